@@ -1,0 +1,73 @@
+//! What can be wrong with a design.
+
+use core::fmt;
+
+/// Why a design was refused. Small, `Copy`, and carries the evidence.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum DesignError {
+    /// A number is not finite or outside what its field allows.
+    OutOfRange {
+        /// The field, with its unit.
+        field: &'static str,
+        /// The value that was given.
+        value: f64,
+    },
+    /// A range whose ends coincide: nothing can be divided by it.
+    EmptyRange {
+        /// The field.
+        field: &'static str,
+        /// Lower end.
+        min: f64,
+        /// Upper end.
+        max: f64,
+    },
+    /// A record of a schema that this release does not know.
+    Schema {
+        /// The schema of the record.
+        found: u32,
+        /// The newest schema that this release reads.
+        newest: u32,
+    },
+    /// A degree, count or length that this release cannot hold.
+    TooLarge {
+        /// The field.
+        field: &'static str,
+        /// What was asked for.
+        asked: usize,
+        /// The most that there is room for.
+        most: usize,
+    },
+}
+
+impl DesignError {
+    /// `value` when it is finite and `holds`, else the error that names `field`.
+    ///
+    /// # Errors
+    /// [`DesignError::OutOfRange`] when the value is not finite or `holds` is false.
+    pub fn check(field: &'static str, value: f64, holds: bool) -> Result<f64, Self> {
+        if value.is_finite() && holds { Ok(value) } else { Err(Self::OutOfRange { field, value }) }
+    }
+}
+
+impl fmt::Display for DesignError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::OutOfRange { field, value } => {
+                write!(f, "{field} is {value}, which is not finite or outside what it may be")
+            }
+            Self::EmptyRange { field, min, max } => {
+                write!(f, "{field} runs from {min} to {max}: it has no extent to divide by")
+            }
+            Self::Schema { found, newest } => write!(
+                f,
+                "schema is {found}, but this release reads up to schema {newest}: update stretch"
+            ),
+            Self::TooLarge { field, asked, most } => {
+                write!(f, "{field} is {asked}, but there is room for {most}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for DesignError {}

@@ -1,0 +1,91 @@
+//! Units at the door: newtypes that keep arguments from being swapped.
+//!
+//! They carry a number across a public boundary and no arithmetic; inside,
+//! the bare number (field `0`) is used.
+
+use crate::{DesignError, Real};
+
+macro_rules! unit {
+    ($($(#[$doc:meta])* $name:ident, $symbol:literal;)*) => {$(
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, Default, PartialEq, PartialOrd)]
+        pub struct $name<T = f64>(pub T);
+
+        impl<T: core::fmt::Display> core::fmt::Display for $name<T> {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                self.0.fmt(f)?;
+                f.write_str(concat!(" ", $symbol))
+            }
+        }
+    )*};
+}
+
+unit! {
+    /// An electric potential, in volts.
+    Volts, "V";
+    /// A length, in millimetres.
+    Millimetres, "mm";
+    /// A rate of length, in millimetres per second.
+    MillimetresPerSecond, "mm/s";
+    /// A duration, in seconds.
+    Seconds, "s";
+    /// A frequency of a signal (a cutoff, say), in hertz. Not a [`SampleRate`].
+    Hertz, "Hz";
+    /// A relative change of length; here a contraction, (L0 - L)/L0.
+    Strain, "(strain)";
+}
+
+/// How many samples a second a stream has: finite and above zero.
+///
+/// A type of its own, so that a cutoff frequency cannot stand in its place.
+///
+/// ```
+/// use stretch_core::SampleRate;
+/// let rate = SampleRate::new(100.0).unwrap();
+/// assert_eq!(rate.period_s(), 0.01);
+/// assert!(SampleRate::new(0.0).is_err());
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "f64", into = "f64"))]
+pub struct SampleRate(f64);
+
+impl SampleRate {
+    /// A rate of `hz` samples a second.
+    ///
+    /// # Errors
+    /// [`DesignError::OutOfRange`] unless `hz` is finite and above zero.
+    pub fn new(hz: f64) -> Result<Self, DesignError> {
+        DesignError::check("sample_rate_hz", hz, hz > 0.0).map(Self)
+    }
+
+    /// Samples a second.
+    pub fn hz(self) -> f64 {
+        self.0
+    }
+
+    /// Seconds from one sample to the next.
+    pub fn period_s(self) -> f64 {
+        1.0 / self.0
+    }
+}
+
+impl TryFrom<f64> for SampleRate {
+    type Error = DesignError;
+    fn try_from(hz: f64) -> Result<Self, DesignError> {
+        Self::new(hz)
+    }
+}
+
+impl From<SampleRate> for f64 {
+    fn from(rate: SampleRate) -> f64 {
+        rate.0
+    }
+}
+
+impl<T: Real> Millimetres<T> {
+    /// The same length in metres, the SI unit.
+    pub fn metres(self) -> T {
+        self.0 / T::from_f64(1000.0)
+    }
+}

@@ -1,17 +1,29 @@
 #![doc = include_str!("../README.md")]
 #![no_std]
 
+mod calibration;
 mod degree;
 mod error;
+mod label;
+mod model;
+mod provenance;
 mod range;
 mod rate;
 mod real;
 mod stage;
+#[cfg(feature = "proptest")]
+pub mod strategies;
 mod surface;
 mod unit;
 
+pub use calibration::{
+    CALIBRATION_SCHEMA, Calibration, CalibrationSpec, Polarity, RateSource, Schema, Target,
+};
 pub use degree::{Degree, MAX_DEGREE, MAX_TERMS};
 pub use error::DesignError;
+pub use label::Label;
+pub use model::{Branch, BranchSurface, Interval, LinearMap, Model};
+pub use provenance::{FitSummary, Provenance};
 pub use range::{Normalisation, Range, RangeSpec};
 pub use rate::RateEstimator;
 pub use real::Real;

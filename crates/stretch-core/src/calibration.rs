@@ -1,0 +1,230 @@
+//! The calibration record: everything a receptor needs, and where it came from.
+
+use crate::{DesignError, Label, Model, Provenance, Range, RateEstimator, SampleRate};
+
+/// The schema of calibration records that this release writes, and the newest it reads.
+pub const CALIBRATION_SCHEMA: u32 = 1;
+
+/// What is estimated, and how a normalised target becomes a number with a unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum Target {
+    /// The reference is the length L of a muscle; the target is its
+    /// contraction `(L0 - L)/L0`, 0 at rest.
+    Contraction {
+        /// Resting length L0, in the unit of the reference.
+        rest_length: f64,
+    },
+    /// The reference itself (an angle, a displacement).
+    Direct,
+}
+
+impl Target {
+    /// The target of a reference value: `(L0 - x)/L0`, or `x` itself.
+    #[inline]
+    pub fn from_reference(self, x: f64) -> f64 {
+        match self {
+            Self::Contraction { rest_length } => (rest_length - x) / rest_length,
+            Self::Direct => x,
+        }
+    }
+
+    /// The reference value of a target: `L0 (1 - t)`, or `t` itself.
+    #[inline]
+    pub fn to_reference(self, target: f64) -> f64 {
+        match self {
+            Self::Contraction { rest_length } => rest_length * (1.0 - target),
+            Self::Direct => target,
+        }
+    }
+
+    /// Change of the reference per change of the target: `-L0`, or 1.
+    #[inline]
+    pub fn reference_per_target(self) -> f64 {
+        match self {
+            Self::Contraction { rest_length } => -rest_length,
+            Self::Direct => 1.0,
+        }
+    }
+}
+
+/// Whether the signal rises or falls as the target rises.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum Polarity {
+    /// Signal and target rise together.
+    #[default]
+    Rising,
+    /// The signal falls as the target rises.
+    Falling,
+}
+
+impl Polarity {
+    /// 1 or -1: what the signal's rate is multiplied by, so that a positive
+    /// signed rate means a rising target.
+    pub fn sign(self) -> f64 {
+        match self {
+            Self::Rising => 1.0,
+            Self::Falling => -1.0,
+        }
+    }
+}
+
+/// Which rate a surface was fitted on. At use it is always the signal's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum RateSource {
+    /// The reference's, as published (paper section 2.5); each normalised by
+    /// its own range.
+    Strain,
+    /// The signal's, by the estimator that runs live: matched.
+    #[default]
+    Voltage,
+}
+
+/// A record's schema number, refused at once when this release does not know it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "u32", into = "u32"))]
+pub struct Schema(u32);
+
+impl Schema {
+    /// The schema that this release writes.
+    pub const CURRENT: Self = Self(CALIBRATION_SCHEMA);
+}
+
+impl TryFrom<u32> for Schema {
+    type Error = DesignError;
+    fn try_from(found: u32) -> Result<Self, DesignError> {
+        if (1..=CALIBRATION_SCHEMA).contains(&found) {
+            Ok(Self(found))
+        } else {
+            Err(DesignError::Schema { found, newest: CALIBRATION_SCHEMA })
+        }
+    }
+}
+
+impl From<Schema> for u32 {
+    fn from(schema: Schema) -> u32 {
+        schema.0
+    }
+}
+
+/// The parts of a [`Calibration`], all public; [`Calibration::new`] checks them.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct CalibrationSpec {
+    /// First in every record, so that a newer one is refused before the rest is read.
+    pub schema: Schema,
+    /// Column of the signal: `bridge_v`.
+    pub signal: Label,
+    /// Column of the reference: `length_mm`. Its unit is that of the estimate.
+    pub reference: Label,
+    /// Samples a second at which the rate estimator was designed.
+    pub sample_rate_hz: SampleRate,
+    /// What is estimated.
+    pub target: Target,
+    /// Whether the signal rises with the target.
+    pub polarity: Polarity,
+    /// Normalises the signal; pooled over all calibration trials and frozen.
+    pub signal_range: Range,
+    /// Normalises the target; pooled over all calibration trials and frozen.
+    pub target_range: Range,
+    /// The estimator of the signal's rate, at use.
+    pub rate_estimator: RateEstimator,
+    /// The rate that the surfaces were fitted on.
+    pub rate_source: RateSource,
+    /// A signed rate this close to zero keeps the branch, in signal units per second.
+    pub dead_band: f64,
+    /// From signal and rate to the normalised target.
+    pub model: Model,
+    /// Where it comes from.
+    pub provenance: Provenance,
+}
+
+/// A checked calibration: every number finite and possible.
+///
+/// Serialised with serde as its [`CalibrationSpec`]: JSON on a desk, `postcard`
+/// on a board, where it loads without an allocator. A record that is not
+/// possible does not deserialise; the error names the field.
+///
+/// ```
+/// use stretch_core::*;
+///
+/// let range = |min, max| Range::new(RangeSpec { mode: Normalisation::Range, zero: min, min, max });
+/// let line = LinearMap {
+///     slope: 0.97,
+///     intercept: 0.0,
+///     signal_domain: Interval { min: 1.24, max: 2.24 },
+///     fit: FitSummary { samples: 9000, r_squared: 0.968, rmse: 0.05 },
+/// };
+/// let spec = CalibrationSpec {
+///     schema: Schema::CURRENT,
+///     signal: Label::new("bridge_v")?,
+///     reference: Label::new("length_mm")?,
+///     sample_rate_hz: SampleRate::new(100.0)?,
+///     target: Target::Contraction { rest_length: 180.0 },
+///     polarity: Polarity::Rising,
+///     signal_range: range(1.24, 2.24)?,
+///     target_range: range(0.0, 0.165)?,
+///     rate_estimator: RateEstimator::SAVGOL_11_2,
+///     rate_source: RateSource::Voltage,
+///     dead_band: 0.05,
+///     model: Model::Linear(line),
+///     provenance: Provenance::new("2026-11-21", ["ramp.csv"]),
+/// };
+/// let calibration = Calibration::new(spec.clone())?;
+/// assert_eq!(calibration.dead_band, 0.05);
+/// let error = Calibration::new(CalibrationSpec { dead_band: -1.0, ..spec }).unwrap_err();
+/// assert!(error.to_string().contains("dead_band"));
+/// # Ok::<(), DesignError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "CalibrationSpec", into = "CalibrationSpec"))]
+pub struct Calibration(CalibrationSpec);
+
+impl Calibration {
+    /// Checks the parts.
+    ///
+    /// # Errors
+    /// [`DesignError`] that names the field.
+    pub fn new(spec: CalibrationSpec) -> Result<Self, DesignError> {
+        if let Target::Contraction { rest_length } = spec.target {
+            DesignError::check("target.rest_length", rest_length, rest_length > 0.0)?;
+        }
+        spec.rate_estimator.validate()?;
+        DesignError::check("dead_band", spec.dead_band, spec.dead_band >= 0.0)?;
+        spec.model.validate()?;
+        Ok(Self(spec))
+    }
+
+    /// The parts, to change and check again.
+    pub fn into_spec(self) -> CalibrationSpec {
+        self.0
+    }
+}
+
+impl core::ops::Deref for Calibration {
+    type Target = CalibrationSpec;
+    fn deref(&self) -> &CalibrationSpec {
+        &self.0
+    }
+}
+
+impl TryFrom<CalibrationSpec> for Calibration {
+    type Error = DesignError;
+    fn try_from(spec: CalibrationSpec) -> Result<Self, DesignError> {
+        Self::new(spec)
+    }
+}
+
+impl From<Calibration> for CalibrationSpec {
+    fn from(calibration: Calibration) -> Self {
+        calibration.0
+    }
+}

@@ -1,0 +1,63 @@
+//! Short names held in place, without an allocator.
+
+use core::fmt;
+
+use crate::DesignError;
+
+/// A name of at most [`Label::CAPACITY`] bytes: a column, a trial, a date.
+///
+/// ```
+/// use stretch_core::Label;
+/// let label = Label::new("length_mm")?;
+/// assert_eq!(label.as_str(), "length_mm");
+/// assert_eq!(label.unit(), "mm");
+/// assert_eq!(Label::truncated("a very long name that goes on and on and on").as_str().len(), 40);
+/// # Ok::<(), stretch_core::DesignError>(())
+/// ```
+#[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(transparent))]
+pub struct Label(heapless::String<{ Label::CAPACITY }>);
+
+impl Label {
+    /// The longest label, in bytes of UTF-8.
+    pub const CAPACITY: usize = 40;
+
+    /// A label that holds the whole name.
+    ///
+    /// # Errors
+    /// [`DesignError::TooLarge`] when the name is longer than [`Label::CAPACITY`].
+    pub fn new(name: &str) -> Result<Self, DesignError> {
+        let too_large =
+            DesignError::TooLarge { field: "label", asked: name.len(), most: Self::CAPACITY };
+        heapless::String::try_from(name).map(Self).map_err(|_| too_large)
+    }
+
+    /// As much of the name as there is room for, cut between characters.
+    pub fn truncated(name: &str) -> Self {
+        let mut text = heapless::String::new();
+        for c in name.chars() {
+            if text.push(c).is_err() {
+                break;
+            }
+        }
+        Self(text)
+    }
+
+    /// The text.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+
+    /// The unit that a column's name ends with: `mm` of `length_mm`; empty
+    /// when there is no `_`.
+    pub fn unit(&self) -> &str {
+        self.0.rsplit_once('_').map_or("", |(_, unit)| unit)
+    }
+}
+
+impl fmt::Display for Label {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&self.0)
+    }
+}

@@ -1,0 +1,146 @@
+//! Identities that hold for every range, surface and calibration.
+
+use proptest::prelude::*;
+use stretch_core::{
+    Branch, Calibration, CalibrationSpec, Degree, DesignError, Normalisation, Poly13, Range,
+    RangeSpec, Real, Surface, strategies,
+};
+
+/// The sum of terms, one power at a time: what Horner's rule must equal.
+fn naive(surface: &Surface, rate: f64, volts: f64) -> f64 {
+    let terms = surface.degree().exponents();
+    terms.map(|(i, j)| surface.coefficient(i, j) * rate.powi(i.into()) * volts.powi(j.into())).sum()
+}
+
+/// Horner and term by term differ by roundings of terms of size 3 * 2^5, of which there are 21.
+const HORNER: f64 = 21.0 * 96.0 * 4.0 * f64::EPSILON;
+
+proptest! {
+    #[test]
+    fn normalise_and_back(range in strategies::range(), n in -2.0..2.0) {
+        let x = range.denormalise(n);
+        let scale = (range.offset().abs() + range.span()) / range.span();
+        prop_assert!((range.normalise(x) - n).abs() <= 8.0 * f64::EPSILON * scale.max(1.0));
+    }
+
+    #[test]
+    fn min_max_maps_its_ends_to_zero_and_one(range in strategies::range()) {
+        let spec = RangeSpec { mode: Normalisation::MinMax, ..range.into() };
+        let range = Range::new(spec).unwrap();
+        prop_assert_eq!(range.normalise(spec.min), 0.0);
+        prop_assert_eq!(range.normalise(spec.max), 1.0);
+    }
+
+    #[test]
+    fn normalise_rises(range in strategies::range(), a in -1e3..1e3, b in -1e3..1e3) {
+        let (low, high) = if a < b { (a, b) } else { (b, a) };
+        prop_assert!(range.normalise(low) <= range.normalise(high));
+        prop_assert!(range.contains(range.clamp(a)));
+    }
+
+    #[test]
+    fn horner_equals_the_sum_of_terms(
+        surface in strategies::surface(), rate in -2.0..2.0, volts in -2.0..2.0,
+    ) {
+        let difference = (surface.eval(rate, volts) - naive(&surface, rate, volts)).abs();
+        prop_assert!(difference <= HORNER);
+    }
+
+    #[test]
+    fn partial_derivatives_are_the_slopes(
+        surface in strategies::surface(), rate in -1.0..1.0, volts in -1.0..1.0,
+    ) {
+        let h = 1e-5;
+        let by_rate = (naive(&surface, rate + h, volts) - naive(&surface, rate - h, volts)) / (2.0 * h);
+        let by_volts = (naive(&surface, rate, volts + h) - naive(&surface, rate, volts - h)) / (2.0 * h);
+        // truncation h^2/6 times a third derivative of at most 21 * 3 * 60; rounding 1e-16/h
+        let tolerance = 1e-10 / 6.0 * 21.0 * 3.0 * 60.0 + 63.0 * 1e-15 / h;
+        prop_assert!((surface.d_rate(rate, volts) - by_rate).abs() <= tolerance);
+        prop_assert!((surface.d_volts(rate, volts) - by_volts).abs() <= tolerance);
+    }
+
+    #[test]
+    fn poly13_and_the_general_surface_agree(
+        surface in strategies::surface_of(Degree::POLY13), rate in -2.0..2.0, volts in -2.0..2.0,
+    ) {
+        let poly: Poly13 = surface.as_poly13().unwrap();
+        prop_assert_eq!(Surface::from(poly), surface);
+        prop_assert!((poly.eval(rate, volts) - surface.eval(rate, volts)).abs() <= HORNER);
+        prop_assert!((poly.d_rate(volts) - surface.d_rate(rate, volts)).abs() <= HORNER);
+        prop_assert!((poly.d_volts(rate, volts) - surface.d_volts(rate, volts)).abs() <= 4.0 * HORNER);
+    }
+
+    #[test]
+    fn coefficients_survive(surface in strategies::surface()) {
+        let terms = surface.degree().terms();
+        let again = Surface::new(surface.degree(), &surface.coefficients()[..terms]).unwrap();
+        prop_assert_eq!(again, surface);
+    }
+
+    #[test]
+    fn the_term_set_is_matlabs(degree in strategies::degree()) {
+        let exponents: Vec<_> = degree.exponents().collect();
+        prop_assert_eq!(exponents.len(), degree.terms());
+        let most = degree.rate().max(degree.volts());
+        for i in 0..=5 {
+            for j in 0..=5 {
+                let belongs = i <= degree.rate() && j <= degree.volts() && i + j <= most;
+                prop_assert_eq!(exponents.contains(&(i, j)), belongs);
+            }
+        }
+        let order = |&(i, j): &(u8, u8)| (i + j, core::cmp::Reverse(i));
+        prop_assert!(exponents.windows(2).all(|pair| order(&pair[0]) < order(&pair[1])));
+    }
+
+    #[test]
+    fn a_branch_changes_only_beyond_the_dead_band(rate in -1.0..1.0f64, dead_band in 0.0..1.0) {
+        for branch in [Branch::Inflation, Branch::Deflation] {
+            let next = branch.next(rate, dead_band);
+            if rate.abs() <= dead_band {
+                prop_assert_eq!(next, branch);
+            } else {
+                prop_assert_eq!(next == Branch::Inflation, rate > 0.0);
+            }
+            prop_assert_eq!(branch.next(f64::NAN, dead_band), branch);
+        }
+    }
+
+    #[test]
+    fn json_and_postcard_keep_every_bit(calibration in strategies::calibration()) {
+        let json = serde_json::to_string(&calibration).unwrap();
+        prop_assert_eq!(&serde_json::from_str::<Calibration>(&json).unwrap(), &calibration);
+        let mut buffer = [0; 4096];
+        let bytes = postcard::to_slice(&calibration, &mut buffer).unwrap();
+        prop_assert_eq!(postcard::from_bytes::<Calibration>(bytes).unwrap(), calibration);
+    }
+
+    #[test]
+    fn a_truncated_or_damaged_record_never_panics(
+        calibration in strategies::calibration(), cut in 0usize..1500, at in 0usize..1500, byte: u8,
+    ) {
+        let mut buffer = [0; 4096];
+        let bytes = postcard::to_slice(&calibration, &mut buffer).unwrap();
+        let length = bytes.len();
+        prop_assert!(postcard::from_bytes::<Calibration>(&bytes[..cut % length]).is_err());
+        bytes[at % length] = byte;
+        if let Ok(calibration) = postcard::from_bytes::<Calibration>(bytes) {
+            // whatever still loads is a calibration that passes its own checks
+            prop_assert!(Calibration::new(CalibrationSpec::from(calibration)).is_ok());
+        }
+    }
+
+    #[test]
+    fn a_range_without_extent_is_refused(min in -1e3..1e3, less in 0.0..1e3) {
+        let spec = RangeSpec { mode: Normalisation::Range, zero: 0.0, min, max: min - less };
+        let refused = matches!(Range::new(spec), Err(DesignError::EmptyRange { .. }));
+        prop_assert!(refused);
+    }
+}
+
+#[test]
+fn square_root_is_ieee() {
+    for x in [0.0_f64, 2.0, 1e-300, 1e300, 0.1] {
+        assert_eq!(Real::sqrt(x).to_bits(), f64::sqrt(x).to_bits());
+        assert_eq!(Real::sqrt(x as f32).to_bits(), f32::sqrt(x as f32).to_bits());
+    }
+}

@@ -1,0 +1,115 @@
+//! Records that must be refused, and what the refusal says.
+
+use proptest::{
+    strategy::{Strategy, ValueTree},
+    test_runner::TestRunner,
+};
+use serde_json::{Value, json};
+use stretch_core::{Calibration, Degree, Model, Surface, strategies};
+
+/// A calibration with surfaces, as JSON to spoil.
+fn record() -> Value {
+    let mut runner = TestRunner::deterministic();
+    loop {
+        let calibration = strategies::calibration().new_tree(&mut runner).unwrap().current();
+        if matches!(calibration.model, Model::Surfaces { .. }) {
+            return serde_json::to_value(calibration).unwrap();
+        }
+    }
+}
+
+#[track_caller]
+fn refused(pointer: &str, value: Value, says: &str) {
+    let mut record = record();
+    *record.pointer_mut(pointer).expect("a field of the record") = value;
+    let error = serde_json::from_value::<Calibration>(record).unwrap_err().to_string();
+    assert!(error.contains(says), "{pointer}: {error}");
+}
+
+#[test]
+fn the_unspoilt_record_loads() {
+    assert!(serde_json::from_value::<Calibration>(record()).is_ok());
+}
+
+#[test]
+fn impossible_numbers_name_their_field() {
+    refused("/dead_band", json!(-1.0), "dead_band");
+    refused("/sample_rate_hz", json!(0.0), "sample_rate_hz");
+    refused("/target", json!({"contraction": {"rest_length": -180.0}}), "target.rest_length");
+    refused(
+        "/rate_estimator",
+        json!({"savitzky_golay": {"window": 1, "degree": 1, "delay": 0}}),
+        "rate.window",
+    );
+    refused(
+        "/rate_estimator",
+        json!({"savitzky_golay": {"window": 5, "degree": 5, "delay": 0}}),
+        "rate.degree",
+    );
+    refused(
+        "/rate_estimator",
+        json!({"savitzky_golay": {"window": 5, "degree": 2, "delay": 5}}),
+        "rate.delay",
+    );
+    refused("/rate_estimator", json!({"differentiator": {"cutoff_hz": 0.0}}), "rate.cutoff_hz");
+    refused("/rate_estimator", json!({"tracker": {"tracking_index": -1.0}}), "rate.tracking_index");
+    refused(
+        "/model/surfaces/inflation/signal_domain",
+        json!({"min": 2.0, "max": 1.0}),
+        "inflation.signal_domain",
+    );
+    refused(
+        "/model/surfaces/deflation/rate_domain",
+        json!({"min": 2.0, "max": 1.0}),
+        "deflation.rate_domain",
+    );
+    refused("/model/surfaces/inflation/fit/r_squared", json!(1.5), "fit.r_squared");
+    refused("/model/surfaces/deflation/fit/rmse", json!(-0.1), "fit.rmse");
+    refused("/signal_range/max", json!(-1e3), "range");
+}
+
+#[test]
+fn a_newer_schema_says_so_before_anything_else() {
+    let newer = r#"{"schema": 99, "a_field_of_tomorrow": 1}"#;
+    let error = serde_json::from_str::<Calibration>(newer).unwrap_err().to_string();
+    assert!(error.contains("schema is 99") && error.contains("update"), "{error}");
+    refused("/schema", json!(0), "schema is 0");
+}
+
+#[test]
+fn an_unknown_or_missing_field_is_named() {
+    let mut unknown = record();
+    unknown["dead_bend"] = json!(0.1);
+    let error = serde_json::from_value::<Calibration>(unknown).unwrap_err().to_string();
+    assert!(error.contains("dead_bend"), "{error}");
+    let mut missing = record();
+    missing.as_object_mut().unwrap().remove("signal_range");
+    let error = serde_json::from_value::<Calibration>(missing).unwrap_err().to_string();
+    assert!(error.contains("signal_range"), "{error}");
+}
+
+#[test]
+fn a_surface_needs_one_finite_coefficient_a_term() {
+    assert!(Surface::new(Degree::POLY13, &[0.0; 6]).is_err());
+    assert!(Surface::new(Degree::POLY13, &[0.0; 8]).is_err());
+    let error = Surface::new(Degree::POLY13, &[f64::NAN; 7]).unwrap_err();
+    assert!(error.to_string().contains("surface.coefficients"));
+    assert!(Degree::new(0, 6).is_err());
+}
+
+#[test]
+fn two_poly13_surfaces_take_about_400_bytes() {
+    let mut runner = TestRunner::deterministic();
+    let mut buffer = [0; 4096];
+    loop {
+        let calibration = strategies::calibration().new_tree(&mut runner).unwrap().current();
+        if let Model::Surfaces { inflation, deflation } = calibration.model
+            && inflation.surface.degree() == Degree::POLY13
+            && deflation.surface.degree() == Degree::POLY13
+        {
+            let bytes = postcard::to_slice(&calibration, &mut buffer).unwrap().len();
+            assert!((300..=450).contains(&bytes), "{bytes}");
+            return;
+        }
+    }
+}

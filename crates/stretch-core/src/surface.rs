@@ -123,7 +123,8 @@ impl<T: Real> Surface<T> {
 /// ```
 /// use stretch_core::Poly13;
 /// // the paper's inflation surface at rest and V = 0.5
-/// let inflation = Poly13 { p00: 0.058, p10: 0.001, p01: 0.774, p11: -0.121, p02: 2.30, p12: 0.094, p03: -2.26 };
+/// let inflation: Poly13 =
+///     Poly13 { p00: 0.058, p10: 0.001, p01: 0.774, p11: -0.121, p02: 2.30, p12: 0.094, p03: -2.26 };
 /// assert!((inflation.eval(0.0, 0.5) - 0.7375).abs() < 1e-12);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

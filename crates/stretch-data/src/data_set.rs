@@ -1,6 +1,17 @@
 //! A folder of trials and what `dataset.toml` says of them.
 
+use std::{
+    fmt::Write,
+    path::{Component, Path},
+};
+
 use serde::{Deserialize, Serialize};
+
+use crate::{
+    DataError, ReadOptions, RigFile, Trial, nearest,
+    toml_view::{View, number_text, parse_table, read_table, string_text},
+    write_folder, write_whole,
+};
 
 /// The contents of `dataset.toml`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -58,4 +69,252 @@ pub enum Split {
     Fit,
     /// Tested on, never fitted.
     Test,
+}
+
+/// What the description of a data set is called in its folder.
+const FILE: &str = "dataset.toml";
+
+impl DataSet {
+    /// Reads `dataset.toml` in a folder and checks it, as [`DataSet::parse`], and that the
+    /// files it names are there. Trials are read one by one with [`TrialEntry::load`].
+    ///
+    /// # Errors
+    /// [`DataError::Io`], [`DataError::NotToml`], or [`DataError::Key`] with table and key.
+    pub fn read(folder: impl AsRef<Path>) -> Result<Self, DataError> {
+        let folder = folder.as_ref();
+        let (file, table) = read_table(&folder.join(FILE))?;
+        let set = Self::from_table(&file, &table)?;
+        for (i, entry) in set.trials.iter().enumerate() {
+            if !folder.join(&entry.file).is_file() {
+                let view = View { file: &file, name: &trial_name(i), table: &table };
+                return view.fail("file", format!("there is no file {} in the folder", entry.file));
+            }
+        }
+        if let Some(rig) = set.rig.as_ref().filter(|rig| !folder.join(rig).is_file()) {
+            let view = View { file: &file, name: TOP, table: &table };
+            return view.fail("rig", format!("there is no file {rig} in the folder"));
+        }
+        Ok(set)
+    }
+
+    /// Parses the text of a `dataset.toml`; `name` stands for the file in messages.
+    ///
+    /// Each file is named once and stands in the folder, `rate_hz` is above 0, openings are
+    /// 0..1, and there is at least one trial. Keys that the format does not know are passed
+    /// over.
+    ///
+    /// # Errors
+    /// [`DataError::NotToml`], or [`DataError::Key`] with table and key.
+    ///
+    /// ```
+    /// use stretch_data::{DataSet, Split};
+    /// let text = "name = 'b'\nrate_hz = 100\n[[trial]]\nfile = 'a.csv'\nkind = 'other'\nsplit = 'fit'";
+    /// let set = DataSet::parse("dataset.toml", text)?;
+    /// assert_eq!(set.entries(Split::Fit).count(), 1);
+    /// let error = DataSet::parse("dataset.toml", &text.replace("fit", "fitt")).unwrap_err();
+    /// assert_eq!(
+    ///     error.to_string(),
+    ///     "dataset.toml, [[trial]] 1, key split: \"fitt\" is none of fit, test (did you mean fit?)"
+    /// );
+    /// # Ok::<(), stretch_data::DataError>(())
+    /// ```
+    pub fn parse(name: &str, text: &str) -> Result<Self, DataError> {
+        Self::from_table(name, &parse_table(name, text)?)
+    }
+
+    /// The trials of one split, in order.
+    pub fn entries(&self, split: Split) -> impl Iterator<Item = &TrialEntry> {
+        self.trials.iter().filter(move |entry| entry.split == split)
+    }
+
+    /// The rig file beside it, if it names one.
+    ///
+    /// # Errors
+    /// As [`RigFile::read`].
+    pub fn read_rig(&self, folder: impl AsRef<Path>) -> Result<Option<RigFile>, DataError> {
+        self.rig.as_ref().map(|rig| RigFile::read(folder.as_ref().join(rig))).transpose()
+    }
+
+    /// Writes `dataset.toml` into a folder that exists, whole or not at all.
+    ///
+    /// # Errors
+    /// [`DataError::Key`] when it could not be read back, else as [`write_whole`].
+    pub fn write(&self, folder: impl AsRef<Path>) -> Result<(), DataError> {
+        let path = folder.as_ref().join(FILE);
+        let text = self.to_toml();
+        Self::parse(&path.display().to_string(), &text)?;
+        write_whole(path, |out| out.write_all(text.as_bytes()))
+    }
+
+    /// Writes a folder with `dataset.toml`, the rig file, and each trial as `trial` makes it,
+    /// whole or not at all, as [`write_folder`](crate::write_folder()).
+    ///
+    /// # Errors
+    /// As [`write_folder`](crate::write_folder()), or what `trial` says.
+    pub fn write_folder<E: From<DataError>>(
+        &self,
+        folder: impl AsRef<Path>,
+        force: bool,
+        rig: Option<&RigFile>,
+        mut trial: impl FnMut(&TrialEntry) -> Result<Trial, E>,
+    ) -> Result<(), E> {
+        write_folder(folder, force, |new| {
+            self.write(new)?;
+            if let (Some(rig), Some(name)) = (rig, &self.rig) {
+                rig.write(new.join(name))?;
+            }
+            for entry in &self.trials {
+                trial(entry)?.write(new.join(&entry.file))?;
+            }
+            Ok(())
+        })
+    }
+
+    /// The text of `dataset.toml`.
+    pub fn to_toml(&self) -> String {
+        let mut text = String::new();
+        self.write_toml(&mut text).expect("a String takes everything");
+        text
+    }
+
+    fn write_toml(&self, out: &mut String) -> std::fmt::Result {
+        writeln!(out, "name = {}", string_text(&self.name))?;
+        writeln!(out, "rate_hz = {}", number_text(self.rate_hz))?;
+        if let Some(rig) = &self.rig {
+            writeln!(out, "rig = {}", string_text(rig))?;
+        }
+        for entry in &self.trials {
+            writeln!(out, "\n[[trial]]\nfile = {}", string_text(&entry.file))?;
+            writeln!(out, "kind = {}", string_text(entry.kind.name()))?;
+            if let Some(opening) = entry.opening {
+                writeln!(out, "opening = {}", number_text(opening))?;
+            }
+            writeln!(out, "start_s = {}", number_text(entry.start_s))?;
+            writeln!(out, "split = {}", string_text(entry.split.name()))?;
+        }
+        Ok(())
+    }
+
+    fn from_table(file: &str, table: &toml::Table) -> Result<Self, DataError> {
+        let top = View { file, name: TOP, table };
+        let rate_hz = top.number("rate_hz")?;
+        if rate_hz <= 0.0 {
+            return top.fail("rate_hz", format!("{rate_hz} is not above 0 samples a second"));
+        }
+        let rig = top.optional_text("rig")?.map(str::to_owned);
+        if let Some(rig) = rig.as_deref().filter(|rig| !stands_in_folder(rig)) {
+            return top.fail("rig", outside(rig));
+        }
+        let name = top.text("name")?.to_owned();
+        let mut set = Self { name, rate_hz, rig, trials: Vec::new() };
+        for (i, table) in top.tables("trial")?.into_iter().enumerate() {
+            let view = View { file, name: &trial_name(i), table };
+            let entry = entry(view)?;
+            if let Some(k) = set.trials.iter().position(|other| other.file == entry.file) {
+                let earlier = trial_name(k);
+                return view.fail("file", format!("{} is the file of {earlier}, too", entry.file));
+            }
+            set.trials.push(entry);
+        }
+        if set.trials.is_empty() {
+            return top.fail("trial", "there is no [[trial]]; write a table for each file");
+        }
+        Ok(set)
+    }
+}
+
+const TOP: &str = "the top of the file";
+
+fn trial_name(index: usize) -> String {
+    format!("[[trial]] {}", index + 1)
+}
+
+fn entry(view: View<'_>) -> Result<TrialEntry, DataError> {
+    let file = view.text("file")?.to_owned();
+    if !stands_in_folder(&file) {
+        return view.fail("file", outside(&file));
+    }
+    let opening = view.optional_number("opening")?;
+    if let Some(opening) = opening.filter(|opening| !(0.0..=1.0).contains(opening)) {
+        return view.fail("opening", format!("{opening} is not between 0 and 1"));
+    }
+    Ok(TrialEntry {
+        file,
+        kind: choice(view, "kind", &TrialKind::ALL, TrialKind::name)?,
+        opening,
+        start_s: view.optional_number("start_s")?.unwrap_or(0.0),
+        split: choice(view, "split", &Split::ALL, Split::name)?,
+    })
+}
+
+fn choice<T: Copy>(
+    view: View<'_>,
+    key: &str,
+    all: &[T],
+    name: fn(T) -> &'static str,
+) -> Result<T, DataError> {
+    let text = view.text(key)?;
+    let names: Vec<&str> = all.iter().map(|&item| name(item)).collect();
+    if let Some(i) = names.iter().position(|n| *n == text) {
+        return Ok(all[i]);
+    }
+    let meant = nearest(text, names.iter().copied())
+        .map_or(String::new(), |other| format!(" (did you mean {other}?)"));
+    view.fail(key, format!("{text:?} is none of {}{meant}", names.join(", ")))
+}
+
+/// Whether a path can only lead to something inside the folder that it starts from.
+fn stands_in_folder(path: &str) -> bool {
+    let mut parts = Path::new(path).components().peekable();
+    parts.peek().is_some() && parts.all(|part| matches!(part, Component::Normal(_)))
+}
+
+fn outside(path: &str) -> String {
+    format!("{path:?} does not stand in the data set's folder; put the file there")
+}
+
+impl TrialEntry {
+    /// Reads the trial from the data set's folder.
+    ///
+    /// # Errors
+    /// As [`Trial::read`].
+    pub fn load(
+        &self,
+        folder: impl AsRef<Path>,
+        options: &ReadOptions,
+    ) -> Result<Trial, DataError> {
+        let mut trial = Trial::read(folder.as_ref().join(&self.file), options)?;
+        trial.name.clone_from(&self.file);
+        Ok(trial)
+    }
+}
+
+impl TrialKind {
+    /// All kinds.
+    pub const ALL: [Self; 5] =
+        [Self::Inflation, Self::Deflation, Self::Arbitrary, Self::Pulses, Self::Other];
+
+    /// What it is called in a file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Inflation => "inflation",
+            Self::Deflation => "deflation",
+            Self::Arbitrary => "arbitrary",
+            Self::Pulses => "pulses",
+            Self::Other => "other",
+        }
+    }
+}
+
+impl Split {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Fit, Self::Test];
+
+    /// What it is called in a file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fit => "fit",
+            Self::Test => "test",
+        }
+    }
 }

@@ -1,9 +1,29 @@
 #![doc = include_str!("../README.md")]
 
 mod data_set;
+mod error;
+mod header;
+mod interrupt;
+mod lines;
+mod nearest;
+mod read;
 mod rig_file;
+mod row;
+mod row_reader;
+mod toml_view;
 mod trial;
+mod write;
+mod write_folder;
+mod write_whole;
 
 pub use data_set::{DataSet, Split, TrialEntry, TrialKind};
+pub use error::{DataError, Place};
+pub use interrupt::{interrupt, interrupted, writers_open};
+pub use nearest::nearest;
+pub use read::ReadOptions;
 pub use rig_file::{EffectEntry, Parameter, RigFile};
-pub use trial::{Channel, Trial};
+pub use row_reader::{Row, RowReader};
+pub use trial::{Channel, Trial, unit};
+pub use write::push_number;
+pub use write_folder::write_folder;
+pub use write_whole::write_whole;

@@ -1,8 +1,15 @@
 //! A rig file: nominal parameters by stage, with tolerances, and effects that are on.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, fmt::Write, path::Path};
 
 use serde::{Deserialize, Serialize};
+use toml::Value;
+
+use crate::{
+    DataError,
+    toml_view::{View, key_text, number_text, parse_table, read_table, string_text},
+    write_whole,
+};
 
 /// The contents of a `rig.toml`: names are checked by whoever simulates it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -40,4 +47,143 @@ pub struct EffectEntry {
     /// Parameters by name.
     #[serde(flatten)]
     pub parameters: BTreeMap<String, f64>,
+}
+
+impl RigFile {
+    /// Reads a rig file. Whether the names are those of a rig is for whoever simulates it.
+    ///
+    /// # Errors
+    /// [`DataError::Io`], [`DataError::NotToml`], or [`DataError::Key`] with table and key.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, DataError> {
+        let (file, table) = read_table(path.as_ref())?;
+        Self::from_table(&file, &table)
+    }
+
+    /// Parses the text of a rig file; `name` stands for the file in messages.
+    ///
+    /// # Errors
+    /// As [`RigFile::read`].
+    ///
+    /// ```
+    /// use stretch_data::RigFile;
+    /// let rig = RigFile::parse("rig.toml", "[muscle]\ntau_m = { value = 0.03, tolerance = 0.5 }")?;
+    /// assert_eq!(rig.stages["muscle"]["tau_m"].value, 0.03);
+    /// assert_eq!(RigFile::parse("copy", &rig.to_toml())?, rig);
+    /// let error = RigFile::parse("rig.toml", "[muscle]\ntau_m = { value = 'long' }").unwrap_err();
+    /// assert_eq!(
+    ///     error.to_string(),
+    ///     "rig.toml, [muscle] tau_m, key value: \"long\" is not a finite number"
+    /// );
+    /// # Ok::<(), stretch_data::DataError>(())
+    /// ```
+    pub fn parse(name: &str, text: &str) -> Result<Self, DataError> {
+        Self::from_table(name, &parse_table(name, text)?)
+    }
+
+    /// Writes the rig file, whole or not at all; numbers read back to the same bits.
+    ///
+    /// # Errors
+    /// As [`write_whole`].
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), DataError> {
+        write_whole(path, |out| out.write_all(self.to_toml().as_bytes()))
+    }
+
+    /// The text of the rig file.
+    pub fn to_toml(&self) -> String {
+        let mut text = String::new();
+        self.write_toml(&mut text).expect("a String takes everything");
+        text
+    }
+
+    fn write_toml(&self, out: &mut String) -> std::fmt::Result {
+        if let Some(kind) = &self.kind {
+            writeln!(out, "kind = {}", string_text(kind))?;
+        }
+        for (stage, parameters) in &self.stages {
+            let gap = gap(out);
+            writeln!(out, "{gap}[{}]", key_text(stage))?;
+            for (name, parameter) in parameters {
+                write!(out, "{} = {{ value = {}", key_text(name), number_text(parameter.value))?;
+                for (key, value) in
+                    [("tolerance", parameter.tolerance), ("tolerance_abs", parameter.tolerance_abs)]
+                {
+                    if let Some(value) = value {
+                        write!(out, ", {key} = {}", number_text(value))?;
+                    }
+                }
+                writeln!(out, " }}")?;
+            }
+        }
+        for effect in &self.effects {
+            let gap = gap(out);
+            writeln!(out, "{gap}[[effect]]\nname = {}", string_text(&effect.name))?;
+            for (name, value) in &effect.parameters {
+                writeln!(out, "{} = {}", key_text(name), number_text(*value))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn from_table(file: &str, table: &toml::Table) -> Result<Self, DataError> {
+        let top = View { file, name: "the top of the file", table };
+        let mut rig =
+            Self { kind: top.optional_text("kind")?.map(str::to_owned), ..Self::default() };
+        for (i, table) in top.tables("effect")?.into_iter().enumerate() {
+            rig.effects.push(effect(file, i, table)?);
+        }
+        for (stage, value) in table.iter().filter(|(key, _)| *key != "kind" && *key != "effect") {
+            let Value::Table(parameters) = value else {
+                return top.fail(stage, "it stands outside the tables of the stages");
+            };
+            let view = View { file, name: &format!("[{stage}]"), table: parameters };
+            let parameters = parameters
+                .iter()
+                .map(|(name, value)| Ok((name.clone(), parameter(view, name, value)?)))
+                .collect::<Result<_, DataError>>()?;
+            rig.stages.insert(stage.clone(), parameters);
+        }
+        Ok(rig)
+    }
+}
+
+/// A blank line between tables, none at the top.
+fn gap(out: &str) -> &'static str {
+    if out.is_empty() { "" } else { "\n" }
+}
+
+fn effect(file: &str, index: usize, table: &toml::Table) -> Result<EffectEntry, DataError> {
+    let name = format!("[[effect]] {}", index + 1);
+    let view = View { file, name: &name, table };
+    let parameters = table
+        .keys()
+        .filter(|key| *key != "name")
+        .map(|key| Ok((key.clone(), view.number(key)?)))
+        .collect::<Result<_, DataError>>()?;
+    Ok(EffectEntry { name: view.text("name")?.to_owned(), parameters })
+}
+
+fn parameter(stage: View<'_>, name: &str, value: &Value) -> Result<Parameter, DataError> {
+    let Value::Table(table) = value else {
+        let how = format!("write {} = {{ value = {value} }}", key_text(name));
+        return stage.fail(name, format!("{value} is not a table with a value; {how}"));
+    };
+    let within = format!("{} {name}", stage.name);
+    let view = View { file: stage.file, name: &within, table };
+    let known = ["value", "tolerance", "tolerance_abs"];
+    if let Some(key) = table.keys().find(|key| !known.contains(&key.as_str())) {
+        return view.fail(key, format!("it is none of {}", known.join(", ")));
+    }
+    let parameter = Parameter {
+        value: view.number("value")?,
+        tolerance: view.optional_number("tolerance")?,
+        tolerance_abs: view.optional_number("tolerance_abs")?,
+    };
+    for (key, tolerance) in
+        [("tolerance", parameter.tolerance), ("tolerance_abs", parameter.tolerance_abs)]
+    {
+        if let Some(tolerance) = tolerance.filter(|t| *t < 0.0) {
+            return view.fail(key, format!("{tolerance} is negative; a tolerance is at least 0"));
+        }
+    }
+    Ok(parameter)
 }

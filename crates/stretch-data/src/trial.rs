@@ -1,5 +1,9 @@
 //! One recorded trial: a time column and named channels.
 
+use std::iter;
+
+use crate::{DataError, header::missing_column};
+
 /// A recording: time stamps and, beside them, named channels of the same length.
 ///
 /// Channels carry their unit as the last part of their name (`length_mm`,
@@ -38,4 +42,57 @@ impl Trial {
     pub fn channel(&self, name: &str) -> Option<&[f64]> {
         self.channels.iter().find(|c| c.name == name).map(|c| c.values.as_slice())
     }
+
+    /// The channel called `name`, or the error that names those that are there.
+    ///
+    /// # Errors
+    /// [`DataError::MissingColumn`].
+    ///
+    /// ```
+    /// use stretch_data::{Channel, Trial};
+    /// let channel = Channel { name: "length_mm".into(), values: vec![180.0] };
+    /// let trial = Trial { name: "a.csv".into(), time_s: vec![0.0], channels: vec![channel] };
+    /// assert_eq!(trial.require("length_mm")?, [180.0]);
+    /// assert_eq!(
+    ///     trial.require("lenght_mm").unwrap_err().to_string(),
+    ///     "a.csv: there is no column lenght_mm (did you mean length_mm?); \
+    ///      the columns are time_s, length_mm"
+    /// );
+    /// # Ok::<(), stretch_data::DataError>(())
+    /// ```
+    pub fn require(&self, name: &str) -> Result<&[f64], DataError> {
+        let names = self.channels.iter().map(|channel| channel.name.as_str());
+        self.channel(name)
+            .ok_or_else(|| missing_column(&self.name, name, iter::once("time_s").chain(names)))
+    }
+
+    /// Seconds from the first sample to the last; 0 for fewer than two.
+    pub fn duration_s(&self) -> f64 {
+        match self.time_s[..] {
+            [first, .., last] => last - first,
+            _ => 0.0,
+        }
+    }
+
+    /// Samples a second, from the median step of the time; `None` for fewer than two samples.
+    ///
+    /// The median is the rate of the recorder even where samples are missing.
+    pub fn rate_hz(&self) -> Option<f64> {
+        let mut steps: Vec<f64> = self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let middle = steps.len() / 2;
+        let (_, median, _) =
+            (!steps.is_empty()).then(|| steps.select_nth_unstable_by(middle, f64::total_cmp))?;
+        Some(1.0 / *median)
+    }
+}
+
+/// The unit in a column's name: its last part, after an underscore.
+///
+/// ```
+/// use stretch_data::unit;
+/// assert_eq!(unit("length_mm"), Some("mm"));
+/// assert_eq!(unit("s2"), None);
+/// ```
+pub fn unit(column: &str) -> Option<&str> {
+    column.rsplit_once('_').map(|(_, unit)| unit).filter(|unit| !unit.is_empty())
 }

@@ -1,0 +1,285 @@
+//! What can be wrong with a file, with the evidence.
+
+use std::{fmt, io};
+
+/// Where in a file something stands.
+///
+/// Rows count from 1 and include the header, as an editor shows them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    /// File, as it was given, or the name of a stream.
+    pub file: String,
+    /// Row as an editor counts it: the header is row 1.
+    pub row: u64,
+    /// Name of the column, or `column 3` where it has none.
+    pub column: String,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}, row {}, column {}", self.file, self.row, self.column)
+    }
+}
+
+/// Why something could not be read or written.
+///
+/// Each variant carries the evidence, and each message is one sentence that
+/// says where, what, and what to do.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DataError {
+    /// The system refused to open, read, write, or rename.
+    #[error("{path}: cannot {action}: {}", Cause(.cause))]
+    Io {
+        /// The file or folder.
+        path: String,
+        /// What was tried: `open it`, `write it`.
+        action: &'static str,
+        /// What the system said.
+        #[source]
+        cause: io::Error,
+    },
+    /// A file without a byte, or with blank lines only.
+    #[error(
+        "{file}: the file is empty; it needs a header line with the names of its columns, then a row a sample"
+    )]
+    Empty {
+        /// The file.
+        file: String,
+    },
+    /// A header and nothing below it.
+    #[error(
+        "{file}: there is a header line and no sample below it; record the trial again or leave the file out"
+    )]
+    HeaderOnly {
+        /// The file.
+        file: String,
+    },
+    /// The first line holds numbers where names should stand.
+    #[error(
+        "{file}: the first line (\"{first}\") holds numbers and no names; put a header line above it, such as time_s,length_mm,bridge_v"
+    )]
+    NoHeader {
+        /// The file.
+        file: String,
+        /// The first line, shortened.
+        first: String,
+    },
+    /// A column that is needed is not there.
+    #[error("{file}: there is no column {column}{}; the columns are {}", Nearest(.nearest), .present.join(", "))]
+    MissingColumn {
+        /// The file.
+        file: String,
+        /// The column that is needed.
+        column: String,
+        /// The columns that are there.
+        present: Vec<String>,
+        /// The one whose name is nearest.
+        nearest: Option<String>,
+    },
+    /// Two columns of one name.
+    #[error("{file}: the header names column {column} twice; rename or remove one of them")]
+    DuplicateColumn {
+        /// The file.
+        file: String,
+        /// The name.
+        column: String,
+    },
+    /// Text where a number should stand.
+    #[error("{at}: \"{value}\" is not a number; correct it or remove that row")]
+    NotANumber {
+        /// Where.
+        at: Place,
+        /// The field, shortened.
+        value: String,
+    },
+    /// A field without a character.
+    #[error("{at}: the field is empty; fill it in or remove that row")]
+    EmptyField {
+        /// Where.
+        at: Place,
+    },
+    /// A decimal comma.
+    #[error("{at}: \"{value}\" has a decimal comma; export the file again with decimal points")]
+    DecimalComma {
+        /// Where.
+        at: Place,
+        /// The field.
+        value: String,
+    },
+    /// NaN, an infinity, or a number too large for 64 bits.
+    #[error("{at}: \"{value}\" is not a finite number; correct it or remove that row")]
+    NotFinite {
+        /// Where.
+        at: Place,
+        /// The field.
+        value: String,
+    },
+    /// Bytes that are no UTF-8 text.
+    #[error("{at}: \"{value}\" is not UTF-8 text; save the file with the encoding UTF-8")]
+    NotUtf8 {
+        /// Where.
+        at: Place,
+        /// The bytes, the foreign ones escaped.
+        value: String,
+    },
+    /// A row with more or fewer fields than the header.
+    #[error(
+        "{file}, row {row}: there are {found} fields where the header has {expected}; complete or remove that row"
+    )]
+    Ragged {
+        /// The file.
+        file: String,
+        /// The row.
+        row: u64,
+        /// Fields of the row.
+        found: usize,
+        /// Fields of the header.
+        expected: usize,
+    },
+    /// A quotation mark that is not closed in its line, or text after it.
+    #[error("{at}: the quotation marks do not pair up within the line; remove or double them")]
+    Quote {
+        /// Where.
+        at: Place,
+    },
+    /// A line longer than the reader accepts.
+    #[error(
+        "{file}, row {row}: the line is longer than {limit} bytes; this is not a table of samples with a line each"
+    )]
+    LineTooLong {
+        /// The file.
+        file: String,
+        /// The row.
+        row: u64,
+        /// The longest line that is accepted.
+        limit: usize,
+    },
+    /// Time that stands still or goes back.
+    #[error("{at}: time {} from {previous_s} to {time_s}; time must rise from row to row: sort the rows or split the recordings", if .time_s == .previous_s { "stands still" } else { "goes back" })]
+    TimeNotRising {
+        /// Where.
+        at: Place,
+        /// Seconds in this row.
+        time_s: f64,
+        /// Seconds in the row before.
+        previous_s: f64,
+    },
+    /// TOML that cannot be parsed at all.
+    #[error("{file}, row {row}: this is not TOML: {message}")]
+    NotToml {
+        /// The file.
+        file: String,
+        /// The row.
+        row: u64,
+        /// What the parser said.
+        message: String,
+    },
+    /// A key that is missing or has an impossible value.
+    #[error("{file}, {table}, key {key}: {problem}")]
+    Key {
+        /// The file.
+        file: String,
+        /// The table, in words: `[[trial]] 3`.
+        table: String,
+        /// The key.
+        key: String,
+        /// What is wrong and what to do.
+        problem: String,
+    },
+    /// Something in memory that has no place in a file.
+    #[error("{name} cannot be written: {problem}")]
+    Unwritable {
+        /// The trial or data set.
+        name: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// A folder that exists and may not be written to.
+    #[error(
+        "{path}: it exists; choose another folder, or force it to replace the files of the same name"
+    )]
+    Exists {
+        /// The folder.
+        path: String,
+    },
+    /// Stopped by [`interrupt`](crate::interrupt).
+    #[error("{path}: interrupted; nothing was written")]
+    Interrupted {
+        /// What was being written.
+        path: String,
+    },
+}
+
+/// A cause without Rust's `(os error 28)`.
+struct Cause<'a>(&'a io::Error);
+
+impl fmt::Display for Cause<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let text = self.0.to_string();
+        f.write_str(text.split(" (os error").next().unwrap_or(&text))
+    }
+}
+
+struct Nearest<'a>(&'a Option<String>);
+
+impl fmt::Display for Nearest<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Some(name) => write!(f, " (did you mean {name}?)"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl DataError {
+    /// Whether the system refused something, such as a missing file or a full disk.
+    pub fn is_io(&self) -> bool {
+        matches!(self, Self::Io { .. })
+    }
+
+    /// Whether the file or folder is not there.
+    pub fn is_not_found(&self) -> bool {
+        matches!(self, Self::Io { cause, .. } if cause.kind() == io::ErrorKind::NotFound)
+    }
+
+    /// Whether whoever read the output has gone: a pipe into `head`, say.
+    pub fn is_broken_pipe(&self) -> bool {
+        matches!(self, Self::Io { cause, .. } if cause.kind() == io::ErrorKind::BrokenPipe)
+    }
+
+    /// Whether a column that is needed is not there.
+    pub fn is_missing_column(&self) -> bool {
+        matches!(self, Self::MissingColumn { .. })
+    }
+
+    /// Whether time stood still or went back.
+    pub fn is_time(&self) -> bool {
+        matches!(self, Self::TimeNotRising { .. })
+    }
+
+    /// Whether one row is at fault, so that a stream may go on with the next.
+    pub fn is_row(&self) -> bool {
+        matches!(
+            self,
+            Self::NotANumber { .. }
+                | Self::EmptyField { .. }
+                | Self::DecimalComma { .. }
+                | Self::NotFinite { .. }
+                | Self::NotUtf8 { .. }
+                | Self::Ragged { .. }
+                | Self::Quote { .. }
+                | Self::LineTooLong { .. }
+                | Self::TimeNotRising { .. }
+        )
+    }
+
+    /// Whether [`interrupt`](crate::interrupt) stopped it.
+    pub fn is_interrupted(&self) -> bool {
+        matches!(self, Self::Interrupted { .. })
+    }
+
+    pub(crate) fn io(path: impl fmt::Display, action: &'static str, cause: io::Error) -> Self {
+        Self::Io { path: path.to_string(), action, cause }
+    }
+}

@@ -1,0 +1,96 @@
+//! The header line: its delimiter and the names of the columns.
+
+use crate::{
+    DataError,
+    error::Place,
+    nearest::nearest,
+    row::{Field, field, number, shown},
+};
+
+/// Names of columns in the file's order; an empty name is a column without one.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Header {
+    pub(crate) names: Vec<String>,
+    pub(crate) delimiter: u8,
+}
+
+impl Header {
+    /// Reads a header line that is not blank.
+    pub(crate) fn parse(file: &str, row: u64, line: &[u8]) -> Result<Self, DataError> {
+        let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
+        let place = |column: String| Place { file: file.to_owned(), row, column };
+        if line.starts_with(b"\xff\xfe") || line.starts_with(b"\xfe\xff") {
+            return Err(DataError::NotUtf8 { at: place("column 1".into()), value: shown(line) });
+        }
+        let delimiter = delimiter(line);
+        let mut names: Vec<String> = Vec::new();
+        let mut at = 0;
+        loop {
+            let column = || format!("column {}", names.len() + 1);
+            let (content, end) = match field(line, at, delimiter) {
+                Field::Plain(content, end) => (content.to_vec(), end),
+                Field::Quoted(content, end) => (content, end),
+                Field::Broken => return Err(DataError::Quote { at: place(column()) }),
+            };
+            let name = String::from_utf8(content).map_err(|e| DataError::NotUtf8 {
+                at: place(column()),
+                value: shown(e.as_bytes()),
+            })?;
+            if !name.is_empty() && names.contains(&name) {
+                return Err(DataError::DuplicateColumn { file: file.to_owned(), column: name });
+            }
+            names.push(name);
+            if end >= line.len() {
+                break;
+            }
+            at = end + 1;
+        }
+        if names.iter().all(|name| number(name.as_bytes()).is_ok()) {
+            return Err(DataError::NoHeader { file: file.to_owned(), first: shown(line) });
+        }
+        Ok(Self { names, delimiter })
+    }
+
+    /// Where column `name` stands.
+    pub(crate) fn position(&self, file: &str, name: &str) -> Result<usize, DataError> {
+        self.names
+            .iter()
+            .position(|n| n == name)
+            .ok_or_else(|| missing_column(file, name, self.names.iter().map(String::as_str)))
+    }
+
+    /// What to call the column at `position` in a message.
+    pub(crate) fn label(&self, position: usize) -> String {
+        match self.names.get(position) {
+            Some(name) if !name.is_empty() => name.clone(),
+            _ => format!("column {}", position + 1),
+        }
+    }
+}
+
+/// The error that names the columns that are there, and the nearest of them.
+pub(crate) fn missing_column<'a>(
+    file: &str,
+    column: &str,
+    present: impl Iterator<Item = &'a str>,
+) -> DataError {
+    let present: Vec<String> =
+        present.filter(|name| !name.is_empty()).map(|name| shown(name.as_bytes())).collect();
+    let nearest = nearest(column, present.iter().map(String::as_str)).map(str::to_owned);
+    DataError::MissingColumn { file: file.to_owned(), column: column.to_owned(), present, nearest }
+}
+
+/// `;` or a tab where the header has one and no comma outside quotation marks; else `,`.
+fn delimiter(line: &[u8]) -> u8 {
+    let mut quoted = false;
+    let mut found = b',';
+    for &byte in line {
+        match byte {
+            b'"' => quoted = !quoted,
+            b',' if !quoted => return b',',
+            b';' | b'\t' if !quoted && found == b',' => found = byte,
+            _ => {}
+        }
+    }
+    found
+}

@@ -1,0 +1,63 @@
+//! Ctrl-C: writers clean up after themselves, and a program without one leaves at once.
+
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
+
+use crate::DataError;
+
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+static OPEN: AtomicUsize = AtomicUsize::new(0);
+
+/// Tells every writer to stop and clean up, and says how many are open.
+///
+/// A signal handler calls it. At 0 no writer is open and none can open any more, so the
+/// handler may leave the process at once; otherwise the writers fail with
+/// [`DataError::Interrupted`] at their next write, nothing half-written stays, and the
+/// program leaves when that error reaches it:
+///
+/// ```no_run
+/// // ctrlc::set_handler(...):
+/// if stretch_data::interrupt() == 0 {
+///     std::process::exit(130);
+/// }
+/// ```
+pub fn interrupt() -> usize {
+    // Stored before the count is read; a writer counts itself before it reads the flag:
+    // one of the two always sees the other.
+    INTERRUPTED.store(true, SeqCst);
+    writers_open()
+}
+
+/// Whether [`interrupt`] was called: long work inside a writer's closure may ask.
+pub fn interrupted() -> bool {
+    INTERRUPTED.load(SeqCst)
+}
+
+/// How many files and folders are being written.
+pub fn writers_open() -> usize {
+    OPEN.load(SeqCst)
+}
+
+/// Counts a writer as open for as long as it lives.
+pub(crate) struct Open(());
+
+impl Open {
+    pub(crate) fn new(path: &dyn std::fmt::Display) -> Result<Self, DataError> {
+        OPEN.fetch_add(1, SeqCst);
+        let open = Self(());
+        check(path)?;
+        Ok(open)
+    }
+}
+
+impl Drop for Open {
+    fn drop(&mut self) {
+        OPEN.fetch_sub(1, SeqCst);
+    }
+}
+
+pub(crate) fn check(path: &dyn std::fmt::Display) -> Result<(), DataError> {
+    if interrupted() {
+        return Err(DataError::Interrupted { path: path.to_string() });
+    }
+    Ok(())
+}

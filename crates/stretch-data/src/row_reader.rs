@@ -1,0 +1,163 @@
+//! Rows of a live stream, each as soon as its line is there.
+
+use std::io::Read;
+
+use crate::{
+    DataError, ReadOptions,
+    error::Place,
+    header::Header,
+    lines::{Line, Lines},
+    read::{located, read_header},
+    row::{Role, numbers},
+};
+
+/// Reads a stream a row at a time, and goes on after a malformed row.
+///
+/// The header comes first, as in a file; then each line is answered as soon as it is
+/// complete, however slowly the stream comes. Only the time and the required columns are
+/// looked at: whatever else stands in a row cannot spoil it. Memory is bounded: a line that
+/// is too long is an error for that line and is skipped.
+///
+/// A row whose time stands still or goes back is an error, too, but the clock goes on from
+/// there: a logger that was restarted is lost for one row, not for good. Whoever keeps a
+/// memory over the rows should reset it when [`DataError::is_time`] holds.
+///
+/// ```
+/// use stretch_data::{ReadOptions, RowReader};
+/// let stream = "bridge_v,time_s\n1.5,0\noops,0.01\n1.75,0.02\n";
+/// let options = ReadOptions::new().require("bridge_v");
+/// let mut rows = RowReader::new(stream.as_bytes(), "standard input", &options)?;
+/// assert_eq!(rows.next_row().expect("a row")?.values, [1.5]);
+/// let error = rows.next_row().expect("a row").expect_err("oops is no number");
+/// assert_eq!(
+///     error.to_string(),
+///     "standard input, row 3, column bridge_v: \"oops\" is not a number; \
+///      correct it or remove that row"
+/// );
+/// let row = rows.next_row().expect("a row")?;
+/// assert_eq!((row.row, row.time_s, row.values), (4, 0.02, &[1.75][..]));
+/// assert!(rows.next_row().is_none());
+/// # Ok::<(), stretch_data::DataError>(())
+/// ```
+pub struct RowReader<R> {
+    lines: Lines<R>,
+    name: String,
+    header: Header,
+    roles: Vec<Role>,
+    fields: Vec<f64>,
+    time: usize,
+    divisor: f64,
+    previous_s: Option<f64>,
+    wanted: Vec<usize>,
+    values: Vec<f64>,
+    failed: bool,
+}
+
+/// One row of a [`RowReader`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row<'a> {
+    /// Row as an editor counts it: the header is row 1.
+    pub row: u64,
+    /// Seconds.
+    pub time_s: f64,
+    /// The required columns, in the order in which they were required; finite.
+    pub values: &'a [f64],
+}
+
+impl<R: Read> RowReader<R> {
+    /// Waits for the header line and finds the time and the required columns in it.
+    ///
+    /// # Errors
+    /// [`DataError`] when there is no header or a column is missing.
+    pub fn new(reader: R, name: &str, options: &ReadOptions) -> Result<Self, DataError> {
+        let mut lines = Lines::new(reader, options.line_limit());
+        let header = read_header(&mut lines, name)?;
+        let time = header.position(name, options.time_column())?;
+        let wanted = options
+            .required()
+            .iter()
+            .map(|column| header.position(name, column))
+            .collect::<Result<Vec<_>, _>>()?;
+        let needed = |i| i == time || wanted.contains(&i);
+        let role = |i| if needed(i) { Role::Needed } else { Role::Skipped };
+        Ok(Self {
+            lines,
+            name: name.to_owned(),
+            roles: (0..header.names.len()).map(role).collect(),
+            fields: vec![f64::NAN; header.names.len()],
+            time,
+            divisor: options.time_divisor(),
+            previous_s: None,
+            values: vec![f64::NAN; wanted.len()],
+            wanted,
+            header,
+            failed: false,
+        })
+    }
+
+    /// Names of all columns, in the order of the stream.
+    pub fn columns(&self) -> impl Iterator<Item = &str> {
+        self.header.names.iter().map(String::as_str)
+    }
+
+    /// The next row; `None` at the end of the stream. Blank lines are passed over.
+    ///
+    /// An error for which [`DataError::is_row`] holds is about that row alone. After any
+    /// other (the stream itself failed) the stream has ended.
+    pub fn next_row(&mut self) -> Option<Result<Row<'_>, DataError>> {
+        if self.failed {
+            return None;
+        }
+        let row = match self.read_row() {
+            Ok(Some(row)) => row,
+            Ok(None) => return None,
+            Err(error) => {
+                self.failed = !error.is_row();
+                return Some(Err(error));
+            }
+        };
+        let time_s = self.fields[self.time] / self.divisor;
+        if let Some(previous_s) = self.previous_s.replace(time_s)
+            && time_s <= previous_s
+        {
+            let column = self.header.label(self.time);
+            let at = Place { file: self.name.clone(), row, column };
+            return Some(Err(DataError::TimeNotRising { at, time_s, previous_s }));
+        }
+        for (value, &i) in self.values.iter_mut().zip(&self.wanted) {
+            *value = self.fields[i];
+        }
+        Some(Ok(Row { row, time_s, values: &self.values }))
+    }
+
+    /// Fills `fields` from the next line that is not blank; its row.
+    fn read_row(&mut self) -> Result<Option<u64>, DataError> {
+        let fail = |e| DataError::io(&self.name, "read it", e);
+        loop {
+            let (row, limit) = (self.lines.row() + 1, self.lines.limit());
+            match self.lines.next().map_err(fail)? {
+                Line::End => return Ok(None),
+                Line::Text(line) if line.trim_ascii().is_empty() => {}
+                Line::Text(line) => {
+                    let delimiter = self.header.delimiter;
+                    return numbers(line, delimiter, &self.roles, &mut self.fields)
+                        .map(|()| Some(row))
+                        .map_err(|fault| located(&self.name, row, &self.header, fault));
+                }
+                Line::TooLong => {
+                    self.lines.skip_line().map_err(fail)?;
+                    return Err(DataError::LineTooLong { file: self.name.clone(), row, limit });
+                }
+            }
+        }
+    }
+}
+
+impl<R> std::fmt::Debug for RowReader<R> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("RowReader")
+            .field("name", &self.name)
+            .field("columns", &self.header.names)
+            .finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,117 @@
+//! A trial to a file or a stream.
+
+use std::{
+    io::{self, Write},
+    path::Path,
+};
+
+use crate::{Channel, DataError, Trial, write_whole};
+
+impl Trial {
+    /// Writes the trial to a file, whole or not at all: `time_s`, then the channels.
+    ///
+    /// Numbers are written with as many digits as it takes to read the same bits back.
+    ///
+    /// # Errors
+    /// [`DataError::Unwritable`] when [`Trial::check`] fails, else as [`write_whole`].
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), DataError> {
+        self.check()?;
+        write_whole(path, |out| self.write_rows(out))
+    }
+
+    /// Writes the trial to a stream, which should be buffered.
+    ///
+    /// # Errors
+    /// [`DataError::Unwritable`] when [`Trial::check`] fails, else [`DataError::Io`].
+    pub fn write_to(&self, mut out: impl Write) -> Result<(), DataError> {
+        self.check()?;
+        self.write_rows(&mut out).map_err(|e| DataError::io(&self.name, "write it", e))
+    }
+
+    /// Whether the trial is one that a file can hold: channels as long as the time, names
+    /// that are there once, finite numbers, rising time, at least one sample.
+    ///
+    /// # Errors
+    /// [`DataError::Unwritable`] with what is wrong.
+    pub fn check(&self) -> Result<(), DataError> {
+        let fail =
+            |problem: String| Err(DataError::Unwritable { name: self.name.clone(), problem });
+        if self.time_s.is_empty() {
+            return fail("it has no sample".to_owned());
+        }
+        if let Some(i) = self.time_s.iter().position(|t| !t.is_finite()) {
+            return fail(format!("time {i} is not finite"));
+        }
+        if let Some(i) = self.time_s.windows(2).position(|pair| pair[1] <= pair[0]) {
+            return fail(format!("time does not rise from sample {i} to the next"));
+        }
+        for (i, Channel { name, values }) in self.channels.iter().enumerate() {
+            if name.trim().is_empty() || name == "time_s" || name.contains(['\n', '\r']) {
+                return fail(format!("{name:?} cannot be the name of a channel"));
+            }
+            if self.channels[..i].iter().any(|other| other.name == *name) {
+                return fail(format!("there are two channels {name}"));
+            }
+            if values.len() != self.len() {
+                let (found, expected) = (values.len(), self.len());
+                return fail(format!("channel {name} has {found} values for {expected} times"));
+            }
+            if let Some(i) = values.iter().position(|value| !value.is_finite()) {
+                return fail(format!("sample {i} of channel {name} is not finite"));
+            }
+        }
+        Ok(())
+    }
+
+    fn write_rows(&self, out: &mut dyn Write) -> io::Result<()> {
+        let mut line = Vec::with_capacity(256);
+        line.extend_from_slice(b"time_s");
+        for channel in &self.channels {
+            line.push(b',');
+            push_name(&mut line, &channel.name);
+        }
+        line.push(b'\n');
+        out.write_all(&line)?;
+        for (row, &time_s) in self.time_s.iter().enumerate() {
+            line.clear();
+            push_number(&mut line, time_s);
+            for channel in &self.channels {
+                line.push(b',');
+                push_number(&mut line, channel.values[row]);
+            }
+            line.push(b'\n');
+            out.write_all(&line)?;
+        }
+        Ok(())
+    }
+}
+
+/// Appends a number with the fewest digits that read back to the same bits.
+///
+/// ```
+/// let mut line = Vec::new();
+/// stretch_data::push_number(&mut line, 0.1);
+/// line.push(b',');
+/// stretch_data::push_number(&mut line, -1e-300);
+/// assert_eq!(line, b"0.1,-1e-300");
+/// ```
+pub fn push_number(line: &mut Vec<u8>, value: f64) {
+    let size = value.abs();
+    // Writing to memory cannot fail.
+    let _ = if size == 0.0 || (1e-5..1e16).contains(&size) {
+        write!(line, "{value}")
+    } else {
+        write!(line, "{value:e}")
+    };
+}
+
+/// Appends a name, in quotation marks where a reader would stumble without.
+pub(crate) fn push_name(line: &mut Vec<u8>, name: &str) {
+    if name.contains([',', ';', '\t', '"']) || name.trim() != name {
+        line.push(b'"');
+        line.extend_from_slice(name.replace('"', "\"\"").as_bytes());
+        line.push(b'"');
+    } else {
+        line.extend_from_slice(name.as_bytes());
+    }
+}

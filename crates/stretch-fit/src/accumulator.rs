@@ -1,0 +1,219 @@
+//! Takes samples one by one and keeps only their triangular factor.
+
+use stretch_core::{Degree, Real};
+
+use crate::{
+    Factor, Fit, FitError,
+    basis::{Basis, entry_exponent, power_of_two},
+};
+
+/// Least squares of a polynomial surface over a stream of samples.
+///
+/// Samples collect in a block of `ROWS`; a full block is folded into the
+/// triangular [`Factor`] by Householder reflections. Memory is
+/// `TERMS^2 + (TERMS + 4) ROWS` numbers whatever the length of the log.
+///
+/// - `TERMS`: room for terms, 7 for poly13, 21 for any degree.
+/// - `ROWS`: 64 to 256 on a desk (128 is fastest for poly13), 8 to 16 on a
+///   board. It changes speed and memory, and results only by rounding.
+///
+/// Rate, voltage and value carry whatever units the caller's normalisation
+/// gives them. In `f32` keep them near 1: powers of large or tiny numbers
+/// leave its range, which is refused.
+///
+/// ```
+/// use stretch_core::Degree;
+/// use stretch_fit::SurfaceAccumulator;
+///
+/// let mut log: SurfaceAccumulator<f64, 7, 64> = SurfaceAccumulator::new(Degree::POLY13)?;
+/// for k in 0..200 {
+///     let (rate, volts) = (f64::from(k % 7) - 3.0, f64::from(k % 31) / 30.0);
+///     log.push(rate, volts, 0.25 + 0.5 * volts - 0.125 * rate * volts)?;
+/// }
+/// let surface = log.fit()?.surface();
+/// assert!((surface.coefficient(0, 1) - 0.5).abs() < 1e-12);
+/// assert!((surface.coefficient(1, 1) + 0.125).abs() < 1e-12);
+/// # Ok::<(), stretch_fit::FitError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurfaceAccumulator<T, const TERMS: usize, const ROWS: usize> {
+    factor: Factor<T, TERMS>,
+    filled: usize,
+    root_weights: [T; ROWS],
+    rates: [T; ROWS],
+    volts: [T; ROWS],
+    values: [T; ROWS],
+    block: [[T; ROWS]; TERMS],
+    most_input: T,
+    most_value: T,
+}
+
+impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS, ROWS> {
+    const SHAPE: () = assert!(ROWS > 0 && TERMS > 0, "a block needs a row and a term");
+
+    /// An accumulator that has seen no sample, for a surface of `degree`.
+    ///
+    /// # Errors
+    /// [`FitError::TooManyTerms`] when the degree has more than `TERMS` terms.
+    pub fn new(degree: Degree) -> Result<Self, FitError> {
+        let () = Self::SHAPE;
+        let basis = Basis::new(degree)?;
+        Ok(Self {
+            factor: Factor::empty(basis),
+            filled: 0,
+            root_weights: [T::zero(); ROWS],
+            rates: [T::zero(); ROWS],
+            volts: [T::zero(); ROWS],
+            values: [T::zero(); ROWS],
+            block: [[T::zero(); ROWS]; TERMS],
+            most_input: basis.most(),
+            most_value: power_of_two(entry_exponent::<T>()),
+        })
+    }
+
+    /// Adds a sample: at this rate and voltage the surface should be `value`.
+    ///
+    /// # Errors
+    /// [`FitError::OutOfRange`] for a number that is not finite or whose powers
+    /// would overflow; the sample is then not added.
+    #[inline]
+    pub fn push(&mut self, rate: T, volts: T, value: T) -> Result<(), FitError> {
+        // Not finite fails these comparisons too.
+        if rate.abs() <= self.most_input
+            && volts.abs() <= self.most_input
+            && value.abs() <= self.most_value
+        {
+            self.place(rate, volts, value, T::one());
+            Ok(())
+        } else {
+            Err(self.refusal(rate, volts, value))
+        }
+    }
+
+    /// Adds a sample whose squared residual counts `weight` times. A sample of
+    /// weight zero is not counted. Weights do not change the degrees of
+    /// freedom, which are samples less terms.
+    ///
+    /// # Errors
+    /// As for [`push`](Self::push); also for a weight below zero, or so large
+    /// that weight times a squared power overflows.
+    pub fn push_weighted(
+        &mut self,
+        rate: T,
+        volts: T,
+        value: T,
+        weight: T,
+    ) -> Result<(), FitError> {
+        let taken = rate.abs() <= self.most_input
+            && volts.abs() <= self.most_input
+            && value.abs() <= self.most_value;
+        if !taken {
+            return Err(self.refusal(rate, volts, value));
+        }
+        let largest = rate.abs().max(volts.abs()).max(T::one());
+        let power = (0..self.factor.degree().total()).fold(T::one(), |power, _| power * largest);
+        let most = self.most_value / power.max(value.abs());
+        let root_weight = weight.sqrt();
+        // A NaN weight, or the root of one below zero, fails this too.
+        if !(root_weight <= most) {
+            let most = most.as_f64() * most.as_f64();
+            return Err(FitError::OutOfRange { field: "weight", value: weight.as_f64(), most });
+        }
+        if weight > T::zero() {
+            self.place(rate, volts, value, root_weight);
+        }
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn place(&mut self, rate: T, volts: T, value: T, root_weight: T) {
+        let row = self.filled;
+        self.root_weights[row] = root_weight;
+        self.rates[row] = rate;
+        self.volts[row] = volts;
+        self.values[row] = value * root_weight;
+        self.filled = row + 1;
+        if self.filled == ROWS {
+            self.fold();
+        }
+    }
+
+    #[cold]
+    fn refusal(&self, rate: T, volts: T, value: T) -> FitError {
+        let most = self.most_input.as_f64();
+        if !(rate.abs() <= self.most_input) {
+            return FitError::OutOfRange { field: "rate", value: rate.as_f64(), most };
+        }
+        if !(volts.abs() <= self.most_input) {
+            return FitError::OutOfRange { field: "volts", value: volts.as_f64(), most };
+        }
+        let most = self.most_value.as_f64();
+        FitError::OutOfRange { field: "value", value: value.as_f64(), most }
+    }
+
+    /// Adds many samples, `(rate, volts, value)`, up to the first refused one.
+    ///
+    /// # Errors
+    /// As for [`push`](Self::push).
+    pub fn extend(&mut self, samples: impl IntoIterator<Item = (T, T, T)>) -> Result<(), FitError> {
+        samples.into_iter().try_for_each(|(rate, volts, value)| self.push(rate, volts, value))
+    }
+
+    /// Folds what the block holds; rows not yet filled weigh nothing.
+    #[inline(never)]
+    fn fold(&mut self) {
+        for row in self.filled..ROWS {
+            self.root_weights[row] = T::zero();
+            self.values[row] = T::zero();
+        }
+        self.factor.fold(
+            self.filled,
+            &self.root_weights,
+            &self.rates,
+            &self.volts,
+            &mut self.values,
+            &mut self.block,
+        );
+        self.filled = 0;
+    }
+
+    /// Samples so far, without those of weight zero.
+    pub fn samples(&self) -> u64 {
+        self.factor.samples() + self.filled as u64
+    }
+
+    /// The degree that the samples are accumulated for.
+    pub fn degree(&self) -> Degree {
+        self.factor.degree()
+    }
+
+    /// Adds all samples of another accumulator, as if they had been pushed
+    /// here: equal to one pass up to rounding, in any order.
+    ///
+    /// # Errors
+    /// [`FitError::MissingTerm`] when the degrees differ.
+    pub fn merge(&mut self, other: &Self) -> Result<(), FitError> {
+        self.fold();
+        self.factor.merge(&other.factor())
+    }
+
+    /// The triangular factor of all samples so far: what merges, what gives
+    /// fits of this and lower degrees, and all there is to keep of a log.
+    pub fn factor(&self) -> Factor<T, TERMS> {
+        if self.filled == 0 {
+            return self.factor;
+        }
+        let mut copy = self.clone();
+        copy.fold();
+        copy.factor
+    }
+
+    /// The least-squares surface of the accumulated degree.
+    ///
+    /// # Errors
+    /// [`FitError::TooFewSamples`], [`FitError::RankDeficient`] with the first
+    /// term that the data cannot determine, [`FitError::NotFinite`].
+    pub fn fit(&self) -> Result<Fit<T, TERMS>, FitError> {
+        self.factor().fit()
+    }
+}

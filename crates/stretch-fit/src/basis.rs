@@ -1,0 +1,112 @@
+//! The terms of a degree as columns and rows of the design matrix.
+
+use stretch_core::{Degree, Real};
+
+use crate::FitError;
+
+/// Where each term comes from: the term one power lower, which stands before
+/// it in the order of `Degree::exponents`, times the rate or the voltage.
+fn parents(degree: Degree) -> impl Iterator<Item = (usize, bool)> {
+    degree.exponents().skip(1).map(move |(i, j)| {
+        let by_volts = j > 0;
+        let lower = if by_volts { (i, j - 1) } else { (i - 1, j) };
+        (position(degree, lower).unwrap_or(0), by_volts)
+    })
+}
+
+/// The place of a term in the order of `Degree::exponents`.
+pub(crate) fn position(degree: Degree, term: (u8, u8)) -> Option<usize> {
+    degree.exponents().position(|t| t == term)
+}
+
+/// The recipe that builds every column from an earlier one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Basis<const TERMS: usize> {
+    degree: Degree,
+    /// `(index of the earlier term, times the voltage)`; the first is unused.
+    steps: [(u8, bool); TERMS],
+}
+
+impl<const TERMS: usize> Basis<TERMS> {
+    pub(crate) fn new(degree: Degree) -> Result<Self, FitError> {
+        let terms = degree.terms();
+        if terms > TERMS {
+            return Err(FitError::TooManyTerms { terms, room: TERMS });
+        }
+        let mut steps = [(0, false); TERMS];
+        for (step, (parent, by_volts)) in steps.iter_mut().skip(1).zip(parents(degree)) {
+            *step = (parent as u8, by_volts);
+        }
+        Ok(Self { degree, steps })
+    }
+
+    pub(crate) fn degree(&self) -> Degree {
+        self.degree
+    }
+
+    pub(crate) fn terms(&self) -> usize {
+        self.degree.terms().min(TERMS)
+    }
+
+    /// Columns for many samples; the constant term's is `one` (the square
+    /// roots of the weights).
+    #[inline(always)]
+    pub(crate) fn columns<T: Real, const ROWS: usize>(
+        &self,
+        one: &[T; ROWS],
+        rate: &[T; ROWS],
+        volts: &[T; ROWS],
+        block: &mut [[T; ROWS]; TERMS],
+    ) {
+        let terms = self.terms();
+        if terms > 0 {
+            block[0] = *one;
+        }
+        for k in 1..terms {
+            let (parent, by_volts) = self.steps[k];
+            let factor = if by_volts { volts } else { rate };
+            let (before, this) = block.split_at_mut(k);
+            let parent = &before[usize::from(parent).min(k - 1)];
+            for row in 0..ROWS {
+                this[0][row] = parent[row] * factor[row];
+            }
+        }
+    }
+
+    /// The row of one sample, in the first `terms` places.
+    pub(crate) fn row<T: Real>(&self, rate: T, volts: T) -> [T; TERMS] {
+        let mut row = [T::zero(); TERMS];
+        if TERMS > 0 {
+            row[0] = T::one();
+        }
+        for k in 1..self.terms() {
+            let (parent, by_volts) = self.steps[k];
+            row[k] = row[usize::from(parent)] * if by_volts { volts } else { rate };
+        }
+        row
+    }
+
+    /// The largest rate or voltage whose powers cannot overflow when squared
+    /// and summed: a power of two.
+    pub(crate) fn most<T: Real>(&self) -> T {
+        let exponent = entry_exponent::<T>() / i32::from(self.degree.total().max(1));
+        power_of_two(exponent)
+    }
+}
+
+/// Entries of a row up to two to this power keep sums of squares finite for
+/// over a hundred million rows (`f32`) or any number of rows (`f64`).
+pub(crate) fn entry_exponent<T: Real>() -> i32 {
+    // f32: 2^128 overflows, f64: 2^1024.
+    if T::max_value().as_f64() < 1e100 { 50 } else { 480 }
+}
+
+/// `2^n`, exactly.
+pub(crate) fn power_of_two<T: Real>(n: i32) -> T {
+    let mut x = T::one();
+    let two = T::one() + T::one();
+    for _ in 0..n {
+        x = x * two;
+    }
+    x
+}

@@ -1,0 +1,122 @@
+//! Bounds at a confidence level.
+
+use stretch_core::Real;
+
+use crate::{
+    Fit, FitError,
+    quantile::{fisher, student_two_sided},
+};
+
+/// A value and the bounds around it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds<T> {
+    /// Lower bound.
+    pub lower: T,
+    /// What was estimated, midway.
+    pub estimate: T,
+    /// Upper bound.
+    pub upper: T,
+}
+
+/// Bounds of a fit at one confidence level, as MATLAB's `confint` and
+/// `predint` give them, for errors that are normal, independent and of one
+/// variance. Samples of a log are seldom independent: true bounds are then
+/// wider, and [`cross_validate`](crate::cross_validate) is the honest check.
+///
+/// With `t` the two-sided quantile of Student's t for `n - p` degrees of
+/// freedom, `s` the fit's sigma and `h` the leverage of a point:
+///
+/// | bounds of | half width |
+/// | --- | --- |
+/// | a coefficient | `t se` |
+/// | the surface at one point | `t s sqrt(h)` |
+/// | one new observation there | `t s sqrt(1 + h)` |
+/// | the surface everywhere at once | `sqrt(p F) s sqrt(h)` |
+/// | observations everywhere at once | `sqrt(p F) s sqrt(1 + h)` |
+///
+/// with `F` the quantile of Fisher's F for `p` and `n - p` (Scheffe's method;
+/// Seber and Lee, Linear Regression Analysis, 2nd ed., section 5.3).
+///
+/// ```
+/// use stretch_core::Degree;
+/// use stretch_fit::SurfaceAccumulator;
+///
+/// let mut line: SurfaceAccumulator<f64, 2, 8> = SurfaceAccumulator::new(Degree::new(0, 1).unwrap())?;
+/// line.extend([(0.0, 0.0, 1.0), (0.0, 1.0, 3.0), (0.0, 2.0, 4.0)])?;
+/// let fit = line.fit()?;
+/// let bounds = fit.confidence(0.95)?;
+/// let slope = bounds.coefficient(1).unwrap();
+/// assert!(slope.lower < 1.5 && 1.5 < slope.upper);
+/// assert!(bounds.coefficient(2).is_none());
+/// let (surface, new) = (bounds.surface(0.0, 1.0), bounds.observation(0.0, 1.0));
+/// assert!(new.lower < surface.lower && surface.upper < new.upper);
+/// # Ok::<(), stretch_fit::FitError>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Confidence<'a, T, const TERMS: usize> {
+    fit: &'a Fit<T, TERMS>,
+    level: f64,
+    t: T,
+    sigma: T,
+}
+
+impl<'a, T: Real, const TERMS: usize> Confidence<'a, T, TERMS> {
+    pub(crate) fn new(fit: &'a Fit<T, TERMS>, level: f64) -> Result<Self, FitError> {
+        if !(level > 0.0 && level < 1.0) {
+            return Err(FitError::Level { level });
+        }
+        let too_few =
+            FitError::TooFewSamples { needed: fit.terms() as u64 + 1, got: fit.samples() };
+        let sigma = fit.sigma().ok_or(too_few)?;
+        let t = T::from_f64(student_two_sided(level, fit.dof()));
+        if !t.is_finite() {
+            return Err(FitError::NotFinite);
+        }
+        Ok(Self { fit, level, t, sigma })
+    }
+
+    /// Bounds of a coefficient by its place in the order of
+    /// `Degree::exponents`; `None` beyond the last.
+    pub fn coefficient(&self, place: usize) -> Option<Bounds<T>> {
+        let estimate = *self.fit.coefficients().get(place)?;
+        let standard_error = self.fit.standard_errors()?.nth(place)?;
+        Some(around(estimate, self.t * standard_error))
+    }
+
+    /// Bounds of the surface at one point (MATLAB's `functional`, `off`).
+    pub fn surface(&self, rate: T, volts: T) -> Bounds<T> {
+        self.at(rate, volts, self.t, T::zero())
+    }
+
+    /// Bounds of one new observation at a point (`observation`, `off`).
+    pub fn observation(&self, rate: T, volts: T) -> Bounds<T> {
+        self.at(rate, volts, self.t, T::one())
+    }
+
+    /// Bounds that hold for the surface at all points at once (`functional`,
+    /// `on`). Finds a quantile of F at every call.
+    pub fn surface_everywhere(&self, rate: T, volts: T) -> Bounds<T> {
+        self.at(rate, volts, self.scheffe(), T::zero())
+    }
+
+    /// Bounds that hold for observations at all points at once
+    /// (`observation`, `on`). Finds a quantile of F at every call.
+    pub fn observation_everywhere(&self, rate: T, volts: T) -> Bounds<T> {
+        self.at(rate, volts, self.scheffe(), T::one())
+    }
+
+    fn scheffe(&self) -> T {
+        let terms = self.fit.terms() as u64;
+        T::from_f64(libm::sqrt(terms as f64 * fisher(self.level, terms, self.fit.dof())))
+    }
+
+    fn at(&self, rate: T, volts: T, factor: T, noise: T) -> Bounds<T> {
+        let estimate = self.fit.surface().eval(rate, volts);
+        let spread = (noise + self.fit.leverage(rate, volts)).sqrt();
+        around(estimate, factor * self.sigma * spread)
+    }
+}
+
+fn around<T: Real>(estimate: T, half_width: T) -> Bounds<T> {
+    Bounds { lower: estimate - half_width, estimate, upper: estimate + half_width }
+}

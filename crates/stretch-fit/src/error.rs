@@ -1,0 +1,118 @@
+//! Why a fit was refused.
+
+use core::fmt;
+
+/// Why samples or a fit were refused. Small, `Copy`, and carries the evidence.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum FitError {
+    /// A sample that is NaN, infinite, or so large that its powers would
+    /// overflow the number type. It was not added.
+    OutOfRange {
+        /// Which of `rate`, `volts`, `value` or `weight`.
+        field: &'static str,
+        /// The number that was given.
+        value: f64,
+        /// The largest magnitude that is taken.
+        most: f64,
+    },
+    /// Fewer samples than the result needs.
+    TooFewSamples {
+        /// How many are needed.
+        needed: u64,
+        /// How many were given.
+        got: u64,
+    },
+    /// The data cannot tell this term from those before it in the order of
+    /// `Degree::exponents` (a rate that never changes cannot determine p10).
+    RankDeficient {
+        /// Power of the rate in the term.
+        rate_power: u8,
+        /// Power of the voltage in the term.
+        volts_power: u8,
+    },
+    /// The degree has more terms than the type has room for.
+    TooManyTerms {
+        /// Terms of the degree.
+        terms: usize,
+        /// Room for terms.
+        room: usize,
+    },
+    /// The degree asks for a term that the accumulated one lacks.
+    MissingTerm {
+        /// Power of the rate in the term.
+        rate_power: u8,
+        /// Power of the voltage in the term.
+        volts_power: u8,
+    },
+    /// A confidence level that is not above 0 and below 1.
+    Level {
+        /// The level that was given.
+        level: f64,
+    },
+    /// The memory that the caller lent is too short.
+    ShortMemory {
+        /// Numbers needed.
+        needed: u64,
+        /// Numbers lent.
+        got: u64,
+    },
+    /// The result is not finite: the samples span too many powers of ten.
+    NotFinite,
+}
+
+/// A term's name as MATLAB writes it, and as a product.
+pub(crate) fn write_term(f: &mut fmt::Formatter<'_>, i: u8, j: u8) -> fmt::Result {
+    write!(f, "p{i}{j}")?;
+    match (i, j) {
+        (0, 0) => return f.write_str(" (the constant)"),
+        (0, _) => f.write_str(" (")?,
+        (1, _) => f.write_str(" (rate")?,
+        _ => write!(f, " (rate^{i}")?,
+    }
+    if i > 0 && j > 0 {
+        f.write_str(" * ")?;
+    }
+    match j {
+        0 => {}
+        1 => f.write_str("volts")?,
+        _ => write!(f, "volts^{j}")?,
+    }
+    f.write_str(")")
+}
+
+impl fmt::Display for FitError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::OutOfRange { field, value, most } => {
+                write!(f, "{field} is {value}, but must be finite and at most {most:e} in size")
+            }
+            Self::TooFewSamples { needed, got } => {
+                write!(f, "{needed} samples are needed, but there are {got}")
+            }
+            Self::RankDeficient { rate_power, volts_power } => {
+                f.write_str("the data cannot determine the term ")?;
+                write_term(f, rate_power, volts_power)?;
+                f.write_str(": over these samples it is a combination of the terms before it")
+            }
+            Self::TooManyTerms { terms, room } => {
+                write!(f, "the degree has {terms} terms, but there is room for {room}")
+            }
+            Self::MissingTerm { rate_power, volts_power } => {
+                f.write_str("the samples were not accumulated for the term ")?;
+                write_term(f, rate_power, volts_power)
+            }
+            Self::Level { level } => {
+                write!(f, "a confidence level must be above 0 and below 1, but is {level}")
+            }
+            Self::ShortMemory { needed, got } => {
+                write!(f, "room for {needed} numbers is needed, but {got} were lent")
+            }
+            Self::NotFinite => {
+                f.write_str("the result is not finite: the samples span too many powers of ten")
+            }
+        }
+    }
+}
+
+impl core::error::Error for FitError {}

@@ -1,0 +1,257 @@
+//! What is kept of the samples: one triangle.
+
+use stretch_core::{Degree, Real, Surface};
+
+use crate::{
+    Fit, FitError,
+    basis::{Basis, position},
+    fold::fold,
+};
+
+/// The triangular factor `R` of a weighted design matrix, with `q = Q^T z` and
+/// the residual sum of squares: everything that least squares needs to know of
+/// the samples, in `TERMS^2` numbers.
+///
+/// Factors [`merge`](Self::merge), and one of a high degree answers for every
+/// degree within it ([`fit_degree`](Self::fit_degree)), so a log is read once.
+/// Get one from [`SurfaceAccumulator::factor`](crate::SurfaceAccumulator::factor).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Factor<T, const TERMS: usize> {
+    basis: Basis<TERMS>,
+    r: [[T; TERMS]; TERMS],
+    q: [T; TERMS],
+    /// Residual sum of squares, and what its last addition rounded off.
+    residual: (T, T),
+    samples: u64,
+}
+
+impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
+    pub(crate) fn empty(basis: Basis<TERMS>) -> Self {
+        Self {
+            basis,
+            r: [[T::zero(); TERMS]; TERMS],
+            q: [T::zero(); TERMS],
+            residual: (T::zero(), T::zero()),
+            samples: 0,
+        }
+    }
+
+    /// The degree that the samples were accumulated for.
+    pub fn degree(&self) -> Degree {
+        self.basis.degree()
+    }
+
+    /// How many samples of a weight above zero went in.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// The sum of all weights: the sample count when none was given.
+    pub fn weight(&self) -> T {
+        self.r[0][0] * self.r[0][0]
+    }
+
+    pub(crate) fn basis(&self) -> &Basis<TERMS> {
+        &self.basis
+    }
+
+    /// Adds to the residual sum of squares (Kahan summation: a long log adds
+    /// many small blocks to a large sum).
+    fn add_residual(&mut self, squares: T) {
+        let (sum, lost) = self.residual;
+        let exact = squares - lost;
+        let total = sum + exact;
+        self.residual = (total, (total - sum) - exact);
+    }
+
+    #[inline]
+    pub(crate) fn fold<const ROWS: usize>(
+        &mut self,
+        samples: usize,
+        root_weights: &[T; ROWS],
+        rates: &[T; ROWS],
+        volts: &[T; ROWS],
+        values: &mut [T; ROWS],
+        block: &mut [[T; ROWS]; TERMS],
+    ) {
+        self.basis.columns(root_weights, rates, volts, block);
+        let squares = fold(self.basis.terms(), &mut self.r, &mut self.q, block, values);
+        self.add_residual(squares);
+        self.samples += samples as u64;
+    }
+
+    /// Adds the samples of another factor: equal to one pass over both logs up
+    /// to rounding, in any order. Costs about `2/3 TERMS^3` multiplications.
+    ///
+    /// # Errors
+    /// [`FitError::MissingTerm`] when the degrees differ; nothing changes then.
+    pub fn merge(&mut self, other: &Self) -> Result<(), FitError> {
+        self.same_degree(other)?;
+        if other.samples == 0 {
+            return Ok(());
+        }
+        if self.samples == 0 {
+            *self = *other;
+            return Ok(());
+        }
+        // The other triangle's rows are a block of TERMS rows, by column.
+        let terms = self.basis.terms();
+        let mut block = [[T::zero(); TERMS]; TERMS];
+        for (k, row) in other.r[..terms].iter().enumerate() {
+            for j in k..terms {
+                block[j][k] = row[j];
+            }
+        }
+        let mut values = other.q;
+        let squares = fold(terms, &mut self.r, &mut self.q, &mut block, &mut values);
+        self.add_residual(squares);
+        self.add_residual(other.residual_sum());
+        self.samples += other.samples;
+        Ok(())
+    }
+
+    fn same_degree(&self, other: &Self) -> Result<(), FitError> {
+        let (a, b) = (self.degree(), other.degree());
+        let odd = a
+            .exponents()
+            .find(|&term| position(b, term).is_none())
+            .or_else(|| b.exponents().find(|&term| position(a, term).is_none()));
+        match odd {
+            None => Ok(()),
+            Some((rate_power, volts_power)) => {
+                Err(FitError::MissingTerm { rate_power, volts_power })
+            }
+        }
+    }
+
+    fn residual_sum(&self) -> T {
+        (self.residual.0 - self.residual.1).max(T::zero())
+    }
+
+    /// The factor of a lower degree over the same samples: columns that the
+    /// degree lacks are dropped and the rest made triangular again.
+    ///
+    /// # Errors
+    /// [`FitError::MissingTerm`] when `degree` has a term that this one lacks.
+    pub fn restrict(&self, degree: Degree) -> Result<Self, FitError> {
+        if degree == self.degree() {
+            return Ok(*self);
+        }
+        let mut lower = Self::empty(Basis::new(degree)?);
+        let terms = self.basis.terms();
+        let mut block = [[T::zero(); TERMS]; TERMS];
+        for (column, (rate_power, volts_power)) in block.iter_mut().zip(degree.exponents()) {
+            let from = position(self.degree(), (rate_power, volts_power))
+                .ok_or(FitError::MissingTerm { rate_power, volts_power })?;
+            for (entry, row) in column.iter_mut().zip(&self.r[..=from.min(terms)]) {
+                *entry = row[from];
+            }
+        }
+        let mut values = self.q;
+        let squares = fold(degree.terms(), &mut lower.r, &mut lower.q, &mut block, &mut values);
+        lower.residual = self.residual;
+        lower.add_residual(squares);
+        lower.samples = self.samples;
+        Ok(lower)
+    }
+
+    /// The weighted sum of squared residuals of *any* surface on these
+    /// samples, `|R c - q|^2 + rest`, from its coefficients in the order of
+    /// `Degree::exponents`; those beyond the end count as zero.
+    pub fn residual_of(&self, coefficients: &[T]) -> T {
+        let mut sum = T::zero();
+        let terms = self.basis.terms();
+        for (k, (row, &q)) in self.r[..terms].iter().zip(&self.q).enumerate() {
+            let mut e = -q;
+            for (&r, &c) in row[..terms].iter().zip(coefficients).skip(k) {
+                e = e + r * c;
+            }
+            sum = sum + e * e;
+        }
+        sum + self.residual_sum()
+    }
+
+    /// The weighted sum of squares of the values about their weighted mean.
+    pub fn total_sum(&self) -> T {
+        let terms = self.basis.terms();
+        let explained = self.q[..terms].iter().skip(1).fold(T::zero(), |sum, &q| sum + q * q);
+        explained + self.residual_sum()
+    }
+
+    /// The least-squares surface of the accumulated degree, by back
+    /// substitution.
+    ///
+    /// # Errors
+    /// [`FitError::TooFewSamples`] unless there is a sample a term,
+    /// [`FitError::RankDeficient`] with the first term (in the order of
+    /// `Degree::exponents`) that depends on those before it,
+    /// [`FitError::NotFinite`].
+    pub fn fit(&self) -> Result<Fit<T, TERMS>, FitError> {
+        let terms = self.basis.terms();
+        if self.samples < terms as u64 {
+            return Err(FitError::TooFewSamples { needed: terms as u64, got: self.samples });
+        }
+        self.check_rank()?;
+        let mut inverse = [[T::zero(); TERMS]; TERMS];
+        let mut coefficients = [T::zero(); TERMS];
+        for k in (0..terms).rev() {
+            let row = &self.r[k];
+            let diagonal = row[k];
+            let mut c = self.q[k];
+            for j in k + 1..terms {
+                c = c - row[j] * coefficients[j];
+            }
+            coefficients[k] = c / diagonal;
+            inverse[k][k] = T::one() / diagonal;
+            for j in k + 1..terms {
+                let mut e = T::zero();
+                for m in k + 1..=j {
+                    e = e + row[m] * inverse[m][j];
+                }
+                inverse[k][j] = -e / diagonal;
+            }
+        }
+        let surface =
+            Surface::new(self.degree(), &coefficients[..terms]).map_err(|_| FitError::NotFinite)?;
+        let fit = Fit {
+            basis: self.basis,
+            coefficients,
+            surface,
+            r: self.r,
+            inverse,
+            sse: self.residual_sum(),
+            sst: self.total_sum(),
+            samples: self.samples,
+            sigma_squared: None,
+        };
+        if fit.is_finite() { Ok(fit) } else { Err(FitError::NotFinite) }
+    }
+
+    /// [`fit`](Self::fit) for a degree within the accumulated one.
+    ///
+    /// # Errors
+    /// As for [`restrict`](Self::restrict) and [`fit`](Self::fit).
+    pub fn fit_degree(&self, degree: Degree) -> Result<Fit<T, TERMS>, FitError> {
+        self.restrict(degree)?.fit()
+    }
+
+    /// A column's length above the diagonal equals its part in the span of the
+    /// columns before; what the diagonal adds must stand above rounding.
+    fn check_rank(&self) -> Result<(), FitError> {
+        let terms = self.basis.terms();
+        let threshold = T::epsilon() * T::from_f64(8.0 * terms as f64);
+        for (k, (rate_power, volts_power)) in (0..terms).zip(self.degree().exponents()) {
+            let largest = (0..=k).fold(T::zero(), |most, m| most.max(self.r[m][k].abs()));
+            // Divided by the largest first, so that no square can underflow.
+            let square = (0..=k).fold(T::zero(), |sum, m| {
+                let part = self.r[m][k] / largest;
+                sum + part * part
+            });
+            let above = self.r[k][k].abs() > threshold * largest * square.sqrt();
+            if !above {
+                return Err(FitError::RankDeficient { rate_power, volts_power });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,205 @@
+//! A fitted surface and how well it fits.
+
+use stretch_core::{Degree, Real, Surface};
+
+use crate::{Confidence, FitError, basis::Basis};
+
+/// A least-squares surface with the statistics of its fit.
+///
+/// With `n` samples, `p` terms, weights `w` (1 unless given) and residuals
+/// `e = z - surface`: `SSE = sum w e^2`, `SST = sum w (z - mean)^2` about the
+/// weighted mean, `dof = n - p`. A quantity that the samples leave undefined
+/// (no degree of freedom, values all equal) is `None`.
+///
+/// ```
+/// use stretch_core::Degree;
+/// use stretch_fit::SurfaceAccumulator;
+///
+/// let mut line: SurfaceAccumulator<f64, 2, 8> = SurfaceAccumulator::new(Degree::new(0, 1).unwrap())?;
+/// for (volts, value) in [(0.0, 1.0), (1.0, 3.0), (2.0, 4.0)] {
+///     line.push(0.0, volts, value)?;
+/// }
+/// let fit = line.fit()?;
+/// assert!((fit.coefficients()[1] - 1.5).abs() < 1e-14);
+/// assert!((fit.sse() - 1.0 / 6.0).abs() < 1e-14);
+/// assert!((fit.r_squared().unwrap() - 27.0 / 28.0).abs() < 1e-14);
+/// # Ok::<(), stretch_fit::FitError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fit<T, const TERMS: usize> {
+    pub(crate) basis: Basis<TERMS>,
+    pub(crate) coefficients: [T; TERMS],
+    pub(crate) surface: Surface<T>,
+    pub(crate) r: [[T; TERMS]; TERMS],
+    pub(crate) inverse: [[T; TERMS]; TERMS],
+    pub(crate) sse: T,
+    pub(crate) sst: T,
+    pub(crate) samples: u64,
+    /// Error variance from elsewhere (a robust scale), in place of SSE / dof.
+    pub(crate) sigma_squared: Option<T>,
+}
+
+impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
+    pub(crate) fn is_finite(&self) -> bool {
+        let terms = self.terms();
+        self.inverse[..terms].iter().flatten().all(|e| e.is_finite())
+            && self.sse.is_finite()
+            && self.sst.is_finite()
+    }
+
+    /// The surface. It can be evaluated, differentiated and recorded.
+    pub fn surface(&self) -> Surface<T> {
+        self.surface
+    }
+
+    /// The degree of the surface.
+    pub fn degree(&self) -> Degree {
+        self.basis.degree()
+    }
+
+    /// The coefficients, one a term, in the order of `Degree::exponents`.
+    pub fn coefficients(&self) -> &[T] {
+        &self.coefficients[..self.terms()]
+    }
+
+    /// How many terms the surface has (`p`).
+    pub fn terms(&self) -> usize {
+        self.basis.terms()
+    }
+
+    /// How many samples were fitted (`n`).
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// Degrees of freedom, `n - p`.
+    pub fn dof(&self) -> u64 {
+        self.samples.saturating_sub(self.terms() as u64)
+    }
+
+    /// The sum of squared residuals, in squared units of the value.
+    pub fn sse(&self) -> T {
+        self.sse
+    }
+
+    /// `R^2 = 1 - SSE/SST`, the share of the values' variation that the surface
+    /// explains. `None` when all values are equal.
+    pub fn r_squared(&self) -> Option<T> {
+        (self.sst > T::zero()).then(|| T::one() - self.sse / self.sst)
+    }
+
+    /// `1 - (SSE/dof)/(SST/(n - 1))`: R^2 with a price on terms. `None` when
+    /// all values are equal or no degree of freedom is left.
+    pub fn adjusted_r_squared(&self) -> Option<T> {
+        let dof = self.dof();
+        (self.sst > T::zero() && dof > 0).then(|| {
+            let ratio = (self.samples - 1) as f64 / dof as f64;
+            T::one() - self.sse / self.sst * T::from_f64(ratio)
+        })
+    }
+
+    /// `sqrt(SSE/(n - p))`, the standard error of the regression, in units of
+    /// the value. `None` when no degree of freedom is left.
+    pub fn rmse(&self) -> Option<T> {
+        let dof = self.dof();
+        (dof > 0).then(|| (self.sse / T::from_f64(dof as f64)).sqrt())
+    }
+
+    /// The standard deviation of one value about the surface: the RMSE, or for
+    /// a robust fit the robust scale.
+    pub fn sigma(&self) -> Option<T> {
+        match self.sigma_squared {
+            Some(square) => (self.dof() > 0).then(|| square.sqrt()),
+            None => self.rmse(),
+        }
+    }
+
+    /// The standard error of each coefficient, `sigma sqrt(((A^T W A)^-1)_kk)`,
+    /// in the order of the coefficients. `None` when no degree of freedom is
+    /// left.
+    pub fn standard_errors(&self) -> Option<impl Iterator<Item = T> + '_> {
+        let sigma = self.sigma()?;
+        Some(self.inverse[..self.terms()].iter().map(move |row| {
+            let square = row.iter().fold(T::zero(), |sum, &e| sum + e * e);
+            sigma * square.sqrt()
+        }))
+    }
+
+    /// Bounds at a level such as 0.95: of coefficients, of the surface, of new
+    /// observations.
+    ///
+    /// # Errors
+    /// [`FitError::Level`] unless the level is above 0 and below 1,
+    /// [`FitError::TooFewSamples`] when no degree of freedom is left.
+    pub fn confidence(&self, level: f64) -> Result<Confidence<'_, T, TERMS>, FitError> {
+        Confidence::new(self, level)
+    }
+
+    /// `h = a^T (A^T W A)^-1 a` for the row `a` of a rate and a voltage: the
+    /// variance of the surface there in units of `sigma^2`. On a sample of
+    /// weight 1 it is the leverage, and these sum to the number of terms.
+    pub fn leverage(&self, rate: T, volts: T) -> T {
+        let row = self.basis.row(rate, volts);
+        let terms = self.terms();
+        // Solve R^T u = a, so that h = |u|^2.
+        let mut u = [T::zero(); TERMS];
+        let mut sum = T::zero();
+        for k in 0..terms {
+            let mut e = row[k];
+            for m in 0..k {
+                e = e - self.r[m][k] * u[m];
+            }
+            u[k] = e / self.r[k][k];
+            sum = sum + u[k] * u[k];
+        }
+        sum
+    }
+
+    /// The condition number of the weighted design matrix (2-norm), found by
+    /// power iteration on `R^T R` and on its inverse: within a few per cent,
+    /// from below. A coefficient can lose as many digits as this has.
+    pub fn condition(&self) -> T {
+        let terms = self.terms();
+        let (mut large, mut small) = (T::zero(), T::zero());
+        let mut x = [T::one(); TERMS];
+        let mut y = [T::one(); TERMS];
+        for _ in 0..STEPS {
+            x = self.transposed_times(&self.r, &times(&self.r, &x, terms));
+            large = rescale(&mut x[..terms]).sqrt();
+            y = times(&self.inverse, &self.transposed_times(&self.inverse, &y), terms);
+            small = rescale(&mut y[..terms]).sqrt();
+        }
+        large * small
+    }
+
+    fn transposed_times(&self, a: &[[T; TERMS]; TERMS], x: &[T; TERMS]) -> [T; TERMS] {
+        let mut out = [T::zero(); TERMS];
+        for (row, &x) in a[..self.terms()].iter().zip(x) {
+            for (out, &e) in out.iter_mut().zip(row) {
+                *out = *out + e * x;
+            }
+        }
+        out
+    }
+}
+
+/// Power iterations: each multiplies the error by a squared ratio of
+/// neighbouring singular values.
+const STEPS: usize = 12;
+
+fn times<T: Real, const N: usize>(a: &[[T; N]; N], x: &[T; N], terms: usize) -> [T; N] {
+    let mut out = [T::zero(); N];
+    for (out, row) in out.iter_mut().zip(&a[..terms]) {
+        *out = row[..terms].iter().zip(x).fold(T::zero(), |sum, (&e, &x)| sum + e * x);
+    }
+    out
+}
+
+/// Scales a vector to length 1 and gives the length it had.
+fn rescale<T: Real>(x: &mut [T]) -> T {
+    let norm = x.iter().fold(T::zero(), |sum, &e| sum + e * e).sqrt();
+    if norm > T::zero() {
+        x.iter_mut().for_each(|e| *e = *e / norm);
+    }
+    norm
+}

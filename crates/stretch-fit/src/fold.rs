@@ -1,0 +1,168 @@
+//! Folding a block of rows into a triangular factor by Householder reflections.
+//!
+//! With `R` the factor so far and `B` the block, reflections built on
+//! `[R; B]` zero `B` column by column (Golub and Van Loan, Matrix
+//! Computations, 4th ed., section 5.2; the block-by-block form is the TSQR of
+//! Demmel et al., doi:10.1137/080731992). No product `A^T A` is ever formed,
+//! so the error grows with the condition number and not with its square.
+//!
+//! Blocks are stored by column, so every inner loop runs along the rows, whose
+//! number is a constant: the compiler vectorises it.
+
+use stretch_core::Real;
+
+/// Numbers that one pass of an inner loop handles side by side.
+const LANES: usize = 4;
+
+/// `v . a`, in lanes.
+#[inline(always)]
+fn dot<T: Real, const ROWS: usize>(v: &[T; ROWS], a: &[T; ROWS]) -> T {
+    let mut sums = [T::zero(); LANES];
+    let ((v, v_tail), (a, a_tail)) = (v.as_chunks::<LANES>(), a.as_chunks::<LANES>());
+    for (v, a) in v.iter().zip(a) {
+        for lane in 0..LANES {
+            sums[lane] = sums[lane] + v[lane] * a[lane];
+        }
+    }
+    let mut tail = T::zero();
+    for (&v, &a) in v_tail.iter().zip(a_tail) {
+        tail = tail + v * a;
+    }
+    ((sums[0] + sums[1]) + (sums[2] + sums[3])) + tail
+}
+
+/// `a - s v` into `a`, and `next . a` of the result.
+#[inline(always)]
+fn reflect_then_dot<T: Real, const ROWS: usize>(
+    a: &mut [T; ROWS],
+    s: T,
+    v: &[T; ROWS],
+    next: &[T; ROWS],
+) -> T {
+    let mut sums = [T::zero(); LANES];
+    let (a, a_tail) = a.as_chunks_mut::<LANES>();
+    let (v, v_tail) = v.as_chunks::<LANES>();
+    let (next, next_tail) = next.as_chunks::<LANES>();
+    for ((a, v), next) in a.iter_mut().zip(v).zip(next) {
+        for lane in 0..LANES {
+            let x = a[lane] - s * v[lane];
+            a[lane] = x;
+            sums[lane] = sums[lane] + next[lane] * x;
+        }
+    }
+    let mut tail = T::zero();
+    for ((a, &v), &next) in a_tail.iter_mut().zip(v_tail).zip(next_tail) {
+        *a = *a - s * v;
+        tail = tail + next * *a;
+    }
+    ((sums[0] + sums[1]) + (sums[2] + sums[3])) + tail
+}
+
+/// `a - s v` into `a`, and the sum of squares of the result.
+#[inline(always)]
+fn reflect_then_square<T: Real, const ROWS: usize>(a: &mut [T; ROWS], s: T, v: &[T; ROWS]) -> T {
+    let mut sums = [T::zero(); LANES];
+    let (a, a_tail) = a.as_chunks_mut::<LANES>();
+    let (v, v_tail) = v.as_chunks::<LANES>();
+    for (a, v) in a.iter_mut().zip(v) {
+        for lane in 0..LANES {
+            let x = a[lane] - s * v[lane];
+            a[lane] = x;
+            sums[lane] = sums[lane] + x * x;
+        }
+    }
+    let mut tail = T::zero();
+    for (a, &v) in a_tail.iter_mut().zip(v_tail) {
+        *a = *a - s * v;
+        tail = tail + *a * *a;
+    }
+    ((sums[0] + sums[1]) + (sums[2] + sums[3])) + tail
+}
+
+/// One reflection `I - beta w w^T` with `w = (head, v)`: what it takes to
+/// apply it, once the sum of squares below the diagonal is known.
+struct Reflection<T> {
+    head: T,
+    beta: T,
+}
+
+impl<T: Real> Reflection<T> {
+    /// The reflection that zeroes a column of sum of squares `below` under the
+    /// diagonal entry `d`, which it replaces. A column too small to be squared
+    /// without underflow is left alone: it is zero to this number type.
+    #[inline(always)]
+    fn zeroing(d: &mut T, below: T) -> Self {
+        let square = *d * *d + below;
+        let floor = T::min_positive_value() / (T::epsilon() * T::epsilon());
+        if below == T::zero() || square < floor {
+            return Self { head: T::zero(), beta: T::zero() };
+        }
+        let norm = square.sqrt();
+        let (head, beta) = if *d > T::zero() {
+            (*d + norm, T::one() / (norm * (norm + *d)))
+        } else {
+            (*d - norm, T::one() / (norm * (norm - *d)))
+        };
+        *d = if *d > T::zero() { -norm } else { norm };
+        Self { head, beta }
+    }
+
+    /// What to subtract from a column, per unit of `w`; updates its top entry.
+    #[inline(always)]
+    fn apply(&self, top: &mut T, dot: T) -> T {
+        let s = (self.head * *top + dot) * self.beta;
+        *top = *top - s * self.head;
+        s
+    }
+}
+
+/// Folds `block` (one array a term) and `values` into `r` and `q`, so that
+/// `[R q]` becomes the triangular factor of all rows together. Both are
+/// overwritten. Returns the sum of squares that no coefficient can explain,
+/// to be added to the residual sum of squares.
+///
+/// Entries at or below the diagonal beyond `terms` are not touched.
+#[inline]
+pub(crate) fn fold<T: Real, const TERMS: usize, const ROWS: usize>(
+    terms: usize,
+    r: &mut [[T; TERMS]; TERMS],
+    q: &mut [T; TERMS],
+    block: &mut [[T; ROWS]; TERMS],
+    values: &mut [T; ROWS],
+) -> T {
+    let terms = terms.min(TERMS);
+    // `dots[j]` holds v_k . column j, known one step ahead: the pass that
+    // applies reflection k - 1 to column j also multiplies it by column k.
+    let mut dots = [T::zero(); TERMS];
+    let mut value_dot = T::zero();
+    let mut below = T::zero();
+    if let Some((first, rest)) = block[..terms].split_first() {
+        below = dot(first, first);
+        for (j, column) in rest.iter().enumerate() {
+            dots[j + 1] = dot(first, column);
+        }
+        value_dot = dot(first, values);
+    }
+    let mut unexplained = if terms == 0 { dot(values, values) } else { T::zero() };
+    for k in 0..terms {
+        let row = &mut r[k];
+        let reflection = Reflection::zeroing(&mut row[k], below);
+        let (done, ahead) = block[..terms].split_at_mut(k + 1);
+        let v = &done[k];
+        let mut subtract = [T::zero(); TERMS];
+        for j in k + 1..terms {
+            subtract[j] = reflection.apply(&mut row[j], dots[j]);
+        }
+        let s_value = reflection.apply(&mut q[k], value_dot);
+        if let Some((next, rest)) = ahead.split_first_mut() {
+            below = reflect_then_square(next, subtract[k + 1], v);
+            for (column, j) in rest.iter_mut().zip(k + 2..) {
+                dots[j] = reflect_then_dot(column, subtract[j], v, next);
+            }
+            value_dot = reflect_then_dot(values, s_value, v, next);
+        } else {
+            unexplained = reflect_then_square(values, s_value, v);
+        }
+    }
+    unexplained
+}

@@ -1,0 +1,82 @@
+//! The calibration that the documentation's examples run with.
+
+use stretch_core::{
+    BranchSurface, Calibration, CalibrationSpec, DesignError, FitSummary, Interval, Label, Model,
+    Normalisation, Polarity, Poly13, Provenance, Range, RangeSpec, RateEstimator, RateSource,
+    SampleRate, Schema, Target,
+};
+
+/// The paper's published surfaces (section 3.2) as a calibration record, for an
+/// 180 mm muscle and a bridge that rises from 1.24 V by 1 V over the stroke.
+///
+/// For examples and tests: the paper prints no ranges, so those here are
+/// plausible, not published.
+///
+/// ```
+/// use stretch_core::Model;
+/// let calibration = stretch_receptor::example_calibration();
+/// assert!(matches!(calibration.model, Model::Surfaces { .. }));
+/// ```
+pub fn example_calibration() -> Calibration {
+    build().expect("the parts are constants and in range")
+}
+
+fn build() -> Result<Calibration, DesignError> {
+    let range =
+        |zero, min, max| Range::new(RangeSpec { mode: Normalisation::Range, zero, min, max });
+    let branch = |surface: Poly13, rate_range, rate_domain, r_squared, rmse| BranchSurface {
+        rate_range,
+        surface: surface.into(),
+        signal_domain: Interval { min: 1.1, max: 2.06 },
+        rate_domain,
+        fit: FitSummary { samples: 9000, r_squared, rmse },
+    };
+    let inflation = Poly13 {
+        p00: 0.058,
+        p10: 0.001,
+        p01: 0.774,
+        p11: -0.121,
+        p02: 2.30,
+        p12: 0.094,
+        p03: -2.26,
+    };
+    let deflation = Poly13 {
+        p00: 0.225,
+        p10: -0.218,
+        p01: 0.825,
+        p11: -0.773,
+        p02: -0.481,
+        p12: 1.05,
+        p03: 0.564,
+    };
+    Calibration::new(CalibrationSpec {
+        schema: Schema::CURRENT,
+        signal: Label::new("bridge_v")?,
+        reference: Label::new("length_mm")?,
+        sample_rate_hz: SampleRate::new(100.0)?,
+        target: Target::Contraction { rest_length: 180.0 },
+        polarity: Polarity::Rising,
+        signal_range: range(1.24, 1.1, 2.1)?,
+        target_range: range(0.0, 0.0, 0.165)?,
+        rate_estimator: RateEstimator::SAVGOL_11_2,
+        rate_source: RateSource::Strain,
+        dead_band: 0.02,
+        model: Model::Surfaces {
+            inflation: branch(
+                inflation,
+                range(0.0, 0.0, 8.0)?,
+                Interval { min: 0.0, max: 8.0 },
+                0.9934,
+                0.02851,
+            ),
+            deflation: branch(
+                deflation,
+                range(0.0, -6.0, 0.0)?,
+                Interval { min: -6.0, max: 0.0 },
+                0.9943,
+                0.01821,
+            ),
+        },
+        provenance: Provenance::new("", ["published coefficients"]),
+    })
+}

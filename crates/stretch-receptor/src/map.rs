@@ -1,0 +1,184 @@
+//! A calibration folded into as few operations as a sample needs.
+//!
+//! Normalisation, denormalisation and the target's unit are affine, so their
+//! scales are multiplied into the coefficients once. What is left per sample is
+//! one subtraction on each input and the polynomial itself.
+
+use stretch_core::{
+    Branch, BranchSurface, Calibration, DesignError, Interval, LinearMap, Model, Poly13, Range,
+    Real, Surface,
+};
+
+use crate::Domain;
+
+/// Value and local slope of a calibration at one input.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Point<T> {
+    pub estimate: T,
+    /// Change of the estimate per change of the signal.
+    pub slope: T,
+    pub domain: Domain,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Bounds<T> {
+    min: T,
+    max: T,
+}
+
+impl<T: Real> Bounds<T> {
+    fn round(interval: Interval) -> Self {
+        Self { min: T::from_f64(interval.min), max: T::from_f64(interval.max) }
+    }
+
+    /// The nearest value inside, and whether the value was outside.
+    #[inline(always)]
+    fn clamp(&self, x: T) -> (T, bool) {
+        let low = if x < self.min { self.min } else { x };
+        let inside = if low > self.max { self.max } else { low };
+        (inside, inside != x)
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Line<T> {
+    signal: Bounds<T>,
+    offset: T,
+    slope: T,
+    intercept: T,
+}
+
+/// A surface over `signal - offset` and `rate - rate_offset`, in physical units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Sheet<T, S> {
+    signal: Bounds<T>,
+    rate: Bounds<T>,
+    offset: T,
+    rate_offset: T,
+    surface: S,
+}
+
+/// A calibration, folded. The rate it takes is the signal's own, unsigned by polarity.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(clippy::large_enum_variant)] // no allocator to box with; one lives in a program
+pub(crate) enum Map<T> {
+    Line(Line<T>),
+    Poly13([Sheet<T, Poly13<T>>; 2]),
+    Surface([Sheet<T, Surface<T>>; 2]),
+}
+
+impl<T: Real> Map<T> {
+    pub(crate) fn new(calibration: &Calibration) -> Result<Self, DesignError> {
+        match &calibration.model {
+            Model::Linear(line) => Ok(Self::Line(fold_line(calibration, line))),
+            Model::Surfaces { inflation, deflation } => {
+                let up = fold_surface(calibration, inflation)?;
+                let down = fold_surface(calibration, deflation)?;
+                let surfaces = [round_surface(&up.surface)?, round_surface(&down.surface)?];
+                Ok(match surfaces.map(|surface| surface.as_poly13()) {
+                    [Some(p), Some(q)] => Self::Poly13([up.with(p), down.with(q)]),
+                    _ => Self::Surface([up.with(surfaces[0]), down.with(surfaces[1])]),
+                })
+            }
+            _ => Err(DesignError::OutOfRange { field: "model", value: f64::NAN }),
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn at(&self, branch: Branch, rate: T, signal: T) -> Point<T> {
+        let index = usize::from(branch == Branch::Deflation);
+        match self {
+            Self::Line(line) => {
+                let (x, outside) = line.signal.clamp(signal);
+                Point {
+                    estimate: line.intercept + line.slope * (x - line.offset),
+                    slope: line.slope,
+                    domain: Domain::from_flags(outside, false),
+                }
+            }
+            Self::Poly13(sheets) => {
+                sheets[index].at(rate, signal, |p, r, v| (p.eval(r, v), p.d_volts(r, v)))
+            }
+            Self::Surface(sheets) => {
+                sheets[index].at(rate, signal, |s, r, v| (s.eval(r, v), s.d_volts(r, v)))
+            }
+        }
+    }
+}
+
+impl<T: Real, S> Sheet<T, S> {
+    #[inline(always)]
+    fn at(&self, rate: T, signal: T, eval: impl Fn(&S, T, T) -> (T, T)) -> Point<T> {
+        let (v, signal_outside) = self.signal.clamp(signal);
+        let (r, rate_outside) = self.rate.clamp(rate);
+        let (estimate, slope) = eval(&self.surface, r - self.rate_offset, v - self.offset);
+        Point { estimate, slope, domain: Domain::from_flags(signal_outside, rate_outside) }
+    }
+}
+
+impl<S> Sheet<f64, S> {
+    fn with<T: Real, U>(self, surface: U) -> Sheet<T, U> {
+        let bounds = |b: Bounds<f64>| Bounds::round(Interval { min: b.min, max: b.max });
+        Sheet {
+            signal: bounds(self.signal),
+            rate: bounds(self.rate),
+            offset: T::from_f64(self.offset),
+            rate_offset: T::from_f64(self.rate_offset),
+            surface,
+        }
+    }
+}
+
+fn round_surface<T: Real>(surface: &Surface) -> Result<Surface<T>, DesignError> {
+    let terms = surface.degree().terms();
+    let coefficients = surface.coefficients().map(T::from_f64);
+    Surface::new(surface.degree(), &coefficients[..terms])
+}
+
+/// Reference units per normalised target, and the reference at a target of zero.
+fn output(calibration: &Calibration) -> (f64, f64) {
+    let range: Range = calibration.target_range;
+    let target = calibration.target;
+    (target.reference_per_target() * range.span(), target.to_reference(range.offset()))
+}
+
+fn fold_line<T: Real>(calibration: &Calibration, line: &LinearMap) -> Line<T> {
+    let (gain, zero) = output(calibration);
+    Line {
+        signal: Bounds::round(line.signal_domain),
+        offset: T::from_f64(calibration.signal_range.offset()),
+        slope: T::from_f64(line.slope * gain / calibration.signal_range.span()),
+        intercept: T::from_f64(zero + gain * line.intercept),
+    }
+}
+
+fn fold_surface(
+    calibration: &Calibration,
+    branch: &BranchSurface,
+) -> Result<Sheet<f64, Surface>, DesignError> {
+    let (gain, zero) = output(calibration);
+    let sign = calibration.polarity.sign();
+    let rate_scale = sign / branch.rate_range.span();
+    let signal_scale = calibration.signal_range.span().recip();
+    let degree = branch.surface.degree();
+    let mut folded = [0.0; stretch_core::MAX_TERMS];
+    for (place, (i, j)) in folded.iter_mut().zip(degree.exponents()) {
+        let scale = power(rate_scale, i) * power(signal_scale, j);
+        *place = branch.surface.coefficient(i, j) * gain * scale;
+    }
+    folded[0] += zero;
+    let [min, max] = [branch.rate_domain.min, branch.rate_domain.max].map(|rate| sign * rate);
+    let rate = if sign > 0.0 { Bounds { min, max } } else { Bounds { min: max, max: min } };
+    Ok(Sheet {
+        signal: Bounds::round(branch.signal_domain),
+        rate,
+        offset: calibration.signal_range.offset(),
+        rate_offset: sign * branch.rate_range.offset(),
+        surface: Surface::new(degree, &folded[..degree.terms()])?,
+    })
+}
+
+/// `x^n` by multiplication: `powi` may differ from platform to platform.
+fn power(x: f64, n: u8) -> f64 {
+    (0..n).map(|_| x).product()
+}

@@ -1,0 +1,93 @@
+//! What a receptor answers for one sample.
+
+use core::fmt;
+
+use stretch_core::{Branch, Millimetres, MillimetresPerSecond, Real};
+
+/// One answer: the estimate, its rate, and how much to trust it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading<T = f64> {
+    /// The estimated reference, in its own unit (millimetres of a muscle,
+    /// degrees of a joint).
+    pub estimate: T,
+    /// Its rate, in that unit per second: the local slope of the calibration
+    /// times the rate of the signal.
+    pub rate: T,
+    /// The branch that was evaluated.
+    pub branch: Branch,
+    /// Whether the inputs lay where the calibration was fitted.
+    pub domain: Domain,
+}
+
+impl<T: Real> Reading<T> {
+    /// The estimate as a length, for a calibration whose reference is in millimetres.
+    pub fn length(&self) -> Millimetres<T> {
+        Millimetres(self.estimate)
+    }
+
+    /// The rate as that of a length, for a calibration whose reference is in millimetres.
+    pub fn length_rate(&self) -> MillimetresPerSecond<T> {
+        MillimetresPerSecond(self.rate)
+    }
+}
+
+/// Whether the inputs of a [`Reading`] lay in the calibrated domain.
+///
+/// An input outside is moved to the nearest end before the calibration is
+/// evaluated, and this says so: a polynomial is never extrapolated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Domain {
+    /// Both inside: the estimate interpolates what was calibrated.
+    Inside,
+    /// The signal was outside, and was clamped.
+    SignalClamped,
+    /// The rate was outside, and was clamped.
+    RateClamped,
+    /// Both were.
+    BothClamped,
+}
+
+impl Domain {
+    #[inline]
+    pub(crate) fn from_flags(signal_outside: bool, rate_outside: bool) -> Self {
+        match (signal_outside, rate_outside) {
+            (false, false) => Self::Inside,
+            (true, false) => Self::SignalClamped,
+            (false, true) => Self::RateClamped,
+            (true, true) => Self::BothClamped,
+        }
+    }
+}
+
+impl fmt::Display for Domain {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Inside => "inside",
+            Self::SignalClamped => "signal_clamped",
+            Self::RateClamped => "rate_clamped",
+            Self::BothClamped => "both_clamped",
+        })
+    }
+}
+
+/// Why there is no [`Reading`] for a sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Withheld {
+    /// The rate estimator has not seen enough samples yet.
+    Warming,
+    /// The sample was missing or not a number. A short gap is bridged inside;
+    /// a longer one starts the warm-up again.
+    Missing,
+}
+
+impl fmt::Display for Withheld {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Warming => f.pad("warming"),
+            Self::Missing => f.pad("missing"),
+        }
+    }
+}
+
+impl core::error::Error for Withheld {}

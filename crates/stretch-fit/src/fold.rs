@@ -31,31 +31,40 @@ fn dot<T: Real, const ROWS: usize>(v: &[T; ROWS], a: &[T; ROWS]) -> T {
     ((sums[0] + sums[1]) + (sums[2] + sums[3])) + tail
 }
 
-/// `a - s v` into `a`, and `next . a` of the result.
+/// `a - s v` into each `a`, and `next . a` of the result: several columns at
+/// once share the loads of `v` and `next`.
 #[inline(always)]
-fn reflect_then_dot<T: Real, const ROWS: usize>(
-    a: &mut [T; ROWS],
-    s: T,
+fn reflect_then_dot<T: Real, const COLUMNS: usize, const ROWS: usize>(
+    a: [&mut [T; ROWS]; COLUMNS],
+    s: [T; COLUMNS],
     v: &[T; ROWS],
     next: &[T; ROWS],
-) -> T {
-    let mut sums = [T::zero(); LANES];
-    let (a, a_tail) = a.as_chunks_mut::<LANES>();
-    let (v, v_tail) = v.as_chunks::<LANES>();
-    let (next, next_tail) = next.as_chunks::<LANES>();
-    for ((a, v), next) in a.iter_mut().zip(v).zip(next) {
+) -> [T; COLUMNS] {
+    let whole = ROWS - ROWS % LANES;
+    let mut sums = [[T::zero(); LANES]; COLUMNS];
+    for start in (0..whole).step_by(LANES) {
         for lane in 0..LANES {
-            let x = a[lane] - s * v[lane];
-            a[lane] = x;
-            sums[lane] = sums[lane] + next[lane] * x;
+            let row = start + lane;
+            for column in 0..COLUMNS {
+                let x = a[column][row] - s[column] * v[row];
+                a[column][row] = x;
+                sums[column][lane] = sums[column][lane] + next[row] * x;
+            }
         }
     }
-    let mut tail = T::zero();
-    for ((a, &v), &next) in a_tail.iter_mut().zip(v_tail).zip(next_tail) {
-        *a = *a - s * v;
-        tail = tail + next * *a;
+    let mut tails = [T::zero(); COLUMNS];
+    for row in whole..ROWS {
+        for column in 0..COLUMNS {
+            let x = a[column][row] - s[column] * v[row];
+            a[column][row] = x;
+            tails[column] = tails[column] + next[row] * x;
+        }
     }
-    ((sums[0] + sums[1]) + (sums[2] + sums[3])) + tail
+    let mut dots = [T::zero(); COLUMNS];
+    for ((dot, sums), tail) in dots.iter_mut().zip(sums).zip(tails) {
+        *dot = ((sums[0] + sums[1]) + (sums[2] + sums[3])) + tail;
+    }
+    dots
 }
 
 /// `a - s v` into `a`, and the sum of squares of the result.
@@ -156,10 +165,21 @@ pub(crate) fn fold<T: Real, const TERMS: usize, const ROWS: usize>(
         let s_value = reflection.apply(&mut q[k], value_dot);
         if let Some((next, rest)) = ahead.split_first_mut() {
             below = reflect_then_square(next, subtract[k + 1], v);
-            for (column, j) in rest.iter_mut().zip(k + 2..) {
-                dots[j] = reflect_then_dot(column, subtract[j], v, next);
+            let mut j = k + 2;
+            let mut pairs = rest.chunks_exact_mut(2);
+            for pair in &mut pairs {
+                if let [one, two] = pair {
+                    let s = [subtract[j], subtract[j + 1]];
+                    [dots[j], dots[j + 1]] = reflect_then_dot([one, two], s, v, next);
+                    j += 2;
+                }
             }
-            value_dot = reflect_then_dot(values, s_value, v, next);
+            if let [last] = pairs.into_remainder() {
+                let s = [subtract[j], s_value];
+                [dots[j], value_dot] = reflect_then_dot([last, values], s, v, next);
+            } else {
+                [value_dot] = reflect_then_dot([values], [s_value], v, next);
+            }
         } else {
             unexplained = reflect_then_square(values, s_value, v);
         }

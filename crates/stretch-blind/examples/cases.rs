@@ -1,0 +1,17 @@
+//! Makes sealed cases: `cargo run --release --example cases -- FOLDER CASES SEED`.
+
+use std::path::Path;
+
+use stretch_blind::{Plan, make};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [folder, cases, seed] = arguments.as_slice() else {
+        eprintln!("usage: cases FOLDER CASES SEED");
+        std::process::exit(2);
+    };
+    let plan = Plan::of(cases.parse()?);
+    let seal = make(Path::new(folder), seed.parse()?, &plan, &|done| eprint!("\r{done} done"))?;
+    println!("\nsealed: {}", seal.sha256());
+    Ok(())
+}

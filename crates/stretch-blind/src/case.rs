@@ -1,0 +1,216 @@
+//! One case: a rig drawn, effects set to the strength wanted, the session recorded.
+
+use std::collections::BTreeMap;
+
+use crate::dice::Dice;
+use crate::effect::{Cause, Causes, Kind};
+use crate::error::BlindError;
+use crate::excess::Yardstick;
+use crate::plan::{Order, Plan};
+use crate::protocol::{Script, session};
+use crate::rig::{L_STEP, LEAST_STRAIN, Rig, SIGMA_L, SIGMA_P, SIGMA_V, UNCERTAIN, V_FS, V_STEP};
+use crate::session::{Conditions, FINE, run};
+use crate::truth::{Acting, CaseKind, Label};
+
+/// Rigs drawn before a case is given up.
+const TRIES: usize = 60;
+
+/// Measured samples of one trial: pressure in kPa where recorded, length in mm, voltage in V.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Recording {
+    pub(crate) script: Script,
+    pub(crate) pressure_kpa: Option<Vec<f64>>,
+    pub(crate) length_mm: Vec<f64>,
+    pub(crate) bridge_v: Vec<f64>,
+}
+
+/// A recorded session and its label.
+#[derive(Debug, Clone)]
+pub(crate) struct Case {
+    pub(crate) label: Label,
+    pub(crate) recordings: Vec<Recording>,
+}
+
+impl Case {
+    /// Makes case `number` of `seed`.
+    pub(crate) fn make(
+        number: usize,
+        seed: u64,
+        plan: &Plan,
+        order: Order,
+    ) -> Result<Self, BlindError> {
+        // Streams of its own for every case: the order in which cases are made cannot matter.
+        let base = 16 * (number as u64 + 1);
+        let mut protocol_dice = Dice::new(seed, base);
+        let mut rig_dice = Dice::new(seed, base + 1);
+        let mut effect_dice = Dice::new(seed, base + 2);
+        let mut noise_dice = Dice::new(seed, base + 3);
+        let scripts = session(&mut protocol_dice);
+        for _ in 0..TRIES {
+            let rig = Rig::draw(&mut rig_dice);
+            let conditions = Conditions::draw(&scripts, &mut rig_dice);
+            let mut yardstick = Yardstick::new(&rig, &scripts, &conditions, order.pressure_column);
+            let chosen = choose(order, plan, &mut yardstick, &mut effect_dice);
+            let causes = Causes::new(&chosen.iter().map(|c| c.0).collect::<Vec<_>>());
+            let (excess, least) = match chosen.as_slice() {
+                [] => (0.0, f64::INFINITY),
+                _ => yardstick.excess(&causes),
+            };
+            if least <= LEAST_STRAIN {
+                continue;
+            }
+            let label = label(order, &rig, &chosen, excess);
+            let traces = run(&rig, &causes, &scripts, &conditions, FINE);
+            let recordings = scripts
+                .iter()
+                .zip(traces)
+                .map(|(script, trace)| {
+                    let pressure = trace.pressure.iter().map(|p| {
+                        let noisy = p + SIGMA_P * noise_dice.gauss();
+                        noisy / 1000.0
+                    });
+                    let pressure: Vec<f64> = pressure.collect();
+                    let length_mm = trace
+                        .length
+                        .iter()
+                        .map(|l| ((l + SIGMA_L * noise_dice.gauss()) / L_STEP).round() * L_STEP);
+                    let length_mm = length_mm.collect();
+                    let bridge_v = trace
+                        .volts
+                        .iter()
+                        .map(|v| {
+                            let clipped = (v + SIGMA_V * noise_dice.gauss()).clamp(0.0, V_FS);
+                            (clipped / V_STEP).round() * V_STEP
+                        })
+                        .collect();
+                    let pressure_kpa = order.pressure_column.then_some(pressure);
+                    Recording { script: script.clone(), pressure_kpa, length_mm, bridge_v }
+                })
+                .collect();
+            return Ok(Self { label, recordings });
+        }
+        Err(BlindError::NoRig { case: number, tries: TRIES })
+    }
+}
+
+fn label(order: Order, rig: &Rig, chosen: &[(Cause, f64)], excess: f64) -> Label {
+    let mut chosen = chosen.to_vec();
+    if order.kind != CaseKind::Dominant {
+        chosen.sort_by(|a, b| b.1.total_cmp(&a.1));
+    }
+    let name = |cause: &Cause| cause.kind.spec().name.to_owned();
+    let lead = chosen.first().map(|c| name(&c.0));
+    let parameters: BTreeMap<String, f64> =
+        UNCERTAIN.iter().zip(rig.values).map(|(p, value)| (p.name.to_owned(), value)).collect();
+    Label {
+        kind: order.kind,
+        effects: chosen.iter().map(|c| name(&c.0)).collect(),
+        stages: chosen.iter().map(|c| c.0.kind.spec().stage).collect(),
+        pressure_column: order.pressure_column,
+        excess,
+        struck: lead.clone().filter(|_| order.kind == CaseKind::Struck),
+        dominant: lead.filter(|_| order.kind == CaseKind::Dominant),
+        acting: chosen
+            .iter()
+            .map(|(cause, alone)| Acting {
+                name: name(cause),
+                stage: cause.kind.spec().stage,
+                form: cause.kind.spec().forms[cause.form].to_owned(),
+                strength: cause.signed(),
+                excess: *alone,
+            })
+            .collect(),
+        parameters,
+    }
+}
+
+/// The causes of a case with the excess of each alone.
+fn choose(
+    order: Order,
+    plan: &Plan,
+    yardstick: &mut Yardstick<'_>,
+    dice: &mut Dice,
+) -> Vec<(Cause, f64)> {
+    let Some(lead) = order.lead else { return Vec::new() };
+    let (least, most) = plan.excess;
+    match order.kind {
+        CaseKind::Null => Vec::new(),
+        CaseKind::Single | CaseKind::OutOfCatalogue | CaseKind::Struck => {
+            vec![tuned(Cause::draw(lead, dice), least, most, yardstick, dice)]
+        }
+        CaseKind::Compound => {
+            // Each visible on its own, and neither drowned by the other.
+            let first = tuned(Cause::draw(lead, dice), 1.0, most.max(1.0), yardstick, dice);
+            let low = (0.2 * first.1).max(0.5);
+            let high = 5.0 * first.1.max(1.0);
+            let other = Cause::draw(partner(&[lead], dice), dice);
+            vec![first, tuned(other, low, high, yardstick, dice)]
+        }
+        CaseKind::Dominant => {
+            let first = tuned(Cause::draw(lead, dice), 8.0, most.max(8.0), yardstick, dice);
+            let mut kinds = vec![lead];
+            let mut chosen = vec![first];
+            while chosen.len() < 4 {
+                let kind = partner(&kinds, dice);
+                kinds.push(kind);
+                let cause = Cause::draw(kind, dice);
+                let (low, high) = (0.02 * first.1, 0.12 * first.1);
+                chosen.push(tuned(cause, low, high, yardstick, dice));
+            }
+            chosen
+        }
+    }
+}
+
+/// A kind of the catalogue that is not among those taken.
+fn partner(taken: &[Kind], dice: &mut Dice) -> Kind {
+    let free: Vec<Kind> =
+        Kind::catalogued().iter().copied().filter(|kind| !taken.contains(kind)).collect();
+    dice.pick(&free)
+}
+
+/// Sets the strength of a cause so that its excess is log-uniform between `low` and `high`, as
+/// far as its range reaches.
+fn tuned(
+    cause: Cause,
+    low: f64,
+    high: f64,
+    yardstick: &mut Yardstick<'_>,
+    dice: &mut Dice,
+) -> (Cause, f64) {
+    let mut measure = |strength: f64| yardstick.excess(&Causes::new(&[cause.at(strength)])).0;
+    let spec = cause.kind.spec();
+    let full = measure(cause.most());
+    let target = dice.log_between(low, high.min(full).max(1.01 * low));
+    if full <= target {
+        return (cause, full);
+    }
+    // Bisection of the logarithm, guided by excess ~ strength^2 while that makes progress.
+    let (mut weak, mut strong) = (spec.least.ln(), cause.most().ln());
+    let mut guess = strong - 0.5 * (full / target).ln();
+    let mut best = (cause, full);
+    for round in 0..9 {
+        if guess <= weak || guess >= strong || round % 3 == 2 {
+            guess = 0.5 * (weak + strong);
+        }
+        let found = measure(guess.exp());
+        if (found / target).ln().abs() < (best.1 / target).ln().abs() {
+            best = (cause.at(guess.exp()), found);
+        }
+        if (found / target).ln().abs() < 0.15 {
+            break;
+        }
+        if found < target {
+            weak = guess;
+        } else {
+            strong = guess;
+        }
+        guess -= 0.5 * (found.max(1e-9) / target).ln();
+    }
+    if (best.1 / target).ln().abs() > 0.9 {
+        // The excess jumps over the target (a threshold): any strength beyond the jump will do.
+        let strength = dice.log_between(strong.exp(), cause.most());
+        return (cause.at(strength), measure(strength));
+    }
+    best
+}

@@ -1,0 +1,206 @@
+//! What may be wrong with a rig: the vocabulary, and the forms each cause takes here.
+
+use serde::{Deserialize, Serialize};
+
+use crate::dice::Dice;
+
+/// Part of the rig that a cause acts in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Stage {
+    /// Openings to pressure.
+    Pneumatics,
+    /// Pressure to length.
+    Muscle,
+    /// Length to bridge voltage.
+    Sensing,
+    /// True length to measured length.
+    Reference,
+}
+
+impl Stage {
+    /// Name as reports write it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pneumatics => "pneumatics",
+            Self::Muscle => "muscle",
+            Self::Sensing => "sensing",
+            Self::Reference => "reference",
+        }
+    }
+}
+
+/// A cause: its name, stage, forms, least and greatest strength, and what a negative sign does.
+#[derive(Debug)]
+pub(crate) struct Spec {
+    pub(crate) name: &'static str,
+    pub(crate) stage: Stage,
+    pub(crate) forms: &'static [&'static str],
+    pub(crate) least: f64,
+    pub(crate) most: f64,
+    /// Share of `most` reached with a negative sign; 0 where the sign is fixed.
+    pub(crate) negative: f64,
+}
+
+macro_rules! causes {
+    ($($id:ident $name:literal $stage:ident [$($form:literal),+] $least:literal .. $most:literal, $negative:literal;)*) => {
+        /// Every cause that can be simulated; the first 23 are in the catalogue of effects.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub(crate) enum Kind { $($id),* }
+        /// In the order of [`Kind`].
+        pub(crate) static SPECS: &[Spec] = &[$(Spec {
+            name: $name, stage: Stage::$stage, forms: &[$($form),+],
+            least: $least, most: $most, negative: $negative,
+        }),*];
+        /// All kinds, in order.
+        pub(crate) static KINDS: &[Kind] = &[$(Kind::$id),*];
+    };
+}
+
+causes! {
+    SupplySag "supply_sag" Pneumatics ["regulator_orifice", "progressive"] 1e4 .. 4e8, 0.0;
+    ValveDelay "valve_delay" Pneumatics ["dead_time_and_lag", "opening_and_closing_differ", "valves_differ"] 1e-4 .. 0.12, 0.0;
+    ValveDeadband "valve_deadband" Pneumatics ["shifted", "smooth_onset"] 1e-4 .. 0.11, 0.0;
+    Leak "leak" Pneumatics ["iso_orifice", "laminar_gap"] 1e-14 .. 2e-10, 0.0;
+    ChamberVolume "chamber_volume" Pneumatics ["quadratic", "sine"] 1e-3 .. 3.0, 0.0;
+    MuscleHysteresis "muscle_hysteresis" Muscle ["dahl", "bouc_wen", "maxwell_slip"] 2e-4 .. 0.6, 0.0;
+    MuscleCreep "muscle_creep" Muscle ["two_time_constants", "power_law"] 1e-4 .. 0.3, 0.0;
+    CrossbeamInertia "crossbeam_inertia" Muscle ["quadratic_damping", "direction_damping"] 4e-3 .. 0.08, 0.0;
+    SleeveSlack "sleeve_slack" Sensing ["hard", "wide_knee"] 2e-4 .. 0.12, 0.0;
+    SleeveSlip "sleeve_slip" Sensing ["dahl", "bouc_wen", "maxwell_slip"] 1e-5 .. 0.03, 0.0;
+    PressureCrosstalk "pressure_crosstalk" Sensing ["saturating", "progressive"] 1e-5 .. 0.05, 1.0;
+    GaugeHysteresis "gauge_hysteresis" Sensing ["dahl", "bouc_wen", "maxwell_slip"] 2e-4 .. 0.6, 0.0;
+    GaugeRelaxation "gauge_relaxation" Sensing ["two_time_constants", "power_law"] 1e-4 .. 0.6, 0.5;
+    GaugeSoftening "gauge_softening" Sensing ["power_law", "hyperbolic"] 1e-4 .. 0.3, 0.0;
+    GaugeNonlinearity "gauge_nonlinearity" Sensing ["sine", "skewed_cubic"] 1e-5 .. 0.1, 1.0;
+    ThermalDrift "thermal_drift" Sensing ["settling", "power_law"] 1e-8 .. 4e-4, 1.0;
+    SelfHeating "self_heating" Sensing ["two_time_constants", "square_root"] 1e-5 .. 0.05, 1.0;
+    AmplifierSaturation "amplifier_saturation" Sensing ["hard_top", "smooth_top", "hard_bottom"] 2e-3 .. 0.8, 0.0;
+    AmplifierLowpass "amplifier_lowpass" Sensing ["two_poles", "pole_and_dead_time"] 1e-4 .. 0.4, 0.0;
+    MainsHum "mains_hum" Sensing ["wandering_50", "wandering_60"] 1e-4 .. 0.1, 0.0;
+    ChannelSkew "channel_skew" Sensing ["clock_rate", "wandering"] 1e-4 .. 0.2, 0.5;
+    PotNonlinearity "pot_nonlinearity" Reference ["sine", "skewed_cubic"] 1e-3 .. 3.0, 1.0;
+    PotBacklash "pot_backlash" Reference ["dahl", "bouc_wen"] 1e-3 .. 2.0, 0.0;
+    ValveSticking "valve_sticking" Pneumatics ["late_opening", "slow_closing"] 1e-3 .. 0.3, 0.0;
+    AdiabaticGas "adiabatic_gas" Pneumatics ["polytropic"] 1e-3 .. 0.6, 0.0;
+    SupplyOscillation "supply_oscillation" Pneumatics ["sine"] 1e-4 .. 0.12, 0.0;
+    OutletCrossflow "outlet_crossflow" Pneumatics ["share_of_inlet"] 1e-4 .. 0.3, 0.0;
+    AsymmetricLag "asymmetric_lag" Muscle ["slower_extension", "slower_contraction"] 1e-2 .. 4.0, 0.0;
+    SnapThrough "snap_through" Muscle ["bistable"] 1e-5 .. 0.03, 0.0;
+    MuscleFatigue "muscle_fatigue" Muscle ["recovering"] 1e-4 .. 0.15, 0.0;
+    CapacitivePickup "capacitive_pickup" Sensing ["command_edges"] 1e-3 .. 0.6, 0.0;
+    AmplifierSlew "amplifier_slew" Sensing ["rate_limit"] 0.1 .. 30.0, 0.0;
+    MissingCodes "missing_codes" Sensing ["sticky_bit"] 0.05 .. 64.0, 0.0;
+    CoilDroop "coil_droop" Sensing ["coil_current"] 1e-5 .. 0.1, 0.0;
+    IntermittentContact "intermittent_contact" Sensing ["telegraph"] 1e-5 .. 0.1, 0.0;
+    FrozenSamples "frozen_samples" Sensing ["runs"] 1e-3 .. 0.6, 0.0;
+    PotStiction "pot_stiction" Reference ["stick_and_jump"] 1e-3 .. 3.0, 0.0;
+}
+
+/// How many kinds of the list above the catalogue of effects holds.
+pub(crate) const CATALOGUED: usize = 23;
+
+impl Kind {
+    pub(crate) fn spec(self) -> &'static Spec {
+        &SPECS[self as usize]
+    }
+
+    /// The catalogue's kinds.
+    pub(crate) fn catalogued() -> &'static [Kind] {
+        &KINDS[..CATALOGUED]
+    }
+
+    /// The kinds that the catalogue lacks.
+    pub(crate) fn foreign() -> &'static [Kind] {
+        &KINDS[CATALOGUED..]
+    }
+
+    /// The kind of this name.
+    pub(crate) fn named(name: &str) -> Option<Kind> {
+        KINDS.iter().copied().find(|k| k.spec().name == name)
+    }
+}
+
+/// A cause at work: a kind in one of its forms at one strength.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Cause {
+    pub(crate) kind: Kind,
+    pub(crate) form: usize,
+    /// Leading parameter, without its sign; units as in the catalogue.
+    pub(crate) strength: f64,
+    pub(crate) sign: f64,
+    /// Uniform numbers that set what else the form leaves open.
+    pub(crate) aux: [f64; 3],
+    /// Seed of what is random inside the cause.
+    pub(crate) seed: u64,
+}
+
+impl Cause {
+    /// A form, a sign and the secondary parameters drawn; the strength still at its most.
+    pub(crate) fn draw(kind: Kind, dice: &mut Dice) -> Self {
+        let form = dice.below(kind.spec().forms.len());
+        let negative = kind.spec().negative > 0.0 && dice.unit() < 0.5;
+        let sign = if negative { -1.0 } else { 1.0 };
+        let aux = std::array::from_fn(|_| dice.unit());
+        let mut cause = Self { kind, form, strength: 0.0, sign, aux, seed: dice.bits() };
+        cause.strength = cause.most();
+        cause
+    }
+
+    /// Greatest strength in the direction of its sign.
+    pub(crate) fn most(&self) -> f64 {
+        let spec = self.kind.spec();
+        if self.sign < 0.0 { spec.most * spec.negative } else { spec.most }
+    }
+
+    /// The same cause at another strength.
+    pub(crate) fn at(self, strength: f64) -> Self {
+        Self { strength, ..self }
+    }
+
+    /// Strength with its sign.
+    pub(crate) fn signed(&self) -> f64 {
+        self.sign * self.strength
+    }
+
+    /// Log-uniform secondary parameter from one of the uniform numbers.
+    pub(crate) fn log_aux(&self, index: usize, low: f64, high: f64) -> f64 {
+        low * (high / low).powf(self.aux[index])
+    }
+}
+
+/// The causes at work in a rig, found by kind.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Causes(Vec<Cause>);
+
+impl Causes {
+    pub(crate) fn new(causes: &[Cause]) -> Self {
+        Self(causes.to_vec())
+    }
+
+    pub(crate) fn find(&self, kind: Kind) -> Option<Cause> {
+        self.0.iter().copied().find(|c| c.kind == kind)
+    }
+
+    pub(crate) fn any_in(&self, stage: Stage) -> bool {
+        self.0.iter().any(|c| c.kind.spec().stage == stage)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vocabulary_is_consistent() {
+        assert_eq!(Kind::catalogued().len(), CATALOGUED);
+        assert!(Kind::foreign().len() >= 8);
+        assert_eq!(Kind::catalogued().last(), Some(&Kind::PotBacklash));
+        for &kind in KINDS {
+            let spec = kind.spec();
+            assert_eq!(Kind::named(spec.name), Some(kind));
+            assert!(spec.least > 0.0 && spec.least < spec.most, "{}", spec.name);
+        }
+    }
+}

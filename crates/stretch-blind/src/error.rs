@@ -1,0 +1,77 @@
+//! What can go wrong when cases are written, sealed or scored.
+
+use std::path::{Path, PathBuf};
+
+/// Failure of the blind check, with its evidence.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BlindError {
+    /// A file or folder could not be read or written.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A JSON file is not what it should be.
+    #[error("{path}: {source}")]
+    Json {
+        /// The file, or the name of the text.
+        path: PathBuf,
+        /// What the parser said.
+        source: serde_json::Error,
+    },
+    /// The sealed labels are not the ones whose hash was printed.
+    #[error("the seal is broken: labels hash to {found}, the seal says {sealed}")]
+    SealBroken {
+        /// Hash written when the cases were made.
+        sealed: String,
+        /// Hash of the labels as they are now.
+        found: String,
+    },
+    /// The folder already holds a sealed set of cases.
+    #[error("{path} already holds cases: make the new ones in an empty folder")]
+    Occupied {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// No rig could be drawn whose sleeve stays stretched with the effect acting.
+    #[error("case {case}: no rig drawn in {tries} tries keeps its sleeve stretched")]
+    NoRig {
+        /// Number of the case.
+        case: usize,
+        /// How many rigs were drawn.
+        tries: usize,
+    },
+    /// A verdict names a case that the labels do not have.
+    #[error("verdict on {case}, which is not among the sealed cases")]
+    UnknownCase {
+        /// Name in the verdict.
+        case: String,
+    },
+    /// More than one verdict on one case.
+    #[error("two verdicts on {case}")]
+    DuplicateCase {
+        /// Name in the verdicts.
+        case: String,
+    },
+    /// A diagnosis lacks a field or holds a number that makes no sense.
+    #[error("{case}: {reason}")]
+    BadVerdict {
+        /// Name of the case.
+        case: String,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
+}
+
+impl BlindError {
+    pub(crate) fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self + '_ {
+        move |source| Self::Io { path: path.to_path_buf(), source }
+    }
+
+    pub(crate) fn json(path: &Path) -> impl FnOnce(serde_json::Error) -> Self + '_ {
+        move |source| Self::Json { path: path.to_path_buf(), source }
+    }
+}

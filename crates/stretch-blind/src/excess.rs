@@ -1,0 +1,223 @@
+//! How strong a case is: the excess over the floor that re-tuning the nominal rig would leave.
+
+use crate::effect::{Causes, Stage};
+use crate::protocol::{Script, Split};
+use crate::rig::{L_0, L_STEP, Rig, SIGMA_L, SIGMA_P, SIGMA_V, UNCERTAIN, V_STEP};
+use crate::session::{COARSE, Conditions, Trace, run};
+
+/// Residuals and sensitivities of three channels (pressure, length, voltage), in floor units, for
+/// samples to fit and samples to test on.
+type Channels = [Vec<f64>; 3];
+
+/// The nominal session of a rig, and what its parameters change in it, computed when needed.
+#[derive(Debug)]
+pub(crate) struct Yardstick<'a> {
+    rig: &'a Rig,
+    scripts: &'a [Script],
+    conditions: &'a Conditions,
+    pressure_column: bool,
+    nominal: Vec<Trace>,
+    moved: Vec<Option<Vec<Trace>>>,
+    floor: [f64; 3],
+}
+
+impl<'a> Yardstick<'a> {
+    pub(crate) fn new(
+        rig: &'a Rig,
+        scripts: &'a [Script],
+        conditions: &'a Conditions,
+        pressure_column: bool,
+    ) -> Self {
+        let nominal = run(rig, &Causes::default(), scripts, conditions, COARSE);
+        let full = rig.static_contraction(rig.p_s() + crate::rig::P_ATM);
+        let slope = (rig.nominal_volts(full) - rig.nominal_volts(0.0)) / (full * L_0);
+        // Length noise reaches the voltage of a gauge that is driven by the measured length.
+        let volts = SIGMA_V.powi(2) + V_STEP.powi(2) / 12.0 + (slope * SIGMA_L).powi(2);
+        let floor = [SIGMA_P, (SIGMA_L.powi(2) + L_STEP.powi(2) / 12.0).sqrt(), volts.sqrt()];
+        let moved = vec![None; UNCERTAIN.len()];
+        Self { rig, scripts, conditions, pressure_column, nominal, moved, floor }
+    }
+
+    /// Excess summed over the channels on the test trials, after the nominal parameters took up
+    /// what they can of the gap in the fit trials; and the least strain met.
+    pub(crate) fn excess(&mut self, causes: &Causes) -> (f64, f64) {
+        let truth = run(self.rig, causes, self.scripts, self.conditions, COARSE);
+        let least = truth.iter().map(|t| t.least_strain).fold(f64::INFINITY, f64::min);
+        let residual = self.residual(&truth);
+        let used: Vec<usize> = (0..UNCERTAIN.len())
+            .filter(|&i| self.shows(UNCERTAIN[i].stage, UNCERTAIN[i].name, &residual))
+            .collect();
+        let columns: Vec<Channels> = used.iter().map(|&i| self.sensitivity(i, &truth)).collect();
+        let shift = self.retune(&residual, &columns);
+        let mut excess = 0.0;
+        for channel in 0..3 {
+            let (mut sum, mut count) = (0.0, 0usize);
+            for (at, r) in self.samples(Split::Test).map(|at| (at, residual[channel].get(at))) {
+                let Some(r) = r else { continue };
+                let fitted: f64 = columns.iter().zip(&shift).map(|(c, s)| s * c[channel][at]).sum();
+                sum += (r - fitted).powi(2);
+                count += 1;
+            }
+            excess += if count > 0 { sum / count as f64 } else { 0.0 };
+        }
+        (excess, least)
+    }
+
+    /// Sample numbers, all trials end to end, that belong to a split.
+    fn samples(&self, split: Split) -> impl Iterator<Item = usize> + '_ {
+        let mut begin = 0;
+        self.scripts.iter().flat_map(move |script| {
+            let range = begin..begin + script.openings.len();
+            begin = range.end;
+            if script.split == split { range } else { 0..0 }
+        })
+    }
+
+    fn join<F: Fn(&Trace, &Trace, usize) -> f64>(
+        &self,
+        truth: &[Trace],
+        floor: f64,
+        f: F,
+    ) -> Vec<f64> {
+        let pairs = truth.iter().zip(&self.nominal);
+        pairs
+            .flat_map(|(t, n)| {
+                let f = &f;
+                (0..t.length.len()).map(move |i| f(t, n, i) / floor)
+            })
+            .collect()
+    }
+
+    /// Every stage fed with its measured input: what the nominal rig leaves in each channel.
+    fn residual(&self, truth: &[Trace]) -> Channels {
+        let pressure = if self.pressure_column {
+            self.join(truth, self.floor[0], |t, n, i| t.pressure[i] - n.pressure[i])
+        } else {
+            Vec::new()
+        };
+        let length = if self.pressure_column {
+            self.join(truth, self.floor[1], |t, _, i| t.length[i] - t.shadow[i])
+        } else {
+            self.join(truth, self.floor[1], |t, n, i| t.length[i] - n.length[i])
+        };
+        let volts = self.join(truth, self.floor[2], |t, _, i| {
+            t.volts[i] - self.rig.nominal_volts(1.0 - t.length[i] / L_0)
+        });
+        [pressure, length, volts]
+    }
+
+    /// Whether a parameter can take up any of the residual.
+    fn shows(&self, stage: Stage, name: &str, residual: &Channels) -> bool {
+        let alive = |c: usize| residual[c].iter().any(|r| r.abs() > 1e-3);
+        match stage {
+            Stage::Pneumatics if self.pressure_column => alive(0),
+            Stage::Pneumatics | Stage::Muscle => alive(1),
+            // The trimmed arm scales with the resistance: R0 does not show.
+            _ => alive(2) && name != "R0",
+        }
+    }
+
+    /// Change of every channel for one standard deviation of a parameter.
+    fn sensitivity(&mut self, index: usize, truth: &[Trace]) -> Channels {
+        let parameter = &UNCERTAIN[index];
+        let step = 0.25 * parameter.sd;
+        if parameter.stage == Stage::Sensing {
+            let rig = self.rig.moved(index, step);
+            let scale = 0.25 * self.floor[2];
+            let volts = self.join(truth, scale, |t, _, i| {
+                let k = 1.0 - t.length[i] / L_0;
+                rig.nominal_volts(k) - self.rig.nominal_volts(k)
+            });
+            let zero = vec![0.0; volts.len()];
+            return [zero.clone(), zero, volts];
+        }
+        if self.moved[index].is_none() {
+            let rig = self.rig.moved(index, step);
+            let traces = run(&rig, &Causes::default(), self.scripts, self.conditions, COARSE);
+            self.moved[index] = Some(traces);
+        }
+        let moved = self.moved[index].as_deref().unwrap_or_default();
+        let pressure = if self.pressure_column {
+            self.join(moved, 0.25 * self.floor[0], |t, n, i| t.pressure[i] - n.pressure[i])
+        } else {
+            Vec::new()
+        };
+        let length = if self.pressure_column && parameter.stage == Stage::Pneumatics {
+            Vec::new()
+        } else {
+            self.join(moved, 0.25 * self.floor[1], |t, n, i| t.length[i] - n.length[i])
+        };
+        let total = self.nominal.iter().map(|t| t.length.len()).sum();
+        let fill = |v: Vec<f64>| if v.is_empty() { vec![0.0; total] } else { v };
+        [fill(pressure), fill(length), vec![0.0; total]]
+    }
+
+    /// Shifts of the parameters, in standard deviations, that explain the residual of the fit
+    /// trials best: least squares with the tolerance as prior, and a bound of three.
+    fn retune(&self, residual: &Channels, columns: &[Channels]) -> Vec<f64> {
+        let n = columns.len();
+        let mut normal = vec![vec![0.0; n]; n];
+        let mut right = vec![0.0; n];
+        // Residuals are correlated over some 50 samples: that many count as one.
+        let weight = 1.0 / 50.0;
+        for channel in 0..3 {
+            if residual[channel].is_empty() {
+                continue;
+            }
+            for at in self.samples(Split::Fit) {
+                for i in 0..n {
+                    let x = columns[i][channel][at];
+                    if x == 0.0 {
+                        continue;
+                    }
+                    right[i] += weight * x * residual[channel][at];
+                    for j in 0..=i {
+                        normal[i][j] += weight * x * columns[j][channel][at];
+                    }
+                }
+            }
+        }
+        for i in 0..n {
+            normal[i][i] += 1.0;
+            for j in 0..i {
+                normal[j][i] = normal[i][j];
+            }
+        }
+        bounded(&normal, &right, 3.0)
+    }
+}
+
+/// Minimiser of 0.5 x'Ax - b'x with every |x| at most `bound`, A positive definite: cyclic
+/// projected descent.
+fn bounded(a: &[Vec<f64>], b: &[f64], bound: f64) -> Vec<f64> {
+    let mut x = vec![0.0; b.len()];
+    for _ in 0..20_000 {
+        let mut change = 0.0_f64;
+        for i in 0..x.len() {
+            let other: f64 = (0..x.len()).filter(|&j| j != i).map(|j| a[i][j] * x[j]).sum();
+            let next = ((b[i] - other) / a[i][i]).clamp(-bound, bound);
+            change = change.max((next - x[i]).abs());
+            x[i] = next;
+        }
+        if change < 1e-7 {
+            break;
+        }
+    }
+    x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounded_least_squares_stops_at_its_bound() {
+        let a = vec![vec![2.0, 0.5], vec![0.5, 1.0]];
+        let free = bounded(&a, &[1.0, 1.0], 3.0);
+        assert!((free[0] - 0.5 / 1.75).abs() < 1e-6 && (free[1] - 1.5 / 1.75).abs() < 1e-6);
+        // With x1 held at its bound, x0 = (b0 - 0.5 x1) / 2.
+        let held = bounded(&a, &[1.0, 9.0], 3.0);
+        assert_eq!(held[1], 3.0);
+        assert!((held[0] + 0.25).abs() < 1e-6);
+    }
+}

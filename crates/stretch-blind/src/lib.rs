@@ -1,0 +1,22 @@
+#![doc = include_str!("../README.md")]
+mod case;
+mod dice;
+mod effect;
+mod error;
+mod excess;
+mod gauge;
+mod make;
+mod memory;
+mod plan;
+mod plant;
+mod protocol;
+mod rig;
+mod seal;
+mod session;
+mod truth;
+pub use effect::Stage;
+pub use error::BlindError;
+pub use make::make;
+pub use plan::Plan;
+pub use seal::Seal;
+pub use truth::{Acting, CaseKind, Label, TWINS, Truth, are_twins};

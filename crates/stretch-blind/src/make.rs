@@ -1,0 +1,105 @@
+//! Writes the cases, each in its folder, and seals their labels.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+
+use crate::case::{Case, Recording};
+use crate::error::BlindError;
+use crate::plan::Plan;
+use crate::protocol::{RATE_HZ, Split};
+use crate::seal::Seal;
+use crate::truth::{CaseKind, Truth};
+
+/// Makes the cases of a plan under `dir` and seals their labels.
+///
+/// Writes `case-000/`, `case-001/`, ... (a data set each: `dataset.toml` and seventeen trials;
+/// where an entry is struck out also `hint.toml` with `without = ["name"]`), `sealed/truth.json`
+/// and `seal.sha256`. Same seed and plan, same bytes, whatever the number of threads. `progress`
+/// is told how many cases are done; it may be called from several threads.
+///
+/// The hash in the [`Seal`] is to be shown before any diagnosis runs.
+///
+/// # Errors
+/// [`BlindError::Occupied`] when `dir` holds a seal already; [`BlindError::Io`] when a file
+/// cannot be written; [`BlindError::NoRig`] when no rig fits a case.
+///
+/// ```
+/// let dir = tempfile::tempdir()?;
+/// let plan = stretch_blind::Plan { null: 1, ..stretch_blind::Plan::of(0) };
+/// let seal = stretch_blind::make(dir.path(), 7, &plan, &|_| {})?;
+/// assert_eq!(seal.sha256().len(), 64);
+/// assert!(dir.path().join("case-000/pulses_2.csv").exists());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn make(
+    dir: &Path,
+    seed: u64,
+    plan: &Plan,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Result<Seal, BlindError> {
+    if dir.join("seal.sha256").exists() || dir.join("sealed").exists() {
+        return Err(BlindError::Occupied { path: dir.to_path_buf() });
+    }
+    fs::create_dir_all(dir).map_err(BlindError::io(dir))?;
+    let done = AtomicUsize::new(0);
+    let orders = plan.orders(seed);
+    let labels: Result<Vec<_>, BlindError> = orders
+        .par_iter()
+        .enumerate()
+        .map(|(number, &order)| {
+            let name = format!("case-{number:03}");
+            let case = Case::make(number, seed, plan, order)?;
+            write_case(&dir.join(&name), &name, &case)?;
+            progress(done.fetch_add(1, Ordering::Relaxed) + 1);
+            Ok((name, case.label))
+        })
+        .collect();
+    let truth = Truth { schema: 1, seed: Some(seed), cases: labels?.into_iter().collect() };
+    Seal::close(dir, &truth)
+}
+
+fn write_case(folder: &Path, name: &str, case: &Case) -> Result<(), BlindError> {
+    fs::create_dir_all(folder).map_err(BlindError::io(folder))?;
+    let write = |file: &str, text: String| {
+        let path = folder.join(file);
+        fs::write(&path, text).map_err(BlindError::io(&path))
+    };
+    let mut index = format!("name = \"{name}\"\nrate_hz = {RATE_HZ}.0\n");
+    for recording in &case.recordings {
+        let script = &recording.script;
+        let _ =
+            write!(index, "\n[[trial]]\nfile = \"{}\"\nkind = \"{}\"\n", script.file, script.kind);
+        if let Some(opening) = script.opening {
+            let _ = writeln!(index, "opening = {opening:?}");
+        }
+        let split = if script.split == Split::Fit { "fit" } else { "test" };
+        let _ = writeln!(index, "start_s = {:?}\nsplit = \"{split}\"", script.start_s);
+        write(&script.file, csv(recording))?;
+    }
+    write("dataset.toml", index)?;
+    if case.label.kind == CaseKind::Struck {
+        let struck = case.label.struck.as_deref().unwrap_or_default();
+        write("hint.toml", format!("without = [\"{struck}\"]\n"))?;
+    }
+    Ok(())
+}
+
+fn csv(recording: &Recording) -> String {
+    let mut text = String::with_capacity(40 * recording.length_mm.len());
+    text.push_str("time_s,inlet,outlet,");
+    text.push_str(if recording.pressure_kpa.is_some() { "pressure_kpa," } else { "" });
+    text.push_str("length_mm,bridge_v\n");
+    for (i, (inlet, outlet)) in recording.script.openings.iter().enumerate() {
+        let time_s = i as f64 / RATE_HZ as f64;
+        let _ = write!(text, "{time_s:.2},{inlet},{outlet},");
+        if let Some(pressure) = &recording.pressure_kpa {
+            let _ = write!(text, "{:.1},", pressure[i]);
+        }
+        let _ = writeln!(text, "{:.3},{:.4}", recording.length_mm[i], recording.bridge_v[i]);
+    }
+    text
+}

@@ -1,0 +1,333 @@
+//! Valves, chamber and muscle, integrated by the classical Runge-Kutta rule.
+
+use crate::effect::{Cause, Causes, Kind};
+use crate::memory::{Lags, Loop};
+use crate::rig::{P_ATM, P_REF, R_T, RHO_0, Rig, V_0};
+
+/// Flow at which the sag of the supply is scaled, kg/s.
+const Q_REF: f64 = 6e-4;
+
+/// Absolute pressure over (1 + theta), lagged contraction, contraction, its rate, sag of the
+/// supply in Pa, relative excess of the gas temperature.
+type State = [f64; 6];
+
+/// Pneumatics and muscle with their memories.
+#[derive(Debug, Clone)]
+pub(crate) struct Plant<'a> {
+    rig: &'a Rig,
+    pub(crate) state: State,
+    shadow: f64,
+    valve_lag: [f64; 2],
+    shut_s: [f64; 2],
+    stuck_s: [f64; 2],
+    snap: (bool, f64),
+    travel: f64,
+    last_static: Option<f64>,
+    hysteresis: Option<(f64, Loop)>,
+    creep: Option<(f64, Lags)>,
+    sag: Option<Cause>,
+    leak: Option<Cause>,
+    volume: Option<Cause>,
+    inertia: Option<Cause>,
+    adiabatic: Option<Cause>,
+    asymmetric: Option<Cause>,
+    snapping: Option<Cause>,
+    fatigue: Option<Cause>,
+    sticking: Option<Cause>,
+    deadband: Option<Cause>,
+    crossflow: Option<Cause>,
+    delay: Option<Cause>,
+}
+
+/// What drives a step: conductance shares of the valves and the supply, Pa absolute.
+#[derive(Debug, Clone, Copy)]
+struct Drive {
+    inlet: f64,
+    outlet: f64,
+    supply: f64,
+}
+
+impl<'a> Plant<'a> {
+    pub(crate) fn new(rig: &'a Rig, causes: &Causes) -> Self {
+        let hysteresis = causes.find(Kind::MuscleHysteresis).map(|c| {
+            let reach = 0.58 * c.log_aux(0, 0.006, 0.05);
+            (c.strength, Loop::new(c.form, reach, c.aux[1], false))
+        });
+        let creep = causes
+            .find(Kind::MuscleCreep)
+            .map(|c| (c.strength, Lags::new(c.form, c.log_aux(0, 0.7, 25.0))));
+        Self {
+            rig,
+            state: [P_ATM, 0.0, 0.0, 0.0, 0.0, 0.0],
+            shadow: 0.0,
+            valve_lag: [0.0; 2],
+            shut_s: [10.0; 2],
+            stuck_s: [0.0; 2],
+            snap: (false, 0.0),
+            travel: 0.0,
+            last_static: None,
+            hysteresis,
+            creep,
+            sag: causes.find(Kind::SupplySag),
+            leak: causes.find(Kind::Leak),
+            volume: causes.find(Kind::ChamberVolume),
+            inertia: causes.find(Kind::CrossbeamInertia),
+            adiabatic: causes.find(Kind::AdiabaticGas),
+            asymmetric: causes.find(Kind::AsymmetricLag),
+            snapping: causes.find(Kind::SnapThrough),
+            fatigue: causes.find(Kind::MuscleFatigue),
+            sticking: causes.find(Kind::ValveSticking),
+            deadband: causes.find(Kind::ValveDeadband),
+            crossflow: causes.find(Kind::OutletCrossflow),
+            delay: causes.find(Kind::ValveDelay),
+        }
+    }
+
+    /// Absolute pressure, Pa.
+    pub(crate) fn pressure(&self) -> f64 {
+        self.state[0] * (1.0 + self.state[5])
+    }
+
+    /// Contraction.
+    pub(crate) fn contraction(&self) -> f64 {
+        self.state[2]
+    }
+
+    /// Contraction of a muscle without any effect at the same pressure.
+    pub(crate) fn shadow(&self) -> f64 {
+        self.shadow
+    }
+
+    /// Sets the pressure, as a regulator would that holds it.
+    pub(crate) fn regulate(&mut self, p: f64) {
+        self.state[0] = p;
+        self.state[4] = 0.0;
+        self.state[5] = 0.0;
+    }
+
+    /// Conductance share of an opening, 0..1.
+    fn share(&self, u: f64, side: usize) -> f64 {
+        let mut u = u;
+        if let Some(c) = self.deadband {
+            // The two valves differ a little; no stretching of what is left.
+            let band = c.strength * if side == 0 { 1.0 } else { 0.8 + 0.4 * c.aux[0] };
+            u = match c.form {
+                0 => (u - band).max(0.0),
+                _ if u <= 0.6 * band => 0.0,
+                _ => at_onset(u, band),
+            };
+        }
+        if u <= 0.0 { 0.0 } else { self.rig.u_min() + (1.0 - self.rig.u_min()) * u }
+    }
+
+    /// Mean share of the `late` command over the step that begins at `t`.
+    fn mean_share(
+        &self,
+        command: &impl Fn(f64) -> (f64, f64),
+        t: f64,
+        h: f64,
+        late: f64,
+        side: usize,
+    ) -> f64 {
+        let at = |time: f64| {
+            let (inlet, outlet) = command(time);
+            self.share(if side == 0 { inlet } else { outlet }, side)
+        };
+        // Commands change at samples only: at most one change falls into a step.
+        let rate = crate::protocol::RATE_HZ as f64;
+        let begin = t - late;
+        let change = (((begin + 1e-9) * rate).floor() + 1.0) / rate;
+        let before = ((change - begin) / h).clamp(0.0, 1.0);
+        let first = at(begin + 1e-9);
+        if before >= 1.0 { first } else { before * first + (1.0 - before) * at(change + 1e-9) }
+    }
+
+    /// Conductance share of a valve over a step, with whatever delays it.
+    fn valve(&mut self, command: &impl Fn(f64) -> (f64, f64), t: f64, h: f64, side: usize) -> f64 {
+        let mut share = match self.delay {
+            None => self.mean_share(command, t, h, 0.0, side),
+            Some(c) => match c.form {
+                0 => {
+                    let target = self.mean_share(command, t, h, 0.65 * c.strength, side);
+                    let tau = 0.35 * c.strength;
+                    let z = &mut self.valve_lag[side];
+                    let decay = (-h / tau).exp();
+                    let mean = target + (*z - target) * (1.0 - decay) * tau / h;
+                    *z = target + (*z - target) * decay;
+                    mean
+                }
+                1 => {
+                    let (slow, fast) = (1.25 * c.strength, 0.75 * c.strength);
+                    let late = self.mean_share(command, t, h, slow, side);
+                    late.min(self.mean_share(command, t, h, fast, side))
+                }
+                _ => {
+                    let scale = if side == 0 { 0.8 } else { 1.2 };
+                    self.mean_share(command, t, h, scale * c.strength, side)
+                }
+            },
+        };
+        if let Some(c) = self.sticking {
+            if c.form == 0 {
+                // The longer it was shut, the later it opens.
+                if share > 0.0 && self.shut_s[side] > 0.0 {
+                    self.stuck_s[side] = c.strength * (1.0 - (-self.shut_s[side] / 1.2).exp());
+                    self.shut_s[side] = 0.0;
+                }
+                if share <= 0.0 {
+                    self.shut_s[side] += h;
+                } else if self.stuck_s[side] > 0.0 {
+                    let held = (self.stuck_s[side] / h).min(1.0);
+                    self.stuck_s[side] -= h;
+                    share *= 1.0 - held;
+                }
+            } else {
+                let z = &mut self.valve_lag[side];
+                *z = share.max(*z + (share - *z) * (h / (0.4 * c.strength + h)));
+                share = *z;
+            }
+        }
+        share
+    }
+
+    /// Change of the static contraction by the muscle's memories, fed once a step.
+    fn offset(&mut self, h: f64) -> f64 {
+        let k = self.rig.static_contraction(self.pressure());
+        let mut offset = 0.0;
+        if let Some((strength, memory)) = &mut self.hysteresis {
+            offset -= *strength * memory.push(k);
+        }
+        if let Some((share, lags)) = &mut self.creep {
+            offset += *share * (lags.push(k, h) - k);
+        }
+        if let Some(c) = self.snapping {
+            let level = k / self.rig.k_max();
+            let threshold = if self.snap.0 { 0.35 } else { 0.5 } + 0.2 * c.aux[0];
+            self.snap.0 = level > threshold;
+            let target = if self.snap.0 { c.strength } else { 0.0 };
+            self.snap.1 += (target - self.snap.1) * (h / 0.012).min(1.0);
+            offset += self.snap.1;
+        }
+        if let Some(c) = self.fatigue {
+            // Weaker after work, recovering with rest.
+            let moved = (k - self.last_static.unwrap_or(k)).abs();
+            self.travel += moved - self.travel * h / (20.0 + 100.0 * c.aux[0]);
+            offset -= c.strength * k * (self.travel / 1.5).tanh();
+        }
+        self.last_static = Some(k);
+        offset
+    }
+
+    fn derivative(&self, y: &State, drive: Drive, offset: f64) -> State {
+        let rig = self.rig;
+        let p = y[0] * (1.0 + y[5]);
+        let q_in = rig.flow(rig.c_in() * drive.inlet, drive.supply - y[4], p);
+        let mut q_out = rig.flow(rig.c_out() * drive.outlet, p, P_ATM);
+        if let Some(c) = self.leak {
+            q_out += match c.form {
+                0 => rig.flow(c.strength * P_REF / (RHO_0 * (P_REF + P_ATM)), p, P_ATM),
+                _ => {
+                    let scale = (P_REF + P_ATM).powi(2) - P_ATM.powi(2);
+                    c.strength * P_REF * (p * p - P_ATM * P_ATM) / scale
+                }
+            };
+        }
+        let mut d = [0.0; 6];
+        let target = rig.static_contraction(p) + offset;
+        let mut tau = rig.tau_m();
+        if let Some(c) = self.asymmetric {
+            let slower = if c.form == 0 { target < y[1] } else { target > y[1] };
+            tau *= if slower { 1.0 + c.strength } else { 1.0 };
+        }
+        d[1] = (target - y[1]) / tau;
+        if let Some(c) = self.inertia {
+            let omega = 1.0 / c.strength;
+            let damping = match c.form {
+                0 => 0.17 + 0.1 * c.aux[0] + 0.12 * y[3].abs() / (0.1 * omega),
+                _ if y[3] > 0.0 => 0.2,
+                _ => 0.33,
+            };
+            d[2] = y[3];
+            d[3] = omega * omega * (y[1] - y[2]) - 2.0 * damping * omega * y[3];
+        } else {
+            d[2] = d[1];
+        }
+        let mut flow = R_T * (q_in - q_out);
+        let mut volume = V_0;
+        if let Some(c) = self.volume {
+            let x = y[2] / rig.k_max();
+            let (shape, slope) = match c.form {
+                0 => (1.35 * x - 0.35 * x * x, 1.35 - 0.7 * x),
+                _ => {
+                    let quarter = std::f64::consts::FRAC_PI_2 * 0.9;
+                    let top = quarter.sin();
+                    ((quarter * x).sin() / top, quarter * (quarter * x).cos() / top)
+                }
+            };
+            volume = V_0 * (1.0 + c.strength * shape);
+            flow -= p * V_0 * c.strength * slope * d[2] / rig.k_max();
+        }
+        d[0] = flow / volume;
+        if let Some(c) = self.adiabatic {
+            d[5] = 0.4 * d[0] / y[0] - y[5] / c.strength;
+        }
+        if let Some(c) = self.sag {
+            let tau = 0.25 + 0.5 * c.aux[0];
+            let scale = c.strength * Q_REF;
+            d[4] = match c.form {
+                // A reservoir behind a regulator that passes the root of its drop.
+                0 => {
+                    let back = (y[4] / scale) / (y[4].abs() / scale + 0.01).sqrt();
+                    scale / tau * (q_in / Q_REF - back)
+                }
+                _ => {
+                    let load = q_in / Q_REF;
+                    (scale * load * (0.5 + 0.5 * load) - y[4]) / tau
+                }
+            };
+        }
+        d
+    }
+
+    /// One step of `h` seconds from `t`; `command` gives the openings at a time.
+    pub(crate) fn step(
+        &mut self,
+        command: &impl Fn(f64) -> (f64, f64),
+        t: f64,
+        h: f64,
+        supply: f64,
+    ) {
+        let inlet = self.valve(command, t, h, 0);
+        let mut outlet = self.valve(command, t, h, 1);
+        if let Some(c) = self.crossflow {
+            outlet += c.strength * inlet;
+        }
+        let drive = Drive { inlet, outlet, supply };
+        let offset = self.offset(h);
+        let y = self.state;
+        let add = |d: &State, s: f64| -> State { std::array::from_fn(|i| y[i] + s * d[i]) };
+        let before = self.pressure();
+        let k1 = self.derivative(&y, drive, offset);
+        let k2 = self.derivative(&add(&k1, 0.5 * h), drive, offset);
+        let k3 = self.derivative(&add(&k2, 0.5 * h), drive, offset);
+        let k4 = self.derivative(&add(&k3, h), drive, offset);
+        self.state =
+            std::array::from_fn(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
+        self.state[0] = self.state[0].max(P_ATM);
+        if self.inertia.is_none() {
+            self.state[2] = self.state[1];
+        }
+        let rig = self.rig;
+        let (first, last) =
+            (rig.static_contraction(before), rig.static_contraction(self.pressure()));
+        // Exact for an input that changes linearly over the step.
+        let (tau, slope) = (rig.tau_m(), (last - first) / h);
+        let decay = (-h / tau).exp();
+        self.shadow = last - slope * tau + (self.shadow - first + slope * tau) * decay;
+    }
+}
+
+/// Passed opening of a dead band with a parabolic onset; from 1.4 bands on it is `u - band`.
+fn at_onset(u: f64, band: f64) -> f64 {
+    crate::memory::at_least(u - band, 0.0, 0.4 * band)
+}

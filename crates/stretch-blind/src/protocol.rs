@@ -1,0 +1,128 @@
+//! The seventeen trials of a session and the openings commanded in them.
+
+use serde::{Deserialize, Serialize};
+
+use crate::dice::Dice;
+
+/// Samples a second.
+pub(crate) const RATE_HZ: usize = 100;
+/// Pause between trials, s.
+pub(crate) const PAUSE_S: f64 = 15.0;
+
+/// What a trial may be used for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Split {
+    Fit,
+    Test,
+}
+
+/// One trial as it is commanded.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Script {
+    pub(crate) file: String,
+    pub(crate) kind: &'static str,
+    pub(crate) opening: Option<f64>,
+    pub(crate) start_s: f64,
+    pub(crate) split: Split,
+    /// Whether it starts settled at the supply pressure, else at the atmosphere.
+    pub(crate) from_full: bool,
+    /// Inlet and outlet opening of every sample, 0..1.
+    pub(crate) openings: Vec<(f64, f64)>,
+}
+
+const RAMPS: [(f64, &str); 6] =
+    [(0.0025, "0_25"), (0.125, "12_5"), (0.25, "25"), (0.5, "50"), (0.75, "75"), (1.0, "100")];
+
+/// The trials of a session: six inflations, six deflations, then two trials to fit and three to
+/// test on.
+pub(crate) fn session(dice: &mut Dice) -> Vec<Script> {
+    let mut scripts = Vec::new();
+    let mut start_s = 0.0;
+    let mut add = |file: String, kind, opening, split, from_full, openings: Vec<(f64, f64)>| {
+        let duration_s = openings.len() as f64 / RATE_HZ as f64;
+        scripts.push(Script { file, kind, opening, start_s, split, from_full, openings });
+        start_s += duration_s + PAUSE_S;
+    };
+    for (opening, label) in RAMPS {
+        let file = format!("inflation_{label}.csv");
+        add(file, "inflation", Some(opening), Split::Fit, false, ramp((opening, 0.0)));
+    }
+    for (opening, label) in RAMPS {
+        let file = format!("deflation_{label}.csv");
+        add(file, "deflation", Some(opening), Split::Fit, true, ramp((0.0, opening)));
+    }
+    add("arbitrary_1.csv".into(), "arbitrary", None, Split::Fit, false, arbitrary(dice));
+    add("pulses_1.csv".into(), "pulses", None, Split::Fit, false, pulses(dice));
+    add("arbitrary_2.csv".into(), "arbitrary", None, Split::Test, false, arbitrary(dice));
+    add("arbitrary_3.csv".into(), "arbitrary", None, Split::Test, false, arbitrary(dice));
+    add("pulses_2.csv".into(), "pulses", None, Split::Test, false, pulses(dice));
+    scripts
+}
+
+/// One second of rest, then one opening held to 15 s.
+fn ramp(opening: (f64, f64)) -> Vec<(f64, f64)> {
+    (0..15 * RATE_HZ).map(|i| if i < RATE_HZ { (0.0, 0.0) } else { opening }).collect()
+}
+
+fn hold(openings: &mut Vec<(f64, f64)>, seconds: f64, opening: (f64, f64)) {
+    let samples = (seconds * RATE_HZ as f64).round() as usize;
+    openings.extend(std::iter::repeat_n(opening, samples));
+}
+
+/// One minute of random segments: inflate, deflate or hold.
+fn arbitrary(dice: &mut Dice) -> Vec<(f64, f64)> {
+    let mut openings = Vec::new();
+    hold(&mut openings, 1.0, (0.0, 0.0));
+    while openings.len() < 60 * RATE_HZ {
+        let seconds = dice.between(0.15, 1.5);
+        let opening = dice.pick(&[0.125, 0.25, 0.5, 0.75, 1.0]);
+        let choice = dice.unit();
+        let segment = match choice {
+            c if c < 0.42 => (opening, 0.0),
+            c if c < 0.84 => (0.0, opening),
+            _ => (0.0, 0.0),
+        };
+        hold(&mut openings, seconds, segment);
+    }
+    openings.truncate(60 * RATE_HZ);
+    openings
+}
+
+/// One minute of pulse pairs whose inner gap falls by 18 % a pair and starts over.
+fn pulses(dice: &mut Dice) -> Vec<(f64, f64)> {
+    let vent = (0.0, dice.pick(&[0.5, 0.75, 1.0]));
+    let rest_s = dice.between(0.3, 1.0);
+    let mut openings = Vec::new();
+    hold(&mut openings, 1.0, (0.0, 0.0));
+    let mut gap_s = 1.4;
+    while openings.len() < 60 * RATE_HZ {
+        hold(&mut openings, 0.25, (1.0, 0.0));
+        hold(&mut openings, gap_s, vent);
+        hold(&mut openings, 0.25, (1.0, 0.0));
+        hold(&mut openings, 1.0, vent);
+        hold(&mut openings, rest_s, (0.0, 0.0));
+        gap_s = if gap_s * 0.82 < 0.15 { 1.4 } else { gap_s * 0.82 };
+    }
+    openings.truncate(60 * RATE_HZ);
+    openings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_session_has_seventeen_trials_and_480_s() {
+        let scripts = session(&mut Dice::new(1, 1));
+        assert_eq!(scripts.len(), 17);
+        assert_eq!(scripts.iter().map(|s| s.openings.len()).sum::<usize>(), 480 * RATE_HZ);
+        assert_eq!(scripts.iter().filter(|s| s.split == Split::Test).count(), 3);
+        assert_eq!(scripts[13].start_s, 435.0);
+        for script in &scripts {
+            assert!(script.openings[..RATE_HZ].iter().all(|&u| u == (0.0, 0.0)));
+            // Never both valves at once.
+            assert!(script.openings.iter().all(|&(i, o)| i * o == 0.0));
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! Labels sealed by their hash: written before the diagnosis, opened after it.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use crate::error::BlindError;
+use crate::truth::Truth;
+
+/// The sealed labels of a set of cases: `sealed/truth.json` beside the case folders, and its
+/// SHA-256 in `seal.sha256`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Seal {
+    path: PathBuf,
+    sha256: String,
+}
+
+impl Seal {
+    /// Writes the labels and their hash under `dir`.
+    ///
+    /// # Errors
+    /// [`BlindError::Io`] when a file cannot be written.
+    pub fn close(dir: &Path, truth: &Truth) -> Result<Self, BlindError> {
+        let folder = dir.join("sealed");
+        let path = folder.join("truth.json");
+        let mut text = serde_json::to_string_pretty(truth).map_err(BlindError::json(&path))?;
+        text.push('\n');
+        fs::create_dir_all(&folder).map_err(BlindError::io(&folder))?;
+        fs::write(&path, &text).map_err(BlindError::io(&path))?;
+        let sha256 = sha256_hex(text.as_bytes());
+        let mark = dir.join("seal.sha256");
+        // The layout of `sha256sum -c`.
+        fs::write(&mark, format!("{sha256}  sealed/truth.json\n"))
+            .map_err(BlindError::io(&mark))?;
+        Ok(Self { path, sha256 })
+    }
+
+    /// SHA-256 of the labels, 64 hexadecimal digits.
+    #[must_use]
+    pub fn sha256(&self) -> &str {
+        &self.sha256
+    }
+
+    /// Where the labels lie.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Opens the labels under `dir`, if their hash is still the one that was written.
+    ///
+    /// # Errors
+    /// [`BlindError::SealBroken`] when it is not; [`BlindError::Io`], [`BlindError::Json`] when a
+    /// file is missing or not what it should be.
+    pub fn open(dir: &Path) -> Result<(Self, Truth), BlindError> {
+        let path = dir.join("sealed").join("truth.json");
+        let bytes = fs::read(&path).map_err(BlindError::io(&path))?;
+        let mark = dir.join("seal.sha256");
+        let sealed = fs::read_to_string(&mark).map_err(BlindError::io(&mark))?;
+        let sealed = sealed.split_whitespace().next().unwrap_or_default().to_owned();
+        let found = sha256_hex(&bytes);
+        if found != sealed {
+            return Err(BlindError::SealBroken { sealed, found });
+        }
+        let truth = serde_json::from_slice(&bytes).map_err(BlindError::json(&path))?;
+        Ok((Self { path, sha256: found }, truth))
+    }
+}
+
+fn sha256_hex(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().fold(String::with_capacity(64), |mut hex, byte| {
+        let _ = write!(hex, "{byte:02x}");
+        hex
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hash_is_the_published_one() {
+        // FIPS 180-4, the message "abc".
+        let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(sha256_hex(b"abc"), expected);
+    }
+
+    #[test]
+    fn an_altered_label_breaks_the_seal() {
+        let dir = tempfile::tempdir().expect("a temporary folder");
+        let truth = Truth { schema: 1, seed: Some(4), cases: Default::default() };
+        let seal = Seal::close(dir.path(), &truth).expect("closed");
+        let (opened, read) = Seal::open(dir.path()).expect("unaltered");
+        assert_eq!((opened, read), (seal.clone(), truth));
+        fs::write(seal.path(), "{ \"schema\": 1, \"cases\": {} }\n").expect("altered");
+        assert!(matches!(Seal::open(dir.path()), Err(BlindError::SealBroken { .. })));
+    }
+}

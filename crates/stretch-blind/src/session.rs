@@ -1,0 +1,209 @@
+//! One session on a rig: every trial after the other, memories carried through the pauses.
+
+use crate::dice::Dice;
+use crate::effect::Causes;
+use crate::gauge::{Gauge, Instant, Pot, hum, skew, spoil_samples};
+use crate::plant::Plant;
+use crate::protocol::{PAUSE_S, RATE_HZ, Script};
+use crate::rig::{P_ATM, Rig};
+
+/// Steps of a sample while a session is recorded: 0.5 ms each.
+pub(crate) const FINE: usize = 20;
+/// Steps of a sample where two sessions are compared: 2 ms each.
+pub(crate) const COARSE: usize = 5;
+/// Steps of a sample in the pauses: 2 ms each.
+const PAUSE: usize = 5;
+/// Length of the preparation before the first trial, s.
+const PREPARE_S: f64 = 2.0 * PAUSE_S;
+/// Knots of the supply fluctuation, s.
+const KNOT_S: f64 = 0.1;
+
+/// What no parameter describes: supply fluctuation and start pressures.
+#[derive(Debug, Clone)]
+pub(crate) struct Conditions {
+    supply: Vec<f64>,
+    start_error: Vec<f64>,
+}
+
+impl Conditions {
+    /// A supply that wanders by 0.25 % (1 sd) over some 15 s, and start pressures 0.1 kPa above
+    /// the atmosphere or 0.1 % below the supply, roughly.
+    pub(crate) fn draw(scripts: &[Script], dice: &mut Dice) -> Self {
+        let duration: f64 =
+            scripts.iter().map(|s| s.openings.len() as f64 / RATE_HZ as f64 + PAUSE_S).sum();
+        let knots = ((duration + PREPARE_S) / KNOT_S) as usize + 3;
+        let (slow_s, smooth_s) = (15.0, 1.5);
+        let mut slow = dice.gauss();
+        let mut smooth = slow;
+        let supply = (0..knots)
+            .map(|_| {
+                slow += -slow * KNOT_S / slow_s + (2.0 * KNOT_S / slow_s).sqrt() * dice.gauss();
+                smooth += (slow - smooth) * KNOT_S / smooth_s;
+                0.0025 * smooth
+            })
+            .collect();
+        let start_error = scripts.iter().map(|_| dice.gauss().abs()).collect();
+        Self { supply, start_error }
+    }
+
+    fn supply(&self, session: f64) -> f64 {
+        let at = ((session + PREPARE_S) / KNOT_S).max(0.0);
+        let knot = (at as usize).min(self.supply.len() - 2);
+        let (low, high) = (self.supply[knot], self.supply[knot + 1]);
+        low + (high - low) * (at - knot as f64)
+    }
+}
+
+/// What a trial shows before noise and rounding, 100 samples a second.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Trace {
+    /// Gauge pressure, Pa.
+    pub(crate) pressure: Vec<f64>,
+    /// Shown length, mm.
+    pub(crate) length: Vec<f64>,
+    /// Length, mm, of a muscle without effects at the same pressure.
+    pub(crate) shadow: Vec<f64>,
+    /// Amplified voltage, V.
+    pub(crate) volts: Vec<f64>,
+    /// Least strain of the sleeve.
+    pub(crate) least_strain: f64,
+}
+
+/// Runs every script in turn; `fine` steps a sample.
+pub(crate) fn run(
+    rig: &Rig,
+    causes: &Causes,
+    scripts: &[Script],
+    conditions: &Conditions,
+    fine: usize,
+) -> Vec<Trace> {
+    let oscillation = causes.find(crate::effect::Kind::SupplyOscillation);
+    let supply = |session: f64| {
+        let mut share = 1.0 + conditions.supply(session);
+        if let Some(c) = oscillation {
+            let hertz = 0.08 + 0.5 * c.aux[0];
+            let phase = std::f64::consts::TAU * (hertz * session + c.aux[1]);
+            share += c.strength * (phase.sin() - 1.0) * 0.5;
+        }
+        rig.p_s() * share + P_ATM
+    };
+    let mut bench = Bench {
+        plant: Plant::new(rig, causes),
+        gauge: Gauge::new(rig, causes),
+        pot: Pot::new(rig, causes),
+        causes,
+        supply: &supply,
+    };
+    bench.pause(true, P_ATM + rig.p_s(), -PREPARE_S);
+    let mut traces = Vec::with_capacity(scripts.len());
+    for (trial, script) in scripts.iter().enumerate() {
+        let error = conditions.start_error[trial];
+        let start = if script.from_full {
+            supply(script.start_s) * (1.0 - 0.001 * error)
+        } else {
+            P_ATM + 100.0 * error
+        };
+        bench.pause(script.from_full, start, script.start_s - PAUSE_S);
+        if trial == 0 {
+            bench.gauge.begin_session();
+        }
+        traces.push(bench.record(rig, trial, script, fine));
+    }
+    traces
+}
+
+/// Everything that carries a memory, and the supply.
+struct Bench<'a, S: Fn(f64) -> f64> {
+    plant: Plant<'a>,
+    gauge: Gauge<'a>,
+    pot: Pot<'a>,
+    causes: &'a Causes,
+    supply: &'a S,
+}
+
+impl<S: Fn(f64) -> f64> Bench<'_, S> {
+    /// Fills or vents for half a pause, then holds the pressure that the next trial starts from.
+    fn pause(&mut self, fill: bool, target: f64, begin: f64) {
+        let h = 1.0 / (RATE_HZ * PAUSE) as f64;
+        let steps = (PAUSE_S / h).round() as usize;
+        let open = if fill { (1.0, 0.0) } else { (0.0, 1.0) };
+        for i in 0..steps {
+            let t = i as f64 * h;
+            // Valves shut at the end in time for the slowest of them.
+            let command =
+                |time: f64| if (0.0..0.5 * PAUSE_S).contains(&time) { open } else { (0.0, 0.0) };
+            self.plant.step(&command, t, h, (self.supply)(begin + t));
+            if t > 0.6 * PAUSE_S {
+                self.plant.regulate(target);
+            }
+            let now = self.instant((0.0, 0.0));
+            self.pot.step(now.k);
+            if self.gauge.active() {
+                self.gauge.step(now, 0.0, begin + t, h);
+            }
+        }
+    }
+
+    fn instant(&self, openings: (f64, f64)) -> Instant {
+        Instant { k: self.plant.contraction(), p: self.plant.pressure(), openings }
+    }
+
+    fn record(&mut self, rig: &Rig, trial: usize, script: &Script, fine: usize) -> Trace {
+        let h = 1.0 / (RATE_HZ * fine) as f64;
+        let samples = script.openings.len();
+        let command = |time: f64| {
+            if time < 0.0 {
+                return (0.0, 0.0);
+            }
+            script.openings[((time * RATE_HZ as f64) as usize).min(samples - 1)]
+        };
+        let mut trace = Trace { least_strain: f64::INFINITY, ..Trace::default() };
+        let mut path = Vec::with_capacity(samples * fine);
+        for step in 0..samples * fine {
+            let t = step as f64 * h;
+            let now = self.instant(command(t + 1e-9));
+            let length = self.pot.step(now.k);
+            path.push(now);
+            trace.least_strain = trace.least_strain.min(rig.strain(now.k));
+            if step % fine == 0 {
+                trace.pressure.push(now.p - P_ATM);
+                trace.length.push(length);
+                trace.shadow.push(crate::rig::L_0 * (1.0 - self.plant.shadow()));
+            }
+            self.plant.step(&command, t, h, (self.supply)(script.start_s + t));
+        }
+        trace.volts = self.volts(trial, script, &path, fine);
+        trace
+    }
+
+    /// Voltages of a recorded path: the skew needs to look ahead, so the path comes first.
+    fn volts(&mut self, trial: usize, script: &Script, path: &[Instant], fine: usize) -> Vec<f64> {
+        let h = 1.0 / (RATE_HZ * fine) as f64;
+        self.gauge.power_up();
+        let every = if self.gauge.active() { 1 } else { fine };
+        let mut volts = Vec::with_capacity(path.len() / fine);
+        for step in (0..path.len()).step_by(every) {
+            let t = step as f64 * h;
+            let session = script.start_s + t;
+            let shift = skew(self.causes, t, session) / h;
+            let at = (step as f64 - shift).clamp(0.0, (path.len() - 1) as f64);
+            let low = (at as usize).min(path.len() - 2);
+            let share = at - low as f64;
+            let (a, b) = (path[low], path[low + 1]);
+            let seen = Instant {
+                k: a.k + (b.k - a.k) * share,
+                p: a.p + (b.p - a.p) * share,
+                openings: path[step].openings,
+            };
+            let v = self.gauge.step(seen, t, session, h * every as f64);
+            if step % fine == 0 {
+                volts.push(v);
+            }
+        }
+        for (v, hum) in volts.iter_mut().zip(hum(self.causes, trial, path.len() / fine)) {
+            *v += hum;
+        }
+        spoil_samples(self.causes, trial, &mut volts);
+        volts
+    }
+}

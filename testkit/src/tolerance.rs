@@ -10,3 +10,86 @@ pub const PRINTED: f64 = 1e-12;
 /// coefficients, so its terms differ from the paper's order by a few hundred roundings of
 /// terms up to `3 * 4^5` (21 terms of the strategies' surfaces at four times the range).
 pub const FOLDED: f64 = 1e-8;
+
+/// Relative to the largest tap: Savitzky-Golay taps against exact rational
+/// arithmetic. Up to 11 steps of a three-term recurrence, then as many products.
+pub const TAPS: f64 = 1e-12;
+
+/// Relative to the largest value: taps or output of a tool that solves a
+/// Vandermonde system, of condition up to 1e6 once its columns are scaled.
+pub const SOLVED_TAPS: f64 = 1e-9;
+
+/// Relative to slope and delay: an alpha-beta or recursive estimate, a difference of
+/// values up to 1e3 s^2 of a parabola or 1e2 of a ramp, times the sample rate of 100 Hz.
+pub const RATE_FROM_DIFFERENCES: f64 = 1e-7;
+
+/// Relative: what a live estimator may still lack when it says that it has warmed up.
+pub const WARMED_UP: f64 = 0.01;
+
+/// Relative: superposition through a recursive filter, rounded at every step, whose
+/// poles at 0.2 Hz of 100 Hz magnify rounding by up to (100/0.2)^2/40.
+pub const SUPERPOSITION: f64 = 1e-11;
+
+/// Relative: a gain by projection on 14 000 samples, rounding alone.
+pub const PROJECTED_GAIN: f64 = 1e-9;
+
+/// In units of the signal: a local fit of degree 3 to values up to 10, whose
+/// derivative divides by a window of 0.1 s and at the ends has taps up to 1e3.
+pub const LOCAL_RATE: f64 = 1e-8;
+
+/// In units of the signal: values up to 10, fitted or interpolated with weights
+/// whose magnitudes add up to less than a hundred.
+pub const LOCAL_VALUE: f64 = 1e-11;
+
+/// Relative to the largest output: 120 steps of a cascade of up to four
+/// recursive sections of which two implementations round every step apart.
+/// At a cutoff of fs/200 the sections forget over 100 samples and magnify
+/// rounding of their poles by (fs/cutoff)^2, some 1e4.
+pub const RECURSIVE_OUTPUT: f64 = 1e-9;
+
+/// Relative: a quadrature by another tool that was asked for 1e-12.
+pub const QUADRATURE: f64 = 1e-9;
+
+/// Relative: a delay that the other tool took from the phase at a small but not
+/// zero frequency (1e-3 Hz, cutoff 0.5 Hz and above): second order in the ratio.
+pub const DELAY_FROM_PHASE: f64 = 1e-4;
+
+/// Relative: a standard deviation measured on 40 000 outputs, of which, as they
+/// are correlated, a few hundred are independent: three standard errors.
+pub const MEASURED_DEVIATION: f64 = 0.08;
+
+/// Relative to the largest output: `f32` against `f64` through a filter of gain
+/// near one or a Savitzky-Golay rate of at most 31 taps.
+pub const F32_FILTER: f64 = 1e-4;
+
+/// Relative: sums over 1200 samples, which NumPy adds pairwise and the crate with compensation.
+pub const METRICS_SUMS: f64 = 1e-11;
+
+/// Relative: a parabola through correlations that differ in their fifth digit.
+pub const METRICS_LAG: f64 = 1e-8;
+
+/// Samples: what a parabola misplaces between samples on two slow sines over 400 samples,
+/// whose ends weigh differently at each lag.
+pub const METRICS_LAG_PARABOLA: f64 = 0.1;
+
+/// Relative: P near 1e-240, where d(ln P)/d(ln t) is about -700.
+pub const METRICS_TINY_P: f64 = 1e-9;
+
+/// Relative to max(1, |ln P|): a few roundings of the terms that ln P is the sum of.
+pub const METRICS_LN_P: f64 = 2e-14;
+
+/// Relative: P down to 1e-300; the exponent, near 700, is rounded to 1e-13.
+pub const METRICS_P: f64 = 1e-12;
+
+/// Relative: SciPy's inverse; P rounded to 1e-14 moves a small t by no more.
+pub const METRICS_CRITICAL: f64 = 1e-11;
+
+/// Relative to max(1, value): moments merged in another order.
+pub const METRICS_MERGE: f64 = 1e-10;
+
+/// Relative to max(1, value): signals of about 1e2 moved by 1e3 and back lose two digits,
+/// a spread of 1 two more.
+pub const METRICS_SHIFT: f64 = 1e-9;
+
+/// Relative: the errors themselves are rounded to `f32`, each by 2^-24; the length adds nothing.
+pub const METRICS_F32: f64 = 5e-7;

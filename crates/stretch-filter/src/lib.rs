@@ -1,2 +1,35 @@
 #![doc = include_str!("../README.md")]
 #![no_std]
+
+#[cfg(feature = "proptest")]
+extern crate std;
+
+mod biquad;
+mod cadence;
+mod cost;
+mod differentiator;
+mod error;
+mod fir;
+mod gram;
+pub mod log;
+mod low_pass;
+mod rate_filter;
+mod sample;
+mod savgol;
+mod sg_filter;
+#[cfg(feature = "proptest")]
+pub mod strategies;
+mod tracker;
+
+pub use biquad::{Biquad, BiquadMemory, BiquadSpec};
+pub use cadence::{Arrival, Cadence, CadenceMemory};
+pub use cost::Cost;
+pub use differentiator::{Differentiator, DifferentiatorMemory};
+pub use error::FilterError;
+pub use gram::MAX_SG_DEGREE;
+pub use low_pass::{LowPass, LowPassMemory, LowPassSpec, MAX_ORDER};
+pub use rate_filter::{RateFilter, RateMemory};
+pub use sample::{LARGEST_SAMPLE, MAX_SAMPLE_RATE_HZ, MIN_SAMPLE_RATE_HZ};
+pub use savgol::{SavitzkyGolay, SgMemory, SgRate, SgSmooth};
+pub use sg_filter::{SgFilter, SgShape};
+pub use tracker::{Track, Tracker, TrackerMemory, TrackerSpec};

@@ -1,0 +1,168 @@
+//! The live rate estimator that a calibration record names.
+
+use crate::{
+    Cost, Differentiator, DifferentiatorMemory, FilterError, LowPassSpec, SgFilter, SgMemory,
+    SgShape, Tracker, TrackerMemory, TrackerSpec,
+};
+use stretch_core::{Design, Hertz, RateEstimator, Real, SampleRate, Stage};
+
+/// A live rate estimator chosen at run time by a [`RateEstimator`] record, with
+/// room for a Savitzky-Golay window of `CAP` samples.
+///
+/// The step gives the rate in the sample's unit per second, or `None` while
+/// the estimator warms up and for a sample that is not usable, which also
+/// leaves the memory as it was.
+///
+/// ```
+/// use stretch_core::{RateEstimator, Runner, SampleRate};
+/// use stretch_filter::{FilterError, RateFilter};
+///
+/// let hz = SampleRate::new(100.0).unwrap();
+/// let design = RateFilter::<f64>::new(RateEstimator::SAVGOL_11_2, hz).unwrap();
+/// let mut rate = Runner::new(design);
+/// let out = (0..11).filter_map(|n| rate.step(0.5 * n as f64)).last().unwrap();
+/// assert!((out - 50.0).abs() < 1e-10);
+///
+/// // The paper's central difference needs the sample after: not live.
+/// let refused = RateFilter::<f64>::new(RateEstimator::CentralDifference, hz);
+/// assert_eq!(refused, Err(FilterError::LooksAhead { samples: 1 }));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RateFilter<T, const CAP: usize = 64> {
+    kind: Kind<T, CAP>,
+    estimator: RateEstimator,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "there is no allocator to put the taps elsewhere")]
+enum Kind<T, const CAP: usize> {
+    SavitzkyGolay(SgFilter<T, CAP>),
+    Differentiator(Differentiator<T>),
+    Tracker(Tracker<T>),
+}
+
+/// What a [`RateFilter`] remembers.
+///
+/// A memory of another estimator is replaced by a fresh one at the next step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RateMemory<T, const CAP: usize = 64>(Inner<T, CAP>);
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "there is no allocator to put the state elsewhere")]
+enum Inner<T, const CAP: usize> {
+    SavitzkyGolay(SgMemory<T, CAP>),
+    Differentiator(DifferentiatorMemory<T>),
+    Tracker(TrackerMemory<T>),
+}
+
+impl<T, const CAP: usize> RateMemory<T, CAP> {
+    /// How many further samples give `None` before the estimator has warmed up.
+    pub fn remaining(&self) -> usize {
+        match &self.0 {
+            Inner::SavitzkyGolay(memory) => memory.remaining(),
+            Inner::Differentiator(memory) => memory.remaining(),
+            Inner::Tracker(memory) => memory.remaining(),
+        }
+    }
+}
+
+impl<T: Real, const CAP: usize> RateFilter<T, CAP> {
+    /// The estimator that the record names, for samples that come at `sample_rate`.
+    ///
+    /// # Errors
+    /// [`FilterError::LooksAhead`] for an estimator that only works on a log;
+    /// [`FilterError::Design`], naming the field, for numbers that no design
+    /// can be computed from or a window above `CAP`.
+    pub fn new(estimator: RateEstimator, sample_rate: SampleRate) -> Result<Self, FilterError> {
+        let estimator = estimator.validate()?;
+        let kind = match estimator {
+            RateEstimator::SavitzkyGolay { window, degree, delay } => {
+                let shape = SgShape {
+                    window: window.into(),
+                    degree: degree.into(),
+                    order: 1,
+                    delay: delay.into(),
+                };
+                Kind::SavitzkyGolay(SgFilter::new(shape, sample_rate)?)
+            }
+            RateEstimator::Differentiator { cutoff_hz } => {
+                let spec = LowPassSpec { cutoff: Hertz(cutoff_hz), sample_rate };
+                Kind::Differentiator(Differentiator::new(spec)?)
+            }
+            RateEstimator::Tracker { tracking_index } => {
+                Kind::Tracker(Tracker::new(TrackerSpec { tracking_index, sample_rate })?)
+            }
+            // The central difference, and whatever a later record may name.
+            _ => return Err(FilterError::LooksAhead { samples: 1 }),
+        };
+        Ok(Self { kind, estimator })
+    }
+
+    /// The record that the design was built from.
+    pub fn estimator(&self) -> RateEstimator {
+        self.estimator
+    }
+
+    /// How many samples give `None` at the start.
+    pub fn warm_up(&self) -> usize {
+        self.memory().remaining()
+    }
+
+    /// By how many seconds the rate is late while the signal changes slowly.
+    pub fn delay_s(&self) -> f64 {
+        match &self.kind {
+            Kind::SavitzkyGolay(design) => design.delay_s(),
+            Kind::Differentiator(design) => design.delay_s(),
+            Kind::Tracker(design) => design.delay_s(),
+        }
+    }
+
+    /// Standard deviation of the rate for white noise of standard deviation one, in 1/s.
+    pub fn noise_gain(&self) -> f64 {
+        match &self.kind {
+            Kind::SavitzkyGolay(design) => design.noise_gain(),
+            Kind::Differentiator(design) => design.noise_gain(),
+            Kind::Tracker(design) => design.noise_gain(),
+        }
+    }
+
+    /// Arithmetic and memory of one step.
+    pub fn cost(&self) -> Cost {
+        match &self.kind {
+            Kind::SavitzkyGolay(design) => design.cost(),
+            Kind::Differentiator(_) => Differentiator::<T>::COST,
+            Kind::Tracker(_) => Tracker::<T>::COST,
+        }
+    }
+}
+
+impl<T: Real, const CAP: usize> Design for RateFilter<T, CAP> {
+    type Memory = RateMemory<T, CAP>;
+
+    fn memory(&self) -> RateMemory<T, CAP> {
+        RateMemory(match &self.kind {
+            Kind::SavitzkyGolay(design) => Inner::SavitzkyGolay(design.memory()),
+            Kind::Differentiator(design) => Inner::Differentiator(design.memory()),
+            Kind::Tracker(design) => Inner::Tracker(design.memory()),
+        })
+    }
+}
+
+impl<T: Real, const CAP: usize> Stage<T> for RateFilter<T, CAP> {
+    type Out = Option<T>;
+
+    #[inline]
+    fn step(&self, memory: &mut RateMemory<T, CAP>, x: T) -> Option<T> {
+        match (&self.kind, &mut memory.0) {
+            (Kind::SavitzkyGolay(design), Inner::SavitzkyGolay(memory)) => design.step(memory, x),
+            (Kind::Differentiator(design), Inner::Differentiator(memory)) => design.step(memory, x),
+            (Kind::Tracker(design), Inner::Tracker(memory)) => {
+                design.step(memory, x).map(|track| track.rate)
+            }
+            _ => {
+                *memory = self.memory();
+                self.step(memory, x)
+            }
+        }
+    }
+}

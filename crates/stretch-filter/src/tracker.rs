@@ -1,0 +1,177 @@
+//! The steady-state Kalman tracker of a value and its rate.
+
+use crate::{Cost, sample};
+use stretch_core::{Design, DesignError, Real, SampleRate, Stage};
+
+/// What a tracker expects of the signal and of its noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrackerSpec {
+    /// lambda = sigma_acceleration T^2 / sigma_measurement, from 1e-6 to 1e6,
+    /// without a unit: how far the signal's acceleration moves it in a sample,
+    /// measured by the noise. Small is smooth and late, large is nervous and fresh.
+    pub tracking_index: f64,
+    /// The sample rate of the stream.
+    pub sample_rate: SampleRate,
+}
+
+/// Value and rate by an alpha-beta filter with the gains of the steady-state
+/// Kalman filter for a signal whose acceleration is white noise.
+///
+/// ```text
+/// predicted = value + T rate;   surprise = x - predicted
+/// value = predicted + alpha surprise;   rate = rate + beta/T surprise
+/// ```
+///
+/// With s = 2 lambda/(lambda + sqrt(lambda^2 + 8 lambda)) the gains are
+/// alpha = s (2 - s) and beta = 2 s^2 (Kalata 1984,
+/// doi:10.1109/TAES.1984.310438, written without cancellation). Unbiased on a
+/// ramp. It starts from its first two samples and gives `None` until what they
+/// left has shrunk to 1 %. A sample that is not usable gives `None` and leaves
+/// the memory as it was; the stream then lacks a sample, so treat it as a gap.
+///
+/// ```
+/// use stretch_core::{Runner, SampleRate};
+/// use stretch_filter::{Tracker, TrackerSpec};
+///
+/// let sample_rate = SampleRate::new(100.0).unwrap();
+/// let design = Tracker::<f64>::new(TrackerSpec { tracking_index: 0.1, sample_rate }).unwrap();
+/// let mut tracker = Runner::new(design);
+/// let last = (0..100).filter_map(|n| tracker.step(0.02 * n as f64)).last().unwrap();
+/// assert!((last.value - 1.98).abs() < 1e-12 && (last.rate - 2.0).abs() < 1e-10);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tracker<T> {
+    alpha: T,
+    beta: T,
+    sample_hz: T,
+    spec: TrackerSpec,
+    warm_up: u32,
+}
+
+/// What a [`Tracker`] knows after a sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Track<T> {
+    /// The value, in the sample's unit.
+    pub value: T,
+    /// Its rate, in the sample's unit per second.
+    pub rate: T,
+}
+
+/// What a [`Tracker`] remembers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrackerMemory<T> {
+    value: T,
+    /// Change a sample.
+    change: T,
+    seen: u8,
+    remaining: u32,
+}
+
+impl<T> TrackerMemory<T> {
+    /// How many further samples give `None` before the tracker has settled.
+    pub fn remaining(&self) -> usize {
+        self.remaining as usize
+    }
+}
+
+impl<T: Real> Tracker<T> {
+    /// Arithmetic and memory of one step.
+    pub const COST: Cost = Cost::new(3, 4, 2);
+
+    /// The tracker that `spec` describes.
+    ///
+    /// # Errors
+    /// [`DesignError::OutOfRange`] naming `tracking_index` or `sample_rate_hz`.
+    pub fn new(spec: TrackerSpec) -> Result<Self, DesignError> {
+        let sample_rate = sample::checked_rate(spec.sample_rate)?;
+        let lambda = spec.tracking_index;
+        DesignError::check("tracking_index", lambda, (1e-6..=1e6).contains(&lambda))?;
+        let s = 2.0 * lambda / (lambda + libm::sqrt(lambda * (lambda + 8.0)));
+        let (alpha, beta) = (s * (2.0 - s), 2.0 * s * s);
+        Ok(Self {
+            alpha: T::from_f64(alpha),
+            beta: T::from_f64(beta),
+            sample_hz: T::from_f64(sample_rate.hz()),
+            spec,
+            warm_up: sample::settling(pole_radius(alpha, beta)),
+        })
+    }
+
+    /// What the tracker was designed for.
+    pub fn spec(&self) -> TrackerSpec {
+        self.spec
+    }
+
+    /// The gains (alpha, beta) as they run, that is, rounded to `T`.
+    pub fn gains(&self) -> (T, T) {
+        (self.alpha, self.beta)
+    }
+
+    /// How many samples give `None` at the start.
+    pub fn warm_up(&self) -> usize {
+        self.warm_up as usize
+    }
+
+    /// By how many seconds the rate is late while the signal bends slowly:
+    /// T (2 alpha - beta)/(2 beta). The value itself is not late on a ramp.
+    pub fn delay_s(&self) -> f64 {
+        let (alpha, beta) = (self.alpha.as_f64(), self.beta.as_f64());
+        (2.0 * alpha - beta) / (2.0 * beta) * self.spec.sample_rate.period_s()
+    }
+
+    /// Standard deviation of the rate for white noise of standard deviation one, in 1/s.
+    pub fn noise_gain(&self) -> f64 {
+        let (alpha, beta) = (self.alpha.as_f64(), self.beta.as_f64());
+        let power = 2.0 * beta * beta / (alpha * (4.0 - 2.0 * alpha - beta));
+        libm::sqrt(power) * self.spec.sample_rate.hz()
+    }
+
+    /// Standard deviation of the value for white noise of standard deviation one.
+    pub fn value_noise_gain(&self) -> f64 {
+        let (alpha, beta) = (self.alpha.as_f64(), self.beta.as_f64());
+        let power = 2.0 * alpha * alpha + beta * (2.0 - 3.0 * alpha);
+        libm::sqrt(power / (alpha * (4.0 - 2.0 * alpha - beta)))
+    }
+}
+
+/// The larger magnitude of the roots of z^2 - (2 - alpha - beta) z + 1 - alpha.
+fn pole_radius(alpha: f64, beta: f64) -> f64 {
+    let half = (2.0 - alpha - beta) / 2.0;
+    let square = half * half - (1.0 - alpha);
+    if square < 0.0 { libm::sqrt(1.0 - alpha) } else { half.abs() + libm::sqrt(square) }
+}
+
+impl<T: Real> Design for Tracker<T> {
+    type Memory = TrackerMemory<T>;
+
+    fn memory(&self) -> TrackerMemory<T> {
+        TrackerMemory { value: T::zero(), change: T::zero(), seen: 0, remaining: self.warm_up }
+    }
+}
+
+impl<T: Real> Stage<T> for Tracker<T> {
+    type Out = Option<Track<T>>;
+
+    #[inline]
+    fn step(&self, memory: &mut TrackerMemory<T>, x: T) -> Option<Track<T>> {
+        if !sample::usable(x) {
+            return None;
+        }
+        if memory.seen < 2 {
+            // The first sample gives the value, the second the rate as well.
+            memory.change = if memory.seen == 0 { T::zero() } else { x - memory.value };
+            memory.value = x;
+            memory.seen += 1;
+        } else {
+            let predicted = memory.value + memory.change;
+            let surprise = x - predicted;
+            memory.value = predicted + self.alpha * surprise;
+            memory.change = memory.change + self.beta * surprise;
+        }
+        if memory.remaining > 0 {
+            memory.remaining -= 1;
+            return None;
+        }
+        Some(Track { value: memory.value, rate: memory.change * self.sample_hz })
+    }
+}

@@ -56,9 +56,12 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
     /// # Errors
     /// [`FitError::TooManyTerms`] when the degree has more than `TERMS` terms.
     pub fn new(degree: Degree) -> Result<Self, FitError> {
+        Ok(Self::of_basis(Basis::new(degree)?))
+    }
+
+    pub(crate) fn of_basis(basis: Basis<TERMS>) -> Self {
         let () = Self::SHAPE;
-        let basis = Basis::new(degree)?;
-        Ok(Self {
+        Self {
             factor: Factor::empty(basis),
             filled: 0,
             root_weights: [T::zero(); ROWS],
@@ -68,7 +71,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
             block: [[T::zero(); ROWS]; TERMS],
             most_input: basis.most(),
             most_value: power_of_two(entry_exponent::<T>()),
-        })
+        }
     }
 
     /// Adds a sample: at this rate and voltage the surface should be `value`.

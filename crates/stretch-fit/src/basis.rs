@@ -27,6 +27,12 @@ pub(crate) struct Basis<const TERMS: usize> {
     steps: [(u8, bool); TERMS],
 }
 
+impl Basis<2> {
+    /// The constant and the voltage.
+    pub(crate) const LINE: Self =
+        Self { degree: crate::LineAccumulator::<f64>::DEGREE, steps: [(0, false), (0, true)] };
+}
+
 impl<const TERMS: usize> Basis<TERMS> {
     pub(crate) fn new(degree: Degree) -> Result<Self, FitError> {
         let terms = degree.terms();

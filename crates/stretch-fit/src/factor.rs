@@ -1,5 +1,8 @@
 //! What is kept of the samples: one triangle.
 
+// Triangles are walked by index, as in the textbooks.
+#![allow(clippy::needless_range_loop)]
+
 use stretch_core::{Degree, Real, Surface};
 
 use crate::{
@@ -49,10 +52,6 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
     /// The sum of all weights: the sample count when none was given.
     pub fn weight(&self) -> T {
         self.r[0][0] * self.r[0][0]
-    }
-
-    pub(crate) fn basis(&self) -> &Basis<TERMS> {
-        &self.basis
     }
 
     /// Adds to the residual sum of squares (Kahan summation: a long log adds

@@ -1,5 +1,8 @@
 //! A fitted surface and how well it fits.
 
+// Triangles are walked by index, as in the textbooks.
+#![allow(clippy::needless_range_loop)]
+
 use stretch_core::{Degree, Real, Surface};
 
 use crate::{Confidence, FitError, basis::Basis};

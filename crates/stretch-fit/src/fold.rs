@@ -9,6 +9,9 @@
 //! Blocks are stored by column, so every inner loop runs along the rows, whose
 //! number is a constant: the compiler vectorises it.
 
+// Lanes are walked by index: the form that the compiler vectorises.
+#![allow(clippy::needless_range_loop)]
+
 use stretch_core::Real;
 
 /// Numbers that one pass of an inner loop handles side by side.

@@ -4,14 +4,24 @@
 mod accumulator;
 mod basis;
 mod confidence;
+mod cross_validation;
 mod error;
 mod factor;
 mod fit;
 mod fold;
+mod line;
+mod order_table;
 mod quantile;
+mod robust;
+#[cfg(feature = "proptest")]
+pub mod strategies;
 
 pub use accumulator::SurfaceAccumulator;
 pub use confidence::{Bounds, Confidence};
+pub use cross_validation::{CrossValidation, HeldOut, cross_validate, held_out};
 pub use error::FitError;
 pub use factor::Factor;
 pub use fit::Fit;
+pub use line::{LineAccumulator, LineFit};
+pub use order_table::{OrderEntry, OrderRow, OrderTable};
+pub use robust::{Loss, RobustFit, robust_fit};

@@ -1,0 +1,204 @@
+//! Which order is worth having.
+
+use stretch_core::{Degree, MAX_DEGREE, Real};
+
+use crate::{CrossValidation, Factor, FitError, cross_validate, held_out};
+
+/// The most orders that one table compares.
+const MOST: usize = 5;
+
+/// One order's fit on all trials, and its error on trials left out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OrderRow<T> {
+    /// The order.
+    pub degree: Degree,
+    /// Its terms.
+    pub terms: usize,
+    /// R^2 over all trials; `None` when all values are equal.
+    pub r_squared: Option<T>,
+    /// RMSE over all trials with `n - p` degrees of freedom; `None` when none
+    /// is left.
+    pub rmse: Option<T>,
+    /// Leave-one-trial-out cross-validation; `Err` when there is one trial, or
+    /// some trial is needed to determine a term.
+    pub cross_validation: Result<CrossValidation<T>, FitError>,
+    /// How much larger the cross-validated mean squared error is than that of
+    /// the best order: mean over trials, and the standard error of that mean.
+    /// `None` without cross-validation.
+    pub excess: Option<(T, T)>,
+}
+
+/// An order with its row, or with the reason why it cannot be fitted.
+pub type OrderEntry<T> = (Degree, Result<OrderRow<T>, FitError>);
+
+/// A chosen order beside its neighbours: next lower, chosen, next higher.
+///
+/// The lowest order worth having is the one with the fewest terms whose excess
+/// over the best order's cross-validated mean squared error is within one
+/// standard error of zero, the excess taken trial by trial: an order that
+/// beats another on every trial by a little is worth having, one that wins on
+/// some trials and loses on others is not (the one-standard-error rule of
+/// Breiman et al., *Classification and Regression Trees*, 1984, section 3.4.3,
+/// on paired differences).
+///
+/// ```
+/// use stretch_core::Degree;
+/// use stretch_fit::{OrderTable, SurfaceAccumulator};
+///
+/// // The truth is quadratic in the voltage; the error differs from trial to trial.
+/// let trials = [1, 2, 3, 4].map(|trial| {
+///     let mut sums: SurfaceAccumulator<f64, 21, 16> =
+///         SurfaceAccumulator::new(OrderTable::<f64>::covering(Degree::POLY13)).unwrap();
+///     for k in 0..300 {
+///         let (rate, volts) = (f64::from(k % 17) / 8.0 - 1.0, f64::from(k % 41) / 20.0 - 1.0);
+///         let noise = 0.05 * f64::from(k * k * trial % 23 - 11) / 11.0;
+///         sums.push(rate, volts, rate + volts + rate * volts + volts * volts + noise).unwrap();
+///     }
+///     sums.factor()
+/// });
+/// let table = OrderTable::new(&trials, Degree::POLY13)?;
+/// assert_eq!(table.rows().count(), 5);
+/// assert_eq!(table.recommended(), Some(Degree::new(1, 2).unwrap()));
+/// # Ok::<(), stretch_fit::FitError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OrderTable<T> {
+    chosen: Degree,
+    rows: [Option<OrderEntry<T>>; MOST],
+}
+
+impl<T: Real> OrderTable<T> {
+    /// The orders beside `chosen`: one less and one more in the voltage, one
+    /// less and one more in the rate, and `chosen` itself, by rising number of
+    /// terms. For poly13: poly03, poly12, poly13, poly14, poly23.
+    pub fn neighbours(chosen: Degree) -> impl Iterator<Item = Degree> {
+        let mut all = [
+            Some(chosen),
+            shifted(chosen, -1, 0),
+            shifted(chosen, 0, -1),
+            shifted(chosen, 0, 1),
+            shifted(chosen, 1, 0),
+        ];
+        all.sort_unstable_by_key(|degree| degree.map(|d| (d.terms(), d.rate(), d.volts())));
+        all.into_iter().flatten()
+    }
+
+    /// The smallest degree to accumulate so that one pass over the samples
+    /// serves the whole table: poly24 for poly13.
+    pub fn covering(chosen: Degree) -> Degree {
+        let up = |power: u8| (power + 1).min(MAX_DEGREE as u8);
+        Degree::new(up(chosen.rate()), up(chosen.volts())).unwrap_or(chosen)
+    }
+
+    /// Compares `chosen` and its [`neighbours`](Self::neighbours) as far as
+    /// the factors, one a trial, were accumulated for them.
+    ///
+    /// # Errors
+    /// [`FitError::TooFewSamples`] without any factor,
+    /// [`FitError::MissingTerm`] when their degrees differ.
+    pub fn new<const TERMS: usize>(
+        trials: &[Factor<T, TERMS>],
+        chosen: Degree,
+    ) -> Result<Self, FitError> {
+        let needed = chosen.terms() as u64;
+        let (first, rest) =
+            trials.split_first().ok_or(FitError::TooFewSamples { needed, got: 0 })?;
+        let mut all = *first;
+        rest.iter().try_for_each(|trial| all.merge(trial))?;
+        let mut rows = [None; MOST];
+        for (place, degree) in rows.iter_mut().zip(Self::neighbours(chosen)) {
+            *place = Some((degree, row(&all, trials, degree)));
+        }
+        let mut table = Self { chosen, rows };
+        table.compare(trials);
+        Ok(table)
+    }
+
+    /// Fills in each row's excess over the best one.
+    fn compare<const TERMS: usize>(&mut self, trials: &[Factor<T, TERMS>]) {
+        let Some(best) = self.best().map(|row| row.degree) else { return };
+        for (degree, row) in self.rows.iter_mut().flatten() {
+            if let Ok(row) = row
+                && row.cross_validation.is_ok()
+            {
+                row.excess = excess(trials, *degree, best);
+            }
+        }
+    }
+
+    /// The order that was asked about.
+    pub fn chosen(&self) -> Degree {
+        self.chosen
+    }
+
+    /// Each order with its row, or with the reason why it cannot be fitted on
+    /// these samples, by rising number of terms.
+    pub fn rows(&self) -> impl Iterator<Item = &OrderEntry<T>> {
+        self.rows.iter().flatten()
+    }
+
+    fn fitted(&self) -> impl Iterator<Item = &OrderRow<T>> {
+        self.rows().filter_map(|(_, row)| row.as_ref().ok())
+    }
+
+    /// The order of the lowest cross-validated error, whatever its terms.
+    pub fn best(&self) -> Option<&OrderRow<T>> {
+        let error = |row: &OrderRow<T>| row.cross_validation.map(|cv| cv.rmse).ok();
+        self.fitted()
+            .filter(|row| error(row).is_some())
+            .reduce(|best, row| if error(row) < error(best) { row } else { best })
+    }
+
+    /// The lowest order worth having, by the rule above. `None` when there are
+    /// not enough trials to leave one out: no statistic of a single trial can
+    /// say how the surface does on the next.
+    pub fn recommended(&self) -> Option<Degree> {
+        self.fitted()
+            .find(|row| row.excess.is_some_and(|(mean, error)| mean <= error))
+            .map(|row| row.degree)
+    }
+}
+
+fn shifted(degree: Degree, rate: i8, volts: i8) -> Option<Degree> {
+    let rate = degree.rate().checked_add_signed(rate)?;
+    let volts = degree.volts().checked_add_signed(volts)?;
+    Degree::new(rate, volts).ok()
+}
+
+fn row<T: Real, const TERMS: usize>(
+    all: &Factor<T, TERMS>,
+    trials: &[Factor<T, TERMS>],
+    degree: Degree,
+) -> Result<OrderRow<T>, FitError> {
+    let fit = all.fit_degree(degree)?;
+    Ok(OrderRow {
+        degree,
+        terms: degree.terms(),
+        r_squared: fit.r_squared(),
+        rmse: fit.rmse(),
+        cross_validation: cross_validate(trials, degree),
+        excess: None,
+    })
+}
+
+/// Mean over trials of the difference in held-out mean squared error, and the
+/// standard error of that mean.
+fn excess<T: Real, const TERMS: usize>(
+    trials: &[Factor<T, TERMS>],
+    degree: Degree,
+    best: Degree,
+) -> Option<(T, T)> {
+    let differences = || {
+        held_out(trials, degree)
+            .zip(held_out(trials, best))
+            .filter_map(|(a, b)| Some(a.ok()?.mean_square() - b.ok()?.mean_square()))
+    };
+    let count = differences().count();
+    if count < 2 {
+        return None;
+    }
+    let n = T::from_f64(count as f64);
+    let mean = differences().fold(T::zero(), |sum, d| sum + d) / n;
+    let squares = differences().fold(T::zero(), |sum, d| sum + (d - mean) * (d - mean));
+    Some((mean, (squares / (n * (n - T::one()))).sqrt()))
+}

@@ -1,0 +1,270 @@
+//! Fits that outliers cannot pull.
+
+use stretch_core::{Degree, Real};
+
+use crate::{Fit, FitError, SurfaceAccumulator};
+
+/// What a residual costs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Loss {
+    /// Tukey's bisquare with tuning constant 4.685: near least squares for
+    /// small residuals (95 % of its efficiency on normal errors), and blind
+    /// to residuals beyond 4.685 robust standard deviations.
+    #[default]
+    Bisquare,
+    /// The sum of absolute residuals: no scale to tune, half the samples may
+    /// be wrong in value; 64 % efficient on normal errors.
+    LeastAbsolute,
+}
+
+/// Bisquare residuals beyond this many robust standard deviations weigh 0.
+const TUNING: f64 = 4.685;
+/// Median absolute deviation of a standard normal variable.
+const NORMAL_MAD: f64 = 0.6745;
+/// Leverage is taken as at most this, so that a residual can be studentised.
+const MOST_LEVERAGE: f64 = 0.9999;
+/// Rows of the accumulators within.
+const ROWS: usize = 32;
+
+impl Loss {
+    /// Re-weighted fits at most. Least absolute residuals converge linearly.
+    fn most_steps(self) -> u32 {
+        match self {
+            Self::Bisquare => 50,
+            Self::LeastAbsolute => 500,
+        }
+    }
+}
+
+/// A robust surface, its scale and how the iteration went.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RobustFit<T, const TERMS: usize> {
+    /// The surface. SSE, R^2 and RMSE count every sample alike, outliers
+    /// included; `sigma`, standard errors and bounds use the robust scale.
+    pub fit: Fit<T, TERMS>,
+    /// Re-weighted fits that were made.
+    pub steps: u32,
+    /// Whether the coefficients came to rest before the limit of steps.
+    pub converged: bool,
+    /// Samples that the bisquare rejected altogether (weight 0).
+    pub rejected: u64,
+}
+
+/// Fits a surface by iteratively re-weighted least squares.
+///
+/// `samples` is called once a pass and must give the same
+/// `(rate, volts, value)` each time; `memory` is lent, one number a sample,
+/// for the median of the residuals. Nothing else grows with the log.
+///
+/// **Bisquare**, as MATLAB's `fit(..., 'Robust', 'Bisquare')` documents it:
+/// residuals are divided by `sqrt(1 - h)` with `h` the leverage in the plain
+/// fit; `s` is the median of the largest `n - p + 1` absolute adjusted
+/// residuals over 0.6745; with `u = e/(4.685 s)` a sample weighs
+/// `(1 - u^2)^2`, or 0 from `|u| = 1` on. Sigma is the robust one of DuMouchel
+/// and O'Brien (1989), never below its mix with the plain RMSE weighed
+/// `n : p^2`.
+///
+/// **Least absolute residuals**: a sample weighs `1/max(|e|, d)` with `d` a
+/// millionth of the robust scale of the plain fit. Sigma is the distribution-free
+/// `sqrt(n) (e_hi - e_lo)/(2 * 1.96)` between the order statistics that bound
+/// the median at 95 % (McKean and Schrader 1987).
+///
+/// Steps end when no coefficient moves by more than `sqrt(epsilon)` of its size.
+///
+/// ```
+/// use stretch_core::Degree;
+/// use stretch_fit::{Loss, robust_fit};
+///
+/// // A line, a wobble, and one wild sample in ten.
+/// let samples = || (0..100).map(|k| {
+///     let volts = f64::from(k) / 100.0;
+///     let wobble = 0.01 * f64::from(k * k % 7 - 3);
+///     (0.0, volts, 3.0 * volts + wobble + if k % 10 == 9 { 50.0 * volts } else { 0.0 })
+/// });
+/// let mut memory = [0.0; 100];
+/// let line = Degree::new(0, 1).unwrap();
+/// for loss in [Loss::Bisquare, Loss::LeastAbsolute] {
+///     let robust = robust_fit::<f64, 2, _>(line, loss, samples, &mut memory)?;
+///     assert!(robust.converged);
+///     assert!((robust.fit.coefficients()[1] - 3.0).abs() < 0.02);
+/// }
+/// # Ok::<(), stretch_fit::FitError>(())
+/// ```
+///
+/// # Errors
+/// As for [`SurfaceAccumulator::push`] and [`SurfaceAccumulator::fit`];
+/// [`FitError::ShortMemory`] when `memory` has fewer places than there are
+/// samples; [`FitError::TooFewSamples`] when no degree of freedom is left;
+/// [`FitError::RankDeficient`] also when the samples that still weigh anything
+/// cannot determine a term.
+pub fn robust_fit<T: Real, const TERMS: usize, I>(
+    degree: Degree,
+    loss: Loss,
+    samples: impl Fn() -> I,
+    memory: &mut [T],
+) -> Result<RobustFit<T, TERMS>, FitError>
+where
+    I: IntoIterator<Item = (T, T, T)>,
+{
+    let mut plain = SurfaceAccumulator::<T, TERMS, ROWS>::new(degree)?;
+    plain.extend(samples())?;
+    let plain = plain.factor();
+    let ols = plain.fit()?;
+    let n = plain.samples();
+    if ols.dof() == 0 {
+        return Err(FitError::TooFewSamples { needed: n + 1, got: n });
+    }
+    let lent = memory.len() as u64;
+    let short = FitError::ShortMemory { needed: n, got: lent };
+    let residuals = usize::try_from(n).ok().and_then(|n| memory.get_mut(..n)).ok_or(short)?;
+
+    let studentising = |rate: T, volts: T| match loss {
+        Loss::Bisquare => {
+            let h = ols.leverage(rate, volts).min(T::from_f64(MOST_LEVERAGE));
+            T::one() / (T::one() - h).sqrt()
+        }
+        Loss::LeastAbsolute => T::one(),
+    };
+    // A perfect fit has no scale: a millionth of the spread of the values.
+    let spread = (ols.sst / T::from_f64((n - 1) as f64)).sqrt();
+    let tiny = T::from_f64(1e-6) * if spread > T::zero() { spread } else { T::one() };
+    let scale_of = |fit: &Fit<T, TERMS>, residuals: &mut [T]| {
+        for ((rate, volts, value), place) in samples().into_iter().zip(&mut *residuals) {
+            let e = value - fit.surface.eval(rate, volts);
+            *place = (e * studentising(rate, volts)).abs();
+        }
+        median_of_largest(residuals, fit.terms()) / T::from_f64(NORMAL_MAD)
+    };
+
+    let floor = T::from_f64(1e-6) * scale_of(&ols, residuals).max(tiny);
+    let rest = T::epsilon().sqrt();
+    let mut found = ols;
+    let mut steps = 0;
+    let mut converged = false;
+    while steps < loss.most_steps() && !converged {
+        let reach = match loss {
+            Loss::Bisquare => T::from_f64(TUNING) * scale_of(&found, residuals).max(tiny),
+            Loss::LeastAbsolute => floor,
+        };
+        let mut sums = SurfaceAccumulator::<T, TERMS, ROWS>::new(degree)?;
+        for (rate, volts, value) in samples() {
+            let e = (value - found.surface.eval(rate, volts)) * studentising(rate, volts);
+            let weight = match loss {
+                Loss::Bisquare => bisquare_weight(e / reach),
+                Loss::LeastAbsolute => reach / e.abs().max(reach),
+            };
+            sums.push_weighted(rate, volts, value, weight)?;
+        }
+        let next = sums.fit()?;
+        converged = next
+            .coefficients()
+            .iter()
+            .zip(found.coefficients())
+            .all(|(&a, &b)| (a - b).abs() <= rest * a.abs().max(b.abs()));
+        found = next;
+        steps += 1;
+    }
+
+    let mut rejected = 0;
+    let sigma = match loss {
+        Loss::Bisquare => {
+            let reach = T::from_f64(TUNING) * scale_of(&found, residuals).max(tiny);
+            let studentised = samples().into_iter().map(|(rate, volts, value)| {
+                let e = (value - found.surface.eval(rate, volts)) * studentising(rate, volts);
+                let h = ols.leverage(rate, volts).min(T::from_f64(MOST_LEVERAGE));
+                if e.abs() >= reach {
+                    rejected += 1;
+                }
+                (e / reach, h)
+            });
+            bisquare_sigma(studentised, reach, &ols)
+        }
+        Loss::LeastAbsolute => {
+            for ((rate, volts, value), place) in samples().into_iter().zip(&mut *residuals) {
+                *place = value - found.surface.eval(rate, volts);
+            }
+            median_spread(residuals)
+        }
+    };
+    // Statistics over all samples alike, from the plain triangle.
+    let fit = Fit {
+        coefficients: found.coefficients,
+        surface: found.surface,
+        sse: plain.residual_of(found.coefficients()),
+        sigma_squared: Some(sigma * sigma),
+        ..ols
+    };
+    let finite = fit.is_finite() && sigma.is_finite();
+    if finite {
+        Ok(RobustFit { fit, steps, converged, rejected })
+    } else {
+        Err(FitError::NotFinite)
+    }
+}
+
+fn bisquare_weight<T: Real>(u: T) -> T {
+    let root = T::one() - u * u;
+    if root > T::zero() { root * root } else { T::zero() }
+}
+
+/// The median of all but the `terms - 1` smallest of some absolute values:
+/// a fit through `terms` samples makes that many residuals nearly zero.
+fn median_of_largest<T: Real>(values: &mut [T], terms: usize) -> T {
+    let skipped = terms.saturating_sub(1).min(values.len().saturating_sub(1));
+    let left = values.len() - skipped;
+    let upper = order_statistic(values, skipped + left / 2);
+    if left % 2 == 1 {
+        return upper;
+    }
+    // The lower middle is the largest of those before the upper one.
+    let lower = values[..skipped + left / 2].iter().fold(T::zero(), |most, &v| most.max(v));
+    (lower + upper) / T::from_f64(2.0)
+}
+
+/// The value that would stand at `place` if sorted; those before it are moved
+/// before it.
+fn order_statistic<T: Real>(values: &mut [T], place: usize) -> T {
+    let order = |a: &T, b: &T| a.partial_cmp(b).unwrap_or(core::cmp::Ordering::Equal);
+    if values.is_empty() {
+        return T::zero();
+    }
+    let place = place.min(values.len() - 1);
+    *values.select_nth_unstable_by(place, order).1
+}
+
+/// Robust sigma from `psi(u) = u (1 - u^2)^2` and its derivative, with the
+/// small-sample factor `1 + (p/n)(1 - m)/m`.
+fn bisquare_sigma<T: Real, const TERMS: usize>(
+    studentised: impl Iterator<Item = (T, T)>,
+    reach: T,
+    ols: &Fit<T, TERMS>,
+) -> T {
+    let (mut slope, mut square) = (T::zero(), T::zero());
+    for (u, h) in studentised {
+        let root = T::one() - u * u;
+        if root > T::zero() {
+            slope = slope + root * (root - T::from_f64(4.0) * u * u);
+            let psi = u * root * root;
+            square = square + (T::one() - h) * psi * psi;
+        }
+    }
+    let (n, p) = (T::from_f64(ols.samples as f64), T::from_f64(ols.terms() as f64));
+    let mean_slope = slope / n;
+    let factor = T::one() + p / n * (T::one() - mean_slope) / mean_slope;
+    let robust = factor * (square / (n - p)).sqrt() * reach / mean_slope;
+    let plain = ols.rmse().unwrap_or(T::zero());
+    let mixed = ((plain * plain * p * p + robust * robust * n) / (p * p + n)).sqrt();
+    robust.max(mixed)
+}
+
+/// Half the width of the 95 % interval of the median of `n` residuals, as the
+/// standard deviation that a mean would need to be that uncertain.
+fn median_spread<T: Real>(residuals: &mut [T]) -> T {
+    const NORMAL_95: f64 = 1.959_963_984_540_054;
+    let n = residuals.len();
+    let root = libm::sqrt(n as f64);
+    let from_end = libm::round((n as f64 + 1.0) / 2.0 - NORMAL_95 * root / 2.0).max(1.0) as usize;
+    let low = order_statistic(residuals, from_end - 1);
+    let high = order_statistic(residuals, n - from_end);
+    (high - low) * T::from_f64(root / (2.0 * NORMAL_95))
+}

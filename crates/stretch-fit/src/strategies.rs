@@ -1,0 +1,64 @@
+//! Proptest strategies: surfaces and noisy samples on them.
+//!
+//! ```
+//! use proptest::prelude::*;
+//! use stretch_core::Degree;
+//! use stretch_fit::{SurfaceAccumulator, strategies::observations};
+//!
+//! let config = ProptestConfig { cases: 8, failure_persistence: None, ..Default::default() };
+//! proptest!(config, |(log in observations(Degree::POLY13, 0.0, 50..200))| {
+//!     let mut sums = SurfaceAccumulator::<f64, 7, 16>::new(log.surface.degree())?;
+//!     sums.extend(log.samples.iter().copied())?;
+//!     let fit = sums.fit()?;
+//!     prop_assert!(fit.rmse().unwrap() < 1e-10);
+//! });
+//! ```
+
+extern crate std;
+
+use std::{ops::Range, vec::Vec};
+
+use proptest::{collection::vec, prelude::*};
+use stretch_core::{Degree, MAX_DEGREE, Surface};
+
+/// Samples of a known surface.
+#[derive(Debug, Clone)]
+pub struct Observations {
+    /// The truth.
+    pub surface: Surface<f64>,
+    /// `(rate, volts, value)`; rate in -1 to 1, volts in 0 to 1.
+    pub samples: Vec<(f64, f64, f64)>,
+}
+
+/// Any degree up to 5 in each variable.
+pub fn degrees() -> impl Strategy<Value = Degree> {
+    let most = MAX_DEGREE as u8;
+    (0..=most, 0..=most).prop_filter_map("a degree", |(rate, volts)| Degree::new(rate, volts).ok())
+}
+
+/// A surface of `degree` with coefficients in -10 to 10.
+pub fn surfaces(degree: Degree) -> impl Strategy<Value = Surface<f64>> {
+    vec(-10.0..10.0, degree.terms())
+        .prop_filter_map("a surface", move |c| Surface::new(degree, &c).ok())
+}
+
+/// Samples of a random surface of `degree`, spread over the whole rectangle by
+/// stratified sampling so that every term is determined once there are a few
+/// times more samples than terms, with uniform noise up to `noise`.
+pub fn observations(
+    degree: Degree,
+    noise: f64,
+    samples: Range<usize>,
+) -> impl Strategy<Value = Observations> {
+    let jitter = (0.0..1.0_f64, 0.0..1.0_f64, -1.0..1.0_f64);
+    (surfaces(degree), vec(jitter, samples)).prop_map(move |(surface, jitters)| {
+        let cells = jitters.len() as f64;
+        let samples = jitters.iter().enumerate().map(|(k, &(across, along, error))| {
+            // Cell k along the voltage; the golden ratio spreads the rates.
+            let volts = (k as f64 + along) / cells;
+            let rate = 2.0 * (k as f64 * 0.618_033_988_749_894_9 + 0.3 * across).fract() - 1.0;
+            (rate, volts, surface.eval(rate, volts) + noise * error)
+        });
+        Observations { surface, samples: samples.collect() }
+    })
+}

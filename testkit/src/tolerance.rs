@@ -93,3 +93,37 @@ pub const METRICS_SHIFT: f64 = 1e-9;
 
 /// Relative: the errors themselves are rounded to `f32`, each by 2^-24; the length adds nothing.
 pub const METRICS_F32: f64 = 5e-7;
+
+/// Relative norm: coefficients of a fit on data of condition up to about a thousand.
+pub const FIT_WELL: f64 = 1e-12;
+
+/// Relative norm: coefficients of a fit on raw volts of condition up to 1.3e8. Rounding
+/// of 1e-16 may grow by the condition, to 1e-8; as the roundings of 240 rows are
+/// independent it stays well below, and normal equations (condition squared) far above.
+pub const FIT_ILL: f64 = 1e-9;
+
+/// Relative: SSE, R^2 and RMSE, whose residuals lose at most six digits to the values.
+pub const FIT_STATISTICS: f64 = 1e-9;
+
+/// Relative: Student and Fisher quantiles by inverting an incomplete beta function whose
+/// logarithms of gamma functions cancel.
+pub const FIT_QUANTILE: f64 = 1e-9;
+
+/// Relative: a condition number by a dozen power iterations, from below.
+pub const FIT_CONDITION: f64 = 0.1;
+
+/// Relative norm: the bisquare stops once no coefficient moves by 1.5e-8 of its size.
+pub const FIT_BISQUARE: f64 = 1e-7;
+
+/// Relative: the sum of absolute residuals above the linear program's optimum: a smoothing
+/// of a millionth of the scale at each of seven interpolated samples, and slow convergence.
+pub const FIT_LEAST_ABSOLUTE: f64 = 1e-6;
+
+/// Relative norm: statsmodels' bisquare, whose scale is the plain MAD without leverage.
+pub const FIT_OTHER_SCALE: f64 = 1e-2;
+
+/// Relative norm: `f32` coefficients on raw volts of condition 4e4.
+pub const FIT_F32_NARROW: f64 = 1e-2;
+
+/// Relative norm: `f32` coefficients on normalised data of condition below a thousand.
+pub const FIT_F32: f64 = 1e-4;

@@ -1,2 +1,20 @@
 #![doc = include_str!("../README.md")]
 #![no_std]
+
+mod agreement;
+mod blocks;
+mod error;
+mod error_stats;
+mod lag;
+mod paired;
+#[cfg(feature = "proptest")]
+pub mod strategies;
+pub mod student_t;
+mod sum;
+
+pub use agreement::{Agreement, Delta};
+pub use blocks::{BlockMeans, PairedBlocks};
+pub use error::MetricsError;
+pub use error_stats::ErrorStats;
+pub use lag::{Lag, lag};
+pub use paired::{PairedT, TTest};

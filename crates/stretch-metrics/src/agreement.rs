@@ -1,0 +1,204 @@
+//! How well an estimate follows the truth, in the units of both and in percent.
+
+use stretch_core::Real;
+
+use crate::{
+    ErrorStats,
+    sum::{Moments, Sum, largest, real},
+};
+
+/// What an error is a percentage of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Delta {
+    /// The range of the estimate: delta of the paper's equation 1, as printed.
+    Estimate,
+    /// The range of the truth: the stroke. The fairer one, as an estimate that swings too
+    /// wide does not shrink its own error.
+    Truth,
+}
+
+/// [`ErrorStats`] and what is needed to relate them to the signals: ranges, R^2, correlation.
+///
+/// The paper's measures (its section 2, with d_p the truth and d_s the estimate):
+///
+/// ```text
+/// average error   100 mean(|d_p - d_s|) / delta      average_error_percent(delta)
+/// signed          100 mean(d_p - d_s) / delta        signed_error_percent(delta)
+/// RMSE            sqrt(mean((d_p - d_s)^2))          errors().rmse(), rmse_percent(delta)
+/// R^2             1 - sum((d_p - d_s)^2) / sum((d_p - mean d_p)^2)
+/// ```
+///
+/// ```
+/// use stretch_metrics::{Agreement, Delta};
+/// let mut agreement = Agreement::<f64>::new();
+/// for (truth, estimate) in [(150.0, 152.0), (160.0, 160.0), (170.0, 172.0), (180.0, 176.0)] {
+///     agreement.push(truth, estimate);
+/// }
+/// assert_eq!(agreement.truth_range(), Some((150.0, 180.0)));
+/// assert_eq!(agreement.average_error_percent(Delta::Estimate), Some(100.0 * 2.0 / 24.0));
+/// assert_eq!(agreement.average_error_percent(Delta::Truth), Some(100.0 * 2.0 / 30.0));
+/// assert_eq!(agreement.r_squared(), Some(1.0 - 24.0 / 500.0));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Agreement<T> {
+    errors: ErrorStats<T>,
+    truth: Spread<T>,
+    estimate: Spread<T>,
+    products: Sum<T>,
+    skipped: u64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Spread<T> {
+    moments: Moments<T>,
+    min: T,
+    max: T,
+}
+
+impl<T: Real> Spread<T> {
+    fn new() -> Self {
+        Self { moments: Moments::new(), min: T::max_value(), max: T::min_value() }
+    }
+
+    fn push(&mut self, x: T) -> (T, T) {
+        self.min = self.min.min(x);
+        self.max = self.max.max(x);
+        self.moments.push(x)
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.moments.merge(&other.moments);
+        self.min = self.min.min(other.min);
+        self.max = self.max.max(other.max);
+    }
+
+    fn range(&self) -> Option<(T, T)> {
+        (self.moments.count() > 0).then_some((self.min, self.max))
+    }
+}
+
+impl<T: Real> Default for Agreement<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real> Agreement<T> {
+    /// Without a sample.
+    pub fn new() -> Self {
+        Self {
+            errors: ErrorStats::new(),
+            truth: Spread::new(),
+            estimate: Spread::new(),
+            products: Sum::new(),
+            skipped: 0,
+        }
+    }
+
+    /// Takes a pair; whether it was taken. One that is not finite, or too large to be
+    /// squared (see [`ErrorStats`]), is not.
+    #[inline]
+    pub fn push(&mut self, truth: T, estimate: T) -> bool {
+        let limit = largest::<T>();
+        let taken =
+            truth.abs() <= limit && estimate.abs() <= limit && self.errors.push(truth, estimate);
+        if taken {
+            let (before, _) = self.truth.push(truth);
+            let (_, after) = self.estimate.push(estimate);
+            self.products.add(before * after);
+        } else {
+            self.skipped += 1;
+        }
+        taken
+    }
+
+    /// Takes all samples of another stream, such as another trial.
+    pub fn merge(&mut self, other: &Self) {
+        let (own, others) = (self.errors.count(), other.errors.count());
+        if own > 0 && others > 0 {
+            let by_truth = other.truth.moments.mean() - self.truth.moments.mean();
+            let by_estimate = other.estimate.moments.mean() - self.estimate.moments.mean();
+            let share = real::<T>(others) / real(own + others);
+            self.products.add(by_truth * by_estimate * (real::<T>(own) * share));
+        }
+        self.products.merge(&other.products);
+        self.errors.merge(&other.errors);
+        self.truth.merge(&other.truth);
+        self.estimate.merge(&other.estimate);
+        self.skipped += other.skipped;
+    }
+
+    /// Bias, MAE, RMSE and the rest, in the unit of the signals.
+    pub fn errors(&self) -> &ErrorStats<T> {
+        &self.errors
+    }
+
+    /// Pairs taken.
+    pub fn count(&self) -> u64 {
+        self.errors.count()
+    }
+
+    /// Pairs not taken.
+    pub fn skipped(&self) -> u64 {
+        self.skipped
+    }
+
+    /// Least and greatest value of the truth. `None` when empty.
+    pub fn truth_range(&self) -> Option<(T, T)> {
+        self.truth.range()
+    }
+
+    /// Least and greatest value of the estimate. `None` when empty.
+    pub fn estimate_range(&self) -> Option<(T, T)> {
+        self.estimate.range()
+    }
+
+    /// The paper's average error: 100 mean(|d_p - d_s|) / delta. `None` when empty or when
+    /// delta is 0 or too small to divide by.
+    pub fn average_error_percent(&self, delta: Delta) -> Option<T> {
+        self.percent(self.errors.mae()?, delta)
+    }
+
+    /// 100 mean(d_p - d_s) / delta, with the sign that the paper's equation has: positive
+    /// where the estimate is too *small*, the opposite of [`ErrorStats::bias`]. `None` as
+    /// [`average_error_percent`](Self::average_error_percent).
+    pub fn signed_error_percent(&self, delta: Delta) -> Option<T> {
+        self.percent(-self.errors.bias()?, delta)
+    }
+
+    /// 100 RMSE / delta; with [`Delta::Truth`] it is percent of the stroke. `None` as
+    /// [`average_error_percent`](Self::average_error_percent).
+    pub fn rmse_percent(&self, delta: Delta) -> Option<T> {
+        self.percent(self.errors.rmse()?, delta)
+    }
+
+    /// R^2 = 1 - SSE / SST of the estimate as it stands, without refitting: 1 is perfect, 0 as
+    /// good as the mean of the truth, below 0 worse. `None` when empty or the truth is
+    /// constant (or so nearly that R^2 is beyond every number).
+    pub fn r_squared(&self) -> Option<T> {
+        let total = self.truth.moments.squares();
+        if total <= T::zero() {
+            return None;
+        }
+        Some(T::one() - self.errors.sum_of_squares() / total).filter(|r| r.is_finite())
+    }
+
+    /// Pearson's correlation of truth and estimate, -1..1: blind to bias and scale. `None`
+    /// when either is constant.
+    pub fn correlation(&self) -> Option<T> {
+        let scale = self.truth.moments.squares().sqrt() * self.estimate.moments.squares().sqrt();
+        let one = T::one();
+        (scale > T::zero()).then(|| (self.products.value() / scale).max(-one).min(one))
+    }
+
+    fn percent(&self, error: T, delta: Delta) -> Option<T> {
+        let (min, max) = match delta {
+            Delta::Estimate => self.estimate.range()?,
+            Delta::Truth => self.truth.range()?,
+        };
+        if max <= min {
+            return None;
+        }
+        Some(T::from_f64(100.0) * error / (max - min)).filter(|percent| percent.is_finite())
+    }
+}

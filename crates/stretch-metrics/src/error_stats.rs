@@ -1,0 +1,113 @@
+//! Errors of an estimate, streaming.
+
+use stretch_core::Real;
+
+use crate::sum::{Moments, Sum, largest, real};
+
+/// Errors of an estimate against the truth: count, bias, MAE, RMSE, spread, largest.
+///
+/// The error is e = estimate - truth, in the unit of both. Moments are Welford's with
+/// compensated sums: an `f32` stream of ten million samples loses no digit to the length.
+/// [`merge`](Self::merge) gives, to rounding, what one stream of both would have given.
+///
+/// A pair that is not finite, or whose error could not be squared (magnitude above about
+/// 1e15 in `f32`, 1e150 in `f64`), is not taken and counted in [`skipped`](Self::skipped).
+///
+/// ```
+/// use stretch_metrics::ErrorStats;
+/// let mut stats = ErrorStats::<f64>::new();
+/// for (truth, estimate) in [(10.0, 11.0), (20.0, 17.0)] {
+///     stats.push(truth, estimate);
+/// }
+/// assert_eq!(stats.bias(), Some(-1.0));
+/// assert_eq!(stats.mae(), Some(2.0));
+/// assert_eq!(stats.rmse(), Some(5.0_f64.sqrt()));
+/// assert_eq!(stats.max_abs(), Some(3.0));
+/// assert_eq!(ErrorStats::<f64>::new().rmse(), None);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ErrorStats<T> {
+    moments: Moments<T>,
+    absolute: Sum<T>,
+    largest: T,
+    skipped: u64,
+}
+
+impl<T: Real> Default for ErrorStats<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real> ErrorStats<T> {
+    /// Without a sample.
+    pub fn new() -> Self {
+        Self { moments: Moments::new(), absolute: Sum::new(), largest: T::zero(), skipped: 0 }
+    }
+
+    /// Takes a pair; whether it was taken.
+    #[inline]
+    pub fn push(&mut self, truth: T, estimate: T) -> bool {
+        let error = estimate - truth;
+        let size = error.abs();
+        // False for NaN, too.
+        let taken = size <= largest();
+        if taken {
+            self.moments.push(error);
+            self.absolute.add(size);
+            self.largest = self.largest.max(size);
+        } else {
+            self.skipped += 1;
+        }
+        taken
+    }
+
+    /// Takes all samples of another stream.
+    pub fn merge(&mut self, other: &Self) {
+        self.moments.merge(&other.moments);
+        self.absolute.merge(&other.absolute);
+        self.largest = self.largest.max(other.largest);
+        self.skipped += other.skipped;
+    }
+
+    /// Pairs taken.
+    pub fn count(&self) -> u64 {
+        self.moments.count()
+    }
+
+    /// Pairs not taken.
+    pub fn skipped(&self) -> u64 {
+        self.skipped
+    }
+
+    /// Mean of the error; positive where the estimate is too large. `None` when empty.
+    pub fn bias(&self) -> Option<T> {
+        (self.count() > 0).then(|| self.moments.mean())
+    }
+
+    /// Mean of the error's magnitude. `None` when empty.
+    pub fn mae(&self) -> Option<T> {
+        (self.count() > 0).then(|| self.absolute.value() / real(self.count()))
+    }
+
+    /// Root of the mean squared error (divided by n). `None` when empty.
+    pub fn rmse(&self) -> Option<T> {
+        (self.count() > 0).then(|| (self.sum_of_squares() / real(self.count())).sqrt())
+    }
+
+    /// Standard deviation of the error about its mean (divided by n - 1). `None` below two.
+    pub fn std_dev(&self) -> Option<T> {
+        self.moments.std_dev()
+    }
+
+    /// The largest magnitude of the error. `None` when empty.
+    pub fn max_abs(&self) -> Option<T> {
+        (self.count() > 0).then_some(self.largest)
+    }
+
+    /// Sum of the squared errors.
+    pub(crate) fn sum_of_squares(&self) -> T {
+        let mean = self.moments.mean();
+        self.moments.squares() + mean * mean * real(self.count())
+    }
+}

@@ -1,0 +1,138 @@
+//! The paired t test, streaming.
+
+use stretch_core::Real;
+
+use crate::{
+    MetricsError,
+    student_t::{critical, ln_two_tailed, two_tailed},
+    sum::{Moments, largest},
+};
+
+/// Accumulates paired samples for Student's paired t test.
+///
+/// The difference is d = first - second; t = mean(d) / (s_d / sqrt(n)) with n - 1 degrees of
+/// freedom. It takes the pairs as independent. Samples of one recording are not: neighbours
+/// resemble each other, and P comes out far too small. [`PairedBlocks`](crate::PairedBlocks)
+/// tests means over blocks, which is nearer to the truth; print both.
+///
+/// ```
+/// use stretch_metrics::PairedT;
+/// let mut test = PairedT::<f64>::new();
+/// for (linear, surface) in [(1.9, 1.5), (1.7, 1.6), (2.1, 1.4), (1.8, 1.6)] {
+///     test.push(linear, surface);
+/// }
+/// let result = test.test()?;
+/// assert_eq!(result.dof, 3);
+/// assert!((result.mean_difference - 0.35).abs() < 1e-15);
+/// assert!((result.t - 2.645_751_311_064_59).abs() < 1e-12);
+/// assert!((result.p - 0.077_162_1).abs() < 1e-6);
+/// # Ok::<(), stretch_metrics::MetricsError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PairedT<T> {
+    moments: Moments<T>,
+    skipped: u64,
+}
+
+/// What a paired t test says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TTest {
+    /// Pairs, or blocks.
+    pub count: u64,
+    /// Mean of first - second, in their unit.
+    pub mean_difference: f64,
+    /// Standard error of that mean.
+    pub standard_error: f64,
+    /// `mean_difference / standard_error`.
+    pub t: f64,
+    /// Degrees of freedom: `count - 1`.
+    pub dof: u64,
+    /// Two-tailed P; 0 where it is below the least `f64`, for which see `ln_p`.
+    pub p: f64,
+    /// Natural logarithm of the two-tailed P, finite however small P is.
+    pub ln_p: f64,
+    /// Ends of the 95 % interval of the mean difference.
+    pub interval_95: (f64, f64),
+}
+
+impl TTest {
+    /// The two-sided confidence interval of the mean difference at `level`, such as 0.99.
+    pub fn interval(&self, level: f64) -> (f64, f64) {
+        let half = critical(1.0 - level, self.dof as f64) * self.standard_error;
+        (self.mean_difference - half, self.mean_difference + half)
+    }
+}
+
+impl<T: Real> Default for PairedT<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real> PairedT<T> {
+    /// Without a pair.
+    pub fn new() -> Self {
+        Self { moments: Moments::new(), skipped: 0 }
+    }
+
+    /// Takes a pair; whether it was taken. One that is not finite, or whose difference could
+    /// not be squared (see [`ErrorStats`](crate::ErrorStats)), is not.
+    #[inline]
+    pub fn push(&mut self, first: T, second: T) -> bool {
+        let difference = first - second;
+        let taken = difference.abs() <= largest();
+        if taken {
+            self.moments.push(difference);
+        } else {
+            self.skipped += 1;
+        }
+        taken
+    }
+
+    /// Takes all pairs of another stream.
+    pub fn merge(&mut self, other: &Self) {
+        self.moments.merge(&other.moments);
+        self.skipped += other.skipped;
+    }
+
+    /// Pairs taken.
+    pub fn count(&self) -> u64 {
+        self.moments.count()
+    }
+
+    /// Pairs not taken.
+    pub fn skipped(&self) -> u64 {
+        self.skipped
+    }
+
+    /// The test of "the mean difference is 0".
+    ///
+    /// # Errors
+    /// [`MetricsError::TooFew`] below two pairs; [`MetricsError::Constant`] when all
+    /// differences are equal, as t would be x / 0.
+    pub fn test(&self) -> Result<TTest, MetricsError> {
+        let count = self.count();
+        let std_dev =
+            self.moments.std_dev().ok_or(MetricsError::TooFew { needed: 2, got: count })?;
+        let standard_error = std_dev.as_f64() / libm::sqrt(count as f64);
+        let mean_difference = self.moments.mean().as_f64();
+        let t = mean_difference / standard_error;
+        // 0 / 0, x / 0, and what is as good as that.
+        if !t.is_finite() {
+            return Err(MetricsError::Constant { signal: "difference" });
+        }
+        let dof = count - 1;
+        let mut test = TTest {
+            count,
+            mean_difference,
+            standard_error,
+            t,
+            dof,
+            p: two_tailed(t, dof as f64),
+            ln_p: ln_two_tailed(t, dof as f64),
+            interval_95: (0.0, 0.0),
+        };
+        test.interval_95 = test.interval(0.95);
+        Ok(test)
+    }
+}

@@ -1,0 +1,109 @@
+//! Running sums and moments that stay accurate over long streams.
+
+use stretch_core::Real;
+
+/// A sum with what rounding lost beside it (Neumaier, doi:10.1002/zamm.19740540106).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Sum<T> {
+    high: T,
+    low: T,
+}
+
+impl<T: Real> Sum<T> {
+    pub(crate) fn new() -> Self {
+        Self { high: T::zero(), low: T::zero() }
+    }
+
+    #[inline]
+    pub(crate) fn add(&mut self, x: T) {
+        // Knuth's two-sum: exact without asking which is larger.
+        let high = self.high + x;
+        let part = high - self.high;
+        self.low = self.low + ((self.high - (high - part)) + (x - part));
+        self.high = high;
+    }
+
+    pub(crate) fn merge(&mut self, other: &Self) {
+        self.add(other.high);
+        self.low = self.low + other.low;
+    }
+
+    #[inline]
+    pub(crate) fn value(&self) -> T {
+        self.high + self.low
+    }
+}
+
+/// Count, mean and sum of squared deviations (Welford, doi:10.1080/00401706.1962.10490022),
+/// the mean and the squares as compensated sums.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Moments<T> {
+    count: u64,
+    mean: Sum<T>,
+    squares: Sum<T>,
+}
+
+impl<T: Real> Moments<T> {
+    pub(crate) fn new() -> Self {
+        Self { count: 0, mean: Sum::new(), squares: Sum::new() }
+    }
+
+    /// Takes a sample; gives how far it was from the mean before and after.
+    #[inline]
+    pub(crate) fn push(&mut self, x: T) -> (T, T) {
+        self.count += 1;
+        let before = x - self.mean.value();
+        self.mean.add(before / real(self.count));
+        let after = x - self.mean.value();
+        self.squares.add(before * after);
+        (before, after)
+    }
+
+    /// As if the other's samples had come, too (Chan, Golub and LeVeque 1979).
+    pub(crate) fn merge(&mut self, other: &Self) {
+        if other.count == 0 {
+            return;
+        }
+        if self.count == 0 {
+            *self = *other;
+            return;
+        }
+        let count = self.count + other.count;
+        let delta = other.mean.value() - self.mean.value();
+        let share = real::<T>(other.count) / real(count);
+        self.squares.merge(&other.squares);
+        self.squares.add(delta * delta * (real::<T>(self.count) * share));
+        self.mean.add(delta * share);
+        self.count = count;
+    }
+
+    pub(crate) fn count(&self) -> u64 {
+        self.count
+    }
+
+    pub(crate) fn mean(&self) -> T {
+        self.mean.value()
+    }
+
+    /// Sum of squared deviations from the mean, at least 0.
+    pub(crate) fn squares(&self) -> T {
+        self.squares.value().max(T::zero())
+    }
+
+    /// Standard deviation with n - 1; `None` below two samples.
+    pub(crate) fn std_dev(&self) -> Option<T> {
+        (self.count > 1).then(|| (self.squares() / real(self.count - 1)).sqrt())
+    }
+}
+
+/// A count as a number.
+#[inline]
+pub(crate) fn real<T: Real>(count: u64) -> T {
+    T::from_f64(count as f64)
+}
+
+/// The largest magnitude that is taken: its square summed 2^28 times is still finite.
+#[inline]
+pub(crate) fn largest<T: Real>() -> T {
+    T::max_value().sqrt() / T::from_f64(16384.0)
+}

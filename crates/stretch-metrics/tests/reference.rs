@@ -1,0 +1,100 @@
+//! Against SciPy, NumPy and mpmath: `reference/metrics/make.py`.
+
+use stretch_metrics::{
+    Agreement, Delta, PairedBlocks, PairedT, TTest, lag,
+    student_t::{critical, ln_two_tailed, two_tailed},
+};
+use testkit::{tolerance, vectors::columns};
+
+#[track_caller]
+fn close(what: &str, value: f64, expected: f64, relative: f64) {
+    let error = (value - expected).abs() / expected.abs().max(f64::MIN_POSITIVE);
+    assert!(error <= relative, "{what}: {value} for {expected}, off by {error:e}");
+}
+
+#[test]
+fn errors_agreement_and_lag() {
+    let signals = columns("metrics/signals.csv");
+    let figures = columns("metrics/figures.csv");
+    let truth = &signals["truth"];
+    for (row, name) in ["first", "second"].into_iter().enumerate() {
+        let estimate = &signals[name];
+        let mut agreement = Agreement::new();
+        for (&t, &e) in truth.iter().zip(estimate) {
+            assert!(agreement.push(t, e));
+        }
+        let errors = agreement.errors();
+        let lag = lag(truth, estimate, 20).expect("enough samples");
+        for (figure, value) in [
+            ("bias", errors.bias()),
+            ("mae", errors.mae()),
+            ("rmse", errors.rmse()),
+            ("std_dev", errors.std_dev()),
+            ("max_abs", errors.max_abs()),
+            ("average_estimate", agreement.average_error_percent(Delta::Estimate)),
+            ("average_truth", agreement.average_error_percent(Delta::Truth)),
+            ("signed_estimate", agreement.signed_error_percent(Delta::Estimate)),
+            ("signed_truth", agreement.signed_error_percent(Delta::Truth)),
+            ("r_squared", agreement.r_squared()),
+            ("correlation", agreement.correlation()),
+            ("lag_correlation", Some(lag.correlation)),
+        ] {
+            let value = value.expect("there are samples");
+            close(figure, value, figures[figure][row], tolerance::METRICS_SUMS);
+        }
+        close("lag", lag.samples, figures["lag"][row], tolerance::METRICS_LAG);
+    }
+}
+
+#[test]
+fn paired_tests_on_samples_and_blocks() {
+    let signals = columns("metrics/signals.csv");
+    let expected = columns("metrics/paired.csv");
+    let (mut samples, mut blocks) = (PairedT::new(), PairedBlocks::new(50).expect("not empty"));
+    for ((t, a), b) in signals["truth"].iter().zip(&signals["first"]).zip(&signals["second"]) {
+        let (a, b) = ((a - t).abs(), (b - t).abs());
+        samples.push(a, b);
+        blocks.push(a, b);
+    }
+    let tests: [TTest; 2] = [samples.test().expect("spread"), blocks.test().expect("spread")];
+    for (row, test) in tests.iter().enumerate() {
+        close("t", test.t, expected["t"][row], tolerance::METRICS_SUMS);
+        close("mean", test.mean_difference, expected["mean"][row], tolerance::METRICS_SUMS);
+        close("low", test.interval_95.0, expected["low"][row], tolerance::METRICS_SUMS);
+        close("high", test.interval_95.1, expected["high"][row], tolerance::METRICS_SUMS);
+        // P of 1e-240 magnifies the last digits of t by t^2 or so.
+        close("p", test.p, expected["p"][row], tolerance::METRICS_TINY_P);
+        assert_eq!(test.dof as f64, expected["dof"][row]);
+    }
+}
+
+#[test]
+fn student_t_of_any_size() {
+    let table = columns("metrics/student_t.csv");
+    let mut tiny = 0;
+    for (row, &ln_p) in table["ln_p"].iter().enumerate() {
+        let (t, dof, p) = (table["t"][row], table["dof"][row], table["p"][row]);
+        let what = format!("t {t}, dof {dof}");
+        let error = (ln_two_tailed(t, dof) - ln_p).abs() / ln_p.abs().max(1.0);
+        assert!(error <= tolerance::METRICS_LN_P, "{what}: ln P off by {error:e}");
+        assert_eq!(ln_two_tailed(-t, dof), ln_two_tailed(t, dof), "{what}: two-tailed");
+        if p > 1e-300 {
+            close(&what, two_tailed(t, dof), p, tolerance::METRICS_P);
+        } else {
+            tiny += 1;
+            assert!(two_tailed(t, dof) <= 1e-300, "{what}");
+        }
+    }
+    assert!(tiny > 10, "the table reaches below the least f64");
+}
+
+#[test]
+fn critical_values() {
+    let table = columns("metrics/critical.csv");
+    for (row, &t) in table["t"].iter().enumerate() {
+        let (p, dof) = (table["p"][row], table["dof"][row]);
+        close(&format!("p {p}, dof {dof}"), critical(p, dof), t, tolerance::METRICS_CRITICAL);
+    }
+    assert_eq!(critical(0.0, 5.0), f64::INFINITY);
+    assert!(critical(f64::NAN, 5.0).is_nan() && critical(0.5, 0.0).is_nan());
+}

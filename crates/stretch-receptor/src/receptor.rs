@@ -48,7 +48,7 @@ pub const MAX_BRIDGED: u8 = 3;
 ///         Err(withheld) => assert!(n < 10 && withheld == Withheld::Warming),
 ///     }
 /// }
-/// assert!(length_mm > 165.0 && length_mm < 172.0);
+/// assert!(length_mm > 158.0 && length_mm < 161.0);
 /// # Ok::<(), stretch_filter::FilterError>(())
 /// ```
 ///

@@ -127,3 +127,14 @@ pub const FIT_F32_NARROW: f64 = 1e-2;
 
 /// Relative norm: `f32` coefficients on normalised data of condition below a thousand.
 pub const FIT_F32: f64 = 1e-4;
+
+/// Share of k_max: the static law of the muscle tabulated by cubics at 256 knots a reference
+/// pressure; interpolation leaves h^4/384 of a fourth derivative of about 100.
+pub const STATIC_LAW: f64 = 1e-8;
+
+/// Share of a channel's full scale: two implementations of the rig at other steps of
+/// integration (the reference's own step leaves 1.5e-6, ours at most [`RIG_STEP`]).
+pub const RIG_CONFORMANCE: f64 = 2e-3;
+
+/// Share of a channel's full scale by which halving the step of integration may move it.
+pub const RIG_STEP: f64 = 1e-4;

@@ -1,0 +1,37 @@
+//! The potentiometer has backlash.
+
+use crate::{
+    effects::{Action, Effect, EffectParameter, Surroundings},
+    operator::Backlash,
+    stage::Stage,
+};
+
+/// The potentiometer has backlash.
+#[derive(Debug)]
+pub(super) struct PotBacklash;
+
+static PARAMETERS: &[EffectParameter] = &[
+    EffectParameter::strength("w", "mm", 0.0, 2.0, 0.3),
+];
+
+impl Effect for PotBacklash {
+    fn name(&self) -> &'static str {
+        "pot_backlash"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Reference
+    }
+
+    fn equation(&self) -> &'static str {
+        "L_meas = play(L, w)"
+    }
+
+    fn parameters(&self) -> &'static [EffectParameter] {
+        PARAMETERS
+    }
+
+    fn action(&self, values: &[f64], _around: &Surroundings<'_>) -> Action {
+        Action::Length(Box::new(Backlash { w: values[0] }))
+    }
+}

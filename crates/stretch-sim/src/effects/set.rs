@@ -1,0 +1,210 @@
+//! Effects that are on, with their values.
+
+use super::{Action, CATALOGUE, Effect, Surroundings, effect_named};
+use crate::{SimError, grid::Grid, nearest::nearest, params::RigParams, stage::Stage};
+
+/// One effect with the values of its parameters, in the order of [`Effect::parameters`].
+#[derive(Debug, Clone)]
+pub struct ActiveEffect {
+    effect: &'static dyn Effect,
+    values: Vec<f64>,
+}
+
+impl ActiveEffect {
+    /// The row of the catalogue.
+    pub fn effect(&self) -> &'static dyn Effect {
+        self.effect
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        self.effect.name()
+    }
+
+    /// Values, one a parameter.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Values, to be changed; whoever changes them keeps them finite.
+    pub fn values_mut(&mut self) -> &mut [f64] {
+        &mut self.values
+    }
+
+    /// Whether these values do nothing.
+    pub fn is_off(&self) -> bool {
+        self.effect.is_off(&self.values)
+    }
+}
+
+impl PartialEq for ActiveEffect {
+    fn eq(&self, other: &Self) -> bool {
+        self.name() == other.name() && self.values == other.values
+    }
+}
+
+/// A combination of effects, kept in the catalogue's order whatever the order of insertion.
+///
+/// ```
+/// use stretch_sim::EffectSet;
+/// let mut effects = EffectSet::new();
+/// effects.insert("pot_backlash", &[("w", 0.5)])?;
+/// effects.insert("gauge_hysteresis", &[("h", 0.2)])?; // s takes its typical value
+/// let names: Vec<_> = effects.iter().map(|e| e.name()).collect();
+/// assert_eq!(names, ["gauge_hysteresis", "pot_backlash"]);
+/// assert!(effects.insert("leek", &[]).unwrap_err().to_string().contains("did you mean `leak`?"));
+/// # Ok::<(), stretch_sim::SimError>(())
+/// ```
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct EffectSet {
+    entries: Vec<ActiveEffect>,
+}
+
+impl EffectSet {
+    /// No effect: the nominal rig.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds an effect of the catalogue by name; shapes that are not given take their typical value.
+    ///
+    /// # Errors
+    /// An unknown name or parameter, a strength that is not given, a value outside its range, an effect that is already in.
+    pub fn insert(&mut self, name: &str, given: &[(&str, f64)]) -> Result<(), SimError> {
+        let effect = effect_named(name).ok_or_else(|| SimError::UnknownEffect {
+            name: name.to_string(),
+            nearest: nearest(name, CATALOGUE.iter().map(|e| e.name())),
+        })?;
+        let values = resolve(effect, given)?;
+        for (p, value) in effect.parameters().iter().zip(&values) {
+            if !(*value >= p.min && *value <= p.max) {
+                return Err(SimError::OutOfRange {
+                    owner: name.to_string(),
+                    name: p.name.to_string(),
+                    value: *value,
+                    min: p.min,
+                    max: p.max,
+                    unit: p.unit,
+                });
+            }
+        }
+        self.push(effect, &values)
+    }
+
+    /// Adds any effect, the catalogue's or a user's own, with the values of all of its parameters. Ranges are plausible
+    /// ones, not limits: they are not enforced here.
+    ///
+    /// # Errors
+    /// An effect of that name is already in, too few or too many values, or one that is not finite.
+    pub fn push(&mut self, effect: &'static dyn Effect, values: &[f64]) -> Result<(), SimError> {
+        let name = effect.name();
+        if self.find(name).is_some() {
+            return Err(SimError::RepeatedEffect { name: name.to_string() });
+        }
+        let expected = effect.parameters().len();
+        if values.len() != expected {
+            return Err(SimError::Length { name, expected, found: values.len() });
+        }
+        if let Some((p, value)) = effect.parameters().iter().zip(values).find(|(_, v)| !v.is_finite()) {
+            return Err(SimError::OutOfRange {
+                owner: name.to_string(),
+                name: p.name.to_string(),
+                value: *value,
+                min: p.min,
+                max: p.max,
+                unit: p.unit,
+            });
+        }
+        let place = |name: &str| CATALOGUE.iter().position(|e| e.name() == name).unwrap_or(usize::MAX);
+        let mine = place(name);
+        let at = self.entries.iter().position(|e| place(e.name()) > mine).unwrap_or(self.entries.len());
+        self.entries.insert(at, ActiveEffect { effect, values: values.to_vec() });
+        Ok(())
+    }
+
+    /// The effect called `name`, if it is in.
+    pub fn find(&self, name: &str) -> Option<&ActiveEffect> {
+        self.entries.iter().find(|e| e.name() == name)
+    }
+
+    /// The effect called `name`, to change its values.
+    pub fn find_mut(&mut self, name: &str) -> Option<&mut ActiveEffect> {
+        self.entries.iter_mut().find(|e| e.name() == name)
+    }
+
+    /// Takes the effect called `name` out.
+    pub fn remove(&mut self, name: &str) -> Option<ActiveEffect> {
+        let at = self.entries.iter().position(|e| e.name() == name)?;
+        Some(self.entries.remove(at))
+    }
+
+    /// All of them, in the order in which they act.
+    pub fn iter(&self) -> impl Iterator<Item = &ActiveEffect> {
+        self.entries.iter()
+    }
+
+    /// Those that do something in the stage.
+    pub fn acting_in(&self, stage: Stage) -> impl Iterator<Item = &ActiveEffect> {
+        self.entries.iter().filter(move |e| stage.holds(e.effect.stage()) && !e.is_off())
+    }
+
+    /// Steps of time for trials sampled every `dt_s`: none longer than `max_step_s`, split where a delayed switch falls,
+    /// half as long where the chamber's volume follows the muscle.
+    ///
+    /// # Errors
+    /// Times that are not positive.
+    pub fn grid(&self, params: &RigParams, dt_s: f64, max_step_s: f64) -> Result<Grid, SimError> {
+        let whole = Grid::samples(dt_s)?;
+        let around = Surroundings::of_rig(params, &whole);
+        let (mut delay_s, mut step_s) = (0.0, max_step_s);
+        for active in self.acting_in(Stage::Pneumatics) {
+            match active.effect().action(active.values(), &around) {
+                Action::Delay(seconds) => delay_s += seconds,
+                Action::Volume(_) => step_s = 0.5 * max_step_s,
+                _ => {}
+            }
+        }
+        Grid::new(dt_s, step_s, delay_s)
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+}
+
+/// Values in the effect's order from names and values.
+fn resolve(effect: &dyn Effect, given: &[(&str, f64)]) -> Result<Vec<f64>, SimError> {
+    let parameters = effect.parameters();
+    if let Some((name, _)) = given.iter().find(|(name, _)| parameters.iter().all(|p| p.name != *name)) {
+        return Err(SimError::UnknownParameter {
+            owner: effect.name().to_string(),
+            name: name.to_string(),
+            nearest: nearest(name, parameters.iter().map(|p| p.name)),
+        });
+    }
+    // One strength is enough where there are several (the rails of an amplifier): the others stay off.
+    let strengths = |p: &&crate::EffectParameter| p.off.is_some();
+    let any = parameters.iter().filter(strengths).any(|p| given.iter().any(|(name, _)| *name == p.name));
+    if let (false, Some(missing)) = (any, parameters.iter().find(strengths)) {
+        return Err(SimError::MissingParameter {
+            owner: effect.name().to_string(),
+            name: missing.name.to_string(),
+        });
+    }
+    Ok(parameters
+        .iter()
+        .map(|p| {
+            given
+                .iter()
+                .rev()
+                .find(|(name, _)| *name == p.name)
+                .map_or(p.off.unwrap_or(p.typical), |(_, value)| *value)
+        })
+        .collect())
+}

@@ -1,0 +1,129 @@
+//! What can be wrong with a rig, its effects or its inputs.
+
+use crate::nearest::suggestion;
+
+/// Why a rig, an effect or an input was refused; carries the evidence.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimError {
+    /// No effect of that name.
+    #[error("no effect is called `{name}`{}", suggestion(.nearest))]
+    UnknownEffect {
+        /// The name that was given.
+        name: String,
+        /// The nearest name of the catalogue, when one is near.
+        nearest: Option<String>,
+    },
+    /// A parameter, table or kind of that name is not known there.
+    #[error("`{owner}` has no parameter `{name}`{}", suggestion(.nearest))]
+    UnknownParameter {
+        /// The effect, table or file it was given to.
+        owner: String,
+        /// The name that was given.
+        name: String,
+        /// The nearest name, when one is near.
+        nearest: Option<String>,
+    },
+    /// A value outside its plausible range.
+    #[error("`{owner}`: {name} = {value} is outside {min} .. {max} {unit}")]
+    OutOfRange {
+        /// The effect or table.
+        owner: String,
+        /// The parameter.
+        name: String,
+        /// The value that was given.
+        value: f64,
+        /// Least value allowed.
+        min: f64,
+        /// Greatest value allowed.
+        max: f64,
+        /// Unit of the three.
+        unit: &'static str,
+    },
+    /// A parameter that has to be given is not there.
+    #[error("`{owner}` lacks the parameter `{name}`")]
+    MissingParameter {
+        /// The effect or table.
+        owner: String,
+        /// The parameter.
+        name: String,
+    },
+    /// A parameter that must be positive (or must not be negative) is neither.
+    #[error("`{owner}`: {name} = {value} must be {needs}")]
+    BadParameter {
+        /// The table.
+        owner: String,
+        /// The parameter.
+        name: String,
+        /// The value that was given.
+        value: f64,
+        /// What it must be.
+        needs: &'static str,
+    },
+    /// The same effect was given twice.
+    #[error("effect `{name}` is given twice")]
+    RepeatedEffect {
+        /// Its name.
+        name: String,
+    },
+    /// The effect does not act in this kind of rig.
+    #[error("effect `{name}` needs {needs}, which this rig does not have")]
+    NotHere {
+        /// Its name.
+        name: String,
+        /// What it needs.
+        needs: &'static str,
+    },
+    /// The bridge would relax to nothing: the sleeve is slack within the stroke.
+    #[error("the sleeve goes slack: gauge strain {strain} at full contraction, at least {least} is needed")]
+    SlackSleeve {
+        /// Strain at the supply pressure.
+        strain: f64,
+        /// Least strain allowed.
+        least: f64,
+    },
+    /// An opening outside 0..1, or not a number.
+    #[error("{column}, sample {sample}: opening {value} is outside 0 .. 1")]
+    Opening {
+        /// `inlet` or `outlet`.
+        column: &'static str,
+        /// Which sample, from 0.
+        sample: usize,
+        /// The opening.
+        value: f64,
+    },
+    /// Time does not advance uniformly.
+    #[error("sample {sample}: time advances by {found} s where the trial's step is {expected} s")]
+    NotUniform {
+        /// Which sample, from 0.
+        sample: usize,
+        /// The step of the trial.
+        expected: f64,
+        /// The step found.
+        found: f64,
+    },
+    /// A column that is needed is not there.
+    #[error("the trial has no column `{name}`")]
+    MissingColumn {
+        /// The column.
+        name: &'static str,
+    },
+    /// Slices that must have the same (or a derived) length do not.
+    #[error("`{name}` has {found} values where {expected} are needed")]
+    Length {
+        /// What is too short or too long.
+        name: &'static str,
+        /// Values needed.
+        expected: usize,
+        /// Values found.
+        found: usize,
+    },
+    /// A number that has to be finite and positive is not.
+    #[error("{name} = {value} must be finite and positive")]
+    NotPositive {
+        /// What it is.
+        name: &'static str,
+        /// The number.
+        value: f64,
+    },
+}

@@ -1,0 +1,129 @@
+//! The grid of time: equal pieces inside a sample, split where a delayed switch falls.
+
+use crate::SimError;
+
+/// Longest step of integration, s, that the nominal rig and every effect of the catalogue allow:
+/// halving it moves no channel by more than 1e-4 of its full scale.
+pub const DEFAULT_STEP_S: f64 = 0.005;
+
+/// Steps of integration inside one sample of a uniformly sampled trial, the same in every sample.
+///
+/// Node 0 is the first sample; sample i is node `i * pieces()`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid {
+    dt_s: f64,
+    /// Length of each piece, s.
+    steps: Vec<f64>,
+    /// Time of each piece's start within the sample, s.
+    offsets: Vec<f64>,
+    /// Pieces at a sample's start in which the openings of `shift + 1` samples ago still act.
+    late: usize,
+    /// Whole samples by which openings are late.
+    shift: usize,
+}
+
+impl Grid {
+    /// One step a sample: what a stage driven by a measured, linearly interpolated input needs.
+    ///
+    /// # Errors
+    /// When the sample time is not finite and positive.
+    pub fn samples(dt_s: f64) -> Result<Self, SimError> {
+        Self::new(dt_s, f64::INFINITY, 0.0)
+    }
+
+    /// Pieces no longer than `max_step_s`, split where openings that act `delay_s` later switch.
+    ///
+    /// # Errors
+    /// When a time is not positive (or, for the delay, negative or not finite).
+    pub fn new(dt_s: f64, max_step_s: f64, delay_s: f64) -> Result<Self, SimError> {
+        if !(dt_s.is_finite() && dt_s > 0.0) {
+            return Err(SimError::NotPositive { name: "sample time", value: dt_s });
+        }
+        // Below 1e-6 of a sample time a step resolves nothing and a sample would take for ever.
+        if !(max_step_s >= 1e-6 * dt_s) {
+            return Err(SimError::NotPositive { name: "step of integration", value: max_step_s });
+        }
+        if !(delay_s.is_finite() && delay_s >= 0.0) {
+            return Err(SimError::NotPositive { name: "delay", value: delay_s });
+        }
+        let samples = delay_s / dt_s;
+        let mut shift = samples.floor();
+        let mut part = samples - shift;
+        // A switch within a billionth of a border falls on it.
+        if part > 1.0 - 1e-9 {
+            shift += 1.0;
+            part = 0.0;
+        } else if part < 1e-9 {
+            part = 0.0;
+        }
+        let count = |length: f64| ((length / max_step_s) * (1.0 - 1e-12)).ceil().max(1.0) as usize;
+        let mut steps = Vec::new();
+        let first = part * dt_s;
+        let late = if part > 0.0 { count(first) } else { 0 };
+        steps.extend(std::iter::repeat_n(first / late.max(1) as f64, late));
+        let rest = dt_s - first;
+        let pieces = count(rest);
+        steps.extend(std::iter::repeat_n(rest / pieces as f64, pieces));
+        let mut at = 0.0;
+        let offsets = steps
+            .iter()
+            .map(|h| {
+                let t = at;
+                at += h;
+                t
+            })
+            .collect();
+        // A delay beyond any trial keeps the valves shut throughout; the cast saturates.
+        Ok(Self { dt_s, steps, offsets, late, shift: shift as usize })
+    }
+
+    /// Sample time, s.
+    pub fn dt_s(&self) -> f64 {
+        self.dt_s
+    }
+
+    /// Lengths of the pieces of a sample, s.
+    pub fn steps(&self) -> &[f64] {
+        &self.steps
+    }
+
+    /// How many pieces a sample has.
+    pub fn pieces(&self) -> usize {
+        self.steps.len()
+    }
+
+    /// How many nodes a trial of so many samples has; 0 for none.
+    pub fn nodes(&self, samples: usize) -> usize {
+        if samples == 0 { 0 } else { (samples - 1) * self.pieces() + 1 }
+    }
+
+    /// Time of a node after the trial's start, s.
+    pub fn time_s(&self, node: usize) -> f64 {
+        let pieces = self.pieces();
+        (node / pieces) as f64 * self.dt_s + self.offsets[node % pieces]
+    }
+
+    /// Which sample's openings act in a piece after a sample; none before the trial's first.
+    pub(crate) fn command(&self, sample: usize, piece: usize) -> Option<usize> {
+        sample.checked_sub(self.shift.saturating_add(usize::from(piece < self.late)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_fill_the_sample_and_split_at_the_switch() {
+        let grid = Grid::new(0.01, 0.005, 0.0635).unwrap();
+        assert!((grid.steps().iter().sum::<f64>() - 0.01).abs() < 1e-15);
+        assert_eq!(grid.pieces(), 3);
+        assert!((grid.time_s(4) - 0.0135).abs() < 1e-12);
+        assert_eq!(grid.command(10, 0), Some(3));
+        assert_eq!(grid.command(10, 1), Some(4));
+        assert_eq!(grid.command(5, 0), None);
+        assert_eq!(Grid::new(0.01, 0.005, 0.02).unwrap().pieces(), 2);
+        assert_eq!(Grid::samples(0.01).unwrap().nodes(7), 7);
+        assert!(Grid::new(0.01, 0.0, 0.0).is_err() && Grid::samples(f64::NAN).is_err());
+    }
+}

@@ -1,0 +1,39 @@
+//! What a stage remembers between trials, and its working space.
+
+/// Memory of a prepared stage: its operators' states, and buffers that grow once and are used again.
+///
+/// Every stage hands out its own by `memory()`; a memory fits the stage (and effects) that made it, and any stage with
+/// the same effects at other values.
+#[derive(Debug, Clone, Default)]
+pub struct Memory {
+    pub(crate) cells: Vec<f64>,
+    /// Whether a trial has run in it.
+    pub(crate) used: bool,
+    pub(crate) nodes: Vec<f64>,
+    pub(crate) more_nodes: Vec<f64>,
+}
+
+impl Memory {
+    pub(crate) fn with_cells(count: usize) -> Self {
+        Self { cells: vec![0.0; count], ..Self::default() }
+    }
+
+    /// How a trial may start in it: nothing can be carried out of a fresh memory, so it settles.
+    pub(crate) fn start(&mut self, asked: crate::Start) -> crate::Start {
+        let used = std::mem::replace(&mut self.used, true);
+        match asked {
+            crate::Start::Carried { .. } if !used => crate::Start::Settled,
+            crate::Start::Wound(_) if !used => {
+                self.cells.fill(0.0);
+                asked
+            }
+            _ => asked,
+        }
+    }
+
+    /// Forgets everything: the next trial settles unless it is wound.
+    pub fn clear(&mut self) {
+        self.cells.fill(0.0);
+        self.used = false;
+    }
+}

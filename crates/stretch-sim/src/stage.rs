@@ -1,0 +1,57 @@
+//! The stages of the rig, as names.
+
+use std::{fmt, str::FromStr};
+
+/// A stage of the rig: what is simulated alone on a measured input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Stage {
+    /// Openings to pressure.
+    Pneumatics,
+    /// Pressure to length.
+    Muscle,
+    /// Openings to length, both of the above as one.
+    Actuation,
+    /// Length (and pressure, for cross-talk) to bridge voltage.
+    Sensing,
+    /// True length to measured length.
+    Reference,
+}
+
+impl Stage {
+    /// All of them.
+    pub const ALL: [Self; 5] =
+        [Self::Pneumatics, Self::Muscle, Self::Actuation, Self::Sensing, Self::Reference];
+
+    /// Its name in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pneumatics => "pneumatics",
+            Self::Muscle => "muscle",
+            Self::Actuation => "actuation",
+            Self::Sensing => "sensing",
+            Self::Reference => "reference",
+        }
+    }
+
+    /// Whether an effect or a parameter of the stage `other` acts in it: `actuation` holds `pneumatics` and `muscle`.
+    pub fn holds(self, other: Self) -> bool {
+        self == other || (self == Self::Actuation && matches!(other, Self::Pneumatics | Self::Muscle))
+    }
+}
+
+impl fmt::Display for Stage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Stage {
+    type Err = crate::SimError;
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        Self::ALL.into_iter().find(|x| x.name() == s).ok_or_else(|| crate::SimError::UnknownParameter {
+            owner: "rig".into(),
+            name: s.into(),
+            nearest: crate::nearest::nearest(s, Self::ALL.map(Self::name)),
+        })
+    }
+}

@@ -1,0 +1,162 @@
+//! Stage `actuation`: openings to pressure and length, both stages as one.
+
+use super::{
+    Muscle, Openings, Pneumatics, check_length,
+    pneumatics::Drive,
+};
+use crate::{
+    SimError,
+    effects::EffectSet,
+    grid::Grid,
+    memory::Memory,
+    operator::Start,
+    params::RigParams,
+};
+
+/// Valves, chamber and muscle, prepared: one after the other, or hand in hand where the chamber's volume follows the muscle.
+#[derive(Debug)]
+pub struct Actuation {
+    pneumatics: Pneumatics,
+    muscle: Muscle,
+}
+
+impl Actuation {
+    /// Prepares the stage for trials on `grid`, which must come from [`EffectSet::grid`] with the same effects.
+    ///
+    /// # Errors
+    /// As the two stages.
+    pub fn new(params: &RigParams, effects: &EffectSet, grid: &Grid) -> Result<Self, SimError> {
+        Ok(Self {
+            pneumatics: Pneumatics::new(params, effects, grid)?,
+            muscle: Muscle::at_cells(params, effects, grid, Pneumatics::CELLS)?,
+        })
+    }
+
+    /// A memory for it.
+    pub fn memory(&self) -> Memory {
+        Memory::with_cells(self.muscle.end())
+    }
+
+    /// Steps of time.
+    pub fn grid(&self) -> &Grid {
+        self.pneumatics.grid()
+    }
+
+    /// Whether pressure and contraction depend on each other.
+    pub fn is_coupled(&self) -> bool {
+        self.pneumatics.is_coupled()
+    }
+
+    /// Gauge pressure in kPa and length in mm at every sample, from `initial_kpa` at the first.
+    ///
+    /// # Errors
+    /// Openings outside 0..1, slices of different lengths, an initial pressure below vacuum or not finite.
+    pub fn run(
+        &self,
+        memory: &mut Memory,
+        start: Start,
+        openings: Openings<'_>,
+        initial_kpa: f64,
+        pressure_kpa: &mut [f64],
+        length_mm: &mut [f64],
+    ) -> Result<(), SimError> {
+        let samples = openings.check()?;
+        check_length("pressure_kpa", samples, pressure_kpa.len())?;
+        check_length("length_mm", samples, length_mm.len())?;
+        let nodes = self.grid().nodes(samples);
+        let mut pressure = std::mem::take(&mut memory.nodes);
+        let mut length = std::mem::take(&mut memory.more_nodes);
+        pressure.resize(nodes, 0.0);
+        length.resize(nodes, 0.0);
+        let done = self.run_nodes(memory, start, openings, initial_kpa, &mut pressure, &mut length);
+        let pieces = self.grid().pieces();
+        for (i, (p, l)) in pressure_kpa.iter_mut().zip(length_mm).enumerate() {
+            (*p, *l) = (pressure[i * pieces], length[i * pieces]);
+        }
+        (memory.nodes, memory.more_nodes) = (pressure, length);
+        done
+    }
+
+    /// As [`run`](Self::run), at every node of the grid; openings are taken as checked.
+    pub(crate) fn run_nodes(
+        &self,
+        memory: &mut Memory,
+        start: Start,
+        openings: Openings<'_>,
+        initial_kpa: f64,
+        pressure: &mut [f64],
+        length: &mut [f64],
+    ) -> Result<(), SimError> {
+        if pressure.is_empty() {
+            return Ok(());
+        }
+        let start = memory.start(start);
+        let cells = &mut memory.cells;
+        if self.is_coupled() {
+            return self.run_coupled(cells, start, openings, initial_kpa, pressure, length);
+        }
+        let pneumatics = &self.pneumatics;
+        let mut chamber = pneumatics.begin(start, initial_kpa, 1.0, cells)?;
+        let mut drive = Drive::new(pneumatics, openings);
+        pressure[0] = initial_kpa;
+        let steps = self.grid().steps();
+        for (sample, out) in pressure[1..].chunks_exact_mut(steps.len()).enumerate() {
+            for (piece, (h, p)) in steps.iter().zip(out).enumerate() {
+                let valves = drive.valves(sample, piece);
+                pneumatics.advance(valves, &mut chamber, [1.0; 2], *h);
+                *p = pneumatics.pressure_kpa(chamber.held, 1.0);
+            }
+        }
+        pneumatics.end(&chamber, cells);
+        length.copy_from_slice(pressure);
+        self.muscle.run_nodes(cells, start, length);
+        Ok(())
+    }
+
+    /// Each step twice: the volume's change is first guessed, then taken from the muscle's answer to that guess.
+    fn run_coupled(
+        &self,
+        cells: &mut [f64],
+        start: Start,
+        openings: Openings<'_>,
+        initial_kpa: f64,
+        pressure: &mut [f64],
+        length: &mut [f64],
+    ) -> Result<(), SimError> {
+        let (pneumatics, muscle) = (&self.pneumatics, &self.muscle);
+        let volume_at = |k: f64| pneumatics.volume(muscle.share(k));
+        let mut k = muscle.begin(cells, start, initial_kpa);
+        let mut volume = volume_at(k);
+        let mut chamber = pneumatics.begin(start, initial_kpa, volume, cells)?;
+        let mut drive = Drive::new(pneumatics, openings);
+        pressure[0] = initial_kpa;
+        length[0] = muscle.length_mm(k);
+        let steps = self.grid().steps();
+        let mut trial = cells.to_vec();
+        // Rate of the contraction over the last step.
+        let mut speed = 0.0;
+        for node in 1..pressure.len() {
+            let (sample, piece) = ((node - 1) / steps.len(), (node - 1) % steps.len());
+            let h = steps[piece];
+            let valves = drive.valves(sample, piece);
+            let mut next_k = k + h * speed;
+            let mut next = chamber;
+            for _ in 0..2 {
+                next = chamber;
+                let next_volume = volume_at(next_k);
+                pneumatics.advance(valves, &mut next, [volume, next_volume], h);
+                trial.copy_from_slice(cells);
+                next_k = muscle.step(&mut trial, node, pneumatics.pressure_kpa(next.held, next_volume));
+            }
+            cells.copy_from_slice(&trial);
+            chamber = next;
+            speed = (next_k - k) / h;
+            k = next_k;
+            volume = volume_at(k);
+            pressure[node] = pneumatics.pressure_kpa(chamber.held, volume);
+            length[node] = muscle.length_mm(k);
+        }
+        pneumatics.end(&chamber, cells);
+        Ok(())
+    }
+}

@@ -1,0 +1,129 @@
+//! The whole rig: every stage on the outputs of the one before.
+
+use super::{Actuation, Openings, Reference, Sensing, check_length};
+use crate::{
+    SimError, effects::EffectSet, grid::Grid, memory::Memory, operator::Start, params::RigParams,
+};
+
+/// Caller's buffers for what the rig shows, one value a sample.
+#[derive(Debug)]
+pub struct Recorded<'a> {
+    /// Gauge pressure, kPa.
+    pub pressure_kpa: &'a mut [f64],
+    /// Length as the reference shows it, mm.
+    pub length_mm: &'a mut [f64],
+    /// Amplified bridge voltage, V.
+    pub bridge_v: &'a mut [f64],
+}
+
+/// Memories of all stages of a [`Chain`], and its working space.
+#[derive(Debug, Clone, Default)]
+pub struct ChainMemory {
+    actuation: Memory,
+    sensing: Memory,
+    reference: Memory,
+    pressure: Vec<f64>,
+    length: Vec<f64>,
+}
+
+impl ChainMemory {
+    /// Forgets everything: the next trial settles.
+    pub fn clear(&mut self) {
+        self.actuation.clear();
+        self.sensing.clear();
+        self.reference.clear();
+    }
+
+    /// Pressure (kPa) and true length (mm) at the last trial's nodes.
+    pub fn nodes(&self) -> (&[f64], &[f64]) {
+        (&self.pressure, &self.length)
+    }
+}
+
+/// The whole rig, prepared: openings to pressure, measured length and bridge voltage, without noise or rounding.
+///
+/// ```
+/// use stretch_sim::{Chain, DEFAULT_STEP_S, EffectSet, Openings, Recorded, RigParams, Start};
+/// let rig = Chain::new(&RigParams::default(), &EffectSet::new(), 0.01, DEFAULT_STEP_S)?;
+/// let (inlet, outlet) = ([1.0; 500], [0.0; 500]);
+/// let [mut p, mut l, mut v] = [[0.0; 500]; 3];
+/// let recorded = Recorded { pressure_kpa: &mut p, length_mm: &mut l, bridge_v: &mut v };
+/// let openings = Openings { inlet: &inlet, outlet: &outlet };
+/// rig.run(&mut rig.memory(), Start::Settled, 0.0, openings, 0.0, recorded)?;
+/// assert_eq!([p[0], l[0], v[0]], [0.0, 180.0, 1.24]);
+/// assert!((p[499] - 620.0).abs() < 1e-9);          // full of supply air
+/// assert!((l[499] - 150.3277).abs() < 1e-3);       // 16.5 % shorter
+/// assert!((v[499] - 2.30929).abs() < 1e-4);
+/// # Ok::<(), stretch_sim::SimError>(())
+/// ```
+#[derive(Debug)]
+pub struct Chain {
+    actuation: Actuation,
+    sensing: Sensing,
+    reference: Reference,
+}
+
+impl Chain {
+    /// Prepares all stages for trials sampled every `dt_s`, integrated in steps of at most `max_step_s`
+    /// ([`DEFAULT_STEP_S`](crate::DEFAULT_STEP_S)).
+    ///
+    /// # Errors
+    /// Times that are not positive; more than two effects that draw on the supply.
+    pub fn new(
+        params: &RigParams,
+        effects: &EffectSet,
+        dt_s: f64,
+        max_step_s: f64,
+    ) -> Result<Self, SimError> {
+        let grid = &effects.grid(params, dt_s, max_step_s)?;
+        Ok(Self {
+            actuation: Actuation::new(params, effects, grid)?,
+            sensing: Sensing::new(params, effects, grid)?,
+            reference: Reference::new(params, effects, grid)?,
+        })
+    }
+
+    /// Memories for it.
+    pub fn memory(&self) -> ChainMemory {
+        ChainMemory {
+            actuation: self.actuation.memory(),
+            sensing: self.sensing.memory(),
+            reference: self.reference.memory(),
+            ..ChainMemory::default()
+        }
+    }
+
+    /// Steps of time.
+    pub fn grid(&self) -> &Grid {
+        self.actuation.grid()
+    }
+
+    /// Simulates one trial: `start_s` is its session time, `initial_kpa` its first pressure.
+    ///
+    /// # Errors
+    /// Openings outside 0..1, buffers of different lengths, an initial pressure below vacuum or not finite.
+    pub fn run(
+        &self,
+        memory: &mut ChainMemory,
+        start: Start,
+        start_s: f64,
+        openings: Openings<'_>,
+        initial_kpa: f64,
+        recorded: Recorded<'_>,
+    ) -> Result<(), SimError> {
+        let samples = openings.check()?;
+        check_length("pressure_kpa", samples, recorded.pressure_kpa.len())?;
+        check_length("length_mm", samples, recorded.length_mm.len())?;
+        check_length("bridge_v", samples, recorded.bridge_v.len())?;
+        let nodes = self.grid().nodes(samples);
+        memory.pressure.resize(nodes, 0.0);
+        memory.length.resize(nodes, 0.0);
+        let (pressure, length) = (&mut memory.pressure, &mut memory.length);
+        self.actuation.run_nodes(&mut memory.actuation, start, openings, initial_kpa, pressure, length)?;
+        for (p, node) in recorded.pressure_kpa.iter_mut().zip(pressure.iter().step_by(self.grid().pieces())) {
+            *p = *node;
+        }
+        self.sensing.run(&mut memory.sensing, start, start_s, length, pressure, recorded.bridge_v)?;
+        self.reference.run(&mut memory.reference, start, length, recorded.length_mm)
+    }
+}

@@ -1,0 +1,23 @@
+//! The stages: each prepared once from parameters and effects, then run on any number of trials without allocating.
+
+mod actuation;
+mod chain;
+mod muscle;
+mod operators;
+mod pneumatics;
+mod reference;
+mod sensing;
+
+pub use actuation::Actuation;
+pub use chain::{Chain, ChainMemory, Recorded};
+pub use muscle::Muscle;
+pub use pneumatics::{Openings, Pneumatics};
+pub use reference::Reference;
+pub use sensing::{Bridge, Sensing};
+
+use crate::SimError;
+
+/// `Ok` when `found` values are `expected`.
+pub(crate) fn check_length(name: &'static str, expected: usize, found: usize) -> Result<(), SimError> {
+    if expected == found { Ok(()) } else { Err(SimError::Length { name, expected, found }) }
+}

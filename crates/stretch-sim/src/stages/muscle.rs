@@ -1,0 +1,174 @@
+//! Stage `muscle`: chamber pressure to length.
+
+use super::{check_length, operators::Operators};
+use crate::{
+    SimError,
+    effects::{Action, EffectSet, Surroundings},
+    grid::Grid,
+    memory::Memory,
+    operator::{MeanReversion, Span, Start},
+    params::{Key, RigParams},
+    stage::Stage,
+    static_law::StaticLaw,
+};
+
+/// The muscle, prepared: static contraction, effects on it, first-order lag, effects behind it, L = L0 (1 - k).
+#[derive(Debug)]
+pub struct Muscle {
+    grid: Grid,
+    law: StaticLaw,
+    lag: MeanReversion,
+    before: Operators,
+    behind: Operators,
+    rest_mm: f64,
+    k_max: f64,
+    offset: usize,
+}
+
+impl Muscle {
+    /// Prepares the stage. On a measured pressure [`Grid::new`] without delay is fitting, at
+    /// [`DEFAULT_STEP_S`](crate::DEFAULT_STEP_S).
+    ///
+    /// # Errors
+    /// None for the catalogue's effects.
+    pub fn new(params: &RigParams, effects: &EffectSet, grid: &Grid) -> Result<Self, SimError> {
+        Self::at_cells(params, effects, grid, 0)
+    }
+
+    /// As [`new`](Self::new), its memory beginning behind another stage's.
+    pub(crate) fn at_cells(
+        params: &RigParams,
+        effects: &EffectSet,
+        grid: &Grid,
+        offset: usize,
+    ) -> Result<Self, SimError> {
+        let around = Surroundings::of_rig(params, grid);
+        let (mut before, mut behind) = (Vec::new(), Vec::new());
+        for active in effects.acting_in(Stage::Muscle) {
+            match active.effect().action(active.values(), &around) {
+                Action::StaticContraction(operator) => before.push(operator),
+                Action::MovingContraction(operator) => behind.push(operator),
+                _ => {}
+            }
+        }
+        let before = Operators::new(before, offset + MeanReversion::CELLS);
+        let behind = Operators::new(behind, before.end());
+        Ok(Self {
+            grid: grid.clone(),
+            law: StaticLaw::new(params),
+            lag: MeanReversion::new(params[Key::TauM], params[Key::KMax], grid),
+            before,
+            behind,
+            rest_mm: params[Key::L0],
+            k_max: params[Key::KMax],
+            offset,
+        })
+    }
+
+    /// A memory for it.
+    pub fn memory(&self) -> Memory {
+        Memory::with_cells(self.end())
+    }
+
+    /// Steps of time.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    pub(crate) fn end(&self) -> usize {
+        self.behind.end()
+    }
+
+    /// Length in mm at every sample, from the gauge pressure in kPa at the same samples, linear between them.
+    ///
+    /// # Errors
+    /// Slices of different lengths.
+    pub fn run(
+        &self,
+        memory: &mut Memory,
+        start: Start,
+        pressure_kpa: &[f64],
+        length_mm: &mut [f64],
+    ) -> Result<(), SimError> {
+        check_length("length_mm", pressure_kpa.len(), length_mm.len())?;
+        let mut nodes = std::mem::take(&mut memory.nodes);
+        interpolate(&self.grid, pressure_kpa, &mut nodes);
+        let start = memory.start(start);
+        self.run_nodes(&mut memory.cells, start, &mut nodes);
+        for (out, node) in length_mm.iter_mut().zip(nodes.iter().step_by(self.grid.pieces())) {
+            *out = *node;
+        }
+        memory.nodes = nodes;
+        Ok(())
+    }
+
+    /// Pressure (kPa) at the nodes, replaced by length (mm).
+    pub(crate) fn run_nodes(&self, cells: &mut [f64], start: Start, nodes: &mut [f64]) {
+        let Some(first) = nodes.first() else { return };
+        self.begin(cells, start, *first);
+        for x in nodes.iter_mut() {
+            *x = self.law.contraction(*x);
+        }
+        self.move_on(cells, 0, nodes);
+        for x in nodes {
+            *x = self.length_mm(*x);
+        }
+    }
+
+    /// Begins a trial at a pressure; returns the contraction there.
+    pub(crate) fn begin(&self, cells: &mut [f64], start: Start, pressure_kpa: f64) -> f64 {
+        let span = self.span(0);
+        let still = self.before.begin(&span, start, self.law.contraction(pressure_kpa), cells);
+        // The lag itself is never wound: it settles within a fifth of a second.
+        let lag_start = if matches!(start, Start::Wound(_)) { Start::Settled } else { start };
+        self.lag.begin(lag_start, still, &mut cells[self.offset..]);
+        let moving = cells[self.offset];
+        self.behind.begin(&span, start, moving, cells)
+    }
+
+    /// Contraction one node further on.
+    #[inline]
+    pub(crate) fn step(&self, cells: &mut [f64], node: usize, pressure_kpa: f64) -> f64 {
+        let mut x = [self.law.contraction(pressure_kpa)];
+        self.move_on(cells, node, &mut x);
+        x[0]
+    }
+
+    /// Static contraction replaced by the moving one.
+    fn move_on(&self, cells: &mut [f64], first_node: usize, signal: &mut [f64]) {
+        let span = self.span(first_node);
+        self.before.run(&span, cells, signal);
+        let lag = &mut cells[self.offset..self.offset + MeanReversion::CELLS];
+        self.lag.run(&span, lag, signal, |_, z| z);
+        self.behind.run(&span, cells, signal);
+    }
+
+    fn span(&self, first_node: usize) -> Span<'_> {
+        Span { grid: &self.grid, first_node, start_s: 0.0, pressure_kpa: &[], strain: &[] }
+    }
+
+    #[inline]
+    pub(crate) fn length_mm(&self, contraction: f64) -> f64 {
+        self.rest_mm * (1.0 - contraction)
+    }
+
+    /// k/k_max.
+    #[inline]
+    pub(crate) fn share(&self, contraction: f64) -> f64 {
+        contraction / self.k_max
+    }
+}
+
+/// Samples, linear between them, at the nodes of a grid.
+pub(crate) fn interpolate(grid: &Grid, samples: &[f64], nodes: &mut Vec<f64>) {
+    nodes.clear();
+    nodes.reserve(grid.nodes(samples.len()));
+    for pair in samples.windows(2) {
+        let mut at = 0.0;
+        for h in grid.steps() {
+            nodes.push(pair[0] + (at / grid.dt_s()) * (pair[1] - pair[0]));
+            at += h;
+        }
+    }
+    nodes.extend(samples.last());
+}

@@ -1,0 +1,402 @@
+//! Stage `pneumatics`: openings of the valves to chamber pressure.
+
+use super::check_length;
+use crate::{
+    SimError,
+    effects::{Action, EffectSet, Surroundings},
+    grid::Grid,
+    memory::Memory,
+    operator::{Droop, Law, Start},
+    params::{Key, RigParams},
+    stage::Stage,
+};
+
+/// Most effects that may draw on the supply at once.
+const MOST_DROOPS: usize = 2;
+
+/// Openings of the two valves, one value a sample, held until the next.
+#[derive(Debug, Clone, Copy)]
+pub struct Openings<'a> {
+    /// Inlet, 0..1.
+    pub inlet: &'a [f64],
+    /// Outlet, 0..1.
+    pub outlet: &'a [f64],
+}
+
+impl Openings<'_> {
+    /// How many samples there are.
+    ///
+    /// # Errors
+    /// The valves have different numbers of samples, or an opening is not within 0..1.
+    pub fn check(&self) -> Result<usize, SimError> {
+        check_length("outlet", self.inlet.len(), self.outlet.len())?;
+        for (column, openings) in [("inlet", self.inlet), ("outlet", self.outlet)] {
+            if let Some(sample) = openings.iter().position(|u| !(0.0..=1.0).contains(u)) {
+                return Err(SimError::Opening { column, sample, value: openings[sample] });
+            }
+        }
+        Ok(self.inlet.len())
+    }
+}
+
+/// Valves and chamber, prepared: ISO 6358 flow into and out of an isothermal chamber.
+///
+/// The mass in the chamber is stepped by the classical Runge-Kutta rule; a step that would pass its equilibrium
+/// (where a valve's flow ends like a square root, and nothing passes in truth) ends on it. With `chamber_volume` on,
+/// the pressure depends on the contraction: run [`Actuation`](crate::Actuation), or hand the measured length to
+/// [`run_with_length`](Self::run_with_length).
+#[derive(Debug)]
+pub struct Pneumatics {
+    grid: Grid,
+    supply_pa: f64,
+    atmosphere_pa: f64,
+    /// R T / V0, Pa/kg.
+    chamber: f64,
+    /// C rho0 of inlet and outlet, kg/(s Pa).
+    conductance: [f64; 2],
+    critical: f64,
+    per_subsonic: f64,
+    least: f64,
+    openings: Vec<Box<dyn Law>>,
+    leaks: Vec<Box<dyn Law>>,
+    volumes: Vec<Box<dyn Law>>,
+    droops: Vec<Box<dyn Droop>>,
+    length_zero_mm: f64,
+    length_span_mm: f64,
+}
+
+/// What the chamber holds: p V / V0 (Pa), and the droops of the supply.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Chamber {
+    pub(crate) held: f64,
+    pub(crate) droops: [f64; MOST_DROOPS],
+}
+
+/// Flow conductances while openings are constant, kg/(s Pa).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Valves {
+    inlet: f64,
+    outlet: f64,
+}
+
+impl Pneumatics {
+    pub(crate) const CELLS: usize = 1 + MOST_DROOPS;
+
+    /// Prepares the stage for trials on `grid`, which must come from [`EffectSet::grid`] with the same effects.
+    ///
+    /// # Errors
+    /// More than two effects that draw on the supply.
+    pub fn new(params: &RigParams, effects: &EffectSet, grid: &Grid) -> Result<Self, SimError> {
+        let around = Surroundings::of_rig(params, grid);
+        let [mut openings, mut leaks, mut volumes] = [const { Vec::new() }; 3];
+        let mut droops: Vec<Box<dyn Droop>> = Vec::new();
+        for active in effects.acting_in(Stage::Pneumatics) {
+            match active.effect().action(active.values(), &around) {
+                Action::Opening(law) => openings.push(law),
+                Action::Leak(law) => leaks.push(law),
+                Action::Volume(law) => volumes.push(law),
+                Action::Droop(_) if droops.len() == MOST_DROOPS => {
+                    return Err(SimError::NotHere {
+                        name: active.name().to_string(),
+                        needs: "a third state of the supply",
+                    });
+                }
+                Action::Droop(droop) => droops.push(droop),
+                _ => {}
+            }
+        }
+        let b = params[Key::B];
+        Ok(Self {
+            grid: grid.clone(),
+            supply_pa: params[Key::PS] + params[Key::PAtm],
+            atmosphere_pa: params[Key::PAtm],
+            chamber: params[Key::RAir] * params[Key::T] / params[Key::V0],
+            conductance: [Key::CIn, Key::COut].map(|c| params[c] * params[Key::Rho0]),
+            critical: b,
+            per_subsonic: 1.0 / (1.0 - b),
+            least: params[Key::UMin],
+            openings,
+            leaks,
+            volumes,
+            droops,
+            length_zero_mm: params[Key::L0],
+            length_span_mm: -params[Key::L0] * params[Key::KMax],
+        })
+    }
+
+    /// A memory for it.
+    pub fn memory(&self) -> Memory {
+        Memory::with_cells(Self::CELLS)
+    }
+
+    /// Steps of time.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// Whether the pressure depends on the contraction.
+    pub fn is_coupled(&self) -> bool {
+        !self.volumes.is_empty()
+    }
+
+    /// Gauge pressure in kPa at every sample, from `initial_kpa` at the first.
+    ///
+    /// # Errors
+    /// Openings outside 0..1, slices of different lengths, an initial pressure below vacuum or not finite, or a
+    /// chamber whose volume depends on the contraction (see [`run_with_length`](Self::run_with_length)).
+    pub fn run(
+        &self,
+        memory: &mut Memory,
+        start: Start,
+        openings: Openings<'_>,
+        initial_kpa: f64,
+        pressure_kpa: &mut [f64],
+    ) -> Result<(), SimError> {
+        if self.is_coupled() {
+            return Err(SimError::NotHere { name: "chamber_volume".into(), needs: "the length of the muscle" });
+        }
+        self.run_sampled(memory, start, openings, None, initial_kpa, pressure_kpa)
+    }
+
+    /// As [`run`](Self::run), the chamber's volume following a measured length (mm, linear between samples).
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub fn run_with_length(
+        &self,
+        memory: &mut Memory,
+        start: Start,
+        openings: Openings<'_>,
+        length_mm: &[f64],
+        initial_kpa: f64,
+        pressure_kpa: &mut [f64],
+    ) -> Result<(), SimError> {
+        check_length("length_mm", openings.inlet.len(), length_mm.len())?;
+        self.run_sampled(memory, start, openings, Some(length_mm), initial_kpa, pressure_kpa)
+    }
+
+    fn run_sampled(
+        &self,
+        memory: &mut Memory,
+        start: Start,
+        openings: Openings<'_>,
+        length_mm: Option<&[f64]>,
+        initial_kpa: f64,
+        pressure_kpa: &mut [f64],
+    ) -> Result<(), SimError> {
+        check_length("pressure_kpa", openings.check()?, pressure_kpa.len())?;
+        let Some(last) = pressure_kpa.len().checked_sub(1) else { return Ok(()) };
+        let length_mm = length_mm.filter(|_| self.is_coupled());
+        let at = |sample: usize, share: f64| {
+            length_mm.map_or(1.0, |l| {
+                let a = l[sample];
+                let b = l[(sample + 1).min(last)];
+                self.volume((a + share * (b - a) - self.length_zero_mm) / self.length_span_mm)
+            })
+        };
+        let mut volume = at(0, 0.0);
+        let start = memory.start(start);
+        let mut chamber = self.begin(start, initial_kpa, volume, &mut memory.cells)?;
+        pressure_kpa[0] = initial_kpa;
+        let mut drive = Drive::new(self, openings);
+        for sample in 0..last {
+            let mut through = 0.0;
+            for (piece, h) in self.grid.steps().iter().enumerate() {
+                through += h;
+                let valves = drive.valves(sample, piece);
+                let next = at(sample, through / self.grid.dt_s());
+                self.advance(valves, &mut chamber, [volume, next], *h);
+                volume = next;
+            }
+            pressure_kpa[sample + 1] = 1e-3 * (chamber.held / volume - self.atmosphere_pa);
+        }
+        self.end(&chamber, &mut memory.cells);
+        Ok(())
+    }
+
+    /// V/V0 at y = k/k_max.
+    #[inline]
+    pub(crate) fn volume(&self, y: f64) -> f64 {
+        // A collapsed chamber divides by nothing.
+        self.volumes.iter().fold(1.0, |v, law| v * law.at(y)).max(0.05)
+    }
+
+    /// Gauge pressure, kPa.
+    #[inline]
+    pub(crate) fn pressure_kpa(&self, held: f64, volume: f64) -> f64 {
+        1e-3 * (held / volume - self.atmosphere_pa)
+    }
+
+    /// Begins a trial in the first cells of a memory.
+    pub(crate) fn begin(
+        &self,
+        start: Start,
+        initial_kpa: f64,
+        volume: f64,
+        cells: &mut [f64],
+    ) -> Result<Chamber, SimError> {
+        let absolute = 1e3 * initial_kpa + self.atmosphere_pa;
+        if !(absolute.is_finite() && absolute > 0.0) {
+            return Err(SimError::NotPositive { name: "initial pressure, Pa absolute", value: absolute });
+        }
+        let mut droops = [0.0; MOST_DROOPS];
+        if let Start::Carried { rest_s } = start {
+            for ((y, law), cell) in droops.iter_mut().zip(&self.droops).zip(&cells[1..]) {
+                *y = law.relaxed(*cell, rest_s);
+            }
+        }
+        Ok(Chamber { held: absolute * volume, droops })
+    }
+
+    /// Remembers how a trial ended.
+    pub(crate) fn end(&self, chamber: &Chamber, cells: &mut [f64]) {
+        cells[0] = chamber.held;
+        cells[1..=MOST_DROOPS].copy_from_slice(&chamber.droops);
+    }
+
+    fn conductance(&self, side: usize, opening: f64) -> f64 {
+        let u = self.openings.iter().fold(opening, |u, law| law.at(u)).clamp(0.0, 1.0);
+        if u > 0.0 { self.conductance[side] * (self.least + (1.0 - self.least) * u) } else { 0.0 }
+    }
+
+    /// psi of ISO 6358.
+    #[inline]
+    fn subsonic(&self, ratio: f64) -> f64 {
+        if ratio <= self.critical {
+            1.0
+        } else if ratio < 1.0 {
+            let z = (ratio - self.critical) * self.per_subsonic;
+            (1.0 - z * z).sqrt()
+        } else {
+            0.0
+        }
+    }
+
+    /// Flow in, and net flow, kg/s, at absolute pressures.
+    #[inline]
+    fn flows(&self, valves: Valves, p: f64, supply: f64) -> (f64, f64) {
+        let mut inflow = 0.0;
+        if valves.inlet > 0.0 && p < supply {
+            inflow = valves.inlet * supply * self.subsonic(p / supply);
+        }
+        let mut net = inflow;
+        if valves.outlet > 0.0 && p > self.atmosphere_pa {
+            net -= valves.outlet * p * self.subsonic(self.atmosphere_pa / p);
+        }
+        for leak in &self.leaks {
+            net -= leak.at(p - self.atmosphere_pa);
+        }
+        (inflow, net)
+    }
+
+    /// One step of length `h` with constant openings; the volume goes linearly between the two given.
+    #[inline]
+    pub(crate) fn advance(&self, valves: Valves, chamber: &mut Chamber, volume: [f64; 2], h: f64) {
+        let still = valves.inlet == 0.0 && valves.outlet == 0.0;
+        if still && self.leaks.is_empty() {
+            for (y, law) in chamber.droops.iter_mut().zip(&self.droops) {
+                *y = law.relaxed(*y, h);
+            }
+        } else if self.droops.is_empty() {
+            self.step::<0>(valves, chamber, volume, h);
+        } else {
+            self.step::<MOST_DROOPS>(valves, chamber, volume, h);
+        }
+    }
+
+    /// Classical Runge-Kutta for what the chamber holds and the first `D` droops.
+    #[inline]
+    fn step<const D: usize>(&self, valves: Valves, chamber: &mut Chamber, volume: [f64; 2], h: f64) {
+        let supply = |droops: &[f64; D]| (self.supply_pa - droops.iter().sum::<f64>()).max(0.0);
+        let rate = |held: f64, droops: &[f64; D], volume: f64| {
+            let (inflow, net) = self.flows(valves, held / volume, supply(droops));
+            let mut fall = [0.0; D];
+            for ((f, y), law) in fall.iter_mut().zip(droops).zip(&self.droops) {
+                *f = law.rate(*y, inflow);
+            }
+            (self.chamber * net, fall)
+        };
+        let from = |droops: &[f64; D], fall: &[f64; D], t: f64| -> [f64; D] {
+            std::array::from_fn(|i| droops[i] + t * fall[i])
+        };
+        let held = chamber.held;
+        let mut y = [0.0; D];
+        for (y, droop) in y.iter_mut().zip(chamber.droops) {
+            *y = droop;
+        }
+        let middle = 0.5 * (volume[0] + volume[1]);
+        let (k1, f1) = rate(held, &y, volume[0]);
+        if D == 0 && volume[0] == volume[1] && k1.abs() * h <= 1e-13 * held {
+            return;
+        }
+        let (k2, f2) = rate(held + 0.5 * h * k1, &from(&y, &f1, 0.5 * h), middle);
+        let (k3, f3) = rate(held + 0.5 * h * k2, &from(&y, &f2, 0.5 * h), middle);
+        let (k4, f4) = rate(held + h * k3, &from(&y, &f3, h), volume[1]);
+        let mut next = held + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4);
+        for i in 0..D {
+            y[i] += h / 6.0 * (f1[i] + 2.0 * (f2[i] + f3[i]) + f4[i]);
+            chamber.droops[i] = y[i];
+        }
+        // No flow passes the pressure that drives it.
+        let (high, low) = (supply(&y) * volume[1], self.atmosphere_pa * volume[1]);
+        if next > held && next > high {
+            next = held.max(high);
+        } else if next < held && next < low {
+            next = held.min(low);
+        }
+        // Nor does a state pass its equilibrium; a step too long for a stiff one ends on it.
+        if k1 * k4 < 0.0 || next == high || next == low {
+            let (end, _) = rate(next, &y, volume[1]);
+            if k1 * end < 0.0 && h * (end - k1).abs() > (next - held).abs() {
+                next = balance(held, next, k1, |m| rate(m, &y, volume[1]).0);
+            }
+        }
+        chamber.held = next;
+    }
+}
+
+/// Where `rate` changes its sign between `a` and `b`: bisection, to the last bits that matter.
+fn balance(mut a: f64, mut b: f64, rate_a: f64, rate: impl Fn(f64) -> f64) -> f64 {
+    for _ in 0..48 {
+        let middle = 0.5 * (a + b);
+        if (b - a).abs() <= 1e-12 * middle.abs() {
+            break;
+        }
+        if rate(middle) * rate_a > 0.0 {
+            a = middle;
+        } else {
+            b = middle;
+        }
+    }
+    0.5 * (a + b)
+}
+
+/// Openings turned into conductances, computed only when they change.
+#[derive(Debug)]
+pub(crate) struct Drive<'a> {
+    stage: &'a Pneumatics,
+    openings: Openings<'a>,
+    last: [f64; 2],
+    valves: Valves,
+}
+
+impl<'a> Drive<'a> {
+    pub(crate) fn new(stage: &'a Pneumatics, openings: Openings<'a>) -> Self {
+        Self { stage, openings, last: [0.0; 2], valves: Valves { inlet: 0.0, outlet: 0.0 } }
+    }
+
+    /// Conductances in a piece after a sample; both valves are shut before the first command arrives.
+    #[inline]
+    pub(crate) fn valves(&mut self, sample: usize, piece: usize) -> Valves {
+        let now = match self.stage.grid.command(sample, piece) {
+            Some(i) => [self.openings.inlet[i], self.openings.outlet[i]],
+            None => [0.0; 2],
+        };
+        if now != self.last {
+            self.last = now;
+            let of = |side: usize| self.stage.conductance(side, now[side]);
+            self.valves = Valves { inlet: of(0), outlet: of(1) };
+        }
+        self.valves
+    }
+}

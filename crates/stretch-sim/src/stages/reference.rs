@@ -1,0 +1,86 @@
+//! Stage `reference`: true length to the length that the potentiometer shows.
+
+use super::{check_length, operators::Operators, sensing::pick};
+use crate::{
+    SimError,
+    effects::{Action, EffectSet, Surroundings},
+    grid::Grid,
+    memory::Memory,
+    operator::{Span, Start},
+    params::RigParams,
+    stage::Stage,
+};
+
+/// The reference, prepared; without an effect it shows the true length.
+#[derive(Debug)]
+pub struct Reference {
+    grid: Grid,
+    row: Operators,
+}
+
+impl Reference {
+    /// Prepares the stage.
+    ///
+    /// # Errors
+    /// None for the catalogue's effects.
+    pub fn new(params: &RigParams, effects: &EffectSet, grid: &Grid) -> Result<Self, SimError> {
+        Ok(Self::around(&Surroundings::of_rig(params, grid), effects, grid))
+    }
+
+    pub(crate) fn around(around: &Surroundings<'_>, effects: &EffectSet, grid: &Grid) -> Self {
+        let row = effects
+            .acting_in(Stage::Reference)
+            .filter_map(|active| match active.effect().action(active.values(), around) {
+                Action::Length(operator) => Some(operator),
+                _ => None,
+            })
+            .collect();
+        Self { grid: grid.clone(), row: Operators::new(row, 0) }
+    }
+
+    /// A memory for it.
+    pub fn memory(&self) -> Memory {
+        Memory::with_cells(self.row.end())
+    }
+
+    /// Measured length (before noise and rounding) at every sample, from the true length at every node of the grid.
+    ///
+    /// # Errors
+    /// Slices of different lengths.
+    pub fn run(
+        &self,
+        memory: &mut Memory,
+        start: Start,
+        true_mm: &[f64],
+        length_mm: &mut [f64],
+    ) -> Result<(), SimError> {
+        check_length("true length", self.grid.nodes(length_mm.len()), true_mm.len())?;
+        let Some(first) = true_mm.first() else { return Ok(()) };
+        let start = memory.start(start);
+        if self.row.is_empty() {
+            pick(&self.grid, None, true_mm, length_mm);
+            return Ok(());
+        }
+        let span = Span { grid: &self.grid, first_node: 0, start_s: 0.0, pressure_kpa: &[], strain: &[] };
+        self.row.begin(&span, start, *first, &mut memory.cells);
+        if self.grid.pieces() == 1 {
+            length_mm.copy_from_slice(true_mm);
+            self.row.run(&span, &mut memory.cells, length_mm);
+        } else {
+            let mut work = std::mem::take(&mut memory.nodes);
+            work.clear();
+            work.extend_from_slice(true_mm);
+            self.row.run(&span, &mut memory.cells, &mut work);
+            pick(&self.grid, None, &work, length_mm);
+            memory.nodes = work;
+        }
+        Ok(())
+    }
+
+    /// Replaces a measured (and smoothed) length by a true length that would have been shown like that: what drives
+    /// `sensing` when the reference has effects of its own. Exact for `pot_nonlinearity`; for `pot_backlash` exact
+    /// while the reference moves, led over linearly while it dwells.
+    pub fn undo(&self, length_mm: &mut [f64]) {
+        self.row.undo(length_mm);
+    }
+}

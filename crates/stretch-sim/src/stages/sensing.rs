@@ -1,0 +1,249 @@
+//! Stage `sensing`: length to bridge voltage.
+
+use super::{check_length, operators::Operators};
+use crate::{
+    SimError,
+    effects::{Action, ActiveEffect, EffectSet, Surroundings},
+    grid::Grid,
+    memory::Memory,
+    operator::{Span, Start},
+    params::{Key, RigParams},
+    skew::Skew,
+    stage::Stage,
+};
+
+/// Values worked on at a time: small enough to stay in the nearest cache.
+const BLOCK: usize = 512;
+
+/// Sleeve, gauge, bridge and amplifier of the nominal rig: memoryless.
+///
+/// e = (1 + e0)(1 - k) - 1; R = R0 (1 + e)^2; v = V_ref + G V_exc (1/2 - R/(R + R_b)), R_b = beta R(e0).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bridge {
+    stretch_per_mm: f64,
+    resistance: f64,
+    trim: f64,
+    reference: f64,
+    scale: f64,
+}
+
+impl Bridge {
+    /// Of a rig.
+    pub fn new(params: &RigParams) -> Self {
+        let stretch = 1.0 + params[Key::E0];
+        let resistance = params[Key::R0];
+        Self {
+            stretch_per_mm: stretch / params[Key::L0],
+            resistance,
+            trim: params[Key::Beta] * resistance * stretch * stretch,
+            reference: params[Key::VRef],
+            scale: params[Key::G] * params[Key::VExc],
+        }
+    }
+
+    /// Gauge strain at a length in mm.
+    #[inline]
+    pub fn strain(&self, length_mm: f64) -> f64 {
+        self.stretch_per_mm * length_mm - 1.0
+    }
+
+    /// Resistance in ohm at a gauge strain.
+    #[inline]
+    pub fn resistance(&self, strain: f64) -> f64 {
+        let stretch = 1.0 + strain;
+        self.resistance * (stretch * stretch)
+    }
+
+    /// Amplified voltage at a resistance in ohm.
+    #[inline]
+    pub fn volts(&self, resistance: f64) -> f64 {
+        self.reference + self.scale * (0.5 - resistance / (resistance + self.trim))
+    }
+}
+
+/// The sensing stage, prepared: the nominal bridge and the effects on strain, resistance, voltage and record.
+#[derive(Debug)]
+pub struct Sensing {
+    grid: Grid,
+    bridge: Bridge,
+    strain: Operators,
+    resistance: Operators,
+    volts: Operators,
+    record: Operators,
+    skew: Option<Skew>,
+    needs_pressure: Option<&'static str>,
+}
+
+impl Sensing {
+    /// Prepares the stage. Driven by a measured length, which is linear between samples, [`Grid::samples`] is enough.
+    ///
+    /// # Errors
+    /// None for the catalogue's effects.
+    pub fn new(params: &RigParams, effects: &EffectSet, grid: &Grid) -> Result<Self, SimError> {
+        let around = Surroundings::of_rig(params, grid);
+        let sites = Sites::new(effects.acting_in(Stage::Sensing), &around);
+        Ok(Self {
+            grid: grid.clone(),
+            bridge: Bridge::new(params),
+            skew: sites.skew(grid),
+            strain: sites.strain,
+            resistance: sites.resistance,
+            volts: sites.volts,
+            record: sites.record,
+            needs_pressure: effects
+                .acting_in(Stage::Sensing)
+                .find(|e| e.effect().needs() == Some("a pressure"))
+                .map(|e| e.name()),
+        })
+    }
+
+    /// A memory for it.
+    pub fn memory(&self) -> Memory {
+        Memory::with_cells(self.record.end())
+    }
+
+    /// Steps of time.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// Bridge voltage in V at every sample, before noise, clipping and rounding.
+    ///
+    /// `length_mm` and `pressure_kpa` hold one value a node of the grid (a sample, on [`Grid::samples`]); the
+    /// pressure may be empty unless `pressure_crosstalk` is on. `start_s` is the session time of the first sample.
+    ///
+    /// # Errors
+    /// Slices of different lengths, a pressure that is needed and absent.
+    pub fn run(
+        &self,
+        memory: &mut Memory,
+        start: Start,
+        start_s: f64,
+        length_mm: &[f64],
+        pressure_kpa: &[f64],
+        bridge_v: &mut [f64],
+    ) -> Result<(), SimError> {
+        check_length("length_mm", self.grid.nodes(bridge_v.len()), length_mm.len())?;
+        if let (Some(name), true) = (self.needs_pressure, pressure_kpa.is_empty()) {
+            return Err(SimError::NotHere { name: name.to_string(), needs: "a pressure" });
+        }
+        if !pressure_kpa.is_empty() {
+            check_length("pressure_kpa", length_mm.len(), pressure_kpa.len())?;
+        }
+        let Some(first) = length_mm.first() else { return Ok(()) };
+        let start = memory.start(start);
+        let bridge = &self.bridge;
+        if self.strain.is_empty() && self.resistance.is_empty() && self.volts.is_empty() {
+            // The nominal bridge: one pass.
+            if self.grid.pieces() == 1 && self.skew.is_none() {
+                for (v, length) in bridge_v.iter_mut().zip(length_mm) {
+                    *v = bridge.volts(bridge.resistance(bridge.strain(*length)));
+                }
+                self.write_down(memory, start_s, bridge_v);
+                return Ok(());
+            }
+        }
+        let grid = &self.grid;
+        let span = |first_node: usize| Span { grid, first_node, start_s, pressure_kpa: &[], strain: &[] };
+        let cells = &mut memory.cells;
+        let at = Span { pressure_kpa: pressure_kpa.get(..1).unwrap_or(&[]), ..span(0) };
+        let e = [self.strain.begin(&at, start, bridge.strain(*first), cells)];
+        let at = Span { strain: &e, ..at };
+        self.resistance.begin_at(start, e[0], cells);
+        let mut r = [bridge.resistance(e[0])];
+        self.resistance.run(&at, cells, &mut r);
+        self.volts.begin(&at, start, bridge.volts(r[0]), cells);
+        let mut work = std::mem::take(&mut memory.nodes);
+        let direct = grid.pieces() == 1 && self.skew.is_none();
+        if !direct {
+            work.resize(length_mm.len(), 0.0);
+        }
+        let nodes: &mut [f64] = if direct { bridge_v } else { &mut work };
+        let mut strain = [0.0; BLOCK];
+        for (block, (length, v)) in length_mm.chunks(BLOCK).zip(nodes.chunks_mut(BLOCK)).enumerate() {
+            let from = block * BLOCK;
+            let strain = &mut strain[..length.len()];
+            for (e, l) in strain.iter_mut().zip(length) {
+                *e = bridge.strain(*l);
+            }
+            let pressure = pressure_kpa.get(from..from + length.len()).unwrap_or(&[]);
+            let at = Span { pressure_kpa: pressure, ..span(from) };
+            self.strain.run(&at, &mut memory.cells, strain);
+            for (v, e) in v.iter_mut().zip(strain.iter()) {
+                *v = bridge.resistance(*e);
+            }
+            self.resistance.run(&Span { strain, ..at }, &mut memory.cells, v);
+            for v in v.iter_mut() {
+                *v = bridge.volts(*v);
+            }
+            self.volts.run(&at, &mut memory.cells, v);
+        }
+        if !direct {
+            pick(grid, self.skew.as_ref(), &work, bridge_v);
+        }
+        memory.nodes = work;
+        self.write_down(memory, start_s, bridge_v);
+        Ok(())
+    }
+
+    /// What acts on recorded samples.
+    fn write_down(&self, memory: &mut Memory, start_s: f64, samples: &mut [f64]) {
+        if self.record.is_empty() {
+            return;
+        }
+        let span = Span { grid: &self.grid, first_node: 0, start_s, pressure_kpa: &[], strain: &[] };
+        self.record.begin(&span, Start::Settled, samples[0], &mut memory.cells);
+        self.record.run(&span, &mut memory.cells, samples);
+    }
+}
+
+/// Samples from nodes, as a skew shows them.
+pub(crate) fn pick(grid: &Grid, skew: Option<&Skew>, nodes: &[f64], samples: &mut [f64]) {
+    match skew {
+        Some(skew) => skew.sample(nodes, samples),
+        None => {
+            for (out, node) in samples.iter_mut().zip(nodes.iter().step_by(grid.pieces())) {
+                *out = *node;
+            }
+        }
+    }
+}
+
+/// Operators of a sensing chain by where they act, in the catalogue's order.
+#[derive(Debug)]
+pub(crate) struct Sites {
+    pub(crate) strain: Operators,
+    pub(crate) resistance: Operators,
+    pub(crate) volts: Operators,
+    pub(crate) record: Operators,
+    skew_s: f64,
+}
+
+impl Sites {
+    pub(crate) fn new<'a>(
+        effects: impl Iterator<Item = &'a ActiveEffect>,
+        around: &Surroundings<'_>,
+    ) -> Self {
+        let [mut strain, mut resistance, mut volts, mut record] = [const { Vec::new() }; 4];
+        let mut skew_s = 0.0;
+        for active in effects {
+            match active.effect().action(active.values(), around) {
+                Action::Strain(operator) => strain.push(operator),
+                Action::Resistance(operator) => resistance.push(operator),
+                Action::Volts(operator) => volts.push(operator),
+                Action::Record(operator) => record.push(operator),
+                Action::Skew(seconds) => skew_s += seconds,
+                _ => {}
+            }
+        }
+        let strain = Operators::new(strain, 0);
+        let resistance = Operators::new(resistance, strain.end());
+        let volts = Operators::new(volts, resistance.end());
+        let record = Operators::new(record, volts.end());
+        Self { strain, resistance, volts, record, skew_s }
+    }
+
+    pub(crate) fn skew(&self, grid: &Grid) -> Option<Skew> {
+        (self.skew_s != 0.0).then(|| Skew::new(grid, self.skew_s))
+    }
+}

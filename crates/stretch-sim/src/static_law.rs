@@ -1,0 +1,104 @@
+//! The static law of the muscle, solved once and tabulated.
+
+use crate::params::{Key, RigParams};
+
+/// Intervals to one reference pressure.
+const DENSITY: usize = 256;
+/// Reference pressures that the table spans; contraction is held beyond.
+const SPAN: usize = 3;
+
+/// Static contraction of the muscle without force, from gauge pressure:
+/// p/P_ref = a0 (1 - exp(-a1 x)) exp(a3 x^2), k_s = k_max x, x = 0 for p <= 0.
+///
+/// The inverse is tabulated by piecewise cubics; see the crate's tests for its error. Beyond three reference
+/// pressures contraction is held.
+#[derive(Debug, Clone)]
+pub struct StaticLaw {
+    per_kpa: f64,
+    cubics: Vec<[f64; 4]>,
+    last: f64,
+}
+
+impl StaticLaw {
+    /// Solves the law for a rig.
+    pub fn new(params: &RigParams) -> Self {
+        let [a0, a1, a3] = [params[Key::A0], params[Key::A1], params[Key::A3]];
+        let k_max = params[Key::KMax];
+        // Pressure and its slope at x.
+        let law = |x: f64| {
+            let gone = libm::exp(-a1 * x);
+            let stiff = a0 * libm::exp(a3 * x * x);
+            let u = stiff * (1.0 - gone);
+            (u, stiff * a1 * gone + 2.0 * a3 * x * u)
+        };
+        let h = 1.0 / DENSITY as f64;
+        let count = SPAN * DENSITY;
+        let (mut x, mut slope) = (0.0, 1.0 / law(0.0).1);
+        let mut cubics = Vec::with_capacity(count);
+        for i in 0..count {
+            let goal = (i + 1) as f64 * h;
+            let mut next = x + slope * h;
+            let mut rise = 1.0;
+            for _ in 0..40 {
+                let (u, du) = law(next);
+                rise = du;
+                let change = (goal - u) / du;
+                next += change;
+                if change.abs() <= 1e-9 * (1.0 + next) {
+                    // Newton squares the error: this change was the last that shows.
+                    rise = law(next).1;
+                    break;
+                }
+            }
+            let next_slope = 1.0 / rise;
+            let (d0, d1, rise) = (slope * h, next_slope * h, next - x);
+            cubics.push([x, d0, 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise].map(|c| k_max * c));
+            (x, slope) = (next, next_slope);
+        }
+        Self {
+            per_kpa: 1e3 * DENSITY as f64 / params[Key::PRef],
+            last: k_max * x,
+            cubics,
+        }
+    }
+
+    /// Static contraction at a gauge pressure in kPa.
+    #[inline]
+    pub fn contraction(&self, pressure_kpa: f64) -> f64 {
+        let u = pressure_kpa * self.per_kpa;
+        if !(u > 0.0) {
+            return 0.0;
+        }
+        match self.cubics.get(u as usize) {
+            Some([a, b, c, d]) => {
+                let t = u - (u as usize) as f64;
+                a + t * (b + t * (c + t * d))
+            }
+            None => self.last,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inverts_the_law() {
+        let params = RigParams::default();
+        let law = StaticLaw::new(&params);
+        let mut worst: f64 = 0.0;
+        for i in 0..4000 {
+            let x = i as f64 * 3e-4;
+            let u = params[Key::A0]
+                * (1.0 - (-params[Key::A1] * x).exp())
+                * (params[Key::A3] * x * x).exp();
+            worst = worst.max((law.contraction(620.0 * u) / params[Key::KMax] - x).abs());
+        }
+        assert!(worst < testkit::tolerance::STATIC_LAW, "{worst:e}");
+        assert_eq!(law.contraction(-3.0), 0.0);
+        assert_eq!(law.contraction(f64::NAN), 0.0);
+        assert!(law.contraction(1e9).is_finite());
+        assert!((law.contraction(620.0) / params[Key::KMax] - 1.0176).abs() < 1e-4);
+    }
+}

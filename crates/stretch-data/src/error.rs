@@ -11,7 +11,7 @@ pub struct Place {
     pub file: String,
     /// Row as an editor counts it: the header is row 1.
     pub row: u64,
-    /// Name of the column, or `column 3` where it has none.
+    /// Name of the column, or its number, the first being 1, where it has no name.
     pub column: String,
 }
 

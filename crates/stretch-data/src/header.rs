@@ -20,13 +20,13 @@ impl Header {
         let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
         let place = |column: String| Place { file: file.to_owned(), row, column };
         if line.starts_with(b"\xff\xfe") || line.starts_with(b"\xfe\xff") {
-            return Err(DataError::NotUtf8 { at: place("column 1".into()), value: shown(line) });
+            return Err(DataError::NotUtf8 { at: place("1".into()), value: shown(line) });
         }
         let delimiter = delimiter(line);
         let mut names: Vec<String> = Vec::new();
         let mut at = 0;
         loop {
-            let column = || format!("column {}", names.len() + 1);
+            let column = || (names.len() + 1).to_string();
             let (content, end) = match field(line, at, delimiter) {
                 Field::Plain(content, end) => (content.to_vec(), end),
                 Field::Quoted(content, end) => (content, end),
@@ -63,7 +63,7 @@ impl Header {
     pub(crate) fn label(&self, position: usize) -> String {
         match self.names.get(position) {
             Some(name) if !name.is_empty() => name.clone(),
-            _ => format!("column {}", position + 1),
+            _ => (position + 1).to_string(),
         }
     }
 }

@@ -10,7 +10,7 @@ use tempfile::{Builder, TempDir};
 use crate::{
     DataError,
     interrupt::{Open, check},
-    write_whole::{folder_of, sync_folder},
+    write_whole::{folder_of, sync_folder, without_path},
 };
 
 /// Writes a folder whole or not at all.
@@ -101,12 +101,7 @@ fn make_parents(parent: &Path) -> io::Result<Vec<PathBuf>> {
 }
 
 fn temporary_folder(parent: &Path) -> io::Result<TempDir> {
-    Builder::new().prefix(".stretch-").suffix(".tmp").tempdir_in(parent).map_err(|e| {
-        match e.get_ref().and_then(|inner| inner.source()) {
-            Some(source) => io::Error::new(e.kind(), source.to_string()),
-            None => e,
-        }
-    })
+    Builder::new().prefix(".stretch-").suffix(".tmp").tempdir_in(parent).map_err(without_path)
 }
 
 /// Moves every file under `from` to the same place under `to`; what it replaces waits under

@@ -118,14 +118,16 @@ fn temporary_file(folder: &Path) -> io::Result<NamedTempFile> {
         // Narrowed by the umask, as for any new file.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
-    // The temporary name would only puzzle: the cause is enough.
-    builder.tempfile_in(folder).map_err(|e| match e.raw_os_error() {
-        Some(code) => io::Error::from_raw_os_error(code),
-        None => match e.get_ref().and_then(|inner| inner.source()) {
-            Some(source) => io::Error::new(e.kind(), source.to_string()),
-            None => io::Error::from(e.kind()),
-        },
-    })
+    builder.tempfile_in(folder).map_err(without_path)
+}
+
+/// The cause alone: the name of a temporary file would only puzzle.
+pub(crate) fn without_path(error: io::Error) -> io::Error {
+    let text = error.to_string();
+    match text.rsplit_once(" at path ") {
+        Some((cause, _)) => io::Error::new(error.kind(), cause.to_owned()),
+        None => error,
+    }
 }
 
 /// The folder that a path stands in.

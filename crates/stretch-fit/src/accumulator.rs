@@ -81,11 +81,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
     /// would overflow; the sample is then not added.
     #[inline]
     pub fn push(&mut self, rate: T, volts: T, value: T) -> Result<(), FitError> {
-        // Not finite fails these comparisons too.
-        if rate.abs() <= self.most_input
-            && volts.abs() <= self.most_input
-            && value.abs() <= self.most_value
-        {
+        if self.takes(rate, volts, value) {
             self.place(rate, volts, value, T::one());
             Ok(())
         } else {
@@ -107,10 +103,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
         value: T,
         weight: T,
     ) -> Result<(), FitError> {
-        let taken = rate.abs() <= self.most_input
-            && volts.abs() <= self.most_input
-            && value.abs() <= self.most_value;
-        if !taken {
+        if !self.takes(rate, volts, value) {
             return Err(self.refusal(rate, volts, value));
         }
         let largest = rate.abs().max(volts.abs()).max(T::one());
@@ -118,7 +111,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
         let most = self.most_value / power.max(value.abs());
         let root_weight = weight.sqrt();
         // A NaN weight, or the root of one below zero, fails this too.
-        if !(root_weight <= most) {
+        if !within(root_weight, most) {
             let most = most.as_f64() * most.as_f64();
             return Err(FitError::OutOfRange { field: "weight", value: weight.as_f64(), most });
         }
@@ -126,6 +119,13 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
             self.place(rate, volts, value, root_weight);
         }
         Ok(())
+    }
+
+    #[inline(always)]
+    fn takes(&self, rate: T, volts: T, value: T) -> bool {
+        within(rate, self.most_input)
+            && within(volts, self.most_input)
+            && within(value, self.most_value)
     }
 
     #[inline(always)]
@@ -144,10 +144,10 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
     #[cold]
     fn refusal(&self, rate: T, volts: T, value: T) -> FitError {
         let most = self.most_input.as_f64();
-        if !(rate.abs() <= self.most_input) {
+        if !within(rate, self.most_input) {
             return FitError::OutOfRange { field: "rate", value: rate.as_f64(), most };
         }
-        if !(volts.abs() <= self.most_input) {
+        if !within(volts, self.most_input) {
             return FitError::OutOfRange { field: "volts", value: volts.as_f64(), most };
         }
         let most = self.most_value.as_f64();
@@ -173,7 +173,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
             self.filled,
             &self.root_weights,
             &self.rates,
-            &self.volts,
+            &mut self.volts,
             &mut self.values,
             &mut self.block,
         );
@@ -219,4 +219,10 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
     pub fn fit(&self) -> Result<Fit<T, TERMS>, FitError> {
         self.factor().fit()
     }
+}
+
+/// Whether a number's size is at most `most`; false for one that is not finite.
+#[inline(always)]
+fn within<T: Real>(x: T, most: T) -> bool {
+    x.abs() <= most
 }

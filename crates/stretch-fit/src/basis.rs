@@ -101,10 +101,10 @@ impl<const TERMS: usize> Basis<TERMS> {
 }
 
 /// Entries of a row up to two to this power keep sums of squares finite for
-/// over a hundred million rows (`f32`) or any number of rows (`f64`).
+/// ten million rows (`f32`) or any number (`f64`), centred or not.
 pub(crate) fn entry_exponent<T: Real>() -> i32 {
     // f32: 2^128 overflows, f64: 2^1024.
-    if T::max_value().as_f64() < 1e100 { 50 } else { 480 }
+    if T::max_value().as_f64() < 1e100 { 45 } else { 480 }
 }
 
 /// `2^n`, exactly.

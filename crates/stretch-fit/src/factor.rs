@@ -9,6 +9,7 @@ use crate::{
     Fit, FitError,
     basis::{Basis, position},
     fold::fold,
+    shift::{apply, product, shift},
 };
 
 /// The triangular factor `R` of a weighted design matrix, with `q = Q^T z` and
@@ -21,6 +22,8 @@ use crate::{
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Factor<T, const TERMS: usize> {
     basis: Basis<TERMS>,
+    /// Terms are powers of `volts - centre`; the first sample's voltage.
+    centre: T,
     r: [[T; TERMS]; TERMS],
     q: [T; TERMS],
     /// Residual sum of squares, and what its last addition rounded off.
@@ -32,6 +35,7 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
     pub(crate) fn empty(basis: Basis<TERMS>) -> Self {
         Self {
             basis,
+            centre: T::zero(),
             r: [[T::zero(); TERMS]; TERMS],
             q: [T::zero(); TERMS],
             residual: (T::zero(), T::zero()),
@@ -69,10 +73,16 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         samples: usize,
         root_weights: &[T; ROWS],
         rates: &[T; ROWS],
-        volts: &[T; ROWS],
+        volts: &mut [T; ROWS],
         values: &mut [T; ROWS],
         block: &mut [[T; ROWS]; TERMS],
     ) {
+        if self.samples == 0 && samples > 0 {
+            self.centre = volts[0];
+        }
+        for volts in volts.iter_mut() {
+            *volts = *volts - self.centre;
+        }
         self.basis.columns(root_weights, rates, volts, block);
         let squares = fold(self.basis.terms(), &mut self.r, &mut self.q, block, values);
         self.add_residual(squares);
@@ -93,10 +103,13 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
             *self = *other;
             return Ok(());
         }
-        // The other triangle's rows are a block of TERMS rows, by column.
+        // The other triangle about this centre; its rows are a block of TERMS
+        // rows, by column.
         let terms = self.basis.terms();
+        let by = other.centre - self.centre;
+        let triangle = product(terms, &other.r, &shift(self.degree(), by));
         let mut block = [[T::zero(); TERMS]; TERMS];
-        for (k, row) in other.r[..terms].iter().enumerate() {
+        for (k, row) in triangle[..terms].iter().enumerate() {
             for j in k..terms {
                 block[j][k] = row[j];
             }
@@ -137,6 +150,7 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
             return Ok(*self);
         }
         let mut lower = Self::empty(Basis::new(degree)?);
+        lower.centre = self.centre;
         let terms = self.basis.terms();
         let mut block = [[T::zero(); TERMS]; TERMS];
         for (column, (rate_power, volts_power)) in block.iter_mut().zip(degree.exponents()) {
@@ -158,15 +172,15 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
     /// samples, `|R c - q|^2 + rest`, from its coefficients in the order of
     /// `Degree::exponents`; those beyond the end count as zero.
     pub fn residual_of(&self, coefficients: &[T]) -> T {
-        let mut sum = T::zero();
         let terms = self.basis.terms();
-        for (k, (row, &q)) in self.r[..terms].iter().zip(&self.q).enumerate() {
-            let mut e = -q;
-            for (&r, &c) in row[..terms].iter().zip(coefficients).skip(k) {
-                e = e + r * c;
-            }
-            sum = sum + e * e;
+        let mut raw = [T::zero(); TERMS];
+        for (place, &c) in raw[..terms].iter_mut().zip(coefficients) {
+            *place = c;
         }
+        let centred = apply(terms, &shift(self.degree(), self.centre), &raw);
+        let reached = apply(terms, &self.r, &centred);
+        let missed = reached[..terms].iter().zip(&self.q);
+        let sum = missed.fold(T::zero(), |sum, (&a, &q)| sum + (a - q) * (a - q));
         sum + self.residual_sum()
     }
 
@@ -210,12 +224,16 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
                 inverse[k][j] = -e / diagonal;
             }
         }
+        let to_raw = shift(self.degree(), -self.centre);
+        let coefficients = apply(terms, &to_raw, &coefficients);
+        let inverse = product(terms, &to_raw, &inverse);
         let surface =
             Surface::new(self.degree(), &coefficients[..terms]).map_err(|_| FitError::NotFinite)?;
         let fit = Fit {
             basis: self.basis,
             coefficients,
             surface,
+            centre: self.centre,
             r: self.r,
             inverse,
             sse: self.residual_sum(),

@@ -5,7 +5,11 @@
 
 use stretch_core::{Degree, Real, Surface};
 
-use crate::{Confidence, FitError, basis::Basis};
+use crate::{
+    Confidence, FitError,
+    basis::Basis,
+    shift::{apply, product, shift},
+};
 
 /// A least-squares surface with the statistics of its fit.
 ///
@@ -33,7 +37,10 @@ pub struct Fit<T, const TERMS: usize> {
     pub(crate) basis: Basis<TERMS>,
     pub(crate) coefficients: [T; TERMS],
     pub(crate) surface: Surface<T>,
+    /// `r` is the triangle of powers of `volts - centre`.
+    pub(crate) centre: T,
     pub(crate) r: [[T; TERMS]; TERMS],
+    /// What turns unit errors into errors of the coefficients in raw volts.
     pub(crate) inverse: [[T; TERMS]; TERMS],
     pub(crate) sse: T,
     pub(crate) sst: T,
@@ -142,7 +149,7 @@ impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
     /// variance of the surface there in units of `sigma^2`. On a sample of
     /// weight 1 it is the leverage, and these sum to the number of terms.
     pub fn leverage(&self, rate: T, volts: T) -> T {
-        let row = self.basis.row(rate, volts);
+        let row = self.basis.row(rate, volts - self.centre);
         let terms = self.terms();
         // Solve R^T u = a, so that h = |u|^2.
         let mut u = [T::zero(); TERMS];
@@ -159,17 +166,19 @@ impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
     }
 
     /// The condition number of the weighted design matrix (2-norm), found by
-    /// power iteration on `R^T R` and on its inverse: within a few per cent,
+    /// power iteration on `R^T R` and on its inverse, in
+    /// raw volts: within a few per cent,
     /// from below. A coefficient can lose as many digits as this has.
     pub fn condition(&self) -> T {
         let terms = self.terms();
+        let raw = product(terms, &self.r, &shift(self.degree(), self.centre));
         let (mut large, mut small) = (T::zero(), T::zero());
         let mut x = [T::one(); TERMS];
         let mut y = [T::one(); TERMS];
         for _ in 0..STEPS {
-            x = self.transposed_times(&self.r, &times(&self.r, &x, terms));
+            x = self.transposed_times(&raw, &apply(terms, &raw, &x));
             large = rescale(&mut x[..terms]).sqrt();
-            y = times(&self.inverse, &self.transposed_times(&self.inverse, &y), terms);
+            y = apply(terms, &self.inverse, &self.transposed_times(&self.inverse, &y));
             small = rescale(&mut y[..terms]).sqrt();
         }
         large * small
@@ -189,14 +198,6 @@ impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
 /// Power iterations: each multiplies the error by a squared ratio of
 /// neighbouring singular values.
 const STEPS: usize = 12;
-
-fn times<T: Real, const N: usize>(a: &[[T; N]; N], x: &[T; N], terms: usize) -> [T; N] {
-    let mut out = [T::zero(); N];
-    for (out, row) in out.iter_mut().zip(&a[..terms]) {
-        *out = row[..terms].iter().zip(x).fold(T::zero(), |sum, (&e, &x)| sum + e * x);
-    }
-    out
-}
 
 /// Scales a vector to length 1 and gives the length it had.
 fn rescale<T: Real>(x: &mut [T]) -> T {

@@ -13,6 +13,7 @@ mod line;
 mod order_table;
 mod quantile;
 mod robust;
+mod shift;
 #[cfg(feature = "proptest")]
 pub mod strategies;
 

@@ -1,0 +1,110 @@
+//! Accuracy where it is hard: narrow raw volts, `f32`, long logs, outliers.
+
+use stretch_core::{Degree, Real};
+use stretch_fit::{Loss, SurfaceAccumulator, robust_fit};
+use testkit::tolerance as tol;
+
+const TRUTH: [f64; 7] = [0.058, 0.001, 0.774, -0.121, 2.30, 0.094, -2.26];
+
+fn surface(r: f64, v: f64) -> f64 {
+    let [p00, p10, p01, p11, p02, p12, p03] = TRUTH;
+    p00 + p01 * v + p02 * v * v + p03 * v * v * v + r * (p10 + p11 * v + p12 * v * v)
+}
+
+/// Fills the rectangle evenly: rate in -1 to 1, volts around `centre`.
+fn points(samples: u32, centre: f64, width: f64) -> impl Iterator<Item = (f64, f64)> {
+    (0..samples).map(move |k| {
+        let (a, b) =
+            (f64::from(k) * 0.754_877_666_246_692_7, f64::from(k) * 0.569_840_290_998_053_2);
+        (2.0 * a.fract() - 1.0, centre + width * (b.fract() - 0.5))
+    })
+}
+
+fn error<T: Real, const ROWS: usize>(samples: u32, centre: f64, width: f64) -> (f64, f64) {
+    let mut sums = SurfaceAccumulator::<T, 7, ROWS>::new(Degree::POLY13).unwrap();
+    for (rate, volts) in points(samples, centre, width) {
+        let (rate, volts) = (T::from_f64(rate), T::from_f64(volts));
+        // The value belongs to the voltage as this type holds it.
+        let value = T::from_f64(surface(rate.as_f64(), volts.as_f64()));
+        sums.push(rate, volts, value).unwrap();
+    }
+    let fit = sums.fit().unwrap();
+    let off: f64 =
+        fit.coefficients().iter().zip(TRUTH).map(|(c, t)| (c.as_f64() - t).powi(2)).sum();
+    let surfaces = points(1000, centre, width).map(|(rate, volts)| {
+        let found = fit.surface().eval(T::from_f64(rate), T::from_f64(volts)).as_f64();
+        (found - surface(rate, volts)).abs()
+    });
+    let worst = surfaces.fold(0.0, f64::max);
+    (off.sqrt() / TRUTH.iter().map(|t| t * t).sum::<f64>().sqrt(), worst)
+}
+
+#[test]
+fn raw_volts_of_condition_1e8_keep_ten_digits() {
+    let (off, _) = error::<f64, 128>(100_000, 1.24, 0.02);
+    assert!(off < 1e-10, "off by {off:e}");
+    let (off, _) = error::<f64, 8>(100_000, 1.24, 0.02);
+    assert!(off < 1e-10, "rows of 8: off by {off:e}");
+}
+
+#[test]
+fn f32_holds_on_a_board() {
+    let (off, worst) = error::<f32, 8>(20_000, 0.35, 1.0);
+    assert!(off < tol::FIT_F32, "normalised: off by {off:e}");
+    assert!(worst < tol::FIT_F32, "normalised: surface off by {worst:e}");
+    // Condition 4e4: normal equations in f32 lose every digit here.
+    let (off, worst) = error::<f32, 8>(20_000, 1.1, 0.25);
+    println!("narrow: {off:e} {worst:e}");
+    assert!(off < tol::FIT_F32_NARROW, "narrow: off by {off:e}");
+    assert!(worst < tol::FIT_F32, "narrow: surface off by {worst:e}");
+}
+
+#[test]
+fn a_long_f32_log_does_not_stall() {
+    let (off, _) = error::<f32, 32>(1_000_000, 0.35, 1.0);
+    assert!(off < tol::FIT_F32, "off by {off:e}");
+}
+
+/// Bounds at 95 % hold the truth in 95 of 100 repetitions, for normal errors:
+/// least squares, bisquare and least absolute residuals alike.
+#[test]
+fn bounds_hold_the_truth_as_often_as_they_say() {
+    let mut state = 7_u64;
+    let mut uniform = || {
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    const RUNS: usize = 200;
+    let mut held = [[0; 7]; 3];
+    for _ in 0..RUNS {
+        let samples: Vec<(f64, f64, f64)> = points(150, 0.35, 1.0)
+            .map(|(rate, volts)| {
+                let normal = (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
+                (rate, volts, surface(rate, volts) + 0.1 * normal)
+            })
+            .collect();
+        let mut sums = SurfaceAccumulator::<f64, 7, 32>::new(Degree::POLY13).unwrap();
+        sums.extend(samples.iter().copied()).unwrap();
+        let mut memory = [0.0; 150];
+        let mut robust = |loss| {
+            let again = || samples.iter().copied();
+            robust_fit::<f64, 7, _>(Degree::POLY13, loss, again, &mut memory).unwrap().fit
+        };
+        let fits = [sums.fit().unwrap(), robust(Loss::Bisquare), robust(Loss::LeastAbsolute)];
+        for (fit, held) in fits.iter().zip(&mut held) {
+            let bounds = fit.confidence(0.95).unwrap();
+            for (k, truth) in TRUTH.into_iter().enumerate() {
+                let bounds = bounds.coefficient(k).unwrap();
+                held[k] += usize::from(bounds.lower <= truth && truth <= bounds.upper);
+            }
+        }
+    }
+    // Of 7 * 200 bounds, correlated within a run; three standard errors of a
+    // single coefficient's 200 are 4.6 %.
+    for (fit, held) in ["plain", "bisquare", "least absolute"].iter().zip(held) {
+        let share = held.iter().sum::<usize>() as f64 / (7 * RUNS) as f64;
+        println!("{fit}: {share}");
+        assert!((0.95 - 0.046..=0.95 + 0.046).contains(&share), "{fit}: {share}");
+    }
+}

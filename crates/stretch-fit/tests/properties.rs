@@ -1,0 +1,317 @@
+//! What must hold for any data.
+
+use proptest::prelude::*;
+use stretch_core::Degree;
+use stretch_fit::{
+    Factor, FitError, LineAccumulator, OrderTable, SurfaceAccumulator, cross_validate, held_out,
+    strategies::{degrees, observations, surfaces},
+};
+use testkit::tolerance as tol;
+
+type Sample = (f64, f64, f64);
+
+fn accumulate<const ROWS: usize>(
+    degree: Degree,
+    samples: &[Sample],
+) -> SurfaceAccumulator<f64, 21, ROWS> {
+    let mut sums = SurfaceAccumulator::new(degree).unwrap();
+    sums.extend(samples.iter().copied()).unwrap();
+    sums
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    let norm = |x: &mut dyn Iterator<Item = f64>| x.map(|e| e * e).sum::<f64>().sqrt();
+    norm(&mut a.iter().zip(b).map(|(a, b)| a - b)) / norm(&mut b.iter().copied()).max(1.0)
+}
+
+/// Rounding grows with the condition, some hundred for poly13 and 1e5 for poly55.
+fn allowed(condition: f64) -> f64 {
+    tol::FIT_WELL * (condition / 1e3).max(1.0)
+}
+
+fn config() -> ProptestConfig {
+    ProptestConfig { cases: 64, ..ProptestConfig::default() }
+}
+
+proptest! {
+    #![proptest_config(config())]
+
+    #[test]
+    fn a_surface_of_any_degree_is_recovered(
+        log in degrees().prop_flat_map(|degree| observations(degree, 0.0, 120..300))
+    ) {
+        let degree = log.surface.degree();
+        let fit = accumulate::<32>(degree, &log.samples).fit().unwrap();
+        let truth = log.surface.coefficients();
+        let off = distance(fit.coefficients(), &truth[..degree.terms()]);
+        prop_assert!(off < allowed(fit.condition()), "{degree}: off by {off:e}");
+    }
+
+    #[test]
+    fn merging_parts_in_any_order_equals_one_pass(
+        log in observations(Degree::POLY13, 0.5, 60..200),
+        cuts in (0.0..1.0_f64, 0.0..1.0_f64),
+        order in Just([0_usize, 1, 2]).prop_shuffle(),
+    ) {
+        let n = log.samples.len() as f64;
+        let (a, b) = ((cuts.0 * n) as usize, (cuts.1 * n) as usize);
+        let (low, high) = (a.min(b), a.max(b));
+        let parts = [&log.samples[..low], &log.samples[low..high], &log.samples[high..]];
+        let whole = accumulate::<16>(Degree::POLY13, &log.samples).fit().unwrap();
+
+        let mut merged = SurfaceAccumulator::<f64, 21, 16>::new(Degree::POLY13).unwrap();
+        let mut factor: Factor<f64, 21> = merged.factor();
+        for part in order {
+            let part = accumulate::<16>(Degree::POLY13, parts[part]);
+            merged.merge(&part).unwrap();
+            factor.merge(&part.factor()).unwrap();
+        }
+        for fit in [merged.fit().unwrap(), factor.fit().unwrap()] {
+            prop_assert_eq!(fit.samples(), whole.samples());
+            prop_assert!(distance(fit.coefficients(), whole.coefficients()) < tol::FIT_WELL);
+            prop_assert!((fit.sse() / whole.sse() - 1.0).abs() < tol::FIT_STATISTICS);
+            let (a, b) = (fit.r_squared().unwrap(), whole.r_squared().unwrap());
+            prop_assert!((a - b).abs() < tol::FIT_STATISTICS);
+        }
+    }
+
+    #[test]
+    fn the_length_of_a_block_changes_nothing_but_rounding(
+        log in observations(Degree::POLY13, 0.5, 30..150)
+    ) {
+        let long = accumulate::<128>(Degree::POLY13, &log.samples).fit().unwrap();
+        for fit in [
+            accumulate::<1>(Degree::POLY13, &log.samples).fit().unwrap(),
+            accumulate::<7>(Degree::POLY13, &log.samples).fit().unwrap(),
+        ] {
+            prop_assert!(distance(fit.coefficients(), long.coefficients()) < tol::FIT_WELL);
+        }
+    }
+
+    /// Other units of rate and value scale the coefficients; powers of two do
+    /// so without rounding. Volts scale p_ij by s^-j.
+    #[test]
+    fn units_scale_the_coefficients(
+        log in observations(Degree::POLY13, 0.5, 30..150),
+        (r, v, z) in (-20..20_i32, -20..20_i32, -20..20_i32),
+    ) {
+        let [r, v, z] = [r, v, z].map(|n| 2.0_f64.powi(n));
+        let fit = accumulate::<16>(Degree::POLY13, &log.samples).fit().unwrap();
+        let other: Vec<Sample> =
+            log.samples.iter().map(|s| (s.0 * r, s.1 * v, s.2 * z)).collect();
+        let other = accumulate::<16>(Degree::POLY13, &other).fit().unwrap();
+        for (k, (i, j)) in Degree::POLY13.exponents().enumerate() {
+            let back = other.coefficients()[k] * r.powi(i.into()) * v.powi(j.into()) / z;
+            prop_assert_eq!(back, fit.coefficients()[k]);
+        }
+    }
+
+    /// Other zeros of voltage and value describe the same surface.
+    #[test]
+    fn a_shift_moves_the_surface(
+        log in observations(Degree::POLY13, 0.5, 60..150),
+        (by_volts, by_value) in (-5.0..5.0_f64, -100.0..100.0_f64),
+    ) {
+        let fit = accumulate::<16>(Degree::POLY13, &log.samples).fit().unwrap();
+        let moved: Vec<Sample> =
+            log.samples.iter().map(|s| (s.0, s.1 + by_volts, s.2 + by_value)).collect();
+        let moved = accumulate::<16>(Degree::POLY13, &moved).fit().unwrap();
+        for &(rate, volts, _) in &log.samples {
+            let (a, b) = (fit.surface(), moved.surface());
+            let off = a.eval(rate, volts) + by_value - b.eval(rate, volts + by_volts);
+            // Horner in raw volts adds terms up to 10 * 6^3 that cancel.
+            prop_assert!(off.abs() < 1e4 * tol::FIT_WELL, "off by {off:e}");
+            let (h, g) = (fit.leverage(rate, volts), moved.leverage(rate, volts + by_volts));
+            prop_assert!((h - g).abs() < 1e2 * tol::FIT_WELL, "leverage {h} and {g}");
+        }
+        prop_assert!((moved.sse() / fit.sse() - 1.0).abs() < tol::FIT_STATISTICS);
+    }
+
+    #[test]
+    fn a_whole_weight_is_a_repetition(
+        log in observations(Degree::POLY13, 0.5, 30..80),
+        weights in prop::collection::vec(0..4_u8, 80),
+    ) {
+        let mut weighted = SurfaceAccumulator::<f64, 21, 16>::new(Degree::POLY13).unwrap();
+        let mut repeated = weighted.clone();
+        for (&(rate, volts, value), &weight) in log.samples.iter().zip(&weights) {
+            weighted.push_weighted(rate, volts, value, weight.into()).unwrap();
+            (0..weight).for_each(|_| repeated.push(rate, volts, value).unwrap());
+        }
+        prop_assume!(weighted.samples() > 20);
+        let (weighted, repeated) = (weighted.factor(), repeated.factor());
+        prop_assert!((weighted.weight() / repeated.weight() - 1.0).abs() < tol::FIT_WELL);
+        let (a, b) = (weighted.fit().unwrap(), repeated.fit().unwrap());
+        prop_assert!(distance(a.coefficients(), b.coefficients()) < allowed(b.condition()));
+        prop_assert!((a.sse() / b.sse() - 1.0).abs() < tol::FIT_STATISTICS);
+        prop_assert!((a.r_squared().unwrap() - b.r_squared().unwrap()).abs() < tol::FIT_STATISTICS);
+    }
+
+    #[test]
+    fn lower_degrees_from_one_triangle_equal_their_own_pass(
+        log in observations(Degree::new(4, 5).unwrap(), 0.5, 100..200),
+        (rate, volts) in (0..=4_u8, 0..=5_u8),
+    ) {
+        let degree = Degree::new(rate, volts).unwrap();
+        // poly45 has every term up to total degree 5 but rate^5.
+        let all = accumulate::<16>(Degree::new(4, 5).unwrap(), &log.samples).factor();
+        let own = accumulate::<16>(degree, &log.samples).fit().unwrap();
+        let fit = all.fit_degree(degree).unwrap();
+        let off = distance(fit.coefficients(), own.coefficients());
+        prop_assert!(off < allowed(1e2 * own.condition()), "{degree}: off by {off:e}");
+        prop_assert!((fit.sse() / own.sse() - 1.0).abs() < tol::FIT_STATISTICS);
+        prop_assert_eq!(fit.dof(), own.dof());
+    }
+
+    #[test]
+    fn the_triangle_knows_the_error_of_any_surface(
+        log in observations(Degree::POLY13, 0.5, 30..150),
+        other in surfaces(Degree::POLY13),
+    ) {
+        let factor = accumulate::<16>(Degree::POLY13, &log.samples).factor();
+        let sum: f64 = log
+            .samples
+            .iter()
+            .map(|&(rate, volts, value)| (value - other.eval(rate, volts)).powi(2))
+            .sum();
+        let found = factor.residual_of(&other.coefficients()[..7]);
+        prop_assert!((found / sum - 1.0).abs() < tol::FIT_STATISTICS);
+    }
+
+    #[test]
+    fn leverages_sum_to_the_number_of_terms(log in observations(Degree::POLY13, 0.5, 30..100)) {
+        let fit = accumulate::<16>(Degree::POLY13, &log.samples).fit().unwrap();
+        let sum: f64 = log.samples.iter().map(|s| fit.leverage(s.0, s.1)).sum();
+        prop_assert!((sum - 7.0).abs() < tol::FIT_STATISTICS);
+    }
+
+    #[test]
+    fn leaving_a_trial_out_equals_fitting_the_others(
+        log in observations(Degree::POLY13, 0.5, 90..200), trials in 2..5_usize,
+    ) {
+        let parts: Vec<Vec<Sample>> = (0..trials)
+            .map(|t| log.samples.iter().skip(t).step_by(trials).copied().collect())
+            .collect();
+        let factors: Vec<_> =
+            parts.iter().map(|part| accumulate::<16>(Degree::POLY13, part).factor()).collect();
+        let (mut sum, mut count) = (0.0, 0);
+        for held_out in held_out(&factors, Degree::POLY13) {
+            let held_out = held_out.unwrap();
+            let others: Vec<Sample> = (0..trials)
+                .filter(|&t| t != held_out.trial)
+                .flat_map(|t| parts[t].iter().copied())
+                .collect();
+            let surface = accumulate::<16>(Degree::POLY13, &others).fit().unwrap().surface();
+            let sse: f64 = parts[held_out.trial]
+                .iter()
+                .map(|&(rate, volts, value)| (value - surface.eval(rate, volts)).powi(2))
+                .sum();
+            prop_assert!((held_out.sse / sse - 1.0).abs() < tol::FIT_STATISTICS);
+            sum += sse;
+            count += parts[held_out.trial].len();
+        }
+        let pooled = cross_validate(&factors, Degree::POLY13).unwrap();
+        prop_assert_eq!(pooled.samples, count as u64);
+        prop_assert!((pooled.rmse / (sum / count as f64).sqrt() - 1.0).abs() < tol::FIT_STATISTICS);
+    }
+
+    /// Any bits whatever: an `Err` or finite numbers.
+    #[test]
+    fn any_input_gives_finite_numbers_or_an_error(
+        samples in prop::collection::vec(
+            (any::<f64>(), any::<f64>(), any::<f64>(), any::<f64>()), 0..60),
+        exponent in -320..320_i32,
+        degree in degrees(),
+    ) {
+        let scale = 10.0_f64.powi(exponent);
+        let mut wild = SurfaceAccumulator::<f64, 21, 8>::new(degree).unwrap();
+        let mut tame = wild.clone();
+        for (k, &(rate, volts, value, weight)) in samples.iter().enumerate() {
+            let _ = wild.push(rate, volts, value);
+            let _ = wild.push_weighted(rate, volts, value, weight.abs());
+            let unit = |x: f64| if x.is_finite() && x != 0.0 { x.log2() % 1.0 } else { 0.5 };
+            let _ = tame.push(unit(rate.abs()) * scale, k as f64 * scale, unit(value.abs()) / scale);
+        }
+        for sums in [wild, tame] {
+            let fit = match sums.fit() {
+                Ok(fit) => fit,
+                Err(error) => {
+                    prop_assert!(!error.to_string().is_empty());
+                    continue;
+                }
+            };
+            prop_assert!(fit.coefficients().iter().all(|c| c.is_finite()));
+            prop_assert!(fit.sse().is_finite() && fit.condition().is_finite());
+            for statistic in [fit.r_squared(), fit.adjusted_r_squared(), fit.rmse()] {
+                prop_assert!(statistic.is_none_or(f64::is_finite));
+            }
+            if let Some(mut errors) = fit.standard_errors() {
+                prop_assert!(errors.all(f64::is_finite));
+            }
+        }
+    }
+
+    #[test]
+    fn a_line_is_the_degree_of_a_line(log in observations(Degree::POLY13, 0.5, 10..50)) {
+        let mut line = LineAccumulator::new();
+        let mut other = LineAccumulator::new();
+        let mut surface =
+            SurfaceAccumulator::<f64, 2, 16>::new(LineAccumulator::<f64>::DEGREE).unwrap();
+        for (k, &(_, volts, value)) in log.samples.iter().enumerate() {
+            if k % 2 == 0 { &mut line } else { &mut other }.push(volts, value).unwrap();
+            surface.push(0.0, volts, value).unwrap();
+        }
+        line.merge(&other);
+        let (line, surface) = (line.fit().unwrap(), surface.fit().unwrap());
+        let both = [line.intercept(), line.slope()];
+        prop_assert!(distance(&both, surface.coefficients()) < tol::FIT_WELL);
+    }
+}
+
+/// A trial with noise of its own; `k` numbers it.
+fn trial(k: u32, degree: Degree, truth: impl Fn(f64, f64) -> f64) -> Factor<f64, 21> {
+    let mut sums = SurfaceAccumulator::<f64, 21, 32>::new(degree).unwrap();
+    let mut state = u64::from(k) * 2_654_435_761 + 1;
+    let mut uniform = || {
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    for _ in 0..250 {
+        let (rate, volts) = (2.0 * uniform() - 1.0, uniform());
+        let noise = 0.02 * (uniform() + uniform() + uniform() - 1.5);
+        sums.push(rate, volts, truth(rate, volts) + noise).unwrap();
+    }
+    sums.factor()
+}
+
+#[test]
+fn the_order_table_recommends_the_order_of_the_truth() {
+    type Truth = fn(f64, f64) -> f64;
+    let truths: [(Truth, (u8, u8)); 3] = [
+        (|r, v| v + r * v + v * v, (1, 2)),
+        (|r, v| v + r * v * v - v * v * v, (1, 3)),
+        (|r, v| v + r * v * v - v * v * v + 2.0 * v * v * v * v, (1, 4)),
+    ];
+    let covering = OrderTable::<f64>::covering(Degree::POLY13);
+    for (truth, (rate, volts)) in truths {
+        let trials: Vec<_> = (0..8).map(|k| trial(k, covering, truth)).collect();
+        let table = OrderTable::new(&trials, Degree::POLY13).unwrap();
+        assert_eq!(table.recommended(), Degree::new(rate, volts).ok());
+        let terms: Vec<usize> = table.rows().map(|(degree, _)| degree.terms()).collect();
+        assert!(terms.is_sorted() && terms.len() == 5, "{terms:?}");
+    }
+}
+
+#[test]
+fn one_trial_recommends_nothing_but_still_fits() {
+    let covering = OrderTable::<f64>::covering(Degree::POLY13);
+    let table = OrderTable::new(&[trial(1, covering, |_, v| v)], Degree::POLY13).unwrap();
+    assert_eq!(table.recommended(), None);
+    for (degree, row) in table.rows() {
+        let row = row.as_ref().unwrap();
+        assert!(row.r_squared.unwrap() > 0.9, "{degree}");
+        let needed = degree.terms() as u64;
+        assert_eq!(row.cross_validation, Err(FitError::TooFewSamples { needed, got: 0 }));
+    }
+}

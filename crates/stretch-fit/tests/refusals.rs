@@ -1,0 +1,170 @@
+//! What is refused, and what the refusal says.
+
+use stretch_core::Degree;
+use stretch_fit::{
+    FitError, LineAccumulator, Loss, SurfaceAccumulator, cross_validate, robust_fit,
+};
+
+fn poly13() -> SurfaceAccumulator<f64, 7, 16> {
+    SurfaceAccumulator::new(Degree::POLY13).unwrap()
+}
+
+#[test]
+fn the_term_that_the_data_cannot_determine_is_named() {
+    // (rate and volts of sample k) and the first term that depends on those before.
+    type Sample = fn(u32) -> (f64, f64);
+    let cases: [(Sample, (u8, u8), &str); 6] = [
+        (|k| (0.7, f64::from(k) / 50.0), (1, 0), "p10 (rate)"),
+        (|k| (f64::from(k % 7), 1.24), (0, 1), "p01 (volts)"),
+        (|k| (f64::from(k), 0.3 * f64::from(k) - 2.0), (0, 1), "p01 (volts)"),
+        (|k| (f64::from(k % 7), f64::from(k % 2)), (0, 2), "p02 (volts^2)"),
+        (|k| (f64::from(k % 7), 1.24 + 0.001 * f64::from(k % 3)), (0, 3), "p03 (volts^3)"),
+        (
+            |k| (f64::from(k % 2) * f64::from(k % 3), f64::from(k % 3)),
+            (1, 2),
+            "p12 (rate * volts^2)",
+        ),
+    ];
+    for (sample, (rate_power, volts_power), name) in cases {
+        let mut sums = poly13();
+        for k in 0..100 {
+            let (rate, volts) = sample(k);
+            sums.push(rate, volts, f64::from(k * k % 17)).unwrap();
+        }
+        let error = sums.fit().unwrap_err();
+        assert_eq!(error, FitError::RankDeficient { rate_power, volts_power }, "{name}");
+        assert!(error.to_string().contains(name), "{error}");
+    }
+}
+
+#[test]
+fn dependence_is_seen_through_the_rounding_of_a_long_log() {
+    for offset in [0.0, 1.24, 1e3] {
+        let mut f64s = SurfaceAccumulator::<f64, 7, 1>::new(Degree::POLY13).unwrap();
+        let mut f32s = SurfaceAccumulator::<f32, 7, 1>::new(Degree::POLY13).unwrap();
+        for k in 0..200_000_u32 {
+            // Rates in proportion to the volts: p01 follows from p10.
+            let rate = (f64::from(k) * 0.618_033_988_749).fract();
+            f64s.push(rate, offset + 3.0 * rate, 0.5).unwrap();
+            f32s.push(rate as f32, (offset + 3.0 * rate) as f32, 0.5).unwrap();
+        }
+        let expected = FitError::RankDeficient { rate_power: 0, volts_power: 1 };
+        assert_eq!(f64s.fit().unwrap_err(), expected);
+        // In f32 an offset of 1e3 leaves volts with an error of 3e-5 of their own.
+        if offset < 1e3 {
+            assert_eq!(f32s.fit().unwrap_err(), expected);
+        }
+    }
+}
+
+#[test]
+fn too_few_samples() {
+    let mut sums = poly13();
+    for k in 0..6 {
+        sums.push(f64::from(k % 2), f64::from(k), 1.0).unwrap();
+    }
+    let error = sums.fit().unwrap_err();
+    assert_eq!(error, FitError::TooFewSamples { needed: 7, got: 6 });
+    assert_eq!(error.to_string(), "7 samples are needed, but there are 6");
+    assert_eq!(poly13().fit().unwrap_err(), FitError::TooFewSamples { needed: 7, got: 0 });
+}
+
+#[test]
+fn as_many_samples_as_terms_leave_no_degree_of_freedom() {
+    let mut line = LineAccumulator::new();
+    line.push(0.0, 1.0).unwrap();
+    line.push(1.0, 3.0).unwrap();
+    let fit = line.fit().unwrap();
+    assert_eq!((fit.slope(), fit.fit().dof(), fit.fit().rmse()), (2.0, 0, None));
+    assert!(fit.fit().standard_errors().is_none() && fit.fit().adjusted_r_squared().is_none());
+    let error = fit.confidence(0.95).unwrap_err();
+    assert_eq!(error, FitError::TooFewSamples { needed: 3, got: 2 });
+}
+
+#[test]
+fn numbers_that_are_not_finite_or_overflow_are_not_added() {
+    let mut sums = poly13();
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX] {
+        for (field, sample) in
+            [("rate", [bad, 0.0, 0.0]), ("volts", [0.0, bad, 0.0]), ("value", [0.0, 0.0, bad])]
+        {
+            let [rate, volts, value] = sample;
+            for error in [
+                sums.push(rate, volts, value).unwrap_err(),
+                sums.push_weighted(rate, volts, value, 1.0).unwrap_err(),
+            ] {
+                let named = matches!(error, FitError::OutOfRange { field: f, .. } if f == field);
+                assert!(named, "{error:?} should name {field}");
+                assert!(error.to_string().starts_with(field), "{error}");
+            }
+        }
+    }
+    for bad in [f64::NAN, f64::INFINITY, -1.0, f64::MAX] {
+        let error = sums.push_weighted(0.0, 0.0, 0.0, bad).unwrap_err();
+        assert!(matches!(error, FitError::OutOfRange { field: "weight", .. }), "{error:?}");
+    }
+    assert_eq!(sums, poly13());
+}
+
+#[test]
+fn a_sample_without_weight_is_not_counted() {
+    let mut sums = poly13();
+    sums.push_weighted(1.0, 1.0, 1.0, 0.0).unwrap();
+    assert_eq!(sums, poly13());
+}
+
+#[test]
+fn degrees_must_have_room_and_agree() {
+    let room = SurfaceAccumulator::<f64, 7, 8>::new(Degree::new(2, 3).unwrap()).unwrap_err();
+    assert_eq!(room, FitError::TooManyTerms { terms: 9, room: 7 });
+    let mut sums = SurfaceAccumulator::<f64, 7, 8>::new(Degree::POLY13).unwrap();
+    let other = SurfaceAccumulator::new(Degree::new(1, 2).unwrap()).unwrap();
+    let missing = FitError::MissingTerm { rate_power: 0, volts_power: 3 };
+    assert_eq!(sums.merge(&other).unwrap_err(), missing);
+    assert_eq!(other.factor().fit_degree(Degree::POLY13).unwrap_err(), missing);
+}
+
+#[test]
+fn levels_lie_between_0_and_1() {
+    let mut line = LineAccumulator::new();
+    (0..9).for_each(|k| line.push(f64::from(k), f64::from(k * k)).unwrap());
+    let fit = line.fit().unwrap();
+    for level in [0.0, 1.0, -0.5, 95.0, f64::NAN] {
+        assert!(matches!(fit.confidence(level), Err(FitError::Level { .. })), "{level}");
+    }
+    assert!(fit.confidence(0.95).is_ok());
+}
+
+#[test]
+fn equal_values_have_no_r_squared() {
+    let mut line = LineAccumulator::new();
+    (0..9).for_each(|k| line.push(f64::from(k), 0.0).unwrap());
+    let fit = line.fit().unwrap();
+    assert_eq!(fit.fit().r_squared(), None);
+    assert_eq!(fit.fit().adjusted_r_squared(), None);
+    assert_eq!(fit.fit().rmse(), Some(0.0));
+}
+
+#[test]
+fn robust_fits_need_memory_and_a_degree_of_freedom() {
+    let samples = |n: u32| move || (0..n).map(|k| (0.0, f64::from(k), f64::from(k % 3)));
+    let line = LineAccumulator::<f64>::DEGREE;
+    let mut memory = [0.0; 9];
+    let short = robust_fit::<f64, 2, _>(line, Loss::Bisquare, samples(10), &mut memory);
+    assert_eq!(short.unwrap_err(), FitError::ShortMemory { needed: 10, got: 9 });
+    let few = robust_fit::<f64, 2, _>(line, Loss::Bisquare, samples(2), &mut memory);
+    assert_eq!(few.unwrap_err(), FitError::TooFewSamples { needed: 3, got: 2 });
+}
+
+#[test]
+fn cross_validation_needs_two_trials() {
+    let none: [stretch_fit::Factor<f64, 7>; 0] = [];
+    let needed = FitError::TooFewSamples { needed: 7, got: 0 };
+    assert_eq!(cross_validate(&none, Degree::POLY13).unwrap_err(), needed);
+    let mut sums = poly13();
+    for k in 0..50 {
+        sums.push(f64::from(k % 5), f64::from(k % 7), f64::from(k % 11)).unwrap();
+    }
+    assert_eq!(cross_validate(&[sums.factor()], Degree::POLY13).unwrap_err(), needed);
+    assert!(cross_validate(&[sums.factor(), sums.factor()], Degree::POLY13).is_ok());
+}

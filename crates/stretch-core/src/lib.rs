@@ -4,6 +4,7 @@
 mod calibration;
 mod degree;
 mod error;
+pub mod fixed;
 mod label;
 mod model;
 mod provenance;

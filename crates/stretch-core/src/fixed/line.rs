@@ -1,0 +1,62 @@
+//! A straight line in fixed point.
+
+use super::{accumulate, check_horner, from_f64};
+use crate::DesignError;
+
+/// A line over an input in -1/2..1/2, for any `i32`: `intercept + slope v`.
+///
+/// `v = volts / 2^32`; coefficients and result are in units of the output's
+/// least bit, which the caller chooses.
+///
+/// ```
+/// use stretch_core::fixed::FixedLine;
+/// let line = FixedLine::new(1000.0, 4000.0)?;
+/// assert_eq!(line.eval(1 << 30), 2000); // 1000 + 4000 / 4
+/// assert_eq!(line.eval(i32::MIN), -1000);
+/// # Ok::<(), stretch_core::DesignError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "(i32, i32)", into = "(i32, i32)"))]
+pub struct FixedLine {
+    intercept: i32,
+    slope: i32,
+}
+
+impl FixedLine {
+    /// The largest error of [`eval`](Self::eval) against the same line in real
+    /// numbers, in least bits: two rounded coefficients and one rounded product.
+    pub const ROUNDING: f64 = 0.5 + 0.25 + 0.5;
+
+    /// The line with these coefficients, rounded.
+    ///
+    /// # Errors
+    /// [`DesignError::OutOfRange`] when some `i32` input would leave 32 bits.
+    pub fn new(intercept: f64, slope: f64) -> Result<Self, DesignError> {
+        check_horner("fixed.line", &[intercept, slope])?;
+        Ok(Self {
+            intercept: from_f64("fixed.line", intercept, 0)?,
+            slope: from_f64("fixed.line", slope, 0)?,
+        })
+    }
+
+    /// The line at `volts / 2^32`, in least bits.
+    #[inline(always)]
+    #[must_use]
+    pub fn eval(&self, volts: i32) -> i32 {
+        accumulate(self.intercept, self.slope, volts)
+    }
+}
+
+impl TryFrom<(i32, i32)> for FixedLine {
+    type Error = DesignError;
+    fn try_from((intercept, slope): (i32, i32)) -> Result<Self, DesignError> {
+        Self::new(intercept.into(), slope.into())
+    }
+}
+
+impl From<FixedLine> for (i32, i32) {
+    fn from(line: FixedLine) -> Self {
+        (line.intercept, line.slope)
+    }
+}

@@ -1,1 +1,21 @@
 #![doc = include_str!("../README.md")]
+
+mod apply;
+mod calibrate;
+mod choose;
+mod error;
+mod evaluate;
+mod fitting;
+mod options;
+mod record;
+mod series;
+mod split;
+
+pub use apply::{Applied, Faults, LiveReceptor, apply, rate_delay_s};
+pub use calibrate::{Calibrated, calibrate};
+pub use choose::{Candidate, rank_signals};
+pub use error::CalibrateError;
+pub use evaluate::{Comparison, Evaluation, MethodErrors, TrialErrors, evaluate};
+pub use fitting::{Coefficient, FitReport, Order};
+pub use options::{ModelKind, Options, Robust, SpellingError, SplitBy, parse_rate};
+pub use record::{read_calibration, write_calibration};

@@ -1,0 +1,153 @@
+//! A calibration applied to time-stamped samples, live or from a file.
+
+use stretch_core::{Calibration, Design, RateEstimator, Runner, Seconds, Stage, Volts};
+use stretch_data::Trial;
+use stretch_filter::{Arrival, Cadence, RateFilter};
+use stretch_receptor::{MAX_BRIDGED, Reading, StretchReceptor, Withheld};
+
+use crate::{
+    CalibrateError,
+    series::{column, rates_at_use},
+};
+
+/// An interval off by more than this share of a period is counted as jitter.
+const JITTER_TOLERANCE: f64 = 0.2;
+
+/// A receptor that minds the time stamps: missing ticks are stepped as missing,
+/// and time that runs backwards starts it afresh.
+///
+/// ```
+/// use stretch_calibrate::LiveReceptor;
+/// use stretch_receptor::Withheld;
+/// # let calibration = stretch_receptor::example_calibration();
+/// let mut live = LiveReceptor::new(&calibration)?;
+/// for n in 0..10 {
+///     assert_eq!(live.step(n as f64 * 0.01, 1.5), Err(Withheld::Warming));
+/// }
+/// assert!(live.step(0.10, 1.5).is_ok());
+/// assert!(live.step(0.13, 1.5).is_ok()); // two samples missing: bridged
+/// assert_eq!(live.step(9.0, 1.5), Err(Withheld::Warming)); // a long gap
+/// assert_eq!(live.faults().missing, 2 + 886);
+/// # Ok::<(), stretch_calibrate::CalibrateError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct LiveReceptor {
+    receptor: Runner<StretchReceptor<f64>>,
+    cadence: Runner<Cadence>,
+    faults: Faults,
+}
+
+/// What was wrong with the time stamps of a stream.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Faults {
+    /// Samples that did not come.
+    pub missing: u64,
+    /// Samples early or late by more than a fifth of a period.
+    pub jittered: u64,
+    /// Stamps that repeated or ran backwards.
+    pub backwards: u64,
+}
+
+impl LiveReceptor {
+    /// A receptor for a calibration whose estimator can run live.
+    ///
+    /// # Errors
+    /// [`CalibrateError::Filter`] for the paper's central difference, which
+    /// needs the next sample.
+    pub fn new(calibration: &Calibration) -> Result<Self, CalibrateError> {
+        Ok(Self {
+            receptor: Runner::new(StretchReceptor::new(calibration)?),
+            cadence: Runner::new(Cadence::new(calibration.sample_rate_hz, JITTER_TOLERANCE)?),
+            faults: Faults::default(),
+        })
+    }
+
+    /// Takes the next sample.
+    ///
+    /// # Errors
+    /// [`Withheld`] when there is no reading for it.
+    pub fn step(&mut self, time_s: f64, signal: f64) -> Result<Reading, Withheld> {
+        match self.cadence.step(Seconds(time_s)) {
+            Arrival::Gap { missing } => {
+                self.faults.missing += u64::from(missing);
+                for _ in 0..missing.min(u32::from(MAX_BRIDGED) + 1) {
+                    let _ = self.receptor.step(Volts(f64::NAN));
+                }
+            }
+            Arrival::Backwards { .. } => {
+                self.faults.backwards += 1;
+                self.receptor.reset();
+            }
+            Arrival::Jitter { .. } => self.faults.jittered += 1,
+            _ => {}
+        }
+        self.receptor.step(Volts(signal))
+    }
+
+    /// What was wrong with the time stamps so far.
+    pub fn faults(&self) -> Faults {
+        self.faults
+    }
+}
+
+/// A trial's readings, one a sample, and what was wrong with its time stamps.
+#[derive(Debug, Clone)]
+pub struct Applied {
+    /// One answer a sample.
+    pub readings: Vec<Result<Reading, Withheld>>,
+    /// What was wrong with the time stamps.
+    pub faults: Faults,
+}
+
+/// Applies a calibration to a logged trial, sample by sample, as it would run live.
+///
+/// A calibration that names the paper's central difference is applied as
+/// published: its rates are taken over the whole log, one sample ahead.
+///
+/// # Errors
+/// [`CalibrateError::MissingColumn`] when the trial lacks the signal,
+/// [`CalibrateError::Filter`] when the estimator cannot be designed.
+pub fn apply(calibration: &Calibration, trial: &Trial) -> Result<Applied, CalibrateError> {
+    let signal = column(trial, calibration.signal.as_str())?;
+    if calibration.rate_estimator == RateEstimator::CentralDifference {
+        let rate = calibration.sample_rate_hz;
+        let rates = Logged(rates_at_use(calibration.rate_estimator, rate, signal)?);
+        let mut receptor = Runner::new(StretchReceptor::with_rate(calibration, rates)?);
+        let readings = signal.iter().map(|&v| receptor.step(Volts(v))).collect();
+        return Ok(Applied { readings, faults: Faults::default() });
+    }
+    let mut live = LiveReceptor::new(calibration)?;
+    let readings = trial.time_s.iter().zip(signal).map(|(&t, &v)| live.step(t, v)).collect();
+    Ok(Applied { readings, faults: live.faults() })
+}
+
+/// How late the calibration's rate is, in seconds; zero for the paper's
+/// central difference.
+///
+/// # Errors
+/// [`CalibrateError::Filter`] when the estimator cannot be designed.
+pub fn rate_delay_s(calibration: &Calibration) -> Result<f64, CalibrateError> {
+    match calibration.rate_estimator {
+        RateEstimator::CentralDifference => Ok(0.0),
+        live => Ok(RateFilter::<f64>::new(live, calibration.sample_rate_hz)?.delay_s()),
+    }
+}
+
+/// Rates that were taken over a whole log beforehand.
+struct Logged(Vec<Option<f64>>);
+
+impl Design for Logged {
+    type Memory = usize;
+    fn memory(&self) -> usize {
+        0
+    }
+}
+
+impl Stage<f64> for Logged {
+    type Out = Option<f64>;
+    fn step(&self, next: &mut usize, _: f64) -> Option<f64> {
+        let rate = self.0.get(*next).copied().flatten();
+        *next += 1;
+        rate
+    }
+}

@@ -1,0 +1,102 @@
+//! Why there is no calibration.
+
+use stretch_core::DesignError;
+use stretch_filter::FilterError;
+use stretch_fit::FitError;
+
+/// Why trials could not be calibrated on, or a calibration could not be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CalibrateError {
+    /// No trial at all.
+    #[error("there is no trial to calibrate on; name at least one file")]
+    NoTrials,
+    /// A column is not there.
+    #[error("{trial}: there is no column {column}; the columns are {present}")]
+    MissingColumn {
+        /// The trial.
+        trial: String,
+        /// The column that is needed.
+        column: String,
+        /// Those that are there.
+        present: String,
+    },
+    /// The time stamps give no sample rate.
+    #[error("{trial}: {samples} samples are too few to tell a sample rate from; record more")]
+    TooShort {
+        /// The trial.
+        trial: String,
+        /// How many samples it has.
+        samples: usize,
+    },
+    /// Trials at different rates cannot share an estimator.
+    #[error(
+        "{trial} was sampled at {rate_hz:.4} Hz and {first} at {first_hz:.4} Hz; resample one of them, or calibrate them apart"
+    )]
+    SampleRates {
+        /// The trial.
+        trial: String,
+        /// Its rate.
+        rate_hz: f64,
+        /// The first trial.
+        first: String,
+        /// Its rate.
+        first_hz: f64,
+    },
+    /// A channel that never changes.
+    #[error(
+        "{column} is {value} throughout: a constant has no range to normalise by; check the wiring, or name another column"
+    )]
+    Constant {
+        /// The column.
+        column: String,
+        /// Its value.
+        value: f64,
+    },
+    /// A direction that the trials do not contain.
+    #[error(
+        "the {branch} branch has {samples} samples and the model has {terms} terms; add trials in which the muscle moves that way, or fit --model linear"
+    )]
+    OneBranch {
+        /// The branch that is missing.
+        branch: &'static str,
+        /// How many samples it has.
+        samples: u64,
+        /// How many terms the model has.
+        terms: usize,
+    },
+    /// A fit that the data do not determine.
+    #[error("{branch}: {cause}")]
+    Fit {
+        /// Which fit.
+        branch: &'static str,
+        /// What the fit said.
+        #[source]
+        cause: FitError,
+    },
+    /// An estimator that cannot be designed.
+    #[error("the rate estimator cannot be used: {0}")]
+    Filter(#[from] FilterError),
+    /// A number that is not possible.
+    #[error("the calibration is not possible: {0}")]
+    Design(#[from] DesignError),
+    /// A calibration file that does not load.
+    #[error("{file}: {problem}")]
+    Record {
+        /// The file.
+        file: String,
+        /// What is wrong with it, and where.
+        problem: String,
+    },
+    /// A file that cannot be read or written.
+    #[error(transparent)]
+    Data(#[from] stretch_data::DataError),
+    /// Nothing to compare: every sample was withheld.
+    #[error(
+        "{trial}: no sample has an estimate; it is shorter than the warm-up of the rate estimator"
+    )]
+    NothingEstimated {
+        /// The trial.
+        trial: String,
+    },
+}

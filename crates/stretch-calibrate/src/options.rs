@@ -1,0 +1,196 @@
+//! What a user chooses about a calibration, and how it is spelt.
+
+use std::{fmt, str::FromStr};
+
+use stretch_core::{Degree, DesignError, Normalisation, RateEstimator, RateSource};
+
+/// Which model is fitted.
+///
+/// ```
+/// use stretch_calibrate::ModelKind;
+/// use stretch_core::Degree;
+/// assert_eq!("poly13".parse(), Ok(ModelKind::Surface(Degree::POLY13)));
+/// assert_eq!(ModelKind::Linear.to_string(), "linear");
+/// assert!("poly16".parse::<ModelKind>().unwrap_err().to_string().contains("poly55"));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ModelKind {
+    /// One straight line for both directions.
+    Linear,
+    /// A polynomial surface a branch.
+    Surface(Degree),
+}
+
+/// How residuals are weighed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Robust {
+    /// Least squares.
+    #[default]
+    Off,
+    /// Bisquare weights: gross outliers count nothing.
+    Bisquare,
+    /// Least absolute residuals.
+    Lar,
+}
+
+/// How samples are given to the two branches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SplitBy {
+    /// Sample by sample, by the sign of the rate with the dead band: as at use.
+    #[default]
+    Rate,
+    /// Trial by trial, by the net change of the target: the paper's six
+    /// inflations and six deflations.
+    Trial,
+}
+
+/// A spelling that is not understood, and those that are.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("\"{given}\" is not understood; use {use_instead}")]
+pub struct SpellingError {
+    given: String,
+    use_instead: &'static str,
+}
+
+impl SpellingError {
+    fn new(given: &str, use_instead: &'static str) -> Self {
+        Self { given: given.to_owned(), use_instead }
+    }
+}
+
+const MODELS: &str = "linear, poly13, or polyIJ with degrees up to poly55";
+
+impl FromStr for ModelKind {
+    type Err = SpellingError;
+
+    fn from_str(text: &str) -> Result<Self, SpellingError> {
+        let unknown = || SpellingError::new(text, MODELS);
+        if text == "linear" {
+            return Ok(Self::Linear);
+        }
+        let digits = text.strip_prefix("poly").ok_or_else(unknown)?;
+        let [i, j] = digits.as_bytes() else { return Err(unknown()) };
+        if !(i.is_ascii_digit() && j.is_ascii_digit()) {
+            return Err(unknown());
+        }
+        Degree::new(i - b'0', j - b'0').map(Self::Surface).map_err(|_| unknown())
+    }
+}
+
+impl fmt::Display for ModelKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Linear => f.pad("linear"),
+            Self::Surface(degree) => f.pad(&degree.to_string()),
+        }
+    }
+}
+
+const RATES: &str = "savgol:WINDOW,DEGREE[,DELAY] in samples, difference:CUTOFF_HZ, \
+                     tracker:INDEX, or central (a log only)";
+
+/// A rate estimator from its spelling: `savgol:11,2`, `savgol:11,2,5`,
+/// `difference:8`, `tracker:0.1`, `central`.
+///
+/// # Errors
+/// [`SpellingError`] with the spellings that are understood.
+///
+/// ```
+/// use stretch_calibrate::parse_rate;
+/// use stretch_core::RateEstimator;
+/// assert_eq!(parse_rate("savgol:11,2"), Ok(RateEstimator::SAVGOL_11_2));
+/// assert!(parse_rate("savgol:2,5").is_err()); // a quintic through two points
+/// ```
+pub fn parse_rate(text: &str) -> Result<RateEstimator, SpellingError> {
+    let unknown = || SpellingError::new(text, RATES);
+    let number = |text: &str| text.parse::<f64>().map_err(|_| unknown());
+    let estimator = match text.split_once(':') {
+        None if text == "central" => RateEstimator::CentralDifference,
+        Some(("savgol", shape)) => {
+            let parts: Vec<&str> = shape.split(',').collect();
+            let count =
+                |i: usize| parts.get(i).unwrap_or(&"0").parse::<u16>().map_err(|_| unknown());
+            if !(2..=3).contains(&parts.len()) {
+                return Err(unknown());
+            }
+            let degree = u8::try_from(count(1)?).map_err(|_| unknown())?;
+            RateEstimator::SavitzkyGolay { window: count(0)?, degree, delay: count(2)? }
+        }
+        Some(("difference", hz)) => RateEstimator::Differentiator { cutoff_hz: number(hz)? },
+        Some(("tracker", index)) => RateEstimator::Tracker { tracking_index: number(index)? },
+        _ => return Err(unknown()),
+    };
+    estimator.validate().map_err(|_: DesignError| unknown())
+}
+
+/// How a calibration is made. [`Options::default`] is the crate's own choice;
+/// [`Options::paper`] is the paper's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// Column of the signal.
+    pub signal: String,
+    /// Column of the reference.
+    pub reference: String,
+    /// What is fitted.
+    pub model: ModelKind,
+    /// How signal, target and rates are normalised.
+    pub normalisation: Normalisation,
+    /// The estimator of the signal's rate, at use.
+    pub rate: RateEstimator,
+    /// The rate that the surfaces are fitted on.
+    pub rate_source: RateSource,
+    /// How samples are given to the branches.
+    pub split: SplitBy,
+    /// How residuals are weighed.
+    pub robust: Robust,
+    /// The signal's zero in [`Normalisation::Range`]; 1.24 V for `bridge_v`
+    /// and 0 for any other column when not given.
+    pub signal_zero: Option<f64>,
+    /// Resting length: the target is then the contraction. When not given, a
+    /// reference whose name begins with `length` rests at its greatest value,
+    /// and any other is the target itself.
+    pub rest_length: Option<f64>,
+    /// Dead band of the branch decision in signal units per second; three
+    /// standard deviations of the rate's noise when not given.
+    pub dead_band: Option<f64>,
+    /// Free text for the record: when it was made.
+    pub date: String,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            signal: "bridge_v".into(),
+            reference: "length_mm".into(),
+            model: ModelKind::Surface(Degree::POLY13),
+            normalisation: Normalisation::Range,
+            rate: RateEstimator::SAVGOL_11_2,
+            rate_source: RateSource::Voltage,
+            split: SplitBy::Rate,
+            robust: Robust::Off,
+            signal_zero: None,
+            rest_length: None,
+            dead_band: None,
+            date: String::new(),
+        }
+    }
+}
+
+impl Options {
+    /// The method as published (paper section 2.5): central differences of the
+    /// strain at calibration, of the voltage at use, a surface for the inflation
+    /// trials and one for the deflation trials, no dead band.
+    pub fn paper() -> Self {
+        Self {
+            rate: RateEstimator::CentralDifference,
+            rate_source: RateSource::Strain,
+            split: SplitBy::Trial,
+            dead_band: Some(0.0),
+            ..Self::default()
+        }
+    }
+
+    pub(crate) fn zero(&self) -> f64 {
+        self.signal_zero.unwrap_or(if self.signal == "bridge_v" { 1.24 } else { 0.0 })
+    }
+}

@@ -1,0 +1,180 @@
+//! A trial made ready to fit: even in time, with the rates that a fit may use.
+
+use stretch_core::{Design, Polarity, RateEstimator, SampleRate, Seconds, Stage, Target};
+use stretch_data::Trial;
+use stretch_filter::{
+    RateFilter, SgFilter, SgShape,
+    log::{Between, Grid, central_difference, resample},
+};
+
+use crate::CalibrateError;
+
+/// Intervals beyond this many periods cut a log in two.
+const GAP_PERIODS: f64 = 5.5;
+
+/// An interval off by more than this share of a period makes a log uneven.
+const EVEN_TOLERANCE: f64 = 0.2;
+
+/// A stretch of a trial without gaps, on an even grid.
+#[derive(Debug, Clone)]
+pub(crate) struct Series {
+    pub trial: usize,
+    pub signal: Vec<f64>,
+    pub target: Vec<f64>,
+    /// Of the signal, signed by polarity, by the estimator that runs at use.
+    pub signal_rate: Vec<Option<f64>>,
+    /// Of the target, by central differences or the centred form of the estimator.
+    pub target_rate: Vec<f64>,
+}
+
+/// The median sample rate of a trial, in hertz.
+pub(crate) fn sample_rate_hz(trial: &Trial) -> Result<f64, CalibrateError> {
+    let mut steps: Vec<f64> = trial.time_s.windows(2).map(|w| w[1] - w[0]).collect();
+    if steps.is_empty() {
+        let (trial, samples) = (trial.name.clone(), trial.len());
+        return Err(CalibrateError::TooShort { trial, samples });
+    }
+    let middle = steps.len() / 2;
+    let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+    let hz = 1.0 / *median;
+    // time stamps are printed to the millisecond: 100.0000001 Hz is 100 Hz
+    let whole = hz.round();
+    Ok(if (hz - whole).abs() < 1e-3 * hz && whole > 0.0 { whole } else { hz })
+}
+
+/// The column of a trial, or an error that names those there are.
+pub(crate) fn column<'a>(trial: &'a Trial, name: &str) -> Result<&'a [f64], CalibrateError> {
+    trial.channel(name).ok_or_else(|| CalibrateError::MissingColumn {
+        trial: trial.name.clone(),
+        column: name.to_owned(),
+        present: trial.channels.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", "),
+    })
+}
+
+/// A trial's signal and reference on an even grid, cut at gaps; and what had to be done.
+pub(crate) struct Even {
+    pub pieces: Vec<(Vec<f64>, Vec<f64>)>,
+    pub note: Option<String>,
+}
+
+/// Brings a trial onto an even grid at `rate`.
+pub(crate) fn even(
+    trial: &Trial,
+    signal: &[f64],
+    reference: &[f64],
+    rate: SampleRate,
+) -> Result<Even, CalibrateError> {
+    let periods = |w: &[f64]| (w[1] - w[0]) * rate.hz();
+    let uneven =
+        trial.time_s.windows(2).filter(|w| (periods(w) - 1.0).abs() > EVEN_TOLERANCE).count();
+    if uneven == 0 {
+        return Ok(Even { pieces: vec![(signal.to_vec(), reference.to_vec())], note: None });
+    }
+    let mut cuts = vec![0];
+    cuts.extend(
+        trial
+            .time_s
+            .windows(2)
+            .enumerate()
+            .filter(|(_, w)| periods(w) > GAP_PERIODS)
+            .map(|(i, _)| i + 1),
+    );
+    let gaps = cuts.len() - 1;
+    cuts.push(trial.len());
+    let mut pieces = Vec::new();
+    for cut in cuts.windows(2) {
+        let span = cut[0]..cut[1];
+        let times = &trial.time_s[span.clone()];
+        if times.len() < 2 {
+            continue;
+        }
+        let grid = Grid { start: Seconds(times[0]), sample_rate: rate };
+        let points = grid.points_until(Seconds(times[times.len() - 1]));
+        let on_grid = |values: &[f64]| {
+            let mut out = vec![0.0; points];
+            resample(times, values, grid, Between::Linear, &mut out).map(|()| out)
+        };
+        pieces.push((on_grid(&signal[span.clone()])?, on_grid(&reference[span])?));
+    }
+    let note = format!(
+        "{}: {uneven} uneven time stamps and {gaps} gaps; resampled to {} Hz by straight lines between samples",
+        trial.name,
+        rate.hz()
+    );
+    Ok(Even { pieces, note: Some(note) })
+}
+
+/// Standard deviation of a record's noise from its second differences, robust
+/// to motion: `1.4826 median|x[i-1] - 2 x[i] + x[i+1]| / sqrt(6)`.
+pub(crate) fn noise(records: &[&[f64]]) -> f64 {
+    let mut bends: Vec<f64> = records
+        .iter()
+        .flat_map(|x| x.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()))
+        .collect();
+    if bends.is_empty() {
+        return 0.0;
+    }
+    let middle = bends.len() / 2;
+    let (_, median, _) = bends.select_nth_unstable_by(middle, f64::total_cmp);
+    1.4826 * *median / 6f64.sqrt()
+}
+
+/// The rates of a log by the estimator that runs at use: live, or the paper's
+/// central difference over the whole log.
+pub(crate) fn rates_at_use(
+    estimator: RateEstimator,
+    rate: SampleRate,
+    signal: &[f64],
+) -> Result<Vec<Option<f64>>, CalibrateError> {
+    if estimator == RateEstimator::CentralDifference {
+        let mut out = vec![0.0; signal.len()];
+        central_difference(rate, signal, &mut out)?;
+        return Ok(out.into_iter().map(Some).collect());
+    }
+    let filter = RateFilter::<f64>::new(estimator, rate)?;
+    let mut memory = filter.memory();
+    Ok(signal.iter().map(|&x| filter.step(&mut memory, x)).collect())
+}
+
+/// The rates of the reference's target, looking ahead: the centred form of a
+/// Savitzky-Golay estimator, or central differences.
+fn target_rates(
+    estimator: RateEstimator,
+    rate: SampleRate,
+    target: &[f64],
+) -> Result<Vec<f64>, CalibrateError> {
+    let mut out = vec![0.0; target.len()];
+    match estimator {
+        RateEstimator::SavitzkyGolay { window, degree, .. } if target.len() >= window.into() => {
+            let shape = SgShape::centred_rate(window.into(), degree.into());
+            SgFilter::<f64>::new(shape, rate)?.over_log(target, &mut out)?;
+        }
+        _ => central_difference(rate, target, &mut out)?,
+    }
+    Ok(out)
+}
+
+/// Whether the signal rises with the target: the sign of their covariance.
+pub(crate) fn polarity(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> Polarity {
+    let count = pairs.clone().count().max(1) as f64;
+    let (x, y) = pairs.clone().fold((0.0, 0.0), |(x, y), (a, b)| (x + a / count, y + b / count));
+    let covariance: f64 = pairs.map(|(a, b)| (a - x) * (b - y)).sum();
+    if covariance < 0.0 { Polarity::Falling } else { Polarity::Rising }
+}
+
+/// Everything a fit needs of one even piece of a trial.
+pub(crate) fn series(
+    trial: usize,
+    piece: (Vec<f64>, Vec<f64>),
+    target: Target,
+    polarity: Polarity,
+    estimator: RateEstimator,
+    rate: SampleRate,
+) -> Result<Series, CalibrateError> {
+    let (signal, reference) = piece;
+    let target: Vec<f64> = reference.iter().map(|&x| target.from_reference(x)).collect();
+    let signed = |r: Option<f64>| r.map(|r| polarity.sign() * r);
+    let signal_rate = rates_at_use(estimator, rate, &signal)?.into_iter().map(signed).collect();
+    let target_rate = target_rates(estimator, rate, &target)?;
+    Ok(Series { trial, signal, target, signal_rate, target_rate })
+}

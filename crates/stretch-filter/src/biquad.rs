@@ -24,7 +24,7 @@ pub struct BiquadSpec {
 /// A stable second-order section in transposed direct form II.
 ///
 /// ```text
-/// y = b0 x + s1;   s1 = b1 x - a1 y + s2;   s2 = b2 x - a2 y
+/// y = b0 x + s1;   s1 = s2 + b1 x - a1 y;   s2 = b2 x - a2 y
 /// ```
 ///
 /// The coefficients never change; what does change is the [`BiquadMemory`]. A
@@ -130,7 +130,8 @@ impl<T: Real> Biquad<T> {
     #[inline(always)]
     pub(crate) fn pass(&self, memory: &mut BiquadMemory<T>, x: T) -> T {
         let y = self.b0 * x + memory.s1;
-        memory.s1 = self.b1 * x - self.a1 * y + memory.s2;
+        // What does not wait for y is added first: the chain from y to y stays short.
+        memory.s1 = (memory.s2 + self.b1 * x) - self.a1 * y;
         memory.s2 = self.b2 * x - self.a2 * y;
         y
     }

@@ -215,6 +215,17 @@ proptest! {
     }
 
     #[test]
+    fn cutoffs_above_the_stated_limit_are_built(part in -7.4..-0.31_f64) {
+        let low = spec(HZ * 10_f64.powf(part));
+        prop_assert!(low.design::<f64, 8>().is_ok());
+        prop_assert!(Differentiator::<f64>::new(low).is_ok());
+        if low.cutoff.0 >= HZ / 1500.0 {
+            prop_assert!(low.design::<f32, 8>().is_ok());
+            prop_assert!(Differentiator::<f32>::new(low).is_ok());
+        }
+    }
+
+    #[test]
     fn any_record_is_built_or_refused(
         window in any::<u16>(), degree in any::<u8>(), delay in any::<u16>(),
         number in any::<f64>(), hz in 1e-12..1e12,

@@ -1,0 +1,249 @@
+//! Causal Savitzky-Golay rate in integers, at a cost that the window does not change.
+
+use core::marker::PhantomData;
+
+use crate::fixed_taps::{FixedTaps, MAX_FIXED_SG_DEGREE, MOMENTS, choose};
+use stretch_core::{Design, Stage};
+
+mod sealed {
+    pub trait Sample: Copy + Default + core::fmt::Debug + PartialEq {
+        type Sum: Copy + Default + core::fmt::Debug + PartialEq;
+        /// The largest magnitude, and what a constant offset of the samples adds to it.
+        const LARGEST: i128;
+        const LARGEST_SUM: i128;
+        fn widen(self) -> Self::Sum;
+        /// `sum + other - choose old`, wrapping.
+        fn slide(sum: Self::Sum, other: Self::Sum, choose: i32, old: Self) -> Self::Sum;
+        /// `total + weight sum`, wrapping.
+        fn weigh(total: i64, weight: i32, sum: Self::Sum) -> i64;
+    }
+
+    impl Sample for u16 {
+        type Sum = i32;
+        const LARGEST: i128 = u16::MAX as i128;
+        const LARGEST_SUM: i128 = i32::MAX as i128;
+        #[inline(always)]
+        fn widen(self) -> i32 {
+            self.into()
+        }
+        #[inline(always)]
+        fn slide(sum: i32, other: i32, choose: i32, old: u16) -> i32 {
+            sum.wrapping_add(other).wrapping_sub(choose.wrapping_mul(old.into()))
+        }
+        #[inline(always)]
+        fn weigh(total: i64, weight: i32, sum: i32) -> i64 {
+            total.wrapping_add(i64::from(weight) * i64::from(sum))
+        }
+    }
+
+    impl Sample for i32 {
+        type Sum = i64;
+        const LARGEST: i128 = 1 << 31;
+        const LARGEST_SUM: i128 = i64::MAX as i128;
+        #[inline(always)]
+        fn widen(self) -> i64 {
+            self.into()
+        }
+        #[inline(always)]
+        fn slide(sum: i64, other: i64, choose: i32, old: i32) -> i64 {
+            sum.wrapping_add(other).wrapping_sub(i64::from(choose) * i64::from(old))
+        }
+        #[inline(always)]
+        fn weigh(total: i64, weight: i32, sum: i64) -> i64 {
+            total.wrapping_add(sum.wrapping_mul(weight.into()))
+        }
+    }
+}
+
+/// An integer sample: `u16` (a converter's code, sums in 32 bits) or `i32`
+/// (sums in 64 bits).
+pub trait FixedSample: sealed::Sample {}
+impl FixedSample for u16 {}
+impl FixedSample for i32 {}
+
+/// Rate of an integer signal by a causal Savitzky-Golay fit of `DEGREE` 1 to 3
+/// through the newest `WINDOW` samples, evaluated `DELAY` samples before the newest.
+///
+/// The same filter as [`SgRate`](crate::SgRate), with two differences: its taps
+/// are exact fractions of integers, so that nothing is rounded where the result
+/// fits 32 bits; and the window is not summed anew for each sample. Its
+/// moments are moved on,
+///
+/// ```text
+/// B_0 <- B_0 + x[now] - x[now-n],    B_k <- B_k + B_(k-1) - C(n, k) x[now-n]
+/// y = (T_0 B_0 + ... + T_d B_d) >> SHIFT
+/// ```
+///
+/// which costs the same for any window. In integers that is safe: a sliding sum
+/// of floats collects rounding errors, a sum of integers has none.
+///
+/// The output is an integer of which [`PER_SAMPLE`](Self::PER_SAMPLE) makes a
+/// change a sample; it fits 32 bits for every possible input, which is checked
+/// when the shape is compiled. It is `None` until the window is full.
+///
+/// ```
+/// use stretch_core::Runner;
+/// use stretch_filter::FixedSgRate;
+///
+/// type Rate = FixedSgRate<u16, 11, 2>;
+/// let mut rate = Runner::new(Rate::new());
+/// let last = (0..20u16).filter_map(|n| rate.step(1000 + n * n)).last().unwrap();
+/// assert_eq!(last, 38 * 4290); // exact on a parabola: (n^2)' = 2 n, over 4290
+/// assert_eq!(f64::from(last) * Rate::PER_SAMPLE, 38.0);
+/// ```
+///
+/// A shape that does not fit does not compile:
+/// ```compile_fail
+/// use stretch_core::Runner;
+/// use stretch_filter::FixedSgRate;
+/// let _ = Runner::new(FixedSgRate::<u16, 64, 3>::new()); // moments of 16 bits leave 32
+/// ```
+///
+/// Source: Savitzky and Golay 1964, doi:10.1021/ac60214a047; moments instead of
+/// taps: Hogenauer's integrators and combs, doi:10.1109/TASSP.1981.1163535.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FixedSgRate<S, const WINDOW: usize, const DEGREE: usize, const DELAY: usize = 0>(
+    PhantomData<S>,
+);
+
+/// What a [`FixedSgRate`] remembers: the window and its moments.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FixedSgMemory<S: FixedSample, const WINDOW: usize> {
+    sums: [S::Sum; MOMENTS],
+    /// Where the oldest sample lies.
+    oldest: usize,
+    remaining: usize,
+    ring: [S; WINDOW],
+}
+
+impl<S: FixedSample, const WINDOW: usize> FixedSgMemory<S, WINDOW> {
+    /// How many further samples give `None` before the window is full.
+    #[inline]
+    pub fn remaining(&self) -> usize {
+        self.remaining
+    }
+
+    /// The newest sample; zero before the first.
+    pub fn newest(&self) -> S {
+        let at = self.oldest.checked_sub(1).unwrap_or(WINDOW - 1);
+        self.ring.get(at).copied().unwrap_or_default()
+    }
+}
+
+impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
+    FixedSgRate<S, WINDOW, DEGREE, DELAY>
+{
+    const TAPS: FixedTaps = {
+        assert!(DEGREE >= 1 && DEGREE <= MAX_FIXED_SG_DEGREE, "DEGREE must be 1 ..= 3");
+        assert!(WINDOW > DEGREE, "WINDOW must exceed DEGREE: too few samples for the polynomial");
+        assert!(DELAY < WINDOW, "DELAY must lie inside the window");
+        let taps = FixedTaps::of(WINDOW, DEGREE, DELAY);
+        // sum of C(j, DEGREE) over the window: the largest moment
+        assert!(
+            choose(WINDOW, DEGREE + 1) * S::LARGEST <= S::LARGEST_SUM,
+            "WINDOW is too long: a moment of the window would not fit"
+        );
+        assert!(taps.total * S::LARGEST < 1 << 62, "the weighted sum would not fit");
+        taps
+    };
+
+    /// How many low bits of the weighted sum are rounded away: none for the
+    /// shapes in common use on 16-bit samples.
+    pub const SHIFT: u32 = {
+        let mut shift = 0;
+        while (Self::TAPS.total * S::LARGEST) >> shift >= i32::MAX as i128 {
+            shift += 1;
+        }
+        shift
+    };
+
+    /// Change of the signal a sample, per unit of the output.
+    pub const PER_SAMPLE: f64 = (1i64 << Self::SHIFT) as f64 / Self::TAPS.denominator as f64;
+
+    /// The largest magnitude that the output can have, whatever the samples are.
+    pub const LARGEST: i32 = ((Self::TAPS.total * S::LARGEST) >> Self::SHIFT) as i32 + 1;
+
+    /// The filter; all its numbers belong to its type.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self(PhantomData)
+    }
+
+    /// A memory that has seen `x` forever: no warm-up and no transient.
+    #[must_use]
+    pub fn settled_at(&self, x: S) -> FixedSgMemory<S, WINDOW> {
+        let mut memory = self.memory();
+        while memory.remaining > 0 {
+            let _ = self.step(&mut memory, x);
+        }
+        let _ = self.step(&mut memory, x);
+        memory
+    }
+
+    /// The output for the window as it stands.
+    #[inline(always)]
+    fn output(memory: &FixedSgMemory<S, WINDOW>) -> i32 {
+        let half = if Self::SHIFT == 0 { 0 } else { 1 << (Self::SHIFT.max(1) - 1) };
+        let mut total = half;
+        for k in 0..=DEGREE {
+            total = S::weigh(total, Self::TAPS.weights[k], memory.sums[k]);
+        }
+        (total >> Self::SHIFT) as i32
+    }
+
+    /// The output of the last step, without a new sample; `None` in the warm-up.
+    #[inline]
+    pub fn last(&self, memory: &FixedSgMemory<S, WINDOW>) -> Option<i32> {
+        (memory.remaining == 0).then(|| Self::output(memory))
+    }
+}
+
+impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usize> Design
+    for FixedSgRate<S, WINDOW, DEGREE, DELAY>
+{
+    type Memory = FixedSgMemory<S, WINDOW>;
+
+    fn memory(&self) -> FixedSgMemory<S, WINDOW> {
+        FixedSgMemory {
+            sums: Default::default(),
+            oldest: 0,
+            remaining: WINDOW,
+            ring: [S::default(); WINDOW],
+        }
+    }
+}
+
+impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usize> Stage<S>
+    for FixedSgRate<S, WINDOW, DEGREE, DELAY>
+{
+    type Out = Option<i32>;
+
+    #[inline(always)]
+    fn step(&self, memory: &mut FixedSgMemory<S, WINDOW>, x: S) -> Option<i32> {
+        // also what shows the compiler that the index is inside
+        let at = if memory.oldest < WINDOW { memory.oldest } else { 0 };
+        let old = core::mem::replace(&mut memory.ring[at], x);
+        memory.oldest = at + 1;
+        for k in (1..=DEGREE).rev() {
+            let choose = const { binomials(WINDOW) }[k];
+            memory.sums[k] = S::slide(memory.sums[k], memory.sums[k - 1], choose, old);
+        }
+        memory.sums[0] = S::slide(memory.sums[0], x.widen(), 1, old);
+        if memory.remaining > 1 {
+            memory.remaining -= 1;
+            return None;
+        }
+        memory.remaining = 0;
+        Some(Self::output(memory))
+    }
+}
+
+/// C(n, k) for every moment; wraps where no admitted shape reads it.
+const fn binomials(n: usize) -> [i32; MOMENTS] {
+    let (mut all, mut k) = ([0; MOMENTS], 0);
+    while k < MOMENTS {
+        all[k] = choose(n, k) as i32;
+        k += 1;
+    }
+    all
+}

@@ -141,25 +141,42 @@ fn choose(
         CaseKind::Compound => {
             // Each visible on its own, and neither drowned by the other.
             let first = tuned(Cause::draw(lead, dice), 1.0, most.max(1.0), yardstick, dice);
-            let low = (0.2 * first.1).max(0.5);
-            let high = 5.0 * first.1.max(1.0);
-            let other = Cause::draw(partner(&[lead], dice), dice);
-            vec![first, tuned(other, low, high, yardstick, dice)]
+            let range = ((0.2 * first.1).max(0.5), 5.0 * first.1.max(1.0));
+            let other = companion(&[lead], range, yardstick, dice);
+            vec![first, other]
         }
         CaseKind::Dominant => {
             let first = tuned(Cause::draw(lead, dice), 8.0, most.max(8.0), yardstick, dice);
+            let range = (0.02 * first.1, 0.12 * first.1);
             let mut kinds = vec![lead];
             let mut chosen = vec![first];
             while chosen.len() < 4 {
-                let kind = partner(&kinds, dice);
-                kinds.push(kind);
-                let cause = Cause::draw(kind, dice);
-                let (low, high) = (0.02 * first.1, 0.12 * first.1);
-                chosen.push(tuned(cause, low, high, yardstick, dice));
+                let small = companion(&kinds, range, yardstick, dice);
+                kinds.push(small.0.kind);
+                chosen.push(small);
             }
             chosen
         }
     }
+}
+
+/// A further cause of another kind whose excess lies in `range`, to a factor of 1.5.
+fn companion(
+    taken: &[Kind],
+    range: (f64, f64),
+    yardstick: &mut Yardstick<'_>,
+    dice: &mut Dice,
+) -> (Cause, f64) {
+    let mut last = None;
+    for _ in 0..12 {
+        let cause = Cause::draw(partner(taken, dice), dice);
+        let found = tuned(cause, range.0, range.1, yardstick, dice);
+        if found.1 >= range.0 / 1.5 && found.1 <= range.1 * 1.5 {
+            return found;
+        }
+        last = Some(found);
+    }
+    last.unwrap_or_else(|| (Cause::draw(partner(taken, dice), dice), 0.0))
 }
 
 /// A kind of the catalogue that is not among those taken.
@@ -208,9 +225,70 @@ fn tuned(
         guess -= 0.5 * (found.max(1e-9) / target).ln();
     }
     if (best.1 / target).ln().abs() > 0.9 {
+        let faintest = measure(spec.least);
+        if faintest >= target {
+            return (cause.at(spec.least), faintest);
+        }
         // The excess jumps over the target (a threshold): any strength beyond the jump will do.
         let strength = dice.log_between(strong.exp(), cause.most());
         return (cause.at(strength), measure(strength));
     }
     best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::truth::TWINS;
+
+    #[test]
+    fn strengths_span_the_range_wanted_for_every_effect() {
+        let scripts = session(&mut Dice::new(2, 1));
+        let mut dice = Dice::new(2, 2);
+        let rig = Rig::draw(&mut dice);
+        let conditions = Conditions::draw(&scripts, &mut dice);
+        let mut yardstick = Yardstick::new(&rig, &scripts, &conditions, true);
+        for &kind in Kind::catalogued().iter().filter(|&&k| k != Kind::ValveDeadband) {
+            for (low, high) in [(0.05, 0.06), (5.0, 6.0)] {
+                let cause = Cause::draw(kind, &mut dice);
+                let (tuned, excess) = tuned(cause, low, high, &mut yardstick, &mut dice);
+                assert!(tuned.strength <= tuned.most());
+                let name = kind.spec().name;
+                // A factor of two, or the end of the range.
+                let reached = excess > 0.5 * low && excess < 2.0 * high;
+                let ended = tuned.strength == tuned.most() && excess < high;
+                assert!(reached || ended, "{name}: {excess} for {low} .. {high}");
+            }
+        }
+    }
+
+    #[test]
+    fn compounds_hold_two_visible_effects_and_dominants_one_strong() {
+        let plan = Plan::of(100);
+        for (kind, count) in [(CaseKind::Compound, 2), (CaseKind::Dominant, 4)] {
+            let order = Order { kind, lead: Some(Kind::MainsHum), pressure_column: true };
+            let case = Case::make(3, 5, &plan, order).expect("a case");
+            let label = &case.label;
+            assert_eq!(label.effects.len(), count);
+            assert_eq!(label.acting.len(), count);
+            let alone: Vec<f64> = label.acting.iter().map(|a| a.excess).collect();
+            if kind == CaseKind::Compound {
+                assert!(alone.iter().all(|&x| x > 0.3), "{alone:?}");
+            } else {
+                assert_eq!(label.dominant.as_deref(), Some("mains_hum"));
+                assert!(alone[1..].iter().all(|&x| x < 0.2 * alone[0]), "{alone:?}");
+            }
+            assert!(case.recordings.iter().all(|r| r.pressure_kpa.is_some()));
+        }
+    }
+
+    #[test]
+    fn twins_are_of_the_catalogue() {
+        for (a, b) in TWINS {
+            for name in [a, b] {
+                let kind = Kind::named(name).expect("a known effect");
+                assert!(Kind::catalogued().contains(&kind), "{name}");
+            }
+        }
+    }
 }

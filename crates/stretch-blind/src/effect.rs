@@ -61,12 +61,12 @@ macro_rules! causes {
 causes! {
     SupplySag "supply_sag" Pneumatics ["regulator_orifice", "progressive"] 1e4 .. 4e8, 0.0;
     ValveDelay "valve_delay" Pneumatics ["dead_time_and_lag", "opening_and_closing_differ", "valves_differ"] 1e-4 .. 0.12, 0.0;
-    ValveDeadband "valve_deadband" Pneumatics ["shifted", "smooth_onset"] 1e-4 .. 0.11, 0.0;
+    ValveDeadband "valve_deadband" Pneumatics ["shifted", "gradual"] 1e-4 .. 0.11, 0.0;
     Leak "leak" Pneumatics ["iso_orifice", "laminar_gap"] 1e-14 .. 2e-10, 0.0;
     ChamberVolume "chamber_volume" Pneumatics ["quadratic", "sine"] 1e-3 .. 3.0, 0.0;
     MuscleHysteresis "muscle_hysteresis" Muscle ["dahl", "bouc_wen", "maxwell_slip"] 2e-4 .. 0.6, 0.0;
     MuscleCreep "muscle_creep" Muscle ["two_time_constants", "power_law"] 1e-4 .. 0.3, 0.0;
-    CrossbeamInertia "crossbeam_inertia" Muscle ["quadratic_damping", "direction_damping"] 4e-3 .. 0.08, 0.0;
+    CrossbeamInertia "crossbeam_inertia" Muscle ["quadratic_damping", "direction_damping"] 2e-3 .. 0.08, 0.0;
     SleeveSlack "sleeve_slack" Sensing ["hard", "wide_knee"] 2e-4 .. 0.12, 0.0;
     SleeveSlip "sleeve_slip" Sensing ["dahl", "bouc_wen", "maxwell_slip"] 1e-5 .. 0.03, 0.0;
     PressureCrosstalk "pressure_crosstalk" Sensing ["saturating", "progressive"] 1e-5 .. 0.05, 1.0;
@@ -76,7 +76,7 @@ causes! {
     GaugeNonlinearity "gauge_nonlinearity" Sensing ["sine", "skewed_cubic"] 1e-5 .. 0.1, 1.0;
     ThermalDrift "thermal_drift" Sensing ["settling", "power_law"] 1e-8 .. 4e-4, 1.0;
     SelfHeating "self_heating" Sensing ["two_time_constants", "square_root"] 1e-5 .. 0.05, 1.0;
-    AmplifierSaturation "amplifier_saturation" Sensing ["hard_top", "smooth_top", "hard_bottom"] 2e-3 .. 0.8, 0.0;
+    AmplifierSaturation "amplifier_saturation" Sensing ["hard_top", "smooth_top", "hard_bottom"] 1e-4 .. 0.8, 0.0;
     AmplifierLowpass "amplifier_lowpass" Sensing ["two_poles", "pole_and_dead_time"] 1e-4 .. 0.4, 0.0;
     MainsHum "mains_hum" Sensing ["wandering_50", "wandering_60"] 1e-4 .. 0.1, 0.0;
     ChannelSkew "channel_skew" Sensing ["clock_rate", "wandering"] 1e-4 .. 0.2, 0.5;

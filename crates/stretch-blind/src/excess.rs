@@ -177,11 +177,10 @@ impl<'a> Yardstick<'a> {
                 }
             }
         }
-        for i in 0..n {
-            normal[i][i] += 1.0;
-            for j in 0..i {
-                normal[j][i] = normal[i][j];
-            }
+        let lower = normal.clone();
+        for (i, row) in normal.iter_mut().enumerate() {
+            row[i] += 1.0;
+            row.iter_mut().enumerate().skip(i + 1).for_each(|(j, x)| *x = lower[j][i]);
         }
         bounded(&normal, &right, 3.0)
     }

@@ -207,10 +207,13 @@ impl<'a> Gauge<'a> {
             return x;
         }
         poles[0] += (v - poles[0]) * (1.0 - (-h / (0.85 * c.strength)).exp());
-        let wait = ((0.15 * c.strength / h).round() as usize).max(1);
         self.late.push(poles[0]);
-        let at = self.late.len().saturating_sub(wait + 1);
-        self.late[at]
+        // The value of 0.15 tau ago, interpolated; the first one before that.
+        let last = self.late.len() - 1;
+        let at = (last as f64 - 0.15 * c.strength / h).max(0.0);
+        let low = at as usize;
+        let (early, next) = (self.late[low], self.late[(low + 1).min(last)]);
+        early + (next - early) * (at - low as f64)
     }
 }
 

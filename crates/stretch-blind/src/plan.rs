@@ -84,7 +84,11 @@ impl Plan {
             for i in 0..count {
                 let lead = (!pool.is_empty()).then(|| pool[i % pool.len()]);
                 let turn = if pool.is_empty() { i } else { i / pool.len() + i % pool.len() };
-                orders.push(Order { kind, lead, pressure_column: (turn + first) % 2 == 0 });
+                orders.push(Order {
+                    kind,
+                    lead,
+                    pressure_column: (turn + first).is_multiple_of(2),
+                });
             }
         }
         dice.shuffle(&mut orders);

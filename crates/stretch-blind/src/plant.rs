@@ -113,8 +113,8 @@ impl<'a> Plant<'a> {
             let band = c.strength * if side == 0 { 1.0 } else { 0.8 + 0.4 * c.aux[0] };
             u = match c.form {
                 0 => (u - band).max(0.0),
-                _ if u <= 0.6 * band => 0.0,
-                _ => at_onset(u, band),
+                // A spool that lifts gradually: the slowest ramp still passes.
+                _ => u - band * (1.0 - (-u / band).exp()),
             };
         }
         if u <= 0.0 { 0.0 } else { self.rig.u_min() + (1.0 - self.rig.u_min()) * u }
@@ -325,9 +325,4 @@ impl<'a> Plant<'a> {
         let decay = (-h / tau).exp();
         self.shadow = last - slope * tau + (self.shadow - first + slope * tau) * decay;
     }
-}
-
-/// Passed opening of a dead band with a parabolic onset; from 1.4 bands on it is `u - band`.
-fn at_onset(u: f64, band: f64) -> f64 {
-    crate::memory::at_least(u - band, 0.0, 0.4 * band)
 }

@@ -207,3 +207,104 @@ impl<S: Fn(f64) -> f64> Bench<'_, S> {
         volts
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::{Cause, KINDS, Stage};
+    use crate::protocol::session;
+
+    fn short_session() -> Vec<Script> {
+        let mut scripts = session(&mut Dice::new(8, 1));
+        // One fast inflation, one fast deflation, 20 s of pulses.
+        scripts = vec![scripts[5].clone(), scripts[11].clone(), scripts[13].clone()];
+        scripts[2].openings.truncate(2000);
+        for (i, script) in scripts.iter_mut().enumerate() {
+            script.start_s = 40.0 * i as f64;
+        }
+        scripts
+    }
+
+    fn changed(a: &[Trace], b: &[Trace], channel: fn(&Trace) -> &Vec<f64>) -> f64 {
+        let pairs = a.iter().zip(b).flat_map(|(a, b)| channel(a).iter().zip(channel(b)));
+        pairs.map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn every_form_acts_in_its_own_stage_and_no_earlier() {
+        let scripts = short_session();
+        let mut dice = Dice::new(8, 2);
+        let rig = Rig::nominal();
+        let conditions = Conditions::draw(&scripts, &mut dice);
+        let nominal = run(&rig, &Causes::default(), &scripts, &conditions, COARSE);
+        for &kind in KINDS {
+            for form in 0..kind.spec().forms.len() {
+                let mut cause = Cause::draw(kind, &mut dice);
+                cause.form = form;
+                let causes = Causes::new(&[cause.at(0.5 * cause.most())]);
+                let acting = run(&rig, &causes, &scripts, &conditions, COARSE);
+                let p = changed(&nominal, &acting, |t| &t.pressure);
+                let l = changed(&nominal, &acting, |t| &t.length);
+                let v = changed(&nominal, &acting, |t| &t.volts);
+                let label =
+                    format!("{} {}: {p} {l} {v}", kind.spec().name, kind.spec().forms[form]);
+                assert!(p.is_finite() && l.is_finite() && v.is_finite(), "{label}");
+                match kind.spec().stage {
+                    Stage::Pneumatics => assert!(p > 100.0, "{label}"),
+                    Stage::Muscle => assert!(p == 0.0 && l > 0.05, "{label}"),
+                    Stage::Sensing => assert!(p == 0.0 && l == 0.0 && v > 0.002, "{label}"),
+                    Stage::Reference => assert!(p == 0.0 && v == 0.0 && l > 0.05, "{label}"),
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_finer_step_changes_nothing_that_shows() {
+        let scripts = short_session();
+        let rig = Rig::nominal();
+        let conditions = Conditions::draw(&scripts, &mut Dice::new(8, 3));
+        let fine = run(&rig, &Causes::default(), &scripts, &conditions, FINE);
+        let finer = run(&rig, &Causes::default(), &scripts, &conditions, 2 * FINE);
+        // 1e-4 of full scale: 62 Pa, 5 um, 0.33 mV.
+        assert!(changed(&fine, &finer, |t| &t.pressure) < 62.0);
+        assert!(changed(&fine, &finer, |t| &t.length) < 5e-3);
+        assert!(changed(&fine, &finer, |t| &t.volts) < 3.3e-4);
+    }
+
+    #[test]
+    fn the_nominal_rig_behaves_as_its_data_sheet_says() {
+        let scripts = short_session();
+        let rig = Rig::nominal();
+        let conditions = Conditions { supply: vec![0.0; 4000], start_error: vec![0.0; 3] };
+        let traces = run(&rig, &Causes::default(), &scripts, &conditions, FINE);
+        let inflation = &traces[0];
+        let end = inflation.length.len() - 1;
+        assert_eq!(inflation.pressure[0], 0.0);
+        assert!((inflation.pressure[end] - 620e3).abs() < 100.0);
+        // Contraction 1.0176 x 0.162 of 180 mm.
+        assert!((inflation.length[end] - 180.0 * (1.0 - 1.0176 * 0.162)).abs() < 0.01);
+        // Choked filling: R T / V0 times C rho0 p1, 28.8 kPa in 10 ms.
+        let expected = 84_148.7 / 25e-6 * 1e-9 * 1.185 * 721_325.0 * 0.01;
+        assert!((inflation.pressure[101] - expected).abs() < 50.0, "{}", inflation.pressure[101]);
+        // Trimmed: no bridge voltage at rest.
+        assert!((inflation.volts[0] - 1.24).abs() < 1e-9);
+        assert!(traces[1].pressure[0] > 619e3 && traces[1].pressure[end] < 1.0);
+        assert!(traces.iter().all(|t| t.least_strain > crate::rig::LEAST_STRAIN));
+    }
+
+    #[test]
+    fn memories_are_wound_before_a_trial_begins() {
+        let scripts = short_session();
+        let rig = Rig::nominal();
+        let conditions = Conditions::draw(&scripts, &mut Dice::new(8, 4));
+        let mut cause = Cause::draw(crate::effect::Kind::SleeveSlip, &mut Dice::new(8, 5));
+        cause.form = 0;
+        let causes = Causes::new(&[cause.at(0.01)]);
+        let traces = run(&rig, &causes, &scripts, &conditions, COARSE);
+        // Vented before the first trial: the slack of 0.01 strain is on the side of relaxing.
+        let offset = traces[0].volts[0] - rig.nominal_volts(0.0);
+        let slope = (rig.nominal_volts(0.01) - rig.nominal_volts(0.0)) / 0.01 / (1.0 + rig.e0());
+        assert!((offset / (0.01 * slope) - 1.0).abs() < 0.2, "{offset}");
+    }
+}

@@ -1,0 +1,94 @@
+//! A score as text: the table of figures, then every miss.
+
+use std::fmt;
+
+use crate::rate::Rate;
+use crate::score::Score;
+
+fn row(f: &mut fmt::Formatter<'_>, what: &str, rate: &Rate) -> fmt::Result {
+    match (rate.share(), rate.wilson()) {
+        (Some(share), Some((low, high))) => {
+            let Rate { hits, cases } = rate;
+            writeln!(f, "| {what} | {share:.3} | {hits} of {cases} | {low:.3} .. {high:.3} |")
+        }
+        _ => writeln!(f, "| {what} | - | no case | |"),
+    }
+}
+
+fn number(f: &mut fmt::Formatter<'_>, what: &str, value: Option<f64>) -> fmt::Result {
+    match value {
+        Some(value) => writeln!(f, "| {what} | {value:.3} | | |"),
+        None => writeln!(f, "| {what} | - | no case | |"),
+    }
+}
+
+impl fmt::Display for Score {
+    /// A Markdown table of every figure with Wilson's intervals, then the misses.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let s = &self.singles;
+        writeln!(f, "| figure | value | count | 95 % interval |\n| --- | --- | --- | --- |")?;
+        row(f, "top-1 at excess >= 0.1", &s.top1)?;
+        row(f, "top-1 above 10", &s.top1_above_10)?;
+        row(f, "top-1 from 1 to 10", &s.top1_1_to_10)?;
+        row(f, "top-1 from 0.1 to 1", &s.top1_below_1)?;
+        row(f, "top-1, twins pooled", &s.top1_twins)?;
+        row(f, "exactly the one effect named", &s.exact)?;
+        row(f, "stage", &s.stage)?;
+        row(f, "95 % set covers (sets not empty)", &s.set_covers)?;
+        row(f, "95 % set covers (empty = miss)", &s.set_covers_all)?;
+        number(f, "mean size of the 95 % set", s.set_size)?;
+        row(f, "sets of one right", &s.singletons_right)?;
+        row(f, "false unknowns", &s.false_unknown)?;
+        row(f, "overlooked", &s.overlooked)?;
+        row(f, "fainter than 0.1 and named: right", &s.faint_named)?;
+        row(f, "false alarms on nulls", &self.false_alarms)?;
+        row(f, "false names on nulls", &self.false_names)?;
+        number(f, "expected calibration error", self.calibration.ece)?;
+        row(f, "compounds: both named", &self.compounds.all_named)?;
+        row(f, "compounds: one named", &self.compounds.one_named)?;
+        row(f, "compounds: precision", &self.compounds.precision)?;
+        row(f, "compounds: recall", &self.compounds.recall)?;
+        row(f, "dominant named", &self.dominants.strongest_named)?;
+        row(f, "dominant and small: precision", &self.dominants.precision)?;
+        row(f, "dominant and small: recall", &self.dominants.recall)?;
+        row(f, "out of the catalogue: unknown", &self.foreign_caught)?;
+        row(f, "out of the catalogue: stage", &self.foreign_stage)?;
+        row(f, "struck out: unknown or twin", &self.struck.unknown_or_twin)?;
+        row(f, "struck out, no twin: unknown", &self.struck.unknown_no_twin)?;
+        row(f, "struck out, nothing closes 85 %: unknown", &self.struck.unknown_no_stand_in)?;
+        row(f, "struck out: wrong name", &self.struck.wrong_name)?;
+        number(f, "median closed gap, named rightly", self.closed)?;
+        number(f, "median closed gap, all singles", self.closed_all)?;
+        number(f, "median closed gap beside the oracle", self.closed_beside_oracle)?;
+        number(f, "median closed gap of the oracle", self.closed_oracle)?;
+        if let Some((median, p95, most)) = self.runtime_s {
+            writeln!(
+                f,
+                "| time, s: median, 95th percentile, greatest | {median:.2} | {p95:.2} | {most:.2} |"
+            )?;
+        }
+        if let Some((low, high)) = self.false_alarms.exact() {
+            writeln!(f, "\nFalse alarms, exact 95 % interval: {low:.4} .. {high:.4}.")?;
+        }
+        if !self.unanswered.is_empty() {
+            writeln!(f, "\nUnanswered: {}.", self.unanswered.join(", "))?;
+        }
+        writeln!(f, "\n{} wrong of {}:\n", self.misses.len(), self.cases)?;
+        for miss in &self.misses {
+            let truth =
+                if miss.truth.is_empty() { "nothing".into() } else { miss.truth.join(" + ") };
+            let named = if miss.named.is_empty() { "-".into() } else { miss.named.join(" + ") };
+            writeln!(
+                f,
+                "- {} ({}, excess {:.2}{}): {truth}; said {}: {named}{}",
+                miss.case,
+                miss.kind.name(),
+                miss.excess,
+                if miss.pressure_column { "" } else { ", no pressure" },
+                miss.verdict,
+                if miss.in_set && !miss.truth.is_empty() { "; truth in the 95 % set" } else { "" },
+            )?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,126 @@
+//! What a diagnosis said of a case, as far as it is scored.
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::effect::Kind;
+use crate::error::BlindError;
+
+/// A diagnosis of one case.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// Name of the case: `case-000`.
+    pub case: String,
+    /// `no_gap`, `parameters`, `effect` or `unknown`.
+    pub verdict: String,
+    /// Effects named, the most important first.
+    pub named: Vec<String>,
+    /// Effects in the 95 % set.
+    pub ambiguous: Vec<String>,
+    /// Candidates with their probabilities, the best first.
+    pub candidates: Vec<(Vec<String>, f64)>,
+    /// Stage that the gap was placed in.
+    pub stage: Option<String>,
+    /// Excess of the re-tuned nominal on the test trials, summed over channels.
+    pub gap_before: f64,
+    /// Excess with the effects named.
+    pub gap_after: f64,
+    /// Closed-gap fraction of the effects named.
+    pub closed: f64,
+    /// Closed-gap fraction of a fit that knows the label, where one was made.
+    pub closed_oracle: Option<f64>,
+    /// Seconds the diagnosis took.
+    pub runtime_s: f64,
+}
+
+impl Verdict {
+    /// Reads a `diagnosis.json`, schema 1, of a case.
+    ///
+    /// The stage is that of the first effect named if the catalogue knows it, else the one with
+    /// the greatest share of the gap. The gaps are those of the candidate named, else of the
+    /// first. `closed_oracle` is left empty.
+    ///
+    /// # Errors
+    /// [`BlindError::BadVerdict`] when the verdict, the names, or a probability are missing or
+    /// out of range.
+    pub fn from_diagnosis(case: &str, diagnosis: &Value) -> Result<Self, BlindError> {
+        let bad = |reason| BlindError::BadVerdict { case: case.to_owned(), reason };
+        let names = |value: &Value| -> Option<Vec<String>> {
+            value.as_array()?.iter().map(|v| v.as_str().map(str::to_owned)).collect()
+        };
+        let verdict = diagnosis["verdict"].as_str().ok_or_else(|| bad("no verdict"))?.to_owned();
+        if !["no_gap", "parameters", "effect", "unknown"].contains(&verdict.as_str()) {
+            return Err(bad("a verdict that the schema does not have"));
+        }
+        let named = names(&diagnosis["named"]).ok_or_else(|| bad("no list of effects named"))?;
+        if verdict == "effect" && named.is_empty() {
+            return Err(bad("an effect without a name"));
+        }
+        let ambiguous =
+            names(&diagnosis["ambiguous"]).ok_or_else(|| bad("no list of the 95 % set"))?;
+        let none = Vec::new();
+        let listed = diagnosis["candidates"].as_array().unwrap_or(&none);
+        let mut candidates = Vec::with_capacity(listed.len());
+        for candidate in listed {
+            let effects =
+                names(&candidate["effects"]).ok_or_else(|| bad("a nameless candidate"))?;
+            let probability =
+                candidate["probability"].as_f64().ok_or_else(|| bad("no probability"))?;
+            if !(0.0..=1.0 + 1e-9).contains(&probability) {
+                return Err(bad("a probability outside 0..1"));
+            }
+            candidates.push((effects, probability));
+        }
+        let chosen = candidates.iter().position(|c| c.0 == named).unwrap_or(0);
+        let number = |field: &str| listed.get(chosen).and_then(|c| c[field].as_f64());
+        let shares = diagnosis["where"]["stages"].as_array().unwrap_or(&none);
+        let share = |s: &&Value| s["share"].as_f64().unwrap_or(0.0);
+        let placed = shares.iter().max_by(|a, b| share(a).total_cmp(&share(b)));
+        let placed = placed.and_then(|s| s["stage"].as_str()).map(str::to_owned);
+        let known = named.first().filter(|_| verdict == "effect").and_then(|n| Kind::named(n));
+        Ok(Self {
+            case: case.to_owned(),
+            verdict,
+            named,
+            ambiguous,
+            candidates,
+            stage: known.map(|kind| kind.spec().stage.name().to_owned()).or(placed),
+            gap_before: number("gap_before").unwrap_or(0.0),
+            gap_after: number("gap_after").unwrap_or(0.0),
+            closed: number("closed").unwrap_or(0.0),
+            closed_oracle: None,
+            runtime_s: diagnosis["runtime_s"].as_f64().unwrap_or(0.0),
+        })
+    }
+
+    /// The effects it commits to: those named, and only if the verdict is `effect`.
+    #[must_use]
+    pub fn answer(&self) -> &[String] {
+        if self.verdict == "effect" { &self.named } else { &[] }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_diagnosis_is_read_and_nonsense_refused() {
+        let text = r#"{ "schema": 1, "verdict": "effect", "named": ["leak"],
+            "ambiguous": ["leak", "supply_sag"],
+            "candidates": [ { "effects": ["leak"], "probability": 0.8, "gap_before": 41.0,
+                              "gap_after": 1.4, "closed": 0.96 } ],
+            "where": { "stages": [ { "stage": "sensing", "share": 0.9 } ] }, "runtime_s": 3.1 }"#;
+        let mut value: Value = serde_json::from_str(text).expect("JSON");
+        let verdict = Verdict::from_diagnosis("case-001", &value).expect("a verdict");
+        assert_eq!(verdict.stage.as_deref(), Some("pneumatics"));
+        assert_eq!((verdict.gap_before, verdict.closed), (41.0, 0.96));
+        value["verdict"] = "unknown".into();
+        let unknown = Verdict::from_diagnosis("case-001", &value).expect("a verdict");
+        assert_eq!(unknown.stage.as_deref(), Some("sensing"));
+        assert!(unknown.answer().is_empty());
+        value["candidates"][0]["probability"] = 1.4.into();
+        assert!(Verdict::from_diagnosis("case-001", &value).is_err());
+        assert!(Verdict::from_diagnosis("case-001", &Value::Null).is_err());
+    }
+}

@@ -1,0 +1,169 @@
+//! Hand-made labels and verdicts, every figure computed by hand.
+
+use std::collections::BTreeMap;
+
+use stretch_blind::{BlindError, CaseKind, Label, Rate, Score, Stage, Truth, Verdict};
+
+fn label(kind: CaseKind, effects: &[(&str, Stage)], excess: f64) -> Label {
+    let first = effects.first().map(|e| e.0.to_owned());
+    Label {
+        kind,
+        effects: effects.iter().map(|e| e.0.to_owned()).collect(),
+        stages: effects.iter().map(|e| e.1).collect(),
+        pressure_column: true,
+        excess,
+        struck: first.clone().filter(|_| kind == CaseKind::Struck),
+        dominant: first.filter(|_| kind == CaseKind::Dominant),
+        acting: Vec::new(),
+        parameters: BTreeMap::new(),
+    }
+}
+
+fn verdict(case: &str, verdict: &str, named: &[&str], set: &[&str], p: f64) -> Verdict {
+    let own = |list: &[&str]| list.iter().map(|s| (*s).to_owned()).collect::<Vec<_>>();
+    Verdict {
+        case: case.into(),
+        verdict: verdict.into(),
+        named: own(named),
+        ambiguous: own(set),
+        candidates: vec![(own(named), p)],
+        stage: Some("sensing".into()),
+        gap_before: 10.0,
+        gap_after: 1.0,
+        closed: 0.9,
+        closed_oracle: Some(0.95),
+        runtime_s: 2.0,
+    }
+}
+
+fn truth(labels: &[(&str, Label)]) -> Truth {
+    let cases = labels.iter().map(|(case, label)| ((*case).to_owned(), label.clone())).collect();
+    Truth { schema: 1, seed: None, cases }
+}
+
+fn rate(hits: usize, cases: usize) -> Rate {
+    Rate { hits, cases }
+}
+
+#[test]
+fn singles_are_scored_by_strength_and_twins_pooled() {
+    let slip = ("sleeve_slip", Stage::Sensing);
+    let hum = ("mains_hum", Stage::Sensing);
+    let single = |effect, excess| label(CaseKind::Single, &[effect], excess);
+    let truth = truth(&[
+        ("a", single(slip, 20.0)),
+        ("b", single(slip, 2.0)),
+        ("c", single(hum, 0.5)),
+        ("d", single(hum, 0.05)),
+        ("e", single(("leak", Stage::Pneumatics), 5.0)),
+    ]);
+    let verdicts = [
+        verdict("a", "effect", &["sleeve_slip"], &["sleeve_slip"], 0.97),
+        verdict("b", "effect", &["gauge_hysteresis"], &["gauge_hysteresis", "sleeve_slip"], 0.6),
+        verdict("c", "no_gap", &[], &[], 0.0),
+        verdict("d", "no_gap", &[], &[], 0.0),
+        verdict("e", "unknown", &["leak"], &["leak"], 0.5),
+    ];
+    let score = Score::of(&truth, &verdicts).expect("matching cases");
+    let s = &score.singles;
+    assert_eq!(s.top1, rate(1, 4));
+    assert_eq!(s.top1_above_10, rate(1, 1));
+    assert_eq!(s.top1_1_to_10, rate(0, 2));
+    assert_eq!(s.top1_below_1, rate(0, 1));
+    assert_eq!(s.top1_twins, rate(2, 4));
+    // The leak was placed in sensing, the overlooked hum nowhere.
+    assert_eq!(s.stage, rate(2, 4));
+    assert_eq!(s.set_covers, rate(3, 3));
+    assert_eq!(s.set_covers_all, rate(3, 4));
+    assert!((s.set_size.expect("sets") - 4.0 / 3.0).abs() < 1e-12);
+    assert_eq!(s.false_unknown, rate(1, 4));
+    assert_eq!(s.overlooked, rate(1, 4));
+    assert_eq!(score.confusion["sleeve_slip"]["gauge_hysteresis"], 1);
+    assert_eq!(score.confusion["mains_hum"]["no_gap"], 1);
+    assert_eq!(score.by_effect["sleeve_slip"], rate(1, 2));
+    // The faint case is no miss.
+    let missed: Vec<&str> = score.misses.iter().map(|m| m.case.as_str()).collect();
+    assert_eq!(missed, ["b", "c", "e"]);
+    // |0.97 - 1|, |0.6 - 0|, |0 - 0|, |0.5 - 1| over four cases.
+    let ece = score.calibration.ece.expect("candidates");
+    assert!((ece - (0.03 + 0.6 + 0.0 + 0.5) / 4.0).abs() < 1e-12, "{ece}");
+    assert_eq!((score.closed, score.closed_oracle), (Some(0.9), Some(0.95)));
+    assert_eq!(score.runtime_s, Some((2.0, 2.0, 2.0)));
+    let text = score.to_string();
+    assert!(text.contains("| top-1 at excess >= 0.1 | 0.250 | 1 of 4 |"), "{text}");
+    assert!(text.contains("- b (single, excess 2.00): sleeve_slip; said effect: gauge_hysteresis"));
+}
+
+#[test]
+fn nulls_foreign_and_struck_cases_have_their_own_right_answers() {
+    let slip = ("sleeve_slip", Stage::Sensing);
+    let droop = ("coil_droop", Stage::Sensing);
+    let truth = truth(&[
+        ("n1", label(CaseKind::Null, &[], 0.0)),
+        ("n2", label(CaseKind::Null, &[], 0.0)),
+        ("n3", label(CaseKind::Null, &[], 0.0)),
+        ("o1", label(CaseKind::OutOfCatalogue, &[droop], 3.0)),
+        ("o2", label(CaseKind::OutOfCatalogue, &[droop], 3.0)),
+        ("s1", label(CaseKind::Struck, &[slip], 3.0)),
+        ("s2", label(CaseKind::Struck, &[("mains_hum", Stage::Sensing)], 3.0)),
+        ("s3", label(CaseKind::Struck, &[("mains_hum", Stage::Sensing)], 3.0)),
+        ("z", label(CaseKind::Null, &[], 0.0)),
+    ]);
+    let verdicts = [
+        verdict("n1", "no_gap", &[], &[], 0.0),
+        verdict("n2", "parameters", &[], &[], 0.0),
+        verdict("n3", "effect", &["thermal_drift"], &["thermal_drift"], 0.9),
+        verdict("o1", "unknown", &[], &[], 0.3),
+        verdict("o2", "effect", &["leak"], &["leak"], 0.9),
+        verdict("s1", "effect", &["gauge_hysteresis"], &["gauge_hysteresis"], 0.9),
+        Verdict { closed: 0.4, ..verdict("s2", "unknown", &[], &[], 0.4) },
+        Verdict { closed: 0.4, ..verdict("s3", "effect", &["leak"], &["leak"], 0.4) },
+    ];
+    let score = Score::of(&truth, &verdicts).expect("matching cases");
+    assert_eq!(score.false_alarms, rate(1, 3));
+    assert_eq!(score.foreign_caught, rate(1, 2));
+    assert_eq!(score.foreign_by_effect["coil_droop"], rate(1, 2));
+    assert_eq!(score.foreign_stage, rate(2, 2));
+    assert_eq!(score.struck.unknown_or_twin, rate(2, 3));
+    assert_eq!(score.struck.unknown_no_twin, rate(1, 2));
+    assert_eq!(score.struck.unknown_no_stand_in, rate(1, 2));
+    assert_eq!(score.struck.wrong_name, rate(1, 3));
+    assert_eq!(score.unanswered, ["z"]);
+    let missed: Vec<&str> = score.misses.iter().map(|m| m.case.as_str()).collect();
+    assert_eq!(missed, ["n3", "o2", "s3"]);
+}
+
+#[test]
+fn several_effects_are_scored_by_precision_and_recall() {
+    let (leak, hum) = (("leak", Stage::Pneumatics), ("mains_hum", Stage::Sensing));
+    let truth = truth(&[
+        ("a", label(CaseKind::Compound, &[leak, hum], 9.0)),
+        ("b", label(CaseKind::Compound, &[hum, leak], 9.0)),
+        ("c", label(CaseKind::Dominant, &[hum, leak], 9.0)),
+    ]);
+    let verdicts = [
+        verdict("a", "effect", &["mains_hum", "leak"], &["mains_hum", "leak"], 0.9),
+        verdict("b", "effect", &["mains_hum", "sleeve_slip"], &["mains_hum"], 0.9),
+        verdict("c", "effect", &["mains_hum"], &["mains_hum"], 0.9),
+    ];
+    let score = Score::of(&truth, &verdicts).expect("matching cases");
+    assert_eq!(score.compounds.all_named, rate(1, 2));
+    assert_eq!(score.compounds.one_named, rate(2, 2));
+    assert_eq!(score.compounds.precision, rate(3, 4));
+    assert_eq!(score.compounds.recall, rate(3, 4));
+    assert_eq!(score.dominants.strongest_named, rate(1, 1));
+    assert_eq!(score.dominants.recall, rate(1, 2));
+    assert_eq!(score.misses.len(), 1);
+}
+
+#[test]
+fn stray_and_repeated_verdicts_are_refused() {
+    let truth = truth(&[("a", label(CaseKind::Null, &[], 0.0))]);
+    let quiet = verdict("a", "no_gap", &[], &[], 0.0);
+    let twice = Score::of(&truth, &[quiet.clone(), quiet]);
+    assert!(matches!(twice, Err(BlindError::DuplicateCase { .. })));
+    let stray = Score::of(&truth, &[verdict("b", "no_gap", &[], &[], 0.0)]);
+    assert!(matches!(stray, Err(BlindError::UnknownCase { .. })));
+    let empty = Score::of(&truth, &[]).expect("no verdict at all");
+    assert_eq!((empty.singles.top1.share(), empty.unanswered.len()), (None, 1));
+}

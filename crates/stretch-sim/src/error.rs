@@ -75,7 +75,9 @@ pub enum SimError {
         needs: &'static str,
     },
     /// The bridge would relax to nothing: the sleeve is slack within the stroke.
-    #[error("the sleeve goes slack: gauge strain {strain} at full contraction, at least {least} is needed")]
+    #[error(
+        "the sleeve goes slack: gauge strain {strain} at full contraction, at least {least} is needed"
+    )]
     SlackSleeve {
         /// Strain at the supply pressure.
         strain: f64,

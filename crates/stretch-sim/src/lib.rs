@@ -27,6 +27,7 @@ pub use operator::{
 pub use params::{Key, PARAMETERS, ParameterInfo, RigParams, Tolerance};
 pub use stage::Stage;
 pub use stages::{
-    Actuation, Bridge, Chain, ChainMemory, Muscle, Openings, Pneumatics, Recorded, Reference, Sensing,
+    Actuation, Bridge, Chain, ChainMemory, Muscle, Openings, Pneumatics, Recorded, Reference,
+    Sensing,
 };
 pub use static_law::StaticLaw;

@@ -1,7 +1,10 @@
 //! Suggestions in messages about unknown names.
 
 /// The candidate that was probably meant.
-pub(crate) fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
+pub(crate) fn nearest<'a>(
+    name: &str,
+    candidates: impl IntoIterator<Item = &'a str>,
+) -> Option<String> {
     stretch_data::nearest(name, candidates).map(str::to_string)
 }
 

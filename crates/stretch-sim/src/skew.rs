@@ -35,7 +35,8 @@ impl Skew {
             (0..4).filter(|j| *j != i).map(|j| (t - nodes[j]) / (nodes[i] - nodes[j])).product()
         });
         // The cast saturates: a skew longer than any trial holds an end throughout.
-        let offset = (samples as isize).saturating_mul(pieces as isize).saturating_add(piece as isize);
+        let offset =
+            (samples as isize).saturating_mul(pieces as isize).saturating_add(piece as isize);
         Self { pieces, offset, weights, share }
     }
 

@@ -35,7 +35,8 @@ impl Stage {
 
     /// Whether an effect or a parameter of the stage `other` acts in it: `actuation` holds `pneumatics` and `muscle`.
     pub fn holds(self, other: Self) -> bool {
-        self == other || (self == Self::Actuation && matches!(other, Self::Pneumatics | Self::Muscle))
+        self == other
+            || (self == Self::Actuation && matches!(other, Self::Pneumatics | Self::Muscle))
     }
 }
 
@@ -48,10 +49,12 @@ impl fmt::Display for Stage {
 impl FromStr for Stage {
     type Err = crate::SimError;
     fn from_str(s: &str) -> Result<Self, Self::Err> {
-        Self::ALL.into_iter().find(|x| x.name() == s).ok_or_else(|| crate::SimError::UnknownParameter {
-            owner: "rig".into(),
-            name: s.into(),
-            nearest: crate::nearest::nearest(s, Self::ALL.map(Self::name)),
+        Self::ALL.into_iter().find(|x| x.name() == s).ok_or_else(|| {
+            crate::SimError::UnknownParameter {
+                owner: "rig".into(),
+                name: s.into(),
+                nearest: crate::nearest::nearest(s, Self::ALL.map(Self::name)),
+            }
         })
     }
 }

@@ -3,15 +3,15 @@
 use crate::params::{Key, RigParams};
 
 /// Intervals to one reference pressure.
-const DENSITY: usize = 256;
-/// Reference pressures that the table spans; contraction is held beyond.
-const SPAN: usize = 3;
+const DENSITY: usize = 128;
+/// Most reference pressures that the table spans.
+const MOST: f64 = 16.0;
 
 /// Static contraction of the muscle without force, from gauge pressure:
 /// p/P_ref = a0 (1 - exp(-a1 x)) exp(a3 x^2), k_s = k_max x, x = 0 for p <= 0.
 ///
-/// The inverse is tabulated by piecewise cubics; see the crate's tests for its error. Beyond three reference
-/// pressures contraction is held.
+/// The inverse is tabulated by piecewise cubics; see the crate's tests for its error. Contraction is held
+/// beyond 1.5 times the supply's or the reference pressure.
 #[derive(Debug, Clone)]
 pub struct StaticLaw {
     per_kpa: f64,
@@ -32,7 +32,8 @@ impl StaticLaw {
             (u, stiff * a1 * gone + 2.0 * a3 * x * u)
         };
         let h = 1.0 / DENSITY as f64;
-        let count = SPAN * DENSITY;
+        let span = (1.5 * (params[Key::PS] / params[Key::PRef]).max(1.0)).clamp(1.0, MOST);
+        let count = (span * DENSITY as f64).ceil() as usize;
         let (mut x, mut slope) = (0.0, 1.0 / law(0.0).1);
         let mut cubics = Vec::with_capacity(count);
         for i in 0..count {
@@ -52,14 +53,11 @@ impl StaticLaw {
             }
             let next_slope = 1.0 / rise;
             let (d0, d1, rise) = (slope * h, next_slope * h, next - x);
-            cubics.push([x, d0, 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise].map(|c| k_max * c));
+            cubics
+                .push([x, d0, 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise].map(|c| k_max * c));
             (x, slope) = (next, next_slope);
         }
-        Self {
-            per_kpa: 1e3 * DENSITY as f64 / params[Key::PRef],
-            last: k_max * x,
-            cubics,
-        }
+        Self { per_kpa: 1e3 * DENSITY as f64 / params[Key::PRef], last: k_max * x, cubics }
     }
 
     /// Static contraction at a gauge pressure in kPa.

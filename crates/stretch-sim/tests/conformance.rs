@@ -67,7 +67,10 @@ fn agrees_with_the_reference() {
                     .map(|(row, x)| (row, (x - ours[5 * row]).abs() / scale))
                     .fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
                 worst = worst.max(error);
-                report += &format!("{name:22} {trial:10} {channel:13} {error:.1e} at {:.2} s\n", 0.05 * row as f64);
+                report += &format!(
+                    "{name:22} {trial:10} {channel:13} {error:.1e} at {:.2} s\n",
+                    0.05 * row as f64
+                );
             }
         }
     }

@@ -10,9 +10,7 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct AmplifierLowpass;
 
-static PARAMETERS: &[EffectParameter] = &[
-    EffectParameter::strength("tau", "s", 0.0, 0.4, 0.05),
-];
+static PARAMETERS: &[EffectParameter] = &[EffectParameter::strength("tau", "s", 0.0, 0.4, 0.05)];
 
 impl Effect for AmplifierLowpass {
     fn name(&self) -> &'static str {
@@ -32,7 +30,11 @@ impl Effect for AmplifierLowpass {
     }
 
     fn action(&self, values: &[f64], around: &Surroundings<'_>) -> Action {
-        Action::Volts(Box::new(Lowpass(MeanReversion::new(values[0], around.volts_stroke, around.grid))))
+        Action::Volts(Box::new(Lowpass(MeanReversion::new(
+            values[0],
+            around.volts_stroke,
+            around.grid,
+        ))))
     }
 }
 

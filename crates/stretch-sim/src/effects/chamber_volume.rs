@@ -10,9 +10,7 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct ChamberVolume;
 
-static PARAMETERS: &[EffectParameter] = &[
-    EffectParameter::strength("g", "1", 0.0, 3.0, 1.0),
-];
+static PARAMETERS: &[EffectParameter] = &[EffectParameter::strength("g", "1", 0.0, 3.0, 1.0)];
 
 impl Effect for ChamberVolume {
     fn name(&self) -> &'static str {

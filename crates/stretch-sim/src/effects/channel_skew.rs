@@ -9,9 +9,8 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct ChannelSkew;
 
-static PARAMETERS: &[EffectParameter] = &[
-    EffectParameter::strength("skew_s", "s", -0.1, 0.2, 0.02),
-];
+static PARAMETERS: &[EffectParameter] =
+    &[EffectParameter::strength("skew_s", "s", -0.1, 0.2, 0.02)];
 
 impl Effect for ChannelSkew {
     fn name(&self) -> &'static str {

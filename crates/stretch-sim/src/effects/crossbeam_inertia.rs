@@ -11,9 +11,7 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct CrossbeamInertia;
 
-static PARAMETERS: &[EffectParameter] = &[
-    EffectParameter::strength("m", "s", 0.0, 0.08, 0.02),
-];
+static PARAMETERS: &[EffectParameter] = &[EffectParameter::strength("m", "s", 0.0, 0.08, 0.02)];
 
 impl Effect for CrossbeamInertia {
     fn name(&self) -> &'static str {
@@ -58,7 +56,15 @@ impl Oscillator {
                 let decay = libm::exp(-ZETA * h / m);
                 let (sin, cos) = (libm::sin(omega * h) / omega, libm::cos(omega * h));
                 let of = |x: f64| decay * x;
-                (h, [of(cos + ZETA / m * sin), of(sin), of(-sin / (m * m)), of(cos - ZETA / m * sin)])
+                (
+                    h,
+                    [
+                        of(cos + ZETA / m * sin),
+                        of(sin),
+                        of(-sin / (m * m)),
+                        of(cos - ZETA / m * sin),
+                    ],
+                )
             })
             .collect();
         Self { m, steps }

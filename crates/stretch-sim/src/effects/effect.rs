@@ -39,12 +39,24 @@ pub struct EffectParameter {
 
 impl EffectParameter {
     /// A strength that is off at zero, searched in equal differences.
-    pub const fn strength(name: &'static str, unit: &'static str, min: f64, max: f64, typical: f64) -> Self {
+    pub const fn strength(
+        name: &'static str,
+        unit: &'static str,
+        min: f64,
+        max: f64,
+        typical: f64,
+    ) -> Self {
         Self { name, unit, min, max, off: Some(0.0), typical, scale: Scale::Linear }
     }
 
     /// A shape (a scale, a time constant), searched in equal ratios.
-    pub const fn shape(name: &'static str, unit: &'static str, min: f64, max: f64, typical: f64) -> Self {
+    pub const fn shape(
+        name: &'static str,
+        unit: &'static str,
+        min: f64,
+        max: f64,
+        typical: f64,
+    ) -> Self {
         Self { name, unit, min, max, off: None, typical, scale: Scale::Log }
     }
 }

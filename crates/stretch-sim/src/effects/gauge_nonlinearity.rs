@@ -10,9 +10,7 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct GaugeNonlinearity;
 
-static PARAMETERS: &[EffectParameter] = &[
-    EffectParameter::strength("c", "1", -0.1, 0.1, 0.02),
-];
+static PARAMETERS: &[EffectParameter] = &[EffectParameter::strength("c", "1", -0.1, 0.1, 0.02)];
 
 impl Effect for GaugeNonlinearity {
     fn name(&self) -> &'static str {

@@ -34,7 +34,12 @@ impl Effect for GaugeSoftening {
 
     fn action(&self, values: &[f64], around: &Surroundings<'_>) -> Action {
         let reversal = REVERSAL * around.strain_unit;
-        Action::Resistance(Box::new(Softening { m: values[0], n: values[1], r0: around.resistance_zero, reversal }))
+        Action::Resistance(Box::new(Softening {
+            m: values[0],
+            n: values[1],
+            r0: around.resistance_zero,
+            reversal,
+        }))
     }
 }
 

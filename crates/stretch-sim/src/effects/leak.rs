@@ -10,9 +10,8 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct Leak;
 
-static PARAMETERS: &[EffectParameter] = &[
-    EffectParameter::strength("c", "kg/(s Pa)", 0.0, 2e-10, 5e-11),
-];
+static PARAMETERS: &[EffectParameter] =
+    &[EffectParameter::strength("c", "kg/(s Pa)", 0.0, 2e-10, 5e-11)];
 
 impl Effect for Leak {
     fn name(&self) -> &'static str {

@@ -15,7 +15,10 @@ pub(super) struct MainsHum;
 static PARAMETERS: &[EffectParameter] = &[
     EffectParameter::strength("a", "V", 0.0, 0.1, 0.02),
     EffectParameter { scale: Scale::Linear, ..EffectParameter::shape("f", "Hz", 50.0, 60.0, 50.0) },
-    EffectParameter { scale: Scale::Linear, ..EffectParameter::shape("phase", "rad", -TAU, TAU, 0.0) },
+    EffectParameter {
+        scale: Scale::Linear,
+        ..EffectParameter::shape("phase", "rad", -TAU, TAU, 0.0)
+    },
 ];
 
 impl Effect for MainsHum {

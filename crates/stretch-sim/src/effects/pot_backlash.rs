@@ -10,9 +10,7 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct PotBacklash;
 
-static PARAMETERS: &[EffectParameter] = &[
-    EffectParameter::strength("w", "mm", 0.0, 2.0, 0.3),
-];
+static PARAMETERS: &[EffectParameter] = &[EffectParameter::strength("w", "mm", 0.0, 2.0, 0.3)];
 
 impl Effect for PotBacklash {
     fn name(&self) -> &'static str {

@@ -10,9 +10,7 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct PotNonlinearity;
 
-static PARAMETERS: &[EffectParameter] = &[
-    EffectParameter::strength("c", "mm", -3.0, 3.0, 0.5),
-];
+static PARAMETERS: &[EffectParameter] = &[EffectParameter::strength("c", "mm", -3.0, 3.0, 0.5)];
 
 impl Effect for PotNonlinearity {
     fn name(&self) -> &'static str {
@@ -32,7 +30,11 @@ impl Effect for PotNonlinearity {
     }
 
     fn action(&self, values: &[f64], around: &Surroundings<'_>) -> Action {
-        Action::Length(Box::new(Bow { c: values[0], zero: around.length_zero, span: around.length_span }))
+        Action::Length(Box::new(Bow {
+            c: values[0],
+            zero: around.length_zero,
+            span: around.length_span,
+        }))
     }
 }
 

@@ -10,9 +10,8 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct PressureCrosstalk;
 
-static PARAMETERS: &[EffectParameter] = &[
-    EffectParameter::strength("c", "strain", -0.05, 0.05, 0.01),
-];
+static PARAMETERS: &[EffectParameter] =
+    &[EffectParameter::strength("c", "strain", -0.05, 0.05, 0.01)];
 
 impl Effect for PressureCrosstalk {
     fn name(&self) -> &'static str {

@@ -105,7 +105,9 @@ impl EffectSet {
         if values.len() != expected {
             return Err(SimError::Length { name, expected, found: values.len() });
         }
-        if let Some((p, value)) = effect.parameters().iter().zip(values).find(|(_, v)| !v.is_finite()) {
+        if let Some((p, value)) =
+            effect.parameters().iter().zip(values).find(|(_, v)| !v.is_finite())
+        {
             return Err(SimError::OutOfRange {
                 owner: name.to_string(),
                 name: p.name.to_string(),
@@ -115,9 +117,11 @@ impl EffectSet {
                 unit: p.unit,
             });
         }
-        let place = |name: &str| CATALOGUE.iter().position(|e| e.name() == name).unwrap_or(usize::MAX);
+        let place =
+            |name: &str| CATALOGUE.iter().position(|e| e.name() == name).unwrap_or(usize::MAX);
         let mine = place(name);
-        let at = self.entries.iter().position(|e| place(e.name()) > mine).unwrap_or(self.entries.len());
+        let at =
+            self.entries.iter().position(|e| place(e.name()) > mine).unwrap_or(self.entries.len());
         self.entries.insert(at, ActiveEffect { effect, values: values.to_vec() });
         Ok(())
     }
@@ -148,23 +152,20 @@ impl EffectSet {
         self.entries.iter().filter(move |e| stage.holds(e.effect.stage()) && !e.is_off())
     }
 
-    /// Steps of time for trials sampled every `dt_s`: none longer than `max_step_s`, split where a delayed switch falls,
-    /// half as long where the chamber's volume follows the muscle.
+    /// Steps of time for trials sampled every `dt_s`: none longer than `max_step_s`, split where a delayed switch falls.
     ///
     /// # Errors
     /// Times that are not positive.
     pub fn grid(&self, params: &RigParams, dt_s: f64, max_step_s: f64) -> Result<Grid, SimError> {
         let whole = Grid::samples(dt_s)?;
         let around = Surroundings::of_rig(params, &whole);
-        let (mut delay_s, mut step_s) = (0.0, max_step_s);
+        let mut delay_s = 0.0;
         for active in self.acting_in(Stage::Pneumatics) {
-            match active.effect().action(active.values(), &around) {
-                Action::Delay(seconds) => delay_s += seconds,
-                Action::Volume(_) => step_s = 0.5 * max_step_s,
-                _ => {}
+            if let Action::Delay(seconds) = active.effect().action(active.values(), &around) {
+                delay_s += seconds;
             }
         }
-        Grid::new(dt_s, step_s, delay_s)
+        Grid::new(dt_s, max_step_s, delay_s)
     }
 
     /// How many there are.
@@ -181,7 +182,9 @@ impl EffectSet {
 /// Values in the effect's order from names and values.
 fn resolve(effect: &dyn Effect, given: &[(&str, f64)]) -> Result<Vec<f64>, SimError> {
     let parameters = effect.parameters();
-    if let Some((name, _)) = given.iter().find(|(name, _)| parameters.iter().all(|p| p.name != *name)) {
+    if let Some((name, _)) =
+        given.iter().find(|(name, _)| parameters.iter().all(|p| p.name != *name))
+    {
         return Err(SimError::UnknownParameter {
             owner: effect.name().to_string(),
             name: name.to_string(),
@@ -190,7 +193,8 @@ fn resolve(effect: &dyn Effect, given: &[(&str, f64)]) -> Result<Vec<f64>, SimEr
     }
     // One strength is enough where there are several (the rails of an amplifier): the others stay off.
     let strengths = |p: &&crate::EffectParameter| p.off.is_some();
-    let any = parameters.iter().filter(strengths).any(|p| given.iter().any(|(name, _)| *name == p.name));
+    let any =
+        parameters.iter().filter(strengths).any(|p| given.iter().any(|(name, _)| *name == p.name));
     if let (false, Some(missing)) = (any, parameters.iter().find(strengths)) {
         return Err(SimError::MissingParameter {
             owner: effect.name().to_string(),

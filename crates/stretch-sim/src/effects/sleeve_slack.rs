@@ -10,9 +10,8 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct SleeveSlack;
 
-static PARAMETERS: &[EffectParameter] = &[
-    EffectParameter::strength("e_s", "strain", 0.0, 0.2, 0.08),
-];
+static PARAMETERS: &[EffectParameter] =
+    &[EffectParameter::strength("e_s", "strain", 0.0, 0.2, 0.08)];
 
 impl Effect for SleeveSlack {
     fn name(&self) -> &'static str {

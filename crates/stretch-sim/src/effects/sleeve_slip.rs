@@ -10,9 +10,8 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct SleeveSlip;
 
-static PARAMETERS: &[EffectParameter] = &[
-    EffectParameter::strength("w", "strain", 0.0, 0.03, 0.008),
-];
+static PARAMETERS: &[EffectParameter] =
+    &[EffectParameter::strength("w", "strain", 0.0, 0.03, 0.008)];
 
 impl Effect for SleeveSlip {
     fn name(&self) -> &'static str {

@@ -10,9 +10,7 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct SupplySag;
 
-static PARAMETERS: &[EffectParameter] = &[
-    EffectParameter::strength("r", "Pa s/kg", 0.0, 4e8, 1e8),
-];
+static PARAMETERS: &[EffectParameter] = &[EffectParameter::strength("r", "Pa s/kg", 0.0, 4e8, 1e8)];
 
 impl Effect for SupplySag {
     fn name(&self) -> &'static str {

@@ -10,9 +10,7 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct ThermalDrift;
 
-static PARAMETERS: &[EffectParameter] = &[
-    EffectParameter::strength("d", "1/s", -4e-4, 4e-4, 5e-5),
-];
+static PARAMETERS: &[EffectParameter] = &[EffectParameter::strength("d", "1/s", -4e-4, 4e-4, 5e-5)];
 
 impl Effect for ThermalDrift {
     fn name(&self) -> &'static str {

@@ -10,9 +10,7 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct ValveDeadband;
 
-static PARAMETERS: &[EffectParameter] = &[
-    EffectParameter::strength("u_db", "1", 0.0, 0.11, 0.03),
-];
+static PARAMETERS: &[EffectParameter] = &[EffectParameter::strength("u_db", "1", 0.0, 0.11, 0.03)];
 
 impl Effect for ValveDeadband {
     fn name(&self) -> &'static str {

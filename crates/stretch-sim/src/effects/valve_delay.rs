@@ -9,9 +9,8 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct ValveDelay;
 
-static PARAMETERS: &[EffectParameter] = &[
-    EffectParameter::strength("delay_s", "s", 0.0, 0.12, 0.03),
-];
+static PARAMETERS: &[EffectParameter] =
+    &[EffectParameter::strength("delay_s", "s", 0.0, 0.12, 0.03)];
 
 impl Effect for ValveDelay {
     fn name(&self) -> &'static str {

@@ -1,16 +1,8 @@
 //! Stage `actuation`: openings to pressure and length, both stages as one.
 
-use super::{
-    Muscle, Openings, Pneumatics, check_length,
-    pneumatics::Drive,
-};
+use super::{Muscle, Openings, Pneumatics, check_length, pneumatics::Drive};
 use crate::{
-    SimError,
-    effects::EffectSet,
-    grid::Grid,
-    memory::Memory,
-    operator::Start,
-    params::RigParams,
+    SimError, effects::EffectSet, grid::Grid, memory::Memory, operator::Start, params::RigParams,
 };
 
 /// Valves, chamber and muscle, prepared: one after the other, or hand in hand where the chamber's volume follows the muscle.
@@ -146,7 +138,8 @@ impl Actuation {
                 let next_volume = volume_at(next_k);
                 pneumatics.advance(valves, &mut next, [volume, next_volume], h);
                 trial.copy_from_slice(cells);
-                next_k = muscle.step(&mut trial, node, pneumatics.pressure_kpa(next.held, next_volume));
+                next_k =
+                    muscle.step(&mut trial, node, pneumatics.pressure_kpa(next.held, next_volume));
             }
             cells.copy_from_slice(&trial);
             chamber = next;

@@ -119,11 +119,27 @@ impl Chain {
         memory.pressure.resize(nodes, 0.0);
         memory.length.resize(nodes, 0.0);
         let (pressure, length) = (&mut memory.pressure, &mut memory.length);
-        self.actuation.run_nodes(&mut memory.actuation, start, openings, initial_kpa, pressure, length)?;
-        for (p, node) in recorded.pressure_kpa.iter_mut().zip(pressure.iter().step_by(self.grid().pieces())) {
+        self.actuation.run_nodes(
+            &mut memory.actuation,
+            start,
+            openings,
+            initial_kpa,
+            pressure,
+            length,
+        )?;
+        for (p, node) in
+            recorded.pressure_kpa.iter_mut().zip(pressure.iter().step_by(self.grid().pieces()))
+        {
             *p = *node;
         }
-        self.sensing.run(&mut memory.sensing, start, start_s, length, pressure, recorded.bridge_v)?;
+        self.sensing.run(
+            &mut memory.sensing,
+            start,
+            start_s,
+            length,
+            pressure,
+            recorded.bridge_v,
+        )?;
         self.reference.run(&mut memory.reference, start, length, recorded.length_mm)
     }
 }

@@ -18,6 +18,10 @@ pub use sensing::{Bridge, Sensing};
 use crate::SimError;
 
 /// `Ok` when `found` values are `expected`.
-pub(crate) fn check_length(name: &'static str, expected: usize, found: usize) -> Result<(), SimError> {
+pub(crate) fn check_length(
+    name: &'static str,
+    expected: usize,
+    found: usize,
+) -> Result<(), SimError> {
     if expected == found { Ok(()) } else { Err(SimError::Length { name, expected, found }) }
 }

@@ -35,7 +35,13 @@ impl Operators {
     }
 
     /// Begins a trial at the input `first`; returns the row's output there. `span` describes node 0 and holds one value of each signal.
-    pub(crate) fn begin(&self, span: &Span<'_>, start: Start, first: f64, cells: &mut [f64]) -> f64 {
+    pub(crate) fn begin(
+        &self,
+        span: &Span<'_>,
+        start: Start,
+        first: f64,
+        cells: &mut [f64],
+    ) -> f64 {
         let mut x = [first];
         for (operator, at) in &self.row {
             let at = self.offset + at;

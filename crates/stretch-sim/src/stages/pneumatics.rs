@@ -11,6 +11,8 @@ use crate::{
     stage::Stage,
 };
 
+/// Steps longer than this many times the time constant of the pressure are too long for the Runge-Kutta rule.
+const STIFF: f64 = 2.0;
 /// Most effects that may draw on the supply at once.
 const MOST_DROOPS: usize = 2;
 
@@ -153,7 +155,10 @@ impl Pneumatics {
         pressure_kpa: &mut [f64],
     ) -> Result<(), SimError> {
         if self.is_coupled() {
-            return Err(SimError::NotHere { name: "chamber_volume".into(), needs: "the length of the muscle" });
+            return Err(SimError::NotHere {
+                name: "chamber_volume".into(),
+                needs: "the length of the muscle",
+            });
         }
         self.run_sampled(memory, start, openings, None, initial_kpa, pressure_kpa)
     }
@@ -237,7 +242,10 @@ impl Pneumatics {
     ) -> Result<Chamber, SimError> {
         let absolute = 1e3 * initial_kpa + self.atmosphere_pa;
         if !(absolute.is_finite() && absolute > 0.0) {
-            return Err(SimError::NotPositive { name: "initial pressure, Pa absolute", value: absolute });
+            return Err(SimError::NotPositive {
+                name: "initial pressure, Pa absolute",
+                value: absolute,
+            });
         }
         let mut droops = [0.0; MOST_DROOPS];
         if let Start::Carried { rest_s } = start {
@@ -306,7 +314,13 @@ impl Pneumatics {
 
     /// Classical Runge-Kutta for what the chamber holds and the first `D` droops.
     #[inline]
-    fn step<const D: usize>(&self, valves: Valves, chamber: &mut Chamber, volume: [f64; 2], h: f64) {
+    fn step<const D: usize>(
+        &self,
+        valves: Valves,
+        chamber: &mut Chamber,
+        volume: [f64; 2],
+        h: f64,
+    ) {
         let supply = |droops: &[f64; D]| (self.supply_pa - droops.iter().sum::<f64>()).max(0.0);
         let rate = |held: f64, droops: &[f64; D], volume: f64| {
             let (inflow, net) = self.flows(valves, held / volume, supply(droops));
@@ -335,23 +349,66 @@ impl Pneumatics {
         let mut next = held + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4);
         for i in 0..D {
             y[i] += h / 6.0 * (f1[i] + 2.0 * (f2[i] + f3[i]) + f4[i]);
-            chamber.droops[i] = y[i];
         }
         // No flow passes the pressure that drives it.
         let (high, low) = (supply(&y) * volume[1], self.atmosphere_pa * volume[1]);
-        if next > held && next > high {
+        let full = next > held && next > high;
+        if full {
             next = held.max(high);
         } else if next < held && next < low {
             next = held.min(low);
         }
         // Nor does a state pass its equilibrium; a step too long for a stiff one ends on it.
-        if k1 * k4 < 0.0 || next == high || next == low {
+        if k1 * k4 < 0.0 || full || next == low {
             let (end, _) = rate(next, &y, volume[1]);
-            if k1 * end < 0.0 && h * (end - k1).abs() > (next - held).abs() {
+            let stiff = k1 * end < 0.0 && h * (end - k1).abs() > STIFF * (next - held).abs();
+            if stiff {
                 next = balance(held, next, k1, |m| rate(m, &y, volume[1]).0);
             }
+            if D > 0 && (stiff || full) {
+                next = self.settle::<D>(valves, chamber, [held, next], volume[1], h);
+                return chamber.held = next;
+            }
         }
+        chamber.droops[..D].copy_from_slice(&y);
         chamber.held = next;
+    }
+
+    /// A step in which the chamber follows a supply that recovers: it ends on its equilibrium with the supply, and
+    /// the flow is what the mass gained asks for. Supply and chamber are brought to agree by iteration.
+    #[cold]
+    fn settle<const D: usize>(
+        &self,
+        valves: Valves,
+        chamber: &mut Chamber,
+        [held, guess]: [f64; 2],
+        volume: f64,
+        h: f64,
+    ) -> f64 {
+        let before = chamber.droops;
+        let mut next = guess;
+        // The iteration contracts by r/(R T/V0)/tau per round, a quarter at the catalogue's strongest.
+        for _ in 0..24 {
+            let droop: f64 = chamber.droops[..D].iter().sum();
+            let supply = (self.supply_pa - droop).max(0.0);
+            let (inflow, net) = self.flows(valves, next / volume, supply);
+            let mean = (next - held) / (h * self.chamber) + (inflow - net);
+            for ((y, last), law) in chamber.droops.iter_mut().zip(before).zip(&self.droops) {
+                *y = last + h * law.rate(0.5 * (last + *y), mean.max(0.0));
+            }
+            let supply = (self.supply_pa - chamber.droops[..D].iter().sum::<f64>()).max(0.0);
+            let (low, high) = (self.atmosphere_pa.min(supply) * volume, supply * volume);
+            let rate = |m: f64| self.flows(valves, m / volume, supply).1;
+            // Nothing flows back into a supply that has fallen below the chamber.
+            let goal =
+                if rate(high) < 0.0 { balance(low, high, 1.0, rate) } else { high.max(held) };
+            let change = goal - next;
+            next = goal;
+            if change.abs() <= 1e-10 * next {
+                break;
+            }
+        }
+        next
     }
 }
 

@@ -144,7 +144,8 @@ impl Sensing {
             }
         }
         let grid = &self.grid;
-        let span = |first_node: usize| Span { grid, first_node, start_s, pressure_kpa: &[], strain: &[] };
+        let span =
+            |first_node: usize| Span { grid, first_node, start_s, pressure_kpa: &[], strain: &[] };
         let cells = &mut memory.cells;
         let at = Span { pressure_kpa: pressure_kpa.get(..1).unwrap_or(&[]), ..span(0) };
         let e = [self.strain.begin(&at, start, bridge.strain(*first), cells)];
@@ -160,7 +161,8 @@ impl Sensing {
         }
         let nodes: &mut [f64] = if direct { bridge_v } else { &mut work };
         let mut strain = [0.0; BLOCK];
-        for (block, (length, v)) in length_mm.chunks(BLOCK).zip(nodes.chunks_mut(BLOCK)).enumerate() {
+        for (block, (length, v)) in length_mm.chunks(BLOCK).zip(nodes.chunks_mut(BLOCK)).enumerate()
+        {
             let from = block * BLOCK;
             let strain = &mut strain[..length.len()];
             for (e, l) in strain.iter_mut().zip(length) {
@@ -191,7 +193,8 @@ impl Sensing {
         if self.record.is_empty() {
             return;
         }
-        let span = Span { grid: &self.grid, first_node: 0, start_s, pressure_kpa: &[], strain: &[] };
+        let span =
+            Span { grid: &self.grid, first_node: 0, start_s, pressure_kpa: &[], strain: &[] };
         self.record.begin(&span, Start::Settled, samples[0], &mut memory.cells);
         self.record.run(&span, &mut memory.cells, samples);
     }

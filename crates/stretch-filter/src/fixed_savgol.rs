@@ -101,7 +101,7 @@ impl FixedSample for i32 {}
 ///
 /// Source: Savitzky and Golay 1964, doi:10.1021/ac60214a047; moments instead of
 /// taps: Hogenauer's integrators and combs, doi:10.1109/TASSP.1981.1163535.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FixedSgRate<S, const WINDOW: usize, const DEGREE: usize, const DELAY: usize = 0>(
     PhantomData<S>,
 );
@@ -110,8 +110,9 @@ pub struct FixedSgRate<S, const WINDOW: usize, const DEGREE: usize, const DELAY:
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FixedSgMemory<S: FixedSample, const WINDOW: usize> {
     sums: [S::Sum; MOMENTS],
-    /// Where the oldest sample lies.
+    /// Where the oldest sample lies, or one past the end.
     oldest: usize,
+    /// Samples until the window is full.
     remaining: usize,
     ring: [S; WINDOW],
 }
@@ -120,7 +121,7 @@ impl<S: FixedSample, const WINDOW: usize> FixedSgMemory<S, WINDOW> {
     /// How many further samples give `None` before the window is full.
     #[inline]
     pub fn remaining(&self) -> usize {
-        self.remaining
+        self.remaining.saturating_sub(1)
     }
 
     /// The newest sample; zero before the first.
@@ -166,6 +167,7 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
     /// The filter; all its numbers belong to its type.
     #[must_use]
     pub const fn new() -> Self {
+        let _ = Self::TAPS; // the shape is checked here at the latest
         Self(PhantomData)
     }
 
@@ -176,7 +178,6 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
         while memory.remaining > 0 {
             let _ = self.step(&mut memory, x);
         }
-        let _ = self.step(&mut memory, x);
         memory
     }
 
@@ -195,6 +196,14 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
     #[inline]
     pub fn last(&self, memory: &FixedSgMemory<S, WINDOW>) -> Option<i32> {
         (memory.remaining == 0).then(|| Self::output(memory))
+    }
+}
+
+impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usize> Default
+    for FixedSgRate<S, WINDOW, DEGREE, DELAY>
+{
+    fn default() -> Self {
+        Self::new()
     }
 }
 
@@ -229,11 +238,12 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
             memory.sums[k] = S::slide(memory.sums[k], memory.sums[k - 1], choose, old);
         }
         memory.sums[0] = S::slide(memory.sums[0], x.widen(), 1, old);
-        if memory.remaining > 1 {
+        if memory.remaining > 0 {
             memory.remaining -= 1;
-            return None;
+            if memory.remaining > 0 {
+                return None;
+            }
         }
-        memory.remaining = 0;
         Some(Self::output(memory))
     }
 }

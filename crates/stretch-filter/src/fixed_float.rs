@@ -1,0 +1,117 @@
+//! A Savitzky-Golay rate for `f32` samples on a core without a floating-point unit.
+
+use crate::{FixedSgMemory, FixedSgRate, LARGEST_SAMPLE, sample};
+use stretch_core::{Design, DesignError, SampleRate, Stage};
+
+/// Rate of an `f32` signal, summed in integers: [`FixedSgRate`] between two conversions.
+///
+/// The same rate as [`SgRate`](crate::SgRate), for cores that have no
+/// floating-point unit: eleven soft-float products and ten sums (about 1,400
+/// instructions on a Cortex-M3) become one conversion to an integer, an exact
+/// sliding sum, and one product. On a core *with* a floating-point unit `SgRate`
+/// is the smaller and faster one.
+///
+/// **Samples** are taken as integer multiples of `2^(e-31)`, where `2^e` is the
+/// first power of two at or above the `largest` magnitude that the design was
+/// made for: exact for every `f32` of at least `2^(e-8)`, rounded to that step
+/// below. A sample beyond `2^e` counts as `2^e`. One that is NaN or beyond
+/// [`LARGEST_SAMPLE`] gives `None` and leaves the memory as it was.
+///
+/// ```
+/// use stretch_core::{Runner, SampleRate};
+/// use stretch_filter::IntegerSgRate;
+///
+/// // a bridge of 0 .. 3.3 V
+/// let design = IntegerSgRate::<11, 2>::new(SampleRate::new(100.0)?, 3.3)?;
+/// let mut rate = Runner::new(design);
+/// let last = (0..20).filter_map(|n| rate.step(1.0 + 0.01 * n as f32)).last().unwrap();
+/// assert!((last - 1.0).abs() < 1e-5); // volts a second
+/// # Ok::<(), stretch_core::DesignError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct IntegerSgRate<const WINDOW: usize, const DEGREE: usize, const DELAY: usize = 0> {
+    sums: FixedSgRate<i32, WINDOW, DEGREE, DELAY>,
+    /// Bits behind the binary point of a quantised sample.
+    fraction_bits: i32,
+    /// From the sums' output to the sample's unit per second.
+    per_second: f32,
+    sample_rate: SampleRate,
+}
+
+impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
+    IntegerSgRate<WINDOW, DEGREE, DELAY>
+{
+    /// The design for samples of at most `largest` in magnitude at `sample_rate`.
+    ///
+    /// # Errors
+    /// [`DesignError::OutOfRange`] for a sample rate that no design is computed
+    /// for, or a `largest` outside 1e-6 ..= 1e18.
+    pub fn new(sample_rate: SampleRate, largest: f64) -> Result<Self, DesignError> {
+        let sample_rate = sample::checked_rate(sample_rate)?;
+        DesignError::check("largest", largest, (1e-6..=LARGEST_SAMPLE).contains(&largest))?;
+        let (mantissa, exponent) = libm::frexp(largest);
+        // frexp gives 0.5 <= mantissa < 1: a power of two itself needs one less
+        let exponent = if mantissa == 0.5 { exponent - 1 } else { exponent };
+        let fraction_bits = 31 - exponent;
+        let per_sample = FixedSgRate::<i32, WINDOW, DEGREE, DELAY>::PER_SAMPLE;
+        let per_second = libm::ldexp(per_sample * sample_rate.hz(), -fraction_bits);
+        Ok(Self {
+            sums: FixedSgRate::new(),
+            fraction_bits,
+            per_second: per_second as f32,
+            sample_rate,
+        })
+    }
+
+    /// The sample rate of the design.
+    pub fn sample_rate(&self) -> SampleRate {
+        self.sample_rate
+    }
+
+    /// `x 2^fraction_bits`, rounded and saturated, without a floating-point operation.
+    #[inline(always)]
+    fn quantise(&self, x: f32) -> Option<i32> {
+        const LARGEST_BITS: u32 = (LARGEST_SAMPLE as f32).to_bits();
+        let bits = x.to_bits();
+        let magnitude = bits & 0x7fff_ffff;
+        if magnitude > LARGEST_BITS {
+            return None; // NaN has the largest bits of all
+        }
+        let mantissa = (magnitude & 0x007f_ffff) | 0x0080_0000;
+        // a mantissa of 24 bits ends 150 below the biased exponent; a subnormal
+        // number is far below half a step and becomes zero
+        let shift = (magnitude >> 23) as i32 - 150 + self.fraction_bits;
+        let size = if shift >= 8 {
+            i32::MAX
+        } else if shift >= 0 {
+            (mantissa << shift).min(i32::MAX as u32) as i32
+        } else if shift >= -24 {
+            ((mantissa + (1 << (-shift - 1))) >> -shift) as i32
+        } else {
+            0
+        };
+        Some(if bits >> 31 == 0 { size } else { -size })
+    }
+}
+
+impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize> Design
+    for IntegerSgRate<WINDOW, DEGREE, DELAY>
+{
+    type Memory = FixedSgMemory<i32, WINDOW>;
+
+    fn memory(&self) -> Self::Memory {
+        self.sums.memory()
+    }
+}
+
+impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize> Stage<f32>
+    for IntegerSgRate<WINDOW, DEGREE, DELAY>
+{
+    type Out = Option<f32>;
+
+    #[inline(always)]
+    fn step(&self, memory: &mut Self::Memory, x: f32) -> Option<f32> {
+        let x = self.quantise(x)?;
+        self.sums.step(memory, x).map(|sum| sum as f32 * self.per_second)
+    }
+}

@@ -85,6 +85,16 @@ pub enum DataError {
         /// The name.
         column: String,
     },
+    /// A name that a line end or another control character stands in.
+    #[error(
+        "{at}: the name \"{value}\" holds a control character; if the lines end in CR alone, save the file with LF"
+    )]
+    ControlCharacter {
+        /// Where.
+        at: Place,
+        /// The name, shortened.
+        value: String,
+    },
     /// Text where a number should stand.
     #[error("{at}: \"{value}\" is not a number; correct it or remove that row")]
     NotANumber {

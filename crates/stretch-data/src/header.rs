@@ -1,5 +1,7 @@
 //! The header line: its delimiter and the names of the columns.
 
+use std::collections::HashSet;
+
 use crate::{
     DataError,
     error::Place,
@@ -24,6 +26,7 @@ impl Header {
         }
         let delimiter = delimiter(line);
         let mut names: Vec<String> = Vec::new();
+        let mut seen = HashSet::new();
         let mut at = 0;
         loop {
             let column = || (names.len() + 1).to_string();
@@ -36,7 +39,11 @@ impl Header {
                 at: place(column()),
                 value: shown(e.as_bytes()),
             })?;
-            if !name.is_empty() && names.contains(&name) {
+            if name.contains(char::is_control) {
+                let value = shown(name.as_bytes());
+                return Err(DataError::ControlCharacter { at: place(column()), value });
+            }
+            if !name.is_empty() && !seen.insert(name.clone()) {
                 return Err(DataError::DuplicateColumn { file: file.to_owned(), column: name });
             }
             names.push(name);

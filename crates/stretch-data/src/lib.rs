@@ -10,6 +10,8 @@ mod read;
 mod rig_file;
 mod row;
 mod row_reader;
+#[cfg(feature = "proptest")]
+pub mod strategies;
 mod toml_view;
 mod trial;
 mod write;

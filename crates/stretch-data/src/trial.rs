@@ -74,15 +74,27 @@ impl Trial {
         }
     }
 
-    /// Samples a second, from the median step of the time; `None` for fewer than two samples.
+    /// Samples a second; `None` for fewer than two samples.
     ///
-    /// The median is the rate of the recorder even where samples are missing.
+    /// One over the mean of the steps that are shorter than one and a half median steps: it is the rate
+    /// of the recorder even where samples are missing or the stamps are rounded.
+    ///
+    /// ```
+    /// use stretch_data::Trial;
+    /// let time_s = vec![0.0, 0.033, 0.067, 0.1, 0.133, 0.167, 0.2, 0.5, 0.533, 0.567, 0.6];
+    /// let trial = Trial { time_s, ..Trial::default() };
+    /// assert!((trial.rate_hz().expect("steps") - 30.0).abs() < 1e-9);
+    /// ```
     pub fn rate_hz(&self) -> Option<f64> {
         let mut steps: Vec<f64> = self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let middle = steps.len() / 2;
-        let (_, median, _) =
-            (!steps.is_empty()).then(|| steps.select_nth_unstable_by(middle, f64::total_cmp))?;
-        Some(1.0 / *median)
+        let median = match steps.len() {
+            0 => return None,
+            _ => *steps.select_nth_unstable_by(middle, f64::total_cmp).1,
+        };
+        let short = steps.iter().filter(|step| **step < 1.5 * median);
+        let (count, sum) = short.fold((0_u32, 0.0), |(count, sum), step| (count + 1, sum + step));
+        Some(f64::from(count) / sum).filter(|rate| rate.is_finite())
     }
 }
 

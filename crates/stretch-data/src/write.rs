@@ -46,7 +46,7 @@ impl Trial {
             return fail(format!("time does not rise from sample {i} to the next"));
         }
         for (i, Channel { name, values }) in self.channels.iter().enumerate() {
-            if name.trim().is_empty() || name == "time_s" || name.contains(['\n', '\r']) {
+            if name.trim().is_empty() || name == "time_s" || name.contains(char::is_control) {
                 return fail(format!("{name:?} cannot be the name of a channel"));
             }
             if self.channels[..i].iter().any(|other| other.name == *name) {
@@ -107,7 +107,7 @@ pub fn push_number(line: &mut Vec<u8>, value: f64) {
 
 /// Appends a name, in quotation marks where a reader would stumble without.
 pub(crate) fn push_name(line: &mut Vec<u8>, name: &str) {
-    if name.contains([',', ';', '\t', '"']) || name.trim() != name {
+    if name.contains([',', ';', '"']) || name.trim() != name {
         line.push(b'"');
         line.extend_from_slice(name.replace('"', "\"\"").as_bytes());
         line.push(b'"');

@@ -51,6 +51,15 @@ fn columns() {
 }
 
 #[test]
+fn line_ends_of_another_age() {
+    says(
+        "time_s,bridge_v\r0,1\r0.1,2\r",
+        "t.csv, row 1, column 2: the name \"bridge_v\u{fffd}0\" holds a control character; if the \
+         lines end in CR alone, save the file with LF",
+    );
+}
+
+#[test]
 fn fields() {
     says(
         "time_s,bridge_v\n0,1\n0.1,oops\n",

@@ -1,71 +1,16 @@
 //! What is written reads back to the bit, and nothing that is read panics.
+#![cfg(feature = "proptest")]
 
-use proptest::{collection::vec, prelude::*};
-use stretch_data::{
-    Channel, DataSet, EffectEntry, Parameter, ReadOptions, RigFile, RowReader, Split, Trial,
-    TrialEntry, TrialKind,
-};
-
-/// Any finite bit pattern.
-fn number() -> impl Strategy<Value = f64> {
-    any::<u64>().prop_map(f64::from_bits).prop_filter("finite", |x| x.is_finite())
-}
-
-fn trial() -> impl Strategy<Value = Trial> {
-    (1..20_usize, vec("[ -~µ°]{1,12}", 0..5)).prop_flat_map(|(rows, mut names)| {
-        names.retain(|name| !name.trim().is_empty() && name != "time_s");
-        names.sort();
-        names.dedup();
-        let columns = vec(vec(number(), rows), names.len());
-        (vec(number(), rows), columns).prop_map(move |(mut time_s, columns)| {
-            time_s.sort_by(f64::total_cmp);
-            time_s.dedup_by(|a, b| a == b);
-            let rows = time_s.len();
-            let channels = names
-                .iter()
-                .zip(columns)
-                .map(|(name, values)| Channel {
-                    name: name.clone(),
-                    values: values[..rows].to_vec(),
-                })
-                .collect();
-            Trial { name: "t.csv".to_owned(), time_s, channels }
-        })
-    })
-}
+use proptest::prelude::*;
+use stretch_data::{DataSet, ReadOptions, RigFile, RowReader, Trial, strategies};
 
 fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|x| x.to_bits()).collect()
 }
 
-fn parameter() -> impl Strategy<Value = Parameter> {
-    let tolerance = || proptest::option::of(number().prop_map(f64::abs));
-    (number(), tolerance(), tolerance()).prop_map(|(value, tolerance, tolerance_abs)| Parameter {
-        value,
-        tolerance,
-        tolerance_abs,
-    })
-}
-
-fn rig() -> impl Strategy<Value = RigFile> {
-    let name = || {
-        "[a-zA-Z_. \"é]{1,8}"
-            .prop_filter("taken", |name| name != "kind" && name != "effect" && name != "name")
-    };
-    let stages = proptest::collection::btree_map(
-        name(),
-        proptest::collection::btree_map(name(), parameter(), 0..4),
-        0..4,
-    );
-    let effect = (any::<String>(), proptest::collection::btree_map(name(), number(), 0..3))
-        .prop_map(|(name, parameters)| EffectEntry { name, parameters });
-    (proptest::option::of(any::<String>()), vec(effect, 0..3), stages)
-        .prop_map(|(kind, effects, stages)| RigFile { kind, effects, stages })
-}
-
 proptest! {
     #[test]
-    fn trials(trial in trial()) {
+    fn trials(trial in prop_oneof![strategies::any_trial(), strategies::rig_trial(1..50)]) {
         let mut text = Vec::new();
         trial.write_to(&mut text)?;
         let back = Trial::from_reader(&text[..], "t.csv", &ReadOptions::new())?;
@@ -88,52 +33,66 @@ proptest! {
     }
 
     #[test]
-    fn rigs(rig in rig()) {
+    fn columns_in_any_order_and_dialect(
+        trial in strategies::rig_trial(1..30),
+        turned in any::<bool>(),
+        dialect in prop::sample::select(vec![(",", "\n", ""), (";", "\r\n", "\u{feff}"), ("\t", "\n\n", "")]),
+    ) {
+        let mut other = trial.clone();
+        if turned {
+            other.channels.reverse();
+        }
+        let mut text = Vec::new();
+        other.write_to(&mut text)?;
+        let (delimiter, end, head) = dialect;
+        let text = String::from_utf8(text)?.replace(',', delimiter).replace('\n', end);
+        let text = format!("{head}{text}");
+        let back = Trial::from_reader(text.as_bytes(), "rig.csv", &ReadOptions::new())?;
+        for channel in &trial.channels {
+            prop_assert_eq!(back.require(&channel.name)?, &channel.values[..]);
+        }
+    }
+
+    #[test]
+    fn rigs(rig in strategies::rig_file()) {
         prop_assert_eq!(RigFile::parse("rig.toml", &rig.to_toml())?, rig);
     }
 
     #[test]
-    fn data_sets(name in any::<String>(), rate_hz in 1e-3..1e6, start_s in number(), opening in proptest::option::of(0.0..=1.0), kind in 0..5_usize) {
-        let entry = TrialEntry {
-            file: "a/b.csv".to_owned(),
-            kind: TrialKind::ALL[kind],
-            opening,
-            start_s,
-            split: Split::Test,
-        };
-        let set = DataSet { name, rate_hz, rig: Some("rig.toml".to_owned()), trials: vec![entry] };
+    fn data_sets(set in strategies::data_set()) {
         prop_assert_eq!(DataSet::parse("dataset.toml", &set.to_toml())?, set);
     }
 
     #[test]
-    fn byte_soup(soup in vec(any::<u8>(), 0..300)) {
-        read_everything(&soup);
+    fn soup_never_panics_and_what_is_read_is_sound(soup in strategies::faulty_csv()) {
+        let options = ReadOptions::new().max_line_bytes(64);
+        if let Ok(trial) = Trial::from_reader(&soup[..], "soup", &options) {
+            trial.check()?;
+        }
+        if let Ok(mut rows) = RowReader::new(&soup[..], "soup", &options.require("bridge_v")) {
+            let mut count = 0;
+            while let Some(row) = rows.next_row() {
+                count += 1;
+                let sound = row.map_or(true, |r| r.time_s.is_finite() && r.values[0].is_finite());
+                prop_assert!(sound);
+            }
+            prop_assert!(count <= soup.len(), "it ends");
+        }
+        let text = String::from_utf8_lossy(&soup);
+        let _ = DataSet::parse("soup", &text);
+        let _ = RigFile::parse("soup", &text);
     }
 
     #[test]
-    fn csv_soup(rows in vec("[-+0-9eE.,;\"\\t naif\\r]{0,20}", 0..12)) {
-        read_everything(format!("time_s,bridge_v\n{}", rows.join("\n")).as_bytes());
-        read_everything(rows.join("\n").as_bytes());
+    fn one_spoilt_field_is_named(trial in strategies::rig_trial(1..30), at in any::<prop::sample::Index>()) {
+        let mut text = Vec::new();
+        trial.write_to(&mut text)?;
+        let mut lines: Vec<String> = String::from_utf8(text)?.lines().map(str::to_owned).collect();
+        let row = 1 + at.index(trial.len());
+        let last = lines[row].rfind(',').expect("three fields");
+        lines[row].replace_range(last + 1.., "x1");
+        let error = Trial::from_reader(lines.join("\n").as_bytes(), "rig.csv", &ReadOptions::new());
+        let start = format!("rig.csv, row {}, column bridge_v: \"x1\" is not a number", row + 1);
+        prop_assert!(error.expect_err("spoilt").to_string().starts_with(&start));
     }
-}
-
-/// Reads bytes as everything that there is; what comes out is sound.
-fn read_everything(soup: &[u8]) {
-    let options = ReadOptions::new().max_line_bytes(64);
-    if let Ok(trial) = Trial::from_reader(soup, "soup", &options) {
-        trial.check().expect("what was read can be written");
-    }
-    if let Ok(mut rows) = RowReader::new(soup, "soup", &options.require("bridge_v")) {
-        let mut count = 0;
-        while let Some(row) = rows.next_row() {
-            count += 1;
-            assert!(
-                row.is_err() || row.is_ok_and(|r| r.time_s.is_finite() && r.values[0].is_finite())
-            );
-        }
-        assert!(count <= soup.len(), "it ends");
-    }
-    let text = String::from_utf8_lossy(soup);
-    let _ = DataSet::parse("soup", &text);
-    let _ = RigFile::parse("soup", &text);
 }

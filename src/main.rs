@@ -1,2 +1,77 @@
-//! The `stretch` program.
-fn main() {}
+//! The `stretch` program: parse, dispatch.
+
+mod commands;
+mod report;
+mod table;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use commands::{apply, calibrate, convert, demo, evaluate};
+
+/// From the voltage of a stretch sensor to length, live.
+///
+/// A first session with logged trials (CSV, a header line, a time_s column):
+///
+///   stretch calibrate ramp_1.csv ramp_2.csv --out cal.json --report cal.html
+///   stretch evaluate --calibration cal.json another.csv
+///   stretch apply --calibration cal.json another.csv --out estimate.csv
+///
+/// and live, a line a sample:  logger | stretch apply --calibration cal.json -
+///
+/// No data at hand? `stretch demo` calibrates on a measured session that it
+/// brings along, tests on another, and writes a report.
+#[derive(Parser)]
+#[command(version, verbatim_doc_comment, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Calibrate(calibrate::Args),
+    Apply(apply::Args),
+    Evaluate(evaluate::Args),
+    Convert(convert::Args),
+    Demo(demo::Args),
+}
+
+/// What the shell is told when Ctrl-C ended the program.
+const INTERRUPTED: u8 = 130;
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    // Without a handler Ctrl-C still ends the program; only the cleaning up is lost.
+    let _ = ctrlc::set_handler(|| {
+        if stretch_data::interrupt() == 0 {
+            std::process::exit(INTERRUPTED.into());
+        }
+    });
+    let result = match cli.command {
+        Command::Calibrate(args) => calibrate::run(args),
+        Command::Apply(args) => apply::run(args),
+        Command::Evaluate(args) => evaluate::run(args),
+        Command::Convert(args) => convert::run(args),
+        Command::Demo(args) => demo::run(args),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(_) if stretch_data::interrupted() => ExitCode::from(INTERRUPTED),
+        // whoever reads our output has gone: nothing is wrong
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("stretch: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| {
+        cause
+            .downcast_ref::<std::io::Error>()
+            .is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
+    })
+}

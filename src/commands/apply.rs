@@ -1,0 +1,150 @@
+//! `stretch apply`: a calibration on a trial, or live on standard input.
+
+use std::{
+    io::{self, BufWriter, Read, Write},
+    path::PathBuf,
+};
+
+use stretch_calibrate::{Applied, LiveReceptor, apply, read_calibration};
+use stretch_core::Calibration;
+use stretch_data::{ReadOptions, RowReader, Trial, push_number, write_whole};
+use stretch_receptor::{Reading, Withheld};
+
+/// Turn a trial's voltage into length, or a stream's as it comes
+///
+/// Writes time_s, the estimate, its rate, the branch and the domain, a line a
+/// sample. Where nothing can be said (the rate estimator warms up, a sample is
+/// missing) the numbers are empty and the domain says why. Inputs outside the
+/// calibrated domain are clamped, and the domain says so.
+///
+/// From standard input each line is answered as it comes; a malformed line is
+/// noted on standard error and passed over:
+///
+///   logger | stretch apply --calibration cal.json -
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(crate) struct Args {
+    /// Calibration record, from `stretch calibrate`
+    #[arg(long, value_name = "cal.json")]
+    calibration: PathBuf,
+    /// Trial, or - for standard input
+    #[arg(default_value = "-", value_name = "TRIAL.csv")]
+    trial: PathBuf,
+    /// Where the estimates go [default: standard output]
+    #[arg(long, value_name = "out.csv")]
+    out: Option<PathBuf>,
+    /// Column of the time; its last part may be ms, us or ns
+    #[arg(long, default_value = "time_s", value_name = "COL")]
+    time: String,
+}
+
+pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+    let calibration = read_calibration(&args.calibration)?;
+    let options = ReadOptions::new().time(&args.time).require(calibration.signal.as_str());
+    if args.trial.as_os_str() == "-" {
+        return match &args.out {
+            None => live(&calibration, io::stdin(), &options, &mut io::stdout().lock()),
+            Some(path) => {
+                let mut result = Ok(());
+                write_whole(path, |out| {
+                    result = live(&calibration, io::stdin(), &options, out);
+                    Ok(())
+                })?;
+                result
+            }
+        };
+    }
+    let trial = Trial::read(&args.trial, &options)?;
+    let applied = apply(&calibration, &trial)?;
+    match &args.out {
+        Some(path) => write_whole(path, |out| write_all(&calibration, &trial, &applied, out))?,
+        None => {
+            let mut out = BufWriter::new(io::stdout().lock());
+            write_all(&calibration, &trial, &applied, &mut out)?;
+            out.flush()?;
+        }
+    }
+    let withheld = applied.readings.iter().filter(|r| r.is_err()).count();
+    let faults = applied.faults;
+    eprintln!(
+        "{} samples: {withheld} without an estimate; time stamps: {} missing, {} early or late",
+        trial.len(),
+        faults.missing,
+        faults.jittered,
+    );
+    Ok(())
+}
+
+/// Answers each line as it comes.
+fn live(
+    calibration: &Calibration,
+    input: impl Read,
+    options: &ReadOptions,
+    out: &mut dyn Write,
+) -> anyhow::Result<()> {
+    let mut receptor = LiveReceptor::new(calibration)?;
+    let mut rows = RowReader::new(input, "standard input", options)?;
+    out.write_all(header(calibration).as_bytes())?;
+    out.flush()?;
+    let mut line = Vec::new();
+    while let Some(row) = rows.next_row() {
+        match row {
+            Ok(row) => {
+                let reading = receptor.step(row.time_s, row.values[0]);
+                line.clear();
+                push_line(&mut line, row.time_s, &reading);
+                out.write_all(&line)?;
+                out.flush()?;
+            }
+            Err(error) if error.is_row() => eprintln!("stretch: {error}"),
+            Err(error) => return Err(error.into()),
+        }
+    }
+    Ok(())
+}
+
+fn write_all(
+    calibration: &Calibration,
+    trial: &Trial,
+    applied: &Applied,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    out.write_all(header(calibration).as_bytes())?;
+    let mut line = Vec::with_capacity(64);
+    for (&time_s, reading) in trial.time_s.iter().zip(&applied.readings) {
+        line.clear();
+        push_line(&mut line, time_s, reading);
+        out.write_all(&line)?;
+    }
+    Ok(())
+}
+
+/// `time_s,estimate_mm,rate_mm_per_s,branch,domain`, the unit that of the reference.
+pub(super) fn header(calibration: &Calibration) -> String {
+    match calibration.reference.unit() {
+        "" => "time_s,estimate,rate_per_s,branch,domain\n".to_owned(),
+        unit => format!("time_s,estimate_{unit},rate_{unit}_per_s,branch,domain\n"),
+    }
+}
+
+fn push_line(line: &mut Vec<u8>, time_s: f64, reading: &Result<Reading, Withheld>) {
+    push_number(line, time_s);
+    // writing to memory cannot fail
+    let _ = match reading {
+        Ok(Reading { estimate, rate, branch, domain }) => {
+            writeln!(line, ",{estimate:.6},{rate:.6},{branch},{domain}")
+        }
+        Err(withheld) => writeln!(line, ",,,,{withheld}"),
+    };
+}
+
+/// The estimates of a trial as a file would hold them.
+pub(super) fn estimates_csv(
+    calibration: &Calibration,
+    trial: &Trial,
+    applied: &Applied,
+) -> io::Result<Vec<u8>> {
+    let mut text = Vec::new();
+    write_all(calibration, trial, applied, &mut text)?;
+    Ok(text)
+}

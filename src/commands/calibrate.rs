@@ -1,0 +1,311 @@
+//! `stretch calibrate`: from logged trials to a calibration record.
+
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+use serde::Serialize;
+use stretch_calibrate::{
+    Calibrated, Candidate, FitReport, ModelKind, Options, Robust, SplitBy, calibrate, evaluate,
+    parse_rate, rank_signals, write_calibration,
+};
+use stretch_core::{Normalisation, RateEstimator, RateSource};
+use stretch_data::{ReadOptions, Split, Trial};
+
+use super::shared::{read_trials, say, say_json, write_text};
+use crate::{
+    report::{self, Context},
+    table::{maybe, number, table},
+};
+
+/// Fit a calibration to logged trials
+///
+/// Each trial is a CSV file with a header line, a time_s column, the signal and
+/// the reference; a folder with a dataset.toml stands for its fit trials. The
+/// record that is written holds all that `apply` or a board needs: surfaces,
+/// ranges, rate estimator, dead band, domain, and where it comes from.
+///
+/// Examples:
+///
+///   stretch calibrate ramps/*.csv --out cal.json --report cal.html
+///   stretch calibrate knee.csv --reference angle_deg --signal auto --out cal.json
+///   stretch calibrate ramps/*.csv --paper --out published.json
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(crate) struct Args {
+    /// Trials to fit, or a folder with a dataset.toml
+    #[arg(required = true, value_name = "TRIAL.csv")]
+    trials: Vec<PathBuf>,
+    /// What to fit: linear, or polyIJ of degree I in the rate and J in the signal
+    #[arg(long, default_value = "poly13")]
+    model: ModelKind,
+    /// How channels are normalised: divided by their range, or minimum to maximum
+    #[arg(long, value_enum, default_value_t = Normalise::Range)]
+    normalise: Normalise,
+    /// Estimator of the signal's rate: savgol:WINDOW,DEGREE[,DELAY], difference:CUTOFF_HZ,
+    /// tracker:INDEX, central
+    #[arg(long, default_value = "savgol:11,2", value_parser = parse_rate)]
+    rate: RateEstimator,
+    /// Rate that surfaces are fitted on: the signal's, as it will run, or the reference's, as in
+    /// the paper
+    #[arg(long, value_enum, default_value_t = Source::Voltage)]
+    rate_source: Source,
+    /// How samples are given to the branches: by the sign of the rate, or a trial each
+    #[arg(long, value_enum, default_value_t = BranchBy::Rate)]
+    branch_by: BranchBy,
+    /// The method as published: central differences, strain rate, a branch a trial, no dead band
+    #[arg(long, conflicts_with_all = ["rate", "rate_source", "branch_by", "dead_band"])]
+    paper: bool,
+    /// Column of the reference; its last part is the unit of the estimate
+    #[arg(long, default_value = "length_mm", value_name = "COL")]
+    reference: String,
+    /// Column of the signal, several with commas, or `auto`: the best by cross-validation
+    #[arg(long, default_value = "bridge_v", value_name = "COL")]
+    signal: String,
+    /// Column of the time; its last part may be ms, us or ns
+    #[arg(long, default_value = "time_s", value_name = "COL")]
+    time: String,
+    /// Zero of the signal, subtracted before it is divided by its range [default: 1.24 for
+    /// bridge_v, else 0]
+    #[arg(long, value_name = "X", allow_hyphen_values = true)]
+    signal_zero: Option<f64>,
+    /// Resting length: the target is then the contraction [default: the greatest value of a
+    /// reference called length..., else the reference itself is the target]
+    #[arg(long, value_name = "X")]
+    rest_length: Option<f64>,
+    /// Rates this close to zero keep the branch, in signal units per second [default: three
+    /// standard deviations of the rate's noise]
+    #[arg(long, value_name = "X")]
+    dead_band: Option<f64>,
+    /// Weigh outliers down: bisquare, or least absolute residuals
+    #[arg(long, value_enum)]
+    robust: Option<Loss>,
+    /// Date for the record, as free text
+    #[arg(long, default_value = "", hide_default_value = true)]
+    date: String,
+    /// Trials that the report judges the calibration on [default: those that were fitted]
+    #[arg(long, value_name = "TRIAL.csv", num_args = 1..)]
+    test: Vec<PathBuf>,
+    /// Where the record goes: JSON, or postcard for a board when the name ends in .postcard
+    #[arg(long, value_name = "cal.json")]
+    out: PathBuf,
+    /// Where a report with pictures goes
+    #[arg(long, value_name = "r.html")]
+    report: Option<PathBuf>,
+    /// Print JSON in place of tables
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Normalise {
+    Range,
+    MinMax,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Source {
+    Strain,
+    Voltage,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum BranchBy {
+    Rate,
+    Trial,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Loss {
+    Bisquare,
+    Lar,
+}
+
+impl Args {
+    fn options(&self) -> Options {
+        let base = if self.paper {
+            Options::paper()
+        } else {
+            Options {
+                rate: self.rate,
+                rate_source: match self.rate_source {
+                    Source::Strain => RateSource::Strain,
+                    Source::Voltage => RateSource::Voltage,
+                },
+                split: match self.branch_by {
+                    BranchBy::Rate => SplitBy::Rate,
+                    BranchBy::Trial => SplitBy::Trial,
+                },
+                dead_band: self.dead_band,
+                ..Options::default()
+            }
+        };
+        Options {
+            signal: self.signal.clone(),
+            reference: self.reference.clone(),
+            model: self.model,
+            normalisation: match self.normalise {
+                Normalise::Range => Normalisation::Range,
+                Normalise::MinMax => Normalisation::MinMax,
+            },
+            robust: match self.robust {
+                None => Robust::Off,
+                Some(Loss::Bisquare) => Robust::Bisquare,
+                Some(Loss::Lar) => Robust::Lar,
+            },
+            signal_zero: self.signal_zero,
+            rest_length: self.rest_length,
+            date: self.date.clone(),
+            ..base
+        }
+    }
+
+    /// The signals to choose from; none when one was named.
+    fn candidates(&self, trials: &[Trial]) -> Vec<String> {
+        if self.signal == "auto" {
+            let channels = trials.first().map(|trial| trial.channels.as_slice()).unwrap_or(&[]);
+            let named = channels.iter().map(|channel| channel.name.clone());
+            return named.filter(|name| *name != self.reference).collect();
+        }
+        if self.signal.contains(',') {
+            return self.signal.split(',').map(|name| name.trim().to_owned()).collect();
+        }
+        Vec::new()
+    }
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Output<'a> {
+    signal: &'a str,
+    candidates: &'a [Candidate],
+    fits: &'a [FitReport],
+    notes: &'a [String],
+}
+
+pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+    let mut options = args.options();
+    let mut columns = ReadOptions::new().time(&args.time).require(&args.reference);
+    if args.signal != "auto" {
+        for signal in args.signal.split(',') {
+            columns = columns.require(signal.trim());
+        }
+    }
+    let trials = read_trials(&args.trials, Split::Fit, &columns)?;
+    let candidates = args.candidates(&trials);
+    let ranking = if candidates.is_empty() {
+        Vec::new()
+    } else {
+        rank_signals(&trials, &candidates, &options)?
+    };
+    if let Some(best) = ranking.first() {
+        options.signal.clone_from(&best.signal);
+    }
+    let calibrated = calibrate(&trials, &options)?;
+    write_calibration(&args.out, &calibrated.calibration)?;
+    if let Some(path) = &args.report {
+        write_report(&args, path, &trials, &columns, &calibrated, &ranking, &options)?;
+    }
+    if args.json {
+        return say_json(&Output {
+            signal: &options.signal,
+            candidates: &ranking,
+            fits: &calibrated.fits,
+            notes: &calibrated.notes,
+        });
+    }
+    print(&calibrated, &ranking)?;
+    say(format!("wrote {}", args.out.display()))?;
+    match &args.report {
+        Some(path) => say(format!("wrote {}", path.display())),
+        None => Ok(()),
+    }
+}
+
+fn write_report(
+    args: &Args,
+    path: &std::path::Path,
+    trials: &[Trial],
+    columns: &ReadOptions,
+    calibrated: &Calibrated,
+    ranking: &[Candidate],
+    options: &Options,
+) -> anyhow::Result<()> {
+    let test = read_trials(&args.test, Split::Test, columns)?;
+    let judged = if test.is_empty() { trials } else { &test };
+    // the line is the yardstick that every surface is held against
+    let linear = calibrate(trials, &Options { model: ModelKind::Linear, ..options.clone() })?;
+    let name = args.model.to_string();
+    let mut shown = vec![("linear", &linear)];
+    if args.model != ModelKind::Linear {
+        shown.push((name.as_str(), calibrated));
+    }
+    let named: Vec<_> = shown.iter().map(|(name, c)| (*name, &c.calibration)).collect();
+    let evaluation = evaluate(&named, judged)?;
+    let names = |trials: &[Trial]| trials.iter().map(|trial| trial.name.clone()).collect();
+    let context = Context {
+        title: format!("Calibration of {} on {}", options.reference, options.signal),
+        calibrated_on: names(trials),
+        tested_on: names(&test),
+        signal_choice: ranking.to_vec(),
+        notes: calibrated.notes.clone(),
+    };
+    write_text(path, &report::calibration_page(&shown, &evaluation, &context))
+}
+
+/// The tables of a calibration, as the paper prints them.
+pub(super) fn print(calibrated: &Calibrated, ranking: &[Candidate]) -> anyhow::Result<()> {
+    if !ranking.is_empty() {
+        say("Signals, by error on data left out of the fit (normalised):")?;
+        let row = |c: &Candidate| {
+            let shown = c.problem.clone().unwrap_or_else(|| maybe(c.cross_validated_rmse));
+            vec![c.signal.clone(), shown]
+        };
+        say(table(&["signal", "cross-validated RMSE"], ranking.iter().map(row)))?;
+    }
+    let row = |fit: &FitReport| {
+        vec![
+            fit.name.clone(),
+            fit.model.clone(),
+            fit.samples.to_string(),
+            format!("{:.4}", fit.r_squared),
+            number(100.0 * fit.rmse),
+            number(fit.condition),
+        ]
+    };
+    let header = ["fit", "model", "samples", "R^2", "RMSE % of range", "condition"];
+    say(table(&header, calibrated.fits.iter().map(row)))?;
+    say("Coefficients (normalised rate r, signal V) with 95 % bounds:")?;
+    let rows = calibrated.fits.iter().flat_map(|fit| {
+        fit.coefficients.iter().map(|c| {
+            vec![
+                format!("{} {}", fit.name, c.name),
+                number(c.estimate),
+                number(c.lower),
+                number(c.upper),
+            ]
+        })
+    });
+    say(table(&["coefficient", "estimate", "lower", "upper"], rows))?;
+    if calibrated.fits.iter().any(|fit| !fit.orders.is_empty()) {
+        say("Orders beside it (CV: on data left out of the fit):")?;
+        let rows = calibrated.fits.iter().flat_map(|fit| {
+            fit.orders.iter().map(|order| {
+                let chosen = Some(&order.model) == fit.recommended.as_ref();
+                vec![
+                    format!("{} {}", fit.name, order.model),
+                    order.terms.to_string(),
+                    order.r_squared.map_or("-".to_owned(), |r| format!("{r:.4}")),
+                    maybe(order.rmse.map(|x| 100.0 * x)),
+                    maybe(order.cross_validated_rmse.map(|x| 100.0 * x)),
+                    if chosen { "recommended".to_owned() } else { String::new() },
+                ]
+            })
+        });
+        let header = ["order", "terms", "R^2", "RMSE %", "CV RMSE %", ""];
+        say(table(&header, rows))?;
+    }
+    for note in &calibrated.notes {
+        say(format!("note: {note}"))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,110 @@
+//! `stretch convert`: a foreign log in the format of the other commands.
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use stretch_data::{Channel, ReadOptions, Trial};
+
+use super::shared::say;
+
+/// Bring a foreign log into the format of the other commands
+///
+/// Reads any table with a header (commas, semicolons or tabs), takes the time
+/// from a column of seconds, milliseconds, microseconds or nanoseconds, renames
+/// and scales columns, and writes a trial:
+///
+///   stretch convert log.csv --time t_ms --column length_mm=pos*1000 \
+///     --column bridge_v=adc*0.000805861-0.2 --out trial.csv
+///
+/// A column is NEW=OLD, NEW=OLD*FACTOR, or NEW=OLD*FACTOR+OFFSET.
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(crate) struct Args {
+    /// Log to read
+    #[arg(value_name = "LOG.csv")]
+    log: PathBuf,
+    /// Column of the time; its last part may be ms, us or ns
+    #[arg(long, default_value = "time_s", value_name = "COL")]
+    time: String,
+    /// Column to write, as NEW=OLD*FACTOR+OFFSET [default: all, as they are]
+    #[arg(long = "column", value_name = "NEW=OLD", value_parser = parse_column)]
+    columns: Vec<Column>,
+    /// Let the time begin at zero
+    #[arg(long)]
+    from_zero: bool,
+    /// Where the trial goes
+    #[arg(long, value_name = "trial.csv")]
+    out: PathBuf,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Column {
+    new: String,
+    old: String,
+    factor: f64,
+    offset: f64,
+}
+
+fn parse_column(text: &str) -> Result<Column, String> {
+    let wrong = || format!("\"{text}\" is not NEW=OLD, NEW=OLD*FACTOR or NEW=OLD*FACTOR+OFFSET");
+    let (new, source) = text.split_once('=').ok_or_else(wrong)?;
+    let (old, scale) = source.split_once('*').unwrap_or((source, "1"));
+    // the sign of the offset is the last one that does not belong to a number
+    let sign = scale
+        .char_indices()
+        .skip(1)
+        .filter(|&(i, c)| matches!(c, '+' | '-') && !scale[..i].ends_with(['e', 'E']))
+        .map(|(i, _)| i)
+        .last();
+    let (factor, offset) = sign.map_or((scale, "0"), |i| scale.split_at(i));
+    let number = |text: &str| text.parse::<f64>().ok().filter(|x| x.is_finite());
+    match (number(factor), number(offset)) {
+        (Some(factor), Some(offset)) if !new.is_empty() && !old.is_empty() => {
+            Ok(Column { new: new.to_owned(), old: old.to_owned(), factor, offset })
+        }
+        _ => Err(wrong()),
+    }
+}
+
+pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+    let mut options = ReadOptions::new().time(&args.time);
+    for column in &args.columns {
+        options = options.require(&column.old);
+    }
+    let log = Trial::read(&args.log, &options)?;
+    let channels = if args.columns.is_empty() {
+        log.channels.clone()
+    } else {
+        let convert = |column: &Column| -> anyhow::Result<Channel> {
+            let values = log.require(&column.old)?.iter();
+            let values = values.map(|x| x * column.factor + column.offset).collect();
+            Ok(Channel { name: column.new.clone(), values })
+        };
+        args.columns.iter().map(convert).collect::<anyhow::Result<_>>()?
+    };
+    let start_s = if args.from_zero { log.time_s[0] } else { 0.0 };
+    let time_s = log.time_s.iter().map(|t| t - start_s).collect();
+    let trial = Trial { name: log.name.clone(), time_s, channels };
+    trial.write(&args.out).context("nothing was written")?;
+    let names: Vec<_> = trial.channels.iter().map(|c| c.name.as_str()).collect();
+    say(format!("wrote {}: {} samples of {}", args.out.display(), trial.len(), names.join(", ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Column, parse_column};
+
+    #[test]
+    fn columns_are_understood() {
+        let column = |factor, offset| {
+            Ok(Column { new: "length_mm".into(), old: "pos".into(), factor, offset })
+        };
+        assert_eq!(parse_column("length_mm=pos"), column(1.0, 0.0));
+        assert_eq!(parse_column("length_mm=pos*-2.5"), column(-2.5, 0.0));
+        assert_eq!(parse_column("length_mm=pos*1e-3-4"), column(1e-3, -4.0));
+        assert_eq!(parse_column("length_mm=pos*1000+0.5"), column(1000.0, 0.5));
+        for wrong in ["pos", "=pos", "a=", "a=b*", "a=b*x", "a=b*1+", "a=b*nan"] {
+            assert!(parse_column(wrong).unwrap_err().contains(wrong), "{wrong}");
+        }
+    }
+}

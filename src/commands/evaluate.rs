@@ -1,0 +1,104 @@
+//! `stretch evaluate`: how good a calibration is on trials with a reference.
+
+use std::path::PathBuf;
+
+use stretch_calibrate::{Evaluation, MethodErrors, evaluate, read_calibration};
+use stretch_data::{ReadOptions, Split};
+
+use super::shared::{read_trials, say, say_json, short_name};
+use crate::table::{maybe, number, p_value, table};
+
+/// Judge calibrations on trials that have a reference
+///
+/// Prints the paper's measures for the raw signal (its extremes scaled onto the
+/// reference's) and for each calibration: average error, RMSE, R^2, lag; and
+/// paired t tests between them, on samples as the paper did and on means of
+/// half-second blocks, which do not count one motion as a thousand.
+///
+///   stretch evaluate --calibration linear.json --calibration poly13.json walk.csv
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(crate) struct Args {
+    /// Calibration record; may be given several times
+    #[arg(long, required = true, value_name = "cal.json")]
+    calibration: Vec<PathBuf>,
+    /// Trials, or a folder with a dataset.toml for its test trials
+    #[arg(required = true, value_name = "TRIAL.csv")]
+    trials: Vec<PathBuf>,
+    /// Column of the time; its last part may be ms, us or ns
+    #[arg(long, default_value = "time_s", value_name = "COL")]
+    time: String,
+    /// Print JSON in place of tables
+    #[arg(long)]
+    json: bool,
+}
+
+pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+    let mut calibrations = Vec::new();
+    for path in &args.calibration {
+        calibrations.push((short_name(path), read_calibration(path)?));
+    }
+    let mut columns = ReadOptions::new().time(&args.time);
+    for (_, calibration) in &calibrations {
+        columns = columns.require(calibration.signal.as_str());
+        columns = columns.require(calibration.reference.as_str());
+    }
+    let trials = read_trials(&args.trials, Split::Test, &columns)?;
+    let named: Vec<_> = calibrations.iter().map(|(name, c)| (name.as_str(), c)).collect();
+    let evaluation = evaluate(&named, &trials)?;
+    if args.json {
+        return say_json(&evaluation);
+    }
+    print(&evaluation)
+}
+
+/// The paper's table, a trial each and pooled.
+pub(super) fn print(evaluation: &Evaluation) -> anyhow::Result<()> {
+    let unit = &evaluation.unit;
+    let rmse = format!("RMSE {unit}");
+    let header =
+        ["method", "average error %", "of reference %", &rmse, "RMSE %", "R^2", "lag s", "clamped"];
+    let row = |m: &MethodErrors| {
+        vec![
+            m.method.clone(),
+            number(m.average_error_percent),
+            number(m.average_error_percent_of_reference),
+            number(m.rmse),
+            number(m.rmse_percent),
+            format!("{:.4}", m.r_squared),
+            maybe(m.lag_s),
+            m.clamped.to_string(),
+        ]
+    };
+    for trial in &evaluation.trials {
+        say(format!("{}:", trial.trial))?;
+        say(table(&header, trial.methods.iter().map(row)))?;
+    }
+    if evaluation.trials.len() > 1 {
+        say("All trials:")?;
+        say(table(&header, evaluation.pooled.iter().map(row)))?;
+    }
+    say(
+        "Average error: mean |reference - estimate| over the range of the estimate (the paper's),",
+    )?;
+    say("and over that of the reference. Lag: positive when the estimate runs behind.")?;
+    if !evaluation.comparisons.is_empty() {
+        let mean = format!("difference of mean |error|, {unit}");
+        let header =
+            ["first - second", &mean, "95 % interval", "P, samples", "P, blocks", "blocks"];
+        let rows = evaluation.comparisons.iter().map(|c| {
+            let interval = c.interval_95;
+            vec![
+                format!("{} - {}", c.first, c.second),
+                number(c.mean_difference),
+                interval.map_or("-".to_owned(), |(a, b)| format!("{} .. {}", number(a), number(b))),
+                p_value(c.p_samples),
+                p_value(c.p_blocks),
+                c.blocks.to_string(),
+            ]
+        });
+        say("Paired t tests of absolute errors:")?;
+        say(table(&header, rows))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,8 @@
+//! One file a subcommand, and what they share.
+
+pub(crate) mod apply;
+pub(crate) mod calibrate;
+pub(crate) mod convert;
+pub(crate) mod demo;
+pub(crate) mod evaluate;
+pub(crate) mod shared;

@@ -45,7 +45,6 @@ pub struct Agreement<T> {
     truth: Spread<T>,
     estimate: Spread<T>,
     products: Sum<T>,
-    skipped: u64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -91,7 +90,6 @@ impl<T: Real> Agreement<T> {
             truth: Spread::new(),
             estimate: Spread::new(),
             products: Sum::new(),
-            skipped: 0,
         }
     }
 
@@ -100,14 +98,14 @@ impl<T: Real> Agreement<T> {
     #[inline]
     pub fn push(&mut self, truth: T, estimate: T) -> bool {
         let limit = largest::<T>();
-        let taken =
-            truth.abs() <= limit && estimate.abs() <= limit && self.errors.push(truth, estimate);
+        let sound = truth.abs() <= limit && estimate.abs() <= limit;
+        let taken = sound && self.errors.push(truth, estimate);
         if taken {
             let (before, _) = self.truth.push(truth);
             let (_, after) = self.estimate.push(estimate);
             self.products.add(before * after);
-        } else {
-            self.skipped += 1;
+        } else if !sound {
+            self.errors.skip();
         }
         taken
     }
@@ -125,7 +123,6 @@ impl<T: Real> Agreement<T> {
         self.errors.merge(&other.errors);
         self.truth.merge(&other.truth);
         self.estimate.merge(&other.estimate);
-        self.skipped += other.skipped;
     }
 
     /// Bias, MAE, RMSE and the rest, in the unit of the signals.
@@ -140,7 +137,7 @@ impl<T: Real> Agreement<T> {
 
     /// Pairs not taken.
     pub fn skipped(&self) -> u64 {
-        self.skipped
+        self.errors.skipped()
     }
 
     /// Least and greatest value of the truth. `None` when empty.

@@ -57,9 +57,14 @@ impl<T: Real> ErrorStats<T> {
             self.absolute.add(size);
             self.largest = self.largest.max(size);
         } else {
-            self.skipped += 1;
+            self.skip();
         }
         taken
+    }
+
+    /// Counts a pair that was not taken.
+    pub(crate) fn skip(&mut self) {
+        self.skipped += 1;
     }
 
     /// Takes all samples of another stream.

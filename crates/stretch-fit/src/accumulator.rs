@@ -15,7 +15,9 @@ use crate::{
 ///
 /// - `TERMS`: room for terms, 7 for poly13, 21 for any degree.
 /// - `ROWS`: 64 to 256 on a desk (128 is fastest for poly13), 8 to 16 on a
-///   board. It changes speed and memory, and results only by rounding.
+///   board. It changes speed and memory, and results only by rounding, which
+///   grows with the number of blocks: below 8 rows, logs of more than 1e5
+///   samples lose a digit or two and dependent terms may go unseen.
 ///
 /// Rate, voltage and value carry whatever units the caller's normalisation
 /// gives them. In `f32` keep them near 1: powers of large or tiny numbers

@@ -66,8 +66,9 @@ pub struct RobustFit<T, const TERMS: usize> {
 ///
 /// **Least absolute residuals**: a sample weighs `1/max(|e|, d)` with `d` a
 /// millionth of the robust scale of the plain fit. Sigma is the distribution-free
-/// `sqrt(n) (e_hi - e_lo)/(2 * 1.96)` between the order statistics that bound
-/// the median at 95 % (McKean and Schrader 1987).
+/// `sqrt(n - p) (e_hi - e_lo)/(2 * 1.96)` between the order statistics that bound
+/// the median at 95 % (McKean and Schrader 1987), over the `n - p` residuals that
+/// the surface does not pass through.
 ///
 /// Steps end when no coefficient moves by more than `sqrt(epsilon)` of its size.
 ///
@@ -183,7 +184,7 @@ where
             for ((rate, volts, value), place) in samples().into_iter().zip(&mut *residuals) {
                 *place = value - found.surface.eval(rate, volts);
             }
-            median_spread(residuals)
+            median_spread(residuals, ols.terms())
         }
     };
     // Statistics over all samples alike, from the plain triangle.
@@ -224,7 +225,6 @@ fn median_of_largest<T: Real>(values: &mut [T], terms: usize) -> T {
 /// The value that would stand at `place` if sorted; those before it are moved
 /// before it.
 fn order_statistic<T: Real>(values: &mut [T], place: usize) -> T {
-    let order = |a: &T, b: &T| a.partial_cmp(b).unwrap_or(core::cmp::Ordering::Equal);
     if values.is_empty() {
         return T::zero();
     }
@@ -257,14 +257,24 @@ fn bisquare_sigma<T: Real, const TERMS: usize>(
     robust.max(mixed)
 }
 
-/// Half the width of the 95 % interval of the median of `n` residuals, as the
-/// standard deviation that a mean would need to be that uncertain.
-fn median_spread<T: Real>(residuals: &mut [T]) -> T {
+/// Half the width of the 95 % interval of the median of residuals, as the
+/// standard deviation that a mean would need to be that uncertain. The surface
+/// passes through `terms` samples; their residuals of zero are no evidence of
+/// the errors' density at the median and are left out.
+fn median_spread<T: Real>(residuals: &mut [T], terms: usize) -> T {
     const NORMAL_95: f64 = 1.959_963_984_540_054;
+    let by_size = |a: &T, b: &T| order(&a.abs(), &b.abs());
+    residuals.sort_unstable_by(by_size);
+    let residuals = &mut residuals[terms..];
     let n = residuals.len();
     let root = libm::sqrt(n as f64);
     let from_end = libm::round((n as f64 + 1.0) / 2.0 - NORMAL_95 * root / 2.0).max(1.0) as usize;
     let low = order_statistic(residuals, from_end - 1);
     let high = order_statistic(residuals, n - from_end);
     (high - low) * T::from_f64(root / (2.0 * NORMAL_95))
+}
+
+/// By size; finite numbers only, so that any two compare.
+fn order<T: Real>(a: &T, b: &T) -> core::cmp::Ordering {
+    a.partial_cmp(b).unwrap_or(core::cmp::Ordering::Equal)
 }

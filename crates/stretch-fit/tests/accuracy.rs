@@ -42,9 +42,9 @@ fn error<T: Real, const ROWS: usize>(samples: u32, centre: f64, width: f64) -> (
 #[test]
 fn raw_volts_of_condition_1e8_keep_ten_digits() {
     let (off, _) = error::<f64, 128>(100_000, 1.24, 0.02);
-    assert!(off < 1e-10, "off by {off:e}");
+    assert!(off < tol::FIT_ILL_LONG, "off by {off:e}");
     let (off, _) = error::<f64, 8>(100_000, 1.24, 0.02);
-    assert!(off < 1e-10, "rows of 8: off by {off:e}");
+    assert!(off < tol::FIT_ILL_LONG, "rows of 8: off by {off:e}");
 }
 
 #[test]
@@ -54,8 +54,7 @@ fn f32_holds_on_a_board() {
     assert!(worst < tol::FIT_F32, "normalised: surface off by {worst:e}");
     // Condition 4e4: normal equations in f32 lose every digit here.
     let (off, worst) = error::<f32, 8>(20_000, 1.1, 0.25);
-    println!("narrow: {off:e} {worst:e}");
-    assert!(off < tol::FIT_F32_NARROW, "narrow: off by {off:e}");
+    assert!(off < tol::FIT_F32, "narrow: off by {off:e}");
     assert!(worst < tol::FIT_F32, "narrow: surface off by {worst:e}");
 }
 
@@ -104,7 +103,6 @@ fn bounds_hold_the_truth_as_often_as_they_say() {
     // single coefficient's 200 are 4.6 %.
     for (fit, held) in ["plain", "bisquare", "least absolute"].iter().zip(held) {
         let share = held.iter().sum::<usize>() as f64 / (7 * RUNS) as f64;
-        println!("{fit}: {share}");
         assert!((0.95 - 0.046..=0.95 + 0.046).contains(&share), "{fit}: {share}");
     }
 }

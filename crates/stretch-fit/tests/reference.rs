@@ -12,9 +12,8 @@ const CASES: [&str; 2] = ["fit/well.csv", "fit/ill.csv"];
 
 fn accumulate(samples: &Columns, degree: Degree, weighted: bool) -> Factor<f64, 21> {
     let mut sums = SurfaceAccumulator::<f64, 21, 64>::new(degree).unwrap();
-    for k in 0..samples["rate"].len() {
-        let [rate, volts, value, weight] =
-            ["rate", "volts", "value", "weight"].map(|name| samples[name][k]);
+    for (k, &rate) in samples["rate"].iter().enumerate() {
+        let [volts, value, weight] = ["volts", "value", "weight"].map(|name| samples[name][k]);
         let weight = if weighted { weight } else { 1.0 };
         sums.push_weighted(rate, volts, value, weight).unwrap();
     }
@@ -42,9 +41,9 @@ fn coefficients_errors_and_statistics() {
     let (coefficients, statistics) =
         (columns("fit/coefficients.csv"), columns("fit/statistics.csv"));
     let samples = CASES.map(columns);
-    for row in 0..statistics["i"].len() {
+    for (row, &i) in statistics["i"].iter().enumerate() {
         let at = |name: &str| statistics[name][row];
-        let [ill, weighted, i, j] = ["ill", "weighted", "i", "j"].map(at);
+        let [ill, weighted, j] = ["ill", "weighted", "j"].map(at);
         let degree = Degree::new(i as u8, j as u8).unwrap();
         let fit = accumulate(&samples[ill as usize], degree, weighted == 1.0).fit().unwrap();
         let condition = at("condition");
@@ -107,12 +106,12 @@ fn lower_orders_from_one_pass() {
 fn prediction_bounds() {
     let table = columns("fit/prediction.csv");
     let samples = CASES.map(columns);
-    for row in 0..table["rate"].len() {
+    for (row, &rate) in table["rate"].iter().enumerate() {
         let at = |name: &str| table[name][row];
         let factor =
             accumulate(&samples[at("ill") as usize], Degree::POLY13, at("weighted") == 1.0);
         let fit = factor.fit().unwrap();
-        let (rate, volts) = (at("rate"), at("volts"));
+        let volts = at("volts");
         let off = relative(fit.leverage(rate, volts), at("leverage"));
         assert!(off < tol::FIT_ILL, "leverage, row {row}: off by {off:e}");
         let bounds = fit.confidence(0.95).unwrap();

@@ -5,10 +5,7 @@ use stretch_data::Trial;
 use stretch_filter::{Arrival, Cadence, RateFilter};
 use stretch_receptor::{MAX_BRIDGED, Reading, StretchReceptor, Withheld};
 
-use crate::{
-    CalibrateError,
-    series::{column, rates_at_use},
-};
+use crate::{CalibrateError, series::rates_at_use};
 
 /// An interval off by more than this share of a period is counted as jitter.
 const JITTER_TOLERANCE: f64 = 0.2;
@@ -105,10 +102,10 @@ pub struct Applied {
 /// published: its rates are taken over the whole log, one sample ahead.
 ///
 /// # Errors
-/// [`CalibrateError::MissingColumn`] when the trial lacks the signal,
+/// [`CalibrateError::Data`] when the trial lacks the signal,
 /// [`CalibrateError::Filter`] when the estimator cannot be designed.
 pub fn apply(calibration: &Calibration, trial: &Trial) -> Result<Applied, CalibrateError> {
-    let signal = column(trial, calibration.signal.as_str())?;
+    let signal = trial.require(calibration.signal.as_str())?;
     if calibration.rate_estimator == RateEstimator::CentralDifference {
         let rate = calibration.sample_rate_hz;
         let rates = Logged(rates_at_use(calibration.rate_estimator, rate, signal)?);

@@ -11,7 +11,7 @@ use stretch_filter::RateFilter;
 use crate::{
     CalibrateError, FitReport, ModelKind, Options,
     fitting::{Sample, fit},
-    series::{Series, column, even, noise, polarity, sample_rate_hz, series},
+    series::{Series, even, noise, polarity, sample_rate_hz, series},
     split::{DeadBands, branches},
 };
 
@@ -105,7 +105,7 @@ impl Prepared {
                 return Err(CalibrateError::SampleRates { trial, rate_hz, first, first_hz });
             }
             let (signal, reference) =
-                (column(trial, &options.signal)?, column(trial, &options.reference)?);
+                (trial.require(&options.signal)?, trial.require(&options.reference)?);
             let even = even(trial, signal, reference, sample_rate)?;
             notes.extend(even.note);
             pieces.extend(even.pieces.into_iter().map(|piece| (index, piece)));

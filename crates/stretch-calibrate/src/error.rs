@@ -11,16 +11,6 @@ pub enum CalibrateError {
     /// No trial at all.
     #[error("there is no trial to calibrate on; name at least one file")]
     NoTrials,
-    /// A column is not there.
-    #[error("{trial}: there is no column {column}; the columns are {present}")]
-    MissingColumn {
-        /// The trial.
-        trial: String,
-        /// The column that is needed.
-        column: String,
-        /// Those that are there.
-        present: String,
-    },
     /// The time stamps give no sample rate.
     #[error("{trial}: {samples} samples are too few to tell a sample rate from; record more")]
     TooShort {

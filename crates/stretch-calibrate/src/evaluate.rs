@@ -8,7 +8,7 @@ use stretch_receptor::Domain;
 
 use crate::{
     CalibrateError, apply,
-    series::{column, polarity, sample_rate_hz},
+    series::{polarity, sample_rate_hz},
 };
 
 /// Blocks of the paired test, in seconds.
@@ -118,7 +118,7 @@ struct Estimates {
 /// reference.
 ///
 /// # Errors
-/// [`CalibrateError::MissingColumn`] when a trial lacks signal or reference,
+/// [`CalibrateError::Data`] when a trial lacks signal or reference,
 /// [`CalibrateError::NothingEstimated`] for one shorter than the warm-up.
 pub fn evaluate(
     calibrations: &[(&str, &Calibration)],
@@ -131,7 +131,7 @@ pub fn evaluate(
     let mut tests = Tests::new(names.len(), first.sample_rate_hz.hz());
     let mut rows = Vec::new();
     for trial in trials {
-        let reference = column(trial, first.reference.as_str())?;
+        let reference = trial.require(first.reference.as_str())?;
         let mut methods = vec![raw(first, trial)?];
         for (_, calibration) in calibrations {
             methods.push(estimates(calibration, trial)?);
@@ -167,8 +167,8 @@ pub fn evaluate(
 
 /// The uncalibrated signal: its extremes scaled onto the reference's.
 fn raw(calibration: &Calibration, trial: &Trial) -> Result<Estimates, CalibrateError> {
-    let signal = column(trial, calibration.signal.as_str())?;
-    let reference = column(trial, calibration.reference.as_str())?;
+    let signal = trial.require(calibration.signal.as_str())?;
+    let reference = trial.require(calibration.reference.as_str())?;
     let ends = |x: &[f64]| {
         x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| (a.min(x), b.max(x)))
     };

@@ -29,26 +29,11 @@ pub(crate) struct Series {
 
 /// The median sample rate of a trial, in hertz.
 pub(crate) fn sample_rate_hz(trial: &Trial) -> Result<f64, CalibrateError> {
-    let mut steps: Vec<f64> = trial.time_s.windows(2).map(|w| w[1] - w[0]).collect();
-    if steps.is_empty() {
-        let (trial, samples) = (trial.name.clone(), trial.len());
-        return Err(CalibrateError::TooShort { trial, samples });
-    }
-    let middle = steps.len() / 2;
-    let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
-    let hz = 1.0 / *median;
+    let too_short = || CalibrateError::TooShort { trial: trial.name.clone(), samples: trial.len() };
+    let hz = trial.rate_hz().ok_or_else(too_short)?;
     // time stamps are printed to the millisecond: 100.0000001 Hz is 100 Hz
     let whole = hz.round();
     Ok(if (hz - whole).abs() < 1e-3 * hz && whole > 0.0 { whole } else { hz })
-}
-
-/// The column of a trial, or an error that names those there are.
-pub(crate) fn column<'a>(trial: &'a Trial, name: &str) -> Result<&'a [f64], CalibrateError> {
-    trial.channel(name).ok_or_else(|| CalibrateError::MissingColumn {
-        trial: trial.name.clone(),
-        column: name.to_owned(),
-        present: trial.channels.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", "),
-    })
 }
 
 /// A trial's signal and reference on an even grid, cut at gaps; and what had to be done.

@@ -3,11 +3,17 @@
 mod backlash;
 mod effects;
 mod error;
+mod gauge;
 mod grid;
 mod memory;
 mod nearest;
 mod operator;
 mod params;
+mod preset;
+mod protocol;
+mod random;
+mod rig;
+mod session;
 mod skew;
 mod stage;
 mod stages;
@@ -18,6 +24,7 @@ pub use effects::{
     effect_named,
 };
 pub use error::SimError;
+pub use gauge::{Gauge, GaugeSpec};
 pub use grid::{DEFAULT_STEP_S, Grid};
 pub use memory::Memory;
 pub use operator::{
@@ -25,6 +32,10 @@ pub use operator::{
     soft_floor,
 };
 pub use params::{Key, PARAMETERS, ParameterInfo, RigParams, Tolerance};
+pub use preset::paper_preset;
+pub use protocol::{OPENINGS, PAUSE_S, RATE_HZ, TrialPlan};
+pub use rig::{LEAST_STRAIN, Rig, RunSettings, default_rig_text};
+pub use session::Session;
 pub use stage::Stage;
 pub use stages::{
     Actuation, Bridge, Chain, ChainMemory, Muscle, Openings, Pneumatics, Recorded, Reference,

@@ -14,6 +14,7 @@ pub use muscle::Muscle;
 pub use pneumatics::{Openings, Pneumatics};
 pub use reference::Reference;
 pub use sensing::{Bridge, Sensing};
+pub(crate) use sensing::{Sites, pick};
 
 use crate::SimError;
 

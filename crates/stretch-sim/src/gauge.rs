@@ -1,0 +1,177 @@
+//! A gauge alone: any stretch sensor with a reference is a rig of one stage.
+
+use crate::{
+    SimError,
+    effects::{ActiveEffect, EffectParameter, EffectSet, Surroundings},
+    grid::Grid,
+    memory::Memory,
+    operator::{Span, Start},
+    skew::Skew,
+    stage::Stage,
+    stages::{Reference, Sites, check_length, pick},
+};
+
+/// The nominal gauge: y = offset + gain e, e = (x - zero)/span.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GaugeSpec {
+    /// Reference at e = 0: its least over the fit trials.
+    pub zero: f64,
+    /// Range of the reference over the fit trials.
+    pub span: f64,
+    /// Signal at e = 0.
+    pub offset: f64,
+    /// Change of the signal over the range.
+    pub gain: f64,
+    /// Pressure that stands for P_ref in `pressure_crosstalk`, in the unit of the pressure given; none without one.
+    pub pressure_scale: Option<f64>,
+}
+
+/// A gauge alone, prepared. The effects of `sensing` act on e in place of the strain, on 1 + (y - offset)/gain in
+/// place of the resistance, on (y - offset)/gain in place of the voltage; those of `reference` act on e as it is
+/// measured, and are undone before it drives the gauge. `amplifier_saturation` takes no part, nor does
+/// `pressure_crosstalk` without a pressure.
+#[derive(Debug)]
+pub struct Gauge {
+    spec: GaugeSpec,
+    grid: Grid,
+    sites: Sites,
+    skew: Option<Skew>,
+    reference: Reference,
+    needs_pressure: bool,
+}
+
+impl Gauge {
+    /// Strokes of the rig in its own units, which ranges are divided by: strain, mm and V for the whole stroke.
+    const STROKES: [(&'static str, f64); 3] = [("strain", 0.2), ("mm", 30.0), ("V", 1.07)];
+
+    /// Whether an effect can act in a gauge alone.
+    pub fn accepts(effect: &dyn crate::Effect, has_pressure: bool) -> bool {
+        matches!(effect.stage(), Stage::Sensing | Stage::Reference)
+            && match effect.needs() {
+                Some("a pressure") => has_pressure,
+                Some(_) => false,
+                None => true,
+            }
+    }
+
+    /// Plausible range and typical value of a parameter in units of e and of y's span.
+    ///
+    /// ```
+    /// use stretch_sim::{Gauge, effect_named};
+    /// let w = &effect_named("sleeve_slip").unwrap().parameters()[0];
+    /// assert_eq!(Gauge::range(w), (0.0, 0.15, 0.04));
+    /// ```
+    pub fn range(parameter: &EffectParameter) -> (f64, f64, f64) {
+        let stroke =
+            Self::STROKES.iter().find(|(unit, _)| *unit == parameter.unit).map_or(1.0, |s| s.1);
+        (parameter.min / stroke, parameter.max / stroke, parameter.typical / stroke)
+    }
+
+    /// Prepares a gauge for records sampled every `dt_s`.
+    ///
+    /// # Errors
+    /// A span or gain that is zero or not finite, a sample time that is not positive, an effect that cannot act here.
+    pub fn new(spec: GaugeSpec, effects: &EffectSet, dt_s: f64) -> Result<Self, SimError> {
+        for (name, value) in [("span of the reference", spec.span), ("gain", spec.gain.abs())] {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(SimError::NotPositive { name, value });
+            }
+        }
+        let on = |e: &&ActiveEffect| !e.is_off();
+        if let Some(e) = effects
+            .iter()
+            .filter(on)
+            .find(|e| !Self::accepts(e.effect(), spec.pressure_scale.is_some()))
+        {
+            let needs = e.effect().needs().unwrap_or("valves and a muscle");
+            return Err(SimError::NotHere { name: e.name().to_string(), needs });
+        }
+        let grid = Grid::samples(dt_s)?;
+        let around = Surroundings {
+            grid: &grid,
+            strain_scale: 1.0,
+            strain_stroke: 1.0,
+            contraction_stroke: 1.0,
+            resistance_zero: 1.0,
+            volts_stroke: 1.0,
+            length_zero: 0.0,
+            length_span: 1.0,
+            pressure_scale_kpa: spec.pressure_scale.unwrap_or(1.0),
+            strain_unit: 1.0 / Self::STROKES[0].1,
+        };
+        let sites = Sites::new(effects.acting_in(Stage::Sensing), &around);
+        let reference = Reference::around(&around, effects, &grid);
+        Ok(Self {
+            spec,
+            skew: sites.skew(&grid),
+            sites,
+            reference,
+            needs_pressure: effects.acting_in(Stage::Sensing).any(|e| e.effect().needs().is_some()),
+            grid,
+        })
+    }
+
+    /// A memory for it.
+    pub fn memory(&self) -> Memory {
+        Memory::with_cells(self.sites.record.end())
+    }
+
+    /// Signal y at every sample, from the measured (smoothed) reference at the same samples. The pressure may be empty
+    /// unless an effect needs it.
+    ///
+    /// # Errors
+    /// Slices of different lengths, a pressure that is needed and absent.
+    pub fn run(
+        &self,
+        memory: &mut Memory,
+        start: Start,
+        start_s: f64,
+        reference: &[f64],
+        pressure: &[f64],
+        signal: &mut [f64],
+    ) -> Result<(), SimError> {
+        check_length("reference", signal.len(), reference.len())?;
+        if !pressure.is_empty() || self.needs_pressure {
+            check_length("pressure", signal.len(), pressure.len())?;
+        }
+        if signal.is_empty() {
+            return Ok(());
+        }
+        let start = memory.start(start);
+        let mut strain = std::mem::take(&mut memory.nodes);
+        strain.clear();
+        strain.extend(reference.iter().map(|x| (x - self.spec.zero) / self.spec.span));
+        self.reference.undo(&mut strain);
+        let sites = &self.sites;
+        let whole =
+            Span { grid: &self.grid, first_node: 0, start_s, pressure_kpa: pressure, strain: &[] };
+        let first = Span { pressure_kpa: pressure.get(..1).unwrap_or(&[]), ..whole };
+        let cells = &mut memory.cells;
+        let e = [sites.strain.begin(&first, start, strain[0], cells)];
+        sites.resistance.begin_at(start, e[0], cells);
+        let mut r = [1.0 + e[0]];
+        sites.resistance.run(&Span { strain: &e, ..first }, cells, &mut r);
+        sites.volts.begin(&first, start, r[0] - 1.0, cells);
+
+        sites.strain.run(&whole, cells, &mut strain);
+        for (y, e) in signal.iter_mut().zip(&strain) {
+            *y = 1.0 + e;
+        }
+        sites.resistance.run(&Span { strain: &strain, ..whole }, cells, signal);
+        for y in signal.iter_mut() {
+            *y -= 1.0;
+        }
+        sites.volts.run(&whole, cells, signal);
+        if let Some(skew) = &self.skew {
+            strain.copy_from_slice(signal);
+            pick(&self.grid, Some(skew), &strain, signal);
+        }
+        sites.record.begin(&whole, Start::Settled, signal[0], cells);
+        sites.record.run(&whole, cells, signal);
+        for y in signal.iter_mut() {
+            *y = self.spec.offset + self.spec.gain * *y;
+        }
+        memory.nodes = strain;
+        Ok(())
+    }
+}

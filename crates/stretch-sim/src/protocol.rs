@@ -1,0 +1,176 @@
+//! Protocols: what the valves do, trial after trial.
+
+use stretch_data::{Split, Trial, TrialKind};
+
+use crate::{SimError, random::Random};
+
+/// Samples a second of every protocol of the paper.
+pub const RATE_HZ: f64 = 100.0;
+/// Openings of the paper's ramps.
+pub const OPENINGS: [f64; 6] = [0.0025, 0.125, 0.25, 0.5, 0.75, 1.0];
+/// Seconds between trials: the clock runs, the excitation is off, the muscle is filled or vented anew.
+pub const PAUSE_S: f64 = 15.0;
+/// Samples of rest at every trial's start, both valves shut.
+const REST: usize = 100;
+const RAMP_S: f64 = 15.0;
+const LONG_S: f64 = 60.0;
+
+/// What the valves do in one trial, and what the trial is called.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrialPlan {
+    /// File to be written.
+    pub file: String,
+    /// What is done in it.
+    pub kind: TrialKind,
+    /// The one opening that is held, when there is one.
+    pub opening: Option<f64>,
+    /// What it may be used for.
+    pub split: Split,
+    /// Whether the chamber starts full (settled at the supply pressure); else it starts vented.
+    pub full: bool,
+    /// Samples a second.
+    pub rate_hz: f64,
+    /// Inlet, one value a sample.
+    pub inlet: Vec<f64>,
+    /// Outlet, one value a sample.
+    pub outlet: Vec<f64>,
+}
+
+impl TrialPlan {
+    fn new(file: String, kind: TrialKind, seconds: f64) -> Self {
+        let samples = (seconds * RATE_HZ) as usize;
+        Self {
+            file,
+            kind,
+            opening: None,
+            split: Split::Fit,
+            full: false,
+            rate_hz: RATE_HZ,
+            inlet: vec![0.0; samples],
+            outlet: vec![0.0; samples],
+        }
+    }
+
+    /// From atmospheric pressure: rest, then the inlet held at an opening; 15 s.
+    pub fn inflation(opening: f64) -> Self {
+        let mut plan = Self::new(ramp_file("inflation", opening), TrialKind::Inflation, RAMP_S);
+        plan.inlet[REST..].fill(opening);
+        Self { opening: Some(opening), ..plan }
+    }
+
+    /// From full contraction: rest, then the outlet held at an opening; 15 s.
+    pub fn deflation(opening: f64) -> Self {
+        let mut plan = Self::new(ramp_file("deflation", opening), TrialKind::Deflation, RAMP_S);
+        plan.outlet[REST..].fill(opening);
+        Self { opening: Some(opening), full: true, ..plan }
+    }
+
+    /// Segments of 0.15 .. 1.5 s, each inflating, deflating or holding (0.42, 0.42, 0.16) at a random opening of
+    /// 0.125 .. 1; 60 s. `number` chooses the file's name and an independent stream of the seed.
+    pub fn arbitrary(number: usize, seed: u64) -> Self {
+        let mut plan = Self::new(format!("arbitrary_{number}.csv"), TrialKind::Arbitrary, LONG_S);
+        let mut random = Random::new(seed, Random::PROTOCOL + 2 * number as u64);
+        let mut at = REST;
+        while at < plan.inlet.len() {
+            let length = (random.between(0.15, 1.5) * RATE_HZ).round() as usize;
+            let end = (at + length).min(plan.inlet.len());
+            let what = random.uniform();
+            let opening = OPENINGS[1 + ((random.uniform() * 5.0) as usize).min(4)];
+            if what < 0.42 {
+                plan.inlet[at..end].fill(opening);
+            } else if what < 0.84 {
+                plan.outlet[at..end].fill(opening);
+            }
+            at = end;
+        }
+        plan
+    }
+
+    /// Pairs of pulses: 0.25 s of full inlet each, the gap between (outlet open) falling from 1.4 s by 18 % a pair to
+    /// 0.15 s and starting over; after a pair the outlet stays open for 1 s, then both are shut for 0.3 .. 1 s; 60 s.
+    pub fn pulses(number: usize, seed: u64) -> Self {
+        let mut plan = Self::new(format!("pulses_{number}.csv"), TrialKind::Pulses, LONG_S);
+        let mut random = Random::new(seed, Random::PROTOCOL + 2 * number as u64 + 1);
+        let total = plan.inlet.len();
+        let mut at = REST;
+        let mut hold = |inlet: f64, outlet: f64, seconds: f64| {
+            let end = (at + (seconds * RATE_HZ).round() as usize).min(total);
+            plan.inlet[at..end].fill(inlet);
+            plan.outlet[at..end].fill(outlet);
+            at = end;
+            at < total
+        };
+        let mut gap: f64 = 1.4;
+        while hold(1.0, 0.0, 0.25)
+            && hold(0.0, 1.0, gap)
+            && hold(1.0, 0.0, 0.25)
+            && hold(0.0, 1.0, 1.0)
+            && hold(0.0, 0.0, random.between(0.3, 1.0))
+        {
+            gap = if gap <= 0.15 { 1.4 } else { (0.82 * gap).max(0.15) };
+        }
+        plan
+    }
+
+    /// The paper's session: six inflations, six deflations, an arbitrary and a pulse trial to fit; two arbitrary and
+    /// one pulse trial to test on. 480 s of recordings in 12 min.
+    ///
+    /// ```
+    /// let plans = stretch_sim::TrialPlan::paper(1);
+    /// assert_eq!(plans.len(), 17);
+    /// assert_eq!(plans.iter().map(|p| p.inlet.len()).sum::<usize>(), 48_000);
+    /// ```
+    pub fn paper(seed: u64) -> Vec<Self> {
+        let test = |plan: Self| Self { split: Split::Test, ..plan };
+        let mut plans: Vec<Self> = OPENINGS.map(Self::inflation).into();
+        plans.extend(OPENINGS.map(Self::deflation));
+        plans.extend([Self::arbitrary(1, seed), Self::pulses(1, seed)]);
+        plans.extend(
+            [Self::arbitrary(2, seed), Self::arbitrary(3, seed), Self::pulses(2, seed)].map(test),
+        );
+        plans
+    }
+
+    /// The openings of a recorded (or invented) trial, to be replayed. A first pressure above half of `supply_kpa`
+    /// starts the replay full, without a pressure column it starts vented.
+    ///
+    /// # Errors
+    /// `inlet` or `outlet` is not there, an opening outside 0..1, fewer than two samples, time that is not uniform.
+    pub fn from_trial(trial: &Trial, supply_kpa: f64) -> Result<Self, SimError> {
+        let column =
+            |name: &'static str| trial.channel(name).ok_or(SimError::MissingColumn { name });
+        let (inlet, outlet) = (column("inlet")?.to_vec(), column("outlet")?.to_vec());
+        crate::Openings { inlet: &inlet, outlet: &outlet }.check()?;
+        let time = &trial.time_s;
+        if time.len() < 2 {
+            return Err(SimError::Length { name: "time_s", expected: 2, found: time.len() });
+        }
+        let mut steps: Vec<f64> = time.windows(2).map(|t| t[1] - t[0]).collect();
+        steps.sort_by(f64::total_cmp);
+        let expected = steps[steps.len() / 2];
+        // Times are written with a few decimals: a hundredth of a step is rounding, more is a gap.
+        if let Some(i) =
+            time.windows(2).position(|t| !((t[1] - t[0] - expected).abs() <= 0.01 * expected))
+        {
+            return Err(SimError::NotUniform {
+                sample: i + 1,
+                expected,
+                found: time[i + 1] - time[i],
+            });
+        }
+        // The rate of the whole, snapped to a whole number where rounding of the times explains the rest.
+        let rate = (time.len() - 1) as f64 / (time[time.len() - 1] - time[0]);
+        let rate_hz = if (rate - rate.round()).abs() < 1e-6 * rate { rate.round() } else { rate };
+        let full = trial.channel("pressure_kpa").is_some_and(|p| p[0] > 0.5 * supply_kpa);
+        let file =
+            if trial.name.is_empty() { "commands.csv".to_string() } else { trial.name.clone() };
+        let kind = TrialKind::Other;
+        Ok(Self { file, kind, opening: None, split: Split::Fit, full, rate_hz, inlet, outlet })
+    }
+}
+
+/// `inflation_0_25.csv` for an opening of 0.25 %.
+fn ramp_file(kind: &str, opening: f64) -> String {
+    let percent = (1e4 * opening).round() / 100.0;
+    format!("{kind}_{}.csv", percent.to_string().replace('.', "_"))
+}

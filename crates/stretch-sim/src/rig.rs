@@ -1,0 +1,344 @@
+//! A rig: parameters with tolerances, and the effects that are on. Read from and written to rig files.
+
+use std::{collections::BTreeMap, fmt::Write};
+
+use stretch_data::{EffectEntry, Parameter, RigFile};
+
+use crate::{
+    Bridge, SimError, StaticLaw,
+    effects::EffectSet,
+    nearest::nearest,
+    params::{Key, PARAMETERS, RigParams, Tolerance},
+    random::Random,
+    stage::Stage,
+};
+
+/// Least gauge strain over the stroke of a rig whose sleeve stays stretched.
+pub const LEAST_STRAIN: f64 = 0.004;
+/// Table of a rig file that says how a simulation was run.
+const SIMULATION: &str = "simulation";
+
+/// Parameters, how far each may be wrong, and the effects that are on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rig {
+    /// Values.
+    pub params: RigParams,
+    /// Tolerances, in the order of [`PARAMETERS`].
+    pub tolerances: [Tolerance; Key::COUNT],
+    /// Effects that are on.
+    pub effects: EffectSet,
+}
+
+impl Default for Rig {
+    /// The stock rig with its usual tolerances, without effects.
+    fn default() -> Self {
+        Self {
+            params: RigParams::default(),
+            tolerances: std::array::from_fn(|i| PARAMETERS[i].tolerance),
+            effects: EffectSet::new(),
+        }
+    }
+}
+
+/// How a simulation was run: what a written rig file holds beside the rig.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RunSettings {
+    /// Seed of noise and protocols, below 2^53 (it stands in the file as a number).
+    pub seed: u64,
+    /// Longest step of integration, s.
+    pub step_s: f64,
+    /// Whether noise is added and the converters clip and round.
+    pub noise: bool,
+}
+
+impl Default for RunSettings {
+    fn default() -> Self {
+        Self { seed: 1, step_s: crate::DEFAULT_STEP_S, noise: true }
+    }
+}
+
+impl Rig {
+    /// The rig that a file describes: every parameter must be there, within its physical limits.
+    ///
+    /// ```
+    /// use stretch_data::RigFile;
+    /// use stretch_sim::{Key, Rig, default_rig_text};
+    /// let text = default_rig_text().replace("tau_m = { value = 0.03", "tau_m = { value = 0.05");
+    /// let rig = Rig::from_file(&RigFile::parse("rig.toml", &text)?)?;
+    /// assert_eq!(rig.params[Key::TauM], 0.05);
+    ///
+    /// let typo = default_rig_text().replace("tau_m", "tau_n");
+    /// let error = Rig::from_file(&RigFile::parse("rig.toml", &typo)?).unwrap_err();
+    /// assert_eq!(error.to_string(), "`muscle` has no parameter `tau_n`; did you mean `tau_m`?");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// A table, parameter or effect that is not known, a parameter that is missing, not positive or beyond its limits,
+    /// a sleeve that goes slack within the stroke, or a rig file of another kind (`kind = "gauge"`).
+    pub fn from_file(file: &RigFile) -> Result<Self, SimError> {
+        if let Some(kind) = &file.kind {
+            if kind != "rig" {
+                return Err(SimError::UnknownParameter {
+                    owner: "a whole rig".into(),
+                    name: format!("kind = \"{kind}\""),
+                    nearest: None,
+                });
+            }
+        }
+        let mut rig = Self::default();
+        let mut seen = [false; Key::COUNT];
+        let tables = [Stage::Pneumatics, Stage::Muscle, Stage::Sensing, Stage::Reference];
+        for (table, parameters) in file.stages.iter().filter(|(name, _)| *name != SIMULATION) {
+            if !tables.iter().any(|stage| stage.name() == table) {
+                return Err(SimError::UnknownParameter {
+                    owner: "a rig file".into(),
+                    name: table.clone(),
+                    nearest: nearest(table, tables.iter().map(|s| s.name())),
+                });
+            }
+            for (name, parameter) in parameters {
+                let known = PARAMETERS.iter().find(|p| p.name == name && p.stage.name() == table);
+                let Some(info) = known else {
+                    let elsewhere = Key::named(name).map(|k| format!("{}.{name}", k.info().stage));
+                    let here = PARAMETERS.iter().filter(|p| p.stage.name() == table);
+                    return Err(SimError::UnknownParameter {
+                        owner: table.clone(),
+                        name: name.clone(),
+                        nearest: elsewhere.or_else(|| nearest(name, here.map(|p| p.name))),
+                    });
+                };
+                seen[info.key as usize] = true;
+                rig.params[info.key] = parameter.value;
+                rig.tolerances[info.key as usize] =
+                    match (parameter.tolerance_abs, parameter.tolerance) {
+                        (Some(sd), _) if sd > 0.0 => Tolerance::Absolute(sd),
+                        (None, Some(share)) if share > 0.0 => Tolerance::Relative(share),
+                        _ => Tolerance::Exact,
+                    };
+            }
+        }
+        if let Some(info) = PARAMETERS.iter().find(|p| !seen[p.key as usize]) {
+            return Err(SimError::MissingParameter {
+                owner: info.stage.name().into(),
+                name: info.name.into(),
+            });
+        }
+        for entry in &file.effects {
+            let values: Vec<(&str, f64)> =
+                entry.parameters.iter().map(|(name, value)| (name.as_str(), *value)).collect();
+            rig.effects.insert(&entry.name, &values)?;
+        }
+        rig.check()?;
+        Ok(rig)
+    }
+
+    /// Whether every parameter is within its physical limits.
+    ///
+    /// # Errors
+    /// The first that is not, or [`SimError::SlackSleeve`].
+    pub fn check(&self) -> Result<(), SimError> {
+        for info in &PARAMETERS {
+            let value = self.params[info.key];
+            let allowed = value > 0.0 || (info.zero_allowed && value == 0.0);
+            if !(value.is_finite() && allowed) {
+                return Err(SimError::BadParameter {
+                    owner: info.stage.name().into(),
+                    name: info.name.into(),
+                    value,
+                    needs: if info.zero_allowed { "zero or positive" } else { "positive" },
+                });
+            }
+        }
+        for (key, min, max) in [
+            (Key::B, 0.0, 0.95),
+            (Key::UMin, 0.0, 1.0),
+            (Key::Bits, 1.0, 24.0),
+            (Key::KMax, 0.0, 0.5),
+        ] {
+            let value = self.params[key];
+            let whole = key != Key::Bits || value.fract() == 0.0;
+            if !(value >= min && value <= max && whole) {
+                return Err(SimError::OutOfRange {
+                    owner: key.info().stage.name().into(),
+                    name: key.info().name.into(),
+                    value,
+                    min,
+                    max,
+                    unit: key.info().unit,
+                });
+            }
+        }
+        let strain = self.least_strain();
+        if !(strain > LEAST_STRAIN) {
+            return Err(SimError::SlackSleeve { strain, least: LEAST_STRAIN });
+        }
+        Ok(())
+    }
+
+    /// Gauge strain at the supply pressure, the least of the nominal stroke.
+    pub fn least_strain(&self) -> f64 {
+        let k = StaticLaw::new(&self.params).contraction(1e-3 * self.params[Key::PS]);
+        Bridge::new(&self.params).strain(self.params[Key::L0] * (1.0 - k))
+    }
+
+    /// Hard bounds of a parameter when it is re-tuned: three standard deviations about its value here, never below a
+    /// hundredth of it.
+    pub fn bounds(&self, key: Key) -> (f64, f64) {
+        let value = self.params[key];
+        let sd = self.tolerances[key as usize].sd(value);
+        ((value - 3.0 * sd).max(0.01 * value), value + 3.0 * sd)
+    }
+
+    /// Another copy of this rig as it might be built: every parameter drawn from its tolerance, a Gaussian cut at
+    /// 2.5 sd and at 0.2 of the value, redrawn until the sleeve stays stretched. None when it never does.
+    pub fn draw(&self, seed: u64) -> Option<Self> {
+        let mut random = Random::new(seed, Random::RIG);
+        (0..1000).find_map(|_| {
+            let mut rig = self.clone();
+            for info in &PARAMETERS {
+                let value = self.params[info.key];
+                let sd = self.tolerances[info.key as usize].sd(value);
+                if sd > 0.0 {
+                    rig.params[info.key] = (0..10_000)
+                        .map(|_| value + sd * random.gauss())
+                        .find(|x| (x - value).abs() <= 2.5 * sd && *x >= 0.2 * value)?;
+                }
+            }
+            rig.check().is_ok().then_some(rig)
+        })
+    }
+
+    /// The rig as a file; `run` adds how a simulation was made, so that it can be repeated.
+    pub fn to_file(&self, run: Option<&RunSettings>) -> RigFile {
+        let mut stages: BTreeMap<String, BTreeMap<String, Parameter>> = BTreeMap::new();
+        for info in &PARAMETERS {
+            let (tolerance, tolerance_abs) = match self.tolerances[info.key as usize] {
+                Tolerance::Exact => (None, None),
+                Tolerance::Relative(share) => (Some(share), None),
+                Tolerance::Absolute(sd) => (None, Some(sd)),
+            };
+            let parameter = Parameter { value: self.params[info.key], tolerance, tolerance_abs };
+            stages.entry(info.stage.name().into()).or_default().insert(info.name.into(), parameter);
+        }
+        if let Some(run) = run {
+            let exact = |value: f64| Parameter { value, tolerance: None, tolerance_abs: None };
+            let entries = [
+                ("seed", run.seed as f64),
+                ("step_s", run.step_s),
+                ("noise", f64::from(u8::from(run.noise))),
+            ];
+            let table = entries.map(|(name, value)| (name.to_string(), exact(value)));
+            stages.insert(SIMULATION.into(), BTreeMap::from(table));
+        }
+        let effects = self
+            .effects
+            .iter()
+            .map(|e| EffectEntry {
+                name: e.name().to_string(),
+                parameters: e
+                    .effect()
+                    .parameters()
+                    .iter()
+                    .zip(e.values())
+                    .map(|(p, value)| (p.name.to_string(), *value))
+                    .collect(),
+            })
+            .collect();
+        RigFile { kind: None, effects, stages }
+    }
+}
+
+impl RunSettings {
+    /// Greatest seed that a rig file can hold.
+    pub const MOST_SEED: u64 = (1 << 53) - 1;
+
+    /// Those that a file holds, when it was written by a simulation.
+    ///
+    /// # Errors
+    /// A setting that is unknown or makes no sense.
+    pub fn from_file(file: &RigFile) -> Result<Option<Self>, SimError> {
+        let Some(table) = file.stages.get(SIMULATION) else { return Ok(None) };
+        let mut settings = Self::default();
+        for (name, parameter) in table {
+            let value = parameter.value;
+            let check = |holds: bool, needs: &'static str| {
+                if holds {
+                    Ok(())
+                } else {
+                    Err(SimError::BadParameter {
+                        owner: SIMULATION.into(),
+                        name: name.clone(),
+                        value,
+                        needs,
+                    })
+                }
+            };
+            match name.as_str() {
+                "seed" => {
+                    let whole =
+                        value >= 0.0 && value.fract() == 0.0 && value <= Self::MOST_SEED as f64;
+                    check(whole, "a whole number below 2^53")?;
+                    settings.seed = value as u64;
+                }
+                "step_s" => {
+                    check(value > 0.0, "positive")?;
+                    settings.step_s = value;
+                }
+                "noise" => {
+                    check(value == 0.0 || value == 1.0, "0 or 1")?;
+                    settings.noise = value == 1.0;
+                }
+                _ => {
+                    return Err(SimError::UnknownParameter {
+                        owner: SIMULATION.into(),
+                        name: name.clone(),
+                        nearest: nearest(name, ["seed", "step_s", "noise"]),
+                    });
+                }
+            }
+        }
+        Ok(Some(settings))
+    }
+}
+
+/// The stock rig as the text of a rig file, every parameter with its unit and meaning.
+///
+/// ```
+/// use stretch_data::RigFile;
+/// use stretch_sim::{Rig, default_rig_text};
+/// let file = RigFile::parse("rig.toml", &default_rig_text())?;
+/// assert_eq!(Rig::from_file(&file)?, Rig::default());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn default_rig_text() -> String {
+    let mut text = String::from(
+        "# A rig: a fluidic muscle that lifts a crossbeam, with a stretch sensor on its sleeve.\n\
+         # tolerance: one standard deviation as a share of the value, tolerance_abs in its unit; exact without.\n\
+         # A diagnosis may re-tune a parameter within three of them before it calls anything an effect.\n",
+    );
+    let mut table = None;
+    for info in &PARAMETERS {
+        if table != Some(info.stage) {
+            table = Some(info.stage);
+            let _ = write!(text, "\n[{}]\n", info.stage);
+        }
+        let value = match info.nominal {
+            v if v != 0.0 && v.abs() < 1e-3 => format!("{v:e}"),
+            v => format!("{v:?}"),
+        };
+        let tolerance = match info.tolerance {
+            Tolerance::Exact => String::new(),
+            Tolerance::Relative(share) => format!(", tolerance = {share:?}"),
+            Tolerance::Absolute(sd) => format!(", tolerance_abs = {sd:?}"),
+        };
+        let entry = format!("{} = {{ value = {value}{tolerance} }}", info.name);
+        let unit = if info.unit == "1" { String::new() } else { format!(" ({})", info.unit) };
+        let _ = writeln!(text, "{entry:48} # {}{unit}", info.meaning.trim_end_matches('.'));
+    }
+    text.push_str(
+        "\n# Effects that the nominal rig leaves out are added like this; `stretch effects` lists them.\n\
+         # [[effect]]\n# name = \"gauge_hysteresis\"\n# h = 0.2\n# s = 0.012\n",
+    );
+    text
+}

@@ -3,6 +3,9 @@
 use crate::{Cost, FilterError, MAX_SG_DEGREE, SgMemory, fir, gram, sample};
 use stretch_core::{Design, DesignError, Real, SampleRate, Stage};
 
+/// Outputs that [`SgFilter::over_log`] works on at once: they stay in the first cache.
+const BLOCK: usize = 256;
+
 /// The shape of a [`SgFilter`], all in samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct SgShape {
@@ -146,12 +149,17 @@ impl<T: Real, const CAP: usize> SgFilter<T, CAP> {
         }
         let taps = self.taps();
         let before = window - 1 - delay;
-        for (samples, y) in log.windows(window).zip(&mut out[before..]) {
-            // Oldest first, as the live step sums: the same bits.
-            *y = samples
-                .iter()
-                .zip(taps.iter().rev())
-                .fold(T::zero(), |sum, (&x, &tap)| sum + tap * x);
+        // Tap by tap over a block of outputs, which runs several outputs at a
+        // time; oldest first, as the live step sums: the same bits.
+        let inside = &mut out[before..log.len() - delay];
+        for (index, block) in inside.chunks_mut(BLOCK).enumerate() {
+            let start = index * BLOCK;
+            block.fill(T::zero());
+            for (k, &tap) in taps.iter().rev().enumerate() {
+                for (y, &x) in block.iter_mut().zip(&log[start + k..]) {
+                    *y = *y + tap * x;
+                }
+            }
         }
         let (head, tail) = (&log[..window], &log[log.len() - window..]);
         self.off_centre(head, &mut out[..before], 0);

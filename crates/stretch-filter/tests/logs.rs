@@ -113,6 +113,21 @@ proptest! {
 }
 
 #[test]
+fn a_long_log_has_the_bits_of_the_live_filter() {
+    let shape = SgShape { window: 12, degree: 3, order: 1, delay: 4 };
+    let filter = SgFilter::<f64, 16>::new(shape, hundred()).unwrap();
+    let log: Vec<f64> = (0..1000).map(|n| (n as f64 * 0.37).sin()).collect();
+    let mut whole = vec![0.0; log.len()];
+    filter.over_log(&log, &mut whole).unwrap();
+    let mut live = Runner::new(filter);
+    for (n, &x) in log.iter().enumerate() {
+        if let Some(rate) = live.step(x) {
+            assert_eq!(rate, whole[n - shape.delay], "sample {n}");
+        }
+    }
+}
+
+#[test]
 fn a_fit_does_not_reach_across_a_gap() {
     // Two ramps of opposite slope, and one lone sample between two gaps.
     let mut times: Vec<f64> = (0..10).map(|n| n as f64 / HZ).collect();

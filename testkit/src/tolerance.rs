@@ -140,3 +140,7 @@ pub const RIG_CONFORMANCE: f64 = 2e-3;
 
 /// Share of a channel's full scale by which halving the step of integration may move it.
 pub const RIG_STEP: f64 = 1e-4;
+
+/// In units of the noise: how far least absolute residuals may end up from the truth at the
+/// edge of the rectangle, where a few samples decide, when a fifth of all are spoilt.
+pub const FIT_WILD: f64 = 20.0;

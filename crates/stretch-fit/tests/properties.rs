@@ -1,9 +1,10 @@
 //! What must hold for any data.
 
 use proptest::prelude::*;
-use stretch_core::Degree;
+use stretch_core::{Degree, Real};
 use stretch_fit::{
-    Factor, FitError, LineAccumulator, OrderTable, SurfaceAccumulator, cross_validate, held_out,
+    Factor, FitError, LineAccumulator, Loss, OrderTable, SurfaceAccumulator, cross_validate,
+    held_out, robust_fit,
     strategies::{degrees, observations, surfaces},
 };
 use testkit::tolerance as tol;
@@ -30,7 +31,7 @@ fn allowed(condition: f64) -> f64 {
 }
 
 fn config() -> ProptestConfig {
-    ProptestConfig { cases: 64, ..ProptestConfig::default() }
+    ProptestConfig { cases: 256, ..ProptestConfig::default() }
 }
 
 proptest! {
@@ -215,7 +216,6 @@ proptest! {
         prop_assert!((pooled.rmse / (sum / count as f64).sqrt() - 1.0).abs() < tol::FIT_STATISTICS);
     }
 
-    /// Any bits whatever: an `Err` or finite numbers.
     #[test]
     fn any_input_gives_finite_numbers_or_an_error(
         samples in prop::collection::vec(
@@ -223,31 +223,43 @@ proptest! {
         exponent in -320..320_i32,
         degree in degrees(),
     ) {
-        let scale = 10.0_f64.powi(exponent);
-        let mut wild = SurfaceAccumulator::<f64, 21, 8>::new(degree).unwrap();
-        let mut tame = wild.clone();
-        for (k, &(rate, volts, value, weight)) in samples.iter().enumerate() {
-            let _ = wild.push(rate, volts, value);
-            let _ = wild.push_weighted(rate, volts, value, weight.abs());
-            let unit = |x: f64| if x.is_finite() && x != 0.0 { x.log2() % 1.0 } else { 0.5 };
-            let _ = tame.push(unit(rate.abs()) * scale, k as f64 * scale, unit(value.abs()) / scale);
+        finite_or_refused::<f64>(degree, &samples, 10.0_f64.powi(exponent))?;
+        // f32 sees the same bits, most of them out of its range, and its own span of scales.
+        finite_or_refused::<f32>(degree, &samples, 10.0_f64.powi(exponent / 8))?;
+    }
+
+    /// Up to a fifth of the samples may be anything at all.
+    #[test]
+    fn robust_fits_ignore_wild_samples(
+        log in observations(Degree::POLY13, 0.01, 80..150),
+        wild in prop::collection::vec(-1e6..1e6_f64, 16),
+        apart in 5..9_usize,
+    ) {
+        let n = log.samples.len();
+        let spoilt = || log.samples.iter().enumerate().map(|(k, &(rate, volts, value))| {
+            let error = if k % apart == 0 { wild[(k / apart) % 16] } else { 0.0 };
+            (rate, volts, value + error)
+        });
+        let mut memory = vec![0.0; n];
+        let absolute =
+            robust_fit::<f64, 7, _>(Degree::POLY13, Loss::LeastAbsolute, spoilt, &mut memory);
+        let surface = absolute.unwrap().fit.surface();
+        for &(rate, volts, _) in &log.samples {
+            let off = (surface.eval(rate, volts) - log.surface.eval(rate, volts)).abs();
+            prop_assert!(off < tol::FIT_WILD * 0.01, "off by {off}");
         }
-        for sums in [wild, tame] {
-            let fit = match sums.fit() {
-                Ok(fit) => fit,
-                Err(error) => {
-                    prop_assert!(!error.to_string().is_empty());
-                    continue;
-                }
-            };
-            prop_assert!(fit.coefficients().iter().all(|c| c.is_finite()));
-            prop_assert!(fit.sse().is_finite() && fit.condition().is_finite());
-            for statistic in [fit.r_squared(), fit.adjusted_r_squared(), fit.rmse()] {
-                prop_assert!(statistic.is_none_or(f64::is_finite));
-            }
-            if let Some(mut errors) = fit.standard_errors() {
-                prop_assert!(errors.all(f64::is_finite));
-            }
+    }
+
+    /// Samples without error leave a robust fit nothing to reject.
+    #[test]
+    fn robust_fits_of_exact_samples_are_exact(log in observations(Degree::POLY13, 0.0, 30..90)) {
+        let mut memory = vec![0.0; log.samples.len()];
+        let again = || log.samples.iter().copied();
+        for loss in [Loss::Bisquare, Loss::LeastAbsolute] {
+            let robust = robust_fit::<f64, 7, _>(Degree::POLY13, loss, again, &mut memory).unwrap();
+            prop_assert!(robust.converged && robust.rejected == 0);
+            let off = distance(robust.fit.coefficients(), &log.surface.coefficients()[..7]);
+            prop_assert!(off < tol::FIT_WELL * 10.0, "off by {off:e}");
         }
     }
 
@@ -266,6 +278,43 @@ proptest! {
         let both = [line.intercept(), line.slope()];
         prop_assert!(distance(&both, surface.coefficients()) < tol::FIT_WELL);
     }
+}
+
+/// Any bits whatever, and samples all of one scale: an `Err` or finite numbers.
+fn finite_or_refused<T: Real>(
+    degree: Degree,
+    samples: &[(f64, f64, f64, f64)],
+    scale: f64,
+) -> Result<(), TestCaseError> {
+    let mut wild = SurfaceAccumulator::<T, 21, 8>::new(degree).unwrap();
+    let mut tame = wild.clone();
+    for (k, &(rate, volts, value, weight)) in samples.iter().enumerate() {
+        let [r, v, z, w] = [rate, volts, value, weight.abs()].map(T::from_f64);
+        let _ = wild.push(r, v, z);
+        let _ = wild.push_weighted(r, v, z, w);
+        let unit = |x: f64| if x.is_finite() && x != 0.0 { x.abs().log2() % 1.0 } else { 0.5 };
+        let sample = [unit(rate) * scale, k as f64 * scale, unit(value) / scale];
+        let [r, v, z] = sample.map(T::from_f64);
+        let _ = tame.push(r, v, z);
+    }
+    for sums in [wild, tame] {
+        let fit = match sums.fit() {
+            Ok(fit) => fit,
+            Err(error) => {
+                prop_assert!(!error.to_string().is_empty());
+                continue;
+            }
+        };
+        prop_assert!(fit.coefficients().iter().all(|c| c.is_finite()));
+        prop_assert!(fit.sse().is_finite() && fit.condition().is_finite());
+        for statistic in [fit.r_squared(), fit.adjusted_r_squared(), fit.rmse()] {
+            prop_assert!(statistic.is_none_or(|s| s.is_finite()));
+        }
+        if let Some(mut errors) = fit.standard_errors() {
+            prop_assert!(errors.all(|e| e.is_finite()));
+        }
+    }
+    Ok(())
 }
 
 /// A trial with noise of its own; `k` numbers it.

@@ -353,17 +353,25 @@ impl Pneumatics {
         // No flow passes the pressure that drives it.
         let (high, low) = (supply(&y) * volume[1], self.atmosphere_pa * volume[1]);
         let full = next > held && next > high;
+        let empty = next < held && next < low;
         if full {
             next = held.max(high);
-        } else if next < held && next < low {
+        } else if empty {
             next = held.min(low);
         }
-        // Nor does a state pass its equilibrium; a step too long for a stiff one ends on it.
-        if k1 * k4 < 0.0 || full || next == low {
+        // Nor does a state pass its equilibrium: a step that was too long for a stiff one, or that had to be cut where
+        // something else still flows, ends on it.
+        if k1 * k4 < 0.0 || full || empty {
             let (end, _) = rate(next, &y, volume[1]);
             let stiff = k1 * end < 0.0 && h * (end - k1).abs() > STIFF * (next - held).abs();
-            if stiff {
-                next = balance(held, next, k1, |m| rate(m, &y, volume[1]).0);
+            let cut = (full && end < 0.0) || (empty && end > 0.0);
+            if stiff || cut {
+                let from = match k1 * end < 0.0 {
+                    true => held,
+                    false if full => low,
+                    false => high,
+                };
+                next = balance(from, next, -end, |m| rate(m, &y, volume[1]).0);
             }
             if D > 0 && (stiff || full) {
                 next = self.settle::<D>(valves, chamber, [held, next], volume[1], h);

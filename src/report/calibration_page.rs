@@ -1,0 +1,240 @@
+//! The report of a calibration: how good it is, and what it is made of.
+
+use stretch_calibrate::{Calibrated, Candidate, Evaluation, MethodErrors, TrialErrors};
+
+use super::{
+    branch::BranchView,
+    calibration_tables::{
+        best, coefficient_table, comparison_table, method_names, method_table, order_table,
+        signal_table,
+    },
+    canvas::Ink,
+    error_figure::{Against, error_figure, residual_figure},
+    estimate_figure::{closest_look, estimate_figure, estimate_picture},
+    markup::{number, with_unit},
+    page::Page,
+    slice_figure::slice_figure,
+    surface_figure::surface_figure,
+};
+
+/// Trials whose curves are drawn; the tables hold all.
+const DRAWN: usize = 4;
+
+/// What a report says beside the numbers.
+#[derive(Debug, Clone, Default)]
+pub struct Context {
+    /// Heading of the page.
+    pub title: String,
+    /// Trials of the fit, as files or sessions.
+    pub calibrated_on: Vec<String>,
+    /// Trials of the evaluation.
+    pub tested_on: Vec<String>,
+    /// Signals among which the calibrated one was chosen, best first; empty
+    /// when the user named it.
+    pub signal_choice: Vec<Candidate>,
+    /// Sentences about the data: where they come from, what was done to them.
+    pub notes: Vec<String>,
+}
+
+/// The report as one HTML file.
+///
+/// `calibrated` are the calibrations by the names that `evaluation` knows them by.
+pub fn calibration_page(
+    calibrated: &[(&str, &Calibrated)],
+    evaluation: &Evaluation,
+    context: &Context,
+) -> String {
+    let names = method_names(calibrated, evaluation);
+    let mut page = Page::new(&context.title, &verdict(evaluation, &names, context));
+    judged(&mut page, evaluation, &names, context);
+    over_time(&mut page, evaluation, &names);
+    errors(&mut page, evaluation, &names);
+    surfaces(&mut page, calibrated);
+    fits(&mut page, calibrated, context);
+    page.finish()
+}
+
+/// A picture of some seconds of the first trial for a README: an SVG file of
+/// its own, light, with its legend inside. Empty when there is nothing to draw.
+pub fn readme_picture(calibrated: &[(&str, &Calibrated)], evaluation: &Evaluation) -> String {
+    let names = method_names(calibrated, evaluation);
+    let first = evaluation.trials.first();
+    first.map_or_else(String::new, |trial| estimate_picture(evaluation, trial, &names))
+}
+
+/// The result in one sentence.
+fn verdict(evaluation: &Evaluation, names: &[String], context: &Context) -> String {
+    let methods = &evaluation.pooled;
+    let Some(best) = best(methods) else {
+        return "No estimate could be held against a reference.".to_owned();
+    };
+    let off = |m: &MethodErrors| {
+        let rmse = with_unit(&number(m.rmse, 2), &evaluation.unit);
+        format!("{rmse} (RMSE, {} % of the range)", number(m.rmse_percent, 2))
+    };
+    let short = |m: &MethodErrors| with_unit(&number(m.rmse, 2), &evaluation.unit);
+    let called = |i: usize| match methods[i].method.as_str() {
+        "raw" => "raw signal".to_owned(),
+        _ => format!("{} calibration", names[i]),
+    };
+    let others: Vec<String> = (0..methods.len())
+        .filter(|i| *i != best)
+        .map(|i| format!("the {} by {}", called(i), short(&methods[i])))
+        .collect();
+    let seen = context.tested_on.iter().filter(|t| context.calibrated_on.contains(t)).count();
+    let several = context.tested_on.len() > 1;
+    let on = match (seen, several) {
+        (0, false) => "On a recording that was not used for the fit",
+        (0, true) => "On recordings that were not used for the fit",
+        (n, _) if n == context.tested_on.len() => "On the very data of the fit",
+        _ => "On recordings of which some were used for the fit",
+    };
+    let rest = if others.is_empty() { String::new() } else { format!("; {}", others.join(", ")) };
+    format!("{on}, the {} is off by {}{rest}.", called(best), off(&methods[best]))
+}
+
+fn judged(page: &mut Page, evaluation: &Evaluation, names: &[String], context: &Context) {
+    page.section("How good it is", "");
+    page.text(&format!(
+        "Fitted on {}; held against {}.",
+        listed(&context.calibrated_on),
+        listed(&context.tested_on)
+    ));
+    let caption = "All test recordings together";
+    page.table(&method_table(caption, &evaluation.pooled, names, &evaluation.unit));
+    page.text(
+        "Raw is the signal itself, its extremes laid on those of the reference, which no \
+         calibration may look at. Average error is the mean absolute error over the range of the \
+         estimate; a positive lag means that the estimate runs behind; outside domain counts \
+         samples whose signal or rate the fit had never seen.",
+    );
+    page.list(&context.notes);
+    let others = evaluation.trials.len();
+    if others > 1 {
+        page.folded(&format!("Each of the {others} recordings"), |page| {
+            for trial in &evaluation.trials {
+                page.table(&method_table(&trial.trial, &trial.methods, names, &evaluation.unit));
+            }
+        });
+    }
+    if !evaluation.comparisons.is_empty() {
+        let called = |method: &str| {
+            let at = evaluation.pooled.iter().position(|m| m.method == method);
+            at.and_then(|i| names.get(i)).cloned().unwrap_or_else(|| method.to_owned())
+        };
+        page.folded("Are the differences more than chance?", |page| {
+            page.table(&comparison_table(&evaluation.comparisons, &evaluation.unit, called));
+            page.text(
+                "Neighbouring samples resemble each other: P over means of half-second blocks is \
+                 nearer to the truth than P over samples, which is given as the paper gives it.",
+            );
+        });
+    }
+}
+
+fn over_time(page: &mut Page, evaluation: &Evaluation, names: &[String]) {
+    page.section("Estimate and reference over time", "");
+    let caption = |trial: &TrialErrors| format!("{}, the whole recording.", trial.trial);
+    let closer = "The eight seconds with the most motion, away from the ends.";
+    for (index, trial) in evaluation.trials.iter().take(DRAWN).enumerate() {
+        let both = |page: &mut Page| {
+            page.figure(&closest_look(evaluation, trial, names), closer);
+            page.figure(&estimate_figure(evaluation, trial, names), &caption(trial));
+        };
+        if index == 0 {
+            both(page);
+        } else {
+            page.folded(&trial.trial, both);
+        }
+    }
+    if evaluation.trials.is_empty() {
+        page.text("There is no recording to draw.");
+    }
+    let more = evaluation.trials.len().saturating_sub(DRAWN);
+    if more > 0 {
+        page.text(&format!("{more} more recordings are in the tables only."));
+    }
+}
+
+fn errors(page: &mut Page, evaluation: &Evaluation, names: &[String]) {
+    let intro = "Error is estimate minus reference. Dots are samples, the dark line is their \
+                 median, the band holds four fifths of them; half a percent of the samples lies \
+                 beyond the frame.";
+    page.section("Where the errors are", intro);
+    let rate = (
+        error_figure(evaluation, names, Against::Rate),
+        "Against the rate: what a model without a rate, or a delay, gets wrong.".to_owned(),
+    );
+    let place = (
+        error_figure(evaluation, names, Against::Reference),
+        "Against the reference: what a model of the wrong shape gets wrong.".to_owned(),
+    );
+    page.figures(&[rate, place]);
+    page.figure(&residual_figure(evaluation, names), "How often each error occurs.");
+}
+
+fn surfaces(page: &mut Page, calibrated: &[(&str, &Calibrated)]) {
+    for (name, calibrated) in calibrated {
+        let views = BranchView::all(calibrated);
+        if views.is_empty() {
+            continue;
+        }
+        let intro = "One surface serves rising targets, one falling ones. Each is drawn where \
+                     samples support it; the outermost percent of rates is left out.";
+        page.section(&format!("The surfaces ({name})"), intro);
+        let inks = [Ink::Fourth, Ink::Fifth];
+        let solid: Vec<_> = views
+            .iter()
+            .zip(inks)
+            .map(|(view, ink)| {
+                let r_squared = number(view.fit.r_squared, 3);
+                let caption = format!("{}: R\u{b2} of the fit {r_squared}.", view.name());
+                (surface_figure(view, ink), caption)
+            })
+            .collect();
+        page.figures(&solid);
+        page.text(
+            "The same surfaces cut at three rates: the samples are parted in thirds from slow to \
+             fast, each line is the surface at the median rate of its third.",
+        );
+        let cuts: Vec<_> =
+            views.iter().map(|v| (slice_figure(v), format!("{}.", v.name()))).collect();
+        page.figures(&cuts);
+    }
+}
+
+fn fits(page: &mut Page, calibrated: &[(&str, &Calibrated)], context: &Context) {
+    page.section("What was fitted", "");
+    if !context.signal_choice.is_empty() {
+        page.text(
+            "The signal was chosen on the data of the fit alone, by the error on parts left out \
+             of it.",
+        );
+        page.table(&signal_table(&context.signal_choice));
+    }
+    for (name, calibrated) in calibrated {
+        page.list(&calibrated.notes);
+        page.folded(&format!("{name}: coefficients and orders"), |page| {
+            for fit in &calibrated.fits {
+                page.table(&coefficient_table(fit));
+                if !fit.orders.is_empty() {
+                    page.table(&order_table(fit));
+                }
+            }
+            page.text(
+                "r is the normalised rate and v the normalised signal. Bounds take the samples \
+                 as independent; those of a log are not, so the true ones are wider.",
+            );
+        });
+    }
+}
+
+/// Names in a sentence.
+fn listed(names: &[String]) -> String {
+    match names {
+        [] => "data that are not named".to_owned(),
+        [one] => one.clone(),
+        [all @ .., last] if names.len() <= 6 => format!("{} and {last}", all.join(", ")),
+        [first, .., last] => format!("{} recordings, {first} to {last}", names.len()),
+    }
+}

@@ -1,0 +1,178 @@
+//! The tables of a calibration's report.
+
+use stretch_calibrate::{Calibrated, Candidate, Comparison, Evaluation, FitReport, MethodErrors};
+use stretch_core::Model;
+
+use super::{
+    markup::{NONE, fixed, number, with_unit},
+    page::Table,
+};
+
+/// Cells from anything that is text.
+fn cells<const N: usize>(cells: [&str; N]) -> Vec<String> {
+    cells.map(str::to_owned).to_vec()
+}
+
+fn optional(x: Option<f64>, digits: usize) -> String {
+    x.map_or_else(|| NONE.to_owned(), |x| number(x, digits))
+}
+
+/// What each method of an evaluation is called on the page.
+pub fn method_names(calibrated: &[(&str, &Calibrated)], evaluation: &Evaluation) -> Vec<String> {
+    let name = |method: &str| {
+        let found = calibrated.iter().find(|(name, _)| *name == method);
+        match found.map(|(_, c)| &c.calibration.model) {
+            Some(Model::Surfaces { .. }) => format!("non-linear ({method})"),
+            Some(_) => "linear".to_owned(),
+            None => method.to_owned(),
+        }
+    };
+    evaluation.pooled.iter().map(|errors| name(&errors.method)).collect()
+}
+
+/// The row with the least RMSE.
+pub fn best(methods: &[MethodErrors]) -> Option<usize> {
+    let finite = methods.iter().enumerate().filter(|(_, m)| m.rmse.is_finite());
+    finite.min_by(|a, b| a.1.rmse.total_cmp(&b.1.rmse)).map(|(i, _)| i)
+}
+
+/// The paper's measures, one row a method.
+pub fn method_table(
+    caption: &str,
+    methods: &[MethodErrors],
+    names: &[String],
+    unit: &str,
+) -> Table {
+    let head = vec![
+        "Method".to_owned(),
+        "Average error, %".to_owned(),
+        format!("RMSE, {}", if unit.is_empty() { "1" } else { unit }),
+        "RMSE, % of range".to_owned(),
+        "R\u{b2}".to_owned(),
+        "Lag, ms".to_owned(),
+        "Largest error".to_owned(),
+        "Outside domain, %".to_owned(),
+    ];
+    let row = |(m, name): (&MethodErrors, &String)| {
+        let outside = 100.0 * m.clamped as f64 / (m.samples.max(1)) as f64;
+        vec![
+            name.clone(),
+            fixed(m.average_error_percent, 2),
+            number(m.rmse, 3),
+            fixed(m.rmse_percent, 2),
+            fixed(m.r_squared, 3),
+            m.lag_s.map_or_else(|| NONE.to_owned(), |lag| fixed(1e3 * lag, 0)),
+            number(m.max, 3),
+            fixed(outside, 1),
+        ]
+    };
+    Table {
+        caption: caption.to_owned(),
+        head,
+        rows: methods.iter().zip(names).map(row).collect(),
+        highlight: best(methods),
+    }
+}
+
+/// Paired tests between methods.
+pub fn comparison_table(
+    comparisons: &[Comparison],
+    unit: &str,
+    called: impl Fn(&str) -> String,
+) -> Table {
+    let probability = |p: Option<f64>| match p {
+        Some(p) if p < 1e-300 => "< 1e\u{2212}300".to_owned(),
+        Some(p) if p < 1e-4 => number(p, 1),
+        Some(p) => number(p, 2),
+        None => NONE.to_owned(),
+    };
+    let row = |c: &Comparison| {
+        let interval = c.interval_95.map_or_else(
+            || NONE.to_owned(),
+            |(low, high)| format!("{} \u{2026} {}", number(low, 3), number(high, 3)),
+        );
+        vec![
+            format!("{} less {}", called(&c.first), called(&c.second)),
+            number(c.mean_difference, 3),
+            interval,
+            probability(c.p_blocks),
+            c.blocks.to_string(),
+            probability(c.p_samples),
+        ]
+    };
+    Table {
+        caption: with_unit("Difference of absolute errors, paired t test; unit:", unit),
+        head: cells(["Difference", "Mean", "95 % interval", "P, blocks", "Blocks", "P, samples"]),
+        rows: comparisons.iter().map(row).collect(),
+        highlight: None,
+    }
+}
+
+/// Candidate signals, best first.
+pub fn signal_table(candidates: &[Candidate]) -> Table {
+    let row = |c: &Candidate| {
+        let percent = c.cross_validated_rmse.map(|rmse| 100.0 * rmse);
+        let text = c.problem.clone().unwrap_or_else(|| optional(percent, 3));
+        vec![c.signal.clone(), text]
+    };
+    Table {
+        caption: "Candidate signals, best first".to_owned(),
+        head: cells(["Signal", "Cross-validated RMSE, % of range"]),
+        rows: candidates.iter().map(row).collect(),
+        highlight: (!candidates.is_empty()).then_some(0),
+    }
+}
+
+/// The fitted order beside its neighbours.
+pub fn order_table(fit: &FitReport) -> Table {
+    let row = |o: &stretch_calibrate::Order| {
+        let fitted = if o.model == fit.model { " (fitted)" } else { "" };
+        let worth = if fit.recommended.as_ref() == Some(&o.model) { " (recommended)" } else { "" };
+        let name = format!("{}{fitted}{worth}", o.model);
+        match &o.problem {
+            Some(problem) => vec![name, o.terms.to_string(), problem.clone()],
+            None => vec![
+                name,
+                o.terms.to_string(),
+                o.r_squared.map_or_else(|| NONE.to_owned(), |r| fixed(r, 4)),
+                optional(o.rmse, 3),
+                optional(o.cross_validated_rmse, 3),
+            ],
+        }
+    };
+    Table {
+        caption: format!("Orders, {}; errors in normalised target", fit.name),
+        head: cells(["Order", "Terms", "R\u{b2}", "RMSE", "RMSE, left out"]),
+        rows: fit.orders.iter().map(row).collect(),
+        highlight: fit.orders.iter().position(|o| Some(&o.model) == fit.recommended.as_ref()),
+    }
+}
+
+/// Coefficients with their bounds.
+pub fn coefficient_table(fit: &FitReport) -> Table {
+    let row = |c: &stretch_calibrate::Coefficient| {
+        let power = |name: &str, power: u8| match power {
+            0 => String::new(),
+            1 => name.to_owned(),
+            2 => format!("{name}\u{b2}"),
+            3 => format!("{name}\u{b3}"),
+            n => format!("{name}^{n}"),
+        };
+        let (r, v) = (power("r", c.rate_power), power("v", c.signal_power));
+        let term = if r.is_empty() && v.is_empty() { "1".to_owned() } else { format!("{r}{v}") };
+        vec![c.name.clone(), term, number(c.estimate, 4), number(c.lower, 4), number(c.upper, 4)]
+    };
+    Table {
+        caption: format!(
+            "Coefficients, {} ({}): {} samples, R\u{b2} {}, RMSE {} in normalised target",
+            fit.name,
+            fit.model,
+            fit.samples,
+            fixed(fit.r_squared, 4),
+            number(fit.rmse, 3)
+        ),
+        head: cells(["Name", "Multiplies", "Estimate", "Lower, 95 %", "Upper, 95 %"]),
+        rows: fit.coefficients.iter().map(row).collect(),
+        highlight: None,
+    }
+}

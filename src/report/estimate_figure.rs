@@ -1,0 +1,119 @@
+//! Estimates against the reference over time.
+
+use std::ops::Range;
+
+use plotters::prelude::*;
+use stretch_calibrate::{Evaluation, TrialErrors};
+
+use super::{
+    canvas::Ink,
+    figure::{Axes, Figure, Frame, plot, stroke},
+    markup::{number, with_unit},
+    thin::{curve, extent, padded},
+};
+
+/// How long the window of [`closest_look`] is, in seconds.
+const WINDOW_S: f64 = 8.0;
+
+/// A trial over its whole time; `names` are those of the methods.
+pub fn estimate_figure(evaluation: &Evaluation, trial: &TrialErrors, names: &[String]) -> Figure {
+    match extent(trial.time_s.iter().copied()) {
+        Some(time) if time.end > time.start => window_figure(evaluation, trial, names, &time),
+        _ => Figure::missing("There is no stretch of time to draw."),
+    }
+}
+
+/// The same for some seconds of it, where the reference moves most.
+pub fn closest_look(evaluation: &Evaluation, trial: &TrialErrors, names: &[String]) -> Figure {
+    match liveliest(trial) {
+        Some(window) => window_figure(evaluation, trial, names, &window),
+        None => Figure::missing("The trial is too short for a closer look."),
+    }
+}
+
+/// A picture that stands alone, such as in a README: light, its legend inside.
+pub fn estimate_picture(evaluation: &Evaluation, trial: &TrialErrors, names: &[String]) -> String {
+    closest_look(evaluation, trial, names).standalone()
+}
+
+fn window_figure(
+    evaluation: &Evaluation,
+    trial: &TrialErrors,
+    names: &[String],
+    window: &Range<f64>,
+) -> Figure {
+    let bins = |frame: Frame| if frame == Frame::WIDE { 750 } else { 360 };
+    let lines = |frame: Frame| {
+        let thin = |values: &[f64]| curve(&trial.time_s, values, window, bins(frame));
+        let estimates = trial.estimates.iter().enumerate();
+        // the reference lies on top: it is what the others are held against
+        let mut lines: Vec<_> = estimates.map(|(i, y)| (Ink::of(i), 1.5, thin(y))).collect();
+        lines.push((Ink::Truth, 1.8, thin(&trial.reference)));
+        lines
+    };
+    let wide = lines(Frame::WIDE);
+    let all = wide.iter().flat_map(|(_, _, pieces)| pieces.iter().flatten());
+    let Some(y) = extent(all.map(|(_, y)| *y)) else {
+        return Figure::missing("Reference and estimates hold no number here.");
+    };
+    let axes = Axes {
+        x: window.clone(),
+        y: padded(&y, 0.04),
+        x_label: "time, s".to_owned(),
+        y_label: with_unit("reference and estimates,", &evaluation.unit)
+            .trim_end_matches(',')
+            .to_owned(),
+    };
+    let from_to = [window.start, window.end].map(|t| number(t, 3)).join(" to ");
+    let description = format!(
+        "Reference and estimates of {} over time, from {from_to} s; unit: {}",
+        trial.trial, evaluation.unit
+    );
+    let narrow = lines(Frame::NARROW);
+    let draw = |lines: Vec<(Ink, f64, Vec<Vec<(f64, f64)>>)>| {
+        let axes = &axes;
+        move |area: &super::figure::Area<'_>| {
+            plot(area, axes, |chart| {
+                for (ink, width, pieces) in lines {
+                    for piece in pieces {
+                        chart.draw_series(LineSeries::new(piece, stroke(ink.color(), width)))?;
+                    }
+                }
+                Ok(())
+            })
+        }
+    };
+    let methods = names.iter().enumerate().map(|(i, name)| (Ink::of(i), name.clone()));
+    Figure::new(&description)
+        .draw(Frame::NARROW, draw(narrow))
+        .draw(Frame::WIDE, draw(wide))
+        .legend([(Ink::Truth, "reference".to_owned())])
+        .legend(methods)
+}
+
+/// The window of [`WINDOW_S`] in which the reference travels farthest, in the
+/// middle half of the trial: neither its start nor its end.
+fn liveliest(trial: &TrialErrors) -> Option<Range<f64>> {
+    let span = extent(trial.time_s.iter().copied())?;
+    let length = span.end - span.start;
+    if length <= WINDOW_S {
+        return None;
+    }
+    let travel = |from: f64| {
+        let inside = |t: f64| t >= from && t < from + WINDOW_S;
+        let steps = trial.time_s.iter().zip(trial.reference.windows(2));
+        let sum: f64 = steps
+            .filter(|(t, _)| inside(**t))
+            .map(|(_, w)| (w[1] - w[0]).abs())
+            .filter(|step| step.is_finite())
+            .sum();
+        sum
+    };
+    let (first, last) = (span.start + 0.25 * length, span.start + 0.75 * length - WINDOW_S);
+    let (first, last) =
+        if last > first { (first, last) } else { (span.start, span.end - WINDOW_S) };
+    let candidates = (0..=12).map(|k| first + (last - first) * f64::from(k) / 12.0);
+    let best = candidates.max_by(|a, b| travel(*a).total_cmp(&travel(*b)))?;
+    let start = best.floor().max(span.start);
+    Some(start..start + WINDOW_S)
+}

@@ -1,0 +1,226 @@
+//! A figure and the axes that all figures share.
+
+use std::{convert::Infallible, ops::Range};
+
+use plotters::{
+    coord::{Shift, types::RangedCoordf64},
+    prelude::*,
+    style::text_anchor::{HPos, Pos, VPos},
+};
+
+use super::{
+    canvas::{Canvas, Ink, STEPS},
+    markup::{escape, tick},
+};
+
+/// Size of words and numbers, in pixels of the figure.
+pub const TEXT_PX: u32 = 13;
+
+/// Where figures are drawn.
+pub type Area<'a> = DrawingArea<Canvas<'a>, Shift>;
+
+/// Axes with a place for the data.
+pub type Chart<'a, 'b> = ChartContext<'a, Canvas<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+
+/// Drawing cannot fail but for a fault in the figure itself.
+pub type Drawn = Result<(), DrawingAreaErrorKind<Infallible>>;
+
+/// Pixels as steps of the drawing grid.
+pub fn px(pixels: f64) -> i32 {
+    (pixels * f64::from(STEPS)).round() as i32
+}
+
+/// The size of a drawing, in pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Frame {
+    /// Width.
+    pub width: u32,
+    /// Height.
+    pub height: u32,
+}
+
+impl Frame {
+    /// For half a desktop page or a whole phone: its text stays legible at 360 px.
+    pub const NARROW: Self = Self { width: 400, height: 290 };
+    /// For the whole width of a desktop page.
+    pub const WIDE: Self = Self { width: 880, height: 320 };
+}
+
+/// A drawing, maybe in two shapes, with a legend in words; or why there is none.
+#[derive(Debug, Clone, Default)]
+pub struct Figure {
+    /// What a reader who cannot see it is told.
+    pub description: String,
+    /// Colours and what they stand for.
+    pub legend: Vec<(Ink, String)>,
+    /// Why it is not drawn.
+    pub missing: Option<String>,
+    drawings: Vec<(Frame, String)>,
+}
+
+impl Figure {
+    /// A figure with this description and nothing drawn yet.
+    pub fn new(description: &str) -> Self {
+        Self { description: description.to_owned(), ..Self::default() }
+    }
+
+    /// Nothing to draw, and why.
+    pub fn missing(why: &str) -> Self {
+        Self { missing: Some(why.to_owned()), ..Self::default() }
+    }
+
+    /// Draws it in one frame; the narrowest of several is for phones.
+    #[must_use]
+    pub fn draw(mut self, frame: Frame, draw: impl FnOnce(&Area<'_>) -> Drawn) -> Self {
+        let mut body = String::new();
+        let done = {
+            let area = Canvas::new(&mut body, frame.width, frame.height).into_drawing_area();
+            draw(&area).and_then(|()| area.present())
+        };
+        match done {
+            Ok(()) => self.drawings.push((frame, body)),
+            Err(error) => self.missing = Some(format!("This figure could not be drawn: {error}")),
+        }
+        self
+    }
+
+    /// Adds a legend.
+    #[must_use]
+    pub fn legend(mut self, entries: impl IntoIterator<Item = (Ink, String)>) -> Self {
+        self.legend.extend(entries);
+        self
+    }
+
+    /// The drawings as inline SVG; of two, the style sheet shows the one that fits.
+    pub fn svg(&self) -> String {
+        let both = self.drawings.len() > 1;
+        let narrowest = self.drawings.iter().map(|(frame, _)| frame.width).min();
+        let label = escape(&self.description);
+        let drawing = |(frame, body): &(Frame, String)| {
+            let class = match (both, Some(frame.width) == narrowest) {
+                (false, _) => "",
+                (true, true) => " class=\"narrow\"",
+                (true, false) => " class=\"wide\"",
+            };
+            let (w, h) = (frame.width * STEPS, frame.height * STEPS);
+            format!(
+                "<svg{class} viewBox=\"0 0 {w} {h}\" role=\"img\" aria-label=\"{label}\">\n\
+                 {body}</svg>\n"
+            )
+        };
+        self.drawings.iter().map(drawing).collect()
+    }
+
+    /// The widest drawing as a file of its own, light, its legend inside.
+    pub fn standalone(&self) -> String {
+        let Some((frame, body)) = self.drawings.iter().max_by_key(|(frame, _)| frame.width) else {
+            return String::new();
+        };
+        let (width, height) = (frame.width, frame.height + LEGEND_PX);
+        let (w, h) = (width * STEPS, height * STEPS);
+        let (mut legend, mut x) = (String::new(), px(52.0));
+        for (ink, name) in &self.legend {
+            let (y, end, words, class) = (px(14.0), x + px(22.0), escape(name), ink.class());
+            legend += &format!(
+                "<path class=\"line {class}\" stroke-width=\"12\" d=\"M{x} {y}H{end}\"/>\n\
+                 <text class=\"ink-text\" x=\"{}\" y=\"{y}\" dy=\"0.35em\" font-size=\"{}\">\
+                 {words}</text>\n",
+                end + px(6.0),
+                TEXT_PX * STEPS
+            );
+            // a letter is about seven pixels wide
+            x = end + px(28.0 + 7.0 * name.chars().count() as f64);
+        }
+        let (label, down) = (escape(&self.description), LEGEND_PX * STEPS);
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
+             viewBox=\"0 0 {w} {h}\" role=\"img\" aria-label=\"{label}\">\n<title>{label}</title>\n\
+             <style>\n{}</style>\n<rect width=\"{w}\" height=\"{h}\" fill=\"#ffffff\"/>\n{legend}\
+             <g transform=\"translate(0 {down})\">\n{body}</g></svg>\n",
+            include_str!("figure_light.css")
+        )
+    }
+}
+
+/// Height of the legend of a figure that stands alone.
+const LEGEND_PX: u32 = 28;
+
+/// What stands on two axes, and what they span.
+#[derive(Debug, Clone)]
+pub struct Axes {
+    /// Horizontal span.
+    pub x: Range<f64>,
+    /// Vertical span.
+    pub y: Range<f64>,
+    /// Below, at the right end; empty for an axis whose numbers another panel bears.
+    pub x_label: String,
+    /// Above, at the left end.
+    pub y_label: String,
+}
+
+/// Text in an ink, held at `h` and `v`.
+pub fn words(ink: Ink, h: HPos, v: VPos) -> TextStyle<'static> {
+    let mut style = TextStyle::from(("sans-serif", TEXT_PX * STEPS).into_font());
+    style.color = ink.color().to_backend_color();
+    style.pos(Pos::new(h, v))
+}
+
+/// A line of `pixels` in width.
+pub fn stroke(color: impl Into<RGBAColor>, pixels: f64) -> ShapeStyle {
+    let stroke_width = px(pixels).unsigned_abs();
+    ShapeStyle { color: color.into(), filled: false, stroke_width }
+}
+
+/// A dot's style.
+pub fn dot(ink: Ink, opacity: f64) -> ShapeStyle {
+    ShapeStyle { color: ink.faint(opacity), filled: true, stroke_width: 0 }
+}
+
+/// Draws axes and then the data.
+pub fn plot<'b>(
+    area: &Area<'b>,
+    axes: &Axes,
+    data: impl FnOnce(&mut Chart<'_, 'b>) -> Drawn,
+) -> Drawn {
+    let (width, height) = area.dim_in_pixel();
+    let bare = axes.x_label.is_empty();
+    let (x, y) = (spread(&axes.x), spread(&axes.y));
+    let (x_span, y_span) = (x.end - x.start, y.end - y.start);
+    let mut chart = ChartBuilder::on(area)
+        .margin_top(px(24.0))
+        .margin_right(px(14.0))
+        .margin_bottom(if bare { px(8.0) } else { px(22.0) })
+        .x_label_area_size(px(20.0))
+        .y_label_area_size(px(50.0))
+        .build_cartesian_2d(x, y)?;
+    let numbers = words(Ink::Text, HPos::Center, VPos::Center);
+    let most = |pixels: u32, each: i32| (pixels as i32 / px(f64::from(each))).max(2) as usize;
+    chart
+        .configure_mesh()
+        .x_labels(most(width, 75))
+        .y_labels(most(height, 42))
+        .x_label_formatter(&|v| tick(*v, x_span))
+        .y_label_formatter(&|v| tick(*v, y_span))
+        .label_style(numbers)
+        .axis_style(stroke(Ink::Axis.color(), 1.0))
+        .bold_line_style(stroke(Ink::Grid.color(), 1.0))
+        .light_line_style(stroke(TRANSPARENT, 0.0))
+        .set_all_tick_mark_size(px(4.0))
+        .draw()?;
+    data(&mut chart)?;
+    let above = words(Ink::Text, HPos::Left, VPos::Top);
+    area.draw(&Text::new(axes.y_label.clone(), (px(4.0), px(3.0)), above))?;
+    let below = words(Ink::Text, HPos::Right, VPos::Bottom);
+    let corner = (width as i32 - px(14.0), height as i32 - px(3.0));
+    area.draw(&Text::new(axes.x_label.clone(), corner, below))
+}
+
+/// A span that is finite and not empty, whatever the data were.
+fn spread(span: &Range<f64>) -> Range<f64> {
+    let (low, high) = (span.start, span.end);
+    if !(low.is_finite() && high.is_finite()) {
+        return 0.0..1.0;
+    }
+    let least = 1e-9 * low.abs().max(high.abs()).max(1e-9);
+    if high - low > least { low..high } else { low - 0.5..low + 0.5 }
+}

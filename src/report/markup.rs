@@ -1,0 +1,72 @@
+//! Text and numbers as they stand on a page.
+
+/// Text that is safe between tags and in double quotes, and well-formed in XML.
+pub fn escape(text: &str) -> String {
+    let mut safe = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => safe.push_str("&amp;"),
+            '<' => safe.push_str("&lt;"),
+            '>' => safe.push_str("&gt;"),
+            '"' => safe.push_str("&quot;"),
+            '\'' => safe.push_str("&#39;"),
+            '\n' | '\t' => safe.push(c),
+            c if c.is_control() => safe.push('\u{fffd}'),
+            c => safe.push(c),
+        }
+    }
+    safe
+}
+
+/// What stands where there is no number.
+pub const NONE: &str = "\u{2013}";
+
+/// `x` to `digits` significant digits, in plain notation from 0.0001 to a
+/// million; a dash when it is not finite.
+pub fn number(x: f64, digits: usize) -> String {
+    if !x.is_finite() {
+        return NONE.to_owned();
+    }
+    let digits = digits.max(1);
+    if x == 0.0 {
+        return "0".to_owned();
+    }
+    let size = x.abs();
+    if !(1e-4..1e6).contains(&size) {
+        return minus(format!("{x:.*e}", digits - 1));
+    }
+    let before = size.log10().floor() as i32 + 1;
+    let after = usize::try_from(digits as i32 - before).unwrap_or(0);
+    fixed(x, after)
+}
+
+/// `x` with `decimals` digits behind the point and a true minus sign; a dash
+/// when it is not finite.
+pub fn fixed(x: f64, decimals: usize) -> String {
+    if !x.is_finite() {
+        return NONE.to_owned();
+    }
+    let text = format!("{x:.decimals$}");
+    let zero = text.chars().all(|c| matches!(c, '-' | '0' | '.'));
+    minus(if zero { text.trim_start_matches('-').to_owned() } else { text })
+}
+
+/// A number on an axis that spans `span`.
+pub fn tick(x: f64, span: f64) -> String {
+    // labels are at least a tenth of the span apart
+    let decimals = (1.0 - span.abs().max(1e-300).log10()).ceil().clamp(0.0, 12.0) as usize;
+    let text = fixed(x, decimals);
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
+}
+
+fn minus(text: String) -> String {
+    text.replace('-', "\u{2212}")
+}
+
+/// A quantity with its unit; the unit may be empty.
+pub fn with_unit(text: &str, unit: &str) -> String {
+    if unit.is_empty() { text.to_owned() } else { format!("{text} {unit}") }
+}

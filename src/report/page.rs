@@ -1,0 +1,156 @@
+//! The frame of every report: one file, no network, light and dark, phone and paper.
+
+use std::fmt::Write as _;
+
+use super::{canvas::Ink, figure::Figure, markup::escape};
+
+/// The look: colours, type, and what a phone and a printer change.
+const STYLE: &str = include_str!("style.css");
+
+/// A table: the first column names its rows, the others hold numbers.
+#[derive(Debug, Clone, Default)]
+pub struct Table {
+    /// What it shows.
+    pub caption: String,
+    /// Heads of the columns.
+    pub head: Vec<String>,
+    /// Cells, row by row.
+    pub rows: Vec<Vec<String>>,
+    /// The row to look at first.
+    pub highlight: Option<usize>,
+}
+
+/// A report under construction; [`Page::finish`] gives the file.
+#[derive(Debug, Clone)]
+pub struct Page {
+    title: String,
+    body: String,
+    in_section: bool,
+}
+
+impl Page {
+    /// A page whose first words are its title and one plain sentence with the result.
+    pub fn new(title: &str, verdict: &str) -> Self {
+        let body = format!(
+            "<header><h1>{}</h1>\n<p class=\"verdict\">{}</p></header>\n",
+            escape(title),
+            escape(verdict)
+        );
+        Self { title: title.to_owned(), body, in_section: false }
+    }
+
+    /// Begins a section; `intro` may be empty.
+    pub fn section(&mut self, heading: &str, intro: &str) -> &mut Self {
+        self.close();
+        self.in_section = true;
+        self.put(&format!("<section><h2>{}</h2>\n", escape(heading)));
+        if intro.is_empty() { self } else { self.text(intro) }
+    }
+
+    /// A paragraph.
+    pub fn text(&mut self, text: &str) -> &mut Self {
+        self.put(&format!("<p>{}</p>\n", escape(text)))
+    }
+
+    /// Notes, one a line; nothing when there are none.
+    pub fn list(&mut self, items: &[String]) -> &mut Self {
+        if items.is_empty() {
+            return self;
+        }
+        self.put("<ul>\n");
+        for item in items {
+            self.put(&format!("<li>{}</li>\n", escape(item)));
+        }
+        self.put("</ul>\n")
+    }
+
+    /// A figure over the whole width.
+    pub fn figure(&mut self, figure: &Figure, caption: &str) -> &mut Self {
+        self.put("<figure>");
+        if !figure.legend.is_empty() {
+            self.put("<div class=\"legend\">");
+            for (ink, name) in &figure.legend {
+                self.put(&legend_entry(*ink, name));
+            }
+            self.put("</div>\n");
+        }
+        match &figure.missing {
+            Some(why) => self.put(&format!("<p class=\"missing\">{}</p>\n", escape(why))),
+            None => self.put(&figure.svg()),
+        };
+        self.put(&format!("<figcaption>{}</figcaption></figure>\n", escape(caption)))
+    }
+
+    /// Figures side by side where there is room, one above the other on a phone.
+    pub fn figures(&mut self, figures: &[(Figure, String)]) -> &mut Self {
+        self.put("<div class=\"side\">\n");
+        for (figure, caption) in figures {
+            self.figure(figure, caption);
+        }
+        self.put("</div>\n")
+    }
+
+    /// A table that scrolls in its own frame when it is too wide.
+    pub fn table(&mut self, table: &Table) -> &mut Self {
+        let caption = escape(&table.caption);
+        self.put(&format!(
+            "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{caption}\">\
+             <table><caption>{caption}</caption>\n<thead><tr>"
+        ));
+        for head in &table.head {
+            self.put(&format!("<th scope=\"col\">{}</th>", escape(head)));
+        }
+        self.put("</tr></thead>\n<tbody>\n");
+        for (index, row) in table.rows.iter().enumerate() {
+            let class = if table.highlight == Some(index) { " class=\"best\"" } else { "" };
+            self.put(&format!("<tr{class}>"));
+            for (column, cell) in row.iter().enumerate() {
+                let cell = escape(cell);
+                self.put(&match column {
+                    0 => format!("<th scope=\"row\">{cell}</th>"),
+                    _ => format!("<td>{cell}</td>"),
+                });
+            }
+            self.put("</tr>\n");
+        }
+        self.put("</tbody></table></div>\n")
+    }
+
+    /// Content behind a line that opens it.
+    pub fn folded(&mut self, summary: &str, content: impl FnOnce(&mut Self)) -> &mut Self {
+        self.put(&format!("<details><summary>{}</summary>\n", escape(summary)));
+        content(self);
+        self.put("</details>\n")
+    }
+
+    /// The whole file: HTML that is also well-formed XML.
+    pub fn finish(mut self) -> String {
+        self.close();
+        let title = escape(&self.title);
+        let body = self.body;
+        format!(
+            "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/>\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n\
+             <meta name=\"color-scheme\" content=\"light dark\"/>\n\
+             <title>{title}</title>\n<style>\n{STYLE}</style></head>\n<body><main>\n{body}\
+             </main></body></html>\n"
+        )
+    }
+
+    fn close(&mut self) {
+        if std::mem::take(&mut self.in_section) {
+            self.put("</section>\n");
+        }
+    }
+
+    fn put(&mut self, html: &str) -> &mut Self {
+        // a string takes every write
+        let _ = self.body.write_str(html);
+        self
+    }
+}
+
+/// A swatch and its name.
+fn legend_entry(ink: Ink, name: &str) -> String {
+    format!("<span><i class=\"{}\"></i>{}</span>\n", ink.class(), escape(name))
+}

@@ -94,7 +94,7 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
     }
 
     /// Adds the samples of another factor: equal to one pass over both logs up
-    /// to rounding, in any order. Costs about `2/3 TERMS^3` multiplications.
+    /// to rounding, in any order. Costs about `TERMS^3` multiplications.
     ///
     /// # Errors
     /// [`FitError::MissingTerm`] when the degrees differ; nothing changes then.

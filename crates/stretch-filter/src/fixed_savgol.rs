@@ -111,9 +111,9 @@ pub struct FixedSgRate<S, const WINDOW: usize, const DEGREE: usize, const DELAY:
 pub struct FixedSgMemory<S: FixedSample, const WINDOW: usize> {
     sums: [S::Sum; MOMENTS],
     /// Where the oldest sample lies, or one past the end.
-    oldest: usize,
+    oldest: u32,
     /// Samples until the window is full.
-    remaining: usize,
+    remaining: u32,
     ring: [S; WINDOW],
 }
 
@@ -121,12 +121,12 @@ impl<S: FixedSample, const WINDOW: usize> FixedSgMemory<S, WINDOW> {
     /// How many further samples give `None` before the window is full.
     #[inline]
     pub fn remaining(&self) -> usize {
-        self.remaining.saturating_sub(1)
+        self.remaining.saturating_sub(1) as usize
     }
 
     /// The newest sample; zero before the first.
     pub fn newest(&self) -> S {
-        let at = self.oldest.checked_sub(1).unwrap_or(WINDOW - 1);
+        let at = (self.oldest as usize).checked_sub(1).unwrap_or(WINDOW - 1);
         self.ring.get(at).copied().unwrap_or_default()
     }
 }
@@ -192,6 +192,36 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
         (total >> Self::SHIFT) as i32
     }
 
+    /// What [`change`](Self::change) multiplies by, and how far it shifts: 29
+    /// bits of `PER_SAMPLE`.
+    const CHANGE: (i64, u32) = {
+        let (denominator, mut shift) = (Self::TAPS.denominator as i128, Self::SHIFT);
+        while (1i128 << shift) / denominator < 1 << 28 {
+            shift += 1;
+        }
+        let factor = ((1i128 << shift) + denominator / 2) / denominator;
+        assert!(
+            factor < 1 << 30 && shift - Self::SHIFT >= 9,
+            "the output is coarser than a change a sample"
+        );
+        (factor as i64, shift - Self::SHIFT)
+    };
+
+    /// The change of the signal over `samples` samples that an output means, rounded.
+    ///
+    /// ```
+    /// type Rate = stretch_filter::FixedSgRate<u16, 11, 2>;
+    /// assert_eq!(Rate::new().change(-7 * 4290, 3), -21);
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn change(&self, output: i32, samples: u8) -> i64 {
+        let (factor, shift) = Self::CHANGE;
+        // 31 + 30 bits; nine bits behind the point are kept for the product
+        let per_sample = (i64::from(output) * factor) >> (shift - 9);
+        (per_sample * i64::from(samples) + 256) >> 9
+    }
+
     /// The output of the last step, without a new sample; `None` in the warm-up.
     #[inline]
     pub fn last(&self, memory: &FixedSgMemory<S, WINDOW>) -> Option<i32> {
@@ -216,7 +246,7 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
         FixedSgMemory {
             sums: Default::default(),
             oldest: 0,
-            remaining: WINDOW,
+            remaining: WINDOW as u32,
             ring: [S::default(); WINDOW],
         }
     }
@@ -230,9 +260,10 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
     #[inline(always)]
     fn step(&self, memory: &mut FixedSgMemory<S, WINDOW>, x: S) -> Option<i32> {
         // also what shows the compiler that the index is inside
-        let at = if memory.oldest < WINDOW { memory.oldest } else { 0 };
+        let at = memory.oldest as usize;
+        let at = if at < WINDOW { at } else { 0 };
         let old = core::mem::replace(&mut memory.ring[at], x);
-        memory.oldest = at + 1;
+        memory.oldest = at as u32 + 1;
         for k in (1..=DEGREE).rev() {
             let choose = const { binomials(WINDOW) }[k];
             memory.sums[k] = S::slide(memory.sums[k], memory.sums[k - 1], choose, old);

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![no_std]
 
+pub mod code;
 mod example;
 mod map;
 mod reading;

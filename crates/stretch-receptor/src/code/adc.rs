@@ -1,0 +1,91 @@
+//! The converter at the edge.
+
+use stretch_core::DesignError;
+
+/// One conversion, right-aligned as data registers hold it.
+///
+/// Any other number than `0 .. 2^bits` is a sample that did not come; firmware
+/// uses [`AdcCode::MISSING`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AdcCode(pub i32);
+
+impl AdcCode {
+    /// A sample that did not come.
+    pub const MISSING: Self = Self(-1);
+}
+
+/// What a converter's codes mean.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AdcSpec {
+    /// Bits of a code, 1 to 16.
+    pub bits: u8,
+    /// Volts at code 0 (below zero for a bipolar converter).
+    pub zero_v: f64,
+    /// Volts at the largest code, `2^bits - 1`.
+    pub full_scale_v: f64,
+}
+
+/// A checked [`AdcSpec`].
+///
+/// ```
+/// use stretch_receptor::code::{Adc, AdcCode, AdcSpec};
+/// let adc = Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 })?;
+/// assert_eq!(adc.volts(AdcCode(4095)), Some(3.3));
+/// assert_eq!(adc.volts(AdcCode(4096)), None);
+/// assert_eq!(adc.code(1.65), AdcCode(2048));
+/// # Ok::<(), stretch_core::DesignError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Adc(AdcSpec);
+
+impl Adc {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// [`DesignError::OutOfRange`] for bits outside 1 ..= 16,
+    /// [`DesignError::EmptyRange`] unless `zero_v < full_scale_v`, both finite.
+    pub fn new(spec: AdcSpec) -> Result<Self, DesignError> {
+        let AdcSpec { bits, zero_v, full_scale_v } = spec;
+        DesignError::check("adc.bits", bits.into(), (1..=16).contains(&bits))?;
+        DesignError::check("adc.zero_v", zero_v, true)?;
+        DesignError::check("adc.full_scale_v", full_scale_v, true)?;
+        let span = full_scale_v - zero_v;
+        if !(span > 0.0 && span.is_finite() && span.recip().is_finite()) {
+            return Err(DesignError::EmptyRange { field: "adc", min: zero_v, max: full_scale_v });
+        }
+        Ok(Self(spec))
+    }
+
+    /// The parts.
+    pub fn spec(&self) -> AdcSpec {
+        self.0
+    }
+
+    /// The largest code, `2^bits - 1`.
+    pub fn largest(&self) -> i32 {
+        (1 << self.0.bits) - 1
+    }
+
+    /// Volts from one code to the next.
+    pub fn volts_per_code(&self) -> f64 {
+        (self.0.full_scale_v - self.0.zero_v) / f64::from(self.largest())
+    }
+
+    /// Volts of a code; `None` for one that the converter does not have.
+    pub fn volts(&self, code: AdcCode) -> Option<f64> {
+        let share = f64::from(code.0) / f64::from(self.largest());
+        let volts = self.0.zero_v + share * (self.0.full_scale_v - self.0.zero_v);
+        (0..=self.largest()).contains(&code.0).then_some(volts)
+    }
+
+    /// The code that the converter gives for a voltage: the nearest, at the ends
+    /// the last; [`AdcCode::MISSING`] for NaN.
+    pub fn code(&self, volts: f64) -> AdcCode {
+        if volts.is_nan() {
+            return AdcCode::MISSING;
+        }
+        let codes = (volts - self.0.zero_v) / self.volts_per_code();
+        // the cast saturates
+        AdcCode(((codes + 0.5).max(0.0) as i32).min(self.largest()))
+    }
+}

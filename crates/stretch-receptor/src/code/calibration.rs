@@ -1,0 +1,191 @@
+//! A calibration converted for a converter's codes.
+
+use stretch_core::{
+    Branch, Calibration, DesignError, Polarity, RateEstimator, SampleRate, fixed::FixedLine,
+    fixed::FixedPoly13,
+};
+use stretch_filter::FixedSgRate;
+
+use super::{
+    Adc, CodeArithmetic, Fixed,
+    fold::{self, Units},
+    sheet::{COARSE_BITS, Sheets},
+};
+
+/// The schema of the records that this release writes, and the newest it reads.
+pub const CODE_SCHEMA: u32 = 1;
+
+/// A [`Calibration`] over the codes of one converter, in the arithmetic `A`,
+/// with a Savitzky-Golay rate of `WINDOW`, `DEGREE` and `DELAY`.
+///
+/// Everything affine (volts per code, both normalisations, the target's unit,
+/// the sample rate, the polarity) is folded into the coefficients. Serialised
+/// with the feature `serde`, it is what a board carries in flash: about 100
+/// bytes, checked while it loads, and without a floating-point design on the
+/// board.
+///
+/// ```
+/// use stretch_receptor::code::{Adc, AdcSpec, FixedCalibration};
+///
+/// let calibration = stretch_receptor::example_calibration();
+/// let adc = Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 })?;
+/// let fixed = FixedCalibration::<11, 2>::new(&calibration, &adc)?;
+/// assert!(fixed.worst_case_error_um() < 0.6); // of which 0.5 is the last rounding
+/// # Ok::<(), stretch_core::DesignError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CodeCalibration<
+    A: CodeArithmetic,
+    const WINDOW: usize,
+    const DEGREE: usize,
+    const DELAY: usize = 0,
+> {
+    pub(super) bits: u8,
+    pub(super) sample_rate: SampleRate,
+    /// The target falls as the signal rises.
+    pub(super) falling: bool,
+    /// The largest rate that keeps the branch.
+    pub(super) dead_band: i32,
+    pub(super) sheets: Sheets<A::Line, A::Surface>,
+}
+
+/// A calibration in fixed point: [`CodeCalibration`] in [`Fixed`].
+pub type FixedCalibration<const WINDOW: usize, const DEGREE: usize, const DELAY: usize = 0> =
+    CodeCalibration<Fixed, WINDOW, DEGREE, DELAY>;
+
+impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
+    CodeCalibration<A, WINDOW, DEGREE, DELAY>
+{
+    /// Converts a calibration for the codes of `adc`.
+    ///
+    /// # Errors
+    /// [`DesignError`], naming the field: a rate estimator other than the
+    /// Savitzky-Golay of this type (`rate.*`), a surface with terms beyond
+    /// poly13 (`model.surface.terms`), a number that the arithmetic cannot hold
+    /// (`fixed.*`, `surface`), or, in fixed point, a [worst-case
+    /// error](FixedCalibration::worst_case_error_um) above 0.01 % of the
+    /// target's span (`fixed.error`).
+    pub fn new(calibration: &Calibration, adc: &Adc) -> Result<Self, DesignError> {
+        Self::check_estimator(calibration.rate_estimator)?;
+        let units = Units::new(
+            adc,
+            calibration.sample_rate_hz.hz(),
+            FixedSgRate::<u16, WINDOW, DEGREE, DELAY>::PER_SAMPLE,
+            FixedSgRate::<u16, WINDOW, DEGREE, DELAY>::LARGEST,
+        );
+        let dead_band = libm::floor(calibration.dead_band / units.rate_v_per_s);
+        let sheets = A::round(&fold::fold(calibration, &units)?)?;
+        let (gain, _) = fold::output(calibration);
+        if let Some(error) = A::worst_case(&sheets, Self::rate_rounding()) {
+            DesignError::check("fixed.error", error, error <= 1e-4 * 1000.0 * gain.abs())?;
+        }
+        Ok(Self {
+            bits: adc.spec().bits,
+            sample_rate: calibration.sample_rate_hz,
+            falling: calibration.polarity == Polarity::Falling,
+            // the cast saturates: no rate is beyond 32 bits
+            dead_band: dead_band as i32,
+            sheets,
+        })
+    }
+
+    /// Samples a second at which the rate is right.
+    pub fn sample_rate(&self) -> SampleRate {
+        self.sample_rate
+    }
+
+    /// Bits of the converter.
+    pub fn adc_bits(&self) -> u8 {
+        self.bits
+    }
+
+    fn check_estimator(estimator: RateEstimator) -> Result<(), DesignError> {
+        let RateEstimator::SavitzkyGolay { window, degree, delay } = estimator else {
+            return Err(DesignError::OutOfRange { field: "rate.estimator", value: f64::NAN });
+        };
+        Self::check_shape((window, degree, delay))
+    }
+
+    pub(super) fn check_shape((window, degree, delay): (u16, u8, u16)) -> Result<(), DesignError> {
+        let same = |field, n: u16, own: usize| {
+            DesignError::check(field, n.into(), usize::from(n) == own).map(|_| ())
+        };
+        same("rate.window", window, WINDOW)?;
+        same("rate.degree", degree.into(), DEGREE)?;
+        same("rate.delay", delay, DELAY)
+    }
+
+    /// By how much of its unit the integer rate may be rounded.
+    fn rate_rounding() -> f64 {
+        if FixedSgRate::<u16, WINDOW, DEGREE, DELAY>::SHIFT == 0 { 0.0 } else { 0.5 }
+    }
+
+    /// The branch that a rate chooses.
+    #[inline(always)]
+    pub(super) fn branch(&self, current: Branch, rate: i32) -> Branch {
+        // -band <= rate <= band, in one comparison
+        let above = rate.wrapping_add(self.dead_band) as u32;
+        if above <= 2 * self.dead_band as u32 {
+            current
+        } else if (rate < 0) != self.falling {
+            Branch::Deflation
+        } else {
+            Branch::Inflation
+        }
+    }
+}
+
+impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
+    FixedCalibration<WINDOW, DEGREE, DELAY>
+{
+    /// The most that an estimate can differ from the calibration in real
+    /// numbers on the same codes, in thousandths of the reference's unit
+    /// (micrometres for a reference in millimetres).
+    ///
+    /// ```text
+    /// 1/2 + roundings of the surface + steepest slopes times roundings of the inputs
+    /// ```
+    ///
+    /// over the whole domain and beyond its ends, for every stream without a
+    /// missing sample. A bridged sample is rounded to 1/65536 of the converter's
+    /// full scale, as a converter of 16 bits would.
+    pub fn worst_case_error_um(&self) -> f64 {
+        worst_case(&self.sheets, Self::rate_rounding())
+    }
+}
+
+pub(super) fn worst_case(
+    sheets: &Sheets<super::arithmetic::Scaled<FixedLine>, super::arithmetic::Scaled<FixedPoly13>>,
+    rate_rounding: f64,
+) -> f64 {
+    // an end of a domain is a whole number: up to one off, and the rate's own rounding
+    let spread = |shift: u8, rounding: f64| libm::ldexp(rounding, i32::from(shift) - 32);
+    let signal = |shift: u8| spread(shift, 1.0 + f64::from(1u32 << COARSE_BITS) * SIGNAL_F64);
+    let bits = |error: f64, bits: u8| 0.5 + libm::ldexp(error, -i32::from(bits));
+    match sheets {
+        Sheets::Line(sheet) => {
+            let (_, slope) = <(i32, i32)>::from(sheet.surface.of);
+            let error = FixedLine::ROUNDING + f64::from(slope).abs() * signal(sheet.signal.shift);
+            bits(error, sheet.surface.bits)
+        }
+        Sheets::Poly13(both) => {
+            let each = both.map(|sheet| {
+                let p = sheet.surface.of.coefficients();
+                // the steepest that the surface can be for inputs within a half
+                let by_rate = p.p10.abs() + 0.5 * p.p11.abs() + 0.25 * p.p12.abs();
+                let by_signal = p.p01.abs()
+                    + p.p02.abs()
+                    + 0.75 * p.p03.abs()
+                    + 0.5 * (p.p11.abs() + p.p12.abs());
+                let error = FixedPoly13::ROUNDING
+                    + by_rate * spread(sheet.rate.shift, 1.0 + rate_rounding)
+                    + by_signal * signal(sheet.signal.shift);
+                bits(error, sheet.surface.bits)
+            });
+            each[0].max(each[1])
+        }
+    }
+}
+
+/// What `f64` may cost a sample's place in the fold, in samples.
+const SIGNAL_F64: f64 = 1e-9;

@@ -1,0 +1,135 @@
+//! A calibration over volts becomes one over a converter's integers, in `f64`.
+
+use stretch_core::{BranchSurface, Calibration, DesignError, Interval, LinearMap, Model, Poly13};
+
+use super::{
+    Adc,
+    sheet::{COARSE_BITS, Sheet, Sheets, Span},
+};
+
+/// Reference units over inputs in -1/2..1/2: what each arithmetic rounds.
+pub(super) type Folded = Sheets<[f64; 2], Poly13>;
+
+/// Integers and what they mean.
+pub(super) struct Units {
+    /// Volts at an aligned sample of 0, and a step of it.
+    pub zero_v: f64,
+    pub step_v: f64,
+    /// Volts a second per unit of the integer rate, and the most units there can be.
+    pub rate_v_per_s: f64,
+    pub largest_rate: i32,
+}
+
+impl Units {
+    pub(super) fn new(adc: &Adc, samples_per_s: f64, per_sample: f64, largest_rate: i32) -> Self {
+        let step_v = adc.volts_per_code() / f64::from(1u32 << (16 - adc.spec().bits));
+        let rate_v_per_s = step_v * samples_per_s * per_sample;
+        Self { zero_v: adc.spec().zero_v, step_v, rate_v_per_s, largest_rate }
+    }
+}
+
+/// A part of an integer that rounding of `f64` may have cost at an end of a domain.
+const SLACK: f64 = 1.0 / 1024.0;
+
+/// The integers inside `min ..= max`, at most `most` in magnitude.
+fn span(min: f64, max: f64, most: i32) -> Span {
+    let end = |x: f64| x.clamp(-f64::from(most), f64::from(most)) as i32;
+    let (min, max) = (end(libm::ceil(min - SLACK)), end(libm::floor(max + SLACK)));
+    // an interval between two integers, or wholly outside: the nearest one
+    let max = max.max(min);
+    let size = min.unsigned_abs().max(max.unsigned_abs()).max(1);
+    Span { min, max, shift: (size.leading_zeros() - 1) as u8 }
+}
+
+pub(super) fn fold(calibration: &Calibration, units: &Units) -> Result<Folded, DesignError> {
+    match &calibration.model {
+        Model::Linear(line) => Ok(Sheets::Line(fold_line(calibration, line, units))),
+        Model::Surfaces { inflation, deflation } => {
+            let sheet = |branch| fold_surface(calibration, branch, units);
+            Ok(Sheets::Poly13([sheet(inflation)?, sheet(deflation)?]))
+        }
+        _ => Err(DesignError::OutOfRange { field: "model", value: f64::NAN }),
+    }
+}
+
+/// Reference units per normalised target, and the reference at a target of zero.
+pub(super) fn output(calibration: &Calibration) -> (f64, f64) {
+    let (range, target) = (calibration.target_range, calibration.target);
+    (target.reference_per_target() * range.span(), target.to_reference(range.offset()))
+}
+
+/// Centre, domain, and the volts that the spread signal counts at 1.
+fn signal(domain: Interval, units: &Units) -> (u16, Span, f64) {
+    let aligned = |volts: f64| (volts - units.zero_v) / units.step_v;
+    let (low, high) = (aligned(domain.min), aligned(domain.max));
+    let visible = |x: f64| x.clamp(0.0, f64::from(u16::MAX));
+    let centre = libm::round(0.5 * (visible(low) + visible(high))) as u16;
+    let coarse = |x: f64| (x - f64::from(centre)) * f64::from(1u32 << COARSE_BITS);
+    let span = span(coarse(low), coarse(high), i32::from(u16::MAX) << COARSE_BITS);
+    let volts = libm::ldexp(units.step_v, 32 - COARSE_BITS as i32 - i32::from(span.shift));
+    (centre, span, volts)
+}
+
+/// Normalised signal at the centre, and its change over the spread signal's 1.
+fn normalised(calibration: &Calibration, centre: u16, volts: f64, units: &Units) -> (f64, f64) {
+    let range = calibration.signal_range;
+    let centre_v = units.zero_v + f64::from(centre) * units.step_v;
+    (range.normalise(centre_v), volts / range.span())
+}
+
+fn fold_line(calibration: &Calibration, line: &LinearMap, units: &Units) -> Sheet<[f64; 2]> {
+    let (gain, zero) = output(calibration);
+    let (centre, span, volts) = signal(line.signal_domain, units);
+    let (at, per) = normalised(calibration, centre, volts, units);
+    let surface = [zero + gain * (line.intercept + line.slope * at), gain * line.slope * per];
+    Sheet { centre, signal: span, rate: Span { min: 0, max: 0, shift: 0 }, surface }
+}
+
+fn fold_surface(
+    calibration: &Calibration,
+    branch: &BranchSurface,
+    units: &Units,
+) -> Result<Sheet<Poly13>, DesignError> {
+    let degree = branch.surface.degree();
+    let Some(p) = branch.surface.as_poly13() else {
+        let (field, asked) = ("model.surface.terms", degree.terms());
+        return Err(DesignError::TooLarge { field, asked, most: 7 });
+    };
+    let (gain, zero) = output(calibration);
+    let sign = calibration.polarity.sign();
+    let (centre, signal, volts) = signal(branch.signal_domain, units);
+    let ends =
+        [branch.rate_domain.min, branch.rate_domain.max].map(|r| sign * r / units.rate_v_per_s);
+    let rate = span(ends[0].min(ends[1]), ends[0].max(ends[1]), units.largest_rate);
+    let per_s = libm::ldexp(units.rate_v_per_s, 32 - i32::from(rate.shift));
+    // normalised signal = at + per v, normalised rate = still + moving r
+    let (at, per) = normalised(calibration, centre, volts, units);
+    let (still, moving) =
+        (branch.rate_range.normalise(0.0), sign * per_s / branch.rate_range.span());
+    // the row of the rate, and what a rate of zero leaves at rest
+    let by_rate = shifted([p.p10, p.p11, p.p12, 0.0], at, per);
+    let at_rest = shifted([p.p00, p.p01, p.p02, p.p03], at, per);
+    let rest = |j: usize| gain * (at_rest[j] + still * by_rate[j]);
+    let rise = |j: usize| gain * moving * by_rate[j];
+    let surface = Poly13 {
+        p00: zero + rest(0),
+        p01: rest(1),
+        p02: rest(2),
+        p03: rest(3),
+        p10: rise(0),
+        p11: rise(1),
+        p12: rise(2),
+    };
+    Ok(Sheet { centre, signal, rate, surface })
+}
+
+/// The cubic `c` in `at + per x`, as a cubic in x.
+fn shifted(c: [f64; 4], at: f64, per: f64) -> [f64; 4] {
+    let [c0, c1, c2, c3] = c;
+    [
+        ((c3 * at + c2) * at + c1) * at + c0,
+        ((3.0 * c3 * at + 2.0 * c2) * at + c1) * per,
+        (3.0 * c3 * at + c2) * per * per,
+        c3 * per * per * per,
+    ]
+}

@@ -1,0 +1,29 @@
+//! Converter codes in, estimates out: the receptor for a board.
+//!
+//! An analogue-to-digital converter gives integers, and a Savitzky-Golay rate of
+//! integers is an integer: up to the surface nothing has to be rounded and no
+//! floating-point number is needed. [`CodeReceptor`] works that way. It answers
+//! as [`StretchReceptor`](crate::StretchReceptor) does (branch, domain, warm-up,
+//! missing samples) and evaluates the surface
+//!
+//! - in 32-bit fixed point ([`FixedReceptor`]): thousandths of the reference's
+//!   unit, about 100 instructions on any Cortex-M; or
+//! - in `f32` ([`CodeReceptor<f32, ..>`](CodeReceptor)): six products and six
+//!   sums, the reference's unit.
+//!
+//! A calibration is converted once, on a desk, by [`CodeCalibration::new`], and
+//! travels as a record of about 100 bytes.
+
+mod adc;
+mod arithmetic;
+mod calibration;
+mod fold;
+mod receptor;
+#[cfg(feature = "serde")]
+mod record;
+mod sheet;
+
+pub use adc::{Adc, AdcCode, AdcSpec};
+pub use arithmetic::{CodeArithmetic, Fixed};
+pub use calibration::{CODE_SCHEMA, CodeCalibration, FixedCalibration};
+pub use receptor::{CodeMemory, CodeReading, CodeReceptor, FixedReceptor};

@@ -1,0 +1,77 @@
+//! A converted calibration as a record, checked while it loads.
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
+use stretch_core::{DesignError, SampleRate};
+
+use super::{CODE_SCHEMA, CodeArithmetic, CodeCalibration, sheet::Sheets};
+
+#[derive(Serialize, Deserialize)]
+struct Record<L, P> {
+    /// First, so that a newer record is refused before the rest is read.
+    schema: u32,
+    /// Window, degree and delay of the rate.
+    shape: (u16, u8, u16),
+    adc_bits: u8,
+    sample_rate_hz: SampleRate,
+    falling: bool,
+    dead_band: i32,
+    sheets: Sheets<L, P>,
+}
+
+impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: usize> Serialize
+    for CodeCalibration<A, WINDOW, DEGREE, DELAY>
+where
+    A::Line: Serialize,
+    A::Surface: Serialize,
+{
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        Record {
+            schema: CODE_SCHEMA,
+            shape: (WINDOW as u16, DEGREE as u8, DELAY as u16),
+            adc_bits: self.bits,
+            sample_rate_hz: self.sample_rate,
+            falling: self.falling,
+            dead_band: self.dead_band,
+            sheets: self.sheets,
+        }
+        .serialize(serializer)
+    }
+}
+
+impl<'de, A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
+    Deserialize<'de> for CodeCalibration<A, WINDOW, DEGREE, DELAY>
+where
+    A::Line: Deserialize<'de>,
+    A::Surface: Deserialize<'de>,
+{
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let record = Record::<A::Line, A::Surface>::deserialize(deserializer)?;
+        Self::check(record).map_err(D::Error::custom)
+    }
+}
+
+impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
+    CodeCalibration<A, WINDOW, DEGREE, DELAY>
+{
+    fn check(record: Record<A::Line, A::Surface>) -> Result<Self, DesignError> {
+        let Record { schema, shape, adc_bits, sample_rate_hz, falling, dead_band, sheets } = record;
+        if !(1..=CODE_SCHEMA).contains(&schema) {
+            return Err(DesignError::Schema { found: schema, newest: CODE_SCHEMA });
+        }
+        Self::check_shape(shape)?;
+        DesignError::check("adc.bits", adc_bits.into(), (1..=16).contains(&adc_bits))?;
+        DesignError::check("dead_band", dead_band.into(), dead_band >= 0)?;
+        let spans = match &sheets {
+            Sheets::Line(sheet) => {
+                A::valid_line(&sheet.surface)?;
+                sheet.signal.holds()
+            }
+            Sheets::Poly13(both) => {
+                both.iter().try_for_each(|sheet| A::valid_surface(&sheet.surface))?;
+                both.iter().all(|sheet| sheet.signal.holds() && sheet.rate.holds())
+            }
+        };
+        DesignError::check("domain", 0.0, spans)?;
+        Ok(Self { bits: adc_bits, sample_rate: sample_rate_hz, falling, dead_band, sheets })
+    }
+}

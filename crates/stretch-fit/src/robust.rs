@@ -65,7 +65,7 @@ pub struct RobustFit<T, const TERMS: usize> {
 /// `n : p^2`.
 ///
 /// **Least absolute residuals**: a sample weighs `1/max(|e|, d)` with `d` a
-/// millionth of the robust scale of the plain fit. Sigma is the distribution-free
+/// millionth of the robust scale so far. Sigma is the distribution-free
 /// `sqrt(n - p) (e_hi - e_lo)/(2 * 1.96)` between the order statistics that bound
 /// the median at 95 % (McKean and Schrader 1987), over the `n - p` residuals that
 /// the surface does not pass through.
@@ -137,7 +137,9 @@ where
         median_of_largest(residuals, fit.terms()) / T::from_f64(NORMAL_MAD)
     };
 
-    let floor = T::from_f64(1e-6) * scale_of(&ols, residuals).max(tiny);
+    // Absolute residuals below this are rounding of the values.
+    let largest = samples().into_iter().fold(T::zero(), |most, (_, _, z)| most.max(z.abs()));
+    let rounding = T::from_f64(8.0) * T::epsilon() * largest.max(T::min_positive_value());
     let rest = T::epsilon().sqrt();
     let mut found = ols;
     let mut steps = 0;
@@ -145,7 +147,7 @@ where
     while steps < loss.most_steps() && !converged {
         let reach = match loss {
             Loss::Bisquare => T::from_f64(TUNING) * scale_of(&found, residuals).max(tiny),
-            Loss::LeastAbsolute => floor,
+            Loss::LeastAbsolute => (T::from_f64(1e-6) * scale_of(&found, residuals)).max(rounding),
         };
         let mut sums = SurfaceAccumulator::<T, TERMS, ROWS>::new(degree)?;
         for (rate, volts, value) in samples() {

@@ -44,11 +44,7 @@ const INTERRUPTED: u8 = 130;
 fn main() -> ExitCode {
     let cli = Cli::parse();
     // Without a handler Ctrl-C still ends the program; only the cleaning up is lost.
-    let _ = ctrlc::set_handler(|| {
-        if stretch_data::interrupt() == 0 {
-            std::process::exit(INTERRUPTED.into());
-        }
-    });
+    let _ = ctrlc::set_handler(|| commands::stop::on_ctrl_c(INTERRUPTED));
     let result = match cli.command {
         Command::Calibrate(args) => calibrate::run(args),
         Command::Apply(args) => apply::run(args),

@@ -10,6 +10,8 @@ use stretch_core::Calibration;
 use stretch_data::{ReadOptions, RowReader, Trial, push_number, write_whole};
 use stretch_receptor::{Reading, Withheld};
 
+use super::stop::RecordedInput;
+
 /// Turn a trial's voltage into length, or a stream's as it comes
 ///
 /// Writes time_s, the estimate, its rate, the branch and the domain, a line a
@@ -21,6 +23,8 @@ use stretch_receptor::{Reading, Withheld};
 /// noted on standard error and passed over:
 ///
 ///   logger | stretch apply --calibration cal.json -
+///
+/// With --out, Ctrl-C ends the stream, and what has come is written.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
@@ -47,8 +51,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             Some(path) => {
                 let mut result = Ok(());
                 write_whole(path, |out| {
-                    result = live(&calibration, io::stdin(), &options, out);
-                    Ok(())
+                    result = live(&calibration, RecordedInput::new(), &options, out);
+                    result.as_ref().map(|_| ()).map_err(|e| io::Error::other(format!("{e:#}")))
                 })?;
                 result
             }

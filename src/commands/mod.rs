@@ -6,3 +6,4 @@ pub(crate) mod convert;
 pub(crate) mod demo;
 pub(crate) mod evaluate;
 pub(crate) mod shared;
+pub(crate) mod stop;

@@ -1,0 +1,82 @@
+#!/usr/bin/env bash
+# The gate, the same on a desk and in CI. A step that cannot run here says
+# SKIPPED and why; everything else must pass.
+set -euo pipefail
+cd "$(dirname "$0")"
+
+LIBRARIES="stretch-core stretch-filter stretch-fit stretch-metrics stretch-receptor"
+TARGETS="thumbv7m-none-eabi thumbv7em-none-eabihf"
+
+step() { printf '\n=== %s (%ss)\n' "$1" "$SECONDS"; }
+skip() { printf 'SKIPPED: %s\n' "$1"; }
+have() { command -v "$1" >/dev/null 2>&1; }
+
+step "format"
+cargo fmt --all --check
+
+step "clippy, warnings denied"
+cargo clippy --workspace --all-targets --all-features --locked -- -D warnings
+
+step "tests"
+if cargo nextest --version >/dev/null 2>&1; then
+    cargo nextest run --workspace --all-features --locked --no-fail-fast
+else
+    cargo test --workspace --all-features --locked --lib --bins --tests --no-fail-fast
+fi
+
+step "examples in the documentation"
+cargo test --workspace --all-features --locked --doc
+
+step "documentation, warnings denied"
+RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --all-features --locked
+
+step "examples"
+for example in examples/*.rs; do
+    name=$(basename "$example" .rs)
+    cargo run --quiet --release --locked --example "$name" >/dev/null
+    echo "$name"
+done
+
+step "benches, each run once"
+cargo test --benches --locked --quiet >/dev/null
+
+step "no_std builds"
+for target in $TARGETS; do
+    if rustup target list --installed 2>/dev/null | grep -qx "$target"; then
+        for library in $LIBRARIES; do
+            cargo build --quiet --locked -p "$library" --target "$target"
+        done
+        cargo build --quiet --locked -p stretch-core --features serde --target "$target"
+        echo "$target: $LIBRARIES"
+    else
+        skip "the target $target is not installed: rustup target add $target"
+    fi
+done
+
+step "every combination of features"
+if cargo hack --version >/dev/null 2>&1; then
+    for library in $LIBRARIES; do
+        cargo hack check --quiet --locked -p "$library" --feature-powerset --no-dev-deps
+    done
+else
+    skip "cargo-hack is not installed: cargo install cargo-hack"
+fi
+
+step "packages of the library crates"
+# shellcheck disable=SC2046,SC2086
+cargo package --locked --allow-dirty --no-verify $(printf -- '-p %s ' $LIBRARIES stretch-data) >/dev/null
+
+step "fuzz targets compile"
+cargo check --quiet --locked --manifest-path fuzz/Cargo.toml
+
+step "firmware in the emulator"
+if [ -x firmware/gate.sh ]; then
+    firmware/gate.sh
+else
+    skip "there is no firmware yet"
+fi
+
+step "oldest supported compiler"
+skip "only the toolchain of rust-toolchain.toml can be installed here; rust-version in Cargo.toml is what the dependencies ask for"
+
+printf '\nall steps passed in %ss\n' "$SECONDS"

@@ -1,0 +1,231 @@
+//! Input that is wrong: each time a sentence that names the place, exit code 1,
+//! and nothing written.
+
+mod support;
+
+use std::fs::File;
+
+use support::{Scratch, calibrate, fails, stdout, stretch};
+
+#[track_caller]
+fn refused(text: &str, parts: &[&str]) {
+    let scratch = Scratch::new();
+    let trial = scratch.write("bad.csv", text);
+    fails(&mut calibrate(&trial, &scratch.path("cal.json")), parts);
+    assert_eq!(scratch.names(), ["bad.csv"], "something was written");
+}
+
+const HEADER: &str = "time_s,length_mm,bridge_v\n";
+
+#[test]
+fn a_missing_file() {
+    let scratch = Scratch::new();
+    let missing = scratch.path("nowhere.csv");
+    fails(&mut calibrate(&missing, &scratch.path("cal.json")), &["nowhere.csv", "open"]);
+}
+
+#[test]
+fn an_empty_file_and_a_lone_header() {
+    refused("", &["bad.csv", "empty"]);
+    refused(HEADER, &["bad.csv", "no sample"]);
+}
+
+#[test]
+fn a_missing_column_names_those_there_are() {
+    refused("time_s,length_mm,bridge\n0,1,2\n", &["bad.csv", "bridge_v", "bridge", "length_mm"]);
+}
+
+#[test]
+fn text_in_a_number() {
+    let text = format!("{HEADER}0,180,1.24\n0.01,180,oops\n");
+    refused(&text, &["bad.csv", "row 3", "bridge_v", "oops"]);
+}
+
+#[test]
+fn not_a_number_and_infinity() {
+    refused(&format!("{HEADER}0,NaN,1.24\n"), &["row 2", "length_mm", "NaN"]);
+    refused(&format!("{HEADER}0,180,inf\n"), &["row 2", "bridge_v", "inf"]);
+}
+
+#[test]
+fn time_that_repeats_or_runs_backwards() {
+    refused(&format!("{HEADER}0,1,1\n0,1,1\n"), &["row 3", "time_s"]);
+    refused(&format!("{HEADER}0,1,1\n0.02,1,1\n0.01,1,1\n"), &["row 4", "time_s", "0.01"]);
+}
+
+#[test]
+fn a_ragged_row() {
+    refused(&format!("{HEADER}0,1,1\n0.01,1\n"), &["row 3", "2 fields", "3"]);
+}
+
+#[test]
+fn a_decimal_comma_is_told() {
+    refused("time_s;length_mm;bridge_v\n0;180,5;1\n", &["row 2", "length_mm", "decimal comma"]);
+}
+
+#[test]
+fn crlf_bom_and_semicolons_are_understood() {
+    let scratch = Scratch::new();
+    let plain = scratch.loops("plain.csv", 20.0, 1.3);
+    let text = std::fs::read_to_string(&plain).unwrap();
+    let foreign = format!("\u{feff}{}", text.replace(',', ";").replace('\n', "\r\n"));
+    let foreign = scratch.write("foreign.csv", foreign);
+    for (trial, out) in [(&plain, "a.json"), (&foreign, "b.json")] {
+        calibrate(trial, &scratch.path(out)).assert().success();
+    }
+    let read = |name| std::fs::read_to_string(scratch.path(name)).unwrap();
+    assert_eq!(read("a.json"), read("b.json").replace("foreign.csv", "plain.csv"));
+}
+
+#[test]
+fn a_constant_signal_has_no_range() {
+    let rows: String = (0..100).map(|n| format!("{},{},1.24\n", 0.01 * f64::from(n), n)).collect();
+    refused(&format!("{HEADER}{rows}"), &["bridge_v", "1.24", "constant"]);
+}
+
+#[test]
+fn too_few_samples() {
+    refused(&format!("{HEADER}0,180,1.24\n"), &["too few"]);
+    let rows: String = (0..14)
+        .map(|n| format!("{},{},{}\n", 0.01 * f64::from(n), 180 - n, 1.24 + f64::from(n)))
+        .collect();
+    refused(&format!("{HEADER}{rows}"), &["samples", "7 terms"]);
+}
+
+#[test]
+fn a_single_branch_asks_for_the_other() {
+    let row = |n: u32| {
+        format!(
+            "{},{},{}\n",
+            f64::from(n) * 0.01,
+            180.0 - 0.05 * f64::from(n),
+            1.24 + 0.003 * f64::from(n)
+        )
+    };
+    let rows: String = (0..400).map(row).collect();
+    refused(&format!("{HEADER}{rows}"), &["deflation", "add trials", "--model linear"]);
+}
+
+#[test]
+fn a_line_of_a_gigabyte_is_not_read_whole() {
+    let scratch = Scratch::new();
+    let path = scratch.write("bad.csv", HEADER);
+    File::options().write(true).open(&path).unwrap().set_len(1 << 30).unwrap();
+    fails(&mut calibrate(&path, &scratch.path("cal.json")), &["row 2", "longer than"]);
+}
+
+#[test]
+fn unwritable_output_and_a_folder_in_its_place() {
+    let scratch = Scratch::new();
+    let trial = scratch.loops("ramp.csv", 20.0, 1.2);
+    let under_a_file = trial.join("cal.json");
+    fails(&mut calibrate(&trial, &under_a_file), &["cal.json", "cannot write"]);
+    std::fs::create_dir(scratch.path("folder")).unwrap();
+    fails(&mut calibrate(&trial, &scratch.path("folder")), &["folder"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_full_disk_leaves_nothing_half_written() {
+    let scratch = Scratch::new();
+    let calibration = scratch.calibration("cal.json");
+    let trial = scratch.loops("long.csv", 60.0, 1.2);
+    let before = scratch.names();
+    // a file size limit stands for the full disk; the signal is ignored, so that the write fails
+    let script =
+        "trap '' XFSZ; ulimit -f 8; exec \"$0\" apply --calibration \"$1\" \"$2\" --out \"$3\"";
+    let output = std::process::Command::new("bash")
+        .args(["-c", script, env!("CARGO_BIN_EXE_stretch")])
+        .args([&calibration, &trial, &scratch.path("out.csv")])
+        .output()
+        .unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("out.csv") && message.contains("cannot write"), "{message}");
+    assert_eq!(scratch.names(), before);
+}
+
+#[test]
+fn a_calibration_that_cannot_be_used() {
+    let scratch = Scratch::new();
+    let good = std::fs::read_to_string(scratch.calibration("cal.json")).unwrap();
+    let trial = scratch.loops("trial.csv", 5.0, 1.2);
+    let apply = |text: &str, parts: &[&str]| {
+        let record = scratch.write("spoilt.json", text);
+        let mut command = stretch();
+        command.arg("apply").arg("--calibration").arg(record).arg(&trial);
+        fails(&mut command, &[&["spoilt.json"], parts].concat());
+    };
+    apply(&good.replace("\"schema\": 1", "\"schema\": 7"), &["schema is 7", "update"]);
+    apply(&good[..good.len() / 2], &["EOF"]);
+    apply("not json", &["line 1"]);
+    let at = good.find("\"dead_band\": ").unwrap() + "\"dead_band\": ".len();
+    let end = at + good[at..].find(',').unwrap();
+    apply(&format!("{}null{}", &good[..at], &good[end..]), &["dead_band"]);
+    apply(&format!("{}-3.0{}", &good[..at], &good[end..]), &["dead_band", "-3"]);
+}
+
+#[test]
+fn a_trial_without_the_calibrations_signal() {
+    let scratch = Scratch::new();
+    let calibration = scratch.calibration("cal.json");
+    let other = scratch.write("other.csv", "time_s,s1\n0,1\n0.01,2\n");
+    let mut command = stretch();
+    command.arg("apply").arg("--calibration").arg(&calibration).arg(&other);
+    fails(&mut command, &["other.csv", "bridge_v", "s1"]);
+}
+
+#[test]
+fn an_option_that_is_misspelt_says_what_is_understood() {
+    let scratch = Scratch::new();
+    let trial = scratch.loops("trial.csv", 5.0, 1.2);
+    for (option, value, hint) in [
+        ("--model", "poly77", "poly55"),
+        ("--rate", "savgol:11", "savgol:WINDOW,DEGREE"),
+        ("--normalise", "both", "min-max"),
+    ] {
+        let output =
+            calibrate(&trial, &scratch.path("cal.json")).args([option, value]).output().unwrap();
+        assert_eq!(output.status.code(), Some(2));
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(message.contains(hint), "{message}");
+    }
+}
+
+#[test]
+fn the_papers_differentiator_cannot_run_live() {
+    let scratch = Scratch::new();
+    let trial = scratch.loops("trial.csv", 30.0, 1.2);
+    let out = scratch.path("cal.json");
+    calibrate(&trial, &out).args(["--rate", "central"]).assert().success();
+    // on a log it may look ahead
+    stretch().arg("apply").arg("--calibration").arg(&out).arg(&trial).assert().success();
+    let mut live = stretch();
+    live.arg("apply").arg("--calibration").arg(&out).arg("-").write_stdin("time_s,bridge_v\n0,1\n");
+    fails(&mut live, &["rate estimator"]);
+}
+
+#[test]
+fn a_malformed_line_does_not_end_a_live_stream() {
+    let scratch = Scratch::new();
+    let calibration = scratch.calibration("cal.json");
+    let mut stream = String::from("time_s,bridge_v\n");
+    for n in 0..30 {
+        stream += &format!("{:.2},{}\n", 0.01 * f64::from(n), 1.5 + 0.002 * f64::from(n));
+        if n == 20 {
+            stream += "what is this\n,,\n";
+        }
+    }
+    let output = stretch()
+        .arg("apply")
+        .arg("--calibration")
+        .arg(&calibration)
+        .arg("-")
+        .write_stdin(stream)
+        .output()
+        .unwrap();
+    assert!(output.status.success());
+    assert_eq!(stdout(&output).lines().count(), 31);
+    let notes = String::from_utf8_lossy(&output.stderr);
+    assert!(notes.contains("row 23") && notes.contains("row 24"), "{notes}");
+}

@@ -8,7 +8,7 @@
 pub(crate) fn undo(w: f64, signal: &mut [f64]) {
     let (low, high) = signal.iter().fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(*x), b.max(*x)));
     let band = (0.1 * w).max(1e-6 * (high - low));
-    if signal.is_empty() || !(band > 0.0) {
+    if signal.is_empty() || band.is_nan() || band <= 0.0 {
         return;
     }
     let turns = turns(signal, band);

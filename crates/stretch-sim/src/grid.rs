@@ -40,7 +40,7 @@ impl Grid {
             return Err(SimError::NotPositive { name: "sample time", value: dt_s });
         }
         // Below 1e-6 of a sample time a step resolves nothing and a sample would take for ever.
-        if !(max_step_s >= 1e-6 * dt_s) {
+        if max_step_s.is_nan() || max_step_s < 1e-6 * dt_s {
             return Err(SimError::NotPositive { name: "step of integration", value: max_step_s });
         }
         if !(delay_s.is_finite() && delay_s >= 0.0) {

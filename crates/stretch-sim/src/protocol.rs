@@ -148,10 +148,9 @@ impl TrialPlan {
         let mut steps: Vec<f64> = time.windows(2).map(|t| t[1] - t[0]).collect();
         steps.sort_by(f64::total_cmp);
         let expected = steps[steps.len() / 2];
+        let even = |step: f64| (step - expected).abs() <= 0.01 * expected;
         // Times are written with a few decimals: a hundredth of a step is rounding, more is a gap.
-        if let Some(i) =
-            time.windows(2).position(|t| !((t[1] - t[0] - expected).abs() <= 0.01 * expected))
-        {
+        if let Some(i) = time.windows(2).position(|t| !even(t[1] - t[0])) {
             return Err(SimError::NotUniform {
                 sample: i + 1,
                 expected,

@@ -77,14 +77,12 @@ impl Rig {
     /// A table, parameter or effect that is not known, a parameter that is missing, not positive or beyond its limits,
     /// a sleeve that goes slack within the stroke, or a rig file of another kind (`kind = "gauge"`).
     pub fn from_file(file: &RigFile) -> Result<Self, SimError> {
-        if let Some(kind) = &file.kind {
-            if kind != "rig" {
-                return Err(SimError::UnknownParameter {
-                    owner: "a whole rig".into(),
-                    name: format!("kind = \"{kind}\""),
-                    nearest: None,
-                });
-            }
+        if let Some(kind) = file.kind.as_ref().filter(|kind| *kind != "rig") {
+            return Err(SimError::UnknownParameter {
+                owner: "a whole rig".into(),
+                name: format!("kind = \"{kind}\""),
+                nearest: None,
+            });
         }
         let mut rig = Self::default();
         let mut seen = [false; Key::COUNT];
@@ -170,7 +168,7 @@ impl Rig {
             }
         }
         let strain = self.least_strain();
-        if !(strain > LEAST_STRAIN) {
+        if strain.is_nan() || strain <= LEAST_STRAIN {
             return Err(SimError::SlackSleeve { strain, least: LEAST_STRAIN });
         }
         Ok(())

@@ -64,7 +64,7 @@ impl StaticLaw {
     #[inline]
     pub fn contraction(&self, pressure_kpa: f64) -> f64 {
         let u = pressure_kpa * self.per_kpa;
-        if !(u > 0.0) {
+        if u.is_nan() || u <= 0.0 {
             return 0.0;
         }
         match self.cubics.get(u as usize) {

@@ -58,10 +58,22 @@ fn main() -> ExitCode {
         // whoever reads our output has gone: nothing is wrong
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("stretch: {error:#}");
+            eprintln!("stretch: {}", message(&error));
             ExitCode::FAILURE
         }
     }
+}
+
+/// The error and its causes as one sentence; a cause that is already told is
+/// not told again.
+fn message(error: &anyhow::Error) -> String {
+    let mut told = error.to_string();
+    for cause in error.chain().skip(1).map(ToString::to_string) {
+        if !told.contains(&cause) {
+            told = format!("{told}: {cause}");
+        }
+    }
+    told
 }
 
 fn is_broken_pipe(error: &anyhow::Error) -> bool {

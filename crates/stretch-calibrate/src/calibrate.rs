@@ -256,6 +256,12 @@ fn surfaces(
         }
         before += series.signal.len();
     }
+    for (raw, branch) in raw.iter().zip(["inflation", "deflation"]) {
+        let (samples, terms) = (raw.signal.len() as u64, degree.terms());
+        if samples <= terms as u64 {
+            return Err(CalibrateError::OneBranch { branch, samples, terms });
+        }
+    }
     let [up, down] = raw;
     let (inflation, first) = surface(prepared, options, degree, Branch::Inflation, up)?;
     let (deflation, second) = surface(prepared, options, degree, Branch::Deflation, down)?;
@@ -274,16 +280,14 @@ fn surface(
         Branch::Inflation => "inflation",
         Branch::Deflation => "deflation",
     };
-    let count = raw.signal.len() as u64;
-    let lacking =
-        || CalibrateError::OneBranch { branch: name, samples: count, terms: degree.terms() };
-    if count <= degree.terms() as u64 {
-        return Err(lacking());
-    }
     let range = |rates: &[f64]| {
         let Interval { min, max } = extent(&mut rates.iter().copied());
-        Range::new(RangeSpec { mode: options.normalisation, zero: 0.0, min, max })
-            .map_err(|_| lacking())
+        Range::new(RangeSpec { mode: options.normalisation, zero: 0.0, min, max }).map_err(|_| {
+            CalibrateError::Constant {
+                column: format!("the rate in the {name} branch"),
+                value: min,
+            }
+        })
     };
     let rate_range = range(&raw.signal_rate)?;
     let (rates, fitted_range) = match options.rate_source {

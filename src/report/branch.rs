@@ -95,9 +95,9 @@ impl<'a> BranchView<'a> {
         let contraction = matches!(self.calibration.target, Target::Contraction { .. });
         match (self.fit.branch, contraction) {
             (Some(Branch::Deflation), true) => "Deflation",
-            (Some(Branch::Deflation), false) => "Falling",
+            (Some(Branch::Deflation), false) => "Falling (deflation)",
             (_, true) => "Inflation",
-            (_, false) => "Rising",
+            (_, false) => "Rising (inflation)",
         }
     }
 

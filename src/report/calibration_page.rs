@@ -5,13 +5,13 @@ use stretch_calibrate::{Calibrated, Candidate, Evaluation, MethodErrors, TrialEr
 use super::{
     branch::BranchView,
     calibration_tables::{
-        best, coefficient_table, comparison_table, method_names, method_table, order_table,
+        RAW, best, coefficient_table, comparison_table, method_names, method_table, order_table,
         signal_table,
     },
     canvas::Ink,
     error_figure::{Against, error_figure, residual_figure},
     estimate_figure::{closest_look, estimate_figure, estimate_picture},
-    markup::{number, with_unit},
+    markup::{fixed, number, with_unit},
     page::Page,
     slice_figure::slice_figure,
     surface_figure::surface_figure,
@@ -69,24 +69,26 @@ fn verdict(evaluation: &Evaluation, names: &[String], context: &Context) -> Stri
         return "No estimate could be held against a reference.".to_owned();
     };
     let off = |m: &MethodErrors| {
-        let rmse = with_unit(&number(m.rmse, 2), &evaluation.unit);
+        let rmse = with_unit(&number(m.rmse, 3), &evaluation.unit);
         format!("{rmse} (RMSE, {} % of the range)", number(m.rmse_percent, 2))
     };
-    let short = |m: &MethodErrors| with_unit(&number(m.rmse, 2), &evaluation.unit);
-    let called = |i: usize| match methods[i].method.as_str() {
-        "raw" => "raw signal".to_owned(),
-        _ => format!("{} calibration", names[i]),
+    let short = |m: &MethodErrors| with_unit(&number(m.rmse, 3), &evaluation.unit);
+    let called = |i: usize| match (methods[i].method.as_str(), names.get(i)) {
+        (RAW, _) => "raw signal, laid on the reference's extremes,".to_owned(),
+        (_, Some(name)) => format!("{name} calibration"),
+        (method, None) => method.to_owned(),
     };
     let others: Vec<String> = (0..methods.len())
+        .rev()
         .filter(|i| *i != best)
         .map(|i| format!("the {} by {}", called(i), short(&methods[i])))
         .collect();
-    let seen = context.tested_on.iter().filter(|t| context.calibrated_on.contains(t)).count();
-    let several = context.tested_on.len() > 1;
-    let on = match (seen, several) {
-        (0, false) => "On a recording that was not used for the fit",
-        (0, true) => "On recordings that were not used for the fit",
-        (n, _) if n == context.tested_on.len() => "On the very data of the fit",
+    let judged = &evaluation.trials;
+    let seen = judged.iter().filter(|t| context.calibrated_on.contains(&t.trial)).count();
+    let on = match (seen, judged.len()) {
+        (0, 1) => "On a recording that was not used for the fit",
+        (0, _) => "On recordings that were not used for the fit",
+        (seen, all) if seen == all => "On the very data of the fit",
         _ => "On recordings of which some were used for the fit",
     };
     let rest = if others.is_empty() { String::new() } else { format!("; {}", others.join(", ")) };
@@ -98,7 +100,11 @@ fn judged(page: &mut Page, evaluation: &Evaluation, names: &[String], context: &
     page.text(&format!(
         "Fitted on {}; held against {}.",
         listed(&context.calibrated_on),
-        listed(&context.tested_on)
+        if context.tested_on.is_empty() {
+            "the same data, which flatters every method".to_owned()
+        } else {
+            listed(&context.tested_on)
+        }
     ));
     let caption = "All test recordings together";
     page.table(&method_table(caption, &evaluation.pooled, names, &evaluation.unit));
@@ -157,9 +163,9 @@ fn over_time(page: &mut Page, evaluation: &Evaluation, names: &[String]) {
 }
 
 fn errors(page: &mut Page, evaluation: &Evaluation, names: &[String]) {
-    let intro = "Error is estimate minus reference. Dots are samples, the dark line is their \
-                 median, the band holds four fifths of them; half a percent of the samples lies \
-                 beyond the frame.";
+    let intro = "Error is estimate minus reference. Dots are samples from every part of the axis, \
+                 the dark line is the median of all, the band holds four fifths of them; about \
+                 one sample in a hundred lies beyond the frame.";
     page.section("Where the errors are", intro);
     let rate = (
         error_figure(evaluation, names, Against::Rate),
@@ -187,15 +193,16 @@ fn surfaces(page: &mut Page, calibrated: &[(&str, &Calibrated)]) {
             .iter()
             .zip(inks)
             .map(|(view, ink)| {
-                let r_squared = number(view.fit.r_squared, 3);
+                let r_squared = fixed(view.fit.r_squared, 4);
                 let caption = format!("{}: R\u{b2} of the fit {r_squared}.", view.name());
                 (surface_figure(view, ink), caption)
             })
             .collect();
         page.figures(&solid);
         page.text(
-            "The same surfaces cut at three rates: the samples are parted in thirds from slow to \
-             fast, each line is the surface at the median rate of its third.",
+            "The same surfaces cut at three rates: samples in motion are parted in thirds from \
+             slow to fast, each line is the surface at the median rate of its third. Samples at \
+             less than a twentieth of the fastest rate are left out.",
         );
         let cuts: Vec<_> =
             views.iter().map(|v| (slice_figure(v), format!("{}.", v.name()))).collect();
@@ -213,7 +220,8 @@ fn fits(page: &mut Page, calibrated: &[(&str, &Calibrated)], context: &Context) 
         page.table(&signal_table(&context.signal_choice));
     }
     for (name, calibrated) in calibrated {
-        page.list(&calibrated.notes);
+        let new = calibrated.notes.iter().filter(|note| !context.notes.contains(note));
+        page.list(&new.cloned().collect::<Vec<_>>());
         page.folded(&format!("{name}: coefficients and orders"), |page| {
             for fit in &calibrated.fits {
                 page.table(&coefficient_table(fit));

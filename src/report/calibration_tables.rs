@@ -8,6 +8,9 @@ use super::{
     page::Table,
 };
 
+/// What an evaluation calls the signal without a calibration.
+pub const RAW: &str = "raw";
+
 /// Cells from anything that is text.
 fn cells<const N: usize>(cells: [&str; N]) -> Vec<String> {
     cells.map(str::to_owned).to_vec()
@@ -22,17 +25,20 @@ pub fn method_names(calibrated: &[(&str, &Calibrated)], evaluation: &Evaluation)
     let name = |method: &str| {
         let found = calibrated.iter().find(|(name, _)| *name == method);
         match found.map(|(_, c)| &c.calibration.model) {
-            Some(Model::Surfaces { .. }) => format!("non-linear ({method})"),
-            Some(_) => "linear".to_owned(),
-            None => method.to_owned(),
+            Some(Model::Surfaces { .. }) if !method.contains("linear") => {
+                format!("non-linear ({method})")
+            }
+            Some(_) if method.is_empty() => "linear".to_owned(),
+            _ => method.to_owned(),
         }
     };
     evaluation.pooled.iter().map(|errors| name(&errors.method)).collect()
 }
 
-/// The row with the least RMSE.
+/// The calibration with the least RMSE: not the raw signal, which is scaled
+/// with the very reference that it is held against.
 pub fn best(methods: &[MethodErrors]) -> Option<usize> {
-    let finite = methods.iter().enumerate().filter(|(_, m)| m.rmse.is_finite());
+    let finite = methods.iter().enumerate().filter(|(_, m)| m.rmse.is_finite() && m.method != RAW);
     finite.min_by(|a, b| a.1.rmse.total_cmp(&b.1.rmse)).map(|(i, _)| i)
 }
 
@@ -50,7 +56,7 @@ pub fn method_table(
         "RMSE, % of range".to_owned(),
         "R\u{b2}".to_owned(),
         "Lag, ms".to_owned(),
-        "Largest error".to_owned(),
+        with_unit("Largest error,", unit).trim_end_matches(',').to_owned(),
         "Outside domain, %".to_owned(),
     ];
     let row = |(m, name): (&MethodErrors, &String)| {

@@ -13,7 +13,10 @@ use super::{
 };
 
 /// Dots of one method at most.
-const DOTS: usize = 700;
+const DOTS: usize = 720;
+
+/// Parts of the axis that have dots and a median of their own.
+const SLOTS: usize = 24;
 
 /// Half the span of the difference that gives the reference's rate, in samples.
 const REACH: usize = 5;
@@ -64,21 +67,21 @@ pub fn error_figure(evaluation: &Evaluation, names: &[String], against: Against)
                 x_label: if last { x_label.clone() } else { String::new() },
                 y_label: joined(&format!("{name}: error"), unit),
             };
-            let bins = binned(points, &x, 24);
+            let bins = binned(points, &x, SLOTS);
             let inside: Vec<_> =
                 points.iter().copied().filter(|(a, e)| x.contains(a) && e.abs() < most).collect();
             plot(&here, &axes, |chart| {
                 let ink = Ink::of(i);
                 let zero = [(x.start, 0.0), (x.end, 0.0)];
                 chart.draw_series(LineSeries::new(zero, stroke(Ink::Axis.color(), 1.0)))?;
-                let dots = sample(&inside, DOTS).into_iter();
-                chart.draw_series(dots.map(|at| Circle::new(at, px(0.9), dot(ink, 0.4))))?;
+                let dots = spread_over(&inside, &x).into_iter();
+                chart.draw_series(dots.map(|at| Circle::new(at, px(0.9), dot(ink, 0.55))))?;
                 let cut = |e: f64| e.clamp(-most, most);
                 let rim = bins.iter().map(|b| (b.x, cut(b.low)));
                 let back = bins.iter().rev().map(|b| (b.x, cut(b.high)));
                 let band: Vec<_> = rim.chain(back).collect();
                 if bins.len() > 1 {
-                    chart.draw_series([Polygon::new(band, ink.faint(0.22))])?;
+                    chart.draw_series([Polygon::new(band, ink.faint(0.18))])?;
                     let median = bins.iter().map(|b| (b.x, cut(b.median)));
                     chart.draw_series(LineSeries::new(median, stroke(Ink::Truth.color(), 2.2)))?;
                 }
@@ -87,6 +90,17 @@ pub fn error_figure(evaluation: &Evaluation, names: &[String], against: Against)
         }
         Ok(())
     })
+}
+
+/// Dots from every part of the axis: most samples of a log are at rest, in one place.
+fn spread_over(points: &[(f64, f64)], span: &Range<f64>) -> Vec<(f64, f64)> {
+    let width = (span.end - span.start) / SLOTS as f64;
+    let mut slots = vec![Vec::new(); SLOTS];
+    for &point in points {
+        let index = ((point.0 - span.start) / width) as usize;
+        slots[index.min(SLOTS - 1)].push(point);
+    }
+    slots.iter().flat_map(|slot| sample(slot, DOTS / SLOTS)).collect()
 }
 
 /// How often each error occurs, one outline a method.
@@ -134,9 +148,6 @@ pub fn residual_figure(evaluation: &Evaluation, names: &[String]) -> Figure {
     let legend = names.iter().enumerate().map(|(i, name)| (Ink::of(i), name.clone()));
     Figure::new(&description).draw(Frame::NARROW, draw).draw(Frame::WIDE, draw).legend(legend)
 }
-
-/// Share of samples whose error lies beyond what the figures show, in percent.
-pub const BEYOND_PERCENT: f64 = 0.5;
 
 /// Places and errors of each method over all trials.
 fn points(evaluation: &Evaluation, methods: usize, against: Against) -> Vec<Vec<(f64, f64)>> {

@@ -46,10 +46,11 @@ fn window_figure(
     let lines = |frame: Frame| {
         let thin = |values: &[f64]| curve(&trial.time_s, values, window, bins(frame));
         let estimates = trial.estimates.iter().enumerate();
-        // the reference lies on top: it is what the others are held against
-        let mut lines: Vec<_> = estimates.map(|(i, y)| (Ink::of(i), 1.5, thin(y))).collect();
-        lines.push((Ink::Truth, 1.8, thin(&trial.reference)));
-        lines
+        // a broad reference below: where an estimate is right, it lies inside
+        let broad = if window.end - window.start > 2.0 * WINDOW_S { 2.0 } else { 3.4 };
+        let reference = [(Ink::Truth, broad, thin(&trial.reference))];
+        let estimates = estimates.map(|(i, y)| (Ink::of(i), 1.4, thin(y)));
+        reference.into_iter().chain(estimates).collect::<Vec<_>>()
     };
     let wide = lines(Frame::WIDE);
     let all = wide.iter().flat_map(|(_, _, pieces)| pieces.iter().flatten());

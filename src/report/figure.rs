@@ -198,7 +198,7 @@ pub fn plot<'b>(
     chart
         .configure_mesh()
         .x_labels(most(width, 75))
-        .y_labels(most(height, 42))
+        .y_labels(most(height, 32))
         .x_label_formatter(&|v| tick(*v, x_span))
         .y_label_formatter(&|v| tick(*v, y_span))
         .label_style(numbers)

@@ -17,8 +17,8 @@ const INKS: [Ink; 3] = [Ink::Low, Ink::Middle, Ink::High];
 /// Dots of each third at most.
 const DOTS: usize = 350;
 
-/// Target over signal: the samples by thirds of their rate, slow to fast, and
-/// the surface at the median rate of each third.
+/// Target over signal: the samples in motion by thirds of their rate, slow to
+/// fast, and the surface at the median rate of each third.
 pub fn slice_figure(view: &BranchView<'_>) -> Figure {
     let thirds = thirds(view);
     let [_, signal, target] = &view.labels;
@@ -47,7 +47,7 @@ pub fn slice_figure(view: &BranchView<'_>) -> Figure {
                 for (third, ink) in thirds.iter().zip(INKS) {
                     let dots = sample(third, DOTS).into_iter();
                     chart.draw_series(
-                        dots.map(|[_, v, t]| Circle::new((v, t), px(1.0), dot(ink, 0.35))),
+                        dots.map(|[_, v, t]| Circle::new((v, t), px(1.0), dot(ink, 0.5))),
                     )?;
                 }
                 for ((_, curve), ink) in curves.iter().zip(INKS) {
@@ -63,9 +63,11 @@ pub fn slice_figure(view: &BranchView<'_>) -> Figure {
         .legend(legend)
 }
 
-/// The samples in three equal parts by the size of their rate.
+/// The samples in motion in three equal parts by the size of their rate.
 fn thirds(view: &BranchView<'_>) -> Vec<Vec<[f64; 3]>> {
-    let mut by_pace = view.cloud.clone();
+    let at_rest = 0.05 * view.rate.start.abs().max(view.rate.end.abs());
+    let mut by_pace: Vec<_> =
+        view.cloud.iter().copied().filter(|sample| sample[0].abs() > at_rest).collect();
     by_pace.sort_by(|a, b| a[0].abs().total_cmp(&b[0].abs()));
     by_pace.chunks(by_pace.len().div_ceil(3).max(1)).map(<[_]>::to_vec).collect()
 }

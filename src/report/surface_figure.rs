@@ -99,7 +99,7 @@ impl Cube<'_> {
         self.z(self.0.surface(rate, signal))
     }
 
-    /// Which cells have a sample in them or beside them.
+    /// Which cells have a sample in them or near them; holes between samples are closed.
     fn supported(&self) -> Vec<bool> {
         let mut cells = vec![false; CELLS * CELLS];
         let cell = |x: f64| ((x * CELLS as f64) as usize).min(CELLS - 1);
@@ -108,20 +108,29 @@ impl Cube<'_> {
             if !(0.0..=1.0).contains(&r) {
                 continue;
             }
-            let (i, j) = (cell(u), cell(r));
-            for i in i.saturating_sub(1)..=(i + 1).min(CELLS - 1) {
-                for j in j.saturating_sub(1)..=(j + 1).min(CELLS - 1) {
-                    cells[i * CELLS + j] = true;
-                }
-            }
+            cells[cell(u) * CELLS + cell(r)] = true;
         }
-        cells
+        // two steps out and one back
+        let out = |cells: Vec<bool>| near(&cells, |lit, _| lit > 0);
+        let back = |cells: Vec<bool>| near(&cells, |lit, all| lit == all);
+        back(out(out(cells)))
     }
+}
+
+/// Says something of each cell by how many of it and its neighbours are lit, and of how many.
+fn near(cells: &[bool], say: impl Fn(usize, usize) -> bool) -> Vec<bool> {
+    let reach = |i: usize| i.saturating_sub(1)..(i + 2).min(CELLS);
+    let around = |c: usize| {
+        let (rows, columns) = (reach(c / CELLS), reach(c % CELLS));
+        let lit = |i: usize| columns.clone().filter(|j| cells[i * CELLS + j]).count();
+        say(rows.clone().map(lit).sum(), rows.len() * columns.len())
+    };
+    (0..cells.len()).map(around).collect()
 }
 
 fn draw(area: &Area<'_>, view: &BranchView<'_>, ink: Ink) -> Drawn {
     let cube = Cube(view);
-    let eye = View::new(48.0, 26.0, 336.0, 258.0);
+    let eye = View::new(46.0, 30.0, 342.0, 268.0);
     floor(area, view, &eye)?;
     let (mut above, mut below) = (Vec::new(), Vec::new());
     for [rate, signal, target] in sample(&view.cloud, DOTS) {
@@ -212,7 +221,7 @@ fn floor(area: &Area<'_>, view: &BranchView<'_>, eye: &View) -> Drawn {
 
 /// Three or four round numbers inside a span.
 fn round_numbers(low: f64, high: f64) -> Vec<f64> {
-    let rough = (high - low) / 3.0;
+    let rough = (high - low) / 4.0;
     let ten = 10f64.powf(rough.log10().floor());
     let step = [1.0, 2.0, 2.5, 5.0, 10.0]
         .map(|m| m * ten)

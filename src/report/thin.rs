@@ -31,63 +31,46 @@ pub fn quantile(sorted: &[f64], q: f64) -> f64 {
 }
 
 /// A curve inside a window of time, cut where a value is missing or the time
-/// leaps, as least and greatest value of each of `bins` slots: at most
-/// `2 bins` points, and no peak is lost.
+/// leaps (ten times the mean step), as least and greatest value of each of
+/// `bins` slots: no peak is lost, and each piece keeps its ends.
 pub fn curve(
     time: &[f64],
     values: &[f64],
     window: &Range<f64>,
     bins: usize,
 ) -> Vec<Vec<(f64, f64)>> {
-    let span = window.end - window.start;
-    let inside = |t: f64| t >= window.start && t <= window.end;
-    let usual = match (time.first(), time.last()) {
+    let mean_step = match (time.first(), time.last()) {
         (Some(first), Some(last)) if time.len() > 1 => (last - first) / (time.len() - 1) as f64,
         _ => 0.0,
     };
-    let mut pieces: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
-    let mut slot: Option<(usize, (f64, f64), (f64, f64))> = None;
-    let mut before = f64::NAN;
-    for (&t, &y) in time.iter().zip(values).filter(|(t, _)| inside(**t)) {
-        if !y.is_finite() || t - before > 10.0 * usual {
-            close(&mut pieces, slot.take());
-            pieces.push(Vec::new());
-        }
-        before = t;
-        if !y.is_finite() {
-            continue;
-        }
-        let index = ((t - window.start) / span * bins as f64) as usize;
-        match &mut slot {
-            Some((at, low, high)) if *at == index => {
-                if y < low.1 {
-                    *low = (t, y);
-                }
-                if y > high.1 {
-                    *high = (t, y);
-                }
-            }
-            _ => {
-                close(&mut pieces, slot.take());
-                slot = Some((index, (t, y), (t, y)));
-            }
-        }
-    }
-    close(&mut pieces, slot);
-    pieces.retain(|piece| piece.len() > 1);
-    pieces
+    let all: Vec<(f64, f64)> = time.iter().copied().zip(values.iter().copied()).collect();
+    let slot = |t: f64| ((t - window.start) / (window.end - window.start) * bins as f64) as usize;
+    all.split(|(t, y)| !(y.is_finite() && *t >= window.start && *t <= window.end))
+        .flat_map(|run| run.chunk_by(|a, b| b.0 - a.0 <= 10.0 * mean_step))
+        .filter(|run| run.len() > 1)
+        .map(|run| peaks(run, slot))
+        .collect()
 }
 
-type Slot = (usize, (f64, f64), (f64, f64));
-
-/// Writes a slot's extremes to the last piece, in the order of time.
-fn close(pieces: &mut [Vec<(f64, f64)>], slot: Option<Slot>) {
-    let (Some((_, low, high)), Some(piece)) = (slot, pieces.last_mut()) else { return };
-    let (first, second) = if low.0 <= high.0 { (low, high) } else { (high, low) };
-    piece.push(first);
-    if second.0 > first.0 {
-        piece.push(second);
+/// The ends of a run and, of each slot, its extremes in the order of time.
+fn peaks(run: &[(f64, f64)], slot: impl Fn(f64) -> usize) -> Vec<(f64, f64)> {
+    let mut points = Vec::new();
+    let mut push = |point: (f64, f64)| {
+        if points.last().is_none_or(|last: &(f64, f64)| last.0 < point.0) {
+            points.push(point);
+        }
+    };
+    run.first().copied().into_iter().for_each(&mut push);
+    for part in run.chunk_by(|a, b| slot(a.0) == slot(b.0)) {
+        let low = part.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1));
+        let high = part.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1));
+        if let (Some(low), Some(high)) = (low, high) {
+            push(if low.0 < high.0 { low } else { high });
+            push(if low.0 < high.0 { high } else { low });
+        }
     }
+    run.last().copied().into_iter().for_each(&mut push);
+    points
 }
 
 /// At most `most` of the items, spread evenly but not in step with a periodic motion.

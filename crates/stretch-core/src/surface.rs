@@ -128,6 +128,7 @@ impl<T: Real> Surface<T> {
 /// assert!((inflation.eval(0.0, 0.5) - 0.7375).abs() < 1e-12);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[allow(missing_docs)] // the equation above says what each multiplies
 pub struct Poly13<T = f64> {
     pub p00: T,

@@ -1,0 +1,152 @@
+//! The firmware's data files and golden checksums are those of this code on this host.
+//!
+//! After a change that is meant to alter them, write them anew with
+//! `STRETCH_WRITE_FIRMWARE=1 cargo test -p stretch-receptor --test firmware`.
+
+use std::{fmt::Write, fs, path::PathBuf};
+
+use stretch_core::{
+    Calibration, Design, FitSummary, Hertz, Interval, LinearMap, Model, RateEstimator, SampleRate,
+    Stage, Volts,
+};
+use stretch_filter::{Differentiator, IntegerSgRate, LowPassSpec, RateFilter, SgRate};
+use stretch_receptor::{
+    StretchReceptor,
+    code::{
+        Adc, AdcCode, AdcSpec, CodeArithmetic, CodeCalibration, CodeReading, CodeReceptor, Fixed,
+    },
+    example_calibration,
+};
+
+#[path = "../../../firmware/src/checksum.rs"]
+#[allow(missing_docs, missing_debug_implementations, unreachable_pub)]
+mod checksum;
+use checksum::{Bits, Checksum};
+
+fn folder() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../firmware")
+}
+
+/// Checks a file against what it should be, or writes it.
+fn same(name: &str, bytes: &[u8]) {
+    let path = folder().join(name);
+    if std::env::var_os("STRETCH_WRITE_FIRMWARE").is_some() {
+        fs::write(&path, bytes).unwrap();
+    }
+    let found = fs::read(&path).unwrap_or_default();
+    assert!(found == bytes, "{name} is not what this host makes; see the head of this test");
+}
+
+fn due() -> Adc {
+    Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 }).unwrap()
+}
+
+/// Twenty seconds of the nominal rig's arbitrary trial at 100 Hz through a noisy
+/// 12-bit converter, with gaps of one, three and five samples.
+fn trial() -> Vec<u16> {
+    // a row every 0.05 s
+    let rows = testkit::vectors::columns("rig/arbitrary.csv").remove("nominal.bridge_v").unwrap();
+    let mut seed = 0x2545_f491_4f6c_dd1du64;
+    let mut uniform = || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (seed >> 40) as f64 / f64::from(1 << 24) - 0.5
+    };
+    let sample = |n: usize| {
+        let at = n as f64 / 5.0;
+        let (row, share) = (at.floor() as usize, at.fract());
+        let next = rows[(row + 1).min(rows.len() - 1)];
+        // four uniform numbers: nearly normal, a standard deviation of 2 mV
+        let noise: f64 = (0..4).map(|_| uniform()).sum::<f64>() * 0.002 * 3f64.sqrt();
+        let volts = rows[row.min(rows.len() - 1)] * (1.0 - share) + next * share + noise;
+        due().code(volts).0 as u16
+    };
+    let mut codes: Vec<u16> = (0..2000).map(sample).collect();
+    for gap in [400..401, 800..803, 1200..1205] {
+        codes[gap].fill(u16::MAX);
+    }
+    codes
+}
+
+fn linear() -> Calibration {
+    let mut spec = example_calibration().into_spec();
+    spec.model = Model::Linear(LinearMap {
+        slope: 0.97,
+        intercept: 0.02,
+        signal_domain: Interval { min: 1.1, max: 2.06 },
+        fit: FitSummary { samples: 9000, r_squared: 0.968, rmse: 0.05 },
+    });
+    Calibration::new(spec).unwrap()
+}
+
+fn record<T: serde::Serialize>(name: &str, value: &T) {
+    let mut buffer = [0; 1024];
+    let bytes = postcard::to_slice(value, &mut buffer).unwrap();
+    same(&format!("data/{name}.postcard"), bytes);
+}
+
+fn codes<A: CodeArithmetic>(calibration: &Calibration) -> String
+where
+    A::Estimate: Bits,
+{
+    let calibration = CodeCalibration::<A, 11, 2>::new(calibration, &due()).unwrap();
+    let receptor = CodeReceptor::new(calibration);
+    let (mut memory, mut checksum) = (receptor.memory(), Checksum::default());
+    for code in trial() {
+        let code = if code == u16::MAX { AdcCode::MISSING } else { AdcCode(code.into()) };
+        checksum.answer(receptor.step(&mut memory, code));
+    }
+    format!("{:08x}", checksum.0)
+}
+
+fn volts<R: Stage<f32, Out = Option<f32>>>(calibration: &Calibration, rate: R) -> String {
+    let receptor = StretchReceptor::with_rate(calibration, rate).unwrap();
+    let (mut memory, mut checksum) = (receptor.memory(), Checksum::default());
+    for code in trial() {
+        let volts = if code == u16::MAX { f32::NAN } else { f32::from(code) * (3.3 / 4095.0) };
+        let answer = receptor.step(&mut memory, Volts(volts)).map(|reading| CodeReading {
+            estimate: reading.estimate,
+            branch: reading.branch,
+            domain: reading.domain,
+        });
+        checksum.answer(answer);
+    }
+    format!("{:08x}", checksum.0)
+}
+
+#[test]
+fn the_trial_and_the_records_are_these() {
+    let bytes: Vec<u8> = trial().into_iter().flat_map(u16::to_le_bytes).collect();
+    same("data/trial.u16le", &bytes);
+    for (name, calibration) in [("poly13", example_calibration()), ("linear", linear())] {
+        record(name, &calibration);
+        let fixed = CodeCalibration::<Fixed, 11, 2>::new(&calibration, &due()).unwrap();
+        record(&format!("{name}-fixed"), &fixed);
+        let float = CodeCalibration::<f32, 11, 2>::new(&calibration, &due()).unwrap();
+        record(&format!("{name}-f32"), &float);
+    }
+}
+
+#[test]
+fn the_golden_checksums_are_these() {
+    let (poly13, linear) = (example_calibration(), linear());
+    let hz = SampleRate::new(100.0).unwrap();
+    let low_pass = LowPassSpec { cutoff: Hertz(5.0), sample_rate: hz };
+    let tracker = RateEstimator::Tracker { tracking_index: 0.1 };
+    let sg = SgRate::<f32, 11, 2>::new(hz).unwrap();
+    let golden = [
+        ("poly13-fixed", codes::<Fixed>(&poly13)),
+        ("linear-fixed", codes::<Fixed>(&linear)),
+        ("poly13-f32", codes::<f32>(&poly13)),
+        ("linear-f32", codes::<f32>(&linear)),
+        ("poly13-f32-volts", volts(&poly13, sg)),
+        ("linear-f32-volts", volts(&linear, sg)),
+        ("poly13-f32-volts-integer", volts(&poly13, IntegerSgRate::<11, 2>::new(hz, 3.3).unwrap())),
+        ("poly13-f32-differentiator", volts(&poly13, Differentiator::new(low_pass).unwrap())),
+        ("poly13-f32-tracker", volts(&poly13, RateFilter::<f32>::new(tracker, hz).unwrap())),
+    ];
+    let mut text = String::from("# made by the test `firmware` of stretch-receptor on a host\n");
+    for (model, checksum) in golden {
+        writeln!(text, "model={model} checksum={checksum}").unwrap();
+    }
+    same("golden.txt", text.as_bytes());
+}

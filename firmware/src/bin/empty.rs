@@ -1,0 +1,18 @@
+//! A step that does nothing: what the replay and its printing take by themselves.
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use stretch_firmware::measure::{Answer, replay};
+use stretch_receptor::{Withheld, code::AdcCode};
+
+#[inline(never)]
+fn step(_: &(), _: &mut (), _: AdcCode) -> Answer<i32> {
+    Err(Withheld::Warming)
+}
+
+#[entry]
+fn main() -> ! {
+    replay("empty", &(), &mut (), |code| code, step);
+    semihosting::process::exit(0)
+}

@@ -1,0 +1,10 @@
+//! What the programs in `src/bin` share. See the README beside this package.
+#![no_std]
+
+pub mod checksum;
+pub mod count;
+pub mod measure;
+pub mod stack;
+pub mod trial;
+
+use semihosting as _; // the panic handler: prints, and leaves the emulator with 101

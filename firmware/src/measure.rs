@@ -1,0 +1,95 @@
+//! Replays the trial through a receptor and prints what it cost.
+
+use core::hint::black_box;
+
+use semihosting::{eprintln, println};
+use stretch_core::Millimetres;
+use stretch_receptor::{Reading, Withheld, code::{AdcCode, CodeReading}};
+
+use crate::{
+    checksum::{Bits, Checksum},
+    count, stack, trial,
+};
+
+/// What a step answers here.
+pub type Answer<E> = Result<CodeReading<E>, Withheld>;
+
+/// An estimate that can be shown.
+pub trait Length: Bits + Copy {
+    /// In millimetres.
+    fn length(self) -> Millimetres<f32>;
+}
+
+impl Length for i32 {
+    fn length(self) -> Millimetres<f32> {
+        Millimetres(self as f32 / 1000.0)
+    }
+}
+
+impl Length for f32 {
+    fn length(self) -> Millimetres<f32> {
+        Millimetres(self)
+    }
+}
+
+/// Length, branch and domain of a reading, and not its rate: what nobody reads
+/// is not computed.
+#[inline(always)]
+pub fn length_only(answer: Result<Reading<f32>, Withheld>) -> Answer<f32> {
+    answer.map(|Reading { estimate, branch, domain, .. }| CodeReading { estimate, branch, domain })
+}
+
+/// Replays every sample through `step`, a function that is not inlined, and prints one line.
+///
+/// `input` makes the sample outside of the count. The count has everything
+/// between two readings of the counter but those: passing the arguments, the
+/// call, the step, the return.
+#[inline(never)]
+pub fn replay<D, M, I, E: Length>(
+    model: &str,
+    design: &D,
+    memory: &mut M,
+    input: impl Fn(AdcCode) -> I,
+    step: fn(&D, &mut M, I) -> Answer<E>,
+) {
+    let mut core = cortex_m::Peripherals::take().expect("taken once");
+    count::start(&mut core.SYST);
+    let step = black_box(step);
+    let ((), empty) = count::bracket(|| ());
+    let (mut samples, mut total, mut max) = (0u32, 0u32, 0u32);
+    let mut checksum = Checksum::default();
+    let mut length = None;
+    let sp = stack::paint();
+    for code in trial::codes() {
+        let sample = input(code);
+        let (answer, count) = count::bracket(|| step(design, memory, sample));
+        let count = count - empty;
+        samples += 1;
+        total += count;
+        max = max.max(count);
+        checksum.answer(answer);
+        length = answer.ok().map(|reading| reading.estimate).or(length);
+    }
+    let stack = stack::depth(sp);
+    let tenths = (total * 10 + samples / 2) / samples;
+    println!(
+        "model={model} mean={}.{} max={max} text_bytes={} stack_bytes={stack} state_bytes={} checksum={:08x}",
+        tenths / 10,
+        tenths % 10,
+        text_bytes(),
+        size_of::<M>(),
+        checksum.0,
+    );
+    if let Some(length) = length {
+        eprintln!("{model}: {samples} samples, the last length {} mm", length.length().0 as i32);
+    }
+}
+
+/// Bytes of code in flash, from the linker.
+fn text_bytes() -> usize {
+    unsafe extern "C" {
+        static __stext: u8;
+        static __etext: u8;
+    }
+    (&raw const __etext as usize) - (&raw const __stext as usize)
+}

@@ -1,0 +1,31 @@
+//! How deep the stack went.
+
+const DEPTH: usize = 1024;
+const PAINT: u32 = 0xa5c3_5a3c;
+
+/// Paints the kilobyte below the caller's frame.
+///
+/// Inlined, so that nothing of its own lies there.
+#[inline(always)]
+pub fn paint() -> usize {
+    let sp: usize;
+    // SAFETY: reads a register.
+    unsafe { core::arch::asm!("mov {}, sp", out(reg) sp, options(nomem, nostack)) };
+    let mut at = sp - DEPTH;
+    while at < sp {
+        // SAFETY: free stack, aligned, inside RAM; the compiler keeps nothing below sp.
+        unsafe { (at as *mut u32).write_volatile(PAINT) };
+        at += 4;
+    }
+    sp
+}
+
+/// Bytes below `sp` that were written since [`paint`].
+pub fn depth(sp: usize) -> usize {
+    let mut at = sp - DEPTH;
+    // SAFETY: as above, read only.
+    while at < sp && unsafe { (at as *const u32).read_volatile() } == PAINT {
+        at += 4;
+    }
+    sp - at
+}

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use commands::{apply, calibrate, convert, demo, evaluate};
+use commands::{apply, calibrate, convert, demo, effects, evaluate, rig, simulate};
 
 /// From the voltage of a stretch sensor to length, live.
 ///
@@ -36,6 +36,9 @@ enum Command {
     Evaluate(evaluate::Args),
     Convert(convert::Args),
     Demo(demo::Args),
+    Simulate(simulate::Args),
+    Effects(effects::Args),
+    Rig(rig::Args),
 }
 
 /// What the shell is told when Ctrl-C ended the program.
@@ -51,6 +54,9 @@ fn main() -> ExitCode {
         Command::Evaluate(args) => evaluate::run(args),
         Command::Convert(args) => convert::run(args),
         Command::Demo(args) => demo::run(args),
+        Command::Simulate(args) => simulate::run(args),
+        Command::Effects(args) => effects::run(args),
+        Command::Rig(args) => rig::run(args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

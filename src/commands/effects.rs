@@ -1,0 +1,79 @@
+//! `stretch effects`: the catalogue of what a rig may do beside its nominal physics.
+
+use stretch_sim::{CATALOGUE, Effect, EffectParameter, SimError, effect_named};
+
+use super::shared::{say, say_json};
+
+/// List the effects that can be added to the simulated rig
+///
+/// With equation, parameters and plausible ranges, in the order in which several
+/// effects of one stage act. Use them as
+///
+///   stretch simulate --effect gauge_hysteresis:h=0.2,s=0.012 --out bench
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(crate) struct Args {
+    /// Effects to list [default: all]
+    #[arg(value_name = "NAME")]
+    names: Vec<String>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+    let chosen: Vec<&dyn Effect> = if args.names.is_empty() {
+        CATALOGUE.to_vec()
+    } else {
+        let find = |name: &String| {
+            effect_named(name).map(|effect| effect as &dyn Effect).ok_or_else(|| {
+                let names = CATALOGUE.iter().map(|e| e.name());
+                let nearest = stretch_data::nearest(name, names).map(str::to_owned);
+                SimError::UnknownEffect { name: name.clone(), nearest }
+            })
+        };
+        args.names.iter().map(find).collect::<Result<_, _>>()?
+    };
+    if args.json {
+        return say_json(&chosen.iter().map(|e| json(*e)).collect::<Vec<_>>());
+    }
+    let mut stage = None;
+    for effect in chosen {
+        if stage != Some(effect.stage()) {
+            say(format!("{}{}", if stage.is_some() { "\n" } else { "" }, effect.stage()))?;
+            stage = Some(effect.stage());
+        }
+        say(format!("  {:22} {}", effect.name(), effect.equation()))?;
+        let parameters: Vec<String> = effect.parameters().iter().map(range).collect();
+        say(format!("  {:22}   {}", "", parameters.join("; ")))?;
+    }
+    Ok(())
+}
+
+/// `h: 0 .. 0.6`, with the unit where there is one.
+fn range(p: &EffectParameter) -> String {
+    let number = |x: f64| {
+        if x != 0.0 && x.abs() < 1e-3 || x.abs() >= 1e6 { format!("{x:e}") } else { format!("{x}") }
+    };
+    let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
+    let default = match p.off {
+        None => format!(" (else {})", number(p.typical)),
+        Some(_) => String::new(),
+    };
+    format!("{}: {} .. {}{unit}{default}", p.name, number(p.min), number(p.max))
+}
+
+fn json(effect: &dyn Effect) -> serde_json::Value {
+    let parameters: Vec<serde_json::Value> = effect
+        .parameters()
+        .iter()
+        .map(|p| {
+            serde_json::json!({
+                "name": p.name, "unit": p.unit, "min": p.min, "max": p.max, "off": p.off, "typical": p.typical,
+            })
+        })
+        .collect();
+    serde_json::json!({
+        "name": effect.name(), "stage": effect.stage().name(), "equation": effect.equation(), "parameters": parameters,
+    })
+}

@@ -1,0 +1,218 @@
+//! `stretch simulate`: a data set from the simulated rig.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, ensure};
+use stretch_data::{DataSet, ReadOptions, RigFile, Trial, write_folder};
+use stretch_sim::{Key, Rig, RunSettings, Session, SimError, TrialPlan, paper_preset};
+
+use super::shared::{progress, say};
+
+/// Simulate trials of the rig and write them as a data set
+///
+///   stretch simulate --protocol paper --effect gauge_hysteresis:h=0.2,s=0.012 --out bench
+///
+/// Without --rig it is the stock rig (`stretch rig` prints it); `stretch effects`
+/// lists what can be added to it. The folder gets the trials, dataset.toml, and
+/// rig.toml with every parameter, effect and the seed: from it the run can be
+/// repeated to the bit, on any machine:
+///
+///   stretch simulate --protocol paper --rig bench/rig.toml --out again
+///
+/// dataset.toml does not name rig.toml as its rig: that is the simulator without
+/// the effects (nominal.toml where it is not the stock rig).
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(crate) struct Args {
+    /// Rig file [default: the stock rig]
+    #[arg(long, value_name = "rig.toml")]
+    rig: Option<PathBuf>,
+    /// A rig that comes along, with effects: paper, whose figures are of the paper's order
+    #[arg(long, value_enum, conflicts_with = "rig")]
+    preset: Option<Preset>,
+    /// What the valves do
+    #[arg(long, value_enum, default_value = "paper")]
+    protocol: Protocol,
+    /// Replay the inlet and outlet columns of a trial instead
+    #[arg(long, value_name = "trial.csv", conflicts_with = "protocol")]
+    commands: Option<PathBuf>,
+    /// Add an effect, as NAME:PARAMETER=VALUE,...
+    #[arg(long = "effect", value_name = "NAME:P=X", value_parser = parse_effect)]
+    effects: Vec<EffectArg>,
+    /// Noise and converter rounding [default: on]
+    #[arg(long, value_enum, value_name = "on|off", hide_possible_values = true)]
+    noise: Option<Switch>,
+    /// Seed of noise and random commands [default: the rig file's, or 1]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=RunSettings::MOST_SEED))]
+    seed: Option<u64>,
+    /// Folder that the data set goes to
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Write into a folder that exists; files of the same name are replaced, nothing is deleted
+    #[arg(long)]
+    force: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Protocol {
+    /// Six inflations, six deflations, arbitrary, pulses, and three test trials
+    Paper,
+    /// One minute of random segments
+    Arbitrary,
+    /// One minute of pulse pairs
+    Pulses,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Preset {
+    /// Hysteresis, slip, overshoot and cross-talk of the paper's order
+    Paper,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Switch {
+    On,
+    Off,
+}
+
+/// An effect as it is written on the command line.
+#[derive(Debug, Clone, PartialEq)]
+struct EffectArg {
+    name: String,
+    values: Vec<(String, f64)>,
+}
+
+fn parse_effect(text: &str) -> Result<EffectArg, String> {
+    let (name, rest) = text.split_once(':').unwrap_or((text, ""));
+    let values = rest
+        .split(',')
+        .filter(|part| !part.trim().is_empty())
+        .map(|part| {
+            let pair = part.split_once('=');
+            let number = pair.and_then(|(_, value)| value.trim().parse::<f64>().ok());
+            match (pair, number) {
+                (Some((name, _)), Some(value)) => Ok((name.trim().to_owned(), value)),
+                _ => Err(format!("\"{part}\" is not PARAMETER=NUMBER; write NAME:P=X,Q=Y")),
+            }
+        })
+        .collect::<Result<Vec<_>, String>>()?;
+    let arg = EffectArg { name: name.trim().to_owned(), values };
+    // Unknown names and values out of range are found before anything is simulated.
+    arg.add_to(&mut Rig::default()).map_err(|e| e.to_string())?;
+    Ok(arg)
+}
+
+impl EffectArg {
+    fn add_to(&self, rig: &mut Rig) -> Result<(), SimError> {
+        let values: Vec<(&str, f64)> =
+            self.values.iter().map(|(name, value)| (name.as_str(), *value)).collect();
+        rig.effects.insert(&self.name, &values)
+    }
+}
+
+pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+    let (mut rig, written) = match (&args.rig, args.preset) {
+        (Some(path), _) => {
+            let file = RigFile::read(path)?;
+            let name = || path.display().to_string();
+            (Rig::from_file(&file).with_context(name)?, RunSettings::from_file(&file).with_context(name)?)
+        }
+        (None, Some(Preset::Paper)) => (paper_preset()?, None),
+        (None, None) => (Rig::default(), None),
+    };
+    for effect in &args.effects {
+        effect.add_to(&mut rig)?;
+    }
+    let mut settings = written.unwrap_or_default();
+    settings.seed = args.seed.unwrap_or(settings.seed);
+    settings.noise = args.noise.map_or(settings.noise, |noise| noise == Switch::On);
+    let plans = plans(&args, &rig, settings.seed)?;
+    write(&args.out, args.force, &rig, &settings, &plans)?;
+
+    let seconds: f64 = plans.iter().map(|p| p.inlet.len() as f64 / p.rate_hz).sum();
+    let effects: Vec<&str> = rig.effects.iter().map(|e| e.name()).collect();
+    let effects = if effects.is_empty() { "no effect".to_owned() } else { effects.join(", ") };
+    say(format!(
+        "wrote {}: {} trials, {seconds:.0} s, {effects}, seed {}",
+        args.out.display(),
+        plans.len(),
+        settings.seed
+    ))
+}
+
+fn plans(args: &Args, rig: &Rig, seed: u64) -> anyhow::Result<Vec<TrialPlan>> {
+    let Some(path) = &args.commands else {
+        return Ok(match args.protocol {
+            Protocol::Paper => TrialPlan::paper(seed),
+            Protocol::Arbitrary => vec![TrialPlan::arbitrary(1, seed)],
+            Protocol::Pulses => vec![TrialPlan::pulses(1, seed)],
+        });
+    };
+    let trial = Trial::read(path, &ReadOptions::new().require("inlet").require("outlet"))?;
+    let plan = TrialPlan::from_trial(&trial, 1e-3 * rig.params[Key::PS])
+        .with_context(|| path.display().to_string())?;
+    Ok(vec![plan])
+}
+
+/// Writes the data set, whole or not at all.
+fn write(
+    out: &Path,
+    force: bool,
+    rig: &Rig,
+    settings: &RunSettings,
+    plans: &[TrialPlan],
+) -> anyhow::Result<()> {
+    let name = out.file_name().map_or("simulated".into(), |n| n.to_string_lossy().into_owned());
+    let nominal = Rig { effects: Default::default(), ..rig.clone() };
+    let is_stock = nominal == Rig::default();
+    let mut set = DataSet {
+        name,
+        rate_hz: plans[0].rate_hz,
+        rig: (!is_stock).then(|| "nominal.toml".to_owned()),
+        trials: Vec::new(),
+    };
+    for own in ["dataset.toml", "rig.toml", "nominal.toml"] {
+        ensure!(plans.iter().all(|p| p.file != own), "a trial cannot be called {own}");
+    }
+    let bar = progress("simulating", plans.len() as u64);
+    write_folder(out, force, |folder| {
+        let mut session = Session::new(rig, settings)?;
+        for plan in plans {
+            let (entry, trial) = session.run(plan)?;
+            trial.write(folder.join(&entry.file))?;
+            set.trials.push(entry);
+            bar.inc(1);
+        }
+        rig.to_file(Some(settings)).write(folder.join("rig.toml"))?;
+        if !is_stock {
+            nominal.to_file(None).write(folder.join("nominal.toml"))?;
+        }
+        set.write(folder)?;
+        anyhow::Ok(())
+    })?;
+    bar.finish_and_clear();
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parse_effect;
+
+    #[test]
+    fn effects_are_understood() {
+        let effect = parse_effect("gauge_hysteresis:h=0.2,s=0.012").unwrap();
+        assert_eq!(effect.name, "gauge_hysteresis");
+        assert_eq!(effect.values, [("h".to_owned(), 0.2), ("s".to_owned(), 0.012)]);
+        for (wrong, says) in [
+            ("gauge_hysterisis:h=0.2", "did you mean `gauge_hysteresis`?"),
+            ("gauge_hysteresis:k=0.2", "no parameter `k`"),
+            ("gauge_hysteresis:h=2", "outside 0 .. 0.6"),
+            ("gauge_hysteresis:h=nan", "outside 0 .. 0.6"),
+            ("gauge_hysteresis", "lacks the parameter `h`"),
+            ("gauge_hysteresis:h", "is not PARAMETER=NUMBER"),
+        ] {
+            let error = parse_effect(wrong).unwrap_err();
+            assert!(error.contains(says), "{wrong}: {error}");
+        }
+    }
+}

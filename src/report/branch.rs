@@ -8,28 +8,28 @@ use stretch_core::{Branch, Calibration, Model, Polarity, RateSource, Target};
 use super::thin::{extent, quantile, sorted};
 
 /// A fit's samples and surface, brought back from normalised numbers.
-pub struct BranchView<'a> {
+pub(crate) struct BranchView<'a> {
     /// The fit.
-    pub fit: &'a FitReport,
+    pub(crate) fit: &'a FitReport,
     /// Samples: rate, signal, target.
-    pub cloud: Vec<[f64; 3]>,
+    pub(crate) cloud: Vec<[f64; 3]>,
     /// Span of the rates but for the outermost percent on either side.
-    pub rate: Range<f64>,
+    pub(crate) rate: Range<f64>,
     /// Span of the signal.
-    pub signal: Range<f64>,
+    pub(crate) signal: Range<f64>,
     /// Span of the target.
-    pub target: Range<f64>,
+    pub(crate) target: Range<f64>,
     /// What stands on the axes: rate, signal, target.
-    pub labels: [String; 3],
+    pub(crate) labels: [String; 3],
     /// Whether the signal falls as the target rises.
-    pub falling: bool,
+    pub(crate) falling: bool,
     calibration: &'a Calibration,
     rate_scale: Option<stretch_core::Range>,
 }
 
 impl<'a> BranchView<'a> {
     /// The view of each branch; none of a linear calibration, or without samples.
-    pub fn all(calibrated: &'a Calibrated) -> Vec<Self> {
+    pub(crate) fn all(calibrated: &'a Calibrated) -> Vec<Self> {
         calibrated.fits.iter().filter_map(|fit| Self::new(&calibrated.calibration, fit)).collect()
     }
 
@@ -84,14 +84,14 @@ impl<'a> BranchView<'a> {
     }
 
     /// The surface at a rate and a signal in the units of the data.
-    pub fn surface(&self, rate: f64, signal: f64) -> f64 {
+    pub(crate) fn surface(&self, rate: f64, signal: f64) -> f64 {
         let rate = self.rate_scale.map_or(rate, |scale| scale.normalise(rate));
         let signal = self.calibration.signal_range.normalise(signal);
         self.shown(self.fit.surface.eval(rate, signal))
     }
 
     /// What the branch is called.
-    pub fn name(&self) -> &'static str {
+    pub(crate) fn name(&self) -> &'static str {
         let contraction = matches!(self.calibration.target, Target::Contraction { .. });
         match (self.fit.branch, contraction) {
             (Some(Branch::Deflation), true) => "Deflation",

@@ -22,24 +22,24 @@ const DRAWN: usize = 4;
 
 /// What a report says beside the numbers.
 #[derive(Debug, Clone, Default)]
-pub struct Context {
+pub(crate) struct Context {
     /// Heading of the page.
-    pub title: String,
+    pub(crate) title: String,
     /// Trials of the fit, as files or sessions.
-    pub calibrated_on: Vec<String>,
+    pub(crate) calibrated_on: Vec<String>,
     /// Trials of the evaluation.
-    pub tested_on: Vec<String>,
+    pub(crate) tested_on: Vec<String>,
     /// Signals among which the calibrated one was chosen, best first; empty
     /// when the user named it.
-    pub signal_choice: Vec<Candidate>,
+    pub(crate) signal_choice: Vec<Candidate>,
     /// Sentences about the data: where they come from, what was done to them.
-    pub notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
 }
 
 /// The report as one HTML file.
 ///
 /// `calibrated` are the calibrations by the names that `evaluation` knows them by.
-pub fn calibration_page(
+pub(crate) fn calibration_page(
     calibrated: &[(&str, &Calibrated)],
     evaluation: &Evaluation,
     context: &Context,
@@ -56,7 +56,11 @@ pub fn calibration_page(
 
 /// A picture of some seconds of the first trial for a README: an SVG file of
 /// its own, light, with its legend inside. Empty when there is nothing to draw.
-pub fn readme_picture(calibrated: &[(&str, &Calibrated)], evaluation: &Evaluation) -> String {
+#[allow(dead_code, reason = "draws the picture of the README, outside the program")]
+pub(crate) fn readme_picture(
+    calibrated: &[(&str, &Calibrated)],
+    evaluation: &Evaluation,
+) -> String {
     let names = method_names(calibrated, evaluation);
     let first = evaluation.trials.first();
     first.map_or_else(String::new, |trial| estimate_picture(evaluation, trial, &names))

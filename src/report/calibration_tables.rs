@@ -9,7 +9,7 @@ use super::{
 };
 
 /// What an evaluation calls the signal without a calibration.
-pub const RAW: &str = "raw";
+pub(crate) const RAW: &str = "raw";
 
 /// Cells from anything that is text.
 fn cells<const N: usize>(cells: [&str; N]) -> Vec<String> {
@@ -21,7 +21,10 @@ fn optional(x: Option<f64>, digits: usize) -> String {
 }
 
 /// What each method of an evaluation is called on the page.
-pub fn method_names(calibrated: &[(&str, &Calibrated)], evaluation: &Evaluation) -> Vec<String> {
+pub(crate) fn method_names(
+    calibrated: &[(&str, &Calibrated)],
+    evaluation: &Evaluation,
+) -> Vec<String> {
     let name = |method: &str| {
         let found = calibrated.iter().find(|(name, _)| *name == method);
         match found.map(|(_, c)| &c.calibration.model) {
@@ -37,13 +40,13 @@ pub fn method_names(calibrated: &[(&str, &Calibrated)], evaluation: &Evaluation)
 
 /// The calibration with the least RMSE: not the raw signal, which is scaled
 /// with the very reference that it is held against.
-pub fn best(methods: &[MethodErrors]) -> Option<usize> {
+pub(crate) fn best(methods: &[MethodErrors]) -> Option<usize> {
     let finite = methods.iter().enumerate().filter(|(_, m)| m.rmse.is_finite() && m.method != RAW);
     finite.min_by(|a, b| a.1.rmse.total_cmp(&b.1.rmse)).map(|(i, _)| i)
 }
 
 /// The paper's measures, one row a method.
-pub fn method_table(
+pub(crate) fn method_table(
     caption: &str,
     methods: &[MethodErrors],
     names: &[String],
@@ -81,7 +84,7 @@ pub fn method_table(
 }
 
 /// Paired tests between methods.
-pub fn comparison_table(
+pub(crate) fn comparison_table(
     comparisons: &[Comparison],
     unit: &str,
     called: impl Fn(&str) -> String,
@@ -115,7 +118,7 @@ pub fn comparison_table(
 }
 
 /// Candidate signals, best first.
-pub fn signal_table(candidates: &[Candidate]) -> Table {
+pub(crate) fn signal_table(candidates: &[Candidate]) -> Table {
     let row = |c: &Candidate| {
         let percent = c.cross_validated_rmse.map(|rmse| 100.0 * rmse);
         let text = c.problem.clone().unwrap_or_else(|| optional(percent, 3));
@@ -130,32 +133,35 @@ pub fn signal_table(candidates: &[Candidate]) -> Table {
 }
 
 /// The fitted order beside its neighbours.
-pub fn order_table(fit: &FitReport) -> Table {
+pub(crate) fn order_table(fit: &FitReport) -> Table {
     let row = |o: &stretch_calibrate::Order| {
-        let fitted = if o.model == fit.model { " (fitted)" } else { "" };
-        let worth = if fit.recommended.as_ref() == Some(&o.model) { " (recommended)" } else { "" };
-        let name = format!("{}{fitted}{worth}", o.model);
-        match &o.problem {
-            Some(problem) => vec![name, o.terms.to_string(), problem.clone()],
-            None => vec![
-                name,
-                o.terms.to_string(),
-                o.r_squared.map_or_else(|| NONE.to_owned(), |r| fixed(r, 4)),
-                optional(o.rmse, 3),
-                optional(o.cross_validated_rmse, 3),
-            ],
+        let mut remarks = Vec::new();
+        if o.model == fit.model {
+            remarks.push("fitted");
         }
+        if fit.recommended.as_ref() == Some(&o.model) {
+            remarks.push("recommended");
+        }
+        remarks.extend(o.problem.as_deref());
+        vec![
+            o.model.clone(),
+            o.terms.to_string(),
+            o.r_squared.map_or_else(|| NONE.to_owned(), |r| fixed(r, 4)),
+            optional(o.rmse, 3),
+            optional(o.cross_validated_rmse, 3),
+            remarks.join(", "),
+        ]
     };
     Table {
         caption: format!("Orders, {}; errors in normalised target", fit.name),
-        head: cells(["Order", "Terms", "R\u{b2}", "RMSE", "RMSE, left out"]),
+        head: cells(["Order", "Terms", "R\u{b2}", "RMSE", "RMSE, left out", "Remarks"]),
         rows: fit.orders.iter().map(row).collect(),
         highlight: fit.orders.iter().position(|o| Some(&o.model) == fit.recommended.as_ref()),
     }
 }
 
 /// Coefficients with their bounds.
-pub fn coefficient_table(fit: &FitReport) -> Table {
+pub(crate) fn coefficient_table(fit: &FitReport) -> Table {
     let row = |c: &stretch_calibrate::Coefficient| {
         let power = |name: &str, power: u8| match power {
             0 => String::new(),

@@ -19,11 +19,11 @@ use plotters_backend::{
 use super::markup::escape;
 
 /// Steps of the drawing grid in one pixel of the figure: plotters places on whole steps.
-pub const STEPS: u32 = 4;
+pub(crate) const STEPS: u32 = 4;
 
 /// A colour by what it stands for; the style sheet says what it looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ink {
+pub(crate) enum Ink {
     /// Words and numbers.
     Text,
     /// Axes.
@@ -67,23 +67,23 @@ impl Ink {
     ];
 
     /// The ink of the `index`-th thing compared; a sixth looks like the first.
-    pub fn of(index: usize) -> Self {
+    pub(crate) fn of(index: usize) -> Self {
         [Self::First, Self::Second, Self::Third, Self::Fourth, Self::Fifth][index % 5]
     }
 
     /// The class that the style sheet colours.
-    pub fn class(self) -> &'static str {
+    pub(crate) fn class(self) -> &'static str {
         Self::ALL.iter().find(|(ink, _)| *ink == self).map_or("ink-text", |(_, class)| class)
     }
 
     /// The stand-in that plotters carries to the backend.
-    pub fn color(self) -> RGBColor {
+    pub(crate) fn color(self) -> RGBColor {
         let index = Self::ALL.iter().position(|(ink, _)| *ink == self).unwrap_or(0);
         RGBColor(index as u8, 0, 0)
     }
 
     /// The same, letting `1 - opacity` of what is behind shine through.
-    pub fn faint(self, opacity: f64) -> RGBAColor {
+    pub(crate) fn faint(self, opacity: f64) -> RGBAColor {
         RGBAColor(self.color().0, 0, 0, opacity)
     }
 }
@@ -105,7 +105,7 @@ struct Dots {
 
 /// The backend: writes the inside of an `svg` element into a string.
 #[derive(Debug)]
-pub struct Canvas<'a> {
+pub(crate) struct Canvas<'a> {
     body: &'a mut String,
     size: (u32, u32),
     dots: Option<Dots>,
@@ -115,7 +115,7 @@ type Done = Result<(), DrawingErrorKind<Infallible>>;
 
 impl<'a> Canvas<'a> {
     /// A canvas of `width` by `height` pixels.
-    pub fn new(body: &'a mut String, width: u32, height: u32) -> Self {
+    pub(crate) fn new(body: &'a mut String, width: u32, height: u32) -> Self {
         Self { body, size: (width * STEPS, height * STEPS), dots: None }
     }
 

@@ -23,7 +23,7 @@ const REACH: usize = 5;
 
 /// What errors are drawn against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Against {
+pub(crate) enum Against {
     /// The rate of the reference, by a central difference over eleven samples.
     Rate,
     /// The reference itself.
@@ -31,7 +31,7 @@ pub enum Against {
 }
 
 /// Errors (estimate minus reference) of all trials against `against`, one panel a method.
-pub fn error_figure(evaluation: &Evaluation, names: &[String], against: Against) -> Figure {
+pub(crate) fn error_figure(evaluation: &Evaluation, names: &[String], against: Against) -> Figure {
     let methods = points(evaluation, names.len(), against);
     let errors = sorted(methods.iter().flatten().map(|(_, e)| e.abs()));
     let places = sorted(methods.iter().flatten().map(|(x, _)| *x));
@@ -104,7 +104,7 @@ fn spread_over(points: &[(f64, f64)], span: &Range<f64>) -> Vec<(f64, f64)> {
 }
 
 /// How often each error occurs, one outline a method.
-pub fn residual_figure(evaluation: &Evaluation, names: &[String]) -> Figure {
+pub(crate) fn residual_figure(evaluation: &Evaluation, names: &[String]) -> Figure {
     let methods = points(evaluation, names.len(), Against::Reference);
     let size = sorted(methods.iter().flatten().map(|(_, e)| e.abs()));
     let most = quantile(&size, 0.995);
@@ -172,9 +172,9 @@ fn points(evaluation: &Evaluation, methods: usize, against: Against) -> Vec<Vec<
 /// Central differences of the reference over eleven samples; NaN at the ends.
 fn rates(time_s: &[f64], values: &[f64]) -> Vec<f64> {
     let mut rates = vec![f64::NAN; values.len()];
-    for i in REACH..values.len().min(time_s.len()).saturating_sub(REACH) {
-        let Range { start, end } = i - REACH..i + REACH;
-        rates[i] = (values[end] - values[start]) / (time_s[end] - time_s[start]);
+    let spans = time_s.windows(2 * REACH + 1).zip(values.windows(2 * REACH + 1));
+    for (rate, (t, y)) in rates.iter_mut().skip(REACH).zip(spans) {
+        *rate = (y[2 * REACH] - y[0]) / (t[2 * REACH] - t[0]);
     }
     rates
 }

@@ -16,7 +16,11 @@ use super::{
 const WINDOW_S: f64 = 8.0;
 
 /// A trial over its whole time; `names` are those of the methods.
-pub fn estimate_figure(evaluation: &Evaluation, trial: &TrialErrors, names: &[String]) -> Figure {
+pub(crate) fn estimate_figure(
+    evaluation: &Evaluation,
+    trial: &TrialErrors,
+    names: &[String],
+) -> Figure {
     match extent(trial.time_s.iter().copied()) {
         Some(time) if time.end > time.start => window_figure(evaluation, trial, names, &time),
         _ => Figure::missing("There is no stretch of time to draw."),
@@ -24,7 +28,11 @@ pub fn estimate_figure(evaluation: &Evaluation, trial: &TrialErrors, names: &[St
 }
 
 /// The same for some seconds of it, where the reference moves most.
-pub fn closest_look(evaluation: &Evaluation, trial: &TrialErrors, names: &[String]) -> Figure {
+pub(crate) fn closest_look(
+    evaluation: &Evaluation,
+    trial: &TrialErrors,
+    names: &[String],
+) -> Figure {
     match liveliest(trial) {
         Some(window) => window_figure(evaluation, trial, names, &window),
         None => Figure::missing("The trial is too short for a closer look."),
@@ -32,9 +40,16 @@ pub fn closest_look(evaluation: &Evaluation, trial: &TrialErrors, names: &[Strin
 }
 
 /// A picture that stands alone, such as in a README: light, its legend inside.
-pub fn estimate_picture(evaluation: &Evaluation, trial: &TrialErrors, names: &[String]) -> String {
+pub(crate) fn estimate_picture(
+    evaluation: &Evaluation,
+    trial: &TrialErrors,
+    names: &[String],
+) -> String {
     closest_look(evaluation, trial, names).standalone()
 }
+
+/// Its ink, its width in pixels, and its pieces.
+type Line = (Ink, f64, Vec<Vec<(f64, f64)>>);
 
 fn window_figure(
     evaluation: &Evaluation,
@@ -71,7 +86,7 @@ fn window_figure(
         trial.trial, evaluation.unit
     );
     let narrow = lines(Frame::NARROW);
-    let draw = |lines: Vec<(Ink, f64, Vec<Vec<(f64, f64)>>)>| {
+    let draw = |lines: Vec<Line>| {
         let axes = &axes;
         move |area: &super::figure::Area<'_>| {
             plot(area, axes, |chart| {

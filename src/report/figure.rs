@@ -14,64 +14,65 @@ use super::{
 };
 
 /// Size of words and numbers, in pixels of the figure.
-pub const TEXT_PX: u32 = 13;
+pub(crate) const TEXT_PX: u32 = 14;
 
 /// Where figures are drawn.
-pub type Area<'a> = DrawingArea<Canvas<'a>, Shift>;
+pub(crate) type Area<'a> = DrawingArea<Canvas<'a>, Shift>;
 
 /// Axes with a place for the data.
-pub type Chart<'a, 'b> = ChartContext<'a, Canvas<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+pub(crate) type Chart<'a, 'b> =
+    ChartContext<'a, Canvas<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 /// Drawing cannot fail but for a fault in the figure itself.
-pub type Drawn = Result<(), DrawingAreaErrorKind<Infallible>>;
+pub(crate) type Drawn = Result<(), DrawingAreaErrorKind<Infallible>>;
 
 /// Pixels as steps of the drawing grid.
-pub fn px(pixels: f64) -> i32 {
+pub(crate) fn px(pixels: f64) -> i32 {
     (pixels * f64::from(STEPS)).round() as i32
 }
 
 /// The size of a drawing, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Frame {
+pub(crate) struct Frame {
     /// Width.
-    pub width: u32,
+    pub(crate) width: u32,
     /// Height.
-    pub height: u32,
+    pub(crate) height: u32,
 }
 
 impl Frame {
     /// For half a desktop page or a whole phone: its text stays legible at 360 px.
-    pub const NARROW: Self = Self { width: 400, height: 290 };
+    pub(crate) const NARROW: Self = Self { width: 400, height: 290 };
     /// For the whole width of a desktop page.
-    pub const WIDE: Self = Self { width: 880, height: 320 };
+    pub(crate) const WIDE: Self = Self { width: 880, height: 320 };
 }
 
 /// A drawing, maybe in two shapes, with a legend in words; or why there is none.
 #[derive(Debug, Clone, Default)]
-pub struct Figure {
+pub(crate) struct Figure {
     /// What a reader who cannot see it is told.
-    pub description: String,
+    pub(crate) description: String,
     /// Colours and what they stand for.
-    pub legend: Vec<(Ink, String)>,
+    pub(crate) legend: Vec<(Ink, String)>,
     /// Why it is not drawn.
-    pub missing: Option<String>,
+    pub(crate) missing: Option<String>,
     drawings: Vec<(Frame, String)>,
 }
 
 impl Figure {
     /// A figure with this description and nothing drawn yet.
-    pub fn new(description: &str) -> Self {
+    pub(crate) fn new(description: &str) -> Self {
         Self { description: description.to_owned(), ..Self::default() }
     }
 
     /// Nothing to draw, and why.
-    pub fn missing(why: &str) -> Self {
+    pub(crate) fn missing(why: &str) -> Self {
         Self { missing: Some(why.to_owned()), ..Self::default() }
     }
 
     /// Draws it in one frame; the narrowest of several is for phones.
     #[must_use]
-    pub fn draw(mut self, frame: Frame, draw: impl FnOnce(&Area<'_>) -> Drawn) -> Self {
+    pub(crate) fn draw(mut self, frame: Frame, draw: impl FnOnce(&Area<'_>) -> Drawn) -> Self {
         let mut body = String::new();
         let done = {
             let area = Canvas::new(&mut body, frame.width, frame.height).into_drawing_area();
@@ -86,13 +87,13 @@ impl Figure {
 
     /// Adds a legend.
     #[must_use]
-    pub fn legend(mut self, entries: impl IntoIterator<Item = (Ink, String)>) -> Self {
+    pub(crate) fn legend(mut self, entries: impl IntoIterator<Item = (Ink, String)>) -> Self {
         self.legend.extend(entries);
         self
     }
 
     /// The drawings as inline SVG; of two, the style sheet shows the one that fits.
-    pub fn svg(&self) -> String {
+    pub(crate) fn svg(&self) -> String {
         let both = self.drawings.len() > 1;
         let narrowest = self.drawings.iter().map(|(frame, _)| frame.width).min();
         let label = escape(&self.description);
@@ -112,7 +113,7 @@ impl Figure {
     }
 
     /// The widest drawing as a file of its own, light, its legend inside.
-    pub fn standalone(&self) -> String {
+    pub(crate) fn standalone(&self) -> String {
         let Some((frame, body)) = self.drawings.iter().max_by_key(|(frame, _)| frame.width) else {
             return String::new();
         };
@@ -128,8 +129,8 @@ impl Figure {
                 end + px(6.0),
                 TEXT_PX * STEPS
             );
-            // a letter is about seven pixels wide
-            x = end + px(28.0 + 7.0 * name.chars().count() as f64);
+            // a letter is about seven and a half pixels wide
+            x = end + px(28.0 + 7.5 * name.chars().count() as f64);
         }
         let (label, down) = (escape(&self.description), LEGEND_PX * STEPS);
         format!(
@@ -147,37 +148,37 @@ const LEGEND_PX: u32 = 28;
 
 /// What stands on two axes, and what they span.
 #[derive(Debug, Clone)]
-pub struct Axes {
+pub(crate) struct Axes {
     /// Horizontal span.
-    pub x: Range<f64>,
+    pub(crate) x: Range<f64>,
     /// Vertical span.
-    pub y: Range<f64>,
+    pub(crate) y: Range<f64>,
     /// Below, at the right end; empty for an axis whose numbers another panel bears.
-    pub x_label: String,
+    pub(crate) x_label: String,
     /// Above, at the left end.
-    pub y_label: String,
+    pub(crate) y_label: String,
 }
 
 /// Text in an ink, held at `h` and `v`.
-pub fn words(ink: Ink, h: HPos, v: VPos) -> TextStyle<'static> {
+pub(crate) fn words(ink: Ink, h: HPos, v: VPos) -> TextStyle<'static> {
     let mut style = TextStyle::from(("sans-serif", TEXT_PX * STEPS).into_font());
     style.color = ink.color().to_backend_color();
     style.pos(Pos::new(h, v))
 }
 
 /// A line of `pixels` in width.
-pub fn stroke(color: impl Into<RGBAColor>, pixels: f64) -> ShapeStyle {
+pub(crate) fn stroke(color: impl Into<RGBAColor>, pixels: f64) -> ShapeStyle {
     let stroke_width = px(pixels).unsigned_abs();
     ShapeStyle { color: color.into(), filled: false, stroke_width }
 }
 
 /// A dot's style.
-pub fn dot(ink: Ink, opacity: f64) -> ShapeStyle {
+pub(crate) fn dot(ink: Ink, opacity: f64) -> ShapeStyle {
     ShapeStyle { color: ink.faint(opacity), filled: true, stroke_width: 0 }
 }
 
 /// Draws axes and then the data.
-pub fn plot<'b>(
+pub(crate) fn plot<'b>(
     area: &Area<'b>,
     axes: &Axes,
     data: impl FnOnce(&mut Chart<'_, 'b>) -> Drawn,
@@ -191,7 +192,7 @@ pub fn plot<'b>(
         .margin_right(px(14.0))
         .margin_bottom(if bare { px(8.0) } else { px(22.0) })
         .x_label_area_size(px(20.0))
-        .y_label_area_size(px(50.0))
+        .y_label_area_size(px(52.0))
         .build_cartesian_2d(x, y)?;
     let numbers = words(Ink::Text, HPos::Center, VPos::Center);
     let most = |pixels: u32, each: i32| (pixels as i32 / px(f64::from(each))).max(2) as usize;

@@ -1,7 +1,7 @@
 //! Text and numbers as they stand on a page.
 
 /// Text that is safe between tags and in double quotes, and well-formed in XML.
-pub fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
@@ -19,11 +19,11 @@ pub fn escape(text: &str) -> String {
 }
 
 /// What stands where there is no number.
-pub const NONE: &str = "\u{2013}";
+pub(crate) const NONE: &str = "\u{2013}";
 
 /// `x` to `digits` significant digits, in plain notation from 0.0001 to a
 /// million; a dash when it is not finite.
-pub fn number(x: f64, digits: usize) -> String {
+pub(crate) fn number(x: f64, digits: usize) -> String {
     if !x.is_finite() {
         return NONE.to_owned();
     }
@@ -42,7 +42,7 @@ pub fn number(x: f64, digits: usize) -> String {
 
 /// `x` with `decimals` digits behind the point and a true minus sign; a dash
 /// when it is not finite.
-pub fn fixed(x: f64, decimals: usize) -> String {
+pub(crate) fn fixed(x: f64, decimals: usize) -> String {
     if !x.is_finite() {
         return NONE.to_owned();
     }
@@ -52,7 +52,7 @@ pub fn fixed(x: f64, decimals: usize) -> String {
 }
 
 /// A number on an axis that spans `span`.
-pub fn tick(x: f64, span: f64) -> String {
+pub(crate) fn tick(x: f64, span: f64) -> String {
     // labels are at least a tenth of the span apart
     let decimals = (1.0 - span.abs().max(1e-300).log10()).ceil().clamp(0.0, 12.0) as usize;
     let text = fixed(x, decimals);
@@ -67,6 +67,6 @@ fn minus(text: String) -> String {
 }
 
 /// A quantity with its unit; the unit may be empty.
-pub fn with_unit(text: &str, unit: &str) -> String {
+pub(crate) fn with_unit(text: &str, unit: &str) -> String {
     if unit.is_empty() { text.to_owned() } else { format!("{text} {unit}") }
 }

@@ -6,17 +6,19 @@
 mod branch;
 mod calibration_page;
 mod calibration_tables;
-pub mod canvas;
+pub(crate) mod canvas;
 mod error_figure;
 mod estimate_figure;
-pub mod figure;
-pub mod markup;
-pub mod page;
+pub(crate) mod figure;
+pub(crate) mod markup;
+pub(crate) mod page;
 mod slice_figure;
 mod surface_figure;
-pub mod thin;
+pub(crate) mod thin;
 
-pub use calibration_page::{Context, calibration_page, readme_picture};
+#[allow(unused_imports, reason = "draws the picture of the README, outside the program")]
+pub(crate) use calibration_page::readme_picture;
+pub(crate) use calibration_page::{Context, calibration_page};
 
 #[cfg(test)]
 mod tests;

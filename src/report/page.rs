@@ -9,20 +9,20 @@ const STYLE: &str = include_str!("style.css");
 
 /// A table: the first column names its rows, the others hold numbers.
 #[derive(Debug, Clone, Default)]
-pub struct Table {
+pub(crate) struct Table {
     /// What it shows.
-    pub caption: String,
+    pub(crate) caption: String,
     /// Heads of the columns.
-    pub head: Vec<String>,
+    pub(crate) head: Vec<String>,
     /// Cells, row by row.
-    pub rows: Vec<Vec<String>>,
+    pub(crate) rows: Vec<Vec<String>>,
     /// The row to look at first.
-    pub highlight: Option<usize>,
+    pub(crate) highlight: Option<usize>,
 }
 
 /// A report under construction; [`Page::finish`] gives the file.
 #[derive(Debug, Clone)]
-pub struct Page {
+pub(crate) struct Page {
     title: String,
     body: String,
     in_section: bool,
@@ -30,7 +30,7 @@ pub struct Page {
 
 impl Page {
     /// A page whose first words are its title and one plain sentence with the result.
-    pub fn new(title: &str, verdict: &str) -> Self {
+    pub(crate) fn new(title: &str, verdict: &str) -> Self {
         let body = format!(
             "<header><h1>{}</h1>\n<p class=\"verdict\">{}</p></header>\n",
             escape(title),
@@ -40,7 +40,7 @@ impl Page {
     }
 
     /// Begins a section; `intro` may be empty.
-    pub fn section(&mut self, heading: &str, intro: &str) -> &mut Self {
+    pub(crate) fn section(&mut self, heading: &str, intro: &str) -> &mut Self {
         self.close();
         self.in_section = true;
         self.put(&format!("<section><h2>{}</h2>\n", escape(heading)));
@@ -48,12 +48,12 @@ impl Page {
     }
 
     /// A paragraph.
-    pub fn text(&mut self, text: &str) -> &mut Self {
+    pub(crate) fn text(&mut self, text: &str) -> &mut Self {
         self.put(&format!("<p>{}</p>\n", escape(text)))
     }
 
     /// Notes, one a line; nothing when there are none.
-    pub fn list(&mut self, items: &[String]) -> &mut Self {
+    pub(crate) fn list(&mut self, items: &[String]) -> &mut Self {
         if items.is_empty() {
             return self;
         }
@@ -65,7 +65,7 @@ impl Page {
     }
 
     /// A figure over the whole width.
-    pub fn figure(&mut self, figure: &Figure, caption: &str) -> &mut Self {
+    pub(crate) fn figure(&mut self, figure: &Figure, caption: &str) -> &mut Self {
         self.put("<figure>");
         if !figure.legend.is_empty() {
             self.put("<div class=\"legend\">");
@@ -82,7 +82,7 @@ impl Page {
     }
 
     /// Figures side by side where there is room, one above the other on a phone.
-    pub fn figures(&mut self, figures: &[(Figure, String)]) -> &mut Self {
+    pub(crate) fn figures(&mut self, figures: &[(Figure, String)]) -> &mut Self {
         self.put("<div class=\"side\">\n");
         for (figure, caption) in figures {
             self.figure(figure, caption);
@@ -91,11 +91,13 @@ impl Page {
     }
 
     /// A table that scrolls in its own frame when it is too wide.
-    pub fn table(&mut self, table: &Table) -> &mut Self {
+    pub(crate) fn table(&mut self, table: &Table) -> &mut Self {
         let caption = escape(&table.caption);
+        // the caption stands outside: it must not scroll away
         self.put(&format!(
-            "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{caption}\">\
-             <table><caption>{caption}</caption>\n<thead><tr>"
+            "<p class=\"caption\">{caption}</p>\n\
+             <div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{caption}\">\
+             <table aria-label=\"{caption}\">\n<thead><tr>"
         ));
         for head in &table.head {
             self.put(&format!("<th scope=\"col\">{}</th>", escape(head)));
@@ -117,14 +119,14 @@ impl Page {
     }
 
     /// Content behind a line that opens it.
-    pub fn folded(&mut self, summary: &str, content: impl FnOnce(&mut Self)) -> &mut Self {
+    pub(crate) fn folded(&mut self, summary: &str, content: impl FnOnce(&mut Self)) -> &mut Self {
         self.put(&format!("<details><summary>{}</summary>\n", escape(summary)));
         content(self);
         self.put("</details>\n")
     }
 
     /// The whole file: HTML that is also well-formed XML.
-    pub fn finish(mut self) -> String {
+    pub(crate) fn finish(mut self) -> String {
         self.close();
         let title = escape(&self.title);
         let body = self.body;

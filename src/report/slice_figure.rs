@@ -19,7 +19,7 @@ const DOTS: usize = 350;
 
 /// Target over signal: the samples in motion by thirds of their rate, slow to
 /// fast, and the surface at the median rate of each third.
-pub fn slice_figure(view: &BranchView<'_>) -> Figure {
+pub(crate) fn slice_figure(view: &BranchView<'_>) -> Figure {
     let thirds = thirds(view);
     let [_, signal, target] = &view.labels;
     let curves: Vec<(f64, Vec<(f64, f64)>)> =

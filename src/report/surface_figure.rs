@@ -20,7 +20,7 @@ const CELLS: usize = 18;
 const DOTS: usize = 900;
 
 /// The surface where there are samples to support it, with dots above and below.
-pub fn surface_figure(view: &BranchView<'_>, ink: Ink) -> Figure {
+pub(crate) fn surface_figure(view: &BranchView<'_>, ink: Ink) -> Figure {
     let name = view.name().to_lowercase();
     let [rate, signal, target] = &view.labels;
     let description = format!(

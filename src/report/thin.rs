@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 /// Least and greatest finite value, or nothing.
-pub fn extent(values: impl IntoIterator<Item = f64>) -> Option<Range<f64>> {
+pub(crate) fn extent(values: impl IntoIterator<Item = f64>) -> Option<Range<f64>> {
     let ends = values
         .into_iter()
         .filter(|x| x.is_finite())
@@ -12,20 +12,20 @@ pub fn extent(values: impl IntoIterator<Item = f64>) -> Option<Range<f64>> {
 }
 
 /// The span widened by a share of itself on both sides.
-pub fn padded(span: &Range<f64>, share: f64) -> Range<f64> {
+pub(crate) fn padded(span: &Range<f64>, share: f64) -> Range<f64> {
     let pad = share * (span.end - span.start);
     span.start - pad..span.end + pad
 }
 
 /// The finite values in order.
-pub fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
+pub(crate) fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     let mut sorted: Vec<f64> = values.into_iter().filter(|x| x.is_finite()).collect();
     sorted.sort_unstable_by(f64::total_cmp);
     sorted
 }
 
 /// The value below which a share `q` of sorted values lies; NaN without any.
-pub fn quantile(sorted: &[f64], q: f64) -> f64 {
+pub(crate) fn quantile(sorted: &[f64], q: f64) -> f64 {
     let last = sorted.len().saturating_sub(1) as f64;
     sorted.get((q * last).round() as usize).copied().unwrap_or(f64::NAN)
 }
@@ -33,7 +33,7 @@ pub fn quantile(sorted: &[f64], q: f64) -> f64 {
 /// A curve inside a window of time, cut where a value is missing or the time
 /// leaps (ten times the mean step), as least and greatest value of each of
 /// `bins` slots: no peak is lost, and each piece keeps its ends.
-pub fn curve(
+pub(crate) fn curve(
     time: &[f64],
     values: &[f64],
     window: &Range<f64>,
@@ -74,7 +74,7 @@ fn peaks(run: &[(f64, f64)], slot: impl Fn(f64) -> usize) -> Vec<(f64, f64)> {
 }
 
 /// At most `most` of the items, spread evenly but not in step with a periodic motion.
-pub fn sample<T: Copy>(items: &[T], most: usize) -> Vec<T> {
+pub(crate) fn sample<T: Copy>(items: &[T], most: usize) -> Vec<T> {
     if items.len() <= most {
         return items.to_vec();
     }
@@ -85,19 +85,19 @@ pub fn sample<T: Copy>(items: &[T], most: usize) -> Vec<T> {
 
 /// One slot of a [`binned`] relation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bin {
+pub(crate) struct Bin {
     /// Middle of the slot.
-    pub x: f64,
+    pub(crate) x: f64,
     /// A tenth of the values lie below.
-    pub low: f64,
+    pub(crate) low: f64,
     /// Half of them.
-    pub median: f64,
+    pub(crate) median: f64,
     /// Nine tenths.
-    pub high: f64,
+    pub(crate) high: f64,
 }
 
 /// Median and spread of `y` in slots of `x`; slots with fewer than 20 values are left out.
-pub fn binned(points: &[(f64, f64)], span: &Range<f64>, bins: usize) -> Vec<Bin> {
+pub(crate) fn binned(points: &[(f64, f64)], span: &Range<f64>, bins: usize) -> Vec<Bin> {
     let width = (span.end - span.start) / bins as f64;
     let mut slots = vec![Vec::new(); bins];
     for &(x, y) in points {

@@ -71,13 +71,14 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     };
     let shown = [("linear", &linear), ("non-linear", &surfaces)];
     write_text(&file("report.html"), &report::calibration_page(&shown, &evaluation, &context))?;
+    write_text(&file("estimate.svg"), &report::readme_picture(&shown, &evaluation))?;
 
     say(format!("Calibrated on {}, a measured session:", fit.name))?;
     print_calibration(&surfaces, &ranking)?;
     say(format!("\nTested on {}, which was not used for the fit:", test.name))?;
     print_evaluation(&evaluation)?;
     say(format!(
-        "\nwrote {}: report.html (open it), linear.json, poly13.json, estimates.csv",
+        "\nwrote {}: report.html (open it), estimate.svg, linear.json, poly13.json, estimates.csv",
         args.out.display()
     ))
 }

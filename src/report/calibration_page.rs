@@ -74,7 +74,7 @@ fn verdict(evaluation: &Evaluation, names: &[String], context: &Context) -> Stri
     };
     let off = |m: &MethodErrors| {
         let rmse = with_unit(&number(m.rmse, 3), &evaluation.unit);
-        format!("{rmse} (RMSE, {} % of the range)", number(m.rmse_percent, 2))
+        format!("{rmse} (RMSE, {}\u{a0}% of the range)", number(m.rmse_percent, 2))
     };
     let short = |m: &MethodErrors| with_unit(&number(m.rmse, 3), &evaluation.unit);
     let called = |i: usize| match (methods[i].method.as_str(), names.get(i)) {
@@ -168,7 +168,7 @@ fn over_time(page: &mut Page, evaluation: &Evaluation, names: &[String]) {
 
 fn errors(page: &mut Page, evaluation: &Evaluation, names: &[String]) {
     let intro = "Error is estimate minus reference. Dots are samples from every part of the axis, \
-                 the dark line is the median of all, the band holds four fifths of them; about \
+                 the strong line is the median of all, the band holds four fifths of them; about \
                  one sample in a hundred lies beyond the frame.";
     page.section("Where the errors are", intro);
     let rate = (

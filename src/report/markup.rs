@@ -66,7 +66,7 @@ fn minus(text: String) -> String {
     text.replace('-', "\u{2212}")
 }
 
-/// A quantity with its unit; the unit may be empty.
+/// A quantity with its unit, on one line; the unit may be empty.
 pub(crate) fn with_unit(text: &str, unit: &str) -> String {
-    if unit.is_empty() { text.to_owned() } else { format!("{text} {unit}") }
+    if unit.is_empty() { text.to_owned() } else { format!("{text}\u{a0}{unit}") }
 }

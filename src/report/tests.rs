@@ -178,12 +178,12 @@ fn the_first_sentence_says_what_the_numbers_say() {
     let made = Made::new(&[recording("tuesday", 1.3, 3000)]);
     let [raw, linear, poly13] = &made.evaluation.pooled[..] else { unreachable!() };
     assert!(poly13.rmse < linear.rmse);
-    let deg = |m: &MethodErrors| format!("{} deg", number(m.rmse, 3));
+    let deg = |m: &MethodErrors| format!("{}\u{a0}deg", number(m.rmse, 3));
     assert_eq!(
         sentence(&made.page(&context("tuesday"))),
         format!(
             "On a recording that was not used for the fit, the non-linear (poly13) calibration is \
-             off by {} (RMSE, {} % of the range); the linear calibration by {}, the raw signal, \
+             off by {} (RMSE, {}\u{a0}% of the range); the linear calibration by {}, the raw signal, \
              laid on the reference&#39;s extremes, by {}.",
             deg(poly13),
             number(poly13.rmse_percent, 2),

@@ -115,7 +115,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         (Some(path), _) => {
             let file = RigFile::read(path)?;
             let name = || path.display().to_string();
-            (Rig::from_file(&file).with_context(name)?, RunSettings::from_file(&file).with_context(name)?)
+            (
+                Rig::from_file(&file).with_context(name)?,
+                RunSettings::from_file(&file).with_context(name)?,
+            )
         }
         (None, Some(Preset::Paper)) => (paper_preset()?, None),
         (None, None) => (Rig::default(), None),

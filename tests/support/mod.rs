@@ -11,30 +11,30 @@ use assert_cmd::Command;
 use tempfile::TempDir;
 
 /// The program.
-pub fn stretch() -> Command {
+pub(crate) fn stretch() -> Command {
     Command::new(env!("CARGO_BIN_EXE_stretch"))
 }
 
 /// A folder that goes with the test.
-pub struct Scratch(TempDir);
+pub(crate) struct Scratch(TempDir);
 
 impl Scratch {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self(tempfile::tempdir().expect("a temporary folder"))
     }
 
-    pub fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.0.path().join(name)
     }
 
-    pub fn write(&self, name: &str, text: impl AsRef<[u8]>) -> PathBuf {
+    pub(crate) fn write(&self, name: &str, text: impl AsRef<[u8]>) -> PathBuf {
         let path = self.path(name);
         std::fs::write(&path, text).expect("a scratch file");
         path
     }
 
     /// Everything in the folder.
-    pub fn names(&self) -> Vec<String> {
+    pub(crate) fn names(&self) -> Vec<String> {
         let entries = std::fs::read_dir(self.0.path()).expect("the scratch folder");
         let mut names: Vec<String> =
             entries.map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
@@ -43,7 +43,7 @@ impl Scratch {
     }
 
     /// A trial of a muscle that shortens and lengthens, with a lagging gauge.
-    pub fn loops(&self, name: &str, seconds: f64, speed: f64) -> PathBuf {
+    pub(crate) fn loops(&self, name: &str, seconds: f64, speed: f64) -> PathBuf {
         let mut text = String::from("time_s,length_mm,bridge_v\n");
         for n in 0..(seconds * 100.0) as u32 {
             let t = f64::from(n) * 0.01;
@@ -55,7 +55,7 @@ impl Scratch {
     }
 
     /// A calibration fitted to such a trial.
-    pub fn calibration(&self, name: &str) -> PathBuf {
+    pub(crate) fn calibration(&self, name: &str) -> PathBuf {
         let trial = self.loops("for_calibration.csv", 40.0, 1.1);
         let out = self.path(name);
         stretch().arg("calibrate").arg(&trial).arg("--out").arg(&out).assert().success();
@@ -64,13 +64,13 @@ impl Scratch {
 }
 
 /// Standard output as text.
-pub fn stdout(output: &Output) -> String {
+pub(crate) fn stdout(output: &Output) -> String {
     String::from_utf8(output.stdout.clone()).expect("UTF-8")
 }
 
 /// Runs to a failure with exit code 1 and a message that has all of `parts`.
 #[track_caller]
-pub fn fails(command: &mut Command, parts: &[&str]) {
+pub(crate) fn fails(command: &mut Command, parts: &[&str]) {
     let output = command.output().expect("the program runs");
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1), "{message}");
@@ -81,7 +81,7 @@ pub fn fails(command: &mut Command, parts: &[&str]) {
 }
 
 /// `calibrate` on a file.
-pub fn calibrate(trial: &Path, out: &Path) -> Command {
+pub(crate) fn calibrate(trial: &Path, out: &Path) -> Command {
     let mut command = stretch();
     command.arg("calibrate").arg(trial).arg("--out").arg(out);
     command

@@ -97,11 +97,7 @@ fn every_effect() {
             cases.push(corner(&|i| {
                 let p = &parameters[i];
                 // The least shape at full strength; a negative strength where there is one.
-                if p.scale == Scale::Log || p.min < 0.0 {
-                    p.min
-                } else {
-                    p.max
-                }
+                if p.scale == Scale::Log || p.min < 0.0 { p.min } else { p.max }
             }));
             cases.push(corner(&|i| {
                 let p = &parameters[i];

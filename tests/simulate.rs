@@ -1,0 +1,152 @@
+//! `stretch simulate`, `effects` and `rig` as a user runs them.
+
+mod support;
+
+use std::fs;
+
+use assert_cmd::Command;
+use support::{Scratch, fails, stdout as text_of, stretch};
+
+/// What a run that succeeds prints.
+#[track_caller]
+fn stdout(command: &mut Command) -> String {
+    let output = command.output().expect("the program runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    text_of(&output)
+}
+
+#[test]
+fn a_run_is_repeated_from_its_own_rig_file() {
+    let scratch = Scratch::new();
+    let (first, again) = (scratch.path("first"), scratch.path("again"));
+    let said = stdout(
+        stretch()
+            .args([
+                "simulate",
+                "--effect",
+                "gauge_hysteresis:h=0.2,s=0.012",
+                "--seed",
+                "5",
+                "--out",
+            ])
+            .arg(&first),
+    );
+    assert!(said.contains("17 trials, 480 s, gauge_hysteresis, seed 5"), "{said}");
+    stdout(
+        stretch().args(["simulate", "--rig"]).arg(first.join("rig.toml")).arg("--out").arg(&again),
+    );
+    let mut files = 0;
+    for entry in fs::read_dir(&first).unwrap() {
+        let name = entry.unwrap().file_name();
+        if name != "dataset.toml" {
+            let read = |folder: &std::path::Path| fs::read(folder.join(&name)).unwrap();
+            assert!(read(&first) == read(&again), "{name:?}");
+            files += 1;
+        }
+    }
+    assert_eq!(files, 18);
+    // The stock rig is what the data are to be compared with, not the rig with the effect.
+    assert!(!fs::read_to_string(first.join("dataset.toml")).unwrap().contains("rig ="));
+}
+
+#[test]
+fn a_rig_of_ones_own_is_named_without_its_effects() {
+    let scratch = Scratch::new();
+    let text = stdout(stretch().arg("rig"));
+    assert!(text.contains("tau_m") && text.contains("# Lag of the muscle (s)"));
+    let text =
+        text.replace("value = 180.0", "value = 200.0") + "[[effect]]\nname = \"leak\"\nc = 1e-10\n";
+    let rig = scratch.write("rig.toml", &text);
+    let out = scratch.path("out");
+    stdout(
+        stretch()
+            .args(["simulate", "--protocol", "pulses", "--rig"])
+            .arg(&rig)
+            .arg("--out")
+            .arg(&out),
+    );
+    let read = |name: &str| fs::read_to_string(out.join(name)).unwrap();
+    assert!(read("dataset.toml").contains("rig = \"nominal.toml\""));
+    assert!(
+        read("nominal.toml").contains("L0 = { value = 200.0 }")
+            && !read("nominal.toml").contains("leak")
+    );
+    assert!(read("rig.toml").contains("leak") && read("rig.toml").contains("seed"));
+}
+
+#[test]
+fn replayed_commands_give_the_trial_again() {
+    let scratch = Scratch::new();
+    let (out, replay) = (scratch.path("out"), scratch.path("replay"));
+    let quiet = ["--noise", "off"];
+    stdout(
+        stretch().args(["simulate", "--protocol", "arbitrary"]).args(quiet).arg("--out").arg(&out),
+    );
+    let trial = out.join("arbitrary_1.csv");
+    stdout(
+        stretch()
+            .arg("simulate")
+            .arg("--commands")
+            .arg(&trial)
+            .args(quiet)
+            .arg("--out")
+            .arg(&replay),
+    );
+    assert!(fs::read(&trial).unwrap() == fs::read(replay.join("arbitrary_1.csv")).unwrap());
+}
+
+#[test]
+fn a_folder_that_exists_is_refused_and_left_alone() {
+    let scratch = Scratch::new();
+    let out = scratch.path("out");
+    fs::create_dir(&out).unwrap();
+    fs::write(out.join("mine.txt"), "mine").unwrap();
+    let run = || {
+        let mut command = stretch();
+        command.args(["simulate", "--protocol", "pulses", "--out"]).arg(&out);
+        command
+    };
+    fails(&mut run(), &["out", "exists"]);
+    assert_eq!(fs::read_dir(&out).unwrap().count(), 1);
+    stdout(run().arg("--force"));
+    assert_eq!(fs::read_to_string(out.join("mine.txt")).unwrap(), "mine");
+    assert!(out.join("pulses_1.csv").is_file());
+}
+
+#[test]
+fn wrong_input_is_named() {
+    let scratch = Scratch::new();
+    let out = scratch.path("out");
+    let commands = |text: &str, parts: &[&str]| {
+        let file = scratch.write("commands.csv", text);
+        fails(stretch().arg("simulate").arg("--commands").arg(&file).arg("--out").arg(&out), parts);
+        assert!(!out.exists());
+    };
+    let header = "time_s,inlet,outlet\n";
+    commands("time_s,inlet\n0,0\n0.01,0\n", &["commands.csv", "outlet"]);
+    commands(&format!("{header}0,0,0\n0.01,1.2,0\n"), &["commands.csv", "inlet", "1.2", "0 .. 1"]);
+    let gap = format!("{header}0,0,0\n0.01,0,0\n0.02,0,0\n0.05,0,0\n0.06,0,0\n");
+    commands(&gap, &["commands.csv", "sample 3", "0.01 s"]);
+    let rig = stdout(stretch().arg("rig"));
+    let file = scratch.write("rig.toml", &rig.replace("value = 0.35", "value = -0.35"));
+    let with = |file: &std::path::Path, parts: &[&str]| {
+        fails(stretch().args(["simulate", "--rig"]).arg(file).arg("--out").arg(&out), parts);
+    };
+    with(&file, &["rig.toml", "b = -0.35", "positive"]);
+    let file = scratch.write("rig.toml", &rig.replace("tau_m", "tau_mm"));
+    with(&file, &["rig.toml", "tau_mm", "did you mean `tau_m`?"]);
+    assert!(!out.exists());
+}
+
+#[test]
+fn the_catalogue_is_listed() {
+    let text = stdout(stretch().arg("effects"));
+    for name in ["supply_sag", "gauge_softening", "pot_backlash"] {
+        assert!(text.contains(name), "{name}");
+    }
+    let json: serde_json::Value =
+        serde_json::from_str(&stdout(stretch().args(["effects", "--json"]))).unwrap();
+    assert_eq!(json.as_array().unwrap().len(), 23);
+    assert_eq!(json[0]["parameters"][0]["name"], "r");
+    fails(stretch().args(["effects", "lek"]), &["did you mean `leak`?"]);
+}

@@ -104,6 +104,16 @@ pub enum SimError {
         /// The step found.
         found: f64,
     },
+    /// A grid that is not split where the valves switch.
+    #[error(
+        "the grid of time is made for a valve delay of {found} s, the effects ask for {expected} s"
+    )]
+    GridDelay {
+        /// Delay of the effects, s.
+        expected: f64,
+        /// Delay of the grid, s.
+        found: f64,
+    },
     /// A column that is needed is not there.
     #[error("the trial has no column `{name}`")]
     MissingColumn {

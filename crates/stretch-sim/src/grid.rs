@@ -20,6 +20,7 @@ pub struct Grid {
     late: usize,
     /// Whole samples by which openings are late.
     shift: usize,
+    delay_s: f64,
 }
 
 impl Grid {
@@ -74,12 +75,17 @@ impl Grid {
             })
             .collect();
         // A delay beyond any trial keeps the valves shut throughout; the cast saturates.
-        Ok(Self { dt_s, steps, offsets, late, shift: shift as usize })
+        Ok(Self { dt_s, steps, offsets, late, shift: shift as usize, delay_s })
     }
 
     /// Sample time, s.
     pub fn dt_s(&self) -> f64 {
         self.dt_s
+    }
+
+    /// By how much openings act late, s.
+    pub fn delay_s(&self) -> f64 {
+        self.delay_s
     }
 
     /// Lengths of the pieces of a sample, s.

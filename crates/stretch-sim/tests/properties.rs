@@ -320,6 +320,17 @@ fn a_wound_memory_is_what_a_long_move_leaves() {
 }
 
 #[test]
+fn a_grid_of_another_delay_is_refused() {
+    let params = RigParams::default();
+    let set = one("valve_delay", &[("delay_s", 0.033)]);
+    let error = Pneumatics::new(&params, &set, &Grid::samples(0.01).unwrap()).unwrap_err();
+    assert!(error.to_string().contains("0.033 s"));
+    assert!(
+        Pneumatics::new(&params, &set, &set.grid(&params, 0.01, DEFAULT_STEP_S).unwrap()).is_ok()
+    );
+}
+
+#[test]
 fn the_reference_is_undone() {
     let params = RigParams::default();
     let set = one("pot_nonlinearity", &[("c", 2.5)]);

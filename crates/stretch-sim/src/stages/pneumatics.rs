@@ -87,13 +87,15 @@ impl Pneumatics {
     /// Prepares the stage for trials on `grid`, which must come from [`EffectSet::grid`] with the same effects.
     ///
     /// # Errors
-    /// More than two effects that draw on the supply.
+    /// More than two effects that draw on the supply, a grid made for another valve delay.
     pub fn new(params: &RigParams, effects: &EffectSet, grid: &Grid) -> Result<Self, SimError> {
         let around = Surroundings::of_rig(params, grid);
         let [mut openings, mut leaks, mut volumes] = [const { Vec::new() }; 3];
         let mut droops: Vec<Box<dyn Droop>> = Vec::new();
+        let mut delay_s = 0.0;
         for active in effects.acting_in(Stage::Pneumatics) {
             match active.effect().action(active.values(), &around) {
+                Action::Delay(seconds) => delay_s += seconds,
                 Action::Opening(law) => openings.push(law),
                 Action::Leak(law) => leaks.push(law),
                 Action::Volume(law) => volumes.push(law),
@@ -106,6 +108,9 @@ impl Pneumatics {
                 Action::Droop(droop) => droops.push(droop),
                 _ => {}
             }
+        }
+        if delay_s != grid.delay_s() {
+            return Err(SimError::GridDelay { expected: delay_s, found: grid.delay_s() });
         }
         let b = params[Key::B];
         Ok(Self {

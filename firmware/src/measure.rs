@@ -1,7 +1,5 @@
 //! Replays the trial through a receptor and prints what it cost.
 
-use core::hint::black_box;
-
 use semihosting::{eprintln, println};
 use stretch_core::Millimetres;
 use stretch_receptor::{Reading, Withheld, code::{AdcCode, CodeReading}};
@@ -50,11 +48,10 @@ pub fn replay<D, M, I, E: Length>(
     design: &D,
     memory: &mut M,
     input: impl Fn(AdcCode) -> I,
-    step: fn(&D, &mut M, I) -> Answer<E>,
+    step: impl Fn(&D, &mut M, I) -> Answer<E>,
 ) {
     let mut core = cortex_m::Peripherals::take().expect("taken once");
     count::start(&mut core.SYST);
-    let step = black_box(step);
     let ((), empty) = count::bracket(|| ());
     let (mut samples, mut total, mut max) = (0u32, 0u32, 0u32);
     let mut checksum = Checksum::default();

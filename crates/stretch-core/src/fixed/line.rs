@@ -1,6 +1,6 @@
 //! A straight line in fixed point.
 
-use super::{accumulate, check_horner, from_f64};
+use super::{Accumulator, check_horner, from_f64};
 use crate::DesignError;
 
 /// A line over an input in -1/2..1/2, for any `i32`: `intercept + slope v`.
@@ -33,25 +33,23 @@ impl FixedLine {
     /// # Errors
     /// [`DesignError::OutOfRange`] when some `i32` input would leave 32 bits.
     pub fn new(intercept: f64, slope: f64) -> Result<Self, DesignError> {
-        check_horner("fixed.line", &[intercept, slope])?;
-        Ok(Self {
-            intercept: from_f64("fixed.line", intercept, 0)?,
-            slope: from_f64("fixed.line", slope, 0)?,
-        })
+        let round = |x| from_f64("fixed.line", x, 0);
+        Self::try_from((round(intercept)?, round(slope)?))
     }
 
     /// The line at `volts / 2^32`, in least bits.
     #[inline(always)]
     #[must_use]
     pub fn eval(&self, volts: i32) -> i32 {
-        accumulate(self.intercept, self.slope, volts)
+        Accumulator::new(self.intercept).plus(self.slope, volts).value()
     }
 }
 
 impl TryFrom<(i32, i32)> for FixedLine {
     type Error = DesignError;
     fn try_from((intercept, slope): (i32, i32)) -> Result<Self, DesignError> {
-        Self::new(intercept.into(), slope.into())
+        check_horner("fixed.line", &[intercept, slope].map(i32::unsigned_abs))?;
+        Ok(Self { intercept, slope })
     }
 }
 

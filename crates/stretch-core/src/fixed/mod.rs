@@ -53,23 +53,60 @@ pub fn saturate(x: i64) -> i32 {
     x.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
 }
 
-/// `c + round(a v / 2^32)`, for a sum that is known to fit.
-#[inline(always)]
-fn accumulate(c: i32, a: i32, v: i32) -> i32 {
-    // one SMLAL into {c, 1/2}; at most 2^62 + 2^63 - 2^32 + 2^31, so the i64 could
-    // only overflow for a sum that does not fit, which designs exclude
-    let sum = ((i64::from(c) << 32) | (1 << 31)).wrapping_add(i64::from(a) * i64::from(v));
-    (sum >> 32) as i32
+/// A value in least bits and the fraction that its last product left, 32 bits each.
+///
+/// The fraction of one product is carried into the next instead of a half: that
+/// costs no instruction and rounds by less than one least bit either way.
+#[derive(Clone, Copy)]
+struct Accumulator(u64);
+
+impl Accumulator {
+    /// `c` and a half, less 2^-32: a whole half would be taken for a rounding
+    /// product (SMMLAR) on cores that have it, which drops the fraction.
+    #[inline(always)]
+    fn new(c: i32) -> Self {
+        Self::from_parts(c, (1 << 31) - 1)
+    }
+
+    /// `c + self v / 2^32`, with what is left of it: one SMLAL. The sum is known to fit.
+    #[inline(always)]
+    fn times(self, v: i32, c: i32) -> Self {
+        Self::from_parts(c, self.0 as u32).plus(self.value(), v)
+    }
+
+    /// `self + a v / 2^32`.
+    #[inline(always)]
+    fn plus(self, a: i32, v: i32) -> Self {
+        Self(self.0.wrapping_add((i64::from(a) * i64::from(v)) as u64))
+    }
+
+    /// This value, with what another one left.
+    #[inline(always)]
+    fn carrying(self, other: Self) -> Self {
+        Self::from_parts(self.value(), other.0 as u32)
+    }
+
+    #[inline(always)]
+    fn from_parts(c: i32, rest: u32) -> Self {
+        Self((u64::from(c as u32) << 32) | u64::from(rest))
+    }
+
+    #[inline(always)]
+    fn value(self) -> i32 {
+        (self.0 >> 32) as i32
+    }
 }
 
 /// Checks that `|terms[0]| + |terms[1]|/2 + |terms[2]|/4 + ...`, and every tail
-/// of that sum, stays inside 32 bits with room for the roundings.
-fn check_horner(field: &'static str, terms: &[f64]) -> Result<(), DesignError> {
-    const MOST: f64 = i32::MAX as f64 - 4.0;
-    let mut sum = 0.0;
-    for term in terms.iter().rev() {
-        sum = 0.5 * sum + libm::fabs(*term);
-        DesignError::check(field, *term, sum <= MOST)?;
+/// of that sum, stays inside 32 bits with room for the roundings; gives the sum.
+fn check_horner(field: &'static str, terms: &[u32]) -> Result<u32, DesignError> {
+    const MOST: u32 = i32::MAX as u32 - 8;
+    let mut sum = 0u32;
+    for &term in terms.iter().rev() {
+        sum = sum.div_ceil(2).saturating_add(term);
+        if sum > MOST {
+            return Err(DesignError::OutOfRange { field, value: sum.into() });
+        }
     }
-    Ok(())
+    Ok(sum)
 }

@@ -1,6 +1,6 @@
 //! The paper's surface in fixed point.
 
-use super::{accumulate, check_horner, from_f64};
+use super::{Accumulator, check_horner, from_f64};
 use crate::{DesignError, Poly13};
 
 /// A [`Poly13`] over inputs in -1/2..1/2, for any two `i32`.
@@ -30,18 +30,21 @@ use crate::{DesignError, Poly13};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "[i32; 7]", into = "[i32; 7]"))]
 pub struct FixedPoly13 {
-    at_rest: [i32; 4],
-    by_rate: [i32; 3],
+    /// p11 p12, p10 p00, p02 p03, p01: as they are used, so that few are held at a time.
+    ordered: [i32; 7],
 }
+
+/// What an error names.
+const FIELD: &str = "fixed.surface";
 
 impl FixedPoly13 {
     /// The largest error of [`eval`](Self::eval) against the same surface in
-    /// real numbers, in least bits: each of the seven coefficients and of the
-    /// six products is rounded by half a bit, and halved by every product behind it.
+    /// real numbers, in least bits: each of the seven coefficients is rounded by
+    /// half a bit and each of the six products by one, halved by every product behind it.
     pub const ROUNDING: f64 = {
-        let at_rest = 0.5 * (1.0 + 0.5 + 0.25 + 0.125) + 0.5 * (1.0 + 0.5 + 0.25);
-        let by_rate = 0.5 * (1.0 + 0.5 + 0.25) + 0.5 * (1.0 + 0.5);
-        at_rest + 0.5 * by_rate + 0.5
+        let at_rest = 0.5 * (1.0 + 0.5 + 0.25 + 0.125) + (1.0 + 0.5 + 0.25);
+        let by_rate = 0.5 * (1.0 + 0.5 + 0.25) + (1.0 + 0.5);
+        at_rest + 0.5 * by_rate + 1.0
     };
 
     /// The surface with these coefficients, rounded.
@@ -50,34 +53,35 @@ impl FixedPoly13 {
     /// [`DesignError::OutOfRange`] when some pair of inputs would take an
     /// intermediate sum out of 32 bits, or a coefficient is not finite.
     pub fn new(surface: &Poly13) -> Result<Self, DesignError> {
-        const FIELD: &str = "fixed.surface";
         let Poly13 { p00, p10, p01, p11, p02, p12, p03 } = *surface;
-        check_horner(FIELD, &[p10, p11, p12])?;
-        let by_rate = libm::fabs(p10) + 0.5 * libm::fabs(p11) + 0.25 * libm::fabs(p12);
-        check_horner(FIELD, &[libm::fabs(p00) + 0.5 * by_rate, p01, p02, p03])?;
         let round = |x| from_f64(FIELD, x, 0);
-        Ok(Self {
-            at_rest: [round(p00)?, round(p01)?, round(p02)?, round(p03)?],
-            by_rate: [round(p10)?, round(p11)?, round(p12)?],
-        })
+        Self::try_from([
+            round(p00)?,
+            round(p10)?,
+            round(p01)?,
+            round(p11)?,
+            round(p02)?,
+            round(p12)?,
+            round(p03)?,
+        ])
     }
 
     /// The surface at `rate / 2^32` and `volts / 2^32`, in least bits.
     #[inline(always)]
     #[must_use]
     pub fn eval(&self, rate: i32, volts: i32) -> i32 {
-        let [p00, p01, p02, p03] = self.at_rest;
-        let [p10, p11, p12] = self.by_rate;
-        let by_rate = accumulate(p10, accumulate(p11, p12, volts), volts);
-        let moving = accumulate(p00, by_rate, rate);
-        accumulate(moving, accumulate(p01, accumulate(p02, p03, volts), volts), volts)
+        let [p11, p12, p10, p00, p02, p03, p01] = self.ordered;
+        let by_rate = Accumulator::new(p11).plus(p12, volts).times(volts, p10);
+        let moving = by_rate.times(rate, p00);
+        let cubic = Accumulator::from_parts(p02, moving.0 as u32).plus(p03, volts);
+        let at_rest = cubic.times(volts, p01);
+        moving.carrying(at_rest).plus(at_rest.value(), volts).value()
     }
 
     /// The rounded coefficients.
     #[must_use]
     pub fn coefficients(&self) -> Poly13 {
-        let [p00, p01, p02, p03] = self.at_rest.map(f64::from);
-        let [p10, p11, p12] = self.by_rate.map(f64::from);
+        let [p11, p12, p10, p00, p02, p03, p01] = self.ordered.map(f64::from);
         Poly13 { p00, p10, p01, p11, p02, p12, p03 }
     }
 }
@@ -86,15 +90,17 @@ impl TryFrom<[i32; 7]> for FixedPoly13 {
     type Error = DesignError;
     /// From p00, p10, p01, p11, p02, p12, p03.
     fn try_from(coefficients: [i32; 7]) -> Result<Self, DesignError> {
-        let [p00, p10, p01, p11, p02, p12, p03] = coefficients.map(f64::from);
-        Self::new(&Poly13 { p00, p10, p01, p11, p02, p12, p03 })
+        let [p00, p10, p01, p11, p02, p12, p03] = coefficients;
+        let [a00, a10, a01, a11, a02, a12, a03] = coefficients.map(i32::unsigned_abs);
+        let by_rate = check_horner(FIELD, &[a10, a11, a12])?;
+        check_horner(FIELD, &[a00.saturating_add(by_rate.div_ceil(2)), a01, a02, a03])?;
+        Ok(Self { ordered: [p11, p12, p10, p00, p02, p03, p01] })
     }
 }
 
 impl From<FixedPoly13> for [i32; 7] {
     fn from(surface: FixedPoly13) -> Self {
-        let [p00, p01, p02, p03] = surface.at_rest;
-        let [p10, p11, p12] = surface.by_rate;
+        let [p11, p12, p10, p00, p02, p03, p01] = surface.ordered;
         [p00, p10, p01, p11, p02, p12, p03]
     }
 }

@@ -45,18 +45,26 @@ pub enum Fixed {}
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Scaled<S> {
     pub(super) of: S,
-    pub(super) bits: u8,
+    /// `2^(32 - bits)`: what the upper word of a product with it makes thousandths.
+    pub(super) thousandths: i32,
 }
 
 impl<S> Scaled<S> {
     fn check(&self) -> Result<(), DesignError> {
-        let bits = f64::from(self.bits);
-        DesignError::check("fixed.bits", bits, self.bits <= MOST_BITS).map(|_| ())
+        let holds = self.thousandths > 0;
+        DesignError::check("fixed.thousandths", self.thousandths.into(), holds).map(|_| ())
+    }
+
+    /// Least bits to thousandths: the half is already in.
+    #[inline(always)]
+    fn finish(&self, bits: i32) -> i32 {
+        ((i64::from(bits) * i64::from(self.thousandths)) >> 32) as i32
     }
 }
 
-/// Beyond this the half that rounds would cost more range than it gains precision.
-const MOST_BITS: u8 = 16;
+/// Bits behind the thousandths: beyond these the half that rounds would cost more
+/// range than it gains precision, and with fewer it would not fit.
+const BITS: core::ops::RangeInclusive<u8> = 2..=16;
 
 impl CodeArithmetic for Fixed {}
 impl sealed::Arithmetic for Fixed {
@@ -67,7 +75,7 @@ impl sealed::Arithmetic for Fixed {
     /// The finest thousandths in which everything fits.
     fn round(folded: &Folded) -> Result<Sheets<Self::Line, Self::Surface>, DesignError> {
         let mut refused = DesignError::OutOfRange { field: "fixed.bits", value: 0.0 };
-        for bits in (0..=MOST_BITS).rev() {
+        for bits in BITS.rev() {
             match fixed_with(folded, bits) {
                 Ok(sheets) => return Ok(sheets),
                 Err(error) => refused = error,
@@ -82,11 +90,11 @@ impl sealed::Arithmetic for Fixed {
 
     #[inline(always)]
     fn line(line: &Self::Line, volts: i32) -> i32 {
-        line.of.eval(volts) >> (line.bits & 31)
+        line.finish(line.of.eval(volts))
     }
     #[inline(always)]
     fn surface(surface: &Self::Surface, rate: i32, volts: i32) -> i32 {
-        surface.of.eval(rate, volts) >> (surface.bits & 31)
+        surface.finish(surface.of.eval(rate, volts))
     }
     fn valid_line(line: &Self::Line) -> Result<(), DesignError> {
         line.check()
@@ -102,10 +110,11 @@ fn fixed_with(
 ) -> Result<Sheets<Scaled<FixedLine>, Scaled<FixedPoly13>>, DesignError> {
     let scale = 1000.0 * f64::from(1u32 << bits);
     let half = 0.5 * f64::from(1u32 << bits);
+    let thousandths = 1 << (32 - bits);
     folded.try_map(
         |&[intercept, slope]| {
             let of = FixedLine::new(intercept * scale + half, slope * scale)?;
-            Ok(Scaled { of, bits })
+            Ok(Scaled { of, thousandths })
         },
         |p| {
             let scaled = Poly13 {
@@ -117,7 +126,7 @@ fn fixed_with(
                 p12: p.p12 * scale,
                 p03: p.p03 * scale,
             };
-            Ok(Scaled { of: FixedPoly13::new(&scaled)?, bits })
+            Ok(Scaled { of: FixedPoly13::new(&scaled)?, thousandths })
         },
     )
 }

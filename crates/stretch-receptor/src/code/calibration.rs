@@ -1,7 +1,7 @@
 //! A calibration converted for a converter's codes.
 
 use stretch_core::{
-    Branch, Calibration, DesignError, Polarity, RateEstimator, SampleRate, fixed::FixedLine,
+    Calibration, DesignError, Polarity, RateEstimator, SampleRate, fixed::FixedLine,
     fixed::FixedPoly13,
 };
 use stretch_filter::FixedSgRate;
@@ -119,20 +119,6 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
     fn rate_rounding() -> f64 {
         if FixedSgRate::<u16, WINDOW, DEGREE, DELAY>::SHIFT == 0 { 0.0 } else { 0.5 }
     }
-
-    /// The branch that a rate chooses.
-    #[inline(always)]
-    pub(super) fn branch(&self, current: Branch, rate: i32) -> Branch {
-        // -band <= rate <= band, in one comparison
-        let above = rate.wrapping_add(self.dead_band) as u32;
-        if above <= 2 * self.dead_band as u32 {
-            current
-        } else if (rate < 0) != self.falling {
-            Branch::Deflation
-        } else {
-            Branch::Inflation
-        }
-    }
 }
 
 impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
@@ -159,14 +145,15 @@ pub(super) fn worst_case(
     rate_rounding: f64,
 ) -> f64 {
     // an end of a domain is a whole number: up to one off, and the rate's own rounding
-    let spread = |shift: u8, rounding: f64| libm::ldexp(rounding, i32::from(shift) - 32);
-    let signal = |shift: u8| spread(shift, 1.0 + f64::from(1u32 << COARSE_BITS) * SIGNAL_F64);
-    let bits = |error: f64, bits: u8| 0.5 + libm::ldexp(error, -i32::from(bits));
+    let spread = |factor: i32, rounding: f64| libm::ldexp(rounding * f64::from(factor), -32);
+    let signal = |factor: i32| spread(factor, 1.0 + f64::from(1u32 << COARSE_BITS) * SIGNAL_F64);
+    let bits =
+        |error: f64, thousandths: i32| 0.5 + libm::ldexp(error * f64::from(thousandths), -32);
     match sheets {
         Sheets::Line(sheet) => {
             let (_, slope) = <(i32, i32)>::from(sheet.surface.of);
-            let error = FixedLine::ROUNDING + f64::from(slope).abs() * signal(sheet.signal.shift);
-            bits(error, sheet.surface.bits)
+            let error = FixedLine::ROUNDING + f64::from(slope).abs() * signal(sheet.signal.factor);
+            bits(error, sheet.surface.thousandths)
         }
         Sheets::Poly13(both) => {
             let each = both.map(|sheet| {
@@ -178,9 +165,9 @@ pub(super) fn worst_case(
                     + 0.75 * p.p03.abs()
                     + 0.5 * (p.p11.abs() + p.p12.abs());
                 let error = FixedPoly13::ROUNDING
-                    + by_rate * spread(sheet.rate.shift, 1.0 + rate_rounding)
-                    + by_signal * signal(sheet.signal.shift);
-                bits(error, sheet.surface.bits)
+                    + by_rate * spread(sheet.rate.factor, 1.0 + rate_rounding)
+                    + by_signal * signal(sheet.signal.factor);
+                bits(error, sheet.surface.thousandths)
             });
             each[0].max(each[1])
         }

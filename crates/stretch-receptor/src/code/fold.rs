@@ -36,9 +36,7 @@ fn span(min: f64, max: f64, most: i32) -> Span {
     let end = |x: f64| x.clamp(-f64::from(most), f64::from(most)) as i32;
     let (min, max) = (end(libm::ceil(min - SLACK)), end(libm::floor(max + SLACK)));
     // an interval between two integers, or wholly outside: the nearest one
-    let max = max.max(min);
-    let size = min.unsigned_abs().max(max.unsigned_abs()).max(1);
-    Span { min, max, shift: (size.leading_zeros() - 1) as u8 }
+    Span::new(min, max.max(min))
 }
 
 pub(super) fn fold(calibration: &Calibration, units: &Units) -> Result<Folded, DesignError> {
@@ -66,7 +64,7 @@ fn signal(domain: Interval, units: &Units) -> (u16, Span, f64) {
     let centre = libm::round(0.5 * (visible(low) + visible(high))) as u16;
     let coarse = |x: f64| (x - f64::from(centre)) * f64::from(1u32 << COARSE_BITS);
     let span = span(coarse(low), coarse(high), i32::from(u16::MAX) << COARSE_BITS);
-    let volts = libm::ldexp(units.step_v, 32 - COARSE_BITS as i32 - i32::from(span.shift));
+    let volts = libm::ldexp(units.step_v, 32 - COARSE_BITS as i32) / f64::from(span.factor);
     (centre, span, volts)
 }
 
@@ -82,7 +80,7 @@ fn fold_line(calibration: &Calibration, line: &LinearMap, units: &Units) -> Shee
     let (centre, span, volts) = signal(line.signal_domain, units);
     let (at, per) = normalised(calibration, centre, volts, units);
     let surface = [zero + gain * (line.intercept + line.slope * at), gain * line.slope * per];
-    Sheet { centre, signal: span, rate: Span { min: 0, max: 0, shift: 0 }, surface }
+    Sheet { centre, signal: span, rate: Span::new(0, 0), surface }
 }
 
 fn fold_surface(
@@ -101,7 +99,7 @@ fn fold_surface(
     let ends =
         [branch.rate_domain.min, branch.rate_domain.max].map(|r| sign * r / units.rate_v_per_s);
     let rate = span(ends[0].min(ends[1]), ends[0].max(ends[1]), units.largest_rate);
-    let per_s = libm::ldexp(units.rate_v_per_s, 32 - i32::from(rate.shift));
+    let per_s = libm::ldexp(units.rate_v_per_s, 32) / f64::from(rate.factor);
     // normalised signal = at + per v, normalised rate = still + moving r
     let (at, per) = normalised(calibration, centre, volts, units);
     let (still, moving) =

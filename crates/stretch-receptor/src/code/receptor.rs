@@ -44,11 +44,14 @@ pub struct CodeReceptor<
     const DEGREE: usize,
     const DELAY: usize = 0,
 > {
-    calibration: CodeCalibration<A, WINDOW, DEGREE, DELAY>,
-    /// From a code's place to the upper end of 16 bits.
-    align: u32,
     /// The first number that is no code.
     codes: u32,
+    /// Moves a code from its place to the upper end of 16 bits.
+    align: i32,
+    dead_band: i32,
+    /// All ones where a rising signal means a falling target, else zero.
+    mirror: i32,
+    sheets: Sheets<A::Line, A::Surface>,
 }
 
 /// The receptor in fixed point: [`CodeReceptor`] in [`Fixed`].
@@ -71,7 +74,8 @@ pub struct CodeReading<E> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CodeMemory<const WINDOW: usize> {
     window: FixedSgMemory<u16, WINDOW>,
-    branch: Branch,
+    /// The branch: 0 for inflation, 1 for deflation.
+    side: u32,
     /// Samples missing in a row, [`MAX_BRIDGED`] before the first sample.
     missing: u8,
     /// The last sample before the gap, and the rate there.
@@ -83,12 +87,12 @@ impl<const WINDOW: usize> CodeMemory<WINDOW> {
     /// The same memory, on another branch: for a stream known to begin contracted.
     #[must_use]
     pub fn starting_on(self, branch: Branch) -> Self {
-        Self { branch, ..self }
+        Self { side: branch as u32, ..self }
     }
 
     /// The branch that the next sample begins on.
     pub fn branch(&self) -> Branch {
-        self.branch
+        branch(self.side)
     }
 }
 
@@ -99,8 +103,24 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
 
     /// The receptor of a calibration.
     pub fn new(calibration: CodeCalibration<A, WINDOW, DEGREE, DELAY>) -> Self {
-        let bits = u32::from(calibration.bits.min(16));
-        Self { calibration, align: 16 - bits, codes: 1 << bits }
+        let CodeCalibration { bits, falling, dead_band, sheets, .. } = calibration;
+        let bits = u32::from(bits.min(16));
+        let mirror = -i32::from(falling);
+        Self { codes: 1 << bits, align: 1 << (16 - bits), dead_band, mirror, sheets }
+    }
+
+    /// The side that a rate chooses: a word and a shift, where an enumeration would
+    /// cost the step five instructions more.
+    #[inline(always)]
+    fn side(&self, current: u32, rate: i32) -> u32 {
+        let band = self.dead_band;
+        // -band <= rate <= band, in one comparison
+        if rate.wrapping_add(band) as u32 <= 2 * band as u32 {
+            current
+        } else {
+            // the sign of the target's rate
+            (rate ^ self.mirror) as u32 >> 31
+        }
     }
 
     /// A missing sample: bridge a short gap, forget the window after a long one.
@@ -112,7 +132,7 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
             memory.last_rate = Self::RATE.last(&memory.window).unwrap_or(0);
         }
         if memory.missing >= MAX_BRIDGED {
-            *memory = self.memory().starting_on(memory.branch);
+            *memory = self.memory().starting_on(memory.branch());
             return;
         }
         memory.missing += 1;
@@ -131,7 +151,7 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
     fn memory(&self) -> CodeMemory<WINDOW> {
         CodeMemory {
             window: Self::RATE.memory(),
-            branch: Branch::Inflation,
+            side: Branch::Inflation as u32,
             missing: MAX_BRIDGED,
             last: 0,
             last_rate: 0,
@@ -152,23 +172,32 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
             return Err(Withheld::Missing);
         }
         memory.missing = 0;
-        let sample = (code.0 << (self.align & 31)) as u16;
+        let sample = code.0.wrapping_mul(self.align) as u16;
         let Some(rate) = Self::RATE.step(&mut memory.window, sample) else {
             return Err(Withheld::Warming);
         };
-        let branch = self.calibration.branch(memory.branch, rate);
-        memory.branch = branch;
-        let (estimate, domain) = match &self.calibration.sheets {
+        let side = self.side(memory.side, rate);
+        memory.side = side;
+        let branch = branch(side);
+        let (estimate, domain) = match &self.sheets {
             Sheets::Line(sheet) => {
                 let (volts, domain) = sheet.input(sample);
                 (A::line(&sheet.surface, volts), domain)
             }
             Sheets::Poly13(sheets) => {
-                let sheet = &sheets[usize::from(branch == Branch::Deflation)];
+                let sheet = &sheets[(side & 1) as usize];
                 let (volts, rate, domain) = sheet.inputs(sample, rate);
                 (A::surface(&sheet.surface, rate, volts), domain)
             }
         };
         Ok(CodeReading { estimate, branch, domain })
+    }
+}
+
+#[inline(always)]
+fn branch(side: u32) -> Branch {
+    match side & 1 {
+        0 => Branch::Inflation,
+        _ => Branch::Deflation,
     }
 }

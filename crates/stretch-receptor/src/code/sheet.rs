@@ -6,29 +6,49 @@ use crate::Domain;
 /// comparison with the domain's ends.
 pub(super) const COARSE_BITS: u32 = 15;
 
-/// Ends of a domain in integers, and the shift that then spreads it over 32 bits.
+/// Ends of a domain in integers, and the factor that then spreads it over 32 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Span {
     pub min: i32,
-    pub max: i32,
-    pub shift: u8,
+    /// From the lower end to the upper one.
+    pub width: u32,
+    /// A power of two.
+    pub factor: i32,
 }
 
 impl Span {
-    #[cfg(feature = "serde")]
-    /// Whether the ends are in order and neither leaves 32 bits when shifted.
-    pub(super) fn holds(&self) -> bool {
-        let fits = |x: i32| (x << self.shift) >> self.shift == x;
-        self.shift < 32 && self.min <= self.max && fits(self.min) && fits(self.max)
+    /// From `min` to `max`, spread as far as both ends allow.
+    pub(super) fn new(min: i32, max: i32) -> Self {
+        let size = min.unsigned_abs().max(max.unsigned_abs()).max(1);
+        // an end of exactly 2^31 has no factor but 1
+        let factor = 1 << size.leading_zeros().saturating_sub(1).min(30);
+        Self { min, width: max.wrapping_sub(min) as u32, factor }
     }
 
-    /// The nearest value inside, spread; and whether the value was outside.
+    /// Whether both ends fit 32 bits when spread.
+    #[cfg(feature = "serde")]
+    pub(super) fn holds(&self) -> bool {
+        let max = i64::from(self.min) + i64::from(self.width);
+        let fits = |end: i64| i32::try_from(end * i64::from(self.factor)).is_ok();
+        self.factor > 0 && fits(self.min.into()) && fits(max)
+    }
+
+    /// The nearest value inside, spread; and 1 for a value that was outside.
     #[inline(always)]
-    fn clamp(&self, x: i32) -> (i32, bool) {
-        let low = if x < self.min { self.min } else { x };
-        let inside = if low > self.max { self.max } else { low };
-        (inside << (self.shift & 31), inside != x)
+    fn clamp(&self, x: i32) -> (i32, u8) {
+        // one comparison: below the lower end the difference wraps to a large number
+        let (inside, outside) = if x.wrapping_sub(self.min) as u32 <= self.width {
+            (x, 0)
+        } else {
+            self.nearest_end(x)
+        };
+        (inside.wrapping_mul(self.factor), outside)
+    }
+
+    #[cold]
+    fn nearest_end(&self, x: i32) -> (i32, u8) {
+        (if x < self.min { self.min } else { self.min.wrapping_add_unsigned(self.width) }, 1)
     }
 }
 
@@ -47,22 +67,33 @@ impl<S> Sheet<S> {
     /// Signal and rate as the surface takes them.
     #[inline(always)]
     pub(super) fn inputs(&self, sample: u16, rate: i32) -> (i32, i32, Domain) {
-        let (volts, signal_outside) = self.clamp_signal(sample);
+        let (volts, signal_outside) = self.signal.clamp(self.coarse(sample));
         let (rate, rate_outside) = self.rate.clamp(rate);
-        (volts, rate, Domain::from_flags(signal_outside, rate_outside))
+        (volts, rate, domain(signal_outside | rate_outside << 1))
     }
 
     /// The signal alone, for a line.
     #[inline(always)]
     pub(super) fn input(&self, sample: u16) -> (i32, Domain) {
-        let (volts, outside) = self.clamp_signal(sample);
-        (volts, Domain::from_flags(outside, false))
+        let (volts, outside) = self.signal.clamp(self.coarse(sample));
+        (volts, domain(outside))
     }
 
     #[inline(always)]
-    fn clamp_signal(&self, sample: u16) -> (i32, bool) {
+    fn coarse(&self, sample: u16) -> i32 {
         // 17 bits and 15: fits
-        self.signal.clamp((i32::from(sample) - i32::from(self.centre)) << COARSE_BITS)
+        (i32::from(sample) - i32::from(self.centre)) << COARSE_BITS
+    }
+}
+
+/// From a bit for the signal outside and one for the rate.
+#[inline(always)]
+fn domain(outside: u8) -> Domain {
+    match outside & 3 {
+        0 => Domain::Inside,
+        1 => Domain::SignalClamped,
+        2 => Domain::RateClamped,
+        _ => Domain::BothClamped,
     }
 }
 

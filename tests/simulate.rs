@@ -128,12 +128,12 @@ fn wrong_input_is_named() {
     let gap = format!("{header}0,0,0\n0.01,0,0\n0.02,0,0\n0.05,0,0\n0.06,0,0\n");
     commands(&gap, &["commands.csv", "sample 3", "0.01 s"]);
     let rig = stdout(stretch().arg("rig"));
-    let file = scratch.write("rig.toml", &rig.replace("value = 0.35", "value = -0.35"));
+    let file = scratch.write("rig.toml", rig.replace("value = 0.35", "value = -0.35"));
     let with = |file: &std::path::Path, parts: &[&str]| {
         fails(stretch().args(["simulate", "--rig"]).arg(file).arg("--out").arg(&out), parts);
     };
     with(&file, &["rig.toml", "b = -0.35", "positive"]);
-    let file = scratch.write("rig.toml", &rig.replace("tau_m", "tau_mm"));
+    let file = scratch.write("rig.toml", rig.replace("tau_m", "tau_mm"));
     with(&file, &["rig.toml", "tau_mm", "did you mean `tau_m`?"]);
     assert!(!out.exists());
 }

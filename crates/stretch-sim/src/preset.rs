@@ -2,25 +2,35 @@
 
 use crate::{Key, Rig, SimError};
 
-/// A hand-set rig whose figures are of the paper's order: never *the* explanation, since several effects trade
-/// against each other and no set reproduces every published number.
+/// A hand-set rig on which the paper's method gives figures like the published ones.
 ///
-/// | what the paper's figures show | effect |
+/// | what the paper's figures show | what stands for it here |
 /// | --- | --- |
-/// | inflation and deflation differ by an eighth of the stroke | `gauge_hysteresis` h = 0.35, s = 0.06 |
-/// | the voltage leads the length when it moves fast | `gauge_relaxation` c = 0.3, tau = 0.3 s |
-/// | the sleeve recovers late when it shortens | `sleeve_slip` w = 0.006 |
-/// | the two branches cross half-way | `pressure_crosstalk` c = 0.05 |
+/// | the voltage leads the length when it moves fast | `gauge_relaxation` c = 0.4, tau = 0.26 s |
+/// | inflation and deflation differ | `muscle_hysteresis` h = 0.22, s = 0.01 |
+/// | the curves bend at the end of the stroke | `pressure_crosstalk` c = -0.045, `gauge_nonlinearity` c = -0.09 |
+/// | a resting voltage of about -0.18 of the range | the bridge trimmed off balance, beta = 0.92 |
+/// | ramps that last | valves of about 0.35e-9 m3/(s Pa) |
 /// | residual floors of 2 to 3 % | noise of 1 % of the voltage's range |
+///
+/// Fitted as published to twelve ramps (seed 3), beside the paper's figures: linear 1.04 V + 0.16, r^2 0.964 (0.974 V + 0.176,
+/// 0.968); poly13 on inflations RMSE 2.8 % (2.85 %), on deflations 2.2 % (1.82 %). Not reproduced: by how much the two
+/// surfaces differ (0.05 of the stroke at V = 0.65, published 0.20).
+///
+/// It is *not* the explanation of the paper's rig. Another set, with no trim error at all, a lagging gauge (c = -0.3, tau = 2 s) and
+/// thrice the hysteresis, comes as close: on ramps the effects trade against each other.
 ///
 /// # Errors
 /// None.
 pub fn paper_preset() -> Result<Rig, SimError> {
     let mut rig = Rig::default();
-    rig.effects.insert("sleeve_slip", &[("w", 0.006)])?;
-    rig.effects.insert("pressure_crosstalk", &[("c", 0.05)])?;
-    rig.effects.insert("gauge_hysteresis", &[("h", 0.35), ("s", 0.06)])?;
-    rig.effects.insert("gauge_relaxation", &[("c", 0.3), ("tau", 0.3)])?;
+    rig.effects.insert("muscle_hysteresis", &[("h", 0.22), ("s", 0.01)])?;
+    rig.effects.insert("pressure_crosstalk", &[("c", -0.045)])?;
+    rig.effects.insert("gauge_relaxation", &[("c", 0.4), ("tau", 0.26)])?;
+    rig.effects.insert("gauge_nonlinearity", &[("c", -0.09)])?;
+    rig.params[Key::Beta] = 0.92;
+    rig.params[Key::CIn] = 0.34e-9;
+    rig.params[Key::COut] = 0.39e-9;
     rig.params[Key::SigmaV] = 0.0107;
     Ok(rig)
 }

@@ -1,1 +1,34 @@
 #![doc = include_str!("../README.md")]
+
+mod bootstrap;
+mod diagnose;
+mod diagnosis;
+mod dice;
+mod error;
+mod evidence;
+mod fit;
+mod floor;
+mod frame;
+mod linear;
+mod probability;
+mod rig;
+mod screen;
+mod select;
+mod simulator;
+mod thresholds;
+mod verdict;
+
+pub use diagnose::{Options, diagnose};
+pub use diagnosis::{
+    Baselines, Candidate, Diagnosis, EffectValue, NextExperiment, ParameterShift, SliceGap,
+    StageGap, Transfer, TransferError, VerdictKind, Where,
+};
+pub use error::GapError;
+pub use evidence::{Evidence, StageEvidence};
+pub use frame::{BLOCK_S, Frame, Metric, Role, Segment};
+pub use rig::{RigSimulator, RigTrial, Session};
+pub use simulator::{
+    EffectParameterSpec, EffectSpec, Model, ParameterSpec, Run, Simulator, StageSpec, TrialSpec,
+    Wander,
+};
+pub use thresholds::Thresholds;

@@ -1,0 +1,205 @@
+//! What a diagnosis says: its serde form is `diagnosis.json`, schema 1.
+
+use serde::{Deserialize, Serialize};
+
+/// The four answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum VerdictKind {
+    /// Simulation and measurement agree within the floor.
+    NoGap,
+    /// They agree once parameters are re-tuned within their tolerances.
+    Parameters,
+    /// Effects of the catalogue are missing, and are named.
+    Effect,
+    /// There is a gap that no effect of the catalogue explains.
+    Unknown,
+}
+
+/// A set of effects that was held against the data.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Candidate {
+    /// Its effects, the strongest first.
+    pub effects: Vec<String>,
+    /// Probability among the candidates.
+    pub probability: f64,
+    /// Score against the re-tuned nominal, nats.
+    pub score: f64,
+    /// Excess of the re-tuned nominal on the test trials, summed over channels.
+    pub gap_before: f64,
+    /// Excess with the effects.
+    pub gap_after: f64,
+    /// Closed-gap fraction.
+    pub closed: f64,
+    /// Its 95 % interval, by block bootstrap.
+    pub closed_ci: [f64; 2],
+    /// Parameters of the effects: `effect.parameter`, value, one standard deviation.
+    pub parameters: Vec<EffectValue>,
+}
+
+/// A fitted parameter of an effect.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EffectValue {
+    /// Effect.
+    pub effect: String,
+    /// Parameter.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Fitted value.
+    pub value: f64,
+    /// One standard deviation, from the curvature of the fit with one observation per 0.5 s.
+    pub sd: f64,
+}
+
+/// Gap of one stage on the test trials, every stage on its measured input.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StageGap {
+    /// Stage.
+    pub stage: String,
+    /// Output channel.
+    pub channel: String,
+    /// Share of the gap of the re-tuned nominal.
+    pub share: f64,
+    /// Excess with the parameters as shipped.
+    pub raw: f64,
+    /// Excess of the re-tuned nominal.
+    pub excess: f64,
+    /// Excess with the named (or best) effects.
+    pub after: f64,
+    /// Root mean square of what the re-tuned nominal leaves, nuisance taken out.
+    pub rms: f64,
+    /// Floor, one standard deviation.
+    pub floor: f64,
+    /// Where the floor comes from.
+    pub floor_source: String,
+    /// Unit of the two.
+    pub unit: String,
+}
+
+/// One slice of the gap; see [`SliceGap::by`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SliceGap {
+    /// `regime`, `level`, `rate`, `frequency`, `time`, `session`, `travel` or `trial`.
+    pub by: String,
+    /// Which slice.
+    pub slice: String,
+    /// Stage whose output it is.
+    pub stage: String,
+    /// Share of the stage's gap.
+    pub share: f64,
+    /// Excess within the slice.
+    pub excess: f64,
+    /// 95 % interval of the excess.
+    pub excess_ci: [f64; 2],
+    /// Whether it stands out after a false-discovery correction.
+    pub stands_out: bool,
+}
+
+/// Where the gap sits.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Where {
+    /// By stage.
+    pub stages: Vec<StageGap>,
+    /// By slices of the trials.
+    pub slices: Vec<SliceGap>,
+}
+
+/// A nominal parameter, re-tuned.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ParameterShift {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Value as shipped.
+    pub nominal: f64,
+    /// Value in the final model.
+    pub fitted: f64,
+    /// Distance in tolerances.
+    pub sigmas: f64,
+    /// Value that the nominal simulator without the effects was bent to.
+    pub bent: f64,
+    /// Whether the value is evidence by itself.
+    pub is_evidence: bool,
+}
+
+/// Error of a calibration trained in one place and applied to measured trials.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TransferError {
+    /// Trained on measured trials.
+    pub real: f64,
+    /// Trained in the re-tuned nominal simulator.
+    pub sim: f64,
+    /// Trained in the simulator with the named effects.
+    pub sim_with_effect: f64,
+}
+
+/// What the gap costs a user.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Transfer {
+    /// Straight line.
+    pub linear: TransferError,
+    /// Surface poly13.
+    pub poly13: TransferError,
+    /// `percent_full_scale`.
+    pub unit: String,
+}
+
+/// The experiment that would tell rivals apart.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NextExperiment {
+    /// Name in the menu.
+    pub name: String,
+    /// Rivals that it separates.
+    pub separates: Vec<String>,
+    /// Difference that no re-tuning removes, in floors.
+    pub d: f64,
+    /// Minutes that it takes.
+    pub minutes: f64,
+    /// Why, in a sentence.
+    pub why: String,
+}
+
+/// What simpler methods would have said of the same data.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Baselines {
+    /// Effect with the largest drop of the error, nominal parameters left as shipped.
+    pub largest_drop: Option<String>,
+    /// Effect whose one-step signature resembles the residual most, nominal sensitivities projected out.
+    pub signature: Option<String>,
+    /// Single effect with the best information criterion, each fitted jointly, samples counted as independent.
+    pub bic: Option<String>,
+}
+
+/// The diagnosis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Diagnosis {
+    /// Version of this schema: 1.
+    pub schema: u32,
+    /// The answer.
+    pub verdict: VerdictKind,
+    /// The answer in one plain sentence.
+    pub sentence: String,
+    /// Effects named, the strongest first; empty unless the verdict is `effect`.
+    pub named: Vec<String>,
+    /// The 95 % set: effects that these data cannot tell apart.
+    pub ambiguous: Vec<String>,
+    /// Sets of effects, the most probable first.
+    pub candidates: Vec<Candidate>,
+    /// Where the gap sits.
+    #[serde(rename = "where")]
+    pub location: Where,
+    /// Nominal parameters.
+    pub parameters: Vec<ParameterShift>,
+    /// What the gap costs a calibration.
+    pub transfer: Option<Transfer>,
+    /// What to measure next.
+    pub next_experiment: Option<NextExperiment>,
+    /// What simpler methods say.
+    pub baselines: Option<Baselines>,
+    /// What was noticed and assumed.
+    pub notes: Vec<String>,
+    /// Seconds it took.
+    pub runtime_s: f64,
+}

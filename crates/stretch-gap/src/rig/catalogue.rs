@@ -1,0 +1,142 @@
+//! The rig's catalogue as the diagnosis sees it: which outputs an effect touches, and where to look for it.
+
+use stretch_sim::{CATALOGUE, Effect, Key, PARAMETERS, RigParams, Scale, Stage};
+
+use super::session::Inputs;
+use crate::simulator::{EffectParameterSpec, EffectSpec};
+
+/// Pairs that are hard to tell apart.
+const TWINS: [(&str, &str); 9] = [
+    ("sleeve_slack", "amplifier_saturation"),
+    ("pot_nonlinearity", "gauge_nonlinearity"),
+    ("amplifier_lowpass", "channel_skew"),
+    ("amplifier_lowpass", "gauge_relaxation"),
+    ("sleeve_slip", "gauge_hysteresis"),
+    ("muscle_hysteresis", "muscle_creep"),
+    ("valve_delay", "crossbeam_inertia"),
+    ("pressure_crosstalk", "gauge_nonlinearity"),
+    ("pot_backlash", "sleeve_slip"),
+];
+
+/// What the screens need to know of the measurement.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Extent {
+    /// Least and greatest simulated nominal bridge voltage, V.
+    pub(super) volts: (f64, f64),
+    /// Least nominal gauge strain.
+    pub(super) strain: f64,
+}
+
+impl Extent {
+    pub(super) fn of(params: &RigParams, inputs: &Inputs) -> Self {
+        let bridge = stretch_sim::Bridge::new(params);
+        let volts = |mm: f64| bridge.volts(bridge.resistance(bridge.strain(mm)));
+        Self {
+            volts: (volts(inputs.stroke.1), volts(inputs.stroke.0)),
+            strain: bridge.strain(inputs.stroke.0),
+        }
+    }
+}
+
+/// Every effect of the catalogue but those left out, as entries for a rig with these stages.
+pub(super) fn entries(
+    without: &[String],
+    pressure: bool,
+    extent: Extent,
+    stage_index: &dyn Fn(Stage) -> Vec<usize>,
+) -> (Vec<EffectSpec>, Vec<&'static dyn Effect>) {
+    let mut specs = Vec::new();
+    let mut effects: Vec<&'static dyn Effect> = Vec::new();
+    for effect in CATALOGUE {
+        if without.iter().any(|name| name == effect.name()) {
+            continue;
+        }
+        let twins = TWINS
+            .iter()
+            .filter_map(|&(a, b)| match effect.name() {
+                name if name == a => Some(b),
+                name if name == b => Some(a),
+                _ => None,
+            })
+            .map(str::to_owned)
+            .collect();
+        let name = effect.name();
+        let is_hum = name == "mains_hum";
+        let parameters = effect
+            .parameters()
+            .iter()
+            .filter(|p| !(is_hum && p.name == "phase"))
+            .map(|p| EffectParameterSpec {
+                name: p.name.into(),
+                unit: p.unit.into(),
+                min: p.min,
+                max: p.max,
+                off: p.off,
+                is_log: p.scale == Scale::Log,
+                is_fitted: !(is_hum && p.name == "f"),
+            })
+            .collect();
+        let _ = pressure;
+        specs.push(EffectSpec {
+            name: name.into(),
+            stage: effect.stage().name().into(),
+            touches: stage_index(effect.stage()),
+            parameters,
+            starts: starts(name, extent),
+            is_between_trials: matches!(name, "thermal_drift" | "gauge_softening" | "self_heating"),
+            twins,
+        });
+        effects.push(*effect);
+    }
+    (specs, effects)
+}
+
+/// Points at which an effect is screened.
+fn starts(name: &str, extent: Extent) -> Vec<Vec<f64>> {
+    let one = |values: &[f64]| values.iter().map(|v| vec![*v]).collect::<Vec<_>>();
+    let two = |first: f64, seconds: &[f64]| seconds.iter().map(|s| vec![first, *s]).collect();
+    let (low, high) = extent.volts;
+    match name {
+        "supply_sag" => one(&[3e7, 1.5e8]),
+        "valve_delay" => one(&[0.004, 0.015, 0.05]),
+        "valve_deadband" => one(&[0.001, 0.01, 0.04]),
+        "leak" => one(&[1e-11]),
+        "chamber_volume" => one(&[0.1, 1.0]),
+        "muscle_hysteresis" => two(0.1, &[0.007, 0.02, 0.05]),
+        "muscle_creep" => two(0.05, &[0.6, 2.0, 6.0, 20.0]),
+        "crossbeam_inertia" => one(&[0.003, 0.01, 0.03]),
+        "sleeve_slack" => {
+            one(&[0.002, 0.01, 0.03, 0.07].map(|above| (extent.strain + above).max(1e-3)))
+        }
+        "sleeve_slip" => one(&[0.0005, 0.002, 0.01]),
+        "pressure_crosstalk" => one(&[0.003]),
+        "gauge_hysteresis" => two(0.1, &[0.006, 0.016, 0.045]),
+        "gauge_relaxation" => two(0.05, &[0.03, 0.1, 0.35, 1.2, 3.5]),
+        "gauge_softening" => two(0.03, &[0.5, 2.5, 12.0]),
+        "gauge_nonlinearity" => one(&[0.005]),
+        "thermal_drift" => one(&[2e-5]),
+        "self_heating" => two(0.003, &[1.5, 5.0, 15.0, 45.0]),
+        "amplifier_saturation" => {
+            let mut points: Vec<Vec<f64>> =
+                [0.01, 0.04, 0.15, 0.4].iter().map(|d| vec![0.5, (high - d).max(1.25)]).collect();
+            points.extend([0.01, 0.04, 0.15, 0.4].iter().map(|d| vec![(low + d).max(0.51), 3.3]));
+            points
+        }
+        "amplifier_lowpass" => one(&[0.004, 0.02, 0.08]),
+        "mains_hum" => {
+            [50.0, 60.0].iter().flat_map(|f| [0.002, 0.02].map(|a| vec![a, *f])).collect()
+        }
+        "channel_skew" => one(&[-0.02, -0.004, 0.004, 0.02, 0.08]),
+        "pot_nonlinearity" => one(&[0.2]),
+        "pot_backlash" => one(&[0.05, 0.2, 0.8]),
+        _ => Vec::new(),
+    }
+}
+
+/// Nominal parameters of a stage that are not exact.
+pub(super) fn tuned(params: Stage) -> impl Iterator<Item = Key> {
+    PARAMETERS
+        .iter()
+        .filter(move |p| params.holds(p.stage) && p.tolerance != stretch_sim::Tolerance::Exact)
+        .map(|p| p.key)
+}

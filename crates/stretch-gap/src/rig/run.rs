@@ -1,0 +1,324 @@
+//! One stage of the rig over the session.
+
+use stretch_sim::{
+    Actuation, DEFAULT_STEP_S, EffectSet, Grid, Key, Memory, Muscle, Openings, Pneumatics,
+    Reference, RigParams, Sensing, Stage, Start,
+};
+
+use super::{RigSimulator, hum, session::Begin};
+use crate::{
+    dice::Dice,
+    error::GapError,
+    simulator::{Model, Run},
+};
+
+/// Step of integration while fitting, s.
+const STEP_S: f64 = 2.0 * DEFAULT_STEP_S;
+/// Offset of a vented chamber, kPa: as a rule a little above the atmosphere (mean, 1 sd).
+const EMPTY_KPA: (f64, f64) = (0.08, 0.06);
+/// Offset of a filled chamber below the supply, a share of it (mean, 1 sd).
+const FULL_SHARE: (f64, f64) = (0.0008, 0.0006);
+
+/// What a run needs beside the rig.
+struct Setting<'a> {
+    rig: &'a RigSimulator,
+    params: RigParams,
+    effects: EffectSet,
+    grid: Grid,
+    offset: f64,
+    shake: Option<u64>,
+}
+
+pub(super) fn simulate(rig: &RigSimulator, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
+    let (params, offset) = params_of(rig, run.model);
+    let mut effects = EffectSet::new();
+    let mut hum = None;
+    for (index, values) in &run.model.effects {
+        let row = rig.rows[*index];
+        if row.name() == "mains_hum" {
+            hum = Some((values[0], values[1]));
+        } else {
+            effects.push(row, values)?;
+        }
+    }
+    let kind = rig.stage_kinds[run.stage];
+    let grid = match kind {
+        // Driven by a measured input that is linear between samples.
+        Stage::Muscle | Stage::Sensing => Grid::new(rig.dt_s, run.step * rig.dt_s, 0.0)?,
+        _ => effects.grid(&params, rig.dt_s, run.step * STEP_S)?,
+    };
+    let setting = Setting { rig, params, effects, grid, offset, shake: run.shake };
+    match kind {
+        Stage::Pneumatics => setting.pneumatics(run.trials, out)?,
+        Stage::Muscle => setting.muscle(run.trials, out)?,
+        Stage::Sensing => setting.sensing(run.trials, hum, out)?,
+        _ => setting.actuation(run.trials, out)?,
+    }
+    if out.iter().all(|x| x.is_finite()) {
+        Ok(())
+    } else {
+        Err(GapError::NotFinite { stage: rig.stages[run.stage].name.clone() })
+    }
+}
+
+fn params_of(rig: &RigSimulator, model: &Model) -> (RigParams, f64) {
+    let mut params = rig.base;
+    let mut offset = 0.0;
+    for (key, value) in rig.keys.iter().zip(&model.parameters) {
+        match key {
+            Some(key) => params[*key] = *value,
+            None => offset = *value,
+        }
+    }
+    (params, offset)
+}
+
+impl Setting<'_> {
+    /// How a trial begins: as the one before left it, after the pause between them.
+    fn start(&self, trial: usize) -> Start {
+        let trials = &self.rig.trials;
+        let rest_s = match trial.checked_sub(1) {
+            Some(before) => {
+                let end = trials[before].start_s + trials[before].samples as f64 * self.rig.dt_s;
+                trials[trial].start_s - end
+            }
+            None => 15.0,
+        };
+        // The move to the new start took a little of the pause.
+        Start::Carried { rest_s: (rest_s - 1.0).max(0.0) }
+    }
+
+    fn is_vented(&self) -> bool {
+        let inputs = &self.rig.inputs;
+        let first = inputs.length[0].1.first().copied().unwrap_or(0.0);
+        first > 0.5 * (inputs.stroke.0 + inputs.stroke.1)
+    }
+
+    fn initial_kpa(&self, trial: usize) -> f64 {
+        let supply = 1e-3 * self.params[Key::PS];
+        match self.rig.inputs.begin[trial] {
+            Begin::Empty => EMPTY_KPA.0 + self.offset * EMPTY_KPA.1,
+            Begin::Full => supply * (1.0 - FULL_SHARE.0 + self.offset * FULL_SHARE.1),
+            Begin::Pressure(kpa, sd) => kpa + self.offset * sd,
+            Begin::Length(mm) => {
+                let p = &self.params;
+                let x = (1.0 - mm / p[Key::L0]) / p[Key::KMax];
+                let law = p[Key::A0] * (1.0 - (-p[Key::A1] * x).exp()) * (p[Key::A3] * x * x).exp();
+                (1e-3 * p[Key::PRef] * law).max(0.0) + 3.0 * self.offset
+            }
+        }
+    }
+
+    fn openings(&self, trial: usize) -> Openings<'_> {
+        let trial = &self.rig.session.trials[trial];
+        Openings { inlet: &trial.inlet, outlet: &trial.outlet }
+    }
+
+    /// A measured input: smoothed, and shaken if asked for.
+    fn input(&self, trial: usize, of_pressure: bool) -> Vec<f64> {
+        let inputs = &self.rig.inputs;
+        let (smoother, values) =
+            if of_pressure { &inputs.pressure[trial] } else { &inputs.length[trial] };
+        let Some(seed) = self.shake else { return values.clone() };
+        let params = &self.params;
+        let sd = if of_pressure { 1e-3 * params[Key::SigmaP] } else { params[Key::SigmaL] };
+        let mut dice = Dice::new(seed, trial as u64);
+        let noise: Vec<f64> = values.iter().map(|_| sd * dice.gauss()).collect();
+        let noise = smoother.apply(&noise);
+        values.iter().zip(noise).map(|(x, n)| x + n).collect()
+    }
+
+    /// Trials with their part of the output.
+    fn each(
+        &self,
+        count: usize,
+        mut out: &mut [f64],
+        mut visit: impl FnMut(usize, &mut [f64]) -> Result<(), GapError>,
+    ) -> Result<(), GapError> {
+        for (trial, spec) in self.rig.trials[..count].iter().enumerate() {
+            let (own, rest) = out.split_at_mut(spec.samples);
+            visit(trial, own)?;
+            out = rest;
+        }
+        Ok(())
+    }
+
+    fn pneumatics(&self, count: usize, out: &mut [f64]) -> Result<(), GapError> {
+        let stage = Pneumatics::new(&self.params, &self.effects, &self.grid)?;
+        let mut memory = stage.memory();
+        self.each(count, out, |trial, own| {
+            let (start, openings) = (self.start(trial), self.openings(trial));
+            let initial = self.initial_kpa(trial);
+            if stage.is_coupled() {
+                let length = self.input(trial, false);
+                stage.run_with_length(&mut memory, start, openings, &length, initial, own)?;
+            } else {
+                stage.run(&mut memory, start, openings, initial, own)?;
+            }
+            Ok(())
+        })
+    }
+
+    fn muscle(&self, count: usize, out: &mut [f64]) -> Result<(), GapError> {
+        let stage = Muscle::new(&self.params, &self.effects, &self.grid)?;
+        let mut memory = stage.memory();
+        let mut shown = self.reference()?;
+        let before = if self.is_vented() { 1e-3 * self.params[Key::PS] } else { 0.0 };
+        let mut filled = [0.0; 2];
+        stage.run(&mut memory, Start::Settled, &[before; 2], &mut filled)?;
+        shown.condition(&filled)?;
+        self.each(count, out, |trial, own| {
+            stage.run(&mut memory, self.start(trial), &self.input(trial, true), own)?;
+            shown.run(self.start(trial), own)
+        })
+    }
+
+    fn actuation(&self, count: usize, out: &mut [f64]) -> Result<(), GapError> {
+        let stage = Actuation::new(&self.params, &self.effects, &self.grid)?;
+        let mut memory = stage.memory();
+        let mut shown = self.reference()?;
+        let before = if self.is_vented() { 1e-3 * self.params[Key::PS] } else { 0.0 };
+        let (shut, mut filled) = ([0.0; 2], [0.0; 2]);
+        let openings = Openings { inlet: &shut, outlet: &shut };
+        stage.run(&mut memory, Start::Settled, openings, before, &mut [0.0; 2], &mut filled)?;
+        shown.condition(&filled)?;
+        let mut pressure = Vec::new();
+        self.each(count, out, |trial, own| {
+            pressure.resize(own.len(), 0.0);
+            stage.run(
+                &mut memory,
+                self.start(trial),
+                self.openings(trial),
+                self.initial_kpa(trial),
+                &mut pressure,
+                own,
+            )?;
+            shown.run(self.start(trial), own)
+        })
+    }
+
+    fn sensing(
+        &self,
+        count: usize,
+        hum: Option<(f64, f64)>,
+        out: &mut [f64],
+    ) -> Result<(), GapError> {
+        let stage = Sensing::new(&self.params, &self.effects, &self.grid)?;
+        let mut memory = stage.memory();
+        let shown = self.reference()?;
+        let needs_pressure = self
+            .effects
+            .acting_in(Stage::Sensing)
+            .any(|e| e.effect().needs() == Some("a pressure"));
+        let mut pressures = Vec::new();
+        if needs_pressure && self.rig.inputs.pressure.is_empty() {
+            pressures = self.simulated_pressure(count)?;
+        }
+        // Travel counts from the session's start: nothing may move before it.
+        if self.effects.find("gauge_softening").is_none() {
+            let stroke = self.rig.inputs.stroke;
+            let before = if self.is_vented() { stroke.0 } else { stroke.1 };
+            let kpa = if self.is_vented() { 1e-3 * self.params[Key::PS] } else { 0.0 };
+            let nodes = self.grid.nodes(2);
+            let mut volts = [0.0; 2];
+            stage.run(
+                &mut memory,
+                Start::Settled,
+                self.rig.trials[0].start_s,
+                &vec![before; nodes],
+                &vec![kpa; nodes],
+                &mut volts,
+            )?;
+        }
+        let mut begin = 0;
+        self.each(count, out, |trial, own| {
+            let mut length = self.input(trial, false);
+            shown.undo(&mut length);
+            let pressure = match (needs_pressure, self.rig.inputs.pressure.is_empty()) {
+                (false, _) => Vec::new(),
+                (true, false) => self.input(trial, true),
+                (true, true) => std::mem::take(&mut pressures[trial]),
+            };
+            let start_s = self.rig.trials[trial].start_s;
+            let (length, pressure) = (self.refined(length), self.refined(pressure));
+            stage.run(&mut memory, self.start(trial), start_s, &length, &pressure, own)?;
+            if let Some((a, f)) = hum {
+                let measured = &self.rig.session.trials[trial].bridge_v;
+                let _ = begin;
+                hum::add(a, f, self.params[Key::SigmaV], self.rig.dt_s, measured, own);
+            }
+            begin += own.len();
+            Ok(())
+        })
+    }
+
+    /// Linear between samples where the grid is finer.
+    fn refined(&self, samples: Vec<f64>) -> Vec<f64> {
+        let pieces = self.grid.pieces();
+        if pieces == 1 || samples.is_empty() {
+            return samples;
+        }
+        let nodes = self.grid.nodes(samples.len());
+        (0..nodes)
+            .map(|n| {
+                let (i, share) = (n / pieces, (n % pieces) as f64 / pieces as f64);
+                let next = samples[(i + 1).min(samples.len() - 1)];
+                samples[i] + share * (next - samples[i])
+            })
+            .collect()
+    }
+
+    /// Pressure of the nominal pneumatics: what there is without a pressure column.
+    fn simulated_pressure(&self, count: usize) -> Result<Vec<Vec<f64>>, GapError> {
+        let none = EffectSet::new();
+        let grid = none.grid(&self.params, self.rig.dt_s, STEP_S)?;
+        let stage = Pneumatics::new(&self.params, &none, &grid)?;
+        let mut memory = stage.memory();
+        let mut all = Vec::with_capacity(count);
+        for trial in 0..count {
+            let mut own = vec![0.0; self.rig.trials[trial].samples];
+            let (start, openings) = (self.start(trial), self.openings(trial));
+            stage.run(&mut memory, start, openings, self.initial_kpa(trial), &mut own)?;
+            all.push(own);
+        }
+        Ok(all)
+    }
+
+    fn reference(&self) -> Result<Shown, GapError> {
+        let grid = Grid::samples(self.rig.dt_s)?;
+        let stage = Reference::new(&self.params, &self.effects, &grid)?;
+        let acts = self.effects.acting_in(Stage::Reference).next().is_some();
+        let memory = stage.memory();
+        Ok(Shown { stage, memory, acts, work: Vec::new() })
+    }
+}
+
+/// The reference at the end of a stage, skipped where nothing acts in it.
+struct Shown {
+    stage: Reference,
+    memory: Memory,
+    acts: bool,
+    work: Vec<f64>,
+}
+
+impl Shown {
+    fn condition(&mut self, length: &[f64]) -> Result<(), GapError> {
+        let mut out = vec![0.0; length.len()];
+        Ok(self.stage.run(&mut self.memory, Start::Settled, length, &mut out)?)
+    }
+
+    fn run(&mut self, start: Start, length: &mut [f64]) -> Result<(), GapError> {
+        if self.acts {
+            self.work.clear();
+            self.work.extend_from_slice(length);
+            self.stage.run(&mut self.memory, start, &self.work, length)?;
+        }
+        Ok(())
+    }
+
+    fn undo(&self, length: &mut [f64]) {
+        if self.acts {
+            self.stage.undo(length);
+        }
+    }
+}

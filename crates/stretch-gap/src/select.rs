@@ -1,0 +1,363 @@
+//! Which effects: screens, joint fits, forward selection, backward pruning, and rivals.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use crate::{
+    error::GapError,
+    fit::{Bench, Fitted, Misfit},
+    frame::Role,
+    screen::{Ground, Screened},
+    simulator::Model,
+    thresholds::Thresholds,
+};
+
+/// Candidates kept by a screen.
+const KEPT: usize = 8;
+/// Leaders whose twins are kept with them.
+const LEADERS: usize = 4;
+
+/// A set of effects, fitted together with every nominal parameter.
+#[derive(Debug, Clone)]
+pub(crate) struct Solution {
+    /// Indices of the effects, in the order in which they came in.
+    pub(crate) effects: Vec<usize>,
+    pub(crate) model: Model,
+    /// By stage.
+    pub(crate) misfits: Vec<Misfit>,
+    /// Free effect parameters.
+    pub(crate) free: usize,
+    pub(crate) effect_sd: BTreeMap<usize, Vec<f64>>,
+    pub(crate) at_bound: usize,
+    /// Score against the re-tuned nominal.
+    pub(crate) score: f64,
+}
+
+impl Solution {
+    /// Sum of the excesses over the fitted and held-out samples.
+    pub(crate) fn excess(&self, bench: &Bench<'_>) -> f64 {
+        self.misfits.iter().map(|m| bench.excess(m)).sum()
+    }
+}
+
+impl Bench<'_> {
+    /// Excess of a stage over fitted and held-out samples together.
+    pub(crate) fn excess(&self, misfit: &Misfit) -> f64 {
+        let (fit, held) = (self.frame.blocks(Role::Fit), self.frame.blocks(Role::Held));
+        ((fit * misfit.fit + held * misfit.held) / (fit + held) - 1.0).max(0.0)
+    }
+
+    /// Score of misfits against the nominal ones: log-likelihood of the fit with its penalty, and of the held-out part.
+    pub(crate) fn score(&self, nominal: &[Misfit], misfits: &[Misfit], free: usize) -> f64 {
+        let (fit, held) = (self.frame.blocks(Role::Fit), self.frame.blocks(Role::Held));
+        let mut sum = -0.5 * free as f64 * fit.ln();
+        for (a, b) in nominal.iter().zip(misfits) {
+            sum += 0.5 * fit * (a.fit / b.fit).ln() + 0.5 * held * (a.held / b.held).ln();
+        }
+        sum
+    }
+}
+
+/// The search over sets of effects.
+pub(crate) struct Search<'a> {
+    pub(crate) bench: &'a Bench<'a>,
+    pub(crate) thresholds: &'a Thresholds,
+    pub(crate) nominal: Solution,
+    /// Every set that was fitted, by its sorted effects.
+    pub(crate) tried: BTreeMap<Vec<usize>, Solution>,
+    pub(crate) depth: usize,
+}
+
+impl<'a> Search<'a> {
+    pub(crate) fn new(
+        bench: &'a Bench<'a>,
+        thresholds: &'a Thresholds,
+        nominal: Solution,
+        depth: usize,
+    ) -> Self {
+        Self { bench, thresholds, nominal, tried: BTreeMap::new(), depth }
+    }
+
+    /// Stages that hang together with some effects: those that they touch, and those that other effects of the set
+    /// which touch one of these touch.
+    fn component(&self, effects: &[usize], seed: usize) -> (Vec<usize>, Vec<usize>) {
+        let specs = self.bench.simulator.effects();
+        let mut stages = specs[seed].touches.clone();
+        loop {
+            let mut grown = stages.clone();
+            for &e in effects {
+                if specs[e].touches.iter().any(|s| grown.contains(s)) {
+                    grown.extend(&specs[e].touches);
+                }
+            }
+            grown.sort_unstable();
+            grown.dedup();
+            if grown == stages {
+                break;
+            }
+            stages = grown;
+        }
+        let own = effects
+            .iter()
+            .copied()
+            .filter(|&e| specs[e].touches.iter().any(|s| stages.contains(s)))
+            .collect();
+        (stages, own)
+    }
+
+    /// Fits `base` with one effect more, from a start.
+    fn extend(
+        &self,
+        base: &Solution,
+        ground: &Ground,
+        effect: usize,
+        values: &[f64],
+    ) -> Result<Solution, GapError> {
+        let mut effects = base.effects.clone();
+        effects.push(effect);
+        let (stages, own) = self.component(&effects, effect);
+        let mut model = base.model.clone();
+        model.effects.retain(|(e, _)| own.contains(e));
+        model.effects.push((effect, values.to_vec()));
+        let fitted = self.bench.fit(&stages, model, &ground.known)?;
+        Ok(self.join(base, effects, &stages, fitted))
+    }
+
+    /// Replaces the part of a solution that a fit renewed.
+    fn join(
+        &self,
+        base: &Solution,
+        effects: Vec<usize>,
+        stages: &[usize],
+        fitted: Fitted,
+    ) -> Solution {
+        let mut next = base.clone();
+        next.effects = effects;
+        let specs = self.bench.simulator.stages();
+        for &stage in stages {
+            for &p in &specs[stage].parameters {
+                next.model.parameters[p] = fitted.model.parameters[p];
+            }
+        }
+        let catalogue = self.bench.simulator.effects();
+        next.model
+            .effects
+            .retain(|(e, _)| !catalogue[*e].touches.iter().any(|s| stages.contains(s)));
+        next.effect_sd.retain(|e, _| next.model.effects.iter().any(|(i, _)| i == e));
+        for ((e, values), sd) in fitted.model.effects.iter().zip(&fitted.effect_sd) {
+            next.model.effects.push((*e, values.clone()));
+            next.effect_sd.insert(*e, sd.clone());
+        }
+        next.model.effects.retain(|(e, _)| next.effects.contains(e));
+        for misfit in fitted.misfits {
+            next.misfits[misfit.stage] = misfit;
+        }
+        next.at_bound = fitted.at_bound;
+        next.free = next
+            .model
+            .effects
+            .iter()
+            .map(|(e, values)| {
+                let parameters = &catalogue[*e].parameters;
+                parameters
+                    .iter()
+                    .zip(values)
+                    .filter(|(p, v)| {
+                        p.is_fitted && p.off.is_none_or(|off| off == 0.0 || off != **v)
+                    })
+                    .count()
+            })
+            .sum();
+        next.score = self.bench.score(&self.nominal.misfits, &next.misfits, next.free);
+        next
+    }
+
+    /// Fits every effect of a list on top of `base`, from one or two starts each.
+    fn extend_all(
+        &mut self,
+        base: &Solution,
+        ground: &Ground,
+        screened: &[Screened],
+    ) -> Result<Vec<Solution>, GapError> {
+        let mut jobs = Vec::new();
+        for screen in screened {
+            let mut key = base.effects.clone();
+            key.push(screen.effect);
+            key.sort_unstable();
+            if self.tried.contains_key(&key) {
+                continue;
+            }
+            let best = screen.gain();
+            let second = screen.starts.iter().skip(1).find(|s| s.1 > 0.6 * best);
+            let starts = screen.starts.first().into_iter().chain(second);
+            jobs.extend(starts.map(|s| (screen.effect, s.0.clone())));
+        }
+        let this = &*self;
+        let solutions: Vec<Result<Solution, GapError>> = jobs
+            .par_iter()
+            .map(|(effect, values)| this.extend(base, ground, *effect, values))
+            .collect();
+        for solution in solutions {
+            let solution = match solution {
+                Ok(solution) => solution,
+                Err(GapError::Stopped) => return Err(GapError::Stopped),
+                Err(_) => continue,
+            };
+            let mut key = solution.effects.clone();
+            key.sort_unstable();
+            match self.tried.get(&key) {
+                Some(other) if other.score >= solution.score => {}
+                _ => {
+                    self.tried.insert(key, solution);
+                }
+            }
+        }
+        let mut found: Vec<Solution> = screened
+            .iter()
+            .filter_map(|s| {
+                let mut key = base.effects.clone();
+                key.push(s.effect);
+                key.sort_unstable();
+                self.tried.get(&key).cloned()
+            })
+            .collect();
+        found.sort_by(|a, b| b.score.total_cmp(&a.score));
+        Ok(found)
+    }
+
+    /// Screens every effect that is not in `base`; the best come first.
+    fn screen(&self, base: &Solution, ground: &Ground) -> Result<Vec<Screened>, GapError> {
+        let all: Vec<usize> = (0..self.bench.simulator.effects().len())
+            .filter(|e| !base.effects.contains(e))
+            .collect();
+        let screened: Result<Vec<Screened>, GapError> =
+            all.par_iter().map(|&e| self.bench.screen(ground, e)).collect();
+        let mut screened = screened?;
+        screened.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
+        Ok(screened)
+    }
+
+    /// The best of a screen, and the twins of the very best.
+    fn shortlist(&self, screened: &[Screened], kept: usize) -> Vec<Screened> {
+        let specs = self.bench.simulator.effects();
+        let best = screened.first().map_or(0.0, Screened::gain);
+        let floor = (0.03 * best).max(0.3 * self.thresholds.rise);
+        let mut list: Vec<Screened> =
+            screened.iter().take(kept).filter(|s| s.gain() >= floor).cloned().collect();
+        let leaders: Vec<usize> = list.iter().take(LEADERS).map(|s| s.effect).collect();
+        for leader in leaders {
+            for twin in &specs[leader].twins {
+                let one = screened.iter().find(|s| specs[s.effect].name == *twin);
+                if let Some(one) = one.filter(|o| list.iter().all(|l| l.effect != o.effect)) {
+                    if one.gain() > 0.0 {
+                        list.push(one.clone());
+                    }
+                }
+            }
+        }
+        list
+    }
+
+    /// Forward selection, backward pruning; the sets that were fitted stay in `tried`.
+    pub(crate) fn run(&mut self, progress: &dyn Fn(&str)) -> Result<Solution, GapError> {
+        let mut best = self.nominal.clone();
+        let mut ground = Ground::around(self.bench, best.model.clone())?;
+        for round in 0..self.depth {
+            progress(&format!("screening effects, round {}", round + 1));
+            let screened = self.screen(&best, &ground)?;
+            let kept = if round == 0 { KEPT } else { 5 };
+            let list = self.shortlist(&screened, kept);
+            if list.is_empty() {
+                break;
+            }
+            progress(&format!("fitting {} candidates, round {}", list.len(), round + 1));
+            let found = self.extend_all(&best, &ground, &list)?;
+            let Some(next) = found.first() else { break };
+            if !self.is_worth(&best, next) {
+                break;
+            }
+            best = next.clone();
+            if round + 1 < self.depth {
+                ground = Ground::around(self.bench, best.model.clone())?;
+            }
+        }
+        if best.effects.len() > 1 {
+            progress("pruning");
+            best = self.prune(best)?;
+        }
+        Ok(best)
+    }
+
+    /// Whether one effect more is worth its parameters.
+    fn is_worth(&self, base: &Solution, next: &Solution) -> bool {
+        let rise = next.score - base.score;
+        let (before, after) = (base.excess(self.bench), next.excess(self.bench));
+        rise > self.thresholds.rise && before - after >= self.thresholds.share * before
+    }
+
+    /// The set without one of its effects, fitted again.
+    pub(crate) fn without(&mut self, set: &Solution, effect: usize) -> Result<Solution, GapError> {
+        let rest: Vec<usize> = set.effects.iter().copied().filter(|e| *e != effect).collect();
+        let mut key = rest.clone();
+        key.sort_unstable();
+        if key.is_empty() {
+            return Ok(self.nominal.clone());
+        }
+        if let Some(solution) = self.tried.get(&key) {
+            return Ok(solution.clone());
+        }
+        let (stages, own) = self.component(&set.effects, effect);
+        let mut model = set.model.clone();
+        model.effects.retain(|(e, _)| own.contains(e) && *e != effect);
+        let fitted = self.bench.fit(&stages, model, &[])?;
+        let solution = self.join(set, rest, &stages, fitted);
+        self.tried.insert(key, solution.clone());
+        Ok(solution)
+    }
+
+    fn prune(&mut self, mut best: Solution) -> Result<Solution, GapError> {
+        while best.effects.len() > 1 {
+            let mut weakest: Option<Solution> = None;
+            for effect in best.effects.clone() {
+                let less = self.without(&best, effect)?;
+                if weakest.as_ref().is_none_or(|w| less.score > w.score) {
+                    weakest = Some(less);
+                }
+            }
+            match weakest {
+                Some(less) if !self.is_worth(&less, &best) => best = less,
+                _ => break,
+            }
+        }
+        Ok(best)
+    }
+
+    /// Sets in which one effect of `best` is replaced by another, the replaced one named; fitted where a screen
+    /// says that they might do.
+    pub(crate) fn rivals(&mut self, best: &Solution) -> Result<Vec<(usize, Solution)>, GapError> {
+        let mut out = Vec::new();
+        for &effect in &best.effects {
+            let less = self.without(best, effect)?;
+            let ground = Ground::around(self.bench, less.model.clone())?;
+            let screened: Vec<Screened> = self
+                .screen(&less, &ground)?
+                .into_iter()
+                .filter(|s| !best.effects.contains(&s.effect))
+                .collect();
+            let own_gain = {
+                let one = self.bench.screen(&ground, effect)?;
+                one.gain()
+            };
+            let list: Vec<Screened> = self
+                .shortlist(&screened, 3)
+                .into_iter()
+                .filter(|s| s.gain() > 0.3 * own_gain)
+                .collect();
+            for solution in self.extend_all(&less, &ground, &list)? {
+                out.push((effect, solution));
+            }
+        }
+        Ok(out)
+    }
+}

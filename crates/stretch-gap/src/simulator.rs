@@ -1,0 +1,170 @@
+//! The one trait through which any simulator is diagnosed.
+
+use serde::Serialize;
+
+use crate::error::GapError;
+
+/// A stage of a simulator: it turns a measured input into one measured output channel.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StageSpec {
+    /// Name in reports.
+    pub name: String,
+    /// Output channel: the column that it is held against.
+    pub channel: String,
+    /// Unit of the output.
+    pub unit: String,
+    /// Indices of the nominal parameters that act in it.
+    pub parameters: Vec<usize>,
+    /// Known noise of the output, one standard deviation, rounding included; none when it has to be taken from
+    /// the record's second differences.
+    pub noise: Option<f64>,
+}
+
+/// A slow wander of a parameter around its value that nobody models: it belongs to the floor.
+///
+/// An Ornstein-Uhlenbeck process of standard deviation `sd` and correlation time `correlation_s`, linear
+/// between knots `knot_s` apart.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Wander {
+    /// Standard deviation, in the parameter's unit.
+    pub sd: f64,
+    /// Correlation time, s.
+    pub correlation_s: f64,
+    /// Distance of the knots, s.
+    pub knot_s: f64,
+}
+
+/// A nominal parameter.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ParameterSpec {
+    /// Name in reports.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Value that the simulator ships with.
+    pub nominal: f64,
+    /// Tolerance, one standard deviation in the parameter's unit; 0 when exact. The re-tuned value stays within
+    /// three of them.
+    pub sd: f64,
+    /// Least value that makes sense.
+    pub least: f64,
+    /// Slow wander within a trial, when there is one.
+    pub wander: Option<Wander>,
+    /// Standard deviation of a constant offset in each trial, in the parameter's unit.
+    pub per_trial_sd: Option<f64>,
+    /// Whether its re-tuned value says anything by itself (not when others can stand in for it).
+    pub is_evidence: bool,
+}
+
+/// A parameter of an effect.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EffectParameterSpec {
+    /// Name in reports.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Least plausible value.
+    pub min: f64,
+    /// Greatest plausible value.
+    pub max: f64,
+    /// Value at which it does nothing; none for a shape.
+    pub off: Option<f64>,
+    /// Whether it is searched in equal ratios.
+    pub is_log: bool,
+    /// Whether it is fitted; otherwise it keeps the value of the start.
+    pub is_fitted: bool,
+}
+
+/// An effect that the nominal simulator leaves out.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EffectSpec {
+    /// Name in reports.
+    pub name: String,
+    /// Stage that it belongs to, in the vocabulary of reports.
+    pub stage: String,
+    /// Indices of the stages whose output it changes.
+    pub touches: Vec<usize>,
+    /// Its parameters.
+    pub parameters: Vec<EffectParameterSpec>,
+    /// Values to screen it at, a few per shape and threshold; strengths in between are interpolated.
+    pub starts: Vec<Vec<f64>>,
+    /// Whether it shows between trials rather than inside them (drift, softening): it is then seen once a trial.
+    pub is_between_trials: bool,
+    /// Names of effects that are hard to tell from it.
+    pub twins: Vec<String>,
+}
+
+/// What is known of a trial.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TrialSpec {
+    /// Name in reports.
+    pub name: String,
+    /// How many samples it has.
+    pub samples: usize,
+    /// Session time of its first sample, s.
+    pub start_s: f64,
+    /// Whether it is a test trial: read once, at the end.
+    pub is_test: bool,
+}
+
+/// Nominal parameters and effects with their values.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Model {
+    /// Every nominal parameter, in the simulator's order.
+    pub parameters: Vec<f64>,
+    /// Effects that are on: index in the catalogue, values.
+    pub effects: Vec<(usize, Vec<f64>)>,
+}
+
+impl Model {
+    /// The simulator as it ships.
+    pub fn nominal(simulator: &dyn Simulator) -> Self {
+        let parameters = simulator.parameters().iter().map(|p| p.nominal).collect();
+        Self { parameters, effects: Vec::new() }
+    }
+
+    /// Values of an effect that is on.
+    pub fn effect(&self, index: usize) -> Option<&[f64]> {
+        self.effects.iter().find(|(i, _)| *i == index).map(|(_, values)| values.as_slice())
+    }
+}
+
+/// One run of one stage over the session.
+#[derive(Debug, Clone, Copy)]
+pub struct Run<'a> {
+    /// Which stage.
+    pub stage: usize,
+    /// Parameters and effects.
+    pub model: &'a Model,
+    /// How many of the session's trials, from the first.
+    pub trials: usize,
+    /// Adds another draw of their noise to the measured inputs, from this seed: tells how much of it arrives at
+    /// the output.
+    pub shake: Option<u64>,
+    /// Share of the usual step of integration: 0.5 for the solver check.
+    pub step: f64,
+}
+
+/// A simulator bound to the measurements that it is held against.
+///
+/// Every stage is run alone on its measured input (teacher forcing), so that what one stage gets wrong does not
+/// spread to the next. Memories are carried from trial to trial in the order of the session.
+pub trait Simulator: Sync {
+    /// Its stages.
+    fn stages(&self) -> &[StageSpec];
+    /// Its nominal parameters.
+    fn parameters(&self) -> &[ParameterSpec];
+    /// The catalogue of effects that it may lack.
+    fn effects(&self) -> &[EffectSpec];
+    /// The trials, in the order of the session.
+    fn trials(&self) -> &[TrialSpec];
+    /// Sample time, s, the same in every trial.
+    fn dt_s(&self) -> f64;
+    /// Measured output of a stage, all trials end to end.
+    fn measured(&self, stage: usize) -> &[f64];
+    /// Simulates a stage on its measured input; `out` takes the samples of the first `run.trials` trials.
+    ///
+    /// # Errors
+    /// When the simulation is not possible with these values: the fit then turns back.
+    fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError>;
+}

@@ -1,0 +1,30 @@
+//! Numbers that were calibrated on development cases, in one file.
+
+use serde::{Deserialize, Serialize};
+
+/// Thresholds of the decision, read from `thresholds.toml`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Thresholds {
+    /// Excess, summed over channels, below which there is no gap.
+    pub null_excess: f64,
+    /// Least rise of the score for an effect, nats.
+    pub rise: f64,
+    /// Least share of the gap left that an effect must close.
+    pub share: f64,
+    /// Temperature of the probabilities, nats.
+    pub temperature: f64,
+    /// Growth of the temperature with the score that an effect brings.
+    pub rho: f64,
+    /// Excess that may be left whatever it was before.
+    pub unknown_excess: f64,
+    /// Share of the excess that mismatch of form may leave.
+    pub unknown_share: f64,
+}
+
+impl Thresholds {
+    /// Those frozen in this version.
+    pub fn frozen() -> Self {
+        toml::from_str(include_str!("../thresholds.toml")).expect("a test reads it")
+    }
+}

@@ -68,6 +68,15 @@ fn bench(c: &mut Criterion) {
         ("gauge_nonlinearity", &[("c", 0.05)]),
         ("thermal_drift", &[("d", 1e-4)]),
     ];
+    let bridge = stretch_sim::Bridge::new(&params);
+    group.bench_function("plain loop over the bridge", |b| {
+        b.iter(|| {
+            for (v, l) in v.iter_mut().zip(black_box(&length)) {
+                *v = bridge.volts(bridge.resistance(bridge.strain(*l)));
+            }
+            black_box(&v);
+        });
+    });
     for (name, effects) in [
         ("sensing, nominal", set(&[])),
         ("sensing, three without memory", set(memoryless)),

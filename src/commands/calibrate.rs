@@ -41,8 +41,8 @@ pub(crate) struct Args {
     /// How channels are normalised: divided by their range, or minimum to maximum
     #[arg(long, value_enum, default_value_t = Normalise::Range)]
     normalise: Normalise,
-    /// Estimator of the signal's rate: savgol:WINDOW,DEGREE[,DELAY], difference:CUTOFF_HZ,
-    /// tracker:INDEX, central
+    /// Estimator of the signal's rate: savgol:WINDOW,DEGREE or savgol:WINDOW,DEGREE,DELAY (in
+    /// samples), difference:CUTOFF_HZ, tracker:INDEX, central
     #[arg(long, default_value = "savgol:11,2", value_parser = parse_rate)]
     rate: RateEstimator,
     /// Rate that surfaces are fitted on: the signal's, as it will run, or the reference's, as in

@@ -1,0 +1,156 @@
+//! One frame: what the board says about one sample.
+
+use crc::{CRC_32_ISCSI, Crc, NoTable};
+use stretch_core::Branch;
+use stretch_receptor::{Domain, Withheld, code::CodeReading};
+
+use crate::text::{Writer, number};
+
+/// Without a table: a kilobyte of flash for a few hundred instructions a sample.
+const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
+
+/// What a board says about one sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Frame {
+    /// 0 after a reset, then one more a sample; wraps.
+    pub counter: u32,
+    /// The board's clock, in milliseconds; wraps.
+    pub time_ms: u32,
+    /// The converter's code; -1 for a sample that did not come.
+    pub code: i32,
+    /// What the receptor answered.
+    pub answer: Answer,
+}
+
+/// What the receptor answered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Answer {
+    /// An estimate.
+    Reading {
+        /// In thousandths of the reference's unit: micrometres for millimetres.
+        thousandths: i32,
+        /// The branch that was evaluated.
+        branch: Branch,
+        /// Whether the inputs lay where the calibration was fitted.
+        domain: Domain,
+    },
+    /// The rate estimator has not seen enough samples.
+    Warming,
+    /// The sample did not come.
+    Missing,
+}
+
+impl From<Result<CodeReading<i32>, Withheld>> for Answer {
+    fn from(answer: Result<CodeReading<i32>, Withheld>) -> Self {
+        match answer {
+            Ok(CodeReading { estimate, branch, domain }) => {
+                Self::Reading { thousandths: estimate, branch, domain }
+            }
+            Err(Withheld::Warming) => Self::Warming,
+            Err(_) => Self::Missing,
+        }
+    }
+}
+
+impl Frame {
+    /// Bytes of the longest line, its newline included.
+    pub const LONGEST: usize = 64;
+
+    /// The version that this release writes and reads.
+    pub const VERSION: u8 = 1;
+
+    /// Writes the frame as one line, `$` first and newline last; gives what was written.
+    pub fn encode<'a>(&self, line: &'a mut [u8; Self::LONGEST]) -> &'a [u8] {
+        let mut writer = Writer::new(line);
+        writer.byte(b'$');
+        self.body(&mut writer);
+        let crc = CRC.checksum(&writer.written()[1..]);
+        writer.byte(b'*');
+        writer.hexadecimal(crc);
+        writer.byte(b'\n');
+        writer.finish()
+    }
+
+    fn body(&self, out: &mut Writer<'_>) {
+        out.bytes(b"S1,");
+        out.unsigned(self.counter);
+        out.byte(b',');
+        out.unsigned(self.time_ms);
+        out.byte(b',');
+        out.signed(self.code);
+        out.byte(b',');
+        match self.answer {
+            Answer::Reading { thousandths, branch, domain } => {
+                out.signed(thousandths);
+                out.bytes(match branch {
+                    Branch::Inflation => b",I,",
+                    Branch::Deflation => b",D,",
+                });
+                out.byte(match domain {
+                    Domain::Inside => b'0',
+                    Domain::SignalClamped => b'1',
+                    Domain::RateClamped => b'2',
+                    Domain::BothClamped => b'3',
+                });
+            }
+            Answer::Warming => out.bytes(b",W,"),
+            Answer::Missing => out.bytes(b",M,"),
+        }
+    }
+
+    /// Reads a line without its `$` and newline.
+    pub(crate) fn decode(line: &[u8]) -> Result<Self, Refused> {
+        let star = line.len().checked_sub(9).filter(|&at| line[at] == b'*');
+        let (body, crc) = star.map(|at| (&line[..at], &line[at + 1..])).ok_or(Refused::Damaged)?;
+        let mut digits = [0; 8];
+        let mut writer = Writer::new(&mut digits);
+        writer.hexadecimal(CRC.checksum(body));
+        if writer.written() != crc {
+            return Err(Refused::Damaged);
+        }
+        if !body.starts_with(b"S1,") {
+            return Err(Refused::OtherVersion);
+        }
+        let frame = Self::fields(&body[3..]).ok_or(Refused::Damaged)?;
+        // only what `encode` writes: no leading zeros, no plus sign
+        let mut again = [0; Self::LONGEST];
+        let mut writer = Writer::new(&mut again);
+        frame.body(&mut writer);
+        if writer.written() == body { Ok(frame) } else { Err(Refused::Damaged) }
+    }
+
+    fn fields(body: &[u8]) -> Option<Self> {
+        let mut fields = body.split(|&byte| byte == b',');
+        let (counter, time_ms) = (number(fields.next()?)?, number(fields.next()?)?);
+        let (code, thousandths) = (number(fields.next()?)?, fields.next()?);
+        let (state, domain) = (fields.next()?, fields.next()?);
+        let branch = match state {
+            b"I" => Some(Branch::Inflation),
+            b"D" => Some(Branch::Deflation),
+            _ => None,
+        };
+        let answer = match (branch, state) {
+            (Some(branch), _) => {
+                let domain = match domain {
+                    b"0" => Domain::Inside,
+                    b"1" => Domain::SignalClamped,
+                    b"2" => Domain::RateClamped,
+                    b"3" => Domain::BothClamped,
+                    _ => return None,
+                };
+                Answer::Reading { thousandths: number(thousandths)?, branch, domain }
+            }
+            (None, b"W") => Answer::Warming,
+            (None, b"M") => Answer::Missing,
+            _ => return None,
+        };
+        Some(Self { counter, time_ms, code, answer })
+    }
+}
+
+/// Why a line is no frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Refused {
+    Damaged,
+    OtherVersion,
+}

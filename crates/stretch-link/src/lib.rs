@@ -1,0 +1,9 @@
+#![doc = include_str!("../README.md")]
+#![no_std]
+
+mod decoder;
+mod frame;
+mod text;
+
+pub use decoder::{Counts, Decoder, Event};
+pub use frame::{Answer, Frame};

@@ -56,7 +56,8 @@ done
 step "every combination of features"
 if cargo hack --version >/dev/null 2>&1; then
     for library in $LIBRARIES; do
-        cargo hack check --quiet --locked -p "$library" --feature-powerset --no-dev-deps
+        # without dev-dependencies the lock file is another: it cannot be --locked
+        cargo hack check --quiet -p "$library" --feature-powerset --no-dev-deps
     done
 else
     skip "cargo-hack is not installed: cargo install cargo-hack"
@@ -64,7 +65,7 @@ fi
 
 step "packages of the library crates"
 # shellcheck disable=SC2046,SC2086
-cargo package --locked --allow-dirty --no-verify $(printf -- '-p %s ' $LIBRARIES stretch-data) >/dev/null
+cargo package --quiet --locked --allow-dirty $(printf -- '-p %s ' $LIBRARIES stretch-data stretch-calibrate stretch-sim)
 
 step "fuzz targets compile"
 cargo check --quiet --locked --manifest-path fuzz/Cargo.toml

@@ -12,6 +12,7 @@ use crate::{
     fit::Bench,
     floor::floors,
     frame::{Frame, Metric, Role},
+    localise,
     probability::{covering_set, weigh},
     select::{Search, Solution},
     simulator::{Model, Run, Simulator},
@@ -104,8 +105,15 @@ fn run(
     let mut ordered = best.clone();
     ordered.effects.sort_by(|a, b| slots[b].total_cmp(&slots[a]));
     let weighed = weigh(&options.thresholds, &ordered, &slots, &rivals);
-    let evidence = Evidence::of(&bench, &shipped, &nominal, &ordered, &floors)?;
+    let mut evidence = Evidence::of(&bench, &shipped, &nominal, &ordered, &floors)?;
+    evidence.candidates = weighed.iter().map(|(solution, _)| solution.model.clone()).collect();
     let candidates = candidates(&bench, &evidence, &weighed, options.seed)?;
+    progress("where the gap sits");
+    let location = Where {
+        stages: stage_gaps(&bench, &evidence, &floors),
+        slices: localise::slices(simulator, &evidence, options.seed),
+        end_to_end: localise::end_to_end(simulator, &evidence)?,
+    };
     let decision =
         verdict::decide(&bench, options, &evidence, &nominal, &ordered, &slots, &candidates);
     let diagnosis = Diagnosis {
@@ -118,7 +126,7 @@ fn run(
             _ => Vec::new(),
         },
         candidates,
-        location: Where { stages: stage_gaps(&bench, &evidence, &floors), slices: Vec::new() },
+        location,
         parameters: shifts(&bench, &nominal, &ordered),
         transfer: None,
         next_experiment: None,
@@ -201,7 +209,16 @@ fn candidates(
                     });
                 }
             }
+            let several = solution.effects.len() > 1;
+            let by_name = parameters
+                .iter()
+                .map(|p: &EffectValue| match several {
+                    true => (format!("{}.{}", p.effect, p.name), p.value),
+                    false => (p.name.clone(), p.value),
+                })
+                .collect();
             Ok(Candidate {
+                by_name,
                 effects: solution.effects.iter().map(|&e| specs[e].name.clone()).collect(),
                 probability: *probability,
                 score: solution.score,

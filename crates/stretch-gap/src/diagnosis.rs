@@ -1,5 +1,7 @@
 //! What a diagnosis says: its serde form is `diagnosis.json`, schema 1.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 /// The four answers.
@@ -33,7 +35,11 @@ pub struct Candidate {
     pub closed: f64,
     /// Its 95 % interval, by block bootstrap.
     pub closed_ci: [f64; 2],
-    /// Parameters of the effects: `effect.parameter`, value, one standard deviation.
+    /// Values of the effects' parameters by name; with several effects by `effect.parameter`.
+    #[serde(rename = "parameters")]
+    pub by_name: BTreeMap<String, f64>,
+    /// The same with units and standard deviations.
+    #[serde(rename = "parameter_values")]
     pub parameters: Vec<EffectValue>,
 }
 
@@ -80,7 +86,7 @@ pub struct StageGap {
 /// One slice of the gap; see [`SliceGap::by`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SliceGap {
-    /// `regime`, `level`, `rate`, `frequency`, `time`, `session`, `travel` or `trial`.
+    /// `regime`, `level`, `rate`, `time` (in the trial), `session` (time), `travel`, `trial` or `frequency`.
     pub by: String,
     /// Which slice.
     pub slice: String,
@@ -96,6 +102,15 @@ pub struct SliceGap {
     pub stands_out: bool,
 }
 
+/// Share of one stage when the stages run one on the other.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StageShare {
+    /// Stage.
+    pub stage: String,
+    /// Its Shapley value as a share of the gap of the last output.
+    pub share: f64,
+}
+
 /// Where the gap sits.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Where {
@@ -103,6 +118,9 @@ pub struct Where {
     pub stages: Vec<StageGap>,
     /// By slices of the trials.
     pub slices: Vec<SliceGap>,
+    /// By stage in the gap of the last output, when nothing but the commands is given; empty where that cannot be told.
+    #[serde(default)]
+    pub end_to_end: Vec<StageShare>,
 }
 
 /// A nominal parameter, re-tuned.

@@ -44,6 +44,8 @@ pub struct Evidence {
     pub retuned: Model,
     /// Best set of effects, whether the verdict names it or not.
     pub best: Model,
+    /// Fitted model of every candidate, in the order of the diagnosis.
+    pub candidates: Vec<Model>,
     /// Mean square in floors of the re-tuned nominal, by stage and test block.
     pub(crate) nominal_blocks: Vec<Vec<f64>>,
     /// The best set's excess over fitted and held-out samples, and the nominal's.
@@ -115,6 +117,7 @@ impl Evidence {
             frame: bench.frame.clone(),
             retuned: nominal.model.clone(),
             best: best.model.clone(),
+            candidates: Vec::new(),
             nominal_blocks,
             trained: (nominal.excess(bench), best.excess(bench)),
         })

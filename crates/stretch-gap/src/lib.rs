@@ -10,6 +10,7 @@ mod fit;
 mod floor;
 mod frame;
 mod linear;
+mod localise;
 mod probability;
 mod rig;
 mod screen;
@@ -21,14 +22,14 @@ mod verdict;
 pub use diagnose::{Options, diagnose};
 pub use diagnosis::{
     Baselines, Candidate, Diagnosis, EffectValue, NextExperiment, ParameterShift, SliceGap,
-    StageGap, Transfer, TransferError, VerdictKind, Where,
+    StageGap, StageShare, Transfer, TransferError, VerdictKind, Where,
 };
 pub use error::GapError;
 pub use evidence::{Evidence, StageEvidence};
 pub use frame::{BLOCK_S, Frame, Metric, Role, Segment};
 pub use rig::{RigSimulator, RigTrial, Session};
 pub use simulator::{
-    EffectParameterSpec, EffectSpec, Model, ParameterSpec, Run, Simulator, StageSpec, TrialSpec,
-    Wander,
+    EffectParameterSpec, EffectSpec, Model, Motion, ParameterSpec, Run, Simulator, StageSpec,
+    TrialSpec, Wander,
 };
 pub use thresholds::Thresholds;

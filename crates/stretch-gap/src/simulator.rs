@@ -145,6 +145,19 @@ pub struct Run<'a> {
     pub step: f64,
 }
 
+/// The measured motion that slices go by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion<'a> {
+    /// All trials end to end.
+    pub values: &'a [f64],
+    /// Unit.
+    pub unit: &'a str,
+    /// What it is called when the values fall.
+    pub falling: &'a str,
+    /// What it is called when they rise.
+    pub rising: &'a str,
+}
+
 /// A simulator bound to the measurements that it is held against.
 ///
 /// Every stage is run alone on its measured input (teacher forcing), so that what one stage gets wrong does not
@@ -167,4 +180,24 @@ pub trait Simulator: Sync {
     /// # Errors
     /// When the simulation is not possible with these values: the fit then turns back.
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError>;
+    /// The motion by which the gap is cut into regimes, levels and rates: the first stage's output unless said
+    /// otherwise.
+    fn motion(&self) -> Motion<'_> {
+        let unit = self.stages().first().map_or("", |s| s.unit.as_str());
+        Motion { values: self.measured(0), unit, falling: "falling", rising: "rising" }
+    }
+    /// Measured input of a stage as it is fed with it, all trials end to end; none where it is not the output of the
+    /// stage before.
+    fn input(&self, stage: usize) -> Option<Vec<f64>> {
+        let _ = stage;
+        None
+    }
+    /// As [`Simulator::simulate`] on an input that was not measured; says whether the stage can.
+    ///
+    /// # Errors
+    /// When the simulation is not possible with these values.
+    fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {
+        let _ = (run, input, out);
+        Ok(false)
+    }
 }

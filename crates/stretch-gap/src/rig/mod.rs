@@ -19,7 +19,7 @@ pub use session::{RigTrial, Session};
 
 use crate::{
     error::GapError,
-    simulator::{EffectSpec, ParameterSpec, Run, Simulator, StageSpec, TrialSpec, Wander},
+    simulator::{EffectSpec, Motion, ParameterSpec, Run, Simulator, StageSpec, TrialSpec, Wander},
 };
 
 /// Slow fluctuation of the supply, a share of it (1 sd).
@@ -244,6 +244,33 @@ impl Simulator for RigSimulator {
     }
 
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
-        run::simulate(self, run, out)
+        run::simulate(self, run, None, out)
+    }
+
+    fn motion(&self) -> Motion<'_> {
+        let stage = self.stages.iter().position(|s| s.channel == "length_mm").unwrap_or(0);
+        Motion {
+            values: &self.measured[stage],
+            unit: "mm",
+            falling: "inflation",
+            rising: "deflation",
+        }
+    }
+
+    fn input(&self, stage: usize) -> Option<Vec<f64>> {
+        let smooth = match self.stage_kinds[stage] {
+            Stage::Muscle => &self.inputs.pressure,
+            Stage::Sensing => &self.inputs.length,
+            _ => return None,
+        };
+        Some(smooth.iter().flat_map(|(_, values)| values).copied().collect())
+    }
+
+    fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {
+        if self.input(run.stage).is_none() {
+            return Ok(false);
+        }
+        run::simulate(self, run, Some(input), out)?;
+        Ok(true)
     }
 }

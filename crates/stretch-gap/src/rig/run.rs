@@ -27,9 +27,18 @@ struct Setting<'a> {
     grid: Grid,
     offset: f64,
     shake: Option<u64>,
+    /// Input of the stage that stands in for the measured one, all trials end to end.
+    given: Option<&'a [f64]>,
+    kind: Stage,
 }
 
-pub(super) fn simulate(rig: &RigSimulator, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
+/// Simulates one stage, on the measured input unless another one is given.
+pub(super) fn simulate(
+    rig: &RigSimulator,
+    run: Run<'_>,
+    given: Option<&[f64]>,
+    out: &mut [f64],
+) -> Result<(), GapError> {
     let (params, offset) = params_of(rig, run.model);
     let mut effects = EffectSet::new();
     let mut hum = None;
@@ -47,7 +56,7 @@ pub(super) fn simulate(rig: &RigSimulator, run: Run<'_>, out: &mut [f64]) -> Res
         Stage::Muscle | Stage::Sensing => Grid::new(rig.dt_s, run.step * rig.dt_s, 0.0)?,
         _ => effects.grid(&params, rig.dt_s, run.step * STEP_S)?,
     };
-    let setting = Setting { rig, params, effects, grid, offset, shake: run.shake };
+    let setting = Setting { rig, params, effects, grid, offset, shake: run.shake, given, kind };
     match kind {
         Stage::Pneumatics => setting.pneumatics(run.trials, out)?,
         Stage::Muscle => setting.muscle(run.trials, out)?,
@@ -116,6 +125,11 @@ impl Setting<'_> {
 
     /// A measured input: smoothed, and shaken if asked for.
     fn input(&self, trial: usize, of_pressure: bool) -> Vec<f64> {
+        if let Some(given) = self.given.filter(|_| of_pressure == (self.kind == Stage::Muscle)) {
+            let trials = &self.rig.trials;
+            let from = trials[..trial].iter().map(|t| t.samples).sum::<usize>();
+            return given[from..from + trials[trial].samples].to_vec();
+        }
         let inputs = &self.rig.inputs;
         let (smoother, values) =
             if of_pressure { &inputs.pressure[trial] } else { &inputs.length[trial] };

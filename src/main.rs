@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use commands::{apply, calibrate, convert, demo, effects, evaluate, rig, simulate};
+use commands::{apply, calibrate, convert, demo, effects, evaluate, listen, rig, simulate};
 
 /// From the voltage of a stretch sensor to length, live.
 ///
@@ -39,6 +39,7 @@ enum Command {
     Simulate(simulate::Args),
     Effects(effects::Args),
     Rig(rig::Args),
+    Listen(listen::Args),
 }
 
 /// What the shell is told when Ctrl-C ended the program.
@@ -57,6 +58,7 @@ fn main() -> ExitCode {
         Command::Simulate(args) => simulate::run(args),
         Command::Effects(args) => effects::run(args),
         Command::Rig(args) => rig::run(args),
+        Command::Listen(args) => listen::run(args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

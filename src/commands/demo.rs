@@ -33,9 +33,18 @@ pub(crate) struct Args {
     /// Folder for the report, the calibrations and the estimates
     #[arg(long, default_value = "stretch-demo", value_name = "DIR")]
     out: PathBuf,
+    /// The paper's experiment instead, end to end on the simulated rig: its tables beside ours
+    #[arg(long)]
+    paper: bool,
+    /// Seed of the simulated experiment
+    #[arg(long, default_value_t = 3, requires = "paper", value_name = "N")]
+    seed: u64,
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+    if args.paper {
+        return super::paper::run(&args.out, args.seed);
+    }
     let read = |(name, text): (&str, &str)| {
         Trial::from_reader(text.as_bytes(), name, &ReadOptions::new().require(REFERENCE))
     };

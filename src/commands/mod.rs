@@ -6,6 +6,8 @@ pub(crate) mod convert;
 pub(crate) mod demo;
 pub(crate) mod effects;
 pub(crate) mod evaluate;
+pub(crate) mod listen;
+pub(crate) mod paper;
 pub(crate) mod rig;
 pub(crate) mod shared;
 pub(crate) mod simulate;

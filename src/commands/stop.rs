@@ -23,6 +23,16 @@ pub(crate) fn on_ctrl_c(exit_code: u8) {
     }
 }
 
+/// From now on the first Ctrl-C only sets what [`ended`] tells.
+pub(crate) fn record() {
+    RECORDING.store(true, SeqCst);
+}
+
+/// Whether Ctrl-C ended the recording.
+pub(crate) fn ended() -> bool {
+    ENDED.load(SeqCst)
+}
+
 /// Standard input that ends at Ctrl-C, so that what has come is still written.
 pub(crate) struct RecordedInput {
     pieces: Receiver<io::Result<Vec<u8>>>,

@@ -12,6 +12,7 @@ mod estimate_figure;
 pub(crate) mod figure;
 pub(crate) mod markup;
 pub(crate) mod page;
+mod paper_page;
 mod slice_figure;
 mod surface_figure;
 pub(crate) mod thin;
@@ -19,6 +20,7 @@ pub(crate) mod thin;
 #[allow(unused_imports, reason = "draws the picture of the README, outside the program")]
 pub(crate) use calibration_page::readme_picture;
 pub(crate) use calibration_page::{Context, calibration_page};
+pub(crate) use paper_page::paper_page;
 
 #[cfg(test)]
 mod tests;

@@ -11,7 +11,7 @@ use stretch_filter::RateFilter;
 use crate::{
     CalibrateError, FitReport, ModelKind, Options,
     fitting::{Sample, fit},
-    series::{Series, even, noise, polarity, sample_rate_hz, series},
+    series::{Series, even, extent, noise, polarity, sample_rate_hz, series},
     split::{DeadBands, branches},
 };
 
@@ -176,13 +176,6 @@ fn target(options: &Options, pieces: &Pieces) -> Result<Target, CalibrateError> 
     })
 }
 
-fn extent(values: &mut dyn Iterator<Item = f64>) -> Interval {
-    values.fold(Interval { min: f64::INFINITY, max: f64::NEG_INFINITY }, |e, x| Interval {
-        min: e.min.min(x),
-        max: e.max.max(x),
-    })
-}
-
 fn pooled_range(
     column: &str,
     mode: Normalisation,
@@ -218,7 +211,7 @@ fn linear(prepared: &Prepared, options: &Options) -> Result<Fitted, CalibrateErr
     let line = LinearMap {
         slope: surface.coefficient(0, 1),
         intercept: surface.coefficient(0, 0),
-        signal_domain: extent(&mut seen.into_iter()),
+        signal_domain: extent(seen.into_iter()),
         fit: report.summary(),
     };
     Ok((Model::Linear(line), vec![report], Vec::new()))
@@ -281,7 +274,7 @@ fn surface(
         Branch::Deflation => "deflation",
     };
     let range = |rates: &[f64]| {
-        let Interval { min, max } = extent(&mut rates.iter().copied());
+        let Interval { min, max } = extent(rates.iter().copied());
         Range::new(RangeSpec { mode: options.normalisation, zero: 0.0, min, max }).map_err(|_| {
             CalibrateError::Constant {
                 column: format!("the rate in the {name} branch"),
@@ -306,8 +299,8 @@ fn surface(
     let fitted = BranchSurface {
         rate_range,
         surface,
-        signal_domain: extent(&mut raw.signal.iter().copied()),
-        rate_domain: extent(&mut raw.signal_rate.iter().copied()),
+        signal_domain: extent(raw.signal.iter().copied()),
+        rate_domain: extent(raw.signal_rate.iter().copied()),
         fit: report.summary(),
     };
     Ok((fitted, report))

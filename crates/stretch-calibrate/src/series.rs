@@ -1,6 +1,6 @@
 //! A trial made ready to fit: even in time, with the rates that a fit may use.
 
-use stretch_core::{Design, Polarity, RateEstimator, SampleRate, Seconds, Stage, Target};
+use stretch_core::{Design, Interval, Polarity, RateEstimator, SampleRate, Seconds, Stage, Target};
 use stretch_data::Trial;
 use stretch_filter::{
     RateFilter, SgFilter, SgShape,
@@ -102,6 +102,14 @@ pub(crate) fn noise(records: &[&[f64]]) -> f64 {
     let middle = bends.len() / 2;
     let (_, median, _) = bends.select_nth_unstable_by(middle, f64::total_cmp);
     1.4826 * *median / 6f64.sqrt()
+}
+
+/// From the least value to the greatest.
+pub(crate) fn extent(values: impl Iterator<Item = f64>) -> Interval {
+    values.fold(Interval { min: f64::INFINITY, max: f64::NEG_INFINITY }, |e, x| Interval {
+        min: e.min.min(x),
+        max: e.max.max(x),
+    })
 }
 
 /// The rates of a log by the estimator that runs at use: live, or the paper's

@@ -1,0 +1,68 @@
+//! A trial normalised by its own ranges, as the paper did.
+
+use stretch_core::{Calibration, Interval, Model, Range, RangeSpec};
+use stretch_data::Trial;
+
+use crate::{
+    CalibrateError,
+    series::{extent, rates_at_use},
+};
+
+/// The same calibration with the ranges of one trial: its signal and its rate are
+/// divided by their own total ranges, and nothing is clamped (paper section 2.5).
+///
+/// For fidelity only: a range is known when the trial is over, so this cannot run
+/// live.
+///
+/// # Errors
+/// [`CalibrateError::Data`] when the trial lacks the signal,
+/// [`CalibrateError::Constant`] when it never changes.
+///
+/// ```
+/// use stretch_calibrate::on_own_ranges;
+/// use stretch_data::{Channel, Trial};
+/// # let calibration = stretch_receptor::example_calibration();
+/// let trial = Trial {
+///     name: "short".into(),
+///     time_s: (0..100).map(|n| n as f64 * 0.01).collect(),
+///     channels: vec![Channel {
+///         name: "bridge_v".into(),
+///         values: (0..100).map(|n| 1.3 + 0.004 * (n as f64)).collect(),
+///     }],
+/// };
+/// let own = on_own_ranges(&calibration, &trial)?;
+/// assert!((own.signal_range.span() - 0.396).abs() < 1e-9);
+/// # Ok::<(), stretch_calibrate::CalibrateError>(())
+/// ```
+pub fn on_own_ranges(
+    calibration: &Calibration,
+    trial: &Trial,
+) -> Result<Calibration, CalibrateError> {
+    let mut spec = calibration.clone().into_spec();
+    let signal = trial.require(spec.signal.as_str())?;
+    let rates = rates_at_use(spec.rate_estimator, spec.sample_rate_hz, signal)?;
+    let signed = rates.iter().flatten().map(|rate| spec.polarity.sign() * rate);
+    let (signal_extent, rate_extent) = (extent(signal.iter().copied()), extent(signed));
+    let constant =
+        || CalibrateError::Constant { column: spec.signal.to_string(), value: signal_extent.min };
+    let range = |old: Range, seen: Interval| {
+        Range::new(RangeSpec { min: seen.min, max: seen.max, ..old.into() }).map_err(|_| constant())
+    };
+    let signal_range = range(spec.signal_range, signal_extent)?;
+    let mut model = spec.model;
+    match &mut model {
+        Model::Linear(line) => line.signal_domain = signal_extent,
+        Model::Surfaces { inflation, deflation } => {
+            for branch in [inflation, deflation] {
+                branch.rate_range = range(branch.rate_range, rate_extent)?;
+                branch.signal_domain = signal_extent;
+                branch.rate_domain = rate_extent;
+            }
+        }
+        // other models have no ranges of a trial's own
+        _ => {}
+    }
+    spec.signal_range = signal_range;
+    spec.model = model;
+    Ok(Calibration::new(spec)?)
+}

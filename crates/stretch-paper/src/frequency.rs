@@ -1,0 +1,77 @@
+//! What the sensor makes of sines: the frequency response that the paper asks for.
+
+use std::f64::consts::TAU;
+
+use serde::Serialize;
+use stretch_sim::{Grid, Key, Rig, Sensing, Start};
+
+use crate::PaperError;
+
+/// Frequencies, in hertz.
+const FREQUENCIES_HZ: [f64; 12] = [0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.6, 2.5, 4.0, 7.0, 12.0];
+
+/// Amplitude of the length, in millimetres.
+const AMPLITUDE_MM: f64 = 3.0;
+
+/// Periods that are left out until the response has settled, and that are kept.
+const PERIODS: (f64, f64) = (4.0, 6.0);
+
+/// Samples a second of the simulation here.
+const RATE_HZ: f64 = 500.0;
+
+/// Gain and phase of the bridge voltage at one frequency.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct FrequencyPoint {
+    /// Frequency of the length, in hertz.
+    pub frequency_hz: f64,
+    /// Amplitude of the voltage's fundamental over that of the length, in volts
+    /// per millimetre.
+    pub gain_v_per_mm: f64,
+    /// Phase by which the voltage leads the contraction, in degrees.
+    pub lead_deg: f64,
+}
+
+/// Drives the sensing stage by sines of 3 mm about the middle of the stroke, at
+/// constant pressure, without noise, and fits the fundamental by least squares.
+///
+/// # Errors
+/// [`PaperError`] for a rig that cannot be simulated.
+pub fn frequency_response(rig: &Rig) -> Result<Vec<FrequencyPoint>, PaperError> {
+    let grid = Grid::samples(1.0 / RATE_HZ)?;
+    let stage = Sensing::new(&rig.params, &rig.effects, &grid)?;
+    let middle_mm = rig.params[Key::L0] * (1.0 - 0.5 * rig.params[Key::KMax]);
+    FREQUENCIES_HZ
+        .into_iter()
+        .map(|frequency_hz| {
+            let settle_s = (PERIODS.0 / frequency_hz).max(20.0);
+            let samples = ((settle_s + PERIODS.1 / frequency_hz) * RATE_HZ) as usize;
+            let phase = |n: usize| TAU * frequency_hz * n as f64 / RATE_HZ;
+            // a positive sine is a contraction: the length falls
+            let length_mm: Vec<f64> =
+                (0..samples).map(|n| middle_mm - AMPLITUDE_MM * phase(n).sin()).collect();
+            let pressure_kpa = vec![300.0; samples];
+            let mut volts = vec![0.0; samples];
+            stage.run(
+                &mut stage.memory(),
+                Start::Settled,
+                0.0,
+                &length_mm,
+                &pressure_kpa,
+                &mut volts,
+            )?;
+            let from = (settle_s * RATE_HZ) as usize;
+            let count = (samples - from) as f64;
+            let mean = volts[from..].iter().sum::<f64>() / count;
+            let project = |wave: fn(f64) -> f64| {
+                let products = volts[from..].iter().enumerate();
+                products.map(|(i, v)| (v - mean) * wave(phase(from + i))).sum::<f64>() * 2.0 / count
+            };
+            let (in_phase, leading) = (project(f64::sin), project(f64::cos));
+            Ok(FrequencyPoint {
+                frequency_hz,
+                gain_v_per_mm: in_phase.hypot(leading) / AMPLITUDE_MM,
+                lead_deg: leading.atan2(in_phase).to_degrees(),
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,80 @@
+//! Error against the gap between two pulses, which the paper asks for.
+
+use serde::Serialize;
+use stretch_data::{Split, TrialKind};
+use stretch_sim::{RATE_HZ, Session, TrialPlan};
+
+use crate::{PaperError, Pipeline, experiment::judge};
+
+/// Gaps that are tried, in seconds: the paper's range and a little beyond.
+const GAPS_S: [f64; 9] = [0.10, 0.15, 0.22, 0.32, 0.46, 0.66, 0.95, 1.4, 2.0];
+
+/// Length of a trial, in seconds.
+const TRIAL_S: f64 = 30.0;
+
+/// Errors on a trial whose pulse pairs all have one gap.
+#[derive(Debug, Clone, Serialize)]
+pub struct GapPoint {
+    /// From the end of the first pulse to the start of the second, in seconds.
+    pub gap_s: f64,
+    /// RMSE of raw, linear and non-linear as published, in millimetres.
+    pub published_rmse_mm: [f64; 3],
+    /// RMSE of raw, linear and non-linear as decided here, in millimetres.
+    pub ours_rmse_mm: [f64; 3],
+}
+
+/// Goes on with a session: a trial of pulse pairs for each gap.
+///
+/// Pulses are 0.25 s of full inlet; the outlet is open in the gap and for 1 s
+/// after a pair, then both valves are shut for 0.5 s.
+///
+/// # Errors
+/// [`PaperError`] when a trial cannot be simulated or judged.
+pub fn pulse_gaps(
+    session: &mut Session,
+    published: &Pipeline,
+    ours: &Pipeline,
+) -> Result<Vec<GapPoint>, PaperError> {
+    let mut points = Vec::new();
+    for gap_s in GAPS_S {
+        let (_, trial) = session.run(&pairs(gap_s))?;
+        let trials = [trial];
+        let rmse = |pipeline: &Pipeline, own_ranges| -> Result<[f64; 3], PaperError> {
+            let verdict = judge(&pipeline.linear, &pipeline.non_linear, &trials, own_ranges)?;
+            Ok([0, 1, 2].map(|method| verdict.pooled[method].rmse))
+        };
+        points.push(GapPoint {
+            gap_s,
+            published_rmse_mm: rmse(published, true)?,
+            ours_rmse_mm: rmse(ours, false)?,
+        });
+    }
+    Ok(points)
+}
+
+fn pairs(gap_s: f64) -> TrialPlan {
+    let samples = |seconds: f64| (seconds * RATE_HZ).round() as usize;
+    let total = samples(TRIAL_S);
+    let (mut inlet, mut outlet) = (vec![0.0; samples(1.0)], vec![0.0; samples(1.0)]);
+    let cycle =
+        [(1.0, 0.0, 0.25), (0.0, 1.0, gap_s), (1.0, 0.0, 0.25), (0.0, 1.0, 1.0), (0.0, 0.0, 0.5)];
+    for (fill, vent, seconds) in cycle.into_iter().cycle() {
+        if inlet.len() >= total {
+            break;
+        }
+        inlet.extend(std::iter::repeat_n(fill, samples(seconds)));
+        outlet.extend(std::iter::repeat_n(vent, samples(seconds)));
+    }
+    inlet.truncate(total);
+    outlet.truncate(total);
+    TrialPlan {
+        file: format!("gap_{:03}_ms.csv", (1000.0 * gap_s).round()),
+        kind: TrialKind::Pulses,
+        opening: None,
+        split: Split::Test,
+        full: false,
+        rate_hz: RATE_HZ,
+        inlet,
+        outlet,
+    }
+}

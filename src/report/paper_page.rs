@@ -1,0 +1,153 @@
+//! The paper's experiment as a page.
+
+use plotters::prelude::*;
+use stretch_paper::{Experiment, PUBLISHED};
+
+use super::{
+    canvas::Ink,
+    figure::{Area, Axes, Drawn, Figure, Frame, plot, stroke},
+    page::{Page, Table},
+};
+use crate::commands::paper::{error_rows, fit_rows, verdicts};
+
+/// Tables beside the published ones, and the two figures that the paper asks for.
+pub(crate) fn paper_page(experiment: &Experiment) -> String {
+    let arbitrary = |method: usize| experiment.published.arbitrary.pooled[method].rmse;
+    let verdict = format!(
+        "On a simulated rig the published method is off by {:.2} mm on arbitrary actuation; the raw signal by {:.2} mm. \
+         With matched rates and frozen ranges it is off by {:.2} mm.",
+        arbitrary(2),
+        arbitrary(0),
+        experiment.ours.arbitrary.pooled[2].rmse
+    );
+    let mut page = Page::new("The paper's experiment, simulated", &verdict);
+    page.section("What agrees and what does not", "");
+    page.list(&verdicts(experiment));
+    page.section("Fits", "Six inflations and six deflations; R^2 and RMSE of normalised strain.");
+    let table = |caption: &str, head: &[&str], rows| Table {
+        caption: caption.to_owned(),
+        head: head.iter().map(|&h| h.to_owned()).collect(),
+        rows,
+        highlight: None,
+    };
+    page.table(&table(
+        "As published, printed in the paper, and with our decisions",
+        &[
+            "Fit",
+            "R², published way",
+            "R², paper",
+            "RMSE %, published way",
+            "RMSE %, paper",
+            "R², ours",
+            "RMSE %, ours",
+        ],
+        fit_rows(experiment),
+    ));
+    page.section("Applied", "Average error over the range of the estimate, and RMSE.");
+    let head = [
+        "Method",
+        "Error %, published way",
+        "Error %, paper",
+        "RMSE mm, published way",
+        "RMSE mm, paper",
+        "Error %, ours",
+        "RMSE mm, ours",
+    ];
+    for (caption, paper, there, here) in [
+        (
+            "Arbitrary actuation",
+            &PUBLISHED.arbitrary,
+            &experiment.published.arbitrary,
+            &experiment.ours.arbitrary,
+        ),
+        ("Pulses", &PUBLISHED.pulses, &experiment.published.pulses, &experiment.ours.pulses),
+    ] {
+        page.table(&table(caption, &head, error_rows(there, paper, here)));
+    }
+    page.section(
+        "What the paper asks for next",
+        "How the error depends on the gap between two pulses, and what the sensor makes of sines.",
+    );
+    page.figure(&gap_figure(experiment), "RMSE on trials of pulse pairs with one gap each.");
+    page.figures(&[
+        (
+            gain_figure(experiment),
+            "Gain of the bridge voltage over the length, 3 mm about mid-stroke.".to_owned(),
+        ),
+        (lead_figure(experiment), "Phase by which the voltage leads the contraction.".to_owned()),
+    ]);
+    page.finish()
+}
+
+type Curve = (Ink, Vec<(f64, f64)>);
+
+fn curves_figure(description: &str, axes: &Axes, curves: &[Curve], frames: &[Frame]) -> Figure {
+    let draw = |area: &Area<'_>| -> Drawn {
+        plot(area, axes, |chart| {
+            for (ink, points) in curves {
+                chart.draw_series(LineSeries::new(
+                    points.iter().copied(),
+                    stroke(ink.color(), 2.0),
+                ))?;
+            }
+            Ok(())
+        })
+    };
+    frames.iter().fold(Figure::new(description), |figure, &frame| figure.draw(frame, draw))
+}
+
+fn top(curves: &[Curve]) -> f64 {
+    1.08 * curves.iter().flat_map(|(_, points)| points.iter().map(|p| p.1)).fold(0.0, f64::max)
+}
+
+fn gap_figure(experiment: &Experiment) -> Figure {
+    let curve = |of: fn(&stretch_paper::GapPoint) -> f64| {
+        experiment.gaps.iter().map(|point| (point.gap_s, of(point))).collect::<Vec<_>>()
+    };
+    let curves = [
+        (Ink::of(0), curve(|p| p.ours_rmse_mm[0])),
+        (Ink::of(1), curve(|p| p.published_rmse_mm[2])),
+        (Ink::of(2), curve(|p| p.ours_rmse_mm[2])),
+    ];
+    let axes = Axes {
+        x: 0.0..2.05,
+        y: 0.0..top(&curves),
+        x_label: "gap between the pulses, s".to_owned(),
+        y_label: "RMSE, mm".to_owned(),
+    };
+    let names = ["raw", "non-linear, as published", "non-linear, ours"];
+    curves_figure(
+        "RMSE against the gap between two pulses",
+        &axes,
+        &curves,
+        &[Frame::NARROW, Frame::WIDE],
+    )
+    .legend(names.into_iter().enumerate().map(|(i, name)| (Ink::of(i), name.to_owned())))
+}
+
+/// Frequencies stand on a logarithmic axis: its numbers are powers of ten.
+fn frequency_axes(y: std::ops::Range<f64>, y_label: &str) -> Axes {
+    Axes {
+        x: -1.75..1.15,
+        y,
+        x_label: "log10 of the frequency in Hz".to_owned(),
+        y_label: y_label.to_owned(),
+    }
+}
+
+fn gain_figure(experiment: &Experiment) -> Figure {
+    let points =
+        experiment.frequency.iter().map(|p| (p.frequency_hz.log10(), 1e3 * p.gain_v_per_mm));
+    let curves = [(Ink::of(2), points.collect())];
+    let axes = frequency_axes(0.0..top(&curves), "gain, mV/mm");
+    curves_figure("Gain of the sensor against frequency", &axes, &curves, &[Frame::NARROW])
+}
+
+fn lead_figure(experiment: &Experiment) -> Figure {
+    let points = experiment.frequency.iter().map(|p| (p.frequency_hz.log10(), p.lead_deg));
+    let curves = [(Ink::of(2), points.collect::<Vec<_>>())];
+    let values = || curves[0].1.iter().map(|p| p.1);
+    let (low, high) = (values().fold(0.0, f64::min), values().fold(0.0, f64::max));
+    let axes = frequency_axes(low - 2.0..high + 2.0, "lead, degrees");
+    curves_figure("Phase lead of the sensor against frequency", &axes, &curves, &[Frame::NARROW])
+}

@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let begun = Instant::now();
         let simulator = RigSimulator::read(&folder.join(name), None, &without)?;
         let result = diagnose(&simulator, &Options::default(), &|_| (), &|| false);
-        let (diagnosis, _) = match result {
+        let (diagnosis, evidence) = match result {
             Ok(done) => done,
             Err(error) => {
                 println!("{name} {error}");
@@ -83,6 +83,24 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             }
         }
         if wanted.contains(name) {
+            let frame = &evidence.frame;
+            for (s, stage) in evidence.stages.iter().enumerate() {
+                print!("        {}:", diagnosis.location.stages[s].stage);
+                for segment in &frame.segments {
+                    let mean = |r: &[f64]| {
+                        let part = &r[segment.from..segment.to];
+                        part.iter().map(|x| x * x).sum::<f64>() / part.len() as f64 - 1.0
+                    };
+                    print!(
+                        " {}{:?}={:.2}>{:.2}",
+                        segment.trial,
+                        segment.role,
+                        mean(&stage.residual_retuned),
+                        mean(&stage.residual_after)
+                    );
+                }
+                println!();
+            }
             for p in &diagnosis.parameters {
                 println!(
                     "        {} {:.2} sd bent {:.4} nominal {:.4}",

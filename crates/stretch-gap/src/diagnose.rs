@@ -78,7 +78,7 @@ fn run(
     let all = simulator.trials().len();
     let metrics: Result<Vec<Metric>, GapError> = (0..stages)
         .into_par_iter()
-        .map(|s| Metric::of(simulator, &frame, s, floors[s].sd, &shipped, all))
+        .map(|s| Metric::of(simulator, &frame, s, &floors[s], &shipped, all))
         .collect();
     let trials = frame.fit_trials;
     let mut bench = Bench { simulator, frame, metrics: metrics?, trials, stop };
@@ -87,7 +87,7 @@ fn run(
     // Once more around the re-tuned values: the sensitivities that nuisances are told by have moved.
     let metrics: Result<Vec<Metric>, GapError> = (0..stages)
         .into_par_iter()
-        .map(|s| Metric::of(simulator, &bench.frame, s, floors[s].sd, &nominal.model, all))
+        .map(|s| Metric::of(simulator, &bench.frame, s, &floors[s], &nominal.model, all))
         .collect();
     bench.metrics = metrics?;
     nominal = retune(&bench, &nominal.model)?;
@@ -248,8 +248,8 @@ fn stage_gaps(
             raw: s.excess_raw,
             excess: s.excess_retuned,
             after: s.excess_after,
-            rms: (1.0 + s.excess_retuned).max(0.0).sqrt() * floors[stage].sd,
-            floor: floors[stage].sd,
+            rms: (1.0 + s.excess_retuned).max(0.0).sqrt() * floors[stage].rms,
+            floor: floors[stage].rms,
             floor_source: floors[stage].source.clone(),
             unit: spec.unit.clone(),
         }

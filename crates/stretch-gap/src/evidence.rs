@@ -58,15 +58,14 @@ pub(crate) fn squares(
     stage: usize,
     model: &Model,
 ) -> Result<(Traces, Vec<f64>), GapError> {
-    let seen = bench.seen(stage, model);
     let trials = bench.simulator.trials().len();
     let mut output = vec![0.0; bench.frame.samples(trials)];
-    let run = Run { stage, model: &seen, trials, shake: None, step: 1.0 };
+    let run = Run { stage, model, trials, shake: None, step: 1.0 };
     bench.simulator.simulate(run, &mut output)?;
     let metric = &bench.metrics[stage];
     let measured = bench.simulator.measured(stage);
-    let mut residual: Vec<f64> =
-        measured.iter().zip(&output).map(|(m, s)| (m - s) / metric.floor).collect();
+    let apart = measured.iter().zip(&output).zip(&metric.sd);
+    let mut residual: Vec<f64> = apart.map(|((m, s), sd)| (m - s) / sd).collect();
     metric.clean(&bench.frame, &mut residual);
     let blocks = test_blocks(&bench.frame, &residual);
     Ok((Traces { output, residual }, blocks))
@@ -105,7 +104,7 @@ impl Evidence {
                 after: after.output,
                 residual_retuned: retuned.residual,
                 residual_after: after.residual,
-                floor: floor.sd,
+                floor: floor.rms,
                 excess_raw: mean_square(&raw_blocks) - 1.0,
                 excess_retuned: mean_square(&blocks) - 1.0,
                 excess_after: mean_square(&after_blocks) - 1.0,

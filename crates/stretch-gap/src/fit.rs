@@ -88,10 +88,7 @@ const ITERATIONS: usize = 14;
 impl Bench<'_> {
     /// Residual of a stage, measured minus simulated in floors.
     pub(crate) fn residual(&self, stage: usize, model: &Model) -> Result<Column, GapError> {
-        let mut values = self.simulate(stage, model)?;
-        let floor = self.metrics[stage].floor;
-        let measured = self.simulator.measured(stage);
-        values.iter_mut().zip(measured).for_each(|(x, m)| *x = (m - *x) / floor);
+        let values = self.residual_values(stage, model)?;
         Ok(self.metrics[stage].column(&self.frame, values))
     }
 
@@ -103,14 +100,6 @@ impl Bench<'_> {
         let mut out = vec![0.0; self.frame.samples(trials)];
         self.simulator.simulate(Run { stage, model, trials, shake: None, step: 1.0 }, &mut out)?;
         Ok(out)
-    }
-
-    /// The model as one stage sees it: effects that do not touch it are left out.
-    pub(crate) fn seen(&self, stage: usize, model: &Model) -> Model {
-        let specs = self.simulator.effects();
-        let mut seen = model.clone();
-        seen.effects.retain(|(i, _)| specs[*i].touches.contains(&stage));
-        seen
     }
 
     pub(crate) fn misfit(&self, stage: usize, residual: &Column) -> Misfit {
@@ -160,7 +149,7 @@ impl Bench<'_> {
     }
 
     fn residuals(&self, stages: &[usize], model: &Model) -> Result<Vec<Column>, GapError> {
-        stages.iter().map(|&s| self.residual(s, &self.seen(s, model))).collect()
+        stages.iter().map(|&s| self.residual(s, model)).collect()
     }
 
     fn weight(&self) -> f64 {
@@ -216,7 +205,7 @@ impl Bench<'_> {
                 if !acts {
                     return Ok(None);
                 }
-                let there = self.residual_values(stage, &self.seen(stage, &moved))?;
+                let there = self.residual_values(stage, &moved)?;
                 let values =
                     residual.values.iter().zip(there).map(|(a, b)| (a - b) / step).collect();
                 Ok(Some(self.metrics[stage].column(&self.frame, values)))
@@ -230,9 +219,10 @@ impl Bench<'_> {
         model: &Model,
     ) -> Result<Vec<f64>, GapError> {
         let mut values = self.simulate(stage, model)?;
-        let floor = self.metrics[stage].floor;
         let measured = self.simulator.measured(stage);
-        values.iter_mut().zip(measured).for_each(|(x, m)| *x = (m - *x) / floor);
+        for ((x, m), sd) in values.iter_mut().zip(measured).zip(&self.metrics[stage].sd) {
+            *x = (m - *x) / sd;
+        }
         Ok(values)
     }
 
@@ -245,8 +235,7 @@ impl Bench<'_> {
     ) -> Result<Sensitivities, GapError> {
         use rayon::prelude::*;
         let stages = [stage];
-        let bare = Model { parameters: model.parameters.clone(), effects: Vec::new() };
-        let (coordinates, bounds) = self.coordinates(&stages, &bare);
+        let (coordinates, bounds) = self.coordinates(&stages, model);
         let residuals = std::slice::from_ref(residual);
         let columns: Result<Vec<_>, GapError> = coordinates
             .par_iter()

@@ -1,5 +1,7 @@
 //! The floor of every stage: what no deterministic model could remove.
 
+use rayon::prelude::*;
+
 use crate::{
     error::GapError,
     frame::{Frame, Role},
@@ -9,41 +11,77 @@ use crate::{
 /// Floor of one stage.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Floor {
-    /// One standard deviation, in the unit of the output.
-    pub(crate) sd: f64,
+    /// One standard deviation at every sample of all trials, in the unit of the output.
+    pub(crate) sd: Vec<f64>,
+    /// Root mean square of it.
+    pub(crate) rms: f64,
     pub(crate) source: String,
 }
 
-/// Known noise of the output (else from second differences of the record), and what of the inputs' noise arrives.
+/// Draws of the inputs' noise.
+const DRAWS: u64 = 4;
+/// Half-width over which what arrives of them is averaged, in samples.
+const NEAR: usize = 8;
+
+/// Known noise of the output (else from second differences of the record), and what of the inputs' noise arrives: more
+/// where the output is steep or the input too quick to be smoothed.
 pub(crate) fn floors(
     simulator: &dyn Simulator,
     frame: &Frame,
     model: &Model,
     seed: u64,
 ) -> Result<Vec<Floor>, GapError> {
-    let trials = frame.fit_trials;
+    (0..simulator.stages().len())
+        .into_par_iter()
+        .map(|stage| floor(simulator, frame, stage, model, seed))
+        .collect()
+}
+
+fn floor(
+    simulator: &dyn Simulator,
+    frame: &Frame,
+    stage: usize,
+    model: &Model,
+    seed: u64,
+) -> Result<Floor, GapError> {
+    let trials = simulator.trials().len();
     let samples = frame.samples(trials);
-    let mut floors = Vec::new();
-    for (stage, spec) in simulator.stages().iter().enumerate() {
-        let mut plain = vec![0.0; samples];
+    let run = Run { stage, model, trials, shake: None, step: 1.0 };
+    let mut plain = vec![0.0; samples];
+    simulator.simulate(run, &mut plain)?;
+    let mut arrived = vec![0.0; samples];
+    for draw in 0..DRAWS {
         let mut shaken = vec![0.0; samples];
-        let run = Run { stage, model, trials, shake: None, step: 1.0 };
-        simulator.simulate(run, &mut plain)?;
-        simulator.simulate(Run { shake: Some(seed), ..run }, &mut shaken)?;
-        let square: f64 = plain.iter().zip(&shaken).map(|(a, b)| (a - b) * (a - b)).sum();
-        let arrived = square / samples.max(1) as f64;
-        let (own, mut source) = match spec.noise {
-            Some(noise) => (noise * noise, "known noise of the channel".to_owned()),
-            None => {
-                (of_record(simulator, frame, stage), "second differences of the record".to_owned())
-            }
-        };
-        if arrived > 1e-4 * own {
-            source += ", and the measured input's noise";
+        simulator.simulate(Run { shake: Some(seed + 1000 * draw), ..run }, &mut shaken)?;
+        let mut any = false;
+        for ((sum, a), b) in arrived.iter_mut().zip(&plain).zip(&shaken) {
+            *sum += (a - b) * (a - b) / DRAWS as f64;
+            any |= a != b;
         }
-        floors.push(Floor { sd: (own + arrived).sqrt().max(1e-12), source });
+        if !any {
+            break;
+        }
     }
-    Ok(floors)
+    let (own, mut source) = match simulator.stages()[stage].noise {
+        Some(noise) => (noise * noise, "known noise of the channel".to_owned()),
+        None => (of_record(simulator, frame, stage), "second differences of the record".to_owned()),
+    };
+    let mean = arrived.iter().sum::<f64>() / samples.max(1) as f64;
+    if mean > 1e-4 * own {
+        source += ", and the measured input's noise";
+    }
+    let mut sd = Vec::with_capacity(samples);
+    let mut begin = 0;
+    for trial in simulator.trials() {
+        let part = &arrived[begin..begin + trial.samples];
+        begin += trial.samples;
+        for i in 0..part.len() {
+            let near = &part[i.saturating_sub(NEAR)..(i + NEAR + 1).min(part.len())];
+            let local = near.iter().sum::<f64>() / near.len() as f64;
+            sd.push((own + local).sqrt().max(1e-12));
+        }
+    }
+    Ok(Floor { sd, rms: (own + mean).sqrt().max(1e-12), source })
 }
 
 /// Noise variance of a record: a sixth of the median square of its second differences, corrected for the median of a

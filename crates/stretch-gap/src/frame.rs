@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::{
     error::GapError,
+    floor::Floor,
     linear::Cholesky,
     simulator::{Model, Run, Simulator},
 };
@@ -124,11 +125,41 @@ impl Frame {
 struct Nuisance {
     /// Offset columns.
     dense: Vec<Vec<f64>>,
-    /// Sensitivities to parameters that wander, with the distance of their knots in samples.
-    wandering: Vec<(Vec<f64>, usize)>,
+    /// Sensitivities to parameters that wander, with the clock of each sample in knots.
+    wandering: Vec<Wandering>,
     /// Of the posterior precision.
     factor: Cholesky,
     size: usize,
+}
+
+/// Sensitivity to a wandering parameter, and the knots that each sample lies between.
+#[derive(Debug, Clone)]
+struct Wandering {
+    sensitivity: Vec<f64>,
+    /// Knot before, and share of the way to the next.
+    place: Vec<(u32, f64)>,
+    knots: usize,
+}
+
+impl Wandering {
+    fn new(sensitivity: Vec<f64>, clock: &[u32], knot: usize) -> Self {
+        let first = clock.first().copied().unwrap_or(0);
+        let place: Vec<(u32, f64)> = clock
+            .iter()
+            .map(|c| {
+                let at = (c - first) as usize;
+                ((at / knot) as u32, (at % knot) as f64 / knot as f64)
+            })
+            .collect();
+        let knots = place.iter().map(|p| p.0 as usize).max().unwrap_or(0) + 2;
+        Self { sensitivity, place, knots }
+    }
+
+    /// Sample, knot, weights of that knot and the next.
+    fn each(&self) -> impl Iterator<Item = (usize, usize, f64, f64)> {
+        let pairs = self.sensitivity.iter().zip(&self.place).enumerate();
+        pairs.map(|(i, (s, (k, share)))| (i, *k as usize, (1.0 - share) * s, share * s))
+    }
 }
 
 impl Nuisance {
@@ -136,14 +167,12 @@ impl Nuisance {
     fn project(&self, x: &[f64]) -> Vec<f64> {
         let mut out: Vec<f64> =
             self.dense.iter().map(|d| d.iter().zip(x).map(|(a, b)| a * b).sum()).collect();
-        for (sensitivity, knot) in &self.wandering {
-            let knots = x.len() / knot + 2;
+        for wandering in &self.wandering {
             let base = out.len();
-            out.resize(base + knots, 0.0);
-            for (i, (s, x)) in sensitivity.iter().zip(x).enumerate() {
-                let (k, share) = (i / knot, (i % knot) as f64 / *knot as f64);
-                out[base + k] += (1.0 - share) * s * x;
-                out[base + k + 1] += share * s * x;
+            out.resize(base + wandering.knots, 0.0);
+            for (i, k, this, next) in wandering.each() {
+                out[base + k] += this * x[i];
+                out[base + k + 1] += next * x[i];
             }
         }
         out
@@ -157,12 +186,11 @@ impl Nuisance {
             x.iter_mut().zip(d).for_each(|(x, d)| *x -= b * d);
         }
         let mut base = self.dense.len();
-        for (sensitivity, knot) in &self.wandering {
-            for (i, (s, x)) in sensitivity.iter().zip(x.iter_mut()).enumerate() {
-                let (k, share) = (i / knot, (i % knot) as f64 / *knot as f64);
-                *x -= s * ((1.0 - share) * b[base + k] + share * b[base + k + 1]);
+        for wandering in &self.wandering {
+            for (i, k, this, next) in wandering.each() {
+                x[i] -= this * b[base + k] + next * b[base + k + 1];
             }
-            base += sensitivity.len() / knot + 2;
+            base += wandering.knots;
         }
     }
 }
@@ -174,6 +202,8 @@ pub struct Metric {
     pub stage: usize,
     /// Floor, one standard deviation in the unit of the output.
     pub floor: f64,
+    /// The same at every sample.
+    pub(crate) sd: Vec<f64>,
     nuisances: Vec<Option<Nuisance>>,
 }
 
@@ -191,7 +221,7 @@ impl Metric {
         simulator: &dyn Simulator,
         frame: &Frame,
         stage: usize,
-        floor: f64,
+        floor: &Floor,
         model: &Model,
         trials: usize,
     ) -> Result<Self, GapError> {
@@ -204,7 +234,12 @@ impl Metric {
             .collect();
         let segments = frame.segments.len();
         if loose.is_empty() {
-            return Ok(Self { stage, floor, nuisances: vec![None; segments] });
+            return Ok(Self {
+                stage,
+                floor: floor.rms,
+                sd: floor.sd.clone(),
+                nuisances: vec![None; segments],
+            });
         }
         let samples = frame.samples(trials);
         let run = |model: &Model| -> Result<Vec<f64>, GapError> {
@@ -221,9 +256,20 @@ impl Metric {
             let mut moved = model.clone();
             moved.parameters[p] += sd;
             let mut column = run(&moved)?;
-            column.iter_mut().zip(&plain).for_each(|(x, y)| *x = (*x - y) / floor);
+            for ((x, y), sd) in column.iter_mut().zip(&plain).zip(&floor.sd) {
+                *x = (*x - y) / sd;
+            }
             columns.push(column);
         }
+        let clocks: Vec<Vec<u32>> = loose
+            .iter()
+            .map(|&p| {
+                simulator.wander_clock(p).unwrap_or_else(|| {
+                    let trials = simulator.trials().iter();
+                    trials.flat_map(|t| 0..t.samples as u32).collect()
+                })
+            })
+            .collect();
         let mut nuisances = Vec::with_capacity(segments);
         for segment in &frame.segments {
             if segment.trial >= trials {
@@ -233,15 +279,17 @@ impl Metric {
             let mut dense = Vec::new();
             let mut wandering = Vec::new();
             let mut priors: Vec<(usize, f64)> = Vec::new();
-            for (&p, column) in loose.iter().zip(&columns) {
+            for ((&p, column), clock) in loose.iter().zip(&columns).zip(&clocks) {
                 let part = column[segment.from..segment.to].to_vec();
                 match specs[p].wander {
                     Some(wander) => {
                         let knot = ((wander.knot_s / simulator.dt_s()) as usize).max(1);
                         let step_s = knot as f64 * simulator.dt_s();
                         let kept = (-step_s / wander.correlation_s).exp();
-                        priors.push((part.len() / knot + 2, kept));
-                        wandering.push((part, knot));
+                        let clock = &clock[segment.from..segment.to];
+                        let one = Wandering::new(part, clock, knot);
+                        priors.push((one.knots, kept));
+                        wandering.push(one);
                     }
                     None => dense.push(part),
                 }
@@ -251,7 +299,7 @@ impl Metric {
             nuisance.factor = Cholesky::of(&precision(&nuisance, &priors), size);
             nuisances.push(Some(nuisance));
         }
-        Ok(Self { stage, floor, nuisances })
+        Ok(Self { stage, floor: floor.rms, sd: floor.sd.clone(), nuisances })
     }
 
     /// A column of values in units of the floor over the first trials.
@@ -325,10 +373,9 @@ fn precision(nuisance: &Nuisance, priors: &[(usize, f64)]) -> Vec<f64> {
         a[i * n + i] += 1.0;
     }
     let mut base = dense;
-    for ((sensitivity, knot), &(knots, kept)) in nuisance.wandering.iter().zip(priors) {
-        for (i, s) in sensitivity.iter().enumerate() {
-            let (k, share) = (base + i / knot, (i % knot) as f64 / *knot as f64);
-            let (x, y) = ((1.0 - share) * s, share * s);
+    for (wandering, &(knots, kept)) in nuisance.wandering.iter().zip(priors) {
+        for (_, k, x, y) in wandering.each() {
+            let k = base + k;
             a[k * n + k] += x * x;
             a[k * n + k + 1] += x * y;
             a[(k + 1) * n + k] += x * y;

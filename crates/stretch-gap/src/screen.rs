@@ -41,9 +41,8 @@ impl Ground {
         let parts: Result<Vec<_>, GapError> = (0..stages)
             .into_par_iter()
             .map(|s| {
-                let seen = bench.seen(s, &model);
-                let residual = bench.residual(s, &seen)?;
-                let known = bench.nominal_sensitivities(s, &seen, &residual)?;
+                let residual = bench.residual(s, &model)?;
+                let known = bench.nominal_sensitivities(s, &model, &residual)?;
                 let solved = bench.solved(s, &known, &residual);
                 Ok((residual, Some(known), solved))
             })
@@ -70,7 +69,7 @@ impl Bench<'_> {
             let mut with_residual = 0.0;
             let mut possible = true;
             for &stage in &spec.touches {
-                let there = match self.residual_values(stage, &self.seen(stage, &model)) {
+                let there = match self.residual_values(stage, &model) {
                     Ok(there) => there,
                     Err(GapError::Stopped) => return Err(GapError::Stopped),
                     Err(_) => {

@@ -293,7 +293,24 @@ impl<'a> Search<'a> {
     fn is_worth(&self, base: &Solution, next: &Solution) -> bool {
         let rise = next.score - base.score;
         let (before, after) = (base.excess(self.bench), next.excess(self.bench));
-        rise > self.thresholds.rise && before - after >= self.thresholds.share * before
+        rise > self.thresholds.rise
+            && before - after >= self.thresholds.share * before
+            && self.is_no_mismatch(base, next)
+    }
+
+    /// Mismatch of form leaves a share of what an effect closes, which other effects then pick up: a further effect
+    /// must close more than that share of the gap that its stages had at first.
+    fn is_no_mismatch(&self, base: &Solution, next: &Solution) -> bool {
+        let Some(new) = next.effects.iter().find(|e| !base.effects.contains(e)) else {
+            return true;
+        };
+        let touched = &self.bench.simulator.effects()[*new].touches;
+        touched.iter().any(|&s| {
+            let closed = self.bench.excess(&base.misfits[s]) - self.bench.excess(&next.misfits[s]);
+            let gone =
+                self.bench.excess(&self.nominal.misfits[s]) - self.bench.excess(&base.misfits[s]);
+            closed > 0.0 && closed >= self.thresholds.mismatch * gone.max(0.0)
+        })
     }
 
     /// The set without one of its effects, fitted again.

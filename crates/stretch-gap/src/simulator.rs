@@ -175,7 +175,14 @@ pub trait Simulator: Sync {
     fn dt_s(&self) -> f64;
     /// Measured output of a stage, all trials end to end.
     fn measured(&self, stage: usize) -> &[f64];
-    /// Simulates a stage on its measured input; `out` takes the samples of the first `run.trials` trials.
+    /// Time, in samples, at which the wander of a parameter last had a way into the outputs, for every sample of all
+    /// trials end to end, counted from each trial's start; none when it always has.
+    fn wander_clock(&self, _parameter: usize) -> Option<Vec<u32>> {
+        None
+    }
+    /// Simulates a stage on its measured input; effects of other stages in the model are passed over.
+    ///
+    /// `out` takes the samples of the first `run.trials` trials.
     ///
     /// # Errors
     /// When the simulation is not possible with these values: the fit then turns back.

@@ -12,6 +12,8 @@ pub struct Thresholds {
     pub rise: f64,
     /// Least share of the gap left that an effect must close.
     pub share: f64,
+    /// Share of what was closed in a stage that mismatch of form may leave to a further effect.
+    pub mismatch: f64,
     /// Temperature of the probabilities, nats.
     pub temperature: f64,
     /// Growth of the temperature with the score that an effect brings.

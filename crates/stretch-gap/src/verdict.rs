@@ -29,7 +29,11 @@ pub(crate) fn decide(
     candidates: &[Candidate],
 ) -> Decision {
     let thresholds = &options.thresholds;
-    let (before, after) = evidence.trained;
+    let sum = |of: fn(&crate::evidence::StageEvidence) -> f64| -> f64 {
+        evidence.stages.iter().map(|s| of(s).max(0.0)).sum()
+    };
+    let before = evidence.trained.0.max(sum(|s| s.excess_retuned));
+    let after = evidence.trained.1.max(sum(|s| s.excess_after));
     let raw: f64 = evidence.stages.iter().map(|s| s.excess_raw.max(0.0)).sum();
     let specs = bench.simulator.effects();
     let mut notes = Vec::new();

@@ -165,10 +165,8 @@ impl Axis {
         let at = |k: usize| sizes.get((k * sizes.len() / 4).min(sizes.len().saturating_sub(1)));
         let ends: Vec<f64> = (0..=4).filter_map(at).copied().collect();
         let per = if unit.is_empty() { "1/s".to_owned() } else { format!("{unit}/s") };
-        let labels = ends
-            .windows(2)
-            .map(|e| format!("{} to {} {per}", short(e[0]), short(e[1])))
-            .collect();
+        let labels =
+            ends.windows(2).map(|e| format!("{} to {} {per}", short(e[0]), short(e[1]))).collect();
         let of = course
             .rate
             .iter()
@@ -202,12 +200,13 @@ impl Axis {
             (None, None) => "all".to_owned(),
         };
         let slot = |t: &f64| TIMES_S.iter().filter(|end| *t >= **end).count() as u16;
-        let in_trial =
-            Self { by: "time", labels: (0..count).map(label).collect(), of: time.iter().map(slot).collect() };
-        let (first, last) = (
-            session.first().copied().unwrap_or(0.0),
-            session.last().copied().unwrap_or(0.0),
-        );
+        let in_trial = Self {
+            by: "time",
+            labels: (0..count).map(label).collect(),
+            of: time.iter().map(slot).collect(),
+        };
+        let (first, last) =
+            (session.first().copied().unwrap_or(0.0), session.last().copied().unwrap_or(0.0));
         let all = course.travel.last().copied().unwrap_or(0.0);
         let motion = simulator.motion();
         [
@@ -265,8 +264,7 @@ fn line(samples: &[f64], at: usize, dt_s: f64) -> (f64, f64) {
 
 /// Noise of a record from the median of its second differences.
 fn noise(values: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> =
-        values.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
+    let mut sizes: Vec<f64> = values.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
     sizes.sort_by(f64::total_cmp);
     sizes.get(sizes.len() / 2).map_or(0.0, |m| m / 0.6745 / 6f64.sqrt())
 }
@@ -287,7 +285,8 @@ mod tests {
     #[test]
     fn noise_is_that_of_the_record() {
         let mut dice = crate::dice::Dice::new(3, 1);
-        let values: Vec<f64> = (0..20_000).map(|i| 1e-3 * f64::from(i) + 0.2 * dice.gauss()).collect();
+        let values: Vec<f64> =
+            (0..20_000).map(|i| 1e-3 * f64::from(i) + 0.2 * dice.gauss()).collect();
         // The median of 20 000 is good to a percent.
         assert!((noise(&values) / 0.2 - 1.0).abs() < 0.04);
     }

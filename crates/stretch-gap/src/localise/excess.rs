@@ -131,11 +131,10 @@ impl Cells {
 pub(super) fn discoveries(p: &[f64]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|a, b| p[*a].total_cmp(&p[*b]));
-    let last = order
-        .iter()
-        .enumerate()
-        .rev()
-        .find(|(rank, i)| p[**i] <= super::FALSE_DISCOVERIES * (rank + 1) as f64 / p.len() as f64);
+    let last =
+        order.iter().enumerate().rev().find(|(rank, i)| {
+            p[**i] <= super::FALSE_DISCOVERIES * (rank + 1) as f64 / p.len() as f64
+        });
     let limit = last.map_or(f64::NEG_INFINITY, |(_, i)| p[*i]);
     p.iter().map(|p| *p <= limit).collect()
 }

@@ -243,6 +243,24 @@ impl Simulator for RigSimulator {
         &self.measured[stage]
     }
 
+    fn wander_clock(&self, parameter: usize) -> Option<Vec<u32>> {
+        if self.keys[parameter] != Some(Key::PS) {
+            return None;
+        }
+        // The supply reaches the chamber through the inlet only: while it is shut, the clock stands still.
+        let mut clock = Vec::new();
+        for trial in &self.session.trials {
+            let mut last = 0;
+            for (i, opening) in trial.inlet.iter().enumerate() {
+                if *opening > 0.0 {
+                    last = i as u32;
+                }
+                clock.push(last);
+            }
+        }
+        Some(clock)
+    }
+
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
         run::simulate(self, run, None, out)
     }

@@ -244,9 +244,21 @@ impl Setting<'_> {
                 &mut volts,
             )?;
         }
-        let mut begin = 0;
+        let play = self.effects.find("pot_backlash").map_or(0.0, |e| e.values()[0]);
+        let mut free = if play > 0.0 { Some(self.free_length(count)?) } else { None };
+        let shown = if free.is_some() { self.reference_without("pot_backlash")? } else { shown };
         self.each(count, out, |trial, own| {
             let mut length = self.input(trial, false);
+            if let Some(free) = free.as_mut().map(|f| std::mem::take(&mut f[trial])) {
+                // The true length is where the model of the motion says, as far as the play of the reference allows.
+                // Their difference changes at reversals only; its mean keeps the noise of the record what it was.
+                let apart: Vec<f64> = free.iter().zip(&length).map(|(a, b)| a - b).collect();
+                for (i, shown) in length.iter_mut().enumerate() {
+                    let near = &apart[i.saturating_sub(3)..(i + 4).min(apart.len())];
+                    let mean = near.iter().sum::<f64>() / near.len() as f64;
+                    *shown += mean.clamp(-play, play);
+                }
+            }
             shown.undo(&mut length);
             let pressure = match (needs_pressure, self.rig.inputs.pressure.is_empty()) {
                 (false, _) => Vec::new(),
@@ -258,12 +270,48 @@ impl Setting<'_> {
             stage.run(&mut memory, self.start(trial), start_s, &length, &pressure, own)?;
             if let Some((a, f)) = hum {
                 let measured = &self.rig.session.trials[trial].bridge_v;
-                let _ = begin;
                 hum::add(a, f, self.params[Key::SigmaV], self.rig.dt_s, measured, own);
             }
-            begin += own.len();
             Ok(())
         })
+    }
+
+    /// Length that the model of the motion shows without play in the reference, trial by trial.
+    fn free_length(&self, count: usize) -> Result<Vec<Vec<f64>>, GapError> {
+        let mut effects = self.effects.clone();
+        effects.remove("pot_backlash");
+        let has_pressure = !self.rig.inputs.pressure.is_empty();
+        let grid = if has_pressure {
+            Grid::samples(self.rig.dt_s)?
+        } else {
+            effects.grid(&self.params, self.rig.dt_s, STEP_S)?
+        };
+        let without = Setting { rig: self.rig, params: self.params, effects, grid, ..*self };
+        let samples = self.rig.trials[..count].iter().map(|t| t.samples).sum();
+        let mut all = vec![0.0; samples];
+        if has_pressure {
+            without.muscle(count, &mut all)?;
+        } else {
+            without.actuation(count, &mut all)?;
+        }
+        let mut rest = all.as_slice();
+        let mut out = Vec::with_capacity(count);
+        for trial in &self.rig.trials[..count] {
+            let (own, behind) = rest.split_at(trial.samples);
+            out.push(own.to_vec());
+            rest = behind;
+        }
+        Ok(out)
+    }
+
+    fn reference_without(&self, name: &str) -> Result<Shown, GapError> {
+        let mut effects = self.effects.clone();
+        effects.remove(name);
+        let grid = Grid::samples(self.rig.dt_s)?;
+        let stage = Reference::new(&self.params, &effects, &grid)?;
+        let acts = effects.acting_in(Stage::Reference).next().is_some();
+        let memory = stage.memory();
+        Ok(Shown { stage, memory, acts, work: Vec::new() })
     }
 
     /// Linear between samples where the grid is finer.

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use stretch_data::{DataSet, ReadOptions, Split, Trial, TrialKind};
 
-use super::smooth::Smoother;
+use super::smooth::{Smoother, schedule};
 use crate::error::GapError;
 
 /// A measured trial of the rig.
@@ -255,20 +255,22 @@ pub(crate) struct Inputs {
 
 impl Inputs {
     pub(crate) fn of(session: &Session, length_sd: f64, pressure_sd: f64, supply_kpa: f64) -> Self {
-        let smooth = |record: &[f64], sd: f64| {
-            let smoother = Smoother::choose(record, sd);
+        let smooth = |trial: &RigTrial, record: &[f64], sd: f64, sharp: bool| {
+            let allowed = schedule(&trial.inlet, &trial.outlet, trial.dt_s, sharp);
+            let smoother = Smoother::choose(record, sd, &allowed);
             let values = smoother.apply(record);
             (smoother, values)
         };
         let trials = &session.trials;
-        let length: Vec<_> = trials.iter().map(|t| smooth(&t.length_mm, length_sd)).collect();
+        let length: Vec<_> =
+            trials.iter().map(|t| smooth(t, &t.length_mm, length_sd, false)).collect();
         let stroke = length
             .iter()
             .flat_map(|(_, l)| l)
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
         let pressure = trials
             .iter()
-            .filter_map(|t| t.pressure_kpa.as_ref().map(|p| smooth(p, pressure_sd)))
+            .filter_map(|t| t.pressure_kpa.as_ref().map(|p| smooth(t, p, pressure_sd, true)))
             .collect();
         let begin =
             trials.iter().map(|t| Self::begin(t, stroke, pressure_sd, supply_kpa)).collect();

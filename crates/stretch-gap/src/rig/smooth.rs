@@ -1,39 +1,106 @@
-//! Smoothing of a measured input, as wide as its noise allows and no wider.
+//! Smoothing of a measured input, as wide as the commands allow.
 
-/// Least squares parabola through five equal samples, at the middle (Savitzky & Golay 1964, doi 10.1021/ac60214a047).
-const FIVE: [f64; 5] = [-3.0 / 35.0, 12.0 / 35.0, 17.0 / 35.0, 12.0 / 35.0, -3.0 / 35.0];
-/// Most chi-squared per degree of freedom at which the parabola stands.
-const MOST: f64 = 3.5;
+/// Widest half-width, in samples.
+const WIDEST: usize = 15;
+/// Narrowest half-width.
+const NARROWEST: usize = 2;
+/// A window reaches no further than this share of the time since the last command, less its wake.
+const SHARE: f64 = 0.125;
+/// Time that the wake of a command lasts at least, s.
+const WAKE_S: f64 = 0.1;
+/// Standard deviations of its own by which a residual sum of squares may exceed its mean: noise alone hardly ever does.
+const PATIENCE: f64 = 4.0;
 
-/// Which samples of a record are smoothed.
+/// For every sample the half-width of the parabola, by least squares, that replaces it; 0 leaves it as it is.
+///
+/// Windows are chosen by what was commanded, not by the record: a choice by the record would favour noise that happens
+/// to look smooth, and what it leaves would pose as a gap. Only where a parabola is far off is a window narrowed.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Smoother {
-    smooth: Vec<bool>,
+    halves: Vec<u8>,
+}
+
+/// Sums of x^2 and x^4 over -h .. h, and the number of samples.
+fn moments(h: usize) -> (f64, f64, f64) {
+    let sum = |power: i32| 2.0 * (1..=h).map(|i| (i as f64).powi(power)).sum::<f64>();
+    (sum(2), sum(4), (2 * h + 1) as f64)
+}
+
+/// Value and residual sum of squares of the parabola around sample `i`.
+fn parabola(record: &[f64], i: usize, h: usize) -> (f64, f64) {
+    let (s2, s4, n) = moments(h);
+    let middle = record[i];
+    let (mut y0, mut y1, mut y2, mut yy) = (0.0, 0.0, 0.0, 0.0);
+    for (k, value) in record[i - h..=i + h].iter().enumerate() {
+        let x = k as f64 - h as f64;
+        let y = value - middle;
+        y0 += y;
+        y1 += x * y;
+        y2 += x * x * y;
+        yy += y * y;
+    }
+    let determinant = n * s4 - s2 * s2;
+    let a = (s4 * y0 - s2 * y2) / determinant;
+    let c = (n * y2 - s2 * y0) / determinant;
+    (middle + a, (yy - a * y0 - y1 * y1 / s2 - c * y2).max(0.0))
+}
+
+/// Half-widths that the commands allow: narrow behind a change, wider the longer nothing was changed, never beyond the next
+/// change. A signal with corners (`sharp`) is not smoothed across a change at all.
+pub(crate) fn schedule(inlet: &[f64], outlet: &[f64], dt_s: f64, sharp: bool) -> Vec<u8> {
+    let changes = |i: usize| i > 0 && (inlet[i] != inlet[i - 1] || outlet[i] != outlet[i - 1]);
+    let mut halves = vec![0_u8; inlet.len()];
+    // A trial begins at rest: nothing was changed for long.
+    let mut since = (1.0 / dt_s) as usize;
+    for (i, half) in halves.iter_mut().enumerate() {
+        since = if changes(i) { 0 } else { since + 1 };
+        let reach = SHARE * (since as f64 - WAKE_S / dt_s);
+        *half = (reach.max(0.0) as usize).clamp(NARROWEST, WIDEST) as u8;
+        if sharp {
+            *half = (*half).min(since.min(WIDEST) as u8);
+        }
+    }
+    let least = if sharp { 0 } else { NARROWEST };
+    let mut until = WIDEST;
+    for i in (0..halves.len()).rev() {
+        halves[i] = halves[i].min(until.max(least) as u8);
+        until = if changes(i) { 0 } else { (until + 1).min(WIDEST) };
+    }
+    halves
 }
 
 impl Smoother {
-    /// Chooses for a record with noise of standard deviation `sd`: where the parabola misses its samples by more
-    /// than noise would, the record turns too sharply and is left as it is.
-    pub(crate) fn choose(record: &[f64], sd: f64) -> Self {
-        let mut smooth = vec![false; record.len()];
-        for (i, w) in record.windows(5).enumerate() {
-            // Residual sum of squares: two degrees of freedom, the third and fourth differences.
-            let third = (-w[0] + 2.0 * w[1] - 2.0 * w[3] + w[4]) / 10.0_f64.sqrt();
-            let fourth = (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]) / 70.0_f64.sqrt();
-            smooth[i + 2] = third * third + fourth * fourth <= 2.0 * MOST * sd * sd;
-        }
-        Self { smooth }
+    /// Chooses for a record with noise of standard deviation `sd` and half-widths that the commands allow.
+    pub(crate) fn choose(record: &[f64], sd: f64, allowed: &[u8]) -> Self {
+        let variance = sd * sd;
+        let halves = allowed
+            .iter()
+            .enumerate()
+            .map(|(i, &allowed)| {
+                let mut h = usize::from(allowed).min(i).min(record.len() - 1 - i);
+                while h >= NARROWEST {
+                    let free = (2 * h - 2) as f64;
+                    if parabola(record, i, h).1
+                        <= variance * (free + PATIENCE * (2.0 * free).sqrt())
+                    {
+                        return h as u8;
+                    }
+                    h = if h > NARROWEST { (h / 2).max(NARROWEST) } else { 0 };
+                }
+                0
+            })
+            .collect();
+        Self { halves }
     }
 
     /// The record smoothed.
     pub(crate) fn apply(&self, record: &[f64]) -> Vec<f64> {
-        let mut out = record.to_vec();
-        for (i, w) in record.windows(5).enumerate() {
-            if self.smooth[i + 2] {
-                out[i + 2] = w.iter().zip(FIVE).map(|(x, c)| x * c).sum();
-            }
-        }
-        out
+        let each = self.halves.iter().enumerate();
+        each.map(|(i, &h)| match usize::from(h) {
+            0 => record[i],
+            h => parabola(record, i, h).0,
+        })
+        .collect()
     }
 }
 
@@ -43,15 +110,34 @@ mod tests {
 
     #[test]
     fn keeps_parabolas_and_corners() {
-        let parabola: Vec<f64> = (0..50).map(|i| 0.01 * f64::from(i * i)).collect();
-        let same = Smoother::choose(&parabola, 0.05).apply(&parabola);
-        assert!(parabola.iter().zip(&same).all(|(a, b)| (a - b).abs() < 1e-12));
+        let wide = vec![WIDEST as u8; 50];
+        let line: Vec<f64> = (0..50).map(|i| 0.01 * f64::from(i * i)).collect();
+        let same = Smoother::choose(&line, 0.05, &wide).apply(&line);
+        assert!(line.iter().zip(&same).all(|(a, b)| (a - b).abs() < 1e-9));
         let corner: Vec<f64> = (0..50).map(|i| f64::from((i - 25).max(0))).collect();
-        assert_eq!(Smoother::choose(&corner, 0.05).apply(&corner), corner);
+        let same = Smoother::choose(&corner, 0.05, &wide).apply(&corner);
+        assert!(corner.iter().zip(&same).all(|(a, b)| (a - b).abs() < 0.1));
+    }
+
+    #[test]
+    fn takes_noise_out_where_nothing_is_commanded() {
         let mut dice = crate::dice::Dice::new(1, 1);
         let noise: Vec<f64> = (0..20_000).map(|_| 0.05 * dice.gauss()).collect();
-        let out = Smoother::choose(&noise, 0.05).apply(&noise);
+        let shut = vec![0.0; noise.len()];
+        let allowed = schedule(&shut, &shut, 0.01, false);
+        let out = Smoother::choose(&noise, 0.05, &allowed).apply(&noise);
         let power = |x: &[f64]| x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64;
-        assert!(power(&out) < 0.6 * power(&noise));
+        assert!(power(&out) < 0.1 * power(&noise));
+    }
+
+    #[test]
+    fn windows_shrink_at_commands() {
+        let mut inlet = vec![0.0; 300];
+        inlet[150..].fill(1.0);
+        let halves = schedule(&inlet, &[0.0; 300], 0.01, false);
+        assert_eq!(schedule(&inlet, &[0.0; 300], 0.01, true)[150], 0);
+        assert_eq!(usize::from(halves[130]), WIDEST.min(20));
+        assert!(halves[145..165].iter().all(|h| *h <= 5));
+        assert_eq!(usize::from(halves[299]), WIDEST);
     }
 }

@@ -1,6 +1,7 @@
 //! What the programs in `src/bin` share. See the README beside this package.
 #![no_std]
 
+pub mod board;
 pub mod checksum;
 pub mod count;
 pub mod measure;

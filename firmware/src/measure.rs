@@ -2,7 +2,10 @@
 
 use semihosting::{eprintln, println};
 use stretch_core::Millimetres;
-use stretch_receptor::{Reading, Withheld, code::{AdcCode, CodeReading}};
+use stretch_receptor::{
+    Reading, Withheld,
+    code::{AdcCode, CodeReading},
+};
 
 use crate::{
     checksum::{Bits, Checksum},

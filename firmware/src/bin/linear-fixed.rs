@@ -16,7 +16,8 @@ fn step(design: &FixedReceptor<11, 2>, memory: &mut CodeMemory<11>, code: AdcCod
 
 #[entry]
 fn main() -> ! {
-    let calibration: FixedCalibration<11, 2> = postcard::from_bytes(RECORD).expect("a valid record");
+    let calibration: FixedCalibration<11, 2> =
+        postcard::from_bytes(RECORD).expect("a valid record");
     let design = FixedReceptor::new(calibration);
     replay("linear-fixed", &design, &mut design.memory(), |code| code, step);
     semihosting::process::exit(0)

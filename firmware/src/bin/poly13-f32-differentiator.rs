@@ -27,8 +27,18 @@ fn step(
 #[entry]
 fn main() -> ! {
     let calibration: Calibration = postcard::from_bytes(RECORD).expect("a valid record");
-    let rate = Differentiator::new(LowPassSpec { cutoff: Hertz(5.0), sample_rate: calibration.sample_rate_hz }).expect("a rate that can be designed");
+    let rate = Differentiator::new(LowPassSpec {
+        cutoff: Hertz(5.0),
+        sample_rate: calibration.sample_rate_hz,
+    })
+    .expect("a rate that can be designed");
     let design = Receptor::with_rate(&calibration, rate).expect("a calibration that fits f32");
-    replay("poly13-f32-differentiator", &design, &mut design.memory(), |code| Volts(trial::volts(code)), step);
+    replay(
+        "poly13-f32-differentiator",
+        &design,
+        &mut design.memory(),
+        |code| Volts(trial::volts(code)),
+        step,
+    );
     semihosting::process::exit(0)
 }

@@ -49,6 +49,12 @@ fn main() -> ! {
     let spec = TrackerSpec { tracking_index: 0.1, sample_rate: calibration.sample_rate_hz };
     let rate = Rate(Tracker::new(spec).expect("a rate that can be designed"));
     let design = Receptor::with_rate(&calibration, rate).expect("a calibration that fits f32");
-    replay("poly13-f32-tracker", &design, &mut design.memory(), |code| Volts(trial::volts(code)), step);
+    replay(
+        "poly13-f32-tracker",
+        &design,
+        &mut design.memory(),
+        |code| Volts(trial::volts(code)),
+        step,
+    );
     semihosting::process::exit(0)
 }

@@ -29,6 +29,12 @@ fn main() -> ! {
     let calibration: Calibration = postcard::from_bytes(RECORD).expect("a valid record");
     let rate = SgRate::new(calibration.sample_rate_hz).expect("a rate that can be designed");
     let design = Receptor::with_rate(&calibration, rate).expect("a calibration that fits f32");
-    replay("poly13-f32-volts", &design, &mut design.memory(), |code| Volts(trial::volts(code)), step);
+    replay(
+        "poly13-f32-volts",
+        &design,
+        &mut design.memory(),
+        |code| Volts(trial::volts(code)),
+        step,
+    );
     semihosting::process::exit(0)
 }

@@ -1,0 +1,81 @@
+//! The example to copy: a sample every 10 ms in, a line of the live link out.
+//!
+//! What belongs to a board is in `main`; `run` is the same on any.
+//! `stretch listen` shows and records what comes out.
+#![no_std]
+#![no_main]
+
+use cortex_m::peripheral::{SYST, syst::SystClkSource};
+use cortex_m_rt::entry;
+use embedded_io::Write;
+use stretch_core::Runner;
+use stretch_firmware::board::{Converter, Ended, Replay, Uart};
+use stretch_link::Frame;
+use stretch_receptor::code::{AdcCode, FixedCalibration, FixedReceptor};
+
+/// Made by `FixedCalibration::new` on a desk: what `stretch calibrate` found,
+/// over this board's converter.
+static RECORD: &[u8] = include_bytes!("../../data/poly13-fixed.postcard");
+
+const CORE_HZ: u32 = 25_000_000;
+const SAMPLE_HZ: u32 = 100;
+
+/// Waits for the next period.
+struct Pace(SYST);
+
+impl Pace {
+    fn new(mut syst: SYST) -> Self {
+        syst.set_clock_source(SystClkSource::Core);
+        syst.set_reload(CORE_HZ / SAMPLE_HZ - 1);
+        syst.clear_current();
+        syst.enable_counter();
+        Self(syst)
+    }
+
+    fn wait(&mut self) {
+        // the flag is cleared by reading it: a period that was missed is not made up
+        while !self.0.has_wrapped() {}
+    }
+}
+
+/// A sample that the converter fails to give is sent as missing; only what
+/// `is_end` accepts ends the loop.
+fn run<C: Converter>(
+    receptor: FixedReceptor<11, 2>,
+    converter: &mut C,
+    port: &mut impl Write,
+    pace: &mut Pace,
+    is_end: impl Fn(&C::Error) -> bool,
+) {
+    let mut receptor = Runner::new(receptor);
+    let mut counter = 0u32;
+    loop {
+        pace.wait();
+        let code = match converter.convert() {
+            Ok(code) => code,
+            Err(error) if is_end(&error) => return,
+            Err(_) => AdcCode::MISSING,
+        };
+        let frame = Frame {
+            counter,
+            time_ms: counter.wrapping_mul(1000 / SAMPLE_HZ),
+            code: code.0,
+            answer: receptor.step(code).into(),
+        };
+        // a port that fails loses a line, which the counter tells; the loop goes on
+        let _ = port.write_all(frame.encode(&mut [0; Frame::LONGEST]));
+        counter = counter.wrapping_add(1);
+    }
+}
+
+#[entry]
+fn main() -> ! {
+    let core = cortex_m::Peripherals::take().expect("taken once");
+    let calibration: FixedCalibration<11, 2> =
+        postcard::from_bytes(RECORD).expect("a valid record");
+    // SAFETY: an MPS2 board, emulated; the port is used here alone.
+    let mut port = unsafe { Uart::take() };
+    let mut pace = Pace::new(core.SYST);
+    run(FixedReceptor::new(calibration), &mut Replay::new(), &mut port, &mut pace, |Ended| true);
+    semihosting::process::exit(0)
+}

@@ -1,0 +1,273 @@
+//! `stretch listen`: a board's live link, shown and recorded.
+
+mod port;
+mod record;
+mod screen;
+
+use std::{
+    io::{self, BufWriter, IsTerminal, StdoutLock, Write},
+    path::PathBuf,
+    sync::mpsc::RecvTimeoutError,
+    time::{Duration, Instant},
+};
+
+use anyhow::Context;
+use stretch_calibrate::read_calibration;
+use stretch_core::{Calibration, Runner, Volts};
+use stretch_link::{Answer, Counts, Decoder, Event};
+use stretch_receptor::{
+    StretchReceptor,
+    code::{Adc, AdcSpec},
+};
+
+use self::{
+    port::Heard,
+    record::{Clock, Recording, Sample},
+    screen::Screen,
+};
+use super::stop;
+
+/// Show and record what a board sends over its serial port
+///
+/// Reads the lines of the live link: a frame a sample, with a counter and a
+/// checksum. A lost or damaged line is counted and skipped. On a terminal the
+/// estimate is plotted as it comes; elsewhere each sample is a line of CSV. A
+/// port that goes away is opened again when it comes back. Ctrl-C (or q) ends it.
+///
+///   stretch listen --port /dev/ttyACM0 --calibration cal.json --out trial.csv
+///
+/// The board's estimates are compared with those of the calibration here, and
+/// the largest difference is told: is it the calibration that the board runs?
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(crate) struct Args {
+    /// Serial port, or - for standard input
+    #[arg(long, value_name = "PATH|-")]
+    port: PathBuf,
+    /// Calibration record, from `stretch calibrate`
+    #[arg(long, value_name = "cal.json")]
+    calibration: PathBuf,
+    /// Trial that is recorded, a line a sample as it comes; must not exist
+    #[arg(long, value_name = "trial.csv")]
+    out: Option<PathBuf>,
+    /// Speed of the port
+    #[arg(long, default_value_t = 115_200, value_name = "BAUD")]
+    baud: u32,
+    /// Bits of the board's converter
+    #[arg(long, default_value_t = 12, value_name = "N")]
+    adc_bits: u8,
+    /// Volts at the converter's code 0
+    #[arg(long, default_value_t = 0.0, value_name = "V", allow_negative_numbers = true)]
+    adc_zero_v: f64,
+    /// Volts at the converter's largest code
+    #[arg(long, default_value_t = 3.3, value_name = "V")]
+    adc_full_scale_v: f64,
+}
+
+/// What there is to say beside the samples.
+pub(crate) struct Status {
+    connected: bool,
+    counts: Counts,
+    /// The largest difference between the board's estimate and the one here.
+    difference: f64,
+    unit: String,
+}
+
+impl Status {
+    fn line(&self) -> String {
+        let Counts { frames, lost, damaged, repeated, restarts, other_version } = self.counts;
+        let mut text = format!(
+            "{frames} frames, {lost} lost, {damaged} damaged, {repeated} repeated, {restarts} restarts"
+        );
+        if other_version > 0 {
+            text += &format!(", {other_version} of another version: update stretch or the board");
+        }
+        if frames > 0 {
+            text +=
+                &format!("; differs from the calibration by {:.4} {}", self.difference, self.unit);
+        }
+        if !self.connected {
+            text += "; waiting for the port";
+        }
+        text
+    }
+}
+
+pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+    let calibration = read_calibration(&args.calibration)?;
+    let adc = Adc::new(AdcSpec {
+        bits: args.adc_bits,
+        zero_v: args.adc_zero_v,
+        full_scale_v: args.adc_full_scale_v,
+    })?;
+    let shown_port = args.port.display();
+    let heard = port::listen(&args.port, args.baud).with_context(|| format!("{shown_port}"))?;
+    let mut recording = match &args.out {
+        Some(path) => Some(
+            Recording::create(path, &calibration)
+                .with_context(|| format!("{}: cannot record there", path.display()))?,
+        ),
+        None => None,
+    };
+    stop::record();
+    let mut session = Session::new(&calibration, adc)?;
+    let mut view = View::open(&calibration)?;
+    let mut result = Ok(());
+    while !stop::ended() && !view.asked_to_stop()? {
+        match heard.recv_timeout(Duration::from_millis(50)) {
+            Ok(Heard::Bytes(bytes)) => {
+                let samples = session.take(&bytes);
+                // what came is recorded before it is shown
+                if let Some(recording) = &mut recording {
+                    result = samples.iter().try_for_each(|sample| recording.push(sample));
+                    if result.is_err() {
+                        break;
+                    }
+                }
+                view.push(&samples)?;
+            }
+            Ok(Heard::Connected) => {
+                session.status.connected = true;
+                view.note(&format!("{shown_port}: connected"));
+            }
+            Ok(Heard::Disconnected(why)) => {
+                session.disconnected();
+                view.note(&format!("{shown_port}: {why}; waiting for it"));
+            }
+            Ok(Heard::Ended) | Err(RecvTimeoutError::Disconnected) => break,
+            Err(RecvTimeoutError::Timeout) => {}
+        }
+        view.draw(&session.status)?;
+    }
+    drop(view);
+    session.status.connected = true;
+    eprintln!("{}", session.status.line());
+    if let Some(recording) = recording {
+        let path = args.out.unwrap_or_default();
+        result
+            .and_then(|()| recording.finish())
+            .with_context(|| format!("{}: cannot record there", path.display()))?;
+    }
+    Ok(())
+}
+
+/// From bytes to samples.
+struct Session {
+    decoder: Decoder,
+    clock: Clock,
+    adc: Adc,
+    /// The calibration here, on the board's codes.
+    receptor: Runner<StretchReceptor<f64>>,
+    status: Status,
+}
+
+impl Session {
+    fn new(calibration: &Calibration, adc: Adc) -> anyhow::Result<Self> {
+        Ok(Self {
+            decoder: Decoder::new(),
+            clock: Clock::new(calibration.sample_rate_hz.period_s()),
+            adc,
+            receptor: Runner::new(StretchReceptor::new(calibration)?),
+            status: Status {
+                connected: false,
+                counts: Counts::default(),
+                difference: 0.0,
+                unit: calibration.reference.unit().to_owned(),
+            },
+        })
+    }
+
+    fn take(&mut self, bytes: &[u8]) -> Vec<Sample> {
+        let mut samples = Vec::new();
+        for &byte in bytes {
+            let Some(event) = self.decoder.push(byte) else { continue };
+            let Some(frame) = event.frame() else { continue };
+            if !matches!(event, Event::Frame(_)) {
+                // the board has seen samples that did not arrive here, or forgot those
+                // that did: both agree again when the window has filled
+                self.receptor.reset();
+            }
+            let restarted = matches!(event, Event::Restarted(_));
+            let time_s = self.clock.time_s(frame.time_ms, restarted, Instant::now());
+            let sample = Sample::new(time_s, frame, &self.adc);
+            self.compare(&sample);
+            samples.push(sample);
+        }
+        self.status.counts = self.decoder.counts();
+        samples
+    }
+
+    /// Where both have an estimate on the same branch, by how much they differ.
+    fn compare(&mut self, sample: &Sample) {
+        let ours = self.receptor.step(Volts(sample.signal.unwrap_or(f64::NAN)));
+        let (Ok(ours), Answer::Reading { branch, .. }) = (ours, sample.frame.answer) else {
+            return;
+        };
+        if let (Some(theirs), true) = (sample.estimate, branch == ours.branch) {
+            self.status.difference = self.status.difference.max((theirs - ours.estimate).abs());
+        }
+    }
+
+    fn disconnected(&mut self) {
+        let _ = self.decoder.disconnected();
+        self.status.counts = self.decoder.counts();
+        self.status.connected = false;
+    }
+}
+
+/// A plot on a terminal, lines elsewhere.
+enum View {
+    Screen { screen: Box<Screen>, drawn: Instant },
+    Lines { out: BufWriter<StdoutLock<'static>>, line: Vec<u8> },
+}
+
+impl View {
+    fn open(calibration: &Calibration) -> anyhow::Result<Self> {
+        if io::stdout().is_terminal() && io::stdin().is_terminal() {
+            let screen = Box::new(Screen::open(calibration).context("the terminal")?);
+            return Ok(Self::Screen { screen, drawn: Instant::now() });
+        }
+        let mut out = BufWriter::new(io::stdout().lock());
+        out.write_all(record::header(calibration).as_bytes())?;
+        out.flush()?;
+        Ok(Self::Lines { out, line: Vec::new() })
+    }
+
+    fn push(&mut self, samples: &[Sample]) -> io::Result<()> {
+        match self {
+            Self::Screen { screen, .. } => samples.iter().for_each(|sample| screen.push(sample)),
+            Self::Lines { out, line } => {
+                for sample in samples {
+                    line.clear();
+                    sample.push_line(line);
+                    out.write_all(line)?;
+                }
+                out.flush()?;
+            }
+        }
+        Ok(())
+    }
+
+    fn note(&self, text: &str) {
+        if let Self::Lines { .. } = self {
+            eprintln!("stretch: {text}");
+        }
+    }
+
+    fn draw(&mut self, status: &Status) -> io::Result<()> {
+        match self {
+            Self::Screen { screen, drawn } if drawn.elapsed() >= Duration::from_millis(50) => {
+                *drawn = Instant::now();
+                screen.draw(status)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn asked_to_stop(&self) -> io::Result<bool> {
+        match self {
+            Self::Screen { screen, .. } => screen.asked_to_stop(),
+            Self::Lines { .. } => Ok(false),
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! The port: bytes from a serial line that may go away and come back.
+
+use std::{
+    fs::{File, OpenOptions},
+    io::{self, Read},
+    path::{Path, PathBuf},
+    sync::mpsc::{Receiver, Sender, channel},
+    thread,
+    time::Duration,
+};
+
+/// What the port has to say.
+pub(crate) enum Heard {
+    Bytes(Vec<u8>),
+    Connected,
+    /// With the reason; it is opened again until somebody stops listening.
+    Disconnected(String),
+    /// The end of a stream that does not come back: a pipe or a file.
+    Ended,
+}
+
+/// How long to wait before a port that went away is opened again.
+const RETRY: Duration = Duration::from_millis(200);
+
+/// Reads a port from now on, `-` for standard input.
+///
+/// # Errors
+/// When the port cannot be opened the first time.
+pub(crate) fn listen(path: &Path, baud: u32) -> io::Result<Receiver<Heard>> {
+    let (sender, heard) = channel();
+    if path.as_os_str() == "-" {
+        thread::spawn(move || {
+            let _ = read_all(io::stdin(), &sender);
+            let _ = sender.send(Heard::Ended);
+        });
+        return Ok(heard);
+    }
+    let first = open(path, baud)?;
+    let path = path.to_owned();
+    // Reading blocks; the thread ends with the program, or when nobody listens.
+    thread::spawn(move || keep_reading(first, path, baud, &sender));
+    Ok(heard)
+}
+
+fn keep_reading(first: File, path: PathBuf, baud: u32, sender: &Sender<Heard>) {
+    let mut port = Some(first);
+    loop {
+        if let Some(file) = port.take() {
+            let regular = file.metadata().is_ok_and(|meta| meta.is_file());
+            if sender.send(Heard::Connected).is_err() {
+                return;
+            }
+            let why = match read_all(file, sender) {
+                Ok(()) if regular => {
+                    let _ = sender.send(Heard::Ended);
+                    return;
+                }
+                Ok(()) => "the port was closed".to_owned(),
+                Err(error) => error.to_string(),
+            };
+            if sender.send(Heard::Disconnected(why)).is_err() {
+                return;
+            }
+        }
+        thread::sleep(RETRY);
+        port = open(&path, baud).ok();
+    }
+}
+
+fn read_all(mut port: impl Read, sender: &Sender<Heard>) -> io::Result<()> {
+    let mut buffer = [0; 4096];
+    loop {
+        match port.read(&mut buffer) {
+            Ok(0) => return Ok(()),
+            Ok(n) => {
+                if sender.send(Heard::Bytes(buffer[..n].to_vec())).is_err() {
+                    return Ok(());
+                }
+            }
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+#[cfg(unix)]
+fn open(path: &Path, baud: u32) -> io::Result<File> {
+    use rustix::{fs::OFlags, termios};
+    use std::os::unix::fs::OpenOptionsExt;
+
+    let mut options = OpenOptions::new();
+    options.read(true);
+    // a terminal must not become ours, where its Ctrl-C would be
+    let port = options.custom_flags(OFlags::NOCTTY.bits() as i32).open(path)?;
+    if termios::isatty(&port) {
+        let mut settings = termios::tcgetattr(&port)?;
+        settings.make_raw();
+        settings.set_speed(baud)?;
+        termios::tcsetattr(&port, termios::OptionalActions::Now, &settings)?;
+    }
+    Ok(port)
+}
+
+#[cfg(not(unix))]
+fn open(path: &Path, _baud: u32) -> io::Result<File> {
+    // set up beforehand (mode COM3 ...)
+    OpenOptions::new().read(true).open(path)
+}

@@ -1,0 +1,125 @@
+//! The trial that is recorded: a line a sample, on the disk as it comes.
+
+use std::{
+    fs::{File, OpenOptions},
+    io::{self, Write},
+    path::Path,
+    time::Instant,
+};
+
+use stretch_core::Calibration;
+use stretch_data::push_number;
+use stretch_link::{Answer, Frame};
+use stretch_receptor::code::{Adc, AdcCode};
+
+/// One time line over restarts of the board and the wrap of its clock.
+pub(crate) struct Clock {
+    period_s: f64,
+    last: Option<(u32, f64, Instant)>,
+}
+
+impl Clock {
+    pub(crate) fn new(period_s: f64) -> Self {
+        Self { period_s, last: None }
+    }
+
+    /// Seconds since the first frame; rising. After a restart the time that
+    /// passed here stands in for the board's.
+    pub(crate) fn time_s(&mut self, time_ms: u32, restarted: bool, now: Instant) -> f64 {
+        let time_s = match self.last {
+            None => 0.0,
+            Some((_, before_s, heard)) if restarted => {
+                before_s + (now - heard).as_secs_f64().max(self.period_s)
+            }
+            Some((before_ms, before_s, _)) => {
+                let step_s = f64::from(time_ms.wrapping_sub(before_ms)) / 1000.0;
+                // two frames within a millisecond of the board's clock
+                before_s + if step_s > 0.0 { step_s } else { 1e-6 }
+            }
+        };
+        // to the microsecond: sums of steps carry dust
+        let time_s = (time_s * 1e6).round() / 1e6;
+        self.last = Some((time_ms, time_s, now));
+        time_s
+    }
+}
+
+/// One sample as it is shown and recorded.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sample {
+    pub time_s: f64,
+    /// In the signal's unit; `None` for a sample that the board did not get.
+    pub signal: Option<f64>,
+    /// In the reference's unit; `None` when withheld.
+    pub estimate: Option<f64>,
+    pub frame: Frame,
+}
+
+impl Sample {
+    pub(crate) fn new(time_s: f64, frame: Frame, adc: &Adc) -> Self {
+        let estimate = match frame.answer {
+            Answer::Reading { thousandths, .. } => Some(f64::from(thousandths) / 1000.0),
+            _ => None,
+        };
+        Self { time_s, signal: adc.volts(AdcCode(frame.code)), estimate, frame }
+    }
+
+    /// `time_s,signal,code,estimate,branch,domain`, empty where there is nothing.
+    pub(crate) fn push_line(&self, line: &mut Vec<u8>) {
+        push_number(line, self.time_s);
+        line.push(b',');
+        if let Some(signal) = self.signal {
+            push_number(line, signal);
+        }
+        // writing to memory cannot fail
+        let _ = match self.frame.answer {
+            Answer::Reading { thousandths, branch, domain } => {
+                let (sign, size) =
+                    (if thousandths < 0 { "-" } else { "" }, thousandths.unsigned_abs());
+                let (whole, rest) = (size / 1000, size % 1000);
+                writeln!(line, ",{},{sign}{whole}.{rest:03},{branch},{domain}", self.frame.code)
+            }
+            Answer::Warming => writeln!(line, ",{},,,warming", self.frame.code),
+            Answer::Missing => writeln!(line, ",{},,,missing", self.frame.code),
+        };
+    }
+}
+
+/// The header of the lines, in the names of the calibration.
+pub(crate) fn header(calibration: &Calibration) -> String {
+    let estimate = match calibration.reference.unit() {
+        "" => "estimate".to_owned(),
+        unit => format!("estimate_{unit}"),
+    };
+    format!("time_s,{},adc_code,{estimate},branch,domain\n", calibration.signal.as_str())
+}
+
+/// A trial file that grows by whole lines.
+pub(crate) struct Recording {
+    file: File,
+    line: Vec<u8>,
+}
+
+impl Recording {
+    /// A new file; one that exists is not touched.
+    pub(crate) fn create(path: &Path, calibration: &Calibration) -> io::Result<Self> {
+        let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
+        file.write_all(header(calibration).as_bytes())?;
+        Ok(Self { file, line: Vec::new() })
+    }
+
+    /// One write a sample, so that a program that is killed leaves whole lines.
+    /// A sample without a signal is no row of a trial: its time is a gap.
+    pub(crate) fn push(&mut self, sample: &Sample) -> io::Result<()> {
+        if sample.signal.is_none() {
+            return Ok(());
+        }
+        self.line.clear();
+        sample.push_line(&mut self.line);
+        self.file.write_all(&self.line)
+    }
+
+    pub(crate) fn finish(self) -> io::Result<()> {
+        self.file.sync_all()
+    }
+}

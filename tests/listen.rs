@@ -1,0 +1,322 @@
+//! `stretch listen` on a pseudo-terminal, with everything that a cable does.
+#![cfg(unix)]
+
+use std::{
+    fs::{self, File},
+    io::{BufRead, BufReader, Read, Write},
+    os::unix::fs::symlink,
+    path::{Path, PathBuf},
+    process::{Child, ChildStderr, Command, ExitStatus, Stdio},
+    thread,
+    time::{Duration, Instant},
+};
+
+use rustix::{
+    process::{Pid, Signal, kill_process},
+    pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt},
+    termios,
+};
+use stretch_core::Runner;
+use stretch_data::{ReadOptions, Trial};
+use stretch_link::Frame;
+use stretch_receptor::{
+    code::{Adc, AdcCode, AdcSpec, FixedCalibration, FixedReceptor},
+    example_calibration,
+};
+
+fn due() -> Adc {
+    Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 }).unwrap()
+}
+
+/// A board's frames for `samples` samples from reset, all of its answers real.
+fn board(samples: u32) -> Vec<Frame> {
+    let fixed = FixedCalibration::<11, 2>::new(&example_calibration(), &due()).unwrap();
+    let mut receptor = Runner::new(FixedReceptor::new(fixed));
+    (0..samples)
+        .map(|counter| {
+            let swing = (f64::from(counter) * 0.02).sin();
+            // one sample in a hundred does not come
+            let code = if counter % 100 == 57 { -1 } else { due().code(1.6 + 0.35 * swing).0 };
+            let answer = receptor.step(AdcCode(code)).into();
+            Frame { counter, time_ms: 10 * counter, code, answer }
+        })
+        .collect()
+}
+
+fn line(frame: &Frame) -> Vec<u8> {
+    frame.encode(&mut [0; Frame::LONGEST]).to_vec()
+}
+
+/// The other end of the port, which stands under a name that stays.
+fn plug(name: &Path) -> File {
+    let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
+    grantpt(&master).unwrap();
+    unlockpt(&master).unwrap();
+    let slave = ptsname(&master, Vec::new()).unwrap();
+    let _ = fs::remove_file(name);
+    symlink(Path::new(slave.to_str().unwrap()), name).unwrap();
+    File::from(master)
+}
+
+struct Listener {
+    child: Child,
+    notes: BufReader<ChildStderr>,
+    folder: tempfile::TempDir,
+}
+
+impl Listener {
+    fn port(folder: &Path) -> PathBuf {
+        folder.join("port")
+    }
+
+    fn start() -> (Self, File) {
+        let folder = tempfile::tempdir().unwrap();
+        let calibration = serde_json::to_string(&example_calibration()).unwrap();
+        fs::write(folder.path().join("cal.json"), calibration).unwrap();
+        let master = plug(&Self::port(folder.path()));
+        let mut child = Command::new(env!("CARGO_BIN_EXE_stretch"))
+            .current_dir(folder.path())
+            .args(["listen", "--port", "port", "--calibration", "cal.json", "--out", "trial.csv"])
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let notes = BufReader::new(child.stderr.take().unwrap());
+        let mut listener = Self { child, notes, folder };
+        listener.await_note("connected");
+        (listener, master)
+    }
+
+    fn await_note(&mut self, word: &str) -> String {
+        let mut note = String::new();
+        while !note.contains(word) {
+            note.clear();
+            assert_ne!(self.notes.read_line(&mut note).unwrap(), 0, "it ended without {word:?}");
+        }
+        note
+    }
+
+    fn recorded(&self) -> String {
+        fs::read_to_string(self.folder.path().join("trial.csv")).unwrap()
+    }
+
+    /// Waits until the record has `rows` rows.
+    fn await_rows(&self, rows: usize) {
+        let start = Instant::now();
+        while self.recorded().lines().count() < rows + 1 {
+            assert!(start.elapsed() < Duration::from_secs(20), "{}", self.recorded());
+            thread::sleep(Duration::from_millis(10));
+        }
+    }
+
+    /// Ctrl-C; how it ended and what it had to say.
+    fn stop(mut self) -> (ExitStatus, String, String) {
+        kill_process(Pid::from_child(&self.child), Signal::INT).unwrap();
+        let status = self.child.wait().unwrap();
+        let mut notes = String::new();
+        self.notes.read_to_string(&mut notes).unwrap();
+        let recorded = self.recorded();
+        let trial = Trial::read(
+            self.folder.path().join("trial.csv"),
+            &ReadOptions::new().require("bridge_v").require("adc_code"),
+        );
+        assert!(trial.is_ok(), "{trial:?}");
+        (status, notes, recorded)
+    }
+}
+
+/// The rows that a record of these frames has, without the time.
+fn rows<'a>(frames: impl IntoIterator<Item = &'a Frame>) -> Vec<String> {
+    use stretch_link::Answer;
+    let row = |frame: &Frame| {
+        let volts = due().volts(AdcCode(frame.code)).unwrap();
+        match frame.answer {
+            Answer::Reading { thousandths, branch, domain } => format!(
+                "{volts},{},{}.{:03},{branch},{domain}",
+                frame.code,
+                thousandths / 1000,
+                thousandths % 1000
+            ),
+            _ => format!("{volts},{},,,warming", frame.code),
+        }
+    };
+    frames.into_iter().filter(|frame| frame.code >= 0).map(row).collect()
+}
+
+fn without_time(recorded: &str) -> Vec<String> {
+    let rest = |line: &str| line.split_once(',').unwrap().1.to_owned();
+    recorded.lines().skip(1).map(rest).collect()
+}
+
+#[test]
+fn a_clean_line_is_recorded_sample_by_sample() {
+    let frames = board(300);
+    let (listener, mut master) = Listener::start();
+    frames.iter().for_each(|frame| master.write_all(&line(frame)).unwrap());
+    listener.await_rows(297);
+    let (status, notes, recorded) = listener.stop();
+    assert!(status.success(), "{notes}");
+    assert_eq!(without_time(&recorded), rows(&frames));
+    assert!(recorded.starts_with("time_s,bridge_v,adc_code,estimate_mm,branch,domain\n0,"));
+    assert!(recorded.contains("\n2.99,"), "the board's clock");
+    assert!(notes.contains("300 frames, 0 lost, 0 damaged, 0 repeated, 0 restarts"), "{notes}");
+    let told = notes.split("calibration by ").nth(1).unwrap().split(' ').next().unwrap();
+    // the last rounding of the board's fixed point, and what bridging three samples costs it
+    assert!((0.0004..=0.0015).contains(&told.parse::<f64>().unwrap()), "{notes}");
+}
+
+#[test]
+fn faults_lose_their_own_frames_and_no_others() {
+    let frames = board(400);
+    let (listener, mut master) = Listener::start();
+    let mut kept = Vec::new();
+    for (n, frame) in frames.iter().enumerate() {
+        let mut bytes = line(frame);
+        match n % 20 {
+            3 => bytes.extend(bytes.clone()), // doubled
+            7 => drop(bytes.remove(9)),       // a byte dropped
+            11 => bytes[12] ^= 0x04,          // a bit flipped
+            13 => bytes.truncate(20),         // the end cut off
+            17 => drop(bytes.splice(0..0, *b"\xff\x00noise\n$S1,\n")),
+            _ => {}
+        }
+        if !matches!(n % 20, 7 | 11 | 13) {
+            kept.push(*frame);
+        }
+        master.write_all(&bytes).unwrap();
+    }
+    listener.await_rows(rows(&kept).len());
+    let (status, notes, recorded) = listener.stop();
+    assert!(status.success(), "{notes}");
+    assert_eq!(without_time(&recorded), rows(&kept));
+    // 340 of 400; every lost one lies before the last that came
+    assert!(notes.contains("340 frames, 60 lost, 100 damaged, 20 repeated, 0 restarts"), "{notes}");
+}
+
+#[test]
+fn a_pulled_cable_and_a_board_that_restarts_lose_nothing_recorded() {
+    let frames = board(150);
+    let (mut listener, mut master) = Listener::start();
+    frames[..100].iter().for_each(|frame| master.write_all(&line(frame)).unwrap());
+    listener.await_rows(99);
+    // half a line, and the cable is pulled
+    master.write_all(&line(&frames[100])[..15]).unwrap();
+    let before = listener.recorded();
+    // the name goes first: the system gives the number to the next pseudo-terminal
+    fs::remove_file(Listener::port(listener.folder.path())).unwrap();
+    drop(master);
+    listener.await_note("waiting");
+    assert_eq!(listener.recorded(), before, "what was recorded stays");
+    let mut master = plug(&Listener::port(listener.folder.path()));
+    listener.await_note("connected");
+    // the end of that line, and the rest
+    master.write_all(&line(&frames[100])[15..]).unwrap();
+    frames[101..].iter().for_each(|frame| master.write_all(&line(frame)).unwrap());
+    listener.await_rows(99 + 49);
+    // the board starts again
+    frames[..30].iter().for_each(|frame| master.write_all(&line(frame)).unwrap());
+    listener.await_rows(99 + 49 + 30);
+    let (status, notes, recorded) = listener.stop();
+    assert!(status.success(), "{notes}");
+    let kept = frames[..100].iter().chain(&frames[101..]).chain(&frames[..30]);
+    assert_eq!(without_time(&recorded), rows(kept));
+    // the first half of that line may go with the cable
+    let damaged = if notes.contains("2 damaged") { 2 } else { 1 };
+    let expected = format!("179 frames, 1 lost, {damaged} damaged, 0 repeated, 1 restarts");
+    assert!(notes.contains(&expected), "{notes}");
+}
+
+#[test]
+fn killed_outright_it_leaves_every_whole_line() {
+    let frames = board(120);
+    let (mut listener, mut master) = Listener::start();
+    frames.iter().for_each(|frame| master.write_all(&line(frame)).unwrap());
+    listener.await_rows(119);
+    listener.child.kill().unwrap();
+    listener.child.wait().unwrap();
+    assert_eq!(without_time(&listener.recorded()), rows(&frames));
+}
+
+#[test]
+fn standard_input_ends_with_its_stream_and_a_record_is_never_overwritten() {
+    let folder = tempfile::tempdir().unwrap();
+    let calibration = serde_json::to_string(&example_calibration()).unwrap();
+    fs::write(folder.path().join("cal.json"), calibration).unwrap();
+    let frames = board(50);
+    let run = |out: &str| {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_stretch"))
+            .current_dir(folder.path())
+            .args(["listen", "--port", "-", "--calibration", "cal.json", "--out", out])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut input = child.stdin.take().unwrap();
+        // a program that refuses to start does not read
+        let _ = frames.iter().try_for_each(|frame| input.write_all(&line(frame)));
+        drop(input);
+        child.wait_with_output().unwrap()
+    };
+    let output = run("trial.csv");
+    assert!(output.status.success());
+    let shown = String::from_utf8(output.stdout).unwrap();
+    let recorded = fs::read_to_string(folder.path().join("trial.csv")).unwrap();
+    assert_eq!(shown, recorded, "off a terminal the lines are those of the record");
+    assert_eq!(without_time(&shown), rows(&frames));
+    let again = run("trial.csv");
+    assert!(!again.status.success());
+    assert!(String::from_utf8_lossy(&again.stderr).contains("trial.csv: cannot record there"));
+    assert_eq!(fs::read_to_string(folder.path().join("trial.csv")).unwrap(), recorded);
+}
+
+#[test]
+fn on_a_terminal_it_plots() {
+    let folder = tempfile::tempdir().unwrap();
+    let calibration = serde_json::to_string(&example_calibration()).unwrap();
+    fs::write(folder.path().join("cal.json"), calibration).unwrap();
+    let mut port = plug(&folder.path().join("port"));
+    let mut terminal = plug(&folder.path().join("terminal"));
+    let tty = |write: bool| {
+        let path = folder.path().join("terminal");
+        let file = File::options().read(true).write(write).open(path).unwrap();
+        let size = termios::Winsize { ws_row: 24, ws_col: 80, ws_xpixel: 0, ws_ypixel: 0 };
+        termios::tcsetwinsize(&file, size).unwrap();
+        file
+    };
+    let mut child = Command::new(env!("CARGO_BIN_EXE_stretch"))
+        .current_dir(folder.path())
+        .args(["listen", "--port", "port", "--calibration", "cal.json"])
+        .env("TERM", "xterm")
+        .stdin(tty(false))
+        .stdout(tty(true))
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut eyes = terminal.try_clone().unwrap();
+    let seen = thread::spawn(move || {
+        let (mut seen, mut buffer) = (Vec::new(), [0; 4096]);
+        // the terminal's end is an error on this side
+        while let Ok(n) = eyes.read(&mut buffer) {
+            seen.extend_from_slice(&buffer[..n]);
+            if n == 0 {
+                break;
+            }
+        }
+        seen
+    });
+    for frame in board(200) {
+        port.write_all(&line(&frame)).unwrap();
+        thread::sleep(Duration::from_millis(2));
+    }
+    thread::sleep(Duration::from_millis(300));
+    terminal.write_all(b"q").unwrap();
+    assert!(child.wait().unwrap().success());
+    let seen = seen.join().unwrap();
+    let seen = String::from_utf8_lossy(&seen);
+    let braille = seen.chars().filter(|c| ('\u{2801}'..='\u{28ff}').contains(c)).count();
+    assert!(braille > 20, "no curve: {braille}");
+    assert!(seen.contains("mm") && seen.contains("frames"), "{seen}");
+    assert!(seen.contains("\u{1b}[?1049l"), "the terminal was not given back");
+}

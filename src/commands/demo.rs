@@ -11,7 +11,7 @@ use super::{
     apply::estimates_csv,
     calibrate::print as print_calibration,
     evaluate::print as print_evaluation,
-    shared::{say, write_text},
+    shared::{say, say_json, write_text},
 };
 use crate::report::{self, Context};
 
@@ -39,11 +39,14 @@ pub(crate) struct Args {
     /// Seed of the simulated experiment
     #[arg(long, default_value_t = 3, requires = "paper", value_name = "N")]
     seed: u64,
+    /// Print JSON in place of tables
+    #[arg(long)]
+    json: bool,
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     if args.paper {
-        return super::paper::run(&args.out, args.seed);
+        return super::paper::run(&args.out, args.seed, args.json);
     }
     let read = |(name, text): (&str, &str)| {
         Trial::from_reader(text.as_bytes(), name, &ReadOptions::new().require(REFERENCE))
@@ -82,6 +85,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     write_text(&file("report.html"), &report::calibration_page(&shown, &evaluation, &context))?;
     write_text(&file("estimate.svg"), &report::readme_picture(&shown, &evaluation))?;
 
+    if args.json {
+        return say_json(&evaluation);
+    }
     say(format!("Calibrated on {}, a measured session:", fit.name))?;
     print_calibration(&surfaces, &ranking)?;
     say(format!("\nTested on {}, which was not used for the fit:", test.name))?;

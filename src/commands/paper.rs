@@ -12,15 +12,18 @@ use crate::{
     table::{number, p_value, table},
 };
 
-pub(super) fn run(out: &Path, seed: u64) -> anyhow::Result<()> {
+pub(super) fn run(out: &Path, seed: u64, json: bool) -> anyhow::Result<()> {
     let bar = progress("simulating, fitting, judging", 1);
     let experiment = Experiment::run(&paper_preset()?, seed)?;
     bar.finish_and_clear();
     std::fs::create_dir_all(out)
         .map_err(|e| anyhow::anyhow!("{}: cannot make the folder: {e}", out.display()))?;
     write_text(&out.join("paper.html"), &report::paper_page(&experiment))?;
-    let json = serde_json::to_string_pretty(&experiment.to_serialise())?;
-    write_text(&out.join("paper.json"), &json)?;
+    let text = serde_json::to_string_pretty(&experiment.to_serialise())?;
+    write_text(&out.join("paper.json"), &text)?;
+    if json {
+        return say(text);
+    }
 
     say(format!("The paper's experiment on the simulated rig, preset `paper`, seed {seed}"))?;
     say("\nFits, normalised (next lower and next higher order below each):")?;

@@ -4,6 +4,7 @@ mod backlash;
 mod effects;
 mod error;
 mod gauge;
+mod gauge_file;
 mod grid;
 mod memory;
 mod nearest;

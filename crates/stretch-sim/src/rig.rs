@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, fmt::Write};
 
-use stretch_data::{EffectEntry, Parameter, RigFile};
+use stretch_data::{Parameter, RigFile};
 
 use crate::{
     Bridge, SimError, StaticLaw,
@@ -122,11 +122,7 @@ impl Rig {
                 name: info.name.into(),
             });
         }
-        for entry in &file.effects {
-            let values: Vec<(&str, f64)> =
-                entry.parameters.iter().map(|(name, value)| (name.as_str(), *value)).collect();
-            rig.effects.insert(&entry.name, &values)?;
-        }
+        rig.effects = EffectSet::from_entries(&file.effects)?;
         rig.check()?;
         Ok(rig)
     }
@@ -229,20 +225,7 @@ impl Rig {
             let table = entries.map(|(name, value)| (name.to_string(), exact(value)));
             stages.insert(SIMULATION.into(), BTreeMap::from(table));
         }
-        let effects = self
-            .effects
-            .iter()
-            .map(|e| EffectEntry {
-                name: e.name().to_string(),
-                parameters: e
-                    .effect()
-                    .parameters()
-                    .iter()
-                    .zip(e.values())
-                    .map(|(p, value)| (p.name.to_string(), *value))
-                    .collect(),
-            })
-            .collect();
+        let effects = self.effects.to_entries();
         RigFile { kind: None, effects, stages }
     }
 }

@@ -1,6 +1,8 @@
 //! Effects that are on, with their values.
 
 use super::{Action, CATALOGUE, Effect, Surroundings, effect_named};
+use stretch_data::EffectEntry;
+
 use crate::{SimError, grid::Grid, nearest::nearest, params::RigParams, stage::Stage};
 
 /// One effect with the values of its parameters, in the order of [`Effect::parameters`].
@@ -89,6 +91,35 @@ impl EffectSet {
             }
         }
         self.push(effect, &values)
+    }
+
+    /// The effects that a rig file lists, in its order.
+    ///
+    /// # Errors
+    /// As for [`insert`](Self::insert).
+    pub fn from_entries(entries: &[EffectEntry]) -> Result<Self, SimError> {
+        let mut effects = Self::new();
+        for entry in entries {
+            let values: Vec<(&str, f64)> =
+                entry.parameters.iter().map(|(name, value)| (name.as_str(), *value)).collect();
+            effects.insert(&entry.name, &values)?;
+        }
+        Ok(effects)
+    }
+
+    /// The effects as a rig file lists them.
+    pub fn to_entries(&self) -> Vec<EffectEntry> {
+        let entry = |e: &ActiveEffect| EffectEntry {
+            name: e.name().to_string(),
+            parameters: e
+                .effect()
+                .parameters()
+                .iter()
+                .zip(e.values())
+                .map(|(p, value)| (p.name.to_string(), *value))
+                .collect(),
+        };
+        self.iter().map(entry).collect()
     }
 
     /// Adds any effect, the catalogue's or a user's own, with the values of all of its parameters. Ranges are plausible

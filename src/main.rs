@@ -1,6 +1,7 @@
 //! The `stretch` program: parse, dispatch.
 
 mod commands;
+mod plain;
 mod report;
 mod table;
 
@@ -8,7 +9,9 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use commands::{apply, calibrate, convert, demo, effects, evaluate, listen, rig, simulate};
+use commands::{
+    apply, calibrate, convert, demo, diagnose, effects, evaluate, listen, rig, simulate,
+};
 
 /// From the voltage of a stretch sensor to length, live.
 ///
@@ -37,6 +40,7 @@ enum Command {
     Convert(convert::Args),
     Demo(demo::Args),
     Simulate(simulate::Args),
+    Diagnose(diagnose::Args),
     Effects(effects::Args),
     Rig(rig::Args),
     Listen(listen::Args),
@@ -56,6 +60,7 @@ fn main() -> ExitCode {
         Command::Convert(args) => convert::run(args),
         Command::Demo(args) => demo::run(args),
         Command::Simulate(args) => simulate::run(args),
+        Command::Diagnose(args) => diagnose::run(args),
         Command::Effects(args) => effects::run(args),
         Command::Rig(args) => rig::run(args),
         Command::Listen(args) => listen::run(args),

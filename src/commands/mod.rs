@@ -4,6 +4,8 @@ pub(crate) mod apply;
 pub(crate) mod calibrate;
 pub(crate) mod convert;
 pub(crate) mod demo;
+pub(crate) mod diagnose;
+mod diagnosis_text;
 pub(crate) mod effects;
 pub(crate) mod evaluate;
 pub(crate) mod listen;

@@ -85,6 +85,12 @@ impl Figure {
         self
     }
 
+    /// Keeps the shape for phones alone: for figures that stand side by side.
+    pub(crate) fn keep_narrowest(&mut self) {
+        let narrowest = self.drawings.iter().map(|(frame, _)| frame.width).min();
+        self.drawings.retain(|(frame, _)| Some(frame.width) == narrowest);
+    }
+
     /// Adds a legend.
     #[must_use]
     pub(crate) fn legend(mut self, entries: impl IntoIterator<Item = (Ink, String)>) -> Self {

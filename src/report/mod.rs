@@ -3,13 +3,17 @@
 //! [`page`] is the frame that all reports share and [`figure`] the axes;
 //! the other files say what stands in them.
 
+mod bar_figure;
 mod branch;
 mod calibration_page;
 mod calibration_tables;
 pub(crate) mod canvas;
+mod diagnosis_page;
+mod diagnosis_tables;
 mod error_figure;
 mod estimate_figure;
 pub(crate) mod figure;
+mod gap_figures;
 pub(crate) mod markup;
 pub(crate) mod page;
 mod paper_page;
@@ -20,6 +24,7 @@ pub(crate) mod thin;
 #[allow(unused_imports, reason = "draws the picture of the README, outside the program")]
 pub(crate) use calibration_page::readme_picture;
 pub(crate) use calibration_page::{Context, calibration_page};
+pub(crate) use diagnosis_page::{Subject, diagnosis_page};
 pub(crate) use paper_page::paper_page;
 
 #[cfg(test)]

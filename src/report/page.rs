@@ -64,6 +64,16 @@ impl Page {
         self.put("</ul>\n")
     }
 
+    /// Short answers side by side, each under its question.
+    pub(crate) fn facts(&mut self, facts: &[(&str, String)]) -> &mut Self {
+        self.put("<dl class=\"facts\">\n");
+        for (question, answer) in facts {
+            let (question, answer) = (escape(question), escape(answer));
+            self.put(&format!("<div><dt>{question}</dt><dd>{answer}</dd></div>\n"));
+        }
+        self.put("</dl>\n")
+    }
+
     /// A figure over the whole width.
     pub(crate) fn figure(&mut self, figure: &Figure, caption: &str) -> &mut Self {
         self.put("<figure>");

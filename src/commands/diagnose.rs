@@ -1,0 +1,157 @@
+//! `stretch diagnose`: where simulator and measurement part, which effect causes it, how far the gap closes.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail, ensure};
+use indicatif::{ProgressBar, ProgressStyle};
+use stretch_data::RigFile;
+use stretch_gap::{Diagnosis, Evidence, GapError, Options, RigSimulator, Simulator, diagnose};
+
+use super::{
+    diagnosis_text::text,
+    shared::{say, short_name, write_text},
+};
+use crate::report::{Subject, diagnosis_page};
+
+/// Say where a simulator and a measurement part, which effect causes it, and how far the gap closes
+///
+///   stretch diagnose bench --report gap.html
+///
+/// DATASET is a folder with dataset.toml and its trials (inlet, outlet, length_mm, bridge_v and,
+/// where it was recorded, pressure_kpa), or, for a gauge alone, one trial or such a folder with a
+/// reference and a signal:
+///
+///   stretch diagnose knit.csv --reference angle_deg --signal s2
+///
+/// Test trials are read once, at the end. Without --rig the rig file that the data set names is
+/// the simulator, else the stock rig.
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(crate) struct Args {
+    /// Folder with dataset.toml, or a trial
+    #[arg(value_name = "DATASET")]
+    data_set: PathBuf,
+    /// Rig file: nominal parameters with their tolerances
+    #[arg(long, value_name = "rig.toml")]
+    rig: Option<PathBuf>,
+    /// Write the diagnosis as JSON
+    #[arg(long, value_name = "d.json")]
+    json: Option<PathBuf>,
+    /// Write a report that opens in any browser
+    #[arg(long, value_name = "d.html")]
+    report: Option<PathBuf>,
+    /// Leave an effect out of the catalogue; may be given several times
+    #[arg(long, value_name = "EFFECT")]
+    without: Vec<String>,
+    /// Most effects named at once
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=8))]
+    depth: u8,
+    /// Threads, 0 for all; the result is the same
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    threads: usize,
+    /// Seed of the intervals
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Reference column of a gauge alone
+    #[arg(long, value_name = "COLUMN", requires = "signal")]
+    reference: Option<String>,
+    /// Signal column of a gauge alone
+    #[arg(long, value_name = "COLUMN", requires = "reference")]
+    signal: Option<String>,
+    /// Write the recommended experiment as a trial file
+    #[arg(long, value_name = "next.csv")]
+    experiment: Option<PathBuf>,
+    /// Run the simpler methods beside, too
+    #[arg(long, hide = true)]
+    baselines: bool,
+}
+
+pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+    ensure!(args.data_set.exists(), "{}: there is no such file or folder", args.data_set.display());
+    let options = Options {
+        depth: args.depth.into(),
+        threads: args.threads,
+        seed: args.seed,
+        baselines: args.baselines,
+        ..Options::default()
+    };
+    let bar = spinner();
+    let rig = args.rig.as_deref().map(RigFile::read).transpose()?;
+    let gauge = args.reference.as_deref().zip(args.signal.as_deref());
+    if !args.data_set.is_dir() && gauge.is_none() {
+        bail!(
+            "{}: a single trial is diagnosed as a gauge alone: say which columns with \
+             --reference and --signal, or give the folder of a data set",
+            args.data_set.display()
+        );
+    }
+    if gauge.is_some() {
+        bail!("a gauge alone cannot be diagnosed yet");
+    }
+    bar.set_message("reading");
+    let shown = || args.data_set.display().to_string();
+    let simulator =
+        RigSimulator::read(&args.data_set, rig.as_ref(), &args.without).with_context(shown)?;
+    let (mut diagnosis, evidence) = work(&simulator, &options, &bar).with_context(shown)?;
+    diagnosis.notes.splice(0..0, simulator.session().notes.iter().cloned());
+    bar.finish_and_clear();
+    conclude(&args, &diagnosis, &evidence, &simulator)
+}
+
+fn work(
+    simulator: &dyn Simulator,
+    options: &Options,
+    bar: &ProgressBar,
+) -> Result<(Diagnosis, Evidence), GapError> {
+    let progress = |what: &str| bar.set_message(what.to_owned());
+    diagnose(simulator, options, &progress, &stretch_data::interrupted)
+}
+
+/// Writes the files first: a message that they are there is then true.
+fn conclude(
+    args: &Args,
+    diagnosis: &Diagnosis,
+    evidence: &Evidence,
+    simulator: &dyn Simulator,
+) -> anyhow::Result<()> {
+    let name = name_of(&args.data_set);
+    if let Some(path) = &args.json {
+        write_text(path, &json(diagnosis, &name, args.seed)?)?;
+    }
+    if let Some(path) = &args.report {
+        let subject = Subject { name: &name, diagnosis, evidence, simulator };
+        write_text(path, &diagnosis_page(&subject))?;
+    }
+    say(&diagnosis.sentence)?;
+    say(text(diagnosis))?;
+    for path in [&args.json, &args.report].into_iter().flatten() {
+        say(format!("wrote {}", path.display()))?;
+    }
+    Ok(())
+}
+
+/// The diagnosis in its schema, with what it was made from.
+fn json(diagnosis: &Diagnosis, name: &str, seed: u64) -> anyhow::Result<String> {
+    let mut value = serde_json::to_value(diagnosis)?;
+    value["data_set"] = name.into();
+    value["seed"] = seed.into();
+    value["version"] = env!("CARGO_PKG_VERSION").into();
+    Ok(serde_json::to_string_pretty(&value)? + "\n")
+}
+
+/// What the data are called: the folder's or the file's name.
+fn name_of(path: &Path) -> String {
+    let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    short_name(&real)
+}
+
+/// Seen on a terminal only: what goes on, and for how long already.
+fn spinner() -> ProgressBar {
+    let bar = ProgressBar::new_spinner().with_message("reading");
+    // the template is a constant: were it wrong, the plain spinner is shown
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed}") {
+        bar.set_style(style);
+    }
+    bar.enable_steady_tick(std::time::Duration::from_millis(120));
+    bar
+}

@@ -1,0 +1,176 @@
+//! Horizontal bars: a few numbers with their intervals, and what they belong to.
+
+use plotters::{
+    prelude::*,
+    style::text_anchor::{HPos, VPos},
+};
+
+use super::{
+    canvas::Ink,
+    figure::{Area, Drawn, Figure, Frame, dot, px, stroke, words},
+    markup::{number, tick},
+};
+
+/// Height of a bar, of a row's label, and of the axis, in pixels.
+const BAR: f64 = 11.0;
+const LABEL: f64 = 21.0;
+const AXIS: f64 = 46.0;
+/// Space for the number behind the longest bar.
+const NUMBER: f64 = 62.0;
+
+/// One bar.
+#[derive(Debug, Clone)]
+pub(crate) struct Bar {
+    /// Its colour.
+    pub(crate) ink: Ink,
+    /// How long it is.
+    pub(crate) value: f64,
+    /// An interval around its end.
+    pub(crate) interval: Option<[f64; 2]>,
+    /// What stands behind it; the value when empty.
+    pub(crate) text: String,
+}
+
+impl Bar {
+    /// A bar with its value behind it.
+    pub(crate) fn new(ink: Ink, value: f64) -> Self {
+        Self { ink, value, interval: None, text: String::new() }
+    }
+}
+
+/// Bars under one label.
+#[derive(Debug, Clone)]
+pub(crate) struct Row {
+    /// What they belong to.
+    pub(crate) label: String,
+    /// The bars.
+    pub(crate) bars: Vec<Bar>,
+}
+
+/// How lengths stand for values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Scale {
+    /// From 0 to 1, in percent.
+    Percent,
+    /// Equal ratios from 1, the noise floor.
+    Floors,
+}
+
+/// Draws rows of bars.
+pub(crate) fn bar_figure(description: &str, rows: &[Row], scale: Scale, x_label: &str) -> Figure {
+    if rows.is_empty() {
+        return Figure::missing("There is nothing to draw here.");
+    }
+    let bars: usize = rows.iter().map(|r| r.bars.len()).sum();
+    let height = (rows.len() as f64 * (LABEL + 5.0) + bars as f64 * (BAR + 3.0) + AXIS) as u32;
+    let most = rows
+        .iter()
+        .flat_map(|r| &r.bars)
+        .map(|b| b.interval.map_or(b.value, |i| i[1].max(b.value)))
+        .filter(|x| x.is_finite())
+        .fold(1.0, f64::max);
+    let draw = |area: &Area<'_>| draw(area, rows, scale, most, x_label);
+    Figure::new(description)
+        .draw(Frame { width: 400, height }, draw)
+        .draw(Frame { width: 880, height }, draw)
+}
+
+/// The same in one shape, for figures that stand side by side.
+pub(crate) fn narrow_bar_figure(
+    description: &str,
+    rows: &[Row],
+    scale: Scale,
+    x_label: &str,
+) -> Figure {
+    let mut figure = bar_figure(description, rows, scale, x_label);
+    figure.keep_narrowest();
+    figure
+}
+
+fn draw(area: &Area<'_>, rows: &[Row], scale: Scale, most: f64, x_label: &str) -> Drawn {
+    let (width, height) = area.dim_in_pixel();
+    let (left, right) = (px(4.0), width as i32 - px(NUMBER));
+    let bottom = height as i32 - px(AXIS - 4.0);
+    let end = match scale {
+        Scale::Percent => 1.0,
+        // The next 1, 2 or 5 times a power of ten.
+        Scale::Floors => [1.0, 2.0, 5.0, 10.0]
+            .map(|k| k * 10f64.powf(most.log10().floor()))
+            .into_iter()
+            .find(|e| *e >= most.max(1.9))
+            .unwrap_or(most),
+    };
+    let place = |value: f64| -> i32 {
+        let share = match scale {
+            Scale::Percent => value,
+            Scale::Floors => value.max(1.0).log10() / end.log10(),
+        };
+        left + (f64::from(right - left) * share.clamp(0.0, 1.0)).round() as i32
+    };
+    let ticks: Vec<f64> = match scale {
+        Scale::Percent => vec![0.0, 0.25, 0.5, 0.75, 1.0],
+        Scale::Floors => {
+            let fine: &[f64] = match end {
+                e if e <= 20.0 => &[1.0, 2.0, 5.0],
+                e if e <= 2e3 => &[1.0, 3.0],
+                _ => &[1.0],
+            };
+            let decades = 0..=(end.log10().ceil() as i32);
+            let all = decades.flat_map(|d| fine.iter().map(move |f| f * 10f64.powi(d)));
+            all.filter(|t| *t <= end * 1.001).collect()
+        }
+    };
+    for t in ticks {
+        let x = place(t);
+        let line = vec![(x, px(2.0)), (x, bottom)];
+        area.draw(&PathElement::new(line, stroke(Ink::Grid.color(), 1.0)))?;
+        let text = match scale {
+            Scale::Percent => tick(100.0 * t, 100.0),
+            Scale::Floors => number(t, 1),
+        };
+        let h = if t == ticks_start(scale) { HPos::Left } else { HPos::Center };
+        area.draw(&Text::new(text, (x, bottom + px(4.0)), words(Ink::Text, h, VPos::Top)))?;
+    }
+    let mut y = px(2.0);
+    for row in rows {
+        let middle = y + px(0.5 * LABEL - 1.0);
+        area.draw(&Text::new(
+            row.label.clone(),
+            (left + px(5.0), middle),
+            words(Ink::Text, HPos::Left, VPos::Center),
+        ))?;
+        y += px(LABEL);
+        for bar in &row.bars {
+            let (top, low) = (y, y + px(BAR));
+            let x = place(bar.value).max(left + px(1.0));
+            area.draw(&Rectangle::new([(left, top), (x, low)], dot(bar.ink, 0.85)))?;
+            let mut behind = x;
+            if let Some([a, b]) = bar.interval {
+                let (a, b, at) = (place(a), place(b), (top + low) / 2);
+                let style = stroke(Ink::Text.color(), 1.4);
+                area.draw(&PathElement::new(vec![(a, at), (b, at)], style))?;
+                for x in [a, b] {
+                    let cap = vec![(x, at - px(3.5)), (x, at + px(3.5))];
+                    area.draw(&PathElement::new(cap, style))?;
+                }
+                behind = behind.max(b);
+            }
+            let text = if bar.text.is_empty() { number(bar.value, 2) } else { bar.text.clone() };
+            let at = (behind + px(5.0), (top + low) / 2);
+            area.draw(&Text::new(text, at, words(Ink::Text, HPos::Left, VPos::Center)))?;
+            y += px(BAR + 3.0);
+        }
+        y += px(5.0);
+    }
+    let axis = vec![(left, px(2.0)), (left, bottom)];
+    area.draw(&PathElement::new(axis, stroke(Ink::Axis.color(), 1.0)))?;
+    let corner = (right, height as i32 - px(1.0));
+    area.draw(&Text::new(x_label.to_owned(), corner, words(Ink::Text, HPos::Right, VPos::Bottom)))
+}
+
+fn ticks_start(scale: Scale) -> f64 {
+    match scale {
+        Scale::Percent => 0.0,
+        Scale::Floors => 1.0,
+    }
+}

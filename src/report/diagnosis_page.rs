@@ -1,0 +1,372 @@
+//! The report of a diagnosis: what to fix in the simulator, how sure that is, and what it gains.
+
+use stretch_gap::{Diagnosis, Evidence, Simulator, VerdictKind};
+
+use super::{
+    bar_figure::{Bar, Row, Scale, bar_figure, narrow_bar_figure},
+    canvas::Ink,
+    diagnosis_tables::{
+        candidate_table, parameter_table, slice_table, stage_table, transfer_table,
+    },
+    figure::Figure,
+    gap_figures::{
+        AFTER, Against, BEFORE, after_name, has_after, left_figure, trace_figures, worst,
+    },
+    markup::number,
+    page::Page,
+};
+use crate::plain::{effect_in_words, listed};
+
+/// Candidates that are drawn.
+const DRAWN: usize = 6;
+
+/// What a report is about.
+#[derive(Clone, Copy)]
+pub(crate) struct Subject<'a> {
+    /// What the data are called.
+    pub(crate) name: &'a str,
+    /// What was found.
+    pub(crate) diagnosis: &'a Diagnosis,
+    /// What it was found from.
+    pub(crate) evidence: &'a Evidence,
+    /// The simulator beside its measurements.
+    pub(crate) simulator: &'a dyn Simulator,
+}
+
+/// The report as one HTML file.
+pub(crate) fn diagnosis_page(subject: &Subject<'_>) -> String {
+    let diagnosis = subject.diagnosis;
+    let mut page = Page::new(
+        &format!("{}: simulator against rig", subject.name),
+        &diagnosis.sentence.replace(" %", "\u{a0}%"),
+    );
+    page.facts(&facts(diagnosis));
+    page.list(&causes(diagnosis));
+    seen(&mut page, subject);
+    located(&mut page, subject);
+    named(&mut page, subject);
+    gained(&mut page, subject);
+    next(&mut page, diagnosis);
+    numbers(&mut page, diagnosis);
+    page.finish()
+}
+
+/// Three answers at a glance.
+fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
+    let best = d.candidates.first();
+    let gain = best.map_or_else(String::new, |c| {
+        format!(
+            "{} of the gap closes on trials that were not fitted ({} to {}).",
+            percent(c.closed),
+            percent(c.closed_ci[0]),
+            percent(c.closed_ci[1])
+        )
+    });
+    let place = d
+        .location
+        .stages
+        .iter()
+        .max_by(|a, b| a.share.total_cmp(&b.share))
+        .map_or_else(String::new, |s| format!("{} ({} of the gap)", s.stage, percent(s.share)));
+    let fix = match d.verdict {
+        VerdictKind::Effect => format!("Add {}.", listed(&d.named)),
+        VerdictKind::Parameters => {
+            let moved = moved(d);
+            if moved.is_empty() {
+                "Take the re-tuned parameters below.".to_owned()
+            } else {
+                format!("Set {}.", listed(&moved))
+            }
+        }
+        VerdictKind::Unknown => format!("Nothing in the catalogue does it. Look at {place}."),
+        VerdictKind::NoGap => "Nothing.".to_owned(),
+    };
+    let sure = match (d.verdict, best) {
+        (VerdictKind::Effect, Some(c)) => {
+            let rivals: Vec<String> =
+                d.ambiguous.iter().filter(|n| !d.named.contains(n)).cloned().collect();
+            let rest = if rivals.is_empty() {
+                "nothing else explains these data as well".to_owned()
+            } else {
+                format!("these data cannot rule out {}", listed(&rivals))
+            };
+            format!("Probability {}: {rest}.", percent(c.probability))
+        }
+        (VerdictKind::Unknown, _) => {
+            "That there is a gap is certain; its cause is not in the catalogue.".to_owned()
+        }
+        _ => "What is left is within the noise floor on trials that were not fitted.".to_owned(),
+    };
+    let gain = match d.verdict {
+        VerdictKind::Effect => gain,
+        VerdictKind::Unknown => format!("The best that the catalogue offers: {gain}"),
+        VerdictKind::Parameters => "The whole gap closes by re-tuning.".to_owned(),
+        VerdictKind::NoGap => "The simulator can be used as it is.".to_owned(),
+    };
+    vec![("Fix in the simulator", fix), ("How sure", sure), ("What it gains", gain)]
+}
+
+/// Parameters that re-tuning moved by more than a tolerance, as assignments.
+fn moved(d: &Diagnosis) -> Vec<String> {
+    let far = d.parameters.iter().filter(|p| p.is_evidence && p.sigmas.abs() > 1.0);
+    far.map(|p| format!("{} to {}", p.name, unit_number(p.fitted, &p.unit))).collect()
+}
+
+/// Every named effect in words, with its values.
+fn causes(d: &Diagnosis) -> Vec<String> {
+    let Some(first) = d.candidates.first().filter(|c| c.effects == d.named) else {
+        return Vec::new();
+    };
+    let one = |name: &String| {
+        let values: Vec<String> = first
+            .parameters
+            .iter()
+            .filter(|p| p.effect == *name)
+            .map(|p| {
+                format!("{} = {} \u{b1} {}", p.name, number(p.value, 3), unit_number(p.sd, &p.unit))
+            })
+            .collect();
+        let words = effect_in_words(name).map_or(String::new(), |w| format!(": {w}"));
+        let values =
+            if values.is_empty() { String::new() } else { format!(" ({})", values.join(", ")) };
+        format!("{name}{words}{values}.")
+    };
+    d.named.iter().map(one).collect()
+}
+
+fn seen(page: &mut Page, subject: &Subject<'_>) {
+    let stage = worst(subject.diagnosis);
+    let spec = &subject.simulator.stages()[stage];
+    page.section(
+        "Measured against simulated",
+        "The stage with the largest gap, driven by its measured input, on the test trial where it is farthest \
+         off. One floor is the noise that no simulator could remove.",
+    );
+    let (top, below, trial) = trace_figures(subject, stage);
+    let caption = format!(
+        "{}: {} in {trial}, the eight seconds with the largest gap.",
+        spec.name, spec.channel
+    );
+    page.figure(&top, &caption);
+    page.figure(&below, "What is left, in floors: within two of them it is noise.");
+    let level = (
+        left_figure(subject, stage, Against::Level),
+        "Against the level of the motion, all trials: what has the wrong shape.".to_owned(),
+    );
+    let rate = (
+        left_figure(subject, stage, Against::Rate),
+        "Against its rate: what is late, slow, or depends on the direction.".to_owned(),
+    );
+    page.figures(&[level, rate]);
+    page.text(
+        "Dots are samples, the strong line is their median, the band holds four fifths of them.",
+    );
+}
+
+fn located(page: &mut Page, subject: &Subject<'_>) {
+    let d = subject.diagnosis;
+    page.section(
+        "Where the gap sits",
+        "Every stage is run on its measured input, so that no stage pays for another. The scale is the root mean \
+         square of what is left on the test trials, in floors: at 1 only noise is left.",
+    );
+    let rms = |excess: f64| (1.0 + excess).max(1.0).sqrt();
+    let after = has_after(subject);
+    let rows: Vec<Row> = d
+        .location
+        .stages
+        .iter()
+        .map(|s| {
+            let mut bars = vec![Bar::new(Ink::First, rms(s.raw)), Bar::new(BEFORE, rms(s.excess))];
+            if after {
+                bars.push(Bar::new(AFTER, rms(s.after)));
+            }
+            Row { label: format!("{} ({})", s.stage, s.channel), bars }
+        })
+        .collect();
+    let mut legend =
+        vec![(Ink::First, "as shipped".to_owned()), (BEFORE, "parameters re-tuned".to_owned())];
+    if after {
+        legend.push((AFTER, after_name(d)));
+    }
+    let figure =
+        bar_figure("What is left, by stage", &rows, Scale::Floors, "floors").legend(legend);
+    page.figure(&figure, "What is left, stage by stage.");
+    if !d.location.end_to_end.is_empty() {
+        let share = |s: &stretch_gap::StageShare| Row {
+            label: s.stage.clone(),
+            bars: vec![Bar { text: percent(s.share), ..Bar::new(BEFORE, s.share) }],
+        };
+        let rows: Vec<Row> = d.location.end_to_end.iter().map(share).collect();
+        let figure = bar_figure("Share of every stage", &rows, Scale::Percent, "%");
+        page.figure(
+            &figure,
+            "Who causes the gap of the last output when the stages run one on the other from the commands alone \
+             (Shapley value).",
+        );
+    }
+    slices(page, d);
+}
+
+fn slices(page: &mut Page, d: &Diagnosis) {
+    let stages = &d.location.stages;
+    let stage = stages.get(worst(d)).map_or("", |s| s.stage.as_str());
+    let of = |by: &str| -> Option<(Figure, String)> {
+        let slices: Vec<_> =
+            d.location.slices.iter().filter(|s| s.by == by && s.stage == stage).collect();
+        let rms = |excess: f64| (1.0 + excess).max(1.0).sqrt();
+        let rows: Vec<Row> = slices
+            .iter()
+            .map(|s| Row {
+                label: s.slice.clone(),
+                bars: vec![Bar {
+                    interval: Some(s.excess_ci.map(rms)),
+                    ..Bar::new(if s.stands_out { BEFORE } else { Ink::First }, rms(s.excess))
+                }],
+            })
+            .collect();
+        let title = match by {
+            "regime" => "By regime",
+            "level" => "By level",
+            "rate" => "By the size of the rate",
+            "frequency" => "By frequency",
+            "time" => "By time in the trial",
+            "session" => "By time in the session",
+            "travel" => "By distance travelled",
+            _ => "By trial",
+        };
+        (!rows.is_empty()).then(|| {
+            let figure = narrow_bar_figure(title, &rows, Scale::Floors, "floors");
+            (figure, format!("{title}."))
+        })
+    };
+    page.text(&format!(
+        "The gap of {stage} before the effect, sliced over all trials. Coloured bars stand out from the rest of the \
+         stage (5 % false discoveries); whiskers are 95 % intervals."
+    ));
+    let main: Vec<_> =
+        ["regime", "rate", "level", "frequency"].into_iter().filter_map(of).collect();
+    page.figures(&main);
+    let clocks: Vec<_> =
+        ["time", "session", "travel", "trial"].into_iter().filter_map(of).collect();
+    page.folded("By time, travel and trial", |page| {
+        page.figures(&clocks);
+    });
+}
+
+fn named(page: &mut Page, subject: &Subject<'_>) {
+    let d = subject.diagnosis;
+    page.section("Which effect", "");
+    let tried: Vec<_> = d.candidates.iter().filter(|c| !c.effects.is_empty()).take(DRAWN).collect();
+    if tried.is_empty() {
+        page.text(
+            "No effect of the catalogue explains more than noise would: none was fitted to the end.",
+        );
+        return;
+    }
+    page.text(
+        "Every candidate is fitted together with all nominal parameters, so that none wins by hiding in a wrong \
+         parameter.",
+    );
+    let label = |c: &&stretch_gap::Candidate| c.effects.join(" + ");
+    let odds: Vec<Row> = tried
+        .iter()
+        .map(|c| Row {
+            label: label(c),
+            bars: vec![Bar { text: percent(c.probability), ..Bar::new(AFTER, c.probability) }],
+        })
+        .collect();
+    let closed: Vec<Row> = tried
+        .iter()
+        .map(|c| Row {
+            label: label(c),
+            bars: vec![Bar {
+                interval: Some(c.closed_ci),
+                text: percent(c.closed),
+                ..Bar::new(AFTER, c.closed)
+            }],
+        })
+        .collect();
+    page.figures(&[
+        (
+            narrow_bar_figure("Probability of every candidate", &odds, Scale::Percent, "%"),
+            "Probability among the candidates.".to_owned(),
+        ),
+        (
+            narrow_bar_figure("Closed gap of every candidate", &closed, Scale::Percent, "%"),
+            "Share of the gap that closes on the test trials, with its 95 % interval.".to_owned(),
+        ),
+    ]);
+    if d.ambiguous.len() > 1 {
+        page.text(&format!(
+            "These data cannot tell {} apart with 95 % probability.",
+            listed(&d.ambiguous)
+        ));
+    }
+    page.table(&candidate_table(&d.candidates));
+}
+
+fn gained(page: &mut Page, subject: &Subject<'_>) {
+    let d = subject.diagnosis;
+    page.section("How far the gap closes", "");
+    page.table(&stage_table(&d.location.stages, has_after(subject)));
+    page.text(
+        "Gaps are mean squares over the floor, minus 1: at 0 nothing but noise is left, at 1 the error is as large as \
+         the noise.",
+    );
+    if let Some(transfer) = &d.transfer {
+        page.table(&transfer_table(transfer));
+        page.text(
+            "What the gap costs a user: a calibration trained in the simulator and applied to measured trials, beside \
+             one trained on measured trials. A true effect can make a calibration that was trained on ramps worse while \
+             the gap closes: ramps may not show what the effect does.",
+        );
+    }
+    if let Some(table) = parameter_table(d) {
+        page.table(&table);
+        page.text(
+            "The last column is what the simulator without the effect had been bent to: parameters that moved between \
+             the two hid the effect. A star marks parameters that others can stand in for: their values are no \
+             evidence by themselves.",
+        );
+    }
+}
+
+fn next(page: &mut Page, d: &Diagnosis) {
+    let Some(next) = &d.next_experiment else { return };
+    page.section("What to measure next", "");
+    page.text(&format!(
+        "{} ({} min) would tell {} apart: whatever their parameters, they differ by {} floors. {}",
+        next.name.replace('_', " "),
+        number(next.minutes, 2),
+        listed(&next.separates),
+        number(next.d, 2),
+        next.why
+    ));
+}
+
+fn numbers(page: &mut Page, d: &Diagnosis) {
+    page.section("All numbers", "");
+    page.list(&d.notes);
+    for stage in &d.location.stages {
+        page.text(&format!("Floor of {}: {}.", stage.stage, stage.floor_source));
+        if let Some(table) = slice_table(&d.location.slices, &stage.stage) {
+            page.folded(&format!("{}: every slice", stage.stage), |page| {
+                page.table(&table);
+            });
+        }
+    }
+    page.text(&format!("The diagnosis took {} s.", number(d.runtime_s, 2)));
+}
+
+pub(crate) fn percent(share: f64) -> String {
+    format!(
+        "{}\u{a0}%",
+        number((1000.0 * share).round() / 10.0, if share.abs() < 0.0995 { 1 } else { 2 })
+    )
+}
+
+fn unit_number(x: f64, unit: &str) -> String {
+    let unit = if unit == "1" { "" } else { unit };
+    super::markup::with_unit(&number(x, 3), unit)
+}

@@ -1,0 +1,151 @@
+//! The tables of a diagnosis's report.
+
+use stretch_gap::{Candidate, Diagnosis, SliceGap, StageGap, Transfer};
+
+use super::{
+    diagnosis_page::percent,
+    markup::{NONE, fixed, number, with_unit},
+    page::Table,
+};
+
+fn cells<const N: usize>(cells: [&str; N]) -> Vec<String> {
+    cells.map(str::to_owned).to_vec()
+}
+
+fn interval([low, high]: [f64; 2], text: impl Fn(f64) -> String) -> String {
+    format!("{} .. {}", text(low), text(high))
+}
+
+/// Gap of every stage.
+pub(crate) fn stage_table(stages: &[StageGap], has_after: bool) -> Table {
+    let row = |s: &StageGap| {
+        vec![
+            s.stage.clone(),
+            number(s.raw, 3),
+            number(s.excess, 3),
+            if has_after { number(s.after, 3) } else { NONE.to_owned() },
+            with_unit(&number(s.rms, 3), &s.unit),
+            with_unit(&number(s.floor, 3), &s.unit),
+        ]
+    };
+    Table {
+        caption: "Gap on the test trials, in floors".to_owned(),
+        head: cells([
+            "Stage",
+            "As shipped",
+            "Re-tuned",
+            "With the effect",
+            "Left, re-tuned",
+            "Floor",
+        ]),
+        rows: stages.iter().map(row).collect(),
+        highlight: None,
+    }
+}
+
+/// Every candidate.
+pub(crate) fn candidate_table(candidates: &[Candidate]) -> Table {
+    let row = |c: &Candidate| {
+        let values: Vec<String> = c
+            .parameters
+            .iter()
+            .map(|p| {
+                let unit = if p.unit == "1" { "" } else { &p.unit };
+                format!(
+                    "{} = {} \u{b1} {}",
+                    p.name,
+                    number(p.value, 3),
+                    with_unit(&number(p.sd, 2), unit)
+                )
+            })
+            .collect();
+        let effects = if c.effects.is_empty() { "none".to_owned() } else { c.effects.join(", ") };
+        vec![
+            effects,
+            fixed(c.probability, 3),
+            number(c.gap_before, 3),
+            number(c.gap_after, 3),
+            percent(c.closed),
+            interval(c.closed_ci, percent),
+            values.join("; "),
+        ]
+    };
+    Table {
+        caption: "Candidates, the most probable first; gaps are summed over the channels"
+            .to_owned(),
+        head: cells([
+            "Effects",
+            "Probability",
+            "Gap before",
+            "After",
+            "Closes",
+            "95 % interval",
+            "Parameters",
+        ]),
+        rows: candidates.iter().map(row).collect(),
+        highlight: (!candidates.is_empty()).then_some(0),
+    }
+}
+
+/// Nominal parameters; nothing when there are none.
+pub(crate) fn parameter_table(d: &Diagnosis) -> Option<Table> {
+    let row = |p: &stretch_gap::ParameterShift| {
+        let unit = if p.unit == "1" { "" } else { &p.unit };
+        vec![
+            format!("{}{}", p.name, if p.is_evidence { "" } else { " *" }),
+            with_unit(&number(p.nominal, 4), unit),
+            number(p.fitted, 4),
+            fixed(p.sigmas, 1),
+            number(p.bent, 4),
+        ]
+    };
+    (!d.parameters.is_empty()).then(|| Table {
+        caption: "Nominal parameters".to_owned(),
+        head: cells(["Name", "As shipped", "Final", "Moved, tolerances", "Without the effect"]),
+        rows: d.parameters.iter().map(row).collect(),
+        highlight: None,
+    })
+}
+
+/// What the gap costs a calibration.
+pub(crate) fn transfer_table(transfer: &Transfer) -> Table {
+    let rows = [("linear", transfer.linear), ("poly13", transfer.poly13)].map(|(name, e)| {
+        vec![name.to_owned(), number(e.real, 3), number(e.sim, 3), number(e.sim_with_effect, 3)]
+    });
+    Table {
+        caption:
+            "Error on measured test trials, % of full scale, by where the calibration was trained"
+                .to_owned(),
+        head: cells([
+            "Calibration",
+            "Measured trials",
+            "Simulator, re-tuned",
+            "Simulator with the effect",
+        ]),
+        rows: rows.to_vec(),
+        highlight: None,
+    }
+}
+
+/// Every slice of a stage; nothing when there are none.
+pub(crate) fn slice_table(slices: &[SliceGap], stage: &str) -> Option<Table> {
+    let rows: Vec<Vec<String>> = slices
+        .iter()
+        .filter(|s| s.stage == stage)
+        .map(|s| {
+            vec![
+                format!("{}: {}", s.by, s.slice),
+                percent(s.share),
+                number(s.excess, 3),
+                interval(s.excess_ci, |x| number(x, 3)),
+                if s.stands_out { "yes" } else { "" }.to_owned(),
+            ]
+        })
+        .collect();
+    (!rows.is_empty()).then(|| Table {
+        caption: format!("{stage}: gap by slice, re-tuned, all trials"),
+        head: cells(["Slice", "Share", "Gap", "95 % interval", "Stands out"]),
+        rows,
+        highlight: None,
+    })
+}

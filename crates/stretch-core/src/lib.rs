@@ -5,29 +5,39 @@ mod calibration;
 mod degree;
 mod error;
 pub mod fixed;
+mod history;
 mod label;
 mod model;
+mod observer;
 mod provenance;
 mod range;
 mod rate;
 mod real;
+mod rest;
 mod stage;
 #[cfg(feature = "proptest")]
 pub mod strategies;
 mod surface;
 mod unit;
+mod values;
 
 pub use calibration::{
     CALIBRATION_SCHEMA, Calibration, CalibrationSpec, Polarity, RateSource, Schema, Target,
 };
 pub use degree::{Degree, MAX_DEGREE, MAX_TERMS};
 pub use error::DesignError;
+pub use history::{
+    HistoryMap, HistoryShape, MAX_HISTORY_TERMS, MAX_PLAYS, MAX_RELAXATIONS, MAX_STATES,
+};
 pub use label::Label;
 pub use model::{Branch, BranchSurface, Interval, LinearMap, Model};
+pub use observer::{MAX_KNOTS, MAX_OBSERVER_PLAYS, MAX_OBSERVER_RELAXATIONS, ObserverMap};
 pub use provenance::{FitSummary, Provenance};
 pub use range::{Normalisation, Range, RangeSpec};
 pub use rate::RateEstimator;
 pub use real::Real;
+pub use rest::RestTracker;
 pub use stage::{Design, Runner, Stage};
 pub use surface::{Poly13, Surface};
 pub use unit::{Hertz, Millimetres, MillimetresPerSecond, SampleRate, Seconds, Strain, Volts};
+pub use values::Values;

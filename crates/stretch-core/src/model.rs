@@ -1,6 +1,6 @@
 //! What a calibration computes: from signal and rate to the normalised target.
 
-use crate::{DesignError, FitSummary, Range, Surface};
+use crate::{DesignError, FitSummary, HistoryMap, ObserverMap, Range, Surface};
 
 /// Which way the target moves, and so which surface describes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -116,6 +116,18 @@ pub enum Model {
         /// For a falling target.
         deflation: BranchSurface,
     },
+    /// The same, mixed across the dead band in place of a jump: the inflation
+    /// surface weighs `(1 + rate/dead_band)/2`, held to 0..1.
+    Blended {
+        /// For a rising target.
+        inflation: BranchSurface,
+        /// For a falling target.
+        deflation: BranchSurface,
+    },
+    /// A polynomial of the signal and its history.
+    History(HistoryMap),
+    /// The gauge's forward model, inverted by a Kalman filter.
+    Observer(ObserverMap),
 }
 
 impl Model {
@@ -135,13 +147,21 @@ impl Model {
                 line.signal_domain.validate("linear.signal_domain")?;
                 fit(&line.fit)?;
             }
-            Self::Surfaces { inflation, deflation } => {
+            Self::Surfaces { inflation, deflation } | Self::Blended { inflation, deflation } => {
                 inflation.signal_domain.validate("inflation.signal_domain")?;
                 inflation.rate_domain.validate("inflation.rate_domain")?;
                 deflation.signal_domain.validate("deflation.signal_domain")?;
                 deflation.rate_domain.validate("deflation.rate_domain")?;
                 fit(&inflation.fit)?;
                 fit(&deflation.fit)?;
+            }
+            Self::History(map) => {
+                map.validate()?;
+                fit(&map.fit)?;
+            }
+            Self::Observer(map) => {
+                map.validate()?;
+                fit(&map.fit)?;
             }
         }
         Ok(())

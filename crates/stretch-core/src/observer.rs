@@ -1,0 +1,102 @@
+//! A gauge described as it works, forwards, and a filter that asks which
+//! motion explains the signal.
+
+use crate::{DesignError, FitSummary, Interval, RestTracker, Values};
+
+/// The most relaxations of an [`ObserverMap`].
+pub const MAX_OBSERVER_RELAXATIONS: usize = 2;
+/// The most plays of an [`ObserverMap`].
+pub const MAX_OBSERVER_PLAYS: usize = 3;
+/// The most knots of an [`ObserverMap`]'s curve.
+pub const MAX_KNOTS: usize = 33;
+
+/// The forward model of a gauge, and what a Kalman filter needs to invert it.
+///
+/// With `y` the normalised target and `r` its rate:
+/// - drive `u = y + lead_s r + sum a_i (y - l_i) + sum b_j (y - play(y, w_j))`;
+/// - signal `v = curve(u) + noise`, a rising (or falling) line between knots.
+///
+/// The filter carries `y`, `r` and every `l_i`; `r` wanders with `agility`. Its
+/// gain follows the slope of the curve: where the signal hardly answers the
+/// target it trusts the motion, elsewhere the signal. `y` never leaves
+/// `estimate_domain`.
+///
+/// Every number is a property of the gauge or of the motion, with a unit.
+/// Source: this project; filter as in Kalman 1960, doi:10.1115/1.3662552,
+/// extended, with the secant in place of the tangent wherever it is steeper.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct ObserverMap {
+    /// The baseline, where it is followed.
+    pub rest: Option<RestTracker>,
+    /// Signal at evenly spaced drives over `drive_domain`, strictly monotone.
+    pub curve: Values<MAX_KNOTS>,
+    /// The drives of the first and the last knot.
+    pub drive_domain: Interval,
+    /// Time constants of the relaxations, in seconds.
+    pub relaxations_s: Values<MAX_OBSERVER_RELAXATIONS>,
+    /// Their amplitudes: with `l' = (y - l)/tau`, `amplitude (y - l)` is added to the
+    /// drive; positive overshoots, negative lags.
+    pub amplitudes: Values<MAX_OBSERVER_RELAXATIONS>,
+    /// Seconds by which the signal leads the target; below zero it is late.
+    pub lead_s: f64,
+    /// Radii of the plays, in normalised target.
+    pub radii: Values<MAX_OBSERVER_PLAYS>,
+    /// Their weights; below zero is the usual hysteresis.
+    pub play_weights: Values<MAX_OBSERVER_PLAYS>,
+    /// Standard deviation of the signal around the model, in the signal's unit.
+    pub noise: f64,
+    /// Spectral density of the rate's wandering, in 1/s^3 of normalised target.
+    pub agility: f64,
+    /// The normalised targets that the fit saw.
+    pub estimate_domain: Interval,
+    /// How good the fit was: of the estimates, in normalised target.
+    pub fit: FitSummary,
+}
+
+impl ObserverMap {
+    /// Checks every number and length.
+    ///
+    /// # Errors
+    /// [`DesignError`] that names the field.
+    pub fn validate(&self) -> Result<(), DesignError> {
+        if let Some(rest) = &self.rest {
+            rest.validate()?;
+        }
+        let knots = self.curve.len();
+        DesignError::check("length of observer.curve", knots as f64, knots >= 2)?;
+        let rises = self.curve[knots - 1] > self.curve[0];
+        for pair in self.curve.windows(2) {
+            let step = pair[1] - pair[0];
+            DesignError::check(
+                "step of observer.curve",
+                step,
+                step != 0.0 && (step > 0.0) == rises,
+            )?;
+        }
+        let drive = self.drive_domain.validate("observer.drive_domain")?;
+        let estimate = self.estimate_domain.validate("observer.estimate_domain")?;
+        for (field, range) in
+            [("observer.drive_domain", drive), ("observer.estimate_domain", estimate)]
+        {
+            if range.min >= range.max {
+                return Err(DesignError::EmptyRange { field, min: range.min, max: range.max });
+            }
+        }
+        for &tau in self.relaxations_s.iter() {
+            DesignError::check("observer.relaxations_s", tau, tau > 0.0)?;
+        }
+        for &radius in self.radii.iter() {
+            DesignError::check("observer.radii", radius, radius > 0.0)?;
+        }
+        let (a, b) = (self.amplitudes.len(), self.play_weights.len());
+        let taus = self.relaxations_s.len();
+        DesignError::check("length of observer.amplitudes", a as f64, a == taus)?;
+        DesignError::check("length of observer.play_weights", b as f64, b == self.radii.len())?;
+        DesignError::check("observer.lead_s", self.lead_s, self.lead_s.abs() <= 10.0)?;
+        DesignError::check("observer.noise", self.noise, self.noise > 0.0)?;
+        DesignError::check("observer.agility", self.agility, self.agility > 0.0)?;
+        Ok(())
+    }
+}

@@ -13,6 +13,7 @@
 //!
 //! A calibration is converted once, on a desk, by [`CodeCalibration::new`], and
 //! travels as a record of about 100 bytes.
+#![doc = include_str!("board.md")]
 
 mod adc;
 mod arithmetic;

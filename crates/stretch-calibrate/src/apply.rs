@@ -3,7 +3,7 @@
 use stretch_core::{Calibration, Design, RateEstimator, Runner, Seconds, Stage, Volts};
 use stretch_data::Trial;
 use stretch_filter::{Arrival, Cadence, RateFilter};
-use stretch_receptor::{MAX_BRIDGED, Reading, StretchReceptor, Withheld};
+use stretch_receptor::{MAX_BRIDGED, Reading, Receptor, Withheld};
 
 use crate::{CalibrateError, series::rates_at_use};
 
@@ -29,7 +29,7 @@ const JITTER_TOLERANCE: f64 = 0.2;
 /// ```
 #[derive(Debug, Clone)]
 pub struct LiveReceptor {
-    receptor: Runner<StretchReceptor<f64>>,
+    receptor: Runner<Receptor<f64>>,
     cadence: Runner<Cadence>,
     faults: Faults,
 }
@@ -53,7 +53,7 @@ impl LiveReceptor {
     /// needs the next sample.
     pub fn new(calibration: &Calibration) -> Result<Self, CalibrateError> {
         Ok(Self {
-            receptor: Runner::new(StretchReceptor::new(calibration)?),
+            receptor: Runner::new(Receptor::new(calibration)?),
             cadence: Runner::new(Cadence::new(calibration.sample_rate_hz, JITTER_TOLERANCE)?),
             faults: Faults::default(),
         })
@@ -109,7 +109,7 @@ pub fn apply(calibration: &Calibration, trial: &Trial) -> Result<Applied, Calibr
     if calibration.rate_estimator == RateEstimator::CentralDifference {
         let rate = calibration.sample_rate_hz;
         let rates = Logged(rates_at_use(calibration.rate_estimator, rate, signal)?);
-        let mut receptor = Runner::new(StretchReceptor::with_rate(calibration, rates)?);
+        let mut receptor = Runner::new(Receptor::with_rate(calibration, rates)?);
         let readings = signal.iter().map(|&v| receptor.step(Volts(v))).collect();
         return Ok(Applied { readings, faults: Faults::default() });
     }

@@ -8,7 +8,7 @@ use stretch_filter::{FilterError, LARGEST_SAMPLE, RateFilter};
 
 use crate::{
     Domain, MAX_BRIDGED, Reading, Withheld,
-    fold::{reference_dead_band, output, share_of},
+    fold::{output, reference_dead_band, share_of},
     rest_level::RestLevel,
 };
 
@@ -131,7 +131,11 @@ impl<T: Real, R> HistoryReceptor<T, R> {
     /// The states of a usable sample, each scaled to -1..1, and whether the
     /// signal and any memory had to be moved into their domains.
     #[inline(always)]
-    fn states<M>(&self, memory: &mut HistoryMemory<T, M>, signal: T) -> ([T; MAX_STATES], bool, bool) {
+    fn states<M>(
+        &self,
+        memory: &mut HistoryMemory<T, M>,
+        signal: T,
+    ) -> ([T; MAX_STATES], bool, bool) {
         let above = self.rest.step(&mut memory.baseline, self.sign * signal);
         let x = (self.sign * above - self.offset) * self.scale;
         if memory.last.is_nan() {
@@ -195,7 +199,11 @@ impl<T: Real, R: Design> Design for HistoryReceptor<T, R> {
 
 impl<T: Real, R: Stage<T, Out = Option<T>>> HistoryReceptor<T, R> {
     #[inline(always)]
-    fn usable(&self, memory: &mut HistoryMemory<T, R::Memory>, signal: T) -> (T, Option<T>, Domain) {
+    fn usable(
+        &self,
+        memory: &mut HistoryMemory<T, R::Memory>,
+        signal: T,
+    ) -> (T, Option<T>, Domain) {
         let (states, signal_outside, memory_outside) = self.states(memory, signal);
         let free = self.polynomial(&states);
         let estimate = free.max(self.low).min(self.high);

@@ -5,11 +5,11 @@
 //! one subtraction on each input and the polynomial itself.
 
 use stretch_core::{
-    Branch, BranchSurface, Calibration, DesignError, Interval, LinearMap, Model, Poly13, Range,
-    Real, Surface,
+    Branch, BranchSurface, Calibration, DesignError, Interval, LinearMap, Model, Poly13, Real,
+    Surface,
 };
 
-use crate::Domain;
+use crate::{Domain, fold::output};
 
 /// Value and local slope of a calibration at one input.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,16 +72,25 @@ impl<T: Real> Map<T> {
         match &calibration.model {
             Model::Linear(line) => Ok(Self::Line(fold_line(calibration, line))),
             Model::Surfaces { inflation, deflation } => {
-                let up = fold_surface(calibration, inflation)?;
-                let down = fold_surface(calibration, deflation)?;
-                let surfaces = [round_surface(&up.surface)?, round_surface(&down.surface)?];
-                Ok(match surfaces.map(|surface| surface.as_poly13()) {
-                    [Some(p), Some(q)] => Self::Poly13([up.with(p), down.with(q)]),
-                    _ => Self::Surface([up.with(surfaces[0]), down.with(surfaces[1])]),
-                })
+                Self::sheets(calibration, inflation, deflation)
             }
             _ => Err(DesignError::OutOfRange { field: "model", value: f64::NAN }),
         }
+    }
+
+    /// A sheet a branch.
+    pub(crate) fn sheets(
+        calibration: &Calibration,
+        inflation: &BranchSurface,
+        deflation: &BranchSurface,
+    ) -> Result<Self, DesignError> {
+        let up = fold_surface(calibration, inflation)?;
+        let down = fold_surface(calibration, deflation)?;
+        let surfaces = [round_surface(&up.surface)?, round_surface(&down.surface)?];
+        Ok(match surfaces.map(|surface| surface.as_poly13()) {
+            [Some(p), Some(q)] => Self::Poly13([up.with(p), down.with(q)]),
+            _ => Self::Surface([up.with(surfaces[0]), down.with(surfaces[1])]),
+        })
     }
 
     #[inline(always)]
@@ -133,13 +142,6 @@ fn round_surface<T: Real>(surface: &Surface) -> Result<Surface<T>, DesignError> 
     let terms = surface.degree().terms();
     let coefficients = surface.coefficients().map(T::from_f64);
     Surface::new(surface.degree(), &coefficients[..terms])
-}
-
-/// Reference units per normalised target, and the reference at a target of zero.
-fn output(calibration: &Calibration) -> (f64, f64) {
-    let range: Range = calibration.target_range;
-    let target = calibration.target;
-    (target.reference_per_target() * range.span(), target.to_reference(range.offset()))
 }
 
 fn fold_line<T: Real>(calibration: &Calibration, line: &LinearMap) -> Line<T> {

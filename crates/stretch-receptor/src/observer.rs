@@ -169,7 +169,7 @@ impl<T: Real> ObserverReceptor<T> {
     fn predict(&self, memory: &mut ObserverMemory<T>) {
         let n = 2 + self.relaxations;
         let (x, p) = (&mut memory.states, &mut memory.spread);
-        x[0] = x[0] + self.period_s * x[1];
+        x[0] = (x[0] + self.period_s * x[1]).max(self.low).min(self.high);
         for j in 0..n {
             p[0][j] = p[0][j] + self.period_s * p[1][j];
         }
@@ -226,7 +226,10 @@ impl<T: Real> ObserverReceptor<T> {
             spread = spread + reach[i] * gradient[i];
         }
         let weight = (spread * slope + self.noise_square).recip();
-        let surprise = signal - predicted;
+        // a spike counts as a signal one whole curve away, no more
+        let (first, last) = (self.curve[0], self.curve[self.knots - 1]);
+        let span = last - first;
+        let surprise = signal.max(first - span).min(last + span) - predicted;
         for i in 0..n {
             let pull = reach[i] * weight;
             memory.states[i] = memory.states[i] + pull * surprise;

@@ -85,6 +85,47 @@ impl<T, M> ReceptorMemory<T, M> {
     pub fn branch(&self) -> Branch {
         self.branch
     }
+
+    pub(crate) fn set_branch(&mut self, branch: Branch) {
+        self.branch = branch;
+    }
+}
+
+impl<T: Real, M> ReceptorMemory<T, M> {
+    pub(crate) fn unseen(rate: M) -> Self {
+        let (last, last_rate) = (T::nan(), T::zero());
+        Self { rate, branch: Branch::Inflation, last, last_rate, missing: 0 }
+    }
+
+    /// A usable sample: its rate, once there is one.
+    #[inline(always)]
+    pub(crate) fn take<R>(&mut self, estimator: &R, signal: T) -> Option<T>
+    where
+        R: Stage<T, Out = Option<T>, Memory = M>,
+    {
+        self.missing = 0;
+        self.last = signal;
+        let rate = estimator.step(&mut self.rate, signal)?;
+        self.last_rate = rate;
+        Some(rate)
+    }
+
+    /// A missing sample: bridge a short gap, forget the window after a long one.
+    #[cold]
+    pub(crate) fn miss<R>(&mut self, estimator: &R, period_s: T, most: u8)
+    where
+        R: Stage<T, Out = Option<T>, Memory = M>,
+    {
+        self.missing = self.missing.saturating_add(1);
+        let bridged = self.last + self.last_rate * period_s;
+        if self.missing <= most && bridged.is_finite() {
+            self.last = bridged;
+            // only the window matters here: nothing is answered for this sample
+            let _ = estimator.step(&mut self.rate, bridged);
+        } else {
+            *self = Self { branch: self.branch, missing: most, ..Self::unseen(estimator.memory()) };
+        }
+    }
 }
 
 impl<T: Real> StretchReceptor<T> {
@@ -153,31 +194,7 @@ impl<T: Real, R: Design> Design for StretchReceptor<T, R> {
     type Memory = ReceptorMemory<T, R::Memory>;
 
     fn memory(&self) -> Self::Memory {
-        ReceptorMemory {
-            rate: self.rate.memory(),
-            branch: Branch::Inflation,
-            last: T::nan(),
-            last_rate: T::zero(),
-            missing: 0,
-        }
-    }
-}
-
-impl<T: Real, R: Stage<T, Out = Option<T>>> StretchReceptor<T, R> {
-    /// A missing sample: bridge a short gap, forget the window after a long one.
-    #[cold]
-    fn missed(&self, memory: &mut ReceptorMemory<T, R::Memory>) {
-        memory.missing = memory.missing.saturating_add(1);
-        let bridged = memory.last + memory.last_rate * self.period_s;
-        if memory.missing <= MAX_BRIDGED && bridged.is_finite() {
-            memory.last = bridged;
-            // only the window matters here: nothing is answered for this sample
-            let _ = self.rate.step(&mut memory.rate, bridged);
-        } else {
-            let branch = memory.branch;
-            *memory = self.memory().starting_on(branch);
-            memory.missing = MAX_BRIDGED;
-        }
+        ReceptorMemory::unseen(self.rate.memory())
     }
 }
 
@@ -190,15 +207,12 @@ impl<T: Real, R: Stage<T, Out = Option<T>>> Stage<Volts<T>> for StretchReceptor<
         // one comparison, false for NaN as well
         let usable = signal.abs() <= T::from_f64(LARGEST_SAMPLE);
         if !usable {
-            self.missed(memory);
+            memory.miss(&self.rate, self.period_s, MAX_BRIDGED);
             return Err(Withheld::Missing);
         }
-        memory.missing = 0;
-        memory.last = signal;
-        let Some(rate) = self.rate.step(&mut memory.rate, signal) else {
+        let Some(rate) = memory.take(&self.rate, signal) else {
             return Err(Withheld::Warming);
         };
-        memory.last_rate = rate;
         memory.branch = self.branch(memory.branch, rate);
         let point = self.map.at(memory.branch, rate, signal);
         Ok(Reading {

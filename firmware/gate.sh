@@ -1,6 +1,8 @@
 #!/bin/sh
 # Fails unless every model gives the host's bits on both emulated cores and stays
-# inside its budget. Prints SKIPPED, and succeeds, where there is no emulator.
+# inside its budget: instructions (mean + 2 %), stack (exactly), .text (+ 1 %: the
+# order of functions, and a few bytes with it, depends on the folder that the
+# sources lie in). Prints SKIPPED, and succeeds, where there is no emulator.
 #
 #   ./gate.sh            compares with golden.txt and budget.txt
 #   ./gate.sh --write    writes budget.txt anew from what is measured
@@ -24,7 +26,7 @@ printf '%s\n' "$measured"
 if [ "${1:-}" = --write ]; then
     {
         echo "# Budget of a step: instructions (mean), bytes of .text, bytes of stack below the caller."
-        echo "# gate.sh fails above mean + 2 %, or above either size. Counts belong to the pinned compiler."
+        echo "# gate.sh says by how much each may be exceeded. Counts belong to the pinned compiler."
         printf '%s\n' "$measured" | sed 's/ max=[0-9]*//; s/ state_bytes=.*//'
     } >budget.txt
     exit 0
@@ -45,12 +47,12 @@ printf '%s\n' "$measured" | awk '
         most = value(budget[name], "mean") * 1.02
         if (value($0, "mean") + 0 > most)
             fail(name ": " value($0, "mean") " instructions a sample, budget " value(budget[name], "mean") " + 2 %")
-        for (key in sizes)
-            if (value($0, key) + 0 > value(budget[name], key) + 0)
+        for (key in slack)
+            if (value($0, key) + 0 > value(budget[name], key) * slack[key])
                 fail(name ": " key " " value($0, key) ", budget " value(budget[name], key))
     }
     function fail(text) { print "FAILED " text; failed = 1 }
-    BEGIN { sizes["text_bytes"]; sizes["stack_bytes"] }
+    BEGIN { slack["text_bytes"] = 1.01; slack["stack_bytes"] = 1 }
     END {
         for (name in budget) if (!(name in seen)) fail(name ": was not measured")
         for (model in golden) if (!(("m3 " model) in seen) || !(("m4f " model) in seen)) fail(model ": was not measured")

@@ -81,7 +81,7 @@ fn run(
         .map(|s| Metric::of(simulator, &frame, s, &floors[s], &shipped, all))
         .collect();
     let trials = frame.fit_trials;
-    let mut bench = Bench { simulator, frame, metrics: metrics?, trials, stop };
+    let mut bench = Bench { simulator, frame, metrics: metrics?, trials, memory: Vec::new(), stop };
     progress("re-tuning the nominal parameters");
     let mut nominal = retune(&bench, &shipped)?;
     // Once more around the re-tuned values: the sensitivities that nuisances are told by have moved.
@@ -91,6 +91,11 @@ fn run(
         .collect();
     bench.metrics = metrics?;
     nominal = retune(&bench, &nominal.model)?;
+    let memory: Result<Vec<f64>, GapError> = (0..stages)
+        .into_par_iter()
+        .map(|s| Ok(bench.memory_of(s, &bench.residual(s, &nominal.model)?)))
+        .collect();
+    bench.memory = memory?;
     solver_check(&bench, &nominal.model)?;
     let mut search = Search::new(&bench, &options.thresholds, nominal.clone(), options.depth);
     let best = search.run(progress)?;

@@ -3,7 +3,7 @@
 
 use crate::{
     error::GapError,
-    frame::{Column, Frame, Metric, Role},
+    frame::{Column, Frame, Metric, Role, dot},
     linear::{Cholesky, boxed},
     simulator::{Model, Run, Simulator},
 };
@@ -16,6 +16,8 @@ pub(crate) struct Bench<'a> {
     pub(crate) metrics: Vec<Metric>,
     /// Trials that fits run, from the first.
     pub(crate) trials: usize,
+    /// By stage: samples that count as one, from the memory of the re-tuned nominal's residual.
+    pub(crate) memory: Vec<f64>,
     pub(crate) stop: &'a (dyn Fn() -> bool + Sync),
 }
 
@@ -45,7 +47,7 @@ pub(crate) struct Fitted {
 #[derive(Debug, Clone, Copy)]
 enum Coordinate {
     Nominal { index: usize, nominal: f64, sd: f64 },
-    Linear { slot: usize, index: usize, range: f64 },
+    Linear { slot: usize, index: usize, range: f64, usual: Option<f64> },
     Log { slot: usize, index: usize, middle: f64, half: f64 },
 }
 
@@ -53,7 +55,7 @@ impl Coordinate {
     fn read(self, model: &Model) -> f64 {
         match self {
             Self::Nominal { index, nominal, sd } => (model.parameters[index] - nominal) / sd,
-            Self::Linear { slot, index, range } => model.effects[slot].1[index] / range,
+            Self::Linear { slot, index, range, .. } => model.effects[slot].1[index] / range,
             Self::Log { slot, index, .. } => model.effects[slot].1[index].max(1e-300).ln(),
         }
     }
@@ -61,7 +63,7 @@ impl Coordinate {
     fn write(self, model: &mut Model, x: f64) {
         match self {
             Self::Nominal { index, nominal, sd } => model.parameters[index] = nominal + sd * x,
-            Self::Linear { slot, index, range } => model.effects[slot].1[index] = x * range,
+            Self::Linear { slot, index, range, .. } => model.effects[slot].1[index] = x * range,
             Self::Log { slot, index, .. } => model.effects[slot].1[index] = x.exp(),
         }
     }
@@ -70,6 +72,10 @@ impl Coordinate {
     fn prior(self, x: f64) -> (f64, f64, f64) {
         match self {
             Self::Nominal { .. } => (0.5 * x * x, x, 1.0),
+            Self::Linear { usual: Some(usual), .. } => {
+                let z = (x - usual) / FORM_SD;
+                (0.5 * z * z, z / FORM_SD, 1.0 / (FORM_SD * FORM_SD))
+            }
             Self::Linear { .. } => (0.0, 0.0, 0.0),
             Self::Log { middle, half, .. } => {
                 let z = (x - middle) / half;
@@ -82,6 +88,8 @@ impl Coordinate {
 /// Sensitivities of the nominal parameters of one stage, by parameter.
 pub(crate) type Sensitivities = Vec<(usize, Column)>;
 
+/// Standard deviation of a form around its usual value, as a share of its range.
+const FORM_SD: f64 = 0.35;
 /// Most iterations of a fit.
 const ITERATIONS: usize = 14;
 
@@ -135,12 +143,17 @@ impl Bench<'_> {
                 }
                 if p.is_log {
                     let (a, b) = (p.min.ln(), p.max.ln());
-                    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+                    // A form is looked for near its usual value, anything else in the whole range.
+                    let (middle, half) = match p.form {
+                        Some(usual) => (usual.ln(), FORM_SD * (b - a)),
+                        None => (0.5 * (a + b), 0.5 * (b - a)),
+                    };
                     coordinates.push(Coordinate::Log { slot, index, middle, half });
                     bounds.push([a, b]);
                 } else {
                     let range = p.max - p.min;
-                    coordinates.push(Coordinate::Linear { slot, index, range });
+                    let usual = p.form.map(|usual| usual / range);
+                    coordinates.push(Coordinate::Linear { slot, index, range, usual });
                     bounds.push([p.min / range, p.max / range]);
                 }
             }
@@ -150,6 +163,42 @@ impl Bench<'_> {
 
     fn residuals(&self, stages: &[usize], model: &Model) -> Result<Vec<Column>, GapError> {
         stages.iter().map(|&s| self.residual(s, model)).collect()
+    }
+
+    /// Samples of a residual that count as one observation of its mean square, 1 + 2 sum of squared autocorrelations
+    /// (Bartlett 1946, doi 10.2307/2983611), at most a block.
+    pub(crate) fn memory_of(&self, stage: usize, residual: &Column) -> f64 {
+        let mut values = residual.values.clone();
+        self.metrics[stage].clean(&self.frame, &mut values);
+        let parts: Vec<&[f64]> =
+            self.frame.of_role(Role::Fit).map(|s| &values[s.from..s.to]).collect();
+        let product = |lag: usize| -> f64 {
+            parts
+                .iter()
+                .filter(|p| p.len() > lag)
+                .map(|p| dot(&p[lag..], &p[..p.len() - lag]))
+                .sum()
+        };
+        let power = product(0).max(1e-300);
+        let sum: f64 = (1..=2 * self.frame.block).map(|lag| (product(lag) / power).powi(2)).sum();
+        (1.0 + 2.0 * sum).min(self.frame.block as f64)
+    }
+
+    /// What the forms of a model's effects cost for lying off their usual values.
+    pub(crate) fn form_cost(&self, model: &Model) -> f64 {
+        let (coordinates, _) = self.coordinates(&[], model);
+        coordinates
+            .iter()
+            .filter(|c| match **c {
+                Coordinate::Linear { usual, .. } => usual.is_some(),
+                Coordinate::Log { slot, index, .. } => {
+                    let effect = model.effects[slot].0;
+                    self.simulator.effects()[effect].parameters[index].form.is_some()
+                }
+                Coordinate::Nominal { .. } => false,
+            })
+            .map(|c| c.prior(c.read(model)).0)
+            .sum()
     }
 
     fn weight(&self) -> f64 {
@@ -370,7 +419,7 @@ impl Bench<'_> {
         for (i, c) in coordinates.iter().enumerate() {
             let (slot, index, sd) = match *c {
                 Coordinate::Nominal { .. } => continue,
-                Coordinate::Linear { slot, index, range } => (slot, index, spread[i] * range),
+                Coordinate::Linear { slot, index, range, .. } => (slot, index, spread[i] * range),
                 Coordinate::Log { slot, index, .. } => {
                     (slot, index, spread[i] * model.effects[slot].1[index])
                 }

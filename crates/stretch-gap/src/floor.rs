@@ -19,9 +19,9 @@ pub(crate) struct Floor {
 }
 
 /// Draws of the inputs' noise.
-const DRAWS: u64 = 4;
+const DRAWS: u64 = 12;
 /// Half-width over which what arrives of them is averaged, in samples.
-const NEAR: usize = 8;
+const NEAR: usize = 12;
 
 /// Known noise of the output (else from second differences of the record), and what of the inputs' noise arrives: more
 /// where the output is steep or the input too quick to be smoothed.

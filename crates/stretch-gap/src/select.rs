@@ -50,9 +50,12 @@ impl Bench<'_> {
 
     /// Score of misfits against the nominal ones: log-likelihood of the fit with its penalty, and of the held-out part.
     pub(crate) fn score(&self, nominal: &[Misfit], misfits: &[Misfit], free: usize) -> f64 {
-        let (fit, held) = (self.frame.blocks(Role::Fit), self.frame.blocks(Role::Held));
-        let mut sum = -0.5 * free as f64 * fit.ln();
+        let blocks = self.frame.blocks(Role::Fit);
+        let mut sum = -0.5 * free as f64 * blocks.ln();
         for (a, b) in nominal.iter().zip(misfits) {
+            let memory = self.memory[a.stage];
+            let fit = self.frame.count(Role::Fit) as f64 / memory;
+            let held = self.frame.count(Role::Held) as f64 / memory;
             sum += 0.5 * fit * (a.fit / b.fit).ln() + 0.5 * held * (a.held / b.held).ln();
         }
         sum
@@ -164,12 +167,15 @@ impl<'a> Search<'a> {
                     .iter()
                     .zip(values)
                     .filter(|(p, v)| {
-                        p.is_fitted && p.off.is_none_or(|off| off == 0.0 || off != **v)
+                        p.is_fitted
+                            && p.form.is_none()
+                            && p.off.is_none_or(|off| off == 0.0 || off != **v)
                     })
                     .count()
             })
             .sum();
-        next.score = self.bench.score(&self.nominal.misfits, &next.misfits, next.free);
+        next.score = self.bench.score(&self.nominal.misfits, &next.misfits, next.free)
+            - self.bench.form_cost(&next.model);
         next
     }
 
@@ -294,7 +300,7 @@ impl<'a> Search<'a> {
         let rise = next.score - base.score;
         let (before, after) = (base.excess(self.bench), next.excess(self.bench));
         rise > self.thresholds.rise
-            && before - after >= self.thresholds.share * before
+            && before - after >= (self.thresholds.share * before).max(self.thresholds.null_excess)
             && self.is_no_mismatch(base, next)
     }
 
@@ -366,10 +372,15 @@ impl<'a> Search<'a> {
                 let one = self.bench.screen(&ground, effect)?;
                 one.gain()
             };
-            let list: Vec<Screened> = self
-                .shortlist(&screened, 3)
-                .into_iter()
-                .filter(|s| s.gain() > 0.3 * own_gain)
+            let twins = &self.bench.simulator.effects()[effect].twins;
+            let is_twin =
+                |s: &Screened| twins.contains(&self.bench.simulator.effects()[s.effect].name);
+            let list: Vec<Screened> = screened
+                .iter()
+                .take(6)
+                .filter(|s| s.gain() > 0.5 * own_gain)
+                .chain(screened.iter().filter(|s| is_twin(s) && s.gain() <= 0.5 * own_gain))
+                .cloned()
                 .collect();
             for solution in self.extend_all(&less, &ground, &list)? {
                 out.push((effect, solution));

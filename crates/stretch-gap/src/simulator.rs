@@ -71,6 +71,9 @@ pub struct EffectParameterSpec {
     pub off: Option<f64>,
     /// Whether it is searched in equal ratios.
     pub is_log: bool,
+    /// Usual value of what only gives the effect its form (a knee's width, a spread): fitted around it within its range,
+    /// and not counted as a parameter of the effect.
+    pub form: Option<f64>,
     /// Whether it is fitted; otherwise it keeps the value of the start.
     pub is_fitted: bool,
 }

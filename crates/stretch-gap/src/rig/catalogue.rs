@@ -2,7 +2,10 @@
 
 use stretch_sim::{CATALOGUE, Effect, Key, PARAMETERS, RigParams, Scale, Stage};
 
-use super::session::Inputs;
+use super::{
+    forms::{NAMES, form_of},
+    session::Inputs,
+};
 use crate::simulator::{EffectParameterSpec, EffectSpec};
 
 /// Pairs that are hard to tell apart.
@@ -60,6 +63,7 @@ pub(super) fn entries(
             })
             .map(str::to_owned)
             .collect();
+        let effect = form_of(*effect);
         let name = effect.name();
         let is_hum = name == "mains_hum";
         let parameters = effect
@@ -74,6 +78,7 @@ pub(super) fn entries(
                 off: p.off,
                 is_log: p.scale == Scale::Log,
                 is_fitted: !(is_hum && p.name == "f"),
+                form: NAMES.contains(&p.name).then_some(p.typical),
             })
             .collect();
         let _ = pressure;
@@ -82,13 +87,28 @@ pub(super) fn entries(
             stage: effect.stage().name().into(),
             touches: stage_index(effect.stage()),
             parameters,
-            starts: starts(name, extent),
+            starts: with_forms(starts(name, extent), effect),
             is_between_trials: matches!(name, "thermal_drift" | "gauge_softening" | "self_heating"),
             twins,
         });
-        effects.push(*effect);
+        effects.push(effect);
     }
     (specs, effects)
+}
+
+/// Starts with the usual value of every form that they leave out.
+fn with_forms(starts: Vec<Vec<f64>>, effect: &dyn Effect) -> Vec<Vec<f64>> {
+    let forms = effect.parameters().iter().filter(|p| NAMES.contains(&p.name)).map(|p| p.typical);
+    let forms: Vec<f64> = forms.collect();
+    let skew = |mut s: Vec<f64>| {
+        s.extend(&forms);
+        s
+    };
+    let mut all: Vec<Vec<f64>> = starts.into_iter().map(skew).collect();
+    if effect.name() == "valve_deadband" {
+        all.extend([0.02, 0.06].map(|u| vec![u, 1.0]));
+    }
+    all
 }
 
 /// Points at which an effect is screened.
@@ -106,7 +126,7 @@ fn starts(name: &str, extent: Extent) -> Vec<Vec<f64>> {
         "muscle_creep" => two(0.05, &[0.6, 2.0, 6.0, 20.0]),
         "crossbeam_inertia" => one(&[0.003, 0.01, 0.03]),
         "sleeve_slack" => {
-            one(&[0.002, 0.01, 0.03, 0.07].map(|above| (extent.strain + above).max(1e-3)))
+            one(&[0.001, 0.004, 0.01, 0.03, 0.07].map(|above| (extent.strain + above).max(1e-3)))
         }
         "sleeve_slip" => one(&[0.0005, 0.002, 0.01]),
         "pressure_crosstalk" => one(&[0.003]),
@@ -117,9 +137,13 @@ fn starts(name: &str, extent: Extent) -> Vec<Vec<f64>> {
         "thermal_drift" => one(&[2e-5]),
         "self_heating" => two(0.003, &[1.5, 5.0, 15.0, 45.0]),
         "amplifier_saturation" => {
-            let mut points: Vec<Vec<f64>> =
-                [0.01, 0.04, 0.15, 0.4].iter().map(|d| vec![0.5, (high - d).max(1.25)]).collect();
-            points.extend([0.01, 0.04, 0.15, 0.4].iter().map(|d| vec![(low + d).max(0.51), 3.3]));
+            let mut points: Vec<Vec<f64>> = [0.004, 0.015, 0.05, 0.15, 0.4]
+                .iter()
+                .map(|d| vec![0.5, (high - d).max(1.25)])
+                .collect();
+            points.extend(
+                [0.004, 0.015, 0.05, 0.15, 0.4].iter().map(|d| vec![(low + d).max(0.51), 3.3]),
+            );
             points
         }
         "amplifier_lowpass" => one(&[0.004, 0.02, 0.08]),

@@ -1,6 +1,7 @@
 //! The rig as a [`Simulator`]: pneumatics, muscle (or both as actuation) and sensing, each on measured inputs.
 
 mod catalogue;
+mod forms;
 mod hum;
 mod params;
 mod run;

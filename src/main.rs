@@ -10,7 +10,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use commands::{
-    apply, calibrate, convert, demo, diagnose, effects, evaluate, listen, rig, simulate,
+    apply, blind, calibrate, convert, demo, diagnose, effects, evaluate, listen, rig, simulate,
 };
 
 /// From the voltage of a stretch sensor to length, live.
@@ -41,6 +41,7 @@ enum Command {
     Demo(demo::Args),
     Simulate(simulate::Args),
     Diagnose(diagnose::Args),
+    Blind(blind::Args),
     Effects(effects::Args),
     Rig(rig::Args),
     Listen(listen::Args),
@@ -61,6 +62,7 @@ fn main() -> ExitCode {
         Command::Demo(args) => demo::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Diagnose(args) => diagnose::run(args),
+        Command::Blind(args) => blind::run(args),
         Command::Effects(args) => effects::run(args),
         Command::Rig(args) => rig::run(args),
         Command::Listen(args) => listen::run(args),

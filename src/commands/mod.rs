@@ -1,6 +1,8 @@
 //! One file a subcommand, and what they share.
 
 pub(crate) mod apply;
+pub(crate) mod blind;
+mod blind_score;
 pub(crate) mod calibrate;
 pub(crate) mod convert;
 pub(crate) mod demo;
@@ -14,3 +16,5 @@ pub(crate) mod rig;
 pub(crate) mod shared;
 pub(crate) mod simulate;
 pub(crate) mod stop;
+
+pub(crate) use blind_score::Goal;

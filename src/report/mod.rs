@@ -4,6 +4,8 @@
 //! the other files say what stands in them.
 
 mod bar_figure;
+mod blind_figures;
+mod blind_page;
 mod branch;
 mod calibration_page;
 mod calibration_tables;
@@ -21,6 +23,7 @@ mod slice_figure;
 mod surface_figure;
 pub(crate) mod thin;
 
+pub(crate) use blind_page::{BlindSubject, blind_page};
 #[allow(unused_imports, reason = "draws the picture of the README, outside the program")]
 pub(crate) use calibration_page::readme_picture;
 pub(crate) use calibration_page::{Context, calibration_page};

@@ -1,0 +1,273 @@
+//! `stretch blind`: does the diagnosis name causes that it was never told?
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+    sync::{
+        Mutex,
+        atomic::{AtomicUsize, Ordering::SeqCst},
+    },
+    time::Duration,
+};
+
+use anyhow::{Context, bail, ensure};
+use indicatif::{ProgressBar, ProgressStyle};
+use stretch_blind::{Plan, Seal, Verdict, make};
+
+use super::{blind_score, shared::say};
+
+/// Check the diagnosis on cases whose causes are sealed until it has answered
+///
+///   stretch blind --cases 360 --seed 7 --out check
+///
+/// makes the cases, prints the hash of the sealed labels, diagnoses every case in a process of its
+/// own that is not given the labels, and only then opens the seal and scores. The cases come from
+/// a second simulator that shares no code with the first and gives every effect another form. The
+/// three steps can be run one by one; `run` goes on where it was stopped.
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment, args_conflicts_with_subcommands = true)]
+pub(crate) struct Args {
+    #[command(subcommand)]
+    step: Option<Step>,
+    /// How many cases
+    #[arg(long, value_name = "N")]
+    cases: Option<usize>,
+    /// Seed of the cases; those below 1000000 are for development
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Folder that the cases, the answers and the report go to
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    options: RunOptions,
+}
+
+#[derive(clap::Subcommand)]
+enum Step {
+    /// Make the cases and seal their labels
+    Make(MakeArgs),
+    /// Diagnose every case without its label
+    Run(RunArgs),
+    /// Open the seal and score the answers
+    Score(ScoreArgs),
+}
+
+#[derive(clap::Args)]
+struct MakeArgs {
+    /// How many cases: single effects, none, several, foreign ones and ones struck out
+    #[arg(long, value_name = "N")]
+    cases: usize,
+    /// Seed; those below 1000000 are for development
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Folder that the cases go to
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+#[derive(clap::Args)]
+struct RunArgs {
+    /// Folder with the cases
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    #[command(flatten)]
+    options: RunOptions,
+}
+
+#[derive(clap::Args)]
+struct RunOptions {
+    /// Cases diagnosed at a time [default: one a core]
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
+    /// Answer again where there is an answer
+    #[arg(long)]
+    again: bool,
+    /// Leave out the simpler methods that are run beside for comparison
+    #[arg(long)]
+    no_baselines: bool,
+}
+
+#[derive(clap::Args)]
+struct ScoreArgs {
+    /// Folder with the cases and their answers
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// Leave out the fits that know the labels
+    #[arg(long)]
+    no_oracle: bool,
+}
+
+/// The answer in a case's folder.
+const ANSWER: &str = "diagnosis.json";
+/// Why there is none.
+const REFUSAL: &str = "refusal.txt";
+
+pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+    match args.step {
+        Some(Step::Make(args)) => return make_cases(&args),
+        Some(Step::Run(args)) => return answer(&args.folder, &args.options),
+        Some(Step::Score(args)) => return blind_score::score(&args.folder, !args.no_oracle),
+        None => {}
+    }
+    let (Some(cases), Some(out)) = (args.cases, args.out) else {
+        bail!("say how many cases and where to: stretch blind --cases 360 --seed 7 --out check");
+    };
+    let make = MakeArgs { cases, seed: args.seed, out };
+    make_cases(&make)?;
+    answer(&make.out, &args.options)?;
+    blind_score::score(&make.out, true)
+}
+
+fn make_cases(args: &MakeArgs) -> anyhow::Result<()> {
+    ensure!(args.cases > 0, "--cases 0: there is nothing to make");
+    let bar = steps("making cases", args.cases);
+    let plan = Plan::of(args.cases);
+    let seal = make(&args.out, args.seed, &plan, &|done| bar.set_position(done as u64))?;
+    bar.finish_and_clear();
+    say(format!(
+        "made {} cases in {}; labels sealed, SHA-256 {}",
+        args.cases,
+        args.out.display(),
+        seal.sha256()
+    ))
+}
+
+/// Folders of the cases, in order.
+pub(super) fn cases(folder: &Path) -> anyhow::Result<Vec<(String, PathBuf)>> {
+    let entries = fs::read_dir(folder).with_context(|| folder.display().to_string())?;
+    let mut cases = Vec::new();
+    for entry in entries {
+        let path = entry?.path();
+        let name = path.file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned());
+        if path.join("dataset.toml").is_file() {
+            cases.push((name, path));
+        }
+    }
+    ensure!(!cases.is_empty(), "{}: there is no case in it", folder.display());
+    cases.sort();
+    Ok(cases)
+}
+
+/// Diagnoses every case that has no answer yet.
+fn answer(folder: &Path, options: &RunOptions) -> anyhow::Result<()> {
+    ensure!(
+        folder.join("seal.sha256").is_file(),
+        "{}: the labels are not sealed (no seal.sha256): make the cases first",
+        folder.display()
+    );
+    let program = std::env::current_exe().context("the program's own path")?;
+    let all = cases(folder)?;
+    let waiting: Vec<&(String, PathBuf)> =
+        all.iter().filter(|(_, path)| options.again || !path.join(ANSWER).is_file()).collect();
+    let bar = steps("diagnosing", all.len());
+    bar.set_position((all.len() - waiting.len()) as u64);
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let jobs = options.jobs.unwrap_or(cores).clamp(1, waiting.len().max(1));
+    let next = AtomicUsize::new(0);
+    let failed: Mutex<Option<anyhow::Error>> = Mutex::new(None);
+    std::thread::scope(|scope| {
+        for _ in 0..jobs {
+            scope.spawn(|| {
+                while let Some((name, path)) = waiting.get(next.fetch_add(1, SeqCst)) {
+                    if stretch_data::interrupted() {
+                        return;
+                    }
+                    let done = one(&program, path, jobs > 1, options).with_context(|| name.clone());
+                    if let Err(error) = done {
+                        // The others stop at their next case.
+                        next.store(waiting.len(), SeqCst);
+                        if let Ok(mut failed) = failed.lock() {
+                            failed.get_or_insert(error);
+                        }
+                    }
+                    bar.inc(1);
+                }
+            });
+        }
+    });
+    bar.finish_and_clear();
+    if let Some(error) = failed.into_inner().unwrap_or(None) {
+        return Err(error);
+    }
+    let refused = all.iter().filter(|(_, path)| !path.join(ANSWER).is_file()).count();
+    let answered = all.len() - refused;
+    say(format!("answered {answered} of {} cases, {refused} refused", all.len()))
+}
+
+/// Diagnoses one case in a process that is told its folder and nothing else.
+fn one(program: &Path, case: &Path, alone: bool, options: &RunOptions) -> anyhow::Result<()> {
+    let mut command = Command::new(program);
+    command.current_dir(case).args(["diagnose", ".", "--json", ANSWER]);
+    for name in struck(case)? {
+        command.args(["--without", &name]);
+    }
+    if alone {
+        command.args(["--threads", "1"]);
+    }
+    if !options.no_baselines {
+        command.arg("--baselines");
+    }
+    let output = command.output().context("the program cannot run itself")?;
+    if output.status.success() {
+        return Ok(());
+    }
+    // A refusal is an answer, too: it is scored as none.
+    let why = String::from_utf8_lossy(&output.stderr).into_owned();
+    ensure!(output.status.code() == Some(1), "the diagnosis broke off: {why}");
+    super::shared::write_text(&case.join(REFUSAL), &why)
+}
+
+/// Effects that a case's `hint.toml` takes out of the catalogue.
+fn struck(case: &Path) -> anyhow::Result<Vec<String>> {
+    let path = case.join("hint.toml");
+    if !path.is_file() {
+        return Ok(Vec::new());
+    }
+    let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+    let hint: Hint = toml::from_str(&text).with_context(|| path.display().to_string())?;
+    Ok(hint.without)
+}
+
+#[derive(serde::Deserialize)]
+struct Hint {
+    #[serde(default)]
+    without: Vec<String>,
+}
+
+/// The answers, with the labels' seal unbroken, and the refusals by case.
+pub(super) fn answers(folder: &Path) -> anyhow::Result<Answers> {
+    let (seal, truth) = Seal::open(folder)?;
+    let mut answers = Answers { seal, truth, verdicts: Vec::new(), raw: Vec::new() };
+    for (name, path) in cases(folder)? {
+        let file = path.join(ANSWER);
+        if let Ok(text) = fs::read_to_string(&file) {
+            let raw: serde_json::Value =
+                serde_json::from_str(&text).with_context(|| file.display().to_string())?;
+            answers.verdicts.push(Verdict::from_diagnosis(&name, &raw)?);
+            answers.raw.push(raw);
+        }
+    }
+    Ok(answers)
+}
+
+/// What is scored.
+pub(super) struct Answers {
+    pub(super) seal: Seal,
+    pub(super) truth: stretch_blind::Truth,
+    pub(super) verdicts: Vec<Verdict>,
+    /// The whole of every answer, in the order of the verdicts.
+    pub(super) raw: Vec<serde_json::Value>,
+}
+
+/// A progress bar that says how long it will still take.
+pub(super) fn steps(what: &'static str, count: usize) -> ProgressBar {
+    let bar = ProgressBar::new(count as u64).with_message(what);
+    let template = "{msg} [{bar:30}] {pos}/{len}, {elapsed} gone, {eta} to go";
+    // the template is a constant: were it wrong, the plain bar is shown
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
+}

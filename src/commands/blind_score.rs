@@ -1,0 +1,213 @@
+//! The seal opened: answers against labels, the goals, and simpler methods beside.
+
+use std::{
+    collections::BTreeMap,
+    path::Path,
+    sync::atomic::{AtomicUsize, Ordering::SeqCst},
+};
+
+use serde::Serialize;
+use stretch_blind::{COUNTED_EXCESS, CaseKind, Label, Rate, Score};
+use stretch_gap::{Options, RigSimulator, diagnose};
+
+use super::{
+    blind::{Answers, answers, steps},
+    shared::{say, write_text},
+};
+use crate::{
+    report::{BlindSubject, blind_page},
+    table::table,
+};
+
+/// A figure, the goal it is held against, and whether it is reached.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Goal {
+    /// What is counted.
+    pub(crate) what: &'static str,
+    /// The goal in words.
+    pub(crate) goal: String,
+    /// What was reached.
+    pub(crate) value: Option<f64>,
+    /// Hits and cases, where it is a rate.
+    pub(crate) rate: Option<Rate>,
+    /// Whether that is good enough; none without a case.
+    pub(crate) met: Option<bool>,
+}
+
+pub(super) fn score(folder: &Path, with_oracle: bool) -> anyhow::Result<()> {
+    let mut answers = answers(folder)?;
+    if with_oracle {
+        oracle(folder, &mut answers)?;
+    }
+    let score = Score::of(&answers.truth, &answers.verdicts)?;
+    let goals = goals(&score);
+    let baselines = baselines(&answers);
+    let subject = BlindSubject {
+        score: &score,
+        truth: &answers.truth,
+        verdicts: &answers.verdicts,
+        goals: &goals,
+        baselines: &baselines,
+        sha256: answers.seal.sha256(),
+    };
+    write_text(&folder.join("blind.html"), &blind_page(&subject))?;
+    let json = serde_json::json!({ "score": score, "goals": goals, "baselines": baselines });
+    write_text(&folder.join("score.json"), &(serde_json::to_string_pretty(&json)? + "\n"))?;
+    say(format!("seal intact, SHA-256 {}\n", answers.seal.sha256()))?;
+    say(table(&["goal", "asked", "reached", "count", "95 % interval", ""], rows(&goals)))?;
+    if !baselines.is_empty() {
+        say("\nSimpler methods on the same cases, top-1 at excess >= 0.1:")?;
+        let rows = baselines.iter().map(|(name, rate)| {
+            let mut row = vec![name.clone()];
+            row.extend(rate_cells(Some(rate)));
+            row
+        });
+        say(table(&["method", "share", "count", "95 % interval"], rows))?;
+    }
+    say(format!("\n{score}"))?;
+    say(format!("wrote {}", folder.join("blind.html").display()))
+}
+
+/// Share, count and Wilson's interval of a rate.
+fn rate_cells(rate: Option<&Rate>) -> Vec<String> {
+    match rate.and_then(|r| Some((r, r.share()?, r.wilson()?))) {
+        Some((r, share, (low, high))) => vec![
+            format!("{share:.3}"),
+            format!("{} of {}", r.hits, r.cases),
+            format!("{low:.3} .. {high:.3}"),
+        ],
+        None => vec!["-".to_owned(), "no case".to_owned(), String::new()],
+    }
+}
+
+fn rows(goals: &[Goal]) -> impl Iterator<Item = Vec<String>> + '_ {
+    goals.iter().map(|g| {
+        let mut row = vec![g.what.to_owned(), g.goal.clone()];
+        match (g.rate, g.value) {
+            (None, Some(value)) => {
+                row.extend([format!("{value:.3}"), String::new(), String::new()])
+            }
+            (rate, _) => row.extend(rate_cells(rate.as_ref())),
+        }
+        row.push(match g.met {
+            None => String::new(),
+            Some(true) => "yes".to_owned(),
+            Some(false) => "no".to_owned(),
+        });
+        row
+    })
+}
+
+/// What a blind check is meant to reach, and what it did.
+fn goals(score: &Score) -> Vec<Goal> {
+    let s = &score.singles;
+    let least = |what, rate: Rate, least: f64| Goal {
+        what,
+        goal: format!(">= {least}"),
+        value: rate.share(),
+        rate: Some(rate),
+        met: rate.share().map(|x| x >= least),
+    };
+    let most = |what, rate: Rate, most: f64| Goal {
+        what,
+        goal: format!("<= {most}"),
+        value: rate.share(),
+        rate: Some(rate),
+        met: rate.share().map(|x| x <= most),
+    };
+    let below = |what, value: Option<f64>, most: f64| Goal {
+        what,
+        goal: format!("<= {most}"),
+        value,
+        rate: None,
+        met: value.map(|x| x <= most),
+    };
+    let behind = score.closed_oracle.zip(score.closed_beside_oracle).map(|(o, c)| o - c);
+    vec![
+        least("top-1 at excess >= 0.1", s.top1, 0.95),
+        least("top-1 at excess above 10", s.top1_above_10, 0.99),
+        least("stage", s.stage, 0.97),
+        least("95 % set covers", s.set_covers, 0.95),
+        below("mean size of the 95 % set", s.set_size, 1.4),
+        most("false alarms on nulls", score.false_alarms, 0.02),
+        below("closed gap behind the oracle's, median", behind, 0.01),
+        below("expected calibration error", score.calibration.ece, 0.04),
+        least("out of the catalogue: unknown", score.foreign_caught, 0.8),
+        least("struck out, no twin: unknown", score.struck.unknown_no_twin, 0.85),
+        most("false unknowns", s.false_unknown, 0.05),
+        least("compounds: both named", score.compounds.all_named, 0.7),
+        least("compounds: one of them named", score.compounds.one_named, 0.97),
+        below("time a case, median, s", score.runtime_s.map(|t| t.0), 5.0),
+    ]
+}
+
+/// Top-1 of the methods that ran beside, over the single effects that count.
+fn baselines(answers: &Answers) -> BTreeMap<String, Rate> {
+    let names = [
+        ("largest_drop", "largest drop of the error, nominal parameters as shipped"),
+        ("signature", "one-step signature"),
+        ("bic", "BIC alone"),
+    ];
+    let mut rates: BTreeMap<String, Rate> = BTreeMap::new();
+    for (verdict, raw) in answers.verdicts.iter().zip(&answers.raw) {
+        let Some(label) = answers.truth.cases.get(&verdict.case).filter(|l| counts(l)) else {
+            continue;
+        };
+        for (field, name) in names {
+            let Some(said) = raw["baselines"].get(field) else { continue };
+            let rate = rates.entry(name.to_owned()).or_default();
+            rate.cases += 1;
+            rate.hits += usize::from(said.as_str() == label.effects.first().map(String::as_str));
+        }
+    }
+    rates
+}
+
+fn counts(label: &Label) -> bool {
+    label.kind == CaseKind::Single && label.excess >= COUNTED_EXCESS
+}
+
+/// Closed gap of a fit whose catalogue holds the true effect alone.
+fn oracle(folder: &Path, answers: &mut Answers) -> anyhow::Result<()> {
+    let wanted: Vec<(usize, Vec<String>)> = answers
+        .verdicts
+        .iter()
+        .enumerate()
+        .filter_map(|(i, v)| {
+            let label = answers.truth.cases.get(&v.case).filter(|l| counts(l))?;
+            Some((i, label.effects.clone()))
+        })
+        .collect();
+    let bar = steps("fits that know the label", wanted.len());
+    let next = AtomicUsize::new(0);
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let verdicts = &answers.verdicts;
+    let found: Vec<(usize, f64)> = std::thread::scope(|scope| {
+        let worker = || {
+            let mut found = Vec::new();
+            while let Some((i, effects)) = wanted.get(next.fetch_add(1, SeqCst)) {
+                let closed = known_fit(&folder.join(&verdicts[*i].case), effects);
+                found.extend(closed.map(|c| (*i, c)));
+                bar.inc(1);
+            }
+            found
+        };
+        let threads: Vec<_> = (0..cores).map(|_| scope.spawn(worker)).collect();
+        threads.into_iter().flat_map(|t| t.join().unwrap_or_default()).collect()
+    });
+    bar.finish_and_clear();
+    for (i, closed) in found {
+        answers.verdicts[i].closed_oracle = Some(closed);
+    }
+    Ok(())
+}
+
+fn known_fit(case: &Path, effects: &[String]) -> Option<f64> {
+    let names = stretch_sim::CATALOGUE.iter().map(|e| e.name().to_owned());
+    let without: Vec<String> = names.filter(|name| !effects.contains(name)).collect();
+    let simulator = RigSimulator::read(case, None, &without).ok()?;
+    let options = Options { threads: 1, ..Options::default() };
+    let (diagnosis, _) =
+        diagnose(&simulator, &options, &|_| (), &stretch_data::interrupted).ok()?;
+    diagnosis.candidates.first().map(|c| c.closed)
+}

@@ -1,0 +1,250 @@
+//! The report of a blind check: how often the diagnosis was right, and every case in which it was not.
+
+use std::collections::BTreeMap;
+
+use stretch_blind::{CaseKind, Rate, Score, Truth, Verdict};
+
+use super::{
+    bar_figure::{Bar, Row, Scale, bar_figure, narrow_bar_figure},
+    blind_figures::{confusion_figure, reliability_figure, time_figure},
+    canvas::Ink,
+    diagnosis_page::percent,
+    markup::{fixed, number},
+    page::{Page, Table},
+};
+use crate::commands::Goal;
+
+/// Ends of the classes of strength.
+const STRENGTHS: [f64; 8] = [0.05, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
+
+/// What a blind check gave.
+#[derive(Clone, Copy)]
+pub(crate) struct BlindSubject<'a> {
+    /// Every figure.
+    pub(crate) score: &'a Score,
+    /// The labels.
+    pub(crate) truth: &'a Truth,
+    /// The answers.
+    pub(crate) verdicts: &'a [Verdict],
+    /// Goals and what was reached.
+    pub(crate) goals: &'a [Goal],
+    /// Top-1 of simpler methods.
+    pub(crate) baselines: &'a BTreeMap<String, Rate>,
+    /// Hash of the sealed labels.
+    pub(crate) sha256: &'a str,
+}
+
+/// The report as one HTML file.
+pub(crate) fn blind_page(subject: &BlindSubject<'_>) -> String {
+    let mut page = Page::new("Blind check of the diagnosis", &sentence(subject.score));
+    goals(&mut page, subject);
+    strength(&mut page, subject);
+    sets(&mut page, subject);
+    confusion(&mut page, subject.score);
+    misses(&mut page, subject.score);
+    page.finish()
+}
+
+fn sentence(score: &Score) -> String {
+    let right = score.singles.top1;
+    let alarms = score.false_alarms;
+    let (Some(share), Some((low, high))) = (right.share(), right.wilson()) else {
+        return format!("{} cases were scored; none has a single effect that counts.", score.cases);
+    };
+    format!(
+        "The right cause was named first in {} of {} cases with one missing effect ({}, 95\u{a0}% interval {} to {}); \
+         {} of {} simulators without a fault were called faulty.",
+        right.hits,
+        right.cases,
+        percent(share),
+        percent(low),
+        percent(high),
+        alarms.hits,
+        alarms.cases
+    )
+}
+
+fn goals(page: &mut Page, subject: &BlindSubject<'_>) {
+    page.section(
+        "What was reached",
+        "The cases come from a second simulator that shares no code with the catalogue and gives every effect another \
+         form. Their labels were sealed before the diagnosis ran.",
+    );
+    page.text(&format!("SHA-256 of the labels: {}", subject.sha256));
+    let row = |g: &Goal| {
+        let interval = g.rate.and_then(|r| r.wilson());
+        vec![
+            g.what.to_owned(),
+            g.goal.clone(),
+            g.value.map_or_else(|| "no case".to_owned(), |v| fixed(v, 3)),
+            g.rate.map_or_else(String::new, |r| format!("{} of {}", r.hits, r.cases)),
+            interval
+                .map_or_else(String::new, |(a, b)| format!("{} .. {}", fixed(a, 3), fixed(b, 3))),
+            g.met.map_or("", |met| if met { "yes" } else { "no" }).to_owned(),
+        ]
+    };
+    page.table(&Table {
+        caption: "Goals; an excess of 1 means an error as large as the noise".to_owned(),
+        head: ["Figure", "Goal", "Reached", "Count", "95 % interval", "Met"]
+            .map(str::to_owned)
+            .to_vec(),
+        rows: subject.goals.iter().map(row).collect(),
+        highlight: None,
+    });
+    let mut rows = vec![rate_row("this diagnosis", &subject.score.singles.top1, Ink::Third)];
+    rows.extend(subject.baselines.iter().map(|(name, rate)| rate_row(name, rate, Ink::First)));
+    let figure = bar_figure("First name right, by method", &rows, Scale::Percent, "%");
+    page.figure(
+        &figure,
+        "First name right at an excess of 0.1 or more, beside simpler methods on the same cases.",
+    );
+}
+
+fn rate_row(label: &str, rate: &Rate, ink: Ink) -> Row {
+    let share = rate.share().unwrap_or(0.0);
+    let text = match rate.share() {
+        Some(share) => format!("{} of {}", percent(share), rate.cases),
+        None => "no case".to_owned(),
+    };
+    let interval = rate.wilson().map(|(a, b)| [a, b]);
+    Row { label: label.to_owned(), bars: vec![Bar { interval, text, ..Bar::new(ink, share) }] }
+}
+
+fn strength(page: &mut Page, subject: &BlindSubject<'_>) {
+    page.section("Accuracy against strength", "");
+    let mut rates = vec![Rate::default(); STRENGTHS.len() + 1];
+    for verdict in subject.verdicts {
+        let Some(label) = subject.truth.cases.get(&verdict.case) else { continue };
+        if label.kind == CaseKind::Single {
+            let class = STRENGTHS.iter().filter(|s| label.excess >= **s).count();
+            rates[class].cases += 1;
+            rates[class].hits += usize::from(verdict.answer().first() == label.effects.first());
+        }
+    }
+    let label = |i: usize| match (i.checked_sub(1).map(|j| STRENGTHS[j]), STRENGTHS.get(i)) {
+        (None, Some(to)) => format!("excess below {to}"),
+        (Some(from), Some(to)) => format!("excess {from} to {to}"),
+        (Some(from), None) => format!("excess above {from}"),
+        (None, None) => String::new(),
+    };
+    let rows: Vec<Row> = rates
+        .iter()
+        .enumerate()
+        .filter(|(_, r)| r.cases > 0)
+        .map(|(i, r)| rate_row(&label(i), r, Ink::Third))
+        .collect();
+    page.figure(
+        &bar_figure("First name right, by strength", &rows, Scale::Percent, "%"),
+        "First name right for one missing effect, by the excess that it causes, with Wilson's 95 % interval.",
+    );
+    let by_effect: Vec<Row> = subject
+        .score
+        .by_effect
+        .iter()
+        .map(|(name, rate)| rate_row(name, rate, Ink::Third))
+        .collect();
+    page.folded("By effect", |page| {
+        page.figure(
+            &bar_figure("First name right, by effect", &by_effect, Scale::Percent, "%"),
+            "First name right at an excess of 0.1 or more.",
+        );
+    });
+}
+
+fn sets(page: &mut Page, subject: &BlindSubject<'_>) {
+    let score = subject.score;
+    page.section("Are the probabilities honest?", "");
+    let sizes: Vec<Row> = (0..=4_usize)
+        .filter_map(|size| {
+            let counted = subject.verdicts.iter().filter(|v| {
+                subject.truth.cases.get(&v.case).is_some_and(|l| {
+                    l.kind == CaseKind::Single && l.excess >= stretch_blind::COUNTED_EXCESS
+                })
+            });
+            let of_size = |v: &&Verdict| v.ambiguous.len().min(4) == size;
+            let (all, here) = (counted.clone().count(), counted.filter(of_size));
+            let mut rate = Rate { hits: 0, cases: 0 };
+            for verdict in here {
+                rate.cases += 1;
+                let label = &subject.truth.cases[&verdict.case];
+                rate.hits +=
+                    usize::from(label.effects.iter().all(|e| verdict.ambiguous.contains(e)));
+            }
+            let name = match size {
+                0 => "no name".to_owned(),
+                4 => "4 or more names".to_owned(),
+                1 => "1 name".to_owned(),
+                n => format!("{n} names"),
+            };
+            (rate.cases > 0).then(|| Row {
+                label: name,
+                bars: vec![Bar {
+                    text: format!("{}, {} right", rate.cases, rate.hits),
+                    ..Bar::new(Ink::Third, rate.cases as f64 / all.max(1) as f64)
+                }],
+            })
+        })
+        .collect();
+    page.figures(&[
+        (
+            reliability_figure(&score.calibration),
+            format!(
+                "Probability stated against how often it came true; expected calibration error {}.",
+                score.calibration.ece.map_or_else(|| "unknown".to_owned(), |e| fixed(e, 3))
+            ),
+        ),
+        (
+            narrow_bar_figure("Sizes of the 95 % sets", &sizes, Scale::Percent, "% of cases"),
+            format!(
+                "Sizes of the 95 % sets and how many hold the true effect; mean size {}.",
+                score.singles.set_size.map_or_else(|| "unknown".to_owned(), |s| fixed(s, 2))
+            ),
+        ),
+    ]);
+    let times: Vec<f64> = subject.verdicts.iter().map(|v| v.runtime_s).collect();
+    page.figure(
+        &time_figure(&times),
+        "How long a diagnosis took: share of the cases that were done.",
+    );
+}
+
+fn confusion(page: &mut Page, score: &Score) {
+    page.section("What was said for what", "");
+    page.figure(
+        &confusion_figure(score),
+        "Rows: what was there; columns: the first name given, or the verdict. On a phone: the wrong answers alone.",
+    );
+}
+
+fn misses(page: &mut Page, score: &Score) {
+    page.section(&format!("Every miss ({} of {})", score.misses.len(), score.cases), "");
+    let row = |m: &stretch_blind::Miss| {
+        let or_none = |names: &[String]| {
+            if names.is_empty() { "nothing".to_owned() } else { names.join(", ") }
+        };
+        vec![
+            m.case.clone(),
+            m.kind.name().replace('_', " "),
+            or_none(&m.truth),
+            m.verdict.replace('_', " "),
+            or_none(&m.named),
+            if m.in_set && !m.truth.is_empty() { "yes" } else { "" }.to_owned(),
+            number(m.excess, 2),
+            if m.pressure_column { "yes" } else { "" }.to_owned(),
+        ]
+    };
+    if score.misses.is_empty() {
+        page.text("There is none.");
+        return;
+    }
+    let head = ["Case", "Kind", "There", "Verdict", "Named", "In the set", "Excess", "Pressure"];
+    page.table(&Table {
+        caption: "Wrong answers".to_owned(),
+        head: head.map(str::to_owned).to_vec(),
+        rows: score.misses.iter().map(row).collect(),
+        highlight: None,
+    });
+    if !score.unanswered.is_empty() {
+        page.text(&format!("Without an answer: {}.", score.unanswered.join(", ")));
+    }
+}

@@ -9,8 +9,10 @@ use stretch_data::Trial;
 use stretch_filter::RateFilter;
 
 use crate::{
-    CalibrateError, FitReport, ModelKind, Options,
+    CalibrateError, FitReport, Memory, ModelKind, Options,
     fitting::{Sample, fit},
+    history_fit::{HistoryChoice, history},
+    observer_fit::{ObserverChoice, observer},
     series::{Series, even, extent, noise, polarity, sample_rate_hz, series},
     split::{DeadBands, branches},
 };
@@ -55,28 +57,58 @@ pub struct Calibrated {
 /// # Ok::<(), stretch_calibrate::CalibrateError>(())
 /// ```
 pub fn calibrate(trials: &[Trial], options: &Options) -> Result<Calibrated, CalibrateError> {
+    calibrate_with(trials, options, None).map(|(calibrated, _)| calibrated)
+}
+
+/// The same, keeping a choice made before, and the choice that was made.
+pub(crate) fn calibrate_with(
+    trials: &[Trial],
+    options: &Options,
+    choice: Option<Choice>,
+) -> Result<(Calibrated, Option<Choice>), CalibrateError> {
+    let mut made = None;
     let prepared = Prepared::new(trials, options)?;
     let (model, fits, mut notes) = match options.model {
         ModelKind::Linear => linear(&prepared, options)?,
         ModelKind::Surface(degree) => surfaces(&prepared, options, degree)?,
+        ModelKind::Blended(degree) => match surfaces(&prepared, options, degree)? {
+            (Model::Surfaces { inflation, deflation }, fits, notes) => {
+                (Model::Blended { inflation, deflation }, fits, notes)
+            }
+            other => other,
+        },
+        ModelKind::Remembering { kind, rest } => {
+            let (fitted, chosen) = remembering(&prepared, kind, rest, choice)?;
+            made = Some(chosen);
+            fitted
+        }
     };
-    notes.splice(0..0, prepared.notes);
-    let calibration = Calibration::new(CalibrationSpec {
-        schema: Schema::CURRENT,
-        signal: Label::new(&options.signal)?,
-        reference: Label::new(&options.reference)?,
-        sample_rate_hz: prepared.sample_rate,
-        target: prepared.target,
-        polarity: prepared.polarity,
-        signal_range: prepared.signal_range,
-        target_range: prepared.target_range,
-        rate_estimator: options.rate,
-        rate_source: options.rate_source,
-        dead_band: prepared.dead.signal,
-        model,
-        provenance: Provenance::new(&options.date, trials.iter().map(|t| t.name.as_str())),
-    })?;
-    Ok(Calibrated { calibration, fits, notes })
+    notes.splice(0..0, prepared.notes.iter().cloned());
+    let names = trials.iter().map(|t| t.name.as_str());
+    let calibration = prepared.calibration(model, Provenance::new(&options.date, names))?;
+    Ok((Calibrated { calibration, fits, notes }, made))
+}
+
+/// What was chosen about a model that remembers, to be kept when it is fitted
+/// to parts of the same data.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Choice {
+    History(HistoryChoice),
+    Observer(ObserverChoice),
+}
+
+fn remembering(
+    prepared: &Prepared,
+    kind: Memory,
+    rest: bool,
+    choice: Option<Choice>,
+) -> Result<(Fitted, Choice), CalibrateError> {
+    if kind == Memory::Observer {
+        let choice = choice.and_then(|c| if let Choice::Observer(c) = c { Some(c) } else { None });
+        return observer(prepared, rest, choice).map(|(fitted, c)| (fitted, Choice::Observer(c)));
+    }
+    let choice = choice.and_then(|c| if let Choice::History(c) = c { Some(c) } else { None });
+    history(prepared, kind, rest, choice).map(|(fitted, c)| (fitted, Choice::History(c)))
 }
 
 /// All trials, even in time, with pooled ranges.
@@ -89,6 +121,7 @@ pub(crate) struct Prepared {
     pub target_range: Range,
     pub dead: DeadBands,
     pub notes: Vec<String>,
+    options: Options,
 }
 
 impl Prepared {
@@ -135,12 +168,46 @@ impl Prepared {
             .filter(|(_, (signal, _))| signal.len() > 2)
             .map(|(trial, piece)| series(trial, piece, target, polarity, options.rate, sample_rate))
             .collect::<Result<_, _>>()?;
-        Ok(Self { series, sample_rate, target, polarity, signal_range, target_range, dead, notes })
+        let options = options.clone();
+        Ok(Self {
+            series,
+            sample_rate,
+            target,
+            polarity,
+            signal_range,
+            target_range,
+            dead,
+            notes,
+            options,
+        })
+    }
+
+    /// A record of a model fitted to these trials.
+    pub(crate) fn calibration(
+        &self,
+        model: Model,
+        provenance: Provenance,
+    ) -> Result<Calibration, CalibrateError> {
+        Ok(Calibration::new(CalibrationSpec {
+            schema: Schema::CURRENT,
+            signal: Label::new(&self.options.signal)?,
+            reference: Label::new(&self.options.reference)?,
+            sample_rate_hz: self.sample_rate,
+            target: self.target,
+            polarity: self.polarity,
+            signal_range: self.signal_range,
+            target_range: self.target_range,
+            rate_estimator: self.options.rate,
+            rate_source: self.options.rate_source,
+            dead_band: self.dead.signal,
+            model,
+            provenance,
+        })?)
     }
 
     /// Which part of the data is left out together in cross-validation: a trial
     /// each, or a tenth of the samples when there are fewer than three trials.
-    fn fold(&self, series: &Series, index: usize, before: usize, total: usize) -> usize {
+    pub(crate) fn fold(&self, series: &Series, index: usize, before: usize, total: usize) -> usize {
         let trials = self.series.iter().map(|s| s.trial).max().map_or(0, |last| last + 1);
         if trials >= 3 { series.trial } else { (before + index) * 10 / total.max(1) }
     }
@@ -187,7 +254,7 @@ fn pooled_range(
         .map_err(|_| CalibrateError::Constant { column: column.to_owned(), value: min })
 }
 
-type Fitted = (Model, Vec<FitReport>, Vec<String>);
+pub(crate) type Fitted = (Model, Vec<FitReport>, Vec<String>);
 
 fn linear(prepared: &Prepared, options: &Options) -> Result<Fitted, CalibrateError> {
     let mut samples = Vec::new();

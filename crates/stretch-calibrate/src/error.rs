@@ -64,6 +64,14 @@ pub enum CalibrateError {
         #[source]
         cause: FitError,
     },
+    /// A model whose numbers the trials do not determine.
+    #[error(
+        "the trials do not determine the {model} model: record trials that move up and down at several speeds, or fit --model linear"
+    )]
+    Undetermined {
+        /// The model.
+        model: String,
+    },
     /// An estimator that cannot be designed.
     #[error("the rate estimator cannot be used: {0}")]
     Filter(#[from] FilterError),

@@ -4,7 +4,7 @@ use serde::Serialize;
 use stretch_core::{Branch, Degree, FitSummary, MAX_TERMS, Surface};
 use stretch_fit::{Factor, Fit, FitError, Loss, OrderTable, SurfaceAccumulator, robust_fit};
 
-use crate::{CalibrateError, Robust};
+use crate::{CalibrateError, Robust, history_fit::no_surface};
 
 /// A normalised sample, and the part of the data that it is left out with.
 #[derive(Debug, Clone, Copy)]
@@ -87,7 +87,44 @@ pub struct Order {
     pub problem: Option<String>,
 }
 
+impl Coefficient {
+    /// A coefficient that is no power of rate and signal.
+    pub(crate) fn named(name: String, estimate: f64, half_width: f64) -> Self {
+        let (lower, upper) = (estimate - half_width, estimate + half_width);
+        Self { name, rate_power: 0, signal_power: 0, estimate, lower, upper }
+    }
+}
+
 impl FitReport {
+    /// Of a model that is no surface.
+    pub(crate) fn of_model(
+        name: String,
+        fit: &FitSummary,
+        sse: f64,
+        coefficients: Vec<Coefficient>,
+        order: Order,
+    ) -> Self {
+        let terms = order.terms as f64;
+        let dof = (fit.samples as f64 - terms).max(1.0);
+        Self {
+            model: name.clone(),
+            name,
+            branch: None,
+            samples: fit.samples,
+            sse,
+            r_squared: fit.r_squared,
+            adjusted_r_squared: 1.0 - (1.0 - fit.r_squared) * (fit.samples as f64 - 1.0) / dof,
+            rmse: fit.rmse,
+            condition: f64::NAN,
+            rejected: None,
+            coefficients,
+            recommended: None,
+            orders: vec![order],
+            cloud: Vec::new(),
+            surface: no_surface(),
+        }
+    }
+
     pub(crate) fn summary(&self) -> FitSummary {
         FitSummary { samples: self.samples, r_squared: self.r_squared, rmse: self.rmse }
     }

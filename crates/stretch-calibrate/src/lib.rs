@@ -3,12 +3,16 @@
 mod apply;
 mod calibrate;
 mod choose;
+mod dense;
 mod error;
 mod evaluate;
 mod fitting;
+mod history_fit;
+mod observer_fit;
 mod options;
 mod own_ranges;
 mod record;
+mod rest;
 mod series;
 mod split;
 
@@ -18,6 +22,6 @@ pub use choose::{Candidate, rank_signals};
 pub use error::CalibrateError;
 pub use evaluate::{Comparison, Evaluation, MethodErrors, TrialErrors, evaluate};
 pub use fitting::{Coefficient, FitReport, Order};
-pub use options::{ModelKind, Options, Robust, SpellingError, SplitBy, parse_rate};
+pub use options::{Memory, ModelKind, Options, Robust, SpellingError, SplitBy, parse_rate};
 pub use own_ranges::on_own_ranges;
 pub use record::{read_calibration, write_calibration};

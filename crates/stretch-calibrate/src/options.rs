@@ -19,6 +19,56 @@ pub enum ModelKind {
     Linear,
     /// A polynomial surface a branch.
     Surface(Degree),
+    /// The same, mixed across the dead band in place of a jump.
+    Blended(Degree),
+    /// A model that remembers what the signal did.
+    Remembering {
+        /// What it remembers with.
+        kind: Memory,
+        /// Whether the resting baseline is followed as it drifts.
+        rest: bool,
+    },
+}
+
+/// What a model remembers with; every time constant, radius and weight is chosen
+/// on data left out of the fit.
+///
+/// ```
+/// use stretch_calibrate::{Memory, ModelKind};
+/// let kind = ModelKind::Remembering { kind: Memory::History, rest: true };
+/// assert_eq!("history+rest".parse(), Ok(kind));
+/// assert_eq!(kind.to_string(), "history+rest");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Memory {
+    /// Plays: the inverse of backlash and Prandtl-Ishlinskii hysteresis, on a cubic.
+    Hysteresis,
+    /// One or two relaxation states: the inverse of lag and lead, on a cubic.
+    Relaxation,
+    /// Both.
+    Both,
+    /// Both, with all products of states.
+    History,
+    /// The gauge's forward model, inverted by a Kalman filter.
+    Observer,
+}
+
+impl Memory {
+    /// All of them, simplest first.
+    pub const ALL: [Self; 5] =
+        [Self::Hysteresis, Self::Relaxation, Self::Both, Self::History, Self::Observer];
+}
+
+impl fmt::Display for Memory {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Hysteresis => "hysteresis",
+            Self::Relaxation => "relaxation",
+            Self::Both => "both",
+            Self::History => "history",
+            Self::Observer => "observer",
+        })
+    }
 }
 
 /// How residuals are weighed.
@@ -58,7 +108,8 @@ impl SpellingError {
     }
 }
 
-const MODELS: &str = "linear, poly13, or polyIJ with degrees up to poly55";
+const MODELS: &str = "linear, poly13, polyIJ with degrees up to poly55, blended, hysteresis, \
+                      relaxation, both, history or observer, the last five also with +rest";
 
 impl FromStr for ModelKind {
     type Err = SpellingError;
@@ -67,6 +118,16 @@ impl FromStr for ModelKind {
         let unknown = || SpellingError::new(text, MODELS);
         if text == "linear" {
             return Ok(Self::Linear);
+        }
+        if text == "blended" {
+            return Ok(Self::Blended(Degree::POLY13));
+        }
+        let (name, rest) = match text.strip_suffix("+rest") {
+            Some(name) => (name, true),
+            None => (text, false),
+        };
+        if let Some(kind) = Memory::ALL.into_iter().find(|kind| kind.to_string() == name) {
+            return Ok(Self::Remembering { kind, rest });
         }
         let digits = text.strip_prefix("poly").ok_or_else(unknown)?;
         let [i, j] = digits.as_bytes() else { return Err(unknown()) };
@@ -82,6 +143,10 @@ impl fmt::Display for ModelKind {
         match self {
             Self::Linear => f.pad("linear"),
             Self::Surface(degree) => f.pad(&degree.to_string()),
+            Self::Blended(Degree::POLY13) => f.pad("blended"),
+            Self::Blended(degree) => f.pad(&format!("blended {degree}")),
+            Self::Remembering { kind, rest: false } => f.pad(&kind.to_string()),
+            Self::Remembering { kind, rest: true } => f.pad(&format!("{kind}+rest")),
         }
     }
 }

@@ -1,0 +1,423 @@
+//! Fits a polynomial of the signal's history: one least-squares problem, its
+//! time constants, radii and ridge chosen on data left out.
+
+use stretch_core::{
+    FitSummary, HistoryMap, HistoryShape, Interval, MAX_HISTORY_TERMS, Model, RestTracker, Surface,
+    Values,
+};
+
+use crate::{
+    CalibrateError, Coefficient, FitReport, Memory, Order,
+    calibrate::{Fitted, Prepared},
+    dense::{Sums, Triangle, block_errors},
+    rest::rested,
+};
+
+/// Samples at the start of a piece while low-passes forget where they began.
+const SETTLE: usize = 10;
+/// Blocks that errors may be correlated within, in seconds.
+const BLOCK_S: f64 = 0.5;
+/// Ridges that are tried, as shares of a term's own power.
+const RIDGES: [f64; 3] = [1e-6, 1e-4, 1e-2];
+const RADII: [f64; 3] = [0.03, 0.1, 0.3];
+
+/// One choice of states and products.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Design {
+    relaxations_s: &'static [f64],
+    radii: &'static [f64],
+    degree: u8,
+    memory_degree: u8,
+}
+
+const fn design(
+    relaxations_s: &'static [f64],
+    radii: &'static [f64],
+    degree: u8,
+    memory_degree: u8,
+) -> Design {
+    Design { relaxations_s, radii, degree, memory_degree }
+}
+
+fn designs(kind: Memory) -> &'static [Design] {
+    match kind {
+        Memory::Hysteresis => &const { [design(&[], &RADII, 3, 1)] },
+        Memory::Relaxation => {
+            &const {
+                [
+                    design(&[0.03], &[], 3, 1),
+                    design(&[0.1], &[], 3, 1),
+                    design(&[0.3], &[], 3, 1),
+                    design(&[1.0], &[], 3, 1),
+                    design(&[0.05, 0.5], &[], 3, 1),
+                    design(&[0.1, 1.0], &[], 3, 1),
+                ]
+            }
+        }
+        Memory::Both => {
+            &const {
+                [
+                    design(&[0.1], &RADII, 3, 1),
+                    design(&[0.3], &RADII, 3, 1),
+                    design(&[0.05, 0.5], &RADII, 3, 1),
+                    design(&[0.1, 1.0], &RADII, 3, 1),
+                ]
+            }
+        }
+        Memory::History => {
+            &const {
+                [
+                    design(&[0.05, 0.2, 0.8], &[], 3, 3),
+                    design(&[0.05, 0.2, 0.8, 3.0], &[], 3, 3),
+                    design(&[0.1, 0.4], &[], 5, 5),
+                    design(&[0.1, 0.4], &[0.15], 5, 5),
+                    design(&[0.06, 0.25, 1.0], &[0.15], 4, 4),
+                ]
+            }
+        }
+        Memory::Observer => &[],
+    }
+}
+
+/// States of a whole piece, and the target.
+struct Piece {
+    fold: Vec<usize>,
+    states: Vec<Vec<f64>>,
+    target: Vec<f64>,
+}
+
+impl Design {
+    fn shape(&self) -> HistoryShape {
+        HistoryShape {
+            states: 1 + self.relaxations_s.len() + self.radii.len(),
+            degree: self.degree,
+            memory_degree: self.memory_degree,
+        }
+    }
+
+    /// The states of every sample, as the receptor steps them.
+    fn states(&self, x: &[f64], period_s: f64) -> Vec<Vec<f64>> {
+        let first = x.first().copied().unwrap_or(0.0);
+        let mut slow = vec![first; self.relaxations_s.len()];
+        let mut played = vec![first; self.radii.len()];
+        let shares: Vec<f64> =
+            self.relaxations_s.iter().map(|tau| -(-period_s / tau).exp_m1()).collect();
+        let step = |&x: &f64| {
+            let mut states = vec![x];
+            let mut before = x;
+            for (l, share) in slow.iter_mut().zip(&shares) {
+                *l += share * (x - *l);
+                states.push(before - *l);
+                before = *l;
+            }
+            for (p, radius) in played.iter_mut().zip(self.radii) {
+                *p = p.max(x - radius).min(x + radius);
+                states.push(x - *p);
+            }
+            states
+        };
+        x.iter().map(step).collect()
+    }
+
+    /// What a state is called in a table.
+    fn name(&self, state: usize) -> String {
+        if state == 0 {
+            return "x".into();
+        }
+        match self.relaxations_s.get(state - 1) {
+            Some(tau) => format!("d({tau} s)"),
+            None => format!("h({})", self.radii[state - 1 - self.relaxations_s.len()]),
+        }
+    }
+
+    fn term_names(&self) -> Vec<String> {
+        let mut names = vec!["1".to_owned()];
+        self.shape().each_product(|parent, state| {
+            let state = self.name(state);
+            let parent = &names[parent];
+            names.push(if parent == "1" { state } else { format!("{parent} {state}") });
+        });
+        names
+    }
+}
+
+/// Scales states and multiplies them out.
+struct Rows {
+    products: Vec<(usize, usize)>,
+    centre: Vec<f64>,
+    half: Vec<f64>,
+}
+
+impl Rows {
+    fn new(shape: HistoryShape, domain: &[Interval]) -> Self {
+        let mut products = Vec::new();
+        shape.each_product(|parent, state| products.push((parent, state)));
+        Self {
+            products,
+            centre: domain.iter().map(|d| 0.5 * (d.min + d.max)).collect(),
+            half: domain.iter().map(|d| 0.5 * (d.max - d.min)).collect(),
+        }
+    }
+
+    fn fill(&self, states: &[f64], scaled: &mut Vec<f64>, row: &mut Vec<f64>) {
+        scaled.clear();
+        let scale = states.iter().zip(&self.centre).zip(&self.half);
+        scaled.extend(scale.map(|((s, c), h)| ((s - c) / h).clamp(-1.0, 1.0)));
+        row.clear();
+        row.push(1.0);
+        for &(parent, state) in &self.products {
+            row.push(row[parent] * scaled[state]);
+        }
+    }
+}
+
+/// What a fit was chosen to be; given again, it is fitted without choosing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct HistoryChoice {
+    pub(crate) design: Design,
+    pub(crate) ridge: f64,
+    pub(crate) rest: Option<RestTracker>,
+}
+
+struct Trained {
+    choice: HistoryChoice,
+    domain: Vec<Interval>,
+    estimate: Interval,
+    pieces: Vec<Piece>,
+    rows: Rows,
+    whole: Sums,
+    cross_validated: f64,
+}
+
+/// Fits `kind`; with `rest` the baseline is followed. A `choice` made before
+/// on more data is kept.
+pub(crate) fn history(
+    prepared: &Prepared,
+    kind: Memory,
+    rest: bool,
+    choice: Option<HistoryChoice>,
+) -> Result<(Fitted, HistoryChoice), CalibrateError> {
+    let best = match choice {
+        Some(choice) => train(prepared, choice.design, choice.rest, &[choice.ridge])?,
+        None => choose(prepared, kind, rest)?,
+    };
+    let choice = best.choice;
+    let undetermined = || CalibrateError::Undetermined { model: kind.to_string() };
+    let triangle = triangle(&best.whole, choice.ridge).ok_or_else(undetermined)?;
+    let weights = triangle.solve(&best.whole.cross);
+    let (fit, errors) = judge(&best, &triangle, &weights, prepared.sample_rate.hz());
+    let list = |f: fn(&Interval) -> f64| best.domain.iter().map(f).collect::<Vec<_>>();
+    let map = HistoryMap {
+        rest: choice.rest,
+        relaxations_s: Values::new("relaxations_s", choice.design.relaxations_s)?,
+        radii: Values::new("radii", choice.design.radii)?,
+        degree: choice.design.degree,
+        memory_degree: choice.design.memory_degree,
+        state_min: Values::new("state_min", &list(|d| d.min))?,
+        state_max: Values::new("state_max", &list(|d| d.max))?,
+        coefficients: Values::new("coefficients", &weights)?,
+        estimate_domain: best.estimate,
+        fit,
+    };
+    let coefficients = choice.design.term_names().into_iter().zip(&weights).zip(&errors);
+    let coefficients =
+        coefficients.map(|((name, &w), &e)| Coefficient::named(name, w, 1.96 * e)).collect();
+    let report = FitReport::of_model(
+        kind.to_string(),
+        &fit,
+        fit.rmse.powi(2) * (best.whole.samples - weights.len() as f64).max(1.0),
+        coefficients,
+        Order {
+            model: kind.to_string(),
+            terms: weights.len(),
+            r_squared: Some(fit.r_squared),
+            rmse: Some(fit.rmse),
+            cross_validated_rmse: Some(best.cross_validated),
+            problem: None,
+        },
+    );
+    let note = format!(
+        "{kind}: {} terms, time constants {:?} s, radii {:?} of the range, ridge {}{}",
+        weights.len(),
+        choice.design.relaxations_s,
+        choice.design.radii,
+        choice.ridge,
+        match choice.rest {
+            Some(rest) => format!(", baseline leaking {:.3} a second", rest.leak),
+            None => String::new(),
+        }
+    );
+    Ok(((Model::History(map), vec![report], vec![note]), choice))
+}
+
+fn choose(prepared: &Prepared, kind: Memory, rest: bool) -> Result<Trained, CalibrateError> {
+    let none = || CalibrateError::Undetermined { model: kind.to_string() };
+    // the baseline first, with the smallest design; then states and ridge
+    let (&first, others) = designs(kind).split_first().ok_or_else(none)?;
+    let mut trackers = vec![None];
+    if rest {
+        trackers = crate::rest::candidates(prepared).into_iter().map(Some).collect();
+    }
+    let mut best: Option<Trained> = None;
+    for tracker in trackers {
+        better(&mut best, train(prepared, first, tracker, &RIDGES));
+    }
+    let tracker = best.as_ref().ok_or_else(none)?.choice.rest;
+    for design in others {
+        better(&mut best, train(prepared, *design, tracker, &RIDGES));
+    }
+    best.ok_or_else(none)
+}
+
+/// Keeps the better of two; a design that the data do not determine is passed over.
+fn better(best: &mut Option<Trained>, found: Result<Trained, CalibrateError>) {
+    if let Ok(found) = found
+        && best.as_ref().is_none_or(|b| found.cross_validated < b.cross_validated)
+    {
+        *best = Some(found);
+    }
+}
+
+fn train(
+    prepared: &Prepared,
+    design: Design,
+    rest: Option<RestTracker>,
+    ridges: &[f64],
+) -> Result<Trained, CalibrateError> {
+    let period_s = prepared.sample_rate.period_s();
+    let total = prepared.series.iter().map(|s| s.signal.len()).sum();
+    let mut before = 0;
+    let mut pieces = Vec::new();
+    for series in &prepared.series {
+        let above =
+            rested(&series.signal, rest, prepared.polarity, prepared.signal_range, period_s);
+        let x: Vec<f64> = above.iter().map(|&v| prepared.signal_range.normalise(v)).collect();
+        let fold = (0..x.len()).map(|i| prepared.fold(series, i, before, total)).collect();
+        let target = series.target.iter().map(|&t| prepared.target_range.normalise(t)).collect();
+        before += x.len();
+        pieces.push(Piece { fold, states: design.states(&x, period_s), target });
+    }
+    let shape = design.shape();
+    let mut domain = vec![Interval { min: f64::INFINITY, max: f64::NEG_INFINITY }; shape.states];
+    let mut estimate = domain[0];
+    for piece in &pieces {
+        for (states, &target) in piece.states.iter().zip(&piece.target) {
+            for (d, &s) in domain.iter_mut().zip(states) {
+                *d = Interval { min: d.min.min(s), max: d.max.max(s) };
+            }
+            estimate = Interval { min: estimate.min.min(target), max: estimate.max.max(target) };
+        }
+    }
+    let undetermined = || CalibrateError::Undetermined { model: "history".into() };
+    if domain.iter().any(|d| d.min >= d.max) || shape.terms() > MAX_HISTORY_TERMS {
+        return Err(undetermined());
+    }
+    let rows = Rows::new(shape, &domain);
+    let folds = sums(&pieces, &rows, shape.terms());
+    let whole = folds.iter().fold(Sums::new(shape.terms()), |all, fold| all.with(fold, 1.0));
+    if whole.samples <= shape.terms() as f64 {
+        return Err(undetermined());
+    }
+    let mut best = (f64::INFINITY, ridges[0]);
+    for &ridge in ridges {
+        let rmse = held_out(&pieces, &rows, &folds, &whole, ridge, estimate);
+        if rmse < best.0 {
+            best = (rmse, ridge);
+        }
+    }
+    let (cross_validated, ridge) = best;
+    if !cross_validated.is_finite() && ridges.len() > 1 {
+        return Err(undetermined());
+    }
+    let choice = HistoryChoice { design, ridge, rest };
+    Ok(Trained { choice, domain, estimate, pieces, rows, whole, cross_validated })
+}
+
+fn sums(pieces: &[Piece], rows: &Rows, terms: usize) -> Vec<Sums> {
+    let last = pieces.iter().flat_map(|p| p.fold.iter()).max().copied().unwrap_or(0);
+    let mut folds = vec![Sums::new(terms); last + 1];
+    let (mut scaled, mut row) = (Vec::new(), Vec::new());
+    for piece in pieces {
+        for ((states, &target), &fold) in
+            piece.states.iter().zip(&piece.target).zip(&piece.fold).skip(SETTLE)
+        {
+            rows.fill(states, &mut scaled, &mut row);
+            folds[fold].push(&row, target);
+        }
+    }
+    folds
+}
+
+fn triangle(sums: &Sums, ridge: f64) -> Option<Triangle> {
+    sums.triangle(|i, diagonal| if i == 0 { 0.0 } else { ridge * diagonal })
+}
+
+/// Root mean square error of each part predicted from the others.
+fn held_out(
+    pieces: &[Piece],
+    rows: &Rows,
+    folds: &[Sums],
+    whole: &Sums,
+    ridge: f64,
+    estimate: Interval,
+) -> f64 {
+    let fit = |fold: &Sums| {
+        let others = whole.with(fold, -1.0);
+        triangle(&others, ridge).map(|t| t.solve(&others.cross))
+    };
+    let weights: Vec<_> = folds.iter().map(fit).collect();
+    let (mut scaled, mut row) = (Vec::new(), Vec::new());
+    let (mut squares, mut count) = (0.0, 0.0);
+    for piece in pieces {
+        for ((states, &target), &fold) in
+            piece.states.iter().zip(&piece.target).zip(&piece.fold).skip(SETTLE)
+        {
+            let Some(weights) = &weights[fold] else { return f64::INFINITY };
+            rows.fill(states, &mut scaled, &mut row);
+            squares += (target - predict(weights, &row, estimate)).powi(2);
+            count += 1.0;
+        }
+    }
+    (squares / count).sqrt()
+}
+
+fn predict(weights: &[f64], row: &[f64], estimate: Interval) -> f64 {
+    let free: f64 = weights.iter().zip(row).map(|(w, x)| w * x).sum();
+    free.clamp(estimate.min, estimate.max)
+}
+
+/// Statistics of the final fit, and standard errors of its coefficients.
+fn judge(best: &Trained, triangle: &Triangle, weights: &[f64], hz: f64) -> (FitSummary, Vec<f64>) {
+    let length = ((BLOCK_S * hz) as usize).max(1);
+    let (mut scaled, mut row) = (Vec::new(), Vec::new());
+    let mut blocks: Vec<Vec<f64>> = Vec::new();
+    let (mut squares, mut sum) = (0.0, 0.0);
+    for piece in &best.pieces {
+        let samples = piece.states.iter().zip(&piece.target).skip(SETTLE);
+        for (i, (states, &target)) in samples.enumerate() {
+            best.rows.fill(states, &mut scaled, &mut row);
+            let residual = target - weights.iter().zip(&row).map(|(w, x)| w * x).sum::<f64>();
+            squares += residual * residual;
+            sum += target;
+            if i % length == 0 {
+                blocks.push(vec![0.0; weights.len()]);
+            }
+            if let Some(block) = blocks.last_mut() {
+                block.iter_mut().zip(&row).for_each(|(b, x)| *b += residual * x);
+            }
+        }
+    }
+    let n = best.whole.samples;
+    let total = (best.whole.power - sum * sum / n).max(f64::MIN_POSITIVE);
+    let fit = FitSummary {
+        samples: n as u64,
+        r_squared: 1.0 - squares / total,
+        rmse: (squares / (n - weights.len() as f64).max(1.0)).sqrt(),
+    };
+    (fit, block_errors(triangle, &blocks))
+}
+
+/// The surface of a model that has none.
+pub(crate) fn no_surface() -> Surface {
+    Surface::new(stretch_core::Degree::POLY13, &[0.0; 7]).expect("seven finite coefficients")
+}

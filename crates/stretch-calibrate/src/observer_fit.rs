@@ -1,0 +1,481 @@
+//! Fits a gauge's forward model: the signal from the target, then the filter
+//! that inverts it.
+
+use stretch_core::{
+    FitSummary, Interval, Model, ObserverMap, Provenance, RestTracker, Runner, Values, Volts,
+};
+use stretch_filter::{SgFilter, SgShape};
+use stretch_receptor::ObserverReceptor;
+
+use crate::{
+    CalibrateError, Coefficient, FitReport, Memory, Order,
+    calibrate::{Fitted, Prepared},
+    dense::{Sums, block_errors},
+    rest::rested,
+};
+
+/// Knots of the curve.
+const KNOTS: usize = 25;
+/// Weight of the curve's second differences against a sample's residual.
+const BEND: f64 = 1e-3;
+/// Ridge on the dynamic parameters, as a share of each one's own power.
+const RIDGE: f64 = 1e-4;
+/// The least a curve rises over its whole length, as a share of the signal's range.
+const LEAST_RISE: f64 = 1e-3;
+const ITERATIONS: usize = 12;
+/// Densities of the rate's wandering that are tried, in 1/s^3.
+const AGILITIES: [f64; 8] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 300.0, 3000.0];
+/// Time constants that a first search looks at, in seconds.
+const TAUS: [f64; 7] = [0.03, 0.08, 0.2, 0.4, 0.8, 1.6, 4.0];
+const RADII: [f64; 3] = [0.03, 0.1, 0.3];
+/// A further part of the model must lower the error to this share to be kept.
+const WORTH: f64 = 0.97;
+/// Window of the reference's smoothing, in samples; quadratic.
+const SMOOTH: usize = 7;
+const SETTLE: usize = 10;
+const BLOCK_S: f64 = 0.5;
+
+/// What a fit was chosen to be; given again, it is fitted without choosing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ObserverChoice {
+    taus: [Option<f64>; 2],
+    plays: bool,
+    agility: f64,
+    pub(crate) rest: Option<RestTracker>,
+}
+
+/// A piece of a trial: signal above its baseline, the target smoothed, its rate.
+struct Piece {
+    signal: Vec<f64>,
+    smooth: Vec<f64>,
+    rate: Vec<f64>,
+}
+
+/// A forward model in signed signal.
+struct Forward {
+    choice: ObserverChoice,
+    curve: Vec<f64>,
+    drive: Interval,
+    /// Lead, amplitudes, weights of the plays.
+    dynamics: Vec<f64>,
+    errors: Vec<f64>,
+    noise: f64,
+}
+
+/// Fits an observer; with `rest` the baseline is followed. A `choice` made
+/// before on more data is kept.
+pub(crate) fn observer(
+    prepared: &Prepared,
+    rest: bool,
+    choice: Option<ObserverChoice>,
+) -> Result<(Fitted, ObserverChoice), CalibrateError> {
+    let (forward, map) = match choice {
+        Some(choice) => {
+            let forward = forward(prepared, &pieces(prepared, choice.rest)?, choice)?;
+            let map = map(prepared, &forward)?;
+            (forward, judged(prepared, map)?)
+        }
+        None => choose(prepared, rest)?,
+    };
+    let choice = forward.choice;
+    let terms = forward.curve.len() + forward.dynamics.len() + 2;
+    let mut names = vec!["lead, s".to_owned()];
+    names.extend(choice.taus().map(|tau| format!("relaxation over {tau:.3} s")));
+    names.extend(choice.radii().iter().map(|w| format!("play of {w} of the range")));
+    let coefficients = names.into_iter().zip(&forward.dynamics).zip(&forward.errors);
+    let coefficients =
+        coefficients.map(|((name, &w), &e)| Coefficient::named(name, w, 1.96 * e)).collect();
+    let kind = Memory::Observer.to_string();
+    let order = Order {
+        model: kind.clone(),
+        terms,
+        r_squared: Some(map.fit.r_squared),
+        rmse: Some(map.fit.rmse),
+        cross_validated_rmse: None,
+        problem: None,
+    };
+    let sse = map.fit.rmse.powi(2) * map.fit.samples as f64;
+    let report = FitReport::of_model(kind, &map.fit, sse, coefficients, order);
+    let note = format!(
+        "observer: noise {:.4}, agility {} 1/s^3, {} numbers in all{}",
+        forward.noise,
+        choice.agility,
+        terms,
+        choice.rest.map_or(String::new(), |r| format!(", baseline leaking {:.4} a second", r.leak)),
+    );
+    Ok(((Model::Observer(map), vec![report], vec![note]), choice))
+}
+
+impl ObserverChoice {
+    fn taus(&self) -> impl Iterator<Item = f64> {
+        self.taus.into_iter().flatten()
+    }
+
+    fn radii(&self) -> &'static [f64] {
+        if self.plays { &RADII } else { &[] }
+    }
+}
+
+fn choose(prepared: &Prepared, rest: bool) -> Result<(Forward, ObserverMap), CalibrateError> {
+    let mut trackers = vec![None];
+    if rest {
+        trackers = crate::rest::candidates(prepared).into_iter().map(Some).collect();
+    }
+    let bare = ObserverChoice { taus: [None; 2], plays: false, agility: 10.0, rest: None };
+    let mut best: Option<(Forward, ObserverMap)> = None;
+    for rest in trackers {
+        let pieces = pieces(prepared, rest)?;
+        let one = one_relaxation(prepared, &pieces, ObserverChoice { rest, ..bare })?;
+        let two = second_relaxation(prepared, &pieces, one)?;
+        for taus in [[None; 2], one.taus, two.taus] {
+            for plays in [false, true] {
+                let choice = ObserverChoice { taus, plays, ..one };
+                let Ok(found) = tuned(prepared, &pieces, choice) else { continue };
+                let bar = best.as_ref().map_or(f64::INFINITY, |(_, map)| WORTH * map.fit.rmse);
+                if found.1.fit.rmse < bar {
+                    best = Some(found);
+                }
+            }
+        }
+    }
+    best.ok_or_else(|| CalibrateError::Undetermined { model: Memory::Observer.to_string() })
+}
+
+/// The time constant that explains the signal best: a grid, then golden sections.
+fn one_relaxation(
+    prepared: &Prepared,
+    pieces: &[Piece],
+    choice: ObserverChoice,
+) -> Result<ObserverChoice, CalibrateError> {
+    let noise = |tau: f64| {
+        let with = ObserverChoice { taus: [Some(tau), None], ..choice };
+        forward(prepared, pieces, with).map_or(f64::INFINITY, |f| f.noise)
+    };
+    let errors = TAUS.map(noise);
+    let best = (0..TAUS.len()).min_by(|&a, &b| errors[a].total_cmp(&errors[b])).unwrap_or(0);
+    let (mut low, mut high) =
+        (TAUS[best.saturating_sub(1)].ln(), TAUS[(best + 1).min(TAUS.len() - 1)].ln());
+    let golden = 0.5 * (5f64.sqrt() - 1.0);
+    for _ in 0..6 {
+        let (a, b) = (high - golden * (high - low), low + golden * (high - low));
+        if noise(a.exp()) < noise(b.exp()) { high = b } else { low = a }
+    }
+    Ok(ObserverChoice { taus: [Some((0.5 * (low + high)).exp()), None], ..choice })
+}
+
+fn second_relaxation(
+    prepared: &Prepared,
+    pieces: &[Piece],
+    one: ObserverChoice,
+) -> Result<ObserverChoice, CalibrateError> {
+    let first = one.taus[0];
+    let mut best = (f64::INFINITY, one);
+    for tau in TAUS {
+        // two of one kind cannot be told apart
+        if first.is_some_and(|first| (tau / first).ln().abs() < 1.0) {
+            continue;
+        }
+        let two = ObserverChoice { taus: [first, Some(tau)], ..one };
+        if let Ok(forward) = forward(prepared, pieces, two)
+            && forward.noise < best.0
+        {
+            best = (forward.noise, two);
+        }
+    }
+    Ok(best.1)
+}
+
+/// A forward model, and the agility with which its filter errs least.
+fn tuned(
+    prepared: &Prepared,
+    pieces: &[Piece],
+    choice: ObserverChoice,
+) -> Result<(Forward, ObserverMap), CalibrateError> {
+    let mut forward = forward(prepared, pieces, choice)?;
+    let mut best: Option<ObserverMap> = None;
+    for agility in AGILITIES {
+        forward.choice.agility = agility;
+        let map = judged(prepared, map(prepared, &forward)?)?;
+        if best.as_ref().is_none_or(|b| map.fit.rmse < b.fit.rmse) {
+            best = Some(map);
+        }
+    }
+    let map = best.ok_or(CalibrateError::NoTrials)?;
+    forward.choice.agility = map.agility;
+    Ok((forward, map))
+}
+
+fn pieces(prepared: &Prepared, rest: Option<RestTracker>) -> Result<Vec<Piece>, CalibrateError> {
+    let (rate, period_s) = (prepared.sample_rate, prepared.sample_rate.period_s());
+    let centred = SgShape::centred_rate(SMOOTH, 2);
+    let smoother = SgFilter::<f64>::new(SgShape { order: 0, ..centred }, rate)?;
+    let differentiator = SgFilter::<f64>::new(centred, rate)?;
+    let sign = prepared.polarity.sign();
+    let mut pieces = Vec::new();
+    for series in &prepared.series {
+        if series.signal.len() <= SMOOTH + SETTLE {
+            continue;
+        }
+        let above =
+            rested(&series.signal, rest, prepared.polarity, prepared.signal_range, period_s);
+        let target: Vec<f64> =
+            series.target.iter().map(|&t| prepared.target_range.normalise(t)).collect();
+        let mut smooth = vec![0.0; target.len()];
+        let mut slope = smooth.clone();
+        smoother.over_log(&target, &mut smooth)?;
+        differentiator.over_log(&target, &mut slope)?;
+        let signal = above.iter().map(|v| sign * v).collect();
+        pieces.push(Piece { signal, smooth, rate: slope });
+    }
+    Ok(pieces)
+}
+
+/// What each dynamic parameter adds to the drive, a sample.
+fn features(piece: &Piece, choice: ObserverChoice, period_s: f64) -> Vec<Vec<f64>> {
+    let first = piece.smooth[0];
+    let mut slow: Vec<(f64, f64)> =
+        choice.taus().map(|tau| (first, -(-period_s / tau).exp_m1())).collect();
+    let mut played = vec![first; choice.radii().len()];
+    let step = |(&y, &rate): (&f64, &f64)| {
+        let mut row = vec![rate];
+        for (l, share) in &mut slow {
+            *l += *share * (y - *l);
+            row.push(y - *l);
+        }
+        for (p, w) in played.iter_mut().zip(choice.radii()) {
+            *p = p.max(y - w).min(y + w);
+            row.push(y - *p);
+        }
+        row
+    };
+    piece.smooth.iter().zip(&piece.rate).map(step).collect()
+}
+
+/// Gauss-Newton over curve and dynamics together.
+fn forward(
+    prepared: &Prepared,
+    pieces: &[Piece],
+    choice: ObserverChoice,
+) -> Result<Forward, CalibrateError> {
+    let undetermined = || CalibrateError::Undetermined { model: Memory::Observer.to_string() };
+    let period_s = prepared.sample_rate.period_s();
+    let added: Vec<_> = pieces.iter().map(|p| features(p, choice, period_s)).collect();
+    let dynamic = 1 + choice.taus().count() + choice.radii().len();
+    let samples: Vec<(f64, &[f64], f64)> = pieces
+        .iter()
+        .zip(&added)
+        .flat_map(|(p, rows)| {
+            let targets = p.smooth.iter().zip(rows).zip(&p.signal).skip(SETTLE);
+            targets.map(|((&y, row), &v)| (y, row.as_slice(), v))
+        })
+        .collect();
+    if samples.len() <= KNOTS + dynamic {
+        return Err(undetermined());
+    }
+    let (low, high) = samples
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), s| (a.min(s.2), b.max(s.2)));
+    let least_step = LEAST_RISE * (high - low) / (KNOTS - 1) as f64;
+    let mut dynamics = vec![0.0; dynamic];
+    let mut curve = Vec::new();
+    for pass in 0..ITERATIONS {
+        let drive = drives(&samples, &dynamics)?;
+        let frozen = solve(&samples, &dynamics, drive, None).ok_or_else(undetermined)?;
+        curve = rising(&frozen.0, least_step);
+        let (_, moved) =
+            solve(&samples, &dynamics, drive, Some(&curve)).ok_or_else(undetermined)?;
+        // half steps first: the curve still takes up what belongs to the dynamics
+        let share = if pass < 2 { 0.7 } else { 1.0 };
+        let mut change: f64 = 0.0;
+        for (d, m) in dynamics.iter_mut().zip(&moved) {
+            change = change.max((m - *d).abs());
+            *d += share * (m - *d);
+        }
+        if change < 1e-4 {
+            break;
+        }
+    }
+    let drive = drives(&samples, &dynamics)?;
+    if let Some((knots, _)) = solve(&samples, &dynamics, drive, None) {
+        curve = rising(&knots, least_step);
+    }
+    let (noise, errors) = residuals(&samples, &dynamics, drive, &curve, prepared.sample_rate.hz());
+    // a curve that follows noiseless data exactly still needs a noise to weigh with
+    let noise = noise.max(1e-6 * (high - low));
+    Ok(Forward { choice, curve, drive, dynamics, errors, noise })
+}
+
+type Sample<'a> = (f64, &'a [f64], f64);
+
+fn driven(sample: &Sample, dynamics: &[f64]) -> f64 {
+    sample.0 + sample.1.iter().zip(dynamics).map(|(a, b)| a * b).sum::<f64>()
+}
+
+/// The drives that occur, without the outermost five in ten thousand.
+fn drives(samples: &[Sample], dynamics: &[f64]) -> Result<Interval, CalibrateError> {
+    let mut all: Vec<f64> = samples.iter().map(|s| driven(s, dynamics)).collect();
+    let edge = all.len() / 5000;
+    let last = all.len() - 1 - edge;
+    let min = *all.select_nth_unstable_by(edge, f64::total_cmp).1;
+    let max = *all.select_nth_unstable_by(last, f64::total_cmp).1;
+    if min < max {
+        Ok(Interval { min, max })
+    } else {
+        Err(CalibrateError::Undetermined { model: Memory::Observer.to_string() })
+    }
+}
+
+/// The knot below a drive and the share of the way to the next.
+fn place(drive: f64, domain: Interval) -> (usize, f64) {
+    let most = (KNOTS - 1) as f64;
+    let at = ((drive - domain.min) / (domain.max - domain.min)).clamp(0.0, 1.0) * most;
+    let below = (at as usize).min(KNOTS - 2);
+    (below, at - below as f64)
+}
+
+/// Knots alone, or knots and dynamics linearised about a curve.
+fn solve(
+    samples: &[Sample],
+    dynamics: &[f64],
+    drive: Interval,
+    about: Option<&[f64]>,
+) -> Option<(Vec<f64>, Vec<f64>)> {
+    let free = if about.is_some() { dynamics.len() } else { 0 };
+    let size = KNOTS + free;
+    let mut sums = Sums::new(size);
+    let per_knot = (KNOTS - 1) as f64 / (drive.max - drive.min);
+    let (mut places, mut row) = (Vec::new(), Vec::new());
+    for sample in samples {
+        let (below, share) = place(driven(sample, dynamics), drive);
+        places.clear();
+        row.clear();
+        places.extend([below, below + 1]);
+        row.extend([1.0 - share, share]);
+        let mut value = sample.2;
+        if let Some(curve) = about {
+            let slope = (curve[below + 1] - curve[below]) * per_knot;
+            places.extend(KNOTS..size);
+            row.extend(sample.1.iter().map(|f| slope * f));
+            value += slope * sample.1.iter().zip(dynamics).map(|(a, b)| a * b).sum::<f64>();
+        }
+        sums.push_sparse(&places, &row, value);
+    }
+    let bend = (BEND * sums.samples).sqrt();
+    for k in 1..KNOTS - 1 {
+        sums.push_sparse(&[k - 1, k, k + 1], &[bend, -2.0 * bend, bend], 0.0);
+    }
+    let penalty = |i: usize, diagonal: f64| {
+        if i < KNOTS { 1e-12 * (1.0 + diagonal) } else { RIDGE * diagonal + 1e-12 }
+    };
+    let solution = sums.triangle(penalty)?.solve(&sums.cross);
+    let (knots, moved) = solution.split_at(KNOTS);
+    solution.iter().all(|x| x.is_finite()).then(|| (knots.to_vec(), moved.to_vec()))
+}
+
+/// The nearest curve that rises by at least `step` a knot: pools that violate
+/// it are averaged (Ayer et al. 1955, doi:10.1214/aoms/1177728423).
+fn rising(knots: &[f64], step: f64) -> Vec<f64> {
+    let mut pools: Vec<(f64, usize)> = Vec::new();
+    for (k, knot) in knots.iter().enumerate() {
+        pools.push((knot - step * k as f64, 1));
+        while let [.., (a, n), (b, m)] = pools[..]
+            && a >= b
+        {
+            pools.truncate(pools.len() - 2);
+            let count = n + m;
+            pools.push(((a * n as f64 + b * m as f64) / count as f64, count));
+        }
+    }
+    let flat = pools.iter().flat_map(|&(level, count)| std::iter::repeat_n(level, count));
+    flat.enumerate().map(|(k, level)| level + step * k as f64).collect()
+}
+
+/// Spread of the signal around the model, and standard errors of the dynamics
+/// given the curve.
+fn residuals(
+    samples: &[Sample],
+    dynamics: &[f64],
+    drive: Interval,
+    curve: &[f64],
+    hz: f64,
+) -> (f64, Vec<f64>) {
+    let length = ((BLOCK_S * hz) as usize).max(1);
+    let per_knot = (KNOTS - 1) as f64 / (drive.max - drive.min);
+    let mut sums = Sums::new(dynamics.len());
+    let mut blocks: Vec<Vec<f64>> = Vec::new();
+    let mut squares = 0.0;
+    for (i, sample) in samples.iter().enumerate() {
+        let (below, share) = place(driven(sample, dynamics), drive);
+        let rise = curve[below + 1] - curve[below];
+        let residual = sample.2 - curve[below] - share * rise;
+        squares += residual * residual;
+        let row: Vec<f64> = sample.1.iter().map(|f| rise * per_knot * f).collect();
+        sums.push(&row, residual);
+        if i % length == 0 {
+            blocks.push(vec![0.0; row.len()]);
+        }
+        if let Some(block) = blocks.last_mut() {
+            block.iter_mut().zip(&row).for_each(|(b, x)| *b += residual * x);
+        }
+    }
+    let errors = match sums.triangle(|_, diagonal| 1e-9 * diagonal + 1e-300) {
+        Some(triangle) => block_errors(&triangle, &blocks),
+        None => vec![f64::NAN; dynamics.len()],
+    };
+    ((squares / samples.len() as f64).sqrt(), errors)
+}
+
+fn map(prepared: &Prepared, forward: &Forward) -> Result<ObserverMap, CalibrateError> {
+    let sign = prepared.polarity.sign();
+    let curve: Vec<f64> = forward.curve.iter().map(|v| sign * v).collect();
+    let taus: Vec<f64> = forward.choice.taus().collect();
+    let (lead, rest) = forward.dynamics.split_at(1);
+    let (amplitudes, weights) = rest.split_at(taus.len());
+    let targets = prepared.series.iter().flat_map(|s| s.target.iter());
+    let estimate_domain =
+        crate::series::extent(targets.map(|&t| prepared.target_range.normalise(t)));
+    Ok(ObserverMap {
+        rest: forward.choice.rest,
+        curve: Values::new("curve", &curve)?,
+        drive_domain: forward.drive,
+        relaxations_s: Values::new("relaxations_s", &taus)?,
+        amplitudes: Values::new("amplitudes", amplitudes)?,
+        lead_s: lead[0],
+        radii: Values::new("radii", forward.choice.radii())?,
+        play_weights: Values::new("play_weights", weights)?,
+        noise: forward.noise,
+        agility: forward.choice.agility,
+        estimate_domain,
+        fit: FitSummary { samples: 0, r_squared: 0.0, rmse: 0.0 },
+    })
+}
+
+/// The same with the statistics of its estimates, run as it will run live.
+fn judged(prepared: &Prepared, map: ObserverMap) -> Result<ObserverMap, CalibrateError> {
+    let calibration = prepared.calibration(Model::Observer(map), Provenance::new("", []))?;
+    let design = ObserverReceptor::<f64>::new(&calibration)?;
+    let mut receptor = Runner::new(design);
+    let (mut squares, mut sum, mut power, mut count) = (0.0, 0.0, 0.0, 0.0);
+    for series in &prepared.series {
+        receptor.reset();
+        for (i, (&v, &target)) in series.signal.iter().zip(&series.target).enumerate() {
+            let Ok(reading) = receptor.step(Volts(v)) else { continue };
+            if i < SETTLE {
+                continue;
+            }
+            let truth = prepared.target_range.normalise(target);
+            let estimate = prepared.target.from_reference(reading.estimate);
+            squares += (truth - prepared.target_range.normalise(estimate)).powi(2);
+            sum += truth;
+            power += truth * truth;
+            count += 1.0;
+        }
+    }
+    let total = (power - sum * sum / f64::max(count, 1.0)).max(f64::MIN_POSITIVE);
+    let fit = FitSummary {
+        samples: count as u64,
+        r_squared: 1.0 - squares / total,
+        rmse: (squares / f64::max(count, 1.0)).sqrt(),
+    };
+    Ok(ObserverMap { fit, ..map })
+}

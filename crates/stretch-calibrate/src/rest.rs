@@ -1,0 +1,58 @@
+//! The resting baseline over a log, and which ones are worth trying.
+
+use stretch_core::{Polarity, Range, RestTracker};
+
+use crate::{calibrate::Prepared, series::noise};
+
+/// How fast a baseline gives way to a signal below rest, in seconds.
+const CATCH_UP_S: f64 = 0.5;
+/// Leaks that are tried, as shares of the signal's range per second.
+const LEAKS: [f64; 4] = [0.0, 0.0003, 0.001, 0.003];
+/// Noise alone may carry the signal this many standard deviations below the level.
+const MARGIN: f64 = 2.5;
+/// Samples at a trial's start that may stand at rest.
+const FIRST: usize = 50;
+/// What a sample counts beyond the level at most, as the receptor has it.
+const MOST_EXCESS: f64 = 0.1;
+
+/// Baselines worth trying. The resting level is the lowest first half second of
+/// any trial, each of which begins before anything moves or contracted, less
+/// what noise alone may do.
+pub(crate) fn candidates(prepared: &Prepared) -> Vec<RestTracker> {
+    let sign = prepared.polarity.sign();
+    let level = prepared.series.iter().map(|series| {
+        let first = &series.signal[..series.signal.len().min(FIRST)];
+        let mut signed: Vec<f64> = first.iter().map(|v| sign * v).collect();
+        signed.sort_by(f64::total_cmp);
+        signed[signed.len() / 2]
+    });
+    let records: Vec<&[f64]> = prepared.series.iter().map(|s| s.signal.as_slice()).collect();
+    let level = sign * (level.fold(f64::INFINITY, f64::min) - MARGIN * noise(&records));
+    let span = prepared.signal_range.span();
+    let tracker = |share| RestTracker { level, catch_up_s: CATCH_UP_S, leak: share * span };
+    LEAKS.map(tracker).into()
+}
+
+/// A log less its baseline, as the receptor steps it.
+pub(crate) fn rested(
+    signal: &[f64],
+    rest: Option<RestTracker>,
+    polarity: Polarity,
+    range: Range,
+    period_s: f64,
+) -> Vec<f64> {
+    let Some(rest) = rest else { return signal.to_vec() };
+    let sign = polarity.sign();
+    let pull = (period_s / rest.catch_up_s).min(1.0);
+    let mut baseline = 0.0;
+    let step = |&v: &f64| {
+        let excess = sign * v - baseline - sign * rest.level;
+        baseline += if excess < 0.0 {
+            pull * excess.max(-MOST_EXCESS * range.span())
+        } else {
+            rest.leak * period_s
+        };
+        v - sign * baseline
+    };
+    signal.iter().map(step).collect()
+}

@@ -198,7 +198,7 @@ fn answer(folder: &Path, options: &RunOptions) -> anyhow::Result<()> {
 /// Diagnoses one case in a process that is told its folder and nothing else.
 fn one(program: &Path, case: &Path, alone: bool, options: &RunOptions) -> anyhow::Result<()> {
     let mut command = Command::new(program);
-    command.current_dir(case).args(["diagnose", ".", "--json", ANSWER]);
+    command.current_dir(case).args(["diagnose", ".", "--json", ANSWER, "--no-next"]);
     for name in struck(case)? {
         command.args(["--without", &name]);
     }

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use stretch_data::RigFile;
-use stretch_gap::{Diagnosis, Evidence, GapError, Options, RigSimulator, Simulator, diagnose};
+use stretch_gap::{
+    Diagnosis, Evidence, GapError, Options, RigSimulator, Simulator, diagnose, next_experiment,
+};
 
 use super::{
     diagnosis_text::text,
@@ -61,6 +63,9 @@ pub(crate) struct Args {
     /// Write the recommended experiment as a trial file
     #[arg(long, value_name = "next.csv")]
     experiment: Option<PathBuf>,
+    /// Do not look for the experiment that would tell rivals apart
+    #[arg(long, hide = true, conflicts_with = "experiment")]
+    no_next: bool,
     /// Run the simpler methods beside, too
     #[arg(long, hide = true)]
     baselines: bool,
@@ -93,6 +98,20 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let simulator =
         RigSimulator::read(&args.data_set, rig.as_ref(), &args.without).with_context(shown)?;
     let (mut diagnosis, evidence) = work(&simulator, &options, &bar).with_context(shown)?;
+    let mut proposal = None;
+    if diagnosis.ambiguous.len() > 1 && !args.no_next {
+        bar.set_message("the next experiment");
+        proposal = next_experiment(&simulator, &diagnosis, &evidence).with_context(shown)?;
+    }
+    diagnosis.next_experiment = proposal.as_ref().map(|p| p.next.clone());
+    if let Some(path) = &args.experiment {
+        match &proposal {
+            Some(proposal) => proposal.trial.write(path)?,
+            None => diagnosis
+                .notes
+                .push("no experiment is recommended: there are no rivals to tell apart".into()),
+        }
+    }
     diagnosis.notes.splice(0..0, simulator.session().notes.iter().cloned());
     bar.finish_and_clear();
     conclude(&args, &diagnosis, &evidence, &simulator)

@@ -16,7 +16,7 @@ const BAR: f64 = 11.0;
 const LABEL: f64 = 21.0;
 const AXIS: f64 = 46.0;
 /// Space for the number behind the longest bar.
-const NUMBER: f64 = 62.0;
+const NUMBER: f64 = 88.0;
 
 /// One bar.
 #[derive(Debug, Clone)]

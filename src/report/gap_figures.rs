@@ -26,6 +26,9 @@ pub(crate) const BEFORE: Ink = Ink::Second;
 /// With the effect.
 pub(crate) const AFTER: Ink = Ink::Third;
 
+/// Its ink, its width in pixels, and its pieces.
+type Line = (Ink, f64, Vec<Vec<(f64, f64)>>);
+
 /// The stage with the largest gap.
 pub(crate) fn worst(diagnosis: &Diagnosis) -> usize {
     let stages = diagnosis.location.stages.iter().enumerate();
@@ -83,7 +86,7 @@ fn lines_figure(
     y_label: &str,
     height: u32,
 ) -> Figure {
-    let thin = |bins: usize| -> Vec<(Ink, f64, Vec<Vec<(f64, f64)>>)> {
+    let thin = |bins: usize| -> Vec<Line> {
         lines.iter().map(|(ink, w, y)| (*ink, *w, curve(time, y, window, bins))).collect()
     };
     let wide = thin(750);
@@ -97,7 +100,7 @@ fn lines_figure(
         x_label: "time in the trial, s".to_owned(),
         y_label: y_label.to_owned(),
     };
-    let draw = |lines: Vec<(Ink, f64, Vec<Vec<(f64, f64)>>)>| {
+    let draw = |lines: Vec<Line>| {
         let axes = &axes;
         move |area: &Area<'_>| {
             plot(area, axes, |chart| {

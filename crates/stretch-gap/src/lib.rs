@@ -11,6 +11,7 @@ mod floor;
 mod frame;
 mod linear;
 mod localise;
+mod next_experiment;
 mod probability;
 mod rig;
 mod screen;
@@ -27,6 +28,7 @@ pub use diagnosis::{
 pub use error::GapError;
 pub use evidence::{Evidence, StageEvidence};
 pub use frame::{BLOCK_S, Frame, Metric, Role, Segment};
+pub use next_experiment::{Proposal, next_experiment};
 pub use rig::{RigSimulator, RigTrial, Session};
 pub use simulator::{
     EffectParameterSpec, EffectSpec, Model, Motion, ParameterSpec, Run, Simulator, StageSpec,

@@ -154,7 +154,7 @@ impl Axis {
         let ends = course.level.iter().filter(|x| x.is_finite());
         let (low, high) =
             ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
-        Self::even("level", &course.level, low, high, 5, |x| short(x), unit)
+        Self::even("level", &course.level, low, high, 5, short, unit)
     }
 
     /// Quarters of the moving samples, by the size of their rate.

@@ -1,6 +1,7 @@
 //! The rig as a [`Simulator`]: pneumatics, muscle (or both as actuation) and sensing, each on measured inputs.
 
 mod catalogue;
+mod experiments;
 mod forms;
 mod hum;
 mod params;
@@ -14,6 +15,7 @@ use stretch_data::{DataSet, RigFile};
 use stretch_sim::{Effect, Key, PARAMETERS, RigParams, Stage};
 
 use catalogue::{Extent, entries, tuned};
+pub(crate) use experiments::Experiment;
 use params::read_params;
 use session::Inputs;
 pub use session::{RigTrial, Session};

@@ -1,0 +1,288 @@
+//! The experiment that tells rivals apart.
+
+use rayon::prelude::*;
+use stretch_data::Trial;
+
+use crate::{
+    diagnosis::{Diagnosis, NextExperiment},
+    error::GapError,
+    evidence::Evidence,
+    frame::BLOCK_S,
+    linear::boxed,
+    rig::{Experiment, RigSimulator},
+    simulator::{Model, Simulator},
+};
+
+/// Samples that count as one observation: residuals are correlated over half a second.
+const BLOCK: f64 = 50.0;
+/// Evidence that tells two rivals apart with 95 % probability, nats.
+const ENOUGH: f64 = 3.0;
+/// Share of an effect parameter's range that a sensitivity is taken over.
+const SMALL: f64 = 0.02;
+
+/// What to measure next, and the trial that does it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Proposal {
+    /// The recommendation.
+    pub next: NextExperiment,
+    /// Openings by time, and what is to be set from outside.
+    pub trial: Trial,
+    /// Every experiment of the menu: name, difference in floors, minutes; the best first.
+    pub menu: Vec<(String, f64, f64)>,
+}
+
+/// Recommends an experiment when the 95 % set of a diagnosis holds more than one effect.
+///
+/// D(x) is the root mean square difference between the predictions of the two leading rivals for the experiment x, in
+/// floors, that is left when one rival's nominal and effect parameters are moved, within their tolerances and at the
+/// price of what has been measured already, to come as near to the other as they can (linearised); both ways, the
+/// smaller. The experiment with the largest D^2 times blocks a minute wins: evidence adds up in squares. The
+/// preparation counts into the minutes.
+///
+/// # Errors
+/// What the simulator says.
+pub fn next_experiment(
+    simulator: &RigSimulator,
+    diagnosis: &Diagnosis,
+    evidence: &Evidence,
+) -> Result<Option<Proposal>, GapError> {
+    let Some((one, two, separates)) = rivals(simulator, diagnosis, evidence) else {
+        return Ok(None);
+    };
+    let (stroke, supply_kpa) = simulator.extent();
+    let menu = Experiment::menu(stroke, supply_kpa);
+    let done = Experiment::done();
+    let known = [Tangent::of(simulator, one, &done)?, Tangent::of(simulator, two, &done)?];
+    let rated: Result<Vec<(usize, f64)>, GapError> = menu
+        .par_iter()
+        .enumerate()
+        .map(|(i, experiment)| {
+            let here = [
+                Tangent::of(simulator, one, experiment)?,
+                Tangent::of(simulator, two, experiment)?,
+            ];
+            let there = left(&known[0], &known[1], &here[0], &here[1]);
+            let back = left(&known[1], &known[0], &here[1], &here[0]);
+            Ok((i, there.min(back)))
+        })
+        .collect();
+    let worth = |&(i, d): &(usize, f64)| {
+        let minutes = menu[i].minutes();
+        d * d * (minutes - menu[i].prepare_min) / minutes
+    };
+    let mut rated = rated?;
+    rated.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
+    let Some(&(best, d)) = rated.first().filter(|r| r.1.is_finite()) else { return Ok(None) };
+    let chosen = &menu[best];
+    let next = NextExperiment {
+        name: chosen.name.to_owned(),
+        separates,
+        d,
+        minutes: chosen.minutes(),
+        why: chosen.how.to_owned() + &repeats(d, chosen.minutes() - chosen.prepare_min),
+    };
+    let menu =
+        rated.iter().map(|&(i, d)| (menu[i].name.to_owned(), d, menu[i].minutes())).collect();
+    Ok(Some(Proposal { next, trial: chosen.trial(), menu }))
+}
+
+/// How often it has to be done until it tells, where once is not enough.
+fn repeats(d: f64, minutes: f64) -> String {
+    let told = 0.5 * d * d * 60.0 * minutes / BLOCK_S;
+    match (ENOUGH / told).ceil() {
+        n if n <= 1.0 => String::new(),
+        n if n <= 20.0 => format!(" Once will hardly do: plan {n} runs."),
+        _ => {
+            " The rivals are so alike that no experiment of the menu is likely to part them.".into()
+        }
+    }
+}
+
+/// The first candidate, the most probable one with an effect of the 95 % set that the first lacks, and the effects in
+/// which they differ.
+fn rivals<'a>(
+    simulator: &RigSimulator,
+    diagnosis: &Diagnosis,
+    evidence: &'a Evidence,
+) -> Option<(&'a Model, &'a Model, Vec<String>)> {
+    let one = evidence.candidates.first()?;
+    let own = &diagnosis.candidates.first()?.effects;
+    let at = diagnosis.candidates.iter().position(|c| {
+        c.effects.iter().any(|e| diagnosis.ambiguous.contains(e) && !own.contains(e))
+    })?;
+    let others = &diagnosis.candidates[at].effects;
+    let mut separates: Vec<String> = own.iter().filter(|e| !others.contains(e)).cloned().collect();
+    separates.extend(others.iter().filter(|e| !own.contains(e)).cloned());
+    let two = evidence.candidates.get(at)?;
+    let specs = simulator.effects();
+    let holds = |m: &Model| m.effects.iter().all(|(e, _)| *e < specs.len());
+    (holds(one) && holds(two)).then_some((one, two, separates))
+}
+
+/// What a model predicts of an experiment, and how that moves with each of its parameters.
+struct Tangent {
+    values: Vec<f64>,
+    slopes: Vec<Vec<f64>>,
+    /// How far each parameter may go down and up, in its own units of one.
+    bounds: Vec<[f64; 2]>,
+    channels: usize,
+}
+
+impl Tangent {
+    fn of(
+        simulator: &RigSimulator,
+        model: &Model,
+        experiment: &Experiment,
+    ) -> Result<Self, GapError> {
+        let run = |model: &Model| -> Result<(Vec<f64>, usize), GapError> {
+            let channels = simulator.predict(model, experiment)?;
+            let count = channels.len();
+            Ok((channels.into_iter().flatten().collect(), count))
+        };
+        let (values, channels) = run(model)?;
+        let mut slopes = Vec::new();
+        let mut bounds = Vec::new();
+        let mut slope = |moved: &Model, step: f64| -> Result<(), GapError> {
+            let (there, _) = run(moved)?;
+            slopes.push(there.iter().zip(&values).map(|(a, b)| (a - b) / step).collect());
+            Ok(())
+        };
+        for (i, p) in simulator.parameters().iter().enumerate().filter(|(_, p)| p.sd > 0.0) {
+            let at = (model.parameters[i] - p.nominal) / p.sd;
+            let step = if at > 0.0 { -0.3 } else { 0.3 };
+            let mut moved = model.clone();
+            moved.parameters[i] += step * p.sd;
+            slope(&moved, step)?;
+            bounds.push([-3.0 - at, 3.0 - at]);
+        }
+        for (slot, (effect, effect_values)) in model.effects.iter().enumerate() {
+            let specs = &simulator.effects()[*effect].parameters;
+            for (k, p) in specs.iter().enumerate().filter(|(_, p)| p.is_fitted) {
+                let range = p.max - p.min;
+                let x = effect_values[k];
+                let step = if x > p.min + 0.5 * range { -SMALL } else { SMALL };
+                // Small beside the value where the range is wide.
+                let step = if p.is_log && x > 0.0 {
+                    step.signum() * (0.1 * x / range).min(SMALL)
+                } else {
+                    step
+                };
+                let mut moved = model.clone();
+                moved.effects[slot].1[k] = x + step * range;
+                slope(&moved, step)?;
+                bounds.push([(p.min - x) / range, (p.max - x) / range]);
+            }
+        }
+        Ok(Self { values, slopes, bounds, channels })
+    }
+
+    fn samples(&self) -> f64 {
+        self.values.len() as f64 / self.channels.max(1) as f64
+    }
+}
+
+/// Root mean square difference, summed over channels, that stays when `rival` comes as near to `truth` as it can.
+fn left(truth_known: &Tangent, rival_known: &Tangent, truth: &Tangent, rival: &Tangent) -> f64 {
+    let n = rival.slopes.len();
+    let mut normal = vec![0.0; n * n];
+    let mut slope = vec![0.0; n];
+    for (truth, rival) in [(truth_known, rival_known), (truth, rival)] {
+        let gap: Vec<f64> = rival.values.iter().zip(&truth.values).map(|(a, b)| a - b).collect();
+        for i in 0..n {
+            slope[i] += crate::frame::dot(&rival.slopes[i], &gap) / BLOCK;
+            for j in 0..=i {
+                let product = crate::frame::dot(&rival.slopes[i], &rival.slopes[j]) / BLOCK;
+                normal[i * n + j] += product;
+                if i != j {
+                    normal[j * n + i] += product;
+                }
+            }
+        }
+    }
+    for i in 0..n {
+        normal[i * n + i] += 1.0;
+    }
+    let low: Vec<f64> = rival.bounds.iter().map(|b| b[0].min(0.0)).collect();
+    let high: Vec<f64> = rival.bounds.iter().map(|b| b[1].max(0.0)).collect();
+    let step = boxed(&normal, &slope, &low, &high);
+    let mut gap: Vec<f64> = rival.values.iter().zip(&truth.values).map(|(a, b)| a - b).collect();
+    for (slopes, x) in rival.slopes.iter().zip(&step) {
+        gap.iter_mut().zip(slopes).for_each(|(g, s)| *g += x * s);
+    }
+    (gap.iter().map(|g| g * g).sum::<f64>() / rival.samples()).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rig::{RigTrial, Session};
+    use stretch_data::TrialKind;
+
+    /// A rig beside an arbitrary trial.
+    fn rig() -> RigSimulator {
+        let plan = stretch_sim::TrialPlan::arbitrary(1, 5);
+        let mut session =
+            stretch_sim::Session::new(&Default::default(), &Default::default()).unwrap();
+        let (_, trial) = session.run(&plan).unwrap();
+        let column = |name: &str| trial.channel(name).unwrap().to_vec();
+        let trial = RigTrial {
+            name: "arbitrary".into(),
+            kind: TrialKind::Arbitrary,
+            start_s: 0.0,
+            is_test: false,
+            dt_s: 0.01,
+            inlet: column("inlet"),
+            outlet: column("outlet"),
+            pressure_kpa: None,
+            length_mm: column("length_mm"),
+            bridge_v: column("bridge_v"),
+        };
+        RigSimulator::new(Session::new(vec![trial]).unwrap(), None, &[]).unwrap()
+    }
+
+    /// D of every experiment of the menu for two effects at given first parameters.
+    fn differences(
+        rig: &RigSimulator,
+        one: (&str, f64),
+        two: (&str, f64),
+    ) -> Vec<(&'static str, f64)> {
+        let model = |(name, value): (&str, f64)| {
+            let at = rig.effects().iter().position(|e| e.name == name).unwrap();
+            let mut values = rig.effects()[at].starts[0].clone();
+            let which = rig.effects()[at].parameters.iter().position(|p| p.name != "v_lo").unwrap();
+            values[which] = value;
+            let mut model = Model::nominal(rig);
+            model.effects.push((at, values));
+            model
+        };
+        let (one, two) = (model(one), model(two));
+        let tangent = |model, experiment| Tangent::of(rig, model, experiment).unwrap();
+        let done = Experiment::done();
+        let known = [tangent(&one, &done), tangent(&two, &done)];
+        let (stroke, supply) = rig.extent();
+        Experiment::menu(stroke, supply)
+            .iter()
+            .map(|x| {
+                let here = [tangent(&one, x), tangent(&two, x)];
+                let there = left(&known[0], &known[1], &here[0], &here[1]);
+                (x.name, there.min(left(&known[1], &known[0], &here[1], &here[0])))
+            })
+            .collect()
+    }
+
+    #[test]
+    fn what_motion_cannot_part_other_experiments_do() {
+        let rig = rig();
+        let d = |all: &[(&str, f64)], name: &str| all.iter().find(|x| x.0 == name).unwrap().1;
+        // A slack sleeve stops at a strain, an amplifier at a voltage: another excitation moves only one of them.
+        let slack = stretch_sim::Bridge::new(rig.nominal());
+        let strain = slack.strain(rig.extent().0.0 + 6.0);
+        let top = slack.volts(slack.resistance(strain));
+        let all = differences(&rig, ("sleeve_slack", strain), ("amplifier_saturation", top));
+        assert!(d(&all, "excitation_0.7") > 3.0 * d(&all, "arbitrary"), "{all:?}");
+        // Which of two scales bends shows only where the length is known otherwise.
+        let all = differences(&rig, ("pot_nonlinearity", 0.6), ("gauge_nonlinearity", -0.01));
+        assert!(d(&all, "gauge_blocks") > 2.0 * d(&all, "minor_loops"), "{all:?}");
+        assert!(all.iter().all(|x| x.1.is_finite()));
+    }
+}

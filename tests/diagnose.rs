@@ -1,0 +1,231 @@
+//! `stretch diagnose` and `stretch blind` as a user runs them.
+
+mod support;
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use assert_cmd::Command;
+use serde_json::Value;
+use support::{Scratch, fails, stdout as text_of, stretch};
+
+/// What a run that succeeds prints.
+#[track_caller]
+fn stdout(command: &mut Command) -> String {
+    let output = command.output().expect("the program runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    text_of(&output)
+}
+
+/// A simulated data set: one arbitrary trial to fit, one to test, with effects.
+fn bench(scratch: &Scratch, name: &str, effects: &[&str]) -> PathBuf {
+    let out = scratch.path(name);
+    let parts = ["one", "two"].map(|part| {
+        let folder = scratch.path(&format!("{name}-{part}"));
+        let seed = if part == "one" { "3" } else { "4" };
+        let mut command = stretch();
+        command.args(["simulate", "--protocol", "arbitrary", "--seed", seed, "--out"]).arg(&folder);
+        effects.iter().for_each(|e| {
+            command.args(["--effect", e]);
+        });
+        stdout(&mut command);
+        folder.join("arbitrary_1.csv")
+    });
+    fs::create_dir(&out).unwrap();
+    fs::copy(&parts[0], out.join("fit.csv")).unwrap();
+    fs::copy(&parts[1], out.join("test.csv")).unwrap();
+    describe(&out, &[("fit.csv", "fit"), ("test.csv", "test")]);
+    out
+}
+
+fn describe(folder: &Path, trials: &[(&str, &str)]) {
+    let mut text = "name = \"bench\"\nrate_hz = 100.0\n".to_owned();
+    for (i, (file, split)) in trials.iter().enumerate() {
+        let start = 75 * i;
+        text += &format!(
+            "[[trial]]\nfile = \"{file}\"\nkind = \"arbitrary\"\nstart_s = {start}.0\nsplit = \"{split}\"\n"
+        );
+    }
+    fs::write(folder.join("dataset.toml"), text).unwrap();
+}
+
+/// Rewrites a column of a trial, sample by sample.
+fn alter(file: &Path, column: &str, change: impl Fn(usize, f64) -> f64) {
+    let text = fs::read_to_string(file).unwrap();
+    let at = text.lines().next().unwrap().split(',').position(|c| c == column).unwrap();
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    for (i, line) in lines.iter_mut().skip(1).enumerate() {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        cells[at] = change(i, cells[at].parse().unwrap()).to_string();
+        *line = cells.join(",");
+    }
+    fs::write(file, lines.join("\n") + "\n").unwrap();
+}
+
+fn both(folder: &Path, column: &str, change: impl Fn(usize, f64) -> f64) {
+    ["fit.csv", "test.csv"].iter().for_each(|file| alter(&folder.join(file), column, &change));
+}
+
+fn diagnose(folder: &Path) -> Command {
+    let mut command = stretch();
+    command.arg("diagnose").arg(folder);
+    command
+}
+
+#[test]
+fn a_simulated_effect_is_named_and_reported() {
+    let scratch = Scratch::new();
+    let folder = bench(&scratch, "bench", &["gauge_hysteresis:h=0.25,s=0.015"]);
+    let (json, page) = (scratch.path("d.json"), scratch.path("d.html"));
+    let run = |threads: &str, json: &Path| {
+        let mut command = diagnose(&folder);
+        command.arg("--json").arg(json).args(["--threads", threads]);
+        command
+    };
+    let text = stdout(run("2", &json).arg("--report").arg(&page));
+    let first = text.lines().next().unwrap();
+    assert!(first.contains("gauge_hysteresis"), "{text}");
+    let read = |path: &Path| -> Value {
+        let mut value: Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
+        assert!(value["runtime_s"].take().as_f64().unwrap() > 0.0);
+        value
+    };
+    let d = read(&json);
+    assert_eq!((d["schema"].as_u64(), d["verdict"].as_str()), (Some(1), Some("effect")));
+    assert_eq!(d["named"][0], "gauge_hysteresis");
+    let best = &d["candidates"][0];
+    assert!(best["parameters"].is_object() && best["closed"].as_f64().unwrap() > 0.8, "{best}");
+    assert!(
+        best["closed_ci"][0].as_f64().unwrap() > 0.5 && best["gap_before"].as_f64().unwrap() > 0.5
+    );
+    let stages = d["where"]["stages"].as_array().unwrap();
+    let sensing = stages.iter().find(|s| s["stage"] == "sensing").unwrap();
+    assert!(sensing["share"].as_f64().unwrap() > 0.9 && sensing["unit"] == "V");
+    let regimes = d["where"]["slices"].as_array().unwrap();
+    assert!(regimes.iter().any(|s| s["by"] == "regime" && s["slice"] == "turnaround"));
+    assert!(d["parameters"].as_array().unwrap().iter().any(|p| p["name"] == "e0"));
+    // Whatever the number of threads, the same bits.
+    let again = scratch.path("again.json");
+    stdout(&mut run("1", &again));
+    assert!(d == read(&again));
+    let page = fs::read_to_string(page).unwrap();
+    assert!(page.contains("Fix in the simulator") && page.contains("Add gauge_hysteresis"));
+    assert!(!page.contains("http") && !page.contains("NaN") && !page.contains("class=\"missing\""));
+    // With its entry struck out nobody else takes the blame with the same right.
+    let without = scratch.path("without.json");
+    stdout(diagnose(&folder).args(["--without", "gauge_hysteresis"]).arg("--json").arg(&without));
+    let w = read(&without);
+    assert_ne!(w["named"][0], "gauge_hysteresis");
+    assert!(w["candidates"][0]["closed"].as_f64() < d["candidates"][0]["closed"].as_f64());
+}
+
+#[test]
+fn a_rig_without_a_fault_gets_no_name() {
+    let scratch = Scratch::new();
+    let folder = bench(&scratch, "bench", &[]);
+    let text = stdout(&mut diagnose(&folder));
+    assert!(!text.lines().next().unwrap().contains("lacks"), "{text}");
+    // One trial alone: its last part is held back and tested on.
+    describe(&folder, &[("fit.csv", "fit")]);
+    let text = stdout(&mut diagnose(&folder));
+    assert!(text.contains("no test trial") && !text.contains("lacks"), "{text}");
+}
+
+#[test]
+fn data_that_are_not_what_they_say_are_refused_by_name() {
+    let scratch = Scratch::new();
+    let good = bench(&scratch, "good", &[]);
+    let spoiled = |name: &str, spoil: &dyn Fn(&Path)| {
+        let folder = scratch.path(name);
+        fs::create_dir(&folder).unwrap();
+        for file in ["fit.csv", "test.csv", "dataset.toml"] {
+            fs::copy(good.join(file), folder.join(file)).unwrap();
+        }
+        spoil(&folder);
+        folder
+    };
+    let metres = spoiled("metres", &|f| both(f, "length_mm", |_, x| 1e-3 * x));
+    fails(&mut diagnose(&metres), &["length_mm", "metres", "1000"]);
+    let dead = spoiled("dead", &|f| both(f, "bridge_v", |_, _| 1.24));
+    fails(&mut diagnose(&dead), &["bridge_v", "dead"]);
+    let swapped = spoiled("swapped", &|f| {
+        for file in ["fit.csv", "test.csv"] {
+            let text = fs::read_to_string(f.join(file)).unwrap();
+            let (head, rest) = text.split_once('\n').unwrap();
+            let head = head.replace("length_mm", "x").replace("bridge_v", "length_mm");
+            fs::write(f.join(file), head.replace(",x,", ",bridge_v,") + "\n" + rest).unwrap();
+        }
+    });
+    fails(&mut diagnose(&swapped), &["swapped"]);
+    let tests = spoiled("tests", &|f| describe(f, &[("fit.csv", "test"), ("test.csv", "test")]));
+    fails(&mut diagnose(&tests), &["no trial may be fitted", "split"]);
+    let shut = spoiled("shut", &|f| {
+        both(f, "inlet", |_, _| 0.0);
+        both(f, "outlet", |_, _| 0.0);
+    });
+    fails(&mut diagnose(&shut), &["valve", "inlet"]);
+    // What was asked for and cannot be is said before anything is computed.
+    fails(
+        diagnose(&good).args(["--without", "gauge_histeresis"]),
+        &["did you mean `gauge_hysteresis`"],
+    );
+    fails(&mut diagnose(&good.join("fit.csv")), &["--reference", "--signal"]);
+    fails(&mut diagnose(&scratch.path("nowhere")), &["nowhere", "no such"]);
+    let json = scratch.path("d.json");
+    fails(diagnose(&metres).arg("--json").arg(&json), &["metres"]);
+    assert!(!json.exists());
+}
+
+#[test]
+fn odd_data_get_an_honest_verdict() {
+    let scratch = Scratch::new();
+    // Two seconds are missing: said, and no cause invented.
+    let folder = bench(&scratch, "gap", &[]);
+    let file = folder.join("fit.csv");
+    let text = fs::read_to_string(&file).unwrap();
+    let kept = text.lines().enumerate().filter(|(i, _)| !(5000..5200).contains(i));
+    fs::write(&file, kept.map(|(_, l)| format!("{l}\n")).collect::<String>()).unwrap();
+    let text = stdout(&mut diagnose(&folder));
+    assert!(
+        text.contains("missing after") && !text.lines().next().unwrap().contains("lacks"),
+        "{text}"
+    );
+    // The rig of somebody else: the gap is everything, and no effect takes the blame.
+    let rig = stdout(stretch().arg("rig"));
+    let other = rig
+        .replace("value = 180.0", "value = 300.0")
+        .replace("value = 25e-6", "value = 200e-6")
+        .replace("value = 2.5e-5", "value = 2e-4");
+    let other = scratch.write("other.toml", other);
+    let text = stdout(diagnose(&folder).arg("--rig").arg(&other));
+    assert!(!text.lines().next().unwrap().contains("lacks"), "{text}");
+    assert!(text.contains("right rig"), "{text}");
+}
+
+#[test]
+fn a_blind_check_keeps_its_labels_sealed() {
+    let scratch = Scratch::new();
+    let out = scratch.path("check");
+    let text = stdout(
+        stretch().args(["blind", "make", "--cases", "2", "--seed", "11", "--out"]).arg(&out),
+    );
+    let hash = text.split_whitespace().last().unwrap().to_owned();
+    assert_eq!(hash.len(), 64);
+    fails(stretch().args(["blind", "make", "--cases", "2", "--out"]).arg(&out), &["check"]);
+    // One case is answered already: it is left as it is.
+    let answer = r#"{"schema":1,"verdict":"no_gap","named":[],"ambiguous":[],"candidates":[],"runtime_s":0.5}"#;
+    fs::write(out.join("case-000/diagnosis.json"), answer).unwrap();
+    fs::write(out.join("case-001/diagnosis.json"), answer).unwrap();
+    assert!(stdout(stretch().args(["blind", "run"]).arg(&out)).contains("answered 2 of 2"));
+    let text = stdout(stretch().args(["blind", "score", "--no-oracle"]).arg(&out));
+    assert!(text.contains(&hash) && text.contains("false alarms on nulls"), "{text}");
+    let page = fs::read_to_string(out.join("blind.html")).unwrap();
+    assert!(page.contains(&hash) && page.contains("Every miss") && !page.contains("NaN"));
+    // A label that was altered afterwards is found out.
+    let labels = out.join("sealed/truth.json");
+    let text = fs::read_to_string(&labels).unwrap();
+    fs::write(&labels, text.replacen("\"excess\": ", "\"excess\": 1", 1)).unwrap();
+    fails(stretch().args(["blind", "score"]).arg(&out), &["seal"]);
+}

@@ -248,7 +248,10 @@ impl<'a> Search<'a> {
     fn shortlist(&self, screened: &[Screened], kept: usize) -> Vec<Screened> {
         let specs = self.bench.simulator.effects();
         let best = screened.first().map_or(0.0, Screened::gain);
-        let floor = (0.03 * best).max(0.3 * self.thresholds.rise);
+        // Gains count a block as one observation, scores what the residual's memory says.
+        let memory = self.bench.memory.iter().copied().fold(f64::INFINITY, f64::min);
+        let finest = (memory / self.bench.frame.block as f64).min(1.0);
+        let floor = (0.03 * best).max(0.3 * self.thresholds.rise * finest);
         let mut list: Vec<Screened> =
             screened.iter().take(kept).filter(|s| s.gain() >= floor).cloned().collect();
         let leaders: Vec<usize> = list.iter().take(LEADERS).map(|s| s.effect).collect();
@@ -279,11 +282,11 @@ impl<'a> Search<'a> {
             }
             progress(&format!("fitting {} candidates, round {}", list.len(), round + 1));
             let found = self.extend_all(&best, &ground, &list)?;
-            let Some(next) = found.first() else { break };
-            if !self.is_worth(&best, next) {
+            // The best may only pick up what mismatch of form left elsewhere: the first that is worth it is taken.
+            let Some(next) = found.into_iter().find(|next| self.is_worth(&best, next)) else {
                 break;
-            }
-            best = next.clone();
+            };
+            best = next;
             if round + 1 < self.depth {
                 ground = Ground::around(self.bench, best.model.clone())?;
             }

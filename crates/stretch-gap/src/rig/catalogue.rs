@@ -106,7 +106,13 @@ fn with_forms(starts: Vec<Vec<f64>>, effect: &dyn Effect) -> Vec<Vec<f64>> {
     };
     let mut all: Vec<Vec<f64>> = starts.into_iter().map(skew).collect();
     if effect.name() == "valve_deadband" {
-        all.extend([0.02, 0.06].map(|u| vec![u, 1.0]));
+        all.extend([0.02, 0.06].map(|u| vec![u, 1.0, 0.01, 1.0]));
+        all.extend([0.01, 0.03].map(|u| vec![u, 1.0, 0.01, 1.9]));
+        all.extend([0.005, 0.015].map(|u| vec![u, 0.5, 0.5, 1.0]));
+    }
+    if effect.name() == "channel_skew" {
+        all.extend([-3e-4, 3e-4].map(|rate| vec![0.002, rate, 0.0]));
+        all.push(vec![0.0005, 0.0, 0.002]);
     }
     all
 }

@@ -35,9 +35,12 @@ pub(super) fn add(a: f64, f: f64, sd: f64, dt_s: f64, measured: &[f64], simulate
         if size > 1.5 * a {
             (p, q) = (p * 1.5 * a / size, q * 1.5 * a / size);
         }
-        for (i, v) in values.iter_mut().enumerate() {
+        for (i, (m, v)) in measured.iter().zip(values.iter_mut()).enumerate() {
             let (c, s) = wave(i);
-            *v += p * c + q * s;
+            let hum = p * c + q * s;
+            // As if the sample itself had not been used to find the phase: no noise is explained away.
+            let leverage = (ss * c * c - 2.0 * cs * c * s + cc * s * s) / determinant;
+            *v = m - (m - (*v + hum)) / (1.0 - leverage.min(0.5));
         }
     }
 }

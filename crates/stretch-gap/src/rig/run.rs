@@ -1,11 +1,18 @@
 //! One stage of the rig over the session.
 
+use std::borrow::Cow;
+
 use stretch_sim::{
     Actuation, DEFAULT_STEP_S, EffectSet, Grid, Key, Memory, Muscle, Openings, Pneumatics,
     Reference, RigParams, Sensing, Stage, Start,
 };
 
-use super::{RigSimulator, hum, session::Begin};
+use super::{
+    RigSimulator,
+    forms::commands::{deadband, skew, wobble},
+    hum,
+    session::Begin,
+};
 use crate::{
     dice::Dice,
     error::GapError,
@@ -30,9 +37,23 @@ struct Setting<'a> {
     /// Input of the stage that stands in for the measured one, all trials end to end.
     given: Option<&'a [f64]>,
     kind: Stage,
+    deadband: Option<&'a [f64]>,
+    skew: Option<&'a [f64]>,
 }
 
 /// Simulates one stage, on the measured input unless another one is given.
+/// Openings of the valves, as commanded or as an effect makes them.
+struct Commands<'a> {
+    inlet: Cow<'a, [f64]>,
+    outlet: Cow<'a, [f64]>,
+}
+
+impl Commands<'_> {
+    fn view(&self) -> Openings<'_> {
+        Openings { inlet: &self.inlet, outlet: &self.outlet }
+    }
+}
+
 pub(super) fn simulate(
     rig: &RigSimulator,
     run: Run<'_>,
@@ -42,12 +63,14 @@ pub(super) fn simulate(
     let (params, offset) = params_of(rig, run.model);
     let mut effects = EffectSet::new();
     let mut hum = None;
+    let (mut deadband, mut skew) = (None, None);
     for (index, values) in &run.model.effects {
         let row = rig.rows[*index];
-        if row.name() == "mains_hum" {
-            hum = Some((values[0], values[1]));
-        } else {
-            effects.push(row, values)?;
+        match row.name() {
+            "mains_hum" => hum = Some((values[0], values[1])),
+            "valve_deadband" => deadband = Some(values.as_slice()).filter(|v| v[0] > 0.0),
+            "channel_skew" => skew = Some(values.as_slice()),
+            _ => effects.push(row, values)?,
         }
     }
     let kind = rig.stage_kinds[run.stage];
@@ -56,7 +79,18 @@ pub(super) fn simulate(
         Stage::Muscle | Stage::Sensing => Grid::new(rig.dt_s, run.step * rig.dt_s, 0.0)?,
         _ => effects.grid(&params, rig.dt_s, run.step * STEP_S)?,
     };
-    let setting = Setting { rig, params, effects, grid, offset, shake: run.shake, given, kind };
+    let setting = Setting {
+        rig,
+        params,
+        effects,
+        grid,
+        offset,
+        shake: run.shake,
+        given,
+        kind,
+        deadband,
+        skew,
+    };
     match kind {
         Stage::Pneumatics => setting.pneumatics(run.trials, out)?,
         Stage::Muscle => setting.muscle(run.trials, out)?,
@@ -118,9 +152,18 @@ impl Setting<'_> {
         }
     }
 
-    fn openings(&self, trial: usize) -> Openings<'_> {
+    /// Openings as the valves take them.
+    fn openings(&self, trial: usize) -> Commands<'_> {
         let trial = &self.rig.session.trials[trial];
-        Openings { inlet: &trial.inlet, outlet: &trial.outlet }
+        match self.deadband {
+            None => Commands { inlet: Cow::from(&trial.inlet), outlet: Cow::from(&trial.outlet) },
+            Some(values) => {
+                let least = self.params[Key::UMin];
+                let taken =
+                    |openings: &[f64], side| Cow::from(deadband(values, side, least, openings));
+                Commands { inlet: taken(&trial.inlet, 0), outlet: taken(&trial.outlet, 1) }
+            }
+        }
     }
 
     /// A measured input: smoothed, and shaken if asked for.
@@ -161,7 +204,8 @@ impl Setting<'_> {
         let stage = Pneumatics::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
         self.each(count, out, |trial, own| {
-            let (start, openings) = (self.start(trial), self.openings(trial));
+            let (start, commands) = (self.start(trial), self.openings(trial));
+            let openings = commands.view();
             let initial = self.initial_kpa(trial);
             if stage.is_coupled() {
                 let length = self.input(trial, false);
@@ -202,7 +246,7 @@ impl Setting<'_> {
             stage.run(
                 &mut memory,
                 self.start(trial),
-                self.openings(trial),
+                self.openings(trial).view(),
                 self.initial_kpa(trial),
                 &mut pressure,
                 own,
@@ -268,6 +312,12 @@ impl Setting<'_> {
             let start_s = self.rig.trials[trial].start_s;
             let (length, pressure) = (self.refined(length), self.refined(pressure));
             stage.run(&mut memory, self.start(trial), start_s, &length, &pressure, own)?;
+            if let Some(values) = self.skew {
+                skew(values, self.rig.dt_s, own);
+                let measured = &self.rig.session.trials[trial].bridge_v;
+                let noise = self.params[Key::SigmaV];
+                wobble(values[2], noise, self.rig.dt_s, measured, own);
+            }
             if let Some((a, f)) = hum {
                 let measured = &self.rig.session.trials[trial].bridge_v;
                 hum::add(a, f, self.params[Key::SigmaV], self.rig.dt_s, measured, own);
@@ -339,7 +389,8 @@ impl Setting<'_> {
         let mut all = Vec::with_capacity(count);
         for trial in 0..count {
             let mut own = vec![0.0; self.rig.trials[trial].samples];
-            let (start, openings) = (self.start(trial), self.openings(trial));
+            let (start, commands) = (self.start(trial), self.openings(trial));
+            let openings = commands.view();
             stage.run(&mut memory, start, openings, self.initial_kpa(trial), &mut own)?;
             all.push(own);
         }

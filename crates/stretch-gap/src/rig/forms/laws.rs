@@ -1,4 +1,4 @@
-//! Valves, supply and chamber: laws with a free curvature.
+//! Supply and chamber: laws with a free curvature.
 
 use stretch_sim::{Action, Droop, EffectParameter, Law, Stage};
 
@@ -64,31 +64,6 @@ impl Law for Growth {
     #[inline]
     fn at(&self, y: f64) -> f64 {
         1.0 + self.g * y * (1.0 + self.bend * (1.0 - y))
-    }
-}
-
-pub(super) static VALVE_DEADBAND: Form = Form {
-    name: "valve_deadband",
-    stage: Stage::Pneumatics,
-    equation: "u -> max(0, u - u_db (1 - exp(-u/(u_db softness))))",
-    parameters: &[
-        EffectParameter::strength("u_db", "1", 0.0, 0.11, 0.03),
-        EffectParameter::shape("softness", "1", 0.02, 1.5, 0.1),
-    ],
-    needs: None,
-    action: |v, _| Action::Opening(Box::new(Deadband { u_db: v[0], soft: v[0] * v[1] })),
-};
-
-#[derive(Debug)]
-struct Deadband {
-    u_db: f64,
-    soft: f64,
-}
-
-impl Law for Deadband {
-    #[inline]
-    fn at(&self, u: f64) -> f64 {
-        (u - self.u_db * (1.0 - (-u / self.soft).exp())).max(0.0)
     }
 }
 

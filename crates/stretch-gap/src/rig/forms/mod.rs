@@ -4,6 +4,7 @@
 //! more than one time constant, loops turn sooner or later. Each effect here has its catalogue's name and parameters
 //! and one more, its form; at the form's usual value it is the catalogue's own.
 
+pub(super) mod commands;
 mod knees;
 mod lags;
 mod laws;
@@ -15,7 +16,7 @@ use stretch_sim::Effect;
 /// Effects that stand in for the catalogue's of the same name.
 static FORMS: &[&dyn Effect] = &[
     &laws::SUPPLY_SAG,
-    &laws::VALVE_DEADBAND,
+    &commands::VALVE_DEADBAND,
     &laws::LEAK,
     &laws::CHAMBER_VOLUME,
     &loops::MUSCLE_HYSTERESIS,
@@ -32,13 +33,15 @@ static FORMS: &[&dyn Effect] = &[
     &lags::SELF_HEATING,
     &knees::AMPLIFIER_SATURATION,
     &lags::AMPLIFIER_LOWPASS,
+    &commands::CHANNEL_SKEW,
     &shapes::POT_NONLINEARITY,
     &loops::POT_BACKLASH,
 ];
 
 /// Names of the parameters that are forms.
 pub(super) const NAMES: &[&str] = &[
-    "knee", "spread", "second", "power", "skew", "softness", "settle_s", "damping", "bend", "lag_s",
+    "knee", "spread", "second", "power", "skew", "softness", "gate", "outlet", "wobble", "rate",
+    "settle_s", "damping", "bend", "lag_s",
 ];
 
 /// The effect that stands in for one of the catalogue's.

@@ -8,6 +8,7 @@ use stretch_data::RigFile;
 use stretch_gap::{
     Diagnosis, Evidence, GapError, Options, RigSimulator, Simulator, diagnose, next_experiment,
 };
+use stretch_sim::Key;
 
 use super::{
     diagnosis_text::text,
@@ -112,9 +113,30 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
                 .push("no experiment is recommended: there are no rivals to tell apart".into()),
         }
     }
+    diagnosis.notes.extend(rails(&simulator));
     diagnosis.notes.splice(0..0, simulator.session().notes.iter().cloned());
     bar.finish_and_clear();
     conclude(&args, &diagnosis, &evidence, &simulator)
+}
+
+/// Where the converter ran into its ends.
+fn rails(simulator: &RigSimulator) -> Vec<String> {
+    let full_v = simulator.nominal()[Key::VFs];
+    let trials = &simulator.session().trials;
+    let all: usize = trials.iter().map(|t| t.bridge_v.len()).sum();
+    let count = |at: &dyn Fn(f64) -> bool| {
+        trials.iter().flat_map(|t| &t.bridge_v).filter(|v| at(**v)).count()
+    };
+    let ends = [(0.0, count(&|v| v <= 1e-6)), (full_v, count(&|v| v >= full_v - 1e-6))];
+    let loud = ends.into_iter().filter(|(_, n)| 1000 * n > all);
+    loud.map(|(end, n)| {
+        let percent = 100.0 * n as f64 / all as f64;
+        format!(
+            "bridge_v stands at {end} V, an end of the converter, in {percent:.1} % of the samples: what the gauge did \
+             there is lost; change gain or reference"
+        )
+    })
+    .collect()
 }
 
 fn work(

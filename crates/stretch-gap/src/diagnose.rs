@@ -14,6 +14,7 @@ use crate::{
     frame::{Frame, Metric, Role},
     localise,
     probability::{covering_set, weigh},
+    sanity,
     select::{Search, Solution},
     simulator::{Model, Run, Simulator},
     thresholds::Thresholds,
@@ -121,7 +122,7 @@ fn run(
     };
     let decision =
         verdict::decide(&bench, options, &evidence, &nominal, &ordered, &slots, &candidates);
-    let diagnosis = Diagnosis {
+    let mut diagnosis = Diagnosis {
         schema: 1,
         verdict: decision.kind,
         sentence: decision.sentence,
@@ -139,6 +140,7 @@ fn run(
         notes: decision.notes,
         runtime_s: begun.elapsed().as_secs_f64(),
     };
+    sanity::check(simulator, &evidence, &mut diagnosis);
     Ok((diagnosis, evidence))
 }
 

@@ -14,6 +14,7 @@ mod localise;
 mod next_experiment;
 mod probability;
 mod rig;
+mod sanity;
 mod screen;
 mod select;
 mod simulator;

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use serde::Serialize;
 use stretch_calibrate::{
-    Calibrated, Candidate, FitReport, ModelKind, Options, Robust, SplitBy, calibrate, evaluate,
-    parse_rate, rank_signals, write_calibration,
+    Calibrated, Candidate, FitReport, ModelChoice, ModelKind, ModelRow, Options, Robust,
+    SpellingError, SplitBy, calibrate, choose_model, evaluate, parse_rate, rank_signals,
+    write_calibration,
 };
 use stretch_core::{Normalisation, RateEstimator, RateSource};
 use stretch_data::{ReadOptions, Split, Trial};
@@ -35,9 +36,11 @@ pub(crate) struct Args {
     /// Trials to fit, or a folder with a dataset.toml
     #[arg(required = true, value_name = "TRIAL.csv")]
     trials: Vec<PathBuf>,
-    /// What to fit: linear, or polyIJ of degree I in the rate and J in the signal
+    /// What to fit: linear; polyIJ of degree I in the rate and J in the signal; blended (poly13
+    /// without the jump at a reversal); hysteresis, relaxation, both, history or observer, which
+    /// remember, also with +rest to follow a drifting baseline; auto: the best on trials left out
     #[arg(long, default_value = "poly13")]
-    model: ModelKind,
+    model: Model,
     /// How channels are normalised: divided by their range, or minimum to maximum
     #[arg(long, value_enum, default_value_t = Normalise::Range)]
     normalise: Normalise,
@@ -96,6 +99,21 @@ pub(crate) struct Args {
     json: bool,
 }
 
+/// A model, or the choice of one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Model {
+    Auto,
+    One(ModelKind),
+}
+
+impl std::str::FromStr for Model {
+    type Err = SpellingError;
+
+    fn from_str(text: &str) -> Result<Self, SpellingError> {
+        if text == "auto" { Ok(Self::Auto) } else { text.parse().map(Self::One) }
+    }
+}
+
 #[derive(Clone, Copy, ValueEnum)]
 enum Normalise {
     Range,
@@ -142,7 +160,11 @@ impl Args {
         Options {
             signal: self.signal.clone(),
             reference: self.reference.clone(),
-            model: self.model,
+            // a signal is ranked, and a model chosen, beginning from the published one
+            model: match self.model {
+                Model::Auto => base.model,
+                Model::One(kind) => kind,
+            },
             normalisation: match self.normalise {
                 Normalise::Range => Normalisation::Range,
                 Normalise::MinMax => Normalisation::MinMax,
@@ -178,6 +200,8 @@ impl Args {
 struct Output<'a> {
     signal: &'a str,
     candidates: &'a [Candidate],
+    models: &'a [ModelRow],
+    model: String,
     fits: &'a [FitReport],
     notes: &'a [String],
 }
@@ -200,7 +224,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     if let Some(best) = ranking.first() {
         options.signal.clone_from(&best.signal);
     }
-    let calibrated = calibrate(&trials, &options)?;
+    let choice = match args.model {
+        Model::Auto => Some(choose_model(&trials, &options)?),
+        Model::One(_) => None,
+    };
+    if let Some(choice) = &choice {
+        options.model = choice.model;
+    }
+    let mut calibrated = calibrate(&trials, &options)?;
+    calibrated.notes.extend(choice.iter().flat_map(|choice| choice.notes.clone()));
     write_calibration(&args.out, &calibrated.calibration)?;
     if let Some(path) = &args.report {
         write_report(&args, path, &trials, &columns, &calibrated, &ranking, &options)?;
@@ -209,9 +241,14 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         return say_json(&Output {
             signal: &options.signal,
             candidates: &ranking,
+            models: choice.as_ref().map_or(&[], |choice| &choice.rows),
+            model: options.model.to_string(),
             fits: &calibrated.fits,
             notes: &calibrated.notes,
         });
+    }
+    if let Some(choice) = &choice {
+        print_models(choice, &options.reference)?;
     }
     print(&calibrated, &ranking)?;
     say(format!("wrote {}", args.out.display()))?;
@@ -234,9 +271,9 @@ fn write_report(
     let judged = if test.is_empty() { trials } else { &test };
     // the line is the yardstick that every surface is held against
     let linear = calibrate(trials, &Options { model: ModelKind::Linear, ..options.clone() })?;
-    let name = args.model.to_string();
+    let name = options.model.to_string();
     let mut shown = vec![("linear", &linear)];
-    if args.model != ModelKind::Linear {
+    if options.model != ModelKind::Linear {
         shown.push((name.as_str(), calibrated));
     }
     let named: Vec<_> = shown.iter().map(|(name, c)| (*name, &c.calibration)).collect();
@@ -250,6 +287,43 @@ fn write_report(
         notes: calibrated.notes.clone(),
     };
     write_text(path, &report::calibration_page(&shown, &evaluation, &context))
+}
+
+/// What `auto` rests on.
+fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Result<()> {
+    let unit = reference.rsplit_once('_').map_or("", |(_, unit)| unit);
+    say(format!("Models, RMSE in {unit} on trials left out of the fit:"))?;
+    let row = |r: &ModelRow| {
+        if let Some(problem) = &r.problem {
+            return vec![r.model.clone(), problem.clone()];
+        }
+        let excess = |(mean, error): (f64, f64)| format!("{} +- {}", number(mean), number(error));
+        vec![
+            r.model.clone(),
+            maybe(r.rmse),
+            maybe(r.rmse_arbitrary),
+            maybe(r.rmse_pulses),
+            maybe(r.rmse_ramps),
+            r.lag_s.map_or("-".to_owned(), |lag| format!("{:.0}", 1e3 * lag)),
+            maybe(r.worst),
+            r.parameters.to_string(),
+            r.excess.map_or("-".to_owned(), excess),
+            if r.model == choice.model.to_string() { "chosen".to_owned() } else { String::new() },
+        ]
+    };
+    let header = [
+        "model",
+        "all",
+        "arbitrary",
+        "pulses",
+        "ramps",
+        "delay ms",
+        "worst",
+        "numbers",
+        "over the best, squared",
+        "",
+    ];
+    say(table(&header, choice.rows.iter().map(row)))
 }
 
 /// The tables of a calibration, as the paper prints them.

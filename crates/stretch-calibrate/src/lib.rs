@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod apply;
+mod auto;
 mod calibrate;
 mod choose;
 mod dense;
@@ -17,6 +18,7 @@ mod series;
 mod split;
 
 pub use apply::{Applied, Faults, LiveReceptor, apply, rate_delay_s};
+pub use auto::{ModelChoice, ModelRow, choose_model};
 pub use calibrate::{Calibrated, calibrate};
 pub use choose::{Candidate, rank_signals};
 pub use error::CalibrateError;

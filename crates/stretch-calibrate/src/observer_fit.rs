@@ -28,7 +28,7 @@ const AGILITIES: [f64; 8] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 300.0, 3000.0];
 /// Time constants that a first search looks at, in seconds.
 const TAUS: [f64; 7] = [0.03, 0.08, 0.2, 0.4, 0.8, 1.6, 4.0];
 const RADII: [f64; 3] = [0.03, 0.1, 0.3];
-/// A further part of the model must lower the error to this share to be kept.
+/// A further part of the model must lower the spread around it to this share to be kept.
 const WORTH: f64 = 0.97;
 /// Window of the reference's smoothing, in samples; quadratic.
 const SMOOTH: usize = 7;
@@ -127,15 +127,21 @@ fn choose(prepared: &Prepared, rest: bool) -> Result<(Forward, ObserverMap), Cal
         let pieces = pieces(prepared, rest)?;
         let one = one_relaxation(prepared, &pieces, ObserverChoice { rest, ..bare })?;
         let two = second_relaxation(prepared, &pieces, one)?;
+        // the structure by how well it explains the signal, simplest first
+        let mut chosen: Option<(f64, ObserverChoice)> = None;
         for taus in [[None; 2], one.taus, two.taus] {
             for plays in [false, true] {
                 let choice = ObserverChoice { taus, plays, ..one };
-                let Ok(found) = tuned(prepared, &pieces, choice) else { continue };
-                let bar = best.as_ref().map_or(f64::INFINITY, |(_, map)| WORTH * map.fit.rmse);
-                if found.1.fit.rmse < bar {
-                    best = Some(found);
+                let Ok(found) = forward(prepared, &pieces, choice) else { continue };
+                if chosen.is_none_or(|(noise, _)| found.noise < WORTH * noise) {
+                    chosen = Some((found.noise, choice));
                 }
             }
+        }
+        let Some((_, choice)) = chosen else { continue };
+        let found = tuned(prepared, &pieces, choice)?;
+        if best.as_ref().is_none_or(|(_, map)| found.1.fit.rmse < WORTH * map.fit.rmse) {
+            best = Some(found);
         }
     }
     best.ok_or_else(|| CalibrateError::Undetermined { model: Memory::Observer.to_string() })

@@ -10,24 +10,34 @@ const CATCH_UP_S: f64 = 0.5;
 const LEAKS: [f64; 4] = [0.0, 0.0003, 0.001, 0.003];
 /// Noise alone may carry the signal this many standard deviations below the level.
 const MARGIN: f64 = 2.5;
+/// A trial that begins this low in the range begins at rest.
+const LOWEST_QUARTER: f64 = 0.25;
 /// Samples at a trial's start that may stand at rest.
 const FIRST: usize = 50;
 /// What a sample counts beyond the level at most, as the receptor has it.
 const MOST_EXCESS: f64 = 0.1;
 
-/// Baselines worth trying. The resting level is the lowest first half second of
-/// any trial, each of which begins before anything moves or contracted, less
-/// what noise alone may do.
+/// Baselines worth trying. The resting level is that of the first trial that
+/// begins in the lowest quarter of the range, less what noise alone may do: what
+/// later rests have below it is drift.
 pub(crate) fn candidates(prepared: &Prepared) -> Vec<RestTracker> {
     let sign = prepared.polarity.sign();
-    let level = prepared.series.iter().map(|series| {
-        let first = &series.signal[..series.signal.len().min(FIRST)];
-        let mut signed: Vec<f64> = first.iter().map(|v| sign * v).collect();
-        signed.sort_by(f64::total_cmp);
-        signed[signed.len() / 2]
-    });
+    let starts: Vec<f64> = prepared
+        .series
+        .iter()
+        .map(|series| {
+            let first = &series.signal[..series.signal.len().min(FIRST)];
+            let mut signed: Vec<f64> = first.iter().map(|v| sign * v).collect();
+            signed.sort_by(f64::total_cmp);
+            signed[signed.len() / 2]
+        })
+        .collect();
     let records: Vec<&[f64]> = prepared.series.iter().map(|s| s.signal.as_slice()).collect();
-    let level = sign * (level.fold(f64::INFINITY, f64::min) - MARGIN * noise(&records));
+    let lowest = (prepared.series.iter().flat_map(|s| s.signal.iter()).map(|v| sign * v))
+        .fold(f64::INFINITY, f64::min);
+    let resting = lowest + LOWEST_QUARTER * prepared.signal_range.span();
+    let first = starts.iter().copied().find(|&start| start < resting).unwrap_or(lowest);
+    let level = sign * (first - MARGIN * noise(&records));
     let span = prepared.signal_range.span();
     let tracker = |share| RestTracker { level, catch_up_s: CATCH_UP_S, leak: share * span };
     LEAKS.map(tracker).into()

@@ -1,0 +1,399 @@
+//! Which model to calibrate with, by errors on trials left out.
+
+use serde::Serialize;
+use stretch_core::Degree;
+use stretch_data::Trial;
+use stretch_metrics::lag;
+
+use crate::{
+    CalibrateError, Memory, ModelKind, Options, apply,
+    calibrate::{Choice, calibrate_with},
+    series::sample_rate_hz,
+};
+
+/// Blocks whose means are compared, in seconds.
+const BLOCK_S: f64 = 0.5;
+/// Samples of warm-up that no model is judged on.
+const SETTLE: usize = 20;
+/// Fewer trials than this are cut into parts.
+const LEAST_TRIALS: usize = 3;
+/// Parts that few trials are cut into, each.
+const PARTS: usize = 6;
+/// A turn counts when the reference has come back by this share of its range.
+const TURN: f64 = 0.1;
+/// A root mean square error this close to the best, as a share, is as good.
+const AS_GOOD: f64 = 1.02;
+/// Turns that make a trial one that reverses.
+const LEAST_TURNS: usize = 3;
+const MAX_LAG_S: f64 = 0.5;
+
+/// What cross-validation says of one model.
+#[derive(Debug, Clone, Serialize)]
+pub struct ModelRow {
+    /// As `--model` takes it.
+    pub model: String,
+    /// Numbers that the fit determines.
+    pub parameters: usize,
+    /// Root mean square error on trials left out, in the reference's unit.
+    pub rmse: Option<f64>,
+    /// The same on trials that reverse at will.
+    pub rmse_arbitrary: Option<f64>,
+    /// On trials of pulses (those with `pulse` in their name).
+    pub rmse_pulses: Option<f64>,
+    /// On trials that move one way.
+    pub rmse_ramps: Option<f64>,
+    /// Seconds that the estimate runs behind, mean over trials that reverse.
+    pub lag_s: Option<f64>,
+    /// Greatest absolute error.
+    pub worst: Option<f64>,
+    /// How much worse than the best, in mean squared error of half-second
+    /// blocks, and the standard error of that.
+    pub excess: Option<(f64, f64)>,
+    /// Why it has no numbers.
+    pub problem: Option<String>,
+}
+
+/// A choice of model, and what it rests on.
+#[derive(Debug, Clone, Serialize)]
+pub struct ModelChoice {
+    /// All candidates, in the order of their errors.
+    pub rows: Vec<ModelRow>,
+    /// The model to use.
+    #[serde(skip)]
+    pub model: ModelKind,
+    /// What the data cannot say, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Every model that is tried, without and with a followed baseline.
+fn candidates() -> Vec<ModelKind> {
+    let mut kinds = vec![
+        ModelKind::Linear,
+        ModelKind::Surface(Degree::POLY13),
+        ModelKind::Blended(Degree::POLY13),
+    ];
+    for rest in [false, true] {
+        kinds.extend(Memory::ALL.map(|kind| ModelKind::Remembering { kind, rest }));
+    }
+    kinds
+}
+
+/// Whether a trial can tell memory from position: it turns at least three times.
+fn reverses(reference: &[f64]) -> bool {
+    let (low, high) = ends(reference);
+    let turn = TURN * (high - low);
+    if turn <= 0.0 {
+        return false;
+    }
+    let (mut turns, mut rising, mut extreme) = (0, None, reference[0]);
+    for &x in reference {
+        let back = if rising == Some(true) { extreme - x } else { x - extreme };
+        match rising {
+            None if (x - extreme).abs() > turn => {
+                rising = Some(x > extreme);
+                extreme = x;
+            }
+            Some(up) if back > turn => {
+                turns += 1;
+                rising = Some(!up);
+                extreme = x;
+            }
+            Some(up) => extreme = if up { extreme.max(x) } else { extreme.min(x) },
+            None => {}
+        }
+    }
+    turns >= LEAST_TURNS
+}
+
+fn ends(x: &[f64]) -> (f64, f64) {
+    x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| (a.min(x), b.max(x)))
+}
+
+/// A part of the data that is left out together: samples `from..to` of a trial.
+struct Fold {
+    trial: usize,
+    from: usize,
+    to: usize,
+}
+
+/// Errors of one model on everything left out.
+#[derive(Default)]
+struct Errors {
+    /// Mean squared error of each block; none where nothing was estimated.
+    blocks: Vec<Option<f64>>,
+    /// Sums of squares and counts: arbitrary, pulses, ramps.
+    kinds: [(f64, f64); 3],
+    worst: f64,
+    lag: (f64, f64),
+}
+
+/// Chooses a model: each candidate is fitted with one trial left out, run live
+/// over that trial, and judged there; in turn for all trials (for parts of
+/// trials where there are fewer than three). Time constants, radii and ridge are
+/// chosen once, on all of them. The simplest candidate is taken whose mean
+/// squared error, block by block, is not worse than the best one's by more than
+/// one standard error (Breiman et al. 1984, section 3.4.3), or whose root mean
+/// square error is within 2 % of it.
+///
+/// Where every trial moves one way, models that remember are not chosen:
+/// such data cannot tell memory from rate. [`ModelChoice::notes`] then says what
+/// to record.
+///
+/// # Errors
+/// [`CalibrateError`] of the simplest model when none can be fitted.
+pub fn choose_model(trials: &[Trial], options: &Options) -> Result<ModelChoice, CalibrateError> {
+    let mut turning = Vec::new();
+    for trial in trials {
+        turning.push(reverses(trial.require(&options.reference)?));
+    }
+    let folds = folds(trials);
+    let mut found = Vec::new();
+    let mut first_problem = None;
+    for kind in candidates() {
+        match judge(trials, &folds, &turning, options, kind) {
+            Ok((parameters, errors)) => found.push((kind, parameters, Ok(errors))),
+            Err(error) => {
+                found.push((kind, 0, Err(error.to_string())));
+                first_problem.get_or_insert(error);
+            }
+        }
+    }
+    let good = |f: &(ModelKind, usize, Result<Errors, String>)| {
+        let errors = f.2.as_ref().ok()?;
+        rmse(all(errors)).filter(|r| r.is_finite())
+    };
+    let best = (0..found.len())
+        .filter(|&i| good(&found[i]).is_some())
+        .min_by(|&a, &b| good(&found[a]).unwrap_or(0.0).total_cmp(&good(&found[b]).unwrap_or(0.0)));
+    let Some(best) = best else {
+        return Err(first_problem.unwrap_or(CalibrateError::NoTrials));
+    };
+    let memory_shows = turning.iter().any(|&t| t);
+    let eligible = |kind: ModelKind| memory_shows || !matches!(kind, ModelKind::Remembering { .. });
+    let excesses: Vec<_> = found
+        .iter()
+        .map(|f| match (&f.2, &found[best].2) {
+            (Ok(errors), Ok(best)) => excess(&errors.blocks, &best.blocks),
+            _ => None,
+        })
+        .collect();
+    // among those that may be chosen, the best and all that are as good
+    let bar = (0..found.len())
+        .filter(|&i| eligible(found[i].0) && good(&found[i]).is_some())
+        .min_by(|&a, &b| good(&found[a]).unwrap_or(0.0).total_cmp(&good(&found[b]).unwrap_or(0.0)));
+    let bar = bar.unwrap_or(best);
+    let as_good = |i: &usize| {
+        let (Ok(errors), Ok(least)) = (&found[*i].2, &found[bar].2) else { return false };
+        let close = excess(&errors.blocks, &least.blocks);
+        let share = good(&found[*i]).zip(good(&found[bar])).map(|(own, least)| own / least);
+        eligible(found[*i].0)
+            && (close.is_some_and(|(mean, error)| mean <= error)
+                || share.is_some_and(|share| share <= AS_GOOD))
+    };
+    let model = (0..found.len())
+        .filter(as_good)
+        .min_by_key(|&i| found[i].1)
+        .map_or(found[bar].0, |i| found[i].0);
+    let mut rows: Vec<ModelRow> = found
+        .into_iter()
+        .zip(excesses)
+        .map(|((kind, parameters, errors), excess)| row(kind, parameters, errors, excess))
+        .collect();
+    let key = |r: &ModelRow| r.rmse.unwrap_or(f64::INFINITY);
+    rows.sort_by(|a, b| key(a).total_cmp(&key(b)));
+    Ok(ModelChoice { rows, model, notes: notes(trials, memory_shows) })
+}
+
+fn notes(trials: &[Trial], memory_shows: bool) -> Vec<String> {
+    let mut notes = Vec::new();
+    if !memory_shows {
+        notes.push(
+            "every trial moves one way: ramps cannot tell memory from rate, so no model that \
+             remembers was chosen; record one minute of arbitrary motion (segments of 0.15 to \
+             1.5 s, up, down or held, in random order and at several speeds, over the whole \
+             range), add it, and choose again"
+                .to_owned(),
+        );
+    }
+    if trials.len() < LEAST_TRIALS {
+        notes.push(format!(
+            "{} {} left out in {PARTS} parts each: a drift from session to session stays unseen; \
+             record a second session to be sure",
+            trials.len(),
+            if trials.len() == 1 { "trial was" } else { "trials were" }
+        ));
+    }
+    notes
+}
+
+fn folds(trials: &[Trial]) -> Vec<Fold> {
+    let parts = if trials.len() >= LEAST_TRIALS { 1 } else { PARTS };
+    let cut = |trial: usize| {
+        let samples = trials[trial].len();
+        (0..parts).map(move |part| Fold {
+            trial,
+            from: samples * part / parts,
+            to: samples * (part + 1) / parts,
+        })
+    };
+    (0..trials.len()).flat_map(cut).collect()
+}
+
+/// The trials without a fold.
+fn without(trials: &[Trial], fold: &Fold) -> Vec<Trial> {
+    let mut rest = Vec::new();
+    for (index, trial) in trials.iter().enumerate() {
+        if index != fold.trial {
+            rest.push(trial.clone());
+            continue;
+        }
+        for span in [0..fold.from, fold.to..trial.len()] {
+            // a stub is no trial: its estimators would hardly warm up
+            if span.len() > 5 * SETTLE {
+                let mut part = trial.clone();
+                part.time_s = trial.time_s[span.clone()].to_vec();
+                for (own, whole) in part.channels.iter_mut().zip(&trial.channels) {
+                    own.values = whole.values[span.clone()].to_vec();
+                }
+                rest.push(part);
+            }
+        }
+    }
+    rest
+}
+
+fn judge(
+    trials: &[Trial],
+    folds: &[Fold],
+    turning: &[bool],
+    options: &Options,
+    kind: ModelKind,
+) -> Result<(usize, Errors), CalibrateError> {
+    let options = Options { model: kind, ..options.clone() };
+    let (whole, choice): (_, Option<Choice>) = calibrate_with(trials, &options, None)?;
+    let parameters = whole
+        .fits
+        .iter()
+        .map(|fit| {
+            let own = fit.orders.iter().find(|order| order.model == fit.model);
+            own.map_or(fit.coefficients.len(), |order| order.terms)
+        })
+        .sum::<usize>()
+        + if matches!(kind, ModelKind::Remembering { rest: true, .. }) { 3 } else { 0 };
+    let mut errors = Errors::default();
+    for fold in folds {
+        let rest = without(trials, fold);
+        let (calibrated, _) = calibrate_with(&rest, &options, choice)?;
+        let trial = &trials[fold.trial];
+        let reference = trial.require(&options.reference)?;
+        let applied = apply(&calibrated.calibration, trial)?;
+        let estimates: Vec<f64> =
+            applied.readings.iter().map(|r| r.as_ref().map_or(f64::NAN, |r| r.estimate)).collect();
+        let period_s = 1.0 / sample_rate_hz(trial)?;
+        let which = match (trial.name.contains("pulse"), turning[fold.trial]) {
+            (true, true) => 1,
+            (false, true) => 0,
+            (_, false) => 2,
+        };
+        errors.take(reference, &estimates, fold, period_s, which);
+    }
+    Ok((parameters, errors))
+}
+
+impl Errors {
+    fn take(
+        &mut self,
+        reference: &[f64],
+        estimates: &[f64],
+        fold: &Fold,
+        period_s: f64,
+        which: usize,
+    ) {
+        let span = fold.from.max(SETTLE).min(fold.to)..fold.to;
+        let (truth, estimate) = (&reference[span.clone()], &estimates[span]);
+        let length = ((BLOCK_S / period_s) as usize).max(1);
+        for (truth, estimate) in truth.chunks(length).zip(estimate.chunks(length)) {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for (t, e) in truth.iter().zip(estimate) {
+                let error = (t - e).abs();
+                if error.is_finite() {
+                    sum += error * error;
+                    count += 1.0;
+                    self.worst = self.worst.max(error);
+                }
+            }
+            self.kinds[which].0 += sum;
+            self.kinds[which].1 += count;
+            self.blocks.push((count > 0.0).then_some(sum / count));
+        }
+        let most = ((MAX_LAG_S / period_s) as usize).min(truth.len() / 4);
+        if which < 2
+            && let Ok(found) = lag(truth, estimate, most)
+            && !found.at_limit
+        {
+            self.lag.0 += found.samples * period_s;
+            self.lag.1 += 1.0;
+        }
+    }
+}
+
+fn all(errors: &Errors) -> (f64, f64) {
+    errors.kinds.iter().fold((0.0, 0.0), |(s, n), k| (s + k.0, n + k.1))
+}
+
+fn rmse((sum, count): (f64, f64)) -> Option<f64> {
+    (count > 0.0).then(|| (sum / count).sqrt())
+}
+
+/// Mean difference of two models' blocks, and its standard error.
+fn excess(blocks: &[Option<f64>], best: &[Option<f64>]) -> Option<(f64, f64)> {
+    let differences: Vec<f64> =
+        blocks.iter().zip(best).filter_map(|(a, b)| Some((*a)? - (*b)?)).collect();
+    let n = differences.len() as f64;
+    if n < 2.0 {
+        return None;
+    }
+    let mean = differences.iter().sum::<f64>() / n;
+    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    Some((mean, (variance / n).sqrt()))
+}
+
+fn row(
+    kind: ModelKind,
+    parameters: usize,
+    errors: Result<Errors, String>,
+    excess: Option<(f64, f64)>,
+) -> ModelRow {
+    let (errors, problem) = match errors {
+        Ok(errors) => (Some(errors), None),
+        Err(problem) => (None, Some(problem)),
+    };
+    let of = |which: usize| errors.as_ref().and_then(|e| rmse(e.kinds[which]));
+    ModelRow {
+        model: kind.to_string(),
+        parameters,
+        rmse: errors.as_ref().and_then(|e| rmse(all(e))),
+        rmse_arbitrary: of(0),
+        rmse_pulses: of(1),
+        rmse_ramps: of(2),
+        lag_s: errors.as_ref().filter(|e| e.lag.1 > 0.0).map(|e| e.lag.0 / e.lag.1),
+        worst: errors.as_ref().map(|e| e.worst),
+        excess,
+        problem,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ramps_do_not_reverse() {
+        let ramp: Vec<f64> = (0..500).map(|n| 180.0 - 0.05 * f64::from(n)).collect();
+        let noisy: Vec<f64> =
+            ramp.iter().enumerate().map(|(n, x)| x + 0.3 * (n as f64).sin()).collect();
+        let wave: Vec<f64> = (0..500).map(|n| 165.0 + 15.0 * (0.05 * f64::from(n)).sin()).collect();
+        assert!(!reverses(&ramp) && !reverses(&noisy) && !reverses(&[1.0; 9]));
+        assert!(reverses(&wave));
+    }
+}

@@ -229,3 +229,21 @@ fn a_blind_check_keeps_its_labels_sealed() {
     fs::write(&labels, text.replacen("\"excess\": ", "\"excess\": 1", 1)).unwrap();
     fails(stretch().args(["blind", "score"]).arg(&out), &["seal"]);
 }
+
+#[test]
+fn a_gauge_alone_is_diagnosed_beside_its_reference() {
+    let scratch = Scratch::new();
+    // The signal shows the length of 30 ms earlier.
+    let trial = scratch.loops("loops.csv", 60.0, 1.1);
+    let page = scratch.path("gauge.html");
+    let columns = ["--reference", "length_mm", "--signal", "bridge_v"];
+    let text = stdout(diagnose(&trial).args(columns).arg("--report").arg(&page));
+    let first = text.lines().next().unwrap();
+    assert!(first.contains("channel_skew") || first.contains("amplifier_lowpass"), "{text}");
+    assert!(text.contains("skew_s = 0.03") || text.contains("skew_s = 0.029"), "{text}");
+    assert!(!fs::read_to_string(page).unwrap().contains("NaN"));
+    let dead = scratch.write("dead.csv", fs::read_to_string(&trial).unwrap());
+    alter(&dead, "bridge_v", |_, _| 1.0);
+    fails(diagnose(&dead).args(columns), &["bridge_v", "dead"]);
+    fails(diagnose(&trial).args(["--reference", "angle_deg", "--signal", "s2"]), &["angle_deg"]);
+}

@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
-use stretch_data::RigFile;
+use stretch_data::{DataSet, ReadOptions, RigFile, Split, Trial};
 use stretch_gap::{
-    Diagnosis, Evidence, GapError, Options, RigSimulator, Simulator, diagnose, next_experiment,
+    Diagnosis, Evidence, GapError, GaugeSimulator, Options, RigSimulator, Simulator, diagnose,
+    next_experiment,
 };
 use stretch_sim::Key;
 
@@ -91,8 +92,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             args.data_set.display()
         );
     }
-    if gauge.is_some() {
-        bail!("a gauge alone cannot be diagnosed yet");
+    if let Some((reference, signal)) = gauge {
+        let trials = gauge_trials(&args.data_set)?;
+        let shown = || args.data_set.display().to_string();
+        let simulator =
+            GaugeSimulator::new(&trials, reference, signal, &args.without).with_context(shown)?;
+        let (mut diagnosis, evidence) = work(&simulator, &options, &bar).with_context(shown)?;
+        diagnosis.notes.splice(0..0, simulator.notes().iter().cloned());
+        bar.finish_and_clear();
+        return conclude(&args, &diagnosis, &evidence, &simulator);
     }
     bar.set_message("reading");
     let shown = || args.data_set.display().to_string();
@@ -117,6 +125,19 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     diagnosis.notes.splice(0..0, simulator.session().notes.iter().cloned());
     bar.finish_and_clear();
     conclude(&args, &diagnosis, &evidence, &simulator)
+}
+
+/// Trials of a gauge alone: a file, or a folder with its splits and times.
+fn gauge_trials(path: &Path) -> anyhow::Result<Vec<(Trial, f64, bool)>> {
+    let options = ReadOptions::new();
+    if !path.is_dir() {
+        return Ok(vec![(Trial::read(path, &options)?, 0.0, false)]);
+    }
+    let set = DataSet::read(path)?;
+    let load = |entry: &stretch_data::TrialEntry| {
+        Ok((entry.load(path, &options)?, entry.start_s, entry.split == Split::Test))
+    };
+    set.trials.iter().map(load).collect()
 }
 
 /// Where the converter ran into its ends.

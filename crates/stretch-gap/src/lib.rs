@@ -9,6 +9,7 @@ mod evidence;
 mod fit;
 mod floor;
 mod frame;
+mod gauge;
 mod linear;
 mod localise;
 mod next_experiment;
@@ -29,6 +30,7 @@ pub use diagnosis::{
 pub use error::GapError;
 pub use evidence::{Evidence, StageEvidence};
 pub use frame::{BLOCK_S, Frame, Metric, Role, Segment};
+pub use gauge::GaugeSimulator;
 pub use next_experiment::{Proposal, next_experiment};
 pub use rig::{RigSimulator, RigTrial, Session};
 pub use simulator::{

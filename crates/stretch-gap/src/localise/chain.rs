@@ -23,7 +23,7 @@ pub(super) fn shapley(
     let stages = simulator.stages().len();
     let trials = simulator.trials().len();
     let model = &evidence.retuned;
-    if stages > 6 {
+    if !(2..=6).contains(&stages) {
         return Ok(Vec::new());
     }
     let mut variants = vec![Variant { simulated: 0, output: None }];

@@ -87,7 +87,7 @@ impl GaugeSimulator {
             let span = values
                 .iter()
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-            if !(span.1 > span.0) {
+            if span.1 <= span.0 {
                 return Err(GapError::Implausible {
                     column: name.into(),
                     found: format!("{} in every sample", span.0),

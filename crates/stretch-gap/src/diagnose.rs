@@ -10,7 +10,7 @@ use crate::{
     error::GapError,
     evidence::{Evidence, StageEvidence, squares},
     fit::Bench,
-    floor::floors,
+    floor::floors_of,
     frame::{Frame, Metric, Role},
     localise,
     probability::{covering_set, weigh},
@@ -74,7 +74,7 @@ fn run(
     let frame = Frame::of(simulator)?;
     let shipped = Model::nominal(simulator);
     progress("floors");
-    let floors = floors(simulator, &frame, &shipped, options.seed)?;
+    let mut floors = floors_of(simulator, &frame, &shipped, options.seed)?;
     let stages = simulator.stages().len();
     let all = simulator.trials().len();
     let metrics: Result<Vec<Metric>, GapError> = (0..stages)
@@ -85,6 +85,7 @@ fn run(
     let mut bench = Bench { simulator, frame, metrics: metrics?, trials, memory: Vec::new(), stop };
     progress("re-tuning the nominal parameters");
     let mut nominal = retune(&bench, &shipped)?;
+    floors = floors_of(simulator, &bench.frame, &nominal.model, options.seed)?;
     // Once more around the re-tuned values: the sensitivities that nuisances are told by have moved.
     let metrics: Result<Vec<Metric>, GapError> = (0..stages)
         .into_par_iter()

@@ -34,9 +34,6 @@ pub(crate) struct Misfit {
 pub(crate) struct Fitted {
     pub(crate) model: Model,
     pub(crate) misfits: Vec<Misfit>,
-    pub(crate) cost: f64,
-    /// Effect parameters that were free.
-    pub(crate) free: usize,
     /// One standard deviation of each effect parameter, in the order of the model's effects.
     pub(crate) effect_sd: Vec<Vec<f64>>,
     /// Effect parameters that ended on a bound of their range.
@@ -317,7 +314,6 @@ impl Bench<'_> {
         let mut columns: Vec<Vec<Option<Column>>> = vec![Vec::new(); n];
         let mut lambda = 1e-3;
         let mut normal = vec![0.0; n * n];
-        let mut fresh = false;
         for iteration in 0..ITERATIONS {
             let renew = matches!(iteration, 1 | 3 | 6 | 9) || (iteration == 0 && known.is_empty());
             for (i, (&c, &b)) in coordinates.iter().zip(&bounds).enumerate() {
@@ -339,7 +335,6 @@ impl Bench<'_> {
                     None => self.sensitivity(stages, c, b, &model, &residuals)?,
                 };
             }
-            fresh |= renew;
             let mut gradient = vec![0.0; n];
             for i in 0..n {
                 for j in 0..=i {
@@ -403,7 +398,7 @@ impl Bench<'_> {
             }
             let gain = before - cost;
             if gain < 0.03 + 2e-5 * cost {
-                if (fresh && renew) || (!moved && renew) {
+                if renew {
                     break;
                 }
                 if !moved && lambda > 1e3 {
@@ -415,7 +410,7 @@ impl Bench<'_> {
         let spread = spreads(&normal, n);
         let mut effect_sd: Vec<Vec<f64>> =
             model.effects.iter().map(|(_, v)| vec![0.0; v.len()]).collect();
-        let (mut free, mut at_bound) = (0, 0);
+        let mut at_bound = 0;
         for (i, c) in coordinates.iter().enumerate() {
             let (slot, index, sd) = match *c {
                 Coordinate::Nominal { .. } => continue,
@@ -424,7 +419,6 @@ impl Bench<'_> {
                     (slot, index, spread[i] * model.effects[slot].1[index])
                 }
             };
-            free += 1;
             effect_sd[slot][index] = sd;
             let (x, b) = (c.read(&model), bounds[i]);
             let spec = &self.simulator.effects()[model.effects[slot].0].parameters[index];
@@ -435,7 +429,7 @@ impl Bench<'_> {
                 at_bound += 1;
             }
         }
-        Ok(Fitted { model, misfits, cost, free, effect_sd, at_bound })
+        Ok(Fitted { model, misfits, effect_sd, at_bound })
     }
 }
 

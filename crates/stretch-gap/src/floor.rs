@@ -25,7 +25,7 @@ const NEAR: usize = 12;
 
 /// Known noise of the output (else from second differences of the record), and what of the inputs' noise arrives: more
 /// where the output is steep or the input too quick to be smoothed.
-pub(crate) fn floors(
+pub(crate) fn floors_of(
     simulator: &dyn Simulator,
     frame: &Frame,
     model: &Model,

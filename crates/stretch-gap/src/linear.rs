@@ -39,8 +39,8 @@ impl Cholesky {
         self.forward(b);
         for i in (0..self.n).rev() {
             let mut sum = b[i];
-            for k in i + 1..self.n {
-                sum -= self.lower[k * self.n + i] * b[k];
+            for (k, x) in b.iter().enumerate().skip(i + 1) {
+                sum -= self.lower[k * self.n + i] * x;
             }
             b[i] = sum / self.lower[i * self.n + i];
         }

@@ -258,10 +258,9 @@ impl<'a> Search<'a> {
         for leader in leaders {
             for twin in &specs[leader].twins {
                 let one = screened.iter().find(|s| specs[s.effect].name == *twin);
-                if let Some(one) = one.filter(|o| list.iter().all(|l| l.effect != o.effect)) {
-                    if one.gain() > 0.0 {
-                        list.push(one.clone());
-                    }
+                let is_new = |o: &&Screened| list.iter().all(|l| l.effect != o.effect);
+                if let Some(one) = one.filter(is_new).filter(|o| o.gain() > 0.0) {
+                    list.push(one.clone());
                 }
             }
         }

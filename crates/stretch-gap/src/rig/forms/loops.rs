@@ -44,7 +44,7 @@ pub(super) static MUSCLE_HYSTERESIS: Form = Form {
     equation: "k_s -> k_s - h mean of (k_s - play(k_s, s {spread^2, spread, 1}))",
     parameters: &[
         EffectParameter::strength("h", "1", 0.0, 0.6, 0.2),
-        EffectParameter::shape("s", "strain", 0.003, 0.06, 0.02),
+        EffectParameter::shape("s", "strain", 0.005, 0.06, 0.02),
         linear("spread", 0.15, 0.95, 0.5),
     ],
     needs: None,
@@ -59,7 +59,7 @@ pub(super) static GAUGE_HYSTERESIS: Form = Form {
     equation: "e -> e - h mean of (e - play(e, s {spread^2, spread, 1}))",
     parameters: &[
         EffectParameter::strength("h", "1", 0.0, 0.6, 0.2),
-        EffectParameter::shape("s", "strain", 0.003, 0.06, 0.02),
+        EffectParameter::shape("s", "strain", 0.005, 0.06, 0.02),
         linear("spread", 0.15, 0.95, 0.5),
     ],
     needs: None,

@@ -51,7 +51,7 @@ pub(super) fn form_of(effect: &'static dyn Effect) -> &'static dyn Effect {
 
 /// A form: the catalogue's name, its parameters with one more, and how it acts.
 #[derive(Clone, Copy)]
-struct Form {
+pub(super) struct Form {
     name: &'static str,
     stage: stretch_sim::Stage,
     equation: &'static str,

@@ -22,6 +22,8 @@ const BEND: f64 = 1e-3;
 const RIDGE: f64 = 1e-4;
 /// The least a curve rises over its whole length, as a share of the signal's range.
 const LEAST_RISE: f64 = 1e-3;
+/// What engaged plays leave of the drive's slope at least.
+const LEAST_ANSWER: f64 = 0.1;
 const ITERATIONS: usize = 12;
 /// Densities of the rate's wandering that are tried, in 1/s^3.
 const AGILITIES: [f64; 8] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 300.0, 3000.0];
@@ -60,6 +62,22 @@ struct Forward {
     dynamics: Vec<f64>,
     errors: Vec<f64>,
     noise: f64,
+}
+
+impl Forward {
+    /// Whether the drive rises with the target whichever plays are engaged: a
+    /// drive that falls cannot be inverted. Plays engage from the widest on.
+    fn answers(&self) -> bool {
+        let plays = self.choice.radii().len();
+        let (instant, weights) = self.dynamics[1..].split_at(self.dynamics.len() - 1 - plays);
+        let least: f64 = 1.0 + instant.iter().sum::<f64>();
+        let mut slope = least;
+        let engaged = weights.iter().rev().all(|weight| {
+            slope += weight;
+            slope > LEAST_ANSWER * least
+        });
+        least > 0.0 && engaged
+    }
 }
 
 /// Fits an observer; with `rest` the baseline is followed. A `choice` made
@@ -133,7 +151,8 @@ fn choose(prepared: &Prepared, rest: bool) -> Result<(Forward, ObserverMap), Cal
             for plays in [false, true] {
                 let choice = ObserverChoice { taus, plays, ..one };
                 let Ok(found) = forward(prepared, &pieces, choice) else { continue };
-                if chosen.is_none_or(|(noise, _)| found.noise < WORTH * noise) {
+                let worth = chosen.is_none_or(|(noise, _)| found.noise < WORTH * noise);
+                if worth && found.answers() {
                     chosen = Some((found.noise, choice));
                 }
             }

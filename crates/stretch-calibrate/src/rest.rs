@@ -9,7 +9,7 @@ const CATCH_UP_S: f64 = 0.5;
 /// Leaks that are tried, as shares of the signal's range per second.
 const LEAKS: [f64; 4] = [0.0, 0.0003, 0.001, 0.003];
 /// Noise alone may carry the signal this many standard deviations below the level.
-const MARGIN: f64 = 2.5;
+const MARGIN: f64 = 1.0;
 /// A trial that begins this low in the range begins at rest.
 const LOWEST_QUARTER: f64 = 0.25;
 /// Samples at a trial's start that may stand at rest.

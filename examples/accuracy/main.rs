@@ -1,0 +1,82 @@
+//! Every figure of `docs/accuracy.md`, by one command:
+//!
+//! ```sh
+//! cargo run --release --example accuracy              # prints tables
+//! cargo run --release --example accuracy -- --write   # and renews reference/accuracy/*.csv
+//! ```
+//!
+//! All errors are root mean squares on trials that were never fitted. Intervals
+//! come from a block bootstrap over half-second blocks.
+
+mod data;
+mod measured;
+mod score;
+mod simulated;
+mod why;
+
+use std::{fs, path::Path};
+
+/// A table that is printed for people and kept as CSV.
+pub(crate) struct Sheet {
+    name: &'static str,
+    title: &'static str,
+    header: Vec<String>,
+    rows: Vec<Vec<String>>,
+}
+
+impl Sheet {
+    pub(crate) fn new(name: &'static str, title: &'static str, header: &[&str]) -> Self {
+        let header = header.iter().map(|h| (*h).to_owned()).collect();
+        Self { name, title, header, rows: Vec::new() }
+    }
+
+    pub(crate) fn push(&mut self, row: Vec<String>) {
+        self.rows.push(row);
+    }
+
+    fn print(&self) {
+        println!("\n### {}\n", self.title);
+        println!("| {} |", self.header.join(" | "));
+        println!("|{}", " --- |".repeat(self.header.len()));
+        for row in &self.rows {
+            println!("| {} |", row.join(" | "));
+        }
+    }
+
+    fn write(&self, folder: &Path) -> anyhow::Result<()> {
+        let version = env!("CARGO_PKG_VERSION");
+        let mut text = format!("# stretch {version}, examples/accuracy: {}\n", self.title);
+        for row in std::iter::once(&self.header).chain(&self.rows) {
+            text += &row.join(",");
+            text.push('\n');
+        }
+        fs::write(folder.join(self.name), text)?;
+        Ok(())
+    }
+}
+
+fn main() -> anyhow::Result<()> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let write = arguments.iter().any(|a| a == "--write");
+    let only: Vec<&String> = arguments.iter().filter(|a| !a.starts_with("--")).collect();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let parts: [(&str, &dyn Fn() -> anyhow::Result<Vec<Sheet>>); 5] = [
+        ("why", &|| why::tables(root)),
+        ("candidates", &simulated::candidates),
+        ("effects", &simulated::effects),
+        ("robust", &simulated::robustness),
+        ("measured", &|| measured::tables(root)),
+    ];
+    for (name, tables) in parts {
+        if !only.is_empty() && !only.iter().any(|o| *o == name) {
+            continue;
+        }
+        for sheet in tables()? {
+            sheet.print();
+            if write {
+                sheet.write(&root.join("reference/accuracy"))?;
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,88 @@
+//! Candidates on measured sessions: calibrated on one, tested on another of the
+//! same sleeve.
+
+use std::path::Path;
+
+use stretch_calibrate::{Options, calibrate, choose_model, rank_signals};
+use stretch_data::{ReadOptions, Trial};
+
+use crate::{
+    Sheet,
+    score::{Blocks, number},
+    simulated::{MODELS, fitted},
+};
+
+const SESSIONS: [[&str; 2]; 3] = [
+    ["heel_curl_90_1", "heel_curl_90_2"],
+    ["heel_curl_45_1", "heel_curl_45_2"],
+    ["lift_up_1", "lift_up_2"],
+];
+
+/// One session to fit, another to test on, and the signal chosen on the first.
+pub(crate) struct Pair {
+    pub(crate) fit: Trial,
+    pub(crate) test: Trial,
+    pub(crate) options: Options,
+}
+
+pub(crate) fn pairs(root: &Path) -> anyhow::Result<Vec<Pair>> {
+    let mut pairs = Vec::new();
+    for [first, second] in SESSIONS {
+        for (fit, test) in [(first, second), (second, first)] {
+            let read = |name: &str| {
+                let path = root.join(format!("data/knit_sleeve/{name}.csv"));
+                Trial::read(&path, &ReadOptions::new())
+            };
+            let (fit, test) = (read(fit)?, read(test)?);
+            let base = Options { reference: "angle_deg".into(), ..Options::default() };
+            let signals = ["s1", "s2", "s3", "s4", "s5"].map(String::from);
+            let ranking = rank_signals(std::slice::from_ref(&fit), &signals, &base)?;
+            let options = Options { signal: ranking[0].signal.clone(), ..base };
+            pairs.push(Pair { fit, test, options });
+        }
+    }
+    Ok(pairs)
+}
+
+pub(crate) fn tables(root: &Path) -> anyhow::Result<Vec<Sheet>> {
+    let mut header = vec!["calibrated on", "tested on", "signal", "raw"];
+    header.extend(MODELS);
+    header.extend(["auto chose", "auto"]);
+    let title =
+        "Measured sessions: RMSE in degrees, calibrated on one session and tested on another";
+    let mut sheet = Sheet::new("measured.csv", title, &header);
+    let mut logs = vec![0.0; MODELS.len() + 1];
+    for pair in pairs(root)? {
+        let fit = std::slice::from_ref(&pair.fit);
+        let test = std::slice::from_ref(&pair.test);
+        let mut errors = Vec::new();
+        let mut raw = f64::NAN;
+        for model in MODELS {
+            let calibration = fitted(model, fit, &pair.options)?.calibration;
+            raw = Blocks::raw(&calibration, test)?.rmse();
+            errors.push(Blocks::of(&calibration, test)?.rmse());
+        }
+        let choice = choose_model(fit, &pair.options)?;
+        let options = Options { model: choice.model, ..pair.options.clone() };
+        errors.push(Blocks::of(&calibrate(fit, &options)?.calibration, test)?.rmse());
+        let bar = errors[0].min(errors[1]);
+        logs.iter_mut().zip(&errors).for_each(|(sum, e)| *sum += (e / bar).ln());
+        let stem = |trial: &Trial| trial.name.trim_end_matches(".csv").to_owned();
+        let mut row =
+            vec![stem(&pair.fit), stem(&pair.test), pair.options.signal.clone(), number(raw)];
+        row.extend(errors[..MODELS.len()].iter().map(|e| number(*e)));
+        row.extend([choice.model.to_string(), number(errors[MODELS.len()])]);
+        sheet.push(row);
+    }
+    let mean = |log: &f64| format!("{:.2}", (log / 6.0).exp());
+    let mut row = vec![
+        "geometric mean".to_owned(),
+        "of the better of linear and poly13".into(),
+        "-".into(),
+        "-".into(),
+    ];
+    row.extend(logs[..MODELS.len()].iter().map(mean));
+    row.extend(["-".to_owned(), mean(&logs[MODELS.len()])]);
+    sheet.push(row);
+    Ok(vec![sheet])
+}

@@ -64,8 +64,12 @@ else
 fi
 
 step "packages of the library crates"
+# a folder of its own each time: cargo keeps what it unpacked for a path and a
+# version, and would verify against the sources of an earlier run
+packages=$(mktemp -d)
+trap 'rm -rf "$packages"' EXIT
 # shellcheck disable=SC2046,SC2086
-cargo package --quiet --locked --allow-dirty $(printf -- '-p %s ' $LIBRARIES stretch-data stretch-calibrate stretch-sim)
+cargo package --quiet --locked --allow-dirty --target-dir "$packages" $(printf -- '-p %s ' $LIBRARIES stretch-data stretch-calibrate stretch-sim)
 
 step "fuzz targets compile"
 cargo check --quiet --locked --manifest-path fuzz/Cargo.toml

@@ -22,6 +22,9 @@ const FIRST_RATE_SPREAD: f64 = 1.0;
 /// The target's variance is never held for more than its whole range squared.
 const MOST_SPREAD: f64 = 1.0;
 
+/// A secant is taken over at least this share of the way between knots.
+const LEAST_RUN: f64 = 0.01;
+
 /// A receptor for [`Model::Observer`]: predicts the motion, compares the signal
 /// it would give with the one that came, and corrects.
 ///
@@ -213,7 +216,9 @@ impl<T: Real> ObserverReceptor<T> {
         let (predicted, tangent, from) = self.signal(drive);
         let (to, held) = self.drive(signal);
         let run = to - from;
-        let secant = if run == T::zero() { tangent } else { (held - predicted) / run };
+        // over a hair's breadth rounding alone would decide the secant
+        let far = run.abs() > T::from_f64(LEAST_RUN) * self.drive_step;
+        let secant = if far { (held - predicted) / run } else { tangent };
         let slope = tangent.max(secant);
 
         let mut reach = [T::zero(); STATES];

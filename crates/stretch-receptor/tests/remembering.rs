@@ -1,0 +1,227 @@
+//! Receptors that remember: finite whatever comes, the same in both precisions,
+//! and an observer that inverts the gauge it describes.
+
+use proptest::prelude::*;
+use stretch_core::{
+    Calibration, CalibrationSpec, FitSummary, HistoryMap, HistoryShape, Interval, Model,
+    ObserverMap, RestTracker, Runner, Values, Volts,
+};
+use stretch_receptor::{
+    BlendedReceptor, HistoryReceptor, ObserverReceptor, Receptor, StretchReceptor, Withheld,
+    example_calibration, strategies,
+};
+
+const FIT: FitSummary = FitSummary { samples: 9000, r_squared: 0.99, rmse: 0.01 };
+const UNIT: Interval = Interval { min: 0.0, max: 1.0 };
+const REST: RestTracker = RestTracker { level: 1.15, catch_up_s: 0.5, leak: 0.001 };
+
+fn with(model: Model) -> Calibration {
+    let spec = CalibrationSpec { model, ..example_calibration().into_spec() };
+    Calibration::new(spec).expect("every part is in range")
+}
+
+fn observer(rest: Option<RestTracker>, amplitude: f64) -> Calibration {
+    let curve: Vec<f64> = (0..=12).map(|k| 1.1 + 0.96 * (f64::from(k) / 12.0).powf(0.8)).collect();
+    with(Model::Observer(ObserverMap {
+        rest,
+        curve: Values::new("curve", &curve).unwrap(),
+        drive_domain: Interval { min: -0.1, max: 1.2 },
+        relaxations_s: Values::new("taus", &[0.25]).unwrap(),
+        amplitudes: Values::new("amplitudes", &[amplitude]).unwrap(),
+        lead_s: 0.01,
+        radii: Values::new("radii", &[0.05]).unwrap(),
+        play_weights: Values::new("weights", &[-0.1]).unwrap(),
+        noise: 0.005,
+        agility: 10.0,
+        estimate_domain: UNIT,
+        fit: FIT,
+    }))
+}
+
+fn history(rest: Option<RestTracker>, coefficients: &[f64]) -> Calibration {
+    with(Model::History(HistoryMap {
+        rest,
+        relaxations_s: Values::new("taus", &[0.1, 0.4]).unwrap(),
+        radii: Values::new("radii", &[0.1]).unwrap(),
+        degree: 3,
+        memory_degree: 3,
+        state_min: Values::new("min", &[0.0, -0.2, -0.2, -0.1]).unwrap(),
+        state_max: Values::new("max", &[1.0, 0.2, 0.2, 0.1]).unwrap(),
+        coefficients: Values::new("coefficients", coefficients).unwrap(),
+        estimate_domain: UNIT,
+        fit: FIT,
+    }))
+}
+
+const TERMS: usize = 35;
+
+#[test]
+fn shape_of_the_terms() {
+    let shape = HistoryShape { states: 4, degree: 3, memory_degree: 3 };
+    assert_eq!(shape.terms(), TERMS);
+}
+
+/// A model's blended twin.
+fn blended() -> Calibration {
+    let spec = example_calibration().into_spec();
+    let Model::Surfaces { inflation, deflation } = spec.model else { unreachable!() };
+    with(Model::Blended { inflation, deflation })
+}
+
+fn rest() -> impl Strategy<Value = Option<RestTracker>> {
+    prop_oneof![Just(None), Just(Some(REST))]
+}
+
+fn remembering() -> impl Strategy<Value = Calibration> {
+    prop_oneof![
+        (rest(), -0.3..0.6f64).prop_map(|(rest, amplitude)| observer(rest, amplitude)),
+        (rest(), proptest::collection::vec(-2.0..2.0f64, TERMS))
+            .prop_map(|(rest, coefficients)| history(rest, &coefficients)),
+        Just(blended()),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn readings_are_finite_whatever_comes(
+        calibration in remembering(),
+        stream in strategies::faulty_stream(200),
+    ) {
+        let mut wide = Runner::new(Receptor::<f64>::new(&calibration).unwrap());
+        let mut narrow = Runner::new(Receptor::<f32>::new(&calibration).unwrap());
+        // a length of the normalised targets 0..1, and what rounding may add
+        let inside = |x: f64| !matches!(calibration.model, Model::History(_) | Model::Observer(_))
+            || (150.0..180.1).contains(&x);
+        for &volts in &stream {
+            if let Ok(reading) = wide.step(Volts(volts)) {
+                prop_assert!(reading.estimate.is_finite() && reading.rate.is_finite());
+                prop_assert!(inside(reading.estimate), "{}", reading.estimate);
+            } else {
+                prop_assert!(true);
+            }
+            if let Ok(reading) = narrow.step(Volts(volts as f32)) {
+                prop_assert!(reading.estimate.is_finite() && reading.rate.is_finite());
+            }
+        }
+    }
+
+    #[test]
+    fn both_precisions_agree(calibration in remembering(), stream in strategies::clean_stream(300)) {
+        let mut wide = Runner::new(Receptor::<f64>::new(&calibration).unwrap());
+        let mut narrow = Runner::new(Receptor::<f32>::new(&calibration).unwrap());
+        for &volts in &stream {
+            let volts = f64::from(volts as f32);
+            match (wide.step(Volts(volts)), narrow.step(Volts(volts as f32))) {
+                (Ok(wide), Ok(narrow)) => {
+                    // coefficients of either sign up to 2 in 35 terms, times a stroke of 30 mm
+                    let error = (wide.estimate - f64::from(narrow.estimate)).abs();
+                    prop_assert!(error < testkit::tolerance::REMEMBERING_F32_MM, "{error}");
+                }
+                (a, b) => prop_assert_eq!(a.err(), b.err()),
+            }
+        }
+    }
+
+    #[test]
+    fn records_round_trip(calibration in remembering()) {
+        let mut buffer = [0; 4096];
+        let bytes = postcard::to_slice(&calibration, &mut buffer).unwrap();
+        let back: Calibration = postcard::from_bytes(bytes).unwrap();
+        prop_assert_eq!(&calibration, &back);
+    }
+
+    /// The gauge of the observer's own description, without noise: a muscle that
+    /// moves smoothly is found to a share of its stroke.
+    #[test]
+    fn an_observer_inverts_its_gauge(amplitude in -0.3..0.6f64, turns in 0.1..0.6f64) {
+        let calibration = observer(None, amplitude);
+        let Model::Observer(map) = &calibration.model else { unreachable!() };
+        let mut receptor = Runner::new(ObserverReceptor::<f64>::new(&calibration).unwrap());
+        let share = -(-0.01f64 / 0.25).exp_m1();
+        let omega = core::f64::consts::TAU * turns;
+        let target = |n: usize| 0.5 - 0.4 * (omega * n as f64 * 0.01).cos();
+        let (mut slow, mut play) = (target(0), target(0));
+        for n in 0..1500 {
+            let y = target(n);
+            let rate = 0.4 * omega * (omega * n as f64 * 0.01).sin();
+            slow += share * (y - slow);
+            play = play.max(y - 0.05).min(y + 0.05);
+            let drive = y + 0.01 * rate + amplitude * (y - slow) - 0.1 * (y - play);
+            let place = ((drive + 0.1) / 1.3 * 12.0).clamp(0.0, 11.999);
+            let below = place as usize;
+            let volts = map.curve[below] + (place - below as f64) * (map.curve[below + 1] - map.curve[below]);
+            let reading = receptor.step(Volts(volts)).unwrap();
+            if n > 300 {
+                let truth = 180.0 * (1.0 - 0.165 * y);
+                let error = (reading.estimate - truth).abs();
+                prop_assert!(error < testkit::tolerance::OBSERVER_INVERTS_MM, "{n}: {error} mm");
+            }
+        }
+    }
+}
+
+#[test]
+fn one_lost_sample_costs_one_reading_and_a_long_gap_a_warm_up() {
+    let mut receptor =
+        Runner::new(HistoryReceptor::<f64>::new(&history(None, &[0.01; TERMS])).unwrap());
+    let mut observer = Runner::new(ObserverReceptor::<f64>::new(&observer(None, 0.3)).unwrap());
+    for _ in 0..30 {
+        let _ = receptor.step(Volts(1.5));
+        assert!(observer.step(Volts(1.5)).is_ok(), "an observer needs no warm-up");
+    }
+    assert_eq!(receptor.step(Volts(f64::NAN)), Err(Withheld::Missing));
+    assert_eq!(observer.step(Volts(f64::NAN)), Err(Withheld::Missing));
+    assert!(receptor.step(Volts(1.5)).is_ok() && observer.step(Volts(1.5)).is_ok());
+    for _ in 0..10 {
+        let _ = receptor.step(Volts(f64::NAN));
+    }
+    assert_eq!(receptor.step(Volts(1.5)), Err(Withheld::Warming));
+}
+
+#[test]
+fn a_model_needs_its_own_receptor() {
+    let calibration = observer(None, 0.3);
+    assert!(StretchReceptor::<f64>::new(&calibration).is_err());
+    assert!(HistoryReceptor::<f64>::new(&calibration).is_err());
+    assert!(BlendedReceptor::<f64>::new(&calibration).is_err());
+    assert!(ObserverReceptor::<f64>::new(&example_calibration()).is_err());
+}
+
+#[test]
+fn blending_has_no_jump() {
+    let spec = CalibrationSpec { dead_band: 0.5, ..blended().into_spec() };
+    let mut receptor =
+        Runner::new(BlendedReceptor::<f64>::new(&Calibration::new(spec).unwrap()).unwrap());
+    let mut before: Option<f64> = None;
+    for n in 0..600 {
+        let volts = 1.6 + 0.05 * (0.02 * f64::from(n)).sin();
+        if let Ok(reading) = receptor.step(Volts(volts)) {
+            if let Some(before) = before {
+                let step = (reading.estimate - before).abs();
+                assert!(step < 0.2, "{step} mm in a sample");
+            }
+            before = Some(reading.estimate);
+        }
+    }
+    assert!(before.is_some());
+}
+
+#[test]
+fn a_resting_baseline_is_found() {
+    let mut receptor =
+        Runner::new(ObserverReceptor::<f64>::new(&observer(Some(REST), 0.0)).unwrap());
+    let mut last = 0.0;
+    for n in 0..3000 {
+        // rest at 1.15 V, drifting down by 0.1 V
+        let volts = 1.15 - 0.1 * f64::from(n.min(1500)) / 1500.0;
+        last = receptor.step(Volts(volts)).unwrap().estimate;
+    }
+    let mut fresh = Runner::new(ObserverReceptor::<f64>::new(&observer(Some(REST), 0.0)).unwrap());
+    let mut rested = 0.0;
+    for _ in 0..3000 {
+        rested = fresh.step(Volts(1.15)).unwrap().estimate;
+    }
+    assert!((last - rested).abs() < 0.5, "{last} {rested}");
+}

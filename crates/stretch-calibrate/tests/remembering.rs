@@ -1,0 +1,121 @@
+//! Models that remember, from trials to readings.
+
+use stretch_calibrate::{
+    Memory, ModelKind, Options, calibrate, choose_model, evaluate, read_calibration,
+    write_calibration,
+};
+use stretch_core::Model;
+use stretch_data::{Channel, Trial};
+
+/// A gauge that overshoots by 0.4 over 0.25 s, on a muscle that moves by `target`.
+fn trial(name: &str, seconds: f64, target: impl Fn(f64) -> f64) -> Trial {
+    let time_s: Vec<f64> = (0..(100.0 * seconds) as usize).map(|n| n as f64 * 0.01).collect();
+    let share = -(-0.01f64 / 0.25).exp_m1();
+    let mut slow = target(0.0);
+    let mut noise = 1u32;
+    let mut signal = |&t: &f64| {
+        let y = target(t);
+        slow += share * (y - slow);
+        noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let noise = 0.01 * (f64::from(noise) / f64::from(u32::MAX) - 0.5);
+        let drive = y + 0.4 * (y - slow);
+        1.24 + drive - 0.2 * drive * drive + noise
+    };
+    let bridge_v: Vec<f64> = time_s.iter().map(&mut signal).collect();
+    let length_mm: Vec<f64> = time_s.iter().map(|&t| 180.0 - 30.0 * target(t)).collect();
+    let channel = |name: &str, values| Channel { name: name.into(), values };
+    Trial {
+        name: name.into(),
+        time_s,
+        channels: vec![channel("length_mm", length_mm), channel("bridge_v", bridge_v)],
+    }
+}
+
+/// Sums of sines that no two trials share.
+fn wander(phase: f64) -> impl Fn(f64) -> f64 {
+    move |t| 0.5 + 0.25 * (2.1 * t + phase).sin() + 0.2 * (5.3 * t + 2.0 * phase).sin()
+}
+
+fn wandering() -> Vec<Trial> {
+    [0.0, 1.0, 2.5].map(|p| trial(&format!("wander_{p}.csv"), 30.0, wander(p))).into()
+}
+
+fn options(kind: Memory, rest: bool) -> Options {
+    Options { model: ModelKind::Remembering { kind, rest }, ..Options::default() }
+}
+
+#[test]
+fn the_observer_finds_the_gauge() {
+    let calibrated = calibrate(&wandering(), &options(Memory::Observer, false)).unwrap();
+    let Model::Observer(map) = &calibrated.calibration.model else { panic!("{calibrated:?}") };
+    assert_eq!(map.relaxations_s.len(), 1);
+    // the fit's time constants are searched to a few percent
+    assert!((map.relaxations_s[0] - 0.25).abs() < 0.03, "{:?}", map.relaxations_s);
+    let drive = calibrated.fits[0].coefficients.iter().find(|c| c.name.starts_with("relax"));
+    let drive = drive.expect("a relaxation");
+    assert!((drive.estimate - 0.4).abs() < 0.04, "{drive:?}");
+    assert!(drive.lower < drive.estimate && drive.estimate < drive.upper);
+}
+
+#[test]
+fn memory_is_worth_having_and_survives_its_record() {
+    let test = [trial("test.csv", 30.0, wander(4.0))];
+    let plain = calibrate(&wandering(), &Options::default()).unwrap();
+    let plain = evaluate(&[("x", &plain.calibration)], &test).unwrap().pooled[1].rmse;
+    let folder = std::env::temp_dir().join(format!("remembering_{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    for kind in [Memory::Relaxation, Memory::Both, Memory::History, Memory::Observer] {
+        let calibration = calibrate(&wandering(), &options(kind, true)).unwrap().calibration;
+        let own = evaluate(&[("x", &calibration)], &test).unwrap().pooled[1].rmse;
+        assert!(own < 0.6 * plain, "{kind}: {own} mm, poly13 {plain} mm");
+        for name in ["record.json", "record.postcard"] {
+            let path = folder.join(name);
+            write_calibration(&path, &calibration).unwrap();
+            assert_eq!(read_calibration(&path).unwrap(), calibration, "{kind} {name}");
+        }
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+/// The fit's rows and the receptor's steps are one arithmetic.
+#[test]
+fn what_was_fitted_is_what_runs() {
+    let trials = wandering();
+    for rest in [false, true] {
+        let calibrated = calibrate(&trials, &options(Memory::History, rest)).unwrap();
+        let live = evaluate(&[("x", &calibrated.calibration)], &trials).unwrap().pooled[1].rmse;
+        let range = calibrated.calibration.target_range.span() * 180.0;
+        let fitted = calibrated.fits[0].rmse * range;
+        // degrees of freedom and the first samples make the difference
+        assert!((live / fitted - 1.0).abs() < 0.05, "live {live} mm, fitted {fitted} mm");
+    }
+}
+
+#[test]
+fn auto_takes_a_model_that_remembers_where_that_shows() {
+    let choice = choose_model(&wandering(), &Options::default()).unwrap();
+    assert!(matches!(choice.model, ModelKind::Remembering { .. }), "{choice:?}");
+    assert!(choice.notes.is_empty());
+    assert_eq!(choice.rows.len(), 13);
+    let chosen = choice.rows.iter().find(|row| row.model == choice.model.to_string()).unwrap();
+    let best = choice.rows[0].rmse.unwrap();
+    let simpler = chosen.parameters <= choice.rows[0].parameters;
+    assert!(chosen.rmse.unwrap() < 1.1 * best && simpler, "{chosen:?}");
+}
+
+#[test]
+fn auto_says_what_ramps_cannot() {
+    let ramps: Vec<Trial> = [0.5, 1.0, 2.0, 4.0]
+        .into_iter()
+        .flat_map(|speed| {
+            let up = move |t: f64| (speed * t / 4.0).min(1.0);
+            [
+                trial(&format!("up_{speed}.csv"), 8.0, up),
+                trial(&format!("down_{speed}.csv"), 8.0, move |t| 1.0 - up(t)),
+            ]
+        })
+        .collect();
+    let choice = choose_model(&ramps, &Options::default()).unwrap();
+    assert!(!matches!(choice.model, ModelKind::Remembering { .. }));
+    assert!(choice.notes[0].contains("record one minute of arbitrary motion"), "{choice:?}");
+}

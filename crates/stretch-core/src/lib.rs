@@ -6,6 +6,7 @@ mod degree;
 mod error;
 pub mod fixed;
 mod history;
+mod hysteresis;
 mod label;
 mod model;
 mod observer;
@@ -29,6 +30,7 @@ pub use error::DesignError;
 pub use history::{
     HistoryMap, HistoryShape, MAX_HISTORY_TERMS, MAX_PLAYS, MAX_RELAXATIONS, MAX_STATES,
 };
+pub use hysteresis::{Hysteresis, MAX_HYSTERESIS_PLAYS};
 pub use label::Label;
 pub use model::{Branch, BranchSurface, Interval, LinearMap, Model};
 pub use observer::{MAX_KNOTS, MAX_OBSERVER_PLAYS, MAX_OBSERVER_RELAXATIONS, ObserverMap};

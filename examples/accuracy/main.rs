@@ -55,12 +55,15 @@ impl Sheet {
     }
 }
 
+/// What makes the tables of one part.
+type Part<'a> = &'a dyn Fn() -> anyhow::Result<Vec<Sheet>>;
+
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let write = arguments.iter().any(|a| a == "--write");
     let only: Vec<&String> = arguments.iter().filter(|a| !a.starts_with("--")).collect();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let parts: [(&str, &dyn Fn() -> anyhow::Result<Vec<Sheet>>); 5] = [
+    let parts: [(&str, Part<'_>); 5] = [
         ("why", &|| why::tables(root)),
         ("candidates", &simulated::candidates),
         ("effects", &simulated::effects),

@@ -14,6 +14,7 @@ mod options;
 mod own_ranges;
 mod record;
 mod rest;
+mod rising;
 mod series;
 mod split;
 

@@ -12,6 +12,7 @@ use crate::{
     calibrate::{Fitted, Prepared},
     dense::{Sums, block_errors},
     rest::rested,
+    rising::rising,
 };
 
 /// Knots of the curve.
@@ -395,24 +396,6 @@ fn solve(
     let solution = sums.triangle(penalty)?.solve(&sums.cross);
     let (knots, moved) = solution.split_at(KNOTS);
     solution.iter().all(|x| x.is_finite()).then(|| (knots.to_vec(), moved.to_vec()))
-}
-
-/// The nearest curve that rises by at least `step` a knot: pools that violate
-/// it are averaged (Ayer et al. 1955, doi:10.1214/aoms/1177728423).
-fn rising(knots: &[f64], step: f64) -> Vec<f64> {
-    let mut pools: Vec<(f64, usize)> = Vec::new();
-    for (k, knot) in knots.iter().enumerate() {
-        pools.push((knot - step * k as f64, 1));
-        while let [.., (a, n), (b, m)] = pools[..]
-            && a >= b
-        {
-            pools.truncate(pools.len() - 2);
-            let count = n + m;
-            pools.push(((a * n as f64 + b * m as f64) / count as f64, count));
-        }
-    }
-    let flat = pools.iter().flat_map(|&(level, count)| std::iter::repeat_n(level, count));
-    flat.enumerate().map(|(k, level)| level + step * k as f64).collect()
 }
 
 /// Spread of the signal around the model, and standard errors of the dynamics

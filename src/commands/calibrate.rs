@@ -290,7 +290,7 @@ fn write_report(
 }
 
 /// What `auto` rests on.
-fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Result<()> {
+pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Result<()> {
     let unit = reference.rsplit_once('_').map_or("", |(_, unit)| unit);
     say(format!("Models, RMSE in {unit} on trials left out of the fit:"))?;
     let row = |r: &ModelRow| {

@@ -3,15 +3,15 @@
 use std::path::PathBuf;
 
 use stretch_calibrate::{
-    ModelKind, Options, apply, calibrate, evaluate, rank_signals, write_calibration,
+    ModelKind, Options, apply, calibrate, choose_model, evaluate, rank_signals, write_calibration,
 };
 use stretch_data::{ReadOptions, Trial};
 
 use super::{
     apply::estimates_csv,
-    calibrate::print as print_calibration,
+    calibrate::{print as print_calibration, print_models},
     evaluate::print as print_evaluation,
-    shared::{say, say_json, write_text},
+    shared::{progress, say, say_json, write_text},
 };
 use crate::report::{self, Context};
 
@@ -61,8 +61,14 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let options = Options { signal, ..options };
     let linear = calibrate(fits, &Options { model: ModelKind::Linear, ..options.clone() })?;
     let surfaces = calibrate(fits, &options)?;
+    let bar = progress("choosing a model by cross-validation", 1);
+    let choice = choose_model(fits, &options)?;
+    bar.finish_and_clear();
+    let chosen = calibrate(fits, &Options { model: choice.model, ..options.clone() })?;
+    let name = format!("chosen ({})", choice.model);
+    let shown = [("linear", &linear), ("non-linear", &surfaces), (name.as_str(), &chosen)];
     let evaluation = evaluate(
-        &[("linear", &linear.calibration), ("non-linear", &surfaces.calibration)],
+        &shown.map(|(name, calibrated)| (name, &calibrated.calibration)),
         std::slice::from_ref(&test),
     )?;
 
@@ -71,8 +77,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let file = |name: &str| args.out.join(name);
     write_calibration(&file("linear.json"), &linear.calibration)?;
     write_calibration(&file("poly13.json"), &surfaces.calibration)?;
-    let applied = apply(&surfaces.calibration, &test)?;
-    let estimates = estimates_csv(&surfaces.calibration, &test, &applied)?;
+    write_calibration(&file("chosen.json"), &chosen.calibration)?;
+    let applied = apply(&chosen.calibration, &test)?;
+    let estimates = estimates_csv(&chosen.calibration, &test, &applied)?;
     stretch_data::write_whole(file("estimates.csv"), |out| out.write_all(&estimates))?;
     let context = Context {
         title: "A knee angle from a knitted strain sensor".into(),
@@ -81,7 +88,6 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         signal_choice: ranking.clone(),
         notes: surfaces.notes.clone(),
     };
-    let shown = [("linear", &linear), ("non-linear", &surfaces)];
     write_text(&file("report.html"), &report::calibration_page(&shown, &evaluation, &context))?;
     write_text(&file("estimate.svg"), &report::readme_picture(&shown, &evaluation))?;
 
@@ -90,10 +96,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
     say(format!("Calibrated on {}, a measured session:", fit.name))?;
     print_calibration(&surfaces, &ranking)?;
+    print_models(&choice, REFERENCE)?;
     say(format!("\nTested on {}, which was not used for the fit:", test.name))?;
     print_evaluation(&evaluation)?;
     say(format!(
-        "\nwrote {}: report.html (open it), estimate.svg, linear.json, poly13.json, estimates.csv",
+        "\nwrote {}: report.html (open it), estimate.svg, linear.json, poly13.json, chosen.json, estimates.csv",
         args.out.display()
     ))
 }

@@ -56,7 +56,6 @@ pub(crate) fn calibration_page(
 
 /// A picture of some seconds of the first trial for a README: an SVG file of
 /// its own, light, with its legend inside. Empty when there is nothing to draw.
-#[allow(dead_code, reason = "draws the picture of the README, outside the program")]
 pub(crate) fn readme_picture(
     calibrated: &[(&str, &Calibrated)],
     evaluation: &Evaluation,

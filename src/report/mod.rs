@@ -24,7 +24,6 @@ mod surface_figure;
 pub(crate) mod thin;
 
 pub(crate) use blind_page::{BlindSubject, blind_page};
-#[allow(unused_imports, reason = "draws the picture of the README, outside the program")]
 pub(crate) use calibration_page::readme_picture;
 pub(crate) use calibration_page::{Context, calibration_page};
 pub(crate) use diagnosis_page::{Subject, diagnosis_page};

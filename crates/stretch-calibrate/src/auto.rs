@@ -8,7 +8,7 @@ use stretch_metrics::lag;
 use crate::{
     CalibrateError, Memory, ModelKind, Options, apply,
     calibrate::{Choice, calibrate_with},
-    series::sample_rate_hz,
+    series::{extent, sample_rate_hz},
 };
 
 /// Blocks whose means are compared, in seconds.
@@ -80,8 +80,8 @@ fn candidates() -> Vec<ModelKind> {
 
 /// Whether a trial can tell memory from position: it turns at least three times.
 fn reverses(reference: &[f64]) -> bool {
-    let (low, high) = ends(reference);
-    let turn = TURN * (high - low);
+    let range = extent(reference.iter().copied());
+    let turn = TURN * (range.max - range.min);
     if turn <= 0.0 {
         return false;
     }
@@ -103,10 +103,6 @@ fn reverses(reference: &[f64]) -> bool {
         }
     }
     turns >= LEAST_TURNS
-}
-
-fn ends(x: &[f64]) -> (f64, f64) {
-    x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| (a.min(x), b.max(x)))
 }
 
 /// A part of the data that is left out together: samples `from..to` of a trial.

@@ -8,7 +8,7 @@ use stretch_receptor::Domain;
 
 use crate::{
     CalibrateError, apply,
-    series::{polarity, sample_rate_hz},
+    series::{extent, polarity, sample_rate_hz},
 };
 
 /// Blocks of the paired test, in seconds.
@@ -169,17 +169,15 @@ pub fn evaluate(
 fn raw(calibration: &Calibration, trial: &Trial) -> Result<Estimates, CalibrateError> {
     let signal = trial.require(calibration.signal.as_str())?;
     let reference = trial.require(calibration.reference.as_str())?;
-    let ends = |x: &[f64]| {
-        x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| (a.min(x), b.max(x)))
-    };
-    let ((low, high), (from, to)) = (ends(signal), ends(reference));
+    let (seen, stroke) = (extent(signal.iter().copied()), extent(reference.iter().copied()));
     let together = polarity(signal.iter().copied().zip(reference.iter().copied()));
-    let (start, gain) = match together {
-        Polarity::Rising => (from, (to - from) / (high - low)),
-        Polarity::Falling => (to, (from - to) / (high - low)),
+    let (start, end) = match together {
+        Polarity::Rising => (stroke.min, stroke.max),
+        Polarity::Falling => (stroke.max, stroke.min),
     };
+    let gain = (end - start) / (seen.max - seen.min);
     let gain = if gain.is_finite() { gain } else { 0.0 };
-    let values: Vec<f64> = signal.iter().map(|v| start + gain * (v - low)).collect();
+    let values: Vec<f64> = signal.iter().map(|v| start + gain * (v - seen.min)).collect();
     Ok(Estimates { rates: vec![f64::NAN; values.len()], values, clamped: 0 })
 }
 

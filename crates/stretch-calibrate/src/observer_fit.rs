@@ -298,10 +298,8 @@ fn forward(
     if samples.len() <= KNOTS + dynamic {
         return Err(undetermined());
     }
-    let (low, high) = samples
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), s| (a.min(s.2), b.max(s.2)));
-    let least_step = LEAST_RISE * (high - low) / (KNOTS - 1) as f64;
+    let range = crate::series::extent(samples.iter().map(|s| s.2));
+    let least_step = LEAST_RISE * (range.max - range.min) / (KNOTS - 1) as f64;
     let mut dynamics = vec![0.0; dynamic];
     let mut curve = Vec::new();
     for pass in 0..ITERATIONS {
@@ -327,7 +325,7 @@ fn forward(
     }
     let (noise, errors) = residuals(&samples, &dynamics, drive, &curve, prepared.sample_rate.hz());
     // a curve that follows noiseless data exactly still needs a noise to weigh with
-    let noise = noise.max(1e-6 * (high - low));
+    let noise = noise.max(1e-6 * (range.max - range.min));
     Ok(Forward { choice, curve, drive, dynamics, errors, noise })
 }
 

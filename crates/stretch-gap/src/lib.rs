@@ -13,6 +13,7 @@ mod gauge;
 mod linear;
 mod localise;
 mod next_experiment;
+mod outside;
 mod probability;
 mod rig;
 mod sanity;

@@ -1,12 +1,15 @@
-//! The rig's catalogue as the diagnosis sees it: which outputs an effect touches, and where to look for it.
+//! The catalogue as the diagnosis sees it: which outputs an effect touches, and where to look for it.
 
-use stretch_sim::{CATALOGUE, Effect, Key, PARAMETERS, RigParams, Scale, Stage};
+use stretch_sim::{CATALOGUE, Effect, EffectParameter, Key, PARAMETERS, RigParams, Scale, Stage};
 
 use super::{
     forms::{NAMES, form_of},
     session::Inputs,
 };
-use crate::simulator::{EffectParameterSpec, EffectSpec};
+use crate::{
+    error::GapError,
+    simulator::{EffectParameterSpec, EffectSpec},
+};
 
 /// Pairs that are hard to tell apart.
 const TWINS: [(&str, &str); 9] = [
@@ -23,11 +26,11 @@ const TWINS: [(&str, &str); 9] = [
 
 /// What the screens need to know of the measurement.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Extent {
+pub(crate) struct Extent {
     /// Least and greatest simulated nominal bridge voltage, V.
-    pub(super) volts: (f64, f64),
+    pub(crate) volts: (f64, f64),
     /// Least nominal gauge strain.
-    pub(super) strain: f64,
+    pub(crate) strain: f64,
 }
 
 impl Extent {
@@ -41,59 +44,81 @@ impl Extent {
     }
 }
 
-/// Every effect of the catalogue but those left out, as entries for a rig with these stages.
-pub(super) fn entries(
-    without: &[String],
-    pressure: bool,
-    extent: Extent,
-    stage_index: &dyn Fn(Stage) -> Vec<usize>,
-) -> (Vec<EffectSpec>, Vec<&'static dyn Effect>) {
-    let mut specs = Vec::new();
-    let mut effects: Vec<&'static dyn Effect> = Vec::new();
-    for effect in CATALOGUE {
-        if without.iter().any(|name| name == effect.name()) {
-            continue;
+/// Where effects act.
+pub(crate) struct Place<'a> {
+    /// Whether an effect can act there at all.
+    pub(crate) accepts: &'a dyn Fn(&dyn Effect) -> bool,
+    /// Stages whose output an effect of a stage changes.
+    pub(crate) touches: &'a dyn Fn(Stage) -> Vec<usize>,
+    /// The catalogue's unit of a parameter in the unit that it has there.
+    pub(crate) unit: &'a dyn Fn(&EffectParameter) -> f64,
+    pub(crate) extent: Extent,
+}
+
+/// Refuses names that nobody knows.
+pub(crate) fn check_names(names: &[String]) -> Result<(), GapError> {
+    match names.iter().find(|name| stretch_sim::effect_named(name).is_none()) {
+        None => Ok(()),
+        Some(name) => {
+            let known = CATALOGUE.iter().map(|e| e.name());
+            let nearest = stretch_data::nearest(name, known).map(str::to_owned);
+            Err(GapError::UnknownEffect { name: name.clone(), nearest })
         }
-        let twins = TWINS
-            .iter()
-            .filter_map(|&(a, b)| match effect.name() {
-                name if name == a => Some(b),
-                name if name == b => Some(a),
-                _ => None,
-            })
-            .map(str::to_owned)
-            .collect();
-        let effect = form_of(*effect);
-        let name = effect.name();
-        let is_hum = name == "mains_hum";
-        let parameters = effect
-            .parameters()
-            .iter()
-            .filter(|p| !(is_hum && p.name == "phase"))
-            .map(|p| EffectParameterSpec {
-                name: p.name.into(),
-                unit: p.unit.into(),
-                min: p.min,
-                max: p.max,
-                off: p.off,
-                is_log: p.scale == Scale::Log,
-                is_fitted: !(is_hum && p.name == "f"),
-                form: NAMES.contains(&p.name).then_some(p.typical),
-            })
-            .collect();
-        let _ = pressure;
-        specs.push(EffectSpec {
-            name: name.into(),
-            stage: effect.stage().name().into(),
-            touches: stage_index(effect.stage()),
-            parameters,
-            starts: with_forms(starts(name, extent), effect),
-            is_between_trials: matches!(name, "thermal_drift" | "gauge_softening" | "self_heating"),
-            twins,
-        });
-        effects.push(effect);
     }
-    (specs, effects)
+}
+
+/// Every effect of the catalogue that a place accepts, but those left out.
+pub(crate) fn entries(
+    without: &[String],
+    place: &Place<'_>,
+) -> (Vec<EffectSpec>, Vec<&'static dyn Effect>) {
+    CATALOGUE
+        .iter()
+        .filter(|e| (place.accepts)(**e) && !without.iter().any(|name| name == e.name()))
+        .map(|e| {
+            let effect = form_of(*e);
+            (entry(effect, place), effect)
+        })
+        .unzip()
+}
+
+fn entry(effect: &'static dyn Effect, place: &Place<'_>) -> EffectSpec {
+    let name = effect.name();
+    let other = |&(a, b): &(&str, &str)| match name {
+        _ if name == a => Some(b.to_owned()),
+        _ if name == b => Some(a.to_owned()),
+        _ => None,
+    };
+    let is_hum = name == "mains_hum";
+    // The phase of a hum is found in the record.
+    let own = || effect.parameters().iter().filter(|p| !(is_hum && p.name == "phase"));
+    let units: Vec<f64> = own().map(place.unit).collect();
+    let parameters = own()
+        .zip(&units)
+        .map(|(p, unit)| EffectParameterSpec {
+            name: p.name.into(),
+            unit: if *unit == 1.0 { p.unit } else { "1" }.into(),
+            min: p.min * unit,
+            max: p.max * unit,
+            off: p.off.map(|off| off * unit),
+            is_log: p.scale == Scale::Log,
+            is_fitted: !(is_hum && p.name == "f"),
+            form: NAMES.contains(&p.name).then_some(p.typical * unit),
+        })
+        .collect();
+    let mut starts = with_forms(starts(name, place.extent), effect);
+    for start in &mut starts {
+        start.iter_mut().zip(&units).for_each(|(x, unit)| *x *= unit);
+    }
+    EffectSpec {
+        name: name.into(),
+        stage: effect.stage().name().into(),
+        touches: (place.touches)(effect.stage()),
+        parameters,
+        starts,
+        is_between_trials: matches!(name, "thermal_drift" | "gauge_softening" | "self_heating"),
+        twins: TWINS.iter().filter_map(other).collect(),
+    }
 }
 
 /// Starts with the usual value of every form that they leave out.

@@ -7,7 +7,7 @@ const WINDOW_S: f64 = 1.0;
 
 /// Adds to a simulated trial the hum of amplitude `a` (V) at `f` (Hz) whose phase in each second is the one that
 /// the measured record shows; noise of standard deviation `sd` shrinks what it cannot tell.
-pub(super) fn add(a: f64, f: f64, sd: f64, dt_s: f64, measured: &[f64], simulated: &mut [f64]) {
+pub(crate) fn add(a: f64, f: f64, sd: f64, dt_s: f64, measured: &[f64], simulated: &mut [f64]) {
     let window = ((WINDOW_S / dt_s) as usize).max(8);
     for (block, values) in simulated.chunks_mut(window).enumerate() {
         let measured = &measured[block * window..block * window + values.len()];

@@ -1,20 +1,20 @@
 //! The rig as a [`Simulator`]: pneumatics, muscle (or both as actuation) and sensing, each on measured inputs.
 
-mod catalogue;
+pub(crate) mod catalogue;
 mod experiments;
-mod forms;
-mod hum;
+pub(crate) mod forms;
+pub(crate) mod hum;
 mod params;
 mod run;
 mod session;
-mod smooth;
+pub(crate) mod smooth;
 
 use std::path::Path;
 
 use stretch_data::{DataSet, RigFile};
 use stretch_sim::{Effect, Key, PARAMETERS, RigParams, Stage};
 
-use catalogue::{Extent, entries, tuned};
+use catalogue::{Extent, Place, check_names, entries, tuned};
 pub(crate) use experiments::Experiment;
 use params::read_params;
 use session::Inputs;
@@ -75,15 +75,7 @@ impl RigSimulator {
         rig: Option<&RigFile>,
         without: &[String],
     ) -> Result<Self, GapError> {
-        for name in without {
-            if stretch_sim::effect_named(name).is_none() {
-                let names = stretch_sim::CATALOGUE.iter().map(|e| e.name());
-                return Err(GapError::UnknownEffect {
-                    name: name.clone(),
-                    nearest: stretch_data::nearest(name, names).map(str::to_owned),
-                });
-            }
-        }
+        check_names(without)?;
         let (base, tolerances) = read_params(rig)?;
         let has_pressure = session.trials[0].pressure_kpa.is_some();
         let step = base[Key::Travel] / (base[Key::Bits].exp2() - 1.0);
@@ -162,8 +154,15 @@ impl RigSimulator {
                 })
                 .collect()
         };
-        let extent = Extent::of(&base, &inputs);
-        let (effects, rows) = entries(without, has_pressure, extent, &index);
+        let (effects, rows) = entries(
+            without,
+            &Place {
+                accepts: &|_| true,
+                touches: &index,
+                unit: &|_| 1.0,
+                extent: Extent::of(&base, &inputs),
+            },
+        );
         let trials = session
             .trials
             .iter()
@@ -217,7 +216,7 @@ impl RigSimulator {
 
     /// Measured inputs, smoothed as the stages see them: length (mm) of a trial.
     pub fn smooth_length(&self, trial: usize) -> &[f64] {
-        &self.inputs.length[trial].1
+        &self.inputs.length[trial].values
     }
 }
 
@@ -284,7 +283,7 @@ impl Simulator for RigSimulator {
             Stage::Sensing => &self.inputs.length,
             _ => return None,
         };
-        Some(smooth.iter().flat_map(|(_, values)| values).copied().collect())
+        Some(smooth.iter().flat_map(|s| &s.values).copied().collect())
     }
 
     fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {

@@ -7,15 +7,11 @@ use stretch_sim::{
     Reference, RigParams, Sensing, Stage, Start,
 };
 
-use super::{
-    RigSimulator,
-    forms::commands::{deadband, skew, wobble},
-    hum,
-    session::Begin,
-};
+use super::{RigSimulator, forms::commands::deadband, session::Begin};
 use crate::{
     dice::Dice,
     error::GapError,
+    outside::{Acting, Recorder},
     simulator::{Model, Run},
 };
 
@@ -38,10 +34,8 @@ struct Setting<'a> {
     given: Option<&'a [f64]>,
     kind: Stage,
     deadband: Option<&'a [f64]>,
-    skew: Option<&'a [f64]>,
 }
 
-/// Simulates one stage, on the measured input unless another one is given.
 /// Openings of the valves, as commanded or as an effect makes them.
 struct Commands<'a> {
     inlet: Cow<'a, [f64]>,
@@ -54,6 +48,7 @@ impl Commands<'_> {
     }
 }
 
+/// Simulates one stage, on the measured input unless another one is given.
 pub(super) fn simulate(
     rig: &RigSimulator,
     run: Run<'_>,
@@ -61,40 +56,28 @@ pub(super) fn simulate(
     out: &mut [f64],
 ) -> Result<(), GapError> {
     let (params, offset) = params_of(rig, run.model);
-    let mut effects = EffectSet::new();
-    let mut hum = None;
-    let (mut deadband, mut skew) = (None, None);
-    for (index, values) in &run.model.effects {
-        let row = rig.rows[*index];
-        match row.name() {
-            "mains_hum" => hum = Some((values[0], values[1])),
-            "valve_deadband" => deadband = Some(values.as_slice()).filter(|v| v[0] > 0.0),
-            "channel_skew" => skew = Some(values.as_slice()),
-            _ => effects.push(row, values)?,
-        }
-    }
+    let acting = Acting::of(&rig.rows, run.model)?;
     let kind = rig.stage_kinds[run.stage];
     let grid = match kind {
         // Driven by a measured input that is linear between samples.
         Stage::Muscle | Stage::Sensing => Grid::new(rig.dt_s, run.step * rig.dt_s, 0.0)?,
-        _ => effects.grid(&params, rig.dt_s, run.step * STEP_S)?,
+        _ => acting.inside.grid(&params, rig.dt_s, run.step * STEP_S)?,
     };
     let setting = Setting {
         rig,
         params,
-        effects,
+        effects: acting.inside.clone(),
         grid,
         offset,
         shake: run.shake,
         given,
         kind,
-        deadband,
-        skew,
+        deadband: acting.deadband,
     };
     match kind {
         Stage::Pneumatics => setting.pneumatics(run.trials, out)?,
         Stage::Muscle => setting.muscle(run.trials, out)?,
-        Stage::Sensing => setting.sensing(run.trials, hum, out)?,
+        Stage::Sensing => setting.sensing(run.trials, &acting, out)?,
         _ => setting.actuation(run.trials, out)?,
     }
     if out.iter().all(|x| x.is_finite()) {
@@ -133,7 +116,7 @@ impl Setting<'_> {
 
     fn is_vented(&self) -> bool {
         let inputs = &self.rig.inputs;
-        let first = inputs.length[0].1.first().copied().unwrap_or(0.0);
+        let first = inputs.length[0].values.first().copied().unwrap_or(0.0);
         first > 0.5 * (inputs.stroke.0 + inputs.stroke.1)
     }
 
@@ -174,15 +157,11 @@ impl Setting<'_> {
             return given[from..from + trials[trial].samples].to_vec();
         }
         let inputs = &self.rig.inputs;
-        let (smoother, values) =
-            if of_pressure { &inputs.pressure[trial] } else { &inputs.length[trial] };
-        let Some(seed) = self.shake else { return values.clone() };
+        let input = if of_pressure { &inputs.pressure[trial] } else { &inputs.length[trial] };
+        let Some(seed) = self.shake else { return input.values.clone() };
         let params = &self.params;
         let sd = if of_pressure { 1e-3 * params[Key::SigmaP] } else { params[Key::SigmaL] };
-        let mut dice = Dice::new(seed, trial as u64);
-        let noise: Vec<f64> = values.iter().map(|_| sd * dice.gauss()).collect();
-        let noise = smoother.apply(&noise);
-        values.iter().zip(noise).map(|(x, n)| x + n).collect()
+        input.shaken(sd, &mut Dice::new(seed, trial as u64))
     }
 
     /// Trials with their part of the output.
@@ -255,12 +234,7 @@ impl Setting<'_> {
         })
     }
 
-    fn sensing(
-        &self,
-        count: usize,
-        hum: Option<(f64, f64)>,
-        out: &mut [f64],
-    ) -> Result<(), GapError> {
+    fn sensing(&self, count: usize, acting: &Acting<'_>, out: &mut [f64]) -> Result<(), GapError> {
         let stage = Sensing::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
         let shown = self.reference()?;
@@ -312,16 +286,9 @@ impl Setting<'_> {
             let start_s = self.rig.trials[trial].start_s;
             let (length, pressure) = (self.refined(length), self.refined(pressure));
             stage.run(&mut memory, self.start(trial), start_s, &length, &pressure, own)?;
-            if let Some(values) = self.skew {
-                skew(values, self.rig.dt_s, own);
-                let measured = &self.rig.session.trials[trial].bridge_v;
-                let noise = self.params[Key::SigmaV];
-                wobble(values[2], noise, self.rig.dt_s, measured, own);
-            }
-            if let Some((a, f)) = hum {
-                let measured = &self.rig.session.trials[trial].bridge_v;
-                hum::add(a, f, self.params[Key::SigmaV], self.rig.dt_s, measured, own);
-            }
+            let noise = self.params[Key::SigmaV];
+            let recorder = Recorder { noise, unit: 1.0, dt_s: self.rig.dt_s };
+            acting.record(recorder, &self.rig.session.trials[trial].bridge_v, own);
             Ok(())
         })
     }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use stretch_data::{DataSet, ReadOptions, Split, Trial, TrialKind};
 
-use super::smooth::{Smoother, schedule};
+use super::smooth::{Smoothed, schedule};
 use crate::error::GapError;
 
 /// A measured trial of the rig.
@@ -246,8 +246,8 @@ pub(crate) enum Begin {
 /// Measured inputs smoothed, and how every trial begins.
 #[derive(Debug, Clone)]
 pub(crate) struct Inputs {
-    pub(crate) length: Vec<(Smoother, Vec<f64>)>,
-    pub(crate) pressure: Vec<(Smoother, Vec<f64>)>,
+    pub(crate) length: Vec<Smoothed>,
+    pub(crate) pressure: Vec<Smoothed>,
     pub(crate) begin: Vec<Begin>,
     /// Shortest and longest length of the session, mm.
     pub(crate) stroke: (f64, f64),
@@ -257,16 +257,14 @@ impl Inputs {
     pub(crate) fn of(session: &Session, length_sd: f64, pressure_sd: f64, supply_kpa: f64) -> Self {
         let smooth = |trial: &RigTrial, record: &[f64], sd: f64, sharp: bool| {
             let allowed = schedule(&trial.inlet, &trial.outlet, trial.dt_s, sharp);
-            let smoother = Smoother::choose(record, sd, &allowed);
-            let values = smoother.apply(record);
-            (smoother, values)
+            Smoothed::of(record, sd, &allowed)
         };
         let trials = &session.trials;
         let length: Vec<_> =
             trials.iter().map(|t| smooth(t, &t.length_mm, length_sd, false)).collect();
         let stroke = length
             .iter()
-            .flat_map(|(_, l)| l)
+            .flat_map(|l| &l.values)
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
         let pressure = trials
             .iter()

@@ -1,5 +1,7 @@
 //! Smoothing of a measured input, as wide as the commands allow.
 
+use crate::dice::Dice;
+
 /// Widest half-width, in samples.
 const WIDEST: usize = 15;
 /// Narrowest half-width.
@@ -102,6 +104,35 @@ impl Smoother {
         })
         .collect()
     }
+}
+
+/// A measured input as a stage is fed with it.
+#[derive(Debug, Clone)]
+pub(crate) struct Smoothed {
+    smoother: Smoother,
+    pub(crate) values: Vec<f64>,
+}
+
+impl Smoothed {
+    /// A record with noise of standard deviation `sd`, smoothed over half-widths that are allowed.
+    pub(crate) fn of(record: &[f64], sd: f64, allowed: &[u8]) -> Self {
+        let smoother = Smoother::choose(record, sd, allowed);
+        let values = smoother.apply(record);
+        Self { smoother, values }
+    }
+
+    /// With another draw of noise of standard deviation `sd`, as far as the smoothing lets it pass.
+    pub(crate) fn shaken(&self, sd: f64, dice: &mut Dice) -> Vec<f64> {
+        let noise: Vec<f64> = self.values.iter().map(|_| sd * dice.gauss()).collect();
+        let noise = self.smoother.apply(&noise);
+        self.values.iter().zip(noise).map(|(x, n)| x + n).collect()
+    }
+}
+
+/// Half-widths where nothing is commanded: as wide as the record itself lets a parabola be.
+#[allow(dead_code)]
+pub(crate) fn unscheduled(samples: usize) -> Vec<u8> {
+    vec![WIDEST as u8; samples]
 }
 
 #[cfg(test)]

@@ -34,12 +34,7 @@ pub(in crate::rig) static CHANNEL_SKEW: Form = Form {
 
 /// Openings as a valve with a dead band takes them. Less than the least conductance passes as pulses of it: a share of
 /// the samples, evenly spread.
-pub(in crate::rig) fn deadband(
-    values: &[f64],
-    side: usize,
-    least: f64,
-    openings: &[f64],
-) -> Vec<f64> {
+pub(crate) fn deadband(values: &[f64], side: usize, least: f64, openings: &[f64]) -> Vec<f64> {
     let share = if side == 0 { 2.0 - values[3] } else { values[3] };
     let (u_db, soft, gate) = ((values[0] * share).max(1e-9), values[1], values[2]);
     let mut owed = 0.0;
@@ -66,7 +61,7 @@ pub(in crate::rig) fn deadband(
 }
 
 /// Samples read `skew_s + rate t` earlier, by cubics through four samples; the first and last value are held.
-pub(in crate::rig) fn skew(values: &[f64], dt_s: f64, samples: &mut [f64]) {
+pub(crate) fn skew(values: &[f64], dt_s: f64, samples: &mut [f64]) {
     let source = samples.to_vec();
     let last = source.len() as f64 - 1.0;
     let at = |i: isize| source[i.clamp(0, source.len() as isize - 1) as usize];
@@ -88,13 +83,7 @@ const STEADY_S: f64 = 2.0;
 
 /// A skew that wanders with standard deviation `sd_s`: in each stretch the most likely one for a record with noise `noise`,
 /// as if the sample itself had not been used to find it.
-pub(in crate::rig) fn wobble(
-    sd_s: f64,
-    noise: f64,
-    dt_s: f64,
-    measured: &[f64],
-    samples: &mut [f64],
-) {
+pub(crate) fn wobble(sd_s: f64, noise: f64, dt_s: f64, measured: &[f64], samples: &mut [f64]) {
     if sd_s <= 0.0 {
         return;
     }

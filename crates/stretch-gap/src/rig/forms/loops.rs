@@ -1,6 +1,6 @@
 //! Loops that turn sooner or later: sums of plays whose half-widths are spread.
 
-use stretch_sim::{Action, EffectParameter, Operator, Span, Stage, Start, play};
+use stretch_sim::{Action, Backlash, EffectParameter, Operator, Span, Stage, Start, play};
 
 use super::{Form, linear};
 
@@ -99,5 +99,12 @@ impl Operator for Loop {
             *x -= share * ((*x - a) + (*x - b) + (*x - c));
         }
         cells.copy_from_slice(&[a, b, c]);
+    }
+
+    fn undo(&self, signal: &mut [f64]) {
+        // A whole play hides its input at its turns only; of a share of one nothing is hidden.
+        if self.share == 1.0 {
+            Backlash { w: self.radii[1] }.undo(signal);
+        }
     }
 }

@@ -4,7 +4,7 @@
 //! more than one time constant, loops turn sooner or later. Each effect here has its catalogue's name and parameters
 //! and one more, its form; at the form's usual value it is the catalogue's own.
 
-pub(super) mod commands;
+pub(crate) mod commands;
 mod knees;
 mod lags;
 mod laws;

@@ -81,7 +81,7 @@ fn a_simulated_effect_is_named_and_reported() {
     let (json, page) = (scratch.path("d.json"), scratch.path("d.html"));
     let run = |threads: &str, json: &Path| {
         let mut command = diagnose(&folder);
-        command.arg("--json").arg(json).args(["--threads", threads]);
+        command.arg("--json").arg(json).args(["--threads", threads, "--baselines"]);
         command
     };
     let text = stdout(run("2", &json).arg("--report").arg(&page));
@@ -106,12 +106,20 @@ fn a_simulated_effect_is_named_and_reported() {
     let regimes = d["where"]["slices"].as_array().unwrap();
     assert!(regimes.iter().any(|s| s["by"] == "regime" && s["slice"] == "turnaround"));
     assert!(d["parameters"].as_array().unwrap().iter().any(|p| p["name"] == "e0"));
+    // A calibration trained with the effect is nearly as good as one trained on the measurement.
+    let poly13 = |from: &str| d["transfer"]["poly13"][from].as_f64().unwrap();
+    assert!(poly13("sim") > 1.2 * poly13("real") && d["transfer"]["unit"] == "percent_full_scale");
+    assert!((poly13("sim_with_effect") / poly13("real") - 1.0).abs() < 0.15, "{}", d["transfer"]);
+    // The parameters are as shipped: then the simplest method does, too.
+    assert_eq!(d["baselines"]["largest_drop"], "gauge_hysteresis");
+    assert!(text.contains("What it costs") && text.contains("simpler methods"), "{text}");
     // Whatever the number of threads, the same bits.
     let again = scratch.path("again.json");
     stdout(&mut run("1", &again));
     assert!(d == read(&again));
     let page = fs::read_to_string(page).unwrap();
     assert!(page.contains("Fix in the simulator") && page.contains("Add gauge_hysteresis"));
+    assert!(page.contains("simpler methods") && page.contains("by where the calibration"));
     assert!(!page.contains("http") && !page.contains("NaN") && !page.contains("class=\"missing\""));
     // With its entry struck out nobody else takes the blame with the same right.
     let without = scratch.path("without.json");
@@ -215,13 +223,19 @@ fn a_blind_check_keeps_its_labels_sealed() {
     assert_eq!(hash.len(), 64);
     fails(stretch().args(["blind", "make", "--cases", "2", "--out"]).arg(&out), &["check"]);
     // One case is answered already: it is left as it is.
-    let answer = r#"{"schema":1,"verdict":"no_gap","named":[],"ambiguous":[],"candidates":[],"runtime_s":0.5}"#;
+    let answer = r#"{"schema":1,"verdict":"no_gap","named":[],"ambiguous":[],"candidates":[],"runtime_s":0.5,
+        "baselines":{"largest_drop":"leak","signature":null,"bic":null}}"#;
     fs::write(out.join("case-000/diagnosis.json"), answer).unwrap();
     fs::write(out.join("case-001/diagnosis.json"), answer).unwrap();
     assert!(stdout(stretch().args(["blind", "run"]).arg(&out)).contains("answered 2 of 2"));
     let text = stdout(stretch().args(["blind", "score", "--no-oracle"]).arg(&out));
     assert!(text.contains(&hash) && text.contains("false alarms on nulls"), "{text}");
+    assert!(text.contains("| this diagnosis |") && text.contains("| BIC alone |"), "{text}");
+    let json: Value =
+        serde_json::from_str(&fs::read_to_string(out.join("score.json")).unwrap()).unwrap();
+    assert!(json["score"]["baselines"]["signature"]["top1"]["cases"].is_u64(), "{json}");
     let page = fs::read_to_string(out.join("blind.html")).unwrap();
+    assert!(page.contains("largest drop of the error"));
     assert!(page.contains(&hash) && page.contains("Every miss") && !page.contains("NaN"));
     // A label that was altered afterwards is found out.
     let labels = out.join("sealed/truth.json");

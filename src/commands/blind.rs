@@ -238,14 +238,13 @@ struct Hint {
 /// The answers, with the labels' seal unbroken, and the refusals by case.
 pub(super) fn answers(folder: &Path) -> anyhow::Result<Answers> {
     let (seal, truth) = Seal::open(folder)?;
-    let mut answers = Answers { seal, truth, verdicts: Vec::new(), raw: Vec::new() };
+    let mut answers = Answers { seal, truth, verdicts: Vec::new() };
     for (name, path) in cases(folder)? {
         let file = path.join(ANSWER);
         if let Ok(text) = fs::read_to_string(&file) {
             let raw: serde_json::Value =
                 serde_json::from_str(&text).with_context(|| file.display().to_string())?;
             answers.verdicts.push(Verdict::from_diagnosis(&name, &raw)?);
-            answers.raw.push(raw);
         }
     }
     Ok(answers)
@@ -256,8 +255,6 @@ pub(super) struct Answers {
     pub(super) seal: Seal,
     pub(super) truth: stretch_blind::Truth,
     pub(super) verdicts: Vec<Verdict>,
-    /// The whole of every answer, in the order of the verdicts.
-    pub(super) raw: Vec<serde_json::Value>,
 }
 
 /// A progress bar that says how long it will still take.

@@ -1,7 +1,6 @@
 //! The seal opened: answers against labels, the goals, and simpler methods beside.
 
 use std::{
-    collections::BTreeMap,
     path::Path,
     sync::atomic::{AtomicUsize, Ordering::SeqCst},
 };
@@ -41,29 +40,18 @@ pub(super) fn score(folder: &Path, with_oracle: bool) -> anyhow::Result<()> {
     }
     let score = Score::of(&answers.truth, &answers.verdicts)?;
     let goals = goals(&score);
-    let baselines = baselines(&answers);
     let subject = BlindSubject {
         score: &score,
         truth: &answers.truth,
         verdicts: &answers.verdicts,
         goals: &goals,
-        baselines: &baselines,
         sha256: answers.seal.sha256(),
     };
     write_text(&folder.join("blind.html"), &blind_page(&subject))?;
-    let json = serde_json::json!({ "score": score, "goals": goals, "baselines": baselines });
+    let json = serde_json::json!({ "score": score, "goals": goals });
     write_text(&folder.join("score.json"), &(serde_json::to_string_pretty(&json)? + "\n"))?;
     say(format!("seal intact, SHA-256 {}\n", answers.seal.sha256()))?;
     say(table(&["goal", "asked", "reached", "count", "95 % interval", ""], rows(&goals)))?;
-    if !baselines.is_empty() {
-        say("\nSimpler methods on the same cases, top-1 at excess >= 0.1:")?;
-        let rows = baselines.iter().map(|(name, rate)| {
-            let mut row = vec![name.clone()];
-            row.extend(rate_cells(Some(rate)));
-            row
-        });
-        say(table(&["method", "share", "count", "95 % interval"], rows))?;
-    }
     say(format!("\n{score}"))?;
     say(format!("wrote {}", folder.join("blind.html").display()))
 }
@@ -139,28 +127,6 @@ fn goals(score: &Score) -> Vec<Goal> {
         least("compounds: one of them named", score.compounds.one_named, 0.97),
         below("time a case, median, s", score.runtime_s.map(|t| t.0), 5.0),
     ]
-}
-
-/// Top-1 of the methods that ran beside, over the single effects that count.
-fn baselines(answers: &Answers) -> BTreeMap<String, Rate> {
-    let names = [
-        ("largest_drop", "largest drop of the error, nominal parameters as shipped"),
-        ("signature", "one-step signature"),
-        ("bic", "BIC alone"),
-    ];
-    let mut rates: BTreeMap<String, Rate> = BTreeMap::new();
-    for (verdict, raw) in answers.verdicts.iter().zip(&answers.raw) {
-        let Some(label) = answers.truth.cases.get(&verdict.case).filter(|l| counts(l)) else {
-            continue;
-        };
-        for (field, name) in names {
-            let Some(said) = raw["baselines"].get(field) else { continue };
-            let rate = rates.entry(name.to_owned()).or_default();
-            rate.cases += 1;
-            rate.hits += usize::from(said.as_str() == label.effects.first().map(String::as_str));
-        }
-    }
-    rates
 }
 
 fn counts(label: &Label) -> bool {

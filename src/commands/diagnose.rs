@@ -68,8 +68,8 @@ pub(crate) struct Args {
     /// Do not look for the experiment that would tell rivals apart
     #[arg(long, hide = true, conflicts_with = "experiment")]
     no_next: bool,
-    /// Run the simpler methods beside, too
-    #[arg(long, hide = true)]
+    /// Say what simpler methods would have named, too
+    #[arg(long)]
     baselines: bool,
 }
 

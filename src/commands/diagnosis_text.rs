@@ -2,10 +2,11 @@
 
 use std::fmt::Write;
 
+use stretch_blind::method_in_words;
 use stretch_gap::{Candidate, Diagnosis, SliceGap, VerdictKind};
 
 use crate::{
-    plain::{effect_in_words, listed},
+    plain::{effect_in_words, listed, methods, transfer_in_words},
     table::{number, table},
 };
 
@@ -27,6 +28,7 @@ pub(crate) fn text(diagnosis: &Diagnosis) -> String {
     candidates(&mut out, diagnosis);
     parameters(&mut out, diagnosis);
     transfer(&mut out, diagnosis);
+    baselines(&mut out, diagnosis);
     next(&mut out, diagnosis);
     if !diagnosis.notes.is_empty() {
         put(&mut out, "\nNoticed:");
@@ -172,6 +174,18 @@ fn transfer(out: &mut String, diagnosis: &Diagnosis) {
     });
     let header = ["calibration", "trained on measured", "in the simulator", "with the effect"];
     put(out, &table(&header, rows));
+    if let Some(words) = transfer_in_words(transfer) {
+        put(out, &words);
+    }
+}
+
+fn baselines(out: &mut String, diagnosis: &Diagnosis) {
+    let Some(said) = &diagnosis.baselines else { return };
+    put(out, "\nWhat simpler methods would have said:");
+    let rows = methods(said).map(|(method, name)| {
+        vec![method_in_words(method).to_owned(), name.unwrap_or("nothing").to_owned()]
+    });
+    put(out, &table(&["method", "names"], rows));
 }
 
 fn next(out: &mut String, diagnosis: &Diagnosis) {

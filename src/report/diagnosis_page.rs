@@ -6,7 +6,7 @@ use super::{
     bar_figure::{Bar, Row, Scale, bar_figure, narrow_bar_figure},
     canvas::Ink,
     diagnosis_tables::{
-        candidate_table, parameter_table, slice_table, stage_table, transfer_table,
+        baseline_table, candidate_table, parameter_table, slice_table, stage_table, transfer_table,
     },
     figure::Figure,
     gap_figures::{
@@ -15,7 +15,7 @@ use super::{
     markup::number,
     page::Page,
 };
-use crate::plain::{effect_in_words, listed};
+use crate::plain::{effect_in_words, listed, transfer_in_words};
 
 /// Candidates that are drawn.
 const DRAWN: usize = 6;
@@ -318,9 +318,11 @@ fn gained(page: &mut Page, subject: &Subject<'_>) {
         page.table(&transfer_table(transfer));
         page.text(
             "What the gap costs a user: a calibration trained in the simulator and applied to measured trials, beside \
-             one trained on measured trials. A true effect can make a calibration that was trained on ramps worse while \
-             the gap closes: ramps may not show what the effect does.",
+             one trained on measured trials.",
         );
+        if let Some(words) = transfer_in_words(transfer) {
+            page.text(&words);
+        }
     }
     if let Some(table) = parameter_table(d) {
         page.table(&table);
@@ -346,6 +348,10 @@ fn next(page: &mut Page, d: &Diagnosis) {
 }
 
 fn numbers(page: &mut Page, d: &Diagnosis) {
+    if let Some(said) = &d.baselines {
+        page.section("What simpler methods would have said", "");
+        page.table(&baseline_table(said));
+    }
     page.section("All numbers", "");
     page.list(&d.notes);
     for stage in &d.location.stages {

@@ -1,12 +1,14 @@
 //! The tables of a diagnosis's report.
 
-use stretch_gap::{Candidate, Diagnosis, SliceGap, StageGap, Transfer};
+use stretch_blind::method_in_words;
+use stretch_gap::{Baselines, Candidate, Diagnosis, SliceGap, StageGap, Transfer};
 
 use super::{
     diagnosis_page::percent,
     markup::{NONE, fixed, number, with_unit},
     page::Table,
 };
+use crate::plain::methods;
 
 fn cells<const N: usize>(cells: [&str; N]) -> Vec<String> {
     cells.map(str::to_owned).to_vec()
@@ -123,6 +125,19 @@ pub(crate) fn transfer_table(transfer: &Transfer) -> Table {
             "Simulator with the effect",
         ]),
         rows: rows.to_vec(),
+        highlight: None,
+    }
+}
+
+/// What simpler methods named.
+pub(crate) fn baseline_table(said: &Baselines) -> Table {
+    let row = |(method, name): (&str, Option<&str>)| {
+        vec![method_in_words(method).to_owned(), name.unwrap_or("nothing").to_owned()]
+    };
+    Table {
+        caption: "Methods that leave one step out, on the same data".to_owned(),
+        head: cells(["Method", "Names"]),
+        rows: methods(said).map(row).to_vec(),
         highlight: None,
     }
 }

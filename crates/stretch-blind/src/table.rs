@@ -22,8 +22,38 @@ fn number(f: &mut fmt::Formatter<'_>, what: &str, value: Option<f64>) -> fmt::Re
     }
 }
 
+/// A simpler method in words.
+#[must_use]
+pub fn method_in_words(method: &str) -> &str {
+    match method {
+        "largest_drop" => "largest drop of the error, parameters as shipped",
+        "signature" => "likeness of a one-step signature",
+        "bic" => "BIC alone",
+        other => other,
+    }
+}
+
+/// This diagnosis and the simpler methods on the same cases.
+fn methods(f: &mut fmt::Formatter<'_>, score: &Score) -> fmt::Result {
+    let cell = |rate: &Rate| match rate.share() {
+        Some(share) => format!("{share:.3} ({} of {})", rate.hits, rate.cases),
+        None => "no case".into(),
+    };
+    writeln!(f, "\n| method | top-1 | above 10 | names something on nulls |")?;
+    writeln!(f, "| --- | --- | --- | --- |")?;
+    let mut row = |name: &str, top1: &Rate, above: &Rate, nulls: &Rate| {
+        writeln!(f, "| {name} | {} | {} | {} |", cell(top1), cell(above), cell(nulls))
+    };
+    let s = &score.singles;
+    row("this diagnosis", &s.top1, &s.top1_above_10, &score.false_names)?;
+    score.baselines.iter().try_for_each(|(name, b)| {
+        row(method_in_words(name), &b.top1, &b.top1_above_10, &b.false_names)
+    })
+}
+
 impl fmt::Display for Score {
-    /// A Markdown table of every figure with Wilson's intervals, then the misses.
+    /// A Markdown table of every figure with Wilson's intervals, one of the methods where simpler ones ran beside, then
+    /// the misses.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let s = &self.singles;
         writeln!(f, "| figure | value | count | 95 % interval |\n| --- | --- | --- | --- |")?;
@@ -69,6 +99,9 @@ impl fmt::Display for Score {
         }
         if let Some((low, high)) = self.false_alarms.exact() {
             writeln!(f, "\nFalse alarms, exact 95 % interval: {low:.4} .. {high:.4}.")?;
+        }
+        if !self.baselines.is_empty() {
+            methods(f, self)?;
         }
         if !self.unanswered.is_empty() {
             writeln!(f, "\nUnanswered: {}.", self.unanswered.join(", "))?;

@@ -1,5 +1,7 @@
 //! What a diagnosis said of a case, as far as it is scored.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -31,6 +33,9 @@ pub struct Verdict {
     pub closed_oracle: Option<f64>,
     /// Seconds the diagnosis took.
     pub runtime_s: f64,
+    /// What simpler methods that ran beside named, by method; `None` where one named nothing.
+    #[serde(default)]
+    pub baselines: BTreeMap<String, Option<String>>,
 }
 
 impl Verdict {
@@ -77,6 +82,9 @@ impl Verdict {
         let share = |s: &&Value| s["share"].as_f64().unwrap_or(0.0);
         let placed = shares.iter().max_by(|a, b| share(a).total_cmp(&share(b)));
         let placed = placed.and_then(|s| s["stage"].as_str()).map(str::to_owned);
+        let beside = diagnosis["baselines"].as_object().into_iter().flatten();
+        let baselines =
+            beside.map(|(method, said)| (method.clone(), said.as_str().map(str::to_owned)));
         let known = named.first().filter(|_| verdict == "effect").and_then(|n| Kind::named(n));
         Ok(Self {
             case: case.to_owned(),
@@ -90,6 +98,7 @@ impl Verdict {
             closed: number("closed").unwrap_or(0.0),
             closed_oracle: None,
             runtime_s: diagnosis["runtime_s"].as_f64().unwrap_or(0.0),
+            baselines: baselines.collect(),
         })
     }
 
@@ -110,11 +119,14 @@ mod tests {
             "ambiguous": ["leak", "supply_sag"],
             "candidates": [ { "effects": ["leak"], "probability": 0.8, "gap_before": 41.0,
                               "gap_after": 1.4, "closed": 0.96 } ],
-            "where": { "stages": [ { "stage": "sensing", "share": 0.9 } ] }, "runtime_s": 3.1 }"#;
+            "where": { "stages": [ { "stage": "sensing", "share": 0.9 } ] },
+            "baselines": { "bic": "supply_sag", "signature": null }, "runtime_s": 3.1 }"#;
         let mut value: Value = serde_json::from_str(text).expect("JSON");
         let verdict = Verdict::from_diagnosis("case-001", &value).expect("a verdict");
         assert_eq!(verdict.stage.as_deref(), Some("pneumatics"));
         assert_eq!((verdict.gap_before, verdict.closed), (41.0, 0.96));
+        assert_eq!(verdict.baselines["bic"].as_deref(), Some("supply_sag"));
+        assert_eq!(verdict.baselines["signature"], None);
         value["verdict"] = "unknown".into();
         let unknown = Verdict::from_diagnosis("case-001", &value).expect("a verdict");
         assert_eq!(unknown.stage.as_deref(), Some("sensing"));

@@ -5,6 +5,7 @@ use std::{collections::BTreeMap, time::Instant};
 use rayon::prelude::*;
 
 use crate::{
+    baselines::baselines,
     bootstrap::closed_interval,
     diagnosis::{Candidate, Diagnosis, EffectValue, ParameterShift, StageGap, VerdictKind, Where},
     error::GapError,
@@ -18,6 +19,7 @@ use crate::{
     select::{Search, Solution},
     simulator::{Model, Run, Simulator},
     thresholds::Thresholds,
+    transfer::transfer,
     verdict,
 };
 
@@ -139,9 +141,20 @@ fn run(
         next_experiment: None,
         baselines: None,
         notes: decision.notes,
-        runtime_s: begun.elapsed().as_secs_f64(),
+        runtime_s: 0.0,
     };
     sanity::check(simulator, &evidence, &mut diagnosis);
+    if diagnosis.verdict == VerdictKind::Effect {
+        progress("what the gap costs a calibration");
+        diagnosis.transfer = transfer(simulator, &evidence, options.seed)?;
+    }
+    diagnosis.runtime_s = begun.elapsed().as_secs_f64();
+    if options.baselines {
+        progress("simpler methods");
+        let null_excess = options.thresholds.null_excess;
+        let said = baselines(&bench, &floors, &nominal, &search.tried, null_excess)?;
+        diagnosis.baselines = Some(said);
+    }
     Ok((diagnosis, evidence))
 }
 

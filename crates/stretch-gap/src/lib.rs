@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod baselines;
 mod bootstrap;
 mod diagnose;
 mod diagnosis;
@@ -21,6 +22,7 @@ mod screen;
 mod select;
 mod simulator;
 mod thresholds;
+mod transfer;
 mod verdict;
 
 pub use diagnose::{Options, diagnose};
@@ -35,7 +37,7 @@ pub use gauge::GaugeSimulator;
 pub use next_experiment::{Proposal, next_experiment};
 pub use rig::{RigSimulator, RigTrial, Session};
 pub use simulator::{
-    EffectParameterSpec, EffectSpec, Model, Motion, ParameterSpec, Run, Simulator, StageSpec,
-    TrialSpec, Wander,
+    Description, EffectParameterSpec, EffectSpec, Model, Motion, ParameterSpec, Run, Simulator,
+    StageSpec, TrialSpec, Wander,
 };
 pub use thresholds::Thresholds;

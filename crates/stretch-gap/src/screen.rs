@@ -138,7 +138,7 @@ impl Bench<'_> {
     }
 
     /// Squares of a change, and its product with the residual, both without what the nominal parameters can do.
-    fn projected(&self, stage: usize, ground: &Ground, change: &Column) -> (f64, f64) {
+    pub(crate) fn projected(&self, stage: usize, ground: &Ground, change: &Column) -> (f64, f64) {
         let metric = &self.metrics[stage];
         let residual = &ground.residuals[stage];
         let product = |a: &Column, b: &Column| metric.product(&self.frame, a, b, Role::Fit);

@@ -1,5 +1,7 @@
 //! The one trait through which any simulator is diagnosed.
 
+use std::ops::RangeInclusive;
+
 use serde::Serialize;
 
 use crate::error::GapError;
@@ -18,6 +20,19 @@ pub struct StageSpec {
     /// Known noise of the output, one standard deviation, rounding included; none when it has to be taken from
     /// the record's second differences.
     pub noise: Option<f64>,
+}
+
+impl StageSpec {
+    /// A stage whose noise is taken from the record.
+    pub fn new(name: &str, channel: &str, unit: &str, parameters: &[usize]) -> Self {
+        Self {
+            name: name.into(),
+            channel: channel.into(),
+            unit: unit.into(),
+            parameters: parameters.into(),
+            noise: None,
+        }
+    }
 }
 
 /// A slow wander of a parameter around its value that nobody models: it belongs to the floor.
@@ -56,6 +71,27 @@ pub struct ParameterSpec {
     pub is_evidence: bool,
 }
 
+impl ParameterSpec {
+    /// An exact parameter; [`ParameterSpec::within`] gives it a tolerance.
+    pub fn new(name: &str, unit: &str, nominal: f64) -> Self {
+        Self {
+            name: name.into(),
+            unit: unit.into(),
+            nominal,
+            sd: 0.0,
+            least: f64::NEG_INFINITY,
+            wander: None,
+            per_trial_sd: None,
+            is_evidence: true,
+        }
+    }
+
+    /// The same with a tolerance: one standard deviation, in the parameter's unit.
+    pub fn within(self, sd: f64) -> Self {
+        Self { sd, ..self }
+    }
+}
+
 /// A parameter of an effect.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EffectParameterSpec {
@@ -78,6 +114,38 @@ pub struct EffectParameterSpec {
     pub is_fitted: bool,
 }
 
+impl EffectParameterSpec {
+    /// A strength that does nothing at 0.
+    pub fn strength(name: &str, unit: &str, range: RangeInclusive<f64>) -> Self {
+        Self {
+            name: name.into(),
+            unit: unit.into(),
+            min: *range.start(),
+            max: *range.end(),
+            off: Some(0.0),
+            is_log: false,
+            form: None,
+            is_fitted: true,
+        }
+    }
+
+    /// A shape (a time constant, a spread) above 0, searched in equal ratios.
+    pub fn shape(name: &str, unit: &str, range: RangeInclusive<f64>) -> Self {
+        Self { off: None, is_log: true, ..Self::strength(name, unit, range) }
+    }
+
+    /// Values to screen at: a strength at a fiftieth and a fifth of its range, of both signs where it has both; a shape at
+    /// a sixth, a half and five sixths of its range, in equal ratios.
+    fn points(&self) -> Vec<f64> {
+        if self.off.is_none() {
+            let ratio = self.max / self.min;
+            return [1.0, 3.0, 5.0].map(|k| self.min * libm::pow(ratio, k / 6.0)).into();
+        }
+        let ends = [self.min, self.max].into_iter().filter(|end| *end != 0.0);
+        ends.flat_map(|end| [0.02 * end, 0.2 * end]).collect()
+    }
+}
+
 /// An effect that the nominal simulator leaves out.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EffectSpec {
@@ -97,6 +165,26 @@ pub struct EffectSpec {
     pub twins: Vec<String>,
 }
 
+impl EffectSpec {
+    /// An effect in one stage, screened at a small and a large value of each strength and at three of each shape.
+    pub fn new(name: &str, stage: (usize, &str), parameters: Vec<EffectParameterSpec>) -> Self {
+        let starts = parameters.iter().fold(vec![Vec::new()], |starts, parameter| {
+            let points = parameter.points();
+            let with = |start: &Vec<f64>, x: &f64| [start.as_slice(), &[*x]].concat();
+            starts.iter().flat_map(|s| points.iter().map(move |x| with(s, x))).collect()
+        });
+        Self {
+            name: name.into(),
+            stage: stage.1.into(),
+            touches: vec![stage.0],
+            parameters,
+            starts,
+            is_between_trials: false,
+            twins: Vec::new(),
+        }
+    }
+}
+
 /// What is known of a trial.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TrialSpec {
@@ -108,6 +196,13 @@ pub struct TrialSpec {
     pub start_s: f64,
     /// Whether it is a test trial: read once, at the end.
     pub is_test: bool,
+}
+
+impl TrialSpec {
+    /// A trial that began at a session time, s, to be fitted or tested on.
+    pub fn new(name: &str, samples: usize, start_s: f64, is_test: bool) -> Self {
+        Self { name: name.into(), samples, start_s, is_test }
+    }
 }
 
 /// Nominal parameters and effects with their values.
@@ -161,21 +256,61 @@ pub struct Motion<'a> {
     pub rising: &'a str,
 }
 
+/// What a simulator is made of and what was recorded beside it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Description {
+    /// Its stages.
+    pub stages: Vec<StageSpec>,
+    /// Its nominal parameters.
+    pub parameters: Vec<ParameterSpec>,
+    /// The catalogue of effects that it may lack.
+    pub effects: Vec<EffectSpec>,
+    /// The trials, in the order of the session.
+    pub trials: Vec<TrialSpec>,
+    /// Sample time, s, the same in every trial.
+    pub dt_s: f64,
+}
+
+static NOTHING: Description = Description {
+    stages: Vec::new(),
+    parameters: Vec::new(),
+    effects: Vec::new(),
+    trials: Vec::new(),
+    dt_s: 1.0,
+};
+
 /// A simulator bound to the measurements that it is held against.
 ///
 /// Every stage is run alone on its measured input (teacher forcing), so that what one stage gets wrong does not
 /// spread to the next. Memories are carried from trial to trial in the order of the session.
+///
+/// Three methods do: [`Simulator::description`] (or its five parts one by one), [`Simulator::measured`] and
+/// [`Simulator::simulate`].
 pub trait Simulator: Sync {
+    /// Stages, parameters, effects and trials in one; nothing unless said otherwise, and then nothing can be fitted.
+    fn description(&self) -> &Description {
+        &NOTHING
+    }
     /// Its stages.
-    fn stages(&self) -> &[StageSpec];
+    fn stages(&self) -> &[StageSpec] {
+        &self.description().stages
+    }
     /// Its nominal parameters.
-    fn parameters(&self) -> &[ParameterSpec];
+    fn parameters(&self) -> &[ParameterSpec] {
+        &self.description().parameters
+    }
     /// The catalogue of effects that it may lack.
-    fn effects(&self) -> &[EffectSpec];
+    fn effects(&self) -> &[EffectSpec] {
+        &self.description().effects
+    }
     /// The trials, in the order of the session.
-    fn trials(&self) -> &[TrialSpec];
+    fn trials(&self) -> &[TrialSpec] {
+        &self.description().trials
+    }
     /// Sample time, s, the same in every trial.
-    fn dt_s(&self) -> f64;
+    fn dt_s(&self) -> f64 {
+        self.description().dt_s
+    }
     /// Measured output of a stage, all trials end to end.
     fn measured(&self, stage: usize) -> &[f64];
     /// Time, in samples, at which the wander of a parameter last had a way into the outputs, for every sample of all
@@ -195,6 +330,10 @@ pub trait Simulator: Sync {
     fn motion(&self) -> Motion<'_> {
         let unit = self.stages().first().map_or("", |s| s.unit.as_str());
         Motion { values: self.measured(0), unit, falling: "falling", rising: "rising" }
+    }
+    /// The stage whose output a user turns back into the motion with a calibration; none where there is no such sensor.
+    fn sensor(&self) -> Option<usize> {
+        None
     }
     /// Measured input of a stage as it is fed with it, all trials end to end; none where it is not the output of the
     /// stage before.

@@ -157,6 +157,38 @@ fn a_slow_amplifier_is_named_and_measured_whatever_the_number_of_threads() {
 }
 
 #[test]
+fn a_calibration_trained_with_the_effect_is_as_good_as_one_trained_on_the_rig() {
+    let effects = effect("gauge_relaxation", &[("c", 0.3), ("tau", 0.1)]);
+    for pressure in [true, false] {
+        let trials = session(&own_rig(), &effects, pressure, 7);
+        let diagnosis = run(trials, &[], &Options { baselines: true, ..shallow() });
+        assert_eq!(diagnosis.named, ["gauge_relaxation"], "{}", diagnosis.sentence);
+        let transfer = diagnosis.transfer.expect("a gauge has a calibration");
+        let poly13 = transfer.poly13;
+        // Without the effect the rate says nothing in the simulator; with it the two trainings differ by their noise.
+        assert!(poly13.sim > 1.5 * poly13.real, "{poly13:?}");
+        assert!((poly13.sim_with_effect / poly13.real - 1.0).abs() < 0.1, "{poly13:?}");
+        assert!(transfer.linear.real > poly13.real, "{transfer:?}");
+        let said = diagnosis.baselines.expect("asked for");
+        assert_eq!(said.bic.as_deref(), Some("gauge_relaxation"));
+        assert_eq!(said.signature.as_deref(), Some("gauge_relaxation"));
+    }
+}
+
+#[test]
+fn simpler_methods_blame_an_effect_for_parameters_that_are_off() {
+    let trials = session(&own_rig(), &EffectSet::new(), true, 8);
+    let diagnosis = run(trials, &[], &Options { baselines: true, ..shallow() });
+    assert!(diagnosis.named.is_empty() && diagnosis.transfer.is_none());
+    // The parameters are off by their tolerances and nothing else is wrong.
+    let said = diagnosis.baselines.expect("asked for");
+    assert!(said.largest_drop.is_some(), "{said:?}");
+    assert!(
+        run(session(&own_rig(), &EffectSet::new(), true, 8), &[], &shallow()).baselines.is_none()
+    );
+}
+
+#[test]
 fn what_the_catalogue_lacks_is_unknown() {
     let effects = effect("thermal_drift", &[("d", 3e-4)]);
     let trials = session(&own_rig(), &effects, true, 4);

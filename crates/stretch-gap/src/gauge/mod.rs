@@ -168,6 +168,10 @@ impl Simulator for GaugeSimulator {
         Motion { values: &self.reference, unit: &self.unit, falling: "falling", rising: "rising" }
     }
 
+    fn sensor(&self) -> Option<usize> {
+        Some(0)
+    }
+
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
         let Model { parameters, effects } = run.model;
         let spec = GaugeSpec { offset: parameters[0], gain: parameters[1], ..self.spec };

@@ -277,6 +277,10 @@ impl Simulator for RigSimulator {
         }
     }
 
+    fn sensor(&self) -> Option<usize> {
+        self.stage_kinds.iter().position(|kind| *kind == Stage::Sensing)
+    }
+
     fn input(&self, stage: usize) -> Option<Vec<f64>> {
         let smooth = match self.stage_kinds[stage] {
             Stage::Muscle => &self.inputs.pressure,

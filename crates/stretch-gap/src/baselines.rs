@@ -1,0 +1,240 @@
+//! What simpler methods say of the same data: what is gained by the longer way shows beside them.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use crate::{
+    diagnosis::Baselines,
+    error::GapError,
+    fit::{Bench, Misfit},
+    floor::Floor,
+    frame::{Metric, Role},
+    screen::Ground,
+    select::Solution,
+    simulator::{EffectSpec, Model, Motion, ParameterSpec, Run, Simulator, StageSpec, TrialSpec},
+};
+
+/// Single effects that an information criterion is asked about: the best of the screen.
+const KEPT: usize = 8;
+/// A correlation that noise alone hardly ever reaches, in its standard deviations, samples counted as independent.
+const FAR: f64 = 4.0;
+/// Starts that are fitted.
+const STARTS: usize = 2;
+
+/// Three methods that leave out one step each.
+pub(crate) fn baselines(
+    bench: &Bench<'_>,
+    floors: &[Floor],
+    nominal: &Solution,
+    tried: &BTreeMap<Vec<usize>, Solution>,
+    null_excess: f64,
+) -> Result<Baselines, GapError> {
+    let name = |effect: Option<usize>| effect.map(|e| bench.simulator.effects()[e].name.clone());
+    let ground = Ground::around(bench, nominal.model.clone())?;
+    Ok(Baselines {
+        largest_drop: name(largest_drop(bench, floors, null_excess)?),
+        signature: name(signature(bench, &ground)?),
+        bic: name(criterion(bench, &ground, nominal, tried)?),
+    })
+}
+
+/// The effect whose own parameters, fitted alone, take most from the mean square error in floors, all parameters of the
+/// simulator left as shipped; none where that is less than what counts as a gap.
+fn largest_drop(
+    bench: &Bench<'_>,
+    floors: &[Floor],
+    null_excess: f64,
+) -> Result<Option<usize>, GapError> {
+    let frozen = Frozen::of(bench.simulator);
+    let shipped = Model::nominal(&frozen);
+    let all = frozen.trials().len();
+    let metrics: Result<Vec<Metric>, GapError> = floors
+        .iter()
+        .enumerate()
+        .map(|(s, floor)| Metric::of(&frozen, &bench.frame, s, floor, &shipped, all))
+        .collect();
+    let rigid = Bench {
+        simulator: &frozen,
+        frame: bench.frame.clone(),
+        metrics: metrics?,
+        trials: bench.trials,
+        memory: bench.memory.clone(),
+        stop: bench.stop,
+    };
+    let ground = Ground::around(&rigid, shipped)?;
+    let before: Vec<Misfit> =
+        ground.residuals.iter().enumerate().map(|(s, r)| rigid.misfit(s, r)).collect();
+    let drops = each_effect(&rigid, |effect| {
+        let mut most = 0.0_f64;
+        for misfits in rigid.fits(&ground, effect)? {
+            let drop = |m: &Misfit| rigid.mean_square(&before[m.stage]) - rigid.mean_square(m);
+            most = most.max(misfits.iter().map(drop).sum());
+        }
+        Ok(most)
+    })?;
+    Ok(best(drops).filter(|(_, drop)| *drop > null_excess).map(|(effect, _)| effect))
+}
+
+/// The effect whose change, taken once, correlates best with what the re-tuned simulator leaves, all that its
+/// parameters can do taken out of both; none where noise could do as well.
+fn signature(bench: &Bench<'_>, ground: &Ground) -> Result<Option<usize>, GapError> {
+    let likeness = each_effect(bench, |effect| {
+        let spec = &bench.simulator.effects()[effect];
+        let mut most = 0.0_f64;
+        'starts: for values in &spec.starts {
+            let mut model = ground.model.clone();
+            model.effects.push((effect, values.clone()));
+            let (mut own, mut mixed) = (0.0, 0.0);
+            for &stage in &spec.touches {
+                let there = match bench.residual_values(stage, &model) {
+                    Ok(there) => there,
+                    Err(GapError::Stopped) => return Err(GapError::Stopped),
+                    Err(_) => continue 'starts,
+                };
+                let here = &ground.residuals[stage].values;
+                let change = here.iter().zip(&there).map(|(a, b)| a - b).collect();
+                let change = bench.metrics[stage].column(&bench.frame, change);
+                let (squares, product) = bench.projected(stage, ground, &change);
+                own += squares;
+                mixed += product;
+            }
+            if own > 1e-9 {
+                most = most.max(mixed.abs() / own.sqrt());
+            }
+        }
+        Ok(most)
+    })?;
+    let stages = ground.residuals.iter().enumerate();
+    let (squares, count) = stages.fold((0.0, 0.0), |(squares, count), (s, residual)| {
+        let own = bench.metrics[s].product(&bench.frame, residual, residual, Role::Fit);
+        (squares + own, count + bench.frame.count(Role::Fit) as f64)
+    });
+    // Correlation r = product / sqrt(own squares); its standard deviation without a likeness is 1 / sqrt(count).
+    let least = FAR * (squares / f64::max(count, 1.0)).sqrt();
+    Ok(best(likeness).filter(|(_, product)| *product > least).map(|(effect, _)| effect))
+}
+
+/// The single effect, fitted together with all parameters, with the lowest BIC = n ln(mean square) + k ln(n), every
+/// sample counted as independent; none where no effect has the lowest (Schwarz 1978, doi 10.1214/aos/1176344136).
+fn criterion(
+    bench: &Bench<'_>,
+    ground: &Ground,
+    nominal: &Solution,
+    tried: &BTreeMap<Vec<usize>, Solution>,
+) -> Result<Option<usize>, GapError> {
+    let gains = each_effect(bench, |effect| Ok(bench.screen(ground, effect)?.gain()))?;
+    let mut order: Vec<usize> = (0..gains.len()).collect();
+    order.sort_by(|a, b| gains[*b].total_cmp(&gains[*a]));
+    let samples = bench.frame.count(Role::Fit) as f64;
+    let falls = each_effect(bench, |effect| {
+        if !order[..KEPT.min(order.len())].contains(&effect) {
+            return Ok(0.0);
+        }
+        let spec = &bench.simulator.effects()[effect];
+        let free = spec.parameters.iter().filter(|p| p.is_fitted && p.form.is_none()).count();
+        let all = samples * nominal.misfits.len() as f64;
+        let fall = |misfits: &[Misfit]| {
+            let gain = |m: &Misfit| samples * (nominal.misfits[m.stage].fit / m.fit).ln();
+            misfits.iter().map(gain).sum::<f64>() - free as f64 * all.ln()
+        };
+        let known = tried.get(&vec![effect]).map(|solution| vec![solution.misfits.clone()]);
+        let fitted = match known {
+            Some(known) => known,
+            None => bench.fits(ground, effect)?,
+        };
+        Ok(fitted.iter().map(|m| fall(m)).fold(0.0, f64::max))
+    })?;
+    Ok(best(falls).map(|(effect, _)| effect))
+}
+
+/// A number for every effect.
+fn each_effect(
+    bench: &Bench<'_>,
+    of: impl Fn(usize) -> Result<f64, GapError> + Sync + Send,
+) -> Result<Vec<f64>, GapError> {
+    (0..bench.simulator.effects().len()).into_par_iter().map(of).collect()
+}
+
+/// The effect with the greatest number above 0.
+fn best(numbers: Vec<f64>) -> Option<(usize, f64)> {
+    let above = numbers.into_iter().enumerate().filter(|(_, x)| *x > 0.0);
+    above.max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+impl Bench<'_> {
+    /// What is left in the stages that an effect touches when it is fitted on top of a ground, from its best starts.
+    fn fits(&self, ground: &Ground, effect: usize) -> Result<Vec<Vec<Misfit>>, GapError> {
+        let mut all = Vec::new();
+        for (values, _) in self.screen(ground, effect)?.starts.into_iter().take(STARTS) {
+            let mut model = ground.model.clone();
+            model.effects.push((effect, values));
+            let touched = &self.simulator.effects()[effect].touches;
+            match self.fit(touched, model, &ground.known) {
+                Ok(fitted) => all.push(fitted.misfits),
+                Err(GapError::Stopped) => return Err(GapError::Stopped),
+                // A fit that cannot begin says nothing for the effect.
+                Err(_) => {}
+            }
+        }
+        Ok(all)
+    }
+
+    /// Mean square over fitted and held-out samples, in floors.
+    fn mean_square(&self, misfit: &Misfit) -> f64 {
+        let (fit, held) = (self.frame.blocks(Role::Fit), self.frame.blocks(Role::Held));
+        (fit * misfit.fit + held * misfit.held) / (fit + held)
+    }
+}
+
+/// A simulator whose parameters are exact: nothing is re-tuned, nothing wanders.
+struct Frozen<'a> {
+    simulator: &'a dyn Simulator,
+    parameters: Vec<ParameterSpec>,
+}
+
+impl<'a> Frozen<'a> {
+    fn of(simulator: &'a dyn Simulator) -> Self {
+        let exact = |p: &ParameterSpec| ParameterSpec {
+            sd: 0.0,
+            wander: None,
+            per_trial_sd: None,
+            ..p.clone()
+        };
+        Self { simulator, parameters: simulator.parameters().iter().map(exact).collect() }
+    }
+}
+
+impl Simulator for Frozen<'_> {
+    fn stages(&self) -> &[StageSpec] {
+        self.simulator.stages()
+    }
+
+    fn parameters(&self) -> &[ParameterSpec] {
+        &self.parameters
+    }
+
+    fn effects(&self) -> &[EffectSpec] {
+        self.simulator.effects()
+    }
+
+    fn trials(&self) -> &[TrialSpec] {
+        self.simulator.trials()
+    }
+
+    fn dt_s(&self) -> f64 {
+        self.simulator.dt_s()
+    }
+
+    fn measured(&self, stage: usize) -> &[f64] {
+        self.simulator.measured(stage)
+    }
+
+    fn motion(&self) -> Motion<'_> {
+        self.simulator.motion()
+    }
+
+    fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
+        self.simulator.simulate(run, out)
+    }
+}

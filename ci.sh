@@ -37,6 +37,12 @@ for example in examples/*.rs; do
     echo "$name"
 done
 
+cargo run --quiet --release --locked -p stretch-gap --example motor >/dev/null
+echo motor
+
+step "every effect of the catalogue, simulated and diagnosed"
+cargo test --quiet --release --locked --test every_effect -- --ignored
+
 step "benches, each run once"
 cargo test --benches --locked --quiet >/dev/null
 

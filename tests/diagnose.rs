@@ -68,6 +68,19 @@ fn both(folder: &Path, column: &str, change: impl Fn(usize, f64) -> f64) {
     ["fit.csv", "test.csv"].iter().for_each(|file| alter(&folder.join(file), column, &change));
 }
 
+/// Renames columns of both trials, one after the other.
+fn rename(folder: &Path, names: [(&str, &str); 3]) {
+    for file in ["fit.csv", "test.csv"] {
+        let text = fs::read_to_string(folder.join(file)).unwrap();
+        let (head, rest) = text.split_once('\n').unwrap();
+        let mut head: Vec<&str> = head.trim_end().split(',').collect();
+        for (from, to) in names {
+            head.iter_mut().filter(|c| **c == from).for_each(|c| *c = to);
+        }
+        fs::write(folder.join(file), head.join(",") + "\n" + rest).unwrap();
+    }
+}
+
 fn diagnose(folder: &Path) -> Command {
     let mut command = stretch();
     command.arg("diagnose").arg(folder);
@@ -159,14 +172,26 @@ fn data_that_are_not_what_they_say_are_refused_by_name() {
     let dead = spoiled("dead", &|f| both(f, "bridge_v", |_, _| 1.24));
     fails(&mut diagnose(&dead), &["bridge_v", "dead"]);
     let swapped = spoiled("swapped", &|f| {
-        for file in ["fit.csv", "test.csv"] {
-            let text = fs::read_to_string(f.join(file)).unwrap();
-            let (head, rest) = text.split_once('\n').unwrap();
-            let head = head.replace("length_mm", "x").replace("bridge_v", "length_mm");
-            fs::write(f.join(file), head.replace(",x,", ",bridge_v,") + "\n" + rest).unwrap();
-        }
+        rename(f, [("length_mm", "x"), ("bridge_v", "length_mm"), ("x", "bridge_v")]);
     });
     fails(&mut diagnose(&swapped), &["swapped"]);
+    // One trial's wire came off while the others are sound.
+    let loose = spoiled("loose", &|f| alter(&f.join("test.csv"), "bridge_v", |_, _| 1.24));
+    fails(&mut diagnose(&loose), &["test.csv", "bridge_v", "dead"]);
+    let valves =
+        spoiled("valves", &|f| rename(f, [("inlet", "x"), ("outlet", "inlet"), ("x", "outlet")]));
+    fails(&mut diagnose(&valves), &["inlet, outlet", "swapped"]);
+    for (name, cell) in [("nan", "NaN"), ("blank", "")] {
+        let folder = spoiled(name, &|f| {
+            let text = fs::read_to_string(f.join("fit.csv")).unwrap();
+            let row = text.lines().nth(100).unwrap();
+            let (head, _) = row.rsplit_once(',').unwrap();
+            fs::write(f.join("fit.csv"), text.replacen(row, &format!("{head},{cell}"), 1)).unwrap();
+        });
+        fails(&mut diagnose(&folder), &["fit.csv", "row 101", "bridge_v"]);
+    }
+    let zeros = spoiled("zeros", &|f| both(f, "pressure_kpa", |_, _| 0.0));
+    fails(&mut diagnose(&zeros), &["pressure_kpa", "dead", "take the column out"]);
     let tests = spoiled("tests", &|f| describe(f, &[("fit.csv", "test"), ("test.csv", "test")]));
     fails(&mut diagnose(&tests), &["no trial may be fitted", "split"]);
     let shut = spoiled("shut", &|f| {
@@ -213,6 +238,71 @@ fn odd_data_get_an_honest_verdict() {
 }
 
 #[test]
+fn a_wrong_rig_is_no_effect_and_a_strong_effect_is_no_wrong_rig() {
+    let scratch = Scratch::new();
+    let folder = bench(&scratch, "bench", &[]);
+    let stock = stdout(stretch().arg("rig"));
+    // Each a rig that the data do not come from, none of which the tolerances reach.
+    let others = [
+        ("amplifier", "G = { value = 10.0", "G = { value = 8.0"),
+        ("bridge", "beta = { value = 1.0", "beta = { value = 0.9"),
+        ("chamber", "V0 = { value = 2.5e-5", "V0 = { value = 2.5e-6"),
+        ("muscle", "L0 = { value = 180.0", "L0 = { value = 165.0"),
+    ];
+    for (name, from, to) in others {
+        assert!(stock.contains(from), "{stock}");
+        let other = scratch.write(&format!("{name}.toml"), stock.replace(from, to));
+        let text = stdout(diagnose(&folder).arg("--rig").arg(&other));
+        let first = text.lines().next().unwrap();
+        assert!(first.contains("right rig") && !first.contains("lacks"), "{name}: {text}");
+    }
+    for effect in ["pressure_crosstalk:c=0.04", "crossbeam_inertia:m=0.07"] {
+        let folder = bench(&scratch, effect.split(':').next().unwrap(), &[effect]);
+        let text = stdout(&mut diagnose(&folder));
+        assert!(text.lines().next().unwrap().contains("lacks"), "{effect}: {text}");
+    }
+}
+
+#[test]
+fn a_saturated_channel_is_noticed_with_its_share() {
+    let scratch = Scratch::new();
+    let folder = bench(&scratch, "bench", &[]);
+    both(&folder, "bridge_v", |_, v| v.min(1.9));
+    let text = stdout(&mut diagnose(&folder));
+    assert!(text.contains("bridge_v stands at 1.9 V, its greatest value, in"), "{text}");
+    // What a clipped record looks like is a saturated amplifier or a slack sleeve, and nothing else.
+    let first = text.lines().next().unwrap();
+    let named = ["amplifier_saturation", "sleeve_slack"].iter().any(|e| first.contains(e));
+    assert!(named || !first.contains("lacks"), "{text}");
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_leaves_nothing_half_written() {
+    let scratch = Scratch::new();
+    let folder = bench(&scratch, "bench", &[]);
+    let out = scratch.path("out");
+    fs::create_dir(&out).unwrap();
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_stretch"))
+        .args(["diagnose", "--threads", "1"])
+        .arg(&folder)
+        .arg("--json")
+        .arg(out.join("d.json"))
+        .arg("--report")
+        .arg(out.join("d.html"))
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(150));
+    let pid = rustix::process::Pid::from_child(&child);
+    rustix::process::kill_process(pid, rustix::process::Signal::INT).unwrap();
+    let code = child.wait().unwrap().code();
+    // A machine on which it was done by then has written both.
+    let files = fs::read_dir(&out).unwrap().count();
+    assert!((code, files) == (Some(130), 0) || (code, files) == (Some(0), 2), "{code:?} {files}");
+}
+
+#[test]
 fn a_blind_check_keeps_its_labels_sealed() {
     let scratch = Scratch::new();
     let out = scratch.path("check");
@@ -242,6 +332,38 @@ fn a_blind_check_keeps_its_labels_sealed() {
     let text = fs::read_to_string(&labels).unwrap();
     fs::write(&labels, text.replacen("\"excess\": ", "\"excess\": 1", 1)).unwrap();
     fails(stretch().args(["blind", "score"]).arg(&out), &["seal"]);
+}
+
+#[test]
+fn a_blind_case_is_diagnosed_away_from_its_label() {
+    let scratch = Scratch::new();
+    let check = scratch.path("check");
+    fs::create_dir(&check).unwrap();
+    let case = check.join("case-000");
+    fs::rename(bench(&scratch, "bench", &[]), &case).unwrap();
+    let truth = stretch_blind::Truth { schema: 1, seed: None, cases: Default::default() };
+    stretch_blind::Seal::close(&check, &truth).unwrap();
+    let rooms = scratch.path("rooms");
+    fs::create_dir(&rooms).unwrap();
+    let mut command = stretch();
+    command.args(["blind", "run", "--no-baselines"]).arg(&check).env("TMPDIR", &rooms);
+    assert!(stdout(&mut command).contains("answered 1 of 1 cases, 0 refused"));
+    let d: Value =
+        serde_json::from_str(&fs::read_to_string(case.join("diagnosis.json")).unwrap()).unwrap();
+    assert_eq!(
+        (d["data_set"].as_str(), d["named"].as_array().unwrap().len()),
+        (Some("case-000"), 0)
+    );
+    assert_eq!(fs::read_dir(&rooms).unwrap().count(), 0);
+    // A case that cannot be diagnosed says why, and is no answer.
+    fs::remove_file(case.join("diagnosis.json")).unwrap();
+    alter(&case.join("fit.csv"), "inlet", |_, _| 3.0);
+    let mut command = stretch();
+    command.args(["blind", "run"]).arg(&check).env("TMPDIR", &rooms);
+    assert!(stdout(&mut command).contains("answered 0 of 1 cases, 1 refused"));
+    let why = fs::read_to_string(case.join("refusal.txt")).unwrap();
+    assert!(why.contains("inlet") && why.contains("from 0 to 1"), "{why}");
+    assert_eq!(fs::read_dir(&rooms).unwrap().count(), 0);
 }
 
 #[test]

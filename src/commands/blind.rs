@@ -3,7 +3,6 @@
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::Command,
     sync::{
         Mutex,
         atomic::{AtomicUsize, Ordering::SeqCst},
@@ -15,14 +14,20 @@ use anyhow::{Context, bail, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use stretch_blind::{Plan, Seal, Verdict, make};
 
-use super::{blind_score, shared::say};
+use super::{
+    blind_room::Room,
+    blind_score,
+    shared::{say, write_text},
+    stop,
+};
 
 /// Check the diagnosis on cases whose causes are sealed until it has answered
 ///
 ///   stretch blind --cases 360 --seed 7 --out check
 ///
-/// makes the cases, prints the hash of the sealed labels, diagnoses every case in a process of its
-/// own that is not given the labels, and only then opens the seal and scores. The cases come from
+/// makes the cases, prints the hash of the sealed labels, diagnoses a copy of every case in a
+/// temporary folder and a process of its own that is not told where the labels are, and only then
+/// opens the seal and scores. The cases come from
 /// a second simulator that shares no code with the first and gives every effect another form. The
 /// three steps can be run one by one; `run` goes on where it was stopped.
 #[derive(clap::Args)]
@@ -102,6 +107,8 @@ struct ScoreArgs {
 const ANSWER: &str = "diagnosis.json";
 /// Why there is none.
 const REFUSAL: &str = "refusal.txt";
+/// What the diagnosis is told beside the data.
+const HINT: &str = "hint.toml";
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     match args.step {
@@ -156,6 +163,7 @@ fn answer(folder: &Path, options: &RunOptions) -> anyhow::Result<()> {
         "{}: the labels are not sealed (no seal.sha256): make the cases first",
         folder.display()
     );
+    stop::tidy();
     let program = std::env::current_exe().context("the program's own path")?;
     let all = cases(folder)?;
     let waiting: Vec<&(String, PathBuf)> =
@@ -187,6 +195,7 @@ fn answer(folder: &Path, options: &RunOptions) -> anyhow::Result<()> {
         }
     });
     bar.finish_and_clear();
+    ensure!(!stretch_data::interrupted(), "interrupted");
     if let Some(error) = failed.into_inner().unwrap_or(None) {
         return Err(error);
     }
@@ -195,10 +204,11 @@ fn answer(folder: &Path, options: &RunOptions) -> anyhow::Result<()> {
     say(format!("answered {answered} of {} cases, {refused} refused", all.len()))
 }
 
-/// Diagnoses one case in a process that is told its folder and nothing else.
+/// Diagnoses one case in a process that is given a copy of its data and nothing else.
 fn one(program: &Path, case: &Path, alone: bool, options: &RunOptions) -> anyhow::Result<()> {
-    let mut command = Command::new(program);
-    command.current_dir(case).args(["diagnose", ".", "--json", ANSWER, "--no-next"]);
+    let room = Room::of(case, &[ANSWER, REFUSAL, HINT])?;
+    let mut command = room.command(program);
+    command.args(["diagnose", ".", "--json", ANSWER, "--no-next"]);
     for name in struck(case)? {
         command.args(["--without", &name]);
     }
@@ -209,18 +219,21 @@ fn one(program: &Path, case: &Path, alone: bool, options: &RunOptions) -> anyhow
         command.arg("--baselines");
     }
     let output = command.output().context("the program cannot run itself")?;
-    if output.status.success() {
-        return Ok(());
-    }
-    // A refusal is an answer, too: it is scored as none.
-    let why = String::from_utf8_lossy(&output.stderr).into_owned();
-    ensure!(output.status.code() == Some(1), "the diagnosis broke off: {why}");
-    super::shared::write_text(&case.join(REFUSAL), &why)
+    let (file, text) = if output.status.success() {
+        (ANSWER, room.read(ANSWER)?)
+    } else {
+        let why = String::from_utf8_lossy(&output.stderr).into_owned();
+        ensure!(output.status.code() == Some(1), "the diagnosis broke off: {why}");
+        // A refusal is an answer, too: it is scored as none.
+        (REFUSAL, why)
+    };
+    room.close()?;
+    write_text(&case.join(file), &text)
 }
 
 /// Effects that a case's `hint.toml` takes out of the catalogue.
 fn struck(case: &Path) -> anyhow::Result<Vec<String>> {
-    let path = case.join("hint.toml");
+    let path = case.join(HINT);
     if !path.is_file() {
         return Ok(Vec::new());
     }

@@ -9,10 +9,10 @@ use stretch_gap::{
     Diagnosis, Evidence, GapError, GaugeSimulator, Options, RigSimulator, Simulator, diagnose,
     next_experiment,
 };
-use stretch_sim::Key;
 
 use super::{
     diagnosis_text::text,
+    rails::rails,
     shared::{say, short_name, write_text},
 };
 use crate::report::{Subject, diagnosis_page};
@@ -121,7 +121,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
                 .push("no experiment is recommended: there are no rivals to tell apart".into()),
         }
     }
-    diagnosis.notes.extend(rails(&simulator));
+    diagnosis.notes.extend(rails(simulator.nominal(), simulator.session()));
     diagnosis.notes.splice(0..0, simulator.session().notes.iter().cloned());
     bar.finish_and_clear();
     conclude(&args, &diagnosis, &evidence, &simulator)
@@ -138,26 +138,6 @@ fn gauge_trials(path: &Path) -> anyhow::Result<Vec<(Trial, f64, bool)>> {
         Ok((entry.load(path, &options)?, entry.start_s, entry.split == Split::Test))
     };
     set.trials.iter().map(load).collect()
-}
-
-/// Where the converter ran into its ends.
-fn rails(simulator: &RigSimulator) -> Vec<String> {
-    let full_v = simulator.nominal()[Key::VFs];
-    let trials = &simulator.session().trials;
-    let all: usize = trials.iter().map(|t| t.bridge_v.len()).sum();
-    let count = |at: &dyn Fn(f64) -> bool| {
-        trials.iter().flat_map(|t| &t.bridge_v).filter(|v| at(**v)).count()
-    };
-    let ends = [(0.0, count(&|v| v <= 1e-6)), (full_v, count(&|v| v >= full_v - 1e-6))];
-    let loud = ends.into_iter().filter(|(_, n)| 1000 * n > all);
-    loud.map(|(end, n)| {
-        let percent = 100.0 * n as f64 / all as f64;
-        format!(
-            "bridge_v stands at {end} V, an end of the converter, in {percent:.1} % of the samples: what the gauge did \
-             there is lost; change gain or reference"
-        )
-    })
-    .collect()
 }
 
 fn work(

@@ -2,6 +2,7 @@
 
 pub(crate) mod apply;
 pub(crate) mod blind;
+mod blind_room;
 mod blind_score;
 pub(crate) mod calibrate;
 pub(crate) mod convert;
@@ -12,6 +13,7 @@ pub(crate) mod effects;
 pub(crate) mod evaluate;
 pub(crate) mod listen;
 pub(crate) mod paper;
+mod rails;
 pub(crate) mod rig;
 pub(crate) mod shared;
 pub(crate) mod simulate;

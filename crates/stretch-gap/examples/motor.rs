@@ -1,7 +1,5 @@
 //! A simulator of another kind, a motor with a gear, beside a bench that has friction and backlash in forms of its own.
 use stretch_gap::*;
-
-const DT_S: f64 = 0.01;
 const SAMPLES: usize = 3000; // of each of two trials; the second is tested on
 
 struct Motor {
@@ -27,7 +25,7 @@ impl Simulator for Motor {
             load = shaft - (shaft - load).clamp(-play, play);
             *out = if run.stage == 0 { speed } else { load };
             let push = p[0] * self.volts[i] + ripple * (6.0 * self.angle[i]).sin();
-            for _ in 0..(DT_S / h).round() as usize {
+            for _ in 0..(self.dt_s() / h).round() as usize {
                 let drag = if speed == 0.0 { push } else { f64::INFINITY.copysign(speed) };
                 let end = (push - drag.clamp(-friction, friction)) / p[1];
                 let next = end + (speed - end) * (-p[1] * h).exp();
@@ -54,28 +52,25 @@ fn main() -> Result<(), GapError> {
         parameters: vec![gain, damping, ratio],
         effects: vec![friction, backlash, ripple],
         trials: vec![trial("monday", 0.0, false), trial("tuesday", 60.0, true)],
-        dt_s: DT_S,
+        dt_s: 0.01,
     };
     // The bench: its friction is smooth and sticks more than it slides, its gear's flanks are soft.
     let mut motor = Motor { description, volts: vec![], angle: vec![], measured: [vec![], vec![]] };
     let (mut speed, mut angle, mut load, mut seed) = (0.0_f64, 0.0_f64, 0.0, 1_u64);
-    let mut noise = || {
-        seed = seed.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
-        (seed >> 11) as f64 / 2_f64.powi(52) - 1.0
-    };
     for i in 0..2 * SAMPLES {
-        let t = i as f64 * DT_S;
+        let t = 0.01 * i as f64;
+        seed = seed.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
+        let noise = (seed >> 11) as f64 / 2_f64.powi(52) - 1.0;
         motor.volts.push((3.0 * (1.3 * t).sin() + 2.0 * (4.1 * t).sin()).round());
         motor.angle.push(angle);
-        motor.measured[0].push(speed + 0.3 * noise());
-        motor.measured[1].push(load + 0.003 * noise());
+        motor.measured[0].push(speed + 0.3 * noise);
+        motor.measured[1].push(load + 0.003 * noise);
         for _ in 0..100 {
             let rub = 25.0 * (speed / 0.3).tanh() * (1.0 + 0.2 * (-speed.abs() / 3.0).exp());
             speed += 1e-4 * (106.0 * motor.volts[i] - 5.2 * speed - rub);
             angle += 1e-4 * speed;
         }
-        let apart: f64 = 0.1 * angle - load;
-        load += (apart.abs() - 0.05).max(0.0) * apart.signum() + 0.02 * apart;
+        load += 0.1 * angle - load - 0.98 * (0.1 * angle - load).clamp(-0.05, 0.05);
     }
     let (diagnosis, _) = diagnose(&motor, &Options::default(), &|_| (), &|| false)?;
     println!("{}", diagnosis.sentence);

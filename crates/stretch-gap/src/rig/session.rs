@@ -184,6 +184,51 @@ impl Session {
                 return bad("pressure_kpa", spread(pressure), "this looks like bar: times 100");
             }
         }
+        self.check_directions()
+    }
+}
+
+/// Share of one stroke at the widest opening that must go against the valves before their columns look exchanged.
+const AGAINST: f64 = 0.5;
+
+impl Session {
+    /// An open inlet shortens the muscle, an open outlet lets it out; and no channel stands still while the muscle moves.
+    fn check_directions(&self) -> Result<(), GapError> {
+        let span = |values: &[f64]| {
+            let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+            values.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low
+        };
+        let (mut against, mut widest, mut stroke) = (0.0, 0.0_f64, 0.0_f64);
+        for trial in &self.trials {
+            let valves =
+                trial.inlet.iter().zip(&trial.outlet).map(|(inlet, outlet)| inlet - outlet);
+            for (open, pair) in valves.zip(trial.length_mm.windows(2)) {
+                against += open * (pair[1] - pair[0]);
+                widest = widest.max(open.abs());
+            }
+            let moved = span(&trial.length_mm);
+            stroke = stroke.max(moved);
+            let others = [
+                ("bridge_v", Some(trial.bridge_v.as_slice())),
+                ("pressure_kpa", trial.pressure_kpa.as_deref()),
+            ];
+            for (column, values) in others {
+                if let Some(values) = values.filter(|values| moved > 1.0 && span(values) <= 0.0) {
+                    return Err(GapError::Implausible {
+                        column: format!("{}, {column}", trial.name),
+                        found: format!("{} in every sample, while the muscle moves", values[0]),
+                        hint: "the channel is dead: check the sensor and its cable".into(),
+                    });
+                }
+            }
+        }
+        if against > AGAINST * widest * stroke {
+            return Err(GapError::Implausible {
+                column: "inlet, outlet".into(),
+                found: "the muscle lengthens while the inlet is open".into(),
+                hint: "they look swapped: exchange the two names".into(),
+            });
+        }
         Ok(())
     }
 }

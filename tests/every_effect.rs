@@ -1,0 +1,53 @@
+//! Every effect of the catalogue, simulated and diagnosed as a newcomer would type it.
+
+mod support;
+
+use std::fs;
+
+use serde_json::Value;
+use stretch_sim::{CATALOGUE, Effect};
+use support::{Scratch, stretch};
+
+/// The effect at the middle of its range's first half, one threshold of several, its shapes at their typical values.
+fn spelled(effect: &dyn Effect) -> String {
+    // At 50 Hz and a phase of 0 every sample at 100 Hz meets a zero of the wave.
+    let fixed = match effect.name() {
+        "mains_hum" => return "mains_hum:a=0.02,f=60,phase=1".into(),
+        "amplifier_saturation" => return "amplifier_saturation:v_hi=2.1".into(),
+        name => name,
+    };
+    let values = effect.parameters().iter().map(|p| format!("{}={}", p.name, p.typical));
+    format!("{fixed}:{}", values.collect::<Vec<_>>().join(","))
+}
+
+#[test]
+#[ignore = "minutes in a debug build: ci.sh runs it in release"]
+fn is_named_when_it_is_simulated() {
+    let scratch = Scratch::new();
+    let mut wrong = Vec::new();
+    for effect in CATALOGUE {
+        let (folder, json) = (scratch.path(effect.name()), scratch.path("d.json"));
+        let given = spelled(*effect);
+        stretch().args(["simulate", "--effect", &given, "--out"]).arg(&folder).assert().success();
+        let mut command = stretch();
+        command.arg("diagnose").arg(&folder).args(["--no-next", "--json"]).arg(&json);
+        command.assert().success();
+        let d: Value = serde_json::from_str(&fs::read_to_string(&json).unwrap()).unwrap();
+        let first = &d["candidates"][0];
+        println!(
+            "{given}: {} {}, 95 % set {}, probability {:.3}, gap {:.3} -> {:.3}, {:.1} s",
+            d["verdict"],
+            d["named"],
+            d["ambiguous"],
+            first["probability"].as_f64().unwrap(),
+            first["gap_before"].as_f64().unwrap(),
+            first["gap_after"].as_f64().unwrap(),
+            d["runtime_s"].as_f64().unwrap()
+        );
+        if d["named"][0] != effect.name() {
+            wrong.push(given);
+        }
+        fs::remove_dir_all(&folder).unwrap();
+    }
+    assert!(wrong.is_empty(), "not named first: {wrong:?}");
+}

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
-use stretch_data::{DataSet, ReadOptions, RigFile, Split, Trial};
+use stretch_data::RigFile;
 use stretch_gap::{
-    Diagnosis, Evidence, GapError, GaugeSimulator, Options, RigSimulator, Simulator, diagnose,
-    next_experiment,
+    Diagnosis, Evidence, GapError, GaugeSimulator, Laboratory, Options, RigSimulator, Simulator,
+    diagnose, next_experiment,
 };
 
 use super::{
@@ -22,8 +22,8 @@ use crate::report::{Subject, diagnosis_page};
 ///   stretch diagnose bench --report gap.html
 ///
 /// DATASET is a folder with dataset.toml and its trials (inlet, outlet, length_mm, bridge_v and,
-/// where it was recorded, pressure_kpa), or, for a gauge alone, one trial or such a folder with a
-/// reference and a signal:
+/// where it was recorded, pressure_kpa), or, for a gauge alone, one trial or such a folder without
+/// openings; its columns are length_mm and bridge_v unless they are named:
 ///
 ///   stretch diagnose knit.csv --reference angle_deg --signal s2
 ///
@@ -84,33 +84,40 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     };
     let bar = spinner();
     let rig = args.rig.as_deref().map(RigFile::read).transpose()?;
-    let gauge = args.reference.as_deref().zip(args.signal.as_deref());
-    if !args.data_set.is_dir() && gauge.is_none() {
+    let shown = || args.data_set.display().to_string();
+    let columns = args.reference.as_deref().zip(args.signal.as_deref());
+    let gauge = GaugeSimulator::read(&args.data_set, columns, rig.as_ref(), &args.without);
+    if let Some(simulator) = gauge.with_context(shown)? {
+        return answer(&args, &options, &bar, &simulator, simulator.notes(), &[]);
+    }
+    if !args.data_set.is_dir() {
         bail!(
             "{}: a single trial is diagnosed as a gauge alone: say which columns with \
              --reference and --signal, or give the folder of a data set",
             args.data_set.display()
         );
     }
-    if let Some((reference, signal)) = gauge {
-        let trials = gauge_trials(&args.data_set)?;
-        let shown = || args.data_set.display().to_string();
-        let simulator =
-            GaugeSimulator::new(&trials, reference, signal, &args.without).with_context(shown)?;
-        let (mut diagnosis, evidence) = work(&simulator, &options, &bar).with_context(shown)?;
-        diagnosis.notes.splice(0..0, simulator.notes().iter().cloned());
-        bar.finish_and_clear();
-        return conclude(&args, &diagnosis, &evidence, &simulator);
-    }
-    bar.set_message("reading");
-    let shown = || args.data_set.display().to_string();
     let simulator =
         RigSimulator::read(&args.data_set, rig.as_ref(), &args.without).with_context(shown)?;
-    let (mut diagnosis, evidence) = work(&simulator, &options, &bar).with_context(shown)?;
+    let rails = rails(simulator.nominal(), simulator.session());
+    answer(&args, &options, &bar, &simulator, &simulator.session().notes, &rails)
+}
+
+/// Diagnoses, looks for the next experiment, and writes; `before` and `after` are notes around the diagnosis' own.
+fn answer<L: Laboratory>(
+    args: &Args,
+    options: &Options,
+    bar: &ProgressBar,
+    simulator: &L,
+    before: &[String],
+    after: &[String],
+) -> anyhow::Result<()> {
+    let shown = || args.data_set.display().to_string();
+    let (mut diagnosis, evidence) = work(simulator, options, bar).with_context(shown)?;
     let mut proposal = None;
     if diagnosis.ambiguous.len() > 1 && !args.no_next {
         bar.set_message("the next experiment");
-        proposal = next_experiment(&simulator, &diagnosis, &evidence).with_context(shown)?;
+        proposal = next_experiment(simulator, &diagnosis, &evidence).with_context(shown)?;
     }
     diagnosis.next_experiment = proposal.as_ref().map(|p| p.next.clone());
     if let Some(path) = &args.experiment {
@@ -121,23 +128,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
                 .push("no experiment is recommended: there are no rivals to tell apart".into()),
         }
     }
-    diagnosis.notes.extend(rails(simulator.nominal(), simulator.session()));
-    diagnosis.notes.splice(0..0, simulator.session().notes.iter().cloned());
+    diagnosis.notes.extend_from_slice(after);
+    diagnosis.notes.splice(0..0, before.iter().cloned());
     bar.finish_and_clear();
-    conclude(&args, &diagnosis, &evidence, &simulator)
-}
-
-/// Trials of a gauge alone: a file, or a folder with its splits and times.
-fn gauge_trials(path: &Path) -> anyhow::Result<Vec<(Trial, f64, bool)>> {
-    let options = ReadOptions::new();
-    if !path.is_dir() {
-        return Ok(vec![(Trial::read(path, &options)?, 0.0, false)]);
-    }
-    let set = DataSet::read(path)?;
-    let load = |entry: &stretch_data::TrialEntry| {
-        Ok((entry.load(path, &options)?, entry.start_s, entry.split == Split::Test))
-    };
-    set.trials.iter().map(load).collect()
+    conclude(args, &diagnosis, &evidence, simulator)
 }
 
 fn work(

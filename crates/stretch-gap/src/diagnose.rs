@@ -17,6 +17,7 @@ use crate::{
     probability::{covering_set, weigh},
     sanity,
     select::{Search, Solution},
+    shares::{shares, tell},
     simulator::{Model, Run, Simulator},
     thresholds::Thresholds,
     transfer::transfer,
@@ -110,6 +111,7 @@ fn run(
         let less = search.without(&best, effect)?;
         slots.insert(effect, best.score - less.score);
     }
+    let closed = shares(&mut search, &best)?;
     progress("test trials");
     let mut ordered = best.clone();
     ordered.effects.sort_by(|a, b| slots[b].total_cmp(&slots[a]));
@@ -135,6 +137,7 @@ fn run(
             _ => Vec::new(),
         },
         candidates,
+        shares: closed,
         location,
         parameters: shifts(&bench, &nominal, &ordered),
         transfer: None,
@@ -143,6 +146,7 @@ fn run(
         notes: decision.notes,
         runtime_s: 0.0,
     };
+    tell(&mut diagnosis);
     sanity::check(simulator, &evidence, &mut diagnosis);
     if diagnosis.verdict == VerdictKind::Effect {
         progress("what the gap costs a calibration");

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::shares::EffectShare;
+
 /// The four answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -205,6 +207,9 @@ pub struct Diagnosis {
     pub ambiguous: Vec<String>,
     /// Sets of effects, the most probable first.
     pub candidates: Vec<Candidate>,
+    /// What each effect of the best set closes, the strongest first; named or not.
+    #[serde(default)]
+    pub shares: Vec<EffectShare>,
     /// Where the gap sits.
     #[serde(rename = "where")]
     pub location: Where,

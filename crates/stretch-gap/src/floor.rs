@@ -84,23 +84,59 @@ fn floor(
     Ok(Floor { sd, rms: (own + mean).sqrt().max(1e-12), source })
 }
 
-/// Noise variance of a record: a sixth of the median square of its second differences, corrected for the median of a
-/// normal variable's square; robust against what the motion adds.
+/// Noise variance of the output of a stage, from the samples that may be looked at.
 fn of_record(simulator: &dyn Simulator, frame: &Frame, stage: usize) -> f64 {
     let measured = simulator.measured(stage);
-    let mut squares: Vec<f64> = frame
-        .segments
-        .iter()
-        .filter(|s| s.role != Role::Test)
-        .flat_map(|s| measured[s.from..s.to].windows(3))
-        .map(|w| (w[0] - 2.0 * w[1] + w[2]).powi(2))
-        .collect();
+    let segments = frame.segments.iter().filter(|s| s.role != Role::Test);
+    noise_variance(segments.map(|s| &measured[s.from..s.to]), simulator.dt_s())
+}
+
+/// Noise variance of a record: a sixth of the median square of its second differences, corrected for the median of a
+/// normal variable's square; robust against what the motion adds. What the mains add is not noise: in every second
+/// the waves of 50 and 60 Hz are taken out before.
+pub(crate) fn noise_variance<'a>(stretches: impl Iterator<Item = &'a [f64]>, dt_s: f64) -> f64 {
+    let window = ((1.0 / dt_s).round() as usize).max(30);
+    let mut squares: Vec<f64> = Vec::new();
+    for stretch in stretches {
+        let mut bends: Vec<f64> = stretch.windows(3).map(|w| w[0] - 2.0 * w[1] + w[2]).collect();
+        for part in bends.chunks_mut(window) {
+            let taken = take_waves_out(part, dt_s) / part.len() as f64;
+            squares.extend(part.iter().map(|x| x * x / (1.0 - taken.min(0.5))));
+        }
+    }
     if squares.is_empty() {
         return 1e-12;
     }
-    squares.sort_by(f64::total_cmp);
-    let median = squares[squares.len() / 2] / 6.0 / 0.4549;
     let mean = squares.iter().sum::<f64>() / squares.len() as f64 / 6.0;
+    let middle = squares.len() / 2;
+    let median = *squares.select_nth_unstable_by(middle, f64::total_cmp).1 / 6.0 / 0.4549;
     // A coarse converter makes the median 0.
     if median > 1e-3 * mean { median } else { mean.max(1e-18) }
+}
+
+/// Takes the waves of the mains out of a second of second differences, one after the other; how many samples' worth of
+/// white noise went with them.
+fn take_waves_out(values: &mut [f64], dt_s: f64) -> f64 {
+    let mut taken = 0.0;
+    for hertz in [50.0, 60.0] {
+        let turns: f64 = hertz * dt_s;
+        let shown = (turns - turns.round()).abs();
+        // What shows as a slow wave cannot be told from motion.
+        if shown < 0.15 || values.len() < 20 {
+            continue;
+        }
+        for phase in [0.0, 0.25] {
+            let wave = |i: usize| (std::f64::consts::TAU * (shown * i as f64 + phase)).cos();
+            let power: f64 = (0..values.len()).map(|i| wave(i).powi(2)).sum();
+            // At half the sample rate there is one wave only.
+            if power < 1e-6 * values.len() as f64 {
+                continue;
+            }
+            let size = values.iter().enumerate().map(|(i, x)| x * wave(i)).sum::<f64>() / power;
+            values.iter_mut().enumerate().for_each(|(i, x)| *x -= size * wave(i));
+            // Of white noise, second differences hold (2 - 2 cos)^2 of each wave, and 6 on the average.
+            taken += (2.0 - 2.0 * (std::f64::consts::TAU * shown).cos()).powi(2) / 6.0;
+        }
+    }
+    taken
 }

@@ -20,6 +20,7 @@ mod rig;
 mod sanity;
 mod screen;
 mod select;
+mod shares;
 mod simulator;
 mod thresholds;
 mod transfer;
@@ -33,9 +34,10 @@ pub use diagnosis::{
 pub use error::GapError;
 pub use evidence::{Evidence, StageEvidence};
 pub use frame::{BLOCK_S, Frame, Metric, Role, Segment};
-pub use gauge::GaugeSimulator;
-pub use next_experiment::{Proposal, next_experiment};
+pub use gauge::{GaugeSimulator, GaugeTrial};
+pub use next_experiment::{Laboratory, Plan, Proposal, next_experiment};
 pub use rig::{RigSimulator, RigTrial, Session};
+pub use shares::EffectShare;
 pub use simulator::{
     Description, EffectParameterSpec, EffectSpec, Model, Motion, ParameterSpec, Run, Simulator,
     StageSpec, TrialSpec, Wander,

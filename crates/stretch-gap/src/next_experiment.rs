@@ -9,16 +9,56 @@ use crate::{
     evidence::Evidence,
     frame::BLOCK_S,
     linear::boxed,
-    rig::{Experiment, RigSimulator},
     simulator::{Model, Simulator},
 };
 
-/// Samples that count as one observation: residuals are correlated over half a second.
-const BLOCK: f64 = 50.0;
 /// Evidence that tells two rivals apart with 95 % probability, nats.
 const ENOUGH: f64 = 3.0;
 /// Share of an effect parameter's range that a sensitivity is taken over.
 const SMALL: f64 = 0.02;
+
+/// An experiment in words, and the trial that does it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// Name in the menu.
+    pub name: String,
+    /// How to do it, in a sentence.
+    pub how: String,
+    /// Time to prepare it, minutes.
+    pub prepare_min: f64,
+    /// What is commanded or set from outside, evenly sampled.
+    pub trial: Trial,
+}
+
+impl Plan {
+    /// Minutes with the preparation.
+    pub fn minutes(&self) -> f64 {
+        self.prepare_min + self.runs_min()
+    }
+
+    fn runs_min(&self) -> f64 {
+        self.trial.len() as f64 * self.dt_s() / 60.0
+    }
+
+    fn dt_s(&self) -> f64 {
+        self.trial.rate_hz().map_or(0.01, |rate| 1.0 / rate)
+    }
+}
+
+/// A simulator that can tell what it would show in experiments that nobody has done yet.
+pub trait Laboratory: Simulator {
+    /// What it takes to simulate an experiment.
+    type Setting: Sync;
+    /// Experiments to choose from, all with the same sample time.
+    fn menu(&self) -> Vec<(Plan, Self::Setting)>;
+    /// An experiment that stands for what has been measured.
+    fn done(&self) -> Self::Setting;
+    /// What a model predicts of an experiment: every recorded channel in units of its noise.
+    ///
+    /// # Errors
+    /// When the simulation is not possible with these values.
+    fn predict(&self, model: &Model, setting: &Self::Setting) -> Result<Vec<Vec<f64>>, GapError>;
+}
 
 /// What to measure next, and the trial that does it.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,49 +81,49 @@ pub struct Proposal {
 ///
 /// # Errors
 /// What the simulator says.
-pub fn next_experiment(
-    simulator: &RigSimulator,
+pub fn next_experiment<L: Laboratory>(
+    simulator: &L,
     diagnosis: &Diagnosis,
     evidence: &Evidence,
 ) -> Result<Option<Proposal>, GapError> {
     let Some((one, two, separates)) = rivals(simulator, diagnosis, evidence) else {
         return Ok(None);
     };
-    let (stroke, supply_kpa) = simulator.extent();
-    let menu = Experiment::menu(stroke, supply_kpa);
-    let done = Experiment::done();
+    let menu = simulator.menu();
+    let done = simulator.done();
+    let block = menu.first().map_or(1.0, |(plan, _)| BLOCK_S / plan.dt_s());
     let known = [Tangent::of(simulator, one, &done)?, Tangent::of(simulator, two, &done)?];
     let rated: Result<Vec<(usize, f64)>, GapError> = menu
         .par_iter()
         .enumerate()
-        .map(|(i, experiment)| {
+        .map(|(i, (_, experiment))| {
             let here = [
                 Tangent::of(simulator, one, experiment)?,
                 Tangent::of(simulator, two, experiment)?,
             ];
-            let there = left(&known[0], &known[1], &here[0], &here[1]);
-            let back = left(&known[1], &known[0], &here[1], &here[0]);
+            let there = left(block, &known[0], &known[1], &here[0], &here[1]);
+            let back = left(block, &known[1], &known[0], &here[1], &here[0]);
             Ok((i, there.min(back)))
         })
         .collect();
     let worth = |&(i, d): &(usize, f64)| {
-        let minutes = menu[i].minutes();
-        d * d * (minutes - menu[i].prepare_min) / minutes
+        let plan = &menu[i].0;
+        d * d * plan.runs_min() / plan.minutes()
     };
     let mut rated = rated?;
     rated.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
     let Some(&(best, d)) = rated.first().filter(|r| r.1.is_finite()) else { return Ok(None) };
-    let chosen = &menu[best];
+    let chosen = &menu[best].0;
     let next = NextExperiment {
-        name: chosen.name.to_owned(),
+        name: chosen.name.clone(),
         separates,
         d,
         minutes: chosen.minutes(),
-        why: chosen.how.to_owned() + &repeats(d, chosen.minutes() - chosen.prepare_min),
+        why: chosen.how.clone() + &repeats(d, chosen.runs_min()),
     };
-    let menu =
-        rated.iter().map(|&(i, d)| (menu[i].name.to_owned(), d, menu[i].minutes())).collect();
-    Ok(Some(Proposal { next, trial: chosen.trial(), menu }))
+    let trial = chosen.trial.clone();
+    let rated = rated.iter().map(|&(i, d)| (menu[i].0.name.clone(), d, menu[i].0.minutes()));
+    Ok(Some(Proposal { next, trial, menu: rated.collect() }))
 }
 
 /// How often it has to be done until it tells, where once is not enough.
@@ -101,7 +141,7 @@ fn repeats(d: f64, minutes: f64) -> String {
 /// The first candidate, the most probable one with an effect of the 95 % set that the first lacks, and the effects in
 /// which they differ.
 fn rivals<'a>(
-    simulator: &RigSimulator,
+    simulator: &dyn Simulator,
     diagnosis: &Diagnosis,
     evidence: &'a Evidence,
 ) -> Option<(&'a Model, &'a Model, Vec<String>)> {
@@ -129,10 +169,10 @@ struct Tangent {
 }
 
 impl Tangent {
-    fn of(
-        simulator: &RigSimulator,
+    fn of<L: Laboratory>(
+        simulator: &L,
         model: &Model,
-        experiment: &Experiment,
+        experiment: &L::Setting,
     ) -> Result<Self, GapError> {
         let run = |model: &Model| -> Result<(Vec<f64>, usize), GapError> {
             let channels = simulator.predict(model, experiment)?;
@@ -181,17 +221,24 @@ impl Tangent {
     }
 }
 
-/// Root mean square difference, summed over channels, that stays when `rival` comes as near to `truth` as it can.
-fn left(truth_known: &Tangent, rival_known: &Tangent, truth: &Tangent, rival: &Tangent) -> f64 {
+/// Root mean square difference, summed over channels, that stays when `rival` comes as near to `truth` as it can;
+/// residuals are correlated, and `block` samples count as one observation.
+fn left(
+    block: f64,
+    truth_known: &Tangent,
+    rival_known: &Tangent,
+    truth: &Tangent,
+    rival: &Tangent,
+) -> f64 {
     let n = rival.slopes.len();
     let mut normal = vec![0.0; n * n];
     let mut slope = vec![0.0; n];
     for (truth, rival) in [(truth_known, rival_known), (truth, rival)] {
         let gap: Vec<f64> = rival.values.iter().zip(&truth.values).map(|(a, b)| a - b).collect();
         for i in 0..n {
-            slope[i] += crate::frame::dot(&rival.slopes[i], &gap) / BLOCK;
+            slope[i] += crate::frame::dot(&rival.slopes[i], &gap) / block;
             for j in 0..=i {
-                let product = crate::frame::dot(&rival.slopes[i], &rival.slopes[j]) / BLOCK;
+                let product = crate::frame::dot(&rival.slopes[i], &rival.slopes[j]) / block;
                 normal[i * n + j] += product;
                 if i != j {
                     normal[j * n + i] += product;
@@ -215,7 +262,7 @@ fn left(truth_known: &Tangent, rival_known: &Tangent, truth: &Tangent, rival: &T
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rig::{RigTrial, Session};
+    use crate::rig::{RigSimulator, RigTrial, Session};
     use stretch_data::TrialKind;
 
     /// A rig beside an arbitrary trial.
@@ -241,11 +288,7 @@ mod tests {
     }
 
     /// D of every experiment of the menu for two effects at given first parameters.
-    fn differences(
-        rig: &RigSimulator,
-        one: (&str, f64),
-        two: (&str, f64),
-    ) -> Vec<(&'static str, f64)> {
+    fn differences(rig: &RigSimulator, one: (&str, f64), two: (&str, f64)) -> Vec<(String, f64)> {
         let model = |(name, value): (&str, f64)| {
             let at = rig.effects().iter().position(|e| e.name == name).unwrap();
             let mut values = rig.effects()[at].starts[0].clone();
@@ -257,15 +300,15 @@ mod tests {
         };
         let (one, two) = (model(one), model(two));
         let tangent = |model, experiment| Tangent::of(rig, model, experiment).unwrap();
-        let done = Experiment::done();
+        let done = rig.done();
         let known = [tangent(&one, &done), tangent(&two, &done)];
-        let (stroke, supply) = rig.extent();
-        Experiment::menu(stroke, supply)
+        rig.menu()
             .iter()
-            .map(|x| {
+            .map(|(plan, x)| {
                 let here = [tangent(&one, x), tangent(&two, x)];
-                let there = left(&known[0], &known[1], &here[0], &here[1]);
-                (x.name, there.min(left(&known[1], &known[0], &here[1], &here[0])))
+                let there = left(50.0, &known[0], &known[1], &here[0], &here[1]);
+                let back = left(50.0, &known[1], &known[0], &here[1], &here[0]);
+                (plan.name.clone(), there.min(back))
             })
             .collect()
     }
@@ -273,10 +316,10 @@ mod tests {
     #[test]
     fn what_motion_cannot_part_other_experiments_do() {
         let rig = rig();
-        let d = |all: &[(&str, f64)], name: &str| all.iter().find(|x| x.0 == name).unwrap().1;
+        let d = |all: &[(String, f64)], name: &str| all.iter().find(|x| x.0 == name).unwrap().1;
         // A slack sleeve stops at a strain, an amplifier at a voltage: another excitation moves only one of them.
         let slack = stretch_sim::Bridge::new(rig.nominal());
-        let strain = slack.strain(rig.extent().0.0 + 6.0);
+        let strain = slack.strain(rig.shortest_mm() + 6.0);
         let top = slack.volts(slack.resistance(strain));
         let all = differences(&rig, ("sleeve_slack", strain), ("amplifier_saturation", top));
         assert!(d(&all, "excitation_0.7") > 3.0 * d(&all, "arbitrary"), "{all:?}");

@@ -49,11 +49,18 @@ impl<'a> Acting<'a> {
         Ok(acting)
     }
 
+    /// Samples of another time: what a recorder does to a trial that nobody has measured yet.
+    pub(crate) fn late(&self, recorder: Recorder, simulated: &mut [f64]) {
+        if let Some(values) = self.skew {
+            skew(values, recorder.dt_s, simulated);
+        }
+    }
+
     /// What the recorder makes of a simulated trial: samples of another time, and hum whose phase is the measured record's.
     pub(crate) fn record(&self, recorder: Recorder, measured: &[f64], simulated: &mut [f64]) {
         let Recorder { noise, unit, dt_s } = recorder;
+        self.late(recorder, simulated);
         if let Some(values) = self.skew {
-            skew(values, dt_s, simulated);
             wobble(values[2], noise, dt_s, measured, simulated);
         }
         if let Some((a, f)) = self.hum {

@@ -1,141 +1,169 @@
 //! A gauge alone beside a reference: a rig of one stage.
 
-use stretch_data::{Trial, unit};
-use stretch_sim::{CATALOGUE, Effect, EffectSet, Gauge, GaugeSpec, Scale, Start};
+mod catalogue;
+mod experiments;
+mod record;
+mod source;
+
+use stretch_data::{RigFile, unit};
+use stretch_sim::{Effect, Gauge, GaugeSpec, Start};
+
+use catalogue::{Scope, catalogue, lag};
+pub use record::GaugeTrial;
+use record::Record;
 
 use crate::{
     dice::Dice,
     error::GapError,
-    simulator::{
-        EffectParameterSpec, EffectSpec, Model, Motion, ParameterSpec, Run, Simulator, StageSpec,
-        TrialSpec,
+    outside::{Acting, Recorder},
+    rig::{
+        catalogue::check_names,
+        smooth::{Smoothed, unscheduled},
     },
+    simulator::{EffectSpec, Model, Motion, ParameterSpec, Run, Simulator, StageSpec, TrialSpec},
 };
 
+/// Parameter that says how the memories of the gauge begin the session: wound from below (1), from above (-1), settled.
+const WINDING: usize = 2;
+
 /// Any stretch sensor with a reference: y = offset + gain e, e the reference over its range in the fit trials.
+///
+/// Offset and gain are free unless a rig file (`kind = "gauge"`) gives them. Effects of the catalogue act on e in place
+/// of the strain and on (y - offset)/gain in place of resistance and voltage. The reference is smoothed as far as its own
+/// noise allows; what of that noise arrives at the signal belongs to the floor. Noise comes from second differences:
+/// it is what changes from sample to sample, and errors that last longer count as gap.
+///
+/// ```
+/// use stretch_data::{Channel, Trial};
+/// use stretch_gap::{GaugeSimulator, GaugeTrial, Options, VerdictKind, diagnose};
+/// // A sensor that shows 0.05 s late what a rod does.
+/// let rod = |t: f64| 40.0 + 20.0 * (1.3 * t).sin() + 10.0 * (3.1 * t).sin();
+/// let time_s: Vec<f64> = (0..4000).map(|i| 0.01 * i as f64).collect();
+/// let noise = |i: usize| 1e-3 * ((i * i * 7919) % 1000) as f64 / 1000.0;
+/// let channel = |name: &str, values| Channel { name: name.into(), values };
+/// let length = time_s.iter().map(|t| rod(*t)).collect();
+/// let signal = time_s.iter().enumerate().map(|(i, t)| 0.02 * rod(t - 0.05) + noise(i)).collect();
+/// let channels = vec![channel("rod_mm", length), channel("s1", signal)];
+/// let trial = Trial { name: "rod.csv".into(), time_s, channels };
+/// let trials = [GaugeTrial { trial, start_s: 0.0, is_test: false }];
+/// let gauge = GaugeSimulator::new(&trials, "rod_mm", "s1", None, &[])?;
+/// let (diagnosis, _) = diagnose(&gauge, &Options::default(), &|_| (), &|| false)?;
+/// assert_eq!(diagnosis.verdict, VerdictKind::Effect);
+/// assert_eq!(diagnosis.named, ["channel_skew"]);
+/// # Ok::<(), stretch_gap::GapError>(())
+/// ```
 #[derive(Debug)]
 pub struct GaugeSimulator {
     stages: Vec<StageSpec>,
     parameters: Vec<ParameterSpec>,
     effects: Vec<EffectSpec>,
     rows: Vec<&'static dyn Effect>,
-    trials: Vec<TrialSpec>,
-    reference: Vec<f64>,
-    signal: Vec<f64>,
-    unit: String,
+    record: Record,
+    /// The reference of each trial as it drives the gauge.
+    inputs: Vec<Smoothed>,
     spec: GaugeSpec,
+    /// Column of the reference.
+    reference: String,
     reference_sd: f64,
-    dt_s: f64,
-    notes: Vec<String>,
+    recorder: Recorder,
 }
 
 impl GaugeSimulator {
-    /// Binds a gauge to trials (with the session time each began, and whether it is a test trial) and two of their
-    /// columns. Effects called in `without` are left out. `mains_hum` takes no part yet.
+    /// Binds a gauge to trials and two of their columns. Effects called in `without` are left out. A rig file gives
+    /// zero, span, offset and gain, with their tolerances; its effects are not part of the nominal gauge.
     ///
     /// # Errors
-    /// Columns that are missing, dead, or hold too few numbers; names in `without` that nobody knows.
+    /// Columns that are missing, dead, hold too few numbers or look swapped; names in `without` that nobody knows; a
+    /// rig file of another kind.
     pub fn new(
-        trials: &[(Trial, f64, bool)],
+        trials: &[GaugeTrial],
         reference: &str,
         signal: &str,
+        rig: Option<&RigFile>,
         without: &[String],
     ) -> Result<Self, GapError> {
-        for name in without {
-            if stretch_sim::effect_named(name).is_none() {
-                let names = CATALOGUE.iter().map(|e| e.name());
-                let nearest = stretch_data::nearest(name, names).map(str::to_owned);
-                return Err(GapError::UnknownEffect { name: name.clone(), nearest });
-            }
+        check_names(without)?;
+        let record = Record::read(trials, reference, signal)?;
+        let (low, high) = record.range(&record.reference);
+        let (least, greatest) = record.range(&record.signal);
+        let spread = greatest - least;
+        let pressure_scale = (!record.pressure.is_empty())
+            .then(|| record.range(&record.pressure).1)
+            .filter(|scale| *scale > 0.0);
+        let mut spec =
+            GaugeSpec { zero: low, span: high - low, offset: 0.0, gain: 1.0, pressure_scale };
+        (spec.offset, spec.gain) = line(&record, &spec);
+        if let Some(file) = rig {
+            let given = GaugeSpec::from_file(file)?.0;
+            spec = GaugeSpec { pressure_scale: given.pressure_scale.or(pressure_scale), ..given };
         }
-        let too_little = || GapError::TooLittle {
-            what: "there is no trial to fit with 100 samples".into(),
-            hint: "give a longer recording".into(),
+        let sd = |name: &str, value: f64| {
+            let own = rig.and_then(|r| r.stages.get("sensing")?.get(name));
+            own.and_then(|p| p.tolerance_abs.or(p.tolerance.map(|share| share * value.abs())))
+                .unwrap_or(3.0 * spread)
         };
-        let first = trials.iter().find(|t| !t.2 && t.0.len() >= 100).ok_or_else(too_little)?;
-        let dt_s = first.0.rate_hz().map_or(0.01, |rate| 1.0 / rate);
-        let (mut xs, mut ys, mut specs, mut notes) =
-            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for (trial, start_s, is_test) in trials {
-            let column = |name: &str| {
-                trial.channel(name).map(<[f64]>::to_vec).ok_or_else(|| GapError::MissingColumn {
-                    trial: trial.name.clone(),
-                    column: name.into(),
-                    needs: "a diagnosis of a gauge alone needs",
-                })
-            };
-            let (mut x, mut y) = (column(reference)?, column(signal)?);
-            let missing = bridge(&mut x) + bridge(&mut y);
-            if missing > 0 {
-                notes.push(format!("{}: {missing} missing values were interpolated", trial.name));
-            }
-            if !is_test {
-                low = x.iter().copied().fold(low, f64::min);
-                high = x.iter().copied().fold(high, f64::max);
-            }
-            specs.push(TrialSpec {
-                name: trial.name.clone(),
-                samples: x.len(),
-                start_s: *start_s,
-                is_test: *is_test,
-            });
-            xs.extend(x);
-            ys.extend(y);
-        }
-        for (name, values) in [(reference, &xs), (signal, &ys)] {
-            let span = values
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-            if span.1 <= span.0 {
-                return Err(GapError::Implausible {
-                    column: name.into(),
-                    found: format!("{} in every sample", span.0),
-                    hint: "the channel is dead: check the sensor and its cable".into(),
-                });
-            }
-        }
-        let (offset, gain) = line(&xs, &ys, low, high - low);
-        let spread =
-            ys.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-        let sd = 3.0 * (spread.1 - spread.0);
         let unit_of = |name: &str| unit(name).unwrap_or("").to_owned();
-        let flat = |name: &str, nominal: f64| ParameterSpec {
+        let parameter = |name: &str, nominal: f64| ParameterSpec {
             name: name.into(),
             unit: unit_of(signal),
             nominal,
-            sd,
+            sd: sd(name, nominal),
             least: f64::NEG_INFINITY,
             wander: None,
             per_trial_sd: None,
-            is_evidence: false,
+            is_evidence: rig.is_some(),
         };
-        let (effects, rows) = entries(without);
+        let (reference_sd, noise) = (record.noise(&record.reference), record.noise(&record.signal));
+        let inputs = parts(&record.trials, &record.reference)
+            .map(|(_, x)| Smoothed::of(x, reference_sd, &unscheduled(x.len())))
+            .collect();
+        let session = |t: &TrialSpec| t.start_s + t.samples as f64 * record.dt_s;
+        let begun = record.trials.first().map_or(0.0, |t| t.start_s);
+        let first = record.fitted().max_by_key(ExactSizeIterator::len).unwrap_or(0..0);
+        let scope = Scope {
+            session_s: record.trials.last().map_or(0.0, session) - begun,
+            lag_s: lag(&record.reference[first.clone()], &record.signal[first], record.dt_s),
+            has_pressure: spec.pressure_scale.is_some(),
+        };
+        let (effects, rows) = catalogue(without, scope);
         Ok(Self {
             stages: vec![StageSpec {
                 name: "sensing".into(),
                 channel: signal.into(),
                 unit: unit_of(signal),
-                parameters: vec![0, 1],
+                parameters: vec![0, 1, WINDING],
                 noise: None,
             }],
-            parameters: vec![flat("offset", offset), flat("gain", gain)],
+            parameters: vec![
+                parameter("offset", spec.offset),
+                parameter("gain", spec.gain),
+                ParameterSpec {
+                    name: "winding".into(),
+                    unit: "1".into(),
+                    nominal: 0.0,
+                    sd: 1.0 / 3.0,
+                    is_evidence: false,
+                    ..parameter("winding", 0.0)
+                },
+            ],
             effects,
             rows,
-            trials: specs,
-            reference_sd: noise(&xs),
-            reference: xs,
-            signal: ys,
-            unit: unit_of(reference),
-            spec: GaugeSpec { zero: low, span: high - low, offset, gain, pressure_scale: None },
-            dt_s,
-            notes,
+            inputs,
+            reference: reference.into(),
+            reference_sd,
+            recorder: Recorder { noise, unit: spread, dt_s: record.dt_s },
+            record,
+            spec,
         })
     }
 
     /// What was noticed while it was read.
     pub fn notes(&self) -> &[String] {
-        &self.notes
+        &self.record.notes
+    }
+
+    fn nominal(&self, model: &Model) -> GaugeSpec {
+        GaugeSpec { offset: model.parameters[0], gain: model.parameters[1], ..self.spec }
     }
 }
 
@@ -153,19 +181,24 @@ impl Simulator for GaugeSimulator {
     }
 
     fn trials(&self) -> &[TrialSpec] {
-        &self.trials
+        &self.record.trials
     }
 
     fn dt_s(&self) -> f64 {
-        self.dt_s
+        self.record.dt_s
     }
 
     fn measured(&self, _stage: usize) -> &[f64] {
-        &self.signal
+        &self.record.signal
     }
 
     fn motion(&self) -> Motion<'_> {
-        Motion { values: &self.reference, unit: &self.unit, falling: "falling", rising: "rising" }
+        Motion {
+            values: &self.record.reference,
+            unit: unit(&self.reference).unwrap_or(""),
+            falling: "falling",
+            rising: "rising",
+        }
     }
 
     fn sensor(&self) -> Option<usize> {
@@ -173,25 +206,27 @@ impl Simulator for GaugeSimulator {
     }
 
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
-        let Model { parameters, effects } = run.model;
-        let spec = GaugeSpec { offset: parameters[0], gain: parameters[1], ..self.spec };
-        let mut set = EffectSet::new();
-        for (index, values) in effects {
-            set.push(self.rows[*index], values)?;
-        }
-        let gauge = Gauge::new(spec, &set, self.dt_s)?;
+        let acting = Acting::of(&self.rows, run.model)?;
+        let gauge = Gauge::new(self.nominal(run.model), &acting.inside, self.dt_s())?;
         let mut memory = gauge.memory();
+        // What was done to the gauge before the session nobody knows.
+        let mut start = Start::Wound(run.model.parameters[WINDING]);
         let mut from = 0;
-        for (i, trial) in self.trials[..run.trials].iter().enumerate() {
-            let mut input = self.reference[from..from + trial.samples].to_vec();
-            if let Some(seed) = run.shake {
-                let mut dice = Dice::new(seed, i as u64);
-                input.iter_mut().for_each(|x| *x += self.reference_sd * dice.gauss());
-            }
-            let start = if i == 0 { Start::Settled } else { Start::Carried { rest_s: 0.0 } };
-            let own = &mut out[from..from + trial.samples];
-            gauge.run(&mut memory, start, trial.start_s, &input, &[], own)?;
-            from += trial.samples;
+        for (i, trial) in self.record.trials[..run.trials].iter().enumerate() {
+            let to = from + trial.samples;
+            let input = match run.shake {
+                None => self.inputs[i].values.clone(),
+                Some(seed) => {
+                    self.inputs[i].shaken(self.reference_sd, &mut Dice::new(seed, i as u64))
+                }
+            };
+            let pressure = self.record.pressure.get(from..to).unwrap_or(&[]);
+            gauge.run(&mut memory, start, trial.start_s, &input, pressure, &mut out[from..to])?;
+            acting.record(self.recorder, &self.record.signal[from..to], &mut out[from..to]);
+            let next = self.record.trials.get(i + 1).map_or(f64::INFINITY, |t| t.start_s);
+            let rest_s = (next - trial.start_s - trial.samples as f64 * self.dt_s()).max(0.0);
+            start = Start::Carried { rest_s };
+            from = to;
         }
         match out.iter().all(|x| x.is_finite()) {
             true => Ok(()),
@@ -200,102 +235,31 @@ impl Simulator for GaugeSimulator {
     }
 }
 
-/// Effects that can act in a gauge alone, in units of e and of the signal's span.
-fn entries(without: &[String]) -> (Vec<EffectSpec>, Vec<&'static dyn Effect>) {
-    let able = CATALOGUE.iter().filter(|e| {
-        Gauge::accepts(**e, false)
-            && e.name() != "mains_hum"
-            && !without.iter().any(|name| name == e.name())
-    });
-    able.map(|&effect| {
-        let parameters: Vec<EffectParameterSpec> = effect
-            .parameters()
-            .iter()
-            .map(|p| {
-                let (min, max, _) = Gauge::range(p);
-                EffectParameterSpec {
-                    name: p.name.into(),
-                    unit: if matches!(p.unit, "strain" | "mm" | "V") { "1" } else { p.unit }.into(),
-                    min,
-                    max,
-                    off: p.off.map(|off| off * max / p.max),
-                    is_log: p.scale == Scale::Log,
-                    is_fitted: true,
-                    form: None,
-                }
-            })
-            .collect();
-        let spec = EffectSpec {
-            name: effect.name().into(),
-            stage: effect.stage().name().into(),
-            touches: vec![0],
-            starts: starts(effect, &parameters),
-            parameters,
-            is_between_trials: matches!(effect.name(), "thermal_drift" | "gauge_softening"),
-            twins: Vec::new(),
-        };
-        (spec, effect as &'static dyn Effect)
+/// Trials with their part of a column.
+fn parts<'a>(
+    trials: &'a [TrialSpec],
+    values: &'a [f64],
+) -> impl Iterator<Item = (&'a TrialSpec, &'a [f64])> {
+    let mut rest = values;
+    trials.iter().map(move |trial| {
+        let (own, behind) = rest.split_at(trial.samples);
+        rest = behind;
+        (trial, own)
     })
-    .unzip()
 }
 
-/// Strengths at their typical value and a fifth of it, of both signs where the range has both; shapes at a sixth, a
-/// half and five sixths of their range in equal ratios.
-fn starts(effect: &dyn Effect, specs: &[EffectParameterSpec]) -> Vec<Vec<f64>> {
-    let mut all: Vec<Vec<f64>> = vec![Vec::new()];
-    for (p, spec) in effect.parameters().iter().zip(specs) {
-        let typical = Gauge::range(p).2;
-        let values: Vec<f64> = match spec.off {
-            None => [1.0, 3.0, 5.0]
-                .map(|k| spec.min * (spec.max / spec.min.max(1e-12)).powf(k / 6.0))
-                .into(),
-            Some(_) => [typical, 0.2 * typical, -typical, -0.2 * typical]
-                .into_iter()
-                .filter(|v| (spec.min..=spec.max).contains(v) && *v != 0.0)
-                .collect(),
-        };
-        all = all
-            .iter()
-            .flat_map(|start| values.iter().map(|v| [start.as_slice(), &[*v]].concat()))
-            .collect();
-    }
-    all
-}
-
-/// Straight lines over missing values; how many there were.
-fn bridge(values: &mut [f64]) -> usize {
-    let known: Vec<usize> = (0..values.len()).filter(|&i| values[i].is_finite()).collect();
-    let (Some(&first), Some(&last)) = (known.first(), known.last()) else { return 0 };
-    let (head, tail) = (values[first], values[last]);
-    values[..first].fill(head);
-    values[last + 1..].fill(tail);
-    for pair in known.windows(2) {
-        let (a, b) = (pair[0], pair[1]);
-        let (from, step) = (values[a], (values[b] - values[a]) / (b - a) as f64);
-        for i in a + 1..b {
-            values[i] = from + step * (i - a) as f64;
-        }
-    }
-    values.len() - known.len()
-}
-
-/// Offset and gain of the straight line of y over (x - zero)/span.
-fn line(x: &[f64], y: &[f64], zero: f64, span: f64) -> (f64, f64) {
-    let n = x.len() as f64;
-    let e = |x: f64| (x - zero) / span;
-    let (me, my) = (x.iter().map(|x| e(*x)).sum::<f64>() / n, y.iter().sum::<f64>() / n);
-    let (mut ee, mut ey) = (0.0, 0.0);
-    for (x, y) in x.iter().zip(y) {
-        ee += (e(*x) - me).powi(2);
-        ey += (e(*x) - me) * (y - my);
-    }
+/// Offset and gain of the straight line of the signal over e, in the trials that are fitted.
+fn line(record: &Record, spec: &GaugeSpec) -> (f64, f64) {
+    let pairs = || {
+        record.fitted().flat_map(|r| {
+            let e = record.reference[r.clone()].iter().map(|x| (x - spec.zero) / spec.span);
+            e.zip(&record.signal[r])
+        })
+    };
+    let (n, e, y) = pairs().fold((0.0, 0.0, 0.0), |(n, a, b), (e, y)| (n + 1.0, a + e, b + y));
+    let (e, y) = (e / n, y / n);
+    let (ee, ey) = pairs()
+        .fold((0.0, 0.0), |(ee, ey), (x, z)| (ee + (x - e) * (x - e), ey + (x - e) * (z - y)));
     let gain = if ee > 0.0 && ey != 0.0 { ey / ee } else { 1.0 };
-    (my - gain * me, gain)
-}
-
-/// Noise of a record from the median of its second differences.
-fn noise(values: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> = values.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    sizes.get(sizes.len() / 2).map_or(0.0, |m| m / 0.6745 / 6f64.sqrt())
+    (y - gain * e, gain)
 }

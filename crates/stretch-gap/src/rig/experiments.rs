@@ -7,7 +7,11 @@ use stretch_sim::{
 };
 
 use super::RigSimulator;
-use crate::{error::GapError, simulator::Model};
+use crate::{
+    error::GapError,
+    next_experiment::{Laboratory, Plan},
+    simulator::Model,
+};
 
 /// Sample time of an experiment, s.
 const DT_S: f64 = 0.01;
@@ -25,15 +29,15 @@ enum Drive {
     Held { length_mm: Vec<f64>, pressure_kpa: Vec<f64>, is_shunted: bool },
 }
 
-/// An experiment.
+/// An experiment on the rig.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Experiment {
+pub struct Experiment {
     /// Name in the menu.
-    pub(crate) name: &'static str,
+    name: &'static str,
     /// How to do it, in a sentence.
-    pub(crate) how: &'static str,
+    how: &'static str,
     /// Time to prepare it, minutes.
-    pub(crate) prepare_min: f64,
+    prepare_min: f64,
     inlet: Vec<f64>,
     outlet: Vec<f64>,
     drive: Drive,
@@ -42,13 +46,13 @@ pub(crate) struct Experiment {
 }
 
 impl Experiment {
-    /// Minutes with the preparation.
-    pub(crate) fn minutes(&self) -> f64 {
-        self.prepare_min + self.inlet.len() as f64 * DT_S / 60.0
+    fn plan(&self) -> Plan {
+        let (name, how, trial) = (self.name.to_owned(), self.how.to_owned(), self.trial());
+        Plan { name, how, prepare_min: self.prepare_min, trial }
     }
 
     /// The trial that runs it: openings, and what is set from outside.
-    pub(crate) fn trial(&self) -> Trial {
+    fn trial(&self) -> Trial {
         let samples = self.inlet.len();
         let channel =
             |name: &str, values: &[f64]| Channel { name: name.into(), values: values.to_vec() };
@@ -64,11 +68,6 @@ impl Experiment {
             time_s: (0..samples).map(|i| (i as f64 * DT_S * 100.0).round() / 100.0).collect(),
             channels,
         }
-    }
-
-    /// The experiment that stands for what has been measured: an arbitrary trial.
-    pub(crate) fn done() -> Self {
-        Self::of(TrialPlan::arbitrary(9, 3), "done", "", 0.0)
     }
 
     fn of(plan: TrialPlan, name: &'static str, how: &'static str, prepare_min: f64) -> Self {
@@ -115,7 +114,7 @@ impl Experiment {
     }
 
     /// The menu for a rig whose length goes from `stroke.0` to `stroke.1` mm and whose supply is at `supply_kpa`.
-    pub(crate) fn menu(stroke: (f64, f64), supply_kpa: f64) -> Vec<Self> {
+    fn all(stroke: (f64, f64), supply_kpa: f64) -> Vec<Self> {
         let at = |share: f64| stroke.0 + share * (stroke.1 - stroke.0);
         let repeat = |piece: &[(f64, f64, f64)], times: usize| piece.repeat(times);
         let mut ramps: Vec<(f64, f64, f64)> = Vec::new();
@@ -251,12 +250,26 @@ impl RigSimulator {
         Ok((params, effects))
     }
 
-    /// What a model predicts of an experiment: every recorded channel in units of its noise.
-    pub(crate) fn predict(
-        &self,
-        model: &Model,
-        experiment: &Experiment,
-    ) -> Result<Vec<Vec<f64>>, GapError> {
+    #[cfg(test)]
+    pub(crate) fn shortest_mm(&self) -> f64 {
+        self.inputs.stroke.0
+    }
+}
+
+impl Laboratory for RigSimulator {
+    type Setting = Experiment;
+
+    fn menu(&self) -> Vec<(Plan, Experiment)> {
+        let all = Experiment::all(self.inputs.stroke, 1e-3 * self.base[Key::PS]);
+        all.into_iter().map(|x| (x.plan(), x)).collect()
+    }
+
+    /// An arbitrary trial.
+    fn done(&self) -> Experiment {
+        Experiment::of(TrialPlan::arbitrary(9, 3), "done", "", 0.0)
+    }
+
+    fn predict(&self, model: &Model, experiment: &Experiment) -> Result<Vec<Vec<f64>>, GapError> {
         let (mut params, effects) = self.rig_of(model)?;
         params[Key::VExc] *= experiment.excitation;
         let samples = experiment.inlet.len();
@@ -307,10 +320,5 @@ impl RigSimulator {
                 values
             })
             .collect())
-    }
-
-    /// Shortest and longest measured length, mm, and the nominal supply, kPa.
-    pub(crate) fn extent(&self) -> ((f64, f64), f64) {
-        (self.inputs.stroke, 1e-3 * self.base[Key::PS])
     }
 }

@@ -15,7 +15,6 @@ use stretch_data::{DataSet, RigFile};
 use stretch_sim::{Effect, Key, PARAMETERS, RigParams, Stage};
 
 use catalogue::{Extent, Place, check_names, entries, tuned};
-pub(crate) use experiments::Experiment;
 use params::read_params;
 use session::Inputs;
 pub use session::{RigTrial, Session};

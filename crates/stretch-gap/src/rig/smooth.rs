@@ -130,7 +130,6 @@ impl Smoothed {
 }
 
 /// Half-widths where nothing is commanded: as wide as the record itself lets a parabola be.
-#[allow(dead_code)]
 pub(crate) fn unscheduled(samples: usize) -> Vec<u8> {
     vec![WIDEST as u8; samples]
 }

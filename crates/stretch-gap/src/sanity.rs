@@ -7,8 +7,6 @@ use crate::{
     simulator::Simulator,
 };
 
-/// Share of a channel's variance that may be left before names mean nothing.
-const FOREIGN: f64 = 0.1;
 /// Tolerances at which a parameter stands at its end: two of the five or so of a stage do so by chance in one rig of a few
 /// thousand.
 const END: f64 = 2.75;
@@ -17,8 +15,8 @@ const LEFT: f64 = 1.0;
 
 /// Takes names back where the data come from something else than the simulator is of.
 ///
-/// Either more than a tenth of a channel's variance is left on the test trials with the best effects in: another rig, or
-/// a column that is not what its name says. Or two parameters of a stage stand at the end of their tolerances and more
+/// Either more of a channel's variance is left on the test trials with the best effects in than the simulator says that
+/// may be ([`Simulator::foreign_share`]): another rig, or a column that is not what its name says. Or two parameters of a stage stand at the end of their tolerances and more
 /// than noise is left of it all the same: what bends them is no effect but other parameters.
 pub(crate) fn check(simulator: &dyn Simulator, evidence: &Evidence, diagnosis: &mut Diagnosis) {
     let sentence = foreign(simulator, evidence).or_else(|| strained(simulator, evidence));
@@ -47,7 +45,7 @@ fn foreign(simulator: &dyn Simulator, evidence: &Evidence) -> Option<String> {
         // What is noise is nobody's fault.
         let noise = count * traces.floor * traces.floor;
         let share = (left - noise) / variance.max(noise).max(f64::MIN_POSITIVE);
-        if share > FOREIGN && worst.is_none_or(|w| share > w.1) {
+        if share > simulator.foreign_share() && worst.is_none_or(|w| share > w.1) {
             worst = Some((stage, share));
         }
     }

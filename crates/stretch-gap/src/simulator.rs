@@ -335,6 +335,10 @@ pub trait Simulator: Sync {
     fn sensor(&self) -> Option<usize> {
         None
     }
+    /// Share of a channel's variance that may be left before the names of effects mean nothing.
+    fn foreign_share(&self) -> f64 {
+        0.1
+    }
     /// Measured input of a stage as it is fed with it, all trials end to end; none where it is not the output of the
     /// stage before.
     fn input(&self, stage: usize) -> Option<Vec<f64>> {

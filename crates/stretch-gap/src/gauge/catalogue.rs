@@ -17,6 +17,11 @@ const HEATING: f64 = 0.15;
 /// beyond, it would not rise any more.
 const BEND: f64 = 0.5;
 
+/// A gauge that is no foil gives way by at most this share of a step,
+const RELAXATION: f64 = 0.6;
+/// with time constants of up to, s.
+const SLOWEST_S: f64 = 20.0;
+
 /// What the search needs to know of the measurement.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scope {
@@ -53,23 +58,34 @@ pub(super) fn catalogue(
     (specs, rows)
 }
 
-/// Widens what the stock rig's tolerances would keep narrow, and looks there.
+/// Widens what belongs to the stock rig, and looks there.
 fn adapt(spec: &mut EffectSpec, scope: Scope) {
     let range = match spec.name.as_str() {
         "channel_skew" => SKEW_S,
         "thermal_drift" => DRIFT / scope.session_s.max(1.0),
         "self_heating" => HEATING,
         "gauge_nonlinearity" => BEND,
+        "gauge_relaxation" => RELAXATION,
         _ => return,
     };
     (spec.parameters[0].min, spec.parameters[0].max) = (-range, range);
-    if spec.name == "channel_skew" {
-        let more = [scope.lag_s, 0.9 * scope.lag_s, -0.15, 0.2].map(|s| vec![s, 0.0, 0.0]);
-        spec.starts.extend(more);
-    } else {
-        for start in &mut spec.starts {
-            start[0] = 0.2 * range;
+    match spec.name.as_str() {
+        "channel_skew" => {
+            // Two clocks part, but they do not tremble: a skew that may follow the record explains what it likes.
+            let wobble = spec.parameters.iter().position(|p| p.name == "wobble");
+            if let Some(at) = wobble {
+                spec.parameters[at].is_fitted = false;
+                spec.starts.retain(|start| start[at] == 0.0);
+            }
+            let more = [scope.lag_s, 0.9 * scope.lag_s, -0.15, 0.2].map(|s| vec![s, 0.0, 0.0]);
+            spec.starts.extend(more);
         }
+        "gauge_relaxation" => {
+            spec.parameters[1].max = SLOWEST_S;
+            let slow = spec.starts.last().map(|s| [&[s[0], 10.0], &s[2..]].concat());
+            spec.starts.extend(slow);
+        }
+        _ => spec.starts.iter_mut().for_each(|start| start[0] = 0.2 * range),
     }
 }
 

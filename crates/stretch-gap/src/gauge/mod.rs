@@ -205,6 +205,11 @@ impl Simulator for GaugeSimulator {
         Some(0)
     }
 
+    /// A line follows whatever it is fitted to; where it does not follow half of it, the two have little to do with each other.
+    fn foreign_share(&self) -> f64 {
+        0.5
+    }
+
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
         let acting = Acting::of(&self.rows, run.model)?;
         let gauge = Gauge::new(self.nominal(run.model), &acting.inside, self.dt_s())?;

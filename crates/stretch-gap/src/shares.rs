@@ -6,6 +6,7 @@ use crate::{
     diagnosis::{Diagnosis, VerdictKind},
     error::GapError,
     select::{Search, Solution},
+    simulator::EffectSpec,
 };
 
 /// Least share of the gap that is told.
@@ -19,6 +20,8 @@ pub struct EffectShare {
     /// Share of the re-tuned nominal's gap that opens again when it is taken out, those that closed less than it gone
     /// before: the shares add up to what the set closes.
     pub closes: f64,
+    /// Whether one of its parameters went to an end of its range: it then rather stands in for something else.
+    pub at_bound: bool,
 }
 
 /// Takes one effect after the other out of the best set, the weakest first, the rest fitted anew.
@@ -39,11 +42,22 @@ pub(crate) fn shares(
         }
         let Some((effect, less)) = weakest else { break };
         let closes = (less.excess(bench) - set.excess(bench)) / whole.max(f64::MIN_POSITIVE);
-        out.push(EffectShare { effect: bench.simulator.effects()[effect].name.clone(), closes });
+        let spec = &bench.simulator.effects()[effect];
+        let at_bound = best.model.effect(effect).is_some_and(|values| is_at_bound(spec, values));
+        out.push(EffectShare { effect: spec.name.clone(), closes, at_bound });
         set = less;
     }
     out.reverse();
     Ok(out)
+}
+
+/// Whether a parameter that is no form stands at an end of its range where the effect is not off.
+fn is_at_bound(spec: &EffectSpec, values: &[f64]) -> bool {
+    let mut fitted = spec.parameters.iter().zip(values).filter(|(p, _)| p.is_fitted);
+    fitted.any(|(p, value)| {
+        let near = |end: f64| (value - end).abs() < 1e-3 * (p.max - p.min);
+        p.form.is_none() && (near(p.min) || near(p.max)) && !p.off.is_some_and(near)
+    })
 }
 
 /// Says in an answer without a name what closes parts of the gap.
@@ -52,7 +66,10 @@ pub(crate) fn tell(diagnosis: &mut Diagnosis) {
         .shares
         .iter()
         .filter(|s| s.closes >= TOLD)
-        .map(|s| format!("{} {:.0} %", s.effect, 100.0 * s.closes))
+        .map(|s| {
+            let end = if s.at_bound { " (at the end of its range)" } else { "" };
+            format!("{} {:.0} %{end}", s.effect, 100.0 * s.closes)
+        })
         .collect();
     if diagnosis.verdict == VerdictKind::Unknown && !told.is_empty() {
         let all: f64 = diagnosis.shares.iter().map(|s| s.closes).sum();

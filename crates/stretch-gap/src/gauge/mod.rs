@@ -20,10 +20,13 @@ use crate::{
         catalogue::check_names,
         smooth::{Smoothed, unscheduled},
     },
-    simulator::{EffectSpec, Model, Motion, ParameterSpec, Run, Simulator, StageSpec, TrialSpec},
+    simulator::{Description, Model, Motion, ParameterSpec, Run, Simulator, StageSpec, TrialSpec},
 };
 
-/// Parameter that says how the memories of the gauge begin the session: wound from below (1), from above (-1), settled.
+/// Where the parameters stand.
+const OFFSET: usize = 0;
+const GAIN: usize = 1;
+/// The one that says how the memories of the gauge begin the session: wound from below (1), from above (-1), settled.
 const WINDING: usize = 2;
 
 /// Any stretch sensor with a reference: y = offset + gain e, e the reference over its range in the fit trials.
@@ -54,9 +57,7 @@ const WINDING: usize = 2;
 /// ```
 #[derive(Debug)]
 pub struct GaugeSimulator {
-    stages: Vec<StageSpec>,
-    parameters: Vec<ParameterSpec>,
-    effects: Vec<EffectSpec>,
+    about: Description,
     rows: Vec<&'static dyn Effect>,
     record: Record,
     /// The reference of each trial as it drives the gauge.
@@ -102,16 +103,9 @@ impl GaugeSimulator {
             own.and_then(|p| p.tolerance_abs.or(p.tolerance.map(|share| share * value.abs())))
                 .unwrap_or(3.0 * spread)
         };
-        let unit_of = |name: &str| unit(name).unwrap_or("").to_owned();
         let parameter = |name: &str, nominal: f64| ParameterSpec {
-            name: name.into(),
-            unit: unit_of(signal),
-            nominal,
-            sd: sd(name, nominal),
-            least: f64::NEG_INFINITY,
-            wander: None,
-            per_trial_sd: None,
             is_evidence: rig.is_some(),
+            ..ParameterSpec::new(name, unit_of(signal), nominal).within(sd(name, nominal))
         };
         let (reference_sd, noise) = (record.noise(&record.reference), record.noise(&record.signal));
         let inputs = parts(&record.trials, &record.reference)
@@ -126,27 +120,18 @@ impl GaugeSimulator {
             has_pressure: spec.pressure_scale.is_some(),
         };
         let (effects, rows) = catalogue(without, scope);
+        let stage = StageSpec::new("sensing", signal, unit_of(signal), &[OFFSET, GAIN, WINDING]);
+        let parameters = vec![
+            parameter("offset", spec.offset),
+            parameter("gain", spec.gain),
+            ParameterSpec {
+                is_evidence: false,
+                ..ParameterSpec::new("winding", "1", 0.0).within(1.0 / 3.0)
+            },
+        ];
+        let (trials, dt_s) = (record.trials.clone(), record.dt_s);
         Ok(Self {
-            stages: vec![StageSpec {
-                name: "sensing".into(),
-                channel: signal.into(),
-                unit: unit_of(signal),
-                parameters: vec![0, 1, WINDING],
-                noise: None,
-            }],
-            parameters: vec![
-                parameter("offset", spec.offset),
-                parameter("gain", spec.gain),
-                ParameterSpec {
-                    name: "winding".into(),
-                    unit: "1".into(),
-                    nominal: 0.0,
-                    sd: 1.0 / 3.0,
-                    is_evidence: false,
-                    ..parameter("winding", 0.0)
-                },
-            ],
-            effects,
+            about: Description { stages: vec![stage], parameters, effects, trials, dt_s },
             rows,
             inputs,
             reference: reference.into(),
@@ -163,29 +148,13 @@ impl GaugeSimulator {
     }
 
     fn nominal(&self, model: &Model) -> GaugeSpec {
-        GaugeSpec { offset: model.parameters[0], gain: model.parameters[1], ..self.spec }
+        GaugeSpec { offset: model.parameters[OFFSET], gain: model.parameters[GAIN], ..self.spec }
     }
 }
 
 impl Simulator for GaugeSimulator {
-    fn stages(&self) -> &[StageSpec] {
-        &self.stages
-    }
-
-    fn parameters(&self) -> &[ParameterSpec] {
-        &self.parameters
-    }
-
-    fn effects(&self) -> &[EffectSpec] {
-        &self.effects
-    }
-
-    fn trials(&self) -> &[TrialSpec] {
-        &self.record.trials
-    }
-
-    fn dt_s(&self) -> f64 {
-        self.record.dt_s
+    fn description(&self) -> &Description {
+        &self.about
     }
 
     fn measured(&self, _stage: usize) -> &[f64] {
@@ -195,7 +164,7 @@ impl Simulator for GaugeSimulator {
     fn motion(&self) -> Motion<'_> {
         Motion {
             values: &self.record.reference,
-            unit: unit(&self.reference).unwrap_or(""),
+            unit: unit_of(&self.reference),
             falling: "falling",
             rising: "rising",
         }
@@ -238,6 +207,11 @@ impl Simulator for GaugeSimulator {
             false => Err(GapError::NotFinite { stage: "sensing".into() }),
         }
     }
+}
+
+/// Unit of a column, empty where its name gives none.
+fn unit_of(column: &str) -> &str {
+    unit(column).unwrap_or("")
 }
 
 /// Trials with their part of a column.

@@ -132,6 +132,7 @@ fn a_simulated_effect_is_named_and_reported() {
     assert!(d == read(&again));
     let page = fs::read_to_string(page).unwrap();
     assert!(page.contains("Fix in the simulator") && page.contains("Add gauge_hysteresis"));
+    assert!(page.contains("trained in the simulator then errs"));
     assert!(page.contains("simpler methods") && page.contains("by where the calibration"));
     assert!(!page.contains("http") && !page.contains("NaN") && !page.contains("class=\"missing\""));
     // With its entry struck out nobody else takes the blame with the same right.

@@ -98,12 +98,25 @@ fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
         _ => "What is left is within the noise floor on trials that were not fitted.".to_owned(),
     };
     let gain = match d.verdict {
-        VerdictKind::Effect => gain,
+        VerdictKind::Effect => format!("{gain}{}", cheaper(d)),
         VerdictKind::Unknown => format!("The best that the catalogue offers: {gain}"),
         VerdictKind::Parameters => "The whole gap closes by re-tuning.".to_owned(),
         VerdictKind::NoGap => "The simulator can be used as it is.".to_owned(),
     };
     vec![("Fix in the simulator", fix), ("How sure", sure), ("What it gains", gain)]
+}
+
+/// What a calibration gains, where it gains anything to speak of.
+fn cheaper(d: &Diagnosis) -> String {
+    let poly13 = d.transfer.as_ref().map(|t| t.poly13);
+    match poly13.filter(|e| e.sim_with_effect < 0.9 * e.sim) {
+        Some(e) => format!(
+            " A poly13 calibration trained in the simulator then errs {} in place of {} of full scale.",
+            percent(0.01 * e.sim_with_effect),
+            percent(0.01 * e.sim)
+        ),
+        None => String::new(),
+    }
 }
 
 /// Parameters that re-tuning moved by more than a tolerance, as assignments.

@@ -89,7 +89,7 @@ impl Fault {
             Self::Drift(share) => {
                 let n = trial.len() as f64;
                 for (i, x) in channel(&mut out, signal).iter_mut().enumerate() {
-                    *x -= share * span * i as f64 / n;
+                    *x += share * span * i as f64 / n;
                 }
             }
         }

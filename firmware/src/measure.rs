@@ -53,8 +53,10 @@ pub fn replay<D, M, I, E: Length>(
     input: impl Fn(AdcCode) -> I,
     step: impl Fn(&D, &mut M, I) -> Answer<E>,
 ) {
-    let mut core = cortex_m::Peripherals::take().expect("taken once");
-    count::start(&mut core.SYST);
+    // a program of several models starts the counter once
+    if let Some(mut core) = cortex_m::Peripherals::take() {
+        count::start(&mut core.SYST);
+    }
     let ((), empty) = count::bracket(|| ());
     let (mut samples, mut total, mut max) = (0u32, 0u32, 0u32);
     let mut checksum = Checksum::default();
@@ -83,6 +85,60 @@ pub fn replay<D, M, I, E: Length>(
     if let Some(length) = length {
         eprintln!("{model}: {samples} samples, the last length {} mm", length.length().0 as i32);
     }
+}
+
+/// A record from flash.
+pub fn load<'a, T: serde::Deserialize<'a>>(record: &'a [u8]) -> T {
+    postcard::from_bytes(record).expect("a valid record")
+}
+
+/// The `main` of a program that replays the trial through a design, once for each
+/// model and the record of it: from converter codes, or from volts to `f32`.
+///
+/// `codes, Design, Estimate, |record| design` or `volts, Design, |calibration| design`,
+/// then `"model" from "record"`.
+#[macro_export]
+macro_rules! program {
+    (volts, $design:ty, $make:expr, $($model:literal from $record:literal),+ $(,)?) => {
+        $crate::program!(
+            @ $design, stretch_core::Volts<f32>, f32,
+            |code| stretch_core::Volts($crate::trial::volts(code)),
+            $crate::measure::length_only,
+            $make, $($model from $record),+
+        );
+    };
+    (codes, $design:ty, $estimate:ty, $make:expr, $($model:literal from $record:literal),+ $(,)?) => {
+        $crate::program!(
+            @ $design, stretch_receptor::code::AdcCode, $estimate,
+            |code| code, core::convert::identity,
+            $make, $($model from $record),+
+        );
+    };
+    (@ $design:ty, $sample:ty, $estimate:ty, $input:expr, $answer:expr, $make:expr,
+     $($model:literal from $record:literal),+) => {
+        #[inline(never)]
+        fn step(
+            design: &$design,
+            memory: &mut <$design as stretch_core::Design>::Memory,
+            sample: $sample,
+        ) -> $crate::measure::Answer<$estimate> {
+            $answer(stretch_core::Stage::step(design, memory, sample))
+        }
+
+        #[cortex_m_rt::entry]
+        fn main() -> ! {
+            $({
+                static RECORD: &[u8] = include_bytes!(concat!(
+                    env!("CARGO_MANIFEST_DIR"), "/data/", $record, ".postcard"
+                ));
+                let make = $make;
+                let design: $design = make($crate::measure::load(RECORD));
+                let mut memory = stretch_core::Design::memory(&design);
+                $crate::measure::replay($model, &design, &mut memory, $input, step);
+            })+
+            semihosting::process::exit(0)
+        }
+    };
 }
 
 /// Bytes of code in flash, from the linker.

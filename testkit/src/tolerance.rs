@@ -146,11 +146,15 @@ pub const RIG_STEP: f64 = 1e-4;
 pub const FIT_WILD: f64 = 20.0;
 
 /// Millimetres between receptors that remember in `f32` and in `f64`: states near
-/// 1 with 24 bits, up to 35 terms of coefficients up to 2, a stroke of 30 mm; a
-/// covariance recursion rounds as often as it has samples.
+/// 1 with 24 bits, up to 35 terms of coefficients up to 2, a stroke of 30 mm.
 pub const REMEMBERING_F32_MM: f64 = 2e-2;
 
 /// Millimetres of a 30 mm stroke by which an observer may err on its own gauge
 /// without noise: its motion model has no acceleration, so it trails a sine of
 /// 0.6 Hz by about `acceleration * settling time^2`.
 pub const OBSERVER_INVERTS_MM: f64 = 0.5;
+
+/// Share of the stroke by which an observer in integers may differ from one in
+/// `f64`: states in 2^-26 of it and gains of 20 bits, behind a curve up to ten
+/// times flatter than its mean and a filter that sums over hundreds of samples.
+pub const FIXED_OBSERVER: f64 = 1e-4;

@@ -35,6 +35,8 @@ const RADII: [f64; 3] = [0.03, 0.1, 0.3];
 const WORTH: f64 = 0.97;
 /// Window of the reference's smoothing, in samples; quadratic.
 const SMOOTH: usize = 7;
+/// How fast a live baseline gives way, in seconds: its level is exact, so at once.
+const LIVE_CATCH_UP_S: f64 = 0.02;
 const SETTLE: usize = 10;
 const BLOCK_S: f64 = 0.5;
 
@@ -440,8 +442,13 @@ fn map(prepared: &Prepared, forward: &Forward) -> Result<ObserverMap, CalibrateE
     let targets = prepared.series.iter().flat_map(|s| s.target.iter());
     let estimate_domain =
         crate::series::extent(targets.map(|&t| prepared.target_range.normalise(t)));
+    // the fitted curve knows where rest is, noise averaged out
+    let low = place(estimate_domain.min, forward.drive);
+    let level = curve[low.0] + low.1 * (curve[low.0 + 1] - curve[low.0]);
+    let rest =
+        forward.choice.rest.map(|rest| RestTracker { level, catch_up_s: LIVE_CATCH_UP_S, ..rest });
     Ok(ObserverMap {
-        rest: forward.choice.rest,
+        rest,
         curve: Values::new("curve", &curve)?,
         drive_domain: forward.drive,
         relaxations_s: Values::new("relaxations_s", &taus)?,

@@ -54,14 +54,17 @@ pub(crate) fn rested(
     let Some(rest) = rest else { return signal.to_vec() };
     let sign = polarity.sign();
     let pull = (period_s / rest.catch_up_s).min(1.0);
-    let mut baseline = 0.0;
+    let average = -(-period_s / RestTracker::AVERAGE_S).exp_m1();
+    let most = MOST_EXCESS * range.span();
+    let furthest = RestTracker::FURTHEST * range.span();
+    let (mut baseline, mut excess) = (0.0f64, 0.0);
     let step = |&v: &f64| {
-        let excess = sign * v - baseline - sign * rest.level;
-        baseline += if excess < 0.0 {
-            pull * excess.max(-MOST_EXCESS * range.span())
-        } else {
-            rest.leak * period_s
-        };
+        let above: f64 = sign * v - baseline - sign * rest.level;
+        excess += average * (above.clamp(-most, most) - excess);
+        let wanted = if excess < 0.0 { pull * excess } else { rest.leak * period_s };
+        let before = baseline;
+        baseline = (before + wanted).clamp(-furthest, furthest);
+        excess -= baseline - before;
         v - sign * baseline
     };
     signal.iter().map(step).collect()

@@ -7,12 +7,14 @@ use crate::DesignError;
 /// A muscle is never longer than at rest and a joint never straighter than
 /// straight: whenever the signal falls below its frozen resting level (or rises
 /// above it, for a signal that falls with the target), that is drift, and the
-/// baseline gives way. With `s` the signal times the sign of the polarity and
-/// `b` the baseline, a sample:
-/// - `s - b < level`: `b += (s - b - level) dt/catch_up_s`;
+/// baseline gives way. With `s` the signal times the sign of the polarity, `b` the
+/// baseline and `e` the mean of `s - b - level` over about [`RestTracker::AVERAGE_S`],
+/// so that noise is no drift, a sample:
+/// - `e < 0`: `b += e dt/catch_up_s`;
 /// - else `b += leak dt`, so that drift the other way is found at the next rest.
 ///
-/// The model sees `s - b`. Source: this project; it is the one-sided zero
+/// The model sees `s - b`. A model that knows how memory moves a resting signal
+/// moves `level` with it. Source: this project; it is the one-sided zero
 /// update of strapdown navigation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -27,6 +29,12 @@ pub struct RestTracker {
 }
 
 impl RestTracker {
+    /// Time constant of the excess's running average, in seconds.
+    pub const AVERAGE_S: f64 = 0.05;
+    /// The furthest that a baseline goes, as a share of the signal's range: what is
+    /// beyond is no drift but another gauge.
+    pub const FURTHEST: f64 = 0.2;
+
     /// Checks every number.
     ///
     /// # Errors

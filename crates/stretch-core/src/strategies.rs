@@ -16,9 +16,10 @@ use std::vec::Vec;
 use proptest::{collection, prelude::*};
 
 use crate::{
-    BranchSurface, Calibration, CalibrationSpec, Degree, FitSummary, Interval, Label, LinearMap,
-    Model, Normalisation, Polarity, Provenance, Range, RangeSpec, RateEstimator, RateSource,
-    SampleRate, Schema, Surface, Target,
+    BranchSurface, Calibration, CalibrationSpec, Degree, FitSummary, HistoryMap, HistoryShape,
+    Interval, Label, LinearMap, MAX_HISTORY_TERMS, Model, Normalisation, ObserverMap, Polarity,
+    Provenance, Range, RangeSpec, RateEstimator, RateSource, RestTracker, SampleRate, Schema,
+    Surface, Target, Values,
 };
 
 /// Either way of normalising.
@@ -90,9 +91,123 @@ fn branch_surface(signal: Interval) -> impl Strategy<Value = BranchSurface> {
     )
 }
 
+fn values<const N: usize>(items: &[f64]) -> Values<N> {
+    Values::new("generated", items).expect("finite, and few enough")
+}
+
+/// Ways of following a baseline, and none, for a signal in `range` that rises
+/// (`sign` 1) or falls (-1) with the target.
+fn rest(range: Range, sign: f64) -> impl Strategy<Value = Option<RestTracker>> {
+    let tracker = (0.0..0.1, 0.02..2.0, 0.0..0.003).prop_map(move |(share, catch_up_s, leak)| {
+        let end = if sign > 0.0 { range.min() } else { range.max() };
+        let level = end + sign * share * range.span();
+        RestTracker { level, catch_up_s, leak: leak * range.span() }
+    });
+    prop_oneof![Just(None), tracker.prop_map(Some)]
+}
+
+/// History maps of up to three relaxations, two plays and degree 4, with
+/// coefficients in -2..2, for a signal in `range`.
+pub fn history_map(range: Range, sign: f64) -> impl Strategy<Value = HistoryMap> {
+    let shape = (0usize..=3, 0usize..=2, 1u8..=4, 0u8..=4);
+    (shape, rest(range, sign), fit_summary()).prop_flat_map(
+        |((relaxations, plays, degree, memory_degree), rest, fit)| {
+            let states = 1 + relaxations + plays;
+            let terms = HistoryShape { states, degree, memory_degree }.terms();
+            collection::vec(-2.0..2.0, terms.min(MAX_HISTORY_TERMS)).prop_map(
+                move |coefficients: Vec<f64>| HistoryMap {
+                    rest,
+                    relaxations_s: values(&[0.05, 0.3, 1.5][..relaxations]),
+                    radii: values(&[0.05, 0.2][..plays]),
+                    degree,
+                    memory_degree,
+                    state_min: values(&[0.0, -0.3, -0.3, -0.2, -0.2, -0.2][..states]),
+                    state_max: values(&[1.0, 0.3, 0.3, 0.2, 0.2, 0.2][..states]),
+                    coefficients: values(&coefficients),
+                    estimate_domain: Interval { min: 0.0, max: 1.0 },
+                    fit,
+                },
+            )
+        },
+    )
+}
+
+/// Observer maps of up to two relaxations and two plays behind a curve whose
+/// slope varies by a factor of ten, for a signal in `range` that rises
+/// (`sign` 1) or falls (-1) with the target.
+pub fn observer_map(range: Range, sign: f64) -> impl Strategy<Value = ObserverMap> {
+    let amplitudes = collection::vec((0.03..3.0f64, -0.3..0.6f64), 0..=2);
+    let plays = collection::vec(-0.2..0.1f64, 0..=2);
+    let steps = collection::vec(0.1..1.0f64, 2..=24);
+    let filter = (-0.02..0.02f64, -3.0..-1.5f64, -1.0..2.0f64);
+    (steps, amplitudes, plays, filter, rest(range, sign), fit_summary()).prop_map(
+        move |(steps, relaxations, weights, (lead_s, noise, agility), rest, fit)| {
+            let total: f64 = steps.iter().sum();
+            let mut curve = std::vec![if sign > 0.0 { range.min() } else { range.max() }];
+            for step in steps {
+                let before = curve[curve.len() - 1];
+                curve.push(before + sign * range.span() * step / total);
+            }
+            let (taus, amplitudes): (Vec<f64>, Vec<f64>) = relaxations.into_iter().unzip();
+            ObserverMap {
+                rest,
+                curve: values(&curve),
+                drive_domain: Interval { min: -0.1, max: 1.2 },
+                relaxations_s: values(&taus),
+                amplitudes: values(&amplitudes),
+                lead_s,
+                radii: values(&[0.05, 0.2][..weights.len()]),
+                play_weights: values(&weights),
+                noise: range.span() * 10f64.powf(noise),
+                agility: 10f64.powf(agility),
+                estimate_domain: Interval { min: 0.0, max: 1.0 },
+                fit,
+            }
+        },
+    )
+}
+
 /// Calibrations of every model, estimator, normalisation and polarity, for a
 /// signal of 1..2 V or so.
 pub fn calibration() -> impl Strategy<Value = Calibration> {
+    frame().prop_flat_map(|frame| {
+        let sign = frame.polarity.sign();
+        let (range, domain) = (frame.signal_range, frame.domain());
+        let linear =
+            (-3.0..3.0, -1.0..1.0, fit_summary()).prop_map(move |(slope, intercept, fit)| {
+                Model::Linear(LinearMap { slope, intercept, signal_domain: domain, fit })
+            });
+        let pair = || (branch_surface(domain), branch_surface(domain));
+        let surfaces =
+            pair().prop_map(|(inflation, deflation)| Model::Surfaces { inflation, deflation });
+        let blended =
+            pair().prop_map(|(inflation, deflation)| Model::Blended { inflation, deflation });
+        let history = history_map(range, sign).prop_map(Model::History);
+        let observer = observer_map(range, sign).prop_map(Model::Observer);
+        prop_oneof![linear, surfaces, blended, history, observer]
+            .prop_map(move |model| frame.holding(model))
+    })
+}
+
+/// Calibrations of [`Model::Observer`], for a signal of 1..2 V or so.
+pub fn observer_calibration() -> impl Strategy<Value = Calibration> {
+    frame().prop_flat_map(|frame| {
+        observer_map(frame.signal_range, frame.polarity.sign())
+            .prop_map(move |map| frame.holding(Model::Observer(map)))
+    })
+}
+
+/// A calibration but for its model.
+#[derive(Debug, Clone, Copy)]
+struct Frame {
+    signal_range: Range,
+    polarity: Polarity,
+    target: Target,
+    rate_estimator: RateEstimator,
+    dead_band: f64,
+}
+
+fn frame() -> impl Strategy<Value = Frame> {
     let signal = (normalisation(), 0.5..1.5, 0.2..2.0).prop_map(|(mode, min, span)| {
         Range::new(RangeSpec { mode, zero: min, min, max: min + span }).expect("a span above zero")
     });
@@ -101,39 +216,40 @@ pub fn calibration() -> impl Strategy<Value = Calibration> {
         (50.0..500.0).prop_map(|rest_length| Target::Contraction { rest_length }),
         Just(Target::Direct),
     ];
-    (signal, polarity, target, live_rate_estimator(), 0.0..0.5).prop_flat_map(
-        |(signal_range, polarity, target, rate_estimator, dead_band)| {
-            let domain = Interval { min: signal_range.min(), max: signal_range.max() };
-            let linear =
-                (-3.0..3.0, -1.0..1.0, fit_summary()).prop_map(move |(slope, intercept, fit)| {
-                    Model::Linear(LinearMap { slope, intercept, signal_domain: domain, fit })
-                });
-            let surfaces = (branch_surface(domain), branch_surface(domain))
-                .prop_map(|(inflation, deflation)| Model::Surfaces { inflation, deflation });
-            prop_oneof![linear, surfaces].prop_map(move |model| {
-                Calibration::new(CalibrationSpec {
-                    schema: Schema::CURRENT,
-                    signal: Label::truncated("bridge_v"),
-                    reference: Label::truncated("length_mm"),
-                    sample_rate_hz: SampleRate::new(100.0).expect("above zero"),
-                    target,
-                    polarity,
-                    signal_range,
-                    target_range: Range::new(RangeSpec {
-                        mode: Normalisation::MinMax,
-                        zero: 0.0,
-                        min: 0.0,
-                        max: 0.17,
-                    })
-                    .expect("a span above zero"),
-                    rate_estimator,
-                    rate_source: RateSource::Voltage,
-                    dead_band,
-                    model,
-                    provenance: Provenance::new("", ["generated"]),
-                })
-                .expect("every part is in range")
-            })
+    (signal, polarity, target, live_rate_estimator(), 0.0..0.5).prop_map(
+        |(signal_range, polarity, target, rate_estimator, dead_band)| Frame {
+            signal_range,
+            polarity,
+            target,
+            rate_estimator,
+            dead_band,
         },
     )
+}
+
+impl Frame {
+    fn domain(&self) -> Interval {
+        Interval { min: self.signal_range.min(), max: self.signal_range.max() }
+    }
+
+    fn holding(&self, model: Model) -> Calibration {
+        let target_range =
+            RangeSpec { mode: Normalisation::MinMax, zero: 0.0, min: 0.0, max: 0.17 };
+        Calibration::new(CalibrationSpec {
+            schema: Schema::CURRENT,
+            signal: Label::truncated("bridge_v"),
+            reference: Label::truncated("length_mm"),
+            sample_rate_hz: SampleRate::new(100.0).expect("above zero"),
+            target: self.target,
+            polarity: self.polarity,
+            signal_range: self.signal_range,
+            target_range: Range::new(target_range).expect("a span above zero"),
+            rate_estimator: self.rate_estimator,
+            rate_source: RateSource::Voltage,
+            dead_band: self.dead_band,
+            model,
+            provenance: Provenance::new("", ["generated"]),
+        })
+        .expect("every part is in range")
+    }
 }

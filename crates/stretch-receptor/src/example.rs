@@ -2,8 +2,8 @@
 
 use stretch_core::{
     BranchSurface, Calibration, CalibrationSpec, DesignError, FitSummary, Interval, Label, Model,
-    Normalisation, Polarity, Poly13, Provenance, Range, RangeSpec, RateEstimator, RateSource,
-    SampleRate, Schema, Target,
+    Normalisation, ObserverMap, Polarity, Poly13, Provenance, Range, RangeSpec, RateEstimator,
+    RateSource, RestTracker, SampleRate, Schema, Target, Values,
 };
 
 /// The paper's published surfaces (section 3.2) as a calibration record, for an
@@ -19,6 +19,43 @@ use stretch_core::{
 /// ```
 pub fn example_calibration() -> Calibration {
     build().expect("the parts are constants and in range")
+}
+
+/// An observer as `stretch calibrate --model observer+rest` finds it on the simulated
+/// rig that resembles the paper's: a gauge that overshoots by 40 % over a quarter
+/// of a second, behind a curve that flattens towards full contraction.
+///
+/// ```
+/// use stretch_core::Model;
+/// let calibration = stretch_receptor::example_observer();
+/// assert!(matches!(calibration.model, Model::Observer(_)));
+/// ```
+pub fn example_observer() -> Calibration {
+    observer().expect("the parts are constants and in range")
+}
+
+fn observer() -> Result<Calibration, DesignError> {
+    let mut curve = [0.0; 25];
+    for (k, volts) in curve.iter_mut().enumerate() {
+        let x = k as f64 / 24.0;
+        *volts = 1.1 + x * (1.9 - 0.94 * x);
+    }
+    let map = ObserverMap {
+        rest: Some(RestTracker { level: 1.105, catch_up_s: 0.02, leak: 0.0 }),
+        curve: Values::new("curve", &curve)?,
+        drive_domain: Interval { min: -0.0025, max: 1.0716 },
+        relaxations_s: Values::new("relaxations_s", &[0.2475])?,
+        amplitudes: Values::new("amplitudes", &[0.397])?,
+        lead_s: 0.0123,
+        radii: Values::EMPTY,
+        play_weights: Values::EMPTY,
+        noise: 0.0115,
+        agility: 1.0,
+        estimate_domain: Interval { min: 0.0, max: 1.0 },
+        fit: FitSummary { samples: 29860, r_squared: 0.9991, rmse: 0.0126 },
+    };
+    let spec = CalibrationSpec { model: Model::Observer(map), ..build()?.into_spec() };
+    Calibration::new(spec)
 }
 
 fn build() -> Result<Calibration, DesignError> {

@@ -9,7 +9,7 @@ use stretch_filter::{FilterError, LARGEST_SAMPLE, RateFilter};
 use crate::{
     Domain, MAX_BRIDGED, Reading, Withheld,
     fold::{output, reference_dead_band, share_of},
-    rest_level::RestLevel,
+    rest_level::{Baseline, RestLevel},
 };
 
 /// A receptor for [`Model::History`]: low-passes and plays of the signal, then
@@ -56,7 +56,7 @@ pub struct HistoryReceptor<T, R = RateFilter<T>> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HistoryMemory<T, M> {
     rate: M,
-    baseline: T,
+    baseline: Baseline<T>,
     /// NaN before the first sample.
     last: T,
     low_passes: [T; MAX_RELAXATIONS],
@@ -136,7 +136,7 @@ impl<T: Real, R> HistoryReceptor<T, R> {
         memory: &mut HistoryMemory<T, M>,
         signal: T,
     ) -> ([T; MAX_STATES], bool, bool) {
-        let above = self.rest.step(&mut memory.baseline, self.sign * signal);
+        let above = self.rest.step(&mut memory.baseline, self.sign * signal, T::zero());
         let x = (self.sign * above - self.offset) * self.scale;
         if memory.last.is_nan() {
             memory.low_passes = [x; MAX_RELAXATIONS];
@@ -187,7 +187,7 @@ impl<T: Real, R: Design> Design for HistoryReceptor<T, R> {
     fn memory(&self) -> Self::Memory {
         HistoryMemory {
             rate: self.rate.memory(),
-            baseline: T::zero(),
+            baseline: Baseline::unmoved(),
             last: T::nan(),
             low_passes: [T::zero(); MAX_RELAXATIONS],
             plays: [T::zero(); MAX_PLAYS],

@@ -5,6 +5,7 @@ mod blended;
 pub mod code;
 mod example;
 mod fold;
+mod gains;
 mod history;
 mod map;
 mod observer;
@@ -16,7 +17,7 @@ mod rest_level;
 pub mod strategies;
 
 pub use blended::BlendedReceptor;
-pub use example::example_calibration;
+pub use example::{example_calibration, example_observer};
 pub use history::{HistoryMemory, HistoryReceptor};
 pub use observer::{ObserverMemory, ObserverReceptor};
 pub use one::{Receptor, StoredMemory};

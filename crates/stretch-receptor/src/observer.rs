@@ -9,18 +9,10 @@ use stretch_filter::LARGEST_SAMPLE;
 use crate::{
     Domain, MAX_BRIDGED, Reading, Withheld,
     fold::{output, reference_dead_band, share_of},
+    gains::{Gains, SLOPES, STATES},
     history::play,
-    rest_level::RestLevel,
+    rest_level::{Baseline, RestLevel},
 };
-
-/// Target, its rate, and the relaxations.
-const STATES: usize = 2 + MAX_OBSERVER_RELAXATIONS;
-/// What is unknown of target and relaxations before the first sample, squared.
-const FIRST_SPREAD: f64 = 0.1;
-/// What is unknown of the rate before the first sample, squared, in 1/s^2.
-const FIRST_RATE_SPREAD: f64 = 1.0;
-/// The target's variance is never held for more than its whole range squared.
-const MOST_SPREAD: f64 = 1.0;
 
 /// A secant is taken over at least this share of the way between knots.
 const LEAST_RUN: f64 = 0.01;
@@ -32,14 +24,17 @@ const LEAST_RUN: f64 = 0.01;
 /// difference. A missing sample is predicted over, at most [`MAX_BRIDGED`] in a
 /// row; one more forgets all but branch and baseline.
 ///
-/// With `P` the states' covariance, `h` the gradient of the drive and `g` the
-/// slope of the curve, a sample corrects by
-/// `k = P h g/(g^2 h'P h + noise^2)` times what the signal has over its
-/// prediction. The slope is the greater of the tangent at the prediction and of
-/// the secant to the drive that the signal alone suggests, so that a flat end
-/// of the curve cannot throw the estimate.
+/// A sample corrects every state by a gain times what the signal has over its
+/// prediction. The gain is the one that a Kalman filter settles at for the slope
+/// of the curve, from a table made when the receptor is: carrying the covariance
+/// along costs twenty times as much and errs more (the slope changes faster than
+/// a covariance can follow, and a filter that is wrong trusts itself). The slope
+/// is the greater of the tangent at the prediction and of the secant to the drive
+/// that the signal alone suggests, so that a flat end of the curve cannot throw
+/// the estimate.
 ///
-/// Cost: about `4 n^2 + 6 n` products a sample for `n = 2 + relaxations` states.
+/// The baseline, where it is followed, is compared with the signal that rest would
+/// give now, memory included: an undershoot after a fast release is not drift.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObserverReceptor<T> {
     sign: T,
@@ -57,24 +52,25 @@ pub struct ObserverReceptor<T> {
     plays: usize,
     radii: [T; MAX_OBSERVER_PLAYS],
     play_weights: [T; MAX_OBSERVER_PLAYS],
-    noise_square: T,
-    agility_a_sample: T,
+    ends: [T; SLOPES - 1],
+    gains: [[T; STATES]; SLOPES],
     period_s: T,
     low: T,
     high: T,
     gain: T,
     zero: T,
     dead_band: T,
+    /// The signal where the target rests, memory settled.
+    at_rest: T,
 }
 
-/// What an [`ObserverReceptor`] remembers: its states, their covariance, the plays.
+/// What an [`ObserverReceptor`] remembers: its states, the plays, the baseline.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObserverMemory<T> {
     /// Target, rate, relaxations: normalised. The target is NaN before the first sample.
     states: [T; STATES],
-    spread: [[T; STATES]; STATES],
     plays: [T; MAX_OBSERVER_PLAYS],
-    baseline: T,
+    baseline: Baseline<T>,
     branch: Branch,
     missing: u8,
 }
@@ -98,8 +94,11 @@ impl<T: Real> ObserverReceptor<T> {
         // a curve against the polarity would be inverted the wrong way round
         let rises = sign * (map.curve[knots - 1] - map.curve[0]);
         DesignError::check("rise of observer.curve", rises, rises > 0.0)?;
-        let noise_square = map.noise * map.noise;
-        Ok(Self {
+        let slopes = map.curve.windows(2).map(|pair| sign * (pair[1] - pair[0]) / step);
+        let (flattest, steepest) =
+            slopes.fold((f64::INFINITY, 0.0), |(a, b): (f64, f64), s| (a.min(s), b.max(s)));
+        let gains = Gains::new(map, period_s, flattest, steepest)?;
+        let design = Self {
             sign: T::from_f64(sign),
             rest: RestLevel::new(map.rest, calibration),
             knots,
@@ -114,20 +113,22 @@ impl<T: Real> ObserverReceptor<T> {
             plays: map.radii.len(),
             radii: filled(map.radii.iter().copied()),
             play_weights: filled(map.play_weights.iter().copied()),
-            noise_square: T::from_f64(noise_square),
-            agility_a_sample: T::from_f64(map.agility * period_s),
+            ends: gains.ends.map(T::from_f64),
+            gains: gains.of.map(|of| of.map(T::from_f64)),
             period_s: T::from_f64(period_s),
             low: T::from_f64(map.estimate_domain.min),
             high: T::from_f64(map.estimate_domain.max),
             gain: T::from_f64(gain),
             zero: T::from_f64(zero),
             dead_band: T::from_f64((reference_dead_band(calibration) / gain).abs()),
-        })
+            at_rest: T::zero(),
+        };
+        Ok(Self { at_rest: design.signal(design.low).0, ..design })
     }
 
     /// The drive that a signal suggests by itself, the nearest end beyond the curve.
     #[inline(always)]
-    fn drive(&self, signal: T) -> (T, T) {
+    fn inverse(&self, signal: T) -> (T, T) {
         let (first, last) = (self.curve[0], self.curve[self.knots - 1]);
         let held = signal.max(first).min(last);
         // the last knot at or below, by halving
@@ -154,114 +155,84 @@ impl<T: Real> ObserverReceptor<T> {
     }
 
     fn begin(&self, memory: &mut ObserverMemory<T>, signal: T) {
-        let (drive, _) = self.drive(signal);
+        let (drive, _) = self.inverse(signal);
         let target = drive.max(self.low).min(self.high);
         memory.states = [target; STATES];
         memory.states[1] = T::zero();
         memory.plays = [target; MAX_OBSERVER_PLAYS];
-        memory.spread = [[T::zero(); STATES]; STATES];
-        for i in 0..2 + self.relaxations {
-            memory.spread[i][i] = T::from_f64(FIRST_SPREAD);
-        }
-        memory.spread[1][1] = T::from_f64(FIRST_RATE_SPREAD);
     }
 
-    /// Moves states and covariance on by a sample: `P = F P F' + Q`, the rows
-    /// and columns that change only.
+    /// Moves the states on by a sample.
     #[inline(always)]
     fn predict(&self, memory: &mut ObserverMemory<T>) {
-        let n = 2 + self.relaxations;
-        let (x, p) = (&mut memory.states, &mut memory.spread);
+        let x = &mut memory.states;
         x[0] = (x[0] + self.period_s * x[1]).max(self.low).min(self.high);
-        for j in 0..n {
-            p[0][j] = p[0][j] + self.period_s * p[1][j];
-        }
-        for row in p.iter_mut().take(n) {
-            row[0] = row[0] + self.period_s * row[1];
-        }
         for i in 0..self.relaxations {
-            let share = self.shares[i];
-            x[2 + i] = x[2 + i] + share * (x[0] - x[2 + i]);
-            for j in 0..n {
-                p[2 + i][j] = p[2 + i][j] + share * (p[0][j] - p[2 + i][j]);
-            }
-            for row in p.iter_mut().take(n) {
-                row[2 + i] = row[2 + i] + share * (row[0] - row[2 + i]);
-            }
+            x[2 + i] = x[2 + i] + self.shares[i] * (x[0] - x[2 + i]);
         }
-        p[1][1] = p[1][1] + self.agility_a_sample;
+    }
+
+    /// The drive of a target that stands at `y` now.
+    #[inline(always)]
+    fn drive_at(&self, memory: &ObserverMemory<T>, y: T) -> T {
+        let mut drive = y;
+        for i in 0..self.relaxations {
+            drive = drive + self.amplitudes[i] * (y - memory.states[2 + i]);
+        }
+        for j in 0..self.plays {
+            let played = play(memory.plays[j], y, self.radii[j]);
+            drive = drive + self.play_weights[j] * (y - played);
+        }
+        drive
+    }
+
+    /// By how much memory moves the signal of a target at rest now.
+    #[inline(always)]
+    fn rest_shift(&self, memory: &ObserverMemory<T>) -> T {
+        if memory.states[0].is_nan() {
+            return T::zero();
+        }
+        self.signal(self.drive_at(memory, self.low)).0 - self.at_rest
     }
 
     /// Takes in a signed signal above its baseline; whether it lay on the curve.
     #[inline(always)]
     fn correct(&self, memory: &mut ObserverMemory<T>, signal: T) -> bool {
-        let n = 2 + self.relaxations;
-        let y = memory.states[0];
-        let mut gradient = [T::zero(); STATES];
-        gradient[0] = T::one();
-        gradient[1] = self.lead_s;
-        let mut drive = y + self.lead_s * memory.states[1];
-        for i in 0..self.relaxations {
-            drive = drive + self.amplitudes[i] * (y - memory.states[2 + i]);
-            gradient[0] = gradient[0] + self.amplitudes[i];
-            gradient[2 + i] = -self.amplitudes[i];
-        }
-        for j in 0..self.plays {
-            let played = play(memory.plays[j], y, self.radii[j]);
-            drive = drive + self.play_weights[j] * (y - played);
-            if played == memory.plays[j] {
-                gradient[0] = gradient[0] + self.play_weights[j];
-            }
-        }
+        let drive = self.drive_at(memory, memory.states[0]) + self.lead_s * memory.states[1];
         let (predicted, tangent, from) = self.signal(drive);
-        let (to, held) = self.drive(signal);
+        let (to, held) = self.inverse(signal);
         let run = to - from;
         // over a hair's breadth rounding alone would decide the secant
         let far = run.abs() > T::from_f64(LEAST_RUN) * self.drive_step;
         let secant = if far { (held - predicted) / run } else { tangent };
         let slope = tangent.max(secant);
 
-        let mut reach = [T::zero(); STATES];
-        let mut spread = T::zero();
-        for i in 0..n {
-            for j in 0..n {
-                reach[i] = reach[i] + memory.spread[i][j] * gradient[j];
-            }
-            reach[i] = reach[i] * slope;
-            spread = spread + reach[i] * gradient[i];
-        }
-        let weight = (spread * slope + self.noise_square).recip();
         // a spike counts as a signal one whole curve away, no more
         let (first, last) = (self.curve[0], self.curve[self.knots - 1]);
         let span = last - first;
         let surprise = signal.max(first - span).min(last + span) - predicted;
-        for i in 0..n {
-            let pull = reach[i] * weight;
-            memory.states[i] = memory.states[i] + pull * surprise;
-            for j in 0..=i {
-                let p = memory.spread[i][j] - pull * reach[j];
-                memory.spread[i][j] = p;
-                memory.spread[j][i] = p;
-            }
-            // rounding may not make a variance vanish or turn
-            memory.spread[i][i] = memory.spread[i][i].max(T::epsilon());
+        let gains = &self.gains[self.nearest(slope)];
+        for i in 0..2 + self.relaxations {
+            memory.states[i] = memory.states[i] + gains[i] * surprise;
         }
-        self.hold(memory, n);
+        self.hold(memory);
         held == signal
     }
 
-    /// Keeps target, rate and covariance where they can be.
+    /// The place of the gains for a slope, by halving.
     #[inline(always)]
-    fn hold(&self, memory: &mut ObserverMemory<T>, n: usize) {
-        let most = T::from_f64(MOST_SPREAD);
-        if memory.spread[0][0] > most {
-            let shrink = most / memory.spread[0][0];
-            for row in memory.spread.iter_mut().take(n) {
-                for p in row.iter_mut().take(n) {
-                    *p = *p * shrink;
-                }
-            }
+    fn nearest(&self, slope: T) -> usize {
+        let (mut from, mut to) = (0, SLOPES - 1);
+        while from < to {
+            let middle = (from + to) / 2;
+            if slope < self.ends[middle] { to = middle } else { from = middle + 1 }
         }
+        from
+    }
+
+    /// Keeps target and rate where they can be.
+    #[inline(always)]
+    fn hold(&self, memory: &mut ObserverMemory<T>) {
         if memory.states[0] < self.low {
             memory.states[0] = self.low;
             memory.states[1] = memory.states[1].max(T::zero());
@@ -280,7 +251,7 @@ impl<T: Real> ObserverReceptor<T> {
         memory.missing = memory.missing.saturating_add(1);
         if memory.missing <= MAX_BRIDGED && !memory.states[0].is_nan() {
             self.predict(memory);
-            self.hold(memory, 2 + self.relaxations);
+            self.hold(memory);
         } else {
             let (branch, baseline) = (memory.branch, memory.baseline);
             *memory = ObserverMemory { branch, baseline, missing: MAX_BRIDGED, ..self.memory() };
@@ -294,9 +265,8 @@ impl<T: Real> Design for ObserverReceptor<T> {
     fn memory(&self) -> ObserverMemory<T> {
         ObserverMemory {
             states: [T::nan(); STATES],
-            spread: [[T::zero(); STATES]; STATES],
             plays: [T::zero(); MAX_OBSERVER_PLAYS],
-            baseline: T::zero(),
+            baseline: Baseline::unmoved(),
             branch: Branch::Inflation,
             missing: 0,
         }
@@ -314,7 +284,8 @@ impl<T: Real> Stage<Volts<T>> for ObserverReceptor<T> {
             return Err(Withheld::Missing);
         }
         memory.missing = 0;
-        let signal = self.rest.step(&mut memory.baseline, self.sign * sample.0);
+        let shift = if self.rest.follows() { self.rest_shift(memory) } else { T::zero() };
+        let signal = self.rest.step(&mut memory.baseline, self.sign * sample.0, shift);
         if memory.states[0].is_nan() {
             self.begin(memory, signal);
         } else {

@@ -6,16 +6,17 @@
 use std::{fmt::Write, fs, path::PathBuf};
 
 use stretch_core::{
-    Calibration, Design, FitSummary, Hertz, Interval, LinearMap, Model, RateEstimator, SampleRate,
-    Stage, Volts,
+    Calibration, CalibrationSpec, Design, FitSummary, Hertz, HistoryMap, HistoryShape, Interval,
+    LinearMap, Model, ObserverMap, RateEstimator, RestTracker, SampleRate, Stage, Values, Volts,
 };
 use stretch_filter::{Differentiator, IntegerSgRate, LowPassSpec, RateFilter, SgRate};
 use stretch_receptor::{
-    StretchReceptor,
+    BlendedReceptor, HistoryReceptor, ObserverReceptor, Reading, StretchReceptor, Withheld,
     code::{
         Adc, AdcCode, AdcSpec, CodeArithmetic, CodeCalibration, CodeReading, CodeReceptor, Fixed,
+        FixedObserver,
     },
-    example_calibration,
+    example_calibration, example_observer,
 };
 
 #[path = "../../../firmware/src/checksum.rs"]
@@ -79,7 +80,7 @@ fn linear() -> Calibration {
 }
 
 fn record<T: serde::Serialize>(name: &str, value: &T) {
-    let mut buffer = [0; 1024];
+    let mut buffer = [0; 4096];
     let bytes = postcard::to_slice(value, &mut buffer).unwrap();
     same(&format!("data/{name}.postcard"), bytes);
 }
@@ -99,7 +100,13 @@ where
 }
 
 fn volts<R: Stage<f32, Out = Option<f32>>>(calibration: &Calibration, rate: R) -> String {
-    let receptor = StretchReceptor::with_rate(calibration, rate).unwrap();
+    volts_of(StretchReceptor::with_rate(calibration, rate).unwrap())
+}
+
+fn volts_of<S>(receptor: S) -> String
+where
+    S: Stage<Volts<f32>, Out = Result<Reading<f32>, Withheld>>,
+{
     let (mut memory, mut checksum) = (receptor.memory(), Checksum::default());
     for code in trial() {
         let volts = if code == u16::MAX { f32::NAN } else { f32::from(code) * (3.3 / 4095.0) };
@@ -109,6 +116,87 @@ fn volts<R: Stage<f32, Out = Option<f32>>>(calibration: &Calibration, rate: R) -
             domain: reading.domain,
         });
         checksum.answer(answer);
+    }
+    format!("{:08x}", checksum.0)
+}
+
+fn with(model: Model) -> Calibration {
+    Calibration::new(CalibrationSpec { model, ..example_calibration().into_spec() }).unwrap()
+}
+
+fn blended() -> Calibration {
+    let Model::Surfaces { inflation, deflation } = example_calibration().into_spec().model else {
+        unreachable!()
+    };
+    with(Model::Blended { inflation, deflation })
+}
+
+const REST: RestTracker = RestTracker { level: 1.105, catch_up_s: 0.5, leak: 0.001 };
+
+/// A map of the largest shape that `stretch calibrate` may choose for a name: what a
+/// step costs depends on the shape, hardly on the numbers.
+fn history(
+    relaxations_s: &[f64],
+    radii: &[f64],
+    degree: u8,
+    memory_degree: u8,
+    rest: Option<RestTracker>,
+) -> Calibration {
+    let states = 1 + relaxations_s.len() + radii.len();
+    let terms = HistoryShape { states, degree, memory_degree }.terms();
+    let mut coefficients: Vec<f64> =
+        (0..terms).map(|k| 0.02 * f64::from((k % 7) as u8) - 0.06).collect();
+    (coefficients[0], coefficients[1]) = (0.5, 0.5);
+    let (mut min, mut max) = (vec![-0.3; states], vec![0.3; states]);
+    (min[0], max[0]) = (-0.1, 0.9);
+    with(Model::History(HistoryMap {
+        rest,
+        relaxations_s: Values::new("relaxations_s", relaxations_s).unwrap(),
+        radii: Values::new("radii", radii).unwrap(),
+        degree,
+        memory_degree,
+        state_min: Values::new("state_min", &min).unwrap(),
+        state_max: Values::new("state_max", &max).unwrap(),
+        coefficients: Values::new("coefficients", &coefficients).unwrap(),
+        estimate_domain: Interval { min: 0.0, max: 1.0 },
+        fit: FitSummary { samples: 9000, r_squared: 0.99, rmse: 0.01 },
+    }))
+}
+
+/// Name of the model, of its record, and its calibration.
+fn histories() -> Vec<(String, String, Calibration)> {
+    let radii = [0.03, 0.1, 0.3];
+    let mut out = Vec::new();
+    for (rest, plus, dash) in [(None, "", ""), (Some(REST), "+rest", "-rest")] {
+        for (name, calibration) in [
+            ("hysteresis", history(&[], &radii, 3, 1, rest)),
+            ("relaxation", history(&[0.1, 1.0], &[], 3, 1, rest)),
+            ("both", history(&[0.1, 1.0], &radii, 3, 1, rest)),
+            ("history", history(&[0.1, 0.4], &[0.15], 5, 5, rest)),
+        ] {
+            out.push((format!("{name}{plus}"), format!("{name}{dash}"), calibration));
+        }
+    }
+    out
+}
+
+fn observers() -> [(&'static str, &'static str, Calibration); 2] {
+    let followed = example_observer();
+    let Model::Observer(map) = followed.model else { unreachable!() };
+    let spec = CalibrationSpec {
+        model: Model::Observer(ObserverMap { rest: None, ..map }),
+        ..followed.clone().into_spec()
+    };
+    let plain = Calibration::new(spec).unwrap();
+    [("observer", "observer", plain), ("observer+rest", "observer-rest", followed)]
+}
+
+fn fixed_observer(calibration: &Calibration) -> String {
+    let receptor = FixedObserver::new(calibration, &due()).unwrap();
+    let (mut memory, mut checksum) = (receptor.memory(), Checksum::default());
+    for code in trial() {
+        let code = if code == u16::MAX { AdcCode::MISSING } else { AdcCode(code.into()) };
+        checksum.answer(receptor.step(&mut memory, code));
     }
     format!("{:08x}", checksum.0)
 }
@@ -123,6 +211,15 @@ fn the_trial_and_the_records_are_these() {
         record(&format!("{name}-fixed"), &fixed);
         let float = CodeCalibration::<f32, 11, 2>::new(&calibration, &due()).unwrap();
         record(&format!("{name}-f32"), &float);
+    }
+    record("blended", &blended());
+    for (_, name, calibration) in histories() {
+        record(&name, &calibration);
+    }
+    for (_, name, calibration) in observers() {
+        record(name, &calibration);
+        let fixed = FixedObserver::new(&calibration, &due()).unwrap();
+        record(&format!("{name}-fixed"), &fixed);
     }
 }
 
@@ -145,6 +242,18 @@ fn the_golden_checksums_are_these() {
         ("poly13-f32-tracker", volts(&poly13, RateFilter::<f32>::new(tracker, hz).unwrap())),
     ];
     let mut text = String::from("# made by the test `firmware` of stretch-receptor on a host\n");
+    let mut golden: Vec<(String, String)> =
+        golden.into_iter().map(|(model, checksum)| (model.to_owned(), checksum)).collect();
+    let mixed = BlendedReceptor::with_rate(&blended(), sg).unwrap();
+    golden.push(("blended".to_owned(), volts_of(mixed)));
+    for (model, _, calibration) in histories() {
+        golden.push((model, volts_of(HistoryReceptor::with_rate(&calibration, sg).unwrap())));
+    }
+    for (model, _, calibration) in observers() {
+        let receptor = ObserverReceptor::<f32>::new(&calibration).unwrap();
+        golden.push((model.to_owned(), volts_of(receptor)));
+        golden.push((format!("{model}-fixed"), fixed_observer(&calibration)));
+    }
     for (model, checksum) in golden {
         writeln!(text, "model={model} checksum={checksum}").unwrap();
     }

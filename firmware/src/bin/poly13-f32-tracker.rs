@@ -2,16 +2,10 @@
 #![no_std]
 #![no_main]
 
-use cortex_m_rt::entry;
-use stretch_core::{Calibration, Design, Stage, Volts};
+use stretch_core::{Calibration, Design, Stage};
 use stretch_filter::{Tracker, TrackerSpec};
-use stretch_firmware::{
-    measure::{Answer, length_only, replay},
-    trial,
-};
+use stretch_firmware::program;
 use stretch_receptor::StretchReceptor;
-
-static RECORD: &[u8] = include_bytes!("../../data/poly13.postcard");
 
 /// The receptor takes the rate alone.
 #[derive(Clone, Copy)]
@@ -34,27 +28,10 @@ impl Stage<f32> for Rate {
 
 type Receptor = StretchReceptor<f32, Rate>;
 
-#[inline(never)]
-fn step(
-    design: &Receptor,
-    memory: &mut <Receptor as Design>::Memory,
-    volts: Volts<f32>,
-) -> Answer<f32> {
-    length_only(design.step(memory, volts))
-}
-
-#[entry]
-fn main() -> ! {
-    let calibration: Calibration = postcard::from_bytes(RECORD).expect("a valid record");
+fn make(calibration: Calibration) -> Receptor {
     let spec = TrackerSpec { tracking_index: 0.1, sample_rate: calibration.sample_rate_hz };
     let rate = Rate(Tracker::new(spec).expect("a rate that can be designed"));
-    let design = Receptor::with_rate(&calibration, rate).expect("a calibration that fits f32");
-    replay(
-        "poly13-f32-tracker",
-        &design,
-        &mut design.memory(),
-        |code| Volts(trial::volts(code)),
-        step,
-    );
-    semihosting::process::exit(0)
+    Receptor::with_rate(&calibration, rate).expect("a calibration that fits f32")
 }
+
+program!(volts, Receptor, make, "poly13-f32-tracker" from "poly13");

@@ -1,41 +1,18 @@
-//! Volts to millimetres in `f32`, with the rate summed in integers.
+//! Volts to millimetres in `f32`, with a rate summed in integers.
 #![no_std]
 #![no_main]
 
-use cortex_m_rt::entry;
-use stretch_core::{Calibration, Design, Stage, Volts};
+use stretch_core::Calibration;
 use stretch_filter::IntegerSgRate;
-use stretch_firmware::{
-    measure::{Answer, length_only, replay},
-    trial,
-};
+use stretch_firmware::program;
 use stretch_receptor::StretchReceptor;
-
-static RECORD: &[u8] = include_bytes!("../../data/poly13.postcard");
 
 type Receptor = StretchReceptor<f32, IntegerSgRate<11, 2>>;
 
-#[inline(never)]
-fn step(
-    design: &Receptor,
-    memory: &mut <Receptor as Design>::Memory,
-    volts: Volts<f32>,
-) -> Answer<f32> {
-    length_only(design.step(memory, volts))
-}
-
-#[entry]
-fn main() -> ! {
-    let calibration: Calibration = postcard::from_bytes(RECORD).expect("a valid record");
+fn make(calibration: Calibration) -> Receptor {
     let rate =
         IntegerSgRate::new(calibration.sample_rate_hz, 3.3).expect("a rate that can be designed");
-    let design = Receptor::with_rate(&calibration, rate).expect("a calibration that fits f32");
-    replay(
-        "poly13-f32-volts-integer",
-        &design,
-        &mut design.memory(),
-        |code| Volts(trial::volts(code)),
-        step,
-    );
-    semihosting::process::exit(0)
+    Receptor::with_rate(&calibration, rate).expect("a calibration that fits f32")
 }
+
+program!(volts, Receptor, make, "poly13-f32-volts-integer" from "poly13");

@@ -1,26 +1,10 @@
-//! Codes to millimetres by the paper's surfaces: an integer rate, a surface in `f32`.
+//! Codes to millimetres by the paper's surfaces: an integer rate, the rest in `f32`.
 #![no_std]
 #![no_main]
 
-use cortex_m_rt::entry;
-use stretch_core::{Design, Stage};
-use stretch_firmware::measure::{Answer, replay};
-use stretch_receptor::code::{AdcCode, CodeCalibration, CodeMemory, CodeReceptor};
-
-static RECORD: &[u8] = include_bytes!("../../data/poly13-f32.postcard");
+use stretch_firmware::program;
+use stretch_receptor::code::CodeReceptor;
 
 type Receptor = CodeReceptor<f32, 11, 2>;
 
-#[inline(never)]
-fn step(design: &Receptor, memory: &mut CodeMemory<11>, code: AdcCode) -> Answer<f32> {
-    design.step(memory, code)
-}
-
-#[entry]
-fn main() -> ! {
-    let calibration: CodeCalibration<f32, 11, 2> =
-        postcard::from_bytes(RECORD).expect("a valid record");
-    let design = Receptor::new(calibration);
-    replay("poly13-f32", &design, &mut design.memory(), |code| code, step);
-    semihosting::process::exit(0)
-}
+program!(codes, Receptor, f32, Receptor::new, "poly13-f32" from "poly13-f32");

@@ -2,23 +2,7 @@
 #![no_std]
 #![no_main]
 
-use cortex_m_rt::entry;
-use stretch_core::{Design, Stage};
-use stretch_firmware::measure::{Answer, replay};
-use stretch_receptor::code::{AdcCode, CodeMemory, FixedCalibration, FixedReceptor};
+use stretch_firmware::program;
+use stretch_receptor::code::FixedReceptor;
 
-static RECORD: &[u8] = include_bytes!("../../data/poly13-fixed.postcard");
-
-#[inline(never)]
-fn step(design: &FixedReceptor<11, 2>, memory: &mut CodeMemory<11>, code: AdcCode) -> Answer<i32> {
-    design.step(memory, code)
-}
-
-#[entry]
-fn main() -> ! {
-    let calibration: FixedCalibration<11, 2> =
-        postcard::from_bytes(RECORD).expect("a valid record");
-    let design = FixedReceptor::new(calibration);
-    replay("poly13-fixed", &design, &mut design.memory(), |code| code, step);
-    semihosting::process::exit(0)
-}
+program!(codes, FixedReceptor<11, 2>, i32, FixedReceptor::new, "poly13-fixed" from "poly13-fixed");

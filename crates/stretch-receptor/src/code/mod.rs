@@ -11,6 +11,8 @@
 //! - in `f32` ([`CodeReceptor<f32, ..>`](CodeReceptor)): six products and six
 //!   sums, the reference's unit.
 //!
+//! [`FixedObserver`] does the same for a model that remembers.
+//!
 //! A calibration is converted once, on a desk, by [`CodeCalibration::new`], and
 //! travels as a record of about 100 bytes.
 #![doc = include_str!("board.md")]
@@ -19,6 +21,8 @@ mod adc;
 mod arithmetic;
 mod calibration;
 mod fold;
+mod observer;
+mod observer_numbers;
 mod receptor;
 #[cfg(feature = "serde")]
 mod record;
@@ -27,4 +31,5 @@ mod sheet;
 pub use adc::{Adc, AdcCode, AdcSpec};
 pub use arithmetic::{CodeArithmetic, Fixed};
 pub use calibration::{CODE_SCHEMA, CodeCalibration, FixedCalibration};
+pub use observer::{FixedObserver, FixedObserverMemory};
 pub use receptor::{CodeMemory, CodeReading, CodeReceptor, FixedReceptor};

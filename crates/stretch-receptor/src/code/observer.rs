@@ -1,0 +1,327 @@
+//! The observer over converter codes, in integers.
+
+use stretch_core::{
+    Branch, Calibration, Design, DesignError, MAX_OBSERVER_PLAYS, MAX_OBSERVER_RELAXATIONS, Stage,
+    fixed::saturate,
+};
+
+use super::{
+    Adc, AdcCode, CodeReading,
+    observer_numbers::{KNOTS, Numbers, PLACE_BITS, SHARE_BITS, TARGET_BITS, WEIGHT_BITS},
+};
+use crate::{Domain, MAX_BRIDGED, Withheld, gains::SLOPES};
+
+/// The fastest rate: a whole range in a sample.
+const FASTEST: i32 = 1 << TARGET_BITS;
+/// The furthest that a relaxation goes.
+const FURTHEST: i32 = 8 << TARGET_BITS;
+/// The furthest that a drive goes.
+const MOST_DRIVE: i32 = 1 << 30;
+/// A secant is taken over at least this share of the way between knots.
+const LEAST_RUN: i32 = (1 << PLACE_BITS) / 100;
+
+/// An [`ObserverReceptor`](crate::ObserverReceptor) for converter codes, in
+/// 32-bit integers: the same filter with the same table of gains, codes in,
+/// thousandths of the reference's unit out (micrometres for millimetres).
+///
+/// Converted once, on a desk, by [`FixedObserver::new`]; with the feature
+/// `serde` it travels as a record of about 400 bytes. No step can overflow:
+/// numbers whose sums could are refused, states are clamped to where they can be.
+/// A code that the converter does not have is a missing sample, predicted over at
+/// most [`MAX_BRIDGED`] in a row.
+///
+/// ```
+/// use stretch_core::Runner;
+/// use stretch_receptor::code::{Adc, AdcCode, AdcSpec, FixedObserver};
+/// let adc = Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 })?;
+/// let calibration = stretch_receptor::example_observer();
+/// let mut receptor = Runner::new(FixedObserver::new(&calibration, &adc)?);
+/// let reading = receptor.step(AdcCode(1861)).expect("an observer needs no warm-up");
+/// assert!((150_000..=180_000).contains(&reading.estimate)); // micrometres
+/// # Ok::<(), stretch_core::DesignError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FixedObserver {
+    n: Numbers,
+    /// Places per signal inside each segment, times `2^recip_bits`.
+    recips: [i32; KNOTS],
+    recip_bits: u32,
+    /// The gains of each segment's slope.
+    tangents: [u8; KNOTS],
+    /// The signal where the target rests, memory settled.
+    at_rest: i32,
+}
+
+/// What a [`FixedObserver`] remembers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FixedObserverMemory {
+    target: i32,
+    /// A sample, not a second.
+    rate: i32,
+    slow: [i32; MAX_OBSERVER_RELAXATIONS],
+    plays: [i32; MAX_OBSERVER_PLAYS],
+    baseline: i32,
+    excess: i32,
+    branch: Branch,
+    begun: bool,
+    missing: u8,
+}
+
+impl FixedObserver {
+    /// The observer of a calibration over the codes of `adc`.
+    ///
+    /// # Errors
+    /// [`DesignError`] when the calibration is of another model or a number does
+    /// not fit its format.
+    pub fn new(calibration: &Calibration, adc: &Adc) -> Result<Self, DesignError> {
+        Numbers::new(calibration, adc).map(Self::of)
+    }
+
+    fn of(n: Numbers) -> Self {
+        let knots = usize::from(n.knots);
+        let rise = |k: usize| n.curve[k + 1] - n.curve[k];
+        let flattest = (0..knots - 1).map(rise).min().unwrap_or(1).max(1);
+        // the flattest segment has the largest reciprocal: it must fit
+        let mut recip_bits = 0;
+        while recip_bits < 31 && (2i64 << (PLACE_BITS + recip_bits)) / i64::from(flattest) < 1 << 31
+        {
+            recip_bits += 1;
+        }
+        let mut out = Self { n, recips: [0; KNOTS], recip_bits, tangents: [0; KNOTS], at_rest: 0 };
+        for k in 0..knots - 1 {
+            let whole = 1i64 << (PLACE_BITS + recip_bits);
+            out.recips[k] = saturate(whole / i64::from(rise(k)));
+            let steeper = n.ends.iter().take_while(|&&end| rise(k) >= end).count();
+            out.tangents[k] = steeper as u8;
+        }
+        out.at_rest = out.signal(n.low).0;
+        out
+    }
+
+    /// The place, in knots, that a signal suggests by itself, and the signal held to the curve.
+    #[inline(always)]
+    fn inverse(&self, signal: i32) -> (i32, i32) {
+        let last = usize::from(self.n.knots) - 1;
+        let held = signal.max(self.n.curve[0]).min(self.n.curve[last]);
+        let (mut below, mut above) = (0, last);
+        while above - below > 1 {
+            let middle = (below + above) / 2;
+            if self.n.curve[middle % KNOTS] <= held { below = middle } else { above = middle }
+        }
+        let below = below % KNOTS;
+        let part = i64::from(held - self.n.curve[below]) * i64::from(self.recips[below]);
+        let share = (part >> self.recip_bits) as i32;
+        (((below as i32) << PLACE_BITS) + share, held)
+    }
+
+    /// The signal at a drive, its segment, and its place held to the curve.
+    #[inline(always)]
+    fn signal(&self, drive: i32) -> (i32, usize, i32) {
+        let last = i32::from(self.n.knots) - 1;
+        let from_low = i64::from(drive.saturating_sub(self.n.drive_low));
+        let place = saturate((from_low * i64::from(self.n.per_step)) >> 32);
+        let place = place.max(0).min(last << PLACE_BITS);
+        let below = ((place >> PLACE_BITS).min(last - 1) as usize) % KNOTS;
+        let rise = self.n.curve[(below + 1) % KNOTS] - self.n.curve[below];
+        let share = place - ((below as i32) << PLACE_BITS);
+        let risen = (i64::from(rise) * i64::from(share)) >> PLACE_BITS;
+        (self.n.curve[below] + risen as i32, below, place)
+    }
+
+    /// The drive of a target that stands at `y` and moves by `rate` a sample.
+    #[inline(always)]
+    fn drive(&self, memory: &FixedObserverMemory, y: i32, rate: i32) -> i32 {
+        let mut sum = i64::from(self.n.lead) * i64::from(rate);
+        for i in 0..usize::from(self.n.relaxations).min(MAX_OBSERVER_RELAXATIONS) {
+            sum += i64::from(self.n.amplitudes[i]) * i64::from(y - memory.slow[i]);
+        }
+        for j in 0..usize::from(self.n.plays).min(MAX_OBSERVER_PLAYS) {
+            let played = play(memory.plays[j], y, self.n.radii[j]);
+            sum += i64::from(self.n.play_weights[j]) * i64::from(y - played);
+        }
+        let drive = i64::from(y) + (sum >> WEIGHT_BITS);
+        drive.clamp((-MOST_DRIVE).into(), MOST_DRIVE.into()) as i32
+    }
+
+    #[inline(always)]
+    fn predict(&self, memory: &mut FixedObserverMemory) {
+        memory.target = (memory.target + memory.rate).max(self.n.low).min(self.n.high);
+        for i in 0..usize::from(self.n.relaxations).min(MAX_OBSERVER_RELAXATIONS) {
+            let step = part(memory.target - memory.slow[i], self.n.shares[i]);
+            memory.slow[i] += step;
+        }
+    }
+
+    /// Takes in a signal above its baseline; whether it lay on the curve.
+    #[inline(always)]
+    fn correct(&self, memory: &mut FixedObserverMemory, signal: i32) -> bool {
+        let drive = self.drive(memory, memory.target, memory.rate);
+        let (predicted, segment, from) = self.signal(drive);
+        let (to, held) = self.inverse(signal);
+        let mut place = usize::from(self.tangents[segment]);
+        let (run, change) = ((to - from).abs(), (held - predicted).abs());
+        if run > LEAST_RUN {
+            // steeper than an end: change/run >= end, without a division
+            let change = i64::from(change) << PLACE_BITS;
+            while place < SLOPES - 1 && change >= i64::from(self.n.ends[place]) * i64::from(run) {
+                place += 1;
+            }
+        }
+        let last = self.n.curve[usize::from(self.n.knots - 1) % KNOTS];
+        let (first, span) = (self.n.curve[0], last - self.n.curve[0]);
+        let surprise = i64::from(signal.max(first - span).min(last + span) - predicted);
+        let gains = &self.n.gains[place.min(SLOPES - 1)];
+        let half = (1i64 << self.n.gain_bits) >> 1;
+        let pull = |k: usize| saturate((i64::from(gains[k]) * surprise + half) >> self.n.gain_bits);
+        memory.target = memory.target.saturating_add(pull(0));
+        memory.rate = memory.rate.saturating_add(pull(1)).max(-FASTEST).min(FASTEST);
+        for i in 0..usize::from(self.n.relaxations).min(MAX_OBSERVER_RELAXATIONS) {
+            let moved = memory.slow[i].saturating_add(pull(2 + i));
+            memory.slow[i] = moved.max(-FURTHEST).min(FURTHEST);
+        }
+        self.hold(memory);
+        held == signal
+    }
+
+    #[inline(always)]
+    fn hold(&self, memory: &mut FixedObserverMemory) {
+        if memory.target < self.n.low {
+            memory.target = self.n.low;
+            memory.rate = memory.rate.max(0);
+        }
+        if memory.target > self.n.high {
+            memory.target = self.n.high;
+            memory.rate = memory.rate.min(0);
+        }
+        for j in 0..usize::from(self.n.plays).min(MAX_OBSERVER_PLAYS) {
+            memory.plays[j] = play(memory.plays[j], memory.target, self.n.radii[j]);
+        }
+    }
+
+    /// The signal above the baseline, which is moved on.
+    #[inline(always)]
+    fn above_rest(&self, memory: &mut FixedObserverMemory, signal: i32) -> i32 {
+        let rest = &self.n.rest;
+        if rest.pull == 0 {
+            return signal;
+        }
+        let shift = if memory.begun {
+            self.signal(self.drive(memory, self.n.low, 0)).0 - self.at_rest
+        } else {
+            0
+        };
+        let excess = signal.saturating_sub(memory.baseline).saturating_sub(rest.level + shift);
+        let held = excess.max(-rest.most).min(rest.most);
+        memory.excess += part(held - memory.excess, rest.average);
+        let wanted = if memory.excess < 0 { part(memory.excess, rest.pull) } else { rest.leak };
+        let before = memory.baseline;
+        memory.baseline = (before + wanted).max(-rest.furthest).min(rest.furthest);
+        memory.excess -= memory.baseline - before;
+        signal - memory.baseline
+    }
+
+    fn begin(&self, memory: &mut FixedObserverMemory, signal: i32) {
+        let (place, _) = self.inverse(signal);
+        let drive =
+            ((i64::from(place) << 32) / i64::from(self.n.per_step)) + i64::from(self.n.drive_low);
+        let target = saturate(drive).max(self.n.low).min(self.n.high);
+        memory.target = target;
+        memory.rate = 0;
+        memory.slow = [target; MAX_OBSERVER_RELAXATIONS];
+        memory.plays = [target; MAX_OBSERVER_PLAYS];
+        memory.begun = true;
+    }
+
+    #[cold]
+    fn missed(&self, memory: &mut FixedObserverMemory) {
+        memory.missing = memory.missing.saturating_add(1);
+        if memory.missing <= MAX_BRIDGED && memory.begun {
+            self.predict(memory);
+            self.hold(memory);
+        } else {
+            let FixedObserverMemory { branch, baseline, excess, .. } = *memory;
+            let missing = MAX_BRIDGED;
+            *memory = FixedObserverMemory { branch, baseline, excess, missing, ..self.memory() };
+        }
+    }
+}
+
+impl Design for FixedObserver {
+    type Memory = FixedObserverMemory;
+
+    fn memory(&self) -> FixedObserverMemory {
+        FixedObserverMemory {
+            target: 0,
+            rate: 0,
+            slow: [0; MAX_OBSERVER_RELAXATIONS],
+            plays: [0; MAX_OBSERVER_PLAYS],
+            baseline: 0,
+            excess: 0,
+            branch: Branch::Inflation,
+            begun: false,
+            missing: 0,
+        }
+    }
+}
+
+impl Stage<AdcCode> for FixedObserver {
+    type Out = Result<CodeReading<i32>, Withheld>;
+
+    #[inline(always)]
+    fn step(&self, memory: &mut FixedObserverMemory, code: AdcCode) -> Self::Out {
+        if code.0 as u32 >= self.n.codes() {
+            self.missed(memory);
+            return Err(Withheld::Missing);
+        }
+        memory.missing = 0;
+        let signal = self.above_rest(memory, self.n.signal(code));
+        if memory.begun {
+            self.predict(memory);
+        } else {
+            self.begin(memory, signal);
+        }
+        let on_curve = self.correct(memory, signal);
+        if memory.rate > self.n.dead_band {
+            memory.branch = Branch::Inflation;
+        } else if memory.rate < -self.n.dead_band {
+            memory.branch = Branch::Deflation;
+        }
+        let scaled = self.n.zero + i64::from(self.n.gain) * i64::from(memory.target);
+        Ok(CodeReading {
+            estimate: saturate(scaled >> (TARGET_BITS + u32::from(self.n.output_bits))),
+            branch: memory.branch,
+            domain: Domain::from_flags(!on_curve, false),
+        })
+    }
+}
+
+/// A share of a number, rounded to the nearest.
+#[inline(always)]
+fn part(x: i32, share: i32) -> i32 {
+    ((i64::from(x) * i64::from(share) + (1 << (SHARE_BITS - 1))) >> SHARE_BITS) as i32
+}
+
+#[inline(always)]
+fn play(before: i32, x: i32, radius: i32) -> i32 {
+    before.max(x - radius).min(x + radius)
+}
+
+#[cfg(feature = "serde")]
+mod record {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
+
+    use super::{FixedObserver, Numbers};
+
+    impl Serialize for FixedObserver {
+        fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+            self.n.serialize(serializer)
+        }
+    }
+
+    impl<'de> Deserialize<'de> for FixedObserver {
+        fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+            let numbers = Numbers::deserialize(deserializer)?;
+            numbers.check().map(Self::of).map_err(D::Error::custom)
+        }
+    }
+}

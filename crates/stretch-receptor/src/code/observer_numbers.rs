@@ -1,0 +1,268 @@
+//! The integers of an observer: converted from a calibration, or checked as a record.
+
+use stretch_core::{
+    Calibration, DesignError, MAX_OBSERVER_PLAYS, MAX_OBSERVER_RELAXATIONS, Model, RestTracker,
+    fixed,
+};
+
+use super::{Adc, AdcCode};
+use crate::{
+    fold::{output, reference_dead_band, share_of},
+    gains::{Gains, SLOPES, STATES},
+};
+
+/// The most knots of a curve in fixed point.
+pub(super) const KNOTS: usize = 32;
+/// Bits behind the point of targets, drives, and rates a sample.
+pub(super) const TARGET_BITS: u32 = 26;
+/// Bits behind the point of weights in the drive.
+pub(super) const WEIGHT_BITS: u32 = 20;
+/// Bits behind the point of a place between knots.
+pub(super) const PLACE_BITS: u32 = 16;
+/// Bits behind the point of shares.
+pub(super) const SHARE_BITS: u32 = 31;
+/// Bits that a 16-bit sample is moved up by.
+pub(super) const SIGNAL_BITS: u32 = 12;
+/// Largest magnitudes: with them no sum of a step leaves 32 bits, no product 63.
+const MOST_SIGNAL: i32 = 1 << 28;
+const MOST_TARGET: i32 = 4 << TARGET_BITS;
+const MOST_WEIGHT: i32 = 16 << WEIGHT_BITS;
+const MOST_LEAD: i32 = 1000 << WEIGHT_BITS;
+/// A share of the signal's range that a sample counts beyond rest at most.
+const MOST_EXCESS: f64 = 0.1;
+
+/// Everything that a [`FixedObserver`](super::FixedObserver) computes with. Signals are in
+/// `2^-SIGNAL_BITS` of a 16-bit sample, signed by polarity.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Numbers {
+    pub schema: u32,
+    pub adc_bits: u8,
+    pub falling: bool,
+    pub knots: u8,
+    pub curve: [i32; KNOTS],
+    pub drive_low: i32,
+    /// Places per drive, times `2^(32 + PLACE_BITS - TARGET_BITS)`.
+    pub per_step: i32,
+    pub shares: [i32; MAX_OBSERVER_RELAXATIONS],
+    pub amplitudes: [i32; MAX_OBSERVER_RELAXATIONS],
+    pub lead: i32,
+    pub radii: [i32; MAX_OBSERVER_PLAYS],
+    pub play_weights: [i32; MAX_OBSERVER_PLAYS],
+    pub relaxations: u8,
+    pub plays: u8,
+    /// Signal per place between gains.
+    pub ends: [i32; SLOPES - 1],
+    /// State per signal, times `2^gain_bits`.
+    pub gains: [[i32; STATES]; SLOPES],
+    pub gain_bits: u8,
+    pub low: i32,
+    pub high: i32,
+    pub dead_band: i32,
+    /// Thousandths at a target of 0, a half included, and per target, times `2^output_bits`.
+    pub zero: i64,
+    pub gain: i32,
+    pub output_bits: u8,
+    /// Nothing is followed without a pull.
+    pub rest: Rest,
+}
+
+/// The baseline's numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Rest {
+    pub level: i32,
+    pub pull: i32,
+    pub leak: i32,
+    pub average: i32,
+    pub most: i32,
+    pub furthest: i32,
+}
+
+/// The schema of the records that this release writes, and the newest it reads.
+pub(super) const SCHEMA: u32 = 1;
+
+impl Numbers {
+    pub(super) fn new(calibration: &Calibration, adc: &Adc) -> Result<Self, DesignError> {
+        let Model::Observer(map) = &calibration.model else {
+            return Err(DesignError::OutOfRange { field: "model", value: f64::NAN });
+        };
+        let sign = calibration.polarity.sign();
+        let period_s = calibration.sample_rate_hz.period_s();
+        let spec = adc.spec();
+        let step_v = adc.volts_per_code() / f64::from(1u32 << (16 - spec.bits));
+        let per_volt = f64::from(1 << SIGNAL_BITS) / step_v;
+        let span = |volts: f64| round("fixed.signal", volts * per_volt);
+        let at = |volts: f64| round("fixed.signal", sign * (volts - spec.zero_v) * per_volt);
+        let knots = map.curve.len();
+        if knots > KNOTS {
+            return Err(DesignError::TooLarge { field: "fixed.curve", asked: knots, most: KNOTS });
+        }
+        let mut curve = [0; KNOTS];
+        for (place, &volts) in curve.iter_mut().zip(map.curve.iter()) {
+            *place = at(volts)?;
+        }
+        let drive = map.drive_domain;
+        let step = (drive.max - drive.min) / (knots - 1) as f64;
+        let slopes = map.curve.windows(2).map(|pair| sign * (pair[1] - pair[0]) / step);
+        let (flattest, steepest) =
+            slopes.fold((f64::INFINITY, 0.0), |(a, b): (f64, f64), s| (a.min(s), b.max(s)));
+        DesignError::check("rise of observer.curve", flattest, flattest > 0.0)?;
+        let gains = Gains::new(map, period_s, flattest, steepest)?;
+        // state per signal; the rate a sample, not a second
+        let of = gains.of.map(|mut of| {
+            of[1] *= period_s;
+            of.map(|gain| gain / per_volt * f64::from(1 << TARGET_BITS))
+        });
+        let largest = of.iter().flatten().fold(f64::MIN_POSITIVE, |most, k| most.max(k.abs()));
+        let gain_bits = bits_for(largest).min(40);
+        let mut rounded = [[0; STATES]; SLOPES];
+        for (row, gains) in rounded.iter_mut().zip(&of) {
+            for (place, &gain) in row.iter_mut().zip(gains) {
+                *place = fixed::from_f64("fixed.gains", gain, gain_bits)?;
+            }
+        }
+        let mut ends = [0; SLOPES - 1];
+        for (place, &end) in ends.iter_mut().zip(&gains.ends) {
+            *place = span(end * step)?;
+        }
+        let (gain, zero) = output(calibration);
+        let (gain, zero) = (1000.0 * gain, 1000.0 * zero);
+        let output_bits = bits_for(gain.abs()).min(20);
+        let target = |x: f64| fixed::from_f64("fixed.target", x, TARGET_BITS);
+        let share = |x: f64| fixed::from_f64("fixed.share", x.min(1.0 - 1e-9), SHARE_BITS);
+        let weight = |x: f64| fixed::from_f64("fixed.weight", x, WEIGHT_BITS);
+        let place_bits = 32 + PLACE_BITS - TARGET_BITS;
+        let rest = match map.rest {
+            None => Rest { level: 0, pull: 0, leak: 0, average: 0, most: 0, furthest: 0 },
+            Some(rest) => Rest {
+                level: at(rest.level)?,
+                pull: share(period_s / rest.catch_up_s)?,
+                leak: span(rest.leak * period_s)?,
+                average: share(share_of(period_s, RestTracker::AVERAGE_S))?,
+                most: span(MOST_EXCESS * calibration.signal_range.span())?,
+                furthest: span(RestTracker::FURTHEST * calibration.signal_range.span())?,
+            },
+        };
+        let half = 0.5;
+        Self {
+            schema: SCHEMA,
+            adc_bits: spec.bits,
+            falling: sign < 0.0,
+            knots: knots as u8,
+            curve,
+            drive_low: target(drive.min)?,
+            per_step: fixed::from_f64("fixed.drive", step.recip(), place_bits)?,
+            shares: each(&map.relaxations_s, |tau| share(share_of(period_s, tau)))?,
+            amplitudes: each(&map.amplitudes, weight)?,
+            lead: weight(map.lead_s / period_s)?,
+            radii: each(&map.radii, target)?,
+            play_weights: each(&map.play_weights, weight)?,
+            relaxations: map.relaxations_s.len() as u8,
+            plays: map.radii.len() as u8,
+            ends,
+            gains: rounded,
+            gain_bits: gain_bits as u8,
+            low: target(map.estimate_domain.min)?,
+            high: target(map.estimate_domain.max)?,
+            dead_band: target(
+                (reference_dead_band(calibration) / (gain / 1000.0)).abs() * period_s,
+            )?,
+            zero: libm::ldexp(zero, (TARGET_BITS + output_bits) as i32) as i64
+                + libm::ldexp(half, (TARGET_BITS + output_bits) as i32) as i64,
+            gain: fixed::from_f64("fixed.gain", gain, output_bits)?,
+            output_bits: output_bits as u8,
+            rest,
+        }
+        .check()
+    }
+
+    /// Refuses what a step could not compute with.
+    pub(super) fn check(self) -> Result<Self, DesignError> {
+        if !(1..=SCHEMA).contains(&self.schema) {
+            return Err(DesignError::Schema { found: self.schema, newest: SCHEMA });
+        }
+        let within = |field, x: i32, most: i32| {
+            DesignError::check(field, x.into(), x.unsigned_abs() <= most as u32).map(|_| ())
+        };
+        let holds = |field, value: f64, holds| DesignError::check(field, value, holds).map(|_| ());
+        let knots = usize::from(self.knots);
+        holds("adc.bits", self.adc_bits.into(), (1..=16).contains(&self.adc_bits))?;
+        holds("fixed.knots", knots as f64, (2..=KNOTS).contains(&knots))?;
+        for &knot in &self.curve[..knots] {
+            within("fixed.curve", knot, 4 * MOST_SIGNAL / 2)?;
+        }
+        for pair in self.curve[..knots].windows(2) {
+            let rise = f64::from(pair[1]) - f64::from(pair[0]);
+            holds("rise of fixed.curve", rise, rise > 0.0 && rise <= f64::from(MOST_SIGNAL))?;
+        }
+        let span = f64::from(self.curve[knots - 1]) - f64::from(self.curve[0]);
+        holds("span of fixed.curve", span, span <= f64::from(MOST_SIGNAL))?;
+        within("fixed.drive_low", self.drive_low, MOST_TARGET)?;
+        holds("fixed.per_step", self.per_step.into(), self.per_step > 0)?;
+        for share in self.shares.into_iter().chain([self.rest.pull, self.rest.average]) {
+            holds("fixed.share", share.into(), share >= 0)?;
+        }
+        for weight in self.amplitudes.into_iter().chain(self.play_weights) {
+            within("fixed.weight", weight, MOST_WEIGHT)?;
+        }
+        within("fixed.lead", self.lead, MOST_LEAD)?;
+        for target in self.radii.into_iter().chain([self.low, self.high]) {
+            within("fixed.target", target, MOST_TARGET)?;
+        }
+        holds("fixed.low", self.low.into(), self.low < self.high)?;
+        holds("fixed.dead_band", self.dead_band.into(), self.dead_band >= 0)?;
+        let counts = usize::from(self.relaxations) <= MAX_OBSERVER_RELAXATIONS
+            && usize::from(self.plays) <= MAX_OBSERVER_PLAYS;
+        holds("fixed.relaxations", self.relaxations.into(), counts)?;
+        holds("fixed.gain_bits", self.gain_bits.into(), self.gain_bits <= 40)?;
+        holds("fixed.output_bits", self.output_bits.into(), self.output_bits <= 20)?;
+        holds("fixed.zero", self.zero as f64, self.zero.unsigned_abs() <= 1 << 60)?;
+        for &end in &self.ends {
+            holds("fixed.ends", end.into(), (0..=MOST_SIGNAL).contains(&end))?;
+        }
+        let Rest { level, leak, most, furthest, .. } = self.rest;
+        within("fixed.level", level, 4 * MOST_SIGNAL / 2)?;
+        for size in [leak, most, furthest] {
+            holds("fixed.rest", size.into(), (0..=MOST_SIGNAL).contains(&size))?;
+        }
+        Ok(self)
+    }
+
+    /// The first number that is no code.
+    pub(super) fn codes(&self) -> u32 {
+        1 << self.adc_bits
+    }
+
+    /// A code of the converter as a signed signal.
+    #[inline(always)]
+    pub(super) fn signal(&self, code: AdcCode) -> i32 {
+        let aligned = code.0 << (16 - u32::from(self.adc_bits) + SIGNAL_BITS);
+        if self.falling { -aligned } else { aligned }
+    }
+}
+
+fn round(field: &'static str, x: f64) -> Result<i32, DesignError> {
+    fixed::from_f64(field, x, 0)
+}
+
+fn each<const N: usize>(
+    values: &[f64],
+    convert: impl Fn(f64) -> Result<i32, DesignError>,
+) -> Result<[i32; N], DesignError> {
+    let mut out = [0; N];
+    for (place, &value) in out.iter_mut().zip(values) {
+        *place = convert(value)?;
+    }
+    Ok(out)
+}
+
+/// How many bits behind the point leave `largest` inside 31.
+fn bits_for(largest: f64) -> u32 {
+    let (mut bits, mut scaled) = (0, largest);
+    while bits < 60 && 2.0 * scaled < f64::from(i32::MAX) {
+        scaled *= 2.0;
+        bits += 1;
+    }
+    bits
+}

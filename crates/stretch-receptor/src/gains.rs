@@ -1,0 +1,161 @@
+//! The gains that a Kalman filter settles at, slope by slope.
+
+use stretch_core::{DesignError, MAX_OBSERVER_RELAXATIONS, ObserverMap};
+
+use crate::fold::share_of;
+
+/// Target, its rate, and the relaxations.
+pub(crate) const STATES: usize = 2 + MAX_OBSERVER_RELAXATIONS;
+/// Slopes of the curve that gains are made for, evenly spaced in ratio from its
+/// flattest to its steepest. Twice and eight times as many gave the same errors.
+pub(crate) const SLOPES: usize = 12;
+/// Doublings at most: the filter after `2^n` samples.
+const DOUBLINGS: usize = 30;
+/// A change of the covariance below this share ends the doubling.
+const SETTLED: f64 = 1e-12;
+
+pub(crate) type Square = [[f64; STATES]; STATES];
+
+/// A gain a slope, and the slopes between which each is the nearest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Gains {
+    /// Below `ends[k]` and not below `ends[k - 1]` the gains are `of[k]`; the last has no end.
+    pub(crate) ends: [f64; SLOPES - 1],
+    /// State per signal, for target, rate and relaxations.
+    pub(crate) of: [[f64; STATES]; SLOPES],
+}
+
+impl Gains {
+    /// The gains of `map` at `period_s`, for a curve whose steps have slopes from
+    /// `flattest` to `steepest` in signal per drive.
+    pub(crate) fn new(
+        map: &ObserverMap,
+        period_s: f64,
+        flattest: f64,
+        steepest: f64,
+    ) -> Result<Self, DesignError> {
+        let ratio = libm::pow(steepest / flattest, 1.0 / (SLOPES - 1) as f64);
+        let mut gains = Self { ends: [0.0; SLOPES - 1], of: [[0.0; STATES]; SLOPES] };
+        let mut slope = flattest;
+        for k in 0..SLOPES {
+            gains.of[k] = settled(map, period_s, slope);
+            for gain in gains.of[k] {
+                DesignError::check("gain of observer", gain, true)?;
+            }
+            if k + 1 < SLOPES {
+                gains.ends[k] = slope * libm::sqrt(ratio);
+            }
+            slope *= ratio;
+        }
+        Ok(gains)
+    }
+}
+
+/// The gain of the filter that has seen one slope for ever.
+///
+/// Source: structure-preserving doubling, Chu et al. 2004,
+/// doi:10.1080/00207170410001714988.
+fn settled(map: &ObserverMap, period_s: f64, slope: f64) -> [f64; STATES] {
+    let (mut a, mut g, mut p) = (identity(), [[0.0; STATES]; STATES], [[0.0; STATES]; STATES]);
+    let mut gradient = [0.0; STATES];
+    (gradient[0], gradient[1]) = (1.0, map.lead_s);
+    for (i, (&tau, &amplitude)) in map.relaxations_s.iter().zip(map.amplitudes.iter()).enumerate() {
+        let share = share_of(period_s, tau);
+        (gradient[0], gradient[2 + i]) = (gradient[0] + amplitude, -amplitude);
+        // the transition, transposed: a relaxation follows the target as predicted
+        (a[0][2 + i], a[1][2 + i], a[2 + i][2 + i]) = (share, share * period_s, 1.0 - share);
+    }
+    a[1][0] = period_s;
+    // what no relaxation uses would stay as it is for ever
+    for unused in 2 + map.relaxations_s.len()..STATES {
+        a[unused][unused] = 0.0;
+    }
+    let noise = map.noise * map.noise;
+    for i in 0..STATES {
+        for j in 0..STATES {
+            g[i][j] = slope * slope * gradient[i] * gradient[j] / noise;
+        }
+    }
+    p[1][1] = map.agility * period_s;
+    for _ in 0..DOUBLINGS {
+        let Some(inverse) = inverse(&plus(&identity(), &times(&g, &p))) else { break };
+        let half = times(&a, &inverse);
+        let more = times(&times(&transposed(&a), &p), &times(&inverse, &a));
+        g = plus(&g, &times(&half, &times(&g, &transposed(&a))));
+        a = times(&half, &a);
+        p = plus(&p, &more);
+        if more[0][0].abs() <= SETTLED * p[0][0] {
+            break;
+        }
+    }
+    let mut reach = [0.0; STATES];
+    let mut spread = noise;
+    for i in 0..STATES {
+        reach[i] = slope * (0..STATES).map(|j| p[i][j] * gradient[j]).sum::<f64>();
+        spread += slope * reach[i] * gradient[i];
+    }
+    reach.map(|r| r / spread)
+}
+
+fn identity() -> Square {
+    let mut out = [[0.0; STATES]; STATES];
+    for i in 0..STATES {
+        out[i][i] = 1.0;
+    }
+    out
+}
+
+fn transposed(x: &Square) -> Square {
+    let mut out = *x;
+    for i in 0..STATES {
+        for j in 0..STATES {
+            out[i][j] = x[j][i];
+        }
+    }
+    out
+}
+
+fn plus(x: &Square, y: &Square) -> Square {
+    let mut out = *x;
+    for (row, other) in out.iter_mut().zip(y) {
+        row.iter_mut().zip(other).for_each(|(a, b)| *a += b);
+    }
+    out
+}
+
+fn times(x: &Square, y: &Square) -> Square {
+    let mut out = [[0.0; STATES]; STATES];
+    for i in 0..STATES {
+        for j in 0..STATES {
+            out[i][j] = (0..STATES).map(|k| x[i][k] * y[k][j]).sum();
+        }
+    }
+    out
+}
+
+/// By Gauss and Jordan with row exchanges; none for a singular one.
+fn inverse(x: &Square) -> Option<Square> {
+    let (mut left, mut right) = (*x, identity());
+    for i in 0..STATES {
+        let size = |row: &usize| left[*row][i].abs();
+        let pivot = (i..STATES).max_by(|a, b| size(a).total_cmp(&size(b)))?;
+        left.swap(i, pivot);
+        right.swap(i, pivot);
+        let scale = left[i][i];
+        if !(scale.abs() > 0.0 && scale.is_finite()) {
+            return None;
+        }
+        for j in 0..STATES {
+            left[i][j] /= scale;
+            right[i][j] /= scale;
+        }
+        for row in (0..STATES).filter(|&row| row != i) {
+            let share = left[row][i];
+            for j in 0..STATES {
+                left[row][j] -= share * left[i][j];
+                right[row][j] -= share * right[i][j];
+            }
+        }
+    }
+    Some(right)
+}

@@ -1,0 +1,152 @@
+//! The observer in integers against the one in `f64`: the same answers to a
+//! share of a micrometre-scale bound, no overflow on any stream, whole records.
+
+use proptest::prelude::*;
+use stretch_core::{Calibration, Runner, Stage, Volts};
+use stretch_receptor::{
+    Domain, ObserverReceptor, Withheld,
+    code::{Adc, AdcCode, AdcSpec, FixedObserver},
+    example_calibration, example_observer, strategies,
+};
+
+fn adc() -> Adc {
+    Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 }).expect("a converter")
+}
+
+/// Both on the same codes: what each answers.
+fn both(
+    calibration: &Calibration,
+    codes: &[AdcCode],
+) -> Vec<(Result<f64, Withheld>, Result<f64, Withheld>)> {
+    let mut fixed = Runner::new(FixedObserver::new(calibration, &adc()).expect("it fits"));
+    let mut float = Runner::new(ObserverReceptor::<f64>::new(calibration).expect("an observer"));
+    let step = |&code: &AdcCode| {
+        let volts = adc().volts(code).unwrap_or(f64::NAN);
+        (
+            fixed.step(code).map(|reading| 1e-3 * f64::from(reading.estimate)),
+            float.step(Volts(volts)).map(|reading| reading.estimate),
+        )
+    };
+    codes.iter().map(step).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Rounding may choose the neighbour of a gain where a slope lies between two:
+    /// the estimates part for a moment and meet again.
+    #[test]
+    fn integers_answer_as_floats_do(
+        calibration in stretch_core::strategies::observer_calibration(),
+        stream in strategies::clean_stream(300),
+    ) {
+        let codes: Vec<AdcCode> = stream.iter().map(|&v| adc().code(v)).collect();
+        let span = calibration.target_range.span() * calibration.target.reference_per_target().abs();
+        let answers = both(&calibration, &codes);
+        let apart = |share: f64| {
+            answers.iter().filter(|(a, b)| match (a, b) {
+                (Ok(a), Ok(b)) => (a - b).abs() > share * span + 1e-3,
+                _ => true,
+            }).count()
+        };
+        let most = testkit::tolerance::FIXED_OBSERVER;
+        prop_assert!(apart(most) <= codes.len() / 10, "{} of {}", apart(most), codes.len());
+    }
+
+    #[test]
+    fn no_code_overflows_a_step(
+        calibration in stretch_core::strategies::observer_calibration(),
+        codes in proptest::collection::vec(prop_oneof![
+            8 => 0..4096i32,
+            1 => any::<i32>(),
+            1 => prop_oneof![Just(0), Just(4095), Just(-1)],
+        ], 300),
+    ) {
+        let mut receptor = Runner::new(FixedObserver::new(&calibration, &adc()).unwrap());
+        let range = calibration.target_range;
+        let ends = [0.0, 1.0].map(|t| calibration.target.to_reference(range.denormalise(t)));
+        let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+        for code in codes {
+            match receptor.step(AdcCode(code)) {
+                Ok(reading) => {
+                    let estimate = 1e-3 * f64::from(reading.estimate);
+                    prop_assert!((low - 0.01..=high + 0.01).contains(&estimate), "{estimate}");
+                }
+                Err(withheld) => {
+                    prop_assert!(!(0..4096).contains(&code) && withheld == Withheld::Missing);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn records_keep_every_bit(calibration in stretch_core::strategies::observer_calibration()) {
+        let fixed = FixedObserver::new(&calibration, &adc()).unwrap();
+        let mut buffer = [0; 1024];
+        let bytes = postcard::to_slice(&fixed, &mut buffer).unwrap();
+        prop_assert_eq!(postcard::from_bytes::<FixedObserver>(bytes).unwrap(), fixed);
+    }
+
+    /// Whatever bytes come: a record that is refused, or one whose steps are sound.
+    #[test]
+    fn spoilt_records_never_panic(
+        place in 0usize..400, byte in any::<u8>(), codes in proptest::collection::vec(0..4096i32, 50),
+    ) {
+        let fixed = FixedObserver::new(&example_observer(), &adc()).unwrap();
+        let mut buffer = [0; 1024];
+        let length = postcard::to_slice(&fixed, &mut buffer).unwrap().len();
+        buffer[place % length] = byte;
+        if let Ok(fixed) = postcard::from_bytes::<FixedObserver>(&buffer[..length]) {
+            let mut receptor = Runner::new(fixed);
+            for code in codes {
+                let _ = receptor.step(AdcCode(code));
+            }
+        }
+    }
+}
+
+/// A smooth motion and its signal: the difference is that of rounding.
+#[test]
+fn a_smooth_motion_differs_by_rounding() {
+    let codes: Vec<AdcCode> = (0..4000)
+        .map(|n| {
+            let t = 0.01 * f64::from(n);
+            adc().code(1.55 + 0.3 * (2.0 * t).sin() + 0.12 * (7.1 * t).sin())
+        })
+        .collect();
+    let squares: Vec<f64> = both(&example_observer(), &codes)
+        .into_iter()
+        .map(|(a, b)| (a.unwrap() - b.unwrap()).powi(2))
+        .collect();
+    let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+    // a stroke of 29.7 mm, thousandths rounded to 0.29 um rms
+    assert!(rms < 0.002, "{rms} mm");
+}
+
+#[test]
+fn a_gap_is_bridged_and_a_long_one_forgets() {
+    let design = FixedObserver::new(&example_observer(), &adc()).unwrap();
+    let mut receptor = Runner::new(design);
+    let settled = (0..200).map(|_| receptor.step(AdcCode(1900)).unwrap()).last().unwrap();
+    assert_eq!(settled.domain, Domain::Inside);
+    for _ in 0..3 {
+        assert_eq!(receptor.step(AdcCode::MISSING), Err(Withheld::Missing));
+    }
+    let after = receptor.step(AdcCode(1900)).unwrap();
+    assert!((after.estimate - settled.estimate).abs() < 20, "{after:?} {settled:?}");
+    for _ in 0..10 {
+        let _ = receptor.step(AdcCode::MISSING);
+    }
+    let mut fresh = Runner::new(design);
+    assert_eq!(
+        receptor.step(AdcCode(1500)).unwrap().estimate,
+        fresh.step(AdcCode(1500)).unwrap().estimate
+    );
+}
+
+#[test]
+fn another_model_is_refused() {
+    assert!(FixedObserver::new(&example_calibration(), &adc()).is_err());
+    fn stage<S: Stage<AdcCode>>(_: S) {}
+    stage(FixedObserver::new(&example_observer(), &adc()).unwrap());
+}

@@ -1,0 +1,17 @@
+//! Volts to millimetres by both surfaces, mixed, in `f32`.
+#![no_std]
+#![no_main]
+
+use stretch_core::Calibration;
+use stretch_filter::SgRate;
+use stretch_firmware::program;
+use stretch_receptor::BlendedReceptor;
+
+type Receptor = BlendedReceptor<f32, SgRate<f32, 11, 2>>;
+
+fn make(calibration: Calibration) -> Receptor {
+    let rate = SgRate::new(calibration.sample_rate_hz).expect("a rate that can be designed");
+    Receptor::with_rate(&calibration, rate).expect("a calibration that fits f32")
+}
+
+program!(volts, Receptor, make, "blended" from "blended");

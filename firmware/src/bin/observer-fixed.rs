@@ -1,0 +1,13 @@
+//! Codes to micrometres by the gauge's forward model and a filter, in integers.
+#![no_std]
+#![no_main]
+
+use core::convert::identity;
+use stretch_firmware::program;
+use stretch_receptor::code::FixedObserver;
+
+program!(
+    codes, FixedObserver, i32, identity,
+    "observer-fixed" from "observer-fixed",
+    "observer+rest-fixed" from "observer-rest-fixed",
+);

@@ -11,6 +11,7 @@
 //! All errors are root mean squares on trials that were never fitted. Intervals
 //! come from a block bootstrap over half-second blocks.
 
+mod coverage;
 mod data;
 mod measured;
 mod score;
@@ -70,12 +71,13 @@ fn main() -> anyhow::Result<()> {
     let chosen =
         only.iter().filter(|o| simulated::is_effect(o)).map(|o| o.as_str()).collect::<Vec<_>>();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let parts: [(&str, Part<'_>); 5] = [
+    let parts: [(&str, Part<'_>); 6] = [
         ("why", &|| why::tables(root, seeds)),
         ("candidates", &|| simulated::candidates(seeds)),
         ("effects", &|| simulated::effects(seeds, &chosen)),
         ("robust", &|| simulated::robustness(seeds)),
         ("measured", &|| measured::tables(root)),
+        ("coverage", &coverage::tables),
     ];
     for (name, tables) in parts {
         if !only.is_empty()

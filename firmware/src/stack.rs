@@ -1,6 +1,6 @@
 //! How deep the stack went.
 
-const DEPTH: usize = 1024;
+const DEPTH: usize = 4096;
 const PAINT: u32 = 0xa5c3_5a3c;
 
 /// Paints the kilobyte below the caller's frame.

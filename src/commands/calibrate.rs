@@ -307,6 +307,7 @@ pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Res
             r.lag_s.map_or("-".to_owned(), |lag| format!("{:.0}", 1e3 * lag)),
             maybe(r.worst),
             r.parameters.to_string(),
+            instructions(r),
             r.excess.map_or("-".to_owned(), excess),
             if r.model == choice.model.to_string() { "chosen".to_owned() } else { String::new() },
         ]
@@ -320,10 +321,21 @@ pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Res
         "delay ms",
         "worst",
         "numbers",
+        "M3 instr.",
         "over the best, squared",
         "",
     ];
-    say(table(&header, choice.rows.iter().map(row)))
+    say(table(&header, choice.rows.iter().map(row)))?;
+    say("M3 instr.: instructions a sample on a Cortex-M3, f32 (fixed point), as measured.")
+}
+
+/// From volts in `f32`, and in fixed point where the model has that form.
+fn instructions(row: &ModelRow) -> String {
+    match (row.m3_instructions, row.m3_instructions_fixed) {
+        (Some(float), Some(fixed)) => format!("{float:.0} ({fixed:.0})"),
+        (Some(float), None) => format!("{float:.0}"),
+        _ => "-".to_owned(),
+    }
 }
 
 /// The tables of a calibration, as the paper prints them.

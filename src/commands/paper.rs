@@ -68,9 +68,10 @@ pub(super) fn run(out: &Path, seed: u64, json: bool) -> anyhow::Result<()> {
             number(point.ours_rmse_mm[0]),
             number(point.published_rmse_mm[2]),
             number(point.ours_rmse_mm[2]),
+            number(point.ours_rmse_mm[3]),
         ]
     });
-    say(table(&["gap s", "raw", "as published", "ours"], rows))?;
+    say(table(&["gap s", "raw", "as published", "ours", "observer"], rows))?;
     say("\nFrequency response of the sensor (3 mm about mid-stroke):")?;
     let rows = experiment.frequency.iter().map(|point| {
         vec![
@@ -147,7 +148,15 @@ pub(crate) fn error_rows(
             number(b.rmse),
         ]
     };
-    there.pooled.iter().zip(paper).zip(&here.pooled).map(row).collect()
+    let beside = there.pooled.iter().zip(paper).zip(&here.pooled).map(row);
+    // what the paper has not
+    let alone = here.pooled[there.pooled.len()..].iter().map(|m| {
+        let mut cells = vec![format!("{} (not in the paper)", m.method)];
+        cells.extend(std::iter::repeat_n("-".to_owned(), 4));
+        cells.extend([number(m.average_error_percent), number(m.rmse)]);
+        cells
+    });
+    beside.chain(alone).collect()
 }
 
 /// Plain sentences, each decided by the figures.

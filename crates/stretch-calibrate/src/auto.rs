@@ -8,6 +8,7 @@ use stretch_metrics::lag;
 use crate::{
     CalibrateError, Memory, ModelKind, Options, apply,
     calibrate::{Choice, calibrate_with},
+    cost::{m3_instructions, m3_instructions_fixed},
     series::{extent, sample_rate_hz},
 };
 
@@ -24,7 +25,7 @@ const TURN: f64 = 0.1;
 /// A root mean square error this close to the best, as a share, is as good.
 const AS_GOOD: f64 = 1.05;
 /// What following the baseline may cost, as a ratio of root mean square errors on
-/// trials without drift: with it, 5 % of drift costs a quarter less.
+/// trials left out: with it, a drift of 5 % in a minute costs a quarter less.
 const PREMIUM: f64 = 1.05;
 /// Turns that make a trial one that reverses.
 const LEAST_TURNS: usize = 3;
@@ -37,6 +38,10 @@ pub struct ModelRow {
     pub model: String,
     /// Numbers that the fit determines.
     pub parameters: usize,
+    /// Instructions a sample on a Cortex-M3, from volts in `f32`, as measured.
+    pub m3_instructions: Option<f64>,
+    /// The same in fixed point, where the model has that form.
+    pub m3_instructions_fixed: Option<f64>,
     /// Root mean square error on trials left out, in the reference's unit.
     pub rmse: Option<f64>,
     /// The same on trials that reverse at will.
@@ -69,7 +74,7 @@ pub struct ModelChoice {
 }
 
 /// Every model that is tried, without and with a followed baseline.
-fn candidates() -> Vec<ModelKind> {
+pub(crate) fn candidates() -> Vec<ModelKind> {
     let mut kinds = vec![
         ModelKind::Linear,
         ModelKind::Surface(Degree::POLY13),
@@ -383,6 +388,8 @@ fn row(
     ModelRow {
         model: kind.to_string(),
         parameters,
+        m3_instructions: m3_instructions(kind),
+        m3_instructions_fixed: m3_instructions_fixed(kind),
         rmse: errors.as_ref().and_then(|e| rmse(all(e))),
         rmse_arbitrary: of(0),
         rmse_pulses: of(1),

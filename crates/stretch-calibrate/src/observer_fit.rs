@@ -10,15 +10,16 @@ use stretch_receptor::ObserverReceptor;
 use crate::{
     CalibrateError, Coefficient, FitReport, Memory, Order,
     calibrate::{Fitted, Prepared},
-    dense::{Sums, block_errors},
+    dense::Sums,
+    observer_bounds::bounds,
     rest::rested,
     rising::rising,
 };
 
 /// Knots of the curve.
-const KNOTS: usize = 25;
+pub(crate) const KNOTS: usize = 25;
 /// Weight of the curve's second differences against a sample's residual.
-const BEND: f64 = 1e-3;
+pub(crate) const BEND: f64 = 1e-3;
 /// Ridge on the dynamic parameters, as a share of each one's own power.
 const RIDGE: f64 = 1e-4;
 /// The least a curve rises over its whole length, as a share of the signal's range.
@@ -37,33 +38,31 @@ const WORTH: f64 = 0.97;
 const SMOOTH: usize = 7;
 /// How fast a live baseline gives way, in seconds: its level is exact, so at once.
 const LIVE_CATCH_UP_S: f64 = 0.02;
-const SETTLE: usize = 10;
-const BLOCK_S: f64 = 0.5;
+pub(crate) const SETTLE: usize = 10;
 
 /// What a fit was chosen to be; given again, it is fitted without choosing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ObserverChoice {
-    taus: [Option<f64>; 2],
+    pub(crate) taus: [Option<f64>; 2],
     plays: bool,
     agility: f64,
     pub(crate) rest: Option<RestTracker>,
 }
 
 /// A piece of a trial: signal above its baseline, the target smoothed, its rate.
-struct Piece {
-    signal: Vec<f64>,
-    smooth: Vec<f64>,
+pub(crate) struct Piece {
+    pub(crate) signal: Vec<f64>,
+    pub(crate) smooth: Vec<f64>,
     rate: Vec<f64>,
 }
 
 /// A forward model in signed signal.
-struct Forward {
-    choice: ObserverChoice,
-    curve: Vec<f64>,
-    drive: Interval,
+pub(crate) struct Forward {
+    pub(crate) choice: ObserverChoice,
+    pub(crate) curve: Vec<f64>,
+    pub(crate) drive: Interval,
     /// Lead, amplitudes, weights of the plays.
-    dynamics: Vec<f64>,
-    errors: Vec<f64>,
+    pub(crate) dynamics: Vec<f64>,
     noise: f64,
 }
 
@@ -103,7 +102,10 @@ pub(crate) fn observer(
     let mut names = vec!["lead, s".to_owned()];
     names.extend(choice.taus().map(|tau| format!("relaxation over {tau:.3} s")));
     names.extend(choice.radii().iter().map(|w| format!("play of {w} of the range")));
-    let coefficients = names.into_iter().zip(&forward.dynamics).zip(&forward.errors);
+    names.extend(choice.taus().map(|_| "time constant, s".to_owned()));
+    let values: Vec<f64> = forward.dynamics.iter().copied().chain(choice.taus()).collect();
+    let errors = bounds(&pieces(prepared, choice.rest)?, &forward, prepared.sample_rate.period_s());
+    let coefficients = names.into_iter().zip(&values).zip(&errors);
     let coefficients =
         coefficients.map(|((name, &w), &e)| Coefficient::named(name, w, 1.96 * e)).collect();
     let kind = Memory::Observer.to_string();
@@ -128,7 +130,7 @@ pub(crate) fn observer(
 }
 
 impl ObserverChoice {
-    fn taus(&self) -> impl Iterator<Item = f64> {
+    pub(crate) fn taus(&self) -> impl Iterator<Item = f64> {
         self.taus.into_iter().flatten()
     }
 
@@ -259,7 +261,7 @@ fn pieces(prepared: &Prepared, rest: Option<RestTracker>) -> Result<Vec<Piece>, 
 }
 
 /// What each dynamic parameter adds to the drive, a sample.
-fn features(piece: &Piece, choice: ObserverChoice, period_s: f64) -> Vec<Vec<f64>> {
+pub(crate) fn features(piece: &Piece, choice: ObserverChoice, period_s: f64) -> Vec<Vec<f64>> {
     let first = piece.smooth[0];
     let mut slow: Vec<(f64, f64)> =
         choice.taus().map(|tau| (first, -(-period_s / tau).exp_m1())).collect();
@@ -325,15 +327,15 @@ fn forward(
     if let Some((knots, _)) = solve(&samples, &dynamics, drive, None) {
         curve = rising(&knots, least_step);
     }
-    let (noise, errors) = residuals(&samples, &dynamics, drive, &curve, prepared.sample_rate.hz());
+    let noise = spread(&samples, &dynamics, drive, &curve);
     // a curve that follows noiseless data exactly still needs a noise to weigh with
     let noise = noise.max(1e-6 * (range.max - range.min));
-    Ok(Forward { choice, curve, drive, dynamics, errors, noise })
+    Ok(Forward { choice, curve, drive, dynamics, noise })
 }
 
-type Sample<'a> = (f64, &'a [f64], f64);
+pub(crate) type Sample<'a> = (f64, &'a [f64], f64);
 
-fn driven(sample: &Sample, dynamics: &[f64]) -> f64 {
+pub(crate) fn driven(sample: &Sample, dynamics: &[f64]) -> f64 {
     sample.0 + sample.1.iter().zip(dynamics).map(|(a, b)| a * b).sum::<f64>()
 }
 
@@ -352,7 +354,7 @@ fn drives(samples: &[Sample], dynamics: &[f64]) -> Result<Interval, CalibrateErr
 }
 
 /// The knot below a drive and the share of the way to the next.
-fn place(drive: f64, domain: Interval) -> (usize, f64) {
+pub(crate) fn place(drive: f64, domain: Interval) -> (usize, f64) {
     let most = (KNOTS - 1) as f64;
     let at = ((drive - domain.min) / (domain.max - domain.min)).clamp(0.0, 1.0) * most;
     let below = (at as usize).min(KNOTS - 2);
@@ -398,39 +400,14 @@ fn solve(
     solution.iter().all(|x| x.is_finite()).then(|| (knots.to_vec(), moved.to_vec()))
 }
 
-/// Spread of the signal around the model, and standard errors of the dynamics
-/// given the curve.
-fn residuals(
-    samples: &[Sample],
-    dynamics: &[f64],
-    drive: Interval,
-    curve: &[f64],
-    hz: f64,
-) -> (f64, Vec<f64>) {
-    let length = ((BLOCK_S * hz) as usize).max(1);
-    let per_knot = (KNOTS - 1) as f64 / (drive.max - drive.min);
-    let mut sums = Sums::new(dynamics.len());
-    let mut blocks: Vec<Vec<f64>> = Vec::new();
-    let mut squares = 0.0;
-    for (i, sample) in samples.iter().enumerate() {
+/// Spread of the signal around the model.
+fn spread(samples: &[Sample], dynamics: &[f64], drive: Interval, curve: &[f64]) -> f64 {
+    let square = |sample: &Sample| {
         let (below, share) = place(driven(sample, dynamics), drive);
         let rise = curve[below + 1] - curve[below];
-        let residual = sample.2 - curve[below] - share * rise;
-        squares += residual * residual;
-        let row: Vec<f64> = sample.1.iter().map(|f| rise * per_knot * f).collect();
-        sums.push(&row, residual);
-        if i % length == 0 {
-            blocks.push(vec![0.0; row.len()]);
-        }
-        if let Some(block) = blocks.last_mut() {
-            block.iter_mut().zip(&row).for_each(|(b, x)| *b += residual * x);
-        }
-    }
-    let errors = match sums.triangle(|_, diagonal| 1e-9 * diagonal + 1e-300) {
-        Some(triangle) => block_errors(&triangle, &blocks),
-        None => vec![f64::NAN; dynamics.len()],
+        (sample.2 - curve[below] - share * rise).powi(2)
     };
-    ((squares / samples.len() as f64).sqrt(), errors)
+    (samples.iter().map(square).sum::<f64>() / samples.len() as f64).sqrt()
 }
 
 fn map(prepared: &Prepared, forward: &Forward) -> Result<ObserverMap, CalibrateError> {

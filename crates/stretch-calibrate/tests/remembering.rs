@@ -99,7 +99,8 @@ fn auto_takes_a_model_that_remembers_where_that_shows() {
     assert_eq!(choice.rows.len(), 13);
     let chosen = choice.rows.iter().find(|row| row.model == choice.model.to_string()).unwrap();
     let best = choice.rows[0].rmse.unwrap();
-    let simpler = chosen.parameters <= choice.rows[0].parameters;
+    // a followed baseline is three numbers of insurance
+    let simpler = chosen.parameters <= choice.rows[0].parameters + 3;
     assert!(chosen.rmse.unwrap() < 1.1 * best && simpler, "{chosen:?}");
 }
 

@@ -106,10 +106,10 @@ fn rest(range: Range, sign: f64) -> impl Strategy<Value = Option<RestTracker>> {
     prop_oneof![Just(None), tracker.prop_map(Some)]
 }
 
-/// History maps of up to three relaxations, two plays and degree 4, with
+/// History maps of up to three relaxations, two plays and degree 3, with
 /// coefficients in -2..2, for a signal in `range`.
 pub fn history_map(range: Range, sign: f64) -> impl Strategy<Value = HistoryMap> {
-    let shape = (0usize..=3, 0usize..=2, 1u8..=4, 0u8..=4);
+    let shape = (0usize..=3, 0usize..=2, 1u8..=3, 0u8..=3);
     (shape, rest(range, sign), fit_summary()).prop_flat_map(
         |((relaxations, plays, degree, memory_degree), rest, fit)| {
             let states = 1 + relaxations + plays;
@@ -170,22 +170,43 @@ pub fn observer_map(range: Range, sign: f64) -> impl Strategy<Value = ObserverMa
 /// Calibrations of every model, estimator, normalisation and polarity, for a
 /// signal of 1..2 V or so.
 pub fn calibration() -> impl Strategy<Value = Calibration> {
+    prop_oneof![
+        2 => paper_calibration(),
+        1 => blended_calibration(),
+        1 => history_calibration(),
+        1 => observer_calibration(),
+    ]
+}
+
+/// Calibrations of the paper's two models, a line and two surfaces.
+pub fn paper_calibration() -> impl Strategy<Value = Calibration> {
     frame().prop_flat_map(|frame| {
-        let sign = frame.polarity.sign();
-        let (range, domain) = (frame.signal_range, frame.domain());
+        let domain = frame.domain();
         let linear =
             (-3.0..3.0, -1.0..1.0, fit_summary()).prop_map(move |(slope, intercept, fit)| {
                 Model::Linear(LinearMap { slope, intercept, signal_domain: domain, fit })
             });
-        let pair = || (branch_surface(domain), branch_surface(domain));
-        let surfaces =
-            pair().prop_map(|(inflation, deflation)| Model::Surfaces { inflation, deflation });
-        let blended =
-            pair().prop_map(|(inflation, deflation)| Model::Blended { inflation, deflation });
-        let history = history_map(range, sign).prop_map(Model::History);
-        let observer = observer_map(range, sign).prop_map(Model::Observer);
-        prop_oneof![linear, surfaces, blended, history, observer]
-            .prop_map(move |model| frame.holding(model))
+        let surfaces = (branch_surface(domain), branch_surface(domain))
+            .prop_map(|(inflation, deflation)| Model::Surfaces { inflation, deflation });
+        prop_oneof![linear, surfaces].prop_map(move |model| frame.holding(model))
+    })
+}
+
+/// Calibrations of [`Model::Blended`].
+pub fn blended_calibration() -> impl Strategy<Value = Calibration> {
+    frame().prop_flat_map(|frame| {
+        let branch = || branch_surface(frame.domain());
+        (branch(), branch()).prop_map(move |(inflation, deflation)| {
+            frame.holding(Model::Blended { inflation, deflation })
+        })
+    })
+}
+
+/// Calibrations of [`Model::History`].
+pub fn history_calibration() -> impl Strategy<Value = Calibration> {
+    frame().prop_flat_map(|frame| {
+        history_map(frame.signal_range, frame.polarity.sign())
+            .prop_map(move |map| frame.holding(Model::History(map)))
     })
 }
 

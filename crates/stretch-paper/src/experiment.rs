@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use stretch_calibrate::{
-    Calibrated, Evaluation, ModelKind, Options, calibrate, evaluate, on_own_ranges,
+    Calibrated, Evaluation, Memory, ModelKind, Options, calibrate, evaluate, on_own_ranges,
 };
 use stretch_data::{Trial, TrialKind};
 use stretch_sim::{Rig, RunSettings, Session, TrialPlan};
@@ -16,9 +16,11 @@ pub struct Pipeline {
     pub linear: Calibrated,
     /// Two poly13 surfaces.
     pub non_linear: Calibrated,
-    /// Raw, linear and non-linear on arbitrary actuation.
+    /// A model that remembers, fitted to the same ramps; ours alone.
+    pub observer: Option<Calibrated>,
+    /// Raw, linear, non-linear and the observer on arbitrary actuation.
     pub arbitrary: Evaluation,
-    /// Raw, linear and non-linear on pulses.
+    /// Raw, linear, non-linear and the observer on pulses.
     pub pulses: Evaluation,
 }
 
@@ -101,27 +103,44 @@ impl Pipeline {
     ) -> Result<Self, PaperError> {
         let linear = calibrate(ramps, &Options { model: ModelKind::Linear, ..options.clone() })?;
         let non_linear = calibrate(ramps, options)?;
-        Ok(Self {
-            arbitrary: judge(&linear, &non_linear, arbitrary, own_ranges)?,
-            pulses: judge(&linear, &non_linear, pulses, own_ranges)?,
-            linear,
-            non_linear,
-        })
+        // the paper's way has no such model
+        let model = ModelKind::Remembering { kind: Memory::Observer, rest: true };
+        let observer = if own_ranges {
+            None
+        } else {
+            Some(calibrate(ramps, &Options { model, ..options.clone() })?)
+        };
+        let judge = |trials| judge(&linear, &non_linear, observer.as_ref(), trials, own_ranges);
+        let (arbitrary, pulses) = (judge(arbitrary)?, judge(pulses)?);
+        Ok(Self { linear, non_linear, observer, arbitrary, pulses })
+    }
+
+    /// All methods on other trials, ranges frozen or each trial's own.
+    pub(crate) fn judge(
+        &self,
+        trials: &[Trial],
+        own_ranges: bool,
+    ) -> Result<Evaluation, PaperError> {
+        judge(&self.linear, &self.non_linear, self.observer.as_ref(), trials, own_ranges)
     }
 
     fn serial(&self) -> SerialPipeline<'_> {
         SerialPipeline {
-            fits: self.linear.fits.iter().chain(&self.non_linear.fits).collect(),
+            fits: (self.linear.fits.iter())
+                .chain(&self.non_linear.fits)
+                .chain(self.observer.iter().flat_map(|observer| &observer.fits))
+                .collect(),
             arbitrary: &self.arbitrary,
             pulses: &self.pulses,
         }
     }
 }
 
-/// Raw, linear and non-linear on trials, with ranges frozen or each trial's own.
-pub(crate) fn judge(
+/// Raw and every method on trials, with ranges frozen or each trial's own.
+fn judge(
     linear: &Calibrated,
     non_linear: &Calibrated,
+    observer: Option<&Calibrated>,
     trials: &[Trial],
     own_ranges: bool,
 ) -> Result<Evaluation, PaperError> {
@@ -130,5 +149,7 @@ pub(crate) fn judge(
         line = on_own_ranges(&line, trial)?;
         surfaces = on_own_ranges(&surfaces, trial)?;
     }
-    Ok(evaluate(&[("linear", &line), ("non-linear", &surfaces)], trials)?)
+    let mut methods = vec![("linear", &line), ("non-linear", &surfaces)];
+    methods.extend(observer.map(|observer| ("observer", &observer.calibration)));
+    Ok(evaluate(&methods, trials)?)
 }

@@ -4,7 +4,7 @@ use serde::Serialize;
 use stretch_data::{Split, TrialKind};
 use stretch_sim::{RATE_HZ, Session, TrialPlan};
 
-use crate::{PaperError, Pipeline, experiment::judge};
+use crate::{PaperError, Pipeline};
 
 /// Gaps that are tried, in seconds: the paper's range and a little beyond.
 const GAPS_S: [f64; 9] = [0.10, 0.15, 0.22, 0.32, 0.46, 0.66, 0.95, 1.4, 2.0];
@@ -19,8 +19,8 @@ pub struct GapPoint {
     pub gap_s: f64,
     /// RMSE of raw, linear and non-linear as published, in millimetres.
     pub published_rmse_mm: [f64; 3],
-    /// RMSE of raw, linear and non-linear as decided here, in millimetres.
-    pub ours_rmse_mm: [f64; 3],
+    /// RMSE of raw, linear, non-linear and the observer as decided here, in millimetres.
+    pub ours_rmse_mm: [f64; 4],
 }
 
 /// Goes on with a session: a trial of pulse pairs for each gap.
@@ -39,14 +39,12 @@ pub fn pulse_gaps(
     for gap_s in GAPS_S {
         let (_, trial) = session.run(&pairs(gap_s))?;
         let trials = [trial];
-        let rmse = |pipeline: &Pipeline, own_ranges| -> Result<[f64; 3], PaperError> {
-            let verdict = judge(&pipeline.linear, &pipeline.non_linear, &trials, own_ranges)?;
-            Ok([0, 1, 2].map(|method| verdict.pooled[method].rmse))
-        };
+        let there = published.judge(&trials, true)?;
+        let here = ours.judge(&trials, false)?;
         points.push(GapPoint {
             gap_s,
-            published_rmse_mm: rmse(published, true)?,
-            ours_rmse_mm: rmse(ours, false)?,
+            published_rmse_mm: [0, 1, 2].map(|method| there.pooled[method].rmse),
+            ours_rmse_mm: [0, 1, 2, 3].map(|method| here.pooled[method].rmse),
         });
     }
     Ok(points)

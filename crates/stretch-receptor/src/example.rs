@@ -38,10 +38,10 @@ fn observer() -> Result<Calibration, DesignError> {
     let mut curve = [0.0; 25];
     for (k, volts) in curve.iter_mut().enumerate() {
         let x = k as f64 / 24.0;
-        *volts = 1.1 + x * (1.9 - 0.94 * x);
+        *volts = 1.24 + x * (1.64 - 0.82 * x);
     }
     let map = ObserverMap {
-        rest: Some(RestTracker { level: 1.105, catch_up_s: 0.02, leak: 0.0 }),
+        rest: Some(RestTracker { level: 1.243, catch_up_s: 0.02, leak: 0.0 }),
         curve: Values::new("curve", &curve)?,
         drive_domain: Interval { min: -0.0025, max: 1.0716 },
         relaxations_s: Values::new("relaxations_s", &[0.2475])?,

@@ -168,7 +168,7 @@ fn floats_over_codes_agree_as_well() {
 /// Calibrations that name the eleven-point parabola, linear or poly13.
 fn calibration() -> impl Strategy<Value = Calibration> {
     let surface = || strategies::surface_of(stretch_core::Degree::POLY13);
-    (strategies::calibration(), surface(), surface(), 60.0..400.0).prop_map(
+    (strategies::paper_calibration(), surface(), surface(), 60.0..400.0).prop_map(
         |(calibration, up, down, rest_length)| {
             let mut spec = calibration.into_spec();
             spec.rate_estimator = RateEstimator::SAVGOL_11_2;

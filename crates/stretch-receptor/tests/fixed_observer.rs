@@ -111,7 +111,7 @@ fn a_smooth_motion_differs_by_rounding() {
     let codes: Vec<AdcCode> = (0..4000)
         .map(|n| {
             let t = 0.01 * f64::from(n);
-            adc().code(1.55 + 0.3 * (2.0 * t).sin() + 0.12 * (7.1 * t).sin())
+            adc().code(1.64 + 0.28 * (2.0 * t).sin() + 0.1 * (7.1 * t).sin())
         })
         .collect();
     let squares: Vec<f64> = both(&example_observer(), &codes)

@@ -107,6 +107,32 @@ proptest! {
         }
     }
 
+    /// Every model, in both precisions; and a fresh memory answers as the first did:
+    /// nothing of a stream stays in the design.
+    #[test]
+    fn any_calibration_on_any_stream(
+        calibration in stretch_core::strategies::calibration(),
+        stream in strategies::faulty_stream(120),
+    ) {
+        let mut wide = Runner::new(Receptor::<f64>::new(&calibration).unwrap());
+        let mut narrow = Runner::new(Receptor::<f32>::new(&calibration).unwrap());
+        let mut first = Vec::new();
+        for &volts in &stream {
+            let reading = wide.step(Volts(volts));
+            if let Ok(reading) = &reading {
+                prop_assert!(reading.estimate.is_finite() && reading.rate.is_finite());
+            }
+            first.push(reading);
+            if let Ok(reading) = narrow.step(Volts(volts as f32)) {
+                prop_assert!(reading.estimate.is_finite() && reading.rate.is_finite());
+            }
+        }
+        wide.reset();
+        for (&volts, before) in stream.iter().zip(&first) {
+            prop_assert_eq!(&wide.step(Volts(volts)), before);
+        }
+    }
+
     #[test]
     fn both_precisions_agree(calibration in remembering(), stream in strategies::clean_stream(300)) {
         let mut wide = Runner::new(Receptor::<f64>::new(&calibration).unwrap());

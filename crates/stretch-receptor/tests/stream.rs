@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use stretch_core::{
     Branch, Calibration, Design, Model, Polarity, Runner, SampleRate, Stage, Volts,
-    strategies::calibration,
+    strategies::paper_calibration,
 };
 use stretch_filter::{RateFilter, SgRate};
 use stretch_receptor::{
@@ -39,7 +39,7 @@ fn by_hand(calibration: &Calibration, branch: Branch, rate: f64, volts: f64) -> 
 proptest! {
     #[test]
     fn folded_equals_the_paper_written_out(
-        calibration in calibration(), stream in strategies::clean_stream(80),
+        calibration in paper_calibration(), stream in strategies::clean_stream(80),
     ) {
         let receptor = StretchReceptor::<f64>::new(&calibration).unwrap();
         let rates = RateFilter::<f64>::new(calibration.rate_estimator, calibration.sample_rate_hz).unwrap();
@@ -64,7 +64,7 @@ proptest! {
 
     #[test]
     fn any_stream_gives_finite_readings(
-        calibration in calibration(), stream in strategies::faulty_stream(200),
+        calibration in paper_calibration(), stream in strategies::faulty_stream(200),
     ) {
         let mut wide = Runner::new(StretchReceptor::<f64>::new(&calibration).unwrap());
         let mut narrow = Runner::new(StretchReceptor::<f32>::new(&calibration).unwrap());

@@ -174,10 +174,10 @@ impl FixedObserver {
         let half = (1i64 << self.n.gain_bits) >> 1;
         let pull = |k: usize| saturate((i64::from(gains[k]) * surprise + half) >> self.n.gain_bits);
         memory.target = memory.target.saturating_add(pull(0));
-        memory.rate = memory.rate.saturating_add(pull(1)).max(-FASTEST).min(FASTEST);
+        memory.rate = memory.rate.saturating_add(pull(1)).clamp(-FASTEST, FASTEST);
         for i in 0..usize::from(self.n.relaxations).min(MAX_OBSERVER_RELAXATIONS) {
             let moved = memory.slow[i].saturating_add(pull(2 + i));
-            memory.slow[i] = moved.max(-FURTHEST).min(FURTHEST);
+            memory.slow[i] = moved.clamp(-FURTHEST, FURTHEST);
         }
         self.hold(memory);
         held == signal

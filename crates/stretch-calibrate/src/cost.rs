@@ -1,0 +1,65 @@
+//! What a sample costs on a board: the figures that the firmware's gate measures.
+
+use stretch_core::Degree;
+
+use crate::ModelKind;
+
+/// Measured by `firmware/gate.sh --write`, and held against the measurement by
+/// `firmware/gate.sh`.
+const BUDGET: &str = include_str!("budget.txt");
+
+/// Instructions a sample on a Cortex-M3, from volts in `f32`, without a
+/// floating-point unit; none for a model that was not measured.
+///
+/// Measured for the largest shape that a fit of the name may choose, one relaxation
+/// in an observer.
+///
+/// ```
+/// use stretch_calibrate::{ModelKind, m3_instructions, m3_instructions_fixed};
+/// let line = m3_instructions(ModelKind::Linear).unwrap();
+/// assert!(m3_instructions_fixed(ModelKind::Linear).unwrap() < line);
+/// assert_eq!(m3_instructions("poly55".parse()?), None);
+/// # Ok::<(), stretch_calibrate::SpellingError>(())
+/// ```
+pub fn m3_instructions(model: ModelKind) -> Option<f64> {
+    match model {
+        ModelKind::Linear | ModelKind::Surface(Degree::POLY13) => {
+            mean(&format!("{model}-f32-volts"))
+        }
+        _ => mean(&model.to_string()),
+    }
+}
+
+/// The same from a converter's codes in fixed point; none for a model without
+/// that form.
+pub fn m3_instructions_fixed(model: ModelKind) -> Option<f64> {
+    mean(&format!("{model}-fixed"))
+}
+
+fn mean(program: &str) -> Option<f64> {
+    let value = |line: &'static str, key: &str| {
+        line.split_whitespace().find_map(|word| word.strip_prefix(key)?.strip_prefix('='))
+    };
+    let line = BUDGET
+        .lines()
+        .find(|line| value(line, "core") == Some("m3") && value(line, "model") == Some(program))?;
+    value(line, "mean")?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_candidate_was_measured() {
+        for kind in crate::auto::candidates() {
+            let instructions = m3_instructions(kind);
+            assert!(instructions.is_some_and(|n| n > 100.0), "{kind}: {instructions:?}");
+        }
+        for kind in ["linear", "poly13", "observer", "observer+rest"] {
+            let kind = kind.parse().unwrap();
+            let (float, fixed) = (m3_instructions(kind), m3_instructions_fixed(kind));
+            assert!(fixed.unwrap() < 0.2 * float.unwrap(), "{kind}: {fixed:?} {float:?}");
+        }
+    }
+}

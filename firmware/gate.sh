@@ -1,8 +1,9 @@
 #!/bin/sh
 # Fails unless every model gives the host's bits on both emulated cores and stays
-# inside its budget, which `stretch calibrate --model auto` prints: instructions (mean + 2 %), stack (exactly), .text (+ 1 %: the
-# order of functions, and a few bytes with it, depends on the folder that the
-# sources lie in). Prints SKIPPED, and succeeds, where there is no emulator.
+# inside its budget, which `stretch calibrate --model auto` prints: instructions
+# (mean + 2 %), stack (exactly), .text (+ 1 %: the order of functions, and a few
+# bytes with it, depends on the folder that the sources lie in). Prints SKIPPED, and
+# succeeds, where there is no emulator.
 #
 #   ./gate.sh            compares with golden.txt and budget.txt
 #   ./gate.sh --write    writes budget.txt anew from what is measured

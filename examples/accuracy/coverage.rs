@@ -1,5 +1,7 @@
 //! How often the 95 % bounds of an observer's parameters hold the truth.
 
+use std::f64::consts::TAU;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use stretch_calibrate::Options;
@@ -18,7 +20,7 @@ const TAU_S: f64 = 0.25;
 /// not have: a first-order Gauss-Markov process of 1 s.
 fn trial(random: &mut ChaCha8Rng, wandering: f64) -> Trial {
     let waves: Vec<(f64, f64)> = (0..5)
-        .map(|k| (0.4 + 1.3 * f64::from(k) + random.random::<f64>(), 6.28 * random.random::<f64>()))
+        .map(|k| (0.4 + 1.3 * f64::from(k) + random.random::<f64>(), TAU * random.random::<f64>()))
         .collect();
     let target = |t: f64| 0.5 + waves.iter().map(|(w, p)| 0.09 * (w * t + p).sin()).sum::<f64>();
     let share = -(-PERIOD_S / TAU_S).exp_m1();

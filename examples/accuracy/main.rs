@@ -8,6 +8,8 @@
 //! Seeds are those of nobody's choosing until `--development` asks for the ones that
 //! the models were designed on; then nothing is written.
 //!
+//! Names of parts (why, candidates, effects, robust, measured, coverage) or of effects select some.
+//!
 //! All errors are root mean squares on trials that were never fitted. Intervals
 //! come from a block bootstrap over half-second blocks.
 
@@ -80,10 +82,8 @@ fn main() -> anyhow::Result<()> {
         ("coverage", &coverage::tables),
     ];
     for (name, tables) in parts {
-        if !only.is_empty()
-            && !only.iter().any(|o| *o == name)
-            && !(name == "effects" && !chosen.is_empty())
-        {
+        let named = only.iter().any(|o| *o == name) || (name == "effects" && !chosen.is_empty());
+        if !(only.is_empty() || named) {
             continue;
         }
         let begun = std::time::Instant::now();

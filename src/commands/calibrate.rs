@@ -2,15 +2,17 @@
 
 use std::path::PathBuf;
 
+use anyhow::Context as _;
 use clap::ValueEnum;
 use serde::Serialize;
 use stretch_calibrate::{
     Calibrated, Candidate, FitReport, ModelChoice, ModelKind, ModelRow, Options, Robust,
-    SpellingError, SplitBy, calibrate, choose_model, evaluate, parse_rate, rank_signals,
-    write_calibration,
+    SpellingError, SplitBy, calibrate, choose_model, evaluate, fixed_record, parse_adc, parse_rate,
+    rank_signals, write_calibration,
 };
 use stretch_core::{Normalisation, RateEstimator, RateSource};
-use stretch_data::{ReadOptions, Split, Trial};
+use stretch_data::{ReadOptions, Split, Trial, write_whole};
+use stretch_receptor::code::Adc;
 
 use super::shared::{read_trials, say, say_json, write_text};
 use crate::{
@@ -30,6 +32,7 @@ use crate::{
 ///   stretch calibrate ramps/*.csv --out cal.json --report cal.html
 ///   stretch calibrate knee.csv --reference angle_deg --signal auto --out cal.json
 ///   stretch calibrate ramps/*.csv --paper --out published.json
+///   stretch calibrate ramps/*.csv --model observer --out cal.json --fixed cal.fixed.postcard
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
@@ -91,6 +94,15 @@ pub(crate) struct Args {
     /// Where the record goes: JSON, or postcard for a board when the name ends in .postcard
     #[arg(long, value_name = "cal.json")]
     out: PathBuf,
+    /// Where the record goes that a board without floating point runs, in postcard: converter
+    /// codes in, thousandths of the reference's unit out. For linear, poly13, observer and
+    /// observer+rest
+    #[arg(long, value_name = "cal.fixed.postcard")]
+    fixed: Option<PathBuf>,
+    /// The board's converter: bits, and the signal at code 0 and at the last code
+    #[arg(long, default_value = "12,0,3.3", value_name = "BITS,ZERO_V,FULL_SCALE_V",
+          value_parser = parse_adc, requires = "fixed")]
+    adc: Adc,
     /// Where a report with pictures goes
     #[arg(long, value_name = "r.html")]
     report: Option<PathBuf>,
@@ -233,7 +245,17 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
     let mut calibrated = calibrate(&trials, &options)?;
     calibrated.notes.extend(choice.iter().flat_map(|choice| choice.notes.clone()));
+    // nothing is written when a part of what was asked for cannot be
+    let fixed = args.fixed.as_ref().map(|path| {
+        let record = fixed_record(&calibrated.calibration, &args.adc);
+        let made = record.with_context(|| format!("{}: --model {}", path.display(), options.model));
+        made.map(|record| (path, record))
+    });
+    let fixed = fixed.transpose()?;
     write_calibration(&args.out, &calibrated.calibration)?;
+    if let Some((path, record)) = &fixed {
+        write_whole(path, |out| out.write_all(&record.bytes))?;
+    }
     if let Some(path) = &args.report {
         write_report(&args, path, &trials, &columns, &calibrated, &ranking, &options)?;
     }
@@ -252,6 +274,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
     print(&calibrated, &ranking)?;
     say(format!("wrote {}", args.out.display()))?;
+    if let Some((path, record)) = &fixed {
+        let (bytes, read_as) = (record.bytes.len(), &record.read_as);
+        say(format!("wrote {}: {bytes} bytes, a board reads it as {read_as}", path.display()))?;
+    }
     match &args.report {
         Some(path) => say(format!("wrote {}", path.display())),
         None => Ok(()),

@@ -78,6 +78,43 @@ pub enum CalibrateError {
     /// A number that is not possible.
     #[error("the calibration is not possible: {0}")]
     Design(#[from] DesignError),
+    /// A model that has no form in integers.
+    #[error(
+        "{model} has no form in integers for a board; those that have are linear, poly13, observer and observer+rest: name one with --model"
+    )]
+    NoFixedForm {
+        /// The model.
+        model: String,
+    },
+    /// A rate that has no form in integers here.
+    #[error(
+        "the rate is {rate}; in integers for a board it can be --rate savgol:WINDOW,DEGREE of degree 1 or 2, window {windows}, without delay"
+    )]
+    FixedRate {
+        /// The estimator.
+        rate: String,
+        /// The windows that there are.
+        windows: String,
+    },
+    /// A converter that never sees the signal.
+    #[error(
+        "the signal ran from {min} to {max}, and the converter sees {zero_v} to {full_scale_v}; name the converter that the board has with --adc, in the signal's unit"
+    )]
+    OutsideConverter {
+        /// The least signal of the trials.
+        min: f64,
+        /// The greatest.
+        max: f64,
+        /// The signal at code 0.
+        zero_v: f64,
+        /// The signal at the last code.
+        full_scale_v: f64,
+    },
+    /// A calibration whose numbers integers over the converter cannot hold.
+    #[error(
+        "the calibration does not fit integers over this converter: {0}; name the converter that the board has with --adc"
+    )]
+    Fixed(#[source] DesignError),
     /// A calibration file that does not load.
     #[error("{file}: {problem}")]
     Record {

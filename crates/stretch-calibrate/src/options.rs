@@ -103,7 +103,7 @@ pub struct SpellingError {
 }
 
 impl SpellingError {
-    fn new(given: &str, use_instead: &'static str) -> Self {
+    pub(crate) fn new(given: &str, use_instead: &'static str) -> Self {
         Self { given: given.to_owned(), use_instead }
     }
 }

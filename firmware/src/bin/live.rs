@@ -8,13 +8,16 @@
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
 use cortex_m_rt::entry;
 use embedded_io::Write;
-use stretch_core::Runner;
+use stretch_core::{Runner, Stage};
 use stretch_firmware::board::{Converter, Ended, Replay, Uart};
 use stretch_link::Frame;
-use stretch_receptor::code::{AdcCode, FixedCalibration, FixedReceptor};
+use stretch_receptor::{
+    Withheld,
+    code::{AdcCode, CodeReading, FixedCalibration, FixedReceptor},
+};
 
-/// Made by `FixedCalibration::new` on a desk: what `stretch calibrate` found,
-/// over this board's converter.
+/// What `stretch calibrate --fixed` writes: the calibration over this board's
+/// converter, in integers.
 static RECORD: &[u8] = include_bytes!("../../data/poly13-fixed.postcard");
 
 const CORE_HZ: u32 = 25_000_000;
@@ -41,7 +44,7 @@ impl Pace {
 /// A sample that the converter fails to give is sent as missing; only what
 /// `is_end` accepts ends the loop.
 fn run<C: Converter>(
-    receptor: FixedReceptor<11, 2>,
+    receptor: impl Stage<AdcCode, Out = Result<CodeReading<i32>, Withheld>>,
     converter: &mut C,
     port: &mut impl Write,
     pace: &mut Pace,

@@ -1,0 +1,141 @@
+//! A calibration over a board's converter, in integers, as the record for its flash.
+
+use serde::Serialize;
+use stretch_core::{Calibration, DesignError, Model, RateEstimator};
+use stretch_receptor::code::{Adc, AdcSpec, FixedCalibration, FixedObserver};
+
+use crate::{CalibrateError, SpellingError};
+
+/// Room for the largest record, an observer's with every number at its longest.
+const BYTES: usize = 1024;
+
+/// A record for a board, and what reads it there.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FixedRecord {
+    /// The record in postcard: about 100 bytes, of an observer 450.
+    pub bytes: Vec<u8>,
+    /// The type in [`stretch_receptor::code`] that it is a record of.
+    pub read_as: String,
+}
+
+/// The record of a calibration in integers: codes of `adc` in, thousandths of the
+/// reference's unit out.
+///
+/// Linear models and surfaces with no term beyond poly13 become a
+/// [`FixedCalibration`], observers a [`FixedObserver`].
+///
+/// # Errors
+/// [`CalibrateError::NoFixedForm`] for any other model,
+/// [`CalibrateError::FixedRate`] for a rate that no type was compiled for (an
+/// observer needs none), [`CalibrateError::OutsideConverter`] when all of the
+/// trials' signal lies outside the converter, [`CalibrateError::Fixed`] when a number
+/// does not fit its format.
+///
+/// ```
+/// use stretch_calibrate::{fixed_record, parse_adc};
+/// use stretch_receptor::code::FixedObserver;
+///
+/// let calibration = stretch_receptor::example_observer();
+/// let adc = parse_adc("12,0,3.3")?;
+/// let record = fixed_record(&calibration, &adc)?;
+/// assert_eq!(record.read_as, "FixedObserver");
+/// let on_board: FixedObserver = postcard::from_bytes(&record.bytes)?;
+/// assert_eq!(on_board, FixedObserver::new(&calibration, &adc)?);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn fixed_record(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord, CalibrateError> {
+    let (min, max) = (calibration.signal_range.min(), calibration.signal_range.max());
+    let AdcSpec { zero_v, full_scale_v, .. } = adc.spec();
+    if max < zero_v || full_scale_v < min {
+        return Err(CalibrateError::OutsideConverter { min, max, zero_v, full_scale_v });
+    }
+    let none = |model: String| Err(CalibrateError::NoFixedForm { model });
+    match &calibration.model {
+        Model::Linear(_) => rated(calibration, adc),
+        Model::Surfaces { inflation, deflation } => {
+            match [inflation, deflation].iter().find(|b| b.surface.as_poly13().is_none()) {
+                Some(branch) => none(branch.surface.degree().to_string()),
+                None => rated(calibration, adc),
+            }
+        }
+        Model::Observer(_) => record("FixedObserver".into(), FixedObserver::new(calibration, adc)),
+        Model::Blended { .. } => none("a blended model".into()),
+        Model::History(_) => none("a model that remembers, other than the observer,".into()),
+        _ => none("this model".into()),
+    }
+}
+
+/// Rates are part of a type: those that this program was compiled for.
+macro_rules! windows {
+    ($($window:literal)*) => {
+        const WINDOWS: &[u16] = &[$($window),*];
+
+        fn rated(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord, CalibrateError> {
+            match calibration.rate_estimator {
+                $(
+                    RateEstimator::SavitzkyGolay { window: $window, degree: 1, delay: 0 } => {
+                        surface::<$window, 1>(calibration, adc)
+                    }
+                    RateEstimator::SavitzkyGolay { window: $window, degree: 2, delay: 0 } => {
+                        surface::<$window, 2>(calibration, adc)
+                    }
+                )*
+                rate => {
+                    let windows: Vec<_> = WINDOWS.iter().map(u16::to_string).collect();
+                    let (rate, windows) = (format!("{rate:?}"), windows.join(", "));
+                    Err(CalibrateError::FixedRate { rate, windows })
+                }
+            }
+        }
+    };
+}
+
+windows!(5 7 9 11 13 15 17 19 21 25 31);
+
+fn surface<const WINDOW: usize, const DEGREE: usize>(
+    calibration: &Calibration,
+    adc: &Adc,
+) -> Result<FixedRecord, CalibrateError> {
+    let fixed = FixedCalibration::<WINDOW, DEGREE>::new(calibration, adc);
+    record(format!("FixedCalibration<{WINDOW}, {DEGREE}>"), fixed)
+}
+
+fn record<T: Serialize>(
+    read_as: String,
+    fixed: Result<T, DesignError>,
+) -> Result<FixedRecord, CalibrateError> {
+    let fixed = fixed.map_err(CalibrateError::Fixed)?;
+    let mut buffer = [0; BYTES];
+    // there is room for every number: this cannot fail
+    let bytes = postcard::to_slice(&fixed, &mut buffer)
+        .map_err(|_| DesignError::TooLarge { field: "fixed.record", asked: BYTES + 1, most: BYTES })
+        .map_err(CalibrateError::Fixed)?;
+    Ok(FixedRecord { bytes: bytes.to_vec(), read_as })
+}
+
+const CONVERTER: &str = "BITS,ZERO_V,FULL_SCALE_V such as 12,0,3.3: 1 to 16 bits, the signal at \
+                         code 0, and a larger one at the last code";
+
+/// A converter from its spelling: bits, the signal at code 0 and at the last code.
+///
+/// # Errors
+/// [`SpellingError`] with the spelling that is understood.
+///
+/// ```
+/// use stretch_calibrate::parse_adc;
+/// assert_eq!(parse_adc("12,0,3.3")?.largest(), 4095);
+/// assert!(parse_adc("12,3.3,0").is_err());
+/// # Ok::<(), stretch_calibrate::SpellingError>(())
+/// ```
+pub fn parse_adc(text: &str) -> Result<Adc, SpellingError> {
+    let unknown = || SpellingError::new(text, CONVERTER);
+    let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+    let &[bits, zero, full_scale] = &parts[..] else { return Err(unknown()) };
+    let volts = |text: &str| text.parse::<f64>().map_err(|_| unknown());
+    let spec = AdcSpec {
+        bits: bits.parse().map_err(|_| unknown())?,
+        zero_v: volts(zero)?,
+        full_scale_v: volts(full_scale)?,
+    };
+    Adc::new(spec).map_err(|_| unknown())
+}

@@ -1,0 +1,129 @@
+//! `stretch calibrate --fixed`: the record that a board reads, run on converter codes.
+
+mod support;
+
+use std::path::{Path, PathBuf};
+
+use postcard::from_bytes;
+use stretch_calibrate::{parse_adc, read_calibration};
+use stretch_core::{Calibration, Design, Runner, Stage, Volts};
+use stretch_filter::RateFilter;
+use stretch_receptor::{
+    ObserverReceptor, Reading, StretchReceptor, Withheld,
+    code::{Adc, AdcCode, CodeReading, FixedCalibration, FixedObserver, FixedReceptor},
+};
+use support::{Scratch, calibrate, fails, stdout};
+
+const ADC: &str = "12,0,3.3";
+
+fn adc() -> Adc {
+    parse_adc(ADC).unwrap()
+}
+
+/// Calibrates on a trial, and reads both records back.
+fn records(scratch: &Scratch, trial: &Path, model: &str, read_as: &str) -> (Calibration, Vec<u8>) {
+    let (float, fixed) = (scratch.path("cal.json"), scratch.path("cal.fixed.postcard"));
+    let mut command = calibrate(trial, &float);
+    let output = command
+        .args(["--model", model, "--adc", ADC, "--fixed"])
+        .arg(&fixed)
+        .output()
+        .expect("the program runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(stdout(&output).contains(&format!("a board reads it as {read_as}")));
+    (read_calibration(&float).unwrap(), std::fs::read(fixed).unwrap())
+}
+
+/// The signal of a trial, as the converter gives it.
+fn codes(trial: &PathBuf) -> Vec<AdcCode> {
+    let text = std::fs::read_to_string(trial).unwrap();
+    let volts = text.lines().skip(1).map(|line| line.rsplit(',').next().unwrap());
+    volts.map(|volts| adc().code(volts.parse().unwrap())).collect()
+}
+
+/// How far each answer in integers lies from the one in `f64`, in millimetres.
+fn apart<D, F>(fixed: D, float: F, codes: &[AdcCode]) -> Vec<f64>
+where
+    D: Design + Stage<AdcCode, Out = Result<CodeReading<i32>, Withheld>>,
+    F: Design + Stage<Volts<f64>, Out = Result<Reading<f64>, Withheld>>,
+{
+    let (mut fixed, mut float) = (Runner::new(fixed), Runner::new(float));
+    let answers = codes.iter().map(|&code| {
+        let volts = adc().volts(code).expect("a code of the converter");
+        (fixed.step(code), float.step(Volts(volts)))
+    });
+    let both = answers.filter_map(|(fixed, float)| {
+        assert_eq!(fixed.is_ok(), float.is_ok(), "both or neither");
+        Some((1e-3 * f64::from(fixed.ok()?.estimate) - float.ok()?.estimate).abs())
+    });
+    both.collect()
+}
+
+fn largest(errors: &[f64]) -> f64 {
+    errors.iter().copied().fold(0.0, f64::max)
+}
+
+#[test]
+fn an_observer_runs_from_its_record_as_it_does_in_floats() {
+    let scratch = Scratch::new();
+    let (fit, test) = (scratch.loops("a.csv", 40.0, 1.1), scratch.loops("b.csv", 40.0, 1.5));
+    for model in ["observer", "observer+rest"] {
+        let (calibration, bytes) = records(&scratch, &fit, model, "FixedObserver");
+        let fixed: FixedObserver = from_bytes(&bytes).unwrap();
+        let float = ObserverReceptor::<f64>::new(&calibration).unwrap();
+        let errors = apart(fixed, float, &codes(&test));
+        assert_eq!(errors.len(), 4000, "an observer needs no warm-up");
+        let per_target = calibration.target.reference_per_target().abs();
+        let span_mm = calibration.target_range.span() * per_target;
+        // a thousandth for the last rounding
+        let bound = testkit::tolerance::FIXED_OBSERVER * span_mm + 1e-3;
+        let largest = largest(&errors);
+        assert!(largest <= bound, "{model}: {largest} mm, bound {bound} mm");
+    }
+}
+
+#[test]
+fn a_line_and_surfaces_run_from_their_records_within_their_bound() {
+    let scratch = Scratch::new();
+    let (fit, test) = (scratch.loops("a.csv", 40.0, 1.1), scratch.loops("b.csv", 40.0, 1.5));
+    for model in ["linear", "poly13"] {
+        let (calibration, bytes) = records(&scratch, &fit, model, "FixedCalibration<11, 2>");
+        let fixed: FixedCalibration<11, 2> = from_bytes(&bytes).unwrap();
+        let rate = RateFilter::<f64>::new(calibration.rate_estimator, calibration.sample_rate_hz);
+        let float = StretchReceptor::with_rate(&calibration, rate.unwrap()).unwrap();
+        let errors = apart(FixedReceptor::new(fixed), float, &codes(&test));
+        assert_eq!(errors.len(), 3990, "all after the warm-up");
+        let largest = largest(&errors);
+        let bound = 1e-3 * fixed.worst_case_error_um();
+        assert!(largest <= bound, "{model}: {largest} mm, bound {bound} mm");
+    }
+}
+
+#[test]
+fn what_has_no_form_in_integers_says_so_and_writes_nothing() {
+    let scratch = Scratch::new();
+    let trial = scratch.loops("a.csv", 20.0, 1.1);
+    let before = scratch.names();
+    for (arguments, parts) in [
+        (["--model", "blended"], ["blended", "observer+rest"]),
+        (["--model", "poly22"], ["poly22", "linear, poly13"]),
+        (["--model", "relaxation"], ["--model relaxation", "observer"]),
+        (["--rate", "tracker:0.1"], ["Tracker", "savgol:WINDOW,DEGREE"]),
+        (["--adc", "12,0,1"], ["from 1.2", "sees 0 to 1"]),
+        (["--adc", "12,0,1000000"], ["does not fit", "fixed.error"]),
+    ] {
+        let mut command = calibrate(&trial, &scratch.path("cal.json"));
+        command.args(arguments).arg("--fixed").arg(scratch.path("cal.fixed.postcard"));
+        fails(&mut command, &parts);
+        assert_eq!(scratch.names(), before, "{arguments:?}");
+    }
+    for (arguments, part) in [
+        (["--fixed", "cal.fixed.postcard", "--adc", "12,3.3,0"].as_slice(), "BITS,ZERO_V"),
+        (["--adc", ADC].as_slice(), "--fixed"),
+    ] {
+        let mut command = calibrate(&trial, &scratch.path("cal.json"));
+        let output = command.args(arguments).output().expect("the program runs");
+        assert_eq!(output.status.code(), Some(2));
+        assert!(String::from_utf8_lossy(&output.stderr).contains(part), "{arguments:?}");
+    }
+}

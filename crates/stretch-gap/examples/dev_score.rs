@@ -25,7 +25,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let without: Vec<String> = label.struck.iter().cloned().collect();
         let begun = Instant::now();
         let simulator = RigSimulator::read(&folder.join(name), None, &without)?;
-        let result = diagnose(&simulator, &Options::default(), &|_| (), &|| false);
+        let progress = |what: &str| {
+            if !wanted.is_empty() {
+                eprintln!("{:6.1} s: {what}", begun.elapsed().as_secs_f64());
+            }
+        };
+        let result = diagnose(&simulator, &Options::default(), &progress, &|| false);
         let (diagnosis, evidence) = match result {
             Ok(done) => done,
             Err(error) => {

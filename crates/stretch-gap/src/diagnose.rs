@@ -10,7 +10,7 @@ use crate::{
     diagnosis::{Candidate, Diagnosis, EffectValue, ParameterShift, StageGap, VerdictKind, Where},
     error::GapError,
     evidence::{Evidence, StageEvidence, squares},
-    fit::Bench,
+    fit::{Bench, FINE},
     floor::floors_of,
     frame::{Frame, Metric, Role},
     localise,
@@ -166,7 +166,7 @@ fn run(
 fn retune(bench: &Bench<'_>, start: &Model) -> Result<Solution, GapError> {
     let fits: Result<Vec<_>, GapError> = (0..bench.metrics.len())
         .into_par_iter()
-        .map(|s| bench.fit(&[s], start.clone(), &[]))
+        .map(|s| bench.fit(&[s], start.clone(), &[], FINE))
         .collect();
     let mut model = start.clone();
     let mut misfits = Vec::new();

@@ -87,8 +87,20 @@ pub(crate) type Sensitivities = Vec<(usize, Column)>;
 
 /// Standard deviation of a form around its usual value, as a share of its range.
 const FORM_SD: f64 = 0.35;
-/// Most iterations of a fit.
-const ITERATIONS: usize = 14;
+
+/// How much work a fit may be.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Effort {
+    /// Most iterations.
+    iterations: usize,
+    /// Iterations at which the sensitivities of the nominal parameters are taken anew.
+    renewals: &'static [usize],
+}
+
+/// Enough to see whether a candidate can compete.
+pub(crate) const COARSE: Effort = Effort { iterations: 5, renewals: &[2] };
+/// Until nothing is gained.
+pub(crate) const FINE: Effort = Effort { iterations: 14, renewals: &[1, 3, 6, 9] };
 
 impl Bench<'_> {
     /// Residual of a stage, measured minus simulated in floors.
@@ -301,6 +313,7 @@ impl Bench<'_> {
         stages: &[usize],
         start: Model,
         known: &[Option<Sensitivities>],
+        effort: Effort,
     ) -> Result<Fitted, GapError> {
         let (coordinates, bounds) = self.coordinates(stages, &start);
         let n = coordinates.len();
@@ -314,8 +327,8 @@ impl Bench<'_> {
         let mut columns: Vec<Vec<Option<Column>>> = vec![Vec::new(); n];
         let mut lambda = 1e-3;
         let mut normal = vec![0.0; n * n];
-        for iteration in 0..ITERATIONS {
-            let renew = matches!(iteration, 1 | 3 | 6 | 9) || (iteration == 0 && known.is_empty());
+        for iteration in 0..effort.iterations {
+            let renew = effort.renewals.contains(&iteration) || (iteration == 0 && known.is_empty());
             for (i, (&c, &b)) in coordinates.iter().zip(&bounds).enumerate() {
                 let reuse = match c {
                     Coordinate::Nominal { index, .. } if iteration == 0 && !known.is_empty() => {

@@ -61,7 +61,7 @@ impl<'a> Acting<'a> {
         let Recorder { noise, unit, dt_s } = recorder;
         self.late(recorder, simulated);
         if let Some(values) = self.skew {
-            wobble(values[2], noise, dt_s, measured, simulated);
+            wobble(values[2] * values[0].abs(), noise, dt_s, measured, simulated);
         }
         if let Some((a, f)) = self.hum {
             hum::add(a * unit, f, noise, dt_s, measured, simulated);

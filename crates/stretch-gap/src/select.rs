@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::{
     error::GapError,
-    fit::{Bench, Fitted, Misfit},
+    fit::{Bench, COARSE, FINE, Fitted, Misfit},
     frame::Role,
     screen::{Ground, Screened},
     simulator::Model,
@@ -15,8 +15,16 @@ use crate::{
 
 /// Candidates kept by a screen.
 const KEPT: usize = 8;
+/// Candidates kept in later rounds.
+const KEPT_LATER: usize = 5;
 /// Leaders whose twins are kept with them.
 const LEADERS: usize = 4;
+/// Rivals looked at for an effect that stands alone, and for one among others.
+const RIVALS: (usize, usize) = (6, 3);
+
+/// Share of the best candidate's rise, and nats beside, within which a candidate may still win once it is fitted to the end.
+const NEAR: f64 = 0.3;
+const NEAR_NATS: f64 = 30.0;
 
 /// A set of effects, fitted together with every nominal parameter.
 #[derive(Debug, Clone)]
@@ -109,7 +117,16 @@ impl<'a> Search<'a> {
         (stages, own)
     }
 
-    /// Fits `base` with one effect more, from a start.
+    /// Fits the newest effect's part of a solution until nothing is gained.
+    fn polish(&self, solution: &Solution, effect: usize) -> Result<Solution, GapError> {
+        let (stages, own) = self.component(&solution.effects, effect);
+        let mut model = solution.model.clone();
+        model.effects.retain(|(e, _)| own.contains(e));
+        let fitted = self.bench.fit(&stages, model, &[], FINE)?;
+        Ok(self.join(solution, solution.effects.clone(), &stages, fitted))
+    }
+
+    /// Fits `base` with one effect more, from a start, as far as it takes to see whether it can compete.
     fn extend(
         &self,
         base: &Solution,
@@ -123,7 +140,7 @@ impl<'a> Search<'a> {
         let mut model = base.model.clone();
         model.effects.retain(|(e, _)| own.contains(e));
         model.effects.push((effect, values.to_vec()));
-        let fitted = self.bench.fit(&stages, model, &ground.known)?;
+        let fitted = self.bench.fit(&stages, model, &ground.known, COARSE)?;
         Ok(self.join(base, effects, &stages, fitted))
     }
 
@@ -179,55 +196,53 @@ impl<'a> Search<'a> {
         next
     }
 
-    /// Fits every effect of a list on top of `base`, from one or two starts each.
+    /// Fits every effect of a list on top of `base`, from one or two starts each; those that come near the score `aim` (the
+    /// best of them, if that is more) until nothing is gained.
     fn extend_all(
         &mut self,
         base: &Solution,
         ground: &Ground,
         screened: &[Screened],
+        aim: f64,
     ) -> Result<Vec<Solution>, GapError> {
-        let mut jobs = Vec::new();
-        for screen in screened {
+        let key = |effect: usize| {
             let mut key = base.effects.clone();
-            key.push(screen.effect);
+            key.push(effect);
             key.sort_unstable();
-            if self.tried.contains_key(&key) {
-                continue;
-            }
-            let best = screen.gain();
-            let second = screen.starts.iter().skip(1).find(|s| s.1 > 0.6 * best);
-            let starts = screen.starts.first().into_iter().chain(second);
-            jobs.extend(starts.map(|s| (screen.effect, s.0.clone())));
-        }
-        let this = &*self;
-        let solutions: Vec<Result<Solution, GapError>> = jobs
-            .par_iter()
-            .map(|(effect, values)| this.extend(base, ground, *effect, values))
-            .collect();
-        for solution in solutions {
-            let solution = match solution {
-                Ok(solution) => solution,
-                Err(GapError::Stopped) => return Err(GapError::Stopped),
-                Err(_) => continue,
-            };
-            let mut key = solution.effects.clone();
-            key.sort_unstable();
-            match self.tried.get(&key) {
-                Some(other) if other.score >= solution.score => {}
-                _ => {
-                    self.tried.insert(key, solution);
-                }
-            }
-        }
-        let mut found: Vec<Solution> = screened
+            key
+        };
+        let fresh: Vec<&Screened> =
+            screened.iter().filter(|s| !self.tried.contains_key(&key(s.effect))).collect();
+        let jobs: Vec<(usize, &Vec<f64>)> = fresh
             .iter()
-            .filter_map(|s| {
-                let mut key = base.effects.clone();
-                key.push(s.effect);
-                key.sort_unstable();
-                self.tried.get(&key).cloned()
+            .flat_map(|screen| {
+                let second = screen.starts.iter().skip(1).find(|s| s.1 > 0.6 * screen.gain());
+                let starts = screen.starts.first().into_iter().chain(second);
+                starts.map(|s| (screen.effect, &s.0))
             })
             .collect();
+        let this = &*self;
+        let coarse = possible(jobs.par_iter().map(|&(effect, values)| {
+            Ok((effect, this.extend(base, ground, effect, values)?))
+        }))?;
+        let mut best: BTreeMap<usize, Solution> = BTreeMap::new();
+        for (effect, solution) in coarse {
+            match best.get(&effect) {
+                Some(other) if other.score >= solution.score => {}
+                _ => drop(best.insert(effect, solution)),
+            }
+        }
+        let top = best.values().map(|s| s.score).fold(aim, f64::max);
+        let near = top - (NEAR * (top - base.score) + NEAR_NATS);
+        let close: Vec<(usize, &Solution)> =
+            best.iter().filter(|(_, s)| s.score >= near).map(|(e, s)| (*e, s)).collect();
+        let fine = possible(close.par_iter().map(|&(effect, solution)| {
+            Ok((effect, this.polish(solution, effect)?))
+        }))?;
+        best.extend(fine);
+        self.tried.extend(best.into_iter().map(|(effect, solution)| (key(effect), solution)));
+        let mut found: Vec<Solution> =
+            screened.iter().filter_map(|s| self.tried.get(&key(s.effect)).cloned()).collect();
         found.sort_by(|a, b| b.score.total_cmp(&a.score));
         Ok(found)
     }
@@ -244,23 +259,42 @@ impl<'a> Search<'a> {
         Ok(screened)
     }
 
+    /// Whether an effect on top of `base` can be worth it at all: a gap that is not there cannot be closed.
+    fn is_possible(&self, base: &Solution, effect: usize) -> bool {
+        let touched = &self.bench.simulator.effects()[effect].touches;
+        let left = |s: usize| self.bench.excess(&base.misfits[s]);
+        let most: f64 = touched.iter().map(|&s| left(s)).sum();
+        let beyond_form = |s: usize| {
+            let gone = (self.bench.excess(&self.nominal.misfits[s]) - left(s)).max(0.0);
+            left(s) >= self.thresholds.mismatch * gone
+        };
+        most >= self.needed(base) && touched.iter().any(|&s| beyond_form(s))
+    }
+
+    /// Excess that one effect more has to close.
+    fn needed(&self, base: &Solution) -> f64 {
+        (self.thresholds.share * base.excess(self.bench)).max(self.thresholds.null_excess)
+    }
+
     /// The best of a screen, and the twins of the very best.
-    fn shortlist(&self, screened: &[Screened], kept: usize) -> Vec<Screened> {
+    fn shortlist(&self, base: &Solution, screened: &[Screened], kept: usize) -> Vec<Screened> {
+        let screened: Vec<&Screened> =
+            screened.iter().filter(|s| self.is_possible(base, s.effect)).collect();
         let specs = self.bench.simulator.effects();
-        let best = screened.first().map_or(0.0, Screened::gain);
+        let best = screened.first().map_or(0.0, |s| s.gain());
         // Gains count a block as one observation, scores what the residual's memory says.
         let memory = self.bench.memory.iter().copied().fold(f64::INFINITY, f64::min);
         let finest = (memory / self.bench.frame.block as f64).min(1.0);
         let floor = (0.03 * best).max(0.3 * self.thresholds.rise * finest);
         let mut list: Vec<Screened> =
-            screened.iter().take(kept).filter(|s| s.gain() >= floor).cloned().collect();
+            screened.iter().take(kept).filter(|s| s.gain() >= floor).copied().cloned().collect();
         let leaders: Vec<usize> = list.iter().take(LEADERS).map(|s| s.effect).collect();
         for leader in leaders {
             for twin in &specs[leader].twins {
                 let one = screened.iter().find(|s| specs[s.effect].name == *twin);
-                let is_new = |o: &&Screened| list.iter().all(|l| l.effect != o.effect);
+                let is_new = |o: &&&Screened| list.iter().all(|l| l.effect != o.effect);
                 if let Some(one) = one.filter(is_new).filter(|o| o.gain() > 0.0) {
-                    list.push(one.clone());
+                    list.push((*one).clone());
                 }
             }
         }
@@ -274,13 +308,13 @@ impl<'a> Search<'a> {
         for round in 0..self.depth {
             progress(&format!("screening effects, round {}", round + 1));
             let screened = self.screen(&best, &ground)?;
-            let kept = if round == 0 { KEPT } else { 5 };
-            let list = self.shortlist(&screened, kept);
+            let kept = if round == 0 { KEPT } else { KEPT_LATER };
+            let list = self.shortlist(&best, &screened, kept);
             if list.is_empty() {
                 break;
             }
             progress(&format!("fitting {} candidates, round {}", list.len(), round + 1));
-            let found = self.extend_all(&best, &ground, &list)?;
+            let found = self.extend_all(&best, &ground, &list, best.score)?;
             // The best may only pick up what mismatch of form left elsewhere: the first that is worth it is taken.
             let Some(next) = found.into_iter().find(|next| self.is_worth(&best, next)) else {
                 break;
@@ -302,7 +336,7 @@ impl<'a> Search<'a> {
         let rise = next.score - base.score;
         let (before, after) = (base.excess(self.bench), next.excess(self.bench));
         rise > self.thresholds.rise
-            && before - after >= (self.thresholds.share * before).max(self.thresholds.null_excess)
+            && before - after >= self.needed(base)
             && self.is_no_mismatch(base, next)
     }
 
@@ -335,7 +369,7 @@ impl<'a> Search<'a> {
         let (stages, own) = self.component(&set.effects, effect);
         let mut model = set.model.clone();
         model.effects.retain(|(e, _)| own.contains(e) && *e != effect);
-        let fitted = self.bench.fit(&stages, model, &[])?;
+        let fitted = self.bench.fit(&stages, model, &[], FINE)?;
         let solution = self.join(set, rest, &stages, fitted);
         self.tried.insert(key, solution.clone());
         Ok(solution)
@@ -362,6 +396,7 @@ impl<'a> Search<'a> {
     /// says that they might do.
     pub(crate) fn rivals(&mut self, best: &Solution) -> Result<Vec<(usize, Solution)>, GapError> {
         let mut out = Vec::new();
+        let kept = if best.effects.len() > 1 { RIVALS.1 } else { RIVALS.0 };
         for &effect in &best.effects {
             let less = self.without(best, effect)?;
             let ground = Ground::around(self.bench, less.model.clone())?;
@@ -369,6 +404,7 @@ impl<'a> Search<'a> {
                 .screen(&less, &ground)?
                 .into_iter()
                 .filter(|s| !best.effects.contains(&s.effect))
+                .filter(|s| self.is_possible(&less, s.effect))
                 .collect();
             let own_gain = {
                 let one = self.bench.screen(&ground, effect)?;
@@ -379,15 +415,31 @@ impl<'a> Search<'a> {
                 |s: &Screened| twins.contains(&self.bench.simulator.effects()[s.effect].name);
             let list: Vec<Screened> = screened
                 .iter()
-                .take(6)
+                .take(kept)
                 .filter(|s| s.gain() > 0.5 * own_gain)
                 .chain(screened.iter().filter(|s| is_twin(s) && s.gain() <= 0.5 * own_gain))
                 .cloned()
                 .collect();
-            for solution in self.extend_all(&less, &ground, &list)? {
+            for solution in self.extend_all(&less, &ground, &list, best.score)? {
                 out.push((effect, solution));
             }
         }
         Ok(out)
     }
+}
+
+/// Fits that were possible; a simulation that fails takes its candidate out, a stop ends all.
+fn possible<T: Send>(
+    fits: impl ParallelIterator<Item = Result<T, GapError>>,
+) -> Result<Vec<T>, GapError> {
+    let all: Vec<Result<T, GapError>> = fits.collect();
+    let mut out = Vec::with_capacity(all.len());
+    for fit in all {
+        match fit {
+            Ok(fit) => out.push(fit),
+            Err(GapError::Stopped) => return Err(GapError::Stopped),
+            Err(_) => {}
+        }
+    }
+    Ok(out)
 }

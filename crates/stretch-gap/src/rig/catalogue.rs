@@ -136,8 +136,8 @@ fn with_forms(starts: Vec<Vec<f64>>, effect: &dyn Effect) -> Vec<Vec<f64>> {
         all.extend([0.005, 0.015].map(|u| vec![u, 0.5, 0.5, 1.0]));
     }
     if effect.name() == "channel_skew" {
-        all.extend([-3e-4, 3e-4].map(|rate| vec![0.002, rate, 0.0]));
-        all.push(vec![0.0005, 0.0, 0.002]);
+        all.extend([-1e-4, 1e-4].map(|rate| vec![0.002, rate, 0.0]));
+        all.push(vec![0.01, 0.0, 0.2]);
     }
     all
 }

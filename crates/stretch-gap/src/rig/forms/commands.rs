@@ -22,11 +22,11 @@ pub(in crate::rig) static VALVE_DEADBAND: Form = Form {
 pub(in crate::rig) static CHANNEL_SKEW: Form = Form {
     name: "channel_skew",
     stage: Stage::Sensing,
-    equation: "bridge samples show the length of skew_s + rate t earlier, t since the trial began; beyond that it wanders by wobble (s, 1 sd)",
+    equation: "bridge samples show the length of skew_s + rate t earlier, t since the trial began; beyond that it wanders by wobble |skew_s| (1 sd)",
     parameters: &[
         EffectParameter::strength("skew_s", "s", -0.1, 0.2, 0.02),
-        linear("rate", -1.5e-3, 1.5e-3, 0.0),
-        linear("wobble", 0.0, 0.02, 0.0),
+        linear("rate", -5e-4, 5e-4, 0.0),
+        linear("wobble", 0.0, 0.5, 0.0),
     ],
     needs: None,
     action: |_, _| Action::Delay(0.0),

@@ -10,7 +10,7 @@ pub(super) static SLEEVE_SLACK: Form = Form {
     equation: "e -> e_s + knee ln(1 + exp((e - e_s)/knee))",
     parameters: &[
         EffectParameter::strength("e_s", "strain", 0.0, 0.2, 0.08),
-        EffectParameter::shape("knee", "strain", 0.0003, 0.015, 0.003),
+        EffectParameter::shape("knee", "strain", 0.0001, 0.015, 0.003),
     ],
     needs: None,
     action: |v, around| {
@@ -29,7 +29,7 @@ pub(super) static AMPLIFIER_SATURATION: Form = Form {
     parameters: &[
         EffectParameter { off: Some(0.5), ..EffectParameter::strength("v_lo", "V", 0.5, 2.2, 1.4) },
         EffectParameter { off: Some(3.3), ..EffectParameter::strength("v_hi", "V", 1.2, 3.3, 2.1) },
-        EffectParameter::shape("knee", "V", 0.001, 0.06, 0.01),
+        EffectParameter::shape("knee", "V", 0.0005, 0.06, 0.01),
     ],
     needs: Some("an amplifier"),
     action: |v, _| {

@@ -1,4 +1,4 @@
-//! Diagnoses a folder of labelled cases and scores the verdicts:
+//! Diagnoses a folder of labelled cases, leaves the answer beside each, and scores:
 //! `cargo run --release -p stretch-gap --example dev_score -- FOLDER [case-000 ...]`.
 
 use std::{fs, path::Path, time::Instant};
@@ -39,6 +39,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             }
         };
         let json = serde_json::to_value(&diagnosis)?;
+        fs::write(folder.join(name).join("diagnosis.json"), json.to_string())?;
         let verdict = Verdict::from_diagnosis(name, &json)?;
         let right = match label.kind {
             CaseKind::Null => verdict.answer().is_empty() && verdict.verdict != "unknown",

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::{
     diagnosis::Baselines,
     error::GapError,
-    fit::{Bench, Misfit},
+    fit::{Bench, COARSE, Misfit},
     floor::Floor,
     frame::{Metric, Role},
     screen::Ground,
@@ -170,7 +170,7 @@ impl Bench<'_> {
             let mut model = ground.model.clone();
             model.effects.push((effect, values));
             let touched = &self.simulator.effects()[effect].touches;
-            match self.fit(touched, model, &ground.known) {
+            match self.fit(touched, model, &ground.known, COARSE) {
                 Ok(fitted) => all.push(fitted.misfits),
                 Err(GapError::Stopped) => return Err(GapError::Stopped),
                 // A fit that cannot begin says nothing for the effect.

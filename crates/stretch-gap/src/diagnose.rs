@@ -125,8 +125,8 @@ fn run(
         slices: localise::slices(simulator, &evidence, options.seed),
         end_to_end: localise::end_to_end(simulator, &evidence)?,
     };
-    let decision =
-        verdict::decide(&bench, options, &evidence, &nominal, &ordered, &slots, &candidates);
+    let gap = evidence.excess();
+    let decision = verdict::decide(&bench, options, &evidence, &ordered, gap, &candidates);
     let mut diagnosis = Diagnosis {
         schema: 1,
         verdict: decision.kind,
@@ -138,6 +138,7 @@ fn run(
         },
         candidates,
         shares: closed,
+        gap,
         location,
         parameters: shifts(&bench, &nominal, &ordered),
         transfer: None,

@@ -192,6 +192,17 @@ pub struct Baselines {
     pub bic: Option<String>,
 }
 
+/// Excess summed over channels, as the verdict weighs it: of the fitted and the test trials, the greater.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Excess {
+    /// Parameters as shipped, test trials only.
+    pub raw: f64,
+    /// Parameters re-tuned.
+    pub retuned: f64,
+    /// With the best set of effects, whether it is named or not.
+    pub left: f64,
+}
+
 /// The diagnosis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {
@@ -210,6 +221,9 @@ pub struct Diagnosis {
     /// What each effect of the best set closes, the strongest first; named or not.
     #[serde(default)]
     pub shares: Vec<EffectShare>,
+    /// How large the gap is.
+    #[serde(default)]
+    pub gap: Excess,
     /// Where the gap sits.
     #[serde(rename = "where")]
     pub location: Where,

@@ -2,6 +2,7 @@
 
 use crate::{
     diagnose::{is_test, mean_square},
+    diagnosis::Excess,
     error::GapError,
     fit::Bench,
     floor::Floor,
@@ -85,6 +86,18 @@ fn test_blocks(frame: &Frame, residual: &[f64]) -> Vec<f64> {
 }
 
 impl Evidence {
+    /// What the verdict weighs.
+    pub(crate) fn excess(&self) -> Excess {
+        let sum = |of: fn(&StageEvidence) -> f64| -> f64 {
+            self.stages.iter().map(|s| of(s).max(0.0)).sum()
+        };
+        Excess {
+            raw: sum(|s| s.excess_raw),
+            retuned: self.trained.0.max(sum(|s| s.excess_retuned)),
+            left: self.trained.1.max(sum(|s| s.excess_after)),
+        }
+    }
+
     pub(crate) fn of(
         bench: &Bench<'_>,
         shipped: &Model,

@@ -28,7 +28,7 @@ mod verdict;
 
 pub use diagnose::{Options, diagnose};
 pub use diagnosis::{
-    Baselines, Candidate, Diagnosis, EffectValue, NextExperiment, ParameterShift, SliceGap,
+    Baselines, Candidate, Diagnosis, EffectValue, Excess, NextExperiment, ParameterShift, SliceGap,
     StageGap, StageShare, Transfer, TransferError, VerdictKind, Where,
 };
 pub use error::GapError;

@@ -268,12 +268,14 @@ impl<'a> Search<'a> {
             let gone = (self.bench.excess(&self.nominal.misfits[s]) - left(s)).max(0.0);
             left(s) >= self.thresholds.mismatch * gone
         };
-        most >= self.needed(base) && touched.iter().any(|&s| beyond_form(s))
+        most >= self.needed(base, effect) && touched.iter().any(|&s| beyond_form(s))
     }
 
-    /// Excess that one effect more has to close.
-    fn needed(&self, base: &Solution) -> f64 {
-        (self.thresholds.share * base.excess(self.bench)).max(self.thresholds.null_excess)
+    /// Excess that one effect more has to close: a share of what is left in the stages that it touches.
+    fn needed(&self, base: &Solution, effect: usize) -> f64 {
+        let touched = &self.bench.simulator.effects()[effect].touches;
+        let left: f64 = touched.iter().map(|&s| self.bench.excess(&base.misfits[s])).sum();
+        (self.thresholds.share * left).max(self.thresholds.null_excess)
     }
 
     /// The best of a screen, and the twins of the very best.
@@ -333,25 +335,23 @@ impl<'a> Search<'a> {
 
     /// Whether one effect more is worth its parameters.
     fn is_worth(&self, base: &Solution, next: &Solution) -> bool {
-        let rise = next.score - base.score;
-        let (before, after) = (base.excess(self.bench), next.excess(self.bench));
-        rise > self.thresholds.rise
-            && before - after >= self.needed(base)
-            && self.is_no_mismatch(base, next)
+        let Some(&new) = next.effects.iter().find(|e| !base.effects.contains(e)) else {
+            return false;
+        };
+        let closed = base.excess(self.bench) - next.excess(self.bench);
+        next.score - base.score > self.thresholds.rise
+            && closed >= self.needed(base, new)
+            && self.is_no_mismatch(base, next, new)
     }
 
     /// Mismatch of form leaves a share of what an effect closes, which other effects then pick up: a further effect
     /// must close more than that share of the gap that its stages had at first.
-    fn is_no_mismatch(&self, base: &Solution, next: &Solution) -> bool {
-        let Some(new) = next.effects.iter().find(|e| !base.effects.contains(e)) else {
-            return true;
-        };
-        let touched = &self.bench.simulator.effects()[*new].touches;
-        touched.iter().any(|&s| {
-            let closed = self.bench.excess(&base.misfits[s]) - self.bench.excess(&next.misfits[s]);
-            let gone =
-                self.bench.excess(&self.nominal.misfits[s]) - self.bench.excess(&base.misfits[s]);
-            closed > 0.0 && closed >= self.thresholds.mismatch * gone.max(0.0)
+    fn is_no_mismatch(&self, base: &Solution, next: &Solution, new: usize) -> bool {
+        let excess = |set: &Solution, stage: usize| self.bench.excess(&set.misfits[stage]);
+        self.bench.simulator.effects()[new].touches.iter().any(|&s| {
+            let closed = excess(base, s) - excess(next, s);
+            let gone = (excess(&self.nominal, s) - excess(base, s)).max(0.0);
+            closed > 0.0 && closed >= self.thresholds.mismatch * gone
         })
     }
 

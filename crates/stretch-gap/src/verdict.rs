@@ -1,10 +1,8 @@
 //! The verdict, from scores and test trials.
 
-use std::collections::BTreeMap;
-
 use crate::{
     diagnose::Options,
-    diagnosis::{Candidate, VerdictKind},
+    diagnosis::{Candidate, Excess, VerdictKind},
     evidence::Evidence,
     fit::Bench,
     select::Solution,
@@ -23,18 +21,12 @@ pub(crate) fn decide(
     bench: &Bench<'_>,
     options: &Options,
     evidence: &Evidence,
-    _nominal: &Solution,
     best: &Solution,
-    _slots: &BTreeMap<usize, f64>,
+    gap: Excess,
     candidates: &[Candidate],
 ) -> Decision {
     let thresholds = &options.thresholds;
-    let sum = |of: fn(&crate::evidence::StageEvidence) -> f64| -> f64 {
-        evidence.stages.iter().map(|s| of(s).max(0.0)).sum()
-    };
-    let before = evidence.trained.0.max(sum(|s| s.excess_retuned));
-    let after = evidence.trained.1.max(sum(|s| s.excess_after));
-    let raw: f64 = evidence.stages.iter().map(|s| s.excess_raw.max(0.0)).sum();
+    let Excess { raw, retuned: before, left: after } = gap;
     let specs = bench.simulator.effects();
     let mut notes = Vec::new();
     if bench.frame.borrowed_test {

@@ -26,7 +26,7 @@ pub(in crate::rig) static CHANNEL_SKEW: Form = Form {
     parameters: &[
         EffectParameter::strength("skew_s", "s", -0.1, 0.2, 0.02),
         linear("rate", -5e-4, 5e-4, 0.0),
-        linear("wobble", 0.0, 0.5, 0.0),
+        linear("wobble", 0.0, 0.25, 0.0),
     ],
     needs: None,
     action: |_, _| Action::Delay(0.0),

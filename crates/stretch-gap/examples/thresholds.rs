@@ -90,7 +90,11 @@ fn probabilities(cases: &[Case]) -> (f64, f64) {
     let grid = temperatures.flat_map(|t| (0..50).map(move |i| (t, 0.002 * f64::from(i))));
     let best = grid.max_by(|a, b| likelihood(a.0, a.1).total_cmp(&likelihood(b.0, b.1)));
     let (t, rho) = best.unwrap_or((2.0, 0.04));
-    eprintln!("{} singles, mean log probability {:.4}", singles.len(), likelihood(t, rho) / singles.len() as f64);
+    eprintln!(
+        "{} singles, mean log probability {:.4}",
+        singles.len(),
+        likelihood(t, rho) / singles.len() as f64
+    );
     (round(t), round(rho))
 }
 

@@ -210,6 +210,18 @@ impl Bench<'_> {
             .sum()
     }
 
+    /// What it costs that an effect may act in one of several ways (a saturation at either end): a logarithm of their number
+    /// for each that acts in one of them only.
+    pub(crate) fn choice_cost(&self, model: &Model) -> f64 {
+        let one = |(effect, values): &(usize, Vec<f64>)| {
+            let specs = &self.simulator.effects()[*effect].parameters;
+            let ways = specs.iter().zip(values).filter_map(|(p, v)| p.off.map(|off| off == *v));
+            let off = ways.clone().filter(|is_off| *is_off).count();
+            if off > 0 { (ways.count() as f64).ln() } else { 0.0 }
+        };
+        model.effects.iter().map(one).sum()
+    }
+
     fn weight(&self) -> f64 {
         1.0 / self.frame.block as f64
     }
@@ -328,7 +340,8 @@ impl Bench<'_> {
         let mut lambda = 1e-3;
         let mut normal = vec![0.0; n * n];
         for iteration in 0..effort.iterations {
-            let renew = effort.renewals.contains(&iteration) || (iteration == 0 && known.is_empty());
+            let renew =
+                effort.renewals.contains(&iteration) || (iteration == 0 && known.is_empty());
             for (i, (&c, &b)) in coordinates.iter().zip(&bounds).enumerate() {
                 let reuse = match c {
                     Coordinate::Nominal { index, .. } if iteration == 0 && !known.is_empty() => {

@@ -1,6 +1,6 @@
 //! Which effects: screens, joint fits, forward selection, backward pruning, and rivals.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
@@ -22,6 +22,9 @@ const LEADERS: usize = 4;
 /// Rivals looked at for an effect that stands alone, and for one among others.
 const RIVALS: (usize, usize) = (6, 3);
 
+/// Starts of one effect that are fitted, and the share of the best one's promise that the others need.
+const STARTS: usize = 3;
+const WORTH_A_START: f64 = 0.3;
 /// Share of the best candidate's rise, and nats beside, within which a candidate may still win once it is fitted to the end.
 const NEAR: f64 = 0.3;
 const NEAR_NATS: f64 = 30.0;
@@ -77,6 +80,8 @@ pub(crate) struct Search<'a> {
     pub(crate) nominal: Solution,
     /// Every set that was fitted, by its sorted effects.
     pub(crate) tried: BTreeMap<Vec<usize>, Solution>,
+    /// Those of them that were fitted from a larger set.
+    refitted: BTreeSet<Vec<usize>>,
     pub(crate) depth: usize,
 }
 
@@ -87,7 +92,14 @@ impl<'a> Search<'a> {
         nominal: Solution,
         depth: usize,
     ) -> Self {
-        Self { bench, thresholds, nominal, tried: BTreeMap::new(), depth }
+        Self {
+            bench,
+            thresholds,
+            nominal,
+            tried: BTreeMap::new(),
+            refitted: BTreeSet::new(),
+            depth,
+        }
     }
 
     /// Stages that hang together with some effects: those that they touch, and those that other effects of the set
@@ -192,11 +204,12 @@ impl<'a> Search<'a> {
             })
             .sum();
         next.score = self.bench.score(&self.nominal.misfits, &next.misfits, next.free)
-            - self.bench.form_cost(&next.model);
+            - self.bench.form_cost(&next.model)
+            - self.bench.choice_cost(&next.model);
         next
     }
 
-    /// Fits every effect of a list on top of `base`, from one or two starts each; those that come near the score `aim` (the
+    /// Fits every effect of a list on top of `base`, from a few starts each; those that come near the score `aim` (the
     /// best of them, if that is more) until nothing is gained.
     fn extend_all(
         &mut self,
@@ -216,15 +229,16 @@ impl<'a> Search<'a> {
         let jobs: Vec<(usize, &Vec<f64>)> = fresh
             .iter()
             .flat_map(|screen| {
-                let second = screen.starts.iter().skip(1).find(|s| s.1 > 0.6 * screen.gain());
-                let starts = screen.starts.first().into_iter().chain(second);
+                let starts = screen.starts.iter().filter(|s| s.1 > WORTH_A_START * screen.gain());
+                let starts = starts.take(STARTS);
                 starts.map(|s| (screen.effect, &s.0))
             })
             .collect();
         let this = &*self;
-        let coarse = possible(jobs.par_iter().map(|&(effect, values)| {
-            Ok((effect, this.extend(base, ground, effect, values)?))
-        }))?;
+        let coarse =
+            possible(jobs.par_iter().map(|&(effect, values)| {
+                Ok((effect, this.extend(base, ground, effect, values)?))
+            }))?;
         let mut best: BTreeMap<usize, Solution> = BTreeMap::new();
         for (effect, solution) in coarse {
             match best.get(&effect) {
@@ -236,9 +250,11 @@ impl<'a> Search<'a> {
         let near = top - (NEAR * (top - base.score) + NEAR_NATS);
         let close: Vec<(usize, &Solution)> =
             best.iter().filter(|(_, s)| s.score >= near).map(|(e, s)| (*e, s)).collect();
-        let fine = possible(close.par_iter().map(|&(effect, solution)| {
-            Ok((effect, this.polish(solution, effect)?))
-        }))?;
+        let fine = possible(
+            close
+                .par_iter()
+                .map(|&(effect, solution)| Ok((effect, this.polish(solution, effect)?))),
+        )?;
         best.extend(fine);
         self.tried.extend(best.into_iter().map(|(effect, solution)| (key(effect), solution)));
         let mut found: Vec<Solution> =
@@ -363,16 +379,22 @@ impl<'a> Search<'a> {
         if key.is_empty() {
             return Ok(self.nominal.clone());
         }
-        if let Some(solution) = self.tried.get(&key) {
-            return Ok(solution.clone());
+        if self.refitted.contains(&key) {
+            return Ok(self.tried[&key].clone());
         }
         let (stages, own) = self.component(&set.effects, effect);
         let mut model = set.model.clone();
         model.effects.retain(|(e, _)| own.contains(e) && *e != effect);
         let fitted = self.bench.fit(&stages, model, &[], FINE)?;
         let solution = self.join(set, rest, &stages, fitted);
-        self.tried.insert(key, solution.clone());
-        Ok(solution)
+        // What the whole set has found of the others must not count for the one that is left out.
+        let better = match self.tried.remove(&key) {
+            Some(other) if other.score >= solution.score => other,
+            _ => solution,
+        };
+        self.refitted.insert(key.clone());
+        self.tried.insert(key, better.clone());
+        Ok(better)
     }
 
     fn prune(&mut self, mut best: Solution) -> Result<Solution, GapError> {

@@ -15,6 +15,8 @@ const COUNTED: f64 = 0.1;
 const NOT_LISTED: f64 = 1e-3;
 /// Width of the border between known and unknown, in logarithms of the excess left: a sharp one would follow single cases.
 const SOFT: f64 = 0.2;
+/// Room for rigs that no generator of ours made: `unknown` begins at this many times the greatest gap of a null.
+const ROOM: f64 = 1.5;
 /// What a false `unknown` costs, in overlooked ones.
 const DEAR: f64 = 3.0;
 
@@ -139,7 +141,8 @@ fn unknowns(cases: &[Case]) -> (f64, f64) {
         called(&foreign, excess, share)
             - DEAR * (called(&explained, excess, share) + called(&nulls, excess, share))
     };
-    let excesses = (0..30).map(|i| 0.03 * 1.1_f64.powi(i));
+    let least = ROOM * nulls.iter().map(|gap| gap.left).fold(0.0, f64::max);
+    let excesses = (0..20).map(|i| least * 1.1_f64.powi(i));
     let grid = excesses.flat_map(|e| (0..50).map(move |i| (e, 0.004 * f64::from(i))));
     let best = grid.max_by(|a, b| worth(a.0, a.1).total_cmp(&worth(b.0, b.1)));
     let (excess, share) = best.unwrap_or((0.1, 0.08));

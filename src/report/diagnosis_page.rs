@@ -78,7 +78,7 @@ fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
                 format!("Set {}.", listed(&moved))
             }
         }
-        VerdictKind::Unknown => format!("Nothing in the catalogue does it. Look at {place}."),
+        VerdictKind::Unknown => format!("Nothing that the catalogue knows. Look at {place}."),
         VerdictKind::NoGap => "Nothing.".to_owned(),
     };
     let sure = match (d.verdict, best) {
@@ -93,7 +93,7 @@ fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
             format!("Probability {}: {rest}.", percent(c.probability))
         }
         (VerdictKind::Unknown, _) => {
-            "That there is a gap is certain; its cause is not in the catalogue.".to_owned()
+            "That there is a gap is certain; what the catalogue offers explains at best a part of it.".to_owned()
         }
         _ => "What is left is within the noise floor on trials that were not fitted.".to_owned(),
     };

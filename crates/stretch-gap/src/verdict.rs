@@ -45,8 +45,9 @@ pub(crate) fn decide(
         let named: Vec<String> = candidates[0].effects.clone();
         let first = &candidates[0];
         let sentence = format!(
-            "The simulator lacks {}: it closes {:.0} % of the gap ({:.0} to {:.0} %) on trials that were not fitted; probability {:.2}.",
+            "The simulator lacks {}: {} {:.0} % of the gap ({:.0} to {:.0} %) on trials that were not fitted; probability {:.2}.",
             named.join(" and "),
+            if named.len() > 1 { "together they close" } else { "it closes" },
             100.0 * first.closed,
             100.0 * first.closed_ci[0],
             100.0 * first.closed_ci[1],
@@ -63,7 +64,7 @@ pub(crate) fn decide(
             .map_or("", |(i, _)| bench.simulator.stages()[i].name.as_str());
         let best_name = best.effects.first().map_or("none", |&e| specs[e].name.as_str());
         let sentence = format!(
-            "There is a gap in {worst} that no effect of the catalogue explains: {:.2} floors are left of {:.2} after the best ({best_name}).",
+            "There is a gap in {worst} that the catalogue does not explain: {:.2} floors are left of {:.2} after the best ({best_name}).",
             after, before
         );
         return none(VerdictKind::Unknown, sentence, notes);

@@ -98,7 +98,7 @@ pub(crate) struct Effort {
 }
 
 /// Enough to see whether a candidate can compete.
-pub(crate) const COARSE: Effort = Effort { iterations: 5, renewals: &[2] };
+pub(crate) const COARSE: Effort = Effort { iterations: 5, renewals: &[1, 3] };
 /// Until nothing is gained.
 pub(crate) const FINE: Effort = Effort { iterations: 14, renewals: &[1, 3, 6, 9] };
 

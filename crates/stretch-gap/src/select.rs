@@ -210,7 +210,7 @@ impl<'a> Search<'a> {
     }
 
     /// Fits every effect of a list on top of `base`, from a few starts each; those that come near the score `aim` (the
-    /// best of them, if that is more) until nothing is gained.
+    /// best of them, if that is more), and the twins of the best, until nothing is gained.
     fn extend_all(
         &mut self,
         base: &Solution,
@@ -248,8 +248,14 @@ impl<'a> Search<'a> {
         }
         let top = best.values().map(|s| s.score).fold(aim, f64::max);
         let near = top - (NEAR * (top - base.score) + NEAR_NATS);
-        let close: Vec<(usize, &Solution)> =
-            best.iter().filter(|(_, s)| s.score >= near).map(|(e, s)| (*e, s)).collect();
+        let specs = self.bench.simulator.effects();
+        let leader = best.iter().max_by(|a, b| a.1.score.total_cmp(&b.1.score)).map(|(e, _)| *e);
+        let is_twin = |e: usize| leader.is_some_and(|l| specs[l].twins.contains(&specs[e].name));
+        let close: Vec<(usize, &Solution)> = best
+            .iter()
+            .filter(|(e, s)| s.score >= near || is_twin(**e))
+            .map(|(e, s)| (*e, s))
+            .collect();
         let fine = possible(
             close
                 .par_iter()

@@ -4,7 +4,7 @@ use stretch_sim::{CATALOGUE, Effect, EffectParameter, Key, PARAMETERS, RigParams
 
 use super::{
     forms::{NAMES, form_of},
-    session::Inputs,
+    session::{Inputs, Session},
 };
 use crate::{
     error::GapError,
@@ -24,23 +24,31 @@ const TWINS: [(&str, &str); 9] = [
     ("pot_backlash", "sleeve_slip"),
 ];
 
+/// Share of the samples beyond either end of the voltage: noise.
+const OUTERMOST: f64 = 0.002;
+
 /// What the screens need to know of the measurement.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Extent {
-    /// Least and greatest simulated nominal bridge voltage, V.
+    /// Least and greatest measured bridge voltage but for noise, V.
     pub(crate) volts: (f64, f64),
     /// Least nominal gauge strain.
     pub(crate) strain: f64,
 }
 
 impl Extent {
-    pub(super) fn of(params: &RigParams, inputs: &Inputs) -> Self {
-        let bridge = stretch_sim::Bridge::new(params);
-        let volts = |mm: f64| bridge.volts(bridge.resistance(bridge.strain(mm)));
-        Self {
-            volts: (volts(inputs.stroke.1), volts(inputs.stroke.0)),
-            strain: bridge.strain(inputs.stroke.0),
-        }
+    pub(super) fn of(params: &RigParams, inputs: &Inputs, session: &Session) -> Self {
+        let mut volts: Vec<f64> = session
+            .trials
+            .iter()
+            .filter(|t| !t.is_test)
+            .flat_map(|t| &t.bridge_v)
+            .copied()
+            .collect();
+        volts.sort_by(f64::total_cmp);
+        let at = |q: f64| volts[(q * (volts.len() - 1) as f64) as usize];
+        let strain = stretch_sim::Bridge::new(params).strain(inputs.stroke.0);
+        Self { volts: (at(OUTERMOST), at(1.0 - OUTERMOST)), strain }
     }
 }
 
@@ -157,7 +165,7 @@ fn starts(name: &str, extent: Extent) -> Vec<Vec<f64>> {
         "muscle_creep" => two(0.05, &[0.6, 2.0, 6.0, 20.0]),
         "crossbeam_inertia" => one(&[0.003, 0.01, 0.03]),
         "sleeve_slack" => {
-            one(&[0.001, 0.004, 0.01, 0.03, 0.07].map(|above| (extent.strain + above).max(1e-3)))
+            one(&[0.001, 0.004, 0.01, 0.03, 0.07].map(|above| (extent.strain + above).max(-0.049)))
         }
         "sleeve_slip" => one(&[0.0005, 0.002, 0.01]),
         "pressure_crosstalk" => one(&[0.003]),

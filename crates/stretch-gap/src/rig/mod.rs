@@ -159,7 +159,7 @@ impl RigSimulator {
                 accepts: &|_| true,
                 touches: &index,
                 unit: &|_| 1.0,
-                extent: Extent::of(&base, &inputs),
+                extent: Extent::of(&base, &inputs, &session),
             },
         );
         let trials = session

@@ -9,7 +9,11 @@ pub(super) static SLEEVE_SLACK: Form = Form {
     stage: Stage::Sensing,
     equation: "e -> e_s + knee ln(1 + exp((e - e_s)/knee))",
     parameters: &[
-        EffectParameter::strength("e_s", "strain", 0.0, 0.2, 0.08),
+        // Where the pre-stretch is not known, neither is where the sleeve goes slack: below nothing by the nominal rig's count.
+        EffectParameter {
+            off: Some(-0.05),
+            ..EffectParameter::strength("e_s", "strain", -0.05, 0.2, 0.08)
+        },
         EffectParameter::shape("knee", "strain", 0.0001, 0.015, 0.003),
     ],
     needs: None,

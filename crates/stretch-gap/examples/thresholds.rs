@@ -121,11 +121,12 @@ fn unknowns(cases: &[Case]) -> (f64, f64) {
                 }
             }
             CaseKind::Single | CaseKind::Compound | CaseKind::Dominant
-                if is_counted(label, d) && d.verdict != VerdictKind::Parameters =>
+                if is_counted(label, d)
+                    && d.verdict != VerdictKind::Parameters
+                    && (label.effects.iter().take(2).all(of)
+                        || label.dominant.as_ref().is_some_and(of)) =>
             {
-                if label.effects.iter().take(2).all(of) || label.dominant.as_ref().is_some_and(of) {
-                    explained.push(d.gap);
-                }
+                explained.push(d.gap);
             }
             _ => {}
         }

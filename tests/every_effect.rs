@@ -20,6 +20,9 @@ fn spelled(effect: &dyn Effect) -> String {
     format!("{fixed}:{}", values.collect::<Vec<_>>().join(","))
 }
 
+/// Difference of probabilities up to which a verdict leaves open which of two it is.
+const TIE: f64 = 0.02;
+
 #[test]
 #[ignore = "minutes in a debug build: ci.sh runs it in release"]
 fn is_named_when_it_is_simulated() {
@@ -44,7 +47,12 @@ fn is_named_when_it_is_simulated() {
             first["gap_after"].as_f64().unwrap(),
             d["runtime_s"].as_f64().unwrap()
         );
-        if d["named"][0] != effect.name() {
+        // Two that fit exactly alike (a sleeve that goes slack, an amplifier that saturates) may come in either order.
+        let own = d["candidates"].as_array().unwrap().iter();
+        let own = own.filter(|c| c["effects"][0] == effect.name());
+        let own = own.filter_map(|c| c["probability"].as_f64()).fold(0.0, f64::max);
+        let is_tied = first["probability"].as_f64().is_some_and(|p| p - own <= TIE);
+        if d["named"][0] != effect.name() && !is_tied {
             wrong.push(given);
         }
         fs::remove_dir_all(&folder).unwrap();

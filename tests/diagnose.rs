@@ -9,16 +9,9 @@ use std::{
 
 use assert_cmd::Command;
 use serde_json::Value;
-use support::{Scratch, fails, stdout as text_of, stretch};
+use support::{Scratch, fails, runs, stretch};
 
 /// What a run that succeeds prints.
-#[track_caller]
-fn stdout(command: &mut Command) -> String {
-    let output = command.output().expect("the program runs");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    text_of(&output)
-}
-
 /// A simulated data set: one arbitrary trial to fit, one to test, with effects.
 fn bench(scratch: &Scratch, name: &str, effects: &[&str]) -> PathBuf {
     let out = scratch.path(name);
@@ -30,7 +23,7 @@ fn bench(scratch: &Scratch, name: &str, effects: &[&str]) -> PathBuf {
         effects.iter().for_each(|e| {
             command.args(["--effect", e]);
         });
-        stdout(&mut command);
+        runs(&mut command);
         folder.join("arbitrary_1.csv")
     });
     fs::create_dir(&out).unwrap();
@@ -97,7 +90,7 @@ fn a_simulated_effect_is_named_and_reported() {
         command.arg("--json").arg(json).args(["--threads", threads, "--baselines"]);
         command
     };
-    let text = stdout(run("2", &json).arg("--report").arg(&page));
+    let text = runs(run("2", &json).arg("--report").arg(&page));
     let first = text.lines().next().unwrap();
     assert!(first.contains("gauge_hysteresis"), "{text}");
     let read = |path: &Path| -> Value {
@@ -128,7 +121,7 @@ fn a_simulated_effect_is_named_and_reported() {
     assert!(text.contains("What it costs") && text.contains("simpler methods"), "{text}");
     // Whatever the number of threads, the same bits.
     let again = scratch.path("again.json");
-    stdout(&mut run("1", &again));
+    runs(&mut run("1", &again));
     assert!(d == read(&again));
     let page = fs::read_to_string(page).unwrap();
     assert!(page.contains("Fix in the simulator") && page.contains("Add gauge_hysteresis"));
@@ -137,7 +130,7 @@ fn a_simulated_effect_is_named_and_reported() {
     assert!(!page.contains("http") && !page.contains("NaN") && !page.contains("class=\"missing\""));
     // With its entry struck out nobody else takes the blame with the same right.
     let without = scratch.path("without.json");
-    stdout(diagnose(&folder).args(["--without", "gauge_hysteresis"]).arg("--json").arg(&without));
+    runs(diagnose(&folder).args(["--without", "gauge_hysteresis"]).arg("--json").arg(&without));
     let w = read(&without);
     assert_ne!(w["named"][0], "gauge_hysteresis");
     assert!(w["candidates"][0]["closed"].as_f64() < d["candidates"][0]["closed"].as_f64());
@@ -147,11 +140,11 @@ fn a_simulated_effect_is_named_and_reported() {
 fn a_rig_without_a_fault_gets_no_name() {
     let scratch = Scratch::new();
     let folder = bench(&scratch, "bench", &[]);
-    let text = stdout(&mut diagnose(&folder));
+    let text = runs(&mut diagnose(&folder));
     assert!(!text.lines().next().unwrap().contains("lacks"), "{text}");
     // One trial alone: its last part is held back and tested on.
     describe(&folder, &[("fit.csv", "fit")]);
-    let text = stdout(&mut diagnose(&folder));
+    let text = runs(&mut diagnose(&folder));
     assert!(text.contains("no test trial") && !text.contains("lacks"), "{text}");
 }
 
@@ -221,19 +214,19 @@ fn odd_data_get_an_honest_verdict() {
     let text = fs::read_to_string(&file).unwrap();
     let kept = text.lines().enumerate().filter(|(i, _)| !(5000..5200).contains(i));
     fs::write(&file, kept.map(|(_, l)| format!("{l}\n")).collect::<String>()).unwrap();
-    let text = stdout(&mut diagnose(&folder));
+    let text = runs(&mut diagnose(&folder));
     assert!(
         text.contains("missing after") && !text.lines().next().unwrap().contains("lacks"),
         "{text}"
     );
     // The rig of somebody else: the gap is everything, and no effect takes the blame.
-    let rig = stdout(stretch().arg("rig"));
+    let rig = runs(stretch().arg("rig"));
     let other = rig
         .replace("value = 180.0", "value = 300.0")
         .replace("value = 25e-6", "value = 200e-6")
         .replace("value = 2.5e-5", "value = 2e-4");
     let other = scratch.write("other.toml", other);
-    let text = stdout(diagnose(&folder).arg("--rig").arg(&other));
+    let text = runs(diagnose(&folder).arg("--rig").arg(&other));
     assert!(!text.lines().next().unwrap().contains("lacks"), "{text}");
     assert!(text.contains("Is it the right rig"), "{text}");
 }
@@ -242,7 +235,7 @@ fn odd_data_get_an_honest_verdict() {
 fn a_wrong_rig_is_no_effect_and_a_strong_effect_is_no_wrong_rig() {
     let scratch = Scratch::new();
     let folder = bench(&scratch, "bench", &[]);
-    let stock = stdout(stretch().arg("rig"));
+    let stock = runs(stretch().arg("rig"));
     // Each a rig that the data do not come from, none of which the tolerances reach.
     let others = [
         ("amplifier", "G = { value = 10.0", "G = { value = 8.0"),
@@ -253,13 +246,13 @@ fn a_wrong_rig_is_no_effect_and_a_strong_effect_is_no_wrong_rig() {
     for (name, from, to) in others {
         assert!(stock.contains(from), "{stock}");
         let other = scratch.write(&format!("{name}.toml"), stock.replace(from, to));
-        let text = stdout(diagnose(&folder).arg("--rig").arg(&other));
+        let text = runs(diagnose(&folder).arg("--rig").arg(&other));
         let first = text.lines().next().unwrap();
         assert!(first.contains("right rig") && !first.contains("lacks"), "{name}: {text}");
     }
     for effect in ["pressure_crosstalk:c=0.04", "crossbeam_inertia:m=0.07"] {
         let folder = bench(&scratch, effect.split(':').next().unwrap(), &[effect]);
-        let text = stdout(&mut diagnose(&folder));
+        let text = runs(&mut diagnose(&folder));
         assert!(text.lines().next().unwrap().contains("lacks"), "{effect}: {text}");
     }
 }
@@ -269,7 +262,7 @@ fn a_saturated_channel_is_noticed_with_its_share() {
     let scratch = Scratch::new();
     let folder = bench(&scratch, "bench", &[]);
     both(&folder, "bridge_v", |_, v| v.min(1.9));
-    let text = stdout(&mut diagnose(&folder));
+    let text = runs(&mut diagnose(&folder));
     assert!(text.contains("bridge_v stands at 1.9 V, its greatest value, in"), "{text}");
     // What a clipped record looks like is a saturated amplifier or a slack sleeve, and nothing else.
     let first = text.lines().next().unwrap();
@@ -307,9 +300,8 @@ fn ctrl_c_leaves_nothing_half_written() {
 fn a_blind_check_keeps_its_labels_sealed() {
     let scratch = Scratch::new();
     let out = scratch.path("check");
-    let text = stdout(
-        stretch().args(["blind", "make", "--cases", "2", "--seed", "11", "--out"]).arg(&out),
-    );
+    let text =
+        runs(stretch().args(["blind", "make", "--cases", "2", "--seed", "11", "--out"]).arg(&out));
     let hash = text.split_whitespace().last().unwrap().to_owned();
     assert_eq!(hash.len(), 64);
     fails(stretch().args(["blind", "make", "--cases", "2", "--out"]).arg(&out), &["check"]);
@@ -318,8 +310,8 @@ fn a_blind_check_keeps_its_labels_sealed() {
         "baselines":{"largest_drop":"leak","signature":null,"bic":null}}"#;
     fs::write(out.join("case-000/diagnosis.json"), answer).unwrap();
     fs::write(out.join("case-001/diagnosis.json"), answer).unwrap();
-    assert!(stdout(stretch().args(["blind", "run"]).arg(&out)).contains("answered 2 of 2"));
-    let text = stdout(stretch().args(["blind", "score", "--no-oracle"]).arg(&out));
+    assert!(runs(stretch().args(["blind", "run"]).arg(&out)).contains("answered 2 of 2"));
+    let text = runs(stretch().args(["blind", "score", "--no-oracle"]).arg(&out));
     assert!(text.contains(&hash) && text.contains("false alarms on nulls"), "{text}");
     assert!(text.contains("| this diagnosis |") && text.contains("| BIC alone |"), "{text}");
     let json: Value =
@@ -348,7 +340,7 @@ fn a_blind_case_is_diagnosed_away_from_its_label() {
     fs::create_dir(&rooms).unwrap();
     let mut command = stretch();
     command.args(["blind", "run", "--no-baselines"]).arg(&check).env("TMPDIR", &rooms);
-    assert!(stdout(&mut command).contains("answered 1 of 1 cases, 0 refused"));
+    assert!(runs(&mut command).contains("answered 1 of 1 cases, 0 refused"));
     let d: Value =
         serde_json::from_str(&fs::read_to_string(case.join("diagnosis.json")).unwrap()).unwrap();
     assert_eq!(
@@ -361,7 +353,7 @@ fn a_blind_case_is_diagnosed_away_from_its_label() {
     alter(&case.join("fit.csv"), "inlet", |_, _| 3.0);
     let mut command = stretch();
     command.args(["blind", "run"]).arg(&check).env("TMPDIR", &rooms);
-    assert!(stdout(&mut command).contains("answered 0 of 1 cases, 1 refused"));
+    assert!(runs(&mut command).contains("answered 0 of 1 cases, 1 refused"));
     let why = fs::read_to_string(case.join("refusal.txt")).unwrap();
     assert!(why.contains("inlet") && why.contains("from 0 to 1"), "{why}");
     assert_eq!(fs::read_dir(&rooms).unwrap().count(), 0);
@@ -374,7 +366,7 @@ fn a_gauge_alone_is_diagnosed_beside_its_reference() {
     let trial = scratch.loops("loops.csv", 60.0, 1.1);
     let page = scratch.path("gauge.html");
     let columns = ["--reference", "length_mm", "--signal", "bridge_v"];
-    let text = stdout(diagnose(&trial).args(columns).arg("--report").arg(&page));
+    let text = runs(diagnose(&trial).args(columns).arg("--report").arg(&page));
     let first = text.lines().next().unwrap();
     assert!(first.contains("channel_skew") || first.contains("amplifier_lowpass"), "{text}");
     assert!(text.contains("skew_s = 0.03") || text.contains("skew_s = 0.029"), "{text}");

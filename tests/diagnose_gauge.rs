@@ -8,18 +8,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use assert_cmd::Command;
 use serde_json::Value;
-use support::{Scratch, fails, stdout as text_of, stretch};
+use support::{Scratch, fails, runs, stretch};
 
 /// What a run that succeeds prints.
-#[track_caller]
-fn stdout(command: &mut Command) -> String {
-    let output = command.output().expect("the program runs");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    text_of(&output)
-}
-
 /// A little noise that comes out the same everywhere.
 fn noise(i: usize) -> f64 {
     let mut z = (i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -79,7 +71,7 @@ fn a_gauge_is_told_by_columns_rig_file_or_missing_openings() {
     let (json, page) = (scratch.path("d.json"), scratch.path("d.html"));
     let mut command = stretch();
     command.arg("diagnose").arg(&file).args(["--reference", "angle_deg", "--signal", "s2"]);
-    named(&stdout(command.arg("--json").arg(&json).arg("--report").arg(&page)));
+    named(&runs(command.arg("--json").arg(&json).arg("--report").arg(&page)));
     let d: Value = serde_json::from_str(&fs::read_to_string(&json).unwrap()).unwrap();
     assert_eq!((d["verdict"].as_str(), &d["named"][0]), (Some("effect"), &"channel_skew".into()));
     let skew = d["candidates"][0]["parameters"]["skew_s"].as_f64().unwrap();
@@ -90,13 +82,13 @@ fn a_gauge_is_told_by_columns_rig_file_or_missing_openings() {
     // A data set whose rig file says so, its columns named; the usual columns need no naming.
     let set = folder(&scratch, "kind", "time_s,angle_deg,s2", Some(GAUGE));
     let columns = ["--reference", "angle_deg", "--signal", "s2"];
-    named(&stdout(stretch().arg("diagnose").arg(&set).args(columns)));
+    named(&runs(stretch().arg("diagnose").arg(&set).args(columns)));
     fails(stretch().arg("diagnose").arg(&set), &["--reference", "angle_deg, s2"]);
     let set = folder(&scratch, "usual", "time_s,length_mm,bridge_v", None);
-    named(&stdout(stretch().arg("diagnose").arg(&set)));
+    named(&runs(stretch().arg("diagnose").arg(&set)));
     // A rig file of a whole rig does not describe a gauge.
     let rig = scratch.path("rig.toml");
-    fs::write(&rig, stdout(stretch().arg("rig"))).unwrap();
+    fs::write(&rig, runs(stretch().arg("rig"))).unwrap();
     let mut command = stretch();
     command.arg("diagnose").arg(&file).args(columns).arg("--rig").arg(&rig);
     fails(&mut command, &["joint.csv", "kind"]);
@@ -144,22 +136,22 @@ fn records_that_cannot_be_used_are_refused_by_name() {
     // A gap in time and a converter at its end are no reason to refuse, and not passed over.
     let kept = good.lines().enumerate().filter(|(i, _)| !(4000..4300).contains(i));
     let gap: String = kept.map(|(_, l)| l.to_owned() + "\n").collect();
-    let text = stdout(&mut run(&gap, "angle_deg", "s2"));
+    let text = runs(&mut run(&gap, "angle_deg", "s2"));
     assert!(text.lines().next().unwrap().contains("channel_skew"), "{text}");
     assert!(text.contains("joint.csv: 3.000 s are missing after 39.98 s"), "{text}");
     let value = |i: usize| -> Option<f64> { good.lines().nth(i)?.split(',').nth(2)?.parse().ok() };
     let all: Vec<Option<f64>> = (0..6001).map(value).collect();
     let clipped = spoiled(2, &|i| Some(format!("{:.5}", all[i]?.min(1.5))));
-    let text = stdout(&mut run(&clipped, "angle_deg", "s2"));
+    let text = runs(&mut run(&clipped, "angle_deg", "s2"));
     assert!(text.contains("s2 stands at its greatest value, 1.5"), "{text}");
     // Reference and signal exchanged: told, and no effect takes the blame for certain.
-    let text = stdout(&mut run(&good, "s2", "angle_deg"));
+    let text = runs(&mut run(&good, "s2", "angle_deg"));
     assert!(text.contains("swapped?"), "{text}");
     let metres = scratch.path("metres.csv");
     record(&metres, "time_s,length_mm,s2", 1e-3, 0.0);
     let mut command = stretch();
     command.arg("diagnose").arg(&metres).args(["--reference", "length_mm", "--signal", "s2"]);
-    let text = stdout(&mut command);
+    let text = runs(&mut command);
     assert!(text.contains("metres") && text.lines().next().unwrap().contains("channel_skew"));
 }
 
@@ -168,7 +160,7 @@ fn a_measured_sleeve_gets_shares_and_no_confident_name() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/knit_sleeve/heel_curl_90_1.csv");
     let mut command = stretch();
     command.arg("diagnose").arg(file).args(["--reference", "angle_deg", "--signal", "s2"]);
-    let text = stdout(&mut command);
+    let text = runs(&mut command);
     let first = text.lines().next().unwrap();
     assert!(!first.contains("lacks"), "{first}");
     // Bending and slow memory, as a fit of other forms finds them too (docs/gauge_alone.md).

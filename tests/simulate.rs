@@ -4,22 +4,14 @@ mod support;
 
 use std::fs;
 
-use assert_cmd::Command;
-use support::{Scratch, fails, stdout as text_of, stretch};
+use support::{Scratch, fails, runs, stretch};
 
 /// What a run that succeeds prints.
-#[track_caller]
-fn stdout(command: &mut Command) -> String {
-    let output = command.output().expect("the program runs");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    text_of(&output)
-}
-
 #[test]
 fn a_run_is_repeated_from_its_own_rig_file() {
     let scratch = Scratch::new();
     let (first, again) = (scratch.path("first"), scratch.path("again"));
-    let said = stdout(
+    let said = runs(
         stretch()
             .args([
                 "simulate",
@@ -32,7 +24,7 @@ fn a_run_is_repeated_from_its_own_rig_file() {
             .arg(&first),
     );
     assert!(said.contains("17 trials, 480 s, gauge_hysteresis, seed 5"), "{said}");
-    stdout(
+    runs(
         stretch().args(["simulate", "--rig"]).arg(first.join("rig.toml")).arg("--out").arg(&again),
     );
     let mut files = 0;
@@ -52,13 +44,13 @@ fn a_run_is_repeated_from_its_own_rig_file() {
 #[test]
 fn a_rig_of_ones_own_is_named_without_its_effects() {
     let scratch = Scratch::new();
-    let text = stdout(stretch().arg("rig"));
+    let text = runs(stretch().arg("rig"));
     assert!(text.contains("tau_m") && text.contains("# Lag of the muscle (s)"));
     let text =
         text.replace("value = 180.0", "value = 200.0") + "[[effect]]\nname = \"leak\"\nc = 1e-10\n";
     let rig = scratch.write("rig.toml", &text);
     let out = scratch.path("out");
-    stdout(
+    runs(
         stretch()
             .args(["simulate", "--protocol", "pulses", "--rig"])
             .arg(&rig)
@@ -79,11 +71,11 @@ fn replayed_commands_give_the_trial_again() {
     let scratch = Scratch::new();
     let (out, replay) = (scratch.path("out"), scratch.path("replay"));
     let quiet = ["--noise", "off"];
-    stdout(
+    runs(
         stretch().args(["simulate", "--protocol", "arbitrary"]).args(quiet).arg("--out").arg(&out),
     );
     let trial = out.join("arbitrary_1.csv");
-    stdout(
+    runs(
         stretch()
             .arg("simulate")
             .arg("--commands")
@@ -108,7 +100,7 @@ fn a_folder_that_exists_is_refused_and_left_alone() {
     };
     fails(&mut run(), &["out", "exists"]);
     assert_eq!(fs::read_dir(&out).unwrap().count(), 1);
-    stdout(run().arg("--force"));
+    runs(run().arg("--force"));
     assert_eq!(fs::read_to_string(out.join("mine.txt")).unwrap(), "mine");
     assert!(out.join("pulses_1.csv").is_file());
 }
@@ -127,7 +119,7 @@ fn wrong_input_is_named() {
     commands(&format!("{header}0,0,0\n0.01,1.2,0\n"), &["commands.csv", "inlet", "1.2", "0 .. 1"]);
     let gap = format!("{header}0,0,0\n0.01,0,0\n0.02,0,0\n0.05,0,0\n0.06,0,0\n");
     commands(&gap, &["commands.csv", "sample 3", "0.01 s"]);
-    let rig = stdout(stretch().arg("rig"));
+    let rig = runs(stretch().arg("rig"));
     let file = scratch.write("rig.toml", rig.replace("value = 0.35", "value = -0.35"));
     let with = |file: &std::path::Path, parts: &[&str]| {
         fails(stretch().args(["simulate", "--rig"]).arg(file).arg("--out").arg(&out), parts);
@@ -140,12 +132,12 @@ fn wrong_input_is_named() {
 
 #[test]
 fn the_catalogue_is_listed() {
-    let text = stdout(stretch().arg("effects"));
+    let text = runs(stretch().arg("effects"));
     for name in ["supply_sag", "gauge_softening", "pot_backlash"] {
         assert!(text.contains(name), "{name}");
     }
     let json: serde_json::Value =
-        serde_json::from_str(&stdout(stretch().args(["effects", "--json"]))).unwrap();
+        serde_json::from_str(&runs(stretch().args(["effects", "--json"]))).unwrap();
     assert_eq!(json.as_array().unwrap().len(), 23);
     assert_eq!(json[0]["parameters"][0]["name"], "r");
     fails(stretch().args(["effects", "lek"]), &["did you mean `leak`?"]);

@@ -3,7 +3,7 @@
 const DEPTH: usize = 4096;
 const PAINT: u32 = 0xa5c3_5a3c;
 
-/// Paints the kilobyte below the caller's frame.
+/// Paints [`DEPTH`] bytes below the caller's frame.
 ///
 /// Inlined, so that nothing of its own lies there.
 #[inline(always)]

@@ -68,6 +68,14 @@ pub(crate) fn stdout(output: &Output) -> String {
     String::from_utf8(output.stdout.clone()).expect("UTF-8")
 }
 
+/// What a command says that succeeds.
+#[track_caller]
+pub(crate) fn runs(command: &mut Command) -> String {
+    let output = command.output().expect("the program runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    stdout(&output)
+}
+
 /// Runs to a failure with exit code 1 and a message that has all of `parts`.
 #[track_caller]
 pub(crate) fn fails(command: &mut Command, parts: &[&str]) {

@@ -6,11 +6,9 @@
 
 use std::{fs, path::Path};
 
-use stretch_blind::{CaseKind, Label, Seal, are_twins};
+use stretch_blind::{COUNTED_EXCESS, CaseKind, Label, Seal, are_twins};
 use stretch_gap::{Diagnosis, Thresholds, VerdictKind};
 
-/// Excess from which a case counts.
-const COUNTED: f64 = 0.1;
 /// Probability of a truth that is no candidate.
 const NOT_LISTED: f64 = 1e-3;
 /// Width of the border between known and unknown, in logarithms of the excess left: a sharp one would follow single cases.
@@ -70,7 +68,7 @@ fn probabilities(cases: &[Case]) -> (f64, f64) {
         .iter()
         .filter(|(label, d)| {
             label.kind == CaseKind::Single
-                && label.excess >= COUNTED
+                && label.excess >= COUNTED_EXCESS
                 && d.candidates.first().is_some_and(|c| c.effects.len() == 1)
         })
         .map(|(label, d)| {
@@ -103,7 +101,7 @@ fn probabilities(cases: &[Case]) -> (f64, f64) {
 /// Excess and share of it that mismatch of form may leave, between cases that an effect explains and those that none does.
 fn unknowns(cases: &[Case]) -> (f64, f64) {
     let is_counted = |label: &Label, d: &Diagnosis| {
-        label.excess >= COUNTED && d.gap.retuned > Thresholds::frozen().null_excess
+        label.excess >= COUNTED_EXCESS && d.gap.retuned > Thresholds::frozen().null_excess
     };
     let mut explained = Vec::new();
     let mut foreign = Vec::new();

@@ -11,8 +11,8 @@ use crate::{
     floor::Floor,
     frame::{Metric, Role},
     screen::Ground,
-    select::Solution,
-    simulator::{EffectSpec, Model, Motion, ParameterSpec, Run, Simulator, StageSpec, TrialSpec},
+    select::{Solution, possible},
+    simulator::{Description, Model, Motion, ParameterSpec, Run, Simulator},
 };
 
 /// Single effects that an information criterion is asked about: the best of the screen.
@@ -60,6 +60,7 @@ fn largest_drop(
         metrics: metrics?,
         trials: bench.trials,
         memory: bench.memory.clone(),
+        arriving: Vec::new(),
         stop: bench.stop,
     };
     let ground = Ground::around(&rigid, shipped)?;
@@ -82,24 +83,8 @@ fn signature(bench: &Bench<'_>, ground: &Ground) -> Result<Option<usize>, GapErr
     let likeness = each_effect(bench, |effect| {
         let spec = &bench.simulator.effects()[effect];
         let mut most = 0.0_f64;
-        'starts: for values in &spec.starts {
-            let mut model = ground.model.clone();
-            model.effects.push((effect, values.clone()));
-            let (mut own, mut mixed) = (0.0, 0.0);
-            for &stage in &spec.touches {
-                let there = match bench.residual_values(stage, &model) {
-                    Ok(there) => there,
-                    Err(GapError::Stopped) => return Err(GapError::Stopped),
-                    Err(_) => continue 'starts,
-                };
-                let here = &ground.residuals[stage].values;
-                let change = here.iter().zip(&there).map(|(a, b)| a - b).collect();
-                let change = bench.metrics[stage].column(&bench.frame, change);
-                let (squares, product) = bench.projected(stage, ground, &change);
-                own += squares;
-                mixed += product;
-            }
-            if own > 1e-9 {
+        for values in &spec.starts {
+            if let Some((own, mixed)) = bench.change(ground, effect, values)? {
                 most = most.max(mixed.abs() / own.sqrt());
             }
         }
@@ -165,32 +150,21 @@ fn best(numbers: Vec<f64>) -> Option<(usize, f64)> {
 impl Bench<'_> {
     /// What is left in the stages that an effect touches when it is fitted on top of a ground, from its best starts.
     fn fits(&self, ground: &Ground, effect: usize) -> Result<Vec<Vec<Misfit>>, GapError> {
-        let mut all = Vec::new();
-        for (values, _) in self.screen(ground, effect)?.starts.into_iter().take(STARTS) {
+        let mut starts = self.screen(ground, effect)?.starts;
+        starts.truncate(STARTS);
+        possible(starts.into_par_iter().map(|(values, _)| {
             let mut model = ground.model.clone();
             model.effects.push((effect, values));
             let touched = &self.simulator.effects()[effect].touches;
-            match self.fit(touched, model, &ground.known, COARSE) {
-                Ok(fitted) => all.push(fitted.misfits),
-                Err(GapError::Stopped) => return Err(GapError::Stopped),
-                // A fit that cannot begin says nothing for the effect.
-                Err(_) => {}
-            }
-        }
-        Ok(all)
-    }
-
-    /// Mean square over fitted and held-out samples, in floors.
-    fn mean_square(&self, misfit: &Misfit) -> f64 {
-        let (fit, held) = (self.frame.blocks(Role::Fit), self.frame.blocks(Role::Held));
-        (fit * misfit.fit + held * misfit.held) / (fit + held)
+            Ok(self.fit(touched, model, &ground.known, COARSE)?.misfits)
+        }))
     }
 }
 
 /// A simulator whose parameters are exact: nothing is re-tuned, nothing wanders.
 struct Frozen<'a> {
     simulator: &'a dyn Simulator,
-    parameters: Vec<ParameterSpec>,
+    about: Description,
 }
 
 impl<'a> Frozen<'a> {
@@ -201,29 +175,15 @@ impl<'a> Frozen<'a> {
             per_trial_sd: None,
             ..p.clone()
         };
-        Self { simulator, parameters: simulator.parameters().iter().map(exact).collect() }
+        let mut about = simulator.description().clone();
+        about.parameters = about.parameters.iter().map(exact).collect();
+        Self { simulator, about }
     }
 }
 
 impl Simulator for Frozen<'_> {
-    fn stages(&self) -> &[StageSpec] {
-        self.simulator.stages()
-    }
-
-    fn parameters(&self) -> &[ParameterSpec] {
-        &self.parameters
-    }
-
-    fn effects(&self) -> &[EffectSpec] {
-        self.simulator.effects()
-    }
-
-    fn trials(&self) -> &[TrialSpec] {
-        self.simulator.trials()
-    }
-
-    fn dt_s(&self) -> f64 {
-        self.simulator.dt_s()
+    fn description(&self) -> &Description {
+        &self.about
     }
 
     fn measured(&self, stage: usize) -> &[f64] {

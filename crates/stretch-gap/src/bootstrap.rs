@@ -12,6 +12,8 @@ pub(crate) struct Closed {
     pub(crate) after: f64,
     pub(crate) closed: f64,
     pub(crate) interval: [f64; 2],
+    /// Whether the mean square falls for certain, at the same level.
+    pub(crate) falls: bool,
 }
 
 /// CGF = 1 - sum max(0, excess after)/sum max(0, excess before), channels in step: a block is drawn for all of them.
@@ -24,7 +26,7 @@ pub(crate) fn closed_interval(before: &[Vec<f64>], after: &[Vec<f64>], seed: u64
     };
     let (b, a) = (excess(before), excess(after));
     let count = before.first().map_or(0, Vec::len);
-    let mut draws = Vec::with_capacity(DRAWS);
+    let (mut draws, mut falls) = (Vec::with_capacity(DRAWS), Vec::with_capacity(DRAWS));
     let mut dice = Dice::new(seed, 77);
     for _ in 0..DRAWS {
         let mut sums = vec![(0.0, 0.0); before.len()];
@@ -42,8 +44,11 @@ pub(crate) fn closed_interval(before: &[Vec<f64>], after: &[Vec<f64>], seed: u64
             sums.iter().map(|s| one(s.1)).sum::<f64>(),
         );
         draws.push(drawn);
+        falls.push(sums.iter().map(|s| s.0 - s.1).sum::<f64>());
     }
     draws.sort_by(f64::total_cmp);
-    let at = |q: f64| draws[((q * DRAWS as f64) as usize).min(DRAWS - 1)];
-    Closed { before: b, after: a, closed: closed(b, a), interval: [at(0.025), at(0.975)] }
+    falls.sort_by(f64::total_cmp);
+    let at = |q: f64| ((q * DRAWS as f64) as usize).min(DRAWS - 1);
+    let interval = [draws[at(0.025)], draws[at(0.975)]];
+    Closed { before: b, after: a, closed: closed(b, a), interval, falls: falls[at(0.025)] > 0.0 }
 }

@@ -85,7 +85,8 @@ fn run(
         .map(|s| Metric::of(simulator, &frame, s, &floors[s], &shipped, all))
         .collect();
     let trials = frame.fit_trials;
-    let mut bench = Bench { simulator, frame, metrics: metrics?, trials, memory: Vec::new(), stop };
+    let (memory, arriving) = (Vec::new(), Vec::new());
+    let mut bench = Bench { simulator, frame, metrics: metrics?, trials, memory, arriving, stop };
     progress("re-tuning the nominal parameters");
     let mut nominal = retune(&bench, &shipped)?;
     floors = floors_of(simulator, &bench.frame, &nominal.model, options.seed)?;
@@ -101,11 +102,12 @@ fn run(
         .map(|s| Ok(bench.memory_of(s, &bench.residual(s, &nominal.model)?)))
         .collect();
     bench.memory = memory?;
+    let arriving: Result<_, GapError> =
+        (0..stages).into_par_iter().map(|s| bench.arriving(s, &nominal.model)).collect();
+    bench.arriving = arriving?;
     solver_check(&bench, &nominal.model)?;
     let mut search = Search::new(&bench, &options.thresholds, nominal.clone(), options.depth);
-    let best = search.run(progress)?;
-    progress("rivals");
-    let rivals = search.rivals(&best)?;
+    let (best, rivals) = search.run(progress)?;
     let mut slots: BTreeMap<usize, f64> = BTreeMap::new();
     for &effect in &best.effects {
         let less = search.without(&best, effect)?;
@@ -183,7 +185,6 @@ fn retune(bench: &Bench<'_>, start: &Model) -> Result<Solution, GapError> {
         misfits,
         free: 0,
         effect_sd: BTreeMap::new(),
-        at_bound: 0,
         score: 0.0,
     })
 }
@@ -252,6 +253,7 @@ fn candidates(
                 gap_after: interval.after,
                 closed: interval.closed,
                 closed_ci: interval.interval,
+                is_confirmed: interval.falls,
                 parameters,
             })
         })

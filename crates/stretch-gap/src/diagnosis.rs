@@ -37,6 +37,8 @@ pub struct Candidate {
     pub closed: f64,
     /// Its 95 % interval, by block bootstrap.
     pub closed_ci: [f64; 2],
+    /// Whether the mean square error falls on the test trials, by the same bootstrap.
+    pub is_confirmed: bool,
     /// Values of the effects' parameters by name; with several effects by `effect.parameter`.
     #[serde(rename = "parameters")]
     pub by_name: BTreeMap<String, f64>,

@@ -18,6 +18,8 @@ pub(crate) struct Bench<'a> {
     pub(crate) trials: usize,
     /// By stage: samples that count as one, from the memory of the re-tuned nominal's residual.
     pub(crate) memory: Vec<f64>,
+    /// By stage: what of the measured input's noise arrives through the re-tuned nominal.
+    pub(crate) arriving: Vec<Misfit>,
     pub(crate) stop: &'a (dyn Fn() -> bool + Sync),
 }
 
@@ -36,8 +38,6 @@ pub(crate) struct Fitted {
     pub(crate) misfits: Vec<Misfit>,
     /// One standard deviation of each effect parameter, in the order of the model's effects.
     pub(crate) effect_sd: Vec<Vec<f64>>,
-    /// Effect parameters that ended on a bound of their range.
-    pub(crate) at_bound: usize,
 }
 
 /// One coordinate of a fit.
@@ -88,6 +88,9 @@ pub(crate) type Sensitivities = Vec<(usize, Column)>;
 /// Standard deviation of a form around its usual value, as a share of its range.
 const FORM_SD: f64 = 0.35;
 
+/// Draws of the measured input's noise; the same for every model.
+const DRAWS: u64 = 4;
+
 /// How much work a fit may be.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {
@@ -126,6 +129,56 @@ impl Bench<'_> {
             if n > 0.0 { sum / n } else { 1.0 }
         };
         Misfit { stage, fit: mean(Role::Fit), held: mean(Role::Held) }
+    }
+
+    /// Mean square over fitted and held-out samples, in floors.
+    pub(crate) fn mean_square(&self, misfit: &Misfit) -> f64 {
+        let (fit, held) = (self.frame.blocks(Role::Fit), self.frame.blocks(Role::Held));
+        (fit * misfit.fit + held * misfit.held) / (fit + held)
+    }
+
+    /// What of the measured input's noise arrives at the output of a stage.
+    pub(crate) fn arriving(&self, stage: usize, model: &Model) -> Result<Misfit, GapError> {
+        let plain = self.simulate(stage, model)?;
+        let mut shaken = vec![0.0; plain.len()];
+        let mut mean = Misfit { stage, ..Misfit::default() };
+        for draw in 0..DRAWS {
+            let run = Run { stage, model, trials: self.trials, shake: Some(draw), step: 1.0 };
+            self.simulator.simulate(run, &mut shaken)?;
+            for ((x, y), sd) in shaken.iter_mut().zip(&plain).zip(&self.metrics[stage].sd) {
+                *x = (*x - y) / sd;
+            }
+            let power = |role| {
+                let parts = self.frame.of_role(role).map(|s| &shaken[s.from..s.to]);
+                let sum: f64 = parts.map(|part| dot(part, part)).sum();
+                sum / (self.frame.count(role) as f64).max(1.0)
+            };
+            mean.fit += power(Role::Fit) / DRAWS as f64;
+            mean.held += power(Role::Held) / DRAWS as f64;
+            if mean.fit == 0.0 {
+                break;
+            }
+        }
+        Ok(mean)
+    }
+
+    /// Misfit of a model beside others: an effect that happens to keep the measured input's noise from the output (a slow
+    /// amplifier, a slipping sleeve) is no better for that, and what it keeps away is given back.
+    fn fair_misfit(
+        &self,
+        stage: usize,
+        model: &Model,
+        residual: &Column,
+    ) -> Result<Misfit, GapError> {
+        let mut misfit = self.misfit(stage, residual);
+        let effects = self.simulator.effects();
+        let acts = model.effects.iter().any(|(e, _)| effects[*e].touches.contains(&stage));
+        if let Some(nominal) = self.arriving.get(stage).filter(|n| acts && n.fit > 0.0) {
+            let own = self.arriving(stage, model)?;
+            misfit.fit += nominal.fit - own.fit;
+            misfit.held += nominal.held - own.held;
+        }
+        Ok(misfit)
     }
 
     fn coordinates(&self, stages: &[usize], model: &Model) -> (Vec<Coordinate>, Vec<[f64; 2]>) {
@@ -432,11 +485,11 @@ impl Bench<'_> {
                 }
             }
         }
-        let misfits = stages.iter().zip(&residuals).map(|(&s, r)| self.misfit(s, r)).collect();
+        let misfits: Result<Vec<Misfit>, GapError> =
+            stages.iter().zip(&residuals).map(|(&s, r)| self.fair_misfit(s, &model, r)).collect();
         let spread = spreads(&normal, n);
         let mut effect_sd: Vec<Vec<f64>> =
             model.effects.iter().map(|(_, v)| vec![0.0; v.len()]).collect();
-        let mut at_bound = 0;
         for (i, c) in coordinates.iter().enumerate() {
             let (slot, index, sd) = match *c {
                 Coordinate::Nominal { .. } => continue,
@@ -446,16 +499,8 @@ impl Bench<'_> {
                 }
             };
             effect_sd[slot][index] = sd;
-            let (x, b) = (c.read(&model), bounds[i]);
-            let spec = &self.simulator.effects()[model.effects[slot].0].parameters[index];
-            let margin = 1e-3 * (b[1] - b[0]);
-            let is_off =
-                spec.off.is_some_and(|off| (off / (spec.max - spec.min) - x).abs() < margin);
-            if !is_off && (x - b[0] < margin || b[1] - x < margin) {
-                at_bound += 1;
-            }
         }
-        Ok(Fitted { model, misfits, effect_sd, at_bound })
+        Ok(Fitted { model, misfits: misfits?, effect_sd })
     }
 }
 

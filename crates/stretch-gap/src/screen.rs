@@ -63,31 +63,7 @@ impl Bench<'_> {
         let spec = &self.simulator.effects()[effect];
         let mut starts = Vec::new();
         for values in &spec.starts {
-            let mut model = ground.model.clone();
-            model.effects.push((effect, values.clone()));
-            let mut own = 0.0;
-            let mut with_residual = 0.0;
-            let mut possible = true;
-            for &stage in &spec.touches {
-                let there = match self.residual_values(stage, &model) {
-                    Ok(there) => there,
-                    Err(GapError::Stopped) => return Err(GapError::Stopped),
-                    Err(_) => {
-                        possible = false;
-                        break;
-                    }
-                };
-                let residual = &ground.residuals[stage];
-                let change: Vec<f64> =
-                    residual.values.iter().zip(&there).map(|(a, b)| a - b).collect();
-                let change = self.metrics[stage].column(&self.frame, change);
-                let (a, b) = self.projected(stage, ground, &change);
-                own += a;
-                with_residual += b;
-            }
-            if !possible || own <= 1e-9 {
-                continue;
-            }
+            let Some((own, with_residual)) = self.change(ground, effect, values)? else { continue };
             let weight = 1.0 / self.frame.block as f64;
             // Strengths scale with the amplitude; thresholds do not scale at all.
             let scalable = spec.parameters[0].off == Some(0.0);
@@ -110,6 +86,33 @@ impl Bench<'_> {
         }
         starts.sort_by(|a, b| b.1.total_cmp(&a.1));
         Ok(Screened { effect, starts })
+    }
+
+    /// Squares of the change that an effect makes, and its product with the residual, both without what the nominal
+    /// parameters can do; none where it makes none or cannot be simulated.
+    pub(crate) fn change(
+        &self,
+        ground: &Ground,
+        effect: usize,
+        values: &[f64],
+    ) -> Result<Option<(f64, f64)>, GapError> {
+        let mut model = ground.model.clone();
+        model.effects.push((effect, values.to_vec()));
+        let (mut own, mut mixed) = (0.0, 0.0);
+        for &stage in &self.simulator.effects()[effect].touches {
+            let there = match self.residual_values(stage, &model) {
+                Ok(there) => there,
+                Err(GapError::Stopped) => return Err(GapError::Stopped),
+                Err(_) => return Ok(None),
+            };
+            let here = &ground.residuals[stage].values;
+            let change = here.iter().zip(&there).map(|(a, b)| a - b).collect();
+            let change = self.metrics[stage].column(&self.frame, change);
+            let (squares, product) = self.projected(stage, ground, &change);
+            own += squares;
+            mixed += product;
+        }
+        Ok((own > 1e-9).then_some((own, mixed)))
     }
 
     fn solved(
@@ -138,7 +141,7 @@ impl Bench<'_> {
     }
 
     /// Squares of a change, and its product with the residual, both without what the nominal parameters can do.
-    pub(crate) fn projected(&self, stage: usize, ground: &Ground, change: &Column) -> (f64, f64) {
+    fn projected(&self, stage: usize, ground: &Ground, change: &Column) -> (f64, f64) {
         let metric = &self.metrics[stage];
         let residual = &ground.residuals[stage];
         let product = |a: &Column, b: &Column| metric.product(&self.frame, a, b, Role::Fit);

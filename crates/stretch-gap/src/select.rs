@@ -22,6 +22,12 @@ const LEADERS: usize = 4;
 /// Rivals looked at for an effect that stands alone, and for one among others.
 const RIVALS: (usize, usize) = (6, 3);
 
+/// Share of the least rise that a screen must promise: where the change bends it promises too little.
+const PROMISE: f64 = 0.1;
+
+/// How often an effect of the best set gives its place to another.
+const EXCHANGES: usize = 2;
+
 /// Starts of one effect that are fitted, and the share of the best one's promise that the others need.
 const STARTS: usize = 3;
 const WORTH_A_START: f64 = 0.3;
@@ -40,7 +46,6 @@ pub(crate) struct Solution {
     /// Free effect parameters.
     pub(crate) free: usize,
     pub(crate) effect_sd: BTreeMap<usize, Vec<f64>>,
-    pub(crate) at_bound: usize,
     /// Score against the re-tuned nominal.
     pub(crate) score: f64,
 }
@@ -55,8 +60,7 @@ impl Solution {
 impl Bench<'_> {
     /// Excess of a stage over fitted and held-out samples together.
     pub(crate) fn excess(&self, misfit: &Misfit) -> f64 {
-        let (fit, held) = (self.frame.blocks(Role::Fit), self.frame.blocks(Role::Held));
-        ((fit * misfit.fit + held * misfit.held) / (fit + held) - 1.0).max(0.0)
+        (self.mean_square(misfit) - 1.0).max(0.0)
     }
 
     /// Score of misfits against the nominal ones: log-likelihood of the fit with its penalty, and of the held-out part.
@@ -185,7 +189,6 @@ impl<'a> Search<'a> {
         for misfit in fitted.misfits {
             next.misfits[misfit.stage] = misfit;
         }
-        next.at_bound = fitted.at_bound;
         next.free = next
             .model
             .effects
@@ -281,23 +284,27 @@ impl<'a> Search<'a> {
         Ok(screened)
     }
 
-    /// Whether an effect on top of `base` can be worth it at all: a gap that is not there cannot be closed.
+    /// Whether an effect on top of `base` can be more than what mismatch of form left.
     fn is_possible(&self, base: &Solution, effect: usize) -> bool {
         let touched = &self.bench.simulator.effects()[effect].touches;
         let left = |s: usize| self.bench.excess(&base.misfits[s]);
-        let most: f64 = touched.iter().map(|&s| left(s)).sum();
         let beyond_form = |s: usize| {
             let gone = (self.bench.excess(&self.nominal.misfits[s]) - left(s)).max(0.0);
             left(s) >= self.thresholds.mismatch * gone
         };
-        most >= self.needed(base, effect) && touched.iter().any(|&s| beyond_form(s))
+        touched.iter().any(|&s| beyond_form(s))
     }
 
-    /// Excess that one effect more has to close: a share of what is left in the stages that it touches.
-    fn needed(&self, base: &Solution, effect: usize) -> f64 {
+    /// Rise of the score that one effect more has to bring, if it closes that much.
+    fn least_rise(&self, closed: f64) -> f64 {
+        let is_faint = closed < self.thresholds.null_excess;
+        if is_faint { self.thresholds.faint_rise } else { self.thresholds.rise }
+    }
+
+    /// Excess that is left in the stages that an effect touches.
+    fn left(&self, base: &Solution, effect: usize) -> f64 {
         let touched = &self.bench.simulator.effects()[effect].touches;
-        let left: f64 = touched.iter().map(|&s| self.bench.excess(&base.misfits[s])).sum();
-        (self.thresholds.share * left).max(self.thresholds.null_excess)
+        touched.iter().map(|&s| self.bench.excess(&base.misfits[s])).sum()
     }
 
     /// The best of a screen, and the twins of the very best.
@@ -309,9 +316,11 @@ impl<'a> Search<'a> {
         // Gains count a block as one observation, scores what the residual's memory says.
         let memory = self.bench.memory.iter().copied().fold(f64::INFINITY, f64::min);
         let finest = (memory / self.bench.frame.block as f64).min(1.0);
-        let floor = (0.03 * best).max(0.3 * self.thresholds.rise * finest);
-        let mut list: Vec<Screened> =
-            screened.iter().take(kept).filter(|s| s.gain() >= floor).copied().cloned().collect();
+        let floor = |effect: usize| {
+            (0.03 * best).max(PROMISE * self.least_rise(self.left(base, effect)) * finest)
+        };
+        let worth = screened.iter().take(kept).filter(|s| s.gain() >= floor(s.effect));
+        let mut list: Vec<Screened> = worth.copied().cloned().collect();
         let leaders: Vec<usize> = list.iter().take(LEADERS).map(|s| s.effect).collect();
         for leader in leaders {
             for twin in &specs[leader].twins {
@@ -325,11 +334,31 @@ impl<'a> Search<'a> {
         list
     }
 
-    /// Forward selection, backward pruning; the sets that were fitted stay in `tried`.
-    pub(crate) fn run(&mut self, progress: &dyn Fn(&str)) -> Result<Solution, GapError> {
-        let mut best = self.nominal.clone();
+    /// The best set, and its rivals: effects are added as long as they are worth it, and one that stands better in the
+    /// place of another takes it, for the strongest comes first and may have stood in for several.
+    pub(crate) fn run(
+        &mut self,
+        progress: &dyn Fn(&str),
+    ) -> Result<(Solution, Vec<(usize, Solution)>), GapError> {
+        let mut best = self.grow(self.nominal.clone(), progress)?;
+        let mut exchanges = 0;
+        loop {
+            progress("rivals");
+            let rivals = self.rivals(&best)?;
+            let first = rivals.iter().map(|(_, r)| r).max_by(|a, b| a.score.total_cmp(&b.score));
+            match first.filter(|r| exchanges < EXCHANGES && r.score > best.score) {
+                Some(first) => best = self.grow(first.clone(), progress)?,
+                None => return Ok((best, rivals)),
+            }
+            exchanges += 1;
+        }
+    }
+
+    /// Forward selection from a set, backward pruning; the sets that were fitted stay in `tried`.
+    fn grow(&mut self, from: Solution, progress: &dyn Fn(&str)) -> Result<Solution, GapError> {
+        let mut best = from;
         let mut ground = Ground::around(self.bench, best.model.clone())?;
-        for round in 0..self.depth {
+        for round in best.effects.len()..self.depth {
             progress(&format!("screening effects, round {}", round + 1));
             let screened = self.screen(&best, &ground)?;
             let kept = if round == 0 { KEPT } else { KEPT_LATER };
@@ -361,8 +390,8 @@ impl<'a> Search<'a> {
             return false;
         };
         let closed = base.excess(self.bench) - next.excess(self.bench);
-        next.score - base.score > self.thresholds.rise
-            && closed >= self.needed(base, new)
+        next.score - base.score > self.least_rise(closed)
+            && closed >= self.thresholds.share * self.left(base, new)
             && self.is_no_mismatch(base, next, new)
     }
 
@@ -422,7 +451,7 @@ impl<'a> Search<'a> {
 
     /// Sets in which one effect of `best` is replaced by another, the replaced one named; fitted where a screen
     /// says that they might do.
-    pub(crate) fn rivals(&mut self, best: &Solution) -> Result<Vec<(usize, Solution)>, GapError> {
+    fn rivals(&mut self, best: &Solution) -> Result<Vec<(usize, Solution)>, GapError> {
         let mut out = Vec::new();
         let kept = if best.effects.len() > 1 { RIVALS.1 } else { RIVALS.0 };
         for &effect in &best.effects {
@@ -457,7 +486,7 @@ impl<'a> Search<'a> {
 }
 
 /// Fits that were possible; a simulation that fails takes its candidate out, a stop ends all.
-fn possible<T: Send>(
+pub(crate) fn possible<T: Send>(
     fits: impl ParallelIterator<Item = Result<T, GapError>>,
 ) -> Result<Vec<T>, GapError> {
     let all: Vec<Result<T, GapError>> = fits.collect();

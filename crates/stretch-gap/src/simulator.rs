@@ -271,26 +271,15 @@ pub struct Description {
     pub dt_s: f64,
 }
 
-static NOTHING: Description = Description {
-    stages: Vec::new(),
-    parameters: Vec::new(),
-    effects: Vec::new(),
-    trials: Vec::new(),
-    dt_s: 1.0,
-};
-
 /// A simulator bound to the measurements that it is held against.
 ///
 /// Every stage is run alone on its measured input (teacher forcing), so that what one stage gets wrong does not
 /// spread to the next. Memories are carried from trial to trial in the order of the session.
 ///
-/// Three methods do: [`Simulator::description`] (or its five parts one by one), [`Simulator::measured`] and
-/// [`Simulator::simulate`].
+/// Three methods do: [`Simulator::description`], [`Simulator::measured`] and [`Simulator::simulate`].
 pub trait Simulator: Sync {
-    /// Stages, parameters, effects and trials in one; nothing unless said otherwise, and then nothing can be fitted.
-    fn description(&self) -> &Description {
-        &NOTHING
-    }
+    /// Stages, parameters, effects and trials in one.
+    fn description(&self) -> &Description;
     /// Its stages.
     fn stages(&self) -> &[StageSpec] {
         &self.description().stages

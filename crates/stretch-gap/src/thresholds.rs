@@ -8,8 +8,10 @@ use serde::{Deserialize, Serialize};
 pub struct Thresholds {
     /// Excess, summed over channels, below which there is no gap.
     pub null_excess: f64,
-    /// Least rise of the score for an effect, nats.
+    /// Least rise of the score for an effect that closes a gap, nats.
     pub rise: f64,
+    /// The same for one that closes less than what counts as a gap.
+    pub faint_rise: f64,
     /// Least share of the gap left that an effect must close.
     pub share: f64,
     /// Share of what was closed in a stage that mismatch of form may leave to a further effect.

@@ -39,7 +39,7 @@ pub(crate) fn decide(
         |kind, sentence: String, notes| Decision { kind, named: Vec::new(), sentence, notes };
     let is_confirmed = candidates
         .first()
-        .is_some_and(|c| !c.effects.is_empty() && c.closed_ci[0] > 0.0 && c.closed > 0.0);
+        .is_some_and(|c| !c.effects.is_empty() && c.is_confirmed && c.closed > 0.0);
     let left_allowed = thresholds.unknown_excess + thresholds.unknown_share * before;
     if !best.effects.is_empty() && is_confirmed && after <= left_allowed {
         let named: Vec<String> = candidates[0].effects.clone();

@@ -1,30 +1,18 @@
 //! Gauges alone, with effects in forms that the catalogue does not have, diagnosed from end to end.
 
+mod support;
+
 use stretch_data::{Channel, RigFile, Trial};
 use stretch_gap::{
     Diagnosis, GapError, GaugeSimulator, GaugeTrial, Options, Simulator, VerdictKind, diagnose,
     next_experiment,
 };
+use support::Noise;
 
 const DT_S: f64 = 0.01;
 /// Noise of the signal, whose span is about one, and of the reference, whose range is about 40 mm.
 const NOISE: f64 = 2e-3;
 const NOISE_MM: f64 = 0.02;
-
-/// Uniform numbers from a congruential generator, and sums of twelve of them as noise.
-struct Noise(u64);
-
-impl Noise {
-    fn unit(&mut self) -> f64 {
-        self.0 =
-            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn gauss(&mut self) -> f64 {
-        (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
-    }
-}
 
 /// A course of e in 0..1 as a hand makes it: moves of 0.15 to 2 s between random levels, some followed by a rest.
 fn course(seconds: f64, noise: &mut Noise) -> Vec<f64> {

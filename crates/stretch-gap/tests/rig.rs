@@ -1,27 +1,15 @@
 //! Small sessions simulated by the catalogue's own rig, diagnosed from end to end.
 
+mod support;
+
 use stretch_data::TrialKind;
 use stretch_gap::{
     Diagnosis, GapError, Options, RigSimulator, RigTrial, Session, VerdictKind, diagnose,
 };
 use stretch_sim::{Chain, DEFAULT_STEP_S, EffectSet, Key, Openings, Recorded, RigParams, Start};
+use support::Noise;
 
 const DT_S: f64 = 0.01;
-
-/// Uniform numbers from a congruential generator, and sums of twelve of them as noise.
-struct Noise(u64);
-
-impl Noise {
-    fn unit(&mut self) -> f64 {
-        self.0 =
-            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn gauss(&mut self) -> f64 {
-        (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
-    }
-}
 
 fn openings(trial: usize, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
     let (mut inlet, mut outlet) = (vec![0.0; 50], vec![0.0; 50]);

@@ -133,11 +133,11 @@ fn entry(effect: &'static dyn Effect, place: &Place<'_>) -> EffectSpec {
 fn with_forms(starts: Vec<Vec<f64>>, effect: &dyn Effect) -> Vec<Vec<f64>> {
     let forms = effect.parameters().iter().filter(|p| NAMES.contains(&p.name)).map(|p| p.typical);
     let forms: Vec<f64> = forms.collect();
-    let skew = |mut s: Vec<f64>| {
-        s.extend(&forms);
-        s
+    let usual = |mut start: Vec<f64>| {
+        start.extend(&forms);
+        start
     };
-    let mut all: Vec<Vec<f64>> = starts.into_iter().map(skew).collect();
+    let mut all: Vec<Vec<f64>> = starts.into_iter().map(usual).collect();
     if effect.name() == "valve_deadband" {
         all.extend([0.02, 0.06].map(|u| vec![u, 1.0, 0.01, 1.0]));
         all.extend([0.01, 0.03].map(|u| vec![u, 1.0, 0.01, 1.9]));
@@ -146,6 +146,18 @@ fn with_forms(starts: Vec<Vec<f64>>, effect: &dyn Effect) -> Vec<Vec<f64>> {
     if effect.name() == "channel_skew" {
         all.extend([-1e-4, 1e-4].map(|rate| vec![0.002, rate, 0.0]));
         all.push(vec![0.01, 0.0, 0.2]);
+    }
+    if matches!(effect.name(), "sleeve_slack" | "amplifier_saturation") {
+        // A knee as sharp as they come: from a soft one a fit does not find there.
+        let sharp = |start: &Vec<f64>| {
+            let mut start = start.clone();
+            if let Some(knee) = start.last_mut() {
+                *knee *= 0.15;
+            }
+            start
+        };
+        let sharper: Vec<Vec<f64>> = all.iter().map(sharp).collect();
+        all.extend(sharper);
     }
     all
 }

@@ -21,7 +21,7 @@ pub use session::{RigTrial, Session};
 
 use crate::{
     error::GapError,
-    simulator::{EffectSpec, Motion, ParameterSpec, Run, Simulator, StageSpec, TrialSpec, Wander},
+    simulator::{Description, Motion, ParameterSpec, Run, Simulator, StageSpec, TrialSpec, Wander},
 };
 
 /// Slow fluctuation of the supply, a share of it (1 sd).
@@ -37,16 +37,12 @@ pub struct RigSimulator {
     base: RigParams,
     session: Session,
     inputs: Inputs,
-    stages: Vec<StageSpec>,
+    about: Description,
     stage_kinds: Vec<Stage>,
-    parameters: Vec<ParameterSpec>,
     /// Key of each parameter; none for the pressure at a trial's start.
     keys: Vec<Option<Key>>,
-    effects: Vec<EffectSpec>,
     rows: Vec<&'static dyn Effect>,
-    trials: Vec<TrialSpec>,
     measured: Vec<Vec<f64>>,
-    dt_s: f64,
 }
 
 impl RigSimulator {
@@ -187,20 +183,8 @@ impl RigSimulator {
             })
             .collect();
         let dt_s = session.trials[0].dt_s;
-        Ok(Self {
-            base,
-            session,
-            inputs,
-            stages,
-            stage_kinds,
-            parameters,
-            keys,
-            effects,
-            rows,
-            trials,
-            measured,
-            dt_s,
-        })
+        let about = Description { stages, parameters, effects, trials, dt_s };
+        Ok(Self { base, session, inputs, about, stage_kinds, keys, rows, measured })
     }
 
     /// The session that it is bound to.
@@ -220,24 +204,8 @@ impl RigSimulator {
 }
 
 impl Simulator for RigSimulator {
-    fn stages(&self) -> &[StageSpec] {
-        &self.stages
-    }
-
-    fn parameters(&self) -> &[ParameterSpec] {
-        &self.parameters
-    }
-
-    fn effects(&self) -> &[EffectSpec] {
-        &self.effects
-    }
-
-    fn trials(&self) -> &[TrialSpec] {
-        &self.trials
-    }
-
-    fn dt_s(&self) -> f64 {
-        self.dt_s
+    fn description(&self) -> &Description {
+        &self.about
     }
 
     fn measured(&self, stage: usize) -> &[f64] {
@@ -267,7 +235,7 @@ impl Simulator for RigSimulator {
     }
 
     fn motion(&self) -> Motion<'_> {
-        let stage = self.stages.iter().position(|s| s.channel == "length_mm").unwrap_or(0);
+        let stage = self.stages().iter().position(|s| s.channel == "length_mm").unwrap_or(0);
         Motion {
             values: &self.measured[stage],
             unit: "mm",

@@ -7,7 +7,11 @@ use stretch_sim::{
     Reference, RigParams, Sensing, Stage, Start,
 };
 
-use super::{RigSimulator, forms::commands::deadband, session::Begin};
+use super::{
+    RigSimulator,
+    forms::commands::{cubic, deadband},
+    session::Begin,
+};
 use crate::{
     dice::Dice,
     error::GapError,
@@ -17,6 +21,8 @@ use crate::{
 
 /// Step of integration while fitting, s.
 const STEP_S: f64 = 2.0 * DEFAULT_STEP_S;
+/// Pieces of a sample where the amplifier is slow: between samples the length is no straight line.
+const PIECES: f64 = 4.0;
 /// Offset of a vented chamber, kPa: as a rule a little above the atmosphere (mean, 1 sd).
 const EMPTY_KPA: (f64, f64) = (0.08, 0.06);
 /// Offset of a filled chamber below the supply, a share of it (mean, 1 sd).
@@ -59,9 +65,13 @@ pub(super) fn simulate(
     let acting = Acting::of(&rig.rows, run.model)?;
     let kind = rig.stage_kinds[run.stage];
     let grid = match kind {
-        // Driven by a measured input that is linear between samples.
-        Stage::Muscle | Stage::Sensing => Grid::new(rig.dt_s, run.step * rig.dt_s, 0.0)?,
-        _ => acting.inside.grid(&params, rig.dt_s, run.step * STEP_S)?,
+        // Driven by a measured input.
+        Stage::Muscle | Stage::Sensing => {
+            let is_slow = acting.inside.find("amplifier_lowpass").is_some();
+            let pieces = if is_slow && kind == Stage::Sensing { PIECES } else { 1.0 };
+            Grid::new(rig.about.dt_s, run.step * rig.about.dt_s / pieces, 0.0)?
+        }
+        _ => acting.inside.grid(&params, rig.about.dt_s, run.step * STEP_S)?,
     };
     let setting = Setting {
         rig,
@@ -83,7 +93,7 @@ pub(super) fn simulate(
     if out.iter().all(|x| x.is_finite()) {
         Ok(())
     } else {
-        Err(GapError::NotFinite { stage: rig.stages[run.stage].name.clone() })
+        Err(GapError::NotFinite { stage: rig.about.stages[run.stage].name.clone() })
     }
 }
 
@@ -102,10 +112,11 @@ fn params_of(rig: &RigSimulator, model: &Model) -> (RigParams, f64) {
 impl Setting<'_> {
     /// How a trial begins: as the one before left it, after the pause between them.
     fn start(&self, trial: usize) -> Start {
-        let trials = &self.rig.trials;
+        let trials = &self.rig.about.trials;
         let rest_s = match trial.checked_sub(1) {
             Some(before) => {
-                let end = trials[before].start_s + trials[before].samples as f64 * self.rig.dt_s;
+                let end =
+                    trials[before].start_s + trials[before].samples as f64 * self.rig.about.dt_s;
                 trials[trial].start_s - end
             }
             None => 15.0,
@@ -152,7 +163,7 @@ impl Setting<'_> {
     /// A measured input: smoothed, and shaken if asked for.
     fn input(&self, trial: usize, of_pressure: bool) -> Vec<f64> {
         if let Some(given) = self.given.filter(|_| of_pressure == (self.kind == Stage::Muscle)) {
-            let trials = &self.rig.trials;
+            let trials = &self.rig.about.trials;
             let from = trials[..trial].iter().map(|t| t.samples).sum::<usize>();
             return given[from..from + trials[trial].samples].to_vec();
         }
@@ -171,7 +182,7 @@ impl Setting<'_> {
         mut out: &mut [f64],
         mut visit: impl FnMut(usize, &mut [f64]) -> Result<(), GapError>,
     ) -> Result<(), GapError> {
-        for (trial, spec) in self.rig.trials[..count].iter().enumerate() {
+        for (trial, spec) in self.rig.about.trials[..count].iter().enumerate() {
             let (own, rest) = out.split_at_mut(spec.samples);
             visit(trial, own)?;
             out = rest;
@@ -199,7 +210,7 @@ impl Setting<'_> {
     fn muscle(&self, count: usize, out: &mut [f64]) -> Result<(), GapError> {
         let stage = Muscle::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
-        let mut shown = self.reference()?;
+        let mut shown = self.shown(&self.effects)?;
         let before = if self.is_vented() { 1e-3 * self.params[Key::PS] } else { 0.0 };
         let mut filled = [0.0; 2];
         stage.run(&mut memory, Start::Settled, &[before; 2], &mut filled)?;
@@ -213,7 +224,7 @@ impl Setting<'_> {
     fn actuation(&self, count: usize, out: &mut [f64]) -> Result<(), GapError> {
         let stage = Actuation::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
-        let mut shown = self.reference()?;
+        let mut shown = self.shown(&self.effects)?;
         let before = if self.is_vented() { 1e-3 * self.params[Key::PS] } else { 0.0 };
         let (shut, mut filled) = ([0.0; 2], [0.0; 2]);
         let openings = Openings { inlet: &shut, outlet: &shut };
@@ -237,7 +248,7 @@ impl Setting<'_> {
     fn sensing(&self, count: usize, acting: &Acting<'_>, out: &mut [f64]) -> Result<(), GapError> {
         let stage = Sensing::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
-        let shown = self.reference()?;
+        let shown = self.shown(&self.without("pot_backlash"))?;
         let needs_pressure = self
             .effects
             .acting_in(Stage::Sensing)
@@ -256,26 +267,19 @@ impl Setting<'_> {
             stage.run(
                 &mut memory,
                 Start::Settled,
-                self.rig.trials[0].start_s,
+                self.rig.about.trials[0].start_s,
                 &vec![before; nodes],
                 &vec![kpa; nodes],
                 &mut volts,
             )?;
         }
-        let play = self.effects.find("pot_backlash").map_or(0.0, |e| e.values()[0]);
-        let mut free = if play > 0.0 { Some(self.free_length(count)?) } else { None };
-        let shown = if free.is_some() { self.reference_without("pot_backlash")? } else { shown };
+        let hidden = self.hidden(count)?;
+        let mut from = 0;
         self.each(count, out, |trial, own| {
             let mut length = self.input(trial, false);
-            if let Some(free) = free.as_mut().map(|f| std::mem::take(&mut f[trial])) {
-                // The true length is where the model of the motion says, as far as the play of the reference allows.
-                // Their difference changes at reversals only; its mean keeps the noise of the record what it was.
-                let apart: Vec<f64> = free.iter().zip(&length).map(|(a, b)| a - b).collect();
-                for (i, shown) in length.iter_mut().enumerate() {
-                    let near = &apart[i.saturating_sub(3)..(i + 4).min(apart.len())];
-                    let mean = near.iter().sum::<f64>() / near.len() as f64;
-                    *shown += mean.clamp(-play, play);
-                }
+            if let Some(hidden) = &hidden {
+                length.iter_mut().zip(&hidden[from..]).for_each(|(x, h)| *x += h);
+                from += own.len();
             }
             shown.undo(&mut length);
             let pressure = match (needs_pressure, self.rig.inputs.pressure.is_empty()) {
@@ -283,55 +287,64 @@ impl Setting<'_> {
                 (true, false) => self.input(trial, true),
                 (true, true) => std::mem::take(&mut pressures[trial]),
             };
-            let start_s = self.rig.trials[trial].start_s;
+            let start_s = self.rig.about.trials[trial].start_s;
             let (length, pressure) = (self.refined(length), self.refined(pressure));
             stage.run(&mut memory, self.start(trial), start_s, &length, &pressure, own)?;
             let noise = self.params[Key::SigmaV];
-            let recorder = Recorder { noise, unit: 1.0, dt_s: self.rig.dt_s };
+            let recorder = Recorder { noise, unit: 1.0, dt_s: self.rig.about.dt_s };
             acting.record(recorder, &self.rig.session.trials[trial].bridge_v, own);
             Ok(())
         })
     }
 
-    /// Length that the model of the motion shows without play in the reference, trial by trial.
-    fn free_length(&self, count: usize) -> Result<Vec<Vec<f64>>, GapError> {
-        let mut effects = self.effects.clone();
-        effects.remove("pot_backlash");
+    /// What play in the reference hides of the length: the model of the motion says which flank it lies on, the record how
+    /// long the muscle is.
+    fn hidden(&self, count: usize) -> Result<Option<Vec<f64>>, GapError> {
+        let Some(play) = self.effects.find("pot_backlash").filter(|e| e.values()[0] > 0.0) else {
+            return Ok(None);
+        };
+        let mut free = self.free_length(count)?;
+        let mut alone = EffectSet::new();
+        alone.push(play.effect(), play.values())?;
+        let mut shown = self.shown(&alone)?;
+        let stroke = self.rig.inputs.stroke;
+        shown.condition(&[if self.is_vented() { stroke.0 } else { stroke.1 }; 2])?;
+        self.each(count, &mut free, |trial, own| {
+            let before = own.to_vec();
+            shown.run(self.start(trial), own)?;
+            own.iter_mut().zip(before).for_each(|(shown, free)| *shown = free - *shown);
+            Ok(())
+        })?;
+        Ok(Some(free))
+    }
+
+    /// Length that the model of the motion shows without play in the reference.
+    fn free_length(&self, count: usize) -> Result<Vec<f64>, GapError> {
+        let effects = self.without("pot_backlash");
         let has_pressure = !self.rig.inputs.pressure.is_empty();
         let grid = if has_pressure {
-            Grid::samples(self.rig.dt_s)?
+            Grid::samples(self.rig.about.dt_s)?
         } else {
-            effects.grid(&self.params, self.rig.dt_s, STEP_S)?
+            effects.grid(&self.params, self.rig.about.dt_s, STEP_S)?
         };
         let without = Setting { rig: self.rig, params: self.params, effects, grid, ..*self };
-        let samples = self.rig.trials[..count].iter().map(|t| t.samples).sum();
+        let samples = self.rig.about.trials[..count].iter().map(|t| t.samples).sum();
         let mut all = vec![0.0; samples];
         if has_pressure {
             without.muscle(count, &mut all)?;
         } else {
             without.actuation(count, &mut all)?;
         }
-        let mut rest = all.as_slice();
-        let mut out = Vec::with_capacity(count);
-        for trial in &self.rig.trials[..count] {
-            let (own, behind) = rest.split_at(trial.samples);
-            out.push(own.to_vec());
-            rest = behind;
-        }
-        Ok(out)
+        Ok(all)
     }
 
-    fn reference_without(&self, name: &str) -> Result<Shown, GapError> {
+    fn without(&self, name: &str) -> EffectSet {
         let mut effects = self.effects.clone();
         effects.remove(name);
-        let grid = Grid::samples(self.rig.dt_s)?;
-        let stage = Reference::new(&self.params, &effects, &grid)?;
-        let acts = effects.acting_in(Stage::Reference).next().is_some();
-        let memory = stage.memory();
-        Ok(Shown { stage, memory, acts, work: Vec::new() })
+        effects
     }
 
-    /// Linear between samples where the grid is finer.
+    /// By cubics through four samples where the grid is finer.
     fn refined(&self, samples: Vec<f64>) -> Vec<f64> {
         let pieces = self.grid.pieces();
         if pieces == 1 || samples.is_empty() {
@@ -339,23 +352,19 @@ impl Setting<'_> {
         }
         let nodes = self.grid.nodes(samples.len());
         (0..nodes)
-            .map(|n| {
-                let (i, share) = (n / pieces, (n % pieces) as f64 / pieces as f64);
-                let next = samples[(i + 1).min(samples.len() - 1)];
-                samples[i] + share * (next - samples[i])
-            })
+            .map(|n| cubic(&samples, n / pieces, (n % pieces) as f64 / pieces as f64))
             .collect()
     }
 
     /// Pressure of the nominal pneumatics: what there is without a pressure column.
     fn simulated_pressure(&self, count: usize) -> Result<Vec<Vec<f64>>, GapError> {
         let none = EffectSet::new();
-        let grid = none.grid(&self.params, self.rig.dt_s, STEP_S)?;
+        let grid = none.grid(&self.params, self.rig.about.dt_s, STEP_S)?;
         let stage = Pneumatics::new(&self.params, &none, &grid)?;
         let mut memory = stage.memory();
         let mut all = Vec::with_capacity(count);
         for trial in 0..count {
-            let mut own = vec![0.0; self.rig.trials[trial].samples];
+            let mut own = vec![0.0; self.rig.about.trials[trial].samples];
             let (start, commands) = (self.start(trial), self.openings(trial));
             let openings = commands.view();
             stage.run(&mut memory, start, openings, self.initial_kpa(trial), &mut own)?;
@@ -364,10 +373,10 @@ impl Setting<'_> {
         Ok(all)
     }
 
-    fn reference(&self) -> Result<Shown, GapError> {
-        let grid = Grid::samples(self.rig.dt_s)?;
-        let stage = Reference::new(&self.params, &self.effects, &grid)?;
-        let acts = self.effects.acting_in(Stage::Reference).next().is_some();
+    fn shown(&self, effects: &EffectSet) -> Result<Shown, GapError> {
+        let grid = Grid::samples(self.rig.about.dt_s)?;
+        let stage = Reference::new(&self.params, effects, &grid)?;
+        let acts = effects.acting_in(Stage::Reference).next().is_some();
         let memory = stage.memory();
         Ok(Shown { stage, memory, acts, work: Vec::new() })
     }

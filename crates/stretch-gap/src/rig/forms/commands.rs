@@ -60,21 +60,23 @@ pub(crate) fn deadband(values: &[f64], side: usize, least: f64, openings: &[f64]
         .collect()
 }
 
+/// Value a share of the way from sample `i` to the next, on a cubic through four samples (Catmull and Rom 1974); the
+/// first and last value are held.
+pub(in crate::rig) fn cubic(samples: &[f64], i: usize, share: f64) -> f64 {
+    let at = |i: usize| samples[i.min(samples.len() - 1)];
+    let (a, b, c, d) = (at(i.saturating_sub(1)), at(i), at(i + 1), at(i + 2));
+    let t = share;
+    b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
+}
+
 /// Samples read `skew_s + rate t` earlier, by cubics through four samples; the first and last value are held.
 pub(crate) fn skew(values: &[f64], dt_s: f64, samples: &mut [f64]) {
     let source = samples.to_vec();
     let last = source.len() as f64 - 1.0;
-    let at = |i: isize| source[i.clamp(0, source.len() as isize - 1) as usize];
     for (i, out) in samples.iter_mut().enumerate() {
         let time = i as f64 - (values[0] + values[1] * i as f64 * dt_s) / dt_s;
         let time = time.clamp(0.0, last);
-        let base = time.floor();
-        let t = time - base;
-        let k = base as isize;
-        let [a, b, c, d] = [at(k - 1), at(k), at(k + 1), at(k + 2)];
-        *out = b + 0.5
-            * t
-            * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)));
+        *out = cubic(&source, time as usize, time.fract());
     }
 }
 

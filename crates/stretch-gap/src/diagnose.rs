@@ -117,8 +117,9 @@ fn run(
     progress("test trials");
     let mut ordered = best.clone();
     ordered.effects.sort_by(|a, b| slots[b].total_cmp(&slots[a]));
-    let weighed = weigh(&options.thresholds, &ordered, &slots, &rivals);
     let mut evidence = Evidence::of(&bench, &shipped, &nominal, &ordered, &floors)?;
+    let gap = evidence.excess();
+    let weighed = weigh(&options.thresholds, &ordered, gap, &rivals);
     evidence.candidates = weighed.iter().map(|(solution, _)| solution.model.clone()).collect();
     let candidates = candidates(&bench, &evidence, &weighed, options.seed)?;
     progress("where the gap sits");
@@ -127,7 +128,6 @@ fn run(
         slices: localise::slices(simulator, &evidence, options.seed),
         end_to_end: localise::end_to_end(simulator, &evidence)?,
     };
-    let gap = evidence.excess();
     let decision = verdict::decide(&bench, options, &evidence, &ordered, gap, &candidates);
     let mut diagnosis = Diagnosis {
         schema: 1,

@@ -1,24 +1,23 @@
 //! From scores to probabilities and the 95 % set.
 
-use std::collections::BTreeMap;
-
-use crate::{select::Solution, simulator::Simulator, thresholds::Thresholds};
+use crate::{diagnosis::Excess, select::Solution, simulator::Simulator, thresholds::Thresholds};
 
 /// Probability that the 95 % set holds.
 const COVERED: f64 = 0.95;
 
-/// Softmax within every slot of the best set (an effect and those that could stand in its place), at a temperature
-/// that grows with what the effect brings; the best set first.
+/// Softmax within every slot of the best set (an effect and those that could stand in its place), at the temperature
+/// `temperature + rho left/retuned`: the more of the gap the best set leaves, the less its form is the rig's, and the less
+/// a difference of scores says. The best set comes first.
 pub(crate) fn weigh(
     thresholds: &Thresholds,
     best: &Solution,
-    slots: &BTreeMap<usize, f64>,
+    gap: Excess,
     rivals: &[(usize, Solution)],
 ) -> Vec<(Solution, f64)> {
     let mut odds: Vec<(Solution, f64)> = vec![(best.clone(), 1.0)];
+    let share = gap.left / gap.retuned.max(thresholds.null_excess);
+    let temperature = thresholds.temperature + thresholds.rho * share;
     for (slot, rival) in rivals {
-        let brought = slots.get(slot).copied().unwrap_or(0.0).max(0.0);
-        let temperature = thresholds.temperature + thresholds.rho * brought;
         let mut rival = rival.clone();
         // The rival stands where the effect stood.
         if let Some(at) = best.effects.iter().position(|e| e == slot) {

@@ -18,7 +18,7 @@ pub struct Thresholds {
     pub mismatch: f64,
     /// Temperature of the probabilities, nats.
     pub temperature: f64,
-    /// Growth of the temperature with the score that an effect brings.
+    /// Growth of the temperature with the share of the gap that the best set leaves, nats.
     pub rho: f64,
     /// Excess that may be left whatever it was before.
     pub unknown_excess: f64,

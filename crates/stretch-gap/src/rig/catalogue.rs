@@ -147,6 +147,10 @@ fn with_forms(starts: Vec<Vec<f64>>, effect: &dyn Effect) -> Vec<Vec<f64>> {
         all.extend([-1e-4, 1e-4].map(|rate| vec![0.002, rate, 0.0]));
         all.push(vec![0.01, 0.0, 0.2]);
     }
+    if effect.name() == "pressure_crosstalk" {
+        // In proportion to the pressure it looks much like another pre-stretch: what is left shows once it bends.
+        all.extend([-0.4, 0.4].map(|bend| vec![0.003, bend]));
+    }
     if matches!(effect.name(), "sleeve_slack" | "amplifier_saturation") {
         // A knee as sharp as they come: from a soft one a fit does not find there.
         let sharp = |start: &Vec<f64>| {

@@ -90,6 +90,8 @@ const FORM_SD: f64 = 0.35;
 
 /// Draws of the measured input's noise; the same for every model.
 const DRAWS: u64 = 4;
+/// Share of a mean square that is left at least when noise is taken from it.
+const LEAST_KEPT: f64 = 0.1;
 
 /// How much work a fit may be.
 #[derive(Debug, Clone, Copy)]
@@ -175,8 +177,9 @@ impl Bench<'_> {
         let acts = model.effects.iter().any(|(e, _)| effects[*e].touches.contains(&stage));
         if let Some(nominal) = self.arriving.get(stage).filter(|n| acts && n.fit > 0.0) {
             let own = self.arriving(stage, model)?;
-            misfit.fit += nominal.fit - own.fit;
-            misfit.held += nominal.held - own.held;
+            // Where the noise is known too large, more could be taken than there is.
+            misfit.fit = (misfit.fit + nominal.fit - own.fit).max(LEAST_KEPT * misfit.fit);
+            misfit.held = (misfit.held + nominal.held - own.held).max(LEAST_KEPT * misfit.held);
         }
         Ok(misfit)
     }

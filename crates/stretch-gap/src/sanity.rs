@@ -10,8 +10,9 @@ use crate::{
 /// Tolerances at which a parameter stands at its end: two of the five or so of a stage do so by chance in one rig of a few
 /// thousand.
 const END: f64 = 2.75;
-/// Excess that must be left for that to count: more error than noise.
+/// Excess that must be left for that to count: more error than noise, and more of the gap than the form of an effect leaves.
 const LEFT: f64 = 1.0;
+const LEFT_SHARE: f64 = 0.03;
 
 /// Takes names back where the data come from something else than the simulator is of.
 ///
@@ -65,10 +66,14 @@ fn strained(simulator: &dyn Simulator, evidence: &Evidence) -> Option<String> {
     let specs = simulator.parameters();
     let at_end = |index: &&usize| {
         let spec = &specs[**index];
-        spec.sd > 0.0 && (evidence.best.parameters[**index] - spec.nominal).abs() >= END * spec.sd
+        spec.sd > 0.0
+            && spec.is_evidence
+            && (evidence.best.parameters[**index] - spec.nominal).abs() >= END * spec.sd
     };
     let left = |stage: usize| evidence.stages[stage].excess_after;
-    let stages = simulator.stages().iter().enumerate().filter(|(stage, _)| left(*stage) > LEFT);
+    let is_bad =
+        |stage: usize| left(stage) > LEFT.max(LEFT_SHARE * evidence.stages[stage].excess_retuned);
+    let stages = simulator.stages().iter().enumerate().filter(|(stage, _)| is_bad(*stage));
     let strained = stages.filter_map(|(stage, spec)| {
         let names: Vec<&str> =
             spec.parameters.iter().filter(at_end).map(|&p| specs[p].name.as_str()).collect();

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use crate::{
+    altered::Altered,
     diagnosis::Baselines,
     error::GapError,
     fit::{Bench, COARSE, Misfit},
@@ -12,7 +13,7 @@ use crate::{
     frame::{Metric, Role},
     screen::Ground,
     select::{Solution, possible},
-    simulator::{Description, Model, Motion, ParameterSpec, Run, Simulator},
+    simulator::{Model, ParameterSpec, Simulator},
 };
 
 /// Single effects that an information criterion is asked about: the best of the screen.
@@ -46,7 +47,13 @@ fn largest_drop(
     floors: &[Floor],
     null_excess: f64,
 ) -> Result<Option<usize>, GapError> {
-    let frozen = Frozen::of(bench.simulator);
+    // Nothing is re-tuned, nothing wanders.
+    let frozen = Altered::of(bench.simulator, |_, p| ParameterSpec {
+        sd: 0.0,
+        wander: None,
+        per_trial_sd: None,
+        ..p.clone()
+    });
     let shipped = Model::nominal(&frozen);
     let all = frozen.trials().len();
     let metrics: Result<Vec<Metric>, GapError> = floors
@@ -158,43 +165,5 @@ impl Bench<'_> {
             let touched = &self.simulator.effects()[effect].touches;
             Ok(self.fit(touched, model, &ground.known, COARSE)?.misfits)
         }))
-    }
-}
-
-/// A simulator whose parameters are exact: nothing is re-tuned, nothing wanders.
-struct Frozen<'a> {
-    simulator: &'a dyn Simulator,
-    about: Description,
-}
-
-impl<'a> Frozen<'a> {
-    fn of(simulator: &'a dyn Simulator) -> Self {
-        let exact = |p: &ParameterSpec| ParameterSpec {
-            sd: 0.0,
-            wander: None,
-            per_trial_sd: None,
-            ..p.clone()
-        };
-        let mut about = simulator.description().clone();
-        about.parameters = about.parameters.iter().map(exact).collect();
-        Self { simulator, about }
-    }
-}
-
-impl Simulator for Frozen<'_> {
-    fn description(&self) -> &Description {
-        &self.about
-    }
-
-    fn measured(&self, stage: usize) -> &[f64] {
-        self.simulator.measured(stage)
-    }
-
-    fn motion(&self) -> Motion<'_> {
-        self.simulator.motion()
-    }
-
-    fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
-        self.simulator.simulate(run, out)
     }
 }

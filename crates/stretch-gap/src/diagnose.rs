@@ -150,7 +150,7 @@ fn run(
         runtime_s: 0.0,
     };
     tell(&mut diagnosis);
-    sanity::check(simulator, &evidence, &mut diagnosis);
+    sanity::check(&bench, &best, &evidence, &mut diagnosis)?;
     if diagnosis.verdict == VerdictKind::Effect {
         progress("what the gap costs a calibration");
         diagnosis.transfer = transfer(simulator, &evidence, options.seed)?;

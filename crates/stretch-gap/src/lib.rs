@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod altered;
 mod baselines;
 mod bootstrap;
 mod diagnose;

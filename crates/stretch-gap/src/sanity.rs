@@ -1,31 +1,48 @@
 //! Is it the right simulator at all?
 
 use crate::{
+    altered::Altered,
     diagnosis::{Diagnosis, VerdictKind},
+    error::GapError,
     evidence::Evidence,
+    fit::{Bench, FINE},
     frame::Role,
-    simulator::Simulator,
+    select::Solution,
+    simulator::{ParameterSpec, Simulator},
 };
 
 /// Tolerances at which a parameter stands at its end: two of the five or so of a stage do so by chance in one rig of a few
 /// thousand.
 const END: f64 = 2.75;
-/// Excess that must be left for that to count: more error than noise, and more of the gap than the form of an effect leaves.
+/// Excess that must be left for that to count: more error than noise.
 const LEFT: f64 = 1.0;
-const LEFT_SHARE: f64 = 0.03;
+/// What the tolerances of such parameters are multiplied by to see whether they would explain all.
+const LOOSE: f64 = 5.0;
+/// Share of its nominal value that a parameter keeps then.
+const KEPT: f64 = 0.02;
 
 /// Takes names back where the data come from something else than the simulator is of.
 ///
 /// Either more of a channel's variance is left on the test trials with the best effects in than the simulator says that
-/// may be ([`Simulator::foreign_share`]): another rig, or a column that is not what its name says. Or two parameters of a stage stand at the end of their tolerances and more
-/// than noise is left of it all the same: what bends them is no effect but other parameters.
-pub(crate) fn check(simulator: &dyn Simulator, evidence: &Evidence, diagnosis: &mut Diagnosis) {
-    let sentence = foreign(simulator, evidence).or_else(|| strained(simulator, evidence));
-    let Some(sentence) = sentence else { return };
+/// may be ([`Simulator::foreign_share`]): another rig, or a column that is not what its name says. Or two parameters of a
+/// stage stand at the end of their tolerances, more than noise is left of it all the same, and set loose, these parameters
+/// explain as much as the effects do: what bends them is no effect but other parameters.
+pub(crate) fn check(
+    bench: &Bench<'_>,
+    best: &Solution,
+    evidence: &Evidence,
+    diagnosis: &mut Diagnosis,
+) -> Result<(), GapError> {
+    let sentence = match foreign(bench.simulator, evidence) {
+        Some(sentence) => Some(sentence),
+        None => strained(bench, best, evidence)?,
+    };
+    let Some(sentence) = sentence else { return Ok(()) };
     diagnosis.notes.push(format!("before that was seen: {}", diagnosis.sentence));
     diagnosis.verdict = VerdictKind::Unknown;
     diagnosis.named.clear();
     diagnosis.sentence = sentence;
+    Ok(())
 }
 
 /// The channel that the simulator has least to do with, if any.
@@ -62,29 +79,65 @@ fn foreign(simulator: &dyn Simulator, evidence: &Evidence) -> Option<String> {
 }
 
 /// The stage whose parameters are strained most, if any.
-fn strained(simulator: &dyn Simulator, evidence: &Evidence) -> Option<String> {
+fn strained(
+    bench: &Bench<'_>,
+    best: &Solution,
+    evidence: &Evidence,
+) -> Result<Option<String>, GapError> {
+    let simulator = bench.simulator;
     let specs = simulator.parameters();
     let at_end = |index: &&usize| {
         let spec = &specs[**index];
-        spec.sd > 0.0
-            && spec.is_evidence
-            && (evidence.best.parameters[**index] - spec.nominal).abs() >= END * spec.sd
+        spec.sd > 0.0 && (evidence.best.parameters[**index] - spec.nominal).abs() >= END * spec.sd
     };
     let left = |stage: usize| evidence.stages[stage].excess_after;
-    let is_bad =
-        |stage: usize| left(stage) > LEFT.max(LEFT_SHARE * evidence.stages[stage].excess_retuned);
-    let stages = simulator.stages().iter().enumerate().filter(|(stage, _)| is_bad(*stage));
+    let stages = simulator.stages().iter().enumerate().filter(|(stage, _)| left(*stage) > LEFT);
     let strained = stages.filter_map(|(stage, spec)| {
-        let names: Vec<&str> =
-            spec.parameters.iter().filter(at_end).map(|&p| specs[p].name.as_str()).collect();
-        (names.len() >= 2).then_some((stage, spec, names))
+        let ended: Vec<usize> = spec.parameters.iter().filter(at_end).copied().collect();
+        (ended.len() >= 2).then_some((stage, spec, ended))
     });
-    let (stage, spec, names) = strained.max_by(|a, b| left(a.0).total_cmp(&left(b.0)))?;
-    Some(format!(
+    let Some((stage, spec, ended)) = strained.max_by(|a, b| left(a.0).total_cmp(&left(b.0))) else {
+        return Ok(None);
+    };
+    if !best.effects.is_empty()
+        && loosened(bench, evidence, stage, &ended)? > bench.excess(&best.misfits[stage])
+    {
+        return Ok(None);
+    }
+    let names: Vec<&str> = ended.iter().map(|&p| specs[p].name.as_str()).collect();
+    Ok(Some(format!(
         "The parameters of {} do not fit within their tolerances: {} stand at the end of them, and a gap of {:.1} floors is left \
          all the same. Is it the right rig? If its parameters are right, something is missing that is not in the catalogue.",
         spec.name,
         names.join(", "),
         left(stage)
-    ))
+    )))
+}
+
+/// Excess of a stage without effects, some of its parameters set loose.
+fn loosened(
+    bench: &Bench<'_>,
+    evidence: &Evidence,
+    stage: usize,
+    ended: &[usize],
+) -> Result<f64, GapError> {
+    let loose = Altered::of(bench.simulator, |i, p| match ended.contains(&i) {
+        true => ParameterSpec {
+            sd: LOOSE * p.sd,
+            least: p.least.min(KEPT * p.nominal.abs()),
+            ..p.clone()
+        },
+        false => p.clone(),
+    });
+    let free = Bench {
+        simulator: &loose,
+        frame: bench.frame.clone(),
+        metrics: bench.metrics.clone(),
+        trials: bench.trials,
+        memory: bench.memory.clone(),
+        arriving: Vec::new(),
+        stop: bench.stop,
+    };
+    let fitted = free.fit(&[stage], evidence.retuned.clone(), &[], FINE)?;
+    Ok(fitted.misfits.iter().map(|m| free.excess(m)).sum())
 }

@@ -1,0 +1,42 @@
+//! A simulator with other tolerances.
+
+use crate::{
+    error::GapError,
+    simulator::{Description, Motion, ParameterSpec, Run, Simulator},
+};
+
+/// A simulator whose parameters are told another way: held, or set loose.
+pub(crate) struct Altered<'a> {
+    simulator: &'a dyn Simulator,
+    about: Description,
+}
+
+impl<'a> Altered<'a> {
+    /// Every parameter, with its index, as `told`.
+    pub(crate) fn of(
+        simulator: &'a dyn Simulator,
+        told: impl Fn(usize, &ParameterSpec) -> ParameterSpec,
+    ) -> Self {
+        let mut about = simulator.description().clone();
+        about.parameters = about.parameters.iter().enumerate().map(|(i, p)| told(i, p)).collect();
+        Self { simulator, about }
+    }
+}
+
+impl Simulator for Altered<'_> {
+    fn description(&self) -> &Description {
+        &self.about
+    }
+
+    fn measured(&self, stage: usize) -> &[f64] {
+        self.simulator.measured(stage)
+    }
+
+    fn motion(&self) -> Motion<'_> {
+        self.simulator.motion()
+    }
+
+    fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
+        self.simulator.simulate(run, out)
+    }
+}

@@ -61,15 +61,7 @@ fn largest_drop(
         .enumerate()
         .map(|(s, floor)| Metric::of(&frozen, &bench.frame, s, floor, &shipped, all))
         .collect();
-    let rigid = Bench {
-        simulator: &frozen,
-        frame: bench.frame.clone(),
-        metrics: metrics?,
-        trials: bench.trials,
-        memory: bench.memory.clone(),
-        arriving: Vec::new(),
-        stop: bench.stop,
-    };
+    let rigid = bench.beside(&frozen, metrics?);
     let ground = Ground::around(&rigid, shipped)?;
     let before: Vec<Misfit> =
         ground.residuals.iter().enumerate().map(|(s, r)| rigid.misfit(s, r)).collect();

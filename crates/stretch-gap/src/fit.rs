@@ -108,6 +108,23 @@ pub(crate) const COARSE: Effort = Effort { iterations: 5, renewals: &[1, 3] };
 pub(crate) const FINE: Effort = Effort { iterations: 14, renewals: &[1, 3, 6, 9] };
 
 impl Bench<'_> {
+    /// The same session beside another simulator of it.
+    pub(crate) fn beside<'b>(
+        &'b self,
+        simulator: &'b dyn Simulator,
+        metrics: Vec<Metric>,
+    ) -> Bench<'b> {
+        Bench {
+            simulator,
+            frame: self.frame.clone(),
+            metrics,
+            trials: self.trials,
+            memory: self.memory.clone(),
+            arriving: Vec::new(),
+            stop: self.stop,
+        }
+    }
+
     /// Residual of a stage, measured minus simulated in floors.
     pub(crate) fn residual(&self, stage: usize, model: &Model) -> Result<Column, GapError> {
         let values = self.residual_values(stage, model)?;

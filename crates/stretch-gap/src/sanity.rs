@@ -129,15 +129,7 @@ fn loosened(
         },
         false => p.clone(),
     });
-    let free = Bench {
-        simulator: &loose,
-        frame: bench.frame.clone(),
-        metrics: bench.metrics.clone(),
-        trials: bench.trials,
-        memory: bench.memory.clone(),
-        arriving: Vec::new(),
-        stop: bench.stop,
-    };
+    let free = bench.beside(&loose, bench.metrics.clone());
     let fitted = free.fit(&[stage], evidence.retuned.clone(), &[], FINE)?;
     Ok(fitted.misfits.iter().map(|m| free.excess(m)).sum())
 }

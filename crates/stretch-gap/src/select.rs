@@ -287,12 +287,13 @@ impl<'a> Search<'a> {
     /// Whether an effect on top of `base` can be more than what mismatch of form left.
     fn is_possible(&self, base: &Solution, effect: usize) -> bool {
         let touched = &self.bench.simulator.effects()[effect].touches;
-        let left = |s: usize| self.bench.excess(&base.misfits[s]);
-        let beyond_form = |s: usize| {
-            let gone = (self.bench.excess(&self.nominal.misfits[s]) - left(s)).max(0.0);
-            left(s) >= self.thresholds.mismatch * gone
-        };
-        touched.iter().any(|&s| beyond_form(s))
+        touched.iter().any(|&s| self.bench.excess(&base.misfits[s]) >= self.mismatch(base, s))
+    }
+
+    /// Excess that mismatch of form may leave of what a set closes in a stage.
+    fn mismatch(&self, base: &Solution, stage: usize) -> f64 {
+        let excess = |set: &Solution| self.bench.excess(&set.misfits[stage]);
+        self.thresholds.mismatch * (excess(&self.nominal) - excess(base)).max(0.0)
     }
 
     /// Rise of the score that one effect more has to bring, if it closes that much.
@@ -357,9 +358,9 @@ impl<'a> Search<'a> {
     /// Forward selection from a set, backward pruning; the sets that were fitted stay in `tried`.
     fn grow(&mut self, from: Solution, progress: &dyn Fn(&str)) -> Result<Solution, GapError> {
         let mut best = from;
-        let mut ground = Ground::around(self.bench, best.model.clone())?;
         for round in best.effects.len()..self.depth {
             progress(&format!("screening effects, round {}", round + 1));
+            let ground = Ground::around(self.bench, best.model.clone())?;
             let screened = self.screen(&best, &ground)?;
             let kept = if round == 0 { KEPT } else { KEPT_LATER };
             let list = self.shortlist(&best, &screened, kept);
@@ -373,9 +374,6 @@ impl<'a> Search<'a> {
                 break;
             };
             best = next;
-            if round + 1 < self.depth {
-                ground = Ground::around(self.bench, best.model.clone())?;
-            }
         }
         if best.effects.len() > 1 {
             progress("pruning");
@@ -401,8 +399,7 @@ impl<'a> Search<'a> {
         let excess = |set: &Solution, stage: usize| self.bench.excess(&set.misfits[stage]);
         self.bench.simulator.effects()[new].touches.iter().any(|&s| {
             let closed = excess(base, s) - excess(next, s);
-            let gone = (excess(&self.nominal, s) - excess(base, s)).max(0.0);
-            closed > 0.0 && closed >= self.thresholds.mismatch * gone
+            closed > 0.0 && closed >= self.mismatch(base, s)
         })
     }
 
@@ -457,16 +454,13 @@ impl<'a> Search<'a> {
         for &effect in &best.effects {
             let less = self.without(best, effect)?;
             let ground = Ground::around(self.bench, less.model.clone())?;
-            let screened: Vec<Screened> = self
-                .screen(&less, &ground)?
+            let all = self.screen(&less, &ground)?;
+            let own_gain = all.iter().find(|s| s.effect == effect).map_or(0.0, Screened::gain);
+            let screened: Vec<Screened> = all
                 .into_iter()
                 .filter(|s| !best.effects.contains(&s.effect))
                 .filter(|s| self.is_possible(&less, s.effect))
                 .collect();
-            let own_gain = {
-                let one = self.bench.screen(&ground, effect)?;
-                one.gain()
-            };
             let twins = &self.bench.simulator.effects()[effect].twins;
             let is_twin =
                 |s: &Screened| twins.contains(&self.bench.simulator.effects()[s.effect].name);

@@ -6,8 +6,9 @@ use std::{
 };
 
 use serde::Serialize;
+use stretch_bench::RigSimulator;
 use stretch_blind::{COUNTED_EXCESS, CaseKind, Label, Rate, Score};
-use stretch_gap::{Options, RigSimulator, diagnose};
+use stretch_gap::{Options, diagnose};
 
 use super::{
     blind::{Answers, answers, steps},

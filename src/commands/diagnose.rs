@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
+use stretch_bench::{GaugeSimulator, RigSimulator};
 use stretch_data::RigFile;
 use stretch_gap::{
-    Diagnosis, Evidence, GapError, GaugeSimulator, Laboratory, Options, RigSimulator, Simulator,
-    diagnose, next_experiment,
+    Diagnosis, Evidence, GapError, Laboratory, Options, Simulator, diagnose, next_experiment,
 };
 
 use super::{

@@ -1,6 +1,6 @@
 //! Channels that ran into an end of their recorder.
 
-use stretch_gap::{RigTrial, Session};
+use stretch_bench::{RigTrial, Session};
 use stretch_sim::{Key, RigParams};
 
 /// Share of the samples at one value from which it is no accident.

@@ -1,17 +1,28 @@
 //! Seeded random numbers: the same on every machine.
 
-/// SplitMix64 (doi 10.1145/2660193.2660195).
+/// SplitMix64 (doi 10.1145/2660193.2660195): what a simulator draws from when it is asked to [shake](crate::Run::shake)
+/// its inputs.
+///
+/// ```
+/// use stretch_gap::Dice;
+/// let (mut one, mut same, mut other) = (Dice::new(1, 0), Dice::new(1, 0), Dice::new(1, 1));
+/// let first = one.gauss();
+/// assert_eq!(first, same.gauss());
+/// assert_ne!(first, other.gauss());
+/// ```
 #[derive(Debug, Clone)]
-pub(crate) struct Dice(u64);
+pub struct Dice(u64);
 
 impl Dice {
-    pub(crate) fn new(seed: u64, stream: u64) -> Self {
+    /// Of a seed and one of its streams.
+    pub fn new(seed: u64, stream: u64) -> Self {
         let mut dice = Self(seed ^ stream.wrapping_mul(0x9e37_79b9_7f4a_7c15));
         dice.bits();
         dice
     }
 
-    pub(crate) fn bits(&mut self) -> u64 {
+    /// 64 random bits.
+    pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -20,18 +31,18 @@ impl Dice {
     }
 
     /// Uniform in 0..1.
-    pub(crate) fn unit(&mut self) -> f64 {
+    pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 * (1.0 / (1_u64 << 53) as f64)
     }
 
     /// Whole number below `n`.
-    pub(crate) fn below(&mut self, n: usize) -> usize {
+    pub fn below(&mut self, n: usize) -> usize {
         ((self.unit() * n as f64) as usize).min(n.saturating_sub(1))
     }
 
     /// Nearly normal with mean 0 and standard deviation 1: the sum of twelve uniform numbers, which needs no
     /// transcendental function.
-    pub(crate) fn gauss(&mut self) -> f64 {
+    pub fn gauss(&mut self) -> f64 {
         (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
     }
 }

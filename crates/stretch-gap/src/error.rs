@@ -1,38 +1,12 @@
 //! Why a diagnosis was refused.
 
-use stretch_data::DataError;
-use stretch_sim::SimError;
-
 /// Why a diagnosis was refused; carries the evidence.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GapError {
-    /// The data could not be read.
+    /// The simulator refused these values, or could not be bound to its measurements.
     #[error(transparent)]
-    Data(#[from] DataError),
-    /// The rig or an effect was refused.
-    #[error(transparent)]
-    Sim(#[from] SimError),
-    /// A column that every trial needs is missing.
-    #[error("{trial}: there is no column {column}, which {needs}")]
-    MissingColumn {
-        /// The trial.
-        trial: String,
-        /// The column.
-        column: String,
-        /// What needs it.
-        needs: &'static str,
-    },
-    /// A column is not what its name says.
-    #[error("{column}: {found}; {hint}")]
-    Implausible {
-        /// The column.
-        column: String,
-        /// What is wrong.
-        found: String,
-        /// What to do.
-        hint: String,
-    },
+    Simulator(Box<dyn std::error::Error + Send + Sync>),
     /// There is nothing to fit on.
     #[error("{what}: {hint}")]
     TooLittle {
@@ -57,15 +31,20 @@ pub enum GapError {
         /// The stage.
         stage: String,
     },
-    /// An effect of that name is not in the catalogue.
-    #[error("no effect is called `{name}`{}", .nearest.as_ref().map_or(String::new(), |n| format!(" (did you mean `{n}`?)")))]
-    UnknownEffect {
-        /// The name given.
-        name: String,
-        /// The nearest name.
-        nearest: Option<String>,
-    },
     /// The caller asked to stop.
     #[error("stopped")]
     Stopped,
+}
+
+impl GapError {
+    /// What a simulator says for itself.
+    ///
+    /// ```
+    /// use stretch_gap::GapError;
+    /// let error = GapError::simulator("the solver did not converge");
+    /// assert_eq!(error.to_string(), "the solver did not converge");
+    /// ```
+    pub fn simulator(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
+        Self::Simulator(error.into())
+    }
 }

@@ -94,7 +94,7 @@ fn of_record(simulator: &dyn Simulator, frame: &Frame, stage: usize) -> f64 {
 /// Noise variance of a record: a sixth of the median square of its second differences, corrected for the median of a
 /// normal variable's square; robust against what the motion adds. What the mains add is not noise: in every second
 /// the waves of 50 and 60 Hz are taken out before.
-pub(crate) fn noise_variance<'a>(stretches: impl Iterator<Item = &'a [f64]>, dt_s: f64) -> f64 {
+pub fn noise_variance<'a>(stretches: impl Iterator<Item = &'a [f64]>, dt_s: f64) -> f64 {
     let window = ((1.0 / dt_s).round() as usize).max(30);
     let mut squares: Vec<f64> = Vec::new();
     for stretch in stretches {

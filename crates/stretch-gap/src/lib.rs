@@ -11,13 +11,10 @@ mod evidence;
 mod fit;
 mod floor;
 mod frame;
-mod gauge;
 mod linear;
 mod localise;
 mod next_experiment;
-mod outside;
 mod probability;
-mod rig;
 mod sanity;
 mod screen;
 mod select;
@@ -32,12 +29,12 @@ pub use diagnosis::{
     Baselines, Candidate, Diagnosis, EffectValue, Excess, NextExperiment, ParameterShift, SliceGap,
     StageGap, StageShare, Transfer, TransferError, VerdictKind, Where,
 };
+pub use dice::Dice;
 pub use error::GapError;
 pub use evidence::{Evidence, StageEvidence};
+pub use floor::noise_variance;
 pub use frame::{BLOCK_S, Frame, Metric, Role, Segment};
-pub use gauge::{GaugeSimulator, GaugeTrial};
-pub use next_experiment::{Laboratory, Plan, Proposal, next_experiment};
-pub use rig::{RigSimulator, RigTrial, Session};
+pub use next_experiment::{Laboratory, Plan, Proposal, differences, next_experiment};
 pub use shares::EffectShare;
 pub use simulator::{
     Description, EffectParameterSpec, EffectSpec, Model, Motion, ParameterSpec, Run, Simulator,

@@ -90,27 +90,12 @@ pub fn next_experiment<L: Laboratory>(
         return Ok(None);
     };
     let menu = simulator.menu();
-    let done = simulator.done();
-    let block = menu.first().map_or(1.0, |(plan, _)| BLOCK_S / plan.dt_s());
-    let known = [Tangent::of(simulator, one, &done)?, Tangent::of(simulator, two, &done)?];
-    let rated: Result<Vec<(usize, f64)>, GapError> = menu
-        .par_iter()
-        .enumerate()
-        .map(|(i, (_, experiment))| {
-            let here = [
-                Tangent::of(simulator, one, experiment)?,
-                Tangent::of(simulator, two, experiment)?,
-            ];
-            let there = left(block, &known[0], &known[1], &here[0], &here[1]);
-            let back = left(block, &known[1], &known[0], &here[1], &here[0]);
-            Ok((i, there.min(back)))
-        })
-        .collect();
+    let rated = rate(simulator, one, two, &menu)?.into_iter().enumerate();
     let worth = |&(i, d): &(usize, f64)| {
         let plan = &menu[i].0;
         d * d * plan.runs_min() / plan.minutes()
     };
-    let mut rated = rated?;
+    let mut rated: Vec<(usize, f64)> = rated.collect();
     rated.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
     let Some(&(best, d)) = rated.first().filter(|r| r.1.is_finite()) else { return Ok(None) };
     let chosen = &menu[best].0;
@@ -124,6 +109,42 @@ pub fn next_experiment<L: Laboratory>(
     let trial = chosen.trial.clone();
     let rated = rated.iter().map(|&(i, d)| (menu[i].0.name.clone(), d, menu[i].0.minutes()));
     Ok(Some(Proposal { next, trial, menu: rated.collect() }))
+}
+
+/// D of every experiment of the menu for two models, in floors: see [`next_experiment`].
+///
+/// # Errors
+/// What the simulator says.
+pub fn differences<L: Laboratory>(
+    simulator: &L,
+    one: &Model,
+    two: &Model,
+) -> Result<Vec<(String, f64)>, GapError> {
+    let menu = simulator.menu();
+    let rated = rate(simulator, one, two, &menu)?;
+    Ok(menu.into_iter().map(|(plan, _)| plan.name).zip(rated).collect())
+}
+
+fn rate<L: Laboratory>(
+    simulator: &L,
+    one: &Model,
+    two: &Model,
+    menu: &[(Plan, L::Setting)],
+) -> Result<Vec<f64>, GapError> {
+    let done = simulator.done();
+    let block = menu.first().map_or(1.0, |(plan, _)| BLOCK_S / plan.dt_s());
+    let known = [Tangent::of(simulator, one, &done)?, Tangent::of(simulator, two, &done)?];
+    menu.par_iter()
+        .map(|(_, experiment)| {
+            let here = [
+                Tangent::of(simulator, one, experiment)?,
+                Tangent::of(simulator, two, experiment)?,
+            ];
+            let there = left(block, &known[0], &known[1], &here[0], &here[1]);
+            let back = left(block, &known[1], &known[0], &here[1], &here[0]);
+            Ok(there.min(back))
+        })
+        .collect()
 }
 
 /// How often it has to be done until it tells, where once is not enough.
@@ -257,75 +278,4 @@ fn left(
         gap.iter_mut().zip(slopes).for_each(|(g, s)| *g += x * s);
     }
     (gap.iter().map(|g| g * g).sum::<f64>() / rival.samples()).sqrt()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::rig::{RigSimulator, RigTrial, Session};
-    use stretch_data::TrialKind;
-
-    /// A rig beside an arbitrary trial.
-    fn rig() -> RigSimulator {
-        let plan = stretch_sim::TrialPlan::arbitrary(1, 5);
-        let mut session =
-            stretch_sim::Session::new(&Default::default(), &Default::default()).unwrap();
-        let (_, trial) = session.run(&plan).unwrap();
-        let column = |name: &str| trial.channel(name).unwrap().to_vec();
-        let trial = RigTrial {
-            name: "arbitrary".into(),
-            kind: TrialKind::Arbitrary,
-            start_s: 0.0,
-            is_test: false,
-            dt_s: 0.01,
-            inlet: column("inlet"),
-            outlet: column("outlet"),
-            pressure_kpa: None,
-            length_mm: column("length_mm"),
-            bridge_v: column("bridge_v"),
-        };
-        RigSimulator::new(Session::new(vec![trial]).unwrap(), None, &[]).unwrap()
-    }
-
-    /// D of every experiment of the menu for two effects at given first parameters.
-    fn differences(rig: &RigSimulator, one: (&str, f64), two: (&str, f64)) -> Vec<(String, f64)> {
-        let model = |(name, value): (&str, f64)| {
-            let at = rig.effects().iter().position(|e| e.name == name).unwrap();
-            let mut values = rig.effects()[at].starts[0].clone();
-            let which = rig.effects()[at].parameters.iter().position(|p| p.name != "v_lo").unwrap();
-            values[which] = value;
-            let mut model = Model::nominal(rig);
-            model.effects.push((at, values));
-            model
-        };
-        let (one, two) = (model(one), model(two));
-        let tangent = |model, experiment| Tangent::of(rig, model, experiment).unwrap();
-        let done = rig.done();
-        let known = [tangent(&one, &done), tangent(&two, &done)];
-        rig.menu()
-            .iter()
-            .map(|(plan, x)| {
-                let here = [tangent(&one, x), tangent(&two, x)];
-                let there = left(50.0, &known[0], &known[1], &here[0], &here[1]);
-                let back = left(50.0, &known[1], &known[0], &here[1], &here[0]);
-                (plan.name.clone(), there.min(back))
-            })
-            .collect()
-    }
-
-    #[test]
-    fn what_motion_cannot_part_other_experiments_do() {
-        let rig = rig();
-        let d = |all: &[(String, f64)], name: &str| all.iter().find(|x| x.0 == name).unwrap().1;
-        // A slack sleeve stops at a strain, an amplifier at a voltage: another excitation moves only one of them.
-        let slack = stretch_sim::Bridge::new(rig.nominal());
-        let strain = slack.strain(rig.shortest_mm() + 6.0);
-        let top = slack.volts(slack.resistance(strain));
-        let all = differences(&rig, ("sleeve_slack", strain), ("amplifier_saturation", top));
-        assert!(d(&all, "excitation_0.7") > 3.0 * d(&all, "arbitrary"), "{all:?}");
-        // Which of two scales bends shows only where the length is known otherwise.
-        let all = differences(&rig, ("pot_nonlinearity", 0.6), ("gauge_nonlinearity", -0.01));
-        assert!(d(&all, "gauge_blocks") > 2.0 * d(&all, "minor_loops"), "{all:?}");
-        assert!(all.iter().all(|x| x.1.is_finite()));
-    }
 }

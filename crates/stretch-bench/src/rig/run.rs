@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use stretch_gap::{Dice, Model, Run};
 use stretch_sim::{
     Actuation, DEFAULT_STEP_S, EffectSet, Grid, Key, Memory, Muscle, Openings, Pneumatics,
     Reference, RigParams, Sensing, Stage, Start,
@@ -13,10 +14,8 @@ use super::{
     session::Begin,
 };
 use crate::{
-    dice::Dice,
-    error::GapError,
+    error::BenchError,
     outside::{Acting, Recorder},
-    simulator::{Model, Run},
 };
 
 /// Step of integration while fitting, s.
@@ -60,7 +59,7 @@ pub(super) fn simulate(
     run: Run<'_>,
     given: Option<&[f64]>,
     out: &mut [f64],
-) -> Result<(), GapError> {
+) -> Result<(), BenchError> {
     let (params, offset) = params_of(rig, run.model);
     let acting = Acting::of(&rig.rows, run.model)?;
     let kind = rig.stage_kinds[run.stage];
@@ -93,7 +92,7 @@ pub(super) fn simulate(
     if out.iter().all(|x| x.is_finite()) {
         Ok(())
     } else {
-        Err(GapError::NotFinite { stage: rig.about.stages[run.stage].name.clone() })
+        Err(BenchError::NotFinite { stage: rig.about.stages[run.stage].name.clone() })
     }
 }
 
@@ -180,8 +179,8 @@ impl Setting<'_> {
         &self,
         count: usize,
         mut out: &mut [f64],
-        mut visit: impl FnMut(usize, &mut [f64]) -> Result<(), GapError>,
-    ) -> Result<(), GapError> {
+        mut visit: impl FnMut(usize, &mut [f64]) -> Result<(), BenchError>,
+    ) -> Result<(), BenchError> {
         for (trial, spec) in self.rig.about.trials[..count].iter().enumerate() {
             let (own, rest) = out.split_at_mut(spec.samples);
             visit(trial, own)?;
@@ -190,7 +189,7 @@ impl Setting<'_> {
         Ok(())
     }
 
-    fn pneumatics(&self, count: usize, out: &mut [f64]) -> Result<(), GapError> {
+    fn pneumatics(&self, count: usize, out: &mut [f64]) -> Result<(), BenchError> {
         let stage = Pneumatics::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
         self.each(count, out, |trial, own| {
@@ -207,7 +206,7 @@ impl Setting<'_> {
         })
     }
 
-    fn muscle(&self, count: usize, out: &mut [f64]) -> Result<(), GapError> {
+    fn muscle(&self, count: usize, out: &mut [f64]) -> Result<(), BenchError> {
         let stage = Muscle::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
         let mut shown = self.shown(&self.effects)?;
@@ -221,7 +220,7 @@ impl Setting<'_> {
         })
     }
 
-    fn actuation(&self, count: usize, out: &mut [f64]) -> Result<(), GapError> {
+    fn actuation(&self, count: usize, out: &mut [f64]) -> Result<(), BenchError> {
         let stage = Actuation::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
         let mut shown = self.shown(&self.effects)?;
@@ -245,7 +244,12 @@ impl Setting<'_> {
         })
     }
 
-    fn sensing(&self, count: usize, acting: &Acting<'_>, out: &mut [f64]) -> Result<(), GapError> {
+    fn sensing(
+        &self,
+        count: usize,
+        acting: &Acting<'_>,
+        out: &mut [f64],
+    ) -> Result<(), BenchError> {
         let stage = Sensing::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
         let shown = self.shown(&self.without("pot_backlash"))?;
@@ -299,7 +303,7 @@ impl Setting<'_> {
 
     /// What play in the reference hides of the length: the model of the motion says which flank it lies on, the record how
     /// long the muscle is.
-    fn hidden(&self, count: usize) -> Result<Option<Vec<f64>>, GapError> {
+    fn hidden(&self, count: usize) -> Result<Option<Vec<f64>>, BenchError> {
         let Some(play) = self.effects.find("pot_backlash").filter(|e| e.values()[0] > 0.0) else {
             return Ok(None);
         };
@@ -319,7 +323,7 @@ impl Setting<'_> {
     }
 
     /// Length that the model of the motion shows without play in the reference.
-    fn free_length(&self, count: usize) -> Result<Vec<f64>, GapError> {
+    fn free_length(&self, count: usize) -> Result<Vec<f64>, BenchError> {
         let effects = self.without("pot_backlash");
         let has_pressure = !self.rig.inputs.pressure.is_empty();
         let grid = if has_pressure {
@@ -357,7 +361,7 @@ impl Setting<'_> {
     }
 
     /// Pressure of the nominal pneumatics: what there is without a pressure column.
-    fn simulated_pressure(&self, count: usize) -> Result<Vec<Vec<f64>>, GapError> {
+    fn simulated_pressure(&self, count: usize) -> Result<Vec<Vec<f64>>, BenchError> {
         let none = EffectSet::new();
         let grid = none.grid(&self.params, self.rig.about.dt_s, STEP_S)?;
         let stage = Pneumatics::new(&self.params, &none, &grid)?;
@@ -373,7 +377,7 @@ impl Setting<'_> {
         Ok(all)
     }
 
-    fn shown(&self, effects: &EffectSet) -> Result<Shown, GapError> {
+    fn shown(&self, effects: &EffectSet) -> Result<Shown, BenchError> {
         let grid = Grid::samples(self.rig.about.dt_s)?;
         let stage = Reference::new(&self.params, effects, &grid)?;
         let acts = effects.acting_in(Stage::Reference).next().is_some();
@@ -391,12 +395,12 @@ struct Shown {
 }
 
 impl Shown {
-    fn condition(&mut self, length: &[f64]) -> Result<(), GapError> {
+    fn condition(&mut self, length: &[f64]) -> Result<(), BenchError> {
         let mut out = vec![0.0; length.len()];
         Ok(self.stage.run(&mut self.memory, Start::Settled, length, &mut out)?)
     }
 
-    fn run(&mut self, start: Start, length: &mut [f64]) -> Result<(), GapError> {
+    fn run(&mut self, start: Start, length: &mut [f64]) -> Result<(), BenchError> {
         if self.acts {
             self.work.clear();
             self.work.extend_from_slice(length);

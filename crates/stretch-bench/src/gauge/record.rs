@@ -3,8 +3,9 @@
 use std::ops::Range;
 
 use stretch_data::{Trial, unit};
+use stretch_gap::{TrialSpec, noise_variance};
 
-use crate::{error::GapError, floor::noise_variance, simulator::TrialSpec};
+use crate::error::BenchError;
 
 /// Least samples that may be fitted.
 const LEAST: usize = 300;
@@ -49,11 +50,11 @@ impl Record {
         trials: &[GaugeTrial],
         reference: &str,
         signal: &str,
-    ) -> Result<Self, GapError> {
+    ) -> Result<Self, BenchError> {
         let rates = || trials.iter().filter_map(|t| Some((&t.trial.name, t.trial.rate_hz()?)));
         let dt_s = rates().next().map_or(0.01, |(_, rate)| 1.0 / rate);
         if let Some((name, rate)) = rates().find(|(_, rate)| (rate * dt_s - 1.0).abs() > 0.02) {
-            return Err(GapError::Implausible {
+            return Err(BenchError::Implausible {
                 column: format!("time_s of {name}"),
                 found: format!("{rate:.2} samples a second where {:.2} are usual", 1.0 / dt_s),
                 hint: "all trials need the same sample rate: convert them first".into(),
@@ -103,14 +104,14 @@ impl Record {
         one: &GaugeTrial,
         start_s: f64,
         columns: [Option<&str>; 3],
-    ) -> Result<(), GapError> {
+    ) -> Result<(), BenchError> {
         let trial = &one.trial;
         let mut found = [&[][..]; 3];
         for (values, name) in found.iter_mut().zip(columns) {
             let Some(name) = name else { continue };
             *values = trial.require(name)?;
             if let Some(row) = values.iter().position(|x| !x.is_finite()) {
-                return Err(GapError::Implausible {
+                return Err(BenchError::Implausible {
                     column: format!("{name} of {}", trial.name),
                     found: format!("{} in sample {}", values[row], row + 1),
                     hint: "give numbers only, or cut the trial there".into(),
@@ -220,16 +221,16 @@ impl Record {
         noise_variance(self.fitted().map(|r| &values[r]), self.dt_s).sqrt()
     }
 
-    fn check(&mut self, reference: &str, signal: &str) -> Result<(), GapError> {
+    fn check(&mut self, reference: &str, signal: &str) -> Result<(), BenchError> {
         let samples: usize = self.fitted().map(|r| r.len()).sum();
         if samples < LEAST {
-            return Err(GapError::TooLittle {
+            return Err(BenchError::TooLittle {
                 what: format!("the trials to fit have {samples} samples"),
                 hint: format!("at least {LEAST} are needed to tell anything"),
             });
         }
         if reference == "bridge_v" || signal == "length_mm" {
-            return Err(GapError::Implausible {
+            return Err(BenchError::Implausible {
                 column: format!("--reference {reference}, --signal {signal}"),
                 found: "the two look swapped".into(),
                 hint: "the reference is the length, the signal what the gauge says".into(),
@@ -239,7 +240,7 @@ impl Record {
         for (name, values) in [(reference, &self.reference), (signal, &self.signal)] {
             let (low, high) = self.range(values);
             if high <= low {
-                return Err(GapError::Implausible {
+                return Err(BenchError::Implausible {
                     column: name.into(),
                     found: format!("{low} in every sample"),
                     hint: "the channel is dead: check the sensor and its cable".into(),

@@ -1,10 +1,11 @@
 //! Diagnoses a folder of labelled cases, leaves the answer beside each, and scores:
-//! `cargo run --release -p stretch-gap --example dev_score -- FOLDER [case-000 ...]`.
+//! `cargo run --release -p stretch-bench --example dev_score -- FOLDER [case-000 ...]`.
 
 use std::{fs, path::Path, time::Instant};
 
+use stretch_bench::RigSimulator;
 use stretch_blind::{CaseKind, Score, Seal, Truth, Verdict};
-use stretch_gap::{Options, RigSimulator, diagnose};
+use stretch_gap::{Options, diagnose};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

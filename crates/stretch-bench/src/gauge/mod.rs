@@ -6,6 +6,9 @@ mod record;
 mod source;
 
 use stretch_data::{RigFile, unit};
+use stretch_gap::{
+    Description, Dice, GapError, Model, Motion, ParameterSpec, Run, Simulator, StageSpec, TrialSpec,
+};
 use stretch_sim::{Effect, Gauge, GaugeSpec, Start};
 
 use catalogue::{Scope, catalogue, lag};
@@ -13,14 +16,12 @@ pub use record::GaugeTrial;
 use record::Record;
 
 use crate::{
-    dice::Dice,
-    error::GapError,
+    error::BenchError,
     outside::{Acting, Recorder},
     rig::{
         catalogue::check_names,
         smooth::{Smoothed, unscheduled},
     },
-    simulator::{Description, Model, Motion, ParameterSpec, Run, Simulator, StageSpec, TrialSpec},
 };
 
 /// Where the parameters stand.
@@ -38,7 +39,8 @@ const WINDING: usize = 2;
 ///
 /// ```
 /// use stretch_data::{Channel, Trial};
-/// use stretch_gap::{GaugeSimulator, GaugeTrial, Options, VerdictKind, diagnose};
+/// use stretch_bench::{GaugeSimulator, GaugeTrial};
+/// use stretch_gap::{Options, VerdictKind, diagnose};
 /// // A sensor that shows 0.05 s late what a rod does.
 /// let rod = |t: f64| 40.0 + 20.0 * (1.3 * t).sin() + 10.0 * (3.1 * t).sin();
 /// let time_s: Vec<f64> = (0..4000).map(|i| 0.01 * i as f64).collect();
@@ -53,7 +55,7 @@ const WINDING: usize = 2;
 /// let (diagnosis, _) = diagnose(&gauge, &Options::default(), &|_| (), &|| false)?;
 /// assert_eq!(diagnosis.verdict, VerdictKind::Effect);
 /// assert_eq!(diagnosis.named, ["channel_skew"]);
-/// # Ok::<(), stretch_gap::GapError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]
 pub struct GaugeSimulator {
@@ -82,7 +84,7 @@ impl GaugeSimulator {
         signal: &str,
         rig: Option<&RigFile>,
         without: &[String],
-    ) -> Result<Self, GapError> {
+    ) -> Result<Self, BenchError> {
         check_names(without)?;
         let record = Record::read(trials, reference, signal)?;
         let (low, high) = record.range(&record.reference);
@@ -152,6 +154,38 @@ impl GaugeSimulator {
     }
 }
 
+impl GaugeSimulator {
+    /// The signal over the trials of a run.
+    fn signal(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), BenchError> {
+        let acting = Acting::of(&self.rows, run.model)?;
+        let gauge = Gauge::new(self.nominal(run.model), &acting.inside, self.dt_s())?;
+        let mut memory = gauge.memory();
+        // What was done to the gauge before the session nobody knows.
+        let mut start = Start::Wound(run.model.parameters[WINDING]);
+        let mut from = 0;
+        for (i, trial) in self.record.trials[..run.trials].iter().enumerate() {
+            let to = from + trial.samples;
+            let input = match run.shake {
+                None => self.inputs[i].values.clone(),
+                Some(seed) => {
+                    self.inputs[i].shaken(self.reference_sd, &mut Dice::new(seed, i as u64))
+                }
+            };
+            let pressure = self.record.pressure.get(from..to).unwrap_or(&[]);
+            gauge.run(&mut memory, start, trial.start_s, &input, pressure, &mut out[from..to])?;
+            acting.record(self.recorder, &self.record.signal[from..to], &mut out[from..to]);
+            let next = self.record.trials.get(i + 1).map_or(f64::INFINITY, |t| t.start_s);
+            let rest_s = (next - trial.start_s - trial.samples as f64 * self.dt_s()).max(0.0);
+            start = Start::Carried { rest_s };
+            from = to;
+        }
+        match out.iter().all(|x| x.is_finite()) {
+            true => Ok(()),
+            false => Err(BenchError::NotFinite { stage: "sensing".into() }),
+        }
+    }
+}
+
 impl Simulator for GaugeSimulator {
     fn description(&self) -> &Description {
         &self.about
@@ -180,32 +214,7 @@ impl Simulator for GaugeSimulator {
     }
 
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
-        let acting = Acting::of(&self.rows, run.model)?;
-        let gauge = Gauge::new(self.nominal(run.model), &acting.inside, self.dt_s())?;
-        let mut memory = gauge.memory();
-        // What was done to the gauge before the session nobody knows.
-        let mut start = Start::Wound(run.model.parameters[WINDING]);
-        let mut from = 0;
-        for (i, trial) in self.record.trials[..run.trials].iter().enumerate() {
-            let to = from + trial.samples;
-            let input = match run.shake {
-                None => self.inputs[i].values.clone(),
-                Some(seed) => {
-                    self.inputs[i].shaken(self.reference_sd, &mut Dice::new(seed, i as u64))
-                }
-            };
-            let pressure = self.record.pressure.get(from..to).unwrap_or(&[]);
-            gauge.run(&mut memory, start, trial.start_s, &input, pressure, &mut out[from..to])?;
-            acting.record(self.recorder, &self.record.signal[from..to], &mut out[from..to]);
-            let next = self.record.trials.get(i + 1).map_or(f64::INFINITY, |t| t.start_s);
-            let rest_s = (next - trial.start_s - trial.samples as f64 * self.dt_s()).max(0.0);
-            start = Start::Carried { rest_s };
-            from = to;
-        }
-        match out.iter().all(|x| x.is_finite()) {
-            true => Ok(()),
-            false => Err(GapError::NotFinite { stage: "sensing".into() }),
-        }
+        Ok(self.signal(run, out)?)
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use stretch_data::{DataSet, ReadOptions, RigFile, Split, Trial};
 
 use super::{GaugeSimulator, GaugeTrial};
-use crate::error::GapError;
+use crate::error::BenchError;
 
 /// Columns that need no naming.
 const USUAL: (&str, &str) = ("length_mm", "bridge_v");
@@ -24,7 +24,7 @@ impl GaugeSimulator {
         columns: Option<(&str, &str)>,
         rig: Option<&RigFile>,
         without: &[String],
-    ) -> Result<Option<Self>, GapError> {
+    ) -> Result<Option<Self>, BenchError> {
         let set = if path.is_dir() { Some(DataSet::read(path)?) } else { None };
         let own = match &set {
             Some(set) => set.read_rig(path)?.filter(is_gauge),
@@ -44,7 +44,7 @@ impl GaugeSimulator {
             None if has(USUAL.0) && has(USUAL.1) => USUAL,
             None => {
                 let names: Vec<&str> = first.channels.iter().map(|c| c.name.as_str()).collect();
-                return Err(GapError::TooLittle {
+                return Err(BenchError::TooLittle {
                     what: format!(
                         "{} is a gauge alone, and nothing says which columns are the reference and the signal",
                         first.name
@@ -68,7 +68,7 @@ impl GaugeSimulator {
                     let is_test = entry.split == Split::Test;
                     Ok(GaugeTrial { trial, start_s: entry.start_s, is_test })
                 };
-                set.trials.iter().map(load).collect::<Result<_, GapError>>()?
+                set.trials.iter().map(load).collect::<Result<_, BenchError>>()?
             }
         };
         Self::new(&trials, reference, signal, rig, without).map(Some)

@@ -1,15 +1,13 @@
 //! The catalogue as the diagnosis sees it: which outputs an effect touches, and where to look for it.
 
+use stretch_gap::{EffectParameterSpec, EffectSpec};
 use stretch_sim::{CATALOGUE, Effect, EffectParameter, Key, PARAMETERS, RigParams, Scale, Stage};
 
 use super::{
     forms::{NAMES, form_of},
     session::{Inputs, Session},
 };
-use crate::{
-    error::GapError,
-    simulator::{EffectParameterSpec, EffectSpec},
-};
+use crate::error::BenchError;
 
 /// Pairs that are hard to tell apart.
 const TWINS: [(&str, &str); 9] = [
@@ -64,13 +62,13 @@ pub(crate) struct Place<'a> {
 }
 
 /// Refuses names that nobody knows.
-pub(crate) fn check_names(names: &[String]) -> Result<(), GapError> {
+pub(crate) fn check_names(names: &[String]) -> Result<(), BenchError> {
     match names.iter().find(|name| stretch_sim::effect_named(name).is_none()) {
         None => Ok(()),
         Some(name) => {
             let known = CATALOGUE.iter().map(|e| e.name());
             let nearest = stretch_data::nearest(name, known).map(str::to_owned);
-            Err(GapError::UnknownEffect { name: name.clone(), nearest })
+            Err(BenchError::UnknownEffect { name: name.clone(), nearest })
         }
     }
 }

@@ -2,10 +2,9 @@
 
 mod support;
 
+use stretch_bench::{BenchError, RigSimulator, RigTrial, Session};
 use stretch_data::TrialKind;
-use stretch_gap::{
-    Diagnosis, GapError, Options, RigSimulator, RigTrial, Session, VerdictKind, diagnose,
-};
+use stretch_gap::{Diagnosis, Options, VerdictKind, diagnose};
 use stretch_sim::{Chain, DEFAULT_STEP_S, EffectSet, Key, Openings, Recorded, RigParams, Start};
 use support::Noise;
 
@@ -212,7 +211,7 @@ fn bad_input_is_refused_in_a_sentence() {
     let unknown =
         RigSimulator::new(Session::new(good).expect("a session"), None, &["leek".to_owned()]);
     assert!(
-        matches!(unknown, Err(GapError::UnknownEffect { nearest: Some(n), .. }) if n == "leak")
+        matches!(unknown, Err(BenchError::UnknownEffect { nearest: Some(n), .. }) if n == "leak")
     );
 }
 

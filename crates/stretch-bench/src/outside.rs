@@ -1,14 +1,14 @@
 //! Effects of a model: those that stages run, and those that act outside of them.
 
+use stretch_gap::Model;
 use stretch_sim::{Effect, EffectSet};
 
 use crate::{
-    error::GapError,
+    error::BenchError,
     rig::{
         forms::commands::{skew, wobble},
         hum,
     },
-    simulator::Model,
 };
 
 /// The effects of a model.
@@ -33,7 +33,7 @@ pub(crate) struct Recorder {
 
 impl<'a> Acting<'a> {
     /// Sorts the effects of a model; `rows` are the entries of its catalogue.
-    pub(crate) fn of(rows: &[&'static dyn Effect], model: &'a Model) -> Result<Self, GapError> {
+    pub(crate) fn of(rows: &[&'static dyn Effect], model: &'a Model) -> Result<Self, BenchError> {
         let mut acting = Self { inside: EffectSet::new(), deadband: None, skew: None, hum: None };
         for (index, values) in &model.effects {
             let row = rows[*index];

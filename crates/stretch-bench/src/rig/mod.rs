@@ -12,6 +12,9 @@ pub(crate) mod smooth;
 use std::path::Path;
 
 use stretch_data::{DataSet, RigFile};
+use stretch_gap::{
+    Description, GapError, Motion, ParameterSpec, Run, Simulator, StageSpec, TrialSpec, Wander,
+};
 use stretch_sim::{Effect, Key, PARAMETERS, RigParams, Stage};
 
 use catalogue::{Extent, Place, check_names, entries, tuned};
@@ -19,10 +22,7 @@ use params::read_params;
 use session::Inputs;
 pub use session::{RigTrial, Session};
 
-use crate::{
-    error::GapError,
-    simulator::{Description, Motion, ParameterSpec, Run, Simulator, StageSpec, TrialSpec, Wander},
-};
+use crate::error::BenchError;
 
 /// Slow fluctuation of the supply, a share of it (1 sd).
 const SUPPLY_WANDER: f64 = 0.003;
@@ -54,7 +54,7 @@ impl RigSimulator {
         folder: &Path,
         rig: Option<&RigFile>,
         without: &[String],
-    ) -> Result<Self, GapError> {
+    ) -> Result<Self, BenchError> {
         let set = DataSet::read(folder)?;
         let own = set.read_rig(folder)?;
         let session = Session::read(folder, &set)?;
@@ -69,7 +69,7 @@ impl RigSimulator {
         session: Session,
         rig: Option<&RigFile>,
         without: &[String],
-    ) -> Result<Self, GapError> {
+    ) -> Result<Self, BenchError> {
         check_names(without)?;
         let (base, tolerances) = read_params(rig)?;
         let has_pressure = session.trials[0].pressure_kpa.is_some();
@@ -231,7 +231,7 @@ impl Simulator for RigSimulator {
     }
 
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
-        run::simulate(self, run, None, out)
+        Ok(run::simulate(self, run, None, out)?)
     }
 
     fn motion(&self) -> Motion<'_> {

@@ -1,5 +1,5 @@
 //! Calibrates what turns scores into probabilities and gaps into `unknown`, on labelled cases that were diagnosed:
-//! `cargo run --release -p stretch-gap --example thresholds -- [--write] FOLDER...`.
+//! `cargo run --release -p stretch-bench --example thresholds -- [--write] FOLDER...`.
 //!
 //! `stretch blind make` and `stretch blind run` make such folders, `dev_score` too. The thresholds that steer the search
 //! itself (`null_excess`, `rise`, `share`, `mismatch`) act while a case is diagnosed: they are kept as they are.
@@ -48,7 +48,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let after = Thresholds { temperature, rho, unknown_excess, unknown_share, ..before };
     let text = format!(
         "# temperature, rho, unknown_excess and unknown_share: calibrated on {} development cases, seeds {}, with\n\
-         #   cargo run --release -p stretch-gap --example thresholds -- --write FOLDER...\n\
+         #   cargo run --release -p stretch-bench --example thresholds -- --write FOLDER...\n\
          # The others steer the search; they were set while such cases were looked at.\n{}",
         cases.len(),
         seeds.join(", "),

@@ -1,6 +1,6 @@
 //! Smoothing of a measured input, as wide as the commands allow.
 
-use crate::dice::Dice;
+use stretch_gap::Dice;
 
 /// Widest half-width, in samples.
 const WIDEST: usize = 15;
@@ -151,7 +151,7 @@ mod tests {
 
     #[test]
     fn takes_noise_out_where_nothing_is_commanded() {
-        let mut dice = crate::dice::Dice::new(1, 1);
+        let mut dice = Dice::new(1, 1);
         let noise: Vec<f64> = (0..20_000).map(|_| 0.05 * dice.gauss()).collect();
         let shut = vec![0.0; noise.len()];
         let allowed = schedule(&shut, &shut, 0.01, false);

@@ -3,10 +3,10 @@
 use stretch_data::RigFile;
 use stretch_sim::{Key, PARAMETERS, RigParams, SimError};
 
-use crate::error::GapError;
+use crate::error::BenchError;
 
 /// Values, and one standard deviation of each, by index of the key.
-pub(super) fn read_params(rig: Option<&RigFile>) -> Result<(RigParams, Vec<f64>), GapError> {
+pub(super) fn read_params(rig: Option<&RigFile>) -> Result<(RigParams, Vec<f64>), BenchError> {
     let mut params = RigParams::default();
     let mut given = vec![None; Key::COUNT];
     for (stage, table) in rig.iter().flat_map(|r| &r.stages) {

@@ -1,15 +1,11 @@
 //! A menu of experiments on a gauge alone, and what a model predicts of each.
 
 use stretch_data::{Channel, Trial};
+use stretch_gap::{GapError, Laboratory, Model, Plan};
 use stretch_sim::{Effect, Gauge, Stage, Start};
 
 use super::GaugeSimulator;
-use crate::{
-    error::GapError,
-    next_experiment::{Laboratory, Plan},
-    outside::Acting,
-    simulator::Model,
-};
+use crate::{error::BenchError, outside::Acting};
 
 /// An experiment on a gauge: the course of e.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,6 +98,28 @@ fn dishes() -> Vec<Dish> {
     ]
 }
 
+impl GaugeSimulator {
+    /// The signal over a course, in units of its noise.
+    fn prediction(&self, model: &Model, course: &Course) -> Result<Vec<Vec<f64>>, BenchError> {
+        let of_reference = |row: &dyn Effect| row.stage() == Stage::Reference;
+        let mut model = model.clone();
+        if course.is_known {
+            model.effects.retain(|(i, _)| !of_reference(self.rows[*i]));
+        }
+        let acting = Acting::of(&self.rows, &model)?;
+        let gauge = Gauge::new(self.nominal(&model), &acting.inside, self.recorder.dt_s)?;
+        let shown: Vec<f64> =
+            course.e.iter().map(|e| self.spec.zero + self.spec.span * e).collect();
+        let mut signal = vec![0.0; shown.len()];
+        let still = vec![0.0; if self.record.pressure.is_empty() { 0 } else { shown.len() }];
+        gauge.run(&mut gauge.memory(), Start::Settled, 0.0, &shown, &still, &mut signal)?;
+        acting.late(self.recorder, &mut signal);
+        let noise = self.recorder.noise.max(1e-6 * self.recorder.unit);
+        signal.iter_mut().for_each(|y| *y /= noise);
+        Ok(vec![signal])
+    }
+}
+
 impl Laboratory for GaugeSimulator {
     type Setting = Course;
 
@@ -129,21 +147,6 @@ impl Laboratory for GaugeSimulator {
     }
 
     fn predict(&self, model: &Model, course: &Course) -> Result<Vec<Vec<f64>>, GapError> {
-        let of_reference = |row: &dyn Effect| row.stage() == Stage::Reference;
-        let mut model = model.clone();
-        if course.is_known {
-            model.effects.retain(|(i, _)| !of_reference(self.rows[*i]));
-        }
-        let acting = Acting::of(&self.rows, &model)?;
-        let gauge = Gauge::new(self.nominal(&model), &acting.inside, self.recorder.dt_s)?;
-        let shown: Vec<f64> =
-            course.e.iter().map(|e| self.spec.zero + self.spec.span * e).collect();
-        let mut signal = vec![0.0; shown.len()];
-        let still = vec![0.0; if self.record.pressure.is_empty() { 0 } else { shown.len() }];
-        gauge.run(&mut gauge.memory(), Start::Settled, 0.0, &shown, &still, &mut signal)?;
-        acting.late(self.recorder, &mut signal);
-        let noise = self.recorder.noise.max(1e-6 * self.recorder.unit);
-        signal.iter_mut().for_each(|y| *y /= noise);
-        Ok(vec![signal])
+        Ok(self.prediction(model, course)?)
     }
 }

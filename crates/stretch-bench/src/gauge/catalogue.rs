@@ -1,11 +1,9 @@
 //! The catalogue in a gauge alone: ranges in units of e and of the signal's span, and where to look.
 
+use stretch_gap::EffectSpec;
 use stretch_sim::{Effect, EffectParameter, Gauge, Stage};
 
-use crate::{
-    rig::catalogue::{Extent, Place, entries},
-    simulator::EffectSpec,
-};
+use crate::rig::catalogue::{Extent, Place, entries};
 
 /// Two recorders may be started by two hands: so far a skew is looked for, s.
 const SKEW_S: f64 = 1.0;
@@ -100,10 +98,11 @@ pub(super) fn lag(x: &[f64], y: &[f64], dt_s: f64) -> f64 {
         v.iter().map(|v| v - mean).collect::<Vec<f64>>()
     };
     let middle = centre(&y[reach..y.len() - reach]);
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
     let size = |shift: usize| {
         let there = centre(&x[shift..shift + middle.len()]);
-        let power = crate::frame::dot(&there, &there).max(f64::MIN_POSITIVE);
-        crate::frame::dot(&there, &middle).powi(2) / power
+        let power = dot(&there, &there).max(f64::MIN_POSITIVE);
+        dot(&there, &middle).powi(2) / power
     };
     let best = (0..=2 * reach).max_by(|a, b| size(*a).total_cmp(&size(*b))).unwrap_or(reach);
     (reach as f64 - best as f64) * dt_s

@@ -1,17 +1,14 @@
 //! A menu of experiments on the rig, and what a model predicts of each.
 
 use stretch_data::{Channel, Trial};
+use stretch_gap::{GapError, Laboratory, Model, Plan};
 use stretch_sim::{
     Chain, DEFAULT_STEP_S, EffectSet, Grid, Key, Openings, Recorded, Reference, RigParams, Sensing,
     Stage, Start, TrialPlan,
 };
 
 use super::RigSimulator;
-use crate::{
-    error::GapError,
-    next_experiment::{Laboratory, Plan},
-    simulator::Model,
-};
+use crate::error::BenchError;
 
 /// Sample time of an experiment, s.
 const DT_S: f64 = 0.01;
@@ -232,7 +229,7 @@ impl Experiment {
 
 impl RigSimulator {
     /// Rig and effects of a model.
-    fn rig_of(&self, model: &Model) -> Result<(RigParams, EffectSet), GapError> {
+    fn rig_of(&self, model: &Model) -> Result<(RigParams, EffectSet), BenchError> {
         let mut params = self.base;
         for (key, value) in self.keys.iter().zip(&model.parameters) {
             if let Some(key) = key {
@@ -250,26 +247,12 @@ impl RigSimulator {
         Ok((params, effects))
     }
 
-    #[cfg(test)]
-    pub(crate) fn shortest_mm(&self) -> f64 {
-        self.inputs.stroke.0
-    }
-}
-
-impl Laboratory for RigSimulator {
-    type Setting = Experiment;
-
-    fn menu(&self) -> Vec<(Plan, Experiment)> {
-        let all = Experiment::all(self.inputs.stroke, 1e-3 * self.base[Key::PS]);
-        all.into_iter().map(|x| (x.plan(), x)).collect()
-    }
-
-    /// An arbitrary trial.
-    fn done(&self) -> Experiment {
-        Experiment::of(TrialPlan::arbitrary(9, 3), "done", "", 0.0)
-    }
-
-    fn predict(&self, model: &Model, experiment: &Experiment) -> Result<Vec<Vec<f64>>, GapError> {
+    /// Every recorded channel of an experiment, in units of its noise.
+    fn prediction(
+        &self,
+        model: &Model,
+        experiment: &Experiment,
+    ) -> Result<Vec<Vec<f64>>, BenchError> {
         let (mut params, effects) = self.rig_of(model)?;
         params[Key::VExc] *= experiment.excitation;
         let samples = experiment.inlet.len();
@@ -320,5 +303,23 @@ impl Laboratory for RigSimulator {
                 values
             })
             .collect())
+    }
+}
+
+impl Laboratory for RigSimulator {
+    type Setting = Experiment;
+
+    fn menu(&self) -> Vec<(Plan, Experiment)> {
+        let all = Experiment::all(self.inputs.stroke, 1e-3 * self.base[Key::PS]);
+        all.into_iter().map(|x| (x.plan(), x)).collect()
+    }
+
+    /// An arbitrary trial.
+    fn done(&self) -> Experiment {
+        Experiment::of(TrialPlan::arbitrary(9, 3), "done", "", 0.0)
+    }
+
+    fn predict(&self, model: &Model, experiment: &Experiment) -> Result<Vec<Vec<f64>>, GapError> {
+        Ok(self.prediction(model, experiment)?)
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use stretch_data::{DataSet, ReadOptions, Split, Trial, TrialKind};
 
 use super::smooth::{Smoothed, schedule};
-use crate::error::GapError;
+use crate::error::BenchError;
 
 /// A measured trial of the rig.
 #[derive(Debug, Clone)]
@@ -49,7 +49,7 @@ impl Session {
     ///
     /// # Errors
     /// Files that cannot be read, columns that are missing or are not what their names say.
-    pub fn read(folder: &Path, set: &DataSet) -> Result<Self, GapError> {
+    pub fn read(folder: &Path, set: &DataSet) -> Result<Self, BenchError> {
         let mut trials = Vec::new();
         let mut notes = Vec::new();
         for entry in &set.trials {
@@ -67,7 +67,7 @@ impl Session {
     ///
     /// # Errors
     /// As [`Session::read`].
-    pub fn new(trials: Vec<RigTrial>) -> Result<Self, GapError> {
+    pub fn new(trials: Vec<RigTrial>) -> Result<Self, BenchError> {
         let mut session = Self { trials, notes: Vec::new() };
         session.order();
         session.check()?;
@@ -98,16 +98,16 @@ impl Session {
         }
     }
 
-    fn check(&mut self) -> Result<(), GapError> {
+    fn check(&mut self) -> Result<(), BenchError> {
         if self.trials.iter().all(|t| t.is_test) {
-            return Err(GapError::TooLittle {
+            return Err(BenchError::TooLittle {
                 what: "no trial may be fitted".into(),
                 hint: "give at least one trial split = \"fit\"".into(),
             });
         }
         let fit: usize = self.trials.iter().filter(|t| !t.is_test).map(|t| t.inlet.len()).sum();
         if fit < 300 {
-            return Err(GapError::TooLittle {
+            return Err(BenchError::TooLittle {
                 what: format!("the trials to fit have {fit} samples"),
                 hint: "at least 300 are needed to tell anything".into(),
             });
@@ -122,7 +122,7 @@ impl Session {
         }
         let dt_s = self.trials[0].dt_s;
         if let Some(other) = self.trials.iter().find(|t| (t.dt_s / dt_s - 1.0).abs() > 0.01) {
-            return Err(GapError::Implausible {
+            return Err(BenchError::Implausible {
                 column: format!("time_s of {}", other.name),
                 found: format!("a sample every {} s where {dt_s} s is usual", other.dt_s),
                 hint: "all trials need the same sample rate: convert them first".into(),
@@ -138,11 +138,11 @@ impl Session {
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)))
     }
 
-    fn check_units(&mut self) -> Result<(), GapError> {
+    fn check_units(&mut self) -> Result<(), BenchError> {
         let length = self.range(|t| &t.length_mm);
         let volts = self.range(|t| &t.bridge_v);
         let bad = |column: &str, found: String, hint: &str| {
-            Err(GapError::Implausible { column: column.into(), found, hint: hint.into() })
+            Err(BenchError::Implausible { column: column.into(), found, hint: hint.into() })
         };
         let spread = |(low, high): (f64, f64)| format!("values from {low} to {high}");
         if length.1 < 10.0 && volts.1 > 10.0 {
@@ -193,7 +193,7 @@ const AGAINST: f64 = 0.5;
 
 impl Session {
     /// An open inlet shortens the muscle, an open outlet lets it out; and no channel stands still while the muscle moves.
-    fn check_directions(&self) -> Result<(), GapError> {
+    fn check_directions(&self) -> Result<(), BenchError> {
         let span = |values: &[f64]| {
             let low = values.iter().copied().fold(f64::INFINITY, f64::min);
             values.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low
@@ -214,7 +214,7 @@ impl Session {
             ];
             for (column, values) in others {
                 if let Some(values) = values.filter(|values| moved > 1.0 && span(values) <= 0.0) {
-                    return Err(GapError::Implausible {
+                    return Err(BenchError::Implausible {
                         column: format!("{}, {column}", trial.name),
                         found: format!("{} in every sample, while the muscle moves", values[0]),
                         hint: "the channel is dead: check the sensor and its cable".into(),
@@ -223,7 +223,7 @@ impl Session {
             }
         }
         if against > AGAINST * widest * stroke {
-            return Err(GapError::Implausible {
+            return Err(BenchError::Implausible {
                 column: "inlet, outlet".into(),
                 found: "the muscle lengthens while the inlet is open".into(),
                 hint: "they look swapped: exchange the two names".into(),
@@ -239,7 +239,7 @@ fn rig_trial(
     start_s: f64,
     is_test: bool,
     notes: &mut Vec<String>,
-) -> Result<RigTrial, GapError> {
+) -> Result<RigTrial, BenchError> {
     let dt_s = trial.rate_hz().map_or(0.01, |rate| 1.0 / rate);
     let mut samples = trial.len();
     if let Some(gap) = trial.time_s.windows(2).position(|t| t[1] - t[0] > 1.6 * dt_s) {
@@ -251,10 +251,10 @@ fn rig_trial(
         ));
         samples = gap + 1;
     }
-    let column = |name: &str| -> Result<Vec<f64>, GapError> {
+    let column = |name: &str| -> Result<Vec<f64>, BenchError> {
         match trial.channel(name) {
             Some(values) => Ok(values[..samples].to_vec()),
-            None => Err(GapError::MissingColumn {
+            None => Err(BenchError::MissingColumn {
                 trial: trial.name.clone(),
                 column: name.into(),
                 needs: "a diagnosis of the whole rig needs",

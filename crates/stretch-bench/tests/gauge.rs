@@ -2,11 +2,9 @@
 
 mod support;
 
+use stretch_bench::{BenchError, GaugeSimulator, GaugeTrial};
 use stretch_data::{Channel, RigFile, Trial};
-use stretch_gap::{
-    Diagnosis, GapError, GaugeSimulator, GaugeTrial, Options, Simulator, VerdictKind, diagnose,
-    next_experiment,
-};
+use stretch_gap::{Diagnosis, Options, Simulator, VerdictKind, diagnose, next_experiment};
 use support::Noise;
 
 const DT_S: f64 = 0.01;
@@ -365,7 +363,7 @@ fn columns_that_cannot_be_what_they_say_are_refused_or_told() {
         t.channels.iter_mut().for_each(|c| c.values.truncate(250));
     };
     refused(&short, "rod_mm", "s1", &["250 samples", "300"]);
-    let noted = |g: Result<GaugeSimulator, GapError>, words: &[&str]| {
+    let noted = |g: Result<GaugeSimulator, BenchError>, words: &[&str]| {
         let notes = g.expect("a gauge").notes().join("; ");
         assert!(words.iter().all(|w| notes.contains(w)), "{notes}");
     };

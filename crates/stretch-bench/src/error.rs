@@ -1,0 +1,65 @@
+//! Why measurements could not be bound to a simulator, or a simulation was refused.
+
+use stretch_data::DataError;
+use stretch_gap::GapError;
+use stretch_sim::SimError;
+
+/// Why measurements could not be bound to a simulator, or a simulation was refused; carries the evidence.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BenchError {
+    /// The data could not be read.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// The rig or an effect was refused.
+    #[error(transparent)]
+    Sim(#[from] SimError),
+    /// A column that every trial needs is missing.
+    #[error("{trial}: there is no column {column}, which {needs}")]
+    MissingColumn {
+        /// The trial.
+        trial: String,
+        /// The column.
+        column: String,
+        /// What needs it.
+        needs: &'static str,
+    },
+    /// A column is not what its name says.
+    #[error("{column}: {found}; {hint}")]
+    Implausible {
+        /// The column.
+        column: String,
+        /// What is wrong.
+        found: String,
+        /// What to do.
+        hint: String,
+    },
+    /// There is nothing to fit on.
+    #[error("{what}: {hint}")]
+    TooLittle {
+        /// What is missing.
+        what: String,
+        /// What to do.
+        hint: String,
+    },
+    /// A simulated output was not finite.
+    #[error("{stage}: the simulation gave a number that is not finite")]
+    NotFinite {
+        /// The stage.
+        stage: String,
+    },
+    /// An effect of that name is not in the catalogue.
+    #[error("no effect is called `{name}`{}", .nearest.as_ref().map_or(String::new(), |n| format!(" (did you mean `{n}`?)")))]
+    UnknownEffect {
+        /// The name given.
+        name: String,
+        /// The nearest name.
+        nearest: Option<String>,
+    },
+}
+
+impl From<BenchError> for GapError {
+    fn from(error: BenchError) -> Self {
+        Self::simulator(error)
+    }
+}

@@ -1,0 +1,57 @@
+//! The menu of experiments: what motion cannot part, other experiments do.
+
+use stretch_bench::{RigSimulator, RigTrial, Session};
+use stretch_data::TrialKind;
+use stretch_gap::{Model, Simulator, differences};
+
+/// A rig beside an arbitrary trial.
+fn rig() -> RigSimulator {
+    let plan = stretch_sim::TrialPlan::arbitrary(1, 5);
+    let mut session = stretch_sim::Session::new(&Default::default(), &Default::default()).unwrap();
+    let (_, trial) = session.run(&plan).unwrap();
+    let column = |name: &str| trial.channel(name).unwrap().to_vec();
+    let trial = RigTrial {
+        name: "arbitrary".into(),
+        kind: TrialKind::Arbitrary,
+        start_s: 0.0,
+        is_test: false,
+        dt_s: 0.01,
+        inlet: column("inlet"),
+        outlet: column("outlet"),
+        pressure_kpa: None,
+        length_mm: column("length_mm"),
+        bridge_v: column("bridge_v"),
+    };
+    RigSimulator::new(Session::new(vec![trial]).unwrap(), None, &[]).unwrap()
+}
+
+/// D of every experiment of the menu for two effects at given first parameters.
+fn of(rig: &RigSimulator, one: (&str, f64), two: (&str, f64)) -> Vec<(String, f64)> {
+    let model = |(name, value): (&str, f64)| {
+        let at = rig.effects().iter().position(|e| e.name == name).unwrap();
+        let mut values = rig.effects()[at].starts[0].clone();
+        let which = rig.effects()[at].parameters.iter().position(|p| p.name != "v_lo").unwrap();
+        values[which] = value;
+        let mut model = Model::nominal(rig);
+        model.effects.push((at, values));
+        model
+    };
+    differences(rig, &model(one), &model(two)).unwrap()
+}
+
+#[test]
+fn what_motion_cannot_part_other_experiments_do() {
+    let rig = rig();
+    let d = |all: &[(String, f64)], name: &str| all.iter().find(|x| x.0 == name).unwrap().1;
+    // A slack sleeve stops at a strain, an amplifier at a voltage: another excitation moves only one of them.
+    let bridge = stretch_sim::Bridge::new(rig.nominal());
+    let shortest_mm = rig.smooth_length(0).iter().copied().fold(f64::INFINITY, f64::min);
+    let strain = bridge.strain(shortest_mm + 6.0);
+    let top = bridge.volts(bridge.resistance(strain));
+    let all = of(&rig, ("sleeve_slack", strain), ("amplifier_saturation", top));
+    assert!(d(&all, "excitation_0.7") > 3.0 * d(&all, "arbitrary"), "{all:?}");
+    // Which of two scales bends shows only where the length is known otherwise.
+    let all = of(&rig, ("pot_nonlinearity", 0.6), ("gauge_nonlinearity", -0.01));
+    assert!(d(&all, "gauge_blocks") > 2.0 * d(&all, "minor_loops"), "{all:?}");
+    assert!(all.iter().all(|x| x.1.is_finite()));
+}

@@ -1,6 +1,7 @@
 //! Channels that ran into an end of their recorder.
 
 use stretch_bench::{RigTrial, Session};
+use stretch_filter::log::{noise_of_differences, second_differences};
 use stretch_sim::{Key, RigParams};
 
 /// Share of the samples at one value from which it is no accident.
@@ -39,10 +40,8 @@ pub(super) fn rails(params: &RigParams, session: &Session) -> Vec<String> {
 /// Noise of a record from its median second difference, away from one value.
 fn noise_off(values: &[f64], end: f64) -> f64 {
     let away = values.windows(3).filter(|w| w.iter().all(|v| *v != end));
-    let mut bends: Vec<f64> = away.map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
-    bends.sort_by(f64::total_cmp);
-    // 0.6745: the median of a standard normal variable's size; 6: squares of 1, -2, 1.
-    bends.get(bends.len() / 2).map_or(0.0, |median| median / 0.6745 / 6.0_f64.sqrt())
+    let mut bends: Vec<f64> = away.flat_map(second_differences).collect();
+    noise_of_differences(&mut bends).unwrap_or(0.0)
 }
 
 #[cfg(test)]

@@ -154,7 +154,7 @@ impl Prepared {
         let signal_range =
             range(&options.signal, options.zero(), &mut pairs.clone().map(|(v, _)| v))?;
         let target_range = range(&options.reference, 0.0, &mut pairs.map(|(_, t)| t))?;
-        let noise_v = noise(&pieces.iter().map(|(_, (v, _))| v.as_slice()).collect::<Vec<_>>());
+        let noise_v = noise(pieces.iter().map(|(_, (v, _))| v.as_slice()));
         let signal_dead = match options.dead_band {
             Some(dead_band) => dead_band,
             None => 3.0 * noise_v * noise_gain(options.rate, sample_rate)?,

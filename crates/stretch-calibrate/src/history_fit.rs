@@ -3,7 +3,7 @@
 
 use stretch_core::{
     FitSummary, HistoryMap, HistoryShape, Interval, MAX_HISTORY_TERMS, Model, RestTracker, Surface,
-    Values,
+    Values, lag, lag_share, play,
 };
 
 use crate::{
@@ -101,17 +101,17 @@ impl Design {
         let mut slow = vec![first; self.relaxations_s.len()];
         let mut played = vec![first; self.radii.len()];
         let shares: Vec<f64> =
-            self.relaxations_s.iter().map(|tau| -(-period_s / tau).exp_m1()).collect();
+            self.relaxations_s.iter().map(|&tau| lag_share(period_s, tau)).collect();
         let step = |&x: &f64| {
             let mut states = vec![x];
             let mut before = x;
-            for (l, share) in slow.iter_mut().zip(&shares) {
-                *l += share * (x - *l);
+            for (l, &share) in slow.iter_mut().zip(&shares) {
+                *l = lag(*l, x, share);
                 states.push(before - *l);
                 before = *l;
             }
-            for (p, radius) in played.iter_mut().zip(self.radii) {
-                *p = p.max(x - radius).min(x + radius);
+            for (p, &radius) in played.iter_mut().zip(self.radii) {
+                *p = play(*p, x, radius);
                 states.push(x - *p);
             }
             states
@@ -289,8 +289,13 @@ fn train(
     let mut before = 0;
     let mut pieces = Vec::new();
     for series in &prepared.series {
-        let above =
-            rested(&series.signal, rest, prepared.polarity, prepared.signal_range, period_s);
+        let above = rested(
+            &series.signal,
+            rest,
+            prepared.polarity,
+            prepared.signal_range,
+            prepared.sample_rate,
+        );
         let x: Vec<f64> = above.iter().map(|&v| prepared.signal_range.normalise(v)).collect();
         let fold = (0..x.len()).map(|i| prepared.fold(series, i, before, total)).collect();
         let target = series.target.iter().map(|&t| prepared.target_range.normalise(t)).collect();

@@ -2,7 +2,8 @@
 //! that inverts it.
 
 use stretch_core::{
-    FitSummary, Interval, Model, ObserverMap, Provenance, RestTracker, Runner, Values, Volts,
+    FitSummary, Interval, Model, ObserverMap, Provenance, RestTracker, Runner, Values, Volts, lag,
+    lag_share, play,
 };
 use stretch_filter::{SgFilter, SgShape};
 use stretch_receptor::ObserverReceptor;
@@ -236,7 +237,7 @@ fn tuned(
 }
 
 fn pieces(prepared: &Prepared, rest: Option<RestTracker>) -> Result<Vec<Piece>, CalibrateError> {
-    let (rate, period_s) = (prepared.sample_rate, prepared.sample_rate.period_s());
+    let rate = prepared.sample_rate;
     let centred = SgShape::centred_rate(SMOOTH, 2);
     let smoother = SgFilter::<f64>::new(SgShape { order: 0, ..centred }, rate)?;
     let differentiator = SgFilter::<f64>::new(centred, rate)?;
@@ -246,8 +247,7 @@ fn pieces(prepared: &Prepared, rest: Option<RestTracker>) -> Result<Vec<Piece>, 
         if series.signal.len() <= SMOOTH + SETTLE {
             continue;
         }
-        let above =
-            rested(&series.signal, rest, prepared.polarity, prepared.signal_range, period_s);
+        let above = rested(&series.signal, rest, prepared.polarity, prepared.signal_range, rate);
         let target: Vec<f64> =
             series.target.iter().map(|&t| prepared.target_range.normalise(t)).collect();
         let mut smooth = vec![0.0; target.len()];
@@ -264,16 +264,16 @@ fn pieces(prepared: &Prepared, rest: Option<RestTracker>) -> Result<Vec<Piece>, 
 pub(crate) fn features(piece: &Piece, choice: ObserverChoice, period_s: f64) -> Vec<Vec<f64>> {
     let first = piece.smooth[0];
     let mut slow: Vec<(f64, f64)> =
-        choice.taus().map(|tau| (first, -(-period_s / tau).exp_m1())).collect();
+        choice.taus().map(|tau| (first, lag_share(period_s, tau))).collect();
     let mut played = vec![first; choice.radii().len()];
     let step = |(&y, &rate): (&f64, &f64)| {
         let mut row = vec![rate];
         for (l, share) in &mut slow {
-            *l += *share * (y - *l);
+            *l = lag(*l, y, *share);
             row.push(y - *l);
         }
-        for (p, w) in played.iter_mut().zip(choice.radii()) {
-            *p = p.max(y - w).min(y + w);
+        for (p, &w) in played.iter_mut().zip(choice.radii()) {
+            *p = play(*p, y, w);
             row.push(y - *p);
         }
         row

@@ -4,7 +4,7 @@ use stretch_core::{Design, Interval, Polarity, RateEstimator, SampleRate, Second
 use stretch_data::Trial;
 use stretch_filter::{
     RateFilter, SgFilter, SgShape,
-    log::{Between, Grid, central_difference, resample},
+    log::{Between, Grid, central_difference, noise_of_differences, resample, second_differences},
 };
 
 use crate::CalibrateError;
@@ -89,19 +89,10 @@ pub(crate) fn even(
     Ok(Even { pieces, note: Some(note) })
 }
 
-/// Standard deviation of a record's noise from its second differences, robust
-/// to motion: `1.4826 median|x[i-1] - 2 x[i] + x[i+1]| / sqrt(6)`.
-pub(crate) fn noise(records: &[&[f64]]) -> f64 {
-    let mut bends: Vec<f64> = records
-        .iter()
-        .flat_map(|x| x.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()))
-        .collect();
-    if bends.is_empty() {
-        return 0.0;
-    }
-    let middle = bends.len() / 2;
-    let (_, median, _) = bends.select_nth_unstable_by(middle, f64::total_cmp);
-    1.4826 * *median / 6f64.sqrt()
+/// Standard deviation of the noise of some records; zero for less than three samples.
+pub(crate) fn noise<'a>(records: impl Iterator<Item = &'a [f64]>) -> f64 {
+    let mut bends: Vec<f64> = records.flat_map(second_differences).collect();
+    noise_of_differences(&mut bends).unwrap_or(0.0)
 }
 
 /// From the least value to the greatest.

@@ -1,6 +1,6 @@
 //! The calibration record: everything a receptor needs, and where it came from.
 
-use crate::{DesignError, Label, Model, Provenance, Range, RateEstimator, SampleRate};
+use crate::{DesignError, Label, Model, Polarity, Provenance, Range, RateEstimator, SampleRate};
 
 /// The schema of calibration records that this release writes, and the newest it reads.
 pub const CALIBRATION_SCHEMA: u32 = 1;
@@ -45,29 +45,6 @@ impl Target {
         match self {
             Self::Contraction { rest_length } => -rest_length,
             Self::Direct => 1.0,
-        }
-    }
-}
-
-/// Whether the signal rises or falls as the target rises.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
-pub enum Polarity {
-    /// Signal and target rise together.
-    #[default]
-    Rising,
-    /// The signal falls as the target rises.
-    Falling,
-}
-
-impl Polarity {
-    /// 1 or -1: what the signal's rate is multiplied by, so that a positive
-    /// signed rate means a rising target.
-    pub fn sign(self) -> f64 {
-        match self {
-            Self::Rising => 1.0,
-            Self::Falling => -1.0,
         }
     }
 }

@@ -29,6 +29,15 @@ pub enum DesignError {
         /// The newest schema that this release reads.
         newest: u32,
     },
+    /// A calibration of another kind than what is made of it can use.
+    Mismatch {
+        /// What differs: `model`, `rate estimator`.
+        field: &'static str,
+        /// The kind, or kinds, that can be used.
+        expected: &'static str,
+        /// The kind that came.
+        found: &'static str,
+    },
     /// A degree, count or length that this release cannot hold.
     TooLarge {
         /// The field.
@@ -63,6 +72,9 @@ impl fmt::Display for DesignError {
                 f,
                 "schema is {found}, but this release reads up to schema {newest}: update stretch"
             ),
+            Self::Mismatch { field, expected, found } => {
+                write!(f, "the calibration's {field} is {found}, but this takes {expected}")
+            }
             Self::TooLarge { field, asked, most } => {
                 write!(f, "{field} is {asked}, but there is room for {most}")
             }

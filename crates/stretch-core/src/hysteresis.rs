@@ -1,6 +1,6 @@
 //! Prandtl-Ishlinskii hysteresis and its analytic inverse.
 
-use crate::{Design, DesignError, Real, Stage, Values};
+use crate::{Design, DesignError, Real, Stage, Values, play};
 
 /// The most plays of a [`Hysteresis`].
 pub const MAX_HYSTERESIS_PLAYS: usize = 4;
@@ -90,11 +90,11 @@ impl<T: Real> Stage<T> for Hysteresis {
     fn step(&self, plays: &mut Self::Memory, x: T) -> T {
         let x = x.as_f64();
         let mut sum = self.gain * x;
-        for ((play, &radius), &weight) in
+        for ((played, &radius), &weight) in
             plays.iter_mut().zip(self.radii.iter()).zip(self.weights.iter())
         {
-            *play = play.max(x - radius).min(x + radius);
-            sum += weight * *play;
+            *played = play(*played, x, radius);
+            sum += weight * *played;
         }
         T::from_f64(sum)
     }

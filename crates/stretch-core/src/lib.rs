@@ -1,20 +1,26 @@
 #![doc = include_str!("../README.md")]
 #![no_std]
 
+mod branch;
 mod calibration;
 mod degree;
 mod error;
 pub mod fixed;
 mod history;
 mod hysteresis;
+mod interval;
 mod label;
+mod lag;
 mod model;
 mod observer;
+mod play;
+mod polarity;
 mod provenance;
 mod range;
 mod rate;
 mod real;
 mod rest;
+mod rest_level;
 mod stage;
 #[cfg(feature = "proptest")]
 pub mod strategies;
@@ -22,8 +28,9 @@ mod surface;
 mod unit;
 mod values;
 
+pub use branch::Branch;
 pub use calibration::{
-    CALIBRATION_SCHEMA, Calibration, CalibrationSpec, Polarity, RateSource, Schema, Target,
+    CALIBRATION_SCHEMA, Calibration, CalibrationSpec, RateSource, Schema, Target,
 };
 pub use degree::{Degree, MAX_DEGREE, MAX_TERMS};
 pub use error::DesignError;
@@ -31,14 +38,19 @@ pub use history::{
     HistoryMap, HistoryShape, MAX_HISTORY_TERMS, MAX_PLAYS, MAX_RELAXATIONS, MAX_STATES,
 };
 pub use hysteresis::{Hysteresis, MAX_HYSTERESIS_PLAYS};
+pub use interval::Interval;
 pub use label::Label;
-pub use model::{Branch, BranchSurface, Interval, LinearMap, Model};
+pub use lag::{lag, lag_share, lag_weights};
+pub use model::{BranchSurface, LinearMap, Model};
 pub use observer::{MAX_KNOTS, MAX_OBSERVER_PLAYS, MAX_OBSERVER_RELAXATIONS, ObserverMap};
+pub use play::play;
+pub use polarity::Polarity;
 pub use provenance::{FitSummary, Provenance};
 pub use range::{Normalisation, Range, RangeSpec};
 pub use rate::RateEstimator;
 pub use real::Real;
 pub use rest::RestTracker;
+pub use rest_level::{Baseline, RestLevel};
 pub use stage::{Design, Runner, Stage};
 pub use surface::{Poly13, Surface};
 pub use unit::{Hertz, Millimetres, MillimetresPerSecond, SampleRate, Seconds, Strain, Volts};

@@ -1,74 +1,6 @@
 //! What a calibration computes: from signal and rate to the normalised target.
 
-use crate::{DesignError, FitSummary, HistoryMap, ObserverMap, Range, Surface};
-
-/// Which way the target moves, and so which surface describes it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
-pub enum Branch {
-    /// The target rises: the muscle fills and shortens, or the joint flexes.
-    #[default]
-    Inflation,
-    /// The target falls.
-    Deflation,
-}
-
-impl Branch {
-    /// The branch for a rate of the target, given the one before: it changes
-    /// only when the rate leaves the dead band (`|rate| > dead_band`). NaN holds.
-    ///
-    /// ```
-    /// use stretch_core::Branch;
-    /// assert_eq!(Branch::Inflation.next(-0.05, 0.1), Branch::Inflation);
-    /// assert_eq!(Branch::Inflation.next(-0.2, 0.1), Branch::Deflation);
-    /// ```
-    #[inline]
-    #[must_use]
-    pub fn next<T: crate::Real>(self, rate: T, dead_band: T) -> Self {
-        if rate > dead_band {
-            Self::Inflation
-        } else if rate < -dead_band {
-            Self::Deflation
-        } else {
-            self
-        }
-    }
-}
-
-impl core::fmt::Display for Branch {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.pad(match self {
-            Self::Inflation => "inflation",
-            Self::Deflation => "deflation",
-        })
-    }
-}
-
-/// A closed interval of valid inputs.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Interval {
-    /// Lower end.
-    pub min: f64,
-    /// Upper end.
-    pub max: f64,
-}
-
-impl Interval {
-    /// Whether both ends are finite and in order; the error names `field`.
-    ///
-    /// # Errors
-    /// [`DesignError::OutOfRange`] or [`DesignError::EmptyRange`].
-    pub fn validate(self, field: &'static str) -> Result<Self, DesignError> {
-        DesignError::check(field, self.min, true)?;
-        DesignError::check(field, self.max, true)?;
-        if self.min > self.max {
-            return Err(DesignError::EmptyRange { field, min: self.min, max: self.max });
-        }
-        Ok(self)
-    }
-}
+use crate::{DesignError, FitSummary, HistoryMap, Interval, ObserverMap, Range, Surface};
 
 /// A straight line: `target = slope signal + intercept`, all normalised.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -131,6 +63,31 @@ pub enum Model {
 }
 
 impl Model {
+    /// The kind, as messages and records call it.
+    ///
+    /// ```
+    /// use stretch_core::{FitSummary, Interval, LinearMap, Model};
+    /// let signal_domain = Interval { min: 1.0, max: 2.0 };
+    /// let fit = FitSummary { samples: 100, r_squared: 0.9, rmse: 0.1 };
+    /// let line = LinearMap { slope: 1.0, intercept: 0.0, signal_domain, fit };
+    /// assert_eq!(Model::Linear(line).name(), "linear");
+    /// ```
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Linear(_) => "linear",
+            Self::Surfaces { .. } => "surfaces",
+            Self::Blended { .. } => "blended",
+            Self::History(_) => "history",
+            Self::Observer(_) => "observer",
+        }
+    }
+
+    /// What a caller answers who takes models of kind `expected` only:
+    /// [`DesignError::Mismatch`], with this model's name.
+    pub fn instead_of(&self, expected: &'static str) -> DesignError {
+        DesignError::Mismatch { field: "model", expected, found: self.name() }
+    }
+
     /// Checks every number.
     ///
     /// # Errors

@@ -45,6 +45,16 @@ impl RateEstimator {
     /// Eleven points, degree 2, at the newest sample: causal, 0.1 s at 100 Hz.
     pub const SAVGOL_11_2: Self = Self::SavitzkyGolay { window: 11, degree: 2, delay: 0 };
 
+    /// The kind, as messages call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::CentralDifference => "a central difference",
+            Self::SavitzkyGolay { .. } => "Savitzky-Golay",
+            Self::Differentiator { .. } => "a differentiator",
+            Self::Tracker { .. } => "a tracker",
+        }
+    }
+
     /// Checks every number of the record.
     ///
     /// # Errors

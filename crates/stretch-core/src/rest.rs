@@ -14,7 +14,7 @@ use crate::DesignError;
 /// - else `b += leak dt`, so that drift the other way is found at the next rest.
 ///
 /// The model sees `s - b`. A model that knows how memory moves a resting signal
-/// moves `level` with it. Source: this project; it is the one-sided zero
+/// moves `level` with it. [`RestLevel`](crate::RestLevel) is this, stepped. Source: this project; it is the one-sided zero
 /// update of strapdown navigation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -34,6 +34,9 @@ impl RestTracker {
     /// The furthest that a baseline goes, as a share of the signal's range: what is
     /// beyond is no drift but another gauge.
     pub const FURTHEST: f64 = 0.2;
+    /// What a sample beyond the level counts for at most, as a share of the signal's
+    /// range: drift is slow, a spike is not drift.
+    pub const MOST_EXCESS: f64 = 0.1;
 
     /// Checks every number.
     ///

@@ -1,6 +1,7 @@
 //! Numbers that every receptor folds out of a calibration.
 
-use stretch_core::{Calibration, Range};
+use stretch_core::{Calibration, Range, Real};
+use stretch_filter::{FilterError, RateFilter};
 
 /// Reference units per normalised target, and the reference at a target of zero.
 pub(crate) fn output(calibration: &Calibration) -> (f64, f64) {
@@ -15,8 +16,16 @@ pub(crate) fn reference_dead_band(calibration: &Calibration) -> f64 {
     calibration.dead_band * (gain / calibration.signal_range.span()).abs()
 }
 
-/// What a first-order low-pass of time constant `tau_s` takes up in a sample:
-/// exact for a signal that holds between samples.
-pub(crate) fn share_of(period_s: f64, tau_s: f64) -> f64 {
-    -libm::expm1(-period_s / tau_s)
+/// The rate estimator that a calibration names.
+pub(crate) fn estimator<T: Real>(calibration: &Calibration) -> Result<RateFilter<T>, FilterError> {
+    RateFilter::new(calibration.rate_estimator, calibration.sample_rate_hz)
+}
+
+/// Values in the receptor's precision, zero behind them.
+pub(crate) fn rounded<T: Real, const N: usize>(values: impl Iterator<Item = f64>) -> [T; N] {
+    let mut out = [T::zero(); N];
+    for (place, value) in out.iter_mut().zip(values) {
+        *place = T::from_f64(value);
+    }
+    out
 }

@@ -1,8 +1,6 @@
 //! The gains that a Kalman filter settles at, slope by slope.
 
-use stretch_core::{DesignError, MAX_OBSERVER_RELAXATIONS, ObserverMap};
-
-use crate::fold::share_of;
+use stretch_core::{DesignError, MAX_OBSERVER_RELAXATIONS, ObserverMap, lag_share};
 
 /// Target, its rate, and the relaxations.
 pub(crate) const STATES: usize = 2 + MAX_OBSERVER_RELAXATIONS;
@@ -60,7 +58,7 @@ fn settled(map: &ObserverMap, period_s: f64, slope: f64) -> [f64; STATES] {
     let mut gradient = [0.0; STATES];
     (gradient[0], gradient[1]) = (1.0, map.lead_s);
     for (i, (&tau, &amplitude)) in map.relaxations_s.iter().zip(map.amplitudes.iter()).enumerate() {
-        let share = share_of(period_s, tau);
+        let share = lag_share(period_s, tau);
         (gradient[0], gradient[2 + i]) = (gradient[0] + amplitude, -amplitude);
         // the transition, transposed: a relaxation follows the target as predicted
         (a[0][2 + i], a[1][2 + i], a[2 + i][2 + i]) = (share, share * period_s, 1.0 - share);

@@ -1,15 +1,15 @@
 //! The live form of a polynomial of the signal's history.
 
 use stretch_core::{
-    Branch, Calibration, Design, DesignError, HistoryMap, MAX_HISTORY_TERMS, MAX_PLAYS,
-    MAX_RELAXATIONS, MAX_STATES, Model, Real, Stage, Volts,
+    Baseline, Branch, Calibration, Design, DesignError, HistoryMap, MAX_HISTORY_TERMS, MAX_PLAYS,
+    MAX_RELAXATIONS, MAX_STATES, Model, Real, RestLevel, Stage, Volts, lag, lag_share, play,
 };
-use stretch_filter::{FilterError, LARGEST_SAMPLE, RateFilter};
+use stretch_filter::{FilterError, RateFilter};
 
 use crate::{
-    Domain, MAX_BRIDGED, Reading, Withheld,
-    fold::{output, reference_dead_band, share_of},
-    rest_level::{Baseline, RestLevel},
+    Domain, Front, Reading,
+    fold::{estimator, output, reference_dead_band, rounded},
+    front::{Direction, Live, usable},
 };
 
 /// A receptor for [`Model::History`]: low-passes and plays of the signal, then
@@ -24,13 +24,15 @@ use crate::{
 ///    sign, outside the dead band carried over to the reference.
 ///
 /// The first sample finds every state settled at it. Warm-up, missing samples
-/// and reset are those of [`StretchReceptor`](crate::StretchReceptor): a short
-/// gap is bridged by the last sample, a longer one forgets all but branch and
-/// baseline.
+/// and branch are those of every [`Front`]: a short gap is bridged by the last
+/// sample, a longer one forgets all but branch and baseline.
 ///
 /// Cost: a product and a sum a term, a product a state.
+pub type HistoryReceptor<T, R = RateFilter<T>> = Front<History<T, R>>;
+
+/// The model of a [`HistoryReceptor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HistoryReceptor<T, R = RateFilter<T>> {
+pub struct History<T, R> {
     rate: R,
     sign: T,
     rest: RestLevel<T>,
@@ -48,11 +50,10 @@ pub struct HistoryReceptor<T, R = RateFilter<T>> {
     coefficients: [T; MAX_HISTORY_TERMS],
     low: T,
     high: T,
-    dead_band: T,
-    rising: Branch,
+    direction: Direction<T>,
 }
 
-/// What a [`HistoryReceptor`] remembers.
+/// What a [`HistoryReceptor`]'s model remembers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HistoryMemory<T, M> {
     rate: M,
@@ -61,8 +62,6 @@ pub struct HistoryMemory<T, M> {
     last: T,
     low_passes: [T; MAX_RELAXATIONS],
     plays: [T; MAX_PLAYS],
-    branch: Branch,
-    missing: u8,
 }
 
 impl<T: Real> HistoryReceptor<T> {
@@ -72,8 +71,7 @@ impl<T: Real> HistoryReceptor<T> {
     /// [`FilterError`] when the estimator cannot run live, or the calibration
     /// is of another model.
     pub fn new(calibration: &Calibration) -> Result<Self, FilterError> {
-        let rate = RateFilter::new(calibration.rate_estimator, calibration.sample_rate_hz)?;
-        Ok(Self::with_rate(calibration, rate)?)
+        Ok(Self::with_rate(calibration, estimator(calibration)?)?)
     }
 }
 
@@ -84,10 +82,10 @@ impl<T: Real, R> HistoryReceptor<T, R> {
     /// [`DesignError`] when the calibration is of another model.
     pub fn with_rate(calibration: &Calibration, rate: R) -> Result<Self, DesignError> {
         let Model::History(map) = &calibration.model else {
-            return Err(DesignError::OutOfRange { field: "model", value: f64::NAN });
+            return Err(calibration.model.instead_of("history"));
         };
         map.validate()?;
-        let sign = calibration.polarity.sign();
+        let (polarity, sample_rate) = (calibration.polarity, calibration.sample_rate_hz);
         let range = calibration.signal_range;
         let shape = map.shape();
         let (gain, zero) = output(calibration);
@@ -99,23 +97,22 @@ impl<T: Real, R> HistoryReceptor<T, R> {
             }
             terms += 1;
         });
-        let mut coefficients = [T::zero(); MAX_HISTORY_TERMS];
-        for (place, &c) in coefficients.iter_mut().zip(map.coefficients.iter()) {
-            *place = T::from_f64(gain * c);
-        }
+        let mut coefficients: [T; MAX_HISTORY_TERMS] =
+            rounded(map.coefficients.iter().map(|c| gain * c));
         coefficients[0] = T::from_f64(zero + gain * map.coefficients[0]);
         let (centre, per_half) = scales(map);
         let ends = [map.estimate_domain.min, map.estimate_domain.max].map(|t| zero + gain * t);
-        Ok(Self {
+        let shares = map.relaxations_s.iter().map(|&tau| lag_share(sample_rate.period_s(), tau));
+        let model = History {
             rate,
-            sign: T::from_f64(sign),
-            rest: RestLevel::new(map.rest, calibration),
+            sign: T::from_f64(polarity.sign()),
+            rest: RestLevel::new(map.rest, polarity, range, sample_rate),
             offset: T::from_f64(range.offset()),
             scale: T::from_f64(range.span().recip()),
             relaxations: map.relaxations_s.len(),
-            shares: shares(map, calibration.sample_rate_hz.period_s()),
+            shares: rounded(shares),
             plays: map.radii.len(),
-            radii: rounded(&map.radii),
+            radii: rounded(map.radii.iter().copied()),
             centre,
             per_half,
             terms,
@@ -123,11 +120,16 @@ impl<T: Real, R> HistoryReceptor<T, R> {
             coefficients,
             low: T::from_f64(ends[0].min(ends[1])),
             high: T::from_f64(ends[0].max(ends[1])),
-            dead_band: T::from_f64(reference_dead_band(calibration)),
-            rising: if gain > 0.0 { Branch::Inflation } else { Branch::Deflation },
-        })
+            direction: Direction {
+                rising: if gain > 0.0 { Branch::Inflation } else { Branch::Deflation },
+                dead_band: T::from_f64(reference_dead_band(calibration)),
+            },
+        };
+        Ok(Self { model })
     }
+}
 
+impl<T: Real, R> History<T, R> {
     /// The states of a usable sample, each scaled to -1..1, and whether the
     /// signal and any memory had to be moved into their domains.
     #[inline(always)]
@@ -147,7 +149,7 @@ impl<T: Real, R> HistoryReceptor<T, R> {
         states[0] = x;
         let mut before = x;
         for i in 0..self.relaxations {
-            let slow = memory.low_passes[i] + self.shares[i] * (x - memory.low_passes[i]);
+            let slow = lag(memory.low_passes[i], x, self.shares[i]);
             memory.low_passes[i] = slow;
             states[1 + i] = before - slow;
             before = slow;
@@ -181,90 +183,67 @@ impl<T: Real, R> HistoryReceptor<T, R> {
     }
 }
 
-impl<T: Real, R: Design> Design for HistoryReceptor<T, R> {
+impl<T: Real, R: Design> Design for History<T, R> {
     type Memory = HistoryMemory<T, R::Memory>;
 
     fn memory(&self) -> Self::Memory {
         HistoryMemory {
             rate: self.rate.memory(),
-            baseline: Baseline::unmoved(),
+            baseline: self.rest.memory(),
             last: T::nan(),
             low_passes: [T::zero(); MAX_RELAXATIONS],
             plays: [T::zero(); MAX_PLAYS],
-            branch: Branch::Inflation,
-            missing: 0,
         }
     }
 }
 
-impl<T: Real, R: Stage<T, Out = Option<T>>> HistoryReceptor<T, R> {
+impl<T: Real, R: Stage<T, Out = Option<T>>> History<T, R> {
     #[inline(always)]
-    fn usable(
-        &self,
-        memory: &mut HistoryMemory<T, R::Memory>,
-        signal: T,
-    ) -> (T, Option<T>, Domain) {
+    fn take(&self, memory: &mut HistoryMemory<T, R::Memory>, signal: T) -> (T, Option<T>, Domain) {
         let (states, signal_outside, memory_outside) = self.states(memory, signal);
         let free = self.polynomial(&states);
         let estimate = free.max(self.low).min(self.high);
         let domain = Domain::from_flags(signal_outside || estimate != free, memory_outside);
         (estimate, self.rate.step(&mut memory.rate, estimate), domain)
     }
-
-    #[cold]
-    fn missed(&self, memory: &mut HistoryMemory<T, R::Memory>) {
-        memory.missing = memory.missing.saturating_add(1);
-        if memory.missing <= MAX_BRIDGED && memory.last.is_finite() {
-            // the memories go on; nothing is answered for this sample
-            let _ = self.usable(memory, memory.last);
-        } else {
-            let (branch, baseline) = (memory.branch, memory.baseline);
-            *memory = HistoryMemory { branch, baseline, missing: MAX_BRIDGED, ..self.memory() };
-        }
-    }
 }
 
-impl<T: Real, R: Stage<T, Out = Option<T>>> Stage<Volts<T>> for HistoryReceptor<T, R> {
-    type Out = Result<Reading<T>, Withheld>;
+impl<T: Real, R: Stage<T, Out = Option<T>>> Live for History<T, R> {
+    type Sample = Volts<T>;
+    type Signal = T;
+    type Side = Branch;
+    type Reading = Reading<T>;
 
     #[inline(always)]
-    fn step(&self, memory: &mut Self::Memory, sample: Volts<T>) -> Self::Out {
-        let usable = sample.0.abs() <= T::from_f64(LARGEST_SAMPLE);
-        if !usable {
-            self.missed(memory);
-            return Err(Withheld::Missing);
+    fn signal(&self, sample: Volts<T>) -> Option<T> {
+        usable(sample.0)
+    }
+
+    #[inline(always)]
+    fn read(
+        &self,
+        memory: &mut Self::Memory,
+        branch: &mut Branch,
+        signal: T,
+    ) -> Option<Reading<T>> {
+        let (estimate, rate, domain) = self.take(memory, signal);
+        let rate = rate?;
+        *branch = self.direction.next(*branch, rate);
+        Some(Reading { estimate, rate, branch: *branch, domain })
+    }
+
+    /// By the last sample: the memories go on, and nothing is answered.
+    fn bridge(&self, memory: &mut Self::Memory, _: u8) -> bool {
+        let begun = memory.last.is_finite();
+        if begun {
+            let _ = self.take(memory, memory.last);
         }
-        memory.missing = 0;
-        let (estimate, rate, domain) = self.usable(memory, sample.0);
-        let Some(rate) = rate else {
-            return Err(Withheld::Warming);
-        };
-        let rising = if self.rising == Branch::Inflation { rate } else { -rate };
-        memory.branch = memory.branch.next(rising, self.dead_band);
-        Ok(Reading { estimate, rate, branch: memory.branch, domain })
+        begun
     }
-}
 
-/// Backlash of half-width `radius`: the nearest value within it.
-#[inline(always)]
-pub(crate) fn play<T: Real>(before: T, x: T, radius: T) -> T {
-    before.max(x - radius).min(x + radius)
-}
-
-fn rounded<T: Real, const N: usize>(values: &[f64]) -> [T; N] {
-    let mut out = [T::zero(); N];
-    for (place, &value) in out.iter_mut().zip(values) {
-        *place = T::from_f64(value);
+    fn forget(&self, memory: &mut Self::Memory) {
+        *memory = HistoryMemory { baseline: memory.baseline, ..self.memory() };
     }
-    out
-}
-
-fn shares<T: Real>(map: &HistoryMap, period_s: f64) -> [T; MAX_RELAXATIONS] {
-    let mut out = [T::zero(); MAX_RELAXATIONS];
-    for (place, &tau) in out.iter_mut().zip(map.relaxations_s.iter()) {
-        *place = T::from_f64(share_of(period_s, tau));
-    }
-    out
 }
 
 fn scales<T: Real>(map: &HistoryMap) -> ([T; MAX_STATES], [T; MAX_STATES]) {

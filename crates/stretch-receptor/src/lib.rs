@@ -1,10 +1,11 @@
 #![doc = include_str!("../README.md")]
 #![no_std]
 
-mod blended;
+mod across;
 pub mod code;
 mod example;
 mod fold;
+mod front;
 mod gains;
 mod history;
 mod map;
@@ -12,14 +13,13 @@ mod observer;
 mod one;
 mod reading;
 mod receptor;
-mod rest_level;
 #[cfg(feature = "proptest")]
 pub mod strategies;
 
-pub use blended::BlendedReceptor;
 pub use example::{example_calibration, example_observer};
-pub use history::{HistoryMemory, HistoryReceptor};
-pub use observer::{ObserverMemory, ObserverReceptor};
-pub use one::{Receptor, StoredMemory};
+pub use front::{Front, MAX_BRIDGED, ReceptorMemory};
+pub use history::HistoryReceptor;
+pub use observer::ObserverReceptor;
+pub use one::Receptor;
 pub use reading::{Domain, Reading, Withheld};
-pub use receptor::{MAX_BRIDGED, ReceptorMemory, StretchReceptor};
+pub use receptor::{BlendedReceptor, StretchReceptor};

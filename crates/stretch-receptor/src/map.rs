@@ -5,15 +5,14 @@
 //! one subtraction on each input and the polynomial itself.
 
 use stretch_core::{
-    Branch, BranchSurface, Calibration, DesignError, Interval, LinearMap, Model, Poly13, Real,
-    Surface,
+    Branch, BranchSurface, Calibration, DesignError, Interval, LinearMap, Poly13, Real, Surface,
 };
 
 use crate::{Domain, fold::output};
 
 /// Value and local slope of a calibration at one input.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Point<T> {
+pub struct Point<T> {
     pub estimate: T,
     /// Change of the estimate per change of the signal.
     pub slope: T,
@@ -41,7 +40,7 @@ impl<T: Real> Bounds<T> {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Line<T> {
+pub struct Line<T> {
     signal: Bounds<T>,
     offset: T,
     slope: T,
@@ -50,7 +49,7 @@ pub(crate) struct Line<T> {
 
 /// A surface over `signal - offset` and `rate - rate_offset`, in physical units.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Sheet<T, S> {
+pub struct Sheet<T, S> {
     signal: Bounds<T>,
     rate: Bounds<T>,
     offset: T,
@@ -61,21 +60,16 @@ pub(crate) struct Sheet<T, S> {
 /// A calibration, folded. The rate it takes is the signal's own, unsigned by polarity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(clippy::large_enum_variant)] // no allocator to box with; one lives in a program
-pub(crate) enum Map<T> {
+pub enum Map<T> {
     Line(Line<T>),
     Poly13([Sheet<T, Poly13<T>>; 2]),
     Surface([Sheet<T, Surface<T>>; 2]),
 }
 
 impl<T: Real> Map<T> {
-    pub(crate) fn new(calibration: &Calibration) -> Result<Self, DesignError> {
-        match &calibration.model {
-            Model::Linear(line) => Ok(Self::Line(fold_line(calibration, line))),
-            Model::Surfaces { inflation, deflation } => {
-                Self::sheets(calibration, inflation, deflation)
-            }
-            _ => Err(DesignError::OutOfRange { field: "model", value: f64::NAN }),
-        }
+    /// One line for both branches.
+    pub(crate) fn line(calibration: &Calibration, line: &LinearMap) -> Self {
+        Self::Line(fold_line(calibration, line))
     }
 
     /// A sheet a branch.

@@ -1,17 +1,15 @@
 //! The live form of a gauge's forward model: a small Kalman filter.
 
 use stretch_core::{
-    Branch, Calibration, Design, DesignError, MAX_KNOTS, MAX_OBSERVER_PLAYS,
-    MAX_OBSERVER_RELAXATIONS, Model, Real, Stage, Volts,
+    Baseline, Branch, Calibration, Design, DesignError, MAX_KNOTS, MAX_OBSERVER_PLAYS,
+    MAX_OBSERVER_RELAXATIONS, Model, Real, RestLevel, Volts, lag, lag_share, play,
 };
-use stretch_filter::LARGEST_SAMPLE;
 
 use crate::{
-    Domain, MAX_BRIDGED, Reading, Withheld,
-    fold::{output, reference_dead_band, share_of},
+    Domain, Front, Reading,
+    fold::{output, reference_dead_band, rounded},
+    front::{Live, usable},
     gains::{Gains, SLOPES, STATES},
-    history::play,
-    rest_level::{Baseline, RestLevel},
 };
 
 /// A secant is taken over at least this share of the way between knots.
@@ -21,8 +19,8 @@ const LEAST_RUN: f64 = 0.01;
 /// it would give with the one that came, and corrects.
 ///
 /// It answers from the first sample on, and its rate is a state, not a
-/// difference. A missing sample is predicted over, at most [`MAX_BRIDGED`] in a
-/// row; one more forgets all but branch and baseline.
+/// difference. A missing sample is predicted over as every [`Front`] does; a long
+/// gap forgets all but branch and baseline.
 ///
 /// A sample corrects every state by a gain times what the signal has over its
 /// prediction. The gain is the one that a Kalman filter settles at for the slope
@@ -35,8 +33,11 @@ const LEAST_RUN: f64 = 0.01;
 ///
 /// The baseline, where it is followed, is compared with the signal that rest would
 /// give now, memory included: an undershoot after a fast release is not drift.
+pub type ObserverReceptor<T> = Front<Observer<T>>;
+
+/// The model of an [`ObserverReceptor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ObserverReceptor<T> {
+pub struct Observer<T> {
     sign: T,
     rest: RestLevel<T>,
     knots: usize,
@@ -64,15 +65,13 @@ pub struct ObserverReceptor<T> {
     at_rest: T,
 }
 
-/// What an [`ObserverReceptor`] remembers: its states, the plays, the baseline.
+/// What an [`ObserverReceptor`]'s model remembers: its states, the plays, the baseline.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObserverMemory<T> {
     /// Target, rate, relaxations: normalised. The target is NaN before the first sample.
     states: [T; STATES],
     plays: [T; MAX_OBSERVER_PLAYS],
     baseline: Baseline<T>,
-    branch: Branch,
-    missing: u8,
 }
 
 impl<T: Real> ObserverReceptor<T> {
@@ -82,11 +81,11 @@ impl<T: Real> ObserverReceptor<T> {
     /// [`DesignError`] when the calibration is of another model.
     pub fn new(calibration: &Calibration) -> Result<Self, DesignError> {
         let Model::Observer(map) = &calibration.model else {
-            return Err(DesignError::OutOfRange { field: "model", value: f64::NAN });
+            return Err(calibration.model.instead_of("observer"));
         };
         map.validate()?;
-        let sign = calibration.polarity.sign();
-        let period_s = calibration.sample_rate_hz.period_s();
+        let (polarity, sample_rate) = (calibration.polarity, calibration.sample_rate_hz);
+        let (sign, period_s) = (polarity.sign(), sample_rate.period_s());
         let (gain, zero) = output(calibration);
         let knots = map.curve.len();
         let drive = map.drive_domain;
@@ -98,21 +97,21 @@ impl<T: Real> ObserverReceptor<T> {
         let (flattest, steepest) =
             slopes.fold((f64::INFINITY, 0.0), |(a, b): (f64, f64), s| (a.min(s), b.max(s)));
         let gains = Gains::new(map, period_s, flattest, steepest)?;
-        let design = Self {
+        let model = Observer {
             sign: T::from_f64(sign),
-            rest: RestLevel::new(map.rest, calibration),
+            rest: RestLevel::new(map.rest, polarity, calibration.signal_range, sample_rate),
             knots,
-            curve: filled(map.curve.iter().map(|v| sign * v)),
+            curve: rounded(map.curve.iter().map(|v| sign * v)),
             drive_low: T::from_f64(drive.min),
             drive_step: T::from_f64(step),
             per_step: T::from_f64(step.recip()),
             relaxations: map.relaxations_s.len(),
-            shares: filled(map.relaxations_s.iter().map(|&tau| share_of(period_s, tau))),
-            amplitudes: filled(map.amplitudes.iter().copied()),
+            shares: rounded(map.relaxations_s.iter().map(|&tau| lag_share(period_s, tau))),
+            amplitudes: rounded(map.amplitudes.iter().copied()),
             lead_s: T::from_f64(map.lead_s),
             plays: map.radii.len(),
-            radii: filled(map.radii.iter().copied()),
-            play_weights: filled(map.play_weights.iter().copied()),
+            radii: rounded(map.radii.iter().copied()),
+            play_weights: rounded(map.play_weights.iter().copied()),
             ends: gains.ends.map(T::from_f64),
             gains: gains.of.map(|of| of.map(T::from_f64)),
             period_s: T::from_f64(period_s),
@@ -123,9 +122,11 @@ impl<T: Real> ObserverReceptor<T> {
             dead_band: T::from_f64((reference_dead_band(calibration) / gain).abs()),
             at_rest: T::zero(),
         };
-        Ok(Self { at_rest: design.signal(design.low).0, ..design })
+        Ok(Self { model: Observer { at_rest: model.forward(model.low).0, ..model } })
     }
+}
 
+impl<T: Real> Observer<T> {
     /// The drive that a signal suggests by itself, the nearest end beyond the curve.
     #[inline(always)]
     fn inverse(&self, signal: T) -> (T, T) {
@@ -144,7 +145,7 @@ impl<T: Real> ObserverReceptor<T> {
 
     /// The signal at a drive and the slope there; the curve ends where it was fitted.
     #[inline(always)]
-    fn signal(&self, drive: T) -> (T, T, T) {
+    fn forward(&self, drive: T) -> (T, T, T) {
         let most = T::from_f64((self.knots - 1) as f64);
         let place = ((drive - self.drive_low) * self.per_step).max(T::zero()).min(most);
         let below = place.to_usize().unwrap_or(0).min(self.knots - 2);
@@ -168,7 +169,7 @@ impl<T: Real> ObserverReceptor<T> {
         let x = &mut memory.states;
         x[0] = (x[0] + self.period_s * x[1]).max(self.low).min(self.high);
         for i in 0..self.relaxations {
-            x[2 + i] = x[2 + i] + self.shares[i] * (x[0] - x[2 + i]);
+            x[2 + i] = lag(x[2 + i], x[0], self.shares[i]);
         }
     }
 
@@ -192,14 +193,14 @@ impl<T: Real> ObserverReceptor<T> {
         if memory.states[0].is_nan() {
             return T::zero();
         }
-        self.signal(self.drive_at(memory, self.low)).0 - self.at_rest
+        self.forward(self.drive_at(memory, self.low)).0 - self.at_rest
     }
 
     /// Takes in a signed signal above its baseline; whether it lay on the curve.
     #[inline(always)]
     fn correct(&self, memory: &mut ObserverMemory<T>, signal: T) -> bool {
         let drive = self.drive_at(memory, memory.states[0]) + self.lead_s * memory.states[1];
-        let (predicted, tangent, from) = self.signal(drive);
+        let (predicted, tangent, from) = self.forward(drive);
         let (to, held) = self.inverse(signal);
         let run = to - from;
         // over a hair's breadth rounding alone would decide the secant
@@ -245,47 +246,40 @@ impl<T: Real> ObserverReceptor<T> {
             memory.plays[j] = play(memory.plays[j], memory.states[0], self.radii[j]);
         }
     }
-
-    #[cold]
-    fn missed(&self, memory: &mut ObserverMemory<T>) {
-        memory.missing = memory.missing.saturating_add(1);
-        if memory.missing <= MAX_BRIDGED && !memory.states[0].is_nan() {
-            self.predict(memory);
-            self.hold(memory);
-        } else {
-            let (branch, baseline) = (memory.branch, memory.baseline);
-            *memory = ObserverMemory { branch, baseline, missing: MAX_BRIDGED, ..self.memory() };
-        }
-    }
 }
 
-impl<T: Real> Design for ObserverReceptor<T> {
+impl<T: Real> Design for Observer<T> {
     type Memory = ObserverMemory<T>;
 
     fn memory(&self) -> ObserverMemory<T> {
         ObserverMemory {
             states: [T::nan(); STATES],
             plays: [T::zero(); MAX_OBSERVER_PLAYS],
-            baseline: Baseline::unmoved(),
-            branch: Branch::Inflation,
-            missing: 0,
+            baseline: self.rest.memory(),
         }
     }
 }
 
-impl<T: Real> Stage<Volts<T>> for ObserverReceptor<T> {
-    type Out = Result<Reading<T>, Withheld>;
+impl<T: Real> Live for Observer<T> {
+    type Sample = Volts<T>;
+    type Signal = T;
+    type Side = Branch;
+    type Reading = Reading<T>;
 
     #[inline(always)]
-    fn step(&self, memory: &mut ObserverMemory<T>, sample: Volts<T>) -> Self::Out {
-        let usable = sample.0.abs() <= T::from_f64(LARGEST_SAMPLE);
-        if !usable {
-            self.missed(memory);
-            return Err(Withheld::Missing);
-        }
-        memory.missing = 0;
+    fn signal(&self, sample: Volts<T>) -> Option<T> {
+        usable(sample.0)
+    }
+
+    #[inline(always)]
+    fn read(
+        &self,
+        memory: &mut ObserverMemory<T>,
+        branch: &mut Branch,
+        signal: T,
+    ) -> Option<Reading<T>> {
         let shift = if self.rest.follows() { self.rest_shift(memory) } else { T::zero() };
-        let signal = self.rest.step(&mut memory.baseline, self.sign * sample.0, shift);
+        let signal = self.rest.step(&mut memory.baseline, self.sign * signal, shift);
         if memory.states[0].is_nan() {
             self.begin(memory, signal);
         } else {
@@ -293,20 +287,26 @@ impl<T: Real> Stage<Volts<T>> for ObserverReceptor<T> {
         }
         let on_curve = self.correct(memory, signal);
         let [target, rate, ..] = memory.states;
-        memory.branch = memory.branch.next(rate, self.dead_band);
-        Ok(Reading {
+        *branch = branch.next(rate, self.dead_band);
+        Some(Reading {
             estimate: self.zero + self.gain * target,
             rate: self.gain * rate,
-            branch: memory.branch,
+            branch: *branch,
             domain: Domain::from_flags(!on_curve, false),
         })
     }
-}
 
-fn filled<T: Real, const N: usize>(values: impl Iterator<Item = f64>) -> [T; N] {
-    let mut out = [T::zero(); N];
-    for (place, value) in out.iter_mut().zip(values) {
-        *place = T::from_f64(value);
+    /// By the motion that it predicts.
+    fn bridge(&self, memory: &mut ObserverMemory<T>, _: u8) -> bool {
+        let begun = !memory.states[0].is_nan();
+        if begun {
+            self.predict(memory);
+            self.hold(memory);
+        }
+        begun
     }
-    out
+
+    fn forget(&self, memory: &mut ObserverMemory<T>) {
+        *memory = ObserverMemory { baseline: memory.baseline, ..self.memory() };
+    }
 }

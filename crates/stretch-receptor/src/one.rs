@@ -1,10 +1,16 @@
 //! A receptor for whatever model a calibration holds.
 
-use stretch_core::{Calibration, Design, Model, Real, Stage, Volts};
+use stretch_core::{Branch, Calibration, Design, Model, Real, Stage, Volts};
 use stretch_filter::{FilterError, RateFilter};
 
 use crate::{
-    BlendedReceptor, HistoryReceptor, ObserverReceptor, Reading, StretchReceptor, Withheld,
+    BlendedReceptor, Front, HistoryReceptor, ObserverReceptor, Reading, StretchReceptor,
+    across::{Jump, Mixed},
+    fold::estimator,
+    front::{Live, usable},
+    history::{History, HistoryMemory},
+    observer::{Observer, ObserverMemory},
+    receptor::{Surfaces, SurfacesMemory},
 };
 
 /// A receptor for any calibration, chosen at run time by its model.
@@ -20,30 +26,32 @@ use crate::{
 /// assert!(last?.length().0 > 150.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+pub type Receptor<T, R = RateFilter<T>> = Front<AnyModel<T, R>>;
+
+/// The model of a [`Receptor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(clippy::large_enum_variant)] // no allocator to box with; one lives in a program
-#[non_exhaustive]
-pub enum Receptor<T, R = RateFilter<T>> {
-    /// A line or two surfaces.
-    Stretch(StretchReceptor<T, R>),
-    /// Two surfaces, mixed.
-    Blended(BlendedReceptor<T, R>),
-    /// The signal's history.
-    History(HistoryReceptor<T, R>),
-    /// A forward model and a filter.
-    Observer(ObserverReceptor<T>),
+pub enum AnyModel<T, R> {
+    /// Of a [`StretchReceptor`].
+    Surfaces(Surfaces<T, R, Jump>),
+    /// Of a [`BlendedReceptor`].
+    Blended(Surfaces<T, R, Mixed<T>>),
+    /// Of a [`HistoryReceptor`].
+    History(History<T, R>),
+    /// Of an [`ObserverReceptor`].
+    Observer(Observer<T>),
 }
 
-/// What a [`Receptor`] remembers: a memory of its own kind.
+/// What a [`Receptor`]'s model remembers: a memory of its own kind.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(clippy::large_enum_variant)] // no allocator to box with; one lives in a program
-pub enum StoredMemory<S, H, O> {
-    /// Of [`StretchReceptor`] or [`BlendedReceptor`].
-    Stretch(S),
-    /// Of [`HistoryReceptor`].
-    History(H),
-    /// Of [`ObserverReceptor`].
-    Observer(O),
+pub enum AnyMemory<T, M> {
+    /// Of a [`StretchReceptor`] or a [`BlendedReceptor`].
+    Surfaces(SurfacesMemory<T, M>),
+    /// Of a [`HistoryReceptor`].
+    History(HistoryMemory<T, M>),
+    /// Of an [`ObserverReceptor`].
+    Observer(ObserverMemory<T>),
 }
 
 impl<T: Real> Receptor<T> {
@@ -53,11 +61,10 @@ impl<T: Real> Receptor<T> {
     /// [`FilterError`] when the estimator cannot run live or cannot be designed,
     /// or a coefficient leaves the range of `T`.
     pub fn new(calibration: &Calibration) -> Result<Self, FilterError> {
-        let rate = || RateFilter::new(calibration.rate_estimator, calibration.sample_rate_hz);
         match &calibration.model {
             // its rate is a state: it needs no estimator, and none that could run live
-            Model::Observer(_) => Ok(Self::Observer(ObserverReceptor::new(calibration)?)),
-            _ => Self::with_rate(calibration, rate()?),
+            Model::Observer(_) => Self::observer(calibration),
+            _ => Self::with_rate(calibration, estimator(calibration)?),
         }
     }
 }
@@ -68,56 +75,81 @@ impl<T: Real, R> Receptor<T, R> {
     /// # Errors
     /// [`FilterError`] when a coefficient leaves the range of `T`.
     pub fn with_rate(calibration: &Calibration, rate: R) -> Result<Self, FilterError> {
-        Ok(match &calibration.model {
-            Model::Blended { .. } => Self::Blended(BlendedReceptor::with_rate(calibration, rate)?),
-            Model::History(_) => Self::History(HistoryReceptor::with_rate(calibration, rate)?),
-            Model::Observer(_) => Self::Observer(ObserverReceptor::new(calibration)?),
-            _ => Self::Stretch(StretchReceptor::with_rate(calibration, rate)?),
-        })
+        let model = match &calibration.model {
+            Model::Blended { .. } => {
+                AnyModel::Blended(BlendedReceptor::with_rate(calibration, rate)?.model)
+            }
+            Model::History(_) => {
+                AnyModel::History(HistoryReceptor::with_rate(calibration, rate)?.model)
+            }
+            Model::Observer(_) => return Self::observer(calibration),
+            _ => AnyModel::Surfaces(StretchReceptor::with_rate(calibration, rate)?.model),
+        };
+        Ok(Self { model })
+    }
+
+    fn observer(calibration: &Calibration) -> Result<Self, FilterError> {
+        Ok(Self { model: AnyModel::Observer(ObserverReceptor::new(calibration)?.model) })
     }
 }
 
-impl<T: Real, R: Design> Design for Receptor<T, R> {
-    type Memory = StoredMemory<
-        <StretchReceptor<T, R> as Design>::Memory,
-        <HistoryReceptor<T, R> as Design>::Memory,
-        <ObserverReceptor<T> as Design>::Memory,
-    >;
+/// Does the same with the model and the memory of its kind, else with neither.
+macro_rules! with_its_own {
+    ($model:expr, $memory:expr, |$own:ident, $its:ident| $answer:expr, $else:expr) => {
+        match ($model, $memory) {
+            (AnyModel::Surfaces($own), AnyMemory::Surfaces($its)) => $answer,
+            (AnyModel::Blended($own), AnyMemory::Surfaces($its)) => $answer,
+            (AnyModel::History($own), AnyMemory::History($its)) => $answer,
+            (AnyModel::Observer($own), AnyMemory::Observer($its)) => $answer,
+            // a memory of another model's receptor
+            _ => $else,
+        }
+    };
+}
+
+impl<T: Real, R: Design> Design for AnyModel<T, R> {
+    type Memory = AnyMemory<T, R::Memory>;
 
     fn memory(&self) -> Self::Memory {
         match self {
-            Self::Stretch(receptor) => StoredMemory::Stretch(receptor.memory()),
-            Self::Blended(receptor) => StoredMemory::Stretch(receptor.memory()),
-            Self::History(receptor) => StoredMemory::History(receptor.memory()),
-            Self::Observer(receptor) => StoredMemory::Observer(receptor.memory()),
+            Self::Surfaces(model) => AnyMemory::Surfaces(model.memory()),
+            Self::Blended(model) => AnyMemory::Surfaces(model.memory()),
+            Self::History(model) => AnyMemory::History(model.memory()),
+            Self::Observer(model) => AnyMemory::Observer(model.memory()),
         }
     }
 }
 
-impl<T: Real, R: Stage<T, Out = Option<T>>> Stage<Volts<T>> for Receptor<T, R> {
-    type Out = Result<Reading<T>, Withheld>;
+impl<T: Real, R: Stage<T, Out = Option<T>>> Live for AnyModel<T, R> {
+    type Sample = Volts<T>;
+    type Signal = T;
+    type Side = Branch;
+    type Reading = Reading<T>;
 
-    /// Takes the next sample. A memory of another model's receptor is replaced
-    /// by a fresh one.
+    #[inline(always)]
+    fn signal(&self, sample: Volts<T>) -> Option<T> {
+        usable(sample.0)
+    }
+
+    /// A memory of another model's receptor is replaced by a fresh one.
     #[inline]
-    fn step(&self, memory: &mut Self::Memory, sample: Volts<T>) -> Self::Out {
-        match (self, memory) {
-            (Self::Stretch(receptor), StoredMemory::Stretch(memory)) => {
-                receptor.step(memory, sample)
-            }
-            (Self::Blended(receptor), StoredMemory::Stretch(memory)) => {
-                receptor.step(memory, sample)
-            }
-            (Self::History(receptor), StoredMemory::History(memory)) => {
-                receptor.step(memory, sample)
-            }
-            (Self::Observer(receptor), StoredMemory::Observer(memory)) => {
-                receptor.step(memory, sample)
-            }
-            (_, memory) => {
-                *memory = self.memory();
-                Err(Withheld::Warming)
-            }
-        }
+    fn read(
+        &self,
+        memory: &mut Self::Memory,
+        branch: &mut Branch,
+        signal: T,
+    ) -> Option<Reading<T>> {
+        with_its_own!(self, &mut *memory, |model, its| model.read(its, branch, signal), {
+            *memory = self.memory();
+            None
+        })
+    }
+
+    fn bridge(&self, memory: &mut Self::Memory, nth: u8) -> bool {
+        with_its_own!(self, memory, |model, its| model.bridge(its, nth), false)
+    }
+
+    fn forget(&self, memory: &mut Self::Memory) {
+        with_its_own!(self, &mut *memory, |model, its| model.forget(its), *memory = self.memory());
     }
 }

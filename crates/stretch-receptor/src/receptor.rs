@@ -1,16 +1,18 @@
-//! The live pipeline: signal in, reading out, one sample at a time.
+//! Lines and surfaces, live: signal in, reading out, one sample at a time.
 
-use stretch_core::{Branch, Calibration, Design, DesignError, Polarity, Real, Stage, Volts};
-use stretch_filter::{FilterError, LARGEST_SAMPLE, RateFilter};
+use stretch_core::{Branch, Calibration, Design, DesignError, Real, Stage, Volts};
+use stretch_filter::{FilterError, RateFilter};
 
-use crate::{Reading, Withheld, map::Map};
+use crate::{
+    Front, Reading,
+    across::{Across, Jump, Mixed},
+    fold::estimator,
+    front::{Direction, Live, usable},
+    map::{Map, Point},
+};
 
-/// Missing samples in a row that are bridged by prediction; one more starts the
-/// warm-up again.
-pub const MAX_BRIDGED: u8 = 3;
-
-/// A stretch receptor: a calibration, folded, with the rate estimator it was
-/// fitted for.
+/// A stretch receptor: a line or two surfaces, folded, with the rate estimator they
+/// were fitted for.
 ///
 /// A sample every period, in volts (or the unit of the calibration's signal):
 /// 1. the rate of the signal, by the estimator `R`;
@@ -21,15 +23,11 @@ pub const MAX_BRIDGED: u8 = 3;
 ///    dependence on the rate is left out of that derivative: it would need the
 ///    second derivative of a noisy signal).
 ///
-/// **Warm-up.** Until the estimator answers there is no reading:
-/// [`Withheld::Warming`]. The branch before the first movement is
-/// [`Branch::Inflation`] unless [`ReceptorMemory::starting_on`] says otherwise.
+/// [`BlendedReceptor`] is the same without the jump at a reversal.
 ///
-/// **Missing samples.** Step a NaN (or any value that is not finite, or beyond
-/// [`LARGEST_SAMPLE`]) for a sample that did not come: it is answered with [`Withheld::Missing`] and never enters
-/// the memory. Up to [`MAX_BRIDGED`] in a row the estimator is fed the last
-/// sample moved on by the last rate, so that one lost sample costs one reading
-/// and not a warm-up. One more forgets the window; the branch is kept.
+/// **Missing samples, warm-up, branch**: see [`Front`]. A short gap is bridged by
+/// the last sample moved on by the last rate, so that one lost sample costs one
+/// reading and not a warm-up.
 ///
 /// **Reset**: a fresh [`Design::memory`], which a
 /// [`Runner`](stretch_core::Runner) does in `reset`.
@@ -53,82 +51,35 @@ pub const MAX_BRIDGED: u8 = 3;
 /// ```
 ///
 /// Source: paper sections 2.5 and 3.4. Cost: see the crate's front page.
+pub type StretchReceptor<T, R = RateFilter<T>> = Front<Surfaces<T, R, Jump>>;
+
+/// A [`StretchReceptor`] for [`Model::Blended`](stretch_core::Model::Blended): inside
+/// the dead band it answers with both surfaces, weighed by the rate, so that there is
+/// no jump at a reversal. With `r` the signed rate and `d` the dead band, the
+/// inflation surface weighs `(1 + r/d)/2`, held to 0..1.
+///
+/// Cost: outside the dead band one surface, inside it two.
+pub type BlendedReceptor<T, R = RateFilter<T>> = Front<Surfaces<T, R, Mixed<T>>>;
+
+/// The model of a [`StretchReceptor`]; `A` says what happens across the dead band.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StretchReceptor<T, R = RateFilter<T>> {
+pub struct Surfaces<T, R, A> {
     rate: R,
     map: Map<T>,
-    /// A rate of the signal above it means the first branch, below `-dead_band` the other.
-    dead_band: T,
-    rising: Branch,
+    direction: Direction<T>,
+    across: A,
     period_s: T,
 }
 
-/// What a [`StretchReceptor`] remembers: the estimator's memory, the branch and
-/// the last sample.
+/// What a [`StretchReceptor`]'s model remembers: the estimator's memory and the last sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ReceptorMemory<T, M> {
+pub struct SurfacesMemory<T, M> {
     rate: M,
-    branch: Branch,
     last: T,
     last_rate: T,
-    missing: u8,
 }
 
-impl<T, M> ReceptorMemory<T, M> {
-    /// The same memory, on another branch: for a stream known to begin contracted.
-    #[must_use]
-    pub fn starting_on(self, branch: Branch) -> Self {
-        Self { branch, ..self }
-    }
-
-    /// The branch that the next sample begins on.
-    pub fn branch(&self) -> Branch {
-        self.branch
-    }
-
-    pub(crate) fn set_branch(&mut self, branch: Branch) {
-        self.branch = branch;
-    }
-}
-
-impl<T: Real, M> ReceptorMemory<T, M> {
-    pub(crate) fn unseen(rate: M) -> Self {
-        let (last, last_rate) = (T::nan(), T::zero());
-        Self { rate, branch: Branch::Inflation, last, last_rate, missing: 0 }
-    }
-
-    /// A usable sample: its rate, once there is one.
-    #[inline(always)]
-    pub(crate) fn take<R>(&mut self, estimator: &R, signal: T) -> Option<T>
-    where
-        R: Stage<T, Out = Option<T>, Memory = M>,
-    {
-        self.missing = 0;
-        self.last = signal;
-        let rate = estimator.step(&mut self.rate, signal)?;
-        self.last_rate = rate;
-        Some(rate)
-    }
-
-    /// A missing sample: bridge a short gap, forget the window after a long one.
-    #[cold]
-    pub(crate) fn miss<R>(&mut self, estimator: &R, period_s: T, most: u8)
-    where
-        R: Stage<T, Out = Option<T>, Memory = M>,
-    {
-        self.missing = self.missing.saturating_add(1);
-        let bridged = self.last + self.last_rate * period_s;
-        if self.missing <= most && bridged.is_finite() {
-            self.last = bridged;
-            // only the window matters here: nothing is answered for this sample
-            let _ = estimator.step(&mut self.rate, bridged);
-        } else {
-            *self = Self { branch: self.branch, missing: most, ..Self::unseen(estimator.memory()) };
-        }
-    }
-}
-
-impl<T: Real> StretchReceptor<T> {
+impl<T: Real, A: Across<T>> Front<Surfaces<T, RateFilter<T>, A>> {
     /// A receptor for `calibration`, with the rate estimator that it names.
     ///
     /// The estimator's shape is a run-time value here; where it is known to the
@@ -137,14 +88,13 @@ impl<T: Real> StretchReceptor<T> {
     ///
     /// # Errors
     /// [`FilterError`] when the estimator cannot run live or cannot be designed,
-    /// or a coefficient leaves the range of `T`.
+    /// the calibration is of another model, or a coefficient leaves the range of `T`.
     pub fn new(calibration: &Calibration) -> Result<Self, FilterError> {
-        let rate = RateFilter::new(calibration.rate_estimator, calibration.sample_rate_hz)?;
-        Ok(Self::with_rate(calibration, rate)?)
+        Ok(Self::with_rate(calibration, estimator(calibration)?)?)
     }
 }
 
-impl<T: Real, R> StretchReceptor<T, R> {
+impl<T: Real, R, A: Across<T>> Front<Surfaces<T, R, A>> {
     /// A receptor for `calibration`, with a rate estimator built for it.
     ///
     /// `rate` must be the estimator that [`CalibrationSpec::rate_estimator`]
@@ -154,72 +104,69 @@ impl<T: Real, R> StretchReceptor<T, R> {
     /// [`CalibrationSpec::rate_estimator`]: stretch_core::CalibrationSpec::rate_estimator
     ///
     /// # Errors
-    /// [`DesignError`] when a coefficient leaves the range of `T`.
+    /// [`DesignError`] when the calibration is of another model or a coefficient
+    /// leaves the range of `T`.
     pub fn with_rate(calibration: &Calibration, rate: R) -> Result<Self, DesignError> {
-        Ok(Self {
+        let direction = Direction::of_signal(calibration.polarity, calibration.dead_band);
+        let model = Surfaces {
             rate,
-            map: Map::new(calibration)?,
-            dead_band: T::from_f64(calibration.dead_band),
-            rising: match calibration.polarity {
-                Polarity::Rising => Branch::Inflation,
-                Polarity::Falling => Branch::Deflation,
-            },
+            map: A::map(calibration)?,
+            direction,
+            across: A::new(direction),
             period_s: T::from_f64(calibration.sample_rate_hz.period_s()),
-        })
+        };
+        Ok(Self { model })
     }
 
     /// The rate estimator.
     pub fn rate_design(&self) -> &R {
-        &self.rate
-    }
-
-    /// The branch that a rate of the signal chooses.
-    #[inline(always)]
-    fn branch(&self, current: Branch, rate: T) -> Branch {
-        let falling = match self.rising {
-            Branch::Inflation => Branch::Deflation,
-            Branch::Deflation => Branch::Inflation,
-        };
-        if rate > self.dead_band {
-            self.rising
-        } else if rate < -self.dead_band {
-            falling
-        } else {
-            current
-        }
+        &self.model.rate
     }
 }
 
-impl<T: Real, R: Design> Design for StretchReceptor<T, R> {
-    type Memory = ReceptorMemory<T, R::Memory>;
+impl<T: Real, R: Design, A> Design for Surfaces<T, R, A> {
+    type Memory = SurfacesMemory<T, R::Memory>;
 
     fn memory(&self) -> Self::Memory {
-        ReceptorMemory::unseen(self.rate.memory())
+        SurfacesMemory { rate: self.rate.memory(), last: T::nan(), last_rate: T::zero() }
     }
 }
 
-impl<T: Real, R: Stage<T, Out = Option<T>>> Stage<Volts<T>> for StretchReceptor<T, R> {
-    type Out = Result<Reading<T>, Withheld>;
+impl<T: Real, R: Stage<T, Out = Option<T>>, A: Across<T>> Live for Surfaces<T, R, A> {
+    type Sample = Volts<T>;
+    type Signal = T;
+    type Side = Branch;
+    type Reading = Reading<T>;
 
     #[inline(always)]
-    fn step(&self, memory: &mut Self::Memory, sample: Volts<T>) -> Self::Out {
-        let signal = sample.0;
-        // one comparison, false for NaN as well
-        let usable = signal.abs() <= T::from_f64(LARGEST_SAMPLE);
-        if !usable {
-            memory.miss(&self.rate, self.period_s, MAX_BRIDGED);
-            return Err(Withheld::Missing);
+    fn signal(&self, sample: Volts<T>) -> Option<T> {
+        usable(sample.0)
+    }
+
+    #[inline(always)]
+    fn read(
+        &self,
+        memory: &mut Self::Memory,
+        branch: &mut Branch,
+        signal: T,
+    ) -> Option<Reading<T>> {
+        memory.last = signal;
+        let rate = self.rate.step(&mut memory.rate, signal)?;
+        memory.last_rate = rate;
+        *branch = self.direction.next(*branch, rate);
+        let point = self.across.point(&self.map, self.direction, *branch, rate, signal);
+        let Point { estimate, slope, domain } = point;
+        Some(Reading { estimate, rate: slope * rate, branch: *branch, domain })
+    }
+
+    /// By the last sample, moved on by the last rate.
+    fn bridge(&self, memory: &mut Self::Memory, _: u8) -> bool {
+        let bridged = memory.last + memory.last_rate * self.period_s;
+        if bridged.is_finite() {
+            memory.last = bridged;
+            // only the window matters here: nothing is answered for this sample
+            let _ = self.rate.step(&mut memory.rate, bridged);
         }
-        let Some(rate) = memory.take(&self.rate, signal) else {
-            return Err(Withheld::Warming);
-        };
-        memory.branch = self.branch(memory.branch, rate);
-        let point = self.map.at(memory.branch, rate, signal);
-        Ok(Reading {
-            estimate: point.estimate,
-            rate: point.slope * rate,
-            branch: memory.branch,
-            domain: point.domain,
-        })
+        bridged.is_finite()
     }
 }

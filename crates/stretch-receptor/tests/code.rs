@@ -337,7 +337,7 @@ fn what_cannot_run_is_refused_by_name() {
         FixedCalibration::<11, 2>::new(&calibration, &due()).unwrap_err().to_string()
     };
     let tracker = RateEstimator::Tracker { tracking_index: 0.1 };
-    assert!(message(&|spec| spec.rate_estimator = tracker).contains("rate.estimator"));
+    assert!(message(&|spec| spec.rate_estimator = tracker).contains("rate estimator is a tracker"));
     let longer = RateEstimator::SavitzkyGolay { window: 13, degree: 2, delay: 0 };
     assert!(message(&|spec| spec.rate_estimator = longer).contains("rate.window is 13"));
     // metres instead of millimetres: a thousandth is then a millimetre

@@ -3,11 +3,12 @@
 
 use proptest::prelude::*;
 use stretch_core::{
-    Calibration, CalibrationSpec, FitSummary, HistoryMap, HistoryShape, Interval, Model,
-    ObserverMap, RestTracker, Runner, Values, Volts,
+    Calibration, CalibrationSpec, DesignError, FitSummary, HistoryMap, HistoryShape, Interval,
+    Model, ObserverMap, RateEstimator, RestTracker, Runner, Values, Volts, play,
 };
 use stretch_receptor::{
     BlendedReceptor, HistoryReceptor, ObserverReceptor, Receptor, StretchReceptor, Withheld,
+    code::{Adc, AdcSpec, FixedCalibration, FixedObserver},
     example_calibration, strategies,
 };
 
@@ -168,13 +169,13 @@ proptest! {
         let share = -(-0.01f64 / 0.25).exp_m1();
         let omega = core::f64::consts::TAU * turns;
         let target = |n: usize| 0.5 - 0.4 * (omega * n as f64 * 0.01).cos();
-        let (mut slow, mut play) = (target(0), target(0));
+        let (mut slow, mut played) = (target(0), target(0));
         for n in 0..1500 {
             let y = target(n);
             let rate = 0.4 * omega * (omega * n as f64 * 0.01).sin();
             slow += share * (y - slow);
-            play = play.max(y - 0.05).min(y + 0.05);
-            let drive = y + 0.01 * rate + amplitude * (y - slow) - 0.1 * (y - play);
+            played = play(played, y, 0.05);
+            let drive = y + 0.01 * rate + amplitude * (y - slow) - 0.1 * (y - played);
             let place = ((drive + 0.1) / 1.3 * 12.0).clamp(0.0, 11.999);
             let below = place as usize;
             let volts = map.curve[below] + (place - below as f64) * (map.curve[below + 1] - map.curve[below]);
@@ -207,12 +208,29 @@ fn one_lost_sample_costs_one_reading_and_a_long_gap_a_warm_up() {
 }
 
 #[test]
-fn a_model_needs_its_own_receptor() {
-    let calibration = observer(None, 0.3);
-    assert!(StretchReceptor::<f64>::new(&calibration).is_err());
-    assert!(HistoryReceptor::<f64>::new(&calibration).is_err());
-    assert!(BlendedReceptor::<f64>::new(&calibration).is_err());
-    assert!(ObserverReceptor::<f64>::new(&example_calibration()).is_err());
+fn a_model_needs_its_own_receptor_and_hears_so() {
+    let mismatch = |expected, found| DesignError::Mismatch { field: "model", expected, found };
+    let (remembers, surfaces) = (observer(None, 0.3), example_calibration());
+    let refused = StretchReceptor::<f64>::new(&remembers).unwrap_err();
+    assert_eq!(refused, mismatch("linear or surfaces", "observer").into());
+    let refused = BlendedReceptor::<f64>::new(&surfaces).unwrap_err();
+    assert_eq!(refused, mismatch("blended", "surfaces").into());
+    let refused = HistoryReceptor::<f64>::new(&remembers).unwrap_err();
+    assert_eq!(refused, mismatch("history", "observer").into());
+    let refused = ObserverReceptor::<f64>::new(&surfaces).unwrap_err();
+    assert_eq!(refused, mismatch("observer", "surfaces"));
+    let adc = Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 }).unwrap();
+    let refused = FixedObserver::new(&surfaces, &adc).unwrap_err();
+    assert_eq!(refused, mismatch("observer", "surfaces"));
+    let refused = FixedCalibration::<11, 2>::new(&blended(), &adc).unwrap_err();
+    assert_eq!(refused, mismatch("linear or surfaces", "blended"));
+    let tracked = RateEstimator::Tracker { tracking_index: 0.1 };
+    let spec = CalibrationSpec { rate_estimator: tracked, ..surfaces.into_spec() };
+    let refused = FixedCalibration::<11, 2>::new(&Calibration::new(spec).unwrap(), &adc);
+    assert_eq!(
+        refused.unwrap_err().to_string(),
+        "the calibration's rate estimator is a tracker, but this takes Savitzky-Golay"
+    );
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! A straight line in fixed point.
 
-use super::{Accumulator, check_horner, from_f64};
+use super::{accumulator::Accumulator, convert::from_f64, horner::check_horner};
 use crate::DesignError;
 
 /// A line over an input in -1/2..1/2, for any `i32`: `intercept + slope v`.

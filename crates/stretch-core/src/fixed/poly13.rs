@@ -1,6 +1,6 @@
 //! The paper's surface in fixed point.
 
-use super::{Accumulator, check_horner, from_f64};
+use super::{accumulator::Accumulator, convert::from_f64, horner::check_horner};
 use crate::{DesignError, Poly13};
 
 /// A [`Poly13`] over inputs in -1/2..1/2, for any two `i32`.

@@ -1,6 +1,6 @@
 //! Normalisation in fixed point.
 
-use super::{from_f64, saturate};
+use super::convert::{from_f64, saturate};
 use crate::{DesignError, Range};
 
 /// What one step of a channel's integer means, in the channel's unit.

@@ -1,6 +1,6 @@
 //! The paper's differentiator.
 
-use super::check_samples;
+use super::check::check_samples;
 use crate::{FilterError, sample};
 use stretch_core::{Real, SampleRate};
 

@@ -1,6 +1,6 @@
 //! Local least squares at the actual times.
 
-use super::check_times;
+use super::check::check_times;
 use crate::gram::Basis;
 use crate::{FilterError, MAX_SG_DEGREE};
 use stretch_core::{DesignError, Real, Seconds};

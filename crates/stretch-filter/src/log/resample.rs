@@ -1,6 +1,6 @@
 //! From uneven times to an even grid.
 
-use super::check_times;
+use super::check::check_times;
 use crate::FilterError;
 use stretch_core::{DesignError, Real, SampleRate, Seconds};
 

@@ -1,16 +1,16 @@
 //! A calibration converted for a converter's codes.
 
-use stretch_core::{
-    Calibration, DesignError, Polarity, RateEstimator, SampleRate, fixed::FixedLine,
-    fixed::FixedPoly13,
-};
+use stretch_core::{Calibration, DesignError, Polarity, RateEstimator, SampleRate};
 use stretch_filter::FixedSgRate;
 
 use super::{
-    Adc, CodeArithmetic, Fixed,
-    fold::{self, Units},
-    sheet::{COARSE_BITS, Sheets},
+    adc::Adc,
+    arithmetic::CodeArithmetic,
+    fixed_arithmetic::{Fixed, worst_case},
+    fold::{Units, fold},
+    sheet::Sheets,
 };
+use crate::fold::output;
 
 /// The schema of the records that this release writes, and the newest it reads.
 pub const CODE_SCHEMA: u32 = 1;
@@ -74,8 +74,8 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
             FixedSgRate::<u16, WINDOW, DEGREE, DELAY>::LARGEST,
         );
         let dead_band = libm::floor(calibration.dead_band / units.rate_v_per_s);
-        let sheets = A::round(&fold::fold(calibration, &units)?)?;
-        let (gain, _) = fold::output(calibration);
+        let sheets = A::round(&fold(calibration, &units)?)?;
+        let (gain, _) = output(calibration);
         if let Some(error) = A::worst_case(&sheets, Self::rate_rounding()) {
             DesignError::check("fixed.error", error, error <= 1e-4 * 1000.0 * gain.abs())?;
         }
@@ -101,7 +101,8 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
 
     fn check_estimator(estimator: RateEstimator) -> Result<(), DesignError> {
         let RateEstimator::SavitzkyGolay { window, degree, delay } = estimator else {
-            return Err(DesignError::OutOfRange { field: "rate.estimator", value: f64::NAN });
+            let (field, expected) = ("rate estimator", "Savitzky-Golay");
+            return Err(DesignError::Mismatch { field, expected, found: estimator.name() });
         };
         Self::check_shape((window, degree, delay))
     }
@@ -139,40 +140,3 @@ impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
         worst_case(&self.sheets, Self::rate_rounding())
     }
 }
-
-pub(super) fn worst_case(
-    sheets: &Sheets<super::arithmetic::Scaled<FixedLine>, super::arithmetic::Scaled<FixedPoly13>>,
-    rate_rounding: f64,
-) -> f64 {
-    // an end of a domain is a whole number: up to one off, and the rate's own rounding
-    let spread = |factor: i32, rounding: f64| libm::ldexp(rounding * f64::from(factor), -32);
-    let signal = |factor: i32| spread(factor, 1.0 + f64::from(1u32 << COARSE_BITS) * SIGNAL_F64);
-    let bits =
-        |error: f64, thousandths: i32| 0.5 + libm::ldexp(error * f64::from(thousandths), -32);
-    match sheets {
-        Sheets::Line(sheet) => {
-            let (_, slope) = <(i32, i32)>::from(sheet.surface.of);
-            let error = FixedLine::ROUNDING + f64::from(slope).abs() * signal(sheet.signal.factor);
-            bits(error, sheet.surface.thousandths)
-        }
-        Sheets::Poly13(both) => {
-            let each = both.map(|sheet| {
-                let p = sheet.surface.of.coefficients();
-                // the steepest that the surface can be for inputs within a half
-                let by_rate = p.p10.abs() + 0.5 * p.p11.abs() + 0.25 * p.p12.abs();
-                let by_signal = p.p01.abs()
-                    + p.p02.abs()
-                    + 0.75 * p.p03.abs()
-                    + 0.5 * (p.p11.abs() + p.p12.abs());
-                let error = FixedPoly13::ROUNDING
-                    + by_rate * spread(sheet.rate.factor, 1.0 + rate_rounding)
-                    + by_signal * signal(sheet.signal.factor);
-                bits(error, sheet.surface.thousandths)
-            });
-            each[0].max(each[1])
-        }
-    }
-}
-
-/// What `f64` may cost a sample's place in the fold, in samples.
-const SIGNAL_F64: f64 = 1e-9;

@@ -3,9 +3,10 @@
 use stretch_core::{BranchSurface, Calibration, DesignError, Interval, LinearMap, Model, Poly13};
 
 use super::{
-    Adc,
+    adc::Adc,
     sheet::{COARSE_BITS, Sheet, Sheets, Span},
 };
+use crate::fold::output;
 
 /// Reference units over inputs in -1/2..1/2: what each arithmetic rounds.
 pub(super) type Folded = Sheets<[f64; 2], Poly13>;
@@ -46,14 +47,8 @@ pub(super) fn fold(calibration: &Calibration, units: &Units) -> Result<Folded, D
             let sheet = |branch| fold_surface(calibration, branch, units);
             Ok(Sheets::Poly13([sheet(inflation)?, sheet(deflation)?]))
         }
-        _ => Err(DesignError::OutOfRange { field: "model", value: f64::NAN }),
+        other => Err(other.instead_of("linear or surfaces")),
     }
-}
-
-/// Reference units per normalised target, and the reference at a target of zero.
-pub(super) fn output(calibration: &Calibration) -> (f64, f64) {
-    let (range, target) = (calibration.target_range, calibration.target);
-    (target.reference_per_target() * range.span(), target.to_reference(range.offset()))
 }
 
 /// Centre, domain, and the volts that the spread signal counts at 1.

@@ -20,16 +20,21 @@
 mod adc;
 mod arithmetic;
 mod calibration;
+mod fixed_arithmetic;
+mod float_arithmetic;
 mod fold;
 mod observer;
 mod observer_numbers;
+mod reading;
 mod receptor;
 #[cfg(feature = "serde")]
 mod record;
 mod sheet;
 
 pub use adc::{Adc, AdcCode, AdcSpec};
-pub use arithmetic::{CodeArithmetic, Fixed};
+pub use arithmetic::CodeArithmetic;
 pub use calibration::{CODE_SCHEMA, CodeCalibration, FixedCalibration};
-pub use observer::{FixedObserver, FixedObserverMemory};
-pub use receptor::{CodeMemory, CodeReading, CodeReceptor, FixedReceptor};
+pub use fixed_arithmetic::Fixed;
+pub use observer::FixedObserver;
+pub use reading::CodeReading;
+pub use receptor::{CodeReceptor, FixedReceptor};

@@ -1,18 +1,21 @@
 //! The observer over converter codes, in integers.
 
 use stretch_core::{
-    Branch, Calibration, Design, DesignError, MAX_OBSERVER_PLAYS, MAX_OBSERVER_RELAXATIONS, Stage,
-    fixed::saturate,
+    Branch, Calibration, Design, DesignError, MAX_OBSERVER_PLAYS, MAX_OBSERVER_RELAXATIONS,
+    fixed::saturate, play,
 };
 
 use super::{
-    Adc, AdcCode, CodeReading,
+    adc::{Adc, AdcCode},
     observer_numbers::{KNOTS, Numbers, PLACE_BITS, SHARE_BITS, TARGET_BITS, WEIGHT_BITS},
+    reading::CodeReading,
 };
-use crate::{Domain, MAX_BRIDGED, Withheld, gains::SLOPES};
+use crate::{Domain, Front, front::Live, gains::SLOPES};
 
 /// The fastest rate: a whole range in a sample.
 const FASTEST: i32 = 1 << TARGET_BITS;
+/// No target: beyond every target that a record may allow.
+const UNBEGUN: i32 = i32::MIN;
 /// The furthest that a relaxation goes.
 const FURTHEST: i32 = 8 << TARGET_BITS;
 /// The furthest that a drive goes.
@@ -28,7 +31,7 @@ const LEAST_RUN: i32 = (1 << PLACE_BITS) / 100;
 /// `serde` it travels as a record of about 400 bytes. No step can overflow:
 /// numbers whose sums could are refused, states are clamped to where they can be.
 /// A code that the converter does not have is a missing sample, predicted over at
-/// most [`MAX_BRIDGED`] in a row.
+/// most [`MAX_BRIDGED`](crate::MAX_BRIDGED) in a row.
 ///
 /// ```
 /// use stretch_core::Runner;
@@ -40,8 +43,11 @@ const LEAST_RUN: i32 = (1 << PLACE_BITS) / 100;
 /// assert!((150_000..=180_000).contains(&reading.estimate)); // micrometres
 /// # Ok::<(), stretch_core::DesignError>(())
 /// ```
+pub type FixedObserver = Front<IntegerObserver>;
+
+/// The model of a [`FixedObserver`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FixedObserver {
+pub struct IntegerObserver {
     n: Numbers,
     /// Places per signal inside each segment, times `2^recip_bits`.
     recips: [i32; KNOTS],
@@ -52,9 +58,10 @@ pub struct FixedObserver {
     at_rest: i32,
 }
 
-/// What a [`FixedObserver`] remembers.
+/// What a [`FixedObserver`]'s model remembers.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FixedObserverMemory {
+pub struct IntegerMemory {
+    /// [`UNBEGUN`] before the first sample.
     target: i32,
     /// A sample, not a second.
     rate: i32,
@@ -62,9 +69,13 @@ pub struct FixedObserverMemory {
     plays: [i32; MAX_OBSERVER_PLAYS],
     baseline: i32,
     excess: i32,
-    branch: Branch,
-    begun: bool,
-    missing: u8,
+}
+
+impl IntegerMemory {
+    #[inline(always)]
+    fn begun(&self) -> bool {
+        self.target != UNBEGUN
+    }
 }
 
 impl FixedObserver {
@@ -74,9 +85,11 @@ impl FixedObserver {
     /// [`DesignError`] when the calibration is of another model or a number does
     /// not fit its format.
     pub fn new(calibration: &Calibration, adc: &Adc) -> Result<Self, DesignError> {
-        Numbers::new(calibration, adc).map(Self::of)
+        Ok(Self { model: Numbers::new(calibration, adc).map(IntegerObserver::of)? })
     }
+}
 
+impl IntegerObserver {
     fn of(n: Numbers) -> Self {
         let knots = usize::from(n.knots);
         let rise = |k: usize| n.curve[k + 1] - n.curve[k];
@@ -94,7 +107,7 @@ impl FixedObserver {
             let steeper = n.ends.iter().take_while(|&&end| rise(k) >= end).count();
             out.tangents[k] = steeper as u8;
         }
-        out.at_rest = out.signal(n.low).0;
+        out.at_rest = out.forward(n.low).0;
         out
     }
 
@@ -116,7 +129,7 @@ impl FixedObserver {
 
     /// The signal at a drive, its segment, and its place held to the curve.
     #[inline(always)]
-    fn signal(&self, drive: i32) -> (i32, usize, i32) {
+    fn forward(&self, drive: i32) -> (i32, usize, i32) {
         let last = i32::from(self.n.knots) - 1;
         let from_low = i64::from(drive.saturating_sub(self.n.drive_low));
         let place = saturate((from_low * i64::from(self.n.per_step)) >> 32);
@@ -130,7 +143,7 @@ impl FixedObserver {
 
     /// The drive of a target that stands at `y` and moves by `rate` a sample.
     #[inline(always)]
-    fn drive(&self, memory: &FixedObserverMemory, y: i32, rate: i32) -> i32 {
+    fn drive(&self, memory: &IntegerMemory, y: i32, rate: i32) -> i32 {
         let mut sum = i64::from(self.n.lead) * i64::from(rate);
         for i in 0..usize::from(self.n.relaxations).min(MAX_OBSERVER_RELAXATIONS) {
             sum += i64::from(self.n.amplitudes[i]) * i64::from(y - memory.slow[i]);
@@ -144,7 +157,7 @@ impl FixedObserver {
     }
 
     #[inline(always)]
-    fn predict(&self, memory: &mut FixedObserverMemory) {
+    fn predict(&self, memory: &mut IntegerMemory) {
         memory.target = (memory.target + memory.rate).max(self.n.low).min(self.n.high);
         for i in 0..usize::from(self.n.relaxations).min(MAX_OBSERVER_RELAXATIONS) {
             let step = part(memory.target - memory.slow[i], self.n.shares[i]);
@@ -154,9 +167,9 @@ impl FixedObserver {
 
     /// Takes in a signal above its baseline; whether it lay on the curve.
     #[inline(always)]
-    fn correct(&self, memory: &mut FixedObserverMemory, signal: i32) -> bool {
+    fn correct(&self, memory: &mut IntegerMemory, signal: i32) -> bool {
         let drive = self.drive(memory, memory.target, memory.rate);
-        let (predicted, segment, from) = self.signal(drive);
+        let (predicted, segment, from) = self.forward(drive);
         let (to, held) = self.inverse(signal);
         let mut place = usize::from(self.tangents[segment]);
         let (run, change) = ((to - from).abs(), (held - predicted).abs());
@@ -184,7 +197,7 @@ impl FixedObserver {
     }
 
     #[inline(always)]
-    fn hold(&self, memory: &mut FixedObserverMemory) {
+    fn hold(&self, memory: &mut IntegerMemory) {
         if memory.target < self.n.low {
             memory.target = self.n.low;
             memory.rate = memory.rate.max(0);
@@ -200,13 +213,13 @@ impl FixedObserver {
 
     /// The signal above the baseline, which is moved on.
     #[inline(always)]
-    fn above_rest(&self, memory: &mut FixedObserverMemory, signal: i32) -> i32 {
+    fn above_rest(&self, memory: &mut IntegerMemory, signal: i32) -> i32 {
         let rest = &self.n.rest;
         if rest.pull == 0 {
             return signal;
         }
-        let shift = if memory.begun {
-            self.signal(self.drive(memory, self.n.low, 0)).0 - self.at_rest
+        let shift = if memory.begun() {
+            self.forward(self.drive(memory, self.n.low, 0)).0 - self.at_rest
         } else {
             0
         };
@@ -220,7 +233,7 @@ impl FixedObserver {
         signal - memory.baseline
     }
 
-    fn begin(&self, memory: &mut FixedObserverMemory, signal: i32) {
+    fn begin(&self, memory: &mut IntegerMemory, signal: i32) {
         let (place, _) = self.inverse(signal);
         let drive =
             ((i64::from(place) << 32) / i64::from(self.n.per_step)) + i64::from(self.n.drive_low);
@@ -229,69 +242,72 @@ impl FixedObserver {
         memory.rate = 0;
         memory.slow = [target; MAX_OBSERVER_RELAXATIONS];
         memory.plays = [target; MAX_OBSERVER_PLAYS];
-        memory.begun = true;
-    }
-
-    #[cold]
-    fn missed(&self, memory: &mut FixedObserverMemory) {
-        memory.missing = memory.missing.saturating_add(1);
-        if memory.missing <= MAX_BRIDGED && memory.begun {
-            self.predict(memory);
-            self.hold(memory);
-        } else {
-            let FixedObserverMemory { branch, baseline, excess, .. } = *memory;
-            let missing = MAX_BRIDGED;
-            *memory = FixedObserverMemory { branch, baseline, excess, missing, ..self.memory() };
-        }
     }
 }
 
-impl Design for FixedObserver {
-    type Memory = FixedObserverMemory;
+impl Design for IntegerObserver {
+    type Memory = IntegerMemory;
 
-    fn memory(&self) -> FixedObserverMemory {
-        FixedObserverMemory {
-            target: 0,
+    fn memory(&self) -> IntegerMemory {
+        IntegerMemory {
+            target: UNBEGUN,
             rate: 0,
             slow: [0; MAX_OBSERVER_RELAXATIONS],
             plays: [0; MAX_OBSERVER_PLAYS],
             baseline: 0,
             excess: 0,
-            branch: Branch::Inflation,
-            begun: false,
-            missing: 0,
         }
     }
 }
 
-impl Stage<AdcCode> for FixedObserver {
-    type Out = Result<CodeReading<i32>, Withheld>;
+impl Live for IntegerObserver {
+    type Sample = AdcCode;
+    type Signal = i32;
+    type Side = Branch;
+    type Reading = CodeReading<i32>;
 
     #[inline(always)]
-    fn step(&self, memory: &mut FixedObserverMemory, code: AdcCode) -> Self::Out {
-        if code.0 as u32 >= self.n.codes() {
-            self.missed(memory);
-            return Err(Withheld::Missing);
-        }
-        memory.missing = 0;
-        let signal = self.above_rest(memory, self.n.signal(code));
-        if memory.begun {
+    fn signal(&self, code: AdcCode) -> Option<i32> {
+        // a negative number is a large unsigned one
+        ((code.0 as u32) < self.n.codes()).then(|| self.n.signal(code))
+    }
+
+    #[inline(always)]
+    fn read(
+        &self,
+        memory: &mut IntegerMemory,
+        branch: &mut Branch,
+        signal: i32,
+    ) -> Option<CodeReading<i32>> {
+        let signal = self.above_rest(memory, signal);
+        if memory.begun() {
             self.predict(memory);
         } else {
             self.begin(memory, signal);
         }
         let on_curve = self.correct(memory, signal);
-        if memory.rate > self.n.dead_band {
-            memory.branch = Branch::Inflation;
-        } else if memory.rate < -self.n.dead_band {
-            memory.branch = Branch::Deflation;
-        }
+        *branch = branch.next(memory.rate, self.n.dead_band);
         let scaled = self.n.zero + i64::from(self.n.gain) * i64::from(memory.target);
-        Ok(CodeReading {
+        Some(CodeReading {
             estimate: saturate(scaled >> (TARGET_BITS + u32::from(self.n.output_bits))),
-            branch: memory.branch,
+            branch: *branch,
             domain: Domain::from_flags(!on_curve, false),
         })
+    }
+
+    /// By the motion that it predicts.
+    fn bridge(&self, memory: &mut IntegerMemory, _: u8) -> bool {
+        let begun = memory.begun();
+        if begun {
+            self.predict(memory);
+            self.hold(memory);
+        }
+        begun
+    }
+
+    fn forget(&self, memory: &mut IntegerMemory) {
+        let IntegerMemory { baseline, excess, .. } = *memory;
+        *memory = IntegerMemory { baseline, excess, ..self.memory() };
     }
 }
 
@@ -301,27 +317,23 @@ fn part(x: i32, share: i32) -> i32 {
     ((i64::from(x) * i64::from(share) + (1 << (SHARE_BITS - 1))) >> SHARE_BITS) as i32
 }
 
-#[inline(always)]
-fn play(before: i32, x: i32, radius: i32) -> i32 {
-    before.max(x - radius).min(x + radius)
-}
-
 #[cfg(feature = "serde")]
 mod record {
     use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
-    use super::{FixedObserver, Numbers};
+    use super::{FixedObserver, IntegerObserver, Numbers};
 
     impl Serialize for FixedObserver {
         fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-            self.n.serialize(serializer)
+            self.model.n.serialize(serializer)
         }
     }
 
     impl<'de> Deserialize<'de> for FixedObserver {
         fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
             let numbers = Numbers::deserialize(deserializer)?;
-            numbers.check().map(Self::of).map_err(D::Error::custom)
+            let model = numbers.check().map(IntegerObserver::of).map_err(D::Error::custom)?;
+            Ok(Self { model })
         }
     }
 }

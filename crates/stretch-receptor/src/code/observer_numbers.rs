@@ -2,12 +2,12 @@
 
 use stretch_core::{
     Calibration, DesignError, MAX_OBSERVER_PLAYS, MAX_OBSERVER_RELAXATIONS, Model, RestTracker,
-    fixed,
+    fixed, lag_share,
 };
 
-use super::{Adc, AdcCode};
+use super::adc::{Adc, AdcCode};
 use crate::{
-    fold::{output, reference_dead_band, share_of},
+    fold::{output, reference_dead_band},
     gains::{Gains, SLOPES, STATES},
 };
 
@@ -28,8 +28,6 @@ const MOST_SIGNAL: i32 = 1 << 28;
 const MOST_TARGET: i32 = 4 << TARGET_BITS;
 const MOST_WEIGHT: i32 = 16 << WEIGHT_BITS;
 const MOST_LEAD: i32 = 1000 << WEIGHT_BITS;
-/// A share of the signal's range that a sample counts beyond rest at most.
-const MOST_EXCESS: f64 = 0.1;
 
 /// Everything that a [`FixedObserver`](super::FixedObserver) computes with. Signals are in
 /// `2^-SIGNAL_BITS` of a 16-bit sample, signed by polarity.
@@ -85,7 +83,7 @@ pub(super) const SCHEMA: u32 = 1;
 impl Numbers {
     pub(super) fn new(calibration: &Calibration, adc: &Adc) -> Result<Self, DesignError> {
         let Model::Observer(map) = &calibration.model else {
-            return Err(DesignError::OutOfRange { field: "model", value: f64::NAN });
+            return Err(calibration.model.instead_of("observer"));
         };
         let sign = calibration.polarity.sign();
         let period_s = calibration.sample_rate_hz.period_s();
@@ -139,8 +137,8 @@ impl Numbers {
                 level: at(rest.level)?,
                 pull: share(period_s / rest.catch_up_s)?,
                 leak: span(rest.leak * period_s)?,
-                average: share(share_of(period_s, RestTracker::AVERAGE_S))?,
-                most: span(MOST_EXCESS * calibration.signal_range.span())?,
+                average: share(lag_share(period_s, RestTracker::AVERAGE_S))?,
+                most: span(RestTracker::MOST_EXCESS * calibration.signal_range.span())?,
                 furthest: span(RestTracker::FURTHEST * calibration.signal_range.span())?,
             },
         };
@@ -153,7 +151,7 @@ impl Numbers {
             curve,
             drive_low: target(drive.min)?,
             per_step: fixed::from_f64("fixed.drive", step.recip(), place_bits)?,
-            shares: each(&map.relaxations_s, |tau| share(share_of(period_s, tau)))?,
+            shares: each(&map.relaxations_s, |tau| share(lag_share(period_s, tau)))?,
             amplitudes: each(&map.amplitudes, weight)?,
             lead: weight(map.lead_s / period_s)?,
             radii: each(&map.radii, target)?,

@@ -3,7 +3,11 @@
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 use stretch_core::{DesignError, SampleRate};
 
-use super::{CODE_SCHEMA, CodeArithmetic, CodeCalibration, sheet::Sheets};
+use super::{
+    arithmetic::CodeArithmetic,
+    calibration::{CODE_SCHEMA, CodeCalibration},
+    sheet::Sheets,
+};
 
 #[derive(Serialize, Deserialize)]
 struct Record<L, P> {

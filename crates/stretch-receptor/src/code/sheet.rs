@@ -1,5 +1,7 @@
 //! A branch's surface over integers, and the bounds of its domain.
 
+use stretch_core::DesignError;
+
 use crate::Domain;
 
 /// How many bits a converter's code is shifted up from its 16-bit place for the
@@ -104,4 +106,24 @@ pub enum Sheets<L, P> {
     Line(Sheet<L>),
     /// Inflation, deflation.
     Poly13([Sheet<P>; 2]),
+}
+
+impl<L, P> Sheets<L, P> {
+    pub(super) fn try_map<M, Q>(
+        &self,
+        line: impl Fn(&L) -> Result<M, DesignError>,
+        surface: impl Fn(&P) -> Result<Q, DesignError>,
+    ) -> Result<Sheets<M, Q>, DesignError> {
+        fn with<S, T>(sheet: &Sheet<S>, surface: T) -> Sheet<T> {
+            let Sheet { centre, signal, rate, .. } = *sheet;
+            Sheet { centre, signal, rate, surface }
+        }
+        Ok(match self {
+            Self::Line(sheet) => Sheets::Line(with(sheet, line(&sheet.surface)?)),
+            Self::Poly13([up, down]) => Sheets::Poly13([
+                with(up, surface(&up.surface)?),
+                with(down, surface(&down.surface)?),
+            ]),
+        })
+    }
 }

@@ -1,0 +1,63 @@
+//! Which way the target moves.
+
+use core::ops::Neg;
+
+/// Which way the target moves, and so which surface describes it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum Branch {
+    /// The target rises: the muscle fills and shortens, or the joint flexes.
+    #[default]
+    Inflation,
+    /// The target falls.
+    Deflation,
+}
+
+impl Branch {
+    /// The branch for a rate of the target, given the one before: it changes
+    /// only when the rate leaves the dead band (`|rate| > dead_band`). NaN holds.
+    /// Floats and integers alike.
+    ///
+    /// ```
+    /// use stretch_core::Branch;
+    /// assert_eq!(Branch::Inflation.next(-0.05, 0.1), Branch::Inflation);
+    /// assert_eq!(Branch::Inflation.next(-0.2, 0.1), Branch::Deflation);
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn next<T: Copy + PartialOrd + Neg<Output = T>>(self, rate: T, dead_band: T) -> Self {
+        if rate > dead_band {
+            Self::Inflation
+        } else if rate < -dead_band {
+            Self::Deflation
+        } else {
+            self
+        }
+    }
+
+    /// The other one.
+    ///
+    /// ```
+    /// use stretch_core::Branch;
+    /// assert_eq!(Branch::Inflation.opposite(), Branch::Deflation);
+    /// assert_eq!(Branch::Inflation.opposite().opposite(), Branch::Inflation);
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn opposite(self) -> Self {
+        match self {
+            Self::Inflation => Self::Deflation,
+            Self::Deflation => Self::Inflation,
+        }
+    }
+}
+
+impl core::fmt::Display for Branch {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.pad(match self {
+            Self::Inflation => "inflation",
+            Self::Deflation => "deflation",
+        })
+    }
+}

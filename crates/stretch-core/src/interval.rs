@@ -1,0 +1,28 @@
+//! Where inputs are valid.
+
+use crate::DesignError;
+
+/// A closed interval of valid inputs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Interval {
+    /// Lower end.
+    pub min: f64,
+    /// Upper end.
+    pub max: f64,
+}
+
+impl Interval {
+    /// Whether both ends are finite and in order; the error names `field`.
+    ///
+    /// # Errors
+    /// [`DesignError::OutOfRange`] or [`DesignError::EmptyRange`].
+    pub fn validate(self, field: &'static str) -> Result<Self, DesignError> {
+        DesignError::check(field, self.min, true)?;
+        DesignError::check(field, self.max, true)?;
+        if self.min > self.max {
+            return Err(DesignError::EmptyRange { field, min: self.min, max: self.max });
+        }
+        Ok(self)
+    }
+}

@@ -1,0 +1,146 @@
+//! Fixed point: thousandths of the reference's unit, in 32 bits.
+
+use stretch_core::{
+    DesignError, Poly13,
+    fixed::{FixedLine, FixedPoly13},
+};
+
+use super::{
+    arithmetic::{CodeArithmetic, sealed},
+    fold::Folded,
+    sheet::{COARSE_BITS, Sheets},
+};
+
+/// 32-bit fixed point; estimates are thousandths of the reference's unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fixed {}
+
+/// A fixed-point line or surface in `2^-bits` thousandths, half of one included.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Scaled<S> {
+    pub(super) of: S,
+    /// `2^(32 - bits)`: what the upper word of a product with it makes thousandths.
+    pub(super) thousandths: i32,
+}
+
+impl<S> Scaled<S> {
+    fn check(&self) -> Result<(), DesignError> {
+        let holds = self.thousandths > 0;
+        DesignError::check("fixed.thousandths", self.thousandths.into(), holds).map(|_| ())
+    }
+
+    /// Least bits to thousandths: the half is already in.
+    #[inline(always)]
+    fn finish(&self, bits: i32) -> i32 {
+        ((i64::from(bits) * i64::from(self.thousandths)) >> 32) as i32
+    }
+}
+
+/// Bits behind the thousandths: beyond these the half that rounds would cost more
+/// range than it gains precision, and with fewer it would not fit.
+const BITS: core::ops::RangeInclusive<u8> = 2..=16;
+
+impl CodeArithmetic for Fixed {}
+impl sealed::Arithmetic for Fixed {
+    type Line = Scaled<FixedLine>;
+    type Surface = Scaled<FixedPoly13>;
+    type Estimate = i32;
+
+    /// The finest thousandths in which everything fits.
+    fn round(folded: &Folded) -> Result<Sheets<Self::Line, Self::Surface>, DesignError> {
+        let mut refused = DesignError::OutOfRange { field: "fixed.bits", value: 0.0 };
+        for bits in BITS.rev() {
+            match fixed_with(folded, bits) {
+                Ok(sheets) => return Ok(sheets),
+                Err(error) => refused = error,
+            }
+        }
+        Err(refused)
+    }
+
+    fn worst_case(sheets: &Sheets<Self::Line, Self::Surface>, rate_rounding: f64) -> Option<f64> {
+        Some(worst_case(sheets, rate_rounding))
+    }
+
+    #[inline(always)]
+    fn line(line: &Self::Line, volts: i32) -> i32 {
+        line.finish(line.of.eval(volts))
+    }
+    #[inline(always)]
+    fn surface(surface: &Self::Surface, rate: i32, volts: i32) -> i32 {
+        surface.finish(surface.of.eval(rate, volts))
+    }
+    fn valid_line(line: &Self::Line) -> Result<(), DesignError> {
+        line.check()
+    }
+    fn valid_surface(surface: &Self::Surface) -> Result<(), DesignError> {
+        surface.check()
+    }
+}
+
+fn fixed_with(
+    folded: &Folded,
+    bits: u8,
+) -> Result<Sheets<Scaled<FixedLine>, Scaled<FixedPoly13>>, DesignError> {
+    let scale = 1000.0 * f64::from(1u32 << bits);
+    let half = 0.5 * f64::from(1u32 << bits);
+    let thousandths = 1 << (32 - bits);
+    folded.try_map(
+        |&[intercept, slope]| {
+            let of = FixedLine::new(intercept * scale + half, slope * scale)?;
+            Ok(Scaled { of, thousandths })
+        },
+        |p| {
+            let scaled = Poly13 {
+                p00: p.p00 * scale + half,
+                p10: p.p10 * scale,
+                p01: p.p01 * scale,
+                p11: p.p11 * scale,
+                p02: p.p02 * scale,
+                p12: p.p12 * scale,
+                p03: p.p03 * scale,
+            };
+            Ok(Scaled { of: FixedPoly13::new(&scaled)?, thousandths })
+        },
+    )
+}
+
+/// The largest error of sheets in thousandths: see
+/// [`FixedCalibration::worst_case_error_um`](super::FixedCalibration::worst_case_error_um).
+pub(super) fn worst_case(
+    sheets: &Sheets<Scaled<FixedLine>, Scaled<FixedPoly13>>,
+    rate_rounding: f64,
+) -> f64 {
+    // an end of a domain is a whole number: up to one off, and the rate's own rounding
+    let spread = |factor: i32, rounding: f64| libm::ldexp(rounding * f64::from(factor), -32);
+    let signal = |factor: i32| spread(factor, 1.0 + f64::from(1u32 << COARSE_BITS) * SIGNAL_F64);
+    let bits =
+        |error: f64, thousandths: i32| 0.5 + libm::ldexp(error * f64::from(thousandths), -32);
+    match sheets {
+        Sheets::Line(sheet) => {
+            let (_, slope) = <(i32, i32)>::from(sheet.surface.of);
+            let error = FixedLine::ROUNDING + f64::from(slope).abs() * signal(sheet.signal.factor);
+            bits(error, sheet.surface.thousandths)
+        }
+        Sheets::Poly13(both) => {
+            let each = both.map(|sheet| {
+                let p = sheet.surface.of.coefficients();
+                // the steepest that the surface can be for inputs within a half
+                let by_rate = p.p10.abs() + 0.5 * p.p11.abs() + 0.25 * p.p12.abs();
+                let by_signal = p.p01.abs()
+                    + p.p02.abs()
+                    + 0.75 * p.p03.abs()
+                    + 0.5 * (p.p11.abs() + p.p12.abs());
+                let error = FixedPoly13::ROUNDING
+                    + by_rate * spread(sheet.rate.factor, 1.0 + rate_rounding)
+                    + by_signal * signal(sheet.signal.factor);
+                bits(error, sheet.surface.thousandths)
+            });
+            each[0].max(each[1])
+        }
+    }
+}
+
+/// What `f64` may cost a sample's place in the fold, in samples.
+const SIGNAL_F64: f64 = 1e-9;

@@ -1,6 +1,8 @@
 //! The `stretch` program: parse, dispatch.
 
 mod commands;
+mod goal;
+mod paper_tables;
 mod plain;
 mod report;
 mod table;

@@ -24,6 +24,9 @@ else
     cargo test --workspace --all-features --locked --lib --bins --tests --no-fail-fast
 fi
 
+[ -d "${STRETCH_DATA:-../shared/data}/knit_sleeve" ] \
+    || skip "tests on measured sessions: no knit_sleeve in ${STRETCH_DATA:-../shared/data}; STRETCH_DATA names the folder that holds it"
+
 step "examples in the documentation"
 cargo test --workspace --all-features --locked --doc
 

@@ -1,6 +1,8 @@
 //! The `stretch` program: parse, dispatch.
 
 mod commands;
+mod goal;
+mod paper_tables;
 mod plain;
 mod report;
 mod table;
@@ -23,8 +25,9 @@ use commands::{
 ///
 /// and live, a line a sample:  logger | stretch apply --calibration cal.json -
 ///
-/// No data at hand? `stretch demo` calibrates on a measured session that it
-/// brings along, tests on another, and writes a report.
+/// No data at hand? `stretch demo` simulates the paper's experiment, calibrates,
+/// judges, says why simulator and rig disagree, and writes one report;
+/// `stretch demo --data DIR` does the same on measured sessions.
 #[derive(Parser)]
 #[command(version, verbatim_doc_comment, max_term_width = 100)]
 struct Cli {

@@ -11,7 +11,6 @@ use std::{
 use serde_json::Value;
 use support::{Scratch, fails, runs, stretch};
 
-/// What a run that succeeds prints.
 /// A little noise that comes out the same everywhere.
 fn noise(i: usize) -> f64 {
     let mut z = (i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -157,7 +156,8 @@ fn records_that_cannot_be_used_are_refused_by_name() {
 
 #[test]
 fn a_measured_sleeve_gets_shares_and_no_confident_name() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/knit_sleeve/heel_curl_90_1.csv");
+    let Some(sleeve) = testkit::measured::folder("knit_sleeve") else { return };
+    let file = sleeve.join("heel_curl_90_1.csv");
     let mut command = stretch();
     command.arg("diagnose").arg(file).args(["--reference", "angle_deg", "--signal", "s2"]);
     let text = runs(&mut command);

@@ -222,26 +222,3 @@ fn ctrl_c_in_the_middle_leaves_no_partial_file() {
     assert_eq!(child.wait().unwrap().code(), Some(130));
     assert_eq!(scratch.names(), before);
 }
-
-#[test]
-fn the_demo_calibrates_on_measured_data_and_wins() {
-    let scratch = Scratch::new();
-    let out = scratch.path("demo");
-    let output = stretch().arg("demo").arg("--out").arg(&out).output().unwrap();
-    let text = stdout(&output);
-    assert!(output.status.success() && text.contains("non-linear"), "{text}");
-    let evaluation = stretch()
-        .args(["evaluate", "--json", "--calibration"])
-        .arg(out.join("linear.json"))
-        .arg("--calibration")
-        .arg(out.join("poly13.json"))
-        .arg("data/knit_sleeve/heel_curl_90_2.csv")
-        .output()
-        .unwrap();
-    let evaluation: Value = serde_json::from_slice(&evaluation.stdout).unwrap();
-    let rmse = |method: usize| evaluation["pooled"][method]["rmse"].as_f64().unwrap();
-    assert!(rmse(2) < rmse(1) && rmse(2) < rmse(0), "{evaluation}");
-    for name in ["report.html", "estimates.csv"] {
-        assert!(out.join(name).metadata().unwrap().len() > 10_000);
-    }
-}

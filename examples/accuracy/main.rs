@@ -8,6 +8,9 @@
 //! Seeds are those of nobody's choosing until `--development` asks for the ones that
 //! the models were designed on; then nothing is written.
 //!
+//! Measured sessions are not part of the project: `--data DIR` or `STRETCH_DATA` names the folder that holds
+//! `knit_sleeve` (default `../shared/data` beside the workspace); without it their tables are left out.
+//!
 //! Names of parts (why, candidates, effects, robust, measured, coverage) or of effects select some.
 //!
 //! All errors are root mean squares on trials that were never fitted. Intervals
@@ -65,7 +68,12 @@ impl Sheet {
 type Part<'a> = &'a dyn Fn() -> anyhow::Result<Vec<Sheet>>;
 
 fn main() -> anyhow::Result<()> {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let mut arguments: Vec<String> = std::env::args().skip(1).collect();
+    let mut data = testkit::measured::root();
+    if let Some(at) = arguments.iter().position(|a| a == "--data") {
+        anyhow::ensure!(at + 1 < arguments.len(), "--data needs a folder");
+        data = arguments.remove(at + 1).into();
+    }
     let development = arguments.iter().any(|a| a == "--development");
     let write = arguments.iter().any(|a| a == "--write") && !development;
     let seeds = if development { &simulated::DEVELOPMENT } else { &simulated::PUBLISHED };
@@ -74,11 +82,11 @@ fn main() -> anyhow::Result<()> {
         only.iter().filter(|o| simulated::is_effect(o)).map(|o| o.as_str()).collect::<Vec<_>>();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let parts: [(&str, Part<'_>); 6] = [
-        ("why", &|| why::tables(root, seeds)),
+        ("why", &|| why::tables(&data, seeds)),
         ("candidates", &|| simulated::candidates(seeds)),
         ("effects", &|| simulated::effects(seeds, &chosen)),
         ("robust", &|| simulated::robustness(seeds)),
-        ("measured", &|| measured::tables(root)),
+        ("measured", &|| measured::tables(&data)),
         ("coverage", &coverage::tables),
     ];
     for (name, tables) in parts {

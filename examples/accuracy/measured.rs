@@ -1,5 +1,5 @@
-//! Candidates on measured sessions: calibrated on one, tested on another of the
-//! same sleeve.
+//! Candidates on measured sessions: calibrated on one, tested on another of the same sleeve
+//! (github.com/e-Body-Lab/graphene-based-knitted-sensing-sleeve, commit 47369abac95f, MIT).
 
 use std::path::Path;
 
@@ -25,14 +25,14 @@ pub(crate) struct Pair {
     pub(crate) options: Options,
 }
 
-pub(crate) fn pairs(root: &Path) -> anyhow::Result<Vec<Pair>> {
+/// All pairs of sessions of a sleeve; none where they are not there.
+pub(crate) fn pairs(data: &Path) -> anyhow::Result<Vec<Pair>> {
     let mut pairs = Vec::new();
+    let Some(sleeve) = testkit::measured::folder_in(data, "knit_sleeve") else { return Ok(pairs) };
     for [first, second] in SESSIONS {
         for (fit, test) in [(first, second), (second, first)] {
-            let read = |name: &str| {
-                let path = root.join(format!("data/knit_sleeve/{name}.csv"));
-                Trial::read(&path, &ReadOptions::new())
-            };
+            let read =
+                |name: &str| Trial::read(sleeve.join(format!("{name}.csv")), &ReadOptions::new());
             let (fit, test) = (read(fit)?, read(test)?);
             let base = Options { reference: "angle_deg".into(), ..Options::default() };
             let signals = ["s1", "s2", "s3", "s4", "s5"].map(String::from);
@@ -44,7 +44,11 @@ pub(crate) fn pairs(root: &Path) -> anyhow::Result<Vec<Pair>> {
     Ok(pairs)
 }
 
-pub(crate) fn tables(root: &Path) -> anyhow::Result<Vec<Sheet>> {
+pub(crate) fn tables(data: &Path) -> anyhow::Result<Vec<Sheet>> {
+    let pairs = pairs(data)?;
+    if pairs.is_empty() {
+        return Ok(Vec::new());
+    }
     let mut header = vec!["calibrated on", "tested on", "signal", "raw"];
     header.extend(MODELS);
     header.extend(["auto chose", "auto"]);
@@ -52,7 +56,7 @@ pub(crate) fn tables(root: &Path) -> anyhow::Result<Vec<Sheet>> {
         "Measured sessions: RMSE in degrees, calibrated on one session and tested on another";
     let mut sheet = Sheet::new("measured.csv", title, &header);
     let mut logs = vec![0.0; MODELS.len() + 1];
-    for pair in pairs(root)? {
+    for pair in pairs {
         let fit = std::slice::from_ref(&pair.fit);
         let test = std::slice::from_ref(&pair.test);
         let mut errors = Vec::new();

@@ -11,13 +11,18 @@ use stretch_sim::{Key, Rig, paper_preset};
 use crate::{
     Sheet,
     data::Simulated,
-    measured,
+    measured::{self, Pair},
     score::{Blocks, interval, number},
     simulated::{fitted, published},
 };
 
-pub(crate) fn tables(root: &Path, seeds: &[u64]) -> anyhow::Result<Vec<Sheet>> {
-    Ok(vec![simulated(seeds)?, measured_causes(root)?])
+pub(crate) fn tables(data: &Path, seeds: &[u64]) -> anyhow::Result<Vec<Sheet>> {
+    let pairs = measured::pairs(data)?;
+    let mut sheets = vec![simulated(seeds)?];
+    if !pairs.is_empty() {
+        sheets.push(measured_causes(&pairs)?);
+    }
+    Ok(sheets)
 }
 
 /// What is left of each estimate when something of it is taken away afterwards.
@@ -163,13 +168,13 @@ fn simulated(seeds: &[u64]) -> anyhow::Result<Sheet> {
     Ok(sheet)
 }
 
-fn measured_causes(root: &Path) -> anyhow::Result<Sheet> {
+fn measured_causes(pairs: &[Pair]) -> anyhow::Result<Sheet> {
     let header = ["cause switched off", "how", "degree", "of poly13"];
     let title =
         "Why it fails: poly13 from one measured session on another of the same sleeve (six pairs)";
     let mut sheet = Sheet::new("why_measured.csv", title, &header);
     let mut all = vec![Blocks::default(); 9];
-    for pair in measured::pairs(root)? {
+    for pair in pairs {
         let tests = std::slice::from_ref(&pair.test);
         let of = |model: &str, options: &Options| -> anyhow::Result<Calibration> {
             Ok(fitted(model, std::slice::from_ref(&pair.fit), options)?.calibration)

@@ -3,11 +3,12 @@
     python3 reference/accuracy/offline.py SIMULATED_7 SIMULATED_8 ...
 
 Each argument is a folder made by `stretch simulate --preset paper --seed N --out SIMULATED_N`; the measured
-sessions are those of data/knit_sleeve, in the pairs and with the signals of reference/accuracy/measured.csv
-(written by the accuracy example). Writes reference/accuracy/offline.csv.
+sessions are those of the folder knit_sleeve below STRETCH_DATA (default ../shared/data beside the project; the
+project carries none), in the pairs and with the signals of reference/accuracy/measured.csv (written by the accuracy example). Writes reference/accuracy/offline.csv.
 """
 
 import csv
+import os
 import pathlib
 import sys
 import tomllib
@@ -79,7 +80,10 @@ def main():
         judge(rows, f"simulated {folder.name}", fit, tests)
     lines = (HERE / "measured.csv").read_text().splitlines()
     pairs = csv.DictReader(line for line in lines if not line.startswith("#"))
-    sessions = HERE.parent.parent / "data" / "knit_sleeve"
+    beside = HERE.resolve().parents[2] / "shared" / "data"
+    sessions = pathlib.Path(os.environ.get("STRETCH_DATA", beside)) / "knit_sleeve"
+    if not sessions.is_dir():
+        sys.exit(f"SKIPPED: there is no folder {sessions}; STRETCH_DATA names the one that holds knit_sleeve")
     for pair in pairs:
         if pair["signal"] == "-":
             continue

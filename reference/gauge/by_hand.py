@@ -1,11 +1,16 @@
 """Checks the diagnosis of a gauge alone by hand, with other forms than the catalogue's.
 
-    python3 reference/gauge/by_hand.py [PICTURE.svg]
+    python3 reference/gauge/by_hand.py [DATA]
+
+DATA holds knit_sleeve and cylinder_friction (default: STRETCH_DATA, else ../shared/data beside the project, which
+carries no recordings of others; docs/gauge_alone.md says whose they are).
 
 Straight lines, splines, exponentials and stops by least squares (numpy, scipy), on the
 first three quarters of a record; the last quarter is only looked at. Nothing here is shared with the program.
 """
 
+import os
+import pathlib
 import sys
 
 import numpy as np
@@ -62,23 +67,21 @@ def sleeve(file, signal):
         rest = left(y, columns, fit)
         closed = [1 - np.mean(rest[p] ** 2) / np.mean(base[p] ** 2) for p in (fit, ~fit)]
         print(f"  {name:34} {100 * closed[0]:4.0f} % fitted {100 * closed[1]:4.0f} % not fitted")
-        return rest
 
     print(f"{file}, {signal}: closed of the mean square that a line leaves")
     skews, taus = np.arange(-0.1, 0.2, 0.005), np.geomspace(0.03, 20, 20)
     widths = np.geomspace(0.01, 0.4, 12)
     s = best(y, lambda v: np.c_[one, late(e, v)], skews, fit)
     say(f"line, {s:.3f} s late", np.c_[one, late(e, s)])
-    bent = say("curve", curve(e))
+    say("curve", curve(e))
     s = best(y, lambda v: curve(late(e, v)), skews, fit)
     say(f"curve, {s:.3f} s late", curve(late(e, s)))
     tau = best(y, lambda v: np.c_[curve(e), lag(e, v)], taus, fit)
-    slow = say(f"curve and lag of {tau:.2f} s", np.c_[curve(e), lag(e, tau)])
+    say(f"curve and lag of {tau:.2f} s", np.c_[curve(e), lag(e, tau)])
     w = best(y, lambda v: np.c_[curve(e), stop(e, v)], widths, fit)
     say(f"curve and stop of {w:.3f} of the range", np.c_[curve(e), stop(e, w)])
     say("curve, lag and stop", np.c_[curve(e), lag(e, tau), stop(e, w)])
     say("curve, lag and drift", np.c_[curve(e), lag(e, tau), part, e * part])
-    return t, e, y, base, bent, slow
 
 
 def cylinder(file):
@@ -98,40 +101,12 @@ def cylinder(file):
     print(f"  {weights[2]:+.1f} N with the direction, {weights[1]:+.1f} N over the stroke, {np.std(rest):.2f} N left")
 
 
-def picture(file, e, y, base, bent, slow):
-    """Four loops beside each other, twenty seconds of each, as SVG."""
-    panels = [
-        ("measured", y - y.mean()),
-        ("a line leaves", base),
-        ("a curve leaves", bent),
-        ("a curve and a lag leave", slow),
-    ]
-    wide, high, top = 200, 170, 24
-    scale = 0.9 * high / np.ptp(panels[0][1])
-    middle = top + high / 2 - scale * (panels[0][1].max() + panels[0][1].min()) / -2
-    out = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {4 * wide} {high + top + 22}" '
-        'font-family="sans-serif" font-size="12" fill="#333">',
-        f'<rect width="{4 * wide}" height="{high + top + 22}" fill="#fff"/>',
-    ]
-    for i, (title, values) in enumerate(panels):
-        left_edge = i * wide + 10
-        points = " ".join(
-            f"{left_edge + (wide - 20) * a:.0f},{middle - scale * b:.0f}"
-            for a, b in zip(e[:2000:2], values[:2000:2])
-        )
-        out.append(f'<text x="{left_edge}" y="15">{title}</text>')
-        out.append(f'<path d="M{left_edge} {middle:.0f}h{wide - 20}" stroke="#bbb"/>')
-        out.append(f'<polyline points="{points}" fill="none" stroke="#2a5d84" stroke-width=".7"/>')
-        out.append(f'<text x="{left_edge}" y="{high + top + 14}" fill="#777">angle over its range</text>')
-    with open(file, "w") as target:
-        target.write("\n".join(out) + "\n</svg>\n")
-
-
 if __name__ == "__main__":
-    found = {}
+    beside = pathlib.Path(__file__).resolve().parents[3] / "shared" / "data"
+    named = sys.argv[1] if len(sys.argv) > 1 else os.environ.get("STRETCH_DATA", beside)
+    data = pathlib.Path(named)
+    if not data.is_dir():
+        sys.exit(f"SKIPPED: there is no folder {data}")
     for name in ("s1", "s2", "s3", "s4"):
-        found[name] = sleeve("data/knit_sleeve/heel_curl_90_1.csv", name)
-    cylinder("data/cylinder_friction/stroke_3bar.csv")
-    if len(sys.argv) > 1:
-        picture(sys.argv[1], *found["s3"][1:])
+        sleeve(data / "knit_sleeve/heel_curl_90_1.csv", name)
+    cylinder(data / "cylinder_friction/stroke_3bar.csv")

@@ -5,7 +5,6 @@ use std::{
     sync::atomic::{AtomicUsize, Ordering::SeqCst},
 };
 
-use serde::Serialize;
 use stretch_bench::RigSimulator;
 use stretch_blind::{COUNTED_EXCESS, CaseKind, Label, Rate, Score};
 use stretch_gap::{Options, diagnose};
@@ -15,24 +14,10 @@ use super::{
     shared::{say, write_text},
 };
 use crate::{
+    goal::{Goal, goals},
     report::{BlindSubject, blind_page},
     table::table,
 };
-
-/// A figure, the goal it is held against, and whether it is reached.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Goal {
-    /// What is counted.
-    pub(crate) what: &'static str,
-    /// The goal in words.
-    pub(crate) goal: String,
-    /// What was reached.
-    pub(crate) value: Option<f64>,
-    /// Hits and cases, where it is a rate.
-    pub(crate) rate: Option<Rate>,
-    /// Whether that is good enough; none without a case.
-    pub(crate) met: Option<bool>,
-}
 
 pub(super) fn score(folder: &Path, with_oracle: bool) -> anyhow::Result<()> {
     let mut answers = answers(folder)?;
@@ -85,49 +70,6 @@ fn rows(goals: &[Goal]) -> impl Iterator<Item = Vec<String>> + '_ {
         });
         row
     })
-}
-
-/// What a blind check is meant to reach, and what it did.
-fn goals(score: &Score) -> Vec<Goal> {
-    let s = &score.singles;
-    let least = |what, rate: Rate, least: f64| Goal {
-        what,
-        goal: format!(">= {least}"),
-        value: rate.share(),
-        rate: Some(rate),
-        met: rate.share().map(|x| x >= least),
-    };
-    let most = |what, rate: Rate, most: f64| Goal {
-        what,
-        goal: format!("<= {most}"),
-        value: rate.share(),
-        rate: Some(rate),
-        met: rate.share().map(|x| x <= most),
-    };
-    let below = |what, value: Option<f64>, most: f64| Goal {
-        what,
-        goal: format!("<= {most}"),
-        value,
-        rate: None,
-        met: value.map(|x| x <= most),
-    };
-    let behind = score.closed_oracle.zip(score.closed_beside_oracle).map(|(o, c)| o - c);
-    vec![
-        least("top-1 at excess >= 0.1", s.top1, 0.95),
-        least("top-1 at excess above 10", s.top1_above_10, 0.99),
-        least("stage", s.stage, 0.97),
-        least("95 % set covers", s.set_covers, 0.95),
-        below("mean size of the 95 % set", s.set_size, 1.4),
-        most("false alarms on nulls", score.false_alarms, 0.02),
-        below("closed gap behind the oracle's, median", behind, 0.01),
-        below("expected calibration error", score.calibration.ece, 0.04),
-        least("out of the catalogue: unknown", score.foreign_caught, 0.8),
-        least("struck out, no twin: unknown", score.struck.unknown_no_twin, 0.85),
-        most("false unknowns", s.false_unknown, 0.05),
-        least("compounds: both named", score.compounds.all_named, 0.7),
-        least("compounds: one of them named", score.compounds.one_named, 0.97),
-        below("time a case, median, s", score.runtime_s.map(|t| t.0), 5.0),
-    ]
 }
 
 fn counts(label: &Label) -> bool {

@@ -16,7 +16,7 @@ use stretch_receptor::code::Adc;
 
 use super::shared::{read_trials, say, say_json, write_text};
 use crate::{
-    report::{self, Context},
+    report::{self, Context, Judged},
     table::{maybe, number, table},
 };
 
@@ -311,8 +311,10 @@ fn write_report(
         tested_on: names(&test),
         signal_choice: ranking.to_vec(),
         notes: calibrated.notes.clone(),
+        kinds: Vec::new(),
     };
-    write_text(path, &report::calibration_page(&shown, &evaluation, &context))
+    let judged = Judged { calibrated: &shown, evaluation: &evaluation, context: &context };
+    write_text(path, &report::calibration_page(&judged))
 }
 
 /// What `auto` rests on.

@@ -1,43 +1,74 @@
-//! `stretch demo`: the whole job on measured sessions that the program brings along.
+//! `stretch demo`: the whole job, on the simulated rig or on measured sessions.
 
-use std::path::PathBuf;
+mod job;
+mod published;
+mod sessions;
 
-use stretch_calibrate::{
-    ModelKind, Options, apply, calibrate, choose_model, evaluate, rank_signals, write_calibration,
-};
-use stretch_data::{ReadOptions, Trial};
+use std::path::{Path, PathBuf};
+
+use stretch_calibrate::{apply, write_calibration};
+use stretch_data::{Trial, TrialKind};
+use stretch_sim::{RunSettings, TrialPlan, paper_preset};
 
 use super::{
     apply::estimates_csv,
     calibrate::{print as print_calibration, print_models},
-    evaluate::print as print_evaluation,
-    shared::{progress, say, say_json, write_text},
+    diagnose::print as print_diagnosis,
+    evaluate::print_errors,
+    shared::{say, say_json, write_text},
+    simulate,
 };
-use crate::report::{self, Context};
+use crate::report::{self, Context, Judged, Subject};
+use job::Job;
+use sessions::{Sessions, Wanted};
 
-const FIT: (&str, &str) =
-    ("heel_curl_90_1.csv", include_str!("../../data/knit_sleeve/heel_curl_90_1.csv"));
-const TEST: (&str, &str) =
-    ("heel_curl_90_2.csv", include_str!("../../data/knit_sleeve/heel_curl_90_2.csv"));
-const REFERENCE: &str = "angle_deg";
-
-/// Calibrate on one measured session, test on another, write a report
+/// The whole job: calibrate, judge, and say why simulator and rig disagree; one report
 ///
-/// The sessions are recordings of a knitted strain-sensor sleeve on a knee with
-/// a motion-capture reference (MIT licence, data/knit_sleeve in the sources).
-/// The sensor is chosen by cross-validation on the first session; the second is
-/// used for nothing but the verdict.
+/// Simulates the paper's experiment on a rig with effects that the simulator at
+/// hand lacks, and writes it as a data set. Then, as a lab would: the paper's
+/// calibrations on the ramps, a model chosen by cross-validation beside them, all
+/// judged on arbitrary and pulse trials that no fit has seen; and the diagnosis.
+///
+/// On measured sessions, the same:
+///
+///   stretch demo --data bench          a folder with a dataset.toml
+///   stretch demo --data knit_sleeve    CSV files with time_s, a reference, signals;
+///                                      a_1.csv and a_2.csv are sessions of one group
+///   stretch demo --data HC_90 --sessions S15_16_HC90
+///                                      files as their authors published them
+///
+/// The last are knees in a knitted sleeve with motion capture (MIT licence),
+/// github.com/e-Body-Lab/graphene-based-knitted-sensing-sleeve, commit
+/// 47369abac95fd43a10ada4156dd22cae91ee7f70, folders of data/Regression: no header,
+/// knee angle in degrees, s1 .. s5, 100 rows a second. A file is cut where all five
+/// sensors are zero, as they are where a session begins. One that begins later than
+/// its first session has no such row, and is refused.
+///
+/// The last session of a group is tested on, the others are fitted; the first is
+/// diagnosed, as a gauge alone, where there is no dataset.toml.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
-    /// Folder for the report, the calibrations and the estimates
+    /// Folder for the report, the calibrations, the estimates and the simulated data set
     #[arg(long, default_value = "stretch-demo", value_name = "DIR")]
     out: PathBuf,
-    /// The paper's experiment instead, end to end on the simulated rig: its tables beside ours
+    /// Measured sessions in place of simulated ones: a folder, or a file with several
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["paper", "seed"])]
+    data: Option<PathBuf>,
+    /// Which sessions of the folder [default: the first by name]
+    #[arg(long, requires = "data", value_name = "NAME")]
+    sessions: Option<String>,
+    /// Column of the reference [default: length_mm or angle_deg]
+    #[arg(long, requires = "data", value_name = "COL")]
+    reference: Option<String>,
+    /// Column of the signal [default: bridge_v, else the best by cross-validation]
+    #[arg(long, requires = "data", value_name = "COL")]
+    signal: Option<String>,
+    /// The paper's tables instead: every figure of its experiment, simulated, beside the published
     #[arg(long)]
     paper: bool,
     /// Seed of the simulated experiment
-    #[arg(long, default_value_t = 3, requires = "paper", value_name = "N")]
+    #[arg(long, default_value_t = 3, value_name = "N")]
     seed: u64,
     /// Print JSON in place of tables
     #[arg(long)]
@@ -48,59 +79,121 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     if args.paper {
         return super::paper::run(&args.out, args.seed, args.json);
     }
-    let read = |(name, text): (&str, &str)| {
-        Trial::from_reader(text.as_bytes(), name, &ReadOptions::new().require(REFERENCE))
-    };
-    let (fit, test) = (read(FIT)?, read(TEST)?);
-    let fits = std::slice::from_ref(&fit);
-    let signals: Vec<String> =
-        fit.channels.iter().map(|c| c.name.clone()).filter(|name| name != REFERENCE).collect();
-    let options = Options { reference: REFERENCE.into(), ..Options::default() };
-    let ranking = rank_signals(fits, &signals, &options)?;
-    let signal = ranking.first().map(|best| best.signal.clone()).unwrap_or_default();
-    let options = Options { signal, ..options };
-    let linear = calibrate(fits, &Options { model: ModelKind::Linear, ..options.clone() })?;
-    let surfaces = calibrate(fits, &options)?;
-    let bar = progress("choosing a model by cross-validation", 1);
-    let choice = choose_model(fits, &options)?;
-    bar.finish_and_clear();
-    let chosen = calibrate(fits, &Options { model: choice.model, ..options.clone() })?;
-    let name = format!("chosen ({})", choice.model);
-    let shown = [("linear", &linear), ("non-linear", &surfaces), (name.as_str(), &chosen)];
-    let evaluation = evaluate(
-        &shown.map(|(name, calibrated)| (name, &calibrated.calibration)),
-        std::slice::from_ref(&test),
-    )?;
-
     std::fs::create_dir_all(&args.out)
         .map_err(|e| anyhow::anyhow!("{}: cannot make the folder: {e}", args.out.display()))?;
-    let file = |name: &str| args.out.join(name);
-    write_calibration(&file("linear.json"), &linear.calibration)?;
-    write_calibration(&file("poly13.json"), &surfaces.calibration)?;
-    write_calibration(&file("chosen.json"), &chosen.calibration)?;
-    let applied = apply(&chosen.calibration, &test)?;
-    let estimates = estimates_csv(&chosen.calibration, &test, &applied)?;
-    stretch_data::write_whole(file("estimates.csv"), |out| out.write_all(&estimates))?;
-    let context = Context {
-        title: "A knee angle from a knitted strain sensor".into(),
-        calibrated_on: vec![fit.name.clone()],
-        tested_on: vec![test.name.clone()],
-        signal_choice: ranking.clone(),
-        notes: surfaces.notes.clone(),
+    let (title, sessions) = match &args.data {
+        Some(path) => {
+            let wanted = Wanted {
+                sessions: args.sessions.as_deref(),
+                reference: args.reference.as_deref(),
+                signal: args.signal.as_deref(),
+            };
+            let sessions = Sessions::read(path, &wanted)?;
+            (format!("{}: {} from a stretch sensor", sessions.name, sessions.reference), sessions)
+        }
+        None => {
+            let sessions = simulated(&args.out.join("bench"), args.seed)?;
+            (format!("The paper's experiment, simulated (seed {})", args.seed), sessions)
+        }
     };
-    write_text(&file("report.html"), &report::calibration_page(&shown, &evaluation, &context))?;
-    write_text(&file("estimate.svg"), &report::readme_picture(&shown, &evaluation))?;
-
-    if args.json {
-        return say_json(&evaluation);
+    if !args.json {
+        sessions.notes.iter().try_for_each(say)?;
     }
-    say(format!("Calibrated on {}, a measured session:", fit.name))?;
-    print_calibration(&surfaces, &ranking)?;
-    print_models(&choice, REFERENCE)?;
-    say(format!("\nTested on {}, which was not used for the fit:", test.name))?;
-    print_evaluation(&evaluation)?;
+    let job = Job::of(&sessions)?;
+    write(&args.out, title, &sessions, &job)?;
+    if args.json {
+        return say_json(&serde_json::json!({
+            "seed": args.data.is_none().then_some(args.seed),
+            "evaluation": job.calibrations.evaluation,
+            "kinds": job.calibrations.kinds,
+            "diagnosis": job.examined.diagnosis,
+        }));
+    }
+    print(&sessions, &job)?;
     say(format!(
-        "\nwrote {}: report.html (open it), estimate.svg, linear.json, poly13.json, chosen.json, estimates.csv",
-        args.out.display()
+        "\nwrote {}: report.html (open it), estimate.svg, linear.json, poly13.json, chosen.json, estimates.csv{}",
+        args.out.display(),
+        if args.data.is_none() { ", bench/ (the data set)" } else { "" }
     ))
+}
+
+/// The paper's session on its preset, written as a data set and read back as one.
+fn simulated(folder: &Path, seed: u64) -> anyhow::Result<Sessions> {
+    let rig = paper_preset()?;
+    let settings = RunSettings { seed, ..RunSettings::default() };
+    simulate::write(folder, true, &rig, &settings, &TrialPlan::paper(seed))?;
+    let mut sessions = Sessions::read(folder, &Wanted::default())?;
+    let effects: Vec<String> = rig.effects.iter().map(|e| e.name().to_owned()).collect();
+    sessions.notes = vec![format!(
+        "Simulated: the paper's session, seed {seed}, on a rig with {}. The simulator at hand has none of them, \
+         and the diagnosis is not told.",
+        crate::plain::listed(&effects)
+    )];
+    Ok(sessions)
+}
+
+fn write(out: &Path, title: String, sessions: &Sessions, job: &Job) -> anyhow::Result<()> {
+    let file = |name: &str| out.join(name);
+    let calibrations = &job.calibrations;
+    let shown = calibrations.shown();
+    for (name, (_, calibrated)) in ["linear.json", "poly13.json", "chosen.json"].iter().zip(&shown)
+    {
+        write_calibration(&file(name), &calibrated.calibration)?;
+    }
+    if let Some((_, trial)) = sessions.test.first() {
+        let chosen = &calibrations.chosen.calibration;
+        let estimates = estimates_csv(chosen, trial, &apply(chosen, trial)?)?;
+        stretch_data::write_whole(file("estimates.csv"), |out| out.write_all(&estimates))?;
+    }
+    let names =
+        |trials: &[(TrialKind, Trial)]| trials.iter().map(|(_, t)| t.name.clone()).collect();
+    let mut notes = sessions.notes.clone();
+    let ramps = sessions.ramps().len();
+    if ramps < sessions.fit.len() {
+        notes.push(format!(
+            "Linear and non-linear are fitted on {ramps} ramps, as in the paper, the chosen model on all {} trials \
+             that may be fitted.",
+            sessions.fit.len()
+        ));
+    }
+    notes.extend(calibrations.surfaces.notes.iter().chain(&calibrations.choice.notes).cloned());
+    let context = Context {
+        title,
+        calibrated_on: names(&sessions.fit),
+        tested_on: names(&sessions.test),
+        signal_choice: job.ranking.clone(),
+        notes,
+        kinds: calibrations.kinds.clone(),
+    };
+    let evaluation = &calibrations.evaluation;
+    let judged = Judged { calibrated: &shown, evaluation, context: &context };
+    let examined = &job.examined;
+    let subject = Subject {
+        name: &sessions.name,
+        diagnosis: &examined.diagnosis,
+        evidence: &examined.evidence,
+        simulator: job.bench.simulator(),
+    };
+    write_text(&file("report.html"), &report::demo_page(&judged, &subject))?;
+    write_text(&file("estimate.svg"), &report::readme_picture(&shown, evaluation))
+}
+
+fn trials(count: usize) -> String {
+    if count == 1 { "one trial".to_owned() } else { format!("{count} trials") }
+}
+
+fn print(sessions: &Sessions, job: &Job) -> anyhow::Result<()> {
+    let calibrations = &job.calibrations;
+    let evaluation = &calibrations.evaluation;
+    say(format!("\nThe paper's calibrations, on {}:", trials(sessions.ramps().len())))?;
+    print_calibration(&calibrations.surfaces, &job.ranking)?;
+    say(format!("\nChosen by cross-validation on {}:", trials(sessions.fit.len())))?;
+    print_models(&calibrations.choice, &sessions.reference)?;
+    say("\nTested on trials that no fit has seen:")?;
+    for (kind, methods) in &calibrations.kinds {
+        print_errors(kind, methods, &evaluation.unit)?;
+    }
+    print_errors("All trials", &evaluation.pooled, &evaluation.unit)?;
+    say("\nWhy simulator and rig disagree:")?;
+    print_diagnosis(&job.examined.diagnosis)
 }

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use stretch_bench::{GaugeSimulator, RigSimulator};
-use stretch_data::RigFile;
+use stretch_data::{RigFile, Trial};
 use stretch_gap::{
     Diagnosis, Evidence, GapError, Laboratory, Options, Simulator, diagnose, next_experiment,
 };
@@ -86,70 +86,104 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let rig = args.rig.as_deref().map(RigFile::read).transpose()?;
     let shown = || args.data_set.display().to_string();
     let columns = args.reference.as_deref().zip(args.signal.as_deref());
-    let gauge = GaugeSimulator::read(&args.data_set, columns, rig.as_ref(), &args.without);
-    if let Some(simulator) = gauge.with_context(shown)? {
-        return answer(&args, &options, &bar, &simulator, simulator.notes(), &[]);
-    }
-    if !args.data_set.is_dir() {
-        bail!(
-            "{}: a single trial is diagnosed as a gauge alone: say which columns with \
-             --reference and --signal, or give the folder of a data set",
-            args.data_set.display()
-        );
-    }
-    let simulator =
-        RigSimulator::read(&args.data_set, rig.as_ref(), &args.without).with_context(shown)?;
-    let rails = rails(simulator.nominal(), simulator.session());
-    answer(&args, &options, &bar, &simulator, &simulator.session().notes, &rails)
-}
-
-/// Diagnoses, looks for the next experiment, and writes; `before` and `after` are notes around the diagnosis' own.
-fn answer<L: Laboratory>(
-    args: &Args,
-    options: &Options,
-    bar: &ProgressBar,
-    simulator: &L,
-    before: &[String],
-    after: &[String],
-) -> anyhow::Result<()> {
-    let shown = || args.data_set.display().to_string();
-    let (mut diagnosis, evidence) = work(simulator, options, bar).with_context(shown)?;
-    let mut proposal = None;
-    if diagnosis.ambiguous.len() > 1 && !args.no_next {
-        bar.set_message("the next experiment");
-        proposal = next_experiment(simulator, &diagnosis, &evidence).with_context(shown)?;
-    }
-    diagnosis.next_experiment = proposal.as_ref().map(|p| p.next.clone());
+    let bench =
+        Bench::read(&args.data_set, columns, rig.as_ref(), &args.without).with_context(shown)?;
+    let mut examined = bench.examine(&options, !args.no_next, &bar).with_context(shown)?;
     if let Some(path) = &args.experiment {
-        match &proposal {
-            Some(proposal) => proposal.trial.write(path)?,
-            None => diagnosis
+        match &examined.experiment {
+            Some(trial) => trial.write(path)?,
+            None => examined
+                .diagnosis
                 .notes
                 .push("no experiment is recommended: there are no rivals to tell apart".into()),
         }
     }
-    diagnosis.notes.extend_from_slice(after);
-    diagnosis.notes.splice(0..0, before.iter().cloned());
     bar.finish_and_clear();
-    conclude(args, &diagnosis, &evidence, simulator)
+    conclude(&args, &examined, bench.simulator())
 }
 
-fn work(
-    simulator: &dyn Simulator,
+/// What is diagnosed: a whole rig, or a gauge alone.
+pub(super) enum Bench {
+    Rig(RigSimulator),
+    Gauge(GaugeSimulator),
+}
+
+/// A diagnosis, what it was found from, and the experiment that it recommends.
+pub(super) struct Examined {
+    pub(super) diagnosis: Diagnosis,
+    pub(super) evidence: Evidence,
+    pub(super) experiment: Option<Trial>,
+}
+
+impl Bench {
+    /// A data set's folder, or a trial of which `columns` are reference and signal.
+    pub(super) fn read(
+        path: &Path,
+        columns: Option<(&str, &str)>,
+        rig: Option<&RigFile>,
+        without: &[String],
+    ) -> anyhow::Result<Self> {
+        if let Some(gauge) = GaugeSimulator::read(path, columns, rig, without)? {
+            return Ok(Self::Gauge(gauge));
+        }
+        ensure!(
+            path.is_dir(),
+            "a single trial is diagnosed as a gauge alone: say which columns with --reference and --signal, \
+             or give the folder of a data set"
+        );
+        Ok(Self::Rig(RigSimulator::read(path, rig, without)?))
+    }
+
+    pub(super) fn simulator(&self) -> &dyn Simulator {
+        match self {
+            Self::Rig(rig) => rig,
+            Self::Gauge(gauge) => gauge,
+        }
+    }
+
+    /// Diagnoses; with `look_on` it looks for the experiment that would tell rivals apart.
+    pub(super) fn examine(
+        &self,
+        options: &Options,
+        look_on: bool,
+        bar: &ProgressBar,
+    ) -> Result<Examined, GapError> {
+        match self {
+            Self::Gauge(gauge) => examine(gauge, options, look_on, bar, gauge.notes(), &[]),
+            Self::Rig(rig) => {
+                let rails = rails(rig.nominal(), rig.session());
+                examine(rig, options, look_on, bar, &rig.session().notes, &rails)
+            }
+        }
+    }
+}
+
+/// `before` and `after` are notes around the diagnosis' own.
+fn examine<L: Laboratory>(
+    simulator: &L,
     options: &Options,
+    look_on: bool,
     bar: &ProgressBar,
-) -> Result<(Diagnosis, Evidence), GapError> {
+    before: &[String],
+    after: &[String],
+) -> Result<Examined, GapError> {
     let progress = |what: &str| bar.set_message(what.to_owned());
-    diagnose(simulator, options, &progress, &stretch_data::interrupted)
+    let (mut diagnosis, evidence) =
+        diagnose(simulator, options, &progress, &stretch_data::interrupted)?;
+    let mut proposal = None;
+    if diagnosis.ambiguous.len() > 1 && look_on {
+        bar.set_message("the next experiment");
+        proposal = next_experiment(simulator, &diagnosis, &evidence)?;
+    }
+    diagnosis.next_experiment = proposal.as_ref().map(|p| p.next.clone());
+    diagnosis.notes.extend_from_slice(after);
+    diagnosis.notes.splice(0..0, before.iter().cloned());
+    Ok(Examined { diagnosis, evidence, experiment: proposal.map(|p| p.trial) })
 }
 
 /// Writes the files first: a message that they are there is then true.
-fn conclude(
-    args: &Args,
-    diagnosis: &Diagnosis,
-    evidence: &Evidence,
-    simulator: &dyn Simulator,
-) -> anyhow::Result<()> {
+fn conclude(args: &Args, examined: &Examined, simulator: &dyn Simulator) -> anyhow::Result<()> {
+    let Examined { diagnosis, evidence, .. } = examined;
     let name = name_of(&args.data_set);
     if let Some(path) = &args.json {
         write_text(path, &json(diagnosis, &name, args.seed)?)?;
@@ -158,12 +192,17 @@ fn conclude(
         let subject = Subject { name: &name, diagnosis, evidence, simulator };
         write_text(path, &diagnosis_page(&subject))?;
     }
-    say(&diagnosis.sentence)?;
-    say(text(diagnosis))?;
+    print(diagnosis)?;
     for path in [&args.json, &args.report].into_iter().flatten() {
         say(format!("wrote {}", path.display()))?;
     }
     Ok(())
+}
+
+/// The sentence, and everything behind it.
+pub(super) fn print(diagnosis: &Diagnosis) -> anyhow::Result<()> {
+    say(&diagnosis.sentence)?;
+    say(text(diagnosis))
 }
 
 /// The diagnosis in its schema, with what it was made from.
@@ -176,13 +215,13 @@ fn json(diagnosis: &Diagnosis, name: &str, seed: u64) -> anyhow::Result<String> 
 }
 
 /// What the data are called: the folder's or the file's name.
-fn name_of(path: &Path) -> String {
+pub(super) fn name_of(path: &Path) -> String {
     let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     short_name(&real)
 }
 
 /// Seen on a terminal only: what goes on, and for how long already.
-fn spinner() -> ProgressBar {
+pub(super) fn spinner() -> ProgressBar {
     let bar = ProgressBar::new_spinner().with_message("reading");
     // the template is a constant: were it wrong, the plain spinner is shown
     if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed}") {

@@ -52,9 +52,12 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     print(&evaluation)
 }
 
-/// The paper's table, a trial each and pooled.
-pub(super) fn print(evaluation: &Evaluation) -> anyhow::Result<()> {
-    let unit = &evaluation.unit;
+/// The paper's table of some trials.
+pub(super) fn print_errors(
+    title: &str,
+    methods: &[MethodErrors],
+    unit: &str,
+) -> anyhow::Result<()> {
     let rmse = format!("RMSE {unit}");
     let header =
         ["method", "average error %", "of reference %", &rmse, "RMSE %", "R^2", "lag s", "clamped"];
@@ -70,13 +73,18 @@ pub(super) fn print(evaluation: &Evaluation) -> anyhow::Result<()> {
             m.clamped.to_string(),
         ]
     };
+    say(format!("{title}:"))?;
+    say(table(&header, methods.iter().map(row)))
+}
+
+/// The paper's table, a trial each and pooled.
+pub(super) fn print(evaluation: &Evaluation) -> anyhow::Result<()> {
+    let unit = &evaluation.unit;
     for trial in &evaluation.trials {
-        say(format!("{}:", trial.trial))?;
-        say(table(&header, trial.methods.iter().map(row)))?;
+        print_errors(&trial.trial, &trial.methods, unit)?;
     }
     if evaluation.trials.len() > 1 {
-        say("All trials:")?;
-        say(table(&header, evaluation.pooled.iter().map(row)))?;
+        print_errors("All trials", &evaluation.pooled, unit)?;
     }
     say(
         "Average error: mean |reference - estimate| over the range of the estimate (the paper's),",

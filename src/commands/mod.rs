@@ -18,5 +18,3 @@ pub(crate) mod rig;
 pub(crate) mod shared;
 pub(crate) mod simulate;
 pub(crate) mod stop;
-
-pub(crate) use blind_score::Goal;

@@ -158,7 +158,7 @@ fn plans(args: &Args, rig: &Rig, seed: u64) -> anyhow::Result<Vec<TrialPlan>> {
 }
 
 /// Writes the data set, whole or not at all.
-fn write(
+pub(super) fn write(
     out: &Path,
     force: bool,
     rig: &Rig,

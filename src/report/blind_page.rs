@@ -10,7 +10,7 @@ use super::{
     markup::{fixed, number},
     page::{Page, Table},
 };
-use crate::commands::Goal;
+use crate::goal::Goal;
 
 /// Ends of the classes of strength.
 const STRENGTHS: [f64; 8] = [0.05, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0];

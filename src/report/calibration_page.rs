@@ -34,24 +34,37 @@ pub(crate) struct Context {
     pub(crate) signal_choice: Vec<Candidate>,
     /// Sentences about the data: where they come from, what was done to them.
     pub(crate) notes: Vec<String>,
+    /// Errors on the trials of one kind, by its name, where there are several kinds.
+    pub(crate) kinds: Vec<(String, Vec<MethodErrors>)>,
+}
+
+/// Calibrations and how they were judged.
+#[derive(Clone, Copy)]
+pub(crate) struct Judged<'a> {
+    /// The calibrations by the names that `evaluation` knows them by.
+    pub(crate) calibrated: &'a [(&'a str, &'a Calibrated)],
+    /// Their errors.
+    pub(crate) evaluation: &'a Evaluation,
+    /// What is said beside the numbers.
+    pub(crate) context: &'a Context,
 }
 
 /// The report as one HTML file.
-///
-/// `calibrated` are the calibrations by the names that `evaluation` knows them by.
-pub(crate) fn calibration_page(
-    calibrated: &[(&str, &Calibrated)],
-    evaluation: &Evaluation,
-    context: &Context,
-) -> String {
-    let names = method_names(calibrated, evaluation);
-    let mut page = Page::new(&context.title, &verdict(evaluation, &names, context));
-    judged(&mut page, evaluation, &names, context);
-    over_time(&mut page, evaluation, &names);
-    errors(&mut page, evaluation, &names);
-    surfaces(&mut page, calibrated);
-    fits(&mut page, calibrated, context);
+pub(crate) fn calibration_page(judged: &Judged<'_>) -> String {
+    let mut page = Page::new(&judged.context.title, &calibration_verdict(judged));
+    calibration_sections(&mut page, judged);
     page.finish()
+}
+
+/// The sections of the report: a page of their own, or a part of a longer one.
+pub(crate) fn calibration_sections(page: &mut Page, subject: &Judged<'_>) {
+    let Judged { calibrated, evaluation, context } = *subject;
+    let names = method_names(calibrated, evaluation);
+    judged(page, evaluation, &names, context);
+    over_time(page, evaluation, &names);
+    errors(page, evaluation, &names);
+    surfaces(page, calibrated);
+    fits(page, calibrated, context);
 }
 
 /// A picture of some seconds of the first trial for a README: an SVG file of
@@ -66,7 +79,9 @@ pub(crate) fn readme_picture(
 }
 
 /// The result in one sentence.
-fn verdict(evaluation: &Evaluation, names: &[String], context: &Context) -> String {
+pub(crate) fn calibration_verdict(judged: &Judged<'_>) -> String {
+    let Judged { calibrated, evaluation, context } = *judged;
+    let names = method_names(calibrated, evaluation);
     let methods = &evaluation.pooled;
     let Some(best) = best(methods) else {
         return "No estimate could be held against a reference.".to_owned();
@@ -111,6 +126,9 @@ fn judged(page: &mut Page, evaluation: &Evaluation, names: &[String], context: &
     ));
     let caption = "All test recordings together";
     page.table(&method_table(caption, &evaluation.pooled, names, &evaluation.unit));
+    for (kind, methods) in &context.kinds {
+        page.table(&method_table(kind, methods, names, &evaluation.unit));
+    }
     page.text(
         "Raw is the signal itself, its extremes laid on those of the reference, which no \
          calibration may look at. Average error is the mean absolute error over the range of the \

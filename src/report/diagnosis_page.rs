@@ -35,20 +35,32 @@ pub(crate) struct Subject<'a> {
 
 /// The report as one HTML file.
 pub(crate) fn diagnosis_page(subject: &Subject<'_>) -> String {
+    let mut page = Page::new(&diagnosis_title(subject), &diagnosis_verdict(subject));
+    diagnosis_sections(&mut page, subject);
+    page.finish()
+}
+
+/// What the report is called.
+pub(crate) fn diagnosis_title(subject: &Subject<'_>) -> String {
+    format!("{}: simulator against rig", subject.name)
+}
+
+/// The result in one sentence.
+pub(crate) fn diagnosis_verdict(subject: &Subject<'_>) -> String {
+    subject.diagnosis.sentence.replace(" %", "\u{a0}%")
+}
+
+/// The sections of the report: a page of their own, or a part of a longer one.
+pub(crate) fn diagnosis_sections(page: &mut Page, subject: &Subject<'_>) {
     let diagnosis = subject.diagnosis;
-    let mut page = Page::new(
-        &format!("{}: simulator against rig", subject.name),
-        &diagnosis.sentence.replace(" %", "\u{a0}%"),
-    );
     page.facts(&facts(diagnosis));
     page.list(&causes(diagnosis));
-    seen(&mut page, subject);
-    located(&mut page, subject);
-    named(&mut page, subject);
-    gained(&mut page, subject);
-    next(&mut page, diagnosis);
-    numbers(&mut page, diagnosis);
-    page.finish()
+    seen(page, subject);
+    located(page, subject);
+    named(page, subject);
+    gained(page, subject);
+    next(page, diagnosis);
+    numbers(page, diagnosis);
 }
 
 /// Three answers at a glance.

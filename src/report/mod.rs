@@ -1,7 +1,7 @@
 //! Reports: one HTML file that opens without a network, on a phone and on paper.
 //!
 //! [`page`] is the frame that all reports share and [`figure`] the axes;
-//! the other files say what stands in them.
+//! the other files say what stands in them. Nothing here knows a command.
 
 mod bar_figure;
 mod blind_figures;
@@ -10,6 +10,7 @@ mod branch;
 mod calibration_page;
 mod calibration_tables;
 pub(crate) mod canvas;
+mod demo_page;
 mod diagnosis_page;
 mod diagnosis_tables;
 mod error_figure;
@@ -24,8 +25,8 @@ mod surface_figure;
 pub(crate) mod thin;
 
 pub(crate) use blind_page::{BlindSubject, blind_page};
-pub(crate) use calibration_page::readme_picture;
-pub(crate) use calibration_page::{Context, calibration_page};
+pub(crate) use calibration_page::{Context, Judged, calibration_page, readme_picture};
+pub(crate) use demo_page::demo_page;
 pub(crate) use diagnosis_page::{Subject, diagnosis_page};
 pub(crate) use paper_page::paper_page;
 

@@ -39,6 +39,16 @@ impl Page {
         Self { title: title.to_owned(), body, in_section: false }
     }
 
+    /// Begins a part of a report that has several: its own title and sentence.
+    pub(crate) fn part(&mut self, title: &str, verdict: &str) -> &mut Self {
+        self.close();
+        self.put(&format!(
+            "<header class=\"part\"><h1>{}</h1>\n<p class=\"verdict\">{}</p></header>\n",
+            escape(title),
+            escape(verdict)
+        ))
+    }
+
     /// Begins a section; `intro` may be empty.
     pub(crate) fn section(&mut self, heading: &str, intro: &str) -> &mut Self {
         self.close();

@@ -8,7 +8,7 @@ use super::{
     figure::{Area, Axes, Drawn, Figure, Frame, plot, stroke},
     page::{Page, Table},
 };
-use crate::commands::paper::{error_rows, fit_rows, verdicts};
+use crate::paper_tables::{error_rows, fit_rows, verdicts};
 
 /// Tables beside the published ones, and the two figures that the paper asks for.
 pub(crate) fn paper_page(experiment: &Experiment) -> String {

@@ -8,7 +8,7 @@ use stretch_core::Degree;
 use stretch_data::{Channel, Trial};
 
 use super::{
-    Context, calibration_page,
+    Context, Judged, calibration_page,
     canvas::Ink,
     figure::{Axes, Figure, Frame, plot},
     markup::{escape, fixed, number, tick},
@@ -51,7 +51,8 @@ impl Made {
     }
 
     fn page(&self, context: &Context) -> String {
-        calibration_page(&self.calibrated(), &self.evaluation, context)
+        let calibrated = self.calibrated();
+        calibration_page(&Judged { calibrated: &calibrated, evaluation: &self.evaluation, context })
     }
 
     fn calibrated(&self) -> [(&str, &Calibrated); 2] {
@@ -74,6 +75,7 @@ fn context(tested_on: &str) -> Context {
             candidate("other", None, Some("constant")),
         ],
         notes: vec!["resampled <twice>".into()],
+        kinds: Vec::new(),
     }
 }
 
@@ -240,7 +242,9 @@ fn data_without_a_number_give_notes_and_no_panic() {
         let notes = trials.iter().all(nothing);
         let (comparisons, unit) = (Vec::new(), String::new());
         let evaluation = Evaluation { unit, trials, pooled: methods.clone(), comparisons };
-        let page = calibration_page(&[], &evaluation, &Context::default());
+        let context = Context::default();
+        let judged = Judged { calibrated: &[], evaluation: &evaluation, context: &context };
+        let page = calibration_page(&judged);
         elements(&page);
         assert_numbers(&page);
         assert!(page.contains("No estimate could be held against a reference."));

@@ -1,0 +1,104 @@
+//! A knee in a knitted sleeve, as its authors published it.
+
+use std::{fs, path::Path};
+
+use anyhow::{Context, bail};
+use stretch_data::{Channel, Trial};
+
+/// Where the files are.
+pub(super) const REPOSITORY: &str = "github.com/e-Body-Lab/graphene-based-knitted-sensing-sleeve";
+/// The version of them that was read.
+pub(super) const COMMIT: &str = "47369abac95fd43a10ada4156dd22cae91ee7f70";
+
+/// The columns that are read; accelerometer and gyroscope stand behind them.
+const COLUMNS: [&str; 6] = ["angle_deg", "s1", "s2", "s3", "s4", "s5"];
+/// The authors' sample rate.
+const RATE_HZ: f64 = 100.0;
+
+/// The sessions of a published file; none when its first line is no row of numbers.
+///
+/// The file has no header and no time: knee angle in degrees, five changes of resistance
+/// over the resistance at rest, six columns of an inertial sensor; 100 rows a second.
+/// Sessions stand end to end. The resistances at rest are those of a session's first row,
+/// so that all five changes are exactly zero there: that is where the file is cut.
+///
+/// # Errors
+/// A file that cannot be read, and fields that are not numbers.
+pub(super) fn sessions(path: &Path) -> anyhow::Result<Option<Vec<Trial>>> {
+    let text = fs::read_to_string(path)
+        .with_context(|| format!("{}: cannot read it as text", path.display()))?;
+    let text = text.trim_start_matches('\u{feff}');
+    let first = text.split([',', '\n']).next().unwrap_or_default();
+    if first.trim().parse::<f64>().is_err() {
+        return Ok(None);
+    }
+    let mut sessions: Vec<Vec<[f64; COLUMNS.len()]>> = Vec::new();
+    for (i, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+        let row = row(line).with_context(|| format!("{}, row {}", path.display(), i + 1))?;
+        match sessions.last_mut() {
+            Some(session) if row[1..].iter().any(|x| *x != 0.0) => session.push(row),
+            _ => sessions.push(vec![row]),
+        }
+    }
+    let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let named = |(i, rows): (usize, &Vec<_>)| trial(format!("{file}, session {}", i + 1), rows);
+    Ok(Some(sessions.iter().enumerate().map(named).collect()))
+}
+
+fn row(line: &str) -> anyhow::Result<[f64; COLUMNS.len()]> {
+    let mut row = [0.0; COLUMNS.len()];
+    let mut fields = line.split(',').map(str::trim);
+    for (value, name) in row.iter_mut().zip(COLUMNS) {
+        let Some(field) = fields.next() else { bail!("there is no field for {name}") };
+        *value = match field.parse() {
+            Ok(number) if f64::is_finite(number) => number,
+            _ => bail!("{name} is {field:?}, not a number"),
+        };
+    }
+    Ok(row)
+}
+
+fn trial(name: String, rows: &[[f64; COLUMNS.len()]]) -> Trial {
+    let channel = |(i, name): (usize, &str)| Channel {
+        name: name.to_owned(),
+        values: rows.iter().map(|row| row[i]).collect(),
+    };
+    Trial {
+        name,
+        time_s: (0..rows.len()).map(|n| n as f64 / RATE_HZ).collect(),
+        channels: COLUMNS.into_iter().enumerate().map(channel).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> anyhow::Result<Option<Vec<Trial>>> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("made_up.csv");
+        fs::write(&path, text).unwrap();
+        sessions(&path)
+    }
+
+    #[test]
+    fn sessions_begin_where_all_sensors_are_zero() {
+        let text = "\u{feff}1.5,0,0,0,0,0,9,9,9,9,9,9\r\n2.5,0,.1,0,0,-2E-1,9,9,9,9,9,9,\r\n\
+                    7,0,0,0,0,0,9,9,9,9,9,9\r\n8,1,2,3,4,5\r\n9,5,4,3,2,1\r\n";
+        let trials = read(text).unwrap().expect("numbers in the first line");
+        let lengths: Vec<usize> = trials.iter().map(Trial::len).collect();
+        assert_eq!(lengths, [2, 3]);
+        assert_eq!(trials[0].channel("angle_deg"), Some(&[1.5, 2.5][..]));
+        assert_eq!(trials[0].channel("s5"), Some(&[0.0, -0.2][..]));
+        assert_eq!((trials[1].time_s[2], trials[1].channels.len()), (0.02, 6));
+        assert_eq!(trials[1].name, "made_up.csv, session 2");
+    }
+
+    #[test]
+    fn other_files_are_told_by_their_header_and_bad_fields_by_their_place() {
+        assert_eq!(read("time_s,angle_deg,s1\n0,1,2\n").unwrap(), None);
+        let wrong = |text: &str| format!("{:#}", read(text).unwrap_err());
+        assert!(wrong("1,0,0,0,0,0\n1,0,0,x,0,0\n").ends_with("row 2: s3 is \"x\", not a number"));
+        assert!(wrong("1,0,0,0,0\n").contains("row 1: there is no field for s5"));
+    }
+}

@@ -1,0 +1,236 @@
+//! What the job is done on: a data set, a folder of sessions, or published files.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use anyhow::{Context, bail, ensure};
+use stretch_data::{DataSet, ReadOptions, Split, Trial, TrialKind};
+use stretch_gap::{GaugeSimulator, GaugeTrial};
+
+use super::published::{self, COMMIT, REPOSITORY};
+use crate::commands::{
+    diagnose::{Bench, name_of},
+    shared::short_name,
+};
+
+/// References and signals that need no naming, the first that is there.
+const REFERENCES: [&str; 2] = ["length_mm", "angle_deg"];
+const SIGNAL: &str = "bridge_v";
+/// Columns that are neither.
+const OTHERS: [&str; 3] = ["inlet", "outlet", "pressure_kpa"];
+
+/// What the user says of measured sessions.
+#[derive(Debug, Default)]
+pub(super) struct Wanted<'a> {
+    pub(super) sessions: Option<&'a str>,
+    pub(super) reference: Option<&'a str>,
+    pub(super) signal: Option<&'a str>,
+}
+
+/// Trials to fit and to test on.
+pub(super) struct Sessions {
+    /// What the data are called.
+    pub(super) name: String,
+    /// Column of the reference.
+    pub(super) reference: String,
+    /// Columns to choose the signal from.
+    pub(super) signals: Vec<String>,
+    /// Everything that may be fitted.
+    pub(super) fit: Vec<(TrialKind, Trial)>,
+    /// What is judged on.
+    pub(super) test: Vec<(TrialKind, Trial)>,
+    /// Where they come from, in sentences.
+    pub(super) notes: Vec<String>,
+    /// The data set's folder, where it is one.
+    folder: Option<PathBuf>,
+}
+
+impl Sessions {
+    /// Reads a folder with a `dataset.toml`; a folder of CSV files, of which those that differ
+    /// in a last `_1`, `_2`, ... belong together; or one file with several sessions.
+    ///
+    /// # Errors
+    /// What cannot be read, has no session to test on, or needs naming.
+    pub(super) fn read(path: &Path, wanted: &Wanted<'_>) -> anyhow::Result<Self> {
+        ensure!(
+            path.exists(),
+            "{}: there is no such folder; the sessions of a knee in a knitted sleeve are public: \
+             {REPOSITORY}, commit {COMMIT}, data/Regression",
+            path.display()
+        );
+        let is_set = path.join("dataset.toml").is_file();
+        let (name, fit, test, note) =
+            if is_set { data_set(path)? } else { loose(path, wanted.sessions)? };
+        let columns = fit.first().map_or(&[][..], |(_, trial)| trial.channels.as_slice());
+        let has = |name: &str| columns.iter().any(|c| c.name == name);
+        let usual = || REFERENCES.into_iter().find(|name| has(name));
+        let named = || columns.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", ");
+        let Some(reference) = wanted.reference.or_else(usual).filter(|name| has(name)) else {
+            bail!("{name}: name the reference with --reference; the columns are {}", named());
+        };
+        let signals: Vec<String> = match wanted.signal {
+            Some(signal) => vec![signal.to_owned()],
+            None if has(SIGNAL) => vec![SIGNAL.to_owned()],
+            None => columns
+                .iter()
+                .map(|c| c.name.clone())
+                .filter(|c| c != reference && !OTHERS.contains(&c.as_str()))
+                .collect(),
+        };
+        ensure!(
+            signals.iter().all(|signal| has(signal)) && !signals.is_empty(),
+            "{name}: name the signal with --signal; the columns are {}",
+            named()
+        );
+        let folder = is_set.then(|| path.to_owned());
+        let notes = vec![note];
+        Ok(Self { name, reference: reference.to_owned(), signals, fit, test, notes, folder })
+    }
+
+    /// What the paper's calibrations are fitted on: its ramps, where there are any.
+    pub(super) fn ramps(&self) -> Vec<Trial> {
+        let is_ramp = |kind: TrialKind| matches!(kind, TrialKind::Inflation | TrialKind::Deflation);
+        let any = self.fit.iter().any(|(kind, _)| is_ramp(*kind));
+        let kept = self.fit.iter().filter(|(kind, _)| !any || is_ramp(*kind));
+        kept.map(|(_, trial)| trial.clone()).collect()
+    }
+
+    /// The rig, or the gauge alone, beside its simulator.
+    ///
+    /// # Errors
+    /// Trials that cannot be diagnosed.
+    pub(super) fn bench(&self, signal: &str) -> anyhow::Result<Bench> {
+        let columns = Some((self.reference.as_str(), signal));
+        if let Some(folder) = &self.folder {
+            let fit = self.fit.iter().map(|(_, trial)| trial);
+            let is_rig = fit.clone().all(|t| t.channel("inlet").or(t.channel("outlet")).is_some());
+            return Bench::read(folder, columns.filter(|_| !is_rig), None, &[]);
+        }
+        // A session has its own zero, and nobody knows the pause before the next.
+        let first = self.fit.iter().take(1);
+        let trials: Vec<GaugeTrial> = first
+            .map(|(_, trial)| GaugeTrial { trial: trial.clone(), start_s: 0.0, is_test: false })
+            .collect();
+        Ok(Bench::Gauge(GaugeSimulator::new(&trials, &self.reference, signal, None, &[])?))
+    }
+}
+
+/// Name, trials to fit, trials to test on, and a sentence.
+type Parts = (String, Vec<(TrialKind, Trial)>, Vec<(TrialKind, Trial)>, String);
+
+fn data_set(folder: &Path) -> anyhow::Result<Parts> {
+    let set = DataSet::read(folder)?;
+    let of = |split: Split| -> anyhow::Result<Vec<(TrialKind, Trial)>> {
+        let entries = set.entries(split);
+        let load = |e: &stretch_data::TrialEntry| e.load(folder, &ReadOptions::new());
+        let trials = entries.map(|e| Ok((e.kind, load(e)?))).collect::<anyhow::Result<Vec<_>>>()?;
+        let split = split.name();
+        ensure!(
+            !trials.is_empty(),
+            "{}: no trial has split = \"{split}\"; the job needs trials to fit and to test on",
+            folder.display()
+        );
+        Ok(trials)
+    };
+    let note = format!("The data set {} of {}.", set.name, name_of(folder));
+    Ok((name_of(folder), of(Split::Fit)?, of(Split::Test)?, note))
+}
+
+/// One group of files without a `dataset.toml`: the last session is tested on.
+fn loose(path: &Path, wanted: Option<&str>) -> anyhow::Result<Parts> {
+    let groups = groups(path)?;
+    let names: Vec<&str> = groups.keys().map(String::as_str).collect();
+    let name = match wanted {
+        Some(name) => name,
+        None => *names.first().with_context(|| {
+            format!("{}: there is neither a dataset.toml nor a CSV file", path.display())
+        })?,
+    };
+    let Some(files) = groups.get(name) else {
+        bail!("{}: there are no sessions {name}; there are {}", path.display(), names.join(", "));
+    };
+    let mut sessions = Vec::new();
+    let mut converted = false;
+    for file in files {
+        match published::sessions(file)? {
+            Some(trials) => {
+                converted = true;
+                sessions.extend(trials);
+            }
+            None => sessions.push(Trial::read(file, &ReadOptions::new())?),
+        }
+    }
+    let mut fit: Vec<_> = sessions.into_iter().map(|trial| (TrialKind::Other, trial)).collect();
+    let test = fit.pop().into_iter().collect();
+    ensure!(
+        !fit.is_empty(),
+        "{}: {name} is one session; the job needs one to fit and another to test on",
+        path.display()
+    );
+    let others: Vec<&str> = names.into_iter().filter(|other| *other != name).collect();
+    let mut note =
+        format!("Sessions {name}; the last one is tested on, the first alone is diagnosed.");
+    if converted {
+        note += &format!(" Read as the authors published them ({REPOSITORY}, commit {COMMIT}).");
+    }
+    if !others.is_empty() {
+        note += &format!(" There are also {} (--sessions).", others.join(", "));
+    }
+    Ok((name.to_owned(), fit, test, note))
+}
+
+/// CSV files by their names without a last `_1`, `_2`, ...
+fn groups(path: &Path) -> anyhow::Result<BTreeMap<String, Vec<PathBuf>>> {
+    let mut files = vec![path.to_owned()];
+    if path.is_dir() {
+        let entries = fs::read_dir(path).and_then(|entries| {
+            entries.map(|entry| entry.map(|e| e.path())).collect::<Result<Vec<_>, _>>()
+        });
+        files = entries.with_context(|| path.display().to_string())?;
+        files.retain(|file| file.extension().is_some_and(|e| e == "csv"));
+    }
+    files.sort();
+    let mut groups = BTreeMap::<String, Vec<PathBuf>>::new();
+    for file in files {
+        let stem = short_name(&file);
+        let group = match stem.rsplit_once('_') {
+            Some((group, n)) if n.bytes().all(|b| b.is_ascii_digit()) => group.to_owned(),
+            _ => stem,
+        };
+        groups.entry(group).or_default().push(file);
+    }
+    Ok(groups)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_as_published_hold_the_same_as_files_a_session() {
+        let Some(sleeve) = testkit::measured::folder("knit_sleeve") else { return };
+        let mut text = String::from("\u{feff}");
+        for session in ["heel_curl_90_1.csv", "heel_curl_90_2.csv"] {
+            for line in fs::read_to_string(sleeve.join(session)).unwrap().lines().skip(1) {
+                let (_, values) = line.split_once(',').expect("a time and values");
+                text += &format!("{values},0.1,-0.9,0.2,1,2,3\r\n");
+            }
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let published = folder.path().join("S15_16_HC90.csv");
+        fs::write(&published, text).unwrap();
+        let wanted = Wanted { sessions: Some("heel_curl_90"), ..Wanted::default() };
+        let [one, other] = [
+            Sessions::read(&sleeve, &wanted).unwrap(),
+            Sessions::read(&published, &Wanted::default()).unwrap(),
+        ];
+        assert_eq!((&one.reference, &one.signals), (&other.reference, &other.signals));
+        for (a, b) in [(&one.fit, &other.fit), (&one.test, &other.test)] {
+            assert_eq!((a.len(), b.len()), (1, 1));
+            assert_eq!((&a[0].1.time_s, &a[0].1.channels), (&b[0].1.time_s, &b[0].1.channels));
+        }
+    }
+}

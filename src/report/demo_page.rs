@@ -1,0 +1,16 @@
+//! The report of the whole job: a calibration, and why simulator and rig disagree.
+
+use super::{
+    calibration_page::{Judged, calibration_sections, calibration_verdict},
+    diagnosis_page::{Subject, diagnosis_sections, diagnosis_title, diagnosis_verdict},
+    page::Page,
+};
+
+/// Both reports as one HTML file; each part is what its own page would be.
+pub(crate) fn demo_page(judged: &Judged<'_>, subject: &Subject<'_>) -> String {
+    let mut page = Page::new(&judged.context.title, &calibration_verdict(judged));
+    calibration_sections(&mut page, judged);
+    page.part(&diagnosis_title(subject), &diagnosis_verdict(subject));
+    diagnosis_sections(&mut page, subject);
+    page.finish()
+}

@@ -1,0 +1,98 @@
+//! `stretch demo`, as a user runs it.
+
+mod support;
+
+use std::{fs, path::Path};
+
+use serde_json::Value;
+use support::{Scratch, fails, runs, stretch};
+
+/// Both parts in one page that needs no network.
+fn holds_both_parts(out: &Path) {
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    for heading in
+        ["How good it is", "The surfaces (non-linear)", "Where the gap sits", "Which effect"]
+    {
+        assert_eq!(page.matches(&format!("<h2>{heading}")).count(), 1, "{heading}");
+    }
+    assert!(page.contains(": simulator against rig</h1>") && !page.contains("NaN"));
+    assert_eq!(page.matches("<!DOCTYPE html>").count(), 1);
+    let elsewhere = page.replace("http://www.w3.org/2000/svg", "");
+    assert!(!elsewhere.contains("http://") && !elsewhere.contains("https://"));
+}
+
+/// RMSE of raw, linear, non-linear and the chosen model.
+fn rmse(methods: &Value) -> [f64; 4] {
+    [0, 1, 2, 3].map(|i| methods[i]["rmse"].as_f64().unwrap())
+}
+
+#[test]
+fn the_demo_does_the_whole_job_without_anybody_s_data() {
+    let scratch = Scratch::new();
+    let out = scratch.path("demo");
+    let mut command = stretch();
+    command.env("STRETCH_DATA", scratch.path("nothing")).args(["demo", "--seed", "4", "--json"]);
+    let said: Value = serde_json::from_str(&runs(command.arg("--out").arg(&out))).unwrap();
+    assert_eq!(said["seed"], 4);
+    // memory is what the rig has and the paper's surfaces lack
+    for kind in [0, 1] {
+        let [_, linear, surfaces, chosen] = rmse(&said["kinds"][kind][1]);
+        assert!(surfaces < linear && chosen < surfaces, "{}", said["kinds"][kind]);
+    }
+    let kinds = [&said["kinds"][0][0], &said["kinds"][1][0]];
+    assert_eq!(kinds, ["arbitrary", "pulses"]);
+    let named: Vec<&str> =
+        said["diagnosis"]["named"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+    let built_in =
+        ["muscle_hysteresis", "pressure_crosstalk", "gauge_relaxation", "gauge_nonlinearity"];
+    assert!(named.contains(&"gauge_relaxation"), "{named:?}");
+    assert!(named.iter().all(|name| built_in.contains(name)), "{named:?}");
+    holds_both_parts(&out);
+    for name in ["linear.json", "poly13.json", "chosen.json", "estimates.csv", "estimate.svg"] {
+        assert!(out.join(name).metadata().unwrap().len() > 100, "{name}");
+    }
+    // the data set that it wrote is one like any other, and the record too
+    let mut command = stretch();
+    command.args(["evaluate", "--json", "--calibration"]).arg(out.join("chosen.json"));
+    let same: Value = serde_json::from_str(&runs(command.arg(out.join("bench")))).unwrap();
+    assert_eq!(same["pooled"][1]["rmse"], said["evaluation"]["pooled"][3]["rmse"]);
+}
+
+#[test]
+fn measured_sessions_take_the_same_way() {
+    let Some(sleeve) = testkit::measured::folder("knit_sleeve") else { return };
+    let scratch = Scratch::new();
+    let out = scratch.path("demo");
+    let mut command = stretch();
+    command.args(["demo", "--sessions", "heel_curl_90", "--data"]).arg(&sleeve).arg("--out");
+    let text = runs(command.arg(&out).arg("--json"));
+    let said: Value = serde_json::from_str(&text).unwrap();
+    let [raw, linear, surfaces, chosen] = rmse(&said["evaluation"]["pooled"]);
+    assert!(surfaces < linear && surfaces < raw && chosen < surfaces, "{text}");
+    assert_eq!(said["diagnosis"]["verdict"], "unknown");
+    holds_both_parts(&out);
+    let command = &mut stretch();
+    command.args(["demo", "--sessions", "heel", "--data"]).arg(&sleeve).arg("--out").arg(&out);
+    fails(command, &["no sessions heel", "heel_curl_45, heel_curl_90, lift_up"]);
+}
+
+#[test]
+fn sessions_that_cannot_be_used_are_refused_with_a_way_out() {
+    let scratch = Scratch::new();
+    let run = |path: &Path| {
+        let mut command = stretch();
+        command.args(["demo", "--data"]).arg(path).arg("--out").arg(scratch.path("out"));
+        command
+    };
+    fails(&mut run(&scratch.path("none")), &["no such folder", "e-Body-Lab", "47369abac95f"]);
+    let one = scratch.loops("alone.csv", 20.0, 1.1);
+    fails(&mut run(&one), &["alone is one session", "another to test on"]);
+    fs::create_dir(scratch.path("empty")).unwrap();
+    fails(&mut run(&scratch.path("empty")), &["neither a dataset.toml nor a CSV file"]);
+    let pair = scratch.path("pair");
+    fs::create_dir(&pair).unwrap();
+    for name in ["a_1.csv", "a_2.csv"] {
+        fs::write(pair.join(name), "time_s,turn_rad,s1\n0,1,2\n0.01,2,3\n").unwrap();
+    }
+    fails(&mut run(&pair), &["name the reference with --reference", "turn_rad, s1"]);
+}

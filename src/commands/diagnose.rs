@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use stretch_bench::{GaugeSimulator, RigSimulator};
-use stretch_data::RigFile;
 use stretch_gap::{
     Diagnosis, Evidence, GapError, Laboratory, Options, Simulator, diagnose, next_experiment,
 };
@@ -28,14 +27,15 @@ use crate::report::{Subject, diagnosis_page};
 ///   stretch diagnose knit.csv --reference angle_deg --signal s2
 ///
 /// Test trials are read once, at the end. Without --rig the rig file that the data set names is
-/// the simulator, else the stock rig.
+/// the simulator, else the stock rig. Its parameters may be re-tuned within their tolerances, its
+/// effects are part of it.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
     /// Folder with dataset.toml, or a trial
     #[arg(value_name = "DATASET")]
     data_set: PathBuf,
-    /// Rig file: nominal parameters with their tolerances
+    /// Rig file: nominal parameters with their tolerances, and effects that it has already
     #[arg(long, value_name = "rig.toml")]
     rig: Option<PathBuf>,
     /// Write the diagnosis as JSON
@@ -83,10 +83,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         ..Options::default()
     };
     let bar = spinner();
-    let rig = args.rig.as_deref().map(RigFile::read).transpose()?;
+    let rig = args.rig.as_deref();
     let shown = || args.data_set.display().to_string();
     let columns = args.reference.as_deref().zip(args.signal.as_deref());
-    let gauge = GaugeSimulator::read(&args.data_set, columns, rig.as_ref(), &args.without);
+    let gauge = GaugeSimulator::read(&args.data_set, columns, rig, &args.without);
     if let Some(simulator) = gauge.with_context(shown)? {
         return answer(&args, &options, &bar, &simulator, simulator.notes(), &[]);
     }
@@ -97,10 +97,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             args.data_set.display()
         );
     }
-    let simulator =
-        RigSimulator::read(&args.data_set, rig.as_ref(), &args.without).with_context(shown)?;
+    let simulator = RigSimulator::read(&args.data_set, rig, &args.without).with_context(shown)?;
     let rails = rails(simulator.nominal(), simulator.session());
-    answer(&args, &options, &bar, &simulator, &simulator.session().notes, &rails)
+    answer(&args, &options, &bar, &simulator, simulator.session().notes(), &rails)
 }
 
 /// Diagnoses, looks for the next experiment, and writes; `before` and `after` are notes around the diagnosis' own.

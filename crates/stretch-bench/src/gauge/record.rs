@@ -40,7 +40,13 @@ impl Record {
         }
         let session = EvenSession::new(trials, &columns, SHORTEST)?;
         let all = |column: usize| -> Vec<f64> {
-            session.trials().iter().filter_map(|t| t.columns().get(column)).flatten().copied().collect()
+            session
+                .trials()
+                .iter()
+                .filter_map(|t| t.columns().get(column))
+                .flatten()
+                .copied()
+                .collect()
         };
         let spec = |trial: &EvenTrial| TrialSpec {
             name: trial.name().to_owned(),

@@ -75,7 +75,8 @@ impl Session {
     /// # Errors
     /// Files that cannot be read, and as [`Session::new`].
     pub fn read(folder: &Path, set: &DataSet) -> Result<Self, BenchError> {
-        let options = NEEDED.iter().fold(ReadOptions::new(), |options, name| options.require(*name));
+        let options =
+            NEEDED.iter().fold(ReadOptions::new(), |options, name| options.require(*name));
         Self::new(&set.load(folder, &options)?)
     }
 
@@ -282,8 +283,10 @@ impl Inputs {
             .iter()
             .filter_map(|t| t.pressure_kpa.as_ref().map(|p| smooth(t, p, pressure_sd, true)))
             .collect();
-        let begin =
-            trials.iter().map(|t| Self::begin(t, session.dt_s, stroke, pressure_sd, supply_kpa)).collect();
+        let begin = trials
+            .iter()
+            .map(|t| Self::begin(t, session.dt_s, stroke, pressure_sd, supply_kpa))
+            .collect();
         Self { length, pressure, begin, stroke }
     }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use stretch_bench::{GaugeSimulator, RigSimulator};
-use stretch_data::{RigFile, Trial};
+use stretch_data::Trial;
 use stretch_gap::{
     Diagnosis, Evidence, GapError, Laboratory, Options, Simulator, diagnose, next_experiment,
 };
@@ -28,14 +28,15 @@ use crate::report::{Subject, diagnosis_page};
 ///   stretch diagnose knit.csv --reference angle_deg --signal s2
 ///
 /// Test trials are read once, at the end. Without --rig the rig file that the data set names is
-/// the simulator, else the stock rig.
+/// the simulator, else the stock rig. Its parameters may be re-tuned within their tolerances, its
+/// effects are part of it.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
     /// Folder with dataset.toml, or a trial
     #[arg(value_name = "DATASET")]
     data_set: PathBuf,
-    /// Rig file: nominal parameters with their tolerances
+    /// Rig file: nominal parameters with their tolerances, and effects that it has already
     #[arg(long, value_name = "rig.toml")]
     rig: Option<PathBuf>,
     /// Write the diagnosis as JSON
@@ -83,11 +84,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         ..Options::default()
     };
     let bar = spinner();
-    let rig = args.rig.as_deref().map(RigFile::read).transpose()?;
+    let rig = args.rig.as_deref();
     let shown = || args.data_set.display().to_string();
     let columns = args.reference.as_deref().zip(args.signal.as_deref());
-    let bench =
-        Bench::read(&args.data_set, columns, rig.as_ref(), &args.without).with_context(shown)?;
+    let bench = Bench::read(&args.data_set, columns, rig, &args.without).with_context(shown)?;
     let mut examined = bench.examine(&options, !args.no_next, &bar).with_context(shown)?;
     if let Some(path) = &args.experiment {
         match &examined.experiment {
@@ -120,7 +120,7 @@ impl Bench {
     pub(super) fn read(
         path: &Path,
         columns: Option<(&str, &str)>,
-        rig: Option<&RigFile>,
+        rig: Option<&Path>,
         without: &[String],
     ) -> anyhow::Result<Self> {
         if let Some(gauge) = GaugeSimulator::read(path, columns, rig, without)? {
@@ -152,7 +152,7 @@ impl Bench {
             Self::Gauge(gauge) => examine(gauge, options, look_on, bar, gauge.notes(), &[]),
             Self::Rig(rig) => {
                 let rails = rails(rig.nominal(), rig.session());
-                examine(rig, options, look_on, bar, &rig.session().notes, &rails)
+                examine(rig, options, look_on, bar, rig.session().notes(), &rails)
             }
         }
     }

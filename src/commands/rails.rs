@@ -11,15 +11,15 @@ const NOISY: f64 = 0.3;
 
 /// A sentence for every end of a channel at which more samples stand than noise would leave there.
 pub(super) fn rails(params: &RigParams, session: &Session) -> Vec<String> {
-    type Channel = fn(&RigTrial) -> Option<&Vec<f64>>;
+    type Channel = fn(&RigTrial) -> Option<&[f64]>;
     let channels: [(&str, &str, f64, Channel); 3] = [
-        ("bridge_v", "V", params[Key::SigmaV], |t| Some(&t.bridge_v)),
-        ("length_mm", "mm", params[Key::SigmaL], |t| Some(&t.length_mm)),
-        ("pressure_kpa", "kPa", 1e-3 * params[Key::SigmaP], |t| t.pressure_kpa.as_ref()),
+        ("bridge_v", "V", params[Key::SigmaV], |t| Some(t.bridge_v())),
+        ("length_mm", "mm", params[Key::SigmaL], |t| Some(t.length_mm())),
+        ("pressure_kpa", "kPa", 1e-3 * params[Key::SigmaP], RigTrial::pressure_kpa),
     ];
     let mut said = Vec::new();
     for (column, unit, sigma, of) in channels {
-        let values: Vec<f64> = session.trials.iter().filter_map(of).flatten().copied().collect();
+        let values: Vec<f64> = session.trials().iter().filter_map(of).flatten().copied().collect();
         let low = values.iter().copied().fold(f64::INFINITY, f64::min);
         let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         for (end, which) in [(low, "least"), (high, "greatest")] {
@@ -46,6 +46,8 @@ fn noise_off(values: &[f64], end: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use stretch_data::{Channel, SessionTrial, Trial};
+
     use super::*;
 
     #[test]
@@ -54,20 +56,21 @@ mod tests {
         let at = |clip: f64, size: f64| -> Vec<f64> {
             (0..3000).map(|i| ((0.01 * i as f64).sin() + size * noise(i)).min(clip)).collect()
         };
-        let trial = |bridge_v: Vec<f64>| RigTrial {
-            name: "a".into(),
-            kind: stretch_data::TrialKind::Other,
-            start_s: 0.0,
-            is_test: false,
-            dt_s: 0.01,
-            inlet: vec![0.5; 3000],
-            outlet: vec![0.0; 3000],
-            pressure_kpa: None,
-            length_mm: (0..3000).map(|i| 170.0 - 0.001 * i as f64 + 0.1 * noise(i)).collect(),
-            bridge_v,
-        };
-        let said = |values| {
-            let session = Session { trials: vec![trial(values)], notes: Vec::new() };
+        let length: Vec<f64> =
+            (0..3000).map(|i| 170.0 - 0.001 * i as f64 + 0.1 * noise(i)).collect();
+        let channel = |name: &str, values| Channel { name: name.into(), values };
+        let said = |bridge_v| {
+            let trial = Trial {
+                name: "a".into(),
+                time_s: (0..3000).map(|i| 0.01 * f64::from(i)).collect(),
+                channels: vec![
+                    channel("inlet", vec![0.5; 3000]),
+                    channel("outlet", vec![0.0; 3000]),
+                    channel("length_mm", length.clone()),
+                    channel("bridge_v", bridge_v),
+                ],
+            };
+            let session = Session::new(&[SessionTrial::new(trial)]).expect("a session");
             rails(&RigParams::default(), &session)
         };
         assert!(said(at(9.0, 0.01)).is_empty());

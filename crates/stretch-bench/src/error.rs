@@ -14,15 +14,14 @@ pub enum BenchError {
     /// The rig or an effect was refused.
     #[error(transparent)]
     Sim(#[from] SimError),
-    /// A column that every trial needs is missing.
-    #[error("{trial}: there is no column {column}, which {needs}")]
-    MissingColumn {
-        /// The trial.
-        trial: String,
-        /// The column.
-        column: String,
-        /// What needs it.
-        needs: &'static str,
+    /// A rig file was refused.
+    #[error("{file}: {cause}")]
+    RigFile {
+        /// The file.
+        file: String,
+        /// What is wrong in it.
+        #[source]
+        cause: SimError,
     },
     /// A column is not what its name says.
     #[error("{column}: {found}; {hint}")]

@@ -4,7 +4,8 @@ mod error;
 mod gauge;
 mod outside;
 mod rig;
+mod rig_file;
 
 pub use error::BenchError;
-pub use gauge::{GaugeSimulator, GaugeTrial};
-pub use rig::{RigSimulator, RigTrial, Session};
+pub use gauge::{GaugeSetup, GaugeSimulator};
+pub use rig::{RigSetup, RigSimulator, RigTrial, Session};

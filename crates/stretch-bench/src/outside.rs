@@ -32,9 +32,16 @@ pub(crate) struct Recorder {
 }
 
 impl<'a> Acting<'a> {
-    /// Sorts the effects of a model; `rows` are the entries of its catalogue.
-    pub(crate) fn of(rows: &[&'static dyn Effect], model: &'a Model) -> Result<Self, BenchError> {
-        let mut acting = Self { inside: EffectSet::new(), deadband: None, skew: None, hum: None };
+    /// Sorts the effects of a model on top of those that the simulator already has; `rows` are the entries of its
+    /// catalogue. A hum's phase is the record's, so that of a rig file, too, acts outside.
+    pub(crate) fn of(
+        base: &EffectSet,
+        rows: &[&'static dyn Effect],
+        model: &'a Model,
+    ) -> Result<Self, BenchError> {
+        let mut acting = Self { inside: base.clone(), deadband: None, skew: None, hum: None };
+        let hum = acting.inside.remove("mains_hum");
+        acting.hum = hum.map(|hum| (hum.values()[0], hum.values()[1]));
         for (index, values) in &model.effects {
             let row = rows[*index];
             match row.name() {

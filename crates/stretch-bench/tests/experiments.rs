@@ -1,28 +1,17 @@
 //! The menu of experiments: what motion cannot part, other experiments do.
 
-use stretch_bench::{RigSimulator, RigTrial, Session};
-use stretch_data::TrialKind;
+use stretch_bench::{RigSetup, RigSimulator, Session};
+use stretch_data::SessionTrial;
 use stretch_gap::{Model, Simulator, differences};
 
 /// A rig beside an arbitrary trial.
 fn rig() -> RigSimulator {
     let plan = stretch_sim::TrialPlan::arbitrary(1, 5);
     let mut session = stretch_sim::Session::new(&Default::default(), &Default::default()).unwrap();
-    let (_, trial) = session.run(&plan).unwrap();
-    let column = |name: &str| trial.channel(name).unwrap().to_vec();
-    let trial = RigTrial {
-        name: "arbitrary".into(),
-        kind: TrialKind::Arbitrary,
-        start_s: 0.0,
-        is_test: false,
-        dt_s: 0.01,
-        inlet: column("inlet"),
-        outlet: column("outlet"),
-        pressure_kpa: None,
-        length_mm: column("length_mm"),
-        bridge_v: column("bridge_v"),
-    };
-    RigSimulator::new(Session::new(vec![trial]).unwrap(), None, &[]).unwrap()
+    let (_, mut trial) = session.run(&plan).unwrap();
+    trial.channels.retain(|c| c.name != "pressure_kpa");
+    let session = Session::new(&[SessionTrial::new(trial)]).unwrap();
+    RigSimulator::new(RigSetup { session, rig: Default::default(), without: &[] }).unwrap()
 }
 
 /// D of every experiment of the menu for two effects at given first parameters.

@@ -2,9 +2,10 @@
 
 mod support;
 
-use stretch_bench::{BenchError, GaugeSimulator, GaugeTrial};
-use stretch_data::{Channel, RigFile, Trial};
+use stretch_bench::{BenchError, GaugeSetup, GaugeSimulator};
+use stretch_data::{Channel, RigFile, SessionTrial, Split, Trial, TrialKind};
 use stretch_gap::{Diagnosis, Options, Simulator, VerdictKind, diagnose, next_experiment};
+use stretch_sim::GaugeRig;
 use support::Noise;
 
 const DT_S: f64 = 0.01;
@@ -136,7 +137,7 @@ impl Gauge {
 }
 
 /// Trials of 60 s, the last a test trial when there are several: rod in mm, and a signal of offset 0.4 and gain -0.9.
-fn trials(fault: Fault, strength: f64, count: usize, seed: u64) -> Vec<GaugeTrial> {
+fn trials(fault: Fault, strength: f64, count: usize, seed: u64) -> Vec<SessionTrial> {
     let mut noise = Noise(seed);
     let mut gauge = Gauge::new(fault, strength);
     (0..count)
@@ -171,14 +172,22 @@ fn trials(fault: Fault, strength: f64, count: usize, seed: u64) -> Vec<GaugeTria
                 time_s: (0..e.len()).map(|i| DT_S * i as f64).collect(),
                 channels: vec![channel("rod_mm", length.collect()), channel("s1", signal)],
             };
-            GaugeTrial { trial, start_s, is_test: count > 1 && number + 1 == count }
+            let is_test = count > 1 && number + 1 == count;
+            let split = if is_test { Split::Test } else { Split::Fit };
+            SessionTrial { trial, kind: TrialKind::Other, start_s, split }
         })
         .collect()
 }
 
-fn run(trials: &[GaugeTrial], without: &[&str]) -> Diagnosis {
+/// The rod and the gauge of [`trials`].
+fn setup(trials: &[SessionTrial]) -> GaugeSetup<'_> {
+    GaugeSetup { trials, reference: "rod_mm", signal: "s1", rig: None, without: &[] }
+}
+
+fn run(trials: &[SessionTrial], without: &[&str]) -> Diagnosis {
     let without: Vec<String> = without.iter().map(|s| (*s).into()).collect();
-    let gauge = GaugeSimulator::new(trials, "rod_mm", "s1", None, &without).expect("a gauge");
+    let setup = GaugeSetup { without: &without, ..setup(trials) };
+    let gauge = GaugeSimulator::new(&setup).expect("a gauge");
     diagnose(&gauge, &Options::default(), &|_| (), &|| false).expect("a diagnosis").0
 }
 
@@ -274,7 +283,7 @@ fn play_in_the_reference_is_never_given_another_name() {
 #[test]
 fn twins_that_no_motion_parts_call_for_gauge_blocks() {
     let trials = trials(Fault::BentReference, 0.2, 3, 11);
-    let gauge = GaugeSimulator::new(&trials, "rod_mm", "s1", None, &[]).expect("a gauge");
+    let gauge = GaugeSimulator::new(&setup(&trials)).expect("a gauge");
     let (d, evidence) =
         diagnose(&gauge, &Options::default(), &|_| (), &|| false).expect("a diagnosis");
     assert_eq!(d.ambiguous.len(), 2, "{:?}", d.ambiguous);
@@ -292,11 +301,12 @@ fn a_rig_file_gives_the_nominal_gauge() {
              offset = {{ value = 0.4, tolerance_abs = 0.02 }}\n\
              gain = {{ value = {gain}, tolerance = 0.05 }}\n"
         );
-        RigFile::parse("gauge.toml", &text).expect("a rig file")
+        GaugeRig::from_file(&RigFile::parse("gauge.toml", &text).expect("TOML")).expect("a gauge")
     };
     let trials = trials(Fault::None, 0.0, 3, 5);
     let run = |gain: f64| {
-        let gauge = GaugeSimulator::new(&trials, "rod_mm", "s1", Some(&file(gain)), &[]);
+        let rig = file(gain);
+        let gauge = GaugeSimulator::new(&GaugeSetup { rig: Some(&rig), ..setup(&trials) });
         diagnose(&gauge.expect("a gauge"), &Options::default(), &|_| (), &|| false)
             .expect("a diagnosis")
             .0
@@ -309,7 +319,7 @@ fn a_rig_file_gives_the_nominal_gauge() {
     // One that is right is left alone.
     assert_eq!(run(-0.9).verdict, VerdictKind::NoGap);
     let whole = RigFile::parse("rig.toml", "[sensing]\nR0 = { value = 4.0 }\n").expect("a rig");
-    let refused = GaugeSimulator::new(&trials, "rod_mm", "s1", Some(&whole), &[]).unwrap_err();
+    let refused = GaugeRig::from_file(&whole).unwrap_err();
     assert!(refused.to_string().contains("kind"), "{refused}");
 }
 
@@ -325,7 +335,7 @@ fn uneven_and_broken_records_are_mended_and_told() {
     for channel in &mut trial.channels {
         channel.values = kept.iter().map(|&i| channel.values[i]).collect();
     }
-    let gauge = GaugeSimulator::new(&trials, "rod_mm", "s1", None, &[]).expect("a gauge");
+    let gauge = GaugeSimulator::new(&setup(&trials)).expect("a gauge");
     let parts: Vec<usize> = gauge.trials().iter().map(|t| t.samples).collect();
     assert!(parts.len() == 2 && parts.iter().sum::<usize>().abs_diff(5800) < 20, "{parts:?}");
     assert!((gauge.trials()[1].start_s - 32.0).abs() < 0.05);
@@ -343,7 +353,7 @@ fn columns_that_cannot_be_what_they_say_are_refused_or_told() {
     let gauge = |change: &dyn Fn(&mut Trial), reference: &str, signal: &str| {
         let mut trials = good.clone();
         change(&mut trials[0].trial);
-        GaugeSimulator::new(&trials, reference, signal, None, &[])
+        GaugeSimulator::new(&GaugeSetup { reference, signal, ..setup(&trials) })
     };
     let refused = |change: &dyn Fn(&mut Trial), reference: &str, signal: &str, words: &[&str]| {
         let error = gauge(change, reference, signal).unwrap_err().to_string();
@@ -357,7 +367,7 @@ fn columns_that_cannot_be_what_they_say_are_refused_or_told() {
     refused(&|t| values(t, 1, &|_, _| 0.5), "rod_mm", "s1", &["s1", "0.5", "dead"]);
     refused(&|t| values(t, 0, &|_, _| 130.0), "rod_mm", "s1", &["rod_mm", "130", "dead"]);
     let hole = |i: usize, x: f64| if i == 41 { f64::NAN } else { x };
-    refused(&|t| values(t, 1, &hole), "rod_mm", "s1", &["s1", "trial_0.csv", "sample 42"]);
+    refused(&|t| values(t, 1, &hole), "rod_mm", "s1", &["s1", "trial_0.csv", "row 43"]);
     let short = |t: &mut Trial| {
         t.time_s.truncate(250);
         t.channels.iter_mut().for_each(|c| c.values.truncate(250));

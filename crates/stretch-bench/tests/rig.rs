@@ -2,10 +2,12 @@
 
 mod support;
 
-use stretch_bench::{BenchError, RigSimulator, RigTrial, Session};
-use stretch_data::TrialKind;
+use stretch_bench::{BenchError, RigSetup, RigSimulator, Session};
+use stretch_data::{Channel, SessionTrial, Split, Trial, TrialKind};
 use stretch_gap::{Diagnosis, Options, VerdictKind, diagnose};
-use stretch_sim::{Chain, DEFAULT_STEP_S, EffectSet, Key, Openings, Recorded, RigParams, Start};
+use stretch_sim::{
+    Chain, DEFAULT_STEP_S, EffectSet, Key, Openings, Recorded, Rig, RigParams, Start,
+};
 use support::Noise;
 
 const DT_S: f64 = 0.01;
@@ -35,7 +37,12 @@ fn openings(trial: usize, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
 }
 
 /// A session of four trials, the last to test on.
-fn session(params: &RigParams, effects: &EffectSet, pressure: bool, seed: u64) -> Vec<RigTrial> {
+fn session(
+    params: &RigParams,
+    effects: &EffectSet,
+    pressure: bool,
+    seed: u64,
+) -> Vec<SessionTrial> {
     let chain = Chain::new(params, effects, DT_S, DEFAULT_STEP_S).expect("a rig");
     let mut memory = chain.memory();
     let mut noise = Noise(seed);
@@ -54,17 +61,22 @@ fn session(params: &RigParams, effects: &EffectSet, pressure: bool, seed: u64) -
             v.iter_mut().for_each(|x| *x += 0.002 * noise.gauss());
             let begun_s = start_s;
             start_s += n as f64 * DT_S + 15.0;
-            RigTrial {
-                name: format!("trial_{trial}.csv"),
+            let channel = |name: &str, values| Channel { name: name.into(), values };
+            let mut channels = vec![
+                channel("inlet", inlet),
+                channel("outlet", outlet),
+                channel("length_mm", l),
+                channel("bridge_v", v),
+            ];
+            if pressure {
+                channels.push(channel("pressure_kpa", p));
+            }
+            let time_s = (0..n).map(|i| DT_S * i as f64).collect();
+            SessionTrial {
+                trial: Trial { name: format!("trial_{trial}.csv"), time_s, channels },
                 kind: TrialKind::Arbitrary,
                 start_s: begun_s,
-                is_test: trial == 3,
-                dt_s: DT_S,
-                inlet,
-                outlet,
-                pressure_kpa: pressure.then_some(p),
-                length_mm: l,
-                bridge_v: v,
+                split: if trial == 3 { Split::Test } else { Split::Fit },
             }
         })
         .collect()
@@ -80,10 +92,16 @@ fn own_rig() -> RigParams {
     params
 }
 
-fn run(trials: Vec<RigTrial>, without: &[&str], options: &Options) -> Diagnosis {
-    let without: Vec<String> = without.iter().map(|s| (*s).to_owned()).collect();
+/// The stock rig beside trials.
+fn setup<'a>(trials: &[SessionTrial], without: &'a [String]) -> RigSetup<'a> {
     let session = Session::new(trials).expect("a session");
-    let simulator = RigSimulator::new(session, None, &without).expect("a simulator");
+    RigSetup { session, rig: Rig::default(), without }
+}
+
+fn run(trials: Vec<SessionTrial>, without: &[&str], options: &Options) -> Diagnosis {
+    let without: Vec<String> = without.iter().map(|s| (*s).to_owned()).collect();
+    let setup = setup(&trials, &without);
+    let simulator = RigSimulator::new(setup).expect("a simulator");
     diagnose(&simulator, options, &|_| (), &|| false).expect("a diagnosis").0
 }
 
@@ -190,26 +208,46 @@ fn what_the_catalogue_lacks_is_unknown() {
 #[test]
 fn bad_input_is_refused_in_a_sentence() {
     let good = session(&RigParams::default(), &EffectSet::new(), true, 5);
-    let changed = |change: &dyn Fn(&mut RigTrial)| {
+    let refused = |change: &dyn Fn(&mut SessionTrial)| {
         let mut trials = good.clone();
         trials.iter_mut().for_each(change);
-        Session::new(trials).expect_err("refused").to_string()
+        Session::new(&trials).expect_err("refused").to_string()
     };
-    let metres = changed(&|t| t.length_mm.iter_mut().for_each(|l| *l *= 1e-3));
+    let each = |column: &str, change: &dyn Fn(&mut Vec<f64>)| {
+        refused(&|t| {
+            let channel = t.trial.channels.iter_mut().find(|c| c.name == column);
+            change(&mut channel.expect("the column").values);
+        })
+    };
+    let metres = each("length_mm", &|l| l.iter_mut().for_each(|l| *l *= 1e-3));
     assert!(metres.contains("metres"), "{metres}");
-    let swapped = changed(&|t| std::mem::swap(&mut t.length_mm, &mut t.bridge_v));
-    assert!(swapped.contains("swapped"), "{swapped}");
-    let dead = changed(&|t| t.bridge_v.fill(1.24));
-    assert!(dead.contains("dead"), "{dead}");
-    let shut = changed(&|t| {
-        t.inlet.fill(0.0);
-        t.outlet.fill(0.0);
+    let swapped = refused(&|t| {
+        for channel in &mut t.trial.channels {
+            channel.name = match channel.name.as_str() {
+                "length_mm" => "bridge_v".into(),
+                "bridge_v" => "length_mm".into(),
+                other => other.into(),
+            };
+        }
     });
+    assert!(swapped.contains("swapped"), "{swapped}");
+    let dead = each("bridge_v", &|v| v.fill(1.24));
+    assert!(dead.contains("dead"), "{dead}");
+    let shut = refused(&|t| t.trial.channels[..2].iter_mut().for_each(|c| c.values.fill(0.0)));
     assert!(shut.contains("no valve ever opens"), "{shut}");
-    let tests = changed(&|t| t.is_test = true);
+    let tests = refused(&|t| t.split = Split::Test);
     assert!(tests.contains("split"), "{tests}");
-    let unknown =
-        RigSimulator::new(Session::new(good).expect("a session"), None, &["leek".to_owned()]);
+    let ragged = each("bridge_v", &|v| v.truncate(40));
+    assert!(ragged.contains("trial_0.csv, column bridge_v: it has 40 values"), "{ragged}");
+    let hole = each("bridge_v", &|v| v[40] = f64::NAN);
+    assert!(hole.contains("trial_0.csv, row 42, column bridge_v"), "{hole}");
+    let still = refused(&|t| t.trial.time_s[7] = t.trial.time_s[6]);
+    assert!(still.contains("trial_0.csv, row 9, column time_s"), "{still}");
+    let gone = refused(&|t| t.trial.channels.retain(|c| c.name != "inlet"));
+    assert!(gone.contains("no column inlet"), "{gone}");
+    assert!(Session::new(&[]).is_err());
+    let leek = ["leek".to_owned()];
+    let unknown = RigSimulator::new(setup(&good, &leek));
     assert!(
         matches!(unknown, Err(BenchError::UnknownEffect { nearest: Some(n), .. }) if n == "leak")
     );
@@ -218,7 +256,7 @@ fn bad_input_is_refused_in_a_sentence() {
 #[test]
 fn without_test_trials_the_last_part_is_held_back() {
     let mut trials = session(&own_rig(), &EffectSet::new(), true, 6);
-    trials.iter_mut().for_each(|t| t.is_test = false);
+    trials.iter_mut().for_each(|t| t.split = Split::Fit);
     let diagnosis = run(trials, &[], &shallow());
     assert!(diagnosis.notes.iter().any(|n| n.contains("no test trial")), "{:?}", diagnosis.notes);
     assert!(diagnosis.named.is_empty());

@@ -5,7 +5,7 @@ use stretch_core::{
     Normalisation, Provenance, Range, RangeSpec, RateEstimator, RateSource, SampleRate, Schema,
     Target,
 };
-use stretch_data::Trial;
+use stretch_data::{EvenSpec, Rows, Trial};
 use stretch_filter::RateFilter;
 
 use crate::{
@@ -13,9 +13,12 @@ use crate::{
     fitting::{Sample, fit},
     history_fit::{HistoryChoice, history},
     observer_fit::{ObserverChoice, observer},
-    series::{Series, even, extent, noise, polarity, sample_rate_hz, series},
+    series::{Series, extent, noise, polarity, sample_rate_hz, series},
     split::{DeadBands, branches},
 };
+
+/// Parts of a trial with fewer samples have no rate.
+const SHORTEST: usize = 3;
 
 /// A calibration and what there is to say about it.
 #[derive(Debug, Clone)]
@@ -31,7 +34,8 @@ pub struct Calibrated {
 /// Fits a calibration to logged trials.
 ///
 /// Ranges are pooled over all trials (of rates, over each branch) and frozen.
-/// Uneven logs are resampled, gaps cut them; [`Calibrated::notes`] says where.
+/// Trials are brought onto an even grid as [`Trial::even`] does it: lost samples are bridged, long gaps cut a trial,
+/// uneven stamps are resampled; [`Calibrated::notes`] says where.
 ///
 /// # Errors
 /// [`CalibrateError`], which names the trial and column, or the branch and term.
@@ -131,17 +135,27 @@ impl Prepared {
         let sample_rate = SampleRate::new(first_hz)?;
         let mut pieces = Vec::new();
         let mut notes = Vec::new();
+        let mut rows = Rows::default();
         for (index, trial) in trials.iter().enumerate() {
             let rate_hz = sample_rate_hz(trial)?;
             if (rate_hz / first_hz - 1.0).abs() > 0.05 {
                 let (trial, first) = (trial.name.clone(), first.name.clone());
                 return Err(CalibrateError::SampleRates { trial, rate_hz, first, first_hz });
             }
-            let (signal, reference) =
-                (trial.require(&options.signal)?, trial.require(&options.reference)?);
-            let even = even(trial, signal, reference, sample_rate)?;
-            notes.extend(even.note);
-            pieces.extend(even.pieces.into_iter().map(|piece| (index, piece)));
+            let columns = [options.signal.as_str(), options.reference.as_str()];
+            let spec = EvenSpec { rate_hz: sample_rate.hz(), shortest: SHORTEST };
+            let even = trial.even(&columns, spec)?;
+            rows.add(even.rows);
+            notes.extend(even.notes);
+            pieces.extend(even.parts.into_iter().filter_map(|part| {
+                let [signal, reference] = part.columns.try_into().ok()?;
+                Some((index, (signal, reference)))
+            }));
+        }
+        notes.extend(rows.note());
+        if pieces.is_empty() {
+            let (trial, samples) = (first.name.clone(), first.len());
+            return Err(CalibrateError::TooShort { trial, samples });
         }
         let target = target(options, &pieces)?;
         let pairs = pieces.iter().flat_map(|(_, (signal, reference))| {
@@ -165,7 +179,6 @@ impl Prepared {
         };
         let series = pieces
             .into_iter()
-            .filter(|(_, (signal, _))| signal.len() > 2)
             .map(|(trial, piece)| series(trial, piece, target, polarity, options.rate, sample_rate))
             .collect::<Result<_, _>>()?;
         let options = options.clone();

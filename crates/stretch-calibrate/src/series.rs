@@ -1,19 +1,13 @@
 //! A trial made ready to fit: even in time, with the rates that a fit may use.
 
-use stretch_core::{Design, Interval, Polarity, RateEstimator, SampleRate, Seconds, Stage, Target};
+use stretch_core::{Design, Interval, Polarity, RateEstimator, SampleRate, Stage, Target};
 use stretch_data::Trial;
 use stretch_filter::{
     RateFilter, SgFilter, SgShape,
-    log::{Between, Grid, central_difference, noise_of_differences, resample, second_differences},
+    log::{central_difference, noise_of_differences, second_differences},
 };
 
 use crate::CalibrateError;
-
-/// Intervals beyond this many periods cut a log in two.
-const GAP_PERIODS: f64 = 5.5;
-
-/// An interval off by more than this share of a period makes a log uneven.
-const EVEN_TOLERANCE: f64 = 0.2;
 
 /// A stretch of a trial without gaps, on an even grid.
 #[derive(Debug, Clone)]
@@ -34,59 +28,6 @@ pub(crate) fn sample_rate_hz(trial: &Trial) -> Result<f64, CalibrateError> {
     // time stamps are printed to the millisecond: 100.0000001 Hz is 100 Hz
     let whole = hz.round();
     Ok(if (hz - whole).abs() < 1e-3 * hz && whole > 0.0 { whole } else { hz })
-}
-
-/// A trial's signal and reference on an even grid, cut at gaps; and what had to be done.
-pub(crate) struct Even {
-    pub pieces: Vec<(Vec<f64>, Vec<f64>)>,
-    pub note: Option<String>,
-}
-
-/// Brings a trial onto an even grid at `rate`.
-pub(crate) fn even(
-    trial: &Trial,
-    signal: &[f64],
-    reference: &[f64],
-    rate: SampleRate,
-) -> Result<Even, CalibrateError> {
-    let periods = |w: &[f64]| (w[1] - w[0]) * rate.hz();
-    let uneven =
-        trial.time_s.windows(2).filter(|w| (periods(w) - 1.0).abs() > EVEN_TOLERANCE).count();
-    if uneven == 0 {
-        return Ok(Even { pieces: vec![(signal.to_vec(), reference.to_vec())], note: None });
-    }
-    let mut cuts = vec![0];
-    cuts.extend(
-        trial
-            .time_s
-            .windows(2)
-            .enumerate()
-            .filter(|(_, w)| periods(w) > GAP_PERIODS)
-            .map(|(i, _)| i + 1),
-    );
-    let gaps = cuts.len() - 1;
-    cuts.push(trial.len());
-    let mut pieces = Vec::new();
-    for cut in cuts.windows(2) {
-        let span = cut[0]..cut[1];
-        let times = &trial.time_s[span.clone()];
-        if times.len() < 2 {
-            continue;
-        }
-        let grid = Grid { start: Seconds(times[0]), sample_rate: rate };
-        let points = grid.points_until(Seconds(times[times.len() - 1]));
-        let on_grid = |values: &[f64]| {
-            let mut out = vec![0.0; points];
-            resample(times, values, grid, Between::Linear, &mut out).map(|()| out)
-        };
-        pieces.push((on_grid(&signal[span.clone()])?, on_grid(&reference[span])?));
-    }
-    let note = format!(
-        "{}: {uneven} uneven time stamps and {gaps} gaps; resampled to {} Hz by straight lines between samples",
-        trial.name,
-        rate.hz()
-    );
-    Ok(Even { pieces, note: Some(note) })
 }
 
 /// Standard deviation of the noise of some records; zero for less than three samples.

@@ -175,6 +175,33 @@ pub enum DataError {
         /// Seconds in the row before.
         previous_s: f64,
     },
+    /// Channels of a trial in memory that do not go with its time.
+    #[error("{trial}, column {column}: it has {found} values where time_s has {expected}")]
+    Lengths {
+        /// The trial.
+        trial: String,
+        /// The column.
+        column: String,
+        /// Its values.
+        found: usize,
+        /// Time stamps.
+        expected: usize,
+    },
+    /// A trial of another sample rate than the rest of its session.
+    #[error(
+        "{trial}, column time_s: {rate_hz:.2} samples a second where {usual_hz:.2} are usual; resample it to that rate or leave it out"
+    )]
+    OtherRate {
+        /// The trial.
+        trial: String,
+        /// Its rate.
+        rate_hz: f64,
+        /// The rate asked for: that of the session's first trial.
+        usual_hz: f64,
+    },
+    /// A session in which no trial has two samples.
+    #[error("no trial has two samples; give at least one recording")]
+    NoSamples,
     /// TOML that cannot be parsed at all.
     #[error("{file}, row {row}: this is not TOML: {message}")]
     NotToml {

@@ -2,6 +2,8 @@
 
 mod data_set;
 mod error;
+mod even;
+mod even_session;
 mod header;
 mod interrupt;
 mod lines;
@@ -20,6 +22,8 @@ mod write_whole;
 
 pub use data_set::{DataSet, Split, TrialEntry, TrialKind};
 pub use error::{DataError, Place};
+pub use even::{Even, EvenPart, EvenSpec, Rows};
+pub use even_session::{EvenSession, EvenTrial, SessionTrial};
 pub use interrupt::{interrupt, interrupted, writers_open};
 pub use nearest::nearest;
 pub use read::ReadOptions;

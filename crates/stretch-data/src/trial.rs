@@ -2,7 +2,7 @@
 
 use std::iter;
 
-use crate::{DataError, header::missing_column};
+use crate::{DataError, Place, header::missing_column};
 
 /// A recording: time stamps and, beside them, named channels of the same length.
 ///
@@ -95,6 +95,46 @@ impl Trial {
         let short = steps.iter().filter(|step| **step < 1.5 * median);
         let (count, sum) = short.fold((0_u32, 0.0), |(count, sum), step| (count + 1, sum + step));
         Some(f64::from(count) / sum).filter(|rate| rate.is_finite())
+    }
+
+    /// Refuses what no file could hold: channels of other lengths, time that does not rise, numbers that are none.
+    pub(crate) fn check_samples(&self) -> Result<(), DataError> {
+        // The header is row 1.
+        let place = |sample: usize, column: &str| Place {
+            file: self.name.clone(),
+            row: sample as u64 + 2,
+            column: column.to_owned(),
+        };
+        let not_finite = |column: &str, values: &[f64]| {
+            let sample = values.iter().position(|x| !x.is_finite())?;
+            let value = values[sample].to_string();
+            Some(DataError::NotFinite { at: place(sample, column), value })
+        };
+        if let Some(error) = not_finite("time_s", &self.time_s) {
+            return Err(error);
+        }
+        if let Some(i) = self.time_s.windows(2).position(|t| t[1] <= t[0]) {
+            let (previous_s, time_s) = (self.time_s[i], self.time_s[i + 1]);
+            return Err(DataError::TimeNotRising {
+                at: place(i + 1, "time_s"),
+                time_s,
+                previous_s,
+            });
+        }
+        for Channel { name, values } in &self.channels {
+            if values.len() != self.len() {
+                return Err(DataError::Lengths {
+                    trial: self.name.clone(),
+                    column: name.clone(),
+                    found: values.len(),
+                    expected: self.len(),
+                });
+            }
+            if let Some(error) = not_finite(name, values) {
+                return Err(error);
+            }
+        }
+        Ok(())
     }
 }
 

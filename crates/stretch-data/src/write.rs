@@ -32,35 +32,22 @@ impl Trial {
     /// that are there once, finite numbers, rising time, at least one sample.
     ///
     /// # Errors
-    /// [`DataError::Unwritable`] with what is wrong.
+    /// [`DataError::Unwritable`], [`DataError::Lengths`], or the sample that is at fault.
     pub fn check(&self) -> Result<(), DataError> {
         let fail =
             |problem: String| Err(DataError::Unwritable { name: self.name.clone(), problem });
         if self.time_s.is_empty() {
             return fail("it has no sample".to_owned());
         }
-        if let Some(i) = self.time_s.iter().position(|t| !t.is_finite()) {
-            return fail(format!("time {i} is not finite"));
-        }
-        if let Some(i) = self.time_s.windows(2).position(|pair| pair[1] <= pair[0]) {
-            return fail(format!("time does not rise from sample {i} to the next"));
-        }
-        for (i, Channel { name, values }) in self.channels.iter().enumerate() {
+        for (i, Channel { name, .. }) in self.channels.iter().enumerate() {
             if name.trim().is_empty() || name == "time_s" || name.contains(char::is_control) {
                 return fail(format!("{name:?} cannot be the name of a channel"));
             }
             if self.channels[..i].iter().any(|other| other.name == *name) {
                 return fail(format!("there are two channels {name}"));
             }
-            if values.len() != self.len() {
-                let (found, expected) = (values.len(), self.len());
-                return fail(format!("channel {name} has {found} values for {expected} times"));
-            }
-            if let Some(i) = values.iter().position(|value| !value.is_finite()) {
-                return fail(format!("sample {i} of channel {name} is not finite"));
-            }
         }
-        Ok(())
+        self.check_samples()
     }
 
     fn write_rows(&self, out: &mut dyn Write) -> io::Result<()> {

@@ -189,7 +189,7 @@ fn a_data_set_comes_back() {
     let error = set.write_folder(&out, true, None, |_| Ok::<_, DataError>(spoilt.clone()));
     assert_eq!(
         error.expect_err("not finite").to_string(),
-        "a.csv cannot be written: time 1 is not finite"
+        "a.csv, row 3, column time_s: \"NaN\" is not a finite number; correct it or remove that row"
     );
     assert_eq!(DataSet::read(&out).expect("still there"), set);
 }

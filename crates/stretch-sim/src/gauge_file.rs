@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use stretch_data::{Parameter, RigFile};
 
-use crate::{EffectSet, GaugeSpec, SimError, nearest::nearest};
+use crate::{EffectSet, GaugeSpec, SimError, Tolerance, nearest::nearest};
 
 /// What `kind` says of a gauge alone.
 const KIND: &str = "gauge";
@@ -15,12 +15,26 @@ const TABLE: &str = "sensing";
 /// Parameters that must be there; `pressure_scale` may be.
 const REQUIRED: [&str; 4] = ["zero", "span", "offset", "gain"];
 
-impl GaugeSpec {
-    /// The gauge and its effects that a file of `kind = "gauge"` describes.
+/// A gauge alone as it should be: its numbers, how far offset and gain may be wrong, and its effects.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GaugeRig {
+    /// Numbers.
+    pub spec: GaugeSpec,
+    /// Tolerance of the offset.
+    pub offset: Tolerance,
+    /// Tolerance of the gain.
+    pub gain: Tolerance,
+    /// Effects that are on.
+    pub effects: EffectSet,
+}
+
+impl GaugeRig {
+    /// The gauge that a file of `kind = "gauge"` describes. Offset and gain are exact unless they have a tolerance, as
+    /// every parameter of a rig file; a gauge has no stock values, so each must be there.
     ///
     /// ```
     /// use stretch_data::RigFile;
-    /// use stretch_sim::GaugeSpec;
+    /// use stretch_sim::{GaugeRig, Tolerance};
     /// let text = r#"
     /// kind = "gauge"
     /// [[effect]]
@@ -30,19 +44,19 @@ impl GaugeSpec {
     /// zero = { value = 2.0 }
     /// span = { value = 88.0 }
     /// offset = { value = 0.01 }
-    /// gain = { value = 0.2 }
+    /// gain = { value = 0.2, tolerance = 0.05 }
     /// "#;
-    /// let (spec, effects) = GaugeSpec::from_file(&RigFile::parse("rig.toml", text)?)?;
-    /// assert_eq!((spec.span, effects.iter().count()), (88.0, 1));
-    /// let again = spec.to_file(&effects);
-    /// assert_eq!(GaugeSpec::from_file(&again)?.0, spec);
+    /// let gauge = GaugeRig::from_file(&RigFile::parse("rig.toml", text)?)?;
+    /// assert_eq!((gauge.spec.span, gauge.effects.iter().count()), (88.0, 1));
+    /// assert_eq!((gauge.offset, gauge.gain), (Tolerance::Exact, Tolerance::Relative(0.05)));
+    /// assert_eq!(GaugeRig::from_file(&gauge.to_file())?, gauge);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
     /// # Errors
     /// Another kind, a table, parameter or effect that is not known, a parameter
     /// that is missing, or a span or gain that is not usable.
-    pub fn from_file(file: &RigFile) -> Result<(Self, EffectSet), SimError> {
+    pub fn from_file(file: &RigFile) -> Result<Self, SimError> {
         let unknown = |owner: &str, name: &str, nearest| SimError::UnknownParameter {
             owner: owner.to_owned(),
             name: name.to_owned(),
@@ -66,7 +80,7 @@ impl GaugeSpec {
                 SimError::MissingParameter { owner: TABLE.to_owned(), name: name.to_owned() }
             })
         };
-        let spec = Self {
+        let spec = GaugeSpec {
             zero: value("zero")?,
             span: value("span")?,
             offset: value("offset")?,
@@ -76,21 +90,28 @@ impl GaugeSpec {
         let effects = EffectSet::from_entries(&file.effects)?;
         // whatever cannot run is refused here, not at the first trial
         crate::Gauge::new(spec, &effects, 0.01)?;
-        Ok((spec, effects))
+        let tolerance = |name: &str| table.get(name).map_or(Tolerance::Exact, Tolerance::of);
+        Ok(Self { spec, offset: tolerance("offset"), gain: tolerance("gain"), effects })
     }
 
-    /// The gauge and its effects as a file. The priors are flat: no tolerances.
-    pub fn to_file(&self, effects: &EffectSet) -> RigFile {
-        let exact = |value| Parameter { value, tolerance: None, tolerance_abs: None };
-        let values = [self.zero, self.span, self.offset, self.gain].map(exact);
-        let mut table: BTreeMap<String, Parameter> =
-            REQUIRED.map(str::to_owned).into_iter().zip(values).collect();
-        if let Some(scale) = self.pressure_scale {
-            table.insert("pressure_scale".to_owned(), exact(scale));
+    /// The gauge as a file.
+    pub fn to_file(&self) -> RigFile {
+        let GaugeSpec { zero, span, offset, gain, pressure_scale } = self.spec;
+        let exact = Tolerance::Exact;
+        let mut table: BTreeMap<String, Parameter> = [
+            ("zero", exact.of_value(zero)),
+            ("span", exact.of_value(span)),
+            ("offset", self.offset.of_value(offset)),
+            ("gain", self.gain.of_value(gain)),
+        ]
+        .map(|(name, parameter)| (name.to_owned(), parameter))
+        .into();
+        if let Some(scale) = pressure_scale {
+            table.insert("pressure_scale".to_owned(), exact.of_value(scale));
         }
         RigFile {
             kind: Some(KIND.to_owned()),
-            effects: effects.to_entries(),
+            effects: self.effects.to_entries(),
             stages: BTreeMap::from([(TABLE.to_owned(), table)]),
         }
     }

@@ -26,6 +26,7 @@ pub use effects::{
 };
 pub use error::SimError;
 pub use gauge::{Gauge, GaugeSpec};
+pub use gauge_file::GaugeRig;
 pub use grid::{DEFAULT_STEP_S, Grid};
 pub use memory::Memory;
 pub use operator::{

@@ -2,6 +2,8 @@
 
 use std::ops::{Index, IndexMut};
 
+use stretch_data::Parameter;
+
 use crate::stage::Stage;
 
 /// How far a nominal parameter may be wrong without that being an unmodelled effect: one standard deviation.
@@ -29,6 +31,25 @@ impl Tolerance {
             Self::Relative(share) => share * value.abs(),
             Self::Absolute(sd) => sd,
         }
+    }
+
+    /// What a rig file says: exact where it gives no tolerance, or none above zero.
+    pub(crate) fn of(parameter: &Parameter) -> Self {
+        match (parameter.tolerance_abs, parameter.tolerance) {
+            (Some(sd), _) if sd > 0.0 => Self::Absolute(sd),
+            (None, Some(share)) if share > 0.0 => Self::Relative(share),
+            _ => Self::Exact,
+        }
+    }
+
+    /// A value with this tolerance as a rig file holds it.
+    pub(crate) fn of_value(self, value: f64) -> Parameter {
+        let (tolerance, tolerance_abs) = match self {
+            Self::Exact => (None, None),
+            Self::Relative(share) => (Some(share), None),
+            Self::Absolute(sd) => (None, Some(sd)),
+        };
+        Parameter { value, tolerance, tolerance_abs }
     }
 }
 

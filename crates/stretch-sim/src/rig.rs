@@ -58,7 +58,16 @@ impl Default for RunSettings {
 }
 
 impl Rig {
-    /// The rig that a file describes: every parameter must be there, within its physical limits.
+    /// The rig that a file describes: the one meaning of a rig file, for simulation and diagnosis alike.
+    ///
+    /// | the file says | value | tolerance |
+    /// | --- | --- | --- |
+    /// | a value and a tolerance | the file's | the file's: a diagnosis may re-tune it |
+    /// | a value alone | the file's | exact: it stays put |
+    /// | nothing of the parameter | the stock rig's | the stock rig's |
+    ///
+    /// Its effects are part of the rig. The table `[simulation]`, in which a simulation says how it was run, is
+    /// [`RunSettings::from_file`]'s and is passed over here.
     ///
     /// ```
     /// use stretch_data::RigFile;
@@ -74,7 +83,7 @@ impl Rig {
     /// ```
     ///
     /// # Errors
-    /// A table, parameter or effect that is not known, a parameter that is missing, not positive or beyond its limits,
+    /// A table, parameter or effect that is not known, a parameter that is not positive or beyond its limits,
     /// a sleeve that goes slack within the stroke, or a rig file of another kind (`kind = "gauge"`).
     pub fn from_file(file: &RigFile) -> Result<Self, SimError> {
         if let Some(kind) = file.kind.as_ref().filter(|kind| *kind != "rig") {
@@ -85,7 +94,6 @@ impl Rig {
             });
         }
         let mut rig = Self::default();
-        let mut seen = [false; Key::COUNT];
         let tables = [Stage::Pneumatics, Stage::Muscle, Stage::Sensing, Stage::Reference];
         for (table, parameters) in file.stages.iter().filter(|(name, _)| *name != SIMULATION) {
             if !tables.iter().any(|stage| stage.name() == table) {
@@ -106,21 +114,9 @@ impl Rig {
                         nearest: elsewhere.or_else(|| nearest(name, here.map(|p| p.name))),
                     });
                 };
-                seen[info.key as usize] = true;
                 rig.params[info.key] = parameter.value;
-                rig.tolerances[info.key as usize] =
-                    match (parameter.tolerance_abs, parameter.tolerance) {
-                        (Some(sd), _) if sd > 0.0 => Tolerance::Absolute(sd),
-                        (None, Some(share)) if share > 0.0 => Tolerance::Relative(share),
-                        _ => Tolerance::Exact,
-                    };
+                rig.tolerances[info.key as usize] = Tolerance::of(parameter);
             }
-        }
-        if let Some(info) = PARAMETERS.iter().find(|p| !seen[p.key as usize]) {
-            return Err(SimError::MissingParameter {
-                owner: info.stage.name().into(),
-                name: info.name.into(),
-            });
         }
         rig.effects = EffectSet::from_entries(&file.effects)?;
         rig.check()?;
@@ -207,16 +203,11 @@ impl Rig {
     pub fn to_file(&self, run: Option<&RunSettings>) -> RigFile {
         let mut stages: BTreeMap<String, BTreeMap<String, Parameter>> = BTreeMap::new();
         for info in &PARAMETERS {
-            let (tolerance, tolerance_abs) = match self.tolerances[info.key as usize] {
-                Tolerance::Exact => (None, None),
-                Tolerance::Relative(share) => (Some(share), None),
-                Tolerance::Absolute(sd) => (None, Some(sd)),
-            };
-            let parameter = Parameter { value: self.params[info.key], tolerance, tolerance_abs };
+            let parameter = self.tolerances[info.key as usize].of_value(self.params[info.key]);
             stages.entry(info.stage.name().into()).or_default().insert(info.name.into(), parameter);
         }
         if let Some(run) = run {
-            let exact = |value: f64| Parameter { value, tolerance: None, tolerance_abs: None };
+            let exact = |value: f64| Tolerance::Exact.of_value(value);
             let entries = [
                 ("seed", run.seed as f64),
                 ("step_s", run.step_s),

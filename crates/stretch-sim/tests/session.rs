@@ -3,7 +3,7 @@
 use stretch_data::{RigFile, Split, Trial};
 use stretch_sim::{
     CATALOGUE, Chain, DEFAULT_STEP_S, EffectSet, Gauge, GaugeSpec, Key, OPENINGS, Openings,
-    Recorded, Rig, RunSettings, Session, SimError, Start, TrialPlan, default_rig_text,
+    Recorded, Rig, RunSettings, Session, SimError, Start, Tolerance, TrialPlan, default_rig_text,
     paper_preset,
 };
 
@@ -170,7 +170,6 @@ fn rig_files_are_read_strictly() {
         let file = RigFile::parse("rig.toml", &text.replace(from, to)).unwrap();
         Rig::from_file(&file).unwrap_err().to_string()
     };
-    assert_eq!(error("tau_m = {", "# tau_m = {"), "`muscle` lacks the parameter `tau_m`");
     assert_eq!(
         error("value = 0.03,", "value = -0.03,"),
         "`muscle`: tau_m = -0.03 must be positive"
@@ -200,6 +199,19 @@ fn rig_files_are_read_strictly() {
     );
     let twice = "name = 'leak'\nc = 1e-11\n[[effect]]\nname = 'leak'\nc = 1e-11";
     assert_eq!(with(twice), "effect `leak` is given twice");
+}
+
+#[test]
+fn a_value_alone_is_exact_and_what_is_left_out_is_stock() {
+    let text = "[muscle]\ntau_m = { value = 0.05 }\nk_max = { value = 0.16, tolerance_abs = 0.01 }\n\
+                [simulation]\nseed = { value = 3 }\n";
+    let rig = Rig::from_file(&RigFile::parse("rig.toml", text).unwrap()).unwrap();
+    let mut wanted = Rig::default();
+    wanted.params[Key::TauM] = 0.05;
+    wanted.params[Key::KMax] = 0.16;
+    wanted.tolerances[Key::TauM as usize] = Tolerance::Exact;
+    wanted.tolerances[Key::KMax as usize] = Tolerance::Absolute(0.01);
+    assert_eq!(rig, wanted);
 }
 
 #[test]

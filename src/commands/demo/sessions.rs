@@ -7,8 +7,8 @@ use std::{
 };
 
 use anyhow::{Context, bail, ensure};
-use stretch_data::{DataSet, ReadOptions, Split, Trial, TrialKind};
-use stretch_gap::{GaugeSimulator, GaugeTrial};
+use stretch_bench::{GaugeSetup, GaugeSimulator};
+use stretch_data::{DataSet, ReadOptions, SessionTrial, Split, Trial, TrialKind};
 
 use super::published::{self, COMMIT, REPOSITORY};
 use crate::commands::{
@@ -111,10 +111,16 @@ impl Sessions {
         }
         // A session has its own zero, and nobody knows the pause before the next.
         let first = self.fit.iter().take(1);
-        let trials: Vec<GaugeTrial> = first
-            .map(|(_, trial)| GaugeTrial { trial: trial.clone(), start_s: 0.0, is_test: false })
-            .collect();
-        Ok(Bench::Gauge(GaugeSimulator::new(&trials, &self.reference, signal, None, &[])?))
+        let trials: Vec<SessionTrial> =
+            first.map(|(_, trial)| SessionTrial::new(trial.clone())).collect();
+        let setup = GaugeSetup {
+            trials: &trials,
+            reference: &self.reference,
+            signal,
+            rig: None,
+            without: &[],
+        };
+        Ok(Bench::Gauge(GaugeSimulator::new(&setup)?))
     }
 }
 

@@ -102,11 +102,14 @@ impl GaugeSimulator {
     /// The signal over a course, in units of its noise.
     fn prediction(&self, model: &Model, course: &Course) -> Result<Vec<Vec<f64>>, BenchError> {
         let of_reference = |row: &dyn Effect| row.stage() == Stage::Reference;
-        let mut model = model.clone();
+        let (mut model, mut base) = (model.clone(), self.effects.clone());
         if course.is_known {
             model.effects.retain(|(i, _)| !of_reference(self.rows[*i]));
+            for known in self.effects.iter().filter(|e| of_reference(e.effect())) {
+                base.remove(known.name());
+            }
         }
-        let acting = Acting::of(&self.rows, &model)?;
+        let acting = Acting::of(&base, &self.rows, &model)?;
         let gauge = Gauge::new(self.nominal(&model), &acting.inside, self.recorder.dt_s)?;
         let shown: Vec<f64> =
             course.e.iter().map(|e| self.spec.zero + self.spec.span * e).collect();

@@ -5,14 +5,13 @@ mod experiments;
 mod record;
 mod source;
 
-use stretch_data::{RigFile, unit};
+use stretch_data::{SessionTrial, unit};
 use stretch_gap::{
     Description, Dice, GapError, Model, Motion, ParameterSpec, Run, Simulator, StageSpec, TrialSpec,
 };
-use stretch_sim::{Effect, Gauge, GaugeSpec, Start};
+use stretch_sim::{Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Start, Tolerance};
 
 use catalogue::{Scope, catalogue, lag};
-pub use record::GaugeTrial;
 use record::Record;
 
 use crate::{
@@ -30,16 +29,31 @@ const GAIN: usize = 1;
 /// The one that says how the memories of the gauge begin the session: wound from below (1), from above (-1), settled.
 const WINDING: usize = 2;
 
+/// What a [`GaugeSimulator`] is made of.
+#[derive(Debug, Clone, Copy)]
+pub struct GaugeSetup<'a> {
+    /// Trials, each with both columns; `pressure_kpa` is welcome.
+    pub trials: &'a [SessionTrial],
+    /// Column of the reference: what the gauge measures.
+    pub reference: &'a str,
+    /// Column of the signal: what the gauge says.
+    pub signal: &'a str,
+    /// The gauge as it should be; without one zero, span, offset and gain are those of the record.
+    pub rig: Option<&'a GaugeRig>,
+    /// Effects that are left out of the catalogue.
+    pub without: &'a [String],
+}
+
 /// Any stretch sensor with a reference: y = offset + gain e, e the reference over its range in the fit trials.
 ///
-/// Offset and gain are free unless a rig file (`kind = "gauge"`) gives them. Effects of the catalogue act on e in place
+/// Offset and gain are free unless a rig file (`kind = "gauge"`) gives them; its effects act in every run. Effects of the catalogue act on e in place
 /// of the strain and on (y - offset)/gain in place of resistance and voltage. The reference is smoothed as far as its own
 /// noise allows; what of that noise arrives at the signal belongs to the floor. Noise comes from second differences:
 /// it is what changes from sample to sample, and errors that last longer count as gap.
 ///
 /// ```
-/// use stretch_data::{Channel, Trial};
-/// use stretch_bench::{GaugeSimulator, GaugeTrial};
+/// use stretch_data::{Channel, SessionTrial, Trial};
+/// use stretch_bench::{GaugeSetup, GaugeSimulator};
 /// use stretch_gap::{Options, VerdictKind, diagnose};
 /// // A sensor that shows 0.05 s late what a rod does.
 /// let rod = |t: f64| 40.0 + 20.0 * (1.3 * t).sin() + 10.0 * (3.1 * t).sin();
@@ -50,8 +64,10 @@ const WINDING: usize = 2;
 /// let signal = time_s.iter().enumerate().map(|(i, t)| 0.02 * rod(t - 0.05) + noise(i)).collect();
 /// let channels = vec![channel("rod_mm", length), channel("s1", signal)];
 /// let trial = Trial { name: "rod.csv".into(), time_s, channels };
-/// let trials = [GaugeTrial { trial, start_s: 0.0, is_test: false }];
-/// let gauge = GaugeSimulator::new(&trials, "rod_mm", "s1", None, &[])?;
+/// let trials = [SessionTrial::new(trial)];
+/// let (reference, signal) = ("rod_mm", "s1");
+/// let gauge =
+///     GaugeSimulator::new(&GaugeSetup { trials: &trials, reference, signal, rig: None, without: &[] })?;
 /// let (diagnosis, _) = diagnose(&gauge, &Options::default(), &|_| (), &|| false)?;
 /// assert_eq!(diagnosis.verdict, VerdictKind::Effect);
 /// assert_eq!(diagnosis.named, ["channel_skew"]);
@@ -60,6 +76,8 @@ const WINDING: usize = 2;
 #[derive(Debug)]
 pub struct GaugeSimulator {
     about: Description,
+    /// Effects that the gauge already has.
+    effects: EffectSet,
     rows: Vec<&'static dyn Effect>,
     record: Record,
     /// The reference of each trial as it drives the gauge.
@@ -72,75 +90,40 @@ pub struct GaugeSimulator {
 }
 
 impl GaugeSimulator {
-    /// Binds a gauge to trials and two of their columns. Effects called in `without` are left out. A rig file gives
-    /// zero, span, offset and gain, with their tolerances; its effects are not part of the nominal gauge.
+    /// Binds a gauge to trials and two of their columns.
     ///
     /// # Errors
-    /// Columns that are missing, dead, hold too few numbers or look swapped; names in `without` that nobody knows; a
-    /// rig file of another kind.
-    pub fn new(
-        trials: &[GaugeTrial],
-        reference: &str,
-        signal: &str,
-        rig: Option<&RigFile>,
-        without: &[String],
-    ) -> Result<Self, BenchError> {
+    /// Columns that are missing, dead, hold too few numbers or look swapped; names in `without` that nobody knows.
+    pub fn new(setup: &GaugeSetup<'_>) -> Result<Self, BenchError> {
+        let GaugeSetup { trials, reference, signal, rig, without } = *setup;
         check_names(without)?;
         let record = Record::read(trials, reference, signal)?;
-        let (low, high) = record.range(&record.reference);
+        let nominal = nominal(&record, rig);
         let (least, greatest) = record.range(&record.signal);
-        let spread = greatest - least;
-        let pressure_scale = (!record.pressure.is_empty())
-            .then(|| record.range(&record.pressure).1)
-            .filter(|scale| *scale > 0.0);
-        let mut spec =
-            GaugeSpec { zero: low, span: high - low, offset: 0.0, gain: 1.0, pressure_scale };
-        (spec.offset, spec.gain) = line(&record, &spec);
-        if let Some(file) = rig {
-            let given = GaugeSpec::from_file(file)?.0;
-            spec = GaugeSpec { pressure_scale: given.pressure_scale.or(pressure_scale), ..given };
-        }
-        let sd = |name: &str, value: f64| {
-            let own = rig.and_then(|r| r.stages.get("sensing")?.get(name));
-            own.and_then(|p| p.tolerance_abs.or(p.tolerance.map(|share| share * value.abs())))
-                .unwrap_or(3.0 * spread)
-        };
-        let parameter = |name: &str, nominal: f64| ParameterSpec {
-            is_evidence: rig.is_some(),
-            ..ParameterSpec::new(name, unit_of(signal), nominal).within(sd(name, nominal))
-        };
         let (reference_sd, noise) = (record.noise(&record.reference), record.noise(&record.signal));
         let inputs = parts(&record.trials, &record.reference)
             .map(|(_, x)| Smoothed::of(x, reference_sd, &unscheduled(x.len())))
             .collect();
-        let session = |t: &TrialSpec| t.start_s + t.samples as f64 * record.dt_s;
-        let begun = record.trials.first().map_or(0.0, |t| t.start_s);
-        let first = record.fitted().max_by_key(ExactSizeIterator::len).unwrap_or(0..0);
-        let scope = Scope {
-            session_s: record.trials.last().map_or(0.0, session) - begun,
-            lag_s: lag(&record.reference[first.clone()], &record.signal[first], record.dt_s),
-            has_pressure: spec.pressure_scale.is_some(),
-        };
-        let (effects, rows) = catalogue(without, scope);
+        let known: Vec<String> = nominal
+            .effects
+            .iter()
+            .map(|e| e.name().to_owned())
+            .chain(without.iter().cloned())
+            .collect();
+        let (effects, rows) = catalogue(&known, scope(&record, &nominal.spec));
         let stage = StageSpec::new("sensing", signal, unit_of(signal), &[OFFSET, GAIN, WINDING]);
-        let parameters = vec![
-            parameter("offset", spec.offset),
-            parameter("gain", spec.gain),
-            ParameterSpec {
-                is_evidence: false,
-                ..ParameterSpec::new("winding", "1", 0.0).within(1.0 / 3.0)
-            },
-        ];
+        let parameters = parameters(&nominal, signal, rig.is_some());
         let (trials, dt_s) = (record.trials.clone(), record.dt_s);
         Ok(Self {
             about: Description { stages: vec![stage], parameters, effects, trials, dt_s },
+            effects: nominal.effects,
             rows,
             inputs,
             reference: reference.into(),
             reference_sd,
-            recorder: Recorder { noise, unit: spread, dt_s: record.dt_s },
+            recorder: Recorder { noise, unit: greatest - least, dt_s: record.dt_s },
             record,
-            spec,
+            spec: nominal.spec,
         })
     }
 
@@ -157,7 +140,7 @@ impl GaugeSimulator {
 impl GaugeSimulator {
     /// The signal over the trials of a run.
     fn signal(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), BenchError> {
-        let acting = Acting::of(&self.rows, run.model)?;
+        let acting = Acting::of(&self.effects, &self.rows, run.model)?;
         let gauge = Gauge::new(self.nominal(run.model), &acting.inside, self.dt_s())?;
         let mut memory = gauge.memory();
         // What was done to the gauge before the session nobody knows.
@@ -234,6 +217,50 @@ fn parts<'a>(
         rest = behind;
         (trial, own)
     })
+}
+
+/// The gauge of a rig file; without one that of the record, its offset and gain free.
+fn nominal(record: &Record, rig: Option<&GaugeRig>) -> GaugeRig {
+    let (low, high) = record.range(&record.reference);
+    let (least, greatest) = record.range(&record.signal);
+    let scale = (!record.pressure.is_empty()).then(|| record.range(&record.pressure).1);
+    let pressure_scale = scale.filter(|scale| *scale > 0.0);
+    if let Some(rig) = rig {
+        let mut rig = rig.clone();
+        rig.spec.pressure_scale = rig.spec.pressure_scale.or(pressure_scale);
+        return rig;
+    }
+    let mut spec =
+        GaugeSpec { zero: low, span: high - low, offset: 0.0, gain: 1.0, pressure_scale };
+    (spec.offset, spec.gain) = line(record, &spec);
+    let free = Tolerance::Absolute(3.0 * (greatest - least));
+    GaugeRig { spec, offset: free, gain: free, effects: EffectSet::new() }
+}
+
+fn parameters(rig: &GaugeRig, signal: &str, is_evidence: bool) -> Vec<ParameterSpec> {
+    let parameter = |name: &str, nominal: f64, tolerance: Tolerance| ParameterSpec {
+        is_evidence,
+        ..ParameterSpec::new(name, unit_of(signal), nominal).within(tolerance.sd(nominal))
+    };
+    vec![
+        parameter("offset", rig.spec.offset, rig.offset),
+        parameter("gain", rig.spec.gain, rig.gain),
+        ParameterSpec {
+            is_evidence: false,
+            ..ParameterSpec::new("winding", "1", 0.0).within(1.0 / 3.0)
+        },
+    ]
+}
+
+fn scope(record: &Record, spec: &GaugeSpec) -> Scope {
+    let end_s = |t: &TrialSpec| t.start_s + t.samples as f64 * record.dt_s;
+    let begun_s = record.trials.first().map_or(0.0, |t| t.start_s);
+    let longest = record.fitted().max_by_key(ExactSizeIterator::len).unwrap_or(0..0);
+    Scope {
+        session_s: record.trials.last().map_or(0.0, end_s) - begun_s,
+        lag_s: lag(&record.reference[longest.clone()], &record.signal[longest], record.dt_s),
+        has_pressure: spec.pressure_scale.is_some(),
+    }
 }
 
 /// Offset and gain of the straight line of the signal over e, in the trials that are fitted.

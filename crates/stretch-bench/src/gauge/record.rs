@@ -2,34 +2,17 @@
 
 use std::ops::Range;
 
-use stretch_data::{Trial, unit};
+use stretch_data::{EvenSession, EvenTrial, SessionTrial, unit};
 use stretch_gap::{TrialSpec, noise_variance};
 
 use crate::error::BenchError;
 
 /// Least samples that may be fitted.
 const LEAST: usize = 300;
-/// Least samples of a stretch between two gaps in time.
+/// Parts of a trial with fewer samples are left out.
 const SHORTEST: usize = 100;
-/// A step of more than so many samples is a gap: what lies behind it is a trial of its own.
-const GAP: f64 = 4.5;
-/// A sample that comes so many samples too early or too late is uneven.
-const UNEVEN: f64 = 0.6;
-/// Pause assumed between trials that do not say when they began, s.
-const PAUSE_S: f64 = 15.0;
 /// Column of the pressure.
 const PRESSURE: &str = "pressure_kpa";
-
-/// A measured trial of a gauge alone.
-#[derive(Debug, Clone, PartialEq)]
-pub struct GaugeTrial {
-    /// Its columns.
-    pub trial: Trial,
-    /// When it began, s since the gauge was first stretched.
-    pub start_s: f64,
-    /// Whether it is tested on and never fitted.
-    pub is_test: bool,
-}
 
 /// All trials end to end.
 #[derive(Debug)]
@@ -47,156 +30,40 @@ impl Record {
     /// # Errors
     /// Columns that are missing, dead or hold what is no number, rates that differ, too little to fit.
     pub(super) fn read(
-        trials: &[GaugeTrial],
+        trials: &[SessionTrial],
         reference: &str,
         signal: &str,
     ) -> Result<Self, BenchError> {
-        let rates = || trials.iter().filter_map(|t| Some((&t.trial.name, t.trial.rate_hz()?)));
-        let dt_s = rates().next().map_or(0.01, |(_, rate)| 1.0 / rate);
-        if let Some((name, rate)) = rates().find(|(_, rate)| (rate * dt_s - 1.0).abs() > 0.02) {
-            return Err(BenchError::Implausible {
-                column: format!("time_s of {name}"),
-                found: format!("{rate:.2} samples a second where {:.2} are usual", 1.0 / dt_s),
-                hint: "all trials need the same sample rate: convert them first".into(),
-            });
+        let mut columns = vec![reference, signal];
+        if trials.iter().all(|t| t.trial.channel(PRESSURE).is_some()) {
+            columns.push(PRESSURE);
         }
-        let has_pressure = trials.iter().all(|t| t.trial.channel(PRESSURE).is_some());
-        let mut record = Self {
-            trials: Vec::new(),
-            reference: Vec::new(),
-            signal: Vec::new(),
-            pressure: Vec::new(),
-            dt_s,
-            notes: Vec::new(),
+        let session = EvenSession::new(trials, &columns, SHORTEST)?;
+        let all = |column: usize| -> Vec<f64> {
+            session
+                .trials()
+                .iter()
+                .filter_map(|t| t.columns().get(column))
+                .flatten()
+                .copied()
+                .collect()
         };
-        for (i, start_s) in record.order(trials) {
-            let one = &trials[i];
-            let columns = [Some(reference), Some(signal), has_pressure.then_some(PRESSURE)];
-            record.add(one, start_s, columns)?;
-        }
+        let spec = |trial: &EvenTrial| TrialSpec {
+            name: trial.name().to_owned(),
+            samples: trial.columns()[0].len(),
+            start_s: trial.start_s(),
+            is_test: trial.is_test(),
+        };
+        let mut record = Self {
+            trials: session.trials().iter().map(spec).collect(),
+            reference: all(0),
+            signal: all(1),
+            pressure: all(2),
+            dt_s: session.dt_s(),
+            notes: session.notes().to_vec(),
+        };
         record.check(reference, signal)?;
         Ok(record)
-    }
-
-    /// Trials in order of time, and when each began.
-    fn order(&mut self, trials: &[GaugeTrial]) -> Vec<(usize, f64)> {
-        let mut order: Vec<usize> = (0..trials.len()).collect();
-        order.sort_by(|a, b| trials[*a].start_s.total_cmp(&trials[*b].start_s));
-        let start = |i: &usize| trials[*i].start_s;
-        if order.windows(2).all(|pair| start(&pair[1]) > start(&pair[0])) {
-            return order.into_iter().map(|i| (i, trials[i].start_s)).collect();
-        }
-        self.notes.push(
-            "the trials give no rising start_s: pauses of 15 s in the order of the file are assumed"
-                .into(),
-        );
-        let mut at = 0.0;
-        let mut begin = |trial: &GaugeTrial| {
-            let begun = at;
-            at += trial.trial.duration_s() + PAUSE_S;
-            begun
-        };
-        trials.iter().enumerate().map(|(i, t)| (i, begin(t))).collect()
-    }
-
-    fn add(
-        &mut self,
-        one: &GaugeTrial,
-        start_s: f64,
-        columns: [Option<&str>; 3],
-    ) -> Result<(), BenchError> {
-        let trial = &one.trial;
-        let mut found = [&[][..]; 3];
-        for (values, name) in found.iter_mut().zip(columns) {
-            let Some(name) = name else { continue };
-            *values = trial.require(name)?;
-            if let Some(row) = values.iter().position(|x| !x.is_finite()) {
-                return Err(BenchError::Implausible {
-                    column: format!("{name} of {}", trial.name),
-                    found: format!("{} in sample {}", values[row], row + 1),
-                    hint: "give numbers only, or cut the trial there".into(),
-                });
-            }
-        }
-        let stretches = self.stretches(trial);
-        let several = stretches.len() > 1;
-        for (part, stretch) in stretches.into_iter().enumerate() {
-            let picked = self.picked(trial, &stretch);
-            let begin_s = trial.time_s[stretch.start] - trial.time_s[0];
-            self.trials.push(TrialSpec {
-                name: match several {
-                    true => format!("{} (part {})", trial.name, part + 1),
-                    false => trial.name.clone(),
-                },
-                samples: picked.len(),
-                start_s: start_s + begin_s,
-                is_test: one.is_test,
-            });
-            let own = [&mut self.reference, &mut self.signal, &mut self.pressure];
-            for (all, values) in own.into_iter().zip(found) {
-                if !values.is_empty() {
-                    all.extend(picked.iter().map(|&i| values[i]));
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Stretches of a trial between gaps in time.
-    fn stretches(&mut self, trial: &Trial) -> Vec<Range<usize>> {
-        let mut out = Vec::new();
-        let mut from = 0;
-        for i in 1..=trial.len() {
-            let step = trial.time_s.get(i).map(|t| t - trial.time_s[i - 1]);
-            if step.is_some_and(|step| step <= GAP * self.dt_s) {
-                continue;
-            }
-            let (name, long) = (&trial.name, i - from >= SHORTEST);
-            if let Some(step) = step {
-                let at = trial.time_s[i - 1];
-                let lost = step - self.dt_s;
-                self.notes.push(format!(
-                    "{name}: {lost:.3} s are missing after {at:.2} s; it goes on as a trial of its own"
-                ));
-            }
-            match long {
-                true => out.push(from..i),
-                false => self.notes.push(format!(
-                    "{name}: the {} samples from {:.2} s on are too few and left out",
-                    i - from,
-                    trial.time_s[from]
-                )),
-            }
-            from = i;
-        }
-        out
-    }
-
-    /// Samples of a stretch at even times: those that are there, or the nearest to each.
-    fn picked(&mut self, trial: &Trial, stretch: &Range<usize>) -> Vec<usize> {
-        let time_s = &trial.time_s[stretch.clone()];
-        let apart = |i: usize, k: usize| (time_s[i] - time_s[0]) / self.dt_s - k as f64;
-        if (0..time_s.len()).all(|i| apart(i, i).abs() < UNEVEN) {
-            return stretch.clone().collect();
-        }
-        let count = ((time_s[time_s.len() - 1] - time_s[0]) / self.dt_s).round() as usize + 1;
-        let mut at = 0;
-        let picked = (0..count)
-            .map(|k| {
-                while at + 1 < time_s.len() && apart(at + 1, k).abs() <= apart(at, k).abs() {
-                    at += 1;
-                }
-                stretch.start + at
-            })
-            .collect();
-        let note = format!(
-            "{}: its samples come unevenly; the nearest to every {:.4} s is taken",
-            trial.name, self.dt_s
-        );
-        if self.notes.last() != Some(&note) {
-            self.notes.push(note);
-        }
-        picked
     }
 
     /// Samples that may be looked at before the end.

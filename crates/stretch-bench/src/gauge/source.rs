@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use stretch_data::{DataSet, ReadOptions, RigFile, Split, Trial};
+use stretch_data::{DataSet, ReadOptions, SessionTrial, Trial};
 
-use super::{GaugeSimulator, GaugeTrial};
-use crate::error::BenchError;
+use super::{GaugeSetup, GaugeSimulator};
+use crate::{error::BenchError, rig_file};
 
 /// Columns that need no naming.
 const USUAL: (&str, &str) = ("length_mm", "bridge_v");
@@ -22,59 +22,57 @@ impl GaugeSimulator {
     pub fn read(
         path: &Path,
         columns: Option<(&str, &str)>,
-        rig: Option<&RigFile>,
+        rig: Option<&Path>,
         without: &[String],
     ) -> Result<Option<Self>, BenchError> {
         let set = if path.is_dir() { Some(DataSet::read(path)?) } else { None };
-        let own = match &set {
-            Some(set) => set.read_rig(path)?.filter(is_gauge),
-            None => None,
+        let own = set.as_ref().and_then(|set| Some(path.join(set.rig.as_ref()?)));
+        let (rig, says_so) = match (rig, &own) {
+            (Some(rig), _) => (Some(rig), rig_file::is_gauge(rig)?),
+            (None, Some(own)) if rig_file::is_gauge(own)? => (Some(own.as_path()), true),
+            _ => (None, false),
         };
-        let rig = rig.or(own.as_ref());
         let first = match &set {
             Some(set) => set.trials[0].load(path, &ReadOptions::new())?,
             None => Trial::read(path, &ReadOptions::new())?,
         };
-        let has = |name: &str| first.channel(name).is_some();
-        let (reference, signal) = match columns {
-            Some(columns) => columns,
-            None if !rig.is_some_and(is_gauge) && (has("inlet") || has("outlet")) => {
-                return Ok(None);
-            }
-            None if has(USUAL.0) && has(USUAL.1) => USUAL,
-            None => {
-                let names: Vec<&str> = first.channels.iter().map(|c| c.name.as_str()).collect();
-                return Err(BenchError::TooLittle {
-                    what: format!(
-                        "{} is a gauge alone, and nothing says which columns are the reference and the signal",
-                        first.name
-                    ),
-                    hint: format!(
-                        "name them with --reference and --signal; the columns are {}",
-                        names.join(", ")
-                    ),
-                });
-            }
+        let Some((reference, signal)) = columns_of(&first, columns, says_so)? else {
+            return Ok(None);
         };
         let options = ReadOptions::new().require(reference).require(signal);
         let trials = match &set {
-            None => {
-                let trial = Trial::read(path, &options)?;
-                vec![GaugeTrial { trial, start_s: 0.0, is_test: false }]
-            }
-            Some(set) => {
-                let load = |entry: &stretch_data::TrialEntry| {
-                    let trial = entry.load(path, &options)?;
-                    let is_test = entry.split == Split::Test;
-                    Ok(GaugeTrial { trial, start_s: entry.start_s, is_test })
-                };
-                set.trials.iter().map(load).collect::<Result<_, BenchError>>()?
-            }
+            None => vec![SessionTrial::new(Trial::read(path, &options)?)],
+            Some(set) => set.load(path, &options)?,
         };
-        Self::new(&trials, reference, signal, rig, without).map(Some)
+        let rig = rig.map(rig_file::gauge).transpose()?;
+        let rig = rig.as_ref();
+        Self::new(&GaugeSetup { trials: &trials, reference, signal, rig, without }).map(Some)
     }
 }
 
-fn is_gauge(rig: &RigFile) -> bool {
-    rig.kind.as_deref() == Some("gauge")
+/// Reference and signal; none where the trial is of a whole rig.
+fn columns_of<'a>(
+    first: &Trial,
+    named: Option<(&'a str, &'a str)>,
+    says_so: bool,
+) -> Result<Option<(&'a str, &'a str)>, BenchError> {
+    let has = |name: &str| first.channel(name).is_some();
+    match named {
+        Some(columns) => Ok(Some(columns)),
+        None if !says_so && (has("inlet") || has("outlet")) => Ok(None),
+        None if has(USUAL.0) && has(USUAL.1) => Ok(Some(USUAL)),
+        None => {
+            let names: Vec<&str> = first.channels.iter().map(|c| c.name.as_str()).collect();
+            Err(BenchError::TooLittle {
+                what: format!(
+                    "{} is a gauge alone, and nothing says which columns are the reference and the signal",
+                    first.name
+                ),
+                hint: format!(
+                    "name them with --reference and --signal; the columns are {}",
+                    names.join(", ")
+                ),
+            })
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! The catalogue as the diagnosis sees it: which outputs an effect touches, and where to look for it.
 
 use stretch_gap::{EffectParameterSpec, EffectSpec};
-use stretch_sim::{CATALOGUE, Effect, EffectParameter, Key, PARAMETERS, RigParams, Scale, Stage};
+use stretch_sim::{CATALOGUE, Effect, EffectParameter, RigParams, Scale, Stage};
 
 use super::{
     forms::{NAMES, form_of},
@@ -208,12 +208,4 @@ fn starts(name: &str, extent: Extent) -> Vec<Vec<f64>> {
         "pot_backlash" => one(&[0.05, 0.2, 0.8]),
         _ => Vec::new(),
     }
-}
-
-/// Nominal parameters of a stage that are not exact.
-pub(super) fn tuned(params: Stage) -> impl Iterator<Item = Key> {
-    PARAMETERS
-        .iter()
-        .filter(move |p| params.holds(p.stage) && p.tolerance != stretch_sim::Tolerance::Exact)
-        .map(|p| p.key)
 }

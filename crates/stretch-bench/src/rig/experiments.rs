@@ -236,7 +236,7 @@ impl RigSimulator {
                 params[*key] = *value;
             }
         }
-        let mut effects = EffectSet::new();
+        let mut effects = self.effects.clone();
         for (index, values) in &model.effects {
             let row = self.rows[*index];
             let mut values = values.clone();

@@ -4,37 +4,41 @@ pub(crate) mod catalogue;
 mod experiments;
 pub(crate) mod forms;
 pub(crate) mod hum;
-mod params;
+mod nominal;
 mod run;
 mod session;
 pub(crate) mod smooth;
 
 use std::path::Path;
 
-use stretch_data::{DataSet, RigFile};
-use stretch_gap::{
-    Description, GapError, Motion, ParameterSpec, Run, Simulator, StageSpec, TrialSpec, Wander,
-};
-use stretch_sim::{Effect, Key, PARAMETERS, RigParams, Stage};
+use stretch_data::DataSet;
+use stretch_gap::{Description, GapError, Motion, Run, Simulator, TrialSpec};
+use stretch_sim::{Effect, EffectSet, Key, Rig, RigParams, Stage};
 
-use catalogue::{Extent, Place, check_names, entries, tuned};
-use params::read_params;
+use catalogue::{Extent, Place, check_names, entries};
+use nominal::{Sds, parameters, stages};
 use session::Inputs;
 pub use session::{RigTrial, Session};
 
-use crate::error::BenchError;
+use crate::{error::BenchError, rig_file};
 
-/// Slow fluctuation of the supply, a share of it (1 sd).
-const SUPPLY_WANDER: f64 = 0.003;
-/// Its correlation time, s.
-const SUPPLY_CORRELATION_S: f64 = 12.0;
-/// Distance of the knots that follow it, s.
-const SUPPLY_KNOT_S: f64 = 2.0;
+/// What a [`RigSimulator`] is made of.
+#[derive(Debug, Clone)]
+pub struct RigSetup<'a> {
+    /// What was measured.
+    pub session: Session,
+    /// The rig beside it: parameters, how far each may be wrong, and the effects that it already has.
+    pub rig: Rig,
+    /// Effects that are left out of the catalogue.
+    pub without: &'a [String],
+}
 
 /// A whole rig beside its recorded session.
 #[derive(Debug)]
 pub struct RigSimulator {
     base: RigParams,
+    /// Effects that the rig already has.
+    effects: EffectSet,
     session: Session,
     inputs: Inputs,
     about: Description,
@@ -49,142 +53,55 @@ impl RigSimulator {
     /// Reads a data set's folder: its trials, and its rig file unless another is given.
     ///
     /// # Errors
-    /// As [`Session::read`] and [`RigSimulator::new`].
-    pub fn read(
-        folder: &Path,
-        rig: Option<&RigFile>,
-        without: &[String],
-    ) -> Result<Self, BenchError> {
+    /// A rig file that cannot be read, and as [`Session::read`] and [`RigSimulator::new`].
+    pub fn read(folder: &Path, rig: Option<&Path>, without: &[String]) -> Result<Self, BenchError> {
         let set = DataSet::read(folder)?;
-        let own = set.read_rig(folder)?;
+        let own = set.rig.as_ref().map(|file| folder.join(file));
+        let rig = rig.or(own.as_deref()).map(rig_file::rig).transpose()?.unwrap_or_default();
         let session = Session::read(folder, &set)?;
-        Self::new(session, rig.or(own.as_ref()), without)
+        Self::new(RigSetup { session, rig, without })
     }
 
-    /// Binds a rig to a session. Effects called in `without` are left out of the catalogue.
+    /// Binds a rig to a session. The effects of the rig act in every run and are not looked for.
     ///
     /// # Errors
-    /// Names in the rig file or in `without` that nobody knows.
-    pub fn new(
-        session: Session,
-        rig: Option<&RigFile>,
-        without: &[String],
-    ) -> Result<Self, BenchError> {
+    /// A rig beyond its limits, names in `without` that nobody knows.
+    pub fn new(setup: RigSetup<'_>) -> Result<Self, BenchError> {
+        let RigSetup { session, rig, without } = setup;
         check_names(without)?;
-        let (base, tolerances) = read_params(rig)?;
-        let has_pressure = session.trials[0].pressure_kpa.is_some();
-        let step = base[Key::Travel] / (base[Key::Bits].exp2() - 1.0);
-        let length_sd = (base[Key::SigmaL].powi(2) + step * step / 12.0).sqrt();
-        let step = base[Key::VFs] / (base[Key::Bits].exp2() - 1.0);
-        let volts_sd = (base[Key::SigmaV].powi(2) + step * step / 12.0).sqrt();
-        let pressure_sd = 1e-3 * base[Key::SigmaP];
-        let inputs = Inputs::of(&session, length_sd, pressure_sd, 1e-3 * base[Key::PS]);
-        let stage_kinds = if has_pressure {
-            vec![Stage::Pneumatics, Stage::Muscle, Stage::Sensing]
-        } else {
-            vec![Stage::Actuation, Stage::Sensing]
+        rig.check()?;
+        let Rig { params: base, effects, .. } = &rig;
+        let sds = Sds::of(base);
+        let inputs = Inputs::of(&session, sds.length_mm, sds.pressure_kpa, 1e-3 * base[Key::PS]);
+        let stage_kinds = match session.trials[0].pressure_kpa {
+            Some(_) => vec![Stage::Pneumatics, Stage::Muscle, Stage::Sensing],
+            None => vec![Stage::Actuation, Stage::Sensing],
         };
-        let mut parameters = Vec::new();
-        let mut keys = Vec::new();
-        for info in &PARAMETERS {
-            let sd = tolerances[info.key as usize];
-            if sd <= 0.0 || !stage_kinds.iter().any(|s| s.holds(info.stage)) {
-                continue;
-            }
-            let nominal = base[info.key];
-            let wander = (info.key == Key::PS).then_some(Wander {
-                sd: SUPPLY_WANDER * nominal,
-                correlation_s: SUPPLY_CORRELATION_S,
-                knot_s: SUPPLY_KNOT_S,
-            });
-            parameters.push(ParameterSpec {
-                name: info.name.into(),
-                unit: info.unit.into(),
-                nominal,
-                sd,
-                least: 0.15 * nominal,
-                wander,
-                per_trial_sd: None,
-                // These three stand in for one another in the nominal rig.
-                is_evidence: !matches!(info.key, Key::E0 | Key::R0 | Key::VExc | Key::G),
-            });
-            keys.push(Some(info.key));
-        }
-        parameters.push(ParameterSpec {
-            name: "p_start".into(),
-            unit: "1".into(),
-            nominal: 0.0,
-            sd: 0.0,
-            least: f64::NEG_INFINITY,
-            wander: None,
-            per_trial_sd: Some(1.0),
-            is_evidence: false,
-        });
-        keys.push(None);
-        let stages: Vec<StageSpec> = stage_kinds
-            .iter()
-            .map(|&kind| {
-                let (channel, unit, noise) = match kind {
-                    Stage::Pneumatics => ("pressure_kpa", "kPa", pressure_sd),
-                    Stage::Sensing => ("bridge_v", "V", volts_sd),
-                    _ => ("length_mm", "mm", length_sd),
-                };
-                let own = |key: Key| tuned(kind).any(|k| k == key);
-                let is_chamber = kind.holds(Stage::Pneumatics);
-                let acting = (0..keys.len()).filter(|&i| keys[i].map_or(is_chamber, own)).collect();
-                StageSpec {
-                    name: kind.name().into(),
-                    channel: channel.into(),
-                    unit: unit.into(),
-                    parameters: acting,
-                    noise: (noise > 0.0).then_some(noise),
-                }
-            })
-            .collect();
-        let index = |stage: Stage| -> Vec<usize> {
-            (0..stage_kinds.len())
-                .filter(|&i| {
-                    stage_kinds[i].holds(stage)
-                        || (stage == Stage::Reference && stage_kinds[i] != Stage::Pneumatics)
-                })
-                .collect()
+        let (parameters, keys) = parameters(&rig, &stage_kinds);
+        let stages = stages(&stage_kinds, &keys, sds);
+        let known: Vec<String> =
+            effects.iter().map(|e| e.name().to_owned()).chain(without.iter().cloned()).collect();
+        let place = Place {
+            accepts: &|_| true,
+            touches: &|stage| touched(&stage_kinds, stage),
+            unit: &|_| 1.0,
+            extent: Extent::of(base, &inputs, &session),
         };
-        let (effects, rows) = entries(
-            without,
-            &Place {
-                accepts: &|_| true,
-                touches: &index,
-                unit: &|_| 1.0,
-                extent: Extent::of(&base, &inputs, &session),
-            },
-        );
-        let trials = session
-            .trials
-            .iter()
-            .map(|t| TrialSpec {
-                name: t.name.clone(),
-                samples: t.length_mm.len(),
-                start_s: t.start_s,
-                is_test: t.is_test,
-            })
-            .collect();
-        let measured = stage_kinds
-            .iter()
-            .map(|kind| {
-                let mut all = Vec::new();
-                for trial in &session.trials {
-                    all.extend_from_slice(match kind {
-                        Stage::Pneumatics => trial.pressure_kpa.as_deref().unwrap_or(&[]),
-                        Stage::Sensing => &trial.bridge_v,
-                        _ => &trial.length_mm,
-                    });
-                }
-                all
-            })
-            .collect();
-        let dt_s = session.trials[0].dt_s;
-        let about = Description { stages, parameters, effects, trials, dt_s };
-        Ok(Self { base, session, inputs, about, stage_kinds, keys, rows, measured })
+        let (missing, rows) = entries(&known, &place);
+        let trials = session.trials.iter().map(trial_spec).collect();
+        let measured = stage_kinds.iter().map(|kind| measured(&session, *kind)).collect();
+        let dt_s = session.dt_s();
+        Ok(Self {
+            about: Description { stages, parameters, effects: missing, trials, dt_s },
+            base: *base,
+            effects: effects.clone(),
+            session,
+            inputs,
+            stage_kinds,
+            keys,
+            rows,
+            measured,
+        })
     }
 
     /// The session that it is bound to.
@@ -201,6 +118,31 @@ impl RigSimulator {
     pub fn smooth_length(&self, trial: usize) -> &[f64] {
         &self.inputs.length[trial].values
     }
+}
+
+/// Stages whose output an effect of a stage changes.
+fn touched(kinds: &[Stage], stage: Stage) -> Vec<usize> {
+    let shows = |kind: Stage| stage == Stage::Reference && kind != Stage::Pneumatics;
+    (0..kinds.len()).filter(|&i| kinds[i].holds(stage) || shows(kinds[i])).collect()
+}
+
+fn trial_spec(trial: &RigTrial) -> TrialSpec {
+    TrialSpec {
+        name: trial.name.clone(),
+        samples: trial.length_mm.len(),
+        start_s: trial.start_s,
+        is_test: trial.is_test,
+    }
+}
+
+/// What was measured of a stage, all trials end to end.
+fn measured(session: &Session, stage: Stage) -> Vec<f64> {
+    let channel = |trial: &'_ RigTrial| match stage {
+        Stage::Pneumatics => trial.pressure_kpa.clone().unwrap_or_default(),
+        Stage::Sensing => trial.bridge_v.clone(),
+        _ => trial.length_mm.clone(),
+    };
+    session.trials.iter().flat_map(channel).collect()
 }
 
 impl Simulator for RigSimulator {

@@ -61,7 +61,7 @@ pub(super) fn simulate(
     out: &mut [f64],
 ) -> Result<(), BenchError> {
     let (params, offset) = params_of(rig, run.model);
-    let acting = Acting::of(&rig.rows, run.model)?;
+    let acting = Acting::of(&rig.effects, &rig.rows, run.model)?;
     let kind = rig.stage_kinds[run.stage];
     let grid = match kind {
         // Driven by a measured input.
@@ -362,19 +362,18 @@ impl Setting<'_> {
 
     /// Pressure of the nominal pneumatics: what there is without a pressure column.
     fn simulated_pressure(&self, count: usize) -> Result<Vec<Vec<f64>>, BenchError> {
-        let none = EffectSet::new();
-        let grid = none.grid(&self.params, self.rig.about.dt_s, STEP_S)?;
-        let stage = Pneumatics::new(&self.params, &none, &grid)?;
-        let mut memory = stage.memory();
-        let mut all = Vec::with_capacity(count);
-        for trial in 0..count {
-            let mut own = vec![0.0; self.rig.about.trials[trial].samples];
-            let (start, commands) = (self.start(trial), self.openings(trial));
-            let openings = commands.view();
-            stage.run(&mut memory, start, openings, self.initial_kpa(trial), &mut own)?;
-            all.push(own);
-        }
-        Ok(all)
+        let effects = &self.rig.effects;
+        let grid = effects.grid(&self.params, self.rig.about.dt_s, STEP_S)?;
+        let nominal = Setting { rig: self.rig, effects: effects.clone(), grid, ..*self };
+        let samples = self.rig.about.trials[..count].iter().map(|t| t.samples).sum();
+        let mut all = vec![0.0; samples];
+        nominal.pneumatics(count, &mut all)?;
+        let mut own = Vec::with_capacity(count);
+        self.each(count, &mut all, |_, values| {
+            own.push(values.to_vec());
+            Ok(())
+        })?;
+        Ok(own)
     }
 
     fn shown(&self, effects: &EffectSet) -> Result<Shown, BenchError> {

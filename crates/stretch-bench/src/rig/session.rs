@@ -2,130 +2,140 @@
 
 use std::path::Path;
 
-use stretch_data::{DataSet, ReadOptions, Split, Trial, TrialKind};
+use stretch_data::{DataSet, EvenSession, EvenTrial, ReadOptions, SessionTrial, Split};
 
 use super::smooth::{Smoothed, schedule};
 use crate::error::BenchError;
 
-/// A measured trial of the rig.
+/// Columns that a rig needs; a pressure is welcome.
+const NEEDED: [&str; 4] = ["inlet", "outlet", "length_mm", "bridge_v"];
+const PRESSURE: &str = "pressure_kpa";
+/// Parts of a trial with fewer samples are left out.
+const SHORTEST: usize = 100;
+/// Least samples that may be fitted.
+const LEAST: usize = 300;
+
+/// A measured trial of the rig, on the session's even grid; all channels are of one length.
 #[derive(Debug, Clone)]
 pub struct RigTrial {
-    /// Name: the file's.
-    pub name: String,
-    /// What was done in it.
-    pub kind: TrialKind,
-    /// Session time of its first sample, s.
-    pub start_s: f64,
-    /// Whether it is a test trial.
-    pub is_test: bool,
-    /// Sample time, s.
-    pub dt_s: f64,
-    /// Inlet opening, 0..1.
-    pub inlet: Vec<f64>,
-    /// Outlet opening, 0..1.
-    pub outlet: Vec<f64>,
-    /// Gauge pressure, kPa, when recorded.
-    pub pressure_kpa: Option<Vec<f64>>,
-    /// Measured length, mm.
-    pub length_mm: Vec<f64>,
-    /// Bridge voltage, V.
-    pub bridge_v: Vec<f64>,
+    pub(super) name: String,
+    pub(super) start_s: f64,
+    pub(super) is_test: bool,
+    pub(super) inlet: Vec<f64>,
+    pub(super) outlet: Vec<f64>,
+    pub(super) pressure_kpa: Option<Vec<f64>>,
+    pub(super) length_mm: Vec<f64>,
+    pub(super) bridge_v: Vec<f64>,
 }
 
-/// A session and what was noticed while it was read.
+impl RigTrial {
+    /// The trial of a session whose columns are [`NEEDED`], then the pressure where there is one.
+    fn of(trial: &EvenTrial) -> Self {
+        let column = |i: usize| trial.columns().get(i).cloned();
+        let needed = |i: usize| column(i).unwrap_or_default();
+        Self {
+            name: trial.name().to_owned(),
+            start_s: trial.start_s(),
+            is_test: trial.is_test(),
+            inlet: needed(0),
+            outlet: needed(1),
+            length_mm: needed(2),
+            bridge_v: needed(3),
+            pressure_kpa: column(4),
+        }
+    }
+
+    /// Gauge pressure, kPa, when every trial of the session has it.
+    pub fn pressure_kpa(&self) -> Option<&[f64]> {
+        self.pressure_kpa.as_deref()
+    }
+
+    /// Measured length, mm.
+    pub fn length_mm(&self) -> &[f64] {
+        &self.length_mm
+    }
+
+    /// Bridge voltage, V.
+    pub fn bridge_v(&self) -> &[f64] {
+        &self.bridge_v
+    }
+}
+
+/// A session of the rig and what was noticed while it was read: at least one trial, one to be fitted among them.
 #[derive(Debug, Clone)]
 pub struct Session {
-    /// Trials in the order in which they were recorded.
-    pub trials: Vec<RigTrial>,
-    /// Sentences for the report.
-    pub notes: Vec<String>,
+    pub(super) trials: Vec<RigTrial>,
+    dt_s: f64,
+    notes: Vec<String>,
 }
 
 impl Session {
     /// Reads every trial of a data set.
     ///
-    /// A trial with a gap in time is cut there. Without a test trial nothing is held back here (the diagnosis then
-    /// tests on the last part of each trial).
-    ///
     /// # Errors
-    /// Files that cannot be read, columns that are missing or are not what their names say.
+    /// Files that cannot be read, and as [`Session::new`].
     pub fn read(folder: &Path, set: &DataSet) -> Result<Self, BenchError> {
-        let mut trials = Vec::new();
-        let mut notes = Vec::new();
-        for entry in &set.trials {
-            let trial = entry.load(folder, &ReadOptions::new())?;
-            let is_test = entry.split == Split::Test;
-            trials.push(rig_trial(trial, entry.kind, entry.start_s, is_test, &mut notes)?);
-        }
-        let mut session = Self { trials, notes };
-        session.order();
-        session.check()?;
-        Ok(session)
+        let options =
+            NEEDED.iter().fold(ReadOptions::new(), |options, name| options.require(*name));
+        Self::new(&set.load(folder, &options)?)
     }
 
-    /// A session from trials in memory.
+    /// Binds trials with the columns `inlet`, `outlet` (0..1), `length_mm`, `bridge_v` and, where it was recorded,
+    /// `pressure_kpa`. They are brought onto one even grid ([`EvenSession`]): lost samples are bridged, a long gap in
+    /// time makes two trials of one, and the notes say so. Without a test trial nothing is held back here (the
+    /// diagnosis then tests on the last part of each trial).
     ///
     /// # Errors
-    /// As [`Session::read`].
-    pub fn new(trials: Vec<RigTrial>) -> Result<Self, BenchError> {
-        let mut session = Self { trials, notes: Vec::new() };
-        session.order();
-        session.check()?;
-        Ok(session)
-    }
-
-    /// Where no session time is known, pauses of 15 s are assumed.
-    fn order(&mut self) {
-        let rising = self.trials.windows(2).all(|t| t[1].start_s > t[0].start_s);
-        if rising || self.trials.len() < 2 {
-            return;
+    /// Columns that are missing or are not what their names say, trials of different rates, too little to fit.
+    pub fn new(trials: &[SessionTrial]) -> Result<Self, BenchError> {
+        let with = trials.iter().filter(|t| t.trial.channel(PRESSURE).is_some()).count();
+        let mut columns = NEEDED.to_vec();
+        if with == trials.len() {
+            columns.push(PRESSURE);
         }
-        if self.trials.iter().any(|t| t.start_s != self.trials[0].start_s) {
-            self.trials.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
-        }
-        if self.trials.windows(2).all(|t| t[1].start_s > t[0].start_s) {
-            self.notes.push("the trials are taken in the order of their start_s".into());
-            return;
-        }
-        self.notes.push(
-            "the trials give no rising start_s: pauses of 15 s in the order of the file are assumed"
-                .into(),
-        );
-        let mut at = 0.0;
-        for trial in &mut self.trials {
-            trial.start_s = at;
-            at += trial.length_mm.len() as f64 * trial.dt_s + 15.0;
-        }
-    }
-
-    fn check(&mut self) -> Result<(), BenchError> {
-        if self.trials.iter().all(|t| t.is_test) {
+        if trials.iter().all(|t| t.split == Split::Test) {
             return Err(BenchError::TooLittle {
                 what: "no trial may be fitted".into(),
                 hint: "give at least one trial split = \"fit\"".into(),
             });
         }
+        let even = EvenSession::new(trials, &columns, SHORTEST)?;
+        let mut session = Self {
+            trials: even.trials().iter().map(RigTrial::of).collect(),
+            dt_s: even.dt_s(),
+            notes: even.notes().to_vec(),
+        };
+        if with > 0 && with < trials.len() {
+            session.notes.push(format!(
+                "only {with} of {} trials have a pressure column: it is left out",
+                trials.len()
+            ));
+        }
+        session.check()?;
+        Ok(session)
+    }
+
+    /// The trials, in the order of time.
+    pub fn trials(&self) -> &[RigTrial] {
+        &self.trials
+    }
+
+    /// What was noticed, in sentences for a report.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// Sample time of every trial, s.
+    pub fn dt_s(&self) -> f64 {
+        self.dt_s
+    }
+
+    fn check(&self) -> Result<(), BenchError> {
         let fit: usize = self.trials.iter().filter(|t| !t.is_test).map(|t| t.inlet.len()).sum();
-        if fit < 300 {
+        if fit < LEAST {
             return Err(BenchError::TooLittle {
                 what: format!("the trials to fit have {fit} samples"),
-                hint: "at least 300 are needed to tell anything".into(),
-            });
-        }
-        let with = self.trials.iter().filter(|t| t.pressure_kpa.is_some()).count();
-        if with > 0 && with < self.trials.len() {
-            self.notes.push(format!(
-                "only {with} of {} trials have a pressure column: it is left out",
-                self.trials.len()
-            ));
-            self.trials.iter_mut().for_each(|t| t.pressure_kpa = None);
-        }
-        let dt_s = self.trials[0].dt_s;
-        if let Some(other) = self.trials.iter().find(|t| (t.dt_s / dt_s - 1.0).abs() > 0.01) {
-            return Err(BenchError::Implausible {
-                column: format!("time_s of {}", other.name),
-                found: format!("a sample every {} s where {dt_s} s is usual", other.dt_s),
-                hint: "all trials need the same sample rate: convert them first".into(),
+                hint: format!("at least {LEAST} are needed to tell anything"),
             });
         }
         self.check_units()
@@ -138,7 +148,7 @@ impl Session {
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)))
     }
 
-    fn check_units(&mut self) -> Result<(), BenchError> {
+    fn check_units(&self) -> Result<(), BenchError> {
         let length = self.range(|t| &t.length_mm);
         let volts = self.range(|t| &t.bridge_v);
         let bad = |column: &str, found: String, hint: &str| {
@@ -233,48 +243,6 @@ impl Session {
     }
 }
 
-fn rig_trial(
-    trial: Trial,
-    kind: TrialKind,
-    start_s: f64,
-    is_test: bool,
-    notes: &mut Vec<String>,
-) -> Result<RigTrial, BenchError> {
-    let dt_s = trial.rate_hz().map_or(0.01, |rate| 1.0 / rate);
-    let mut samples = trial.len();
-    if let Some(gap) = trial.time_s.windows(2).position(|t| t[1] - t[0] > 1.6 * dt_s) {
-        notes.push(format!(
-            "{}: {:.3} s are missing after {:.2} s; the trial is cut there",
-            trial.name,
-            trial.time_s[gap + 1] - trial.time_s[gap] - dt_s,
-            trial.time_s[gap]
-        ));
-        samples = gap + 1;
-    }
-    let column = |name: &str| -> Result<Vec<f64>, BenchError> {
-        match trial.channel(name) {
-            Some(values) => Ok(values[..samples].to_vec()),
-            None => Err(BenchError::MissingColumn {
-                trial: trial.name.clone(),
-                column: name.into(),
-                needs: "a diagnosis of the whole rig needs",
-            }),
-        }
-    };
-    Ok(RigTrial {
-        kind,
-        start_s,
-        is_test,
-        dt_s,
-        inlet: column("inlet")?,
-        outlet: column("outlet")?,
-        pressure_kpa: trial.channel("pressure_kpa").map(|p| p[..samples].to_vec()),
-        length_mm: column("length_mm")?,
-        bridge_v: column("bridge_v")?,
-        name: trial.name,
-    })
-}
-
 /// How the chamber begins a trial.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Begin {
@@ -301,7 +269,7 @@ pub(crate) struct Inputs {
 impl Inputs {
     pub(crate) fn of(session: &Session, length_sd: f64, pressure_sd: f64, supply_kpa: f64) -> Self {
         let smooth = |trial: &RigTrial, record: &[f64], sd: f64, sharp: bool| {
-            let allowed = schedule(&trial.inlet, &trial.outlet, trial.dt_s, sharp);
+            let allowed = schedule(&trial.inlet, &trial.outlet, session.dt_s, sharp);
             Smoothed::of(record, sd, &allowed)
         };
         let trials = &session.trials;
@@ -315,14 +283,22 @@ impl Inputs {
             .iter()
             .filter_map(|t| t.pressure_kpa.as_ref().map(|p| smooth(t, p, pressure_sd, true)))
             .collect();
-        let begin =
-            trials.iter().map(|t| Self::begin(t, stroke, pressure_sd, supply_kpa)).collect();
+        let begin = trials
+            .iter()
+            .map(|t| Self::begin(t, session.dt_s, stroke, pressure_sd, supply_kpa))
+            .collect();
         Self { length, pressure, begin, stroke }
     }
 
-    fn begin(trial: &RigTrial, stroke: (f64, f64), pressure_sd: f64, supply_kpa: f64) -> Begin {
+    fn begin(
+        trial: &RigTrial,
+        dt_s: f64,
+        stroke: (f64, f64),
+        pressure_sd: f64,
+        supply_kpa: f64,
+    ) -> Begin {
         // The rest at the trial's start, at most a fifth of a second of it.
-        let longest = ((0.2 / trial.dt_s) as usize).max(1);
+        let longest = ((0.2 / dt_s) as usize).max(1);
         let shut = trial.inlet.iter().zip(&trial.outlet).take_while(|(i, o)| **i + **o == 0.0);
         let rest = shut.count().clamp(1, longest).min(trial.length_mm.len());
         let mean = |x: &[f64]| x[..rest].iter().sum::<f64>() / rest as f64;

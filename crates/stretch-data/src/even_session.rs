@@ -1,0 +1,195 @@
+//! A session: its trials on one even grid of time, in the order in which they were recorded.
+
+use std::path::Path;
+
+use crate::{DataError, DataSet, EvenSpec, ReadOptions, Rows, Split, Trial, TrialKind};
+
+/// Pause between trials that do not say when they began, s.
+const PAUSE_S: f64 = 15.0;
+
+/// A trial and its place in a session.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SessionTrial {
+    /// What was recorded.
+    pub trial: Trial,
+    /// What was done in it.
+    pub kind: TrialKind,
+    /// Session time of its first sample, s.
+    pub start_s: f64,
+    /// Whether it may be fitted or only tested on.
+    pub split: Split,
+}
+
+impl SessionTrial {
+    /// A trial that may be fitted, at the session's start; change what differs.
+    pub fn new(trial: Trial) -> Self {
+        Self { trial, kind: TrialKind::Other, start_s: 0.0, split: Split::Fit }
+    }
+}
+
+impl DataSet {
+    /// Reads every trial.
+    ///
+    /// # Errors
+    /// As [`Trial::read`].
+    pub fn load(
+        &self,
+        folder: impl AsRef<Path>,
+        options: &ReadOptions,
+    ) -> Result<Vec<SessionTrial>, DataError> {
+        let load = |entry: &crate::TrialEntry| {
+            let trial = entry.load(&folder, options)?;
+            Ok(SessionTrial { trial, kind: entry.kind, start_s: entry.start_s, split: entry.split })
+        };
+        self.trials.iter().map(load).collect()
+    }
+}
+
+/// A trial of an [`EvenSession`]: columns on an even grid, without a gap.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EvenTrial {
+    name: String,
+    kind: TrialKind,
+    start_s: f64,
+    split: Split,
+    columns: Vec<Vec<f64>>,
+}
+
+impl EvenTrial {
+    /// What to call it; parts of a trial with gaps are numbered.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What was done in it.
+    pub fn kind(&self) -> TrialKind {
+        self.kind
+    }
+
+    /// Session time of its first sample, s.
+    pub fn start_s(&self) -> f64 {
+        self.start_s
+    }
+
+    /// Whether it is a test trial.
+    pub fn is_test(&self) -> bool {
+        self.split == Split::Test
+    }
+
+    /// Columns in the order in which they were asked for; each of one length and finite.
+    pub fn columns(&self) -> &[Vec<f64>] {
+        &self.columns
+    }
+}
+
+/// Trials on one even grid, in the order of time: what simulation and diagnosis are driven by.
+///
+/// ```
+/// use stretch_data::{Channel, EvenSession, SessionTrial, Trial};
+/// // Half a second is missing after 0.99 s.
+/// let time_s: Vec<f64> = (0..300).filter(|i| !(100..150).contains(i)).map(|i| 0.01 * i as f64).collect();
+/// let values = time_s.iter().map(|t| 180.0 - t).collect();
+/// let channels = vec![Channel { name: "length_mm".into(), values }];
+/// let trial = Trial { name: "a.csv".into(), time_s, channels };
+/// let trials = [SessionTrial { start_s: 40.0, ..SessionTrial::new(trial) }];
+/// let session = EvenSession::new(&trials, &["length_mm"], 50)?;
+/// let starts: Vec<f64> = session.trials().iter().map(|t| t.start_s()).collect();
+/// assert_eq!(starts, [40.0, 41.5]);
+/// assert_eq!(session.trials()[1].name(), "a.csv (part 2)");
+/// assert_eq!(
+///     session.notes(),
+///     ["a.csv: 0.500 s are missing after 0.99 s; it goes on as a trial of its own"]
+/// );
+/// # Ok::<(), stretch_data::DataError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct EvenSession {
+    trials: Vec<EvenTrial>,
+    dt_s: f64,
+    rows: Rows,
+    notes: Vec<String>,
+}
+
+impl EvenSession {
+    /// Brings columns of trials onto one even grid, as [`Trial::even`]; the first trial's rate is the session's.
+    ///
+    /// Trials go in the order of their `start_s`. Where that does not rise, they go in the order given, with pauses of 15 s.
+    /// Parts of a trial with gaps begin where the trial's time says, and inherit its kind and split.
+    ///
+    /// # Errors
+    /// No trial, none with two samples, and as [`Trial::even`].
+    pub fn new(
+        trials: &[SessionTrial],
+        columns: &[&str],
+        shortest: usize,
+    ) -> Result<Self, DataError> {
+        let rate_hz = trials.iter().find_map(|t| t.trial.rate_hz()).ok_or(DataError::NoSamples)?;
+        let (dt_s, rows) = (1.0 / rate_hz, Rows::default());
+        let mut session = Self { trials: Vec::new(), dt_s, rows, notes: Vec::new() };
+        for (one, start_s) in session.in_order(trials) {
+            let even = one.trial.even(columns, EvenSpec { rate_hz, shortest })?;
+            let count = even.parts.len();
+            session.rows.add(even.rows);
+            session.notes.extend(even.notes);
+            session.trials.extend(even.parts.into_iter().enumerate().map(|(i, part)| EvenTrial {
+                name: match count {
+                    1 => one.trial.name.clone(),
+                    _ => format!("{} (part {})", one.trial.name, i + 1),
+                },
+                kind: one.kind,
+                start_s: start_s + part.begin_s,
+                split: one.split,
+                columns: part.columns,
+            }));
+        }
+        session.notes.extend(session.rows.note());
+        Ok(session)
+    }
+
+    /// Trials in order of time, and when each began.
+    fn in_order<'a>(&mut self, trials: &'a [SessionTrial]) -> Vec<(&'a SessionTrial, f64)> {
+        let mut order: Vec<_> = trials.iter().map(|t| (t, t.start_s)).collect();
+        let rises = |order: &[(&SessionTrial, f64)]| order.windows(2).all(|t| t[1].1 > t[0].1);
+        if rises(&order) {
+            return order;
+        }
+        order.sort_by(|a, b| a.1.total_cmp(&b.1));
+        if rises(&order) {
+            self.notes.push("the trials are taken in the order of their start_s".into());
+            return order;
+        }
+        self.notes.push(
+            "the trials give no rising start_s: pauses of 15 s in the order of the file are assumed"
+                .into(),
+        );
+        let mut at_s = 0.0;
+        trials
+            .iter()
+            .map(|one| {
+                let begun_s = at_s;
+                at_s += one.trial.duration_s() + self.dt_s + PAUSE_S;
+                (one, begun_s)
+            })
+            .collect()
+    }
+
+    /// The trials, in the order of time.
+    pub fn trials(&self) -> &[EvenTrial] {
+        &self.trials
+    }
+
+    /// Sample time of all of them, s; above zero.
+    pub fn dt_s(&self) -> f64 {
+        self.dt_s
+    }
+
+    /// What became of the rows.
+    pub fn rows(&self) -> Rows {
+        self.rows
+    }
+
+    /// What had to be done to them, in sentences; none for even trials that say when they began.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+}

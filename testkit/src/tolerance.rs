@@ -158,3 +158,11 @@ pub const OBSERVER_INVERTS_MM: f64 = 0.5;
 /// `f64`: states in 2^-26 of it and gains of 20 bits, behind a curve up to ten
 /// times flatter than its mean and a filter that sums over hundreds of samples.
 pub const FIXED_OBSERVER: f64 = 1e-4;
+
+/// Relative: time constant and amplitude of an observer on its own gauge. Golden sections
+/// stop at a few per cent of the time constant, and the amplitude takes up the difference.
+pub const OBSERVER_SEARCHED: f64 = 0.1;
+
+/// Relative: the error of a model of the history as it runs against that of its fit, which
+/// divides by the degrees of freedom (126 of 9000) and leaves out the first samples.
+pub const HISTORY_LIVE: f64 = 0.05;

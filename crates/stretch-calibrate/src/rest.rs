@@ -2,7 +2,7 @@
 
 use stretch_core::{Polarity, Range, RestTracker};
 
-use crate::{calibrate::Prepared, series::noise};
+use crate::{prepared::Prepared, series::noise};
 
 /// How fast a baseline gives way to a signal below rest, in seconds.
 const CATCH_UP_S: f64 = 0.5;

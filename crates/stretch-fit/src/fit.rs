@@ -6,7 +6,6 @@
 use stretch_core::{Degree, Real, Surface};
 
 use crate::{
-    Confidence, FitError,
     basis::Basis,
     shift::{apply, product, shift},
 };
@@ -133,16 +132,6 @@ impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
             let square = row.iter().fold(T::zero(), |sum, &e| sum + e * e);
             sigma * square.sqrt()
         }))
-    }
-
-    /// Bounds at a level such as 0.95: of coefficients, of the surface, of new
-    /// observations.
-    ///
-    /// # Errors
-    /// [`FitError::Level`] unless the level is above 0 and below 1,
-    /// [`FitError::TooFewSamples`] when no degree of freedom is left.
-    pub fn confidence(&self, level: f64) -> Result<Confidence<'_, T, TERMS>, FitError> {
-        Confidence::new(self, level)
     }
 
     /// `h = a^T (A^T W A)^-1 a` for the row `a` of a rate and a voltage: the

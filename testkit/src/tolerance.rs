@@ -102,6 +102,11 @@ pub const FIT_WELL: f64 = 1e-12;
 /// independent it stays well below, and normal equations (condition squared) far above.
 pub const FIT_ILL: f64 = 1e-9;
 
+/// Share of `|A| |c|` and of the condition times the residual: what reflections over 300 rows
+/// of up to 21 terms round off. Were all 6000 roundings of 1e-16 of one sign it would be
+/// 1e-12; they walk at random, as their square root.
+pub const FIT_BACKWARD: f64 = 1e-14;
+
 /// Relative: SSE, R^2 and RMSE, whose residuals lose at most six digits to the values.
 pub const FIT_STATISTICS: f64 = 1e-9;
 

@@ -6,6 +6,20 @@ pub const F64_ROUNDING: f64 = 1e-14;
 /// Relative: a value printed by another tool with at least twelve digits.
 pub const PRINTED: f64 = 1e-12;
 
+/// Horner and term by term: roundings of terms of size `3 * 2^5`, of which there are 21.
+pub const HORNER: f64 = 21.0 * 96.0 * 4.0 * f64::EPSILON;
+
+/// Of a normalised number, in units of the larger of 1 and (offset + span) / span: eight
+/// roundings there and back.
+pub const RANGE_ROUND_TRIP: f64 = 8.0 * f64::EPSILON;
+
+/// In codes: one rounding to the nearest, of a sum that is exact before it.
+pub const LAST_ROUNDING: f64 = 0.5;
+
+/// In units of the input, up to 1: a hysteresis of slopes from 0.1 to 9 and its inverse. Some
+/// 20 roundings of values up to 9, magnified by up to 10, at each of four plays.
+pub const HYSTERESIS_INVERSE: f64 = 1e-11;
+
 /// Relative to the reference's full scale: the receptor folds normalisation into the
 /// coefficients, so its terms differ from the paper's order by a few hundred roundings of
 /// terms up to `3 * 4^5` (21 terms of the strategies' surfaces at four times the range).

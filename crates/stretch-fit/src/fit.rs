@@ -26,9 +26,9 @@ use crate::{
 ///     line.push(0.0, volts, value)?;
 /// }
 /// let fit = line.fit()?;
-/// assert!((fit.coefficients()[1] - 1.5).abs() < 1e-14);
-/// assert!((fit.sse() - 1.0 / 6.0).abs() < 1e-14);
-/// assert!((fit.r_squared().unwrap() - 27.0 / 28.0).abs() < 1e-14);
+/// approx::assert_abs_diff_eq!(fit.coefficients()[1], 1.5, epsilon = 1e-14);
+/// approx::assert_abs_diff_eq!(fit.sse(), 1.0 / 6.0, epsilon = 1e-14);
+/// approx::assert_abs_diff_eq!(fit.r_squared().unwrap(), 27.0 / 28.0, epsilon = 1e-14);
 /// # Ok::<(), stretch_fit::FitError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -19,8 +19,8 @@ const ROWS: usize = 16;
 ///     line.push(volts, 0.9744 * volts + 0.1757)?;
 /// }
 /// let fit = line.fit()?;
-/// assert!((fit.slope() - 0.9744).abs() < 1e-12);
-/// assert!((fit.intercept() - 0.1757).abs() < 1e-12);
+/// approx::assert_abs_diff_eq!(fit.slope(), 0.9744, epsilon = 1e-12);
+/// approx::assert_abs_diff_eq!(fit.intercept(), 0.1757, epsilon = 1e-12);
 /// assert!(fit.fit().r_squared().unwrap() > 1.0 - 1e-12);
 /// # Ok::<(), stretch_fit::FitError>(())
 /// ```

@@ -1,7 +1,7 @@
 //! What must hold for any signals.
 #![cfg(feature = "proptest")]
 
-use approx::{abs_diff_eq, assert_abs_diff_eq, relative_eq};
+use approx::{assert_abs_diff_eq, relative_eq};
 use proptest::prelude::*;
 use stretch_metrics::{
     Agreement, Delta, PairedBlocks, PairedT, lag, strategies, student_t::ln_two_tailed,

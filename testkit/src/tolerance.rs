@@ -6,6 +6,20 @@ pub const F64_ROUNDING: f64 = 1e-14;
 /// Relative: a value printed by another tool with at least twelve digits.
 pub const PRINTED: f64 = 1e-12;
 
+/// Horner and term by term: roundings of terms of size `3 * 2^5`, of which there are 21.
+pub const HORNER: f64 = 21.0 * 96.0 * 4.0 * f64::EPSILON;
+
+/// Of a normalised number, in units of the larger of 1 and (offset + span) / span: eight
+/// roundings there and back.
+pub const RANGE_ROUND_TRIP: f64 = 8.0 * f64::EPSILON;
+
+/// In codes: one rounding to the nearest, of a sum that is exact before it.
+pub const LAST_ROUNDING: f64 = 0.5;
+
+/// In units of the input, up to 1: a hysteresis of slopes from 0.1 to 9 and its inverse. Some
+/// 20 roundings of values up to 9, magnified by up to 10, at each of four plays.
+pub const HYSTERESIS_INVERSE: f64 = 1e-11;
+
 /// Relative to the reference's full scale: the receptor folds normalisation into the
 /// coefficients, so its terms differ from the paper's order by a few hundred roundings of
 /// terms up to `3 * 4^5` (21 terms of the strategies' surfaces at four times the range).
@@ -102,6 +116,11 @@ pub const FIT_WELL: f64 = 1e-12;
 /// independent it stays well below, and normal equations (condition squared) far above.
 pub const FIT_ILL: f64 = 1e-9;
 
+/// Share of `|A| |c|` and of the condition times the residual: what reflections over 300 rows
+/// of up to 21 terms round off. Were all 6000 roundings of 1e-16 of one sign it would be
+/// 1e-12; they walk at random, as their square root.
+pub const FIT_BACKWARD: f64 = 1e-14;
+
 /// Relative: SSE, R^2 and RMSE, whose residuals lose at most six digits to the values.
 pub const FIT_STATISTICS: f64 = 1e-9;
 
@@ -158,3 +177,11 @@ pub const OBSERVER_INVERTS_MM: f64 = 0.5;
 /// `f64`: states in 2^-26 of it and gains of 20 bits, behind a curve up to ten
 /// times flatter than its mean and a filter that sums over hundreds of samples.
 pub const FIXED_OBSERVER: f64 = 1e-4;
+
+/// Relative: time constant and amplitude of an observer on its own gauge. Golden sections
+/// stop at a few per cent of the time constant, and the amplitude takes up the difference.
+pub const OBSERVER_SEARCHED: f64 = 0.1;
+
+/// Relative: the error of a model of the history as it runs against that of its fit, which
+/// divides by the degrees of freedom (126 of 9000) and leaves out the first samples.
+pub const HISTORY_LIVE: f64 = 0.05;

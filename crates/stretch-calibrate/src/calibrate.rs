@@ -1,24 +1,21 @@
 //! From logged trials to a calibration.
 
 use stretch_core::{
-    Branch, BranchSurface, Calibration, CalibrationSpec, Degree, Interval, Label, LinearMap, Model,
-    Normalisation, Provenance, Range, RangeSpec, RateEstimator, RateSource, SampleRate, Schema,
-    Target,
+    Branch, BranchSurface, Calibration, Degree, Interval, LinearMap, Model, Provenance, Range,
+    RangeSpec, RateSource,
 };
-use stretch_data::{EvenSpec, Rows, Trial};
-use stretch_filter::RateFilter;
+use stretch_data::Trial;
 
 use crate::{
     CalibrateError, FitReport, Memory, ModelKind, Options,
-    fitting::{Sample, fit},
+    fitting::{Fitted, Sample, fit},
     history_fit::{HistoryChoice, history},
-    observer_fit::{ObserverChoice, observer},
-    series::{Series, extent, noise, polarity, sample_rate_hz, series},
-    split::{DeadBands, branches},
+    observer_fit::observer,
+    observer_model::ObserverChoice,
+    prepared::Prepared,
+    series::extent,
+    split::branches,
 };
-
-/// Parts of a trial with fewer samples have no rate.
-const SHORTEST: usize = 3;
 
 /// A calibration and what there is to say about it.
 #[derive(Debug, Clone)]
@@ -114,160 +111,6 @@ fn remembering(
     let choice = choice.and_then(|c| if let Choice::History(c) = c { Some(c) } else { None });
     history(prepared, kind, rest, choice).map(|(fitted, c)| (fitted, Choice::History(c)))
 }
-
-/// All trials, even in time, with pooled ranges.
-pub(crate) struct Prepared {
-    pub series: Vec<Series>,
-    pub sample_rate: SampleRate,
-    pub target: Target,
-    pub polarity: stretch_core::Polarity,
-    pub signal_range: Range,
-    pub target_range: Range,
-    pub dead: DeadBands,
-    pub notes: Vec<String>,
-    options: Options,
-}
-
-impl Prepared {
-    pub(crate) fn new(trials: &[Trial], options: &Options) -> Result<Self, CalibrateError> {
-        let first = trials.first().ok_or(CalibrateError::NoTrials)?;
-        let first_hz = sample_rate_hz(first)?;
-        let sample_rate = SampleRate::new(first_hz)?;
-        let mut pieces = Vec::new();
-        let mut notes = Vec::new();
-        let mut rows = Rows::default();
-        for (index, trial) in trials.iter().enumerate() {
-            let rate_hz = sample_rate_hz(trial)?;
-            if (rate_hz / first_hz - 1.0).abs() > 0.05 {
-                let (trial, first) = (trial.name.clone(), first.name.clone());
-                return Err(CalibrateError::SampleRates { trial, rate_hz, first, first_hz });
-            }
-            let columns = [options.signal.as_str(), options.reference.as_str()];
-            let spec = EvenSpec { rate_hz: sample_rate.hz(), shortest: SHORTEST };
-            let even = trial.even(&columns, spec)?;
-            rows.add(even.rows);
-            notes.extend(even.notes);
-            pieces.extend(even.parts.into_iter().filter_map(|part| {
-                let [signal, reference] = part.columns.try_into().ok()?;
-                Some((index, (signal, reference)))
-            }));
-        }
-        notes.extend(rows.note());
-        if pieces.is_empty() {
-            let (trial, samples) = (first.name.clone(), first.len());
-            return Err(CalibrateError::TooShort { trial, samples });
-        }
-        let target = target(options, &pieces)?;
-        let pairs = pieces.iter().flat_map(|(_, (signal, reference))| {
-            signal.iter().zip(reference).map(|(&v, &x)| (v, target.from_reference(x)))
-        });
-        let polarity = polarity(pairs.clone());
-        let range = |column: &str, zero, values: &mut dyn Iterator<Item = f64>| {
-            pooled_range(column, options.normalisation, zero, values)
-        };
-        let signal_range =
-            range(&options.signal, options.zero(), &mut pairs.clone().map(|(v, _)| v))?;
-        let target_range = range(&options.reference, 0.0, &mut pairs.map(|(_, t)| t))?;
-        let noise_v = noise(pieces.iter().map(|(_, (v, _))| v.as_slice()));
-        let signal_dead = match options.dead_band {
-            Some(dead_band) => dead_band,
-            None => 3.0 * noise_v * noise_gain(options.rate, sample_rate)?,
-        };
-        let dead = DeadBands {
-            signal: signal_dead,
-            target: signal_dead * target_range.span() / signal_range.span(),
-        };
-        let series = pieces
-            .into_iter()
-            .map(|(trial, piece)| series(trial, piece, target, polarity, options.rate, sample_rate))
-            .collect::<Result<_, _>>()?;
-        let options = options.clone();
-        Ok(Self {
-            series,
-            sample_rate,
-            target,
-            polarity,
-            signal_range,
-            target_range,
-            dead,
-            notes,
-            options,
-        })
-    }
-
-    /// A record of a model fitted to these trials.
-    pub(crate) fn calibration(
-        &self,
-        model: Model,
-        provenance: Provenance,
-    ) -> Result<Calibration, CalibrateError> {
-        Ok(Calibration::new(CalibrationSpec {
-            schema: Schema::CURRENT,
-            signal: Label::new(&self.options.signal)?,
-            reference: Label::new(&self.options.reference)?,
-            sample_rate_hz: self.sample_rate,
-            target: self.target,
-            polarity: self.polarity,
-            signal_range: self.signal_range,
-            target_range: self.target_range,
-            rate_estimator: self.options.rate,
-            rate_source: self.options.rate_source,
-            dead_band: self.dead.signal,
-            model,
-            provenance,
-        })?)
-    }
-
-    /// Which part of the data is left out together in cross-validation: a trial
-    /// each, or a tenth of the samples when there are fewer than three trials.
-    pub(crate) fn fold(&self, series: &Series, index: usize, before: usize, total: usize) -> usize {
-        let trials = self.series.iter().map(|s| s.trial).max().map_or(0, |last| last + 1);
-        if trials >= 3 { series.trial } else { (before + index) * 10 / total.max(1) }
-    }
-}
-
-/// Standard deviation of an estimator's rate for white noise of one.
-fn noise_gain(estimator: RateEstimator, rate: SampleRate) -> Result<f64, CalibrateError> {
-    match estimator {
-        RateEstimator::CentralDifference => Ok(rate.hz() / 2f64.sqrt()),
-        live => Ok(RateFilter::<f64>::new(live, rate)?.noise_gain()),
-    }
-}
-
-type Pieces = [(usize, (Vec<f64>, Vec<f64>))];
-
-fn target(options: &Options, pieces: &Pieces) -> Result<Target, CalibrateError> {
-    let longest = || {
-        pieces
-            .iter()
-            .flat_map(|(_, (_, reference))| reference.iter().copied())
-            .fold(f64::MIN, f64::max)
-    };
-    let rest_length = match options.rest_length {
-        Some(rest_length) => Some(rest_length),
-        None => options.reference.starts_with("length").then(longest),
-    };
-    Ok(match rest_length {
-        Some(rest_length) => {
-            stretch_core::DesignError::check("rest_length", rest_length, rest_length > 0.0)?;
-            Target::Contraction { rest_length }
-        }
-        None => Target::Direct,
-    })
-}
-
-fn pooled_range(
-    column: &str,
-    mode: Normalisation,
-    zero: f64,
-    values: &mut dyn Iterator<Item = f64>,
-) -> Result<Range, CalibrateError> {
-    let Interval { min, max } = extent(values);
-    Range::new(RangeSpec { mode, zero, min, max })
-        .map_err(|_| CalibrateError::Constant { column: column.to_owned(), value: min })
-}
-
-pub(crate) type Fitted = (Model, Vec<FitReport>, Vec<String>);
 
 fn linear(prepared: &Prepared, options: &Options) -> Result<Fitted, CalibrateError> {
     let mut samples = Vec::new();

@@ -1,10 +1,13 @@
 //! One fit and everything that is reported of it.
 
 use serde::Serialize;
-use stretch_core::{Branch, Degree, FitSummary, MAX_TERMS, Surface};
+use stretch_core::{Branch, Degree, FitSummary, MAX_TERMS, Model, Surface};
 use stretch_fit::{Factor, Fit, FitError, Loss, OrderTable, SurfaceAccumulator, robust_fit};
 
-use crate::{CalibrateError, Robust, history_fit::no_surface};
+use crate::{CalibrateError, Robust};
+
+/// A fitted model, what there is to say of each fit, and one sentence a remark.
+pub(crate) type Fitted = (Model, Vec<FitReport>, Vec<String>);
 
 /// A normalised sample, and the part of the data that it is left out with.
 #[derive(Debug, Clone, Copy)]
@@ -13,6 +16,11 @@ pub(crate) struct Sample {
     pub rate: f64,
     pub signal: f64,
     pub target: f64,
+}
+
+/// The surface of a model that has none.
+fn no_surface() -> Surface {
+    Surface::new(Degree::POLY13, &[0.0; 7]).expect("seven finite coefficients")
 }
 
 /// One fitted surface (or line) with its statistics, in normalised units.
@@ -35,7 +43,8 @@ pub struct FitReport {
     pub adjusted_r_squared: f64,
     /// `sqrt(SSE/(n - p))`, in normalised target.
     pub rmse: f64,
-    /// Condition number of the design matrix.
+    /// Condition number of the design matrix, with the rows of a ridge where the
+    /// fit has one: of an observer that of curve, dynamics and time constants.
     pub condition: f64,
     /// Samples that a bisquare fit rejected altogether.
     pub rejected: Option<u64>,
@@ -101,6 +110,7 @@ impl FitReport {
         name: String,
         fit: &FitSummary,
         sse: f64,
+        condition: f64,
         coefficients: Vec<Coefficient>,
         order: Order,
     ) -> Self {
@@ -115,7 +125,7 @@ impl FitReport {
             r_squared: fit.r_squared,
             adjusted_r_squared: 1.0 - (1.0 - fit.r_squared) * (fit.samples as f64 - 1.0) / dof,
             rmse: fit.rmse,
-            condition: f64::NAN,
+            condition,
             rejected: None,
             coefficients,
             recommended: None,

@@ -2,14 +2,15 @@
 //! time constants, radii and ridge chosen on data left out.
 
 use stretch_core::{
-    FitSummary, HistoryMap, HistoryShape, Interval, MAX_HISTORY_TERMS, Model, RestTracker, Surface,
-    Values, lag, lag_share, play,
+    FitSummary, HistoryMap, HistoryShape, Interval, MAX_HISTORY_TERMS, Model, RestTracker, Values,
+    lag, lag_share, play,
 };
 
 use crate::{
     CalibrateError, Coefficient, FitReport, Memory, Order,
-    calibrate::{Fitted, Prepared},
-    dense::{Sums, Triangle, block_errors},
+    fitting::Fitted,
+    least_squares::{LinearFactor, RowAccumulator, Solution, leave_one_out},
+    prepared::Prepared,
     rest::rested,
 };
 
@@ -185,7 +186,8 @@ struct Trained {
     estimate: Interval,
     pieces: Vec<Piece>,
     rows: Rows,
-    whole: Sums,
+    samples: usize,
+    whole: LinearFactor,
     cross_validated: f64,
 }
 
@@ -203,9 +205,9 @@ pub(crate) fn history(
     };
     let choice = best.choice;
     let undetermined = || CalibrateError::Undetermined { model: kind.to_string() };
-    let triangle = triangle(&best.whole, choice.ridge).ok_or_else(undetermined)?;
-    let weights = triangle.solve(&best.whole.cross);
-    let (fit, errors) = judge(&best, &triangle, &weights, prepared.sample_rate.hz());
+    let solution = solve(&best.whole, choice.ridge).ok_or_else(undetermined)?;
+    let weights = &solution.weights;
+    let (fit, errors) = judge(&best, &solution, prepared.sample_rate.hz());
     let list = |f: fn(&Interval) -> f64| best.domain.iter().map(f).collect::<Vec<_>>();
     let map = HistoryMap {
         rest: choice.rest,
@@ -215,17 +217,18 @@ pub(crate) fn history(
         memory_degree: choice.design.memory_degree,
         state_min: Values::new("state_min", &list(|d| d.min))?,
         state_max: Values::new("state_max", &list(|d| d.max))?,
-        coefficients: Values::new("coefficients", &weights)?,
+        coefficients: Values::new("coefficients", weights)?,
         estimate_domain: best.estimate,
         fit,
     };
-    let coefficients = choice.design.term_names().into_iter().zip(&weights).zip(&errors);
+    let coefficients = choice.design.term_names().into_iter().zip(weights).zip(&errors);
     let coefficients =
         coefficients.map(|((name, &w), &e)| Coefficient::named(name, w, 1.96 * e)).collect();
     let report = FitReport::of_model(
         kind.to_string(),
         &fit,
-        fit.rmse.powi(2) * (best.whole.samples - weights.len() as f64).max(1.0),
+        fit.rmse.powi(2) * dof(best.samples, weights.len()),
+        solution.condition(),
         coefficients,
         Order {
             model: kind.to_string(),
@@ -318,14 +321,15 @@ fn train(
         return Err(undetermined());
     }
     let rows = Rows::new(shape, &domain);
-    let folds = sums(&pieces, &rows, shape.terms());
-    let whole = folds.iter().fold(Sums::new(shape.terms()), |all, fold| all.with(fold, 1.0));
-    if whole.samples <= shape.terms() as f64 {
+    let samples = pieces.iter().map(|p| p.target.len().saturating_sub(SETTLE)).sum();
+    if samples <= shape.terms() {
         return Err(undetermined());
     }
+    let folds = factors(&pieces, &rows, shape.terms());
+    let (whole, others) = leave_one_out(&folds).ok_or_else(undetermined)?;
     let mut best = (f64::INFINITY, ridges[0]);
     for &ridge in ridges {
-        let rmse = held_out(&pieces, &rows, &folds, &whole, ridge, estimate);
+        let rmse = held_out(&pieces, &rows, &others, ridge, estimate);
         if rmse < best.0 {
             best = (rmse, ridge);
         }
@@ -335,12 +339,13 @@ fn train(
         return Err(undetermined());
     }
     let choice = HistoryChoice { design, ridge, rest };
-    Ok(Trained { choice, domain, estimate, pieces, rows, whole, cross_validated })
+    Ok(Trained { choice, domain, estimate, pieces, rows, samples, whole, cross_validated })
 }
 
-fn sums(pieces: &[Piece], rows: &Rows, terms: usize) -> Vec<Sums> {
+/// One triangle a fold.
+fn factors(pieces: &[Piece], rows: &Rows, terms: usize) -> Vec<LinearFactor> {
     let last = pieces.iter().flat_map(|p| p.fold.iter()).max().copied().unwrap_or(0);
-    let mut folds = vec![Sums::new(terms); last + 1];
+    let mut folds = vec![RowAccumulator::new(terms); last + 1];
     let (mut scaled, mut row) = (Vec::new(), Vec::new());
     for piece in pieces {
         for ((states, &target), &fold) in
@@ -350,36 +355,36 @@ fn sums(pieces: &[Piece], rows: &Rows, terms: usize) -> Vec<Sums> {
             folds[fold].push(&row, target);
         }
     }
-    folds
+    folds.into_iter().map(RowAccumulator::factor).collect()
 }
 
-fn triangle(sums: &Sums, ridge: f64) -> Option<Triangle> {
-    sums.triangle(|i, diagonal| if i == 0 { 0.0 } else { ridge * diagonal })
+/// Least squares with a ridge on all terms but the constant.
+fn solve(factor: &LinearFactor, ridge: f64) -> Option<Solution> {
+    factor.solve(|term, power| if term == 0 { 0.0 } else { ridge * power })
+}
+
+fn dof(samples: usize, terms: usize) -> f64 {
+    (samples as f64 - terms as f64).max(1.0)
 }
 
 /// Root mean square error of each part predicted from the others.
 fn held_out(
     pieces: &[Piece],
     rows: &Rows,
-    folds: &[Sums],
-    whole: &Sums,
+    others: &[LinearFactor],
     ridge: f64,
     estimate: Interval,
 ) -> f64 {
-    let fit = |fold: &Sums| {
-        let others = whole.with(fold, -1.0);
-        triangle(&others, ridge).map(|t| t.solve(&others.cross))
-    };
-    let weights: Vec<_> = folds.iter().map(fit).collect();
+    let fits: Vec<_> = others.iter().map(|others| solve(others, ridge)).collect();
     let (mut scaled, mut row) = (Vec::new(), Vec::new());
     let (mut squares, mut count) = (0.0, 0.0);
     for piece in pieces {
         for ((states, &target), &fold) in
             piece.states.iter().zip(&piece.target).zip(&piece.fold).skip(SETTLE)
         {
-            let Some(weights) = &weights[fold] else { return f64::INFINITY };
+            let Some(fit) = &fits[fold] else { return f64::INFINITY };
             rows.fill(states, &mut scaled, &mut row);
-            squares += (target - predict(weights, &row, estimate)).powi(2);
+            squares += (target - predict(&fit.weights, &row, estimate)).powi(2);
             count += 1.0;
         }
     }
@@ -392,18 +397,18 @@ fn predict(weights: &[f64], row: &[f64], estimate: Interval) -> f64 {
 }
 
 /// Statistics of the final fit, and standard errors of its coefficients.
-fn judge(best: &Trained, triangle: &Triangle, weights: &[f64], hz: f64) -> (FitSummary, Vec<f64>) {
+fn judge(best: &Trained, solution: &Solution, hz: f64) -> (FitSummary, Vec<f64>) {
+    let weights = &solution.weights;
     let length = ((BLOCK_S * hz) as usize).max(1);
     let (mut scaled, mut row) = (Vec::new(), Vec::new());
     let mut blocks: Vec<Vec<f64>> = Vec::new();
-    let (mut squares, mut sum) = (0.0, 0.0);
+    let mut squares = 0.0;
     for piece in &best.pieces {
         let samples = piece.states.iter().zip(&piece.target).skip(SETTLE);
         for (i, (states, &target)) in samples.enumerate() {
             best.rows.fill(states, &mut scaled, &mut row);
             let residual = target - weights.iter().zip(&row).map(|(w, x)| w * x).sum::<f64>();
             squares += residual * residual;
-            sum += target;
             if i % length == 0 {
                 blocks.push(vec![0.0; weights.len()]);
             }
@@ -412,17 +417,10 @@ fn judge(best: &Trained, triangle: &Triangle, weights: &[f64], hz: f64) -> (FitS
             }
         }
     }
-    let n = best.whole.samples;
-    let total = (best.whole.power - sum * sum / n).max(f64::MIN_POSITIVE);
     let fit = FitSummary {
-        samples: n as u64,
-        r_squared: 1.0 - squares / total,
-        rmse: (squares / (n - weights.len() as f64).max(1.0)).sqrt(),
+        samples: best.samples as u64,
+        r_squared: 1.0 - squares / best.whole.total_sum().max(f64::MIN_POSITIVE),
+        rmse: (squares / dof(best.samples, weights.len())).sqrt(),
     };
-    (fit, block_errors(triangle, &blocks))
-}
-
-/// The surface of a model that has none.
-pub(crate) fn no_surface() -> Surface {
-    Surface::new(stretch_core::Degree::POLY13, &[0.0; 7]).expect("seven finite coefficients")
+    (fit, solution.block_errors(&blocks))
 }

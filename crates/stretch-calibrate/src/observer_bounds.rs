@@ -1,8 +1,8 @@
 //! How well the data determine an observer's dynamics.
 
 use crate::{
-    dense::{Sums, block_errors},
-    observer_fit::{BEND, Forward, KNOTS, Piece, SETTLE, driven, features, place},
+    observer_curve::{CurveRows, KNOTS},
+    observer_model::{Forward, Piece, SETTLE},
 };
 
 /// Errors of the model are correlated over as long as the slowest of its parts
@@ -10,61 +10,70 @@ use crate::{
 const BLOCK_S: f64 = 2.0;
 /// A time constant is moved by this share to see what it does.
 const NUDGE: f64 = 0.01;
+/// Keeps a parameter that nothing shows from being divided by: as a share of its
+/// column's power, far below what any data that determine it have.
+const RIDGE: f64 = 1e-9;
 
-/// Standard errors of lead, amplitudes and weights of plays, then of the time constants.
+/// How well a forward model is determined.
+pub(crate) struct Bounds {
+    /// Standard errors of lead, amplitudes and weights of plays, then of the time
+    /// constants; NaN where the data do not determine them.
+    pub(crate) errors: Vec<f64>,
+    /// Condition of the rows that they come from.
+    pub(crate) condition: f64,
+}
+
+/// Bounds of a forward model on the pieces that it was fitted to.
 ///
 /// The sandwich over blocks of two seconds, of the curve, the dynamics and the time
 /// constants together: what the curve or a time constant could take up instead is
 /// not counted as known. The choice of the structure is.
-pub(crate) fn bounds(pieces: &[Piece], forward: &Forward, period_s: f64) -> Vec<f64> {
+pub(crate) fn bounds(pieces: &[Piece], forward: &Forward, period_s: f64) -> Bounds {
     let Forward { choice, curve, drive, dynamics, .. } = forward;
     let taus: Vec<f64> = choice.taus().collect();
-    let first = KNOTS + dynamics.len();
-    let size = first + taus.len();
-    let mut sums = Sums::new(size);
+    let more = dynamics.len() + taus.len();
+    let mut rows = CurveRows::new(more);
     let mut blocks: Vec<Vec<f64>> = Vec::new();
     let length = ((BLOCK_S / period_s) as usize).max(1);
-    let per_knot = (KNOTS - 1) as f64 / (drive.max - drive.min);
+    let mut values = Vec::new();
     for piece in pieces {
-        let rows = features(piece, *choice, period_s);
+        let features = piece.features(*choice, period_s);
         let nudged: Vec<_> = (0..taus.len())
             .map(|i| {
                 let mut other = *choice;
                 other.taus[i] = other.taus[i].map(|tau| tau * (1.0 + NUDGE));
-                features(piece, other, period_s)
+                piece.features(other, period_s)
             })
             .collect();
-        for (n, row) in rows.iter().enumerate().skip(SETTLE) {
-            let at = driven(&(piece.smooth[n], row, piece.signal[n]), dynamics);
-            let (below, share) = place(at, *drive);
-            let rise = curve[below + 1] - curve[below];
-            let residual = piece.signal[n] - curve[below] - share * rise;
-            let slope = rise * per_knot;
-            let mut places = vec![below, below + 1];
-            let mut values = vec![1.0 - share, share];
-            places.extend(KNOTS..size);
-            values.extend(row.iter().map(|f| slope * f));
+        for (n, sample) in piece.samples(&features).enumerate() {
+            let at = forward.place(&sample);
+            let slope = at.slope(curve, *drive);
+            let residual = sample.signal - at.on(curve);
+            values.clear();
+            values.extend(sample.features.iter().map(|f| slope * f));
             values.extend((0..taus.len()).map(|i| {
-                let change = (nudged[i][n][1 + i] - row[1 + i]) / (NUDGE * taus[i]);
-                slope * dynamics[1 + i] * change
+                let moved = nudged[i][SETTLE + n][1 + i] - sample.features[1 + i];
+                slope * dynamics[1 + i] * moved / (NUDGE * taus[i])
             }));
-            sums.push_sparse(&places, &values, residual);
-            if (n - SETTLE).is_multiple_of(length) {
-                blocks.push(vec![0.0; size]);
+            rows.push(at, &values, residual);
+            if n.is_multiple_of(length) {
+                blocks.push(vec![0.0; KNOTS + more]);
             }
             if let Some(block) = blocks.last_mut() {
-                for (&place, x) in places.iter().zip(&values) {
-                    block[place] += residual * x;
+                block[at.below] += residual * (1.0 - at.share);
+                block[at.below + 1] += residual * at.share;
+                for (sum, x) in block[KNOTS..].iter_mut().zip(&values) {
+                    *sum += residual * x;
                 }
             }
         }
     }
-    let bend = (BEND * sums.samples).sqrt();
-    for k in 1..KNOTS - 1 {
-        sums.push_sparse(&[k - 1, k, k + 1], &[bend, -2.0 * bend, bend], 0.0);
-    }
-    match sums.triangle(|_, diagonal| 1e-9 * diagonal + 1e-300) {
-        Some(triangle) => block_errors(&triangle, &blocks).split_off(KNOTS),
-        None => vec![f64::NAN; size - KNOTS],
+    // the least positive number keeps a column of zeros from dividing by nothing
+    match rows.factor().solve(|_, power| RIDGE * power + 1e-300) {
+        Some(solution) => Bounds {
+            errors: solution.block_errors(&blocks).split_off(KNOTS),
+            condition: solution.condition(),
+        },
+        None => Bounds { errors: vec![f64::NAN; more], condition: f64::INFINITY },
     }
 }

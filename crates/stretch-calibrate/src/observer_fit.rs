@@ -2,86 +2,33 @@
 //! that inverts it.
 
 use stretch_core::{
-    FitSummary, Interval, Model, ObserverMap, Provenance, RestTracker, Runner, Values, Volts, lag,
-    lag_share, play,
+    FitSummary, Interval, Model, ObserverMap, Provenance, RestTracker, Runner, Values, Volts,
 };
-use stretch_filter::{SgFilter, SgShape};
 use stretch_receptor::ObserverReceptor;
 
 use crate::{
     CalibrateError, Coefficient, FitReport, Memory, Order,
-    calibrate::{Fitted, Prepared},
-    dense::Sums,
+    fitting::Fitted,
     observer_bounds::bounds,
-    rest::rested,
+    observer_curve::{CurveRows, KNOTS, Place},
+    observer_model::{Forward, ObserverChoice, Piece, SETTLE, Sample, pieces},
+    prepared::Prepared,
     rising::rising,
 };
 
-/// Knots of the curve.
-pub(crate) const KNOTS: usize = 25;
-/// Weight of the curve's second differences against a sample's residual.
-pub(crate) const BEND: f64 = 1e-3;
 /// Ridge on the dynamic parameters, as a share of each one's own power.
 const RIDGE: f64 = 1e-4;
 /// The least a curve rises over its whole length, as a share of the signal's range.
 const LEAST_RISE: f64 = 1e-3;
-/// What engaged plays leave of the drive's slope at least.
-const LEAST_ANSWER: f64 = 0.1;
 const ITERATIONS: usize = 12;
 /// Densities of the rate's wandering that are tried, in 1/s^3.
 const AGILITIES: [f64; 8] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 300.0, 3000.0];
 /// Time constants that a first search looks at, in seconds.
 const TAUS: [f64; 7] = [0.03, 0.08, 0.2, 0.4, 0.8, 1.6, 4.0];
-const RADII: [f64; 3] = [0.03, 0.1, 0.3];
 /// A further part of the model must lower the spread around it to this share to be kept.
 const WORTH: f64 = 0.97;
-/// Window of the reference's smoothing, in samples; quadratic.
-const SMOOTH: usize = 7;
 /// How fast a live baseline gives way, in seconds: its level is exact, so at once.
 const LIVE_CATCH_UP_S: f64 = 0.02;
-pub(crate) const SETTLE: usize = 10;
-
-/// What a fit was chosen to be; given again, it is fitted without choosing.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ObserverChoice {
-    pub(crate) taus: [Option<f64>; 2],
-    plays: bool,
-    agility: f64,
-    pub(crate) rest: Option<RestTracker>,
-}
-
-/// A piece of a trial: signal above its baseline, the target smoothed, its rate.
-pub(crate) struct Piece {
-    pub(crate) signal: Vec<f64>,
-    pub(crate) smooth: Vec<f64>,
-    rate: Vec<f64>,
-}
-
-/// A forward model in signed signal.
-pub(crate) struct Forward {
-    pub(crate) choice: ObserverChoice,
-    pub(crate) curve: Vec<f64>,
-    pub(crate) drive: Interval,
-    /// Lead, amplitudes, weights of the plays.
-    pub(crate) dynamics: Vec<f64>,
-    noise: f64,
-}
-
-impl Forward {
-    /// Whether the drive rises with the target whichever plays are engaged: a
-    /// drive that falls cannot be inverted. Plays engage from the widest on.
-    fn answers(&self) -> bool {
-        let plays = self.choice.radii().len();
-        let (instant, weights) = self.dynamics[1..].split_at(self.dynamics.len() - 1 - plays);
-        let least: f64 = 1.0 + instant.iter().sum::<f64>();
-        let mut slope = least;
-        let engaged = weights.iter().rev().all(|weight| {
-            slope += weight;
-            slope > LEAST_ANSWER * least
-        });
-        least > 0.0 && engaged
-    }
-}
 
 /// Fits an observer; with `rest` the baseline is followed. A `choice` made
 /// before on more data is kept.
@@ -105,8 +52,8 @@ pub(crate) fn observer(
     names.extend(choice.radii().iter().map(|w| format!("play of {w} of the range")));
     names.extend(choice.taus().map(|_| "time constant, s".to_owned()));
     let values: Vec<f64> = forward.dynamics.iter().copied().chain(choice.taus()).collect();
-    let errors = bounds(&pieces(prepared, choice.rest)?, &forward, prepared.sample_rate.period_s());
-    let coefficients = names.into_iter().zip(&values).zip(&errors);
+    let bounds = bounds(&pieces(prepared, choice.rest)?, &forward, prepared.sample_rate.period_s());
+    let coefficients = names.into_iter().zip(&values).zip(&bounds.errors);
     let coefficients =
         coefficients.map(|((name, &w), &e)| Coefficient::named(name, w, 1.96 * e)).collect();
     let kind = Memory::Observer.to_string();
@@ -119,7 +66,7 @@ pub(crate) fn observer(
         problem: None,
     };
     let sse = map.fit.rmse.powi(2) * map.fit.samples as f64;
-    let report = FitReport::of_model(kind, &map.fit, sse, coefficients, order);
+    let report = FitReport::of_model(kind, &map.fit, sse, bounds.condition, coefficients, order);
     let note = format!(
         "observer: noise {:.4}, agility {} 1/s^3, {} numbers in all{}",
         forward.noise,
@@ -128,16 +75,6 @@ pub(crate) fn observer(
         choice.rest.map_or(String::new(), |r| format!(", baseline leaking {:.4} a second", r.leak)),
     );
     Ok(((Model::Observer(map), vec![report], vec![note]), choice))
-}
-
-impl ObserverChoice {
-    pub(crate) fn taus(&self) -> impl Iterator<Item = f64> {
-        self.taus.into_iter().flatten()
-    }
-
-    fn radii(&self) -> &'static [f64] {
-        if self.plays { &RADII } else { &[] }
-    }
 }
 
 fn choose(prepared: &Prepared, rest: bool) -> Result<(Forward, ObserverMap), CalibrateError> {
@@ -236,51 +173,6 @@ fn tuned(
     Ok((forward, map))
 }
 
-fn pieces(prepared: &Prepared, rest: Option<RestTracker>) -> Result<Vec<Piece>, CalibrateError> {
-    let rate = prepared.sample_rate;
-    let centred = SgShape::centred_rate(SMOOTH, 2);
-    let smoother = SgFilter::<f64>::new(SgShape { order: 0, ..centred }, rate)?;
-    let differentiator = SgFilter::<f64>::new(centred, rate)?;
-    let sign = prepared.polarity.sign();
-    let mut pieces = Vec::new();
-    for series in &prepared.series {
-        if series.signal.len() <= SMOOTH + SETTLE {
-            continue;
-        }
-        let above = rested(&series.signal, rest, prepared.polarity, prepared.signal_range, rate);
-        let target: Vec<f64> =
-            series.target.iter().map(|&t| prepared.target_range.normalise(t)).collect();
-        let mut smooth = vec![0.0; target.len()];
-        let mut slope = smooth.clone();
-        smoother.over_log(&target, &mut smooth)?;
-        differentiator.over_log(&target, &mut slope)?;
-        let signal = above.iter().map(|v| sign * v).collect();
-        pieces.push(Piece { signal, smooth, rate: slope });
-    }
-    Ok(pieces)
-}
-
-/// What each dynamic parameter adds to the drive, a sample.
-pub(crate) fn features(piece: &Piece, choice: ObserverChoice, period_s: f64) -> Vec<Vec<f64>> {
-    let first = piece.smooth[0];
-    let mut slow: Vec<(f64, f64)> =
-        choice.taus().map(|tau| (first, lag_share(period_s, tau))).collect();
-    let mut played = vec![first; choice.radii().len()];
-    let step = |(&y, &rate): (&f64, &f64)| {
-        let mut row = vec![rate];
-        for (l, share) in &mut slow {
-            *l = lag(*l, y, *share);
-            row.push(y - *l);
-        }
-        for (p, &w) in played.iter_mut().zip(choice.radii()) {
-            *p = play(*p, y, w);
-            row.push(y - *p);
-        }
-        row
-    };
-    piece.smooth.iter().zip(&piece.rate).map(step).collect()
-}
-
 /// Gauss-Newton over curve and dynamics together.
 fn forward(
     prepared: &Prepared,
@@ -289,20 +181,14 @@ fn forward(
 ) -> Result<Forward, CalibrateError> {
     let undetermined = || CalibrateError::Undetermined { model: Memory::Observer.to_string() };
     let period_s = prepared.sample_rate.period_s();
-    let added: Vec<_> = pieces.iter().map(|p| features(p, choice, period_s)).collect();
-    let dynamic = 1 + choice.taus().count() + choice.radii().len();
-    let samples: Vec<(f64, &[f64], f64)> = pieces
-        .iter()
-        .zip(&added)
-        .flat_map(|(p, rows)| {
-            let targets = p.smooth.iter().zip(rows).zip(&p.signal).skip(SETTLE);
-            targets.map(|((&y, row), &v)| (y, row.as_slice(), v))
-        })
-        .collect();
+    let features: Vec<_> = pieces.iter().map(|p| p.features(choice, period_s)).collect();
+    let dynamic = choice.dynamics();
+    let samples: Vec<Sample> =
+        pieces.iter().zip(&features).flat_map(|(p, features)| p.samples(features)).collect();
     if samples.len() <= KNOTS + dynamic {
         return Err(undetermined());
     }
-    let range = crate::series::extent(samples.iter().map(|s| s.2));
+    let range = crate::series::extent(samples.iter().map(|s| s.signal));
     let least_step = LEAST_RISE * (range.max - range.min) / (KNOTS - 1) as f64;
     let mut dynamics = vec![0.0; dynamic];
     let mut curve = Vec::new();
@@ -333,15 +219,9 @@ fn forward(
     Ok(Forward { choice, curve, drive, dynamics, noise })
 }
 
-pub(crate) type Sample<'a> = (f64, &'a [f64], f64);
-
-pub(crate) fn driven(sample: &Sample, dynamics: &[f64]) -> f64 {
-    sample.0 + sample.1.iter().zip(dynamics).map(|(a, b)| a * b).sum::<f64>()
-}
-
 /// The drives that occur, without the outermost five in ten thousand.
 fn drives(samples: &[Sample], dynamics: &[f64]) -> Result<Interval, CalibrateError> {
-    let mut all: Vec<f64> = samples.iter().map(|s| driven(s, dynamics)).collect();
+    let mut all: Vec<f64> = samples.iter().map(|s| s.drive(dynamics)).collect();
     let edge = all.len() / 5000;
     let last = all.len() - 1 - edge;
     let min = *all.select_nth_unstable_by(edge, f64::total_cmp).1;
@@ -353,14 +233,6 @@ fn drives(samples: &[Sample], dynamics: &[f64]) -> Result<Interval, CalibrateErr
     }
 }
 
-/// The knot below a drive and the share of the way to the next.
-pub(crate) fn place(drive: f64, domain: Interval) -> (usize, f64) {
-    let most = (KNOTS - 1) as f64;
-    let at = ((drive - domain.min) / (domain.max - domain.min)).clamp(0.0, 1.0) * most;
-    let below = (at as usize).min(KNOTS - 2);
-    (below, at - below as f64)
-}
-
 /// Knots alone, or knots and dynamics linearised about a curve.
 fn solve(
     samples: &[Sample],
@@ -368,44 +240,32 @@ fn solve(
     drive: Interval,
     about: Option<&[f64]>,
 ) -> Option<(Vec<f64>, Vec<f64>)> {
-    let free = if about.is_some() { dynamics.len() } else { 0 };
-    let size = KNOTS + free;
-    let mut sums = Sums::new(size);
-    let per_knot = (KNOTS - 1) as f64 / (drive.max - drive.min);
-    let (mut places, mut row) = (Vec::new(), Vec::new());
+    let mut rows = CurveRows::new(if about.is_some() { dynamics.len() } else { 0 });
+    let mut more = Vec::new();
     for sample in samples {
-        let (below, share) = place(driven(sample, dynamics), drive);
-        places.clear();
-        row.clear();
-        places.extend([below, below + 1]);
-        row.extend([1.0 - share, share]);
-        let mut value = sample.2;
+        let at = Place::new(sample.drive(dynamics), drive);
+        more.clear();
+        let mut value = sample.signal;
         if let Some(curve) = about {
-            let slope = (curve[below + 1] - curve[below]) * per_knot;
-            places.extend(KNOTS..size);
-            row.extend(sample.1.iter().map(|f| slope * f));
-            value += slope * sample.1.iter().zip(dynamics).map(|(a, b)| a * b).sum::<f64>();
+            let slope = at.slope(curve, drive);
+            more.extend(sample.features.iter().map(|f| slope * f));
+            value += slope * sample.added(dynamics);
         }
-        sums.push_sparse(&places, &row, value);
+        rows.push(at, &more, value);
     }
-    let bend = (BEND * sums.samples).sqrt();
-    for k in 1..KNOTS - 1 {
-        sums.push_sparse(&[k - 1, k, k + 1], &[bend, -2.0 * bend, bend], 0.0);
-    }
-    let penalty = |i: usize, diagonal: f64| {
-        if i < KNOTS { 1e-12 * (1.0 + diagonal) } else { RIDGE * diagonal + 1e-12 }
+    let penalty = |term: usize, power: f64| {
+        if term < KNOTS { 1e-12 * (1.0 + power) } else { RIDGE * power + 1e-12 }
     };
-    let solution = sums.triangle(penalty)?.solve(&sums.cross);
-    let (knots, moved) = solution.split_at(KNOTS);
-    solution.iter().all(|x| x.is_finite()).then(|| (knots.to_vec(), moved.to_vec()))
+    let mut knots = rows.factor().solve(penalty)?.weights;
+    let moved = knots.split_off(KNOTS);
+    Some((knots, moved))
 }
 
 /// Spread of the signal around the model.
 fn spread(samples: &[Sample], dynamics: &[f64], drive: Interval, curve: &[f64]) -> f64 {
     let square = |sample: &Sample| {
-        let (below, share) = place(driven(sample, dynamics), drive);
-        let rise = curve[below + 1] - curve[below];
-        (sample.2 - curve[below] - share * rise).powi(2)
+        let at = Place::new(sample.drive(dynamics), drive);
+        (sample.signal - at.on(curve)).powi(2)
     };
     (samples.iter().map(square).sum::<f64>() / samples.len() as f64).sqrt()
 }
@@ -420,8 +280,7 @@ fn map(prepared: &Prepared, forward: &Forward) -> Result<ObserverMap, CalibrateE
     let estimate_domain =
         crate::series::extent(targets.map(|&t| prepared.target_range.normalise(t)));
     // the fitted curve knows where rest is, noise averaged out
-    let low = place(estimate_domain.min, forward.drive);
-    let level = curve[low.0] + low.1 * (curve[low.0 + 1] - curve[low.0]);
+    let level = Place::new(estimate_domain.min, forward.drive).on(&curve);
     let rest =
         forward.choice.rest.map(|rest| RestTracker { level, catch_up_s: LIVE_CATCH_UP_S, ..rest });
     Ok(ObserverMap {

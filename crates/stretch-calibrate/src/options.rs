@@ -30,6 +30,19 @@ pub enum ModelKind {
     },
 }
 
+impl ModelKind {
+    /// Every model that a choice by the data tries, without and with a followed
+    /// baseline, simplest first.
+    pub(crate) fn candidates() -> Vec<Self> {
+        let mut kinds =
+            vec![Self::Linear, Self::Surface(Degree::POLY13), Self::Blended(Degree::POLY13)];
+        for rest in [false, true] {
+            kinds.extend(Memory::ALL.map(|kind| Self::Remembering { kind, rest }));
+        }
+        kinds
+    }
+}
+
 /// What a model remembers with; every time constant, radius and weight is chosen
 /// on data left out of the fit.
 ///

@@ -31,7 +31,7 @@ use crate::{
 ///     }],
 /// };
 /// let own = on_own_ranges(&calibration, &trial)?;
-/// assert!((own.signal_range.span() - 0.396).abs() < 1e-9);
+/// approx::assert_abs_diff_eq!(own.signal_range.span(), 0.396, epsilon = 1e-9);
 /// # Ok::<(), stretch_calibrate::CalibrateError>(())
 /// ```
 pub fn on_own_ranges(

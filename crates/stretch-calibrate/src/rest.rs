@@ -2,7 +2,7 @@
 
 use stretch_core::{Design, Polarity, Range, RestLevel, RestTracker, SampleRate};
 
-use crate::{calibrate::Prepared, series::noise};
+use crate::{prepared::Prepared, series::noise};
 
 /// How fast a baseline gives way to a signal below rest, in seconds.
 const CATCH_UP_S: f64 = 0.5;

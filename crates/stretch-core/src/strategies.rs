@@ -5,7 +5,7 @@
 //! use stretch_core::strategies;
 //! proptest!(|(range in strategies::range(), x in -1e3..1e3)| {
 //!     let back = range.denormalise(range.normalise(x));
-//!     prop_assert!((back - x).abs() <= 1e-9 * (1.0 + x.abs() + range.offset().abs()));
+//!     approx::assert_abs_diff_eq!(back, x, epsilon = 1e-9 * (1.0 + x.abs() + range.offset().abs()));
 //! });
 //! ```
 

@@ -125,7 +125,7 @@ impl<T: Real> Surface<T> {
 /// // the paper's inflation surface at rest and V = 0.5
 /// let inflation: Poly13 =
 ///     Poly13 { p00: 0.058, p10: 0.001, p01: 0.774, p11: -0.121, p02: 2.30, p12: 0.094, p03: -2.26 };
-/// assert!((inflation.eval(0.0, 0.5) - 0.7375).abs() < 1e-12);
+/// approx::assert_abs_diff_eq!(inflation.eval(0.0, 0.5), 0.7375, epsilon = 1e-12);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -1,11 +1,13 @@
 //! Fixed point against real numbers, at every corner and in between.
 
+use approx::{abs_diff_eq, assert_abs_diff_eq};
 use proptest::prelude::*;
 use stretch_core::{
     Poly13, Range,
     fixed::{FixedLine, FixedPoly13, FixedRange, RangeUnits, saturate},
     strategies,
 };
+use testkit::tolerance as tol;
 
 /// The inputs at which 32-bit arithmetic goes wrong, if it does.
 const CORNERS: [i32; 11] = [
@@ -43,11 +45,11 @@ fn largest(shape: [f64; 7]) -> FixedPoly13 {
 fn close(surface: &FixedPoly13, rate: i32, volts: i32) -> Result<(), String> {
     // the coefficients are already rounded: the products' share of the error is left
     let exact = surface.coefficients().eval(half(rate), half(volts));
-    let error = f64::from(surface.eval(rate, volts)) - exact;
-    if error.abs() <= FixedPoly13::ROUNDING {
+    let found = f64::from(surface.eval(rate, volts));
+    if abs_diff_eq!(found, exact, epsilon = FixedPoly13::ROUNDING) {
         Ok(())
     } else {
-        Err(format!("{surface:?} at {rate}, {volts}: {exact}, off by {error}"))
+        Err(format!("{surface:?} at {rate}, {volts}: {found} for {exact}"))
     }
 }
 
@@ -78,8 +80,9 @@ fn the_largest_line_holds_at_every_corner() {
     for (intercept, slope) in [(2.14e9, 0.0), (1.0e9, 2.14e9), (-1.0e9, 2.14e9), (0.0, -2.14e9)] {
         let line = FixedLine::new(intercept, slope).unwrap();
         for volts in CORNERS {
-            let error = f64::from(line.eval(volts)) - (intercept + slope * half(volts));
-            assert!(error.abs() <= FixedLine::ROUNDING, "{line:?} at {volts}: {error}");
+            let (found, exact) = (f64::from(line.eval(volts)), intercept + slope * half(volts));
+            let near = abs_diff_eq!(found, exact, epsilon = FixedLine::ROUNDING);
+            assert!(near, "{line:?} at {volts}: {found} for {exact}");
         }
     }
     assert!(FixedLine::new(1.2e9, 2.0e9).is_err());
@@ -95,8 +98,9 @@ proptest! {
         let [p00, p10, p01, p11, p02, p12, p03] = coefficients.map(|c| c * scale);
         let surface = Poly13 { p00, p10, p01, p11, p02, p12, p03 };
         if let Ok(fixed) = FixedPoly13::new(&surface) {
-            let error = f64::from(fixed.eval(rate, volts)) - surface.eval(half(rate), half(volts));
-            prop_assert!(error.abs() <= FixedPoly13::ROUNDING, "{error}");
+            let exact = surface.eval(half(rate), half(volts));
+            let found = f64::from(fixed.eval(rate, volts));
+            assert_abs_diff_eq!(found, exact, epsilon = FixedPoly13::ROUNDING);
         }
     }
 
@@ -110,7 +114,7 @@ proptest! {
         }
         if let Ok(fixed) = FixedLine::try_from(line) {
             let exact = f64::from(line.0) + f64::from(line.1) * half(volts);
-            prop_assert!((f64::from(fixed.eval(volts)) - exact).abs() <= 0.5);
+            assert_abs_diff_eq!(f64::from(fixed.eval(volts)), exact, epsilon = tol::LAST_ROUNDING);
         }
     }
 
@@ -127,17 +131,19 @@ proptest! {
             let moved = saturate(i64::from(x) - whole as i64);
             let channel = zero + step * (f64::from(moved) + whole);
             let exact = saturate((range.normalise(channel) * 2f64.powi(27)).round() as i64);
-            let error = f64::from(fixed.normalise(x)) - f64::from(exact);
+            let found = f64::from(fixed.normalise(x));
             // 31 bits of gain over a full-scale input, and the last rounding
             let bound = 2.0 + f64::from(exact).abs() * 2f64.powi(-29);
-            prop_assert!(error.abs() <= bound, "{x}: {exact} off by {error}");
+            let near = abs_diff_eq!(found, f64::from(exact), epsilon = bound);
+            prop_assert!(near, "{x}: {found} for {exact}");
         }
         for n in [x, x >> 3].into_iter().chain(CORNERS) {
             let real: f64 = (range.denormalise(f64::from(n) / 2f64.powi(27)) - zero) / step;
             let exact = saturate(real.round() as i64);
-            let error = f64::from(fixed.denormalise(n)) - f64::from(exact);
+            let found = f64::from(fixed.denormalise(n));
             let bound = 1.0 + f64::from(exact).abs() * 2f64.powi(-29);
-            prop_assert!(error.abs() <= bound, "{n}: {exact} off by {error}");
+            let near = abs_diff_eq!(found, f64::from(exact), epsilon = bound);
+            prop_assert!(near, "{n}: {found} for {exact}");
         }
     }
 

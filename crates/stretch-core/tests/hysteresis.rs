@@ -1,7 +1,9 @@
 //! A Prandtl-Ishlinskii operator and its inverse undo each other.
 
+use approx::assert_abs_diff_eq;
 use proptest::prelude::*;
 use stretch_core::{Hysteresis, Runner};
+use testkit::tolerance as tol;
 
 fn operator() -> impl Strategy<Value = Hysteresis> {
     let plays = proptest::collection::vec((0.01..0.3f64, -0.8..1.5f64), 0..=4);
@@ -33,7 +35,7 @@ proptest! {
         for x in path {
             let y: f64 = there.step(x);
             let found: f64 = back.step(y);
-            prop_assert!((found - x).abs() < 1e-9, "{found} {x}");
+            assert_abs_diff_eq!(found, x, epsilon = tol::HYSTERESIS_INVERSE);
         }
     }
 
@@ -41,7 +43,7 @@ proptest! {
     fn inverse_of_inverse_is_the_operator(forward in operator(), x in -1.0..1.0f64) {
         let twice = forward.inverse().unwrap().inverse().unwrap();
         let (a, b): (f64, f64) = (Runner::new(forward).step(x), Runner::new(twice).step(x));
-        prop_assert!((a - b).abs() < 1e-9);
+        assert_abs_diff_eq!(a, b, epsilon = tol::HYSTERESIS_INVERSE);
     }
 }
 

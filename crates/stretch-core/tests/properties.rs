@@ -1,10 +1,12 @@
 //! Identities that hold for every range, surface and calibration.
 
+use approx::assert_abs_diff_eq;
 use proptest::prelude::*;
 use stretch_core::{
     Branch, Calibration, CalibrationSpec, Degree, DesignError, Normalisation, Poly13, Range,
     RangeSpec, Real, Surface, strategies,
 };
+use testkit::tolerance as tol;
 
 /// The sum of terms, one power at a time: what Horner's rule must equal.
 fn naive(surface: &Surface, rate: f64, volts: f64) -> f64 {
@@ -12,15 +14,16 @@ fn naive(surface: &Surface, rate: f64, volts: f64) -> f64 {
     terms.map(|(i, j)| surface.coefficient(i, j) * rate.powi(i.into()) * volts.powi(j.into())).sum()
 }
 
-/// Horner and term by term differ by roundings of terms of size 3 * 2^5, of which there are 21.
-const HORNER: f64 = 21.0 * 96.0 * 4.0 * f64::EPSILON;
-
 proptest! {
     #[test]
     fn normalise_and_back(range in strategies::range(), n in -2.0..2.0) {
         let x = range.denormalise(n);
         let scale = (range.offset().abs() + range.span()) / range.span();
-        prop_assert!((range.normalise(x) - n).abs() <= 8.0 * f64::EPSILON * scale.max(1.0));
+        assert_abs_diff_eq!(
+            range.normalise(x),
+            n,
+            epsilon = tol::RANGE_ROUND_TRIP * scale.max(1.0)
+        );
     }
 
     #[test]
@@ -42,8 +45,8 @@ proptest! {
     fn horner_equals_the_sum_of_terms(
         surface in strategies::surface(), rate in -2.0..2.0, volts in -2.0..2.0,
     ) {
-        let difference = (surface.eval(rate, volts) - naive(&surface, rate, volts)).abs();
-        prop_assert!(difference <= HORNER);
+        let (found, exact) = (surface.eval(rate, volts), naive(&surface, rate, volts));
+        assert_abs_diff_eq!(found, exact, epsilon = tol::HORNER);
     }
 
     #[test]
@@ -55,8 +58,8 @@ proptest! {
         let by_volts = (naive(&surface, rate, volts + h) - naive(&surface, rate, volts - h)) / (2.0 * h);
         // truncation h^2/6 times a third derivative of at most 21 * 3 * 60; rounding 1e-16/h
         let tolerance = 1e-10 / 6.0 * 21.0 * 3.0 * 60.0 + 63.0 * 1e-15 / h;
-        prop_assert!((surface.d_rate(rate, volts) - by_rate).abs() <= tolerance);
-        prop_assert!((surface.d_volts(rate, volts) - by_volts).abs() <= tolerance);
+        assert_abs_diff_eq!(surface.d_rate(rate, volts), by_rate, epsilon = tolerance);
+        assert_abs_diff_eq!(surface.d_volts(rate, volts), by_volts, epsilon = tolerance);
     }
 
     #[test]
@@ -65,9 +68,17 @@ proptest! {
     ) {
         let poly: Poly13 = surface.as_poly13().unwrap();
         prop_assert_eq!(Surface::from(poly), surface);
-        prop_assert!((poly.eval(rate, volts) - surface.eval(rate, volts)).abs() <= HORNER);
-        prop_assert!((poly.d_rate(volts) - surface.d_rate(rate, volts)).abs() <= HORNER);
-        prop_assert!((poly.d_volts(rate, volts) - surface.d_volts(rate, volts)).abs() <= 4.0 * HORNER);
+        assert_abs_diff_eq!(
+            poly.eval(rate, volts),
+            surface.eval(rate, volts),
+            epsilon = tol::HORNER
+        );
+        assert_abs_diff_eq!(poly.d_rate(volts), surface.d_rate(rate, volts), epsilon = tol::HORNER);
+        assert_abs_diff_eq!(
+            poly.d_volts(rate, volts),
+            surface.d_volts(rate, volts),
+            epsilon = 4.0 * tol::HORNER
+        );
     }
 
     #[test]

@@ -83,7 +83,7 @@ impl Trial {
     /// use stretch_data::Trial;
     /// let time_s = vec![0.0, 0.033, 0.067, 0.1, 0.133, 0.167, 0.2, 0.5, 0.533, 0.567, 0.6];
     /// let trial = Trial { time_s, ..Trial::default() };
-    /// assert!((trial.rate_hz().expect("steps") - 30.0).abs() < 1e-9);
+    /// approx::assert_abs_diff_eq!(trial.rate_hz().expect("steps"), 30.0, epsilon = 1e-9);
     /// ```
     pub fn rate_hz(&self) -> Option<f64> {
         let mut steps: Vec<f64> = self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();

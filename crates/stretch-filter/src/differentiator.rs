@@ -28,7 +28,7 @@ use stretch_core::{Design, DesignError, Real, Stage};
 /// let spec = LowPassSpec { cutoff: Hertz(5.0), sample_rate: SampleRate::new(100.0).unwrap() };
 /// let mut rate = Runner::new(Differentiator::<f64>::new(spec).unwrap());
 /// let ramp = (0..200).filter_map(|n| rate.step(1.0 + 0.02 * n as f64)).last();
-/// assert!((ramp.unwrap() - 2.0).abs() < 1e-9);
+/// approx::assert_abs_diff_eq!(ramp.unwrap(), 2.0, epsilon = 1e-9);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Differentiator<T> {

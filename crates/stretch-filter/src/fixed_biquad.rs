@@ -30,7 +30,7 @@ use stretch_core::{
 /// let section = spec.design::<f64, 2>()?.sections()[0];
 /// let mut smooth = Runner::new(FixedBiquad::new(section.spec())?);
 /// let last = (0..200).map(|_| smooth.step(1 << 20)).last().unwrap();
-/// assert!((last - (1 << 20)).abs() <= 1);
+/// approx::assert_abs_diff_eq!(last, 1 << 20, epsilon = 1);
 /// # Ok::<(), stretch_core::DesignError>(())
 /// ```
 ///

@@ -25,7 +25,7 @@ use stretch_core::{Design, DesignError, SampleRate, Stage};
 /// let design = IntegerSgRate::<11, 2>::new(SampleRate::new(100.0)?, 3.3)?;
 /// let mut rate = Runner::new(design);
 /// let last = (0..20).filter_map(|n| rate.step(1.0 + 0.01 * n as f32)).last().unwrap();
-/// assert!((last - 1.0).abs() < 1e-5); // volts a second
+/// approx::assert_abs_diff_eq!(last, 1.0, epsilon = 1e-5); // volts a second
 /// # Ok::<(), stretch_core::DesignError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]

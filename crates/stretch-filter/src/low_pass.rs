@@ -102,8 +102,8 @@ impl LowPassSpec {
 ///
 /// let spec = LowPassSpec { cutoff: Hertz(5.0), sample_rate: SampleRate::new(100.0).unwrap() };
 /// let mut smooth = Runner::new(spec.design::<f64, 2>().unwrap());
-/// assert!((smooth.step(0.7) - 0.7).abs() < 1e-15);
-/// assert!((smooth.design().delay_s() - 0.0446).abs() < 1e-4);
+/// approx::assert_abs_diff_eq!(smooth.step(0.7), 0.7, epsilon = 1e-15);
+/// approx::assert_abs_diff_eq!(smooth.design().delay_s(), 0.0446, epsilon = 1e-4);
 /// ```
 /// ```compile_fail
 /// # use stretch_core::{Hertz, SampleRate};

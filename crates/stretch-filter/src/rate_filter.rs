@@ -21,7 +21,7 @@ use stretch_core::{Design, Hertz, RateEstimator, Real, SampleRate, Stage};
 /// let design = RateFilter::<f64>::new(RateEstimator::SAVGOL_11_2, hz).unwrap();
 /// let mut rate = Runner::new(design);
 /// let out = (0..11).filter_map(|n| rate.step(0.5 * n as f64)).last().unwrap();
-/// assert!((out - 50.0).abs() < 1e-10);
+/// approx::assert_abs_diff_eq!(out, 50.0, epsilon = 1e-10);
 ///
 /// // The paper's central difference needs the sample after: not live.
 /// let refused = RateFilter::<f64>::new(RateEstimator::CentralDifference, hz);

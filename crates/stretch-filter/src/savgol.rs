@@ -75,8 +75,8 @@ pub struct SavitzkyGolay<
 ///     last = rate.step(3.0 * t * t); // exact on a parabola: x' = 6 t
 ///     assert_eq!(last.is_some(), n >= 10);
 /// }
-/// assert!((last.unwrap() - 6.0 * 0.19).abs() < 1e-12);
-/// assert!(design.delay_s().abs() < 1e-12);
+/// approx::assert_abs_diff_eq!(last.unwrap(), 6.0 * 0.19, epsilon = 1e-12);
+/// approx::assert_abs_diff_eq!(design.delay_s(), 0.0, epsilon = 1e-12);
 /// ```
 pub type SgRate<T, const WINDOW: usize, const DEGREE: usize, const DELAY: usize = 0> =
     SavitzkyGolay<T, 1, WINDOW, DEGREE, DELAY>;
@@ -91,7 +91,7 @@ pub type SgRate<T, const WINDOW: usize, const DEGREE: usize, const DELAY: usize 
 /// let mut mean = Runner::new(design); // degree 1 in the middle: the mean of five
 /// let out: Vec<_> = [1.0, 2.0, 3.0, 4.0, 10.0].iter().map(|&x| mean.step(x)).collect();
 /// assert_eq!(out[3], None);
-/// assert!((out[4].unwrap() - 4.0_f64).abs() < 1e-14);
+/// approx::assert_abs_diff_eq!(out[4].unwrap(), 4.0_f64, epsilon = 1e-14);
 /// ```
 pub type SgSmooth<T, const WINDOW: usize, const DEGREE: usize, const DELAY: usize = 0> =
     SavitzkyGolay<T, 0, WINDOW, DEGREE, DELAY>;

@@ -68,7 +68,7 @@ impl SgShape {
 /// filter.over_log(&log, &mut slope).unwrap();
 /// for (n, slope) in slope.iter().enumerate() {
 ///     let t = n as f64 * 0.01;
-///     assert!((slope - 3.0 * t * t).abs() < 1e-12); // exact to both ends
+///     approx::assert_abs_diff_eq!(*slope, 3.0 * t * t, epsilon = 1e-12); // exact to both ends
 /// }
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]

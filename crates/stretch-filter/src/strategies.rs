@@ -14,7 +14,7 @@
 //!     for n in 0..30 {
 //!         let t = n as f64 * 0.01;
 //!         if let Some(estimate) = rate.step(signal.value(t)) {
-//!             prop_assert!((estimate - signal.rate(t)).abs() < 1e-9);
+//!             approx::assert_abs_diff_eq!(estimate, signal.rate(t), epsilon = 1e-9);
 //!         }
 //!     }
 //! });

@@ -37,7 +37,8 @@ pub struct TrackerSpec {
 /// let design = Tracker::<f64>::new(TrackerSpec { tracking_index: 0.1, sample_rate }).unwrap();
 /// let mut tracker = Runner::new(design);
 /// let last = (0..100).filter_map(|n| tracker.step(0.02 * n as f64)).last().unwrap();
-/// assert!((last.value - 1.98).abs() < 1e-12 && (last.rate - 2.0).abs() < 1e-10);
+/// approx::assert_abs_diff_eq!(last.value, 1.98, epsilon = 1e-12);
+/// approx::assert_abs_diff_eq!(last.rate, 2.0, epsilon = 1e-10);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tracker<T> {

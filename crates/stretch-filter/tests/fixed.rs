@@ -1,5 +1,6 @@
 //! The integer filters against exact integer arithmetic and against the float ones.
 
+use approx::{abs_diff_eq, assert_abs_diff_eq};
 use proptest::{collection::vec, prelude::*};
 use stretch_core::{Design, Hertz, Runner, SampleRate, Stage};
 use stretch_filter::{
@@ -141,11 +142,10 @@ proptest! {
         for step in steps {
             x = (x + step).clamp(-8.0, 8.0);
             let (Some(rate), exact) = (integer.step(x), float.step(x.into())) else { continue };
-            let error = (f64::from(rate) - exact.unwrap()).abs();
             // half a step of 2^-28 at each tap (their magnitudes sum to about one), and
             // of the output, which holds 16 times the sum; then two roundings of f32
             let bound = hz * 16.0 * 2f64.powi(-28) + exact.unwrap().abs() * 2f64.powi(-22);
-            prop_assert!(error <= bound, "{rate} {exact:?}");
+            assert_abs_diff_eq!(f64::from(rate), exact.unwrap(), epsilon = bound);
         }
     }
 
@@ -179,7 +179,7 @@ fn a_constant_passes_a_low_pass_unchanged() {
             assert!(errors.iter().all(|error| error.abs() < 4.0), "{cutoff} Hz, {x}");
             let mean = errors.iter().sum::<f64>() / 4000.0;
             // a settled memory starts on the nearest integer, half a bit away at most
-            assert!(mean.abs() < 0.55, "{cutoff} Hz, {x}: {mean}");
+            assert!(abs_diff_eq!(mean, 0.0, epsilon = 0.55), "{cutoff} Hz, {x}: {mean}");
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Logs with even and uneven time stamps.
 
+use approx::{abs_diff_eq, assert_abs_diff_eq};
 use proptest::prelude::*;
 use stretch_core::{Runner, SampleRate, Seconds};
 use stretch_filter::log::{
@@ -29,11 +30,11 @@ proptest! {
         let mut out = vec![None; log.len()];
         local_polynomial(fit(11, 3, 1), &times, &log, &mut out).unwrap();
         for (&t, y) in times.iter().zip(&out) {
-            prop_assert!((y.unwrap() - signal.rate(t)).abs() < tolerance::LOCAL_RATE);
+            assert_abs_diff_eq!(y.unwrap(), signal.rate(t), epsilon = tolerance::LOCAL_RATE);
         }
         local_polynomial(fit(11, 3, 0), &times, &log, &mut out).unwrap();
         for (&x, y) in log.iter().zip(&out) {
-            prop_assert!((y.unwrap() - x).abs() < tolerance::LOCAL_VALUE);
+            assert_abs_diff_eq!(y.unwrap(), x, epsilon = tolerance::LOCAL_VALUE);
         }
     }
 
@@ -49,7 +50,7 @@ proptest! {
         let mut even = vec![0.0; log.len()];
         sg.over_log(&log, &mut even).unwrap();
         for (a, b) in local.iter().zip(&even) {
-            prop_assert!((a.unwrap() - b).abs() < tolerance::LOCAL_RATE, "{a:?} {b}");
+            prop_assert!(abs_diff_eq!(a.unwrap(), b, epsilon = tolerance::LOCAL_RATE), "{a:?} {b}");
         }
     }
 
@@ -66,7 +67,11 @@ proptest! {
             let log: Vec<f64> = times.iter().map(|&t| signal.value(t)).collect();
             resample(&times, &log, grid, between, &mut out).unwrap();
             for (i, y) in out.iter().enumerate() {
-                prop_assert!((y - signal.value(grid.time_s(i))).abs() < tolerance::LOCAL_VALUE);
+                assert_abs_diff_eq!(
+                    *y,
+                    signal.value(grid.time_s(i)),
+                    epsilon = tolerance::LOCAL_VALUE
+                );
             }
         }
     }
@@ -139,7 +144,7 @@ fn a_fit_does_not_reach_across_a_gap() {
     assert_eq!(out[10], None);
     for (t, y) in times.iter().zip(&out).filter(|(_, y)| y.is_some()) {
         let truth = if *t < 1.5 { 1.0 } else { -1.0 };
-        assert!((y.unwrap() - truth).abs() < tolerance::LOCAL_RATE, "{t}: {y:?}");
+        assert!(abs_diff_eq!(y.unwrap(), truth, epsilon = tolerance::LOCAL_RATE), "{t}: {y:?}");
     }
     assert_eq!(out.iter().flatten().count(), 20);
 }
@@ -150,7 +155,7 @@ fn central_differences_are_exact_on_a_parabola() {
     let mut rate = [0.0; 9];
     central_difference(hundred(), &log, &mut rate).unwrap();
     for (n, y) in rate.iter().enumerate() {
-        assert!((y - 2.0 * n as f64 / HZ).abs() < tolerance::LOCAL_VALUE);
+        assert_abs_diff_eq!(*y, 2.0 * n as f64 / HZ, epsilon = tolerance::LOCAL_VALUE);
     }
     let mut two = [0.0_f32; 2];
     central_difference(hundred(), &[1.0, 1.5], &mut two).unwrap();

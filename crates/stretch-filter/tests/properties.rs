@@ -1,5 +1,6 @@
 //! What must hold for every signal.
 
+use approx::{abs_diff_eq, assert_abs_diff_eq};
 use proptest::prelude::*;
 use stretch_core::{Hertz, RateEstimator, Runner, SampleRate, Stage};
 use stretch_filter::strategies::{self, Signal};
@@ -81,7 +82,7 @@ proptest! {
         let end_taps: f64 = end.taps().iter().map(|t| t.abs()).sum();
         let end_bound = tolerance::TAPS * (end_taps * largest(&log) + largest(&truth));
         for (y, t) in whole.iter().zip(&truth) {
-            prop_assert!((y - t).abs() <= end_bound.max(bound), "{y} against {t}");
+            prop_assert!(abs_diff_eq!(y, t, epsilon = end_bound.max(bound)), "{y} against {t}");
         }
 
         let mut runner = Runner::new(filter);
@@ -89,7 +90,7 @@ proptest! {
             let y = runner.step(x);
             prop_assert_eq!(y.is_some(), n + 1 >= shape.window);
             if let Some(y) = y {
-                prop_assert!((y - truth[n - shape.delay]).abs() <= bound);
+                assert_abs_diff_eq!(y, truth[n - shape.delay], epsilon = bound);
                 // The live step and the pass over a log give the same bits.
                 prop_assert_eq!(y, whole[n - shape.delay]);
             }
@@ -109,7 +110,8 @@ proptest! {
         }
         let t = settled as f64 / HZ;
         let delay_s = t - last.unwrap() / bend;
-        prop_assert!((delay_s - design.delay_s()).abs() <= tolerance::RATE_FROM_DIFFERENCES * (1.0 + t * t), "{delay_s}");
+        let within = tolerance::RATE_FROM_DIFFERENCES * (1.0 + t * t);
+        assert_abs_diff_eq!(delay_s, design.delay_s(), epsilon = within);
     }
 
     #[test]
@@ -125,10 +127,12 @@ proptest! {
             prop_assert_eq!(rate.is_some(), n >= warm_up);
             if let Some(rate) = rate {
                 // The differentiator has settled to 1 %, the others are exact.
-                prop_assert!((rate - slope).abs() <= tolerance::WARMED_UP * slope.abs() + tolerance::RATE_FROM_DIFFERENCES);
+                let within = tolerance::WARMED_UP * slope.abs() + tolerance::RATE_FROM_DIFFERENCES;
+                assert_abs_diff_eq!(rate, slope, epsilon = within);
             }
         }
-        prop_assert!((rate.unwrap() - slope).abs() <= tolerance::RATE_FROM_DIFFERENCES * (1.0 + slope.abs()));
+        let within = tolerance::RATE_FROM_DIFFERENCES * (1.0 + slope.abs());
+        assert_abs_diff_eq!(rate.unwrap(), slope, epsilon = within);
     }
 
     #[test]
@@ -145,7 +149,7 @@ proptest! {
             prop_assert_eq!(ya.is_some(), yab.is_some());
             if let (Some(ya), Some(yb), Some(yab)) = (ya, yb, yab) {
                 let bound = tolerance::SUPERPOSITION * (ya.abs() + yb.abs() * gain.abs() + design.noise_gain() * 50.0);
-                prop_assert!((yab - (ya + gain * yb)).abs() <= bound);
+                assert_abs_diff_eq!(yab, ya + gain * yb, epsilon = bound);
             }
         }
     }
@@ -189,10 +193,10 @@ proptest! {
         let scale = largest(&x) * 50.0;
         for &x in &x {
             if let (Some(a), Some(b)) = (sg.step(x), sg32.step(x as f32)) {
-                prop_assert!((a - f64::from(b)).abs() <= tolerance::F32_FILTER * scale);
+                assert_abs_diff_eq!(a, f64::from(b), epsilon = tolerance::F32_FILTER * scale);
             }
             let (a, b) = (lp.step(x), lp32.step(x as f32));
-            prop_assert!((a - f64::from(b)).abs() <= tolerance::F32_FILTER * scale);
+            assert_abs_diff_eq!(a, f64::from(b), epsilon = tolerance::F32_FILTER * scale);
         }
     }
 
@@ -207,10 +211,10 @@ proptest! {
         // A design forgets at the pole's pace: rounding may add up over 1/cutoff.
         let bound = tolerance::RECURSIVE_OUTPUT * x.abs().max(1.0);
         for _ in 0..200 {
-            prop_assert!((low_pass.step(&mut memories.0, x) - x).abs() <= bound);
-            prop_assert!((smooth.step(&mut memories.1, x).unwrap() - x).abs() <= bound);
-            prop_assert!(rate.step(&mut memories.2, x).unwrap().abs() <= bound);
-            prop_assert!((biquad.step(&mut memories.3, x) - x).abs() <= bound);
+            assert_abs_diff_eq!(low_pass.step(&mut memories.0, x), x, epsilon = bound);
+            assert_abs_diff_eq!(smooth.step(&mut memories.1, x).unwrap(), x, epsilon = bound);
+            assert_abs_diff_eq!(rate.step(&mut memories.2, x).unwrap(), 0.0, epsilon = bound);
+            assert_abs_diff_eq!(biquad.step(&mut memories.3, x), x, epsilon = bound);
         }
     }
 
@@ -264,7 +268,11 @@ fn cutoff_is_minus_3_db<const N: usize>() {
     for cutoff_hz in [1.0, 5.0, 20.0, 40.0] {
         let gain = measured_gain(&spec(cutoff_hz).design::<f64, N>().unwrap(), cutoff_hz);
         assert!(
-            (gain - std::f64::consts::FRAC_1_SQRT_2).abs() < tolerance::PROJECTED_GAIN,
+            abs_diff_eq!(
+                gain,
+                std::f64::consts::FRAC_1_SQRT_2,
+                epsilon = tolerance::PROJECTED_GAIN
+            ),
             "{N} {cutoff_hz}: {gain}"
         );
     }
@@ -310,13 +318,16 @@ fn noise_gain_is_the_deviation_that_is_measured() {
         let mut runner = Runner::new(design);
         let y: Vec<f64> = x.iter().filter_map(|&x| runner.step(x)).collect();
         let ratio = deviation(&y) / design.noise_gain();
-        assert!((ratio - 1.0).abs() <= tolerance::MEASURED_DEVIATION, "{estimator:?}: {ratio}");
+        assert!(
+            abs_diff_eq!(ratio, 1.0, epsilon = tolerance::MEASURED_DEVIATION),
+            "{estimator:?}: {ratio}"
+        );
     }
     let low_pass = spec(5.0).design::<f64, 3>().unwrap();
     let mut memory = low_pass.settled_at(0.0);
     let y: Vec<f64> = x.iter().map(|&x| low_pass.step(&mut memory, x)).collect();
     let ratio = deviation(&y) / low_pass.noise_gain();
-    assert!((ratio - 1.0).abs() <= tolerance::MEASURED_DEVIATION, "{ratio}");
+    assert!(abs_diff_eq!(ratio, 1.0, epsilon = tolerance::MEASURED_DEVIATION), "{ratio}");
 }
 
 #[test]

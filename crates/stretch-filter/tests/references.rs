@@ -1,5 +1,6 @@
 //! Values from exact arithmetic and from SciPy (`reference/filter/generate.py`).
 
+use approx::abs_diff_eq;
 use std::collections::HashMap;
 use stretch_core::{Design, Hertz, Runner, SampleRate, Stage};
 use stretch_filter::{
@@ -29,7 +30,10 @@ fn assert_close(ours: &[f64], theirs: &[f64], relative: f64) {
     assert_eq!(ours.len(), theirs.len());
     let largest = theirs.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     for (i, (a, b)) in ours.iter().zip(theirs).enumerate() {
-        assert!((a - b).abs() <= relative * largest, "{i}: {a} against {b} (largest {largest})");
+        assert!(
+            abs_diff_eq!(a, b, epsilon = relative * largest),
+            "{i}: {a} against {b} (largest {largest})"
+        );
     }
 }
 

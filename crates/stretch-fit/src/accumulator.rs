@@ -33,8 +33,8 @@ use crate::{
 ///     log.push(rate, volts, 0.25 + 0.5 * volts - 0.125 * rate * volts)?;
 /// }
 /// let surface = log.fit()?.surface();
-/// assert!((surface.coefficient(0, 1) - 0.5).abs() < 1e-12);
-/// assert!((surface.coefficient(1, 1) + 0.125).abs() < 1e-12);
+/// approx::assert_abs_diff_eq!(surface.coefficient(0, 1), 0.5, epsilon = 1e-12);
+/// approx::assert_abs_diff_eq!(surface.coefficient(1, 1), -0.125, epsilon = 1e-12);
 /// # Ok::<(), stretch_fit::FitError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]

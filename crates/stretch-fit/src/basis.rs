@@ -29,8 +29,13 @@ pub(crate) struct Basis<const TERMS: usize> {
 
 impl Basis<2> {
     /// The constant and the voltage.
-    pub(crate) const LINE: Self =
-        Self { degree: crate::LineAccumulator::<f64>::DEGREE, steps: [(0, false), (0, true)] };
+    pub(crate) const LINE: Self = Self {
+        degree: match Degree::new(0, 1) {
+            Ok(degree) => degree,
+            Err(_) => panic!("a line is a degree"),
+        },
+        steps: [(0, false), (0, true)],
+    };
 }
 
 impl<const TERMS: usize> Basis<TERMS> {
@@ -46,7 +51,7 @@ impl<const TERMS: usize> Basis<TERMS> {
         Ok(Self { degree, steps })
     }
 
-    pub(crate) fn degree(&self) -> Degree {
+    pub(crate) const fn degree(&self) -> Degree {
         self.degree
     }
 

@@ -60,8 +60,20 @@ pub struct Confidence<'a, T, const TERMS: usize> {
     sigma: T,
 }
 
+impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
+    /// Bounds at a level such as 0.95: of coefficients, of the surface, of new
+    /// observations.
+    ///
+    /// # Errors
+    /// [`FitError::Level`] unless the level is above 0 and below 1,
+    /// [`FitError::TooFewSamples`] when no degree of freedom is left.
+    pub fn confidence(&self, level: f64) -> Result<Confidence<'_, T, TERMS>, FitError> {
+        Confidence::new(self, level)
+    }
+}
+
 impl<'a, T: Real, const TERMS: usize> Confidence<'a, T, TERMS> {
-    pub(crate) fn new(fit: &'a Fit<T, TERMS>, level: f64) -> Result<Self, FitError> {
+    fn new(fit: &'a Fit<T, TERMS>, level: f64) -> Result<Self, FitError> {
         if !(level > 0.0 && level < 1.0) {
             return Err(FitError::Level { level });
         }

@@ -99,7 +99,7 @@ pub struct CrossValidation<T> {
 /// });
 /// let judged = cross_validate(&trials, Degree::new(0, 1).unwrap())?;
 /// assert_eq!(judged.worst.trial, 2);
-/// assert!((judged.worst.rmse() - 0.1).abs() < 1e-12);
+/// approx::assert_abs_diff_eq!(judged.worst.rmse(), 0.1, epsilon = 1e-12);
 /// # Ok::<(), stretch_fit::FitError>(())
 /// ```
 ///

@@ -6,7 +6,6 @@
 use stretch_core::{Degree, Real, Surface};
 
 use crate::{
-    Confidence, FitError,
     basis::Basis,
     shift::{apply, product, shift},
 };
@@ -27,9 +26,9 @@ use crate::{
 ///     line.push(0.0, volts, value)?;
 /// }
 /// let fit = line.fit()?;
-/// assert!((fit.coefficients()[1] - 1.5).abs() < 1e-14);
-/// assert!((fit.sse() - 1.0 / 6.0).abs() < 1e-14);
-/// assert!((fit.r_squared().unwrap() - 27.0 / 28.0).abs() < 1e-14);
+/// approx::assert_abs_diff_eq!(fit.coefficients()[1], 1.5, epsilon = 1e-14);
+/// approx::assert_abs_diff_eq!(fit.sse(), 1.0 / 6.0, epsilon = 1e-14);
+/// approx::assert_abs_diff_eq!(fit.r_squared().unwrap(), 27.0 / 28.0, epsilon = 1e-14);
 /// # Ok::<(), stretch_fit::FitError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -133,16 +132,6 @@ impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
             let square = row.iter().fold(T::zero(), |sum, &e| sum + e * e);
             sigma * square.sqrt()
         }))
-    }
-
-    /// Bounds at a level such as 0.95: of coefficients, of the surface, of new
-    /// observations.
-    ///
-    /// # Errors
-    /// [`FitError::Level`] unless the level is above 0 and below 1,
-    /// [`FitError::TooFewSamples`] when no degree of freedom is left.
-    pub fn confidence(&self, level: f64) -> Result<Confidence<'_, T, TERMS>, FitError> {
-        Confidence::new(self, level)
     }
 
     /// `h = a^T (A^T W A)^-1 a` for the row `a` of a rate and a voltage: the

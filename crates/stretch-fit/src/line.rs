@@ -2,7 +2,7 @@
 
 use stretch_core::{Degree, Real};
 
-use crate::{Confidence, Factor, Fit, FitError, SurfaceAccumulator};
+use crate::{Confidence, Factor, Fit, FitError, SurfaceAccumulator, basis::Basis};
 
 /// Rows of a line's block: short, so that it suits a board.
 const ROWS: usize = 16;
@@ -19,8 +19,8 @@ const ROWS: usize = 16;
 ///     line.push(volts, 0.9744 * volts + 0.1757)?;
 /// }
 /// let fit = line.fit()?;
-/// assert!((fit.slope() - 0.9744).abs() < 1e-12);
-/// assert!((fit.intercept() - 0.1757).abs() < 1e-12);
+/// approx::assert_abs_diff_eq!(fit.slope(), 0.9744, epsilon = 1e-12);
+/// approx::assert_abs_diff_eq!(fit.intercept(), 0.1757, epsilon = 1e-12);
 /// assert!(fit.fit().r_squared().unwrap() > 1.0 - 1e-12);
 /// # Ok::<(), stretch_fit::FitError>(())
 /// ```
@@ -35,14 +35,11 @@ impl<T: Real> Default for LineAccumulator<T> {
 
 impl<T: Real> LineAccumulator<T> {
     /// The line's terms: the constant and the voltage.
-    pub const DEGREE: Degree = match Degree::new(0, 1) {
-        Ok(degree) => degree,
-        Err(_) => panic!("a line is a degree"),
-    };
+    pub const DEGREE: Degree = Basis::LINE.degree();
 
     /// An accumulator that has seen no sample.
     pub fn new() -> Self {
-        Self(SurfaceAccumulator::of_basis(crate::basis::Basis::LINE))
+        Self(SurfaceAccumulator::of_basis(Basis::LINE))
     }
 
     /// Adds a sample: at this voltage the line should be `value`.

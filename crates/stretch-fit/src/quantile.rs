@@ -65,6 +65,8 @@ fn root_of(wanted: f64, tail: impl Fn(f64) -> f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use approx::relative_eq;
+
     use super::{fisher, student_two_sided};
     use testkit::{tolerance::FIT_QUANTILE, vectors::columns};
 
@@ -73,10 +75,11 @@ mod tests {
         let table = columns("fit/quantiles.csv");
         for (row, expected) in table["t"].iter().enumerate() {
             let [level, terms, dof] = ["level", "terms", "dof"].map(|name| table[name][row]);
-            let t = student_two_sided(level, dof as u64) / expected;
-            assert!((t - 1.0).abs() < FIT_QUANTILE, "t at {level} of {dof}: ratio {t:?}");
-            let f = fisher(level, terms as u64, dof as u64) / table["f"][row];
-            assert!((f - 1.0).abs() < FIT_QUANTILE, "F at {level} of {terms}, {dof}: {f:?}");
+            let near = |a: f64, b| relative_eq!(a, b, epsilon = 0.0, max_relative = FIT_QUANTILE);
+            let t = student_two_sided(level, dof as u64);
+            assert!(near(t, *expected), "t at {level} of {dof}: {t:?}");
+            let f = fisher(level, terms as u64, dof as u64);
+            assert!(near(f, table["f"][row]), "F at {level} of {terms}, {dof}: {f:?}");
         }
     }
 

@@ -87,7 +87,7 @@ pub struct RobustFit<T, const TERMS: usize> {
 /// for loss in [Loss::Bisquare, Loss::LeastAbsolute] {
 ///     let robust = robust_fit::<f64, 2, _>(line, loss, samples, &mut memory)?;
 ///     assert!(robust.converged);
-///     assert!((robust.fit.coefficients()[1] - 3.0).abs() < 0.02);
+///     approx::assert_abs_diff_eq!(robust.fit.coefficients()[1], 3.0, epsilon = 0.02);
 /// }
 /// # Ok::<(), stretch_fit::FitError>(())
 /// ```

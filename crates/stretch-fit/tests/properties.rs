@@ -1,5 +1,6 @@
 //! What must hold for any data.
 
+use approx::{assert_abs_diff_eq, assert_relative_eq};
 use proptest::prelude::*;
 use stretch_core::{Degree, Real};
 use stretch_fit::{
@@ -70,9 +71,14 @@ proptest! {
         for fit in [merged.fit().unwrap(), factor.fit().unwrap()] {
             prop_assert_eq!(fit.samples(), whole.samples());
             prop_assert!(distance(fit.coefficients(), whole.coefficients()) < tol::FIT_WELL);
-            prop_assert!((fit.sse() / whole.sse() - 1.0).abs() < tol::FIT_STATISTICS);
+            assert_relative_eq!(
+                fit.sse(),
+                whole.sse(),
+                epsilon = 0.0,
+                max_relative = tol::FIT_STATISTICS
+            );
             let (a, b) = (fit.r_squared().unwrap(), whole.r_squared().unwrap());
-            prop_assert!((a - b).abs() < tol::FIT_STATISTICS);
+            assert_abs_diff_eq!(a, b, epsilon = tol::FIT_STATISTICS);
         }
     }
 
@@ -119,13 +125,18 @@ proptest! {
         let moved = accumulate::<16>(Degree::POLY13, &moved).fit().unwrap();
         for &(rate, volts, _) in &log.samples {
             let (a, b) = (fit.surface(), moved.surface());
-            let off = a.eval(rate, volts) + by_value - b.eval(rate, volts + by_volts);
+            let (a, b) = (a.eval(rate, volts) + by_value, b.eval(rate, volts + by_volts));
             // Horner in raw volts adds terms up to 10 * 6^3 that cancel.
-            prop_assert!(off.abs() < 1e4 * tol::FIT_WELL, "off by {off:e}");
+            assert_abs_diff_eq!(a, b, epsilon = 1e4 * tol::FIT_WELL);
             let (h, g) = (fit.leverage(rate, volts), moved.leverage(rate, volts + by_volts));
-            prop_assert!((h - g).abs() < 1e2 * tol::FIT_WELL, "leverage {h} and {g}");
+            assert_abs_diff_eq!(h, g, epsilon = 1e2 * tol::FIT_WELL);
         }
-        prop_assert!((moved.sse() / fit.sse() - 1.0).abs() < tol::FIT_STATISTICS);
+        assert_relative_eq!(
+            moved.sse(),
+            fit.sse(),
+            epsilon = 0.0,
+            max_relative = tol::FIT_STATISTICS
+        );
     }
 
     #[test]
@@ -141,11 +152,20 @@ proptest! {
         }
         prop_assume!(weighted.samples() > 20);
         let (weighted, repeated) = (weighted.factor(), repeated.factor());
-        prop_assert!((weighted.weight() / repeated.weight() - 1.0).abs() < tol::FIT_WELL);
+        assert_relative_eq!(
+            weighted.weight(),
+            repeated.weight(),
+            epsilon = 0.0,
+            max_relative = tol::FIT_WELL
+        );
         let (a, b) = (weighted.fit().unwrap(), repeated.fit().unwrap());
         prop_assert!(distance(a.coefficients(), b.coefficients()) < allowed(b.condition()));
-        prop_assert!((a.sse() / b.sse() - 1.0).abs() < tol::FIT_STATISTICS);
-        prop_assert!((a.r_squared().unwrap() - b.r_squared().unwrap()).abs() < tol::FIT_STATISTICS);
+        assert_relative_eq!(a.sse(), b.sse(), epsilon = 0.0, max_relative = tol::FIT_STATISTICS);
+        assert_abs_diff_eq!(
+            a.r_squared().unwrap(),
+            b.r_squared().unwrap(),
+            epsilon = tol::FIT_STATISTICS
+        );
     }
 
     #[test]
@@ -160,7 +180,12 @@ proptest! {
         let fit = all.fit_degree(degree).unwrap();
         let off = distance(fit.coefficients(), own.coefficients());
         prop_assert!(off < allowed(1e2 * own.condition()), "{degree}: off by {off:e}");
-        prop_assert!((fit.sse() / own.sse() - 1.0).abs() < tol::FIT_STATISTICS);
+        assert_relative_eq!(
+            fit.sse(),
+            own.sse(),
+            epsilon = 0.0,
+            max_relative = tol::FIT_STATISTICS
+        );
         prop_assert_eq!(fit.dof(), own.dof());
     }
 
@@ -176,14 +201,14 @@ proptest! {
             .map(|&(rate, volts, value)| (value - other.eval(rate, volts)).powi(2))
             .sum();
         let found = factor.residual_of(&other.coefficients()[..7]);
-        prop_assert!((found / sum - 1.0).abs() < tol::FIT_STATISTICS);
+        assert_relative_eq!(found, sum, epsilon = 0.0, max_relative = tol::FIT_STATISTICS);
     }
 
     #[test]
     fn leverages_sum_to_the_number_of_terms(log in observations(Degree::POLY13, 0.5, 30..100)) {
         let fit = accumulate::<16>(Degree::POLY13, &log.samples).fit().unwrap();
         let sum: f64 = log.samples.iter().map(|s| fit.leverage(s.0, s.1)).sum();
-        prop_assert!((sum - 7.0).abs() < tol::FIT_STATISTICS);
+        assert_abs_diff_eq!(sum, 7.0, epsilon = tol::FIT_STATISTICS);
     }
 
     #[test]
@@ -207,13 +232,23 @@ proptest! {
                 .iter()
                 .map(|&(rate, volts, value)| (value - surface.eval(rate, volts)).powi(2))
                 .sum();
-            prop_assert!((held_out.sse / sse - 1.0).abs() < tol::FIT_STATISTICS);
+            assert_relative_eq!(
+                held_out.sse,
+                sse,
+                epsilon = 0.0,
+                max_relative = tol::FIT_STATISTICS
+            );
             sum += sse;
             count += parts[held_out.trial].len();
         }
         let pooled = cross_validate(&factors, Degree::POLY13).unwrap();
         prop_assert_eq!(pooled.samples, count as u64);
-        prop_assert!((pooled.rmse / (sum / count as f64).sqrt() - 1.0).abs() < tol::FIT_STATISTICS);
+        assert_relative_eq!(
+            pooled.rmse,
+            (sum / count as f64).sqrt(),
+            epsilon = 0.0,
+            max_relative = tol::FIT_STATISTICS
+        );
     }
 
     #[test]
@@ -245,8 +280,8 @@ proptest! {
             robust_fit::<f64, 7, _>(Degree::POLY13, Loss::LeastAbsolute, spoilt, &mut memory);
         let surface = absolute.unwrap().fit.surface();
         for &(rate, volts, _) in &log.samples {
-            let off = (surface.eval(rate, volts) - log.surface.eval(rate, volts)).abs();
-            prop_assert!(off < tol::FIT_WILD * 0.01, "off by {off}");
+            let (found, truth) = (surface.eval(rate, volts), log.surface.eval(rate, volts));
+            assert_abs_diff_eq!(found, truth, epsilon = tol::FIT_WILD * 0.01);
         }
     }
 

@@ -1,5 +1,6 @@
 //! Against 60-digit least squares, SciPy and statsmodels (`reference/fit/surfaces.py`).
 
+use approx::{assert_relative_eq, relative_eq};
 use std::collections::HashMap;
 
 use stretch_core::Degree;
@@ -20,8 +21,8 @@ fn accumulate(samples: &Columns, degree: Degree, weighted: bool) -> Factor<f64, 
     sums.factor()
 }
 
-fn relative(a: f64, b: f64) -> f64 {
-    (a - b).abs() / b.abs()
+fn near(a: f64, b: f64, relative: f64) -> bool {
+    relative_eq!(a, b, epsilon = 0.0, max_relative = relative)
 }
 
 fn distance(a: &[f64], b: &[f64]) -> f64 {
@@ -76,11 +77,12 @@ fn coefficients_errors_and_statistics() {
             ("adjusted_r_squared", fit.adjusted_r_squared().unwrap()),
             ("rmse", fit.rmse().unwrap()),
         ] {
-            let off = relative(found, at(what));
-            assert!(off < tol::FIT_STATISTICS, "{name}: {what} off by {off:e}");
+            let expected = at(what);
+            let near = near(found, expected, tol::FIT_STATISTICS);
+            assert!(near, "{name}: {what} {found} for {expected}");
         }
-        let off = relative(fit.condition(), condition);
-        assert!(off < tol::FIT_CONDITION, "{name}: condition found as {:e}", fit.condition());
+        let found = fit.condition();
+        assert!(near(found, condition, tol::FIT_CONDITION), "{name}: condition found as {found:e}");
     }
 }
 
@@ -98,7 +100,7 @@ fn lower_orders_from_one_pass() {
         let fit = all.fit_degree(Degree::new(i as u8, j as u8).unwrap()).unwrap();
         let allowed = tol::FIT_WELL * (fit.condition() / 1e3).max(1.0);
         assert!(distance(fit.coefficients(), &expected) < allowed, "{}", fit.degree());
-        assert!(relative(fit.sse(), statistics["sse"][row]) < tol::FIT_STATISTICS);
+        assert!(near(fit.sse(), statistics["sse"][row], tol::FIT_STATISTICS), "{}", fit.degree());
     }
 }
 
@@ -112,8 +114,8 @@ fn prediction_bounds() {
             accumulate(&samples[at("ill") as usize], Degree::POLY13, at("weighted") == 1.0);
         let fit = factor.fit().unwrap();
         let volts = at("volts");
-        let off = relative(fit.leverage(rate, volts), at("leverage"));
-        assert!(off < tol::FIT_ILL, "leverage, row {row}: off by {off:e}");
+        let leverage = fit.leverage(rate, volts);
+        assert!(near(leverage, at("leverage"), tol::FIT_ILL), "row {row}: leverage {leverage}");
         let bounds = fit.confidence(0.95).unwrap();
         for (what, bounds) in [
             ("surface", bounds.surface(rate, volts)),
@@ -121,12 +123,11 @@ fn prediction_bounds() {
             ("surface_everywhere", bounds.surface_everywhere(rate, volts)),
             ("observation_everywhere", bounds.observation_everywhere(rate, volts)),
         ] {
-            assert!(relative(bounds.estimate, at("estimate")) < tol::FIT_STATISTICS, "{what}");
+            assert!(near(bounds.estimate, at("estimate"), tol::FIT_STATISTICS), "{what}");
             // Estimate less bound: half widths of 1e-6 beside estimates of 1.
-            let rounding = 1e-14 / at(what);
+            let allowed = tol::FIT_STATISTICS + tol::F64_ROUNDING / at(what);
             for half in [bounds.estimate - bounds.lower, bounds.upper - bounds.estimate] {
-                let off = relative(half, at(what));
-                assert!(off < tol::FIT_STATISTICS + rounding, "{what}, row {row}: off by {off:e}");
+                assert!(near(half, at(what), allowed), "{what}, row {row}: {half} wide");
             }
         }
     }
@@ -154,8 +155,8 @@ fn robust_fits() {
     let off = distance(found, &expected["statsmodels_bisquare"]);
     assert!(off < tol::FIT_OTHER_SCALE, "statsmodels: off by {off:e}");
     let sigma = bisquare.fit.sigma().unwrap();
-    let off = relative(sigma, expected["bisquare_sigma"][0]);
-    assert!(off < tol::FIT_BISQUARE, "sigma {sigma}, off by {off:e}");
+    let expected_sigma = expected["bisquare_sigma"][0];
+    assert_relative_eq!(sigma, expected_sigma, epsilon = 0.0, max_relative = tol::FIT_BISQUARE);
 
     let absolute = fitted(Loss::LeastAbsolute);
     assert!(absolute.converged);

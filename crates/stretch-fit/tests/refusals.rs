@@ -1,5 +1,6 @@
 //! What is refused, and what the refusal says.
 
+use approx::assert_abs_diff_eq;
 use stretch_core::{Degree, Real};
 use stretch_fit::{
     FitError, LineAccumulator, Loss, SurfaceAccumulator, cross_validate, robust_fit,
@@ -79,7 +80,7 @@ fn as_many_samples_as_terms_leave_no_degree_of_freedom() {
     line.push(0.0, 1.0_f64).unwrap();
     line.push(1.0, 3.0).unwrap();
     let fit = line.fit().unwrap();
-    assert!((fit.slope() - 2.0).abs() < F64_ROUNDING);
+    assert_abs_diff_eq!(fit.slope(), 2.0, epsilon = F64_ROUNDING);
     assert_eq!((fit.fit().dof(), fit.fit().rmse()), (0, None));
     assert!(fit.fit().standard_errors().is_none() && fit.fit().adjusted_r_squared().is_none());
     let error = fit.confidence(0.95).unwrap_err();

@@ -37,7 +37,7 @@ pub struct Lag {
 /// let truth: [f64; 200] = core::array::from_fn(|i| libm::sin(0.1 * i as f64));
 /// let estimate: [f64; 200] = core::array::from_fn(|i| 3.0 + libm::sin(0.1 * (i as f64 - 2.5)));
 /// let lag = stretch_metrics::lag(&truth, &estimate, 10)?;
-/// assert!((lag.samples - 2.5).abs() < 0.01);
+/// approx::assert_abs_diff_eq!(lag.samples, 2.5, epsilon = 0.01);
 /// # Ok::<(), stretch_metrics::MetricsError>(())
 /// ```
 pub fn lag<T: Real>(truth: &[T], estimate: &[T], max_lag: usize) -> Result<Lag, MetricsError> {

@@ -23,9 +23,9 @@ use crate::{
 /// }
 /// let result = test.test()?;
 /// assert_eq!(result.dof, 3);
-/// assert!((result.mean_difference - 0.35).abs() < 1e-15);
-/// assert!((result.t - 2.645_751_311_064_59).abs() < 1e-12);
-/// assert!((result.p - 0.077_274_29).abs() < 1e-6);
+/// approx::assert_abs_diff_eq!(result.mean_difference, 0.35, epsilon = 1e-15);
+/// approx::assert_abs_diff_eq!(result.t, 2.645_751_311_064_59, epsilon = 1e-12);
+/// approx::assert_abs_diff_eq!(result.p, 0.077_274_29, epsilon = 1e-6);
 /// # Ok::<(), stretch_metrics::MetricsError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]

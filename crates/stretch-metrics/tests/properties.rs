@@ -1,6 +1,7 @@
 //! What must hold for any signals.
 #![cfg(feature = "proptest")]
 
+use approx::{assert_abs_diff_eq, relative_eq};
 use proptest::prelude::*;
 use stretch_metrics::{
     Agreement, Delta, PairedBlocks, PairedT, lag, strategies, student_t::ln_two_tailed,
@@ -32,8 +33,9 @@ fn same(a: &[Option<f64>], b: &[Option<f64>], within: f64) -> Result<(), TestCas
     for (i, pair) in a.iter().zip(b).enumerate() {
         match pair {
             (Some(a), Some(b)) => {
-                let scale = a.abs().max(b.abs()).max(1.0);
-                prop_assert!((a - b).abs() <= within * scale, "figure {i}: {a} and {b}");
+                // relative to max(1, value)
+                let near = relative_eq!(a, b, epsilon = within, max_relative = within);
+                prop_assert!(near, "figure {i}: {a} and {b}");
             }
             (a, b) => prop_assert_eq!(a, b),
         }
@@ -117,10 +119,10 @@ proptest! {
     #[test]
     fn a_lag_is_found_and_is_antisymmetric((expected, truth, estimate) in strategies::lagged(400)) {
         let found = lag(&truth, &estimate, 12)?;
-        prop_assert!((found.samples - expected).abs() < tolerance::METRICS_LAG_PARABOLA, "{found:?}");
+        assert_abs_diff_eq!(found.samples, expected, epsilon = tolerance::METRICS_LAG_PARABOLA);
         prop_assert!(found.correlation >= found.correlation_at_zero && !found.at_limit);
         let back = lag(&estimate, &truth, 12)?;
-        prop_assert!((back.samples + found.samples).abs() < tolerance::METRICS_SHIFT);
+        assert_abs_diff_eq!(back.samples, -found.samples, epsilon = tolerance::METRICS_SHIFT);
     }
 
     #[test]

@@ -21,7 +21,7 @@ use crate::{DesignError, Poly13};
 /// let fixed = FixedPoly13::new(&surface)?;
 /// let (rate, volts) = (1 << 30, -(1 << 29)); // 0.25 and -0.125
 /// let error = f64::from(fixed.eval(rate, volts)) - surface.eval(0.25, -0.125);
-/// assert!(error.abs() <= FixedPoly13::ROUNDING);
+/// approx::assert_abs_diff_eq!(error, 0.0, epsilon = FixedPoly13::ROUNDING);
 /// let steep = Poly13 { p03: 1e10, ..surface };
 /// assert!(FixedPoly13::new(&steep).is_err());
 /// # Ok::<(), stretch_core::DesignError>(())

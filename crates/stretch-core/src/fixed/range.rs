@@ -27,7 +27,7 @@ pub struct RangeUnits {
 /// // a 12-bit converter of 3.3 V
 /// let range = FixedRange::new(&volts, RangeUnits { zero: 0.0, step: 3.3 / 4095.0 })?;
 /// let n = f64::from(range.normalise(2048)) / f64::from(1 << 27);
-/// assert!((n - (2048.0 * 3.3 / 4095.0 - 1.24)).abs() < 1e-8);
+/// approx::assert_abs_diff_eq!(n, 2048.0 * 3.3 / 4095.0 - 1.24, epsilon = 1e-8);
 /// assert_eq!(range.denormalise(range.normalise(2048)), 2048);
 /// assert_eq!(range.normalise(i32::MAX), i32::MAX); // saturated
 /// # Ok::<(), stretch_core::DesignError>(())

@@ -57,7 +57,7 @@ impl LocalFit {
 /// let mut rate = [None; 6];
 /// local_polynomial(fit, &times, &log, &mut rate).unwrap();
 /// for (t, rate) in times.iter().zip(rate) {
-///     assert!((rate.unwrap() - 10.0 * t).abs() < 1e-9);
+///     approx::assert_abs_diff_eq!(rate.unwrap(), 10.0 * t, epsilon = 1e-9);
 /// }
 /// ```
 pub fn local_polynomial<T: Real>(

@@ -71,7 +71,7 @@ pub enum Between {
 /// let mut even = [0.0; 4];
 /// assert_eq!(grid.points_until(Seconds(0.03)), 4);
 /// resample(&times, &log, grid, Between::Linear, &mut even).unwrap();
-/// assert!((even[2] - 0.04_f64).abs() < 1e-15);
+/// approx::assert_abs_diff_eq!(even[2], 0.04_f64, epsilon = 1e-15);
 /// ```
 pub fn resample<T: Real>(
     times_s: &[f64],

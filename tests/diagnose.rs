@@ -232,6 +232,38 @@ fn odd_data_get_an_honest_verdict() {
 }
 
 #[test]
+fn a_simulator_that_has_the_effect_agrees() {
+    let scratch = Scratch::new();
+    let stock = runs(stretch().arg("rig"));
+    let agrees = |command: &mut Command, name: &str| {
+        let text = runs(command);
+        let first = text.lines().next().unwrap();
+        assert!(first.contains("agree") && !first.contains("lacks"), "{name}: {text}");
+    };
+    for (effect, table) in [
+        ("gauge_relaxation:c=0.4,tau=0.2", "name = \"gauge_relaxation\"\nc = 0.4\ntau = 0.2\n"),
+        ("muscle_hysteresis:h=0.3,s=0.02", "name = \"muscle_hysteresis\"\nh = 0.3\ns = 0.02\n"),
+        ("valve_delay:delay_s=0.04", "name = \"valve_delay\"\ndelay_s = 0.04\n"),
+    ] {
+        let name = effect.split(':').next().unwrap();
+        let folder = bench(&scratch, name, &[effect]);
+        let rig = scratch.write(&format!("{name}.toml"), format!("{stock}\n[[effect]]\n{table}"));
+        agrees(diagnose(&folder).arg("--rig").arg(&rig), name);
+        // What `simulate` wrote beside its trials is the rig that they come from.
+        let written = scratch.path(&format!("{name}-one")).join("rig.toml");
+        agrees(diagnose(&folder).arg("--rig").arg(&written), name);
+    }
+    let folder = scratch.path("valve_delay");
+    for (from, to, words) in [
+        ("[muscle]", "[muscles]", ["odd.toml", "`muscles`", "`muscle`"]),
+        ("tau_m = ", "tau_n = ", ["odd.toml", "`tau_n`", "`tau_m`"]),
+    ] {
+        let odd = scratch.write("odd.toml", stock.replace(from, to));
+        fails(diagnose(&folder).arg("--rig").arg(&odd), &words);
+    }
+}
+
+#[test]
 fn a_wrong_rig_is_no_effect_and_a_strong_effect_is_no_wrong_rig() {
     let scratch = Scratch::new();
     let folder = bench(&scratch, "bench", &[]);

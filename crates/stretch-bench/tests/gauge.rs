@@ -6,7 +6,7 @@ use stretch_bench::{BenchError, GaugeSetup, GaugeSimulator};
 use stretch_data::{Channel, RigFile, SessionTrial, Split, Trial, TrialKind};
 use stretch_gap::{Diagnosis, Options, Simulator, VerdictKind, diagnose, next_experiment};
 use stretch_sim::GaugeRig;
-use support::Noise;
+use support::{Noise, PROBABILITY, with_lost_rows};
 
 const DT_S: f64 = 0.01;
 /// Noise of the signal, whose span is about one, and of the reference, whose range is about 40 mm.
@@ -345,6 +345,38 @@ fn uneven_and_broken_records_are_mended_and_told() {
     assert_eq!(d.named, ["channel_skew"], "{}", d.sentence);
     let skew = d.candidates[0].by_name["skew_s"];
     assert!((skew - 0.03).abs() < 2e-3, "{skew}");
+}
+
+#[test]
+fn lost_rows_change_no_verdict() {
+    let trials = trials(Fault::TwoLags, 0.3, 3, 11);
+    let whole = run(&trials, &[]);
+    assert_eq!(whole.named, ["gauge_relaxation"], "{}", whole.sentence);
+    for share in [0.0, 0.01] {
+        let lost = with_lost_rows(&trials, share, 5);
+        let d = run(&lost, &[]);
+        let what = format!("{share} lost: {}", d.sentence);
+        assert_eq!((d.verdict, &d.named), (whole.verdict, &whole.named), "{what}");
+        let (was, is) = (whole.candidates[0].probability, d.candidates[0].probability);
+        assert!((was - is).abs() <= PROBABILITY, "{what}: {was} {is}");
+    }
+}
+
+#[test]
+fn a_gauge_that_has_the_effect_agrees_and_one_without_tolerance_stays_put() {
+    let text = "kind = 'gauge'\n[[effect]]\nname = 'channel_skew'\nskew_s = 0.03\n[sensing]\n\
+                zero = { value = 120.0 }\nspan = { value = 40.0 }\noffset = { value = 0.4 }\n\
+                gain = { value = -0.9, tolerance = 0.05 }\n";
+    let rig = GaugeRig::from_file(&RigFile::parse("gauge.toml", text).expect("TOML"));
+    let rig = rig.expect("a gauge");
+    let trials = trials(Fault::Late, 0.3, 3, 7);
+    let gauge = GaugeSimulator::new(&GaugeSetup { rig: Some(&rig), ..setup(&trials) });
+    let gauge = gauge.expect("a gauge");
+    assert!(gauge.effects().iter().all(|e| e.name != "channel_skew"));
+    let d = diagnose(&gauge, &Options::default(), &|_| (), &|| false).expect("a diagnosis").0;
+    let agrees = matches!(d.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
+    assert!(agrees && d.named.is_empty(), "{}", d.sentence);
+    assert!(d.parameters.iter().all(|p| p.name != "offset"), "{:?}", d.parameters);
 }
 
 #[test]

@@ -3,12 +3,13 @@
 mod support;
 
 use stretch_bench::{BenchError, RigSetup, RigSimulator, Session};
-use stretch_data::{Channel, SessionTrial, Split, Trial, TrialKind};
-use stretch_gap::{Diagnosis, Options, VerdictKind, diagnose};
+use stretch_data::{Channel, RigFile, SessionTrial, Split, Trial, TrialKind};
+use stretch_gap::{Diagnosis, Options, Simulator, VerdictKind, diagnose};
 use stretch_sim::{
     Chain, DEFAULT_STEP_S, EffectSet, Key, Openings, Recorded, Rig, RigParams, Start,
+    default_rig_text,
 };
-use support::Noise;
+use support::{Noise, PROBABILITY, with_lost_rows};
 
 const DT_S: f64 = 0.01;
 
@@ -260,4 +261,76 @@ fn without_test_trials_the_last_part_is_held_back() {
     let diagnosis = run(trials, &[], &shallow());
     assert!(diagnosis.notes.iter().any(|n| n.contains("no test trial")), "{:?}", diagnosis.notes);
     assert!(diagnosis.named.is_empty());
+}
+
+#[test]
+fn lost_rows_change_no_verdict() {
+    let effects = effect("gauge_relaxation", &[("c", 0.3), ("tau", 0.1)]);
+    for pressure in [true, false] {
+        let trials = session(&own_rig(), &effects, pressure, 7);
+        let whole = run(trials.clone(), &[], &shallow());
+        assert_eq!(whole.named, ["gauge_relaxation"], "{}", whole.sentence);
+        for share in [0.0, 0.01] {
+            let lost = with_lost_rows(&trials, share, 5);
+            let read = Session::new(&lost).expect("a session");
+            let samples =
+                |s: &Session| s.trials().iter().map(|t| t.bridge_v().len()).sum::<usize>();
+            let all = samples(&Session::new(&trials).expect("a session"));
+            // A row at the very end leaves nothing to bridge to.
+            assert!(samples(&read) + 4 >= all, "{} of {all}", samples(&read));
+            assert!(read.notes().iter().any(|n| n.starts_with("rows: ")), "{:?}", read.notes());
+            let d = run(lost, &[], &shallow());
+            let what = format!("pressure {pressure}, {share} lost: {}", d.sentence);
+            assert_eq!((d.verdict, &d.named), (whole.verdict, &whole.named), "{what}");
+            let (was, is) = (whole.candidates[0].probability, d.candidates[0].probability);
+            assert!((was - is).abs() <= PROBABILITY, "{what}: {was} {is}");
+        }
+    }
+}
+
+/// The stock rig's file with an effect appended, read as a program reads it.
+fn with_effect(entry: &str) -> Rig {
+    let text = default_rig_text() + "\n[[effect]]\n" + entry;
+    Rig::from_file(&RigFile::parse("rig.toml", &text).expect("TOML")).expect("a rig")
+}
+
+#[test]
+fn a_simulator_that_has_the_effect_agrees_and_is_not_offered_it_again() {
+    let cases = [
+        ("gauge_relaxation", "name = 'gauge_relaxation'\nc = 0.3\ntau = 0.1"),
+        ("amplifier_lowpass", "name = 'amplifier_lowpass'\ntau = 0.03"),
+        ("muscle_hysteresis", "name = 'muscle_hysteresis'\nh = 0.3\ns = 0.02"),
+        ("valve_delay", "name = 'valve_delay'\ndelay_s = 0.03"),
+        ("channel_skew", "name = 'channel_skew'\nskew_s = 0.03"),
+        ("valve_deadband", "name = 'valve_deadband'\nu_db = 0.05"),
+    ];
+    for (seed, (name, entry)) in cases.into_iter().enumerate() {
+        let rig = with_effect(entry);
+        let pressure = seed % 2 == 0;
+        let trials = session(&own_rig(), &rig.effects, pressure, 11 + seed as u64);
+        let session = Session::new(&trials).expect("a session");
+        let simulator =
+            RigSimulator::new(RigSetup { session, rig, without: &[] }).expect("a simulator");
+        assert!(simulator.effects().iter().all(|e| e.name != name));
+        let d = diagnose(&simulator, &shallow(), &|_| (), &|| false).expect("a diagnosis").0;
+        let agrees = matches!(d.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
+        assert!(agrees && d.named.is_empty(), "{name}: {}", d.sentence);
+    }
+}
+
+#[test]
+fn a_parameter_without_tolerance_stays_put() {
+    let text = "[muscle]\ntau_m = { value = 0.03 }\nL0 = { value = 180.0, tolerance_abs = 0.5 }\n";
+    let rig = Rig::from_file(&RigFile::parse("rig.toml", text).expect("TOML")).expect("a rig");
+    let trials = session(&RigParams::default(), &EffectSet::new(), true, 2);
+    let session = Session::new(&trials).expect("a session");
+    let simulator =
+        RigSimulator::new(RigSetup { session, rig, without: &[] }).expect("a simulator");
+    let tuned: Vec<&str> = simulator.parameters().iter().map(|p| p.name.as_str()).collect();
+    // What the file leaves out keeps its stock tolerance, what the file frees is free in its stage.
+    assert!(!tuned.contains(&"tau_m") && tuned.contains(&"k_max"), "{tuned:?}");
+    let at = tuned.iter().position(|name| *name == "L0").expect("L0 is free");
+    assert!(simulator.stages()[1].parameters.contains(&at));
+    let d = diagnose(&simulator, &shallow(), &|_| (), &|| false).expect("a diagnosis").0;
+    assert!(d.named.is_empty(), "{}", d.sentence);
 }

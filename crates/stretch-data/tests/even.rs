@@ -1,0 +1,111 @@
+//! Trials and sessions on an even grid.
+
+use stretch_data::{Channel, DataError, EvenSession, EvenSpec, SessionTrial, Split, Trial};
+
+const SPEC: EvenSpec = EvenSpec { rate_hz: 100.0, shortest: 10 };
+
+/// A trial of a line in time, and of a command that is 1 from half a second on.
+fn trial(time_s: Vec<f64>) -> Trial {
+    let length = time_s.iter().map(|t| 180.0 - 20.0 * t).collect();
+    let inlet = time_s.iter().map(|t| f64::from(u8::from(*t > 0.4999))).collect();
+    let channel = |name: &str, values| Channel { name: name.into(), values };
+    let channels = vec![channel("length_mm", length), channel("inlet", inlet)];
+    Trial { name: "a.csv".into(), time_s, channels }
+}
+
+fn stamps(count: usize) -> Vec<f64> {
+    (0..count).map(|i| 0.01 * i as f64).collect()
+}
+
+/// Rounding of straight lines between numbers of this size.
+const ROUNDING: f64 = 1e-9;
+
+#[test]
+fn an_even_trial_is_taken_to_the_bit_and_nothing_is_said() {
+    let trial = trial(stamps(200));
+    let even = trial.even(&["length_mm", "inlet"], SPEC).expect("even");
+    assert_eq!(even.parts[0].columns[0], trial.channels[0].values);
+    assert_eq!(even.parts[0].columns[1], trial.channels[1].values);
+    assert!(even.notes.is_empty() && even.rows.note().is_none());
+}
+
+#[test]
+fn every_gap_of_up_to_three_samples_is_bridged_and_a_longer_one_cuts() {
+    for lost in 1..=5 {
+        let kept =
+            stamps(200).into_iter().enumerate().filter(|(i, _)| !(80..80 + lost).contains(i));
+        let even = trial(kept.map(|(_, t)| t).collect()).even(&["length_mm", "inlet"], SPEC);
+        let even = even.expect("even");
+        if lost > 3 {
+            assert_eq!((even.parts.len(), even.rows.bridged), (2, 0));
+            assert!((even.parts[1].begin_s - 0.01 * (80 + lost) as f64).abs() < ROUNDING);
+            assert!(even.notes[0].contains("missing after 0.79 s"), "{:?}", even.notes);
+            continue;
+        }
+        assert_eq!((even.parts.len(), even.rows.bridged), (1, lost));
+        let whole = trial(stamps(200));
+        for (x, y) in even.parts[0].columns[0].iter().zip(&whole.channels[0].values) {
+            assert!((x - y).abs() < ROUNDING);
+        }
+        assert_eq!(even.parts[0].columns[1], whole.channels[1].values);
+    }
+}
+
+#[test]
+fn uneven_stamps_are_resampled_and_told() {
+    let late = |i: usize| if i % 10 == 5 { 0.004 } else { 0.0 };
+    let even = trial((0..200).map(|i| 0.01 * i as f64 + late(i)).collect());
+    let even = even.even(&["length_mm", "inlet"], SPEC).expect("even");
+    let part = &even.parts[0];
+    assert_eq!(part.len(), 200);
+    for (i, x) in part.columns[0].iter().enumerate() {
+        assert!((x - (180.0 - 0.2 * i as f64)).abs() < ROUNDING, "{i}: {x}");
+    }
+    // A command is one of those that were given.
+    assert!(part.columns[1].iter().all(|u| *u == 0.0 || *u == 1.0));
+    assert!(even.notes.iter().any(|n| n.contains("unevenly")), "{:?}", even.notes);
+}
+
+#[test]
+fn another_clock_is_followed_and_another_rate_is_refused() {
+    // Two clocks that part by 0.01 % and by 2 %: as it is, and brought to the grid.
+    for (rate_hz, is_resampled) in [(100.01, false), (102.0, true)] {
+        let even = trial((0..1000).map(|i| i as f64 / rate_hz).collect());
+        let even = even.even(&["length_mm"], SPEC).expect("even");
+        assert_eq!(even.notes.iter().any(|n| n.contains("unevenly")), is_resampled, "{rate_hz}");
+    }
+    let slow = trial((0..200).map(|i| 0.02 * i as f64).collect());
+    assert!(matches!(slow.even(&["length_mm"], SPEC), Err(DataError::OtherRate { .. })));
+    let zero = EvenSpec { rate_hz: 0.0, ..SPEC };
+    assert!(slow.even(&["length_mm"], zero).is_err());
+}
+
+#[test]
+fn parts_that_are_too_short_are_left_out_and_counted() {
+    let kept = stamps(200)
+        .into_iter()
+        .filter(|t| !(0.495..0.995).contains(t) && !(1.045..1.195).contains(t));
+    let even = trial(kept.collect()).even(&["length_mm"], SPEC).expect("even");
+    assert_eq!((even.parts.len(), even.rows.dropped), (2, 5));
+    assert!(even.rows.note().expect("a note").contains("5 left out"));
+}
+
+#[test]
+fn a_session_keeps_order_split_and_pauses() {
+    let at = |start_s: f64, split| SessionTrial {
+        start_s,
+        split,
+        ..SessionTrial::new(trial(stamps(200)))
+    };
+    let starts = |s: &EvenSession| s.trials().iter().map(|t| t.start_s()).collect::<Vec<_>>();
+    let late_first = [at(50.0, Split::Test), at(10.0, Split::Fit)];
+    let session = EvenSession::new(&late_first, &["length_mm"], 10).expect("a session");
+    assert_eq!(starts(&session), [10.0, 50.0]);
+    assert!(session.trials()[1].is_test());
+    assert!(session.notes()[0].contains("in the order of their start_s"));
+    let unknown = [at(0.0, Split::Fit), at(0.0, Split::Test)];
+    let session = EvenSession::new(&unknown, &["length_mm"], 10).expect("a session");
+    assert!((starts(&session)[1] - 17.0).abs() < ROUNDING, "{:?}", starts(&session));
+    assert!(session.notes()[0].contains("pauses of 15 s"));
+    assert!(matches!(EvenSession::new(&[], &["length_mm"], 10), Err(DataError::NoSamples)));
+}

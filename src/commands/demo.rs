@@ -41,8 +41,8 @@ use sessions::{Sessions, Wanted};
 /// github.com/e-Body-Lab/graphene-based-knitted-sensing-sleeve, commit
 /// 47369abac95fd43a10ada4156dd22cae91ee7f70, folders of data/Regression: no header,
 /// knee angle in degrees, s1 .. s5, 100 rows a second. A file is cut where all five
-/// sensors are zero, as they are where a session begins. One that begins later than
-/// its first session has no such row, and is refused.
+/// sensors are zero, as they are where a session begins; one without such a row, as in
+/// the folder sit, counts as a single session, and is refused.
 ///
 /// The last session of a group is tested on, the others are fitted; the first is
 /// diagnosed, as a gauge alone, where there is no dataset.toml.

@@ -404,3 +404,12 @@ fn numbers_read_as_written() {
     assert_eq!(tick(0.0, 0.004), "0");
     assert_eq!(escape("a\u{0}b\"'"), "a\u{fffd}b&quot;&#39;");
 }
+
+#[test]
+fn a_part_closes_what_stands_before_it() {
+    let mut page = Page::new("Whole", "One.");
+    page.section("A", "").part("Second", "Two & three.").section("B", "");
+    let names = elements(&page.finish());
+    let count = |name: &str| names.iter().filter(|n| *n == name).count();
+    assert_eq!(["h1", "h2", "header", "section"].map(count), [2; 4]);
+}

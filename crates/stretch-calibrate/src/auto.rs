@@ -1,12 +1,11 @@
 //! Which model to calibrate with, by errors on trials left out.
 
 use serde::Serialize;
-use stretch_core::Degree;
 use stretch_data::Trial;
 use stretch_metrics::lag;
 
 use crate::{
-    CalibrateError, Memory, ModelKind, Options, apply,
+    CalibrateError, ModelKind, Options, apply,
     calibrate::{Choice, calibrate_with},
     cost::{m3_instructions, m3_instructions_fixed},
     series::{extent, sample_rate_hz},
@@ -71,19 +70,6 @@ pub struct ModelChoice {
     pub model: ModelKind,
     /// What the data cannot say, one sentence each.
     pub notes: Vec<String>,
-}
-
-/// Every model that is tried, without and with a followed baseline.
-pub(crate) fn candidates() -> Vec<ModelKind> {
-    let mut kinds = vec![
-        ModelKind::Linear,
-        ModelKind::Surface(Degree::POLY13),
-        ModelKind::Blended(Degree::POLY13),
-    ];
-    for rest in [false, true] {
-        kinds.extend(Memory::ALL.map(|kind| ModelKind::Remembering { kind, rest }));
-    }
-    kinds
 }
 
 /// Whether a trial can tell memory from position: it turns at least three times.
@@ -155,7 +141,7 @@ pub fn choose_model(trials: &[Trial], options: &Options) -> Result<ModelChoice, 
     let folds = folds(trials);
     let mut found = Vec::new();
     let mut first_problem = None;
-    for kind in candidates() {
+    for kind in ModelKind::named() {
         match judge(trials, &folds, &turning, options, kind) {
             Ok((parameters, errors)) => found.push((kind, parameters, Ok(errors))),
             Err(error) => {

@@ -108,6 +108,24 @@ impl SpellingError {
     }
 }
 
+impl ModelKind {
+    /// Every name that `--model` takes, simplest first; of the surfaces poly13, which
+    /// stands for all of them.
+    ///
+    /// ```
+    /// use stretch_calibrate::ModelKind;
+    /// assert!(ModelKind::named().iter().all(|kind| kind.to_string().parse() == Ok(*kind)));
+    /// ```
+    pub fn named() -> Vec<Self> {
+        let mut kinds =
+            vec![Self::Linear, Self::Surface(Degree::POLY13), Self::Blended(Degree::POLY13)];
+        for rest in [false, true] {
+            kinds.extend(Memory::ALL.map(|kind| Self::Remembering { kind, rest }));
+        }
+        kinds
+    }
+}
+
 const MODELS: &str = "linear, poly13, polyIJ with degrees up to poly55, blended, hysteresis, \
                       relaxation, both, history or observer, the last five also with +rest";
 

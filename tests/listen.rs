@@ -1,6 +1,8 @@
 //! `stretch listen` on a pseudo-terminal, with everything that a cable does.
 #![cfg(unix)]
 
+mod support;
+
 use std::{
     fs::{self, File},
     io::{BufRead, BufReader, Read, Write},
@@ -16,13 +18,16 @@ use rustix::{
     pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt},
     termios,
 };
-use stretch_core::Runner;
+use stretch_calibrate::{BoardReceptor, ModelKind, fixed_record, read_calibration};
+use stretch_core::{Calibration, Runner, Volts};
 use stretch_data::{ReadOptions, Trial};
 use stretch_link::Frame;
 use stretch_receptor::{
-    code::{Adc, AdcCode, AdcSpec, FixedCalibration, FixedReceptor},
+    Receptor, Withheld,
+    code::{Adc, AdcCode, AdcSpec, CodeReading, FixedCalibration, FixedReceptor},
     example_calibration,
 };
+use support::{Scratch, calibrate, runs};
 
 fn due() -> Adc {
     Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 }).unwrap()
@@ -32,15 +37,34 @@ fn due() -> Adc {
 fn board(samples: u32) -> Vec<Frame> {
     let fixed = FixedCalibration::<11, 2>::new(&example_calibration(), &due()).unwrap();
     let mut receptor = Runner::new(FixedReceptor::new(fixed));
+    frames(samples, |code| receptor.step(code))
+}
+
+/// The frames of a board that answers so.
+fn frames(
+    samples: u32,
+    mut answer: impl FnMut(AdcCode) -> Result<CodeReading<i32>, Withheld>,
+) -> Vec<Frame> {
     (0..samples)
         .map(|counter| {
             let swing = (f64::from(counter) * 0.02).sin();
             // one sample in a hundred does not come
             let code = if counter % 100 == 57 { -1 } else { due().code(1.6 + 0.35 * swing).0 };
-            let answer = receptor.step(AdcCode(code)).into();
+            let answer = answer(AdcCode(code)).into();
             Frame { counter, time_ms: 10 * counter, code, answer }
         })
         .collect()
+}
+
+/// A board with a floating-point unit, which runs a calibration in `f32`.
+fn float_board(calibration: &Calibration) -> Vec<Frame> {
+    let mut receptor = Runner::new(Receptor::<f32>::new(calibration).unwrap());
+    frames(300, |code| {
+        let volts = due().volts(code).map_or(f32::NAN, |volts| volts as f32);
+        let reading = receptor.step(Volts(volts))?;
+        let estimate = (1000.0 * reading.estimate).round() as i32;
+        Ok(CodeReading { estimate, branch: reading.branch, domain: reading.domain })
+    })
 }
 
 fn line(frame: &Frame) -> Vec<u8> {
@@ -70,9 +94,12 @@ impl Listener {
     }
 
     fn start() -> (Self, File) {
+        Self::start_with(&serde_json::to_vec(&example_calibration()).unwrap())
+    }
+
+    fn start_with(record: &[u8]) -> (Self, File) {
         let folder = tempfile::tempdir().unwrap();
-        let calibration = serde_json::to_string(&example_calibration()).unwrap();
-        fs::write(folder.path().join("cal.json"), calibration).unwrap();
+        fs::write(folder.path().join("cal.json"), record).unwrap();
         let master = plug(&Self::port(folder.path()));
         let mut child = Command::new(env!("CARGO_BIN_EXE_stretch"))
             .current_dir(folder.path())
@@ -117,10 +144,9 @@ impl Listener {
         let mut notes = String::new();
         self.notes.read_to_string(&mut notes).unwrap();
         let recorded = self.recorded();
-        let trial = Trial::read(
-            self.folder.path().join("trial.csv"),
-            &ReadOptions::new().require("bridge_v").require("adc_code"),
-        );
+        let signal = recorded.split(',').nth(1).unwrap();
+        let columns = ReadOptions::new().require(signal).require("adc_code");
+        let trial = Trial::read(self.folder.path().join("trial.csv"), &columns);
         assert!(trial.is_ok(), "{trial:?}");
         (status, notes, recorded)
     }
@@ -164,6 +190,65 @@ fn a_clean_line_is_recorded_sample_by_sample() {
     let told = notes.split("calibration by ").nth(1).unwrap().split(' ').next().unwrap();
     // the last rounding of the board's fixed point, and what bridging three samples costs it
     assert!((0.0004..=0.0015).contains(&told.parse::<f64>().unwrap()), "{notes}");
+}
+
+/// Listens to the frames with that record; the largest difference that it tells.
+fn difference(record: &[u8], frames: &[Frame], what: &str) -> f64 {
+    let (listener, mut master) = Listener::start_with(record);
+    frames.iter().for_each(|frame| master.write_all(&line(frame)).unwrap());
+    listener.await_rows(rows(frames).len());
+    let (status, notes, recorded) = listener.stop();
+    assert!(status.success(), "{what}: {notes}");
+    assert_eq!(without_time(&recorded), rows(frames), "{what}");
+    assert!(notes.contains("300 frames, 0 lost"), "{what}: {notes}");
+    let told = notes.split("calibration by ").nth(1).unwrap();
+    told.split_whitespace().next().unwrap().parse().unwrap()
+}
+
+#[test]
+fn every_model_that_is_calibrated_is_listened_to() {
+    let scratch = Scratch::new();
+    let (trial, out) = (scratch.loops("a.csv", 20.0, 1.1), scratch.path("cal.json"));
+    let (mut in_integers, mut kinds) = (Vec::new(), ModelKind::named());
+    kinds.push("poly22".parse().unwrap());
+    for kind in kinds {
+        let kind = kind.to_string();
+        runs(calibrate(&trial, &out).args(["--model", &kind]));
+        let calibration = read_calibration(&out).unwrap();
+        let told = difference(&fs::read(&out).unwrap(), &float_board(&calibration), &kind);
+        // the last rounding to a micrometre, and f32 on the board
+        let bound = 6e-4 + testkit::tolerance::REMEMBERING_F32_MM;
+        assert!(told <= bound, "{kind}: {told} mm, bound {bound} mm");
+
+        let Ok(fixed) = fixed_record(&calibration, &due()) else { continue };
+        let mut receptor = BoardReceptor::new(&fixed.bytes).unwrap();
+        let frames = frames(300, |code| receptor.step(code));
+        assert_eq!(difference(&fixed.bytes, &frames, &kind), 0.0, "{kind}: the same integers");
+        in_integers.push(kind);
+    }
+    assert_eq!(in_integers, ["linear", "poly13", "observer", "observer+rest"]);
+}
+
+#[test]
+fn a_start_that_fails_leaves_nothing_behind() {
+    let scratch = Scratch::new();
+    scratch.write("broken.json", "{}");
+    let fixed = fixed_record(&example_calibration(), &due()).unwrap();
+    scratch.write("cal.postcard", fixed.bytes);
+    let before = scratch.names();
+    for (arguments, parts) in [
+        (["--port", "-", "--calibration", "broken.json"].as_slice(), ["broken.json", "schema"]),
+        (&["--port", "none", "--calibration", "cal.postcard"], ["none", "No such file"]),
+        (
+            &["--port", "-", "--calibration", "cal.postcard", "--adc-bits", "16"],
+            ["12 bits", "--adc-bits 12"],
+        ),
+    ] {
+        let mut command = support::stretch();
+        command.arg("listen").args(["--out", "trial.csv"]).args(arguments);
+        support::fails(command.current_dir(scratch.path("")), &parts);
+        assert_eq!(scratch.names(), before, "{arguments:?}");
+    }
 }
 
 #[test]

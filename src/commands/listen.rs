@@ -3,27 +3,24 @@
 mod port;
 mod record;
 mod screen;
+mod twin;
 
 use std::{
     io::{self, BufWriter, IsTerminal, StdoutLock, Write},
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::mpsc::RecvTimeoutError,
     time::{Duration, Instant},
 };
 
 use anyhow::Context;
-use stretch_calibrate::read_calibration;
-use stretch_core::{Calibration, Runner, Volts};
 use stretch_link::{Answer, Counts, Decoder, Event};
-use stretch_receptor::{
-    StretchReceptor,
-    code::{Adc, AdcSpec},
-};
+use stretch_receptor::code::{Adc, AdcCode, AdcSpec};
 
 use self::{
     port::Heard,
     record::{Clock, Recording, Sample},
     screen::Screen,
+    twin::Twin,
 };
 use super::stop;
 
@@ -37,14 +34,16 @@ use super::stop;
 ///   stretch listen --port /dev/ttyACM0 --calibration cal.json --out trial.csv
 ///
 /// The board's estimates are compared with those of the calibration here, and
-/// the largest difference is told: is it the calibration that the board runs?
+/// the largest difference is told: is it the calibration that the board runs? Any
+/// record will do: a calibration of any model, or what --fixed wrote for the board,
+/// which says neither names nor units.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
     /// Serial port, or - for standard input
     #[arg(long, value_name = "PATH|-")]
     port: PathBuf,
-    /// Calibration record, from `stretch calibrate`
+    /// Record from `stretch calibrate`: of --out, or of --fixed
     #[arg(long, value_name = "cal.json")]
     calibration: PathBuf,
     /// Trial that is recorded, a line a sample as it comes; must not exist
@@ -68,8 +67,8 @@ pub(crate) struct Args {
 pub(crate) struct Status {
     connected: bool,
     counts: Counts,
-    /// The largest difference between the board's estimate and the one here.
-    difference: f64,
+    /// The largest difference between the board's estimate and the one here, when there is one.
+    difference: Option<f64>,
     unit: String,
 }
 
@@ -82,9 +81,9 @@ impl Status {
         if other_version > 0 {
             text += &format!(", {other_version} of another version: update stretch or the board");
         }
-        if frames > 0 {
-            text +=
-                &format!("; differs from the calibration by {:.4} {}", self.difference, self.unit);
+        if let (Some(difference), true) = (self.difference, frames > 0) {
+            text += format!("; differs from the calibration by {difference:.4} {}", self.unit)
+                .trim_end();
         }
         if !self.connected {
             text += "; waiting for the port";
@@ -94,24 +93,31 @@ impl Status {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    let calibration = read_calibration(&args.calibration)?;
     let adc = Adc::new(AdcSpec {
         bits: args.adc_bits,
         zero_v: args.adc_zero_v,
         full_scale_v: args.adc_full_scale_v,
     })?;
+    let twin = Twin::read(&args.calibration, args.adc_bits)?;
     let shown_port = args.port.display();
     let heard = port::listen(&args.port, args.baud).with_context(|| format!("{shown_port}"))?;
-    let mut recording = match &args.out {
-        Some(path) => Some(
-            Recording::create(path, &calibration)
-                .with_context(|| format!("{}: cannot record there", path.display()))?,
-        ),
-        None => None,
-    };
+    let header = record::header(&twin);
+    // last of what can fail: a start that fails leaves nothing behind
+    let create = |path| Recording::create(path, &header);
+    let recording = args.out.as_deref().map(create).transpose();
+    let mut recording = recording.with_context(|| cannot_record(args.out.as_deref()))?;
     stop::record();
-    let mut session = Session::new(&calibration, adc)?;
-    let mut view = View::open(&calibration)?;
+    let mut view = match View::open(&twin, &header) {
+        Ok(view) => view,
+        Err(error) => {
+            recording.into_iter().for_each(Recording::discard);
+            return Err(error);
+        }
+    };
+    if !twin.answers() {
+        view.note("the calibration's rate looks a sample ahead: estimates are not compared");
+    }
+    let mut session = Session::new(twin, adc);
     let mut result = Ok(());
     while !stop::ended() && !view.asked_to_stop()? {
         match heard.recv_timeout(Duration::from_millis(50)) {
@@ -143,12 +149,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     session.status.connected = true;
     eprintln!("{}", session.status.line());
     if let Some(recording) = recording {
-        let path = args.out.unwrap_or_default();
         result
             .and_then(|()| recording.finish())
-            .with_context(|| format!("{}: cannot record there", path.display()))?;
+            .with_context(|| cannot_record(args.out.as_deref()))?;
     }
     Ok(())
+}
+
+fn cannot_record(path: Option<&Path>) -> String {
+    format!("{}: cannot record there", path.unwrap_or(Path::new("")).display())
 }
 
 /// From bytes to samples.
@@ -157,24 +166,21 @@ struct Session {
     clock: Clock,
     adc: Adc,
     /// The calibration here, on the board's codes.
-    receptor: Runner<StretchReceptor<f64>>,
+    twin: Twin,
     status: Status,
 }
 
 impl Session {
-    fn new(calibration: &Calibration, adc: Adc) -> anyhow::Result<Self> {
-        Ok(Self {
-            decoder: Decoder::new(),
-            clock: Clock::new(calibration.sample_rate_hz.period_s()),
-            adc,
-            receptor: Runner::new(StretchReceptor::new(calibration)?),
-            status: Status {
-                connected: false,
-                counts: Counts::default(),
-                difference: 0.0,
-                unit: calibration.reference.unit().to_owned(),
-            },
-        })
+    fn new(twin: Twin, adc: Adc) -> Self {
+        let status = Status {
+            connected: false,
+            counts: Counts::default(),
+            difference: twin.answers().then_some(0.0),
+            unit: twin.unit.clone(),
+        };
+        // a record that does not say: a tick of the board's clock
+        let clock = Clock::new(twin.period_s.unwrap_or(1e-3));
+        Self { decoder: Decoder::new(), clock, adc, twin, status }
     }
 
     fn take(&mut self, bytes: &[u8]) -> Vec<Sample> {
@@ -185,7 +191,7 @@ impl Session {
             if !matches!(event, Event::Frame(_)) {
                 // the board has seen samples that did not arrive here, or forgot those
                 // that did: both agree again when the window has filled
-                self.receptor.reset();
+                self.twin.reset();
             }
             let restarted = matches!(event, Event::Restarted(_));
             let time_s = self.clock.time_s(frame.time_ms, restarted, Instant::now());
@@ -199,12 +205,14 @@ impl Session {
 
     /// Where both have an estimate on the same branch, by how much they differ.
     fn compare(&mut self, sample: &Sample) {
-        let ours = self.receptor.step(Volts(sample.signal.unwrap_or(f64::NAN)));
-        let (Ok(ours), Answer::Reading { branch, .. }) = (ours, sample.frame.answer) else {
+        let ours = self.twin.step(AdcCode(sample.frame.code), sample.signal);
+        let (Some((ours, own)), Answer::Reading { branch, .. }) = (ours, sample.frame.answer)
+        else {
             return;
         };
-        if let (Some(theirs), true) = (sample.estimate, branch == ours.branch) {
-            self.status.difference = self.status.difference.max((theirs - ours.estimate).abs());
+        if let (Some(theirs), true) = (sample.estimate, branch == own) {
+            let difference = (theirs - ours).abs();
+            self.status.difference = self.status.difference.map(|most| most.max(difference));
         }
     }
 
@@ -222,13 +230,13 @@ enum View {
 }
 
 impl View {
-    fn open(calibration: &Calibration) -> anyhow::Result<Self> {
+    fn open(twin: &Twin, header: &str) -> anyhow::Result<Self> {
         if io::stdout().is_terminal() && io::stdin().is_terminal() {
-            let screen = Box::new(Screen::open(calibration).context("the terminal")?);
+            let screen = Box::new(Screen::open(twin).context("the terminal")?);
             return Ok(Self::Screen { screen, drawn: Instant::now() });
         }
         let mut out = BufWriter::new(io::stdout().lock());
-        out.write_all(record::header(calibration).as_bytes())?;
+        out.write_all(header.as_bytes())?;
         out.flush()?;
         Ok(Self::Lines { out, line: Vec::new() })
     }

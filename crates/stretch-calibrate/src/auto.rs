@@ -141,7 +141,7 @@ pub fn choose_model(trials: &[Trial], options: &Options) -> Result<ModelChoice, 
     let folds = folds(trials);
     let mut found = Vec::new();
     let mut first_problem = None;
-    for kind in ModelKind::candidates() {
+    for kind in ModelKind::named() {
         match judge(trials, &folds, &turning, options, kind) {
             Ok((parameters, errors)) => found.push((kind, parameters, Ok(errors))),
             Err(error) => {

@@ -52,7 +52,7 @@ mod tests {
 
     #[test]
     fn every_candidate_was_measured() {
-        for kind in ModelKind::candidates() {
+        for kind in ModelKind::named() {
             let instructions = m3_instructions(kind);
             assert!(instructions.is_some_and(|n| n > 100.0), "{kind}: {instructions:?}");
         }

@@ -1,8 +1,13 @@
 //! A calibration over a board's converter, in integers, as the record for its flash.
 
+use std::{fmt, path::Path};
+
 use serde::Serialize;
-use stretch_core::{Calibration, DesignError, Model, RateEstimator};
-use stretch_receptor::code::{Adc, AdcSpec, FixedCalibration, FixedObserver};
+use stretch_core::{Calibration, DesignError, Model, RateEstimator, Runner, Stage};
+use stretch_receptor::{
+    Withheld,
+    code::{Adc, AdcCode, AdcSpec, CodeReading, FixedCalibration, FixedObserver, FixedReceptor},
+};
 
 use crate::{CalibrateError, SpellingError};
 
@@ -87,6 +92,13 @@ macro_rules! windows {
                 }
             }
         }
+
+        fn rated_receptor(bytes: &[u8]) -> Option<BoardReceptor> {
+            None$(
+                .or_else(|| surface_receptor::<$window, 1>(bytes))
+                .or_else(|| surface_receptor::<$window, 2>(bytes))
+            )*
+        }
     };
 }
 
@@ -111,6 +123,88 @@ fn record<T: Serialize>(
         .map_err(|_| DesignError::TooLarge { field: "fixed.record", asked: BYTES + 1, most: BYTES })
         .map_err(CalibrateError::Fixed)?;
     Ok(FixedRecord { bytes: bytes.to_vec(), read_as })
+}
+
+/// A record of `stretch calibrate --fixed`, run as the board runs it: code for code, bit for bit.
+///
+/// ```
+/// use stretch_calibrate::{BoardReceptor, fixed_record, parse_adc};
+/// use stretch_receptor::code::AdcCode;
+///
+/// let adc = parse_adc("12,0,3.3")?;
+/// let record = fixed_record(&stretch_receptor::example_observer(), &adc)?;
+/// let mut receptor = BoardReceptor::new(&record.bytes).expect("one of those records");
+/// assert_eq!(receptor.adc_bits(), 12);
+/// assert!(receptor.step(AdcCode(1861)).is_ok());
+/// assert!(BoardReceptor::new(b"anything else").is_none());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct BoardReceptor {
+    adc_bits: u8,
+    running: Box<dyn Running>,
+}
+
+impl BoardReceptor {
+    /// The receptor of a record; none where the bytes are no such record, or of a rate that
+    /// [`fixed_record`] does not write.
+    pub fn new(bytes: &[u8]) -> Option<Self> {
+        rated_receptor(bytes).or_else(|| {
+            let observer: FixedObserver = postcard::from_bytes(bytes).ok()?;
+            let adc_bits = observer.adc_bits();
+            Some(Self { adc_bits, running: Box::new(Runner::new(observer)) })
+        })
+    }
+
+    /// The same from a file; none where it cannot be read.
+    pub fn read(path: &Path) -> Option<Self> {
+        Self::new(&std::fs::read(path).ok()?)
+    }
+
+    /// Bits of the converter that the record was made for.
+    pub fn adc_bits(&self) -> u8 {
+        self.adc_bits
+    }
+
+    /// Takes the next code; estimates are thousandths of the reference's unit.
+    ///
+    /// # Errors
+    /// [`Withheld`] when there is no reading for it.
+    pub fn step(&mut self, code: AdcCode) -> Result<CodeReading<i32>, Withheld> {
+        self.running.step(code)
+    }
+
+    /// Forgets every sample.
+    pub fn reset(&mut self) {
+        self.running.reset();
+    }
+}
+
+fn surface_receptor<const WINDOW: usize, const DEGREE: usize>(
+    bytes: &[u8],
+) -> Option<BoardReceptor> {
+    let fixed: FixedCalibration<WINDOW, DEGREE> = postcard::from_bytes(bytes).ok()?;
+    let running = Box::new(Runner::new(FixedReceptor::new(fixed)));
+    Some(BoardReceptor { adc_bits: fixed.adc_bits(), running })
+}
+
+/// Any receptor over codes, its type forgotten.
+trait Running: fmt::Debug {
+    fn step(&mut self, code: AdcCode) -> Result<CodeReading<i32>, Withheld>;
+    fn reset(&mut self);
+}
+
+impl<D> Running for Runner<D>
+where
+    Self: fmt::Debug,
+    D: Stage<AdcCode, Out = Result<CodeReading<i32>, Withheld>>,
+{
+    fn step(&mut self, code: AdcCode) -> Result<CodeReading<i32>, Withheld> {
+        Runner::step(self, code)
+    }
+    fn reset(&mut self) {
+        Runner::reset(self);
+    }
 }
 
 const CONVERTER: &str = "BITS,ZERO_V,FULL_SCALE_V such as 12,0,3.3: 1 to 16 bits, the signal at \

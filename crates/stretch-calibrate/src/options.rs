@@ -30,19 +30,6 @@ pub enum ModelKind {
     },
 }
 
-impl ModelKind {
-    /// Every model that a choice by the data tries, without and with a followed
-    /// baseline, simplest first.
-    pub(crate) fn candidates() -> Vec<Self> {
-        let mut kinds =
-            vec![Self::Linear, Self::Surface(Degree::POLY13), Self::Blended(Degree::POLY13)];
-        for rest in [false, true] {
-            kinds.extend(Memory::ALL.map(|kind| Self::Remembering { kind, rest }));
-        }
-        kinds
-    }
-}
-
 /// What a model remembers with; every time constant, radius and weight is chosen
 /// on data left out of the fit.
 ///
@@ -118,6 +105,24 @@ pub struct SpellingError {
 impl SpellingError {
     pub(crate) fn new(given: &str, use_instead: &'static str) -> Self {
         Self { given: given.to_owned(), use_instead }
+    }
+}
+
+impl ModelKind {
+    /// Every name that `--model` takes, simplest first; of the surfaces poly13, which
+    /// stands for all of them.
+    ///
+    /// ```
+    /// use stretch_calibrate::ModelKind;
+    /// assert!(ModelKind::named().iter().all(|kind| kind.to_string().parse() == Ok(*kind)));
+    /// ```
+    pub fn named() -> Vec<Self> {
+        let mut kinds =
+            vec![Self::Linear, Self::Surface(Degree::POLY13), Self::Blended(Degree::POLY13)];
+        for rest in [false, true] {
+            kinds.extend(Memory::ALL.map(|kind| Self::Remembering { kind, rest }));
+        }
+        kinds
     }
 }
 

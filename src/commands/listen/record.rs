@@ -1,16 +1,17 @@
 //! The trial that is recorded: a line a sample, on the disk as it comes.
 
 use std::{
-    fs::{File, OpenOptions},
+    fs::{self, File, OpenOptions},
     io::{self, Write},
-    path::Path,
+    path::{Path, PathBuf},
     time::Instant,
 };
 
-use stretch_core::Calibration;
 use stretch_data::push_number;
 use stretch_link::{Answer, Frame};
 use stretch_receptor::code::{Adc, AdcCode};
+
+use super::twin::Twin;
 
 /// One time line over restarts of the board and the wrap of its clock.
 pub(crate) struct Clock {
@@ -86,26 +87,39 @@ impl Sample {
 }
 
 /// The header of the lines, in the names of the calibration.
-pub(crate) fn header(calibration: &Calibration) -> String {
-    let estimate = match calibration.reference.unit() {
+pub(crate) fn header(twin: &Twin) -> String {
+    let estimate = match twin.unit.as_str() {
         "" => "estimate".to_owned(),
         unit => format!("estimate_{unit}"),
     };
-    format!("time_s,{},adc_code,{estimate},branch,domain\n", calibration.signal.as_str())
+    format!("time_s,{},adc_code,{estimate},branch,domain\n", twin.signal)
 }
 
 /// A trial file that grows by whole lines.
 pub(crate) struct Recording {
+    path: PathBuf,
     file: File,
     line: Vec<u8>,
 }
 
 impl Recording {
     /// A new file; one that exists is not touched.
-    pub(crate) fn create(path: &Path, calibration: &Calibration) -> io::Result<Self> {
-        let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
-        file.write_all(header(calibration).as_bytes())?;
-        Ok(Self { file, line: Vec::new() })
+    pub(crate) fn create(path: &Path, header: &str) -> io::Result<Self> {
+        let file = OpenOptions::new().write(true).create_new(true).open(path)?;
+        let mut recording = Self { path: path.to_owned(), file, line: Vec::new() };
+        match recording.file.write_all(header.as_bytes()) {
+            Ok(()) => Ok(recording),
+            Err(error) => {
+                recording.discard();
+                Err(error)
+            }
+        }
+    }
+
+    /// Takes the file away again, for a start that fails.
+    pub(crate) fn discard(self) {
+        // what made the start fail is told; that this failed too would not help
+        let _ = fs::remove_file(self.path);
     }
 
     /// One write a sample, so that a program that is killed leaves whole lines.

@@ -11,9 +11,8 @@ use ratatui::{
     text::Line,
     widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph},
 };
-use stretch_core::Calibration;
 
-use super::{Status, record::Sample};
+use super::{Status, record::Sample, twin::Twin};
 
 /// Seconds that the plot shows.
 const SPAN_S: f64 = 20.0;
@@ -22,20 +21,18 @@ pub(crate) struct Screen {
     terminal: DefaultTerminal,
     points: VecDeque<(f64, f64)>,
     unit: String,
-    /// What the axis shows at least: the calibrated span.
-    bounds: [f64; 2],
+    /// What the axis shows at least: the calibrated span, where it is known.
+    bounds: Option<[f64; 2]>,
 }
 
 impl Screen {
     /// Takes the terminal; it is given back by `drop`, and when the program panics.
-    pub(crate) fn open(calibration: &Calibration) -> io::Result<Self> {
-        let (range, target) = (calibration.target_range, calibration.target);
-        let ends = [range.min(), range.max()].map(|t| target.to_reference(t));
+    pub(crate) fn open(twin: &Twin) -> io::Result<Self> {
         Ok(Self {
             terminal: ratatui::try_init()?,
             points: VecDeque::new(),
-            unit: calibration.reference.unit().to_owned(),
-            bounds: [ends[0].min(ends[1]), ends[0].max(ends[1])],
+            unit: twin.unit.clone(),
+            bounds: twin.span,
         })
     }
 
@@ -67,8 +64,10 @@ impl Screen {
         let points: &[(f64, f64)] = self.points.make_contiguous();
         let newest = points.last().copied();
         let end = newest.map_or(SPAN_S, |(t, _)| t.max(SPAN_S));
+        let around = newest.map_or([0.0, 1.0], |(_, y)| [y - 1.0, y + 1.0]);
+        let bounds = self.bounds.unwrap_or(around);
         let [low, high] =
-            points.iter().fold(self.bounds, |[low, high], &(_, y)| [low.min(y), high.max(y)]);
+            points.iter().fold(bounds, |[low, high], &(_, y)| [low.min(y), high.max(y)]);
         let unit = &self.unit;
         let title = match newest {
             Some((_, estimate)) => format!(" {estimate:.3} {unit} "),

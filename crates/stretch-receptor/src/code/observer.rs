@@ -87,6 +87,11 @@ impl FixedObserver {
     pub fn new(calibration: &Calibration, adc: &Adc) -> Result<Self, DesignError> {
         Ok(Self { model: Numbers::new(calibration, adc).map(IntegerObserver::of)? })
     }
+
+    /// Bits of the converter.
+    pub fn adc_bits(&self) -> u8 {
+        self.model.n.adc_bits
+    }
 }
 
 impl IntegerObserver {

@@ -13,7 +13,8 @@ use crate::{
     frame::{Metric, Role},
     screen::Ground,
     select::{Solution, possible},
-    simulator::{Model, ParameterSpec, Simulator},
+    simulator::{Model, Simulator},
+    spec::ParameterSpec,
 };
 
 /// Single effects that an information criterion is asked about: the best of the screen.

@@ -3,6 +3,7 @@
 mod altered;
 mod baselines;
 mod bootstrap;
+mod description;
 mod diagnose;
 mod diagnosis;
 mod dice;
@@ -20,10 +21,12 @@ mod screen;
 mod select;
 mod shares;
 mod simulator;
+mod spec;
 mod thresholds;
 mod transfer;
 mod verdict;
 
+pub use description::{Description, DescriptionError, DescriptionSpec};
 pub use diagnose::{Options, diagnose};
 pub use diagnosis::{
     Baselines, Candidate, Diagnosis, EffectValue, Excess, NextExperiment, ParameterShift, SliceGap,
@@ -36,8 +39,6 @@ pub use floor::noise_variance;
 pub use frame::{BLOCK_S, Frame, Metric, Role, Segment};
 pub use next_experiment::{Laboratory, Plan, Proposal, differences, next_experiment};
 pub use shares::EffectShare;
-pub use simulator::{
-    Description, EffectParameterSpec, EffectSpec, Model, Motion, ParameterSpec, Run, Simulator,
-    StageSpec, TrialSpec, Wander,
-};
+pub use simulator::{Model, Motion, Run, Simulator};
+pub use spec::{EffectParameterSpec, EffectSpec, ParameterSpec, StageSpec, TrialSpec, Wander};
 pub use thresholds::Thresholds;

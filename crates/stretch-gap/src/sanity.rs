@@ -8,7 +8,8 @@ use crate::{
     fit::{Bench, FINE},
     frame::Role,
     select::Solution,
-    simulator::{ParameterSpec, Simulator},
+    simulator::Simulator,
+    spec::ParameterSpec,
 };
 
 /// Tolerances at which a parameter stands at its end: two of the five or so of a stage do so by chance in one rig of a few

@@ -6,7 +6,7 @@ use crate::{
     diagnosis::{Diagnosis, VerdictKind},
     error::GapError,
     select::{Search, Solution},
-    simulator::EffectSpec,
+    spec::EffectSpec,
 };
 
 /// Least share of the gap that is told.

@@ -7,7 +7,8 @@ mod source;
 
 use stretch_data::{RigFile, unit};
 use stretch_gap::{
-    Description, Dice, GapError, Model, Motion, ParameterSpec, Run, Simulator, StageSpec, TrialSpec,
+    Description, DescriptionSpec, Dice, GapError, Model, Motion, ParameterSpec, Run, Simulator,
+    StageSpec, TrialSpec,
 };
 use stretch_sim::{Effect, Gauge, GaugeSpec, Start};
 
@@ -133,7 +134,13 @@ impl GaugeSimulator {
         ];
         let (trials, dt_s) = (record.trials.clone(), record.dt_s);
         Ok(Self {
-            about: Description { stages: vec![stage], parameters, effects, trials, dt_s },
+            about: Description::new(DescriptionSpec {
+                stages: vec![stage],
+                parameters,
+                effects,
+                trials,
+                dt_s,
+            })?,
             rows,
             inputs,
             reference: reference.into(),

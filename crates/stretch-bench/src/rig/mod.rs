@@ -13,7 +13,8 @@ use std::path::Path;
 
 use stretch_data::{DataSet, RigFile};
 use stretch_gap::{
-    Description, GapError, Motion, ParameterSpec, Run, Simulator, StageSpec, TrialSpec, Wander,
+    Description, DescriptionSpec, GapError, Motion, ParameterSpec, Run, Simulator, StageSpec,
+    TrialSpec, Wander,
 };
 use stretch_sim::{Effect, Key, PARAMETERS, RigParams, Stage};
 
@@ -183,7 +184,8 @@ impl RigSimulator {
             })
             .collect();
         let dt_s = session.trials[0].dt_s;
-        let about = Description { stages, parameters, effects, trials, dt_s };
+        let about =
+            Description::new(DescriptionSpec { stages, parameters, effects, trials, dt_s })?;
         Ok(Self { base, session, inputs, about, stage_kinds, keys, rows, measured })
     }
 

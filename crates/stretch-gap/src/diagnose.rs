@@ -84,15 +84,10 @@ fn run(
     let candidates = candidates(&problem, &evidence, &weighed, seed)?;
     let sanity = Sanity::of(&problem, &found.best, &evidence)?;
     progress("where the gap sits");
-    let location = Where {
-        stages: stage_gaps(&problem, &evidence),
-        slices: localise::slices(simulator, &evidence, seed),
-        end_to_end: localise::end_to_end(runs, &evidence)?,
-    };
+    let location = locate(&problem, &evidence, seed)?;
     // Judged.
-    let foreign_share = simulator.foreign_share();
     let first = candidates.first();
-    let case = Case { gap: evidence.gap, first, sanity: &sanity, foreign_share };
+    let case = Case { gap: evidence.gap, first, sanity: &sanity };
     let verdict = judge(case, thresholds);
     let (named, transfer) = match (verdict.kind, first) {
         (VerdictKind::Effect, Some(first)) => {
@@ -106,11 +101,7 @@ fn run(
         VerdictKind::NoGap | VerdictKind::Parameters => Vec::new(),
     };
     let (runtime_s, simulations) = (begun.elapsed().as_secs_f64(), runs.count());
-    let simpler = || {
-        progress("simpler methods");
-        baselines(&problem, &search.sets.tried, thresholds.null_excess)
-    };
-    let baselines = options.baselines.then(simpler).transpose()?;
+    let simpler = || baselines(&problem, &search.sets.tried, thresholds.null_excess);
     // Told.
     let told = tell(&verdict, case, simulator, &evidence, &shares);
     let diagnosis = Diagnosis {
@@ -125,11 +116,20 @@ fn run(
         parameters: shifts(simulator, &evidence),
         transfer,
         next_experiment: None,
-        baselines,
+        baselines: options.baselines.then(simpler).transpose()?,
         notes: told.notes,
         simulations,
         runtime_s,
         candidates,
     };
     Ok((diagnosis, evidence))
+}
+
+/// Where the gap sits: by stage, by slices, and from end to end.
+fn locate(problem: &Problem<'_>, evidence: &Evidence, seed: u64) -> Result<Where, GapError> {
+    Ok(Where {
+        stages: stage_gaps(problem, evidence),
+        slices: localise::slices(problem.simulator(), evidence, seed),
+        end_to_end: localise::end_to_end(&problem.compare.runs, evidence)?,
+    })
 }

@@ -25,8 +25,6 @@ pub(crate) struct Case<'a> {
     /// The most probable candidate; it has no effects where none was worth it.
     pub(crate) first: Option<&'a Candidate>,
     pub(crate) sanity: &'a Sanity,
-    /// Share of a channel's variance that may be left before names mean nothing.
-    pub(crate) foreign_share: f64,
 }
 
 /// The verdict.
@@ -76,7 +74,7 @@ fn seen(case: Case<'_>, thresholds: &Thresholds) -> VerdictKind {
 fn foreign(case: Case<'_>) -> Option<Overruled> {
     let mut worst: Option<(usize, f64)> = None;
     for (stage, &share) in case.sanity.left.iter().enumerate() {
-        if share > case.foreign_share && worst.is_none_or(|w| share > w.1) {
+        if share > case.sanity.allowed && worst.is_none_or(|w| share > w.1) {
             worst = Some((stage, share));
         }
     }
@@ -119,7 +117,7 @@ mod tests {
     fn each_row_has_its_verdict() {
         use VerdictKind::{Effect, NoGap, Parameters, Unknown};
         let (sound, named) =
-            (Sanity { left: vec![0.0], strained: None }, candidate(&["play"], true));
+            (Sanity { left: vec![0.0], allowed: 0.1, strained: None }, candidate(&["play"], true));
         let (chance, none) = (candidate(&["play"], false), candidate(&[], true));
         let cases = [
             (gap(20.0, 10.0, 0.1), &named, Effect),
@@ -131,7 +129,7 @@ mod tests {
             (gap(0.01, 0.1, 0.05), &chance, NoGap),
         ];
         for (gap, first, expected) in cases {
-            let case = Case { gap, first: Some(first), sanity: &sound, foreign_share: 0.1 };
+            let case = Case { gap, first: Some(first), sanity: &sound };
             let verdict = judge(case, &Thresholds::frozen());
             assert_eq!((verdict.kind, verdict.seen), (expected, expected), "{gap:?}");
         }
@@ -142,9 +140,9 @@ mod tests {
         let first = candidate(&["play"], true);
         let strained = |rivals| Some(Strained { stage: 0, ended: vec![0, 1], left: 3.0, rivals });
         let judged = |left: f64, strained| {
-            let sanity = Sanity { left: vec![0.0, left], strained };
+            let sanity = Sanity { left: vec![0.0, left], allowed: 0.1, strained };
             let gap = gap(20.0, 10.0, 0.1);
-            let case = Case { gap, first: Some(&first), sanity: &sanity, foreign_share: 0.1 };
+            let case = Case { gap, first: Some(&first), sanity: &sanity };
             judge(case, &Thresholds::frozen())
         };
         let foreign = judged(0.5, None);

@@ -29,6 +29,8 @@ const KEPT: f64 = 0.02;
 pub(crate) struct Sanity {
     /// By stage: share of its channel's variance that the best effects leave.
     pub(crate) left: Vec<f64>,
+    /// Share that may be left before names of effects mean nothing.
+    pub(crate) allowed: f64,
     /// The stage whose parameters are strained most, if any.
     pub(crate) strained: Option<Strained>,
 }
@@ -52,9 +54,13 @@ impl Sanity {
         best: &Hypothesis,
         evidence: &Evidence,
     ) -> Result<Self, GapError> {
-        let stages = 0..evidence.stages.len();
-        let left = stages.map(|stage| left(problem.simulator(), evidence, stage)).collect();
-        Ok(Self { left, strained: strained(problem, best, evidence)? })
+        let simulator = problem.simulator();
+        let left = (0..evidence.stages.len()).map(|stage| left(simulator, evidence, stage));
+        Ok(Self {
+            left: left.collect(),
+            allowed: simulator.foreign_share(),
+            strained: strained(problem, best, evidence)?,
+        })
     }
 }
 

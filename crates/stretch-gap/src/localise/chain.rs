@@ -89,6 +89,8 @@ fn shares(worth: &[f64], players: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_relative_eq;
+    use testkit::tolerance::F64_ROUNDING;
 
     #[test]
     fn shares_are_those_of_the_glove_game() {
@@ -97,7 +99,7 @@ mod tests {
         let worth: Vec<f64> = (0..8).map(pairs).collect();
         let shares = shares(&worth, 3);
         for (share, expected) in shares.iter().zip([1.0 / 6.0, 1.0 / 6.0, 4.0 / 6.0]) {
-            assert!((share - expected).abs() < 1e-12, "{shares:?}");
+            assert_relative_eq!(*share, expected, max_relative = F64_ROUNDING, epsilon = 0.0);
         }
     }
 }

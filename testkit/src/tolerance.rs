@@ -108,6 +108,34 @@ pub const METRICS_SHIFT: f64 = 1e-9;
 /// Relative: the errors themselves are rounded to `f32`, each by 2^-24; the length adds nothing.
 pub const METRICS_F32: f64 = 5e-7;
 
+/// Relative: an integral time from 40 000 samples of correlation 0.8, whose hundred squared
+/// autocorrelations have a chance part of 4.6/40 000 each: three standard errors.
+pub const EFFECTIVE_SIZE: f64 = 0.1;
+
+/// Relative: what two equal columns of a singular system share, solved with a jitter of 1e-13 of
+/// its diagonal, whose condition of 1e13 magnifies roundings of 1e-16.
+pub const TWINS: f64 = 1e-2;
+
+/// Share of what was put in or set off by which a diagnosis may miss it: noise and nuisances of
+/// a minute of record. A wrong cause misses by all of it.
+pub const GAP_FOUND: f64 = 0.15;
+
+/// The same where a second parameter can stand in for a part of the first.
+pub const GAP_BLURRED: f64 = 0.35;
+
+/// Excess of a sound model on 1800 test samples: three standard errors, 3 sqrt(2/1800).
+pub const GAP_NULL: f64 = 0.1;
+
+/// Relative: errors of two calibrations trained on two noises of the same 18 s.
+pub const TRAINED_AGAIN: f64 = 0.1;
+
+/// Relative: a spread from the median of 20 000 second differences, each in three neighbours:
+/// four standard errors.
+pub const MEDIAN_SPREAD: f64 = 0.04;
+
+/// Excess of a slice of 2500 samples whose mean square is 9: five standard errors 9 sqrt(2/2500).
+pub const SLICE_EXCESS: f64 = 1.3;
+
 /// Relative norm: coefficients of a fit on data of condition up to about a thousand.
 pub const FIT_WELL: f64 = 1e-12;
 

@@ -1,7 +1,7 @@
 //! Why measurements could not be bound to a simulator, or a simulation was refused.
 
 use stretch_data::DataError;
-use stretch_gap::GapError;
+use stretch_gap::{DescriptionError, GapError};
 use stretch_sim::SimError;
 
 /// Why measurements could not be bound to a simulator, or a simulation was refused; carries the evidence.
@@ -14,6 +14,9 @@ pub enum BenchError {
     /// The rig or an effect was refused.
     #[error(transparent)]
     Sim(#[from] SimError),
+    /// What the simulator is made of does not hold together.
+    #[error(transparent)]
+    Description(#[from] DescriptionError),
     /// A rig file was refused.
     #[error("{file}: {cause}")]
     RigFile {

@@ -2,11 +2,13 @@
 
 mod support;
 
+use approx::{assert_abs_diff_eq, assert_relative_eq};
 use stretch_bench::{BenchError, GaugeSetup, GaugeSimulator};
 use stretch_data::{Channel, RigFile, SessionTrial, Split, Trial, TrialKind};
 use stretch_gap::{Diagnosis, Options, Simulator, VerdictKind, diagnose, next_experiment};
 use stretch_sim::GaugeRig;
 use support::{Noise, PROBABILITY, with_lost_rows};
+use testkit::tolerance::{FIT_WELL, GAP_FOUND};
 
 const DT_S: f64 = 0.01;
 /// Noise of the signal, whose span is about one, and of the reference, whose range is about 40 mm.
@@ -236,7 +238,7 @@ fn every_fault_is_named_or_shares_the_set_with_its_twins() {
         assert!(best.closed > 0.9 && best.closed_ci[0] > 0.5, "{what}, {best:?}");
         let shares: f64 = d.shares.iter().map(|s| s.closes).sum();
         assert_eq!(d.shares.len(), 1, "{what}");
-        assert!(shares > 0.9 && shares <= 1.0 + 1e-9, "{what}");
+        assert!(shares > 0.9 && shares <= 1.0 + FIT_WELL, "{what}");
     }
 }
 
@@ -315,7 +317,8 @@ fn a_rig_file_gives_the_nominal_gauge() {
     // A gain that is off by two of its tolerances is re-tuned and told.
     let d = run(-0.82);
     assert_eq!(d.verdict, VerdictKind::Parameters, "{}", d.sentence);
-    assert!((gain(&d).fitted + 0.9).abs() < 2e-3 && gain(&d).is_evidence, "{:?}", gain(&d));
+    assert!(gain(&d).is_evidence);
+    assert_abs_diff_eq!(gain(&d).fitted, -0.9, epsilon = GAP_FOUND * (0.9 - 0.82));
     // One that is right is left alone.
     assert_eq!(run(-0.9).verdict, VerdictKind::NoGap);
     let whole = RigFile::parse("rig.toml", "[sensing]\nR0 = { value = 4.0 }\n").expect("a rig");
@@ -338,13 +341,13 @@ fn uneven_and_broken_records_are_mended_and_told() {
     let gauge = GaugeSimulator::new(&setup(&trials)).expect("a gauge");
     let parts: Vec<usize> = gauge.trials().iter().map(|t| t.samples).collect();
     assert!(parts.len() == 2 && parts.iter().sum::<usize>().abs_diff(5800) < 20, "{parts:?}");
-    assert!((gauge.trials()[1].start_s - 32.0).abs() < 0.05);
+    assert_abs_diff_eq!(gauge.trials()[1].start_s, 32.0, epsilon = GAP_FOUND * 2.0);
     assert!(gauge.notes().iter().any(|n| n.contains("missing after 29.9")), "{:?}", gauge.notes());
     assert!(gauge.notes().iter().any(|n| n.contains("unevenly")), "{:?}", gauge.notes());
     let d = diagnose(&gauge, &Options::default(), &|_| (), &|| false).expect("a diagnosis").0;
     assert_eq!(d.named, ["channel_skew"], "{}", d.sentence);
     let skew = d.candidates[0].by_name["skew_s"];
-    assert!((skew - 0.03).abs() < 2e-3, "{skew}");
+    assert_relative_eq!(skew, 0.03, max_relative = GAP_FOUND, epsilon = 0.0);
 }
 
 #[test]

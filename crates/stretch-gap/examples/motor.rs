@@ -47,13 +47,13 @@ fn main() -> Result<(), GapError> {
     let backlash = EffectSpec::new("backlash", (1, "gear"), strength("w", "rad", 0.3));
     let ripple = EffectSpec::new("torque_ripple", (0, "drive"), strength("a", "rad/s2", 100.0));
     let trial = |name, start_s, is_test| TrialSpec::new(name, SAMPLES, start_s, is_test);
-    let description = Description {
+    let description = Description::new(DescriptionSpec {
         stages: vec![drive, gear],
         parameters: vec![gain, damping, ratio],
         effects: vec![friction, backlash, ripple],
         trials: vec![trial("monday", 0.0, false), trial("tuesday", 60.0, true)],
         dt_s: 0.01,
-    };
+    })?;
     // The bench: its friction is smooth and sticks more than it slides, its gear's flanks are soft.
     let mut motor = Motor { description, volts: vec![], angle: vec![], measured: [vec![], vec![]] };
     let (mut speed, mut angle, mut load, mut seed) = (0.0_f64, 0.0_f64, 0.0, 1_u64);

@@ -1,8 +1,10 @@
 //! A simulator with other tolerances.
 
 use crate::{
+    description::Description,
     error::GapError,
-    simulator::{Description, Motion, ParameterSpec, Run, Simulator},
+    simulator::{Motion, Run, Simulator},
+    spec::ParameterSpec,
 };
 
 /// A simulator whose parameters are told another way: held, or set loose.
@@ -17,9 +19,7 @@ impl<'a> Altered<'a> {
         simulator: &'a dyn Simulator,
         told: impl Fn(usize, &ParameterSpec) -> ParameterSpec,
     ) -> Self {
-        let mut about = simulator.description().clone();
-        about.parameters = about.parameters.iter().enumerate().map(|(i, p)| told(i, p)).collect();
-        Self { simulator, about }
+        Self { simulator, about: simulator.description().with_parameters(told) }
     }
 }
 

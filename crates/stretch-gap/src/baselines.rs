@@ -6,14 +6,18 @@ use rayon::prelude::*;
 
 use crate::{
     altered::Altered,
+    compare::Comparison,
     diagnosis::Baselines,
     error::GapError,
-    fit::{Bench, COARSE, Misfit},
-    floor::Floor,
-    frame::{Metric, Role},
+    fit::{COARSE, Fitted, possible},
+    frame::Role,
+    hypothesis::Hypothesis,
+    metric::Metric,
+    problem::Problem,
+    score::Misfit,
     screen::Ground,
-    select::{Solution, possible},
-    simulator::{Model, ParameterSpec, Simulator},
+    simulator::Model,
+    spec::ParameterSpec,
 };
 
 /// Single effects that an information criterion is asked about: the best of the screen.
@@ -25,49 +29,43 @@ const STARTS: usize = 2;
 
 /// Three methods that leave out one step each.
 pub(crate) fn baselines(
-    bench: &Bench<'_>,
-    floors: &[Floor],
-    nominal: &Solution,
-    tried: &BTreeMap<Vec<usize>, Solution>,
+    problem: &Problem<'_>,
+    tried: &BTreeMap<Vec<usize>, Hypothesis>,
     null_excess: f64,
 ) -> Result<Baselines, GapError> {
-    let name = |effect: Option<usize>| effect.map(|e| bench.simulator.effects()[e].name.clone());
-    let ground = Ground::around(bench, nominal.model.clone())?;
+    let name =
+        |effect: Option<usize>| effect.map(|e| problem.simulator().effects()[e].name.clone());
+    let ground = Ground::around(&problem.compare, problem.nominal.model.clone())?;
     Ok(Baselines {
-        largest_drop: name(largest_drop(bench, floors, null_excess)?),
-        signature: name(signature(bench, &ground)?),
-        bic: name(criterion(bench, &ground, nominal, tried)?),
+        largest_drop: name(largest_drop(problem, null_excess)?),
+        signature: name(signature(&problem.compare, &ground)?),
+        bic: name(criterion(problem, &ground, tried)?),
     })
 }
 
 /// The effect whose own parameters, fitted alone, take most from the mean square error in floors, all parameters of the
 /// simulator left as shipped; none where that is less than what counts as a gap.
-fn largest_drop(
-    bench: &Bench<'_>,
-    floors: &[Floor],
-    null_excess: f64,
-) -> Result<Option<usize>, GapError> {
+fn largest_drop(problem: &Problem<'_>, null_excess: f64) -> Result<Option<usize>, GapError> {
     // Nothing is re-tuned, nothing wanders.
-    let frozen = Altered::of(bench.simulator, |_, p| ParameterSpec {
+    let compare = &problem.compare;
+    let frozen = Altered::of(problem.simulator(), |_, p| ParameterSpec {
         sd: 0.0,
         wander: None,
         per_trial_sd: None,
         ..p.clone()
     });
-    let shipped = Model::nominal(&frozen);
-    let all = frozen.trials().len();
-    let metrics: Result<Vec<Metric>, GapError> = floors
-        .iter()
-        .enumerate()
-        .map(|(s, floor)| Metric::of(&frozen, &bench.frame, s, floor, &shipped, all))
-        .collect();
-    let rigid = bench.beside(&frozen, metrics?);
+    let (runs, shipped) = (compare.runs.beside(&frozen), Model::nominal(&frozen));
+    let metrics = compare.metrics.iter().enumerate().map(|(stage, metric)| {
+        Metric::of(&runs, &compare.frame, stage, metric.floor.clone(), &shipped)
+    });
+    let rigid = compare.beside(&frozen, metrics.collect::<Result<_, _>>()?);
     let ground = Ground::around(&rigid, shipped)?;
     let before: Vec<Misfit> =
         ground.residuals.iter().enumerate().map(|(s, r)| rigid.misfit(s, r)).collect();
     let drops = each_effect(&rigid, |effect| {
         let mut most = 0.0_f64;
-        for misfits in rigid.fits(&ground, effect)? {
+        let fit = |stages: &[usize], model| rigid.fit(stages, model, &ground.known, COARSE);
+        for misfits in fits(&rigid, &ground, effect, fit)? {
             let drop = |m: &Misfit| rigid.mean_square(&before[m.stage]) - rigid.mean_square(m);
             most = most.max(misfits.iter().map(drop).sum());
         }
@@ -78,12 +76,12 @@ fn largest_drop(
 
 /// The effect whose change, taken once, correlates best with what the re-tuned simulator leaves, all that its
 /// parameters can do taken out of both; none where noise could do as well.
-fn signature(bench: &Bench<'_>, ground: &Ground) -> Result<Option<usize>, GapError> {
-    let likeness = each_effect(bench, |effect| {
-        let spec = &bench.simulator.effects()[effect];
+fn signature(compare: &Comparison<'_>, ground: &Ground) -> Result<Option<usize>, GapError> {
+    let likeness = each_effect(compare, |effect| {
+        let spec = &compare.simulator().effects()[effect];
         let mut most = 0.0_f64;
         for values in &spec.starts {
-            if let Some((own, mixed)) = bench.change(ground, effect, values)? {
+            if let Some((own, mixed)) = compare.change(ground, effect, values)? {
                 most = most.max(mixed.abs() / own.sqrt());
             }
         }
@@ -91,8 +89,8 @@ fn signature(bench: &Bench<'_>, ground: &Ground) -> Result<Option<usize>, GapErr
     })?;
     let stages = ground.residuals.iter().enumerate();
     let (squares, count) = stages.fold((0.0, 0.0), |(squares, count), (s, residual)| {
-        let own = bench.metrics[s].product(&bench.frame, residual, residual, Role::Fit);
-        (squares + own, count + bench.frame.count(Role::Fit) as f64)
+        let own = compare.product(s, residual, residual);
+        (squares + own, count + compare.frame.count(Role::Fit) as f64)
     });
     // Correlation r = product / sqrt(own squares); its standard deviation without a likeness is 1 / sqrt(count).
     let least = FAR * (squares / f64::max(count, 1.0)).sqrt();
@@ -102,30 +100,31 @@ fn signature(bench: &Bench<'_>, ground: &Ground) -> Result<Option<usize>, GapErr
 /// The single effect, fitted together with all parameters, with the lowest BIC = n ln(mean square) + k ln(n), every
 /// sample counted as independent; none where no effect has the lowest (Schwarz 1978, doi 10.1214/aos/1176344136).
 fn criterion(
-    bench: &Bench<'_>,
+    problem: &Problem<'_>,
     ground: &Ground,
-    nominal: &Solution,
-    tried: &BTreeMap<Vec<usize>, Solution>,
+    tried: &BTreeMap<Vec<usize>, Hypothesis>,
 ) -> Result<Option<usize>, GapError> {
-    let gains = each_effect(bench, |effect| Ok(bench.screen(ground, effect)?.gain()))?;
+    let (compare, nominal) = (&problem.compare, &problem.nominal);
+    let gains = each_effect(compare, |effect| Ok(compare.screen(ground, effect)?.gain()))?;
     let mut order: Vec<usize> = (0..gains.len()).collect();
     order.sort_by(|a, b| gains[*b].total_cmp(&gains[*a]));
-    let samples = bench.frame.count(Role::Fit) as f64;
-    let falls = each_effect(bench, |effect| {
+    let samples = compare.frame.count(Role::Fit) as f64;
+    let falls = each_effect(compare, |effect| {
         if !order[..KEPT.min(order.len())].contains(&effect) {
             return Ok(0.0);
         }
-        let spec = &bench.simulator.effects()[effect];
+        let spec = &compare.simulator().effects()[effect];
         let free = spec.parameters.iter().filter(|p| p.is_fitted && p.form.is_none()).count();
         let all = samples * nominal.misfits.len() as f64;
         let fall = |misfits: &[Misfit]| {
             let gain = |m: &Misfit| samples * (nominal.misfits[m.stage].fit / m.fit).ln();
             misfits.iter().map(gain).sum::<f64>() - free as f64 * all.ln()
         };
-        let known = tried.get(&vec![effect]).map(|solution| vec![solution.misfits.clone()]);
+        let fit = |stages: &[usize], model| problem.fit(stages, model, &ground.known, COARSE);
+        let known = tried.get(&vec![effect]).map(|set| vec![set.misfits.clone()]);
         let fitted = match known {
             Some(known) => known,
-            None => bench.fits(ground, effect)?,
+            None => fits(compare, ground, effect, fit)?,
         };
         Ok(fitted.iter().map(|m| fall(m)).fold(0.0, f64::max))
     })?;
@@ -134,10 +133,10 @@ fn criterion(
 
 /// A number for every effect.
 fn each_effect(
-    bench: &Bench<'_>,
+    compare: &Comparison<'_>,
     of: impl Fn(usize) -> Result<f64, GapError> + Sync + Send,
 ) -> Result<Vec<f64>, GapError> {
-    (0..bench.simulator.effects().len()).into_par_iter().map(of).collect()
+    (0..compare.simulator().effects().len()).into_par_iter().map(of).collect()
 }
 
 /// The effect with the greatest number above 0.
@@ -146,16 +145,18 @@ fn best(numbers: Vec<f64>) -> Option<(usize, f64)> {
     above.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-impl Bench<'_> {
-    /// What is left in the stages that an effect touches when it is fitted on top of a ground, from its best starts.
-    fn fits(&self, ground: &Ground, effect: usize) -> Result<Vec<Vec<Misfit>>, GapError> {
-        let mut starts = self.screen(ground, effect)?.starts;
-        starts.truncate(STARTS);
-        possible(starts.into_par_iter().map(|(values, _)| {
-            let mut model = ground.model.clone();
-            model.effects.push((effect, values));
-            let touched = &self.simulator.effects()[effect].touches;
-            Ok(self.fit(touched, model, &ground.known, COARSE)?.misfits)
-        }))
-    }
+/// What is left in the stages that an effect touches when it is fitted on top of a ground, from its best starts.
+fn fits(
+    compare: &Comparison<'_>,
+    ground: &Ground,
+    effect: usize,
+    fit: impl Fn(&[usize], Model) -> Result<Fitted, GapError> + Sync,
+) -> Result<Vec<Vec<Misfit>>, GapError> {
+    let mut starts = compare.screen(ground, effect)?.starts;
+    starts.truncate(STARTS);
+    possible(starts.into_par_iter().map(|(values, _)| {
+        let mut model = ground.model.clone();
+        model.effects.push((effect, values));
+        Ok(fit(&compare.simulator().effects()[effect].touches, model)?.misfits)
+    }))
 }

@@ -1,6 +1,12 @@
 //! Closed-gap fraction with an interval, by block bootstrap.
+//!
+//! Residuals are correlated within blocks, which are drawn whole and with replacement (Kunsch 1989, doi 10.1214/aos/1176347265);
+//! the interval is that of the percentiles of the draws.
 
-use crate::{diagnose::mean_square, dice::Dice};
+use crate::{
+    dice::Dice,
+    score::{gap, mean_square},
+};
 
 /// Draws of the bootstrap.
 const DRAWS: usize = 400;
@@ -18,13 +24,11 @@ pub(crate) struct Closed {
 
 /// CGF = 1 - sum max(0, excess after)/sum max(0, excess before), channels in step: a block is drawn for all of them.
 pub(crate) fn closed_interval(before: &[Vec<f64>], after: &[Vec<f64>], seed: u64) -> Closed {
-    let excess = |blocks: &[Vec<f64>]| -> f64 {
-        blocks.iter().map(|b| (mean_square(b) - 1.0).max(0.0)).sum()
-    };
+    let whole = |blocks: &[Vec<f64>]| -> f64 { blocks.iter().map(|b| gap(mean_square(b))).sum() };
     let closed = |before: f64, after: f64| {
         if before > 1e-9 { 1.0 - after / before } else { 0.0 }
     };
-    let (b, a) = (excess(before), excess(after));
+    let (b, a) = (whole(before), whole(after));
     let count = before.first().map_or(0, Vec::len);
     let (mut draws, mut falls) = (Vec::with_capacity(DRAWS), Vec::with_capacity(DRAWS));
     let mut dice = Dice::new(seed, 77);
@@ -38,7 +42,7 @@ pub(crate) fn closed_interval(before: &[Vec<f64>], after: &[Vec<f64>], seed: u64
             }
         }
         let n = count.max(1) as f64;
-        let one = |sum: f64| (sum / n - 1.0).max(0.0);
+        let one = |sum: f64| gap(sum / n);
         let drawn = closed(
             sums.iter().map(|s| one(s.0)).sum::<f64>(),
             sums.iter().map(|s| one(s.1)).sum::<f64>(),

@@ -4,8 +4,6 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::shares::EffectShare;
-
 /// The four answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -60,6 +58,18 @@ pub struct EffectValue {
     pub value: f64,
     /// One standard deviation, from the curvature of the fit with one observation per 0.5 s.
     pub sd: f64,
+}
+
+/// What one effect of the best set closes of the gap in the trials that were fitted.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EffectShare {
+    /// Effect.
+    pub effect: String,
+    /// Share of the re-tuned nominal's gap that opens again when it is taken out, those that closed less than it gone
+    /// before: the shares add up to what the set closes.
+    pub closes: f64,
+    /// Whether one of its parameters went to an end of its range: it then rather stands in for something else.
+    pub at_bound: bool,
 }
 
 /// Gap of one stage on the test trials, every stage on its measured input.
@@ -194,7 +204,7 @@ pub struct Baselines {
     pub bic: Option<String>,
 }
 
-/// Excess summed over channels, as the verdict weighs it: of the fitted and the test trials, the greater.
+/// Excess (reduced chi-square minus one) summed over channels, as the verdict weighs it: of the fitted and the test trials, the greater.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Excess {
     /// Parameters as shipped, test trials only.
@@ -239,6 +249,9 @@ pub struct Diagnosis {
     pub baselines: Option<Baselines>,
     /// What was noticed and assumed.
     pub notes: Vec<String>,
+    /// Simulations of one stage that it took, simpler methods left out.
+    #[serde(default)]
+    pub simulations: usize,
     /// Seconds it took.
     pub runtime_s: f64,
 }

@@ -1,9 +1,26 @@
 //! Why a diagnosis was refused.
 
+use crate::description::DescriptionError;
+
 /// Why a diagnosis was refused; carries the evidence.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GapError {
+    /// The simulator's description does not hold together.
+    #[error(transparent)]
+    Description(#[from] DescriptionError),
+    /// A measured channel does not have as many finite samples as the trials.
+    #[error(
+        "{stage}: {found} measured samples in a row are finite, the trials hold {needed}; give one finite number for each sample"
+    )]
+    Measured {
+        /// The stage.
+        stage: String,
+        /// Finite samples from the first.
+        found: usize,
+        /// Samples of all trials.
+        needed: usize,
+    },
     /// The simulator refused these values, or could not be bound to its measurements.
     #[error(transparent)]
     Simulator(Box<dyn std::error::Error + Send + Sync>),

@@ -1,14 +1,16 @@
-//! What pictures and slices are made of: every trial before and after.
+//! The evidence: every trial before and after, test trials included, which nothing has read until here.
 
 use crate::{
-    diagnose::{is_test, mean_square},
     diagnosis::Excess,
     error::GapError,
-    fit::Bench,
-    floor::Floor,
-    frame::{Frame, Segment},
-    select::Solution,
-    simulator::{Model, Run},
+    frame::{Frame, Role},
+    hypothesis::Hypothesis,
+    probability::{Weighed, weigh},
+    problem::Problem,
+    score::{excess, mean_square},
+    search::Found,
+    simulator::Model,
+    thresholds::Thresholds,
 };
 
 /// One stage over the whole session, all trials end to end.
@@ -47,91 +49,93 @@ pub struct Evidence {
     pub best: Model,
     /// Fitted model of every candidate, in the order of the diagnosis.
     pub candidates: Vec<Model>,
-    /// Mean square in floors of the re-tuned nominal, by stage and test block.
+    /// Reduced chi-square of the re-tuned nominal, by stage and test block.
     pub(crate) nominal_blocks: Vec<Vec<f64>>,
-    /// The best set's excess over fitted and held-out samples, and the nominal's.
-    pub(crate) trained: (f64, f64),
+    /// The strongest effect of the best set.
+    pub(crate) best_effect: Option<usize>,
+    /// How large the gap is.
+    pub(crate) gap: Excess,
 }
 
-/// Output of a model over the whole session, and its mean square in floors by test block.
-pub(crate) fn squares(
-    bench: &Bench<'_>,
-    stage: usize,
-    model: &Model,
-) -> Result<(Traces, Vec<f64>), GapError> {
-    let trials = bench.simulator.trials().len();
-    let mut output = vec![0.0; bench.frame.samples(trials)];
-    let run = Run { stage, model, trials, shake: None, step: 1.0 };
-    bench.simulator.simulate(run, &mut output)?;
-    let metric = &bench.metrics[stage];
-    let measured = bench.simulator.measured(stage);
-    let apart = measured.iter().zip(&output).zip(&metric.sd);
-    let mut residual: Vec<f64> = apart.map(|((m, s), sd)| (m - s) / sd).collect();
-    metric.clean(&bench.frame, &mut residual);
-    let blocks = test_blocks(&bench.frame, &residual);
-    Ok((Traces { output, residual }, blocks))
-}
-
-/// Output and clean residual.
+/// Output of a model over the whole session, its clean residual, and its reduced chi-square by test block.
 pub(crate) struct Traces {
-    pub(crate) output: Vec<f64>,
-    pub(crate) residual: Vec<f64>,
+    output: Vec<f64>,
+    residual: Vec<f64>,
+    pub(crate) blocks: Vec<f64>,
+}
+
+impl Traces {
+    pub(crate) fn of(problem: &Problem<'_>, stage: usize, model: &Model) -> Result<Self, GapError> {
+        let compare = &problem.compare;
+        let simulator = problem.simulator();
+        let output = compare.runs.output(stage, model, simulator.trials().len())?;
+        let metric = &compare.metrics[stage];
+        let apart = simulator.measured(stage).iter().zip(&output).zip(&metric.floor.sd);
+        let mut residual: Vec<f64> = apart.map(|((m, s), sd)| (m - s) / sd).collect();
+        metric.clean(&compare.frame, &mut residual);
+        let blocks = test_blocks(&compare.frame, &residual);
+        Ok(Self { output, residual, blocks })
+    }
 }
 
 fn test_blocks(frame: &Frame, residual: &[f64]) -> Vec<f64> {
-    let test = frame.segments.iter().filter(|s: &&Segment| is_test(s.role));
-    test.flat_map(|s| residual[s.from..s.to].chunks_exact(frame.block))
+    frame
+        .of_role(Role::Test)
+        .flat_map(|s| residual[s.from..s.to].chunks_exact(frame.block))
         .map(|block| block.iter().map(|r| r * r).sum::<f64>() / block.len() as f64)
         .collect()
 }
 
 impl Evidence {
-    /// What the verdict weighs.
-    pub(crate) fn excess(&self) -> Excess {
-        let sum = |of: fn(&StageEvidence) -> f64| -> f64 {
-            self.stages.iter().map(|s| of(s).max(0.0)).sum()
-        };
-        Excess {
-            raw: sum(|s| s.excess_raw),
-            retuned: self.trained.0.max(sum(|s| s.excess_retuned)),
-            left: self.trained.1.max(sum(|s| s.excess_after)),
-        }
-    }
-
-    pub(crate) fn of(
-        bench: &Bench<'_>,
-        shipped: &Model,
-        nominal: &Solution,
-        best: &Solution,
-        floors: &[Floor],
-    ) -> Result<Self, GapError> {
+    /// Runs the simulator as shipped, re-tuned and with the best set over every trial, and weighs the best set against its
+    /// rivals.
+    pub(crate) fn gather(
+        problem: &Problem<'_>,
+        thresholds: &Thresholds,
+        found: &Found,
+    ) -> Result<(Self, Vec<Weighed>), GapError> {
         let mut stages = Vec::new();
         let mut nominal_blocks = Vec::new();
-        for (stage, floor) in floors.iter().enumerate() {
-            let (raw, raw_blocks) = squares(bench, stage, shipped)?;
-            let (retuned, blocks) = squares(bench, stage, &nominal.model)?;
-            let (after, after_blocks) = squares(bench, stage, &best.model)?;
+        for (stage, metric) in problem.compare.metrics.iter().enumerate() {
+            let raw = Traces::of(problem, stage, &problem.shipped)?;
+            let retuned = Traces::of(problem, stage, &problem.nominal.model)?;
+            let after = Traces::of(problem, stage, &found.best.model)?;
             stages.push(StageEvidence {
                 raw: raw.output,
                 retuned: retuned.output,
                 after: after.output,
                 residual_retuned: retuned.residual,
                 residual_after: after.residual,
-                floor: floor.rms,
-                excess_raw: mean_square(&raw_blocks) - 1.0,
-                excess_retuned: mean_square(&blocks) - 1.0,
-                excess_after: mean_square(&after_blocks) - 1.0,
+                floor: metric.floor.rms,
+                excess_raw: excess(mean_square(&raw.blocks)),
+                excess_retuned: excess(mean_square(&retuned.blocks)),
+                excess_after: excess(mean_square(&after.blocks)),
             });
-            nominal_blocks.push(blocks);
+            nominal_blocks.push(retuned.blocks);
         }
-        Ok(Self {
+        let gap = gap(problem, &found.best, &stages);
+        let weighed = weigh(thresholds, &found.best, gap, &found.rivals);
+        let evidence = Self {
             stages,
-            frame: bench.frame.clone(),
-            retuned: nominal.model.clone(),
-            best: best.model.clone(),
-            candidates: Vec::new(),
+            frame: problem.compare.frame.clone(),
+            retuned: problem.nominal.model.clone(),
+            best: found.best.model.clone(),
+            candidates: weighed.iter().map(|w| w.hypothesis.model.clone()).collect(),
             nominal_blocks,
-            trained: (nominal.excess(bench), best.excess(bench)),
-        })
+            best_effect: found.best.effects.first().copied(),
+            gap,
+        };
+        Ok((evidence, weighed))
+    }
+}
+
+/// Of the fitted and the test trials the greater: a gap that only one of them shows is a gap.
+fn gap(problem: &Problem<'_>, best: &Hypothesis, stages: &[StageEvidence]) -> Excess {
+    let tested =
+        |of: fn(&StageEvidence) -> f64| -> f64 { stages.iter().map(|s| of(s).max(0.0)).sum() };
+    Excess {
+        raw: tested(|s| s.excess_raw),
+        retuned: problem.gap(&problem.nominal).max(tested(|s| s.excess_retuned)),
+        left: problem.gap(best).max(tested(|s| s.excess_after)),
     }
 }

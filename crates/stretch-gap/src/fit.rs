@@ -1,97 +1,46 @@
-//! Joint fits: all nominal parameters of the stages concerned and those of the effects, maximum a posteriori in a
-//! box, by Levenberg-Marquardt.
+//! Joint fits: nominal parameters of the stages concerned and those of the effects, maximum a posteriori in a box.
+//!
+//! With residuals r(x) in the [metric](crate::metric) V and priors p of the [coordinates](crate::coordinate) the cost is
+//!
+//! ```text
+//! J(x) = 0.5/b sum over stages r' V^-1 r - sum ln p(x_i)
+//! ```
+//!
+//! where b, the samples of a block, keeps neighbours from counting as independent. Levenberg-Marquardt (Marquardt 1963,
+//! doi 10.1137/0111030) minimises it: with sensitivities A = -dr/dx
+//!
+//! ```text
+//! (N + lambda diag N) d = -g,    N = A'V^-1 A/b + P'',    g = -A'V^-1 r/b + P',    low <= x + d <= high
+//! ```
+//!
+//! and each damped step is solved *within* its box ([`boxed`]) rather than clipped to it, which would leave the face along
+//! which the cost still falls. Sensitivities of the nominal parameters change little and cost one simulation each: they are renewed
+//! at a few iterations only, those of the effect at every one.
+//!
+//! Effects and nominal parameters must move together. An effect fitted with the nominal parameters held is credited with what
+//! they could have done (Brynjarsdottir and O'Hagan 2014, doi 10.1088/0266-5611/30/11/114007).
+
+use rayon::prelude::*;
 
 use crate::{
+    compare::{Comparison, Sensitivities},
+    coordinate::{Coordinate, coordinates},
     error::GapError,
-    frame::{Column, Frame, Metric, Role, dot},
     linear::{Cholesky, boxed},
-    simulator::{Model, Run, Simulator},
+    metric::Column,
+    score::Misfit,
+    simulator::Model,
 };
-
-/// Everything a fit needs to know; shared by all candidates.
-pub(crate) struct Bench<'a> {
-    pub(crate) simulator: &'a dyn Simulator,
-    pub(crate) frame: Frame,
-    /// One per stage.
-    pub(crate) metrics: Vec<Metric>,
-    /// Trials that fits run, from the first.
-    pub(crate) trials: usize,
-    /// By stage: samples that count as one, from the memory of the re-tuned nominal's residual.
-    pub(crate) memory: Vec<f64>,
-    /// By stage: what of the measured input's noise arrives through the re-tuned nominal.
-    pub(crate) arriving: Vec<Misfit>,
-    pub(crate) stop: &'a (dyn Fn() -> bool + Sync),
-}
-
-/// Mean squares of one stage in units of its floor.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Misfit {
-    pub(crate) stage: usize,
-    pub(crate) fit: f64,
-    pub(crate) held: f64,
-}
 
 /// A fit of some stages with some effects.
 #[derive(Debug, Clone)]
 pub(crate) struct Fitted {
     pub(crate) model: Model,
+    /// Of the stages that were fitted.
     pub(crate) misfits: Vec<Misfit>,
     /// One standard deviation of each effect parameter, in the order of the model's effects.
     pub(crate) effect_sd: Vec<Vec<f64>>,
 }
-
-/// One coordinate of a fit.
-#[derive(Debug, Clone, Copy)]
-enum Coordinate {
-    Nominal { index: usize, nominal: f64, sd: f64 },
-    Linear { slot: usize, index: usize, range: f64, usual: Option<f64> },
-    Log { slot: usize, index: usize, middle: f64, half: f64 },
-}
-
-impl Coordinate {
-    fn read(self, model: &Model) -> f64 {
-        match self {
-            Self::Nominal { index, nominal, sd } => (model.parameters[index] - nominal) / sd,
-            Self::Linear { slot, index, range, .. } => model.effects[slot].1[index] / range,
-            Self::Log { slot, index, .. } => model.effects[slot].1[index].max(1e-300).ln(),
-        }
-    }
-
-    fn write(self, model: &mut Model, x: f64) {
-        match self {
-            Self::Nominal { index, nominal, sd } => model.parameters[index] = nominal + sd * x,
-            Self::Linear { slot, index, range, .. } => model.effects[slot].1[index] = x * range,
-            Self::Log { slot, index, .. } => model.effects[slot].1[index] = x.exp(),
-        }
-    }
-
-    /// Slope and curvature of the prior.
-    fn prior(self, x: f64) -> (f64, f64, f64) {
-        match self {
-            Self::Nominal { .. } => (0.5 * x * x, x, 1.0),
-            Self::Linear { usual: Some(usual), .. } => {
-                let z = (x - usual) / FORM_SD;
-                (0.5 * z * z, z / FORM_SD, 1.0 / (FORM_SD * FORM_SD))
-            }
-            Self::Linear { .. } => (0.0, 0.0, 0.0),
-            Self::Log { middle, half, .. } => {
-                let z = (x - middle) / half;
-                (0.5 * z * z, z / half, 1.0 / (half * half))
-            }
-        }
-    }
-}
-
-/// Sensitivities of the nominal parameters of one stage, by parameter.
-pub(crate) type Sensitivities = Vec<(usize, Column)>;
-
-/// Standard deviation of a form around its usual value, as a share of its range.
-const FORM_SD: f64 = 0.35;
-
-/// Draws of the measured input's noise; the same for every model.
-const DRAWS: u64 = 4;
-/// Share of a mean square that is left at least when noise is taken from it.
-const LEAST_KEPT: f64 = 0.1;
 
 /// How much work a fit may be.
 #[derive(Debug, Clone, Copy)]
@@ -107,291 +56,12 @@ pub(crate) const COARSE: Effort = Effort { iterations: 5, renewals: &[1, 3] };
 /// Until nothing is gained.
 pub(crate) const FINE: Effort = Effort { iterations: 14, renewals: &[1, 3, 6, 9] };
 
-impl Bench<'_> {
-    /// The same session beside another simulator of it.
-    pub(crate) fn beside<'b>(
-        &'b self,
-        simulator: &'b dyn Simulator,
-        metrics: Vec<Metric>,
-    ) -> Bench<'b> {
-        Bench {
-            simulator,
-            frame: self.frame.clone(),
-            metrics,
-            trials: self.trials,
-            memory: self.memory.clone(),
-            arriving: Vec::new(),
-            stop: self.stop,
-        }
-    }
+/// Dampings tried in one iteration.
+const TRIES: usize = 5;
+/// An iteration that lowers the cost by less, nats and as a share of it, has gained nothing.
+const LEAST_GAIN: (f64, f64) = (0.03, 2e-5);
 
-    /// Residual of a stage, measured minus simulated in floors.
-    pub(crate) fn residual(&self, stage: usize, model: &Model) -> Result<Column, GapError> {
-        let values = self.residual_values(stage, model)?;
-        Ok(self.metrics[stage].column(&self.frame, values))
-    }
-
-    pub(crate) fn simulate(&self, stage: usize, model: &Model) -> Result<Vec<f64>, GapError> {
-        if (self.stop)() {
-            return Err(GapError::Stopped);
-        }
-        let trials = self.trials;
-        let mut out = vec![0.0; self.frame.samples(trials)];
-        self.simulator.simulate(Run { stage, model, trials, shake: None, step: 1.0 }, &mut out)?;
-        Ok(out)
-    }
-
-    pub(crate) fn misfit(&self, stage: usize, residual: &Column) -> Misfit {
-        let mean = |role| {
-            let n = self.frame.count(role) as f64;
-            let sum = self.metrics[stage].product(&self.frame, residual, residual, role);
-            if n > 0.0 { sum / n } else { 1.0 }
-        };
-        Misfit { stage, fit: mean(Role::Fit), held: mean(Role::Held) }
-    }
-
-    /// Mean square over fitted and held-out samples, in floors.
-    pub(crate) fn mean_square(&self, misfit: &Misfit) -> f64 {
-        let (fit, held) = (self.frame.blocks(Role::Fit), self.frame.blocks(Role::Held));
-        (fit * misfit.fit + held * misfit.held) / (fit + held)
-    }
-
-    /// What of the measured input's noise arrives at the output of a stage.
-    pub(crate) fn arriving(&self, stage: usize, model: &Model) -> Result<Misfit, GapError> {
-        let plain = self.simulate(stage, model)?;
-        let mut shaken = vec![0.0; plain.len()];
-        let mut mean = Misfit { stage, ..Misfit::default() };
-        for draw in 0..DRAWS {
-            let run = Run { stage, model, trials: self.trials, shake: Some(draw), step: 1.0 };
-            self.simulator.simulate(run, &mut shaken)?;
-            for ((x, y), sd) in shaken.iter_mut().zip(&plain).zip(&self.metrics[stage].sd) {
-                *x = (*x - y) / sd;
-            }
-            let power = |role| {
-                let parts = self.frame.of_role(role).map(|s| &shaken[s.from..s.to]);
-                let sum: f64 = parts.map(|part| dot(part, part)).sum();
-                sum / (self.frame.count(role) as f64).max(1.0)
-            };
-            mean.fit += power(Role::Fit) / DRAWS as f64;
-            mean.held += power(Role::Held) / DRAWS as f64;
-            if mean.fit == 0.0 {
-                break;
-            }
-        }
-        Ok(mean)
-    }
-
-    /// Misfit of a model beside others: an effect that happens to keep the measured input's noise from the output (a slow
-    /// amplifier, a slipping sleeve) is no better for that, and what it keeps away is given back.
-    fn fair_misfit(
-        &self,
-        stage: usize,
-        model: &Model,
-        residual: &Column,
-    ) -> Result<Misfit, GapError> {
-        let mut misfit = self.misfit(stage, residual);
-        let effects = self.simulator.effects();
-        let acts = model.effects.iter().any(|(e, _)| effects[*e].touches.contains(&stage));
-        if let Some(nominal) = self.arriving.get(stage).filter(|n| acts && n.fit > 0.0) {
-            let own = self.arriving(stage, model)?;
-            // Where the noise is known too large, more could be taken than there is.
-            misfit.fit = (misfit.fit + nominal.fit - own.fit).max(LEAST_KEPT * misfit.fit);
-            misfit.held = (misfit.held + nominal.held - own.held).max(LEAST_KEPT * misfit.held);
-        }
-        Ok(misfit)
-    }
-
-    fn coordinates(&self, stages: &[usize], model: &Model) -> (Vec<Coordinate>, Vec<[f64; 2]>) {
-        let specs = self.simulator.parameters();
-        let mut coordinates = Vec::new();
-        let mut bounds = Vec::new();
-        for &stage in stages {
-            for &index in &self.simulator.stages()[stage].parameters {
-                let p = &specs[index];
-                if p.sd > 0.0 {
-                    coordinates.push(Coordinate::Nominal { index, nominal: p.nominal, sd: p.sd });
-                    bounds.push([((p.least - p.nominal) / p.sd).max(-3.0), 3.0]);
-                }
-            }
-        }
-        for (slot, (effect, values)) in model.effects.iter().enumerate() {
-            for (index, p) in self.simulator.effects()[*effect].parameters.iter().enumerate() {
-                // A second threshold that is off stays off: it is another form of the effect.
-                let is_other = index > 0 || values.len() > 1;
-                if !p.is_fitted
-                    || (is_other && p.off == Some(values[index]) && values[index] != 0.0)
-                {
-                    continue;
-                }
-                if p.is_log {
-                    let (a, b) = (p.min.ln(), p.max.ln());
-                    // A form is looked for near its usual value, anything else in the whole range.
-                    let (middle, half) = match p.form {
-                        Some(usual) => (usual.ln(), FORM_SD * (b - a)),
-                        None => (0.5 * (a + b), 0.5 * (b - a)),
-                    };
-                    coordinates.push(Coordinate::Log { slot, index, middle, half });
-                    bounds.push([a, b]);
-                } else {
-                    let range = p.max - p.min;
-                    let usual = p.form.map(|usual| usual / range);
-                    coordinates.push(Coordinate::Linear { slot, index, range, usual });
-                    bounds.push([p.min / range, p.max / range]);
-                }
-            }
-        }
-        (coordinates, bounds)
-    }
-
-    fn residuals(&self, stages: &[usize], model: &Model) -> Result<Vec<Column>, GapError> {
-        stages.iter().map(|&s| self.residual(s, model)).collect()
-    }
-
-    /// Samples of a residual that count as one observation of its mean square, 1 + 2 sum of squared autocorrelations
-    /// (Bartlett 1946, doi 10.2307/2983611), at most a block.
-    pub(crate) fn memory_of(&self, stage: usize, residual: &Column) -> f64 {
-        let mut values = residual.values.clone();
-        self.metrics[stage].clean(&self.frame, &mut values);
-        let parts: Vec<&[f64]> =
-            self.frame.of_role(Role::Fit).map(|s| &values[s.from..s.to]).collect();
-        let product = |lag: usize| -> f64 {
-            parts
-                .iter()
-                .filter(|p| p.len() > lag)
-                .map(|p| dot(&p[lag..], &p[..p.len() - lag]))
-                .sum()
-        };
-        let power = product(0).max(1e-300);
-        let sum: f64 = (1..=2 * self.frame.block).map(|lag| (product(lag) / power).powi(2)).sum();
-        (1.0 + 2.0 * sum).min(self.frame.block as f64)
-    }
-
-    /// What the forms of a model's effects cost for lying off their usual values.
-    pub(crate) fn form_cost(&self, model: &Model) -> f64 {
-        let (coordinates, _) = self.coordinates(&[], model);
-        coordinates
-            .iter()
-            .filter(|c| match **c {
-                Coordinate::Linear { usual, .. } => usual.is_some(),
-                Coordinate::Log { slot, index, .. } => {
-                    let effect = model.effects[slot].0;
-                    self.simulator.effects()[effect].parameters[index].form.is_some()
-                }
-                Coordinate::Nominal { .. } => false,
-            })
-            .map(|c| c.prior(c.read(model)).0)
-            .sum()
-    }
-
-    /// What it costs that an effect may act in one of several ways (a saturation at either end): a logarithm of their number
-    /// for each that acts in one of them only.
-    pub(crate) fn choice_cost(&self, model: &Model) -> f64 {
-        let one = |(effect, values): &(usize, Vec<f64>)| {
-            let specs = &self.simulator.effects()[*effect].parameters;
-            let ways = specs.iter().zip(values).filter_map(|(p, v)| p.off.map(|off| off == *v));
-            let off = ways.clone().filter(|is_off| *is_off).count();
-            if off > 0 { (ways.count() as f64).ln() } else { 0.0 }
-        };
-        model.effects.iter().map(one).sum()
-    }
-
-    fn weight(&self) -> f64 {
-        1.0 / self.frame.block as f64
-    }
-
-    fn cost(
-        &self,
-        stages: &[usize],
-        coordinates: &[Coordinate],
-        model: &Model,
-        residuals: &[Column],
-    ) -> f64 {
-        let data: f64 = stages
-            .iter()
-            .zip(residuals)
-            .map(|(&s, r)| self.metrics[s].product(&self.frame, r, r, Role::Fit))
-            .sum();
-        let prior: f64 = coordinates.iter().map(|c| c.prior(c.read(model)).0).sum();
-        0.5 * self.weight() * data + prior
-    }
-
-    /// Sensitivity of the stages to one coordinate; none where it does not act.
-    fn sensitivity(
-        &self,
-        stages: &[usize],
-        coordinate: Coordinate,
-        bounds: [f64; 2],
-        model: &Model,
-        residuals: &[Column],
-    ) -> Result<Vec<Option<Column>>, GapError> {
-        let x = coordinate.read(model);
-        let step = match coordinate {
-            Coordinate::Nominal { .. } => 0.03,
-            Coordinate::Linear { .. } => (2e-4_f64).max(0.02 * x.abs()),
-            Coordinate::Log { .. } => 0.03,
-        };
-        let step = if x + step > bounds[1] { -step } else { step };
-        let mut moved = model.clone();
-        coordinate.write(&mut moved, x + step);
-        stages
-            .iter()
-            .zip(residuals)
-            .map(|(&stage, residual)| {
-                let acts = match coordinate {
-                    Coordinate::Nominal { index, .. } => {
-                        self.simulator.stages()[stage].parameters.contains(&index)
-                    }
-                    Coordinate::Linear { slot, .. } | Coordinate::Log { slot, .. } => {
-                        self.simulator.effects()[model.effects[slot].0].touches.contains(&stage)
-                    }
-                };
-                if !acts {
-                    return Ok(None);
-                }
-                let there = self.residual_values(stage, &moved)?;
-                let values =
-                    residual.values.iter().zip(there).map(|(a, b)| (a - b) / step).collect();
-                Ok(Some(self.metrics[stage].column(&self.frame, values)))
-            })
-            .collect()
-    }
-
-    pub(crate) fn residual_values(
-        &self,
-        stage: usize,
-        model: &Model,
-    ) -> Result<Vec<f64>, GapError> {
-        let mut values = self.simulate(stage, model)?;
-        let measured = self.simulator.measured(stage);
-        for ((x, m), sd) in values.iter_mut().zip(measured).zip(&self.metrics[stage].sd) {
-            *x = (m - *x) / sd;
-        }
-        Ok(values)
-    }
-
-    /// Sensitivities of a stage to its nominal parameters at a model, one standard deviation each.
-    pub(crate) fn nominal_sensitivities(
-        &self,
-        stage: usize,
-        model: &Model,
-        residual: &Column,
-    ) -> Result<Sensitivities, GapError> {
-        use rayon::prelude::*;
-        let stages = [stage];
-        let (coordinates, bounds) = self.coordinates(&stages, model);
-        let residuals = std::slice::from_ref(residual);
-        let columns: Result<Vec<_>, GapError> = coordinates
-            .par_iter()
-            .zip(&bounds)
-            .map(|(&c, &b)| {
-                let Coordinate::Nominal { index, .. } = c else { return Ok(None) };
-                let column = self.sensitivity(&stages, c, b, model, residuals)?.swap_remove(0);
-                Ok(column.map(|column| (index, column)))
-            })
-            .collect();
-        Ok(columns?.into_iter().flatten().collect())
-    }
-
+impl Comparison<'_> {
     /// Fits from a starting model. `known` holds sensitivities of the nominal parameters near the start, by stage.
     pub(crate) fn fit(
         &self,
@@ -400,131 +70,211 @@ impl Bench<'_> {
         known: &[Option<Sensitivities>],
         effort: Effort,
     ) -> Result<Fitted, GapError> {
-        let (coordinates, bounds) = self.coordinates(stages, &start);
-        let n = coordinates.len();
-        let mut model = start;
-        for (c, b) in coordinates.iter().zip(&bounds) {
-            let x = c.read(&model);
-            c.write(&mut model, x.clamp(b[0], b[1]));
-        }
-        let mut residuals = self.residuals(stages, &model)?;
-        let mut cost = self.cost(stages, &coordinates, &model, &residuals);
-        let mut columns: Vec<Vec<Option<Column>>> = vec![Vec::new(); n];
-        let mut lambda = 1e-3;
-        let mut normal = vec![0.0; n * n];
+        let mut descent = Descent::new(self, stages, start)?;
         for iteration in 0..effort.iterations {
-            let renew =
-                effort.renewals.contains(&iteration) || (iteration == 0 && known.is_empty());
-            for (i, (&c, &b)) in coordinates.iter().zip(&bounds).enumerate() {
-                let reuse = match c {
-                    Coordinate::Nominal { index, .. } if iteration == 0 && !known.is_empty() => {
-                        Some(index)
-                    }
-                    Coordinate::Nominal { .. } if !renew => continue,
-                    _ => None,
-                };
-                columns[i] = match reuse {
-                    Some(index) => stages
-                        .iter()
-                        .map(|&s| {
-                            let own = known.get(s).and_then(Option::as_ref)?;
-                            own.iter().find(|(p, _)| *p == index).map(|(_, c)| c.clone())
-                        })
-                        .collect(),
-                    None => self.sensitivity(stages, c, b, &model, &residuals)?,
-                };
-            }
-            let mut gradient = vec![0.0; n];
-            for i in 0..n {
-                for j in 0..=i {
-                    let mut sum = 0.0;
-                    for (s, &stage) in stages.iter().enumerate() {
-                        if let (Some(a), Some(b)) = (&columns[i][s], &columns[j][s]) {
-                            sum += self.metrics[stage].product(&self.frame, a, b, Role::Fit);
-                        }
-                    }
-                    normal[i * n + j] = self.weight() * sum;
-                    normal[j * n + i] = normal[i * n + j];
-                }
-                for (s, &stage) in stages.iter().enumerate() {
-                    if let Some(a) = &columns[i][s] {
-                        let product =
-                            self.metrics[stage].product(&self.frame, a, &residuals[s], Role::Fit);
-                        gradient[i] -= self.weight() * product;
-                    }
-                }
-                let (_, slope, curvature) = coordinates[i].prior(coordinates[i].read(&model));
-                gradient[i] += slope;
-                normal[i * n + i] += curvature;
-            }
-            let before = cost;
-            let mut moved = false;
-            for _ in 0..5 {
-                let mut damped = normal.clone();
-                for i in 0..n {
-                    damped[i * n + i] += lambda * normal[i * n + i] + 1e-12;
-                }
-                let x: Vec<f64> = coordinates.iter().map(|c| c.read(&model)).collect();
-                let low: Vec<f64> = bounds.iter().zip(&x).map(|(b, x)| b[0] - x).collect();
-                let high: Vec<f64> = bounds.iter().zip(&x).map(|(b, x)| b[1] - x).collect();
-                // A logarithm goes a factor of three at most, at once.
-                let cap = |i: usize| match coordinates[i] {
-                    Coordinate::Log { .. } => 1.1,
-                    Coordinate::Linear { .. } => 0.4,
-                    Coordinate::Nominal { .. } => 6.0,
-                };
-                let low: Vec<f64> = low.iter().enumerate().map(|(i, l)| l.max(-cap(i))).collect();
-                let high: Vec<f64> = high.iter().enumerate().map(|(i, h)| h.min(cap(i))).collect();
-                let step = boxed(&damped, &gradient, &low, &high);
-                let mut next = model.clone();
-                for ((c, x), s) in coordinates.iter().zip(&x).zip(&step) {
-                    c.write(&mut next, x + s);
-                }
-                let trial = self.residuals(stages, &next);
-                if let Err(GapError::Stopped) = trial {
-                    return Err(GapError::Stopped);
-                }
-                if let Ok(there) = trial {
-                    let new_cost = self.cost(stages, &coordinates, &next, &there);
-                    if new_cost < cost {
-                        (model, residuals, cost) = (next, there, new_cost);
-                        lambda = (0.2 * lambda).max(1e-7);
-                        moved = true;
-                        break;
-                    }
-                }
-                lambda = (8.0 * lambda).max(1e-4);
-            }
-            let gain = before - cost;
-            if gain < 0.03 + 2e-5 * cost {
-                if renew {
-                    break;
-                }
-                if !moved && lambda > 1e3 {
-                    break;
-                }
+            let is_first = iteration == 0;
+            let renew = effort.renewals.contains(&iteration) || (is_first && known.is_empty());
+            descent.linearise(known, is_first, renew)?;
+            let before = descent.cost;
+            let has_moved = descent.step()?;
+            let is_still = before - descent.cost < LEAST_GAIN.0 + LEAST_GAIN.1 * descent.cost;
+            // With old sensitivities a stand-still may only mean that they are old.
+            if is_still && (renew || (!has_moved && descent.lambda > 1e3)) {
+                break;
             }
         }
-        let misfits: Result<Vec<Misfit>, GapError> =
-            stages.iter().zip(&residuals).map(|(&s, r)| self.fair_misfit(s, &model, r)).collect();
-        let spread = spreads(&normal, n);
-        let mut effect_sd: Vec<Vec<f64>> =
-            model.effects.iter().map(|(_, v)| vec![0.0; v.len()]).collect();
-        for (i, c) in coordinates.iter().enumerate() {
-            let (slot, index, sd) = match *c {
-                Coordinate::Nominal { .. } => continue,
-                Coordinate::Linear { slot, index, range, .. } => (slot, index, spread[i] * range),
-                Coordinate::Log { slot, index, .. } => {
-                    (slot, index, spread[i] * model.effects[slot].1[index])
-                }
-            };
-            effect_sd[slot][index] = sd;
-        }
-        Ok(Fitted { model, misfits: misfits?, effect_sd })
+        Ok(descent.finish())
     }
 }
 
-/// Standard deviations from a normal matrix.
+/// Fits that were possible; a simulation that fails takes its candidate out, a stop ends all.
+pub(crate) fn possible<T: Send>(
+    fits: impl ParallelIterator<Item = Result<T, GapError>>,
+) -> Result<Vec<T>, GapError> {
+    let all: Vec<Result<T, GapError>> = fits.collect();
+    let mut out = Vec::with_capacity(all.len());
+    for fit in all {
+        match fit {
+            Ok(fit) => out.push(fit),
+            Err(GapError::Stopped) => return Err(GapError::Stopped),
+            Err(_) => {}
+        }
+    }
+    Ok(out)
+}
+
+/// A fit under way.
+struct Descent<'a, 'b> {
+    compare: &'a Comparison<'b>,
+    stages: &'a [usize],
+    coordinates: Vec<(Coordinate, [f64; 2])>,
+    model: Model,
+    /// By stage, as `stages`.
+    residuals: Vec<Column>,
+    cost: f64,
+    /// Sensitivities by coordinate, then by stage; none where a coordinate does not act.
+    columns: Vec<Vec<Option<Column>>>,
+    /// N, undamped.
+    normal: Vec<f64>,
+    gradient: Vec<f64>,
+    lambda: f64,
+}
+
+impl<'a, 'b> Descent<'a, 'b> {
+    fn new(
+        compare: &'a Comparison<'b>,
+        stages: &'a [usize],
+        mut model: Model,
+    ) -> Result<Self, GapError> {
+        let coordinates = coordinates(compare.simulator(), stages, &model);
+        for (c, b) in &coordinates {
+            let x = c.read(&model);
+            c.write(&mut model, x.clamp(b[0], b[1]));
+        }
+        let n = coordinates.len();
+        let mut descent = Self {
+            compare,
+            stages,
+            residuals: Vec::new(),
+            cost: f64::INFINITY,
+            columns: vec![Vec::new(); n],
+            normal: vec![0.0; n * n],
+            gradient: vec![0.0; n],
+            lambda: 1e-3,
+            coordinates,
+            model,
+        };
+        descent.residuals = descent.residuals_of(&descent.model)?;
+        descent.cost = descent.cost_of(&descent.model, &descent.residuals);
+        Ok(descent)
+    }
+
+    fn residuals_of(&self, model: &Model) -> Result<Vec<Column>, GapError> {
+        self.stages.iter().map(|&s| self.compare.residual(s, model)).collect()
+    }
+
+    /// J of the module's head.
+    fn cost_of(&self, model: &Model, residuals: &[Column]) -> f64 {
+        let stages = self.stages.iter().zip(residuals);
+        let data: f64 = stages.map(|(&s, r)| self.compare.product(s, r, r)).sum();
+        let prior: f64 = self.coordinates.iter().map(|(c, _)| c.prior(c.read(model)).cost).sum();
+        0.5 * self.compare.weight() * data + prior
+    }
+
+    /// Sensitivities where they are due, then N and g.
+    fn linearise(
+        &mut self,
+        known: &[Option<Sensitivities>],
+        is_first: bool,
+        renew: bool,
+    ) -> Result<(), GapError> {
+        for i in 0..self.coordinates.len() {
+            let place = self.coordinates[i];
+            self.columns[i] = match place.0 {
+                Coordinate::Nominal { index, .. } if is_first && !known.is_empty() => {
+                    let of = |&s: &usize| {
+                        let own = known.get(s).and_then(Option::as_ref)?;
+                        own.iter().find(|(p, _)| *p == index).map(|(_, c)| c.clone())
+                    };
+                    self.stages.iter().map(of).collect()
+                }
+                Coordinate::Nominal { .. } if !renew => continue,
+                _ => self.compare.sensitivity(self.stages, place, &self.model, &self.residuals)?,
+            };
+        }
+        self.normal_equations();
+        Ok(())
+    }
+
+    fn normal_equations(&mut self) {
+        let n = self.coordinates.len();
+        let weight = self.compare.weight();
+        for i in 0..n {
+            for j in 0..=i {
+                let mut sum = 0.0;
+                for (s, &stage) in self.stages.iter().enumerate() {
+                    if let (Some(a), Some(b)) = (&self.columns[i][s], &self.columns[j][s]) {
+                        sum += self.compare.product(stage, a, b);
+                    }
+                }
+                self.normal[i * n + j] = weight * sum;
+                self.normal[j * n + i] = self.normal[i * n + j];
+            }
+            self.gradient[i] = 0.0;
+            for (s, &stage) in self.stages.iter().enumerate() {
+                if let Some(a) = &self.columns[i][s] {
+                    let product = self.compare.product(stage, a, &self.residuals[s]);
+                    self.gradient[i] -= weight * product;
+                }
+            }
+            let c = self.coordinates[i].0;
+            let prior = c.prior(c.read(&self.model));
+            self.gradient[i] += prior.slope;
+            self.normal[i * n + i] += prior.curvature;
+        }
+    }
+
+    /// One step downhill with as little damping as will do; says whether there was one.
+    fn step(&mut self) -> Result<bool, GapError> {
+        let n = self.coordinates.len();
+        let x: Vec<f64> = self.coordinates.iter().map(|(c, _)| c.read(&self.model)).collect();
+        let reach = |i: usize| {
+            let (c, bounds) = self.coordinates[i];
+            [(bounds[0] - x[i]).max(-c.stride()), (bounds[1] - x[i]).min(c.stride())]
+        };
+        let (low, high): (Vec<f64>, Vec<f64>) = (0..n).map(reach).map(|[l, h]| (l, h)).unzip();
+        for _ in 0..TRIES {
+            let mut damped = self.normal.clone();
+            for i in 0..n {
+                damped[i * n + i] += self.lambda * self.normal[i * n + i] + 1e-12;
+            }
+            let step = boxed(&damped, &self.gradient, &low, &high);
+            let mut next = self.model.clone();
+            for (((c, _), x), s) in self.coordinates.iter().zip(&x).zip(&step) {
+                c.write(&mut next, x + s);
+            }
+            match self.residuals_of(&next) {
+                Err(GapError::Stopped) => return Err(GapError::Stopped),
+                // These values cannot be simulated: nearer to where it can.
+                Err(_) => {}
+                Ok(there) => {
+                    let cost = self.cost_of(&next, &there);
+                    if cost < self.cost {
+                        (self.model, self.residuals, self.cost) = (next, there, cost);
+                        self.lambda = (0.2 * self.lambda).max(1e-7);
+                        return Ok(true);
+                    }
+                }
+            }
+            self.lambda = (8.0 * self.lambda).max(1e-4);
+        }
+        Ok(false)
+    }
+
+    /// Misfits, and standard deviations by Laplace's approximation: the covariance is N^-1.
+    fn finish(self) -> Fitted {
+        let stages = self.stages.iter().zip(&self.residuals);
+        let misfits = stages.map(|(&s, r)| self.compare.misfit(s, r)).collect();
+        let spread = spreads(&self.normal, self.coordinates.len());
+        let effects = self.model.effects.iter();
+        let mut effect_sd: Vec<Vec<f64>> = effects.map(|(_, v)| vec![0.0; v.len()]).collect();
+        for ((c, _), spread) in self.coordinates.iter().zip(spread) {
+            match *c {
+                Coordinate::Nominal { .. } => {}
+                Coordinate::Linear { slot, index, range, .. } => {
+                    effect_sd[slot][index] = spread * range;
+                }
+                // d value = value d ln value
+                Coordinate::Log { slot, index, .. } => {
+                    effect_sd[slot][index] = spread * self.model.effects[slot].1[index];
+                }
+            }
+        }
+        Fitted { model: self.model, misfits, effect_sd }
+    }
+}
+
+/// Square roots of the diagonal of the inverse of a normal matrix.
 fn spreads(normal: &[f64], n: usize) -> Vec<f64> {
     let mut lifted = normal.to_vec();
     for i in 0..n {

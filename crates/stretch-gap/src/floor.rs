@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use crate::{
     error::GapError,
     frame::{Frame, Role},
+    runs::Runs,
     simulator::{Model, Run, Simulator},
 };
 
@@ -23,45 +24,32 @@ const DRAWS: u64 = 12;
 /// Half-width over which what arrives of them is averaged, in samples.
 const NEAR: usize = 12;
 
-/// Known noise of the output (else from second differences of the record), and what of the inputs' noise arrives: more
-/// where the output is steep or the input too quick to be smoothed.
+/// Floors of all stages around a model.
+///
+/// The variance of the floor is that of the output's own noise, known or taken from the record's second differences,
+/// plus the *noise transmitted*: what of the measured input's noise arrives at the output, by Monte Carlo with the
+/// same draws for every model. It is larger where the output is steep or the input too quick to be smoothed, so the floor is one
+/// of every sample.
 pub(crate) fn floors_of(
-    simulator: &dyn Simulator,
+    runs: &Runs<'_>,
     frame: &Frame,
     model: &Model,
     seed: u64,
 ) -> Result<Vec<Floor>, GapError> {
-    (0..simulator.stages().len())
-        .into_par_iter()
-        .map(|stage| floor(simulator, frame, stage, model, seed))
-        .collect()
+    let stages = 0..runs.simulator().stages().len();
+    stages.into_par_iter().map(|stage| floor(runs, frame, stage, model, seed)).collect()
 }
 
 fn floor(
-    simulator: &dyn Simulator,
+    runs: &Runs<'_>,
     frame: &Frame,
     stage: usize,
     model: &Model,
     seed: u64,
 ) -> Result<Floor, GapError> {
-    let trials = simulator.trials().len();
-    let samples = frame.samples(trials);
-    let run = Run { stage, model, trials, shake: None, step: 1.0 };
-    let mut plain = vec![0.0; samples];
-    simulator.simulate(run, &mut plain)?;
-    let mut arrived = vec![0.0; samples];
-    for draw in 0..DRAWS {
-        let mut shaken = vec![0.0; samples];
-        simulator.simulate(Run { shake: Some(seed + 1000 * draw), ..run }, &mut shaken)?;
-        let mut any = false;
-        for ((sum, a), b) in arrived.iter_mut().zip(&plain).zip(&shaken) {
-            *sum += (a - b) * (a - b) / DRAWS as f64;
-            any |= a != b;
-        }
-        if !any {
-            break;
-        }
-    }
+    let simulator = runs.simulator();
+    let arrived = transmitted(runs, stage, model, seed)?;
+    let samples = arrived.len();
     let (own, mut source) = match simulator.stages()[stage].noise {
         Some(noise) => (noise * noise, "known noise of the channel".to_owned()),
         None => (of_record(simulator, frame, stage), "second differences of the record".to_owned()),
@@ -76,12 +64,39 @@ fn floor(
         let part = &arrived[begin..begin + trial.samples];
         begin += trial.samples;
         for i in 0..part.len() {
+            // A dozen draws tell a variance to 40 % only: neighbours of the same trial lend theirs.
             let near = &part[i.saturating_sub(NEAR)..(i + NEAR + 1).min(part.len())];
             let local = near.iter().sum::<f64>() / near.len() as f64;
             sd.push((own + local).sqrt().max(1e-12));
         }
     }
     Ok(Floor { sd, rms: (own + mean).sqrt().max(1e-12), source })
+}
+
+/// Variance that the measured input's noise causes at every sample of the output.
+fn transmitted(
+    runs: &Runs<'_>,
+    stage: usize,
+    model: &Model,
+    seed: u64,
+) -> Result<Vec<f64>, GapError> {
+    let trials = runs.simulator().trials().len();
+    let run = Run { stage, model, trials, shake: None, step: 1.0 };
+    let plain = runs.run(run)?;
+    let mut arrived = vec![0.0; plain.len()];
+    for draw in 0..DRAWS {
+        let shaken = runs.run(Run { shake: Some(seed + 1000 * draw), ..run })?;
+        let mut any = false;
+        for ((sum, a), b) in arrived.iter_mut().zip(&plain).zip(&shaken) {
+            *sum += (a - b) * (a - b) / DRAWS as f64;
+            any |= a != b;
+        }
+        // A stage whose input is commanded transmits nothing.
+        if !any {
+            break;
+        }
+    }
+    Ok(arrived)
 }
 
 /// Noise variance of the output of a stage, from the samples that may be looked at.

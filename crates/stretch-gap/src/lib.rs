@@ -3,6 +3,10 @@
 mod altered;
 mod baselines;
 mod bootstrap;
+mod candidates;
+mod compare;
+mod coordinate;
+mod description;
 mod diagnose;
 mod diagnosis;
 mod dice;
@@ -11,33 +15,41 @@ mod evidence;
 mod fit;
 mod floor;
 mod frame;
+mod hypothesis;
+mod judge;
 mod linear;
 mod localise;
+mod metric;
 mod next_experiment;
+mod nuisance;
 mod probability;
+mod problem;
+mod runs;
 mod sanity;
+mod score;
 mod screen;
-mod select;
+mod search;
+mod sets;
 mod shares;
 mod simulator;
+mod spec;
 mod thresholds;
 mod transfer;
-mod verdict;
+mod words;
+mod worth;
 
+pub use description::{Description, DescriptionError, DescriptionSpec};
 pub use diagnose::{Options, diagnose};
 pub use diagnosis::{
-    Baselines, Candidate, Diagnosis, EffectValue, Excess, NextExperiment, ParameterShift, SliceGap,
-    StageGap, StageShare, Transfer, TransferError, VerdictKind, Where,
+    Baselines, Candidate, Diagnosis, EffectShare, EffectValue, Excess, NextExperiment,
+    ParameterShift, SliceGap, StageGap, StageShare, Transfer, TransferError, VerdictKind, Where,
 };
 pub use dice::Dice;
 pub use error::GapError;
 pub use evidence::{Evidence, StageEvidence};
 pub use floor::noise_variance;
-pub use frame::{BLOCK_S, Frame, Metric, Role, Segment};
+pub use frame::{BLOCK_S, Frame, Role, Segment};
 pub use next_experiment::{Laboratory, Plan, Proposal, differences, next_experiment};
-pub use shares::EffectShare;
-pub use simulator::{
-    Description, EffectParameterSpec, EffectSpec, Model, Motion, ParameterSpec, Run, Simulator,
-    StageSpec, TrialSpec, Wander,
-};
+pub use simulator::{Model, Motion, Run, Simulator};
+pub use spec::{EffectParameterSpec, EffectSpec, ParameterSpec, StageSpec, TrialSpec, Wander};
 pub use thresholds::Thresholds;

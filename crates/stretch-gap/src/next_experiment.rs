@@ -8,7 +8,7 @@ use crate::{
     error::GapError,
     evidence::Evidence,
     frame::BLOCK_S,
-    linear::boxed,
+    linear::{boxed, dot},
     simulator::{Model, Simulator},
 };
 
@@ -257,9 +257,9 @@ fn left(
     for (truth, rival) in [(truth_known, rival_known), (truth, rival)] {
         let gap: Vec<f64> = rival.values.iter().zip(&truth.values).map(|(a, b)| a - b).collect();
         for i in 0..n {
-            slope[i] += crate::frame::dot(&rival.slopes[i], &gap) / block;
+            slope[i] += dot(&rival.slopes[i], &gap) / block;
             for j in 0..=i {
-                let product = crate::frame::dot(&rival.slopes[i], &rival.slopes[j]) / block;
+                let product = dot(&rival.slopes[i], &rival.slopes[j]) / block;
                 normal[i * n + j] += product;
                 if i != j {
                     normal[j * n + i] += product;

@@ -1,51 +1,66 @@
 //! From scores to probabilities and the 95 % set.
+//!
+//! Scores S_i are log-likelihood ratios in nats of hypotheses that all are wrong in form. A softmax at the temperature t,
+//!
+//! ```text
+//! p_i = exp(S_i/t)/sum_j exp(S_j/t),     t = T + rho gap_left/gap_retuned
+//! ```
+//!
+//! is a tempered posterior (Grunwald and van Ommen 2017, doi 10.1214/17-BA1085): the more of the gap the best set leaves, the less its
+//! form is the rig's, and the less a difference of scores says. T and rho are calibrated on development cases.
 
-use crate::{diagnosis::Excess, select::Solution, simulator::Simulator, thresholds::Thresholds};
+use crate::{
+    diagnosis::Excess, hypothesis::Hypothesis, simulator::Simulator, thresholds::Thresholds,
+};
 
 /// Probability that the 95 % set holds.
 const COVERED: f64 = 0.95;
 
-/// Softmax within every slot of the best set (an effect and those that could stand in its place), at the temperature
-/// `temperature + rho left/retuned`: the more of the gap the best set leaves, the less its form is the rig's, and the less
-/// a difference of scores says. The best set comes first.
+/// A hypothesis with its probability.
+#[derive(Debug, Clone)]
+pub(crate) struct Weighed {
+    pub(crate) hypothesis: Hypothesis,
+    pub(crate) probability: f64,
+}
+
+/// Softmax over the best set and those in which a rival stands in the place of one of its effects; the most probable first.
 pub(crate) fn weigh(
     thresholds: &Thresholds,
-    best: &Solution,
+    best: &Hypothesis,
     gap: Excess,
-    rivals: &[(usize, Solution)],
-) -> Vec<(Solution, f64)> {
-    let mut odds: Vec<(Solution, f64)> = vec![(best.clone(), 1.0)];
+    rivals: &[(usize, Hypothesis)],
+) -> Vec<Weighed> {
     let share = gap.left / gap.retuned.max(thresholds.null_excess);
     let temperature = thresholds.temperature + thresholds.rho * share;
+    let mut all = vec![Weighed { hypothesis: best.clone(), probability: 1.0 }];
     for (slot, rival) in rivals {
-        let mut rival = rival.clone();
+        let mut hypothesis = rival.clone();
         // The rival stands where the effect stood.
-        if let Some(at) = best.effects.iter().position(|e| e == slot) {
-            let newcomer = rival.effects.iter().find(|e| !best.effects.contains(e)).copied();
-            let mut effects = best.effects.clone();
-            if let Some(newcomer) = newcomer {
-                effects[at] = newcomer;
-                rival.effects = effects;
-            }
+        let at = best.effects.iter().position(|e| e == slot);
+        let newcomer = rival.effects.iter().find(|e| !best.effects.contains(e));
+        if let (Some(at), Some(newcomer)) = (at, newcomer) {
+            hypothesis.effects.clone_from(&best.effects);
+            hypothesis.effects[at] = *newcomer;
         }
-        odds.push((rival.clone(), ((rival.score - best.score) / temperature).exp()));
+        let probability = ((rival.score - best.score) / temperature).exp();
+        all.push(Weighed { hypothesis, probability });
     }
-    let total: f64 = odds.iter().map(|o| o.1).sum();
-    odds.iter_mut().for_each(|o| o.1 /= total);
-    odds.sort_by(|a, b| b.1.total_cmp(&a.1));
-    odds
+    let total: f64 = all.iter().map(|w| w.probability).sum();
+    all.iter_mut().for_each(|w| w.probability /= total);
+    all.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    all
 }
 
 /// Effects of the smallest set of candidates that holds 95 % of the probability, the best candidate's first.
-pub(crate) fn covering_set(weighed: &[(Solution, f64)], simulator: &dyn Simulator) -> Vec<String> {
+pub(crate) fn covering_set(weighed: &[Weighed], simulator: &dyn Simulator) -> Vec<String> {
     let mut sum = 0.0;
     let mut names: Vec<String> = Vec::new();
-    for (solution, probability) in weighed {
+    for Weighed { hypothesis, probability } in weighed {
         if sum >= COVERED {
             break;
         }
         sum += probability;
-        for &e in &solution.effects {
+        for &e in &hypothesis.effects {
             let name = &simulator.effects()[e].name;
             if !names.contains(name) {
                 names.push(name.clone());

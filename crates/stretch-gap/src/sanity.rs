@@ -1,14 +1,17 @@
-//! Is it the right simulator at all?
+//! Is it the right simulator at all? What the judge is told of that.
+//!
+//! Two signs that data come from something else than the simulator is of:
+//!
+//! * *foreign*: more of a channel's variance is left on the test trials than a missing effect leaves
+//!   ([`Simulator::foreign_share`]): another rig, or a column that is not what its name says. The share is that of
+//!   1 - R^2, noise taken off: (sum (y - y_sim)^2 - N floor^2)/sum (y - mean y)^2;
+//! * *strained*: two parameters of a stage stand at the end of their tolerances and more than noise is left all the same. If the
+//!   same two, set loose, explain as much without any effect, what bends them is no effect but other parameters.
 
 use crate::{
-    altered::Altered,
-    diagnosis::{Diagnosis, VerdictKind},
-    error::GapError,
-    evidence::Evidence,
-    fit::{Bench, FINE},
-    frame::Role,
-    select::Solution,
-    simulator::{ParameterSpec, Simulator},
+    altered::Altered, error::GapError, evidence::Evidence, fit::FINE, frame::Role,
+    hypothesis::Hypothesis, problem::Problem, score::gap, simulator::Simulator,
+    spec::ParameterSpec,
 };
 
 /// Tolerances at which a parameter stands at its end: two of the five or so of a stage do so by chance in one rig of a few
@@ -21,107 +24,101 @@ const LOOSE: f64 = 5.0;
 /// Share of its nominal value that a parameter keeps then.
 const KEPT: f64 = 0.02;
 
-/// Takes names back where the data come from something else than the simulator is of.
-///
-/// Either more of a channel's variance is left on the test trials with the best effects in than the simulator says that
-/// may be ([`Simulator::foreign_share`]): another rig, or a column that is not what its name says. Or two parameters of a
-/// stage stand at the end of their tolerances, more than noise is left of it all the same, and set loose, these parameters
-/// explain as much as the effects do: what bends them is no effect but other parameters.
-pub(crate) fn check(
-    bench: &Bench<'_>,
-    best: &Solution,
-    evidence: &Evidence,
-    diagnosis: &mut Diagnosis,
-) -> Result<(), GapError> {
-    let sentence = match foreign(bench.simulator, evidence) {
-        Some(sentence) => Some(sentence),
-        None => strained(bench, best, evidence)?,
-    };
-    let Some(sentence) = sentence else { return Ok(()) };
-    diagnosis.notes.push(format!("before that was seen: {}", diagnosis.sentence));
-    diagnosis.verdict = VerdictKind::Unknown;
-    diagnosis.named.clear();
-    diagnosis.sentence = sentence;
-    Ok(())
+/// What was found out.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Sanity {
+    /// By stage: share of its channel's variance that the best effects leave.
+    pub(crate) left: Vec<f64>,
+    /// Share that may be left before names of effects mean nothing.
+    pub(crate) allowed: f64,
+    /// The stage whose parameters are strained most, if any.
+    pub(crate) strained: Option<Strained>,
 }
 
-/// The channel that the simulator has least to do with, if any.
-fn foreign(simulator: &dyn Simulator, evidence: &Evidence) -> Option<String> {
-    let mut worst: Option<(usize, f64)> = None;
-    for (stage, traces) in evidence.stages.iter().enumerate() {
-        let measured = simulator.measured(stage);
-        let (mut count, mut sum, mut squares, mut left) = (0.0, 0.0, 0.0, 0.0);
-        for segment in evidence.frame.of_role(Role::Test) {
-            for i in segment.from..segment.to {
-                count += 1.0;
-                sum += measured[i];
-                squares += measured[i] * measured[i];
-                left += (measured[i] - traces.after[i]).powi(2);
-            }
-        }
-        let variance = squares - sum * sum / f64::max(count, 1.0);
-        // What is noise is nobody's fault.
-        let noise = count * traces.floor * traces.floor;
-        let share = (left - noise) / variance.max(noise).max(f64::MIN_POSITIVE);
-        if share > simulator.foreign_share() && worst.is_none_or(|w| share > w.1) {
-            worst = Some((stage, share));
+/// A stage with two or more parameters at the end of their tolerances.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Strained {
+    pub(crate) stage: usize,
+    /// These parameters.
+    pub(crate) ended: Vec<usize>,
+    /// Excess that is left on the test trials.
+    pub(crate) left: f64,
+    /// Excess over the fitted trials with the best effects, and with these parameters set loose and no effect; none where
+    /// there is no effect to compare with.
+    pub(crate) rivals: Option<(f64, f64)>,
+}
+
+impl Sanity {
+    pub(crate) fn of(
+        problem: &Problem<'_>,
+        best: &Hypothesis,
+        evidence: &Evidence,
+    ) -> Result<Self, GapError> {
+        let simulator = problem.simulator();
+        let left = (0..evidence.stages.len()).map(|stage| left(simulator, evidence, stage));
+        Ok(Self {
+            left: left.collect(),
+            allowed: simulator.foreign_share(),
+            strained: strained(problem, best, evidence)?,
+        })
+    }
+}
+
+fn left(simulator: &dyn Simulator, evidence: &Evidence, stage: usize) -> f64 {
+    let (traces, measured) = (&evidence.stages[stage], simulator.measured(stage));
+    let (mut count, mut sum, mut squares, mut left) = (0.0, 0.0, 0.0, 0.0);
+    for segment in evidence.frame.of_role(Role::Test) {
+        for i in segment.from..segment.to {
+            count += 1.0;
+            sum += measured[i];
+            squares += measured[i] * measured[i];
+            left += (measured[i] - traces.after[i]).powi(2);
         }
     }
-    let (stage, share) = worst?;
-    let spec = &simulator.stages()[stage];
-    Some(format!(
-        "The gap is everything: {:.0} % of what {} does is not in the simulator of {}. Is it the right rig, and is every \
-         column what its name says?",
-        100.0 * share.min(1.0),
-        spec.channel,
-        spec.name
-    ))
+    let variance = squares - sum * sum / f64::max(count, 1.0);
+    // What is noise is nobody's fault.
+    let noise = count * traces.floor * traces.floor;
+    (left - noise) / variance.max(noise).max(f64::MIN_POSITIVE)
 }
 
-/// The stage whose parameters are strained most, if any.
 fn strained(
-    bench: &Bench<'_>,
-    best: &Solution,
+    problem: &Problem<'_>,
+    best: &Hypothesis,
     evidence: &Evidence,
-) -> Result<Option<String>, GapError> {
-    let simulator = bench.simulator;
-    let specs = simulator.parameters();
-    let at_end = |index: &&usize| {
-        let spec = &specs[**index];
-        spec.sd > 0.0 && (evidence.best.parameters[**index] - spec.nominal).abs() >= END * spec.sd
+) -> Result<Option<Strained>, GapError> {
+    let simulator = problem.simulator();
+    let at_end = |index: &usize| {
+        let spec = &simulator.parameters()[*index];
+        spec.sd > 0.0 && (evidence.best.parameters[*index] - spec.nominal).abs() >= END * spec.sd
     };
-    let left = |stage: usize| evidence.stages[stage].excess_after;
-    let stages = simulator.stages().iter().enumerate().filter(|(stage, _)| left(*stage) > LEFT);
-    let strained = stages.filter_map(|(stage, spec)| {
-        let ended: Vec<usize> = spec.parameters.iter().filter(at_end).copied().collect();
-        (ended.len() >= 2).then_some((stage, spec, ended))
-    });
-    let Some((stage, spec, ended)) = strained.max_by(|a, b| left(a.0).total_cmp(&left(b.0))) else {
-        return Ok(None);
+    let all = simulator.stages().iter().zip(&evidence.stages).enumerate();
+    let worst = all
+        .filter(|(_, (_, traces))| traces.excess_after > LEFT)
+        .map(|(stage, (spec, traces))| {
+            let ended: Vec<usize> = spec.parameters.iter().copied().filter(at_end).collect();
+            Strained { stage, ended, left: traces.excess_after, rivals: None }
+        })
+        .filter(|strained| strained.ended.len() >= 2)
+        .max_by(|a, b| a.left.total_cmp(&b.left));
+    let Some(worst) = worst else { return Ok(None) };
+    let rivals = match best.effects.is_empty() {
+        true => None,
+        false => {
+            let loose = loosened(problem, evidence, worst.stage, &worst.ended)?;
+            Some((problem.gap_in(best, worst.stage), loose))
+        }
     };
-    if !best.effects.is_empty()
-        && loosened(bench, evidence, stage, &ended)? > bench.excess(&best.misfits[stage])
-    {
-        return Ok(None);
-    }
-    let names: Vec<&str> = ended.iter().map(|&p| specs[p].name.as_str()).collect();
-    Ok(Some(format!(
-        "The parameters of {} do not fit within their tolerances: {} stand at the end of them, and a gap of {:.1} floors is left \
-         all the same. Is it the right rig? If its parameters are right, something is missing that is not in the catalogue.",
-        spec.name,
-        names.join(", "),
-        left(stage)
-    )))
+    Ok(Some(Strained { rivals, ..worst }))
 }
 
 /// Excess of a stage without effects, some of its parameters set loose.
 fn loosened(
-    bench: &Bench<'_>,
+    problem: &Problem<'_>,
     evidence: &Evidence,
     stage: usize,
     ended: &[usize],
 ) -> Result<f64, GapError> {
-    let loose = Altered::of(bench.simulator, |i, p| match ended.contains(&i) {
+    let loose = Altered::of(problem.simulator(), |i, p| match ended.contains(&i) {
         true => ParameterSpec {
             sd: LOOSE * p.sd,
             least: p.least.min(KEPT * p.nominal.abs()),
@@ -129,7 +126,7 @@ fn loosened(
         },
         false => p.clone(),
     });
-    let free = bench.beside(&loose, bench.metrics.clone());
+    let free = problem.compare.beside(&loose, problem.compare.metrics.clone());
     let fitted = free.fit(&[stage], evidence.retuned.clone(), &[], FINE)?;
-    Ok(fitted.misfits.iter().map(|m| free.excess(m)).sum())
+    Ok(fitted.misfits.iter().map(|m| gap(free.mean_square(m))).sum())
 }

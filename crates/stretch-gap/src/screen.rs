@@ -1,12 +1,31 @@
 //! Cheap look at every effect: the change that it would make, nominal sensitivities projected out.
+//!
+//! Let d be the change of the output, in floors, that an effect of finite severity makes, r the residual and A the sensitivities of the
+//! nominal parameters, whose prior precision is 1. What the parameters can do is marginalised as nuisances are:
+//!
+//! ```text
+//! <x, y> = x'V^-1 y - x'V^-1 A (A'V^-1 A + b I)^-1 A'V^-1 y
+//! ```
+//!
+//! An effect a times as strong changes the cost by (0.5 a^2 <d,d> - a <d,r>)/b, which is least at a = <d,r>/<d,d>. The reduction
+//! there is the *gain*, half the score statistic of Rao (1948, doi 10.1017/S0305004100023987) for the effect, b samples a block:
+//! one simulation a start instead of a fit. Strengths scale so; thresholds do not, and are judged as they are.
+//! A kink bends the change, so gains only say what is worth a fit.
+
+use rayon::prelude::*;
 
 use crate::{
+    compare::{Comparison, Sensitivities},
     error::GapError,
-    fit::{Bench, Sensitivities},
-    frame::{Column, Role},
     linear::Cholesky,
+    metric::Column,
     simulator::Model,
 };
+
+/// Times by which the first start's strength may be scaled.
+const SCALED: f64 = 8.0;
+/// A change smaller than this, in floors squared over all samples, is none.
+const NO_CHANGE: f64 = 1e-9;
 
 /// What a screen says of one effect.
 #[derive(Debug, Clone)]
@@ -35,15 +54,14 @@ pub(crate) struct Ground {
 
 impl Ground {
     /// Around a model.
-    pub(crate) fn around(bench: &Bench<'_>, model: Model) -> Result<Self, GapError> {
-        use rayon::prelude::*;
-        let stages = bench.simulator.stages().len();
+    pub(crate) fn around(compare: &Comparison<'_>, model: Model) -> Result<Self, GapError> {
+        let stages = compare.metrics.len();
         let parts: Result<Vec<_>, GapError> = (0..stages)
             .into_par_iter()
             .map(|s| {
-                let residual = bench.residual(s, &model)?;
-                let known = bench.nominal_sensitivities(s, &model, &residual)?;
-                let solved = bench.solved(s, &known, &residual);
+                let residual = compare.residual(s, &model)?;
+                let known = compare.nominal_sensitivities(s, &model, &residual)?;
+                let solved = compare.solved(s, &known, &residual);
                 Ok((residual, Some(known), solved))
             })
             .collect();
@@ -57,26 +75,25 @@ impl Ground {
     }
 }
 
-impl Bench<'_> {
+impl Comparison<'_> {
     /// Screens one effect on top of a model.
     pub(crate) fn screen(&self, ground: &Ground, effect: usize) -> Result<Screened, GapError> {
-        let spec = &self.simulator.effects()[effect];
+        let spec = &self.simulator().effects()[effect];
         let mut starts = Vec::new();
         for values in &spec.starts {
             let Some((own, with_residual)) = self.change(ground, effect, values)? else { continue };
-            let weight = 1.0 / self.frame.block as f64;
             // Strengths scale with the amplitude; thresholds do not scale at all.
             let scalable = spec.parameters[0].off == Some(0.0);
             let (value, range) = (values[0], &spec.parameters[0]);
             let alpha = with_residual / own;
             let (least, most) = if scalable && value != 0.0 {
                 let (a, b) = (range.min / value, range.max / value);
-                (a.min(b).max(-8.0), a.max(b).min(8.0))
+                (a.min(b).max(-SCALED), a.max(b).min(SCALED))
             } else {
                 (0.0, 1.5)
             };
             let alpha = alpha.clamp(least, most);
-            let gain = weight * (alpha * with_residual - 0.5 * alpha * alpha * own);
+            let gain = self.weight() * (alpha * with_residual - 0.5 * alpha * alpha * own);
             let mut start = values.clone();
             if scalable {
                 let size = if alpha.abs() < 0.02 { 0.02 * alpha.signum() } else { alpha };
@@ -88,8 +105,7 @@ impl Bench<'_> {
         Ok(Screened { effect, starts })
     }
 
-    /// Squares of the change that an effect makes, and its product with the residual, both without what the nominal
-    /// parameters can do; none where it makes none or cannot be simulated.
+    /// <d,d> and <d,r> of the change d that an effect makes; none where it makes none or cannot be simulated.
     pub(crate) fn change(
         &self,
         ground: &Ground,
@@ -99,7 +115,7 @@ impl Bench<'_> {
         let mut model = ground.model.clone();
         model.effects.push((effect, values.to_vec()));
         let (mut own, mut mixed) = (0.0, 0.0);
-        for &stage in &self.simulator.effects()[effect].touches {
+        for &stage in &self.simulator().effects()[effect].touches {
             let there = match self.residual_values(stage, &model) {
                 Ok(there) => there,
                 Err(GapError::Stopped) => return Err(GapError::Stopped),
@@ -112,17 +128,17 @@ impl Bench<'_> {
             own += squares;
             mixed += product;
         }
-        Ok((own > 1e-9).then_some((own, mixed)))
+        Ok((own > NO_CHANGE).then_some((own, mixed)))
     }
 
+    /// Factor L of A'V^-1 A + b I, and L^-1 A'V^-1 r.
     fn solved(
         &self,
         stage: usize,
         known: &Sensitivities,
         residual: &Column,
     ) -> (Cholesky, Vec<f64>) {
-        let metric = &self.metrics[stage];
-        let product = |a: &Column, b: &Column| metric.product(&self.frame, a, b, Role::Fit);
+        let product = |a: &Column, b: &Column| self.product(stage, a, b);
         let n = known.len();
         let mut normal = vec![0.0; n * n];
         for i in 0..n {
@@ -140,11 +156,10 @@ impl Bench<'_> {
         (factor, of_residual)
     }
 
-    /// Squares of a change, and its product with the residual, both without what the nominal parameters can do.
+    /// <d,d> and <d,r> of a change in one stage.
     fn projected(&self, stage: usize, ground: &Ground, change: &Column) -> (f64, f64) {
-        let metric = &self.metrics[stage];
         let residual = &ground.residuals[stage];
-        let product = |a: &Column, b: &Column| metric.product(&self.frame, a, b, Role::Fit);
+        let product = |a: &Column, b: &Column| self.product(stage, a, b);
         let mut own = product(change, change);
         let mut mixed = product(change, residual);
         let (factor, of_residual) = &ground.solved[stage];

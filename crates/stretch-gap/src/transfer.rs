@@ -11,7 +11,8 @@ use crate::{
     error::GapError,
     evidence::Evidence,
     frame::{Frame, Role},
-    simulator::{Model, Run, Simulator},
+    runs::Runs,
+    simulator::{Model, Run},
 };
 
 const SIGNAL: &str = "signal";
@@ -30,10 +31,11 @@ struct Records {
 /// In the simulator nothing is measured but the commands: the stages run one on the other, and its reference and its
 /// signal get the noise that the channels are known to have. A sensor that is the first stage sees the measured motion.
 pub(crate) fn transfer(
-    simulator: &dyn Simulator,
+    runs: &Runs<'_>,
     evidence: &Evidence,
     seed: u64,
 ) -> Result<Option<Transfer>, GapError> {
+    let simulator = runs.simulator();
     let Some(sensor) = simulator.sensor() else { return Ok(None) };
     let motion = simulator.motion().values;
     let real = Records { reference: motion.to_vec(), signal: simulator.measured(sensor).to_vec() };
@@ -41,7 +43,7 @@ pub(crate) fn transfer(
     let models = [(&evidence.retuned, &first.retuned), (&evidence.best, &first.after)];
     let simulated: Result<Vec<_>, GapError> = models
         .par_iter()
-        .map(|(model, first)| records(simulator, evidence, sensor, model, first, seed))
+        .map(|(model, first)| records(runs, evidence, sensor, model, first, seed))
         .collect();
     let [Some(retuned), Some(best)] = &simulated?[..] else { return Ok(None) };
     let frame = &evidence.frame;
@@ -67,23 +69,22 @@ pub(crate) fn transfer(
 /// The fitted trials as a model records them, whose first stage gave `first`; `None` where the stages cannot run one on the
 /// other.
 fn records(
-    simulator: &dyn Simulator,
+    runs: &Runs<'_>,
     evidence: &Evidence,
     sensor: usize,
     model: &Model,
     first: &[f64],
     seed: u64,
 ) -> Result<Option<Records>, GapError> {
+    let simulator = runs.simulator();
     let trials = evidence.frame.fit_trials;
     let samples = evidence.frame.samples(trials);
     let mut output = first[..samples].to_vec();
     let mut before = None;
     for stage in 1..=sensor {
-        let input = before.insert(std::mem::replace(&mut output, vec![0.0; samples]));
         let run = Run { stage, model, trials, shake: None, step: 1.0 };
-        if !simulator.simulate_on(run, input, &mut output)? {
-            return Ok(None);
-        }
+        let Some(next) = runs.run_on(run, &output)? else { return Ok(None) };
+        before = Some(std::mem::replace(&mut output, next));
     }
     let noisy = |mut values: Vec<f64>, stage: usize| {
         let sd = simulator.stages()[stage].noise.unwrap_or(evidence.stages[stage].floor);

@@ -7,7 +7,8 @@ mod source;
 
 use stretch_data::{SessionTrial, unit};
 use stretch_gap::{
-    Description, Dice, GapError, Model, Motion, ParameterSpec, Run, Simulator, StageSpec, TrialSpec,
+    Description, DescriptionSpec, Dice, GapError, Model, Motion, ParameterSpec, Run, Simulator,
+    StageSpec, TrialSpec,
 };
 use stretch_sim::{Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Start, Tolerance};
 
@@ -115,7 +116,13 @@ impl GaugeSimulator {
         let parameters = parameters(&nominal, signal, rig.is_some());
         let (trials, dt_s) = (record.trials.clone(), record.dt_s);
         Ok(Self {
-            about: Description { stages: vec![stage], parameters, effects, trials, dt_s },
+            about: Description::new(DescriptionSpec {
+                stages: vec![stage],
+                parameters,
+                effects,
+                trials,
+                dt_s,
+            })?,
             effects: nominal.effects,
             rows,
             inputs,

@@ -12,7 +12,7 @@ pub(crate) mod smooth;
 use std::path::Path;
 
 use stretch_data::DataSet;
-use stretch_gap::{Description, GapError, Motion, Run, Simulator, TrialSpec};
+use stretch_gap::{Description, DescriptionSpec, GapError, Motion, Run, Simulator, TrialSpec};
 use stretch_sim::{Effect, EffectSet, Key, Rig, RigParams, Stage};
 
 use catalogue::{Extent, Place, check_names, entries};
@@ -92,7 +92,13 @@ impl RigSimulator {
         let measured = stage_kinds.iter().map(|kind| measured(&session, *kind)).collect();
         let dt_s = session.dt_s();
         Ok(Self {
-            about: Description { stages, parameters, effects: missing, trials, dt_s },
+            about: Description::new(DescriptionSpec {
+                stages,
+                parameters,
+                effects: missing,
+                trials,
+                dt_s,
+            })?,
             base: *base,
             effects: effects.clone(),
             session,

@@ -272,13 +272,21 @@ fn noise(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_relative_eq;
+    use testkit::tolerance::{LOCAL_VALUE, MEDIAN_SPREAD};
 
     #[test]
     fn a_line_is_found_at_any_place() {
         let samples: Vec<f64> = (0..15).map(|i| 3.0 - 0.5 * f64::from(i)).collect();
         for at in [0, 7, 14] {
             let (value, slope) = line(&samples, at, 0.01);
-            assert!((value - samples[at]).abs() < 1e-12 && (slope + 50.0).abs() < 1e-9);
+            assert_relative_eq!(
+                value,
+                samples[at],
+                max_relative = LOCAL_VALUE,
+                epsilon = LOCAL_VALUE
+            );
+            assert_relative_eq!(slope, -50.0, max_relative = LOCAL_VALUE, epsilon = 0.0);
         }
     }
 
@@ -287,7 +295,6 @@ mod tests {
         let mut dice = crate::dice::Dice::new(3, 1);
         let values: Vec<f64> =
             (0..20_000).map(|i| 1e-3 * f64::from(i) + 0.2 * dice.gauss()).collect();
-        // The median of 20 000 is good to a percent.
-        assert!((noise(&values) / 0.2 - 1.0).abs() < 0.04);
+        assert_relative_eq!(noise(&values), 0.2, max_relative = MEDIAN_SPREAD, epsilon = 0.0);
     }
 }

@@ -1,11 +1,6 @@
 //! The stages run one on the other: who causes the gap of the last output.
 
-use crate::{
-    error::GapError,
-    evidence::Evidence,
-    frame::Role,
-    simulator::{Run, Simulator},
-};
+use crate::{error::GapError, evidence::Evidence, frame::Role, runs::Runs, simulator::Run};
 
 /// A variant of what one stage hands to the next.
 struct Variant {
@@ -16,10 +11,8 @@ struct Variant {
 }
 
 /// Share of every stage; empty where a stage cannot be run on another's output or there is nothing to share.
-pub(super) fn shapley(
-    simulator: &dyn Simulator,
-    evidence: &Evidence,
-) -> Result<Vec<f64>, GapError> {
+pub(super) fn shapley(runs: &Runs<'_>, evidence: &Evidence) -> Result<Vec<f64>, GapError> {
+    let simulator = runs.simulator();
     let stages = simulator.stages().len();
     let trials = simulator.trials().len();
     let model = &evidence.retuned;
@@ -40,13 +33,10 @@ pub(super) fn shapley(
             let run = Run { stage, model, trials, shake: None, step: 1.0 };
             let output = match &variant.output {
                 None => alone.clone(),
-                Some(input) => {
-                    let mut output = vec![0.0; alone.len()];
-                    if !simulator.simulate_on(run, input, &mut output)? {
-                        return Ok(Vec::new());
-                    }
-                    output
-                }
+                Some(input) => match runs.run_on(run, input)? {
+                    Some(output) => output,
+                    None => return Ok(Vec::new()),
+                },
             };
             let corrected = variant.output.as_ref().map(|_| {
                 base.iter().zip(output.iter().zip(alone)).map(|(b, (o, a))| b + o - a).collect()
@@ -99,6 +89,8 @@ fn shares(worth: &[f64], players: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_relative_eq;
+    use testkit::tolerance::F64_ROUNDING;
 
     #[test]
     fn shares_are_those_of_the_glove_game() {
@@ -107,7 +99,7 @@ mod tests {
         let worth: Vec<f64> = (0..8).map(pairs).collect();
         let shares = shares(&worth, 3);
         for (share, expected) in shares.iter().zip([1.0 / 6.0, 1.0 / 6.0, 4.0 / 6.0]) {
-            assert!((share - expected).abs() < 1e-12, "{shares:?}");
+            assert_relative_eq!(*share, expected, max_relative = F64_ROUNDING, epsilon = 0.0);
         }
     }
 }

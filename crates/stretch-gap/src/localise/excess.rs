@@ -1,8 +1,10 @@
 //! Excess of slices, with intervals by block bootstrap, and the false-discovery correction.
 
 use super::axes::Axis;
-use crate::{dice::Dice, frame::Frame};
+use crate::{dice::Dice, frame::Frame, score::excess};
 
+/// Share of false discoveries allowed among the slices that stand out.
+const FALSE_DISCOVERIES: f64 = 0.05;
 /// Draws of the bootstrap.
 const DRAWS: usize = 200;
 /// Blocks that a slice needs before it can stand out.
@@ -70,7 +72,7 @@ impl Cells {
             (0..blocks).for_each(|_| times[dice.below(blocks)] += 1);
             for (slice, sum) in self.sums(&times).iter().enumerate() {
                 if sum.1 > 0.0 {
-                    draws[slice].push(sum.0 / sum.1 - 1.0);
+                    draws[slice].push(excess(sum.0 / sum.1));
                 }
             }
         }
@@ -83,7 +85,7 @@ impl Cells {
             let at = |q: f64| drawn[((q * drawn.len() as f64) as usize).min(drawn.len() - 1)];
             Sliced {
                 share: if gaps > 0.0 { (sum.0 - sum.1).max(0.0) / gaps } else { 0.0 },
-                excess: sum.0 / sum.1 - 1.0,
+                excess: excess(sum.0 / sum.1),
                 interval: [at(0.025), at(0.975)],
                 p: self.p_value(slice, *sum, whole),
             }
@@ -131,10 +133,11 @@ impl Cells {
 pub(super) fn discoveries(p: &[f64]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|a, b| p[*a].total_cmp(&p[*b]));
-    let last =
-        order.iter().enumerate().rev().find(|(rank, i)| {
-            p[**i] <= super::FALSE_DISCOVERIES * (rank + 1) as f64 / p.len() as f64
-        });
+    let last = order
+        .iter()
+        .enumerate()
+        .rev()
+        .find(|(rank, i)| p[**i] <= FALSE_DISCOVERIES * (rank + 1) as f64 / p.len() as f64);
     let limit = last.map_or(f64::NEG_INFINITY, |(_, i)| p[*i]);
     p.iter().map(|p| *p <= limit).collect()
 }
@@ -142,6 +145,7 @@ pub(super) fn discoveries(p: &[f64]) -> Vec<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use testkit::tolerance::SLICE_EXCESS;
 
     #[test]
     fn benjamini_and_hochberg_as_in_their_paper() {
@@ -168,8 +172,7 @@ mod tests {
         let cells = Cells::new(2, cells);
         let sliced = cells.sliced(1, 0);
         assert!(sliced[1].share > 0.95 && sliced[1].p < 1e-6 && sliced[0].p > 0.99);
-        // Excess 8, its standard error 9 sqrt(2/2500).
-        assert!((sliced[1].excess - 8.0).abs() < 5.0 * 0.26, "{:?}", sliced[1]);
+        approx::assert_abs_diff_eq!(sliced[1].excess, 8.0, epsilon = SLICE_EXCESS);
         assert!(sliced[1].interval[0] < 8.3 && sliced[1].interval[1] > 7.7);
         assert!(sliced[0].interval[0] < 0.1 && sliced[0].interval[1] > -0.1);
         assert_eq!(cells.sliced(1, 0), sliced);

@@ -9,14 +9,12 @@ use crate::{
     diagnosis::{SliceGap, StageShare},
     error::GapError,
     evidence::Evidence,
+    runs::Runs,
     simulator::Simulator,
 };
 
 use axes::{Axis, Course};
 use excess::{Cells, Sliced};
-
-/// Share of false discoveries allowed among the slices that stand out.
-const FALSE_DISCOVERIES: f64 = 0.05;
 
 /// Cuts the residual of the re-tuned nominal, over all trials, along every axis.
 ///
@@ -73,10 +71,10 @@ pub(crate) fn slices(simulator: &dyn Simulator, evidence: &Evidence, seed: u64) 
 /// # Errors
 /// What the simulator says.
 pub(crate) fn end_to_end(
-    simulator: &dyn Simulator,
+    runs: &Runs<'_>,
     evidence: &Evidence,
 ) -> Result<Vec<StageShare>, GapError> {
-    let shares = chain::shapley(simulator, evidence)?;
-    let names = simulator.stages().iter().map(|s| s.name.clone());
+    let shares = chain::shapley(runs, evidence)?;
+    let names = runs.simulator().stages().iter().map(|s| s.name.clone());
     Ok(names.zip(shares).map(|(stage, share)| StageShare { stage, share }).collect())
 }

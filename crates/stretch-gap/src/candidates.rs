@@ -1,0 +1,112 @@
+//! Candidates, stages and parameters as the diagnosis lists them.
+
+use rayon::prelude::*;
+
+use crate::{
+    bootstrap::closed_interval,
+    diagnosis::{Candidate, EffectValue, ParameterShift, StageGap},
+    error::GapError,
+    evidence::{Evidence, StageEvidence, Traces},
+    hypothesis::Hypothesis,
+    probability::Weighed,
+    problem::Problem,
+    simulator::Simulator,
+};
+
+/// Every weighed hypothesis on the test trials.
+pub(crate) fn candidates(
+    problem: &Problem<'_>,
+    evidence: &Evidence,
+    weighed: &[Weighed],
+    seed: u64,
+) -> Result<Vec<Candidate>, GapError> {
+    weighed.par_iter().map(|one| candidate(problem, evidence, one, seed)).collect()
+}
+
+fn candidate(
+    problem: &Problem<'_>,
+    evidence: &Evidence,
+    Weighed { hypothesis, probability }: &Weighed,
+    seed: u64,
+) -> Result<Candidate, GapError> {
+    let stages = 0..evidence.stages.len();
+    let blocks = stages.map(|s| Ok(Traces::of(problem, s, &hypothesis.model)?.blocks));
+    let blocks: Result<Vec<Vec<f64>>, GapError> = blocks.collect();
+    let interval = closed_interval(&evidence.nominal_blocks, &blocks?, seed);
+    let parameters = effect_values(problem.simulator(), hypothesis);
+    let is_alone = hypothesis.effects.len() == 1;
+    let name = |p: &EffectValue| match is_alone {
+        true => p.name.clone(),
+        false => format!("{}.{}", p.effect, p.name),
+    };
+    let specs = problem.simulator().effects();
+    Ok(Candidate {
+        by_name: parameters.iter().map(|p| (name(p), p.value)).collect(),
+        effects: hypothesis.effects.iter().map(|&e| specs[e].name.clone()).collect(),
+        probability: *probability,
+        score: hypothesis.score,
+        gap_before: interval.before,
+        gap_after: interval.after,
+        closed: interval.closed,
+        closed_ci: interval.interval,
+        is_confirmed: interval.falls,
+        parameters,
+    })
+}
+
+fn effect_values(simulator: &dyn Simulator, hypothesis: &Hypothesis) -> Vec<EffectValue> {
+    let mut all = Vec::new();
+    for &e in &hypothesis.effects {
+        let spec = &simulator.effects()[e];
+        let values = hypothesis.model.effect(e).unwrap_or(&[]);
+        let sds = hypothesis.effect_sd.get(&e);
+        for (i, (p, value)) in spec.parameters.iter().zip(values).enumerate() {
+            all.push(EffectValue {
+                effect: spec.name.clone(),
+                name: p.name.clone(),
+                unit: p.unit.clone(),
+                value: *value,
+                sd: sds.and_then(|s| s.get(i)).copied().unwrap_or(0.0),
+            });
+        }
+    }
+    all
+}
+
+/// The gap of every stage on the test trials.
+pub(crate) fn stage_gaps(problem: &Problem<'_>, evidence: &Evidence) -> Vec<StageGap> {
+    let total: f64 = evidence.stages.iter().map(|s| s.excess_retuned.max(0.0)).sum();
+    let one = |(stage, s): (usize, &StageEvidence)| {
+        let spec = &problem.simulator().stages()[stage];
+        let floor = &problem.compare.metrics[stage].floor;
+        StageGap {
+            stage: spec.name.clone(),
+            channel: spec.channel.clone(),
+            share: if total > 0.0 { s.excess_retuned.max(0.0) / total } else { 0.0 },
+            raw: s.excess_raw,
+            excess: s.excess_retuned,
+            after: s.excess_after,
+            rms: (1.0 + s.excess_retuned).max(0.0).sqrt() * floor.rms,
+            floor: floor.rms,
+            floor_source: floor.source.clone(),
+            unit: spec.unit.clone(),
+        }
+    };
+    evidence.stages.iter().enumerate().map(one).collect()
+}
+
+/// How far every parameter with a tolerance moved.
+pub(crate) fn shifts(simulator: &dyn Simulator, evidence: &Evidence) -> Vec<ParameterShift> {
+    let (fitted, bent) = (&evidence.best.parameters, &evidence.retuned.parameters);
+    let all = simulator.parameters().iter().enumerate().filter(|(_, p)| p.sd > 0.0);
+    all.map(|(i, p)| ParameterShift {
+        name: p.name.clone(),
+        unit: p.unit.clone(),
+        nominal: p.nominal,
+        fitted: fitted[i],
+        sigmas: (fitted[i] - p.nominal) / p.sd,
+        bent: bent[i],
+        is_evidence: p.is_evidence,
+    })
+    .collect()
+}

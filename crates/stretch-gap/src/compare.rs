@@ -1,0 +1,191 @@
+//! A simulator beside its measurements, every stage on its measured input and in its own metric.
+
+use rayon::prelude::*;
+
+use crate::{
+    coordinate::{Coordinate, coordinates},
+    error::GapError,
+    floor::floors_of,
+    frame::{Frame, Role},
+    linear::dot,
+    metric::{Column, Metric},
+    runs::Runs,
+    score::{Misfit, samples_per_observation},
+    simulator::{Model, Run, Simulator},
+};
+
+/// Draws of the measured input's noise; the same for every model, so that differences of models are none of the draws'.
+const DRAWS: u64 = 4;
+
+/// What a fit needs to know.
+#[derive(Clone)]
+pub(crate) struct Comparison<'a> {
+    pub(crate) runs: Runs<'a>,
+    pub(crate) frame: Frame,
+    /// One per stage.
+    pub(crate) metrics: Vec<Metric>,
+}
+
+/// Sensitivities of the nominal parameters of one stage, by parameter.
+pub(crate) type Sensitivities = Vec<(usize, Column)>;
+
+impl<'a> Comparison<'a> {
+    /// Floors and metrics around a model.
+    pub(crate) fn around(
+        runs: Runs<'a>,
+        frame: Frame,
+        model: &Model,
+        seed: u64,
+    ) -> Result<Self, GapError> {
+        let floors = floors_of(&runs, &frame, model, seed)?;
+        let floors: Vec<_> = floors.into_iter().enumerate().collect();
+        let metrics: Result<Vec<Metric>, GapError> = floors
+            .into_par_iter()
+            .map(|(stage, floor)| Metric::of(&runs, &frame, stage, floor, model))
+            .collect();
+        Ok(Self { metrics: metrics?, runs, frame })
+    }
+
+    /// The same session beside another simulator, in metrics of its own.
+    pub(crate) fn beside<'b>(
+        &self,
+        simulator: &'b dyn Simulator,
+        metrics: Vec<Metric>,
+    ) -> Comparison<'b>
+    where
+        'a: 'b,
+    {
+        Comparison { runs: self.runs.beside(simulator), frame: self.frame.clone(), metrics }
+    }
+
+    pub(crate) fn simulator(&self) -> &'a dyn Simulator {
+        self.runs.simulator()
+    }
+
+    /// An observation for each block: what the cost of a fit counts, whatever the residual's own memory is.
+    pub(crate) fn weight(&self) -> f64 {
+        1.0 / self.frame.block as f64
+    }
+
+    /// Measured minus simulated, in floors, over the trials that fits run.
+    pub(crate) fn residual_values(
+        &self,
+        stage: usize,
+        model: &Model,
+    ) -> Result<Vec<f64>, GapError> {
+        let mut values = self.runs.output(stage, model, self.frame.fit_trials)?;
+        let measured = self.simulator().measured(stage);
+        for ((x, m), sd) in values.iter_mut().zip(measured).zip(&self.metrics[stage].floor.sd) {
+            *x = (m - *x) / sd;
+        }
+        Ok(values)
+    }
+
+    /// The same, ready for products.
+    pub(crate) fn residual(&self, stage: usize, model: &Model) -> Result<Column, GapError> {
+        let values = self.residual_values(stage, model)?;
+        Ok(self.metrics[stage].column(&self.frame, values))
+    }
+
+    /// x'V^-1 y of a stage over the fitted samples.
+    pub(crate) fn product(&self, stage: usize, x: &Column, y: &Column) -> f64 {
+        self.metrics[stage].product(&self.frame, x, y, Role::Fit)
+    }
+
+    /// Reduced chi-squares of a residual, at the noise that its own model transmits.
+    pub(crate) fn misfit(&self, stage: usize, residual: &Column) -> Misfit {
+        let mean = |role| {
+            let n = self.frame.count(role) as f64;
+            let sum = self.metrics[stage].product(&self.frame, residual, residual, role);
+            if n > 0.0 { sum / n } else { 1.0 }
+        };
+        Misfit { stage, fit: mean(Role::Fit), held: mean(Role::Held) }
+    }
+
+    /// Reduced chi-square over fitted and held-out samples together.
+    pub(crate) fn mean_square(&self, misfit: &Misfit) -> f64 {
+        let (fit, held) = (self.frame.blocks(Role::Fit), self.frame.blocks(Role::Held));
+        (fit * misfit.fit + held * misfit.held) / (fit + held)
+    }
+
+    /// Samples of a stage that count as one observation of its misfit at a model.
+    pub(crate) fn samples_per_observation(
+        &self,
+        stage: usize,
+        model: &Model,
+    ) -> Result<f64, GapError> {
+        let mut values = self.residual_values(stage, model)?;
+        self.metrics[stage].clean(&self.frame, &mut values);
+        let parts = self.frame.of_role(Role::Fit).map(|s| &values[s.from..s.to]);
+        Ok(samples_per_observation(&parts.collect::<Vec<_>>(), self.frame.block))
+    }
+
+    /// Noise transmitted: what of the measured input's noise arrives at the output of a stage, in floors squared.
+    pub(crate) fn transmitted(&self, stage: usize, model: &Model) -> Result<Misfit, GapError> {
+        let run = Run { stage, model, trials: self.frame.fit_trials, shake: None, step: 1.0 };
+        let plain = self.runs.run(run)?;
+        let mut mean = Misfit { stage, ..Misfit::default() };
+        for draw in 0..DRAWS {
+            let mut shaken = self.runs.run(Run { shake: Some(draw), ..run })?;
+            let sds = &self.metrics[stage].floor.sd;
+            for ((x, y), sd) in shaken.iter_mut().zip(&plain).zip(sds) {
+                *x = (*x - y) / sd;
+            }
+            let power = |role| {
+                let parts = self.frame.of_role(role).map(|s| &shaken[s.from..s.to]);
+                let sum: f64 = parts.map(|part| dot(part, part)).sum();
+                sum / (self.frame.count(role) as f64).max(1.0)
+            };
+            mean.fit += power(Role::Fit) / DRAWS as f64;
+            mean.held += power(Role::Held) / DRAWS as f64;
+            if mean.fit == 0.0 {
+                break;
+            }
+        }
+        Ok(mean)
+    }
+
+    /// Sensitivity -dr/dx of the stages to one coordinate, by a one-sided difference; none where it does not act.
+    pub(crate) fn sensitivity(
+        &self,
+        stages: &[usize],
+        (coordinate, bounds): (Coordinate, [f64; 2]),
+        model: &Model,
+        residuals: &[Column],
+    ) -> Result<Vec<Option<Column>>, GapError> {
+        let x = coordinate.read(model);
+        let step = coordinate.probe(x);
+        let step = if x + step > bounds[1] { -step } else { step };
+        let mut moved = model.clone();
+        coordinate.write(&mut moved, x + step);
+        let one = |(&stage, residual): (&usize, &Column)| {
+            if !coordinate.acts_in(self.simulator(), stage, model) {
+                return Ok(None);
+            }
+            let there = self.residual_values(stage, &moved)?;
+            let values = residual.values.iter().zip(there).map(|(a, b)| (a - b) / step).collect();
+            Ok(Some(self.metrics[stage].column(&self.frame, values)))
+        };
+        stages.iter().zip(residuals).map(one).collect()
+    }
+
+    /// Sensitivities of a stage to its nominal parameters at a model, one standard deviation each.
+    pub(crate) fn nominal_sensitivities(
+        &self,
+        stage: usize,
+        model: &Model,
+        residual: &Column,
+    ) -> Result<Sensitivities, GapError> {
+        let bare = Model { parameters: model.parameters.clone(), effects: Vec::new() };
+        let residuals = std::slice::from_ref(residual);
+        let columns: Result<Vec<_>, GapError> = coordinates(self.simulator(), &[stage], &bare)
+            .into_par_iter()
+            .map(|coordinate| {
+                let Coordinate::Nominal { index, .. } = coordinate.0 else { return Ok(None) };
+                let column = self.sensitivity(&[stage], coordinate, model, residuals)?;
+                Ok(column.into_iter().next().flatten().map(|column| (index, column)))
+            })
+            .collect();
+        Ok(columns?.into_iter().flatten().collect())
+    }
+}

@@ -1,0 +1,197 @@
+//! Nuisances of one stretch of samples: slow wander and trial offsets of parameters, marginalised out of a residual.
+//!
+//! With columns C of what the nuisances could change (in floors, per unit of each), amplitudes b with prior precision P and
+//! white noise of one floor, a residual r has the covariance V = I + C P^-1 C'. By the matrix inversion lemma
+//!
+//! ```text
+//! x' V^-1 y = x'y - (L^-1 C'x)' (L^-1 C'y),     L L' = C'C + P
+//! ```
+//!
+//! (Rasmussen and Williams 2006, appendix A.3), so that a product of two columns costs a projection and a triangular solve each,
+//! and never a matrix as large as the record. The most likely amplitudes, with which a residual is drawn, are
+//! b = (C'C + P)^-1 C'r.
+
+use crate::{linear::Cholesky, spec::Wander};
+
+/// Nuisances of one segment of one stage.
+#[derive(Debug, Clone)]
+pub(super) struct Nuisance {
+    /// Columns of constant offsets, one a parameter; their amplitudes have prior precision 1.
+    offsets: Vec<Vec<f64>>,
+    /// Columns of parameters that wander.
+    wandering: Vec<Wandering>,
+    /// L of the module's head.
+    factor: Cholesky,
+}
+
+/// Sensitivity to a wandering parameter, and the knots that each sample lies between.
+///
+/// The wander is linear between knots: sample i at the share w between knots k and k + 1 moves by
+/// s_i ((1 - w) b_k + w b_(k+1)). The clock of a sample is the time at which the wander last had a way into the output.
+#[derive(Debug, Clone)]
+pub(super) struct Wandering {
+    sensitivity: Vec<f64>,
+    /// Knot before, and share of the way to the next.
+    place: Vec<(u32, f64)>,
+    knots: usize,
+    /// Correlation of neighbouring knots, exp(-distance/correlation time).
+    kept: f64,
+}
+
+impl Wandering {
+    /// `clock` counts samples of `dt_s`.
+    pub(super) fn new(sensitivity: Vec<f64>, clock: &[u32], wander: Wander, dt_s: f64) -> Self {
+        let knot = ((wander.knot_s / dt_s) as usize).max(1);
+        let first = clock.first().copied().unwrap_or(0);
+        let place: Vec<(u32, f64)> = clock
+            .iter()
+            .map(|c| {
+                let at = c.saturating_sub(first) as usize;
+                ((at / knot) as u32, (at % knot) as f64 / knot as f64)
+            })
+            .collect();
+        let knots = place.iter().map(|p| p.0 as usize).max().unwrap_or(0) + 2;
+        let step_s = knot as f64 * dt_s;
+        Self { sensitivity, place, knots, kept: (-step_s / wander.correlation_s).exp() }
+    }
+
+    /// Sample, knot, weights of that knot and the next.
+    fn each(&self) -> impl Iterator<Item = (usize, usize, f64, f64)> {
+        let pairs = self.sensitivity.iter().zip(&self.place).enumerate();
+        pairs.map(|(i, (s, (k, share)))| (i, *k as usize, (1.0 - share) * s, share * s))
+    }
+}
+
+impl Nuisance {
+    pub(super) fn new(offsets: Vec<Vec<f64>>, wandering: Vec<Wandering>) -> Self {
+        let size = offsets.len() + wandering.iter().map(|w| w.knots).sum::<usize>();
+        let factor = Cholesky::of(&precision(&offsets, &wandering, size), size);
+        Self { offsets, wandering, factor }
+    }
+
+    /// L^-1 C'x: what a product of columns loses to the nuisances.
+    pub(super) fn tail(&self, x: &[f64]) -> Vec<f64> {
+        let mut tail = project(&self.offsets, &self.wandering, x);
+        self.factor.forward(&mut tail);
+        tail
+    }
+
+    /// Takes the most likely nuisance out of a residual.
+    pub(super) fn clean(&self, x: &mut [f64]) {
+        let mut b = project(&self.offsets, &self.wandering, x);
+        self.factor.solve(&mut b);
+        for (offset, b) in self.offsets.iter().zip(&b) {
+            x.iter_mut().zip(offset).for_each(|(x, d)| *x -= b * d);
+        }
+        let mut base = self.offsets.len();
+        for wandering in &self.wandering {
+            for (i, k, this, next) in wandering.each() {
+                x[i] -= this * b[base + k] + next * b[base + k + 1];
+            }
+            base += wandering.knots;
+        }
+    }
+}
+
+/// C'x.
+fn project(offsets: &[Vec<f64>], wandering: &[Wandering], x: &[f64]) -> Vec<f64> {
+    let mut out: Vec<f64> =
+        offsets.iter().map(|d| d.iter().zip(x).map(|(a, b)| a * b).sum()).collect();
+    for wandering in wandering {
+        let base = out.len();
+        out.resize(base + wandering.knots, 0.0);
+        for (i, k, this, next) in wandering.each() {
+            out[base + k] += this * x[i];
+            out[base + k + 1] += next * x[i];
+        }
+    }
+    out
+}
+
+/// Posterior precision C'C + P.
+fn precision(offsets: &[Vec<f64>], wandering: &[Wandering], n: usize) -> Vec<f64> {
+    let mut a = vec![0.0; n * n];
+    for (i, column) in offsets.iter().enumerate() {
+        for (j, p) in project(offsets, wandering, column).iter().enumerate() {
+            a[i * n + j] = *p;
+            a[j * n + i] = *p;
+        }
+    }
+    for i in 0..offsets.len() {
+        a[i * n + i] += 1.0;
+    }
+    let mut base = offsets.len();
+    for wandering in wandering {
+        // A sample lies between two knots: C'C is tridiagonal there. Two wanders of one stage are taken as orthogonal.
+        for (_, k, x, y) in wandering.each() {
+            let k = base + k;
+            a[k * n + k] += x * x;
+            a[k * n + k + 1] += x * y;
+            a[(k + 1) * n + k] += x * y;
+            a[(k + 1) * n + k + 1] += y * y;
+        }
+        // Inverse covariance of an Ornstein-Uhlenbeck process at even knots, of correlation rho between neighbours:
+        // (1, 1 + rho^2, ..., 1)/(1 - rho^2) on the diagonal, -rho/(1 - rho^2) beside it.
+        let (knots, kept) = (wandering.knots, wandering.kept);
+        let scale = 1.0 / (1.0 - kept * kept);
+        for k in 0..knots {
+            let inner = k > 0 && k + 1 < knots;
+            let at = base + k;
+            a[at * n + at] += scale * if inner { 1.0 + kept * kept } else { 1.0 };
+            if k + 1 < knots {
+                a[at * n + at + 1] -= scale * kept;
+                a[(at + 1) * n + at] -= scale * kept;
+            }
+        }
+        base += knots;
+    }
+    a
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{dice::Dice, linear::dot};
+    use testkit::tolerance::FIT_WELL;
+
+    const SAMPLES: usize = 60;
+
+    fn nuisance() -> Nuisance {
+        let clock: Vec<u32> = (0..SAMPLES as u32).collect();
+        let slope: Vec<f64> = (0..SAMPLES).map(|i| 0.1 * i as f64).collect();
+        let wander = Wander { sd: 1.0, correlation_s: 0.3, knot_s: 0.1 };
+        Nuisance::new(vec![vec![0.5; SAMPLES]], vec![Wandering::new(slope, &clock, wander, 0.01)])
+    }
+
+    /// x'V^-1 y = x'(y - C b) with the most likely b: two ways to the same product.
+    #[test]
+    fn the_product_is_that_with_a_cleaned_column() {
+        let mut dice = Dice::new(2, 0);
+        let [x, y] = [0, 1].map(|_| (0..SAMPLES).map(|_| dice.gauss()).collect::<Vec<f64>>());
+        let nuisance = nuisance();
+        let product = dot(&x, &y) - dot(&nuisance.tail(&x), &nuisance.tail(&y));
+        let mut cleaned = y.clone();
+        nuisance.clean(&mut cleaned);
+        approx::assert_relative_eq!(
+            product,
+            dot(&x, &cleaned),
+            max_relative = FIT_WELL,
+            epsilon = FIT_WELL
+        );
+    }
+
+    /// An offset alone against the closed form: V = I + cc', so 1'V^-1 1 = n - (n/2)^2/(1 + n/4) at c = 1/2.
+    #[test]
+    fn an_offset_is_taken_out_as_far_as_its_prior_says() {
+        let nuisance = Nuisance::new(vec![vec![0.5; SAMPLES]], Vec::new());
+        let (ones, n) = (vec![1.0; SAMPLES], SAMPLES as f64);
+        let tail = nuisance.tail(&ones);
+        let expected = n - (0.5 * n).powi(2) / (1.0 + 0.25 * n);
+        approx::assert_relative_eq!(
+            n - dot(&tail, &tail),
+            expected,
+            max_relative = FIT_WELL,
+            epsilon = 0.0
+        );
+    }
+}

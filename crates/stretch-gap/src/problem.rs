@@ -1,0 +1,171 @@
+//! The problem, prepared: a simulator beside its measurements, re-tuned, with everything that hypotheses are scored by.
+//!
+//! Preparation runs once, in an order in which each part needs the ones before:
+//!
+//! 1. the frame; floors and metrics around the parameters as shipped;
+//! 2. a first re-tuning: maximum a posteriori within the tolerances;
+//! 3. floors and metrics around what it found, for sensitivities have moved, and a second re-tuning in them;
+//! 4. the effective sample size of every stage and the noise transmitted, both at the re-tuned nominal, so that they are the same
+//!    for every hypothesis.
+//!
+//! What exists is complete: nothing of a [`Problem`] is set later.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use crate::{
+    compare::{Comparison, Sensitivities},
+    coordinate::{choice_cost, form_cost, free_parameters},
+    error::GapError,
+    fit::{Effort, FINE, Fitted},
+    frame::{Frame, Role},
+    hypothesis::Hypothesis,
+    runs::Runs,
+    score::{Misfit, Observations, gap, score},
+    simulator::{Model, Run, Simulator},
+};
+
+/// Root mean square change in floors that a halved step of integration may make: a tenth, a hundredth of the floor's square.
+const SOLVED: f64 = 0.1;
+
+/// Everything that a search needs.
+pub(crate) struct Problem<'a> {
+    pub(crate) compare: Comparison<'a>,
+    /// Parameters as shipped.
+    pub(crate) shipped: Model,
+    /// Re-tuned, without effects.
+    pub(crate) nominal: Hypothesis,
+    /// By stage: samples that count as one observation.
+    memory: Vec<f64>,
+    /// By stage: how much its samples count.
+    observations: Vec<Observations>,
+    /// By stage: noise that the re-tuned nominal transmits.
+    transmitted: Vec<Misfit>,
+}
+
+impl<'a> Problem<'a> {
+    /// Frame, floors, metrics, re-tuning, sample sizes and noise transmitted.
+    ///
+    /// # Errors
+    /// [`GapError::Solver`] when the step of integration shows, [`GapError::TooLittle`] without anything to fit,
+    /// [`GapError::Measured`] where measurements are missing, and what the simulator says.
+    pub(crate) fn prepare(
+        simulator: &'a dyn Simulator,
+        stop: &'a (dyn Fn() -> bool + Sync),
+        seed: u64,
+        progress: &dyn Fn(&str),
+    ) -> Result<Self, GapError> {
+        let runs = Runs::new(simulator, stop)?;
+        let frame = Frame::of(simulator)?;
+        let shipped = Model::nominal(simulator);
+        progress("floors");
+        let rough = Comparison::around(runs.clone(), frame.clone(), &shipped, seed)?;
+        progress("re-tuning the nominal parameters");
+        let first = retuned(&rough, &shipped)?;
+        let compare = Comparison::around(runs, frame, &first.model, seed)?;
+        let nominal = retuned(&compare, &first.model)?;
+        let stages = compare.metrics.len();
+        let memory: Result<Vec<f64>, GapError> = (0..stages)
+            .into_par_iter()
+            .map(|s| compare.samples_per_observation(s, &nominal.model))
+            .collect();
+        let memory = memory?;
+        let count = |role, memory: f64| compare.frame.count(role) as f64 / memory;
+        let observations = memory
+            .iter()
+            .map(|&m| Observations { fit: count(Role::Fit, m), held: count(Role::Held, m) })
+            .collect();
+        let transmitted: Result<_, GapError> =
+            (0..stages).into_par_iter().map(|s| compare.transmitted(s, &nominal.model)).collect();
+        solver_check(&compare, &nominal.model)?;
+        let transmitted = transmitted?;
+        Ok(Self { compare, shipped, nominal, memory, observations, transmitted })
+    }
+
+    pub(crate) fn simulator(&self) -> &'a dyn Simulator {
+        self.compare.simulator()
+    }
+
+    /// [`Comparison::fit`], misfits at equal noise transmitted.
+    pub(crate) fn fit(
+        &self,
+        stages: &[usize],
+        start: Model,
+        known: &[Option<Sensitivities>],
+        effort: Effort,
+    ) -> Result<Fitted, GapError> {
+        let mut fitted = self.compare.fit(stages, start, known, effort)?;
+        let effects = self.simulator().effects();
+        for misfit in &mut fitted.misfits {
+            let stage = misfit.stage;
+            let acts = |(e, _): &(usize, Vec<f64>)| effects[*e].touches.contains(&stage);
+            let nominal = &self.transmitted[stage];
+            if nominal.fit > 0.0 && fitted.model.effects.iter().any(acts) {
+                let own = self.compare.transmitted(stage, &fitted.model)?;
+                *misfit = misfit.at_equal_noise(nominal, &own);
+            }
+        }
+        Ok(fitted)
+    }
+
+    /// Score of a hypothesis's misfits and model against the re-tuned nominal, nats.
+    pub(crate) fn score(&self, misfits: &[Misfit], model: &Model) -> f64 {
+        let simulator = self.simulator();
+        let free = free_parameters(simulator, model);
+        let blocks = self.compare.frame.blocks(Role::Fit);
+        score(&self.nominal.misfits, misfits, &self.observations, free, blocks)
+            - form_cost(simulator, model)
+            - choice_cost(simulator, model)
+    }
+
+    /// Excess of one stage over fitted and held-out samples together.
+    pub(crate) fn gap_in(&self, hypothesis: &Hypothesis, stage: usize) -> f64 {
+        gap(self.compare.mean_square(&hypothesis.misfits[stage]))
+    }
+
+    /// The same summed over stages.
+    pub(crate) fn gap(&self, hypothesis: &Hypothesis) -> f64 {
+        (0..hypothesis.misfits.len()).map(|stage| self.gap_in(hypothesis, stage)).sum()
+    }
+
+    /// Least samples per observation of all stages, as a share of a block.
+    pub(crate) fn finest(&self) -> f64 {
+        let memory = self.memory.iter().copied().fold(f64::INFINITY, f64::min);
+        (memory / self.compare.frame.block as f64).min(1.0)
+    }
+}
+
+/// Every stage re-tuned on its own: without effects no stage knows of another.
+fn retuned(compare: &Comparison<'_>, start: &Model) -> Result<Hypothesis, GapError> {
+    let fits: Result<Vec<_>, GapError> = (0..compare.metrics.len())
+        .into_par_iter()
+        .map(|s| compare.fit(&[s], start.clone(), &[], FINE))
+        .collect();
+    let mut model = start.clone();
+    let mut misfits = Vec::new();
+    for (stage, fitted) in fits?.into_iter().enumerate() {
+        for &p in &compare.simulator().stages()[stage].parameters {
+            model.parameters[p] = fitted.model.parameters[p];
+        }
+        misfits.extend(fitted.misfits);
+    }
+    let (effects, effect_sd) = (Vec::new(), BTreeMap::new());
+    Ok(Hypothesis { effects, model, misfits, effect_sd, score: 0.0 })
+}
+
+/// Refuses a simulator whose step of integration shows: its error would be named as an effect.
+fn solver_check(compare: &Comparison<'_>, model: &Model) -> Result<(), GapError> {
+    for (stage, metric) in compare.metrics.iter().enumerate() {
+        let run = Run { stage, model, trials: compare.frame.fit_trials, shake: None, step: 1.0 };
+        let plain = compare.runs.run(run)?;
+        let fine = compare.runs.run(Run { step: 0.5, ..run })?;
+        let square: f64 = plain.iter().zip(&fine).map(|(a, b)| (a - b) * (a - b)).sum();
+        let moved = (square / plain.len().max(1) as f64).sqrt() / metric.floor.rms;
+        if moved > SOLVED {
+            let stage = compare.simulator().stages()[stage].name.clone();
+            return Err(GapError::Solver { stage, moved });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,107 @@
+//! The one door to the simulator: every run is counted, may be stopped before it begins, and ends in finite numbers.
+
+use std::sync::{
+    Arc,
+    atomic::{AtomicUsize, Ordering},
+};
+
+use crate::{
+    error::GapError,
+    simulator::{Model, Run, Simulator},
+};
+
+/// A simulator, how often it was run, and whether to go on. Clones share the count.
+#[derive(Clone)]
+pub(crate) struct Runs<'a> {
+    simulator: &'a dyn Simulator,
+    stop: &'a (dyn Fn() -> bool + Sync),
+    count: Arc<AtomicUsize>,
+}
+
+impl<'a> Runs<'a> {
+    /// Of a simulator whose measured channels are complete.
+    ///
+    /// # Errors
+    /// [`GapError::Measured`] where a channel is shorter than the trials or not finite: everything after indexes it.
+    pub(crate) fn new(
+        simulator: &'a dyn Simulator,
+        stop: &'a (dyn Fn() -> bool + Sync),
+    ) -> Result<Self, GapError> {
+        let runs = Self { simulator, stop, count: Arc::default() };
+        let needed = runs.samples(simulator.trials().len());
+        for (stage, spec) in simulator.stages().iter().enumerate() {
+            let finite = simulator.measured(stage).iter().take_while(|x| x.is_finite());
+            let found = finite.take(needed).count();
+            if found < needed {
+                return Err(GapError::Measured { stage: spec.name.clone(), found, needed });
+            }
+        }
+        Ok(runs)
+    }
+
+    /// Another simulator of the same session; its runs count here, too.
+    pub(crate) fn beside<'b>(&self, simulator: &'b dyn Simulator) -> Runs<'b>
+    where
+        'a: 'b,
+    {
+        Runs { simulator, stop: self.stop, count: Arc::clone(&self.count) }
+    }
+
+    pub(crate) fn simulator(&self) -> &'a dyn Simulator {
+        self.simulator
+    }
+
+    /// Simulations since the count began.
+    pub(crate) fn count(&self) -> usize {
+        self.count.load(Ordering::Relaxed)
+    }
+
+    /// Samples of the first `trials` trials.
+    pub(crate) fn samples(&self, trials: usize) -> usize {
+        self.simulator.trials()[..trials].iter().map(|t| t.samples).sum()
+    }
+
+    /// Output of a stage on its measured input over the first `trials` trials.
+    pub(crate) fn output(
+        &self,
+        stage: usize,
+        model: &Model,
+        trials: usize,
+    ) -> Result<Vec<f64>, GapError> {
+        self.run(Run { stage, model, trials, shake: None, step: 1.0 })
+    }
+
+    /// One run of one stage on its measured input.
+    pub(crate) fn run(&self, run: Run<'_>) -> Result<Vec<f64>, GapError> {
+        let mut out = self.begin(run)?;
+        self.simulator.simulate(run, &mut out)?;
+        self.finite(run.stage, out)
+    }
+
+    /// One run on an input that was not measured; none where the stage cannot.
+    pub(crate) fn run_on(&self, run: Run<'_>, input: &[f64]) -> Result<Option<Vec<f64>>, GapError> {
+        let mut out = self.begin(run)?;
+        match self.simulator.simulate_on(run, input, &mut out)? {
+            true => self.finite(run.stage, out).map(Some),
+            false => Ok(None),
+        }
+    }
+
+    fn begin(&self, run: Run<'_>) -> Result<Vec<f64>, GapError> {
+        if (self.stop)() {
+            return Err(GapError::Stopped);
+        }
+        // Only the sum is read, and only after the work is done: no order is needed.
+        self.count.fetch_add(1, Ordering::Relaxed);
+        Ok(vec![0.0; self.samples(run.trials)])
+    }
+
+    fn finite(&self, stage: usize, out: Vec<f64>) -> Result<Vec<f64>, GapError> {
+        match out.iter().all(|x| x.is_finite()) {
+            true => Ok(out),
+            false => {
+                Err(GapError::NotFinite { stage: self.simulator.stages()[stage].name.clone() })
+            }
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! The search: forward selection, backward pruning, and rivals in every slot.
+//!
+//! Greedy selection is dangerously sure of a strong effect that stands in for several small ones, so the search looks back three
+//! times: sets are pruned with the rest fitted anew from the larger set, every effect of the best set is held against rivals
+//! fitted in its place, and a rival that stands better takes it, from which the search goes on.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use crate::{
+    error::GapError,
+    hypothesis::Hypothesis,
+    problem::Problem,
+    screen::{Ground, Screened},
+    sets::Sets,
+    thresholds::Thresholds,
+    worth::Worth,
+};
+
+/// Candidates kept by a screen.
+const KEPT: usize = 8;
+/// Candidates kept in later rounds.
+const KEPT_LATER: usize = 5;
+/// Leaders whose twins are kept with them.
+const LEADERS: usize = 4;
+/// Rivals looked at for an effect that stands alone, and for one among others.
+const RIVALS: (usize, usize) = (6, 3);
+/// Share of the least rise that a screen must promise: where the change bends it promises too little.
+const PROMISE: f64 = 0.1;
+/// Share of the best gain below which an effect is not fitted.
+const FAINT: f64 = 0.03;
+/// Share of an effect's own gain that a rival in its place must promise; twins are held against it whatever they promise.
+const RIVALRY: f64 = 0.5;
+/// How often an effect of the best set gives its place to another.
+const EXCHANGES: usize = 2;
+
+/// The search over sets of effects.
+pub(crate) struct Search<'a> {
+    problem: &'a Problem<'a>,
+    worth: Worth<'a>,
+    pub(crate) sets: Sets<'a>,
+    /// Most effects at once.
+    depth: usize,
+}
+
+/// What the search found.
+pub(crate) struct Found {
+    /// The best set.
+    pub(crate) best: Hypothesis,
+    /// Sets with one of its effects, which is named, replaced.
+    pub(crate) rivals: Vec<(usize, Hypothesis)>,
+}
+
+impl<'a> Search<'a> {
+    pub(crate) fn new(problem: &'a Problem<'a>, thresholds: &'a Thresholds, depth: usize) -> Self {
+        Self { problem, worth: Worth { problem, thresholds }, sets: Sets::new(problem), depth }
+    }
+
+    /// The best set, and its rivals: effects are added as long as they are worth it, and one that stands better in the
+    /// place of another takes it, for the strongest comes first and may have stood in for several.
+    pub(crate) fn run(&mut self, progress: &dyn Fn(&str)) -> Result<Found, GapError> {
+        let mut best = self.grow(self.problem.nominal.clone(), progress)?;
+        let mut exchanges = 0;
+        loop {
+            progress("rivals");
+            let rivals = self.rivals(&best)?;
+            let first = rivals.iter().map(|(_, r)| r).max_by(|a, b| a.score.total_cmp(&b.score));
+            match first.filter(|r| exchanges < EXCHANGES && r.score > best.score) {
+                Some(first) => best = self.grow(first.clone(), progress)?,
+                None => return Ok(Found { best: self.strongest_first(best)?, rivals }),
+            }
+            exchanges += 1;
+        }
+    }
+
+    /// A set with its effects in order of what the score loses without each, the most first.
+    fn strongest_first(&mut self, mut set: Hypothesis) -> Result<Hypothesis, GapError> {
+        let mut losses: BTreeMap<usize, f64> = BTreeMap::new();
+        for &effect in &set.effects {
+            losses.insert(effect, set.score - self.sets.without(&set, effect)?.score);
+        }
+        set.effects.sort_by(|a, b| losses[b].total_cmp(&losses[a]));
+        Ok(set)
+    }
+
+    /// Forward selection from a set, backward pruning; the sets that were fitted are remembered.
+    fn grow(&mut self, from: Hypothesis, progress: &dyn Fn(&str)) -> Result<Hypothesis, GapError> {
+        let mut best = from;
+        for round in best.effects.len()..self.depth {
+            progress(&format!("screening effects, round {}", round + 1));
+            let ground = Ground::around(&self.problem.compare, best.model.clone())?;
+            let screened = self.screen(&best, &ground)?;
+            let kept = if round == 0 { KEPT } else { KEPT_LATER };
+            let list = self.shortlist(&best, &screened, kept);
+            if list.is_empty() {
+                break;
+            }
+            progress(&format!("fitting {} candidates, round {}", list.len(), round + 1));
+            let found = self.sets.extend_all(&best, &ground, &list, best.score)?;
+            // The best may only pick up what mismatch of form left elsewhere: the first that is worth it is taken.
+            let Some(next) = found.into_iter().find(|next| self.worth.is_worth(&best, next)) else {
+                break;
+            };
+            best = next;
+        }
+        if best.effects.len() > 1 {
+            progress("pruning");
+            best = self.prune(best)?;
+        }
+        Ok(best)
+    }
+
+    fn prune(&mut self, mut best: Hypothesis) -> Result<Hypothesis, GapError> {
+        while best.effects.len() > 1 {
+            let mut weakest: Option<Hypothesis> = None;
+            for effect in best.effects.clone() {
+                let less = self.sets.without(&best, effect)?;
+                if weakest.as_ref().is_none_or(|w| less.score > w.score) {
+                    weakest = Some(less);
+                }
+            }
+            match weakest {
+                Some(less) if !self.worth.is_worth(&less, &best) => best = less,
+                _ => break,
+            }
+        }
+        Ok(best)
+    }
+
+    /// Screens every effect that is not in `base`; the best come first.
+    fn screen(&self, base: &Hypothesis, ground: &Ground) -> Result<Vec<Screened>, GapError> {
+        let all: Vec<usize> = (0..self.problem.simulator().effects().len())
+            .filter(|e| !base.effects.contains(e))
+            .collect();
+        let screened: Result<Vec<Screened>, GapError> =
+            all.par_iter().map(|&e| self.problem.compare.screen(ground, e)).collect();
+        let mut screened = screened?;
+        screened.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
+        Ok(screened)
+    }
+
+    /// The best of a screen, and the twins of the very best.
+    fn shortlist(&self, base: &Hypothesis, screened: &[Screened], kept: usize) -> Vec<Screened> {
+        let screened: Vec<&Screened> =
+            screened.iter().filter(|s| self.worth.is_possible(base, s.effect)).collect();
+        let specs = self.problem.simulator().effects();
+        let best = screened.first().map_or(0.0, |s| s.gain());
+        // Gains count a block as one observation, scores the effective sample size.
+        let finest = self.problem.finest();
+        let floor = |effect: usize| {
+            (FAINT * best)
+                .max(PROMISE * self.worth.least_rise(self.worth.left(base, effect)) * finest)
+        };
+        let worth = screened.iter().take(kept).filter(|s| s.gain() >= floor(s.effect));
+        let mut list: Vec<Screened> = worth.copied().cloned().collect();
+        let leaders: Vec<usize> = list.iter().take(LEADERS).map(|s| s.effect).collect();
+        for leader in leaders {
+            for twin in &specs[leader].twins {
+                let one = screened.iter().find(|s| specs[s.effect].name == *twin);
+                let is_new = |o: &&&Screened| list.iter().all(|l| l.effect != o.effect);
+                if let Some(one) = one.filter(is_new).filter(|o| o.gain() > 0.0) {
+                    list.push((*one).clone());
+                }
+            }
+        }
+        list
+    }
+
+    /// Sets in which one effect of `best` is replaced by another, the replaced one named; fitted where a screen
+    /// says that they might do.
+    fn rivals(&mut self, best: &Hypothesis) -> Result<Vec<(usize, Hypothesis)>, GapError> {
+        let mut out = Vec::new();
+        let kept = if best.effects.len() > 1 { RIVALS.1 } else { RIVALS.0 };
+        for &effect in &best.effects {
+            let less = self.sets.without(best, effect)?;
+            let ground = Ground::around(&self.problem.compare, less.model.clone())?;
+            let all = self.screen(&less, &ground)?;
+            let own_gain = all.iter().find(|s| s.effect == effect).map_or(0.0, Screened::gain);
+            let screened: Vec<Screened> = all
+                .into_iter()
+                .filter(|s| !best.effects.contains(&s.effect))
+                .filter(|s| self.worth.is_possible(&less, s.effect))
+                .collect();
+            let twins = &self.problem.simulator().effects()[effect].twins;
+            let is_twin =
+                |s: &Screened| twins.contains(&self.problem.simulator().effects()[s.effect].name);
+            let list: Vec<Screened> = screened
+                .iter()
+                .take(kept)
+                .filter(|s| s.gain() > RIVALRY * own_gain)
+                .chain(screened.iter().filter(|s| is_twin(s) && s.gain() <= RIVALRY * own_gain))
+                .cloned()
+                .collect();
+            for solution in self.sets.extend_all(&less, &ground, &list, best.score)? {
+                out.push((effect, solution));
+            }
+        }
+        Ok(out)
+    }
+}

@@ -1,4 +1,7 @@
 //! A simulator with other tolerances.
+//!
+//! Held (tolerance 0), a parameter stays as shipped: the ablation without re-tuning. Set loose, it shows whether it could explain what
+//! effects are credited with.
 
 use crate::{
     description::Description,

@@ -1,4 +1,10 @@
 //! What simpler methods say of the same data: what is gained by the longer way shows beside them.
+//!
+//! | method | leaves out |
+//! | --- | --- |
+//! | largest drop | re-tuning: nominal parameters stay as shipped |
+//! | signature | the fit: one change of the output, correlated with the residual |
+//! | BIC | correlation of samples, held-out data, and sets of several effects |
 
 use std::collections::BTreeMap;
 

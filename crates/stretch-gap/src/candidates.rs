@@ -1,4 +1,7 @@
 //! Candidates, stages and parameters as the diagnosis lists them.
+//!
+//! A candidate's closed-gap fraction is 1 - sum_c max(0, e_c with its effects)/sum_c max(0, e_c re-tuned) of the excesses e_c of
+//! the channels on the test trials.
 
 use rayon::prelude::*;
 

@@ -20,6 +20,7 @@
 //! Effects and nominal parameters must move together. An effect fitted with the nominal parameters held is credited with what
 //! they could have done (Brynjarsdottir and O'Hagan 2014, doi 10.1088/0266-5611/30/11/114007).
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::{
@@ -56,6 +57,8 @@ pub(crate) const COARSE: Effort = Effort { iterations: 5, renewals: &[1, 3] };
 /// Until nothing is gained.
 pub(crate) const FINE: Effort = Effort { iterations: 14, renewals: &[1, 3, 6, 9] };
 
+/// Added to every diagonal: a coordinate that does nothing has no curvature.
+const RIDGE: f64 = 1e-12;
 /// Dampings tried in one iteration.
 const TRIES: usize = 5;
 /// An iteration that lowers the cost by less, nats and as a share of it, has gained nothing.
@@ -115,7 +118,7 @@ struct Descent<'a, 'b> {
     /// Sensitivities by coordinate, then by stage; none where a coordinate does not act.
     columns: Vec<Vec<Option<Column>>>,
     /// N, undamped.
-    normal: Vec<f64>,
+    normal: DMatrix<f64>,
     gradient: Vec<f64>,
     lambda: f64,
 }
@@ -138,7 +141,7 @@ impl<'a, 'b> Descent<'a, 'b> {
             residuals: Vec::new(),
             cost: f64::INFINITY,
             columns: vec![Vec::new(); n],
-            normal: vec![0.0; n * n],
+            normal: DMatrix::zeros(n, n),
             gradient: vec![0.0; n],
             lambda: 1e-3,
             coordinates,
@@ -197,8 +200,8 @@ impl<'a, 'b> Descent<'a, 'b> {
                         sum += self.compare.product(stage, a, b);
                     }
                 }
-                self.normal[i * n + j] = weight * sum;
-                self.normal[j * n + i] = self.normal[i * n + j];
+                self.normal[(i, j)] = weight * sum;
+                self.normal[(j, i)] = self.normal[(i, j)];
             }
             self.gradient[i] = 0.0;
             for (s, &stage) in self.stages.iter().enumerate() {
@@ -210,7 +213,7 @@ impl<'a, 'b> Descent<'a, 'b> {
             let c = self.coordinates[i].0;
             let prior = c.prior(c.read(&self.model));
             self.gradient[i] += prior.slope;
-            self.normal[i * n + i] += prior.curvature;
+            self.normal[(i, i)] += prior.curvature;
         }
     }
 
@@ -226,7 +229,7 @@ impl<'a, 'b> Descent<'a, 'b> {
         for _ in 0..TRIES {
             let mut damped = self.normal.clone();
             for i in 0..n {
-                damped[i * n + i] += self.lambda * self.normal[i * n + i] + 1e-12;
+                damped[(i, i)] += self.lambda * self.normal[(i, i)] + RIDGE;
             }
             let step = boxed(&damped, &self.gradient, &low, &high);
             let mut next = self.model.clone();
@@ -255,7 +258,7 @@ impl<'a, 'b> Descent<'a, 'b> {
     fn finish(self) -> Fitted {
         let stages = self.stages.iter().zip(&self.residuals);
         let misfits = stages.map(|(&s, r)| self.compare.misfit(s, r)).collect();
-        let spread = spreads(&self.normal, self.coordinates.len());
+        let spread = spreads(self.normal);
         let effects = self.model.effects.iter();
         let mut effect_sd: Vec<Vec<f64>> = effects.map(|(_, v)| vec![0.0; v.len()]).collect();
         for ((c, _), spread) in self.coordinates.iter().zip(spread) {
@@ -275,18 +278,9 @@ impl<'a, 'b> Descent<'a, 'b> {
 }
 
 /// Square roots of the diagonal of the inverse of a normal matrix.
-fn spreads(normal: &[f64], n: usize) -> Vec<f64> {
-    let mut lifted = normal.to_vec();
-    for i in 0..n {
-        lifted[i * n + i] += 1e-12;
+fn spreads(mut normal: DMatrix<f64>) -> Vec<f64> {
+    for i in 0..normal.nrows() {
+        normal[(i, i)] += RIDGE;
     }
-    let factor = Cholesky::of(&lifted, n);
-    (0..n)
-        .map(|i| {
-            let mut unit = vec![0.0; n];
-            unit[i] = 1.0;
-            factor.solve(&mut unit);
-            unit[i].max(0.0).sqrt()
-        })
-        .collect()
+    Cholesky::of(normal).inverse().diagonal().iter().map(|v| v.max(0.0).sqrt()).collect()
 }

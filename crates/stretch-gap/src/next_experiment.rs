@@ -1,5 +1,16 @@
 //! The experiment that tells rivals apart.
+//!
+//! Discrimination between models after Atkinson and Fedorov (1975, doi 10.1093/biomet/62.1.57), T-optimality: the best experiment is that
+//! in which the rival, its parameters free within what is already known, comes least near to the truth. With tangents A of the rival's
+//! predictions and differences d between the two, over what was measured (index 0) and the experiment (1),
+//!
+//! ```text
+//! x = argmin of 0.5/b (|d_0 + A_0 x|^2 + |d_1 + A_1 x|^2) + 0.5 |x|^2 in its box,     D^2 = |d_1 + A_1 x|^2/samples
+//! ```
+//!
+//! Which of the two is true nobody knows: both are tried, and the smaller D counts.
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 use stretch_data::Trial;
 
@@ -252,7 +263,8 @@ fn left(
     rival: &Tangent,
 ) -> f64 {
     let n = rival.slopes.len();
-    let mut normal = vec![0.0; n * n];
+    // The prior: one tolerance is 1.
+    let mut normal = DMatrix::identity(n, n);
     let mut slope = vec![0.0; n];
     for (truth, rival) in [(truth_known, rival_known), (truth, rival)] {
         let gap: Vec<f64> = rival.values.iter().zip(&truth.values).map(|(a, b)| a - b).collect();
@@ -260,15 +272,12 @@ fn left(
             slope[i] += dot(&rival.slopes[i], &gap) / block;
             for j in 0..=i {
                 let product = dot(&rival.slopes[i], &rival.slopes[j]) / block;
-                normal[i * n + j] += product;
+                normal[(i, j)] += product;
                 if i != j {
-                    normal[j * n + i] += product;
+                    normal[(j, i)] += product;
                 }
             }
         }
-    }
-    for i in 0..n {
-        normal[i * n + i] += 1.0;
     }
     let low: Vec<f64> = rival.bounds.iter().map(|b| b[0].min(0.0)).collect();
     let high: Vec<f64> = rival.bounds.iter().map(|b| b[1].max(0.0)).collect();

@@ -12,6 +12,7 @@
 //! one simulation a start instead of a fit. Strengths scale so; thresholds do not, and are judged as they are.
 //! A kink bends the change, so gains only say what is worth a fit.
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::{
@@ -140,17 +141,17 @@ impl Comparison<'_> {
     ) -> (Cholesky, Vec<f64>) {
         let product = |a: &Column, b: &Column| self.product(stage, a, b);
         let n = known.len();
-        let mut normal = vec![0.0; n * n];
+        let mut normal = DMatrix::zeros(n, n);
         for i in 0..n {
             for j in 0..=i {
                 let p = product(&known[i].1, &known[j].1);
-                normal[i * n + j] = p;
-                normal[j * n + i] = p;
+                normal[(i, j)] = p;
+                normal[(j, i)] = p;
             }
             // The prior: one standard deviation is 1, and a block counts as one sample.
-            normal[i * n + i] += self.frame.block as f64;
+            normal[(i, i)] += self.frame.block as f64;
         }
-        let factor = Cholesky::of(&normal, n);
+        let factor = Cholesky::of(normal);
         let mut of_residual: Vec<f64> = known.iter().map(|(_, k)| product(k, residual)).collect();
         factor.forward(&mut of_residual);
         (factor, of_residual)

@@ -1,5 +1,8 @@
 //! Fits sets of effects, and remembers every one.
 //!
+//! A smaller set is fitted twice, from below and from the larger set that holds it, and the better counts: a likelihood ratio of nested
+//! hypotheses is a ratio of maxima, and what a better start found must not be credited to the effect that is left out.
+//!
 //! Only what hangs together is fitted anew: a set falls into components of stages that share effects, and a fit of one
 //! component leaves the others as they are.
 

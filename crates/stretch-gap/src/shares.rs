@@ -1,4 +1,7 @@
 //! What each effect of the best set closes, so that an answer without a name still says what is known.
+//!
+//! Effects overlap: what each closes alone adds up to more than the whole. Taken out from the weakest to the strongest, with the rest
+//! fitted anew each time, their shares (gap without - gap with)/gap of the nominal telescope to what the set closes.
 
 use crate::{
     diagnosis::EffectShare, error::GapError, hypothesis::Hypothesis, sets::Sets, spec::EffectSpec,

@@ -173,6 +173,17 @@ pub struct EffectSpec {
 
 impl EffectSpec {
     /// An effect in one stage, screened at a small and a large value of each strength and at three of each shape.
+    ///
+    /// ```
+    /// use stretch_gap::{EffectParameterSpec, EffectSpec};
+    /// let parameters = vec![
+    ///     EffectParameterSpec::strength("c", "1", 0.0..=1.0),
+    ///     EffectParameterSpec::shape("tau", "s", 0.01..=10.0),
+    /// ];
+    /// let relaxation = EffectSpec::new("relaxation", (0, "sensing"), parameters);
+    /// assert_eq!(relaxation.starts.len(), 2 * 3);
+    /// assert_eq!(relaxation.starts[0][0], 0.02);
+    /// ```
     pub fn new(name: &str, stage: (usize, &str), parameters: Vec<EffectParameterSpec>) -> Self {
         Self {
             name: name.into(),

@@ -1,4 +1,7 @@
 //! What the gap costs whoever trains a calibration in the simulator and runs it on the rig.
+//!
+//! The *transfer gap* is the error on measured test trials of a calibration trained in the simulator minus that of one trained on measured
+//! trials. It is what a user pays; the chi-square is not: a true effect can close the gap and leave a calibration as it was.
 
 use rayon::prelude::*;
 use stretch_calibrate::{CalibrateError, ModelKind, Options, apply, calibrate};

@@ -1,4 +1,14 @@
 //! The stages run one on the other: who causes the gap of the last output.
+//!
+//! Errors of a stage pass through those behind it, so shares depend on the order in which stages are corrected. The Shapley value (1953,
+//! doi 10.1515/9781400881970-018) averages over all orders,
+//!
+//! ```text
+//! phi_s = sum over sets T without s of |T|! (n - |T| - 1)!/n! (gap(T + s) - gap(T))
+//! ```
+//!
+//! where gap(T) is the mean square error of the last output with the stages of T simulated and the others corrected by what they get
+//! wrong on their measured input.
 
 use crate::{error::GapError, evidence::Evidence, frame::Role, runs::Runs, simulator::Run};
 

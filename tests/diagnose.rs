@@ -242,7 +242,7 @@ fn a_simulator_that_has_the_effect_agrees() {
     };
     for (effect, table) in [
         ("gauge_relaxation:c=0.4,tau=0.2", "name = \"gauge_relaxation\"\nc = 0.4\ntau = 0.2\n"),
-        ("muscle_hysteresis:h=0.3,s=0.02", "name = \"muscle_hysteresis\"\nh = 0.3\ns = 0.02\n"),
+        ("crossbeam_inertia:m=0.04", "name = \"crossbeam_inertia\"\nm = 0.04\n"),
         ("valve_delay:delay_s=0.04", "name = \"valve_delay\"\ndelay_s = 0.04\n"),
     ] {
         let name = effect.split(':').next().unwrap();

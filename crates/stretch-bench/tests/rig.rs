@@ -271,27 +271,36 @@ fn without_test_trials_the_last_part_is_held_back() {
 
 #[test]
 fn lost_rows_change_no_verdict() {
-    let effects = effect("gauge_relaxation", &[("c", 0.3), ("tau", 0.1)]);
-    for pressure in [true, false] {
-        let trials = session(&own_rig(), &effects, pressure, 7);
+    let cases = [
+        effect("gauge_relaxation", &[("c", 0.3), ("tau", 0.1)]),
+        effect("valve_delay", &[("delay_s", 0.03)]),
+        EffectSet::new(),
+    ];
+    for (effects, pressure) in cases.iter().flat_map(|e| [(e, true), (e, false)]) {
+        let trials = session(&own_rig(), effects, pressure, 7);
         let whole = run(trials.clone(), &[], &shallow());
-        assert_eq!(whole.named, ["gauge_relaxation"], "{}", whole.sentence);
+        let names: Vec<&str> = effects.iter().map(|e| e.name()).collect();
+        assert_eq!(whole.named, names, "{}", whole.sentence);
         for share in [0.0, 0.01] {
-            let lost = with_lost_rows(&trials, share, 5);
-            let read = Session::new(&lost).expect("a session");
-            let samples =
-                |s: &Session| s.trials().iter().map(|t| t.bridge_v().len()).sum::<usize>();
-            let all = samples(&Session::new(&trials).expect("a session"));
-            // A row at the very end leaves nothing to bridge to.
-            assert!(samples(&read) + 4 >= all, "{} of {all}", samples(&read));
-            assert!(read.notes().iter().any(|n| n.starts_with("rows: ")), "{:?}", read.notes());
-            let d = run(lost, &[], &shallow());
-            let what = format!("pressure {pressure}, {share} lost: {}", d.sentence);
+            let d = run(with_lost_rows(&trials, share, 5), &[], &shallow());
+            let what = format!("{names:?}, pressure {pressure}, {share} lost: {}", d.sentence);
             assert_eq!((d.verdict, &d.named), (whole.verdict, &whole.named), "{what}");
-            let (was, is) = (whole.candidates[0].probability, d.candidates[0].probability);
-            assert!((was - is).abs() <= PROBABILITY, "{what}: {was} {is}");
+            if let (Some(was), Some(is)) = (whole.candidates.first(), d.candidates.first()) {
+                assert!((was.probability - is.probability).abs() <= PROBABILITY, "{what}");
+            }
         }
     }
+}
+
+#[test]
+fn what_becomes_of_lost_rows_is_told() {
+    let trials = session(&own_rig(), &EffectSet::new(), true, 7);
+    let samples = |s: &Session| s.trials().iter().map(|t| t.bridge_v().len()).sum::<usize>();
+    let all = samples(&Session::new(&trials).expect("a session"));
+    let read = Session::new(&with_lost_rows(&trials, 0.01, 5)).expect("a session");
+    // A row lost at the very end of a trial leaves nothing to bridge to.
+    assert!(samples(&read) + 4 >= all, "{} of {all}", samples(&read));
+    assert!(read.notes().iter().any(|n| n.starts_with("rows: ")), "{:?}", read.notes());
 }
 
 /// The stock rig's file with an effect appended, read as a program reads it.
@@ -314,7 +323,8 @@ fn a_simulator_that_has_the_effect_agrees_and_is_not_offered_it_again() {
         let rig = with_effect(entry);
         let pressure = seed % 2 == 0;
         let trials = session(&own_rig(), &rig.effects, pressure, 11 + seed as u64);
-        let session = Session::new(&trials).expect("a session");
+        // The first trial winds the loops: a rig that is measured has moved before.
+        let session = Session::new(&trials[1..]).expect("a session");
         let simulator =
             RigSimulator::new(RigSetup { session, rig, without: &[] }).expect("a simulator");
         assert!(simulator.effects().iter().all(|e| e.name != name));

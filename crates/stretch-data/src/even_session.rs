@@ -6,6 +6,8 @@ use crate::{DataError, DataSet, EvenSpec, ReadOptions, Rows, Split, Trial, Trial
 
 /// Pause between trials that do not say when they began, s.
 const PAUSE_S: f64 = 15.0;
+/// Rounding of time stamps: a rate this near to a whole number of hertz is that number.
+const STAMPED: f64 = 1e-6;
 
 /// A trial and its place in a session.
 #[derive(Debug, Clone, PartialEq)]
@@ -124,6 +126,10 @@ impl EvenSession {
         shortest: usize,
     ) -> Result<Self, DataError> {
         let rate_hz = trials.iter().find_map(|t| t.trial.rate_hz()).ok_or(DataError::NoSamples)?;
+        // Stamps are rounded: 100 Hz is told as 100.000000000002, and whatever counts samples would count one less.
+        let whole = rate_hz.round();
+        let is_whole = whole > 0.0 && (rate_hz / whole - 1.0).abs() < STAMPED;
+        let rate_hz = if is_whole { whole } else { rate_hz };
         let (dt_s, rows) = (1.0 / rate_hz, Rows::default());
         let mut session = Self { trials: Vec::new(), dt_s, rows, notes: Vec::new() };
         for (one, start_s) in session.in_order(trials) {

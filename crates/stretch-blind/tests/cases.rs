@@ -53,7 +53,8 @@ fn same_seed_same_bits_whatever_the_number_of_threads() {
         let mut lines = csv.lines();
         let header = lines.next().expect("a header");
         assert_eq!(header.contains("pressure_kpa"), label.pressure_column);
-        assert_eq!(lines.clone().count(), 6000);
+        // Up to one row in a hundred may be missing, and by chance some more.
+        assert!((5800..=6000).contains(&lines.clone().count()));
         let columns = header.split(',').count();
         assert!(lines.all(|line| line.split(',').count() == columns));
         assert_eq!(label.effects.len(), usize::from(label.kind != CaseKind::Null));

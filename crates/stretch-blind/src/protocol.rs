@@ -117,7 +117,8 @@ pub(crate) fn with_pauses(mut scripts: Vec<Script>, mut pause: impl FnMut() -> f
             script.pause_s = pause();
             start_s += script.pause_s;
         }
-        script.start_s = start_s;
+        // Written to a hundredth, as pauses are.
+        script.start_s = (start_s * 100.0).round() / 100.0;
         start_s += script.openings.len() as f64 / RATE_HZ as f64;
     }
     scripts

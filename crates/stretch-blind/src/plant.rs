@@ -273,21 +273,44 @@ impl<'a> Plant<'a> {
         offset
     }
 
+    /// Flow that is lost at an absolute pressure, kg/s.
+    fn leak_flow(&self, c: Cause, p: f64) -> f64 {
+        if let Some(law) = &self.drawn.leak {
+            return c.strength * P_REF * law.at((p - P_ATM) / P_REF);
+        }
+        match c.form {
+            0 => self.rig.flow(c.strength * P_REF / (RHO_0 * (P_REF + P_ATM)), p, P_ATM),
+            _ => {
+                let scale = (P_REF + P_ATM).powi(2) - P_ATM.powi(2);
+                c.strength * P_REF * (p * p - P_ATM * P_ATM) / scale
+            }
+        }
+    }
+
+    /// Acceleration of a crossbeam of some inertia.
+    fn acceleration(&self, c: Cause, y: &State) -> f64 {
+        let omega = 1.0 / c.strength;
+        let spring = omega * omega * (y[1] - y[2]);
+        if let Some(law) = &self.drawn.damping {
+            // Speeds count in tenths of the natural one.
+            let u = y[3] / (0.1 * omega);
+            return spring - 0.2 * omega * omega * law.at((u + 2.0) / 4.0);
+        }
+        let damping = match c.form {
+            0 => 0.17 + 0.1 * c.aux[0] + 0.12 * y[3].abs() / (0.1 * omega),
+            _ if y[3] > 0.0 => 0.2,
+            _ => 0.33,
+        };
+        spring - 2.0 * damping * omega * y[3]
+    }
+
     fn derivative(&self, y: &State, drive: Drive, offset: f64) -> State {
         let rig = self.rig;
         let p = y[0] * (1.0 + y[5]);
         let q_in = rig.flow(rig.c_in() * drive.inlet, drive.supply - y[4], p);
         let mut q_out = rig.flow(rig.c_out() * drive.outlet, p, P_ATM);
-        if let Some((c, law)) = self.leak.zip(self.drawn.leak.as_ref()) {
-            q_out += c.strength * P_REF * law.at((p - P_ATM) / P_REF);
-        } else if let Some(c) = self.leak {
-            q_out += match c.form {
-                0 => rig.flow(c.strength * P_REF / (RHO_0 * (P_REF + P_ATM)), p, P_ATM),
-                _ => {
-                    let scale = (P_REF + P_ATM).powi(2) - P_ATM.powi(2);
-                    c.strength * P_REF * (p * p - P_ATM * P_ATM) / scale
-                }
-            };
+        if let Some(c) = self.leak {
+            q_out += self.leak_flow(c, p);
         }
         let mut d = [0.0; 6];
         let target = rig.static_contraction(p) + offset;
@@ -298,21 +321,8 @@ impl<'a> Plant<'a> {
         }
         d[1] = (target - y[1]) / tau;
         if let Some(c) = self.inertia {
-            let omega = 1.0 / c.strength;
-            // Speeds count in tenths of the natural one.
-            let u = y[3] / (0.1 * omega);
-            let force = self.drawn.damping.as_ref().map(|law| law.at((u + 2.0) / 4.0));
-            let damping = match c.form {
-                0 => 0.17 + 0.1 * c.aux[0] + 0.12 * y[3].abs() / (0.1 * omega),
-                _ if y[3] > 0.0 => 0.2,
-                _ => 0.33,
-            };
             d[2] = y[3];
-            d[3] = omega * omega * (y[1] - y[2])
-                - match force {
-                    Some(force) => 0.2 * omega * omega * force,
-                    None => 2.0 * damping * omega * y[3],
-                };
+            d[3] = self.acceleration(c, y);
         } else {
             d[2] = d[1];
         }

@@ -298,6 +298,7 @@ impl Tally {
             return answer.is_empty() || top1;
         }
         self.confuse(effect, verdict);
+        self.tie(verdict);
         let singles = &mut self.score.singles;
         singles.top1.add(top1);
         singles.first_name.add(first_name);
@@ -313,11 +314,6 @@ impl Tally {
         singles.exact.add(exact);
         singles.partial.add(verdict.verdict == "partial");
         singles.false_record.add(verdict.verdict == "record");
-        let tied = verdict.ties().iter().filter(|name| !answer.contains(name)).count();
-        singles.tied.add(tied > 0);
-        if tied > 0 {
-            self.tie_sizes.push(1.0 + tied as f64);
-        }
         singles.stage.add(in_stage(label, verdict));
         singles.false_unknown.add(verdict.verdict == "unknown");
         singles.overlooked.add(["no_gap", "parameters"].contains(&verdict.verdict.as_str()));
@@ -342,6 +338,15 @@ impl Tally {
             self.oracle.push((verdict.closed, oracle));
         }
         exact
+    }
+
+    fn tie(&mut self, verdict: &Verdict) {
+        let answer = verdict.answer();
+        let tied = verdict.ties().iter().filter(|name| !answer.contains(name)).count();
+        self.score.singles.tied.add(tied > 0);
+        if tied > 0 {
+            self.tie_sizes.push(1.0 + tied as f64);
+        }
     }
 
     fn null(&mut self, verdict: &Verdict) -> bool {

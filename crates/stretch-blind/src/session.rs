@@ -345,7 +345,8 @@ mod tests {
 
     /// Sum of squares, over all channels, of what two sessions differ by, in units of the noise.
     fn apart(a: &[Trace], b: &[Trace]) -> f64 {
-        let channels: [(fn(&Trace) -> &Vec<f64>, f64); 3] =
+        type Channel = fn(&Trace) -> &Vec<f64>;
+        let channels: [(Channel, f64); 3] =
             [(|t| &t.pressure, 1200.0), (|t| &t.length, 0.05), (|t| &t.volts, 0.002)];
         let squares = channels.iter().flat_map(|(channel, noise)| {
             let pairs = a.iter().zip(b).flat_map(|(a, b)| channel(a).iter().zip(channel(b)));

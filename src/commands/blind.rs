@@ -12,7 +12,7 @@ use std::{
 
 use anyhow::{Context, bail, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
-use stretch_blind::{Plan, Seal, Verdict, make};
+use stretch_blind::{Clutter, Family, Plan, Protocol, Seal, Verdict, make};
 
 use super::{
     blind_room::Room,
@@ -28,7 +28,8 @@ use super::{
 /// makes the cases, prints the hash of the sealed labels, diagnoses a copy of every case in a
 /// temporary folder and a process of its own that is not told where the labels are, and only then
 /// opens the seal and scores. The cases come from
-/// a second simulator that shares no code with the first and gives every effect another form. The
+/// a second simulator that shares no code with the first and draws other forms of every effect, and
+/// what is around each rig. The
 /// three steps can be run one by one; `run` goes on where it was stopped.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment, args_conflicts_with_subcommands = true)]
@@ -44,6 +45,8 @@ pub(crate) struct Args {
     /// Folder that the cases, the answers and the report go to
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    forms: Forms,
     #[command(flatten)]
     options: RunOptions,
 }
@@ -69,6 +72,47 @@ struct MakeArgs {
     /// Folder that the cases go to
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    #[command(flatten)]
+    forms: Forms,
+}
+
+/// Where the forms of the effects, and what is around a rig, come from.
+#[derive(clap::Args)]
+struct Forms {
+    /// Family that the forms are drawn from: written, splines, spectra, rate_laws, asymmetric, or
+    /// all of them in turn
+    #[arg(long, value_name = "NAME|all", default_value = "all", value_parser = family)]
+    family: Families,
+    /// Supply, noise, clock and pauses: plain is the same for every rig, drawn another for each
+    #[arg(long, value_name = "plain|drawn", default_value = "drawn", value_parser = clutter)]
+    clutter: Clutter,
+    /// Trials of a session: paper, or paper+ with one more at 0.7 of the excitation
+    #[arg(long, value_name = "paper|paper+", default_value = "paper", value_parser = protocol)]
+    protocol: Protocol,
+}
+
+/// One family, or all in turn.
+#[derive(Clone, Copy)]
+struct Families(Option<Family>);
+
+fn family(name: &str) -> Result<Families, String> {
+    if name == "all" {
+        return Ok(Families(None));
+    }
+    let known = || Family::ALL.map(Family::name).join(", ");
+    Family::named(name)
+        .map(|family| Families(Some(family)))
+        .ok_or_else(|| format!("there are {}, all", known()))
+}
+
+fn clutter(name: &str) -> Result<Clutter, String> {
+    let found = Clutter::ALL.into_iter().find(|clutter| clutter.name() == name);
+    found.ok_or_else(|| "there are plain, drawn".to_owned())
+}
+
+fn protocol(name: &str) -> Result<Protocol, String> {
+    let found = Protocol::ALL.into_iter().find(|protocol| protocol.name() == name);
+    found.ok_or_else(|| "there are paper, paper+".to_owned())
 }
 
 #[derive(clap::Args)]
@@ -120,7 +164,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let (Some(cases), Some(out)) = (args.cases, args.out) else {
         bail!("say how many cases and where to: stretch blind --cases 360 --seed 7 --out check");
     };
-    let make = MakeArgs { cases, seed: args.seed, out };
+    let make = MakeArgs { cases, seed: args.seed, out, forms: args.forms };
     make_cases(&make)?;
     answer(&make.out, &args.options)?;
     blind_score::score(&make.out, true)
@@ -129,7 +173,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
 fn make_cases(args: &MakeArgs) -> anyhow::Result<()> {
     ensure!(args.cases > 0, "--cases 0: there is nothing to make");
     let bar = steps("making cases", args.cases);
-    let plan = Plan::of(args.cases);
+    let Forms { family: Families(family), clutter, protocol } = args.forms;
+    let plan = Plan { family, clutter, protocol, ..Plan::of(args.cases) };
     let seal = make(&args.out, args.seed, &plan, &|done| bar.set_position(done as u64))?;
     bar.finish_and_clear();
     say(format!(

@@ -1,16 +1,21 @@
-//! Makes sealed cases: `cargo run --release --example cases -- FOLDER CASES SEED`.
+//! Makes sealed cases: `cargo run --release --example cases -- FOLDER CASES SEED [plain|FAMILY]`.
 
 use std::path::Path;
 
-use stretch_blind::{Plan, make};
+use stretch_blind::{Family, Plan, make};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [folder, cases, seed] = arguments.as_slice() else {
-        eprintln!("usage: cases FOLDER CASES SEED");
+    let [folder, cases, seed, forms @ ..] = arguments.as_slice() else {
+        eprintln!("usage: cases FOLDER CASES SEED [plain|FAMILY]");
         std::process::exit(2);
     };
-    let plan = Plan::of(cases.parse()?);
+    let mut plan = Plan::of(cases.parse()?);
+    match forms.first().map(String::as_str) {
+        None => {}
+        Some("plain") => plan = plan.plain(),
+        Some(name) => plan.family = Some(Family::named(name).ok_or("no such family")?),
+    }
     let seal = make(Path::new(folder), seed.parse()?, &plan, &|done| eprint!("\r{done} done"))?;
     println!("\nsealed: {}", seal.sha256());
     Ok(())

@@ -2,14 +2,16 @@
 
 use std::collections::BTreeMap;
 
+use crate::clutter::{Clutter, Surroundings};
 use crate::dice::Dice;
 use crate::effect::{Cause, Causes, Kind};
 use crate::error::BlindError;
 use crate::excess::Yardstick;
+use crate::family::Family;
 use crate::plan::{Order, Plan};
-use crate::protocol::{Script, session};
-use crate::rig::{L_STEP, LEAST_STRAIN, Rig, SIGMA_L, SIGMA_P, SIGMA_V, UNCERTAIN, V_FS, V_STEP};
-use crate::session::{Conditions, FINE, run};
+use crate::protocol::{RATE_HZ, Script, session, with_pauses};
+use crate::rig::{L_STEP, LEAST_STRAIN, Rig, UNCERTAIN, V_FS, V_STEP};
+use crate::session::{Conditions, FINE, Trace, run};
 use crate::truth::{Acting, CaseKind, Label};
 
 /// Rigs drawn before a case is given up.
@@ -22,6 +24,10 @@ pub(crate) struct Recording {
     pub(crate) pressure_kpa: Option<Vec<f64>>,
     pub(crate) length_mm: Vec<f64>,
     pub(crate) bridge_v: Vec<f64>,
+    /// When each sample was taken, where `time_s` says so and it is not the grid, s.
+    pub(crate) stamps: Option<Vec<f64>>,
+    /// Samples that are missing; empty when none is.
+    pub(crate) missing: Vec<bool>,
 }
 
 /// A recorded session and its label.
@@ -29,6 +35,8 @@ pub(crate) struct Recording {
 pub(crate) struct Case {
     pub(crate) label: Label,
     pub(crate) recordings: Vec<Recording>,
+    /// Noise of pressure in Pa, length in mm and voltage in V, where a rig file says it.
+    pub(crate) noise: Option<[f64; 3]>,
 }
 
 impl Case {
@@ -45,11 +53,20 @@ impl Case {
         let mut rig_dice = Dice::new(seed, base + 1);
         let mut effect_dice = Dice::new(seed, base + 2);
         let mut noise_dice = Dice::new(seed, base + 3);
-        let scripts = session(&mut protocol_dice);
+        let mut clutter_dice = Dice::new(seed, base + 4);
+        let mut scripts = session(plan.protocol, &mut protocol_dice);
+        let around = match plan.clutter {
+            Clutter::Plain => Surroundings::plain(),
+            Clutter::Drawn => Surroundings::draw(&mut clutter_dice),
+        };
+        if let Some(drawn) = around.drawn {
+            scripts = with_pauses(scripts, || drawn.pause(&mut clutter_dice));
+        }
         for _ in 0..TRIES {
             let rig = Rig::draw(&mut rig_dice);
-            let conditions = Conditions::draw(&scripts, &mut rig_dice);
-            let mut yardstick = Yardstick::new(&rig, &scripts, &conditions, order.pressure_column);
+            let conditions = Conditions::draw(&scripts, &around, &mut rig_dice);
+            let column = order.pressure_column;
+            let mut yardstick = Yardstick::new(&rig, &scripts, &conditions, &around, column);
             let chosen = choose(order, plan, &mut yardstick, &mut effect_dice);
             let causes = Causes::new(&chosen.iter().map(|c| c.0).collect::<Vec<_>>());
             let (excess, least) = match chosen.as_slice() {
@@ -59,37 +76,48 @@ impl Case {
             if least <= LEAST_STRAIN {
                 continue;
             }
-            let label = label(order, &rig, &chosen, excess);
+            let mut label = label(order, &rig, &chosen, excess);
+            label.clutter = around.facts();
             let traces = run(&rig, &causes, &scripts, &conditions, FINE);
-            let recordings = scripts
-                .iter()
-                .zip(traces)
-                .map(|(script, trace)| {
-                    let pressure = trace.pressure.iter().map(|p| {
-                        let noisy = p + SIGMA_P * noise_dice.gauss();
-                        noisy / 1000.0
-                    });
-                    let pressure: Vec<f64> = pressure.collect();
-                    let length_mm = trace
-                        .length
-                        .iter()
-                        .map(|l| ((l + SIGMA_L * noise_dice.gauss()) / L_STEP).round() * L_STEP);
-                    let length_mm = length_mm.collect();
-                    let bridge_v = trace
-                        .volts
-                        .iter()
-                        .map(|v| {
-                            let clipped = (v + SIGMA_V * noise_dice.gauss()).clamp(0.0, V_FS);
-                            (clipped / V_STEP).round() * V_STEP
-                        })
-                        .collect();
-                    let pressure_kpa = order.pressure_column.then_some(pressure);
-                    Recording { script: script.clone(), pressure_kpa, length_mm, bridge_v }
-                })
-                .collect();
-            return Ok(Self { label, recordings });
+            let recordings =
+                scripts.iter().zip(traces).enumerate().map(|(trial, (script, trace))| {
+                    let offsets = conditions.offsets(trial);
+                    record(script, trace, offsets, (&around, column), &mut noise_dice)
+                });
+            let recordings = recordings.collect();
+            let noise = around.stated.then(|| around.noise.map(|noise| noise.sigma));
+            return Ok(Self { label, recordings, noise });
         }
         Err(BlindError::NoRig { case: number, tries: TRIES })
+    }
+}
+
+/// What a recorder makes of a trial: noise, converters, lost rows.
+fn record(
+    script: &Script,
+    trace: Trace,
+    offsets: &[f64],
+    (around, pressure_column): (&Surroundings, bool),
+    dice: &mut Dice,
+) -> Recording {
+    let count = script.openings.len();
+    let [p, l, v] = around.noise;
+    let noisy = |values: &[f64], noise: Vec<f64>| -> Vec<f64> {
+        values.iter().zip(noise).map(|(x, n)| x + n).collect()
+    };
+    let pressure = noisy(&trace.pressure, p.samples(count, dice));
+    let length = noisy(&trace.length, l.samples(count, dice));
+    let volts = noisy(&trace.volts, v.samples(count, dice));
+    let shown = |v: f64| (v.clamp(0.0, V_FS) / V_STEP).round() * V_STEP;
+    let stamped = around.drawn.is_some_and(|d| d.stamped) && !offsets.is_empty();
+    let stamp = |(i, late): (usize, &f64)| i as f64 / RATE_HZ as f64 + late;
+    Recording {
+        script: script.clone(),
+        pressure_kpa: pressure_column.then(|| pressure.iter().map(|p| p / 1000.0).collect()),
+        length_mm: length.iter().map(|l| (l / L_STEP).round() * L_STEP).collect(),
+        bridge_v: volts.into_iter().map(shown).collect(),
+        stamps: stamped.then(|| offsets.iter().enumerate().map(stamp).collect()),
+        missing: around.drawn.map_or_else(Vec::new, |d| d.missing(count, dice)),
     }
 }
 
@@ -115,12 +143,14 @@ fn label(order: Order, rig: &Rig, chosen: &[(Cause, f64)], excess: f64) -> Label
             .map(|(cause, alone)| Acting {
                 name: name(cause),
                 stage: cause.kind.spec().stage,
-                form: cause.kind.spec().forms[cause.form].to_owned(),
+                form: cause.form_name().to_owned(),
                 strength: cause.signed(),
                 excess: *alone,
             })
             .collect(),
         parameters,
+        family: order.family,
+        clutter: BTreeMap::new(),
     }
 }
 
@@ -133,25 +163,26 @@ fn choose(
 ) -> Vec<(Cause, f64)> {
     let Some(lead) = order.lead else { return Vec::new() };
     let (least, most) = plan.excess;
+    let family = order.family;
     match order.kind {
         CaseKind::Null => Vec::new(),
         CaseKind::Single | CaseKind::OutOfCatalogue | CaseKind::Struck => {
-            vec![tuned(Cause::draw(lead, dice), least, most, yardstick, dice)]
+            vec![tuned(Cause::draw(lead, family, dice), least, most, yardstick, dice)]
         }
         CaseKind::Compound => {
             // Each visible on its own, and neither drowned by the other.
-            let first = tuned(Cause::draw(lead, dice), 1.0, most.max(1.0), yardstick, dice);
+            let first = tuned(Cause::draw(lead, family, dice), 1.0, most.max(1.0), yardstick, dice);
             let range = ((0.2 * first.1).max(0.5), 5.0 * first.1.max(1.0));
-            let other = companion(&[lead], range, yardstick, dice);
+            let other = companion(&[lead], family, range, yardstick, dice);
             vec![first, other]
         }
         CaseKind::Dominant => {
-            let first = tuned(Cause::draw(lead, dice), 8.0, most.max(8.0), yardstick, dice);
+            let first = tuned(Cause::draw(lead, family, dice), 8.0, most.max(8.0), yardstick, dice);
             let range = (0.02 * first.1, 0.12 * first.1);
             let mut kinds = vec![lead];
             let mut chosen = vec![first];
             while chosen.len() < 4 {
-                let small = companion(&kinds, range, yardstick, dice);
+                let small = companion(&kinds, family, range, yardstick, dice);
                 kinds.push(small.0.kind);
                 chosen.push(small);
             }
@@ -163,20 +194,21 @@ fn choose(
 /// A further cause of another kind whose excess lies in `range`, to a factor of 1.5.
 fn companion(
     taken: &[Kind],
+    family: Family,
     range: (f64, f64),
     yardstick: &mut Yardstick<'_>,
     dice: &mut Dice,
 ) -> (Cause, f64) {
     let mut last = None;
     for _ in 0..12 {
-        let cause = Cause::draw(partner(taken, dice), dice);
+        let cause = Cause::draw(partner(taken, dice), family, dice);
         let found = tuned(cause, range.0, range.1, yardstick, dice);
         if found.1 >= range.0 / 1.5 && found.1 <= range.1 * 1.5 {
             return found;
         }
         last = Some(found);
     }
-    last.unwrap_or_else(|| (Cause::draw(partner(taken, dice), dice), 0.0))
+    last.unwrap_or_else(|| (Cause::draw(partner(taken, dice), family, dice), 0.0))
 }
 
 /// A kind of the catalogue that is not among those taken.
@@ -239,18 +271,23 @@ fn tuned(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::protocol::Protocol;
     use crate::truth::TWINS;
 
     #[test]
     fn strengths_span_the_range_wanted_for_every_effect() {
-        let scripts = session(&mut Dice::new(2, 1));
+        let scripts = session(Protocol::Paper, &mut Dice::new(2, 1));
         let mut dice = Dice::new(2, 2);
         let rig = Rig::draw(&mut dice);
-        let conditions = Conditions::draw(&scripts, &mut dice);
-        let mut yardstick = Yardstick::new(&rig, &scripts, &conditions, true);
-        for &kind in Kind::catalogued().iter().filter(|&&k| k != Kind::ValveDeadband) {
+        let around = Surroundings::plain();
+        let conditions = Conditions::draw(&scripts, &around, &mut dice);
+        let mut yardstick = Yardstick::new(&rig, &scripts, &conditions, &around, true);
+        let kinds = Kind::catalogued().iter().filter(|&&k| k != Kind::ValveDeadband);
+        for (i, &kind) in kinds.enumerate() {
+            // Every family has its turn.
+            let family = Family::ALL[i % Family::ALL.len()];
             for (low, high) in [(0.05, 0.06), (5.0, 6.0)] {
-                let cause = Cause::draw(kind, &mut dice);
+                let cause = Cause::draw(kind, family, &mut dice);
                 let (tuned, excess) = tuned(cause, low, high, &mut yardstick, &mut dice);
                 assert!(tuned.strength <= tuned.most());
                 let name = kind.spec().name;
@@ -266,7 +303,8 @@ mod tests {
     fn compounds_hold_two_visible_effects_and_dominants_one_strong() {
         let plan = Plan::of(100);
         for (kind, count) in [(CaseKind::Compound, 2), (CaseKind::Dominant, 4)] {
-            let order = Order { kind, lead: Some(Kind::MainsHum), pressure_column: true };
+            let family = Family::Splines;
+            let order = Order { kind, lead: Some(Kind::MainsHum), pressure_column: true, family };
             let case = Case::make(3, 5, &plan, order).expect("a case");
             let label = &case.label;
             assert_eq!(label.effects.len(), count);

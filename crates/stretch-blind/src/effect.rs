@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::dice::Dice;
+use crate::family::Family;
 
 /// Part of the rig that a cause acts in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -116,6 +117,11 @@ impl Kind {
         &KINDS[CATALOGUED..]
     }
 
+    /// Whether the catalogue of effects has it.
+    pub(crate) fn is_catalogued(self) -> bool {
+        (self as usize) < CATALOGUED
+    }
+
     /// The kind of this name.
     pub(crate) fn named(name: &str) -> Option<Kind> {
         KINDS.iter().copied().find(|k| k.spec().name == name)
@@ -126,6 +132,9 @@ impl Kind {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Cause {
     pub(crate) kind: Kind,
+    /// Where its form is drawn from; what the catalogue lacks is always written.
+    pub(crate) family: Family,
+    /// Which of the written forms.
     pub(crate) form: usize,
     /// Leading parameter, without its sign; units as in the catalogue.
     pub(crate) strength: f64,
@@ -138,14 +147,31 @@ pub(crate) struct Cause {
 
 impl Cause {
     /// A form, a sign and the secondary parameters drawn; the strength still at its most.
-    pub(crate) fn draw(kind: Kind, dice: &mut Dice) -> Self {
+    pub(crate) fn draw(kind: Kind, family: Family, dice: &mut Dice) -> Self {
         let form = dice.below(kind.spec().forms.len());
         let negative = kind.spec().negative > 0.0 && dice.unit() < 0.5;
         let sign = if negative { -1.0 } else { 1.0 };
         let aux = std::array::from_fn(|_| dice.unit());
-        let mut cause = Self { kind, form, strength: 0.0, sign, aux, seed: dice.bits() };
+        let seed = dice.bits();
+        let family = if kind.is_catalogued() { family } else { Family::Written };
+        let mut cause = Self { kind, family, form, strength: 0.0, sign, aux, seed };
         cause.strength = cause.most();
         cause
+    }
+
+    /// Name of its form: of the written one, else of the family.
+    pub(crate) fn form_name(&self) -> &'static str {
+        if self.is_drawn() { self.family.name() } else { self.kind.spec().forms[self.form] }
+    }
+
+    /// Whether its form is drawn from a function space.
+    pub(crate) fn is_drawn(&self) -> bool {
+        self.family != Family::Written
+    }
+
+    /// Random numbers of its form: the same at every strength.
+    pub(crate) fn dice(&self, purpose: u64) -> Dice {
+        Dice::new(self.seed, 1000 + purpose)
     }
 
     /// Greatest strength in the direction of its sign.

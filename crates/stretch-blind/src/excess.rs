@@ -1,8 +1,9 @@
 //! How strong a case is: the excess over the floor that re-tuning the nominal rig would leave.
 
+use crate::clutter::Surroundings;
 use crate::effect::{Causes, Stage};
 use crate::protocol::{Script, Split};
-use crate::rig::{L_0, L_STEP, Rig, SIGMA_L, SIGMA_P, SIGMA_V, UNCERTAIN, V_STEP};
+use crate::rig::{L_0, L_STEP, Rig, UNCERTAIN, V_STEP};
 use crate::session::{COARSE, Conditions, Trace, run};
 
 /// Residuals and sensitivities of three channels (pressure, length, voltage), in floor units, for
@@ -26,14 +27,16 @@ impl<'a> Yardstick<'a> {
         rig: &'a Rig,
         scripts: &'a [Script],
         conditions: &'a Conditions,
+        around: &Surroundings,
         pressure_column: bool,
     ) -> Self {
+        let [sigma_p, sigma_l, sigma_v] = around.noise.map(|noise| noise.sigma);
         let nominal = run(rig, &Causes::default(), scripts, conditions, COARSE);
         let full = rig.static_contraction(rig.p_s() + crate::rig::P_ATM);
         let slope = (rig.nominal_volts(full) - rig.nominal_volts(0.0)) / (full * L_0);
         // Length noise reaches the voltage of a gauge that is driven by the measured length.
-        let volts = SIGMA_V.powi(2) + V_STEP.powi(2) / 12.0 + (slope * SIGMA_L).powi(2);
-        let floor = [SIGMA_P, (SIGMA_L.powi(2) + L_STEP.powi(2) / 12.0).sqrt(), volts.sqrt()];
+        let volts = sigma_v.powi(2) + V_STEP.powi(2) / 12.0 + (slope * sigma_l).powi(2);
+        let floor = [sigma_p, (sigma_l.powi(2) + L_STEP.powi(2) / 12.0).sqrt(), volts.sqrt()];
         let moved = vec![None; UNCERTAIN.len()];
         Self { rig, scripts, conditions, pressure_column, nominal, moved, floor }
     }
@@ -101,7 +104,7 @@ impl<'a> Yardstick<'a> {
             self.join(truth, self.floor[1], |t, n, i| t.length[i] - n.length[i])
         };
         let volts = self.join(truth, self.floor[2], |t, _, i| {
-            t.volts[i] - self.rig.nominal_volts(1.0 - t.length[i] / L_0)
+            t.volts[i] - self.rig.volts(1.0 - t.length[i] / L_0, t.excitation)
         });
         [pressure, length, volts]
     }
@@ -126,7 +129,7 @@ impl<'a> Yardstick<'a> {
             let scale = 0.25 * self.floor[2];
             let volts = self.join(truth, scale, |t, _, i| {
                 let k = 1.0 - t.length[i] / L_0;
-                rig.nominal_volts(k) - self.rig.nominal_volts(k)
+                rig.volts(k, t.excitation) - self.rig.volts(k, t.excitation)
             });
             let zero = vec![0.0; volts.len()];
             return [zero.clone(), zero, volts];

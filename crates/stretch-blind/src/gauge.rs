@@ -1,9 +1,13 @@
 //! Sleeve, gauge, bridge and amplifier, and the potentiometer beside them.
 
+use crate::curve::Curve;
 use crate::dice::Dice;
 use crate::effect::{Cause, Causes, Kind, Stage};
+use crate::electric::Electric;
+use crate::laws::bump;
 use crate::memory::{Lags, Loop, at_least};
 use crate::rig::{L_0, P_ATM, P_REF, Rig, V_STEP};
+use crate::timing::mains;
 
 /// One instant of the mechanics: contraction, absolute pressure, openings.
 #[derive(Debug, Clone, Copy)]
@@ -29,6 +33,9 @@ pub(crate) struct Gauge<'a> {
     late: Vec<f64>,
     pickup: (f64, (f64, f64)),
     contact: (bool, Dice),
+    drawn: Electric,
+    /// Share of the nominal excitation.
+    excitation: f64,
 }
 
 impl<'a> Gauge<'a> {
@@ -37,16 +44,14 @@ impl<'a> Gauge<'a> {
         Self {
             rig,
             active: causes.any_in(Stage::Sensing),
-            slip: causes
-                .find(Kind::SleeveSlip)
-                .map(|c| Loop::new(c.form, c.strength, c.aux[1], true)),
+            slip: causes.find(Kind::SleeveSlip).map(|c| Loop::of(&c, c.strength, true)),
             hysteresis: causes.find(Kind::GaugeHysteresis).map(|c| {
                 let reach = 0.58 * c.log_aux(0, 0.006, 0.05);
-                (c.strength, Loop::new(c.form, reach, c.aux[1], false))
+                (c.strength, Loop::of(&c, reach, false))
             }),
             relaxation: causes
                 .find(Kind::GaugeRelaxation)
-                .map(|c| (c.signed(), Lags::new(c.form, c.log_aux(0, 0.03, 3.0)))),
+                .map(|c| (c.signed(), Lags::of(&c, c.log_aux(0, 0.03, 3.0), 0.2))),
             travel: 0.0,
             last_strain: None,
             poles: None,
@@ -54,6 +59,8 @@ impl<'a> Gauge<'a> {
             late: Vec::new(),
             pickup: (0.0, (0.0, 0.0)),
             contact: (false, Dice::new(contact_seed, 7)),
+            drawn: Electric::of(causes),
+            excitation: 1.0,
             causes: causes.clone(),
         }
     }
@@ -63,8 +70,10 @@ impl<'a> Gauge<'a> {
         self.active
     }
 
-    /// Excitation on: the amplifier settles, the travel counts on.
-    pub(crate) fn power_up(&mut self) {
+    /// Excitation on at a share of its nominal value: the amplifier settles, the travel counts on.
+    pub(crate) fn power_up(&mut self, excitation: f64) {
+        self.excitation = excitation;
+        self.drawn.power_up();
         self.poles = None;
         self.slewed = None;
         self.late.clear();
@@ -74,17 +83,18 @@ impl<'a> Gauge<'a> {
     /// The session begins: travel counts from here.
     pub(crate) fn begin_session(&mut self) {
         self.travel = 0.0;
+        self.drawn.begin_session();
     }
 
     /// Analogue voltage after `h` seconds; `t` since the trial's, `session` since the session's
     /// start.
     pub(crate) fn step(&mut self, now: Instant, t: f64, session: f64, h: f64) -> f64 {
         if !self.active {
-            return self.rig.nominal_volts(now.k);
+            return self.rig.volts(now.k, self.excitation);
         }
         let e = self.gauge_strain(now, h);
         let ohm = self.resistance(e, t, session, h);
-        let mut excitation = self.rig.v_exc();
+        let mut excitation = self.rig.v_exc() * self.excitation;
         if let Some(c) = self.causes.find(Kind::CoilDroop) {
             let current = now.openings.0 + now.openings.1;
             excitation *= 1.0 - c.strength * current.sqrt();
@@ -97,19 +107,25 @@ impl<'a> Gauge<'a> {
         if let Some(c) = self.causes.find(Kind::SleeveSlack) {
             let least = self.rig.strain(self.rig.static_contraction(self.rig.p_s() + P_ATM));
             let width = if c.form == 0 { 0.0 } else { 0.012_f64.min(c.strength) };
-            e = at_least(e, least + c.strength, width);
+            e = match &self.drawn.slack {
+                Some(knee) => knee.at_least(e, least + c.strength),
+                None => at_least(e, least + c.strength, width),
+            };
         }
         if let Some(slip) = &mut self.slip {
-            e -= slip.push(e);
+            e -= slip.push(e, h);
         }
         if let Some(c) = self.causes.find(Kind::PressureCrosstalk) {
             let ratio = (now.p - P_ATM) / P_REF;
-            let shape =
-                if c.form == 0 { (1.1 * ratio).tanh() / 1.1_f64.tanh() } else { ratio.powf(1.35) };
+            let shape = match &self.drawn.crosstalk {
+                Some(law) => law.at(ratio),
+                None if c.form == 0 => (1.1 * ratio).tanh() / 1.1_f64.tanh(),
+                None => ratio.powf(1.35),
+            };
             e += c.signed() * shape;
         }
         if let Some((strength, memory)) = &mut self.hysteresis {
-            e -= *strength * memory.push(e);
+            e -= *strength * memory.push(e, h);
         }
         if let Some((share, lags)) = &mut self.relaxation {
             e += *share * (e - lags.push(e, h));
@@ -120,8 +136,14 @@ impl<'a> Gauge<'a> {
     fn resistance(&mut self, e: f64, t: f64, session: f64, h: f64) -> f64 {
         let r0 = self.rig.r0();
         let mut ohm = r0 * (1.0 + e).powi(2);
-        self.travel += (e - self.last_strain.replace(e).unwrap_or(e)).abs();
-        if let Some(c) = self.causes.find(Kind::GaugeSoftening) {
+        let moved = e - self.last_strain.replace(e).unwrap_or(e);
+        self.travel += moved.abs();
+        if let Some((c, law)) =
+            self.causes.find(Kind::GaugeSoftening).zip(self.drawn.softening.as_mut())
+        {
+            let done = law.push(moved, c.log_aux(0, 0.5, 12.0), h);
+            ohm = r0 + (ohm - r0) * (1.0 - c.strength * done);
+        } else if let Some(c) = self.causes.find(Kind::GaugeSoftening) {
             let turns = self.travel / c.log_aux(0, 0.5, 12.0);
             let done = match c.form {
                 0 => 1.0 - (1.0 + turns / 0.8).powf(-0.8),
@@ -132,6 +154,9 @@ impl<'a> Gauge<'a> {
         if let Some(c) = self.causes.find(Kind::GaugeNonlinearity) {
             let x = e / self.rig.e0();
             let bump = match c.form {
+                _ if self.drawn.nonlinearity.is_some() => {
+                    self.drawn.nonlinearity.as_ref().map_or(0.0, |law| law.at(x))
+                }
                 0 => (std::f64::consts::PI * x).sin(),
                 _ => 4.0 * x * (1.0 - x) * (0.75 + 0.5 * x),
             };
@@ -139,6 +164,7 @@ impl<'a> Gauge<'a> {
         }
         if let Some(c) = self.causes.find(Kind::ThermalDrift) {
             let shape = match c.form {
+                _ if self.drawn.drift.is_some() => self.drawn.drift(session),
                 0 => 900.0 * (1.0 - (-session / 900.0).exp()),
                 _ => 735.0 * (session.max(0.0) / 735.0).powf(0.8),
             };
@@ -147,10 +173,12 @@ impl<'a> Gauge<'a> {
         if let Some(c) = self.causes.find(Kind::SelfHeating) {
             let tau = c.log_aux(0, 1.5, 30.0);
             let warm = match c.form {
+                _ if self.drawn.heating.is_some() => self.drawn.warmth(t / tau),
                 0 => 1.0 - 0.5 * (-t / (0.5 * tau)).exp() - 0.5 * (-t / (2.0 * tau)).exp(),
                 _ => 1.0 - (-(t.max(0.0) / tau).powf(0.65)).exp(),
             };
-            ohm *= 1.0 + c.signed() * warm;
+            // Heat is the square of the excitation.
+            ohm *= 1.0 + c.signed() * warm * self.excitation.powi(2);
         }
         if let Some(c) = self.causes.find(Kind::IntermittentContact) {
             let (open, dice) = &mut self.contact;
@@ -170,6 +198,7 @@ impl<'a> Gauge<'a> {
             let full = self.rig.static_contraction(self.rig.p_s() + P_ATM);
             let (bottom, top) = (self.rig.nominal_volts(0.0), self.rig.nominal_volts(full));
             v = match c.form {
+                _ if self.drawn.saturation.is_some() => self.drawn.clip(v, c.strength, bottom, top),
                 0 => v.min(top - c.strength),
                 1 => -at_least(-v, c.strength - top, 0.05_f64.min(c.strength)),
                 _ => v.max(bottom + c.strength),
@@ -183,7 +212,10 @@ impl<'a> Gauge<'a> {
             v += *spike;
         }
         if let Some(c) = self.causes.find(Kind::AmplifierLowpass) {
-            v = self.low_pass(v, c, h);
+            v = match &mut self.drawn.lowpass {
+                Some(filter) => filter.push(v, h),
+                None => self.low_pass(v, c, h),
+            };
         }
         if let Some(c) = self.causes.find(Kind::AmplifierSlew) {
             let last = self.slewed.unwrap_or(v);
@@ -217,9 +249,12 @@ impl<'a> Gauge<'a> {
     }
 }
 
-/// How much earlier the length is that a bridge sample shows, s.
+/// How much earlier the length is that a bridge sample shows, s; of a drawn one the mean.
 pub(crate) fn skew(causes: &Causes, t: f64, session: f64) -> f64 {
     causes.find(Kind::ChannelSkew).map_or(0.0, |c| {
+        if c.is_drawn() {
+            return c.signed();
+        }
         let drift = match c.form {
             // A clock that runs 0..80 ppm fast or slow, noticed since the trial began.
             0 => (c.strength / 0.02).min(1.0) * 8e-5 * (2.0 * c.aux[0] - 1.0) * t,
@@ -229,19 +264,24 @@ pub(crate) fn skew(causes: &Causes, t: f64, session: f64) -> f64 {
     })
 }
 
-/// Hum on the samples of one trial, V.
-pub(crate) fn hum(causes: &Causes, trial: usize, samples: usize) -> Vec<f64> {
+/// Hum on the samples of one trial, V; `offsets` as in [`mains`].
+pub(crate) fn hum(causes: &Causes, trial: usize, samples: usize, offsets: &[f64]) -> Vec<f64> {
     let Some(c) = causes.find(Kind::MainsHum) else { return vec![0.0; samples] };
+    if c.is_drawn() {
+        return mains(c, trial, samples, offsets);
+    }
     let mut dice = Dice::new(c.seed, trial as u64);
     let mains = if c.form == 0 { 50.0 } else { 60.0 };
     let mut phase = dice.between(0.0, std::f64::consts::TAU);
     let mut wander = 0.03 * dice.gauss();
     let h = 0.01_f64;
     (0..samples)
-        .map(|_| {
+        .map(|i| {
             wander += -wander * h / 20.0 + 0.03 * (2.0 * h / 20.0).sqrt() * dice.gauss();
             phase += std::f64::consts::TAU * (mains + wander) * h;
-            c.strength * (phase.sin() + 0.08 * (3.0 * phase).sin())
+            let late = offsets.get(i).map_or(0.0, |late| std::f64::consts::TAU * mains * late);
+            let now = phase + late;
+            c.strength * (now.sin() + 0.08 * (3.0 * now).sin())
         })
         .collect()
 }
@@ -277,7 +317,7 @@ pub(crate) fn spoil_samples(causes: &Causes, trial: usize, volts: &mut [f64]) {
 #[derive(Debug, Clone)]
 pub(crate) struct Pot<'a> {
     rig: &'a Rig,
-    nonlinearity: Option<Cause>,
+    nonlinearity: Option<(Cause, Option<Curve>)>,
     backlash: Option<Loop>,
     stiction: Option<(f64, Option<f64>)>,
 }
@@ -286,28 +326,29 @@ impl<'a> Pot<'a> {
     pub(crate) fn new(rig: &'a Rig, causes: &Causes) -> Self {
         Self {
             rig,
-            nonlinearity: causes.find(Kind::PotNonlinearity),
-            backlash: causes
-                .find(Kind::PotBacklash)
-                .map(|c| Loop::new(c.form, c.strength, c.aux[1], true)),
+            nonlinearity: causes
+                .find(Kind::PotNonlinearity)
+                .map(|c| (c, c.is_drawn().then(|| bump(c.family, &mut c.dice(1))))),
+            backlash: causes.find(Kind::PotBacklash).map(|c| Loop::of(&c, c.strength, true)),
             stiction: causes.find(Kind::PotStiction).map(|c| (c.strength, None)),
         }
     }
 
-    /// Shown length in mm at a contraction.
-    pub(crate) fn step(&mut self, k: f64) -> f64 {
+    /// Shown length in mm at a contraction, `h` seconds after the last.
+    pub(crate) fn step(&mut self, k: f64, h: f64) -> f64 {
         let mut length = L_0 * (1.0 - k);
-        if let Some(c) = self.nonlinearity {
+        if let Some((c, law)) = &self.nonlinearity {
             let y = k / self.rig.k_max();
             let pi = std::f64::consts::PI;
             length += c.signed()
                 * match c.form {
+                    _ if law.is_some() => law.as_ref().map_or(0.0, |law| law.at(y)),
                     0 => (pi * y).sin() + 0.12 * (2.0 * pi * y).sin(),
                     _ => 4.0 * y * (1.0 - y) * (0.8 + 0.4 * y),
                 };
         }
         if let Some(backlash) = &mut self.backlash {
-            length -= backlash.push(length);
+            length -= backlash.push(length, h);
         }
         if let Some((reach, shown)) = &mut self.stiction {
             let stuck = shown.get_or_insert(length);

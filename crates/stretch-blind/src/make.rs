@@ -16,8 +16,8 @@ use crate::truth::{CaseKind, Truth};
 
 /// Makes the cases of a plan under `dir` and seals their labels.
 ///
-/// Writes `case-000/`, `case-001/`, ... (a data set each: `dataset.toml` and seventeen trials;
-/// where an entry is struck out also `hint.toml` with `without = ["name"]`), `sealed/truth.json`
+/// Writes `case-000/`, `case-001/`, ... (a data set each: `dataset.toml` and seventeen trials, or
+/// eighteen; where a rig file says how much noise there is also `rig.toml`; where an entry is struck out also `hint.toml` with `without = ["name"]`), `sealed/truth.json`
 /// and `seal.sha256`. Same seed and plan, same bytes, whatever the number of threads. `progress`
 /// is told how many cases are done; it may be called from several threads.
 ///
@@ -69,6 +69,17 @@ fn write_case(folder: &Path, name: &str, case: &Case) -> Result<(), BlindError> 
         fs::write(&path, text).map_err(BlindError::io(&path))
     };
     let mut index = format!("name = \"{name}\"\nrate_hz = {RATE_HZ}.0\n");
+    if let Some([pressure, length, volts]) = case.noise {
+        index.push_str("rig = \"rig.toml\"\n");
+        write(
+            "rig.toml",
+            format!(
+                "[pneumatics]\nsigma_p = {{ value = {pressure:?} }}\n\n\
+                 [sensing]\nsigma_v = {{ value = {volts:?} }}\n\n\
+                 [reference]\nsigma_L = {{ value = {length:?} }}\n"
+            ),
+        )?;
+    }
     for recording in &case.recordings {
         let script = &recording.script;
         let _ =
@@ -89,17 +100,25 @@ fn write_case(folder: &Path, name: &str, case: &Case) -> Result<(), BlindError> 
 }
 
 fn csv(recording: &Recording) -> String {
+    let excitation = recording.script.excitation;
     let mut text = String::with_capacity(40 * recording.length_mm.len());
     text.push_str("time_s,inlet,outlet,");
     text.push_str(if recording.pressure_kpa.is_some() { "pressure_kpa," } else { "" });
-    text.push_str("length_mm,bridge_v\n");
+    text.push_str("length_mm,bridge_v");
+    text.push_str(if excitation == 1.0 { "\n" } else { ",excitation_share\n" });
     for (i, (inlet, outlet)) in recording.script.openings.iter().enumerate() {
-        let time_s = i as f64 / RATE_HZ as f64;
-        let _ = write!(text, "{time_s:.2},{inlet},{outlet},");
+        if recording.missing.get(i) == Some(&true) {
+            continue;
+        }
+        let _ = match &recording.stamps {
+            Some(stamps) => write!(text, "{:.6},{inlet},{outlet},", stamps[i]),
+            None => write!(text, "{:.2},{inlet},{outlet},", i as f64 / RATE_HZ as f64),
+        };
         if let Some(pressure) = &recording.pressure_kpa {
             let _ = write!(text, "{:.1},", pressure[i]);
         }
-        let _ = writeln!(text, "{:.3},{:.4}", recording.length_mm[i], recording.bridge_v[i]);
+        let _ = write!(text, "{:.3},{:.4}", recording.length_mm[i], recording.bridge_v[i]);
+        let _ = if excitation == 1.0 { writeln!(text) } else { writeln!(text, ",{excitation}") };
     }
     text
 }

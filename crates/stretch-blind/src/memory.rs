@@ -1,9 +1,15 @@
 //! Memories in other forms: friction loops by Dahl, Bouc and Wen, and slip elements of spread
-//! strength; relaxation by several time constants.
+//! strength; relaxation by several time constants. Drawn ones are passed on to.
+
+use crate::effect::Cause;
+use crate::friction::Friction;
+use crate::relaxation::Relaxation;
 
 /// How a friction loop turns at a reversal.
 #[derive(Debug, Clone)]
 enum Law {
+    /// Drawn from a family.
+    Drawn(Friction),
     /// dz = dx (1 - sgn(dx) z / r)^n (Dahl 1968).
     Dahl { exponent: f64 },
     /// dz = dx (1 - (g + (1 - g) sgn(dx z)) |z / r|^n) (Wen 1976).
@@ -42,8 +48,21 @@ impl Loop {
         Self { law, reach, z: 0.0, last: None }
     }
 
-    /// Feeds the next value of the driving quantity; gives z, at most the reach in size.
-    pub(crate) fn push(&mut self, x: f64) -> f64 {
+    /// The loop of a cause.
+    pub(crate) fn of(cause: &Cause, reach: f64, sharp: bool) -> Self {
+        if !cause.is_drawn() {
+            return Self::new(cause.form, reach, cause.aux[1], sharp);
+        }
+        let law = Law::Drawn(Friction::draw(cause.family, reach, sharp, &mut cause.dice(2)));
+        Self { law, reach, z: 0.0, last: None }
+    }
+
+    /// Feeds the next value of the driving quantity, `h` seconds after the last; gives z, at most
+    /// the reach in size.
+    pub(crate) fn push(&mut self, x: f64, h: f64) -> f64 {
+        if let Law::Drawn(friction) = &mut self.law {
+            return friction.push(x, h);
+        }
         let dx = x - self.last.replace(x).unwrap_or(x);
         if dx == 0.0 || self.reach <= 0.0 {
             return self.z;
@@ -69,7 +88,7 @@ impl Loop {
                     let turn = share + (1.0 - share) * (direction * self.z).signum();
                     1.0 - turn * ratio.abs().powf(exponent)
                 }
-                Law::Slip { .. } => 0.0,
+                Law::Slip { .. } | Law::Drawn(_) => 0.0,
             };
             self.z = (self.z + step * slope).clamp(-self.reach, self.reach);
         }
@@ -80,6 +99,7 @@ impl Loop {
 /// Weighted sum of first-order lags.
 #[derive(Debug, Clone)]
 pub(crate) struct Lags {
+    drawn: Option<Relaxation>,
     parts: Vec<(f64, f64, f64)>,
     settled: bool,
 }
@@ -92,11 +112,22 @@ impl Lags {
             _ => &[(0.25, 0.28), (0.7, 0.26), (1.8, 0.24), (5.0, 0.22)],
         };
         let parts = shape.iter().map(|&(scale, weight)| (tau * scale, weight, 0.0)).collect();
-        Self { parts, settled: false }
+        Self { drawn: None, parts, settled: false }
+    }
+
+    /// The lags of a cause around `tau`; `scale` is the span of what is fed.
+    pub(crate) fn of(cause: &Cause, tau: f64, scale: f64) -> Self {
+        let drawn = cause
+            .is_drawn()
+            .then(|| Relaxation::draw(cause.family, tau, scale, &mut cause.dice(3)));
+        Self { drawn, ..Self::new(cause.form, tau) }
     }
 
     /// Advances by `h` seconds at input `x` (starts settled); gives the lagged value.
     pub(crate) fn push(&mut self, x: f64, h: f64) -> f64 {
+        if let Some(drawn) = &mut self.drawn {
+            return drawn.push(x, h);
+        }
         if !self.settled {
             self.parts.iter_mut().for_each(|part| part.2 = x);
             self.settled = true;
@@ -132,15 +163,15 @@ mod tests {
         for form in 0..3 {
             for sharp in [false, true] {
                 let mut element = Loop::new(form, 0.02, 0.5, sharp);
-                element.push(0.0);
-                let early = element.push(1e-5);
+                element.push(0.0, 1e-3);
+                let early = element.push(1e-5, 1e-3);
                 assert!((early / 1e-5 - 1.0).abs() < 0.05, "{form} {sharp} {early}");
                 for i in 1..400 {
-                    element.push(1e-5 + 0.001 * f64::from(i));
+                    element.push(1e-5 + 0.001 * f64::from(i), 1e-3);
                 }
-                let up = element.push(0.4);
+                let up = element.push(0.4, 1e-3);
                 assert!(up <= 0.02 + 1e-12 && up > 0.019, "{form} {sharp} {up}");
-                let turned = element.push(0.4 - 0.005);
+                let turned = element.push(0.4 - 0.005, 1e-3);
                 assert!(turned < up, "{form}: nothing happens at a reversal");
             }
         }

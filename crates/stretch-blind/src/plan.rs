@@ -2,11 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::clutter::Clutter;
 use crate::dice::Dice;
 use crate::effect::Kind;
+use crate::family::Family;
+use crate::protocol::Protocol;
 use crate::truth::CaseKind;
 
-/// Numbers of cases by kind, and the range of the strengths.
+/// Numbers of cases by kind, the range of the strengths, and where forms and clutter come from.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     /// One effect of the catalogue, every effect in turn.
@@ -23,11 +26,18 @@ pub struct Plan {
     pub struck: usize,
     /// Least and greatest excess aimed at, log-uniform between them.
     pub excess: (f64, f64),
+    /// Family that every form is drawn from; `None` is every family in turn.
+    pub family: Option<Family>,
+    /// What is around the rigs.
+    pub clutter: Clutter,
+    /// Trials of a session.
+    pub protocol: Protocol,
 }
 
 impl Plan {
     /// Shares out `cases` as 34 % single, 28 % null, 8 % compound, 6 % dominant, 10 % out of the
-    /// catalogue, the rest struck, with excesses from 0.05 to 100.
+    /// catalogue, the rest struck, with excesses from 0.05 to 100, every family of forms in turn,
+    /// drawn clutter and the paper's trials.
     ///
     /// ```
     /// let plan = stretch_blind::Plan::of(360);
@@ -50,7 +60,22 @@ impl Plan {
             out_of_catalogue,
             struck,
             excess: (0.05, 100.0),
+            family: None,
+            clutter: Clutter::Drawn,
+            protocol: Protocol::Paper,
         }
+    }
+
+    /// The plan of the hand-written forms alone, with the same clutter around every rig.
+    ///
+    /// ```
+    /// use stretch_blind::{Clutter, Family, Plan};
+    /// let plan = Plan::of(20).plain();
+    /// assert_eq!((plan.family, plan.clutter), (Some(Family::Written), Clutter::Plain));
+    /// ```
+    #[must_use]
+    pub fn plain(self) -> Self {
+        Self { family: Some(Family::Written), clutter: Clutter::Plain, ..self }
     }
 
     /// Cases in all.
@@ -64,7 +89,8 @@ impl Plan {
             + self.struck
     }
 
-    /// What each case is to be, in random order; half of every kind with a pressure column.
+    /// What each case is to be, in random order; half of every kind with a pressure column, the
+    /// families in turn for every kind and every effect.
     pub(crate) fn orders(&self, seed: u64) -> Vec<Order> {
         let mut dice = Dice::new(seed, 0);
         let mut orders = Vec::with_capacity(self.cases());
@@ -88,11 +114,31 @@ impl Plan {
                     kind,
                     lead,
                     pressure_column: (turn + first).is_multiple_of(2),
+                    family: self.family.unwrap_or_default(),
                 });
             }
         }
         dice.shuffle(&mut orders);
+        if self.family.is_none() {
+            rotate(&mut orders, seed);
+        }
         orders
+    }
+}
+
+/// Gives every effect of every kind of case all families in turn, from one drawn for it.
+fn rotate(orders: &mut [Order], seed: u64) {
+    let mut dice = Dice::new(seed, 1);
+    let mut turns: Vec<((CaseKind, Option<Kind>), usize)> = Vec::new();
+    for order in orders {
+        let key = (order.kind, order.lead);
+        let place = turns.iter().position(|(k, _)| *k == key).unwrap_or_else(|| {
+            turns.push((key, dice.below(Family::ALL.len())));
+            turns.len() - 1
+        });
+        let turn = &mut turns[place].1;
+        order.family = Family::ALL[*turn % Family::ALL.len()];
+        *turn += 1;
     }
 }
 
@@ -103,6 +149,7 @@ pub(crate) struct Order {
     /// Its (strongest) effect.
     pub(crate) lead: Option<Kind>,
     pub(crate) pressure_column: bool,
+    pub(crate) family: Family,
 }
 
 #[cfg(test)]
@@ -125,5 +172,27 @@ mod tests {
         let counts: Vec<usize> = Kind::catalogued().iter().map(|&k| singles(k)).collect();
         assert!(counts.iter().max() <= counts.iter().min().map(|m| m + 1).as_ref(), "{counts:?}");
         assert_ne!(orders, plan.orders(2));
+    }
+
+    #[test]
+    fn families_come_in_turn_and_leave_the_rest_of_the_plan_alone() {
+        let plan = Plan::of(400);
+        let turns = plan.orders(1);
+        let count = |kind: CaseKind, lead: Option<Kind>, family: Family| {
+            let same = |o: &&Order| {
+                o.kind == kind && (lead.is_none() || o.lead == lead) && o.family == family
+            };
+            turns.iter().filter(same).count()
+        };
+        for &kind in Kind::catalogued() {
+            let each = Family::ALL.map(|family| count(CaseKind::Single, Some(kind), family));
+            assert!(each.iter().max() <= each.iter().min().map(|m| m + 1).as_ref(), "{each:?}");
+        }
+        let each = Family::ALL.map(|family| count(CaseKind::Null, None, family));
+        assert!(each.iter().all(|n| (22..=23).contains(n)), "{each:?}");
+        let one = Plan { family: Some(Family::Splines), ..plan }.orders(1);
+        let same = |(a, b): (&Order, &Order)| Order { family: b.family, ..*a } == *b;
+        assert!(turns.iter().zip(&one).all(same));
+        assert!(one.iter().all(|o| o.family == Family::Splines));
     }
 }

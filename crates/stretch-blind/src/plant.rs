@@ -1,8 +1,12 @@
 //! Valves, chamber and muscle, integrated by the classical Runge-Kutta rule.
 
+use crate::curve::Curve;
 use crate::effect::{Cause, Causes, Kind};
+use crate::laws::{damping, rising};
 use crate::memory::{Lags, Loop};
 use crate::rig::{P_ATM, P_REF, R_T, RHO_0, Rig, V_0};
+use crate::supply::Sag;
+use crate::valves::{DeadBand, Delay};
 
 /// Flow at which the sag of the supply is scaled, kg/s.
 const Q_REF: f64 = 6e-4;
@@ -37,6 +41,32 @@ pub(crate) struct Plant<'a> {
     deadband: Option<Cause>,
     crossflow: Option<Cause>,
     delay: Option<Cause>,
+    drawn: Drawn,
+}
+
+/// Laws that are drawn for the causes at work.
+#[derive(Debug, Clone)]
+struct Drawn {
+    sag: Option<Sag>,
+    leak: Option<Curve>,
+    volume: Option<Curve>,
+    damping: Option<Curve>,
+    deadband: Option<DeadBand>,
+    delay: Option<Delay>,
+}
+
+impl Drawn {
+    fn of(causes: &Causes) -> Self {
+        let find = |kind| causes.find(kind).filter(Cause::is_drawn);
+        Self {
+            sag: find(Kind::SupplySag).map(|c| Sag::draw(c.family, c.strength, &mut c.dice(1))),
+            leak: find(Kind::Leak).map(|c| rising(c.family, &mut c.dice(1))),
+            volume: find(Kind::ChamberVolume).map(|c| rising(c.family, &mut c.dice(1))),
+            damping: find(Kind::CrossbeamInertia).map(|c| damping(c.family, &mut c.dice(1))),
+            deadband: find(Kind::ValveDeadband).map(|c| DeadBand::draw(c.family, &mut c.dice(1))),
+            delay: find(Kind::ValveDelay).map(|c| Delay::draw(c.family, &mut c.dice(1))),
+        }
+    }
 }
 
 /// What drives a step: conductance shares of the valves and the supply, Pa absolute.
@@ -51,11 +81,11 @@ impl<'a> Plant<'a> {
     pub(crate) fn new(rig: &'a Rig, causes: &Causes) -> Self {
         let hysteresis = causes.find(Kind::MuscleHysteresis).map(|c| {
             let reach = 0.58 * c.log_aux(0, 0.006, 0.05);
-            (c.strength, Loop::new(c.form, reach, c.aux[1], false))
+            (c.strength, Loop::of(&c, reach, false))
         });
         let creep = causes
             .find(Kind::MuscleCreep)
-            .map(|c| (c.strength, Lags::new(c.form, c.log_aux(0, 0.7, 25.0))));
+            .map(|c| (c.strength, Lags::of(&c, c.log_aux(0, 0.7, 25.0), 0.16)));
         Self {
             rig,
             state: [P_ATM, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -80,6 +110,7 @@ impl<'a> Plant<'a> {
             deadband: causes.find(Kind::ValveDeadband),
             crossflow: causes.find(Kind::OutletCrossflow),
             delay: causes.find(Kind::ValveDelay),
+            drawn: Drawn::of(causes),
         }
     }
 
@@ -103,12 +134,17 @@ impl<'a> Plant<'a> {
         self.state[0] = p;
         self.state[4] = 0.0;
         self.state[5] = 0.0;
+        if let Some(sag) = &mut self.drawn.sag {
+            sag.reset();
+        }
     }
 
     /// Conductance share of an opening, 0..1.
     fn share(&self, u: f64, side: usize) -> f64 {
         let mut u = u;
-        if let Some(c) = self.deadband {
+        if let Some((c, law)) = self.deadband.zip(self.drawn.deadband.as_ref()) {
+            u = law.pass(u, c.strength, side);
+        } else if let Some(c) = self.deadband {
             // The two valves differ a little; no stretching of what is left.
             let band = c.strength * if side == 0 { 1.0 } else { 0.8 + 0.4 * c.aux[0] };
             u = match c.form {
@@ -145,6 +181,7 @@ impl<'a> Plant<'a> {
     /// Conductance share of a valve over a step, with whatever delays it.
     fn valve(&mut self, command: &impl Fn(f64) -> (f64, f64), t: f64, h: f64, side: usize) -> f64 {
         let mut share = match self.delay {
+            Some(c) if c.is_drawn() => self.drawn_delay(c, command, t, h, side),
             None => self.mean_share(command, t, h, 0.0, side),
             Some(c) => match c.form {
                 0 => {
@@ -190,12 +227,30 @@ impl<'a> Plant<'a> {
         share
     }
 
+    fn drawn_delay(
+        &mut self,
+        c: Cause,
+        command: &impl Fn(f64) -> (f64, f64),
+        t: f64,
+        h: f64,
+        side: usize,
+    ) -> f64 {
+        let Some(law) = &self.drawn.delay else { return 0.0 };
+        let (inlet, outlet) = command(t + 1e-9);
+        let opening = if side == 0 { inlet } else { outlet };
+        let mut lag = self.valve_lag[side];
+        let late = |late| self.mean_share(command, t, h, late, side);
+        let share = law.share(c.strength, (side, opening, h), late, &mut lag);
+        self.valve_lag[side] = lag;
+        share
+    }
+
     /// Change of the static contraction by the muscle's memories, fed once a step.
     fn offset(&mut self, h: f64) -> f64 {
         let k = self.rig.static_contraction(self.pressure());
         let mut offset = 0.0;
         if let Some((strength, memory)) = &mut self.hysteresis {
-            offset -= *strength * memory.push(k);
+            offset -= *strength * memory.push(k, h);
         }
         if let Some((share, lags)) = &mut self.creep {
             offset += *share * (lags.push(k, h) - k);
@@ -218,19 +273,44 @@ impl<'a> Plant<'a> {
         offset
     }
 
+    /// Flow that is lost at an absolute pressure, kg/s.
+    fn leak_flow(&self, c: Cause, p: f64) -> f64 {
+        if let Some(law) = &self.drawn.leak {
+            return c.strength * P_REF * law.at((p - P_ATM) / P_REF);
+        }
+        match c.form {
+            0 => self.rig.flow(c.strength * P_REF / (RHO_0 * (P_REF + P_ATM)), p, P_ATM),
+            _ => {
+                let scale = (P_REF + P_ATM).powi(2) - P_ATM.powi(2);
+                c.strength * P_REF * (p * p - P_ATM * P_ATM) / scale
+            }
+        }
+    }
+
+    /// Acceleration of a crossbeam of some inertia.
+    fn acceleration(&self, c: Cause, y: &State) -> f64 {
+        let omega = 1.0 / c.strength;
+        let spring = omega * omega * (y[1] - y[2]);
+        if let Some(law) = &self.drawn.damping {
+            // Speeds count in tenths of the natural one.
+            let u = y[3] / (0.1 * omega);
+            return spring - 0.2 * omega * omega * law.at((u + 2.0) / 4.0);
+        }
+        let damping = match c.form {
+            0 => 0.17 + 0.1 * c.aux[0] + 0.12 * y[3].abs() / (0.1 * omega),
+            _ if y[3] > 0.0 => 0.2,
+            _ => 0.33,
+        };
+        spring - 2.0 * damping * omega * y[3]
+    }
+
     fn derivative(&self, y: &State, drive: Drive, offset: f64) -> State {
         let rig = self.rig;
         let p = y[0] * (1.0 + y[5]);
         let q_in = rig.flow(rig.c_in() * drive.inlet, drive.supply - y[4], p);
         let mut q_out = rig.flow(rig.c_out() * drive.outlet, p, P_ATM);
         if let Some(c) = self.leak {
-            q_out += match c.form {
-                0 => rig.flow(c.strength * P_REF / (RHO_0 * (P_REF + P_ATM)), p, P_ATM),
-                _ => {
-                    let scale = (P_REF + P_ATM).powi(2) - P_ATM.powi(2);
-                    c.strength * P_REF * (p * p - P_ATM * P_ATM) / scale
-                }
-            };
+            q_out += self.leak_flow(c, p);
         }
         let mut d = [0.0; 6];
         let target = rig.static_contraction(p) + offset;
@@ -241,14 +321,8 @@ impl<'a> Plant<'a> {
         }
         d[1] = (target - y[1]) / tau;
         if let Some(c) = self.inertia {
-            let omega = 1.0 / c.strength;
-            let damping = match c.form {
-                0 => 0.17 + 0.1 * c.aux[0] + 0.12 * y[3].abs() / (0.1 * omega),
-                _ if y[3] > 0.0 => 0.2,
-                _ => 0.33,
-            };
             d[2] = y[3];
-            d[3] = omega * omega * (y[1] - y[2]) - 2.0 * damping * omega * y[3];
+            d[3] = self.acceleration(c, y);
         } else {
             d[2] = d[1];
         }
@@ -256,7 +330,9 @@ impl<'a> Plant<'a> {
         let mut volume = V_0;
         if let Some(c) = self.volume {
             let x = y[2] / rig.k_max();
+            let law = self.drawn.volume.as_ref();
             let (shape, slope) = match c.form {
+                _ if law.is_some() => law.map_or((0.0, 0.0), |v| (v.at(x), v.slope(x))),
                 0 => (1.35 * x - 0.35 * x * x, 1.35 - 0.7 * x),
                 _ => {
                     let quarter = std::f64::consts::FRAC_PI_2 * 0.9;
@@ -271,7 +347,8 @@ impl<'a> Plant<'a> {
         if let Some(c) = self.adiabatic {
             d[5] = 0.4 * d[0] / y[0] - y[5] / c.strength;
         }
-        if let Some(c) = self.sag {
+        // A drawn sag stands still within a step.
+        if let Some(c) = self.sag.filter(|c| !c.is_drawn()) {
             let tau = 0.25 + 0.5 * c.aux[0];
             let scale = c.strength * Q_REF;
             d[4] = match c.form {
@@ -304,6 +381,11 @@ impl<'a> Plant<'a> {
         }
         let drive = Drive { inlet, outlet, supply };
         let offset = self.offset(h);
+        if self.drawn.sag.is_some() {
+            let conductance = self.rig.c_in() * inlet;
+            let flow = self.rig.flow(conductance, supply - self.state[4], self.pressure());
+            self.state[4] = self.drawn.sag.as_mut().map_or(0.0, |sag| sag.push(flow, h));
+        }
         let y = self.state;
         let add = |d: &State, s: f64| -> State { std::array::from_fn(|i| y[i] + s * d[i]) };
         let before = self.pressure();

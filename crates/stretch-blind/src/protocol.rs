@@ -9,6 +9,36 @@ pub(crate) const RATE_HZ: usize = 100;
 /// Pause between trials, s.
 pub(crate) const PAUSE_S: f64 = 15.0;
 
+/// Which trials a session has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+pub enum Protocol {
+    /// The seventeen trials of the paper.
+    #[default]
+    #[serde(rename = "paper")]
+    Paper,
+    /// One more to fit: an arbitrary trial at [`LOW_EXCITATION`] of the excitation, which parts a
+    /// sleeve that goes slack from an amplifier that saturates.
+    #[serde(rename = "paper+")]
+    PaperPlus,
+}
+
+impl Protocol {
+    /// Both, in the order of reports.
+    pub const ALL: [Self; 2] = [Self::Paper, Self::PaperPlus];
+
+    /// Name as options write it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::PaperPlus => "paper+",
+        }
+    }
+}
+
+/// Share of the nominal excitation in the further trial of [`Protocol::PaperPlus`].
+pub const LOW_EXCITATION: f64 = 0.7;
+
 /// What a trial may be used for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -25,6 +55,10 @@ pub(crate) struct Script {
     pub(crate) opening: Option<f64>,
     pub(crate) start_s: f64,
     pub(crate) split: Split,
+    /// Pause before it, s.
+    pub(crate) pause_s: f64,
+    /// Share of the nominal excitation.
+    pub(crate) excitation: f64,
     /// Whether it starts settled at the supply pressure, else at the atmosphere.
     pub(crate) from_full: bool,
     /// Inlet and outlet opening of every sample, 0..1.
@@ -35,13 +69,24 @@ const RAMPS: [(f64, &str); 6] =
     [(0.0025, "0_25"), (0.125, "12_5"), (0.25, "25"), (0.5, "50"), (0.75, "75"), (1.0, "100")];
 
 /// The trials of a session: six inflations, six deflations, then two trials to fit and three to
-/// test on.
-pub(crate) fn session(dice: &mut Dice) -> Vec<Script> {
+/// test on; then whatever more the protocol has.
+pub(crate) fn session(protocol: Protocol, dice: &mut Dice) -> Vec<Script> {
     let mut scripts = Vec::new();
     let mut start_s = 0.0;
+    let (pause_s, excitation) = (PAUSE_S, 1.0);
     let mut add = |file: String, kind, opening, split, from_full, openings: Vec<(f64, f64)>| {
         let duration_s = openings.len() as f64 / RATE_HZ as f64;
-        scripts.push(Script { file, kind, opening, start_s, split, from_full, openings });
+        scripts.push(Script {
+            file,
+            kind,
+            opening,
+            start_s,
+            split,
+            pause_s,
+            excitation,
+            from_full,
+            openings,
+        });
         start_s += duration_s + PAUSE_S;
     };
     for (opening, label) in RAMPS {
@@ -57,6 +102,25 @@ pub(crate) fn session(dice: &mut Dice) -> Vec<Script> {
     add("arbitrary_2.csv".into(), "arbitrary", None, Split::Test, false, arbitrary(dice));
     add("arbitrary_3.csv".into(), "arbitrary", None, Split::Test, false, arbitrary(dice));
     add("pulses_2.csv".into(), "pulses", None, Split::Test, false, pulses(dice));
+    if protocol == Protocol::PaperPlus {
+        add("arbitrary_low.csv".into(), "arbitrary", None, Split::Fit, false, arbitrary(dice));
+        scripts.iter_mut().skip(17).for_each(|script| script.excitation = LOW_EXCITATION);
+    }
+    scripts
+}
+
+/// The same session with other pauses.
+pub(crate) fn with_pauses(mut scripts: Vec<Script>, mut pause: impl FnMut() -> f64) -> Vec<Script> {
+    let mut start_s = 0.0;
+    for (i, script) in scripts.iter_mut().enumerate() {
+        if i > 0 {
+            script.pause_s = pause();
+            start_s += script.pause_s;
+        }
+        // Written to a hundredth, as pauses are.
+        script.start_s = (start_s * 100.0).round() / 100.0;
+        start_s += script.openings.len() as f64 / RATE_HZ as f64;
+    }
     scripts
 }
 
@@ -114,7 +178,7 @@ mod tests {
 
     #[test]
     fn a_session_has_seventeen_trials_and_480_s() {
-        let scripts = session(&mut Dice::new(1, 1));
+        let scripts = session(Protocol::Paper, &mut Dice::new(1, 1));
         assert_eq!(scripts.len(), 17);
         assert_eq!(scripts.iter().map(|s| s.openings.len()).sum::<usize>(), 480 * RATE_HZ);
         assert_eq!(scripts.iter().filter(|s| s.split == Split::Test).count(), 3);
@@ -124,5 +188,16 @@ mod tests {
             // Never both valves at once.
             assert!(script.openings.iter().all(|&(i, o)| i * o == 0.0));
         }
+    }
+
+    #[test]
+    fn paper_plus_is_the_paper_and_one_trial_more() {
+        let [paper, plus] = Protocol::ALL.map(|p| session(p, &mut Dice::new(1, 1)));
+        assert_eq!(paper, plus[..17]);
+        let more = &plus[17];
+        assert_eq!((plus.len(), more.split, more.excitation), (18, Split::Fit, LOW_EXCITATION));
+        let spread = with_pauses(plus.clone(), || 20.0);
+        assert_eq!(spread[0], plus[0]);
+        assert_eq!(spread[13].start_s, plus[13].start_s + 13.0 * 5.0);
     }
 }

@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
+use crate::by_family::FamilyRow;
 use crate::error::BlindError;
+use crate::family::Family;
 use crate::rate::{Calibration, Rate};
 use crate::truth::{CaseKind, Label, Truth, are_twins};
 use crate::verdict::Verdict;
@@ -17,7 +19,7 @@ pub const STAND_IN: f64 = 0.85;
 /// Answers to single effects with at least [`COUNTED_EXCESS`].
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Singles {
-    /// First name right.
+    /// First name right, a declared tie that holds the truth counted right.
     pub top1: Rate,
     /// The same for an excess above 10, 1 .. 10, 0.1 .. 1.
     pub top1_above_10: Rate,
@@ -27,8 +29,23 @@ pub struct Singles {
     pub top1_below_1: Rate,
     /// First name right or its known twin.
     pub top1_twins: Rate,
-    /// Exactly the one effect named.
+    /// First name right, whatever ties were declared.
+    #[serde(default)]
+    pub first_name: Rate,
+    /// Exactly the one effect named, a declared tie that holds the truth counted right.
     pub exact: Rate,
+    /// Called a part of the gap, by a `partial`.
+    #[serde(default)]
+    pub partial: Rate,
+    /// A tie was declared.
+    #[serde(default)]
+    pub tied: Rate,
+    /// Mean number of names in a tie declared, the one named included.
+    #[serde(default)]
+    pub tie_size: Option<f64>,
+    /// Called an error of the record or the rig file.
+    #[serde(default)]
+    pub false_record: Rate,
     /// Stage right.
     pub stage: Rate,
     /// The effect is in the 95 % set (of cases whose set is not empty).
@@ -132,19 +149,26 @@ pub struct Score {
     pub unanswered: Vec<String>,
     /// Single effects.
     pub singles: Singles,
-    /// Nulls on which an effect was named or the gap was called unknown.
+    /// Nulls on which an effect was named, the gap was called unknown, or the record wrong.
     pub false_alarms: Rate,
     /// Nulls on which an effect was named.
     pub false_names: Rate,
     /// Probability of the first candidate against truth, over the singles counted.
     pub calibration: Calibration,
+    /// Probability of `unknown` against truth, over every case where one was stated and the excess
+    /// counts.
+    #[serde(default)]
+    pub calibration_unknown: Calibration,
     /// Two effects.
     pub compounds: Several,
     /// One strong effect and three weak ones.
     pub dominants: Several,
     /// Effects out of the catalogue answered `unknown`, excess at least [`COUNTED_EXCESS`].
     pub foreign_caught: Rate,
-    /// The same, by effect.
+    /// An effect named for one out of the catalogue.
+    #[serde(default)]
+    pub foreign_named: Rate,
+    /// Caught, by effect.
     pub foreign_by_effect: BTreeMap<String, Rate>,
     /// Effects out of the catalogue placed in their stage.
     pub foreign_stage: Rate,
@@ -165,6 +189,9 @@ pub struct Score {
     /// Simpler methods, by name.
     #[serde(default)]
     pub baselines: BTreeMap<String, Baseline>,
+    /// Figures by family of forms, where there is more than one.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub families: BTreeMap<Family, FamilyRow>,
     /// Every wrong answer.
     pub misses: Vec<Miss>,
     /// Median, 95th percentile and greatest time of a diagnosis, s.
@@ -179,6 +206,7 @@ impl Score {
     /// not belong together.
     pub fn of(truth: &Truth, verdicts: &[Verdict]) -> Result<Self, BlindError> {
         let mut tally = Tally::default();
+        let mut families: BTreeMap<Family, Tally> = BTreeMap::new();
         let mut seen = BTreeSet::new();
         for verdict in verdicts {
             let case = &verdict.case;
@@ -190,10 +218,16 @@ impl Score {
                 return Err(BlindError::DuplicateCase { case: case.clone() });
             }
             tally.add(label, verdict);
+            families.entry(label.family).or_default().add(label, verdict);
         }
         let missing = truth.cases.keys().filter(|case| !seen.contains(*case));
         tally.score.unanswered = missing.cloned().collect();
-        Ok(tally.finish())
+        let mut score = tally.finish();
+        if families.len() > 1 {
+            let row = |(family, tally): (Family, Tally)| (family, FamilyRow::of(&tally.finish()));
+            score.families = families.into_iter().map(row).collect();
+        }
+        Ok(score)
     }
 }
 
@@ -202,6 +236,8 @@ impl Score {
 struct Tally {
     score: Score,
     outcomes: Vec<(f64, bool)>,
+    unknowns: Vec<(f64, bool)>,
+    tie_sizes: Vec<f64>,
     set_sizes: Vec<f64>,
     closed: Vec<f64>,
     closed_all: Vec<f64>,
@@ -216,6 +252,10 @@ impl Tally {
         for (method, named) in &verdict.baselines {
             let one = self.score.baselines.entry(method.clone()).or_default();
             one.add(label, named.as_ref());
+        }
+        let lacking = matches!(label.kind, CaseKind::OutOfCatalogue | CaseKind::Struck);
+        if label.kind == CaseKind::Null || label.excess >= COUNTED_EXCESS {
+            self.unknowns.extend(verdict.unknown().map(|p| (p, lacking)));
         }
         let right = match label.kind {
             CaseKind::Single => self.single(label, verdict),
@@ -248,7 +288,8 @@ impl Tally {
     fn single(&mut self, label: &Label, verdict: &Verdict) -> bool {
         let Some(effect) = label.effects.first() else { return false };
         let answer = verdict.answer();
-        let top1 = answer.first() == Some(effect);
+        let first_name = answer.first() == Some(effect);
+        let top1 = first_name || verdict.ties().contains(effect);
         if label.excess < COUNTED_EXCESS {
             if !answer.is_empty() {
                 self.score.singles.faint_named.add(top1);
@@ -257,8 +298,10 @@ impl Tally {
             return answer.is_empty() || top1;
         }
         self.confuse(effect, verdict);
+        self.tie(verdict);
         let singles = &mut self.score.singles;
         singles.top1.add(top1);
+        singles.first_name.add(first_name);
         let band = match label.excess {
             x if x > 10.0 => &mut singles.top1_above_10,
             x if x > 1.0 => &mut singles.top1_1_to_10,
@@ -267,7 +310,10 @@ impl Tally {
         band.add(top1);
         let twin = |name: &String| are_twins(name, effect, label.pressure_column);
         singles.top1_twins.add(top1 || answer.first().is_some_and(twin));
-        singles.exact.add(answer.len() == 1 && top1);
+        let exact = answer.len() == 1 && top1;
+        singles.exact.add(exact);
+        singles.partial.add(verdict.verdict == "partial");
+        singles.false_record.add(verdict.verdict == "record");
         singles.stage.add(in_stage(label, verdict));
         singles.false_unknown.add(verdict.verdict == "unknown");
         singles.overlooked.add(["no_gap", "parameters"].contains(&verdict.verdict.as_str()));
@@ -281,8 +327,8 @@ impl Tally {
             singles.singletons_right.add(covered);
         }
         self.score.by_effect.entry(effect.clone()).or_default().add(top1);
-        if let Some((effects, probability)) = verdict.candidates.first() {
-            self.outcomes.push((*probability, effects.first() == Some(effect)));
+        if let Some((names, probability)) = verdict.belief() {
+            self.outcomes.push((probability, names.contains(&effect)));
         }
         self.closed_all.push(verdict.closed);
         if top1 {
@@ -291,7 +337,16 @@ impl Tally {
         if let Some(oracle) = verdict.closed_oracle {
             self.oracle.push((verdict.closed, oracle));
         }
-        top1
+        exact
+    }
+
+    fn tie(&mut self, verdict: &Verdict) {
+        let answer = verdict.answer();
+        let tied = verdict.ties().iter().filter(|name| !answer.contains(name)).count();
+        self.score.singles.tied.add(tied > 0);
+        if tied > 0 {
+            self.tie_sizes.push(1.0 + tied as f64);
+        }
     }
 
     fn null(&mut self, verdict: &Verdict) -> bool {
@@ -308,6 +363,7 @@ impl Tally {
             return caught || verdict.answer().is_empty();
         }
         self.score.foreign_caught.add(caught);
+        self.score.foreign_named.add(!verdict.answer().is_empty());
         self.score.foreign_stage.add(in_stage(label, verdict));
         for effect in &label.effects {
             self.score.foreign_by_effect.entry(effect.clone()).or_default().add(caught);
@@ -341,9 +397,10 @@ impl Tally {
     fn finish(mut self) -> Score {
         let score = &mut self.score;
         score.calibration = Calibration::of(&self.outcomes);
-        let sizes = &self.set_sizes;
-        score.singles.set_size =
-            (!sizes.is_empty()).then(|| sizes.iter().sum::<f64>() / sizes.len() as f64);
+        score.calibration_unknown = Calibration::of(&self.unknowns);
+        let mean = |x: &[f64]| (!x.is_empty()).then(|| x.iter().sum::<f64>() / x.len() as f64);
+        score.singles.set_size = mean(&self.set_sizes);
+        score.singles.tie_size = mean(&self.tie_sizes);
         score.closed = quantile(&mut self.closed, 0.5);
         score.closed_all = quantile(&mut self.closed_all, 0.5);
         let (mut beside, mut oracle): (Vec<f64>, Vec<f64>) = self.oracle.into_iter().unzip();
@@ -359,21 +416,24 @@ impl Tally {
     }
 }
 
+/// A name that is not there is excused by an effect that is there, was not named, and stands in the
+/// tie declared.
 fn several(several: &mut Several, label: &Label, verdict: &Verdict) -> bool {
     let answer = verdict.answer();
-    let found = label.effects.iter().filter(|e| answer.contains(e)).count();
+    let named = label.effects.iter().filter(|e| answer.contains(e)).count();
+    let tied = |e: &&String| !answer.contains(e) && verdict.ties().contains(e);
+    let excused = label.effects.iter().filter(tied).count().min(answer.len() - named);
+    let found = named + excused;
     several.all_named.add(found == label.effects.len());
     several.one_named.add(found > 0);
     let strongest = label.dominant.as_ref().or(label.effects.first());
-    several.strongest_named.add(strongest.is_some_and(|e| answer.contains(e)));
-    for effect in &label.effects {
-        several.recall.add(answer.contains(effect));
-    }
-    for name in answer {
-        several.precision.add(label.effects.contains(name));
-    }
+    let strongest = strongest
+        .is_some_and(|e| answer.contains(e) || (excused > 0 && verdict.ties().contains(e)));
+    several.strongest_named.add(strongest);
+    (0..label.effects.len()).for_each(|i| several.recall.add(i < found));
+    (0..answer.len()).for_each(|i| several.precision.add(i < found));
     match label.kind {
-        CaseKind::Dominant => strongest.is_some_and(|e| answer.contains(e)),
+        CaseKind::Dominant => strongest,
         _ => found == label.effects.len() && answer.len() == found,
     }
 }

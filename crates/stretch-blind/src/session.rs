@@ -1,11 +1,14 @@
 //! One session on a rig: every trial after the other, memories carried through the pauses.
 
+use crate::clutter::{Drawn, Surroundings};
+use crate::curve::hermite;
 use crate::dice::Dice;
-use crate::effect::Causes;
+use crate::effect::{Cause, Causes, Kind};
 use crate::gauge::{Gauge, Instant, Pot, hum, skew, spoil_samples};
 use crate::plant::Plant;
 use crate::protocol::{PAUSE_S, RATE_HZ, Script};
 use crate::rig::{P_ATM, Rig};
+use crate::timing::Wander;
 
 /// Steps of a sample while a session is recorded: 0.5 ms each.
 pub(crate) const FINE: usize = 20;
@@ -22,16 +25,17 @@ const KNOT_S: f64 = 0.1;
 #[derive(Debug, Clone)]
 pub(crate) struct Conditions {
     supply: Vec<f64>,
+    /// Of each trial: Pa above the atmosphere, or the share of the supply that it lacks.
     start_error: Vec<f64>,
+    /// How much later than on the grid each sample of a trial is taken, s; empty when on the grid.
+    offsets: Vec<Vec<f64>>,
 }
 
 impl Conditions {
     /// A supply that wanders by 0.25 % (1 sd) over some 15 s, and start pressures 0.1 kPa above
     /// the atmosphere or 0.1 % below the supply, roughly.
-    pub(crate) fn draw(scripts: &[Script], dice: &mut Dice) -> Self {
-        let duration: f64 =
-            scripts.iter().map(|s| s.openings.len() as f64 / RATE_HZ as f64 + PAUSE_S).sum();
-        let knots = ((duration + PREPARE_S) / KNOT_S) as usize + 3;
+    pub(crate) fn plain(scripts: &[Script], dice: &mut Dice) -> Self {
+        let knots = knots(scripts);
         let (slow_s, smooth_s) = (15.0, 1.5);
         let mut slow = dice.gauss();
         let mut smooth = slow;
@@ -42,8 +46,36 @@ impl Conditions {
                 0.0025 * smooth
             })
             .collect();
-        let start_error = scripts.iter().map(|_| dice.gauss().abs()).collect();
-        Self { supply, start_error }
+        let start_error = scripts.iter().map(|script| {
+            let error = dice.gauss().abs();
+            if script.from_full { 0.001 * error } else { 100.0 * error }
+        });
+        Self {
+            supply,
+            start_error: start_error.collect(),
+            offsets: vec![Vec::new(); scripts.len()],
+        }
+    }
+
+    /// As the surroundings have it.
+    pub(crate) fn draw(scripts: &[Script], around: &Surroundings, dice: &mut Dice) -> Self {
+        let Some(drawn) = around.drawn else { return Self::plain(scripts, dice) };
+        Self::of(scripts, &drawn, dice)
+    }
+
+    fn of(scripts: &[Script], drawn: &Drawn, dice: &mut Dice) -> Self {
+        let supply = drawn.supply.knots(knots(scripts), KNOT_S, dice);
+        let error = |script: &Script| {
+            if script.from_full { drawn.starts.full(dice) } else { drawn.starts.empty(dice) }
+        };
+        let start_error = scripts.iter().map(error).collect();
+        let offsets = scripts.iter().map(|s| drawn.offsets(s.openings.len(), dice)).collect();
+        Self { supply, start_error, offsets }
+    }
+
+    /// How much later than on the grid the samples of a trial are taken, s.
+    pub(crate) fn offsets(&self, trial: usize) -> &[f64] {
+        &self.offsets[trial]
     }
 
     fn supply(&self, session: f64) -> f64 {
@@ -52,6 +84,28 @@ impl Conditions {
         let (low, high) = (self.supply[knot], self.supply[knot + 1]);
         low + (high - low) * (at - knot as f64)
     }
+}
+
+/// Knots that the supply needs over a session.
+fn knots(scripts: &[Script]) -> usize {
+    let duration: f64 =
+        scripts.iter().map(|s| s.openings.len() as f64 / RATE_HZ as f64 + s.pause_s).sum();
+    ((duration + PREPARE_S) / KNOT_S) as usize + 3
+}
+
+/// Values at the times that samples are taken at, from those on the grid.
+fn resampled(values: Vec<f64>, offsets: &[f64]) -> Vec<f64> {
+    if offsets.is_empty() {
+        return values;
+    }
+    let last = values.len() - 1;
+    let at = |i: isize| values[i.clamp(0, last as isize) as usize];
+    let value = |(i, late): (usize, &f64)| {
+        let share = late * RATE_HZ as f64;
+        let low = i as isize + share.floor() as isize;
+        hermite([at(low - 1), at(low), at(low + 1), at(low + 2)], share - share.floor())
+    };
+    offsets.iter().enumerate().map(value).collect()
 }
 
 /// What a trial shows before noise and rounding, 100 samples a second.
@@ -65,6 +119,8 @@ pub(crate) struct Trace {
     pub(crate) shadow: Vec<f64>,
     /// Amplified voltage, V.
     pub(crate) volts: Vec<f64>,
+    /// Share of the nominal excitation.
+    pub(crate) excitation: f64,
     /// Least strain of the sleeve.
     pub(crate) least_strain: f64,
 }
@@ -77,7 +133,7 @@ pub(crate) fn run(
     conditions: &Conditions,
     fine: usize,
 ) -> Vec<Trace> {
-    let oscillation = causes.find(crate::effect::Kind::SupplyOscillation);
+    let oscillation = causes.find(Kind::SupplyOscillation);
     let supply = |session: f64| {
         let mut share = 1.0 + conditions.supply(session);
         if let Some(c) = oscillation {
@@ -92,22 +148,21 @@ pub(crate) fn run(
         gauge: Gauge::new(rig, causes),
         pot: Pot::new(rig, causes),
         causes,
+        skew: causes.find(Kind::ChannelSkew).filter(Cause::is_drawn).map(Wander::draw),
         supply: &supply,
     };
-    bench.pause(true, P_ATM + rig.p_s(), -PREPARE_S);
+    bench.pause(true, P_ATM + rig.p_s(), (-PREPARE_S, PAUSE_S));
     let mut traces = Vec::with_capacity(scripts.len());
     for (trial, script) in scripts.iter().enumerate() {
         let error = conditions.start_error[trial];
-        let start = if script.from_full {
-            supply(script.start_s) * (1.0 - 0.001 * error)
-        } else {
-            P_ATM + 100.0 * error
-        };
-        bench.pause(script.from_full, start, script.start_s - PAUSE_S);
+        let start =
+            if script.from_full { supply(script.start_s) * (1.0 - error) } else { P_ATM + error };
+        let pause = (script.start_s - script.pause_s, script.pause_s);
+        bench.pause(script.from_full, start, pause);
         if trial == 0 {
             bench.gauge.begin_session();
         }
-        traces.push(bench.record(rig, trial, script, fine));
+        traces.push(bench.record(rig, (trial, conditions.offsets(trial)), script, fine));
     }
     traces
 }
@@ -118,26 +173,28 @@ struct Bench<'a, S: Fn(f64) -> f64> {
     gauge: Gauge<'a>,
     pot: Pot<'a>,
     causes: &'a Causes,
+    skew: Option<Wander>,
     supply: &'a S,
 }
 
 impl<S: Fn(f64) -> f64> Bench<'_, S> {
-    /// Fills or vents for half a pause, then holds the pressure that the next trial starts from.
-    fn pause(&mut self, fill: bool, target: f64, begin: f64) {
+    /// Fills or vents for half a pause (when it begins, how long it is), then holds the pressure that
+    /// the next trial starts from.
+    fn pause(&mut self, fill: bool, target: f64, (begin, pause_s): (f64, f64)) {
         let h = 1.0 / (RATE_HZ * PAUSE) as f64;
-        let steps = (PAUSE_S / h).round() as usize;
+        let steps = (pause_s / h).round() as usize;
         let open = if fill { (1.0, 0.0) } else { (0.0, 1.0) };
         for i in 0..steps {
             let t = i as f64 * h;
             // Valves shut at the end in time for the slowest of them.
             let command =
-                |time: f64| if (0.0..0.5 * PAUSE_S).contains(&time) { open } else { (0.0, 0.0) };
+                |time: f64| if (0.0..0.5 * pause_s).contains(&time) { open } else { (0.0, 0.0) };
             self.plant.step(&command, t, h, (self.supply)(begin + t));
-            if t > 0.6 * PAUSE_S {
+            if t > 0.6 * pause_s {
                 self.plant.regulate(target);
             }
             let now = self.instant((0.0, 0.0));
-            self.pot.step(now.k);
+            self.pot.step(now.k, h);
             if self.gauge.active() {
                 self.gauge.step(now, 0.0, begin + t, h);
             }
@@ -148,7 +205,13 @@ impl<S: Fn(f64) -> f64> Bench<'_, S> {
         Instant { k: self.plant.contraction(), p: self.plant.pressure(), openings }
     }
 
-    fn record(&mut self, rig: &Rig, trial: usize, script: &Script, fine: usize) -> Trace {
+    fn record(
+        &mut self,
+        rig: &Rig,
+        (trial, offsets): (usize, &[f64]),
+        script: &Script,
+        fine: usize,
+    ) -> Trace {
         let h = 1.0 / (RATE_HZ * fine) as f64;
         let samples = script.openings.len();
         let command = |time: f64| {
@@ -157,12 +220,16 @@ impl<S: Fn(f64) -> f64> Bench<'_, S> {
             }
             script.openings[((time * RATE_HZ as f64) as usize).min(samples - 1)]
         };
-        let mut trace = Trace { least_strain: f64::INFINITY, ..Trace::default() };
+        let mut trace = Trace {
+            excitation: script.excitation,
+            least_strain: f64::INFINITY,
+            ..Trace::default()
+        };
         let mut path = Vec::with_capacity(samples * fine);
         for step in 0..samples * fine {
             let t = step as f64 * h;
             let now = self.instant(command(t + 1e-9));
-            let length = self.pot.step(now.k);
+            let length = self.pot.step(now.k, h);
             path.push(now);
             trace.least_strain = trace.least_strain.min(rig.strain(now.k));
             if step % fine == 0 {
@@ -172,20 +239,33 @@ impl<S: Fn(f64) -> f64> Bench<'_, S> {
             }
             self.plant.step(&command, t, h, (self.supply)(script.start_s + t));
         }
-        trace.volts = self.volts(trial, script, &path, fine);
+        for channel in [&mut trace.pressure, &mut trace.length, &mut trace.shadow] {
+            *channel = resampled(std::mem::take(channel), offsets);
+        }
+        trace.volts = self.volts((trial, offsets), script, &path, fine);
         trace
     }
 
     /// Voltages of a recorded path: the skew needs to look ahead, so the path comes first.
-    fn volts(&mut self, trial: usize, script: &Script, path: &[Instant], fine: usize) -> Vec<f64> {
+    fn volts(
+        &mut self,
+        (trial, offsets): (usize, &[f64]),
+        script: &Script,
+        path: &[Instant],
+        fine: usize,
+    ) -> Vec<f64> {
         let h = 1.0 / (RATE_HZ * fine) as f64;
-        self.gauge.power_up();
+        self.gauge.power_up(script.excitation);
+        if let Some(skew) = &mut self.skew {
+            skew.begin(trial);
+        }
         let every = if self.gauge.active() { 1 } else { fine };
         let mut volts = Vec::with_capacity(path.len() / fine);
         for step in (0..path.len()).step_by(every) {
             let t = step as f64 * h;
             let session = script.start_s + t;
-            let shift = skew(self.causes, t, session) / h;
+            let wander = self.skew.as_ref().map_or(0.0, |w| w.at(t, session));
+            let shift = (skew(self.causes, t, session) + wander) / h;
             let at = (step as f64 - shift).clamp(0.0, (path.len() - 1) as f64);
             let low = (at as usize).min(path.len() - 2);
             let share = at - low as f64;
@@ -200,7 +280,8 @@ impl<S: Fn(f64) -> f64> Bench<'_, S> {
                 volts.push(v);
             }
         }
-        for (v, hum) in volts.iter_mut().zip(hum(self.causes, trial, path.len() / fine)) {
+        let mut volts = resampled(volts, offsets);
+        for (v, hum) in volts.iter_mut().zip(hum(self.causes, trial, path.len() / fine, offsets)) {
             *v += hum;
         }
         spoil_samples(self.causes, trial, &mut volts);
@@ -211,11 +292,12 @@ impl<S: Fn(f64) -> f64> Bench<'_, S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effect::{Cause, KINDS, Stage};
-    use crate::protocol::session;
+    use crate::effect::{KINDS, Stage};
+    use crate::family::Family;
+    use crate::protocol::{Protocol, session};
 
     fn short_session() -> Vec<Script> {
-        let mut scripts = session(&mut Dice::new(8, 1));
+        let mut scripts = session(Protocol::Paper, &mut Dice::new(8, 1));
         // One fast inflation, one fast deflation, 20 s of pulses.
         scripts = vec![scripts[5].clone(), scripts[11].clone(), scripts[13].clone()];
         scripts[2].openings.truncate(2000);
@@ -235,19 +317,21 @@ mod tests {
         let scripts = short_session();
         let mut dice = Dice::new(8, 2);
         let rig = Rig::nominal();
-        let conditions = Conditions::draw(&scripts, &mut dice);
+        let conditions = Conditions::plain(&scripts, &mut dice);
         let nominal = run(&rig, &Causes::default(), &scripts, &conditions, COARSE);
         for &kind in KINDS {
-            for form in 0..kind.spec().forms.len() {
-                let mut cause = Cause::draw(kind, &mut dice);
+            let written = (0..kind.spec().forms.len()).map(|form| (Family::Written, form));
+            let drawn = Family::ALL[1..].iter().map(|&family| (family, 0));
+            let drawn = drawn.filter(|_| kind.is_catalogued());
+            for (family, form) in written.chain(drawn) {
+                let mut cause = Cause::draw(kind, family, &mut dice);
                 cause.form = form;
                 let causes = Causes::new(&[cause.at(0.5 * cause.most())]);
                 let acting = run(&rig, &causes, &scripts, &conditions, COARSE);
                 let p = changed(&nominal, &acting, |t| &t.pressure);
                 let l = changed(&nominal, &acting, |t| &t.length);
                 let v = changed(&nominal, &acting, |t| &t.volts);
-                let label =
-                    format!("{} {}: {p} {l} {v}", kind.spec().name, kind.spec().forms[form]);
+                let label = format!("{} {}: {p} {l} {v}", kind.spec().name, cause.form_name());
                 assert!(p.is_finite() && l.is_finite() && v.is_finite(), "{label}");
                 match kind.spec().stage {
                     Stage::Pneumatics => assert!(p > 100.0, "{label}"),
@@ -259,11 +343,62 @@ mod tests {
         }
     }
 
+    /// Sum of squares, over all channels, of what two sessions differ by, in units of the noise.
+    fn apart(a: &[Trace], b: &[Trace]) -> f64 {
+        type Channel = fn(&Trace) -> &Vec<f64>;
+        let channels: [(Channel, f64); 3] =
+            [(|t| &t.pressure, 1200.0), (|t| &t.length, 0.05), (|t| &t.volts, 0.002)];
+        let squares = channels.iter().flat_map(|(channel, noise)| {
+            let pairs = a.iter().zip(b).flat_map(|(a, b)| channel(a).iter().zip(channel(b)));
+            pairs.map(move |(x, y)| ((x - y) / noise).powi(2))
+        });
+        squares.sum()
+    }
+
+    #[test]
+    fn drawn_forms_vanish_with_their_strength_grow_with_it_and_differ_by_family() {
+        let mut scripts = short_session();
+        // Dead bands differ where the valve is hardly open.
+        scripts[0].openings.iter_mut().for_each(|u| u.0 *= 0.08);
+        let mut dice = Dice::new(8, 6);
+        let rig = Rig::nominal();
+        // Knees count from the strain and the voltage at the nominal supply.
+        let (supply, offsets) = (vec![0.0; 4000], vec![Vec::new(); 3]);
+        let conditions = Conditions { supply, start_error: vec![0.0; 3], offsets };
+        let session =
+            |causes: &[Cause]| run(&rig, &Causes::new(causes), &scripts, &conditions, COARSE);
+        let nominal = session(&[]);
+        for &kind in Kind::catalogued() {
+            let seed = dice.bits();
+            let mut strongest: Vec<Vec<Trace>> = Vec::new();
+            for family in Family::ALL {
+                // One cause but for where its form comes from.
+                let cause = Cause::draw(kind, family, &mut Dice::new(seed, 0));
+                let name = format!("{} {family}", kind.spec().name);
+                let at = |share: f64| session(&[cause.at(share * cause.most())]);
+                // A muscle on a spring of 2 ms has inertia still, and none is not simulated.
+                if kind != Kind::CrossbeamInertia {
+                    let none = apart(&nominal, &session(&[cause.at(1e-3 * kind.spec().least)]));
+                    assert!(none < 1e-2, "{name}: {none}");
+                }
+                let weak = apart(&nominal, &at(0.15));
+                let strong = at(0.6);
+                let grown = apart(&nominal, &strong);
+                assert!(grown > weak && weak > 0.0, "{name}: {weak} then {grown}");
+                for other in &strongest {
+                    // Narrow knees differ in a few samples only.
+                    assert!(apart(&strong, other) > 1e-2, "{name} is as another family");
+                }
+                strongest.push(strong);
+            }
+        }
+    }
+
     #[test]
     fn a_finer_step_changes_nothing_that_shows() {
         let scripts = short_session();
         let rig = Rig::nominal();
-        let conditions = Conditions::draw(&scripts, &mut Dice::new(8, 3));
+        let conditions = Conditions::plain(&scripts, &mut Dice::new(8, 3));
         let fine = run(&rig, &Causes::default(), &scripts, &conditions, FINE);
         let finer = run(&rig, &Causes::default(), &scripts, &conditions, 2 * FINE);
         // 1e-4 of full scale: 62 Pa, 5 um, 0.33 mV.
@@ -276,7 +411,8 @@ mod tests {
     fn the_nominal_rig_behaves_as_its_data_sheet_says() {
         let scripts = short_session();
         let rig = Rig::nominal();
-        let conditions = Conditions { supply: vec![0.0; 4000], start_error: vec![0.0; 3] };
+        let offsets = vec![Vec::new(); 3];
+        let conditions = Conditions { supply: vec![0.0; 4000], start_error: vec![0.0; 3], offsets };
         let traces = run(&rig, &Causes::default(), &scripts, &conditions, FINE);
         let inflation = &traces[0];
         let end = inflation.length.len() - 1;
@@ -297,8 +433,9 @@ mod tests {
     fn memories_are_wound_before_a_trial_begins() {
         let scripts = short_session();
         let rig = Rig::nominal();
-        let conditions = Conditions::draw(&scripts, &mut Dice::new(8, 4));
-        let mut cause = Cause::draw(crate::effect::Kind::SleeveSlip, &mut Dice::new(8, 5));
+        let conditions = Conditions::plain(&scripts, &mut Dice::new(8, 4));
+        let dice = &mut Dice::new(8, 5);
+        let mut cause = Cause::draw(Kind::SleeveSlip, Family::Written, dice);
         cause.form = 0;
         let causes = Causes::new(&[cause.at(0.01)]);
         let traces = run(&rig, &causes, &scripts, &conditions, COARSE);

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use crate::by_family;
 use crate::rate::Rate;
 use crate::score::Score;
 
@@ -62,7 +63,18 @@ impl fmt::Display for Score {
         row(f, "top-1 from 1 to 10", &s.top1_1_to_10)?;
         row(f, "top-1 from 0.1 to 1", &s.top1_below_1)?;
         row(f, "top-1, twins pooled", &s.top1_twins)?;
+        row(f, "first name, ties not counted", &s.first_name)?;
         row(f, "exactly the one effect named", &s.exact)?;
+        if s.tied.hits > 0 {
+            row(f, "ties declared", &s.tied)?;
+            number(f, "mean names in a tie", s.tie_size)?;
+        }
+        if s.partial.hits > 0 {
+            row(f, "called a part of the gap", &s.partial)?;
+        }
+        if s.false_record.hits > 0 {
+            row(f, "called an error of the record", &s.false_record)?;
+        }
         row(f, "stage", &s.stage)?;
         row(f, "95 % set covers (sets not empty)", &s.set_covers)?;
         row(f, "95 % set covers (empty = miss)", &s.set_covers_all)?;
@@ -74,6 +86,9 @@ impl fmt::Display for Score {
         row(f, "false alarms on nulls", &self.false_alarms)?;
         row(f, "false names on nulls", &self.false_names)?;
         number(f, "expected calibration error", self.calibration.ece)?;
+        if self.calibration_unknown.ece.is_some() {
+            number(f, "calibration error of unknown", self.calibration_unknown.ece)?;
+        }
         row(f, "compounds: both named", &self.compounds.all_named)?;
         row(f, "compounds: one named", &self.compounds.one_named)?;
         row(f, "compounds: precision", &self.compounds.precision)?;
@@ -82,6 +97,7 @@ impl fmt::Display for Score {
         row(f, "dominant and small: precision", &self.dominants.precision)?;
         row(f, "dominant and small: recall", &self.dominants.recall)?;
         row(f, "out of the catalogue: unknown", &self.foreign_caught)?;
+        row(f, "out of the catalogue: a name", &self.foreign_named)?;
         row(f, "out of the catalogue: stage", &self.foreign_stage)?;
         row(f, "struck out: unknown or twin", &self.struck.unknown_or_twin)?;
         row(f, "struck out, no twin: unknown", &self.struck.unknown_no_twin)?;
@@ -102,6 +118,9 @@ impl fmt::Display for Score {
         }
         if !self.baselines.is_empty() {
             methods(f, self)?;
+        }
+        if !self.families.is_empty() {
+            by_family::table(f, &self.families)?;
         }
         if !self.unanswered.is_empty() {
             writeln!(f, "\nUnanswered: {}.", self.unanswered.join(", "))?;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::Stage;
+use crate::family::Family;
 
 /// What kind of case it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -87,12 +88,22 @@ pub struct Label {
     /// The strong one of a dominant case.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dominant: Option<String>,
+    /// Family that its forms were drawn from (a null has it by lot); absent where they were written.
+    #[serde(default, skip_serializing_if = "is_written")]
+    pub family: Family,
     /// How each effect was simulated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub acting: Vec<Acting>,
     /// Nominal parameters of this rig, SI (V and mm as in rig files).
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub parameters: BTreeMap<String, f64>,
+    /// What was around the rig, where that was drawn: levels, times in s, shares.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub clutter: BTreeMap<String, f64>,
+}
+
+fn is_written(family: &Family) -> bool {
+    *family == Family::Written
 }
 
 /// The labels of all cases, by name of the case.

@@ -8,18 +8,27 @@ use serde_json::Value;
 use crate::effect::Kind;
 use crate::error::BlindError;
 
+/// Verdicts of the schema.
+const VERDICTS: [&str; 6] = ["no_gap", "parameters", "record", "effect", "partial", "unknown"];
+/// Verdicts that commit to the effects named.
+const COMMITS: [&str; 2] = ["effect", "partial"];
+
 /// A diagnosis of one case.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
     /// Name of the case: `case-000`.
     pub case: String,
-    /// `no_gap`, `parameters`, `effect` or `unknown`.
+    /// `no_gap`, `parameters`, `record`, `effect`, `partial` or `unknown`.
     pub verdict: String,
     /// Effects named, the most important first.
     pub named: Vec<String>,
     /// Effects in the 95 % set.
     pub ambiguous: Vec<String>,
-    /// Candidates with their probabilities, the best first.
+    /// Names declared to be one with those named: the data cannot tell them.
+    #[serde(default)]
+    pub tied: Vec<String>,
+    /// Candidates with their probabilities, the best first; one whose only effect is `unknown`
+    /// stands for whatever the catalogue lacks.
     pub candidates: Vec<(Vec<String>, f64)>,
     /// Stage that the gap was placed in.
     pub stage: Option<String>,
@@ -54,15 +63,20 @@ impl Verdict {
             value.as_array()?.iter().map(|v| v.as_str().map(str::to_owned)).collect()
         };
         let verdict = diagnosis["verdict"].as_str().ok_or_else(|| bad("no verdict"))?.to_owned();
-        if !["no_gap", "parameters", "effect", "unknown"].contains(&verdict.as_str()) {
+        if !VERDICTS.contains(&verdict.as_str()) {
             return Err(bad("a verdict that the schema does not have"));
         }
         let named = names(&diagnosis["named"]).ok_or_else(|| bad("no list of effects named"))?;
-        if verdict == "effect" && named.is_empty() {
+        let commits = COMMITS.contains(&verdict.as_str());
+        if commits && named.is_empty() {
             return Err(bad("an effect without a name"));
         }
         let ambiguous =
             names(&diagnosis["ambiguous"]).ok_or_else(|| bad("no list of the 95 % set"))?;
+        let tied = match &diagnosis["tied"] {
+            Value::Null => Vec::new(),
+            some => names(some).ok_or_else(|| bad("ties that are no list of names"))?,
+        };
         let none = Vec::new();
         let listed = diagnosis["candidates"].as_array().unwrap_or(&none);
         let mut candidates = Vec::with_capacity(listed.len());
@@ -85,12 +99,13 @@ impl Verdict {
         let beside = diagnosis["baselines"].as_object().into_iter().flatten();
         let baselines =
             beside.map(|(method, said)| (method.clone(), said.as_str().map(str::to_owned)));
-        let known = named.first().filter(|_| verdict == "effect").and_then(|n| Kind::named(n));
+        let known = named.first().filter(|_| commits).and_then(|n| Kind::named(n));
         Ok(Self {
             case: case.to_owned(),
             verdict,
             named,
             ambiguous,
+            tied,
             candidates,
             stage: known.map(|kind| kind.spec().stage.name().to_owned()).or(placed),
             gap_before: number("gap_before").unwrap_or(0.0),
@@ -102,10 +117,37 @@ impl Verdict {
         })
     }
 
-    /// The effects it commits to: those named, and only if the verdict is `effect`.
+    /// The effects it commits to: those named, and only if the verdict is `effect` or `partial`.
     #[must_use]
     pub fn answer(&self) -> &[String] {
-        if self.verdict == "effect" { &self.named } else { &[] }
+        if COMMITS.contains(&self.verdict.as_str()) { &self.named } else { &[] }
+    }
+
+    /// The names declared to be one with those it commits to.
+    pub(crate) fn ties(&self) -> &[String] {
+        if self.answer().is_empty() { &[] } else { &self.tied }
+    }
+
+    /// Probability that it gives to what the catalogue lacks; `None` where it gives none.
+    #[must_use]
+    pub fn unknown(&self) -> Option<f64> {
+        let alone = |c: &&(Vec<String>, f64)| c.0.len() == 1 && c.0[0] == "unknown";
+        self.candidates.iter().find(alone).map(|c| c.1)
+    }
+
+    /// What it holds most likely, the names tied with it, and the probability of them together.
+    pub(crate) fn belief(&self) -> Option<(Vec<&String>, f64)> {
+        let (first, probability) = self.candidates.first()?;
+        let mut names: Vec<&String> = first.iter().take(1).collect();
+        let mut sum = *probability;
+        if first.len() == 1 && self.answer() == first.as_slice() {
+            for name in self.ties().iter().filter(|name| *name != &first[0]) {
+                names.push(name);
+                let alone = self.candidates.iter().find(|c| c.0.as_slice() == [name.clone()]);
+                sum += alone.map_or(0.0, |c| c.1);
+            }
+        }
+        Some((names, sum.min(1.0)))
     }
 }
 
@@ -127,6 +169,22 @@ mod tests {
         assert_eq!((verdict.gap_before, verdict.closed), (41.0, 0.96));
         assert_eq!(verdict.baselines["bic"].as_deref(), Some("supply_sag"));
         assert_eq!(verdict.baselines["signature"], None);
+        value["verdict"] = "partial".into();
+        value["tied"] = serde_json::json!(["supply_sag"]);
+        let unknown = serde_json::json!({ "effects": ["unknown"], "probability": 0.1 });
+        let listed = value["candidates"].as_array_mut().expect("candidates");
+        listed.push(unknown);
+        let partial = Verdict::from_diagnosis("case-001", &value).expect("a verdict");
+        assert_eq!(
+            (partial.answer(), partial.ties()),
+            (&["leak".to_owned()][..], &partial.tied[..])
+        );
+        assert_eq!((partial.unknown(), verdict.unknown()), (Some(0.1), None));
+        value["verdict"] = "record".into();
+        assert!(Verdict::from_diagnosis("case-001", &value).expect("read").answer().is_empty());
+        value["tied"] = "supply_sag".into();
+        assert!(Verdict::from_diagnosis("case-001", &value).is_err());
+        value["tied"] = Value::Null;
         value["verdict"] = "unknown".into();
         let unknown = Verdict::from_diagnosis("case-001", &value).expect("a verdict");
         assert_eq!(unknown.stage.as_deref(), Some("sensing"));

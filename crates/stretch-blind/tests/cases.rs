@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use stretch_blind::{BlindError, CaseKind, Plan, Seal, make};
+use stretch_blind::{BlindError, CaseKind, Clutter, Family, Plan, Protocol, Seal, make};
 
 fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
@@ -53,7 +53,8 @@ fn same_seed_same_bits_whatever_the_number_of_threads() {
         let mut lines = csv.lines();
         let header = lines.next().expect("a header");
         assert_eq!(header.contains("pressure_kpa"), label.pressure_column);
-        assert_eq!(lines.clone().count(), 6000);
+        // Up to one row in a hundred may be missing, and by chance some more.
+        assert!((5800..=6000).contains(&lines.clone().count()));
         let columns = header.split(',').count();
         assert!(lines.all(|line| line.split(',').count() == columns));
         assert_eq!(label.effects.len(), usize::from(label.kind != CaseKind::Null));
@@ -69,4 +70,31 @@ fn another_seed_gives_other_cases() {
         fs::read(dir.path().join("case-000/arbitrary_1.csv")).expect("a trial")
     });
     assert_ne!(a, b);
+}
+
+#[test]
+fn a_case_says_its_family_its_clutter_and_a_lower_excitation() {
+    let plan = Plan { single: 1, family: Some(Family::Spectra), ..Plan::of(0) };
+    let plan = Plan { protocol: Protocol::PaperPlus, ..plan };
+    let made = [Clutter::Drawn, Clutter::Plain].map(|clutter| {
+        let dir = tempfile::tempdir().expect("a temporary folder");
+        make(dir.path(), 9, &Plan { clutter, ..plan }, &|_| {}).expect("a case");
+        let (_, truth) = Seal::open(dir.path()).expect("an unbroken seal");
+        let label = truth.cases["case-000"].clone();
+        assert_eq!((label.family, label.acting[0].form.as_str()), (Family::Spectra, "spectra"));
+        let found = files(&dir.path().join("case-000"));
+        assert_eq!(found.keys().filter(|name| name.ends_with(".csv")).count(), 18);
+        let text = |name: &str| String::from_utf8(found[name].clone()).expect("text");
+        for name in found.keys().filter(|name| name.ends_with(".csv")) {
+            let low = name == "arbitrary_low.csv";
+            assert_eq!(text(name).contains("excitation_share"), low, "{name}");
+            assert!(!low || text(name).lines().skip(1).all(|line| line.ends_with(",0.7")));
+        }
+        // The rig file says the noise that is there.
+        assert_eq!(found.contains_key("rig.toml"), label.clutter.get("noise_stated") == Some(&1.0));
+        (label, text("arbitrary_1.csv"))
+    });
+    assert!(made[0].0.clutter.len() > 20 && made[1].0.clutter.is_empty());
+    // The same commands, other clutter.
+    assert_ne!(made[0].1, made[1].1);
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use stretch_blind::{BlindError, CaseKind, Label, Rate, Score, Stage, Truth, Verdict};
+use stretch_blind::{BlindError, CaseKind, Family, Label, Rate, Score, Stage, Truth, Verdict};
 
 fn label(kind: CaseKind, effects: &[(&str, Stage)], excess: f64) -> Label {
     let first = effects.first().map(|e| e.0.to_owned());
@@ -14,8 +14,10 @@ fn label(kind: CaseKind, effects: &[(&str, Stage)], excess: f64) -> Label {
         excess,
         struck: first.clone().filter(|_| kind == CaseKind::Struck),
         dominant: first.filter(|_| kind == CaseKind::Dominant),
+        family: Family::Written,
         acting: Vec::new(),
         parameters: BTreeMap::new(),
+        clutter: BTreeMap::new(),
     }
 }
 
@@ -26,6 +28,7 @@ fn verdict(case: &str, verdict: &str, named: &[&str], set: &[&str], p: f64) -> V
         verdict: verdict.into(),
         named: own(named),
         ambiguous: own(set),
+        tied: Vec::new(),
         candidates: vec![(own(named), p)],
         stage: Some("sensing".into()),
         gap_before: 10.0,
@@ -215,4 +218,89 @@ fn stray_and_repeated_verdicts_are_refused() {
     assert!(matches!(stray, Err(BlindError::UnknownCase { .. })));
     let empty = Score::of(&truth, &[]).expect("no verdict at all");
     assert_eq!((empty.singles.top1.share(), empty.unanswered.len()), (None, 1));
+}
+
+#[test]
+fn a_declared_tie_that_holds_the_truth_is_right_and_an_undeclared_one_wrong() {
+    let slack = ("sleeve_slack", Stage::Sensing);
+    let leak = ("leak", Stage::Pneumatics);
+    let truth = truth(&[
+        ("a", label(CaseKind::Single, &[slack], 20.0)),
+        ("b", label(CaseKind::Single, &[slack], 20.0)),
+        ("c", label(CaseKind::Single, &[slack], 20.0)),
+        ("d", label(CaseKind::Compound, &[slack, leak], 20.0)),
+    ]);
+    let own = |names: &[&str]| names.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>();
+    let tie = |case, named: &[&str], tied: &[&str]| Verdict {
+        tied: own(tied),
+        candidates: vec![(own(&named[..1]), 0.5), (own(tied), 0.4)],
+        ..verdict(case, "effect", named, &["amplifier_saturation", "sleeve_slack"], 0.5)
+    };
+    let verdicts = [
+        tie("a", &["amplifier_saturation"], &["sleeve_slack"]),
+        tie("b", &["amplifier_saturation"], &["channel_skew"]),
+        tie("c", &["sleeve_slack", "leak"], &["amplifier_saturation"]),
+        tie("d", &["amplifier_saturation", "leak"], &["sleeve_slack"]),
+    ];
+    let score = Score::of(&truth, &verdicts).expect("matching cases");
+    let s = &score.singles;
+    assert_eq!((s.first_name, s.top1, s.exact), (rate(1, 3), rate(2, 3), rate(1, 3)));
+    assert_eq!((s.tied, s.tie_size), (rate(3, 3), Some(2.0)));
+    assert_eq!((score.compounds.all_named, score.compounds.precision), (rate(1, 1), rate(2, 2)));
+    // "A or B" is stated with 0.9 (a: right; b: wrong); c names two, its first with 0.5.
+    let ece = score.calibration.ece.expect("candidates");
+    assert!((ece - (2.0 * 0.4 + 0.5) / 3.0).abs() < 1e-12, "{ece}");
+    let missed: Vec<&str> = score.misses.iter().map(|m| m.case.as_str()).collect();
+    assert_eq!(missed, ["b", "c"]);
+}
+
+#[test]
+fn a_partial_is_held_to_its_names_and_a_record_is_no_answer() {
+    let slip = ("sleeve_slip", Stage::Sensing);
+    let truth = truth(&[
+        ("a", label(CaseKind::Single, &[slip], 20.0)),
+        ("b", label(CaseKind::Single, &[slip], 20.0)),
+        ("c", label(CaseKind::Single, &[slip], 20.0)),
+        ("n", label(CaseKind::Null, &[], 0.0)),
+        ("o", label(CaseKind::OutOfCatalogue, &[("coil_droop", Stage::Sensing)], 3.0)),
+        ("u", label(CaseKind::OutOfCatalogue, &[("coil_droop", Stage::Sensing)], 3.0)),
+    ]);
+    let unknown = vec![(vec!["unknown".to_owned()], 0.8)];
+    let verdicts = [
+        verdict("a", "partial", &["sleeve_slip"], &["sleeve_slip"], 0.9),
+        verdict("b", "partial", &["sleeve_slip", "leak"], &["sleeve_slip"], 0.9),
+        verdict("c", "record", &[], &[], 0.9),
+        verdict("n", "record", &[], &[], 0.0),
+        verdict("o", "partial", &["leak"], &["leak"], 0.9),
+        Verdict { candidates: unknown, ..verdict("u", "unknown", &[], &[], 0.0) },
+    ];
+    let score = Score::of(&truth, &verdicts).expect("matching cases");
+    let s = &score.singles;
+    assert_eq!((s.exact, s.top1), (rate(1, 3), rate(2, 3)));
+    assert_eq!((s.partial, s.false_record), (rate(2, 3), rate(1, 3)));
+    assert_eq!(score.false_alarms, rate(1, 1));
+    assert_eq!((score.foreign_caught, score.foreign_named), (rate(1, 2), rate(1, 2)));
+    // 0.8 stated once, and it was.
+    assert!((score.calibration_unknown.ece.expect("stated") - 0.2).abs() < 1e-12);
+}
+
+#[test]
+fn families_have_rows_and_each_is_judged_by_the_run_that_left_it_out() {
+    let slip = ("sleeve_slip", Stage::Sensing);
+    let of = |family| Label { family, ..label(CaseKind::Single, &[slip], 20.0) };
+    let truth = truth(&[("a", of(Family::Splines)), ("b", of(Family::Spectra))]);
+    let right = |case| verdict(case, "effect", &["sleeve_slip"], &["sleeve_slip"], 1.0);
+    let wrong = |case| verdict(case, "effect", &["leak"], &["leak"], 1.0);
+    let runs = [
+        (Family::Splines, vec![right("a"), wrong("b")]),
+        (Family::Spectra, vec![right("a"), wrong("b")]),
+    ];
+    let score = Score::leave_family_out(&truth, &runs.into()).expect("matching cases");
+    assert_eq!(score.singles.exact, rate(1, 2));
+    assert_eq!(score.families[&Family::Splines].exact, rate(1, 1));
+    assert_eq!(score.families[&Family::Spectra].exact, rate(0, 1));
+    let text = score.to_string();
+    assert!(text.contains("\n| splines | 1.00 (1 of 1) |"), "{text}");
+    let json = serde_json::to_string(&score).expect("JSON");
+    assert_eq!(serde_json::from_str::<Score>(&json).expect("read back"), score);
 }

@@ -1,0 +1,135 @@
+//! A function of one variable as a table, and how smooth random ones are drawn.
+
+use crate::dice::Dice;
+
+/// Intervals of a table: the curve between its knots is the truth itself, not an approximation.
+const INTERVALS: usize = 240;
+
+/// A function on 0..1, straight between knots; beyond the ends it goes on with the last slope.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Curve(Vec<f64>);
+
+impl Curve {
+    /// Tables a function on 0..1.
+    pub(crate) fn table(f: impl Fn(f64) -> f64) -> Self {
+        Self((0..=INTERVALS).map(|i| f(i as f64 / INTERVALS as f64)).collect())
+    }
+
+    /// Integral of a positive function from 0, over its integral to 1: it rises from 0 to 1.
+    pub(crate) fn risen(slope: impl Fn(f64) -> f64) -> Self {
+        let mut sum = 0.0;
+        let middle = |i: usize| slope((i as f64 + 0.5) / INTERVALS as f64).max(1e-9);
+        let mut values = vec![0.0];
+        for i in 0..INTERVALS {
+            sum += middle(i);
+            values.push(sum);
+        }
+        Self(values.into_iter().map(|v| v / sum).collect())
+    }
+
+    /// The same curve times a number.
+    pub(crate) fn times(mut self, factor: f64) -> Self {
+        self.0.iter_mut().for_each(|v| *v *= factor);
+        self
+    }
+
+    /// Largest size of a value.
+    pub(crate) fn size(&self) -> f64 {
+        self.0.iter().fold(0.0, |most, v| v.abs().max(most))
+    }
+
+    /// Mean over 0..1.
+    pub(crate) fn mean(&self) -> f64 {
+        let ends = 0.5 * (self.0[0] + self.0[INTERVALS]);
+        (self.0.iter().sum::<f64>() - ends) / INTERVALS as f64
+    }
+
+    /// Integral from 0 to each knot.
+    pub(crate) fn integral(&self) -> Self {
+        let mut sum = 0.0;
+        let steps = self.0.windows(2).map(|w| {
+            sum += 0.5 * (w[0] + w[1]) / INTERVALS as f64;
+            sum
+        });
+        Self(std::iter::once(0.0).chain(steps).collect())
+    }
+
+    fn cell(&self, x: f64) -> (f64, f64, f64) {
+        let at = x * INTERVALS as f64;
+        // A negative or missing number becomes the first cell.
+        let low = (at as usize).min(INTERVALS - 1);
+        let (a, b) = (self.0[low], self.0[low + 1]);
+        (a, b, at - low as f64)
+    }
+
+    /// Value at `x`.
+    pub(crate) fn at(&self, x: f64) -> f64 {
+        let (a, b, share) = self.cell(x);
+        a + (b - a) * share
+    }
+
+    /// Slope at `x`.
+    pub(crate) fn slope(&self, x: f64) -> f64 {
+        let (a, b, _) = self.cell(x);
+        (b - a) * INTERVALS as f64
+    }
+}
+
+/// A smooth random function on 0..1: Catmull's and Rom's spline through Gaussian knots.
+#[derive(Debug, Clone)]
+pub(crate) struct Wiggle(Vec<f64>);
+
+impl Wiggle {
+    /// `knots` (at least 2) values of standard deviation `sd`.
+    pub(crate) fn draw(knots: usize, sd: f64, dice: &mut Dice) -> Self {
+        Self((0..knots.max(2)).map(|_| sd * dice.gauss()).collect())
+    }
+
+    /// Value at `x`.
+    pub(crate) fn at(&self, x: f64) -> f64 {
+        let last = self.0.len() - 1;
+        let at = x.clamp(0.0, 1.0) * last as f64;
+        let low = (at as usize).min(last - 1);
+        let knot = |i: isize| self.0[(low as isize + i).clamp(0, last as isize) as usize];
+        hermite([knot(-1), knot(0), knot(1), knot(2)], at - low as f64)
+    }
+}
+
+/// Catmull's and Rom's cubic between the middle two of four equidistant values.
+pub(crate) fn hermite([a, b, c, d]: [f64; 4], t: f64) -> f64 {
+    b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
+}
+
+/// Positive random weights that sum to 1; `sd` is that of their logarithms.
+pub(crate) fn weights(count: usize, sd: f64, dice: &mut Dice) -> Vec<f64> {
+    let raw: Vec<f64> = (0..count).map(|_| (sd * dice.gauss()).exp()).collect();
+    let sum: f64 = raw.iter().sum();
+    raw.into_iter().map(|w| w / sum).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_keeps_straight_lines_and_goes_on_beyond_its_ends() {
+        let line = Curve::table(|x| 2.0 * x - 0.5);
+        for x in [-0.3, 0.0, 0.123, 0.999, 1.0, 1.4] {
+            assert!((line.at(x) - (2.0 * x - 0.5)).abs() < 1e-12, "{x}");
+            assert!((line.slope(x) - 2.0).abs() < 1e-9);
+        }
+        assert!((line.mean() - 0.5).abs() < 1e-12);
+        // x^2 - x/2 at 1.
+        assert!((line.integral().at(1.0) - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn splines_pass_through_their_knots_and_weights_sum_to_one() {
+        let mut dice = Dice::new(1, 9);
+        let wiggle = Wiggle::draw(5, 1.0, &mut dice);
+        for (i, knot) in wiggle.0.iter().enumerate() {
+            assert!((wiggle.at(0.25 * i as f64) - knot).abs() < 1e-12);
+        }
+        assert!((weights(6, 1.0, &mut dice).iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    }
+}

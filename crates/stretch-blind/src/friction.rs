@@ -1,0 +1,158 @@
+//! Friction loops drawn: plays of a random distribution, rate laws, and reaches that differ by
+//! direction.
+
+use crate::curve::{Wiggle, weights};
+use crate::dice::Dice;
+use crate::family::Family;
+use crate::laws::sign;
+
+/// One play: share of the whole, reach when it rises and when it falls, where it stands.
+#[derive(Debug, Clone, Copy)]
+struct Element {
+    share: f64,
+    up: f64,
+    down: f64,
+    at: f64,
+}
+
+/// How the loop turns at a reversal.
+#[derive(Debug, Clone)]
+enum Law {
+    /// z = sum of shares times x - play(x, r).
+    Plays(Vec<Element>),
+    /// dz = dx (1 - turn |z / r|^n), turn = a + (1 - a) sgn(dx z) (Bouc, Wen), or
+    /// dz = dx (1 - sgn(dx) z / r)^n (Dahl); r grows towards rest (Stribeck, as in LuGre).
+    Rate { dahl: bool, exponent: f64, share: f64, rest: f64, speed: f64, z: f64 },
+}
+
+/// A loop: follows a change at first with slope 1, then stays at its reach.
+#[derive(Debug, Clone)]
+pub(crate) struct Friction {
+    law: Law,
+    reach: f64,
+    last: Option<f64>,
+}
+
+impl Friction {
+    /// A loop of a family; `sharp` ones turn within their reach, as a backlash does.
+    pub(crate) fn draw(family: Family, reach: f64, sharp: bool, dice: &mut Dice) -> Self {
+        let law = match family {
+            Family::RateLaws => Self::rate(sharp, dice),
+            _ => Law::Plays(plays(family, sharp, dice)),
+        };
+        Self { law, reach, last: None }
+    }
+
+    fn rate(sharp: bool, dice: &mut Dice) -> Law {
+        let dahl = dice.unit() < 0.5;
+        let exponent = match (dahl, sharp) {
+            (true, true) => dice.between(0.3, 0.8),
+            (true, false) => dice.between(0.7, 2.0),
+            (false, true) => dice.between(2.0, 6.0),
+            (false, false) => dice.between(1.0, 2.5),
+        };
+        let share = dice.between(0.5, 0.9);
+        let rest = if dice.unit() < 0.5 { dice.between(0.1, 0.4) } else { 0.0 };
+        // In reaches a second.
+        let speed = dice.log_between(2.0, 40.0);
+        Law::Rate { dahl, exponent, share, rest, speed, z: 0.0 }
+    }
+
+    /// Feeds the next value, `h` seconds after the last; gives what the loop holds back.
+    pub(crate) fn push(&mut self, x: f64, h: f64) -> f64 {
+        let dx = x - self.last.replace(x).unwrap_or(x);
+        if self.reach <= 0.0 {
+            return 0.0;
+        }
+        match &mut self.law {
+            Law::Plays(elements) => {
+                let reach = self.reach;
+                elements
+                    .iter_mut()
+                    .map(|e| {
+                        e.at = (e.at + dx).clamp(-e.down * reach, e.up * reach);
+                        e.share * e.at
+                    })
+                    .sum()
+            }
+            Law::Rate { dahl, exponent, share, rest, speed, z } => {
+                let slow = dx / (h * self.reach * *speed);
+                let reach = self.reach * (1.0 + *rest * ((-slow * slow).exp() - 0.5));
+                let direction = dx.signum();
+                let pieces = (dx.abs() / (0.05 * self.reach)).ceil().clamp(1.0, 80.0);
+                for _ in 0..pieces as usize {
+                    let slope = if *dahl {
+                        (1.0 - direction * *z / reach).max(0.0).powf(*exponent)
+                    } else {
+                        let turn = *share + (1.0 - *share) * (direction * *z).signum();
+                        1.0 - turn * (*z / reach).abs().powf(*exponent)
+                    };
+                    *z = (*z + dx / pieces * slope).clamp(-reach, reach);
+                }
+                *z
+            }
+        }
+    }
+}
+
+/// Plays whose shares sum to 1 and whose mean reach is 1.
+fn plays(family: Family, sharp: bool, dice: &mut Dice) -> Vec<Element> {
+    let mut radii: Vec<(f64, f64)> = match family {
+        // A density of radii that is a random spline.
+        Family::Splines => {
+            let (low, high) = if sharp { (0.6, 1.4) } else { (0.1, 2.2) };
+            let density = Wiggle::draw(4, 0.8, dice);
+            let at = |i: usize| (i as f64 + 0.5) / 10.0;
+            (0..10).map(|i| (low + (high - low) * at(i), density.at(at(i)).exp())).collect()
+        }
+        // A power law of radii, shaken.
+        Family::Spectra => {
+            let decades = if sharp { dice.between(0.15, 0.4) } else { dice.between(0.7, 1.6) };
+            let power = dice.between(-0.4, 1.0);
+            let shaken = weights(8, 0.5, dice);
+            let radius = |i: usize| 10f64.powf(decades * (i as f64 / 7.0 - 0.5));
+            (0..8).map(|i| (radius(i), shaken[i] * radius(i).powf(-power))).collect()
+        }
+        _ => {
+            let spread = if sharp { 0.12 } else { dice.between(0.4, 0.9) };
+            (0..5).map(|i| (10f64.powf(spread * (f64::from(i) / 4.0 - 0.5)), 0.2)).collect()
+        }
+    };
+    let total: f64 = radii.iter().map(|r| r.1).sum();
+    let mean: f64 = radii.iter().map(|r| r.0 * r.1).sum::<f64>() / total;
+    radii.iter_mut().for_each(|r| *r = (r.0 / mean, r.1 / total));
+    let lean = if family == Family::Asymmetric { sign(dice) * dice.between(0.2, 0.5) } else { 0.0 };
+    radii
+        .into_iter()
+        .map(|(radius, share)| {
+            let own = lean * if lean == 0.0 { 0.0 } else { dice.between(0.7, 1.3) };
+            Element { share, up: radius * (1.0 + own), down: radius * (1.0 - own), at: 0.0 }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn loops_start_elastic_turn_at_a_reversal_and_stay_within_their_reach() {
+        let mut dice = Dice::new(9, 1);
+        for family in &Family::ALL[1..] {
+            for draw in 0..40 {
+                let sharp = draw % 2 == 0;
+                let mut one = Friction::draw(*family, 0.02, sharp, &mut dice);
+                one.push(0.0, 1e-3);
+                let early = one.push(1e-6, 1e-3);
+                assert!((early / 1e-6 - 1.0).abs() < 0.1, "{family} {early}");
+                let mut up = 0.0;
+                for i in 1..400 {
+                    up = one.push(1e-6 + 0.001 * f64::from(i), 1e-3);
+                }
+                // Directions may differ by 0.65 of the reach, the Stribeck peak is below 0.2.
+                assert!(up < 1.66 * 0.02 && up > 0.33 * 0.02, "{family} {up}");
+                assert!(one.push(0.395, 1e-3) < up, "{family}: nothing at a reversal");
+            }
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! Relaxation drawn: spectra of time constants, rates that depend on how far there is to go, and
+//! ones that differ by direction.
+
+use crate::curve::{Wiggle, weights};
+use crate::dice::Dice;
+use crate::family::Family;
+use crate::laws::sign;
+
+/// One lag: its share, its time constants rising and falling in s, where it stands.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    share: f64,
+    rising_s: f64,
+    falling_s: f64,
+    at: f64,
+}
+
+/// Weighted sum of lags; shares sum to 1.
+#[derive(Debug, Clone)]
+pub(crate) struct Relaxation {
+    parts: Vec<Part>,
+    /// Distance at which a lag runs twice as fast, and the power of that; 0 where it never does.
+    hurry: (f64, f64),
+    settled: bool,
+}
+
+impl Relaxation {
+    /// Lags of a family around `tau` s; `scale` is the span of what is fed.
+    pub(crate) fn draw(family: Family, tau: f64, scale: f64, dice: &mut Dice) -> Self {
+        let mut hurry = (0.0, 1.0);
+        let even = |parts: Vec<(f64, f64)>| -> Vec<Part> {
+            let total: f64 = parts.iter().map(|p| p.1).sum();
+            let part = |&(s, w): &(f64, f64)| Part {
+                share: w / total,
+                rising_s: tau * s,
+                falling_s: tau * s,
+                at: 0.0,
+            };
+            parts.iter().map(part).collect()
+        };
+        let mut parts = match family {
+            Family::Written => even(vec![(1.0, 1.0)]),
+            // A continuous spectrum whose logarithm is a random spline over 1.6 decades.
+            Family::Splines => {
+                let density = Wiggle::draw(4, 0.8, dice);
+                let at = |i: i32| f64::from(i) / 6.0;
+                even(
+                    (0..7)
+                        .map(|i| (10f64.powf(1.6 * at(i) - 0.8), density.at(at(i)).exp()))
+                        .collect(),
+                )
+            }
+            // A few of them anywhere in two decades, or a power law.
+            Family::Spectra if dice.unit() < 0.5 => {
+                let count = 2 + dice.below(4);
+                let shares = weights(count, 0.8, dice);
+                even(shares.into_iter().map(|w| (dice.log_between(0.12, 8.0), w)).collect())
+            }
+            Family::Spectra => {
+                let power = dice.between(-0.5, 0.5);
+                let scale = |i: i32| 10f64.powf(0.5 * f64::from(i) - 1.0);
+                even((0..5).map(|i| (scale(i), scale(i).powf(power))).collect())
+            }
+            Family::RateLaws => {
+                hurry = (scale * dice.log_between(0.02, 0.2), dice.between(0.5, 2.0));
+                let second = dice.log_between(1.0, 4.0);
+                let share = dice.between(0.4, 1.0);
+                even(vec![(1.5, share), (1.5 * second, 1.0 - share)])
+            }
+            Family::Asymmetric => {
+                let apart = dice.log_between(1.0, 3.0);
+                even(vec![(1.0 / apart, 0.5), (apart, 0.5)])
+            }
+        };
+        if family == Family::Asymmetric {
+            let ratio = dice.log_between(1.4, 2.6).powf(sign(dice)).sqrt();
+            for part in &mut parts {
+                part.rising_s *= ratio;
+                part.falling_s /= ratio;
+            }
+        }
+        Self { parts, hurry, settled: false }
+    }
+
+    /// Advances by `h` seconds at input `x` (starts settled); gives the lagged value.
+    pub(crate) fn push(&mut self, x: f64, h: f64) -> f64 {
+        if !self.settled {
+            self.parts.iter_mut().for_each(|part| part.at = x);
+            self.settled = true;
+        }
+        let (scale, power) = self.hurry;
+        self.parts
+            .iter_mut()
+            .map(|part| {
+                let way = x - part.at;
+                let tau = if way > 0.0 { part.rising_s } else { part.falling_s };
+                let faster = if scale > 0.0 { 1.0 + (way.abs() / scale).powf(power) } else { 1.0 };
+                part.at += way * (h * faster / (tau + 0.5 * h * faster)).min(1.0);
+                part.share * part.at
+            })
+            .sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lags_stay_between_and_settle_at_their_input() {
+        let mut dice = Dice::new(9, 2);
+        for family in Family::ALL {
+            for _ in 0..40 {
+                let mut lags = Relaxation::draw(family, 0.1, 1.0, &mut dice);
+                assert_eq!(lags.push(0.0, 1e-3), 0.0);
+                let mut last = 0.0;
+                for _ in 0..20_000 {
+                    let next = lags.push(1.0, 1e-3);
+                    assert!(next >= last - 1e-12 && next <= 1.0 + 1e-9, "{family}");
+                    last = next;
+                }
+                // The slowest part is eight to ten times 0.1 s: exp(-20) is left.
+                assert!((last - 1.0).abs() < 1e-6, "{family} {last}");
+            }
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! Clocks and mains drawn: a skew that wanders, and hum of any shape.
+
+use crate::curve::{Wiggle, weights};
+use crate::dice::Dice;
+use crate::effect::Cause;
+use crate::family::Family;
+
+/// Longest session that a wandering skew is tabled for, s; it stands still from there on.
+const LONGEST_S: f64 = 1000.0;
+
+/// How far a skew is from its mean, s.
+#[derive(Debug, Clone)]
+pub(crate) struct Wander {
+    law: Law,
+    /// Offset of this trial.
+    trial: f64,
+    cause: Cause,
+}
+
+#[derive(Debug, Clone)]
+enum Law {
+    /// A smooth random path over the session.
+    Path(Wiggle),
+    /// Sines: size, angular frequency in 1/s, phase.
+    Waves(Vec<(f64, f64, f64)>),
+    /// A clock that runs fast or slow, noticed since the trial began.
+    Rate(f64),
+    /// Another start in every trial.
+    Starts(f64),
+}
+
+impl Wander {
+    /// The wander of a skew cause.
+    pub(crate) fn draw(cause: Cause) -> Self {
+        let mut dice = cause.dice(1);
+        let size = cause.strength * dice.between(0.04, 0.12);
+        let law = match cause.family {
+            Family::Written => Law::Rate(0.0),
+            Family::Splines => Law::Path(Wiggle::draw(12, 0.7 * size, &mut dice)),
+            Family::Spectra => {
+                let shares = weights(4, 0.7, &mut dice);
+                let mut wave = |w: f64| {
+                    let omega = dice.log_between(0.02, 2.0);
+                    (1.4 * size * w, omega, dice.between(0.0, std::f64::consts::TAU))
+                };
+                Law::Waves(shares.into_iter().map(&mut wave).collect())
+            }
+            Family::RateLaws => {
+                let rate = 2e-4 * dice.between(-1.0, 1.0);
+                Law::Rate(rate * (cause.strength / 0.02).min(1.0))
+            }
+            Family::Asymmetric => Law::Starts(size),
+        };
+        Self { law, trial: 0.0, cause }
+    }
+
+    /// A trial begins.
+    pub(crate) fn begin(&mut self, trial: usize) {
+        if let Law::Starts(size) = self.law {
+            self.trial = size * Dice::new(self.cause.seed, 2000 + trial as u64).between(-1.0, 1.0);
+        }
+    }
+
+    /// Wander at `t` s of the trial, `session` s of the session.
+    pub(crate) fn at(&self, t: f64, session: f64) -> f64 {
+        match &self.law {
+            Law::Path(path) => path.at(session / LONGEST_S),
+            Law::Waves(waves) => {
+                waves.iter().map(|(a, omega, phase)| a * (omega * session + phase).sin()).sum()
+            }
+            Law::Rate(rate) => rate * t,
+            Law::Starts(_) => self.trial,
+        }
+    }
+}
+
+/// Mains on the samples of a trial, V; `offsets` are how much later than on the grid each was
+/// taken (none: on the grid).
+pub(crate) fn mains(cause: Cause, trial: usize, samples: usize, offsets: &[f64]) -> Vec<f64> {
+    let mut shape = cause.dice(1);
+    let mut dice = Dice::new(cause.seed, trial as u64);
+    let hertz = if cause.aux[0] < 0.5 { 50.0 } else { 60.0 };
+    let (spread, memory_s) = (shape.log_between(0.01, 0.08), shape.log_between(3.0, 60.0));
+    // Share of harmonics 2, 3, 5 and 7.
+    let harmonics: Vec<(f64, f64)> = match cause.family {
+        Family::Spectra => {
+            let sizes = [2.0, 3.0, 5.0, 7.0].map(|k| (k, 0.3 * shape.gauss() / k));
+            sizes.to_vec()
+        }
+        Family::Asymmetric => vec![(2.0, shape.between(0.1, 0.3)), (4.0, shape.between(0.0, 0.1))],
+        Family::RateLaws => vec![(3.0, -shape.between(0.05, 0.2))],
+        _ => Vec::new(),
+    };
+    let swell = (cause.family == Family::Splines).then(|| Wiggle::draw(8, 0.25, &mut dice));
+    let mut phase = dice.between(0.0, std::f64::consts::TAU);
+    let mut wander = spread * dice.gauss();
+    let h = 0.01_f64;
+    (0..samples)
+        .map(|i| {
+            wander += -wander * h / memory_s + spread * (2.0 * h / memory_s).sqrt() * dice.gauss();
+            phase += std::f64::consts::TAU * (hertz + wander) * h;
+            let late = offsets.get(i).copied().unwrap_or(0.0);
+            let now = phase + std::f64::consts::TAU * hertz * late;
+            let sum: f64 = harmonics.iter().map(|(k, a)| a * (k * now).sin()).sum();
+            let size = swell.as_ref().map_or(1.0, |s| s.at(i as f64 / samples as f64).exp());
+            cause.strength * size * (now.sin() + sum)
+        })
+        .collect()
+}

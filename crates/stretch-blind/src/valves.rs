@@ -1,0 +1,168 @@
+//! Valves drawn: openings that act late, and dead bands of any shape.
+
+use crate::curve::{Curve, weights};
+use crate::dice::Dice;
+use crate::family::Family;
+use crate::laws::{rising, sign};
+
+/// How a command reaches the valves.
+#[derive(Debug, Clone)]
+pub(crate) enum Delay {
+    /// Later or earlier with the opening commanded: delay over opening, in units of the mean.
+    Graded(Curve),
+    /// Several seats, each with a share and a delay of its own.
+    Spread(Vec<(f64, f64)>),
+    /// A dead time, and a lag for the rest.
+    Lagged { dead: f64 },
+    /// Of inlet and outlet, opening and closing.
+    Sided([[f64; 2]; 2]),
+}
+
+impl Delay {
+    /// Delays of a family, of mean 1.
+    pub(crate) fn draw(family: Family, dice: &mut Dice) -> Self {
+        match family {
+            Family::Written => Self::Spread(vec![(1.0, 1.0)]),
+            Family::Splines => {
+                let law = rising(family, dice);
+                let span = sign(dice) * dice.between(0.2, 0.6);
+                let mean = law.mean();
+                Self::Graded(Curve::table(|u| 1.0 + span * (law.at(u) - mean)))
+            }
+            Family::Spectra => {
+                let count = 3 + dice.below(2);
+                let shares = weights(count, 0.5, dice);
+                let raw: Vec<f64> = (0..count).map(|_| dice.between(0.5, 1.6)).collect();
+                let mean: f64 = shares.iter().zip(&raw).map(|(w, d)| w * d).sum();
+                Self::Spread(shares.into_iter().zip(raw).map(|(w, d)| (w, d / mean)).collect())
+            }
+            Family::RateLaws => Self::Lagged { dead: dice.between(0.35, 0.9) },
+            Family::Asymmetric => {
+                let raw: [[f64; 2]; 2] =
+                    std::array::from_fn(|_| std::array::from_fn(|_| dice.between(0.6, 1.4)));
+                let mean = raw.iter().flatten().sum::<f64>() / 4.0;
+                Self::Sided(raw.map(|side| side.map(|d| d / mean)))
+            }
+        }
+    }
+
+    /// Mean share of a valve over a step of `h` s: `opening` is what is commanded now, `late` the
+    /// mean share of the command so many seconds ago, `lag` what this valve remembers.
+    pub(crate) fn share(
+        &self,
+        strength: f64,
+        (side, opening, h): (usize, f64, f64),
+        late: impl Fn(f64) -> f64,
+        lag: &mut f64,
+    ) -> f64 {
+        match self {
+            Self::Graded(delay) => late(strength * delay.at(opening)),
+            Self::Spread(seats) => seats.iter().map(|(w, d)| w * late(strength * d)).sum(),
+            Self::Lagged { dead } => {
+                let target = late(dead * strength);
+                let tau = (1.0 - dead) * strength;
+                let decay = (-h / tau).exp();
+                let mean = target + (*lag - target) * (1.0 - decay) * tau / h;
+                *lag = target + (*lag - target) * decay;
+                mean
+            }
+            Self::Sided(factors) => {
+                let [opens, closes] = factors[side].map(|f| late(f * strength));
+                // What is slower to open is open where both are, what is slower to close where
+                // either is.
+                if factors[side][0] > factors[side][1] {
+                    opens.min(closes)
+                } else {
+                    opens.max(closes)
+                }
+            }
+        }
+    }
+}
+
+/// A dead band: what of a small opening is lost.
+#[derive(Debug, Clone)]
+pub(crate) struct DeadBand {
+    /// Lost opening over opening, both in bands; table over 0..4, where it is 1.
+    lost: Curve,
+    /// Band of inlet and outlet, in units of the mean.
+    sides: [f64; 2],
+}
+
+impl DeadBand {
+    /// A dead band of a family.
+    pub(crate) fn draw(family: Family, dice: &mut Dice) -> Self {
+        let mut sides = [1.0, dice.between(0.85, 1.15)];
+        // Shut up to `begin` bands; from there on the slope rises to 1 as a drawn law does.
+        let begin = if dice.unit() < 0.6 { dice.between(0.3, 0.85) } else { 0.0 };
+        let mut law = rising(family, dice);
+        let mut long = (1.0 - begin) / (1.0 - law.mean());
+        if family == Family::Asymmetric {
+            // Hard, and the two valves far apart.
+            sides = [dice.between(0.6, 1.4), dice.between(0.6, 1.4)];
+            law = Curve::table(|_| 0.0);
+            long = 1.0 - begin;
+        }
+        let passed = law.integral();
+        let lost = Curve::table(|x| {
+            let z = 4.0 * x;
+            let within = ((z - begin) / long).clamp(0.0, 1.0);
+            z.min(begin) + long * (within - passed.at(within))
+        });
+        let end = lost.at(1.0);
+        Self { lost: lost.times(1.0 / end), sides }
+    }
+
+    /// What is left of an opening.
+    pub(crate) fn pass(&self, u: f64, band: f64, side: usize) -> f64 {
+        let band = band * self.sides[side];
+        (u - band * self.lost.at((u / (4.0 * band)).min(1.0))).max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dead_bands_never_fall_and_lose_one_band_of_what_is_far_open() {
+        let mut dice = Dice::new(9, 5);
+        for family in Family::ALL {
+            for _ in 0..40 {
+                let band = DeadBand::draw(family, &mut dice);
+                let mut last = 0.0;
+                for i in 0..=1000 {
+                    let left = band.pass(f64::from(i) / 1000.0, 0.05, 0);
+                    assert!(left >= last - 1e-12 && left >= 0.0, "{family} {i} {left} {last}");
+                    last = left;
+                }
+                assert!((last - (1.0 - 0.05 * band.sides[0])).abs() < 1e-9, "{family} {last}");
+                assert!((band.pass(0.4, 1e-9, 1) - 0.4).abs() < 1e-8, "{family}: off");
+            }
+        }
+    }
+
+    #[test]
+    fn a_step_arrives_after_the_mean_delay() {
+        let mut dice = Dice::new(9, 6);
+        let h = 1e-4;
+        for family in Family::ALL {
+            for _ in 0..20 {
+                let delay = Delay::draw(family, &mut dice);
+                let mut lag = 0.0;
+                let missing = |side| {
+                    (0..5000)
+                        .map(|i| {
+                            let t = f64::from(i) * h;
+                            let late = |d: f64| if t >= d { 1.0 } else { 0.0 };
+                            (1.0 - delay.share(0.04, (side, 1.0, h), late, &mut lag)) * h
+                        })
+                        .sum::<f64>()
+                };
+                let mut missing = missing;
+                let seconds = missing(0);
+                assert!((0.5 * 0.04..1.7 * 0.04).contains(&seconds), "{family} {seconds}");
+            }
+        }
+    }
+}

@@ -2,7 +2,7 @@
 
 use stretch_data::DataError;
 use stretch_gap::GapError;
-use stretch_sim::SimError;
+use stretch_sim::{GridError, SimError};
 
 /// Why measurements could not be bound to a simulator, or a simulation was refused; carries the evidence.
 #[derive(Debug, thiserror::Error)]
@@ -61,5 +61,11 @@ pub enum BenchError {
 impl From<BenchError> for GapError {
     fn from(error: BenchError) -> Self {
         Self::simulator(error)
+    }
+}
+
+impl From<GridError> for BenchError {
+    fn from(error: GridError) -> Self {
+        Self::Sim(error.into())
     }
 }

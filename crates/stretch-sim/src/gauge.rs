@@ -1,12 +1,11 @@
 //! A gauge alone: any stretch sensor with a reference is a rig of one stage.
 
+use stretch_operators::{Grid, Skew, Span, Start};
+
 use crate::{
     SimError,
     effects::{ActiveEffect, EffectParameter, EffectSet, Surroundings},
-    grid::Grid,
     memory::Memory,
-    operator::{Span, Start},
-    skew::Skew,
     stage::Stage,
     stages::{Reference, Sites, check_length, pick},
 };

@@ -1,21 +1,18 @@
 #![doc = include_str!("../README.md")]
 
-mod backlash;
 mod effects;
 mod error;
 mod gauge;
 mod gauge_file;
-mod grid;
+mod law;
 mod memory;
 mod nearest;
-mod operator;
 mod params;
 mod preset;
 mod protocol;
 mod random;
 mod rig;
 mod session;
-mod skew;
 mod stage;
 mod stages;
 mod static_law;
@@ -26,12 +23,8 @@ pub use effects::{
 };
 pub use error::SimError;
 pub use gauge::{Gauge, GaugeSpec};
-pub use grid::{DEFAULT_STEP_S, Grid};
+pub use law::{Droop, Law};
 pub use memory::Memory;
-pub use operator::{
-    Backlash, Droop, Hysteresis, Law, MeanReversion, Operator, Span, Start, play, soft_ceiling,
-    soft_floor,
-};
 pub use params::{Key, PARAMETERS, ParameterInfo, RigParams, Tolerance};
 pub use preset::paper_preset;
 pub use protocol::{OPENINGS, PAUSE_S, RATE_HZ, TrialPlan};
@@ -43,3 +36,7 @@ pub use stages::{
     Sensing,
 };
 pub use static_law::StaticLaw;
+pub use stretch_operators::{
+    Backlash, DEFAULT_STEP_S, Grid, GridError, MeanReversion, Operator, Span, Start, play,
+    soft_ceiling, soft_floor,
+};

@@ -1,8 +1,9 @@
 //! The amplifier's output is bounded.
 
+use stretch_operators::{Operator, Span, soft_ceiling, soft_floor};
+
 use crate::{
     effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::{Operator, Span, soft_ceiling, soft_floor},
     stage::Stage,
 };
 

@@ -2,7 +2,7 @@
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::Law,
+    law::Law,
     stage::Stage,
 };
 

@@ -1,9 +1,9 @@
 //! The crossbeam has a mass, on the spring of the muscle.
 
+use stretch_operators::{Grid, Operator, Span, Start};
+
 use crate::{
     effects::{Action, Effect, EffectParameter, Surroundings},
-    grid::Grid,
-    operator::{Operator, Span, Start},
     stage::Stage,
 };
 

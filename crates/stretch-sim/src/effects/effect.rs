@@ -2,9 +2,10 @@
 
 use std::fmt;
 
+use stretch_operators::{Grid, Operator};
+
 use crate::{
-    grid::Grid,
-    operator::{Droop, Law, Operator},
+    law::{Droop, Law},
     params::{Key, RigParams},
     stage::Stage,
 };

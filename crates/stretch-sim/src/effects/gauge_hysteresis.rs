@@ -1,8 +1,9 @@
 //! The gauge remembers its strain.
 
+use stretch_operators::{Loops, PrandtlIshlinskii};
+
 use crate::{
     effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::Hysteresis,
     stage::Stage,
 };
 
@@ -33,6 +34,10 @@ impl Effect for GaugeHysteresis {
     }
 
     fn action(&self, values: &[f64], _around: &Surroundings<'_>) -> Action {
-        Action::Strain(Box::new(Hysteresis::new(values[0], values[1])))
+        Action::Strain(Box::new(PrandtlIshlinskii::new(Loops {
+            h: values[0],
+            s: values[1],
+            spread: 0.5,
+        })))
     }
 }

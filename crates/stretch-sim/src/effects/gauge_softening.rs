@@ -1,8 +1,9 @@
 //! The gauge softens as it is worked.
 
+use stretch_operators::{Operator, Span, Start};
+
 use crate::{
     effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::{Operator, Span, Start},
     stage::Stage,
 };
 

@@ -2,9 +2,10 @@
 
 use std::f64::consts::TAU;
 
+use stretch_operators::{Operator, Span};
+
 use crate::{
     effects::{Action, Effect, EffectParameter, Scale, Surroundings},
-    operator::{Operator, Span},
     stage::Stage,
 };
 

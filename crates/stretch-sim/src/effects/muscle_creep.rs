@@ -1,8 +1,9 @@
 //! The rubber of the muscle creeps.
 
+use stretch_operators::{MeanReversion, Operator, Span, Start};
+
 use crate::{
     effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::{MeanReversion, Operator, Span, Start},
     stage::Stage,
 };
 

@@ -1,8 +1,9 @@
 //! Friction in the braid: the static contraction depends on its history.
 
+use stretch_operators::{Loops, PrandtlIshlinskii};
+
 use crate::{
     effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::Hysteresis,
     stage::Stage,
 };
 
@@ -33,6 +34,10 @@ impl Effect for MuscleHysteresis {
     }
 
     fn action(&self, values: &[f64], _around: &Surroundings<'_>) -> Action {
-        Action::StaticContraction(Box::new(Hysteresis::new(values[0], values[1])))
+        Action::StaticContraction(Box::new(PrandtlIshlinskii::new(Loops {
+            h: values[0],
+            s: values[1],
+            spread: 0.5,
+        })))
     }
 }

@@ -1,8 +1,9 @@
 //! The potentiometer has backlash.
 
+use stretch_operators::Backlash;
+
 use crate::{
     effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::Backlash,
     stage::Stage,
 };
 
@@ -30,6 +31,6 @@ impl Effect for PotBacklash {
     }
 
     fn action(&self, values: &[f64], _around: &Surroundings<'_>) -> Action {
-        Action::Length(Box::new(Backlash { w: values[0] }))
+        Action::Length(Box::new(Backlash::hard(values[0])))
     }
 }

@@ -1,8 +1,9 @@
 //! The potentiometer is not quite linear.
 
+use stretch_operators::{Operator, Span};
+
 use crate::{
     effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::{Operator, Span},
     stage::Stage,
 };
 

@@ -1,8 +1,9 @@
 //! The pressure inside the muscle stretches the gauge.
 
+use stretch_operators::{Operator, Span};
+
 use crate::{
     effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::{Operator, Span},
     stage::Stage,
 };
 

@@ -3,7 +3,9 @@
 use super::{Action, CATALOGUE, Effect, Surroundings, effect_named};
 use stretch_data::EffectEntry;
 
-use crate::{SimError, grid::Grid, nearest::nearest, params::RigParams, stage::Stage};
+use stretch_operators::Grid;
+
+use crate::{SimError, nearest::nearest, params::RigParams, stage::Stage};
 
 /// One effect with the values of its parameters, in the order of [`Effect::parameters`].
 #[derive(Debug, Clone)]
@@ -196,7 +198,7 @@ impl EffectSet {
                 delay_s += seconds;
             }
         }
-        Grid::new(dt_s, max_step_s, delay_s)
+        Ok(Grid::new(dt_s, max_step_s, delay_s)?)
     }
 
     /// How many there are.

@@ -1,8 +1,9 @@
 //! The sleeve goes slack: the gauge cannot be compressed.
 
+use stretch_operators::{Operator, Span, soft_floor};
+
 use crate::{
     effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::{Operator, Span, soft_floor},
     stage::Stage,
 };
 

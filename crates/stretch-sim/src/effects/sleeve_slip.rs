@@ -1,8 +1,9 @@
 //! The sleeve slips on the muscle.
 
+use stretch_operators::Backlash;
+
 use crate::{
     effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::Backlash,
     stage::Stage,
 };
 
@@ -31,6 +32,6 @@ impl Effect for SleeveSlip {
     }
 
     fn action(&self, values: &[f64], _around: &Surroundings<'_>) -> Action {
-        Action::Strain(Box::new(Backlash { w: values[0] }))
+        Action::Strain(Box::new(Backlash::hard(values[0])))
     }
 }

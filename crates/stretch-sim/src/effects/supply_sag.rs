@@ -2,7 +2,7 @@
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::Droop,
+    law::Droop,
     stage::Stage,
 };
 

@@ -1,9 +1,9 @@
 //! Stage `actuation`: openings to pressure and length, both stages as one.
 
+use stretch_operators::{Grid, Start};
+
 use super::{Muscle, Openings, Pneumatics, check_length, pneumatics::Drive};
-use crate::{
-    SimError, effects::EffectSet, grid::Grid, memory::Memory, operator::Start, params::RigParams,
-};
+use crate::{SimError, effects::EffectSet, memory::Memory, params::RigParams};
 
 /// Valves, chamber and muscle, prepared: one after the other, or hand in hand where the chamber's volume follows the muscle.
 #[derive(Debug)]

@@ -1,12 +1,13 @@
 //! Stage `pneumatics`: openings of the valves to chamber pressure.
 
+use stretch_operators::{Grid, Start};
+
 use super::check_length;
 use crate::{
     SimError,
     effects::{Action, EffectSet, Surroundings},
-    grid::Grid,
+    law::{Droop, Law},
     memory::Memory,
-    operator::{Droop, Law, Start},
     params::{Key, RigParams},
     stage::Stage,
 };

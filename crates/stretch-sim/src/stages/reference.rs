@@ -1,12 +1,12 @@
 //! Stage `reference`: true length to the length that the potentiometer shows.
 
-use super::{check_length, operators::Operators, sensing::pick};
+use stretch_operators::{Grid, Row, Span, Start};
+
+use super::{check_length, sensing::pick};
 use crate::{
     SimError,
     effects::{Action, EffectSet, Surroundings},
-    grid::Grid,
     memory::Memory,
-    operator::{Span, Start},
     params::RigParams,
     stage::Stage,
 };
@@ -15,7 +15,7 @@ use crate::{
 #[derive(Debug)]
 pub struct Reference {
     grid: Grid,
-    row: Operators,
+    row: Row,
 }
 
 impl Reference {
@@ -35,7 +35,7 @@ impl Reference {
                 _ => None,
             })
             .collect();
-        Self { grid: grid.clone(), row: Operators::new(row, 0) }
+        Self { grid: grid.clone(), row: Row::new(row, 0) }
     }
 
     /// A memory for it.

@@ -1,14 +1,13 @@
 //! Stage `sensing`: length to bridge voltage.
 
-use super::{check_length, operators::Operators};
+use stretch_operators::{Grid, Row, Skew, SkewSpec, Span, Start};
+
+use super::check_length;
 use crate::{
     SimError,
     effects::{Action, ActiveEffect, EffectSet, Surroundings},
-    grid::Grid,
     memory::Memory,
-    operator::{Span, Start},
     params::{Key, RigParams},
-    skew::Skew,
     stage::Stage,
 };
 
@@ -66,10 +65,10 @@ impl Bridge {
 pub struct Sensing {
     grid: Grid,
     bridge: Bridge,
-    strain: Operators,
-    resistance: Operators,
-    volts: Operators,
-    record: Operators,
+    strain: Row,
+    resistance: Row,
+    volts: Row,
+    record: Row,
     skew: Option<Skew>,
     needs_pressure: Option<&'static str>,
 }
@@ -212,13 +211,13 @@ pub(crate) fn pick(grid: &Grid, skew: Option<&Skew>, nodes: &[f64], samples: &mu
     }
 }
 
-/// Operators of a sensing chain by where they act, in the catalogue's order.
+/// Row of a sensing chain by where they act, in the catalogue's order.
 #[derive(Debug)]
 pub(crate) struct Sites {
-    pub(crate) strain: Operators,
-    pub(crate) resistance: Operators,
-    pub(crate) volts: Operators,
-    pub(crate) record: Operators,
+    pub(crate) strain: Row,
+    pub(crate) resistance: Row,
+    pub(crate) volts: Row,
+    pub(crate) record: Row,
     skew_s: f64,
 }
 
@@ -239,14 +238,14 @@ impl Sites {
                 _ => {}
             }
         }
-        let strain = Operators::new(strain, 0);
-        let resistance = Operators::new(resistance, strain.end());
-        let volts = Operators::new(volts, resistance.end());
-        let record = Operators::new(record, volts.end());
+        let strain = Row::new(strain, 0);
+        let resistance = Row::new(resistance, strain.end());
+        let volts = Row::new(volts, resistance.end());
+        let record = Row::new(record, volts.end());
         Self { strain, resistance, volts, record, skew_s }
     }
 
     pub(crate) fn skew(&self, grid: &Grid) -> Option<Skew> {
-        (self.skew_s != 0.0).then(|| Skew::new(grid, self.skew_s))
+        (self.skew_s != 0.0).then(|| Skew::new(grid, SkewSpec { skew_s: self.skew_s, rate: 0.0 }))
     }
 }

@@ -104,7 +104,7 @@ impl Operator for Loop {
     fn undo(&self, signal: &mut [f64]) {
         // A whole play hides its input at its turns only; of a share of one nothing is hidden.
         if self.share == 1.0 {
-            Backlash { w: self.radii[1] }.undo(signal);
+            Backlash::hard(self.radii[1]).undo(signal);
         }
     }
 }

@@ -9,6 +9,7 @@ use stretch_data::RigFile;
 use stretch_gap::{
     Diagnosis, Evidence, GapError, Laboratory, Options, Simulator, diagnose, next_experiment,
 };
+use stretch_sim::Catalogue;
 
 use super::{
     diagnosis_text::text,
@@ -86,7 +87,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let rig = args.rig.as_deref().map(RigFile::read).transpose()?;
     let shown = || args.data_set.display().to_string();
     let columns = args.reference.as_deref().zip(args.signal.as_deref());
-    let gauge = GaugeSimulator::read(&args.data_set, columns, rig.as_ref(), &args.without);
+    let catalogue = Catalogue::default().without(&args.without)?;
+    let gauge = GaugeSimulator::read(&args.data_set, columns, rig.as_ref(), &catalogue);
     if let Some(simulator) = gauge.with_context(shown)? {
         return answer(&args, &options, &bar, &simulator, simulator.notes(), &[]);
     }
@@ -98,7 +100,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         );
     }
     let simulator =
-        RigSimulator::read(&args.data_set, rig.as_ref(), &args.without).with_context(shown)?;
+        RigSimulator::read(&args.data_set, rig.as_ref(), &catalogue).with_context(shown)?;
     let rails = rails(simulator.nominal(), simulator.session());
     answer(&args, &options, &bar, &simulator, &simulator.session().notes, &rails)
 }

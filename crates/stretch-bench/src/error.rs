@@ -48,14 +48,6 @@ pub enum BenchError {
         /// The stage.
         stage: String,
     },
-    /// An effect of that name is not in the catalogue.
-    #[error("no effect is called `{name}`{}", .nearest.as_ref().map_or(String::new(), |n| format!(" (did you mean `{n}`?)")))]
-    UnknownEffect {
-        /// The name given.
-        name: String,
-        /// The nearest name.
-        nearest: Option<String>,
-    },
 }
 
 impl From<BenchError> for GapError {

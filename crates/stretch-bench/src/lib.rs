@@ -1,9 +1,10 @@
 #![doc = include_str!("../README.md")]
 
+mod acting;
 mod error;
 mod gauge;
-mod outside;
 mod rig;
+mod specs;
 
 pub use error::BenchError;
 pub use gauge::{GaugeSimulator, GaugeTrial};

@@ -3,6 +3,7 @@
 use stretch_bench::{RigSimulator, RigTrial, Session};
 use stretch_data::TrialKind;
 use stretch_gap::{Model, Simulator, differences};
+use stretch_sim::Catalogue;
 
 /// A rig beside an arbitrary trial.
 fn rig() -> RigSimulator {
@@ -22,7 +23,7 @@ fn rig() -> RigSimulator {
         length_mm: column("length_mm"),
         bridge_v: column("bridge_v"),
     };
-    RigSimulator::new(Session::new(vec![trial]).unwrap(), None, &[]).unwrap()
+    RigSimulator::new(Session::new(vec![trial]).unwrap(), None, &Catalogue::default()).unwrap()
 }
 
 /// D of every experiment of the menu for two effects at given first parameters.

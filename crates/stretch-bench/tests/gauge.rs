@@ -5,6 +5,7 @@ mod support;
 use stretch_bench::{BenchError, GaugeSimulator, GaugeTrial};
 use stretch_data::{Channel, RigFile, Trial};
 use stretch_gap::{Diagnosis, Options, Simulator, VerdictKind, diagnose, next_experiment};
+use stretch_sim::Catalogue;
 use support::Noise;
 
 const DT_S: f64 = 0.01;
@@ -177,8 +178,8 @@ fn trials(fault: Fault, strength: f64, count: usize, seed: u64) -> Vec<GaugeTria
 }
 
 fn run(trials: &[GaugeTrial], without: &[&str]) -> Diagnosis {
-    let without: Vec<String> = without.iter().map(|s| (*s).into()).collect();
-    let gauge = GaugeSimulator::new(trials, "rod_mm", "s1", None, &without).expect("a gauge");
+    let catalogue = Catalogue::default().without(without).expect("known names");
+    let gauge = GaugeSimulator::new(trials, "rod_mm", "s1", None, &catalogue).expect("a gauge");
     diagnose(&gauge, &Options::default(), &|_| (), &|| false).expect("a diagnosis").0
 }
 
@@ -274,7 +275,8 @@ fn play_in_the_reference_is_never_given_another_name() {
 #[test]
 fn twins_that_no_motion_parts_call_for_gauge_blocks() {
     let trials = trials(Fault::BentReference, 0.2, 3, 11);
-    let gauge = GaugeSimulator::new(&trials, "rod_mm", "s1", None, &[]).expect("a gauge");
+    let gauge =
+        GaugeSimulator::new(&trials, "rod_mm", "s1", None, &Catalogue::default()).expect("a gauge");
     let (d, evidence) =
         diagnose(&gauge, &Options::default(), &|_| (), &|| false).expect("a diagnosis");
     assert_eq!(d.ambiguous.len(), 2, "{:?}", d.ambiguous);
@@ -296,7 +298,8 @@ fn a_rig_file_gives_the_nominal_gauge() {
     };
     let trials = trials(Fault::None, 0.0, 3, 5);
     let run = |gain: f64| {
-        let gauge = GaugeSimulator::new(&trials, "rod_mm", "s1", Some(&file(gain)), &[]);
+        let gauge =
+            GaugeSimulator::new(&trials, "rod_mm", "s1", Some(&file(gain)), &Catalogue::default());
         diagnose(&gauge.expect("a gauge"), &Options::default(), &|_| (), &|| false)
             .expect("a diagnosis")
             .0
@@ -309,7 +312,8 @@ fn a_rig_file_gives_the_nominal_gauge() {
     // One that is right is left alone.
     assert_eq!(run(-0.9).verdict, VerdictKind::NoGap);
     let whole = RigFile::parse("rig.toml", "[sensing]\nR0 = { value = 4.0 }\n").expect("a rig");
-    let refused = GaugeSimulator::new(&trials, "rod_mm", "s1", Some(&whole), &[]).unwrap_err();
+    let refused = GaugeSimulator::new(&trials, "rod_mm", "s1", Some(&whole), &Catalogue::default())
+        .unwrap_err();
     assert!(refused.to_string().contains("kind"), "{refused}");
 }
 
@@ -325,7 +329,8 @@ fn uneven_and_broken_records_are_mended_and_told() {
     for channel in &mut trial.channels {
         channel.values = kept.iter().map(|&i| channel.values[i]).collect();
     }
-    let gauge = GaugeSimulator::new(&trials, "rod_mm", "s1", None, &[]).expect("a gauge");
+    let gauge =
+        GaugeSimulator::new(&trials, "rod_mm", "s1", None, &Catalogue::default()).expect("a gauge");
     let parts: Vec<usize> = gauge.trials().iter().map(|t| t.samples).collect();
     assert!(parts.len() == 2 && parts.iter().sum::<usize>().abs_diff(5800) < 20, "{parts:?}");
     assert!((gauge.trials()[1].start_s - 32.0).abs() < 0.05);
@@ -343,7 +348,7 @@ fn columns_that_cannot_be_what_they_say_are_refused_or_told() {
     let gauge = |change: &dyn Fn(&mut Trial), reference: &str, signal: &str| {
         let mut trials = good.clone();
         change(&mut trials[0].trial);
-        GaugeSimulator::new(&trials, reference, signal, None, &[])
+        GaugeSimulator::new(&trials, reference, signal, None, &Catalogue::default())
     };
     let refused = |change: &dyn Fn(&mut Trial), reference: &str, signal: &str, words: &[&str]| {
         let error = gauge(change, reference, signal).unwrap_err().to_string();

@@ -2,10 +2,13 @@
 
 mod support;
 
-use stretch_bench::{BenchError, RigSimulator, RigTrial, Session};
+use stretch_bench::{RigSimulator, RigTrial, Session};
 use stretch_data::TrialKind;
 use stretch_gap::{Diagnosis, Options, VerdictKind, diagnose};
-use stretch_sim::{Chain, DEFAULT_STEP_S, EffectSet, Key, Openings, Recorded, RigParams, Start};
+use stretch_sim::{
+    Catalogue, Chain, DEFAULT_STEP_S, EffectSet, Key, Openings, Recorded, RigParams, SimError,
+    Start,
+};
 use support::Noise;
 
 const DT_S: f64 = 0.01;
@@ -81,9 +84,9 @@ fn own_rig() -> RigParams {
 }
 
 fn run(trials: Vec<RigTrial>, without: &[&str], options: &Options) -> Diagnosis {
-    let without: Vec<String> = without.iter().map(|s| (*s).to_owned()).collect();
+    let catalogue = Catalogue::default().without(without).expect("known names");
     let session = Session::new(trials).expect("a session");
-    let simulator = RigSimulator::new(session, None, &without).expect("a simulator");
+    let simulator = RigSimulator::new(session, None, &catalogue).expect("a simulator");
     diagnose(&simulator, options, &|_| (), &|| false).expect("a diagnosis").0
 }
 
@@ -208,10 +211,9 @@ fn bad_input_is_refused_in_a_sentence() {
     assert!(shut.contains("no valve ever opens"), "{shut}");
     let tests = changed(&|t| t.is_test = true);
     assert!(tests.contains("split"), "{tests}");
-    let unknown =
-        RigSimulator::new(Session::new(good).expect("a session"), None, &["leek".to_owned()]);
+    let unknown = Catalogue::default().without(&["leek"]);
     assert!(
-        matches!(unknown, Err(BenchError::UnknownEffect { nearest: Some(n), .. }) if n == "leak")
+        matches!(unknown, Err(SimError::UnknownEffect { nearest: Some(n), .. }) if n == "leak")
     );
 }
 

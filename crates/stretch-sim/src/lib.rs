@@ -18,8 +18,8 @@ mod stages;
 mod static_law;
 
 pub use effects::{
-    Action, ActiveEffect, CATALOGUE, Effect, EffectParameter, EffectSet, Scale, Surroundings,
-    effect_named,
+    Action, ActiveEffect, Alone, CATALOGUE, Catalogue, Effect, EffectParameter, EffectSet, Extent,
+    Find, Form, Measured, Need, Role, Scale, Search, Surroundings, effect_named,
 };
 pub use error::SimError;
 pub use gauge::{Gauge, GaugeSpec};
@@ -36,7 +36,4 @@ pub use stages::{
     Sensing,
 };
 pub use static_law::StaticLaw;
-pub use stretch_operators::{
-    Backlash, DEFAULT_STEP_S, Grid, GridError, MeanReversion, Operator, Span, Start, play,
-    soft_ceiling, soft_floor,
-};
+pub use stretch_operators::{DEFAULT_STEP_S, Grid, GridError, Operator, Span, Start};

@@ -1,7 +1,7 @@
 //! A gauge alone beside a reference: a rig of one stage.
 
-mod catalogue;
 mod experiments;
+mod lag;
 mod record;
 mod source;
 
@@ -9,19 +9,17 @@ use stretch_data::{RigFile, unit};
 use stretch_gap::{
     Description, Dice, GapError, Model, Motion, ParameterSpec, Run, Simulator, StageSpec, TrialSpec,
 };
-use stretch_sim::{Effect, Gauge, GaugeSpec, Start};
+use stretch_sim::{Alone, Catalogue, Effect, Gauge, GaugeSpec, Measured, Start};
 
-use catalogue::{Scope, catalogue, lag};
+use lag::lag;
 pub use record::GaugeTrial;
 use record::Record;
 
 use crate::{
+    acting::Acting,
     error::BenchError,
-    outside::{Acting, Recorder},
-    rig::{
-        catalogue::check_names,
-        smooth::{Smoothed, unscheduled},
-    },
+    rig::smooth::{Smoothed, unscheduled},
+    specs::{Place, spec as spec_of},
 };
 
 /// Where the parameters stand.
@@ -41,6 +39,7 @@ const WINDING: usize = 2;
 /// use stretch_data::{Channel, Trial};
 /// use stretch_bench::{GaugeSimulator, GaugeTrial};
 /// use stretch_gap::{Options, VerdictKind, diagnose};
+/// use stretch_sim::Catalogue;
 /// // A sensor that shows 0.05 s late what a rod does.
 /// let rod = |t: f64| 40.0 + 20.0 * (1.3 * t).sin() + 10.0 * (3.1 * t).sin();
 /// let time_s: Vec<f64> = (0..4000).map(|i| 0.01 * i as f64).collect();
@@ -51,7 +50,7 @@ const WINDING: usize = 2;
 /// let channels = vec![channel("rod_mm", length), channel("s1", signal)];
 /// let trial = Trial { name: "rod.csv".into(), time_s, channels };
 /// let trials = [GaugeTrial { trial, start_s: 0.0, is_test: false }];
-/// let gauge = GaugeSimulator::new(&trials, "rod_mm", "s1", None, &[])?;
+/// let gauge = GaugeSimulator::new(&trials, "rod_mm", "s1", None, &Catalogue::default())?;
 /// let (diagnosis, _) = diagnose(&gauge, &Options::default(), &|_| (), &|| false)?;
 /// assert_eq!(diagnosis.verdict, VerdictKind::Effect);
 /// assert_eq!(diagnosis.named, ["channel_skew"]);
@@ -60,7 +59,7 @@ const WINDING: usize = 2;
 #[derive(Debug)]
 pub struct GaugeSimulator {
     about: Description,
-    rows: Vec<&'static dyn Effect>,
+    rows: Vec<&'static Effect>,
     record: Record,
     /// The reference of each trial as it drives the gauge.
     inputs: Vec<Smoothed>,
@@ -68,24 +67,25 @@ pub struct GaugeSimulator {
     /// Column of the reference.
     reference: String,
     reference_sd: f64,
-    recorder: Recorder,
+    /// Noise of the signal, one standard deviation.
+    noise: f64,
+    /// Range of the signal.
+    spread: f64,
 }
 
 impl GaugeSimulator {
-    /// Binds a gauge to trials and two of their columns. Effects called in `without` are left out. A rig file gives
+    /// Binds a gauge to trials and two of their columns; the effects of `catalogue` that can act in it are looked for. A rig file gives
     /// zero, span, offset and gain, with their tolerances; its effects are not part of the nominal gauge.
     ///
     /// # Errors
-    /// Columns that are missing, dead, hold too few numbers or look swapped; names in `without` that nobody knows; a
-    /// rig file of another kind.
+    /// Columns that are missing, dead, hold too few numbers or look swapped; a rig file of another kind.
     pub fn new(
         trials: &[GaugeTrial],
         reference: &str,
         signal: &str,
         rig: Option<&RigFile>,
-        without: &[String],
+        catalogue: &Catalogue,
     ) -> Result<Self, BenchError> {
-        check_names(without)?;
         let record = Record::read(trials, reference, signal)?;
         let (low, high) = record.range(&record.reference);
         let (least, greatest) = record.range(&record.signal);
@@ -116,12 +116,18 @@ impl GaugeSimulator {
         let session = |t: &TrialSpec| t.start_s + t.samples as f64 * record.dt_s;
         let begun = record.trials.first().map_or(0.0, |t| t.start_s);
         let first = record.fitted().max_by_key(ExactSizeIterator::len).unwrap_or(0..0);
-        let scope = Scope {
+        let alone = Alone {
             session_s: record.trials.last().map_or(0.0, session) - begun,
             lag_s: lag(&record.reference[first.clone()], &record.signal[first], record.dt_s),
-            has_pressure: spec.pressure_scale.is_some(),
         };
-        let (effects, rows) = catalogue(without, scope);
+        let has_pressure = spec.pressure_scale.is_some();
+        let rows: Vec<_> = catalogue.iter().filter(|e| Gauge::accepts(e, has_pressure)).collect();
+        let place = |effect: &Effect| Place {
+            touches: vec![0],
+            search: Gauge::search(effect, &alone),
+            unit: Gauge::unit,
+        };
+        let effects = rows.iter().map(|effect| spec_of(effect, place(effect))).collect();
         let stage = StageSpec::new("sensing", signal, unit_of(signal), &[OFFSET, GAIN, WINDING]);
         let parameters = vec![
             parameter("offset", spec.offset),
@@ -138,7 +144,8 @@ impl GaugeSimulator {
             inputs,
             reference: reference.into(),
             reference_sd,
-            recorder: Recorder { noise, unit: spread, dt_s: record.dt_s },
+            noise,
+            spread,
             record,
             spec,
         })
@@ -173,7 +180,13 @@ impl GaugeSimulator {
             };
             let pressure = self.record.pressure.get(from..to).unwrap_or(&[]);
             gauge.run(&mut memory, start, trial.start_s, &input, pressure, &mut out[from..to])?;
-            acting.record(self.recorder, &self.record.signal[from..to], &mut out[from..to]);
+            let record = Measured {
+                samples: &self.record.signal[from..to],
+                noise: self.noise,
+                unit: self.spread,
+                dt_s: self.dt_s(),
+            };
+            acting.follow(record, &mut out[from..to]);
             let next = self.record.trials.get(i + 1).map_or(f64::INFINITY, |t| t.start_s);
             let rest_s = (next - trial.start_s - trial.samples as f64 * self.dt_s()).max(0.0);
             start = Start::Carried { rest_s };

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use stretch_data::{DataSet, ReadOptions, RigFile, Split, Trial};
+use stretch_sim::Catalogue;
 
 use super::{GaugeSimulator, GaugeTrial};
 use crate::error::BenchError;
@@ -23,7 +24,7 @@ impl GaugeSimulator {
         path: &Path,
         columns: Option<(&str, &str)>,
         rig: Option<&RigFile>,
-        without: &[String],
+        catalogue: &Catalogue,
     ) -> Result<Option<Self>, BenchError> {
         let set = if path.is_dir() { Some(DataSet::read(path)?) } else { None };
         let own = match &set {
@@ -71,7 +72,7 @@ impl GaugeSimulator {
                 set.trials.iter().map(load).collect::<Result<_, BenchError>>()?
             }
         };
-        Self::new(&trials, reference, signal, rig, without).map(Some)
+        Self::new(&trials, reference, signal, rig, catalogue).map(Some)
     }
 }
 

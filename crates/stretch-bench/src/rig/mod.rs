@@ -1,9 +1,7 @@
 //! The rig as a [`Simulator`]: pneumatics, muscle (or both as actuation) and sensing, each on measured inputs.
 
-pub(crate) mod catalogue;
 mod experiments;
-pub(crate) mod forms;
-pub(crate) mod hum;
+mod extent;
 mod params;
 mod run;
 mod session;
@@ -15,14 +13,17 @@ use stretch_data::{DataSet, RigFile};
 use stretch_gap::{
     Description, GapError, Motion, ParameterSpec, Run, Simulator, StageSpec, TrialSpec, Wander,
 };
-use stretch_sim::{Effect, Key, PARAMETERS, RigParams, Stage};
+use stretch_sim::{Catalogue, Effect, Key, PARAMETERS, RigParams, Search, Stage};
 
-use catalogue::{Extent, Place, check_names, entries, tuned};
+use extent::{extent_of, tuned};
 use params::read_params;
 use session::Inputs;
 pub use session::{RigTrial, Session};
 
-use crate::error::BenchError;
+use crate::{
+    error::BenchError,
+    specs::{Place, spec},
+};
 
 /// Slow fluctuation of the supply, a share of it (1 sd).
 const SUPPLY_WANDER: f64 = 0.003;
@@ -41,7 +42,7 @@ pub struct RigSimulator {
     stage_kinds: Vec<Stage>,
     /// Key of each parameter; none for the pressure at a trial's start.
     keys: Vec<Option<Key>>,
-    rows: Vec<&'static dyn Effect>,
+    rows: Vec<&'static Effect>,
     measured: Vec<Vec<f64>>,
 }
 
@@ -53,24 +54,23 @@ impl RigSimulator {
     pub fn read(
         folder: &Path,
         rig: Option<&RigFile>,
-        without: &[String],
+        catalogue: &Catalogue,
     ) -> Result<Self, BenchError> {
         let set = DataSet::read(folder)?;
         let own = set.read_rig(folder)?;
         let session = Session::read(folder, &set)?;
-        Self::new(session, rig.or(own.as_ref()), without)
+        Self::new(session, rig.or(own.as_ref()), catalogue)
     }
 
-    /// Binds a rig to a session. Effects called in `without` are left out of the catalogue.
+    /// Binds a rig to a session; the effects of `catalogue` are looked for.
     ///
     /// # Errors
-    /// Names in the rig file or in `without` that nobody knows.
+    /// Names in the rig file that nobody knows.
     pub fn new(
         session: Session,
         rig: Option<&RigFile>,
-        without: &[String],
+        catalogue: &Catalogue,
     ) -> Result<Self, BenchError> {
-        check_names(without)?;
         let (base, tolerances) = read_params(rig)?;
         let has_pressure = session.trials[0].pressure_kpa.is_some();
         let step = base[Key::Travel] / (base[Key::Bits].exp2() - 1.0);
@@ -149,15 +149,14 @@ impl RigSimulator {
                 })
                 .collect()
         };
-        let (effects, rows) = entries(
-            without,
-            &Place {
-                accepts: &|_| true,
-                touches: &index,
-                unit: &|_| 1.0,
-                extent: Extent::of(&base, &inputs, &session),
-            },
-        );
+        let extent = extent_of(&base, &inputs, &session);
+        let rows: Vec<_> = catalogue.iter().collect();
+        let place = |effect: &Effect| Place {
+            touches: index(effect.stage),
+            search: Search::of(effect, &extent),
+            unit: |_| 1.0,
+        };
+        let effects = rows.iter().map(|effect| spec(effect, place(effect))).collect();
         let trials = session
             .trials
             .iter()

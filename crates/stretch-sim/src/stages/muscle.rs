@@ -45,7 +45,7 @@ impl Muscle {
         let around = Surroundings::of_rig(params, grid);
         let (mut before, mut behind) = (Vec::new(), Vec::new());
         for active in effects.acting_in(Stage::Muscle) {
-            match active.effect().action(active.values(), &around) {
+            match (active.effect().action)(active.values(), &around) {
                 Action::StaticContraction(operator) => before.push(operator),
                 Action::MovingContraction(operator) => behind.push(operator),
                 _ => {}

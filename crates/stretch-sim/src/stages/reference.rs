@@ -30,7 +30,7 @@ impl Reference {
     pub(crate) fn around(around: &Surroundings<'_>, effects: &EffectSet, grid: &Grid) -> Self {
         let row = effects
             .acting_in(Stage::Reference)
-            .filter_map(|active| match active.effect().action(active.values(), around) {
+            .filter_map(|active| match (active.effect().action)(active.values(), around) {
                 Action::Length(operator) => Some(operator),
                 _ => None,
             })

@@ -5,7 +5,7 @@ use stretch_operators::{Grid, Row, Skew, SkewSpec, Span, Start};
 use super::check_length;
 use crate::{
     SimError,
-    effects::{Action, ActiveEffect, EffectSet, Surroundings},
+    effects::{Action, ActiveEffect, EffectSet, Need, Surroundings},
     memory::Memory,
     params::{Key, RigParams},
     stage::Stage,
@@ -91,7 +91,7 @@ impl Sensing {
             record: sites.record,
             needs_pressure: effects
                 .acting_in(Stage::Sensing)
-                .find(|e| e.effect().needs() == Some("a pressure"))
+                .find(|e| e.effect().needs == Some(Need::Pressure))
                 .map(|e| e.name()),
         })
     }
@@ -124,7 +124,10 @@ impl Sensing {
     ) -> Result<(), SimError> {
         check_length("length_mm", self.grid.nodes(bridge_v.len()), length_mm.len())?;
         if let (Some(name), true) = (self.needs_pressure, pressure_kpa.is_empty()) {
-            return Err(SimError::NotHere { name: name.to_string(), needs: "a pressure" });
+            return Err(SimError::NotHere {
+                name: name.to_string(),
+                needs: Need::Pressure.words(),
+            });
         }
         if !pressure_kpa.is_empty() {
             check_length("pressure_kpa", length_mm.len(), pressure_kpa.len())?;
@@ -218,7 +221,7 @@ pub(crate) struct Sites {
     pub(crate) resistance: Row,
     pub(crate) volts: Row,
     pub(crate) record: Row,
-    skew_s: f64,
+    skew: SkewSpec,
 }
 
 impl Sites {
@@ -227,14 +230,17 @@ impl Sites {
         around: &Surroundings<'_>,
     ) -> Self {
         let [mut strain, mut resistance, mut volts, mut record] = [const { Vec::new() }; 4];
-        let mut skew_s = 0.0;
+        let mut skew = SkewSpec::default();
         for active in effects {
-            match active.effect().action(active.values(), around) {
+            match (active.effect().action)(active.values(), around) {
                 Action::Strain(operator) => strain.push(operator),
                 Action::Resistance(operator) => resistance.push(operator),
                 Action::Volts(operator) => volts.push(operator),
                 Action::Record(operator) => record.push(operator),
-                Action::Skew(seconds) => skew_s += seconds,
+                Action::Skew(own) => {
+                    skew.skew_s += own.skew_s;
+                    skew.rate += own.rate;
+                }
                 _ => {}
             }
         }
@@ -242,10 +248,10 @@ impl Sites {
         let resistance = Row::new(resistance, strain.end());
         let volts = Row::new(volts, resistance.end());
         let record = Row::new(record, volts.end());
-        Self { strain, resistance, volts, record, skew_s }
+        Self { strain, resistance, volts, record, skew }
     }
 
     pub(crate) fn skew(&self, grid: &Grid) -> Option<Skew> {
-        (self.skew_s != 0.0).then(|| Skew::new(grid, SkewSpec { skew_s: self.skew_s, rate: 0.0 }))
+        (self.skew != SkewSpec::default()).then(|| Skew::new(grid, self.skew))
     }
 }

@@ -116,7 +116,7 @@ fn every_effect() {
         }
         for values in cases {
             let mut set = EffectSet::new();
-            set.push(*effect, &values).unwrap();
+            set.push(effect, &values).unwrap();
             let (share, at) = moved(&RigParams::default(), &set);
             println!("{:22} {values:?} {share:.1e} {at}", effect.name);
             if share > RIG_STEP {

@@ -68,7 +68,7 @@ fn effects() -> impl Strategy<Value = EffectSet> {
         let mut set = EffectSet::new();
         for (effect, (on, values)) in CATALOGUE.iter().zip(each) {
             if on {
-                set.push(*effect, &values).unwrap();
+                set.push(effect, &values).unwrap();
             }
         }
         set

@@ -30,7 +30,7 @@ fn all_effects() -> Rig {
     let mut rig = Rig::default();
     for effect in CATALOGUE {
         let values: Vec<f64> = effect.parameters.iter().map(|p| p.typical).collect();
-        rig.effects.push(*effect, &values).unwrap();
+        rig.effects.push(effect, &values).unwrap();
     }
     rig
 }
@@ -232,7 +232,7 @@ fn a_gauge_alone_is_a_rig() {
     for effect in CATALOGUE.iter().filter(|e| Gauge::accepts(e, false)) {
         let values: Vec<f64> = effect.parameters.iter().map(|p| Gauge::range(p).2).collect();
         let mut set = EffectSet::new();
-        set.push(*effect, &values).unwrap();
+        set.push(effect, &values).unwrap();
         let moved = run(&set).iter().zip(&plain).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         if effect.name != "mains_hum" {
             assert!(moved > 5e-4 * 120.0 && moved < 120.0, "{}: {moved}", effect.name);

@@ -40,6 +40,9 @@ pub struct Measured<'a> {
 /// Finds what a record alone can tell, and acts with it: values, the record, the simulated samples.
 pub type Find = fn(&[f64], &Measured<'_>, &mut [f64]);
 
+/// Points to look for an effect at, from what was measured.
+pub type Starts = fn(&Extent) -> Vec<Vec<f64>>;
+
 /// What the screens need to know of a measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
@@ -109,7 +112,7 @@ pub struct Effect {
     pub needs_fine_steps: bool,
     /// Points to look for it at; values of forms at their end may be left out and are then the usual ones. Without any,
     /// a small and a large value of each strength with three of each shape are taken.
-    pub starts: Option<fn(&Extent) -> Vec<Vec<f64>>>,
+    pub starts: Option<Starts>,
     /// What a gauge alone changes of ranges and starts, in its units.
     pub alone: fn(&Alone, &mut Search),
     /// How its [`Role::Found`] numbers are found in a record; none for all but hum.

@@ -9,7 +9,7 @@ mod set;
 
 pub use action::{Action, Surroundings};
 pub use catalogue::Catalogue;
-pub use effect::{Alone, Effect, Extent, Find, Measured, Need};
+pub use effect::{Alone, Effect, Extent, Find, Measured, Need, Starts};
 pub use parameter::{EffectParameter, Form, Role, Scale};
 pub use search::Search;
 pub use set::{ActiveEffect, EffectSet};

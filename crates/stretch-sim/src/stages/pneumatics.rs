@@ -71,6 +71,8 @@ pub struct Pneumatics {
     commands: [Row; 2],
     leaks: Vec<Box<dyn Law>>,
     volumes: Vec<Box<dyn Law>>,
+    /// The first effect that makes the volume follow the muscle.
+    coupled_by: Option<&'static str>,
     droops: Vec<Box<dyn Droop>>,
     length_zero_mm: f64,
     length_span_mm: f64,
@@ -102,7 +104,7 @@ impl Pneumatics {
         let [mut leaks, mut volumes] = [const { Vec::new() }; 2];
         let [mut inlet, mut outlet] = [const { Vec::new() }; 2];
         let mut droops: Vec<Box<dyn Droop>> = Vec::new();
-        let mut delay_s = 0.0;
+        let (mut delay_s, mut coupled_by) = (0.0, None);
         for active in effects.acting_in(Stage::Pneumatics) {
             match (active.effect().action)(active.values(), &around) {
                 Action::Delay(seconds) => delay_s += seconds,
@@ -111,7 +113,10 @@ impl Pneumatics {
                     outlet.push(of_outlet);
                 }
                 Action::Leak(law) => leaks.push(law),
-                Action::Volume(law) => volumes.push(law),
+                Action::Volume(law) => {
+                    coupled_by = coupled_by.or(Some(active.name()));
+                    volumes.push(law);
+                }
                 Action::Droop(_) if droops.len() == MOST_DROOPS => {
                     return Err(SimError::NotHere {
                         name: active.name().to_string(),
@@ -140,6 +145,7 @@ impl Pneumatics {
             commands: [inlet, outlet],
             leaks,
             volumes,
+            coupled_by,
             droops,
             length_zero_mm: params[Key::L0],
             length_span_mm: -params[Key::L0] * params[Key::KMax],
@@ -163,7 +169,7 @@ impl Pneumatics {
 
     /// Whether the pressure depends on the contraction.
     pub fn is_coupled(&self) -> bool {
-        !self.volumes.is_empty()
+        self.coupled_by.is_some()
     }
 
     /// Gauge pressure in kPa at every sample, from `initial_kpa` at the first.
@@ -179,11 +185,8 @@ impl Pneumatics {
         initial_kpa: f64,
         pressure_kpa: &mut [f64],
     ) -> Result<(), SimError> {
-        if self.is_coupled() {
-            return Err(SimError::NotHere {
-                name: "chamber_volume".into(),
-                needs: "the length of the muscle",
-            });
+        if let Some(name) = self.coupled_by {
+            return Err(SimError::NotHere { name: name.into(), needs: "the length of the muscle" });
         }
         self.run_sampled(memory, start, openings, None, initial_kpa, pressure_kpa)
     }

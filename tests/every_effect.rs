@@ -9,14 +9,14 @@ use stretch_sim::{CATALOGUE, Effect};
 use support::{Scratch, stretch};
 
 /// The effect at the middle of its range's first half, one threshold of several, its shapes at their typical values.
-fn spelled(effect: &dyn Effect) -> String {
+fn spelled(effect: &Effect) -> String {
     // At 50 Hz and a phase of 0 every sample at 100 Hz meets a zero of the wave.
-    let fixed = match effect.name() {
+    let fixed = match effect.name {
         "mains_hum" => return "mains_hum:a=0.02,f=60,phase=1".into(),
         "amplifier_saturation" => return "amplifier_saturation:v_hi=2.1".into(),
         name => name,
     };
-    let values = effect.parameters().iter().map(|p| format!("{}={}", p.name, p.typical));
+    let values = effect.parameters.iter().map(|p| format!("{}={}", p.name, p.typical));
     format!("{fixed}:{}", values.collect::<Vec<_>>().join(","))
 }
 
@@ -29,8 +29,8 @@ fn is_named_when_it_is_simulated() {
     let scratch = Scratch::new();
     let mut wrong = Vec::new();
     for effect in CATALOGUE {
-        let (folder, json) = (scratch.path(effect.name()), scratch.path("d.json"));
-        let given = spelled(*effect);
+        let (folder, json) = (scratch.path(effect.name), scratch.path("d.json"));
+        let given = spelled(effect);
         stretch().args(["simulate", "--effect", &given, "--out"]).arg(&folder).assert().success();
         let mut command = stretch();
         command.arg("diagnose").arg(&folder).args(["--no-next", "--json"]).arg(&json);
@@ -49,10 +49,10 @@ fn is_named_when_it_is_simulated() {
         );
         // Two that fit exactly alike (a sleeve that goes slack, an amplifier that saturates) may come in either order.
         let own = d["candidates"].as_array().unwrap().iter();
-        let own = own.filter(|c| c["effects"][0] == effect.name());
+        let own = own.filter(|c| c["effects"][0] == effect.name);
         let own = own.filter_map(|c| c["score"].as_f64()).fold(f64::NEG_INFINITY, f64::max);
         let is_tied = first["score"].as_f64().is_some_and(|score| score - own <= TIE);
-        if d["named"][0] != effect.name() && !is_tied {
+        if d["named"][0] != effect.name && !is_tied {
             wrong.push(given);
         }
         fs::remove_dir_all(&folder).unwrap();

@@ -112,9 +112,10 @@ fn oracle(folder: &Path, answers: &mut Answers) -> anyhow::Result<()> {
 }
 
 fn known_fit(case: &Path, effects: &[String]) -> Option<f64> {
-    let names = stretch_sim::CATALOGUE.iter().map(|e| e.name().to_owned());
-    let without: Vec<String> = names.filter(|name| !effects.contains(name)).collect();
-    let simulator = RigSimulator::read(case, None, &without).ok()?;
+    let names = stretch_sim::CATALOGUE.iter().map(|e| e.name);
+    let without: Vec<&str> = names.filter(|name| effects.iter().all(|e| e != name)).collect();
+    let catalogue = stretch_sim::Catalogue::default().without(&without).ok()?;
+    let simulator = RigSimulator::read(case, None, &catalogue).ok()?;
     let options = Options { threads: 1, ..Options::default() };
     let (diagnosis, _) =
         diagnose(&simulator, &options, &|_| (), &stretch_data::interrupted).ok()?;

@@ -9,6 +9,7 @@ use stretch_data::Trial;
 use stretch_gap::{
     Diagnosis, Evidence, GapError, Laboratory, Options, Simulator, diagnose, next_experiment,
 };
+use stretch_sim::Catalogue;
 
 use super::{
     diagnosis_text::text,
@@ -87,7 +88,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let rig = args.rig.as_deref();
     let shown = || args.data_set.display().to_string();
     let columns = args.reference.as_deref().zip(args.signal.as_deref());
-    let bench = Bench::read(&args.data_set, columns, rig, &args.without).with_context(shown)?;
+    let catalogue = Catalogue::default().without(&args.without)?;
+    let bench = Bench::read(&args.data_set, columns, rig, &catalogue).with_context(shown)?;
     let mut examined = bench.examine(&options, !args.no_next, &bar).with_context(shown)?;
     if let Some(path) = &args.experiment {
         match &examined.experiment {
@@ -121,9 +123,9 @@ impl Bench {
         path: &Path,
         columns: Option<(&str, &str)>,
         rig: Option<&Path>,
-        without: &[String],
+        catalogue: &Catalogue,
     ) -> anyhow::Result<Self> {
-        if let Some(gauge) = GaugeSimulator::read(path, columns, rig, without)? {
+        if let Some(gauge) = GaugeSimulator::read(path, columns, rig, catalogue)? {
             return Ok(Self::Gauge(gauge));
         }
         ensure!(
@@ -131,7 +133,7 @@ impl Bench {
             "a single trial is diagnosed as a gauge alone: say which columns with --reference and --signal, \
              or give the folder of a data set"
         );
-        Ok(Self::Rig(RigSimulator::read(path, rig, without)?))
+        Ok(Self::Rig(RigSimulator::read(path, rig, catalogue)?))
     }
 
     pub(super) fn simulator(&self) -> &dyn Simulator {

@@ -1,13 +1,15 @@
 //! `stretch effects`: the catalogue of what a rig may do beside its nominal physics.
 
-use stretch_sim::{CATALOGUE, Effect, EffectParameter, SimError, effect_named};
+use stretch_sim::{CATALOGUE, Effect, EffectParameter, Role, SimError, effect_named};
 
 use super::shared::{say, say_json};
 
 /// List the effects that can be added to the simulated rig
 ///
 /// With equation, parameters and plausible ranges, in the order in which several
-/// effects of one stage act. Use them as
+/// effects of one stage act. A form is a freedom that measured rigs ask for: it is
+/// neutral when it is not given, and `stretch diagnose` fits it around its usual
+/// value. Use them as
 ///
 ///   stretch simulate --effect gauge_hysteresis:h=0.2,s=0.012 --out bench
 #[derive(clap::Args)]
@@ -22,12 +24,12 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    let chosen: Vec<&dyn Effect> = if args.names.is_empty() {
+    let chosen: Vec<&Effect> = if args.names.is_empty() {
         CATALOGUE.to_vec()
     } else {
         let find = |name: &String| {
-            effect_named(name).map(|effect| effect as &dyn Effect).ok_or_else(|| {
-                let names = CATALOGUE.iter().map(|e| e.name());
+            effect_named(name).ok_or_else(|| {
+                let names = CATALOGUE.iter().map(|e| e.name);
                 let nearest = stretch_data::nearest(name, names).map(str::to_owned);
                 SimError::UnknownEffect { name: name.clone(), nearest }
             })
@@ -35,17 +37,24 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         args.names.iter().map(find).collect::<Result<_, _>>()?
     };
     if args.json {
-        return say_json(&chosen.iter().map(|e| json(*e)).collect::<Vec<_>>());
+        return say_json(&chosen.iter().map(|e| json(e)).collect::<Vec<_>>());
     }
     let mut stage = None;
     for effect in chosen {
-        if stage != Some(effect.stage()) {
-            say(format!("{}{}", if stage.is_some() { "\n" } else { "" }, effect.stage()))?;
-            stage = Some(effect.stage());
+        if stage != Some(effect.stage) {
+            say(format!("{}{}", if stage.is_some() { "\n" } else { "" }, effect.stage))?;
+            stage = Some(effect.stage);
         }
-        say(format!("  {:22} {}", effect.name(), effect.equation()))?;
-        let parameters: Vec<String> = effect.parameters().iter().map(range).collect();
-        say(format!("  {:22}   {}", "", parameters.join("; ")))?;
+        say(format!("  {:22} {}", effect.name, effect.equation))?;
+        let of = |is_form: bool| {
+            let own = effect.parameters.iter();
+            own.filter(move |p| matches!(p.role, Role::Form { .. }) == is_form).map(range)
+        };
+        say(format!("  {:22}   {}", "", of(false).collect::<Vec<_>>().join("; ")))?;
+        let forms: Vec<String> = of(true).collect();
+        if !forms.is_empty() {
+            say(format!("  {:22}   form {}", "", forms.join("; ")))?;
+        }
     }
     Ok(())
 }
@@ -53,27 +62,35 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
 /// `h: 0 .. 0.6`, with the unit where there is one.
 fn range(p: &EffectParameter) -> String {
     let number = |x: f64| {
+        // Four digits are enough for a third.
+        let x = format!("{x:.3e}").parse().unwrap_or(x);
         if x != 0.0 && x.abs() < 1e-3 || x.abs() >= 1e6 { format!("{x:e}") } else { format!("{x}") }
     };
     let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
-    let default = match p.off {
-        None => format!(" (else {})", number(p.typical)),
-        Some(_) => String::new(),
+    let default = match p.role {
+        Role::Strength { .. } => String::new(),
+        Role::Form { usual } if usual != p.typical => {
+            format!(" (else {}, usually {})", number(p.typical), number(usual))
+        }
+        _ => format!(" (else {})", number(p.typical)),
     };
-    format!("{}: {} .. {}{unit}{default}", p.name, number(p.min), number(p.max))
+    let allowed = p.allowed();
+    format!("{}: {} .. {}{unit}{default}", p.name, number(*allowed.start()), number(*allowed.end()))
 }
 
-fn json(effect: &dyn Effect) -> serde_json::Value {
+fn json(effect: &Effect) -> serde_json::Value {
     let parameters: Vec<serde_json::Value> = effect
-        .parameters()
+        .parameters
         .iter()
         .map(|p| {
             serde_json::json!({
-                "name": p.name, "unit": p.unit, "min": p.min, "max": p.max, "off": p.off, "typical": p.typical,
+                "name": p.name, "role": p.role.name(), "unit": p.unit, "min": p.allowed().start(), "max": p.allowed().end(),
+                "off": p.off(), "typical": p.typical, "usual": p.usual(),
             })
         })
         .collect();
     serde_json::json!({
-        "name": effect.name(), "stage": effect.stage().name(), "equation": effect.equation(), "parameters": parameters,
+        "name": effect.name, "words": effect.words, "stage": effect.stage.name(), "equation": effect.equation,
+        "parameters": parameters,
     })
 }

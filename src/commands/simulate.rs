@@ -206,6 +206,9 @@ mod tests {
         let effect = parse_effect("gauge_hysteresis:h=0.2,s=0.012").unwrap();
         assert_eq!(effect.name, "gauge_hysteresis");
         assert_eq!(effect.values, [("h".to_owned(), 0.2), ("s".to_owned(), 0.012)]);
+        // Forms, as a diagnosis answers them.
+        let effect = parse_effect("gauge_hysteresis:h=0.2,s=0.012,spread=0.4").unwrap();
+        assert_eq!(effect.values[2], ("spread".to_owned(), 0.4));
         for (wrong, says) in [
             ("gauge_hysterisis:h=0.2", "did you mean `gauge_hysteresis`?"),
             ("gauge_hysteresis:k=0.2", "no parameter `k`"),

@@ -6,6 +6,7 @@ use std::{fs, path::Path, time::Instant};
 use stretch_bench::RigSimulator;
 use stretch_blind::{CaseKind, Score, Seal, Truth, Verdict};
 use stretch_gap::{Options, diagnose};
+use stretch_sim::Catalogue;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -23,9 +24,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         if !wanted.is_empty() && !wanted.contains(name) {
             continue;
         }
-        let without: Vec<String> = label.struck.iter().cloned().collect();
+        let struck: Vec<&String> = label.struck.iter().collect();
+        let catalogue = Catalogue::default().without(&struck)?;
         let begun = Instant::now();
-        let simulator = RigSimulator::read(&folder.join(name), None, &without)?;
+        let simulator = RigSimulator::read(&folder.join(name), None, &catalogue)?;
         let progress = |what: &str| {
             if !wanted.is_empty() {
                 eprintln!("{:6.1} s: {what}", begun.elapsed().as_secs_f64());

@@ -2,7 +2,7 @@
 
 use stretch_data::DataError;
 use stretch_gap::{DescriptionError, GapError};
-use stretch_sim::SimError;
+use stretch_sim::{GridError, SimError};
 
 /// Why measurements could not be bound to a simulator, or a simulation was refused; carries the evidence.
 #[derive(Debug, thiserror::Error)]
@@ -50,18 +50,16 @@ pub enum BenchError {
         /// The stage.
         stage: String,
     },
-    /// An effect of that name is not in the catalogue.
-    #[error("no effect is called `{name}`{}", .nearest.as_ref().map_or(String::new(), |n| format!(" (did you mean `{n}`?)")))]
-    UnknownEffect {
-        /// The name given.
-        name: String,
-        /// The nearest name.
-        nearest: Option<String>,
-    },
 }
 
 impl From<BenchError> for GapError {
     fn from(error: BenchError) -> Self {
         Self::simulator(error)
+    }
+}
+
+impl From<GridError> for BenchError {
+    fn from(error: GridError) -> Self {
+        Self::Sim(error.into())
     }
 }

@@ -1,10 +1,11 @@
 #![doc = include_str!("../README.md")]
 
+mod acting;
 mod error;
 mod gauge;
-mod outside;
 mod rig;
 mod rig_file;
+mod specs;
 
 pub use error::BenchError;
 pub use gauge::{GaugeSetup, GaugeSimulator};

@@ -3,6 +3,7 @@
 use stretch_bench::{RigSetup, RigSimulator, Session};
 use stretch_data::SessionTrial;
 use stretch_gap::{Model, Simulator, differences};
+use stretch_sim::Catalogue;
 
 /// A rig beside an arbitrary trial.
 fn rig() -> RigSimulator {
@@ -11,7 +12,8 @@ fn rig() -> RigSimulator {
     let (_, mut trial) = session.run(&plan).unwrap();
     trial.channels.retain(|c| c.name != "pressure_kpa");
     let session = Session::new(&[SessionTrial::new(trial)]).unwrap();
-    RigSimulator::new(RigSetup { session, rig: Default::default(), without: &[] }).unwrap()
+    let catalogue = &Catalogue::default();
+    RigSimulator::new(RigSetup { session, rig: Default::default(), catalogue }).unwrap()
 }
 
 /// D of every experiment of the menu for two effects at given first parameters.

@@ -6,7 +6,7 @@ use approx::{assert_abs_diff_eq, assert_relative_eq};
 use stretch_bench::{BenchError, GaugeSetup, GaugeSimulator};
 use stretch_data::{Channel, RigFile, SessionTrial, Split, Trial, TrialKind};
 use stretch_gap::{Diagnosis, Options, Simulator, VerdictKind, diagnose, next_experiment};
-use stretch_sim::GaugeRig;
+use stretch_sim::{Catalogue, GaugeRig};
 use support::{Noise, PROBABILITY, with_lost_rows};
 use testkit::tolerance::{FIT_WELL, GAP_FOUND};
 
@@ -182,14 +182,13 @@ fn trials(fault: Fault, strength: f64, count: usize, seed: u64) -> Vec<SessionTr
 }
 
 /// The rod and the gauge of [`trials`].
-fn setup(trials: &[SessionTrial]) -> GaugeSetup<'_> {
-    GaugeSetup { trials, reference: "rod_mm", signal: "s1", rig: None, without: &[] }
+fn setup<'a>(trials: &'a [SessionTrial], catalogue: &'a Catalogue) -> GaugeSetup<'a> {
+    GaugeSetup { trials, reference: "rod_mm", signal: "s1", rig: None, catalogue }
 }
 
 fn run(trials: &[SessionTrial], without: &[&str]) -> Diagnosis {
-    let without: Vec<String> = without.iter().map(|s| (*s).into()).collect();
-    let setup = GaugeSetup { without: &without, ..setup(trials) };
-    let gauge = GaugeSimulator::new(&setup).expect("a gauge");
+    let catalogue = Catalogue::default().without(without).expect("known names");
+    let gauge = GaugeSimulator::new(&setup(trials, &catalogue)).expect("a gauge");
     diagnose(&gauge, &Options::default(), &|_| (), &|| false).expect("a diagnosis").0
 }
 
@@ -285,7 +284,7 @@ fn play_in_the_reference_is_never_given_another_name() {
 #[test]
 fn twins_that_no_motion_parts_call_for_gauge_blocks() {
     let trials = trials(Fault::BentReference, 0.2, 3, 11);
-    let gauge = GaugeSimulator::new(&setup(&trials)).expect("a gauge");
+    let gauge = GaugeSimulator::new(&setup(&trials, &Catalogue::default())).expect("a gauge");
     let (d, evidence) =
         diagnose(&gauge, &Options::default(), &|_| (), &|| false).expect("a diagnosis");
     assert_eq!(d.ambiguous.len(), 2, "{:?}", d.ambiguous);
@@ -308,7 +307,10 @@ fn a_rig_file_gives_the_nominal_gauge() {
     let trials = trials(Fault::None, 0.0, 3, 5);
     let run = |gain: f64| {
         let rig = file(gain);
-        let gauge = GaugeSimulator::new(&GaugeSetup { rig: Some(&rig), ..setup(&trials) });
+        let gauge = GaugeSimulator::new(&GaugeSetup {
+            rig: Some(&rig),
+            ..setup(&trials, &Catalogue::default())
+        });
         diagnose(&gauge.expect("a gauge"), &Options::default(), &|_| (), &|| false)
             .expect("a diagnosis")
             .0
@@ -338,7 +340,7 @@ fn uneven_and_broken_records_are_mended_and_told() {
     for channel in &mut trial.channels {
         channel.values = kept.iter().map(|&i| channel.values[i]).collect();
     }
-    let gauge = GaugeSimulator::new(&setup(&trials)).expect("a gauge");
+    let gauge = GaugeSimulator::new(&setup(&trials, &Catalogue::default())).expect("a gauge");
     let parts: Vec<usize> = gauge.trials().iter().map(|t| t.samples).collect();
     assert!(parts.len() == 2 && parts.iter().sum::<usize>().abs_diff(5800) < 20, "{parts:?}");
     assert_abs_diff_eq!(gauge.trials()[1].start_s, 32.0, epsilon = GAP_FOUND * 2.0);
@@ -373,7 +375,10 @@ fn a_gauge_that_has_the_effect_agrees_and_one_without_tolerance_stays_put() {
     let rig = GaugeRig::from_file(&RigFile::parse("gauge.toml", text).expect("TOML"));
     let rig = rig.expect("a gauge");
     let trials = trials(Fault::Late, 0.3, 3, 7);
-    let gauge = GaugeSimulator::new(&GaugeSetup { rig: Some(&rig), ..setup(&trials) });
+    let gauge = GaugeSimulator::new(&GaugeSetup {
+        rig: Some(&rig),
+        ..setup(&trials, &Catalogue::default())
+    });
     let gauge = gauge.expect("a gauge");
     assert!(gauge.effects().iter().all(|e| e.name != "channel_skew"));
     let d = diagnose(&gauge, &Options::default(), &|_| (), &|| false).expect("a diagnosis").0;
@@ -388,7 +393,11 @@ fn columns_that_cannot_be_what_they_say_are_refused_or_told() {
     let gauge = |change: &dyn Fn(&mut Trial), reference: &str, signal: &str| {
         let mut trials = good.clone();
         change(&mut trials[0].trial);
-        GaugeSimulator::new(&GaugeSetup { reference, signal, ..setup(&trials) })
+        GaugeSimulator::new(&GaugeSetup {
+            reference,
+            signal,
+            ..setup(&trials, &Catalogue::default())
+        })
     };
     let refused = |change: &dyn Fn(&mut Trial), reference: &str, signal: &str, words: &[&str]| {
         let error = gauge(change, reference, signal).unwrap_err().to_string();

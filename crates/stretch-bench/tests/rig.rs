@@ -3,12 +3,12 @@
 mod support;
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};
-use stretch_bench::{BenchError, RigSetup, RigSimulator, Session};
+use stretch_bench::{RigSetup, RigSimulator, Session};
 use stretch_data::{Channel, RigFile, SessionTrial, Split, Trial, TrialKind};
 use stretch_gap::{Diagnosis, Options, Simulator, VerdictKind, diagnose};
 use stretch_sim::{
-    Chain, DEFAULT_STEP_S, EffectSet, Key, Openings, Recorded, Rig, RigParams, Start,
-    default_rig_text,
+    Catalogue, Chain, DEFAULT_STEP_S, EffectSet, Key, Openings, Recorded, Rig, RigParams, SimError,
+    Start, default_rig_text,
 };
 use support::{Noise, PROBABILITY, with_lost_rows};
 use testkit::tolerance::{GAP_BLURRED, GAP_FOUND, GAP_NULL, TRAINED_AGAIN};
@@ -96,15 +96,14 @@ fn own_rig() -> RigParams {
 }
 
 /// The stock rig beside trials.
-fn setup<'a>(trials: &[SessionTrial], without: &'a [String]) -> RigSetup<'a> {
+fn setup<'a>(trials: &[SessionTrial], catalogue: &'a Catalogue) -> RigSetup<'a> {
     let session = Session::new(trials).expect("a session");
-    RigSetup { session, rig: Rig::default(), without }
+    RigSetup { session, rig: Rig::default(), catalogue }
 }
 
 fn run(trials: Vec<SessionTrial>, without: &[&str], options: &Options) -> Diagnosis {
-    let without: Vec<String> = without.iter().map(|s| (*s).to_owned()).collect();
-    let setup = setup(&trials, &without);
-    let simulator = RigSimulator::new(setup).expect("a simulator");
+    let catalogue = Catalogue::default().without(without).expect("known names");
+    let simulator = RigSimulator::new(setup(&trials, &catalogue)).expect("a simulator");
     diagnose(&simulator, options, &|_| (), &|| false).expect("a diagnosis").0
 }
 
@@ -253,10 +252,9 @@ fn bad_input_is_refused_in_a_sentence() {
     let gone = refused(&|t| t.trial.channels.retain(|c| c.name != "inlet"));
     assert!(gone.contains("no column inlet"), "{gone}");
     assert!(Session::new(&[]).is_err());
-    let leek = ["leek".to_owned()];
-    let unknown = RigSimulator::new(setup(&good, &leek));
+    let unknown = Catalogue::default().without(&["leek"]);
     assert!(
-        matches!(unknown, Err(BenchError::UnknownEffect { nearest: Some(n), .. }) if n == "leak")
+        matches!(unknown, Err(SimError::UnknownEffect { nearest: Some(n), .. }) if n == "leak")
     );
 }
 
@@ -326,7 +324,8 @@ fn a_simulator_that_has_the_effect_agrees_and_is_not_offered_it_again() {
         // The first trial winds the loops: a rig that is measured has moved before.
         let session = Session::new(&trials[1..]).expect("a session");
         let simulator =
-            RigSimulator::new(RigSetup { session, rig, without: &[] }).expect("a simulator");
+            RigSimulator::new(RigSetup { session, rig, catalogue: &Catalogue::default() })
+                .expect("a simulator");
         assert!(simulator.effects().iter().all(|e| e.name != name));
         let d = diagnose(&simulator, &shallow(), &|_| (), &|| false).expect("a diagnosis").0;
         let agrees = matches!(d.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
@@ -340,8 +339,8 @@ fn a_parameter_without_tolerance_stays_put() {
     let rig = Rig::from_file(&RigFile::parse("rig.toml", text).expect("TOML")).expect("a rig");
     let trials = session(&RigParams::default(), &EffectSet::new(), true, 2);
     let session = Session::new(&trials).expect("a session");
-    let simulator =
-        RigSimulator::new(RigSetup { session, rig, without: &[] }).expect("a simulator");
+    let simulator = RigSimulator::new(RigSetup { session, rig, catalogue: &Catalogue::default() })
+        .expect("a simulator");
     let tuned: Vec<&str> = simulator.parameters().iter().map(|p| p.name.as_str()).collect();
     // What the file leaves out keeps its stock tolerance, what the file frees is free in its stage.
     assert!(!tuned.contains(&"tau_m") && tuned.contains(&"k_max"), "{tuned:?}");

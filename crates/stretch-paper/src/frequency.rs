@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use serde::Serialize;
-use stretch_sim::{Grid, Key, Rig, Sensing, Start};
+use stretch_sim::{Grid, Key, Rig, Sensing, SimError, Start};
 
 use crate::PaperError;
 
@@ -37,7 +37,7 @@ pub struct FrequencyPoint {
 /// # Errors
 /// [`PaperError`] for a rig that cannot be simulated.
 pub fn frequency_response(rig: &Rig) -> Result<Vec<FrequencyPoint>, PaperError> {
-    let grid = Grid::samples(1.0 / RATE_HZ)?;
+    let grid = Grid::samples(1.0 / RATE_HZ).map_err(SimError::from)?;
     let stage = Sensing::new(&rig.params, &rig.effects, &grid)?;
     let middle_mm = rig.params[Key::L0] * (1.0 - 0.5 * rig.params[Key::KMax]);
     FREQUENCIES_HZ

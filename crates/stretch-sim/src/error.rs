@@ -139,3 +139,9 @@ pub enum SimError {
         value: f64,
     },
 }
+
+impl From<stretch_operators::GridError> for SimError {
+    fn from(error: stretch_operators::GridError) -> Self {
+        Self::NotPositive { name: error.name, value: error.value }
+    }
+}

@@ -1,12 +1,13 @@
 //! A gauge alone: any stretch sensor with a reference is a rig of one stage.
 
+use stretch_operators::{Grid, Skew, Span, Start};
+
 use crate::{
     SimError,
-    effects::{ActiveEffect, EffectParameter, EffectSet, Surroundings},
-    grid::Grid,
+    effects::{
+        ActiveEffect, Alone, Effect, EffectParameter, EffectSet, Extent, Need, Search, Surroundings,
+    },
     memory::Memory,
-    operator::{Span, Start},
-    skew::Skew,
     stage::Stage,
     stages::{Reference, Sites, check_length, pick},
 };
@@ -45,20 +46,34 @@ impl Gauge {
     const STROKES: [(&'static str, f64); 3] = [("strain", 0.2), ("mm", 30.0), ("V", 1.07)];
 
     /// Whether an effect can act in a gauge alone.
-    pub fn accepts(effect: &dyn crate::Effect, has_pressure: bool) -> bool {
-        matches!(effect.stage(), Stage::Sensing | Stage::Reference)
-            && match effect.needs() {
-                Some("a pressure") => has_pressure,
-                Some(_) => false,
+    pub fn accepts(effect: &Effect, has_pressure: bool) -> bool {
+        matches!(effect.stage, Stage::Sensing | Stage::Reference)
+            && match effect.needs {
+                Some(Need::Pressure) => has_pressure,
+                Some(Need::Amplifier) => false,
                 None => true,
             }
+    }
+
+    /// The catalogue's unit of a parameter in units of e and of y's span.
+    pub fn unit(parameter: &EffectParameter) -> f64 {
+        Self::STROKES.iter().find(|(unit, _)| *unit == parameter.unit).map_or(1.0, |s| 1.0 / s.1)
+    }
+
+    /// Where an effect is looked for in a gauge alone.
+    pub fn search(effect: &Effect, alone: &Alone) -> Search {
+        let units: Vec<f64> = effect.fitted().map(Self::unit).collect();
+        let mut search =
+            Search::of(effect, &Extent { volts: (0.0, 1.0), strain: 0.0 }).times(&units);
+        (effect.alone)(alone, &mut search);
+        search
     }
 
     /// Plausible range and typical value of a parameter in units of e and of y's span.
     ///
     /// ```
     /// use stretch_sim::{Gauge, effect_named};
-    /// let w = &effect_named("sleeve_slip").unwrap().parameters()[0];
+    /// let w = &effect_named("sleeve_slip").unwrap().parameters[0];
     /// assert_eq!(Gauge::range(w), (0.0, 0.15, 0.04));
     /// ```
     pub fn range(parameter: &EffectParameter) -> (f64, f64, f64) {
@@ -83,7 +98,7 @@ impl Gauge {
             .filter(on)
             .find(|e| !Self::accepts(e.effect(), spec.pressure_scale.is_some()))
         {
-            let needs = e.effect().needs().unwrap_or("valves and a muscle");
+            let needs = e.effect().needs.map_or("valves and a muscle", Need::words);
             return Err(SimError::NotHere { name: e.name().to_string(), needs });
         }
         let grid = Grid::samples(dt_s)?;
@@ -93,11 +108,11 @@ impl Gauge {
             strain_stroke: 1.0,
             contraction_stroke: 1.0,
             resistance_zero: 1.0,
-            volts_stroke: 1.0,
             length_zero: 0.0,
             length_span: 1.0,
             pressure_scale_kpa: spec.pressure_scale.unwrap_or(1.0),
             strain_unit: 1.0 / Self::STROKES[0].1,
+            least_opening: 0.0,
         };
         let sites = Sites::new(effects.acting_in(Stage::Sensing), &around);
         let reference = Reference::around(&around, effects, &grid);
@@ -106,7 +121,7 @@ impl Gauge {
             skew: sites.skew(&grid),
             sites,
             reference,
-            needs_pressure: effects.acting_in(Stage::Sensing).any(|e| e.effect().needs().is_some()),
+            needs_pressure: effects.acting_in(Stage::Sensing).any(|e| e.effect().needs.is_some()),
             grid,
         })
     }

@@ -87,7 +87,10 @@ impl GaugeRig {
             gain: value("gain")?,
             pressure_scale: value("pressure_scale").ok(),
         };
-        let effects = EffectSet::from_entries(&file.effects)?;
+        let mut effects = EffectSet::new();
+        for entry in &file.effects {
+            effects.insert_in(entry, crate::Gauge::unit)?;
+        }
         // whatever cannot run is refused here, not at the first trial
         crate::Gauge::new(spec, &effects, 0.01)?;
         let tolerance = |name: &str| table.get(name).map_or(Tolerance::Exact, Tolerance::of);

@@ -1,38 +1,31 @@
 #![doc = include_str!("../README.md")]
 
-mod backlash;
 mod effects;
 mod error;
 mod gauge;
 mod gauge_file;
-mod grid;
+mod law;
 mod memory;
 mod nearest;
-mod operator;
 mod params;
 mod preset;
 mod protocol;
 mod random;
 mod rig;
 mod session;
-mod skew;
 mod stage;
 mod stages;
 mod static_law;
 
 pub use effects::{
-    Action, ActiveEffect, CATALOGUE, Effect, EffectParameter, EffectSet, Scale, Surroundings,
-    effect_named,
+    Action, ActiveEffect, Alone, CATALOGUE, Catalogue, Effect, EffectParameter, EffectSet, Extent,
+    Find, Form, Measured, Need, Role, Scale, Search, Starts, Surroundings, effect_named,
 };
 pub use error::SimError;
 pub use gauge::{Gauge, GaugeSpec};
 pub use gauge_file::GaugeRig;
-pub use grid::{DEFAULT_STEP_S, Grid};
+pub use law::{Droop, Law};
 pub use memory::Memory;
-pub use operator::{
-    Backlash, Droop, Hysteresis, Law, MeanReversion, Operator, Span, Start, play, soft_ceiling,
-    soft_floor,
-};
 pub use params::{Key, PARAMETERS, ParameterInfo, RigParams, Tolerance};
 pub use preset::paper_preset;
 pub use protocol::{OPENINGS, PAUSE_S, RATE_HZ, TrialPlan};
@@ -44,3 +37,4 @@ pub use stages::{
     Sensing,
 };
 pub use static_law::StaticLaw;
+pub use stretch_operators::{DEFAULT_STEP_S, Grid, GridError, Operator, Span, Start};

@@ -11,6 +11,8 @@ pub struct Memory {
     pub(crate) used: bool,
     pub(crate) nodes: Vec<f64>,
     pub(crate) more_nodes: Vec<f64>,
+    /// Openings as the valves take them.
+    pub(crate) commands: [Vec<f64>; 2],
 }
 
 impl Memory {

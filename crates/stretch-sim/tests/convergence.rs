@@ -2,7 +2,8 @@
 //! effect at its typical and extreme values, rigs at the edge of their tolerances.
 
 use stretch_sim::{
-    CATALOGUE, Chain, DEFAULT_STEP_S, EffectSet, Key, Openings, Recorded, RigParams, Scale, Start,
+    CATALOGUE, Chain, DEFAULT_STEP_S, EffectSet, Key, Openings, Recorded, RigParams, Role, Scale,
+    Start,
 };
 use testkit::{tolerance::RIG_STEP, vectors::columns};
 
@@ -88,11 +89,20 @@ fn nominal_rig_at_the_edges_of_its_tolerances() {
 fn every_effect() {
     let mut failures = Vec::new();
     for effect in CATALOGUE {
-        let parameters = effect.parameters();
-        let corner =
-            |pick: &dyn Fn(usize) -> f64| (0..parameters.len()).map(pick).collect::<Vec<f64>>();
+        let parameters = effect.parameters;
+        // Strengths and shapes at their extremes have neutral forms; forms go to their own at typical strengths.
+        let is_form = |i: usize| matches!(parameters[i].role, Role::Form { .. });
+        let corner = |pick: &dyn Fn(usize) -> f64| {
+            let value = |i| if is_form(i) { parameters[i].typical } else { pick(i) };
+            (0..parameters.len()).map(value).collect::<Vec<f64>>()
+        };
+        let formed = |pick: &dyn Fn(usize) -> f64| {
+            let value = |i| if is_form(i) { pick(i) } else { parameters[i].typical };
+            (0..parameters.len()).map(value).collect::<Vec<f64>>()
+        };
         let mut cases = vec![corner(&|i| parameters[i].typical)];
-        if effect.name() != "amplifier_saturation" {
+        cases.extend([formed(&|i| parameters[i].min), formed(&|i| parameters[i].max)]);
+        if effect.name != "amplifier_saturation" {
             cases.push(corner(&|i| parameters[i].max));
             cases.push(corner(&|i| {
                 let p = &parameters[i];
@@ -101,16 +111,16 @@ fn every_effect() {
             }));
             cases.push(corner(&|i| {
                 let p = &parameters[i];
-                if p.off.is_some() { 0.1 * p.max } else { p.typical }
+                if p.off().is_some() { 0.1 * p.max } else { p.typical }
             }));
         }
         for values in cases {
             let mut set = EffectSet::new();
-            set.push(*effect, &values).unwrap();
+            set.push(effect, &values).unwrap();
             let (share, at) = moved(&RigParams::default(), &set);
-            println!("{:22} {values:?} {share:.1e} {at}", effect.name());
+            println!("{:22} {values:?} {share:.1e} {at}", effect.name);
             if share > RIG_STEP {
-                failures.push(format!("{} {values:?}: {share:.1e} ({at})", effect.name()));
+                failures.push(format!("{} {values:?}: {share:.1e} ({at})", effect.name));
             }
         }
     }

@@ -60,7 +60,7 @@ fn effects() -> impl Strategy<Value = EffectSet> {
     let each: Vec<_> = CATALOGUE
         .iter()
         .map(|effect| {
-            let values: Vec<_> = effect.parameters().iter().map(|p| p.min..=p.max).collect();
+            let values: Vec<_> = effect.parameters.iter().map(|p| p.min..=p.max).collect();
             (prop::bool::weighted(0.3), values)
         })
         .collect();
@@ -68,7 +68,7 @@ fn effects() -> impl Strategy<Value = EffectSet> {
         let mut set = EffectSet::new();
         for (effect, (on, values)) in CATALOGUE.iter().zip(each) {
             if on {
-                set.push(*effect, &values).unwrap();
+                set.push(effect, &values).unwrap();
             }
         }
         set
@@ -102,11 +102,11 @@ proptest! {
     fn off_leaves_the_same_bits((inlet, outlet) in commands(), effects in effects(), which in 0..CATALOGUE.len()) {
         let effect = CATALOGUE[which];
         let mut without = effects;
-        without.remove(effect.name());
+        without.remove(effect.name);
         let mut with_off = without.clone();
-        let values: Vec<f64> = effect.parameters().iter().map(|p| p.off.unwrap_or(p.typical)).collect();
+        let values: Vec<f64> = effect.parameters.iter().map(|p| p.off().unwrap_or(p.typical)).collect();
         with_off.push(effect, &values).unwrap();
-        prop_assert!(with_off.find(effect.name()).unwrap().is_off());
+        prop_assert!(with_off.find(effect.name).unwrap().is_off());
         let params = RigParams::default();
         let a = simulate(&params, &without, &inlet, &outlet, 0.0);
         let b = simulate(&params, &with_off, &inlet, &outlet, 0.0);
@@ -295,12 +295,8 @@ fn a_wound_memory_is_what_a_long_move_leaves() {
     let params = RigParams::default();
     let grid = Grid::samples(0.01).unwrap();
     for name in ["gauge_hysteresis", "sleeve_slip"] {
-        let values: Vec<f64> = stretch_sim::effect_named(name)
-            .unwrap()
-            .parameters()
-            .iter()
-            .map(|p| p.typical)
-            .collect();
+        let values: Vec<f64> =
+            stretch_sim::effect_named(name).unwrap().parameters.iter().map(|p| p.typical).collect();
         let stage = Sensing::new(&params, &extreme(name, &values), &grid).unwrap();
         let tail: Vec<f64> = (0..50).map(|i| 160.0 - 0.3 * i as f64).collect();
         for (share, from) in [(1.0, 100.0), (-1.0, 200.0)] {

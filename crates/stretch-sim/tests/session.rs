@@ -29,8 +29,8 @@ fn simulate(rig: &Rig, settings: &RunSettings, plans: &[TrialPlan]) -> Vec<Trial
 fn all_effects() -> Rig {
     let mut rig = Rig::default();
     for effect in CATALOGUE {
-        let values: Vec<f64> = effect.parameters().iter().map(|p| p.typical).collect();
-        rig.effects.push(*effect, &values).unwrap();
+        let values: Vec<f64> = effect.parameters.iter().map(|p| p.typical).collect();
+        rig.effects.push(effect, &values).unwrap();
     }
     rig
 }
@@ -241,13 +241,13 @@ fn a_gauge_alone_is_a_rig() {
     };
     let plain = run(&EffectSet::new());
     assert!(plain.iter().zip(&x).all(|(y, x)| (y - (400.0 - 1.5 * (x - 10.0))).abs() < 1e-10));
-    for effect in CATALOGUE.iter().filter(|e| Gauge::accepts(**e, false)) {
-        let values: Vec<f64> = effect.parameters().iter().map(|p| Gauge::range(p).2).collect();
+    for effect in CATALOGUE.iter().filter(|e| Gauge::accepts(e, false)) {
+        let values: Vec<f64> = effect.parameters.iter().map(|p| Gauge::range(p).2).collect();
         let mut set = EffectSet::new();
-        set.push(*effect, &values).unwrap();
+        set.push(effect, &values).unwrap();
         let moved = run(&set).iter().zip(&plain).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        if effect.name() != "mains_hum" {
-            assert!(moved > 5e-4 * 120.0 && moved < 120.0, "{}: {moved}", effect.name());
+        if effect.name != "mains_hum" {
+            assert!(moved > 5e-4 * 120.0 && moved < 120.0, "{}: {moved}", effect.name);
         }
     }
     let mut set = EffectSet::new();
@@ -258,11 +258,9 @@ fn a_gauge_alone_is_a_rig() {
 
 #[test]
 fn a_users_own_effect_takes_part() {
-    use stretch_sim::{Action, Effect, EffectParameter, Operator, Span, Stage, Surroundings};
+    use stretch_sim::{Action, Effect, EffectParameter, Operator, Span};
 
-    /// Every tenth sample of the bridge is lost: the last one stays.
-    #[derive(Debug)]
-    struct Dropouts;
+    /// The last sample stays.
     #[derive(Debug)]
     struct Hold(f64);
     impl Operator for Hold {
@@ -272,24 +270,14 @@ fn a_users_own_effect_takes_part() {
             }
         }
     }
-    impl Effect for Dropouts {
-        fn name(&self) -> &'static str {
-            "dropouts"
-        }
-        fn stage(&self) -> Stage {
-            Stage::Sensing
-        }
-        fn equation(&self) -> &'static str {
-            "v_i -> v_i + share (v_(i-1) - v_i) for every tenth i"
-        }
-        fn parameters(&self) -> &'static [EffectParameter] {
-            const { &[EffectParameter::strength("share", "1", 0.0, 1.0, 1.0)] }
-        }
-        fn action(&self, values: &[f64], _: &Surroundings<'_>) -> Action {
-            Action::Record(Box::new(Hold(values[0])))
-        }
-    }
-    static DROPOUTS: Dropouts = Dropouts;
+    static DROPOUTS: Effect = Effect {
+        name: "dropouts",
+        words: "every tenth sample of the bridge is lost",
+        equation: "v_i -> v_i + share (v_(i-1) - v_i) for every tenth i",
+        parameters: &[EffectParameter::strength("share", "1", 0.0, 1.0, 1.0)],
+        action: |values, _| Action::Record(Box::new(Hold(values[0]))),
+        ..Effect::PLAIN
+    };
 
     let mut effects = EffectSet::new();
     effects.push(&DROPOUTS, &[1.0]).unwrap();

@@ -9,6 +9,7 @@ use std::{
 use anyhow::{Context, bail, ensure};
 use stretch_bench::{GaugeSetup, GaugeSimulator};
 use stretch_data::{DataSet, ReadOptions, SessionTrial, Split, Trial, TrialKind};
+use stretch_sim::Catalogue;
 
 use super::published::{self, COMMIT, REPOSITORY};
 use crate::commands::{
@@ -104,10 +105,11 @@ impl Sessions {
     /// Trials that cannot be diagnosed.
     pub(super) fn bench(&self, signal: &str) -> anyhow::Result<Bench> {
         let columns = Some((self.reference.as_str(), signal));
+        let catalogue = Catalogue::default();
         if let Some(folder) = &self.folder {
             let fit = self.fit.iter().map(|(_, trial)| trial);
             let is_rig = fit.clone().all(|t| t.channel("inlet").or(t.channel("outlet")).is_some());
-            return Bench::read(folder, columns.filter(|_| !is_rig), None, &[]);
+            return Bench::read(folder, columns.filter(|_| !is_rig), None, &catalogue);
         }
         // A session has its own zero, and nobody knows the pause before the next.
         let first = self.fit.iter().take(1);
@@ -118,7 +120,7 @@ impl Sessions {
             reference: &self.reference,
             signal,
             rig: None,
-            without: &[],
+            catalogue: &catalogue,
         };
         Ok(Bench::Gauge(GaugeSimulator::new(&setup)?))
     }

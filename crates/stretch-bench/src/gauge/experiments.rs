@@ -2,10 +2,10 @@
 
 use stretch_data::{Channel, Trial};
 use stretch_gap::{GapError, Laboratory, Model, Plan};
-use stretch_sim::{Effect, Gauge, Stage, Start};
+use stretch_sim::{Gauge, Stage, Start};
 
 use super::GaugeSimulator;
-use crate::{error::BenchError, outside::Acting};
+use crate::{acting::unrecorded, error::BenchError};
 
 /// An experiment on a gauge: the course of e.
 #[derive(Debug, Clone, PartialEq)]
@@ -101,23 +101,20 @@ fn dishes() -> Vec<Dish> {
 impl GaugeSimulator {
     /// The signal over a course, in units of its noise.
     fn prediction(&self, model: &Model, course: &Course) -> Result<Vec<Vec<f64>>, BenchError> {
-        let of_reference = |row: &dyn Effect| row.stage() == Stage::Reference;
         let (mut model, mut base) = (model.clone(), self.effects.clone());
         if course.is_known {
-            model.effects.retain(|(i, _)| !of_reference(self.rows[*i]));
-            for known in self.effects.iter().filter(|e| of_reference(e.effect())) {
-                base.remove(known.name());
-            }
+            model.effects.retain(|(i, _)| self.rows[*i].stage != Stage::Reference);
+            let shown = self.effects.iter().filter(|e| e.effect().stage == Stage::Reference);
+            shown.for_each(|known| drop(base.remove(known.name())));
         }
-        let acting = Acting::of(&base, &self.rows, &model)?;
-        let gauge = Gauge::new(self.nominal(&model), &acting.inside, self.recorder.dt_s)?;
+        let effects = unrecorded(&base, &self.rows, &model)?;
+        let gauge = Gauge::new(self.nominal(&model), &effects, self.record.dt_s)?;
         let shown: Vec<f64> =
             course.e.iter().map(|e| self.spec.zero + self.spec.span * e).collect();
         let mut signal = vec![0.0; shown.len()];
         let still = vec![0.0; if self.record.pressure.is_empty() { 0 } else { shown.len() }];
         gauge.run(&mut gauge.memory(), Start::Settled, 0.0, &shown, &still, &mut signal)?;
-        acting.late(self.recorder, &mut signal);
-        let noise = self.recorder.noise.max(1e-6 * self.recorder.unit);
+        let noise = self.noise.max(1e-6 * self.spread);
         signal.iter_mut().for_each(|y| *y /= noise);
         Ok(vec![signal])
     }
@@ -127,7 +124,7 @@ impl Laboratory for GaugeSimulator {
     type Setting = Course;
 
     fn menu(&self) -> Vec<(Plan, Course)> {
-        let dt_s = self.recorder.dt_s;
+        let dt_s = self.record.dt_s;
         let plan = |(name, how, prepare_min, points, is_known): Dish| {
             let course = Course { is_known, ..course(&points, dt_s) };
             let values = course.e.iter().map(|e| self.spec.zero + self.spec.span * e).collect();
@@ -143,7 +140,7 @@ impl Laboratory for GaugeSimulator {
 
     /// The first minute of the record.
     fn done(&self) -> Course {
-        let samples = ((60.0 / self.recorder.dt_s) as usize).min(self.inputs[0].values.len());
+        let samples = ((60.0 / self.record.dt_s) as usize).min(self.inputs[0].values.len());
         let values = &self.inputs[0].values[..samples];
         let e = values.iter().map(|x| (x - self.spec.zero) / self.spec.span).collect();
         Course { e, is_known: false }

@@ -1,7 +1,7 @@
 //! A gauge alone beside a reference: a rig of one stage.
 
-mod catalogue;
 mod experiments;
+mod lag;
 mod record;
 mod source;
 
@@ -10,18 +10,18 @@ use stretch_gap::{
     Description, DescriptionSpec, Dice, GapError, Model, Motion, ParameterSpec, Run, Simulator,
     StageSpec, TrialSpec,
 };
-use stretch_sim::{Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Start, Tolerance};
+use stretch_sim::{
+    Alone, Catalogue, Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Measured, Start, Tolerance,
+};
 
-use catalogue::{Scope, catalogue, lag};
+use lag::lag;
 use record::Record;
 
 use crate::{
+    acting::Acting,
     error::BenchError,
-    outside::{Acting, Recorder},
-    rig::{
-        catalogue::check_names,
-        smooth::{Smoothed, unscheduled},
-    },
+    rig::smooth::{Smoothed, unscheduled},
+    specs::{Place, spec as spec_of},
 };
 
 /// Where the parameters stand.
@@ -41,8 +41,8 @@ pub struct GaugeSetup<'a> {
     pub signal: &'a str,
     /// The gauge as it should be; without one zero, span, offset and gain are those of the record.
     pub rig: Option<&'a GaugeRig>,
-    /// Effects that are left out of the catalogue.
-    pub without: &'a [String],
+    /// Effects that are looked for, those that the gauge has apart.
+    pub catalogue: &'a Catalogue,
 }
 
 /// Any stretch sensor with a reference: y = offset + gain e, e the reference over its range in the fit trials.
@@ -56,6 +56,7 @@ pub struct GaugeSetup<'a> {
 /// use stretch_data::{Channel, SessionTrial, Trial};
 /// use stretch_bench::{GaugeSetup, GaugeSimulator};
 /// use stretch_gap::{Options, VerdictKind, diagnose};
+/// use stretch_sim::Catalogue;
 /// // A sensor that shows 0.05 s late what a rod does.
 /// let rod = |t: f64| 40.0 + 20.0 * (1.3 * t).sin() + 10.0 * (3.1 * t).sin();
 /// let time_s: Vec<f64> = (0..4000).map(|i| 0.01 * i as f64).collect();
@@ -66,9 +67,13 @@ pub struct GaugeSetup<'a> {
 /// let channels = vec![channel("rod_mm", length), channel("s1", signal)];
 /// let trial = Trial { name: "rod.csv".into(), time_s, channels };
 /// let trials = [SessionTrial::new(trial)];
-/// let (reference, signal) = ("rod_mm", "s1");
-/// let gauge =
-///     GaugeSimulator::new(&GaugeSetup { trials: &trials, reference, signal, rig: None, without: &[] })?;
+/// let gauge = GaugeSimulator::new(&GaugeSetup {
+///     trials: &trials,
+///     reference: "rod_mm",
+///     signal: "s1",
+///     rig: None,
+///     catalogue: &Catalogue::default(),
+/// })?;
 /// let (diagnosis, _) = diagnose(&gauge, &Options::default(), &|_| (), &|| false)?;
 /// assert_eq!(diagnosis.verdict, VerdictKind::Effect);
 /// assert_eq!(diagnosis.named, ["channel_skew"]);
@@ -79,7 +84,7 @@ pub struct GaugeSimulator {
     about: Description,
     /// Effects that the gauge already has.
     effects: EffectSet,
-    rows: Vec<&'static dyn Effect>,
+    rows: Vec<&'static Effect>,
     record: Record,
     /// The reference of each trial as it drives the gauge.
     inputs: Vec<Smoothed>,
@@ -87,17 +92,20 @@ pub struct GaugeSimulator {
     /// Column of the reference.
     reference: String,
     reference_sd: f64,
-    recorder: Recorder,
+    /// Noise of the signal, one standard deviation.
+    noise: f64,
+    /// Range of the signal.
+    spread: f64,
 }
 
 impl GaugeSimulator {
-    /// Binds a gauge to trials and two of their columns.
+    /// Binds a gauge to trials and two of their columns; the effects of the catalogue that can act in it and that it does
+    /// not have are looked for.
     ///
     /// # Errors
-    /// Columns that are missing, dead, hold too few numbers or look swapped; names in `without` that nobody knows.
+    /// Columns that are missing, dead, hold too few numbers or look swapped.
     pub fn new(setup: &GaugeSetup<'_>) -> Result<Self, BenchError> {
-        let GaugeSetup { trials, reference, signal, rig, without } = *setup;
-        check_names(without)?;
+        let GaugeSetup { trials, reference, signal, rig, catalogue } = *setup;
         let record = Record::read(trials, reference, signal)?;
         let nominal = nominal(&record, rig);
         let (least, greatest) = record.range(&record.signal);
@@ -105,13 +113,17 @@ impl GaugeSimulator {
         let inputs = parts(&record.trials, &record.reference)
             .map(|(_, x)| Smoothed::of(x, reference_sd, &unscheduled(x.len())))
             .collect();
-        let known: Vec<String> = nominal
-            .effects
-            .iter()
-            .map(|e| e.name().to_owned())
-            .chain(without.iter().cloned())
-            .collect();
-        let (effects, rows) = catalogue(&known, scope(&record, &nominal.spec));
+        let alone = alone(&record);
+        let has_pressure = nominal.spec.pressure_scale.is_some();
+        let is_missing = |e: &&Effect| nominal.effects.find(e.name).is_none();
+        let rows: Vec<_> =
+            catalogue.iter().filter(|e| Gauge::accepts(e, has_pressure) && is_missing(e)).collect();
+        let place = |effect: &Effect| Place {
+            touches: vec![0],
+            search: Gauge::search(effect, &alone),
+            unit: Gauge::unit,
+        };
+        let effects = rows.iter().map(|effect| spec_of(effect, place(effect))).collect();
         let stage = StageSpec::new("sensing", signal, unit_of(signal), &[OFFSET, GAIN, WINDING]);
         let parameters = parameters(&nominal, signal, rig.is_some());
         let (trials, dt_s) = (record.trials.clone(), record.dt_s);
@@ -128,7 +140,8 @@ impl GaugeSimulator {
             inputs,
             reference: reference.into(),
             reference_sd,
-            recorder: Recorder { noise, unit: greatest - least, dt_s: record.dt_s },
+            noise,
+            spread: greatest - least,
             record,
             spec: nominal.spec,
         })
@@ -163,7 +176,13 @@ impl GaugeSimulator {
             };
             let pressure = self.record.pressure.get(from..to).unwrap_or(&[]);
             gauge.run(&mut memory, start, trial.start_s, &input, pressure, &mut out[from..to])?;
-            acting.record(self.recorder, &self.record.signal[from..to], &mut out[from..to]);
+            let record = Measured {
+                samples: &self.record.signal[from..to],
+                noise: self.noise,
+                unit: self.spread,
+                dt_s: self.dt_s(),
+            };
+            acting.follow(record, &mut out[from..to]);
             let next = self.record.trials.get(i + 1).map_or(f64::INFINITY, |t| t.start_s);
             let rest_s = (next - trial.start_s - trial.samples as f64 * self.dt_s()).max(0.0);
             start = Start::Carried { rest_s };
@@ -259,14 +278,13 @@ fn parameters(rig: &GaugeRig, signal: &str, is_evidence: bool) -> Vec<ParameterS
     ]
 }
 
-fn scope(record: &Record, spec: &GaugeSpec) -> Scope {
+fn alone(record: &Record) -> Alone {
     let end_s = |t: &TrialSpec| t.start_s + t.samples as f64 * record.dt_s;
     let begun_s = record.trials.first().map_or(0.0, |t| t.start_s);
     let longest = record.fitted().max_by_key(ExactSizeIterator::len).unwrap_or(0..0);
-    Scope {
+    Alone {
         session_s: record.trials.last().map_or(0.0, end_s) - begun_s,
         lag_s: lag(&record.reference[longest.clone()], &record.signal[longest], record.dt_s),
-        has_pressure: spec.pressure_scale.is_some(),
     }
 }
 

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use stretch_data::{DataSet, ReadOptions, SessionTrial, Trial};
+use stretch_sim::Catalogue;
 
 use super::{GaugeSetup, GaugeSimulator};
 use crate::{error::BenchError, rig_file};
@@ -23,7 +24,7 @@ impl GaugeSimulator {
         path: &Path,
         columns: Option<(&str, &str)>,
         rig: Option<&Path>,
-        without: &[String],
+        catalogue: &Catalogue,
     ) -> Result<Option<Self>, BenchError> {
         let set = if path.is_dir() { Some(DataSet::read(path)?) } else { None };
         let own = set.as_ref().and_then(|set| Some(path.join(set.rig.as_ref()?)));
@@ -46,7 +47,7 @@ impl GaugeSimulator {
         };
         let rig = rig.map(rig_file::gauge).transpose()?;
         let rig = rig.as_ref();
-        Self::new(&GaugeSetup { trials: &trials, reference, signal, rig, without }).map(Some)
+        Self::new(&GaugeSetup { trials: &trials, reference, signal, rig, catalogue }).map(Some)
     }
 }
 

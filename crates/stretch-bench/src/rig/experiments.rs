@@ -8,7 +8,7 @@ use stretch_sim::{
 };
 
 use super::RigSimulator;
-use crate::error::BenchError;
+use crate::{acting::unrecorded, error::BenchError};
 
 /// Sample time of an experiment, s.
 const DT_S: f64 = 0.01;
@@ -236,15 +236,7 @@ impl RigSimulator {
                 params[*key] = *value;
             }
         }
-        let mut effects = self.effects.clone();
-        for (index, values) in &model.effects {
-            let row = self.rows[*index];
-            let mut values = values.clone();
-            // A phase that the model leaves open.
-            values.resize(row.parameters().len(), 0.0);
-            effects.push(row, &values)?;
-        }
-        Ok((params, effects))
+        Ok((params, unrecorded(&self.effects, &self.rows, model)?))
     }
 
     /// Every recorded channel of an experiment, in units of its noise.

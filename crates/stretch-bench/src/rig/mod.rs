@@ -1,9 +1,7 @@
 //! The rig as a [`Simulator`]: pneumatics, muscle (or both as actuation) and sensing, each on measured inputs.
 
-pub(crate) mod catalogue;
 mod experiments;
-pub(crate) mod forms;
-pub(crate) mod hum;
+mod extent;
 mod nominal;
 mod run;
 mod session;
@@ -13,14 +11,18 @@ use std::path::Path;
 
 use stretch_data::DataSet;
 use stretch_gap::{Description, DescriptionSpec, GapError, Motion, Run, Simulator, TrialSpec};
-use stretch_sim::{Effect, EffectSet, Key, Rig, RigParams, Stage};
+use stretch_sim::{Catalogue, Effect, EffectSet, Key, Rig, RigParams, Search, Stage};
 
-use catalogue::{Extent, Place, check_names, entries};
+use extent::extent_of;
 use nominal::{Sds, parameters, stages};
 use session::Inputs;
 pub use session::{RigTrial, Session};
 
-use crate::{error::BenchError, rig_file};
+use crate::{
+    error::BenchError,
+    rig_file,
+    specs::{Place, spec},
+};
 
 /// What a [`RigSimulator`] is made of.
 #[derive(Debug, Clone)]
@@ -29,8 +31,8 @@ pub struct RigSetup<'a> {
     pub session: Session,
     /// The rig beside it: parameters, how far each may be wrong, and the effects that it already has.
     pub rig: Rig,
-    /// Effects that are left out of the catalogue.
-    pub without: &'a [String],
+    /// Effects that are looked for, those of the rig apart.
+    pub catalogue: &'a Catalogue,
 }
 
 /// A whole rig beside its recorded session.
@@ -45,7 +47,7 @@ pub struct RigSimulator {
     stage_kinds: Vec<Stage>,
     /// Key of each parameter; none for the pressure at a trial's start.
     keys: Vec<Option<Key>>,
-    rows: Vec<&'static dyn Effect>,
+    rows: Vec<&'static Effect>,
     measured: Vec<Vec<f64>>,
 }
 
@@ -54,21 +56,24 @@ impl RigSimulator {
     ///
     /// # Errors
     /// A rig file that cannot be read, and as [`Session::read`] and [`RigSimulator::new`].
-    pub fn read(folder: &Path, rig: Option<&Path>, without: &[String]) -> Result<Self, BenchError> {
+    pub fn read(
+        folder: &Path,
+        rig: Option<&Path>,
+        catalogue: &Catalogue,
+    ) -> Result<Self, BenchError> {
         let set = DataSet::read(folder)?;
         let own = set.rig.as_ref().map(|file| folder.join(file));
         let rig = rig.or(own.as_deref()).map(rig_file::rig).transpose()?.unwrap_or_default();
         let session = Session::read(folder, &set)?;
-        Self::new(RigSetup { session, rig, without })
+        Self::new(RigSetup { session, rig, catalogue })
     }
 
     /// Binds a rig to a session. The effects of the rig act in every run and are not looked for.
     ///
     /// # Errors
-    /// A rig beyond its limits, names in `without` that nobody knows.
+    /// A rig beyond its limits.
     pub fn new(setup: RigSetup<'_>) -> Result<Self, BenchError> {
-        let RigSetup { session, rig, without } = setup;
-        check_names(without)?;
+        let RigSetup { session, rig, catalogue } = setup;
         rig.check()?;
         let Rig { params: base, effects, .. } = &rig;
         let sds = Sds::of(base);
@@ -79,15 +84,14 @@ impl RigSimulator {
         };
         let (parameters, keys) = parameters(&rig, &stage_kinds);
         let stages = stages(&stage_kinds, &keys, sds);
-        let known: Vec<String> =
-            effects.iter().map(|e| e.name().to_owned()).chain(without.iter().cloned()).collect();
-        let place = Place {
-            accepts: &|_| true,
-            touches: &|stage| touched(&stage_kinds, stage),
-            unit: &|_| 1.0,
-            extent: Extent::of(base, &inputs, &session),
+        let extent = extent_of(base, &inputs, &session);
+        let rows: Vec<_> = catalogue.iter().filter(|e| effects.find(e.name).is_none()).collect();
+        let place = |effect: &Effect| Place {
+            touches: touched(&stage_kinds, effect.stage),
+            search: Search::of(effect, &extent),
+            unit: |_| 1.0,
         };
-        let (missing, rows) = entries(&known, &place);
+        let missing = rows.iter().map(|effect| spec(effect, place(effect))).collect();
         let trials = session.trials.iter().map(trial_spec).collect();
         let measured = stage_kinds.iter().map(|kind| measured(&session, *kind)).collect();
         let dt_s = session.dt_s();

@@ -1,26 +1,17 @@
 //! One stage of the rig over the session.
 
-use std::borrow::Cow;
-
 use stretch_gap::{Dice, Model, Run};
 use stretch_sim::{
-    Actuation, DEFAULT_STEP_S, EffectSet, Grid, Key, Memory, Muscle, Openings, Pneumatics,
-    Reference, RigParams, Sensing, Stage, Start,
+    Actuation, DEFAULT_STEP_S, EffectSet, Grid, Key, Measured, Memory, Muscle, Need, Openings,
+    Pneumatics, Reference, RigParams, Sensing, Stage, Start,
 };
 
-use super::{
-    RigSimulator,
-    forms::commands::{cubic, deadband},
-    session::Begin,
-};
-use crate::{
-    error::BenchError,
-    outside::{Acting, Recorder},
-};
+use super::{RigSimulator, session::Begin, smooth::cubic};
+use crate::{acting::Acting, error::BenchError};
 
 /// Step of integration while fitting, s.
 const STEP_S: f64 = 2.0 * DEFAULT_STEP_S;
-/// Pieces of a sample where the amplifier is slow: between samples the length is no straight line.
+/// Pieces of a sample where an effect needs fine steps: between samples the length is no straight line.
 const PIECES: f64 = 4.0;
 /// Offset of a vented chamber, kPa: as a rule a little above the atmosphere (mean, 1 sd).
 const EMPTY_KPA: (f64, f64) = (0.08, 0.06);
@@ -38,19 +29,6 @@ struct Setting<'a> {
     /// Input of the stage that stands in for the measured one, all trials end to end.
     given: Option<&'a [f64]>,
     kind: Stage,
-    deadband: Option<&'a [f64]>,
-}
-
-/// Openings of the valves, as commanded or as an effect makes them.
-struct Commands<'a> {
-    inlet: Cow<'a, [f64]>,
-    outlet: Cow<'a, [f64]>,
-}
-
-impl Commands<'_> {
-    fn view(&self) -> Openings<'_> {
-        Openings { inlet: &self.inlet, outlet: &self.outlet }
-    }
 }
 
 /// Simulates one stage, on the measured input unless another one is given.
@@ -66,8 +44,8 @@ pub(super) fn simulate(
     let grid = match kind {
         // Driven by a measured input.
         Stage::Muscle | Stage::Sensing => {
-            let is_slow = acting.inside.find("amplifier_lowpass").is_some();
-            let pieces = if is_slow && kind == Stage::Sensing { PIECES } else { 1.0 };
+            let is_fine = acting.inside.acting_in(kind).any(|e| e.effect().needs_fine_steps);
+            let pieces = if is_fine { PIECES } else { 1.0 };
             Grid::new(rig.about.dt_s, run.step * rig.about.dt_s / pieces, 0.0)?
         }
         _ => acting.inside.grid(&params, rig.about.dt_s, run.step * STEP_S)?,
@@ -81,7 +59,6 @@ pub(super) fn simulate(
         shake: run.shake,
         given,
         kind,
-        deadband: acting.deadband,
     };
     match kind {
         Stage::Pneumatics => setting.pneumatics(run.trials, out)?,
@@ -145,18 +122,9 @@ impl Setting<'_> {
         }
     }
 
-    /// Openings as the valves take them.
-    fn openings(&self, trial: usize) -> Commands<'_> {
+    fn openings(&self, trial: usize) -> Openings<'_> {
         let trial = &self.rig.session.trials[trial];
-        match self.deadband {
-            None => Commands { inlet: Cow::from(&trial.inlet), outlet: Cow::from(&trial.outlet) },
-            Some(values) => {
-                let least = self.params[Key::UMin];
-                let taken =
-                    |openings: &[f64], side| Cow::from(deadband(values, side, least, openings));
-                Commands { inlet: taken(&trial.inlet, 0), outlet: taken(&trial.outlet, 1) }
-            }
-        }
+        Openings { inlet: &trial.inlet, outlet: &trial.outlet }
     }
 
     /// A measured input: smoothed, and shaken if asked for.
@@ -193,8 +161,7 @@ impl Setting<'_> {
         let stage = Pneumatics::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
         self.each(count, out, |trial, own| {
-            let (start, commands) = (self.start(trial), self.openings(trial));
-            let openings = commands.view();
+            let (start, openings) = (self.start(trial), self.openings(trial));
             let initial = self.initial_kpa(trial);
             if stage.is_coupled() {
                 let length = self.input(trial, false);
@@ -235,7 +202,7 @@ impl Setting<'_> {
             stage.run(
                 &mut memory,
                 self.start(trial),
-                self.openings(trial).view(),
+                self.openings(trial),
                 self.initial_kpa(trial),
                 &mut pressure,
                 own,
@@ -252,17 +219,17 @@ impl Setting<'_> {
     ) -> Result<(), BenchError> {
         let stage = Sensing::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
-        let shown = self.shown(&self.without("pot_backlash"))?;
+        let shown = self.shown(&self.effects.only(|e| !e.hides_input))?;
         let needs_pressure = self
             .effects
             .acting_in(Stage::Sensing)
-            .any(|e| e.effect().needs() == Some("a pressure"));
+            .any(|e| e.effect().needs == Some(Need::Pressure));
         let mut pressures = Vec::new();
         if needs_pressure && self.rig.inputs.pressure.is_empty() {
             pressures = self.simulated_pressure(count)?;
         }
-        // Travel counts from the session's start: nothing may move before it.
-        if self.effects.find("gauge_softening").is_none() {
+        // What counts from the session's start allows no move before it.
+        if !self.effects.iter().any(|e| e.effect().counts_session) {
             let stroke = self.rig.inputs.stroke;
             let before = if self.is_vented() { stroke.0 } else { stroke.1 };
             let kpa = if self.is_vented() { 1e-3 * self.params[Key::PS] } else { 0.0 };
@@ -294,9 +261,13 @@ impl Setting<'_> {
             let start_s = self.rig.about.trials[trial].start_s;
             let (length, pressure) = (self.refined(length), self.refined(pressure));
             stage.run(&mut memory, self.start(trial), start_s, &length, &pressure, own)?;
-            let noise = self.params[Key::SigmaV];
-            let recorder = Recorder { noise, unit: 1.0, dt_s: self.rig.about.dt_s };
-            acting.record(recorder, &self.rig.session.trials[trial].bridge_v, own);
+            let record = Measured {
+                samples: &self.rig.session.trials[trial].bridge_v,
+                noise: self.params[Key::SigmaV],
+                unit: 1.0,
+                dt_s: self.rig.about.dt_s,
+            };
+            acting.follow(record, own);
             Ok(())
         })
     }
@@ -304,12 +275,11 @@ impl Setting<'_> {
     /// What play in the reference hides of the length: the model of the motion says which flank it lies on, the record how
     /// long the muscle is.
     fn hidden(&self, count: usize) -> Result<Option<Vec<f64>>, BenchError> {
-        let Some(play) = self.effects.find("pot_backlash").filter(|e| e.values()[0] > 0.0) else {
+        let alone = self.effects.only(|e| e.hides_input);
+        if alone.acting_in(Stage::Reference).next().is_none() {
             return Ok(None);
-        };
+        }
         let mut free = self.free_length(count)?;
-        let mut alone = EffectSet::new();
-        alone.push(play.effect(), play.values())?;
         let mut shown = self.shown(&alone)?;
         let stroke = self.rig.inputs.stroke;
         shown.condition(&[if self.is_vented() { stroke.0 } else { stroke.1 }; 2])?;
@@ -324,7 +294,7 @@ impl Setting<'_> {
 
     /// Length that the model of the motion shows without play in the reference.
     fn free_length(&self, count: usize) -> Result<Vec<f64>, BenchError> {
-        let effects = self.without("pot_backlash");
+        let effects = self.effects.only(|e| !e.hides_input);
         let has_pressure = !self.rig.inputs.pressure.is_empty();
         let grid = if has_pressure {
             Grid::samples(self.rig.about.dt_s)?
@@ -340,12 +310,6 @@ impl Setting<'_> {
             without.actuation(count, &mut all)?;
         }
         Ok(all)
-    }
-
-    fn without(&self, name: &str) -> EffectSet {
-        let mut effects = self.effects.clone();
-        effects.remove(name);
-        effects
     }
 
     /// By cubics through four samples where the grid is finer.

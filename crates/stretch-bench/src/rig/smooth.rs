@@ -134,6 +134,15 @@ pub(crate) fn unscheduled(samples: usize) -> Vec<u8> {
     vec![WIDEST as u8; samples]
 }
 
+/// Value a share of the way from sample `i` to the next, on a cubic through four samples (Catmull and Rom 1974); the
+/// first and last value are held.
+pub(super) fn cubic(samples: &[f64], i: usize, share: f64) -> f64 {
+    let at = |i: usize| samples[i.min(samples.len() - 1)];
+    let (a, b, c, d) = (at(i.saturating_sub(1)), at(i), at(i + 1), at(i + 2));
+    let t = share;
+    b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,57 +1,28 @@
 //! The amplifier is slow.
 
+use stretch_operators::{Lowpass, Poles};
+
 use crate::{
-    effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::{MeanReversion, Operator, Span, Start},
+    effects::{Action, Effect, EffectParameter, Form, search::each},
     stage::Stage,
 };
 
 /// The amplifier is slow.
-#[derive(Debug)]
-pub(super) struct AmplifierLowpass;
-
-static PARAMETERS: &[EffectParameter] = &[EffectParameter::strength("tau", "s", 0.0, 0.4, 0.05)];
-
-impl Effect for AmplifierLowpass {
-    fn name(&self) -> &'static str {
-        "amplifier_lowpass"
-    }
-
-    fn stage(&self) -> Stage {
-        Stage::Sensing
-    }
-
-    fn equation(&self) -> &'static str {
-        "v -> mean_rev(v, tau)"
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        PARAMETERS
-    }
-
-    fn action(&self, values: &[f64], around: &Surroundings<'_>) -> Action {
-        Action::Volts(Box::new(Lowpass(MeanReversion::new(
-            values[0],
-            around.volts_stroke,
-            around.grid,
-        ))))
-    }
-}
-
-#[derive(Debug)]
-struct Lowpass(MeanReversion);
-
-impl Operator for Lowpass {
-    fn cells(&self) -> usize {
-        MeanReversion::CELLS
-    }
-
-    fn begin(&self, _start: Start, first: f64, cells: &mut [f64]) {
-        // Powered and settled before every trial, whatever came before.
-        self.0.begin(Start::Settled, first, cells);
-    }
-
-    fn run(&self, span: &Span<'_>, cells: &mut [f64], signal: &mut [f64]) {
-        self.0.run(span, cells, signal, |_, z| z);
-    }
-}
+pub(super) static AMPLIFIER_LOWPASS: Effect = Effect {
+    name: "amplifier_lowpass",
+    words: "the amplifier is slow",
+    stage: Stage::Sensing,
+    equation: "v -> mean_rev(mean_rev(v, tau (1 - second)), tau second)",
+    parameters: &[
+        EffectParameter::strength("tau", "s", 0.0, 0.4, 0.05),
+        EffectParameter::form("second", "1", 0.0, 0.5, Form { neutral: 0.0, usual: 0.1 }),
+    ],
+    action: |values, around| {
+        let poles = Poles { tau_s: values[0], second: values[1] };
+        Action::Volts(Box::new(Lowpass::new(poles, around.grid)))
+    },
+    twins: &["channel_skew", "gauge_relaxation"],
+    needs_fine_steps: true,
+    starts: Some(|_| each([0.004, 0.02, 0.08])),
+    ..Effect::PLAIN
+};

@@ -1,67 +1,45 @@
 //! The amplifier's output is bounded.
 
+use stretch_operators::Knees;
+
 use crate::{
-    effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::{Operator, Span, soft_ceiling, soft_floor},
+    effects::{Action, Effect, EffectParameter, Extent, Form, Need},
     stage::Stage,
 };
 
+/// Rails that no signal reaches, V.
+const LOW_V: f64 = 0.5;
+const HIGH_V: f64 = 3.3;
+
 /// The amplifier's output is bounded.
-#[derive(Debug)]
-pub(super) struct AmplifierSaturation;
+pub(super) static AMPLIFIER_SATURATION: Effect = Effect {
+    name: "amplifier_saturation",
+    words: "the amplifier runs into its limit",
+    stage: Stage::Sensing,
+    equation: "v cannot leave [v_lo, v_hi], soft knees of the width given",
+    parameters: &[
+        EffectParameter::strength("v_lo", "V", LOW_V, 2.2, 1.4).off_at(LOW_V),
+        EffectParameter::strength("v_hi", "V", 1.2, HIGH_V, 2.1).off_at(HIGH_V),
+        EffectParameter::form("knee", "V", 0.0005, 0.06, Form { neutral: 0.01, usual: 0.01 }).log(),
+    ],
+    action: |values, _| {
+        let bound = |v: f64, off: f64| (v != off).then_some(v);
+        let (low, high) = (bound(values[0], LOW_V), bound(values[1], HIGH_V));
+        Action::Volts(Box::new(Knees { low, high, width: values[2] }))
+    },
+    twins: &["sleeve_slack"],
+    needs: Some(Need::Amplifier),
+    starts: Some(starts),
+    ..Effect::PLAIN
+};
 
-static PARAMETERS: &[EffectParameter] = &[
-    EffectParameter { off: Some(0.5), ..EffectParameter::strength("v_lo", "V", 0.5, 2.2, 1.4) },
-    EffectParameter { off: Some(3.3), ..EffectParameter::strength("v_hi", "V", 1.2, 3.3, 2.1) },
-];
-
-impl Effect for AmplifierSaturation {
-    fn name(&self) -> &'static str {
-        "amplifier_saturation"
-    }
-
-    fn stage(&self) -> Stage {
-        Stage::Sensing
-    }
-
-    fn equation(&self) -> &'static str {
-        "v cannot leave [v_lo, v_hi], soft knees of 0.01 V"
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        PARAMETERS
-    }
-
-    fn action(&self, values: &[f64], _around: &Surroundings<'_>) -> Action {
-        let bound = |p: usize| (PARAMETERS[p].off != Some(values[p])).then_some(values[p]);
-        Action::Volts(Box::new(Rails { low: bound(0), high: bound(1) }))
-    }
-
-    fn needs(&self) -> Option<&'static str> {
-        Some("an amplifier")
-    }
-}
-
-/// Width of the soft knees, V.
-const KNEE_V: f64 = 0.01;
-
-#[derive(Debug)]
-struct Rails {
-    low: Option<f64>,
-    high: Option<f64>,
-}
-
-impl Operator for Rails {
-    fn run(&self, _span: &Span<'_>, _cells: &mut [f64], signal: &mut [f64]) {
-        if let Some(low) = self.low {
-            for v in signal.iter_mut() {
-                *v = soft_floor(*v, low, KNEE_V);
-            }
-        }
-        if let Some(high) = self.high {
-            for v in signal.iter_mut() {
-                *v = soft_ceiling(*v, high, KNEE_V);
-            }
-        }
-    }
+/// A little inside of either end, with the usual knee and one as sharp as they come: from a soft one a fit does not find there.
+fn starts(extent: &Extent) -> Vec<Vec<f64>> {
+    let (low, high) = extent.volts;
+    let within = [0.004, 0.015, 0.05, 0.15, 0.4];
+    let with = |knee: f64| {
+        let tops = within.map(|d| vec![LOW_V, (high - d).max(1.25), knee]);
+        [tops, within.map(|d| vec![(low + d).max(0.51), HIGH_V, knee])].concat()
+    };
+    [with(0.01), with(0.15 * 0.01)].concat()
 }

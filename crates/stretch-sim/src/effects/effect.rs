@@ -1,163 +1,160 @@
 //! What an effect is.
 
-use std::fmt;
-
 use crate::{
-    grid::Grid,
-    operator::{Droop, Law, Operator},
-    params::{Key, RigParams},
+    effects::{Action, EffectParameter, Role, Search, Surroundings},
     stage::Stage,
 };
 
-/// How a parameter's range is best walked.
+/// What an effect needs beside the input of its stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scale {
-    /// In equal differences.
-    Linear,
-    /// In equal ratios.
-    Log,
+pub enum Need {
+    /// The pressure inside the muscle.
+    Pressure,
+    /// An amplifier with rails.
+    Amplifier,
 }
 
-/// A parameter of an effect.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EffectParameter {
-    /// Name in files and on the command line.
-    pub name: &'static str,
-    /// Unit; `1` when it has none, `strain` and `mm` for what scales with the stroke.
-    pub unit: &'static str,
-    /// Least plausible value.
-    pub min: f64,
-    /// Greatest plausible value.
-    pub max: f64,
-    /// Value at which it does nothing; none for what only shapes the effect (a scale, a time constant).
-    pub off: Option<f64>,
-    /// Used when a shape is not given, and where a search starts.
-    pub typical: f64,
-    /// How its range is best walked.
-    pub scale: Scale,
-}
-
-impl EffectParameter {
-    /// A strength that is off at zero, searched in equal differences.
-    pub const fn strength(
-        name: &'static str,
-        unit: &'static str,
-        min: f64,
-        max: f64,
-        typical: f64,
-    ) -> Self {
-        Self { name, unit, min, max, off: Some(0.0), typical, scale: Scale::Linear }
-    }
-
-    /// A shape (a scale, a time constant), searched in equal ratios.
-    pub const fn shape(
-        name: &'static str,
-        unit: &'static str,
-        min: f64,
-        max: f64,
-        typical: f64,
-    ) -> Self {
-        Self { name, unit, min, max, off: None, typical, scale: Scale::Log }
-    }
-}
-
-/// What an effect may need to know of the rig it acts in.
-#[derive(Debug, Clone, Copy)]
-pub struct Surroundings<'a> {
-    /// Steps of time.
-    pub grid: &'a Grid,
-    /// Strain that stands for e0: the pre-stretch, 1 for a gauge alone.
-    pub strain_scale: f64,
-    /// Stroke of the strain, for what is wound by a move: (1 + e0) k_max, 1 for a gauge alone.
-    pub strain_stroke: f64,
-    /// Stroke of the contraction: k_max.
-    pub contraction_stroke: f64,
-    /// Resistance at zero strain: R0, 1 for a gauge alone.
-    pub resistance_zero: f64,
-    /// Stroke of the bridge voltage, V: about 1, 1 for a gauge alone.
-    pub volts_stroke: f64,
-    /// Length (or reference) at which y = 0.
-    pub length_zero: f64,
-    /// Change of the length (or reference) from y = 0 to y = 1, with its sign.
-    pub length_span: f64,
-    /// Reference pressure, kPa.
-    pub pressure_scale_kpa: f64,
-    /// What one unit of strain of the catalogue is in the signal: 1, or its share of the range for a gauge alone.
-    pub strain_unit: f64,
-}
-
-impl<'a> Surroundings<'a> {
-    /// Those of the whole rig.
-    pub(crate) fn of_rig(params: &RigParams, grid: &'a Grid) -> Self {
-        let (stretch, k_max) = (1.0 + params[Key::E0], params[Key::KMax]);
-        Self {
-            grid,
-            strain_scale: params[Key::E0],
-            strain_stroke: stretch * k_max,
-            contraction_stroke: k_max,
-            resistance_zero: params[Key::R0],
-            volts_stroke: 1.0,
-            length_zero: params[Key::L0],
-            length_span: -params[Key::L0] * k_max,
-            pressure_scale_kpa: 1e-3 * params[Key::PRef],
-            strain_unit: 1.0,
+impl Need {
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Pressure => "a pressure",
+            Self::Amplifier => "an amplifier",
         }
     }
 }
 
-/// Where and how an effect acts, once its values are known.
-#[derive(Debug)]
-#[non_exhaustive]
-pub enum Action {
-    /// Openings act later, s.
-    Delay(f64),
-    /// Opening of either valve, before the least conductance.
-    Opening(Box<dyn Law>),
-    /// The supply gives way to the flow.
-    Droop(Box<dyn Droop>),
-    /// Gauge pressure (Pa) to a mass flow out of the chamber (kg/s).
-    Leak(Box<dyn Law>),
-    /// k/k_max to V/V0.
-    Volume(Box<dyn Law>),
-    /// Static contraction k_s, before the lag.
-    StaticContraction(Box<dyn Operator>),
-    /// Moving contraction, behind the lag.
-    MovingContraction(Box<dyn Operator>),
-    /// Gauge strain.
-    Strain(Box<dyn Operator>),
-    /// Resistance; the span holds the strain.
-    Resistance(Box<dyn Operator>),
-    /// Amplified voltage.
-    Volts(Box<dyn Operator>),
-    /// Samples of the bridge show the voltage of so many seconds earlier.
-    Skew(f64),
-    /// Recorded samples of the bridge, after a skew.
-    Record(Box<dyn Operator>),
-    /// Length as the reference sees it, mm.
-    Length(Box<dyn Operator>),
+/// What was measured, for numbers that are found in the record.
+#[derive(Debug, Clone, Copy)]
+pub struct Measured<'a> {
+    /// Samples of the trial.
+    pub samples: &'a [f64],
+    /// Their noise, one standard deviation.
+    pub noise: f64,
+    /// What a strength of one is in the unit of the samples.
+    pub unit: f64,
+    /// Sample time, s.
+    pub dt_s: f64,
 }
 
-/// One row of the catalogue: an effect that the nominal rig leaves out.
+/// Finds what a record alone can tell, and acts with it: values, the record, the simulated samples.
+pub type Find = fn(&[f64], &Measured<'_>, &mut [f64]);
+
+/// Points to look for an effect at, from what was measured.
+pub type Starts = fn(&Extent) -> Vec<Vec<f64>>;
+
+/// What the screens need to know of a measurement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// Least and greatest measured bridge voltage but for noise, V.
+    pub volts: (f64, f64),
+    /// Least nominal gauge strain.
+    pub strain: f64,
+}
+
+/// What the search needs to know of the measurement of a gauge alone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alone {
+    /// From the first to the last sample, s.
+    pub session_s: f64,
+    /// Time by which the signal seems to trail the reference, s.
+    pub lag_s: f64,
+}
+
+/// An effect that the nominal rig leaves out: an operator at a place, and how it is looked for.
 ///
-/// A new effect needs a type that implements this in a file of its own and one line in [`CATALOGUE`](crate::CATALOGUE),
-/// or, outside of this crate, a `static` handed to [`EffectSet::push`](crate::EffectSet::push).
-pub trait Effect: fmt::Debug + Send + Sync {
+/// One `static` holds all of it: the simulator runs it, the diagnosis fits it, reports speak of it. A new effect is such a
+/// `static` in a file of its own and one line in [`CATALOGUE`](crate::CATALOGUE); or, outside of this crate, a `static` handed to
+/// [`EffectSet::push`](crate::EffectSet::push) to be simulated and to [`Catalogue::with`](crate::Catalogue::with) to be diagnosed.
+///
+/// ```
+/// use stretch_operators::Backlash;
+/// use stretch_sim::{Action, Effect, EffectParameter, EffectSet, Stage};
+/// static CLAMP_PLAY: Effect = Effect {
+///     name: "clamp_play",
+///     words: "the clamp of the sleeve has play",
+///     stage: Stage::Sensing,
+///     equation: "e -> play(e, w)",
+///     parameters: &[EffectParameter::strength("w", "strain", 0.0, 0.02, 0.005)],
+///     action: |values, _| Action::Strain(Box::new(Backlash::hard(values[0]))),
+///     ..Effect::PLAIN
+/// };
+/// let mut effects = EffectSet::new();
+/// effects.push(&CLAMP_PLAY, &[0.004])?;
+/// assert!(CLAMP_PLAY.is_off(&[0.0]) && !effects.find("clamp_play").unwrap().is_off());
+/// # Ok::<(), stretch_sim::SimError>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Effect {
     /// Name: the vocabulary of every file and report.
-    fn name(&self) -> &'static str;
+    pub name: &'static str,
+    /// What it is, for someone who does not know its name, in one line.
+    pub words: &'static str,
     /// Stage it acts in.
-    fn stage(&self) -> Stage;
+    pub stage: Stage,
     /// Its equation, in plain text.
-    fn equation(&self) -> &'static str;
-    /// Its parameters, the strength first.
-    fn parameters(&self) -> &'static [EffectParameter];
+    pub equation: &'static str,
+    /// Its parameters: the strengths first, then shapes, then forms; what is found in the record last.
+    pub parameters: &'static [EffectParameter],
     /// Where and how it acts with these values, which are not off.
-    fn action(&self, values: &[f64], around: &Surroundings<'_>) -> Action;
-    /// What it needs beside the stage's own input, in words; none for most.
-    fn needs(&self) -> Option<&'static str> {
-        None
-    }
+    pub action: fn(&[f64], &Surroundings<'_>) -> Action,
+    /// What it needs beside the stage's own input.
+    pub needs: Option<Need>,
+    /// Names of effects that are hard to tell from it.
+    pub twins: &'static [&'static str],
+    /// Whether it shows between trials rather than inside them (drift, softening).
+    pub is_between_trials: bool,
+    /// Whether it counts everything from the session's start: nothing may move before it.
+    pub counts_session: bool,
+    /// Whether its input cannot be told from its output (play in the reference).
+    pub hides_input: bool,
+    /// Whether it asks for steps shorter than a sample where a measured input drives its stage.
+    pub needs_fine_steps: bool,
+    /// Points to look for it at; values of forms at their end may be left out and are then the usual ones. Without any,
+    /// a small and a large value of each strength with three of each shape are taken.
+    pub starts: Option<Starts>,
+    /// What a gauge alone changes of ranges and starts, in its units.
+    pub alone: fn(&Alone, &mut Search),
+    /// How its [`Role::Found`] numbers are found in a record; none for all but hum.
+    pub find: Option<Find>,
+}
+
+impl Effect {
+    /// An effect that does nothing, to be filled in.
+    pub const PLAIN: Self = Self {
+        name: "",
+        words: "",
+        stage: Stage::Sensing,
+        equation: "",
+        parameters: &[],
+        action: |_, _| Action::Nothing,
+        needs: None,
+        twins: &[],
+        is_between_trials: false,
+        counts_session: false,
+        hides_input: false,
+        needs_fine_steps: false,
+        starts: None,
+        alone: |_, _| (),
+        find: None,
+    };
+
     /// Whether these values leave the rig as if the effect were absent: every strength is at its off value.
-    fn is_off(&self, values: &[f64]) -> bool {
-        self.parameters().iter().zip(values).all(|(p, v)| p.off.is_none_or(|off| *v == off))
+    pub fn is_off(&self, values: &[f64]) -> bool {
+        self.parameters.iter().zip(values).all(|(p, v)| p.off().is_none_or(|off| *v == off))
+    }
+
+    /// Parameters that a model has values of: all but what is found in the record.
+    pub fn fitted(&self) -> impl Iterator<Item = &'static EffectParameter> {
+        self.parameters.iter().filter(|p| !matches!(p.role, Role::Found { .. }))
+    }
+
+    /// Values of a model with a guess of what would be found in a record.
+    pub fn with_stand_ins(&self, values: &[f64]) -> Vec<f64> {
+        let guesses = self.parameters.iter().filter_map(|p| match p.role {
+            Role::Found { stand_in } => Some(stand_in),
+            _ => None,
+        });
+        values.iter().copied().chain(guesses).collect()
     }
 }

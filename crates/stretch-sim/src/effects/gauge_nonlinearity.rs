@@ -1,50 +1,29 @@
 //! The gauge is not quite linear.
 
+use stretch_operators::BowedGain;
+
 use crate::{
-    effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::{Operator, Span},
+    effects::{Action, Effect, EffectParameter, Form, search::each},
     stage::Stage,
 };
 
 /// The gauge is not quite linear.
-#[derive(Debug)]
-pub(super) struct GaugeNonlinearity;
-
-static PARAMETERS: &[EffectParameter] = &[EffectParameter::strength("c", "1", -0.1, 0.1, 0.02)];
-
-impl Effect for GaugeNonlinearity {
-    fn name(&self) -> &'static str {
-        "gauge_nonlinearity"
-    }
-
-    fn stage(&self) -> Stage {
-        Stage::Sensing
-    }
-
-    fn equation(&self) -> &'static str {
-        "R -> R (1 + c 4 (e/e0)(1 - e/e0))"
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        PARAMETERS
-    }
-
-    fn action(&self, values: &[f64], around: &Surroundings<'_>) -> Action {
-        Action::Resistance(Box::new(Bow { c: values[0], scale: around.strain_scale }))
-    }
-}
-
-#[derive(Debug)]
-struct Bow {
-    c: f64,
-    scale: f64,
-}
-
-impl Operator for Bow {
-    fn run(&self, span: &Span<'_>, _cells: &mut [f64], signal: &mut [f64]) {
-        for (r, e) in signal.iter_mut().zip(span.strain) {
-            let y = e / self.scale;
-            *r *= 1.0 + self.c * 4.0 * y * (1.0 - y);
-        }
-    }
-}
+pub(super) static GAUGE_NONLINEARITY: Effect = Effect {
+    name: "gauge_nonlinearity",
+    words: "the gauge's resistance bends away from the ideal curve",
+    stage: Stage::Sensing,
+    equation: "R -> R (1 + c 4 x (1 - x)(1 + skew (2 x - 1))), x = e/e0",
+    parameters: &[
+        EffectParameter::strength("c", "1", -0.1, 0.1, 0.02),
+        EffectParameter::form("skew", "1", -0.6, 0.6, Form { neutral: 0.0, usual: 0.0 }),
+    ],
+    action: |values, around| {
+        let scale = around.strain_scale;
+        Action::Resistance(Box::new(BowedGain { c: values[0], skew: values[1], scale }))
+    },
+    twins: &["pot_nonlinearity", "pressure_crosstalk"],
+    // At half of the range, where e + 1 is 1.5, it bends by half as much again; further, it would not rise any more.
+    alone: |_, search| search.reach_from(0.5),
+    starts: Some(|_| each([0.005])),
+    ..Effect::PLAIN
+};

@@ -1,59 +1,36 @@
 //! The gauge overshoots a quick strain and relaxes.
 
+use stretch_operators::{FadingMemory, Times};
+
 use crate::{
-    effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::{MeanReversion, Operator, Span, Start},
+    effects::{Action, Effect, EffectParameter, Form, search::pairs},
     stage::Stage,
 };
 
 /// The gauge overshoots a quick strain and relaxes.
-#[derive(Debug)]
-pub(super) struct GaugeRelaxation;
-
-static PARAMETERS: &[EffectParameter] = &[
-    EffectParameter::strength("c", "1", -0.3, 0.6, 0.1),
-    EffectParameter::shape("tau", "s", 0.02, 4.0, 0.3),
-];
-
-impl Effect for GaugeRelaxation {
-    fn name(&self) -> &'static str {
-        "gauge_relaxation"
-    }
-
-    fn stage(&self) -> Stage {
-        Stage::Sensing
-    }
-
-    fn equation(&self) -> &'static str {
-        "e -> e + c (e - mean_rev(e, tau))"
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        PARAMETERS
-    }
-
-    fn action(&self, values: &[f64], around: &Surroundings<'_>) -> Action {
-        let lag = MeanReversion::new(values[1], around.strain_stroke, around.grid);
-        Action::Strain(Box::new(Relaxation { c: values[0], lag }))
-    }
-}
-
-#[derive(Debug)]
-struct Relaxation {
-    c: f64,
-    lag: MeanReversion,
-}
-
-impl Operator for Relaxation {
-    fn cells(&self) -> usize {
-        MeanReversion::CELLS
-    }
-
-    fn begin(&self, start: Start, first: f64, cells: &mut [f64]) {
-        self.lag.begin(start, first, cells);
-    }
-
-    fn run(&self, span: &Span<'_>, cells: &mut [f64], signal: &mut [f64]) {
-        self.lag.run(span, cells, signal, |x, z| x + self.c * (x - z));
-    }
-}
+pub(super) static GAUGE_RELAXATION: Effect = Effect {
+    name: "gauge_relaxation",
+    words: "the gauge relaxes (or overshoots) after a change of strain",
+    stage: Stage::Sensing,
+    equation: "e -> e + c (e - mean of mean_rev(e, tau {1/spread, 1, spread}))",
+    parameters: &[
+        EffectParameter::strength("c", "1", -0.3, 0.6, 0.1),
+        EffectParameter::shape("tau", "s", 0.02, 4.0, 0.3),
+        EffectParameter::form("spread", "1", 1.0, 8.0, Form { neutral: 1.0, usual: 1.6 }).log(),
+    ],
+    action: |values, around| {
+        let times = Times { tau_s: values[1], spread: values[2] };
+        let memory = FadingMemory::new(values[0], times, around.strain_stroke, around.grid);
+        Action::Strain(Box::new(memory))
+    },
+    twins: &["amplifier_lowpass"],
+    // A gauge that is no foil gives way by more of a step, and more slowly.
+    alone: |_, search| {
+        search.reach(0.6);
+        search.ranges[1][1] = 20.0;
+        let slow = search.starts.last().map(|s| [&[s[0], 10.0], &s[2..]].concat());
+        search.starts.extend(slow);
+    },
+    starts: Some(|_| pairs(0.05, [0.03, 0.1, 0.35, 1.2, 3.5])),
+    ..Effect::PLAIN
+};

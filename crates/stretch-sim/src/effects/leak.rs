@@ -1,48 +1,49 @@
 //! Air leaks out of the chamber.
 
 use crate::{
-    effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::Law,
+    effects::{Action, Effect, EffectParameter, Form, search::each},
+    law::Law,
     stage::Stage,
 };
 
 /// Air leaks out of the chamber.
-#[derive(Debug)]
-pub(super) struct Leak;
+pub(super) static LEAK: Effect = Effect {
+    name: "leak",
+    words: "air leaks from the chamber",
+    stage: Stage::Pneumatics,
+    equation: "q_leak = c p (p/620 kPa)^(power - 1), p above the atmosphere",
+    parameters: &[
+        EffectParameter::strength("c", "kg/(s Pa)", 0.0, 2e-10, 5e-11),
+        EffectParameter::form("power", "1", 0.4, 2.0, Form { neutral: 1.0, usual: 1.0 }),
+    ],
+    action: |values, _| Action::Leak(Box::new(Leak { c: values[0], excess: values[1] - 1.0 })),
+    starts: Some(|_| each([1e-11])),
+    ..Effect::PLAIN
+};
 
-static PARAMETERS: &[EffectParameter] =
-    &[EffectParameter::strength("c", "kg/(s Pa)", 0.0, 2e-10, 5e-11)];
-
-impl Effect for Leak {
-    fn name(&self) -> &'static str {
-        "leak"
-    }
-
-    fn stage(&self) -> Stage {
-        Stage::Pneumatics
-    }
-
-    fn equation(&self) -> &'static str {
-        "q_leak = c (p - P_atm)"
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        PARAMETERS
-    }
-
-    fn action(&self, values: &[f64], _around: &Surroundings<'_>) -> Action {
-        Action::Leak(Box::new(Linear { c: values[0] }))
-    }
-}
+/// Pressure at which a leak of any power flows what a linear one would, Pa.
+const AT_PA: f64 = 620e3;
 
 #[derive(Debug)]
-struct Linear {
+struct Leak {
     c: f64,
+    /// Power less one.
+    excess: f64,
 }
 
-impl Law for Linear {
+impl Law for Leak {
     #[inline]
-    fn at(&self, x: f64) -> f64 {
-        self.c * x
+    fn at(&self, p: f64) -> f64 {
+        if p <= 0.0 {
+            return self.c * p;
+        }
+        // A power without a transcendental: two terms that agree at no and at full pressure.
+        let x = p / AT_PA;
+        let shape = if self.excess >= 0.0 {
+            1.0 + self.excess * (x - 1.0)
+        } else {
+            (1.0 - self.excess) / (1.0 - self.excess * x)
+        };
+        self.c * p * shape.max(0.0)
     }
 }

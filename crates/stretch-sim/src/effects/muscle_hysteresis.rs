@@ -1,38 +1,28 @@
 //! Friction in the braid: the static contraction depends on its history.
 
+use stretch_operators::{Loops, PrandtlIshlinskii};
+
 use crate::{
-    effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::Hysteresis,
+    effects::{Action, Effect, EffectParameter, Form, search::pairs},
     stage::Stage,
 };
 
 /// Friction in the braid: the static contraction depends on its history.
-#[derive(Debug)]
-pub(super) struct MuscleHysteresis;
-
-static PARAMETERS: &[EffectParameter] = &[
-    EffectParameter::strength("h", "1", 0.0, 0.6, 0.2),
-    EffectParameter::shape("s", "strain", 0.005, 0.06, 0.02),
-];
-
-impl Effect for MuscleHysteresis {
-    fn name(&self) -> &'static str {
-        "muscle_hysteresis"
-    }
-
-    fn stage(&self) -> Stage {
-        Stage::Muscle
-    }
-
-    fn equation(&self) -> &'static str {
-        "k_s -> k_s + PI(k_s; h, s)"
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        PARAMETERS
-    }
-
-    fn action(&self, values: &[f64], _around: &Surroundings<'_>) -> Action {
-        Action::StaticContraction(Box::new(Hysteresis::new(values[0], values[1])))
-    }
-}
+pub(super) static MUSCLE_HYSTERESIS: Effect = Effect {
+    name: "muscle_hysteresis",
+    words: "the muscle follows another path on the way back",
+    stage: Stage::Muscle,
+    equation: "k_s -> k_s - h mean of (k_s - play(k_s, s {spread^2, spread, 1}))",
+    parameters: &[
+        EffectParameter::strength("h", "1", 0.0, 0.6, 0.2),
+        EffectParameter::shape("s", "strain", 0.005, 0.06, 0.02),
+        EffectParameter::form("spread", "1", 0.15, 0.95, Form { neutral: 0.5, usual: 0.5 }),
+    ],
+    action: |values, _| {
+        let loops = Loops { h: values[0], s: values[1], spread: values[2] };
+        Action::StaticContraction(Box::new(PrandtlIshlinskii::new(loops)))
+    },
+    twins: &["muscle_creep"],
+    starts: Some(|_| pairs(0.1, [0.007, 0.02, 0.05])),
+    ..Effect::PLAIN
+};

@@ -1,35 +1,25 @@
 //! The potentiometer has backlash.
 
+use stretch_operators::Backlash;
+
 use crate::{
-    effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::Backlash,
+    effects::{Action, Effect, EffectParameter, Form, search::each},
     stage::Stage,
 };
 
 /// The potentiometer has backlash.
-#[derive(Debug)]
-pub(super) struct PotBacklash;
-
-static PARAMETERS: &[EffectParameter] = &[EffectParameter::strength("w", "mm", 0.0, 2.0, 0.3)];
-
-impl Effect for PotBacklash {
-    fn name(&self) -> &'static str {
-        "pot_backlash"
-    }
-
-    fn stage(&self) -> Stage {
-        Stage::Reference
-    }
-
-    fn equation(&self) -> &'static str {
-        "L_meas = play(L, w)"
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        PARAMETERS
-    }
-
-    fn action(&self, values: &[f64], _around: &Surroundings<'_>) -> Action {
-        Action::Length(Box::new(Backlash { w: values[0] }))
-    }
-}
+pub(super) static POT_BACKLASH: Effect = Effect {
+    name: "pot_backlash",
+    words: "the potentiometer has backlash",
+    stage: Stage::Reference,
+    equation: "L_meas = mean of play(L, w {1 - spread, 1, 1 + spread})",
+    parameters: &[
+        EffectParameter::strength("w", "mm", 0.0, 2.0, 0.3),
+        EffectParameter::form("spread", "1", 0.0, 0.95, Form { neutral: 0.0, usual: 0.3 }),
+    ],
+    action: |values, _| Action::Length(Box::new(Backlash::soft(values[0], values[1]))),
+    twins: &["sleeve_slip"],
+    hides_input: true,
+    starts: Some(|_| each([0.05, 0.2, 0.8])),
+    ..Effect::PLAIN
+};

@@ -1,53 +1,47 @@
 //! The pressure inside the muscle stretches the gauge.
 
+use stretch_operators::{Operator, Span};
+
 use crate::{
-    effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::{Operator, Span},
+    effects::{Action, Effect, EffectParameter, Form, Need},
     stage::Stage,
 };
 
 /// The pressure inside the muscle stretches the gauge.
-#[derive(Debug)]
-pub(super) struct PressureCrosstalk;
-
-static PARAMETERS: &[EffectParameter] =
-    &[EffectParameter::strength("c", "strain", -0.05, 0.05, 0.01)];
-
-impl Effect for PressureCrosstalk {
-    fn name(&self) -> &'static str {
-        "pressure_crosstalk"
-    }
-
-    fn stage(&self) -> Stage {
-        Stage::Sensing
-    }
-
-    fn equation(&self) -> &'static str {
-        "e -> e + c (p - P_atm)/P_ref"
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        PARAMETERS
-    }
-
-    fn action(&self, values: &[f64], around: &Surroundings<'_>) -> Action {
-        Action::Strain(Box::new(Crosstalk { per_kpa: values[0] / around.pressure_scale_kpa }))
-    }
-
-    fn needs(&self) -> Option<&'static str> {
-        Some("a pressure")
-    }
-}
+pub(super) static PRESSURE_CROSSTALK: Effect = Effect {
+    name: "pressure_crosstalk",
+    words: "the pressure itself strains the gauge",
+    stage: Stage::Sensing,
+    equation: "e -> e + c x (1 + bend (1 - x)), x = (p - P_atm)/P_ref",
+    parameters: &[
+        EffectParameter::strength("c", "strain", -0.05, 0.05, 0.01),
+        EffectParameter::form("bend", "1", -0.6, 0.6, Form { neutral: 0.0, usual: 0.0 }),
+    ],
+    action: |values, around| {
+        let scale_kpa = around.pressure_scale_kpa;
+        Action::Strain(Box::new(Crosstalk {
+            per_kpa: values[0] / scale_kpa,
+            bend: values[1],
+            scale_kpa,
+        }))
+    },
+    twins: &["gauge_nonlinearity"],
+    needs: Some(Need::Pressure),
+    starts: Some(|_| vec![vec![0.003], vec![0.003, -0.4], vec![0.003, 0.4]]),
+    ..Effect::PLAIN
+};
 
 #[derive(Debug)]
 struct Crosstalk {
     per_kpa: f64,
+    bend: f64,
+    scale_kpa: f64,
 }
 
 impl Operator for Crosstalk {
     fn run(&self, span: &Span<'_>, _cells: &mut [f64], signal: &mut [f64]) {
         for (e, p) in signal.iter_mut().zip(span.pressure_kpa) {
-            *e += self.per_kpa * p;
+            *e += self.per_kpa * p * (1.0 + self.bend * (1.0 - p / self.scale_kpa));
         }
     }
 }

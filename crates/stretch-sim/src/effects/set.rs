@@ -1,26 +1,28 @@
 //! Effects that are on, with their values.
 
-use super::{Action, CATALOGUE, Effect, Surroundings, effect_named};
+use super::{Action, CATALOGUE, Effect, EffectParameter, Role, Surroundings, effect_named};
 use stretch_data::EffectEntry;
 
-use crate::{SimError, grid::Grid, nearest::nearest, params::RigParams, stage::Stage};
+use stretch_operators::Grid;
 
-/// One effect with the values of its parameters, in the order of [`Effect::parameters`].
+use crate::{SimError, nearest::nearest, params::RigParams, stage::Stage};
+
+/// One effect with the values of its parameters, in the order of [`Effect`]'s parameters.
 #[derive(Debug, Clone)]
 pub struct ActiveEffect {
-    effect: &'static dyn Effect,
+    effect: &'static Effect,
     values: Vec<f64>,
 }
 
 impl ActiveEffect {
     /// The row of the catalogue.
-    pub fn effect(&self) -> &'static dyn Effect {
+    pub fn effect(&self) -> &'static Effect {
         self.effect
     }
 
     /// Its name.
     pub fn name(&self) -> &'static str {
-        self.effect.name()
+        self.effect.name
     }
 
     /// Values, one a parameter.
@@ -68,28 +70,30 @@ impl EffectSet {
         Self::default()
     }
 
-    /// Adds an effect of the catalogue by name; shapes that are not given take their typical value.
+    /// Adds an effect of the catalogue by name; shapes that are not given take their typical value, forms their neutral one.
     ///
     /// # Errors
     /// An unknown name or parameter, a strength that is not given, a value outside its range, an effect that is already in.
     pub fn insert(&mut self, name: &str, given: &[(&str, f64)]) -> Result<(), SimError> {
-        let effect = effect_named(name).ok_or_else(|| SimError::UnknownEffect {
-            name: name.to_string(),
-            nearest: nearest(name, CATALOGUE.iter().map(|e| e.name())),
-        })?;
-        let values = resolve(effect, given)?;
-        for (p, value) in effect.parameters().iter().zip(&values) {
-            if !(*value >= p.min && *value <= p.max) {
-                return Err(SimError::OutOfRange {
-                    owner: name.to_string(),
-                    name: p.name.to_string(),
-                    value: *value,
-                    min: p.min,
-                    max: p.max,
-                    unit: p.unit,
-                });
+        let effect = known(name)?;
+        let values = resolve(effect, given, |_| 1.0)?;
+        for (p, value) in effect.parameters.iter().zip(&values) {
+            if !p.allowed().contains(value) {
+                return Err(out_of_range(effect, p, *value));
             }
         }
+        self.push(effect, &values)
+    }
+
+    /// As [`insert`](Self::insert) in other units, `unit` of each parameter's own; ranges, which are the rig's, are not
+    /// enforced.
+    pub(crate) fn insert_in(
+        &mut self,
+        entry: &EffectEntry,
+        unit: impl Fn(&EffectParameter) -> f64,
+    ) -> Result<(), SimError> {
+        let effect = known(&entry.name)?;
+        let values = resolve(effect, &given(entry), unit)?;
         self.push(effect, &values)
     }
 
@@ -100,9 +104,7 @@ impl EffectSet {
     pub fn from_entries(entries: &[EffectEntry]) -> Result<Self, SimError> {
         let mut effects = Self::new();
         for entry in entries {
-            let values: Vec<(&str, f64)> =
-                entry.parameters.iter().map(|(name, value)| (name.as_str(), *value)).collect();
-            effects.insert(&entry.name, &values)?;
+            effects.insert(&entry.name, &given(entry))?;
         }
         Ok(effects)
     }
@@ -113,7 +115,7 @@ impl EffectSet {
             name: e.name().to_string(),
             parameters: e
                 .effect()
-                .parameters()
+                .parameters
                 .iter()
                 .zip(e.values())
                 .map(|(p, value)| (p.name.to_string(), *value))
@@ -122,38 +124,35 @@ impl EffectSet {
         self.iter().map(entry).collect()
     }
 
-    /// Adds any effect, the catalogue's or a user's own, with the values of all of its parameters. Ranges are plausible
-    /// ones, not limits: they are not enforced here.
+    /// Adds any effect, the catalogue's or a user's own, with the values of its parameters; forms at their end may be left
+    /// out. Ranges are plausible ones, not limits: they are not enforced here.
     ///
     /// # Errors
     /// An effect of that name is already in, too few or too many values, or one that is not finite.
-    pub fn push(&mut self, effect: &'static dyn Effect, values: &[f64]) -> Result<(), SimError> {
-        let name = effect.name();
+    pub fn push(&mut self, effect: &'static Effect, values: &[f64]) -> Result<(), SimError> {
+        let name = effect.name;
         if self.find(name).is_some() {
             return Err(SimError::RepeatedEffect { name: name.to_string() });
         }
-        let expected = effect.parameters().len();
-        if values.len() != expected {
-            return Err(SimError::Length { name, expected, found: values.len() });
+        let (expected, found) = (effect.parameters.len(), values.len());
+        let left_out = effect.parameters.get(found..).unwrap_or(&[]);
+        let is_needed = |p: &EffectParameter| matches!(p.role, Role::Strength { .. } | Role::Shape);
+        if found > expected || left_out.iter().any(is_needed) {
+            return Err(SimError::Length { name, expected, found });
         }
+        let mut values = values.to_vec();
+        values.extend(left_out.iter().map(|p| p.typical));
         if let Some((p, value)) =
-            effect.parameters().iter().zip(values).find(|(_, v)| !v.is_finite())
+            effect.parameters.iter().zip(&values).find(|(_, v)| !v.is_finite())
         {
-            return Err(SimError::OutOfRange {
-                owner: name.to_string(),
-                name: p.name.to_string(),
-                value: *value,
-                min: p.min,
-                max: p.max,
-                unit: p.unit,
-            });
+            return Err(out_of_range(effect, p, *value));
         }
         let place =
-            |name: &str| CATALOGUE.iter().position(|e| e.name() == name).unwrap_or(usize::MAX);
+            |name: &str| CATALOGUE.iter().position(|e| e.name == name).unwrap_or(usize::MAX);
         let mine = place(name);
         let at =
             self.entries.iter().position(|e| place(e.name()) > mine).unwrap_or(self.entries.len());
-        self.entries.insert(at, ActiveEffect { effect, values: values.to_vec() });
+        self.entries.insert(at, ActiveEffect { effect, values });
         Ok(())
     }
 
@@ -173,6 +172,12 @@ impl EffectSet {
         Some(self.entries.remove(at))
     }
 
+    /// Those of them that are wanted.
+    pub fn only(&self, is_wanted: impl Fn(&Effect) -> bool) -> Self {
+        let wanted = self.entries.iter().filter(|e| is_wanted(e.effect));
+        Self { entries: wanted.cloned().collect() }
+    }
+
     /// All of them, in the order in which they act.
     pub fn iter(&self) -> impl Iterator<Item = &ActiveEffect> {
         self.entries.iter()
@@ -180,7 +185,7 @@ impl EffectSet {
 
     /// Those that do something in the stage.
     pub fn acting_in(&self, stage: Stage) -> impl Iterator<Item = &ActiveEffect> {
-        self.entries.iter().filter(move |e| stage.holds(e.effect.stage()) && !e.is_off())
+        self.entries.iter().filter(move |e| stage.holds(e.effect.stage) && !e.is_off())
     }
 
     /// Steps of time for trials sampled every `dt_s`: none longer than `max_step_s`, split where a delayed switch falls.
@@ -192,11 +197,11 @@ impl EffectSet {
         let around = Surroundings::of_rig(params, &whole);
         let mut delay_s = 0.0;
         for active in self.acting_in(Stage::Pneumatics) {
-            if let Action::Delay(seconds) = active.effect().action(active.values(), &around) {
+            if let Action::Delay(seconds) = (active.effect().action)(active.values(), &around) {
                 delay_s += seconds;
             }
         }
-        Grid::new(dt_s, max_step_s, delay_s)
+        Ok(Grid::new(dt_s, max_step_s, delay_s)?)
     }
 
     /// How many there are.
@@ -210,25 +215,54 @@ impl EffectSet {
     }
 }
 
-/// Values in the effect's order from names and values.
-fn resolve(effect: &dyn Effect, given: &[(&str, f64)]) -> Result<Vec<f64>, SimError> {
-    let parameters = effect.parameters();
+/// The catalogue's effect of that name.
+fn known(name: &str) -> Result<&'static Effect, SimError> {
+    effect_named(name).ok_or_else(|| SimError::UnknownEffect {
+        name: name.to_string(),
+        nearest: nearest(name, CATALOGUE.iter().map(|e| e.name)),
+    })
+}
+
+fn out_of_range(effect: &Effect, p: &EffectParameter, value: f64) -> SimError {
+    let allowed = p.allowed();
+    SimError::OutOfRange {
+        owner: effect.name.to_string(),
+        name: p.name.to_string(),
+        value,
+        min: *allowed.start(),
+        max: *allowed.end(),
+        unit: p.unit,
+    }
+}
+
+/// Names and values of a rig file's entry.
+fn given(entry: &EffectEntry) -> Vec<(&str, f64)> {
+    entry.parameters.iter().map(|(name, value)| (name.as_str(), *value)).collect()
+}
+
+/// Values in the effect's order from names and values; what is not given is in the catalogue's unit times `unit`.
+fn resolve(
+    effect: &Effect,
+    given: &[(&str, f64)],
+    unit: impl Fn(&EffectParameter) -> f64,
+) -> Result<Vec<f64>, SimError> {
+    let parameters = effect.parameters;
     if let Some((name, _)) =
         given.iter().find(|(name, _)| parameters.iter().all(|p| p.name != *name))
     {
         return Err(SimError::UnknownParameter {
-            owner: effect.name().to_string(),
+            owner: effect.name.to_string(),
             name: name.to_string(),
             nearest: nearest(name, parameters.iter().map(|p| p.name)),
         });
     }
     // One strength is enough where there are several (the rails of an amplifier): the others stay off.
-    let strengths = |p: &&crate::EffectParameter| p.off.is_some();
+    let strengths = |p: &&EffectParameter| p.off().is_some();
     let any =
         parameters.iter().filter(strengths).any(|p| given.iter().any(|(name, _)| *name == p.name));
     if let (false, Some(missing)) = (any, parameters.iter().find(strengths)) {
         return Err(SimError::MissingParameter {
-            owner: effect.name().to_string(),
+            owner: effect.name.to_string(),
             name: missing.name.to_string(),
         });
     }
@@ -239,7 +273,7 @@ fn resolve(effect: &dyn Effect, given: &[(&str, f64)]) -> Result<Vec<f64>, SimEr
                 .iter()
                 .rev()
                 .find(|(name, _)| *name == p.name)
-                .map_or(p.off.unwrap_or(p.typical), |(_, value)| *value)
+                .map_or_else(|| p.off().unwrap_or(p.typical) * unit(p), |(_, value)| *value)
         })
         .collect())
 }

@@ -1,36 +1,24 @@
 //! The sleeve slips on the muscle.
 
+use stretch_operators::Backlash;
+
 use crate::{
-    effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::Backlash,
+    effects::{Action, Effect, EffectParameter, Form, search::each},
     stage::Stage,
 };
 
 /// The sleeve slips on the muscle.
-#[derive(Debug)]
-pub(super) struct SleeveSlip;
-
-static PARAMETERS: &[EffectParameter] =
-    &[EffectParameter::strength("w", "strain", 0.0, 0.03, 0.008)];
-
-impl Effect for SleeveSlip {
-    fn name(&self) -> &'static str {
-        "sleeve_slip"
-    }
-
-    fn stage(&self) -> Stage {
-        Stage::Sensing
-    }
-
-    fn equation(&self) -> &'static str {
-        "e -> play(e, w)"
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        PARAMETERS
-    }
-
-    fn action(&self, values: &[f64], _around: &Surroundings<'_>) -> Action {
-        Action::Strain(Box::new(Backlash { w: values[0] }))
-    }
-}
+pub(super) static SLEEVE_SLIP: Effect = Effect {
+    name: "sleeve_slip",
+    words: "the sleeve slips on the muscle before it follows",
+    stage: Stage::Sensing,
+    equation: "e -> mean of play(e, w {1 - spread, 1, 1 + spread})",
+    parameters: &[
+        EffectParameter::strength("w", "strain", 0.0, 0.03, 0.008),
+        EffectParameter::form("spread", "1", 0.0, 0.95, Form { neutral: 0.0, usual: 0.3 }),
+    ],
+    action: |values, _| Action::Strain(Box::new(Backlash::soft(values[0], values[1]))),
+    twins: &["gauge_hysteresis", "pot_backlash"],
+    starts: Some(|_| each([0.0005, 0.002, 0.01])),
+    ..Effect::PLAIN
+};

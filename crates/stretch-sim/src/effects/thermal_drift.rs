@@ -1,48 +1,35 @@
 //! The gauge drifts while the session lasts.
 
+use stretch_operators::Drift;
+
 use crate::{
-    effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::{Operator, Span},
+    effects::{Action, Effect, EffectParameter, Form, search::each},
     stage::Stage,
 };
 
 /// The gauge drifts while the session lasts.
-#[derive(Debug)]
-pub(super) struct ThermalDrift;
-
-static PARAMETERS: &[EffectParameter] = &[EffectParameter::strength("d", "1/s", -4e-4, 4e-4, 5e-5)];
-
-impl Effect for ThermalDrift {
-    fn name(&self) -> &'static str {
-        "thermal_drift"
-    }
-
-    fn stage(&self) -> Stage {
-        Stage::Sensing
-    }
-
-    fn equation(&self) -> &'static str {
-        "R -> R (1 + d t), t since the session began"
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        PARAMETERS
-    }
-
-    fn action(&self, values: &[f64], _around: &Surroundings<'_>) -> Action {
-        Action::Resistance(Box::new(Drift { d: values[0] }))
-    }
-}
-
-#[derive(Debug)]
-struct Drift {
-    d: f64,
-}
-
-impl Operator for Drift {
-    fn run(&self, span: &Span<'_>, _cells: &mut [f64], signal: &mut [f64]) {
-        for (i, r) in signal.iter_mut().enumerate() {
-            *r *= 1.0 + self.d * (span.start_s + span.grid.time_s(span.first_node + i));
-        }
-    }
-}
+pub(super) static THERMAL_DRIFT: Effect = Effect {
+    name: "thermal_drift",
+    words: "the gauge drifts with time",
+    stage: Stage::Sensing,
+    equation: "R -> R (1 + d (1 - exp(-settle_per_s t))/settle_per_s), 1 + d t at 0; t since the session began",
+    parameters: &[
+        EffectParameter::strength("d", "1/s", -4e-4, 4e-4, 5e-5),
+        EffectParameter::form(
+            "settle_per_s",
+            "1/s",
+            5e-5,
+            1.0 / 150.0,
+            Form { neutral: 0.0, usual: 1.0 / 3e3 },
+        )
+        .log(),
+    ],
+    action: |values, _| {
+        Action::Resistance(Box::new(Drift { per_s: values[0], settle_per_s: values[1] }))
+    },
+    is_between_trials: true,
+    // It takes at most half of the signal's span away over the session.
+    alone: |alone, search| search.reach_from(0.5 / alone.session_s.max(1.0)),
+    starts: Some(|_| each([2e-5])),
+    ..Effect::PLAIN
+};

@@ -1,46 +1,39 @@
 //! The valves stay shut up to a least command.
 
+use stretch_operators::DeadBand;
+
 use crate::{
-    effects::{Action, Effect, EffectParameter, Surroundings},
-    operator::Law,
+    effects::{Action, Effect, EffectParameter, Form, search::each},
     stage::Stage,
 };
 
 /// The valves stay shut up to a least command.
-#[derive(Debug)]
-pub(super) struct ValveDeadband;
+pub(super) static VALVE_DEADBAND: Effect = Effect {
+    name: "valve_deadband",
+    words: "the valves stay shut at small openings",
+    stage: Stage::Pneumatics,
+    equation: "u -> max(0, (u - d(u))/(1 - d(1))), d(u) = u_db (1 - exp(-u/(u_db softness))) before u_eff; conductance times 1 - exp(-u/(u_db gate)); u_db times outlet at the outlet, times 2 - outlet at the inlet",
+    parameters: &[
+        EffectParameter::strength("u_db", "1", 0.0, 0.11, 0.03),
+        EffectParameter::form("softness", "1", 0.02, 1.5, Form { neutral: 0.0, usual: 0.1 }).log(),
+        EffectParameter::form("gate", "1", 0.001, 2.0, Form { neutral: 0.0, usual: 0.01 }).log(),
+        EffectParameter::form("outlet", "1", 0.0, 2.0, Form { neutral: 1.0, usual: 1.0 }),
+    ],
+    action: |values, around| {
+        let &[u_db, softness, gate, outlet] = values else { return Action::Nothing };
+        let least = around.least_opening;
+        let valve = |share: f64| DeadBand { u_db: share * u_db, softness, gate, least };
+        Action::Commands([Box::new(valve(2.0 - outlet)), Box::new(valve(outlet))])
+    },
+    starts: Some(|_| starts()),
+    ..Effect::PLAIN
+};
 
-static PARAMETERS: &[EffectParameter] = &[EffectParameter::strength("u_db", "1", 0.0, 0.11, 0.03)];
-
-impl Effect for ValveDeadband {
-    fn name(&self) -> &'static str {
-        "valve_deadband"
-    }
-
-    fn stage(&self) -> Stage {
-        Stage::Pneumatics
-    }
-
-    fn equation(&self) -> &'static str {
-        "u -> max(0, (u - u_db)/(1 - u_db)) before u_eff"
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        PARAMETERS
-    }
-
-    fn action(&self, values: &[f64], _around: &Surroundings<'_>) -> Action {
-        Action::Opening(Box::new(Deadband { u_db: values[0] }))
-    }
-}
-
-#[derive(Debug)]
-struct Deadband {
-    u_db: f64,
-}
-
-impl Law for Deadband {
-    fn at(&self, x: f64) -> f64 {
-        ((x - self.u_db) / (1.0 - self.u_db)).max(0.0)
-    }
+/// Hard and gradual bands, valves that differ, and a gate that lets the slowest ramp through as pulses.
+fn starts() -> Vec<Vec<f64>> {
+    let mut all = each([0.001, 0.01, 0.04]);
+    all.extend([0.02, 0.06].map(|u| vec![u, 1.0, 0.01, 1.0]));
+    all.extend([0.01, 0.03].map(|u| vec![u, 1.0, 0.01, 1.9]));
+    all.extend([0.005, 0.015].map(|u| vec![u, 0.5, 0.5, 1.0]));
+    all
 }

@@ -1,9 +1,9 @@
 //! Stage `actuation`: openings to pressure and length, both stages as one.
 
+use stretch_operators::{Grid, Start};
+
 use super::{Muscle, Openings, Pneumatics, check_length, pneumatics::Drive};
-use crate::{
-    SimError, effects::EffectSet, grid::Grid, memory::Memory, operator::Start, params::RigParams,
-};
+use crate::{SimError, effects::EffectSet, memory::Memory, params::RigParams};
 
 /// Valves, chamber and muscle, prepared: one after the other, or hand in hand where the chamber's volume follows the muscle.
 #[derive(Debug)]
@@ -18,10 +18,9 @@ impl Actuation {
     /// # Errors
     /// As the two stages.
     pub fn new(params: &RigParams, effects: &EffectSet, grid: &Grid) -> Result<Self, SimError> {
-        Ok(Self {
-            pneumatics: Pneumatics::new(params, effects, grid)?,
-            muscle: Muscle::at_cells(params, effects, grid, Pneumatics::CELLS)?,
-        })
+        let pneumatics = Pneumatics::new(params, effects, grid)?;
+        let muscle = Muscle::at_cells(params, effects, grid, pneumatics.end())?;
+        Ok(Self { pneumatics, muscle })
     }
 
     /// A memory for it.
@@ -83,10 +82,28 @@ impl Actuation {
             return Ok(());
         }
         let start = memory.start(start);
+        let taken = self.pneumatics.taken(memory, start, openings);
+        let openings = Openings::of(taken.as_ref(), openings);
         let cells = &mut memory.cells;
-        if self.is_coupled() {
-            return self.run_coupled(cells, start, openings, initial_kpa, pressure, length);
-        }
+        let done = if self.is_coupled() {
+            self.run_coupled(cells, start, openings, initial_kpa, pressure, length)
+        } else {
+            self.run_in_turn(cells, start, openings, initial_kpa, pressure, length)
+        };
+        memory.commands = taken.unwrap_or_default();
+        done
+    }
+
+    /// The pressure first, then the length that follows it.
+    fn run_in_turn(
+        &self,
+        cells: &mut [f64],
+        start: Start,
+        openings: Openings<'_>,
+        initial_kpa: f64,
+        pressure: &mut [f64],
+        length: &mut [f64],
+    ) -> Result<(), SimError> {
         let pneumatics = &self.pneumatics;
         let mut chamber = pneumatics.begin(start, initial_kpa, 1.0, cells)?;
         let mut drive = Drive::new(pneumatics, openings);
@@ -99,7 +116,7 @@ impl Actuation {
                 *p = pneumatics.pressure_kpa(chamber.held, 1.0);
             }
         }
-        pneumatics.end(&chamber, cells);
+        pneumatics.remember(&chamber, cells);
         length.copy_from_slice(pressure);
         self.muscle.run_nodes(cells, start, length);
         Ok(())
@@ -149,7 +166,7 @@ impl Actuation {
             pressure[node] = pneumatics.pressure_kpa(chamber.held, volume);
             length[node] = muscle.length_mm(k);
         }
-        pneumatics.end(&chamber, cells);
+        pneumatics.remember(&chamber, cells);
         Ok(())
     }
 }

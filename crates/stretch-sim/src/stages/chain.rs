@@ -1,9 +1,9 @@
 //! The whole rig: every stage on the outputs of the one before.
 
+use stretch_operators::{Grid, Start};
+
 use super::{Actuation, Openings, Reference, Sensing, check_length};
-use crate::{
-    SimError, effects::EffectSet, grid::Grid, memory::Memory, operator::Start, params::RigParams,
-};
+use crate::{SimError, effects::EffectSet, memory::Memory, params::RigParams};
 
 /// Caller's buffers for what the rig shows, one value a sample.
 #[derive(Debug)]

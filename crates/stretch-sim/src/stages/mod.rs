@@ -3,7 +3,6 @@
 mod actuation;
 mod chain;
 mod muscle;
-mod operators;
 mod pneumatics;
 mod reference;
 mod sensing;

@@ -1,12 +1,12 @@
 //! Stage `muscle`: chamber pressure to length.
 
-use super::{check_length, operators::Operators};
+use stretch_operators::{Grid, MeanReversion, Row, Span, Start};
+
+use super::check_length;
 use crate::{
     SimError,
     effects::{Action, EffectSet, Surroundings},
-    grid::Grid,
     memory::Memory,
-    operator::{MeanReversion, Span, Start},
     params::{Key, RigParams},
     stage::Stage,
     static_law::StaticLaw,
@@ -18,8 +18,8 @@ pub struct Muscle {
     grid: Grid,
     law: StaticLaw,
     lag: MeanReversion,
-    before: Operators,
-    behind: Operators,
+    before: Row,
+    behind: Row,
     rest_mm: f64,
     k_max: f64,
     offset: usize,
@@ -45,14 +45,14 @@ impl Muscle {
         let around = Surroundings::of_rig(params, grid);
         let (mut before, mut behind) = (Vec::new(), Vec::new());
         for active in effects.acting_in(Stage::Muscle) {
-            match active.effect().action(active.values(), &around) {
+            match (active.effect().action)(active.values(), &around) {
                 Action::StaticContraction(operator) => before.push(operator),
                 Action::MovingContraction(operator) => behind.push(operator),
                 _ => {}
             }
         }
-        let before = Operators::new(before, offset + MeanReversion::CELLS);
-        let behind = Operators::new(behind, before.end());
+        let before = Row::new(before, offset + MeanReversion::CELLS);
+        let behind = Row::new(behind, before.end());
         Ok(Self {
             grid: grid.clone(),
             law: StaticLaw::new(params),

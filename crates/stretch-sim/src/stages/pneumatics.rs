@@ -1,12 +1,13 @@
 //! Stage `pneumatics`: openings of the valves to chamber pressure.
 
+use stretch_operators::{Grid, Row, Span, Start};
+
 use super::check_length;
 use crate::{
     SimError,
     effects::{Action, EffectSet, Surroundings},
-    grid::Grid,
+    law::{Droop, Law},
     memory::Memory,
-    operator::{Droop, Law, Start},
     params::{Key, RigParams},
     stage::Stage,
 };
@@ -23,6 +24,13 @@ pub struct Openings<'a> {
     pub inlet: &'a [f64],
     /// Outlet, 0..1.
     pub outlet: &'a [f64],
+}
+
+impl<'a> Openings<'a> {
+    /// What the valves take of the commands, where that differs.
+    pub(crate) fn of(taken: Option<&'a [Vec<f64>; 2]>, commanded: Self) -> Self {
+        taken.map_or(commanded, |[inlet, outlet]| Self { inlet, outlet })
+    }
 }
 
 impl Openings<'_> {
@@ -59,9 +67,12 @@ pub struct Pneumatics {
     critical: f64,
     per_subsonic: f64,
     least: f64,
-    openings: Vec<Box<dyn Law>>,
+    /// What inlet and outlet make of their commands.
+    commands: [Row; 2],
     leaks: Vec<Box<dyn Law>>,
     volumes: Vec<Box<dyn Law>>,
+    /// The first effect that makes the volume follow the muscle.
+    coupled_by: Option<&'static str>,
     droops: Vec<Box<dyn Droop>>,
     length_zero_mm: f64,
     length_span_mm: f64,
@@ -82,7 +93,7 @@ pub(crate) struct Valves {
 }
 
 impl Pneumatics {
-    pub(crate) const CELLS: usize = 1 + MOST_DROOPS;
+    const CELLS: usize = 1 + MOST_DROOPS;
 
     /// Prepares the stage for trials on `grid`, which must come from [`EffectSet::grid`] with the same effects.
     ///
@@ -90,15 +101,22 @@ impl Pneumatics {
     /// More than two effects that draw on the supply, a grid made for another valve delay.
     pub fn new(params: &RigParams, effects: &EffectSet, grid: &Grid) -> Result<Self, SimError> {
         let around = Surroundings::of_rig(params, grid);
-        let [mut openings, mut leaks, mut volumes] = [const { Vec::new() }; 3];
+        let [mut leaks, mut volumes] = [const { Vec::new() }; 2];
+        let [mut inlet, mut outlet] = [const { Vec::new() }; 2];
         let mut droops: Vec<Box<dyn Droop>> = Vec::new();
-        let mut delay_s = 0.0;
+        let (mut delay_s, mut coupled_by) = (0.0, None);
         for active in effects.acting_in(Stage::Pneumatics) {
-            match active.effect().action(active.values(), &around) {
+            match (active.effect().action)(active.values(), &around) {
                 Action::Delay(seconds) => delay_s += seconds,
-                Action::Opening(law) => openings.push(law),
+                Action::Commands([of_inlet, of_outlet]) => {
+                    inlet.push(of_inlet);
+                    outlet.push(of_outlet);
+                }
                 Action::Leak(law) => leaks.push(law),
-                Action::Volume(law) => volumes.push(law),
+                Action::Volume(law) => {
+                    coupled_by = coupled_by.or(Some(active.name()));
+                    volumes.push(law);
+                }
                 Action::Droop(_) if droops.len() == MOST_DROOPS => {
                     return Err(SimError::NotHere {
                         name: active.name().to_string(),
@@ -112,6 +130,8 @@ impl Pneumatics {
         if delay_s != grid.delay_s() {
             return Err(SimError::GridDelay { expected: delay_s, found: grid.delay_s() });
         }
+        let inlet = Row::new(inlet, Self::CELLS);
+        let outlet = Row::new(outlet, inlet.end());
         let b = params[Key::B];
         Ok(Self {
             grid: grid.clone(),
@@ -122,9 +142,10 @@ impl Pneumatics {
             critical: b,
             per_subsonic: 1.0 / (1.0 - b),
             least: params[Key::UMin],
-            openings,
+            commands: [inlet, outlet],
             leaks,
             volumes,
+            coupled_by,
             droops,
             length_zero_mm: params[Key::L0],
             length_span_mm: -params[Key::L0] * params[Key::KMax],
@@ -133,7 +154,12 @@ impl Pneumatics {
 
     /// A memory for it.
     pub fn memory(&self) -> Memory {
-        Memory::with_cells(Self::CELLS)
+        Memory::with_cells(self.end())
+    }
+
+    /// First cell behind its own.
+    pub(crate) fn end(&self) -> usize {
+        self.commands[1].end()
     }
 
     /// Steps of time.
@@ -143,7 +169,7 @@ impl Pneumatics {
 
     /// Whether the pressure depends on the contraction.
     pub fn is_coupled(&self) -> bool {
-        !self.volumes.is_empty()
+        self.coupled_by.is_some()
     }
 
     /// Gauge pressure in kPa at every sample, from `initial_kpa` at the first.
@@ -159,11 +185,8 @@ impl Pneumatics {
         initial_kpa: f64,
         pressure_kpa: &mut [f64],
     ) -> Result<(), SimError> {
-        if self.is_coupled() {
-            return Err(SimError::NotHere {
-                name: "chamber_volume".into(),
-                needs: "the length of the muscle",
-            });
+        if let Some(name) = self.coupled_by {
+            return Err(SimError::NotHere { name: name.into(), needs: "the length of the muscle" });
         }
         self.run_sampled(memory, start, openings, None, initial_kpa, pressure_kpa)
     }
@@ -206,6 +229,8 @@ impl Pneumatics {
         };
         let mut volume = at(0, 0.0);
         let start = memory.start(start);
+        let taken = self.taken(memory, start, openings);
+        let openings = Openings::of(taken.as_ref(), openings);
         let mut chamber = self.begin(start, initial_kpa, volume, &mut memory.cells)?;
         pressure_kpa[0] = initial_kpa;
         let mut drive = Drive::new(self, openings);
@@ -220,7 +245,8 @@ impl Pneumatics {
             }
             pressure_kpa[sample + 1] = 1e-3 * (chamber.held / volume - self.atmosphere_pa);
         }
-        self.end(&chamber, &mut memory.cells);
+        self.remember(&chamber, &mut memory.cells);
+        memory.commands = taken.unwrap_or_default();
         Ok(())
     }
 
@@ -262,13 +288,36 @@ impl Pneumatics {
     }
 
     /// Remembers how a trial ended.
-    pub(crate) fn end(&self, chamber: &Chamber, cells: &mut [f64]) {
+    pub(crate) fn remember(&self, chamber: &Chamber, cells: &mut [f64]) {
         cells[0] = chamber.held;
         cells[1..=MOST_DROOPS].copy_from_slice(&chamber.droops);
     }
 
+    /// Openings as the valves take them, in buffers of the memory; none where nothing acts on the commands.
+    pub(crate) fn taken(
+        &self,
+        memory: &mut Memory,
+        start: Start,
+        openings: Openings<'_>,
+    ) -> Option<[Vec<f64>; 2]> {
+        let first = [openings.inlet.first()?, openings.outlet.first()?];
+        if self.commands.iter().all(Row::is_empty) {
+            return None;
+        }
+        let mut taken = std::mem::take(&mut memory.commands);
+        let span = Span::whole(&self.grid);
+        for (side, given) in [openings.inlet, openings.outlet].into_iter().enumerate() {
+            let (row, own) = (&self.commands[side], &mut taken[side]);
+            own.clear();
+            own.extend_from_slice(given);
+            row.begin_at(start, *first[side], &mut memory.cells);
+            row.run(&span, &mut memory.cells, own);
+        }
+        Some(taken)
+    }
+
     fn conductance(&self, side: usize, opening: f64) -> f64 {
-        let u = self.openings.iter().fold(opening, |u, law| law.at(u)).clamp(0.0, 1.0);
+        let u = opening.clamp(0.0, 1.0);
         if u > 0.0 { self.conductance[side] * (self.least + (1.0 - self.least) * u) } else { 0.0 }
     }
 

@@ -1,12 +1,12 @@
 //! Stage `reference`: true length to the length that the potentiometer shows.
 
-use super::{check_length, operators::Operators, sensing::pick};
+use stretch_operators::{Grid, Row, Span, Start};
+
+use super::{check_length, sensing::pick};
 use crate::{
     SimError,
     effects::{Action, EffectSet, Surroundings},
-    grid::Grid,
     memory::Memory,
-    operator::{Span, Start},
     params::RigParams,
     stage::Stage,
 };
@@ -15,7 +15,7 @@ use crate::{
 #[derive(Debug)]
 pub struct Reference {
     grid: Grid,
-    row: Operators,
+    row: Row,
 }
 
 impl Reference {
@@ -30,12 +30,12 @@ impl Reference {
     pub(crate) fn around(around: &Surroundings<'_>, effects: &EffectSet, grid: &Grid) -> Self {
         let row = effects
             .acting_in(Stage::Reference)
-            .filter_map(|active| match active.effect().action(active.values(), around) {
+            .filter_map(|active| match (active.effect().action)(active.values(), around) {
                 Action::Length(operator) => Some(operator),
                 _ => None,
             })
             .collect();
-        Self { grid: grid.clone(), row: Operators::new(row, 0) }
+        Self { grid: grid.clone(), row: Row::new(row, 0) }
     }
 
     /// A memory for it.

@@ -1,14 +1,13 @@
 //! Stage `sensing`: length to bridge voltage.
 
-use super::{check_length, operators::Operators};
+use stretch_operators::{Grid, Row, Skew, SkewSpec, Span, Start};
+
+use super::check_length;
 use crate::{
     SimError,
-    effects::{Action, ActiveEffect, EffectSet, Surroundings},
-    grid::Grid,
+    effects::{Action, ActiveEffect, EffectSet, Need, Surroundings},
     memory::Memory,
-    operator::{Span, Start},
     params::{Key, RigParams},
-    skew::Skew,
     stage::Stage,
 };
 
@@ -66,10 +65,10 @@ impl Bridge {
 pub struct Sensing {
     grid: Grid,
     bridge: Bridge,
-    strain: Operators,
-    resistance: Operators,
-    volts: Operators,
-    record: Operators,
+    strain: Row,
+    resistance: Row,
+    volts: Row,
+    record: Row,
     skew: Option<Skew>,
     needs_pressure: Option<&'static str>,
 }
@@ -92,7 +91,7 @@ impl Sensing {
             record: sites.record,
             needs_pressure: effects
                 .acting_in(Stage::Sensing)
-                .find(|e| e.effect().needs() == Some("a pressure"))
+                .find(|e| e.effect().needs == Some(Need::Pressure))
                 .map(|e| e.name()),
         })
     }
@@ -125,7 +124,10 @@ impl Sensing {
     ) -> Result<(), SimError> {
         check_length("length_mm", self.grid.nodes(bridge_v.len()), length_mm.len())?;
         if let (Some(name), true) = (self.needs_pressure, pressure_kpa.is_empty()) {
-            return Err(SimError::NotHere { name: name.to_string(), needs: "a pressure" });
+            return Err(SimError::NotHere {
+                name: name.to_string(),
+                needs: Need::Pressure.words(),
+            });
         }
         if !pressure_kpa.is_empty() {
             check_length("pressure_kpa", length_mm.len(), pressure_kpa.len())?;
@@ -212,14 +214,14 @@ pub(crate) fn pick(grid: &Grid, skew: Option<&Skew>, nodes: &[f64], samples: &mu
     }
 }
 
-/// Operators of a sensing chain by where they act, in the catalogue's order.
+/// Row of a sensing chain by where they act, in the catalogue's order.
 #[derive(Debug)]
 pub(crate) struct Sites {
-    pub(crate) strain: Operators,
-    pub(crate) resistance: Operators,
-    pub(crate) volts: Operators,
-    pub(crate) record: Operators,
-    skew_s: f64,
+    pub(crate) strain: Row,
+    pub(crate) resistance: Row,
+    pub(crate) volts: Row,
+    pub(crate) record: Row,
+    skew: SkewSpec,
 }
 
 impl Sites {
@@ -228,25 +230,28 @@ impl Sites {
         around: &Surroundings<'_>,
     ) -> Self {
         let [mut strain, mut resistance, mut volts, mut record] = [const { Vec::new() }; 4];
-        let mut skew_s = 0.0;
+        let mut skew = SkewSpec::default();
         for active in effects {
-            match active.effect().action(active.values(), around) {
+            match (active.effect().action)(active.values(), around) {
                 Action::Strain(operator) => strain.push(operator),
                 Action::Resistance(operator) => resistance.push(operator),
                 Action::Volts(operator) => volts.push(operator),
                 Action::Record(operator) => record.push(operator),
-                Action::Skew(seconds) => skew_s += seconds,
+                Action::Skew(own) => {
+                    skew.skew_s += own.skew_s;
+                    skew.rate += own.rate;
+                }
                 _ => {}
             }
         }
-        let strain = Operators::new(strain, 0);
-        let resistance = Operators::new(resistance, strain.end());
-        let volts = Operators::new(volts, resistance.end());
-        let record = Operators::new(record, volts.end());
-        Self { strain, resistance, volts, record, skew_s }
+        let strain = Row::new(strain, 0);
+        let resistance = Row::new(resistance, strain.end());
+        let volts = Row::new(volts, resistance.end());
+        let record = Row::new(record, volts.end());
+        Self { strain, resistance, volts, record, skew }
     }
 
     pub(crate) fn skew(&self, grid: &Grid) -> Option<Skew> {
-        (self.skew_s != 0.0).then(|| Skew::new(grid, self.skew_s))
+        (self.skew != SkewSpec::default()).then(|| Skew::new(grid, self.skew))
     }
 }

@@ -1,6 +1,25 @@
 //! The grid of time: equal pieces inside a sample, split where a delayed switch falls.
 
-use crate::SimError;
+use alloc::vec::Vec;
+use core::fmt;
+
+/// Why a grid was refused; carries the number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct GridError {
+    /// Which time.
+    pub name: &'static str,
+    /// Its value, s.
+    pub value: f64,
+}
+
+impl fmt::Display for GridError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} = {} must be finite and positive", self.name, self.value)
+    }
+}
+
+impl core::error::Error for GridError {}
 
 /// Longest step of integration, s, that the nominal rig and every effect of the catalogue allow:
 /// halving it moves no channel by more than 1e-4 of its full scale.
@@ -9,6 +28,17 @@ pub const DEFAULT_STEP_S: f64 = 0.0025;
 /// Steps of integration inside one sample of a uniformly sampled trial, the same in every sample.
 ///
 /// Node 0 is the first sample; sample i is node `i * pieces()`.
+///
+/// ```
+/// use stretch_operators::Grid;
+/// // A hundred samples a second, steps of at most 5 ms, commands that act 13.5 ms late.
+/// let grid = Grid::new(0.01, 0.005, 0.0135)?;
+/// assert_eq!(grid.pieces(), 3); // 3.5 ms, then twice 3.25 ms
+/// assert_eq!(grid.nodes(101), 301);
+/// assert_eq!(grid.command(10, 0), Some(8)); // the switch falls behind the first piece
+/// assert_eq!(grid.command(10, 1), Some(9));
+/// # Ok::<(), stretch_operators::GridError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
     dt_s: f64,
@@ -28,7 +58,7 @@ impl Grid {
     ///
     /// # Errors
     /// When the sample time is not finite and positive.
-    pub fn samples(dt_s: f64) -> Result<Self, SimError> {
+    pub fn samples(dt_s: f64) -> Result<Self, GridError> {
         Self::new(dt_s, f64::INFINITY, 0.0)
     }
 
@@ -36,19 +66,19 @@ impl Grid {
     ///
     /// # Errors
     /// When a time is not positive (or, for the delay, negative or not finite).
-    pub fn new(dt_s: f64, max_step_s: f64, delay_s: f64) -> Result<Self, SimError> {
+    pub fn new(dt_s: f64, max_step_s: f64, delay_s: f64) -> Result<Self, GridError> {
         if !(dt_s.is_finite() && dt_s > 0.0) {
-            return Err(SimError::NotPositive { name: "sample time", value: dt_s });
+            return Err(GridError { name: "sample time", value: dt_s });
         }
         // Below 1e-6 of a sample time a step resolves nothing and a sample would take for ever.
         if max_step_s.is_nan() || max_step_s < 1e-6 * dt_s {
-            return Err(SimError::NotPositive { name: "step of integration", value: max_step_s });
+            return Err(GridError { name: "step of integration", value: max_step_s });
         }
         if !(delay_s.is_finite() && delay_s >= 0.0) {
-            return Err(SimError::NotPositive { name: "delay", value: delay_s });
+            return Err(GridError { name: "delay", value: delay_s });
         }
         let samples = delay_s / dt_s;
-        let mut shift = samples.floor();
+        let mut shift = libm::floor(samples);
         let mut part = samples - shift;
         // A switch within a billionth of a border falls on it.
         if part > 1.0 - 1e-9 {
@@ -57,14 +87,15 @@ impl Grid {
         } else if part < 1e-9 {
             part = 0.0;
         }
-        let count = |length: f64| ((length / max_step_s) * (1.0 - 1e-12)).ceil().max(1.0) as usize;
+        let count =
+            |length: f64| libm::ceil((length / max_step_s) * (1.0 - 1e-12)).max(1.0) as usize;
         let mut steps = Vec::new();
         let first = part * dt_s;
         let late = if part > 0.0 { count(first) } else { 0 };
-        steps.extend(std::iter::repeat_n(first / late.max(1) as f64, late));
+        steps.extend(core::iter::repeat_n(first / late.max(1) as f64, late));
         let rest = dt_s - first;
         let pieces = count(rest);
-        steps.extend(std::iter::repeat_n(rest / pieces as f64, pieces));
+        steps.extend(core::iter::repeat_n(rest / pieces as f64, pieces));
         let mut at = 0.0;
         let offsets = steps
             .iter()
@@ -109,8 +140,8 @@ impl Grid {
         (node / pieces) as f64 * self.dt_s + self.offsets[node % pieces]
     }
 
-    /// Which sample's openings act in a piece after a sample; none before the trial's first.
-    pub(crate) fn command(&self, sample: usize, piece: usize) -> Option<usize> {
+    /// Which sample's command acts in a piece after a sample; none before the trial's first.
+    pub fn command(&self, sample: usize, piece: usize) -> Option<usize> {
         sample.checked_sub(self.shift.saturating_add(usize::from(piece < self.late)))
     }
 }

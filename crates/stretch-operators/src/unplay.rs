@@ -1,11 +1,13 @@
 //! The input of a backlash from its recorded output.
 
+use alloc::vec::Vec;
+
 /// Replaces the output of a backlash of half-width `w` by an input that would have made it.
 ///
 /// While the output moves, the input is w ahead of it. After each turn the output dwells at its extreme while
 /// the input crosses the play; there the input is unknown and is led over linearly. Turns and dwells are told with a
 /// band of w/10 (at least a millionth of the record's range): the record has to be smoother than that.
-pub(crate) fn undo(w: f64, signal: &mut [f64]) {
+pub(crate) fn unplay(w: f64, signal: &mut [f64]) {
     let (low, high) = signal.iter().fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(*x), b.max(*x)));
     let band = (0.1 * w).max(1e-6 * (high - low));
     if signal.is_empty() || band.is_nan() || band <= 0.0 {
@@ -35,7 +37,7 @@ struct Turn {
 
 /// Extremes between moves of more than `band`; the first stands at the record's start.
 fn turns(signal: &[f64], band: f64) -> Vec<Turn> {
-    let mut turns = vec![Turn { at: 0, direction: 0.0 }];
+    let mut turns = alloc::vec![Turn { at: 0, direction: 0.0 }];
     let mut extreme = 0;
     for (i, x) in signal.iter().enumerate() {
         let last = turns.len() - 1;
@@ -63,7 +65,7 @@ mod tests {
     #[test]
     fn finds_the_input_while_the_output_moves() {
         let w = 0.5;
-        let input: Vec<f64> = (0..2000).map(|i| 10.0 * (i as f64 * 0.01).sin()).collect();
+        let input: Vec<f64> = (0..2000).map(|i| 10.0 * libm::sin(i as f64 * 0.01)).collect();
         let mut z = input[0];
         let output: Vec<f64> = input
             .iter()
@@ -73,15 +75,16 @@ mod tests {
             })
             .collect();
         let mut found = output.clone();
-        undo(w, &mut found);
+        unplay(w, &mut found);
         let rms = |a: &[f64]| {
-            (a.iter().zip(&input).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / 2e3).sqrt()
+            let sum: f64 = a.iter().zip(&input).map(|(a, b)| (a - b) * (a - b)).sum();
+            libm::sqrt(sum / 2e3)
         };
         assert!(rms(&found) < 0.2 * rms(&output), "{} of {}", rms(&found), rms(&output));
         // Away from the turns it is exact.
         assert!((found[1000] - input[1000]).abs() < 1e-12);
-        let mut still = vec![3.0; 10];
-        undo(w, &mut still);
+        let mut still = [3.0; 10];
+        unplay(w, &mut still);
         assert_eq!(still, [3.0; 10]);
     }
 }

@@ -1,0 +1,114 @@
+//! What an operator is, and what it acts on.
+
+use core::fmt;
+
+use crate::grid::Grid;
+
+/// How an operator's memory begins a trial.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Start {
+    /// At rest at the first value, everything before forgotten.
+    Settled,
+    /// As the last trial left it: the input went straight to this trial's first value and stayed there for `rest_s`.
+    Carried {
+        /// Seconds of rest between the trials.
+        rest_s: f64,
+    },
+    /// Wound by a move that nobody recorded: +1 as if the input had come up to its first value from far
+    /// below, -1 from far above, 0 settled, anything between a share of that reach. What counts the whole session (the
+    /// travel of a gauge) goes on as when carried.
+    Wound(f64),
+}
+
+/// The stretch of signal that an operator acts on, and what else is known there.
+#[derive(Debug, Clone, Copy)]
+pub struct Span<'a> {
+    /// Steps of time.
+    pub grid: &'a Grid,
+    /// Node of the signal's first value; node 0 is emitted without advancing time.
+    pub first_node: usize,
+    /// Session time of node 0, s: since the gauge was powered and the sleeve first stretched.
+    pub start_s: f64,
+    /// Gauge pressure at the same nodes, kPa; empty when there is none.
+    pub pressure_kpa: &'a [f64],
+    /// Gauge strain at the same nodes, after the effects on it; empty where it is not yet known.
+    pub strain: &'a [f64],
+}
+
+impl<'a> Span<'a> {
+    /// From node 0 on, in a session that begins with it, without pressure or strain.
+    pub fn whole(grid: &'a Grid) -> Self {
+        Self { grid, first_node: 0, start_s: 0.0, pressure_kpa: &[], strain: &[] }
+    }
+}
+
+impl Span<'_> {
+    /// Calls `visit(step, i)` for every value: `step` is the index of the piece of time that leads to it, none at node 0.
+    #[inline]
+    pub fn each(&self, len: usize, mut visit: impl FnMut(Option<usize>, usize)) {
+        let mut i = 0;
+        if self.first_node == 0 && len > 0 {
+            visit(None, 0);
+            i = 1;
+        }
+        let pieces = self.grid.pieces();
+        if pieces == 1 {
+            while i < len {
+                visit(Some(0), i);
+                i += 1;
+            }
+            return;
+        }
+        let mut step = (self.first_node + i + pieces - 1) % pieces;
+        while i < len {
+            visit(Some(step), i);
+            step = if step + 1 == pieces { 0 } else { step + 1 };
+            i += 1;
+        }
+    }
+}
+
+/// Something that changes a signal in place, sample by sample, with a memory of `cells()` numbers.
+///
+/// The memory is the caller's: the operator itself never changes, so one serves many channels.
+///
+/// ```
+/// use stretch_operators::{Grid, Operator, Span, Start};
+///
+/// /// y = x - x before.
+/// #[derive(Debug)]
+/// struct Difference;
+/// impl Operator for Difference {
+///     fn cells(&self) -> usize {
+///         1
+///     }
+///     fn begin(&self, _: Start, first: f64, cells: &mut [f64]) {
+///         cells[0] = first;
+///     }
+///     fn run(&self, _: &Span<'_>, cells: &mut [f64], signal: &mut [f64]) {
+///         for x in signal {
+///             (*x, cells[0]) = (*x - cells[0], *x);
+///         }
+///     }
+/// }
+/// let (mut cells, mut signal) = ([0.0], [2.0, 5.0, 4.0]);
+/// Difference.begin(Start::Settled, signal[0], &mut cells);
+/// Difference.run(&Span::whole(&Grid::samples(0.01)?), &mut cells, &mut signal);
+/// assert_eq!(signal, [0.0, 3.0, -1.0]);
+/// # Ok::<(), stretch_operators::GridError>(())
+/// ```
+pub trait Operator: fmt::Debug + Send + Sync {
+    /// How many numbers it remembers.
+    fn cells(&self) -> usize {
+        0
+    }
+
+    /// Prepares the memory for a trial whose first input is `first`.
+    fn begin(&self, _start: Start, _first: f64, _cells: &mut [f64]) {}
+
+    /// Replaces every value of `signal` by what the operator makes of it.
+    fn run(&self, span: &Span<'_>, cells: &mut [f64], signal: &mut [f64]);
+
+    /// Replaces a recorded output by the input that made it, as far as that is possible; by default it leaves it alone.
+    fn undo(&self, _signal: &mut [f64]) {}
+}

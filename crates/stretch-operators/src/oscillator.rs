@@ -1,0 +1,91 @@
+//! A mass on a spring.
+
+use alloc::vec::Vec;
+
+use crate::{
+    grid::Grid,
+    operator::{Operator, Span, Start},
+};
+
+/// The numbers of an [`Oscillator`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Swing {
+    /// Time of a radian of the undamped swing, s: the natural frequency is 1/(2 pi m).
+    pub m: f64,
+    /// Damping ratio, below 1.
+    pub damping: f64,
+}
+
+/// A damped second-order oscillator driven at its foot: m^2 y'' = x - y - 2 damping m y', exact for an input that is
+/// linear between nodes. Remembers position, velocity and the last input.
+///
+/// ```
+/// use stretch_operators::{Grid, Operator, Oscillator, Span, Start, Swing};
+/// let grid = Grid::samples(0.001)?;
+/// let beam = Oscillator::new(Swing { m: 0.02, damping: 0.25 }, &grid);
+/// let (mut cells, mut signal) = ([0.0; 3], vec![1.0; 2000]);
+/// beam.begin(Start::Settled, 0.0, &mut cells);
+/// beam.run(&Span::whole(&grid), &mut cells, &mut signal);
+/// // A step overshoots by exp(-pi damping/sqrt(1 - damping^2)) = 44 %, then settles.
+/// let top = signal.iter().copied().fold(0.0, f64::max);
+/// assert!((top - 1.444).abs() < 2e-3 && (signal[1999] - 1.0).abs() < 1e-6);
+/// # Ok::<(), stretch_operators::GridError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Oscillator {
+    swing: Swing,
+    /// For each piece of time: its length, and how position and velocity about the steady response go on.
+    steps: Vec<(f64, [f64; 4])>,
+}
+
+impl Oscillator {
+    /// Of a natural frequency and a damping ratio on a grid.
+    pub fn new(swing: Swing, grid: &Grid) -> Self {
+        let Swing { m, damping } = swing;
+        let omega = libm::sqrt(1.0 - damping * damping) / m;
+        let one = |h: f64| {
+            let decay = libm::exp(-damping * h / m);
+            let (sin, cos) = (libm::sin(omega * h) / omega, libm::cos(omega * h));
+            let turn = [cos + damping / m * sin, sin, -sin / (m * m), cos - damping / m * sin];
+            (h, turn.map(|x| decay * x))
+        };
+        Self { swing, steps: grid.steps().iter().map(|&h| one(h)).collect() }
+    }
+}
+
+impl Operator for Oscillator {
+    fn cells(&self) -> usize {
+        3
+    }
+
+    fn begin(&self, start: Start, first: f64, cells: &mut [f64]) {
+        // A rest of 20 m leaves less than 1 % of a swing of damping 0.25; trials are further apart than that.
+        let at_rest = !matches!(start, Start::Carried { rest_s } if rest_s < 20.0 * self.swing.m);
+        if at_rest {
+            cells[0] = first;
+            cells[1] = 0.0;
+        }
+        cells[2] = first;
+    }
+
+    fn run(&self, span: &Span<'_>, cells: &mut [f64], signal: &mut [f64]) {
+        let Swing { m, damping } = self.swing;
+        let [mut y, mut velocity, mut last] = [cells[0], cells[1], cells[2]];
+        span.each(signal.len(), |step, i| {
+            let x = signal[i];
+            if let Some(step) = step {
+                let (h, [a, b, c, d]) = self.steps[step];
+                let slope = (x - last) / h;
+                // The steady response to a ramp trails it by 2 damping m slope.
+                let trail = 2.0 * damping * m * slope;
+                let position = y - (last - trail);
+                let relative = velocity - slope;
+                y = x - trail + (a * position + b * relative);
+                velocity = slope + (c * position + d * relative);
+            }
+            last = x;
+            signal[i] = y;
+        });
+        cells.copy_from_slice(&[y, velocity, last]);
+    }
+}

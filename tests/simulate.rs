@@ -133,12 +133,13 @@ fn wrong_input_is_named() {
 #[test]
 fn the_catalogue_is_listed() {
     let text = runs(stretch().arg("effects"));
-    for name in ["supply_sag", "gauge_softening", "pot_backlash"] {
+    for name in ["supply_sag", "gauge_softening", "pot_backlash", "form tail: 0 .. 2.5"] {
         assert!(text.contains(name), "{name}");
     }
     let json: serde_json::Value =
         serde_json::from_str(&runs(stretch().args(["effects", "--json"]))).unwrap();
     assert_eq!(json.as_array().unwrap().len(), 23);
     assert_eq!(json[0]["parameters"][0]["name"], "r");
+    assert_eq!(json[0]["parameters"][1]["role"], "form");
     fails(stretch().args(["effects", "lek"]), &["did you mean `leak`?"]);
 }

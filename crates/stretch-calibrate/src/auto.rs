@@ -1,5 +1,6 @@
 //! Which model to calibrate with, by errors on trials left out.
 
+use rayon::prelude::*;
 use serde::Serialize;
 use stretch_data::Trial;
 use stretch_metrics::lag;
@@ -141,8 +142,12 @@ pub fn choose_model(trials: &[Trial], options: &Options) -> Result<ModelChoice, 
     let folds = folds(trials);
     let mut found = Vec::new();
     let mut first_problem = None;
-    for kind in ModelKind::named() {
-        match judge(trials, &folds, &turning, options, kind) {
+    let judged: Vec<_> = ModelKind::named()
+        .into_par_iter()
+        .map(|kind| (kind, judge(trials, &folds, &turning, options, kind)))
+        .collect();
+    for (kind, outcome) in judged {
+        match outcome {
             Ok((parameters, errors)) => found.push((kind, parameters, Ok(errors))),
             Err(error) => {
                 found.push((kind, 0, Err(error.to_string())));

@@ -13,6 +13,8 @@ pub struct Course {
     e: Vec<f64>,
     /// Whether gauge blocks stand in for the reference.
     is_known: bool,
+    /// Share of the pressure's range, where one is applied.
+    pressure: Vec<f64>,
 }
 
 /// A course through points (e, seconds to get there), the first where it begins; eased where it turns.
@@ -27,7 +29,13 @@ fn course(points: &[(f64, f64)], dt_s: f64) -> Course {
             from + (to - from) * x * x * (3.0 - 2.0 * x)
         }));
     }
-    Course { e, is_known: false }
+    Course { pressure: vec![0.0; e.len()], e, is_known: false }
+}
+
+/// The gauge held in the middle while the pressure goes up and down.
+fn held_under_pressure(dt_s: f64) -> Course {
+    let swept = course(&[vec![(0.0, 0.0), (0.0, 1.0)], loops(0.0, 1.0, 4.0, 4)].concat(), dt_s);
+    Course { e: vec![0.5; swept.e.len()], is_known: true, pressure: swept.e }
 }
 
 /// Up and down between two levels, `times` times, `half_s` each way.
@@ -112,11 +120,41 @@ impl GaugeSimulator {
         let shown: Vec<f64> =
             course.e.iter().map(|e| self.spec.zero + self.spec.span * e).collect();
         let mut signal = vec![0.0; shown.len()];
-        let still = vec![0.0; if self.record.pressure.is_empty() { 0 } else { shown.len() }];
-        gauge.run(&mut gauge.memory(), Start::Settled, 0.0, &shown, &still, &mut signal)?;
+        // Without a pressure column there is no effect of it either.
+        let scale = self.spec.pressure_scale.filter(|_| !self.record.pressure.is_empty());
+        let pressure: Vec<f64> = match scale {
+            Some(scale) => course.pressure.iter().map(|share| share * scale).collect(),
+            None => Vec::new(),
+        };
+        gauge.run(&mut gauge.memory(), Start::Settled, 0.0, &shown, &pressure, &mut signal)?;
         let noise = self.noise.max(1e-6 * self.spread);
         signal.iter_mut().for_each(|y| *y /= noise);
         Ok(vec![signal])
+    }
+}
+
+impl GaugeSimulator {
+    /// What the gauge shows of a pressure while its length stands still.
+    fn pressure_sweep(&self) -> (Plan, Course) {
+        let course = held_under_pressure(self.record.dt_s);
+        let of = |values: &[f64], zero: f64, span: f64| -> Vec<f64> {
+            values.iter().map(|x| zero + span * x).collect()
+        };
+        let length = of(&course.e, self.spec.zero, self.spec.span);
+        let pressure = of(&course.pressure, 0.0, self.spec.pressure_scale.unwrap_or(0.0));
+        let channel = |name: String, values| Channel { name, values };
+        let trial = Trial {
+            name: "held_under_pressure".into(),
+            time_s: (0..course.e.len()).map(|i| i as f64 * self.record.dt_s).collect(),
+            channels: vec![
+                channel(format!("set_{}", self.reference), length),
+                channel("set_pressure_kpa".into(), pressure),
+            ],
+        };
+        let how =
+            "Hold the gauge at one length, with a block, while the pressure goes up and down.";
+        let name = trial.name.clone();
+        (Plan { name, how: how.into(), prepare_min: 3.0, trial }, course)
     }
 }
 
@@ -135,15 +173,19 @@ impl Laboratory for GaugeSimulator {
             };
             (Plan { name: name.into(), how: how.into(), prepare_min, trial }, course)
         };
-        dishes().into_iter().map(plan).collect()
+        let mut menu: Vec<(Plan, Course)> = dishes().into_iter().map(plan).collect();
+        if !self.record.pressure.is_empty() {
+            menu.push(self.pressure_sweep());
+        }
+        menu
     }
 
     /// The first minute of the record.
     fn done(&self) -> Course {
         let samples = ((60.0 / self.record.dt_s) as usize).min(self.inputs[0].values.len());
         let values = &self.inputs[0].values[..samples];
-        let e = values.iter().map(|x| (x - self.spec.zero) / self.spec.span).collect();
-        Course { e, is_known: false }
+        let e: Vec<f64> = values.iter().map(|x| (x - self.spec.zero) / self.spec.span).collect();
+        Course { pressure: vec![0.0; e.len()], e, is_known: false }
     }
 
     fn predict(&self, model: &Model, course: &Course) -> Result<Vec<Vec<f64>>, GapError> {

@@ -81,7 +81,7 @@ fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
         .max_by(|a, b| a.share.total_cmp(&b.share))
         .map_or_else(String::new, |s| format!("{} ({} of the gap)", s.stage, percent(s.share)));
     let fix = match d.verdict {
-        VerdictKind::Effect => format!("Add {}.", listed(&d.named)),
+        VerdictKind::Effect | VerdictKind::Partial => format!("Add {}.", listed(&d.named)),
         VerdictKind::Parameters => {
             let moved = moved(d);
             if moved.is_empty() {
@@ -94,7 +94,7 @@ fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
         VerdictKind::NoGap => "Nothing.".to_owned(),
     };
     let sure = match (d.verdict, best) {
-        (VerdictKind::Effect, Some(c)) => {
+        (VerdictKind::Effect | VerdictKind::Partial, Some(c)) => {
             let rivals: Vec<String> =
                 d.ambiguous.iter().filter(|n| !d.named.contains(n)).cloned().collect();
             let rest = if rivals.is_empty() {
@@ -110,7 +110,7 @@ fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
         _ => "What is left is within the noise floor on trials that were not fitted.".to_owned(),
     };
     let gain = match d.verdict {
-        VerdictKind::Effect => format!("{gain}{}", cheaper(d)),
+        VerdictKind::Effect | VerdictKind::Partial => format!("{gain}{}", cheaper(d)),
         VerdictKind::Unknown => format!("The best that the catalogue offers: {gain}"),
         VerdictKind::Parameters => "The whole gap closes by re-tuning.".to_owned(),
         VerdictKind::NoGap => "The simulator can be used as it is.".to_owned(),

@@ -5,20 +5,21 @@ use std::time::Instant;
 use crate::{
     baselines::baselines,
     candidates::{candidates, shifts, stage_gaps},
-    diagnosis::{Diagnosis, VerdictKind, Where},
+    diagnosis::{Candidate, Diagnosis, Unexplained, VerdictKind, Where},
     error::GapError,
     evidence::Evidence,
     judge::{Case, judge},
     localise,
+    naming::Naming,
     probability::covering_set,
     problem::Problem,
     sanity::Sanity,
     search::Search,
-    shares::shares,
+    shares::{peeled, shares},
     simulator::Simulator,
     thresholds::Thresholds,
     transfer::transfer,
-    words::tell,
+    words::{Answer, tell},
 };
 
 /// How to diagnose.
@@ -77,38 +78,51 @@ fn run(
     // Searched.
     let mut search = Search::new(&problem, thresholds, options.depth);
     let found = search.run(progress)?;
-    let shares = shares(&mut search.sets, &found.best)?;
+    let peeled = peeled(&mut search.sets, &found.best)?;
     // Gathered: from here on test trials are read.
     progress("test trials");
     let (evidence, weighed) = Evidence::gather(&problem, thresholds, &found)?;
     let candidates = candidates(&problem, &evidence, &weighed, seed)?;
+    let shares = shares(&problem, &evidence, &found.best, &peeled, thresholds.null_excess)?;
     let sanity = Sanity::of(&problem, &found.best, &evidence)?;
     progress("where the gap sits");
     let location = locate(&problem, &evidence, seed)?;
     // Judged.
     let first = candidates.first();
-    let case = Case { gap: evidence.gap, first, sanity: &sanity };
+    let case = Case { gap: evidence.gap, first, strongest: shares.first(), sanity: &sanity };
     let verdict = judge(case, thresholds);
-    let (named, transfer) = match (verdict.kind, first) {
-        (VerdictKind::Effect, Some(first)) => {
+    let (naming, transfer) = match verdict.kind {
+        VerdictKind::Effect | VerdictKind::Partial => {
             progress("what the gap costs a calibration");
-            (first.effects.clone(), transfer(runs, &evidence, seed)?)
+            let naming = Naming::of(&candidates, &shares, thresholds);
+            (naming, transfer(runs, &evidence, seed)?)
         }
-        _ => (Vec::new(), None),
+        _ => (Naming::default(), None),
+    };
+    let unexplained = match (verdict.kind, first) {
+        (VerdictKind::Partial, Some(first)) => Some(unexplained(simulator, &evidence, first, seed)),
+        _ => None,
     };
     let ambiguous = match verdict.kind {
-        VerdictKind::Effect | VerdictKind::Unknown => covering_set(&weighed, simulator),
+        VerdictKind::Effect | VerdictKind::Partial | VerdictKind::Unknown => {
+            covering_set(&weighed, simulator)
+        }
         VerdictKind::NoGap | VerdictKind::Parameters => Vec::new(),
     };
     let (runtime_s, simulations) = (begun.elapsed().as_secs_f64(), runs.count());
     let simpler = || baselines(&problem, &search.sets.tried, thresholds.null_excess);
     // Told.
-    let told = tell(&verdict, case, simulator, &evidence, &shares);
+    let answer = Answer { verdict: &verdict, naming: &naming, unexplained: unexplained.as_ref() };
+    let told = tell(answer, case, simulator, &evidence, &shares);
     let diagnosis = Diagnosis {
         schema: 1,
         verdict: verdict.kind,
         sentence: told.sentence,
-        named,
+        tied: naming.ties.iter().map(|(_, other)| other.clone()).collect(),
+        named: naming.named,
+        faint: naming.faint,
+        least_share: thresholds.least_share,
+        unexplained,
         ambiguous,
         shares,
         gap: evidence.gap,
@@ -125,11 +139,31 @@ fn run(
     Ok((diagnosis, evidence))
 }
 
+/// Slices that are told of what a partial answer leaves.
+const TOLD_SLICES: usize = 3;
+
+/// What the first candidate leaves of the held-out gap, and where it stands out.
+fn unexplained(
+    simulator: &dyn Simulator,
+    evidence: &Evidence,
+    first: &Candidate,
+    seed: u64,
+) -> Unexplained {
+    let stages = evidence.stages.iter().zip(simulator.stages());
+    let worst = stages.max_by(|a, b| a.0.excess_after.total_cmp(&b.0.excess_after));
+    let stage = worst.map_or(String::new(), |(_, spec)| spec.name.clone());
+    let mut loud = localise::slices(simulator, evidence, |s| &s.residual_after, seed);
+    loud.retain(|s| s.stands_out && s.stage == stage);
+    loud.sort_by(|a, b| b.excess.total_cmp(&a.excess));
+    let sits = loud.iter().take(TOLD_SLICES).map(|s| format!("{}: {}", s.by, s.slice)).collect();
+    Unexplained { share: 1.0 - first.closed, stage, sits }
+}
+
 /// Where the gap sits: by stage, by slices, and from end to end.
 fn locate(problem: &Problem<'_>, evidence: &Evidence, seed: u64) -> Result<Where, GapError> {
     Ok(Where {
         stages: stage_gaps(problem, evidence),
-        slices: localise::slices(problem.simulator(), evidence, seed),
+        slices: localise::slices(problem.simulator(), evidence, |s| &s.residual_retuned, seed),
         end_to_end: localise::end_to_end(&problem.compare.runs, evidence)?,
     })
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// The four answers.
+/// The answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum VerdictKind {
@@ -14,8 +14,21 @@ pub enum VerdictKind {
     Parameters,
     /// Effects of the catalogue are missing, and are named.
     Effect,
+    /// An effect of the catalogue is missing, is named, and leaves more than the mismatch of its form explains.
+    Partial,
     /// There is a gap that no effect of the catalogue explains.
     Unknown,
+}
+
+/// What the named effects leave of the gap.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Unexplained {
+    /// Share of the held-out gap.
+    pub share: f64,
+    /// Stage where most of it sits.
+    pub stage: String,
+    /// Slices of that stage where it stands out, the loudest first.
+    pub sits: Vec<String>,
 }
 
 /// A set of effects that was held against the data.
@@ -68,6 +81,10 @@ pub struct EffectShare {
     /// Share of the re-tuned nominal's gap that opens again when it is taken out, those that closed less than it gone
     /// before: the shares add up to what the set closes.
     pub closes: f64,
+    /// Greatest share of the gap of one stage that it closes, of those that have one: a stage with little noise must not hide
+    /// what is wrong in another.
+    #[serde(default)]
+    pub closes_of_stage: f64,
     /// Whether one of its parameters went to an end of its range: it then rather stands in for something else.
     pub at_bound: bool,
 }
@@ -224,13 +241,25 @@ pub struct Diagnosis {
     pub verdict: VerdictKind,
     /// The answer in one plain sentence.
     pub sentence: String,
-    /// Effects named, the strongest first; empty unless the verdict is `effect`.
+    /// Effects named, the strongest first; empty unless the verdict is `effect` or `partial`.
     pub named: Vec<String>,
+    /// Effects that these data cannot tell from one that is named.
+    #[serde(default)]
+    pub tied: Vec<String>,
+    /// Effects that were found but close less of the held-out gap than `least_share`.
+    #[serde(default)]
+    pub faint: Vec<String>,
+    /// Least share of the held-out gap that a name closes.
+    #[serde(default)]
+    pub least_share: f64,
+    /// What a partial answer leaves.
+    #[serde(default)]
+    pub unexplained: Option<Unexplained>,
     /// The 95 % set: effects that these data cannot tell apart.
     pub ambiguous: Vec<String>,
     /// Sets of effects, the most probable first.
     pub candidates: Vec<Candidate>,
-    /// What each effect of the best set closes, the strongest first; named or not.
+    /// What each effect of the best set closes of the held-out gap, the strongest first; named or not.
     #[serde(default)]
     pub shares: Vec<EffectShare>,
     /// How large the gap is.

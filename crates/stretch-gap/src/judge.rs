@@ -5,15 +5,16 @@
 //! | foreign | a channel's variance left exceeds what a missing effect leaves | `unknown` |
 //! | strained | parameters at their ends explain as much as the effects do | `unknown` |
 //! | effect | confirmed on the test trials, and g_left <= u + v g_retuned | `effect` |
+//! | mostly | the same but for what is left, and the strongest effect alone closes the share m of the held-out gap, off its bounds | `partial` |
 //! | unexplained | g_retuned > n, and g_left > u + v g_retuned | `unknown` |
 //! | parameters | g_raw > n | `parameters` |
 //! | else | | `no_gap` |
 //!
-//! with gaps g in floors, n = `null_excess`, u = `unknown_excess` and v = `unknown_share`: mismatch of form may leave a share of
-//! the gap in a rig that has the named effect. The first two overrule what the others say; that is kept as `seen`.
+//! with gaps g in floors, n = `null_excess`, u = `unknown_excess`, v = `unknown_share` and m = `partial_share`: mismatch of form may leave a
+//! share of the gap in a rig that has the named effect. A set that closes its part by halves stands in for something else. The first two overrule what the others say; that is kept as `seen`.
 
 use crate::{
-    diagnosis::{Candidate, Excess, VerdictKind},
+    diagnosis::{Candidate, EffectShare, Excess, VerdictKind},
     sanity::{Sanity, Strained},
     thresholds::Thresholds,
 };
@@ -24,6 +25,8 @@ pub(crate) struct Case<'a> {
     pub(crate) gap: Excess,
     /// The most probable candidate; it has no effects where none was worth it.
     pub(crate) first: Option<&'a Candidate>,
+    /// What the strongest effect of the best set does, if there is one.
+    pub(crate) strongest: Option<&'a EffectShare>,
     pub(crate) sanity: &'a Sanity,
 }
 
@@ -61,6 +64,8 @@ fn seen(case: Case<'_>, thresholds: &Thresholds) -> VerdictKind {
         case.first.is_some_and(|c| !c.effects.is_empty() && c.is_confirmed && c.closed > 0.0);
     if is_confirmed && left <= left_allowed {
         VerdictKind::Effect
+    } else if is_confirmed && case.strongest.is_some_and(|s| is_mostly(s, thresholds)) {
+        VerdictKind::Partial
     } else if retuned > thresholds.null_excess && left > left_allowed {
         VerdictKind::Unknown
     } else if raw > thresholds.null_excess {
@@ -68,6 +73,10 @@ fn seen(case: Case<'_>, thresholds: &Thresholds) -> VerdictKind {
     } else {
         VerdictKind::NoGap
     }
+}
+
+fn is_mostly(strongest: &EffectShare, thresholds: &Thresholds) -> bool {
+    strongest.closes >= thresholds.partial_share && !strongest.at_bound
 }
 
 /// The channel that the simulator has least to do with, if any.
@@ -115,7 +124,7 @@ mod tests {
     /// Every row of the module's table.
     #[test]
     fn each_row_has_its_verdict() {
-        use VerdictKind::{Effect, NoGap, Parameters, Unknown};
+        use VerdictKind::{Effect, NoGap, Parameters, Partial, Unknown};
         let (sound, named) =
             (Sanity { left: vec![0.0], allowed: 0.1, strained: None }, candidate(&["play"], true));
         let (chance, none) = (candidate(&["play"], false), candidate(&[], true));
@@ -129,9 +138,25 @@ mod tests {
             (gap(0.01, 0.1, 0.05), &chance, NoGap),
         ];
         for (gap, first, expected) in cases {
-            let case = Case { gap, first: Some(first), sanity: &sound };
+            let case = Case { gap, first: Some(first), strongest: None, sanity: &sound };
             let verdict = judge(case, &Thresholds::frozen());
             assert_eq!((verdict.kind, verdict.seen), (expected, expected), "{gap:?}");
+        }
+        let share = |closes, at_bound| EffectShare {
+            effect: "play".into(),
+            closes,
+            closes_of_stage: closes,
+            at_bound,
+        };
+        for (strongest, expected) in [
+            (share(0.7, false), Partial),
+            (share(0.7, true), Unknown),
+            (share(0.4, false), Unknown),
+        ] {
+            let gap = gap(20.0, 10.0, 3.0);
+            let case =
+                Case { gap, first: Some(&named), strongest: Some(&strongest), sanity: &sound };
+            assert_eq!(judge(case, &Thresholds::frozen()).kind, expected, "{strongest:?}");
         }
     }
 
@@ -142,7 +167,7 @@ mod tests {
         let judged = |left: f64, strained| {
             let sanity = Sanity { left: vec![0.0, left], allowed: 0.1, strained };
             let gap = gap(20.0, 10.0, 0.1);
-            let case = Case { gap, first: Some(&first), sanity: &sanity };
+            let case = Case { gap, first: Some(&first), strongest: None, sanity: &sanity };
             judge(case, &Thresholds::frozen())
         };
         let foreign = judged(0.5, None);

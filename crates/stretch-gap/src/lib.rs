@@ -20,6 +20,7 @@ mod judge;
 mod linear;
 mod localise;
 mod metric;
+mod naming;
 mod next_experiment;
 mod nuisance;
 mod probability;
@@ -42,7 +43,8 @@ pub use description::{Description, DescriptionError, DescriptionSpec};
 pub use diagnose::{Options, diagnose};
 pub use diagnosis::{
     Baselines, Candidate, Diagnosis, EffectShare, EffectValue, Excess, NextExperiment,
-    ParameterShift, SliceGap, StageGap, StageShare, Transfer, TransferError, VerdictKind, Where,
+    ParameterShift, SliceGap, StageGap, StageShare, Transfer, TransferError, Unexplained,
+    VerdictKind, Where,
 };
 pub use dice::Dice;
 pub use error::GapError;

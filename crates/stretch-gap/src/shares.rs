@@ -1,16 +1,26 @@
 //! What each effect of the best set closes, so that an answer without a name still says what is known.
 //!
 //! Effects overlap: what each closes alone adds up to more than the whole. Taken out from the weakest to the strongest, with the rest
-//! fitted anew each time, their shares (gap without - gap with)/gap of the nominal telescope to what the set closes.
+//! fitted anew each time, their shares (gap without - gap with)/gap of the nominal telescope to what the set closes. Gaps are those of
+//! the test trials: what is fitted can close anything.
 
 use crate::{
-    diagnosis::EffectShare, error::GapError, hypothesis::Hypothesis, sets::Sets, spec::EffectSpec,
+    diagnosis::EffectShare,
+    error::GapError,
+    evidence::{Evidence, Traces},
+    hypothesis::Hypothesis,
+    problem::Problem,
+    score::{gap, mean_square},
+    sets::Sets,
+    spec::EffectSpec,
 };
 
-/// Takes one effect after the other out of the best set, the weakest first, the rest fitted anew.
-pub(crate) fn shares(sets: &mut Sets<'_>, best: &Hypothesis) -> Result<Vec<EffectShare>, GapError> {
+/// The best set with its effects taken out one after the other, the weakest first: the effect, and what is left without it.
+pub(crate) fn peeled(
+    sets: &mut Sets<'_>,
+    best: &Hypothesis,
+) -> Result<Vec<(usize, Hypothesis)>, GapError> {
     let problem = sets.problem;
-    let whole = problem.gap(&problem.nominal);
     let (mut set, mut out) = (best.clone(), Vec::new());
     while !set.effects.is_empty() {
         let mut weakest: Option<(usize, Hypothesis)> = None;
@@ -21,11 +31,40 @@ pub(crate) fn shares(sets: &mut Sets<'_>, best: &Hypothesis) -> Result<Vec<Effec
             }
         }
         let Some((effect, less)) = weakest else { break };
-        let closes = (problem.gap(&less) - problem.gap(&set)) / whole.max(f64::MIN_POSITIVE);
-        let spec = &problem.simulator().effects()[effect];
-        let at_bound = best.model.effect(effect).is_some_and(|values| is_at_bound(spec, values));
-        out.push(EffectShare { effect: spec.name.clone(), closes, at_bound });
+        out.push((effect, less.clone()));
         set = less;
+    }
+    Ok(out)
+}
+
+/// What each effect closes of the held-out gap, the strongest first. Stages whose gap is below `least_gap` have none.
+pub(crate) fn shares(
+    problem: &Problem<'_>,
+    evidence: &Evidence,
+    best: &Hypothesis,
+    peeled: &[(usize, Hypothesis)],
+    least_gap: f64,
+) -> Result<Vec<EffectShare>, GapError> {
+    let nominal: Vec<f64> = evidence.nominal_blocks.iter().map(|b| gap(mean_square(b))).collect();
+    let whole = nominal.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+    let mut with: Vec<f64> = evidence.stages.iter().map(|s| s.excess_after.max(0.0)).collect();
+    let mut out = Vec::new();
+    for (effect, less) in peeled {
+        let stages = 0..nominal.len();
+        let without: Result<Vec<f64>, GapError> = stages
+            .map(|s| Ok(gap(mean_square(&Traces::of(problem, s, &less.model)?.blocks))))
+            .collect();
+        let without = without?;
+        let closed = without.iter().zip(&with).map(|(without, with)| without - with);
+        let of_stages = closed.clone().zip(&nominal).filter(|(_, whole)| **whole >= least_gap);
+        let spec = &problem.simulator().effects()[*effect];
+        out.push(EffectShare {
+            effect: spec.name.clone(),
+            closes: closed.sum::<f64>() / whole,
+            closes_of_stage: of_stages.map(|(closed, whole)| closed / whole).fold(0.0, f64::max),
+            at_bound: best.model.effect(*effect).is_some_and(|values| is_at_bound(spec, values)),
+        });
+        with = without;
     }
     out.reverse();
     Ok(out)

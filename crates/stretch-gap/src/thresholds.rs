@@ -24,6 +24,10 @@ pub struct Thresholds {
     pub unknown_excess: f64,
     /// Share of the excess that mismatch of form may leave.
     pub unknown_share: f64,
+    /// Least share of the held-out gap that a name in the headline closes.
+    pub least_share: f64,
+    /// Share of the held-out gap that one effect closes at least where it is named though more is left than its form explains.
+    pub partial_share: f64,
 }
 
 impl Thresholds {

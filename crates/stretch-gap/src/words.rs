@@ -1,9 +1,10 @@
 //! The answer in words, made from the verdict when nothing can change any more.
 
 use crate::{
-    diagnosis::{EffectShare, VerdictKind},
+    diagnosis::{EffectShare, Unexplained, VerdictKind},
     evidence::Evidence,
     judge::{Case, Overruled, Verdict},
+    naming::Naming,
     simulator::Simulator,
 };
 
@@ -16,9 +17,17 @@ pub(crate) struct Told {
     pub(crate) notes: Vec<String>,
 }
 
+/// The verdict with its names, and what a partial one leaves.
+#[derive(Clone, Copy)]
+pub(crate) struct Answer<'a> {
+    pub(crate) verdict: &'a Verdict,
+    pub(crate) naming: &'a Naming,
+    pub(crate) unexplained: Option<&'a Unexplained>,
+}
+
 /// Tells a verdict.
 pub(crate) fn tell(
-    verdict: &Verdict,
+    answer: Answer<'_>,
     case: Case<'_>,
     simulator: &dyn Simulator,
     evidence: &Evidence,
@@ -30,8 +39,8 @@ pub(crate) fn tell(
             "there is no test trial: the last quarter of every trial is held back and tested on";
         notes.push(held.into());
     }
-    let seen = seen(verdict.seen, case, simulator, evidence, shares);
-    let sentence = match &verdict.overruled {
+    let seen = seen(answer, case, simulator, evidence, shares);
+    let sentence = match &answer.verdict.overruled {
         None => seen,
         Some(overruled) => {
             notes.push(format!("before that was seen: {seen}"));
@@ -42,24 +51,33 @@ pub(crate) fn tell(
 }
 
 fn seen(
-    kind: VerdictKind,
+    answer: Answer<'_>,
     case: Case<'_>,
     simulator: &dyn Simulator,
     evidence: &Evidence,
     shares: &[EffectShare],
 ) -> String {
     let gap = case.gap;
-    match (kind, case.first) {
-        (VerdictKind::Effect, Some(first)) => format!(
-            "The simulator lacks {}: {} {:.0} % of the gap ({:.0} to {:.0} %) on trials that were not fitted; probability {:.2}.",
-            first.effects.join(" and "),
-            if first.effects.len() > 1 { "together they close" } else { "it closes" },
-            100.0 * first.closed,
-            100.0 * first.closed_ci[0],
-            100.0 * first.closed_ci[1],
-            first.probability
-        ),
-        (VerdictKind::Effect | VerdictKind::Unknown, _) => {
+    let naming = answer.naming;
+    match (answer.verdict.seen, case.first) {
+        (VerdictKind::Effect, Some(first)) => {
+            // Overruled, nothing was named: what was seen is told as it stood.
+            let names = match naming.named.is_empty() {
+                true => first.effects.clone(),
+                false => naming.alternatives(),
+            };
+            format!(
+                "The simulator lacks {}: {} {:.0} % of the gap ({:.0} to {:.0} %) on trials that were not fitted; probability {:.2}.",
+                names.join(" and "),
+                if names.len() > 1 { "together they close" } else { "it closes" },
+                100.0 * first.closed,
+                100.0 * first.closed_ci[0],
+                100.0 * first.closed_ci[1],
+                first.probability
+            ) + &beside(naming)
+        }
+        (VerdictKind::Partial, Some(_)) => partial(answer, shares) + &beside(naming),
+        (VerdictKind::Effect | VerdictKind::Partial | VerdictKind::Unknown, _) => {
             let all = evidence.stages.iter().zip(simulator.stages());
             let worst = all.max_by(|a, b| a.0.excess_after.total_cmp(&b.0.excess_after));
             let best = evidence.best_effect.map(|e| simulator.effects()[e].name.as_str());
@@ -79,6 +97,36 @@ fn seen(
     }
 }
 
+/// Mostly this, and so much else.
+fn partial(answer: Answer<'_>, shares: &[EffectShare]) -> String {
+    let closes = |name: &String| {
+        let share = shares.iter().find(|s| s.effect == *name).map(|s| 100.0 * s.closes);
+        share.map_or(String::new(), |s| format!(" ({s:.0} %)"))
+    };
+    let pairs = answer.naming.named.iter().zip(answer.naming.alternatives());
+    let names: Vec<String> = pairs.map(|(name, told)| told + &closes(name)).collect();
+    let rest = answer.unexplained.map_or(String::new(), |u| {
+        let sits = match u.sits.is_empty() {
+            true => String::new(),
+            false => format!(", most of it at {}", u.sits.join("; ")),
+        };
+        format!("{:.0} % are not explained: they sit in {}{sits}.", 100.0 * u.share, u.stage)
+    });
+    format!("Mostly {} of the gap on trials that were not fitted. {rest}", names.join(", "))
+}
+
+/// Ties and what is faint, behind the headline.
+fn beside(naming: &Naming) -> String {
+    let mut out = String::new();
+    if !naming.ties.is_empty() {
+        out += " These data cannot tell which.";
+    }
+    if !naming.faint.is_empty() {
+        out += &format!(" Also seen, faint: {}.", naming.faint.join(", "));
+    }
+    out
+}
+
 /// Which effects close parts of a gap that no set of them explains.
 fn parts(shares: &[EffectShare]) -> String {
     let told = shares.iter().filter(|s| s.closes >= TOLD).map(|s| {
@@ -90,7 +138,7 @@ fn parts(shares: &[EffectShare]) -> String {
     match told.is_empty() {
         true => String::new(),
         false => format!(
-            " Parts of it close: {} ({:.0} % together, on trials that were fitted).",
+            " Parts of it close: {} ({:.0} % together, on trials that were not fitted).",
             told.join(", "),
             100.0 * all
         ),

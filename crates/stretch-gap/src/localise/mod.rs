@@ -8,7 +8,7 @@ mod excess;
 use crate::{
     diagnosis::{SliceGap, StageShare},
     error::GapError,
-    evidence::Evidence,
+    evidence::{Evidence, StageEvidence},
     runs::Runs,
     simulator::Simulator,
 };
@@ -22,13 +22,18 @@ use excess::{Cells, Sliced};
 /// 0.5 s (over windows for frequency bands). A slice stands out when its excess is above 0 and above that of the
 /// rest of the stage, after Benjamini and Hochberg's correction (doi 10.1111/j.2517-6161.1995.tb02031.x) over
 /// all slices.
-pub(crate) fn slices(simulator: &dyn Simulator, evidence: &Evidence, seed: u64) -> Vec<SliceGap> {
+pub(crate) fn slices(
+    simulator: &dyn Simulator,
+    evidence: &Evidence,
+    of: fn(&StageEvidence) -> &[f64],
+    seed: u64,
+) -> Vec<SliceGap> {
     let course = Course::of(simulator, &evidence.frame);
     let axes = Axis::all(&course, simulator, &evidence.frame);
     let mut found: Vec<(SliceGap, f64)> = Vec::new();
     for (stage, traces) in evidence.stages.iter().enumerate() {
         let name = &simulator.stages()[stage].name;
-        let residual = &traces.residual_retuned;
+        let residual = of(traces);
         let mut cut: Vec<(&str, Vec<String>, Cells)> = axes
             .iter()
             .map(|a| (a.by, a.labels.clone(), Cells::of_samples(&evidence.frame, residual, a)))

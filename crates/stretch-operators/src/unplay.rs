@@ -60,7 +60,7 @@ fn turns(signal: &[f64], band: f64) -> Vec<Turn> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::play;
+    use stretch_core::play;
 
     #[test]
     fn finds_the_input_while_the_output_moves() {

@@ -116,12 +116,11 @@ pub const EFFECTIVE_SIZE: f64 = 0.1;
 /// its diagonal, whose condition of 1e13 magnifies roundings of 1e-16.
 pub const TWINS: f64 = 1e-2;
 
-/// Of a gain of 0.9 V/range that was 0.08 off, found by a diagnosis: 2 mV of noise on two minutes
-/// of record leave 1e-4; most of it is what the prior of 0.05 of it pulls back and what the form
-/// of a sound gauge's noise may move.
+/// Of a gain of -0.9 over the range, found by a diagnosis that was told -0.82: noise of 2e-3 at 12 000
+/// samples of spread 0.35 leaves 5e-5; the rest is for the reference, which is smoothed, and the prior.
 pub const GAIN_FOUND: f64 = 2e-3;
 
-/// Seconds: a skew found by a diagnosis, a fifth of a sample of 10 ms; noise leaves less.
+/// Seconds: a skew found by a diagnosis; a fifth of a sample of 10 ms.
 pub const SKEW_FOUND_S: f64 = 2e-3;
 
 /// Seconds: a time constant of 30 ms found by a diagnosis, a fifth of a sample of 10 ms.
@@ -279,19 +278,19 @@ pub const BLIND_ROWS: f64 = 0.15;
 /// Of curves of size near 1, through a table or a spline: some hundred roundings at most.
 pub const BLIND_CURVE: f64 = 1e-12;
 
-/// Relative: a slope by differences of a table of knots some 1e-3 apart, which lose three digits more.
-pub const BLIND_SLOPE: f64 = 1e-9;
+/// Relative: a slope by differences in a table of 240 intervals of values up to 2: 240 times a rounding or two, and ten times that.
+pub const BLIND_SLOPE: f64 = 1e-11;
 
-/// Of a law from 0 to 1: where it starts, scaled by a number that may be small.
+/// Of a law from 0 to 1: where it starts, a table's first knot less what it is scaled from.
 pub const BLIND_LAW_START: f64 = 1e-9;
 
-/// Relative: where it ends, by a quadrature or a search that stops there.
-pub const BLIND_LAW_END: f64 = 1e-6;
+/// Relative: where it ends, a table of 240 intervals, scaled to end at 1.
+pub const BLIND_LAW_END: f64 = 1e-9;
 
 /// Share of the reference pressure: a linear table of 4096 knots, h^2 x''/8.
 pub const BLIND_LAW_TABLE: f64 = 1e-6;
 
-/// Of unknowns near 1: coordinates in turn stop once no one moves by more.
+/// Of unknowns near 1: the descent stops once none moves by 1e-7; ten times that.
 pub const BOUNDED_SQUARES: f64 = 1e-6;
 
 /// Seconds: a delay of 0.05 s by a sum over steps of 0.1 ms, two of them.
@@ -333,7 +332,7 @@ pub const BLIND_WOUND: f64 = 0.2;
 /// Relative: what a steady load has still to draw down after 40 s.
 pub const BLIND_DRAWN: f64 = 0.01;
 
-/// Of an opening up to 1: a dead band at its end, whose soft shapes leave an exponential's tail.
+/// Of an opening up to 1, far beyond a dead band: the end of its law, [`BLIND_LAW_END`].
 pub const BLIND_BAND: f64 = 1e-9;
 
 /// Of an opening: what a dead band of 1e-9 may take, up to ten times itself.

@@ -8,8 +8,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use approx::assert_abs_diff_eq;
 use serde_json::Value;
 use support::{Scratch, fails, runs, stretch};
+use testkit::tolerance::SKEW_FOUND_S;
 
 /// A little noise that comes out the same everywhere.
 fn noise(i: usize) -> f64 {
@@ -74,7 +76,7 @@ fn a_gauge_is_told_by_columns_rig_file_or_missing_openings() {
     let d: Value = serde_json::from_str(&fs::read_to_string(&json).unwrap()).unwrap();
     assert_eq!((d["verdict"].as_str(), &d["named"][0]), (Some("effect"), &"channel_skew".into()));
     let skew = d["candidates"][0]["parameters"]["skew_s"].as_f64().unwrap();
-    assert!((skew - 0.12).abs() < 2e-3, "{skew}");
+    assert_abs_diff_eq!(skew, 0.12, epsilon = SKEW_FOUND_S);
     assert_eq!(d["shares"][0]["effect"], "channel_skew");
     let page = fs::read_to_string(page).unwrap();
     assert!(page.contains("channel_skew") && page.contains("deg") && !page.contains("NaN"));

@@ -7,17 +7,16 @@ use std::{
         Mutex,
         atomic::{AtomicUsize, Ordering::SeqCst},
     },
-    time::Duration,
 };
 
 use anyhow::{Context, bail, ensure};
-use indicatif::{ProgressBar, ProgressStyle};
-use stretch_blind::{Clutter, Family, Plan, Protocol, Seal, Verdict, make};
+use stretch_blind::{Clutter, Family, Plan, Protocol, make};
 
 use super::{
+    blind_answers::{ANSWER, cases},
     blind_room::Room,
     blind_score,
-    shared::{say, write_text},
+    shared::{say, steps, write_text},
     stop,
 };
 
@@ -147,8 +146,6 @@ struct ScoreArgs {
     no_oracle: bool,
 }
 
-/// The answer in a case's folder.
-const ANSWER: &str = "diagnosis.json";
 /// Why there is none.
 const REFUSAL: &str = "refusal.txt";
 /// What the diagnosis is told beside the data.
@@ -183,22 +180,6 @@ fn make_cases(args: &MakeArgs) -> anyhow::Result<()> {
         args.out.display(),
         seal.sha256()
     ))
-}
-
-/// Folders of the cases, in order.
-pub(super) fn cases(folder: &Path) -> anyhow::Result<Vec<(String, PathBuf)>> {
-    let entries = fs::read_dir(folder).with_context(|| folder.display().to_string())?;
-    let mut cases = Vec::new();
-    for entry in entries {
-        let path = entry?.path();
-        let name = path.file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned());
-        if path.join("dataset.toml").is_file() {
-            cases.push((name, path));
-        }
-    }
-    ensure!(!cases.is_empty(), "{}: there is no case in it", folder.display());
-    cases.sort();
-    Ok(cases)
 }
 
 /// Diagnoses every case that has no answer yet.
@@ -291,38 +272,4 @@ fn struck(case: &Path) -> anyhow::Result<Vec<String>> {
 struct Hint {
     #[serde(default)]
     without: Vec<String>,
-}
-
-/// The answers, with the labels' seal unbroken, and the refusals by case.
-pub(super) fn answers(folder: &Path) -> anyhow::Result<Answers> {
-    let (seal, truth) = Seal::open(folder)?;
-    let mut answers = Answers { seal, truth, verdicts: Vec::new() };
-    for (name, path) in cases(folder)? {
-        let file = path.join(ANSWER);
-        if let Ok(text) = fs::read_to_string(&file) {
-            let raw: serde_json::Value =
-                serde_json::from_str(&text).with_context(|| file.display().to_string())?;
-            answers.verdicts.push(Verdict::from_diagnosis(&name, &raw)?);
-        }
-    }
-    Ok(answers)
-}
-
-/// What is scored.
-pub(super) struct Answers {
-    pub(super) seal: Seal,
-    pub(super) truth: stretch_blind::Truth,
-    pub(super) verdicts: Vec<Verdict>,
-}
-
-/// A progress bar that says how long it will still take.
-pub(super) fn steps(what: &'static str, count: usize) -> ProgressBar {
-    let bar = ProgressBar::new(count as u64).with_message(what);
-    let template = "{msg} [{bar:30}] {pos}/{len}, {elapsed} gone, {eta} to go";
-    // the template is a constant: were it wrong, the plain bar is shown
-    if let Ok(style) = ProgressStyle::with_template(template) {
-        bar.set_style(style);
-    }
-    bar.enable_steady_tick(Duration::from_millis(200));
-    bar
 }

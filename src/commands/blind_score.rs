@@ -10,8 +10,8 @@ use stretch_blind::{COUNTED_EXCESS, CaseKind, Label, Rate, Score};
 use stretch_gap::{Options, diagnose};
 
 use super::{
-    blind::{Answers, answers, steps},
-    shared::{say, write_text},
+    blind_answers::{Answers, answers},
+    shared::{say, steps, write_text},
 };
 use crate::{
     goal::{Goal, goals},

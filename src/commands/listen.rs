@@ -3,6 +3,7 @@
 mod port;
 mod record;
 mod screen;
+mod status;
 mod twin;
 
 use std::{
@@ -20,6 +21,7 @@ use self::{
     port::Heard,
     record::{Clock, Recording, Sample},
     screen::Screen,
+    status::Status,
     twin::Twin,
 };
 use super::stop;
@@ -61,35 +63,6 @@ pub(crate) struct Args {
     /// Volts at the converter's largest code
     #[arg(long, default_value_t = 3.3, value_name = "V")]
     adc_full_scale_v: f64,
-}
-
-/// What there is to say beside the samples.
-pub(crate) struct Status {
-    connected: bool,
-    counts: Counts,
-    /// The largest difference between the board's estimate and the one here, when there is one.
-    difference: Option<f64>,
-    unit: String,
-}
-
-impl Status {
-    fn line(&self) -> String {
-        let Counts { frames, lost, damaged, repeated, restarts, other_version } = self.counts;
-        let mut text = format!(
-            "{frames} frames, {lost} lost, {damaged} damaged, {repeated} repeated, {restarts} restarts"
-        );
-        if other_version > 0 {
-            text += &format!(", {other_version} of another version: update stretch or the board");
-        }
-        if let (Some(difference), true) = (self.difference, frames > 0) {
-            text += format!("; differs from the calibration by {difference:.4} {}", self.unit)
-                .trim_end();
-        }
-        if !self.connected {
-            text += "; waiting for the port";
-        }
-        text
-    }
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {

@@ -2,6 +2,7 @@
 
 pub(crate) mod apply;
 pub(crate) mod blind;
+mod blind_answers;
 mod blind_room;
 mod blind_score;
 pub(crate) mod calibrate;

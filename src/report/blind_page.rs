@@ -6,8 +6,7 @@ use super::{
     bar_figure::{Bar, Row, Scale, bar_figure, narrow_bar_figure},
     blind_figures::{confusion_figure, reliability_figure, time_figure},
     canvas::Ink,
-    diagnosis_page::percent,
-    markup::{fixed, number},
+    markup::{fixed, number, percent},
     page::{Page, Table},
 };
 use crate::goal::Goal;

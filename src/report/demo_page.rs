@@ -2,8 +2,9 @@
 
 use super::{
     calibration_page::{Judged, calibration_sections, calibration_verdict},
-    diagnosis_page::{Subject, diagnosis_sections, diagnosis_title, diagnosis_verdict},
+    diagnosis_page::{diagnosis_sections, diagnosis_title, diagnosis_verdict},
     page::Page,
+    subject::Subject,
 };
 
 /// Both reports as one HTML file; each part is what its own page would be.

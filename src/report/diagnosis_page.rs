@@ -1,6 +1,6 @@
 //! The report of a diagnosis: what to fix in the simulator, how sure that is, and what it gains.
 
-use stretch_gap::{Diagnosis, Evidence, Simulator, VerdictKind};
+use stretch_gap::{Diagnosis, VerdictKind};
 
 use super::{
     bar_figure::{Bar, Row, Scale, bar_figure, narrow_bar_figure},
@@ -12,26 +12,14 @@ use super::{
     gap_figures::{
         AFTER, Against, BEFORE, after_name, has_after, left_figure, trace_figures, worst,
     },
-    markup::number,
+    markup::{number, percent, with_unit},
     page::Page,
+    subject::Subject,
 };
 use crate::plain::{effect_in_words, listed, transfer_in_words};
 
 /// Candidates that are drawn.
 const DRAWN: usize = 6;
-
-/// What a report is about.
-#[derive(Clone, Copy)]
-pub(crate) struct Subject<'a> {
-    /// What the data are called.
-    pub(crate) name: &'a str,
-    /// What was found.
-    pub(crate) diagnosis: &'a Diagnosis,
-    /// What it was found from.
-    pub(crate) evidence: &'a Evidence,
-    /// The simulator beside its measurements.
-    pub(crate) simulator: &'a dyn Simulator,
-}
 
 /// The report as one HTML file.
 pub(crate) fn diagnosis_page(subject: &Subject<'_>) -> String {
@@ -390,14 +378,7 @@ fn numbers(page: &mut Page, d: &Diagnosis) {
     page.text(&format!("The diagnosis took {} s.", number(d.runtime_s, 2)));
 }
 
-pub(crate) fn percent(share: f64) -> String {
-    format!(
-        "{}\u{a0}%",
-        number((1000.0 * share).round() / 10.0, if share.abs() < 0.0995 { 1 } else { 2 })
-    )
-}
-
 fn unit_number(x: f64, unit: &str) -> String {
     let unit = if unit == "1" { "" } else { unit };
-    super::markup::with_unit(&number(x, 3), unit)
+    with_unit(&number(x, 3), unit)
 }

@@ -4,8 +4,7 @@ use stretch_blind::method_in_words;
 use stretch_gap::{Baselines, Candidate, Diagnosis, SliceGap, StageGap, Transfer};
 
 use super::{
-    diagnosis_page::percent,
-    markup::{NONE, fixed, number, with_unit},
+    markup::{NONE, fixed, number, percent, with_unit},
     page::Table,
 };
 use crate::plain::methods;

@@ -7,9 +7,9 @@ use stretch_gap::{Diagnosis, Role, StageEvidence};
 
 use super::{
     canvas::Ink,
-    diagnosis_page::Subject,
     figure::{Area, Axes, Figure, Frame, dot, plot, px, stroke},
     markup::with_unit,
+    subject::Subject,
     thin::{binned, curve, extent, padded, quantile, sample, sorted},
 };
 

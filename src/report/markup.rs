@@ -51,6 +51,14 @@ pub(crate) fn fixed(x: f64, decimals: usize) -> String {
     minus(if zero { text.trim_start_matches('-').to_owned() } else { text })
 }
 
+/// A share in percent, to two digits, below 10 % to one.
+pub(crate) fn percent(share: f64) -> String {
+    format!(
+        "{}\u{a0}%",
+        number((1000.0 * share).round() / 10.0, if share.abs() < 0.0995 { 1 } else { 2 })
+    )
+}
+
 /// A number on an axis that spans `span`.
 pub(crate) fn tick(x: f64, span: f64) -> String {
     // labels are at least a tenth of the span apart

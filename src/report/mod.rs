@@ -21,14 +21,16 @@ pub(crate) mod markup;
 pub(crate) mod page;
 mod paper_page;
 mod slice_figure;
+mod subject;
 mod surface_figure;
 pub(crate) mod thin;
 
 pub(crate) use blind_page::{BlindSubject, blind_page};
 pub(crate) use calibration_page::{Context, Judged, calibration_page, readme_picture};
 pub(crate) use demo_page::demo_page;
-pub(crate) use diagnosis_page::{Subject, diagnosis_page};
+pub(crate) use diagnosis_page::diagnosis_page;
 pub(crate) use paper_page::paper_page;
+pub(crate) use subject::Subject;
 
 #[cfg(test)]
 mod tests;

@@ -116,12 +116,26 @@ pub const EFFECTIVE_SIZE: f64 = 0.1;
 /// its diagonal, whose condition of 1e13 magnifies roundings of 1e-16.
 pub const TWINS: f64 = 1e-2;
 
-/// Share of what was put in or set off by which a diagnosis may miss it: noise and nuisances of
-/// a minute of record. A wrong cause misses by all of it.
-pub const GAP_FOUND: f64 = 0.15;
+/// Of a gain of -0.9 over the range, found by a diagnosis that was told -0.82: noise of 2e-3 at 12 000
+/// samples of spread 0.35 leaves 5e-5; the rest is for the reference, which is smoothed, and the prior.
+pub const GAIN_FOUND: f64 = 2e-3;
 
-/// The same where a second parameter can stand in for a part of the first.
-pub const GAP_BLURRED: f64 = 0.35;
+/// Seconds: a skew found by a diagnosis; a fifth of a sample of 10 ms.
+pub const SKEW_FOUND_S: f64 = 2e-3;
+
+/// Seconds: a time constant of 30 ms found by a diagnosis, a fifth of a sample of 10 ms.
+pub const POLE_FOUND_S: f64 = 2e-3;
+
+/// Relative to nominal: the inlet's flow found by a diagnosis, a sixth of the 0.2 that it is off.
+pub const FLOW_FOUND: f64 = 0.03;
+
+/// Relative to nominal: the muscle's time constant of 30 ms found by a diagnosis, a third of the
+/// 0.3 that it is off: 3 ms, a third of a sample.
+pub const LAG_FOUND: f64 = 0.1;
+
+/// Seconds: where a record resumes after a gap, on a grid of 10 ms whose stamps come up to 4 ms late,
+/// beside a sample lost: five samples.
+pub const RESUMED_S: f64 = 0.05;
 
 /// Excess of a sound model on 1800 test samples: three standard errors, 3 sqrt(2/1800).
 pub const GAP_NULL: f64 = 0.1;
@@ -213,3 +227,113 @@ pub const OBSERVER_SEARCHED: f64 = 0.1;
 /// Relative: the error of a model of the history as it runs against that of its fit, which
 /// divides by the degrees of freedom (126 of 9000) and leaves out the first samples.
 pub const HISTORY_LIVE: f64 = 0.05;
+
+/// Relative: errors of two calibrations, one trained on simulated trials that last as long as the
+/// measured ones but are others: half as much again as [`TRAINED_AGAIN`].
+pub const TRAINED_APART: f64 = 0.15;
+
+/// In units of a signal up to 25: a smoother may round off a corner of slope 1 by a tenth of a sample's step.
+pub const CORNER_KEPT: f64 = 0.1;
+
+/// Share of k_max: the contraction at the reference pressure as the literature prints it, to four decimals.
+pub const K_MAX_DIGITS: f64 = 5e-5;
+
+/// Of a value near 1: printed tables with five decimals.
+pub const TABLE_DIGITS: f64 = 1e-5;
+
+/// Volts: a value between samples, led over linearly where the time is a whole sample but for
+/// rounding of 1e-15 s times the session's length, at slopes up to 1e2 V/s.
+pub const SHIFTED_V: f64 = 1e-9;
+
+/// Share of full scale: a stage on samples that are led over linearly sees less of the kinks.
+pub const STAGE_ALONE: f64 = 2e-3;
+
+/// Volts: what an amplifier of a time constant of 1e12 s follows in 6 s of up to 2 V: 1e-11, and rounding.
+pub const NEVER_FOLLOWS_V: f64 = 1e-6;
+
+/// Millimetres: by how much a length still moves at the end of a move that settled for seconds.
+pub const BEHIND_MM: f64 = 1e-6;
+
+/// In codes: values that are whole codes but for seven printed digits.
+pub const WHOLE_CODE: f64 = 1e-3;
+
+/// Micrometres: half a step of 3.3 V/65536 at up to three taps of 0.12 a sample, at 100 Hz and
+/// about 1.1 mm for 1 V/s, beside the stated error: 0.9 + 0.6.
+pub const CODE_STEP_UM: f64 = 1.5;
+
+/// Millimetres of a 30 mm stroke: a baseline that drifted by 0.1 V and rested for 15 s, found again.
+pub const REST_FOUND_MM: f64 = 0.5;
+
+/// Standard deviation, relative, and correlation of 200 000 coloured samples of heavy tails, some
+/// 20 000 of them independent: 0.5 %, twice that for the tails, five times.
+pub const BLIND_NOISE: f64 = 0.05;
+
+/// Relative: the standard deviation of a wander of 5 s over 40 000 s, 4000 of them independent: 1.1 %,
+/// up to twice that where several lags follow each other, four to five times.
+pub const BLIND_SUPPLY: f64 = 0.1;
+
+/// Relative: the share of 4000 missing rows, four in a row: 1000 independent ones, 3 %, five times.
+pub const BLIND_ROWS: f64 = 0.15;
+
+/// Of curves of size near 1, through a table or a spline: some hundred roundings at most.
+pub const BLIND_CURVE: f64 = 1e-12;
+
+/// Relative: a slope by differences in a table of 240 intervals of values up to 2: 240 times a rounding or two, and ten times that.
+pub const BLIND_SLOPE: f64 = 1e-11;
+
+/// Of a law from 0 to 1: where it starts, a table's first knot less what it is scaled from.
+pub const BLIND_LAW_START: f64 = 1e-9;
+
+/// Relative: where it ends, a table of 240 intervals, scaled to end at 1.
+pub const BLIND_LAW_END: f64 = 1e-9;
+
+/// Share of the reference pressure: a linear table of 4096 knots, h^2 x''/8.
+pub const BLIND_LAW_TABLE: f64 = 1e-6;
+
+/// Of unknowns near 1: the descent stops once none moves by 1e-7; ten times that.
+pub const BOUNDED_SQUARES: f64 = 1e-6;
+
+/// Seconds: a delay of 0.05 s by a sum over steps of 0.1 ms, two of them.
+pub const BLIND_DELAY_S: f64 = 2e-4;
+
+/// Seconds: the same where rising has a time constant of its own.
+pub const BLIND_UNEVEN_S: f64 = 0.02;
+
+/// Relative: what a filter of 1 ns holds back of a step after 1 ms, 1e-6 at each of up to ten poles.
+pub const BLIND_NO_FILTER: f64 = 1e-5;
+
+/// Relative: how much of a move of 1/20 000 of its reach a loop of any family yields.
+pub const BLIND_ELASTIC: f64 = 0.1;
+
+/// Relative: how much of a move of 1/2000 of its reach a loop of the written forms yields.
+pub const BLIND_LOOP_ELASTIC: f64 = 0.05;
+
+/// Relative: what lags of 0.1 s still lack after 20 s: exp(-200) and rounding.
+pub const BLIND_SETTLED: f64 = 1e-9;
+
+/// What a relaxation still lacks after 20 s whose slowest part is eight to ten times 0.1 s: exp(-20).
+pub const BLIND_RELAXED: f64 = 1e-6;
+
+/// Pascals of 620 kPa that a chamber still lacks when it is full.
+pub const BLIND_FULL_PA: f64 = 100.0;
+
+/// Pascals of 28.8 kPa that choked filling brings in 10 ms: the first steps of integration.
+pub const BLIND_FILL_PA: f64 = 50.0;
+
+/// Millimetres: the printed contraction, 5e-5 of 29 mm, and what [`BLIND_FULL_PA`] still moves.
+pub const BLIND_LENGTH_MM: f64 = 0.01;
+
+/// Volts at rest of a bridge that was trimmed: rounding, magnified by the amplifier.
+pub const BLIND_TRIMMED_V: f64 = 1e-9;
+
+/// Relative: the offset of a slip wound by a vent, which ends where its curve is still a little bent.
+pub const BLIND_WOUND: f64 = 0.2;
+
+/// Relative: what a steady load has still to draw down after 40 s.
+pub const BLIND_DRAWN: f64 = 0.01;
+
+/// Of an opening up to 1, far beyond a dead band: the end of its law, [`BLIND_LAW_END`].
+pub const BLIND_BAND: f64 = 1e-9;
+
+/// Of an opening: what a dead band of 1e-9 may take, up to ten times itself.
+pub const BLIND_BAND_OFF: f64 = 1e-8;

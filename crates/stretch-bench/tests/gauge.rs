@@ -2,13 +2,13 @@
 
 mod support;
 
-use approx::{assert_abs_diff_eq, assert_relative_eq};
+use approx::{abs_diff_eq, assert_abs_diff_eq};
 use stretch_bench::{BenchError, GaugeSetup, GaugeSimulator};
 use stretch_data::{Channel, RigFile, SessionTrial, Split, Trial, TrialKind};
 use stretch_gap::{Diagnosis, Options, Simulator, VerdictKind, diagnose, next_experiment};
 use stretch_sim::{Catalogue, GaugeRig};
 use support::{Noise, PROBABILITY, with_lost_rows};
-use testkit::tolerance::{FIT_WELL, GAP_FOUND};
+use testkit::tolerance::{FIT_WELL, GAIN_FOUND, RESUMED_S, SKEW_FOUND_S};
 
 const DT_S: f64 = 0.01;
 /// Noise of the signal, whose span is about one, and of the reference, whose range is about 40 mm.
@@ -320,7 +320,7 @@ fn a_rig_file_gives_the_nominal_gauge() {
     let d = run(-0.82);
     assert_eq!(d.verdict, VerdictKind::Parameters, "{}", d.sentence);
     assert!(gain(&d).is_evidence);
-    assert_abs_diff_eq!(gain(&d).fitted, -0.9, epsilon = GAP_FOUND * (0.9 - 0.82));
+    assert_abs_diff_eq!(gain(&d).fitted, -0.9, epsilon = GAIN_FOUND);
     // One that is right is left alone.
     assert_eq!(run(-0.9).verdict, VerdictKind::NoGap);
     let whole = RigFile::parse("rig.toml", "[sensing]\nR0 = { value = 4.0 }\n").expect("a rig");
@@ -343,13 +343,13 @@ fn uneven_and_broken_records_are_mended_and_told() {
     let gauge = GaugeSimulator::new(&setup(&trials, &Catalogue::default())).expect("a gauge");
     let parts: Vec<usize> = gauge.trials().iter().map(|t| t.samples).collect();
     assert!(parts.len() == 2 && parts.iter().sum::<usize>().abs_diff(5800) < 20, "{parts:?}");
-    assert_abs_diff_eq!(gauge.trials()[1].start_s, 32.0, epsilon = GAP_FOUND * 2.0);
+    assert_abs_diff_eq!(gauge.trials()[1].start_s, 32.0, epsilon = RESUMED_S);
     assert!(gauge.notes().iter().any(|n| n.contains("missing after 29.9")), "{:?}", gauge.notes());
     assert!(gauge.notes().iter().any(|n| n.contains("unevenly")), "{:?}", gauge.notes());
     let d = diagnose(&gauge, &Options::default(), &|_| (), &|| false).expect("a diagnosis").0;
     assert_eq!(d.named, ["channel_skew"], "{}", d.sentence);
     let skew = d.candidates[0].by_name["skew_s"];
-    assert_relative_eq!(skew, 0.03, max_relative = GAP_FOUND, epsilon = 0.0);
+    assert_abs_diff_eq!(skew, 0.03, epsilon = SKEW_FOUND_S);
 }
 
 #[test]
@@ -363,7 +363,7 @@ fn lost_rows_change_no_verdict() {
         let what = format!("{share} lost: {}", d.sentence);
         assert_eq!((d.verdict, &d.named), (whole.verdict, &whole.named), "{what}");
         let (was, is) = (whole.candidates[0].probability, d.candidates[0].probability);
-        assert!((was - is).abs() <= PROBABILITY, "{what}: {was} {is}");
+        assert!(abs_diff_eq!(was, is, epsilon = PROBABILITY), "{what}: {was} {is}");
     }
 }
 

@@ -2,7 +2,7 @@
 
 mod support;
 
-use approx::{assert_abs_diff_eq, assert_relative_eq};
+use approx::{abs_diff_eq, assert_abs_diff_eq};
 use stretch_bench::{RigSetup, RigSimulator, Session};
 use stretch_data::{Channel, RigFile, SessionTrial, Split, Trial, TrialKind};
 use stretch_gap::{Diagnosis, Options, Simulator, VerdictKind, diagnose};
@@ -11,7 +11,7 @@ use stretch_sim::{
     Start, default_rig_text,
 };
 use support::{Noise, PROBABILITY, with_lost_rows};
-use testkit::tolerance::{GAP_BLURRED, GAP_FOUND, GAP_NULL, TRAINED_AGAIN};
+use testkit::tolerance::{FLOW_FOUND, GAP_NULL, LAG_FOUND, POLE_FOUND_S, TRAINED_AGAIN};
 
 const DT_S: f64 = 0.01;
 
@@ -126,8 +126,8 @@ fn a_rig_off_its_data_sheet_lacks_no_effect() {
         let p = diagnosis.parameters.iter().find(|p| p.name == name).expect("a parameter");
         p.fitted / p.nominal
     };
-    assert_abs_diff_eq!(tuned("C_in"), 1.2, epsilon = GAP_FOUND * 0.2);
-    assert_abs_diff_eq!(tuned("tau_m"), 1.3, epsilon = GAP_BLURRED * 0.3);
+    assert_abs_diff_eq!(tuned("C_in"), 1.2, epsilon = FLOW_FOUND);
+    assert_abs_diff_eq!(tuned("tau_m"), 1.3, epsilon = LAG_FOUND);
     for stage in &diagnosis.location.stages {
         assert_abs_diff_eq!(stage.excess, 0.0, epsilon = GAP_NULL);
         assert!(stage.raw > 1.0, "{stage:?}");
@@ -158,7 +158,7 @@ fn a_slow_amplifier_is_named_and_measured_whatever_the_number_of_threads() {
     let first = &one.candidates[0];
     assert!(first.closed > 0.98 && first.closed_ci[0] > 0.9, "{first:?}");
     let tau = first.parameters.iter().find(|p| p.name == "tau").expect("tau");
-    assert_relative_eq!(tau.value, 0.03, max_relative = GAP_FOUND, epsilon = 0.0);
+    assert_abs_diff_eq!(tau.value, 0.03, epsilon = POLE_FOUND_S);
     let two = run(trials, &[], &Options { threads: 2, ..shallow() });
     let text = |d: &Diagnosis| {
         serde_json::to_string(&Diagnosis { runtime_s: 0.0, ..d.clone() }).expect("JSON")
@@ -178,7 +178,7 @@ fn a_calibration_trained_with_the_effect_is_as_good_as_one_trained_on_the_rig() 
         // Without the effect the rate says nothing in the simulator; with it the two trainings differ by their noise.
         assert!(poly13.sim > 1.5 * poly13.real, "{poly13:?}");
         let (with, real) = (poly13.sim_with_effect, poly13.real);
-        assert_relative_eq!(with, real, max_relative = TRAINED_AGAIN, epsilon = 0.0);
+        assert_abs_diff_eq!(with, real, epsilon = TRAINED_AGAIN * real);
         assert!(transfer.linear.real > poly13.real, "{transfer:?}");
         let said = diagnosis.baselines.expect("asked for");
         assert_eq!(said.bic.as_deref(), Some("gauge_relaxation"));
@@ -284,7 +284,8 @@ fn lost_rows_change_no_verdict() {
             let what = format!("{names:?}, pressure {pressure}, {share} lost: {}", d.sentence);
             assert_eq!((d.verdict, &d.named), (whole.verdict, &whole.named), "{what}");
             if let (Some(was), Some(is)) = (whole.candidates.first(), d.candidates.first()) {
-                assert!((was.probability - is.probability).abs() <= PROBABILITY, "{what}");
+                let (was, is) = (was.probability, is.probability);
+                assert!(abs_diff_eq!(was, is, epsilon = PROBABILITY), "{what}: {was} {is}");
             }
         }
     }

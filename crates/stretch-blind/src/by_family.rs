@@ -5,14 +5,10 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::BlindError;
 use crate::family::Family;
 use crate::rate::Rate;
-use crate::score::Score;
-use crate::truth::Truth;
-use crate::verdict::Verdict;
 
-/// Figures of the cases of one family; as in [`Score`].
+/// Figures of the cases of one family; as in [`Score`](crate::Score).
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct FamilyRow {
     /// Cases scored.
@@ -41,64 +37,6 @@ pub struct FamilyRow {
     pub struck: Rate,
     /// Expected calibration error.
     pub ece: Option<f64>,
-}
-
-impl FamilyRow {
-    pub(crate) fn of(score: &Score) -> Self {
-        let singles = &score.singles;
-        Self {
-            cases: score.cases,
-            exact: singles.exact,
-            top1: singles.top1,
-            stage: singles.stage,
-            set_covers_all: singles.set_covers_all,
-            false_unknown: singles.false_unknown,
-            both_named: score.compounds.all_named,
-            one_named: score.compounds.one_named,
-            strongest_named: score.dominants.strongest_named,
-            false_alarms: score.false_alarms,
-            foreign_caught: score.foreign_caught,
-            struck: score.struck.unknown_or_twin,
-            ece: score.calibration.ece,
-        }
-    }
-}
-
-impl Score {
-    /// Scores every family by the run that was calibrated without it.
-    ///
-    /// `runs` holds, for each family, the verdicts of a diagnosis whose thresholds saw the other
-    /// families only; of each run only the cases of that family count. The rows of
-    /// [`Score::families`] are then the leave-family-out table, the other figures pool them.
-    ///
-    /// # Errors
-    /// As [`Score::of`].
-    ///
-    /// ```
-    /// use std::collections::BTreeMap;
-    /// use stretch_blind::{Family, Score, Truth};
-    /// let truth = Truth { schema: 1, seed: None, cases: BTreeMap::new() };
-    /// let runs = BTreeMap::from([(Family::Splines, Vec::new())]);
-    /// assert_eq!(Score::leave_family_out(&truth, &runs)?.cases, 0);
-    /// # Ok::<(), stretch_blind::BlindError>(())
-    /// ```
-    pub fn leave_family_out(
-        truth: &Truth,
-        runs: &BTreeMap<Family, Vec<Verdict>>,
-    ) -> Result<Self, BlindError> {
-        let mut judged = Vec::new();
-        for (family, verdicts) in runs {
-            for verdict in verdicts {
-                let label = truth.cases.get(&verdict.case);
-                let label =
-                    label.ok_or_else(|| BlindError::UnknownCase { case: verdict.case.clone() })?;
-                if label.family == *family {
-                    judged.push(verdict.clone());
-                }
-            }
-        }
-        Self::of(truth, &judged)
-    }
 }
 
 /// The table of families, a row each.

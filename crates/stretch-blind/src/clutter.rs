@@ -289,6 +289,8 @@ impl Drawn {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::{abs_diff_eq, assert_abs_diff_eq};
+    use testkit::tolerance::{BLIND_NOISE, BLIND_ROWS, BLIND_SUPPLY};
 
     fn sd(x: &[f64]) -> f64 {
         (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt()
@@ -300,10 +302,10 @@ mod tests {
         for (slow, freedom) in [(0.0, 0), (0.5, 0), (0.0, 5), (0.5, 7)] {
             let noise = Noise { slow, memory: 5.0, freedom, ..Noise::white(0.3) };
             let x = noise.samples(200_000, &mut dice);
-            // Some 200,000 / 10 independent ones: 0.5 % (heavy tails: twice that), five times.
-            assert!((sd(&x) / 0.3 - 1.0).abs() < 0.05, "{slow} {freedom}: {}", sd(&x));
+            let level = abs_diff_eq!(sd(&x), 0.3, epsilon = BLIND_NOISE * 0.3);
+            assert!(level, "{slow} {freedom}: {}", sd(&x));
             let lag: f64 = x.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / x.len() as f64 / 0.09;
-            assert!((lag - slow * (-0.2_f64).exp()).abs() < 0.05, "{lag}");
+            assert_abs_diff_eq!(lag, slow * (-0.2_f64).exp(), epsilon = BLIND_NOISE);
         }
     }
 
@@ -314,7 +316,8 @@ mod tests {
             for memory_s in [0.3, 5.0] {
                 let wander = SupplyWander { sd: 0.003, memory_s, order };
                 let x = wander.knots(400_000, 0.1, &mut dice);
-                assert!((sd(&x) / 0.003 - 1.0).abs() < 0.1, "{order} {memory_s} {}", sd(&x));
+                let level = abs_diff_eq!(sd(&x), 0.003, epsilon = BLIND_SUPPLY * 0.003);
+                assert!(level, "{order} {memory_s} {}", sd(&x));
                 let lag = (memory_s / 0.1) as usize;
                 let products = x.iter().zip(&x[lag..]).map(|(a, b)| a * b);
                 let left = products.sum::<f64>() / x.len() as f64 / 0.003_f64.powi(2);
@@ -332,7 +335,8 @@ mod tests {
             drawn = Drawn { dropped: 0.01, in_a_row, ..drawn };
             let gone = drawn.missing(400_000, &mut dice);
             let share = gone.iter().filter(|&&g| g).count() as f64 / 400_000.0;
-            assert!(!gone[0] && (share / 0.01 - 1.0).abs() < 0.15, "{share}");
+            assert!(!gone[0]);
+            assert_abs_diff_eq!(share, 0.01, epsilon = BLIND_ROWS * 0.01);
         }
     }
 }

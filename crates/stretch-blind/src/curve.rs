@@ -110,17 +110,22 @@ pub(crate) fn weights(count: usize, sd: f64, dice: &mut Dice) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::{abs_diff_eq, assert_abs_diff_eq, assert_relative_eq, relative_eq};
+    use testkit::tolerance::{BLIND_CURVE, BLIND_SLOPE, F64_ROUNDING};
 
     #[test]
     fn a_table_keeps_straight_lines_and_goes_on_beyond_its_ends() {
         let line = Curve::table(|x| 2.0 * x - 0.5);
         for x in [-0.3, 0.0, 0.123, 0.999, 1.0, 1.4] {
-            assert!((line.at(x) - (2.0 * x - 0.5)).abs() < 1e-12, "{x}");
-            assert!((line.slope(x) - 2.0).abs() < 1e-9);
+            assert!(abs_diff_eq!(line.at(x), 2.0 * x - 0.5, epsilon = BLIND_CURVE), "{x}");
+            assert!(
+                relative_eq!(line.slope(x), 2.0, epsilon = 0.0, max_relative = BLIND_SLOPE),
+                "{x}"
+            );
         }
-        assert!((line.mean() - 0.5).abs() < 1e-12);
+        assert_abs_diff_eq!(line.mean(), 0.5, epsilon = BLIND_CURVE);
         // x^2 - x/2 at 1.
-        assert!((line.integral().at(1.0) - 0.5).abs() < 1e-12);
+        assert_abs_diff_eq!(line.integral().at(1.0), 0.5, epsilon = BLIND_CURVE);
     }
 
     #[test]
@@ -128,8 +133,9 @@ mod tests {
         let mut dice = Dice::new(1, 9);
         let wiggle = Wiggle::draw(5, 1.0, &mut dice);
         for (i, knot) in wiggle.0.iter().enumerate() {
-            assert!((wiggle.at(0.25 * i as f64) - knot).abs() < 1e-12);
+            assert_abs_diff_eq!(wiggle.at(0.25 * i as f64), *knot, epsilon = BLIND_CURVE);
         }
-        assert!((weights(6, 1.0, &mut dice).iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        let sum = weights(6, 1.0, &mut dice).iter().sum::<f64>();
+        assert_relative_eq!(sum, 1.0, epsilon = 0.0, max_relative = F64_ROUNDING);
     }
 }

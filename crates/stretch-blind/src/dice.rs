@@ -62,6 +62,7 @@ impl Dice {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_abs_diff_eq;
 
     #[test]
     fn moments_are_those_of_the_distributions() {
@@ -71,8 +72,8 @@ mod tests {
         let mean = draws.iter().sum::<f64>() / n as f64;
         let var = draws.iter().map(|x| x * x).sum::<f64>() / n as f64;
         // Five standard errors: 1/sqrt(n) of the mean, sqrt(2/n) of the variance.
-        assert!(mean.abs() < 5.0 / (n as f64).sqrt(), "{mean}");
-        assert!((var - 1.0).abs() < 5.0 * (2.0 / n as f64).sqrt(), "{var}");
+        assert_abs_diff_eq!(mean, 0.0, epsilon = 5.0 / (n as f64).sqrt());
+        assert_abs_diff_eq!(var, 1.0, epsilon = 5.0 * (2.0 / n as f64).sqrt());
         assert_ne!(Dice::new(5, 1).bits(), Dice::new(5, 2).bits());
     }
 }

@@ -211,15 +211,18 @@ fn bounded(a: &[Vec<f64>], b: &[f64], bound: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_abs_diff_eq;
+    use testkit::tolerance::BOUNDED_SQUARES;
 
     #[test]
     fn bounded_least_squares_stops_at_its_bound() {
         let a = vec![vec![2.0, 0.5], vec![0.5, 1.0]];
         let free = bounded(&a, &[1.0, 1.0], 3.0);
-        assert!((free[0] - 0.5 / 1.75).abs() < 1e-6 && (free[1] - 1.5 / 1.75).abs() < 1e-6);
+        assert_abs_diff_eq!(free[0], 0.5 / 1.75, epsilon = BOUNDED_SQUARES);
+        assert_abs_diff_eq!(free[1], 1.5 / 1.75, epsilon = BOUNDED_SQUARES);
         // With x1 held at its bound, x0 = (b0 - 0.5 x1) / 2.
         let held = bounded(&a, &[1.0, 9.0], 3.0);
         assert_eq!(held[1], 3.0);
-        assert!((held[0] + 0.25).abs() < 1e-6);
+        assert_abs_diff_eq!(held[0], -0.25, epsilon = BOUNDED_SQUARES);
     }
 }

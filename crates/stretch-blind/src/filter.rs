@@ -87,6 +87,8 @@ impl LowPass {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::abs_diff_eq;
+    use testkit::tolerance::{BLIND_DELAY_S, BLIND_NO_FILTER, BLIND_UNEVEN_S};
 
     #[test]
     fn the_mean_delay_is_the_one_asked_for_and_none_is_no_filter() {
@@ -97,11 +99,13 @@ mod tests {
                 filter.push(0.0, 1e-4);
                 // Integral of 1 - step response; uneven ones rise with their own constant.
                 let delay: f64 = (0..40_000).map(|_| (1.0 - filter.push(1.0, 1e-4)) * 1e-4).sum();
-                let uneven = if family == Family::Asymmetric { 0.02 } else { 2e-4 };
-                assert!((delay - 0.05).abs() < uneven, "{family} {delay}");
+                let uneven =
+                    if family == Family::Asymmetric { BLIND_UNEVEN_S } else { BLIND_DELAY_S };
+                assert!(abs_diff_eq!(delay, 0.05, epsilon = uneven), "{family} {delay}");
                 let mut none = LowPass::draw(family, 1e-9, &mut dice);
                 none.push(0.0, 1e-3);
-                assert!((none.push(1.0, 1e-3) - 1.0).abs() < 1e-5, "{family}");
+                let passed = none.push(1.0, 1e-3);
+                assert!(abs_diff_eq!(passed, 1.0, epsilon = BLIND_NO_FILTER), "{family}");
             }
         }
     }

@@ -223,6 +223,8 @@ pub(crate) fn damping(family: Family, dice: &mut Dice) -> Curve {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::{abs_diff_eq, relative_eq};
+    use testkit::tolerance::{BLIND_CURVE, BLIND_LAW_END, BLIND_LAW_START};
 
     #[test]
     fn rising_laws_rise_from_nought_to_one() {
@@ -230,8 +232,11 @@ mod tests {
         for family in Family::ALL {
             for draw in 0..60 {
                 for law in [rising(family, &mut dice), settling(family, &mut dice)] {
-                    assert!(law.at(0.0).abs() < 1e-9, "{family} {draw}");
-                    assert!((law.at(1.0) - 1.0).abs() < 1e-6, "{family} {draw} {}", law.at(1.0));
+                    let (start, end) = (law.at(0.0), law.at(1.0));
+                    let from = abs_diff_eq!(start, 0.0, epsilon = BLIND_LAW_START);
+                    assert!(from, "{family} {draw} {start}");
+                    let to = relative_eq!(end, 1.0, epsilon = 0.0, max_relative = BLIND_LAW_END);
+                    assert!(to, "{family} {draw} {end}");
                     for i in 0..400 {
                         let x = f64::from(i) / 400.0;
                         let (a, b) = (law.at(x), law.at(x + 1.0 / 400.0));
@@ -248,11 +253,12 @@ mod tests {
         for family in Family::ALL {
             for _ in 0..60 {
                 let bump = bump(family, &mut dice);
-                assert!((bump.size() - 1.0).abs() < 1e-12);
+                assert!(abs_diff_eq!(bump.size(), 1.0, epsilon = BLIND_CURVE), "{family}");
                 assert!(bump.at(0.0).abs() < 0.4 && bump.at(1.0).abs() < 0.4, "{family}");
                 assert!(bump.mean().abs() > 0.2, "{family}: {}", bump.mean());
                 let path = path(family, &mut dice);
-                assert!(path.at(0.0).abs() < 1e-9 && path.size() < 3.0, "{family}");
+                assert!(abs_diff_eq!(path.at(0.0), 0.0, epsilon = BLIND_LAW_START), "{family}");
+                assert!(path.size() < 3.0, "{family}");
             }
         }
     }

@@ -14,6 +14,7 @@ mod friction;
 mod gauge;
 mod knee;
 mod laws;
+mod leave_family_out;
 mod make;
 mod memory;
 mod plan;

@@ -157,6 +157,8 @@ pub(crate) fn at_least(x: f64, floor: f64, width: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::{abs_diff_eq, assert_relative_eq};
+    use testkit::tolerance::{BLIND_LOOP_ELASTIC, BLIND_SETTLED, F64_ROUNDING};
 
     #[test]
     fn loops_start_elastic_and_saturate_at_their_reach() {
@@ -165,7 +167,8 @@ mod tests {
                 let mut element = Loop::new(form, 0.02, 0.5, sharp);
                 element.push(0.0, 1e-3);
                 let early = element.push(1e-5, 1e-3);
-                assert!((early / 1e-5 - 1.0).abs() < 0.05, "{form} {sharp} {early}");
+                let elastic = abs_diff_eq!(early, 1e-5, epsilon = BLIND_LOOP_ELASTIC * 1e-5);
+                assert!(elastic, "{form} {sharp} {early}");
                 for i in 1..400 {
                     element.push(1e-5 + 0.001 * f64::from(i), 1e-3);
                 }
@@ -186,7 +189,7 @@ mod tests {
             for _ in 0..20_000 {
                 last = lags.push(1.0, 1e-3);
             }
-            assert!((last - 1.0).abs() < 1e-9, "{last}");
+            assert_relative_eq!(last, 1.0, epsilon = 0.0, max_relative = BLIND_SETTLED);
         }
     }
 
@@ -194,7 +197,12 @@ mod tests {
     fn knee_is_the_greater_far_from_it() {
         assert_eq!(at_least(1.0, 0.0, 0.1), 1.0);
         assert_eq!(at_least(-1.0, 0.0, 0.1), 0.0);
-        assert!((at_least(0.0, 0.0, 0.1) - 0.025).abs() < 1e-15);
+        assert_relative_eq!(
+            at_least(0.0, 0.0, 0.1),
+            0.025,
+            epsilon = 0.0,
+            max_relative = F64_ROUNDING
+        );
         assert_eq!(at_least(-0.5, 0.0, 0.0), 0.0);
     }
 }

@@ -139,12 +139,15 @@ impl Calibration {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::{assert_abs_diff_eq, assert_relative_eq};
+    use testkit::tolerance::{F64_ROUNDING, TABLE_DIGITS};
 
     #[test]
     fn exact_interval_matches_tables() {
         // Two of ten: 0.02521 .. 0.55610 (any statistics table of Clopper and Pearson).
         let (low, high) = Rate { hits: 2, cases: 10 }.exact().expect("cases");
-        assert!((low - 0.025_211).abs() < 1e-5 && (high - 0.556_095).abs() < 1e-5, "{low} {high}");
+        assert_abs_diff_eq!(low, 0.025_21, epsilon = TABLE_DIGITS);
+        assert_abs_diff_eq!(high, 0.556_10, epsilon = TABLE_DIGITS);
         assert_eq!(Rate::default().exact(), None);
         assert_eq!(Rate { hits: 3, cases: 3 }.exact().expect("cases").1, 1.0);
     }
@@ -154,7 +157,12 @@ mod tests {
         let outcomes = [(0.95, true), (0.95, true), (0.55, false), (0.55, true)];
         let calibration = Calibration::of(&outcomes);
         // Half the cases are off by 0.05, half by 0.05.
-        assert!((calibration.ece.expect("cases") - 0.05).abs() < 1e-12);
+        assert_relative_eq!(
+            calibration.ece.expect("cases"),
+            0.05,
+            epsilon = 0.0,
+            max_relative = F64_ROUNDING
+        );
         assert_eq!(calibration.bins[9].right, Rate { hits: 2, cases: 2 });
     }
 }

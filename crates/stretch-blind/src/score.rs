@@ -224,10 +224,30 @@ impl Score {
         tally.score.unanswered = missing.cloned().collect();
         let mut score = tally.finish();
         if families.len() > 1 {
-            let row = |(family, tally): (Family, Tally)| (family, FamilyRow::of(&tally.finish()));
+            let row = |(family, tally): (Family, Tally)| (family, tally.finish().row());
             score.families = families.into_iter().map(row).collect();
         }
         Ok(score)
+    }
+
+    /// What a table by family shows of it.
+    fn row(&self) -> FamilyRow {
+        let singles = &self.singles;
+        FamilyRow {
+            cases: self.cases,
+            exact: singles.exact,
+            top1: singles.top1,
+            stage: singles.stage,
+            set_covers_all: singles.set_covers_all,
+            false_unknown: singles.false_unknown,
+            both_named: self.compounds.all_named,
+            one_named: self.compounds.one_named,
+            strongest_named: self.dominants.strongest_named,
+            false_alarms: self.false_alarms,
+            foreign_caught: self.foreign_caught,
+            struck: self.struck.unknown_or_twin,
+            ece: self.calibration.ece,
+        }
     }
 }
 

@@ -295,6 +295,10 @@ mod tests {
     use crate::effect::{KINDS, Stage};
     use crate::family::Family;
     use crate::protocol::{Protocol, session};
+    use approx::assert_abs_diff_eq;
+    use testkit::tolerance::{
+        BLIND_FILL_PA, BLIND_FULL_PA, BLIND_LENGTH_MM, BLIND_TRIMMED_V, BLIND_WOUND,
+    };
 
     fn short_session() -> Vec<Script> {
         let mut scripts = session(Protocol::Paper, &mut Dice::new(8, 1));
@@ -417,14 +421,15 @@ mod tests {
         let inflation = &traces[0];
         let end = inflation.length.len() - 1;
         assert_eq!(inflation.pressure[0], 0.0);
-        assert!((inflation.pressure[end] - 620e3).abs() < 100.0);
+        assert_abs_diff_eq!(inflation.pressure[end], 620e3, epsilon = BLIND_FULL_PA);
         // Contraction 1.0176 x 0.162 of 180 mm.
-        assert!((inflation.length[end] - 180.0 * (1.0 - 1.0176 * 0.162)).abs() < 0.01);
+        let length_mm = 180.0 * (1.0 - 1.0176 * 0.162);
+        assert_abs_diff_eq!(inflation.length[end], length_mm, epsilon = BLIND_LENGTH_MM);
         // Choked filling: R T / V0 times C rho0 p1, 28.8 kPa in 10 ms.
         let expected = 84_148.7 / 25e-6 * 1e-9 * 1.185 * 721_325.0 * 0.01;
-        assert!((inflation.pressure[101] - expected).abs() < 50.0, "{}", inflation.pressure[101]);
+        assert_abs_diff_eq!(inflation.pressure[101], expected, epsilon = BLIND_FILL_PA);
         // Trimmed: no bridge voltage at rest.
-        assert!((inflation.volts[0] - 1.24).abs() < 1e-9);
+        assert_abs_diff_eq!(inflation.volts[0], 1.24, epsilon = BLIND_TRIMMED_V);
         assert!(traces[1].pressure[0] > 619e3 && traces[1].pressure[end] < 1.0);
         assert!(traces.iter().all(|t| t.least_strain > crate::rig::LEAST_STRAIN));
     }
@@ -442,6 +447,6 @@ mod tests {
         // Vented before the first trial: the slack of 0.01 strain is on the side of relaxing.
         let offset = traces[0].volts[0] - rig.nominal_volts(0.0);
         let slope = (rig.nominal_volts(0.01) - rig.nominal_volts(0.0)) / 0.01 / (1.0 + rig.e0());
-        assert!((offset / (0.01 * slope) - 1.0).abs() < 0.2, "{offset}");
+        assert_abs_diff_eq!(offset, 0.01 * slope, epsilon = BLIND_WOUND * 0.01 * slope.abs());
     }
 }

@@ -123,6 +123,8 @@ impl DeadBand {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::abs_diff_eq;
+    use testkit::tolerance::{BLIND_BAND, BLIND_BAND_OFF};
 
     #[test]
     fn dead_bands_never_fall_and_lose_one_band_of_what_is_far_open() {
@@ -136,8 +138,10 @@ mod tests {
                     assert!(left >= last - 1e-12 && left >= 0.0, "{family} {i} {left} {last}");
                     last = left;
                 }
-                assert!((last - (1.0 - 0.05 * band.sides[0])).abs() < 1e-9, "{family} {last}");
-                assert!((band.pass(0.4, 1e-9, 1) - 0.4).abs() < 1e-8, "{family}: off");
+                let open = 1.0 - 0.05 * band.sides[0];
+                assert!(abs_diff_eq!(last, open, epsilon = BLIND_BAND), "{family} {last}");
+                let off = band.pass(0.4, 1e-9, 1);
+                assert!(abs_diff_eq!(off, 0.4, epsilon = BLIND_BAND_OFF), "{family}: {off}");
             }
         }
     }

@@ -1,6 +1,8 @@
 //! Hand-made labels and verdicts, every figure computed by hand.
 
+use approx::assert_relative_eq;
 use std::collections::BTreeMap;
+use testkit::tolerance::F64_ROUNDING;
 
 use stretch_blind::{BlindError, CaseKind, Family, Label, Rate, Score, Stage, Truth, Verdict};
 
@@ -79,7 +81,8 @@ fn singles_are_scored_by_strength_and_twins_pooled() {
     assert_eq!(s.stage, rate(2, 4));
     assert_eq!(s.set_covers, rate(3, 3));
     assert_eq!(s.set_covers_all, rate(3, 4));
-    assert!((s.set_size.expect("sets") - 4.0 / 3.0).abs() < 1e-12);
+    let size = s.set_size.expect("sets");
+    assert_relative_eq!(size, 4.0 / 3.0, epsilon = 0.0, max_relative = F64_ROUNDING);
     assert_eq!(s.false_unknown, rate(1, 4));
     assert_eq!(s.overlooked, rate(1, 4));
     assert_eq!(score.confusion["sleeve_slip"]["gauge_hysteresis"], 1);
@@ -90,7 +93,12 @@ fn singles_are_scored_by_strength_and_twins_pooled() {
     assert_eq!(missed, ["b", "c", "e"]);
     // |0.97 - 1|, |0.6 - 0|, |0 - 0|, |0.5 - 1| over four cases.
     let ece = score.calibration.ece.expect("candidates");
-    assert!((ece - (0.03 + 0.6 + 0.0 + 0.5) / 4.0).abs() < 1e-12, "{ece}");
+    assert_relative_eq!(
+        ece,
+        (0.03 + 0.6 + 0.0 + 0.5) / 4.0,
+        epsilon = 0.0,
+        max_relative = F64_ROUNDING
+    );
     assert_eq!((score.closed, score.closed_oracle), (Some(0.9), Some(0.95)));
     assert_eq!(score.runtime_s, Some((2.0, 2.0, 2.0)));
     let text = score.to_string();
@@ -249,7 +257,7 @@ fn a_declared_tie_that_holds_the_truth_is_right_and_an_undeclared_one_wrong() {
     assert_eq!((score.compounds.all_named, score.compounds.precision), (rate(1, 1), rate(2, 2)));
     // "A or B" is stated with 0.9 (a: right; b: wrong); c names two, its first with 0.5.
     let ece = score.calibration.ece.expect("candidates");
-    assert!((ece - (2.0 * 0.4 + 0.5) / 3.0).abs() < 1e-12, "{ece}");
+    assert_relative_eq!(ece, (2.0 * 0.4 + 0.5) / 3.0, epsilon = 0.0, max_relative = F64_ROUNDING);
     let missed: Vec<&str> = score.misses.iter().map(|m| m.case.as_str()).collect();
     assert_eq!(missed, ["b", "c"]);
 }
@@ -281,7 +289,8 @@ fn a_partial_is_held_to_its_names_and_a_record_is_no_answer() {
     assert_eq!(score.false_alarms, rate(1, 1));
     assert_eq!((score.foreign_caught, score.foreign_named), (rate(1, 2), rate(1, 2)));
     // 0.8 stated once, and it was.
-    assert!((score.calibration_unknown.ece.expect("stated") - 0.2).abs() < 1e-12);
+    let ece = score.calibration_unknown.ece.expect("stated");
+    assert_relative_eq!(ece, 0.2, epsilon = 0.0, max_relative = F64_ROUNDING);
 }
 
 #[test]

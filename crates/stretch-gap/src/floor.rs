@@ -8,6 +8,7 @@
 //! as a gap where the output is steep.
 
 use rayon::prelude::*;
+use stretch_filter::log::second_differences;
 
 use crate::{
     error::GapError,
@@ -132,7 +133,7 @@ pub fn noise_variance<'a>(stretches: impl Iterator<Item = &'a [f64]>, dt_s: f64)
     let window = ((1.0 / dt_s).round() as usize).max(30);
     let mut squares: Vec<f64> = Vec::new();
     for stretch in stretches {
-        let mut bends: Vec<f64> = stretch.windows(3).map(|w| w[0] - 2.0 * w[1] + w[2]).collect();
+        let mut bends: Vec<f64> = second_differences(stretch).collect();
         for part in bends.chunks_mut(window) {
             let taken = take_waves_out(part, dt_s) / part.len() as f64;
             squares.extend(part.iter().map(|x| x * x / (1.0 - taken.min(0.5))));

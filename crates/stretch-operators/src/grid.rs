@@ -149,13 +149,16 @@ impl Grid {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_relative_eq;
+    use testkit::tolerance::F64_ROUNDING;
 
     #[test]
     fn pieces_fill_the_sample_and_split_at_the_switch() {
         let grid = Grid::new(0.01, 0.005, 0.0635).unwrap();
-        assert!((grid.steps().iter().sum::<f64>() - 0.01).abs() < 1e-15);
+        let whole = grid.steps().iter().sum::<f64>();
+        assert_relative_eq!(whole, 0.01, epsilon = 0.0, max_relative = F64_ROUNDING);
         assert_eq!(grid.pieces(), 3);
-        assert!((grid.time_s(4) - 0.0135).abs() < 1e-12);
+        assert_relative_eq!(grid.time_s(4), 0.0135, epsilon = 0.0, max_relative = F64_ROUNDING);
         assert_eq!(grid.command(10, 0), Some(3));
         assert_eq!(grid.command(10, 1), Some(4));
         assert_eq!(grid.command(5, 0), None);

@@ -2,6 +2,8 @@
 
 use alloc::vec::Vec;
 
+use stretch_core::lag_weights;
+
 use crate::{
     grid::Grid,
     operator::{Span, Start},
@@ -35,15 +37,7 @@ impl MeanReversion {
 
     /// Of time constant `tau` (s, positive) on a grid; `reach` is the stroke of its input, in the input's unit.
     pub fn new(tau: f64, reach: f64, grid: &Grid) -> Self {
-        Self { tau, reach, weights: grid.steps().iter().map(|h| Self::weights(tau, *h)).collect() }
-    }
-
-    fn weights(tau: f64, h: f64) -> [f64; 3] {
-        let a = h / tau;
-        let gone = -libm::expm1(-a);
-        // Mean of the decay over the step; a series where the quotient would cancel.
-        let mean = if a < 1e-4 { 1.0 - a * (0.5 - a / 6.0) } else { gone / a };
-        [1.0 - gone, mean - (1.0 - gone), 1.0 - mean]
+        Self { tau, reach, weights: grid.steps().iter().map(|h| lag_weights(*h, tau)).collect() }
     }
 
     /// Prepares the memory, as [`Operator::begin`](crate::Operator::begin).

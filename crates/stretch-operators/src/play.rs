@@ -1,40 +1,13 @@
 //! Play: a part that follows once its backlash is used up.
 
+use stretch_core::play;
+
 use crate::{
     operator::{Operator, Span, Start},
+    play_start::play_start,
     prandtl_ishlinskii::PrandtlIshlinskii,
     unplay::unplay,
 };
-
-/// Backlash of half-width `w`: the output `z` stays until the input `x` pushes it, z -> max(x - w, min(x + w, z)).
-///
-/// ```
-/// use stretch_operators::play;
-/// assert_eq!(play(0.0, 0.5, 1.0), 0.0);
-/// assert_eq!(play(0.0, 3.0, 1.0), 2.0);
-/// assert_eq!(play(2.0, -3.0, 1.0), -2.0);
-/// ```
-#[inline]
-pub fn play(z: f64, x: f64, w: f64) -> f64 {
-    let low = x - w;
-    let high = x + w;
-    if z < low {
-        low
-    } else if z > high {
-        high
-    } else {
-        z
-    }
-}
-
-/// Where a play of half-width `w` begins a trial at input `first`; `last` is its output before.
-pub(crate) fn play_start(start: Start, last: f64, first: f64, w: f64) -> f64 {
-    match start {
-        Start::Settled => first,
-        Start::Carried { .. } => play(last, first, w),
-        Start::Wound(share) => first - share.clamp(-1.0, 1.0) * w,
-    }
-}
 
 /// Backlash as an operator: y = play(x, w), or the mean of play(x, w {1 - spread, 1, 1 + spread}), which turns softly.
 ///

@@ -1,8 +1,10 @@
 //! Prandtl-Ishlinskii hysteresis.
 
+use stretch_core::play;
+
 use crate::{
     operator::{Operator, Span, Start},
-    play::{play, play_start},
+    play_start::play_start,
 };
 
 /// The numbers of a [`PrandtlIshlinskii`] operator.

@@ -60,7 +60,9 @@ fn turns(signal: &[f64], band: f64) -> Vec<Turn> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::play;
+    use approx::assert_relative_eq;
+    use stretch_core::play;
+    use testkit::tolerance::F64_ROUNDING;
 
     #[test]
     fn finds_the_input_while_the_output_moves() {
@@ -82,7 +84,7 @@ mod tests {
         };
         assert!(rms(&found) < 0.2 * rms(&output), "{} of {}", rms(&found), rms(&output));
         // Away from the turns it is exact.
-        assert!((found[1000] - input[1000]).abs() < 1e-12);
+        assert_relative_eq!(found[1000], input[1000], epsilon = 0.0, max_relative = F64_ROUNDING);
         let mut still = [3.0; 10];
         unplay(w, &mut still);
         assert_eq!(still, [3.0; 10]);

@@ -1,5 +1,6 @@
 //! The receptor over converter codes against the one over volts, in `f64`.
 
+use approx::abs_diff_eq;
 use proptest::{collection::vec, prelude::*};
 use stretch_core::{
     Branch, Calibration, Model, Polarity, RateEstimator, Runner, Stage, Target, Volts, strategies,
@@ -265,10 +266,9 @@ proptest! {
                 if ours.branch != theirs.branch {
                     break; // a rate within that rounding of the dead band
                 }
-                let error = f64::from(ours.estimate) - 1000.0 * theirs.estimate;
-                // half a step of 3.3 V / 65536 at up to three taps of 0.12 a sample, at
-                // 100 Hz and about 1.1 mm for 1 V/s, beside the stated error: 0.9 + 0.6 um
-                prop_assert!(error.abs() <= 1.5, "{error}");
+                let (ours, theirs) = (f64::from(ours.estimate), 1000.0 * theirs.estimate);
+                let near = abs_diff_eq!(ours, theirs, epsilon = testkit::tolerance::CODE_STEP_UM);
+                prop_assert!(near, "{ours} {theirs}");
             }
         }
     }

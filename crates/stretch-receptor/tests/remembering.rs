@@ -1,6 +1,7 @@
 //! Receptors that remember: finite whatever comes, the same in both precisions,
 //! and an observer that inverts the gauge it describes.
 
+use approx::assert_abs_diff_eq;
 use proptest::prelude::*;
 use stretch_core::{
     Calibration, CalibrationSpec, DesignError, FitSummary, HistoryMap, HistoryShape, Interval,
@@ -267,5 +268,5 @@ fn a_resting_baseline_is_found() {
     for _ in 0..3000 {
         rested = fresh.step(Volts(1.15)).unwrap().estimate;
     }
-    assert!((last - rested).abs() < 0.5, "{last} {rested}");
+    assert_abs_diff_eq!(last, rested, epsilon = testkit::tolerance::REST_FOUND_MM);
 }

@@ -1,5 +1,6 @@
 //! The receptor on clean and faulty streams.
 
+use approx::{abs_diff_eq, assert_abs_diff_eq};
 use proptest::prelude::*;
 use stretch_core::{
     Branch, Calibration, Design, Model, Polarity, Runner, SampleRate, Stage, Volts,
@@ -117,8 +118,9 @@ proptest! {
             if let (Ok(a), Ok(b)) = (one.step(Volts(volts)), other.step(Volts(about - volts))) {
                 // at the very edge of the dead band a rounding may choose the other branch
                 if a.branch == b.branch {
-                    prop_assert!((a.estimate - b.estimate).abs() <= 180.0 * tolerance::FOLDED);
-                    prop_assert!((a.rate - b.rate).abs() <= 1e6 * tolerance::FOLDED);
+                    let (length, rate) = (180.0 * tolerance::FOLDED, 1e6 * tolerance::FOLDED);
+                    prop_assert!(abs_diff_eq!(a.estimate, b.estimate, epsilon = length));
+                    prop_assert!(abs_diff_eq!(a.rate, b.rate, epsilon = rate));
                 }
             }
         }
@@ -158,7 +160,8 @@ fn a_short_gap_costs_its_own_samples_only() {
     let mut unbroken = self::receptor();
     let whole = (0..=20 + u32::from(MAX_BRIDGED)).map(|n| unbroken.step(Volts(ramp(n)))).last();
     // on a straight ramp the bridge predicts every lost sample
-    assert!((after.estimate - whole.unwrap().unwrap().estimate).abs() < 180.0 * tolerance::FOLDED);
+    let whole = whole.unwrap().unwrap().estimate;
+    assert_abs_diff_eq!(after.estimate, whole, epsilon = 180.0 * tolerance::FOLDED);
 }
 
 #[test]

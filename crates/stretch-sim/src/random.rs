@@ -50,6 +50,7 @@ impl Random {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_abs_diff_eq;
 
     #[test]
     fn gaussians_have_the_moments_of_one_and_streams_differ() {
@@ -59,9 +60,9 @@ mod tests {
         let moment = |k: i32| x.iter().map(|x| x.powi(k)).sum::<f64>() / n as f64;
         // Five standard errors of each moment of so many samples.
         let error = 5.0 / (n as f64).sqrt();
-        assert!(moment(1).abs() < error);
-        assert!((moment(2) - 1.0).abs() < error * 2f64.sqrt());
-        assert!((moment(4) - 3.0).abs() < error * 96f64.sqrt());
+        assert_abs_diff_eq!(moment(1), 0.0, epsilon = error);
+        assert_abs_diff_eq!(moment(2), 1.0, epsilon = error * 2f64.sqrt());
+        assert_abs_diff_eq!(moment(4), 3.0, epsilon = error * 96f64.sqrt());
         assert_ne!(Random::new(7, 1).uniform(), Random::new(7, 2).uniform());
         assert_ne!(Random::new(7, 1).uniform(), Random::new(8, 1).uniform());
     }

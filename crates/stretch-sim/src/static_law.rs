@@ -97,6 +97,7 @@ mod tests {
         assert_eq!(law.contraction(-3.0), 0.0);
         assert_eq!(law.contraction(f64::NAN), 0.0);
         assert!(law.contraction(1e9).is_finite());
-        assert!((law.contraction(620.0) / params[Key::KMax] - 1.0176).abs() < 1e-4);
+        let full = law.contraction(620.0) / params[Key::KMax];
+        approx::assert_abs_diff_eq!(full, 1.0176, epsilon = testkit::tolerance::K_MAX_DIGITS);
     }
 }

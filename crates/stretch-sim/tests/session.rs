@@ -1,11 +1,13 @@
 //! Sessions repeat to the bit, rig files are read strictly, a gauge alone is a rig.
 
+use approx::{abs_diff_eq, assert_relative_eq, relative_eq};
 use stretch_data::{RigFile, Split, Trial};
 use stretch_sim::{
     CATALOGUE, Chain, DEFAULT_STEP_S, EffectSet, Gauge, GaugeSpec, Key, OPENINGS, Openings,
     Recorded, Rig, RunSettings, Session, SimError, Start, Tolerance, TrialPlan, default_rig_text,
     paper_preset,
 };
+use testkit::tolerance::{F64_ROUNDING, WHOLE_CODE};
 
 /// FNV-1a of the bits: any change of any number shows.
 fn fingerprint(trials: &[Trial]) -> u64 {
@@ -129,9 +131,12 @@ fn noise_and_converters() {
         let sd = (a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / n).sqrt();
         let wanted = (sigma * sigma + step * step / 12.0f64).sqrt();
         // Five standard errors of a standard deviation.
-        assert!((sd / wanted - 1.0).abs() < 5.0 / (2.0 * n).sqrt(), "{name}: {sd} for {wanted}");
+        let level = relative_eq!(sd, wanted, epsilon = 0.0, max_relative = 5.0 / (2.0 * n).sqrt());
+        assert!(level, "{name}: {sd} for {wanted}");
         if step > 0.0 {
-            assert!(a.iter().all(|x| ((x / step) - (x / step).round()).abs() < 1e-3), "{name}");
+            let codes = a.iter().map(|x| x / step);
+            let whole = |x: f64| abs_diff_eq!(x, x.round(), epsilon = WHOLE_CODE);
+            assert!(codes.into_iter().all(whole), "{name}");
         }
     }
     // A converter clips.
@@ -240,7 +245,13 @@ fn a_gauge_alone_is_a_rig() {
         y
     };
     let plain = run(&EffectSet::new());
-    assert!(plain.iter().zip(&x).all(|(y, x)| (y - (400.0 - 1.5 * (x - 10.0))).abs() < 1e-10));
+    let line: Vec<f64> = x.iter().map(|x| 400.0 - 1.5 * (x - 10.0)).collect();
+    assert_relative_eq!(
+        plain.as_slice(),
+        line.as_slice(),
+        epsilon = 0.0,
+        max_relative = 1e1 * F64_ROUNDING
+    );
     for effect in CATALOGUE.iter().filter(|e| Gauge::accepts(e, false)) {
         let values: Vec<f64> = effect.parameters.iter().map(|p| Gauge::range(p).2).collect();
         let mut set = EffectSet::new();

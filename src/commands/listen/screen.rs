@@ -12,7 +12,7 @@ use ratatui::{
     widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph},
 };
 
-use super::{Status, record::Sample, twin::Twin};
+use super::{record::Sample, status::Status, twin::Twin};
 
 /// Seconds that the plot shows.
 const SPAN_S: f64 = 20.0;

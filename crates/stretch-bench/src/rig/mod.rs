@@ -1,16 +1,17 @@
-//! The rig as a [`Simulator`]: pneumatics, muscle (or both as actuation) and sensing, each on measured inputs.
+//! The rig as a [`Simulator`](stretch_gap::Simulator): pneumatics, muscle (or both as actuation) and sensing, each on measured inputs.
 
 mod experiments;
 mod extent;
 mod nominal;
 mod run;
 mod session;
+mod simulator;
 pub(crate) mod smooth;
 
 use std::path::Path;
 
 use stretch_data::DataSet;
-use stretch_gap::{Description, DescriptionSpec, GapError, Motion, Run, Simulator, TrialSpec};
+use stretch_gap::{Description, DescriptionSpec, TrialSpec};
 use stretch_sim::{Catalogue, Effect, EffectSet, Key, Rig, RigParams, Search, Stage};
 
 use extent::extent_of;
@@ -153,67 +154,4 @@ fn measured(session: &Session, stage: Stage) -> Vec<f64> {
         _ => trial.length_mm.clone(),
     };
     session.trials.iter().flat_map(channel).collect()
-}
-
-impl Simulator for RigSimulator {
-    fn description(&self) -> &Description {
-        &self.about
-    }
-
-    fn measured(&self, stage: usize) -> &[f64] {
-        &self.measured[stage]
-    }
-
-    fn wander_clock(&self, parameter: usize) -> Option<Vec<u32>> {
-        if self.keys[parameter] != Some(Key::PS) {
-            return None;
-        }
-        // The supply reaches the chamber through the inlet only: while it is shut, the clock stands still.
-        let mut clock = Vec::new();
-        for trial in &self.session.trials {
-            let mut last = 0;
-            for (i, opening) in trial.inlet.iter().enumerate() {
-                if *opening > 0.0 {
-                    last = i as u32;
-                }
-                clock.push(last);
-            }
-        }
-        Some(clock)
-    }
-
-    fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
-        Ok(run::simulate(self, run, None, out)?)
-    }
-
-    fn motion(&self) -> Motion<'_> {
-        let stage = self.stages().iter().position(|s| s.channel == "length_mm").unwrap_or(0);
-        Motion {
-            values: &self.measured[stage],
-            unit: "mm",
-            falling: "inflation",
-            rising: "deflation",
-        }
-    }
-
-    fn sensor(&self) -> Option<usize> {
-        self.stage_kinds.iter().position(|kind| *kind == Stage::Sensing)
-    }
-
-    fn input(&self, stage: usize) -> Option<Vec<f64>> {
-        let smooth = match self.stage_kinds[stage] {
-            Stage::Muscle => &self.inputs.pressure,
-            Stage::Sensing => &self.inputs.length,
-            _ => return None,
-        };
-        Some(smooth.iter().flat_map(|s| &s.values).copied().collect())
-    }
-
-    fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {
-        if self.input(run.stage).is_none() {
-            return Ok(false);
-        }
-        run::simulate(self, run, Some(input), out)?;
-        Ok(true)
-    }
 }

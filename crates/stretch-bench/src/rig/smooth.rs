@@ -146,16 +146,18 @@ pub(super) fn cubic(samples: &[f64], i: usize, share: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_abs_diff_eq;
+    use testkit::tolerance::{CORNER_KEPT, LOCAL_VALUE};
 
     #[test]
     fn keeps_parabolas_and_corners() {
         let wide = vec![WIDEST as u8; 50];
         let line: Vec<f64> = (0..50).map(|i| 0.01 * f64::from(i * i)).collect();
         let same = Smoother::choose(&line, 0.05, &wide).apply(&line);
-        assert!(line.iter().zip(&same).all(|(a, b)| (a - b).abs() < 1e-9));
+        assert_abs_diff_eq!(line.as_slice(), same.as_slice(), epsilon = LOCAL_VALUE);
         let corner: Vec<f64> = (0..50).map(|i| f64::from((i - 25).max(0))).collect();
         let same = Smoother::choose(&corner, 0.05, &wide).apply(&corner);
-        assert!(corner.iter().zip(&same).all(|(a, b)| (a - b).abs() < 0.1));
+        assert_abs_diff_eq!(corner.as_slice(), same.as_slice(), epsilon = CORNER_KEPT);
     }
 
     #[test]

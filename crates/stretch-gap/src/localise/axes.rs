@@ -3,6 +3,8 @@
 //! Level and rate come from the measured motion by a straight line over 21 samples, whose slope has the standard deviation
 //! sigma/(dt sqrt(2 sum_1^10 k^2)) for noise sigma of one sample; motion slower than four of these is rest.
 
+use stretch_filter::log::second_differences;
+
 use crate::{
     frame::Frame,
     simulator::{Motion, Simulator},
@@ -267,7 +269,7 @@ fn line(samples: &[f64], at: usize, dt_s: f64) -> (f64, f64) {
 
 /// Noise of a record from the median of its second differences.
 fn noise(values: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> = values.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
+    let mut sizes: Vec<f64> = second_differences(values).map(f64::abs).collect();
     sizes.sort_by(f64::total_cmp);
     sizes.get(sizes.len() / 2).map_or(0.0, |m| m / 0.6745 / 6f64.sqrt())
 }

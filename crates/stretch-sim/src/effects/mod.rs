@@ -6,6 +6,7 @@ mod effect;
 mod parameter;
 mod search;
 mod set;
+mod starts;
 
 pub use action::{Action, Surroundings};
 pub use catalogue::Catalogue;

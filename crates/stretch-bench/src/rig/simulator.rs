@@ -1,0 +1,69 @@
+//! What a diagnosis asks of the rig.
+
+use stretch_gap::{Description, GapError, Motion, Run, Simulator};
+use stretch_sim::{Key, Stage};
+
+use super::{RigSimulator, run};
+
+impl Simulator for RigSimulator {
+    fn description(&self) -> &Description {
+        &self.about
+    }
+
+    fn measured(&self, stage: usize) -> &[f64] {
+        &self.measured[stage]
+    }
+
+    fn wander_clock(&self, parameter: usize) -> Option<Vec<u32>> {
+        if self.keys[parameter] != Some(Key::PS) {
+            return None;
+        }
+        // The supply reaches the chamber through the inlet only: while it is shut, the clock stands still.
+        let mut clock = Vec::new();
+        for trial in &self.session.trials {
+            let mut last = 0;
+            for (i, opening) in trial.inlet.iter().enumerate() {
+                if *opening > 0.0 {
+                    last = i as u32;
+                }
+                clock.push(last);
+            }
+        }
+        Some(clock)
+    }
+
+    fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
+        Ok(run::simulate(self, run, None, out)?)
+    }
+
+    fn motion(&self) -> Motion<'_> {
+        let stage = self.stages().iter().position(|s| s.channel == "length_mm").unwrap_or(0);
+        Motion {
+            values: &self.measured[stage],
+            unit: "mm",
+            falling: "inflation",
+            rising: "deflation",
+        }
+    }
+
+    fn sensor(&self) -> Option<usize> {
+        self.stage_kinds.iter().position(|kind| *kind == Stage::Sensing)
+    }
+
+    fn input(&self, stage: usize) -> Option<Vec<f64>> {
+        let smooth = match self.stage_kinds[stage] {
+            Stage::Muscle => &self.inputs.pressure,
+            Stage::Sensing => &self.inputs.length,
+            _ => return None,
+        };
+        Some(smooth.iter().flat_map(|s| &s.values).copied().collect())
+    }
+
+    fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {
+        if self.input(run.stage).is_none() {
+            return Ok(false);
+        }
+        run::simulate(self, run, Some(input), out)?;
+        Ok(true)
+    }
+}

@@ -1,0 +1,109 @@
+//! Imports between files go one way.
+
+mod imports;
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use imports::{Imports, Module, circles, imports, module, shown};
+
+/// The text of every file below a folder.
+fn sources(folder: &Path) -> BTreeMap<Module, String> {
+    let (mut found, mut folders) = (BTreeMap::new(), vec![folder.to_owned()]);
+    while let Some(next) = folders.pop() {
+        for entry in fs::read_dir(&next).unwrap_or_else(|e| panic!("{}: {e}", next.display())) {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|end| end == "rs") {
+                let below = path.strip_prefix(folder).unwrap().to_str().unwrap();
+                found.insert(module(below), fs::read_to_string(&path).unwrap());
+            }
+        }
+    }
+    found
+}
+
+fn root() -> PathBuf {
+    env!("CARGO_MANIFEST_DIR").into()
+}
+
+/// Files of a report that import from a command.
+fn reports_that_know_commands(imports: &Imports) -> Vec<String> {
+    let is_in = |module: &Module, folder: &str| module.first().is_some_and(|m| m == folder);
+    let reports = imports.iter().filter(|(module, _)| is_in(module, "report"));
+    let knows = reports.filter(|(_, of)| of.iter().any(|m| is_in(m, "commands")));
+    knows.map(|(module, _)| shown(module)).collect()
+}
+
+#[test]
+fn files_of_a_crate_import_in_no_circle() {
+    let crates = fs::read_dir(root().join("crates")).unwrap().map(|entry| entry.unwrap().path());
+    let mut wrong = Vec::new();
+    for folder in crates.chain([root(), root().join("testkit")]) {
+        let found = imports(&sources(&folder.join("src")));
+        assert!(!found.is_empty(), "{}: no file", folder.display());
+        wrong.extend(circles(&found).iter().map(|line| format!("{}: {line}", folder.display())));
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn reports_know_no_command() {
+    let wrong = reports_that_know_commands(&imports(&sources(&root().join("src"))));
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Imports of a made-up crate, by path below `src`.
+fn made_up(files: &[(&str, &str)]) -> Imports {
+    imports(&files.iter().map(|(path, text)| (module(path), (*text).to_owned())).collect())
+}
+
+#[test]
+fn a_planted_circle_is_found_however_it_is_written() {
+    let root = ("lib.rs", "mod a; mod b; pub use a::A; pub use b::{B, b};");
+    let a = ("a.rs", "use crate::b::B; pub struct A(B);");
+    for b in [
+        "use crate::a::A; pub struct B(A);",
+        "use super::a; pub struct B(a::A);",
+        "use crate::{A}; pub struct B(A);",
+        "pub struct B; fn b(x: crate::a::A) {}",
+        "pub struct B; fn b() { println!(\"{}\", crate::a::A::new()) }",
+    ] {
+        let found = circles(&made_up(&[root, a, ("b.rs", b)]));
+        assert_eq!(found, ["a imports from b", "b imports from a"], "{b}");
+    }
+    let parent = ("p.rs", "mod c; use c::C; pub const ONE: C = C(1);");
+    let child = ("p/c.rs", "use super::ONE; pub struct C(i8);");
+    let main = ("main.rs", "mod p; fn main() { p::run() }");
+    let found = circles(&made_up(&[main, parent, child]));
+    assert_eq!(found, ["p imports from p::c", "p::c imports from p"]);
+}
+
+#[test]
+fn handing_on_and_testing_make_no_circle() {
+    let found = made_up(&[
+        ("lib.rs", "mod a; mod b; pub use a::A; pub use b::B;"),
+        ("a/mod.rs", "mod c; pub use c::C; pub struct A(crate::B);"),
+        ("a/c.rs", "pub struct C; #[cfg(test)] mod tests { use super::*; use crate::A; }"),
+        ("b.rs", "use crate::a::C; pub struct B(C);"),
+    ]);
+    assert_eq!(circles(&found), [""; 0]);
+    assert_eq!(found[&module("b.rs")], [module("a/c.rs")].into());
+}
+
+#[test]
+fn a_planted_import_from_a_command_is_found() {
+    let found = made_up(&[
+        ("main.rs", "mod commands; mod report;"),
+        ("commands/mod.rs", "mod run; pub use run::Args;"),
+        ("commands/run.rs", "use crate::report::page; pub struct Args;"),
+        ("report/mod.rs", "mod page; mod tidy; pub use page::page;"),
+        ("report/page.rs", "use crate::commands::Args; pub fn page(_: Args) {}"),
+        ("report/tidy.rs", "use super::page;"),
+    ]);
+    assert_eq!(reports_that_know_commands(&found), ["report::page"]);
+}

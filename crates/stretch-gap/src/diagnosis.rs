@@ -73,7 +73,7 @@ pub struct EffectValue {
     pub sd: f64,
 }
 
-/// What one effect of the best set closes of the gap in the trials that were fitted.
+/// What one effect of the best set closes of the gap in the trials that were not fitted.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EffectShare {
     /// Effect.

@@ -91,23 +91,18 @@ fn run(
     let first = candidates.first();
     let case = Case { gap: evidence.gap, first, strongest: shares.first(), sanity: &sanity };
     let verdict = judge(case, thresholds);
-    let (naming, transfer) = match verdict.kind {
-        VerdictKind::Effect | VerdictKind::Partial => {
-            progress("what the gap costs a calibration");
-            let naming = Naming::of(&candidates, &shares, thresholds);
-            (naming, transfer(runs, &evidence, seed)?)
-        }
-        _ => (Naming::default(), None),
+    let names = matches!(verdict.kind, VerdictKind::Effect | VerdictKind::Partial);
+    let naming = match names {
+        true => Naming::of(&candidates, &shares, thresholds),
+        false => Naming::default(),
     };
-    let unexplained = match (verdict.kind, first) {
-        (VerdictKind::Partial, Some(first)) => Some(unexplained(simulator, &evidence, first, seed)),
-        _ => None,
-    };
+    progress("what the gap costs a calibration");
+    let transfer = if names { transfer(runs, &evidence, seed)? } else { None };
+    let partial = first.filter(|_| verdict.kind == VerdictKind::Partial);
+    let unexplained = partial.map(|first| unexplained(simulator, &evidence, first, seed));
     let ambiguous = match verdict.kind {
-        VerdictKind::Effect | VerdictKind::Partial | VerdictKind::Unknown => {
-            covering_set(&weighed, simulator)
-        }
         VerdictKind::NoGap | VerdictKind::Parameters => Vec::new(),
+        _ => covering_set(&weighed, simulator),
     };
     let (runtime_s, simulations) = (begun.elapsed().as_secs_f64(), runs.count());
     let simpler = || baselines(&problem, &search.sets.tried, thresholds.null_excess);

@@ -3,6 +3,7 @@
 mod actuation;
 mod chain;
 mod muscle;
+mod openings;
 mod pneumatics;
 mod reference;
 mod sensing;
@@ -10,7 +11,8 @@ mod sensing;
 pub use actuation::Actuation;
 pub use chain::{Chain, ChainMemory, Recorded};
 pub use muscle::Muscle;
-pub use pneumatics::{Openings, Pneumatics};
+pub use openings::Openings;
+pub use pneumatics::Pneumatics;
 pub use reference::Reference;
 pub use sensing::{Bridge, Sensing};
 pub(crate) use sensing::{Sites, pick};

@@ -2,7 +2,7 @@
 
 use stretch_operators::{Grid, Row, Span, Start};
 
-use super::check_length;
+use super::{check_length, openings::Openings};
 use crate::{
     SimError,
     effects::{Action, EffectSet, Surroundings},
@@ -16,38 +16,6 @@ use crate::{
 const STIFF: f64 = 2.0;
 /// Most effects that may draw on the supply at once.
 const MOST_DROOPS: usize = 2;
-
-/// Openings of the two valves, one value a sample, held until the next.
-#[derive(Debug, Clone, Copy)]
-pub struct Openings<'a> {
-    /// Inlet, 0..1.
-    pub inlet: &'a [f64],
-    /// Outlet, 0..1.
-    pub outlet: &'a [f64],
-}
-
-impl<'a> Openings<'a> {
-    /// What the valves take of the commands, where that differs.
-    pub(crate) fn of(taken: Option<&'a [Vec<f64>; 2]>, commanded: Self) -> Self {
-        taken.map_or(commanded, |[inlet, outlet]| Self { inlet, outlet })
-    }
-}
-
-impl Openings<'_> {
-    /// How many samples there are.
-    ///
-    /// # Errors
-    /// The valves have different numbers of samples, or an opening is not within 0..1.
-    pub fn check(&self) -> Result<usize, SimError> {
-        check_length("outlet", self.inlet.len(), self.outlet.len())?;
-        for (column, openings) in [("inlet", self.inlet), ("outlet", self.outlet)] {
-            if let Some(sample) = openings.iter().position(|u| !(0.0..=1.0).contains(u)) {
-                return Err(SimError::Opening { column, sample, value: openings[sample] });
-            }
-        }
-        Ok(self.inlet.len())
-    }
-}
 
 /// Valves and chamber, prepared: ISO 6358 flow into and out of an isothermal chamber.
 ///

@@ -12,7 +12,7 @@
 //!
 //! Integer arithmetic rounds the same way everywhere: results are the same bits
 //! on a desk and on any core. Designs are computed in `f64` and refused when
-//! they do not fit ([`DesignError::OutOfRange`]); a step takes any `i32` and
+//! they do not fit ([`DesignError::OutOfRange`](crate::DesignError::OutOfRange)); a step takes any `i32` and
 //! never panics or wraps.
 
 mod accumulator;

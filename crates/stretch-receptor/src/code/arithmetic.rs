@@ -27,5 +27,5 @@ pub(super) mod sealed {
 }
 
 /// The arithmetic that a [`CodeReceptor`](super::CodeReceptor) evaluates its
-/// surface in: [`Fixed`], `f32` or `f64`.
+/// surface in: [`Fixed`](crate::code::Fixed), `f32` or `f64`.
 pub trait CodeArithmetic: sealed::Arithmetic {}

@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")"
 
-LIBRARIES="stretch-core stretch-filter stretch-fit stretch-metrics stretch-receptor stretch-link"
+LIBRARIES="stretch-core stretch-filter stretch-fit stretch-metrics stretch-operators stretch-receptor stretch-link"
 TARGETS="thumbv7m-none-eabi thumbv7em-none-eabihf"
 
 step() { printf '\n=== %s (%ss)\n' "$1" "$SECONDS"; }
@@ -78,7 +78,7 @@ step "packages of the library crates"
 packages=$(mktemp -d)
 trap 'rm -rf "$packages"' EXIT
 # shellcheck disable=SC2046,SC2086
-cargo package --quiet --locked --allow-dirty --target-dir "$packages" $(printf -- '-p %s ' $LIBRARIES stretch-data stretch-calibrate stretch-operators stretch-sim)
+cargo package --quiet --locked --allow-dirty --target-dir "$packages" $(printf -- '-p %s ' $LIBRARIES stretch-data stretch-calibrate stretch-sim)
 
 step "fuzz targets compile"
 cargo check --quiet --locked --manifest-path fuzz/Cargo.toml

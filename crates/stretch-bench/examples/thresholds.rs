@@ -56,7 +56,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     print!("{text}");
     if is_written {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("thresholds.toml");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stretch-gap/thresholds.toml");
         fs::write(path, text)?;
     }
     Ok(())

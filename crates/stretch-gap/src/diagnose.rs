@@ -96,8 +96,13 @@ fn run(
         true => Naming::of(&candidates, &shares, thresholds),
         false => Naming::default(),
     };
-    progress("what the gap costs a calibration");
-    let transfer = if names { transfer(runs, &evidence, seed)? } else { None };
+    let transfer = match names {
+        true => {
+            progress("what the gap costs a calibration");
+            transfer(runs, &evidence, seed)?
+        }
+        false => None,
+    };
     let partial = first.filter(|_| verdict.kind == VerdictKind::Partial);
     let unexplained = partial.map(|first| unexplained(simulator, &evidence, first, seed));
     let ambiguous = match verdict.kind {

@@ -51,10 +51,13 @@ pub(crate) fn shares(
     let mut out = Vec::new();
     for (effect, less) in peeled {
         let stages = 0..nominal.len();
-        let without: Result<Vec<f64>, GapError> = stages
-            .map(|s| Ok(gap(mean_square(&Traces::of(problem, s, &less.model)?.blocks))))
-            .collect();
-        let without = without?;
+        let without: Vec<f64> = match less.effects.is_empty() {
+            // The nominal was run already.
+            true => nominal.clone(),
+            false => stages
+                .map(|s| Ok(gap(mean_square(&Traces::of(problem, s, &less.model)?.blocks))))
+                .collect::<Result<_, GapError>>()?,
+        };
         let closed = without.iter().zip(&with).map(|(without, with)| without - with);
         let of_stages = closed.clone().zip(&nominal).filter(|(_, whole)| **whole >= least_gap);
         let spec = &problem.simulator().effects()[*effect];

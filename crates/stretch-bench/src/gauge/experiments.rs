@@ -117,14 +117,12 @@ impl GaugeSimulator {
         }
         let effects = unrecorded(&base, &self.rows, &model)?;
         let gauge = Gauge::new(self.nominal(&model), &effects, self.record.dt_s)?;
-        let shown: Vec<f64> =
-            course.e.iter().map(|e| self.spec.zero + self.spec.span * e).collect();
+        let shown = self.reference_of(course);
         let mut signal = vec![0.0; shown.len()];
         // Without a pressure column there is no effect of it either.
-        let scale = self.spec.pressure_scale.filter(|_| !self.record.pressure.is_empty());
-        let pressure: Vec<f64> = match scale {
-            Some(scale) => course.pressure.iter().map(|share| share * scale).collect(),
-            None => Vec::new(),
+        let pressure = match self.record.pressure.is_empty() {
+            true => Vec::new(),
+            false => self.pressure_of(course),
         };
         gauge.run(&mut gauge.memory(), Start::Settled, 0.0, &shown, &pressure, &mut signal)?;
         let noise = self.noise.max(1e-6 * self.spread);
@@ -134,27 +132,35 @@ impl GaugeSimulator {
 }
 
 impl GaugeSimulator {
-    /// What the gauge shows of a pressure while its length stands still.
-    fn pressure_sweep(&self) -> (Plan, Course) {
-        let course = held_under_pressure(self.record.dt_s);
-        let of = |values: &[f64], zero: f64, span: f64| -> Vec<f64> {
-            values.iter().map(|x| zero + span * x).collect()
-        };
-        let length = of(&course.e, self.spec.zero, self.spec.span);
-        let pressure = of(&course.pressure, 0.0, self.spec.pressure_scale.unwrap_or(0.0));
+    fn reference_of(&self, course: &Course) -> Vec<f64> {
+        course.e.iter().map(|e| self.spec.zero + self.spec.span * e).collect()
+    }
+
+    fn pressure_of(&self, course: &Course) -> Vec<f64> {
+        let scale = self.spec.pressure_scale.unwrap_or(0.0);
+        course.pressure.iter().map(|share| share * scale).collect()
+    }
+
+    /// The trial that sets a course: the reference, and the pressure where one is applied.
+    fn trial(&self, name: &str, course: &Course) -> Trial {
         let channel = |name: String, values| Channel { name, values };
-        let trial = Trial {
-            name: "held_under_pressure".into(),
-            time_s: (0..course.e.len()).map(|i| i as f64 * self.record.dt_s).collect(),
-            channels: vec![
-                channel(format!("set_{}", self.reference), length),
-                channel("set_pressure_kpa".into(), pressure),
-            ],
-        };
-        let how =
-            "Hold the gauge at one length, with a block, while the pressure goes up and down.";
-        let name = trial.name.clone();
-        (Plan { name, how: how.into(), prepare_min: 3.0, trial }, course)
+        let reference = format!("set_{}", self.reference);
+        let mut channels = vec![channel(reference, self.reference_of(course))];
+        if course.pressure.iter().any(|share| *share != 0.0) {
+            channels.push(channel("set_pressure_kpa".into(), self.pressure_of(course)));
+        }
+        let time_s = (0..course.e.len()).map(|i| i as f64 * self.record.dt_s).collect();
+        Trial { name: name.into(), time_s, channels }
+    }
+
+    fn experiment(
+        &self,
+        (name, how): (&str, &str),
+        prepare_min: f64,
+        course: Course,
+    ) -> (Plan, Course) {
+        let trial = self.trial(name, &course);
+        (Plan { name: name.into(), how: how.into(), prepare_min, trial }, course)
     }
 }
 
@@ -165,17 +171,14 @@ impl Laboratory for GaugeSimulator {
         let dt_s = self.record.dt_s;
         let plan = |(name, how, prepare_min, points, is_known): Dish| {
             let course = Course { is_known, ..course(&points, dt_s) };
-            let values = course.e.iter().map(|e| self.spec.zero + self.spec.span * e).collect();
-            let trial = Trial {
-                name: name.into(),
-                time_s: (0..course.e.len()).map(|i| i as f64 * dt_s).collect(),
-                channels: vec![Channel { name: format!("set_{}", self.reference), values }],
-            };
-            (Plan { name: name.into(), how: how.into(), prepare_min, trial }, course)
+            self.experiment((name, how), prepare_min, course)
         };
         let mut menu: Vec<(Plan, Course)> = dishes().into_iter().map(plan).collect();
         if !self.record.pressure.is_empty() {
-            menu.push(self.pressure_sweep());
+            let how =
+                "Hold the gauge at one length, with a block, while the pressure goes up and down.";
+            let told = ("held_under_pressure", how);
+            menu.push(self.experiment(told, 3.0, held_under_pressure(dt_s)));
         }
         menu
     }

@@ -6,6 +6,7 @@ mod gauge;
 mod rig;
 mod rig_file;
 mod specs;
+mod wild;
 
 pub use error::BenchError;
 pub use gauge::{GaugeSetup, GaugeSimulator};

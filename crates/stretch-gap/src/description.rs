@@ -135,7 +135,7 @@ impl Description {
         for stage in &spec.stages {
             let owner = || format!("stage `{}`", stage.name);
             indices(&owner, "parameter", &stage.parameters, spec.parameters.len())?;
-            let noise = stage.noise.unwrap_or(0.0);
+            let noise = stage.noise.as_ref().map_or(0.0, crate::noise::Noise::sd);
             number(&owner, "noise", noise, "0 or more", |x| x >= 0.0)?;
         }
         spec.parameters.iter().try_for_each(check_parameter)?;

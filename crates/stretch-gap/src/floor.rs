@@ -8,11 +8,11 @@
 //! as a gap where the output is steep.
 
 use rayon::prelude::*;
-use stretch_filter::log::second_differences;
 
 use crate::{
     error::GapError,
     frame::{Frame, Role},
+    noise::Noise,
     runs::Runs,
     simulator::{Model, Run, Simulator},
 };
@@ -58,10 +58,11 @@ fn floor(
     let simulator = runs.simulator();
     let arrived = transmitted(runs, stage, model, seed)?;
     let samples = arrived.len();
-    let (own, mut source) = match simulator.stages()[stage].noise {
-        Some(noise) => (noise * noise, "known noise of the channel".to_owned()),
-        None => (of_record(simulator, frame, stage), "second differences of the record".to_owned()),
+    let noise = match &simulator.stages()[stage].noise {
+        Some(noise) => noise.clone(),
+        None => of_record(simulator, frame, stage),
     };
+    let (own, mut source) = (noise.sd().powi(2), noise.source().to_owned());
     let mean = arrived.iter().sum::<f64>() / samples.max(1) as f64;
     if mean > 1e-4 * own {
         source += ", and the measured input's noise";
@@ -107,71 +108,9 @@ fn transmitted(
     Ok(arrived)
 }
 
-/// Noise variance of the output of a stage, from the samples that may be looked at.
-fn of_record(simulator: &dyn Simulator, frame: &Frame, stage: usize) -> f64 {
+/// Noise of the output of a stage, from the samples that may be looked at.
+fn of_record(simulator: &dyn Simulator, frame: &Frame, stage: usize) -> Noise {
     let measured = simulator.measured(stage);
     let segments = frame.segments.iter().filter(|s| s.role != Role::Test);
-    noise_variance(segments.map(|s| &measured[s.from..s.to]), simulator.dt_s())
-}
-
-/// Noise variance of a record: a sixth of the median square of its second differences, corrected for the median of a
-/// normal variable's square; robust against what the motion adds. What the mains add is not noise: in every second
-/// the waves of 50 and 60 Hz are taken out before.
-///
-/// Second differences d_i = x_(i-1) - 2 x_i + x_(i+1) of white noise have the variance (1 + 4 + 1) sigma^2, and the median of a squared
-/// normal variable is 0.4549 of its mean: sigma^2 = median(d^2)/(6 * 0.4549). `dt_s` is the sample time, s; the answer has the unit of the
-/// record squared.
-///
-/// ```
-/// use stretch_gap::{Dice, noise_variance};
-/// let mut dice = Dice::new(1, 0);
-/// let record: Vec<f64> = (0..20_000).map(|i| (1e-3 * f64::from(i)).sin() + 0.2 * dice.gauss()).collect();
-/// let sd = noise_variance([record.as_slice()].into_iter(), 0.01).sqrt();
-/// assert!((sd - 0.2).abs() < 0.01);
-/// ```
-pub fn noise_variance<'a>(stretches: impl Iterator<Item = &'a [f64]>, dt_s: f64) -> f64 {
-    let window = ((1.0 / dt_s).round() as usize).max(30);
-    let mut squares: Vec<f64> = Vec::new();
-    for stretch in stretches {
-        let mut bends: Vec<f64> = second_differences(stretch).collect();
-        for part in bends.chunks_mut(window) {
-            let taken = take_waves_out(part, dt_s) / part.len() as f64;
-            squares.extend(part.iter().map(|x| x * x / (1.0 - taken.min(0.5))));
-        }
-    }
-    if squares.is_empty() {
-        return 1e-12;
-    }
-    let mean = squares.iter().sum::<f64>() / squares.len() as f64 / 6.0;
-    let middle = squares.len() / 2;
-    let median = *squares.select_nth_unstable_by(middle, f64::total_cmp).1 / 6.0 / 0.4549;
-    // A coarse converter makes the median 0.
-    if median > 1e-3 * mean { median } else { mean.max(1e-18) }
-}
-
-/// Takes the waves of the mains out of a second of second differences, one after the other; how many samples' worth of
-/// white noise went with them.
-fn take_waves_out(values: &mut [f64], dt_s: f64) -> f64 {
-    let mut taken = 0.0;
-    for hertz in [50.0, 60.0] {
-        let turns: f64 = hertz * dt_s;
-        let shown = (turns - turns.round()).abs();
-        // What shows as a slow wave cannot be told from motion.
-        if shown < 0.15 || values.len() < 20 {
-            continue;
-        }
-        for phase in [0.0, 0.25] {
-            let wave = |i: usize| (std::f64::consts::TAU * (shown * i as f64 + phase)).cos();
-            let power: f64 = (0..values.len()).map(|i| wave(i).powi(2)).sum();
-            // At half the sample rate there is one wave only.
-            if power < 1e-6 * values.len() as f64 {
-                continue;
-            }
-            let size = values.iter().enumerate().map(|(i, x)| x * wave(i)).sum::<f64>() / power;
-            values.iter_mut().enumerate().for_each(|(i, x)| *x -= size * wave(i));
-            // Of white noise, second differences hold (2 - 2 cos)^2 of each wave, and 6 on the average.
-            taken += (2.0 - 2.0 * (std::f64::consts::TAU * shown).cos()).powi(2) / 6.0;
-        }
-    }
-    taken
+    Noise::of_differences(segments.map(|s| &measured[s.from..s.to]), simulator.dt_s())
 }

@@ -22,6 +22,7 @@ mod localise;
 mod metric;
 mod naming;
 mod next_experiment;
+mod noise;
 mod nuisance;
 mod probability;
 mod problem;
@@ -49,9 +50,9 @@ pub use diagnosis::{
 pub use dice::Dice;
 pub use error::GapError;
 pub use evidence::{Evidence, StageEvidence};
-pub use floor::noise_variance;
 pub use frame::{BLOCK_S, Frame, Role, Segment};
 pub use next_experiment::{Laboratory, Plan, Proposal, differences, next_experiment};
+pub use noise::{Noise, WINDOW, noise_variance};
 pub use simulator::{Model, Motion, Run, Simulator};
 pub use spec::{EffectParameterSpec, EffectSpec, ParameterSpec, StageSpec, TrialSpec, Wander};
 pub use thresholds::Thresholds;

@@ -6,6 +6,8 @@ use std::ops::RangeInclusive;
 
 use serde::Serialize;
 
+use crate::noise::Noise;
+
 /// A stage of a simulator: it turns a measured input into one measured output channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StageSpec {
@@ -17,9 +19,8 @@ pub struct StageSpec {
     pub unit: String,
     /// Indices of the nominal parameters that act in it.
     pub parameters: Vec<usize>,
-    /// Known noise of the output, one standard deviation, rounding included; none when it has to be taken from
-    /// the record's second differences.
-    pub noise: Option<f64>,
+    /// Noise of the output, rounding included; none when it has to be taken from the record's second differences.
+    pub noise: Option<Noise>,
 }
 
 impl StageSpec {

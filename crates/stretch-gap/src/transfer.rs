@@ -90,7 +90,10 @@ fn records(
         before = Some(std::mem::replace(&mut output, next));
     }
     let noisy = |mut values: Vec<f64>, stage: usize| {
-        let sd = simulator.stages()[stage].noise.unwrap_or(evidence.stages[stage].floor);
+        let sd = simulator.stages()[stage]
+            .noise
+            .as_ref()
+            .map_or(evidence.stages[stage].floor, crate::noise::Noise::sd);
         let mut dice = Dice::new(seed, 900 + stage as u64);
         values.iter_mut().for_each(|x| *x += sd * dice.gauss());
         values

@@ -7,8 +7,8 @@ mod source;
 
 use stretch_data::{SessionTrial, unit};
 use stretch_gap::{
-    Description, DescriptionSpec, Dice, GapError, Model, Motion, ParameterSpec, Run, Simulator,
-    StageSpec, TrialSpec,
+    Description, DescriptionSpec, Dice, GapError, Model, Motion, Noise, ParameterSpec, Run,
+    Simulator, StageSpec, TrialSpec,
 };
 use stretch_sim::{
     Alone, Catalogue, Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Measured, Start, Tolerance,
@@ -91,7 +91,7 @@ pub struct GaugeSimulator {
     spec: GaugeSpec,
     /// Column of the reference.
     reference: String,
-    reference_sd: f64,
+    reference_noise: Noise,
     /// Noise of the signal, one standard deviation.
     noise: f64,
     /// Range of the signal.
@@ -109,9 +109,10 @@ impl GaugeSimulator {
         let record = Record::read(trials, reference, signal)?;
         let nominal = nominal(&record, rig);
         let (least, greatest) = record.range(&record.signal);
-        let (reference_sd, noise) = (record.noise(&record.reference), record.noise(&record.signal));
+        let (reference_noise, noise) =
+            (record.noise(&record.reference), record.noise(&record.signal).sd());
         let inputs = parts(&record.trials, &record.reference)
-            .map(|(_, x)| Smoothed::of(x, reference_sd, &unscheduled(x.len())))
+            .map(|(_, x)| Smoothed::of(x, reference_noise.sd(), &unscheduled(x.len())))
             .collect();
         let alone = alone(&record);
         let has_pressure = nominal.spec.pressure_scale.is_some();
@@ -139,7 +140,7 @@ impl GaugeSimulator {
             rows,
             inputs,
             reference: reference.into(),
-            reference_sd,
+            reference_noise,
             noise,
             spread: greatest - least,
             record,
@@ -171,7 +172,7 @@ impl GaugeSimulator {
             let input = match run.shake {
                 None => self.inputs[i].values.clone(),
                 Some(seed) => {
-                    self.inputs[i].shaken(self.reference_sd, &mut Dice::new(seed, i as u64))
+                    self.inputs[i].shaken(&self.reference_noise, &mut Dice::new(seed, i as u64))
                 }
             };
             let pressure = self.record.pressure.get(from..to).unwrap_or(&[]);

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use stretch_data::{EvenSession, EvenTrial, SessionTrial, unit};
-use stretch_gap::{TrialSpec, noise_variance};
+use stretch_gap::{Noise, TrialSpec};
 
 use crate::error::BenchError;
 
@@ -83,9 +83,9 @@ impl Record {
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)))
     }
 
-    /// Noise of a column (1 sd) from the median of its second differences in the trials that are fitted.
-    pub(super) fn noise(&self, values: &[f64]) -> f64 {
-        noise_variance(self.fitted().map(|r| &values[r]), self.dt_s).sqrt()
+    /// Noise of a column from the median of its second differences in the trials that are fitted.
+    pub(super) fn noise(&self, values: &[f64]) -> Noise {
+        Noise::of_differences(self.fitted().map(|r| &values[r]), self.dt_s)
     }
 
     fn check(&mut self, reference: &str, signal: &str) -> Result<(), BenchError> {
@@ -113,7 +113,7 @@ impl Record {
                     hint: "the channel is dead: check the sensor and its cable".into(),
                 });
             }
-            shares.push(self.noise(values) / (high - low));
+            shares.push(self.noise(values).sd() / (high - low));
         }
         let mut notes = Vec::new();
         if shares[0] > 3.0 * shares[1] {

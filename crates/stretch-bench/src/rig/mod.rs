@@ -2,6 +2,7 @@
 
 mod experiments;
 mod extent;
+mod noises;
 mod nominal;
 mod run;
 mod session;
@@ -15,7 +16,8 @@ use stretch_gap::{Description, DescriptionSpec, TrialSpec};
 use stretch_sim::{Catalogue, Effect, EffectSet, Key, Rig, RigParams, Search, Stage};
 
 use extent::extent_of;
-use nominal::{Sds, parameters, stages};
+use noises::Noises;
+use nominal::{parameters, stages};
 use session::Inputs;
 pub use session::{RigTrial, Session};
 
@@ -44,6 +46,7 @@ pub struct RigSimulator {
     effects: EffectSet,
     session: Session,
     inputs: Inputs,
+    noises: Noises,
     about: Description,
     stage_kinds: Vec<Stage>,
     /// Key of each parameter; none for the pressure at a trial's start.
@@ -77,14 +80,15 @@ impl RigSimulator {
         let RigSetup { session, rig, catalogue } = setup;
         rig.check()?;
         let Rig { params: base, effects, .. } = &rig;
-        let sds = Sds::of(base);
-        let inputs = Inputs::of(&session, sds.length_mm, sds.pressure_kpa, 1e-3 * base[Key::PS]);
+        let noises = Noises::of(base, &session);
+        let (length_sd, pressure_sd) = (noises.length_mm.sd(), noises.pressure_kpa.sd());
+        let inputs = Inputs::of(&session, length_sd, pressure_sd, 1e-3 * base[Key::PS]);
         let stage_kinds = match session.trials[0].pressure_kpa {
             Some(_) => vec![Stage::Pneumatics, Stage::Muscle, Stage::Sensing],
             None => vec![Stage::Actuation, Stage::Sensing],
         };
         let (parameters, keys) = parameters(&rig, &stage_kinds);
-        let stages = stages(&stage_kinds, &keys, sds);
+        let stages = stages(&stage_kinds, &keys, &noises);
         let extent = extent_of(base, &inputs, &session);
         let rows: Vec<_> = catalogue.iter().filter(|e| effects.find(e.name).is_none()).collect();
         let place = |effect: &Effect| Place {
@@ -108,6 +112,7 @@ impl RigSimulator {
             effects: effects.clone(),
             session,
             inputs,
+            noises,
             stage_kinds,
             keys,
             rows,

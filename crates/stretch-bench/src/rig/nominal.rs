@@ -1,7 +1,9 @@
 //! What may be re-tuned of a rig, and the stages that it acts in.
 
 use stretch_gap::{ParameterSpec, StageSpec, Wander};
-use stretch_sim::{Key, PARAMETERS, Rig, RigParams, Stage};
+use stretch_sim::{Key, PARAMETERS, Rig, Stage};
+
+use super::noises::Noises;
 
 /// Slow fluctuation of the supply, a share of it (1 sd).
 const SUPPLY_WANDER: f64 = 0.003;
@@ -9,29 +11,6 @@ const SUPPLY_WANDER: f64 = 0.003;
 const SUPPLY_CORRELATION_S: f64 = 12.0;
 /// Distance of the knots that follow it, s.
 const SUPPLY_KNOT_S: f64 = 2.0;
-
-/// Noise of the channels with the steps of their converters, 1 sd.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Sds {
-    pub(super) length_mm: f64,
-    pub(super) volts: f64,
-    pub(super) pressure_kpa: f64,
-}
-
-impl Sds {
-    pub(super) fn of(params: &RigParams) -> Self {
-        // A step adds a uniform error of variance step^2/12.
-        let with_step = |sigma: Key, full_scale: Key| {
-            let step = params[full_scale] / (params[Key::Bits].exp2() - 1.0);
-            (params[sigma].powi(2) + step * step / 12.0).sqrt()
-        };
-        Self {
-            length_mm: with_step(Key::SigmaL, Key::Travel),
-            volts: with_step(Key::SigmaV, Key::VFs),
-            pressure_kpa: 1e-3 * params[Key::SigmaP],
-        }
-    }
-}
 
 /// Parameters with a tolerance in the stages, then the pressure at a trial's start; and the key of each.
 pub(super) fn parameters(rig: &Rig, kinds: &[Stage]) -> (Vec<ParameterSpec>, Vec<Option<Key>>) {
@@ -66,12 +45,12 @@ pub(super) fn parameters(rig: &Rig, kinds: &[Stage]) -> (Vec<ParameterSpec>, Vec
 }
 
 /// Stages with their channels, the parameters that act in them, and their noise.
-pub(super) fn stages(kinds: &[Stage], keys: &[Option<Key>], sds: Sds) -> Vec<StageSpec> {
+pub(super) fn stages(kinds: &[Stage], keys: &[Option<Key>], noises: &Noises) -> Vec<StageSpec> {
     let stage = |kind: &Stage| {
         let (channel, unit, noise) = match kind {
-            Stage::Pneumatics => ("pressure_kpa", "kPa", sds.pressure_kpa),
-            Stage::Sensing => ("bridge_v", "V", sds.volts),
-            _ => ("length_mm", "mm", sds.length_mm),
+            Stage::Pneumatics => ("pressure_kpa", "kPa", &noises.pressure_kpa),
+            Stage::Sensing => ("bridge_v", "V", &noises.volts),
+            _ => ("length_mm", "mm", &noises.length_mm),
         };
         // The start's pressure, which has no key, belongs to the chamber.
         let owner = |key: &Option<Key>| key.map_or(Stage::Pneumatics, |key| key.info().stage);
@@ -80,7 +59,7 @@ pub(super) fn stages(kinds: &[Stage], keys: &[Option<Key>], sds: Sds) -> Vec<Sta
             channel: channel.into(),
             unit: unit.into(),
             parameters: (0..keys.len()).filter(|&i| kind.holds(owner(&keys[i]))).collect(),
-            noise: (noise > 0.0).then_some(noise),
+            noise: (noise.sd() > 0.0).then(|| noise.clone()),
         }
     };
     kinds.iter().map(stage).collect()

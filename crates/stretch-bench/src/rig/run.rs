@@ -137,9 +137,9 @@ impl Setting<'_> {
         let inputs = &self.rig.inputs;
         let input = if of_pressure { &inputs.pressure[trial] } else { &inputs.length[trial] };
         let Some(seed) = self.shake else { return input.values.clone() };
-        let params = &self.params;
-        let sd = if of_pressure { 1e-3 * params[Key::SigmaP] } else { params[Key::SigmaL] };
-        input.shaken(sd, &mut Dice::new(seed, trial as u64))
+        let noises = &self.rig.noises;
+        let noise = if of_pressure { &noises.pressure_kpa } else { &noises.length_mm };
+        input.shaken(noise, &mut Dice::new(seed, trial as u64))
     }
 
     /// Trials with their part of the output.
@@ -263,7 +263,7 @@ impl Setting<'_> {
             stage.run(&mut memory, self.start(trial), start_s, &length, &pressure, own)?;
             let record = Measured {
                 samples: &self.rig.session.trials[trial].bridge_v,
-                noise: self.params[Key::SigmaV],
+                noise: self.rig.noises.volts.sd(),
                 unit: 1.0,
                 dt_s: self.rig.about.dt_s,
             };

@@ -5,7 +5,7 @@ use std::path::Path;
 use stretch_data::{DataSet, EvenSession, EvenTrial, ReadOptions, SessionTrial, Split};
 
 use super::smooth::{Smoothed, schedule};
-use crate::error::BenchError;
+use crate::{error::BenchError, wild::tame};
 
 /// Columns that a rig needs; a pressure is welcome.
 const NEEDED: [&str; 4] = ["inlet", "outlet", "length_mm", "bridge_v"];
@@ -112,7 +112,28 @@ impl Session {
             ));
         }
         session.check()?;
+        session.tame();
         Ok(session)
+    }
+
+    /// Replaces wild values, and says how many of which channel there were.
+    fn tame(&mut self) {
+        let mut counts = [("pressure_kpa", 0), ("length_mm", 0), ("bridge_v", 0)];
+        for trial in &mut self.trials {
+            let channels = [
+                trial.pressure_kpa.as_mut(),
+                Some(&mut trial.length_mm),
+                Some(&mut trial.bridge_v),
+            ];
+            for ((_, count), values) in counts.iter_mut().zip(channels) {
+                *count += values.map_or(0, |values| tame(values));
+            }
+        }
+        for (channel, count) in counts.into_iter().filter(|(_, count)| *count > 0) {
+            let what =
+                format!("{count} wild values of {channel} were replaced by their neighbours'");
+            self.notes.push(what);
+        }
     }
 
     /// The trials, in the order of time.

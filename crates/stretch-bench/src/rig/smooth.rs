@@ -1,6 +1,6 @@
 //! Smoothing of a measured input, as wide as the commands allow.
 
-use stretch_gap::Dice;
+use stretch_gap::{Dice, Noise};
 
 /// Widest half-width, in samples.
 const WIDEST: usize = 15;
@@ -121,10 +121,9 @@ impl Smoothed {
         Self { smoother, values }
     }
 
-    /// With another draw of noise of standard deviation `sd`, as far as the smoothing lets it pass.
-    pub(crate) fn shaken(&self, sd: f64, dice: &mut Dice) -> Vec<f64> {
-        let noise: Vec<f64> = self.values.iter().map(|_| sd * dice.gauss()).collect();
-        let noise = self.smoother.apply(&noise);
+    /// With another draw of the noise, as far as the smoothing lets it pass.
+    pub(crate) fn shaken(&self, noise: &Noise, dice: &mut Dice) -> Vec<f64> {
+        let noise = self.smoother.apply(&noise.samples(self.values.len(), dice));
         self.values.iter().zip(noise).map(|(x, n)| x + n).collect()
     }
 }

@@ -44,7 +44,7 @@ impl Prepared {
                 return Err(CalibrateError::SampleRates { trial, rate_hz, first, first_hz });
             }
             let columns = [options.signal.as_str(), options.reference.as_str()];
-            let spec = EvenSpec { rate_hz: sample_rate.hz(), shortest: SHORTEST };
+            let spec = EvenSpec { rate_hz: sample_rate.hz(), shortest: SHORTEST, bridged_s: 0.0 };
             let even = trial.even(&columns, spec)?;
             rows.add(even.rows);
             notes.extend(even.notes);

@@ -24,6 +24,8 @@ pub struct EvenSpec {
     pub rate_hz: f64,
     /// Parts between two gaps with fewer samples are left out, and so is a trial.
     pub shortest: usize,
+    /// Longest gap that is bridged, s, where the commands are the same on both sides of it; three samples always are.
+    pub bridged_s: f64,
 }
 
 /// What became of a trial's rows.
@@ -65,6 +67,8 @@ pub struct EvenPart {
     pub begin_s: f64,
     /// Values of the columns that were asked for, in that order; all of one length.
     pub columns: Vec<Vec<f64>>,
+    /// Samples that were lost and bridged.
+    pub is_lost: Vec<bool>,
 }
 
 impl EvenPart {
@@ -98,6 +102,7 @@ impl Trial {
     ///   hold: they keep their last value. Anything else is measured and goes straight from the sample before the gap to
     ///   the one behind it. A live receptor moves its last sample on by the last rate instead: it cannot see what comes,
     ///   a log can, and a line between two samples cannot overshoot.
+    /// - So is a longer gap up to [`EvenSpec::bridged_s`] where the commands behind it are those before it.
     /// - More lost samples cut the trial; parts with fewer than [`EvenSpec::shortest`] samples are left out.
     /// - Uneven stamps are resampled: measured channels by straight lines, of the commands the one that holds in the middle
     ///   of each period.
@@ -113,7 +118,7 @@ impl Trial {
     /// let length = channel("length_mm", vec![180.0, 179.0, 177.0, 176.0]);
     /// let inlet = channel("inlet", vec![0.5, 0.5, 0.0, 0.0]);
     /// let trial = Trial { name: "a.csv".into(), time_s, channels: vec![length, inlet] };
-    /// let even = trial.even(&["length_mm", "inlet"], EvenSpec { rate_hz: 100.0, shortest: 2 })?;
+    /// let even = trial.even(&["length_mm", "inlet"], EvenSpec { rate_hz: 100.0, shortest: 2, bridged_s: 0.0 })?;
     /// assert_eq!(even.parts[0].columns[0], [180.0, 179.0, 178.0, 177.0, 176.0]);
     /// assert_eq!(even.parts[0].columns[1], [0.5, 0.5, 0.5, 0.0, 0.0]);
     /// assert_eq!((even.rows.read, even.rows.bridged), (4, 1));
@@ -140,7 +145,15 @@ impl Trial {
         };
         let mut even = Even { parts: Vec::new(), rows: Rows::default(), notes: Vec::new() };
         even.rows.read = self.len();
-        let stretches = clock.stretches(&self.time_s);
+        let is_same = |i: usize| {
+            let mut held = values.iter().zip(&is_held).filter(|(_, held)| **held);
+            held.all(|(column, _)| column[i - 1] == column[i])
+        };
+        let most = |i: usize| match is_same(i) {
+            true => ((spec.bridged_s / clock.own_s).round() as usize).max(MOST_BRIDGED),
+            false => MOST_BRIDGED,
+        };
+        let stretches = clock.stretches(&self.time_s, most);
         even.tell_gaps(self, &stretches, clock.own_s);
         let mut is_uneven = false;
         for stretch in stretches {
@@ -166,6 +179,7 @@ impl Trial {
             even.parts.push(EvenPart {
                 begin_s: time_s[0] - self.time_s[0],
                 columns: values.iter().zip(&is_held).map(filled).collect(),
+                is_lost: points.iter().map(|p| clock.is_lost(time_s, p)).collect(),
             });
         }
         if is_uneven {
@@ -243,9 +257,15 @@ impl Clock {
         time_s.windows(2).map(|t| self.between(t[1] - t[0])).sum()
     }
 
-    /// Parts between gaps that are not bridged.
-    fn stretches(&self, time_s: &[f64]) -> Vec<Range<usize>> {
-        let is_gap = |i: &usize| self.between(time_s[*i] - time_s[*i - 1]) > MOST_BRIDGED;
+    /// Whether a point lies within a gap.
+    fn is_lost(&self, time_s: &[f64], point: &Point) -> bool {
+        let next = time_s.get(point.left + 1);
+        next.is_some_and(|t| point.way > 0.0 && self.between(t - time_s[point.left]) > 0)
+    }
+
+    /// Parts between gaps that are not bridged: `most` says how many samples may be lost before a sample.
+    fn stretches(&self, time_s: &[f64], most: impl Fn(usize) -> usize) -> Vec<Range<usize>> {
+        let is_gap = |i: &usize| self.between(time_s[*i] - time_s[*i - 1]) > most(*i);
         let mut out = Vec::new();
         let mut from = 0;
         for cut in (1..time_s.len()).filter(is_gap).chain([time_s.len()]) {

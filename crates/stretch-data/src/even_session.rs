@@ -8,6 +8,8 @@ use crate::{DataError, DataSet, EvenSpec, ReadOptions, Rows, Split, Trial, Trial
 const PAUSE_S: f64 = 15.0;
 /// Rounding of time stamps: a rate this near to a whole number of hertz is that number.
 const STAMPED: f64 = 1e-6;
+/// Longest gap that is bridged where the commands are the same on both sides, s: a command that comes and goes within it is rare.
+const BRIDGED_S: f64 = 0.5;
 
 /// A trial and its place in a session.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,6 +57,7 @@ pub struct EvenTrial {
     start_s: f64,
     split: Split,
     columns: Vec<Vec<f64>>,
+    is_lost: Vec<bool>,
 }
 
 impl EvenTrial {
@@ -82,25 +85,30 @@ impl EvenTrial {
     pub fn columns(&self) -> &[Vec<f64>] {
         &self.columns
     }
+
+    /// Samples that were lost: their values bridge a gap.
+    pub fn is_lost(&self) -> &[bool] {
+        &self.is_lost
+    }
 }
 
 /// Trials on one even grid, in the order of time: what simulation and diagnosis are driven by.
 ///
 /// ```
 /// use stretch_data::{Channel, EvenSession, SessionTrial, Trial};
-/// // Half a second is missing after 0.99 s.
-/// let time_s: Vec<f64> = (0..300).filter(|i| !(100..150).contains(i)).map(|i| 0.01 * i as f64).collect();
+/// // Eight tenths of a second are missing after 0.99 s.
+/// let time_s: Vec<f64> = (0..300).filter(|i| !(100..180).contains(i)).map(|i| 0.01 * i as f64).collect();
 /// let values = time_s.iter().map(|t| 180.0 - t).collect();
 /// let channels = vec![Channel { name: "length_mm".into(), values }];
 /// let trial = Trial { name: "a.csv".into(), time_s, channels };
 /// let trials = [SessionTrial { start_s: 40.0, ..SessionTrial::new(trial) }];
 /// let session = EvenSession::new(&trials, &["length_mm"], 50)?;
 /// let starts: Vec<f64> = session.trials().iter().map(|t| t.start_s()).collect();
-/// assert_eq!(starts, [40.0, 41.5]);
+/// assert_eq!(starts, [40.0, 41.8]);
 /// assert_eq!(session.trials()[1].name(), "a.csv (part 2)");
 /// assert_eq!(
 ///     session.notes(),
-///     ["a.csv: 0.500 s are missing after 0.99 s; it goes on as a trial of its own"]
+///     ["a.csv: 0.800 s are missing after 0.99 s; it goes on as a trial of its own"]
 /// );
 /// # Ok::<(), stretch_data::DataError>(())
 /// ```
@@ -116,6 +124,7 @@ impl EvenSession {
     /// Brings columns of trials onto one even grid, as [`Trial::even`]; the first trial's rate is the session's.
     ///
     /// Trials go in the order of their `start_s`. Where that does not rise, they go in the order given, with pauses of 15 s.
+    /// Gaps of up to half a second are bridged where the commands are the same on both sides.
     /// Parts of a trial with gaps begin where the trial's time says, and inherit its kind and split.
     ///
     /// # Errors
@@ -133,7 +142,8 @@ impl EvenSession {
         let (dt_s, rows) = (1.0 / rate_hz, Rows::default());
         let mut session = Self { trials: Vec::new(), dt_s, rows, notes: Vec::new() };
         for (one, start_s) in session.in_order(trials) {
-            let even = one.trial.even(columns, EvenSpec { rate_hz, shortest })?;
+            let even =
+                one.trial.even(columns, EvenSpec { rate_hz, shortest, bridged_s: BRIDGED_S })?;
             let count = even.parts.len();
             session.rows.add(even.rows);
             session.notes.extend(even.notes);
@@ -146,6 +156,7 @@ impl EvenSession {
                 start_s: start_s + part.begin_s,
                 split: one.split,
                 columns: part.columns,
+                is_lost: part.is_lost,
             }));
         }
         session.notes.extend(session.rows.note());

@@ -2,7 +2,7 @@
 
 use stretch_data::{Channel, DataError, EvenSession, EvenSpec, SessionTrial, Split, Trial};
 
-const SPEC: EvenSpec = EvenSpec { rate_hz: 100.0, shortest: 10 };
+const SPEC: EvenSpec = EvenSpec { rate_hz: 100.0, shortest: 10, bridged_s: 0.0 };
 
 /// A trial of a line in time, and of a command that is 1 from half a second on.
 fn trial(time_s: Vec<f64>) -> Trial {

@@ -35,6 +35,10 @@ impl Simulator for Altered<'_> {
         self.simulator.measured(stage)
     }
 
+    fn is_lost(&self) -> &[bool] {
+        self.simulator.is_lost()
+    }
+
     fn motion(&self) -> Motion<'_> {
         self.simulator.motion()
     }

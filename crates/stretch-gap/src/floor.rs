@@ -20,7 +20,7 @@ use crate::{
 /// Floor of one stage.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Floor {
-    /// One standard deviation at every sample of all trials, in the unit of the output.
+    /// One standard deviation at every sample of all trials, in the unit of the output; infinite where nothing was measured.
     pub(crate) sd: Vec<f64>,
     /// Root mean square of it.
     pub(crate) rms: f64,
@@ -78,6 +78,10 @@ fn floor(
             let local = near.iter().sum::<f64>() / near.len() as f64;
             sd.push((own + local).sqrt().max(1e-12));
         }
+    }
+    // What was not measured weighs nothing.
+    for (sd, _) in sd.iter_mut().zip(simulator.is_lost()).filter(|(_, lost)| **lost) {
+        *sd = f64::INFINITY;
     }
     Ok(Floor { sd, rms: (own + mean).sqrt().max(1e-12), source })
 }

@@ -88,6 +88,11 @@ pub trait Simulator: Sync {
     }
     /// Measured output of a stage, all trials end to end.
     fn measured(&self, stage: usize) -> &[f64];
+    /// Samples of all trials end to end that were not measured, whatever stands in their place: they count for nothing. Empty
+    /// where all were.
+    fn is_lost(&self) -> &[bool] {
+        &[]
+    }
     /// Time, in samples, at which the wander of a parameter last had a way into the outputs, for every sample of all
     /// trials end to end, counted from each trial's start; none when it always has.
     fn wander_clock(&self, _parameter: usize) -> Option<Vec<u32>> {

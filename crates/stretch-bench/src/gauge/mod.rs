@@ -205,6 +205,10 @@ impl Simulator for GaugeSimulator {
         &self.record.signal
     }
 
+    fn is_lost(&self) -> &[bool] {
+        &self.record.is_lost
+    }
+
     fn motion(&self) -> Motion<'_> {
         Motion {
             values: &self.record.reference,

@@ -5,7 +5,7 @@ use std::ops::Range;
 use stretch_data::{EvenSession, EvenTrial, SessionTrial, unit};
 use stretch_gap::{Noise, TrialSpec};
 
-use crate::error::BenchError;
+use crate::{error::BenchError, lost::open};
 
 /// Least samples that may be fitted.
 const LEAST: usize = 300;
@@ -22,6 +22,7 @@ pub(super) struct Record {
     pub(super) signal: Vec<f64>,
     /// Empty unless every trial has one.
     pub(super) pressure: Vec<f64>,
+    pub(super) is_lost: Vec<bool>,
     pub(super) dt_s: f64,
     pub(super) notes: Vec<String>,
 }
@@ -59,6 +60,7 @@ impl Record {
             reference: all(0),
             signal: all(1),
             pressure: all(2),
+            is_lost: session.trials().iter().flat_map(|t| open(t.is_lost())).collect(),
             dt_s: session.dt_s(),
             notes: session.notes().to_vec(),
         };

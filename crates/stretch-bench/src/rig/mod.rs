@@ -53,6 +53,7 @@ pub struct RigSimulator {
     keys: Vec<Option<Key>>,
     rows: Vec<&'static Effect>,
     measured: Vec<Vec<f64>>,
+    is_lost: Vec<bool>,
 }
 
 impl RigSimulator {
@@ -99,6 +100,7 @@ impl RigSimulator {
         let missing = rows.iter().map(|effect| spec(effect, place(effect))).collect();
         let trials = session.trials.iter().map(trial_spec).collect();
         let measured = stage_kinds.iter().map(|kind| measured(&session, *kind)).collect();
+        let is_lost = session.trials.iter().flat_map(|t| &t.is_lost).copied().collect();
         let dt_s = session.dt_s();
         Ok(Self {
             about: Description::new(DescriptionSpec {
@@ -117,6 +119,7 @@ impl RigSimulator {
             keys,
             rows,
             measured,
+            is_lost,
         })
     }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use stretch_data::{DataSet, EvenSession, EvenTrial, ReadOptions, SessionTrial, Split};
 
 use super::smooth::{Smoothed, schedule};
-use crate::{error::BenchError, wild::tame};
+use crate::{error::BenchError, lost::open, wild::tame};
 
 /// Columns that a rig needs; a pressure is welcome.
 const NEEDED: [&str; 4] = ["inlet", "outlet", "length_mm", "bridge_v"];
@@ -26,6 +26,8 @@ pub struct RigTrial {
     pub(super) pressure_kpa: Option<Vec<f64>>,
     pub(super) length_mm: Vec<f64>,
     pub(super) bridge_v: Vec<f64>,
+    /// Samples that were lost, or that a lost one before them leaves open.
+    pub(super) is_lost: Vec<bool>,
 }
 
 impl RigTrial {
@@ -42,6 +44,7 @@ impl RigTrial {
             length_mm: needed(2),
             bridge_v: needed(3),
             pressure_kpa: column(4),
+            is_lost: open(trial.is_lost()),
         }
     }
 

@@ -14,6 +14,10 @@ impl Simulator for RigSimulator {
         &self.measured[stage]
     }
 
+    fn is_lost(&self) -> &[bool] {
+        &self.is_lost
+    }
+
     fn wander_clock(&self, parameter: usize) -> Option<Vec<u32>> {
         if self.keys[parameter] != Some(Key::PS) {
             return None;

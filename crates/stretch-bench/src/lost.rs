@@ -1,0 +1,37 @@
+//! Samples that say nothing: lost ones, and those that a gap leaves open.
+
+/// Lost samples in a row that a straight line bridges well.
+const SHORT: usize = 3;
+/// Samples before a longer gap whose smoothing reaches into it.
+const BEFORE: usize = 3;
+
+/// Lost samples, with those behind a longer gap that depend on what nobody measured: as many as were lost, since the memory
+/// of a stage is shorter than the gaps that are worth bridging.
+pub(crate) fn open(is_lost: &[bool]) -> Vec<bool> {
+    let mut out = is_lost.to_vec();
+    let mut from = 0;
+    for stretch in is_lost.chunk_by(|a, b| a == b) {
+        let to = from + stretch.len();
+        if stretch[0] && stretch.len() > SHORT {
+            let end = (to + stretch.len()).min(out.len());
+            out[from.saturating_sub(BEFORE)..end].fill(true);
+        }
+        from = to;
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::open;
+
+    #[test]
+    fn a_long_gap_leaves_as_many_samples_open_behind_it() {
+        let mut lost = vec![false; 40];
+        lost[5] = true;
+        lost[20..25].fill(true);
+        let open: Vec<usize> =
+            open(&lost).iter().enumerate().filter(|(_, o)| **o).map(|(i, _)| i).collect();
+        assert_eq!(open, [[5].as_slice(), &(17..30).collect::<Vec<_>>()].concat());
+    }
+}

@@ -62,7 +62,7 @@ fn largest_drop(problem: &Problem<'_>, null_excess: f64) -> Result<Option<usize>
     });
     let (runs, shipped) = (compare.runs.beside(&frozen), Model::nominal(&frozen));
     let metrics = compare.metrics.iter().enumerate().map(|(stage, metric)| {
-        Metric::of(&runs, &compare.frame, stage, metric.floor.clone(), &shipped)
+        Metric::of(&runs, &compare.frame, stage, metric.floor.clone(), &shipped, Some(metric))
     });
     let rigid = compare.beside(&frozen, metrics.collect::<Result<_, _>>()?);
     let ground = Ground::around(&rigid, shipped)?;

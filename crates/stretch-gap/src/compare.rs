@@ -30,20 +30,38 @@ pub(crate) struct Comparison<'a> {
 pub(crate) type Sensitivities = Vec<(usize, Column)>;
 
 impl<'a> Comparison<'a> {
-    /// Floors and metrics around a model.
+    /// Floors and metrics around a model; nuisances as large as those of `like`, where there is one.
     pub(crate) fn around(
         runs: Runs<'a>,
         frame: Frame,
         model: &Model,
+        like: Option<&[Metric]>,
         seed: u64,
     ) -> Result<Self, GapError> {
         let floors = floors_of(&runs, &frame, model, seed)?;
         let floors: Vec<_> = floors.into_iter().enumerate().collect();
         let metrics: Result<Vec<Metric>, GapError> = floors
             .into_par_iter()
-            .map(|(stage, floor)| Metric::of(&runs, &frame, stage, floor, model))
+            .map(|(stage, floor)| {
+                Metric::of(&runs, &frame, stage, floor, model, like.map(|l| &l[stage]))
+            })
             .collect();
         Ok(Self { metrics: metrics?, runs, frame })
+    }
+
+    /// Nuisances as large and as quick as the residual of a model has them; the rise of their likelihood, nats.
+    pub(crate) fn adapt(&mut self, model: &Model) -> Result<f64, GapError> {
+        let dt_s = self.simulator().dt_s();
+        let mut gained = 0.0;
+        for stage in 0..self.metrics.len() {
+            if !self.metrics[stage].loose().is_empty() {
+                let residual = self.residual_values(stage, model)?;
+                let (metric, more) = self.metrics[stage].adapted(&self.frame, dt_s, &residual);
+                self.metrics[stage] = metric;
+                gained += more;
+            }
+        }
+        Ok(gained)
     }
 
     /// The same session beside another simulator, in metrics of its own.

@@ -186,7 +186,6 @@ fn check_parameter(p: &ParameterSpec) -> Result<(), DescriptionError> {
     if let Some(wander) = p.wander {
         number(&owner, "wander.sd", wander.sd, "0 or more", |x| x >= 0.0)?;
         number(&owner, "wander.correlation_s", wander.correlation_s, "above 0", |x| x > 0.0)?;
-        number(&owner, "wander.knot_s", wander.knot_s, "above 0", |x| x > 0.0)?;
     }
     Ok(())
 }

@@ -77,16 +77,23 @@ fn run(
     let runs = &problem.compare.runs;
     // Searched.
     let mut search = Search::new(&problem, thresholds, options.depth);
-    let found = search.run(progress)?;
+    let mut found = search.run(progress)?;
+    // What the best set explains was no nuisance: once more, with those that are left beside it.
+    let renewed = problem.adapted(&found.best.model, seed)?;
+    let problem = renewed.as_ref().unwrap_or(&problem);
+    if renewed.is_some() {
+        search = Search::new(problem, thresholds, options.depth);
+        found = search.run(progress)?;
+    }
     let peeled = peeled(&mut search.sets, &found.best)?;
     // Gathered: from here on test trials are read.
     progress("test trials");
-    let (evidence, weighed) = Evidence::gather(&problem, thresholds, &found)?;
-    let candidates = candidates(&problem, &evidence, &weighed, seed)?;
-    let shares = shares(&problem, &evidence, &found.best, &peeled, thresholds.null_excess)?;
-    let sanity = Sanity::of(&problem, &found.best, &evidence)?;
+    let (evidence, weighed) = Evidence::gather(problem, thresholds, &found)?;
+    let candidates = candidates(problem, &evidence, &weighed, seed)?;
+    let shares = shares(problem, &evidence, &found.best, &peeled, thresholds.null_excess)?;
+    let sanity = Sanity::of(problem, &found.best, &evidence)?;
     progress("where the gap sits");
-    let location = locate(&problem, &evidence, seed)?;
+    let location = locate(problem, &evidence, seed)?;
     // Judged.
     let first = candidates.first();
     let case = Case { gap: evidence.gap, first, strongest: shares.first(), sanity: &sanity };
@@ -110,7 +117,7 @@ fn run(
         _ => covering_set(&weighed, simulator),
     };
     let (runtime_s, simulations) = (begun.elapsed().as_secs_f64(), runs.count());
-    let simpler = || baselines(&problem, &search.sets.tried, thresholds.null_excess);
+    let simpler = || baselines(problem, &search.sets.tried, thresholds.null_excess);
     // Told.
     let answer = Answer { verdict: &verdict, naming: &naming, unexplained: unexplained.as_ref() };
     let told = tell(answer, case, simulator, &evidence, &shares);

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod altered;
+mod arrow;
 mod baselines;
 mod bootstrap;
 mod candidates;
@@ -15,6 +16,7 @@ mod evidence;
 mod fit;
 mod floor;
 mod frame;
+mod hyper;
 mod hypothesis;
 mod judge;
 mod linear;

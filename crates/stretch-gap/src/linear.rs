@@ -36,6 +36,12 @@ impl Cholesky {
         self.0.solve_mut(&mut DVectorViewMut::from_slice(b, b.len()));
     }
 
+    /// ln det A.
+    pub(crate) fn ln_determinant(&self) -> f64 {
+        let diagonal = self.0.l_dirty().diagonal();
+        2.0 * diagonal.iter().map(|x| x.ln()).sum::<f64>()
+    }
+
     /// A^-1.
     pub(crate) fn inverse(&self) -> DMatrix<f64> {
         self.0.inverse()

@@ -14,11 +14,12 @@
 use crate::{
     error::GapError,
     floor::Floor,
-    frame::{Frame, Role},
+    frame::{Frame, Role, Segment},
     linear::dot,
     nuisance::{Nuisance, Wandering},
     runs::Runs,
     simulator::Model,
+    spec::Wander,
 };
 
 /// The metric of one stage.
@@ -26,8 +27,30 @@ use crate::{
 pub(crate) struct Metric {
     /// One standard deviation of the noise, sample by sample.
     pub(crate) floor: Floor,
-    /// By segment of the frame; none where no parameter of the stage wanders.
+    /// Parameters of the stage that wander or are offset in each trial.
+    loose: Vec<Loose>,
+    /// By segment of the frame; none where no parameter of the stage is loose.
     nuisances: Vec<Option<Nuisance>>,
+}
+
+/// A parameter that wanders or is offset in each trial.
+#[derive(Debug, Clone)]
+pub(crate) struct Loose {
+    /// Change of the output, in floors, for one standard deviation as the simulator describes it.
+    column: Vec<f64>,
+    /// See [`Simulator::wander_clock`](crate::Simulator::wander_clock).
+    clock: Vec<u32>,
+    /// How it wanders as the simulator describes it; none for an offset.
+    pub(crate) wander: Option<Wander>,
+    /// How it is taken to.
+    pub(crate) level: Level,
+}
+
+/// Size of a nuisance, as a multiple of what the simulator describes, and its correlation time, s (of no meaning for an offset).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Level {
+    pub(crate) size: f64,
+    pub(crate) time_s: f64,
 }
 
 /// A residual or a sensitivity over whole segments, in floors, ready for products.
@@ -40,33 +63,33 @@ pub(crate) struct Column {
 
 impl Metric {
     /// The metric of a stage around a model: its sensitivities to the parameters that wander or are offset in each trial
-    /// tell what of a residual can be theirs.
+    /// tell what of a residual can be theirs. They wander as the simulator describes it, unless `like` says otherwise.
     pub(crate) fn of(
         runs: &Runs<'_>,
         frame: &Frame,
         stage: usize,
         floor: Floor,
         model: &Model,
+        like: Option<&Self>,
     ) -> Result<Self, GapError> {
         let simulator = runs.simulator();
         let specs = simulator.parameters();
         let is_loose = |p: &usize| specs[*p].wander.is_some() || specs[*p].per_trial_sd.is_some();
         let own = simulator.stages()[stage].parameters.iter().copied();
-        let loose: Vec<usize> = own.filter(is_loose).collect();
-        if loose.is_empty() {
-            return Ok(Self { floor, nuisances: vec![None; frame.segments.len()] });
-        }
+        let parameters: Vec<usize> = own.filter(is_loose).collect();
+        let mut metric = Self { floor, loose: Vec::new(), nuisances: Vec::new() };
         let trials = simulator.trials();
-        let plain = runs.output(stage, model, trials.len())?;
-        let mut columns = Vec::new();
-        for &p in &loose {
+        let plain = match parameters.is_empty() {
+            true => Vec::new(),
+            false => runs.output(stage, model, trials.len())?,
+        };
+        for &p in &parameters {
             let spec = &specs[p];
-            // Change of the output, in floors, for one standard deviation.
             let sd = spec.wander.map(|w| w.sd).or(spec.per_trial_sd).unwrap_or(0.0);
             let mut moved = model.clone();
             moved.parameters[p] += sd;
             let mut column = runs.output(stage, &moved, trials.len())?;
-            for ((x, y), sd) in column.iter_mut().zip(&plain).zip(&floor.sd) {
+            for ((x, y), sd) in column.iter_mut().zip(&plain).zip(&metric.floor.sd) {
                 *x = (*x - y) / sd;
             }
             let always = || trials.iter().flat_map(|t| 0..t.samples as u32).collect();
@@ -76,24 +99,56 @@ impl Metric {
                 let what = format!("the wander clock of {name} has {found} samples of {needed}");
                 return Err(GapError::simulator(what));
             }
-            columns.push((spec, column, clock));
+            let level = Level { size: 1.0, time_s: spec.wander.map_or(1.0, |w| w.correlation_s) };
+            metric.loose.push(Loose { column, clock, wander: spec.wander, level });
         }
-        let nuisances = frame.segments.iter().map(|segment| {
+        if let Some(like) = like {
+            let pairs = metric.loose.iter_mut().zip(&like.loose);
+            pairs.for_each(|(own, other)| own.level = other.level);
+        }
+        metric.marginalise(frame, simulator.dt_s());
+        Ok(metric)
+    }
+
+    /// Factors of the nuisances as the loose parameters now are.
+    fn marginalise(&mut self, frame: &Frame, dt_s: f64) {
+        let one = |segment: &Segment| {
             let range = segment.from..segment.to;
             let (mut offsets, mut wandering) = (Vec::new(), Vec::new());
-            for (spec, column, clock) in &columns {
-                let part = column[range.clone()].to_vec();
-                match spec.wander {
-                    Some(wander) => {
-                        let clock = &clock[range.clone()];
-                        wandering.push(Wandering::new(part, clock, wander, simulator.dt_s()));
+            for loose in &self.loose {
+                let Level { size, time_s } = loose.level;
+                let part = loose.column[range.clone()].iter().map(|x| size * x).collect();
+                match loose.wander {
+                    Some(_) => {
+                        let clock = &loose.clock[range.clone()];
+                        wandering.push(Wandering::new(part, clock, time_s, dt_s));
                     }
                     None => offsets.push(part),
                 }
             }
-            Some(Nuisance::new(offsets, wandering))
-        });
-        Ok(Self { nuisances: nuisances.collect(), floor })
+            (!self.loose.is_empty()).then(|| Nuisance::new(offsets, wandering))
+        };
+        self.nuisances = frame.segments.iter().map(one).collect();
+    }
+
+    /// Parameters of the stage that wander or are offset in each trial.
+    pub(crate) fn loose(&self) -> &[Loose] {
+        &self.loose
+    }
+
+    /// The same with one of them at another level.
+    pub(crate) fn with(&self, which: usize, level: Level, frame: &Frame, dt_s: f64) -> Self {
+        let mut other = self.clone();
+        other.loose[which].level = level;
+        other.marginalise(frame, dt_s);
+        other
+    }
+
+    /// ln det V over the segments that are not tested on.
+    pub(crate) fn ln_determinant(&self, frame: &Frame, samples: usize) -> f64 {
+        let all = frame.segments.iter().zip(&self.nuisances);
+        let looked = all.filter(|(s, _)| s.role != Role::Test && s.to <= samples);
+        looked.filter_map(|(_, nuisance)| Some(nuisance.as_ref()?.ln_determinant())).sum()
     }
 
     /// A column of values in floors over the first trials.
@@ -133,5 +188,24 @@ impl Metric {
                 nuisance.clean(&mut values[segment.from..segment.to]);
             }
         }
+    }
+}
+
+#[cfg(test)]
+impl Metric {
+    /// One parameter that wanders in one trial.
+    pub(crate) fn with_wander(
+        floor: Floor,
+        column: Vec<f64>,
+        wander: Wander,
+        frame: &Frame,
+        dt_s: f64,
+    ) -> Self {
+        let clock = (0..column.len() as u32).collect();
+        let level = Level { size: 1.0, time_s: wander.correlation_s };
+        let loose = vec![Loose { column, clock, wander: Some(wander), level }];
+        let mut metric = Self { floor, loose, nuisances: Vec::new() };
+        metric.marginalise(frame, dt_s);
+        metric
     }
 }

@@ -11,9 +11,14 @@
 //! and never a matrix as large as the record. The most likely amplitudes, with which a residual is drawn, are
 //! b = (C'C + P)^-1 C'r.
 
-use nalgebra::DMatrix;
+use crate::{
+    arrow::{Arrow, ArrowFactor},
+    linear::dot,
+};
 
-use crate::{linear::Cholesky, spec::Wander};
+/// Distance of the knots, s: the process is rough, and straight lines between wide knots would pass what it does on the way to a
+/// quicker one.
+const KNOT_S: f64 = 0.1;
 
 /// Nuisances of one segment of one stage.
 #[derive(Debug, Clone)]
@@ -23,7 +28,8 @@ pub(super) struct Nuisance {
     /// Columns of parameters that wander.
     wandering: Vec<Wandering>,
     /// L of the module's head.
-    factor: Cholesky,
+    factor: ArrowFactor,
+    ln_determinant: f64,
 }
 
 /// Sensitivity to a wandering parameter, and the knots that each sample lies between.
@@ -41,9 +47,9 @@ pub(super) struct Wandering {
 }
 
 impl Wandering {
-    /// `clock` counts samples of `dt_s`.
-    pub(super) fn new(sensitivity: Vec<f64>, clock: &[u32], wander: Wander, dt_s: f64) -> Self {
-        let knot = ((wander.knot_s / dt_s) as usize).max(1);
+    /// Of a wander of variance 1 and correlation time `time_s`; `clock` counts samples of `dt_s`.
+    pub(super) fn new(sensitivity: Vec<f64>, clock: &[u32], time_s: f64, dt_s: f64) -> Self {
+        let knot = ((KNOT_S / dt_s) as usize).max(1);
         let first = clock.first().copied().unwrap_or(0);
         let place: Vec<(u32, f64)> = clock
             .iter()
@@ -54,7 +60,7 @@ impl Wandering {
             .collect();
         let knots = place.iter().map(|p| p.0 as usize).max().unwrap_or(0) + 2;
         let step_s = knot as f64 * dt_s;
-        Self { sensitivity, place, knots, kept: (-step_s / wander.correlation_s).exp() }
+        Self { sensitivity, place, knots, kept: (-step_s / time_s).exp() }
     }
 
     /// Sample, knot, weights of that knot and the next.
@@ -66,9 +72,17 @@ impl Wandering {
 
 impl Nuisance {
     pub(super) fn new(offsets: Vec<Vec<f64>>, wandering: Vec<Wandering>) -> Self {
-        let size = offsets.len() + wandering.iter().map(|w| w.knots).sum::<usize>();
-        let factor = Cholesky::of(precision(&offsets, &wandering, size));
-        Self { offsets, wandering, factor }
+        let factor = precision(&offsets, &wandering).factor();
+        // ln det P of chains of correlation rho with variance 1: -(K - 1) ln(1 - rho^2).
+        let prior = |w: &Wandering| -(w.knots as f64 - 1.0) * (1.0 - w.kept * w.kept).ln();
+        let prior: f64 = wandering.iter().map(prior).sum();
+        let ln_determinant = factor.ln_determinant() - prior;
+        Self { offsets, wandering, factor, ln_determinant }
+    }
+
+    /// ln det V = ln det(C'C + P) - ln det P.
+    pub(super) fn ln_determinant(&self) -> f64 {
+        self.ln_determinant
     }
 
     /// L^-1 C'x: what a product of columns loses to the nuisances.
@@ -82,23 +96,22 @@ impl Nuisance {
     pub(super) fn clean(&self, x: &mut [f64]) {
         let mut b = project(&self.offsets, &self.wandering, x);
         self.factor.solve(&mut b);
-        for (offset, b) in self.offsets.iter().zip(&b) {
-            x.iter_mut().zip(offset).for_each(|(x, d)| *x -= b * d);
-        }
-        let mut base = self.offsets.len();
+        let mut base = 0;
         for wandering in &self.wandering {
             for (i, k, this, next) in wandering.each() {
                 x[i] -= this * b[base + k] + next * b[base + k + 1];
             }
             base += wandering.knots;
         }
+        for (offset, b) in self.offsets.iter().zip(&b[base..]) {
+            x.iter_mut().zip(offset).for_each(|(x, d)| *x -= b * d);
+        }
     }
 }
 
-/// C'x.
+/// C'x: the knots of what wanders, then the offsets.
 fn project(offsets: &[Vec<f64>], wandering: &[Wandering], x: &[f64]) -> Vec<f64> {
-    let mut out: Vec<f64> =
-        offsets.iter().map(|d| d.iter().zip(x).map(|(a, b)| a * b).sum()).collect();
+    let mut out = Vec::new();
     for wandering in wandering {
         let base = out.len();
         out.resize(base + wandering.knots, 0.0);
@@ -107,30 +120,28 @@ fn project(offsets: &[Vec<f64>], wandering: &[Wandering], x: &[f64]) -> Vec<f64>
             out[base + k + 1] += next * x[i];
         }
     }
+    out.extend(offsets.iter().map(|d| dot(d, x)));
     out
 }
 
-/// Posterior precision C'C + P.
-fn precision(offsets: &[Vec<f64>], wandering: &[Wandering], n: usize) -> DMatrix<f64> {
-    let mut a = DMatrix::zeros(n, n);
+/// Posterior precision C'C + P. Two wanders of one stage are taken as orthogonal.
+fn precision(offsets: &[Vec<f64>], wandering: &[Wandering]) -> Arrow {
+    let knots = wandering.iter().map(|w| w.knots).sum();
+    let mut a = Arrow::zeros(knots, offsets.len());
     for (i, column) in offsets.iter().enumerate() {
-        for (j, p) in project(offsets, wandering, column).iter().enumerate() {
-            a[(i, j)] = *p;
-            a[(j, i)] = *p;
-        }
+        let products = project(offsets, wandering, column);
+        a.border[i].copy_from_slice(&products[..knots]);
+        a.corner[i].copy_from_slice(&products[knots..]);
+        a.corner[i][i] += 1.0;
     }
-    for i in 0..offsets.len() {
-        a[(i, i)] += 1.0;
-    }
-    let mut base = offsets.len();
+    let mut base = 0;
     for wandering in wandering {
-        // A sample lies between two knots: C'C is tridiagonal there. Two wanders of one stage are taken as orthogonal.
+        // A sample lies between two knots: C'C is tridiagonal there.
         for (_, k, x, y) in wandering.each() {
             let k = base + k;
-            a[(k, k)] += x * x;
-            a[(k, k + 1)] += x * y;
-            a[(k + 1, k)] += x * y;
-            a[(k + 1, k + 1)] += y * y;
+            a.diagonal[k] += x * x;
+            a.beside[k] += x * y;
+            a.diagonal[k + 1] += y * y;
         }
         // Inverse covariance of an Ornstein-Uhlenbeck process at even knots, of correlation rho between neighbours:
         // (1, 1 + rho^2, ..., 1)/(1 - rho^2) on the diagonal, -rho/(1 - rho^2) beside it.
@@ -138,11 +149,9 @@ fn precision(offsets: &[Vec<f64>], wandering: &[Wandering], n: usize) -> DMatrix
         let scale = 1.0 / (1.0 - kept * kept);
         for k in 0..knots {
             let inner = k > 0 && k + 1 < knots;
-            let at = base + k;
-            a[(at, at)] += scale * if inner { 1.0 + kept * kept } else { 1.0 };
+            a.diagonal[base + k] += scale * if inner { 1.0 + kept * kept } else { 1.0 };
             if k + 1 < knots {
-                a[(at, at + 1)] -= scale * kept;
-                a[(at + 1, at)] -= scale * kept;
+                a.beside[base + k] -= scale * kept;
             }
         }
         base += knots;
@@ -153,7 +162,7 @@ fn precision(offsets: &[Vec<f64>], wandering: &[Wandering], n: usize) -> DMatrix
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{dice::Dice, linear::dot};
+    use crate::dice::Dice;
     use testkit::tolerance::FIT_WELL;
 
     const SAMPLES: usize = 60;
@@ -161,8 +170,7 @@ mod tests {
     fn nuisance() -> Nuisance {
         let clock: Vec<u32> = (0..SAMPLES as u32).collect();
         let slope: Vec<f64> = (0..SAMPLES).map(|i| 0.1 * i as f64).collect();
-        let wander = Wander { sd: 1.0, correlation_s: 0.3, knot_s: 0.1 };
-        Nuisance::new(vec![vec![0.5; SAMPLES]], vec![Wandering::new(slope, &clock, wander, 0.01)])
+        Nuisance::new(vec![vec![0.5; SAMPLES]], vec![Wandering::new(slope, &clock, 0.3, 0.01)])
     }
 
     /// x'V^-1 y = x'(y - C b) with the most likely b: two ways to the same product.

@@ -4,7 +4,7 @@
 //!
 //! 1. the frame; floors and metrics around the parameters as shipped;
 //! 2. a first re-tuning: maximum a posteriori within the tolerances;
-//! 3. floors and metrics around what it found, for sensitivities have moved, and a second re-tuning in them;
+//! 3. floors and metrics around what it found, for sensitivities have moved; sizes of the nuisances; a second re-tuning in them;
 //! 4. the effective sample size of every stage and the noise transmitted, both at the re-tuned nominal, so that they are the same
 //!    for every hypothesis.
 //!
@@ -28,6 +28,9 @@ use crate::{
 
 /// Root mean square change in floors that a halved step of integration may make: a tenth, a hundredth of the floor's square.
 const SOLVED: f64 = 0.1;
+
+/// Rise of the nuisances' likelihood for which all is done again, nats: what a parameter costs.
+const LEARNT: f64 = 5.0;
 
 /// Everything that a search needs.
 pub(crate) struct Problem<'a> {
@@ -60,11 +63,29 @@ impl<'a> Problem<'a> {
         let frame = Frame::of(simulator)?;
         let shipped = Model::nominal(simulator);
         progress("floors");
-        let rough = Comparison::around(runs.clone(), frame.clone(), &shipped, seed)?;
+        let rough = Comparison::around(runs.clone(), frame.clone(), &shipped, None, seed)?;
         progress("re-tuning the nominal parameters");
         let first = retuned(&rough, &shipped)?;
-        let compare = Comparison::around(runs, frame, &first.model, seed)?;
-        let nominal = retuned(&compare, &first.model)?;
+        let mut compare = Comparison::around(runs, frame, &first.model, None, seed)?;
+        compare.adapt(&first.model)?;
+        Self::of(compare, shipped, &first.model)
+    }
+
+    /// The problem with nuisances as large as a model that explains more leaves them; none where they are so already.
+    pub(crate) fn adapted(&self, best: &Model, seed: u64) -> Result<Option<Self>, GapError> {
+        let mut compare = self.compare.clone();
+        if compare.adapt(best)? < LEARNT {
+            return Ok(None);
+        }
+        let (runs, frame) = (compare.runs.clone(), compare.frame.clone());
+        let like = Some(compare.metrics.as_slice());
+        let compare = Comparison::around(runs, frame, &self.nominal.model, like, seed)?;
+        Self::of(compare, self.shipped.clone(), &self.nominal.model).map(Some)
+    }
+
+    /// Re-tuned in metrics that stand.
+    fn of(compare: Comparison<'a>, shipped: Model, start: &Model) -> Result<Self, GapError> {
+        let nominal = retuned(&compare, start)?;
         let stages = compare.metrics.len();
         let memory: Result<Vec<f64>, GapError> = (0..stages)
             .into_par_iter()

@@ -38,16 +38,14 @@ impl StageSpec {
 
 /// A slow wander of a parameter around its value that nobody models: it belongs to the floor.
 ///
-/// An Ornstein-Uhlenbeck process of standard deviation `sd` and correlation time `correlation_s`, linear
-/// between knots `knot_s` apart.
+/// An Ornstein-Uhlenbeck process of about the standard deviation `sd` and the correlation time `correlation_s`: both are
+/// looked for in the record, around these within factors of some two and three.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Wander {
     /// Standard deviation, in the parameter's unit.
     pub sd: f64,
     /// Correlation time, s.
     pub correlation_s: f64,
-    /// Distance of the knots, s.
-    pub knot_s: f64,
 }
 
 /// A nominal parameter.

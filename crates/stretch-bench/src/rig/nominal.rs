@@ -5,12 +5,10 @@ use stretch_sim::{Key, PARAMETERS, Rig, Stage};
 
 use super::noises::Noises;
 
-/// Slow fluctuation of the supply, a share of it (1 sd).
-const SUPPLY_WANDER: f64 = 0.003;
-/// Its correlation time, s.
-const SUPPLY_CORRELATION_S: f64 = 12.0;
-/// Distance of the knots that follow it, s.
-const SUPPLY_KNOT_S: f64 = 2.0;
+/// Fluctuation of the supply as laboratories have it, a share of it (1 sd): regulators hold a tenth of a per cent to half of one.
+const SUPPLY_WANDER: f64 = 0.0025;
+/// Its correlation time, s: a compressor's cycle at one end, a regulator's hunting at the other.
+const SUPPLY_CORRELATION_S: f64 = 4.0;
 
 /// Parameters with a tolerance in the stages, then the pressure at a trial's start; and the key of each.
 pub(super) fn parameters(rig: &Rig, kinds: &[Stage]) -> (Vec<ParameterSpec>, Vec<Option<Key>>) {
@@ -19,7 +17,6 @@ pub(super) fn parameters(rig: &Rig, kinds: &[Stage]) -> (Vec<ParameterSpec>, Vec
         let wander = (key == Key::PS).then_some(Wander {
             sd: SUPPLY_WANDER * nominal,
             correlation_s: SUPPLY_CORRELATION_S,
-            knot_s: SUPPLY_KNOT_S,
         });
         ParameterSpec {
             least: 0.15 * nominal,

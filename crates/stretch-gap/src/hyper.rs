@@ -1,0 +1,134 @@
+//! How large and how quick the nuisances of a stage are, from the record.
+//!
+//! A supply wanders by a tenth of a per cent or by half of one, in half a second or in thirty; who assumes one of these finds an effect in
+//! the difference. So size a and correlation time tau of every wander, and the size of offsets, are those of the greatest
+//!
+//! ```text
+//! L = -(r'V^-1 r + ln det V)/2 + ln p(a, tau),     V = s I + C P^-1 C'
+//! ```
+//!
+//! over the samples that are not tested on (Rasmussen and Williams 2006, section 5.4.1), with lognormal priors p around what the simulator
+//! describes, wide enough for any lab. What else is left in the residual r must not be taken for a nuisance, so s is its spectral level at
+//! the blocks' rate: the mean square of block means times the samples of a block, the least of all that are tried, and at least the 1 of
+//! the noise alone.
+
+use crate::{
+    frame::{Frame, Role},
+    metric::{Level, Loose, Metric},
+};
+
+/// Sizes that are tried, as multiples of what the simulator describes.
+const SIZES: [f64; 6] = [0.2, 0.4, 0.7, 1.0, 1.6, 2.5];
+/// Correlation times that are tried, s.
+const TIMES_S: [f64; 7] = [0.3, 0.7, 1.5, 3.0, 6.0, 12.0, 30.0];
+/// Deviations of the priors of ln a and of ln tau: a factor of two, and of three.
+const SPREAD: (f64, f64) = (0.7, 1.1);
+
+impl Metric {
+    /// The metric with nuisances of the greatest likelihood for a residual in floors, and by how many nats it is greater than with
+    /// those of this one.
+    pub(crate) fn adapted(&self, frame: &Frame, dt_s: f64, residual: &[f64]) -> (Self, f64) {
+        let (mut best, mut gained) = (self.clone(), 0.0);
+        for which in 0..self.loose().len() {
+            let own = best.loose()[which].level;
+            let levels = hypotheses(&best.loose()[which]).chain([own]);
+            let tried: Vec<Self> = levels.map(|l| best.with(which, l, frame, dt_s)).collect();
+            let noise = tried.iter().map(|m| m.spectral_level(frame, residual));
+            let noise = noise.fold(f64::INFINITY, f64::min).max(1.0).sqrt();
+            let scaled: Vec<f64> = residual.iter().map(|r| r / noise).collect();
+            let fit = |m: &Self| {
+                // V/s: the nuisances beside a floor that is sqrt(s) times as high.
+                let Level { size, time_s } = m.loose()[which].level;
+                let beside = m.with(which, Level { size: size / noise, time_s }, frame, dt_s);
+                beside.likelihood(frame, &scaled) - cost(&m.loose()[which])
+            };
+            let fits: Vec<f64> = tried.iter().map(fit).collect();
+            let before = fits.last().copied().unwrap_or(0.0);
+            let all = fits.iter().copied().zip(&tried);
+            if let Some((most, metric)) = all.max_by(|a, b| a.0.total_cmp(&b.0)) {
+                gained += most - before;
+                best = metric.clone();
+            }
+        }
+        (best, gained)
+    }
+
+    /// -(r'V^-1 r + ln det V)/2 over the samples that are not tested on.
+    fn likelihood(&self, frame: &Frame, residual: &[f64]) -> f64 {
+        let column = self.column(frame, residual.to_vec());
+        let square = |role| self.product(frame, &column, &column, role);
+        -0.5 * (square(Role::Fit) + square(Role::Held) + self.ln_determinant(frame, residual.len()))
+    }
+
+    /// s of the module's head for one residual.
+    fn spectral_level(&self, frame: &Frame, residual: &[f64]) -> f64 {
+        let mut clean = residual.to_vec();
+        self.clean(frame, &mut clean);
+        let looked = frame.segments.iter().filter(|s| s.role != Role::Test && s.to <= clean.len());
+        let blocks = looked.flat_map(|s| clean[s.from..s.to].chunks_exact(frame.block));
+        let means = blocks.map(|b| b.iter().sum::<f64>() / b.len() as f64);
+        let (count, sum) = means.fold((0.0, 0.0), |(n, sum), mean| (n + 1.0, sum + mean * mean));
+        frame.block as f64 * sum / f64::max(count, 1.0)
+    }
+}
+
+fn hypotheses(loose: &Loose) -> impl Iterator<Item = Level> {
+    let times_s: Vec<f64> = match loose.wander {
+        Some(_) => TIMES_S.into(),
+        None => vec![loose.level.time_s],
+    };
+    times_s.into_iter().flat_map(|time_s| SIZES.map(|size| Level { size, time_s }))
+}
+
+/// -ln p.
+fn cost(loose: &Loose) -> f64 {
+    let Level { size, time_s } = loose.level;
+    let usual_s = loose.wander.map_or(time_s, |w| w.correlation_s);
+    0.5 * (size.ln() / SPREAD.0).powi(2) + 0.5 * ((time_s / usual_s).ln() / SPREAD.1).powi(2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{dice::Dice, floor::Floor, frame::Segment};
+
+    /// A residual of noise and a wander that acts with changing strength.
+    fn residual(size: f64, time_s: f64, drive: &[f64]) -> Vec<f64> {
+        let mut dice = Dice::new(12, (100.0 * time_s) as u64);
+        let kept = (-0.01 / time_s).exp();
+        let mut wander = dice.gauss();
+        let one = |drive: &f64| {
+            wander = kept * wander + (1.0 - kept * kept).sqrt() * dice.gauss();
+            size * drive * wander + dice.gauss()
+        };
+        drive.iter().map(one).collect()
+    }
+
+    #[test]
+    fn size_and_time_of_a_wander_are_found_again() {
+        let samples = 20_000;
+        let drive: Vec<f64> = (0..samples).map(|i| 2.0 + (0.003 * i as f64).sin()).collect();
+        let floor = Floor { sd: vec![1.0; samples], rms: 1.0, source: String::new() };
+        let frame = Frame {
+            segments: vec![Segment { trial: 0, from: 0, to: samples, role: Role::Fit }],
+            block: 50,
+            fit_trials: 1,
+            borrowed_test: false,
+        };
+        let described = crate::spec::Wander { sd: 1.0, correlation_s: 4.0 };
+        let metric = Metric::with_wander(floor, drive.clone(), described, &frame, 0.01);
+        for (size, time_s) in [(0.4, 0.7), (1.6, 3.0), (1.0, 12.0)] {
+            let record = residual(size, time_s, &drive);
+            let (adapted, gained) = metric.adapted(&frame, 0.01, &record);
+            let Level { size: found, time_s: found_s } = adapted.loose()[0].level;
+            // The next one of the grid at most.
+            assert!((0.55..1.8).contains(&(found / size)), "{found} for {size}");
+            assert!((0.4..2.6).contains(&(found_s / time_s)), "{found_s} for {time_s}");
+            assert!(gained >= 0.0);
+        }
+        // Noise alone: as little as there is, and nothing gained by a second look.
+        let (quiet, _) = metric.adapted(&frame, 0.01, &residual(0.0, 1.0, &drive));
+        assert!(quiet.loose()[0].level.size < 0.5);
+        assert_eq!(quiet.adapted(&frame, 0.01, &residual(0.0, 1.0, &drive)).1, 0.0);
+    }
+}

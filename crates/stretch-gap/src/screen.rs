@@ -94,7 +94,12 @@ impl Comparison<'_> {
                 (0.0, 1.5)
             };
             let alpha = alpha.clamp(least, most);
-            let gain = self.weight() * (alpha * with_residual - 0.5 * alpha * alpha * own);
+            let promise = |a: f64| self.weight() * (a * with_residual - 0.5 * a * a * own);
+            let gain = promise(alpha);
+            // A threshold has the sign of a strength and bends the change: as it was simulated, its promise is kept.
+            if scalable && promise(1.0) > 0.0 {
+                starts.push((values.clone(), promise(1.0)));
+            }
             let mut start = values.clone();
             if scalable {
                 let size = if alpha.abs() < 0.02 { 0.02 * alpha.signum() } else { alpha };

@@ -93,15 +93,15 @@ impl<'a> Search<'a> {
             let screened = self.screen(&best, &ground)?;
             let kept = if round == 0 { KEPT } else { KEPT_LATER };
             let list = self.shortlist(&best, &screened, kept);
-            if list.is_empty() {
-                break;
-            }
             progress(&format!("fitting {} candidates, round {}", list.len(), round + 1));
-            let found = self.sets.extend_all(&best, &ground, &list, best.score)?;
-            // The best may only pick up what mismatch of form left elsewhere: the first that is worth it is taken.
-            let Some(next) = found.into_iter().find(|next| self.worth.is_worth(&best, next)) else {
-                break;
-            };
+            let mut next = self.first_worth(&best, &ground, &list)?;
+            if next.is_none() && self.problem.gap(&best) > self.worth.thresholds.null_excess {
+                // A screen is a straight line: before a gap is left as it is, whatever could be in it is fitted.
+                progress(&format!("fitting the other candidates, round {}", round + 1));
+                let others: Vec<Screened> = self.others(&best, &screened, &list);
+                next = self.first_worth(&best, &ground, &others)?;
+            }
+            let Some(next) = next else { break };
             best = next;
         }
         if best.effects.len() > 1 {
@@ -109,6 +109,24 @@ impl<'a> Search<'a> {
             best = self.prune(best)?;
         }
         Ok(best)
+    }
+
+    /// The best may only pick up what mismatch of form left elsewhere: the first that is worth it is taken.
+    fn first_worth(
+        &mut self,
+        base: &Hypothesis,
+        ground: &Ground,
+        list: &[Screened],
+    ) -> Result<Option<Hypothesis>, GapError> {
+        let found = self.sets.extend_all(base, ground, list, base.score)?;
+        Ok(found.into_iter().find(|next| self.worth.is_worth(base, next)))
+    }
+
+    /// Effects that a shortlist leaves out, where a gap is left for them.
+    fn others(&self, base: &Hypothesis, screened: &[Screened], list: &[Screened]) -> Vec<Screened> {
+        let is_new = |s: &&Screened| list.iter().all(|l| l.effect != s.effect);
+        let is_possible = |s: &&Screened| self.worth.is_possible(base, s.effect);
+        screened.iter().filter(is_new).filter(is_possible).cloned().collect()
     }
 
     fn prune(&mut self, mut best: Hypothesis) -> Result<Hypothesis, GapError> {
@@ -193,7 +211,10 @@ impl<'a> Search<'a> {
                 .cloned()
                 .collect();
             for solution in self.sets.extend_all(&less, &ground, &list, best.score)? {
-                out.push((effect, solution));
+                let new = solution.effects.iter().find(|e| !less.effects.contains(e));
+                if new.is_some_and(|new| !self.worth.is_at_bound(&solution, *new)) {
+                    out.push((effect, solution));
+                }
             }
         }
         Ok(out)

@@ -12,7 +12,6 @@ use crate::{
     problem::Problem,
     score::{gap, mean_square},
     sets::Sets,
-    spec::EffectSpec,
 };
 
 /// The best set with its effects taken out one after the other, the weakest first: the effect, and what is left without it.
@@ -65,19 +64,10 @@ pub(crate) fn shares(
             effect: spec.name.clone(),
             closes: closed.sum::<f64>() / whole,
             closes_of_stage: of_stages.map(|(closed, whole)| closed / whole).fold(0.0, f64::max),
-            at_bound: best.model.effect(*effect).is_some_and(|values| is_at_bound(spec, values)),
+            at_bound: best.model.effect(*effect).is_some_and(|values| spec.is_at_bound(values)),
         });
         with = without;
     }
     out.reverse();
     Ok(out)
-}
-
-/// Whether a parameter that is no form stands at an end of its range where the effect is not off.
-fn is_at_bound(spec: &EffectSpec, values: &[f64]) -> bool {
-    let mut fitted = spec.parameters.iter().zip(values).filter(|(p, _)| p.is_fitted);
-    fitted.any(|(p, value)| {
-        let near = |end: f64| (value - end).abs() < 1e-3 * (p.max - p.min);
-        p.form.is_none() && (near(p.min) || near(p.max)) && !p.off.is_some_and(near)
-    })
 }

@@ -151,6 +151,9 @@ impl EffectParameterSpec {
     }
 }
 
+/// Share of its range within which a parameter stands at an end of it.
+const AT_END: f64 = 1e-3;
+
 /// An effect that the nominal simulator leaves out.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EffectSpec {
@@ -193,6 +196,19 @@ impl EffectSpec {
             is_between_trials: false,
             twins: Vec::new(),
         }
+    }
+
+    /// Whether a parameter that is no form stands at an end of its range where the effect is not off: it stands in for something
+    /// else then.
+    pub(crate) fn is_at_bound(&self, values: &[f64]) -> bool {
+        let mut fitted = self.parameters.iter().zip(values).filter(|(p, _)| p.is_fitted);
+        fitted.any(|(p, value)| {
+            let near = |end: f64| match p.is_log {
+                true => (value / end).ln().abs() < AT_END * (p.max / p.min).ln(),
+                false => (value - end).abs() < AT_END * (p.max - p.min),
+            };
+            p.form.is_none() && (near(p.min) || near(p.max)) && !p.off.is_some_and(near)
+        })
     }
 
     /// Every combination of the parameters' points.

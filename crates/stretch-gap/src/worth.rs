@@ -1,6 +1,6 @@
 //! What an effect must bring to be taken: more than chance, more than what counts, more than mismatch of form.
 //!
-//! Three hurdles, all of them in [`Thresholds`]: the score rises by `rise` nats (by `faint_rise` where what is closed would not count as
+//! No parameter of it stands at an end of its range. Then three hurdles, all of them in [`Thresholds`]: the score rises by `rise` nats (by `faint_rise` where what is closed would not count as
 //! a gap); at least `share` of the gap that is left in the effect's stages closes; and in one of these stages more closes than
 //! *mismatch of form* could explain. The rig's backlash is not the textbook's: an effect in the right place leaves a share `mismatch` of
 //! what it closes, with the shape of a further effect, and evidence grows with the samples while that share does not.
@@ -22,8 +22,15 @@ impl Worth<'_> {
         };
         let closed = self.problem.gap(base) - self.problem.gap(next);
         next.score - base.score > self.least_rise(closed)
+            && !self.is_at_bound(next, new)
             && closed >= self.thresholds.share * self.left(base, new)
             && self.is_no_mismatch(base, next, new)
+    }
+
+    /// Whether a parameter of an effect stands at an end of its range: such an effect is announced by nobody.
+    pub(crate) fn is_at_bound(&self, set: &Hypothesis, effect: usize) -> bool {
+        let spec = &self.problem.simulator().effects()[effect];
+        set.model.effect(effect).is_some_and(|values| spec.is_at_bound(values))
     }
 
     /// Whether an effect on top of `base` can be more than what mismatch of form left.

@@ -8,6 +8,7 @@ use crate::{
     diagnosis::{Candidate, Diagnosis, Unexplained, VerdictKind, Where},
     error::GapError,
     evidence::Evidence,
+    hypothesis::Hypothesis,
     judge::{Case, judge},
     localise,
     naming::Naming,
@@ -15,6 +16,7 @@ use crate::{
     problem::Problem,
     sanity::Sanity,
     search::Search,
+    sets::Sets,
     shares::{peeled, shares},
     simulator::Simulator,
     thresholds::Thresholds,
@@ -77,14 +79,28 @@ fn run(
     let runs = &problem.compare.runs;
     // Searched.
     let mut search = Search::new(&problem, thresholds, options.depth);
-    let mut found = search.run(progress)?;
-    // What the best set explains was no nuisance: once more, with those that are left beside it.
-    let renewed = problem.adapted(&found.best.model, seed)?;
-    let problem = renewed.as_ref().unwrap_or(&problem);
-    if renewed.is_some() {
+    let mut found = search.run(&problem.nominal, progress)?;
+    progress("nuisances");
+    eprintln!(
+        found.best.effects.iter().map(|e| &simulator.effects()[*e].name).collect::<Vec<_>>(),
+        found.best.score,
+        problem.gap(&found.best)
+    );
+    let settled = settled(&problem, &mut search.sets, &found.best, seed)?;
+    let problem = settled.as_ref().map_or(&problem, |(problem, _)| problem);
+    if let Some((problem, from)) = &settled {
         search = Search::new(problem, thresholds, options.depth);
-        found = search.run(progress)?;
+        found = search.run(from, progress)?;
     }
+    for m in &problem.compare.metrics {
+        for l in m.loose() {
+        }
+    }
+    eprintln!(
+        found.best.effects.iter().map(|e| &simulator.effects()[*e].name).collect::<Vec<_>>(),
+        found.best.score,
+        problem.gap(&found.best)
+    );
     let peeled = peeled(&mut search.sets, &found.best)?;
     // Gathered: from here on test trials are read.
     progress("test trials");
@@ -144,6 +160,42 @@ fn run(
         candidates,
     };
     Ok((diagnosis, evidence))
+}
+
+/// The problem with the nuisances that the record has, and the set to go on from; none where they are as described.
+///
+/// What an effect of their stage explains, a larger nuisance may explain as well: two hypotheses, the nuisances beside the best set and
+/// those beside what is left of it without such effects, weighed by their likelihoods.
+fn settled<'a>(
+    problem: &Problem<'a>,
+    sets: &mut Sets<'_>,
+    best: &Hypothesis,
+    seed: u64,
+) -> Result<Option<(Problem<'a>, Hypothesis)>, GapError> {
+    let mut bare = best.clone();
+    for effect in best.effects.iter().copied().filter(|e| problem.is_in_loose_stage(*e)) {
+        bare = sets.without(&bare, effect)?;
+    }
+    let beside_best = problem.adapted(&best.model, seed)?;
+    if bare.effects.len() == best.effects.len() {
+        return Ok(beside_best.map(|problem| (problem, best.clone())));
+    }
+    let Some(beside_bare) = problem.adapted(&bare.model, seed)? else {
+        return Ok(beside_best.map(|problem| (problem, best.clone())));
+    };
+    let own = beside_best.as_ref().unwrap_or(problem);
+    let (levels, others) = (own.levels(best)?, beside_bare.levels(&bare)?);
+    let levels: Vec<f64> = levels.iter().zip(&others).map(|(a, b)| a.min(*b)).collect();
+    eprintln!(
+        bare.effects,
+        best.effects,
+        beside_bare.likelihood(&bare, &levels)?,
+        own.likelihood(best, &levels)?
+    );
+    if beside_bare.likelihood(&bare, &levels)? > own.likelihood(best, &levels)? {
+        return Ok(Some((beside_bare, bare)));
+    }
+    Ok(beside_best.map(|problem| (problem, best.clone())))
 }
 
 /// Slices that are told of what a partial answer leaves.

@@ -3,8 +3,9 @@
 use crate::{
     diagnosis::Excess,
     error::GapError,
-    frame::{Frame, Role},
+    frame::{Frame, Role, Segment},
     hypothesis::Hypothesis,
+    linear::dot,
     probability::{Weighed, weigh},
     problem::Problem,
     score::{excess, mean_square},
@@ -72,18 +73,21 @@ impl Traces {
         let metric = &compare.metrics[stage];
         let apart = simulator.measured(stage).iter().zip(&output).zip(&metric.floor.sd);
         let mut residual: Vec<f64> = apart.map(|((m, s), sd)| (m - s) / sd).collect();
+        let whole = residual.clone();
         metric.clean(&compare.frame, &mut residual);
-        let blocks = test_blocks(&compare.frame, &residual);
+        let blocks = test_blocks(&compare.frame, &whole, &residual);
         Ok(Self { output, residual, blocks })
     }
 }
 
-fn test_blocks(frame: &Frame, residual: &[f64]) -> Vec<f64> {
-    frame
-        .of_role(Role::Test)
-        .flat_map(|s| residual[s.from..s.to].chunks_exact(frame.block))
-        .map(|block| block.iter().map(|r| r * r).sum::<f64>() / block.len() as f64)
-        .collect()
+/// r V^-1 r by block: V^-1 r is the residual without its most likely nuisances, whose own improbability so counts.
+fn test_blocks(frame: &Frame, whole: &[f64], clean: &[f64]) -> Vec<f64> {
+    let block = |s: &Segment| {
+        let parts = whole[s.from..s.to].chunks_exact(frame.block);
+        let pairs = parts.zip(clean[s.from..s.to].chunks_exact(frame.block));
+        pairs.map(|(r, c)| dot(r, c) / r.len() as f64).collect::<Vec<f64>>()
+    };
+    frame.of_role(Role::Test).flat_map(block).collect()
 }
 
 impl Evidence {

@@ -35,13 +35,7 @@ impl Metric {
             let tried: Vec<Self> = levels.map(|l| best.with(which, l, frame, dt_s)).collect();
             let noise = tried.iter().map(|m| m.spectral_level(frame, residual));
             let noise = noise.fold(f64::INFINITY, f64::min).max(1.0).sqrt();
-            let scaled: Vec<f64> = residual.iter().map(|r| r / noise).collect();
-            let fit = |m: &Self| {
-                // V/s: the nuisances beside a floor that is sqrt(s) times as high.
-                let Level { size, time_s } = m.loose()[which].level;
-                let beside = m.with(which, Level { size: size / noise, time_s }, frame, dt_s);
-                beside.likelihood(frame, &scaled) - cost(&m.loose()[which])
-            };
+            let fit = |m: &Self| m.beside(frame, dt_s, residual, noise);
             let fits: Vec<f64> = tried.iter().map(fit).collect();
             let before = fits.last().copied().unwrap_or(0.0);
             let all = fits.iter().copied().zip(&tried);
@@ -53,6 +47,18 @@ impl Metric {
         (best, gained)
     }
 
+    /// L of the module's head beside a floor that is `noise` times as high: V/s has nuisances that much smaller.
+    pub(crate) fn beside(&self, frame: &Frame, dt_s: f64, residual: &[f64], noise: f64) -> f64 {
+        let scaled: Vec<f64> = residual.iter().map(|r| r / noise).collect();
+        let mut beside = self.clone();
+        for which in 0..self.loose().len() {
+            let Level { size, time_s } = self.loose()[which].level;
+            beside = beside.with(which, Level { size: size / noise, time_s }, frame, dt_s);
+        }
+        let price: f64 = self.loose().iter().map(cost).sum();
+        beside.likelihood(frame, &scaled) - price
+    }
+
     /// -(r'V^-1 r + ln det V)/2 over the samples that are not tested on.
     fn likelihood(&self, frame: &Frame, residual: &[f64]) -> f64 {
         let column = self.column(frame, residual.to_vec());
@@ -61,7 +67,7 @@ impl Metric {
     }
 
     /// s of the module's head for one residual.
-    fn spectral_level(&self, frame: &Frame, residual: &[f64]) -> f64 {
+    pub(crate) fn spectral_level(&self, frame: &Frame, residual: &[f64]) -> f64 {
         let mut clean = residual.to_vec();
         self.clean(frame, &mut clean);
         let looked = frame.segments.iter().filter(|s| s.role != Role::Test && s.to <= clean.len());

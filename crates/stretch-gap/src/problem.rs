@@ -66,15 +66,14 @@ impl<'a> Problem<'a> {
         let rough = Comparison::around(runs.clone(), frame.clone(), &shipped, None, seed)?;
         progress("re-tuning the nominal parameters");
         let first = retuned(&rough, &shipped)?;
-        let mut compare = Comparison::around(runs, frame, &first.model, None, seed)?;
-        compare.adapt(&first.model)?;
+        let compare = Comparison::around(runs, frame, &first.model, None, seed)?;
         Self::of(compare, shipped, &first.model)
     }
 
-    /// The problem with nuisances as large as a model that explains more leaves them; none where they are so already.
-    pub(crate) fn adapted(&self, best: &Model, seed: u64) -> Result<Option<Self>, GapError> {
+    /// The problem with nuisances as large and as quick as a model leaves them; none where they are so already.
+    pub(crate) fn adapted(&self, model: &Model, seed: u64) -> Result<Option<Self>, GapError> {
         let mut compare = self.compare.clone();
-        if compare.adapt(best)? < LEARNT {
+        if compare.adapt(model)? < LEARNT {
             return Ok(None);
         }
         let (runs, frame) = (compare.runs.clone(), compare.frame.clone());
@@ -140,9 +139,61 @@ impl<'a> Problem<'a> {
             - choice_cost(simulator, model)
     }
 
+    /// Stages whose parameters wander or are offset in each trial.
+    pub(crate) fn loose_stages(&self) -> impl Iterator<Item = usize> {
+        let all = self.compare.metrics.iter().enumerate();
+        all.filter(|(_, m)| !m.loose().is_empty()).map(|(stage, _)| stage)
+    }
+
+    /// Effects that act in a stage with loose parameters: what they do, nuisances may have done.
+    pub(crate) fn is_in_loose_stage(&self, effect: usize) -> bool {
+        let touches = &self.simulator().effects()[effect].touches;
+        self.loose_stages().any(|stage| touches.contains(&stage))
+    }
+
+    /// Least spectral level of what a hypothesis leaves in each stage with loose parameters.
+    pub(crate) fn levels(&self, hypothesis: &Hypothesis) -> Result<Vec<f64>, GapError> {
+        let one = |stage| {
+            let residual = self.compare.residual_values(stage, &hypothesis.model)?;
+            Ok(self.compare.metrics[stage].spectral_level(&self.compare.frame, &residual).max(1.0))
+        };
+        self.loose_stages().map(one).collect()
+    }
+
+    /// Log-likelihood of a hypothesis in the stages with loose parameters, their nuisances marginalised, what their sizes and the
+    /// effects cost taken off, nats; `levels` as of [`Problem::levels`].
+    pub(crate) fn likelihood(
+        &self,
+        hypothesis: &Hypothesis,
+        levels: &[f64],
+    ) -> Result<f64, GapError> {
+        let mut model = hypothesis.model.clone();
+        model.effects.retain(|(e, _)| self.is_in_loose_stage(*e));
+        let simulator = self.simulator();
+        let blocks = self.compare.frame.blocks(Role::Fit);
+        let free = free_parameters(simulator, &model) as f64;
+        let price = 0.5 * free * blocks.ln()
+            + form_cost(simulator, &model)
+            + choice_cost(simulator, &model);
+        let mut sum = -price;
+        for (stage, level) in self.loose_stages().zip(levels) {
+            let residual = self.compare.residual_values(stage, &hypothesis.model)?;
+            let metric = &self.compare.metrics[stage];
+            sum += metric.beside(&self.compare.frame, simulator.dt_s(), &residual, level.sqrt());
+        }
+        Ok(sum)
+    }
+
     /// Excess of one stage over fitted and held-out samples together.
     pub(crate) fn gap_in(&self, hypothesis: &Hypothesis, stage: usize) -> f64 {
         gap(self.compare.mean_square(&hypothesis.misfits[stage]))
+    }
+
+    /// What a hypothesis closes of one stage that another leaves. Floors are known to some per cent: what is closed below them
+    /// counts as well.
+    pub(crate) fn closes(&self, base: &Hypothesis, next: &Hypothesis, stage: usize) -> f64 {
+        let mean_square = |h: &Hypothesis| self.compare.mean_square(&h.misfits[stage]);
+        mean_square(base) - mean_square(next)
     }
 
     /// The same summed over stages.

@@ -57,10 +57,15 @@ impl<'a> Search<'a> {
         Self { problem, worth: Worth { problem, thresholds }, sets: Sets::new(problem), depth }
     }
 
-    /// The best set, and its rivals: effects are added as long as they are worth it, and one that stands better in the
+    /// The best set that grows from one of this or another problem, and its rivals: effects are added as long as they are worth it, and one that stands better in the
     /// place of another takes it, for the strongest comes first and may have stood in for several.
-    pub(crate) fn run(&mut self, progress: &dyn Fn(&str)) -> Result<Found, GapError> {
-        let mut best = self.grow(self.problem.nominal.clone(), progress)?;
+    pub(crate) fn run(
+        &mut self,
+        from: &Hypothesis,
+        progress: &dyn Fn(&str),
+    ) -> Result<Found, GapError> {
+        let from = self.sets.refit(from)?;
+        let mut best = self.grow(from, progress)?;
         let mut exchanges = 0;
         loop {
             progress("rivals");

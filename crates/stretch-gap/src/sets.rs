@@ -66,6 +66,20 @@ impl<'a> Sets<'a> {
         (stages, own)
     }
 
+    /// A set of another problem, fitted in this one from where it stands there.
+    pub(crate) fn refit(&mut self, set: &Hypothesis) -> Result<Hypothesis, GapError> {
+        if set.effects.is_empty() {
+            return Ok(self.problem.nominal.clone());
+        }
+        let stages: Vec<usize> = (0..self.problem.simulator().stages().len()).collect();
+        let fitted = self.problem.fit(&stages, set.model.clone(), &[], FINE)?;
+        let own = self.join(&self.problem.nominal, set.effects.clone(), &stages, fitted);
+        let mut key = own.effects.clone();
+        key.sort_unstable();
+        self.tried.insert(key, own.clone());
+        Ok(own)
+    }
+
     /// Fits the newest effect's part of a set until nothing is gained.
     fn polish(&self, set: &Hypothesis, effect: usize) -> Result<Hypothesis, GapError> {
         let (stages, own) = self.component(&set.effects, effect);

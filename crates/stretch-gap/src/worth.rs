@@ -20,7 +20,8 @@ impl Worth<'_> {
         let Some(&new) = next.effects.iter().find(|e| !base.effects.contains(e)) else {
             return false;
         };
-        let closed = self.problem.gap(base) - self.problem.gap(next);
+        let all = 0..base.misfits.len();
+        let closed: f64 = all.map(|stage| self.problem.closes(base, next, stage)).sum();
         next.score - base.score > self.least_rise(closed)
             && !self.is_at_bound(next, new)
             && closed >= self.thresholds.share * self.left(base, new)
@@ -52,7 +53,7 @@ impl Worth<'_> {
 
     fn is_no_mismatch(&self, base: &Hypothesis, next: &Hypothesis, new: usize) -> bool {
         self.touched(new).iter().any(|&s| {
-            let closed = self.problem.gap_in(base, s) - self.problem.gap_in(next, s);
+            let closed = self.problem.closes(base, next, s);
             closed > 0.0 && closed >= self.mismatch(base, s)
         })
     }

@@ -10,6 +10,7 @@ use crate::{
     evidence::Evidence,
     judge::{Case, judge},
     localise,
+    missing::propose,
     naming::Naming,
     probability::covering_set,
     problem::Problem,
@@ -105,6 +106,18 @@ fn run(
     };
     let partial = first.filter(|_| verdict.kind == VerdictKind::Partial);
     let unexplained = partial.map(|first| unexplained(simulator, &evidence, first, seed));
+    let base = match verdict.kind {
+        VerdictKind::Partial => Some(&found.best),
+        VerdictKind::Unknown => Some(&problem.nominal),
+        _ => None,
+    };
+    let proposed = match base {
+        Some(base) => {
+            progress("what the catalogue lacks");
+            propose(&problem, base)?
+        }
+        None => None,
+    };
     let ambiguous = match verdict.kind {
         VerdictKind::NoGap | VerdictKind::Parameters => Vec::new(),
         _ => covering_set(&weighed, simulator),
@@ -123,6 +136,7 @@ fn run(
         faint: naming.faint,
         least_share: thresholds.least_share,
         unexplained,
+        proposed,
         ambiguous,
         shares,
         gap: evidence.gap,

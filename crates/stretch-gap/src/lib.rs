@@ -52,6 +52,7 @@ pub use error::GapError;
 pub use evidence::{Evidence, StageEvidence};
 pub use floor::noise_variance;
 pub use frame::{BLOCK_S, Frame, Role, Segment};
+pub use missing::{Factor, Passage, Proposed, ProposedTerm, RateForm, SignalScale, Term};
 pub use next_experiment::{Laboratory, Plan, Proposal, differences, next_experiment};
 pub use simulator::{Model, Motion, Recorded, Run, Simulator};
 pub use spec::{EffectParameterSpec, EffectSpec, ParameterSpec, StageSpec, TrialSpec, Wander};

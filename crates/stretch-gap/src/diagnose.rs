@@ -125,7 +125,12 @@ fn run(
     let (runtime_s, simulations) = (begun.elapsed().as_secs_f64(), runs.count());
     let simpler = || baselines(&problem, &search.sets.tried, thresholds.null_excess);
     // Told.
-    let answer = Answer { verdict: &verdict, naming: &naming, unexplained: unexplained.as_ref() };
+    let answer = Answer {
+        verdict: &verdict,
+        naming: &naming,
+        unexplained: unexplained.as_ref(),
+        proposed: proposed.as_ref(),
+    };
     let told = tell(answer, case, simulator, &evidence, &shares);
     let diagnosis = Diagnosis {
         schema: 1,

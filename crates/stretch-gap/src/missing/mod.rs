@@ -5,6 +5,7 @@
 //! parameters (Brynjarsdottir and O'Hagan 2014, doi 10.1088/0266-5611/30/11/114007).
 
 mod coloured;
+mod dense;
 mod library;
 mod propose;
 mod proposed;

@@ -53,19 +53,20 @@ pub(crate) fn propose(
         compare.metrics[stage].clean(&compare.frame, &mut values);
         values
     };
-    let log_odds = match sum.terms.is_empty() {
-        true => 0.0,
-        false => {
-            let (alone, beside) = (clean(&residue.residual), clean(&settled.left));
-            odds(&choice, &alone, &beside, sum.terms.len(), sum.library)
-        }
-    };
+    let (alone, beside) = (clean(&residue.residual), clean(&settled.left));
+    // Many terms at once say whether it is a function of what was recorded at all, the sum whether it is that function: what a
+    // chosen few see alone was chosen by chance.
+    // A function has one term of the library at least.
+    let log_odds = odds(&choice, &alone, &sum.beside_many, 1, sum.library);
     let random = log_odds <= 0.0;
+    let stands = !random
+        && !sum.terms.is_empty()
+        && odds(&choice, &alone, &beside, sum.terms.len(), sum.library) > 0.0;
     let spec = &simulator.stages()[stage];
     let signals = scales(&residue.record);
     let pairs = sum.terms.iter().zip(settled.coefficients.iter().zip(&settled.sd));
     let terms: Vec<ProposedTerm> = pairs
-        .filter(|_| !random)
+        .filter(|_| stands)
         .map(|(term, (&coefficient, &sd))| ProposedTerm {
             name: words(term, &signals),
             coefficient,
@@ -76,12 +77,15 @@ pub(crate) fn propose(
         .collect();
     let held =
         |column: &Column| compare.metrics[stage].product(&choice, column, column, Role::Held);
-    let (closes_held, closes_test) = match random {
-        true => (0.0, 0.0),
-        false => (
+    let (closes_held, closes_test) = match stands {
+        false => (0.0, 0.0),
+        true => (
             closed(held(&residue.residual), held(&settled.left), choice.count(Role::Held)),
             tested(&residue, &sum.terms, &settled)?,
         ),
+    };
+    let squares = |values: &[f64]| -> f64 {
+        choice.of_role(Role::Held).flat_map(|s| &values[s.from..s.to]).map(|r| r * r).sum()
     };
     let mut proposed = Proposed {
         stage: spec.name.clone(),
@@ -96,6 +100,7 @@ pub(crate) fn propose(
         closes_test,
         random,
         log_odds,
+        foretold: closed(squares(&alone), squares(&sum.beside_many), choice.count(Role::Held)),
         sentence: String::new(),
     };
     proposed.sentence = sentence(&proposed);

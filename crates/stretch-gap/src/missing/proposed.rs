@@ -68,6 +68,9 @@ pub struct Proposed {
     pub random: bool,
     /// ln of the odds that it is a function of what was recorded rather than random in time.
     pub log_odds: f64,
+    /// Share of the remaining gap that many terms of the library foretell together on samples held out.
+    #[serde(default)]
+    pub foretold: f64,
     /// All of this in one sentence.
     pub sentence: String,
 }
@@ -141,11 +144,11 @@ pub(crate) fn words(term: &Term, signals: &[SignalScale]) -> String {
     let product = if factors.is_empty() { "1".to_owned() } else { factors.join(" ") };
     match term.passage {
         Passage::Direct => product,
-        Passage::Lag { tau_s } => format!("lag({product}; {} s)", number(tau_s)),
+        Passage::Lag { tau_s } => format!("lag({product}, {} s)", number(tau_s)),
         Passage::Rest { tau_s } => {
-            format!("({product} - lag({product}; {} s))", number(tau_s))
+            format!("({product} - lag({product}, {} s))", number(tau_s))
         }
-        Passage::Leak { tau_s } => format!("leak({product}; {} s)", number(tau_s)),
+        Passage::Leak { tau_s } => format!("leak({product}, {} s)", number(tau_s)),
     }
 }
 
@@ -180,7 +183,7 @@ fn factor(factor: Factor, signals: &[SignalScale]) -> String {
             format!("({0} - play({0}, {1}))", x(signal), number(width))
         }
         Factor::Lag { signal, tau_s } => {
-            format!("({0} - lag({0}; {1} s))", x(signal), number(tau_s))
+            format!("({0} - lag({0}, {1} s))", x(signal), number(tau_s))
         }
         Factor::Late { signal, delay_s } => {
             format!("({0}(t - {1} s) - {0})", x(signal), number(delay_s))
@@ -216,11 +219,16 @@ pub(crate) fn acts(stage: &str, terms: &[ProposedTerm]) -> String {
 /// The sentence.
 pub(crate) fn sentence(proposed: &Proposed) -> String {
     let Proposed { stage, equation, closes_test, .. } = proposed;
-    match proposed.random {
-        true => format!(
+    // What the letters are stands with the equation.
+    let equation = equation.split(';').next().unwrap_or_default();
+    match (proposed.random, proposed.terms.is_empty()) {
+        (true, _) => format!(
             "What is left in {stage} is random in time: nothing that was recorded explains it."
         ),
-        false => format!(
+        (false, true) => format!(
+            "What is left in {stage} follows what was recorded, but no short sum of terms says how."
+        ),
+        (false, false) => format!(
             "What is missing in {stage} may be {equation}: it closes {:.0} % of what is left there on trials that were not fitted.",
             100.0 * closes_test
         ),

@@ -39,6 +39,7 @@ const TURN: f64 = 0.01;
 /// One factor of a term; `signal` counts the signals of the proposal, x and v are on their scales.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[expect(missing_docs, reason = "fields stand in the equation of their variant")]
 pub enum Factor {
     /// x^power
     Power { signal: usize, power: f64 },
@@ -83,6 +84,7 @@ pub enum Factor {
 /// How a product of factors reaches the output.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[expect(missing_docs, reason = "fields stand in the equation of their variant")]
 pub enum Passage {
     /// At once.
     Direct,

@@ -6,19 +6,19 @@ use stretch_gap::{
 };
 
 /// Samples of a trial, and their time, s.
-pub const SAMPLES: usize = 4000;
-pub const DT_S: f64 = 0.01;
+const SAMPLES: usize = 4000;
+const DT_S: f64 = 0.01;
 /// Noise of the output, V.
-pub const NOISE_V: f64 = 0.002;
+const NOISE_V: f64 = 0.002;
 
 /// What the rig has and the simulator lacks.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Lack {
-    /// 0.03 V (x - play(x, 0.1)), x from 0 to 1.
+pub(crate) enum Lack {
+    /// 0.1 V (x - play(x, 0.1)), x from 0 to 1.
     Play,
-    /// 0.02 V x |v|, v in root mean squares.
+    /// 0.01 V x |v|, v in half ranges a second.
     Product,
-    /// A lag of the square of the rate.
+    /// 0.02 V lag(v^2, 2 s).
     Warming,
     /// Two levels between which it switches on its own.
     Telegraph,
@@ -30,32 +30,24 @@ pub enum Lack {
     Wander,
 }
 
-pub const ALL: [Lack; 7] = [
-    Lack::Play,
-    Lack::Product,
-    Lack::Warming,
-    Lack::Telegraph,
-    Lack::Jumps,
-    Lack::White,
-    Lack::Wander,
-];
-
 /// A gauge of a rod.
 #[derive(Debug, Clone)]
-pub struct Gauge {
+pub(crate) struct Gauge {
     description: Description,
-    pub rod_mm: Vec<f64>,
-    pub volts: Vec<f64>,
+    /// Units of the rod in a millimetre, of the output in a volt.
+    units: [f64; 2],
+    rod_mm: Vec<f64>,
+    volts: Vec<f64>,
 }
 
 /// Volts over the range of the rod.
 const GAIN: f64 = 1.0;
 /// Rod at rest and its range, mm.
 const ZERO_MM: f64 = 40.0;
-const RANGE_MM: f64 = 25.0;
+pub(crate) const RANGE_MM: f64 = 25.0;
 
 impl Gauge {
-    pub fn lacking(lack: Lack, seed: u64) -> Self {
+    pub(crate) fn lacking(lack: Lack, seed: u64) -> Self {
         let mut dice = Dice::new(seed, 9);
         let trials = [("one", false), ("two", false), ("three", false), ("test", true)];
         let specs: Vec<TrialSpec> = trials
@@ -81,21 +73,47 @@ impl Gauge {
                 volts.push(0.3 + 1.02 * GAIN * x + extra + NOISE_V * dice.gauss());
             }
         }
-        let gain = ParameterSpec::new("gain", "V", GAIN).within(0.05);
-        let offset = ParameterSpec::new("offset", "V", 0.3).within(0.05);
-        let mut stage = StageSpec::new("gauge", "volts", "V", &[0, 1]);
-        stage.noise = Some(NOISE_V);
-        let quadratic = vec![EffectParameterSpec::strength("c", "1", -0.2..=0.2)];
-        let description = Description::new(DescriptionSpec {
-            stages: vec![stage],
-            parameters: vec![gain, offset],
-            effects: vec![EffectSpec::new("curve", (0, "gauge"), quadratic)],
-            trials: specs,
-            dt_s: DT_S,
-        })
-        .expect("a description that holds together");
-        Self { description, rod_mm, volts }
+        Self { description: description(specs, 1.0), units: [1.0; 2], rod_mm, volts }
     }
+
+    /// The same in other units.
+    pub(crate) fn scaled(&self, rod: f64, output: f64) -> Self {
+        let trials = self.trials().to_vec();
+        Self {
+            description: description(trials, output),
+            units: [rod, output],
+            rod_mm: self.rod_mm.iter().map(|x| rod * x).collect(),
+            volts: self.volts.iter().map(|x| output * x).collect(),
+        }
+    }
+
+    /// The same with a test trial in which both columns are something else.
+    pub(crate) fn with_another_test_trial(&self) -> Self {
+        let mut other = self.clone();
+        let from = other.rod_mm.len() - SAMPLES;
+        for (i, (x, y)) in other.rod_mm[from..].iter_mut().zip(&mut other.volts[from..]).enumerate()
+        {
+            *x += 3.0 * (0.02 * i as f64).sin();
+            *y += 0.05 * (0.03 * i as f64).cos();
+        }
+        other
+    }
+}
+
+fn description(trials: Vec<TrialSpec>, volt: f64) -> Description {
+    let gain = ParameterSpec::new("gain", "V", GAIN * volt).within(0.05 * volt);
+    let offset = ParameterSpec::new("offset", "V", 0.3 * volt).within(0.05 * volt);
+    let mut stage = StageSpec::new("gauge", "volts", "V", &[0, 1]);
+    stage.noise = Some(NOISE_V * volt);
+    let quadratic = vec![EffectParameterSpec::strength("c", "1", -0.2..=0.2)];
+    Description::new(DescriptionSpec {
+        stages: vec![stage],
+        parameters: vec![gain, offset],
+        effects: vec![EffectSpec::new("curve", (0, "gauge"), quadratic)],
+        trials,
+        dt_s: DT_S,
+    })
+    .expect("a description that holds together")
 }
 
 fn extra(lack: Lack, x: &[f64], dice: &mut Dice) -> Vec<f64> {
@@ -147,7 +165,7 @@ impl Simulator for Gauge {
         let p = &run.model.parameters;
         let curve = run.model.effect(0).map_or(0.0, |values| values[0]);
         for (out, rod) in out.iter_mut().zip(&self.rod_mm) {
-            let x = (rod - ZERO_MM) / RANGE_MM;
+            let x = (rod / self.units[0] - ZERO_MM) / RANGE_MM;
             *out = p[1] + p[0] * (x + curve * x * (1.0 - x));
         }
         Ok(())

@@ -2,7 +2,7 @@
 //!
 //! | hypothesis | residual |
 //! | --- | --- |
-//! | sum | terms, and a stationary coloured process of what they leave |
+//! | function | many terms at once, or a few, and a stationary coloured process of what they leave |
 //! | coloured | a stationary coloured process alone, that looks at no input |
 //!
 //! Both processes are autoregressions, fitted by least squares on the fitted samples (Box and Jenkins 1970, chapter 7) to means over a
@@ -12,13 +12,13 @@
 //! L = -0.5 sum (ln 2 pi s^2 + e^2/s^2)
 //! ```
 //!
-//! A function of slow inputs is slow, so that a coloured process foretells it, too, but no better than the sum does; noise that
+//! A function of slow inputs is slow, so that a coloured process foretells it, too, but no better than the function does; noise that
 //! switches or jumps on its own is foretold no better by any term. A sum of k terms from a library of M has been chosen: ln M each.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::{
-    frame::{BLOCK_S, Frame, Role},
+    frame::{Frame, Role},
     linear::Cholesky,
 };
 
@@ -26,18 +26,10 @@ use crate::{
 const ORDER: usize = 5;
 /// Means a block.
 const PER_BLOCK: usize = 5;
-/// Length over which means are taken, s.
-const _: f64 = BLOCK_S / PER_BLOCK as f64;
 
-/// ln of the odds of the sum against the coloured process alone, nats; both residuals over whole segments, nuisances taken out.
-pub(crate) fn odds(
-    frame: &Frame,
-    alone: &[f64],
-    beside_sum: &[f64],
-    chosen: usize,
-    of: usize,
-) -> f64 {
-    log_score(frame, beside_sum) - log_score(frame, alone) - chosen as f64 * (of as f64).ln()
+/// ln of the odds of a function against the coloured process alone, nats; both residuals over whole segments, nuisances taken out.
+pub(crate) fn odds(frame: &Frame, alone: &[f64], beside: &[f64], chosen: usize, of: usize) -> f64 {
+    log_score(frame, beside) - log_score(frame, alone) - chosen as f64 * (of as f64).ln()
 }
 
 /// L of the held-out samples.

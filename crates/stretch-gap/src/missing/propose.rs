@@ -42,31 +42,72 @@ pub(crate) fn propose(
         .max_by(|&a, &b| problem.gap_in(base, a).total_cmp(&problem.gap_in(base, b)))
         .filter(|&stage| problem.gap_in(base, stage) > 0.0);
     let Some(stage) = largest else { return Ok(None) };
-    let compare = &problem.compare;
-    let residue = Residue::of(compare, stage, &base.model)?;
-    let choice = choice(&compare.frame);
-    let is_commanded = simulator.input(stage).is_none();
+    let residue = Residue::of(&problem.compare, stage, &base.model)?;
+    let choice = choice(&problem.compare.frame);
+    let is_commanded = simulator.input(stage).is_none() && !residue.record.of_kind(true).is_empty();
     let sum = pursue(&residue, &choice, is_commanded);
     let settled = settle(&residue, &choice, &sum)?;
+    let weighed = weigh(&residue, &choice, &sum, &settled);
+    let closes_test = match weighed.stands {
+        true => tested(&residue, &sum.terms, &settled)?,
+        false => 0.0,
+    };
+    Ok(Some(told(&residue, &sum, &settled, &weighed, closes_test)))
+}
+
+/// What the samples held out say of a sum.
+struct Weighed {
+    /// ln of the odds that the rest is a function of what was recorded.
+    log_odds: f64,
+    /// Whether the sum is that function.
+    stands: bool,
+    /// Shares of the gap that the sum closes and that many terms foretell.
+    closes: f64,
+    foretold: f64,
+}
+
+/// Many terms at once say whether it is a function of what was recorded at all, the sum whether it is that function: what a
+/// chosen few see alone was chosen by chance.
+fn weigh(residue: &Residue<'_>, choice: &Frame, sum: &Sum, settled: &Settled) -> Weighed {
+    let metric = &residue.compare.metrics[residue.stage];
     let clean = |column: &Column| {
         let mut values = column.values.clone();
-        compare.metrics[stage].clean(&compare.frame, &mut values);
+        metric.clean(residue.frame(), &mut values);
         values
     };
     let (alone, beside) = (clean(&residue.residual), clean(&settled.left));
-    // Many terms at once say whether it is a function of what was recorded at all, the sum whether it is that function: what a
-    // chosen few see alone was chosen by chance.
     // A function has one term of the library at least.
-    let log_odds = odds(&choice, &alone, &sum.beside_many, 1, sum.library);
-    let random = log_odds <= 0.0;
-    let stands = !random
+    let log_odds = odds(choice, &alone, &sum.beside_many, 1, sum.library);
+    let stands = log_odds > 0.0
         && !sum.terms.is_empty()
-        && odds(&choice, &alone, &beside, sum.terms.len(), sum.library) > 0.0;
-    let spec = &simulator.stages()[stage];
+        && odds(choice, &alone, &beside, sum.terms.len(), sum.library) > 0.0;
+    let squares = |values: &[f64]| -> f64 {
+        choice.of_role(Role::Held).flat_map(|s| &values[s.from..s.to]).map(|r| r * r).sum()
+    };
+    let held = |column: &Column| metric.product(choice, column, column, Role::Held);
+    let samples = choice.count(Role::Held);
+    let closes = closed(held(&residue.residual), held(&settled.left), samples);
+    Weighed {
+        log_odds,
+        stands,
+        closes: if stands { closes } else { 0.0 },
+        foretold: closed(squares(&alone), squares(&sum.beside_many), samples),
+    }
+}
+
+/// All of it as it is told.
+fn told(
+    residue: &Residue<'_>,
+    sum: &Sum,
+    settled: &Settled,
+    weighed: &Weighed,
+    closes_test: f64,
+) -> Proposed {
+    let spec = &residue.compare.simulator().stages()[residue.stage];
     let signals = scales(&residue.record);
     let pairs = sum.terms.iter().zip(settled.coefficients.iter().zip(&settled.sd));
     let terms: Vec<ProposedTerm> = pairs
-        .filter(|_| stands)
+        .filter(|_| weighed.stands)
         .map(|(term, (&coefficient, &sd))| ProposedTerm {
             name: words(term, &signals),
             coefficient,
@@ -75,18 +116,6 @@ pub(crate) fn propose(
             form: term.clone(),
         })
         .collect();
-    let held =
-        |column: &Column| compare.metrics[stage].product(&choice, column, column, Role::Held);
-    let (closes_held, closes_test) = match stands {
-        false => (0.0, 0.0),
-        true => (
-            closed(held(&residue.residual), held(&settled.left), choice.count(Role::Held)),
-            tested(&residue, &sum.terms, &settled)?,
-        ),
-    };
-    let squares = |values: &[f64]| -> f64 {
-        choice.of_role(Role::Held).flat_map(|s| &values[s.from..s.to]).map(|r| r * r).sum()
-    };
     let mut proposed = Proposed {
         stage: spec.name.clone(),
         channel: spec.channel.clone(),
@@ -96,15 +125,15 @@ pub(crate) fn propose(
         signals,
         time_scales_s: [residue.record.trial_s, residue.record.session_s],
         initial: "settled at the start of every trial".into(),
-        closes_held,
+        closes_held: weighed.closes,
         closes_test,
-        random,
-        log_odds,
-        foretold: closed(squares(&alone), squares(&sum.beside_many), choice.count(Role::Held)),
+        random: weighed.log_odds <= 0.0,
+        log_odds: weighed.log_odds,
+        foretold: weighed.foretold,
         sentence: String::new(),
     };
     proposed.sentence = sentence(&proposed);
-    Ok(Some(proposed))
+    proposed
 }
 
 /// Share of a gap that is closed, from sums of squares over a number of samples.

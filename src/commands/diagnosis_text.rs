@@ -23,6 +23,9 @@ pub(crate) fn text(diagnosis: &Diagnosis) -> String {
             put(&mut out, &format!("  {name}: {words}"));
         }
     }
+    if let Some(proposed) = diagnosis.proposed.as_ref().filter(|p| !p.equation.is_empty()) {
+        put(&mut out, &format!("  proposed, on the {}: {}", proposed.acts, proposed.equation));
+    }
     stages(&mut out, diagnosis);
     slices(&mut out, diagnosis);
     candidates(&mut out, diagnosis);

@@ -43,6 +43,9 @@ pub(crate) fn diagnosis_sections(page: &mut Page, subject: &Subject<'_>) {
     let diagnosis = subject.diagnosis;
     page.facts(&facts(diagnosis));
     page.list(&causes(diagnosis));
+    if let Some(proposed) = diagnosis.proposed.as_ref().filter(|p| !p.equation.is_empty()) {
+        page.text(&format!("Proposed, on the {}: {}.", proposed.acts, proposed.equation));
+    }
     seen(page, subject);
     located(page, subject);
     named(page, subject);

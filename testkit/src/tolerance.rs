@@ -342,3 +342,10 @@ pub const BLIND_BAND: f64 = 1e-9;
 
 /// Of an opening: what a dead band of 1e-9 may take, up to ten times itself.
 pub const BLIND_BAND_OFF: f64 = 1e-8;
+
+/// A term that was planted, beside the one proposed for it: shapes are refined in steps of 5 %, and a width that is that much
+/// off takes as much of the coefficient with it.
+pub const PLANTED_TERM: f64 = 0.08;
+/// A coefficient fitted in other units: factors that are no powers of two round every sample, and a search of its parameters by
+/// differences ends where their steps do.
+pub const RESCALED: f64 = 1e-4;

@@ -11,6 +11,7 @@ use crate::{
     hypothesis::Hypothesis,
     judge::{Case, judge},
     localise,
+    missing::propose,
     naming::Naming,
     probability::covering_set,
     problem::Problem,
@@ -93,8 +94,7 @@ fn run(
         found = search.run(from, progress)?;
     }
     for m in &problem.compare.metrics {
-        for l in m.loose() {
-        }
+        for l in m.loose() {}
     }
     eprintln!(
         found.best.effects.iter().map(|e| &simulator.effects()[*e].name).collect::<Vec<_>>(),
@@ -128,6 +128,18 @@ fn run(
     };
     let partial = first.filter(|_| verdict.kind == VerdictKind::Partial);
     let unexplained = partial.map(|first| unexplained(simulator, &evidence, first, seed));
+    let base = match verdict.kind {
+        VerdictKind::Partial => Some(&found.best),
+        VerdictKind::Unknown => Some(&problem.nominal),
+        _ => None,
+    };
+    let proposed = match base {
+        Some(base) => {
+            progress("what the catalogue lacks");
+            propose(&problem, base)?
+        }
+        None => None,
+    };
     let ambiguous = match verdict.kind {
         VerdictKind::NoGap | VerdictKind::Parameters => Vec::new(),
         _ => covering_set(&weighed, simulator),
@@ -135,7 +147,12 @@ fn run(
     let (runtime_s, simulations) = (begun.elapsed().as_secs_f64(), runs.count());
     let simpler = || baselines(problem, &search.sets.tried, thresholds.null_excess);
     // Told.
-    let answer = Answer { verdict: &verdict, naming: &naming, unexplained: unexplained.as_ref() };
+    let answer = Answer {
+        verdict: &verdict,
+        naming: &naming,
+        unexplained: unexplained.as_ref(),
+        proposed: proposed.as_ref(),
+    };
     let told = tell(answer, case, simulator, &evidence, &shares);
     let diagnosis = Diagnosis {
         schema: 1,
@@ -146,6 +163,7 @@ fn run(
         faint: naming.faint,
         least_share: thresholds.least_share,
         unexplained,
+        proposed,
         ambiguous,
         shares,
         gap: evidence.gap,

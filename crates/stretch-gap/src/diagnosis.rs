@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::missing::Proposed;
+
 /// The answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -255,6 +257,9 @@ pub struct Diagnosis {
     /// What a partial answer leaves.
     #[serde(default)]
     pub unexplained: Option<Unexplained>,
+    /// What the catalogue lacks, where a gap is left that its effects do not explain.
+    #[serde(default)]
+    pub proposed: Option<Proposed>,
     /// The 95 % set: effects that these data cannot tell apart.
     pub ambiguous: Vec<String>,
     /// Sets of effects, the most probable first.

@@ -57,6 +57,19 @@ pub struct Motion<'a> {
     pub rising: &'a str,
 }
 
+/// A signal that was recorded beside the outputs, or is fed to a stage: what a missing term may be a function of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recorded {
+    /// Column.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Values, all trials end to end; a measured one smoothed as far as its noise allows, for terms use its rate.
+    pub values: Vec<f64>,
+    /// Whether it is commanded: it may jump, and its zero means that nothing is done.
+    pub is_command: bool,
+}
+
 /// A simulator bound to the measurements that it is held against.
 ///
 /// Every stage is run alone on its measured input (teacher forcing), so that what one stage gets wrong does not
@@ -124,6 +137,26 @@ pub trait Simulator: Sync {
     fn input(&self, stage: usize) -> Option<Vec<f64>> {
         let _ = stage;
         None
+    }
+    /// Everything that a missing term may be a function of: by default what the stages are fed with, under the name of the
+    /// channel before, or the motion where they are fed with nothing.
+    fn recorded(&self) -> Vec<Recorded> {
+        let signal = |(name, unit): (&str, &str), values| Recorded {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            values,
+            is_command: false,
+        };
+        let fed = (1..self.stages().len()).filter_map(|stage| {
+            let before = &self.stages()[stage - 1];
+            Some(signal((&before.channel, &before.unit), self.input(stage)?))
+        });
+        let fed: Vec<Recorded> = fed.collect();
+        let motion = self.motion();
+        match fed.is_empty() {
+            true => vec![signal(("motion", motion.unit), motion.values.to_vec())],
+            false => fed,
+        }
     }
     /// As [`Simulator::simulate`] on an input that was not measured; says whether the stage can.
     ///

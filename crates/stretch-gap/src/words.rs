@@ -4,6 +4,7 @@ use crate::{
     diagnosis::{EffectShare, Unexplained, VerdictKind},
     evidence::Evidence,
     judge::{Case, Overruled, Verdict},
+    missing::Proposed,
     naming::Naming,
     simulator::Simulator,
 };
@@ -23,6 +24,7 @@ pub(crate) struct Answer<'a> {
     pub(crate) verdict: &'a Verdict,
     pub(crate) naming: &'a Naming,
     pub(crate) unexplained: Option<&'a Unexplained>,
+    pub(crate) proposed: Option<&'a Proposed>,
 }
 
 /// Tells a verdict.
@@ -47,7 +49,8 @@ pub(crate) fn tell(
             wrong(overruled, simulator)
         }
     };
-    Told { sentence, notes }
+    let proposed = answer.proposed.map_or(String::new(), |p| format!(" {}", p.sentence));
+    Told { sentence: sentence + &proposed, notes }
 }
 
 fn seen(

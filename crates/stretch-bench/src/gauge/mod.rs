@@ -7,8 +7,8 @@ mod source;
 
 use stretch_data::{SessionTrial, unit};
 use stretch_gap::{
-    Description, DescriptionSpec, Dice, GapError, Model, Motion, Noise, ParameterSpec, Run,
-    Simulator, StageSpec, TrialSpec,
+    Description, DescriptionSpec, Dice, GapError, Model, Motion, Noise, ParameterSpec, Recorded,
+    Run, Simulator, StageSpec, TrialSpec,
 };
 use stretch_sim::{
     Alone, Catalogue, Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Measured, Start, Tolerance,
@@ -220,6 +220,22 @@ impl Simulator for GaugeSimulator {
 
     fn sensor(&self) -> Option<usize> {
         Some(0)
+    }
+
+    /// The reference as it drives the gauge, and the pressure where it was recorded.
+    fn recorded(&self) -> Vec<Recorded> {
+        let signal = |name: &str, unit: &str, values| Recorded {
+            name: name.into(),
+            unit: unit.into(),
+            values,
+            is_command: false,
+        };
+        let driving = self.inputs.iter().flat_map(|s| &s.values).copied().collect();
+        let mut out = vec![signal(&self.reference, unit_of(&self.reference), driving)];
+        if !self.record.pressure.is_empty() {
+            out.push(signal("pressure_kpa", "kPa", self.record.pressure.clone()));
+        }
+        out
     }
 
     /// A line follows whatever it is fitted to; where it does not follow half of it, the two have little to do with each other.

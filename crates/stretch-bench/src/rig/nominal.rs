@@ -14,10 +14,8 @@ const SUPPLY_CORRELATION_S: f64 = 4.0;
 pub(super) fn parameters(rig: &Rig, kinds: &[Stage]) -> (Vec<ParameterSpec>, Vec<Option<Key>>) {
     let parameter = |key: Key| {
         let (info, nominal) = (key.info(), rig.params[key]);
-        let wander = (key == Key::PS).then_some(Wander {
-            sd: SUPPLY_WANDER * nominal,
-            correlation_s: SUPPLY_CORRELATION_S,
-        });
+        let wander = (key == Key::PS)
+            .then_some(Wander { sd: SUPPLY_WANDER * nominal, correlation_s: SUPPLY_CORRELATION_S });
         ParameterSpec {
             least: 0.15 * nominal,
             wander,

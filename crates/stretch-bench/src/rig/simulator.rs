@@ -1,9 +1,9 @@
 //! What a diagnosis asks of the rig.
 
-use stretch_gap::{Description, GapError, Motion, Run, Simulator};
+use stretch_gap::{Description, GapError, Motion, Recorded, Run, Simulator};
 use stretch_sim::{Key, Stage};
 
-use super::{RigSimulator, run};
+use super::{RigSimulator, run, smooth::Smoothed};
 
 impl Simulator for RigSimulator {
     fn description(&self) -> &Description {
@@ -61,6 +61,27 @@ impl Simulator for RigSimulator {
             _ => return None,
         };
         Some(smooth.iter().flat_map(|s| &s.values).copied().collect())
+    }
+
+    /// The openings, and pressure and length smoothed as the stages see them.
+    fn recorded(&self) -> Vec<Recorded> {
+        let trials = &self.session.trials;
+        let signal = |name: &str, unit: &str, is_command, values: Vec<f64>| Recorded {
+            name: name.into(),
+            unit: unit.into(),
+            values,
+            is_command,
+        };
+        let smooth = |all: &[Smoothed]| all.iter().flat_map(|s| &s.values).copied().collect();
+        let mut out = vec![
+            signal("inlet", "1", true, trials.iter().flat_map(|t| &t.inlet).copied().collect()),
+            signal("outlet", "1", true, trials.iter().flat_map(|t| &t.outlet).copied().collect()),
+            signal("length_mm", "mm", false, smooth(&self.inputs.length)),
+        ];
+        if !self.inputs.pressure.is_empty() {
+            out.push(signal("pressure_kpa", "kPa", false, smooth(&self.inputs.pressure)));
+        }
+        out
     }
 
     fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {

@@ -1,0 +1,19 @@
+//! A name for what the catalogue lacks: a sparse sum of terms of what was recorded, proposed where most of a gap is left.
+//!
+//! A discrepancy between simulator and rig can be learnt as a few terms of a library (Kaheman et al. 2019,
+//! arXiv 1909.08574), but whatever nominal parameters could have done has to be fitted with it, or terms stand in for
+//! parameters (Brynjarsdottir and O'Hagan 2014, doi 10.1088/0266-5611/30/11/114007).
+
+mod coloured;
+mod dense;
+mod library;
+mod propose;
+mod proposed;
+mod record;
+mod residue;
+mod sparse;
+mod term;
+
+pub(crate) use propose::propose;
+pub use proposed::{Proposed, ProposedTerm, SignalScale};
+pub use term::{Factor, Passage, RateForm, Term};

@@ -1,0 +1,226 @@
+//! From what a model leaves to what is proposed.
+
+use super::{
+    coloured::odds,
+    proposed::{Proposed, ProposedTerm, acts, equation, scales, sentence, words},
+    residue::{Products, Residue},
+    sparse::{Sum, choice, pursue},
+    term::Term,
+};
+use crate::{
+    error::GapError,
+    frame::{Frame, Role},
+    hypothesis::Hypothesis,
+    metric::Column,
+    problem::Problem,
+    simulator::Model,
+};
+
+/// Steps of Gauss and Newton with a whole run of the moved model.
+const STEPS: usize = 2;
+
+/// A sum at the model that was moved with it.
+struct Settled {
+    model: Model,
+    coefficients: Vec<f64>,
+    sd: Vec<f64>,
+    cost: f64,
+    /// Residual of the moved model with the sum taken out.
+    left: Column,
+}
+
+/// Proposes what is missing where most of a hypothesis's gap sits; none where no stage has one.
+///
+/// Everything is chosen and fitted without the test trials; they are read at the end, for the share that is told.
+pub(crate) fn propose(
+    problem: &Problem<'_>,
+    base: &Hypothesis,
+) -> Result<Option<Proposed>, GapError> {
+    let simulator = problem.simulator();
+    let stages = 0..simulator.stages().len();
+    let largest = stages
+        .max_by(|&a, &b| problem.gap_in(base, a).total_cmp(&problem.gap_in(base, b)))
+        .filter(|&stage| problem.gap_in(base, stage) > 0.0);
+    let Some(stage) = largest else { return Ok(None) };
+    let residue = Residue::of(&problem.compare, stage, &base.model)?;
+    let choice = choice(&problem.compare.frame);
+    let is_commanded = simulator.input(stage).is_none() && !residue.record.of_kind(true).is_empty();
+    let sum = pursue(&residue, &choice, is_commanded);
+    let settled = settle(&residue, &choice, &sum)?;
+    let weighed = weigh(&residue, &choice, &sum, &settled);
+    let closes_test = match weighed.stands {
+        true => tested(&residue, &sum.terms, &settled)?,
+        false => 0.0,
+    };
+    Ok(Some(told(&residue, &sum, &settled, &weighed, closes_test)))
+}
+
+/// What the samples held out say of a sum.
+struct Weighed {
+    /// ln of the odds that the rest is a function of what was recorded.
+    log_odds: f64,
+    /// Whether the sum is that function.
+    stands: bool,
+    /// Shares of the gap that the sum closes and that many terms foretell.
+    closes: f64,
+    foretold: f64,
+}
+
+/// Many terms at once say whether it is a function of what was recorded at all, the sum whether it is that function: what a
+/// chosen few see alone was chosen by chance.
+fn weigh(residue: &Residue<'_>, choice: &Frame, sum: &Sum, settled: &Settled) -> Weighed {
+    let metric = &residue.compare.metrics[residue.stage];
+    let clean = |column: &Column| {
+        let mut values = column.values.clone();
+        metric.clean(residue.frame(), &mut values);
+        values
+    };
+    let (alone, beside) = (clean(&residue.residual), clean(&settled.left));
+    // A function has one term of the library at least.
+    let log_odds = odds(choice, &alone, &sum.beside_many, 1, sum.library);
+    let stands = log_odds > 0.0
+        && !sum.terms.is_empty()
+        && odds(choice, &alone, &beside, sum.terms.len(), sum.library) > 0.0;
+    let squares = |values: &[f64]| -> f64 {
+        choice.of_role(Role::Held).flat_map(|s| &values[s.from..s.to]).map(|r| r * r).sum()
+    };
+    let held = |column: &Column| metric.product(choice, column, column, Role::Held);
+    let samples = choice.count(Role::Held);
+    let closes = closed(held(&residue.residual), held(&settled.left), samples);
+    Weighed {
+        log_odds,
+        stands,
+        closes: if stands { closes } else { 0.0 },
+        foretold: closed(squares(&alone), squares(&sum.beside_many), samples),
+    }
+}
+
+/// All of it as it is told.
+fn told(
+    residue: &Residue<'_>,
+    sum: &Sum,
+    settled: &Settled,
+    weighed: &Weighed,
+    closes_test: f64,
+) -> Proposed {
+    let spec = &residue.compare.simulator().stages()[residue.stage];
+    let signals = scales(&residue.record);
+    let pairs = sum.terms.iter().zip(settled.coefficients.iter().zip(&settled.sd));
+    let terms: Vec<ProposedTerm> = pairs
+        .filter(|_| weighed.stands)
+        .map(|(term, (&coefficient, &sd))| ProposedTerm {
+            name: words(term, &signals),
+            coefficient,
+            sd,
+            unit: spec.unit.clone(),
+            form: term.clone(),
+        })
+        .collect();
+    let mut proposed = Proposed {
+        stage: spec.name.clone(),
+        channel: spec.channel.clone(),
+        equation: equation(&spec.channel, &terms, &signals),
+        acts: acts(&spec.name, &terms),
+        terms,
+        signals,
+        time_scales_s: [residue.record.trial_s, residue.record.session_s],
+        initial: "settled at the start of every trial".into(),
+        closes_held: weighed.closes,
+        closes_test,
+        random: weighed.log_odds <= 0.0,
+        log_odds: weighed.log_odds,
+        foretold: weighed.foretold,
+        sentence: String::new(),
+    };
+    proposed.sentence = sentence(&proposed);
+    proposed
+}
+
+/// Share of a gap that is closed, from sums of squares over a number of samples.
+fn closed(before: f64, after: f64, samples: usize) -> f64 {
+    let gap = |squares: f64| squares - samples as f64;
+    if gap(before) > 0.0 { 1.0 - gap(after).max(0.0) / gap(before) } else { 0.0 }
+}
+
+/// Fits parameters and coefficients to the fitted samples, whole runs instead of lines where that is better.
+fn settle(residue: &Residue<'_>, choice: &Frame, sum: &Sum) -> Result<Settled, GapError> {
+    // What was held out for the choice alone is fitted now.
+    let frame = match choice.count(Role::Held) == residue.frame().count(Role::Held) {
+        true => choice,
+        false => residue.frame(),
+    };
+    let at = |model: &Model, residual: &Column| {
+        let products = products(residue, frame, residual, sum);
+        let fit = residue.solve(&products, model, false);
+        let own = residue.parameters();
+        let coefficients = fit.values[own..].to_vec();
+        let sd = residue.coefficient_sd(&products, model);
+        let left = left(residue, residual, &sum.columns, &coefficients);
+        (products, Settled { model: model.clone(), coefficients, sd, cost: fit.cost, left })
+    };
+    let (mut products, mut best) = at(&residue.model, &residue.residual);
+    for _ in 0..STEPS {
+        let fit = residue.solve(&products, &best.model, true);
+        let model = residue.moved(&best.model, &fit);
+        let residual = match residue.compare.residual(residue.stage, &model) {
+            Ok(residual) => residual,
+            Err(GapError::Stopped) => return Err(GapError::Stopped),
+            // Values that cannot be simulated: it stays where it was.
+            Err(_) => break,
+        };
+        let (next_products, next) = at(&model, &residual);
+        if next.cost >= best.cost {
+            break;
+        }
+        (products, best) = (next_products, next);
+    }
+    Ok(best)
+}
+
+fn products(residue: &Residue<'_>, frame: &Frame, residual: &Column, sum: &Sum) -> Products {
+    let mut products = residue.products(frame, residual);
+    let mut before: Vec<&Column> = std::iter::once(residual).chain(residue.columns()).collect();
+    for column in &sum.columns {
+        products = residue.with(frame, &products, &before, column);
+        before.push(column);
+    }
+    products
+}
+
+fn left(
+    residue: &Residue<'_>,
+    residual: &Column,
+    columns: &[Column],
+    coefficients: &[f64],
+) -> Column {
+    let mut values = residual.values.clone();
+    for (column, c) in columns.iter().zip(coefficients) {
+        values.iter_mut().zip(&column.values).for_each(|(x, d)| *x -= c * d);
+    }
+    residue.compare.metrics[residue.stage].column(residue.frame(), values)
+}
+
+/// Share of the gap on the test trials that a settled sum closes.
+fn tested(residue: &Residue<'_>, terms: &[Term], settled: &Settled) -> Result<f64, GapError> {
+    let (compare, stage) = (residue.compare, residue.stage);
+    let trials = compare.simulator().trials().len();
+    let (metric, frame) = (&compare.metrics[stage], residue.frame());
+    let residual = |model: &Model| -> Result<Vec<f64>, GapError> {
+        let output = compare.runs.output(stage, model, trials)?;
+        let apart = compare.simulator().measured(stage).iter().zip(output).zip(&metric.floor.sd);
+        Ok(apart.map(|((m, s), sd)| (m - s) / sd).collect())
+    };
+    let square = |values: Vec<f64>| {
+        let column = metric.column(frame, values);
+        metric.product(frame, &column, &column, Role::Test)
+    };
+    let before = square(residual(&residue.model)?);
+    let mut values = residual(&settled.model)?;
+    for (term, c) in terms.iter().zip(&settled.coefficients) {
+        let own = term.values(&residue.record, trials);
+        for ((x, d), sd) in values.iter_mut().zip(own).zip(&metric.floor.sd) {
+            *x -= c * d / sd;
+        }
+    }
+    Ok(closed(before, square(values), frame.count(Role::Test)))
+}

@@ -1,0 +1,236 @@
+//! What is said of a term that the catalogue lacks.
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    record::Record,
+    term::{Factor, Passage, RateForm, Term},
+};
+
+/// A signal of a proposal and its scale: x = (signal - offset)/scale, v = (dx/dt)/`rate_per_s`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SignalScale {
+    /// Column; the stage's own channel stands for what the simulator makes of it before the terms.
+    pub name: String,
+    /// Unit of offset and scale.
+    pub unit: String,
+    /// Value at x = 0.
+    pub offset: f64,
+    /// Change for which x changes by 1.
+    pub scale: f64,
+    /// dx/dt at v = 1, 1/s.
+    pub rate_per_s: f64,
+    /// Whether it is commanded; what leaks does so by the sum of commands.
+    pub is_command: bool,
+}
+
+/// One term with its coefficient.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ProposedTerm {
+    /// The term in words of the equation, dimensionless.
+    pub name: String,
+    /// Coefficient.
+    pub coefficient: f64,
+    /// One standard deviation of it.
+    pub sd: f64,
+    /// Unit of the coefficient: that of the channel.
+    pub unit: String,
+    /// The term as it can be computed.
+    pub form: Term,
+}
+
+/// A sum of terms that the simulator lacks and the catalogue does not hold, or that there is none to be found.
+///
+/// It can be computed from what stands here alone: `channel += sum coefficient form`, memories settled at the start of every trial.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Proposed {
+    /// Stage where most of what is left sits.
+    pub stage: String,
+    /// Its channel.
+    pub channel: String,
+    /// Equation with numbers and units; empty where nothing was found.
+    pub equation: String,
+    /// Terms, in the order in which they were found.
+    pub terms: Vec<ProposedTerm>,
+    /// Signals that terms speak of by number.
+    pub signals: Vec<SignalScale>,
+    /// What time in a trial and in the session is counted in, s.
+    pub time_scales_s: [f64; 2],
+    /// How memories begin a trial.
+    pub initial: String,
+    /// Share of the stage's remaining gap that is closed on the samples that terms were chosen by.
+    pub closes_held: f64,
+    /// The same on the test trials, which are read for this alone.
+    pub closes_test: f64,
+    /// Where it acts.
+    pub acts: String,
+    /// Whether what is left is random in time: no function of what was recorded foretells it.
+    pub random: bool,
+    /// ln of the odds that it is a function of what was recorded rather than random in time.
+    pub log_odds: f64,
+    /// Share of the remaining gap that many terms of the library foretell together on samples held out.
+    #[serde(default)]
+    pub foretold: f64,
+    /// All of this in one sentence.
+    pub sentence: String,
+}
+
+/// Signals of a record that terms speak of.
+pub(crate) fn scales(record: &Record) -> Vec<SignalScale> {
+    let one = |s: &super::record::Signal| SignalScale {
+        name: s.name.clone(),
+        unit: s.unit.clone(),
+        offset: s.offset,
+        scale: s.scale,
+        rate_per_s: s.rate,
+        is_command: s.is_command,
+    };
+    record.signals.iter().map(one).collect()
+}
+
+/// `channel += ...`, and what its letters are.
+pub(crate) fn equation(channel: &str, terms: &[ProposedTerm], signals: &[SignalScale]) -> String {
+    if terms.is_empty() {
+        return String::new();
+    }
+    let sum: Vec<String> = terms
+        .iter()
+        .map(|t| {
+            let unit = if t.unit.is_empty() { String::new() } else { format!(" {}", t.unit) };
+            format!("{}{unit} {}", number(t.coefficient), t.name)
+        })
+        .collect();
+    let speaks = |letter: &str, s: &SignalScale| {
+        terms.iter().any(|t| t.name.contains(&format!("{letter}[{}]", s.name)))
+    };
+    let mut letters = Vec::new();
+    for s in signals.iter().filter(|s| speaks("x", s) || speaks("v", s)) {
+        let name = &s.name;
+        if speaks("x", s) && !s.is_command {
+            let unit = if s.unit == "1" { "" } else { s.unit.as_str() };
+            letters.push(format!(
+                "x[{name}] = ({name} - {} {unit})/({} {unit})",
+                number(s.offset),
+                number(s.scale)
+            ));
+        } else if speaks("x", s) {
+            letters.push(format!("x[{name}] = {name}"));
+        }
+        if speaks("v", s) {
+            let rate = number(s.rate_per_s * s.scale);
+            letters.push(format!("v[{name}] = (d {name}/dt)/({rate} {}/s)", s.unit));
+        }
+    }
+    let with = if letters.is_empty() { String::new() } else { format!("; {}", letters.join(", ")) };
+    format!("{channel} += {}{with}", sum.join(" + "))
+}
+
+/// Three significant digits.
+fn number(x: f64) -> String {
+    let size = x.abs();
+    if size == 0.0 {
+        return "0".into();
+    }
+    let digits = (2 - size.log10().floor() as i32).clamp(0, 12) as usize;
+    match size {
+        1e-6..1e6 => format!("{x:.digits$}"),
+        _ => format!("{x:.2e}"),
+    }
+}
+
+/// A term in words.
+pub(crate) fn words(term: &Term, signals: &[SignalScale]) -> String {
+    let factors: Vec<String> = term.factors.iter().map(|f| factor(*f, signals)).collect();
+    let product = if factors.is_empty() { "1".to_owned() } else { factors.join(" ") };
+    match term.passage {
+        Passage::Direct => product,
+        Passage::Lag { tau_s } => format!("lag({product}, {} s)", number(tau_s)),
+        Passage::Rest { tau_s } => {
+            format!("({product} - lag({product}, {} s))", number(tau_s))
+        }
+        Passage::Leak { tau_s } => format!("leak({product}, {} s)", number(tau_s)),
+    }
+}
+
+fn factor(factor: Factor, signals: &[SignalScale]) -> String {
+    let x = |s: usize| format!("x[{}]", signals[s].name);
+    let v = |s: usize| format!("v[{}]", signals[s].name);
+    let raised = |what: String, p: f64| if p == 1.0 { what } else { format!("{what}^{p}") };
+    match factor {
+        Factor::Power { signal, power } => raised(x(signal), power),
+        Factor::Above { signal, at, power } => {
+            raised(format!("max(0, {} - {})", x(signal), number(at)), power)
+        }
+        Factor::Below { signal, at, power } => {
+            raised(format!("max(0, {} - {})", number(at), x(signal)), power)
+        }
+        Factor::Low { signal, width } => format!("exp(-{}/{})", x(signal), number(width)),
+        Factor::High { signal, width } => format!("exp(-(1 - {})/{})", x(signal), number(width)),
+        Factor::Sine { signal, turns } => format!("sin(2 pi {} {})", number(turns), x(signal)),
+        Factor::Cosine { signal, turns } => format!("cos(2 pi {} {})", number(turns), x(signal)),
+        Factor::Rate { signal, form } => match form {
+            RateForm::Linear => v(signal),
+            RateForm::Magnitude => format!("|{}|", v(signal)),
+            RateForm::Square => format!("{}^2", v(signal)),
+            RateForm::SignedSquare => format!("{0} |{0}|", v(signal)),
+            RateForm::SignedRoot => format!("sign({0}) sqrt|{0}|", v(signal)),
+            RateForm::Sign => format!("sign({})", v(signal)),
+            RateForm::Striction => format!("sign({0}) exp(-|{0}|/0.3)", v(signal)),
+            RateForm::Rising => format!("max(0, {})", v(signal)),
+        },
+        Factor::Bend { signal } => format!("step({})", v(signal)),
+        Factor::Play { signal, width } => {
+            format!("({0} - play({0}, {1}))", x(signal), number(width))
+        }
+        Factor::Lag { signal, tau_s } => {
+            format!("({0} - lag({0}, {1} s))", x(signal), number(tau_s))
+        }
+        Factor::Late { signal, delay_s } => {
+            format!("({0}(t - {1} s) - {0})", x(signal), number(delay_s))
+        }
+        Factor::Peak { signal } => format!("(greatest {0} - {0})", x(signal)),
+        Factor::Turned { signal, width } => {
+            format!(
+                "sign({}) (1 - exp(-way since turn of {}/{}))",
+                v(signal),
+                x(signal),
+                number(width)
+            )
+        }
+        Factor::Travel { signal, power } => raised(format!("travel({})", x(signal)), power),
+        Factor::TravelFade { signal, width } => {
+            format!("exp(-travel({})/{})", x(signal), number(width))
+        }
+        Factor::Time { power } => raised("(time in trial/T)".into(), power),
+        Factor::TimeFade { tau_s } => format!("exp(-time in trial/{} s)", number(tau_s)),
+        Factor::Session { power } => raised("(session time/T)".into(), power),
+    }
+}
+
+/// Where a sum acts.
+pub(crate) fn acts(stage: &str, terms: &[ProposedTerm]) -> String {
+    let is_rate = |t: &ProposedTerm| matches!(t.form.passage, Passage::Leak { .. });
+    match terms.iter().any(is_rate) {
+        true => format!("rate of the output of {stage}"),
+        false => format!("output of {stage}"),
+    }
+}
+
+/// The sentence.
+pub(crate) fn sentence(proposed: &Proposed) -> String {
+    let Proposed { stage, equation, closes_test, .. } = proposed;
+    // What the letters are stands with the equation.
+    let equation = equation.split(';').next().unwrap_or_default();
+    match (proposed.random, proposed.terms.is_empty()) {
+        (true, _) => format!(
+            "What is left in {stage} is random in time: nothing that was recorded explains it."
+        ),
+        (false, true) => format!(
+            "What is left in {stage} follows what was recorded, but no short sum of terms says how."
+        ),
+        (false, false) => format!(
+            "What is missing in {stage} may be {equation}: it closes {:.0} % of what is left there on trials that were not fitted.",
+            100.0 * closes_test
+        ),
+    }
+}

@@ -1,0 +1,395 @@
+//! Terms: what a simulator may lack, as products of factors of what was recorded, passed on at once or slowly.
+//!
+//! A term is dimensionless; its coefficient has the unit of the stage's output. It can be written down and read back
+//! ([`serde`]), with the scales of its signals beside it, so that a simulator can be given it.
+
+use serde::{Deserialize, Serialize};
+use stretch_operators::{Backlash, MeanReversion, Operator, Span, Start};
+
+use super::record::{Record, Signal};
+
+/// A function of one signal's rate v.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RateForm {
+    /// v
+    Linear,
+    /// |v|
+    Magnitude,
+    /// v^2
+    Square,
+    /// v |v|
+    SignedSquare,
+    /// sign(v) sqrt|v|
+    SignedRoot,
+    /// tanh(v/0.1): the sign, smooth where noise would toss it.
+    Sign,
+    /// sign(v) exp(-|v|/0.3): friction that is gone once it slides.
+    Striction,
+    /// max(0, v)
+    Rising,
+}
+
+/// Share of the usual rate within which a sign is uncertain, and above which sticking is over.
+const AT_REST: f64 = 0.1;
+const SLIDING: f64 = 0.3;
+/// Way back, as a share of the range, that makes a turn.
+const TURN: f64 = 0.01;
+
+/// One factor of a term; `signal` counts the signals of the proposal, x and v are on their scales.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[expect(missing_docs, reason = "fields stand in the equation of their variant")]
+pub enum Factor {
+    /// x^power
+    Power { signal: usize, power: f64 },
+    /// max(0, x - at)^power
+    Above { signal: usize, at: f64, power: f64 },
+    /// max(0, at - x)^power
+    Below { signal: usize, at: f64, power: f64 },
+    /// exp(-x/width)
+    Low { signal: usize, width: f64 },
+    /// exp(-(1 - x)/width)
+    High { signal: usize, width: f64 },
+    /// sin(2 pi turns x)
+    Sine { signal: usize, turns: f64 },
+    /// cos(2 pi turns x)
+    Cosine { signal: usize, turns: f64 },
+    /// A function of v.
+    Rate { signal: usize, form: RateForm },
+    /// dv/dt times the sample time, looking back.
+    Bend { signal: usize },
+    /// x - play(x, width), settled at a trial's start; width is half the backlash.
+    Play { signal: usize, width: f64 },
+    /// x - lag(x, tau), settled at a trial's start.
+    Lag { signal: usize, tau_s: f64 },
+    /// x(t - delay) - x(t)
+    Late { signal: usize, delay_s: f64 },
+    /// Greatest x of the trial so far - x.
+    Peak { signal: usize },
+    /// sign of the motion times 1 - exp(-way since the last turn/width)
+    Turned { signal: usize, width: f64 },
+    /// Travel within the trial, in ranges, to a power.
+    Travel { signal: usize, power: f64 },
+    /// exp(-travel/width)
+    TravelFade { signal: usize, width: f64 },
+    /// (t/T)^power, t in the trial, T the longest fitted trial.
+    Time { power: f64 },
+    /// exp(-t/tau)
+    TimeFade { tau_s: f64 },
+    /// (t/T)^power, t in the session, T the session.
+    Session { power: f64 },
+}
+
+/// How a product of factors reaches the output.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[expect(missing_docs, reason = "fields stand in the equation of their variant")]
+pub enum Passage {
+    /// At once.
+    Direct,
+    /// Through a lag, z' = (g - z)/tau from 0.
+    Lag { tau_s: f64 },
+    /// What a lag leaves, g - z from 0.
+    Rest { tau_s: f64 },
+    /// As a rate that an opening forgets, z' = g/tau - (sum of commands) z/tau from 0.
+    Leak { tau_s: f64 },
+}
+
+/// A term.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Term {
+    /// What is multiplied; nothing is 1.
+    pub factors: Vec<Factor>,
+    /// How the product arrives.
+    pub passage: Passage,
+}
+
+impl Term {
+    pub(crate) fn new(factors: &[Factor], passage: Passage) -> Self {
+        Self { factors: factors.to_vec(), passage }
+    }
+
+    /// Values over the first trials.
+    pub(crate) fn values(&self, record: &Record, trials: usize) -> Vec<f64> {
+        let mut out = vec![1.0; record.samples(trials)];
+        for factor in &self.factors {
+            factor.multiply(record, trials, &mut out);
+        }
+        self.passage.pass(record, trials, &mut out);
+        out
+    }
+
+    /// Shapes (widths, times, knees) that may be refined.
+    pub(crate) fn shapes(&self) -> Vec<f64> {
+        let mut copy = self.clone();
+        copy.shapes_mut().into_iter().map(|x| *x).collect()
+    }
+
+    /// The same with another shape.
+    pub(crate) fn with_shape(&self, index: usize, value: f64) -> Self {
+        let mut copy = self.clone();
+        if let Some(shape) = copy.shapes_mut().into_iter().nth(index) {
+            *shape = value;
+        }
+        copy
+    }
+
+    fn shapes_mut(&mut self) -> Vec<&mut f64> {
+        let factors = self.factors.iter_mut().filter_map(|f| match f {
+            Factor::Above { at, .. } | Factor::Below { at, .. } => Some(at),
+            Factor::Low { width, .. }
+            | Factor::High { width, .. }
+            | Factor::Play { width, .. }
+            | Factor::Turned { width, .. }
+            | Factor::TravelFade { width, .. } => Some(width),
+            Factor::Sine { turns, .. } | Factor::Cosine { turns, .. } => Some(turns),
+            Factor::Lag { tau_s, .. } | Factor::TimeFade { tau_s } => Some(tau_s),
+            Factor::Late { delay_s, .. } => Some(delay_s),
+            _ => None,
+        });
+        let passage = match &mut self.passage {
+            Passage::Direct => None,
+            Passage::Lag { tau_s } | Passage::Rest { tau_s } | Passage::Leak { tau_s } => {
+                Some(tau_s)
+            }
+        };
+        factors.chain(passage).collect()
+    }
+}
+
+impl RateForm {
+    fn of(self, v: f64) -> f64 {
+        match self {
+            Self::Linear => v,
+            Self::Magnitude => v.abs(),
+            Self::Square => v * v,
+            Self::SignedSquare => v * v.abs(),
+            Self::SignedRoot => v.abs().sqrt().copysign(v),
+            Self::Sign => (v / AT_REST).tanh(),
+            Self::Striction => (v / AT_REST).tanh() * (-v.abs() / SLIDING).exp(),
+            Self::Rising => v.max(0.0),
+        }
+    }
+}
+
+impl Factor {
+    /// Multiplies values over the first trials by this factor.
+    fn multiply(self, record: &Record, trials: usize, out: &mut [f64]) {
+        for trial in 0..trials {
+            let range = record.trials[trial].clone();
+            self.in_trial(record, trial, &mut out[range]);
+        }
+    }
+
+    fn in_trial(self, record: &Record, trial: usize, out: &mut [f64]) {
+        let range = record.trials[trial].clone();
+        let dt_s = record.grid.dt_s();
+        let signal = |i: usize| {
+            let Signal { x, v, .. } = &record.signals[i];
+            (&x[range.clone()], &v[range.clone()])
+        };
+        let mut each = |of: &mut dyn FnMut(usize) -> f64| {
+            out.iter_mut().enumerate().for_each(|(i, out)| *out *= of(i));
+        };
+        match self {
+            Self::Power { signal: s, power } => {
+                let x = signal(s).0;
+                each(&mut |i| raised(x[i].max(0.0), power));
+            }
+            Self::Above { signal: s, at, power } => {
+                let x = signal(s).0;
+                each(&mut |i| raised((x[i] - at).max(0.0), power));
+            }
+            Self::Below { signal: s, at, power } => {
+                let x = signal(s).0;
+                each(&mut |i| raised((at - x[i]).max(0.0), power));
+            }
+            Self::Low { signal: s, width } => {
+                let x = signal(s).0;
+                each(&mut |i| (-x[i].max(0.0) / width).exp());
+            }
+            Self::High { signal: s, width } => {
+                let x = signal(s).0;
+                each(&mut |i| (-(1.0 - x[i]).max(0.0) / width).exp());
+            }
+            Self::Sine { signal: s, turns } => {
+                let x = signal(s).0;
+                each(&mut |i| (std::f64::consts::TAU * turns * x[i]).sin());
+            }
+            Self::Cosine { signal: s, turns } => {
+                let x = signal(s).0;
+                each(&mut |i| (std::f64::consts::TAU * turns * x[i]).cos());
+            }
+            Self::Rate { signal: s, form } => {
+                let v = signal(s).1;
+                each(&mut |i| form.of(v[i]));
+            }
+            Self::Bend { signal: s } => {
+                let v = signal(s).1;
+                each(&mut |i| if i > 0 { v[i] - v[i - 1] } else { 0.0 });
+            }
+            Self::Play { signal: s, width } => {
+                let x = signal(s).0;
+                let play = ran(&Backlash::hard(width), record, x);
+                each(&mut |i| x[i] - play[i]);
+            }
+            Self::Lag { signal: s, tau_s } => {
+                let x = signal(s).0;
+                let lag = lagged(record, x, tau_s, x.first().copied().unwrap_or(0.0));
+                each(&mut |i| x[i] - lag[i]);
+            }
+            Self::Late { signal: s, delay_s } => {
+                let x = signal(s).0;
+                let by = delay_s / dt_s;
+                each(&mut |i| late(x, i, by) - x[i]);
+            }
+            Self::Peak { signal: s } => {
+                let x = signal(s).0;
+                let mut most = f64::NEG_INFINITY;
+                each(&mut |i| {
+                    most = most.max(x[i]);
+                    most - x[i]
+                });
+            }
+            Self::Turned { signal: s, width } => {
+                let x = signal(s).0;
+                let mut turns = Turns::at(x.first().copied().unwrap_or(0.0));
+                each(&mut |i| turns.follow(x[i], width));
+            }
+            Self::Travel { signal: s, power } => {
+                let mut travel = Travel::default();
+                let x = signal(s).0;
+                each(&mut |i| raised(travel.follow(x, i), power));
+            }
+            Self::TravelFade { signal: s, width } => {
+                let mut travel = Travel::default();
+                let x = signal(s).0;
+                each(&mut |i| (-travel.follow(x, i) / width).exp());
+            }
+            Self::Time { power } => each(&mut |i| raised(i as f64 * dt_s / record.trial_s, power)),
+            Self::TimeFade { tau_s } => each(&mut |i| (-(i as f64) * dt_s / tau_s).exp()),
+            Self::Session { power } => {
+                let start_s = record.starts_s[trial].max(0.0);
+                each(&mut |i| raised((start_s + i as f64 * dt_s) / record.session_s, power));
+            }
+        }
+    }
+}
+
+/// x^power for x >= 0; the usual powers without a logarithm.
+fn raised(x: f64, power: f64) -> f64 {
+    match power {
+        1.0 => x,
+        2.0 => x * x,
+        3.0 => x * x * x,
+        0.5 => x.sqrt(),
+        _ => libm::pow(x, power),
+    }
+}
+
+/// x some samples ago; the first value before a trial.
+fn late(x: &[f64], i: usize, by: f64) -> f64 {
+    let at = (i as f64 - by).max(0.0);
+    let (whole, share) = (at as usize, at.fract());
+    let next = x[(whole + 1).min(i)];
+    x[whole] + share * (next - x[whole])
+}
+
+fn ran(operator: &dyn Operator, record: &Record, x: &[f64]) -> Vec<f64> {
+    let mut out = x.to_vec();
+    let mut cells = vec![0.0; operator.cells()];
+    operator.begin(Start::Settled, x.first().copied().unwrap_or(0.0), &mut cells);
+    operator.run(&Span::whole(&record.grid), &mut cells, &mut out);
+    out
+}
+
+fn lagged(record: &Record, x: &[f64], tau_s: f64, first: f64) -> Vec<f64> {
+    let lag = MeanReversion::new(tau_s, 0.0, &record.grid);
+    let mut cells = [0.0; MeanReversion::CELLS];
+    lag.begin(Start::Settled, first, &mut cells);
+    let mut out = x.to_vec();
+    lag.run(&Span::whole(&record.grid), &mut cells, &mut out, |_, z| z);
+    out
+}
+
+/// Way since the last turn, and which way.
+struct Turns {
+    turn: f64,
+    furthest: f64,
+    way: f64,
+}
+
+impl Turns {
+    fn at(x: f64) -> Self {
+        Self { turn: x, furthest: x, way: 0.0 }
+    }
+
+    fn follow(&mut self, x: f64, width: f64) -> f64 {
+        if self.way == 0.0 {
+            self.way = if (x - self.turn).abs() > TURN { (x - self.turn).signum() } else { 0.0 };
+            self.furthest = x;
+        } else if self.way * (x - self.furthest) > 0.0 {
+            self.furthest = x;
+        } else if self.way * (self.furthest - x) > TURN {
+            (self.turn, self.furthest, self.way) = (self.furthest, x, -self.way);
+        }
+        self.way * (1.0 - (-(self.furthest - self.turn).abs() / width).exp())
+    }
+}
+
+/// Way so far, both ways counted, beyond a turn's noise.
+#[derive(Default)]
+struct Travel {
+    held: Option<f64>,
+    sum: f64,
+}
+
+impl Travel {
+    fn follow(&mut self, x: &[f64], i: usize) -> f64 {
+        let held = self.held.unwrap_or(x[0]);
+        // A play of the turn's width: noise at rest is no travel.
+        let next = stretch_core::play(held, x[i], TURN);
+        self.sum += (next - held).abs();
+        self.held = Some(next);
+        self.sum
+    }
+}
+
+impl Passage {
+    fn pass(self, record: &Record, trials: usize, values: &mut [f64]) {
+        let dt_s = record.grid.dt_s();
+        for range in &record.trials[..trials] {
+            let own = &mut values[range.clone()];
+            match self {
+                Self::Direct => {}
+                Self::Lag { tau_s } => {
+                    let z = lagged(record, own, tau_s, 0.0);
+                    own.copy_from_slice(&z);
+                }
+                Self::Rest { tau_s } => {
+                    let z = lagged(record, own, tau_s, 0.0);
+                    own.iter_mut().zip(z).for_each(|(g, z)| *g -= z);
+                }
+                Self::Leak { tau_s } => {
+                    let open: Vec<&[f64]> = record
+                        .signals
+                        .iter()
+                        .filter(|s| s.is_command)
+                        .map(|s| &s.x[range.clone()])
+                        .collect();
+                    let mut z = 0.0;
+                    for (i, g) in own.iter_mut().enumerate() {
+                        // Exact for openings and g held over a sample.
+                        let opening: f64 = open.iter().map(|o| o[i]).sum();
+                        let rate = opening.max(0.0) / tau_s;
+                        let kept = (-rate * dt_s).exp();
+                        let grown = if rate > 0.0 { (1.0 - kept) / rate } else { dt_s };
+                        z = kept * z + grown * *g / tau_s;
+                        *g = z;
+                    }
+                }
+            }
+        }
+    }
+}

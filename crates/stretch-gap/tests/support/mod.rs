@@ -1,0 +1,186 @@
+//! A gauge with one stage, straight but for what it lacks.
+
+use stretch_gap::{
+    Description, DescriptionSpec, Dice, EffectParameterSpec, EffectSpec, GapError, Motion,
+    ParameterSpec, Recorded, Run, Simulator, StageSpec, TrialSpec,
+};
+
+/// Samples of a trial, and their time, s.
+const SAMPLES: usize = 4000;
+const DT_S: f64 = 0.01;
+/// Noise of the output, V.
+const NOISE_V: f64 = 0.002;
+
+/// What the rig has and the simulator lacks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Lack {
+    /// 0.1 V (x - play(x, 0.1)), x from 0 to 1.
+    Play,
+    /// 0.01 V x |v|, v in half ranges a second.
+    Product,
+    /// 0.02 V lag(v^2, 2 s).
+    Warming,
+    /// Two levels between which it switches on its own.
+    Telegraph,
+    /// A step at a time of its own in each trial.
+    Jumps,
+    /// White noise above the floor.
+    White,
+    /// A random walk that returns.
+    Wander,
+}
+
+/// A gauge of a rod.
+#[derive(Debug, Clone)]
+pub(crate) struct Gauge {
+    description: Description,
+    /// Units of the rod in a millimetre, of the output in a volt.
+    units: [f64; 2],
+    rod_mm: Vec<f64>,
+    volts: Vec<f64>,
+}
+
+/// Volts over the range of the rod.
+const GAIN: f64 = 1.0;
+/// Rod at rest and its range, mm.
+const ZERO_MM: f64 = 40.0;
+pub(crate) const RANGE_MM: f64 = 25.0;
+
+impl Gauge {
+    pub(crate) fn lacking(lack: Lack, seed: u64) -> Self {
+        let mut dice = Dice::new(seed, 9);
+        let trials = [("one", false), ("two", false), ("three", false), ("test", true)];
+        let specs: Vec<TrialSpec> = trials
+            .iter()
+            .enumerate()
+            .map(|(i, (name, is_test))| TrialSpec::new(name, SAMPLES, 60.0 * i as f64, *is_test))
+            .collect();
+        let (mut rod_mm, mut volts) = (Vec::new(), Vec::new());
+        for _ in 0..trials.len() {
+            let tones: Vec<[f64; 2]> = (0..4)
+                .map(|k| [0.3 + 0.9 * f64::from(k) + 0.6 * dice.unit(), 6.0 * dice.unit()])
+                .collect();
+            let x: Vec<f64> = (0..SAMPLES)
+                .map(|i| {
+                    let t = DT_S * i as f64;
+                    let sum: f64 = tones.iter().map(|[w, p]| (w * t + p).sin()).sum();
+                    0.5 + 0.125 * sum
+                })
+                .collect();
+            let extra = extra(lack, &x, &mut dice);
+            for (x, extra) in x.iter().zip(extra) {
+                rod_mm.push(ZERO_MM + RANGE_MM * x);
+                volts.push(0.3 + 1.02 * GAIN * x + extra + NOISE_V * dice.gauss());
+            }
+        }
+        Self { description: description(specs, 1.0), units: [1.0; 2], rod_mm, volts }
+    }
+
+    /// The same in other units.
+    pub(crate) fn scaled(&self, rod: f64, output: f64) -> Self {
+        let trials = self.trials().to_vec();
+        Self {
+            description: description(trials, output),
+            units: [rod, output],
+            rod_mm: self.rod_mm.iter().map(|x| rod * x).collect(),
+            volts: self.volts.iter().map(|x| output * x).collect(),
+        }
+    }
+
+    /// The same with a test trial in which both columns are something else.
+    pub(crate) fn with_another_test_trial(&self) -> Self {
+        let mut other = self.clone();
+        let from = other.rod_mm.len() - SAMPLES;
+        for (i, (x, y)) in other.rod_mm[from..].iter_mut().zip(&mut other.volts[from..]).enumerate()
+        {
+            *x += 3.0 * (0.02 * i as f64).sin();
+            *y += 0.05 * (0.03 * i as f64).cos();
+        }
+        other
+    }
+}
+
+fn description(trials: Vec<TrialSpec>, volt: f64) -> Description {
+    let gain = ParameterSpec::new("gain", "V", GAIN * volt).within(0.05 * volt);
+    let offset = ParameterSpec::new("offset", "V", 0.3 * volt).within(0.05 * volt);
+    let mut stage = StageSpec::new("gauge", "volts", "V", &[0, 1]);
+    stage.noise = Some(NOISE_V * volt);
+    let quadratic = vec![EffectParameterSpec::strength("c", "1", -0.2..=0.2)];
+    Description::new(DescriptionSpec {
+        stages: vec![stage],
+        parameters: vec![gain, offset],
+        effects: vec![EffectSpec::new("curve", (0, "gauge"), quadratic)],
+        trials,
+        dt_s: DT_S,
+    })
+    .expect("a description that holds together")
+}
+
+fn extra(lack: Lack, x: &[f64], dice: &mut Dice) -> Vec<f64> {
+    let rate =
+        |i: usize| (x[(i + 1).min(x.len() - 1)] - x[i.saturating_sub(1)]) / (2.0 * DT_S) / 0.5;
+    let (mut held, mut level) = (x[0], if dice.unit() < 0.5 { 0.0 } else { 1.0 });
+    let at = dice.below(x.len());
+    let mut each = |i: usize| match lack {
+        Lack::Play => {
+            held = x[i] - (x[i] - held).clamp(-0.1, 0.1);
+            0.1 * (x[i] - held)
+        }
+        Lack::Product => 0.01 * x[i] * rate(i).abs(),
+        Lack::Warming => {
+            held += if i == 0 { -held } else { DT_S * (rate(i).powi(2) - held) / 2.0 };
+            0.02 * held
+        }
+        Lack::Telegraph => {
+            if dice.unit() < DT_S / 1.5 {
+                level = 1.0 - level;
+            }
+            0.02 * level
+        }
+        Lack::Jumps => {
+            if i == at {
+                level = dice.gauss();
+            }
+            0.02 * level
+        }
+        Lack::White => 0.01 * dice.gauss(),
+        Lack::Wander => {
+            held += if i == 0 { -held } else { -DT_S * held / 2.0 + DT_S.sqrt() * dice.gauss() };
+            0.01 * held
+        }
+    };
+    (0..x.len()).map(&mut each).collect()
+}
+
+impl Simulator for Gauge {
+    fn description(&self) -> &Description {
+        &self.description
+    }
+
+    fn measured(&self, _: usize) -> &[f64] {
+        &self.volts
+    }
+
+    fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
+        let p = &run.model.parameters;
+        let curve = run.model.effect(0).map_or(0.0, |values| values[0]);
+        for (out, rod) in out.iter_mut().zip(&self.rod_mm) {
+            let x = (rod / self.units[0] - ZERO_MM) / RANGE_MM;
+            *out = p[1] + p[0] * (x + curve * x * (1.0 - x));
+        }
+        Ok(())
+    }
+
+    fn motion(&self) -> Motion<'_> {
+        Motion { values: &self.rod_mm, unit: "mm", falling: "falling", rising: "rising" }
+    }
+
+    fn recorded(&self) -> Vec<Recorded> {
+        vec![Recorded {
+            name: "rod_mm".into(),
+            unit: "mm".into(),
+            values: self.rod_mm.clone(),
+            is_command: false,
+        }]
+    }
+}

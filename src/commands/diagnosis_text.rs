@@ -23,6 +23,9 @@ pub(crate) fn text(diagnosis: &Diagnosis) -> String {
             put(&mut out, &format!("  {name}: {words}"));
         }
     }
+    for gross in &diagnosis.gross {
+        put(&mut out, &format!("  {}; {}", gross.sentence, gross.hint));
+    }
     stages(&mut out, diagnosis);
     slices(&mut out, diagnosis);
     candidates(&mut out, diagnosis);

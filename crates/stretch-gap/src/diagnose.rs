@@ -8,11 +8,18 @@ use crate::{
     diagnosis::{Candidate, Diagnosis, Unexplained, VerdictKind, Where},
     error::GapError,
     evidence::Evidence,
+    hypothesis::Hypothesis,
     judge::{Case, judge},
     localise,
     naming::Naming,
     probability::covering_set,
     problem::Problem,
+    record::{
+        examine::{Doubts, is_strained},
+        plain::plain,
+        suspect::Suspect,
+        weigh::{allowed, weighed},
+    },
     sanity::Sanity,
     search::Search,
     shares::{peeled, shares},
@@ -72,24 +79,56 @@ fn run(
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<(Diagnosis, Evidence), GapError> {
     let (begun, seed, thresholds) = (Instant::now(), options.seed, &options.thresholds);
+    // What the columns alone say: with one of them copied or dead, effects mean nothing.
+    let plain = plain(&simulator.columns(), simulator.trials(), simulator.dt_s());
     // Prepared.
     let problem = Problem::prepare(simulator, stop, seed, progress)?;
-    let runs = &problem.compare.runs;
-    // Searched.
-    let mut search = Search::new(&problem, thresholds, options.depth);
+    // Doubted: errors of the record and of the rig file are commoner than effects, and cheap to look at.
+    progress("errors of the record");
+    let suspect = Suspect::of(simulator);
+    let doubted = problem.beside(&suspect);
+    let mut doubts = match plain.is_empty() {
+        true => Doubts::of(&doubted, &suspect, thresholds)?,
+        false => Doubts::default(),
+    };
+    // Searched. Nothing but noise is left for a set of effects to explain better than an error that leaves noise.
+    let is_noise = |e: &Hypothesis| doubted.gap(e) <= thresholds.null_excess;
+    let depth = match (plain.is_empty(), doubts.errors.first()) {
+        (false, _) => 0,
+        (true, Some(error)) if is_noise(error) => 1.min(options.depth),
+        (true, _) => options.depth,
+    };
+    let mut search = Search::new(&problem, thresholds, depth);
     let found = search.run(progress)?;
     let peeled = peeled(&mut search.sets, &found.best)?;
+    let is_unexplained = problem.gap(&found.best) > allowed(&problem, thresholds);
+    if plain.is_empty() && (is_unexplained || is_strained(&problem, &found.best.model)) {
+        doubts.closer(&doubted, &suspect, &found.best)?;
+    }
+    let record = weighed(&doubted, &suspect, doubts.errors, &found, thresholds);
+    let searched = &problem;
+    let (problem, found, peeled, gross) = match record {
+        Some((gross, found)) => (&doubted, found, Vec::new(), gross),
+        None => (&problem, found, peeled, plain),
+    };
+    let (simulator, runs) = (problem.simulator(), &problem.compare.runs);
     // Gathered: from here on test trials are read.
     progress("test trials");
-    let (evidence, weighed) = Evidence::gather(&problem, thresholds, &found)?;
-    let candidates = candidates(&problem, &evidence, &weighed, seed)?;
-    let shares = shares(&problem, &evidence, &found.best, &peeled, thresholds.null_excess)?;
-    let sanity = Sanity::of(&problem, &found.best, &evidence)?;
+    let (evidence, weighed) = Evidence::gather(problem, thresholds, &found)?;
+    let candidates = candidates(problem, &evidence, &weighed, seed)?;
+    let shares = shares(problem, &evidence, &found.best, &peeled, thresholds.null_excess)?;
+    let sanity = Sanity::of(problem, &found.best, &evidence)?;
     progress("where the gap sits");
-    let location = locate(&problem, &evidence, seed)?;
+    let location = locate(problem, &evidence, seed)?;
     // Judged.
     let first = candidates.first();
-    let case = Case { gap: evidence.gap, first, strongest: shares.first(), sanity: &sanity };
+    let case = Case {
+        gap: evidence.gap,
+        first,
+        strongest: shares.first(),
+        sanity: &sanity,
+        is_record: !gross.is_empty(),
+    };
     let verdict = judge(case, thresholds);
     let names = matches!(verdict.kind, VerdictKind::Effect | VerdictKind::Partial);
     let naming = match names {
@@ -106,13 +145,15 @@ fn run(
     let partial = first.filter(|_| verdict.kind == VerdictKind::Partial);
     let unexplained = partial.map(|first| unexplained(simulator, &evidence, first, seed));
     let ambiguous = match verdict.kind {
-        VerdictKind::NoGap | VerdictKind::Parameters => Vec::new(),
+        VerdictKind::NoGap | VerdictKind::Parameters | VerdictKind::Record => Vec::new(),
         _ => covering_set(&weighed, simulator),
     };
     let (runtime_s, simulations) = (begun.elapsed().as_secs_f64(), runs.count());
-    let simpler = || baselines(&problem, &search.sets.tried, thresholds.null_excess);
+    let simpler = || baselines(searched, &search.sets.tried, thresholds.null_excess);
     // Told.
-    let answer = Answer { verdict: &verdict, naming: &naming, unexplained: unexplained.as_ref() };
+    let unexplained_part = unexplained.as_ref();
+    let answer =
+        Answer { verdict: &verdict, naming: &naming, unexplained: unexplained_part, gross: &gross };
     let told = tell(answer, case, simulator, &evidence, &shares);
     let diagnosis = Diagnosis {
         schema: 1,
@@ -123,6 +164,7 @@ fn run(
         faint: naming.faint,
         least_share: thresholds.least_share,
         unexplained,
+        gross,
         ambiguous,
         shares,
         gap: evidence.gap,

@@ -25,6 +25,7 @@ mod next_experiment;
 mod nuisance;
 mod probability;
 mod problem;
+mod record;
 mod runs;
 mod sanity;
 mod score;
@@ -42,9 +43,9 @@ mod worth;
 pub use description::{Description, DescriptionError, DescriptionSpec};
 pub use diagnose::{Options, diagnose};
 pub use diagnosis::{
-    Baselines, Candidate, Diagnosis, EffectShare, EffectValue, Excess, NextExperiment,
-    ParameterShift, SliceGap, StageGap, StageShare, Transfer, TransferError, Unexplained,
-    VerdictKind, Where,
+    Baselines, Candidate, Diagnosis, EffectShare, EffectValue, Excess, Gross, GrossKind,
+    NextExperiment, ParameterShift, SliceGap, StageGap, StageShare, Transfer, TransferError,
+    Unexplained, VerdictKind, Where,
 };
 pub use dice::Dice;
 pub use error::GapError;
@@ -52,6 +53,10 @@ pub use evidence::{Evidence, StageEvidence};
 pub use floor::noise_variance;
 pub use frame::{BLOCK_S, Frame, Role, Segment};
 pub use next_experiment::{Laboratory, Plan, Proposal, differences, next_experiment};
+pub use record::{
+    column::{Column, Distortion},
+    plain::copied,
+};
 pub use simulator::{Model, Motion, Run, Simulator};
 pub use spec::{EffectParameterSpec, EffectSpec, ParameterSpec, StageSpec, TrialSpec, Wander};
 pub use thresholds::Thresholds;

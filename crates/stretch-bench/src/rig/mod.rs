@@ -3,6 +3,7 @@
 mod experiments;
 mod extent;
 mod nominal;
+mod put_right;
 mod run;
 mod session;
 mod simulator;
@@ -37,7 +38,7 @@ pub struct RigSetup<'a> {
 }
 
 /// A whole rig beside its recorded session.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct RigSimulator {
     base: RigParams,
     /// Effects that the rig already has.

@@ -46,6 +46,9 @@ echo motor
 step "every effect of the catalogue, simulated and diagnosed"
 cargo test --quiet --release --locked --test every_effect -- --ignored
 
+step "errors of records and rig files, none of them given an effect's name"
+cargo test --quiet --release --locked -p stretch-bench --test gross -- --ignored
+
 step "benches, each run once"
 cargo test --benches --locked --quiet >/dev/null
 

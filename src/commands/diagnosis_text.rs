@@ -26,6 +26,9 @@ pub(crate) fn text(diagnosis: &Diagnosis) -> String {
     if let Some(proposed) = diagnosis.proposed.as_ref().filter(|p| !p.equation.is_empty()) {
         put(&mut out, &format!("  proposed, on the {}: {}", proposed.acts, proposed.equation));
     }
+    for gross in &diagnosis.gross {
+        put(&mut out, &format!("  {}; {}", gross.sentence, gross.hint));
+    }
     stages(&mut out, diagnosis);
     slices(&mut out, diagnosis);
     candidates(&mut out, diagnosis);

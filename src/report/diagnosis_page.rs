@@ -1,6 +1,6 @@
 //! The report of a diagnosis: what to fix in the simulator, how sure that is, and what it gains.
 
-use stretch_gap::{Diagnosis, VerdictKind};
+use stretch_gap::{Diagnosis, Gross, VerdictKind};
 
 use super::{
     bar_figure::{Bar, Row, Scale, bar_figure, narrow_bar_figure},
@@ -83,6 +83,10 @@ fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
         }
         VerdictKind::Unknown => format!("Nothing that the catalogue knows. Look at {place}."),
         VerdictKind::NoGap => "Nothing.".to_owned(),
+        VerdictKind::Record => {
+            let what: Vec<&str> = d.gross.iter().map(|g| g.hint.as_str()).take(1).collect();
+            format!("Nothing before the record is right: {}.", what.concat())
+        }
     };
     let sure = match (d.verdict, best) {
         (VerdictKind::Effect | VerdictKind::Partial, Some(c)) => {
@@ -95,6 +99,10 @@ fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
             };
             format!("Probability {}: {rest}.", percent(c.probability))
         }
+        (VerdictKind::Record, Some(c)) if !d.gross.iter().any(Gross::is_plain) => {
+            format!("Probability {} beside every set of effects.", percent(c.probability))
+        }
+        (VerdictKind::Record, _) => "The columns alone say so, whatever the simulator is.".to_owned(),
         (VerdictKind::Unknown, _) => {
             "That there is a gap is certain; what the catalogue offers explains at best a part of it.".to_owned()
         }
@@ -103,6 +111,10 @@ fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
     let gain = match d.verdict {
         VerdictKind::Effect | VerdictKind::Partial => format!("{gain}{}", cheaper(d)),
         VerdictKind::Unknown => format!("The best that the catalogue offers: {gain}"),
+        VerdictKind::Record if d.gross.iter().any(Gross::is_plain) => {
+            "A record from which something can be learnt.".to_owned()
+        }
+        VerdictKind::Record => format!("{gain} Then what effects do can be seen."),
         VerdictKind::Parameters => "The whole gap closes by re-tuning.".to_owned(),
         VerdictKind::NoGap => "The simulator can be used as it is.".to_owned(),
     };

@@ -148,6 +148,13 @@ impl Description {
         Ok(Self(spec))
     }
 
+    /// The same with more effects, which are valid.
+    pub(crate) fn with_effects(&self, more: impl Iterator<Item = EffectSpec>) -> Self {
+        let mut spec = self.0.clone();
+        spec.effects.extend(more);
+        Self(spec)
+    }
+
     /// The same with other tolerances: `told` gives every parameter anew, and keeps it valid.
     pub(crate) fn with_parameters(
         &self,

@@ -8,16 +8,16 @@ use crate::{
     diagnosis::{Candidate, Diagnosis, Unexplained, VerdictKind, Where},
     error::GapError,
     evidence::Evidence,
-    hypothesis::Hypothesis,
     judge::{Case, judge},
     localise,
     missing::propose,
     naming::Naming,
     probability::covering_set,
     problem::Problem,
+    record::{examine::Doubts, plain::plain, suspect::Suspect, weigh::weighed},
     sanity::Sanity,
     search::Search,
-    sets::Sets,
+    settle::settled,
     shares::{peeled, shares},
     simulator::Simulator,
     thresholds::Thresholds,
@@ -75,33 +75,38 @@ fn run(
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<(Diagnosis, Evidence), GapError> {
     let (begun, seed, thresholds) = (Instant::now(), options.seed, &options.thresholds);
+    // What the columns alone say: with one of them copied or dead, effects mean nothing.
+    let plain = plain(&simulator.columns(), simulator.trials(), simulator.dt_s());
+    let depth = if plain.is_empty() { options.depth } else { 0 };
     // Prepared.
     let problem = Problem::prepare(simulator, stop, seed, progress)?;
-    let runs = &problem.compare.runs;
-    // Searched.
-    let mut search = Search::new(&problem, thresholds, options.depth);
+    // Searched, once more where the nuisances turn out to be others.
+    let mut search = Search::new(&problem, thresholds, depth);
     let mut found = search.run(&problem.nominal, progress)?;
     progress("nuisances");
-    eprintln!(
-        found.best.effects.iter().map(|e| &simulator.effects()[*e].name).collect::<Vec<_>>(),
-        found.best.score,
-        problem.gap(&found.best)
-    );
     let settled = settled(&problem, &mut search.sets, &found.best, seed)?;
     let problem = settled.as_ref().map_or(&problem, |(problem, _)| problem);
     if let Some((problem, from)) = &settled {
-        search = Search::new(problem, thresholds, options.depth);
+        search = Search::new(problem, thresholds, depth);
         found = search.run(from, progress)?;
     }
-    for m in &problem.compare.metrics {
-        for l in m.loose() {}
-    }
-    eprintln!(
-        found.best.effects.iter().map(|e| &simulator.effects()[*e].name).collect::<Vec<_>>(),
-        found.best.score,
-        problem.gap(&found.best)
-    );
     let peeled = peeled(&mut search.sets, &found.best)?;
+    // Doubted: an error of the record or of the rig file has one number and leaves noise.
+    progress("errors of the record");
+    let suspect = Suspect::of(simulator);
+    let doubted = problem.beside(&suspect);
+    let doubts = match plain.is_empty() {
+        true => Doubts::of(&doubted, &suspect, thresholds)?
+            .closer_if(&doubted, &suspect, &found, thresholds)?,
+        false => Doubts::default(),
+    };
+    let record = weighed(&doubted, &suspect, doubts.errors, &found, thresholds);
+    let searched = problem;
+    let (problem, found, peeled, gross) = match record {
+        Some((gross, found)) => (&doubted, found, Vec::new(), gross),
+        None => (problem, found, peeled, plain),
+    };
+    let (simulator, runs) = (problem.simulator(), &problem.compare.runs);
     // Gathered: from here on test trials are read.
     progress("test trials");
     let (evidence, weighed) = Evidence::gather(problem, thresholds, &found)?;
@@ -112,7 +117,13 @@ fn run(
     let location = locate(problem, &evidence, seed)?;
     // Judged.
     let first = candidates.first();
-    let case = Case { gap: evidence.gap, first, strongest: shares.first(), sanity: &sanity };
+    let case = Case {
+        gap: evidence.gap,
+        first,
+        strongest: shares.first(),
+        sanity: &sanity,
+        is_record: !gross.is_empty(),
+    };
     let verdict = judge(case, thresholds);
     let names = matches!(verdict.kind, VerdictKind::Effect | VerdictKind::Partial);
     let naming = match names {
@@ -136,22 +147,23 @@ fn run(
     let proposed = match base {
         Some(base) => {
             progress("what the catalogue lacks");
-            propose(&problem, base)?
+            propose(problem, base)?
         }
         None => None,
     };
     let ambiguous = match verdict.kind {
-        VerdictKind::NoGap | VerdictKind::Parameters => Vec::new(),
+        VerdictKind::NoGap | VerdictKind::Parameters | VerdictKind::Record => Vec::new(),
         _ => covering_set(&weighed, simulator),
     };
     let (runtime_s, simulations) = (begun.elapsed().as_secs_f64(), runs.count());
-    let simpler = || baselines(problem, &search.sets.tried, thresholds.null_excess);
+    let simpler = || baselines(searched, &search.sets.tried, thresholds.null_excess);
     // Told.
     let answer = Answer {
         verdict: &verdict,
         naming: &naming,
         unexplained: unexplained.as_ref(),
         proposed: proposed.as_ref(),
+        gross: &gross,
     };
     let told = tell(answer, case, simulator, &evidence, &shares);
     let diagnosis = Diagnosis {
@@ -164,6 +176,7 @@ fn run(
         least_share: thresholds.least_share,
         unexplained,
         proposed,
+        gross,
         ambiguous,
         shares,
         gap: evidence.gap,
@@ -178,42 +191,6 @@ fn run(
         candidates,
     };
     Ok((diagnosis, evidence))
-}
-
-/// The problem with the nuisances that the record has, and the set to go on from; none where they are as described.
-///
-/// What an effect of their stage explains, a larger nuisance may explain as well: two hypotheses, the nuisances beside the best set and
-/// those beside what is left of it without such effects, weighed by their likelihoods.
-fn settled<'a>(
-    problem: &Problem<'a>,
-    sets: &mut Sets<'_>,
-    best: &Hypothesis,
-    seed: u64,
-) -> Result<Option<(Problem<'a>, Hypothesis)>, GapError> {
-    let mut bare = best.clone();
-    for effect in best.effects.iter().copied().filter(|e| problem.is_in_loose_stage(*e)) {
-        bare = sets.without(&bare, effect)?;
-    }
-    let beside_best = problem.adapted(&best.model, seed)?;
-    if bare.effects.len() == best.effects.len() {
-        return Ok(beside_best.map(|problem| (problem, best.clone())));
-    }
-    let Some(beside_bare) = problem.adapted(&bare.model, seed)? else {
-        return Ok(beside_best.map(|problem| (problem, best.clone())));
-    };
-    let own = beside_best.as_ref().unwrap_or(problem);
-    let (levels, others) = (own.levels(best)?, beside_bare.levels(&bare)?);
-    let levels: Vec<f64> = levels.iter().zip(&others).map(|(a, b)| a.min(*b)).collect();
-    eprintln!(
-        bare.effects,
-        best.effects,
-        beside_bare.likelihood(&bare, &levels)?,
-        own.likelihood(best, &levels)?
-    );
-    if beside_bare.likelihood(&bare, &levels)? > own.likelihood(best, &levels)? {
-        return Ok(Some((beside_bare, bare)));
-    }
-    Ok(beside_best.map(|problem| (problem, best.clone())))
 }
 
 /// Slices that are told of what a partial answer leaves.

@@ -2,6 +2,7 @@
 //!
 //! | in order | holds when | verdict |
 //! | --- | --- | --- |
+//! | record | a column alone says so, or an error of record or rig file stands above every set of effects | `record` |
 //! | foreign | a channel's variance left exceeds what a missing effect leaves | `unknown` |
 //! | strained | parameters at their ends explain as much as the effects do | `unknown` |
 //! | effect | confirmed on the test trials, and g_left <= u + v g_retuned | `effect` |
@@ -28,6 +29,8 @@ pub(crate) struct Case<'a> {
     /// What the strongest effect of the best set does, if there is one.
     pub(crate) strongest: Option<&'a EffectShare>,
     pub(crate) sanity: &'a Sanity,
+    /// Whether an error of the record or of the rig file stands above all effects.
+    pub(crate) is_record: bool,
 }
 
 /// The verdict.
@@ -51,6 +54,10 @@ pub(crate) enum Overruled {
 
 /// Judges.
 pub(crate) fn judge(case: Case<'_>, thresholds: &Thresholds) -> Verdict {
+    if case.is_record {
+        let kind = VerdictKind::Record;
+        return Verdict { kind, seen: kind, overruled: None };
+    }
     let seen = seen(case, thresholds);
     let overruled = foreign(case).or_else(|| strained(case));
     let kind = if overruled.is_some() { VerdictKind::Unknown } else { seen };
@@ -138,7 +145,8 @@ mod tests {
             (gap(0.01, 0.1, 0.05), &chance, NoGap),
         ];
         for (gap, first, expected) in cases {
-            let case = Case { gap, first: Some(first), strongest: None, sanity: &sound };
+            let case =
+                Case { gap, first: Some(first), strongest: None, sanity: &sound, is_record: false };
             let verdict = judge(case, &Thresholds::frozen());
             assert_eq!((verdict.kind, verdict.seen), (expected, expected), "{gap:?}");
         }
@@ -154,8 +162,13 @@ mod tests {
             (share(0.4, false), Unknown),
         ] {
             let gap = gap(20.0, 10.0, 3.0);
-            let case =
-                Case { gap, first: Some(&named), strongest: Some(&strongest), sanity: &sound };
+            let case = Case {
+                gap,
+                first: Some(&named),
+                strongest: Some(&strongest),
+                sanity: &sound,
+                is_record: false,
+            };
             assert_eq!(judge(case, &Thresholds::frozen()).kind, expected, "{strongest:?}");
         }
     }
@@ -167,9 +180,28 @@ mod tests {
         let judged = |left: f64, strained| {
             let sanity = Sanity { left: vec![0.0, left], allowed: 0.1, strained };
             let gap = gap(20.0, 10.0, 0.1);
-            let case = Case { gap, first: Some(&first), strongest: None, sanity: &sanity };
+            let case = Case {
+                gap,
+                first: Some(&first),
+                strongest: None,
+                sanity: &sanity,
+                is_record: false,
+            };
             judge(case, &Thresholds::frozen())
         };
+        let error = {
+            let sanity = Sanity { left: vec![0.5], allowed: 0.1, strained: None };
+            let gap = gap(20.0, 10.0, 0.1);
+            let case = Case {
+                gap,
+                first: Some(&first),
+                strongest: None,
+                sanity: &sanity,
+                is_record: true,
+            };
+            judge(case, &Thresholds::frozen())
+        };
+        assert_eq!((error.kind, error.overruled), (VerdictKind::Record, None));
         let foreign = judged(0.5, None);
         assert_eq!(foreign.overruled, Some(Overruled::Foreign { stage: 1, share: 0.5 }));
         assert_eq!((foreign.kind, foreign.seen), (VerdictKind::Unknown, VerdictKind::Effect));

@@ -29,12 +29,14 @@ mod noise;
 mod nuisance;
 mod probability;
 mod problem;
+mod record;
 mod runs;
 mod sanity;
 mod score;
 mod screen;
 mod search;
 mod sets;
+mod settle;
 mod shares;
 mod simulator;
 mod spec;
@@ -46,9 +48,9 @@ mod worth;
 pub use description::{Description, DescriptionError, DescriptionSpec};
 pub use diagnose::{Options, diagnose};
 pub use diagnosis::{
-    Baselines, Candidate, Diagnosis, EffectShare, EffectValue, Excess, NextExperiment,
-    ParameterShift, SliceGap, StageGap, StageShare, Transfer, TransferError, Unexplained,
-    VerdictKind, Where,
+    Baselines, Candidate, Diagnosis, EffectShare, EffectValue, Excess, Gross, GrossKind,
+    NextExperiment, ParameterShift, SliceGap, StageGap, StageShare, Transfer, TransferError,
+    Unexplained, VerdictKind, Where,
 };
 pub use dice::Dice;
 pub use error::GapError;
@@ -57,6 +59,10 @@ pub use frame::{BLOCK_S, Frame, Role, Segment};
 pub use missing::{Factor, Passage, Proposed, ProposedTerm, RateForm, SignalScale, Term};
 pub use next_experiment::{Laboratory, Plan, Proposal, differences, next_experiment};
 pub use noise::{Noise, WINDOW, noise_variance};
+pub use record::{
+    column::{Column, Distortion},
+    plain::copied,
+};
 pub use simulator::{Model, Motion, Recorded, Run, Simulator};
 pub use spec::{EffectParameterSpec, EffectSpec, ParameterSpec, StageSpec, TrialSpec, Wander};
 pub use thresholds::Thresholds;

@@ -31,6 +31,12 @@ impl Cholesky {
         self.0.l_dirty().solve_lower_triangular_mut(&mut b);
     }
 
+    /// Solves L' x = y in place.
+    pub(crate) fn backward(&self, y: &mut [f64]) {
+        let mut y = DVectorViewMut::from_slice(y, y.len());
+        self.0.l_dirty().tr_solve_lower_triangular_mut(&mut y);
+    }
+
     /// Solves A x = b in place.
     pub(crate) fn solve(&self, b: &mut [f64]) {
         self.0.solve_mut(&mut DVectorViewMut::from_slice(b, b.len()));

@@ -103,6 +103,21 @@ impl<'a> Problem<'a> {
         Ok(Self { compare, shipped, nominal, memory, observations, transmitted })
     }
 
+    /// The same problem beside another simulator of the same stages and parameters.
+    pub(crate) fn beside<'b>(&self, simulator: &'b dyn Simulator) -> Problem<'b>
+    where
+        'a: 'b,
+    {
+        Problem {
+            compare: self.compare.beside(simulator, self.compare.metrics.clone()),
+            shipped: self.shipped.clone(),
+            nominal: self.nominal.clone(),
+            memory: self.memory.clone(),
+            observations: self.observations.clone(),
+            transmitted: self.transmitted.clone(),
+        }
+    }
+
     pub(crate) fn simulator(&self) -> &'a dyn Simulator {
         self.compare.simulator()
     }

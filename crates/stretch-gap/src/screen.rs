@@ -50,7 +50,7 @@ pub(crate) struct Ground {
     /// Sensitivities of nominal parameters by stage.
     pub(crate) known: Vec<Option<Sensitivities>>,
     /// Factor of their normal matrix (with the prior), and what it makes of the residual, by stage.
-    solved: Vec<(Cholesky, Vec<f64>)>,
+    pub(crate) solved: Vec<(Cholesky, Vec<f64>)>,
 }
 
 impl Ground {
@@ -138,7 +138,7 @@ impl Comparison<'_> {
     }
 
     /// Factor L of A'V^-1 A + b I, and L^-1 A'V^-1 r.
-    fn solved(
+    pub(crate) fn solved(
         &self,
         stage: usize,
         known: &Sensitivities,

@@ -1,8 +1,11 @@
 //! The one trait through which any simulator is diagnosed.
 
+use std::borrow::Cow;
+
 use crate::{
     description::Description,
     error::GapError,
+    record::column::{Column, Distortion},
     spec::{EffectSpec, ParameterSpec, StageSpec, TrialSpec},
 };
 
@@ -165,5 +168,33 @@ pub trait Simulator: Sync {
     fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {
         let _ = (run, input, out);
         Ok(false)
+    }
+    /// Columns of the record: those of the stages' outputs, unless more are known.
+    fn columns(&self) -> Vec<Column<'_>> {
+        let column = |(stage, spec): (usize, &'_ StageSpec)| Column {
+            name: Cow::Owned(spec.channel.clone()),
+            unit: Cow::Owned(spec.unit.clone()),
+            values: Cow::Borrowed(self.measured(stage)),
+            output_of: Some(stage),
+            read_by: Vec::new(),
+            is_command: false,
+            skew_s: [0.0; 2],
+            hint: Cow::Borrowed("its sensor, its cable and its scale"),
+        };
+        self.stages().iter().enumerate().map(column).collect()
+    }
+    /// The same simulator driven by one column of the record put right; none where no stage is driven by it.
+    ///
+    /// What was measured of the stages' outputs may stay as it is.
+    ///
+    /// # Errors
+    /// When the column so put right cannot drive it.
+    fn put_right(
+        &self,
+        column: &str,
+        error: Distortion,
+    ) -> Result<Option<Box<dyn Simulator + Send + '_>>, GapError> {
+        let _ = (column, error);
+        Ok(None)
     }
 }

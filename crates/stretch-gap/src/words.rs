@@ -1,11 +1,12 @@
 //! The answer in words, made from the verdict when nothing can change any more.
 
 use crate::{
-    diagnosis::{EffectShare, Unexplained, VerdictKind},
+    diagnosis::{EffectShare, Gross, Unexplained, VerdictKind},
     evidence::Evidence,
     judge::{Case, Overruled, Verdict},
     missing::Proposed,
     naming::Naming,
+    record::told::sentence,
     simulator::Simulator,
 };
 
@@ -25,6 +26,8 @@ pub(crate) struct Answer<'a> {
     pub(crate) naming: &'a Naming,
     pub(crate) unexplained: Option<&'a Unexplained>,
     pub(crate) proposed: Option<&'a Proposed>,
+    /// What is wrong with the record or the rig file.
+    pub(crate) gross: &'a [Gross],
 }
 
 /// Tells a verdict.
@@ -63,6 +66,19 @@ fn seen(
     let gap = case.gap;
     let naming = answer.naming;
     match (answer.verdict.seen, case.first) {
+        (VerdictKind::Record, Some(first)) if !answer.gross.iter().any(Gross::is_plain) => {
+            sentence(answer.gross)
+                + &format!(
+                    " With that put right {:.0} % of the gap close ({:.0} to {:.0} %) on trials that were not fitted; probability {:.2}.",
+                    100.0 * first.closed,
+                    100.0 * first.closed_ci[0],
+                    100.0 * first.closed_ci[1],
+                    first.probability
+                )
+        }
+        (VerdictKind::Record, _) => {
+            sentence(answer.gross) + " Nothing can be said of effects until that is put right."
+        }
         (VerdictKind::Effect, Some(first)) => {
             // Overruled, nothing was named: what was seen is told as it stood.
             let names = match naming.named.is_empty() {

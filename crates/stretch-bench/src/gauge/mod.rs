@@ -1,5 +1,6 @@
 //! A gauge alone beside a reference: a rig of one stage.
 
+mod columns;
 mod experiments;
 mod lag;
 mod record;
@@ -7,8 +8,8 @@ mod source;
 
 use stretch_data::{SessionTrial, unit};
 use stretch_gap::{
-    Description, DescriptionSpec, Dice, GapError, Model, Motion, Noise, ParameterSpec, Recorded,
-    Run, Simulator, StageSpec, TrialSpec,
+    Column, Description, DescriptionSpec, Dice, GapError, Model, Motion, Noise, ParameterSpec,
+    Recorded, Run, Simulator, StageSpec, TrialSpec,
 };
 use stretch_sim::{
     Alone, Catalogue, Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Measured, Start, Tolerance,
@@ -236,6 +237,10 @@ impl Simulator for GaugeSimulator {
             out.push(signal("pressure_kpa", "kPa", self.record.pressure.clone()));
         }
         out
+    }
+
+    fn columns(&self) -> Vec<Column<'_>> {
+        self.record_columns()
     }
 
     /// A line follows whatever it is fitted to; where it does not follow half of it, the two have little to do with each other.

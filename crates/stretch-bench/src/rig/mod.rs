@@ -4,6 +4,7 @@ mod experiments;
 mod extent;
 mod noises;
 mod nominal;
+mod put_right;
 mod run;
 mod session;
 mod simulator;
@@ -39,7 +40,7 @@ pub struct RigSetup<'a> {
 }
 
 /// A whole rig beside its recorded session.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct RigSimulator {
     base: RigParams,
     /// Effects that the rig already has.

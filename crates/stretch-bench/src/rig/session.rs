@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use stretch_data::{DataSet, EvenSession, EvenTrial, ReadOptions, SessionTrial, Split};
+use stretch_gap::{copied, noise_variance};
 
 use super::smooth::{Smoothed, schedule};
 use crate::{error::BenchError, lost::open, wild::tame};
@@ -12,6 +13,8 @@ const NEEDED: [&str; 4] = ["inlet", "outlet", "length_mm", "bridge_v"];
 const PRESSURE: &str = "pressure_kpa";
 /// Parts of a trial with fewer samples are left out.
 const SHORTEST: usize = 100;
+/// Standard deviations that noise alone hardly ever spans.
+const NOISE_SPAN: f64 = 15.0;
 /// Least samples that may be fitted.
 const LEAST: usize = 300;
 
@@ -172,6 +175,22 @@ impl Session {
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)))
     }
 
+    /// Whether the voltage is a copy of another column, which is no matter of units: the diagnosis says so.
+    fn is_copied(&self) -> bool {
+        let all = |of: fn(&RigTrial) -> &[f64]| -> Vec<f64> {
+            self.trials.iter().flat_map(of).copied().collect()
+        };
+        let volts = all(|t| &t.bridge_v);
+        let others = [all(|t| &t.length_mm), all(|t| t.pressure_kpa.as_deref().unwrap_or(&[]))];
+        others.iter().any(|other| copied(other, &volts).is_some())
+    }
+
+    /// Whether a pressure of such a range moves by no more than its noise does.
+    fn is_noise(&self, (low, high): (f64, f64)) -> bool {
+        let trials = self.trials.iter().filter_map(|t| t.pressure_kpa.as_deref());
+        high - low < NOISE_SPAN * noise_variance(trials, self.dt_s).sqrt()
+    }
+
     fn check_units(&self) -> Result<(), BenchError> {
         let length = self.range(|t| &t.length_mm);
         let volts = self.range(|t| &t.bridge_v);
@@ -186,7 +205,7 @@ impl Session {
         if length.1 < 1.0 && length.0 > 0.0 {
             return bad("length_mm", spread(length), "this looks like metres: multiply by 1000");
         }
-        if volts.1 > 50.0 {
+        if volts.1 > 50.0 && !self.is_copied() {
             return bad("bridge_v", spread(volts), "this looks like millivolts: divide by 1000");
         }
         for (column, range) in [("length_mm", length), ("bridge_v", volts)] {
@@ -210,6 +229,10 @@ impl Session {
             if pressure.1 - pressure.0 <= 0.0 {
                 let hint = "the channel is dead: check the sensor, or take the column out";
                 return bad("pressure_kpa", format!("{} in every sample", pressure.0), hint);
+            }
+            // Noise alone has no unit: the diagnosis says that the channel is dead.
+            if self.is_noise(pressure) {
+                return self.check_directions();
             }
             if pressure.1 > 10_000.0 {
                 return bad("pressure_kpa", spread(pressure), "this looks like Pa: divide by 1000");
@@ -257,13 +280,46 @@ impl Session {
             }
         }
         if against > AGAINST * widest * stroke {
+            let (column, hint) = self.against();
             return Err(BenchError::Implausible {
-                column: "inlet, outlet".into(),
+                column: column.into(),
                 found: "the muscle lengthens while the inlet is open".into(),
-                hint: "they look swapped: exchange the two names".into(),
+                hint: hint.into(),
             });
         }
         Ok(())
+    }
+}
+
+impl Session {
+    /// Which columns are wrong where length and valves disagree: the pressure is the witness.
+    fn against(&self) -> (&'static str, &'static str) {
+        let (mut with, mut seen) = (0.0, false);
+        for trial in &self.trials {
+            let Some(pressure) = &trial.pressure_kpa else { continue };
+            seen = true;
+            let valves = trial.inlet.iter().zip(&trial.outlet).map(|(i, o)| i - o);
+            with += valves.zip(pressure.windows(2)).map(|(u, p)| u * (p[1] - p[0])).sum::<f64>();
+        }
+        let length = self.range(|t| &t.length_mm);
+        let pressure = self.range(|t| t.pressure_kpa.as_deref().unwrap_or(&[]));
+        // A muscle keeps most of its length, a chamber none of its pressure.
+        let is_length = |(low, high): (f64, f64)| low > 0.5 * high;
+        if seen && is_length(pressure) && !is_length(length) {
+            ("length_mm, pressure_kpa", "they look swapped: exchange the two names")
+        } else if seen && with > 0.0 {
+            (
+                "length_mm",
+                "it looks upside down, for the pressure goes with the valves: check the potentiometer's polarity",
+            )
+        } else if seen {
+            ("inlet, outlet", "they look swapped: exchange the two names")
+        } else {
+            (
+                "inlet, outlet",
+                "they look swapped: exchange the two names, unless length_mm is upside down",
+            )
+        }
     }
 }
 

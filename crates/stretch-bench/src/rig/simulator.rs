@@ -1,6 +1,6 @@
 //! What a diagnosis asks of the rig.
 
-use stretch_gap::{Description, GapError, Motion, Recorded, Run, Simulator};
+use stretch_gap::{Column, Description, Distortion, GapError, Motion, Recorded, Run, Simulator};
 use stretch_sim::{Key, Stage};
 
 use super::{RigSimulator, run, smooth::Smoothed};
@@ -90,5 +90,17 @@ impl Simulator for RigSimulator {
         }
         run::simulate(self, run, Some(input), out)?;
         Ok(true)
+    }
+
+    fn columns(&self) -> Vec<Column<'_>> {
+        self.record()
+    }
+
+    fn put_right(
+        &self,
+        column: &str,
+        error: Distortion,
+    ) -> Result<Option<Box<dyn Simulator + Send + '_>>, GapError> {
+        Ok(self.driven(column, error).map(|rig| Box::new(rig) as Box<dyn Simulator + Send>))
     }
 }

@@ -1,0 +1,38 @@
+//! The columns of a gauge alone.
+
+use std::borrow::Cow;
+
+use stretch_gap::Column;
+
+use super::{GaugeSimulator, unit_of};
+
+/// Effect that stands for two recorders that were not started together, and its range without a catalogue, s.
+const SKEW: (&str, [f64; 2]) = ("channel_skew", [-1.0, 1.0]);
+
+impl GaugeSimulator {
+    /// The signal, and the reference that drives it.
+    pub(super) fn record_columns(&self) -> Vec<Column<'_>> {
+        let skew = self.about.effects.iter().find(|e| e.name == SKEW.0);
+        let skew_s = skew.and_then(|e| e.parameters.first()).map_or(SKEW.1, |p| [p.min, p.max]);
+        let stage = &self.about.stages[0];
+        let signal = Column {
+            name: Cow::Borrowed(&stage.channel),
+            unit: Cow::Borrowed(&stage.unit),
+            values: Cow::Borrowed(&self.record.signal),
+            output_of: Some(0),
+            read_by: Vec::new(),
+            is_command: false,
+            skew_s,
+            hint: Cow::Borrowed("the gauge, its wires and its amplifier"),
+        };
+        let reference = Column {
+            name: Cow::Borrowed(&self.reference),
+            unit: Cow::Borrowed(unit_of(&self.reference)),
+            values: Cow::Borrowed(&self.record.reference),
+            output_of: None,
+            hint: Cow::Borrowed("the reference, its cable and its scale"),
+            ..signal.clone()
+        };
+        vec![signal, reference]
+    }
+}

@@ -1,0 +1,199 @@
+//! Every error of the record and of the rig file, looked at; those that could explain most of a gap, fitted.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use crate::{
+    error::GapError,
+    fit::{COARSE, Effort, FINE, possible},
+    hypothesis::Hypothesis,
+    problem::Problem,
+    record::{
+        fault::{Kind, span},
+        screen::{Bench, END, Promising, REACH},
+        suspect::Suspect,
+        weigh::allowed,
+    },
+    screen::Ground,
+    search::Found,
+    simulator::{Model, Simulator},
+    thresholds::Thresholds,
+};
+
+/// Share of the gap of the stages that it touches which an error must promise: it is exact, and a look at it nearly so.
+const MOST: f64 = 0.5;
+/// Share of the fall of the most promising that others must promise.
+const NEAR: f64 = 0.5;
+/// Errors that are fitted at most.
+const FITTED: usize = 4;
+/// Errors that are fitted to the end after a coarse fit.
+const POLISHED: usize = 2;
+/// Least scale and offset (a share of the span) that are told: an instrument is that good.
+const LEAST: f64 = 0.03;
+/// Least delay that is told, in samples: less is when within a sample a channel is read.
+const LEAST_SAMPLES: f64 = 2.0;
+/// Standard deviations by which a size must lie beyond what is allowed.
+const SURE: f64 = 3.0;
+
+/// Errors that were looked at, and those of them that were fitted, each with the nominal parameters.
+#[derive(Debug, Default)]
+pub(crate) struct Doubts {
+    looked: Vec<Promising>,
+    /// Larger than what tolerances, instruments and effects stand for; the best first.
+    pub(crate) errors: Vec<Hypothesis>,
+}
+
+impl Doubts {
+    /// Looks at every error, and fits those that could explain most of a gap; `problem` is one of the suspect.
+    pub(crate) fn of(
+        problem: &Problem<'_>,
+        suspect: &Suspect<'_>,
+        thresholds: &Thresholds,
+    ) -> Result<Self, GapError> {
+        if problem.gap(&problem.nominal) <= thresholds.null_excess
+            && !is_strained(problem, &problem.nominal.model)
+        {
+            return Ok(Self::default());
+        }
+        let ground = Ground::around(&problem.compare, problem.nominal.model.clone())?;
+        let bench = Bench::new(problem, suspect, &ground)?;
+        let all: Result<Vec<Option<Promising>>, GapError> =
+            (0..suspect.faults().len()).into_par_iter().map(|fault| bench.look(fault)).collect();
+        let looked: Vec<Promising> = all?.into_iter().flatten().collect();
+        // A fall counts as a score does: by the samples of an observation.
+        let least = 2.0 * thresholds.rise * problem.finest() * problem.compare.frame.block as f64;
+        let counts = |p: &&Promising| p.share > MOST && p.fall > least;
+        let mut promising: Vec<&Promising> = looked.iter().filter(counts).collect();
+        promising.sort_by(|a, b| b.fall.total_cmp(&a.fall));
+        let most = promising.first().map_or(0.0, |p| p.fall);
+        promising.retain(|p| p.fall >= NEAR * most);
+        promising.truncate(FITTED);
+        let fits = promising.par_iter().map(|p| fitted(problem, suspect, p.fault, &p.start, FINE));
+        let errors = sorted(suspect, possible(fits)?);
+        Ok(Self { looked, errors })
+    }
+
+    /// Looks closer where the best set of effects leaves more than form may, or parameters stand at their ends.
+    pub(crate) fn closer_if(
+        mut self,
+        problem: &Problem<'_>,
+        suspect: &Suspect<'_>,
+        found: &Found,
+        thresholds: &Thresholds,
+    ) -> Result<Self, GapError> {
+        let best = &found.best;
+        if problem.gap(best) > allowed(problem, thresholds) || is_strained(problem, &best.model) {
+            self.closer(problem, suspect, best)?;
+        }
+        Ok(self)
+    }
+
+    /// A straight line says little of a large error, so those in the stage where most is left are fitted coarsely from the rig as
+    /// shipped, and the best of them to the end.
+    fn closer(
+        &mut self,
+        problem: &Problem<'_>,
+        suspect: &Suspect<'_>,
+        best: &Hypothesis,
+    ) -> Result<(), GapError> {
+        let stages = 0..problem.compare.metrics.len();
+        let gap = |stage: &usize| problem.gap_in(best, *stage);
+        let Some(worst) = stages.max_by(|a, b| gap(a).total_cmp(&gap(b))) else { return Ok(()) };
+        let is_new = |p: &&Promising| {
+            let effect = suspect.index(p.fault);
+            suspect.faults()[p.fault].touches.contains(&worst)
+                && self.errors.iter().all(|e| e.effects != [effect])
+        };
+        let large = |model: &Model| is_large(suspect, model, 0.0);
+        let starts = self.looked.iter().filter(is_new).flat_map(|p| {
+            let plain = p.plain.as_ref().filter(|model| large(model));
+            plain.or(Some(&p.start).filter(|model| large(model))).map(|model| (p.fault, model))
+        });
+        let starts: Vec<(usize, &Model)> = starts.collect();
+        let fits =
+            starts.par_iter().map(|(fault, start)| fitted(problem, suspect, *fault, start, COARSE));
+        let mut coarse = sorted(suspect, possible(fits)?);
+        coarse.truncate(POLISHED);
+        let fits = coarse.par_iter().map(|one| {
+            fitted(problem, suspect, one.effects[0] - suspect.index(0), &one.model, FINE)
+        });
+        self.errors.extend(possible(fits)?);
+        self.errors = sorted(suspect, std::mem::take(&mut self.errors));
+        Ok(())
+    }
+}
+
+/// Those that are gross, the best first.
+fn sorted(suspect: &Suspect<'_>, mut found: Vec<Hypothesis>) -> Vec<Hypothesis> {
+    found.retain(|one| {
+        let sd = one.effect_sd.values().flatten().copied().fold(0.0, f64::max);
+        is_large(suspect, &one.model, sd)
+    });
+    found.sort_by(|a, b| b.score.total_cmp(&a.score));
+    found
+}
+
+/// Whether a parameter of a model that is evidence stands at an end of its tolerances, or any two of one stage.
+fn is_strained(problem: &Problem<'_>, model: &Model) -> bool {
+    let specs = problem.simulator().parameters();
+    let at_end = |p: &usize| {
+        let spec = &specs[*p];
+        spec.sd > 0.0 && (model.parameters[*p] - spec.nominal).abs() > END * REACH * spec.sd
+    };
+    problem.simulator().stages().iter().any(|stage| {
+        let ended: Vec<usize> = stage.parameters.iter().copied().filter(at_end).collect();
+        ended.len() > 1 || ended.iter().any(|p| specs[*p].is_evidence)
+    })
+}
+
+fn fitted(
+    problem: &Problem<'_>,
+    suspect: &Suspect<'_>,
+    fault: usize,
+    start: &Model,
+    effort: Effort,
+) -> Result<Hypothesis, GapError> {
+    let effect = suspect.index(fault);
+    let stages = &suspect.faults()[fault].touches;
+    let fitted = problem.fit(stages, start.clone(), &[], effort)?;
+    let mut found = Hypothesis {
+        effects: vec![effect],
+        effect_sd: BTreeMap::from([(effect, fitted.effect_sd.concat())]),
+        ..problem.nominal.clone()
+    };
+    for &stage in stages {
+        for &p in &problem.simulator().stages()[stage].parameters {
+            found.model.parameters[p] = fitted.model.parameters[p];
+        }
+    }
+    found.model.effects = fitted.model.effects;
+    for misfit in fitted.misfits {
+        found.misfits[misfit.stage] = misfit;
+    }
+    found.score = problem.score(&found.misfits, &found.model);
+    Ok(found)
+}
+
+/// Whether the error of a model, known to `sd`, is larger than what tolerances, instruments and effects of the catalogue stand for.
+fn is_large(suspect: &Suspect<'_>, model: &Model, sd: f64) -> bool {
+    let Some((fault, size)) = suspect.error_of(model) else { return false };
+    let column = fault.column.map(|c| &suspect.columns()[c]);
+    let sure = |least: f64| size.abs() - SURE * sd > least;
+    match (fault.kind, column) {
+        (Kind::Parameter(p), _) => {
+            let spec = &suspect.parameters()[p];
+            let value = model.parameters[p] * (1.0 + size);
+            (value - spec.nominal).abs() > REACH * spec.sd
+        }
+        (Kind::Scale, _) => sure(LEAST),
+        (Kind::Offset, Some(column)) => sure(LEAST * span(&column.values)),
+        (Kind::Delay, Some(column)) => {
+            let [early, late] = column.skew_s;
+            let is_skew = (early - SURE * sd..=late + SURE * sd).contains(&size);
+            sure(LEAST_SAMPLES * suspect.dt_s()) && !is_skew
+        }
+        (Kind::Sign, _) => true,
+        _ => false,
+    }
+}

@@ -1,0 +1,127 @@
+//! The hypotheses: one error of the record or of the rig file each, as an effect with one number.
+
+use crate::{
+    record::column::{Column, Distortion},
+    simulator::Simulator,
+    spec::{EffectParameterSpec, EffectSpec},
+};
+
+/// Factors that are looked for, as deviations from 1.
+const FACTORS: (f64, f64) = (-0.95, 9.0);
+/// Offsets that are looked for, in spans of the column.
+const SPANS: f64 = 20.0;
+/// Delays that are looked for, s.
+pub(crate) const DELAY_S: f64 = 2.0;
+
+/// What is wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// A column is too large by a factor.
+    Scale,
+    /// A column has an offset.
+    Offset,
+    /// A column is late.
+    Delay,
+    /// A column is upside down.
+    Sign,
+    /// A nominal parameter, by its index.
+    Parameter(usize),
+}
+
+/// One error, its size left open.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Fault {
+    pub(crate) kind: Kind,
+    /// Which column; none for a parameter.
+    pub(crate) column: Option<usize>,
+    /// Stages whose simulation it changes.
+    pub(crate) touches: Vec<usize>,
+    name: String,
+    unit: String,
+    range: (f64, f64),
+}
+
+impl Fault {
+    /// Every error that a simulator's columns and parameters may have.
+    pub(crate) fn all(simulator: &dyn Simulator, columns: &[Column<'_>]) -> Vec<Self> {
+        let mut all: Vec<Self> =
+            columns.iter().enumerate().flat_map(|(i, column)| Self::of_column(i, column)).collect();
+        let stages = simulator.stages();
+        for (p, spec) in simulator.parameters().iter().enumerate() {
+            // A factor says nothing of what is 0.
+            if spec.sd > 0.0 && spec.nominal != 0.0 {
+                let acts = |s: &usize| stages[*s].parameters.contains(&p);
+                all.push(Self {
+                    kind: Kind::Parameter(p),
+                    column: None,
+                    touches: (0..stages.len()).filter(acts).collect(),
+                    name: format!("{} in the rig file", spec.name),
+                    unit: "1".into(),
+                    range: FACTORS,
+                });
+            }
+        }
+        all.retain(|fault| !fault.touches.is_empty());
+        all
+    }
+
+    fn of_column(index: usize, column: &Column<'_>) -> Vec<Self> {
+        let mut touches: Vec<usize> =
+            column.output_of.iter().chain(&column.read_by).copied().collect();
+        touches.sort_unstable();
+        touches.dedup();
+        let reach = SPANS * span(&column.values);
+        let kinds = [
+            (Kind::Scale, "scale", "1", FACTORS),
+            (Kind::Offset, "offset", &*column.unit, (-reach, reach)),
+            (Kind::Delay, "delay", "s", (-DELAY_S, DELAY_S)),
+            (Kind::Sign, "sign", &*column.unit, (-reach, reach)),
+        ];
+        let offered = if column.is_command { 1 } else { kinds.len() };
+        let one = |(kind, what, unit, range): (Kind, &str, &str, (f64, f64))| Self {
+            kind,
+            column: Some(index),
+            touches: touches.clone(),
+            name: format!("{what} of {}", column.name),
+            unit: unit.into(),
+            range,
+        };
+        kinds.into_iter().take(offered).map(one).filter(|f| f.range.0 < f.range.1).collect()
+    }
+
+    /// As the engine fits it.
+    pub(crate) fn spec(&self) -> EffectSpec {
+        let strength = EffectParameterSpec {
+            // Upside down is never off.
+            off: (self.kind != Kind::Sign).then_some(0.0),
+            ..EffectParameterSpec::strength("size", &self.unit, self.range.0..=self.range.1)
+        };
+        let first = self.touches.first().copied().unwrap_or(0);
+        EffectSpec {
+            touches: self.touches.clone(),
+            ..EffectSpec::new(&self.name, (first, "record"), vec![strength])
+        }
+    }
+
+    pub(crate) fn clamped(&self, size: f64) -> f64 {
+        size.clamp(self.range.0, self.range.1)
+    }
+
+    /// What a size does to its column.
+    pub(crate) fn distortion(&self, size: f64) -> Distortion {
+        let none = Distortion::default();
+        match self.kind {
+            Kind::Scale => Distortion { scale: 1.0 + size, ..none },
+            Kind::Offset => Distortion { offset: size, ..none },
+            Kind::Delay => Distortion { delay_s: size, ..none },
+            Kind::Sign => Distortion { scale: -1.0, offset: size, ..none },
+            Kind::Parameter(_) => none,
+        }
+    }
+}
+
+/// Greatest less least.
+pub(crate) fn span(values: &[f64]) -> f64 {
+    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+    (values.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low).max(0.0)
+}

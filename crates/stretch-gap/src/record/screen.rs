@@ -1,0 +1,292 @@
+//! A cheap look at every error: how much of the gap it could explain, and how large it would be.
+//!
+//! What an error does to an output is known in closed form, so its size is regressed on the output as shipped without a simulation:
+//!
+//! ```text
+//! scale s = <m, y>/<y, y>,   offset o = mean(m - y),   upside down c = mean(m + y),   delay d = argmin |m(t) - y(t - d)|^2
+//! ```
+//!
+//! for the measured m and the simulated y. A parameter's size is one step of Gauss and Newton with its own tolerance taken away. Then
+//! one or two simulations a stage say what is left, from either end: from the rig as shipped, after one step of all parameters within
+//! their tolerances, for a large error bends what was re-tuned; and from the re-tuned rig, for a small one does not.
+
+use crate::{
+    error::GapError,
+    frame::Role,
+    linear::dot,
+    metric::Column as Weighted,
+    problem::Problem,
+    record::{
+        fault::{DELAY_S, Fault, Kind},
+        suspect::Suspect,
+    },
+    screen::Ground,
+    simulator::Model,
+};
+
+/// Delays looked at: coarsest step, in samples.
+const STEP: usize = 2;
+/// Scales of the commands that are looked at.
+const COMMANDS: [f64; 4] = [-0.5, -0.2, 0.25, 1.0];
+/// Factors at which a parameter is looked at beside the step of Gauss and Newton, as deviations from 1: smaller, larger.
+const FACTORS: [[f64; 2]; 2] = [[-0.4, -0.8], [0.5, 4.0]];
+/// Share of a tolerance within which a parameter stands at its end.
+pub(crate) const END: f64 = 0.99;
+/// Tolerances within which no parameter is wrong.
+pub(crate) const REACH: f64 = 3.0;
+
+/// An error that could explain something.
+#[derive(Debug, Clone)]
+pub(crate) struct Promising {
+    pub(crate) fault: usize,
+    /// Where a fit may start from.
+    pub(crate) start: Model,
+    /// The same from the rig as shipped, where a large error did not bend what was re-tuned.
+    pub(crate) plain: Option<Model>,
+    /// Fall of the sum of squares, in floors.
+    pub(crate) fall: f64,
+    /// Share of the excess of the stages that it touches.
+    pub(crate) share: f64,
+}
+
+/// What every error is held against.
+pub(crate) struct Bench<'a, 'p, 's> {
+    problem: &'a Problem<'p>,
+    suspect: &'a Suspect<'s>,
+    /// Around the re-tuned nominal.
+    ground: &'a Ground,
+    /// Around the rig as shipped.
+    shipped: Ground,
+    /// By stage, over the trials to fit: output as shipped.
+    outputs: Vec<Vec<f64>>,
+    /// By stage: what the re-tuned nominal leaves.
+    left: Vec<f64>,
+}
+
+impl<'a, 'p, 's> Bench<'a, 'p, 's> {
+    pub(crate) fn new(
+        problem: &'a Problem<'p>,
+        suspect: &'a Suspect<'s>,
+        ground: &'a Ground,
+    ) -> Result<Self, GapError> {
+        let compare = &problem.compare;
+        let stages = 0..compare.metrics.len();
+        let trials = compare.frame.fit_trials;
+        let outputs = stages.clone().map(|s| compare.runs.output(s, &problem.shipped, trials));
+        let outputs = outputs.collect::<Result<_, _>>()?;
+        let shipped = Ground::around(compare, problem.shipped.clone())?;
+        let mut bench = Self { problem, suspect, ground, shipped, outputs, left: Vec::new() };
+        bench.left = stages.map(|s| bench.squares(s, ground, &ground.residuals[s])).collect();
+        Ok(bench)
+    }
+
+    /// Best size of one error, and what it promises; none where it promises nothing.
+    pub(crate) fn look(&self, fault: usize) -> Result<Option<Promising>, GapError> {
+        let one = &self.suspect.faults()[fault];
+        let mut best: Option<Promising> = None;
+        let mut plain: Option<(Model, f64)> = None;
+        for size in self.sizes(one) {
+            let size = one.clamped(size);
+            let ends = [self.beside_shipped(fault, size), self.beside_retuned(fault, size)];
+            for (end, found) in ends.into_iter().enumerate() {
+                let found = match found {
+                    Err(GapError::Stopped) => return Err(GapError::Stopped),
+                    // A rig that cannot be is no hypothesis.
+                    Err(_) => continue,
+                    Ok(found) => found,
+                };
+                if end == 0 && plain.as_ref().is_none_or(|(_, fall)| found.fall > *fall) {
+                    plain = Some((self.with(&self.problem.shipped, fault, size), found.fall));
+                }
+                if best.as_ref().is_none_or(|b| found.fall > b.fall) {
+                    best = Some(found);
+                }
+            }
+        }
+        Ok(best.map(|best| Promising { plain: plain.map(|(model, _)| model), ..best }))
+    }
+
+    fn promising(&self, fault: usize, start: Model, fall: f64) -> Promising {
+        let noise = self.problem.compare.frame.count(Role::Fit) as f64;
+        let touches = &self.suspect.faults()[fault].touches;
+        let before: f64 = touches.iter().map(|&s| (self.left[s] - noise).max(0.0)).sum();
+        Promising { fault, start, plain: None, fall, share: fall / before.max(1.0) }
+    }
+
+    fn with(&self, base: &Model, fault: usize, size: f64) -> Model {
+        let mut model = base.clone();
+        model.effects.push((self.suspect.index(fault), vec![size]));
+        model
+    }
+
+    /// From the rig as shipped: the error, one step of the parameters, and what is left then.
+    fn beside_shipped(&self, fault: usize, size: f64) -> Result<Promising, GapError> {
+        let mut model = self.with(&self.problem.shipped, fault, size);
+        let touches = &self.suspect.faults()[fault].touches;
+        for &stage in touches {
+            let residual = self.residual(stage, &model)?;
+            let known = self.shipped.known[stage].as_deref().unwrap_or(&[]);
+            let mut step = self.told(stage, &self.shipped, &residual);
+            self.shipped.solved[stage].0.backward(&mut step);
+            for ((p, _), step) in known.iter().zip(step) {
+                let spec = &self.problem.simulator().parameters()[*p];
+                let to = spec.nominal + spec.sd * step.clamp(-REACH, REACH);
+                model.parameters[*p] = to.max(spec.least);
+            }
+        }
+        let mut fall = 0.0;
+        for &stage in touches {
+            let residual = self.residual(stage, &model)?;
+            fall += self.left[stage] - self.squares(stage, &self.shipped, &residual);
+        }
+        Ok(self.promising(fault, model, fall))
+    }
+
+    /// From the re-tuned rig: the change that the error makes, as much of it as helps.
+    fn beside_retuned(&self, fault: usize, size: f64) -> Result<Promising, GapError> {
+        let base = &self.problem.nominal.model;
+        let one = &self.suspect.faults()[fault];
+        let size = match one.kind {
+            // A factor of what was re-tuned.
+            Kind::Parameter(p) => {
+                let nominal = self.problem.simulator().parameters()[p].nominal;
+                (1.0 + size) * nominal / base.parameters[p] - 1.0
+            }
+            _ => size,
+        };
+        let model = self.with(base, fault, size);
+        let (mut own, mut mixed) = (0.0, 0.0);
+        for &stage in &one.touches {
+            let there = self.problem.compare.residual_values(stage, &model)?;
+            let here = &self.ground.residuals[stage].values;
+            let change = here.iter().zip(&there).map(|(a, b)| a - b).collect();
+            let change =
+                self.problem.compare.metrics[stage].column(&self.problem.compare.frame, change);
+            let told = self.told(stage, self.ground, &change);
+            let product = |x: &Weighted| self.problem.compare.product(stage, &change, x);
+            let of_residual = self.told(stage, self.ground, &self.ground.residuals[stage]);
+            own += product(&change) - dot(&told, &told);
+            mixed += product(&self.ground.residuals[stage]) - dot(&told, &of_residual);
+        }
+        let most = if one.kind == Kind::Sign { 1.0 } else { f64::INFINITY };
+        let least = if one.kind == Kind::Sign { 1.0 } else { 0.0 };
+        let share = (mixed / own.max(f64::MIN_POSITIVE)).clamp(least, most);
+        let start = self.with(base, fault, one.clamped(share.min(2.0) * size));
+        Ok(self.promising(fault, start, share * (2.0 * mixed - share * own)))
+    }
+
+    fn residual(&self, stage: usize, model: &Model) -> Result<Weighted, GapError> {
+        self.problem.compare.residual(stage, model)
+    }
+
+    /// L^-1 A'V^-1 x: what the sensitivities around a ground have to do with a column.
+    fn told(&self, stage: usize, ground: &Ground, x: &Weighted) -> Vec<f64> {
+        let known = ground.known[stage].as_deref().unwrap_or(&[]);
+        let mut told: Vec<f64> =
+            known.iter().map(|(_, k)| self.problem.compare.product(stage, k, x)).collect();
+        ground.solved[stage].0.forward(&mut told);
+        told
+    }
+
+    /// Squares of a residual over the fitted samples, what re-tuning can do projected out.
+    fn squares(&self, stage: usize, ground: &Ground, residual: &Weighted) -> f64 {
+        let told = self.told(stage, ground, residual);
+        self.problem.compare.product(stage, residual, residual) - dot(&told, &told)
+    }
+
+    /// Sizes worth a simulation.
+    fn sizes(&self, fault: &Fault) -> Vec<f64> {
+        let column = fault.column.map(|c| &self.suspect.columns()[c]);
+        match (fault.kind, column) {
+            (Kind::Parameter(p), _) => self.factors(fault, p),
+            (_, Some(column)) => match column.output_of {
+                Some(stage) => self.regressed(fault.kind, stage).into_iter().collect(),
+                None => COMMANDS.into(),
+            },
+            _ => Vec::new(),
+        }
+    }
+
+    fn regressed(&self, kind: Kind, stage: usize) -> Option<f64> {
+        let measured = self.problem.simulator().measured(stage);
+        let simulated = &self.outputs[stage];
+        let frame = &self.problem.compare.frame;
+        let fitted = || frame.of_role(Role::Fit).flat_map(|s| s.from..s.to);
+        let count = frame.count(Role::Fit) as f64;
+        let mean = |of: &dyn Fn(usize) -> f64| fitted().map(of).sum::<f64>() / count;
+        match kind {
+            Kind::Scale => {
+                let power = mean(&|i| simulated[i] * simulated[i]);
+                Some(mean(&|i| measured[i] * simulated[i]) / power.max(f64::MIN_POSITIVE) - 1.0)
+            }
+            Kind::Offset => Some(mean(&|i| measured[i] - simulated[i])),
+            Kind::Sign => Some(mean(&|i| measured[i] + simulated[i])),
+            Kind::Delay => self.delay(measured, simulated),
+            Kind::Parameter(_) => None,
+        }
+    }
+
+    /// Delay at which the simulated output lies nearest to the measured one, an offset and a scale of it left free.
+    fn delay(&self, measured: &[f64], simulated: &[f64]) -> Option<f64> {
+        let (frame, dt_s) = (&self.problem.compare.frame, self.problem.simulator().dt_s());
+        let reach = (DELAY_S / dt_s) as i64;
+        let likeness = |shift: i64| {
+            let pairs = frame.of_role(Role::Fit).flat_map(|s| {
+                let (from, last) = (s.from as i64, s.to as i64 - 1);
+                (from..=last).step_by(STEP).map(move |i| {
+                    (measured[i as usize], simulated[(i - shift).clamp(from, last) as usize])
+                })
+            });
+            let (mut n, mut x, mut y, mut xx, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
+            for (m, s) in pairs {
+                n += 1.0;
+                x += s;
+                y += m;
+                xx += s * s;
+                xy += s * m;
+            }
+            let (power, mixed) = (xx - x * x / n, xy - x * y / n);
+            mixed * mixed.abs() / power.max(f64::MIN_POSITIVE)
+        };
+        let best = (-reach..=reach).max_by(|a, b| likeness(*a).total_cmp(&likeness(*b)))?;
+        (best != 0).then_some(best as f64 * dt_s)
+    }
+
+    /// Factors of a parameter, as deviations from 1, that are looked at: none unless re-tuning took it to an end of its tolerance or
+    /// would, without it, take it beyond. Far off, a line says which way and not how far.
+    fn factors(&self, fault: &Fault, parameter: usize) -> Vec<f64> {
+        let spec = &self.problem.simulator().parameters()[parameter];
+        let far = |value: f64, reach: f64| (value - spec.nominal).abs() > reach * spec.sd;
+        let retuned = self.problem.nominal.model.parameters[parameter];
+        let free = self.free(fault, parameter).filter(|value| far(*value, REACH));
+        let Some(value) = free.or(far(retuned, END * REACH).then_some(retuned)) else {
+            return Vec::new();
+        };
+        let factor = value / spec.nominal - 1.0;
+        let [smaller, larger] = FACTORS;
+        let rest = if factor < 0.0 { smaller } else { larger };
+        std::iter::once(factor.clamp(smaller[1], larger[1])).chain(rest).collect()
+    }
+
+    /// Value of a parameter by one step of Gauss and Newton without its tolerance.
+    fn free(&self, fault: &Fault, parameter: usize) -> Option<f64> {
+        let compare = &self.problem.compare;
+        let spec = &self.problem.simulator().parameters()[parameter];
+        let (mut own, mut mixed) = (0.0, 0.0);
+        for &stage in &fault.touches {
+            let known = self.ground.known[stage].as_ref()?;
+            let column = &known.iter().find(|(p, _)| *p == parameter)?.1;
+            let others = known.iter().filter(|(p, _)| *p != parameter).cloned().collect();
+            let residual = &self.ground.residuals[stage];
+            let (factor, mut rest) = compare.solved(stage, &others, residual);
+            let mut of_column: Vec<f64> =
+                others.iter().map(|(_, k)| compare.product(stage, k, column)).collect();
+            factor.forward(&mut of_column);
+            rest.truncate(of_column.len());
+            own += compare.product(stage, column, column) - dot(&of_column, &of_column);
+            mixed += compare.product(stage, column, residual) - dot(&of_column, &rest);
+        }
+        let retuned = self.problem.nominal.model.parameters[parameter];
+        (own > 0.0).then(|| retuned + spec.sd * mixed / own)
+    }
+}

@@ -73,6 +73,13 @@ impl Traces {
         let apart = simulator.measured(stage).iter().zip(&output).zip(&metric.floor.sd);
         let mut residual: Vec<f64> = apart.map(|((m, s), sd)| (m - s) / sd).collect();
         metric.clean(&compare.frame, &mut residual);
+        let lines = simulator.lines(stage, model);
+        for tested in compare.frame.of_role(Role::Test).map(|s| s.from..s.to) {
+            let floor = &metric.floor.sd[tested.clone()];
+            lines.iter().for_each(|line| {
+                line.level(&mut residual[tested.clone()], floor, simulator.dt_s());
+            });
+        }
         let blocks = test_blocks(&compare.frame, &residual);
         Ok(Self { output, residual, blocks })
     }

@@ -3,6 +3,7 @@
 use crate::{
     description::Description,
     error::GapError,
+    line::Line,
     spec::{EffectSpec, ParameterSpec, StageSpec, TrialSpec},
 };
 
@@ -100,6 +101,11 @@ pub trait Simulator: Sync {
     /// # Errors
     /// When the simulation is not possible with these values: the fit then turns back.
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError>;
+    /// Lines of unknown phase that a model leaves in the output of a stage where it is not fitted; see [`Line`].
+    fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
+        let _ = (stage, model);
+        Vec::new()
+    }
     /// The motion by which the gap is cut into regimes, levels and rates: the first stage's output unless said
     /// otherwise.
     fn motion(&self) -> Motion<'_> {

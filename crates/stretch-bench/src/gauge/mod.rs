@@ -7,21 +7,21 @@ mod source;
 
 use stretch_data::{SessionTrial, unit};
 use stretch_gap::{
-    Description, DescriptionSpec, Dice, GapError, Model, Motion, ParameterSpec, Run, Simulator,
+    Description, DescriptionSpec, Dice, GapError, Line, Model, Motion, ParameterSpec, Run, Simulator,
     StageSpec, TrialSpec,
 };
 use stretch_sim::{
-    Alone, Catalogue, Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Measured, Start, Tolerance,
+    Alone, Catalogue, Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Start, Tolerance,
 };
 
 use lag::lag;
 use record::Record;
 
 use crate::{
-    acting::Acting,
+    acting::{Acting, FitRecord, lines},
     error::BenchError,
     rig::smooth::{Smoothed, unscheduled},
-    specs::{Place, spec as spec_of},
+    specs::{Place, shown, spec as spec_of},
 };
 
 /// Where the parameters stand.
@@ -96,6 +96,9 @@ pub struct GaugeSimulator {
     noise: f64,
     /// Range of the signal.
     spread: f64,
+    /// The signal that effects may be found in.
+    found_in: FitRecord,
+    notes: Vec<String>,
 }
 
 impl GaugeSimulator {
@@ -116,14 +119,16 @@ impl GaugeSimulator {
         let alone = alone(&record);
         let has_pressure = nominal.spec.pressure_scale.is_some();
         let is_missing = |e: &&Effect| nominal.effects.find(e.name).is_none();
-        let rows: Vec<_> =
-            catalogue.iter().filter(|e| Gauge::accepts(e, has_pressure) && is_missing(e)).collect();
         let place = |effect: &Effect| Place {
             touches: vec![0],
             search: Gauge::search(effect, &alone),
             unit: Gauge::unit,
         };
-        let effects = rows.iter().map(|effect| spec_of(effect, place(effect))).collect();
+        let missing = catalogue.iter().filter(|e| Gauge::accepts(e, has_pressure) && is_missing(e));
+        let mut notes = record.notes.clone();
+        let (rows, places) = shown(missing.map(|e| (e, place(e))), record.dt_s, &mut notes);
+        let effects =
+            rows.iter().zip(places).map(|(effect, place)| spec_of(effect, place)).collect();
         let stage = StageSpec::new("sensing", signal, unit_of(signal), &[OFFSET, GAIN, WINDING]);
         let parameters = parameters(&nominal, signal, rig.is_some());
         let (trials, dt_s) = (record.trials.clone(), record.dt_s);
@@ -142,6 +147,8 @@ impl GaugeSimulator {
             reference_sd,
             noise,
             spread: greatest - least,
+            found_in: FitRecord::of(&record.trials, &record.signal, dt_s),
+            notes,
             record,
             spec: nominal.spec,
         })
@@ -149,7 +156,7 @@ impl GaugeSimulator {
 
     /// What was noticed while it was read.
     pub fn notes(&self) -> &[String] {
-        &self.record.notes
+        &self.notes
     }
 
     fn nominal(&self, model: &Model) -> GaugeSpec {
@@ -176,12 +183,7 @@ impl GaugeSimulator {
             };
             let pressure = self.record.pressure.get(from..to).unwrap_or(&[]);
             gauge.run(&mut memory, start, trial.start_s, &input, pressure, &mut out[from..to])?;
-            let record = Measured {
-                samples: &self.record.signal[from..to],
-                noise: self.noise,
-                unit: self.spread,
-                dt_s: self.dt_s(),
-            };
+            let record = self.found_in.of_trial(i, self.noise, self.spread);
             acting.follow(record, &mut out[from..to]);
             let next = self.record.trials.get(i + 1).map_or(f64::INFINITY, |t| t.start_s);
             let rest_s = (next - trial.start_s - trial.samples as f64 * self.dt_s()).max(0.0);
@@ -202,6 +204,10 @@ impl Simulator for GaugeSimulator {
 
     fn measured(&self, _stage: usize) -> &[f64] {
         &self.record.signal
+    }
+
+    fn lines(&self, _stage: usize, model: &Model) -> Vec<Line> {
+        lines(&self.effects, &self.rows, model, self.spread)
     }
 
     fn motion(&self) -> Motion<'_> {

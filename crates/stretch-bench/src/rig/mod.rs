@@ -20,9 +20,10 @@ use session::Inputs;
 pub use session::{RigTrial, Session};
 
 use crate::{
+    acting::FitRecord,
     error::BenchError,
     rig_file,
-    specs::{Place, spec},
+    specs::{Place, shown, spec},
 };
 
 /// What a [`RigSimulator`] is made of.
@@ -50,6 +51,9 @@ pub struct RigSimulator {
     keys: Vec<Option<Key>>,
     rows: Vec<&'static Effect>,
     measured: Vec<Vec<f64>>,
+    /// The bridge voltage that effects may be found in.
+    bridge: FitRecord,
+    notes: Vec<String>,
 }
 
 impl RigSimulator {
@@ -86,16 +90,19 @@ impl RigSimulator {
         let (parameters, keys) = parameters(&rig, &stage_kinds);
         let stages = stages(&stage_kinds, &keys, sds);
         let extent = extent_of(base, &inputs, &session);
-        let rows: Vec<_> = catalogue.iter().filter(|e| effects.find(e.name).is_none()).collect();
+        let dt_s = session.dt_s();
         let place = |effect: &Effect| Place {
             touches: touched(&stage_kinds, effect.stage),
             search: Search::of(effect, &extent),
             unit: |_| 1.0,
         };
-        let missing = rows.iter().map(|effect| spec(effect, place(effect))).collect();
-        let trials = session.trials.iter().map(trial_spec).collect();
-        let measured = stage_kinds.iter().map(|kind| measured(&session, *kind)).collect();
-        let dt_s = session.dt_s();
+        let missing = catalogue.iter().filter(|e| effects.find(e.name).is_none());
+        let mut notes = session.notes.clone();
+        let (rows, places) = shown(missing.map(|e| (e, place(e))), dt_s, &mut notes);
+        let missing = rows.iter().zip(places).map(|(effect, place)| spec(effect, place)).collect();
+        let trials: Vec<_> = session.trials.iter().map(trial_spec).collect();
+        let measured: Vec<_> = stage_kinds.iter().map(|kind| measured(&session, *kind)).collect();
+        let bridge = FitRecord::of(&trials, measured.last().map_or(&[], Vec::as_slice), dt_s);
         Ok(Self {
             about: Description::new(DescriptionSpec {
                 stages,
@@ -112,12 +119,19 @@ impl RigSimulator {
             keys,
             rows,
             measured,
+            bridge,
+            notes,
         })
     }
 
     /// The session that it is bound to.
     pub fn session(&self) -> &Session {
         &self.session
+    }
+
+    /// What was noticed, in sentences for a report: of the session, and what it cannot show.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
     }
 
     /// Nominal parameters as shipped.

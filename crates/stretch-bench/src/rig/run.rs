@@ -2,7 +2,7 @@
 
 use stretch_gap::{Dice, Model, Run};
 use stretch_sim::{
-    Actuation, DEFAULT_STEP_S, EffectSet, Grid, Key, Measured, Memory, Muscle, Need, Openings,
+    Actuation, DEFAULT_STEP_S, EffectSet, Grid, Key, Memory, Muscle, Need, Openings,
     Pneumatics, Reference, RigParams, Sensing, Stage, Start,
 };
 
@@ -261,12 +261,7 @@ impl Setting<'_> {
             let start_s = self.rig.about.trials[trial].start_s;
             let (length, pressure) = (self.refined(length), self.refined(pressure));
             stage.run(&mut memory, self.start(trial), start_s, &length, &pressure, own)?;
-            let record = Measured {
-                samples: &self.rig.session.trials[trial].bridge_v,
-                noise: self.params[Key::SigmaV],
-                unit: 1.0,
-                dt_s: self.rig.about.dt_s,
-            };
+            let record = self.rig.bridge.of_trial(trial, self.params[Key::SigmaV], 1.0);
             acting.follow(record, own);
             Ok(())
         })

@@ -66,7 +66,7 @@ impl RigTrial {
 pub struct Session {
     pub(super) trials: Vec<RigTrial>,
     dt_s: f64,
-    notes: Vec<String>,
+    pub(super) notes: Vec<String>,
 }
 
 impl Session {

@@ -1,9 +1,10 @@
 //! What a diagnosis asks of the rig.
 
-use stretch_gap::{Description, GapError, Motion, Run, Simulator};
+use stretch_gap::{Description, GapError, Line, Model, Motion, Run, Simulator};
 use stretch_sim::{Key, Stage};
 
 use super::{RigSimulator, run};
+use crate::acting::lines;
 
 impl Simulator for RigSimulator {
     fn description(&self) -> &Description {
@@ -34,6 +35,13 @@ impl Simulator for RigSimulator {
 
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
         Ok(run::simulate(self, run, None, out)?)
+    }
+
+    fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
+        match self.stage_kinds[stage] {
+            Stage::Sensing => lines(&self.effects, &self.rows, model, 1.0),
+            _ => Vec::new(),
+        }
     }
 
     fn motion(&self) -> Motion<'_> {

@@ -2,98 +2,19 @@
 
 mod support;
 
+#[path = "support/session.rs"]
+mod simulated;
+
 use approx::{abs_diff_eq, assert_abs_diff_eq};
+use simulated::{effect, own_rig, session};
 use stretch_bench::{RigSetup, RigSimulator, Session};
-use stretch_data::{Channel, RigFile, SessionTrial, Split, Trial, TrialKind};
+use stretch_data::{RigFile, SessionTrial, Split};
 use stretch_gap::{Diagnosis, Options, Simulator, VerdictKind, diagnose};
 use stretch_sim::{
-    Catalogue, Chain, DEFAULT_STEP_S, EffectSet, Key, Openings, Recorded, Rig, RigParams, SimError,
-    Start, default_rig_text,
+    Catalogue, DEFAULT_STEP_S, EffectSet, Key, Rig, RigParams, SimError, default_rig_text,
 };
-use support::{Noise, PROBABILITY, with_lost_rows};
+use support::{PROBABILITY, with_lost_rows};
 use testkit::tolerance::{FLOW_FOUND, GAP_NULL, LAG_FOUND, POLE_FOUND_S, TRAINED_AGAIN};
-
-const DT_S: f64 = 0.01;
-
-fn openings(trial: usize, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
-    let (mut inlet, mut outlet) = (vec![0.0; 50], vec![0.0; 50]);
-    if trial == 0 {
-        inlet.extend([0.25; 600]);
-        outlet.extend([0.0; 600]);
-        return (inlet, outlet);
-    }
-    while inlet.len() < 1800 {
-        let length = (20.0 + 100.0 * noise.unit()) as usize;
-        let opening = [0.125, 0.25, 0.5, 1.0][(4.0 * noise.unit()) as usize % 4];
-        let choice = noise.unit();
-        let (i, o) = match choice {
-            c if c < 0.42 => (opening, 0.0),
-            c if c < 0.84 => (0.0, opening),
-            _ => (0.0, 0.0),
-        };
-        inlet.extend(std::iter::repeat_n(i, length));
-        outlet.extend(std::iter::repeat_n(o, length));
-    }
-    inlet.truncate(1800);
-    outlet.truncate(1800);
-    (inlet, outlet)
-}
-
-/// A session of four trials, the last to test on.
-fn session(
-    params: &RigParams,
-    effects: &EffectSet,
-    pressure: bool,
-    seed: u64,
-) -> Vec<SessionTrial> {
-    let chain = Chain::new(params, effects, DT_S, DEFAULT_STEP_S).expect("a rig");
-    let mut memory = chain.memory();
-    let mut noise = Noise(seed);
-    let mut start_s = 0.0;
-    (0..4)
-        .map(|trial| {
-            let (inlet, outlet) = openings(trial, &mut noise);
-            let n = inlet.len();
-            let [mut p, mut l, mut v] = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
-            let recorded = Recorded { pressure_kpa: &mut p, length_mm: &mut l, bridge_v: &mut v };
-            let valves = Openings { inlet: &inlet, outlet: &outlet };
-            let start = Start::Carried { rest_s: 14.0 };
-            chain.run(&mut memory, start, start_s, valves, 0.1, recorded).expect("a trial");
-            p.iter_mut().for_each(|x| *x += 1.2 * noise.gauss());
-            l.iter_mut().for_each(|x| *x += 0.05 * noise.gauss());
-            v.iter_mut().for_each(|x| *x += 0.002 * noise.gauss());
-            let begun_s = start_s;
-            start_s += n as f64 * DT_S + 15.0;
-            let channel = |name: &str, values| Channel { name: name.into(), values };
-            let mut channels = vec![
-                channel("inlet", inlet),
-                channel("outlet", outlet),
-                channel("length_mm", l),
-                channel("bridge_v", v),
-            ];
-            if pressure {
-                channels.push(channel("pressure_kpa", p));
-            }
-            let time_s = (0..n).map(|i| DT_S * i as f64).collect();
-            SessionTrial {
-                trial: Trial { name: format!("trial_{trial}.csv"), time_s, channels },
-                kind: TrialKind::Arbitrary,
-                start_s: begun_s,
-                split: if trial == 3 { Split::Test } else { Split::Fit },
-            }
-        })
-        .collect()
-}
-
-/// A rig within its tolerances but not as shipped.
-fn own_rig() -> RigParams {
-    let mut params = RigParams::default();
-    params[Key::CIn] *= 1.2;
-    params[Key::KMax] *= 1.04;
-    params[Key::TauM] *= 1.3;
-    params[Key::VRef] += 0.015;
-    params
-}
 
 /// The stock rig beside trials.
 fn setup<'a>(trials: &[SessionTrial], catalogue: &'a Catalogue) -> RigSetup<'a> {
@@ -105,12 +26,6 @@ fn run(trials: Vec<SessionTrial>, without: &[&str], options: &Options) -> Diagno
     let catalogue = Catalogue::default().without(without).expect("known names");
     let simulator = RigSimulator::new(setup(&trials, &catalogue)).expect("a simulator");
     diagnose(&simulator, options, &|_| (), &|| false).expect("a diagnosis").0
-}
-
-fn effect(name: &str, values: &[(&str, f64)]) -> EffectSet {
-    let mut effects = EffectSet::new();
-    effects.insert(name, values).expect("an effect");
-    effects
 }
 
 fn shallow() -> Options {

@@ -18,6 +18,7 @@ use crate::{
     shares::{peeled, shares},
     simulator::Simulator,
     thresholds::Thresholds,
+    timing,
     transfer::transfer,
     words::{Answer, tell},
 };
@@ -73,7 +74,14 @@ fn run(
 ) -> Result<(Diagnosis, Evidence), GapError> {
     let (begun, seed, thresholds) = (Instant::now(), options.seed, &options.thresholds);
     // Prepared.
-    let problem = Problem::prepare(simulator, stop, seed, progress)?;
+    let between_rows = timing::between_rows(simulator);
+    let at_rows = Problem::prepare(simulator, stop, seed, progress)?;
+    let other = || match &between_rows {
+        Some(between) => Problem::prepare(between, stop, seed, progress),
+        None => Problem::prepare(simulator, stop, seed, progress),
+    };
+    let problem = timing::likelier(at_rows, other, (thresholds, options.depth), progress)?;
+    let simulator = problem.simulator();
     let runs = &problem.compare.runs;
     // Searched.
     let mut search = Search::new(&problem, thresholds, options.depth);

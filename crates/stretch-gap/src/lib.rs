@@ -36,6 +36,7 @@ mod shares;
 mod simulator;
 mod spec;
 mod thresholds;
+mod timing;
 mod transfer;
 mod words;
 mod worth;

@@ -36,6 +36,11 @@ impl Cholesky {
         self.0.solve_mut(&mut DVectorViewMut::from_slice(b, b.len()));
     }
 
+    /// ln det A.
+    pub(crate) fn ln_det(&self) -> f64 {
+        2.0 * self.0.l_dirty().diagonal().iter().map(|pivot| pivot.ln()).sum::<f64>()
+    }
+
     /// A^-1.
     pub(crate) fn inverse(&self) -> DMatrix<f64> {
         self.0.inverse()

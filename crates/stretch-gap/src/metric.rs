@@ -126,6 +126,18 @@ impl Metric {
         sum
     }
 
+    /// ln det V + 2 sum ln s over the segments in a role: the normaliser of the residual's density, floors s.
+    pub(crate) fn ln_det(&self, frame: &Frame, role: Role) -> f64 {
+        let pairs = frame.segments.iter().zip(&self.nuisances).filter(|(s, _)| s.role == role);
+        pairs
+            .map(|(segment, nuisance)| {
+                let floors = self.floor.sd[segment.from..segment.to].iter();
+                nuisance.as_ref().map_or(0.0, Nuisance::ln_det)
+                    + 2.0 * floors.map(|sd| sd.ln()).sum::<f64>()
+            })
+            .sum()
+    }
+
     /// Takes the most likely nuisances out of a residual in floors.
     pub(crate) fn clean(&self, frame: &Frame, values: &mut [f64]) {
         for (segment, nuisance) in frame.segments.iter().zip(&self.nuisances) {

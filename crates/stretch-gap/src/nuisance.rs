@@ -71,6 +71,13 @@ impl Nuisance {
         Self { offsets, wandering, factor }
     }
 
+    /// ln det V: what the nuisances' freedom costs. det V = det(C'C + P)/det P, and of an Ornstein-Uhlenbeck process at even knots
+    /// det P = (1 - rho^2)^(1 - knots).
+    pub(super) fn ln_det(&self) -> f64 {
+        let prior = |w: &Wandering| (w.knots as f64 - 1.0) * -(1.0 - w.kept * w.kept).ln();
+        self.factor.ln_det() - self.wandering.iter().map(prior).sum::<f64>()
+    }
+
     /// L^-1 C'x: what a product of columns loses to the nuisances.
     pub(super) fn tail(&self, x: &[f64]) -> Vec<f64> {
         let mut tail = project(&self.offsets, &self.wandering, x);
@@ -124,7 +131,7 @@ fn precision(offsets: &[Vec<f64>], wandering: &[Wandering], n: usize) -> DMatrix
     }
     let mut base = offsets.len();
     for wandering in wandering {
-        // A sample lies between two knots: C'C is tridiagonal there. Two wanders of one stage are taken as orthogonal.
+        // A sample lies between two knots: C'C is tridiagonal there.
         for (_, k, x, y) in wandering.each() {
             let k = base + k;
             a[(k, k)] += x * x;
@@ -147,14 +154,35 @@ fn precision(offsets: &[Vec<f64>], wandering: &[Wandering], n: usize) -> DMatrix
         }
         base += knots;
     }
+    cross(&mut a, offsets.len(), wandering);
     a
+}
+
+/// C'C between two wanders of one stage.
+fn cross(a: &mut DMatrix<f64>, mut base: usize, wandering: &[Wandering]) {
+    for (w, one) in wandering.iter().enumerate() {
+        let mut other_base = base + one.knots;
+        for other in &wandering[w + 1..] {
+            for ((_, k, x, y), (_, l, u, v)) in one.each().zip(other.each()) {
+                let (k, l) = (base + k, other_base + l);
+                for (i, j, product) in
+                    [(k, l, x * u), (k, l + 1, x * v), (k + 1, l, y * u), (k + 1, l + 1, y * v)]
+                {
+                    a[(i, j)] += product;
+                    a[(j, i)] += product;
+                }
+            }
+            other_base += other.knots;
+        }
+        base += one.knots;
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{dice::Dice, linear::dot};
-    use testkit::tolerance::FIT_WELL;
+    use testkit::tolerance::{FIT_ILL, FIT_WELL};
 
     const SAMPLES: usize = 60;
 
@@ -182,6 +210,24 @@ mod tests {
         );
     }
 
+    /// Two wanders of one stage may have the same shape: together they then have twice the variance, no less is left of a residual.
+    #[test]
+    fn two_wanders_share_what_they_explain() {
+        let clock: Vec<u32> = (0..SAMPLES as u32).collect();
+        let one = |size: f64| {
+            let wander = Wander { sd: 1.0, correlation_s: 0.3, knot_s: 0.1 };
+            Wandering::new(vec![size; SAMPLES], &clock, wander, 0.01)
+        };
+        let both = Nuisance::new(Vec::new(), vec![one(2.0), one(2.0)]);
+        let single = Nuisance::new(Vec::new(), vec![one(2.0 * 2.0_f64.sqrt())]);
+        let mut dice = Dice::new(5, 0);
+        let x: Vec<f64> = (0..SAMPLES).map(|_| dice.gauss()).collect();
+        let lost = |nuisance: &Nuisance| dot(&nuisance.tail(&x), &nuisance.tail(&x));
+        // Products of a hundred numbers of the order of one, and a factor.
+        approx::assert_relative_eq!(lost(&both), lost(&single), max_relative = FIT_ILL);
+        approx::assert_relative_eq!(both.ln_det(), single.ln_det(), max_relative = FIT_ILL);
+    }
+
     /// An offset alone against the closed form: V = I + cc', so 1'V^-1 1 = n - (n/2)^2/(1 + n/4) at c = 1/2.
     #[test]
     fn an_offset_is_taken_out_as_far_as_its_prior_says() {
@@ -191,5 +237,7 @@ mod tests {
         let expected = n - (0.5 * n).powi(2) / (1.0 + 0.25 * n);
         // A difference of numbers as large as n.
         approx::assert_abs_diff_eq!(n - dot(&tail, &tail), expected, epsilon = FIT_WELL * n);
+        let ln_det = (1.0 + 0.25 * n).ln();
+        approx::assert_abs_diff_eq!(nuisance.ln_det(), ln_det, epsilon = FIT_WELL * n);
     }
 }

@@ -101,6 +101,13 @@ pub trait Simulator: Sync {
     /// # Errors
     /// When the simulation is not possible with these values: the fit then turns back.
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError>;
+    /// Parameters that are exact while commands switch at rows of the record, and what they are where commands switch anywhere
+    /// between two rows; the diagnosis weighs both. None where commands are not held from row to row.
+    ///
+    /// Their [wander](ParameterSpec::wander) is that of the instants from switch to switch.
+    fn command_timing(&self) -> Vec<(usize, ParameterSpec)> {
+        Vec::new()
+    }
     /// Lines of unknown phase that a model leaves in the output of a stage where it is not fitted; see [`Line`].
     fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
         let _ = (stage, model);

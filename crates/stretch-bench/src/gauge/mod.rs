@@ -7,8 +7,8 @@ mod source;
 
 use stretch_data::{SessionTrial, unit};
 use stretch_gap::{
-    Description, DescriptionSpec, Dice, GapError, Line, Model, Motion, ParameterSpec, Run, Simulator,
-    StageSpec, TrialSpec,
+    Description, DescriptionSpec, Dice, GapError, Line, Model, Motion, ParameterSpec, Run,
+    Simulator, StageSpec, TrialSpec,
 };
 use stretch_sim::{
     Alone, Catalogue, Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Start, Tolerance,

@@ -7,6 +7,7 @@ mod run;
 mod session;
 mod simulator;
 pub(crate) mod smooth;
+mod timing;
 
 use std::path::Path;
 
@@ -15,7 +16,7 @@ use stretch_gap::{Description, DescriptionSpec, TrialSpec};
 use stretch_sim::{Catalogue, Effect, EffectSet, Key, Rig, RigParams, Search, Stage};
 
 use extent::extent_of;
-use nominal::{Sds, parameters, stages};
+use nominal::{Knob, Sds, parameters, stages};
 use session::Inputs;
 pub use session::{RigTrial, Session};
 
@@ -47,8 +48,8 @@ pub struct RigSimulator {
     inputs: Inputs,
     about: Description,
     stage_kinds: Vec<Stage>,
-    /// Key of each parameter; none for the pressure at a trial's start.
-    keys: Vec<Option<Key>>,
+    /// What each parameter turns.
+    knobs: Vec<Knob>,
     rows: Vec<&'static Effect>,
     measured: Vec<Vec<f64>>,
     /// The bridge voltage that effects may be found in.
@@ -87,8 +88,8 @@ impl RigSimulator {
             Some(_) => vec![Stage::Pneumatics, Stage::Muscle, Stage::Sensing],
             None => vec![Stage::Actuation, Stage::Sensing],
         };
-        let (parameters, keys) = parameters(&rig, &stage_kinds);
-        let stages = stages(&stage_kinds, &keys, sds);
+        let (parameters, knobs) = parameters(&rig, &stage_kinds);
+        let stages = stages(&stage_kinds, &knobs, sds);
         let extent = extent_of(base, &inputs, &session);
         let dt_s = session.dt_s();
         let place = |effect: &Effect| Place {
@@ -116,7 +117,7 @@ impl RigSimulator {
             session,
             inputs,
             stage_kinds,
-            keys,
+            knobs,
             rows,
             measured,
             bridge,

@@ -23,6 +23,11 @@ impl FitRecord {
         Self { parts: trials.iter().zip(Frame::not_tested(trials)).map(part).collect(), dt_s }
     }
 
+    /// All of it.
+    pub(crate) fn samples(&self) -> impl Iterator<Item = f64> {
+        self.parts.iter().flatten().copied()
+    }
+
     /// Of one trial; noise and unit as in [`Measured`].
     pub(crate) fn of_trial(&self, trial: usize, noise: f64, unit: f64) -> Measured<'_> {
         Measured { samples: &self.parts[trial], noise, unit, dt_s: self.dt_s }

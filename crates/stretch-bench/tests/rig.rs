@@ -2,10 +2,14 @@
 
 mod support;
 
+#[path = "support/rows.rs"]
+mod rows;
+
 #[path = "support/session.rs"]
 mod simulated;
 
 use approx::{abs_diff_eq, assert_abs_diff_eq};
+use rows::{PROBABILITY, with_lost_rows};
 use simulated::{effect, own_rig, session};
 use stretch_bench::{RigSetup, RigSimulator, Session};
 use stretch_data::{RigFile, SessionTrial, Split};
@@ -13,7 +17,6 @@ use stretch_gap::{Diagnosis, Options, Simulator, VerdictKind, diagnose};
 use stretch_sim::{
     Catalogue, DEFAULT_STEP_S, EffectSet, Key, Rig, RigParams, SimError, default_rig_text,
 };
-use support::{PROBABILITY, with_lost_rows};
 use testkit::tolerance::{FLOW_FOUND, GAP_NULL, LAG_FOUND, POLE_FOUND_S, TRAINED_AGAIN};
 
 /// The stock rig beside trials.

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use stretch_data::{EvenSession, EvenTrial, SessionTrial, unit};
-use stretch_gap::{TrialSpec, noise_variance};
+use stretch_gap::{Frame, TrialSpec, noise_variance};
 
 use crate::error::BenchError;
 
@@ -69,10 +69,10 @@ impl Record {
     /// Samples that may be looked at before the end.
     pub(super) fn fitted(&self) -> impl Iterator<Item = Range<usize>> {
         let mut begin = 0;
-        self.trials.iter().filter_map(move |t| {
-            let own = begin..begin + t.samples;
-            begin = own.end;
-            (!t.is_test).then_some(own)
+        self.trials.iter().zip(Frame::not_tested(&self.trials)).filter_map(move |(t, fit)| {
+            let own = begin..begin + fit;
+            begin += t.samples;
+            (fit > 0).then_some(own)
         })
     }
 

@@ -90,8 +90,11 @@ impl RigSimulator {
         };
         let (parameters, knobs) = parameters(&rig, &stage_kinds);
         let stages = stages(&stage_kinds, &knobs, sds);
-        let extent = extent_of(base, &inputs, &session);
         let dt_s = session.dt_s();
+        let trials: Vec<_> = session.trials.iter().map(trial_spec).collect();
+        let measured: Vec<_> = stage_kinds.iter().map(|kind| measured(&session, *kind)).collect();
+        let bridge = FitRecord::of(&trials, measured.last().map_or(&[], Vec::as_slice), dt_s);
+        let extent = extent_of(base, &inputs, &bridge);
         let place = |effect: &Effect| Place {
             touches: touched(&stage_kinds, effect.stage),
             search: Search::of(effect, &extent),
@@ -101,9 +104,6 @@ impl RigSimulator {
         let mut notes = session.notes.clone();
         let (rows, places) = shown(missing.map(|e| (e, place(e))), dt_s, &mut notes);
         let missing = rows.iter().zip(places).map(|(effect, place)| spec(effect, place)).collect();
-        let trials: Vec<_> = session.trials.iter().map(trial_spec).collect();
-        let measured: Vec<_> = stage_kinds.iter().map(|kind| measured(&session, *kind)).collect();
-        let bridge = FitRecord::of(&trials, measured.last().map_or(&[], Vec::as_slice), dt_s);
         Ok(Self {
             about: Description::new(DescriptionSpec {
                 stages,

@@ -23,6 +23,11 @@ pub(crate) fn text(diagnosis: &Diagnosis) -> String {
             put(&mut out, &format!("  {name}: {words}"));
         }
     }
+    let rows = diagnosis.rows_used;
+    if rows.used < rows.read {
+        let share = percent(rows.share());
+        put(&mut out, &format!("It stands on {} of {} rows ({share}).", rows.used, rows.read));
+    }
     stages(&mut out, diagnosis);
     slices(&mut out, diagnosis);
     candidates(&mut out, diagnosis);

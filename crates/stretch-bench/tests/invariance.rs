@@ -8,7 +8,7 @@ mod simulated;
 
 use simulated::{DT_S, effect, own_rig, session};
 use stretch_bench::{GaugeSetup, GaugeSimulator, RigSetup, RigSimulator, Session};
-use stretch_data::{SessionTrial, Split};
+use stretch_data::{Channel, SessionTrial, Split};
 use stretch_gap::{Diagnosis, Model, Options, Run, Simulator, VerdictKind, diagnose};
 use stretch_sim::{Catalogue, EffectSet, Key, Rig, RigParams};
 use support::Noise;
@@ -206,4 +206,43 @@ fn what_a_rate_cannot_show_is_not_looked_for() {
     assert!(rig.effects().iter().all(|e| e.name != "mains_hum"));
     assert!(rig.notes().iter().any(|n| n.starts_with("mains_hum is not looked for")));
     assert_eq!(rig.dt_s(), 2.0 * DT_S);
+}
+
+/// Slack and a saturated amplifier bend the same end of the voltage; at 0.7 of the excitation only one of them moves with it. The trial
+/// is read at its excitation: a rig without either has no gap there.
+#[test]
+fn a_trial_at_another_excitation_is_no_gap() {
+    let mut low = own_rig();
+    low[Key::VExc] *= 0.7;
+    let mut trials = session(&own_rig(), &EffectSet::new(), true, 8);
+    let mut dimmed = session(&low, &EffectSet::new(), true, 8).remove(2);
+    let share = vec![0.7; dimmed.trial.len()];
+    dimmed.trial.channels.push(Channel { name: "excitation_share".into(), values: share });
+    trials[2] = dimmed;
+    let diagnosis = diagnosed(&trials, Rig::default());
+    assert_eq!(diagnosis.verdict, VerdictKind::Parameters, "{}", diagnosis.sentence);
+    // Without the column the same records are a gap.
+    trials[2].trial.channels.pop();
+    let blind = diagnosed(&trials, Rig::default());
+    assert!(blind.gap.retuned > 1.0, "{}", blind.sentence);
+}
+
+/// Gaps that leave less than half of the rows carry no name, and the answer says on what it stands.
+#[test]
+fn few_rows_carry_no_name() {
+    let mut trials = session(&own_rig(), &effect("amplifier_lowpass", &[("tau", 0.08)]), true, 9);
+    for one in &mut trials {
+        // Six seconds in one piece, then pieces of half a second, too short, with gaps of five samples.
+        let keep = |i: usize| !(600..).contains(&i) || i % 55 < 50;
+        let thin = |values: &mut Vec<f64>| {
+            *values =
+                values.iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, x)| *x).collect();
+        };
+        thin(&mut one.trial.time_s);
+        one.trial.channels.iter_mut().for_each(|c| thin(&mut c.values));
+    }
+    let diagnosis = diagnosed(&trials, Rig::default());
+    assert!(diagnosis.rows_used.share() < 0.5, "{:?}", diagnosis.rows_used);
+    assert_eq!(diagnosis.verdict, VerdictKind::Unknown, "{}", diagnosis.sentence);
+    assert!(diagnosis.named.is_empty() && diagnosis.sentence.contains("of the rows"));
 }

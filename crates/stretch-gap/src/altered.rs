@@ -4,6 +4,7 @@
 //! effects are credited with.
 
 use crate::{
+    coverage::RowsUsed,
     description::Description,
     error::GapError,
     line::Line,
@@ -38,6 +39,10 @@ impl Simulator for Altered<'_> {
 
     fn wander_clock(&self, parameter: usize) -> Option<Vec<u32>> {
         self.simulator.wander_clock(parameter)
+    }
+
+    fn rows_used(&self) -> RowsUsed {
+        self.simulator.rows_used()
     }
 
     fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {

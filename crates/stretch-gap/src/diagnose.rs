@@ -5,6 +5,7 @@ use std::time::Instant;
 use crate::{
     baselines::baselines,
     candidates::{candidates, shifts, stage_gaps},
+    coverage::{carried, is_short, thin},
     diagnosis::{Candidate, Diagnosis, Unexplained, VerdictKind, Where},
     error::GapError,
     evidence::Evidence,
@@ -98,10 +99,15 @@ fn run(
     // Judged.
     let first = candidates.first();
     let case = Case { gap: evidence.gap, first, strongest: shares.first(), sanity: &sanity };
-    let verdict = judge(case, thresholds);
+    let rows_used = simulator.rows_used();
+    let thin = thin(&evidence.frame, rows_used, simulator.dt_s());
+    let verdict = carried(judge(case, thresholds), thin);
     let names = matches!(verdict.kind, VerdictKind::Effect | VerdictKind::Partial);
     let naming = match names {
-        true => Naming::of(&candidates, &shares, thresholds),
+        true => {
+            let is_short = is_short(&evidence.frame, simulator.dt_s());
+            Naming::of(&candidates, &shares, thresholds, is_short)
+        }
         false => Naming::default(),
     };
     let transfer = match names {
@@ -140,6 +146,7 @@ fn run(
         next_experiment: None,
         baselines: options.baselines.then(simpler).transpose()?,
         notes: told.notes,
+        rows_used,
         simulations,
         runtime_s,
         candidates,

@@ -6,6 +6,7 @@ mod bootstrap;
 mod candidates;
 mod compare;
 mod coordinate;
+mod coverage;
 mod description;
 mod diagnose;
 mod diagnosis;
@@ -41,6 +42,7 @@ mod transfer;
 mod words;
 mod worth;
 
+pub use coverage::RowsUsed;
 pub use description::{Description, DescriptionError, DescriptionSpec};
 pub use diagnose::{Options, diagnose};
 pub use diagnosis::{

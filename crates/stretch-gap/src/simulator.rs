@@ -1,6 +1,7 @@
 //! The one trait through which any simulator is diagnosed.
 
 use crate::{
+    coverage::RowsUsed,
     description::Description,
     error::GapError,
     line::Line,
@@ -101,6 +102,11 @@ pub trait Simulator: Sync {
     /// # Errors
     /// When the simulation is not possible with these values: the fit then turns back.
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError>;
+    /// Rows that the trials stand on, of those that were read; all, where it reads none.
+    fn rows_used(&self) -> RowsUsed {
+        let used = self.trials().iter().map(|t| t.samples).sum();
+        RowsUsed { used, read: used }
+    }
     /// Parameters that are exact while commands switch at rows of the record, and what they are where commands switch anywhere
     /// between two rows; the diagnosis weighs both. None where commands are not held from row to row.
     ///

@@ -7,8 +7,8 @@ mod source;
 
 use stretch_data::{SessionTrial, unit};
 use stretch_gap::{
-    Description, DescriptionSpec, Dice, GapError, Line, Model, Motion, ParameterSpec, Run,
-    Simulator, StageSpec, TrialSpec,
+    Description, DescriptionSpec, Dice, GapError, Line, Model, Motion, ParameterSpec, RowsUsed,
+    Run, Simulator, StageSpec, TrialSpec,
 };
 use stretch_sim::{
     Alone, Catalogue, Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Start, Tolerance,
@@ -204,6 +204,10 @@ impl Simulator for GaugeSimulator {
 
     fn measured(&self, _stage: usize) -> &[f64] {
         &self.record.signal
+    }
+
+    fn rows_used(&self) -> RowsUsed {
+        RowsUsed { used: self.record.rows.used(), read: self.record.rows.read }
     }
 
     fn lines(&self, _stage: usize, model: &Model) -> Vec<Line> {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use stretch_data::{EvenSession, EvenTrial, SessionTrial, unit};
+use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial, unit};
 use stretch_gap::{Frame, TrialSpec, noise_variance};
 
 use crate::error::BenchError;
@@ -23,6 +23,7 @@ pub(super) struct Record {
     /// Empty unless every trial has one.
     pub(super) pressure: Vec<f64>,
     pub(super) dt_s: f64,
+    pub(super) rows: Rows,
     pub(super) notes: Vec<String>,
 }
 
@@ -60,6 +61,7 @@ impl Record {
             signal: all(1),
             pressure: all(2),
             dt_s: session.dt_s(),
+            rows: session.rows(),
             notes: session.notes().to_vec(),
         };
         record.check(reference, signal)?;

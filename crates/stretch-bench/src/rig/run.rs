@@ -262,6 +262,7 @@ impl Setting<'_> {
                 &mut volts,
             )?;
         }
+        let dimmed = self.dimmed(count)?;
         let hidden = self.hidden(count)?;
         let mut from = 0;
         self.each(count, out, |trial, own| {
@@ -278,11 +279,24 @@ impl Setting<'_> {
             };
             let start_s = self.rig.about.trials[trial].start_s;
             let (length, pressure) = (self.refined(length), self.refined(pressure));
+            let stage = dimmed.get(trial).and_then(Option::as_ref).unwrap_or(&stage);
             stage.run(&mut memory, self.start(trial), start_s, &length, &pressure, own)?;
             let record = self.rig.bridge.of_trial(trial, self.params[Key::SigmaV], 1.0);
             acting.follow(record, own);
             Ok(())
         })
+    }
+
+    /// By trial: sensing where the bridge is excited otherwise than usual. The memory is that of the one gauge.
+    fn dimmed(&self, count: usize) -> Result<Vec<Option<Sensing>>, BenchError> {
+        let one = |excitation: f64| -> Result<Option<Sensing>, BenchError> {
+            let mut params = self.params;
+            params[Key::VExc] *= excitation;
+            let is_usual = excitation == 1.0;
+            let stage = || Sensing::new(&params, &self.effects, &self.grid);
+            Ok(if is_usual { None } else { Some(stage()?) })
+        };
+        self.rig.session.trials[..count].iter().map(|t| one(t.excitation)).collect()
     }
 
     /// What play in the reference hides of the length: the model of the motion says which flank it lies on, the record how

@@ -1,6 +1,8 @@
 //! What a diagnosis asks of the rig.
 
-use stretch_gap::{Description, GapError, Line, Model, Motion, ParameterSpec, Run, Simulator};
+use stretch_gap::{
+    Description, GapError, Line, Model, Motion, ParameterSpec, RowsUsed, Run, Simulator,
+};
 use stretch_sim::{Key, Stage};
 
 use super::{RigSimulator, nominal::Knob, run, timing};
@@ -41,6 +43,10 @@ impl Simulator for RigSimulator {
 
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
         Ok(run::simulate(self, run, None, out)?)
+    }
+
+    fn rows_used(&self) -> RowsUsed {
+        RowsUsed { used: self.session.rows.used(), read: self.session.rows.read }
     }
 
     fn command_timing(&self) -> Vec<(usize, ParameterSpec)> {

@@ -154,7 +154,7 @@ impl Bench {
             Self::Gauge(gauge) => examine(gauge, options, look_on, bar, gauge.notes(), &[]),
             Self::Rig(rig) => {
                 let rails = rails(rig.nominal(), rig.session());
-                examine(rig, options, look_on, bar, rig.session().notes(), &rails)
+                examine(rig, options, look_on, bar, rig.notes(), &rails)
             }
         }
     }

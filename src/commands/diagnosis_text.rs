@@ -29,6 +29,11 @@ pub(crate) fn text(diagnosis: &Diagnosis) -> String {
     for gross in &diagnosis.gross {
         put(&mut out, &format!("  {}; {}", gross.sentence, gross.hint));
     }
+    let rows = diagnosis.rows_used;
+    if rows.used < rows.read {
+        let share = percent(rows.share());
+        put(&mut out, &format!("It stands on {} of {} rows ({share}).", rows.used, rows.read));
+    }
     stages(&mut out, diagnosis);
     slices(&mut out, diagnosis);
     candidates(&mut out, diagnosis);

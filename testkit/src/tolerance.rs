@@ -148,7 +148,7 @@ pub const GAP_NULL: f64 = 0.1;
 /// Relative: errors of two calibrations trained on two noises of the same 18 s.
 pub const TRAINED_AGAIN: f64 = 0.1;
 
-/// Relative: a spread from the median of 20 000 second differences, each in three neighbours:
+/// Relative: a mean square of 20 000 samples, or a spread from the median of as many second differences, each in three neighbours:
 /// four standard errors.
 pub const MEDIAN_SPREAD: f64 = 0.04;
 

@@ -38,3 +38,24 @@ pub(crate) fn spec(effect: &Effect, place: Place) -> EffectSpec {
         twins: effect.twins.iter().map(|twin| (*twin).to_owned()).collect(),
     }
 }
+
+/// Effects that a record of this sample time can show, each with its place; of the others a note says why not.
+pub(crate) fn shown(
+    effects: impl Iterator<Item = (&'static Effect, Place)>,
+    dt_s: f64,
+    notes: &mut Vec<String>,
+) -> (Vec<&'static Effect>, Vec<Place>) {
+    let rate_hz = 1.0 / dt_s;
+    effects
+        .filter_map(|(effect, mut place)| {
+            let Some(needed) = place.search.at_rate(effect, rate_hz) else {
+                return Some((effect, place));
+            };
+            notes.push(format!(
+                "{} is not looked for: at {rate_hz:.4} samples a second it cannot be told from motion and drift; from {needed} on it can",
+                effect.name
+            ));
+            None
+        })
+        .unzip()
+}

@@ -2,12 +2,16 @@
 
 mod support;
 
+#[path = "support/rows.rs"]
+mod rows;
+
 use approx::{abs_diff_eq, assert_abs_diff_eq};
+use rows::{PROBABILITY, with_lost_rows};
 use stretch_bench::{BenchError, GaugeSetup, GaugeSimulator};
 use stretch_data::{Channel, RigFile, SessionTrial, Split, Trial, TrialKind};
 use stretch_gap::{Diagnosis, Options, Simulator, VerdictKind, diagnose, next_experiment};
 use stretch_sim::{Catalogue, GaugeRig};
-use support::{Noise, PROBABILITY, with_lost_rows};
+use support::Noise;
 use testkit::tolerance::{FIT_WELL, GAIN_FOUND, RESUMED_S, SKEW_FOUND_S};
 
 const DT_S: f64 = 0.01;

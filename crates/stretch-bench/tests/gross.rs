@@ -1,15 +1,17 @@
 //! Errors of the record and of the rig file: told as what they are, never given an effect's name.
 
+#[path = "support/rows.rs"]
+mod rows;
 #[path = "support/session.rs"]
 mod session;
 mod support;
 
+use rows::{PROBABILITY, with_lost_rows};
 use session::{DT_S, session};
 use stretch_bench::{GaugeSetup, GaugeSimulator, RigSetup, RigSimulator, Session};
 use stretch_data::{Channel, SessionTrial, Split, Trial, TrialKind};
 use stretch_gap::{Diagnosis, GrossKind, Options, Simulator, VerdictKind, diagnose};
 use stretch_sim::{Catalogue, EffectSet, GaugeRig, GaugeSpec, Key, Rig, RigParams, Tolerance};
-use support::{PROBABILITY, with_lost_rows};
 use testkit::tolerance::GAIN_FOUND;
 
 /// What is done to a record or a rig file.

@@ -1,27 +1,24 @@
 //! Small sessions simulated by the catalogue's own rig, diagnosed from end to end.
 
-#[path = "support/session.rs"]
-mod session;
 mod support;
 
+#[path = "support/rows.rs"]
+mod rows;
+
+#[path = "support/rigs.rs"]
+mod rigs;
+#[path = "support/session.rs"]
+mod simulated;
+
 use approx::{abs_diff_eq, assert_abs_diff_eq};
-use session::session;
+use rigs::{effect, own_rig};
+use rows::{PROBABILITY, with_lost_rows};
+use simulated::session;
 use stretch_bench::{RigSetup, RigSimulator, Session};
 use stretch_data::{RigFile, SessionTrial, Split};
 use stretch_gap::{Diagnosis, Options, Simulator, VerdictKind, diagnose};
-use stretch_sim::{Catalogue, EffectSet, Key, Rig, RigParams, SimError, default_rig_text};
-use support::{PROBABILITY, with_lost_rows};
+use stretch_sim::{Catalogue, EffectSet, Rig, RigParams, SimError, default_rig_text};
 use testkit::tolerance::{FLOW_FOUND, GAP_NULL, LAG_FOUND, POLE_FOUND_S, TRAINED_AGAIN};
-
-/// A rig within its tolerances but not as shipped.
-fn own_rig() -> RigParams {
-    let mut params = RigParams::default();
-    params[Key::CIn] *= 1.2;
-    params[Key::KMax] *= 1.04;
-    params[Key::TauM] *= 1.3;
-    params[Key::VRef] += 0.015;
-    params
-}
 
 /// The stock rig beside trials.
 fn setup<'a>(trials: &[SessionTrial], catalogue: &'a Catalogue) -> RigSetup<'a> {
@@ -33,12 +30,6 @@ fn run(trials: Vec<SessionTrial>, without: &[&str], options: &Options) -> Diagno
     let catalogue = Catalogue::default().without(without).expect("known names");
     let simulator = RigSimulator::new(setup(&trials, &catalogue)).expect("a simulator");
     diagnose(&simulator, options, &|_| (), &|| false).expect("a diagnosis").0
-}
-
-fn effect(name: &str, values: &[(&str, f64)]) -> EffectSet {
-    let mut effects = EffectSet::new();
-    effects.insert(name, values).expect("an effect");
-    effects
 }
 
 fn shallow() -> Options {

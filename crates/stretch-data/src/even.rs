@@ -40,6 +40,11 @@ pub struct Rows {
 }
 
 impl Rows {
+    /// Rows that are used.
+    pub fn used(&self) -> usize {
+        self.read - self.dropped
+    }
+
     /// Adds those of another trial.
     pub fn add(&mut self, other: Self) {
         self.read += other.read;

@@ -53,6 +53,7 @@ impl DataSet {
 #[derive(Debug, Clone, PartialEq)]
 pub struct EvenTrial {
     name: String,
+    source: usize,
     kind: TrialKind,
     start_s: f64,
     split: Split,
@@ -64,6 +65,11 @@ impl EvenTrial {
     /// What to call it; parts of a trial with gaps are numbered.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Which of the trials given it is, or is a part of.
+    pub fn source(&self) -> usize {
+        self.source
     }
 
     /// What was done in it.
@@ -152,6 +158,7 @@ impl EvenSession {
                     1 => one.trial.name.clone(),
                     _ => format!("{} (part {})", one.trial.name, i + 1),
                 },
+                source: trials.iter().position(|t| std::ptr::eq(t, one)).unwrap_or(0),
                 kind: one.kind,
                 start_s: start_s + part.begin_s,
                 split: one.split,

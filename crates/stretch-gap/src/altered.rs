@@ -4,9 +4,11 @@
 //! effects are credited with.
 
 use crate::{
+    coverage::RowsUsed,
     description::Description,
     error::GapError,
-    simulator::{Motion, Run, Simulator},
+    line::Line,
+    simulator::{Model, Motion, Run, Simulator},
     spec::ParameterSpec,
 };
 
@@ -39,8 +41,36 @@ impl Simulator for Altered<'_> {
         self.simulator.is_lost()
     }
 
+    fn wander_clock(&self, parameter: usize) -> Option<Vec<u32>> {
+        self.simulator.wander_clock(parameter)
+    }
+
+    fn rows_used(&self) -> RowsUsed {
+        self.simulator.rows_used()
+    }
+
+    fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
+        self.simulator.lines(stage, model)
+    }
+
     fn motion(&self) -> Motion<'_> {
         self.simulator.motion()
+    }
+
+    fn sensor(&self) -> Option<usize> {
+        self.simulator.sensor()
+    }
+
+    fn foreign_share(&self) -> f64 {
+        self.simulator.foreign_share()
+    }
+
+    fn input(&self, stage: usize) -> Option<Vec<f64>> {
+        self.simulator.input(stage)
+    }
+
+    fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {
+        self.simulator.simulate_on(run, input, out)
     }
 
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {

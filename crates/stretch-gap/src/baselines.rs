@@ -58,6 +58,7 @@ fn largest_drop(problem: &Problem<'_>, null_excess: f64) -> Result<Option<usize>
         sd: 0.0,
         wander: None,
         per_trial_sd: None,
+        per_tick_sd: None,
         ..p.clone()
     });
     let (runs, shipped) = (compare.runs.beside(&frozen), Model::nominal(&frozen));

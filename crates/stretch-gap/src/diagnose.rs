@@ -5,6 +5,7 @@ use std::time::Instant;
 use crate::{
     baselines::baselines,
     candidates::{candidates, shifts, stage_gaps},
+    coverage::{carried, is_short, thin},
     diagnosis::{Candidate, Diagnosis, Unexplained, VerdictKind, Where},
     error::GapError,
     evidence::Evidence,
@@ -21,6 +22,7 @@ use crate::{
     shares::{peeled, shares},
     simulator::Simulator,
     thresholds::Thresholds,
+    timing,
     transfer::transfer,
     words::{Answer, tell},
 };
@@ -79,7 +81,11 @@ fn run(
     let plain = plain(&simulator.columns(), simulator.trials(), simulator.dt_s());
     let depth = if plain.is_empty() { options.depth } else { 0 };
     // Prepared.
-    let problem = Problem::prepare(simulator, stop, seed, progress)?;
+    let at_rows = Problem::prepare(simulator, stop, seed, progress)?;
+    let between_rows = timing::between_rows(simulator);
+    let between_rows = between_rows.as_ref();
+    let problem = timing::likelier(at_rows, between_rows, (thresholds, depth), seed, progress)?;
+    let simulator = problem.simulator();
     // Searched, once more where the nuisances turn out to be others.
     let mut search = Search::new(&problem, thresholds, depth);
     let mut found = search.run(&problem.nominal, progress)?;
@@ -124,10 +130,15 @@ fn run(
         sanity: &sanity,
         is_record: !gross.is_empty(),
     };
-    let verdict = judge(case, thresholds);
+    let rows_used = simulator.rows_used();
+    let thin = thin(&evidence.frame, rows_used, simulator.dt_s());
+    let verdict = carried(judge(case, thresholds), thin);
     let names = matches!(verdict.kind, VerdictKind::Effect | VerdictKind::Partial);
     let naming = match names {
-        true => Naming::of(&candidates, &shares, thresholds),
+        true => {
+            let is_short = is_short(&evidence.frame, simulator.dt_s());
+            Naming::of(&candidates, &shares, thresholds, is_short)
+        }
         false => Naming::default(),
     };
     let transfer = match names {
@@ -186,6 +197,7 @@ fn run(
         next_experiment: None,
         baselines: options.baselines.then(simpler).transpose()?,
         notes: told.notes,
+        rows_used,
         simulations,
         runtime_s,
         candidates,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::missing::Proposed;
+use crate::{coverage::RowsUsed, missing::Proposed};
 
 /// The answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -349,6 +349,9 @@ pub struct Diagnosis {
     pub baselines: Option<Baselines>,
     /// What was noticed and assumed.
     pub notes: Vec<String>,
+    /// Rows that it stands on, of those that were read.
+    #[serde(default)]
+    pub rows_used: RowsUsed,
     /// Simulations of one stage that it took, simpler methods left out.
     #[serde(default)]
     pub simulations: usize,

@@ -75,6 +75,15 @@ impl Traces {
         let mut residual: Vec<f64> = apart.map(|((m, s), sd)| (m - s) / sd).collect();
         let whole = residual.clone();
         metric.clean(&compare.frame, &mut residual);
+        let mut whole = whole;
+        let lines = simulator.lines(stage, model);
+        for tested in compare.frame.of_role(Role::Test).map(|s| s.from..s.to) {
+            let floor = &metric.floor.sd[tested.clone()];
+            for line in &lines {
+                line.level(&mut residual[tested.clone()], floor, simulator.dt_s());
+                line.level(&mut whole[tested.clone()], floor, simulator.dt_s());
+            }
+        }
         let blocks = test_blocks(&compare.frame, &whole, &residual);
         Ok(Self { output, residual, blocks })
     }

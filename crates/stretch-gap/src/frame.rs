@@ -6,7 +6,7 @@
 
 use serde::Serialize;
 
-use crate::{error::GapError, simulator::Simulator};
+use crate::{error::GapError, simulator::Simulator, spec::TrialSpec};
 
 /// What a stretch of samples is used for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -55,7 +55,27 @@ pub struct Frame {
     pub borrowed_test: bool,
 }
 
+/// Samples from a trial's start that are not tested on.
+fn may_fit(trial: &TrialSpec, borrowed_test: bool) -> usize {
+    let share = if borrowed_test { TESTED } else { 0.0 };
+    if trial.is_test { 0 } else { trial.samples - (share * trial.samples as f64) as usize }
+}
+
 impl Frame {
+    /// By trial: samples from its start that are not tested on, which is all that a simulator may look at before the end.
+    ///
+    /// ```
+    /// use stretch_gap::{Frame, TrialSpec};
+    /// let fit = TrialSpec::new("a", 400, 0.0, false);
+    /// let test = TrialSpec::new("b", 400, 10.0, true);
+    /// assert_eq!(Frame::not_tested(&[fit.clone(), test]), [400, 0]);
+    /// assert_eq!(Frame::not_tested(&[fit]), [300]); // without a test trial the last quarter is held back
+    /// ```
+    pub fn not_tested(trials: &[TrialSpec]) -> Vec<usize> {
+        let borrowed_test = trials.iter().all(|t| !t.is_test);
+        trials.iter().map(|t| may_fit(t, borrowed_test)).collect()
+    }
+
     /// Cuts a session.
     ///
     /// # Errors
@@ -73,11 +93,10 @@ impl Frame {
                     segments.push(Segment { trial, from, to, role });
                 }
             };
+            let test = begin + may_fit(spec, borrowed_test);
             if spec.is_test {
                 add(begin, end, Role::Test);
             } else {
-                let share = if borrowed_test { TESTED } else { 0.0 };
-                let test = end - (share * spec.samples as f64) as usize;
                 let is_long = (test - begin) as f64 * dt_s >= LONG_S;
                 let held = if is_long { HELD * (test - begin) as f64 } else { 0.0 };
                 let fit = test - held as usize;

@@ -80,6 +80,7 @@ impl Metric {
 
 fn hypotheses(loose: &Loose) -> impl Iterator<Item = Level> {
     let times_s: Vec<f64> = match loose.wander {
+        _ if loose.is_by_tick => Vec::new(),
         Some(_) => TIMES_S.into(),
         None => vec![loose.level.time_s],
     };

@@ -15,6 +15,7 @@
 //! share of the gap in a rig that has the named effect. A set that closes its part by halves stands in for something else. The first two overrule what the others say; that is kept as `seen`.
 
 use crate::{
+    coverage::Thin,
     diagnosis::{Candidate, EffectShare, Excess, VerdictKind},
     sanity::{Sanity, Strained},
     thresholds::Thresholds,
@@ -50,6 +51,8 @@ pub(crate) enum Overruled {
     Foreign { stage: usize, share: f64 },
     /// Its parameters do not fit.
     Strained(Strained),
+    /// The record carries no name.
+    Thin(Thin),
 }
 
 /// Judges.

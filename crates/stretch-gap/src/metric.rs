@@ -16,7 +16,7 @@ use crate::{
     floor::Floor,
     frame::{Frame, Role, Segment},
     linear::dot,
-    nuisance::{Nuisance, Wandering},
+    nuisance::{Nuisance, Patch, Wandering},
     runs::Runs,
     simulator::Model,
     spec::Wander,
@@ -42,6 +42,8 @@ pub(crate) struct Loose {
     clock: Vec<u32>,
     /// How it wanders as the simulator describes it; none for an offset.
     pub(crate) wander: Option<Wander>,
+    /// Whether each tick of the clock has an offset of its own, as large as the simulator describes it.
+    pub(crate) is_by_tick: bool,
     /// How it is taken to.
     pub(crate) level: Level,
 }
@@ -74,7 +76,11 @@ impl Metric {
     ) -> Result<Self, GapError> {
         let simulator = runs.simulator();
         let specs = simulator.parameters();
-        let is_loose = |p: &usize| specs[*p].wander.is_some() || specs[*p].per_trial_sd.is_some();
+        let sd = |p: usize| {
+            let spec = &specs[p];
+            spec.wander.map(|w| w.sd).or(spec.per_trial_sd).or(spec.per_tick_sd)
+        };
+        let is_loose = |p: &usize| sd(*p).is_some();
         let own = simulator.stages()[stage].parameters.iter().copied();
         let parameters: Vec<usize> = own.filter(is_loose).collect();
         let mut metric = Self { floor, loose: Vec::new(), nuisances: Vec::new() };
@@ -85,9 +91,8 @@ impl Metric {
         };
         for &p in &parameters {
             let spec = &specs[p];
-            let sd = spec.wander.map(|w| w.sd).or(spec.per_trial_sd).unwrap_or(0.0);
             let mut moved = model.clone();
-            moved.parameters[p] += sd;
+            moved.parameters[p] += sd(p).unwrap_or(0.0);
             let mut column = runs.output(stage, &moved, trials.len())?;
             for ((x, y), sd) in column.iter_mut().zip(&plain).zip(&metric.floor.sd) {
                 *x = (*x - y) / sd;
@@ -100,7 +105,8 @@ impl Metric {
                 return Err(GapError::simulator(what));
             }
             let level = Level { size: 1.0, time_s: spec.wander.map_or(1.0, |w| w.correlation_s) };
-            metric.loose.push(Loose { column, clock, wander: spec.wander, level });
+            let is_by_tick = spec.per_tick_sd.is_some();
+            metric.loose.push(Loose { column, clock, wander: spec.wander, is_by_tick, level });
         }
         if let Some(like) = like {
             let pairs = metric.loose.iter_mut().zip(&like.loose);
@@ -117,13 +123,19 @@ impl Metric {
             let (mut offsets, mut wandering) = (Vec::new(), Vec::new());
             for loose in &self.loose {
                 let Level { size, time_s } = loose.level;
-                let part = loose.column[range.clone()].iter().map(|x| size * x).collect();
-                match loose.wander {
-                    Some(_) => {
-                        let clock = &loose.clock[range.clone()];
-                        wandering.push(Wandering::new(part, clock, time_s, dt_s));
+                let part: Vec<f64> = loose.column[range.clone()].iter().map(|x| size * x).collect();
+                let clock = &loose.clock[range.clone()];
+                if loose.is_by_tick {
+                    let mut from = 0;
+                    for tick in clock.chunk_by(|a, b| a == b) {
+                        let values = part[from..from + tick.len()].to_vec();
+                        offsets.push(Patch { from, values });
+                        from += tick.len();
                     }
-                    None => offsets.push(part),
+                } else if loose.wander.is_some() {
+                    wandering.push(Wandering::new(part, clock, time_s, dt_s));
+                } else {
+                    offsets.push(Patch { from: 0, values: part });
                 }
             }
             (!self.loose.is_empty()).then(|| Nuisance::new(offsets, wandering))
@@ -181,6 +193,19 @@ impl Metric {
         sum
     }
 
+    /// ln det V + 2 sum ln s over the segments in a role: the normaliser of the residual's density, floors s.
+    pub(crate) fn ln_det(&self, frame: &Frame, role: Role) -> f64 {
+        let pairs = frame.segments.iter().zip(&self.nuisances).filter(|(s, _)| s.role == role);
+        pairs
+            .map(|(segment, nuisance)| {
+                let floors = self.floor.sd[segment.from..segment.to].iter();
+                let measured = floors.filter(|sd| sd.is_finite());
+                nuisance.as_ref().map_or(0.0, Nuisance::ln_determinant)
+                    + 2.0 * measured.map(|sd| sd.ln()).sum::<f64>()
+            })
+            .sum()
+    }
+
     /// Takes the most likely nuisances out of a residual in floors.
     pub(crate) fn clean(&self, frame: &Frame, values: &mut [f64]) {
         for (segment, nuisance) in frame.segments.iter().zip(&self.nuisances) {
@@ -203,7 +228,7 @@ impl Metric {
     ) -> Self {
         let clock = (0..column.len() as u32).collect();
         let level = Level { size: 1.0, time_s: wander.correlation_s };
-        let loose = vec![Loose { column, clock, wander: Some(wander), level }];
+        let loose = vec![Loose { column, clock, wander: Some(wander), is_by_tick: false, level }];
         let mut metric = Self { floor, loose, nuisances: Vec::new() };
         metric.marginalise(frame, dt_s);
         metric

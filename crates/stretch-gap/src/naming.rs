@@ -26,6 +26,7 @@ impl Naming {
         candidates: &[Candidate],
         shares: &[EffectShare],
         thresholds: &Thresholds,
+        is_short: bool,
     ) -> Self {
         let Some(first) = candidates.first() else { return Self::default() };
         let share =
@@ -37,7 +38,10 @@ impl Naming {
         if named.is_empty() && !faint.is_empty() {
             named.push(faint.remove(0));
         }
-        let rivals = candidates[1..].iter().filter(|c| c.probability >= TIE * first.probability);
+        // On a short record probabilities part what the held-out gap does not.
+        let closes_alike = |c: &Candidate| is_short && c.closed >= first.closed_ci[0];
+        let is_tied = |c: &&Candidate| c.probability >= TIE * first.probability || closes_alike(c);
+        let rivals = candidates[1..].iter().filter(is_tied);
         let mut ties = Vec::new();
         for rival in rivals.filter(|c| c.effects.len() == first.effects.len()) {
             let lost: Vec<&String> =
@@ -95,21 +99,34 @@ mod tests {
             candidate(&["slack", "leak"], 0.1),
         ];
         let shares = [share("slack", 0.95), share("sag", 0.0)];
-        let naming = Naming::of(&candidates, &shares, &Thresholds::frozen());
+        let naming = Naming::of(&candidates, &shares, &Thresholds::frozen(), false);
         assert_eq!(
             (naming.named.as_slice(), naming.faint.as_slice()),
             (&["slack".to_owned()][..], &["sag".to_owned()][..])
         );
         assert_eq!(naming.alternatives(), ["slack or saturation"]);
+        // On a short record what closes as much is a tie, whatever its probability.
+        let short = Naming::of(&candidates, &shares, &Thresholds::frozen(), true);
+        assert_eq!(short.ties.len(), 1);
+        let sure = [candidate(&["slip"], 0.999), candidate(&["lowpass"], 0.001)];
+        let alike = |is_short| {
+            let shares = [share("slip", 0.9)];
+            Naming::of(&sure, &shares, &Thresholds::frozen(), is_short).alternatives()
+        };
+        assert_eq!(
+            (alike(false), alike(true)),
+            (vec!["slip".into()], vec!["slip or lowpass".into()])
+        );
         // Something is named where an effect is, however little it closes.
         let weak = Naming::of(
             &candidates,
             &[share("slack", 0.0), share("sag", 0.0)],
             &Thresholds::frozen(),
+            false,
         );
         assert_eq!(weak.named, ["slack"]);
         assert_eq!(
-            Naming::of(&[candidate(&[], 1.0)], &[], &Thresholds::frozen()),
+            Naming::of(&[candidate(&[], 1.0)], &[], &Thresholds::frozen(), false),
             Naming::default()
         );
     }

@@ -11,6 +11,8 @@
 //! and never a matrix as large as the record. The most likely amplitudes, with which a residual is drawn, are
 //! b = (C'C + P)^-1 C'r.
 
+use std::ops::Range;
+
 use crate::{
     arrow::{Arrow, ArrowFactor},
     linear::dot,
@@ -23,13 +25,39 @@ const KNOT_S: f64 = 0.1;
 /// Nuisances of one segment of one stage.
 #[derive(Debug, Clone)]
 pub(super) struct Nuisance {
-    /// Columns of constant offsets, one a parameter; their amplitudes have prior precision 1.
-    offsets: Vec<Vec<f64>>,
+    /// Columns of offsets; their amplitudes have prior precision 1.
+    offsets: Vec<Patch>,
     /// Columns of parameters that wander.
     wandering: Vec<Wandering>,
     /// L of the module's head.
     factor: ArrowFactor,
     ln_determinant: f64,
+}
+
+/// Sensitivity to an offset from one sample on, for as long as it lasts.
+#[derive(Debug, Clone)]
+pub(super) struct Patch {
+    pub(super) from: usize,
+    pub(super) values: Vec<f64>,
+}
+
+impl Patch {
+    fn dot(&self, x: &[f64]) -> f64 {
+        dot(&self.values, &x[self.from..self.from + self.values.len()])
+    }
+
+    /// Product with another one where both last.
+    fn overlap(&self, other: &Self) -> f64 {
+        let from = self.from.max(other.from);
+        let to = (self.from + self.values.len()).min(other.from + other.values.len());
+        if from >= to {
+            return 0.0;
+        }
+        dot(
+            &self.values[from - self.from..to - self.from],
+            &other.values[from - other.from..to - other.from],
+        )
+    }
 }
 
 /// Sensitivity to a wandering parameter, and the knots that each sample lies between.
@@ -65,13 +93,19 @@ impl Wandering {
 
     /// Sample, knot, weights of that knot and the next.
     fn each(&self) -> impl Iterator<Item = (usize, usize, f64, f64)> {
-        let pairs = self.sensitivity.iter().zip(&self.place).enumerate();
-        pairs.map(|(i, (s, (k, share)))| (i, *k as usize, (1.0 - share) * s, share * s))
+        self.within(0..self.place.len())
+    }
+
+    fn within(&self, samples: Range<usize>) -> impl Iterator<Item = (usize, usize, f64, f64)> {
+        samples.map(|i| {
+            let (s, (k, share)) = (self.sensitivity[i], self.place[i]);
+            (i, k as usize, (1.0 - share) * s, share * s)
+        })
     }
 }
 
 impl Nuisance {
-    pub(super) fn new(offsets: Vec<Vec<f64>>, wandering: Vec<Wandering>) -> Self {
+    pub(super) fn new(offsets: Vec<Patch>, wandering: Vec<Wandering>) -> Self {
         let factor = precision(&offsets, &wandering).factor();
         // ln det P of chains of correlation rho with variance 1: -(K - 1) ln(1 - rho^2).
         let prior = |w: &Wandering| -(w.knots as f64 - 1.0) * (1.0 - w.kept * w.kept).ln();
@@ -104,13 +138,13 @@ impl Nuisance {
             base += wandering.knots;
         }
         for (offset, b) in self.offsets.iter().zip(&b[base..]) {
-            x.iter_mut().zip(offset).for_each(|(x, d)| *x -= b * d);
+            x[offset.from..].iter_mut().zip(&offset.values).for_each(|(x, d)| *x -= b * d);
         }
     }
 }
 
 /// C'x: the knots of what wanders, then the offsets.
-fn project(offsets: &[Vec<f64>], wandering: &[Wandering], x: &[f64]) -> Vec<f64> {
+fn project(offsets: &[Patch], wandering: &[Wandering], x: &[f64]) -> Vec<f64> {
     let mut out = Vec::new();
     for wandering in wandering {
         let base = out.len();
@@ -120,18 +154,28 @@ fn project(offsets: &[Vec<f64>], wandering: &[Wandering], x: &[f64]) -> Vec<f64>
             out[base + k + 1] += next * x[i];
         }
     }
-    out.extend(offsets.iter().map(|d| dot(d, x)));
+    out.extend(offsets.iter().map(|d| d.dot(x)));
     out
 }
 
 /// Posterior precision C'C + P. Two wanders of one stage are taken as orthogonal.
-fn precision(offsets: &[Vec<f64>], wandering: &[Wandering]) -> Arrow {
+fn precision(offsets: &[Patch], wandering: &[Wandering]) -> Arrow {
     let knots = wandering.iter().map(|w| w.knots).sum();
     let mut a = Arrow::zeros(knots, offsets.len());
     for (i, column) in offsets.iter().enumerate() {
-        let products = project(offsets, wandering, column);
-        a.border[i].copy_from_slice(&products[..knots]);
-        a.corner[i].copy_from_slice(&products[knots..]);
+        let mut base = 0;
+        for wandering in wandering {
+            let span = column.from..column.from + column.values.len();
+            for (sample, k, this, next) in wandering.within(span) {
+                let x = column.values[sample - column.from];
+                a.border[i][base + k] += this * x;
+                a.border[i][base + k + 1] += next * x;
+            }
+            base += wandering.knots;
+        }
+        for (j, other) in offsets.iter().enumerate() {
+            a.corner[i][j] = column.overlap(other);
+        }
         a.corner[i][i] += 1.0;
     }
     let mut base = 0;
@@ -167,10 +211,14 @@ mod tests {
 
     const SAMPLES: usize = 60;
 
+    fn patch(from: usize, samples: usize) -> Patch {
+        Patch { from, values: vec![0.5; samples] }
+    }
+
     fn nuisance() -> Nuisance {
         let clock: Vec<u32> = (0..SAMPLES as u32).collect();
         let slope: Vec<f64> = (0..SAMPLES).map(|i| 0.1 * i as f64).collect();
-        Nuisance::new(vec![vec![0.5; SAMPLES]], vec![Wandering::new(slope, &clock, 0.3, 0.01)])
+        Nuisance::new(vec![patch(0, SAMPLES)], vec![Wandering::new(slope, &clock, 0.3, 0.01)])
     }
 
     /// x'V^-1 y = x'(y - C b) with the most likely b: two ways to the same product.
@@ -190,14 +238,39 @@ mod tests {
         );
     }
 
+    /// Two equal offsets at the same samples have twice the variance of one; at other samples they do not know of each other.
+    #[test]
+    fn offsets_share_what_they_explain() {
+        let mut dice = Dice::new(5, 0);
+        let x: Vec<f64> = (0..SAMPLES).map(|_| dice.gauss()).collect();
+        let lost = |nuisance: &Nuisance| dot(&nuisance.tail(&x), &nuisance.tail(&x));
+        let both = Nuisance::new(vec![patch(10, 20), patch(10, 20)], Vec::new());
+        let wide = Patch { from: 10, values: vec![0.5 * 2.0_f64.sqrt(); 20] };
+        let single = Nuisance::new(vec![wide], Vec::new());
+        approx::assert_relative_eq!(lost(&both), lost(&single), max_relative = FIT_WELL);
+        let apart = Nuisance::new(vec![patch(10, 20), patch(30, 20)], Vec::new());
+        let [one, other] = [10, 30].map(|from| Nuisance::new(vec![patch(from, 20)], Vec::new()));
+        approx::assert_relative_eq!(
+            lost(&apart),
+            lost(&one) + lost(&other),
+            max_relative = FIT_WELL
+        );
+    }
+
     /// An offset alone against the closed form: V = I + cc', so 1'V^-1 1 = n - (n/2)^2/(1 + n/4) at c = 1/2.
     #[test]
     fn an_offset_is_taken_out_as_far_as_its_prior_says() {
-        let nuisance = Nuisance::new(vec![vec![0.5; SAMPLES]], Vec::new());
+        let nuisance = Nuisance::new(vec![patch(0, SAMPLES)], Vec::new());
         let (ones, n) = (vec![1.0; SAMPLES], SAMPLES as f64);
         let tail = nuisance.tail(&ones);
         let expected = n - (0.5 * n).powi(2) / (1.0 + 0.25 * n);
         // A difference of numbers as large as n.
         approx::assert_abs_diff_eq!(n - dot(&tail, &tail), expected, epsilon = FIT_WELL * n);
+        let ln_determinant = (1.0 + 0.25 * n).ln();
+        approx::assert_abs_diff_eq!(
+            nuisance.ln_determinant(),
+            ln_determinant,
+            epsilon = FIT_WELL * n
+        );
     }
 }

@@ -122,6 +122,10 @@ impl<'a> Problem<'a> {
         self.compare.simulator()
     }
 
+    pub(crate) fn stop(&self) -> &'a (dyn Fn() -> bool + Sync) {
+        self.compare.runs.stop()
+    }
+
     /// [`Comparison::fit`], misfits at equal noise transmitted.
     pub(crate) fn fit(
         &self,
@@ -197,6 +201,27 @@ impl<'a> Problem<'a> {
             sum += metric.beside(&self.compare.frame, simulator.dt_s(), &residual, level.sqrt());
         }
         Ok(sum)
+    }
+
+    /// Log-likelihood of a hypothesis, nats: of the records themselves, so that two problems of the same records compare.
+    ///
+    /// ```text
+    /// l = -(1/block) sum over stages [ (N/2) ln max(X, 1) + (1/2) ln det V + sum ln s_i ] - penalties
+    /// ```
+    ///
+    /// with floors s_i, the metric V and the reduced chi-square X over fitted and held-out samples: a model may leave more than its
+    /// noise, but noise that is foretold too large is no better for it. One observation a block, whatever the residual's own memory is.
+    pub(crate) fn log_likelihood(&self, hypothesis: &Hypothesis) -> f64 {
+        let (compare, frame) = (&self.compare, &self.compare.frame);
+        let mut sum = 0.0;
+        for (misfit, metric) in hypothesis.misfits.iter().zip(&compare.metrics) {
+            for (role, x) in [(Role::Fit, misfit.fit), (Role::Held, misfit.held)] {
+                sum += 0.5 * frame.count(role) as f64 * x.max(1.0).ln();
+                sum += 0.5 * metric.ln_det(frame, role);
+            }
+        }
+        let free = free_parameters(self.simulator(), &hypothesis.model) as f64;
+        -compare.weight() * sum - 0.5 * free * frame.blocks(Role::Fit).ln()
     }
 
     /// Excess of one stage over fitted and held-out samples together.

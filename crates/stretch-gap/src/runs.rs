@@ -51,6 +51,10 @@ impl<'a> Runs<'a> {
         self.simulator
     }
 
+    pub(crate) fn stop(&self) -> &'a (dyn Fn() -> bool + Sync) {
+        self.stop
+    }
+
     /// Simulations since the count began.
     pub(crate) fn count(&self) -> usize {
         self.count.load(Ordering::Relaxed)

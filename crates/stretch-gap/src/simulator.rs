@@ -3,8 +3,10 @@
 use std::borrow::Cow;
 
 use crate::{
+    coverage::RowsUsed,
     description::Description,
     error::GapError,
+    line::Line,
     record::column::{Column, Distortion},
     spec::{EffectSpec, ParameterSpec, StageSpec, TrialSpec},
 };
@@ -121,6 +123,23 @@ pub trait Simulator: Sync {
     /// # Errors
     /// When the simulation is not possible with these values: the fit then turns back.
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError>;
+    /// Rows that the trials stand on, of those that were read; all, where it reads none.
+    fn rows_used(&self) -> RowsUsed {
+        let used = self.trials().iter().map(|t| t.samples).sum();
+        RowsUsed { used, read: used }
+    }
+    /// Parameters that are exact while commands switch at rows of the record, and what they are where commands switch anywhere
+    /// between two rows; the diagnosis weighs both. None where commands are not held from row to row.
+    ///
+    /// What differs from switch to switch is told [by tick](ParameterSpec::per_tick_sd).
+    fn command_timing(&self) -> Vec<(usize, ParameterSpec)> {
+        Vec::new()
+    }
+    /// Lines of unknown phase that a model leaves in the output of a stage where it is not fitted; see [`Line`].
+    fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
+        let _ = (stage, model);
+        Vec::new()
+    }
     /// The motion by which the gap is cut into regimes, levels and rates: the first stage's output unless said
     /// otherwise.
     fn motion(&self) -> Motion<'_> {

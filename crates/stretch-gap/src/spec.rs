@@ -66,6 +66,9 @@ pub struct ParameterSpec {
     pub wander: Option<Wander>,
     /// Standard deviation of a constant offset in each trial, in the parameter's unit.
     pub per_trial_sd: Option<f64>,
+    /// Standard deviation of an offset of its own for each tick of its [wander clock](crate::Simulator::wander_clock), in the
+    /// parameter's unit: what differs from event to event.
+    pub per_tick_sd: Option<f64>,
     /// Whether its re-tuned value says anything by itself (not when others can stand in for it).
     pub is_evidence: bool,
 }
@@ -81,6 +84,7 @@ impl ParameterSpec {
             least: f64::NEG_INFINITY,
             wander: None,
             per_trial_sd: None,
+            per_tick_sd: None,
             is_evidence: true,
         }
     }

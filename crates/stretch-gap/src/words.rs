@@ -177,6 +177,7 @@ fn wrong(overruled: &Overruled, simulator: &dyn Simulator) -> String {
                 spec.name
             )
         }
+        Overruled::Thin(thin) => thin.words(),
         Overruled::Strained(strained) => {
             let names = strained.ended.iter().map(|&p| simulator.parameters()[p].name.as_str());
             format!(

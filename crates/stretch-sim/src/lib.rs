@@ -19,7 +19,7 @@ mod static_law;
 
 pub use effects::{
     Action, ActiveEffect, Alone, CATALOGUE, Catalogue, Effect, EffectParameter, EffectSet, Extent,
-    Find, Form, Measured, Need, Role, Scale, Search, Starts, Surroundings, effect_named,
+    Find, Form, Line, Measured, Need, Role, Scale, Search, Starts, Surroundings, effect_named,
 };
 pub use error::SimError;
 pub use gauge::{Gauge, GaugeSpec};

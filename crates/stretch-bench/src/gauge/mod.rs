@@ -8,21 +8,21 @@ mod source;
 
 use stretch_data::{SessionTrial, unit};
 use stretch_gap::{
-    Column, Description, DescriptionSpec, Dice, GapError, Model, Motion, Noise, ParameterSpec,
-    Recorded, Run, Simulator, StageSpec, TrialSpec,
+    Column, Description, DescriptionSpec, Dice, GapError, Line, Model, Motion, Noise,
+    ParameterSpec, Recorded, RowsUsed, Run, Simulator, StageSpec, TrialSpec,
 };
 use stretch_sim::{
-    Alone, Catalogue, Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Measured, Start, Tolerance,
+    Alone, Catalogue, Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Start, Tolerance,
 };
 
 use lag::lag;
 use record::Record;
 
 use crate::{
-    acting::Acting,
+    acting::{Acting, FitRecord, lines},
     error::BenchError,
     rig::smooth::{Smoothed, unscheduled},
-    specs::{Place, spec as spec_of},
+    specs::{Place, shown, spec as spec_of},
 };
 
 /// Where the parameters stand.
@@ -97,6 +97,9 @@ pub struct GaugeSimulator {
     noise: f64,
     /// Range of the signal.
     spread: f64,
+    /// The signal that effects may be found in.
+    found_in: FitRecord,
+    notes: Vec<String>,
 }
 
 impl GaugeSimulator {
@@ -118,14 +121,16 @@ impl GaugeSimulator {
         let alone = alone(&record);
         let has_pressure = nominal.spec.pressure_scale.is_some();
         let is_missing = |e: &&Effect| nominal.effects.find(e.name).is_none();
-        let rows: Vec<_> =
-            catalogue.iter().filter(|e| Gauge::accepts(e, has_pressure) && is_missing(e)).collect();
         let place = |effect: &Effect| Place {
             touches: vec![0],
             search: Gauge::search(effect, &alone),
             unit: Gauge::unit,
         };
-        let effects = rows.iter().map(|effect| spec_of(effect, place(effect))).collect();
+        let missing = catalogue.iter().filter(|e| Gauge::accepts(e, has_pressure) && is_missing(e));
+        let mut notes = record.notes.clone();
+        let (rows, places) = shown(missing.map(|e| (e, place(e))), record.dt_s, &mut notes);
+        let effects =
+            rows.iter().zip(places).map(|(effect, place)| spec_of(effect, place)).collect();
         let stage = StageSpec::new("sensing", signal, unit_of(signal), &[OFFSET, GAIN, WINDING]);
         let parameters = parameters(&nominal, signal, rig.is_some());
         let (trials, dt_s) = (record.trials.clone(), record.dt_s);
@@ -144,6 +149,8 @@ impl GaugeSimulator {
             reference_noise,
             noise,
             spread: greatest - least,
+            found_in: FitRecord::of(&record.trials, &record.signal, dt_s),
+            notes,
             record,
             spec: nominal.spec,
         })
@@ -151,7 +158,7 @@ impl GaugeSimulator {
 
     /// What was noticed while it was read.
     pub fn notes(&self) -> &[String] {
-        &self.record.notes
+        &self.notes
     }
 
     fn nominal(&self, model: &Model) -> GaugeSpec {
@@ -178,12 +185,7 @@ impl GaugeSimulator {
             };
             let pressure = self.record.pressure.get(from..to).unwrap_or(&[]);
             gauge.run(&mut memory, start, trial.start_s, &input, pressure, &mut out[from..to])?;
-            let record = Measured {
-                samples: &self.record.signal[from..to],
-                noise: self.noise,
-                unit: self.spread,
-                dt_s: self.dt_s(),
-            };
+            let record = self.found_in.of_trial(i, self.noise, self.spread);
             acting.follow(record, &mut out[from..to]);
             let next = self.record.trials.get(i + 1).map_or(f64::INFINITY, |t| t.start_s);
             let rest_s = (next - trial.start_s - trial.samples as f64 * self.dt_s()).max(0.0);
@@ -208,6 +210,14 @@ impl Simulator for GaugeSimulator {
 
     fn is_lost(&self) -> &[bool] {
         &self.record.is_lost
+    }
+
+    fn rows_used(&self) -> RowsUsed {
+        RowsUsed { used: self.record.rows.used(), read: self.record.rows.read }
+    }
+
+    fn lines(&self, _stage: usize, model: &Model) -> Vec<Line> {
+        lines(&self.effects, &self.rows, model, self.spread)
     }
 
     fn motion(&self) -> Motion<'_> {

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use stretch_data::{EvenSession, EvenTrial, SessionTrial, unit};
-use stretch_gap::{Noise, TrialSpec};
+use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial, unit};
+use stretch_gap::{Frame, Noise, TrialSpec};
 
 use crate::{error::BenchError, lost::open};
 
@@ -24,6 +24,7 @@ pub(super) struct Record {
     pub(super) pressure: Vec<f64>,
     pub(super) is_lost: Vec<bool>,
     pub(super) dt_s: f64,
+    pub(super) rows: Rows,
     pub(super) notes: Vec<String>,
 }
 
@@ -62,6 +63,7 @@ impl Record {
             pressure: all(2),
             is_lost: session.trials().iter().flat_map(|t| open(t.is_lost())).collect(),
             dt_s: session.dt_s(),
+            rows: session.rows(),
             notes: session.notes().to_vec(),
         };
         record.check(reference, signal)?;
@@ -71,10 +73,10 @@ impl Record {
     /// Samples that may be looked at before the end.
     pub(super) fn fitted(&self) -> impl Iterator<Item = Range<usize>> {
         let mut begin = 0;
-        self.trials.iter().filter_map(move |t| {
-            let own = begin..begin + t.samples;
-            begin = own.end;
-            (!t.is_test).then_some(own)
+        self.trials.iter().zip(Frame::not_tested(&self.trials)).filter_map(move |(t, fit)| {
+            let own = begin..begin + fit;
+            begin += t.samples;
+            (fit > 0).then_some(own)
         })
     }
 

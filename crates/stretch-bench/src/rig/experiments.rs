@@ -231,9 +231,9 @@ impl RigSimulator {
     /// Rig and effects of a model.
     fn rig_of(&self, model: &Model) -> Result<(RigParams, EffectSet), BenchError> {
         let mut params = self.base;
-        for (key, value) in self.keys.iter().zip(&model.parameters) {
-            if let Some(key) = key {
-                params[*key] = *value;
+        for (knob, value) in self.knobs.iter().zip(&model.parameters) {
+            if let Some(key) = knob.key() {
+                params[key] = *value;
             }
         }
         Ok((params, unrecorded(&self.effects, &self.rows, model)?))

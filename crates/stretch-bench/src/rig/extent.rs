@@ -2,15 +2,15 @@
 
 use stretch_sim::{Bridge, Extent, RigParams};
 
-use super::session::{Inputs, Session};
+use super::session::Inputs;
+use crate::acting::FitRecord;
 
 /// Share of the samples beyond either end of the voltage: noise.
 const OUTERMOST: f64 = 0.002;
 
 /// Voltages and strains that the trials to fit span.
-pub(super) fn extent_of(params: &RigParams, inputs: &Inputs, session: &Session) -> Extent {
-    let fitted = session.trials.iter().filter(|t| !t.is_test);
-    let mut volts: Vec<f64> = fitted.flat_map(|t| &t.bridge_v).copied().collect();
+pub(super) fn extent_of(params: &RigParams, inputs: &Inputs, bridge: &FitRecord) -> Extent {
+    let mut volts: Vec<f64> = bridge.samples().collect();
     volts.sort_by(f64::total_cmp);
     let at = |q: f64| volts[(q * (volts.len() - 1) as f64) as usize];
     let strain = Bridge::new(params).strain(inputs.stroke.0);

@@ -9,6 +9,7 @@ mod run;
 mod session;
 mod simulator;
 pub(crate) mod smooth;
+mod timing;
 
 use std::path::Path;
 
@@ -18,14 +19,15 @@ use stretch_sim::{Catalogue, Effect, EffectSet, Key, Rig, RigParams, Search, Sta
 
 use extent::extent_of;
 use noises::Noises;
-use nominal::{parameters, stages};
+use nominal::{Knob, parameters, stages};
 use session::Inputs;
 pub use session::{RigTrial, Session};
 
 use crate::{
+    acting::FitRecord,
     error::BenchError,
     rig_file,
-    specs::{Place, spec},
+    specs::{Place, shown, spec},
 };
 
 /// What a [`RigSimulator`] is made of.
@@ -50,11 +52,14 @@ pub struct RigSimulator {
     noises: Noises,
     about: Description,
     stage_kinds: Vec<Stage>,
-    /// Key of each parameter; none for the pressure at a trial's start.
-    keys: Vec<Option<Key>>,
+    /// What each parameter turns.
+    knobs: Vec<Knob>,
     rows: Vec<&'static Effect>,
     measured: Vec<Vec<f64>>,
     is_lost: Vec<bool>,
+    /// The bridge voltage that effects may be found in.
+    bridge: FitRecord,
+    notes: Vec<String>,
 }
 
 impl RigSimulator {
@@ -89,20 +94,23 @@ impl RigSimulator {
             Some(_) => vec![Stage::Pneumatics, Stage::Muscle, Stage::Sensing],
             None => vec![Stage::Actuation, Stage::Sensing],
         };
-        let (parameters, keys) = parameters(&rig, &stage_kinds);
-        let stages = stages(&stage_kinds, &keys, &noises);
-        let extent = extent_of(base, &inputs, &session);
-        let rows: Vec<_> = catalogue.iter().filter(|e| effects.find(e.name).is_none()).collect();
+        let (parameters, knobs) = parameters(&rig, &stage_kinds);
+        let stages = stages(&stage_kinds, &knobs, &noises);
+        let dt_s = session.dt_s();
+        let trials: Vec<_> = session.trials.iter().map(trial_spec).collect();
+        let measured: Vec<_> = stage_kinds.iter().map(|kind| measured(&session, *kind)).collect();
+        let bridge = FitRecord::of(&trials, measured.last().map_or(&[], Vec::as_slice), dt_s);
+        let extent = extent_of(base, &inputs, &bridge);
         let place = |effect: &Effect| Place {
             touches: touched(&stage_kinds, effect.stage),
             search: Search::of(effect, &extent),
             unit: |_| 1.0,
         };
-        let missing = rows.iter().map(|effect| spec(effect, place(effect))).collect();
-        let trials = session.trials.iter().map(trial_spec).collect();
-        let measured = stage_kinds.iter().map(|kind| measured(&session, *kind)).collect();
+        let missing = catalogue.iter().filter(|e| effects.find(e.name).is_none());
+        let mut notes = session.notes.clone();
+        let (rows, places) = shown(missing.map(|e| (e, place(e))), dt_s, &mut notes);
+        let missing = rows.iter().zip(places).map(|(effect, place)| spec(effect, place)).collect();
         let is_lost = session.trials.iter().flat_map(|t| &t.is_lost).copied().collect();
-        let dt_s = session.dt_s();
         Ok(Self {
             about: Description::new(DescriptionSpec {
                 stages,
@@ -117,16 +125,23 @@ impl RigSimulator {
             inputs,
             noises,
             stage_kinds,
-            keys,
+            knobs,
             rows,
             measured,
             is_lost,
+            bridge,
+            notes,
         })
     }
 
     /// The session that it is bound to.
     pub fn session(&self) -> &Session {
         &self.session
+    }
+
+    /// What was noticed, in sentences for a report: of the session, and what it cannot show.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
     }
 
     /// Nominal parameters as shipped.

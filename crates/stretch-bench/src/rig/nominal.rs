@@ -3,15 +3,35 @@
 use stretch_gap::{ParameterSpec, StageSpec, Wander};
 use stretch_sim::{Key, PARAMETERS, Rig, Stage};
 
-use super::noises::Noises;
+use super::{noises::Noises, timing};
 
 /// Fluctuation of the supply as laboratories have it, a share of it (1 sd): regulators hold a tenth of a per cent to half of one.
 const SUPPLY_WANDER: f64 = 0.0025;
 /// Its correlation time, s: a compressor's cycle at one end, a regulator's hunting at the other.
 const SUPPLY_CORRELATION_S: f64 = 4.0;
 
-/// Parameters with a tolerance in the stages, then the pressure at a trial's start; and the key of each.
-pub(super) fn parameters(rig: &Rig, kinds: &[Stage]) -> (Vec<ParameterSpec>, Vec<Option<Key>>) {
+/// What a parameter of the diagnosis turns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Knob {
+    /// A parameter of the rig.
+    Rig(Key),
+    /// The pressure at a trial's start.
+    Start,
+    /// How far ahead of their rows every other command acts.
+    Lead(usize),
+}
+
+impl Knob {
+    pub(super) fn key(self) -> Option<Key> {
+        match self {
+            Self::Rig(key) => Some(key),
+            Self::Start | Self::Lead(_) => None,
+        }
+    }
+}
+
+/// Parameters with a tolerance in the stages, then the pressure at a trial's start and the timing of commands; and what each turns.
+pub(super) fn parameters(rig: &Rig, kinds: &[Stage]) -> (Vec<ParameterSpec>, Vec<Knob>) {
     let parameter = |key: Key| {
         let (info, nominal) = (key.info(), rig.params[key]);
         let wander = (key == Key::PS)
@@ -33,22 +53,23 @@ pub(super) fn parameters(rig: &Rig, kinds: &[Stage]) -> (Vec<ParameterSpec>, Vec
     PARAMETERS
         .iter()
         .filter(|info| kinds.iter().any(|kind| kind.holds(info.stage)))
-        .map(|info| (parameter(info.key), Some(info.key)))
+        .map(|info| (parameter(info.key), Knob::Rig(info.key)))
         .filter(|(parameter, _)| parameter.sd > 0.0)
-        .chain([(start, None)])
+        .chain([(start, Knob::Start)])
+        .chain([0, 1].map(|which| (timing::at_rows(which), Knob::Lead(which))))
         .unzip()
 }
 
 /// Stages with their channels, the parameters that act in them, and their noise.
-pub(super) fn stages(kinds: &[Stage], keys: &[Option<Key>], noises: &Noises) -> Vec<StageSpec> {
+pub(super) fn stages(kinds: &[Stage], keys: &[Knob], noises: &Noises) -> Vec<StageSpec> {
     let stage = |kind: &Stage| {
         let (channel, unit, noise) = match kind {
             Stage::Pneumatics => ("pressure_kpa", "kPa", &noises.pressure_kpa),
             Stage::Sensing => ("bridge_v", "V", &noises.volts),
             _ => ("length_mm", "mm", &noises.length_mm),
         };
-        // The start's pressure, which has no key, belongs to the chamber.
-        let owner = |key: &Option<Key>| key.map_or(Stage::Pneumatics, |key| key.info().stage);
+        // The start's pressure and the timing of commands belong to the chamber.
+        let owner = |knob: &Knob| knob.key().map_or(Stage::Pneumatics, |key| key.info().stage);
         StageSpec {
             name: kind.name().into(),
             channel: channel.into(),

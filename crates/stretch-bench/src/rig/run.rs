@@ -1,12 +1,14 @@
 //! One stage of the rig over the session.
 
+use std::borrow::Cow;
+
 use stretch_gap::{Dice, Model, Run};
 use stretch_sim::{
-    Actuation, DEFAULT_STEP_S, EffectSet, Grid, Key, Measured, Memory, Muscle, Need, Openings,
-    Pneumatics, Reference, RigParams, Sensing, Stage, Start,
+    Actuation, DEFAULT_STEP_S, EffectSet, Grid, Key, Memory, Muscle, Need, Openings, Pneumatics,
+    Reference, RigParams, Sensing, Stage, Start,
 };
 
-use super::{RigSimulator, session::Begin, smooth::cubic};
+use super::{RigSimulator, nominal::Knob, session::Begin, smooth::cubic, timing, timing::Leads};
 use crate::{acting::Acting, error::BenchError};
 
 /// Step of integration while fitting, s.
@@ -25,6 +27,7 @@ struct Setting<'a> {
     effects: EffectSet,
     grid: Grid,
     offset: f64,
+    leads: Leads,
     shake: Option<u64>,
     /// Input of the stage that stands in for the measured one, all trials end to end.
     given: Option<&'a [f64]>,
@@ -38,7 +41,7 @@ pub(super) fn simulate(
     given: Option<&[f64]>,
     out: &mut [f64],
 ) -> Result<(), BenchError> {
-    let (params, offset) = params_of(rig, run.model);
+    let Turned { params, offset, leads } = Turned::of(rig, run.model);
     let acting = Acting::of(&rig.effects, &rig.rows, run.model)?;
     let kind = rig.stage_kinds[run.stage];
     let grid = match kind {
@@ -56,6 +59,7 @@ pub(super) fn simulate(
         effects: acting.inside.clone(),
         grid,
         offset,
+        leads,
         shake: run.shake,
         given,
         kind,
@@ -73,16 +77,27 @@ pub(super) fn simulate(
     }
 }
 
-fn params_of(rig: &RigSimulator, model: &Model) -> (RigParams, f64) {
-    let mut params = rig.base;
-    let mut offset = 0.0;
-    for (key, value) in rig.keys.iter().zip(&model.parameters) {
-        match key {
-            Some(key) => params[*key] = *value,
-            None => offset = *value,
+/// The parameters of a model.
+struct Turned {
+    params: RigParams,
+    /// Of the pressure at a trial's start, standard deviations.
+    offset: f64,
+    /// How far ahead of their rows commands act, samples.
+    leads: Leads,
+}
+
+impl Turned {
+    fn of(rig: &RigSimulator, model: &Model) -> Self {
+        let mut turned = Self { params: rig.base, offset: 0.0, leads: [0.0; 2] };
+        for (knob, value) in rig.knobs.iter().zip(&model.parameters) {
+            match knob {
+                Knob::Rig(key) => turned.params[*key] = *value,
+                Knob::Start => turned.offset = *value,
+                Knob::Lead(which) => turned.leads[*which] = *value,
+            }
         }
+        turned
     }
-    (params, offset)
 }
 
 impl Setting<'_> {
@@ -122,9 +137,10 @@ impl Setting<'_> {
         }
     }
 
-    fn openings(&self, trial: usize) -> Openings<'_> {
-        let trial = &self.rig.session.trials[trial];
-        Openings { inlet: &trial.inlet, outlet: &trial.outlet }
+    /// Inlet and outlet as they act.
+    fn openings(&self, trial: usize) -> [Cow<'_, [f64]>; 2] {
+        let own = &self.rig.session.trials[trial];
+        timing::ahead(&own.inlet, &own.outlet, self.leads)
     }
 
     /// A measured input: smoothed, and shaken if asked for.
@@ -161,7 +177,8 @@ impl Setting<'_> {
         let stage = Pneumatics::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
         self.each(count, out, |trial, own| {
-            let (start, openings) = (self.start(trial), self.openings(trial));
+            let (start, [inlet, outlet]) = (self.start(trial), self.openings(trial));
+            let openings = Openings { inlet: &inlet, outlet: &outlet };
             let initial = self.initial_kpa(trial);
             if stage.is_coupled() {
                 let length = self.input(trial, false);
@@ -199,10 +216,11 @@ impl Setting<'_> {
         let mut pressure = Vec::new();
         self.each(count, out, |trial, own| {
             pressure.resize(own.len(), 0.0);
+            let [inlet, outlet] = self.openings(trial);
             stage.run(
                 &mut memory,
                 self.start(trial),
-                self.openings(trial),
+                Openings { inlet: &inlet, outlet: &outlet },
                 self.initial_kpa(trial),
                 &mut pressure,
                 own,
@@ -244,6 +262,7 @@ impl Setting<'_> {
                 &mut volts,
             )?;
         }
+        let dimmed = self.dimmed(count)?;
         let hidden = self.hidden(count)?;
         let mut from = 0;
         self.each(count, out, |trial, own| {
@@ -260,16 +279,24 @@ impl Setting<'_> {
             };
             let start_s = self.rig.about.trials[trial].start_s;
             let (length, pressure) = (self.refined(length), self.refined(pressure));
+            let stage = dimmed.get(trial).and_then(Option::as_ref).unwrap_or(&stage);
             stage.run(&mut memory, self.start(trial), start_s, &length, &pressure, own)?;
-            let record = Measured {
-                samples: &self.rig.session.trials[trial].bridge_v,
-                noise: self.rig.noises.volts.sd(),
-                unit: 1.0,
-                dt_s: self.rig.about.dt_s,
-            };
+            let record = self.rig.bridge.of_trial(trial, self.rig.noises.volts.sd(), 1.0);
             acting.follow(record, own);
             Ok(())
         })
+    }
+
+    /// By trial: sensing where the bridge is excited otherwise than usual. The memory is that of the one gauge.
+    fn dimmed(&self, count: usize) -> Result<Vec<Option<Sensing>>, BenchError> {
+        let one = |excitation: f64| -> Result<Option<Sensing>, BenchError> {
+            let mut params = self.params;
+            params[Key::VExc] *= excitation;
+            let is_usual = excitation == 1.0;
+            let stage = || Sensing::new(&params, &self.effects, &self.grid);
+            Ok(if is_usual { None } else { Some(stage()?) })
+        };
+        self.rig.session.trials[..count].iter().map(|t| one(t.excitation)).collect()
     }
 
     /// What play in the reference hides of the length: the model of the motion says which flank it lies on, the record how

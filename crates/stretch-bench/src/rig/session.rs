@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use stretch_data::{DataSet, EvenSession, EvenTrial, ReadOptions, SessionTrial, Split};
+use stretch_data::{DataSet, EvenSession, EvenTrial, ReadOptions, Rows, SessionTrial, Split};
 use stretch_gap::{copied, noise_variance};
 
 use super::smooth::{Smoothed, schedule};
@@ -11,6 +11,8 @@ use crate::{error::BenchError, lost::open, wild::tame};
 /// Columns that a rig needs; a pressure is welcome.
 const NEEDED: [&str; 4] = ["inlet", "outlet", "length_mm", "bridge_v"];
 const PRESSURE: &str = "pressure_kpa";
+/// Column of the bridge's excitation, a share of the nominal one, the same throughout a trial; 1 where it is missing.
+const EXCITATION: &str = "excitation_share";
 /// Parts of a trial with fewer samples are left out.
 const SHORTEST: usize = 100;
 /// Standard deviations that noise alone hardly ever spans.
@@ -31,11 +33,13 @@ pub struct RigTrial {
     pub(super) bridge_v: Vec<f64>,
     /// Samples that were lost, or that a lost one before them leaves open.
     pub(super) is_lost: Vec<bool>,
+    /// Of the bridge, a share of the nominal one.
+    pub(super) excitation: f64,
 }
 
 impl RigTrial {
     /// The trial of a session whose columns are [`NEEDED`], then the pressure where there is one.
-    fn of(trial: &EvenTrial) -> Self {
+    fn of(trial: &EvenTrial, excitation: f64) -> Self {
         let column = |i: usize| trial.columns().get(i).cloned();
         let needed = |i: usize| column(i).unwrap_or_default();
         Self {
@@ -48,6 +52,7 @@ impl RigTrial {
             bridge_v: needed(3),
             pressure_kpa: column(4),
             is_lost: open(trial.is_lost()),
+            excitation,
         }
     }
 
@@ -72,7 +77,8 @@ impl RigTrial {
 pub struct Session {
     pub(super) trials: Vec<RigTrial>,
     dt_s: f64,
-    notes: Vec<String>,
+    pub(super) rows: Rows,
+    pub(super) notes: Vec<String>,
 }
 
 impl Session {
@@ -105,10 +111,13 @@ impl Session {
                 hint: "give at least one trial split = \"fit\"".into(),
             });
         }
+        let shares: Vec<f64> = trials.iter().map(excitation).collect::<Result<_, _>>()?;
         let even = EvenSession::new(trials, &columns, SHORTEST)?;
+        let of = |t: &EvenTrial| RigTrial::of(t, shares[t.source()]);
         let mut session = Self {
-            trials: even.trials().iter().map(RigTrial::of).collect(),
+            trials: even.trials().iter().map(of).collect(),
             dt_s: even.dt_s(),
+            rows: even.rows(),
             notes: even.notes().to_vec(),
         };
         if with > 0 && with < trials.len() {
@@ -243,6 +252,24 @@ impl Session {
         }
         self.check_directions()
     }
+}
+
+/// Share of the nominal excitation that a trial was recorded at.
+fn excitation(one: &SessionTrial) -> Result<f64, BenchError> {
+    let Some(shares) = one.trial.channel(EXCITATION) else { return Ok(1.0) };
+    let share = shares.first().copied().unwrap_or(1.0);
+    let is_sound = share > 0.0 && share <= 2.0 && shares.iter().all(|s| *s == share);
+    is_sound.then_some(share).ok_or_else(|| {
+        let (low, high) = shares
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+        BenchError::Implausible {
+            column: format!("{}, {EXCITATION}", one.trial.name),
+            found: format!("values from {low} to {high}"),
+            hint: "give the share of the nominal excitation, one number in every row of a trial"
+                .into(),
+        }
+    })
 }
 
 /// Share of one stroke at the widest opening that must go against the valves before their columns look exchanged.

@@ -1,9 +1,13 @@
 //! What a diagnosis asks of the rig.
 
-use stretch_gap::{Column, Description, Distortion, GapError, Motion, Recorded, Run, Simulator};
+use stretch_gap::{
+    Column, Description, Distortion, GapError, Line, Model, Motion, ParameterSpec, Recorded,
+    RowsUsed, Run, Simulator,
+};
 use stretch_sim::{Key, Stage};
 
-use super::{RigSimulator, run, smooth::Smoothed};
+use super::{RigSimulator, nominal::Knob, run, smooth::Smoothed, timing};
+use crate::acting::lines;
 
 impl Simulator for RigSimulator {
     fn description(&self) -> &Description {
@@ -19,12 +23,18 @@ impl Simulator for RigSimulator {
     }
 
     fn wander_clock(&self, parameter: usize) -> Option<Vec<u32>> {
-        if self.keys[parameter] != Some(Key::PS) {
-            return None;
+        let trials = &self.session.trials;
+        match self.knobs[parameter] {
+            Knob::Rig(Key::PS) => {}
+            Knob::Lead(_) => {
+                let all = trials.iter().flat_map(|t| timing::switches(&t.inlet, &t.outlet));
+                return Some(all.collect());
+            }
+            _ => return None,
         }
         // The supply reaches the chamber through the inlet only: while it is shut, the clock stands still.
         let mut clock = Vec::new();
-        for trial in &self.session.trials {
+        for trial in trials {
             let mut last = 0;
             for (i, opening) in trial.inlet.iter().enumerate() {
                 if *opening > 0.0 {
@@ -38,6 +48,28 @@ impl Simulator for RigSimulator {
 
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
         Ok(run::simulate(self, run, None, out)?)
+    }
+
+    fn rows_used(&self) -> RowsUsed {
+        RowsUsed { used: self.session.rows.used(), read: self.session.rows.read }
+    }
+
+    fn command_timing(&self) -> Vec<(usize, ParameterSpec)> {
+        if !timing::is_slow(self.session.dt_s()) {
+            return Vec::new();
+        }
+        let timing = |(i, knob): (usize, &Knob)| match knob {
+            Knob::Lead(which) => Some((i, timing::anywhere(*which))),
+            _ => None,
+        };
+        self.knobs.iter().enumerate().filter_map(timing).collect()
+    }
+
+    fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
+        match self.stage_kinds[stage] {
+            Stage::Sensing => lines(&self.effects, &self.rows, model, 1.0),
+            _ => Vec::new(),
+        }
     }
 
     fn motion(&self) -> Motion<'_> {

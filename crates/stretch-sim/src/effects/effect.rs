@@ -24,10 +24,10 @@ impl Need {
     }
 }
 
-/// What was measured, for numbers that are found in the record.
+/// What was measured and may be fitted, for numbers that are found in the record. Samples to test on are never in one.
 #[derive(Debug, Clone, Copy)]
 pub struct Measured<'a> {
-    /// Samples of the trial.
+    /// Samples of the trial, from its start, that may be fitted.
     pub samples: &'a [f64],
     /// Their noise, one standard deviation.
     pub noise: f64,
@@ -39,6 +39,15 @@ pub struct Measured<'a> {
 
 /// Finds what a record alone can tell, and acts with it: values, the record, the simulated samples.
 pub type Find = fn(&[f64], &Measured<'_>, &mut [f64]);
+
+/// A line in the record whose phase nothing foretells: what is known of a found effect where nothing may be fitted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Line {
+    /// Frequency, Hz.
+    pub hertz: f64,
+    /// Amplitude, in the unit of the strength.
+    pub amplitude: f64,
+}
 
 /// Points to look for an effect at, from what was measured.
 pub type Starts = fn(&Extent) -> Vec<Vec<f64>>;
@@ -117,6 +126,11 @@ pub struct Effect {
     pub alone: fn(&Alone, &mut Search),
     /// How its [`Role::Found`] numbers are found in a record; none for all but hum.
     pub find: Option<Find>,
+    /// The line that an effect with such numbers leaves where they may not be found; none for all but hum.
+    pub line: Option<fn(&[f64]) -> Line>,
+    /// Least sample rate, Hz, at which the effect with these values shows as itself; none where any rate will do. Below it
+    /// the effect is not looked for.
+    pub shown_from_hz: Option<fn(&[f64]) -> f64>,
 }
 
 impl Effect {
@@ -137,7 +151,20 @@ impl Effect {
         starts: None,
         alone: |_, _| (),
         find: None,
+        line: None,
+        shown_from_hz: None,
     };
+
+    /// Least sample rate, Hz, at which the effect with these values shows as itself; 0 where any will do.
+    ///
+    /// ```
+    /// let hum = stretch_sim::effect_named("mains_hum").unwrap();
+    /// assert_eq!(hum.least_rate_hz(&[0.02, 60.0]), 90.0);
+    /// assert_eq!(stretch_sim::effect_named("leak").unwrap().least_rate_hz(&[1.0]), 0.0);
+    /// ```
+    pub fn least_rate_hz(&self, values: &[f64]) -> f64 {
+        self.shown_from_hz.map_or(0.0, |least| least(values))
+    }
 
     /// Whether these values leave the rig as if the effect were absent: every strength is at its off value.
     pub fn is_off(&self, values: &[f64]) -> bool {

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_4, TAU};
 use stretch_operators::Hum;
 
 use crate::{
-    effects::{Action, Effect, EffectParameter, Measured, Role},
+    effects::{Action, Effect, EffectParameter, Line, Measured, Role},
     stage::Stage,
 };
 
@@ -27,6 +27,10 @@ pub(super) static MAINS_HUM: Effect = Effect {
         Action::Record(Box::new(Hum { a: values[0], f_hz: values[1], phase: values[2] }))
     },
     find: Some(wandering),
+    line: Some(|values| Line { hertz: values[1], amplitude: values[0] }),
+    // At fs the hum shows at |f - k fs|. From 1.5 f on that is a third of fs at least and f/2 = 25 Hz at least, where no muscle
+    // moves; a slower record shows it anywhere, down to a slow wave that passes for motion or drift.
+    shown_from_hz: Some(|values| 1.5 * values[1]),
     starts: Some(|_| {
         [50.0, 60.0].iter().flat_map(|f| [0.002, 0.02].map(|a| vec![a, *f])).collect()
     }),
@@ -36,8 +40,9 @@ pub(super) static MAINS_HUM: Effect = Effect {
 /// Window in which the phase is taken as steady, s.
 const WINDOW_S: f64 = 1.0;
 
-/// Adds to a simulated trial the hum whose phase in each second is the one that the measured record shows: as much of the
-/// residual at the line's frequency as the amplitude allows; noise shrinks what it cannot tell.
+/// Adds to samples that may be fitted the hum whose phase in each second is the one that the measured record shows: as much of
+/// the residual at the line's frequency as the amplitude allows; noise shrinks what it cannot tell. Each sample is foretold by
+/// the others of its second. On samples to test on nothing is found: there the hum is a [`Line`].
 fn wandering(values: &[f64], record: &Measured<'_>, simulated: &mut [f64]) {
     let (a, f) = (values[0] * record.unit, values[1]);
     let window = ((WINDOW_S / record.dt_s) as usize).max(8);

@@ -10,7 +10,7 @@ mod starts;
 
 pub use action::{Action, Surroundings};
 pub use catalogue::Catalogue;
-pub use effect::{Alone, Effect, Extent, Find, Measured, Need, Starts};
+pub use effect::{Alone, Effect, Extent, Find, Line, Measured, Need, Starts};
 pub use parameter::{EffectParameter, Form, Role, Scale};
 pub use search::Search;
 pub use set::{ActiveEffect, EffectSet};

@@ -4,12 +4,15 @@
 //!
 //! `cargo run --release -p stretch-bench --example excitation`
 
+#[path = "../tests/support/rigs.rs"]
+mod rigs;
 #[path = "../tests/support/session.rs"]
 mod simulated;
 #[path = "../tests/support/mod.rs"]
 mod support;
 
-use simulated::{effect, own_rig, session};
+use rigs::{effect, own_rig};
+use simulated::session;
 use stretch_bench::{RigSetup, RigSimulator, Session};
 use stretch_data::{Channel, SessionTrial};
 use stretch_gap::{Diagnosis, Options, diagnose};

@@ -10,7 +10,7 @@ use crate::{
     evidence::{Evidence, Traces},
     hypothesis::Hypothesis,
     problem::Problem,
-    score::{gap, mean_square},
+    score::{excess, mean_square},
     sets::Sets,
 };
 
@@ -44,7 +44,12 @@ pub(crate) fn shares(
     peeled: &[(usize, Hypothesis)],
     least_gap: f64,
 ) -> Result<Vec<EffectShare>, GapError> {
-    let nominal: Vec<f64> = evidence.nominal_blocks.iter().map(|b| gap(mean_square(b))).collect();
+    // Floors are known to some per cent: what the best set leaves is the noise where it is less than they say.
+    let least: Vec<f64> = evidence.stages.iter().map(|s| s.excess_after.min(0.0)).collect();
+    let above =
+        |stage: usize, blocks: &[f64]| (excess(mean_square(blocks)) - least[stage]).max(0.0);
+    let blocks = evidence.nominal_blocks.iter().enumerate();
+    let nominal: Vec<f64> = blocks.map(|(stage, blocks)| above(stage, blocks)).collect();
     let whole = nominal.iter().sum::<f64>().max(f64::MIN_POSITIVE);
     let mut with: Vec<f64> = evidence.stages.iter().map(|s| s.excess_after.max(0.0)).collect();
     let mut out = Vec::new();
@@ -54,7 +59,7 @@ pub(crate) fn shares(
             // The nominal was run already.
             true => nominal.clone(),
             false => stages
-                .map(|s| Ok(gap(mean_square(&Traces::of(problem, s, &less.model)?.blocks))))
+                .map(|s| Ok(above(s, &Traces::of(problem, s, &less.model)?.blocks)))
                 .collect::<Result<_, GapError>>()?,
         };
         let closed = without.iter().zip(&with).map(|(without, with)| without - with);

@@ -173,6 +173,8 @@ pub struct EffectSpec {
     pub starts: Vec<Vec<f64>>,
     /// Whether it shows between trials rather than inside them (drift, softening): it is then seen once a trial.
     pub is_between_trials: bool,
+    /// Whether its course is found in the record: its size then only says how much is looked for.
+    pub is_found: bool,
     /// Names of effects that are hard to tell from it.
     pub twins: Vec<String>,
 }
@@ -198,6 +200,7 @@ impl EffectSpec {
             starts: Self::starts_of(&parameters),
             parameters,
             is_between_trials: false,
+            is_found: false,
             twins: Vec::new(),
         }
     }
@@ -212,7 +215,7 @@ impl EffectSpec {
                 false => (value - end).abs() < AT_END * (p.max - p.min),
             };
             p.form.is_none() && (near(p.min) || near(p.max)) && !p.off.is_some_and(near)
-        })
+        }) && !self.is_found
     }
 
     /// Every combination of the parameters' points.

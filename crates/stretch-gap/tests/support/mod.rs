@@ -104,7 +104,7 @@ fn description(trials: Vec<TrialSpec>, volt: f64) -> Description {
     let gain = ParameterSpec::new("gain", "V", GAIN * volt).within(0.05 * volt);
     let offset = ParameterSpec::new("offset", "V", 0.3 * volt).within(0.05 * volt);
     let mut stage = StageSpec::new("gauge", "volts", "V", &[0, 1]);
-    stage.noise = Some(NOISE_V * volt);
+    stage.noise = Some(stretch_gap::Noise::known(NOISE_V * volt));
     let quadratic = vec![EffectParameterSpec::strength("c", "1", -0.2..=0.2)];
     Description::new(DescriptionSpec {
         stages: vec![stage],

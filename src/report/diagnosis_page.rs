@@ -306,6 +306,7 @@ fn named(page: &mut Page, subject: &Subject<'_>) {
         .collect();
     let closed: Vec<Row> = tried
         .iter()
+        .filter(|c| !c.parameters.is_empty())
         .map(|c| Row {
             label: label(c),
             bars: vec![Bar {

@@ -3,11 +3,13 @@
 //! A candidate's closed-gap fraction is 1 - sum_c max(0, e_c with its effects)/sum_c max(0, e_c re-tuned) of the excesses e_c of
 //! the channels on the test trials.
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 
 use crate::{
     bootstrap::closed_interval,
-    diagnosis::{Candidate, EffectValue, ParameterShift, StageGap},
+    diagnosis::{Candidate, EffectValue, Excess, ParameterShift, StageGap},
     error::GapError,
     evidence::{Evidence, StageEvidence, Traces},
     hypothesis::Hypothesis,
@@ -15,6 +17,9 @@ use crate::{
     problem::Problem,
     simulator::Simulator,
 };
+
+/// Name of what the catalogue lacks.
+const UNKNOWN: &str = "unknown";
 
 /// Every weighed hypothesis on the test trials.
 pub(crate) fn candidates(
@@ -55,6 +60,28 @@ fn candidate(
         is_confirmed: interval.falls,
         parameters,
     })
+}
+
+/// The candidates with what the catalogue lacks behind them, of a probability that the others share the rest of.
+pub(crate) fn beside_unknown(
+    mut candidates: Vec<Candidate>,
+    gap: Excess,
+    probability: f64,
+) -> Vec<Candidate> {
+    candidates.iter_mut().for_each(|c| c.probability *= 1.0 - probability);
+    candidates.push(Candidate {
+        effects: vec![UNKNOWN.into()],
+        probability,
+        score: 0.0,
+        gap_before: gap.retuned,
+        gap_after: gap.retuned,
+        closed: 0.0,
+        closed_ci: [0.0; 2],
+        is_confirmed: false,
+        by_name: BTreeMap::new(),
+        parameters: Vec::new(),
+    });
+    candidates
 }
 
 fn effect_values(simulator: &dyn Simulator, hypothesis: &Hypothesis) -> Vec<EffectValue> {

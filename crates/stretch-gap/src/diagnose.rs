@@ -4,19 +4,21 @@ use std::time::Instant;
 
 use crate::{
     baselines::baselines,
-    candidates::{candidates, shifts, stage_gaps},
+    candidates::{beside_unknown, candidates, shifts, stage_gaps},
     coverage::{carried, is_short, thin},
     diagnosis::{Candidate, Diagnosis, Unexplained, VerdictKind, Where},
     error::GapError,
     evidence::Evidence,
-    judge::{Case, judge},
+    hypothesis::Hypothesis,
+    judge::{Case, Verdict, judge},
     localise,
-    missing::propose,
+    missing::{Proposed, propose},
     naming::Naming,
-    probability::covering_set,
+    probability::{covering_set, unknown},
     problem::Problem,
     record::{examine::Doubts, plain::plain, suspect::Suspect, weigh::weighed},
     sanity::Sanity,
+    score::gap,
     search::Search,
     settle::settled,
     shares::{peeled, shares},
@@ -133,6 +135,7 @@ fn run(
     let rows_used = simulator.rows_used();
     let thin = thin(&evidence.frame, rows_used, simulator.dt_s());
     let verdict = carried(judge(case, thresholds), thin);
+    let (verdict, proposed) = lacking(problem, &found.best, verdict, progress)?;
     let names = matches!(verdict.kind, VerdictKind::Effect | VerdictKind::Partial);
     let naming = match names {
         true => {
@@ -150,18 +153,6 @@ fn run(
     };
     let partial = first.filter(|_| verdict.kind == VerdictKind::Partial);
     let unexplained = partial.map(|first| unexplained(simulator, &evidence, first, seed));
-    let base = match verdict.kind {
-        VerdictKind::Partial => Some(&found.best),
-        VerdictKind::Unknown => Some(&problem.nominal),
-        _ => None,
-    };
-    let proposed = match base {
-        Some(base) => {
-            progress("what the catalogue lacks");
-            propose(problem, base)?
-        }
-        None => None,
-    };
     let ambiguous = match verdict.kind {
         VerdictKind::NoGap | VerdictKind::Parameters | VerdictKind::Record => Vec::new(),
         _ => covering_set(&weighed, simulator),
@@ -176,6 +167,7 @@ fn run(
         proposed: proposed.as_ref(),
         gross: &gross,
     };
+    let unknown = unknown(evidence.gap, thresholds);
     let told = tell(answer, case, simulator, &evidence, &shares);
     let diagnosis = Diagnosis {
         schema: 1,
@@ -200,9 +192,40 @@ fn run(
         rows_used,
         simulations,
         runtime_s,
-        candidates,
+        candidates: beside_unknown(candidates, evidence.gap, unknown),
     };
     Ok((diagnosis, evidence))
+}
+
+/// What the catalogue lacks where a gap is left, and the verdict beside it: names stand for most of a gap only where they close more
+/// of it, held out, than a sum of terms that stands for something else.
+fn lacking(
+    problem: &Problem<'_>,
+    best: &Hypothesis,
+    verdict: Verdict,
+    progress: &dyn Fn(&str),
+) -> Result<(Verdict, Option<Proposed>), GapError> {
+    if !matches!(verdict.kind, VerdictKind::Partial | VerdictKind::Unknown) {
+        return Ok((verdict, None));
+    }
+    progress("what the catalogue lacks");
+    let instead = propose(problem, &problem.nominal)?;
+    if verdict.kind == VerdictKind::Unknown {
+        return Ok((verdict, instead));
+    }
+    let held = |h: &Hypothesis, stage: usize| gap(h.misfits[stage].held);
+    let named = |name: &String| problem.simulator().stages().iter().position(|s| s.name == *name);
+    let is_beaten = instead.as_ref().is_some_and(|other| {
+        named(&other.stage).is_some_and(|stage| {
+            let whole = held(&problem.nominal, stage).max(f64::MIN_POSITIVE);
+            other.closes_held >= 1.0 - held(best, stage) / whole
+        })
+    });
+    if is_beaten {
+        let verdict = Verdict { kind: VerdictKind::Unknown, ..verdict };
+        return Ok((verdict, instead));
+    }
+    Ok((verdict, propose(problem, best)?))
 }
 
 /// Slices that are told of what a partial answer leaves.

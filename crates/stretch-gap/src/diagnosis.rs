@@ -98,7 +98,7 @@ impl Gross {
 /// A set of effects that was held against the data.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Candidate {
-    /// Its effects, the strongest first.
+    /// Its effects, the strongest first; `unknown` stands for whatever the catalogue lacks and is always the last candidate.
     pub effects: Vec<String>,
     /// Probability among the candidates.
     pub probability: f64,

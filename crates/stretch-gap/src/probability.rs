@@ -8,6 +8,8 @@
 //!
 //! is a tempered posterior (Grunwald and van Ommen 2017, doi 10.1214/17-BA1085): the more of the gap the best set leaves, the less its
 //! form is the rig's, and the less a difference of scores says. T and rho are calibrated on development cases.
+//!
+//! Beside them stands what the catalogue lacks, `unknown`, with a probability of its own: see [`unknown`].
 
 use crate::{
     diagnosis::Excess, hypothesis::Hypothesis, simulator::Simulator, thresholds::Thresholds,
@@ -49,6 +51,14 @@ pub(crate) fn weigh(
     all.iter_mut().for_each(|w| w.probability /= total);
     all.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     all
+}
+
+/// Probability that something else than mismatch of its form leaves what the best set leaves: even where that is what form may leave,
+/// by the logistic of the logarithm beyond.
+pub(crate) fn unknown(gap: Excess, thresholds: &Thresholds) -> f64 {
+    let allowed = thresholds.unknown_excess + thresholds.unknown_share * gap.retuned;
+    let beyond = (gap.left.max(f64::MIN_POSITIVE) / allowed).ln();
+    1.0 / (1.0 + (-beyond / thresholds.unknown_soft).exp())
 }
 
 /// Effects of the smallest set of candidates that holds 95 % of the probability, the best candidate's first.

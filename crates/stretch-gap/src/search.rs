@@ -127,11 +127,15 @@ impl<'a> Search<'a> {
         Ok(found.into_iter().find(|next| self.worth.is_worth(base, next)))
     }
 
-    /// Effects that a shortlist leaves out, where a gap is left for them.
+    /// Effects that a shortlist leaves out, where a gap is left for them, each from its best start.
     fn others(&self, base: &Hypothesis, screened: &[Screened], list: &[Screened]) -> Vec<Screened> {
         let is_new = |s: &&Screened| list.iter().all(|l| l.effect != s.effect);
         let is_possible = |s: &&Screened| self.worth.is_possible(base, s.effect);
-        screened.iter().filter(is_new).filter(is_possible).cloned().collect()
+        let one = |s: &Screened| {
+            let starts = s.starts.iter().take(1).cloned().collect();
+            Screened { effect: s.effect, starts }
+        };
+        screened.iter().filter(is_new).filter(is_possible).map(one).collect()
     }
 
     fn prune(&mut self, mut best: Hypothesis) -> Result<Hypothesis, GapError> {

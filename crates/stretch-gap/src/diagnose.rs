@@ -9,16 +9,14 @@ use crate::{
     diagnosis::{Candidate, Diagnosis, Unexplained, VerdictKind, Where},
     error::GapError,
     evidence::Evidence,
-    hypothesis::Hypothesis,
-    judge::{Case, Verdict, judge},
+    judge::{Case, judge},
+    lacking::lacking,
     localise,
-    missing::{Proposed, propose},
     naming::Naming,
     probability::{covering_set, unknown},
     problem::Problem,
     record::{examine::Doubts, plain::plain, suspect::Suspect, weigh::weighed},
     sanity::Sanity,
-    score::gap,
     search::Search,
     settle::settled,
     shares::{peeled, shares},
@@ -135,7 +133,7 @@ fn run(
     let rows_used = simulator.rows_used();
     let thin = thin(&evidence.frame, rows_used, simulator.dt_s());
     let verdict = carried(judge(case, thresholds), thin);
-    let (verdict, proposed) = lacking(problem, &found.best, verdict, progress)?;
+    let (verdict, proposed) = lacking(problem, &found.best, (verdict, evidence.gap), progress)?;
     let names = matches!(verdict.kind, VerdictKind::Effect | VerdictKind::Partial);
     let naming = match names {
         true => {
@@ -195,37 +193,6 @@ fn run(
         candidates: beside_unknown(candidates, evidence.gap, unknown),
     };
     Ok((diagnosis, evidence))
-}
-
-/// What the catalogue lacks where a gap is left, and the verdict beside it: names stand for most of a gap only where they close more
-/// of it, held out, than a sum of terms that stands for something else.
-fn lacking(
-    problem: &Problem<'_>,
-    best: &Hypothesis,
-    verdict: Verdict,
-    progress: &dyn Fn(&str),
-) -> Result<(Verdict, Option<Proposed>), GapError> {
-    if !matches!(verdict.kind, VerdictKind::Partial | VerdictKind::Unknown) {
-        return Ok((verdict, None));
-    }
-    progress("what the catalogue lacks");
-    let instead = propose(problem, &problem.nominal)?;
-    if verdict.kind == VerdictKind::Unknown {
-        return Ok((verdict, instead));
-    }
-    let held = |h: &Hypothesis, stage: usize| gap(h.misfits[stage].held);
-    let named = |name: &String| problem.simulator().stages().iter().position(|s| s.name == *name);
-    let is_beaten = instead.as_ref().is_some_and(|other| {
-        named(&other.stage).is_some_and(|stage| {
-            let whole = held(&problem.nominal, stage).max(f64::MIN_POSITIVE);
-            other.closes_held >= 1.0 - held(best, stage) / whole
-        })
-    });
-    if is_beaten {
-        let verdict = Verdict { kind: VerdictKind::Unknown, ..verdict };
-        return Ok((verdict, instead));
-    }
-    Ok((verdict, propose(problem, best)?))
 }
 
 /// Slices that are told of what a partial answer leaves.

@@ -20,6 +20,7 @@ mod frame;
 mod hyper;
 mod hypothesis;
 mod judge;
+mod lacking;
 mod line;
 mod linear;
 mod localise;

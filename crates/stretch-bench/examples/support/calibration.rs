@@ -10,8 +10,10 @@ const COLDEST: f64 = 5.0;
 /// Widths of the border between known and unknown that are tried, in logarithms of the excess left; the first is the one that the border is
 /// laid by: a sharp one would follow single cases.
 const SOFT: [f64; 6] = [0.2, 0.3, 0.45, 0.7, 1.0, 1.5];
-/// Room for rigs that no generator of ours made: `unknown` begins at this many times the greatest gap of a null.
+/// Room for rigs that no generator of ours made: `unknown` begins at this many times the greatest gap of a null that was called so.
 const ROOM: f64 = 1.5;
+/// Excess below which nothing is called unknown: floors are known to a twentieth.
+const LEAST_UNKNOWN: f64 = 0.05;
 /// What a false `unknown` costs, in overlooked ones.
 const DEAR: f64 = 3.0;
 
@@ -89,7 +91,7 @@ fn unknowns(cases: &[&Case]) -> (f64, f64, f64) {
         let Some(best) = d.candidates.first() else { continue };
         let of = |name: &String| best.effects.contains(name);
         match label.kind {
-            CaseKind::Null => nulls.push(d.gap),
+            CaseKind::Null if d.verdict == VerdictKind::Unknown => nulls.push(d.gap),
             CaseKind::OutOfCatalogue if is_counted(label, d) => foreign.push(d.gap),
             CaseKind::Struck if is_counted(label, d) => {
                 let truth = &label.effects[0];
@@ -120,7 +122,7 @@ fn unknowns(cases: &[&Case]) -> (f64, f64, f64) {
         called(&foreign, excess, share)
             - DEAR * (called(&explained, excess, share) + called(&nulls, excess, share))
     };
-    let least = ROOM * nulls.iter().map(|gap| gap.left).fold(0.0, f64::max);
+    let least = (ROOM * nulls.iter().map(|gap| gap.left).fold(0.0, f64::max)).max(LEAST_UNKNOWN);
     let excesses = (0..20).map(|i| least * 1.1_f64.powi(i));
     let grid = excesses.flat_map(|e| (0..50).map(move |i| (e, 0.004 * f64::from(i))));
     let best = grid.max_by(|a, b| worth(a.0, a.1).total_cmp(&worth(b.0, b.1)));

@@ -9,6 +9,8 @@
 //! It is wild where |d_i| is more than eight deviations of the record's own d and half of what the record moves on either side, and more
 //! than d is beside it: a kink and a step of the motion are neither. A wild value gives way to the cubic.
 
+use stretch_data::SessionTrial;
+
 /// Deviations beyond which a sample is wild.
 const WILD: f64 = 8.0;
 /// Share of the motion on either side that a kink stays below: a third of it.
@@ -16,8 +18,28 @@ const KINK: f64 = 0.5;
 /// Ratio to the neighbours' that a step stays below: 1, where a single value has 3/2.
 const STEP: f64 = 1.25;
 
+/// Measured columns of a rig.
+const MEASURED: [&str; 3] = ["pressure_kpa", "length_mm", "bridge_v"];
+
+/// Trials with the wild values of their measured columns replaced, and a sentence for each column that had some.
+pub(crate) fn tamed(trials: &[SessionTrial]) -> (Vec<SessionTrial>, Vec<String>) {
+    let mut trials = trials.to_vec();
+    let mut notes = Vec::new();
+    for name in MEASURED {
+        let channels = trials.iter_mut().flat_map(|t| &mut t.trial.channels);
+        let own = channels.filter(|channel| channel.name == name);
+        let count: usize = own.map(|channel| tame(&mut channel.values)).sum();
+        if count > 0 {
+            notes.push(format!(
+                "{count} wild values of {name} were replaced by what lies on either side"
+            ));
+        }
+    }
+    (trials, notes)
+}
+
 /// Replaces the wild values of a channel; how many there were.
-pub(crate) fn tame(values: &mut [f64]) -> usize {
+fn tame(values: &mut [f64]) -> usize {
     let off: Vec<f64> =
         values.windows(5).map(|x| x[2] - (4.0 * (x[1] + x[3]) - x[0] - x[4]) / 6.0).collect();
     let Some(sd) = deviation(&off) else { return 0 };

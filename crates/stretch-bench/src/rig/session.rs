@@ -6,7 +6,7 @@ use stretch_data::{DataSet, EvenSession, EvenTrial, ReadOptions, Rows, SessionTr
 use stretch_gap::{copied, noise_variance};
 
 use super::smooth::{Smoothed, schedule};
-use crate::{error::BenchError, lost::open, wild::tame};
+use crate::{error::BenchError, lost::open, wild::tamed};
 
 /// Columns that a rig needs; a pressure is welcome.
 const NEEDED: [&str; 4] = ["inlet", "outlet", "length_mm", "bridge_v"];
@@ -112,13 +112,16 @@ impl Session {
             });
         }
         let shares: Vec<f64> = trials.iter().map(excitation).collect::<Result<_, _>>()?;
+        // Before anything is resampled: between two rows a wild value would spread.
+        let (trials, wild) = tamed(trials);
+        let trials = &trials[..];
         let even = EvenSession::new(trials, &columns, SHORTEST)?;
         let of = |t: &EvenTrial| RigTrial::of(t, shares[t.source()]);
         let mut session = Self {
             trials: even.trials().iter().map(of).collect(),
             dt_s: even.dt_s(),
             rows: even.rows(),
-            notes: even.notes().to_vec(),
+            notes: even.notes().iter().cloned().chain(wild).collect(),
         };
         if with > 0 && with < trials.len() {
             session.notes.push(format!(
@@ -127,28 +130,7 @@ impl Session {
             ));
         }
         session.check()?;
-        session.tame();
         Ok(session)
-    }
-
-    /// Replaces wild values, and says how many of which channel there were.
-    fn tame(&mut self) {
-        let mut counts = [("pressure_kpa", 0), ("length_mm", 0), ("bridge_v", 0)];
-        for trial in &mut self.trials {
-            let channels = [
-                trial.pressure_kpa.as_mut(),
-                Some(&mut trial.length_mm),
-                Some(&mut trial.bridge_v),
-            ];
-            for ((_, count), values) in counts.iter_mut().zip(channels) {
-                *count += values.map_or(0, |values| tame(values));
-            }
-        }
-        for (channel, count) in counts.into_iter().filter(|(_, count)| *count > 0) {
-            let what =
-                format!("{count} wild values of {channel} were replaced by their neighbours'");
-            self.notes.push(what);
-        }
     }
 
     /// The trials, in the order of time.

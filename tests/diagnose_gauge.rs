@@ -131,7 +131,10 @@ fn records_that_cannot_be_used_are_refused_by_name() {
     let hole = spoiled(2, &|i| (i == 17).then(|| "n/a".into()));
     fails(&mut run(&hole, "angle_deg", "s2"), &["joint.csv", "row 18", "s2", "n/a"]);
     let short: String = good.lines().take(200).map(|l| l.to_owned() + "\n").collect();
-    fails(&mut run(&short, "angle_deg", "s2"), &["199 samples", "at least 300"]);
+    fails(
+        &mut run(&short, "angle_deg", "s2"),
+        &["joint.csv", "to fit have 150 samples", "at least 300"],
+    );
     let swapped = good.replacen("angle_deg,s2", "bridge_v,length_mm", 1);
     fails(&mut run(&swapped, "bridge_v", "length_mm"), &["swapped", "reference is the length"]);
     // A gap in time and a converter at its end are no reason to refuse, and not passed over.

@@ -420,7 +420,7 @@ fn columns_that_cannot_be_what_they_say_are_refused_or_told() {
         t.time_s.truncate(250);
         t.channels.iter_mut().for_each(|c| c.values.truncate(250));
     };
-    refused(&short, "rod_mm", "s1", &["250 samples", "300"]);
+    refused(&short, "rod_mm", "s1", &["to fit have 188 samples", "300"]);
     let noted = |g: Result<GaugeSimulator, BenchError>, words: &[&str]| {
         let notes = g.expect("a gauge").notes().join("; ");
         assert!(words.iter().all(|w| notes.contains(w)), "{notes}");

@@ -235,8 +235,8 @@ fn a_trial_at_another_excitation_is_no_gap() {
 fn few_rows_carry_no_name() {
     let mut trials = session(&own_rig(), &effect("amplifier_lowpass", &[("tau", 0.08)]), true, 9);
     for one in &mut trials {
-        // Six seconds in one piece, then pieces of half a second, too short, with gaps of five samples.
-        let keep = |i: usize| !(600..).contains(&i) || i % 55 < 50;
+        // Four seconds in one piece, then pieces of half a second, too short, with gaps of 0.6 s: shorter ones may be bridged.
+        let keep = |i: usize| !(380..).contains(&i) || i % 110 < 50;
         let thin = |values: &mut Vec<f64>| {
             *values =
                 values.iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, x)| *x).collect();

@@ -4,10 +4,10 @@
 //! effects are credited with.
 
 use crate::{
-    coverage::RowsUsed,
     description::Description,
     error::GapError,
     line::Line,
+    rows::RowsUsed,
     simulator::{Model, Motion, Run, Simulator},
     spec::ParameterSpec,
 };

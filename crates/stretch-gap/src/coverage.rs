@@ -6,71 +6,17 @@
 //! is as good as another: whatever closes as much of the held-out gap, within the interval of the first, is then a
 //! tie with it, however the fitted samples weigh the two.
 
-use serde::{Deserialize, Serialize};
-
+pub(crate) use crate::thin::Thin;
 use crate::{
     diagnosis::VerdictKind,
     frame::{Frame, Role},
     judge::{Overruled, Verdict},
+    rows::RowsUsed,
+    thin::{LEAST_FIT_S, LEAST_SHARE, LEAST_TEST_S},
 };
 
-/// Least share of the rows.
-const LEAST_SHARE: f64 = 0.5;
-/// Least to test on, s.
-const LEAST_TEST_S: f64 = 5.0;
-/// Least to fit, s.
-const LEAST_FIT_S: f64 = 10.0;
 /// Fitted records shorter than this, s, part no lags.
 const SHORT_S: f64 = 60.0;
-
-/// Rows of the trials: those that a diagnosis stands on, and all that were read.
-///
-/// ```
-/// let rows = stretch_gap::RowsUsed { used: 120, read: 1000 };
-/// assert_eq!(rows.share(), 0.12);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct RowsUsed {
-    /// Rows used.
-    pub used: usize,
-    /// Rows read.
-    pub read: usize,
-}
-
-impl RowsUsed {
-    /// Share of the rows that is used; 1 of none.
-    pub fn share(&self) -> f64 {
-        if self.read == 0 { 1.0 } else { self.used as f64 / self.read as f64 }
-    }
-}
-
-/// Why a record carries no name.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Thin {
-    /// Most rows were left out.
-    Rows(RowsUsed),
-    /// Too short, s: to fit and to test on.
-    Short { fit_s: f64, test_s: f64 },
-}
-
-impl Thin {
-    /// What is wrong, and what to record.
-    pub(crate) fn words(&self) -> String {
-        match self {
-            Self::Rows(rows) => format!(
-                "No cause can be named on {:.0} % of the rows ({} of {}): record without gaps, so that at least {:.0} % can be used.",
-                100.0 * rows.share(),
-                rows.used,
-                rows.read,
-                100.0 * LEAST_SHARE
-            ),
-            Self::Short { fit_s, test_s } => format!(
-                "The record is too short to carry a name: {fit_s:.1} s to fit and {test_s:.1} s to test on. Record at least \
-                 {LEAST_FIT_S:.0} s to fit and {LEAST_TEST_S:.0} s to test on; without test trials four times {LEAST_TEST_S:.0} s in all."
-            ),
-        }
-    }
-}
 
 /// Why the record carries no name, if it does not.
 pub(crate) fn thin(frame: &Frame, rows: RowsUsed, dt_s: f64) -> Option<Thin> {

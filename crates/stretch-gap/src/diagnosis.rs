@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{coverage::RowsUsed, missing::Proposed};
+use crate::{missing::Proposed, rows::RowsUsed};
 
 /// The answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

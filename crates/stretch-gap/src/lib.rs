@@ -33,6 +33,7 @@ mod nuisance;
 mod probability;
 mod problem;
 mod record;
+mod rows;
 mod runs;
 mod sanity;
 mod score;
@@ -43,13 +44,13 @@ mod settle;
 mod shares;
 mod simulator;
 mod spec;
+mod thin;
 mod thresholds;
 mod timing;
 mod transfer;
 mod words;
 mod worth;
 
-pub use coverage::RowsUsed;
 pub use description::{Description, DescriptionError, DescriptionSpec};
 pub use diagnose::{Options, diagnose};
 pub use diagnosis::{
@@ -69,6 +70,7 @@ pub use record::{
     column::{Column, Distortion},
     plain::copied,
 };
+pub use rows::RowsUsed;
 pub use simulator::{Model, Motion, Recorded, Run, Simulator};
 pub use spec::{EffectParameterSpec, EffectSpec, ParameterSpec, StageSpec, TrialSpec, Wander};
 pub use thresholds::Thresholds;

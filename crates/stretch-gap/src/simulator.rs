@@ -3,11 +3,11 @@
 use std::borrow::Cow;
 
 use crate::{
-    coverage::RowsUsed,
     description::Description,
     error::GapError,
     line::Line,
     record::column::{Column, Distortion},
+    rows::RowsUsed,
     spec::{EffectSpec, ParameterSpec, StageSpec, TrialSpec},
 };
 

@@ -185,3 +185,14 @@ impl Effect {
         values.iter().copied().chain(guesses).collect()
     }
 }
+
+impl Search {
+    /// Leaves out the points at which an effect does not show at a sample rate, Hz; says which rate would do where none is left.
+    pub fn at_rate(&mut self, effect: &Effect, rate_hz: f64) -> Option<f64> {
+        let least = |start: &Vec<f64>| effect.least_rate_hz(start);
+        let needed = self.starts.iter().map(least).fold(f64::INFINITY, f64::min);
+        // A rate told by rounded stamps may miss its own value by a little.
+        self.starts.retain(|start| effect.least_rate_hz(start) <= rate_hz * (1.0 + 1e-6));
+        self.starts.is_empty().then_some(needed)
+    }
+}

@@ -11,8 +11,12 @@ enum Kind {
     Drift,
     /// It follows with a time constant of so many milliseconds.
     Lag,
+    /// As [`Kind::Lag`], ahead of the sensor's noise.
+    LagAhead,
     /// It follows once a play of so many per cent of its span to either side is used up.
     Play,
+    /// As [`Kind::Play`], ahead of the sensor's noise.
+    PlayAhead,
     /// It cannot rise beyond so many per cent of its span.
     Clip,
 }
@@ -34,7 +38,7 @@ pub(crate) struct Injection {
 }
 
 /// The effects, each at three strengths.
-pub(crate) const ALL: [Injection; 5] = [
+pub(crate) const ALL: [Injection; 7] = [
     Injection {
         kind: Kind::Late,
         words: "late",
@@ -63,8 +67,27 @@ pub(crate) const ALL: [Injection; 5] = [
         size: Some(("tau", 1e3)),
     },
     Injection {
+        kind: Kind::LagAhead,
+        words: "lag, noise after it,",
+        unit: "ms",
+        strengths: [20.0, 50.0, 150.0],
+        name: "amplifier_lowpass",
+        kin: &["channel_skew", "gauge_relaxation"],
+        size: Some(("tau", 1e3)),
+    },
+    Injection {
         kind: Kind::Play,
         words: "play",
+        unit: "%",
+        strengths: [2.0, 5.0, 10.0],
+        name: "sleeve_slip",
+        kin: &["gauge_hysteresis", "pot_backlash"],
+        // The catalogue's strain has a stroke of 0.2; here the stroke is 1.
+        size: Some(("w", 100.0)),
+    },
+    Injection {
+        kind: Kind::PlayAhead,
+        words: "play, noise after it,",
         unit: "%",
         strengths: [2.0, 5.0, 10.0],
         name: "sleeve_slip",
@@ -90,7 +113,7 @@ impl Injection {
         format!("{} {strength} {}", self.words, self.unit)
     }
 
-    /// Puts it into a signal, noise and all.
+    /// Puts it into a signal.
     pub(crate) fn apply(&self, strength: f64, time_s: &[f64], signal: &mut [f64]) {
         let low = signal.iter().copied().fold(f64::INFINITY, f64::min);
         let high = signal.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -102,13 +125,9 @@ impl Injection {
                 signal.iter_mut().zip(time_s).for_each(|(y, t)| *y -= share * t / 60.0);
             }
             Kind::Lag => lag(1e-3 * strength, time_s, signal),
-            Kind::Play => {
-                let mut z = signal.first().copied().unwrap_or(0.0);
-                for y in signal {
-                    z = play(z, *y, share);
-                    *y = z;
-                }
-            }
+            Kind::LagAhead => ahead_of_noise(signal, |x| lag(1e-3 * strength, time_s, x)),
+            Kind::Play => slip(share, signal),
+            Kind::PlayAhead => ahead_of_noise(signal, |x| slip(share, x)),
             Kind::Clip => signal.iter_mut().for_each(|y| *y = y.min(low + share)),
         }
     }
@@ -139,4 +158,31 @@ fn lag(tau_s: f64, time_s: &[f64], signal: &mut [f64]) {
         z = kept * z + (1.0 - kept) * 0.5 * (before + signal[i]);
         (before, signal[i]) = (signal[i], z);
     }
+}
+
+/// A play of half-width `w`, at its middle to begin with.
+fn slip(w: f64, signal: &mut [f64]) {
+    let mut z = signal.first().copied().unwrap_or(0.0);
+    for y in signal {
+        z = play(z, *y, w);
+        *y = z;
+    }
+}
+
+/// Samples to either side whose mean is taken for the signal without its noise: 0.11 s at 100 Hz.
+const BESIDE: usize = 5;
+
+/// Acts on the signal without its noise, which is added again: what slips or trails ahead of the sensor does not slow or stop
+/// the sensor's noise.
+fn ahead_of_noise(signal: &mut [f64], act: impl Fn(&mut [f64])) {
+    let mean = |i: usize| {
+        // As many to either side, so that a slope is no bias at the ends.
+        let beside = BESIDE.min(i).min(signal.len() - 1 - i);
+        let window = &signal[i - beside..=i + beside];
+        window.iter().sum::<f64>() / window.len() as f64
+    };
+    let smooth: Vec<f64> = (0..signal.len()).map(mean).collect();
+    let mut acted = smooth.clone();
+    act(&mut acted);
+    signal.iter_mut().zip(acted.iter().zip(&smooth)).for_each(|(y, (a, s))| *y += a - s);
 }

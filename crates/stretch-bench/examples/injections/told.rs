@@ -20,8 +20,9 @@ impl Said {
         let d = &self.diagnosis;
         let shares: Vec<String> =
             d.shares.iter().map(|s| format!("{} {:.2}", s.effect, s.closes)).collect();
+        let gross: Vec<&str> = d.gross.iter().map(|g| g.sentence.as_str()).collect();
         format!(
-            "{:?}, named {:?}, tied {:?}, shares {shares:?}, 95 % {:?}, {:.1} s",
+            "{:?}, named {:?}, tied {:?}, shares {shares:?}, 95 % {:?}, {gross:?}, {:.1} s",
             d.verdict, d.named, d.tied, d.ambiguous, d.runtime_s
         )
     }
@@ -51,6 +52,16 @@ impl Said {
         let best = self.diagnosis.candidates.iter().find(|c| c.effects.iter().any(with))?;
         let own = best.parameters.iter().find(|p| p.effect == effect && p.name == parameter);
         own.map(|p| p.value)
+    }
+
+    /// Whether a name is neither what was put in, nor its kin, nor in the 95 % set of the record as it was.
+    fn names_strangely(&self, injection: &Injection, before: &Said) -> bool {
+        let is_known = |name: &String| {
+            name == injection.name
+                || injection.kin.contains(&name.as_str())
+                || before.diagnosis.ambiguous.contains(name)
+        };
+        !self.diagnosis.named.iter().all(is_known)
     }
 
     /// Whether it was noticed that the signal stands at its greatest value.
@@ -130,7 +141,7 @@ fn verdicts(said: &[Said]) -> [usize; 5] {
 
 /// By how much the fitted strength grew, over how many records; by what factor the gap; in how many records the signal is
 /// noticed to stand at its top; in how many the largest part is another than before.
-fn changes(injection: &Injection, untouched: &[Said], said: &[Said]) -> [String; 5] {
+fn changes(injection: &Injection, untouched: &[Said], said: &[Said]) -> [String; 6] {
     let pairs = || untouched.iter().zip(said);
     let mut grown: Vec<f64> = match injection.size {
         None => Vec::new(),
@@ -150,6 +161,7 @@ fn changes(injection: &Injection, untouched: &[Said], said: &[Said]) -> [String;
         median(&mut gaps).map_or("-".into(), |x| format!("{x:.2}")),
         said.iter().filter(|one| one.stands()).count().to_string(),
         pairs().filter(|(b, a)| b.largest() != a.largest()).count().to_string(),
+        pairs().filter(|(b, a)| a.names_strangely(injection, b)).count().to_string(),
     ]
 }
 

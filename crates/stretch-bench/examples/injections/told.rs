@@ -101,6 +101,7 @@ pub(crate) fn tables(untouched: &[Said], injected: &[&[Said]]) -> String {
         "gap, times",
         "stands at its top",
         "another largest part",
+        "strange name",
     ];
     heading(&mut text, "What else changes", &columns);
     for ((injection, strength), said) in rows() {
@@ -140,7 +141,7 @@ fn verdicts(said: &[Said]) -> [usize; 5] {
 }
 
 /// By how much the fitted strength grew, over how many records; by what factor the gap; in how many records the signal is
-/// noticed to stand at its top; in how many the largest part is another than before.
+/// noticed to stand at its top; in how many the largest part is another than before; in how many a name came up from nowhere.
 fn changes(injection: &Injection, untouched: &[Said], said: &[Said]) -> [String; 6] {
     let pairs = || untouched.iter().zip(said);
     let mut grown: Vec<f64> = match injection.size {

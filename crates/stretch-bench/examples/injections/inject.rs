@@ -1,0 +1,188 @@
+//! Effects in forms of their own, put into a signal that was measured.
+
+use stretch_operators::play;
+
+/// What is done to a signal.
+#[derive(Debug, Clone, Copy)]
+enum Kind {
+    /// It shows what was so many milliseconds before.
+    Late,
+    /// It sinks by so many per cent of its span a minute.
+    Drift,
+    /// It follows with a time constant of so many milliseconds.
+    Lag,
+    /// As [`Kind::Lag`], ahead of the sensor's noise.
+    LagAhead,
+    /// It follows once a play of so many per cent of its span to either side is used up.
+    Play,
+    /// As [`Kind::Play`], ahead of the sensor's noise.
+    PlayAhead,
+    /// It cannot rise beyond so many per cent of its span.
+    Clip,
+}
+
+/// An effect that is put into a signal.
+#[derive(Debug)]
+pub(crate) struct Injection {
+    kind: Kind,
+    pub(crate) words: &'static str,
+    /// Unit of the strengths.
+    unit: &'static str,
+    pub(crate) strengths: [f64; 3],
+    /// What the catalogue calls it.
+    pub(crate) name: &'static str,
+    /// Other names that a record of two minutes of alike strokes may well not tell from it.
+    pub(crate) kin: &'static [&'static str],
+    /// Its strength among the parameters of the effect, and how much of ours makes one of that.
+    pub(crate) size: Option<(&'static str, f64)>,
+}
+
+/// The effects, each at three strengths.
+pub(crate) const ALL: [Injection; 7] = [
+    Injection {
+        kind: Kind::Late,
+        words: "late",
+        unit: "ms",
+        strengths: [30.0, 70.0, 150.0],
+        name: "channel_skew",
+        kin: &["amplifier_lowpass", "gauge_relaxation"],
+        size: Some(("skew_s", 1e3)),
+    },
+    Injection {
+        kind: Kind::Drift,
+        words: "drift",
+        unit: "%/min",
+        strengths: [0.5, 1.0, 3.0],
+        name: "thermal_drift",
+        kin: &["self_heating", "gauge_softening"],
+        size: None,
+    },
+    Injection {
+        kind: Kind::Lag,
+        words: "lag",
+        unit: "ms",
+        strengths: [20.0, 50.0, 150.0],
+        name: "amplifier_lowpass",
+        kin: &["channel_skew", "gauge_relaxation"],
+        size: Some(("tau", 1e3)),
+    },
+    Injection {
+        kind: Kind::LagAhead,
+        words: "lag, noise after it,",
+        unit: "ms",
+        strengths: [20.0, 50.0, 150.0],
+        name: "amplifier_lowpass",
+        kin: &["channel_skew", "gauge_relaxation"],
+        size: Some(("tau", 1e3)),
+    },
+    Injection {
+        kind: Kind::Play,
+        words: "play",
+        unit: "%",
+        strengths: [2.0, 5.0, 10.0],
+        name: "sleeve_slip",
+        kin: &["gauge_hysteresis", "pot_backlash"],
+        // The catalogue's strain has a stroke of 0.2; here the stroke is 1.
+        size: Some(("w", 100.0)),
+    },
+    Injection {
+        kind: Kind::PlayAhead,
+        words: "play, noise after it,",
+        unit: "%",
+        strengths: [2.0, 5.0, 10.0],
+        name: "sleeve_slip",
+        kin: &["gauge_hysteresis", "pot_backlash"],
+        // The catalogue's strain has a stroke of 0.2; here the stroke is 1.
+        size: Some(("w", 100.0)),
+    },
+    // Not looked for in a gauge alone, whose amplifier is unknown.
+    Injection {
+        kind: Kind::Clip,
+        words: "clipped at",
+        unit: "%",
+        strengths: [95.0, 90.0, 80.0],
+        name: "amplifier_saturation",
+        kin: &["gauge_nonlinearity", "sleeve_slack"],
+        size: None,
+    },
+];
+
+impl Injection {
+    /// Such as `late 30 ms`.
+    pub(crate) fn in_words(&self, strength: f64) -> String {
+        format!("{} {strength} {}", self.words, self.unit)
+    }
+
+    /// Puts it into a signal.
+    pub(crate) fn apply(&self, strength: f64, time_s: &[f64], signal: &mut [f64]) {
+        let low = signal.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = signal.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let span = high - low;
+        let share = 0.01 * strength * span;
+        match self.kind {
+            Kind::Late => late(1e-3 * strength, time_s, signal),
+            Kind::Drift => {
+                signal.iter_mut().zip(time_s).for_each(|(y, t)| *y -= share * t / 60.0);
+            }
+            Kind::Lag => lag(1e-3 * strength, time_s, signal),
+            Kind::LagAhead => ahead_of_noise(signal, |x| lag(1e-3 * strength, time_s, x)),
+            Kind::Play => slip(share, signal),
+            Kind::PlayAhead => ahead_of_noise(signal, |x| slip(share, x)),
+            Kind::Clip => signal.iter_mut().for_each(|y| *y = y.min(low + share)),
+        }
+    }
+}
+
+/// y(t) -> y(t - delay), linear between samples, the first value held.
+fn late(delay_s: f64, time_s: &[f64], signal: &mut [f64]) {
+    let recorded = signal.to_vec();
+    let mut at = 0;
+    for (y, t) in signal.iter_mut().zip(time_s) {
+        let t = t - delay_s;
+        while at + 1 < time_s.len() && time_s[at + 1] <= t {
+            at += 1;
+        }
+        let next = (at + 1).min(time_s.len() - 1);
+        let step = time_s[next] - time_s[at];
+        let part = if step > 0.0 { ((t - time_s[at]) / step).max(0.0) } else { 0.0 };
+        *y = recorded[at] + part * (recorded[next] - recorded[at]);
+    }
+}
+
+/// tau z' = x - z from rest, the input between two samples their mean.
+fn lag(tau_s: f64, time_s: &[f64], signal: &mut [f64]) {
+    let Some(&first) = signal.first() else { return };
+    let (mut z, mut before) = (first, first);
+    for i in 1..signal.len() {
+        let kept = (-(time_s[i] - time_s[i - 1]) / tau_s).exp();
+        z = kept * z + (1.0 - kept) * 0.5 * (before + signal[i]);
+        (before, signal[i]) = (signal[i], z);
+    }
+}
+
+/// A play of half-width `w`, at its middle to begin with.
+fn slip(w: f64, signal: &mut [f64]) {
+    let mut z = signal.first().copied().unwrap_or(0.0);
+    for y in signal {
+        z = play(z, *y, w);
+        *y = z;
+    }
+}
+
+/// Samples to either side whose mean is taken for the signal without its noise: 0.11 s at 100 Hz.
+const BESIDE: usize = 5;
+
+/// Acts on the signal without its noise, which is added again: what slips or trails ahead of the sensor does not slow or stop
+/// the sensor's noise.
+fn ahead_of_noise(signal: &mut [f64], act: impl Fn(&mut [f64])) {
+    let mean = |i: usize| {
+        // As many to either side, so that a slope is no bias at the ends.
+        let beside = BESIDE.min(i).min(signal.len() - 1 - i);
+        let window = &signal[i - beside..=i + beside];
+        window.iter().sum::<f64>() / window.len() as f64
+    };
+    let smooth: Vec<f64> = (0..signal.len()).map(mean).collect();
+    let mut acted = smooth.clone();
+    act(&mut acted);
+    signal.iter_mut().zip(acted.iter().zip(&smooth)).for_each(|(y, (a, s))| *y += a - s);
+}

@@ -171,7 +171,7 @@ fn run(
         schema: 1,
         verdict: verdict.kind,
         sentence: told.sentence,
-        tied: naming.ties.iter().map(|(_, other)| other.clone()).collect(),
+        tied: naming.tied(),
         named: naming.named,
         faint: naming.faint,
         least_share: thresholds.least_share,

@@ -57,6 +57,17 @@ impl Naming {
         Self { named, ties, faint }
     }
 
+    /// Every name that may stand in the place of another, once.
+    pub(crate) fn tied(&self) -> Vec<String> {
+        let mut tied: Vec<String> = Vec::new();
+        for (_, other) in &self.ties {
+            if !tied.contains(other) {
+                tied.push(other.clone());
+            }
+        }
+        tied
+    }
+
     /// The headline's names, each with what may stand in its place.
     pub(crate) fn alternatives(&self) -> Vec<String> {
         let one = |name: &String| {

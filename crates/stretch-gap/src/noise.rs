@@ -88,27 +88,33 @@ impl Noise {
             .collect()
     }
 
-    /// From windows of [`WINDOW`] samples in which nothing was done; `stated` is what a rig file says. None where there are too
-    /// few windows or nothing changes in them. `dt_s` is the sample time, s: waves of the mains (50 and 60 Hz) are left out.
+    /// From windows of [`WINDOW`] samples in which nothing was done; `stated` is what a rig file says. Where they are not still,
+    /// because something moves on by itself, only the quicker half of the waves is looked at, and of slow noise nothing is said.
+    /// None where there are too few windows or nothing changes in them. `dt_s` is the sample time, s: waves of the mains (50 and 60 Hz) are left out.
     ///
     /// ```
     /// use stretch_gap::{Dice, Noise, WINDOW};
     /// let mut dice = Dice::new(1, 0);
     /// let mut window = || (0..WINDOW).map(|i| 0.01 * i as f64 + 0.2 * dice.gauss()).collect::<Vec<f64>>();
     /// let windows: Vec<Vec<f64>> = (0..60).map(|_| window()).collect();
-    /// let noise = Noise::of_windows(&windows, Some(0.2), 0.01).unwrap();
+    /// let noise = Noise::of_windows(&windows, Some(0.2), true, 0.01).unwrap();
     /// assert_eq!(noise.sd(), 0.2);
-    /// let noise = Noise::of_windows(&windows, Some(0.02), 0.01).unwrap();
+    /// let noise = Noise::of_windows(&windows, Some(0.02), true, 0.01).unwrap();
     /// assert!((noise.sd() - 0.2).abs() < 0.01);
     /// ```
-    pub fn of_windows(windows: &[Vec<f64>], stated: Option<f64>, dt_s: f64) -> Option<Self> {
+    pub fn of_windows(
+        windows: &[Vec<f64>],
+        stated: Option<f64>,
+        is_still: bool,
+        dt_s: f64,
+    ) -> Option<Self> {
         let whole: Vec<&Vec<f64>> = windows.iter().filter(|w| w.len() == WINDOW).collect();
         if whole.len() < FEWEST {
             return None;
         }
         let steps = whole.iter().flat_map(|w| w.windows(2).map(|p| (p[1] - p[0]).abs()));
         let step = steps.filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
-        let shapes = Shapes::new(dt_s);
+        let shapes = Shapes::new(is_still, dt_s);
         let powers = shapes.mean_powers(&whole);
         // A coarse converter shows nothing at all of a small noise.
         if !step.is_finite() || powers.iter().all(|p| *p <= 0.0) {
@@ -141,7 +147,7 @@ struct Shapes {
 }
 
 impl Shapes {
-    fn new(dt_s: f64) -> Self {
+    fn new(is_still: bool, dt_s: f64) -> Self {
         let n = WINDOW;
         let at = |i: usize| (2.0 * i as f64 + 1.0) / n as f64 - 1.0;
         let powers = DMatrix::from_fn(n, SLOWEST, |i, k| at(i).powi(k as i32));
@@ -162,13 +168,15 @@ impl Shapes {
             2.0 * n as f64 * (turns - turns.round()).abs()
         });
         let is_hum = |k: &usize| hum.iter().any(|h| (*k as f64 - h).abs() < 2.5);
-        let waves = (SLOWEST..n).filter(|k| !is_hum(k)).collect();
-        Self { white: of(&DMatrix::identity(n, n)), slow: slow.into(), transform, waves }
+        let slowest = if is_still { SLOWEST } else { n / 2 };
+        let waves = (slowest..n).filter(|k| !is_hum(k)).collect();
+        let slow = if is_still { slow.into() } else { Vec::new() };
+        Self { white: of(&DMatrix::identity(n, n)), slow, transform, waves }
     }
 
     /// Mean power of every wave, the upper tenth of the windows left out.
     fn mean_powers(&self, windows: &[&Vec<f64>]) -> Vec<f64> {
-        let mut powers = vec![Vec::with_capacity(windows.len()); WINDOW];
+        let mut powers: Vec<Vec<f64>> = vec![Vec::new(); WINDOW];
         for window in windows {
             // About its first value: a parabola is taken out anyway, and rounding stays small.
             let values = DVector::from_iterator(WINDOW, window.iter().map(|x| x - window[0]));
@@ -300,7 +308,8 @@ mod tests {
         {
             let (white, slow) = ((1.0 - slow as f64).sqrt(), (slow as f64).sqrt());
             let truth = Noise { white, slow, memory_samples: memory, source: String::new() };
-            let found = Noise::of_windows(&windows(&truth, 100, seed as u64), Some(1.0), 0.01);
+            let found =
+                Noise::of_windows(&windows(&truth, 100, seed as u64), Some(1.0), true, 0.01);
             let found = found.expect("enough windows");
             approx::assert_relative_eq!(found.sd(), 1.0, max_relative = NOISE_LEVEL);
             let (share, found) = found.slow();
@@ -314,10 +323,11 @@ mod tests {
     fn what_is_stated_is_a_hypothesis() {
         for seed in 0..20 {
             let windows = windows(&Noise::known(1.0), 100, seed);
-            let borne = Noise::of_windows(&windows, Some(1.0), 0.01).expect("enough windows");
+            let borne = Noise::of_windows(&windows, Some(1.0), true, 0.01).expect("enough windows");
             assert_eq!(borne, Noise::known(1.0), "seed {seed}");
             for stated in [Some(1.3), Some(30.0), None] {
-                let other = Noise::of_windows(&windows, stated, 0.01).expect("enough windows");
+                let other =
+                    Noise::of_windows(&windows, stated, true, 0.01).expect("enough windows");
                 approx::assert_relative_eq!(other.sd(), 1.0, max_relative = NOISE_LEVEL);
             }
         }
@@ -329,9 +339,9 @@ mod tests {
         for window in &mut all[..6] {
             window[60..].iter_mut().for_each(|x| *x += 30.0);
         }
-        let found = Noise::of_windows(&all, None, 0.01).expect("enough windows");
+        let found = Noise::of_windows(&all, None, true, 0.01).expect("enough windows");
         approx::assert_relative_eq!(found.sd(), 1.0, max_relative = NOISE_LEVEL);
-        assert_eq!(Noise::of_windows(&all[..5], None, 0.01), None);
-        assert_eq!(Noise::of_windows(&vec![vec![2.0; WINDOW]; 50], None, 0.01), None);
+        assert_eq!(Noise::of_windows(&all[..5], None, true, 0.01), None);
+        assert_eq!(Noise::of_windows(&vec![vec![2.0; WINDOW]; 50], None, true, 0.01), None);
     }
 }

@@ -73,6 +73,6 @@ pub(crate) fn shares(
         });
         with = without;
     }
-    out.reverse();
+    out.sort_by(|a: &EffectShare, b| b.closes.total_cmp(&a.closes));
     Ok(out)
 }

@@ -8,6 +8,9 @@ use super::session::{RigTrial, Session};
 /// Share of the quiet windows that are listened to, those the longest after a command, and how many at least.
 const LISTENED: (f64, usize) = (0.5, 24);
 
+/// Time after a command from which a muscle stands still but for what a parabola follows, s: a few of its time constants.
+const SETTLED_S: f64 = 2.0;
+
 /// Noise of every channel, steps of the converters included.
 #[derive(Debug, Clone)]
 pub(super) struct Noises {
@@ -31,8 +34,8 @@ impl Noises {
                 let values = channel(&session.trials()[trial]);
                 values.get(from..from + WINDOW).unwrap_or(&[]).to_vec()
             };
-            let windows: Vec<Vec<f64>> = quiet.iter().map(window).collect();
-            Noise::of_windows(&windows, Some(stated), session.dt_s())
+            let windows: Vec<Vec<f64>> = quiet.places.iter().map(window).collect();
+            Noise::of_windows(&windows, Some(stated), quiet.is_still, session.dt_s())
                 .unwrap_or_else(|| Noise::known(stated))
         };
         Self {
@@ -43,8 +46,14 @@ impl Noises {
     }
 }
 
-/// Windows without a command: trial and first sample, the ones that begin the longest after a command first.
-fn quiet(session: &Session) -> Vec<(usize, usize)> {
+/// Windows without a command: trial and first sample.
+struct Quiet {
+    places: Vec<(usize, usize)>,
+    /// Whether all of them begin long after a command.
+    is_still: bool,
+}
+
+fn quiet(session: &Session) -> Quiet {
     let mut all: Vec<(usize, (usize, usize))> = Vec::new();
     for (i, trial) in session.trials().iter().enumerate().filter(|(_, t)| !t.is_test) {
         let commands: Vec<(f64, f64)> =
@@ -59,7 +68,11 @@ fn quiet(session: &Session) -> Vec<(usize, usize)> {
             from += still.len();
         }
     }
-    all.sort_by(|a, b| b.0.cmp(&a.0));
-    let listened = ((LISTENED.0 * all.len() as f64) as usize).max(LISTENED.1).min(all.len());
-    all.into_iter().take(listened).map(|(_, place)| place).collect()
+    all.sort_by_key(|window| std::cmp::Reverse(window.0));
+    let listened = ((LISTENED.0 * all.len() as f64) as usize).max(LISTENED.1);
+    let settled = (SETTLED_S / session.dt_s()) as usize;
+    let count = all.iter().filter(|(since, _)| *since >= settled).count();
+    let is_still = count >= LISTENED.1;
+    all.truncate(if is_still { listened.min(count) } else { listened });
+    Quiet { places: all.into_iter().map(|(_, place)| place).collect(), is_still }
 }

@@ -30,8 +30,8 @@ const RANGE: f64 = 0.8;
 const KEEPS: f64 = 4.0;
 /// Samples of such a block.
 const BLOCK: usize = 10;
-/// Share of its range that another column moves by, at least, while one is stuck.
-const MOVES: f64 = 0.1;
+/// Share of its range that another column moves by, at least, while one is stuck: play in a sensor is less.
+const MOVES: f64 = 0.3;
 /// ln of the probability that noise repeats itself like that.
 const CHANCE: f64 = -20.7;
 

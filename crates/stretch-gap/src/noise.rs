@@ -25,9 +25,8 @@ pub const WINDOW: usize = 128;
 const FEWEST: usize = 12;
 /// Waves slower than parabolas leave, in half turns a window.
 const SLOWEST: usize = 3;
-/// Share of the windows left out of each mean, and the mean of the rest of a squared normal variable:
-/// P(chi^2_3 < q)/0.9 at the 0.9 quantile q = 2.7055 of chi^2_1.
-const TRIMMED: (f64, f64) = (0.1, 0.6232);
+/// Share of the windows left out of each mean, those with the most power.
+const TRIMMED: f64 = 0.1;
 /// Memories that are tried, in samples.
 const MEMORIES: [f64; 9] = [1.5, 2.2, 3.3, 5.0, 7.5, 11.0, 17.0, 25.0, 38.0];
 /// Shares of the slow part that are tried.
@@ -135,6 +134,19 @@ impl Noise {
     }
 }
 
+/// Mean of a squared normal variable over the share `kept` of its least values: (kept - 2 z phi(z))/kept with
+/// P(|x| < z) = kept and the density phi.
+fn trimmed_mean(kept: f64) -> f64 {
+    let (mut low, mut high) = (0.0, 9.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        let within = libm::erf(middle / std::f64::consts::SQRT_2);
+        if within < kept { low = middle } else { high = middle }
+    }
+    let density = (-0.5 * low * low).exp() / std::f64::consts::TAU.sqrt();
+    (kept - 2.0 * low * density) / kept
+}
+
 /// Powers that white and slow noise have in the windows.
 struct Shapes {
     /// D M, waves by samples.
@@ -184,10 +196,11 @@ impl Shapes {
                 power.push(x * x);
             }
         }
-        let kept = ((1.0 - TRIMMED.0) * windows.len() as f64) as usize;
+        let kept = ((1.0 - TRIMMED) * windows.len() as f64) as usize;
+        let share = trimmed_mean(kept as f64 / windows.len() as f64);
         let mean = |mut power: Vec<f64>| {
             power.sort_by(f64::total_cmp);
-            power[..kept].iter().sum::<f64>() / kept as f64 / TRIMMED.1
+            power[..kept].iter().sum::<f64>() / kept as f64 / share
         };
         powers.into_iter().map(mean).collect()
     }
@@ -316,6 +329,13 @@ mod tests {
             approx::assert_abs_diff_eq!(share, slow * slow, epsilon = NOISE_LEVEL);
             assert!((0.5..2.0).contains(&(found / memory)), "{found} for {memory}");
         }
+    }
+
+    #[test]
+    fn a_trimmed_mean_is_exact() {
+        // P(chi^2_3 < 2.7055)/0.9 at the 0.9 quantile of chi^2_1.
+        approx::assert_abs_diff_eq!(trimmed_mean(0.9), 0.6230, epsilon = 1e-4);
+        approx::assert_abs_diff_eq!(trimmed_mean(1.0), 1.0, epsilon = 1e-12);
     }
 
     /// A stated level that the record bears out stands; one that it does not gives way.

@@ -91,7 +91,11 @@ fn unknowns(cases: &[&Case]) -> (f64, f64, f64) {
         let Some(best) = d.candidates.first() else { continue };
         let of = |name: &String| best.effects.contains(name);
         match label.kind {
-            CaseKind::Null if d.verdict == VerdictKind::Unknown => nulls.push(d.gap),
+            CaseKind::Null => {
+                let is_called = d.verdict == VerdictKind::Unknown;
+                // What is told as noise has no gap to be called unknown.
+                nulls.push(if is_called { d.gap } else { Excess { left: 0.0, ..d.gap } });
+            }
             CaseKind::OutOfCatalogue if is_counted(label, d) => foreign.push(d.gap),
             CaseKind::Struck if is_counted(label, d) => {
                 let truth = &label.effects[0];

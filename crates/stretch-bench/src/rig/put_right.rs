@@ -68,7 +68,9 @@ impl RigSimulator {
             read_by: (0..self.stage_kinds.len()).filter(commanded).collect(),
             is_command: true,
             skew_s: [0.0; 2],
-            hint: Cow::Borrowed("the scale on which commands are written, and the valves' supply"),
+            hint: Cow::Borrowed(
+                "the scale on which commands are written, the valves' supply, and the volume and the conductances in the rig file",
+            ),
         };
         self.stage_kinds.iter().enumerate().map(output).chain([commands]).collect()
     }

@@ -9,7 +9,7 @@ use crate::{
     diagnosis::{Candidate, Diagnosis, Unexplained, VerdictKind, Where},
     error::GapError,
     evidence::Evidence,
-    judge::{Case, judge},
+    judge::{Case, Verdict, judge},
     lacking::lacking,
     localise,
     naming::Naming,
@@ -134,13 +134,20 @@ fn run(
     let thin = thin(&evidence.frame, rows_used, simulator.dt_s());
     let verdict = carried(judge(case, thresholds), thin);
     let (verdict, proposed) = lacking(problem, &found.best, (verdict, evidence.gap), progress)?;
-    let names = matches!(verdict.kind, VerdictKind::Effect | VerdictKind::Partial);
-    let naming = match names {
-        true => {
-            let is_short = is_short(&evidence.frame, simulator.dt_s());
+    let is_short = is_short(&evidence.frame, simulator.dt_s());
+    let naming = match verdict.kind {
+        VerdictKind::Effect | VerdictKind::Partial => {
             Naming::of(&candidates, &shares, thresholds, is_short)
         }
-        false => Naming::default(),
+        _ => Naming::default(),
+    };
+    let names = !naming.named.is_empty();
+    // Where all that was found stands at an end of its range, it stands in for something else.
+    let verdict = match verdict.kind {
+        VerdictKind::Effect | VerdictKind::Partial if !names => {
+            Verdict { kind: VerdictKind::Unknown, ..verdict }
+        }
+        _ => verdict,
     };
     let transfer = match names {
         true => {

@@ -29,14 +29,16 @@ impl Naming {
         is_short: bool,
     ) -> Self {
         let Some(first) = candidates.first() else { return Self::default() };
-        let share =
-            |name: &str| shares.iter().find(|s| s.effect == name).map(|s| s.closes_of_stage);
+        // What stands at an end of its range stands in for something else.
+        let of = |share: &EffectShare| if share.at_bound { 0.0 } else { share.closes_of_stage };
+        let share = |name: &str| shares.iter().find(|s| s.effect == name).map(of);
         // A rival that came out first was not taken apart: it stands where an effect that was stood.
         let counts = |name: &&String| share(name).is_none_or(|s| s >= thresholds.least_share);
         let (mut named, mut faint): (Vec<String>, Vec<String>) =
             first.effects.iter().cloned().partition(|name| counts(&name));
-        if named.is_empty() && !faint.is_empty() {
-            named.push(faint.remove(0));
+        let is_inside = |name: &String| !shares.iter().any(|s| s.effect == *name && s.at_bound);
+        if let Some(at) = faint.iter().position(is_inside).filter(|_| named.is_empty()) {
+            named.push(faint.remove(at));
         }
         // On a short record probabilities part what the held-out gap does not.
         let closes_alike = |c: &Candidate| is_short && c.closed >= first.closed_ci[0];

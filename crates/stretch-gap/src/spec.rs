@@ -205,7 +205,7 @@ impl EffectSpec {
         }
     }
 
-    /// Whether a parameter that is no form stands at an end of its range where the effect is not off: it stands in for something
+    /// Whether a size stands at an end of its range where the effect is not off: it stands in for something
     /// else then.
     pub(crate) fn is_at_bound(&self, values: &[f64]) -> bool {
         let mut fitted = self.parameters.iter().zip(values).filter(|(p, _)| p.is_fitted);
@@ -214,7 +214,8 @@ impl EffectSpec {
                 true => (value / end).ln().abs() < AT_END * (p.max / p.min).ln(),
                 false => (value - end).abs() < AT_END * (p.max - p.min),
             };
-            p.form.is_none() && (near(p.min) || near(p.max)) && !p.off.is_some_and(near)
+            // A time beyond its range is still that of a memory; a size beyond it is another cause's.
+            p.off.is_some_and(|off| !near(off)) && (near(p.min) || near(p.max))
         }) && !self.is_found
     }
 

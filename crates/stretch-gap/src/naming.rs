@@ -29,16 +29,19 @@ impl Naming {
         is_short: bool,
     ) -> Self {
         let Some(first) = candidates.first() else { return Self::default() };
-        // What stands at an end of its range stands in for something else.
-        let of = |share: &EffectShare| if share.at_bound { 0.0 } else { share.closes_of_stage };
-        let share = |name: &str| shares.iter().find(|s| s.effect == name).map(of);
+        let share =
+            |name: &str| shares.iter().find(|s| s.effect == name).map(|s| s.closes_of_stage);
         // A rival that came out first was not taken apart: it stands where an effect that was stood.
         let counts = |name: &&String| share(name).is_none_or(|s| s >= thresholds.least_share);
         let (mut named, mut faint): (Vec<String>, Vec<String>) =
             first.effects.iter().cloned().partition(|name| counts(&name));
-        let is_inside = |name: &String| !shares.iter().any(|s| s.effect == *name && s.at_bound);
-        if let Some(at) = faint.iter().position(is_inside).filter(|_| named.is_empty()) {
-            named.push(faint.remove(at));
+        if named.is_empty() && !faint.is_empty() {
+            named.push(faint.remove(0));
+        }
+        // Where every size stands at an end of its range, the set stands in for something else.
+        let is_bound = |name: &String| shares.iter().any(|s| s.effect == *name && s.at_bound);
+        if named.iter().all(is_bound) {
+            faint.splice(0..0, named.drain(..));
         }
         // On a short record probabilities part what the held-out gap does not.
         let closes_alike = |c: &Candidate| is_short && c.closed >= first.closed_ci[0];

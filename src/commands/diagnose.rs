@@ -106,7 +106,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
 
 /// What is diagnosed: a whole rig, or a gauge alone.
 pub(super) enum Bench {
-    Rig(RigSimulator),
+    Rig(Box<RigSimulator>),
     Gauge(GaugeSimulator),
 }
 
@@ -133,12 +133,12 @@ impl Bench {
             "a single trial is diagnosed as a gauge alone: say which columns with --reference and --signal, \
              or give the folder of a data set"
         );
-        Ok(Self::Rig(RigSimulator::read(path, rig, catalogue)?))
+        Ok(Self::Rig(Box::new(RigSimulator::read(path, rig, catalogue)?)))
     }
 
     pub(super) fn simulator(&self) -> &dyn Simulator {
         match self {
-            Self::Rig(rig) => rig,
+            Self::Rig(rig) => rig.as_ref(),
             Self::Gauge(gauge) => gauge,
         }
     }
@@ -154,7 +154,7 @@ impl Bench {
             Self::Gauge(gauge) => examine(gauge, options, look_on, bar, gauge.notes(), &[]),
             Self::Rig(rig) => {
                 let rails = rails(rig.nominal(), rig.session());
-                examine(rig, options, look_on, bar, rig.notes(), &rails)
+                examine(rig.as_ref(), options, look_on, bar, rig.notes(), &rails)
             }
         }
     }

@@ -319,7 +319,7 @@ mod tests {
     fn level_colour_and_memory_are_found_again() {
         for (seed, (slow, memory)) in [(0.3, 2.0), (0.5, 7.0), (0.7, 20.0)].into_iter().enumerate()
         {
-            let (white, slow) = ((1.0 - slow as f64).sqrt(), (slow as f64).sqrt());
+            let (white, slow) = ((1.0_f64 - slow).sqrt(), f64::sqrt(slow));
             let truth = Noise { white, slow, memory_samples: memory, source: String::new() };
             let found =
                 Noise::of_windows(&windows(&truth, 100, seed as u64), Some(1.0), true, 0.01);

@@ -107,7 +107,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
 /// What is diagnosed: a whole rig, or a gauge alone.
 pub(super) enum Bench {
     Rig(Box<RigSimulator>),
-    Gauge(GaugeSimulator),
+    Gauge(Box<GaugeSimulator>),
 }
 
 /// A diagnosis, what it was found from, and the experiment that it recommends.
@@ -126,7 +126,7 @@ impl Bench {
         catalogue: &Catalogue,
     ) -> anyhow::Result<Self> {
         if let Some(gauge) = GaugeSimulator::read(path, columns, rig, catalogue)? {
-            return Ok(Self::Gauge(gauge));
+            return Ok(Self::Gauge(Box::new(gauge)));
         }
         ensure!(
             path.is_dir(),
@@ -139,7 +139,7 @@ impl Bench {
     pub(super) fn simulator(&self) -> &dyn Simulator {
         match self {
             Self::Rig(rig) => rig.as_ref(),
-            Self::Gauge(gauge) => gauge,
+            Self::Gauge(gauge) => gauge.as_ref(),
         }
     }
 
@@ -151,7 +151,9 @@ impl Bench {
         bar: &ProgressBar,
     ) -> Result<Examined, GapError> {
         match self {
-            Self::Gauge(gauge) => examine(gauge, options, look_on, bar, gauge.notes(), &[]),
+            Self::Gauge(gauge) => {
+                examine(gauge.as_ref(), options, look_on, bar, gauge.notes(), &[])
+            }
             Self::Rig(rig) => {
                 let rails = rails(rig.nominal(), rig.session());
                 examine(rig.as_ref(), options, look_on, bar, rig.notes(), &rails)

@@ -122,7 +122,7 @@ impl Sessions {
             rig: None,
             catalogue: &catalogue,
         };
-        Ok(Bench::Gauge(GaugeSimulator::new(&setup)?))
+        Ok(Bench::Gauge(Box::new(GaugeSimulator::new(&setup)?)))
     }
 }
 

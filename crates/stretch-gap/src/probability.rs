@@ -54,11 +54,12 @@ pub(crate) fn weigh(
 }
 
 /// Probability that something else than mismatch of its form leaves what the best set leaves: even where that is what form may leave,
-/// by the logistic of the logarithm beyond.
+/// by the logistic of the logarithm beyond, with the odds that it has at the border.
 pub(crate) fn unknown(gap: Excess, thresholds: &Thresholds) -> f64 {
     let allowed = thresholds.unknown_excess + thresholds.unknown_share * gap.retuned;
     let beyond = (gap.left.max(f64::MIN_POSITIVE) / allowed).ln();
-    1.0 / (1.0 + (-beyond / thresholds.unknown_soft).exp())
+    let odds = thresholds.unknown_odds * (beyond / thresholds.unknown_soft).exp();
+    odds / (1.0 + odds)
 }
 
 /// Effects of the smallest set of candidates that holds 95 % of the probability, the best candidate's first.

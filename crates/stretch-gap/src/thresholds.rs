@@ -26,6 +26,8 @@ pub struct Thresholds {
     pub unknown_share: f64,
     /// Width of the border to `unknown`, in logarithms of the excess left.
     pub unknown_soft: f64,
+    /// Odds of `unknown` at its border.
+    pub unknown_odds: f64,
     /// Least share of the held-out gap that a name in the headline closes.
     pub least_share: f64,
     /// Share of the held-out gap that one effect closes at least where it is named though more is left than its form explains.

@@ -10,6 +10,8 @@ const COLDEST: f64 = 5.0;
 /// Widths of the border between known and unknown that are tried, in logarithms of the excess left; the first is the one that the border is
 /// laid by: a sharp one would follow single cases.
 const SOFT: [f64; 6] = [0.2, 0.3, 0.45, 0.7, 1.0, 1.5];
+/// Odds of `unknown` at its border that are tried.
+const ODDS: [f64; 6] = [0.05, 0.1, 0.165, 0.3, 0.55, 1.0];
 /// Room for rigs that no generator of ours made: `unknown` begins at this many times the greatest gap of a null that was called so.
 const ROOM: f64 = 1.5;
 /// Excess below which nothing is called unknown: floors are known to a twentieth.
@@ -20,13 +22,14 @@ const DEAR: f64 = 3.0;
 /// Thresholds of labelled cases that were diagnosed; those that steer the search stay as they are.
 pub(crate) fn calibrated(cases: &[&Case]) -> Thresholds {
     let (temperature, rho) = probabilities(cases);
-    let (unknown_excess, unknown_share, unknown_soft) = unknowns(cases);
+    let (unknown_excess, unknown_share, unknown_soft, unknown_odds) = unknowns(cases);
     Thresholds {
         temperature,
         rho,
         unknown_excess,
         unknown_share,
         unknown_soft,
+        unknown_odds,
         ..Thresholds::frozen()
     }
 }
@@ -80,7 +83,7 @@ fn probabilities(cases: &[&Case]) -> (f64, f64) {
 }
 
 /// Excess and share of it that mismatch of form may leave, between cases that an effect explains and those that none does.
-fn unknowns(cases: &[&Case]) -> (f64, f64, f64) {
+fn unknowns(cases: &[&Case]) -> (f64, f64, f64, f64) {
     let is_counted = |label: &Label, d: &Diagnosis| {
         label.excess >= COUNTED_EXCESS && d.gap.retuned > Thresholds::frozen().null_excess
     };
@@ -140,15 +143,21 @@ fn unknowns(cases: &[&Case]) -> (f64, f64, f64) {
         called(&nulls, excess, share),
         nulls.len()
     );
-    // The width under which the truths are likeliest.
-    let likelihood = |soft: f64| -> f64 {
+    // Width and odds under which the truths are likeliest.
+    let likelihood = |soft: f64, odds: f64| -> f64 {
         let ln = |p: f64| p.clamp(NOT_LISTED, 1.0).ln();
-        let is: f64 = foreign.iter().map(|g| ln(of(g, excess, share, soft))).sum();
-        let known = explained.iter().chain(&nulls);
-        is + known.map(|g| ln(1.0 - of(g, excess, share, soft))).sum::<f64>()
+        let of = |g: &Excess| {
+            let beyond = (g.left.max(1e-6) / (excess + share * g.retuned)).ln();
+            let odds = odds * (beyond / soft).exp();
+            odds / (1.0 + odds)
+        };
+        let is: f64 = foreign.iter().map(|g| ln(of(g))).sum();
+        is + explained.iter().chain(&nulls).map(|g| ln(1.0 - of(g))).sum::<f64>()
     };
-    let soft = SOFT.into_iter().max_by(|a, b| likelihood(*a).total_cmp(&likelihood(*b)));
-    (round(excess), round(share), soft.unwrap_or(SOFT[0]))
+    let grid = SOFT.into_iter().flat_map(|soft| ODDS.map(|odds| (soft, odds)));
+    let best = grid.max_by(|a, b| likelihood(a.0, a.1).total_cmp(&likelihood(b.0, b.1)));
+    let (soft, odds) = best.unwrap_or((SOFT[0], 1.0));
+    (round(excess), round(share), soft, odds)
 }
 
 /// To three digits behind the point.

@@ -18,7 +18,8 @@ use std::f64::consts::TAU;
 /// ```
 /// use stretch_gap::Line;
 /// // Ten floors of 60 Hz on one second at 100 Hz: of a mean square of 50 one floor's worth is left.
-/// let mut residual: Vec<f64> = (0..100).map(|i| 10.0 * (37.7 * 0.01 * i as f64 + 0.3).sin()).collect();
+/// let turn = std::f64::consts::TAU * 60.0 * 0.01;
+/// let mut residual: Vec<f64> = (0..100).map(|i| 10.0 * (turn * i as f64 + 0.3).sin()).collect();
 /// let line = Line { hertz: 60.0, amplitude: 10.0 };
 /// line.level(&mut residual, &[1.0; 100], 0.01);
 /// let left: f64 = residual.iter().map(|r| r * r).sum();

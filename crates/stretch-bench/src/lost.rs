@@ -21,9 +21,27 @@ pub(crate) fn open(is_lost: &[bool]) -> Vec<bool> {
     out
 }
 
+/// Time for which a part of a trial that begins amid a motion shows what nobody saw before it, s: a few time constants of a muscle.
+const AMID_S: f64 = 1.0;
+
+/// The same for a part that goes on behind a gap: what moved within the gap still moves.
+pub(crate) fn open_behind(is_lost: &[bool], dt_s: f64) -> Vec<bool> {
+    let mut out = open(is_lost);
+    let amid = ((AMID_S / dt_s) as usize).min(out.len());
+    out[..amid].fill(true);
+    out
+}
+
 #[cfg(test)]
 mod tests {
-    use super::open;
+    use super::{open, open_behind};
+
+    #[test]
+    fn a_part_begins_with_a_second_that_counts_for_nothing() {
+        let open: Vec<bool> = open_behind(&[false; 250], 0.01);
+        assert!(open[..100].iter().all(|o| *o) && !open[100..].iter().any(|o| *o));
+        assert_eq!(open_behind(&[false; 2], 0.01), [true; 2]);
+    }
 
     #[test]
     fn a_long_gap_leaves_as_many_samples_open_behind_it() {

@@ -44,7 +44,9 @@ impl Prepared {
                 return Err(CalibrateError::SampleRates { trial, rate_hz, first, first_hz });
             }
             let columns = [options.signal.as_str(), options.reference.as_str()];
-            let spec = EvenSpec { rate_hz: sample_rate.hz(), shortest: SHORTEST, bridged_s: 0.0 };
+            let rate_hz = sample_rate.hz();
+            let spec =
+                EvenSpec { rate_hz, shortest: SHORTEST, bridged_s: 0.0, over_switches: true };
             let even = trial.even(&columns, spec)?;
             rows.add(even.rows);
             notes.extend(even.notes);

@@ -14,6 +14,8 @@ const CLOCKS: f64 = 1e-3;
 const OTHER_RATE: f64 = 0.05;
 /// More gaps than these are told in one sentence.
 const TOLD: usize = 3;
+/// Change of an opening that is a switch: one sample of it is more than noise. What is smaller is bridged well by whatever holds.
+const SWITCH: f64 = 0.05;
 /// Channels that a device holds from one sample to the next: commands of the valves.
 const HELD: [&str; 2] = ["inlet", "outlet"];
 
@@ -24,8 +26,10 @@ pub struct EvenSpec {
     pub rate_hz: f64,
     /// Parts between two gaps with fewer samples are left out, and so is a trial.
     pub shortest: usize,
-    /// Longest gap that is bridged, s, where the commands are the same on both sides of it; three samples always are.
+    /// Longest gap that is bridged, s, where the commands are the same on both sides of it; three samples always are then.
     pub bridged_s: f64,
+    /// Whether three samples are bridged where a valve switched between them as well, though nobody knows when.
+    pub over_switches: bool,
 }
 
 /// What became of a trial's rows.
@@ -103,10 +107,11 @@ impl Trial {
     /// Brings columns of the trial onto an even grid.
     ///
     /// - Samples within a fifth of a period of the grid are taken as they are.
-    /// - Up to three lost samples in a row are bridged. The channels `inlet` and `outlet` are commands, which the valves
-    ///   hold: they keep their last value. Anything else is measured and goes straight from the sample before the gap to
-    ///   the one behind it. A live receptor moves its last sample on by the last rate instead: it cannot see what comes,
-    ///   a log can, and a line between two samples cannot overshoot.
+    /// - Up to three lost samples in a row are bridged, over a switch of a valve only with [`EvenSpec::over_switches`]. The
+    ///   channels `inlet` and `outlet` are commands, which the valves hold: they keep their last value. Anything else is
+    ///   measured and goes straight from the sample before the gap to the one behind it. A live receptor moves its last
+    ///   sample on by the last rate instead: it cannot see what comes, a log can, and a line between two samples cannot
+    ///   overshoot.
     /// - So is a longer gap up to [`EvenSpec::bridged_s`] where the commands behind it are those before it.
     /// - More lost samples cut the trial; parts with fewer than [`EvenSpec::shortest`] samples are left out.
     /// - Uneven stamps are resampled: measured channels by straight lines, of the commands the one that holds in the middle
@@ -123,7 +128,8 @@ impl Trial {
     /// let length = channel("length_mm", vec![180.0, 179.0, 177.0, 176.0]);
     /// let inlet = channel("inlet", vec![0.5, 0.5, 0.0, 0.0]);
     /// let trial = Trial { name: "a.csv".into(), time_s, channels: vec![length, inlet] };
-    /// let even = trial.even(&["length_mm", "inlet"], EvenSpec { rate_hz: 100.0, shortest: 2, bridged_s: 0.0 })?;
+    /// let spec = EvenSpec { rate_hz: 100.0, shortest: 2, bridged_s: 0.0, over_switches: true };
+    /// let even = trial.even(&["length_mm", "inlet"], spec)?;
     /// assert_eq!(even.parts[0].columns[0], [180.0, 179.0, 178.0, 177.0, 176.0]);
     /// assert_eq!(even.parts[0].columns[1], [0.5, 0.5, 0.5, 0.0, 0.0]);
     /// assert_eq!((even.rows.read, even.rows.bridged), (4, 1));
@@ -150,13 +156,14 @@ impl Trial {
         };
         let mut even = Even { parts: Vec::new(), rows: Rows::default(), notes: Vec::new() };
         even.rows.read = self.len();
-        let is_same = |i: usize| {
-            let mut held = values.iter().zip(&is_held).filter(|(_, held)| **held);
-            held.all(|(column, _)| column[i - 1] == column[i])
+        let changed = |i: usize| {
+            let held = values.iter().zip(&is_held).filter(|(_, held)| **held);
+            held.map(|(column, _)| (column[i] - column[i - 1]).abs()).fold(0.0, f64::max)
         };
-        let most = |i: usize| match is_same(i) {
-            true => ((spec.bridged_s / clock.own_s).round() as usize).max(MOST_BRIDGED),
-            false => MOST_BRIDGED,
+        let most = |i: usize| match changed(i) {
+            0.0 => ((spec.bridged_s / clock.own_s).round() as usize).max(MOST_BRIDGED),
+            change if change > SWITCH && !spec.over_switches => 0,
+            _ => MOST_BRIDGED,
         };
         let stretches = clock.stretches(&self.time_s, most);
         even.tell_gaps(self, &stretches, clock.own_s);

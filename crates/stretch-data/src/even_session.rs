@@ -130,7 +130,8 @@ impl EvenSession {
     /// Brings columns of trials onto one even grid, as [`Trial::even`]; the first trial's rate is the session's.
     ///
     /// Trials go in the order of their `start_s`. Where that does not rise, they go in the order given, with pauses of 15 s.
-    /// Gaps of up to half a second are bridged where the commands are the same on both sides.
+    /// Gaps of up to half a second are bridged where the commands are the same on both sides, none where a valve switched
+    /// meanwhile: when it did, nobody knows, and one sample of a wrong flow stays in the chamber for seconds.
     /// Parts of a trial with gaps begin where the trial's time says, and inherit its kind and split.
     ///
     /// # Errors
@@ -148,8 +149,8 @@ impl EvenSession {
         let (dt_s, rows) = (1.0 / rate_hz, Rows::default());
         let mut session = Self { trials: Vec::new(), dt_s, rows, notes: Vec::new() };
         for (one, start_s) in session.in_order(trials) {
-            let even =
-                one.trial.even(columns, EvenSpec { rate_hz, shortest, bridged_s: BRIDGED_S })?;
+            let spec = EvenSpec { rate_hz, shortest, bridged_s: BRIDGED_S, over_switches: false };
+            let even = one.trial.even(columns, spec)?;
             let count = even.parts.len();
             session.rows.add(even.rows);
             session.notes.extend(even.notes);

@@ -2,7 +2,8 @@
 
 use stretch_data::{Channel, DataError, EvenSession, EvenSpec, SessionTrial, Split, Trial};
 
-const SPEC: EvenSpec = EvenSpec { rate_hz: 100.0, shortest: 10, bridged_s: 0.0 };
+const SPEC: EvenSpec =
+    EvenSpec { rate_hz: 100.0, shortest: 10, bridged_s: 0.0, over_switches: true };
 
 /// A trial of a line in time, and of a command that is 1 from half a second on.
 fn trial(time_s: Vec<f64>) -> Trial {
@@ -48,6 +49,16 @@ fn every_gap_of_up_to_three_samples_is_bridged_and_a_longer_one_cuts() {
             assert!((x - y).abs() < ROUNDING);
         }
         assert_eq!(even.parts[0].columns[1], whole.channels[1].values);
+    }
+}
+
+#[test]
+fn a_gap_in_which_a_valve_switched_cuts_a_session() {
+    for (lost, parts) in [(48..49, 1), (49..52, 2), (50..51, 2), (52..54, 1)] {
+        let kept = stamps(200).into_iter().enumerate().filter(|(i, _)| !lost.contains(i));
+        let trial = SessionTrial::new(trial(kept.map(|(_, t)| t).collect()));
+        let session = EvenSession::new(&[trial], &["length_mm", "inlet"], 10).expect("a session");
+        assert_eq!(session.trials().len(), parts, "{lost:?}");
     }
 }
 

@@ -6,7 +6,11 @@ use stretch_data::{DataSet, EvenSession, EvenTrial, ReadOptions, Rows, SessionTr
 use stretch_gap::{copied, noise_variance};
 
 use super::smooth::{Smoothed, schedule};
-use crate::{error::BenchError, lost::open, wild::tamed};
+use crate::{
+    error::BenchError,
+    lost::{open, open_behind},
+    wild::tamed,
+};
 
 /// Columns that a rig needs; a pressure is welcome.
 const NEEDED: [&str; 4] = ["inlet", "outlet", "length_mm", "bridge_v"];
@@ -38,8 +42,9 @@ pub struct RigTrial {
 }
 
 impl RigTrial {
-    /// The trial of a session whose columns are [`NEEDED`], then the pressure where there is one.
-    fn of(trial: &EvenTrial, excitation: f64) -> Self {
+    /// The trial of a session whose columns are [`NEEDED`], then the pressure where there is one; `before` is the one before it.
+    fn of(trial: &EvenTrial, before: Option<&EvenTrial>, excitation: f64, dt_s: f64) -> Self {
+        let goes_on = before.is_some_and(|before| before.source() == trial.source());
         let column = |i: usize| trial.columns().get(i).cloned();
         let needed = |i: usize| column(i).unwrap_or_default();
         Self {
@@ -51,7 +56,10 @@ impl RigTrial {
             length_mm: needed(2),
             bridge_v: needed(3),
             pressure_kpa: column(4),
-            is_lost: open(trial.is_lost()),
+            is_lost: match goes_on {
+                true => open_behind(trial.is_lost(), dt_s),
+                false => open(trial.is_lost()),
+            },
             excitation,
         }
     }
@@ -116,9 +124,11 @@ impl Session {
         let (trials, wild) = tamed(trials);
         let trials = &trials[..];
         let even = EvenSession::new(trials, &columns, SHORTEST)?;
-        let of = |t: &EvenTrial| RigTrial::of(t, shares[t.source()]);
+        let before = std::iter::once(None).chain(even.trials().iter().map(Some));
+        let of =
+            |(t, before): (&EvenTrial, _)| RigTrial::of(t, before, shares[t.source()], even.dt_s());
         let mut session = Self {
-            trials: even.trials().iter().map(of).collect(),
+            trials: even.trials().iter().zip(before).map(of).collect(),
             dt_s: even.dt_s(),
             rows: even.rows(),
             notes: even.notes().iter().cloned().chain(wild).collect(),

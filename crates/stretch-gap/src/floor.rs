@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use crate::{
     error::GapError,
     frame::{Frame, Role},
+    lone::lone,
     noise::Noise,
     runs::Runs,
     simulator::{Model, Run, Simulator},
@@ -20,7 +21,8 @@ use crate::{
 /// Floor of one stage.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Floor {
-    /// One standard deviation at every sample of all trials, in the unit of the output; infinite where nothing was measured.
+    /// One standard deviation at every sample of all trials, in the unit of the output; infinite where nothing was measured and where a
+    /// sample [stands alone](crate::lone).
     pub(crate) sd: Vec<f64>,
     /// Root mean square of it.
     pub(crate) rms: f64,
@@ -79,9 +81,22 @@ fn floor(
             sd.push((own + local).sqrt().max(1e-12));
         }
     }
-    // What was not measured weighs nothing.
+    // What was not measured weighs nothing, and what stands alone.
     for (sd, _) in sd.iter_mut().zip(simulator.is_lost()).filter(|(_, lost)| **lost) {
         *sd = f64::INFINITY;
+    }
+    let output = runs.output(stage, model, simulator.trials().len())?;
+    let apart = simulator.measured(stage).iter().zip(&output).zip(&sd);
+    let residual: Vec<f64> = apart.map(|((m, s), sd)| (m - s) / sd).collect();
+    let mut end = 0;
+    let trials = simulator.trials().iter().map(|trial| {
+        end += trial.samples;
+        end - trial.samples..end
+    });
+    let lone = lone(&residual, trials);
+    lone.iter().for_each(|&i| sd[i] = f64::INFINITY);
+    if !lone.is_empty() {
+        source += &format!("; samples that stand alone and do not count: {}", lone.len());
     }
     Ok(Floor { sd, rms: (own + mean).sqrt().max(1e-12), source })
 }

@@ -24,6 +24,7 @@ mod lacking;
 mod line;
 mod linear;
 mod localise;
+mod lone;
 mod metric;
 mod missing;
 mod naming;

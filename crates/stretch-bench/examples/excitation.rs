@@ -4,6 +4,8 @@
 //!
 //! `cargo run --release -p stretch-bench --example excitation`
 
+#[path = "../tests/support/effects.rs"]
+mod effects;
 #[path = "../tests/support/rigs.rs"]
 mod rigs;
 #[path = "../tests/support/session.rs"]
@@ -11,7 +13,8 @@ mod simulated;
 #[path = "../tests/support/mod.rs"]
 mod support;
 
-use rigs::{effect, own_rig};
+use effects::effect;
+use rigs::own_rig;
 use simulated::session;
 use stretch_bench::{RigSetup, RigSimulator, Session};
 use stretch_data::{Channel, SessionTrial};

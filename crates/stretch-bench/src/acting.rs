@@ -41,6 +41,16 @@ pub(crate) struct Acting<'a> {
     found: Vec<(Find, &'a [f64])>,
 }
 
+/// Effects that a simulator already has, then those of a model, with their values; `rows` are the entries of its catalogue.
+fn all<'a>(
+    base: &'a EffectSet,
+    rows: &'a [&'static Effect],
+    model: &'a Model,
+) -> impl Iterator<Item = (&'static Effect, &'a [f64])> {
+    let own = base.iter().map(|e| (e.effect(), e.values()));
+    own.chain(model.effects.iter().map(|(i, values)| (rows[*i], values.as_slice())))
+}
+
 /// Lines, in `unit`s, that the effects of a simulator and of a model leave where they may not be found.
 pub(crate) fn lines(
     base: &EffectSet,
@@ -48,26 +58,21 @@ pub(crate) fn lines(
     model: &Model,
     unit: f64,
 ) -> Vec<Line> {
-    let own = base.iter().map(|e| (e.effect(), e.values()));
-    let missing = model.effects.iter().map(|(i, values)| (rows[*i], values.as_slice()));
-    own.chain(missing)
+    all(base, rows, model)
         .filter_map(|(effect, values)| effect.line.map(|line| line(values)))
         .map(|line| Line { hertz: line.hertz, amplitude: unit * line.amplitude })
         .collect()
 }
 
 impl<'a> Acting<'a> {
-    /// Sorts the effects of a model on top of those that the simulator already has; `rows` are the entries of its
-    /// catalogue. What is found in the record is found there for a rig file's effect, too.
+    /// Sorts the effects of a model on top of those that the simulator already has. What is found in the record is found there for a rig file's effect, too.
     pub(crate) fn of(
         base: &'a EffectSet,
-        rows: &[&'static Effect],
+        rows: &'a [&'static Effect],
         model: &'a Model,
     ) -> Result<Self, SimError> {
         let mut acting = Self { inside: EffectSet::new(), found: Vec::new() };
-        let own = base.iter().map(|e| (e.effect(), e.values()));
-        let missing = model.effects.iter().map(|(i, values)| (rows[*i], values.as_slice()));
-        for (effect, values) in own.chain(missing) {
+        for (effect, values) in all(base, rows, model) {
             match effect.find {
                 Some(find) => acting.found.push((find, values)),
                 None => acting.inside.push(effect, values)?,

@@ -1,6 +1,6 @@
 //! Effects as the engine of the diagnosis takes them.
 
-use stretch_gap::{EffectParameterSpec, EffectSpec};
+use stretch_gap::{Description, EffectParameterSpec, EffectSpec};
 use stretch_sim::{Effect, EffectParameter, Role, Scale, Search};
 
 /// Where an effect acts, and where it is looked for.
@@ -38,6 +38,15 @@ pub(crate) fn spec(effect: &Effect, place: Place) -> EffectSpec {
         is_found: effect.find.is_some(),
         twins: effect.twins.iter().map(|twin| (*twin).to_owned()).collect(),
     }
+}
+
+/// Effect that stands for channels that are sampled a little late or early.
+const SKEW: &str = "channel_skew";
+
+/// Delays that the catalogue has an effect for, s; without one the `usual` ones.
+pub(crate) fn skew_of(about: &Description, usual: [f64; 2]) -> [f64; 2] {
+    let skew = about.effects.iter().find(|e| e.name == SKEW);
+    skew.and_then(|e| e.parameters.first()).map_or(usual, |p| [p.min, p.max])
 }
 
 /// Effects that a record of this sample time can show, each with its place; of the others a note says why not.

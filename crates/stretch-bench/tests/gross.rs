@@ -1,17 +1,20 @@
 //! Errors of the record and of the rig file: told as what they are, never given an effect's name.
 
+#[path = "support/rigs.rs"]
+mod rigs;
 #[path = "support/rows.rs"]
 mod rows;
 #[path = "support/session.rs"]
 mod session;
 mod support;
 
+use rigs::own_rig;
 use rows::{PROBABILITY, with_lost_rows};
 use session::{DT_S, session};
 use stretch_bench::{GaugeSetup, GaugeSimulator, RigSetup, RigSimulator, Session};
 use stretch_data::{Channel, SessionTrial, Split, Trial, TrialKind};
 use stretch_gap::{Diagnosis, GrossKind, Options, Simulator, VerdictKind, diagnose};
-use stretch_sim::{Catalogue, EffectSet, GaugeRig, GaugeSpec, Key, Rig, RigParams, Tolerance};
+use stretch_sim::{Catalogue, EffectSet, GaugeRig, GaugeSpec, Key, Rig, Tolerance};
 use testkit::tolerance::GAIN_FOUND;
 
 /// What is done to a record or a rig file.
@@ -194,16 +197,6 @@ fn cases() -> Vec<Case> {
         alone("gauge alone: signal 1.5 s late", Late(V, 150), &[(G::Delay, V)]),
     ]);
     all
-}
-
-/// The rig that is recorded: within its tolerances, not as shipped.
-fn own_rig() -> RigParams {
-    let mut params = RigParams::default();
-    params[Key::CIn] *= 1.2;
-    params[Key::KMax] *= 1.04;
-    params[Key::TauM] *= 1.3;
-    params[Key::VRef] += 0.015;
-    params
 }
 
 fn column<'a>(trial: &'a mut SessionTrial, name: &str) -> Option<&'a mut Vec<f64>> {

@@ -3,12 +3,15 @@
 
 mod support;
 
+#[path = "support/effects.rs"]
+mod effects;
 #[path = "support/rigs.rs"]
 mod rigs;
 #[path = "support/session.rs"]
 mod simulated;
 
-use rigs::{effect, own_rig};
+use effects::effect;
+use rigs::own_rig;
 use simulated::{DT_S, session};
 use stretch_bench::{GaugeSetup, GaugeSimulator, RigSetup, RigSimulator, Session};
 use stretch_data::{Channel, SessionTrial, Split};

@@ -5,13 +5,16 @@ mod support;
 #[path = "support/rows.rs"]
 mod rows;
 
+#[path = "support/effects.rs"]
+mod effects;
 #[path = "support/rigs.rs"]
 mod rigs;
 #[path = "support/session.rs"]
 mod simulated;
 
 use approx::{abs_diff_eq, assert_abs_diff_eq};
-use rigs::{effect, own_rig};
+use effects::effect;
+use rigs::own_rig;
 use rows::{PROBABILITY, with_lost_rows};
 use simulated::session;
 use stretch_bench::{RigSetup, RigSimulator, Session};

@@ -4,11 +4,11 @@
 //! effects are credited with.
 
 use crate::{
+    as_is::as_is,
     description::Description,
     error::GapError,
     line::Line,
-    rows::RowsUsed,
-    simulator::{Model, Motion, Run, Simulator},
+    simulator::{Model, Run, Simulator},
     spec::ParameterSpec,
 };
 
@@ -29,44 +29,14 @@ impl<'a> Altered<'a> {
 }
 
 impl Simulator for Altered<'_> {
+    as_is!();
+
     fn description(&self) -> &Description {
         &self.about
     }
 
-    fn measured(&self, stage: usize) -> &[f64] {
-        self.simulator.measured(stage)
-    }
-
-    fn is_lost(&self) -> &[bool] {
-        self.simulator.is_lost()
-    }
-
-    fn wander_clock(&self, parameter: usize) -> Option<Vec<u32>> {
-        self.simulator.wander_clock(parameter)
-    }
-
-    fn rows_used(&self) -> RowsUsed {
-        self.simulator.rows_used()
-    }
-
     fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
         self.simulator.lines(stage, model)
-    }
-
-    fn motion(&self) -> Motion<'_> {
-        self.simulator.motion()
-    }
-
-    fn sensor(&self) -> Option<usize> {
-        self.simulator.sensor()
-    }
-
-    fn foreign_share(&self) -> f64 {
-        self.simulator.foreign_share()
-    }
-
-    fn input(&self, stage: usize) -> Option<Vec<f64>> {
-        self.simulator.input(stage)
     }
 
     fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {

@@ -6,13 +6,12 @@
 //! is as good as another: whatever closes as much of the held-out gap, within the interval of the first, is then a
 //! tie with it, however the fitted samples weigh the two.
 
-pub(crate) use crate::thin::Thin;
 use crate::{
     diagnosis::VerdictKind,
     frame::{Frame, Role},
     judge::{Overruled, Verdict},
     rows::RowsUsed,
-    thin::{LEAST_FIT_S, LEAST_SHARE, LEAST_TEST_S},
+    thin::{LEAST_FIT_S, LEAST_SHARE, LEAST_TEST_S, Thin},
 };
 
 /// Fitted records shorter than this, s, part no lags.
@@ -35,8 +34,7 @@ pub(crate) fn is_short(frame: &Frame, dt_s: f64) -> bool {
 
 /// The verdict without names where the record carries none.
 pub(crate) fn carried(verdict: Verdict, thin: Option<Thin>) -> Verdict {
-    let names = matches!(verdict.kind, VerdictKind::Effect | VerdictKind::Partial);
-    match thin.filter(|_| names) {
+    match thin.filter(|_| verdict.names()) {
         None => verdict,
         Some(thin) => Verdict {
             kind: VerdictKind::Unknown,

@@ -9,7 +9,7 @@ use crate::{
     diagnosis::{Candidate, Diagnosis, Unexplained, VerdictKind, Where},
     error::GapError,
     evidence::Evidence,
-    judge::{Case, Verdict, judge},
+    judge::{Case, judge},
     lacking::lacking,
     localise,
     naming::Naming,
@@ -84,11 +84,12 @@ fn run(
     let at_rows = Problem::prepare(simulator, stop, seed, progress)?;
     let between_rows = timing::between_rows(simulator);
     let between_rows = between_rows.as_ref();
-    let problem = timing::likelier(at_rows, between_rows, (thresholds, depth), seed, progress)?;
+    let (problem, from) =
+        timing::likelier(at_rows, between_rows, (thresholds, depth), seed, progress)?;
     let simulator = problem.simulator();
     // Searched, once more where the nuisances turn out to be others.
     let mut search = Search::new(&problem, thresholds, depth);
-    let mut found = search.run(&problem.nominal, progress)?;
+    let mut found = search.run(&from, progress)?;
     progress("nuisances");
     let settled = settled(&problem, &mut search.sets, &found.best, seed)?;
     let problem = settled.as_ref().map_or(&problem, |(problem, _)| problem);
@@ -132,24 +133,18 @@ fn run(
     };
     let rows_used = simulator.rows_used();
     let thin = thin(&evidence.frame, rows_used, simulator.dt_s());
-    let verdict = carried(judge(case, thresholds), thin);
-    let (verdict, proposed) = lacking(problem, &found.best, (verdict, evidence.gap), progress)?;
     let is_short = is_short(&evidence.frame, simulator.dt_s());
-    let naming = match verdict.kind {
-        VerdictKind::Effect | VerdictKind::Partial => {
-            Naming::of(&candidates, &shares, thresholds, is_short)
-        }
-        _ => Naming::default(),
+    let judged = carried(judge(case, thresholds), thin);
+    let naming = match judged.names() {
+        true => Naming::of(&candidates, &shares, thresholds, is_short),
+        false => Naming::default(),
     };
-    let names = !naming.named.is_empty();
-    // Where all that was found stands at an end of its range, it stands in for something else.
-    let verdict = match verdict.kind {
-        VerdictKind::Effect | VerdictKind::Partial if !names => {
-            Verdict { kind: VerdictKind::Unknown, ..verdict }
-        }
-        _ => verdict,
-    };
-    let transfer = match names {
+    let verdict = if naming.named.is_empty() { judged.nameless() } else { judged };
+    let (verdict, proposed) = lacking(problem, &found.best, (verdict, evidence.gap), progress)?;
+    // Names that a sum of terms beats stand for nothing.
+    let is_beaten = !naming.named.is_empty() && !verdict.names();
+    let naming = if is_beaten { Naming::default() } else { naming };
+    let transfer = match verdict.names() {
         true => {
             progress("what the gap costs a calibration");
             transfer(runs, &evidence, seed)?

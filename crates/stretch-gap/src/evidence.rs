@@ -72,10 +72,9 @@ impl Traces {
         let output = compare.runs.output(stage, model, simulator.trials().len())?;
         let metric = &compare.metrics[stage];
         let apart = simulator.measured(stage).iter().zip(&output).zip(&metric.floor.sd);
-        let mut residual: Vec<f64> = apart.map(|((m, s), sd)| (m - s) / sd).collect();
-        let whole = residual.clone();
+        let mut whole: Vec<f64> = apart.map(|((m, s), sd)| (m - s) / sd).collect();
+        let mut residual = whole.clone();
         metric.clean(&compare.frame, &mut residual);
-        let mut whole = whole;
         let lines = simulator.lines(stage, model);
         for tested in compare.frame.of_role(Role::Test).map(|s| s.from..s.to) {
             let floor = &metric.floor.sd[tested.clone()];

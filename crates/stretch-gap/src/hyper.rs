@@ -32,7 +32,8 @@ impl Metric {
         for which in 0..self.loose().len() {
             let own = best.loose()[which].level;
             let levels = hypotheses(&best.loose()[which]).chain([own]);
-            let tried: Vec<Self> = levels.map(|l| best.with(which, l, frame, dt_s)).collect();
+            let one = |level| best.with(|i, own| if i == which { level } else { own }, frame, dt_s);
+            let tried: Vec<Self> = levels.map(one).collect();
             let noise = tried.iter().map(|m| m.spectral_level(frame, residual));
             let noise = noise.fold(f64::INFINITY, f64::min).max(1.0).sqrt();
             let fit = |m: &Self| m.beside(frame, dt_s, residual, noise);
@@ -49,21 +50,21 @@ impl Metric {
 
     /// L of the module's head beside a floor that is `noise` times as high: V/s has nuisances that much smaller.
     pub(crate) fn beside(&self, frame: &Frame, dt_s: f64, residual: &[f64], noise: f64) -> f64 {
-        let scaled: Vec<f64> = residual.iter().map(|r| r / noise).collect();
-        let mut beside = self.clone();
-        for which in 0..self.loose().len() {
-            let Level { size, time_s } = self.loose()[which].level;
-            beside = beside.with(which, Level { size: size / noise, time_s }, frame, dt_s);
-        }
         let price: f64 = self.loose().iter().map(cost).sum();
-        beside.likelihood(frame, &scaled) - price
+        if noise == 1.0 {
+            return self.likelihood(frame, residual) - price;
+        }
+        let smaller = |_, level: Level| Level { size: level.size / noise, ..level };
+        let scaled: Vec<f64> = residual.iter().map(|r| r / noise).collect();
+        self.with(smaller, frame, dt_s).likelihood(frame, &scaled) - price
     }
 
     /// -(r'V^-1 r + ln det V)/2 over the samples that are not tested on.
     fn likelihood(&self, frame: &Frame, residual: &[f64]) -> f64 {
         let column = self.column(frame, residual.to_vec());
         let square = |role| self.product(frame, &column, &column, role);
-        -0.5 * (square(Role::Fit) + square(Role::Held) + self.ln_determinant(frame, residual.len()))
+        let ln_det = self.ln_det(frame, Role::Fit) + self.ln_det(frame, Role::Held);
+        -0.5 * (square(Role::Fit) + square(Role::Held) + ln_det)
     }
 
     /// s of the module's head for one residual.

@@ -15,9 +15,9 @@
 //! share of the gap in a rig that has the named effect. A set that closes its part by halves stands in for something else. The first two overrule what the others say; that is kept as `seen`.
 
 use crate::{
-    coverage::Thin,
     diagnosis::{Candidate, EffectShare, Excess, VerdictKind},
     sanity::{Sanity, Strained},
+    thin::Thin,
     thresholds::Thresholds,
 };
 
@@ -42,6 +42,19 @@ pub(crate) struct Verdict {
     pub(crate) seen: VerdictKind,
     /// Why it is the wrong one.
     pub(crate) overruled: Option<Overruled>,
+}
+
+impl Verdict {
+    /// Whether it says which effects are missing.
+    pub(crate) fn names(&self) -> bool {
+        matches!(self.kind, VerdictKind::Effect | VerdictKind::Partial)
+    }
+
+    /// The same where no name is left: all that was found stands at an end of its range, so it stands in for something else.
+    pub(crate) fn nameless(self) -> Self {
+        let kind = if self.names() { VerdictKind::Unknown } else { self.kind };
+        Self { kind, ..self }
+    }
 }
 
 /// Why the data cannot come from the simulator.
@@ -180,37 +193,20 @@ mod tests {
     fn the_wrong_simulator_overrules_a_name() {
         let first = candidate(&["play"], true);
         let strained = |rivals| Some(Strained { stage: 0, ended: vec![0, 1], left: 3.0, rivals });
-        let judged = |left: f64, strained| {
+        let judged = |left: f64, strained, is_record| {
             let sanity = Sanity { left: vec![0.0, left], allowed: 0.1, strained };
-            let gap = gap(20.0, 10.0, 0.1);
-            let case = Case {
-                gap,
-                first: Some(&first),
-                strongest: None,
-                sanity: &sanity,
-                is_record: false,
-            };
+            let (gap, first) = (gap(20.0, 10.0, 0.1), Some(&first));
+            let case = Case { gap, first, strongest: None, sanity: &sanity, is_record };
             judge(case, &Thresholds::frozen())
         };
-        let error = {
-            let sanity = Sanity { left: vec![0.5], allowed: 0.1, strained: None };
-            let gap = gap(20.0, 10.0, 0.1);
-            let case = Case {
-                gap,
-                first: Some(&first),
-                strongest: None,
-                sanity: &sanity,
-                is_record: true,
-            };
-            judge(case, &Thresholds::frozen())
-        };
+        let error = judged(0.5, None, true);
         assert_eq!((error.kind, error.overruled), (VerdictKind::Record, None));
-        let foreign = judged(0.5, None);
+        let foreign = judged(0.5, None, false);
         assert_eq!(foreign.overruled, Some(Overruled::Foreign { stage: 1, share: 0.5 }));
         assert_eq!((foreign.kind, foreign.seen), (VerdictKind::Unknown, VerdictKind::Effect));
-        assert_eq!(judged(0.0, strained(Some((0.1, 0.05)))).kind, VerdictKind::Unknown);
-        assert_eq!(judged(0.0, strained(None)).kind, VerdictKind::Unknown);
+        assert_eq!(judged(0.0, strained(Some((0.1, 0.05))), false).kind, VerdictKind::Unknown);
+        assert_eq!(judged(0.0, strained(None), false).kind, VerdictKind::Unknown);
         // Loose parameters leave more than the effects do: the effects stand.
-        assert_eq!(judged(0.0, strained(Some((0.1, 4.0)))).kind, VerdictKind::Effect);
+        assert_eq!(judged(0.0, strained(Some((0.1, 4.0))), false).kind, VerdictKind::Effect);
     }
 }

@@ -2,6 +2,7 @@
 
 mod altered;
 mod arrow;
+mod as_is;
 mod baselines;
 mod bootstrap;
 mod candidates;

@@ -11,6 +11,8 @@
 //! and products x'V^-1 y of sensitivities make the normal equations of every fit. This is the generative discrepancy of
 //! Kennedy and O'Hagan (2001, doi 10.1111/1467-9868.00294), confined to what the simulator's own parameters could do.
 
+use std::sync::Arc;
+
 use crate::{
     error::GapError,
     floor::Floor,
@@ -37,9 +39,9 @@ pub(crate) struct Metric {
 #[derive(Debug, Clone)]
 pub(crate) struct Loose {
     /// Change of the output, in floors, for one standard deviation as the simulator describes it.
-    column: Vec<f64>,
+    column: Arc<[f64]>,
     /// See [`Simulator::wander_clock`](crate::Simulator::wander_clock).
-    clock: Vec<u32>,
+    clock: Arc<[u32]>,
     /// How it wanders as the simulator describes it; none for an offset.
     pub(crate) wander: Option<Wander>,
     /// Whether each tick of the clock has an offset of its own, as large as the simulator describes it.
@@ -106,6 +108,7 @@ impl Metric {
             }
             let level = Level { size: 1.0, time_s: spec.wander.map_or(1.0, |w| w.correlation_s) };
             let is_by_tick = spec.per_tick_sd.is_some();
+            let (column, clock) = (column.into(), clock.into());
             metric.loose.push(Loose { column, clock, wander: spec.wander, is_by_tick, level });
         }
         if let Some(like) = like {
@@ -148,19 +151,18 @@ impl Metric {
         &self.loose
     }
 
-    /// The same with one of them at another level.
-    pub(crate) fn with(&self, which: usize, level: Level, frame: &Frame, dt_s: f64) -> Self {
+    /// The same with all of them at other levels.
+    pub(crate) fn with(
+        &self,
+        level: impl Fn(usize, Level) -> Level,
+        frame: &Frame,
+        dt_s: f64,
+    ) -> Self {
         let mut other = self.clone();
-        other.loose[which].level = level;
+        let each = other.loose.iter_mut().enumerate();
+        each.for_each(|(i, loose)| loose.level = level(i, loose.level));
         other.marginalise(frame, dt_s);
         other
-    }
-
-    /// ln det V over the segments that are not tested on.
-    pub(crate) fn ln_determinant(&self, frame: &Frame, samples: usize) -> f64 {
-        let all = frame.segments.iter().zip(&self.nuisances);
-        let looked = all.filter(|(s, _)| s.role != Role::Test && s.to <= samples);
-        looked.filter_map(|(_, nuisance)| Some(nuisance.as_ref()?.ln_determinant())).sum()
     }
 
     /// A column of values in floors over the first trials.
@@ -193,17 +195,17 @@ impl Metric {
         sum
     }
 
-    /// ln det V + 2 sum ln s over the segments in a role: the normaliser of the residual's density, floors s.
+    /// ln det V over the segments in a role.
     pub(crate) fn ln_det(&self, frame: &Frame, role: Role) -> f64 {
         let pairs = frame.segments.iter().zip(&self.nuisances).filter(|(s, _)| s.role == role);
-        pairs
-            .map(|(segment, nuisance)| {
-                let floors = self.floor.sd[segment.from..segment.to].iter();
-                let measured = floors.filter(|sd| sd.is_finite());
-                nuisance.as_ref().map_or(0.0, Nuisance::ln_determinant)
-                    + 2.0 * measured.map(|sd| sd.ln()).sum::<f64>()
-            })
-            .sum()
+        pairs.filter_map(|(_, nuisance)| Some(nuisance.as_ref()?.ln_determinant())).sum()
+    }
+
+    /// 2 sum ln s over the segments in a role: what floors s add to it in the unit of the output.
+    pub(crate) fn ln_floors(&self, frame: &Frame, role: Role) -> f64 {
+        let own = frame.segments.iter().filter(|s| s.role == role);
+        let floors = own.flat_map(|s| &self.floor.sd[s.from..s.to]).filter(|sd| sd.is_finite());
+        2.0 * floors.map(|sd| sd.ln()).sum::<f64>()
     }
 
     /// Takes the most likely nuisances out of a residual in floors.
@@ -227,6 +229,7 @@ impl Metric {
         dt_s: f64,
     ) -> Self {
         let clock = (0..column.len() as u32).collect();
+        let column = column.into();
         let level = Level { size: 1.0, time_s: wander.correlation_s };
         let loose = vec![Loose { column, clock, wander: Some(wander), is_by_tick: false, level }];
         let mut metric = Self { floor, loose, nuisances: Vec::new() };

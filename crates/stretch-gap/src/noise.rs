@@ -175,10 +175,7 @@ impl Shapes {
         };
         let slow = MEMORIES
             .map(|m| of(&DMatrix::from_fn(n, n, |i, j| (-(i.abs_diff(j) as f64) / m).exp())));
-        let hum = [50.0, 60.0].map(|hertz: f64| {
-            let turns = hertz * dt_s;
-            2.0 * n as f64 * (turns - turns.round()).abs()
-        });
+        let hum = mains(dt_s).map(|turns| 2.0 * n as f64 * turns);
         let is_hum = |k: &usize| hum.iter().any(|h| (*k as f64 - h).abs() < 2.5);
         let slowest = if is_still { SLOWEST } else { n / 2 };
         let waves = (slowest..n).filter(|k| !is_hum(k)).collect();
@@ -243,6 +240,14 @@ impl Shapes {
     }
 }
 
+/// Mains of 50 and of 60 Hz as a record shows them, turns a sample: folded into half the sample rate.
+fn mains(dt_s: f64) -> [f64; 2] {
+    [50.0, 60.0].map(|hertz: f64| {
+        let turns = hertz * dt_s;
+        (turns - turns.round()).abs()
+    })
+}
+
 /// Noise variance of a record: a sixth of the median square of its second differences, corrected for the median of a
 /// normal variable's square; robust against what the motion adds. What the mains add is not noise: in every second
 /// the waves of 50 and 60 Hz are taken out before.
@@ -282,9 +287,7 @@ pub fn noise_variance<'a>(stretches: impl Iterator<Item = &'a [f64]>, dt_s: f64)
 /// white noise went with them.
 fn take_waves_out(values: &mut [f64], dt_s: f64) -> f64 {
     let mut taken = 0.0;
-    for hertz in [50.0, 60.0] {
-        let turns: f64 = hertz * dt_s;
-        let shown = (turns - turns.round()).abs();
+    for shown in mains(dt_s) {
         // What shows as a slow wave cannot be told from motion.
         if shown < 0.15 || values.len() < 20 {
             continue;

@@ -4,7 +4,7 @@
 //!
 //! 1. the frame; floors and metrics around the parameters as shipped;
 //! 2. a first re-tuning: maximum a posteriori within the tolerances;
-//! 3. floors and metrics around what it found, for sensitivities have moved; sizes of the nuisances; a second re-tuning in them;
+//! 3. floors and metrics around what it found, for sensitivities have moved; a second re-tuning in them;
 //! 4. the effective sample size of every stage and the noise transmitted, both at the re-tuned nominal, so that they are the same
 //!    for every hypothesis.
 //!
@@ -217,7 +217,7 @@ impl<'a> Problem<'a> {
         for (misfit, metric) in hypothesis.misfits.iter().zip(&compare.metrics) {
             for (role, x) in [(Role::Fit, misfit.fit), (Role::Held, misfit.held)] {
                 sum += 0.5 * frame.count(role) as f64 * x.max(1.0).ln();
-                sum += 0.5 * metric.ln_det(frame, role);
+                sum += 0.5 * (metric.ln_det(frame, role) + metric.ln_floors(frame, role));
             }
         }
         let free = free_parameters(self.simulator(), &hypothesis.model) as f64;

@@ -6,8 +6,8 @@
 //! the better likelihood of the records decides.
 
 use crate::{
-    altered::Altered, error::GapError, problem::Problem, search::Search, simulator::Simulator,
-    spec::ParameterSpec, thresholds::Thresholds,
+    altered::Altered, error::GapError, hypothesis::Hypothesis, problem::Problem, search::Search,
+    simulator::Simulator, spec::ParameterSpec, thresholds::Thresholds,
 };
 
 /// A simulator whose commands switch between rows; none where it has no such commands.
@@ -20,16 +20,17 @@ pub(crate) fn between_rows(simulator: &dyn Simulator) -> Option<Altered<'_>> {
     (!timing.is_empty()).then(|| Altered::of(simulator, told))
 }
 
-/// The problem in which the records are likelier; that of commands between rows is prepared where there are such
-/// commands and a gap that they could explain.
+/// The problem in which the records are likelier, and the set to go on from; that of commands between rows is prepared where there are
+/// such commands and a gap that they could explain.
 pub(crate) fn likelier<'a>(
     at_rows: Problem<'a>,
     between_rows: Option<&'a Altered<'a>>,
     (thresholds, depth): (&Thresholds, usize),
     seed: u64,
     progress: &dyn Fn(&str),
-) -> Result<Problem<'a>, GapError> {
-    let Some(between_rows) = between_rows else { return Ok(at_rows) };
+) -> Result<(Problem<'a>, Hypothesis), GapError> {
+    let plain = at_rows.nominal.clone();
+    let Some(between_rows) = between_rows else { return Ok((at_rows, plain)) };
     let simulator = at_rows.simulator();
     let timing = simulator.command_timing();
     let is_timed = |stage: &usize| {
@@ -38,16 +39,17 @@ pub(crate) fn likelier<'a>(
     let commanded = (0..simulator.stages().len()).filter(is_timed);
     let gap: f64 = commanded.map(|stage| at_rows.gap_in(&at_rows.nominal, stage)).sum();
     if gap < thresholds.null_excess {
-        return Ok(at_rows);
+        return Ok((at_rows, plain));
     }
     progress("when commands switch");
     let between = Problem::prepare(between_rows, at_rows.stop(), seed, progress)?;
     if between.log_likelihood(&between.nominal) <= at_rows.log_likelihood(&at_rows.nominal) {
-        return Ok(at_rows);
+        return Ok((at_rows, plain));
     }
-    let best = |problem: &Problem<'_>| -> Result<f64, GapError> {
+    let best = |problem: &Problem<'_>| -> Result<(f64, Hypothesis), GapError> {
         let found = Search::new(problem, thresholds, depth).run(&problem.nominal, progress)?;
-        Ok(problem.log_likelihood(&found.best))
+        Ok((problem.log_likelihood(&found.best), found.best))
     };
-    Ok(if best(&between)? > best(&at_rows)? { between } else { at_rows })
+    let ((own, from), (other, from_other)) = (best(&at_rows)?, best(&between)?);
+    Ok(if other > own { (between, from_other) } else { (at_rows, from) })
 }

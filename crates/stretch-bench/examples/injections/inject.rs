@@ -11,12 +11,8 @@ enum Kind {
     Drift,
     /// It follows with a time constant of so many milliseconds.
     Lag,
-    /// As [`Kind::Lag`], ahead of the sensor's noise.
-    LagAhead,
     /// It follows once a play of so many per cent of its span to either side is used up.
     Play,
-    /// As [`Kind::Play`], ahead of the sensor's noise.
-    PlayAhead,
     /// It cannot rise beyond so many per cent of its span.
     Clip,
 }
@@ -25,6 +21,8 @@ enum Kind {
 #[derive(Debug)]
 pub(crate) struct Injection {
     kind: Kind,
+    /// Whether it acts ahead of the sensor's noise.
+    is_ahead: bool,
     pub(crate) words: &'static str,
     /// Unit of the strengths.
     unit: &'static str,
@@ -37,10 +35,34 @@ pub(crate) struct Injection {
     pub(crate) size: Option<(&'static str, f64)>,
 }
 
+const LAG: Injection = Injection {
+    kind: Kind::Lag,
+    is_ahead: false,
+    words: "lag",
+    unit: "ms",
+    strengths: [20.0, 50.0, 150.0],
+    name: "amplifier_lowpass",
+    kin: &["channel_skew", "gauge_relaxation"],
+    size: Some(("tau", 1e3)),
+};
+
+const PLAY: Injection = Injection {
+    kind: Kind::Play,
+    is_ahead: false,
+    words: "play",
+    unit: "%",
+    strengths: [2.0, 5.0, 10.0],
+    name: "sleeve_slip",
+    kin: &["gauge_hysteresis", "pot_backlash"],
+    // The catalogue's strain has a stroke of 0.2; here the stroke is 1.
+    size: Some(("w", 100.0)),
+};
+
 /// The effects, each at three strengths.
 pub(crate) const ALL: [Injection; 7] = [
     Injection {
         kind: Kind::Late,
+        is_ahead: false,
         words: "late",
         unit: "ms",
         strengths: [30.0, 70.0, 150.0],
@@ -50,6 +72,7 @@ pub(crate) const ALL: [Injection; 7] = [
     },
     Injection {
         kind: Kind::Drift,
+        is_ahead: false,
         words: "drift",
         unit: "%/min",
         strengths: [0.5, 1.0, 3.0],
@@ -57,47 +80,14 @@ pub(crate) const ALL: [Injection; 7] = [
         kin: &["self_heating", "gauge_softening"],
         size: None,
     },
-    Injection {
-        kind: Kind::Lag,
-        words: "lag",
-        unit: "ms",
-        strengths: [20.0, 50.0, 150.0],
-        name: "amplifier_lowpass",
-        kin: &["channel_skew", "gauge_relaxation"],
-        size: Some(("tau", 1e3)),
-    },
-    Injection {
-        kind: Kind::LagAhead,
-        words: "lag, noise after it,",
-        unit: "ms",
-        strengths: [20.0, 50.0, 150.0],
-        name: "amplifier_lowpass",
-        kin: &["channel_skew", "gauge_relaxation"],
-        size: Some(("tau", 1e3)),
-    },
-    Injection {
-        kind: Kind::Play,
-        words: "play",
-        unit: "%",
-        strengths: [2.0, 5.0, 10.0],
-        name: "sleeve_slip",
-        kin: &["gauge_hysteresis", "pot_backlash"],
-        // The catalogue's strain has a stroke of 0.2; here the stroke is 1.
-        size: Some(("w", 100.0)),
-    },
-    Injection {
-        kind: Kind::PlayAhead,
-        words: "play, noise after it,",
-        unit: "%",
-        strengths: [2.0, 5.0, 10.0],
-        name: "sleeve_slip",
-        kin: &["gauge_hysteresis", "pot_backlash"],
-        // The catalogue's strain has a stroke of 0.2; here the stroke is 1.
-        size: Some(("w", 100.0)),
-    },
+    LAG,
+    Injection { is_ahead: true, words: "lag, noise after it,", ..LAG },
+    PLAY,
+    Injection { is_ahead: true, words: "play, noise after it,", ..PLAY },
     // Not looked for in a gauge alone, whose amplifier is unknown.
     Injection {
         kind: Kind::Clip,
+        is_ahead: false,
         words: "clipped at",
         unit: "%",
         strengths: [95.0, 90.0, 80.0],
@@ -117,18 +107,19 @@ impl Injection {
     pub(crate) fn apply(&self, strength: f64, time_s: &[f64], signal: &mut [f64]) {
         let low = signal.iter().copied().fold(f64::INFINITY, f64::min);
         let high = signal.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let span = high - low;
-        let share = 0.01 * strength * span;
-        match self.kind {
+        let share = 0.01 * strength * (high - low);
+        let act = |signal: &mut [f64]| match self.kind {
             Kind::Late => late(1e-3 * strength, time_s, signal),
             Kind::Drift => {
                 signal.iter_mut().zip(time_s).for_each(|(y, t)| *y -= share * t / 60.0);
             }
             Kind::Lag => lag(1e-3 * strength, time_s, signal),
-            Kind::LagAhead => ahead_of_noise(signal, |x| lag(1e-3 * strength, time_s, x)),
             Kind::Play => slip(share, signal),
-            Kind::PlayAhead => ahead_of_noise(signal, |x| slip(share, x)),
             Kind::Clip => signal.iter_mut().for_each(|y| *y = y.min(low + share)),
+        };
+        match self.is_ahead {
+            true => ahead_of_noise(signal, act),
+            false => act(signal),
         }
     }
 }

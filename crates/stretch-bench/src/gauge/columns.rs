@@ -5,15 +5,14 @@ use std::borrow::Cow;
 use stretch_gap::Column;
 
 use super::{GaugeSimulator, unit_of};
+use crate::specs::skew_of;
 
-/// Effect that stands for two recorders that were not started together, and its range without a catalogue, s.
-const SKEW: (&str, [f64; 2]) = ("channel_skew", [-1.0, 1.0]);
+/// Delays of two recorders that were not started together, without a catalogue, s.
+const SKEW_S: [f64; 2] = [-1.0, 1.0];
 
 impl GaugeSimulator {
     /// The signal, and the reference that drives it.
     pub(super) fn record_columns(&self) -> Vec<Column<'_>> {
-        let skew = self.about.effects.iter().find(|e| e.name == SKEW.0);
-        let skew_s = skew.and_then(|e| e.parameters.first()).map_or(SKEW.1, |p| [p.min, p.max]);
         let stage = &self.about.stages[0];
         let signal = Column {
             name: Cow::Borrowed(&stage.channel),
@@ -22,7 +21,7 @@ impl GaugeSimulator {
             output_of: Some(0),
             read_by: Vec::new(),
             is_command: false,
-            skew_s,
+            skew_s: skew_of(&self.about, SKEW_S),
             hint: Cow::Borrowed("the gauge, its wires and its amplifier"),
         };
         let reference = Column {

@@ -2,21 +2,22 @@
 
 use std::borrow::Cow;
 
-use stretch_gap::{Column, Description, Distortion};
+use stretch_gap::{Column, Distortion};
 use stretch_sim::{Key, Stage};
 
 use super::{
     RigSimulator,
     session::{Inputs, RigTrial},
 };
+use crate::specs::skew_of;
 
 const PRESSURE: &str = "pressure_kpa";
 const LENGTH: &str = "length_mm";
 const VOLTAGE: &str = "bridge_v";
 const COMMANDS: &str = "inlet, outlet";
 
-/// Effect that stands for voltages that are sampled a little late or early, and its range without a catalogue, s.
-const SKEW: (&str, [f64; 2]) = ("channel_skew", [-0.1, 0.2]);
+/// Delays of the voltage without a catalogue, s.
+const SKEW_S: [f64; 2] = [-0.1, 0.2];
 
 impl RigSimulator {
     /// The columns, and which stages are driven by them.
@@ -25,7 +26,7 @@ impl RigSimulator {
         let reads = |stages: [Stage; 2]| -> Vec<usize> {
             (0..self.stage_kinds.len()).filter(|&i| stages.contains(&self.stage_kinds[i])).collect()
         };
-        let skew_s = skew_of(&self.about);
+        let skew_s = skew_of(&self.about, SKEW_S);
         let output = |(stage, kind): (usize, &Stage)| {
             let (name, read_by, skew_s, hint) = match kind {
                 Stage::Pneumatics => (
@@ -109,10 +110,4 @@ impl RigSimulator {
         );
         Some(rig)
     }
-}
-
-/// Delays of the voltage that the catalogue has an effect for.
-fn skew_of(about: &Description) -> [f64; 2] {
-    let skew = about.effects.iter().find(|e| e.name == SKEW.0);
-    skew.and_then(|e| e.parameters.first()).map_or(SKEW.1, |p| [p.min, p.max])
 }

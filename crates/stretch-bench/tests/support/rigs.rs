@@ -1,6 +1,6 @@
-//! A rig that is not as shipped, and its effects.
+//! A rig that is not as shipped.
 
-use stretch_sim::{EffectSet, Key, RigParams};
+use stretch_sim::{Key, RigParams};
 
 /// A rig within its tolerances but not as shipped.
 pub(crate) fn own_rig() -> RigParams {
@@ -10,10 +10,4 @@ pub(crate) fn own_rig() -> RigParams {
     params[Key::TauM] *= 1.3;
     params[Key::VRef] += 0.015;
     params
-}
-
-pub(crate) fn effect(name: &str, values: &[(&str, f64)]) -> EffectSet {
-    let mut effects = EffectSet::new();
-    effects.insert(name, values).expect("an effect");
-    effects
 }

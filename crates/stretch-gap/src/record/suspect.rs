@@ -7,13 +7,15 @@
 use std::{collections::VecDeque, sync::Mutex};
 
 use crate::{
+    as_is::as_is,
     description::Description,
     error::GapError,
+    line::Line,
     record::{
         column::Column,
         fault::{Fault, Kind},
     },
-    simulator::{Model, Motion, Run, Simulator},
+    simulator::{Model, Run, Simulator},
 };
 
 /// Simulators with a column put right that are kept: those of the probes and steps of the fits under way.
@@ -69,6 +71,13 @@ impl<'a> Suspect<'a> {
         Some((self.faults.get(index - self.first)?, *values.first()?))
     }
 
+    /// A model of the simulator itself.
+    fn without_errors(&self, model: &Model) -> Model {
+        let mut model = model.clone();
+        model.effects.retain(|(e, _)| *e < self.first);
+        model
+    }
+
     /// The simulator driven by a column put right.
     fn driven(&self, fault: usize, size: f64) -> Result<Option<Driven<'a>>, GapError> {
         let key = (fault, size.to_bits());
@@ -108,42 +117,18 @@ impl<'a> Suspect<'a> {
 }
 
 impl Simulator for Suspect<'_> {
+    as_is!();
+
     fn description(&self) -> &Description {
         &self.about
     }
 
-    fn measured(&self, stage: usize) -> &[f64] {
-        self.simulator.measured(stage)
-    }
-
-    fn wander_clock(&self, parameter: usize) -> Option<Vec<u32>> {
-        self.simulator.wander_clock(parameter)
-    }
-
-    fn is_lost(&self) -> &[bool] {
-        self.simulator.is_lost()
-    }
-
-    fn motion(&self) -> Motion<'_> {
-        self.simulator.motion()
-    }
-
-    fn sensor(&self) -> Option<usize> {
-        self.simulator.sensor()
-    }
-
-    fn foreign_share(&self) -> f64 {
-        self.simulator.foreign_share()
-    }
-
-    fn input(&self, stage: usize) -> Option<Vec<f64>> {
-        self.simulator.input(stage)
+    fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
+        self.simulator.lines(stage, &self.without_errors(model))
     }
 
     fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {
-        let is_own = |(e, _): &(usize, Vec<f64>)| *e < self.first;
-        let effects = run.model.effects.iter().filter(|e| is_own(e)).cloned().collect();
-        let model = Model { parameters: run.model.parameters.clone(), effects };
+        let model = self.without_errors(run.model);
         self.simulator.simulate_on(Run { model: &model, ..run }, input, out)
     }
 

@@ -1,0 +1,57 @@
+//! A simulator that stands before another one: what it leaves as it is.
+
+/// Every method of [`Simulator`](crate::Simulator) that a simulator with a field `simulator` takes from that one, but for its description,
+/// its runs and the lines of its effects.
+macro_rules! as_is {
+    () => {
+        fn measured(&self, stage: usize) -> &[f64] {
+            self.simulator.measured(stage)
+        }
+
+        fn is_lost(&self) -> &[bool] {
+            self.simulator.is_lost()
+        }
+
+        fn wander_clock(&self, parameter: usize) -> Option<Vec<u32>> {
+            self.simulator.wander_clock(parameter)
+        }
+
+        fn rows_used(&self) -> $crate::rows::RowsUsed {
+            self.simulator.rows_used()
+        }
+
+        fn motion(&self) -> $crate::simulator::Motion<'_> {
+            self.simulator.motion()
+        }
+
+        fn sensor(&self) -> Option<usize> {
+            self.simulator.sensor()
+        }
+
+        fn foreign_share(&self) -> f64 {
+            self.simulator.foreign_share()
+        }
+
+        fn input(&self, stage: usize) -> Option<Vec<f64>> {
+            self.simulator.input(stage)
+        }
+
+        fn recorded(&self) -> Vec<$crate::simulator::Recorded> {
+            self.simulator.recorded()
+        }
+
+        fn columns(&self) -> Vec<$crate::record::column::Column<'_>> {
+            self.simulator.columns()
+        }
+
+        fn put_right(
+            &self,
+            column: &str,
+            error: $crate::record::column::Distortion,
+        ) -> Result<Option<Box<dyn Simulator + Send + '_>>, GapError> {
+            self.simulator.put_right(column, error)
+        }
+    };
+}
+
+pub(crate) use as_is;

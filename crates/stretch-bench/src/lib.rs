@@ -3,6 +3,7 @@
 mod acting;
 mod error;
 mod gauge;
+mod kept;
 mod lost;
 mod rig;
 mod rig_file;

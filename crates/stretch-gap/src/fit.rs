@@ -171,19 +171,25 @@ impl<'a, 'b> Descent<'a, 'b> {
         is_first: bool,
         renew: bool,
     ) -> Result<(), GapError> {
-        for i in 0..self.coordinates.len() {
-            let place = self.coordinates[i];
-            self.columns[i] = match place.0 {
-                Coordinate::Nominal { index, .. } if is_first && !known.is_empty() => {
-                    let of = |&s: &usize| {
-                        let own = known.get(s).and_then(Option::as_ref)?;
-                        own.iter().find(|(p, _)| *p == index).map(|(_, c)| c.clone())
-                    };
-                    self.stages.iter().map(of).collect()
-                }
-                Coordinate::Nominal { .. } if !renew => continue,
-                _ => self.compare.sensitivity(self.stages, place, &self.model, &self.residuals)?,
-            };
+        let due = |place: &(Coordinate, [f64; 2])| match place.0 {
+            Coordinate::Nominal { index, .. } if is_first && !known.is_empty() => {
+                let of = |&s: &usize| {
+                    let own = known.get(s).and_then(Option::as_ref)?;
+                    own.iter().find(|(p, _)| *p == index).map(|(_, c)| c.clone())
+                };
+                Ok(Some(self.stages.iter().map(of).collect()))
+            }
+            Coordinate::Nominal { .. } if !renew => Ok(None),
+            _ => {
+                let own =
+                    self.compare.sensitivity(self.stages, *place, &self.model, &self.residuals);
+                own.map(Some)
+            }
+        };
+        let columns: Result<Vec<Option<Vec<_>>>, GapError> =
+            self.coordinates.par_iter().map(due).collect();
+        for (column, due) in self.columns.iter_mut().zip(columns?) {
+            *column = due.unwrap_or_else(|| std::mem::take(column));
         }
         self.normal_equations();
         Ok(())

@@ -12,6 +12,8 @@
 //! the blocks' rate: the mean square of block means times the samples of a block, the least of all that are tried, and at least the 1 of
 //! the noise alone.
 
+use rayon::prelude::*;
+
 use crate::{
     frame::{Frame, Role},
     metric::{Level, Loose, Metric},
@@ -33,11 +35,12 @@ impl Metric {
             let own = best.loose()[which].level;
             let levels = hypotheses(&best.loose()[which]).chain([own]);
             let one = |level| best.with(|i, own| if i == which { level } else { own }, frame, dt_s);
-            let tried: Vec<Self> = levels.map(one).collect();
-            let noise = tried.iter().map(|m| m.spectral_level(frame, residual));
-            let noise = noise.fold(f64::INFINITY, f64::min).max(1.0).sqrt();
+            let levels: Vec<Level> = levels.collect();
+            let tried: Vec<Self> = levels.into_par_iter().map(one).collect();
+            let noise = tried.par_iter().map(|m| m.spectral_level(frame, residual));
+            let noise = noise.reduce(|| f64::INFINITY, f64::min).max(1.0).sqrt();
             let fit = |m: &Self| m.beside(frame, dt_s, residual, noise);
-            let fits: Vec<f64> = tried.iter().map(fit).collect();
+            let fits: Vec<f64> = tried.par_iter().map(fit).collect();
             let before = fits.last().copied().unwrap_or(0.0);
             let all = fits.iter().copied().zip(&tried);
             if let Some((most, metric)) = all.max_by(|a, b| a.0.total_cmp(&b.0)) {

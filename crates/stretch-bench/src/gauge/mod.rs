@@ -8,8 +8,8 @@ mod source;
 
 use stretch_data::{SessionTrial, unit};
 use stretch_gap::{
-    Column, Description, DescriptionSpec, Dice, GapError, Line, Model, Motion, Noise,
-    ParameterSpec, Recorded, RowsUsed, Run, Simulator, StageSpec, TrialSpec,
+    Column, Description, DescriptionSpec, GapError, Line, Model, Motion, Noise, ParameterSpec,
+    Recorded, RowsUsed, Run, Simulator, StageSpec, TrialSpec,
 };
 use stretch_sim::{
     Alone, Catalogue, Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Start, Tolerance,
@@ -21,7 +21,7 @@ use record::Record;
 use crate::{
     acting::{Acting, FitRecord, lines},
     error::BenchError,
-    rig::smooth::{Smoothed, unscheduled},
+    rig::smooth::{Draws, Smoothed, unscheduled},
     specs::{Place, shown, spec as spec_of},
 };
 
@@ -89,6 +89,7 @@ pub struct GaugeSimulator {
     record: Record,
     /// The reference of each trial as it drives the gauge.
     inputs: Vec<Smoothed>,
+    draws: Draws,
     spec: GaugeSpec,
     /// Column of the reference.
     reference: String,
@@ -146,6 +147,7 @@ impl GaugeSimulator {
             rows,
             inputs,
             reference: reference.into(),
+            draws: Draws::new(),
             reference_noise,
             noise,
             spread: greatest - least,
@@ -179,9 +181,7 @@ impl GaugeSimulator {
             let to = from + trial.samples;
             let input = match run.shake {
                 None => self.inputs[i].values.clone(),
-                Some(seed) => {
-                    self.inputs[i].shaken(&self.reference_noise, &mut Dice::new(seed, i as u64))
-                }
+                Some(seed) => self.draws.shaken(&self.inputs, &self.reference_noise, seed, i),
             };
             let pressure = self.record.pressure.get(from..to).unwrap_or(&[]);
             gauge.run(&mut memory, start, trial.start_s, &input, pressure, &mut out[from..to])?;

@@ -20,6 +20,7 @@ use stretch_sim::{Catalogue, Effect, EffectSet, Key, Rig, RigParams, Search, Sta
 use extent::extent_of;
 use noises::Noises;
 use nominal::{Knob, parameters, stages};
+use run::KeptRuns;
 use session::Inputs;
 pub use session::{RigTrial, Session};
 
@@ -59,6 +60,7 @@ pub struct RigSimulator {
     is_lost: Vec<bool>,
     /// The bridge voltage that effects may be found in.
     bridge: FitRecord,
+    kept: KeptRuns,
     notes: Vec<String>,
 }
 
@@ -130,6 +132,7 @@ impl RigSimulator {
             measured,
             is_lost,
             bridge,
+            kept: KeptRuns::new(),
             notes,
         })
     }

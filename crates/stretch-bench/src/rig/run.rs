@@ -1,15 +1,22 @@
 //! One stage of the rig over the session.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, num::NonZeroUsize, sync::Arc};
 
-use stretch_gap::{Dice, Model, Run};
+use stretch_gap::{Model, Run};
 use stretch_sim::{
-    Actuation, DEFAULT_STEP_S, EffectSet, Grid, Key, Memory, Muscle, Need, Openings, Pneumatics,
-    Reference, RigParams, Sensing, Stage, Start,
+    ActiveEffect, Actuation, DEFAULT_STEP_S, EffectSet, Grid, Key, Memory, Muscle, Need, Openings,
+    PARAMETERS, ParameterInfo, Pneumatics, Reference, RigParams, Sensing, Stage, Start,
 };
 
-use super::{RigSimulator, nominal::Knob, session::Begin, smooth::cubic, timing, timing::Leads};
-use crate::{acting::Acting, error::BenchError};
+use super::{
+    RigSimulator,
+    nominal::Knob,
+    session::Begin,
+    smooth::{Draws, cubic},
+    timing,
+    timing::Leads,
+};
+use crate::{acting::Acting, error::BenchError, kept::Kept};
 
 /// Step of integration while fitting, s.
 const STEP_S: f64 = 2.0 * DEFAULT_STEP_S;
@@ -19,6 +26,29 @@ const PIECES: f64 = 4.0;
 const EMPTY_KPA: (f64, f64) = (0.08, 0.06);
 /// Offset of a filled chamber below the supply, a share of it (mean, 1 sd).
 const FULL_SHARE: (f64, f64) = (0.0008, 0.0006);
+
+/// By trial, pressure at every node, kPa.
+type Chamber = Arc<Vec<Vec<f64>>>;
+/// Effects, and bits of all numbers.
+type ChamberKey = (Vec<&'static str>, Vec<u64>);
+
+/// Chambers that are kept: those of the probes and steps of the fits under way.
+const CHAMBERS: NonZeroUsize = NonZeroUsize::new(12).expect("not 0");
+
+/// What a rig keeps between runs.
+#[derive(Debug, Clone)]
+pub(super) struct KeptRuns {
+    length_draws: Draws,
+    pressure_draws: Draws,
+    chambers: Kept<ChamberKey, Vec<Vec<f64>>>,
+}
+
+impl KeptRuns {
+    pub(super) fn new() -> Self {
+        let [length_draws, pressure_draws] = [Draws::new(), Draws::new()];
+        Self { length_draws, pressure_draws, chambers: Kept::new(CHAMBERS) }
+    }
+}
 
 /// What a run needs beside the rig.
 struct Setting<'a> {
@@ -154,8 +184,15 @@ impl Setting<'_> {
         let input = if of_pressure { &inputs.pressure[trial] } else { &inputs.length[trial] };
         let Some(seed) = self.shake else { return input.values.clone() };
         let noises = &self.rig.noises;
-        let noise = if of_pressure { &noises.pressure_kpa } else { &noises.length_mm };
-        input.shaken(noise, &mut Dice::new(seed, trial as u64))
+        match of_pressure {
+            true => {
+                let draws = &self.rig.kept.pressure_draws;
+                draws.shaken(&inputs.pressure, &noises.pressure_kpa, seed, trial)
+            }
+            false => {
+                self.rig.kept.length_draws.shaken(&inputs.length, &noises.length_mm, seed, trial)
+            }
+        }
     }
 
     /// Trials with their part of the output.
@@ -209,7 +246,18 @@ impl Setting<'_> {
         let mut memory = stage.memory();
         let mut shown = self.shown(&self.effects)?;
         let before = if self.is_vented() { 1e-3 * self.params[Key::PS] } else { 0.0 };
-        let (shut, mut filled) = ([0.0; 2], [0.0; 2]);
+        let mut filled = [0.0; 2];
+        if !stage.is_coupled() {
+            let nodes = stage.grid().nodes(filled.len());
+            stage.run_length(&mut memory, Start::Settled, &vec![before; nodes], &mut filled)?;
+            shown.condition(&filled)?;
+            let pressure = self.chamber_kpa(&stage, count)?;
+            return self.each(count, out, |trial, own| {
+                stage.run_length(&mut memory, self.start(trial), &pressure[trial], own)?;
+                shown.run(self.start(trial), own)
+            });
+        }
+        let shut = [0.0; 2];
         let openings = Openings { inlet: &shut, outlet: &shut };
         stage.run(&mut memory, Start::Settled, openings, before, &mut [0.0; 2], &mut filled)?;
         shown.condition(&filled)?;
@@ -227,6 +275,46 @@ impl Setting<'_> {
             )?;
             shown.run(self.start(trial), own)
         })
+    }
+
+    /// By trial, the chamber's pressure at every node where it does not depend on the muscle: what acts in the muscle alone finds it kept.
+    fn chamber_kpa(&self, stage: &Actuation, count: usize) -> Result<Chamber, BenchError> {
+        let initial: Vec<f64> = (0..count).map(|trial| self.initial_kpa(trial)).collect();
+        let key = self.chamber_key(&initial);
+        self.rig.kept.chambers.or_make(key, || {
+            let mut memory = stage.memory();
+            let before = if self.is_vented() { 1e-3 * self.params[Key::PS] } else { 0.0 };
+            let shut = Openings { inlet: &[0.0; 2], outlet: &[0.0; 2] };
+            stage.run_pressure(&mut memory, Start::Settled, shut, before, &mut Vec::new())?;
+            let one = |(trial, initial_kpa): (usize, &f64)| {
+                let (start, [inlet, outlet]) = (self.start(trial), self.openings(trial));
+                let openings = Openings { inlet: &inlet, outlet: &outlet };
+                let mut nodes = Vec::new();
+                stage.run_pressure(&mut memory, start, openings, *initial_kpa, &mut nodes)?;
+                Ok(nodes)
+            };
+            initial.iter().enumerate().map(one).collect()
+        })
+    }
+
+    /// All that the pressure of a chamber is a function of which does not depend on the muscle.
+    fn chamber_key(&self, initial_kpa: &[f64]) -> ChamberKey {
+        let effects = || self.effects.acting_in(Stage::Pneumatics);
+        let acts = effects().next().is_some();
+        // Effects know of the scales around them.
+        let counts = |info: &&ParameterInfo| {
+            info.stage == Stage::Pneumatics || (acts && info.stage == Stage::Muscle)
+        };
+        let numbers = PARAMETERS
+            .iter()
+            .filter(counts)
+            .map(|info| self.params[info.key])
+            .chain(effects().flat_map(|e| e.values().iter().copied()))
+            .chain(initial_kpa.iter().copied())
+            .chain(self.leads)
+            .chain(self.grid.steps().iter().copied())
+            .map(f64::to_bits);
+        (effects().map(ActiveEffect::name).collect(), numbers.collect())
     }
 
     fn sensing(

@@ -1,6 +1,10 @@
 //! Smoothing of a measured input, as wide as the commands allow.
 
+use std::{convert::Infallible, num::NonZeroUsize};
+
 use stretch_gap::{Dice, Noise};
+
+use crate::kept::Kept;
 
 /// Widest half-width, in samples.
 const WIDEST: usize = 15;
@@ -121,10 +125,37 @@ impl Smoothed {
         Self { smoother, values }
     }
 
-    /// With another draw of the noise, as far as the smoothing lets it pass.
-    pub(crate) fn shaken(&self, noise: &Noise, dice: &mut Dice) -> Vec<f64> {
-        let noise = self.smoother.apply(&noise.samples(self.values.len(), dice));
-        self.values.iter().zip(noise).map(|(x, n)| x + n).collect()
+    /// Another draw of the noise, as far as the smoothing lets it pass.
+    fn drawn(&self, noise: &Noise, dice: &mut Dice) -> Vec<f64> {
+        self.smoother.apply(&noise.samples(self.values.len(), dice))
+    }
+}
+
+/// Draws of a channel's noise that are kept: those of the floors and of what is transmitted.
+const DRAWS: NonZeroUsize = NonZeroUsize::new(16).expect("not 0");
+
+/// Draws of the noise of a measured input, every model given the same.
+#[derive(Debug, Clone)]
+pub(crate) struct Draws(Kept<u64, Vec<Vec<f64>>>);
+
+impl Draws {
+    pub(crate) fn new() -> Self {
+        Self(Kept::new(DRAWS))
+    }
+
+    /// A trial of an input with the draw of a seed.
+    pub(crate) fn shaken(
+        &self,
+        inputs: &[Smoothed],
+        noise: &Noise,
+        seed: u64,
+        trial: usize,
+    ) -> Vec<f64> {
+        let draw =
+            |(i, input): (usize, &Smoothed)| input.drawn(noise, &mut Dice::new(seed, i as u64));
+        let all = || Ok::<_, Infallible>(inputs.iter().enumerate().map(draw).collect());
+        let Ok(drawn) = self.0.or_make(seed, all);
+        inputs[trial].values.iter().zip(&drawn[trial]).map(|(x, n)| x + n).collect()
     }
 }
 

@@ -68,6 +68,56 @@ impl Actuation {
         done
     }
 
+    /// Gauge pressure in kPa at every node of the grid, from `initial_kpa` at the first, where it does not depend on the contraction:
+    /// the first half of [`run`](Self::run), for callers that run the second one often.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run), and a chamber whose volume depends on the contraction.
+    pub fn run_pressure(
+        &self,
+        memory: &mut Memory,
+        start: Start,
+        openings: Openings<'_>,
+        initial_kpa: f64,
+        nodes_kpa: &mut Vec<f64>,
+    ) -> Result<(), SimError> {
+        self.pneumatics.check_uncoupled()?;
+        nodes_kpa.resize(self.grid().nodes(openings.check()?), 0.0);
+        if nodes_kpa.is_empty() {
+            return Ok(());
+        }
+        let start = memory.start(start);
+        let taken = self.pneumatics.taken(memory, start, openings);
+        let openings = Openings::of(taken.as_ref(), openings);
+        let done = self.fill(&mut memory.cells, start, openings, initial_kpa, nodes_kpa);
+        memory.commands = taken.unwrap_or_default();
+        done
+    }
+
+    /// Length in mm at every sample, from the gauge pressure in kPa at every node: the second half of [`run`](Self::run), in a memory
+    /// of its own.
+    ///
+    /// # Errors
+    /// Slices of lengths that do not belong together.
+    pub fn run_length(
+        &self,
+        memory: &mut Memory,
+        start: Start,
+        nodes_kpa: &[f64],
+        length_mm: &mut [f64],
+    ) -> Result<(), SimError> {
+        check_length("nodes_kpa", self.grid().nodes(length_mm.len()), nodes_kpa.len())?;
+        let mut nodes = std::mem::take(&mut memory.nodes);
+        nodes.clear();
+        nodes.extend_from_slice(nodes_kpa);
+        let start = memory.start(start);
+        self.muscle.run_nodes(&mut memory.cells, start, &mut nodes);
+        let samples = nodes.iter().step_by(self.grid().pieces());
+        length_mm.iter_mut().zip(samples).for_each(|(out, node)| *out = *node);
+        memory.nodes = nodes;
+        Ok(())
+    }
+
     /// As [`run`](Self::run), at every node of the grid; openings are taken as checked.
     pub(crate) fn run_nodes(
         &self,
@@ -104,6 +154,21 @@ impl Actuation {
         pressure: &mut [f64],
         length: &mut [f64],
     ) -> Result<(), SimError> {
+        self.fill(cells, start, openings, initial_kpa, pressure)?;
+        length.copy_from_slice(pressure);
+        self.muscle.run_nodes(cells, start, length);
+        Ok(())
+    }
+
+    /// The pressure at every node, at least one.
+    fn fill(
+        &self,
+        cells: &mut [f64],
+        start: Start,
+        openings: Openings<'_>,
+        initial_kpa: f64,
+        pressure: &mut [f64],
+    ) -> Result<(), SimError> {
         let pneumatics = &self.pneumatics;
         let mut chamber = pneumatics.begin(start, initial_kpa, 1.0, cells)?;
         let mut drive = Drive::new(pneumatics, openings);
@@ -117,8 +182,6 @@ impl Actuation {
             }
         }
         pneumatics.remember(&chamber, cells);
-        length.copy_from_slice(pressure);
-        self.muscle.run_nodes(cells, start, length);
         Ok(())
     }
 

@@ -153,10 +153,18 @@ impl Pneumatics {
         initial_kpa: f64,
         pressure_kpa: &mut [f64],
     ) -> Result<(), SimError> {
-        if let Some(name) = self.coupled_by {
-            return Err(SimError::NotHere { name: name.into(), needs: "the length of the muscle" });
-        }
+        self.check_uncoupled()?;
         self.run_sampled(memory, start, openings, None, initial_kpa, pressure_kpa)
+    }
+
+    /// Refuses a chamber whose volume depends on the contraction.
+    pub(crate) fn check_uncoupled(&self) -> Result<(), SimError> {
+        match self.coupled_by {
+            None => Ok(()),
+            Some(name) => {
+                Err(SimError::NotHere { name: name.into(), needs: "the length of the muscle" })
+            }
+        }
     }
 
     /// As [`run`](Self::run), the chamber's volume following a measured length (mm, linear between samples).

@@ -139,6 +139,7 @@ fn run(
         true => Naming::of(&candidates, &shares, thresholds, is_short),
         false => Naming::default(),
     };
+    // At an end of its range an effect stands in for something else.
     let verdict = if naming.named.is_empty() { judged.nameless() } else { judged };
     let (verdict, proposed) = lacking(problem, &found.best, (verdict, evidence.gap), progress)?;
     // Names that a sum of terms beats stand for nothing.

@@ -50,10 +50,13 @@ impl Verdict {
         matches!(self.kind, VerdictKind::Effect | VerdictKind::Partial)
     }
 
-    /// The same where no name is left: all that was found stands at an end of its range, so it stands in for something else.
+    /// The same where no name is left: what was found stands in for something else.
     pub(crate) fn nameless(self) -> Self {
-        let kind = if self.names() { VerdictKind::Unknown } else { self.kind };
-        Self { kind, ..self }
+        let without = |kind| match kind {
+            VerdictKind::Effect | VerdictKind::Partial => VerdictKind::Unknown,
+            kind => kind,
+        };
+        Self { kind: without(self.kind), seen: without(self.seen), overruled: self.overruled }
     }
 }
 

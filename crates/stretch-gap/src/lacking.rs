@@ -12,11 +12,10 @@ use crate::{
 
 /// Noise is known to a factor of two of its variance: what is left below that and random in time is noise.
 const NOISE: f64 = 1.0;
-/// Share of a gap by which a sum of terms must close more than the names do to stand in their place: it has more freedom.
-const BEATEN: f64 = 0.15;
-
-/// What the catalogue lacks where a gap is left, and the verdict beside it: a gap that is random in time may be noise, and names do not stand for
-/// most of a gap of which a sum of terms, that stands for something else, closes clearly more, held out.
+/// What the catalogue lacks where a gap is left, and the verdict beside it: a gap that is random in time may be noise.
+///
+/// What a known cause leaves because its form is another, and what an unknown cause leaves, are two hypotheses: the named effects with a sum of
+/// terms beside them, and a sum of terms alone. The names stand where the first closes more of the held-out gap.
 pub(crate) fn lacking(
     problem: &Problem<'_>,
     best: &Hypothesis,
@@ -35,17 +34,16 @@ pub(crate) fn lacking(
             false => (verdict, instead),
         });
     }
+    let beside = propose(problem, best)?;
     let held = |h: &Hypothesis, stage: usize| gap(h.misfits[stage].held);
-    let named = |name: &String| problem.simulator().stages().iter().position(|s| s.name == *name);
+    let of = |p: &Proposed| problem.simulator().stages().iter().position(|s| s.name == p.stage);
     let is_beaten = instead.as_ref().is_some_and(|other| {
-        named(&other.stage).is_some_and(|stage| {
+        of(other).is_some_and(|stage| {
             let whole = held(&problem.nominal, stage).max(f64::MIN_POSITIVE);
-            other.closes_held >= 1.0 - held(best, stage) / whole + BEATEN
+            let own = beside.as_ref().filter(|own| own.stage == other.stage);
+            let left = held(best, stage) / whole * (1.0 - own.map_or(0.0, |p| p.closes_held));
+            other.closes_held > 1.0 - left
         })
     });
-    if is_beaten {
-        let verdict = Verdict { kind: VerdictKind::Unknown, ..verdict };
-        return Ok((verdict, instead));
-    }
-    Ok((verdict, propose(problem, best)?))
+    Ok(if is_beaten { (verdict.nameless(), instead) } else { (verdict, beside) })
 }

@@ -13,6 +13,9 @@ use crate::{
 /// Least share of the gap that is told of an effect that is not named.
 const TOLD: f64 = 0.05;
 
+/// Share that is told as a number.
+const LEAST_TOLD: f64 = 0.01;
+
 /// What is told: the answer in one sentence, and what was noticed and assumed.
 pub(crate) struct Told {
     pub(crate) sentence: String,
@@ -118,12 +121,17 @@ fn seen(
 
 /// Mostly this, and so much else.
 fn partial(answer: Answer<'_>, shares: &[EffectShare]) -> String {
-    let closes = |name: &String| {
-        let share = shares.iter().find(|s| s.effect == *name).map(|s| 100.0 * s.closes);
-        share.map_or(String::new(), |s| format!(" ({s:.0} %)"))
+    let closes =
+        |name: &String| shares.iter().find(|s| s.effect == *name).map_or(0.0, |s| s.closes);
+    let in_words = |share: f64| match share < LEAST_TOLD {
+        true => " (below 1 %)".to_owned(),
+        false => format!(" ({:.0} %)", 100.0 * share),
     };
     let pairs = answer.naming.named.iter().zip(answer.naming.alternatives());
-    let names: Vec<String> = pairs.map(|(name, told)| told + &closes(name)).collect();
+    let mut names: Vec<(f64, String)> = pairs.map(|(name, told)| (closes(name), told)).collect();
+    names.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let names: Vec<String> =
+        names.into_iter().map(|(share, told)| told + &in_words(share)).collect();
     let rest = answer.unexplained.map_or(String::new(), |u| {
         let sits = match u.sits.is_empty() {
             true => String::new(),

@@ -1,5 +1,6 @@
 //! The rig as a [`Simulator`](stretch_gap::Simulator): pneumatics, muscle (or both as actuation) and sensing, each on measured inputs.
 
+mod chamber;
 mod experiments;
 mod extent;
 mod noises;
@@ -17,10 +18,10 @@ use stretch_data::DataSet;
 use stretch_gap::{Description, DescriptionSpec, TrialSpec};
 use stretch_sim::{Catalogue, Effect, EffectSet, Key, Rig, RigParams, Search, Stage};
 
+use chamber::{CHAMBERS, Chambers};
 use extent::extent_of;
 use noises::Noises;
 use nominal::{Knob, parameters, stages};
-use run::KeptRuns;
 use session::Inputs;
 pub use session::{RigTrial, Session};
 
@@ -60,7 +61,7 @@ pub struct RigSimulator {
     is_lost: Vec<bool>,
     /// The bridge voltage that effects may be found in.
     bridge: FitRecord,
-    kept: KeptRuns,
+    chambers: Chambers,
     notes: Vec<String>,
 }
 
@@ -132,7 +133,7 @@ impl RigSimulator {
             measured,
             is_lost,
             bridge,
-            kept: KeptRuns::new(),
+            chambers: Chambers::new(CHAMBERS),
             notes,
         })
     }

@@ -1,22 +1,15 @@
 //! One stage of the rig over the session.
 
-use std::{borrow::Cow, num::NonZeroUsize, sync::Arc};
+use std::borrow::Cow;
 
 use stretch_gap::{Model, Run};
 use stretch_sim::{
-    ActiveEffect, Actuation, DEFAULT_STEP_S, EffectSet, Grid, Key, Memory, Muscle, Need, Openings,
-    PARAMETERS, ParameterInfo, Pneumatics, Reference, RigParams, Sensing, Stage, Start,
+    Actuation, DEFAULT_STEP_S, EffectSet, Grid, Key, Memory, Muscle, Need, Openings, Pneumatics,
+    Reference, RigParams, Sensing, Stage, Start,
 };
 
-use super::{
-    RigSimulator,
-    nominal::Knob,
-    session::Begin,
-    smooth::{Draws, cubic},
-    timing,
-    timing::Leads,
-};
-use crate::{acting::Acting, error::BenchError, kept::Kept};
+use super::{RigSimulator, nominal::Knob, session::Begin, smooth::cubic, timing, timing::Leads};
+use crate::{acting::Acting, error::BenchError};
 
 /// Step of integration while fitting, s.
 const STEP_S: f64 = 2.0 * DEFAULT_STEP_S;
@@ -27,37 +20,14 @@ const EMPTY_KPA: (f64, f64) = (0.08, 0.06);
 /// Offset of a filled chamber below the supply, a share of it (mean, 1 sd).
 const FULL_SHARE: (f64, f64) = (0.0008, 0.0006);
 
-/// By trial, pressure at every node, kPa.
-type Chamber = Arc<Vec<Vec<f64>>>;
-/// Effects, and bits of all numbers.
-type ChamberKey = (Vec<&'static str>, Vec<u64>);
-
-/// Chambers that are kept: those of the probes and steps of the fits under way.
-const CHAMBERS: NonZeroUsize = NonZeroUsize::new(12).expect("not 0");
-
-/// What a rig keeps between runs.
-#[derive(Debug, Clone)]
-pub(super) struct KeptRuns {
-    length_draws: Draws,
-    pressure_draws: Draws,
-    chambers: Kept<ChamberKey, Vec<Vec<f64>>>,
-}
-
-impl KeptRuns {
-    pub(super) fn new() -> Self {
-        let [length_draws, pressure_draws] = [Draws::new(), Draws::new()];
-        Self { length_draws, pressure_draws, chambers: Kept::new(CHAMBERS) }
-    }
-}
-
 /// What a run needs beside the rig.
-struct Setting<'a> {
-    rig: &'a RigSimulator,
-    params: RigParams,
-    effects: EffectSet,
-    grid: Grid,
+pub(super) struct Setting<'a> {
+    pub(super) rig: &'a RigSimulator,
+    pub(super) params: RigParams,
+    pub(super) effects: EffectSet,
+    pub(super) grid: Grid,
     offset: f64,
-    leads: Leads,
+    pub(super) leads: Leads,
     shake: Option<u64>,
     /// Input of the stage that stands in for the measured one, all trials end to end.
     given: Option<&'a [f64]>,
@@ -132,7 +102,7 @@ impl Turned {
 
 impl Setting<'_> {
     /// How a trial begins: as the one before left it, after the pause between them.
-    fn start(&self, trial: usize) -> Start {
+    pub(super) fn start(&self, trial: usize) -> Start {
         let trials = &self.rig.about.trials;
         let rest_s = match trial.checked_sub(1) {
             Some(before) => {
@@ -146,13 +116,13 @@ impl Setting<'_> {
         Start::Carried { rest_s: (rest_s - 1.0).max(0.0) }
     }
 
-    fn is_vented(&self) -> bool {
+    pub(super) fn is_vented(&self) -> bool {
         let inputs = &self.rig.inputs;
         let first = inputs.length[0].values.first().copied().unwrap_or(0.0);
         first > 0.5 * (inputs.stroke.0 + inputs.stroke.1)
     }
 
-    fn initial_kpa(&self, trial: usize) -> f64 {
+    pub(super) fn initial_kpa(&self, trial: usize) -> f64 {
         let supply = 1e-3 * self.params[Key::PS];
         match self.rig.inputs.begin[trial] {
             Begin::Empty => EMPTY_KPA.0 + self.offset * EMPTY_KPA.1,
@@ -168,7 +138,7 @@ impl Setting<'_> {
     }
 
     /// Inlet and outlet as they act.
-    fn openings(&self, trial: usize) -> [Cow<'_, [f64]>; 2] {
+    pub(super) fn openings(&self, trial: usize) -> [Cow<'_, [f64]>; 2] {
         let own = &self.rig.session.trials[trial];
         timing::ahead(&own.inlet, &own.outlet, self.leads)
     }
@@ -186,12 +156,10 @@ impl Setting<'_> {
         let noises = &self.rig.noises;
         match of_pressure {
             true => {
-                let draws = &self.rig.kept.pressure_draws;
+                let draws = &inputs.pressure_draws;
                 draws.shaken(&inputs.pressure, &noises.pressure_kpa, seed, trial)
             }
-            false => {
-                self.rig.kept.length_draws.shaken(&inputs.length, &noises.length_mm, seed, trial)
-            }
+            false => inputs.length_draws.shaken(&inputs.length, &noises.length_mm, seed, trial),
         }
     }
 
@@ -275,46 +243,6 @@ impl Setting<'_> {
             )?;
             shown.run(self.start(trial), own)
         })
-    }
-
-    /// By trial, the chamber's pressure at every node where it does not depend on the muscle: what acts in the muscle alone finds it kept.
-    fn chamber_kpa(&self, stage: &Actuation, count: usize) -> Result<Chamber, BenchError> {
-        let initial: Vec<f64> = (0..count).map(|trial| self.initial_kpa(trial)).collect();
-        let key = self.chamber_key(&initial);
-        self.rig.kept.chambers.or_make(key, || {
-            let mut memory = stage.memory();
-            let before = if self.is_vented() { 1e-3 * self.params[Key::PS] } else { 0.0 };
-            let shut = Openings { inlet: &[0.0; 2], outlet: &[0.0; 2] };
-            stage.run_pressure(&mut memory, Start::Settled, shut, before, &mut Vec::new())?;
-            let one = |(trial, initial_kpa): (usize, &f64)| {
-                let (start, [inlet, outlet]) = (self.start(trial), self.openings(trial));
-                let openings = Openings { inlet: &inlet, outlet: &outlet };
-                let mut nodes = Vec::new();
-                stage.run_pressure(&mut memory, start, openings, *initial_kpa, &mut nodes)?;
-                Ok(nodes)
-            };
-            initial.iter().enumerate().map(one).collect()
-        })
-    }
-
-    /// All that the pressure of a chamber is a function of which does not depend on the muscle.
-    fn chamber_key(&self, initial_kpa: &[f64]) -> ChamberKey {
-        let effects = || self.effects.acting_in(Stage::Pneumatics);
-        let acts = effects().next().is_some();
-        // Effects know of the scales around them.
-        let counts = |info: &&ParameterInfo| {
-            info.stage == Stage::Pneumatics || (acts && info.stage == Stage::Muscle)
-        };
-        let numbers = PARAMETERS
-            .iter()
-            .filter(counts)
-            .map(|info| self.params[info.key])
-            .chain(effects().flat_map(|e| e.values().iter().copied()))
-            .chain(initial_kpa.iter().copied())
-            .chain(self.leads)
-            .chain(self.grid.steps().iter().copied())
-            .map(f64::to_bits);
-        (effects().map(ActiveEffect::name).collect(), numbers.collect())
     }
 
     fn sensing(

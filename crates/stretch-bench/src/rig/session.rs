@@ -5,7 +5,7 @@ use std::path::Path;
 use stretch_data::{DataSet, EvenSession, EvenTrial, ReadOptions, Rows, SessionTrial, Split};
 use stretch_gap::{copied, noise_variance};
 
-use super::smooth::{Smoothed, schedule};
+use super::smooth::{Draws, Smoothed, schedule};
 use crate::{
     error::BenchError,
     lost::{open, open_behind},
@@ -359,7 +359,9 @@ pub(crate) enum Begin {
 #[derive(Debug, Clone)]
 pub(crate) struct Inputs {
     pub(crate) length: Vec<Smoothed>,
+    pub(crate) length_draws: Draws,
     pub(crate) pressure: Vec<Smoothed>,
+    pub(crate) pressure_draws: Draws,
     pub(crate) begin: Vec<Begin>,
     /// Shortest and longest length of the session, mm.
     pub(crate) stroke: (f64, f64),
@@ -386,7 +388,8 @@ impl Inputs {
             .iter()
             .map(|t| Self::begin(t, session.dt_s, stroke, pressure_sd, supply_kpa))
             .collect();
-        Self { length, pressure, begin, stroke }
+        let [length_draws, pressure_draws] = [Draws::new(), Draws::new()];
+        Self { length, length_draws, pressure, pressure_draws, begin, stroke }
     }
 
     fn begin(

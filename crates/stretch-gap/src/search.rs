@@ -4,7 +4,7 @@
 //! times: sets are pruned with the rest fitted anew from the larger set, every effect of the best set is held against rivals
 //! fitted in its place, and a rival that stands better takes it, from which the search goes on.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 use rayon::prelude::*;
 
@@ -35,6 +35,9 @@ const RIVALRY: f64 = 0.5;
 /// How often an effect of the best set gives its place to another.
 const EXCHANGES: usize = 2;
 
+/// Screens that are kept: that of the set before the last one found, and what lies between.
+const LOOKED: usize = 4;
+
 /// The search over sets of effects.
 pub(crate) struct Search<'a> {
     problem: &'a Problem<'a>,
@@ -42,6 +45,14 @@ pub(crate) struct Search<'a> {
     pub(crate) sets: Sets<'a>,
     /// Most effects at once.
     depth: usize,
+    /// Screens that were made, by what they were made around: rivals of an effect alone come from the one that it was found by.
+    looked: Vec<Arc<Looked>>,
+}
+
+/// A ground, and every effect that is not in it screened on top; the best come first.
+struct Looked {
+    ground: Ground,
+    screened: Vec<Screened>,
 }
 
 /// What the search found.
@@ -54,7 +65,8 @@ pub(crate) struct Found {
 
 impl<'a> Search<'a> {
     pub(crate) fn new(problem: &'a Problem<'a>, thresholds: &'a Thresholds, depth: usize) -> Self {
-        Self { problem, worth: Worth { problem, thresholds }, sets: Sets::new(problem), depth }
+        let worth = Worth { problem, thresholds };
+        Self { problem, worth, sets: Sets::new(problem), depth, looked: Vec::new() }
     }
 
     /// The best set that grows from one of this or another problem, and its rivals: effects are added as long as they are worth it, and one that stands better in the
@@ -94,17 +106,17 @@ impl<'a> Search<'a> {
         let mut best = from;
         for round in best.effects.len()..self.depth {
             progress(&format!("screening effects, round {}", round + 1));
-            let ground = Ground::around(&self.problem.compare, best.model.clone())?;
-            let screened = self.screen(&best, &ground)?;
+            let looked = self.look(&best)?;
+            let Looked { ground, screened } = &*looked;
             let kept = if round == 0 { KEPT } else { KEPT_LATER };
-            let list = self.shortlist(&best, &screened, kept);
+            let list = self.shortlist(&best, screened, kept);
             progress(&format!("fitting {} candidates, round {}", list.len(), round + 1));
-            let mut next = self.first_worth(&best, &ground, &list)?;
+            let mut next = self.first_worth(&best, ground, &list)?;
             if next.is_none() && self.problem.gap(&best) > self.worth.thresholds.null_excess {
                 // A screen is a straight line: before a gap is left as it is, whatever could be in it is fitted.
                 progress(&format!("fitting the other candidates, round {}", round + 1));
-                let others: Vec<Screened> = self.others(&best, &screened, &list);
-                next = self.first_worth(&best, &ground, &others)?;
+                let others: Vec<Screened> = self.others(&best, screened, &list);
+                next = self.first_worth(&best, ground, &others)?;
             }
             let Some(next) = next else { break };
             best = next;
@@ -155,16 +167,23 @@ impl<'a> Search<'a> {
         Ok(best)
     }
 
-    /// Screens every effect that is not in `base`; the best come first.
-    fn screen(&self, base: &Hypothesis, ground: &Ground) -> Result<Vec<Screened>, GapError> {
+    /// Screens every effect that is not in `base`, once a model.
+    fn look(&mut self, base: &Hypothesis) -> Result<Arc<Looked>, GapError> {
+        if let Some(looked) = self.looked.iter().find(|l| l.ground.model == base.model) {
+            return Ok(Arc::clone(looked));
+        }
+        let ground = Ground::around(&self.problem.compare, base.model.clone())?;
         let all: Vec<usize> = (0..self.problem.simulator().effects().len())
             .filter(|e| !base.effects.contains(e))
             .collect();
         let screened: Result<Vec<Screened>, GapError> =
-            all.par_iter().map(|&e| self.problem.compare.screen(ground, e)).collect();
+            all.par_iter().map(|&e| self.problem.compare.screen(&ground, e)).collect();
         let mut screened = screened?;
         screened.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
-        Ok(screened)
+        let looked = Arc::new(Looked { ground, screened });
+        self.looked.truncate(LOOKED - 1);
+        self.looked.insert(0, Arc::clone(&looked));
+        Ok(looked)
     }
 
     /// The best of a screen, and the twins of the very best.
@@ -201,11 +220,11 @@ impl<'a> Search<'a> {
         let kept = if best.effects.len() > 1 { RIVALS.1 } else { RIVALS.0 };
         for &effect in &best.effects {
             let less = self.sets.without(best, effect)?;
-            let ground = Ground::around(&self.problem.compare, less.model.clone())?;
-            let all = self.screen(&less, &ground)?;
+            let looked = self.look(&less)?;
+            let Looked { ground, screened: all } = &*looked;
             let own_gain = all.iter().find(|s| s.effect == effect).map_or(0.0, Screened::gain);
-            let screened: Vec<Screened> = all
-                .into_iter()
+            let screened: Vec<&Screened> = all
+                .iter()
                 .filter(|s| !best.effects.contains(&s.effect))
                 .filter(|s| self.worth.is_possible(&less, s.effect))
                 .collect();
@@ -217,9 +236,9 @@ impl<'a> Search<'a> {
                 .take(kept)
                 .filter(|s| s.gain() > RIVALRY * own_gain)
                 .chain(screened.iter().filter(|s| is_twin(s) && s.gain() <= RIVALRY * own_gain))
-                .cloned()
+                .map(|s| (*s).clone())
                 .collect();
-            for solution in self.sets.extend_all(&less, &ground, &list, best.score)? {
+            for solution in self.sets.extend_all(&less, ground, &list, best.score)? {
                 let new = solution.effects.iter().find(|e| !less.effects.contains(e));
                 if new.is_some_and(|new| !self.worth.is_at_bound(&solution, *new)) {
                     out.push((effect, solution));

@@ -1,5 +1,7 @@
 //! A simulator beside its measurements, every stage on its measured input and in its own metric.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::{
@@ -9,6 +11,7 @@ use crate::{
     frame::{Frame, Role},
     linear::dot,
     metric::{Column, Metric},
+    octaves::Octaves,
     runs::Runs,
     score::{Misfit, samples_per_observation},
     simulator::{Model, Run, Simulator},
@@ -117,7 +120,8 @@ impl<'a> Comparison<'a> {
             let sum = self.metrics[stage].product(&self.frame, residual, residual, role);
             if n > 0.0 { sum / n } else { 1.0 }
         };
-        Misfit { stage, fit: mean(Role::Fit), held: mean(Role::Held) }
+        let octaves = self.octaves(stage, &residual.values);
+        Misfit { stage, fit: mean(Role::Fit), held: mean(Role::Held), octaves }
     }
 
     /// Reduced chi-square over fitted and held-out samples together.
@@ -138,6 +142,23 @@ impl<'a> Comparison<'a> {
         Ok(samples_per_observation(&parts.collect::<Vec<_>>(), self.frame.block))
     }
 
+    /// Octaves of a residual in floors over fitted and held-out samples.
+    fn octaves(&self, stage: usize, residual: &[f64]) -> Octaves {
+        let mut clean = residual.to_vec();
+        self.metrics[stage].clean(&self.frame, &mut clean);
+        let mut octaves = Octaves::default();
+        for segment in self.looked() {
+            octaves.add(&residual[segment.clone()], &clean[segment]);
+        }
+        octaves
+    }
+
+    /// Segments that are not tested on.
+    fn looked(&self) -> impl Iterator<Item = Range<usize>> {
+        let all = self.frame.segments.iter().filter(|s| s.role != Role::Test);
+        all.map(|s| s.from..s.to)
+    }
+
     /// Noise transmitted: what of the measured input's noise arrives at the output of a stage, in floors squared.
     pub(crate) fn transmitted(&self, stage: usize, model: &Model) -> Result<Misfit, GapError> {
         let run = Run { stage, model, trials: self.frame.fit_trials, shake: None, step: 1.0 };
@@ -156,10 +177,14 @@ impl<'a> Comparison<'a> {
             };
             mean.fit += power(Role::Fit) / DRAWS as f64;
             mean.held += power(Role::Held) / DRAWS as f64;
+            for segment in self.looked() {
+                mean.octaves.add(&shaken[segment.clone()], &shaken[segment]);
+            }
             if mean.fit == 0.0 {
                 break;
             }
         }
+        mean.octaves = mean.octaves.scaled(1.0 / DRAWS as f64);
         Ok(mean)
     }
 

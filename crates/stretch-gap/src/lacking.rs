@@ -12,7 +12,9 @@ use crate::{
 
 /// Noise is known to a factor of two of its variance: what is left below that and random in time is noise.
 const NOISE: f64 = 1.0;
-/// What the catalogue lacks where a gap is left, and the verdict beside it: a gap that is random in time may be noise.
+/// What the catalogue lacks where a gap is left, and the verdict beside it: a gap that is random in time may be noise. So may be one that is
+/// smaller than the noise of a measured input that arrives there, though it follows that input: its noise does so, too, where the input
+/// rests and nothing else moves it.
 ///
 /// What a known cause leaves because its form is another, and what an unknown cause leaves, are two hypotheses: the named effects with a sum of
 /// terms beside them, and a sum of terms alone. The names stand where the first closes more of the held-out gap.
@@ -28,7 +30,8 @@ pub(crate) fn lacking(
     progress("what the catalogue lacks");
     let instead = propose(problem, &problem.nominal)?;
     if verdict.kind == VerdictKind::Unknown {
-        let is_noise = instead.as_ref().is_some_and(|p| p.random) && gaps.left < NOISE;
+        let is_random = instead.as_ref().is_some_and(|p| p.random);
+        let is_noise = gaps.left < NOISE && (is_random || problem.is_transmitted(best));
         return Ok(match is_noise && verdict.overruled.is_none() {
             true => (Verdict { kind: VerdictKind::Parameters, ..verdict }, None),
             false => (verdict, instead),

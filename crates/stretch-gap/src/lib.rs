@@ -32,6 +32,7 @@ mod naming;
 mod next_experiment;
 mod noise;
 mod nuisance;
+mod octaves;
 mod probability;
 mod problem;
 mod record;

@@ -224,6 +224,20 @@ impl<'a> Problem<'a> {
         -compare.weight() * sum - 0.5 * free * frame.blocks(Role::Fit).ln()
     }
 
+    /// Rise of the log-likelihood from one hypothesis to another by the [octaves](crate::octaves) of what they leave, nats.
+    pub(crate) fn rise(&self, base: &Hypothesis, next: &Hypothesis) -> f64 {
+        let pairs = base.misfits.iter().zip(&next.misfits);
+        pairs.map(|(a, b)| a.octaves.rise(&b.octaves)).sum()
+    }
+
+    /// Whether what is left where most is left is less than the noise of the measured input that arrives there.
+    pub(crate) fn is_transmitted(&self, hypothesis: &Hypothesis) -> bool {
+        let left = |stage: &usize| self.gap_in(hypothesis, *stage);
+        let stages = 0..hypothesis.misfits.len();
+        let worst = stages.max_by(|a, b| left(a).total_cmp(&left(b)));
+        worst.is_some_and(|stage| left(&stage) < self.transmitted[stage].fit)
+    }
+
     /// Excess of one stage over fitted and held-out samples together.
     pub(crate) fn gap_in(&self, hypothesis: &Hypothesis, stage: usize) -> f64 {
         gap(self.compare.mean_square(&hypothesis.misfits[stage]))

@@ -24,7 +24,7 @@
 //! with Schwarz's penalty for k free parameters (1978, doi 10.1214/aos/1176344136), counted in blocks. Held-out samples
 //! enter with their own N and X and need no penalty.
 
-use crate::linear::dot;
+use crate::{linear::dot, octaves::Octaves};
 
 /// Mean squares of one stage in units of its floor: the reduced chi-square over fitted and over held-out samples.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -32,6 +32,8 @@ pub(crate) struct Misfit {
     pub(crate) stage: usize,
     pub(crate) fit: f64,
     pub(crate) held: f64,
+    /// Of both together.
+    pub(crate) octaves: Octaves,
 }
 
 /// How much the samples of one stage count: fitted, held out.
@@ -71,6 +73,7 @@ impl Misfit {
         Self {
             fit: level(self.fit, nominal.fit, own.fit),
             held: level(self.held, nominal.held, own.held),
+            octaves: self.octaves.at_equal_noise(&nominal.octaves, &own.octaves),
             ..self
         }
     }
@@ -134,7 +137,7 @@ mod tests {
 
     #[test]
     fn what_is_transmitted_less_is_no_better_fit() {
-        let of = |x: f64| Misfit { stage: 0, fit: x, held: x };
+        let of = |x: f64| Misfit { fit: x, held: x, ..Misfit::default() };
         let level = of(1.2).at_equal_noise(&of(0.5), &of(0.2));
         approx::assert_relative_eq!(level.fit, 1.5, max_relative = F64_ROUNDING);
         assert_eq!(of(1.0).at_equal_noise(&of(0.0), &of(5.0)).held, LEAST_KEPT);

@@ -1,9 +1,10 @@
 //! What an effect must bring to be taken: more than chance, more than what counts, more than mismatch of form.
 //!
-//! Three hurdles, all of them in [`Thresholds`]: the score rises by `rise` nats (by `faint_rise` where what is closed would not count as
-//! a gap); at least `share` of the gap that is left in the effect's stages closes; and in one of these stages more closes than
-//! *mismatch of form* could explain. The rig's backlash is not the textbook's: an effect in the right place leaves a share `mismatch` of
-//! what it closes, with the shape of a further effect, and evidence grows with the samples while that share does not.
+//! Four hurdles, all of them in [`Thresholds`]. What is closed is more than chance makes of noise of this colour: `rise` nats by the
+//! [octaves](crate::octaves). The score rises by as much, and by `faint_rise` where what is closed would not count as a gap: so little may be
+//! mismatch of form within the noise. At least `share` of the gap that is left in the effect's stages closes. And in one of these stages more
+//! closes than *mismatch of form* could explain: the rig's backlash is not the textbook's; an effect in the right place leaves a share
+//! `mismatch` of what it closes, with the shape of a further effect, and evidence grows with the samples while that share does not.
 
 use crate::{hypothesis::Hypothesis, problem::Problem, thresholds::Thresholds};
 
@@ -23,6 +24,7 @@ impl Worth<'_> {
         let all = 0..base.misfits.len();
         let closed: f64 = all.map(|stage| self.problem.closes(base, next, stage)).sum();
         next.score - base.score > self.least_rise(closed)
+            && self.problem.rise(base, next) > self.thresholds.rise
             && closed >= self.thresholds.share * self.left(base, new)
             && self.is_no_mismatch(base, next, new)
     }

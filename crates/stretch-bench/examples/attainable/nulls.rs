@@ -70,10 +70,13 @@ pub(crate) fn band(seeds: Range<u64>) -> Answer<String> {
         let [a, b, c] = excess.map(|x| format!("{x:.4}"));
         let told = |x: f64| if x.is_finite() { format!("{x:.1}") } else { "none".into() };
         let [d, e, f] = scores.map(told);
+        let by_score = |a: &&(f64, String), b: &&(f64, String)| a.0.total_cmp(&b.0);
+        let greatest = nulls.iter().filter_map(|n| n.best.as_ref()).max_by(by_score);
+        let whose = greatest.map_or("-", |(_, effect)| effect.as_str());
         let name = protocol.name();
         writeln!(
             text,
-            "| {name} | {a} | {b} | {c} | {d} | {e} | {f} | {none} of {each} | {others} |"
+            "| {name} | {a} | {b} | {c} | {d} | {e} | {f} ({whose}) | {none} of {each} | {others} |"
         )?;
     }
     Ok(text)

@@ -9,7 +9,7 @@ use crate::{
 };
 
 /// Most sessions that are simulated for one excess.
-const MOST: usize = 8;
+const MOST: usize = 12;
 /// The excess may miss its aim by this factor.
 const NEAR: f64 = 1.7;
 /// Smallest excess that is interpolated with: below it chance decides.
@@ -17,7 +17,7 @@ const LEAST: f64 = 1e-3;
 /// Factor by which one step of the search goes on at most.
 const STEP: f64 = 8.0;
 /// Shares nearer to each other than this factor leave nothing between them: the excess jumps.
-const JUMP: f64 = 1.03;
+const JUMP: f64 = 1.003;
 /// Greatest share of the range: at its end an effect is announced by nobody.
 const END: f64 = 0.8;
 /// Share that is looked at first.

@@ -19,8 +19,8 @@ const AIMS: [f64; 2] = [0.55, 10.0];
 /// Protocols that are compared.
 const PROTOCOLS: [Protocol; 2] = [Protocol::Paper, Protocol::Plus];
 
-/// A rival this many nats or fewer behind the first name is told in the table: at the temperature of the probabilities, five nats, it has a
-/// four-hundredth of the first's.
+/// A rival so few nats behind the true effect, or beyond it, is told in the table: at the temperature of the probabilities, five nats, it has a
+/// four-hundredth of the true one's probability.
 const NEAR_NATS: f64 = 30.0;
 
 /// What is said of one session.
@@ -97,7 +97,7 @@ fn row(effect: &'static Effect, seed: u64) -> Answer<Row> {
     Ok([weak?, strong?])
 }
 
-/// The table of ties, a row an effect and seed.
+/// The table of ties, a row an effect; where sessions of several seeds differ, each has its part of a cell.
 pub(crate) fn matrix(seeds: Range<u64>) -> Answer<String> {
     let effects: Vec<&'static Effect> = Catalogue::default().iter().collect();
     let each = seeds.clone().count();
@@ -107,19 +107,31 @@ pub(crate) fn matrix(seeds: Range<u64>) -> Answer<String> {
     let mut text = format!("Effects, seeds {} .. {}\n\n", seeds.start, seeds.end - 1);
     text.push_str("| effect | excess, weak | paper | paper+ | strong | paper | paper+ |\n");
     text.push_str("|---|---|---|---|---|---|---|\n");
-    for (at, [weak, strong]) in rows.iter().enumerate() {
-        let name = effects[at / each].name;
-        let ([a, b], [c, d]) = (&weak.said, &strong.said);
-        let (weak, strong) = (weak.excess, strong.excess);
-        writeln!(text, "| {name} | {weak:.2} | {a} | {b} | {strong:.1} | {c} | {d} |")?;
+    for (effect, rows) in effects.iter().zip(rows.chunks(each.max(1))) {
+        write!(text, "| {} |", effect.name)?;
+        for (strength, places) in [2, 1].into_iter().enumerate() {
+            let cells = || rows.iter().map(|row| &row[strength]);
+            let excess = in_one(cells().map(|c| format!("{:.places$}", c.excess)));
+            let said = |at: usize| in_one(cells().map(|c| c.said[at].to_string()));
+            write!(text, " {excess} | {} | {} |", said(0), said(1))?;
+        }
+        text.push('\n');
     }
     Ok(text)
+}
+
+/// What sessions say, once where all say the same.
+fn in_one(told: impl Iterator<Item = String>) -> String {
+    let mut told: Vec<String> = told.collect();
+    told.dedup();
+    told.join("; ")
 }
 
 impl Display for Said {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         f.write_str(&self.told)?;
         match self.nearest.as_ref().filter(|(_, nats)| nats.abs() < NEAR_NATS) {
+            Some((name, nats)) if self.told.ends_with(name) => write!(f, " ({nats:+.0})"),
             Some((name, nats)) => write!(f, " ({name} {nats:+.0})"),
             None => Ok(()),
         }

@@ -7,20 +7,15 @@
 
 #[path = "injections/inject.rs"]
 mod inject;
+#[path = "support/shared_out.rs"]
+mod shared_out;
 #[path = "injections/told.rs"]
 mod told;
 
-use std::{
-    error::Error,
-    path::Path,
-    sync::{
-        Mutex,
-        atomic::{AtomicUsize, Ordering},
-    },
-    thread,
-};
+use std::path::Path;
 
 use inject::{ALL, Injection};
+use shared_out::{Answer, shared_out};
 use stretch_bench::{GaugeSetup, GaugeSimulator};
 use stretch_data::{Channel, ReadOptions, SessionTrial, Trial};
 use stretch_gap::{Options, diagnose};
@@ -42,9 +37,6 @@ const REFERENCE: &str = "angle_deg";
 /// What is taken of a session, s.
 const LENGTH_S: f64 = 120.0;
 const WORKERS: usize = 2;
-
-/// Fallible, from a worker.
-type Answer<T> = Result<T, Box<dyn Error + Send + Sync>>;
 
 /// The first [`LENGTH_S`] of a session: the reference and one sensor.
 fn record(folder: &Path, session: &str, sensor: &str) -> Answer<Trial> {
@@ -80,28 +72,6 @@ fn said(record: &Trial, injected: Option<(&Injection, usize)>) -> Answer<Said> {
     Ok(Said { diagnosis, noticed: gauge.notes().to_vec() })
 }
 
-/// The results of `count` jobs, in order, by [`WORKERS`] threads.
-fn shared_out<T: Send>(count: usize, job: impl Fn(usize) -> Answer<T> + Sync) -> Answer<Vec<T>> {
-    let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::with_capacity(count)));
-    thread::scope(|scope| {
-        for _ in 0..WORKERS {
-            scope.spawn(|| {
-                loop {
-                    let at = next.fetch_add(1, Ordering::Relaxed);
-                    if at >= count {
-                        break;
-                    }
-                    let result = job(at);
-                    done.lock().unwrap_or_else(|e| e.into_inner()).push((at, result));
-                }
-            });
-        }
-    });
-    let mut done = done.into_inner().unwrap_or_else(|e| e.into_inner());
-    done.sort_by_key(|(at, _)| *at);
-    done.into_iter().map(|(_, result)| result).collect()
-}
-
 fn main() -> Answer<()> {
     let Some(folder) = std::env::args().nth(1) else {
         println!("SKIPPED: no folder was given; one with {}.csv holds the records", RECORDS[0].0);
@@ -120,7 +90,7 @@ fn main() -> Answer<()> {
     let cases: Vec<Option<(&Injection, usize)>> = std::iter::once(None)
         .chain(ALL.iter().flat_map(|i| (0..i.strengths.len()).map(move |which| Some((i, which)))))
         .collect();
-    let all = shared_out(records.len() * cases.len(), |at| {
+    let all = shared_out(WORKERS, records.len() * cases.len(), |at| {
         let (case, which) = (cases[at / records.len()], at % records.len());
         let said = said(&records[which], case)?;
         let (session, sensor) = RECORDS[which];

@@ -1,0 +1,123 @@
+//! How strong an effect has to be for a stated excess.
+
+use stretch_gap::Thresholds;
+use stretch_sim::{Effect, EffectParameter};
+
+use crate::{
+    shared_out::Answer,
+    simulated::{Protocol, Source},
+};
+
+/// Most sessions that are simulated for one excess.
+const MOST: usize = 12;
+/// The excess may miss its aim by this factor.
+const NEAR: f64 = 1.7;
+/// Smallest excess that is interpolated with: below it chance decides.
+const LEAST: f64 = 1e-3;
+/// Factor by which one step of the search goes on at most.
+const STEP: f64 = 8.0;
+/// Shares nearer to each other than this factor leave nothing between them: the excess jumps.
+const JUMP: f64 = 1.003;
+/// Greatest share of the range: at its end an effect is announced by nobody.
+const END: f64 = 0.8;
+/// Share that is looked at first.
+const FIRST: f64 = 0.1;
+
+/// A share of the way from off to the end of an effect's range, and the excess there.
+#[derive(Debug, Clone, Copy)]
+struct Point {
+    share: f64,
+    excess: f64,
+}
+
+/// The strengths of an effect on one rig, as far as they were looked at.
+#[derive(Debug)]
+pub(crate) struct Strengths {
+    effect: &'static Effect,
+    seed: u64,
+    points: Vec<Point>,
+}
+
+impl Strengths {
+    pub(crate) fn of(effect: &'static Effect, seed: u64) -> Self {
+        Self { effect, seed, points: Vec::new() }
+    }
+
+    /// The source whose excess on the trials of the paper comes near an aim, and that excess. Where the range ends before, what is at
+    /// its end; where the excess jumps over the aim, what is behind the jump.
+    pub(crate) fn near(&mut self, aim: f64) -> Answer<(Source, f64)> {
+        let off_by = |p: &Point| (p.excess / aim).ln().abs();
+        for step in 0..MOST {
+            let nearest = self.points.iter().min_by(|a, b| off_by(a).total_cmp(&off_by(b)));
+            if nearest.is_some_and(|p| off_by(p) <= NEAR.ln()) {
+                break;
+            }
+            let Some(share) = self.next(aim, step % 2 == 1) else { break };
+            let excess = self.excess(share)?;
+            self.points.push(Point { share, excess });
+        }
+        let near = self.points.iter().filter(|p| off_by(p) <= NEAR.ln());
+        let near = near.min_by(|a, b| off_by(a).total_cmp(&off_by(b)));
+        let point = near.or(self.above(aim)).or(self.below(aim)).ok_or("nothing was simulated")?;
+        Ok((self.source(point.share), point.excess))
+    }
+
+    /// The strongest of those that fall short of an aim.
+    fn below(&self, aim: f64) -> Option<&Point> {
+        let below = self.points.iter().filter(|p| p.excess < aim);
+        below.max_by(|a, b| a.share.total_cmp(&b.share))
+    }
+
+    /// The weakest of those that reach it.
+    fn above(&self, aim: f64) -> Option<&Point> {
+        let above = self.points.iter().filter(|p| p.excess >= aim);
+        above.min_by(|a, b| a.share.total_cmp(&b.share))
+    }
+
+    /// Where to look next; nowhere where nothing is left between, or beyond.
+    fn next(&self, aim: f64, halves: bool) -> Option<f64> {
+        match (self.below(aim), self.above(aim)) {
+            (None, None) => Some(FIRST),
+            (Some(a), Some(b)) if b.share < JUMP * a.share => None,
+            // The middle and a straight line of logarithms in turn: a threshold bends the line.
+            (Some(a), Some(b)) if halves => Some((a.share * b.share).sqrt()),
+            (Some(a), Some(b)) => {
+                let way = (aim / a.excess).ln() / (b.excess / a.excess).ln();
+                Some(a.share * (b.share / a.share).powf(way))
+            }
+            (Some(a), None) if a.share >= END => None,
+            // Excess goes with the square of a strength.
+            (one, other) => one.or(other).map(|p| {
+                let times = (aim / p.excess).sqrt().clamp(1.0 / STEP, STEP);
+                (p.share * times).min(END)
+            }),
+        }
+    }
+
+    fn excess(&self, share: f64) -> Answer<f64> {
+        // Nothing counts as unknown: only the excess is asked for, not what may be behind it.
+        let thresholds = Thresholds { unknown_excess: f64::INFINITY, ..Thresholds::frozen() };
+        let diagnosis = self.source(share).diagnosed(Protocol::Paper, 0, thresholds)?;
+        Ok(diagnosis.gap.retuned.max(LEAST))
+    }
+
+    fn source(&self, share: f64) -> Source {
+        Source { seed: self.seed, effect: Some((self.effect, values(self.effect, share))) }
+    }
+}
+
+/// Values of an effect that goes a share of the way from off to the farther end of its (last) strength. Shapes are typical and forms
+/// usual: where a diagnosis begins, so that no form has to be paid for.
+fn values(effect: &'static Effect, share: f64) -> Vec<f64> {
+    let last = effect.parameters.iter().rposition(|p| p.off().is_some());
+    let one = |(i, p): (usize, &EffectParameter)| match p.off() {
+        Some(off) if Some(i) == last => {
+            let end = if p.max - off >= off - p.min { p.max } else { p.min };
+            off + share * (end - off)
+        }
+        Some(off) => off,
+        None => p.usual(),
+    };
+    let fitted: Vec<f64> = effect.fitted().enumerate().map(one).collect();
+    effect.with_stand_ins(&fitted)
+}

@@ -1,0 +1,139 @@
+//! Which effects cannot be told apart: every effect of the catalogue at two strengths.
+
+use std::{
+    fmt::{Display, Formatter, Write},
+    ops::Range,
+};
+
+use stretch_gap::{Diagnosis, Thresholds, VerdictKind};
+use stretch_sim::{Catalogue, Effect};
+
+use crate::{
+    shared_out::{Answer, shared_out},
+    simulated::Protocol,
+    strength::Strengths,
+};
+
+/// Excesses aimed at: a weak and a strong effect.
+const AIMS: [f64; 2] = [0.55, 10.0];
+/// Protocols that are compared.
+const PROTOCOLS: [Protocol; 2] = [Protocol::Paper, Protocol::Plus];
+
+/// A rival so few nats behind the true effect, or beyond it, is told in the table: at the temperature of the probabilities, five nats, it has a
+/// four-hundredth of the true one's probability.
+const NEAR_NATS: f64 = 30.0;
+
+/// What is said of one session.
+#[derive(Debug)]
+struct Said {
+    /// In the words of the table.
+    told: String,
+    /// The best of the other effects, and how many nats it lies beyond the true one.
+    nearest: Option<(String, f64)>,
+}
+
+/// One effect at one strength: its excess, and what is said by protocol.
+#[derive(Debug)]
+struct Cell {
+    excess: f64,
+    said: [Said; 2],
+}
+
+/// Weak and strong.
+type Row = [Cell; 2];
+
+impl Said {
+    fn of(truth: &str, diagnosis: &Diagnosis) -> Self {
+        Self { told: told(truth, diagnosis), nearest: nearest(truth, diagnosis) }
+    }
+}
+
+/// Whether the true name stands alone, is tied, or is not there.
+fn told(truth: &str, diagnosis: &Diagnosis) -> String {
+    let Diagnosis { verdict, named, tied, gross, .. } = diagnosis;
+    let is_truth = |name: &&String| *name == truth;
+    let all = || named.iter().chain(tied);
+    let others: Vec<&str> = all().filter(|n| !is_truth(n)).map(String::as_str).collect();
+    let others = others.join(", ");
+    if let Some(error) = gross.first() {
+        return format!("record: {:?}", error.what).to_lowercase();
+    }
+    match (all().any(|n| is_truth(&n)), others.is_empty(), verdict) {
+        (true, true, _) => "alone".into(),
+        (true, false, _) => format!("tied: {others}"),
+        (false, false, _) => format!("other: {others}"),
+        (_, _, VerdictKind::Unknown) => "unknown".into(),
+        _ => "nothing".into(),
+    }
+}
+
+fn nearest(truth: &str, diagnosis: &Diagnosis) -> Option<(String, f64)> {
+    // The last candidate stands for what the catalogue lacks, and has no parameters.
+    let effects = diagnosis.candidates.iter().filter(|c| !c.parameters.is_empty());
+    let (own, others): (Vec<_>, Vec<_>) =
+        effects.partition(|c| c.effects.iter().any(|e| e == truth));
+    let best = others.into_iter().max_by(|a, b| a.score.total_cmp(&b.score))?;
+    // Where the true effect was not even fitted, it stands at nothing closed.
+    let truth = own.first().map_or(0.0, |c| c.score);
+    Some((best.effects.join(" + "), best.score - truth))
+}
+
+/// One effect on one rig at both strengths.
+fn row(effect: &'static Effect, seed: u64) -> Answer<Row> {
+    let mut strengths = Strengths::of(effect, seed);
+    let cell = |aim| -> Answer<Cell> {
+        let (source, excess) = strengths.near(aim)?;
+        let one = |protocol: Protocol| -> Answer<Said> {
+            let diagnosis = source.diagnosed(protocol, 1, Thresholds::frozen())?;
+            let said = Said::of(effect.name, &diagnosis);
+            let values = source.effect.as_ref().map(|e| &e.1[..]).unwrap_or(&[]);
+            let (name, protocol) = (effect.name, protocol.name());
+            eprintln!("{name} {values:?} seed {seed}, {protocol}: {excess:.2}, {said:?}");
+            Ok(said)
+        };
+        Ok(Cell { excess, said: [one(PROTOCOLS[0])?, one(PROTOCOLS[1])?] })
+    };
+    let [weak, strong] = AIMS.map(cell);
+    Ok([weak?, strong?])
+}
+
+/// The table of ties, a row an effect; where sessions of several seeds differ, each has its part of a cell.
+pub(crate) fn matrix(seeds: Range<u64>) -> Answer<String> {
+    let effects: Vec<&'static Effect> = Catalogue::default().iter().collect();
+    let each = seeds.clone().count();
+    let rows = shared_out(rayon::current_num_threads(), effects.len() * each, |at| {
+        row(effects[at / each], seeds.start + (at % each) as u64)
+    })?;
+    let mut text = format!("Effects, seeds {} .. {}\n\n", seeds.start, seeds.end - 1);
+    text.push_str("| effect | excess, weak | paper | paper+ | strong | paper | paper+ |\n");
+    text.push_str("|---|---|---|---|---|---|---|\n");
+    for (effect, rows) in effects.iter().zip(rows.chunks(each.max(1))) {
+        write!(text, "| {} |", effect.name)?;
+        for (strength, places) in [2, 1].into_iter().enumerate() {
+            let cells = || rows.iter().map(|row| &row[strength]);
+            let excess = in_one(cells().map(|c| format!("{:.places$}", c.excess)));
+            let said = |at: usize| in_one(cells().map(|c| c.said[at].to_string()));
+            write!(text, " {excess} | {} | {} |", said(0), said(1))?;
+        }
+        text.push('\n');
+    }
+    Ok(text)
+}
+
+/// What sessions say, once where all say the same.
+fn in_one(told: impl Iterator<Item = String>) -> String {
+    let mut told: Vec<String> = told.collect();
+    told.dedup();
+    told.join("; ")
+}
+
+impl Display for Said {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.told)?;
+        match self.nearest.as_ref().filter(|(_, nats)| nats.abs() < NEAR_NATS) {
+            Some((name, nats)) if self.told.ends_with(name) => write!(f, " ({nats:+.0})"),
+            Some((name, nats)) => write!(f, " ({name} {nats:+.0})"),
+            None => Ok(()),
+        }
+    }
+}

@@ -86,6 +86,44 @@ fn every_second_row_dropped() {
 }
 
 #[test]
+fn rows_lost_while_valves_switch() {
+    holds("rows lost in which a valve switched", |_, trials| {
+        for one in trials.iter_mut() {
+            let inlet = &one.trial.channels[0].values;
+            let switches = (1..inlet.len()).filter(|&i| inlet[i] != inlet[i - 1]);
+            // One in each trial, the sixth.
+            let lost: Vec<usize> = switches.skip(5).take(1).collect();
+            let mut row = 0..;
+            one.trial.time_s.retain(|_| row.next().is_none_or(|i| !lost.contains(&i)));
+            for channel in &mut one.trial.channels {
+                let mut row = 0..;
+                channel.values.retain(|_| row.next().is_none_or(|i| !lost.contains(&i)));
+            }
+        }
+        Rig::default()
+    });
+}
+
+#[test]
+fn single_values_off_amid_a_motion() {
+    holds("single values off amid a motion", |_, trials| {
+        for (column, off) in [("length_mm", 0.6), ("bridge_v", -0.03)] {
+            for one in trials.iter_mut() {
+                let length = &one.trial.channels[2].values;
+                let moves =
+                    (3..length.len() - 3).filter(|&i| (length[i + 3] - length[i - 3]).abs() > 3.0);
+                let places: Vec<usize> = moves.step_by(97).collect();
+                let channels = one.trial.channels.iter_mut();
+                for channel in channels.filter(|c| c.name == column) {
+                    places.iter().for_each(|&i| channel.values[i] += off);
+                }
+            }
+        }
+        Rig::default()
+    });
+}
+
+#[test]
 fn time_shifted() {
     holds("session an hour later", |_, trials| {
         trials.iter_mut().for_each(|t| t.start_s += 3600.0);

@@ -7,7 +7,7 @@
 //! | strained | parameters at their ends explain as much as the effects do | `unknown` |
 //! | effect | confirmed on the test trials, and g_left <= u + v g_retuned | `effect` |
 //! | mostly | the same but for what is left, and the strongest effect alone closes the share m of the held-out gap, off its bounds | `partial` |
-//! | unexplained | g_retuned > n, and g_left > u + v g_retuned | `unknown` |
+//! | unexplained | g_retuned > n, and g_left > u + v g_retuned, all of g_retuned being left by what is not confirmed | `unknown` |
 //! | parameters | g_raw > n | `parameters` |
 //! | else | | `no_gap` |
 //!
@@ -88,11 +88,13 @@ fn seen(case: Case<'_>, thresholds: &Thresholds) -> VerdictKind {
     let left_allowed = thresholds.unknown_excess + thresholds.unknown_share * retuned;
     let is_confirmed =
         case.first.is_some_and(|c| !c.effects.is_empty() && c.is_confirmed && c.closed > 0.0);
+    // What is not confirmed explains nothing.
+    let unexplained = if is_confirmed { left } else { retuned };
     if is_confirmed && left <= left_allowed {
         VerdictKind::Effect
     } else if is_confirmed && case.strongest.is_some_and(|s| is_mostly(s, thresholds)) {
         VerdictKind::Partial
-    } else if retuned > thresholds.null_excess && left > left_allowed {
+    } else if retuned > thresholds.null_excess && unexplained > left_allowed {
         VerdictKind::Unknown
     } else if raw > thresholds.null_excess {
         VerdictKind::Parameters
@@ -160,6 +162,7 @@ mod tests {
             (gap(20.0, 10.0, 10.0), &none, Unknown),
             (gap(20.0, 0.01, 0.01), &none, Parameters),
             (gap(0.01, 0.01, 0.01), &none, NoGap),
+            (gap(20.0, 10.0, 0.1), &chance, Unknown),
             // A small gap that falls on no test trial is nobody's.
             (gap(0.01, 0.1, 0.05), &chance, NoGap),
         ];

@@ -20,6 +20,10 @@ const EMPTY_KPA: (f64, f64) = (0.08, 0.06);
 /// Offset of a filled chamber below the supply, a share of it (mean, 1 sd).
 const FULL_SHARE: (f64, f64) = (0.0008, 0.0006);
 
+/// How well a length tells the pressure of a trial's start, at rest and amid a motion, kPa (1 sd).
+const LENGTH_KPA: f64 = 3.0;
+const MOVING_KPA: f64 = 10.0;
+
 /// What a run needs beside the rig.
 pub(super) struct Setting<'a> {
     pub(super) rig: &'a RigSimulator,
@@ -128,13 +132,21 @@ impl Setting<'_> {
             Begin::Empty => EMPTY_KPA.0 + self.offset * EMPTY_KPA.1,
             Begin::Full => supply * (1.0 - FULL_SHARE.0 + self.offset * FULL_SHARE.1),
             Begin::Pressure(kpa, sd) => kpa + self.offset * sd,
-            Begin::Length(mm) => {
-                let p = &self.params;
-                let x = (1.0 - mm / p[Key::L0]) / p[Key::KMax];
-                let law = p[Key::A0] * (1.0 - (-p[Key::A1] * x).exp()) * (p[Key::A3] * x * x).exp();
-                (1e-3 * p[Key::PRef] * law).max(0.0) + 3.0 * self.offset
+            Begin::Length(mm) => self.static_kpa(mm) + LENGTH_KPA * self.offset,
+            // The muscle lags behind its pressure: tau L' = L_static - L.
+            Begin::Moving(mm, mm_per_s) => {
+                let ahead = mm + self.params[Key::TauM] * mm_per_s;
+                self.static_kpa(ahead) + MOVING_KPA * self.offset
             }
         }
+    }
+
+    /// Pressure that belongs to a length at rest.
+    fn static_kpa(&self, mm: f64) -> f64 {
+        let p = &self.params;
+        let x = (1.0 - mm / p[Key::L0]) / p[Key::KMax];
+        let law = p[Key::A0] * (1.0 - (-p[Key::A1] * x).exp()) * (p[Key::A3] * x * x).exp();
+        (1e-3 * p[Key::PRef] * law).max(0.0)
     }
 
     /// Inlet and outlet as they act.

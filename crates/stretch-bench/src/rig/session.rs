@@ -37,6 +37,8 @@ pub struct RigTrial {
     pub(super) bridge_v: Vec<f64>,
     /// Samples that were lost, or that a lost one before them leaves open.
     pub(super) is_lost: Vec<bool>,
+    /// Whether it is the next part of the trial before it.
+    goes_on: bool,
     /// Of the bridge, a share of the nominal one.
     pub(super) excitation: f64,
 }
@@ -60,6 +62,7 @@ impl RigTrial {
                 true => open_behind(trial.is_lost(), dt_s),
                 false => open(trial.is_lost()),
             },
+            goes_on,
             excitation,
         }
     }
@@ -353,6 +356,8 @@ pub(crate) enum Begin {
     Pressure(f64, f64),
     /// At the pressure that belongs to a measured length, mm.
     Length(f64),
+    /// Amid a motion, at a measured length and rate: mm, mm/s.
+    Moving(f64, f64),
 }
 
 /// Measured inputs smoothed, and how every trial begins.
@@ -415,6 +420,10 @@ impl Inputs {
             }
             return Begin::Pressure(found, sd);
         }
+        if trial.goes_on {
+            let (mm, per_sample) = line(&trial.length_mm[..LINE.min(trial.length_mm.len())]);
+            return Begin::Moving(mm, per_sample / dt_s);
+        }
         let found = mean(&trial.length_mm);
         let whole = stroke.1 - stroke.0;
         if found > stroke.1 - 0.05 * whole {
@@ -425,4 +434,22 @@ impl Inputs {
             Begin::Length(found)
         }
     }
+}
+
+/// Samples at the beginning of a part that tell its motion.
+const LINE: usize = 9;
+
+/// First value and slope a sample of the straight line through values, by least squares.
+fn line(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let middle = 0.5 * (n - 1.0);
+    let mean = values.iter().sum::<f64>() / n;
+    let (mut along, mut square) = (0.0, 0.0);
+    for (i, x) in values.iter().enumerate() {
+        let t = i as f64 - middle;
+        along += t * x;
+        square += t * t;
+    }
+    let slope = if square > 0.0 { along / square } else { 0.0 };
+    (mean - slope * middle, slope)
 }

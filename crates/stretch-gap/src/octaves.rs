@@ -8,16 +8,18 @@
 //! Gaussian log-likelihoods, determinants included, by
 //!
 //! ```text
-//! S = sum over octaves j of (n_j/2) ln(P_j/P'_j)
+//! S = sum over octaves j of (m_j/2) ln(P_j/P'_j),     m_j = n_j/(1 + u^2 n_j)
 //! ```
 //!
-//! with n_j coefficients of mean squares P_j and P'_j. A regressor that does nothing brings half a nat, in noise of any colour. What acts
+//! with n_j coefficients of mean squares P_j and P'_j, and the share u to which noise is known as it is described. A regressor that does nothing brings half a nat, in noise of any colour. What acts
 //! between trials is seen once a trial, for what is as slow has as many coefficients.
 //!
 //! This says whether something is more than chance. What is the greater cause it does not say: slow power of any size may be slow noise to
 //! it, so that causes are ranked by their [score](crate::score).
 
-use std::borrow::Cow;
+use std::f64::consts::FRAC_1_SQRT_2;
+
+use crate::linear::dot;
 
 /// Octaves: the last holds what is slower than 2^10 samples, ten seconds at 100 Hz.
 const OCTAVES: usize = 11;
@@ -37,24 +39,15 @@ pub(crate) struct Octaves {
 impl Octaves {
     /// Adds a stretch without a break: products of a residual r and of V^-1 r, its most likely nuisances taken out.
     pub(crate) fn add(&mut self, residual: &[f64], clean: &[f64]) {
-        let is_one = residual == clean;
-        let mut a = residual.to_vec();
-        let mut b = if is_one { Cow::Borrowed(residual) } else { Cow::Owned(clean.to_vec()) };
-        for octave in 0..OCTAVES {
-            let is_last = octave + 1 == OCTAVES;
-            let (details_a, next_a) = halves(&a, is_last);
-            let (details_b, next_b) = match is_one {
-                true => (Vec::new(), Vec::new()),
-                false => halves(&b, is_last),
-            };
-            let pair = if is_one { &details_a } else { &details_b };
-            self.sums[octave] += details_a.iter().zip(pair).map(|(x, y)| x * y).sum::<f64>();
-            self.counts[octave] += details_a.len() as f64;
-            (a, b) = (next_a, Cow::Owned(next_b));
+        let own = coefficients(residual);
+        let other = (residual != clean).then(|| coefficients(clean));
+        for (octave, (x, y)) in own.iter().zip(other.as_ref().unwrap_or(&own)).enumerate() {
+            self.sums[octave] += dot(x, y);
+            self.counts[octave] += x.len() as f64;
         }
     }
 
-    /// Each sum moved by those of noise that is transmitted, `share` of it; a tenth stays at least.
+    /// At equal noise transmitted, as mean squares are: `own` is what the hypothesis lets through; a tenth stays at least.
     pub(crate) fn at_equal_noise(mut self, nominal: &Self, own: &Self) -> Self {
         for ((x, nominal), own) in self.sums.iter_mut().zip(nominal.sums).zip(own.sums) {
             *x = (*x + nominal - own).max(0.1 * *x);
@@ -62,7 +55,7 @@ impl Octaves {
         self
     }
 
-    /// The same a share as large.
+    /// The same `share` as large.
     pub(crate) fn scaled(mut self, share: f64) -> Self {
         self.sums.iter_mut().for_each(|sum| *sum *= share);
         self
@@ -82,17 +75,20 @@ impl Octaves {
     }
 }
 
-/// Details and sums of neighbours; a last one without a neighbour goes on as it is. The last octave is what is left.
-fn halves(values: &[f64], is_last: bool) -> (Vec<f64>, Vec<f64>) {
-    if is_last {
-        return (values.to_vec(), Vec::new());
-    }
-    let pairs = values.chunks_exact(2);
-    let odd = pairs.remainder();
-    let scale = std::f64::consts::FRAC_1_SQRT_2;
-    let details = pairs.clone().map(|p| scale * (p[0] - p[1])).collect();
-    let sums = pairs.map(|p| scale * (p[0] + p[1])).chain(odd.iter().copied()).collect();
-    (details, sums)
+/// Haar's coefficients by octave; a last sample without a neighbour goes on as it is, and the last octave holds what is left.
+fn coefficients(values: &[f64]) -> [Vec<f64>; OCTAVES] {
+    let mut left = values.to_vec();
+    std::array::from_fn(|octave| {
+        if octave + 1 == OCTAVES {
+            return std::mem::take(&mut left);
+        }
+        let pairs = left.chunks_exact(2);
+        let odd = pairs.remainder();
+        let details = pairs.clone().map(|p| FRAC_1_SQRT_2 * (p[0] - p[1])).collect();
+        let sums = pairs.map(|p| FRAC_1_SQRT_2 * (p[0] + p[1])).chain(odd.iter().copied());
+        left = sums.collect();
+        details
+    })
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! One stage of the rig over the session.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, sync::Arc};
 
 use stretch_gap::{Model, Run};
 use stretch_sim::{
@@ -8,7 +8,15 @@ use stretch_sim::{
     Reference, RigParams, Sensing, Stage, Start,
 };
 
-use super::{RigSimulator, nominal::Knob, session::Begin, smooth::cubic, timing, timing::Leads};
+use super::{
+    RigSimulator,
+    chamber::{Pressures, causes},
+    nominal::Knob,
+    session::Begin,
+    smooth::cubic,
+    timing,
+    timing::Leads,
+};
 use crate::{acting::Acting, error::BenchError};
 
 /// Step of integration while fitting, s.
@@ -25,13 +33,13 @@ const LENGTH_KPA: f64 = 3.0;
 const MOVING_KPA: f64 = 10.0;
 
 /// What a run needs beside the rig.
-pub(super) struct Setting<'a> {
-    pub(super) rig: &'a RigSimulator,
-    pub(super) params: RigParams,
-    pub(super) effects: EffectSet,
-    pub(super) grid: Grid,
+struct Setting<'a> {
+    rig: &'a RigSimulator,
+    params: RigParams,
+    effects: EffectSet,
+    grid: Grid,
     offset: f64,
-    pub(super) leads: Leads,
+    leads: Leads,
     shake: Option<u64>,
     /// Input of the stage that stands in for the measured one, all trials end to end.
     given: Option<&'a [f64]>,
@@ -106,7 +114,7 @@ impl Turned {
 
 impl Setting<'_> {
     /// How a trial begins: as the one before left it, after the pause between them.
-    pub(super) fn start(&self, trial: usize) -> Start {
+    fn start(&self, trial: usize) -> Start {
         let trials = &self.rig.about.trials;
         let rest_s = match trial.checked_sub(1) {
             Some(before) => {
@@ -120,13 +128,13 @@ impl Setting<'_> {
         Start::Carried { rest_s: (rest_s - 1.0).max(0.0) }
     }
 
-    pub(super) fn is_vented(&self) -> bool {
+    fn is_vented(&self) -> bool {
         let inputs = &self.rig.inputs;
         let first = inputs.length[0].values.first().copied().unwrap_or(0.0);
         first > 0.5 * (inputs.stroke.0 + inputs.stroke.1)
     }
 
-    pub(super) fn initial_kpa(&self, trial: usize) -> f64 {
+    fn initial_kpa(&self, trial: usize) -> f64 {
         let supply = 1e-3 * self.params[Key::PS];
         match self.rig.inputs.begin[trial] {
             Begin::Empty => EMPTY_KPA.0 + self.offset * EMPTY_KPA.1,
@@ -150,7 +158,7 @@ impl Setting<'_> {
     }
 
     /// Inlet and outlet as they act.
-    pub(super) fn openings(&self, trial: usize) -> [Cow<'_, [f64]>; 2] {
+    fn openings(&self, trial: usize) -> [Cow<'_, [f64]>; 2] {
         let own = &self.rig.session.trials[trial];
         timing::ahead(&own.inlet, &own.outlet, self.leads)
     }
@@ -254,6 +262,26 @@ impl Setting<'_> {
                 own,
             )?;
             shown.run(self.start(trial), own)
+        })
+    }
+
+    /// By trial, the chamber's pressure at every node where it does not depend on the muscle: what acts in the muscle alone finds it kept.
+    fn chamber_kpa(&self, stage: &Actuation, count: usize) -> Result<Arc<Pressures>, BenchError> {
+        let initial: Vec<f64> = (0..count).map(|trial| self.initial_kpa(trial)).collect();
+        let key = causes(&self.params, &self.effects, &self.grid, self.leads, &initial);
+        self.rig.chambers.or_make(key, || {
+            let mut memory = stage.memory();
+            let before = if self.is_vented() { 1e-3 * self.params[Key::PS] } else { 0.0 };
+            let shut = Openings { inlet: &[0.0; 2], outlet: &[0.0; 2] };
+            stage.run_pressure(&mut memory, Start::Settled, shut, before, &mut Vec::new())?;
+            let one = |(trial, initial_kpa): (usize, &f64)| {
+                let (start, [inlet, outlet]) = (self.start(trial), self.openings(trial));
+                let openings = Openings { inlet: &inlet, outlet: &outlet };
+                let mut nodes = Vec::new();
+                stage.run_pressure(&mut memory, start, openings, *initial_kpa, &mut nodes)?;
+                Ok(nodes)
+            };
+            initial.iter().enumerate().map(one).collect()
         })
     }
 

@@ -11,8 +11,9 @@
 //! S = sum over octaves j of (m_j/2) ln(P_j/P'_j),     m_j = n_j/(1 + u^2 n_j)
 //! ```
 //!
-//! with n_j coefficients of mean squares P_j and P'_j, and the share u to which noise is known as it is described. A regressor that does nothing brings half a nat, in noise of any colour. What acts
-//! between trials is seen once a trial, for what is as slow has as many coefficients.
+//! with n_j coefficients of mean squares P_j and P'_j, and the share u to which noise is known as it is described. A regressor that does
+//! nothing brings half a nat at most in the mean, in noise of any colour. What acts between trials is seen once a trial, for what is as slow
+//! has as many coefficients.
 //!
 //! This says whether something is more than chance. What is the greater cause it does not say: slow power of any size may be slow noise to
 //! it, so that causes are ranked by their [score](crate::score).
@@ -150,7 +151,8 @@ mod tests {
                 let mean = rises.iter().sum::<f64>() / DRAWS as f64;
                 let most = rises.iter().copied().fold(0.0, f64::max);
                 let told = format!("{share} of {memory}, regressor {regressor}: {mean}, {most}");
-                assert!(mean.abs() < 1.0 && most < 12.0, "{told}");
+                // 200 draws tell the mean to 0.05; what fits for white noise gains less in coloured one.
+                assert!((-0.5..0.7).contains(&mean) && most < 12.0, "{told}");
             }
         }
     }

@@ -65,7 +65,8 @@ pub(crate) fn lines(
 }
 
 impl<'a> Acting<'a> {
-    /// Sorts the effects of a model on top of those that the simulator already has. What is found in the record is found there for a rig file's effect, too.
+    /// Sorts the effects of a model on top of those that the simulator already has. What is found in the record is found
+    /// there for a rig file's effect, too.
     pub(crate) fn of(
         base: &'a EffectSet,
         rows: &'a [&'static Effect],

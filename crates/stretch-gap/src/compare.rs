@@ -1,7 +1,5 @@
 //! A simulator beside its measurements, every stage on its measured input and in its own metric.
 
-use std::ops::Range;
-
 use rayon::prelude::*;
 
 use crate::{
@@ -147,16 +145,10 @@ impl<'a> Comparison<'a> {
         let mut clean = residual.to_vec();
         self.metrics[stage].clean(&self.frame, &mut clean);
         let mut octaves = Octaves::default();
-        for segment in self.looked() {
-            octaves.add(&residual[segment.clone()], &clean[segment]);
+        for s in self.frame.looked_at() {
+            octaves.add(&residual[s.from..s.to], &clean[s.from..s.to]);
         }
         octaves
-    }
-
-    /// Segments that are not tested on.
-    fn looked(&self) -> impl Iterator<Item = Range<usize>> {
-        let all = self.frame.segments.iter().filter(|s| s.role != Role::Test);
-        all.map(|s| s.from..s.to)
     }
 
     /// Noise transmitted: what of the measured input's noise arrives at the output of a stage, in floors squared.
@@ -177,8 +169,8 @@ impl<'a> Comparison<'a> {
             };
             mean.fit += power(Role::Fit) / DRAWS as f64;
             mean.held += power(Role::Held) / DRAWS as f64;
-            for segment in self.looked() {
-                mean.octaves.add(&shaken[segment.clone()], &shaken[segment]);
+            for s in self.frame.looked_at() {
+                mean.octaves.add(&shaken[s.from..s.to], &shaken[s.from..s.to]);
             }
             if mean.fit == 0.0 {
                 break;

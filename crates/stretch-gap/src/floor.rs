@@ -7,11 +7,13 @@
 //! Teacher forcing feeds a stage f with a *measured* input x, whose noise the stage transmits: an error in variables, which would pose
 //! as a gap where the output is steep.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::{
     error::GapError,
-    frame::{Frame, Role},
+    frame::Frame,
     lone::lone,
     noise::Noise,
     runs::Runs,
@@ -58,7 +60,8 @@ fn floor(
     seed: u64,
 ) -> Result<Floor, GapError> {
     let simulator = runs.simulator();
-    let arrived = transmitted(runs, stage, model, seed)?;
+    let output = runs.output(stage, model, simulator.trials().len())?;
+    let arrived = transmitted(runs, stage, model, &output, seed)?;
     let samples = arrived.len();
     let noise = match &simulator.stages()[stage].noise {
         Some(noise) => noise.clone(),
@@ -69,11 +72,15 @@ fn floor(
     if mean > 1e-4 * own {
         source += ", and the measured input's noise";
     }
+    let mut end = 0;
+    let trials = simulator.trials().iter().map(|trial| {
+        end += trial.samples;
+        end - trial.samples..end
+    });
+    let trials: Vec<Range<usize>> = trials.collect();
     let mut sd = Vec::with_capacity(samples);
-    let mut begin = 0;
-    for trial in simulator.trials() {
-        let part = &arrived[begin..begin + trial.samples];
-        begin += trial.samples;
+    for trial in &trials {
+        let part = &arrived[trial.clone()];
         for i in 0..part.len() {
             // A dozen draws tell a variance to 40 % only: neighbours of the same trial lend theirs.
             let near = &part[i.saturating_sub(NEAR)..(i + NEAR + 1).min(part.len())];
@@ -85,15 +92,9 @@ fn floor(
     for (sd, _) in sd.iter_mut().zip(simulator.is_lost()).filter(|(_, lost)| **lost) {
         *sd = f64::INFINITY;
     }
-    let output = runs.output(stage, model, simulator.trials().len())?;
     let apart = simulator.measured(stage).iter().zip(&output).zip(&sd);
     let residual: Vec<f64> = apart.map(|((m, s), sd)| (m - s) / sd).collect();
-    let mut end = 0;
-    let trials = simulator.trials().iter().map(|trial| {
-        end += trial.samples;
-        end - trial.samples..end
-    });
-    let lone = lone(&residual, trials);
+    let lone = lone(&residual, trials.into_iter());
     lone.iter().for_each(|&i| sd[i] = f64::INFINITY);
     if !lone.is_empty() {
         source += &format!("; samples that stand alone and do not count: {}", lone.len());
@@ -101,21 +102,21 @@ fn floor(
     Ok(Floor { sd, rms: (own + mean).sqrt().max(1e-12), source })
 }
 
-/// Variance that the measured input's noise causes at every sample of the output.
+/// Variance that the measured input's noise causes at every sample of the output, which is `plain` without it.
 fn transmitted(
     runs: &Runs<'_>,
     stage: usize,
     model: &Model,
+    plain: &[f64],
     seed: u64,
 ) -> Result<Vec<f64>, GapError> {
     let trials = runs.simulator().trials().len();
     let run = Run { stage, model, trials, shake: None, step: 1.0 };
-    let plain = runs.run(run)?;
     let mut arrived = vec![0.0; plain.len()];
     for draw in 0..DRAWS {
         let shaken = runs.run(Run { shake: Some(seed + 1000 * draw), ..run })?;
         let mut any = false;
-        for ((sum, a), b) in arrived.iter_mut().zip(&plain).zip(&shaken) {
+        for ((sum, a), b) in arrived.iter_mut().zip(plain).zip(&shaken) {
             *sum += (a - b) * (a - b) / DRAWS as f64;
             any |= a != b;
         }
@@ -130,6 +131,5 @@ fn transmitted(
 /// Noise of the output of a stage, from the samples that may be looked at.
 fn of_record(simulator: &dyn Simulator, frame: &Frame, stage: usize) -> Noise {
     let measured = simulator.measured(stage);
-    let segments = frame.segments.iter().filter(|s| s.role != Role::Test);
-    Noise::of_differences(segments.map(|s| &measured[s.from..s.to]), simulator.dt_s())
+    Noise::of_differences(frame.looked_at().map(|s| &measured[s.from..s.to]), simulator.dt_s())
 }

@@ -132,6 +132,11 @@ impl Frame {
         self.count(role) as f64 / self.block as f64
     }
 
+    /// Segments that may be looked at before the end: all but those that are tested on.
+    pub(crate) fn looked_at(&self) -> impl Iterator<Item = &Segment> {
+        self.segments.iter().filter(|s| s.role != Role::Test)
+    }
+
     /// Segments in a role.
     pub fn of_role(&self, role: Role) -> impl Iterator<Item = &Segment> {
         self.segments.iter().filter(move |s| s.role == role)

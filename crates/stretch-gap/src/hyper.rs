@@ -74,7 +74,7 @@ impl Metric {
     pub(crate) fn spectral_level(&self, frame: &Frame, residual: &[f64]) -> f64 {
         let mut clean = residual.to_vec();
         self.clean(frame, &mut clean);
-        let looked = frame.segments.iter().filter(|s| s.role != Role::Test && s.to <= clean.len());
+        let looked = frame.looked_at().filter(|s| s.to <= clean.len());
         let blocks = looked.flat_map(|s| clean[s.from..s.to].chunks_exact(frame.block));
         let means = blocks.map(|b| b.iter().sum::<f64>() / b.len() as f64);
         let (count, sum) = means.fold((0.0, 0.0), |(n, sum), mean| (n + 1.0, sum + mean * mean));

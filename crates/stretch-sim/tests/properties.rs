@@ -194,6 +194,9 @@ proptest! {
         let mut length = vec![0.0; SAMPLES];
         stage.run(&mut stage.memory(), Start::Settled, openings, 0.0, &mut out, &mut length).unwrap();
         prop_assert_eq!((&out, &length), (&p, &l));
+        // A chamber that follows the muscle has no pressure of its own.
+        let half = stage.run_pressure(&mut stage.memory(), Start::Settled, openings, 0.0, &mut Vec::new());
+        prop_assert!(half.is_err());
     }
 }
 

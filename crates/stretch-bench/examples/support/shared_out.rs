@@ -12,7 +12,8 @@ use std::{
 /// Fallible, from a worker.
 pub(crate) type Answer<T> = Result<T, Box<dyn Error + Send + Sync>>;
 
-/// The results of `count` jobs, in order, by so many threads.
+/// The results of `count` jobs, in order, by so many threads. Not rayon's: a diagnosis has a pool of its own, and a worker that waits for
+/// one would begin the next job meanwhile, one inside the other.
 pub(crate) fn shared_out<T: Send>(
     workers: usize,
     count: usize,

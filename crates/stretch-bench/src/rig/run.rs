@@ -134,6 +134,17 @@ impl Setting<'_> {
         first > 0.5 * (inputs.stroke.0 + inputs.stroke.1)
     }
 
+    /// Pressure before the session: a muscle that begins it vented was filled, and the other way round.
+    fn before_kpa(&self) -> f64 {
+        if self.is_vented() { 1e-3 * self.params[Key::PS] } else { 0.0 }
+    }
+
+    /// Length before the session.
+    fn before_mm(&self) -> f64 {
+        let (filled, vented) = self.rig.inputs.stroke;
+        if self.is_vented() { filled } else { vented }
+    }
+
     fn initial_kpa(&self, trial: usize) -> f64 {
         let supply = 1e-3 * self.params[Key::PS];
         match self.rig.inputs.begin[trial] {
@@ -219,7 +230,7 @@ impl Setting<'_> {
         let stage = Muscle::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
         let mut shown = self.shown(&self.effects)?;
-        let before = if self.is_vented() { 1e-3 * self.params[Key::PS] } else { 0.0 };
+        let before = self.before_kpa();
         let mut filled = [0.0; 2];
         stage.run(&mut memory, Start::Settled, &[before; 2], &mut filled)?;
         shown.condition(&filled)?;
@@ -233,7 +244,7 @@ impl Setting<'_> {
         let stage = Actuation::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
         let mut shown = self.shown(&self.effects)?;
-        let before = if self.is_vented() { 1e-3 * self.params[Key::PS] } else { 0.0 };
+        let before = self.before_kpa();
         let mut filled = [0.0; 2];
         if !stage.is_coupled() {
             let nodes = stage.grid().nodes(filled.len());
@@ -271,7 +282,7 @@ impl Setting<'_> {
         let key = causes(&self.params, &self.effects, &self.grid, self.leads, &initial);
         self.rig.chambers.or_make(key, || {
             let mut memory = stage.memory();
-            let before = if self.is_vented() { 1e-3 * self.params[Key::PS] } else { 0.0 };
+            let before = self.before_kpa();
             let shut = Openings { inlet: &[0.0; 2], outlet: &[0.0; 2] };
             stage.run_pressure(&mut memory, Start::Settled, shut, before, &mut Vec::new())?;
             let one = |(trial, initial_kpa): (usize, &f64)| {
@@ -304,9 +315,7 @@ impl Setting<'_> {
         }
         // What counts from the session's start allows no move before it.
         if !self.effects.iter().any(|e| e.effect().counts_session) {
-            let stroke = self.rig.inputs.stroke;
-            let before = if self.is_vented() { stroke.0 } else { stroke.1 };
-            let kpa = if self.is_vented() { 1e-3 * self.params[Key::PS] } else { 0.0 };
+            let (before, kpa) = (self.before_mm(), self.before_kpa());
             let nodes = self.grid.nodes(2);
             let mut volts = [0.0; 2];
             stage.run(
@@ -364,8 +373,7 @@ impl Setting<'_> {
         }
         let mut free = self.free_length(count)?;
         let mut shown = self.shown(&alone)?;
-        let stroke = self.rig.inputs.stroke;
-        shown.condition(&[if self.is_vented() { stroke.0 } else { stroke.1 }; 2])?;
+        shown.condition(&[self.before_mm(); 2])?;
         self.each(count, &mut free, |trial, own| {
             let before = own.to_vec();
             shown.run(self.start(trial), own)?;

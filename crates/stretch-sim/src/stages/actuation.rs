@@ -99,6 +99,26 @@ impl Actuation {
     ///
     /// # Errors
     /// Slices of lengths that do not belong together.
+    ///
+    /// ```
+    /// use stretch_sim::{Actuation, DEFAULT_STEP_S, EffectSet, Openings, RigParams, Start};
+    /// let mut effects = EffectSet::new();
+    /// effects.insert("muscle_creep", &[("c", 0.05), ("tau", 2.0)])?;
+    /// effects.insert("valve_delay", &[("delay_s", 0.013)])?;
+    /// let params = RigParams::default();
+    /// let stage = Actuation::new(&params, &effects, &effects.grid(&params, 0.01, DEFAULT_STEP_S)?)?;
+    /// let openings = Openings { inlet: &[1.0; 300], outlet: &[0.0; 300] };
+    /// let [mut pressure_kpa, mut length_mm, mut again_mm] = [[0.0; 300]; 3];
+    /// let memory = || stage.memory();
+    /// stage.run(&mut memory(), Start::Settled, openings, 0.0, &mut pressure_kpa, &mut length_mm)?;
+    /// // The halves are the whole, to the bit.
+    /// let mut nodes_kpa = Vec::new();
+    /// stage.run_pressure(&mut memory(), Start::Settled, openings, 0.0, &mut nodes_kpa)?;
+    /// stage.run_length(&mut memory(), Start::Settled, &nodes_kpa, &mut again_mm)?;
+    /// assert!(length_mm[299] < 160.0 && length_mm == again_mm);
+    /// assert!(stage.run_length(&mut memory(), Start::Settled, &nodes_kpa[1..], &mut again_mm).is_err());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn run_length(
         &self,
         memory: &mut Memory,

@@ -77,7 +77,9 @@ impl<'a> Search<'a> {
         progress: &dyn Fn(&str),
     ) -> Result<Found, GapError> {
         let from = self.sets.refit(from)?;
-        let mut best = self.grow(from, progress)?;
+        let begun = from.effects.len();
+        let first = self.grow(from, progress)?;
+        let mut best = self.second_line(begun, first, progress)?;
         let mut exchanges = 0;
         loop {
             progress("rivals");
@@ -89,6 +91,29 @@ impl<'a> Search<'a> {
             }
             exchanges += 1;
         }
+    }
+
+    /// The better of a set of several and of what grows from the runner-up of its first round: a strong effect that stands in for two
+    /// others is replaced in no slot, for each of the two alone is worse than it.
+    fn second_line(
+        &mut self,
+        begun: usize,
+        best: Hypothesis,
+        progress: &dyn Fn(&str),
+    ) -> Result<Hypothesis, GapError> {
+        if best.effects.len() < begun + 2 {
+            return Ok(best);
+        }
+        let first_round = self.sets.tried.values().filter(|s| s.effects.len() == begun + 1);
+        let others =
+            first_round.filter(|s| s.effects.last().is_some_and(|e| !best.effects.contains(e)));
+        let runner_up = others.max_by(|a, b| a.score.total_cmp(&b.score)).cloned();
+        let Some(runner_up) = runner_up.filter(|r| r.score > RIVALRY * best.score) else {
+            return Ok(best);
+        };
+        progress("a second line");
+        let other = self.grow(runner_up, progress)?;
+        Ok(if other.score > best.score { other } else { best })
     }
 
     /// A set with its effects in order of what the score loses without each, the most first.

@@ -34,7 +34,6 @@ pub(crate) fn spec(effect: &Effect, place: Place) -> EffectSpec {
         touches,
         parameters: effect.fitted().zip(&search.ranges).map(parameter).collect(),
         starts: search.starts,
-        is_between_trials: effect.is_between_trials,
         is_found: effect.find.is_some(),
         twins: effect.twins.iter().map(|twin| (*twin).to_owned()).collect(),
     }

@@ -13,6 +13,7 @@ use crate::{
     lacking::lacking,
     localise,
     naming::Naming,
+    null_band::null_band,
     probability::{covering_set, unknown},
     problem::Problem,
     record::{examine::Doubts, plain::plain, suspect::Suspect, weigh::weighed},
@@ -160,6 +161,8 @@ fn run(
     };
     let (runtime_s, simulations) = (begun.elapsed().as_secs_f64(), runs.count());
     let simpler = || baselines(searched, &search.sets.tried, thresholds.null_excess);
+    let is_quiet = matches!(verdict.kind, VerdictKind::NoGap | VerdictKind::Parameters);
+    let null_band = is_quiet.then(|| null_band(problem, seed)).transpose()?;
     // Told.
     let answer = Answer {
         verdict: &verdict,
@@ -167,6 +170,7 @@ fn run(
         unexplained: unexplained.as_ref(),
         proposed: proposed.as_ref(),
         gross: &gross,
+        null_band,
     };
     let unknown = unknown(evidence.gap, thresholds);
     let told = tell(answer, case, simulator, &evidence, &shares);
@@ -184,6 +188,7 @@ fn run(
         ambiguous,
         shares,
         gap: evidence.gap,
+        null_band,
         location,
         parameters: shifts(simulator, &evidence),
         transfer,

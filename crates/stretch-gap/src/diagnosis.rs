@@ -336,6 +336,10 @@ pub struct Diagnosis {
     /// How large the gap is.
     #[serde(default)]
     pub gap: Excess,
+    /// Gap that 19 of 20 records like this one stay below in which nothing is missing; none where something is named, or the record
+    /// itself is wrong.
+    #[serde(default)]
+    pub null_band: Option<f64>,
     /// Where the gap sits.
     #[serde(rename = "where")]
     pub location: Where,

@@ -32,6 +32,7 @@ mod naming;
 mod next_experiment;
 mod noise;
 mod nuisance;
+mod null_band;
 mod octaves;
 mod probability;
 mod problem;

@@ -238,6 +238,11 @@ impl<'a> Problem<'a> {
         worst.is_some_and(|stage| left(&stage) < self.transmitted[stage].fit)
     }
 
+    /// Share of a stage's floor that noise of its measured input makes.
+    pub(crate) fn transmits(&self, stage: usize) -> f64 {
+        self.transmitted[stage].fit
+    }
+
     /// Excess of one stage over fitted and held-out samples together.
     pub(crate) fn gap_in(&self, hypothesis: &Hypothesis, stage: usize) -> f64 {
         gap(self.compare.mean_square(&hypothesis.misfits[stage]))

@@ -171,8 +171,6 @@ pub struct EffectSpec {
     pub parameters: Vec<EffectParameterSpec>,
     /// Values to screen it at, a few per shape and threshold; strengths in between are interpolated.
     pub starts: Vec<Vec<f64>>,
-    /// Whether it shows between trials rather than inside them (drift, softening): it is then seen once a trial.
-    pub is_between_trials: bool,
     /// Whether its course is found in the record: its size then only says how much is looked for.
     pub is_found: bool,
     /// Names of effects that are hard to tell from it.
@@ -199,7 +197,6 @@ impl EffectSpec {
             touches: vec![stage.0],
             starts: Self::starts_of(&parameters),
             parameters,
-            is_between_trials: false,
             is_found: false,
             twins: Vec::new(),
         }

@@ -1,7 +1,7 @@
 //! The answer in words, made from the verdict when nothing can change any more.
 
 use crate::{
-    diagnosis::{EffectShare, Gross, Unexplained, VerdictKind},
+    diagnosis::{EffectShare, Excess, Gross, Unexplained, VerdictKind},
     evidence::Evidence,
     judge::{Case, Overruled, Verdict},
     missing::Proposed,
@@ -31,6 +31,8 @@ pub(crate) struct Answer<'a> {
     pub(crate) proposed: Option<&'a Proposed>,
     /// What is wrong with the record or the rig file.
     pub(crate) gross: &'a [Gross],
+    /// Gap that noise alone may leave, where nothing is named.
+    pub(crate) null_band: Option<f64>,
 }
 
 /// Tells a verdict.
@@ -111,12 +113,29 @@ fn seen(
                 best.unwrap_or("none")
             ) + &parts(shares)
         }
-        (VerdictKind::Parameters, _) => format!(
-            "No effect is missing: with its parameters re-tuned within their tolerances the simulator agrees with the rig (gap {:.1} floors as shipped, {:.2} re-tuned).",
-            gap.raw, gap.retuned
-        ),
-        (VerdictKind::NoGap, _) => "Simulator and rig agree within the noise floor.".into(),
+        (VerdictKind::Parameters | VerdictKind::NoGap, _) => match answer.null_band {
+            Some(band) if gap.retuned > band => too_faint(gap, band, evidence, simulator),
+            _ if answer.verdict.seen == VerdictKind::NoGap => {
+                "Simulator and rig agree within the noise floor.".into()
+            }
+            _ => format!(
+                "No effect is missing: with its parameters re-tuned within their tolerances the simulator agrees with the rig (gap {:.1} floors as shipped, {:.2} re-tuned).",
+                gap.raw, gap.retuned
+            ),
+        },
     }
+}
+
+/// More than chance, and nothing that a name could stand on.
+fn too_faint(gap: Excess, band: f64, evidence: &Evidence, simulator: &dyn Simulator) -> String {
+    let all = evidence.stages.iter().zip(simulator.stages());
+    let worst = all.max_by(|a, b| a.0.excess_retuned.total_cmp(&b.0.excess_retuned));
+    format!(
+        "Too faint to name: with its parameters re-tuned the simulator leaves {:.2} floors, most of them in {}. Noise as it is described \
+         stays below {band:.2} in 19 of 20 records like this one: it is larger, or something is missing.",
+        gap.retuned,
+        worst.map_or("", |(_, spec)| spec.name.as_str())
+    )
 }
 
 /// Mostly this, and so much else.

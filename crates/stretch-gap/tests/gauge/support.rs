@@ -24,6 +24,10 @@ pub(crate) enum Lack {
     Telegraph,
     /// A step at a time of its own in each trial.
     Jumps,
+    /// Nothing.
+    Nothing,
+    /// White noise a third as large as the floor.
+    Whisper,
     /// White noise above the floor.
     White,
     /// A random walk that returns.
@@ -143,6 +147,8 @@ fn extra(lack: Lack, x: &[f64], dice: &mut Dice) -> Vec<f64> {
             }
             0.02 * level
         }
+        Lack::Nothing => 0.0,
+        Lack::Whisper => NOISE_V / 3.0 * dice.gauss(),
         Lack::White => 0.01 * dice.gauss(),
         Lack::Wander => {
             held += if i == 0 { -held } else { -DT_S * held / 2.0 + DT_S.sqrt() * dice.gauss() };

@@ -111,8 +111,6 @@ pub struct Effect {
     pub needs: Option<Need>,
     /// Names of effects that are hard to tell from it.
     pub twins: &'static [&'static str],
-    /// Whether it shows between trials rather than inside them (drift, softening).
-    pub is_between_trials: bool,
     /// Whether it counts everything from the session's start: nothing may move before it.
     pub counts_session: bool,
     /// Whether its input cannot be told from its output (play in the reference).
@@ -144,7 +142,6 @@ impl Effect {
         action: |_, _| Action::Nothing,
         needs: None,
         twins: &[],
-        is_between_trials: false,
         counts_session: false,
         hides_input: false,
         needs_fine_steps: false,

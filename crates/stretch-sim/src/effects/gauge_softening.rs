@@ -28,7 +28,6 @@ pub(super) static GAUGE_SOFTENING: Effect = Effect {
             reversal: REVERSAL * around.strain_unit,
         }))
     },
-    is_between_trials: true,
     counts_session: true,
     starts: Some(|_| pairs(0.03, [0.5, 2.5, 12.0])),
     ..Effect::PLAIN

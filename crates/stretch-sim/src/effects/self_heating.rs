@@ -22,7 +22,6 @@ pub(super) static SELF_HEATING: Effect = Effect {
         let times = Times { tau_s: values[1], spread: values[2] };
         Action::Resistance(Box::new(Warming::new(values[0], times, around.grid)))
     },
-    is_between_trials: true,
     alone: |_, search| search.reach_from(0.15),
     starts: Some(|_| pairs(0.003, [1.5, 5.0, 15.0, 45.0])),
     ..Effect::PLAIN

@@ -27,7 +27,6 @@ pub(super) static THERMAL_DRIFT: Effect = Effect {
     action: |values, _| {
         Action::Resistance(Box::new(Drift { per_s: values[0], settle_per_s: values[1] }))
     },
-    is_between_trials: true,
     // It takes at most half of the signal's span away over the session.
     alone: |alone, search| search.reach_from(0.5 / alone.session_s.max(1.0)),
     starts: Some(|_| each([2e-5])),

@@ -1,0 +1,5 @@
+//! A gauge that lacks something that no catalogue holds, or nothing.
+
+mod missing_term;
+mod null_band;
+mod support;

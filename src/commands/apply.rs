@@ -5,8 +5,8 @@ use std::{
     path::PathBuf,
 };
 
-use stretch_calibrate::{Applied, LiveReceptor, apply, read_calibration};
-use stretch_core::Calibration;
+use stretch_calibrate::{Applied, LiveReceptor, apply, pressure_column, read_calibration};
+use stretch_core::{Calibration, Model};
 use stretch_data::{ReadOptions, RowReader, Trial, push_number, write_whole};
 use stretch_receptor::{Reading, Withheld};
 
@@ -44,7 +44,10 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let calibration = read_calibration(&args.calibration)?;
-    let options = ReadOptions::new().time(&args.time).require(calibration.signal.as_str());
+    let mut options = ReadOptions::new().time(&args.time).require(calibration.signal.as_str());
+    if let Some(pressure) = pressure_column(&calibration) {
+        options = options.require(pressure);
+    }
     if args.trial.as_os_str() == "-" {
         return match &args.out {
             None => live(&calibration, io::stdin(), &options, &mut io::stdout().lock()),
@@ -94,9 +97,12 @@ fn live(
     while let Some(row) = rows.next_row() {
         match row {
             Ok(row) => {
+                if let Some(pressure) = row.values.get(1) {
+                    receptor.feel(*pressure);
+                }
                 let reading = receptor.step(row.time_s, row.values[0]);
                 line.clear();
-                push_line(&mut line, row.time_s, &reading);
+                push_line(&mut line, row.time_s, &reading, knows_sd(calibration));
                 out.write_all(&line)?;
                 out.flush()?;
             }
@@ -117,29 +123,41 @@ fn write_all(
     let mut line = Vec::with_capacity(64);
     for (&time_s, reading) in trial.time_s.iter().zip(&applied.readings) {
         line.clear();
-        push_line(&mut line, time_s, reading);
+        push_line(&mut line, time_s, reading, knows_sd(calibration));
         out.write_all(&line)?;
     }
     Ok(())
 }
 
-/// `time_s,estimate_mm,rate_mm_per_s,branch,domain`, the unit that of the reference.
+/// `time_s,estimate_mm,rate_mm_per_s,branch,domain`, the unit that of the reference; `sd_mm` behind it where the model knows how sure
+/// it is.
 pub(super) fn header(calibration: &Calibration) -> String {
-    match calibration.reference.unit() {
-        "" => "time_s,estimate,rate_per_s,branch,domain\n".to_owned(),
-        unit => format!("time_s,estimate_{unit},rate_{unit}_per_s,branch,domain\n"),
-    }
+    let unit = match calibration.reference.unit() {
+        "" => String::new(),
+        unit => format!("_{unit}"),
+    };
+    let sd = if knows_sd(calibration) { format!(",sd{unit}") } else { String::new() };
+    format!("time_s,estimate{unit},rate{unit}_per_s,branch,domain{sd}\n")
 }
 
-fn push_line(line: &mut Vec<u8>, time_s: f64, reading: &Result<Reading, Withheld>) {
+fn knows_sd(calibration: &Calibration) -> bool {
+    matches!(calibration.model, Model::Diagnosed(_))
+}
+
+fn push_line(line: &mut Vec<u8>, time_s: f64, reading: &Result<Reading, Withheld>, with_sd: bool) {
     push_number(line, time_s);
     // writing to memory cannot fail
     let _ = match reading {
-        Ok(Reading { estimate, rate, branch, domain }) => {
-            writeln!(line, ",{estimate:.6},{rate:.6},{branch},{domain}")
+        Ok(Reading { estimate, rate, branch, domain, sd }) => {
+            let told = write!(line, ",{estimate:.6},{rate:.6},{branch},{domain}");
+            match sd.filter(|_| with_sd) {
+                Some(sd) => told.and_then(|()| write!(line, ",{sd:.6}")),
+                None => told,
+            }
         }
-        Err(withheld) => writeln!(line, ",,,,{withheld}"),
+        Err(withheld) => write!(line, ",,,,{withheld}{}", if with_sd { "," } else { "" }),
     };
+    line.push(b'\n');
 }
 
 /// The estimates of a trial as a file would hold them.

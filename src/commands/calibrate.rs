@@ -6,7 +6,7 @@ use anyhow::Context as _;
 use clap::ValueEnum;
 use serde::Serialize;
 use stretch_calibrate::{
-    Calibrated, Candidate, FitReport, ModelChoice, ModelKind, ModelRow, Options, Robust,
+    Calibrated, Candidate, FitReport, Memory, ModelChoice, ModelKind, ModelRow, Options, Robust,
     SpellingError, SplitBy, calibrate, choose_model, evaluate, fixed_record, parse_adc, parse_rate,
     rank_signals, write_calibration,
 };
@@ -14,6 +14,7 @@ use stretch_core::{Normalisation, RateEstimator, RateSource};
 use stretch_data::{ReadOptions, Split, Trial, write_whole};
 use stretch_receptor::code::Adc;
 
+use super::causes::Causes;
 use super::shared::{read_trials, say, say_json, write_text};
 use crate::{
     report::{self, Context, Judged},
@@ -91,6 +92,10 @@ pub(crate) struct Args {
     /// Trials that the report judges the calibration on [default: those that were fitted]
     #[arg(long, value_name = "TRIAL.csv", num_args = 1..)]
     test: Vec<PathBuf>,
+    /// A diagnosis (`stretch diagnose --json d.json`) whose named effects --model diagnosed and auto build on [default: the
+    /// trials are diagnosed as a gauge alone]
+    #[arg(long, value_name = "d.json")]
+    from: Option<PathBuf>,
     /// Where the record goes: JSON, or postcard for a board when the name ends in .postcard
     #[arg(long, value_name = "cal.json")]
     out: PathBuf,
@@ -193,6 +198,23 @@ impl Args {
         }
     }
 
+    /// What a diagnosis names, where the model asks for it.
+    fn causes(&self, trials: &[Trial], options: &Options) -> anyhow::Result<Causes> {
+        let is_asked = match self.model {
+            Model::Auto => true,
+            Model::One(kind) => {
+                matches!(kind, ModelKind::Remembering { kind: Memory::Diagnosed, .. })
+            }
+        };
+        if let Some(path) = self.from.as_ref().filter(|_| is_asked) {
+            return Causes::read(path);
+        }
+        match is_asked {
+            true => Causes::of(trials, options),
+            false => Ok(Causes::default()),
+        }
+    }
+
     /// The signals to choose from; none when one was named.
     fn candidates(&self, trials: &[Trial]) -> Vec<String> {
         if self.signal == "auto" {
@@ -236,6 +258,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     if let Some(best) = ranking.first() {
         options.signal.clone_from(&best.signal);
     }
+    let causes = args.causes(&trials, &options)?;
+    options.causes.clone_from(&causes.found);
     let choice = match args.model {
         Model::Auto => Some(choose_model(&trials, &options)?),
         Model::One(_) => None,
@@ -244,6 +268,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         options.model = choice.model;
     }
     let mut calibrated = calibrate(&trials, &options)?;
+    calibrated.notes.extend(causes.notes);
     calibrated.notes.extend(choice.iter().flat_map(|choice| choice.notes.clone()));
     // nothing is written when a part of what was asked for cannot be
     let fixed = args.fixed.as_ref().map(|path| {

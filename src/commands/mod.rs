@@ -6,6 +6,7 @@ mod blind_answers;
 mod blind_room;
 mod blind_score;
 pub(crate) mod calibrate;
+mod causes;
 pub(crate) mod convert;
 pub(crate) mod demo;
 pub(crate) mod diagnose;

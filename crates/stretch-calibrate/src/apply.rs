@@ -1,6 +1,6 @@
 //! A calibration applied to time-stamped samples, live or from a file.
 
-use stretch_core::{Calibration, Design, RateEstimator, Runner, Seconds, Stage, Volts};
+use stretch_core::{Calibration, Design, Model, RateEstimator, Runner, Seconds, Stage, Volts};
 use stretch_data::Trial;
 use stretch_filter::{Arrival, Cadence, RateFilter};
 use stretch_receptor::{MAX_BRIDGED, Reading, Receptor, Withheld};
@@ -29,7 +29,8 @@ const JITTER_TOLERANCE: f64 = 0.2;
 /// ```
 #[derive(Debug, Clone)]
 pub struct LiveReceptor {
-    receptor: Runner<Receptor<f64>>,
+    receptor: Receptor<f64>,
+    memory: <Receptor<f64> as Design>::Memory,
     cadence: Runner<Cadence>,
     faults: Faults,
 }
@@ -52,8 +53,10 @@ impl LiveReceptor {
     /// [`CalibrateError::Filter`] for the paper's central difference, which
     /// needs the next sample.
     pub fn new(calibration: &Calibration) -> Result<Self, CalibrateError> {
+        let receptor = Receptor::new(calibration)?;
         Ok(Self {
-            receptor: Runner::new(Receptor::new(calibration)?),
+            memory: receptor.memory(),
+            receptor,
             cadence: Runner::new(Cadence::new(calibration.sample_rate_hz, JITTER_TOLERANCE)?),
             faults: Faults::default(),
         })
@@ -68,17 +71,22 @@ impl LiveReceptor {
             Arrival::Gap { missing } => {
                 self.faults.missing += u64::from(missing);
                 for _ in 0..missing.min(u32::from(MAX_BRIDGED) + 1) {
-                    let _ = self.receptor.step(Volts(f64::NAN));
+                    let _ = self.receptor.step(&mut self.memory, Volts(f64::NAN));
                 }
             }
             Arrival::Backwards { .. } => {
                 self.faults.backwards += 1;
-                self.receptor.reset();
+                self.memory = self.receptor.memory();
             }
             Arrival::Jitter { .. } => self.faults.jittered += 1,
             _ => {}
         }
-        self.receptor.step(Volts(signal))
+        self.receptor.step(&mut self.memory, Volts(signal))
+    }
+
+    /// The pressure of the samples to come, for a calibration that [needs](pressure_column) it.
+    pub fn feel(&mut self, pressure: f64) {
+        self.memory.feel(pressure);
     }
 
     /// What was wrong with the time stamps so far.
@@ -114,8 +122,26 @@ pub fn apply(calibration: &Calibration, trial: &Trial) -> Result<Applied, Calibr
         return Ok(Applied { readings, faults: Faults::default() });
     }
     let mut live = LiveReceptor::new(calibration)?;
-    let readings = trial.time_s.iter().zip(signal).map(|(&t, &v)| live.step(t, v)).collect();
+    let pressure = match pressure_column(calibration) {
+        Some(column) => Some(trial.require(column)?),
+        None => None,
+    };
+    let one = |(i, (&t, &v)): (usize, (&f64, &f64))| {
+        if let Some(pressure) = pressure {
+            live.feel(pressure[i]);
+        }
+        live.step(t, v)
+    };
+    let readings = trial.time_s.iter().zip(signal).enumerate().map(one).collect();
     Ok(Applied { readings, faults: live.faults() })
+}
+
+/// The column of the pressure, where a calibration needs one beside its signal.
+pub fn pressure_column(calibration: &Calibration) -> Option<&'static str> {
+    match &calibration.model {
+        Model::Diagnosed(map) if map.crosstalk.is_some() => Some("pressure_kpa"),
+        _ => None,
+    }
 }
 
 /// How late the calibration's rate is, in seconds; zero for the paper's

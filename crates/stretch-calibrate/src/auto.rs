@@ -6,7 +6,7 @@ use stretch_data::Trial;
 use stretch_metrics::lag;
 
 use crate::{
-    CalibrateError, ModelKind, Options, apply,
+    CalibrateError, Memory, ModelKind, Options, apply,
     calibrate::{Choice, calibrate_with},
     cost::{m3_instructions, m3_instructions_fixed},
     series::{extent, sample_rate_hz},
@@ -142,7 +142,13 @@ pub fn choose_model(trials: &[Trial], options: &Options) -> Result<ModelChoice, 
     let folds = folds(trials);
     let mut found = Vec::new();
     let mut first_problem = None;
-    let judged: Vec<_> = ModelKind::named()
+    // A model of what a diagnosis named exists where one named something.
+    let is_here = |kind: &ModelKind| {
+        let diagnosed = matches!(kind, ModelKind::Remembering { kind: Memory::Diagnosed, .. });
+        !(diagnosed && options.causes.is_empty())
+    };
+    let kinds: Vec<ModelKind> = ModelKind::named().into_iter().filter(is_here).collect();
+    let judged: Vec<_> = kinds
         .into_par_iter()
         .map(|kind| (kind, judge(trials, &folds, &turning, options, kind)))
         .collect();
@@ -290,7 +296,7 @@ fn judge(
     let mut errors = Errors::default();
     for fold in folds {
         let rest = without(trials, fold);
-        let (calibrated, _) = calibrate_with(&rest, &options, choice)?;
+        let (calibrated, _) = calibrate_with(&rest, &options, choice.clone())?;
         let trial = &trials[fold.trial];
         let reference = trial.require(&options.reference)?;
         let applied = apply(&calibrated.calibration, trial)?;

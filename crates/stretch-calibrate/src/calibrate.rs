@@ -8,6 +8,7 @@ use stretch_data::Trial;
 
 use crate::{
     CalibrateError, FitReport, Memory, ModelKind, Options,
+    diagnosed_fit::{DiagnosedChoice, diagnosed},
     fitting::{Fitted, Sample, fit},
     history_fit::{HistoryChoice, history},
     observer_fit::observer,
@@ -92,10 +93,11 @@ pub(crate) fn calibrate_with(
 
 /// What was chosen about a model that remembers, to be kept when it is fitted
 /// to parts of the same data.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Choice {
     History(HistoryChoice),
     Observer(ObserverChoice),
+    Diagnosed(DiagnosedChoice),
 }
 
 fn remembering(
@@ -107,6 +109,10 @@ fn remembering(
     if kind == Memory::Observer {
         let choice = choice.and_then(|c| if let Choice::Observer(c) = c { Some(c) } else { None });
         return observer(prepared, rest, choice).map(|(fitted, c)| (fitted, Choice::Observer(c)));
+    }
+    if kind == Memory::Diagnosed {
+        let choice = choice.and_then(|c| if let Choice::Diagnosed(c) = c { Some(c) } else { None });
+        return diagnosed(prepared, rest, choice).map(|(fitted, c)| (fitted, Choice::Diagnosed(c)));
     }
     let choice = choice.and_then(|c| if let Choice::History(c) = c { Some(c) } else { None });
     history(prepared, kind, rest, choice).map(|(fitted, c)| (fitted, Choice::History(c)))

@@ -72,6 +72,31 @@ pub enum CalibrateError {
         /// The model.
         model: String,
     },
+    /// A model of what was named, and nothing was.
+    #[error(
+        "no effect of the gauge or its reference was named: diagnose first (stretch diagnose) and give its answer with --from, or fit --model observer"
+    )]
+    NotDiagnosed,
+    /// A cause that acts elsewhere, or that nobody knows.
+    #[error("{effect} is no effect of the gauge or its reference; a calibration can use {known}")]
+    UnknownCause {
+        /// The name.
+        effect: String,
+        /// Those that there are.
+        known: String,
+    },
+    /// A cause that needs a pressure, in trials without.
+    #[error(
+        "{effect} needs the pressure, and {trial} has no column {column}; record it, or leave the effect out"
+    )]
+    NoPressure {
+        /// The cause.
+        effect: String,
+        /// The trial.
+        trial: String,
+        /// The column that was looked for.
+        column: String,
+    },
     /// An estimator that cannot be designed.
     #[error("the rate estimator cannot be used: {0}")]
     Filter(#[from] FilterError),

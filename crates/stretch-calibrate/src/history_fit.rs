@@ -76,7 +76,7 @@ fn designs(kind: Memory) -> &'static [Design] {
                 ]
             }
         }
-        Memory::Observer => &[],
+        Memory::Observer | Memory::Diagnosed => &[],
     }
 }
 

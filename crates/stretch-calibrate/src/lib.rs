@@ -3,13 +3,16 @@
 mod apply;
 mod auto;
 mod calibrate;
+mod cause;
 mod choose;
 mod cost;
+mod diagnosed_fit;
 mod error;
 mod evaluate;
 mod fitting;
 mod fixed_record;
 mod history_fit;
+mod knobs;
 mod least_squares;
 mod observer_bounds;
 mod observer_curve;
@@ -24,9 +27,10 @@ mod rising;
 mod series;
 mod split;
 
-pub use apply::{Applied, Faults, LiveReceptor, apply, rate_delay_s};
+pub use apply::{Applied, Faults, LiveReceptor, apply, pressure_column, rate_delay_s};
 pub use auto::{ModelChoice, ModelRow, choose_model};
 pub use calibrate::{Calibrated, calibrate};
+pub use cause::Cause;
 pub use choose::{Candidate, rank_signals};
 pub use cost::{m3_instructions, m3_instructions_fixed};
 pub use error::CalibrateError;

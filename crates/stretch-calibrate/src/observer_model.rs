@@ -39,8 +39,10 @@ impl ObserverChoice {
 
 /// A piece of a trial: signal above its baseline, the target smoothed, its rate.
 pub(crate) struct Piece {
-    signal: Vec<f64>,
-    smooth: Vec<f64>,
+    pub(crate) signal: Vec<f64>,
+    pub(crate) smooth: Vec<f64>,
+    /// Empty where none is needed.
+    pub(crate) pressure: Vec<f64>,
     rate: Vec<f64>,
 }
 
@@ -87,7 +89,8 @@ pub(crate) fn pieces(
         smoother.over_log(&target, &mut smooth)?;
         differentiator.over_log(&target, &mut slope)?;
         let signal = above.iter().map(|v| sign * v).collect();
-        pieces.push(Piece { signal, smooth, rate: slope });
+        let pressure = series.pressure.clone();
+        pieces.push(Piece { signal, smooth, pressure, rate: slope });
     }
     Ok(pieces)
 }

@@ -2,6 +2,7 @@
 
 use std::{fmt, str::FromStr};
 
+use crate::cause::Cause;
 use stretch_core::{Degree, DesignError, Normalisation, RateEstimator, RateSource};
 
 /// Which model is fitted.
@@ -51,12 +52,20 @@ pub enum Memory {
     History,
     /// The gauge's forward model, inverted by a Kalman filter.
     Observer,
+    /// The same, built from the effects that a diagnosis named: [`Options::causes`].
+    Diagnosed,
 }
 
 impl Memory {
     /// All of them, simplest first.
-    pub const ALL: [Self; 5] =
-        [Self::Hysteresis, Self::Relaxation, Self::Both, Self::History, Self::Observer];
+    pub const ALL: [Self; 6] = [
+        Self::Hysteresis,
+        Self::Relaxation,
+        Self::Both,
+        Self::History,
+        Self::Observer,
+        Self::Diagnosed,
+    ];
 }
 
 impl fmt::Display for Memory {
@@ -67,6 +76,7 @@ impl fmt::Display for Memory {
             Self::Both => "both",
             Self::History => "history",
             Self::Observer => "observer",
+            Self::Diagnosed => "diagnosed",
         })
     }
 }
@@ -127,7 +137,7 @@ impl ModelKind {
 }
 
 const MODELS: &str = "linear, poly13, polyIJ with degrees up to poly55, blended, hysteresis, \
-                      relaxation, both, history or observer, the last five also with +rest";
+                      relaxation, both, history, observer or diagnosed, the last six also with +rest";
 
 impl FromStr for ModelKind {
     type Err = SpellingError;
@@ -238,6 +248,10 @@ pub struct Options {
     pub dead_band: Option<f64>,
     /// Free text for the record: when it was made.
     pub date: String,
+    /// What a diagnosis named, for [`Memory::Diagnosed`].
+    pub causes: Vec<Cause>,
+    /// Column of the pressure, where a cause needs it.
+    pub pressure: String,
 }
 
 impl Default for Options {
@@ -255,6 +269,8 @@ impl Default for Options {
             rest_length: None,
             dead_band: None,
             date: String::new(),
+            causes: Vec::new(),
+            pressure: "pressure_kpa".into(),
         }
     }
 }
@@ -271,6 +287,10 @@ impl Options {
             dead_band: Some(0.0),
             ..Self::default()
         }
+    }
+
+    pub(crate) fn needs_pressure(&self) -> bool {
+        self.causes.iter().any(|cause| cause.effect == "pressure_crosstalk")
     }
 
     pub(crate) fn zero(&self) -> f64 {

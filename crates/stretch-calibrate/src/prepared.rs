@@ -26,7 +26,8 @@ pub(crate) struct Prepared {
     pub target_range: Range,
     pub dead: DeadBands,
     pub notes: Vec<String>,
-    options: Options,
+    pub options: Options,
+    first: String,
 }
 
 impl Prepared {
@@ -43,7 +44,11 @@ impl Prepared {
                 let (trial, first) = (trial.name.clone(), first.name.clone());
                 return Err(CalibrateError::SampleRates { trial, rate_hz, first, first_hz });
             }
-            let columns = [options.signal.as_str(), options.reference.as_str()];
+            let mut columns = vec![options.signal.as_str(), options.reference.as_str()];
+            // Only where it was recorded: a cause that needs it says so when it is missing.
+            let has_pressure =
+                options.needs_pressure() && trial.channel(&options.pressure).is_some();
+            columns.extend(has_pressure.then_some(options.pressure.as_str()));
             let rate_hz = sample_rate.hz();
             let spec =
                 EvenSpec { rate_hz, shortest: SHORTEST, bridged_s: 0.0, over_switches: true };
@@ -51,8 +56,11 @@ impl Prepared {
             rows.add(even.rows);
             notes.extend(even.notes);
             pieces.extend(even.parts.into_iter().filter_map(|part| {
-                let [signal, reference] = part.columns.try_into().ok()?;
-                Some((index, (signal, reference)))
+                let mut columns = part.columns.into_iter();
+                Some((
+                    index,
+                    [columns.next()?, columns.next()?, columns.next().unwrap_or_default()],
+                ))
             }));
         }
         notes.extend(rows.note());
@@ -61,7 +69,7 @@ impl Prepared {
             return Err(CalibrateError::TooShort { trial, samples });
         }
         let target = target(options, &pieces)?;
-        let pairs = pieces.iter().flat_map(|(_, (signal, reference))| {
+        let pairs = pieces.iter().flat_map(|(_, [signal, reference, _])| {
             signal.iter().zip(reference).map(|(&v, &x)| (v, target.from_reference(x)))
         });
         let polarity = polarity(pairs.clone());
@@ -71,7 +79,7 @@ impl Prepared {
         let signal_range =
             range(&options.signal, options.zero(), &mut pairs.clone().map(|(v, _)| v))?;
         let target_range = range(&options.reference, 0.0, &mut pairs.map(|(_, t)| t))?;
-        let noise_v = noise(pieces.iter().map(|(_, (v, _))| v.as_slice()));
+        let noise_v = noise(pieces.iter().map(|(_, [v, ..])| v.as_slice()));
         let signal_dead = match options.dead_band {
             Some(dead_band) => dead_band,
             None => 3.0 * noise_v * noise_gain(options.rate, sample_rate)?,
@@ -95,7 +103,13 @@ impl Prepared {
             dead,
             notes,
             options,
+            first: first.name.clone(),
         })
+    }
+
+    /// Name of the first trial.
+    pub(crate) fn first_trial(&self) -> String {
+        self.first.clone()
     }
 
     /// A record of a model fitted to these trials.
@@ -137,13 +151,14 @@ fn noise_gain(estimator: RateEstimator, rate: SampleRate) -> Result<f64, Calibra
     }
 }
 
-type Pieces = [(usize, (Vec<f64>, Vec<f64>))];
+/// Trial; signal, reference and, where it is needed, the pressure.
+type Pieces = [(usize, [Vec<f64>; 3])];
 
 fn target(options: &Options, pieces: &Pieces) -> Result<Target, CalibrateError> {
     let longest = || {
         pieces
             .iter()
-            .flat_map(|(_, (_, reference))| reference.iter().copied())
+            .flat_map(|(_, [_, reference, _])| reference.iter().copied())
             .fold(f64::MIN, f64::max)
     };
     let rest_length = match options.rest_length {

@@ -15,6 +15,8 @@ pub(crate) struct Series {
     pub trial: usize,
     pub signal: Vec<f64>,
     pub target: Vec<f64>,
+    /// Empty where none is needed.
+    pub pressure: Vec<f64>,
     /// Of the signal, signed by polarity, by the estimator that runs at use.
     pub signal_rate: Vec<Option<f64>>,
     /// Of the target, by central differences or the centred form of the estimator.
@@ -90,16 +92,16 @@ pub(crate) fn polarity(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> Polar
 /// Everything a fit needs of one even piece of a trial.
 pub(crate) fn series(
     trial: usize,
-    piece: (Vec<f64>, Vec<f64>),
+    piece: [Vec<f64>; 3],
     target: Target,
     polarity: Polarity,
     estimator: RateEstimator,
     rate: SampleRate,
 ) -> Result<Series, CalibrateError> {
-    let (signal, reference) = piece;
+    let [signal, reference, pressure] = piece;
     let target: Vec<f64> = reference.iter().map(|&x| target.from_reference(x)).collect();
     let signed = |r: Option<f64>| r.map(|r| polarity.sign() * r);
     let signal_rate = rates_at_use(estimator, rate, &signal)?.into_iter().map(signed).collect();
     let target_rate = target_rates(estimator, rate, &target)?;
-    Ok(Series { trial, signal, target, signal_rate, target_rate })
+    Ok(Series { trial, signal, target, pressure, signal_rate, target_rate })
 }

@@ -4,6 +4,7 @@
 mod branch;
 mod calibration;
 mod degree;
+mod diagnosed;
 mod error;
 pub mod fixed;
 mod history;
@@ -33,6 +34,7 @@ pub use calibration::{
     CALIBRATION_SCHEMA, Calibration, CalibrationSpec, RateSource, Schema, Target,
 };
 pub use degree::{Degree, MAX_DEGREE, MAX_TERMS};
+pub use diagnosed::{Crosstalk, DiagnosedMap, Fading, Knee, Plays, Worn};
 pub use error::DesignError;
 pub use history::{
     HistoryMap, HistoryShape, MAX_HISTORY_TERMS, MAX_PLAYS, MAX_RELAXATIONS, MAX_STATES,

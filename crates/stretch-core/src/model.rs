@@ -1,6 +1,8 @@
 //! What a calibration computes: from signal and rate to the normalised target.
 
-use crate::{DesignError, FitSummary, HistoryMap, Interval, ObserverMap, Range, Surface};
+use crate::{
+    DesignError, DiagnosedMap, FitSummary, HistoryMap, Interval, ObserverMap, Range, Surface,
+};
 
 /// A straight line: `target = slope signal + intercept`, all normalised.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,6 +62,8 @@ pub enum Model {
     History(HistoryMap),
     /// The gauge's forward model, inverted by a Kalman filter.
     Observer(ObserverMap),
+    /// The gauge's forward model with its defects by name, inverted by a filter.
+    Diagnosed(DiagnosedMap),
 }
 
 impl Model {
@@ -79,6 +83,7 @@ impl Model {
             Self::Blended { .. } => "blended",
             Self::History(_) => "history",
             Self::Observer(_) => "observer",
+            Self::Diagnosed(_) => "diagnosed",
         }
     }
 
@@ -117,6 +122,10 @@ impl Model {
                 fit(&map.fit)?;
             }
             Self::Observer(map) => {
+                map.validate()?;
+                fit(&map.fit)?;
+            }
+            Self::Diagnosed(map) => {
                 map.validate()?;
                 fit(&map.fit)?;
             }

@@ -1,9 +1,9 @@
 //! The calibration that the documentation's examples run with.
 
 use stretch_core::{
-    BranchSurface, Calibration, CalibrationSpec, DesignError, FitSummary, Interval, Label, Model,
-    Normalisation, ObserverMap, Polarity, Poly13, Provenance, Range, RangeSpec, RateEstimator,
-    RateSource, RestTracker, SampleRate, Schema, Target, Values,
+    BranchSurface, Calibration, CalibrationSpec, DesignError, DiagnosedMap, Fading, FitSummary,
+    Interval, Label, Model, Normalisation, ObserverMap, Plays, Polarity, Poly13, Provenance, Range,
+    RangeSpec, RateEstimator, RateSource, RestTracker, SampleRate, Schema, Target, Values,
 };
 
 /// The paper's published surfaces (section 3.2) as a calibration record, for an
@@ -32,6 +32,49 @@ pub fn example_calibration() -> Calibration {
 /// ```
 pub fn example_observer() -> Calibration {
     observer().expect("the parts are constants and in range")
+}
+
+/// A gauge with two named defects, as `stretch calibrate --model diagnosed` finds it: it overshoots by a fifth over a quarter of a
+/// second, and its sleeve slips by 2 % of the stroke.
+///
+/// ```
+/// use stretch_core::Model;
+/// let calibration = stretch_receptor::example_diagnosed();
+/// assert!(matches!(calibration.model, Model::Diagnosed(_)));
+/// ```
+pub fn example_diagnosed() -> Calibration {
+    diagnosed().expect("the parts are constants and in range")
+}
+
+fn diagnosed() -> Result<Calibration, DesignError> {
+    let observer = observer()?;
+    let Model::Observer(map) = observer.model else {
+        return Err(observer.model.instead_of("observer"));
+    };
+    let map = DiagnosedMap {
+        rest: None,
+        slack_low: None,
+        slack_high: None,
+        slip: Some(Plays { share: 1.0, radii: [0.007, 0.01, 0.013] }),
+        crosstalk: None,
+        hysteresis: None,
+        relaxation: Some(Fading { share: 0.2, taus_s: [0.15, 0.25, 0.4] }),
+        worn: None,
+        floor: None,
+        ceiling: None,
+        lowpass_s: None,
+        skew_s: 0.0,
+        wound: [-1.0, 1.0],
+        curve: map.curve,
+        drive_domain: map.drive_domain,
+        noise: 0.005,
+        agility: 10.0,
+        steady_s: 1.0,
+        spread: 1.0,
+        estimate_domain: map.estimate_domain,
+        fit: map.fit,
+    };
+    Calibration::new(CalibrationSpec { model: Model::Diagnosed(map), ..observer.into_spec() })
 }
 
 fn observer() -> Result<Calibration, DesignError> {

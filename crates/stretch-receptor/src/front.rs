@@ -82,7 +82,7 @@ pub struct Front<M> {
 /// samples are missing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReceptorMemory<M, S = Branch> {
-    model: M,
+    pub(crate) model: M,
     side: S,
     /// In a row; [`MAX_BRIDGED`] where there is nothing to predict from.
     missing: u8,

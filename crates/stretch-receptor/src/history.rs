@@ -229,7 +229,7 @@ impl<T: Real, R: Stage<T, Out = Option<T>>> Live for History<T, R> {
         let (estimate, rate, domain) = self.take(memory, signal);
         let rate = rate?;
         *branch = self.direction.next(*branch, rate);
-        Some(Reading { estimate, rate, branch: *branch, domain })
+        Some(Reading { estimate, rate, branch: *branch, domain, sd: None })
     }
 
     /// By the last sample: the memories go on, and nothing is answered.

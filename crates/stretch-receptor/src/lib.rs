@@ -3,6 +3,9 @@
 
 mod across;
 pub mod code;
+mod curve;
+mod defects;
+mod diagnosed;
 mod example;
 mod fold;
 mod front;
@@ -16,7 +19,9 @@ mod receptor;
 #[cfg(feature = "proptest")]
 pub mod strategies;
 
-pub use example::{example_calibration, example_observer};
+pub use defects::{Defects, DefectsMemory};
+pub use diagnosed::DiagnosedReceptor;
+pub use example::{example_calibration, example_diagnosed, example_observer};
 pub use front::{Front, MAX_BRIDGED, ReceptorMemory};
 pub use history::HistoryReceptor;
 pub use observer::ObserverReceptor;

@@ -293,6 +293,7 @@ impl<T: Real> Live for Observer<T> {
             rate: self.gain * rate,
             branch: *branch,
             domain: Domain::from_flags(!on_curve, false),
+            sd: None,
         })
     }
 

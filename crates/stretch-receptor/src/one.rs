@@ -4,8 +4,10 @@ use stretch_core::{Branch, Calibration, Design, Model, Real, Stage, Volts};
 use stretch_filter::{FilterError, RateFilter};
 
 use crate::{
-    BlendedReceptor, Front, HistoryReceptor, ObserverReceptor, Reading, StretchReceptor,
+    BlendedReceptor, DiagnosedReceptor, Front, HistoryReceptor, ObserverReceptor, Reading,
+    ReceptorMemory, StretchReceptor,
     across::{Jump, Mixed},
+    diagnosed::{Diagnosed, DiagnosedMemory},
     fold::estimator,
     front::{Live, usable},
     history::{History, HistoryMemory},
@@ -40,6 +42,8 @@ pub enum AnyModel<T, R> {
     History(History<T, R>),
     /// Of an [`ObserverReceptor`].
     Observer(Observer<T>),
+    /// Of a [`DiagnosedReceptor`].
+    Diagnosed(Diagnosed<T>),
 }
 
 /// What a [`Receptor`]'s model remembers: a memory of its own kind.
@@ -52,6 +56,8 @@ pub enum AnyMemory<T, M> {
     History(HistoryMemory<T, M>),
     /// Of an [`ObserverReceptor`].
     Observer(ObserverMemory<T>),
+    /// Of a [`DiagnosedReceptor`].
+    Diagnosed(DiagnosedMemory<T>),
 }
 
 impl<T: Real> Receptor<T> {
@@ -63,7 +69,7 @@ impl<T: Real> Receptor<T> {
     pub fn new(calibration: &Calibration) -> Result<Self, FilterError> {
         match &calibration.model {
             // its rate is a state: it needs no estimator, and none that could run live
-            Model::Observer(_) => Self::observer(calibration),
+            Model::Observer(_) | Model::Diagnosed(_) => Self::observer(calibration),
             _ => Self::with_rate(calibration, estimator(calibration)?),
         }
     }
@@ -82,14 +88,27 @@ impl<T: Real, R> Receptor<T, R> {
             Model::History(_) => {
                 AnyModel::History(HistoryReceptor::with_rate(calibration, rate)?.model)
             }
-            Model::Observer(_) => return Self::observer(calibration),
+            Model::Observer(_) | Model::Diagnosed(_) => return Self::observer(calibration),
             _ => AnyModel::Surfaces(StretchReceptor::with_rate(calibration, rate)?.model),
         };
         Ok(Self { model })
     }
 
     fn observer(calibration: &Calibration) -> Result<Self, FilterError> {
-        Ok(Self { model: AnyModel::Observer(ObserverReceptor::new(calibration)?.model) })
+        let model = match &calibration.model {
+            Model::Diagnosed(_) => AnyModel::Diagnosed(DiagnosedReceptor::new(calibration)?.model),
+            _ => AnyModel::Observer(ObserverReceptor::new(calibration)?.model),
+        };
+        Ok(Self { model })
+    }
+}
+
+impl<T: Real, M> ReceptorMemory<AnyMemory<T, M>> {
+    /// The pressure of the samples to come, for a [`DiagnosedReceptor`] with a crosstalk; others do not mind it.
+    pub fn feel(&mut self, pressure: T) {
+        if let AnyMemory::Diagnosed(memory) = &mut self.model {
+            memory.feel(pressure);
+        }
     }
 }
 
@@ -101,6 +120,7 @@ macro_rules! with_its_own {
             (AnyModel::Blended($own), AnyMemory::Surfaces($its)) => $answer,
             (AnyModel::History($own), AnyMemory::History($its)) => $answer,
             (AnyModel::Observer($own), AnyMemory::Observer($its)) => $answer,
+            (AnyModel::Diagnosed($own), AnyMemory::Diagnosed($its)) => $answer,
             // a memory of another model's receptor
             _ => $else,
         }
@@ -116,6 +136,7 @@ impl<T: Real, R: Design> Design for AnyModel<T, R> {
             Self::Blended(model) => AnyMemory::Surfaces(model.memory()),
             Self::History(model) => AnyMemory::History(model.memory()),
             Self::Observer(model) => AnyMemory::Observer(model.memory()),
+            Self::Diagnosed(model) => AnyMemory::Diagnosed(model.memory()),
         }
     }
 }

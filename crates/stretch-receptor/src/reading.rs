@@ -17,6 +17,8 @@ pub struct Reading<T = f64> {
     pub branch: Branch,
     /// Whether the inputs lay where the calibration was fitted.
     pub domain: Domain,
+    /// Standard deviation of the estimate, in the reference's unit, where the model knows it.
+    pub sd: Option<T>,
 }
 
 impl<T: Real> Reading<T> {

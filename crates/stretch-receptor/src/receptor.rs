@@ -156,7 +156,7 @@ impl<T: Real, R: Stage<T, Out = Option<T>>, A: Across<T>> Live for Surfaces<T, R
         *branch = self.direction.next(*branch, rate);
         let point = self.across.point(&self.map, self.direction, *branch, rate, signal);
         let Point { estimate, slope, domain } = point;
-        Some(Reading { estimate, rate: slope * rate, branch: *branch, domain })
+        Some(Reading { estimate, rate: slope * rate, branch: *branch, domain, sd: None })
     }
 
     /// By the last sample, moved on by the last rate.

@@ -1,0 +1,398 @@
+//! Fits the forward model of what a diagnosis named, then the filter that inverts it.
+
+use stretch_core::{
+    Design, DiagnosedMap, FitSummary, Interval, Model, Provenance, RestTracker, Stage, Values,
+    Volts,
+};
+use stretch_operators::{Backlash, Operator};
+use stretch_receptor::{Defects, DiagnosedReceptor};
+
+use crate::{
+    CalibrateError, Coefficient, FitReport, Memory, Order,
+    fitting::Fitted,
+    knobs::Knobs,
+    observer_curve::{CurveRows, KNOTS, Place},
+    observer_model::{Piece, SETTLE, pieces},
+    prepared::Prepared,
+    rising::rising,
+};
+
+/// The least a curve rises over its whole length, as a share of the signal's range.
+const LEAST_RISE: f64 = 1e-3;
+const ITERATIONS: usize = 14;
+/// Rise of the likelihood's square below which a fit has ended, as a share.
+const ENDED: f64 = 1e-4;
+/// Errors of the model are correlated over as long as this, s.
+const BLOCK_S: f64 = 2.0;
+/// Densities of the rate's wandering that are tried, in 1/s^3, and times in which a rate forgets itself, s.
+const AGILITIES: [f64; 7] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 300.0];
+const STEADY_S: [f64; 3] = [0.15, 0.5, 3.0];
+/// What the filter takes for noise, as multiples of what the forward model leaves.
+const LIVE_CATCH_UP_S: f64 = 0.02;
+/// A further part of the model must lower the error to this share to be kept.
+const WORTH: f64 = 0.97;
+
+/// What a fit was chosen to be; given again, it begins there.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct DiagnosedChoice {
+    at: Vec<f64>,
+    rest: Option<RestTracker>,
+    agility: f64,
+    steady_s: f64,
+}
+
+/// Fits what [`Options::causes`](crate::Options::causes) names; with `rest` the baseline is followed.
+pub(crate) fn diagnosed(
+    prepared: &Prepared,
+    rest: bool,
+    choice: Option<DiagnosedChoice>,
+) -> Result<(Fitted, DiagnosedChoice), CalibrateError> {
+    let knobs = Knobs::of(prepared)?;
+    let mut trackers = vec![choice.as_ref().and_then(|c| c.rest)];
+    if choice.is_none() && (rest || knobs.drifts()) {
+        trackers = crate::rest::candidates(prepared).into_iter().map(Some).collect();
+    }
+    let mut best: Option<(Forward, DiagnosedMap)> = None;
+    for rest in trackers {
+        let record = Record::of(prepared, rest)?;
+        let begin = choice.as_ref().map_or_else(|| knobs.clone(), |c| knobs.moved(c.at.clone()));
+        let forward = record.fit(begin)?;
+        let map = match &choice {
+            Some(c) => record.judged(&forward, c.agility, c.steady_s)?,
+            None => record.tuned(&forward)?,
+        };
+        if best.as_ref().is_none_or(|(_, b)| map.fit.rmse < WORTH * b.fit.rmse) {
+            best = Some((forward, map));
+        }
+    }
+    let (forward, map) = best.ok_or(CalibrateError::NoTrials)?;
+    let report = report(&forward, &map);
+    let note = format!(
+        "diagnosed: {}; noise {:.4}, agility {} 1/s^3, a rate forgets itself in {} s",
+        prepared.options.causes.iter().map(|c| c.effect.as_str()).collect::<Vec<_>>().join(", "),
+        map.noise,
+        map.agility,
+        map.steady_s,
+    );
+    let (at, rest) = (forward.knobs.at, forward.rest);
+    let choice = DiagnosedChoice { at, rest, agility: map.agility, steady_s: map.steady_s };
+    Ok(((Model::Diagnosed(map), vec![report], vec![note]), choice))
+}
+
+/// What a fit determined.
+struct Forward {
+    knobs: Knobs,
+    rest: Option<RestTracker>,
+    /// Signed, rising.
+    curve: Vec<f64>,
+    domain: Interval,
+    noise: f64,
+    /// Standard errors of the coordinates.
+    errors: Vec<f64>,
+    /// How plays stand where a trial begins.
+    wound: [f64; 2],
+    /// The way that the gauge has gone in the end.
+    travelled: f64,
+}
+
+fn report(forward: &Forward, map: &DiagnosedMap) -> FitReport {
+    let named = |(i, error): (usize, &f64)| {
+        let knob = &forward.knobs.knobs[i];
+        let value = forward.knobs.value(knob.effect, knob.name).unwrap_or(f64::NAN);
+        let name = format!("{} {}", knob.effect, knob.name);
+        Coefficient::named(name, value, 1.96 * knob.error(value, *error))
+    };
+    let coefficients: Vec<Coefficient> = forward.errors.iter().enumerate().map(named).collect();
+    let kind = Memory::Diagnosed.to_string();
+    let order = Order {
+        model: kind.clone(),
+        terms: forward.curve.len() + coefficients.len() + 3,
+        r_squared: Some(map.fit.r_squared),
+        rmse: Some(map.fit.rmse),
+        cross_validated_rmse: None,
+        problem: None,
+    };
+    let sse = map.fit.rmse.powi(2) * map.fit.samples as f64;
+    FitReport::of_model(kind, &map.fit, sse, 1.0, coefficients, order)
+}
+
+/// The trials as a forward fit sees them.
+struct Record<'a> {
+    prepared: &'a Prepared,
+    rest: Option<RestTracker>,
+    pieces: Vec<Piece>,
+    period_s: f64,
+    least_step: f64,
+}
+
+/// A forward model at some values: what it leaves.
+struct Seen {
+    curve: Vec<f64>,
+    domain: Interval,
+    residuals: Vec<f64>,
+    square: f64,
+    wound: [f64; 2],
+    travelled: f64,
+}
+
+/// Every drive with its signal, and where the defects stood.
+struct Simulated {
+    pairs: Vec<(f64, f64)>,
+    wound: [f64; 2],
+    travelled: f64,
+}
+
+/// From the least to the greatest, without the outermost two in ten thousand at either end.
+fn inner(mut all: Vec<f64>) -> Option<Interval> {
+    let edge = all.len() / 5000;
+    let last = all.len().checked_sub(1 + edge)?;
+    let min = *all.select_nth_unstable_by(edge, f64::total_cmp).1;
+    let max = *all.select_nth_unstable_by(last, f64::total_cmp).1;
+    (min < max).then_some(Interval { min, max })
+}
+
+impl<'a> Record<'a> {
+    fn of(prepared: &'a Prepared, rest: Option<RestTracker>) -> Result<Self, CalibrateError> {
+        let pieces = pieces(prepared, rest)?;
+        let range = crate::series::extent(pieces.iter().flat_map(|p| p.signal.iter().copied()));
+        let least_step = LEAST_RISE * (range.max - range.min) / (KNOTS - 1) as f64;
+        let period_s = prepared.sample_rate.period_s();
+        Ok(Self { prepared, rest, pieces, period_s, least_step })
+    }
+
+    /// Pairs of drive and signal, the drive of so long before as the skew says.
+    fn pairs(&self, knobs: &Knobs) -> Simulated {
+        let map = knobs.map();
+        let defects = Defects::<f64>::new(&map, self.period_s);
+        let late = map.skew_s / self.period_s;
+        let mut memory = None;
+        let (mut pairs, mut windings) = (Vec::new(), Vec::new());
+        for piece in &self.pieces {
+            let mut targets = piece.smooth.clone();
+            if let Some(w) = knobs.backlash() {
+                Backlash::hard(w).undo(&mut targets);
+            }
+            let pressure = |i: usize| piece.pressure.get(i).copied().unwrap_or(0.0);
+            let mut now = match &memory {
+                None => defects.begin(targets[0], pressure(0)),
+                Some(before) => {
+                    let now = defects.carry(before, targets[0], pressure(0));
+                    let stands = defects.winding(&now, targets[0], pressure(0));
+                    windings.extend(stands.map(|share| (targets[0], share)));
+                    now
+                }
+            };
+            let each = targets.iter().enumerate();
+            let drives: Vec<f64> =
+                each.map(|(i, &y)| defects.advance(&mut now, y, pressure(i))).collect();
+            memory = Some(now);
+            for (i, &signal) in piece.signal.iter().enumerate().skip(SETTLE) {
+                // Behind an end it is held: so every value of the skew leaves as many pairs.
+                let place = (i as f64 - late).clamp(0.0, (drives.len() - 1) as f64);
+                let below = (place as usize).min(drives.len() - 2);
+                let share = place - below as f64;
+                let drive = drives[below] + share * (drives[below + 1] - drives[below]);
+                pairs.push((drive, signal));
+            }
+        }
+        // A stream begins as trials do that others went before.
+        let mean = |is_upper: bool, otherwise: f64| {
+            let own = windings.iter().filter(|(y, _)| (*y > 0.5) == is_upper);
+            let (n, sum) = own.fold((0.0, 0.0), |(n, sum), (_, share)| (n + 1.0, sum + share));
+            if n > 0.0 { sum / n } else { otherwise }
+        };
+        let wound = [mean(false, -1.0), mean(true, 1.0)];
+        Simulated { pairs, wound, travelled: memory.map_or(0.0, |m| m.travelled()) }
+    }
+
+    /// The curve that leaves least, and what it leaves.
+    fn look(&self, knobs: &Knobs) -> Option<Seen> {
+        let Simulated { pairs, wound, travelled } = self.pairs(knobs);
+        if pairs.len() <= KNOTS + knobs.at.len() {
+            return None;
+        }
+        let domain = inner(pairs.iter().map(|(drive, _)| *drive).collect())?;
+        let mut rows = CurveRows::new(0);
+        for (drive, signal) in &pairs {
+            rows.push(Place::new(*drive, domain), &[], *signal);
+        }
+        let solution = rows.factor().solve(|_, power| 1e-12 * (1.0 + power))?;
+        let curve = rising(&solution.weights, self.least_step);
+        let left = |(drive, signal): &(f64, f64)| signal - Place::new(*drive, domain).on(&curve);
+        let residuals: Vec<f64> = pairs.iter().map(left).collect();
+        let square = residuals.iter().map(|r| r * r).sum::<f64>();
+        Some(Seen { curve, domain, residuals, square, wound, travelled })
+    }
+
+    /// Levenberg and Marquardt over the numbers of the defects, the curve solved for at each.
+    fn fit(&self, begin: Knobs) -> Result<Forward, CalibrateError> {
+        let undetermined = || CalibrateError::Undetermined { model: Memory::Diagnosed.to_string() };
+        let mut knobs = begin;
+        let mut seen = self.look(&knobs).ok_or_else(undetermined)?;
+        let count = knobs.at.len();
+        let mut damping = 1e-2;
+        let mut normal = nalgebra::DMatrix::zeros(count, count);
+        for _ in 0..ITERATIONS {
+            let columns = self.sensitivities(&knobs, &seen);
+            let n = columns.iter().map(Vec::len).min().unwrap_or(0).min(seen.residuals.len());
+            let dot = |a: &[f64], b: &[f64]| -> f64 {
+                a[..n].iter().zip(&b[..n]).map(|(x, y)| x * y).sum()
+            };
+            normal = nalgebra::DMatrix::from_fn(count, count, |i, j| dot(&columns[i], &columns[j]));
+            let slope = nalgebra::DVector::from_fn(count, |i, _| dot(&columns[i], &seen.residuals));
+            let before = seen.square;
+            for _ in 0..6 {
+                let mut damped = normal.clone();
+                for i in 0..count {
+                    damped[(i, i)] += damping * damped[(i, i)] + 1e-12 * before;
+                }
+                let Some(step) = damped.lu().solve(&slope) else { break };
+                let at = knobs.at.iter().zip(step.iter()).map(|(x, dx)| x - dx).collect();
+                let next = knobs.moved(at);
+                match self.look(&next).filter(|s| self.mean(s) < self.mean(&seen)) {
+                    Some(better) => {
+                        (knobs, seen) = (next, better);
+                        damping = (damping * 0.3).max(1e-6);
+                        break;
+                    }
+                    None => damping = (damping * 4.0).min(1e6),
+                }
+            }
+            if seen.square > before * (1.0 - ENDED) {
+                break;
+            }
+        }
+        let noise = self.mean(&seen).sqrt();
+        let errors = self.errors(&normal, noise);
+        let range = seen.curve[KNOTS - 1] - seen.curve[0];
+        // a curve that follows noiseless data exactly still needs a noise to weigh with
+        let noise = noise.max(1e-6 * range);
+        let Seen { curve, domain, wound, travelled, .. } = seen;
+        Ok(Forward { knobs, rest: self.rest, curve, domain, noise, errors, wound, travelled })
+    }
+
+    fn mean(&self, seen: &Seen) -> f64 {
+        seen.square / seen.residuals.len() as f64
+    }
+
+    /// By how much each number moves what is left.
+    fn sensitivities(&self, knobs: &Knobs, seen: &Seen) -> Vec<Vec<f64>> {
+        use rayon::prelude::*;
+        let one = |i: usize| {
+            let knob = &knobs.knobs[i];
+            let mut at = knobs.at.clone();
+            let step = knob.step();
+            at[i] = if knob.held(at[i] + step) == at[i] { at[i] - step } else { at[i] + step };
+            let next = knobs.moved(at);
+            let moved = next.at[i] - knobs.at[i];
+            match self.look(&next).filter(|_| moved != 0.0) {
+                Some(there) => {
+                    let pairs = there.residuals.iter().zip(&seen.residuals);
+                    pairs.map(|(a, b)| (a - b) / moved).collect()
+                }
+                None => vec![0.0; seen.residuals.len()],
+            }
+        };
+        (0..knobs.at.len()).into_par_iter().map(one).collect()
+    }
+
+    /// Standard errors, with one observation in a block.
+    fn errors(&self, normal: &nalgebra::DMatrix<f64>, noise: f64) -> Vec<f64> {
+        let block = (BLOCK_S / self.period_s).max(1.0);
+        match normal.clone().try_inverse() {
+            Some(inverse) => {
+                inverse.diagonal().iter().map(|v| noise * (v.max(0.0) * block).sqrt()).collect()
+            }
+            None => vec![f64::NAN; normal.nrows()],
+        }
+    }
+
+    /// The filter that errs least, live.
+    fn tuned(&self, forward: &Forward) -> Result<DiagnosedMap, CalibrateError> {
+        use rayon::prelude::*;
+        let grid = STEADY_S.iter().flat_map(|s| AGILITIES.iter().map(move |a| (*a, *s)));
+        let grid: Vec<(f64, f64)> = grid.collect();
+        let maps: Result<Vec<DiagnosedMap>, CalibrateError> =
+            grid.into_par_iter().map(|(a, s)| self.judged(forward, a, s)).collect();
+        let best = maps?.into_iter().min_by(|a, b| a.fit.rmse.total_cmp(&b.fit.rmse));
+        best.ok_or(CalibrateError::NoTrials)
+    }
+
+    /// A map with the statistics of its estimates, run as it will run live.
+    fn judged(
+        &self,
+        forward: &Forward,
+        agility: f64,
+        steady_s: f64,
+    ) -> Result<DiagnosedMap, CalibrateError> {
+        let prepared = self.prepared;
+        let map = self.map(forward, agility, steady_s)?;
+        let calibration = prepared.calibration(Model::Diagnosed(map), Provenance::new("", []))?;
+        let receptor = DiagnosedReceptor::<f64>::new(&calibration)?;
+        let unit = (prepared.target.reference_per_target() * prepared.target_range.span()).abs();
+        let (mut squares, mut sum, mut power, mut count) = (0.0, 0.0, 0.0, 0.0);
+        let mut apart = 0.0;
+        for series in &prepared.series {
+            let mut memory = receptor.memory();
+            for (i, (&v, &target)) in series.signal.iter().zip(&series.target).enumerate() {
+                if let Some(&p) = series.pressure.get(i) {
+                    memory.feel(p);
+                }
+                let Ok(reading) = receptor.step(&mut memory, Volts(v)) else { continue };
+                if i < SETTLE {
+                    continue;
+                }
+                let truth = prepared.target_range.normalise(target);
+                let estimate = prepared.target.from_reference(reading.estimate);
+                let error = truth - prepared.target_range.normalise(estimate);
+                squares += error * error;
+                apart += reading.sd.map_or(0.0, |sd| (error * unit / sd.max(1e-12)).powi(2));
+                sum += truth;
+                power += truth * truth;
+                count += 1.0;
+            }
+        }
+        let total = (power - sum * sum / f64::max(count, 1.0)).max(f64::MIN_POSITIVE);
+        let fit = FitSummary {
+            samples: count as u64,
+            r_squared: 1.0 - squares / total,
+            rmse: (squares / f64::max(count, 1.0)).sqrt(),
+        };
+        let spread = f64::max(apart / f64::max(count, 1.0), 1e-12).sqrt();
+        Ok(DiagnosedMap { fit, spread, ..map })
+    }
+
+    fn map(
+        &self,
+        forward: &Forward,
+        agility: f64,
+        steady_s: f64,
+    ) -> Result<DiagnosedMap, CalibrateError> {
+        let prepared = self.prepared;
+        let sign = prepared.polarity.sign();
+        let curve: Vec<f64> = forward.curve.iter().map(|v| sign * v).collect();
+        let targets = self.pieces.iter().flat_map(|p| p.smooth.iter().copied());
+        let estimate_domain = inner(targets.collect()).unwrap_or(forward.domain);
+        let map = forward.knobs.map();
+        // the fitted curve knows where rest is, noise averaged out
+        let mut still = Defects::<f64>::new(&map, self.period_s).begin(estimate_domain.min, 0.0);
+        let at_rest =
+            Defects::<f64>::new(&map, self.period_s).advance(&mut still, estimate_domain.min, 0.0);
+        let level = Place::new(at_rest, forward.domain).on(&curve);
+        let rest =
+            forward.rest.map(|rest| RestTracker { level, catch_up_s: LIVE_CATCH_UP_S, ..rest });
+        let travelled = forward.travelled;
+        Ok(DiagnosedMap {
+            rest,
+            wound: forward.wound,
+            worn: map.worn.map(|worn| stretch_core::Worn { travelled, ..worn }),
+            curve: Values::new("curve", &curve)?,
+            drive_domain: forward.domain,
+            noise: forward.noise,
+            agility,
+            steady_s,
+            estimate_domain,
+            ..map
+        })
+    }
+}

@@ -1,0 +1,393 @@
+//! What named defects of a gauge make of a target, sample by sample.
+
+use stretch_core::{DiagnosedMap, Fading, Knee, Plays, Real, Worn, lag_weights, play};
+
+/// ln 2, by which a soft knee lies inside at its bound, in widths.
+const LN_2: f64 = core::f64::consts::LN_2;
+
+/// The defects of a [`DiagnosedMap`] in the order in which they act, with their rates folded to one sample.
+///
+/// What is linear in the target within a sample is [poised](Self::poise) once, so that asking for the drive of several targets
+/// costs little more than their plays.
+///
+/// ```
+/// use stretch_receptor::{Defects, example_diagnosed};
+/// use stretch_core::Model;
+/// let calibration = example_diagnosed();
+/// let Model::Diagnosed(map) = &calibration.model else { unreachable!() };
+/// let defects = Defects::<f64>::new(map, 0.01);
+/// let mut memory = defects.begin(0.5, 0.0);
+/// let settled = defects.advance(&mut memory, 0.5, 0.0);
+/// // a gauge that overshoots by a fifth, once the plays of its sleeve are used up
+/// let jumped = defects.advance(&mut memory, 0.7, 0.0);
+/// assert!(jumped - settled > 0.2);
+/// let relaxed = (0..3000).map(|_| defects.advance(&mut memory, 0.7, 0.0)).last().unwrap();
+/// assert!(relaxed < jumped);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Defects<T> {
+    slack_low: Option<Bound<T>>,
+    slack_high: Option<Bound<T>>,
+    slip: Option<Played<T>>,
+    crosstalk: Option<[T; 3]>,
+    hysteresis: Option<Played<T>>,
+    relaxation: Option<Relaxing<T>>,
+    worn: Option<Wearing<T>>,
+    floor: Option<Bound<T>>,
+    ceiling: Option<Bound<T>>,
+    poles: Option<[[T; 3]; 2]>,
+    /// Winding at a target of zero, and by how much it grows with the target.
+    wound: [T; 2],
+}
+
+/// What they remember.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DefectsMemory<T> {
+    slip: [T; 3],
+    hysteresis: [T; 3],
+    lags: [T; 3],
+    lagged: T,
+    travelled: T,
+    reached: T,
+    direction: T,
+    poles: [[T; 2]; 2],
+}
+
+/// The linear parts of one sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Poised<T> {
+    pressed: T,
+    relaxed: T,
+    worn: T,
+    passed: T,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Bound<T> {
+    at: T,
+    /// 4 (w ln 2)^2.
+    round: T,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Played<T> {
+    radii: [T; 3],
+    /// A third of the share.
+    each: T,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Relaxing<T> {
+    /// Weights of a lag before, the input before and the input now, a lag each.
+    weights: [[T; 3]; 3],
+    /// A third of the share.
+    each: T,
+    /// What a sample's own input gets in all.
+    own: T,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Wearing<T> {
+    m: T,
+    n: T,
+    zero: T,
+    reversal: T,
+    travelled: T,
+}
+
+impl<T: Copy> DefectsMemory<T> {
+    /// The way that the gauge has gone, in drive.
+    pub fn travelled(&self) -> T {
+        self.travelled
+    }
+
+    /// The same, as far worked as another.
+    pub(crate) fn as_worked(self, other: &Self) -> Self {
+        Self { travelled: other.travelled, ..self }
+    }
+}
+
+impl<T: Real> Bound<T> {
+    fn new(knee: Knee, sign: f64) -> Self {
+        let inside = 2.0 * knee.width * LN_2;
+        Self { at: T::from_f64(sign * knee.at), round: T::from_f64(inside * inside) }
+    }
+
+    /// From below; a ceiling is asked with both signs turned.
+    #[inline(always)]
+    fn hold(&self, u: T) -> T {
+        let above = u - self.at;
+        let half = T::from_f64(0.5);
+        self.at + half * (above + Real::sqrt(above * above + self.round))
+    }
+}
+
+#[inline(always)]
+fn between<T: Real>(floor: Option<Bound<T>>, ceiling: Option<Bound<T>>, u: T) -> T {
+    let u = floor.map_or(u, |floor| floor.hold(u));
+    ceiling.map_or(u, |ceiling| -ceiling.hold(-u))
+}
+
+impl<T: Real> Played<T> {
+    fn new(plays: Plays) -> Self {
+        Self { radii: plays.radii.map(T::from_f64), each: T::from_f64(plays.share / 3.0) }
+    }
+
+    #[inline(always)]
+    fn of(&self, at: [T; 3], u: T) -> T {
+        let apart = |i: usize| u - play(at[i], u, self.radii[i]);
+        u - self.each * (apart(0) + apart(1) + apart(2))
+    }
+
+    #[inline(always)]
+    fn follow(&self, at: &mut [T; 3], u: T) -> T {
+        for i in 0..3 {
+            at[i] = play(at[i], u, self.radii[i]);
+        }
+        self.of(*at, u)
+    }
+
+    /// As far wound as that at u.
+    fn begin(&self, wound: T, u: T) -> [T; 3] {
+        self.radii.map(|radius| u - wound * radius)
+    }
+}
+
+impl<T: Real> Relaxing<T> {
+    fn new(fading: Fading, period_s: f64) -> Self {
+        let exact = fading.taus_s.map(|tau| lag_weights(period_s, tau));
+        let now: f64 = exact.iter().map(|w| w[2]).sum();
+        Self {
+            weights: exact.map(|w| w.map(T::from_f64)),
+            each: T::from_f64(fading.share / 3.0),
+            own: T::from_f64(1.0 + fading.share * (1.0 - now / 3.0)),
+        }
+    }
+
+    /// What the past takes from the drive: its own linear part is [`Self::own`].
+    #[inline(always)]
+    fn past(&self, lags: &[T; 3], before: T) -> T {
+        let of = |i: usize| self.weights[i][0] * lags[i] + self.weights[i][1] * before;
+        -self.each * (of(0) + of(1) + of(2))
+    }
+
+    #[inline(always)]
+    fn follow(&self, lags: &mut [T; 3], before: &mut T, u: T) {
+        for i in 0..3 {
+            let [a, b, c] = self.weights[i];
+            lags[i] = a * lags[i] + b * *before + c * u;
+        }
+        *before = u;
+    }
+}
+
+impl<T: Real> Wearing<T> {
+    /// What is left of the response.
+    #[inline(always)]
+    fn left(&self, travelled: T) -> T {
+        T::one() - self.m * travelled / (self.n + travelled)
+    }
+
+    /// Turns that are smaller than a reversal do not travel: noise alone would go a long way.
+    #[inline(always)]
+    fn go(&self, memory: &mut DefectsMemory<T>, u: T) {
+        let moved = u - memory.reached;
+        let onward = moved * memory.direction > T::zero();
+        if onward || moved.abs() > self.reversal {
+            memory.travelled = memory.travelled + moved.abs();
+            memory.reached = u;
+            memory.direction = if moved > T::zero() { T::one() } else { -T::one() };
+        }
+    }
+}
+
+impl<T: Real> Defects<T> {
+    /// Of a map that was checked, sampled every `period_s`.
+    pub fn new(map: &DiagnosedMap, period_s: f64) -> Self {
+        let [wound, end] = map.wound;
+        let slope = (end - wound) / (map.estimate_domain.max - map.estimate_domain.min);
+        Self {
+            slack_low: map.slack_low.map(|knee| Bound::new(knee, 1.0)),
+            slack_high: map.slack_high.map(|knee| Bound::new(knee, -1.0)),
+            slip: map.slip.map(Played::new),
+            crosstalk: map.crosstalk.map(|c| {
+                let per = c.c / c.scale;
+                [per * (1.0 + c.bend), -per * c.bend / c.scale, 0.0].map(T::from_f64)
+            }),
+            hysteresis: map.hysteresis.map(Played::new),
+            relaxation: map.relaxation.map(|fading| Relaxing::new(fading, period_s)),
+            worn: map.worn.map(|w: Worn| Wearing {
+                m: T::from_f64(w.m),
+                n: T::from_f64(w.n),
+                zero: T::from_f64(w.zero),
+                reversal: T::from_f64(w.reversal),
+                travelled: T::from_f64(w.travelled),
+            }),
+            floor: map.floor.map(|knee| Bound::new(knee, 1.0)),
+            ceiling: map.ceiling.map(|knee| Bound::new(knee, -1.0)),
+            poles: map
+                .lowpass_s
+                .map(|taus| taus.map(|tau| lag_weights(period_s, tau).map(T::from_f64))),
+            wound: [wound - slope * map.estimate_domain.min, slope].map(T::from_f64),
+        }
+    }
+
+    /// Whether a pressure is needed.
+    pub fn needs_pressure(&self) -> bool {
+        self.crosstalk.is_some()
+    }
+
+    /// The memory of a target that has rested at `y` since it came there.
+    pub fn begin(&self, y: T, pressure: T) -> DefectsMemory<T> {
+        let zero = T::zero();
+        let mut memory = DefectsMemory {
+            slip: [zero; 3],
+            hysteresis: [zero; 3],
+            lags: [zero; 3],
+            lagged: zero,
+            travelled: self.worn.map_or(zero, |w| w.travelled),
+            reached: zero,
+            direction: zero,
+            poles: [[zero; 2]; 2],
+        };
+        let wound = self.wound_at(y);
+        let u = self.taut(y);
+        memory.slip = self.slip.map_or([u; 3], |slip| slip.begin(wound, u));
+        let u = self.slip.map_or(u, |slip| slip.of(memory.slip, u)) + self.pressed(pressure);
+        memory.hysteresis = self.hysteresis.map_or([u; 3], |h| h.begin(wound, u));
+        let u = self.hysteresis.map_or(u, |h| h.of(memory.hysteresis, u));
+        memory.lags = [u; 3];
+        memory.lagged = u;
+        memory.reached = u;
+        let u = self.bounded(self.worn.map_or(u, |w| w.zero + (u - w.zero) * w.left(w.travelled)));
+        memory.poles = [[u; 2]; 2];
+        memory
+    }
+
+    /// The memory of a trial that begins at `y`, of a session that goes on: the target went straight there and rested.
+    pub fn carry(&self, before: &DefectsMemory<T>, y: T, pressure: T) -> DefectsMemory<T> {
+        let mut memory = self.begin(y, pressure);
+        let u = self.taut(y);
+        let mut slipped = u;
+        if let Some(slip) = &self.slip {
+            memory.slip = before.slip;
+            slipped = slip.follow(&mut memory.slip, u);
+        }
+        let mut felt = slipped + self.pressed(pressure);
+        if let Some(hysteresis) = &self.hysteresis {
+            memory.hysteresis = before.hysteresis;
+            felt = hysteresis.follow(&mut memory.hysteresis, felt);
+        }
+        memory.lags = [felt; 3];
+        memory.lagged = felt;
+        if let Some(worn) = &self.worn {
+            (memory.travelled, memory.reached, memory.direction) =
+                (before.travelled, before.reached, before.direction);
+            worn.go(&mut memory, felt);
+            felt = worn.zero + (felt - worn.zero) * worn.left(memory.travelled);
+        }
+        memory.poles = [[self.bounded(felt); 2]; 2];
+        memory
+    }
+
+    /// How plays stand where a stream begins.
+    pub(crate) fn wound_at(&self, y: T) -> T {
+        (self.wound[0] + self.wound[1] * y).max(-T::one()).min(T::one())
+    }
+
+    /// How plays stand at a target: 1 as if it had come up from far below, -1 from far above, their mean; none without plays.
+    pub fn winding(&self, memory: &DefectsMemory<T>, y: T, pressure: T) -> Option<T> {
+        let u = self.taut(y);
+        let slipped = self.slip.map_or(u, |slip| slip.of(memory.slip, u)) + self.pressed(pressure);
+        let share = |plays: &Played<T>, at: [T; 3], u: T| {
+            let sum = at.iter().zip(plays.radii).fold(T::zero(), |sum, (z, radius)| {
+                let share = if radius > T::zero() { (u - *z) / radius } else { T::zero() };
+                sum + share.max(-T::one()).min(T::one())
+            });
+            sum / T::from_f64(3.0)
+        };
+        let both = [
+            self.slip.map(|slip| share(&slip, memory.slip, u)),
+            self.hysteresis.map(|h| share(&h, memory.hysteresis, slipped)),
+        ];
+        let count = both.iter().flatten().count();
+        let sum = both.into_iter().flatten().fold(T::zero(), |a, b| a + b);
+        (count > 0).then(|| sum / T::from_f64(count as f64))
+    }
+
+    #[inline(always)]
+    fn pressed(&self, pressure: T) -> T {
+        self.crosstalk.map_or(T::zero(), |[a, b, _]| pressure * (a + b * pressure))
+    }
+
+    /// What a sleeve that may go slack has of a target.
+    #[inline(always)]
+    fn taut(&self, y: T) -> T {
+        between(self.slack_low, self.slack_high, y)
+    }
+
+    #[inline(always)]
+    fn bounded(&self, u: T) -> T {
+        between(self.floor, self.ceiling, u)
+    }
+
+    /// The linear parts of the next sample.
+    #[inline(always)]
+    pub(crate) fn poise(&self, memory: &DefectsMemory<T>, pressure: T) -> Poised<T> {
+        let passed = self.poles.map_or(T::zero(), |[first, second]| {
+            let z = first[0] * memory.poles[0][0] + first[1] * memory.poles[0][1];
+            second[0] * memory.poles[1][0] + second[1] * memory.poles[1][1] + second[2] * z
+        });
+        Poised {
+            pressed: self.pressed(pressure),
+            relaxed: self.relaxation.map_or(T::zero(), |r| r.past(&memory.lags, memory.lagged)),
+            worn: self.worn.map_or(T::one(), |w| w.left(memory.travelled)),
+            passed,
+        }
+    }
+
+    /// The drive of a target in the next sample.
+    #[inline(always)]
+    pub(crate) fn drive(&self, memory: &DefectsMemory<T>, poised: &Poised<T>, y: T) -> T {
+        let u = self.taut(y);
+        let u = self.slip.map_or(u, |slip| slip.of(memory.slip, u)) + poised.pressed;
+        let u = self.hysteresis.map_or(u, |h| h.of(memory.hysteresis, u));
+        let u = self.relaxation.map_or(u, |r| r.own * u + poised.relaxed);
+        let u = self.worn.map_or(u, |w| w.zero + (u - w.zero) * poised.worn);
+        let u = self.bounded(u);
+        self.poles.map_or(u, |[first, second]| second[2] * (first[2] * u) + poised.passed)
+    }
+
+    /// Moves on by a sample at a target; its drive.
+    #[inline(always)]
+    pub fn advance(&self, memory: &mut DefectsMemory<T>, y: T, pressure: T) -> T {
+        let poised = self.poise(memory, pressure);
+        let mut u = self.taut(y);
+        if let Some(slip) = &self.slip {
+            u = slip.follow(&mut memory.slip, u);
+        }
+        u = u + poised.pressed;
+        if let Some(hysteresis) = &self.hysteresis {
+            u = hysteresis.follow(&mut memory.hysteresis, u);
+        }
+        if let Some(relaxation) = &self.relaxation {
+            let felt = u;
+            u = relaxation.own * u + poised.relaxed;
+            relaxation.follow(&mut memory.lags, &mut memory.lagged, felt);
+        }
+        if let Some(worn) = &self.worn {
+            let felt = u;
+            u = worn.zero + (u - worn.zero) * poised.worn;
+            worn.go(memory, felt);
+        }
+        u = self.bounded(u);
+        if let Some([first, second]) = &self.poles {
+            let z = first[0] * memory.poles[0][0] + first[1] * memory.poles[0][1] + first[2] * u;
+            let out =
+                second[0] * memory.poles[1][0] + second[1] * memory.poles[1][1] + second[2] * z;
+            memory.poles = [[z, u], [out, z]];
+            u = out;
+        }
+        u
+    }
+}

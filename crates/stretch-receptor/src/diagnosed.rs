@@ -1,0 +1,396 @@
+//! The live form of a gauge with named defects: asks which motion explains the signal.
+
+use stretch_core::{
+    Baseline, Branch, Calibration, Design, DesignError, DiagnosedMap, Model, Real, RestLevel,
+    Volts, lag, lag_share,
+};
+
+use crate::{
+    Domain, Front, Reading, ReceptorMemory,
+    curve::Curve,
+    defects::{Defects, DefectsMemory},
+    fold::{output, reference_dead_band},
+    front::{Live, usable},
+};
+
+/// A secant is taken over at least this share of the way between knots.
+const LEAST_RUN: f64 = 0.01;
+/// A drive is taken to answer a target by at least this share: what answers less cannot be asked.
+const LEAST_ANSWER: f64 = 0.05;
+/// Share of a sample in what the signal shows, and the share of the noise's variance that is left of it: s/(2 - s).
+const SMOOTH: f64 = 0.33;
+const SHOWN: f64 = 0.2;
+/// Standard deviations of it by which a sleeve must have come back before it is taken to have turned.
+const SURE: f64 = 6.0;
+/// Greatest standard deviation of a target, in those of what one signal tells over the whole curve.
+const WIDEST: f64 = 2.0;
+/// Beyond the targets that were fitted by this share of them the estimate does not go.
+const BEYOND: f64 = 0.02;
+
+/// A receptor for [`Model::Diagnosed`].
+///
+/// A sample:
+/// 1. target and rate go on as they were, the rate forgetting itself in `steady_s`; their covariance grows;
+/// 2. the drive that the defects make of that target is compared with the one that the signal suggests; a second target is tried
+///    where it would have to lie;
+/// 3. the secant between the two is the slope that a Kalman step takes;
+/// 4. the defects follow the target that was found. A sleeve that slips is asked for where it stands itself: the muscle is ahead of it in
+///    the direction in which it last moved for certain.
+///
+/// So what a play, a clipped end or a delay hides is told by the motion, and [`Reading::sd`] says how surely. A skew is predicted
+/// over: the estimate is of now. It answers from the first sample on. Where the map has a crosstalk, tell it the pressure
+/// with [`ReceptorMemory::feel`] before a sample.
+///
+/// ```
+/// use stretch_core::{Design, Stage, Volts};
+/// use stretch_receptor::{DiagnosedReceptor, example_diagnosed};
+/// let receptor = DiagnosedReceptor::<f32>::new(&example_diagnosed())?;
+/// let mut memory = receptor.memory();
+/// let readings = (0..200).map(|n| receptor.step(&mut memory, Volts(1.3 + 0.004 * n as f32)).unwrap());
+/// let last = readings.last().unwrap();
+/// assert!(last.length().0 < 165.0 && last.sd.unwrap() < 2.0);
+/// # Ok::<(), stretch_core::DesignError>(())
+/// ```
+pub type DiagnosedReceptor<T> = Front<Diagnosed<T>>;
+
+/// The model of a [`DiagnosedReceptor`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Diagnosed<T> {
+    sign: T,
+    rest: RestLevel<T>,
+    defects: Defects<T>,
+    curve: Curve<T>,
+    period_s: T,
+    /// What a rate keeps of itself in a sample, and what it wanders, squared.
+    kept: T,
+    wander: T,
+    /// Variance of the signal around the model.
+    noise: T,
+    /// Greatest variance of a target.
+    widest: T,
+    low: T,
+    high: T,
+    /// Seconds that the estimate is ahead of the signal, as far as a rate reaches.
+    ahead_s: T,
+    spread: T,
+    /// Half-width of the sleeve's slip.
+    slip: T,
+    /// By how much a sleeve must have come back, in signal.
+    sure: T,
+    /// Variance of a target that may be anywhere in it, and the share of it that a sample adds.
+    hideout: T,
+    hiding: T,
+    gain: T,
+    zero: T,
+    dead_band: T,
+    at_rest: T,
+}
+
+/// What a [`DiagnosedReceptor`]'s model remembers: target and rate with their covariance, the defects, the baseline, the pressure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DiagnosedMemory<T> {
+    /// NaN before the first sample.
+    target: T,
+    rate: T,
+    /// Variance of the target, covariance, variance of the rate.
+    covariance: [T; 3],
+    defects: DefectsMemory<T>,
+    baseline: Baseline<T>,
+    pressure: T,
+    /// Variance of the target that a play hides.
+    hidden: T,
+    /// By how much the muscle is ahead of its sleeve.
+    slipped: T,
+    /// How far the sleeve has come in the direction in which it last moved, in signal.
+    reached: T,
+    /// What the signal of the sleeve would be without memory, a little smoothed: a filter that carries a rate overshoots where it stops.
+    shown: T,
+}
+
+impl<T: Real> DiagnosedReceptor<T> {
+    /// A receptor for `calibration`.
+    ///
+    /// # Errors
+    /// [`DesignError`] when the calibration is of another model.
+    pub fn new(calibration: &Calibration) -> Result<Self, DesignError> {
+        let Model::Diagnosed(map) = &calibration.model else {
+            return Err(calibration.model.instead_of("diagnosed"));
+        };
+        map.validate()?;
+        Diagnosed::new(map, calibration).map(|model| Self { model })
+    }
+}
+
+impl<T: Real> ReceptorMemory<DiagnosedMemory<T>> {
+    /// The pressure of the samples to come, in the unit of the map's crosstalk.
+    pub fn feel(&mut self, pressure: T) {
+        self.model.feel(pressure);
+    }
+}
+
+impl<T: Real> DiagnosedMemory<T> {
+    pub(crate) fn feel(&mut self, pressure: T) {
+        if let Some(pressure) = usable(pressure) {
+            self.pressure = pressure;
+        }
+    }
+}
+
+impl<T: Real> Diagnosed<T> {
+    fn new(map: &DiagnosedMap, calibration: &Calibration) -> Result<Self, DesignError> {
+        let (polarity, sample_rate) = (calibration.polarity, calibration.sample_rate_hz);
+        let (sign, period_s) = (polarity.sign(), sample_rate.period_s());
+        let (gain, zero) = output(calibration);
+        let knots = map.curve.len();
+        // a curve against the polarity would be inverted the wrong way round
+        let rises = sign * (map.curve[knots - 1] - map.curve[0]);
+        DesignError::check("rise of diagnosed.curve", rises, rises > 0.0)?;
+        let widest = WIDEST * map.noise * (map.drive_domain.max - map.drive_domain.min) / rises;
+        let values = map.curve.iter().map(|v| sign * v);
+        let (skew, steady) = (map.skew_s, map.steady_s);
+        // what is left of a rate's way after so long; into the past it is not known to have been another
+        let ahead = if skew > 0.0 { -steady * libm::expm1(-skew / steady) } else { skew };
+        let edge = BEYOND * (map.estimate_domain.max - map.estimate_domain.min);
+        // the filter asks for the sleeve; where in it the muscle is its turns tell
+        let slip = map.slip.map_or(0.0, |p| p.radii.iter().sum::<f64>() / 3.0);
+        let defects = Defects::new(&DiagnosedMap { slip: None, ..*map }, period_s);
+        let model = Self {
+            sign: T::from_f64(sign),
+            rest: RestLevel::new(map.rest, polarity, calibration.signal_range, sample_rate),
+            defects,
+            curve: Curve::new(values, map.drive_domain),
+            period_s: T::from_f64(period_s),
+            kept: T::from_f64(libm::exp(-period_s / steady)),
+            wander: T::from_f64(map.agility * period_s),
+            noise: T::from_f64(map.noise * map.noise),
+            widest: T::from_f64(widest * widest),
+            low: T::from_f64(map.estimate_domain.min - edge),
+            high: T::from_f64(map.estimate_domain.max + edge),
+            ahead_s: T::from_f64(ahead),
+            spread: T::from_f64(map.spread * gain.abs()),
+            slip: T::from_f64(slip),
+            sure: T::from_f64(SURE * libm::sqrt(SHOWN) * map.noise),
+            hideout: T::from_f64(slip * slip / 3.0),
+            hiding: T::from_f64(lag_share(period_s, steady)),
+            gain: T::from_f64(gain),
+            zero: T::from_f64(zero),
+            dead_band: T::from_f64((reference_dead_band(calibration) / gain).abs()),
+            at_rest: T::zero(),
+        };
+        let mut still = model.defects.begin(model.low, T::zero());
+        let at_rest = model.curve.forward(model.defects.advance(&mut still, model.low, T::zero()));
+        Ok(Self { at_rest: at_rest.0, ..model })
+    }
+
+    /// The target that would rest at a signal, and what its defects remember.
+    fn begin(&self, memory: &mut DiagnosedMemory<T>, signal: T) {
+        let (to, _) = self.curve.inverse(signal);
+        let mut target = to.max(self.low).min(self.high);
+        // plays that are wound stand off by a constant; a second look takes what bends
+        for _ in 0..3 {
+            let defects = self.defects.begin(target, memory.pressure);
+            let poised = self.defects.poise(&defects, memory.pressure);
+            let off = to - self.defects.drive(&defects, &poised, target);
+            target = (target + off).max(self.low).min(self.high);
+        }
+        memory.target = target;
+        memory.rate = T::zero();
+        memory.slipped = self.slip * self.defects.wound_at(target);
+        (memory.shown, _) = self.curve.forward(target);
+        memory.reached = memory.shown;
+        let travelled = memory.defects;
+        memory.defects = self.defects.begin(target, memory.pressure).as_worked(&travelled);
+        let span = self.high - self.low;
+        let tenth = T::from_f64(0.1) * span;
+        memory.covariance = [tenth * tenth, T::zero(), span * span];
+    }
+
+    /// Moves target, rate and covariance on by a sample.
+    #[inline(always)]
+    fn predict(&self, memory: &mut DiagnosedMemory<T>) {
+        let (dt, kept) = (self.period_s, self.kept);
+        memory.target = memory.target + dt * memory.rate;
+        memory.rate = kept * memory.rate;
+        let [yy, yr, rr] = memory.covariance;
+        let across = yr + dt * rr;
+        let grown = yy + dt * (yr + across);
+        // where the signal hardly answers, a variance without end would throw the target from end to end of the flat
+        let share = if grown > self.widest { self.widest / grown } else { T::one() };
+        memory.covariance =
+            [share * grown, share * (kept * across), kept * kept * rr + self.wander];
+        self.hold(memory);
+    }
+
+    /// Keeps target and rate where they can be.
+    #[inline(always)]
+    fn hold(&self, memory: &mut DiagnosedMemory<T>) {
+        if memory.target < self.low {
+            memory.target = self.low;
+            memory.rate = memory.rate.max(T::zero());
+        }
+        if memory.target > self.high {
+            memory.target = self.high;
+            memory.rate = memory.rate.min(T::zero());
+        }
+    }
+
+    /// By how much memory moves the signal of a target at rest now.
+    #[inline(always)]
+    fn rest_shift(&self, memory: &DiagnosedMemory<T>) -> T {
+        if memory.target.is_nan() {
+            return T::zero();
+        }
+        let poised = self.defects.poise(&memory.defects, memory.pressure);
+        let drive = self.defects.drive(&memory.defects, &poised, self.low);
+        self.curve.forward(drive).0 - self.at_rest
+    }
+
+    /// Takes in a signed signal above its baseline; whether it lay on the curve.
+    #[inline(always)]
+    fn correct(&self, memory: &mut DiagnosedMemory<T>, signal: T) -> bool {
+        let poised = self.defects.poise(&memory.defects, memory.pressure);
+        let here = memory.target;
+        let drive = self.defects.drive(&memory.defects, &poised, here);
+        let (predicted, tangent) = self.curve.forward(drive);
+        // a spike counts as a signal one whole curve away, no more
+        let (first, last) = self.curve.ends();
+        let span = last - first;
+        let felt = signal.max(first - span).min(last + span);
+        let (to, on_curve) = self.curve.inverse(felt);
+        let (run, surprise) = (to - drive, felt - predicted);
+        let least = T::from_f64(LEAST_RUN) * self.curve.step;
+        let far = run.abs() > least;
+        let toward = if run < T::zero() { -T::one() } else { T::one() };
+
+        // the slope of the drive, as a secant to where the target would have to be
+        let probe = if far { run } else { toward * least };
+        let moved = self.defects.drive(&memory.defects, &poised, here + probe) - drive;
+        let answer = (moved / probe).max(T::from_f64(LEAST_ANSWER));
+        // and of the curve, so that a flat end of it cannot throw the estimate
+        let secant = if far { surprise / run } else { tangent };
+        let slope = answer * tangent.max(secant);
+        let [yy, yr, rr] = memory.covariance;
+        let (by_y, by_r) = (slope * yy, slope * yr);
+        let share = (slope * by_y + self.noise).recip();
+        let (gain_y, gain_r) = (by_y * share, by_r * share);
+        memory.target = here + gain_y * surprise;
+        memory.rate = memory.rate + gain_r * surprise;
+        memory.covariance = [yy - gain_y * by_y, yr - gain_y * by_r, rr - gain_r * by_r];
+        self.hold(memory);
+        if self.slip > T::zero() {
+            // the signal of a gauge that remembers nothing
+            let (bare, _) = self.curve.forward(here);
+            let shown = bare + surprise;
+            memory.shown = lag(memory.shown, shown, T::from_f64(SMOOTH));
+            self.turn(memory);
+        }
+        self.follow(memory);
+        on_curve
+    }
+
+    /// Where the muscle is in its sleeve: ahead of it in the direction in which it last moved. While the sleeve stands, the muscle
+    /// may have gone anywhere inside.
+    #[inline(always)]
+    fn turn(&self, memory: &mut DiagnosedMemory<T>) {
+        let toward = if memory.slipped < T::zero() { -T::one() } else { T::one() };
+        let back = toward * (memory.reached - memory.shown);
+        if back <= T::zero() {
+            memory.reached = memory.shown;
+            memory.slipped = toward * self.slip;
+            memory.hidden = T::zero();
+        } else if back > self.sure {
+            memory.reached = memory.shown;
+            memory.slipped = -toward * self.slip;
+            memory.hidden = T::zero();
+        } else {
+            memory.reached = lag(memory.reached, memory.shown, self.hiding);
+            memory.hidden = lag(memory.hidden, self.hideout, self.hiding);
+        }
+    }
+
+    /// The defects follow the target.
+    #[inline(always)]
+    fn follow(&self, memory: &mut DiagnosedMemory<T>) {
+        let (target, pressure) = (memory.target, memory.pressure);
+        self.defects.advance(&mut memory.defects, target, pressure);
+    }
+}
+
+impl<T: Real> Design for Diagnosed<T> {
+    type Memory = DiagnosedMemory<T>;
+
+    fn memory(&self) -> DiagnosedMemory<T> {
+        let zero = T::zero();
+        DiagnosedMemory {
+            target: T::nan(),
+            rate: zero,
+            covariance: [zero; 3],
+            defects: self.defects.begin(self.low, zero),
+            baseline: self.rest.memory(),
+            pressure: zero,
+            hidden: zero,
+            slipped: zero,
+            reached: zero,
+            shown: zero,
+        }
+    }
+}
+
+impl<T: Real> Live for Diagnosed<T> {
+    type Sample = Volts<T>;
+    type Signal = T;
+    type Side = Branch;
+    type Reading = Reading<T>;
+
+    #[inline(always)]
+    fn signal(&self, sample: Volts<T>) -> Option<T> {
+        usable(sample.0)
+    }
+
+    #[inline(always)]
+    fn read(
+        &self,
+        memory: &mut DiagnosedMemory<T>,
+        branch: &mut Branch,
+        signal: T,
+    ) -> Option<Reading<T>> {
+        let shift = if self.rest.follows() { self.rest_shift(memory) } else { T::zero() };
+        let signal = self.rest.step(&mut memory.baseline, self.sign * signal, shift);
+        if memory.target.is_nan() {
+            self.begin(memory, signal);
+        } else {
+            self.predict(memory);
+        }
+        let on_curve = self.correct(memory, signal);
+        let (rate, ahead) = (memory.rate, self.ahead_s);
+        *branch = branch.next(rate, self.dead_band);
+        let target = (memory.target + memory.slipped + ahead * rate).max(self.low).min(self.high);
+        let [yy, yr, rr] = memory.covariance;
+        let variance = memory.hidden + yy + ahead * (yr + yr + ahead * rr);
+        Some(Reading {
+            estimate: self.zero + self.gain * target,
+            rate: self.gain * rate,
+            branch: *branch,
+            domain: Domain::from_flags(!on_curve, false),
+            sd: Some(self.spread * Real::sqrt(variance.max(T::zero()))),
+        })
+    }
+
+    /// By the motion that it predicts.
+    fn bridge(&self, memory: &mut DiagnosedMemory<T>, _: u8) -> bool {
+        let begun = !memory.target.is_nan();
+        if begun {
+            self.predict(memory);
+            self.follow(memory);
+        }
+        begun
+    }
+
+    /// All but baseline, pressure, and how far the gauge was worked.
+    fn forget(&self, memory: &mut DiagnosedMemory<T>) {
+        let (baseline, pressure) = (memory.baseline, memory.pressure);
+        let fresh = self.memory();
+        let defects = fresh.defects.as_worked(&memory.defects);
+        *memory = DiagnosedMemory { baseline, pressure, defects, ..fresh };
+    }
+}

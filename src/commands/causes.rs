@@ -1,0 +1,86 @@
+//! What a calibration builds on: a diagnosis that was written before, or one of the trials themselves.
+
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use stretch_bench::{GaugeSetup, GaugeSimulator, causes};
+use stretch_calibrate::{Cause, Options};
+use stretch_data::{SessionTrial, Trial};
+use stretch_gap::{Diagnosis, Options as Diagnosing, diagnose};
+use stretch_sim::Catalogue;
+
+use super::diagnose::spinner;
+
+/// The newest diagnosis that is read.
+const SCHEMA: u32 = 1;
+
+/// Effects of the gauge, and what there is to say of how they were found.
+#[derive(Debug, Default)]
+pub(super) struct Causes {
+    pub(super) found: Vec<Cause>,
+    pub(super) notes: Vec<String>,
+}
+
+impl Causes {
+    /// Of a diagnosis that was written.
+    pub(super) fn read(path: &Path) -> anyhow::Result<Self> {
+        let name = || path.display().to_string();
+        let text = std::fs::read_to_string(path).with_context(name)?;
+        let schema: Schema = serde_json::from_str(&text).with_context(|| {
+            format!("{}: this is no diagnosis; make one with stretch diagnose --json", name())
+        })?;
+        if schema.schema > SCHEMA {
+            bail!(
+                "{}: a diagnosis of schema {}, newer than this release reads ({SCHEMA}); use the release that wrote it",
+                name(),
+                schema.schema
+            );
+        }
+        let diagnosis: Diagnosis = serde_json::from_str(&text).with_context(name)?;
+        let found = causes(&diagnosis);
+        if found.is_empty() {
+            bail!(
+                "{}: no effect of the gauge or its reference is in this diagnosis, which says: {} Calibrate with --model observer or auto without --from",
+                name(),
+                diagnosis.sentence
+            );
+        }
+        let notes = vec![format!("built on {}: {}", name(), diagnosis.sentence)];
+        Ok(Self { found, notes })
+    }
+
+    /// Of the trials, as a gauge alone; nothing where they cannot be diagnosed, which is said.
+    pub(super) fn of(trials: &[Trial], options: &Options) -> anyhow::Result<Self> {
+        let bar = spinner();
+        bar.set_message("diagnosing the gauge");
+        let session: Vec<SessionTrial> = trials.iter().cloned().map(SessionTrial::new).collect();
+        let catalogue = Catalogue::default();
+        let gauge = GaugeSimulator::new(&GaugeSetup {
+            trials: &session,
+            reference: &options.reference,
+            signal: &options.signal,
+            rig: None,
+            catalogue: &catalogue,
+        });
+        let told = |text: &str| bar.set_message(text.to_owned());
+        let done = gauge.map_err(anyhow::Error::from).and_then(|gauge| {
+            Ok(diagnose(&gauge, &Diagnosing::default(), &told, &stretch_data::interrupted)?.0)
+        });
+        bar.finish_and_clear();
+        Ok(match done {
+            Ok(diagnosis) => {
+                let notes = vec![format!("the gauge alone: {}", diagnosis.sentence)];
+                Self { found: causes(&diagnosis), notes }
+            }
+            Err(error) => {
+                let notes = vec![format!("the trials could not be diagnosed: {error:#}")];
+                Self { found: Vec::new(), notes }
+            }
+        })
+    }
+}
+
+#[derive(serde::Deserialize)]
+struct Schema {
+    schema: u32,
+}

@@ -19,9 +19,10 @@ pub enum Fixed {}
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Scaled<S> {
-    pub(super) of: S,
+    /// The line or surface.
+    pub of: S,
     /// `2^(32 - bits)`: what the upper word of a product with it makes thousandths.
-    pub(super) thousandths: i32,
+    pub thousandths: i32,
 }
 
 impl<S> Scaled<S> {

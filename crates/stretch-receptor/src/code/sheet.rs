@@ -12,6 +12,7 @@ pub(super) const COARSE_BITS: u32 = 15;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Span {
+    /// The lower end.
     pub min: i32,
     /// From the lower end to the upper one.
     pub width: u32,
@@ -60,8 +61,11 @@ impl Span {
 pub struct Sheet<S> {
     /// The code, aligned to 16 bits, that the surface is expanded about.
     pub centre: u16,
+    /// Where the signal is clamped to: `2^15` of a 16-bit sample, from the centre.
     pub signal: Span,
+    /// Where the integer rate is clamped to.
     pub rate: Span,
+    /// Over signal and rate, spread.
     pub surface: S,
 }
 
@@ -103,6 +107,7 @@ fn domain(outside: u8) -> Domain {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Sheets<L, P> {
+    /// One line for both branches.
     Line(Sheet<L>),
     /// Inflation, deflation.
     Poly13([Sheet<P>; 2]),

@@ -107,13 +107,8 @@ impl IntegerObserver {
         {
             recip_bits += 1;
         }
-        let mut out = Self {
-            numbers: n,
-            recips: [0; KNOTS],
-            recip_bits,
-            tangents: [0; KNOTS],
-            at_rest: 0,
-        };
+        let mut out =
+            Self { numbers: n, recips: [0; KNOTS], recip_bits, tangents: [0; KNOTS], at_rest: 0 };
         for k in 0..knots - 1 {
             let whole = 1i64 << (PLACE_BITS + recip_bits);
             out.recips[k] = saturate(whole / i64::from(rise(k)));
@@ -189,7 +184,9 @@ impl IntegerObserver {
         if run > LEAST_RUN {
             // steeper than an end: change/run >= end, without a division
             let change = i64::from(change) << PLACE_BITS;
-            while place < SLOPES - 1 && change >= i64::from(self.numbers.ends[place]) * i64::from(run) {
+            while place < SLOPES - 1
+                && change >= i64::from(self.numbers.ends[place]) * i64::from(run)
+            {
                 place += 1;
             }
         }
@@ -198,7 +195,8 @@ impl IntegerObserver {
         let surprise = i64::from(signal.max(first - span).min(last + span) - predicted);
         let gains = &self.numbers.gains[place.min(SLOPES - 1)];
         let half = (1i64 << self.numbers.gain_bits) >> 1;
-        let pull = |k: usize| saturate((i64::from(gains[k]) * surprise + half) >> self.numbers.gain_bits);
+        let pull =
+            |k: usize| saturate((i64::from(gains[k]) * surprise + half) >> self.numbers.gain_bits);
         memory.target = memory.target.saturating_add(pull(0));
         memory.rate = memory.rate.saturating_add(pull(1)).clamp(-FASTEST, FASTEST);
         for i in 0..usize::from(self.numbers.relaxations).min(MAX_OBSERVER_RELAXATIONS) {
@@ -248,8 +246,8 @@ impl IntegerObserver {
 
     fn begin(&self, memory: &mut IntegerMemory, signal: i32) {
         let (place, _) = self.inverse(signal);
-        let drive =
-            ((i64::from(place) << 32) / i64::from(self.numbers.per_step)) + i64::from(self.numbers.drive_low);
+        let drive = ((i64::from(place) << 32) / i64::from(self.numbers.per_step))
+            + i64::from(self.numbers.drive_low);
         let target = saturate(drive).max(self.numbers.low).min(self.numbers.high);
         memory.target = target;
         memory.rate = 0;

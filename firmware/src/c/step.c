@@ -1,0 +1,26 @@
+/* The functions of a header under names of their own, so that several fit into a program. */
+#include "stretch.h"
+
+#define JOINED(model, name) c_##model##_##name
+#define NAMED(model, name) JOINED(model, name)
+
+extern const uint32_t NAMED(MODEL, bytes);
+const uint32_t NAMED(MODEL, bytes) = sizeof(stretch_state);
+
+void NAMED(MODEL, init)(stretch_state *state);
+void NAMED(MODEL, init)(stretch_state *state)
+{
+    stretch_init(state);
+}
+
+stretch_reading NAMED(MODEL, step)(stretch_state *state, SAMPLE sample);
+stretch_reading NAMED(MODEL, step)(stretch_state *state, SAMPLE sample)
+{
+    return stretch_step(state, sample);
+}
+
+int NAMED(MODEL, self_test)(void);
+int NAMED(MODEL, self_test)(void)
+{
+    return stretch_self_test();
+}

@@ -46,7 +46,7 @@ pub fn length_only(answer: Result<Reading<f32>, Withheld>) -> Answer<f32> {
 /// between two readings of the counter but those: passing the arguments, the
 /// call, the step, the return.
 #[inline(never)]
-pub fn replay<D, M, I, R, E: Length>(
+pub fn replay<D, M: ?Sized, I, R, E: Length>(
     model: &str,
     design: &D,
     memory: &mut M,
@@ -80,7 +80,7 @@ pub fn replay<D, M, I, R, E: Length>(
         tenths / 10,
         tenths % 10,
         text_bytes(),
-        size_of::<M>(),
+        size_of_val(memory),
         checksum.0,
     );
     if let Some(length) = length {

@@ -3,7 +3,6 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use semihosting::println;
 use stretch_core::Branch;
 use stretch_firmware::{
     measure::{Answer, Length, replay},
@@ -30,12 +29,8 @@ struct Float {
     domain: u8,
 }
 
-/// Room for any `stretch_state`.
+/// Room for any `stretch_state`, in words, so that it is aligned.
 const WORDS: usize = 64;
-
-/// The state of one channel: words, so that it is aligned. `replay` prints its size as that of
-/// the type, which is why each model says its own.
-struct State([u32; WORDS]);
 
 fn answer<E: Length>(estimate: E, status: u8, branch: u8, domain: u8) -> Answer<E> {
     match status {
@@ -65,7 +60,7 @@ macro_rules! model {
                 #[link_name = concat!("c_", stringify!($symbol), "_init")]
                 pub fn init(state: *mut u32);
                 #[link_name = concat!("c_", stringify!($symbol), "_step")]
-                pub fn step(state: *mut u32, sample: $sample) -> $reading;
+                pub static STEP: unsafe extern "C" fn(*mut u32, $sample) -> $reading;
                 #[link_name = concat!("c_", stringify!($symbol), "_self_test")]
                 pub fn self_test() -> i32;
             }
@@ -76,19 +71,21 @@ macro_rules! model {
         // SAFETY: it uses a state of its own.
         let wrong = unsafe { linked::self_test() };
         assert!(wrong == 0, "{}: the self-test fails at sample {wrong}", $name);
-        let mut state = State([0; WORDS]);
+        // SAFETY: a constant of the C program.
+        let step = unsafe { linked::STEP };
+        let mut room = [0; WORDS];
+        let state: &mut [u32] = &mut room[..bytes.div_ceil(4)];
         // SAFETY: the state is aligned and large enough.
-        unsafe { linked::init(state.0.as_mut_ptr()) };
+        unsafe { linked::init(state.as_mut_ptr()) };
         replay(
             $name,
             &(),
-            &mut state,
+            state,
             $input,
             // SAFETY: as above, and it was initialised.
-            |_, state, sample| unsafe { linked::step(state.0.as_mut_ptr(), sample) },
+            |_, state, sample| unsafe { step(state.as_mut_ptr(), sample) },
             |r: $reading| answer(r.estimate, r.status, r.branch, r.domain),
         );
-        println!("state={} bytes={bytes}", $name);
     }};
 }
 

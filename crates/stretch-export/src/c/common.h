@@ -15,9 +15,12 @@
 /* Missing samples in a row that are bridged; one more forgets the stream. */
 #define STRETCH_MAX_BRIDGED 3
 
+/* What a sample always needs belongs into the step, what it seldom needs apart from it. */
 #if defined(__GNUC__)
+#define STRETCH_INLINE static inline __attribute__((always_inline))
 #define STRETCH_APART __attribute__((noinline, unused))
 #else
+#define STRETCH_INLINE static inline
 #define STRETCH_APART
 #endif
 

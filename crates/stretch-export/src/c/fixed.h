@@ -11,7 +11,7 @@ typedef struct stretch_reading {
     uint8_t domain;
 } stretch_reading;
 
-static inline stretch_reading stretch_answer(uint8_t status, uint8_t branch, uint8_t domain,
+STRETCH_INLINE stretch_reading stretch_answer(uint8_t status, uint8_t branch, uint8_t domain,
                                              int32_t estimate)
 {
     stretch_reading reading;
@@ -23,7 +23,7 @@ static inline stretch_reading stretch_answer(uint8_t status, uint8_t branch, uin
 }
 
 /* a b, in 64 bits */
-static inline int64_t stretch_product(int32_t a, int32_t b)
+STRETCH_INLINE int64_t stretch_product(int32_t a, int32_t b)
 {
     return (int64_t)a * (int64_t)b;
 }

@@ -28,7 +28,7 @@ typedef struct stretch_reading {
     uint8_t domain;
 } stretch_reading;
 
-static inline stretch_reading stretch_answer(uint8_t status, uint8_t branch, uint8_t domain,
+STRETCH_INLINE stretch_reading stretch_answer(uint8_t status, uint8_t branch, uint8_t domain,
                                              float estimate, float rate)
 {
     stretch_reading reading;
@@ -41,7 +41,7 @@ static inline stretch_reading stretch_answer(uint8_t status, uint8_t branch, uin
 }
 
 /* false for what is not a number as well */
-static inline int stretch_usable(float x)
+STRETCH_INLINE int stretch_usable(float x)
 {
     return x >= -STRETCH_LARGEST && x <= STRETCH_LARGEST;
 }

@@ -37,7 +37,7 @@ static inline void stretch_init(stretch_state *s)
     s->missing = STRETCH_MAX_BRIDGED;
 }
 
-static inline int32_t stretch_saturate(int64_t x)
+STRETCH_INLINE int32_t stretch_saturate(int64_t x)
 {
     if (x > INT32_MAX) {
         return INT32_MAX;
@@ -46,7 +46,7 @@ static inline int32_t stretch_saturate(int64_t x)
 }
 
 /* x held to low .. high */
-static inline int32_t stretch_held(int32_t x, int32_t low, int32_t high)
+STRETCH_INLINE int32_t stretch_held(int32_t x, int32_t low, int32_t high)
 {
     if (x < low) {
         x = low;
@@ -55,19 +55,19 @@ static inline int32_t stretch_held(int32_t x, int32_t low, int32_t high)
 }
 
 /* A share of a number, rounded to the nearest. */
-static inline int32_t stretch_part(int32_t x, int32_t share)
+STRETCH_INLINE int32_t stretch_part(int32_t x, int32_t share)
 {
     return (int32_t)((stretch_product(x, share) + ((int64_t)1 << 30)) >> 31);
 }
 
 /* Backlash: stays within radius of x. */
-static inline int32_t stretch_play(int32_t before, int32_t x, int32_t radius)
+STRETCH_INLINE int32_t stretch_play(int32_t before, int32_t x, int32_t radius)
 {
     return stretch_held(before, x - radius, x + radius);
 }
 
 /* The place, in knots, that a signal suggests by itself; *held: the signal held to the curve. */
-static inline int32_t stretch_inverse(int32_t signal, int32_t *held)
+STRETCH_INLINE int32_t stretch_inverse(int32_t signal, int32_t *held)
 {
     int below = 0, above = STRETCH_KNOTS - 1;
     *held = stretch_held(signal, stretch_curve[0], stretch_curve[STRETCH_KNOTS - 1]);
@@ -85,7 +85,7 @@ static inline int32_t stretch_inverse(int32_t signal, int32_t *held)
 }
 
 /* The signal at a drive; *segment it lies in; *place held to the curve. */
-static inline int32_t stretch_forward(int32_t drive, int32_t *segment, int32_t *place)
+STRETCH_INLINE int32_t stretch_forward(int32_t drive, int32_t *segment, int32_t *place)
 {
     const int32_t from_low = stretch_saturate((int64_t)drive - STRETCH_DRIVE_LOW);
     int32_t at = stretch_saturate(stretch_product(from_low, STRETCH_PER_STEP) >> 32);
@@ -104,7 +104,7 @@ static inline int32_t stretch_forward(int32_t drive, int32_t *segment, int32_t *
 }
 
 /* The drive of a target that stands at y and moves by rate a sample. */
-static inline int32_t stretch_drive(const stretch_state *s, int32_t y, int32_t rate)
+STRETCH_INLINE int32_t stretch_drive(const stretch_state *s, int32_t y, int32_t rate)
 {
     const int64_t most = (int64_t)1 << 30;
     int64_t sum = stretch_product(STRETCH_LEAD, rate);
@@ -124,7 +124,7 @@ static inline int32_t stretch_drive(const stretch_state *s, int32_t y, int32_t r
 }
 
 /* Moves the states on by a sample. */
-static inline void stretch_predict(stretch_state *s)
+STRETCH_INLINE void stretch_predict(stretch_state *s)
 {
     int i;
     s->target = stretch_held(s->target + s->rate, STRETCH_LOW, STRETCH_HIGH);
@@ -134,7 +134,7 @@ static inline void stretch_predict(stretch_state *s)
 }
 
 /* Keeps target and rate where they can be. */
-static inline void stretch_hold(stretch_state *s)
+STRETCH_INLINE void stretch_hold(stretch_state *s)
 {
     int i;
     if (s->target < STRETCH_LOW) {
@@ -151,14 +151,14 @@ static inline void stretch_hold(stretch_state *s)
 }
 
 /* What a gain makes of a surprise, rounded. */
-static inline int32_t stretch_pull(int32_t gain, int32_t surprise)
+STRETCH_INLINE int32_t stretch_pull(int32_t gain, int32_t surprise)
 {
     return stretch_saturate((stretch_product(gain, surprise) + STRETCH_GAIN_HALF) >>
                             STRETCH_GAIN_BITS);
 }
 
 /* Takes in a signal above its baseline; whether it lay on the curve. */
-static inline int stretch_correct(stretch_state *s, int32_t signal)
+STRETCH_INLINE int stretch_correct(stretch_state *s, int32_t signal)
 {
     const int32_t first = stretch_curve[0], last = stretch_curve[STRETCH_KNOTS - 1];
     const int32_t *gains;
@@ -193,7 +193,7 @@ static inline int stretch_correct(stretch_state *s, int32_t signal)
 
 #if STRETCH_FOLLOWS_REST
 /* The signal above the baseline, which is moved on. */
-static inline int32_t stretch_above_rest(stretch_state *s, int32_t signal)
+STRETCH_INLINE int32_t stretch_above_rest(stretch_state *s, int32_t signal)
 {
     int32_t shift = 0, segment, place, excess, before;
     if (s->begun) {

@@ -35,7 +35,7 @@ static inline void stretch_init(stretch_state *s)
 }
 
 /* x held to low .. high */
-static inline float stretch_held(float x, float low, float high)
+STRETCH_INLINE float stretch_held(float x, float low, float high)
 {
     if (x < low) {
         x = low;
@@ -44,13 +44,13 @@ static inline float stretch_held(float x, float low, float high)
 }
 
 /* Backlash: stays within radius of x. */
-static inline float stretch_play(float before, float x, float radius)
+STRETCH_INLINE float stretch_play(float before, float x, float radius)
 {
     return stretch_held(before, x - radius, x + radius);
 }
 
 /* The drive that a signal suggests by itself; *held: the signal held to the curve. */
-static inline float stretch_inverse(float signal, float *held)
+STRETCH_INLINE float stretch_inverse(float signal, float *held)
 {
     int below = 0, above = STRETCH_KNOTS - 1;
     float place;
@@ -69,7 +69,7 @@ static inline float stretch_inverse(float signal, float *held)
 }
 
 /* The signal at a drive; *tangent: the slope there; *held: the drive held to the curve. */
-static inline float stretch_forward(float drive, float *tangent, float *held)
+STRETCH_INLINE float stretch_forward(float drive, float *tangent, float *held)
 {
     const float place = stretch_held((drive - STRETCH_DRIVE_LOW) * STRETCH_PER_STEP, 0.0f,
                                      (float)(STRETCH_KNOTS - 1));
@@ -85,7 +85,7 @@ static inline float stretch_forward(float drive, float *tangent, float *held)
 }
 
 /* The drive of a target that stands at y now. */
-static inline float stretch_drive(const stretch_state *s, float y)
+STRETCH_INLINE float stretch_drive(const stretch_state *s, float y)
 {
     float drive = y;
     int i;
@@ -100,7 +100,7 @@ static inline float stretch_drive(const stretch_state *s, float y)
 }
 
 /* Moves the states on by a sample. */
-static inline void stretch_predict(stretch_state *s)
+STRETCH_INLINE void stretch_predict(stretch_state *s)
 {
     int i;
     s->target = stretch_held(s->target + STRETCH_PERIOD_S * s->rate, STRETCH_LOW, STRETCH_HIGH);
@@ -110,7 +110,7 @@ static inline void stretch_predict(stretch_state *s)
 }
 
 /* Keeps target and rate where they can be. */
-static inline void stretch_hold(stretch_state *s)
+STRETCH_INLINE void stretch_hold(stretch_state *s)
 {
     int i;
     if (s->target < STRETCH_LOW) {
@@ -127,7 +127,7 @@ static inline void stretch_hold(stretch_state *s)
 }
 
 /* The place of the gains for a slope, by halving. */
-static inline int stretch_nearest(float slope)
+STRETCH_INLINE int stretch_nearest(float slope)
 {
     int from = 0, to = STRETCH_SLOPES - 1;
     while (from < to) {
@@ -142,7 +142,7 @@ static inline int stretch_nearest(float slope)
 }
 
 /* Takes in a signed signal above its baseline; whether it lay on the curve. */
-static inline int stretch_correct(stretch_state *s, float signal)
+STRETCH_INLINE int stretch_correct(stretch_state *s, float signal)
 {
     const float first = stretch_curve[0], last = stretch_curve[STRETCH_KNOTS - 1];
     const float span = last - first;
@@ -173,7 +173,7 @@ static inline int stretch_correct(stretch_state *s, float signal)
 
 #if STRETCH_FOLLOWS_REST
 /* The signal above the baseline, which is moved on. */
-static inline float stretch_above_rest(stretch_state *s, float signal)
+STRETCH_INLINE float stretch_above_rest(stretch_state *s, float signal)
 {
     float shift = 0.0f, tangent, at, excess, wanted, before;
     if (s->begun) {

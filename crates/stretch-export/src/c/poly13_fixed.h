@@ -9,7 +9,7 @@ typedef struct stretch_sheet {
 static const stretch_sheet stretch_sheets[2] = STRETCH_SHEETS;
 
 /* Horner's rule; what a product leaves below the point is carried into the next. */
-static inline int32_t stretch_estimate(const stretch_state *s, uint16_t sample, int32_t rate,
+STRETCH_INLINE int32_t stretch_estimate(const stretch_state *s, uint32_t sample, int32_t rate,
                                        uint8_t *outside)
 {
     const stretch_sheet *sheet = &stretch_sheets[s->branch];

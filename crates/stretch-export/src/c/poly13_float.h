@@ -7,7 +7,7 @@ typedef struct stretch_sheet {
 static const stretch_sheet stretch_sheets[2] = STRETCH_SHEETS;
 
 /* The estimate, and its change per change of the signal. */
-static inline float stretch_estimate(const stretch_state *s, float x, float rate, float *slope,
+STRETCH_INLINE float stretch_estimate(const stretch_state *s, float x, float rate, float *slope,
                                      uint8_t *outside)
 {
     const stretch_sheet *p = &stretch_sheets[s->branch];

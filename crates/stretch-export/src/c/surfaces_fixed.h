@@ -3,12 +3,12 @@
 typedef struct stretch_state {
     uint32_t sums[STRETCH_DEGREE + 1]; /* moments of the window, modulo 2^32 */
     int32_t last_rate;                 /* before a gap */
-    uint16_t last;
-    uint16_t oldest; /* place of the oldest sample, or one past the end */
-    uint16_t remaining;
+    uint32_t oldest;                   /* place of the oldest sample, or one past the end */
+    uint32_t remaining;                /* samples until the window is full */
+    uint16_t ring[STRETCH_WINDOW];
+    uint16_t last; /* before a gap */
     uint8_t branch;
     uint8_t missing;
-    uint16_t ring[STRETCH_WINDOW];
 } stretch_state;
 
 static inline void stretch_forget(stretch_state *s)
@@ -34,26 +34,26 @@ static inline void stretch_init(stretch_state *s)
 }
 
 /* B_0 += x - old,  B_k += B_(k-1) - C(n, k) old; 1 when the window is full */
-static inline int stretch_slide(stretch_state *s, uint16_t sample)
+STRETCH_INLINE int stretch_slide(stretch_state *s, uint32_t sample)
 {
     const uint32_t at = s->oldest < STRETCH_WINDOW ? s->oldest : 0u;
     const uint32_t old = s->ring[at];
-    s->ring[at] = sample;
-    s->oldest = (uint16_t)(at + 1u);
+    s->ring[at] = (uint16_t)sample;
+    s->oldest = at + 1u;
 #if STRETCH_DEGREE > 1
     s->sums[2] += s->sums[1] - STRETCH_CHOOSE_2 * old;
 #endif
     s->sums[1] += s->sums[0] - STRETCH_CHOOSE_1 * old;
-    s->sums[0] += (uint32_t)sample - old;
+    s->sums[0] += sample - old;
     if (s->remaining > 0) {
-        s->remaining = (uint16_t)(s->remaining - 1u);
+        s->remaining--;
         return s->remaining == 0;
     }
     return 1;
 }
 
 /* (T_0 B_0 + T_1 B_1 + ..) / 2^shift */
-static inline int32_t stretch_rate(const stretch_state *s)
+STRETCH_INLINE int32_t stretch_rate(const stretch_state *s)
 {
     int64_t total = STRETCH_HALF;
     total += stretch_product(STRETCH_WEIGHT_0, (int32_t)s->sums[0]);
@@ -73,7 +73,7 @@ static STRETCH_APART void stretch_missed(stretch_state *s)
     }
     s->missing = (uint8_t)(s->missing + 1u);
     if (s->missing == 1) {
-        s->last = s->ring[s->oldest > 0 ? s->oldest - 1 : STRETCH_WINDOW - 1];
+        s->last = s->ring[s->oldest > 0 ? s->oldest - 1u : STRETCH_WINDOW - 1u];
         s->last_rate = s->remaining == 0 ? stretch_rate(s) : 0;
     }
     /* the last sample, moved on by the last rate */
@@ -85,7 +85,7 @@ static STRETCH_APART void stretch_missed(stretch_state *s)
     if (bridged > 65535) {
         bridged = 65535;
     }
-    (void)stretch_slide(s, (uint16_t)bridged);
+    (void)stretch_slide(s, (uint32_t)bridged);
 }
 
 /* ---- the surface ---- */
@@ -97,7 +97,7 @@ typedef struct stretch_span {
 } stretch_span;
 
 /* The nearest value inside, spread; *outside is set for one that was outside. */
-static inline int32_t stretch_clamp(const stretch_span *span, int32_t x, uint8_t flag,
+STRETCH_INLINE int32_t stretch_clamp(const stretch_span *span, int32_t x, uint8_t flag,
                                     uint8_t *outside)
 {
     /* one comparison: below the lower end the difference wraps to a large number */
@@ -109,12 +109,12 @@ static inline int32_t stretch_clamp(const stretch_span *span, int32_t x, uint8_t
 }
 
 /* c and a fraction of 32 bits, plus a v / 2^32 */
-static inline uint64_t stretch_sum(uint32_t c, uint32_t fraction, int32_t a, int32_t v)
+STRETCH_INLINE uint64_t stretch_sum(uint32_t c, uint32_t fraction, int32_t a, int32_t v)
 {
     return (((uint64_t)c << 32) | fraction) + (uint64_t)stretch_product(a, v);
 }
 
-static inline int32_t stretch_high(uint64_t sum)
+STRETCH_INLINE int32_t stretch_high(uint64_t sum)
 {
     return (int32_t)(uint32_t)(sum >> 32);
 }

@@ -12,12 +12,12 @@ static inline stretch_reading stretch_step(stretch_state *s, int32_t code)
 {
     const uint32_t band = STRETCH_DEAD_BAND;
     uint8_t outside = STRETCH_INSIDE;
-    uint16_t sample;
+    uint32_t sample;
     int32_t rate, estimate;
     if ((uint32_t)code >= STRETCH_CODES) {
         return stretch_lost(s);
     }
-    sample = (uint16_t)((uint32_t)code * STRETCH_ALIGN);
+    sample = (uint32_t)code * STRETCH_ALIGN;
     s->missing = 0;
     if (!stretch_slide(s, sample)) {
         return stretch_answer(STRETCH_WARMING, s->branch, STRETCH_INSIDE, 0);

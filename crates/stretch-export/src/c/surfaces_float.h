@@ -28,7 +28,7 @@ static inline void stretch_init(stretch_state *s)
 }
 
 /* The transposed filter: 1 and the rate when the window is full. */
-static inline int stretch_rate(stretch_state *s, float x, float *rate)
+STRETCH_INLINE int stretch_rate(stretch_state *s, float x, float *rate)
 {
     int j;
     *rate = s->sums[0] + stretch_taps[0] * x;
@@ -64,7 +64,7 @@ static STRETCH_APART void stretch_missed(stretch_state *s)
 /* ---- the surface ---- */
 
 /* The nearest value inside; *outside is set for one that was outside. */
-static inline float stretch_clamp(float x, float min, float max, uint8_t flag, uint8_t *outside)
+STRETCH_INLINE float stretch_clamp(float x, float min, float max, uint8_t flag, uint8_t *outside)
 {
     if (x < min) {
         *outside = (uint8_t)(*outside | flag);

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use stretch_calibrate::{parse_adc, read_calibration};
 use stretch_data::{DataError, write_folder, write_whole};
 use stretch_export::{
@@ -66,7 +66,13 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             }
             write_whole(path, |out| out.write_all(text.as_bytes()))?;
         }
-        Ok::<(), DataError>(())
+        Ok(())
+    })
+    .map_err(|error| match error {
+        DataError::Exists { path } => {
+            anyhow!("{path}: it exists; name a folder that does not: nothing is overwritten")
+        }
+        other => other.into(),
     })?;
     let out = args.c.display();
     say(format!("wrote {out}: {model}, {form}, a self-test of {SELF_TEST_SAMPLES} samples"))?;

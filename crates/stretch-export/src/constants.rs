@@ -81,8 +81,14 @@ impl Constants {
         ))
     }
 
+    /// The sheets of a line or of both branches; a macro, because their type comes later.
+    pub(crate) fn sheets(&mut self, sheets: &[String]) -> &mut Self {
+        let rows = sheets.join(", \\\n        ");
+        self.line(&format!("#define STRETCH_SHEETS \\\n    {{ \\\n        {rows} \\\n    }}"))
+    }
+
     /// A line as it is.
-    pub(crate) fn line(&mut self, line: &str) -> &mut Self {
+    fn line(&mut self, line: &str) -> &mut Self {
         self.0.push_str(line);
         self.0.push('\n');
         self
@@ -90,7 +96,7 @@ impl Constants {
 }
 
 /// `{1, 2, 3}`, in lines of six.
-pub(crate) fn braced<L: Literal>(values: &[L]) -> String {
+fn braced<L: Literal>(values: &[L]) -> String {
     let mut out = String::from("{");
     for (k, value) in values.iter().enumerate() {
         let before = match k {

@@ -18,7 +18,7 @@ pub enum ExportError {
         model: String,
     },
     /// Integers were asked of a model that has none.
-    #[error("no integers: {0}; or export it with --form float, which takes volts")]
+    #[error("{0}; or export in --form float, which needs no converter")]
     NoFixedForm(#[source] CalibrateError),
     /// A rate that is written in C for no arithmetic.
     #[error(

@@ -46,15 +46,20 @@ pub struct Header {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn header(calibration: &Calibration, options: &Options) -> Result<Header, ExportError> {
-    match options.form {
-        Some(Form::Fixed) => fixed(calibration, options),
-        Some(Form::Float) => float(calibration, options),
-        None => match fixed(calibration, options) {
-            Err(ExportError::NoFixedForm(
+    if options.form == Some(Form::Float) {
+        return float(calibration, options);
+    }
+    match fixed(calibration, options) {
+        // what is missing in integers may be there in floats; a converter that does not fit is another matter
+        Err(
+            none @ ExportError::NoFixedForm(
                 CalibrateError::NoFixedForm { .. } | CalibrateError::FixedRate { .. },
-            )) => float(calibration, options),
-            other => other,
-        },
+            ),
+        ) => {
+            let float = float(calibration, options)?;
+            if options.form.is_none() { Ok(float) } else { Err(none) }
+        }
+        other => other,
     }
 }
 
@@ -115,24 +120,25 @@ fn opening(calibration: &Calibration, form: Form, model: &str) -> String {
         Form::Fixed => ("a code of the converter", format!("thousandths of {reference}'s unit")),
         Form::Float => (signal.as_str(), reference.clone()),
     };
+    let from =
+        match (calibration.provenance.trial_count(), comment_safe(calibration.provenance.date())) {
+            (1, date) if date.is_empty() => "1 trial".to_owned(),
+            (trials, date) if date.is_empty() => format!("{trials} trials"),
+            (trials, date) => format!("{trials} trials, {date}"),
+        };
     let mut text = String::new();
     // writing to memory cannot fail
     let _ = write!(
         text,
         "/* A stretch receptor: {signal} in, {reference} out, every {period} s.\n *\n * Model {model}, form \
-         {form}: {taken} in, {given} out. The same bits as on the desk.\n * Written by stretch \
-         {version} from a calibration of {trials} trials{date}.\n *\n *     stretch_state \
-         state;\n *     stretch_init(&state);\n *     for (;;) {{ reading = stretch_step(&state, \
-         sample); }}  or stretch_lost(&state)\n *\n * One state a channel. C99 and C++11; no \
-         malloc, no libm. stretch_self_test() is 0 where\n * the board computes as the desk does.\n */\n\
+         {form}: {taken} in,\n * {given} out; the same bits as on the desk.\n * Written by stretch \
+         {version} from a calibration of {from}.\n *\n *     stretch_state state;\n *     \
+         stretch_init(&state);\n *     then every period\n *     reading = stretch_step(&state, sample); or \
+         stretch_lost(&state) where none came\n *\n * One state a channel. C99 and C++11; no malloc, no \
+         libm. stretch_self_test() is 0 where the\n * board computes as the desk does.\n */\n\
          #ifndef STRETCH_H\n#define STRETCH_H\n\n#include <stdint.h>\n\n",
         period = calibration.sample_rate_hz.period_s(),
         version = env!("CARGO_PKG_VERSION"),
-        trials = calibration.provenance.trial_count(),
-        date = match comment_safe(calibration.provenance.date()) {
-            date if date.is_empty() => date,
-            date => format!(", {date}"),
-        },
     );
     text
 }

@@ -4,7 +4,7 @@ use stretch_core::{Poly13, fixed::FixedPoly13};
 use stretch_receptor::code::{FixedNumbers, Scaled, Sheet, Sheets, Span};
 
 use crate::{
-    constants::{Constants, Literal, braced},
+    constants::{Constants, Literal},
     part::Part,
 };
 
@@ -47,18 +47,11 @@ pub(crate) fn surfaces_fixed(numbers: &FixedNumbers) -> Part {
             let (intercept, slope) = <(i32, i32)>::from(of);
             let signal = span(&sheet.signal);
             let line = [thousandths, intercept, slope].map(|n| n.c()).join(", ");
-            constants.line(&format!(
-                "#define STRETCH_SHEETS \\\n    {{{{{}, {signal}, {line}}}}}",
-                sheet.centre
-            ));
+            constants.sheets(&[format!("{{{}, {signal}, {line}}}", sheet.centre)]);
             ("linear", include_str!("../c/line_fixed.h"))
         }
         Sheets::Poly13([inflation, deflation]) => {
-            constants.line(&format!(
-                "#define STRETCH_SHEETS \\\n    {{{}, \\\n     {}}}",
-                poly13(inflation),
-                poly13(deflation)
-            ));
+            constants.sheets(&[poly13(inflation), poly13(deflation)]);
             ("poly13", include_str!("../c/poly13_fixed.h"))
         }
     };
@@ -73,13 +66,14 @@ fn span(span: &Span) -> String {
     format!("{{{}, {}, {}}}", span.min.c(), span.width.c(), span.factor.c())
 }
 
-/// A branch's sheet on one line.
+/// A branch's sheet.
 fn poly13(sheet: &Sheet<Scaled<FixedPoly13>>) -> String {
     let Scaled { of, thousandths } = sheet.surface;
     // all of them integers of 32 bits: nothing is lost
     let Poly13 { p00, p10, p01, p11, p02, p12, p03 } = of.coefficients();
     let ordered = [p11, p12, p10, p00, p02, p03, p01].map(|p| p as i32);
+    let ordered = ordered.map(|p| p.c()).join(", ");
     let (signal, rate) = (span(&sheet.signal), span(&sheet.rate));
-    let ordered = braced(&ordered).replace('\n', " \\\n");
-    format!("{{{}, {signal}, {rate}, {}, {ordered}}}", sheet.centre, thousandths.c())
+    let domain = format!("{}, {signal}, {rate}, {}", sheet.centre, thousandths.c());
+    format!("{{{domain}, \\\n         {{{ordered}}}}}")
 }

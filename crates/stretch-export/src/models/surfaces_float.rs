@@ -54,11 +54,7 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
             ("linear", include_str!("../c/line_float.h"))
         }
         Map::Poly13([inflation, deflation]) => {
-            constants.line(&format!(
-                "#define STRETCH_SHEETS \\\n    {{{}, \\\n     {}}}",
-                poly13(inflation),
-                poly13(deflation)
-            ));
+            constants.sheets(&[poly13(inflation), poly13(deflation)]);
             ("poly13", include_str!("../c/poly13_float.h"))
         }
         Map::Surface([sheet, _]) => {
@@ -84,5 +80,5 @@ fn poly13(sheet: &Sheet<f32, Poly13<f32>>) -> String {
     let Poly13 { p00, p10, p01, p11, p02, p12, p03 } = surface;
     let join = |numbers: &[f32]| numbers.iter().map(Literal::c).collect::<Vec<_>>().join(", ");
     let domain = join(&[signal.min, signal.max, rate.min, rate.max, offset, rate_offset]);
-    format!("{{{domain}, \\\n      {}}}", join(&[p00, p10, p01, p11, p02, p12, p03]))
+    format!("{{{domain}, \\\n         {}}}", join(&[p00, p10, p01, p11, p02, p12, p03]))
 }

@@ -81,7 +81,7 @@ step "packages of the library crates"
 packages=$(mktemp -d)
 trap 'rm -rf "$packages"' EXIT
 # shellcheck disable=SC2046,SC2086
-cargo package --quiet --locked --allow-dirty --target-dir "$packages" $(printf -- '-p %s ' $LIBRARIES stretch-data stretch-calibrate stretch-sim)
+cargo package --quiet --locked --allow-dirty --target-dir "$packages" $(printf -- '-p %s ' $LIBRARIES stretch-data stretch-calibrate stretch-export stretch-sim)
 
 step "fuzz targets compile"
 cargo check --quiet --locked --manifest-path fuzz/Cargo.toml

@@ -29,7 +29,9 @@ fn compiled(folder: &Path, main: &str, include: &[PathBuf]) -> Option<String> {
     fs::write(&source, main).unwrap();
     let mut command = Command::new("g++");
     command.args(["-std=gnu++11", "-Wall", "-Wextra", "-Werror"]);
-    include.iter().for_each(|folder| drop(command.arg("-I").arg(folder)));
+    for folder in include {
+        command.arg("-I").arg(folder);
+    }
     let program = folder.join("program");
     let output = match command.arg(source).arg("-o").arg(&program).output() {
         Ok(output) => output,

@@ -37,16 +37,17 @@ impl Span {
         self.factor > 0 && fits(self.min.into()) && fits(max)
     }
 
-    /// The nearest value inside, spread; and 1 for a value that was outside.
+    /// The nearest value inside; and 1 for a value that was outside.
     #[inline(always)]
     fn clamp(&self, x: i32) -> (i32, u8) {
         // one comparison: below the lower end the difference wraps to a large number
-        let (inside, outside) = if x.wrapping_sub(self.min) as u32 <= self.width {
-            (x, 0)
-        } else {
-            self.nearest_end(x)
-        };
-        (inside.wrapping_mul(self.factor), outside)
+        if x.wrapping_sub(self.min) as u32 <= self.width { (x, 0) } else { self.nearest_end(x) }
+    }
+
+    /// A value inside, spread over 32 bits.
+    #[inline(always)]
+    pub(super) fn spread(&self, inside: i32) -> i32 {
+        inside.wrapping_mul(self.factor)
     }
 
     #[cold]
@@ -70,7 +71,7 @@ pub struct Sheet<S> {
 }
 
 impl<S> Sheet<S> {
-    /// Signal and rate as the surface takes them.
+    /// Signal and rate inside the domain, not yet spread.
     #[inline(always)]
     pub(super) fn inputs(&self, sample: u16, rate: i32) -> (i32, i32, Domain) {
         let (volts, signal_outside) = self.signal.clamp(self.coarse(sample));

@@ -27,6 +27,11 @@ fi
 [ -d "${STRETCH_DATA:-../shared/data}/knit_sleeve" ] \
     || skip "tests on measured sessions: no knit_sleeve in ${STRETCH_DATA:-../shared/data}; STRETCH_DATA names the folder that holds it"
 
+have gcc && have g++ \
+    || skip "the exported C on this machine: no gcc or no g++"
+have clang \
+    || skip "the exported C from clang: there is none"
+
 step "examples in the documentation"
 cargo test --workspace --all-features --locked --doc
 

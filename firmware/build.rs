@@ -33,8 +33,9 @@ fn compile_c(headers: &Path, out: &Path) -> Result<(), Box<dyn Error>> {
         &["-mcpu=cortex-m3", "-mthumb"]
     };
     let flags = ["-std=gnu99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror"];
-    let mut folders: Vec<PathBuf> =
-        fs::read_dir(headers)?.map(|entry| Ok(entry?.path())).collect::<Result<_, std::io::Error>>()?;
+    let mut folders: Vec<PathBuf> = fs::read_dir(headers)?
+        .map(|entry| Ok(entry?.path()))
+        .collect::<Result<_, std::io::Error>>()?;
     folders.sort();
     let (mut objects, mut calls) = (Vec::new(), String::from("{\n"));
     for folder in folders {
@@ -43,7 +44,8 @@ fn compile_c(headers: &Path, out: &Path) -> Result<(), Box<dyn Error>> {
         let model = folder.file_name().and_then(|name| name.to_str()).ok_or("a folder's name")?;
         let symbol = model.replace(['-', '+'], "_");
         let object = out.join(format!("{symbol}.o"));
-        let is_float = fs::read_to_string(&header)?.contains("stretch_step(stretch_state *s, float");
+        let is_float =
+            fs::read_to_string(&header)?.contains("stretch_step(stretch_state *s, float");
         run(Command::new("arm-none-eabi-gcc")
             .args(core)
             .args(flags)

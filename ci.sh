@@ -27,6 +27,11 @@ fi
 [ -d "${STRETCH_DATA:-../shared/data}/knit_sleeve" ] \
     || skip "tests on measured sessions: no knit_sleeve in ${STRETCH_DATA:-../shared/data}; STRETCH_DATA names the folder that holds it"
 
+have gcc && have g++ \
+    || skip "the exported C on this machine: no gcc or no g++"
+have clang \
+    || skip "the exported C from clang: there is none"
+
 step "examples in the documentation"
 cargo test --workspace --all-features --locked --doc
 
@@ -81,7 +86,7 @@ step "packages of the library crates"
 packages=$(mktemp -d)
 trap 'rm -rf "$packages"' EXIT
 # shellcheck disable=SC2046,SC2086
-cargo package --quiet --locked --allow-dirty --target-dir "$packages" $(printf -- '-p %s ' $LIBRARIES stretch-data stretch-calibrate stretch-sim)
+cargo package --quiet --locked --allow-dirty --target-dir "$packages" $(printf -- '-p %s ' $LIBRARIES stretch-data stretch-calibrate stretch-export stretch-sim)
 
 step "fuzz targets compile"
 cargo check --quiet --locked --manifest-path fuzz/Cargo.toml

@@ -1,6 +1,14 @@
-//! Puts `memory.x` where the linker finds it.
+//! Puts `memory.x` where the linker finds it; with the feature `c`, compiles the headers of
+//! `stretch export` that lie in the folders of `STRETCH_C`.
 
-use std::{env, error::Error, fs, path::PathBuf};
+use std::{
+    env,
+    error::Error,
+    fmt::Write,
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let out = PathBuf::from(env::var("OUT_DIR")?);
@@ -8,5 +16,65 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo:rustc-link-search={}", out.display());
     println!("cargo:rerun-if-changed=memory.x");
     println!("cargo:rerun-if-changed=data");
+    if env::var_os("CARGO_FEATURE_C").is_some() {
+        println!("cargo:rerun-if-env-changed=STRETCH_C");
+        println!("cargo:rerun-if-changed=src/c");
+        compile_c(Path::new(&env::var("STRETCH_C")?), &out)?;
+    }
     Ok(())
+}
+
+/// An object of all headers for the program `c`, and the list of their models for its `main`.
+fn compile_c(headers: &Path, out: &Path) -> Result<(), Box<dyn Error>> {
+    let hard_float = env::var("TARGET")?.ends_with("eabihf");
+    let core: &[&str] = if hard_float {
+        &["-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"]
+    } else {
+        &["-mcpu=cortex-m3", "-mthumb"]
+    };
+    let flags = ["-std=gnu99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror"];
+    let mut folders: Vec<PathBuf> = fs::read_dir(headers)?
+        .map(|entry| Ok(entry?.path()))
+        .collect::<Result<_, std::io::Error>>()?;
+    folders.sort();
+    let (mut objects, mut calls) = (Vec::new(), String::from("{\n"));
+    for folder in folders {
+        let header = folder.join("stretch.h");
+        println!("cargo:rerun-if-changed={}", header.display());
+        let model = folder.file_name().and_then(|name| name.to_str()).ok_or("a folder's name")?;
+        let symbol = model.replace(['-', '+'], "_");
+        let object = out.join(format!("{symbol}.o"));
+        let is_float =
+            fs::read_to_string(&header)?.contains("stretch_step(stretch_state *s, float");
+        run(Command::new("arm-none-eabi-gcc")
+            .args(core)
+            .args(flags)
+            .args(["-ffreestanding", "-c", "src/c/step.c", "-o"])
+            .arg(&object)
+            .arg(format!("-DMODEL={symbol}"))
+            .arg(if is_float { "-DSAMPLE=float" } else { "-DSAMPLE=int32_t" })
+            .arg("-I")
+            .arg(&folder))?;
+        objects.push(object);
+        let kind = if is_float { "float" } else { "fixed" };
+        writeln!(calls, "{kind}!({symbol}, {model:?});")?;
+    }
+    calls.push('}');
+    fs::write(out.join("c_models.rs"), calls)?;
+    // soft float is the C compiler's own, as in a program of C alone, and hidden from Rust's
+    let all = out.join("all.o");
+    run(Command::new("arm-none-eabi-gcc")
+        .args(core)
+        .args(["-r", "-nostdlib", "-o"])
+        .arg(&all)
+        .args(&objects)
+        .arg("-lgcc"))?;
+    run(Command::new("arm-none-eabi-objcopy").args(["--wildcard", "-G", "c_*"]).arg(&all))?;
+    println!("cargo:rustc-link-arg-bin=c={}", all.display());
+    Ok(())
+}
+
+fn run(command: &mut Command) -> Result<(), Box<dyn Error>> {
+    let status = command.status().map_err(|e| format!("{command:?}: {e}"))?;
+    if status.success() { Ok(()) } else { Err(format!("{command:?}: {status}").into()) }
 }

@@ -6,8 +6,12 @@
 # the folder that the sources lie in). Prints SKIPPED, and succeeds, where there is
 # no emulator.
 #
-#   ./gate.sh            compares with golden.txt and budget.txt
-#   ./gate.sh --write    writes budget.txt anew from what is measured
+# The same for what `stretch export` makes of the models in C, where there is an
+# arm-none-eabi-gcc: the bits always, the instructions (c_budget.txt) where it is the
+# compiler that they were counted with.
+#
+#   ./gate.sh            compares with golden.txt, budget.txt and c_budget.txt
+#   ./gate.sh --write    writes the budgets anew from what is measured
 set -eu
 cd "$(dirname "$0")"
 budget=../crates/stretch-calibrate/src/budget.txt
@@ -25,6 +29,10 @@ done
 
 measured=$(./measure.sh)
 printf '%s\n' "$measured"
+if compiler=$(arm-none-eabi-gcc -dumpfullversion 2>/dev/null); then
+    in_c=$(./c.sh)
+    printf '%s\n' "$in_c"
+fi
 
 if [ "${1:-}" = --write ]; then
     {
@@ -32,6 +40,11 @@ if [ "${1:-}" = --write ]; then
         echo "# gate.sh says by how much each may be exceeded. Counts belong to the pinned compiler."
         printf '%s\n' "$measured" | sed 's/ max=[0-9]*//; s/ state_bytes=.*//'
     } >"$budget"
+    [ -z "$compiler" ] || {
+        echo "# Budget of a step in C: instructions (mean), bytes of stack below the caller."
+        echo "# arm-none-eabi-gcc $compiler -O2"
+        printf '%s\n' "$in_c" | sed 's/ max=[0-9]*//; s/ state_bytes=.*//'
+    } >c_budget.txt
     exit 0
 fi
 
@@ -65,3 +78,41 @@ printf '%s\n' "$measured" | awk '
         exit failed
     }
 ' golden.txt "$budget" -
+
+if [ -z "$compiler" ]; then
+    echo "SKIPPED firmware in C: there is no arm-none-eabi-gcc (Debian: apt-get install gcc-arm-none-eabi)"
+    exit 0
+fi
+if ! grep -q "arm-none-eabi-gcc $compiler " c_budget.txt; then
+    echo "SKIPPED instructions of the C: they were counted with another compiler than $compiler"
+fi
+printf '%s\n' "$in_c" | awk -v compiler="arm-none-eabi-gcc $compiler " '
+    function value(line, key,    parts) {
+        if (match(line, key "=[^ ]*")) return substr(line, RSTART + length(key) + 1, RLENGTH - length(key) - 1)
+        return ""
+    }
+    FILENAME == "golden.txt" { if (!/^#/) golden[value($0, "model")] = value($0, "checksum"); next }
+    FILENAME == "c_budget.txt" {
+        if (index($0, compiler)) counted = 1
+        if (!/^#/) budget[value($0, "core") " " value($0, " c")] = $0
+        next
+    }
+    {
+        model = value($0, " c"); name = value($0, "core") " " model; seen[name] = 1
+        if (value($0, "checksum") != golden[model])
+            fail(name ": checksum " value($0, "checksum") ", of Rust " golden[model])
+        if (!(name in budget)) { fail(name ": no budget"); next }
+        if (!counted) next
+        mean = value($0, "mean"); planned = value(budget[name], "mean")
+        if (mean + 0 > planned * 1.02 || mean + 0 < planned * 0.98)
+            fail(name ": " mean " instructions a sample, budget " planned ", 2 % either way; renew it with firmware/gate.sh --write")
+        if (value($0, "stack_bytes") + 0 > value(budget[name], "stack_bytes") + 0)
+            fail(name ": stack " value($0, "stack_bytes") ", budget " value(budget[name], "stack_bytes"))
+    }
+    function fail(text) { print "FAILED C: " text; failed = 1 }
+    END {
+        for (name in budget) if (!(name in seen)) fail(name ": was not measured")
+        if (!failed) print "firmware in C: bits are those of Rust" (counted ? ", instructions and stack as they should be" : "")
+        exit failed
+    }
+' golden.txt c_budget.txt -

@@ -12,7 +12,8 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use commands::{
-    apply, blind, calibrate, convert, demo, diagnose, effects, evaluate, listen, rig, simulate,
+    apply, blind, calibrate, convert, demo, diagnose, effects, evaluate, export, listen, rig,
+    simulate,
 };
 
 /// From the voltage of a stretch sensor to length, live.
@@ -48,6 +49,7 @@ enum Command {
     Effects(effects::Args),
     Rig(rig::Args),
     Listen(listen::Args),
+    Export(export::Args),
 }
 
 /// What the shell is told when Ctrl-C ended the program.
@@ -69,6 +71,7 @@ fn main() -> ExitCode {
         Command::Effects(args) => effects::run(args),
         Command::Rig(args) => rig::run(args),
         Command::Listen(args) => listen::run(args),
+        Command::Export(args) => export::run(args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -42,16 +42,17 @@ pub fn length_only(answer: Result<Reading<f32>, Withheld>) -> Answer<f32> {
 
 /// Replays every sample through `step`, a function that is not inlined, and prints one line.
 ///
-/// `input` makes the sample outside of the count. The count has everything
+/// `input` makes the sample, and `answer` an answer of what came back, outside of the count. The count has everything
 /// between two readings of the counter but those: passing the arguments, the
 /// call, the step, the return.
 #[inline(never)]
-pub fn replay<D, M, I, E: Length>(
+pub fn replay<D, M: ?Sized, I, R, E: Length>(
     model: &str,
     design: &D,
     memory: &mut M,
     input: impl Fn(AdcCode) -> I,
-    step: impl Fn(&D, &mut M, I) -> Answer<E>,
+    step: impl Fn(&D, &mut M, I) -> R,
+    answer: impl Fn(R) -> Answer<E>,
 ) {
     // a program of several models starts the counter once
     if let Some(mut core) = cortex_m::Peripherals::take() {
@@ -64,8 +65,8 @@ pub fn replay<D, M, I, E: Length>(
     let sp = stack::paint();
     for code in trial::codes() {
         let sample = input(code);
-        let (answer, count) = count::bracket(|| step(design, memory, sample));
-        let count = count - empty;
+        let (reading, count) = count::bracket(|| step(design, memory, sample));
+        let (answer, count) = (answer(reading), count - empty);
         samples += 1;
         total += count;
         max = max.max(count);
@@ -79,7 +80,7 @@ pub fn replay<D, M, I, E: Length>(
         tenths / 10,
         tenths % 10,
         text_bytes(),
-        size_of::<M>(),
+        size_of_val(memory),
         checksum.0,
     );
     if let Some(length) = length {
@@ -134,7 +135,8 @@ macro_rules! program {
                 let make = $make;
                 let design: $design = make($crate::measure::load(RECORD));
                 let mut memory = stretch_core::Design::memory(&design);
-                $crate::measure::replay($model, &design, &mut memory, $input, step);
+                let as_is = core::convert::identity;
+                $crate::measure::replay($model, &design, &mut memory, $input, step, as_is);
             })+
             semihosting::process::exit(0)
         }

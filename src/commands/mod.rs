@@ -13,6 +13,7 @@ pub(crate) mod diagnose;
 mod diagnosis_text;
 pub(crate) mod effects;
 pub(crate) mod evaluate;
+pub(crate) mod export;
 pub(crate) mod listen;
 pub(crate) mod paper;
 mod rails;

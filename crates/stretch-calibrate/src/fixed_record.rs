@@ -6,7 +6,10 @@ use serde::Serialize;
 use stretch_core::{Calibration, DesignError, Model, RateEstimator, Runner, Stage};
 use stretch_receptor::{
     Withheld,
-    code::{Adc, AdcCode, AdcSpec, CodeReading, FixedCalibration, FixedObserver, FixedReceptor},
+    code::{
+        Adc, AdcCode, AdcSpec, CodeReading, FixedCalibration, FixedNumbers, FixedObserver,
+        FixedReceptor, IntegerObserver,
+    },
 };
 
 use crate::{CalibrateError, SpellingError};
@@ -14,13 +17,25 @@ use crate::{CalibrateError, SpellingError};
 /// Room for the largest record, an observer's with every number at its longest.
 const BYTES: usize = 1024;
 
+/// What the step of a record computes with: for whoever writes it in another language.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(clippy::large_enum_variant)] // one lives at a time
+pub enum RecordNumbers {
+    /// Of a [`FixedCalibration`].
+    Rated(FixedNumbers),
+    /// Of a [`FixedObserver`].
+    Observer(IntegerObserver),
+}
+
 /// A record for a board, and what reads it there.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct FixedRecord {
     /// The record in postcard: about 100 bytes, of an observer 450.
     pub bytes: Vec<u8>,
     /// The type in [`stretch_receptor::code`] that it is a record of.
     pub read_as: String,
+    /// The same numbers as the bytes.
+    pub numbers: RecordNumbers,
 }
 
 /// The record of a calibration in integers: codes of `adc` in, thousandths of the
@@ -63,7 +78,10 @@ pub fn fixed_record(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord,
                 None => rated(calibration, adc),
             }
         }
-        Model::Observer(_) => record("FixedObserver".into(), FixedObserver::new(calibration, adc)),
+        Model::Observer(_) => {
+            let fixed = FixedObserver::new(calibration, adc).map_err(CalibrateError::Fixed)?;
+            record("FixedObserver".into(), &fixed, RecordNumbers::Observer(*fixed.model()))
+        }
         Model::Blended { .. } => none("a blended model".into()),
         Model::History(_) => none("a model that remembers, other than the observer,".into()),
         _ => none("this model".into()),
@@ -109,20 +127,22 @@ fn surface<const WINDOW: usize, const DEGREE: usize>(
     adc: &Adc,
 ) -> Result<FixedRecord, CalibrateError> {
     let fixed = FixedCalibration::<WINDOW, DEGREE>::new(calibration, adc);
-    record(format!("FixedCalibration<{WINDOW}, {DEGREE}>"), fixed)
+    let fixed = fixed.map_err(CalibrateError::Fixed)?;
+    let read_as = format!("FixedCalibration<{WINDOW}, {DEGREE}>");
+    record(read_as, &fixed, RecordNumbers::Rated(fixed.numbers()))
 }
 
 fn record<T: Serialize>(
     read_as: String,
-    fixed: Result<T, DesignError>,
+    fixed: &T,
+    numbers: RecordNumbers,
 ) -> Result<FixedRecord, CalibrateError> {
-    let fixed = fixed.map_err(CalibrateError::Fixed)?;
     let mut buffer = [0; BYTES];
     // there is room for every number: this cannot fail
-    let bytes = postcard::to_slice(&fixed, &mut buffer)
+    let bytes = postcard::to_slice(fixed, &mut buffer)
         .map_err(|_| DesignError::TooLarge { field: "fixed.record", asked: BYTES + 1, most: BYTES })
         .map_err(CalibrateError::Fixed)?;
-    Ok(FixedRecord { bytes: bytes.to_vec(), read_as })
+    Ok(FixedRecord { bytes: bytes.to_vec(), read_as, numbers })
 }
 
 /// A record of `stretch calibrate --fixed`, run as the board runs it: code for code, bit for bit.

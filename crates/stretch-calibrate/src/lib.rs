@@ -36,7 +36,7 @@ pub use cost::{m3_instructions, m3_instructions_fixed};
 pub use error::CalibrateError;
 pub use evaluate::{Comparison, Evaluation, MethodErrors, TrialErrors, evaluate};
 pub use fitting::{Coefficient, FitReport, Order};
-pub use fixed_record::{BoardReceptor, FixedRecord, fixed_record, parse_adc};
+pub use fixed_record::{BoardReceptor, FixedRecord, RecordNumbers, fixed_record, parse_adc};
 pub use options::{Memory, ModelKind, Options, Robust, SpellingError, SplitBy, parse_rate};
 pub use own_ranges::on_own_ranges;
 pub use record::{read_calibration, write_calibration};

@@ -113,7 +113,8 @@ pub struct SpellingError {
 }
 
 impl SpellingError {
-    pub(crate) fn new(given: &str, use_instead: &'static str) -> Self {
+    /// What was given, and what is understood in its place.
+    pub fn new(given: &str, use_instead: &'static str) -> Self {
         Self { given: given.to_owned(), use_instead }
     }
 }

@@ -18,14 +18,18 @@ use crate::{Design, Polarity, Range, Real, RestTracker, SampleRate, lag, lag_sha
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RestLevel<T> {
-    level: T,
+    /// The resting signal, times the sign of its polarity.
+    pub level: T,
     /// Share of the excess that is taken up in a sample; zero: nothing is followed.
-    pull: T,
-    leak: T,
+    pub pull: T,
+    /// What the baseline rises by in a sample without excess.
+    pub leak: T,
     /// Share of a sample in the running average of the excess.
-    average: T,
-    furthest: T,
-    most: T,
+    pub average: T,
+    /// The furthest that the baseline goes.
+    pub furthest: T,
+    /// The most that an excess counts for.
+    pub most: T,
 }
 
 /// Where the baseline is, and how far the signal has been above rest of late.

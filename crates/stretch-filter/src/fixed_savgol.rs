@@ -106,6 +106,25 @@ pub struct FixedSgRate<S, const WINDOW: usize, const DEGREE: usize, const DELAY:
     PhantomData<S>,
 );
 
+/// What a [`FixedSgRate`] computes with, its shape forgotten: for whoever writes the step in
+/// another language. The letters are those of [`FixedSgRate`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FixedSgIntegers {
+    /// Samples in the window.
+    pub window: usize,
+    /// Degree of the polynomial.
+    pub degree: usize,
+    /// T_k, in the first `degree + 1` places.
+    pub weights: [i32; MOMENTS],
+    /// C(n, k), in the first `degree + 1` places.
+    pub choose: [i32; MOMENTS],
+    /// SHIFT.
+    pub shift: u32,
+    /// The factor f and the shift s of [`FixedSgRate::change`]:
+    /// `(((output f) >> (s - 9)) samples + 256) >> 9`.
+    pub change: (i64, u32),
+}
+
 /// What a [`FixedSgRate`] remembers: the window and its moments.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FixedSgMemory<S: FixedSample, const WINDOW: usize> {
@@ -205,6 +224,24 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
             "the output is coarser than a change a sample"
         );
         (factor as i64, shift - Self::SHIFT)
+    };
+
+    /// The integers that a step computes with.
+    ///
+    /// ```
+    /// type Rate = stretch_filter::FixedSgRate<u16, 11, 2>;
+    /// let integers = Rate::INTEGERS;
+    /// assert_eq!(integers.weights[..3], [945, -489, 100]);
+    /// assert_eq!(integers.choose[..3], [1, 11, 55]);
+    /// assert_eq!(integers.shift, 0);
+    /// ```
+    pub const INTEGERS: FixedSgIntegers = FixedSgIntegers {
+        window: WINDOW,
+        degree: DEGREE,
+        weights: Self::TAPS.weights,
+        choose: binomials(WINDOW),
+        shift: Self::SHIFT,
+        change: Self::CHANGE,
     };
 
     /// The change of the signal over `samples` samples that an output means, rounded.

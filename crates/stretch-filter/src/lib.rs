@@ -32,7 +32,7 @@ pub use differentiator::{Differentiator, DifferentiatorMemory};
 pub use error::FilterError;
 pub use fixed_biquad::{FixedBiquad, FixedBiquadMemory};
 pub use fixed_float::IntegerSgRate;
-pub use fixed_savgol::{FixedSample, FixedSgMemory, FixedSgRate};
+pub use fixed_savgol::{FixedSample, FixedSgIntegers, FixedSgMemory, FixedSgRate};
 pub use fixed_taps::MAX_FIXED_SG_DEGREE;
 pub use gram::MAX_SG_DEGREE;
 pub use low_pass::{LowPass, LowPassMemory, LowPassSpec, MAX_ORDER};

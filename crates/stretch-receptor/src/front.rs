@@ -101,6 +101,14 @@ impl<M, S: Side> ReceptorMemory<M, S> {
     }
 }
 
+impl<M> Front<M> {
+    /// What the receptor computes with, for whoever writes its step in another language; see
+    /// [`numbers`](crate::numbers).
+    pub fn model(&self) -> &M {
+        &self.model
+    }
+}
+
 impl<M: Live> Front<M> {
     /// A missing sample: bridge a short gap, forget the stream after a long one.
     #[cold]
@@ -149,8 +157,9 @@ pub(crate) fn usable<T: Real>(signal: T) -> Option<T> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Direction<T> {
     /// The branch of a positive rate.
-    pub(crate) rising: Branch,
-    pub(crate) dead_band: T,
+    pub rising: Branch,
+    /// The largest rate that keeps the branch.
+    pub dead_band: T,
 }
 
 impl<T: Real> Direction<T> {

@@ -12,6 +12,7 @@ mod front;
 mod gains;
 mod history;
 mod map;
+pub mod numbers;
 mod observer;
 mod one;
 mod reading;

@@ -19,10 +19,13 @@ pub struct Point<T> {
     pub domain: Domain,
 }
 
+/// The ends of an input's domain.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Bounds<T> {
-    min: T,
-    max: T,
+pub struct Bounds<T> {
+    /// The lower end.
+    pub min: T,
+    /// The upper end.
+    pub max: T,
 }
 
 impl<T: Real> Bounds<T> {
@@ -39,30 +42,43 @@ impl<T: Real> Bounds<T> {
     }
 }
 
+/// A line over `signal - offset`, in physical units: `intercept + slope (signal - offset)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line<T> {
-    signal: Bounds<T>,
-    offset: T,
-    slope: T,
-    intercept: T,
+    /// Where the signal is clamped to.
+    pub signal: Bounds<T>,
+    /// What is taken from the signal.
+    pub offset: T,
+    /// Reference units per signal unit.
+    pub slope: T,
+    /// The reference at `offset`.
+    pub intercept: T,
 }
 
 /// A surface over `signal - offset` and `rate - rate_offset`, in physical units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sheet<T, S> {
-    signal: Bounds<T>,
-    rate: Bounds<T>,
-    offset: T,
-    rate_offset: T,
-    surface: S,
+    /// Where the signal is clamped to.
+    pub signal: Bounds<T>,
+    /// Where its rate is clamped to.
+    pub rate: Bounds<T>,
+    /// What is taken from the signal.
+    pub offset: T,
+    /// What is taken from the rate.
+    pub rate_offset: T,
+    /// Reference units over what is left.
+    pub surface: S,
 }
 
 /// A calibration, folded. The rate it takes is the signal's own, unsigned by polarity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(clippy::large_enum_variant)] // no allocator to box with; one lives in a program
 pub enum Map<T> {
+    /// One line for both branches.
     Line(Line<T>),
+    /// Inflation, deflation.
     Poly13([Sheet<T, Poly13<T>>; 2]),
+    /// The same with terms beyond poly13.
     Surface([Sheet<T, Surface<T>>; 2]),
 }
 

@@ -38,31 +38,52 @@ pub type ObserverReceptor<T> = Front<Observer<T>>;
 /// The model of an [`ObserverReceptor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observer<T> {
-    sign: T,
-    rest: RestLevel<T>,
-    knots: usize,
+    /// Multiplies the signal: -1 where it falls as the target rises.
+    pub sign: T,
+    /// The baseline, where one is followed.
+    pub rest: RestLevel<T>,
+    /// Knots of the curve.
+    pub knots: usize,
     /// Signed signals at the knots, rising.
-    curve: [T; MAX_KNOTS],
-    drive_low: T,
-    drive_step: T,
-    per_step: T,
-    relaxations: usize,
-    shares: [T; MAX_OBSERVER_RELAXATIONS],
-    amplitudes: [T; MAX_OBSERVER_RELAXATIONS],
-    lead_s: T,
-    plays: usize,
-    radii: [T; MAX_OBSERVER_PLAYS],
-    play_weights: [T; MAX_OBSERVER_PLAYS],
-    ends: [T; SLOPES - 1],
-    gains: [[T; STATES]; SLOPES],
-    period_s: T,
-    low: T,
-    high: T,
-    gain: T,
-    zero: T,
-    dead_band: T,
+    pub curve: [T; MAX_KNOTS],
+    /// The drive of the first knot.
+    pub drive_low: T,
+    /// From knot to knot.
+    pub drive_step: T,
+    /// Its reciprocal.
+    pub per_step: T,
+    /// How many there are.
+    pub relaxations: usize,
+    /// The share of the way that each goes in a sample.
+    pub shares: [T; MAX_OBSERVER_RELAXATIONS],
+    /// What each adds to the drive.
+    pub amplitudes: [T; MAX_OBSERVER_RELAXATIONS],
+    /// Seconds by which the signal leads.
+    pub lead_s: T,
+    /// How many there are.
+    pub plays: usize,
+    /// Their half-widths.
+    pub radii: [T; MAX_OBSERVER_PLAYS],
+    /// What each adds to the drive.
+    pub play_weights: [T; MAX_OBSERVER_PLAYS],
+    /// Below `ends[k]`, and not below the one before, a slope has the gains `gains[k]`.
+    pub ends: [T; SLOPES - 1],
+    /// State (target, rate, relaxations) per signal.
+    pub gains: [[T; STATES]; SLOPES],
+    /// Seconds from a sample to the next.
+    pub period_s: T,
+    /// The least target.
+    pub low: T,
+    /// The greatest.
+    pub high: T,
+    /// Reference units per target.
+    pub gain: T,
+    /// The reference at a target of zero.
+    pub zero: T,
+    /// The largest rate of the target that keeps the branch.
+    pub dead_band: T,
     /// The signal where the target rests, memory settled.
-    at_rest: T,
+    pub at_rest: T,
 }
 
 /// What an [`ObserverReceptor`]'s model remembers: its states, the plays, the baseline.

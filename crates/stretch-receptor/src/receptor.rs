@@ -71,6 +71,23 @@ pub struct Surfaces<T, R, A> {
     period_s: T,
 }
 
+impl<T: Real, R, A> Surfaces<T, R, A> {
+    /// The line or the surfaces, folded.
+    pub fn map(&self) -> &Map<T> {
+        &self.map
+    }
+
+    /// How the rate chooses the branch.
+    pub fn direction(&self) -> Direction<T> {
+        self.direction
+    }
+
+    /// Seconds from a sample to the next.
+    pub fn period_s(&self) -> T {
+        self.period_s
+    }
+}
+
 /// What a [`StretchReceptor`]'s model remembers: the estimator's memory and the last sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacesMemory<T, M> {

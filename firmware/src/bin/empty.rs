@@ -13,6 +13,6 @@ fn step(_: &(), _: &mut (), _: AdcCode) -> Answer<i32> {
 
 #[entry]
 fn main() -> ! {
-    replay("empty", &(), &mut (), |code| code, step);
+    replay("empty", &(), &mut (), |code| code, step, |answer| answer);
     semihosting::process::exit(0)
 }

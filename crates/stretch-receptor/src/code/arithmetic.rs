@@ -2,7 +2,10 @@
 
 use stretch_core::DesignError;
 
-use super::{fold::Folded, sheet::Sheets};
+use super::{
+    fold::Folded,
+    sheet::{Sheets, Span},
+};
 
 pub(super) mod sealed {
     use super::*;
@@ -19,8 +22,17 @@ pub(super) mod sealed {
             sheets: &Sheets<Self::Line, Self::Surface>,
             rate_rounding: f64,
         ) -> Option<f64>;
-        fn line(line: &Self::Line, volts: i32) -> Self::Estimate;
-        fn surface(surface: &Self::Surface, rate: i32, volts: i32) -> Self::Estimate;
+        /// As the step evaluates it: a float takes the factor of the span into its coefficients.
+        fn line_over(line: Self::Line, signal: &Span) -> Self::Line;
+        fn surface_over(surface: Self::Surface, signal: &Span, rate: &Span) -> Self::Surface;
+        /// At a signal inside its span.
+        fn line(line: &Self::Line, signal: &Span, volts: i32) -> Self::Estimate;
+        /// At a rate and a signal inside their spans.
+        fn surface(
+            surface: &Self::Surface,
+            volts: (&Span, i32),
+            rate: (&Span, i32),
+        ) -> Self::Estimate;
         fn valid_line(line: &Self::Line) -> Result<(), DesignError>;
         fn valid_surface(surface: &Self::Surface) -> Result<(), DesignError>;
     }

@@ -1,12 +1,15 @@
 //! A calibration converted for a converter's codes.
 
-use stretch_core::{Calibration, DesignError, Polarity, RateEstimator, SampleRate};
-use stretch_filter::FixedSgRate;
+use stretch_core::{
+    Calibration, DesignError, Polarity, RateEstimator, SampleRate,
+    fixed::{FixedLine, FixedPoly13},
+};
+use stretch_filter::{FixedSgIntegers, FixedSgRate};
 
 use super::{
     adc::Adc,
     arithmetic::CodeArithmetic,
-    fixed_arithmetic::{Fixed, worst_case},
+    fixed_arithmetic::{Fixed, Scaled, worst_case},
     fold::{Units, fold},
     sheet::Sheets,
 };
@@ -52,6 +55,21 @@ pub struct CodeCalibration<
 /// A calibration in fixed point: [`CodeCalibration`] in [`Fixed`].
 pub type FixedCalibration<const WINDOW: usize, const DEGREE: usize, const DELAY: usize = 0> =
     CodeCalibration<Fixed, WINDOW, DEGREE, DELAY>;
+
+/// What a [`FixedReceptor`](super::FixedReceptor) computes with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FixedNumbers {
+    /// Bits of the converter.
+    pub adc_bits: u8,
+    /// The target falls as the signal rises.
+    pub falling: bool,
+    /// The largest integer rate that keeps the branch.
+    pub dead_band: i32,
+    /// A line, or a surface a branch.
+    pub sheets: Sheets<Scaled<FixedLine>, Scaled<FixedPoly13>>,
+    /// The rate.
+    pub rate: FixedSgIntegers,
+}
 
 impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
     CodeCalibration<A, WINDOW, DEGREE, DELAY>
@@ -125,6 +143,17 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
 impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
     FixedCalibration<WINDOW, DEGREE, DELAY>
 {
+    /// The integers, the shape forgotten: for whoever writes the step in another language.
+    pub fn numbers(&self) -> FixedNumbers {
+        FixedNumbers {
+            adc_bits: self.bits,
+            falling: self.falling,
+            dead_band: self.dead_band,
+            sheets: self.sheets,
+            rate: FixedSgRate::<u16, WINDOW, DEGREE, DELAY>::INTEGERS,
+        }
+    }
+
     /// The most that an estimate can differ from the calibration in real
     /// numbers on the same codes, in thousandths of the reference's unit
     /// (micrometres for a reference in millimetres).

@@ -8,7 +8,7 @@ use stretch_core::{
 use super::{
     arithmetic::{CodeArithmetic, sealed},
     fold::Folded,
-    sheet::{COARSE_BITS, Sheets},
+    sheet::{COARSE_BITS, Sheets, Span},
 };
 
 /// 32-bit fixed point; estimates are thousandths of the reference's unit.
@@ -19,9 +19,10 @@ pub enum Fixed {}
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Scaled<S> {
-    pub(super) of: S,
+    /// The line or surface.
+    pub of: S,
     /// `2^(32 - bits)`: what the upper word of a product with it makes thousandths.
-    pub(super) thousandths: i32,
+    pub thousandths: i32,
 }
 
 impl<S> Scaled<S> {
@@ -63,13 +64,23 @@ impl sealed::Arithmetic for Fixed {
         Some(worst_case(sheets, rate_rounding))
     }
 
-    #[inline(always)]
-    fn line(line: &Self::Line, volts: i32) -> i32 {
-        line.finish(line.of.eval(volts))
+    fn line_over(line: Self::Line, _: &Span) -> Self::Line {
+        line
+    }
+    fn surface_over(surface: Self::Surface, _: &Span, _: &Span) -> Self::Surface {
+        surface
     }
     #[inline(always)]
-    fn surface(surface: &Self::Surface, rate: i32, volts: i32) -> i32 {
-        surface.finish(surface.of.eval(rate, volts))
+    fn line(line: &Self::Line, signal: &Span, volts: i32) -> i32 {
+        line.finish(line.of.eval(signal.spread(volts)))
+    }
+    #[inline(always)]
+    fn surface(
+        surface: &Self::Surface,
+        (signal, volts): (&Span, i32),
+        (rate_span, rate): (&Span, i32),
+    ) -> i32 {
+        surface.finish(surface.of.eval(rate_span.spread(rate), signal.spread(volts)))
     }
     fn valid_line(line: &Self::Line) -> Result<(), DesignError> {
         line.check()

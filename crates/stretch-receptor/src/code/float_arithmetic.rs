@@ -5,7 +5,7 @@ use stretch_core::{DesignError, Poly13, Real};
 use super::{
     arithmetic::{CodeArithmetic, sealed},
     fold::Folded,
-    sheet::Sheets,
+    sheet::{Sheets, Span},
 };
 
 macro_rules! float {
@@ -24,12 +24,32 @@ macro_rules! float {
                 None
             }
 
+            // a factor is a power of two: whether it multiplies an input or a coefficient, the bits are the same
+            fn line_over([intercept, slope]: Self::Line, signal: &Span) -> Self::Line {
+                [intercept, slope * signal.factor as $float]
+            }
+            fn surface_over(p: Self::Surface, signal: &Span, rate: &Span) -> Self::Surface {
+                let (v, r) = (signal.factor as $float, rate.factor as $float);
+                Poly13 {
+                    p00: p.p00,
+                    p10: p.p10 * r,
+                    p01: p.p01 * v,
+                    p11: p.p11 * r * v,
+                    p02: p.p02 * v * v,
+                    p12: p.p12 * r * v * v,
+                    p03: p.p03 * v * v * v,
+                }
+            }
             #[inline(always)]
-            fn line(&[intercept, slope]: &Self::Line, volts: i32) -> $float {
+            fn line(&[intercept, slope]: &Self::Line, _: &Span, volts: i32) -> $float {
                 intercept + slope * volts as $float
             }
             #[inline(always)]
-            fn surface(surface: &Self::Surface, rate: i32, volts: i32) -> $float {
+            fn surface(
+                surface: &Self::Surface,
+                (_, volts): (&Span, i32),
+                (_, rate): (&Span, i32),
+            ) -> $float {
                 surface.eval(rate as $float, volts as $float)
             }
             fn valid_line(line: &Self::Line) -> Result<(), DesignError> {
@@ -66,4 +86,44 @@ fn float<T: Real>(folded: &Folded) -> Result<Sheets<[T; 2], Poly13<T>>, DesignEr
             })
         },
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use sealed::Arithmetic;
+
+    proptest! {
+        #[test]
+        fn a_factor_on_the_coefficients_gives_the_bits_of_one_on_the_inputs(
+            p in proptest::array::uniform7(-300.0..300.0f64),
+            ends in (1i32..1 << 30, 1i32..1 << 30),
+            shares in (-1.0..1.0f64, -1.0..1.0f64),
+        ) {
+            let (signal, rate) = (Span::new(-ends.0, ends.0), Span::new(-ends.1, ends.1));
+            let scaled = |c: f64, powers: i32| libm::ldexp(c, -32 * powers) as f32;
+            let [p00, p10, p01, p11, p02, p12, p03] = p;
+            let p = Poly13 {
+                p00: p00 as f32,
+                p10: scaled(p10, 1),
+                p01: scaled(p01, 1),
+                p11: scaled(p11, 2),
+                p02: scaled(p02, 2),
+                p12: scaled(p12, 3),
+                p03: scaled(p03, 3),
+            };
+            let volts = (shares.0 * f64::from(ends.0)) as i32;
+            let r = (shares.1 * f64::from(ends.1)) as i32;
+            let over = f32::surface_over(p, &signal, &rate);
+            let found = f32::surface(&over, (&signal, volts), (&rate, r));
+            let spread = p.eval(rate.spread(r) as f32, signal.spread(volts) as f32);
+            prop_assert_eq!(found.to_bits(), spread.to_bits());
+            let line = [p.p00, p.p01];
+            let found = f32::line(&f32::line_over(line, &signal), &signal, volts);
+            let spread = line[0] + line[1] * signal.spread(volts) as f32;
+            prop_assert_eq!(found.to_bits(), spread.to_bits());
+        }
+    }
 }

@@ -33,8 +33,10 @@ mod sheet;
 
 pub use adc::{Adc, AdcCode, AdcSpec};
 pub use arithmetic::CodeArithmetic;
-pub use calibration::{CODE_SCHEMA, CodeCalibration, FixedCalibration};
-pub use fixed_arithmetic::Fixed;
-pub use observer::FixedObserver;
+pub use calibration::{CODE_SCHEMA, CodeCalibration, FixedCalibration, FixedNumbers};
+pub use fixed_arithmetic::{Fixed, Scaled};
+pub use observer::{FixedObserver, IntegerObserver};
+pub use observer_numbers::{Numbers, Rest};
 pub use reading::CodeReading;
 pub use receptor::{CodeReceptor, FixedReceptor};
+pub use sheet::{Sheet, Sheets, Span};

@@ -48,14 +48,16 @@ pub type FixedObserver = Front<IntegerObserver>;
 /// The model of a [`FixedObserver`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IntegerObserver {
-    n: Numbers,
+    /// What the record holds.
+    pub numbers: Numbers,
     /// Places per signal inside each segment, times `2^recip_bits`.
-    recips: [i32; KNOTS],
-    recip_bits: u32,
+    pub recips: [i32; KNOTS],
+    /// See `recips`.
+    pub recip_bits: u32,
     /// The gains of each segment's slope.
-    tangents: [u8; KNOTS],
+    pub tangents: [u8; KNOTS],
     /// The signal where the target rests, memory settled.
-    at_rest: i32,
+    pub at_rest: i32,
 }
 
 /// What a [`FixedObserver`]'s model remembers.
@@ -90,7 +92,7 @@ impl FixedObserver {
 
     /// Bits of the converter.
     pub fn adc_bits(&self) -> u8 {
-        self.model.n.adc_bits
+        self.model.numbers.adc_bits
     }
 }
 
@@ -105,7 +107,8 @@ impl IntegerObserver {
         {
             recip_bits += 1;
         }
-        let mut out = Self { n, recips: [0; KNOTS], recip_bits, tangents: [0; KNOTS], at_rest: 0 };
+        let mut out =
+            Self { numbers: n, recips: [0; KNOTS], recip_bits, tangents: [0; KNOTS], at_rest: 0 };
         for k in 0..knots - 1 {
             let whole = 1i64 << (PLACE_BITS + recip_bits);
             out.recips[k] = saturate(whole / i64::from(rise(k)));
@@ -119,15 +122,15 @@ impl IntegerObserver {
     /// The place, in knots, that a signal suggests by itself, and the signal held to the curve.
     #[inline(always)]
     fn inverse(&self, signal: i32) -> (i32, i32) {
-        let last = usize::from(self.n.knots) - 1;
-        let held = signal.max(self.n.curve[0]).min(self.n.curve[last]);
+        let last = usize::from(self.numbers.knots) - 1;
+        let held = signal.max(self.numbers.curve[0]).min(self.numbers.curve[last]);
         let (mut below, mut above) = (0, last);
         while above - below > 1 {
             let middle = (below + above) / 2;
-            if self.n.curve[middle % KNOTS] <= held { below = middle } else { above = middle }
+            if self.numbers.curve[middle % KNOTS] <= held { below = middle } else { above = middle }
         }
         let below = below % KNOTS;
-        let part = i64::from(held - self.n.curve[below]) * i64::from(self.recips[below]);
+        let part = i64::from(held - self.numbers.curve[below]) * i64::from(self.recips[below]);
         let share = (part >> self.recip_bits) as i32;
         (((below as i32) << PLACE_BITS) + share, held)
     }
@@ -135,27 +138,27 @@ impl IntegerObserver {
     /// The signal at a drive, its segment, and its place held to the curve.
     #[inline(always)]
     fn forward(&self, drive: i32) -> (i32, usize, i32) {
-        let last = i32::from(self.n.knots) - 1;
-        let from_low = i64::from(drive.saturating_sub(self.n.drive_low));
-        let place = saturate((from_low * i64::from(self.n.per_step)) >> 32);
+        let last = i32::from(self.numbers.knots) - 1;
+        let from_low = i64::from(drive.saturating_sub(self.numbers.drive_low));
+        let place = saturate((from_low * i64::from(self.numbers.per_step)) >> 32);
         let place = place.max(0).min(last << PLACE_BITS);
         let below = ((place >> PLACE_BITS).min(last - 1) as usize) % KNOTS;
-        let rise = self.n.curve[(below + 1) % KNOTS] - self.n.curve[below];
+        let rise = self.numbers.curve[(below + 1) % KNOTS] - self.numbers.curve[below];
         let share = place - ((below as i32) << PLACE_BITS);
         let risen = (i64::from(rise) * i64::from(share)) >> PLACE_BITS;
-        (self.n.curve[below] + risen as i32, below, place)
+        (self.numbers.curve[below] + risen as i32, below, place)
     }
 
     /// The drive of a target that stands at `y` and moves by `rate` a sample.
     #[inline(always)]
     fn drive(&self, memory: &IntegerMemory, y: i32, rate: i32) -> i32 {
-        let mut sum = i64::from(self.n.lead) * i64::from(rate);
-        for i in 0..usize::from(self.n.relaxations).min(MAX_OBSERVER_RELAXATIONS) {
-            sum += i64::from(self.n.amplitudes[i]) * i64::from(y - memory.slow[i]);
+        let mut sum = i64::from(self.numbers.lead) * i64::from(rate);
+        for i in 0..usize::from(self.numbers.relaxations).min(MAX_OBSERVER_RELAXATIONS) {
+            sum += i64::from(self.numbers.amplitudes[i]) * i64::from(y - memory.slow[i]);
         }
-        for j in 0..usize::from(self.n.plays).min(MAX_OBSERVER_PLAYS) {
-            let played = play(memory.plays[j], y, self.n.radii[j]);
-            sum += i64::from(self.n.play_weights[j]) * i64::from(y - played);
+        for j in 0..usize::from(self.numbers.plays).min(MAX_OBSERVER_PLAYS) {
+            let played = play(memory.plays[j], y, self.numbers.radii[j]);
+            sum += i64::from(self.numbers.play_weights[j]) * i64::from(y - played);
         }
         let drive = i64::from(y) + (sum >> WEIGHT_BITS);
         drive.clamp((-MOST_DRIVE).into(), MOST_DRIVE.into()) as i32
@@ -163,9 +166,9 @@ impl IntegerObserver {
 
     #[inline(always)]
     fn predict(&self, memory: &mut IntegerMemory) {
-        memory.target = (memory.target + memory.rate).max(self.n.low).min(self.n.high);
-        for i in 0..usize::from(self.n.relaxations).min(MAX_OBSERVER_RELAXATIONS) {
-            let step = part(memory.target - memory.slow[i], self.n.shares[i]);
+        memory.target = (memory.target + memory.rate).max(self.numbers.low).min(self.numbers.high);
+        for i in 0..usize::from(self.numbers.relaxations).min(MAX_OBSERVER_RELAXATIONS) {
+            let step = part(memory.target - memory.slow[i], self.numbers.shares[i]);
             memory.slow[i] += step;
         }
     }
@@ -181,19 +184,22 @@ impl IntegerObserver {
         if run > LEAST_RUN {
             // steeper than an end: change/run >= end, without a division
             let change = i64::from(change) << PLACE_BITS;
-            while place < SLOPES - 1 && change >= i64::from(self.n.ends[place]) * i64::from(run) {
+            while place < SLOPES - 1
+                && change >= i64::from(self.numbers.ends[place]) * i64::from(run)
+            {
                 place += 1;
             }
         }
-        let last = self.n.curve[usize::from(self.n.knots - 1) % KNOTS];
-        let (first, span) = (self.n.curve[0], last - self.n.curve[0]);
+        let last = self.numbers.curve[usize::from(self.numbers.knots - 1) % KNOTS];
+        let (first, span) = (self.numbers.curve[0], last - self.numbers.curve[0]);
         let surprise = i64::from(signal.max(first - span).min(last + span) - predicted);
-        let gains = &self.n.gains[place.min(SLOPES - 1)];
-        let half = (1i64 << self.n.gain_bits) >> 1;
-        let pull = |k: usize| saturate((i64::from(gains[k]) * surprise + half) >> self.n.gain_bits);
+        let gains = &self.numbers.gains[place.min(SLOPES - 1)];
+        let half = (1i64 << self.numbers.gain_bits) >> 1;
+        let pull =
+            |k: usize| saturate((i64::from(gains[k]) * surprise + half) >> self.numbers.gain_bits);
         memory.target = memory.target.saturating_add(pull(0));
         memory.rate = memory.rate.saturating_add(pull(1)).clamp(-FASTEST, FASTEST);
-        for i in 0..usize::from(self.n.relaxations).min(MAX_OBSERVER_RELAXATIONS) {
+        for i in 0..usize::from(self.numbers.relaxations).min(MAX_OBSERVER_RELAXATIONS) {
             let moved = memory.slow[i].saturating_add(pull(2 + i));
             memory.slow[i] = moved.clamp(-FURTHEST, FURTHEST);
         }
@@ -203,28 +209,28 @@ impl IntegerObserver {
 
     #[inline(always)]
     fn hold(&self, memory: &mut IntegerMemory) {
-        if memory.target < self.n.low {
-            memory.target = self.n.low;
+        if memory.target < self.numbers.low {
+            memory.target = self.numbers.low;
             memory.rate = memory.rate.max(0);
         }
-        if memory.target > self.n.high {
-            memory.target = self.n.high;
+        if memory.target > self.numbers.high {
+            memory.target = self.numbers.high;
             memory.rate = memory.rate.min(0);
         }
-        for j in 0..usize::from(self.n.plays).min(MAX_OBSERVER_PLAYS) {
-            memory.plays[j] = play(memory.plays[j], memory.target, self.n.radii[j]);
+        for j in 0..usize::from(self.numbers.plays).min(MAX_OBSERVER_PLAYS) {
+            memory.plays[j] = play(memory.plays[j], memory.target, self.numbers.radii[j]);
         }
     }
 
     /// The signal above the baseline, which is moved on.
     #[inline(always)]
     fn above_rest(&self, memory: &mut IntegerMemory, signal: i32) -> i32 {
-        let rest = &self.n.rest;
+        let rest = &self.numbers.rest;
         if rest.pull == 0 {
             return signal;
         }
         let shift = if memory.begun() {
-            self.forward(self.drive(memory, self.n.low, 0)).0 - self.at_rest
+            self.forward(self.drive(memory, self.numbers.low, 0)).0 - self.at_rest
         } else {
             0
         };
@@ -240,9 +246,9 @@ impl IntegerObserver {
 
     fn begin(&self, memory: &mut IntegerMemory, signal: i32) {
         let (place, _) = self.inverse(signal);
-        let drive =
-            ((i64::from(place) << 32) / i64::from(self.n.per_step)) + i64::from(self.n.drive_low);
-        let target = saturate(drive).max(self.n.low).min(self.n.high);
+        let drive = ((i64::from(place) << 32) / i64::from(self.numbers.per_step))
+            + i64::from(self.numbers.drive_low);
+        let target = saturate(drive).max(self.numbers.low).min(self.numbers.high);
         memory.target = target;
         memory.rate = 0;
         memory.slow = [target; MAX_OBSERVER_RELAXATIONS];
@@ -274,7 +280,7 @@ impl Live for IntegerObserver {
     #[inline(always)]
     fn signal(&self, code: AdcCode) -> Option<i32> {
         // a negative number is a large unsigned one
-        ((code.0 as u32) < self.n.codes()).then(|| self.n.signal(code))
+        ((code.0 as u32) < self.numbers.codes()).then(|| self.numbers.signal(code))
     }
 
     #[inline(always)]
@@ -291,10 +297,10 @@ impl Live for IntegerObserver {
             self.begin(memory, signal);
         }
         let on_curve = self.correct(memory, signal);
-        *branch = branch.next(memory.rate, self.n.dead_band);
-        let scaled = self.n.zero + i64::from(self.n.gain) * i64::from(memory.target);
+        *branch = branch.next(memory.rate, self.numbers.dead_band);
+        let scaled = self.numbers.zero + i64::from(self.numbers.gain) * i64::from(memory.target);
         Some(CodeReading {
-            estimate: saturate(scaled >> (TARGET_BITS + u32::from(self.n.output_bits))),
+            estimate: saturate(scaled >> (TARGET_BITS + u32::from(self.numbers.output_bits))),
             branch: *branch,
             domain: Domain::from_flags(!on_curve, false),
         })
@@ -330,7 +336,7 @@ mod record {
 
     impl Serialize for FixedObserver {
         fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-            self.model.n.serialize(serializer)
+            self.model.numbers.serialize(serializer)
         }
     }
 

@@ -30,36 +30,56 @@ const MOST_WEIGHT: i32 = 16 << WEIGHT_BITS;
 const MOST_LEAD: i32 = 1000 << WEIGHT_BITS;
 
 /// Everything that a [`FixedObserver`](super::FixedObserver) computes with. Signals are in
-/// `2^-SIGNAL_BITS` of a 16-bit sample, signed by polarity.
+/// `2^-12` of a 16-bit sample, signed by polarity; targets, drives and rates a sample have 26
+/// bits behind the point, weights 20, places between knots 16, shares 31.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(super) struct Numbers {
+pub struct Numbers {
+    /// First, so that a newer record is refused before the rest is read.
     pub schema: u32,
+    /// Bits of the converter.
     pub adc_bits: u8,
+    /// The signal falls as the target rises.
     pub falling: bool,
+    /// Knots of the curve.
     pub knots: u8,
+    /// Signals at the knots, rising.
     pub curve: [i32; KNOTS],
+    /// The drive of the first knot.
     pub drive_low: i32,
     /// Places per drive, times `2^(32 + PLACE_BITS - TARGET_BITS)`.
     pub per_step: i32,
+    /// The share of the way that each relaxation goes in a sample.
     pub shares: [i32; MAX_OBSERVER_RELAXATIONS],
+    /// What each adds to the drive.
     pub amplitudes: [i32; MAX_OBSERVER_RELAXATIONS],
+    /// Samples by which the signal leads.
     pub lead: i32,
+    /// Half-widths of the plays.
     pub radii: [i32; MAX_OBSERVER_PLAYS],
+    /// What each adds to the drive.
     pub play_weights: [i32; MAX_OBSERVER_PLAYS],
+    /// How many there are.
     pub relaxations: u8,
+    /// How many there are.
     pub plays: u8,
     /// Signal per place between gains.
     pub ends: [i32; SLOPES - 1],
     /// State per signal, times `2^gain_bits`.
     pub gains: [[i32; STATES]; SLOPES],
+    /// See `gains`.
     pub gain_bits: u8,
+    /// The least target.
     pub low: i32,
+    /// The greatest.
     pub high: i32,
+    /// The largest rate that keeps the branch.
     pub dead_band: i32,
     /// Thousandths at a target of 0, a half included, and per target, times `2^output_bits`.
     pub zero: i64,
+    /// See `zero`.
     pub gain: i32,
+    /// See `zero`.
     pub output_bits: u8,
     /// Nothing is followed without a pull.
     pub rest: Rest,
@@ -68,12 +88,18 @@ pub(super) struct Numbers {
 /// The baseline's numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(super) struct Rest {
+pub struct Rest {
+    /// The resting signal.
     pub level: i32,
+    /// Share of the excess that is taken up in a sample.
     pub pull: i32,
+    /// What the baseline rises by in a sample without excess.
     pub leak: i32,
+    /// Share of a sample in the running average of the excess.
     pub average: i32,
+    /// The most that an excess counts for.
     pub most: i32,
+    /// The furthest that the baseline goes.
     pub furthest: i32,
 }
 

@@ -4,8 +4,12 @@ use stretch_core::{Branch, Design, Stage};
 use stretch_filter::{FixedSgMemory, FixedSgRate};
 
 use super::{
-    adc::AdcCode, arithmetic::CodeArithmetic, calibration::CodeCalibration,
-    fixed_arithmetic::Fixed, reading::CodeReading, sheet::Sheets,
+    adc::AdcCode,
+    arithmetic::CodeArithmetic,
+    calibration::CodeCalibration,
+    fixed_arithmetic::Fixed,
+    reading::CodeReading,
+    sheet::{Sheet, Sheets},
 };
 use crate::{
     Front,
@@ -105,6 +109,16 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
         let bits = u32::from(bits.min(16));
         let mirror = -i32::from(falling);
         let (codes, align) = (1 << bits, 1 << (16 - bits));
+        let sheets =
+            match sheets {
+                Sheets::Line(s) => {
+                    Sheets::Line(Sheet { surface: A::line_over(s.surface, &s.signal), ..s })
+                }
+                Sheets::Poly13(both) => Sheets::Poly13(both.map(|s| Sheet {
+                    surface: A::surface_over(s.surface, &s.signal, &s.rate),
+                    ..s
+                })),
+            };
         Self { model: CodeSurfaces { codes, align, dead_band, mirror, sheets } }
     }
 }
@@ -166,12 +180,13 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
         let (estimate, domain) = match &self.sheets {
             Sheets::Line(sheet) => {
                 let (volts, domain) = sheet.input(sample);
-                (A::line(&sheet.surface, volts), domain)
+                (A::line(&sheet.surface, &sheet.signal, volts), domain)
             }
             Sheets::Poly13(sheets) => {
                 let sheet = &sheets[usize::from(now.0 & 1)];
                 let (volts, rate, domain) = sheet.inputs(sample, rate);
-                (A::surface(&sheet.surface, rate, volts), domain)
+                let (volts, rate) = ((&sheet.signal, volts), (&sheet.rate, rate));
+                (A::surface(&sheet.surface, volts, rate), domain)
             }
         };
         Some(CodeReading { estimate, branch, domain })

@@ -12,6 +12,7 @@ pub(super) const COARSE_BITS: u32 = 15;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Span {
+    /// The lower end.
     pub min: i32,
     /// From the lower end to the upper one.
     pub width: u32,
@@ -36,16 +37,17 @@ impl Span {
         self.factor > 0 && fits(self.min.into()) && fits(max)
     }
 
-    /// The nearest value inside, spread; and 1 for a value that was outside.
+    /// The nearest value inside; and 1 for a value that was outside.
     #[inline(always)]
     fn clamp(&self, x: i32) -> (i32, u8) {
         // one comparison: below the lower end the difference wraps to a large number
-        let (inside, outside) = if x.wrapping_sub(self.min) as u32 <= self.width {
-            (x, 0)
-        } else {
-            self.nearest_end(x)
-        };
-        (inside.wrapping_mul(self.factor), outside)
+        if x.wrapping_sub(self.min) as u32 <= self.width { (x, 0) } else { self.nearest_end(x) }
+    }
+
+    /// A value inside, spread over 32 bits.
+    #[inline(always)]
+    pub(super) fn spread(&self, inside: i32) -> i32 {
+        inside.wrapping_mul(self.factor)
     }
 
     #[cold]
@@ -60,13 +62,16 @@ impl Span {
 pub struct Sheet<S> {
     /// The code, aligned to 16 bits, that the surface is expanded about.
     pub centre: u16,
+    /// Where the signal is clamped to: `2^15` of a 16-bit sample, from the centre.
     pub signal: Span,
+    /// Where the integer rate is clamped to.
     pub rate: Span,
+    /// Over signal and rate, spread.
     pub surface: S,
 }
 
 impl<S> Sheet<S> {
-    /// Signal and rate as the surface takes them.
+    /// Signal and rate inside the domain, not yet spread.
     #[inline(always)]
     pub(super) fn inputs(&self, sample: u16, rate: i32) -> (i32, i32, Domain) {
         let (volts, signal_outside) = self.signal.clamp(self.coarse(sample));
@@ -103,6 +108,7 @@ fn domain(outside: u8) -> Domain {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Sheets<L, P> {
+    /// One line for both branches.
     Line(Sheet<L>),
     /// Inflation, deflation.
     Poly13([Sheet<P>; 2]),

@@ -1,0 +1,99 @@
+//! A header as a library that the Arduino IDE takes.
+
+use crate::{Form, HEADER, Header};
+
+/// A file of a library folder.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct File {
+    /// Where it lies in the folder, parts divided by `/`.
+    pub path: String,
+    /// What it says.
+    pub text: String,
+}
+
+/// The library: its properties, the header in `src`, an example that reads A0 at the
+/// calibration's sample rate, and the words that the IDE colours.
+///
+/// The folder goes into the sketchbook's `libraries`. Source: Arduino library specification,
+/// revision 2.2 (format 1.5).
+///
+/// ```
+/// use stretch_calibrate::parse_adc;
+/// use stretch_export::{Options, arduino_library, header};
+/// let options = Options { form: None, adc: parse_adc("12,0,3.3")? };
+/// let header = header(&stretch_receptor::example_calibration(), &options)?;
+/// let paths: Vec<_> = arduino_library(&header).into_iter().map(|file| file.path).collect();
+/// assert_eq!(paths, ["library.properties", "keywords.txt", "src/stretch.h", "examples/Live/Live.ino"]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn arduino_library(header: &Header) -> Vec<File> {
+    let file = |path: &str, text: String| File { path: path.into(), text };
+    vec![
+        file("library.properties", properties(header)),
+        file("keywords.txt", keywords()),
+        file(&format!("src/{HEADER}"), header.text.clone()),
+        file("examples/Live/Live.ino", live(header.form)),
+    ]
+}
+
+fn properties(header: &Header) -> String {
+    let Header { model, form, .. } = header;
+    format!(
+        "name=StretchReceptor\nversion={}\nauthor=The stretch developers\nmaintainer=The stretch developers\n\
+         sentence=Length from a stretch sensor's voltage, by one calibration.\nparagraph=Model {model}, form \
+         {form}. Missing samples are bridged, and every reading says whether it is inside the calibrated \
+         domain. The same bits as on the desk.\ncategory=Sensors\nurl=\narchitectures=*\nincludes={HEADER}\n",
+        env!("CARGO_PKG_VERSION"),
+    )
+}
+
+fn keywords() -> String {
+    let kinds: [(&str, &[&str]); 3] = [
+        ("KEYWORD1", &["stretch_state", "stretch_reading"]),
+        (
+            "KEYWORD2",
+            &[
+                "stretch_init",
+                "stretch_step",
+                "stretch_lost",
+                "stretch_start_on",
+                "stretch_self_test",
+            ],
+        ),
+        (
+            "LITERAL1",
+            &[
+                "STRETCH_OK",
+                "STRETCH_WARMING",
+                "STRETCH_MISSING",
+                "STRETCH_INFLATION",
+                "STRETCH_DEFLATION",
+                "STRETCH_INSIDE",
+                "STRETCH_SIGNAL_CLAMPED",
+                "STRETCH_RATE_CLAMPED",
+                "STRETCH_PERIOD_US",
+                "STRETCH_UNIT",
+            ],
+        ),
+    ];
+    // the IDE wants a tab between a word and its kind
+    let lines = |(kind, words): (&str, &[&str])| {
+        words.iter().map(|word| format!("{word}\t{kind}\n")).collect::<String>()
+    };
+    kinds.into_iter().map(lines).collect()
+}
+
+fn live(form: Form) -> String {
+    let (step, estimate) = match form {
+        Form::Fixed => (
+            "  stretch_reading reading = stretch_step(&state, analogRead(A0));",
+            "reading.estimate / 1000.0, 3",
+        ),
+        Form::Float => (
+            "  float volts = STRETCH_ADC_ZERO + STRETCH_ADC_PER_CODE * (float)analogRead(A0);\n  \
+             stretch_reading reading = stretch_step(&state, volts);",
+            "reading.estimate, 3",
+        ),
+    };
+    include_str!("arduino/Live.ino").replace("@STEP@", step).replace("@ESTIMATE@", estimate)
+}

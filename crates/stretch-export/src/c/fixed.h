@@ -1,0 +1,30 @@
+/* In place of a code: a sample that did not come, as any number that is no code. */
+#define STRETCH_NO_CODE (-1)
+
+/* Shifts of negative numbers must keep the sign, as on every known compiler for a board. */
+typedef char stretch_shifts_keep_signs[(-1 >> 1) == -1 ? 1 : -1];
+
+typedef struct stretch_reading {
+    int32_t estimate; /* thousandths of STRETCH_UNIT */
+    uint8_t status;
+    uint8_t branch;
+    uint8_t domain;
+} stretch_reading;
+
+STRETCH_INLINE stretch_reading stretch_answer(uint8_t status, uint8_t branch, uint8_t domain,
+                                             int32_t estimate)
+{
+    stretch_reading reading;
+    reading.estimate = estimate;
+    reading.status = status;
+    reading.branch = branch;
+    reading.domain = domain;
+    return reading;
+}
+
+/* a b, in 64 bits */
+STRETCH_INLINE int64_t stretch_product(int32_t a, int32_t b)
+{
+    return (int64_t)a * (int64_t)b;
+}
+

@@ -1,0 +1,48 @@
+#include <float.h>
+
+/* The same bits as on the desk: each operation rounded by itself, in 32 bits. */
+#if defined(__FAST_MATH__)
+#error "stretch: compile without -ffast-math, which gives other bits"
+#endif
+#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
+#error "stretch: float is computed in more than 32 bits; on x86 add -msse2 -mfpmath=sse"
+#endif
+/* No fused multiply-add. GCC takes it from here; for other compilers pass -ffp-contract=off or
+ * what they call it. */
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__)
+#pragma GCC push_options
+#pragma GCC optimize("fp-contract=off")
+#endif
+
+/* A sample beyond this size, or one that is not a number, is a sample that did not come. */
+#define STRETCH_LARGEST 1e18f
+#define STRETCH_NO_VOLTS 2e18f
+
+typedef struct stretch_reading {
+    float estimate; /* in STRETCH_UNIT */
+    float rate;     /* of the estimate, a second */
+    uint8_t status;
+    uint8_t branch;
+    uint8_t domain;
+} stretch_reading;
+
+STRETCH_INLINE stretch_reading stretch_answer(uint8_t status, uint8_t branch, uint8_t domain,
+                                             float estimate, float rate)
+{
+    stretch_reading reading;
+    reading.estimate = estimate;
+    reading.rate = rate;
+    reading.status = status;
+    reading.branch = branch;
+    reading.domain = domain;
+    return reading;
+}
+
+/* false for what is not a number as well */
+STRETCH_INLINE int stretch_usable(float x)
+{
+    return x >= -STRETCH_LARGEST && x <= STRETCH_LARGEST;
+}
+

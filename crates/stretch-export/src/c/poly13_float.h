@@ -1,0 +1,24 @@
+typedef struct stretch_sheet {
+    float signal_min, signal_max, rate_min, rate_max;
+    float offset, rate_offset;
+    float p00, p10, p01, p11, p02, p12, p03;
+} stretch_sheet;
+
+static const stretch_sheet stretch_sheets[2] = STRETCH_SHEETS;
+
+/* The estimate, and its change per change of the signal. */
+STRETCH_INLINE float stretch_estimate(const stretch_state *s, float x, float rate, float *slope,
+                                     uint8_t *outside)
+{
+    const stretch_sheet *p = &stretch_sheets[s->branch];
+    const float v =
+        stretch_clamp(x, p->signal_min, p->signal_max, STRETCH_SIGNAL_CLAMPED, outside) - p->offset;
+    const float r =
+        stretch_clamp(rate, p->rate_min, p->rate_max, STRETCH_RATE_CLAMPED, outside) -
+        p->rate_offset;
+    const float at_rest = ((p->p03 * v + p->p02) * v + p->p01) * v + p->p00;
+    const float by_rate = (p->p12 * v + p->p11) * v + p->p10;
+    *slope = (3.0f * p->p03 * v + 2.0f * (p->p02 + p->p12 * r)) * v + p->p01 + p->p11 * r;
+    return at_rest + r * by_rate;
+}
+

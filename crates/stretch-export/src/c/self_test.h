@@ -1,0 +1,22 @@
+/* ---- self-test ---- */
+
+/* Runs the samples below, 0 when every answer is the desk's, bit for bit; else the number of the
+ * first that is not, from 1. */
+static STRETCH_APART int stretch_self_test(void)
+{
+    static const stretch_sample samples[STRETCH_SELF_TEST] = {
+@ROWS@
+    };
+    stretch_state state;
+    int n;
+    stretch_init(&state);
+    for (n = 0; n < STRETCH_SELF_TEST; n++) {
+        const stretch_reading reading = stretch_step(&state, samples[n].@INPUT@);
+        const uint8_t flags =
+            (uint8_t)(reading.status | (reading.branch << 2) | (reading.domain << 3));
+        if (flags != samples[n].flags || @DIFFERS@) {
+            return n + 1;
+        }
+    }
+    return 0;
+}

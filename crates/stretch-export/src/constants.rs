@@ -1,0 +1,133 @@
+//! Numbers as C constants, each with what it is.
+
+use std::fmt::{Display, Write};
+
+/// A number that has a spelling in C99 and in C++11.
+pub(crate) trait Literal {
+    /// The spelling.
+    fn c(&self) -> String;
+}
+
+impl Literal for i32 {
+    fn c(&self) -> String {
+        // -2147483648 would be minus a number that is too large
+        if *self == Self::MIN { "(-2147483647 - 1)".into() } else { self.to_string() }
+    }
+}
+
+impl Literal for u32 {
+    fn c(&self) -> String {
+        format!("{self}u")
+    }
+}
+
+impl Literal for i64 {
+    fn c(&self) -> String {
+        format!("INT64_C({self})")
+    }
+}
+
+/// The fewest digits that give the same bits back.
+impl Literal for f32 {
+    fn c(&self) -> String {
+        format!("{self:?}f")
+    }
+}
+
+/// The constants of a header, in order.
+#[derive(Debug, Default)]
+pub(crate) struct Constants(String);
+
+impl Constants {
+    /// The text.
+    pub(crate) fn into_text(self) -> String {
+        self.0
+    }
+
+    /// `#define NAME value`, with what it is.
+    pub(crate) fn define(&mut self, name: &str, value: impl Literal, what: &str) -> &mut Self {
+        // a sign would join whatever stands before it
+        let value = match value.c() {
+            negative if negative.starts_with('-') => format!("({negative})"),
+            value => value,
+        };
+        self.word(name, value, what)
+    }
+
+    /// `#define NAME word`.
+    pub(crate) fn word(&mut self, name: &str, word: impl Display, what: &str) -> &mut Self {
+        let comment = if what.is_empty() { String::new() } else { format!(" /* {what} */") };
+        self.line(&format!("#define STRETCH_{name} {word}{comment}"))
+    }
+
+    /// `static const type stretch_name[n] = {..}`.
+    pub(crate) fn array<L: Literal>(&mut self, kind: &str, name: &str, values: &[L]) -> &mut Self {
+        let count = values.len();
+        self.line(&format!("static const {kind} stretch_{name}[{count}] = {};", braced(values)))
+    }
+
+    /// The same with rows of `N`.
+    pub(crate) fn rows<L: Literal, const N: usize>(
+        &mut self,
+        kind: &str,
+        name: &str,
+        rows: &[[L; N]],
+    ) -> &mut Self {
+        let count = rows.len();
+        let inner: Vec<String> = rows.iter().map(|row| format!("    {}", braced(row))).collect();
+        self.line(&format!(
+            "static const {kind} stretch_{name}[{count}][{N}] = {{\n{}\n}};",
+            inner.join(",\n")
+        ))
+    }
+
+    /// The sheets of a line or of both branches; a macro, because their type comes later.
+    pub(crate) fn sheets(&mut self, sheets: &[String]) -> &mut Self {
+        let rows = sheets.join(", \\\n        ");
+        self.line(&format!("#define STRETCH_SHEETS \\\n    {{ \\\n        {rows} \\\n    }}"))
+    }
+
+    /// A line as it is.
+    fn line(&mut self, line: &str) -> &mut Self {
+        self.0.push_str(line);
+        self.0.push('\n');
+        self
+    }
+}
+
+/// `{1, 2, 3}`, in lines of six.
+fn braced<L: Literal>(values: &[L]) -> String {
+    let mut out = String::from("{");
+    for (k, value) in values.iter().enumerate() {
+        let before = match k {
+            0 => "",
+            k if k % 6 == 0 => ",\n        ",
+            _ => ", ",
+        };
+        // writing to memory cannot fail
+        let _ = write!(out, "{before}{}", value.c());
+    }
+    out.push('}');
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_float_comes_back_with_its_bits() {
+        for x in [0.1f32, -0.0, 1e-40, f32::MAX, f32::MIN_POSITIVE, 1.0, 16_777_217.0] {
+            let c = x.c();
+            let back: f32 = c.trim_end_matches('f').parse().unwrap();
+            assert_eq!(back.to_bits(), x.to_bits(), "{c}");
+            assert!(c.contains(['.', 'e']), "{c} would be an integer with a wrong ending");
+        }
+    }
+
+    #[test]
+    fn the_least_integer_is_no_minus_of_a_larger_one() {
+        assert_eq!(i32::MIN.c(), "(-2147483647 - 1)");
+        assert_eq!((-5i32).c(), "-5");
+    }
+}

@@ -1,0 +1,42 @@
+//! Why there is no C.
+
+use stretch_calibrate::CalibrateError;
+use stretch_filter::FilterError;
+
+use crate::Form;
+
+/// Why a calibration could not be written in C.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExportError {
+    /// A model that nobody has written in C.
+    #[error(
+        "{model} has no form in C; those that have are linear, poly13, observer and observer+rest: calibrate with one of them as --model"
+    )]
+    NoForm {
+        /// The model.
+        model: String,
+    },
+    /// Integers were asked of a model that has none.
+    #[error("{0}; or export in --form float, which needs no converter")]
+    NoFixedForm(#[source] CalibrateError),
+    /// A rate that is written in C for no arithmetic.
+    #[error(
+        "the rate is {rate}, which has no form in C; calibrate with --rate savgol:WINDOW,DEGREE such as savgol:11,2"
+    )]
+    Rate {
+        /// The estimator.
+        rate: String,
+    },
+    /// A calibration that gives no receptor.
+    #[error("the calibration gives no receptor: {0}")]
+    Receptor(#[from] FilterError),
+    /// A record that the desk itself does not run: there are no answers to test against.
+    #[error(
+        "the record in the form {form} does not run on the desk; there is nothing to hold the C against"
+    )]
+    NoAnswers {
+        /// The form.
+        form: Form,
+    },
+}

@@ -1,0 +1,164 @@
+//! From a calibration to a header.
+
+use std::fmt::Write;
+
+use stretch_calibrate::{CalibrateError, RecordNumbers, fixed_record};
+use stretch_core::{Calibration, Model};
+
+use crate::{
+    ExportError, Form, Options,
+    constants::Constants,
+    models::{observer_fixed, observer_float, surfaces_fixed, surfaces_float},
+    part::Part,
+    self_test,
+};
+
+/// The name of the header's file.
+pub const HEADER: &str = "stretch.h";
+
+/// Samples of the self-test.
+pub const SELF_TEST_SAMPLES: usize = self_test::SAMPLES;
+
+/// A calibration in C.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Header {
+    /// The text of [`HEADER`].
+    pub text: String,
+    /// The arithmetic that it is in.
+    pub form: Form,
+    /// The model, as `--model` calls it.
+    pub model: String,
+}
+
+/// A calibration as a C99 header that compiles as C++11 too.
+///
+/// # Errors
+/// [`ExportError`] for a model or a rate that has no form in C, integers asked of a model
+/// that has none, and what [`fixed_record`] says of a converter that does not fit.
+///
+/// ```
+/// use stretch_calibrate::parse_adc;
+/// use stretch_export::{Form, Options, header};
+/// let options = Options { form: None, adc: parse_adc("12,0,3.3")? };
+/// let header = header(&stretch_receptor::example_observer(), &options)?;
+/// assert_eq!((header.form, header.model.as_str()), (Form::Fixed, "observer+rest"));
+/// assert!(header.text.contains("stretch_step(stretch_state *s, int32_t code)"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn header(calibration: &Calibration, options: &Options) -> Result<Header, ExportError> {
+    if options.form == Some(Form::Float) {
+        return float(calibration, options);
+    }
+    match fixed(calibration, options) {
+        // what is missing in integers may be there in floats; a converter that does not fit is another matter
+        Err(
+            none @ ExportError::NoFixedForm(
+                CalibrateError::NoFixedForm { .. } | CalibrateError::FixedRate { .. },
+            ),
+        ) => {
+            let float = float(calibration, options)?;
+            if options.form.is_none() { Ok(float) } else { Err(none) }
+        }
+        other => other,
+    }
+}
+
+fn fixed(calibration: &Calibration, options: &Options) -> Result<Header, ExportError> {
+    let record = fixed_record(calibration, &options.adc).map_err(ExportError::NoFixedForm)?;
+    let part = match &record.numbers {
+        RecordNumbers::Rated(numbers) => surfaces_fixed(numbers),
+        RecordNumbers::Observer(numbers) => observer_fixed(numbers),
+    };
+    let test = self_test::fixed(calibration, &options.adc, &record)?;
+    Ok(assembled(calibration, options, Form::Fixed, part, &test))
+}
+
+fn float(calibration: &Calibration, options: &Options) -> Result<Header, ExportError> {
+    let part = match &calibration.model {
+        Model::Linear(_) | Model::Surfaces { .. } => surfaces_float(calibration)?,
+        Model::Observer(_) => observer_float(calibration)?,
+        other => {
+            let model = match other {
+                Model::Blended { .. } => "a blended model",
+                Model::History(_) => "a model that remembers, other than the observer,",
+                _ => "this model",
+            };
+            return Err(ExportError::NoForm { model: model.into() });
+        }
+    };
+    let test = self_test::float(calibration)?;
+    Ok(assembled(calibration, options, Form::Float, part, &test))
+}
+
+/// The parts in order.
+fn assembled(
+    calibration: &Calibration,
+    options: &Options,
+    form: Form,
+    part: Part,
+    self_test: &str,
+) -> Header {
+    let Part { model, constants, step } = part;
+    let mut text = opening(calibration, form, &model);
+    text.push_str(&frame(calibration, options));
+    text.push_str("\n/* ---- the record ---- */\n\n");
+    text.push_str(&constants);
+    text.push('\n');
+    text.push_str(include_str!("c/common.h"));
+    step.iter().for_each(|part| text.push_str(part));
+    text.push_str(include_str!("c/start_on.h"));
+    text.push_str(self_test);
+    text.push_str("\n#endif\n");
+    Header { text, form, model }
+}
+
+/// What the file is, for whoever opens it.
+fn opening(calibration: &Calibration, form: Form, model: &str) -> String {
+    let signal = comment_safe(calibration.signal.as_str());
+    let reference = comment_safe(calibration.reference.as_str());
+    let (taken, given) = match form {
+        Form::Fixed => ("a code of the converter", format!("thousandths of {reference}'s unit")),
+        Form::Float => (signal.as_str(), reference.clone()),
+    };
+    let from =
+        match (calibration.provenance.trial_count(), comment_safe(calibration.provenance.date())) {
+            (1, date) if date.is_empty() => "1 trial".to_owned(),
+            (trials, date) if date.is_empty() => format!("{trials} trials"),
+            (trials, date) => format!("{trials} trials, {date}"),
+        };
+    let mut text = String::new();
+    // writing to memory cannot fail
+    let _ = write!(
+        text,
+        "/* A stretch receptor: {signal} in, {reference} out, every {period} s.\n *\n * Model {model}, form \
+         {form}: {taken} in,\n * {given} out; the same bits as on the desk.\n * Written by stretch \
+         {version} from a calibration of {from}.\n *\n *     stretch_state state;\n *     \
+         stretch_init(&state);\n *     then every period\n *     reading = stretch_step(&state, sample); or \
+         stretch_lost(&state) where none came\n *\n * One state a channel. C99 and C++11; no malloc, no \
+         libm. stretch_self_test() is 0 where the\n * board computes as the desk does.\n */\n\
+         #ifndef STRETCH_H\n#define STRETCH_H\n\n#include <stdint.h>\n\n",
+        period = calibration.sample_rate_hz.period_s(),
+        version = env!("CARGO_PKG_VERSION"),
+    );
+    text
+}
+
+/// What a program around the step needs to know.
+fn frame(calibration: &Calibration, options: &Options) -> String {
+    let spec = options.adc.spec();
+    let unit = comment_safe(calibration.reference.unit());
+    let period_us = (1e6 * calibration.sample_rate_hz.period_s()).round() as i64;
+    let mut constants = Constants::default();
+    constants
+        .word("UNIT", format!("\"{unit}\""), "of the reference")
+        .word("PERIOD_US", format!("{period_us}L"), "from a sample to the next")
+        .define("ADC_BITS", i32::from(spec.bits), "of the board's converter")
+        .define("ADC_ZERO", spec.zero_v as f32, "the signal at code 0")
+        .define("ADC_PER_CODE", options.adc.volts_per_code() as f32, "what a code adds to it");
+    constants.into_text()
+}
+
+/// A label that cannot end a comment, a string or a line.
+fn comment_safe(text: &str) -> String {
+    text.chars().filter(|c| !c.is_control() && !"*\\?\"".contains(*c)).collect()
+}

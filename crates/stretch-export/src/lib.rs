@@ -1,0 +1,15 @@
+#![doc = include_str!("../README.md")]
+
+mod arduino;
+mod constants;
+mod error;
+mod export;
+mod models;
+mod options;
+mod part;
+mod self_test;
+
+pub use arduino::{File, arduino_library};
+pub use error::ExportError;
+pub use export::{HEADER, Header, SELF_TEST_SAMPLES, header};
+pub use options::{Form, Options};

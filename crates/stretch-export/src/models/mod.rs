@@ -1,0 +1,13 @@
+//! One file a model and form: from its numbers to its constants and step.
+//!
+//! A further model is a file here, its step in `../c`, and an arm in `../export.rs`.
+
+mod observer_fixed;
+mod observer_float;
+mod surfaces_fixed;
+mod surfaces_float;
+
+pub(crate) use observer_fixed::observer_fixed;
+pub(crate) use observer_float::observer_float;
+pub(crate) use surfaces_fixed::surfaces_fixed;
+pub(crate) use surfaces_float::surfaces_float;

@@ -1,0 +1,84 @@
+//! `linear` and `poly13` in `float`.
+
+use stretch_core::{Branch, Calibration, Poly13, RateEstimator};
+use stretch_filter::{SgFilter, SgShape};
+use stretch_receptor::{
+    StretchReceptor,
+    numbers::{Line, Map, Sheet},
+};
+
+use crate::{
+    ExportError,
+    constants::{Constants, Literal},
+    part::Part,
+};
+
+/// What stands before and after the surface.
+const RATE: &str = include_str!("../c/surfaces_float.h");
+const STEP: &str = include_str!("../c/surfaces_float_step.h");
+
+/// The constants and the step of a line, or of surfaces without a term beyond poly13.
+pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportError> {
+    let receptor = StretchReceptor::<f32>::new(calibration)?;
+    let RateEstimator::SavitzkyGolay { window, degree, delay } = calibration.rate_estimator else {
+        return Err(ExportError::Rate { rate: format!("{:?}", calibration.rate_estimator) });
+    };
+    let [window, degree, delay] = [window, degree.into(), delay].map(usize::from);
+    let shape = SgShape { window, degree, order: 1, delay };
+    // the filter that the receptor runs: see `RateFilter`
+    let filter = SgFilter::<f32>::new(shape, calibration.sample_rate_hz)
+        .map_err(stretch_filter::FilterError::from)?;
+    let model = receptor.model();
+    let direction = model.direction();
+    let [rising, falling] = match direction.rising {
+        Branch::Inflation => ["STRETCH_INFLATION", "STRETCH_DEFLATION"],
+        Branch::Deflation => ["STRETCH_DEFLATION", "STRETCH_INFLATION"],
+    };
+    let mut constants = Constants::default();
+    constants
+        .define("WINDOW", window as i32, "samples")
+        .array("float", "taps", filter.taps())
+        .define("PERIOD_S", model.period_s(), "from a sample to the next")
+        .define("DEAD_BAND", direction.dead_band, "the largest rate that keeps the branch")
+        .word("RISING", rising, "the branch of a rising signal")
+        .word("FALLING", falling, "");
+    let (name, surface) = match model.map() {
+        Map::Line(line) => {
+            let Line { signal, offset, slope, intercept } = line;
+            constants
+                .define("SIGNAL_MIN", signal.min, "the signal that the fit saw")
+                .define("SIGNAL_MAX", signal.max, "")
+                .define("OFFSET", *offset, "")
+                .define("SLOPE", *slope, "")
+                .define("INTERCEPT", *intercept, "");
+            ("linear", include_str!("../c/line_float.h"))
+        }
+        Map::Poly13([inflation, deflation]) => {
+            constants.sheets(&[poly13(inflation), poly13(deflation)]);
+            ("poly13", include_str!("../c/poly13_float.h"))
+        }
+        Map::Surface([sheet, _]) => {
+            return Err(ExportError::NoForm { model: sheet.surface.degree().to_string() });
+        }
+    };
+    Ok(Part {
+        model: name.into(),
+        constants: constants.into_text(),
+        step: vec![
+            include_str!("../c/float.h"),
+            RATE,
+            surface,
+            STEP,
+            include_str!("../c/float_end.h"),
+        ],
+    })
+}
+
+/// A branch's sheet.
+fn poly13(sheet: &Sheet<f32, Poly13<f32>>) -> String {
+    let Sheet { signal, rate, offset, rate_offset, surface } = *sheet;
+    let Poly13 { p00, p10, p01, p11, p02, p12, p03 } = surface;
+    let join = |numbers: &[f32]| numbers.iter().map(Literal::c).collect::<Vec<_>>().join(", ");
+    let domain = join(&[signal.min, signal.max, rate.min, rate.max, offset, rate_offset]);
+    format!("{{{domain}, \\\n         {}}}", join(&[p00, p10, p01, p11, p02, p12, p03]))
+}

@@ -1,0 +1,118 @@
+//! Samples and the desk's answers, for the board to repeat.
+
+use std::fmt::Write;
+
+use stretch_calibrate::{BoardReceptor, FixedRecord};
+use stretch_core::{Branch, Calibration, Runner, Volts};
+use stretch_receptor::{
+    Receptor, Withheld,
+    code::{Adc, AdcCode},
+};
+
+use crate::{ExportError, Form};
+
+/// How many.
+pub(crate) const SAMPLES: usize = 200;
+/// Larger than any sample: one that did not come (`STRETCH_NO_VOLTS`).
+const NO_VOLTS: f32 = 2e18;
+/// Up and down once in this many samples.
+const PERIOD: usize = 70;
+
+/// Signals that go up and down, a tenth beyond both ends of the calibrated range, with one, three and
+/// five samples lost: all that a step can meet.
+fn signals(calibration: &Calibration) -> impl Iterator<Item = Option<f64>> {
+    let (min, max) = (calibration.signal_range.min(), calibration.signal_range.max());
+    (0..SAMPLES).map(move |n| {
+        let lost = n == 48 || (90..93).contains(&n) || (121..126).contains(&n);
+        // smooth at both ends, by products alone: the same numbers on every desk
+        let ramp = (n % PERIOD) as f64 / (PERIOD / 2) as f64;
+        let t = if ramp < 1.0 { ramp } else { 2.0 - ramp };
+        let share = 1.2 * (t * t * (3.0 - 2.0 * t)) - 0.1;
+        (!lost).then_some(min + share * (max - min))
+    })
+}
+
+/// Status, branch and domain as the C packs them. Of a sample without a reading the branch is the last one.
+fn flags<E>(answer: &Result<(E, Branch, u8), Withheld>, branch: &mut Branch) -> u8 {
+    let (status, domain) = match answer {
+        Ok((_, now, domain)) => {
+            *branch = *now;
+            (0, *domain)
+        }
+        Err(Withheld::Warming) => (1, 0),
+        Err(_) => (2, 0),
+    };
+    status | (*branch as u8) << 2 | domain << 3
+}
+
+/// The self-test of a form in integers.
+pub(crate) fn fixed(
+    calibration: &Calibration,
+    adc: &Adc,
+    record: &FixedRecord,
+) -> Result<String, ExportError> {
+    let none = ExportError::NoAnswers { form: Form::Fixed };
+    let mut receptor = BoardReceptor::new(&record.bytes).ok_or(none)?;
+    let (mut rows, mut branch) = (Rows::default(), Branch::Inflation);
+    for signal in signals(calibration) {
+        let code = signal.map_or(AdcCode::MISSING, |volts| adc.code(volts));
+        let answer = receptor.step(code).map(|r| (r.estimate, r.branch, r.domain as u8));
+        let flags = flags(&answer, &mut branch);
+        rows.push(&format!("{{{}, {}, {flags}}}", code.0, answer.map_or(0, |(e, ..)| e)));
+    }
+    let fields = "int32_t code;\n    int32_t estimate;";
+    Ok(rows.text(fields, "code", "reading.estimate != samples[n].estimate"))
+}
+
+/// The self-test of a form in `float`.
+pub(crate) fn float(calibration: &Calibration) -> Result<String, ExportError> {
+    let mut receptor = Runner::new(Receptor::<f32>::new(calibration)?);
+    let (mut rows, mut branch) = (Rows::default(), Branch::Inflation);
+    for signal in signals(calibration) {
+        let volts = signal.map_or(NO_VOLTS, |volts| volts as f32);
+        let answer = receptor.step(Volts(volts));
+        let answer = answer.map(|r| ((r.estimate, r.rate), r.branch, r.domain as u8));
+        let flags = flags(&answer, &mut branch);
+        let (estimate, rate) = answer.map_or((0.0, 0.0), |(numbers, ..)| numbers);
+        rows.push(&format!("{{{volts:?}f, {estimate:?}f, {rate:?}f, {flags}}}"));
+    }
+    let fields = "float volts;\n    float estimate;\n    float rate;";
+    let below = "reading.estimate < samples[n].estimate || reading.estimate > samples[n].estimate";
+    let rate = "reading.rate < samples[n].rate || reading.rate > samples[n].rate";
+    Ok(rows.text(fields, "volts", &format!("{below} ||\n            {rate}")))
+}
+
+/// Rows of the table, as many on a line as fit.
+#[derive(Default)]
+struct Rows {
+    done: String,
+    line: String,
+}
+
+impl Rows {
+    fn push(&mut self, row: &str) {
+        if self.line.len() + row.len() > 90 {
+            self.end_line();
+        }
+        // writing to memory cannot fail
+        let _ = write!(self.line, "{}{row},", if self.line.is_empty() { "" } else { " " });
+    }
+
+    fn end_line(&mut self) {
+        let _ = writeln!(self.done, "        {}", self.line);
+        self.line.clear();
+    }
+
+    fn text(mut self, fields: &str, input: &str, differs: &str) -> String {
+        self.end_line();
+        let sample = format!(
+            "#define STRETCH_SELF_TEST {SAMPLES}\n\ntypedef struct stretch_sample {{\n    {fields}\n    \
+             uint8_t flags; /* status, branch << 2, domain << 3 */\n}} stretch_sample;\n\n"
+        );
+        let test = include_str!("c/self_test.h")
+            .replace("@ROWS@", self.done.trim_end())
+            .replace("@INPUT@", input)
+            .replace("@DIFFERS@", differs);
+        sample + &test
+    }
+}

@@ -1,0 +1,45 @@
+/* Answers every sample of standard input (32 bits in hexadecimal, x for one that did not come). */
+#include "stretch.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static uint32_t bits_of(const void *number)
+{
+    uint32_t bits;
+    memcpy(&bits, number, sizeof bits);
+    return bits;
+}
+
+int main(void)
+{
+    char word[16];
+    stretch_state state;
+    const int wrong = stretch_self_test();
+    if (wrong != 0) {
+        printf("the self-test fails at sample %d\n", wrong);
+        return 1;
+    }
+    stretch_init(&state);
+    while (scanf("%15s", word) == 1) {
+        const uint32_t bits = (uint32_t)strtoul(word, NULL, 16);
+        stretch_reading reading;
+        uint32_t rate = 0;
+#ifdef FLOAT
+        float volts;
+        memcpy(&volts, &bits, sizeof volts);
+        reading = word[0] == 'x' ? stretch_lost(&state) : stretch_step(&state, volts);
+        rate = bits_of(&reading.rate);
+#else
+        reading = word[0] == 'x' ? stretch_lost(&state) : stretch_step(&state, (int32_t)bits);
+#endif
+        if (reading.status == STRETCH_OK) {
+            printf("%u %u %08lx %08lx\n", (unsigned)reading.branch, (unsigned)reading.domain,
+                   (unsigned long)bits_of(&reading.estimate), (unsigned long)rate);
+        } else {
+            printf("%s\n", reading.status == STRETCH_WARMING ? "warming" : "missing");
+        }
+    }
+    return 0;
+}

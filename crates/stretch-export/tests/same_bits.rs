@@ -1,0 +1,290 @@
+//! The C gives the bits of the Rust receptor, whatever compiles it and whatever comes in.
+
+use std::{
+    fmt::Write as _,
+    fs,
+    io::Write as _,
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+};
+
+use stretch_calibrate::{BoardReceptor, fixed_record, parse_adc, read_calibration};
+use stretch_core::{
+    Calibration, CalibrationSpec, Interval, Model, ObserverMap, Polarity, RateEstimator, Runner,
+    Values, Volts,
+};
+use stretch_export::{Form, HEADER, Options, header};
+use stretch_receptor::{Receptor, Withheld, code::Adc, code::AdcCode, example_observer};
+
+const WARNINGS: [&str; 5] = ["-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror"];
+const SANITIZERS: [&str; 2] =
+    ["-fsanitize=undefined,float-cast-overflow,float-divide-by-zero", "-fno-sanitize-recover=all"];
+
+/// A compiler and how it is called.
+struct Compiler {
+    program: &'static str,
+    arguments: Vec<&'static str>,
+}
+
+fn exists(program: &str) -> bool {
+    Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success())
+}
+
+/// Strict C99 and strict C++11 with sanitizers; and as a board's build tool calls it, where the
+/// processor would offer to fuse products and sums.
+fn compilers() -> Vec<Compiler> {
+    let with = |first: &[&'static str], then: &[&'static str]| [first, &WARNINGS, then].concat();
+    let mut all = vec![
+        Compiler { program: "gcc", arguments: with(&["-std=c99", "-O1"], &SANITIZERS) },
+        Compiler {
+            program: "g++",
+            arguments: with(&["-x", "c++", "-std=c++11", "-O1"], &SANITIZERS),
+        },
+        Compiler { program: "gcc", arguments: with(&["-std=gnu99", "-Os"], &[]) },
+    ];
+    if fuses() {
+        let fused = ["-O3", "-mfma", "-ffp-contract=fast"];
+        all.push(Compiler { program: "gcc", arguments: with(&["-std=gnu99"], &fused) });
+        let plus = ["-x", "c++", "-std=gnu++11"];
+        all.push(Compiler { program: "g++", arguments: with(&plus, &fused) });
+    }
+    all.push(Compiler { program: "clang", arguments: with(&["-std=c99", "-O2"], &[]) });
+    all.retain(|compiler| {
+        let found = exists(compiler.program);
+        if !found {
+            println!("SKIPPED: there is no {}", compiler.program);
+        }
+        found
+    });
+    all
+}
+
+#[cfg(target_arch = "x86_64")]
+fn fuses() -> bool {
+    std::arch::is_x86_feature_detected!("fma")
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn fuses() -> bool {
+    false
+}
+
+fn adc() -> Adc {
+    parse_adc("12,0,3.3").unwrap()
+}
+
+fn firmware(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../firmware/data").join(name)
+}
+
+/// What the board replays: `u16::MAX` for a sample that did not come.
+fn trial() -> Vec<i32> {
+    let bytes = fs::read(firmware("trial.u16le")).unwrap();
+    let codes = bytes.chunks_exact(2).map(|two| u16::from_le_bytes([two[0], two[1]]));
+    codes.map(|code| if code == u16::MAX { -1 } else { code.into() }).collect()
+}
+
+/// Walks, jumps to anywhere, numbers that are no codes, and gaps of every length to seven.
+fn wild() -> Vec<i32> {
+    let mut seed = 0x9e37_79b9_7f4a_7c15u64;
+    let mut below = move |n: i32| {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((seed >> 33) % n as u64) as i32
+    };
+    let (mut codes, mut code) = (Vec::new(), 1800);
+    while codes.len() < 6000 {
+        match below(40) {
+            0 => codes.extend(std::iter::repeat_n(-1, below(7) as usize + 1)),
+            1 => codes.push([i32::MIN, i32::MAX, 4096, -2][below(4) as usize]),
+            2 => codes.push(below(4096)),
+            3 => code = below(4096),
+            _ => {
+                code = (code + below(121) - 60).clamp(0, 4095);
+                codes.push(code);
+            }
+        }
+    }
+    codes
+}
+
+/// A code in volts; what is no code becomes each thing that is no sample.
+fn volts(code: i32) -> f32 {
+    match code {
+        0..=4095 => code as f32 * (3.3 / 4095.0),
+        -1 => f32::NAN,
+        4096 => f32::INFINITY,
+        i32::MIN => 1.1e18,
+        i32::MAX => 0.9e18,
+        _ => 1e-42,
+    }
+}
+
+/// What the harness should print.
+fn expected(calibration: &Calibration, form: Form, codes: &[i32]) -> String {
+    let mut text = String::new();
+    let mut answer = |answer: Result<(u8, u8, u32, u32), Withheld>| match answer {
+        Ok((branch, domain, estimate, rate)) => {
+            writeln!(text, "{branch} {domain} {estimate:08x} {rate:08x}").unwrap();
+        }
+        Err(withheld) => writeln!(text, "{withheld}").unwrap(),
+    };
+    match form {
+        Form::Fixed => {
+            let record = fixed_record(calibration, &adc()).unwrap();
+            let mut receptor = BoardReceptor::new(&record.bytes).unwrap();
+            for &code in codes {
+                let reading = receptor.step(AdcCode(code));
+                answer(reading.map(|r| (r.branch as u8, r.domain as u8, r.estimate as u32, 0)));
+            }
+        }
+        Form::Float => {
+            let mut receptor = Runner::new(Receptor::<f32>::new(calibration).unwrap());
+            for &code in codes {
+                let reading = receptor.step(Volts(volts(code)));
+                answer(reading.map(|r| {
+                    (r.branch as u8, r.domain as u8, r.estimate.to_bits(), r.rate.to_bits())
+                }));
+            }
+        }
+    }
+    text
+}
+
+/// The samples as the harness reads them.
+fn input(form: Form, codes: &[i32]) -> String {
+    let mut text = String::new();
+    for &code in codes {
+        match (form, code) {
+            (_, -1) => writeln!(text, "x").unwrap(),
+            (Form::Fixed, code) => writeln!(text, "{:x}", code as u32).unwrap(),
+            (Form::Float, code) => writeln!(text, "{:x}", volts(code).to_bits()).unwrap(),
+        }
+    }
+    text
+}
+
+/// Compiles the harness around a header; the program.
+fn compiled(folder: &Path, form: Form, compiler: &Compiler) -> PathBuf {
+    let program = folder.join("harness");
+    let mut command = Command::new(compiler.program);
+    command.args(&compiler.arguments).arg("-I").arg(folder).arg("-o").arg(&program);
+    if form == Form::Float {
+        command.arg("-DFLOAT");
+    }
+    command.arg(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/harness.c"));
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{command:?}\n{}", String::from_utf8_lossy(&output.stderr));
+    program
+}
+
+fn run(program: &Path, input: &str) -> String {
+    let mut command = Command::new(program);
+    let mut child = command
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut stdin = child.stdin.take().unwrap();
+    let bytes = input.to_owned();
+    let writer = std::thread::spawn(move || stdin.write_all(bytes.as_bytes()));
+    let output = child.wait_with_output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{}\n{said}", text.lines().last().unwrap_or_default());
+    writer.join().unwrap().unwrap();
+    text
+}
+
+fn holds(name: &str, calibration: &Calibration, form: Form, compilers: &[Compiler]) {
+    let folder = tempfile::tempdir().unwrap();
+    let options = Options { form: Some(form), adc: adc() };
+    let made = header(calibration, &options).unwrap();
+    fs::write(folder.path().join(HEADER), made.text).unwrap();
+    for compiler in compilers {
+        let program = compiled(folder.path(), form, compiler);
+        for codes in [trial(), wild()] {
+            let (found, expected) =
+                (run(&program, &input(form, &codes)), expected(calibration, form, &codes));
+            let what = || format!("{name} {form} {} {:?}", compiler.program, compiler.arguments);
+            for (n, (found, expected)) in found.lines().zip(expected.lines()).enumerate() {
+                assert_eq!(found, expected, "{} sample {n} of {}", what(), codes.len());
+            }
+            assert_eq!(found.lines().count(), codes.len(), "{}", what());
+        }
+    }
+}
+
+#[test]
+fn the_boards_models_give_the_same_bits_from_every_compiler() {
+    let compilers = compilers();
+    for name in ["linear", "poly13", "observer", "observer-rest"] {
+        let calibration = read_calibration(&firmware(&format!("{name}.postcard"))).unwrap();
+        for form in [Form::Fixed, Form::Float] {
+            holds(name, &calibration, form, &compilers);
+        }
+    }
+}
+
+fn changed(calibration: &Calibration, change: impl FnOnce(&mut CalibrationSpec)) -> Calibration {
+    let mut spec = calibration.clone().into_spec();
+    change(&mut spec);
+    Calibration::new(spec).unwrap()
+}
+
+fn observer_with(change: impl FnOnce(&mut ObserverMap)) -> Calibration {
+    changed(&example_observer(), |spec| {
+        let Model::Observer(map) = &mut spec.model else { unreachable!() };
+        change(map);
+    })
+}
+
+#[test]
+fn shapes_and_signs_give_the_same_bits() {
+    let poly13 = stretch_receptor::example_calibration();
+    let linear = read_calibration(&firmware("linear.postcard")).unwrap();
+    let rate = |of: &Calibration, window, degree| {
+        changed(of, |spec| {
+            spec.rate_estimator = RateEstimator::SavitzkyGolay { window, degree, delay: 0 };
+        })
+    };
+    let falling = changed(&poly13, |spec| spec.polarity = Polarity::Falling);
+    let falling_observer = changed(&example_observer(), |spec| {
+        spec.polarity = Polarity::Falling;
+        let Model::Observer(map) = &mut spec.model else { unreachable!() };
+        let mut curve: Vec<f64> = map.curve.iter().copied().collect();
+        curve.reverse();
+        map.curve = Values::new("curve", &curve).unwrap();
+    });
+    let all_that_remembers = observer_with(|map| {
+        map.relaxations_s = Values::new("relaxations_s", &[0.1, 1.2]).unwrap();
+        map.amplitudes = Values::new("amplitudes", &[0.3, -0.2]).unwrap();
+        map.radii = Values::new("radii", &[0.02, 0.05, 0.2]).unwrap();
+        map.play_weights = Values::new("play_weights", &[-0.1, -0.05, 0.02]).unwrap();
+        map.estimate_domain = Interval { min: 0.05, max: 0.9 };
+    });
+    let nothing_that_remembers = observer_with(|map| {
+        map.rest = None;
+        map.relaxations_s = Values::EMPTY;
+        map.amplitudes = Values::EMPTY;
+        map.curve = Values::new("curve", &[1.2, 2.1]).unwrap();
+    });
+    let compilers: Vec<Compiler> = compilers().into_iter().take(1).collect();
+    for (name, calibration) in [
+        ("a straight line of 21", rate(&poly13, 21, 1)),
+        // the sums of this one leave 32 bits, and are rounded
+        ("a window of 31", rate(&linear, 31, 2)),
+        ("falling", falling),
+        ("a falling observer", falling_observer),
+        ("all that remembers", all_that_remembers),
+        ("nothing that remembers", nothing_that_remembers),
+    ] {
+        for form in [Form::Fixed, Form::Float] {
+            holds(name, &calibration, form, &compilers);
+        }
+    }
+    let late = changed(&poly13, |spec| {
+        spec.rate_estimator = RateEstimator::SavitzkyGolay { window: 12, degree: 3, delay: 5 };
+    });
+    holds("a delay", &late, Form::Float, &compilers);
+}

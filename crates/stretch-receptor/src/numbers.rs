@@ -1,0 +1,19 @@
+//! What the steps compute with: for whoever writes one in another language.
+//!
+//! [`Front::model`](crate::Front::model) gives the numbers of a receptor that takes volts;
+//! those of one that takes codes are in [`code`](mod@crate::code) (`FixedNumbers`, `IntegerObserver`).
+//!
+//! ```
+//! use stretch_receptor::{StretchReceptor, example_calibration, numbers::Map};
+//! let receptor = StretchReceptor::<f32>::new(&example_calibration())?;
+//! let Map::Poly13([inflation, _]) = receptor.model().map() else { panic!("a surface a branch") };
+//! assert_eq!((inflation.signal.min, inflation.signal.max), (1.1, 2.06)); // volts
+//! # Ok::<(), stretch_filter::FilterError>(())
+//! ```
+
+pub use crate::{
+    front::Direction,
+    map::{Bounds, Line, Map, Sheet},
+    observer::Observer,
+    receptor::Surfaces,
+};

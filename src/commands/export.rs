@@ -1,0 +1,87 @@
+//! `stretch export`: a calibration in C, for a board.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, anyhow};
+use stretch_calibrate::{parse_adc, read_calibration};
+use stretch_data::{DataError, write_folder, write_whole};
+use stretch_export::{
+    File, Form, HEADER, Header, Options, SELF_TEST_SAMPLES, arduino_library, header,
+};
+use stretch_receptor::code::Adc;
+
+use super::shared::say;
+
+/// Write a calibration in C, for a board
+///
+/// One C99 header that C++ takes as well: the record as constants, stretch_init(), stretch_step() for
+/// a sample, stretch_lost() for one that did not come, and stretch_self_test(), which runs 200 samples
+/// and compares the answers with the desk's. No allocation, no library; the same bits as on the desk.
+///
+///   stretch export --calibration cal.json --c StretchReceptor --arduino
+///
+/// makes a folder for the libraries of the Arduino IDE, with an example that reads A0.
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(crate) struct Args {
+    /// Calibration record, from `stretch calibrate`
+    #[arg(long, value_name = "cal.json")]
+    calibration: PathBuf,
+    /// Folder for the header; it must not exist
+    #[arg(long, value_name = "DIR")]
+    c: PathBuf,
+    /// Make the folder a library that the Arduino IDE takes
+    #[arg(long)]
+    arduino: bool,
+    /// fixed: integers, from converter codes to thousandths of the reference's unit. float: from the
+    /// signal's unit to the reference's [default: fixed where the model has such a form]
+    #[arg(long, value_name = "FORM")]
+    form: Option<Form>,
+    /// The board's converter: bits, and the signal at code 0 and at the last code
+    #[arg(long, default_value = "12,0,3.3", value_name = "BITS,ZERO_V,FULL_SCALE_V",
+          value_parser = parse_adc)]
+    adc: Adc,
+}
+
+pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+    let calibration = read_calibration(&args.calibration)?;
+    let options = Options { form: args.form, adc: args.adc };
+    let made =
+        header(&calibration, &options).with_context(|| args.calibration.display().to_string())?;
+    let Header { text, form, model } = &made;
+    let files = if args.arduino {
+        arduino_library(&made)
+    } else {
+        vec![File { path: HEADER.into(), text: text.clone() }]
+    };
+    write_folder(&args.c, false, |folder| {
+        for File { path, text } in &files {
+            let path = folder.join(path);
+            if let Some(parent) = path.parent() {
+                std::fs::create_dir_all(parent).map_err(|cause| DataError::Io {
+                    path: parent.display().to_string(),
+                    action: "make it",
+                    cause,
+                })?;
+            }
+            write_whole(path, |out| out.write_all(text.as_bytes()))?;
+        }
+        Ok(())
+    })
+    .map_err(|error| match error {
+        DataError::Exists { path } => {
+            anyhow!("{path}: it exists; name a folder that does not: nothing is overwritten")
+        }
+        other => other.into(),
+    })?;
+    let out = args.c.display();
+    say(format!("wrote {out}: {model}, {form}, a self-test of {SELF_TEST_SAMPLES} samples"))?;
+    for File { path, .. } in &files {
+        say(format!("  {path}"))?;
+    }
+    say(if args.arduino {
+        "put the folder into the sketchbook's libraries; the IDE then has File > Examples > StretchReceptor > Live"
+    } else {
+        "include it in one file of the program; stretch_self_test() is 0 where the board computes as the desk does"
+    })
+}

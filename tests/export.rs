@@ -1,0 +1,163 @@
+//! `stretch export`: from trials to C that a compiler takes, and what is refused.
+
+mod support;
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use support::{Scratch, calibrate, fails, runs, stdout, stretch};
+
+/// A calibration of that model, and the command that exports it to `c`.
+fn calibrated(scratch: &Scratch, arguments: &[&str]) -> PathBuf {
+    let (trial, out) = (scratch.loops("a.csv", 20.0, 1.1), scratch.path("cal.json"));
+    runs(calibrate(&trial, &out).args(arguments));
+    out
+}
+
+fn export(calibration: &Path, out: &Path) -> assert_cmd::Command {
+    let mut command = stretch();
+    command.arg("export").arg("--calibration").arg(calibration).arg("--c").arg(out);
+    command
+}
+
+/// Compiles and runs a C++ file; none where there is no compiler.
+fn compiled(folder: &Path, main: &str, include: &[PathBuf]) -> Option<String> {
+    let source = folder.join("main.cpp");
+    fs::write(&source, main).unwrap();
+    let mut command = Command::new("g++");
+    command.args(["-std=gnu++11", "-Wall", "-Wextra", "-Werror"]);
+    for folder in include {
+        command.arg("-I").arg(folder);
+    }
+    let program = folder.join("program");
+    let output = match command.arg(source).arg("-o").arg(&program).output() {
+        Ok(output) => output,
+        Err(cause) => {
+            println!("SKIPPED: no g++: {cause}");
+            return None;
+        }
+    };
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let output = Command::new(program).output().unwrap();
+    assert!(output.status.success(), "{}", stdout(&output));
+    Some(stdout(&output))
+}
+
+#[test]
+fn a_header_of_every_model_passes_its_self_test() {
+    for (model, form, says) in [
+        ("linear", "fixed", "linear, fixed"),
+        ("poly13", "float", "poly13, float"),
+        ("observer", "float", "observer, float"),
+        ("observer+rest", "fixed", "observer+rest, fixed"),
+    ] {
+        let scratch = Scratch::new();
+        let calibration = calibrated(&scratch, &["--model", model]);
+        let out = scratch.path("c");
+        let said = runs(export(&calibration, &out).args(["--form", form]));
+        assert!(said.contains(says) && said.contains("200 samples"), "{said}");
+        let main = "#include \"stretch.h\"\nint main() { return stretch_self_test(); }\n";
+        compiled(&scratch.path("."), main, &[out]);
+    }
+}
+
+/// What an Arduino core has, as far as the example needs it: a converter that gives a rising code, a
+/// clock, and a port that is standard output.
+const ARDUINO: &str = r#"
+#include <cstdint>
+#include <iostream>
+static int A0 = 0, code = 1600;
+static uint32_t now_us = 4294000000u; // it wraps soon
+static uint32_t micros() { return now_us; }
+static int analogRead(int) { return code += 3; }
+static void analogReadResolution(int bits) { if (bits != 12) { std::cout << "bits " << bits; } }
+struct Port {
+    void begin(long) {}
+    void print(double x, int) { std::cout << x; }
+    template <class T> void print(T x) { std::cout << x; }
+    template <class T> void println(T x) { std::cout << x << "\n"; }
+} Serial;
+"#;
+
+#[test]
+fn an_arduino_library_reads_a_sample_every_period() {
+    let scratch = Scratch::new();
+    let calibration = calibrated(&scratch, &["--model", "poly13"]);
+    for form in ["fixed", "float"] {
+        let library = scratch.path(form);
+        runs(export(&calibration, &library).args(["--arduino", "--form", form]));
+        let properties = fs::read_to_string(library.join("library.properties")).unwrap();
+        for key in ["name=", "version=", "author=", "maintainer=", "sentence=", "category=Sensors"]
+        {
+            assert!(properties.lines().any(|line| line.starts_with(key)), "{key}");
+        }
+        let keywords = fs::read_to_string(library.join("keywords.txt")).unwrap();
+        assert!(keywords.contains("stretch_step\tKEYWORD2\n"));
+        let example = library.join("examples/Live/Live.ino");
+        let main = format!(
+            "{ARDUINO}\n#include \"{}\"\nint main() {{ setup(); for (int n = 0; n < 300; n++) {{ loop(); \
+             now_us += n == 200 ? 70000 : 5000; }} }}\n",
+            example.display()
+        );
+        let Some(said) = compiled(&scratch.path("."), &main, &[library.join("src")]) else {
+            return;
+        };
+        let lines: Vec<&str> = said.lines().collect();
+        // a loop every 5 ms answers every other time; one of 70 ms loses six samples and warms up again
+        assert_eq!(lines.iter().filter(|line| **line == "warming").count(), 20, "{said}");
+        assert_eq!(lines.len(), 151, "{said}");
+        assert!(lines[60].contains("mm inflation"), "{said}");
+    }
+}
+
+#[test]
+fn what_has_no_form_in_c_says_so_and_writes_nothing() {
+    for (arguments, form, parts) in [
+        (["--model", "blended"], "fixed", ["blended", "observer+rest"]),
+        (["--model", "poly22"], "float", ["poly22", "linear, poly13"]),
+        (["--model", "relaxation"], "fixed", ["remembers", "--model"]),
+        (["--rate", "tracker:0.1"], "fixed", ["Tracker", "savgol:11,2"]),
+    ] {
+        let scratch = Scratch::new();
+        let calibration = calibrated(&scratch, &arguments);
+        let before = scratch.names();
+        let mut command = export(&calibration, &scratch.path("c"));
+        fails(command.args(["--form", form]), &parts);
+        assert_eq!(scratch.names(), before, "{arguments:?}");
+    }
+}
+
+#[test]
+fn integers_that_the_model_or_the_converter_does_not_allow() {
+    let scratch = Scratch::new();
+    // a rate in the middle of its window has a form in floats alone
+    let calibration = calibrated(&scratch, &["--model", "poly13", "--rate", "savgol:11,2,5"]);
+    let before = scratch.names();
+    let out = scratch.path("c");
+    fails(export(&calibration, &out).args(["--form", "fixed"]), &["--form float", "window"]);
+    let calibration = calibrated(&scratch, &["--model", "poly13"]);
+    fails(export(&calibration, &out).args(["--adc", "12,0,1"]), &["sees 0 to 1", "--adc"]);
+    assert_eq!(scratch.names(), before);
+    runs(export(&calibration, &out).args(["--adc", "12,0,1", "--form", "float"]));
+}
+
+#[test]
+fn a_folder_that_exists_and_a_newer_record_are_refused() {
+    let scratch = Scratch::new();
+    let calibration = calibrated(&scratch, &["--model", "linear"]);
+    let out = scratch.path("c");
+    fs::create_dir(&out).unwrap();
+    fs::write(out.join("stretch.h"), "mine").unwrap();
+    fails(&mut export(&calibration, &out), &["it exists", "nothing is overwritten"]);
+    assert_eq!(fs::read_to_string(out.join("stretch.h")).unwrap(), "mine");
+
+    let newer =
+        fs::read_to_string(&calibration).unwrap().replace("\"schema\": 1", "\"schema\": 99");
+    let newer = scratch.write("newer.json", newer);
+    let before = scratch.names();
+    fails(&mut export(&newer, &scratch.path("d")), &["newer.json", "schema", "99"]);
+    assert_eq!(scratch.names(), before);
+}

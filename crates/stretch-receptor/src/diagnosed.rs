@@ -147,13 +147,15 @@ impl<T: Real> Diagnosed<T> {
         DesignError::check("rise of diagnosed.curve", rises, rises > 0.0)?;
         let widest = WIDEST * map.noise * (map.drive_domain.max - map.drive_domain.min) / rises;
         let values = map.curve.iter().map(|v| sign * v);
-        let (skew, steady) = (map.skew_s, map.steady_s);
+        // a slow amplifier is late by its time constants, as far as a rate tells
+        let slow: f64 = map.lowpass_s.into_iter().flatten().sum();
+        let (skew, steady) = (map.skew_s + slow, map.steady_s);
         // what is left of a rate's way after so long; into the past it is not known to have been another
         let ahead = if skew > 0.0 { -steady * libm::expm1(-skew / steady) } else { skew };
         let edge = BEYOND * (map.estimate_domain.max - map.estimate_domain.min);
         // the filter asks for the sleeve; where in it the muscle is its turns tell
         let slip = map.slip.map_or(0.0, |p| p.radii.iter().sum::<f64>() / 3.0);
-        let defects = Defects::new(&DiagnosedMap { slip: None, ..*map }, period_s);
+        let defects = Defects::new(&DiagnosedMap { slip: None, lowpass_s: None, ..*map }, period_s);
         let model = Self {
             sign: T::from_f64(sign),
             rest: RestLevel::new(map.rest, polarity, calibration.signal_range, sample_rate),

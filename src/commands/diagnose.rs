@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
-use stretch_bench::{GaugeSimulator, RigSimulator};
-use stretch_data::Trial;
+use stretch_bench::{Fix, GaugeSimulator, NoFix, RigSimulator};
+use stretch_data::{DataSet, Trial};
 use stretch_gap::{
     Diagnosis, Evidence, GapError, Laboratory, Options, Simulator, diagnose, next_experiment,
 };
@@ -16,7 +16,10 @@ use super::{
     rails::rails,
     shared::{say, short_name, write_text},
 };
-use crate::report::{Subject, diagnosis_page};
+use crate::{
+    plain::listed,
+    report::{Subject, diagnosis_page},
+};
 
 /// Say where a simulator and a measurement part, which effect causes it, and how far the gap closes
 ///
@@ -46,6 +49,9 @@ pub(crate) struct Args {
     /// Write a report that opens in any browser
     #[arg(long, value_name = "d.html")]
     report: Option<PathBuf>,
+    /// Write a rig file with what was found: parameters re-tuned, effects added; a file that exists is replaced
+    #[arg(long, value_name = "fixed.toml")]
+    fix: Option<PathBuf>,
     /// Leave an effect out of the catalogue; may be given several times
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
@@ -77,6 +83,9 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     ensure!(args.data_set.exists(), "{}: there is no such file or folder", args.data_set.display());
+    if let Some(fix) = &args.fix {
+        not_read(&args, fix)?;
+    }
     let options = Options {
         depth: args.depth.into(),
         threads: args.threads,
@@ -101,7 +110,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         }
     }
     bar.finish_and_clear();
-    conclude(&args, &examined, bench.simulator())
+    conclude(&args, &examined, &bench)
 }
 
 /// What is diagnosed: a whole rig, or a gauge alone.
@@ -140,6 +149,15 @@ impl Bench {
         match self {
             Self::Rig(rig) => rig.as_ref(),
             Self::Gauge(gauge) => gauge.as_ref(),
+        }
+    }
+
+    /// The rig or the gauge with what was found of it.
+    fn fixed(&self, examined: &Examined) -> Result<Fix, NoFix> {
+        let Examined { diagnosis, evidence, .. } = examined;
+        match self {
+            Self::Rig(rig) => rig.fixed(diagnosis, evidence),
+            Self::Gauge(gauge) => gauge.fixed(diagnosis, evidence),
         }
     }
 
@@ -185,22 +203,64 @@ fn examine<L: Laboratory>(
     Ok(Examined { diagnosis, evidence, experiment: proposal.map(|p| p.trial) })
 }
 
+/// Refuses to write where something is read from.
+fn not_read(args: &Args, fix: &Path) -> anyhow::Result<()> {
+    let real = |path: &Path| path.canonicalize().ok();
+    let own = DataSet::read(&args.data_set).ok().and_then(|set| set.rig);
+    let own = own.map(|file| args.data_set.join(file));
+    let mut read = args.rig.iter().chain(&own).chain([&args.data_set]);
+    let is_read = read.any(|path| real(path).is_some() && real(path) == real(fix));
+    ensure!(
+        !is_read,
+        "{}: --fix would replace a file that is read; give it another name",
+        fix.display()
+    );
+    Ok(())
+}
+
 /// Writes the files first: a message that they are there is then true.
-fn conclude(args: &Args, examined: &Examined, simulator: &dyn Simulator) -> anyhow::Result<()> {
+fn conclude(args: &Args, examined: &Examined, bench: &Bench) -> anyhow::Result<()> {
     let Examined { diagnosis, evidence, .. } = examined;
     let name = name_of(&args.data_set);
+    let fix = bench.fixed(examined);
+    let mut said = Vec::new();
     if let Some(path) = &args.json {
-        write_text(path, &json(diagnosis, &name, args.seed)?)?;
+        write_text(path, &json(diagnosis, &fix, &name, args.seed)?)?;
+        said.push(format!("wrote {}", path.display()));
     }
     if let Some(path) = &args.report {
+        let simulator = bench.simulator();
         let subject = Subject { name: &name, diagnosis, evidence, simulator };
         write_text(path, &diagnosis_page(&subject))?;
+        said.push(format!("wrote {}", path.display()));
+    }
+    if let Some(path) = &args.fix {
+        said.push(write_fix(path, &fix, &name, args.seed)?);
     }
     print(diagnosis)?;
-    for path in [&args.json, &args.report].into_iter().flatten() {
-        say(format!("wrote {}", path.display()))?;
-    }
-    Ok(())
+    said.iter().try_for_each(say)
+}
+
+/// Writes the rig file where there is something to write; says what it did.
+fn write_fix(
+    path: &Path,
+    fix: &Result<Fix, NoFix>,
+    name: &str,
+    seed: u64,
+) -> anyhow::Result<String> {
+    let shown = path.display();
+    let mut fix = match fix {
+        Err(why) => return Ok(format!("{shown} is not written: {why}")),
+        Ok(fix) => fix.clone(),
+    };
+    let from = format!("Found by stretch {} diagnose {name}, seed {seed}.", env!("CARGO_PKG_VERSION"));
+    fix.remarks.head.insert(0, from);
+    let is_there = path.exists();
+    write_text(path, &fix.text())?;
+    let effects: Vec<String> = fix.file.effects.iter().map(|e| e.name.clone()).collect();
+    let with = if effects.is_empty() { "no effect".to_owned() } else { listed(&effects) };
+    let replaced = if is_there { ", in place of the file that was there" } else { "" };
+    Ok(format!("wrote {shown}: the rig re-tuned, with {with}{replaced}"))
 }
 
 /// The sentence, and everything behind it.
@@ -209,9 +269,15 @@ pub(super) fn print(diagnosis: &Diagnosis) -> anyhow::Result<()> {
     say(text(diagnosis))
 }
 
-/// The diagnosis in its schema, with what it was made from.
-fn json(diagnosis: &Diagnosis, name: &str, seed: u64) -> anyhow::Result<String> {
+/// The diagnosis in its schema, with what it was made from, and the rig file that comes of it.
+fn json(
+    diagnosis: &Diagnosis,
+    fix: &Result<Fix, NoFix>,
+    name: &str,
+    seed: u64,
+) -> anyhow::Result<String> {
     let mut value = serde_json::to_value(diagnosis)?;
+    value["fixed_rig"] = serde_json::to_value(fix.as_ref().ok().map(|fix| &fix.file))?;
     value["data_set"] = name.into();
     value["seed"] = seed.into();
     value["version"] = env!("CARGO_PKG_VERSION").into();

@@ -2,6 +2,7 @@
 
 mod acting;
 mod error;
+mod fix;
 mod gauge;
 mod kept;
 mod lost;
@@ -11,5 +12,6 @@ mod specs;
 mod wild;
 
 pub use error::BenchError;
+pub use fix::{Fix, NoFix};
 pub use gauge::{GaugeSetup, GaugeSimulator};
 pub use rig::{RigSetup, RigSimulator, RigTrial, Session};

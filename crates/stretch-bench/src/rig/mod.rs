@@ -3,6 +3,7 @@
 mod chamber;
 mod experiments;
 mod extent;
+mod fixed;
 mod noises;
 mod nominal;
 mod put_right;
@@ -16,7 +17,9 @@ use std::path::Path;
 
 use stretch_data::DataSet;
 use stretch_gap::{Description, DescriptionSpec, TrialSpec};
-use stretch_sim::{Catalogue, Effect, EffectSet, Key, Rig, RigParams, Search, Stage};
+use stretch_sim::{
+    Catalogue, Effect, EffectSet, Key, Rig, RigParams, Search, Stage, Tolerance,
+};
 
 use chamber::{CHAMBERS, Chambers};
 use extent::extent_of;
@@ -47,6 +50,7 @@ pub struct RigSetup<'a> {
 #[derive(Debug, Clone)]
 pub struct RigSimulator {
     base: RigParams,
+    tolerances: [Tolerance; Key::COUNT],
     /// Effects that the rig already has.
     effects: EffectSet,
     session: Session,
@@ -123,6 +127,7 @@ impl RigSimulator {
                 dt_s,
             })?,
             base: *base,
+            tolerances: rig.tolerances,
             effects: effects.clone(),
             session,
             inputs,

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
-use stretch_data::{DataSet, ReadOptions, RigFile, Trial, write_folder};
+use stretch_data::{DataSet, ReadOptions, RigFile, Trial, TrialEntry, write_folder};
 use stretch_sim::{Key, Rig, RunSettings, Session, SimError, TrialPlan, paper_preset};
 
 use super::shared::{progress, say};
@@ -33,7 +33,7 @@ pub(crate) struct Args {
     /// What the valves do
     #[arg(long, value_enum, default_value = "paper")]
     protocol: Protocol,
-    /// Replay the inlet and outlet columns of a trial instead
+    /// Replay what a trial does instead (openings, excitation, what is set from outside), or all trials of a data set
     #[arg(long, value_name = "trial.csv", conflicts_with = "protocol")]
     commands: Option<PathBuf>,
     /// Add an effect, as NAME:PARAMETER=VALUE,...
@@ -151,10 +151,22 @@ fn plans(args: &Args, rig: &Rig, seed: u64) -> anyhow::Result<Vec<TrialPlan>> {
             Protocol::Pulses => vec![TrialPlan::pulses(1, seed)],
         });
     };
-    let trial = Trial::read(path, &ReadOptions::new().require("inlet").require("outlet"))?;
-    let plan = TrialPlan::from_trial(&trial, 1e-3 * rig.params[Key::PS])
-        .with_context(|| path.display().to_string())?;
-    Ok(vec![plan])
+    let supply_kpa = 1e-3 * rig.params[Key::PS];
+    let named = |path: &Path| path.display().to_string();
+    if !path.is_dir() {
+        let trial = Trial::read(path, &ReadOptions::new())?;
+        let plan = TrialPlan::from_trial(&trial, supply_kpa).with_context(|| named(path))?;
+        return Ok(vec![plan]);
+    }
+    let set = DataSet::read(path)?;
+    let one = |entry: &TrialEntry| {
+        let file = path.join(&entry.file);
+        let trial = entry.load(path, &ReadOptions::new())?;
+        let plan = TrialPlan::from_trial(&trial, supply_kpa).with_context(|| named(&file))?;
+        let (kind, opening, split) = (entry.kind, entry.opening, entry.split);
+        anyhow::Ok(TrialPlan { kind, opening, split, start_s: Some(entry.start_s), ..plan })
+    };
+    set.trials.iter().map(one).collect()
 }
 
 /// Writes the data set, whole or not at all.

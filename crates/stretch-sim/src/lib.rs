@@ -33,8 +33,8 @@ pub use rig::{LEAST_STRAIN, Rig, RunSettings, default_rig_text};
 pub use session::Session;
 pub use stage::Stage;
 pub use stages::{
-    Actuation, Bridge, Chain, ChainMemory, Muscle, Openings, Pneumatics, Recorded, Reference,
-    Sensing,
+    Actuation, Bridge, Chain, ChainMemory, Held, Muscle, Openings, Pneumatics, Recorded, Reference,
+    Sensing, Setting,
 };
 pub use static_law::StaticLaw;
 pub use stretch_operators::{DEFAULT_STEP_S, Grid, GridError, Operator, Span, Start};

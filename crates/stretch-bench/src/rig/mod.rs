@@ -9,9 +9,12 @@ mod nominal;
 mod put_right;
 mod run;
 mod session;
+mod shown;
 mod simulator;
 pub(crate) mod smooth;
 mod timing;
+mod turned;
+mod unwound;
 
 use std::path::Path;
 

@@ -253,7 +253,8 @@ fn write_fix(
         Err(why) => return Ok(format!("{shown} is not written: {why}")),
         Ok(fix) => fix.clone(),
     };
-    let from = format!("Found by stretch {} diagnose {name}, seed {seed}.", env!("CARGO_PKG_VERSION"));
+    let from =
+        format!("Found by stretch {} diagnose {name}, seed {seed}.", env!("CARGO_PKG_VERSION"));
     fix.remarks.head.insert(0, from);
     let is_there = path.exists();
     write_text(path, &fix.text())?;

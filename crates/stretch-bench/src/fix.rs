@@ -165,7 +165,10 @@ impl<'a> Chosen<'a> {
         let d = self.diagnosis;
         let share = d.shares.iter().find(|s| s.effect == effect.name);
         let closes = share.map_or(String::new(), |s| {
-            format!(" it closes {:.0} % of the gap on trials that were not fitted", 100.0 * s.closes)
+            format!(
+                " it closes {:.0} % of the gap on trials that were not fitted",
+                100.0 * s.closes
+            )
         });
         let faint = match d.faint.iter().any(|name| name == effect.name) {
             true => " (faint: named for the sake of the parameters, which were fitted beside it)",

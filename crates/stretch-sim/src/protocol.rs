@@ -224,10 +224,8 @@ impl TrialPlan {
 
     /// What it does beside the openings, as columns of a trial: those that a replay reads.
     pub(crate) fn more_columns(&self) -> Vec<Channel> {
-        let column = |name: &str, values: &[f64]| Channel {
-            name: name.to_owned(),
-            values: values.to_vec(),
-        };
+        let column =
+            |name: &str, values: &[f64]| Channel { name: name.to_owned(), values: values.to_vec() };
         let excited = vec![self.excitation; self.inlet.len()];
         let excitation = (self.excitation != 1.0).then(|| column(EXCITATION, &excited));
         let length = self.set_length_mm.as_ref().map(|values| column(SET_LENGTH, values));
@@ -261,7 +259,9 @@ fn excitation(trial: &Trial) -> Result<f64, SimError> {
         None => Ok(share),
         Some(other) => Err(SimError::Column {
             name: EXCITATION.to_owned(),
-            problem: format!("{other} stands beside {share}; give one number in 0 .. 2 in every row"),
+            problem: format!(
+                "{other} stands beside {share}; give one number in 0 .. 2 in every row"
+            ),
         }),
     }
 }

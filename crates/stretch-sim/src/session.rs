@@ -3,8 +3,8 @@
 use stretch_data::{Channel, Trial, TrialEntry};
 
 use crate::{
-    Chain, ChainMemory, Held, Key, Openings, Recorded, Rig, RigParams, RunSettings, Setting, SimError,
-    Start,
+    Chain, ChainMemory, Held, Key, Openings, Recorded, Rig, RigParams, RunSettings, Setting,
+    SimError, Start,
     protocol::{PAUSE_S, TrialPlan},
     random::Random,
 };

@@ -112,7 +112,8 @@ impl GaugeSimulator {
         let (mut model, mut base) = (model.clone(), self.nominal.effects.clone());
         if course.is_known {
             model.effects.retain(|(i, _)| self.rows[*i].stage != Stage::Reference);
-            let shown = self.nominal.effects.iter().filter(|e| e.effect().stage == Stage::Reference);
+            let shown =
+                self.nominal.effects.iter().filter(|e| e.effect().stage == Stage::Reference);
             shown.for_each(|known| drop(base.remove(known.name())));
         }
         let effects = unrecorded(&base, &self.rows, &model)?;
@@ -187,7 +188,8 @@ impl Laboratory for GaugeSimulator {
     fn done(&self) -> Course {
         let samples = ((60.0 / self.record.dt_s) as usize).min(self.inputs[0].values.len());
         let values = &self.inputs[0].values[..samples];
-        let e: Vec<f64> = values.iter().map(|x| (x - self.nominal.spec.zero) / self.nominal.spec.span).collect();
+        let e: Vec<f64> =
+            values.iter().map(|x| (x - self.nominal.spec.zero) / self.nominal.spec.span).collect();
         Course { pressure: vec![0.0; e.len()], e, is_known: false }
     }
 

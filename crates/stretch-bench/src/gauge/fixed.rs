@@ -36,7 +36,13 @@ impl GaugeSimulator {
         }
         let gain = rig.spec.gain;
         for (effect, mut values) in chosen.effects(&self.rows, |_, _| ()) {
-            values.extend(found_phase(self, (0, gain), &self.rows, chosen.model, (effect, &values)));
+            values.extend(found_phase(
+                self,
+                (0, gain),
+                &self.rows,
+                chosen.model,
+                (effect, &values),
+            ));
             chosen.tell(effect, &mut remarks);
             rig.effects.push(effect, &values)?;
         }

@@ -163,7 +163,11 @@ impl GaugeSimulator {
     }
 
     fn nominal(&self, model: &Model) -> GaugeSpec {
-        GaugeSpec { offset: model.parameters[OFFSET], gain: model.parameters[GAIN], ..self.nominal.spec }
+        GaugeSpec {
+            offset: model.parameters[OFFSET],
+            gain: model.parameters[GAIN],
+            ..self.nominal.spec
+        }
     }
 }
 

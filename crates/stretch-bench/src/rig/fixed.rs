@@ -18,11 +18,8 @@ impl RigSimulator {
     pub fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
         let chosen = Chosen::of(diagnosis, evidence)?;
         let mut remarks = Remarks { head: chosen.head(), ..Remarks::default() };
-        let mut rig = Rig {
-            params: self.base,
-            tolerances: self.tolerances,
-            effects: self.effects.clone(),
-        };
+        let mut rig =
+            Rig { params: self.base, tolerances: self.tolerances, effects: self.effects.clone() };
         let tuned = self.knobs.iter().zip(&chosen.model.parameters).enumerate();
         for (index, (knob, value)) in tuned {
             let Knob::Rig(key) = *knob else { continue };
@@ -45,7 +42,13 @@ impl RigSimulator {
         };
         let stage = self.sensor().unwrap_or(0);
         for (effect, mut values) in chosen.effects(&self.rows, within) {
-            values.extend(found_phase(self, (stage, 1.0), &self.rows, chosen.model, (effect, &values)));
+            values.extend(found_phase(
+                self,
+                (stage, 1.0),
+                &self.rows,
+                chosen.model,
+                (effect, &values),
+            ));
             chosen.tell(effect, &mut remarks);
             rig.effects.push(effect, &values)?;
         }

@@ -20,9 +20,7 @@ use std::path::Path;
 
 use stretch_data::DataSet;
 use stretch_gap::{Description, DescriptionSpec, TrialSpec};
-use stretch_sim::{
-    Catalogue, Effect, EffectSet, Key, Rig, RigParams, Search, Stage, Tolerance,
-};
+use stretch_sim::{Catalogue, Effect, EffectSet, Key, Rig, RigParams, Search, Stage, Tolerance};
 
 use chamber::{CHAMBERS, Chambers};
 use extent::extent_of;

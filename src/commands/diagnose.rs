@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
-use stretch_bench::{Fix, GaugeSimulator, NoFix, RigSimulator};
-use stretch_data::{DataSet, Trial};
+use serde_json::json;
+use stretch_bench::{Fix, GaugeSimulator, Implementation, NoFix, RigSimulator};
+use stretch_data::{DataError, DataSet, Trial, write_folder, write_whole};
 use stretch_gap::{
     Diagnosis, Evidence, GapError, Laboratory, Options, Simulator, diagnose, next_experiment,
 };
-use stretch_sim::Catalogue;
+use stretch_sim::{Catalogue, Language, Quantity};
 
 use super::{
     diagnosis_text::text,
@@ -52,6 +53,9 @@ pub(crate) struct Args {
     /// Write a rig file with what was found: parameters re-tuned, effects added; a file that exists is replaced
     #[arg(long, value_name = "fixed.toml")]
     fix: Option<PathBuf>,
+    /// Write the code of each named effect in C, Python and MATLAB into a new folder
+    #[arg(long, value_name = "DIR")]
+    snippets: Option<PathBuf>,
     /// Leave an effect out of the catalogue; may be given several times
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
@@ -85,6 +89,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     ensure!(args.data_set.exists(), "{}: there is no such file or folder", args.data_set.display());
     if let Some(fix) = &args.fix {
         not_read(&args, fix)?;
+    }
+    if let Some(folder) = args.snippets.as_deref().filter(|folder| folder.exists()) {
+        return Err(DataError::Exists { path: folder.display().to_string() }.into());
     }
     let options = Options {
         depth: args.depth.into(),
@@ -124,6 +131,8 @@ pub(super) struct Examined {
     pub(super) diagnosis: Diagnosis,
     pub(super) evidence: Evidence,
     pub(super) experiment: Option<Trial>,
+    /// What is named, as something to type.
+    pub(super) implementations: Vec<Implementation>,
 }
 
 impl Bench {
@@ -168,7 +177,7 @@ impl Bench {
         look_on: bool,
         bar: &ProgressBar,
     ) -> Result<Examined, GapError> {
-        match self {
+        let examined = match self {
             Self::Gauge(gauge) => {
                 examine(gauge.as_ref(), options, look_on, bar, gauge.notes(), &[])
             }
@@ -176,7 +185,14 @@ impl Bench {
                 let rails = rails(rig.nominal(), rig.session());
                 examine(rig.as_ref(), options, look_on, bar, rig.notes(), &rails)
             }
-        }
+        }?;
+        let Examined { diagnosis, evidence, .. } = &examined;
+        let implementations = match self {
+            Self::Rig(rig) => rig.implementations(diagnosis, evidence),
+            Self::Gauge(gauge) => gauge.implementations(diagnosis, evidence),
+        };
+        // A sample time that was diagnosed is one.
+        Ok(Examined { implementations: implementations.unwrap_or_default(), ..examined })
     }
 }
 
@@ -200,7 +216,8 @@ fn examine<L: Laboratory>(
     diagnosis.next_experiment = proposal.as_ref().map(|p| p.next.clone());
     diagnosis.notes.extend_from_slice(after);
     diagnosis.notes.splice(0..0, before.iter().cloned());
-    Ok(Examined { diagnosis, evidence, experiment: proposal.map(|p| p.trial) })
+    let experiment = proposal.map(|p| p.trial);
+    Ok(Examined { diagnosis, evidence, experiment, implementations: Vec::new() })
 }
 
 /// Refuses to write where something is read from.
@@ -220,24 +237,27 @@ fn not_read(args: &Args, fix: &Path) -> anyhow::Result<()> {
 
 /// Writes the files first: a message that they are there is then true.
 fn conclude(args: &Args, examined: &Examined, bench: &Bench) -> anyhow::Result<()> {
-    let Examined { diagnosis, evidence, .. } = examined;
+    let Examined { diagnosis, evidence, implementations, .. } = examined;
     let name = name_of(&args.data_set);
     let fix = bench.fixed(examined);
     let mut said = Vec::new();
     if let Some(path) = &args.json {
-        write_text(path, &json(diagnosis, &fix, &name, args.seed)?)?;
+        write_text(path, &to_json(examined, &fix, &name, args.seed)?)?;
         said.push(format!("wrote {}", path.display()));
     }
     if let Some(path) = &args.report {
         let simulator = bench.simulator();
-        let subject = Subject { name: &name, diagnosis, evidence, simulator };
+        let subject = Subject { name: &name, diagnosis, evidence, implementations, simulator };
         write_text(path, &diagnosis_page(&subject))?;
         said.push(format!("wrote {}", path.display()));
     }
     if let Some(path) = &args.fix {
         said.push(write_fix(path, &fix, &name, args.seed)?);
     }
-    print(diagnosis)?;
+    if let Some(folder) = &args.snippets {
+        said.push(write_snippets(folder, implementations)?);
+    }
+    print(examined)?;
     said.iter().try_for_each(say)
 }
 
@@ -264,25 +284,63 @@ fn write_fix(
     Ok(format!("wrote {shown}: the rig re-tuned, with {with}{replaced}"))
 }
 
-/// The sentence, and everything behind it.
-pub(super) fn print(diagnosis: &Diagnosis) -> anyhow::Result<()> {
-    say(&diagnosis.sentence)?;
-    say(text(diagnosis))
+/// Writes the code of what is named where there is something; says what it did.
+fn write_snippets(folder: &Path, all: &[Implementation]) -> anyhow::Result<String> {
+    let shown = folder.display();
+    let mut files = Vec::new();
+    for one in all {
+        for language in Language::ALL {
+            let name = format!("{}.{}", one.effect.name, language.ending());
+            files.extend(one.code(language).map(|code| (name, code)));
+        }
+    }
+    if files.is_empty() {
+        return Ok(format!("{shown} is not written: no effect is named"));
+    }
+    write_folder(folder, false, |folder| {
+        files.iter().try_for_each(|(name, code)| {
+            write_whole(folder.join(name), |out| out.write_all(code.as_bytes()))
+        })
+    })?;
+    Ok(format!("wrote {shown}: {} files", files.len()))
 }
 
-/// The diagnosis in its schema, with what it was made from, and the rig file that comes of it.
-fn json(
-    diagnosis: &Diagnosis,
+/// The sentence, and everything behind it.
+pub(super) fn print(examined: &Examined) -> anyhow::Result<()> {
+    say(&examined.diagnosis.sentence)?;
+    say(text(&examined.diagnosis, &examined.implementations))
+}
+
+/// The diagnosis in its schema, with what it was made from, what is named as something to implement, and the rig file that comes of it.
+fn to_json(
+    examined: &Examined,
     fix: &Result<Fix, NoFix>,
     name: &str,
     seed: u64,
 ) -> anyhow::Result<String> {
-    let mut value = serde_json::to_value(diagnosis)?;
+    let mut value = serde_json::to_value(&examined.diagnosis)?;
+    value["implement"] = examined.implementations.iter().map(implement_json).collect();
     value["fixed_rig"] = serde_json::to_value(fix.as_ref().ok().map(|fix| &fix.file))?;
     value["data_set"] = name.into();
     value["seed"] = seed.into();
     value["version"] = env!("CARGO_PKG_VERSION").into();
     Ok(serde_json::to_string_pretty(&value)? + "\n")
+}
+
+/// A named effect as something to implement.
+fn implement_json(one: &Implementation) -> serde_json::Value {
+    let quantity = |q: &Quantity| json!({ "name": q.name, "unit": q.unit, "meaning": q.meaning });
+    let sketch = one.sketch.as_ref();
+    json!({
+        "effect": one.effect.name,
+        "words": one.effect.words,
+        "stage": one.effect.stage.name(),
+        "equation": one.effect.equation,
+        "numbers": one.numbers,
+        "inputs": sketch.map(|s| s.inputs.iter().map(quantity).collect::<Vec<_>>()),
+        "output": sketch.map(|s| quantity(&s.output)),
+        "state": sketch.and_then(stretch_sim::Sketch::initial_state),
+    })
 }
 
 /// What the data are called: the folder's or the file's name.

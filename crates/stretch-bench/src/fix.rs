@@ -154,34 +154,37 @@ impl<'a> Chosen<'a> {
     pub(crate) fn tell(&self, effect: &Effect, remarks: &mut Remarks) {
         let name = effect.name;
         remarks.effects.insert(name.into(), self.lines(effect));
-        let own = self.found.iter().flat_map(|c| &c.parameters).filter(|p| p.effect == name);
-        for p in own {
+        for p in self.numbers(effect) {
             let key = (name.to_owned(), p.name.clone());
-            remarks.effect_parameters.insert(key, told_of_effect(p));
+            remarks.effect_parameters.insert(key, told_of_effect(&p));
         }
+    }
+
+    /// Parameters and forms of an effect.
+    pub(crate) fn numbers(&self, effect: &Effect) -> Vec<EffectValue> {
+        let all = self.found.iter().flat_map(|c| &c.parameters);
+        all.filter(|p| p.effect == effect.name).cloned().collect()
     }
 
     fn lines(&self, effect: &Effect) -> Vec<String> {
         let d = self.diagnosis;
         let share = d.shares.iter().find(|s| s.effect == effect.name);
-        let closes = share.map_or(String::new(), |s| {
-            format!(
-                " it closes {:.0} % of the gap on trials that were not fitted",
-                100.0 * s.closes
-            )
-        });
+        let closes = share.map_or(String::new(), |s| format!(" closes {:.0} %", 100.0 * s.closes));
         let faint = match d.faint.iter().any(|name| name == effect.name) {
-            true => " (faint: named for the sake of the parameters, which were fitted beside it)",
+            true => ", faint, and kept because the parameters were fitted beside it",
             false => "",
         };
         let set = self.found.map_or(String::new(), |c| {
             let [low, high] = c.closed_ci.map(|x| 100.0 * x);
-            let set = if c.effects.len() > 1 { "; the set closes" } else { "; with" };
-            format!("{set} {low:.0} to {high:.0} % at 95 %, probability {:.2}", c.probability)
+            let what = if c.effects.len() > 1 { ", the set" } else { " (95 %:" };
+            let end = if c.effects.len() > 1 { "" } else { ")" };
+            format!("{what} {low:.0} to {high:.0} %{end}; probability {:.2}", c.probability)
         });
         let mut lines = vec![
             effect.words.to_owned(),
-            format!("Found by diagnosis{faint}:{closes}{set}."),
+            format!(
+                "Found by diagnosis{faint}:{closes} of the gap on trials that were not fitted{set}."
+            ),
             effect.equation.to_owned(),
         ];
         if !d.tied.is_empty() && d.named.iter().any(|name| name == effect.name) {
@@ -203,7 +206,7 @@ fn of_unit(unit: &str) -> String {
 }
 
 /// A number to four digits.
-fn digits(x: f64) -> String {
+pub(crate) fn digits(x: f64) -> String {
     let rounded = format!("{x:.3e}").parse().unwrap_or(x);
     if rounded != 0.0 && !(1e-3..1e6).contains(&f64::abs(rounded)) {
         format!("{rounded:e}")

@@ -2,15 +2,36 @@
 
 use stretch_data::Remarks;
 use stretch_gap::{Diagnosis, Evidence, Simulator};
-use stretch_sim::GaugeRig;
+use stretch_sim::{Gauge, GaugeRig, Grid, GridError};
 
 use super::{GAIN, GaugeSimulator, OFFSET};
-use crate::fix::{Chosen, Fix, NoFix, found_phase};
+use crate::{
+    fix::{Chosen, Fix, NoFix, found_phase},
+    implement::{Implementation, implementations},
+};
 
 /// Table of the file.
 const TABLE: &str = "sensing";
 
 impl GaugeSimulator {
+    /// What a diagnosis of this gauge names, as something to type: with its numbers, in units of e.
+    ///
+    /// # Errors
+    /// None for a gauge that was diagnosed: its sample time is positive.
+    pub fn implementations(
+        &self,
+        diagnosis: &Diagnosis,
+        evidence: &Evidence,
+    ) -> Result<Vec<Implementation>, GridError> {
+        let grid = Grid::samples(self.record.dt_s)?;
+        let model = evidence.candidates.first().unwrap_or(&evidence.best);
+        let around = Gauge::surroundings(&self.nominal.spec, &grid);
+        let place = (0, model.parameters[GAIN]);
+        Ok(implementations(diagnosis, evidence, &self.rows, &around, |effect, values| {
+            found_phase(self, place, &self.rows, model, (effect, values))
+        }))
+    }
+
     /// A gauge file (`kind = "gauge"`) with what a diagnosis of this gauge found: see [`Fix`]. How the gauge was wound before the
     /// session belongs to the record and stays out.
     ///

@@ -2,12 +2,39 @@
 
 use stretch_data::Remarks;
 use stretch_gap::{Diagnosis, Evidence, Simulator};
-use stretch_sim::{Effect, Rig};
+use stretch_sim::{Effect, Grid, GridError, Rig, Surroundings};
 
 use super::{RigSimulator, nominal::Knob};
-use crate::fix::{Chosen, Fix, NoFix, found_phase};
+use crate::{
+    fix::{Chosen, Fix, NoFix, found_phase},
+    implement::{Implementation, implementations},
+};
 
 impl RigSimulator {
+    /// What a diagnosis of this rig names, as something to type: with its numbers, in the rig as it was re-tuned.
+    ///
+    /// # Errors
+    /// None for a rig that was diagnosed: its sample time is positive.
+    pub fn implementations(
+        &self,
+        diagnosis: &Diagnosis,
+        evidence: &Evidence,
+    ) -> Result<Vec<Implementation>, GridError> {
+        let grid = Grid::samples(self.about.dt_s)?;
+        let mut params = self.base;
+        let model = evidence.candidates.first().unwrap_or(&evidence.best);
+        for (knob, value) in self.knobs.iter().zip(&model.parameters) {
+            if let Knob::Rig(key) = *knob {
+                params[key] = *value;
+            }
+        }
+        let around = Surroundings::of_rig(&params, &grid);
+        let place = (self.sensor().unwrap_or(0), 1.0);
+        Ok(implementations(diagnosis, evidence, &self.rows, &around, |effect, values| {
+            found_phase(self, place, &self.rows, model, (effect, values))
+        }))
+    }
+
     /// A rig file with what a diagnosis of this rig found: see [`Fix`]. Held against the same record it says `no_gap`.
     ///
     /// What belongs to the record and not to the rig (the pressure at a trial's start, the timing of commands) stays out. A hum's

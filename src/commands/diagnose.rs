@@ -4,23 +4,20 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
-use serde_json::json;
 use stretch_bench::{Fix, GaugeSimulator, Implementation, NoFix, RigSimulator};
-use stretch_data::{DataError, DataSet, Trial, write_folder, write_whole};
+use stretch_data::{DataError, Trial};
 use stretch_gap::{
     Diagnosis, Evidence, GapError, Laboratory, Options, Simulator, diagnose, next_experiment,
 };
-use stretch_sim::{Catalogue, Language, Quantity};
+use stretch_sim::Catalogue;
 
 use super::{
+    diagnosis_files::{not_read, to_json, write_fix, write_snippets},
     diagnosis_text::text,
     rails::rails,
     shared::{say, short_name, write_text},
 };
-use crate::{
-    plain::listed,
-    report::{Subject, diagnosis_page},
-};
+use crate::report::{Subject, diagnosis_page};
 
 /// Say where a simulator and a measurement part, which effect causes it, and how far the gap closes
 ///
@@ -88,7 +85,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     ensure!(args.data_set.exists(), "{}: there is no such file or folder", args.data_set.display());
     if let Some(fix) = &args.fix {
-        not_read(&args, fix)?;
+        not_read(fix, &args.data_set, args.rig.as_deref())?;
     }
     if let Some(folder) = args.snippets.as_deref().filter(|folder| folder.exists()) {
         return Err(DataError::Exists { path: folder.display().to_string() }.into());
@@ -220,21 +217,6 @@ fn examine<L: Laboratory>(
     Ok(Examined { diagnosis, evidence, experiment, implementations: Vec::new() })
 }
 
-/// Refuses to write where something is read from.
-fn not_read(args: &Args, fix: &Path) -> anyhow::Result<()> {
-    let real = |path: &Path| path.canonicalize().ok();
-    let own = DataSet::read(&args.data_set).ok().and_then(|set| set.rig);
-    let own = own.map(|file| args.data_set.join(file));
-    let mut read = args.rig.iter().chain(&own).chain([&args.data_set]);
-    let is_read = read.any(|path| real(path).is_some() && real(path) == real(fix));
-    ensure!(
-        !is_read,
-        "{}: --fix would replace a file that is read; give it another name",
-        fix.display()
-    );
-    Ok(())
-}
-
 /// Writes the files first: a message that they are there is then true.
 fn conclude(args: &Args, examined: &Examined, bench: &Bench) -> anyhow::Result<()> {
     let Examined { diagnosis, evidence, implementations, .. } = examined;
@@ -242,7 +224,7 @@ fn conclude(args: &Args, examined: &Examined, bench: &Bench) -> anyhow::Result<(
     let fix = bench.fixed(examined);
     let mut said = Vec::new();
     if let Some(path) = &args.json {
-        write_text(path, &to_json(examined, &fix, &name, args.seed)?)?;
+        write_text(path, &to_json(diagnosis, implementations, &fix, &name, args.seed)?)?;
         said.push(format!("wrote {}", path.display()));
     }
     if let Some(path) = &args.report {
@@ -261,86 +243,10 @@ fn conclude(args: &Args, examined: &Examined, bench: &Bench) -> anyhow::Result<(
     said.iter().try_for_each(say)
 }
 
-/// Writes the rig file where there is something to write; says what it did.
-fn write_fix(
-    path: &Path,
-    fix: &Result<Fix, NoFix>,
-    name: &str,
-    seed: u64,
-) -> anyhow::Result<String> {
-    let shown = path.display();
-    let mut fix = match fix {
-        Err(why) => return Ok(format!("{shown} is not written: {why}")),
-        Ok(fix) => fix.clone(),
-    };
-    let from =
-        format!("Found by stretch {} diagnose {name}, seed {seed}.", env!("CARGO_PKG_VERSION"));
-    fix.remarks.head.insert(0, from);
-    let is_there = path.exists();
-    write_text(path, &fix.text())?;
-    let effects: Vec<String> = fix.file.effects.iter().map(|e| e.name.clone()).collect();
-    let with = if effects.is_empty() { "no effect".to_owned() } else { listed(&effects) };
-    let replaced = if is_there { ", in place of the file that was there" } else { "" };
-    Ok(format!("wrote {shown}: the rig re-tuned, with {with}{replaced}"))
-}
-
-/// Writes the code of what is named where there is something; says what it did.
-fn write_snippets(folder: &Path, all: &[Implementation]) -> anyhow::Result<String> {
-    let shown = folder.display();
-    let mut files = Vec::new();
-    for one in all {
-        for language in Language::ALL {
-            let name = format!("{}.{}", one.effect.name, language.ending());
-            files.extend(one.code(language).map(|code| (name, code)));
-        }
-    }
-    if files.is_empty() {
-        return Ok(format!("{shown} is not written: no effect is named"));
-    }
-    write_folder(folder, false, |folder| {
-        files.iter().try_for_each(|(name, code)| {
-            write_whole(folder.join(name), |out| out.write_all(code.as_bytes()))
-        })
-    })?;
-    Ok(format!("wrote {shown}: {} files", files.len()))
-}
-
 /// The sentence, and everything behind it.
 pub(super) fn print(examined: &Examined) -> anyhow::Result<()> {
     say(&examined.diagnosis.sentence)?;
     say(text(&examined.diagnosis, &examined.implementations))
-}
-
-/// The diagnosis in its schema, with what it was made from, what is named as something to implement, and the rig file that comes of it.
-fn to_json(
-    examined: &Examined,
-    fix: &Result<Fix, NoFix>,
-    name: &str,
-    seed: u64,
-) -> anyhow::Result<String> {
-    let mut value = serde_json::to_value(&examined.diagnosis)?;
-    value["implement"] = examined.implementations.iter().map(implement_json).collect();
-    value["fixed_rig"] = serde_json::to_value(fix.as_ref().ok().map(|fix| &fix.file))?;
-    value["data_set"] = name.into();
-    value["seed"] = seed.into();
-    value["version"] = env!("CARGO_PKG_VERSION").into();
-    Ok(serde_json::to_string_pretty(&value)? + "\n")
-}
-
-/// A named effect as something to implement.
-fn implement_json(one: &Implementation) -> serde_json::Value {
-    let quantity = |q: &Quantity| json!({ "name": q.name, "unit": q.unit, "meaning": q.meaning });
-    let sketch = one.sketch.as_ref();
-    json!({
-        "effect": one.effect.name,
-        "words": one.effect.words,
-        "stage": one.effect.stage.name(),
-        "equation": one.effect.equation,
-        "numbers": one.numbers,
-        "inputs": sketch.map(|s| s.inputs.iter().map(quantity).collect::<Vec<_>>()),
-        "output": sketch.map(|s| quantity(&s.output)),
-        "state": sketch.and_then(stretch_sim::Sketch::initial_state),
-    })
 }
 
 /// What the data are called: the folder's or the file's name.

@@ -155,8 +155,7 @@ fn implement(out: &mut String, all: &[Implementation]) {
         put(out, &format!("- {}: {}", one.effect.name, one.equation()));
         if let Some(sketch) = &one.sketch {
             for q in &sketch.inputs {
-                let unit = if q.unit == "1" { String::new() } else { format!(", {}", q.unit) };
-                put(out, &format!("  {}: {}{unit}", q.name, q.meaning));
+                put(out, &format!("  {q}"));
             }
             put(out, &format!("  state: {}", one.state()));
         }

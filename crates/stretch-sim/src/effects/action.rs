@@ -77,8 +77,8 @@ impl<'a> Surroundings<'a> {
 
     /// What effects on the strain act on.
     pub(crate) fn strain(&self) -> Quantity {
-        let rig = ("strain", "gauge strain e; y goes on in its place, into the resistance");
-        self.signal(rig, "e = (reference - zero)/span; y goes on in its place")
+        let rig = ("strain", "gauge strain e, before the resistance");
+        self.signal(rig, "e = (reference - zero)/span")
     }
 
     /// The strain where an effect on the resistance needs it.
@@ -89,30 +89,30 @@ impl<'a> Surroundings<'a> {
 
     /// What effects on the resistance act on.
     pub(crate) fn resistance(&self) -> Quantity {
-        let rig = ("ohm", "resistance R of the gauge; y goes on in its place, into the bridge");
-        self.signal(rig, "1 + e; the signal is offset + gain (y - 1)")
+        let rig = ("ohm", "resistance R of the gauge, before the bridge");
+        self.signal(rig, "1 + e, where the signal is offset + gain e")
     }
 
     /// What effects on the voltage act on.
     pub(crate) fn volts(&self) -> Quantity {
-        let rig = ("V", "amplified voltage v; y is what the amplifier gives");
-        self.signal(rig, "(signal - offset)/gain; y goes on in its place")
+        let rig = ("V", "amplified voltage v");
+        self.signal(rig, "(signal - offset)/gain")
     }
 
     /// What effects on recorded samples act on.
     pub(crate) fn record(&self) -> Quantity {
-        let rig = ("V", "amplified voltage, sample by sample; y is what is recorded");
+        let rig = ("V", "amplified voltage, sample by sample, before it is recorded");
         let name = "v";
         Quantity {
             name,
-            ..self.signal(rig, "(signal - offset)/gain, sample by sample; y is recorded")
+            ..self.signal(rig, "(signal - offset)/gain, sample by sample, before it is recorded")
         }
     }
 
     /// What effects on the reference act on.
     pub(crate) fn length(&self) -> Quantity {
-        let rig = ("mm", "true length; y is what the reference shows");
-        self.signal(rig, "e as it is; y is what the reference shows of it")
+        let rig = ("mm", "true length, before the reference shows it");
+        self.signal(rig, "e as it is, before the reference shows it")
     }
 }
 

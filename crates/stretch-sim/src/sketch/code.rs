@@ -152,7 +152,7 @@ impl Sketch {
             let _ = writeln!(out, "{}", language.comment(line));
         }
         for q in self.inputs.iter().chain([&self.output]) {
-            let _ = writeln!(out, "{}", language.comment(&told(q)));
+            let _ = writeln!(out, "{}", language.comment(&q.to_string()));
         }
         out + &match language {
             Language::C => self.c(name),
@@ -243,10 +243,4 @@ impl Sketch {
         }
         out + &Language::Matlab.body(&self.body, 1) + "end\n"
     }
-}
-
-/// A quantity in words.
-fn told(q: &Quantity) -> String {
-    let unit = if q.unit == "1" { String::new() } else { format!(", {}", q.unit) };
-    format!("{}: {}{unit}", q.name, q.meaning)
 }

@@ -28,7 +28,7 @@ pub(crate) fn fading([share, tau, spread]: [f64; 3], dt_s: f64, x: Quantity) -> 
     constants.push((DT, dt_s, "s"));
     Sketch {
         inputs: vec![x],
-        output: Quantity { name: "y", ..x },
+        output: x.behind(),
         constants: Sketch::constants(&constants),
         state,
         body: format!("{lags}s.last = x\nlet y = x + SHARE * (x - {mean})"),
@@ -61,7 +61,7 @@ pub(crate) fn lowpass([tau, second]: [f64; 2], dt_s: f64, x: Quantity) -> Sketch
     constants.push((DT, dt_s, "s"));
     Sketch {
         inputs: vec![x],
-        output: Quantity { name: "y", ..x },
+        output: x.behind(),
         constants: Sketch::constants(&constants),
         state,
         body,
@@ -74,7 +74,7 @@ pub(crate) fn swinging([m, damping]: [f64; 2], dt_s: f64, x: Quantity) -> Sketch
     state.extend(cells(["speed"], "1/s", "0"));
     Sketch {
         inputs: vec![x],
-        output: Quantity { name: "y", ..x },
+        output: x.behind(),
         constants: Sketch::constants(&[("M", m, "s"), ("DAMPING", damping, "1"), (DT, dt_s, "s")]),
         state,
         body: "let w = sqrt(1 - DAMPING * DAMPING) / M
@@ -110,7 +110,7 @@ pub(crate) fn warming([h, tau, spread]: [f64; 3], dt_s: f64, x: Quantity) -> Ske
     constants.push((DT, dt_s, "s"));
     Sketch {
         inputs: vec![x],
-        output: Quantity { name: "y", ..x },
+        output: x.behind(),
         constants: Sketch::constants(&constants),
         state,
         body: body.into(),
@@ -129,7 +129,7 @@ pub(crate) fn drifting([d, settle]: [f64; 2], x: Quantity) -> Sketch {
     };
     Sketch {
         inputs: vec![x, t],
-        output: Quantity { name: "y", ..x },
+        output: x.behind(),
         constants: Sketch::constants(&constants),
         state: Vec::new(),
         body: body.into(),

@@ -7,6 +7,8 @@ mod plays;
 mod records;
 mod shapes;
 
+use std::fmt;
+
 pub use code::Language;
 pub(crate) use laws::{droop, growth, leak};
 pub(crate) use memories::{drifting, fading, lowpass, swinging, warming};
@@ -32,20 +34,31 @@ impl Quantity {
         Self { name, unit, meaning, is_record: false }
     }
 
+    /// What comes out where it went in.
+    pub(crate) const fn behind(self) -> Self {
+        Self { name: "y", unit: self.unit, meaning: "what goes on in its place", is_record: false }
+    }
+
     pub(crate) const fn record(self) -> Self {
         Self { is_record: true, ..self }
     }
 }
 
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.unit {
+            "1" => write!(f, "{}: {}", self.name, self.meaning),
+            unit => write!(f, "{} ({unit}): {}", self.name, self.meaning),
+        }
+    }
+}
+
 /// Contraction before the lag of the muscle.
-pub(crate) const STILL: Quantity = Quantity::new(
-    "x",
-    "1",
-    "static contraction k_s; y goes on in its place, into the lag of the muscle",
-);
+pub(crate) const STILL: Quantity =
+    Quantity::new("x", "1", "static contraction k_s, before the lag of the muscle");
 /// Contraction behind it.
 pub(crate) const MOVING: Quantity =
-    Quantity::new("x", "1", "contraction k behind the lag of the muscle; L = L0 (1 - y)");
+    Quantity::new("x", "1", "contraction k, behind the lag of the muscle");
 
 /// A number of an operator.
 #[derive(Debug, Clone, PartialEq)]

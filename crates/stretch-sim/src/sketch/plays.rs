@@ -6,7 +6,7 @@ use super::{Quantity, Sketch, cells};
 pub(crate) fn loops([h, s, spread]: [f64; 3], x: Quantity) -> Sketch {
     Sketch {
         inputs: vec![x],
-        output: Quantity { name: "y", ..x },
+        output: x.behind(),
         constants: Sketch::constants(&[("H", h, "1"), ("S", s, x.unit), ("SPREAD", spread, "1")]),
         state: cells(["a", "b", "c"], x.unit, x.name),
         body: "let rb = S * SPREAD
@@ -23,7 +23,7 @@ pub(crate) fn loops([h, s, spread]: [f64; 3], x: Quantity) -> Sketch {
 pub(crate) fn backlash([w, spread]: [f64; 2], x: Quantity) -> Sketch {
     Sketch {
         inputs: vec![x],
-        output: Quantity { name: "y", ..x },
+        output: x.behind(),
         constants: Sketch::constants(&[("W", w, x.unit), ("SPREAD", spread, "1")]),
         state: cells(["a", "b", "c"], x.unit, x.name),
         body: "let ra = W * (1 - SPREAD)
@@ -62,7 +62,7 @@ pub(crate) fn softening(soft: &Soft, x: Quantity, e: Quantity) -> Sketch {
     constants.extend([("ZERO", zero, x.unit), ("REVERSAL", reversal, e.unit)]);
     Sketch {
         inputs: vec![x, e],
-        output: Quantity { name: "y", ..x },
+        output: x.behind(),
         constants: Sketch::constants(&constants),
         state,
         body: format!(

@@ -12,7 +12,7 @@ pub(crate) fn skewed([skew_s, rate]: [f64; 2], dt_s: f64, v: Quantity) -> Sketch
             COUNT,
             Quantity::new("i", "1", "which sample is shown, from 0"),
         ],
-        output: Quantity { name: "y", is_record: false, ..v },
+        output: v.behind(),
         constants: Sketch::constants(&[
             ("SKEW", skew_s, "s"),
             ("RATE", rate, "s/s"),
@@ -70,7 +70,7 @@ pub(crate) fn hum([a, f_hz, phase]: [f64; 3], x: Quantity) -> Sketch {
     let constants = [("A", a, x.unit), ("F", f_hz, "Hz"), ("PHASE", phase, "rad")];
     Sketch {
         inputs: vec![x, Quantity::new("t", "s", "time since the session began")],
-        output: Quantity { name: "y", ..x },
+        output: x.behind(),
         constants: Sketch::constants(&constants),
         state: Vec::new(),
         body: "let turns = F * t

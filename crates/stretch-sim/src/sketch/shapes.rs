@@ -8,7 +8,7 @@ pub(crate) fn bowed([c, skew]: [f64; 2], [zero, span]: [f64; 2], x: Quantity) ->
         [("C", c, x.unit), ("SKEW", skew, "1"), ("ZERO", zero, x.unit), ("SPAN", span, x.unit)];
     Sketch {
         inputs: vec![x],
-        output: Quantity { name: "y", ..x },
+        output: x.behind(),
         constants: Sketch::constants(&constants),
         state: Vec::new(),
         body: "let u = (x - ZERO) / SPAN
@@ -22,7 +22,7 @@ pub(crate) fn bowed_gain([c, skew, scale]: [f64; 3], x: Quantity, e: Quantity) -
     let constants = [("C", c, "1"), ("SKEW", skew, "1"), ("SCALE", scale, e.unit)];
     Sketch {
         inputs: vec![x, e],
-        output: Quantity { name: "y", ..x },
+        output: x.behind(),
         constants: Sketch::constants(&constants),
         state: Vec::new(),
         body: "let u = e / SCALE
@@ -47,7 +47,7 @@ pub(crate) fn knees([low, high]: [Option<f64>; 2], width: f64, x: Quantity) -> S
     }
     Sketch {
         inputs: vec![x],
-        output: Quantity { name: "y", ..x },
+        output: x.behind(),
         constants: Sketch::constants(&constants),
         state: Vec::new(),
         body,
@@ -60,7 +60,7 @@ pub(crate) fn crosstalk([c, bend, scale_kpa]: [f64; 3], x: Quantity) -> Sketch {
     let constants = [("C", c, x.unit), ("BEND", bend, "1"), ("P_REF", scale_kpa, "kPa")];
     Sketch {
         inputs: vec![x, p],
-        output: Quantity { name: "y", ..x },
+        output: x.behind(),
         constants: Sketch::constants(&constants),
         state: Vec::new(),
         body: "let u = p / P_REF

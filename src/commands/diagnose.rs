@@ -29,6 +29,12 @@ use crate::report::{Subject, diagnosis_page};
 ///
 ///   stretch diagnose knit.csv --reference angle_deg --signal s2
 ///
+/// What is named can be written into a rig file, beside which nothing is missing any more, and
+/// as code for a simulator of your own:
+///
+///   stretch diagnose bench --fix fixed.toml --snippets code
+///   stretch diagnose bench --rig fixed.toml
+///
 /// Test trials are read once, at the end. Without --rig the rig file that the data set names is
 /// the simulator, else the stock rig. Its parameters may be re-tuned within their tolerances, its
 /// effects are part of it.

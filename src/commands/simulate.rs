@@ -19,6 +19,11 @@ use super::shared::{progress, say};
 ///
 ///   stretch simulate --protocol paper --rig bench/rig.toml --out again
 ///
+/// --commands replays what a recorded or recommended trial does: its openings,
+/// excitation_share, set_length_mm and shunt_share; a column that asks for more is
+/// refused by name. A trial alone begins the session, so that nothing is remembered
+/// of before; a folder is replayed as one session.
+///
 /// dataset.toml does not name rig.toml as its rig: that is the simulator without
 /// the effects (nominal.toml where it is not the stock rig).
 #[derive(clap::Args)]

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use stretch_data::{DataSet, ReadOptions, RigFile, Trial, TrialEntry, write_folder};
-use stretch_sim::{Key, Rig, RunSettings, Session, SimError, TrialPlan, paper_preset};
+use stretch_sim::{Rig, RunSettings, Session, SimError, TrialPlan, paper_preset};
 
 use super::shared::{progress, say};
 
@@ -156,18 +156,17 @@ fn plans(args: &Args, rig: &Rig, seed: u64) -> anyhow::Result<Vec<TrialPlan>> {
             Protocol::Pulses => vec![TrialPlan::pulses(1, seed)],
         });
     };
-    let supply_kpa = 1e-3 * rig.params[Key::PS];
     let named = |path: &Path| path.display().to_string();
     if !path.is_dir() {
         let trial = Trial::read(path, &ReadOptions::new())?;
-        let plan = TrialPlan::from_trial(&trial, supply_kpa).with_context(|| named(path))?;
+        let plan = TrialPlan::from_trial(&trial, &rig.params).with_context(|| named(path))?;
         return Ok(vec![plan]);
     }
     let set = DataSet::read(path)?;
     let one = |entry: &TrialEntry| {
         let file = path.join(&entry.file);
         let trial = entry.load(path, &ReadOptions::new())?;
-        let plan = TrialPlan::from_trial(&trial, supply_kpa).with_context(|| named(&file))?;
+        let plan = TrialPlan::from_trial(&trial, &rig.params).with_context(|| named(&file))?;
         let (kind, opening, split) = (entry.kind, entry.opening, entry.split);
         anyhow::Ok(TrialPlan { kind, opening, split, start_s: Some(entry.start_s), ..plan })
     };

@@ -215,15 +215,30 @@ pub(crate) fn digits(x: f64) -> String {
     }
 }
 
-/// Phase of an effect's line in what a model leaves without it in the samples that are not tested on; none of an effect that
-/// leaves no line. `place` is the stage that shows it, and what an amplitude of one is there.
-pub(crate) fn found_phase(
+/// Values of an effect with amplitude and phase of its line, which a diagnosis leaves to the record: those in what a model leaves
+/// without it in the samples that are not tested on. An effect that leaves no line keeps its values. `place` is the stage that shows it, and what an amplitude of one is there.
+pub(crate) fn with_line(
+    simulator: &dyn Simulator,
+    place: (usize, f64),
+    rows: &[&'static Effect],
+    model: &Model,
+    (effect, values): (&Effect, Vec<f64>),
+) -> Vec<f64> {
+    let found = found_line(simulator, place, rows, model, (effect, &values));
+    match (found, &values[..]) {
+        (Some([amplitude, phase]), [_, rest @ ..]) => [&[amplitude], rest, &[phase]].concat(),
+        _ => values,
+    }
+}
+
+/// Amplitude and phase of an effect's line.
+fn found_line(
     simulator: &dyn Simulator,
     place: (usize, f64),
     rows: &[&'static Effect],
     model: &Model,
     (effect, values): (&Effect, &[f64]),
-) -> Option<f64> {
+) -> Option<[f64; 2]> {
     let line = effect.line?(values);
     let (stage, unit) = place;
     let is_other = |(index, _): &&(usize, Vec<f64>)| rows[*index].name != effect.name;
@@ -243,39 +258,41 @@ pub(crate) fn found_phase(
         left.extend((0..fit).map(|i| (at(i), apart(i))));
         begin += trial.samples;
     }
-    Some(phase(line.amplitude, line.hertz, left.into_iter()))
+    Some(sine(line.hertz, &left))
 }
 
-/// Phase at which a sine of a known amplitude and frequency comes nearest to what is left, in pairs of time (s) and value.
+/// Seconds in which the phase of the mains is taken as steady.
+const STEADY_S: f64 = 1.0;
+
+/// Amplitude and phase of a sine in pairs of time (s) and value: the steady one where it holds half of the power that the line has
+/// second by second, else the amplitude of the seconds with the phase of the whole.
 ///
-/// The cost a^2 (s^2 cc + 2 s c cs + c^2 ss) - 2 a (s rc + c rs), s and c of the phase, is looked for its least value on a
-/// grid, then between its neighbours: on samples at twice the frequency one quadrature is never seen and the two have to be weighed.
-fn phase(amplitude: f64, hertz: f64, left: impl Iterator<Item = (f64, f64)>) -> f64 {
-    let mut sums = [0.0; 5];
-    for (t, r) in left {
-        let turns = hertz * t;
-        let (sin, cos) = (TAU * (turns - turns.floor())).sin_cos();
-        for (sum, x) in sums.iter_mut().zip([cos * cos, cos * sin, sin * sin, r * cos, r * sin]) {
-            *sum += x;
+/// On samples at twice the frequency one quadrature is never seen, and is taken as nothing.
+fn sine(hertz: f64, left: &[(f64, f64)]) -> [f64; 2] {
+    let of = |part: &[(f64, f64)]| -> [f64; 2] {
+        let mut sums = [0.0; 5];
+        for (t, r) in part {
+            let turns = hertz * t;
+            let (sin, cos) = (TAU * (turns - turns.floor())).sin_cos();
+            let products = [cos * cos, cos * sin, sin * sin, r * cos, r * sin];
+            sums.iter_mut().zip(products).for_each(|(sum, x)| *sum += x);
         }
-    }
-    let [cc, cs, ss, rc, rs] = sums;
-    let cost = |phase: f64| {
-        let (s, c) = phase.sin_cos();
-        let own = s * s * cc + 2.0 * s * c * cs + c * c * ss;
-        amplitude * own - 2.0 * (s * rc + c * rs)
+        let [cc, cs, ss, rc, rs] = sums;
+        // A quadrature that is not seen has no power: a millionth of the whole stands for it.
+        let ridge = 1e-6 * (cc + ss) + f64::MIN_POSITIVE;
+        let (cc, ss) = (cc + ridge, ss + ridge);
+        let determinant = cc * ss - cs * cs;
+        [(rc * ss - rs * cs) / determinant, (rs * cc - rc * cs) / determinant]
     };
-    let least = |from: f64, step: f64, count: i32| {
-        let points = (0..=count).map(|k| from + step * f64::from(k));
-        points.min_by(|a, b| cost(*a).total_cmp(&cost(*b))).unwrap_or(from)
-    };
-    let mut step = TAU / 360.0;
-    let mut best = least(0.0, step, 359);
-    for _ in 0..3 {
-        best = least(best - step, step / 20.0, 40);
-        step /= 20.0;
-    }
-    best
+    let power = |[p, q]: [f64; 2]| p * p + q * q;
+    let whole = of(left);
+    let seconds: Vec<f64> = left
+        .chunk_by(|a, b| (a.0 / STEADY_S).floor() == (b.0 / STEADY_S).floor())
+        .map(|part| power(of(part)))
+        .collect();
+    let mean = seconds.iter().sum::<f64>() / seconds.len().max(1) as f64;
+    let amplitude = if power(whole) >= 0.5 * mean { power(whole) } else { mean }.sqrt();
+    [amplitude, whole[0].atan2(whole[1])]
 }
 
 #[cfg(test)]
@@ -284,17 +301,19 @@ mod tests {
     use approx::assert_abs_diff_eq;
 
     #[test]
-    fn the_phase_of_a_sine_is_found_where_a_quadrature_is_never_seen_too() {
-        for (hertz, wanted) in [(60.0, 1.0), (50.0, 0.7)] {
-            let wave = |i: u32| {
-                let t = 0.01 * f64::from(i);
-                (t, 0.02 * (TAU * hertz * t + wanted).sin())
-            };
-            let found = phase(0.02, hertz, (0..500).map(wave));
-            // At twice the frequency pi - phase looks the same.
-            let apart = (found - wanted).abs().min((std::f64::consts::PI - found - wanted).abs());
-            assert_abs_diff_eq!(apart, 0.0, epsilon = 1e-4);
-        }
+    fn a_sine_is_found_steady_or_wandering() {
+        let wave = |hertz: f64, phase: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
+            let at = |i: u32| 0.01 * f64::from(i);
+            (0..1000).map(at).map(|t| (t, 0.02 * (TAU * hertz * t + phase(t)).sin())).collect()
+        };
+        let [a, phase] = sine(60.0, &wave(60.0, &|_| 1.0));
+        assert_abs_diff_eq!(a, 0.02, epsilon = 1e-6);
+        assert_abs_diff_eq!(phase, 1.0, epsilon = 1e-4);
+        // At twice the frequency only the sine of the phase is seen.
+        let [a, phase] = sine(50.0, &wave(50.0, &|_| 0.7));
+        assert_abs_diff_eq!(a * phase.sin(), 0.02 * 0.7_f64.sin(), epsilon = 1e-6);
+        let [a, _] = sine(60.0, &wave(60.0, &|t| 2.0 * t));
+        assert!(a > 0.015, "{a}");
     }
 
     #[test]

@@ -44,19 +44,19 @@ impl Implementation {
     }
 }
 
-/// The effects that a diagnosis names; `phase` finds what it leaves to the record.
+/// The effects that a diagnosis names; `complete` finds what it leaves to the record.
 pub(crate) fn implementations(
     diagnosis: &Diagnosis,
     evidence: &Evidence,
     rows: &[&'static Effect],
     around: &Surroundings<'_>,
-    phase: impl Fn(&Effect, &[f64]) -> Option<f64>,
+    complete: impl Fn(&Effect, Vec<f64>) -> Vec<f64>,
 ) -> Vec<Implementation> {
     let Ok(chosen) = Chosen::of(diagnosis, evidence) else { return Vec::new() };
     let is_named = |effect: &Effect| diagnosis.named.iter().any(|name| name == effect.name);
     let effects = chosen.effects(rows, |_, _| ()).into_iter();
-    let one = |(effect, mut values): (&'static Effect, Vec<f64>)| {
-        values.extend(phase(effect, &values));
+    let one = |(effect, values): (&'static Effect, Vec<f64>)| {
+        let values = complete(effect, values);
         Implementation {
             effect,
             numbers: chosen.numbers(effect),

@@ -2,7 +2,7 @@
 
 use stretch_data::{Channel, Split, Trial, TrialKind};
 
-use crate::{SimError, random::Random};
+use crate::{Key, RigParams, SimError, StaticLaw, random::Random};
 
 /// Samples a second of every protocol of the paper.
 pub const RATE_HZ: f64 = 100.0;
@@ -167,17 +167,18 @@ impl TrialPlan {
     ///
     /// ```
     /// use stretch_data::{Channel, Trial};
-    /// use stretch_sim::TrialPlan;
+    /// use stretch_sim::{RigParams, TrialPlan};
     /// let column = |name: &str, x: f64| Channel { name: name.into(), values: vec![x; 3] };
+    /// let rig = RigParams::default();
     /// let mut trial = Trial { name: "next.csv".into(), time_s: vec![0.0, 0.01, 0.02], ..Trial::default() };
     /// trial.channels = vec![column("inlet", 0.0), column("outlet", 0.0), column("excitation_share", 0.7)];
-    /// assert_eq!(TrialPlan::from_trial(&trial, 620.0)?.excitation, 0.7);
+    /// assert_eq!(TrialPlan::from_trial(&trial, &rig)?.excitation, 0.7);
     /// trial.channels.push(column("set_pressure_kpa", 100.0));
-    /// let error = TrialPlan::from_trial(&trial, 620.0).unwrap_err().to_string();
+    /// let error = TrialPlan::from_trial(&trial, &rig).unwrap_err().to_string();
     /// assert!(error.contains("set_pressure_kpa"), "{error}");
     /// # Ok::<(), stretch_sim::SimError>(())
     /// ```
-    pub fn from_trial(trial: &Trial, supply_kpa: f64) -> Result<Self, SimError> {
+    pub fn from_trial(trial: &Trial, rig: &RigParams) -> Result<Self, SimError> {
         check_columns(trial)?;
         let column =
             |name: &'static str| trial.channel(name).ok_or(SimError::MissingColumn { name });
@@ -202,7 +203,13 @@ impl TrialPlan {
         // The rate of the whole, snapped to a whole number where rounding of the times explains the rest.
         let rate = (time.len() - 1) as f64 / (time[time.len() - 1] - time[0]);
         let rate_hz = if (rate - rate.round()).abs() < 1e-6 * rate { rate.round() } else { rate };
-        let full = trial.channel("pressure_kpa").is_some_and(|p| p[0] > 0.5 * supply_kpa);
+        let supply_kpa = 1e-3 * rig[Key::PS];
+        let half_mm = rig[Key::L0] * (1.0 - 0.5 * StaticLaw::new(rig).contraction(supply_kpa));
+        let full = match (trial.channel("pressure_kpa"), trial.channel("length_mm")) {
+            (Some(pressure), _) => pressure[0] > 0.5 * supply_kpa,
+            (None, Some(length)) => length[0] < half_mm,
+            (None, None) => false,
+        };
         let file =
             if trial.name.is_empty() { "commands.csv".to_string() } else { trial.name.clone() };
         let kind = TrialKind::Other;

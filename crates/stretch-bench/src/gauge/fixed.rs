@@ -6,7 +6,7 @@ use stretch_sim::{Gauge, GaugeRig, Grid, GridError};
 
 use super::{GAIN, GaugeSimulator, OFFSET};
 use crate::{
-    fix::{Chosen, Fix, NoFix, found_phase},
+    fix::{Chosen, Fix, NoFix, with_line},
     implement::{Implementation, implementations},
 };
 
@@ -28,7 +28,7 @@ impl GaugeSimulator {
         let around = Gauge::surroundings(&self.nominal.spec, &grid);
         let place = (0, model.parameters[GAIN]);
         Ok(implementations(diagnosis, evidence, &self.rows, &around, |effect, values| {
-            found_phase(self, place, &self.rows, model, (effect, values))
+            with_line(self, place, &self.rows, model, (effect, values))
         }))
     }
 
@@ -56,14 +56,8 @@ impl GaugeSimulator {
             remarks.effects.insert(effect.name().into(), own);
         }
         let gain = rig.spec.gain;
-        for (effect, mut values) in chosen.effects(&self.rows, |_, _| ()) {
-            values.extend(found_phase(
-                self,
-                (0, gain),
-                &self.rows,
-                chosen.model,
-                (effect, &values),
-            ));
+        for (effect, values) in chosen.effects(&self.rows, |_, _| ()) {
+            let values = with_line(self, (0, gain), &self.rows, chosen.model, (effect, values));
             chosen.tell(effect, &mut remarks);
             rig.effects.push(effect, &values)?;
         }

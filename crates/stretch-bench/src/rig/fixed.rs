@@ -6,7 +6,7 @@ use stretch_sim::{Effect, Grid, GridError, Rig, Surroundings};
 
 use super::{RigSimulator, nominal::Knob};
 use crate::{
-    fix::{Chosen, Fix, NoFix, found_phase},
+    fix::{Chosen, Fix, NoFix, with_line},
     implement::{Implementation, implementations},
 };
 
@@ -31,7 +31,7 @@ impl RigSimulator {
         let around = Surroundings::of_rig(&params, &grid);
         let place = (self.sensor().unwrap_or(0), 1.0);
         Ok(implementations(diagnosis, evidence, &self.rows, &around, |effect, values| {
-            found_phase(self, place, &self.rows, model, (effect, values))
+            with_line(self, place, &self.rows, model, (effect, values))
         }))
     }
 
@@ -68,14 +68,8 @@ impl RigSimulator {
             }
         };
         let stage = self.sensor().unwrap_or(0);
-        for (effect, mut values) in chosen.effects(&self.rows, within) {
-            values.extend(found_phase(
-                self,
-                (stage, 1.0),
-                &self.rows,
-                chosen.model,
-                (effect, &values),
-            ));
+        for (effect, values) in chosen.effects(&self.rows, within) {
+            let values = with_line(self, (stage, 1.0), &self.rows, chosen.model, (effect, values));
             chosen.tell(effect, &mut remarks);
             rig.effects.push(effect, &values)?;
         }

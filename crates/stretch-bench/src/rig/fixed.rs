@@ -38,7 +38,7 @@ impl RigSimulator {
     /// A rig file with what a diagnosis of this rig found: see [`Fix`]. Held against the same record it says `no_gap`.
     ///
     /// What belongs to the record and not to the rig (the pressure at a trial's start, the timing of commands) stays out. A hum's
-    /// phase, which no diagnosis answers, is the one that the fit trials show on the session's clock.
+    /// amplitude and phase, which no diagnosis answers, are those that the fit trials show on the session's clock.
     ///
     /// # Errors
     /// [`NoFix`] where the diagnosis names nothing to fix, or a rig that no file may hold.

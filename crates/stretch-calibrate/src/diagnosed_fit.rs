@@ -235,14 +235,16 @@ impl<'a> Record<'a> {
         let count = knobs.at.len();
         let mut damping = 1e-2;
         let mut normal = nalgebra::DMatrix::zeros(count, count);
-        for _ in 0..ITERATIONS {
+        let iterations = if count > 0 { ITERATIONS } else { 0 };
+        for _ in 0..iterations {
             let columns = self.sensitivities(&knobs, &seen);
             let n = columns.iter().map(Vec::len).min().unwrap_or(0).min(seen.residuals.len());
             let dot = |a: &[f64], b: &[f64]| -> f64 {
                 a[..n].iter().zip(&b[..n]).map(|(x, y)| x * y).sum()
             };
             normal = nalgebra::DMatrix::from_fn(count, count, |i, j| dot(&columns[i], &columns[j]));
-            let mut slope = nalgebra::DVector::from_fn(count, |i, _| dot(&columns[i], &seen.residuals));
+            let mut slope =
+                nalgebra::DVector::from_fn(count, |i, _| dot(&columns[i], &seen.residuals));
             let level = self.mean(&seen) * block;
             let cost = |seen: &Seen, knobs: &Knobs| {
                 let stray: f64 = strayed(knobs).iter().map(|(d, w)| w * d * d).sum();
@@ -313,6 +315,9 @@ impl<'a> Record<'a> {
     /// Standard errors, with one observation in a block.
     fn errors(&self, normal: &nalgebra::DMatrix<f64>, noise: f64) -> Vec<f64> {
         let block = (BLOCK_S / self.period_s).max(1.0);
+        if normal.is_empty() {
+            return Vec::new();
+        }
         match normal.clone().try_inverse() {
             Some(inverse) => {
                 inverse.diagonal().iter().map(|v| noise * (v.max(0.0) * block).sqrt()).collect()

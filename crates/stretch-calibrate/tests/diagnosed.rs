@@ -140,6 +140,18 @@ fn without_a_diagnosis_it_is_no_candidate() {
     assert!(error.contains("wander_0") && error.contains("pressure_kpa"), "{error}");
 }
 
+/// A bend is in the curve, and a drift in the baseline: neither has a number of its own.
+#[test]
+fn causes_without_numbers_are_calibrated() {
+    for name in ["gauge_nonlinearity", "thermal_drift", "mains_hum"] {
+        let bent = options(vec![Cause::new(name, &[])]);
+        let calibrated = calibrate(&PLAIN.trials(), &bent).unwrap();
+        let Model::Diagnosed(map) = &calibrated.calibration.model else { unreachable!() };
+        assert!(map.fit.rmse < 0.01, "{name}: {}", map.fit.rmse);
+        assert_eq!(map.rest.is_some(), name == "thermal_drift");
+    }
+}
+
 #[test]
 fn a_record_comes_back_and_asks_for_the_pressure_that_it_needs() {
     let gauge = Gauge { crosstalk: 0.1, ..PLAIN };

@@ -23,7 +23,7 @@ const SHOWN: f64 = 0.2;
 /// Standard deviations of it by which a sleeve must have come back before it is taken to have turned.
 const SURE: f64 = 6.0;
 /// Greatest standard deviation of a target, in those of what one signal tells over the whole curve.
-const WIDEST: f64 = 2.0;
+const WIDEST: f64 = 4.0;
 /// Beyond the targets that were fitted by this share of them the estimate does not go.
 const BEYOND: f64 = 0.02;
 

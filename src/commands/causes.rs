@@ -59,7 +59,8 @@ impl Causes {
                 diagnosis.sentence
             );
         }
-        let notes = vec![format!("built on {}: {}", name(), diagnosis.sentence)];
+        let of = schema.data_set.map_or(String::new(), |set| format!(", a diagnosis of {set}"));
+        let notes = vec![format!("built on {}{of}: {}", name(), diagnosis.sentence)];
         Ok(Self { found, notes })
     }
 
@@ -94,7 +95,9 @@ impl Causes {
     }
 }
 
+/// What is read of a diagnosis before the rest.
 #[derive(serde::Deserialize)]
 struct Schema {
     schema: u32,
+    data_set: Option<String>,
 }

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use stretch_bench::{GaugeSetup, GaugeSimulator, causes};
 use stretch_blind::{Label, Seal};
 use stretch_calibrate::{Cause, Memory, ModelKind, Options, calibrate, evaluate};
-use stretch_core::{Calibration, DiagnosedMap, Model};
+use stretch_core::{Calibration, Design, DiagnosedMap, Model, RestLevel};
 use stretch_data::{DataSet, ReadOptions, SessionTrial, Split, Trial};
 use stretch_gap::{Dice, Options as Diagnosing, diagnose};
 use stretch_receptor::{Defects, DefectsMemory};
@@ -203,7 +203,12 @@ fn particles(calibration: &Calibration, agility: f64, trial: &Trial) -> Result<V
     let mut cloud: Vec<Particle> = spread.map(begin).collect();
     let mut weights = vec![1.0 / PARTICLES as f64; PARTICLES];
     let mut estimates = Vec::with_capacity(volts.len());
+    // a baseline is followed as live
+    let (polarity, rate) = (calibration.polarity, calibration.sample_rate_hz);
+    let level = RestLevel::<f64>::new(map.rest, polarity, calibration.signal_range, rate);
+    let mut baseline = level.memory();
     for (i, v) in volts.iter().enumerate() {
+        let v = polarity.sign() * level.step(&mut baseline, polarity.sign() * v, 0.0);
         let mut total = 0.0;
         for (particle, weight) in cloud.iter_mut().zip(&mut weights) {
             let leap = if dice.unit() < LEAPS { LEAP } else { 1.0 };

@@ -25,7 +25,7 @@ const SURE: f64 = 6.0;
 /// Greatest standard deviation of a target, in those of what one signal tells over the whole curve.
 const WIDEST: f64 = 4.0;
 /// Beyond the targets that were fitted by this share of them the estimate does not go.
-const BEYOND: f64 = 0.02;
+const BEYOND: f64 = 0.003;
 
 /// A receptor for [`Model::Diagnosed`].
 ///

@@ -4,14 +4,19 @@ use stretch_core::{Interval, MAX_KNOTS, Real};
 
 use crate::fold::rounded;
 
-/// Signed signals at the knots, rising.
+/// A rising line of signals over evenly spaced drives.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Curve<T> {
-    knots: usize,
-    values: [T; MAX_KNOTS],
-    low: T,
-    pub(crate) step: T,
-    per_step: T,
+pub struct Curve<T> {
+    /// Knots.
+    pub knots: usize,
+    /// Signed signals at them.
+    pub values: [T; MAX_KNOTS],
+    /// The drive of the first.
+    pub low: T,
+    /// From knot to knot.
+    pub step: T,
+    /// Its reciprocal.
+    pub per_step: T,
 }
 
 impl<T: Real> Curve<T> {

@@ -26,18 +26,28 @@ const LN_2: f64 = core::f64::consts::LN_2;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Defects<T> {
-    slack_low: Option<Bound<T>>,
-    slack_high: Option<Bound<T>>,
-    slip: Option<Played<T>>,
-    crosstalk: Option<[T; 3]>,
-    hysteresis: Option<Played<T>>,
-    relaxation: Option<Relaxing<T>>,
-    worn: Option<Wearing<T>>,
-    floor: Option<Bound<T>>,
-    ceiling: Option<Bound<T>>,
-    poles: Option<[[T; 3]; 2]>,
+    /// The sleeve goes slack at low targets.
+    pub slack_low: Option<Bound<T>>,
+    /// At high ones.
+    pub slack_high: Option<Bound<T>>,
+    /// The sleeve slips.
+    pub slip: Option<Played<T>>,
+    /// Of pressure and of its square.
+    pub crosstalk: Option<[T; 3]>,
+    /// The gauge takes another way back.
+    pub hysteresis: Option<Played<T>>,
+    /// It relaxes or overshoots.
+    pub relaxation: Option<Relaxing<T>>,
+    /// It softens.
+    pub worn: Option<Wearing<T>>,
+    /// The amplifier's lower end.
+    pub floor: Option<Bound<T>>,
+    /// Its upper end.
+    pub ceiling: Option<Bound<T>>,
+    /// The amplifier is slow: weights of what came out, of the input before and of the input now.
+    pub poles: Option<[[T; 3]; 2]>,
     /// Winding at a target of zero, and by how much it grows with the target.
-    wound: [T; 2],
+    pub wound: [T; 2],
 }
 
 /// What they remember.
@@ -62,37 +72,48 @@ pub(crate) struct Poised<T> {
     passed: T,
 }
 
+/// A bound with a knee.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Bound<T> {
-    at: T,
+pub struct Bound<T> {
+    /// The drive that is not left.
+    pub at: T,
     /// 4 (w ln 2)^2.
-    round: T,
+    pub round: T,
 }
 
+/// Three plays.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Played<T> {
-    radii: [T; 3],
+pub struct Played<T> {
+    /// Their half-widths.
+    pub radii: [T; 3],
     /// A third of the share.
-    each: T,
+    pub each: T,
 }
 
+/// Three lags.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Relaxing<T> {
+pub struct Relaxing<T> {
     /// Weights of a lag before, the input before and the input now, a lag each.
-    weights: [[T; 3]; 3],
+    pub weights: [[T; 3]; 3],
     /// A third of the share.
-    each: T,
+    pub each: T,
     /// What a sample's own input gets in all.
-    own: T,
+    pub own: T,
 }
 
+/// A response that weakens as it is worked.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Wearing<T> {
-    m: T,
-    n: T,
-    zero: T,
-    reversal: T,
-    travelled: T,
+pub struct Wearing<T> {
+    /// What is lost in the end.
+    pub m: T,
+    /// The way by which half of it is lost.
+    pub n: T,
+    /// The drive at which nothing is lost.
+    pub zero: T,
+    /// Turns smaller than this do not count.
+    pub reversal: T,
+    /// The way at which a stream begins.
+    pub travelled: T,
 }
 
 impl<T: Copy> DefectsMemory<T> {

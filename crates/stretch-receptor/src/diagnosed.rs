@@ -14,11 +14,11 @@ use crate::{
 };
 
 /// A secant is taken over at least this share of the way between knots.
-const LEAST_RUN: f64 = 0.01;
+pub const LEAST_RUN: f64 = 0.01;
 /// A drive is taken to answer a target by at least this share: what answers less cannot be asked.
-const LEAST_ANSWER: f64 = 0.05;
+pub const LEAST_ANSWER: f64 = 0.05;
 /// Share of a sample in what the signal shows, and the share of the noise's variance that is left of it: s/(2 - s).
-const SMOOTH: f64 = 0.33;
+pub const SMOOTH: f64 = 0.33;
 const SHOWN: f64 = 0.2;
 /// Standard deviations of it by which a sleeve must have come back before it is taken to have turned.
 const SURE: f64 = 6.0;
@@ -56,34 +56,48 @@ pub type DiagnosedReceptor<T> = Front<Diagnosed<T>>;
 /// The model of a [`DiagnosedReceptor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Diagnosed<T> {
-    sign: T,
-    rest: RestLevel<T>,
-    defects: Defects<T>,
-    curve: Curve<T>,
-    period_s: T,
-    /// What a rate keeps of itself in a sample, and what it wanders, squared.
-    kept: T,
-    wander: T,
+    /// Multiplies the signal: -1 where it falls as the target rises.
+    pub sign: T,
+    /// The baseline, where one is followed.
+    pub rest: RestLevel<T>,
+    /// What stands between target and curve.
+    pub defects: Defects<T>,
+    /// From drive to signal.
+    pub curve: Curve<T>,
+    /// Seconds from a sample to the next.
+    pub period_s: T,
+    /// What a rate keeps of itself in a sample.
+    pub kept: T,
+    /// What it wanders, squared.
+    pub wander: T,
     /// Variance of the signal around the model.
-    noise: T,
+    pub noise: T,
     /// Greatest variance of a target.
-    widest: T,
-    low: T,
-    high: T,
+    pub widest: T,
+    /// The least target.
+    pub low: T,
+    /// The greatest.
+    pub high: T,
     /// Seconds that the estimate is ahead of the signal, as far as a rate reaches.
-    ahead_s: T,
-    spread: T,
+    pub ahead_s: T,
+    /// Reference units per standard deviation that the filter finds.
+    pub spread: T,
     /// Half-width of the sleeve's slip.
-    slip: T,
+    pub slip: T,
     /// By how much a sleeve must have come back, in signal.
-    sure: T,
-    /// Variance of a target that may be anywhere in it, and the share of it that a sample adds.
-    hideout: T,
-    hiding: T,
-    gain: T,
-    zero: T,
-    dead_band: T,
-    at_rest: T,
+    pub sure: T,
+    /// Variance of a target that may be anywhere in it.
+    pub hideout: T,
+    /// The share of it that a sample adds.
+    pub hiding: T,
+    /// Reference units per target.
+    pub gain: T,
+    /// The reference at a target of zero.
+    pub zero: T,
+    /// The largest rate of the target that keeps the branch.
+    pub dead_band: T,
+    /// The signal where the target rests, memory settled.
+    pub at_rest: T,
 }
 
 /// What a [`DiagnosedReceptor`]'s model remembers: target and rate with their covariance, the defects, the baseline, the pressure.

@@ -9,7 +9,7 @@ use crate::{
     Domain, Front, Reading, ReceptorMemory,
     curve::Curve,
     defects::{Defects, DefectsMemory},
-    fold::{output, reference_dead_band},
+    fold::{greater, held, output, reference_dead_band},
     front::{Live, usable},
 };
 
@@ -68,6 +68,8 @@ pub struct Diagnosed<T> {
     pub period_s: T,
     /// What a rate keeps of itself in a sample.
     pub kept: T,
+    /// The same squared.
+    pub kept_twice: T,
     /// What it wanders, squared.
     pub wander: T,
     /// Variance of the signal around the model.
@@ -175,6 +177,7 @@ impl<T: Real> Diagnosed<T> {
             curve: Curve::new(values, map.drive_domain),
             period_s: T::from_f64(period_s),
             kept: T::from_f64(libm::exp(-period_s / steady)),
+            kept_twice: T::from_f64(libm::exp(-2.0 * period_s / steady)),
             wander: T::from_f64(map.agility * period_s),
             noise: T::from_f64(map.noise * map.noise),
             widest: T::from_f64(widest * widest),
@@ -199,13 +202,13 @@ impl<T: Real> Diagnosed<T> {
     /// The target that would rest at a signal, and what its defects remember.
     fn begin(&self, memory: &mut DiagnosedMemory<T>, signal: T) {
         let (to, _) = self.curve.inverse(signal);
-        let mut target = to.max(self.low).min(self.high);
+        let mut target = held(to, self.low, self.high);
         // plays that are wound stand off by a constant; a second look takes what bends
         for _ in 0..3 {
             let defects = self.defects.begin(target, memory.pressure);
             let poised = self.defects.poise(&defects, memory.pressure);
             let off = to - self.defects.drive(&defects, &poised, target);
-            target = (target + off).max(self.low).min(self.high);
+            target = held(target + off, self.low, self.high);
         }
         memory.target = target;
         memory.rate = T::zero();
@@ -229,9 +232,13 @@ impl<T: Real> Diagnosed<T> {
         let across = yr + dt * rr;
         let grown = yy + dt * (yr + across);
         // where the signal hardly answers, a variance without end would throw the target from end to end of the flat
-        let share = if grown > self.widest { self.widest / grown } else { T::one() };
-        memory.covariance =
-            [share * grown, share * (kept * across), kept * kept * rr + self.wander];
+        let (grown, across) = if grown > self.widest {
+            let share = self.widest / grown;
+            (share * grown, share * (kept * across))
+        } else {
+            (grown, kept * across)
+        };
+        memory.covariance = [grown, across, self.kept_twice * rr + self.wander];
         self.hold(memory);
     }
 
@@ -240,11 +247,11 @@ impl<T: Real> Diagnosed<T> {
     fn hold(&self, memory: &mut DiagnosedMemory<T>) {
         if memory.target < self.low {
             memory.target = self.low;
-            memory.rate = memory.rate.max(T::zero());
+            memory.rate = greater(memory.rate, T::zero());
         }
         if memory.target > self.high {
             memory.target = self.high;
-            memory.rate = memory.rate.min(T::zero());
+            memory.rate = if memory.rate < T::zero() { memory.rate } else { T::zero() };
         }
     }
 
@@ -269,7 +276,7 @@ impl<T: Real> Diagnosed<T> {
         // a spike counts as a signal one whole curve away, no more
         let (first, last) = self.curve.ends();
         let span = last - first;
-        let felt = signal.max(first - span).min(last + span);
+        let felt = held(signal, first - span, last + span);
         let (to, on_curve) = self.curve.inverse(felt);
         let (run, surprise) = (to - drive, felt - predicted);
         let least = T::from_f64(LEAST_RUN) * self.curve.step;
@@ -279,10 +286,10 @@ impl<T: Real> Diagnosed<T> {
         // the slope of the drive, as a secant to where the target would have to be
         let probe = if far { run } else { toward * least };
         let moved = self.defects.drive(&memory.defects, &poised, here + probe) - drive;
-        let answer = (moved / probe).max(T::from_f64(LEAST_ANSWER));
+        let answer = greater(moved / probe, T::from_f64(LEAST_ANSWER));
         // and of the curve, so that a flat end of it cannot throw the estimate
         let secant = if far { surprise / run } else { tangent };
-        let slope = answer * tangent.max(secant);
+        let slope = answer * greater(secant, tangent);
         let [yy, yr, rr] = memory.covariance;
         let (by_y, by_r) = (slope * yy, slope * yr);
         let share = (slope * by_y + self.noise).recip();
@@ -298,7 +305,7 @@ impl<T: Real> Diagnosed<T> {
             memory.shown = lag(memory.shown, shown, T::from_f64(SMOOTH));
             self.turn(memory);
         }
-        self.follow(memory);
+        self.defects.follow(&mut memory.defects, &poised, memory.target);
         on_curve
     }
 
@@ -320,13 +327,6 @@ impl<T: Real> Diagnosed<T> {
             memory.reached = lag(memory.reached, memory.shown, self.hiding);
             memory.hidden = lag(memory.hidden, self.hideout, self.hiding);
         }
-    }
-
-    /// The defects follow the target.
-    #[inline(always)]
-    fn follow(&self, memory: &mut DiagnosedMemory<T>) {
-        let (target, pressure) = (memory.target, memory.pressure);
-        self.defects.advance(&mut memory.defects, target, pressure);
     }
 }
 
@@ -378,7 +378,7 @@ impl<T: Real> Live for Diagnosed<T> {
         let on_curve = self.correct(memory, signal);
         let (rate, ahead) = (memory.rate, self.ahead_s);
         *branch = branch.next(rate, self.dead_band);
-        let target = (memory.target + memory.slipped + ahead * rate).max(self.low).min(self.high);
+        let target = held(memory.target + memory.slipped + ahead * rate, self.low, self.high);
         let [yy, yr, rr] = memory.covariance;
         let variance = memory.hidden + yy + ahead * (yr + yr + ahead * rr);
         Some(Reading {
@@ -386,7 +386,7 @@ impl<T: Real> Live for Diagnosed<T> {
             rate: self.gain * rate,
             branch: *branch,
             domain: Domain::from_flags(!on_curve, false),
-            sd: Some(self.spread * Real::sqrt(variance.max(T::zero()))),
+            sd: Some(self.spread * Real::sqrt(greater(variance, T::zero()))),
         })
     }
 
@@ -395,7 +395,7 @@ impl<T: Real> Live for Diagnosed<T> {
         let begun = !memory.target.is_nan();
         if begun {
             self.predict(memory);
-            self.follow(memory);
+            self.defects.advance(&mut memory.defects, memory.target, memory.pressure);
         }
         begun
     }

@@ -13,7 +13,7 @@ use stretch_core::{
     Calibration, CalibrationSpec, Crosstalk, Design, DiagnosedMap, Interval, Knee, Model,
     ObserverMap, Plays, Polarity, RateEstimator, RestTracker, Stage, Values, Volts, Worn,
 };
-use stretch_export::{Form, HEADER, Options, header};
+use stretch_export::{Form, HEADER, Options, arduino_library, header};
 use stretch_receptor::{
     Receptor, Withheld, code::Adc, code::AdcCode, example_diagnosed, example_observer,
 };
@@ -398,6 +398,9 @@ fn a_header_has_the_defects_that_its_map_has() {
         let made = header(&calibration, &options).unwrap();
         assert_eq!(made.form, Form::Float, "{name}");
         assert!(!made.text.contains('@'), "{name}: a mark was left");
+        let library = arduino_library(&made);
+        let live = library.iter().find(|file| file.path.ends_with(".ino")).unwrap();
+        assert_eq!(live.text.contains("stretch_feel("), made.pressure, "{name}");
         (made.pressure, made.text)
     };
     let (no_pressure, plain) = text("no defect");

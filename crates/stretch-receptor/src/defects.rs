@@ -1,6 +1,6 @@
 //! What named defects of a gauge make of a target, sample by sample.
 
-use stretch_core::{DiagnosedMap, Fading, Knee, Plays, Real, Worn, lag_weights, play};
+use stretch_core::{DiagnosedMap, Fading, Knee, Plays, Real, Worn, lag_weights};
 
 use crate::fold::held;
 
@@ -159,18 +159,35 @@ impl<T: Real> Played<T> {
         Self { radii: plays.radii.map(T::from_f64), each: T::from_f64(plays.share / 3.0) }
     }
 
+    /// How far a play stays behind u: u - play(at, u, radius) without the two ends.
+    #[inline(always)]
+    fn apart(&self, i: usize, at: T, u: T) -> T {
+        let (behind, radius) = (u - at, self.radii[i]);
+        if behind.abs() <= radius {
+            behind
+        } else if behind > T::zero() {
+            radius
+        } else {
+            -radius
+        }
+    }
+
     #[inline(always)]
     fn of(&self, at: [T; 3], u: T) -> T {
-        let apart = |i: usize| u - play(at[i], u, self.radii[i]);
+        let apart = |i: usize| self.apart(i, at[i], u);
         u - self.each * (apart(0) + apart(1) + apart(2))
     }
 
     #[inline(always)]
     fn follow(&self, at: &mut [T; 3], u: T) -> T {
+        let out = self.of(*at, u);
         for i in 0..3 {
-            at[i] = play(at[i], u, self.radii[i]);
+            let behind = u - at[i];
+            if behind.abs() > self.radii[i] {
+                at[i] = u - self.apart(i, at[i], u);
+            }
         }
-        u - self.each * ((u - at[0]) + (u - at[1]) + (u - at[2]))
+        out
     }
 
     /// As far wound as that at u.

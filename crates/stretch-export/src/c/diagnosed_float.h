@@ -126,11 +126,12 @@ STRETCH_INLINE float stretch_bounded(float u)
 
 @end
 @if hysteresis
-/* How far a play stays behind x. */
-STRETCH_INLINE float stretch_apart(float before, float x, float radius)
+/* How far a play stays behind u. */
+STRETCH_INLINE float stretch_apart(float at, float u, float radius)
 {
-    const float low = x - radius, high = x + radius;
-    return x - (before < low ? low : before > high ? high : before);
+    const float behind = u - at;
+    const float size = behind < 0.0f ? -behind : behind;
+    return size <= radius ? behind : behind > 0.0f ? radius : -radius;
 }
 
 /* What the plays leave of a drive. */
@@ -234,8 +235,10 @@ STRETCH_INLINE void stretch_follow(stretch_state *s)
     felt = u;
     u = stretch_played(s, u);
     for (i = 0; i < 3; i++) {
-        const float low = felt - stretch_radii[i], high = felt + stretch_radii[i];
-        s->plays[i] = s->plays[i] < low ? low : s->plays[i] > high ? high : s->plays[i];
+        const float behind = felt - s->plays[i];
+        if ((behind < 0.0f ? -behind : behind) > stretch_radii[i]) {
+            s->plays[i] = felt - stretch_apart(s->plays[i], felt, stretch_radii[i]);
+        }
     }
 @end
 @if relaxation

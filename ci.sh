@@ -48,7 +48,7 @@ done
 cargo run --quiet --release --locked -p stretch-gap --example motor >/dev/null
 echo motor
 
-step "every effect of the catalogue, simulated and diagnosed"
+step "every effect of the catalogue, simulated, diagnosed, written into the rig file and diagnosed again"
 cargo test --quiet --release --locked --test every_effect -- --ignored
 
 step "errors of records and rig files, none of them given an effect's name"

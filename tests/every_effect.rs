@@ -2,11 +2,15 @@
 
 mod support;
 
-use std::fs;
+use std::{fs, path::Path};
 
 use serde_json::Value;
 use stretch_sim::{CATALOGUE, Effect};
-use support::{Scratch, stretch};
+use support::{
+    Scratch,
+    round_trip::{diagnosed, is_agreed, replayed},
+    stretch,
+};
 
 /// The effect at the middle of its range's first half, one threshold of several, its shapes at their typical values.
 fn spelled(effect: &Effect) -> String {
@@ -58,4 +62,63 @@ fn is_named_when_it_is_simulated() {
         fs::remove_dir_all(&folder).unwrap();
     }
     assert!(wrong.is_empty(), "not named first: {wrong:?}");
+}
+
+/// Share of the gap that was closed up to which what is left counts as the first diagnosis' own mismatch: play acts on the motion, and a
+/// diagnosis knows the motion as far as its noise allows, which shows where the motion turns.
+const MISMATCH: f64 = 0.005;
+/// Root mean square distance, in noises, of a replay with noise off from a measurement: 1 is the noise alone.
+const REPLAYED: f64 = 1.15;
+
+/// Takes the pressure out of every trial of a data set.
+fn without_pressure(folder: &Path) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|ending| ending != "csv") {
+            continue;
+        }
+        let text = fs::read_to_string(&path).unwrap();
+        let head: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+        let at = head.iter().position(|column| *column == "pressure_kpa").unwrap();
+        let line = |line: &str| {
+            let cells = line.split(',').enumerate().filter(|(i, _)| *i != at);
+            cells.map(|(_, cell)| cell).collect::<Vec<_>>().join(",") + "\n"
+        };
+        fs::write(&path, text.lines().map(line).collect::<String>()).unwrap();
+    }
+}
+
+#[test]
+#[ignore = "minutes in a debug build: ci.sh runs it in release"]
+fn is_agreed_with_once_it_is_written_into_the_rig_file() {
+    let scratch = Scratch::new();
+    let mut wrong = Vec::new();
+    for effect in CATALOGUE {
+        let (folder, fixed) = (scratch.path(effect.name), scratch.path("fixed.toml"));
+        let given = spelled(effect);
+        stretch().args(["simulate", "--effect", &given, "--out"]).arg(&folder).assert().success();
+        for pressure in ["with", "without"] {
+            if pressure == "without" {
+                without_pressure(&folder);
+            }
+            let first = diagnosed(&scratch, &folder, None, Some(&fixed));
+            let again = diagnosed(&scratch, &folder, Some(&fixed), None);
+            // All trials in one session: what a trial remembers of the one before is in it.
+            let apart = replayed(&scratch, &fixed, &folder, &folder);
+            let [before, left] = [&first, &again].map(|d| d["gap"]["retuned"].as_f64().unwrap());
+            println!(
+                "{given}, {pressure} pressure: {} then {} ({before:.3} -> {left:.3} floors), replayed {}",
+                first["named"],
+                again["verdict"],
+                apart.iter().map(|(c, x)| format!("{c} {x:.3}")).collect::<Vec<_>>().join(", ")
+            );
+            let is_mismatch = left <= MISMATCH * before;
+            let is_replayed = apart.iter().all(|(_, floors)| *floors < REPLAYED);
+            if !(is_agreed(&again) || is_mismatch) || !is_replayed {
+                wrong.push(format!("{given}, {pressure} pressure: {}", again["sentence"]));
+            }
+        }
+        fs::remove_dir_all(&folder).unwrap();
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }

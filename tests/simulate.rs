@@ -88,6 +88,97 @@ fn replayed_commands_give_the_trial_again() {
 }
 
 #[test]
+fn a_replayed_session_is_the_session_again() {
+    let scratch = Scratch::new();
+    let (out, replay) = (scratch.path("out"), scratch.path("replay"));
+    let effect = ["--effect", "gauge_softening:m=0.1", "--effect", "thermal_drift:d=1e-4"];
+    runs(stretch().args(["simulate", "--protocol", "paper"]).args(effect).arg("--out").arg(&out));
+    runs(
+        stretch()
+            .arg("simulate")
+            .args(effect)
+            .arg("--commands")
+            .arg(&out)
+            .arg("--out")
+            .arg(&replay),
+    );
+    for name in ["dataset.toml", "inflation_0_25.csv", "deflation_50.csv", "arbitrary_3.csv"] {
+        let read = |folder: &std::path::Path| fs::read_to_string(folder.join(name)).unwrap();
+        let own = read(&replay).replace("name = \"replay\"", "name = \"out\"");
+        assert!(read(&out) == own, "{name}");
+    }
+}
+
+/// Greatest distance of two columns of two trials.
+fn apart(a: &std::path::Path, b: &std::path::Path, column: &str) -> f64 {
+    let values = |path: &std::path::Path| -> Vec<f64> {
+        let text = fs::read_to_string(path).unwrap();
+        let mut lines = text.lines();
+        let at = lines.next().unwrap().split(',').position(|c| c == column).unwrap();
+        lines.map(|line| line.split(',').nth(at).unwrap().parse().unwrap()).collect()
+    };
+    values(a).iter().zip(values(b)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_replay_does_what_every_column_says_or_refuses_it_by_name() {
+    let scratch = Scratch::new();
+    let mut count = 0;
+    let mut replayed = |head: &str, cells: &dyn Fn(usize) -> String| {
+        count += 1;
+        let rows = (0..800).map(|i| format!("{:.2},{}\n", 0.01 * i as f64, cells(i)));
+        let text = format!("time_s,{head}\n") + &rows.collect::<String>();
+        let (file, out) = (scratch.write("next.csv", text), scratch.path(&format!("out_{count}")));
+        let mut command = stretch();
+        command.args(["simulate", "--noise", "off", "--effect", "amplifier_lowpass:tau=0.1"]);
+        command.arg("--commands").arg(&file).arg("--out").arg(&out);
+        (command, out.join("next.csv"))
+    };
+    let fills = |i: usize| if (100..160).contains(&i) { "1,0" } else { "0,0" };
+    let (mut usual, usual_at) = replayed("inlet,outlet", &|i| fills(i).to_owned());
+    runs(&mut usual);
+    let (mut dim, dim_at) =
+        replayed("inlet,outlet,excitation_share", &|i| fills(i).to_owned() + ",0.7");
+    runs(&mut dim);
+    assert!(apart(&usual_at, &dim_at, "bridge_v") > 0.1, "the bridge is dimmed");
+    assert_eq!(apart(&usual_at, &dim_at, "length_mm"), 0.0);
+    assert!(fs::read_to_string(&dim_at).unwrap().contains("excitation_share"));
+    // Clamped, the chamber fills and the muscle does not move.
+    let (mut clamped, clamped_at) =
+        replayed("inlet,outlet,set_length_mm", &|i| fills(i).to_owned() + ",165");
+    runs(&mut clamped);
+    assert_eq!(apart(&usual_at, &clamped_at, "pressure_kpa"), 0.0);
+    let text = fs::read_to_string(&clamped_at).unwrap();
+    assert!(text.lines().skip(1).all(|line| line.split(',').nth(4) == Some("165")));
+    // A shunt acts at once, and a slow amplifier behind it is slow.
+    let shunted = |i: usize| if (200..400).contains(&i) { "0.02" } else { "0" };
+    let (mut shunt, shunt_at) = replayed("inlet,outlet,set_length_mm,shunt_share", &|i| {
+        format!("{},165,{}", fills(i), shunted(i))
+    });
+    runs(&mut shunt);
+    let moved = apart(&clamped_at, &shunt_at, "bridge_v");
+    assert!((0.03..0.1).contains(&moved), "{moved}");
+    for (head, cell, parts) in [
+        ("set_pressure_kpa", "100", ["next.csv", "set_pressure_kpa", "cannot do that"]),
+        ("heater_share", "0.5", ["next.csv", "heater_share", "excitation_share"]),
+        ("shunt_share", "0.02", ["next.csv", "shunt_share", "add set_length_mm"]),
+        ("excitation_share", "-1", ["next.csv", "excitation_share", "0 .. 2"]),
+    ] {
+        let (mut command, at) =
+            replayed(&format!("inlet,outlet,{head}"), &|i| format!("{},{cell}", fills(i)));
+        fails(&mut command, &parts);
+        assert!(!at.exists());
+    }
+    let (mut command, _) = replayed("inlet,outlet,excitation_share", &|i| {
+        format!("{},{}", fills(i), if i < 400 { "1" } else { "0.7" })
+    });
+    fails(&mut command, &["next.csv", "excitation_share", "0.7 stands beside 1"]);
+    // An experiment on a gauge alone sets what this rig has no place for.
+    let (mut command, _) = replayed("set_angle_deg", &|_| "10".to_owned());
+    fails(&mut command, &["next.csv", "set_angle_deg"]);
+}
+
+#[test]
 fn a_folder_that_exists_is_refused_and_left_alone() {
     let scratch = Scratch::new();
     let out = scratch.path("out");
@@ -141,5 +232,7 @@ fn the_catalogue_is_listed() {
     assert_eq!(json.as_array().unwrap().len(), 23);
     assert_eq!(json[0]["parameters"][0]["name"], "r");
     assert_eq!(json[0]["parameters"][1]["role"], "form");
+    let code = runs(stretch().args(["effects", "leak", "--code", "python"]));
+    assert!(code.contains("def leak(p):") && code.contains("kg/(s Pa)"), "{code}");
     fails(stretch().args(["effects", "lek"]), &["did you mean `leak`?"]);
 }

@@ -258,7 +258,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     if let Some(best) = ranking.first() {
         options.signal.clone_from(&best.signal);
     }
-    let causes = args.causes(&trials, &options)?;
+    let causes = args.causes(&trials, &options)?.felt(&trials, &options);
     options.causes.clone_from(&causes.found);
     let choice = match args.model {
         Model::Auto => Some(choose_model(&trials, &options)?),

@@ -22,6 +22,20 @@ pub(super) struct Causes {
 }
 
 impl Causes {
+    /// Without those that need a pressure, where some trial has none; which is said.
+    pub(super) fn felt(mut self, trials: &[Trial], options: &Options) -> Self {
+        let has_pressure = trials.iter().all(|t| t.channel(&options.pressure).is_some());
+        let needs = |cause: &Cause| cause.effect == "pressure_crosstalk" && !has_pressure;
+        if self.found.iter().any(needs) {
+            self.found.retain(|cause| !needs(cause));
+            self.notes.push(format!(
+                "pressure_crosstalk needs the pressure, and no {} was recorded: it is left out",
+                options.pressure
+            ));
+        }
+        self
+    }
+
     /// Of a diagnosis that was written.
     pub(super) fn read(path: &Path) -> anyhow::Result<Self> {
         let name = || path.display().to_string();

@@ -172,6 +172,7 @@ fn write(out: &Path, title: String, sessions: &Sessions, job: &Job) -> anyhow::R
         name: &sessions.name,
         diagnosis: &examined.diagnosis,
         evidence: &examined.evidence,
+        implementations: &examined.implementations,
         simulator: job.bench.simulator(),
     };
     write_text(&file("report.html"), &report::demo_page(&judged, &subject))?;
@@ -195,5 +196,5 @@ fn print(sessions: &Sessions, job: &Job) -> anyhow::Result<()> {
     }
     print_errors("All trials", &evaluation.pooled, &evaluation.unit)?;
     say("\nWhy simulator and rig disagree:")?;
-    print_diagnosis(&job.examined.diagnosis)
+    print_diagnosis(&job.examined)
 }

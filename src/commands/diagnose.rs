@@ -4,14 +4,15 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
-use stretch_bench::{GaugeSimulator, RigSimulator};
-use stretch_data::Trial;
+use stretch_bench::{Fix, GaugeSimulator, Implementation, NoFix, RigSimulator};
+use stretch_data::{DataError, Trial};
 use stretch_gap::{
     Diagnosis, Evidence, GapError, Laboratory, Options, Simulator, diagnose, next_experiment,
 };
 use stretch_sim::Catalogue;
 
 use super::{
+    diagnosis_files::{not_read, to_json, write_fix, write_snippets},
     diagnosis_text::text,
     rails::rails,
     shared::{say, short_name, write_text},
@@ -27,6 +28,12 @@ use crate::report::{Subject, diagnosis_page};
 /// openings; its columns are length_mm and bridge_v unless they are named:
 ///
 ///   stretch diagnose knit.csv --reference angle_deg --signal s2
+///
+/// What is named can be written into a rig file, beside which nothing is missing any more, and
+/// as code for a simulator of your own:
+///
+///   stretch diagnose bench --fix fixed.toml --snippets code
+///   stretch diagnose bench --rig fixed.toml
 ///
 /// Test trials are read once, at the end. Without --rig the rig file that the data set names is
 /// the simulator, else the stock rig. Its parameters may be re-tuned within their tolerances, its
@@ -46,6 +53,12 @@ pub(crate) struct Args {
     /// Write a report that opens in any browser
     #[arg(long, value_name = "d.html")]
     report: Option<PathBuf>,
+    /// Write a rig file with what was found: parameters re-tuned, effects added; a file that exists is replaced
+    #[arg(long, value_name = "fixed.toml")]
+    fix: Option<PathBuf>,
+    /// Write the code of each named effect in C, Python and MATLAB into a new folder
+    #[arg(long, value_name = "DIR")]
+    snippets: Option<PathBuf>,
     /// Leave an effect out of the catalogue; may be given several times
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
@@ -77,6 +90,12 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     ensure!(args.data_set.exists(), "{}: there is no such file or folder", args.data_set.display());
+    if let Some(fix) = &args.fix {
+        not_read(fix, &args.data_set, args.rig.as_deref())?;
+    }
+    if let Some(folder) = args.snippets.as_deref().filter(|folder| folder.exists()) {
+        return Err(DataError::Exists { path: folder.display().to_string() }.into());
+    }
     let options = Options {
         depth: args.depth.into(),
         threads: args.threads,
@@ -101,7 +120,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         }
     }
     bar.finish_and_clear();
-    conclude(&args, &examined, bench.simulator())
+    conclude(&args, &examined, &bench)
 }
 
 /// What is diagnosed: a whole rig, or a gauge alone.
@@ -115,6 +134,8 @@ pub(super) struct Examined {
     pub(super) diagnosis: Diagnosis,
     pub(super) evidence: Evidence,
     pub(super) experiment: Option<Trial>,
+    /// What is named, as something to type.
+    pub(super) implementations: Vec<Implementation>,
 }
 
 impl Bench {
@@ -143,6 +164,15 @@ impl Bench {
         }
     }
 
+    /// The rig or the gauge with what was found of it.
+    fn fixed(&self, examined: &Examined) -> Result<Fix, NoFix> {
+        let Examined { diagnosis, evidence, .. } = examined;
+        match self {
+            Self::Rig(rig) => rig.fixed(diagnosis, evidence),
+            Self::Gauge(gauge) => gauge.fixed(diagnosis, evidence),
+        }
+    }
+
     /// Diagnoses; with `look_on` it looks for the experiment that would tell rivals apart.
     pub(super) fn examine(
         &self,
@@ -150,7 +180,7 @@ impl Bench {
         look_on: bool,
         bar: &ProgressBar,
     ) -> Result<Examined, GapError> {
-        match self {
+        let examined = match self {
             Self::Gauge(gauge) => {
                 examine(gauge.as_ref(), options, look_on, bar, gauge.notes(), &[])
             }
@@ -158,7 +188,14 @@ impl Bench {
                 let rails = rails(rig.nominal(), rig.session());
                 examine(rig.as_ref(), options, look_on, bar, rig.notes(), &rails)
             }
-        }
+        }?;
+        let Examined { diagnosis, evidence, .. } = &examined;
+        let implementations = match self {
+            Self::Rig(rig) => rig.implementations(diagnosis, evidence),
+            Self::Gauge(gauge) => gauge.implementations(diagnosis, evidence),
+        };
+        // A sample time that was diagnosed is one.
+        Ok(Examined { implementations: implementations.unwrap_or_default(), ..examined })
     }
 }
 
@@ -182,40 +219,40 @@ fn examine<L: Laboratory>(
     diagnosis.next_experiment = proposal.as_ref().map(|p| p.next.clone());
     diagnosis.notes.extend_from_slice(after);
     diagnosis.notes.splice(0..0, before.iter().cloned());
-    Ok(Examined { diagnosis, evidence, experiment: proposal.map(|p| p.trial) })
+    let experiment = proposal.map(|p| p.trial);
+    Ok(Examined { diagnosis, evidence, experiment, implementations: Vec::new() })
 }
 
 /// Writes the files first: a message that they are there is then true.
-fn conclude(args: &Args, examined: &Examined, simulator: &dyn Simulator) -> anyhow::Result<()> {
-    let Examined { diagnosis, evidence, .. } = examined;
+fn conclude(args: &Args, examined: &Examined, bench: &Bench) -> anyhow::Result<()> {
+    let Examined { diagnosis, evidence, implementations, .. } = examined;
     let name = name_of(&args.data_set);
+    let fix = bench.fixed(examined);
+    let mut said = Vec::new();
     if let Some(path) = &args.json {
-        write_text(path, &json(diagnosis, &name, args.seed)?)?;
+        write_text(path, &to_json(diagnosis, implementations, &fix, &name, args.seed)?)?;
+        said.push(format!("wrote {}", path.display()));
     }
     if let Some(path) = &args.report {
-        let subject = Subject { name: &name, diagnosis, evidence, simulator };
+        let simulator = bench.simulator();
+        let subject = Subject { name: &name, diagnosis, evidence, implementations, simulator };
         write_text(path, &diagnosis_page(&subject))?;
+        said.push(format!("wrote {}", path.display()));
     }
-    print(diagnosis)?;
-    for path in [&args.json, &args.report].into_iter().flatten() {
-        say(format!("wrote {}", path.display()))?;
+    if let Some(path) = &args.fix {
+        said.push(write_fix(path, &fix, &name, args.seed)?);
     }
-    Ok(())
+    if let Some(folder) = &args.snippets {
+        said.push(write_snippets(folder, implementations)?);
+    }
+    print(examined)?;
+    said.iter().try_for_each(say)
 }
 
 /// The sentence, and everything behind it.
-pub(super) fn print(diagnosis: &Diagnosis) -> anyhow::Result<()> {
-    say(&diagnosis.sentence)?;
-    say(text(diagnosis))
-}
-
-/// The diagnosis in its schema, with what it was made from.
-fn json(diagnosis: &Diagnosis, name: &str, seed: u64) -> anyhow::Result<String> {
-    let mut value = serde_json::to_value(diagnosis)?;
-    value["data_set"] = name.into();
-    value["seed"] = seed.into();
-    value["version"] = env!("CARGO_PKG_VERSION").into();
-    Ok(serde_json::to_string_pretty(&value)? + "\n")
+pub(super) fn print(examined: &Examined) -> anyhow::Result<()> {
+    say(&examined.diagnosis.sentence)?;
+    say(text(&examined.diagnosis, &examined.implementations))
 }
 
 /// What the data are called: the folder's or the file's name.

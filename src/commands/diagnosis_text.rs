@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use stretch_bench::Implementation;
 use stretch_blind::method_in_words;
 use stretch_gap::{Candidate, Diagnosis, SliceGap, VerdictKind};
 
@@ -16,7 +17,7 @@ const SLICES: usize = 8;
 const CANDIDATES: usize = 6;
 
 /// Everything behind the sentence: where, which, how far, and what to do next.
-pub(crate) fn text(diagnosis: &Diagnosis) -> String {
+pub(crate) fn text(diagnosis: &Diagnosis, implementations: &[Implementation]) -> String {
     let mut out = String::new();
     for name in &diagnosis.named {
         if let Some(words) = effect_in_words(name) {
@@ -38,6 +39,7 @@ pub(crate) fn text(diagnosis: &Diagnosis) -> String {
     slices(&mut out, diagnosis);
     candidates(&mut out, diagnosis);
     parameters(&mut out, diagnosis);
+    implement(&mut out, implementations);
     transfer(&mut out, diagnosis);
     baselines(&mut out, diagnosis);
     next(&mut out, diagnosis);
@@ -140,6 +142,23 @@ fn candidates(out: &mut String, diagnosis: &Diagnosis) {
             out,
             &format!("95 % set, not told apart by these data: {}.", listed(&diagnosis.ambiguous)),
         );
+    }
+}
+
+/// What is named, as something to type.
+fn implement(out: &mut String, all: &[Implementation]) {
+    if all.is_empty() {
+        return;
+    }
+    put(out, "\nTo implement (--snippets DIR or the report has the code in C, Python and MATLAB):");
+    for one in all {
+        put(out, &format!("- {}: {}", one.effect.name, one.equation()));
+        if let Some(sketch) = &one.sketch {
+            for q in &sketch.inputs {
+                put(out, &format!("  {q}"));
+            }
+            put(out, &format!("  state: {}", one.state()));
+        }
     }
 }
 

@@ -1,6 +1,10 @@
 //! `stretch effects`: the catalogue of what a rig may do beside its nominal physics.
 
-use stretch_sim::{CATALOGUE, Effect, EffectParameter, Role, SimError, effect_named};
+use anyhow::Context;
+use stretch_sim::{
+    CATALOGUE, Effect, EffectParameter, Grid, Language, RATE_HZ, RigParams, Role, SimError,
+    Surroundings, effect_named,
+};
 
 use super::shared::{say, say_json};
 
@@ -12,6 +16,10 @@ use super::shared::{say, say_json};
 /// value. Use them as
 ///
 ///   stretch simulate --effect gauge_hysteresis:h=0.2,s=0.012 --out bench
+///
+/// or type them into a simulator of your own:
+///
+///   stretch effects gauge_hysteresis --code python
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
@@ -21,6 +29,24 @@ pub(crate) struct Args {
     /// Print JSON
     #[arg(long)]
     json: bool,
+    /// Print code with the typical numbers, for a record at 100 Hz
+    #[arg(
+        long,
+        value_enum,
+        value_name = "c|python|matlab",
+        hide_possible_values = true,
+        conflicts_with = "json",
+        requires = "names"
+    )]
+    code: Option<Code>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Code {
+    C,
+    Python,
+    #[value(alias = "octave")]
+    Matlab,
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
@@ -38,6 +64,16 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     };
     if args.json {
         return say_json(&chosen.iter().map(|e| json(e)).collect::<Vec<_>>());
+    }
+    if let Some(code) = args.code {
+        let language = match code {
+            Code::C => Language::C,
+            Code::Python => Language::Python,
+            Code::Matlab => Language::Matlab,
+        };
+        return chosen
+            .iter()
+            .try_for_each(|effect| say(typical_code(effect, language)?.trim_end()));
     }
     let mut stage = None;
     for effect in chosen {
@@ -57,6 +93,16 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         }
     }
     Ok(())
+}
+
+/// The code of an effect as a usual rig has it.
+fn typical_code(effect: &Effect, language: Language) -> anyhow::Result<String> {
+    let (params, grid) = (RigParams::default(), Grid::samples(1.0 / RATE_HZ)?);
+    let values: Vec<f64> = effect.parameters.iter().map(EffectParameter::usual).collect();
+    let sketch = effect.sketch.context("nobody has written its code down")?;
+    let sketch = sketch(&values, &Surroundings::of_rig(&params, &grid));
+    let comments = [format!("{}: {}.", effect.name, effect.words), effect.equation.to_owned()];
+    Ok(sketch.code(language, effect.name, &comments))
 }
 
 /// `h: 0 .. 0.6`, with the unit where there is one.

@@ -10,6 +10,7 @@ mod causes;
 pub(crate) mod convert;
 pub(crate) mod demo;
 pub(crate) mod diagnose;
+mod diagnosis_files;
 mod diagnosis_text;
 pub(crate) mod effects;
 pub(crate) mod evaluate;

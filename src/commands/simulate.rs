@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
-use stretch_data::{DataSet, ReadOptions, RigFile, Trial, write_folder};
-use stretch_sim::{Key, Rig, RunSettings, Session, SimError, TrialPlan, paper_preset};
+use stretch_data::{DataSet, ReadOptions, RigFile, Trial, TrialEntry, write_folder};
+use stretch_sim::{Rig, RunSettings, Session, SimError, TrialPlan, paper_preset};
 
 use super::shared::{progress, say};
 
@@ -18,6 +18,11 @@ use super::shared::{progress, say};
 /// repeated to the bit, on any machine:
 ///
 ///   stretch simulate --protocol paper --rig bench/rig.toml --out again
+///
+/// --commands replays what a recorded or recommended trial does: its openings,
+/// excitation_share, set_length_mm and shunt_share; a column that asks for more is
+/// refused by name. A trial alone begins the session, so that nothing is remembered
+/// of before; a folder is replayed as one session.
 ///
 /// dataset.toml does not name rig.toml as its rig: that is the simulator without
 /// the effects (nominal.toml where it is not the stock rig).
@@ -33,7 +38,7 @@ pub(crate) struct Args {
     /// What the valves do
     #[arg(long, value_enum, default_value = "paper")]
     protocol: Protocol,
-    /// Replay the inlet and outlet columns of a trial instead
+    /// Replay what a trial does instead (openings, excitation, what is set from outside), or all trials of a data set
     #[arg(long, value_name = "trial.csv", conflicts_with = "protocol")]
     commands: Option<PathBuf>,
     /// Add an effect, as NAME:PARAMETER=VALUE,...
@@ -151,10 +156,21 @@ fn plans(args: &Args, rig: &Rig, seed: u64) -> anyhow::Result<Vec<TrialPlan>> {
             Protocol::Pulses => vec![TrialPlan::pulses(1, seed)],
         });
     };
-    let trial = Trial::read(path, &ReadOptions::new().require("inlet").require("outlet"))?;
-    let plan = TrialPlan::from_trial(&trial, 1e-3 * rig.params[Key::PS])
-        .with_context(|| path.display().to_string())?;
-    Ok(vec![plan])
+    let named = |path: &Path| path.display().to_string();
+    if !path.is_dir() {
+        let trial = Trial::read(path, &ReadOptions::new())?;
+        let plan = TrialPlan::from_trial(&trial, &rig.params).with_context(|| named(path))?;
+        return Ok(vec![plan]);
+    }
+    let set = DataSet::read(path)?;
+    let one = |entry: &TrialEntry| {
+        let file = path.join(&entry.file);
+        let trial = entry.load(path, &ReadOptions::new())?;
+        let plan = TrialPlan::from_trial(&trial, &rig.params).with_context(|| named(&file))?;
+        let (kind, opening, split) = (entry.kind, entry.opening, entry.split);
+        anyhow::Ok(TrialPlan { kind, opening, split, start_s: Some(entry.start_s), ..plan })
+    };
+    set.trials.iter().map(one).collect()
 }
 
 /// Writes the data set, whole or not at all.

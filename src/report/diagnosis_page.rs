@@ -1,6 +1,7 @@
 //! The report of a diagnosis: what to fix in the simulator, how sure that is, and what it gains.
 
 use stretch_gap::{Diagnosis, Gross, VerdictKind};
+use stretch_sim::Language;
 
 use super::{
     bar_figure::{Bar, Row, Scale, bar_figure, narrow_bar_figure},
@@ -49,6 +50,7 @@ pub(crate) fn diagnosis_sections(page: &mut Page, subject: &Subject<'_>) {
     seen(page, subject);
     located(page, subject);
     named(page, subject);
+    implemented(page, subject);
     gained(page, subject);
     next(page, diagnosis);
     numbers(page, diagnosis);
@@ -333,6 +335,29 @@ fn named(page: &mut Page, subject: &Subject<'_>) {
         ));
     }
     page.table(&candidate_table(&d.candidates));
+}
+
+/// What is named, as something to type into a simulator.
+fn implemented(page: &mut Page, subject: &Subject<'_>) {
+    if subject.implementations.is_empty() {
+        return;
+    }
+    page.section(
+        "To implement",
+        "Each named effect with its fitted numbers (and their 95 % intervals), its initial state, and its code: a function that \
+         takes a sample and hands back the next one.",
+    );
+    for one in subject.implementations {
+        page.text(&format!("{}: {}. State: {}.", one.effect.name, one.equation(), one.state()));
+        for language in Language::ALL {
+            if let Some(code) = one.code(language) {
+                let summary = format!("{} in {}", one.effect.name, language.name());
+                page.folded(&summary, |page| {
+                    page.code(&code);
+                });
+            }
+        }
+    }
 }
 
 fn gained(page: &mut Page, subject: &Subject<'_>) {

@@ -62,6 +62,11 @@ impl Page {
         self.put(&format!("<p>{}</p>\n", escape(text)))
     }
 
+    /// Code, as it is typed.
+    pub(crate) fn code(&mut self, code: &str) -> &mut Self {
+        self.put(&format!("<pre>{}</pre>\n", escape(code)))
+    }
+
     /// Notes, one a line; nothing when there are none.
     pub(crate) fn list(&mut self, items: &[String]) -> &mut Self {
         if items.is_empty() {

@@ -1,6 +1,8 @@
 //! What the tests of the program share: a scratch folder, trials, running.
 #![allow(dead_code)] // each test file uses its part
 
+pub(crate) mod round_trip;
+
 use std::{
     fmt::Write,
     path::{Path, PathBuf},

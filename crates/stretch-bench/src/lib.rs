@@ -3,7 +3,9 @@
 mod acting;
 mod causes;
 mod error;
+mod fix;
 mod gauge;
+mod implement;
 mod kept;
 mod lost;
 mod rig;
@@ -13,5 +15,7 @@ mod wild;
 
 pub use causes::causes;
 pub use error::BenchError;
+pub use fix::{Fix, NoFix};
 pub use gauge::{GaugeSetup, GaugeSimulator};
+pub use implement::Implementation;
 pub use rig::{RigSetup, RigSimulator, RigTrial, Session};

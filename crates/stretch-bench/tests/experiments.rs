@@ -2,8 +2,11 @@
 
 use stretch_bench::{RigSetup, RigSimulator, Session};
 use stretch_data::SessionTrial;
-use stretch_gap::{Model, Simulator, differences};
+use stretch_gap::{Laboratory, Model, Simulator, differences};
 use stretch_sim::Catalogue;
+
+/// Noises by which a prediction, in steps of 10 ms, may lie off a simulation in steps of 2.5 ms.
+const SAME: f64 = 1.0;
 
 /// A rig beside an arbitrary trial.
 fn rig() -> RigSimulator {
@@ -45,4 +48,27 @@ fn what_motion_cannot_part_other_experiments_do() {
     let all = of(&rig, ("pot_nonlinearity", 0.6), ("gauge_nonlinearity", -0.01));
     assert!(d(&all, "gauge_blocks") > 2.0 * d(&all, "minor_loops"), "{all:?}");
     assert!(all.iter().all(|x| x.1.is_finite()));
+}
+
+/// What is written of an experiment is all of it: the simulator that replays the trial does what the menu foretells.
+#[test]
+fn every_experiment_is_replayed_from_its_columns() {
+    let rig = rig();
+    let nominal = Model::nominal(&rig);
+    for (plan, setting) in rig.menu() {
+        let replay = stretch_sim::TrialPlan::from_trial(&plan.trial, rig.nominal()).unwrap();
+        let quiet = stretch_sim::RunSettings { noise: false, ..Default::default() };
+        let mut session = stretch_sim::Session::new(&Default::default(), &quiet).unwrap();
+        let (_, trial) = session.run(&replay).unwrap();
+        // Length and voltage in noises; there is no pressure here.
+        let foretold = rig.predict(&nominal, &setting).unwrap();
+        for (column, values) in ["length_mm", "bridge_v"].into_iter().zip(&foretold) {
+            // A vented muscle shows the voltage of its own pressure where the menu lets the pressure follow a course of its own.
+            let noise = if column == "length_mm" { 0.05 } else { 0.002 };
+            let shown = trial.channel(column).unwrap();
+            let worst = shown.iter().zip(values).map(|(a, b)| (a / noise - b).abs());
+            let worst = worst.fold(0.0, f64::max);
+            assert!(worst < SAME, "{}, {column}: {worst} noises apart", plan.name);
+        }
+    }
 }

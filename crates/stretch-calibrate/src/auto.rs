@@ -12,8 +12,8 @@ use crate::{
     series::{extent, sample_rate_hz},
 };
 
-/// Blocks whose means are compared, in seconds.
-const BLOCK_S: f64 = 0.5;
+/// What is not fitted on either side of a part that is left out, in seconds: neighbours tell each other.
+const GAP_S: f64 = 2.0;
 /// Samples of warm-up that no model is judged on.
 const SETTLE: usize = 20;
 /// Fewer trials than this are cut into parts.
@@ -54,8 +54,8 @@ pub struct ModelRow {
     pub lag_s: Option<f64>,
     /// Greatest absolute error.
     pub worst: Option<f64>,
-    /// How much worse than the best, in mean squared error of half-second
-    /// blocks, and the standard error of that.
+    /// How much worse than the best, in mean squared error of the parts
+    /// left out, and the standard error of that.
     pub excess: Option<(f64, f64)>,
     /// Why it has no numbers.
     pub problem: Option<String>,
@@ -110,8 +110,8 @@ struct Fold {
 /// Errors of one model on everything left out.
 #[derive(Default)]
 struct Errors {
-    /// Mean squared error of each block; none where nothing was estimated.
-    blocks: Vec<Option<f64>>,
+    /// Mean squared error of each part left out; none where nothing was estimated.
+    parts: Vec<Option<f64>>,
     /// Sums of squares and counts: arbitrary, pulses, ramps.
     kinds: [(f64, f64); 3],
     worst: f64,
@@ -122,7 +122,7 @@ struct Errors {
 /// over that trial, and judged there; in turn for all trials (for parts of
 /// trials where there are fewer than three). Time constants, radii and ridge are
 /// chosen once, on all of them. The simplest candidate is taken whose mean
-/// squared error, block by block, is not worse than the best one's by more than
+/// squared error, part by part, is not worse than the best one's by more than
 /// one standard error (Breiman et al. 1984, section 3.4.3), or whose root mean
 /// square error is within 5 % of it. Of a length, which cannot pass its resting
 /// stop, the same model with its baseline followed is taken where that costs at
@@ -176,7 +176,7 @@ pub fn choose_model(trials: &[Trial], options: &Options) -> Result<ModelChoice, 
     let excesses: Vec<_> = found
         .iter()
         .map(|f| match (&f.2, &found[best].2) {
-            (Ok(errors), Ok(best)) => excess(&errors.blocks, &best.blocks),
+            (Ok(errors), Ok(best)) => excess(&errors.parts, &best.parts),
             _ => None,
         })
         .collect();
@@ -187,7 +187,7 @@ pub fn choose_model(trials: &[Trial], options: &Options) -> Result<ModelChoice, 
     let bar = bar.unwrap_or(best);
     let as_good = |i: &usize| {
         let (Ok(errors), Ok(least)) = (&found[*i].2, &found[bar].2) else { return false };
-        let close = excess(&errors.blocks, &least.blocks);
+        let close = excess(&errors.parts, &least.parts);
         let share = good(&found[*i]).zip(good(&found[bar])).map(|(own, least)| own / least);
         eligible(found[*i].0)
             && (close.is_some_and(|(mean, error)| mean <= error)
@@ -260,7 +260,8 @@ fn without(trials: &[Trial], fold: &Fold) -> Vec<Trial> {
             rest.push(trial.clone());
             continue;
         }
-        for span in [0..fold.from, fold.to..trial.len()] {
+        let gap = sample_rate_hz(trial).map_or(0, |hz| (GAP_S * hz) as usize);
+        for span in [0..fold.from.saturating_sub(gap), fold.to + gap..trial.len()] {
             // a stub is no trial: its estimators would hardly warm up
             if span.len() > 5 * SETTLE {
                 let mut part = trial.clone();
@@ -324,21 +325,18 @@ impl Errors {
     ) {
         let span = fold.from.max(SETTLE).min(fold.to)..fold.to;
         let (truth, estimate) = (&reference[span.clone()], &estimates[span]);
-        let length = ((BLOCK_S / period_s) as usize).max(1);
-        for (truth, estimate) in truth.chunks(length).zip(estimate.chunks(length)) {
-            let (mut sum, mut count) = (0.0, 0.0);
-            for (t, e) in truth.iter().zip(estimate) {
-                let error = (t - e).abs();
-                if error.is_finite() {
-                    sum += error * error;
-                    count += 1.0;
-                    self.worst = self.worst.max(error);
-                }
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (t, e) in truth.iter().zip(estimate) {
+            let error = (t - e).abs();
+            if error.is_finite() {
+                sum += error * error;
+                count += 1.0;
+                self.worst = self.worst.max(error);
             }
-            self.kinds[which].0 += sum;
-            self.kinds[which].1 += count;
-            self.blocks.push((count > 0.0).then_some(sum / count));
         }
+        self.kinds[which].0 += sum;
+        self.kinds[which].1 += count;
+        self.parts.push((count > 0.0).then_some(sum / count));
         let most = ((MAX_LAG_S / period_s) as usize).min(truth.len() / 4);
         if which < 2
             && let Ok(found) = lag(truth, estimate, most)
@@ -358,10 +356,10 @@ fn rmse((sum, count): (f64, f64)) -> Option<f64> {
     (count > 0.0).then(|| (sum / count).sqrt())
 }
 
-/// Mean difference of two models' blocks, and its standard error.
-fn excess(blocks: &[Option<f64>], best: &[Option<f64>]) -> Option<(f64, f64)> {
+/// Mean difference of two models' parts, and its standard error: a part is one draw, however long it is.
+fn excess(parts: &[Option<f64>], best: &[Option<f64>]) -> Option<(f64, f64)> {
     let differences: Vec<f64> =
-        blocks.iter().zip(best).filter_map(|(a, b)| Some((*a)? - (*b)?)).collect();
+        parts.iter().zip(best).filter_map(|(a, b)| Some((*a)? - (*b)?)).collect();
     let n = differences.len() as f64;
     if n < 2.0 {
         return None;

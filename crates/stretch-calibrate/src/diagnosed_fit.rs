@@ -227,20 +227,35 @@ impl<'a> Record<'a> {
     /// Levenberg and Marquardt over the numbers of the defects, the curve solved for at each.
     fn fit(&self, begin: Knobs) -> Result<Forward, CalibrateError> {
         let undetermined = || CalibrateError::Undetermined { model: Memory::Diagnosed.to_string() };
-        let mut knobs = begin;
+        // a block counts as one observation, so does where the diagnosis saw it
+        let block = (BLOCK_S / self.period_s).max(1.0);
+        let strayed = |knobs: &Knobs| knobs.strayed(&begin);
+        let mut knobs = begin.clone();
         let mut seen = self.look(&knobs).ok_or_else(undetermined)?;
         let count = knobs.at.len();
         let mut damping = 1e-2;
         let mut normal = nalgebra::DMatrix::zeros(count, count);
-        for _ in 0..ITERATIONS {
+        let iterations = if count > 0 { ITERATIONS } else { 0 };
+        for _ in 0..iterations {
             let columns = self.sensitivities(&knobs, &seen);
             let n = columns.iter().map(Vec::len).min().unwrap_or(0).min(seen.residuals.len());
             let dot = |a: &[f64], b: &[f64]| -> f64 {
                 a[..n].iter().zip(&b[..n]).map(|(x, y)| x * y).sum()
             };
             normal = nalgebra::DMatrix::from_fn(count, count, |i, j| dot(&columns[i], &columns[j]));
-            let slope = nalgebra::DVector::from_fn(count, |i, _| dot(&columns[i], &seen.residuals));
-            let before = seen.square;
+            let mut slope =
+                nalgebra::DVector::from_fn(count, |i, _| dot(&columns[i], &seen.residuals));
+            let level = self.mean(&seen) * block;
+            let cost = |seen: &Seen, knobs: &Knobs| {
+                let stray: f64 = strayed(knobs).iter().map(|(d, w)| w * d * d).sum();
+                seen.square + level * stray
+            };
+            let before = cost(&seen, &knobs);
+            for (i, (distance, weight)) in strayed(&knobs).into_iter().enumerate() {
+                normal[(i, i)] += level * weight;
+                slope[i] += level * weight * distance;
+            }
+            let mut now = before;
             for _ in 0..6 {
                 let mut damped = normal.clone();
                 for i in 0..count {
@@ -249,8 +264,9 @@ impl<'a> Record<'a> {
                 let Some(step) = damped.lu().solve(&slope) else { break };
                 let at = knobs.at.iter().zip(step.iter()).map(|(x, dx)| x - dx).collect();
                 let next = knobs.moved(at);
-                match self.look(&next).filter(|s| self.mean(s) < self.mean(&seen)) {
+                match self.look(&next).filter(|s| cost(s, &next) < now) {
                     Some(better) => {
+                        now = cost(&better, &next);
                         (knobs, seen) = (next, better);
                         damping = (damping * 0.3).max(1e-6);
                         break;
@@ -258,7 +274,7 @@ impl<'a> Record<'a> {
                     None => damping = (damping * 4.0).min(1e6),
                 }
             }
-            if seen.square > before * (1.0 - ENDED) {
+            if now > before * (1.0 - ENDED) {
                 break;
             }
         }
@@ -299,6 +315,9 @@ impl<'a> Record<'a> {
     /// Standard errors, with one observation in a block.
     fn errors(&self, normal: &nalgebra::DMatrix<f64>, noise: f64) -> Vec<f64> {
         let block = (BLOCK_S / self.period_s).max(1.0);
+        if normal.is_empty() {
+            return Vec::new();
+        }
         match normal.clone().try_inverse() {
             Some(inverse) => {
                 inverse.diagonal().iter().map(|v| noise * (v.max(0.0) * block).sqrt()).collect()

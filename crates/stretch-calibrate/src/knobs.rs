@@ -95,6 +95,17 @@ impl Knob {
         if self.scale == Log { 0.01 } else { 0.002 * (self.greatest - self.least) }
     }
 
+    /// How far from where it begins it is likely to lie: a form by less than what it is a form of.
+    fn likely(&self) -> f64 {
+        let is_form = ["spread", "bend", "second", "knee", "zero"].contains(&self.name);
+        match (self.scale, is_form) {
+            (Log, true) => 0.3,
+            (Log, false) => 1.0,
+            (Plain, true) => 0.1 * (self.greatest - self.least),
+            (Plain, false) => 0.3 * (self.greatest - self.least),
+        }
+    }
+
     /// Coordinates within the range.
     pub(crate) fn held(&self, coordinate: f64) -> f64 {
         self.coordinate(self.value(coordinate))
@@ -175,6 +186,12 @@ impl Knobs {
     pub(crate) fn moved(&self, at: Vec<f64>) -> Self {
         let at = self.knobs.iter().zip(at).map(|(knob, x)| knob.held(x)).collect();
         Self { at, ..self.clone() }
+    }
+
+    /// By number: distance from where the fit began and weight, in likely distances.
+    pub(crate) fn strayed(&self, from: &Self) -> Vec<(f64, f64)> {
+        let all = self.knobs.iter().zip(&self.at).zip(&from.at);
+        all.map(|((knob, x), from)| (x - from, knob.likely().powi(-2))).collect()
     }
 
     /// Value of a number; none where it takes no part.

@@ -13,13 +13,13 @@ extern crate std;
 
 use std::vec::Vec;
 
-use proptest::{collection, prelude::*};
+use proptest::{collection, option, prelude::*};
 
 use crate::{
-    BranchSurface, Calibration, CalibrationSpec, Degree, FitSummary, HistoryMap, HistoryShape,
-    Interval, Label, LinearMap, MAX_HISTORY_TERMS, Model, Normalisation, ObserverMap, Polarity,
-    Provenance, Range, RangeSpec, RateEstimator, RateSource, RestTracker, SampleRate, Schema,
-    Surface, Target, Values,
+    BranchSurface, Calibration, CalibrationSpec, Crosstalk, Degree, DiagnosedMap, Fading,
+    FitSummary, HistoryMap, HistoryShape, Interval, Knee, Label, LinearMap, MAX_HISTORY_TERMS,
+    Model, Normalisation, ObserverMap, Plays, Polarity, Provenance, Range, RangeSpec,
+    RateEstimator, RateSource, RestTracker, SampleRate, Schema, Surface, Target, Values, Worn,
 };
 
 /// Either way of normalising.
@@ -167,6 +167,64 @@ pub fn observer_map(range: Range, sign: f64) -> impl Strategy<Value = ObserverMa
     )
 }
 
+/// Maps of named defects, any of them or none, behind a curve as an observer's.
+pub fn diagnosed_map(range: Range, sign: f64) -> impl Strategy<Value = DiagnosedMap> {
+    let knee = || option::of((-0.1..0.3f64, 1e-3..0.05f64));
+    let plays = |share| option::of((share, 0.001..0.2f64, 0.1..0.9f64));
+    let fading = option::of((-0.3..0.8f64, 0.02..4.0f64, 1.0..4.0f64));
+    let worn = option::of((0.0..0.3f64, 1.0..50.0f64, 0.0..100.0f64));
+    let slow = (option::of(0.002..0.3f64), -0.2..0.4f64, -1.0..1.0f64, 0.05..3.0f64);
+    let pressed = option::of((-0.1..0.1f64, -0.6..0.6f64));
+    let input = (knee(), knee(), plays(1.0..1.0000001f64), pressed);
+    let middle = (plays(0.0..0.6f64), fading, worn);
+    (observer_map(range, sign), input, middle, (knee(), knee()), slow).prop_map(
+        |(map, (low, high, slip, pressed), (loops, fading, worn), ends, slow)| {
+            let at = |knee: Option<(f64, f64)>, from: f64, sign: f64| {
+                knee.map(|(at, width)| Knee { at: from + sign * at, width })
+            };
+            let plays = |plays: Option<(f64, f64, f64)>| {
+                plays.map(|(share, r, spread): (f64, f64, f64)| Plays {
+                    share: share.min(1.0),
+                    radii: [r * (1.0 - spread), r, r * (1.0 + spread)],
+                })
+            };
+            let (lowpass, skew_s, wound, steady_s) = slow;
+            DiagnosedMap {
+                rest: map.rest,
+                slack_low: at(low, 0.0, 1.0),
+                slack_high: at(high, 1.0, -1.0),
+                slip: plays(slip),
+                crosstalk: pressed.map(|(c, bend)| Crosstalk { c, bend, scale: 620.0 }),
+                hysteresis: plays(loops),
+                relaxation: fading.map(|(share, tau, spread): (f64, f64, f64)| Fading {
+                    share,
+                    taus_s: [tau / spread, tau, tau * spread],
+                }),
+                worn: worn.map(|(m, n, travelled)| Worn {
+                    m,
+                    n,
+                    zero: 0.0,
+                    reversal: 0.0025,
+                    travelled,
+                }),
+                floor: at(ends.0, 0.0, 1.0),
+                ceiling: at(ends.1, 1.0, -1.0),
+                lowpass_s: lowpass.map(|tau| [0.9 * tau, 0.1 * tau]),
+                skew_s,
+                wound: [-wound, wound],
+                curve: map.curve,
+                drive_domain: map.drive_domain,
+                noise: map.noise,
+                agility: map.agility,
+                steady_s,
+                spread: 1.0,
+                estimate_domain: map.estimate_domain,
+                fit: map.fit,
+            }
+        },
+    )
+}
+
 /// Calibrations of every model, estimator, normalisation and polarity, for a
 /// signal of 1..2 V or so.
 pub fn calibration() -> impl Strategy<Value = Calibration> {
@@ -175,6 +233,7 @@ pub fn calibration() -> impl Strategy<Value = Calibration> {
         1 => blended_calibration(),
         1 => history_calibration(),
         1 => observer_calibration(),
+        1 => diagnosed_calibration(),
     ]
 }
 
@@ -215,6 +274,14 @@ pub fn observer_calibration() -> impl Strategy<Value = Calibration> {
     frame().prop_flat_map(|frame| {
         observer_map(frame.signal_range, frame.polarity.sign())
             .prop_map(move |map| frame.holding(Model::Observer(map)))
+    })
+}
+
+/// Calibrations of [`Model::Diagnosed`], for a signal of 1..2 V or so.
+pub fn diagnosed_calibration() -> impl Strategy<Value = Calibration> {
+    frame().prop_flat_map(|frame| {
+        diagnosed_map(frame.signal_range, frame.polarity.sign())
+            .prop_map(move |map| frame.holding(Model::Diagnosed(map)))
     })
 }
 

@@ -27,7 +27,7 @@ pub use even_session::{EvenSession, EvenTrial, SessionTrial};
 pub use interrupt::{interrupt, interrupted, writers_open};
 pub use nearest::nearest;
 pub use read::ReadOptions;
-pub use rig_file::{EffectEntry, Parameter, RigFile};
+pub use rig_file::{EffectEntry, Parameter, Remarks, RigFile};
 pub use row_reader::{Row, RowReader};
 pub use trial::{Channel, Trial, unit};
 pub use write::push_number;

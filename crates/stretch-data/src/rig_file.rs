@@ -49,6 +49,31 @@ pub struct EffectEntry {
     pub parameters: BTreeMap<String, f64>,
 }
 
+/// What is said beside the entries of a rig file: comments, which no reader takes for anything else.
+///
+/// ```
+/// use stretch_data::{Remarks, RigFile};
+/// let rig = RigFile::parse("rig.toml", "[muscle]\ntau_m = { value = 0.03 }")?;
+/// let mut remarks = Remarks::default();
+/// remarks.head.push("Found on Monday.".into());
+/// remarks.parameters.insert(("muscle".into(), "tau_m".into()), "lag, s".into());
+/// let text = rig.to_toml_with(&remarks);
+/// assert_eq!(text, "# Found on Monday.\n\n[muscle]\ntau_m = { value = 0.03 } # lag, s\n");
+/// assert_eq!(RigFile::parse("copy", &text)?, rig);
+/// # Ok::<(), stretch_data::DataError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Remarks {
+    /// Lines at the top of the file.
+    pub head: Vec<String>,
+    /// Behind a parameter: by stage and name.
+    pub parameters: BTreeMap<(String, String), String>,
+    /// Lines above an effect: by its name.
+    pub effects: BTreeMap<String, Vec<String>>,
+    /// Behind a parameter of an effect: by the effect's name and its own.
+    pub effect_parameters: BTreeMap<(String, String), String>,
+}
+
 impl RigFile {
     /// Reads a rig file. Whether the names are those of a rig is for whoever simulates it.
     ///
@@ -90,12 +115,20 @@ impl RigFile {
 
     /// The text of the rig file.
     pub fn to_toml(&self) -> String {
+        self.to_toml_with(&Remarks::default())
+    }
+
+    /// The text of the rig file with comments beside its entries; it reads back to the same.
+    pub fn to_toml_with(&self, remarks: &Remarks) -> String {
         let mut text = String::new();
-        self.write_toml(&mut text).expect("a String takes everything");
+        self.write_toml(remarks, &mut text).expect("a String takes everything");
         text
     }
 
-    fn write_toml(&self, out: &mut String) -> std::fmt::Result {
+    fn write_toml(&self, remarks: &Remarks, out: &mut String) -> std::fmt::Result {
+        for line in &remarks.head {
+            writeln!(out, "# {}", one_line(line))?;
+        }
         if let Some(kind) = &self.kind {
             writeln!(out, "kind = {}", string_text(kind))?;
         }
@@ -111,14 +144,20 @@ impl RigFile {
                         write!(out, ", {key} = {}", number_text(value))?;
                     }
                 }
-                writeln!(out, " }}")?;
+                let remark = remarks.parameters.get(&(stage.clone(), name.clone()));
+                writeln!(out, " }}{}", behind(remark))?;
             }
         }
         for effect in &self.effects {
             let gap = gap(out);
-            writeln!(out, "{gap}[[effect]]\nname = {}", string_text(&effect.name))?;
+            writeln!(out, "{gap}[[effect]]")?;
+            for line in remarks.effects.get(&effect.name).into_iter().flatten() {
+                writeln!(out, "# {}", one_line(line))?;
+            }
+            writeln!(out, "name = {}", string_text(&effect.name))?;
             for (name, value) in &effect.parameters {
-                writeln!(out, "{} = {}", key_text(name), number_text(*value))?;
+                let remark = remarks.effect_parameters.get(&(effect.name.clone(), name.clone()));
+                writeln!(out, "{} = {}{}", key_text(name), number_text(*value), behind(remark))?;
             }
         }
         Ok(())
@@ -149,6 +188,16 @@ impl RigFile {
 /// A blank line between tables, none at the top.
 fn gap(out: &str) -> &'static str {
     if out.is_empty() { "" } else { "\n" }
+}
+
+/// A remark behind an entry.
+fn behind(remark: Option<&String>) -> String {
+    remark.map_or_else(String::new, |remark| format!(" # {}", one_line(remark)))
+}
+
+/// A comment ends with its line, and holds no control character.
+fn one_line(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
 fn effect(file: &str, index: usize, table: &toml::Table) -> Result<EffectEntry, DataError> {

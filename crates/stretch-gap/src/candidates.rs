@@ -16,7 +16,11 @@ use crate::{
     probability::Weighed,
     problem::Problem,
     simulator::Simulator,
+    spec::EffectParameterSpec,
 };
+
+/// Standard deviations to either side that hold 95 % of a Gaussian.
+const COVERS: f64 = 1.96;
 
 /// Name of what the catalogue lacks.
 const UNKNOWN: &str = "unknown";
@@ -91,16 +95,30 @@ fn effect_values(simulator: &dyn Simulator, hypothesis: &Hypothesis) -> Vec<Effe
         let values = hypothesis.model.effect(e).unwrap_or(&[]);
         let sds = hypothesis.effect_sd.get(&e);
         for (i, (p, value)) in spec.parameters.iter().zip(values).enumerate() {
+            let sd = sds.and_then(|s| s.get(i)).copied().unwrap_or(0.0);
             all.push(EffectValue {
                 effect: spec.name.clone(),
                 name: p.name.clone(),
                 unit: p.unit.clone(),
                 value: *value,
-                sd: sds.and_then(|s| s.get(i)).copied().unwrap_or(0.0),
+                sd,
+                interval: interval(p, *value, sd),
+                is_form: p.form.is_some(),
             });
         }
     }
     all
+}
+
+/// 95 % interval of a fitted parameter, as far as its range goes: of what is fitted in equal ratios in equal ratios.
+fn interval(p: &EffectParameterSpec, value: f64, sd: f64) -> [f64; 2] {
+    let ends = match p.is_log && value > 0.0 {
+        true => [-COVERS, COVERS].map(|k| value * libm::exp(k * sd / value)),
+        false => [-COVERS, COVERS].map(|k| value + k * sd),
+    };
+    // A value outside of its range (a threshold that is off) is its own end.
+    let (low, high) = (p.min.min(value), p.max.max(value));
+    ends.map(|end| end.clamp(low, high))
 }
 
 /// The gap of every stage on the test trials.
@@ -134,6 +152,7 @@ pub(crate) fn shifts(simulator: &dyn Simulator, evidence: &Evidence) -> Vec<Para
         unit: p.unit.clone(),
         nominal: p.nominal,
         fitted: fitted[i],
+        sd: evidence.best_sd[i],
         sigmas: (fitted[i] - p.nominal) / p.sd,
         bent: bent[i],
         is_evidence: p.is_evidence,

@@ -135,6 +135,12 @@ pub struct EffectValue {
     pub value: f64,
     /// One standard deviation, from the curvature of the fit with one observation per 0.5 s.
     pub sd: f64,
+    /// Its 95 % interval, within the range that it was looked for in.
+    #[serde(default)]
+    pub interval: [f64; 2],
+    /// Whether it only gives the effect its form.
+    #[serde(default)]
+    pub is_form: bool,
 }
 
 /// What one effect of the best set closes of the gap in the trials that were not fitted.
@@ -229,6 +235,9 @@ pub struct ParameterShift {
     pub nominal: f64,
     /// Value in the final model.
     pub fitted: f64,
+    /// One standard deviation of it, as that of an [`EffectValue`].
+    #[serde(default)]
+    pub sd: f64,
     /// Distance in tolerances.
     pub sigmas: f64,
     /// Value that the nominal simulator without the effects was bent to.

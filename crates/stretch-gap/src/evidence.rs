@@ -50,6 +50,12 @@ pub struct Evidence {
     pub best: Model,
     /// Fitted model of every candidate, in the order of the diagnosis.
     pub candidates: Vec<Model>,
+    /// One standard deviation of every nominal parameter of the re-tuned nominal, 0 where it is exact.
+    pub retuned_sd: Vec<f64>,
+    /// The same of every candidate.
+    pub candidate_sds: Vec<Vec<f64>>,
+    /// One standard deviation of every nominal parameter with the best set.
+    pub(crate) best_sd: Vec<f64>,
     /// Reduced chi-square of the re-tuned nominal, by stage and test block.
     pub(crate) nominal_blocks: Vec<Vec<f64>>,
     /// The strongest effect of the best set.
@@ -133,6 +139,9 @@ impl Evidence {
             retuned: problem.nominal.model.clone(),
             best: found.best.model.clone(),
             candidates: weighed.iter().map(|w| w.hypothesis.model.clone()).collect(),
+            retuned_sd: problem.nominal.parameter_sd.clone(),
+            candidate_sds: weighed.iter().map(|w| w.hypothesis.parameter_sd.clone()).collect(),
+            best_sd: found.best.parameter_sd.clone(),
             nominal_blocks,
             best_effect: found.best.effects.first().copied(),
             gap,

@@ -41,6 +41,8 @@ pub(crate) struct Fitted {
     pub(crate) misfits: Vec<Misfit>,
     /// One standard deviation of each effect parameter, in the order of the model's effects.
     pub(crate) effect_sd: Vec<Vec<f64>>,
+    /// One standard deviation of each nominal parameter that was re-tuned.
+    pub(crate) parameter_sd: Vec<(usize, f64)>,
 }
 
 /// How much work a fit may be.
@@ -267,9 +269,10 @@ impl<'a, 'b> Descent<'a, 'b> {
         let spread = spreads(self.normal);
         let effects = self.model.effects.iter();
         let mut effect_sd: Vec<Vec<f64>> = effects.map(|(_, v)| vec![0.0; v.len()]).collect();
+        let mut parameter_sd = Vec::new();
         for ((c, _), spread) in self.coordinates.iter().zip(spread) {
             match *c {
-                Coordinate::Nominal { .. } => {}
+                Coordinate::Nominal { index, sd, .. } => parameter_sd.push((index, spread * sd)),
                 Coordinate::Linear { slot, index, range, .. } => {
                     effect_sd[slot][index] = spread * range;
                 }
@@ -279,7 +282,7 @@ impl<'a, 'b> Descent<'a, 'b> {
                 }
             }
         }
-        Fitted { model: self.model, misfits, effect_sd }
+        Fitted { model: self.model, misfits, effect_sd, parameter_sd }
     }
 }
 

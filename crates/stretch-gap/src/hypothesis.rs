@@ -15,6 +15,8 @@ pub(crate) struct Hypothesis {
     pub(crate) misfits: Vec<Misfit>,
     /// One standard deviation of the parameters of each effect.
     pub(crate) effect_sd: BTreeMap<usize, Vec<f64>>,
+    /// One standard deviation of every nominal parameter that was re-tuned, 0 of the others.
+    pub(crate) parameter_sd: Vec<f64>,
     /// Log-likelihood against the re-tuned nominal, nats, with penalties: see [`crate::score`].
     pub(crate) score: f64,
 }

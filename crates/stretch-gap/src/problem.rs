@@ -275,14 +275,16 @@ fn retuned(compare: &Comparison<'_>, start: &Model) -> Result<Hypothesis, GapErr
         .collect();
     let mut model = start.clone();
     let mut misfits = Vec::new();
+    let mut parameter_sd = vec![0.0; model.parameters.len()];
     for (stage, fitted) in fits?.into_iter().enumerate() {
+        fitted.parameter_sd.iter().for_each(|(p, sd)| parameter_sd[*p] = *sd);
         for &p in &compare.simulator().stages()[stage].parameters {
             model.parameters[p] = fitted.model.parameters[p];
         }
         misfits.extend(fitted.misfits);
     }
     let (effects, effect_sd) = (Vec::new(), BTreeMap::new());
-    Ok(Hypothesis { effects, model, misfits, effect_sd, score: 0.0 })
+    Ok(Hypothesis { effects, model, misfits, effect_sd, parameter_sd, score: 0.0 })
 }
 
 /// Refuses a simulator whose step of integration shows: its error would be named as an effect.

@@ -123,6 +123,7 @@ impl<'a> Sets<'a> {
                 next.model.parameters[p] = fitted.model.parameters[p];
             }
         }
+        fitted.parameter_sd.iter().for_each(|(p, sd)| next.parameter_sd[*p] = *sd);
         let catalogue = self.problem.simulator().effects();
         next.model
             .effects

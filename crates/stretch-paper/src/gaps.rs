@@ -74,5 +74,9 @@ fn pairs(gap_s: f64) -> TrialPlan {
         rate_hz: RATE_HZ,
         inlet,
         outlet,
+        excitation: 1.0,
+        set_length_mm: None,
+        shunt: None,
+        start_s: None,
     }
 }

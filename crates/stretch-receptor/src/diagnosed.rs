@@ -23,7 +23,7 @@ const SHOWN: f64 = 0.2;
 /// Standard deviations of it by which a sleeve must have come back before it is taken to have turned.
 const SURE: f64 = 6.0;
 /// Greatest standard deviation of a target, in those of what one signal tells over the whole curve.
-const WIDEST: f64 = 2.0;
+const WIDEST: f64 = 4.0;
 /// Beyond the targets that were fitted by this share of them the estimate does not go.
 const BEYOND: f64 = 0.02;
 
@@ -163,13 +163,15 @@ impl<T: Real> Diagnosed<T> {
         DesignError::check("rise of diagnosed.curve", rises, rises > 0.0)?;
         let widest = WIDEST * map.noise * (map.drive_domain.max - map.drive_domain.min) / rises;
         let values = map.curve.iter().map(|v| sign * v);
-        let (skew, steady) = (map.skew_s, map.steady_s);
+        // a slow amplifier is late by its time constants, as far as a rate tells
+        let slow: f64 = map.lowpass_s.into_iter().flatten().sum();
+        let (skew, steady) = (map.skew_s + slow, map.steady_s);
         // what is left of a rate's way after so long; into the past it is not known to have been another
         let ahead = if skew > 0.0 { -steady * libm::expm1(-skew / steady) } else { skew };
         let edge = BEYOND * (map.estimate_domain.max - map.estimate_domain.min);
         // the filter asks for the sleeve; where in it the muscle is its turns tell
         let slip = map.slip.map_or(0.0, |p| p.radii.iter().sum::<f64>() / 3.0);
-        let defects = Defects::new(&DiagnosedMap { slip: None, ..*map }, period_s);
+        let defects = Defects::new(&DiagnosedMap { slip: None, lowpass_s: None, ..*map }, period_s);
         let model = Self {
             sign: T::from_f64(sign),
             rest: RestLevel::new(map.rest, polarity, calibration.signal_range, sample_rate),

@@ -120,6 +120,14 @@ pub enum SimError {
         /// The column.
         name: &'static str,
     },
+    /// A column asks for what cannot be done.
+    #[error("column {name}: {problem}")]
+    Column {
+        /// The column.
+        name: String,
+        /// What is wrong with it, and what would do.
+        problem: String,
+    },
     /// Slices that must have the same (or a derived) length do not.
     #[error("`{name}` has {found} values where {expected} are needed")]
     Length {

@@ -102,18 +102,7 @@ impl Gauge {
             return Err(SimError::NotHere { name: e.name().to_string(), needs });
         }
         let grid = Grid::samples(dt_s)?;
-        let around = Surroundings {
-            grid: &grid,
-            strain_scale: 1.0,
-            strain_stroke: 1.0,
-            contraction_stroke: 1.0,
-            resistance_zero: 1.0,
-            length_zero: 0.0,
-            length_span: 1.0,
-            pressure_scale_kpa: spec.pressure_scale.unwrap_or(1.0),
-            strain_unit: 1.0 / Self::STROKES[0].1,
-            least_opening: 0.0,
-        };
+        let around = Self::surroundings(&spec, &grid);
         let sites = Sites::new(effects.acting_in(Stage::Sensing), &around);
         let reference = Reference::around(&around, effects, &grid);
         Ok(Self {
@@ -124,6 +113,11 @@ impl Gauge {
             needs_pressure: effects.acting_in(Stage::Sensing).any(|e| e.effect().needs.is_some()),
             grid,
         })
+    }
+
+    /// What an effect may know of a gauge alone.
+    pub fn surroundings<'a>(spec: &GaugeSpec, grid: &'a Grid) -> Surroundings<'a> {
+        Surroundings::of_gauge(spec.pressure_scale, 1.0 / Self::STROKES[0].1, grid)
     }
 
     /// A memory for it.

@@ -13,6 +13,7 @@ mod protocol;
 mod random;
 mod rig;
 mod session;
+mod sketch;
 mod stage;
 mod stages;
 mod static_law;
@@ -31,10 +32,11 @@ pub use preset::paper_preset;
 pub use protocol::{OPENINGS, PAUSE_S, RATE_HZ, TrialPlan};
 pub use rig::{LEAST_STRAIN, Rig, RunSettings, default_rig_text};
 pub use session::Session;
+pub use sketch::{Cell, Constant, Language, Quantity, Sketch};
 pub use stage::Stage;
 pub use stages::{
-    Actuation, Bridge, Chain, ChainMemory, Muscle, Openings, Pneumatics, Recorded, Reference,
-    Sensing,
+    Actuation, Bridge, Chain, ChainMemory, Held, Muscle, Openings, Pneumatics, Recorded, Reference,
+    Sensing, Setting,
 };
 pub use static_law::StaticLaw;
 pub use stretch_operators::{DEFAULT_STEP_S, Grid, GridError, Operator, Span, Start};

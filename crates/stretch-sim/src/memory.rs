@@ -33,6 +33,14 @@ impl Memory {
         }
     }
 
+    /// Moves what is remembered a share of the way to what another memory of the same stage remembers: between two states that an
+    /// operator may be in lie only such states.
+    pub fn move_towards(&mut self, other: &Self, share: f64) {
+        for (own, other) in self.cells.iter_mut().zip(&other.cells) {
+            *own += share * (other - *own);
+        }
+    }
+
     /// Forgets everything: the next trial settles unless it is wound.
     pub fn clear(&mut self) {
         self.cells.fill(0.0);

@@ -1,8 +1,8 @@
 //! Protocols: what the valves do, trial after trial.
 
-use stretch_data::{Split, Trial, TrialKind};
+use stretch_data::{Channel, Split, Trial, TrialKind};
 
-use crate::{SimError, random::Random};
+use crate::{Key, RigParams, SimError, StaticLaw, random::Random};
 
 /// Samples a second of every protocol of the paper.
 pub const RATE_HZ: f64 = 100.0;
@@ -34,7 +34,20 @@ pub struct TrialPlan {
     pub inlet: Vec<f64>,
     /// Outlet, one value a sample.
     pub outlet: Vec<f64>,
+    /// Excitation of the bridge, a share of the rig's.
+    pub excitation: f64,
+    /// Length that is set from outside (clamped, or held by gauge blocks), mm, one value a sample; none where the muscle moves freely.
+    pub set_length_mm: Option<Vec<f64>>,
+    /// Share by which a shunt lowers the trim of the bridge, one value a sample; none without a shunt.
+    pub shunt: Option<Vec<f64>>,
+    /// Session time at which it begins, s; none where it follows the trial before after the usual pause.
+    pub start_s: Option<f64>,
 }
+
+/// Columns of a trial that say what is done beside the valves' openings.
+const EXCITATION: &str = "excitation_share";
+const SET_LENGTH: &str = "set_length_mm";
+const SHUNT: &str = "shunt_share";
 
 impl TrialPlan {
     fn new(file: String, kind: TrialKind, seconds: f64) -> Self {
@@ -48,6 +61,10 @@ impl TrialPlan {
             rate_hz: RATE_HZ,
             inlet: vec![0.0; samples],
             outlet: vec![0.0; samples],
+            excitation: 1.0,
+            set_length_mm: None,
+            shunt: None,
+            start_s: None,
         }
     }
 
@@ -131,12 +148,38 @@ impl TrialPlan {
         plans
     }
 
-    /// The openings of a recorded (or invented) trial, to be replayed. A first pressure above half of `supply_kpa`
-    /// starts the replay full, without a pressure column it starts vented.
+    /// What a recorded (or invented) trial does, to be replayed.
+    ///
+    /// | column | what is done with it |
+    /// | --- | --- |
+    /// | `inlet`, `outlet` | the openings; needed |
+    /// | `excitation_share` | excitation of the bridge, a share of the rig's, the same throughout; 1 where it is missing |
+    /// | `set_length_mm` | the length is set from outside, mm |
+    /// | `shunt_share` | a shunt lowers the trim of the bridge by this share; at a set length only |
+    /// | another `set_...` or `..._share` | refused: it asks for what this rig cannot do |
+    /// | any other | passed over: it was recorded |
+    ///
+    /// A first pressure above half of `supply_kpa` starts the replay full; without a pressure column it starts vented.
     ///
     /// # Errors
-    /// `inlet` or `outlet` is not there, an opening outside 0..1, fewer than two samples, time that is not uniform.
-    pub fn from_trial(trial: &Trial, supply_kpa: f64) -> Result<Self, SimError> {
+    /// `inlet` or `outlet` is not there, an opening outside 0..1, fewer than two samples, time that is not uniform, and
+    /// columns as above.
+    ///
+    /// ```
+    /// use stretch_data::{Channel, Trial};
+    /// use stretch_sim::{RigParams, TrialPlan};
+    /// let column = |name: &str, x: f64| Channel { name: name.into(), values: vec![x; 3] };
+    /// let rig = RigParams::default();
+    /// let mut trial = Trial { name: "next.csv".into(), time_s: vec![0.0, 0.01, 0.02], ..Trial::default() };
+    /// trial.channels = vec![column("inlet", 0.0), column("outlet", 0.0), column("excitation_share", 0.7)];
+    /// assert_eq!(TrialPlan::from_trial(&trial, &rig)?.excitation, 0.7);
+    /// trial.channels.push(column("set_pressure_kpa", 100.0));
+    /// let error = TrialPlan::from_trial(&trial, &rig).unwrap_err().to_string();
+    /// assert!(error.contains("set_pressure_kpa"), "{error}");
+    /// # Ok::<(), stretch_sim::SimError>(())
+    /// ```
+    pub fn from_trial(trial: &Trial, rig: &RigParams) -> Result<Self, SimError> {
+        check_columns(trial)?;
         let column =
             |name: &'static str| trial.channel(name).ok_or(SimError::MissingColumn { name });
         let (inlet, outlet) = (column("inlet")?.to_vec(), column("outlet")?.to_vec());
@@ -160,12 +203,87 @@ impl TrialPlan {
         // The rate of the whole, snapped to a whole number where rounding of the times explains the rest.
         let rate = (time.len() - 1) as f64 / (time[time.len() - 1] - time[0]);
         let rate_hz = if (rate - rate.round()).abs() < 1e-6 * rate { rate.round() } else { rate };
-        let full = trial.channel("pressure_kpa").is_some_and(|p| p[0] > 0.5 * supply_kpa);
+        let supply_kpa = 1e-3 * rig[Key::PS];
+        let half_mm = rig[Key::L0] * (1.0 - 0.5 * StaticLaw::new(rig).contraction(supply_kpa));
+        let full = match (trial.channel("pressure_kpa"), trial.channel("length_mm")) {
+            (Some(pressure), _) => pressure[0] > 0.5 * supply_kpa,
+            (None, Some(length)) => length[0] < half_mm,
+            (None, None) => false,
+        };
         let file =
             if trial.name.is_empty() { "commands.csv".to_string() } else { trial.name.clone() };
         let kind = TrialKind::Other;
-        Ok(Self { file, kind, opening: None, split: Split::Fit, full, rate_hz, inlet, outlet })
+        Ok(Self {
+            file,
+            kind,
+            opening: None,
+            split: Split::Fit,
+            full,
+            rate_hz,
+            inlet,
+            outlet,
+            excitation: excitation(trial)?,
+            set_length_mm: trial.channel(SET_LENGTH).map(<[f64]>::to_vec),
+            shunt: shunt(trial)?,
+            start_s: None,
+        })
     }
+
+    /// What it does beside the openings, as columns of a trial: those that a replay reads.
+    pub(crate) fn more_columns(&self) -> Vec<Channel> {
+        let column =
+            |name: &str, values: &[f64]| Channel { name: name.to_owned(), values: values.to_vec() };
+        let excited = vec![self.excitation; self.inlet.len()];
+        let excitation = (self.excitation != 1.0).then(|| column(EXCITATION, &excited));
+        let length = self.set_length_mm.as_ref().map(|values| column(SET_LENGTH, values));
+        let shunt = self.shunt.as_ref().map(|values| column(SHUNT, values));
+        [excitation, length, shunt].into_iter().flatten().collect()
+    }
+}
+
+/// Refuses columns that ask for what the rig cannot do.
+fn check_columns(trial: &Trial) -> Result<(), SimError> {
+    let known = [EXCITATION, SET_LENGTH, SHUNT];
+    let asks = |name: &str| name.starts_with("set_") || name.ends_with("_share");
+    let other = trial.channels.iter().find(|c| asks(&c.name) && !known.contains(&c.name.as_str()));
+    match other {
+        None => Ok(()),
+        Some(other) => Err(SimError::Column {
+            name: other.name.clone(),
+            problem: format!(
+                "the simulated rig cannot do that; besides inlet and outlet it takes {}",
+                known.join(", ")
+            ),
+        }),
+    }
+}
+
+/// Share of the rig's excitation, the same in every row.
+fn excitation(trial: &Trial) -> Result<f64, SimError> {
+    let Some(shares) = trial.channel(EXCITATION) else { return Ok(1.0) };
+    let share = shares.first().copied().unwrap_or(1.0);
+    match shares.iter().find(|s| **s != share || !(**s > 0.0 && **s <= 2.0)) {
+        None => Ok(share),
+        Some(other) => Err(SimError::Column {
+            name: EXCITATION.to_owned(),
+            problem: format!(
+                "{other} stands beside {share}; give one number in 0 .. 2 in every row"
+            ),
+        }),
+    }
+}
+
+/// Shares of a shunt, where there is one.
+fn shunt(trial: &Trial) -> Result<Option<Vec<f64>>, SimError> {
+    let Some(shares) = trial.channel(SHUNT) else { return Ok(None) };
+    let fail = |problem: String| Err(SimError::Column { name: SHUNT.to_owned(), problem });
+    if let Some(share) = shares.iter().find(|s| !(0.0..1.0).contains(*s)) {
+        return fail(format!("{share} is outside 0 .. 1"));
+    }
+    if trial.channel(SET_LENGTH).is_none() {
+        return fail(format!("a shunt is simulated at a set length only; add {SET_LENGTH}"));
+    }
+    Ok(Some(shares.to_vec()))
 }
 
 /// `inflation_0_25.csv` for an opening of 0.25 %.

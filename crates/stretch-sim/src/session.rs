@@ -3,7 +3,8 @@
 use stretch_data::{Channel, Trial, TrialEntry};
 
 use crate::{
-    Chain, ChainMemory, Key, Openings, Recorded, Rig, RunSettings, SimError, Start,
+    Chain, ChainMemory, Held, Key, Openings, Recorded, Rig, RigParams, RunSettings, Setting,
+    SimError, Start,
     protocol::{PAUSE_S, TrialPlan},
     random::Random,
 };
@@ -27,9 +28,10 @@ use crate::{
 pub struct Session {
     rig: Rig,
     settings: RunSettings,
-    /// Prepared rig, its rate and its memory.
-    prepared: Option<(f64, Chain, ChainMemory)>,
-    clock_s: f64,
+    /// Rate and excitation that the rig is prepared for, the rig, and its memory.
+    prepared: Option<([f64; 2], Chain, ChainMemory)>,
+    /// Session time at which the last trial ended, s.
+    end_s: f64,
     trials: u64,
     last_kpa: f64,
 }
@@ -54,38 +56,52 @@ impl Session {
             rig: rig.clone(),
             settings: *settings,
             prepared: None,
-            clock_s: 0.0,
+            end_s: 0.0,
             trials: 0,
             last_kpa: 0.0,
         })
     }
 
     /// Simulates the next trial; returns its entry for a data set and its recording: `inlet`, `outlet`,
-    /// `pressure_kpa`, `length_mm`, `bridge_v`.
+    /// `pressure_kpa`, `length_mm`, `bridge_v`, and what the plan does beside the openings.
     ///
     /// # Errors
-    /// Openings outside 0..1, valves with different numbers of samples, a rate that is not positive.
+    /// Openings outside 0..1, valves with different numbers of samples, a rate that is not positive, a start before the trial
+    /// before has ended.
     pub fn run(&mut self, plan: &TrialPlan) -> Result<(TrialEntry, Trial), SimError> {
         let openings = Openings { inlet: &plan.inlet, outlet: &plan.outlet };
         let samples = openings.check()?;
         if !(plan.rate_hz.is_finite() && plan.rate_hz > 0.0) {
             return Err(SimError::NotPositive { name: "rate", value: plan.rate_hz });
         }
-        let (rate, mut chain, mut memory) = match self.prepared.take() {
+        let (start_s, pause_s) = self.clock(plan)?;
+        let wanted = [plan.rate_hz, plan.excitation];
+        let (found, mut chain, mut memory) = match self.prepared.take() {
             Some(prepared) => prepared,
-            None => self.prepare(plan.rate_hz)?,
+            None => self.prepare(wanted)?,
         };
-        if rate != plan.rate_hz {
-            // Same effects, same memory; only the steps of time differ.
-            chain = self.prepare(plan.rate_hz)?.1;
+        if found != wanted {
+            // Same effects, same memory; only the steps of time and the excitation differ.
+            chain = self.prepare(wanted)?.1;
         }
         let full_kpa = 1e-3 * self.rig.params[Key::PS];
         let initial_kpa = if plan.full { full_kpa } else { 0.0 };
-        let start = self.pause(&chain, &mut memory, plan, initial_kpa)?;
+        let times = (start_s, pause_s);
+        let start = self.pause(&chain, &mut memory, plan, times, initial_kpa)?;
         let mut out = [(); 3].map(|()| vec![0.0; samples]);
         let [pressure, length, bridge] = &mut out;
         let recorded = Recorded { pressure_kpa: pressure, length_mm: length, bridge_v: bridge };
-        chain.run(&mut memory, start, self.clock_s, openings, initial_kpa, recorded)?;
+        match &plan.set_length_mm {
+            None => chain.run(&mut memory, start, start_s, openings, initial_kpa, recorded)?,
+            Some(length_mm) => {
+                let (dt_s, step_s) = (1.0 / plan.rate_hz, self.settings.step_s);
+                let params = self.excited(plan.excitation);
+                let held = Held::new(&params, &self.rig.effects, dt_s, step_s)?;
+                let setting = Setting { length_mm, shunt: plan.shunt.as_deref().unwrap_or(&[]) };
+                let begun = (start, start_s);
+                held.run(&mut memory, begun, openings, setting, initial_kpa, recorded)?;
+            }
+        }
         self.last_kpa = out[0].last().copied().unwrap_or(self.last_kpa);
         if self.settings.noise {
             self.record(&mut out);
@@ -99,7 +115,7 @@ impl Session {
             file: plan.file.clone(),
             kind: plan.kind,
             opening: plan.opening,
-            start_s: self.clock_s,
+            start_s,
             split: plan.split,
         };
         let names = ["inlet", "outlet", "pressure_kpa", "length_mm", "bridge_v"];
@@ -111,21 +127,41 @@ impl Session {
                 .into_iter()
                 .zip(columns)
                 .map(|(name, values)| Channel { name: name.to_string(), values })
+                .chain(plan.more_columns())
                 .collect(),
         };
-        // Rounded to a millionth: sums of sample times would print long.
-        self.clock_s =
-            ((self.clock_s + samples as f64 / plan.rate_hz + PAUSE_S) * 1e6).round() / 1e6;
+        self.end_s = start_s + samples as f64 / plan.rate_hz;
         self.trials += 1;
-        self.prepared = Some((plan.rate_hz, chain, memory));
+        self.prepared = Some((wanted, chain, memory));
         Ok((entry, trial))
     }
 
-    fn prepare(&self, rate_hz: f64) -> Result<(f64, Chain, ChainMemory), SimError> {
-        let chain =
-            Chain::new(&self.rig.params, &self.rig.effects, 1.0 / rate_hz, self.settings.step_s)?;
+    /// Session time at which a trial begins, and how long the pause before it is, s.
+    fn clock(&self, plan: &TrialPlan) -> Result<(f64, f64), SimError> {
+        // Rounded to a millionth: sums of sample times would print long.
+        let rounded = |s: f64| (s * 1e6).round() / 1e6;
+        let usual = if self.trials == 0 { 0.0 } else { rounded(self.end_s + PAUSE_S) };
+        let start_s = plan.start_s.unwrap_or(usual);
+        let pause_s = if self.trials == 0 { PAUSE_S } else { rounded(start_s - self.end_s) };
+        if !(start_s.is_finite() && pause_s >= 0.0) {
+            return Err(SimError::NotPositive { name: "pause before a trial, s", value: pause_s });
+        }
+        Ok((start_s, pause_s))
+    }
+
+    /// The rig's parameters with the bridge at a share of its excitation.
+    fn excited(&self, share: f64) -> RigParams {
+        let mut params = self.rig.params;
+        params[Key::VExc] *= share;
+        params
+    }
+
+    /// For a rate and an excitation.
+    fn prepare(&self, wanted: [f64; 2]) -> Result<([f64; 2], Chain, ChainMemory), SimError> {
+        let (params, dt_s) = (self.excited(wanted[1]), 1.0 / wanted[0]);
+        let chain = Chain::new(&params, &self.rig.effects, dt_s, self.settings.step_s)?;
         let memory = chain.memory();
-        Ok((rate_hz, chain, memory))
+        Ok((wanted, chain, memory))
     }
 
     /// Fills or vents the chamber in the pause before a trial; before the first only when it starts full.
@@ -134,12 +170,13 @@ impl Session {
         chain: &Chain,
         memory: &mut ChainMemory,
         plan: &TrialPlan,
+        (start_s, pause_s): (f64, f64),
         initial_kpa: f64,
     ) -> Result<Start, SimError> {
         if self.trials == 0 && initial_kpa == 0.0 {
             return Ok(Start::Settled);
         }
-        let samples = (PAUSE_S * plan.rate_hz).ceil() as usize + 1;
+        let samples = (pause_s * plan.rate_hz).ceil() as usize + 1;
         let (open, shut) = (vec![1.0; samples], vec![0.0; samples]);
         let openings = if initial_kpa > 0.0 {
             Openings { inlet: &open, outlet: &shut }
@@ -149,7 +186,7 @@ impl Session {
         let mut out = [(); 3].map(|()| vec![0.0; samples]);
         let [pressure_kpa, length_mm, bridge_v] = &mut out;
         let recorded = Recorded { pressure_kpa, length_mm, bridge_v };
-        let at_s = (self.clock_s - PAUSE_S).max(0.0);
+        let at_s = (start_s - pause_s).max(0.0);
         let on = Start::Carried { rest_s: 0.0 };
         chain.run(memory, on, at_s, openings, self.last_kpa, recorded)?;
         Ok(on)

@@ -109,10 +109,11 @@ fn dishes() -> Vec<Dish> {
 impl GaugeSimulator {
     /// The signal over a course, in units of its noise.
     fn prediction(&self, model: &Model, course: &Course) -> Result<Vec<Vec<f64>>, BenchError> {
-        let (mut model, mut base) = (model.clone(), self.effects.clone());
+        let (mut model, mut base) = (model.clone(), self.nominal.effects.clone());
         if course.is_known {
             model.effects.retain(|(i, _)| self.rows[*i].stage != Stage::Reference);
-            let shown = self.effects.iter().filter(|e| e.effect().stage == Stage::Reference);
+            let shown =
+                self.nominal.effects.iter().filter(|e| e.effect().stage == Stage::Reference);
             shown.for_each(|known| drop(base.remove(known.name())));
         }
         let effects = unrecorded(&base, &self.rows, &model)?;
@@ -133,11 +134,11 @@ impl GaugeSimulator {
 
 impl GaugeSimulator {
     fn reference_of(&self, course: &Course) -> Vec<f64> {
-        course.e.iter().map(|e| self.spec.zero + self.spec.span * e).collect()
+        course.e.iter().map(|e| self.nominal.spec.zero + self.nominal.spec.span * e).collect()
     }
 
     fn pressure_of(&self, course: &Course) -> Vec<f64> {
-        let scale = self.spec.pressure_scale.unwrap_or(0.0);
+        let scale = self.nominal.spec.pressure_scale.unwrap_or(0.0);
         course.pressure.iter().map(|share| share * scale).collect()
     }
 
@@ -187,7 +188,8 @@ impl Laboratory for GaugeSimulator {
     fn done(&self) -> Course {
         let samples = ((60.0 / self.record.dt_s) as usize).min(self.inputs[0].values.len());
         let values = &self.inputs[0].values[..samples];
-        let e: Vec<f64> = values.iter().map(|x| (x - self.spec.zero) / self.spec.span).collect();
+        let e: Vec<f64> =
+            values.iter().map(|x| (x - self.nominal.spec.zero) / self.nominal.spec.span).collect();
         Course { pressure: vec![0.0; e.len()], e, is_known: false }
     }
 

@@ -2,6 +2,7 @@
 
 mod columns;
 mod experiments;
+mod fixed;
 mod lag;
 mod record;
 mod source;
@@ -83,14 +84,13 @@ pub struct GaugeSetup<'a> {
 #[derive(Debug)]
 pub struct GaugeSimulator {
     about: Description,
-    /// Effects that the gauge already has.
-    effects: EffectSet,
+    /// The gauge as shipped, with the effects that it already has.
+    nominal: GaugeRig,
     rows: Vec<&'static Effect>,
     record: Record,
     /// The reference of each trial as it drives the gauge.
     inputs: Vec<Smoothed>,
     draws: Draws,
-    spec: GaugeSpec,
     /// Column of the reference.
     reference: String,
     reference_noise: Noise,
@@ -143,7 +143,6 @@ impl GaugeSimulator {
                 trials,
                 dt_s,
             })?,
-            effects: nominal.effects,
             rows,
             inputs,
             reference: reference.into(),
@@ -154,7 +153,7 @@ impl GaugeSimulator {
             found_in: FitRecord::of(&record.trials, &record.signal, dt_s),
             notes,
             record,
-            spec: nominal.spec,
+            nominal,
         })
     }
 
@@ -164,14 +163,18 @@ impl GaugeSimulator {
     }
 
     fn nominal(&self, model: &Model) -> GaugeSpec {
-        GaugeSpec { offset: model.parameters[OFFSET], gain: model.parameters[GAIN], ..self.spec }
+        GaugeSpec {
+            offset: model.parameters[OFFSET],
+            gain: model.parameters[GAIN],
+            ..self.nominal.spec
+        }
     }
 }
 
 impl GaugeSimulator {
     /// The signal over the trials of a run.
     fn signal(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), BenchError> {
-        let acting = Acting::of(&self.effects, &self.rows, run.model)?;
+        let acting = Acting::of(&self.nominal.effects, &self.rows, run.model)?;
         let gauge = Gauge::new(self.nominal(run.model), &acting.inside, self.dt_s())?;
         let mut memory = gauge.memory();
         // What was done to the gauge before the session nobody knows.
@@ -217,7 +220,7 @@ impl Simulator for GaugeSimulator {
     }
 
     fn lines(&self, _stage: usize, model: &Model) -> Vec<Line> {
-        lines(&self.effects, &self.rows, model, self.spread)
+        lines(&self.nominal.effects, &self.rows, model, self.spread)
     }
 
     fn motion(&self) -> Motion<'_> {

@@ -23,7 +23,8 @@ enum Drive {
     /// Openings; whether the chamber begins full.
     Valves { full: bool },
     /// The length (mm) is held or set from outside, the pressure (kPa) follows its own course.
-    Held { length_mm: Vec<f64>, pressure_kpa: Vec<f64>, is_shunted: bool },
+    /// Share by which a shunt lowers the bridge's trim; empty without one.
+    Held { length_mm: Vec<f64>, pressure_kpa: Vec<f64>, shunt: Vec<f64> },
 }
 
 /// An experiment on the rig.
@@ -54,8 +55,11 @@ impl Experiment {
         let channel =
             |name: &str, values: &[f64]| Channel { name: name.into(), values: values.to_vec() };
         let mut channels = vec![channel("inlet", &self.inlet), channel("outlet", &self.outlet)];
-        if let Drive::Held { length_mm, .. } = &self.drive {
+        if let Drive::Held { length_mm, shunt, .. } = &self.drive {
             channels.push(channel("set_length_mm", length_mm));
+            if !shunt.is_empty() {
+                channels.push(channel("shunt_share", shunt));
+            }
         }
         if self.excitation != 1.0 {
             channels.push(channel("excitation_share", &vec![self.excitation; samples]));
@@ -105,7 +109,7 @@ impl Experiment {
             prepare_min,
             inlet: vec![0.0; samples],
             outlet: vec![0.0; samples],
-            drive: Drive::Held { length_mm, pressure_kpa, is_shunted: false },
+            drive: Drive::Held { length_mm, pressure_kpa, shunt: Vec::new() },
             excitation: 1.0,
         }
     }
@@ -181,8 +185,11 @@ impl Experiment {
             vec![at(1.0); seconds(8.0)],
             vec![0.0; seconds(8.0)],
         );
-        if let Drive::Held { is_shunted, .. } = &mut shunt.drive {
-            *is_shunted = true;
+        if let Drive::Held { length_mm, shunt, .. } = &mut shunt.drive {
+            // Off, on, off.
+            *shunt = vec![0.0; length_mm.len()];
+            let part = length_mm.len() / 4;
+            shunt[part..3 * part].fill(SHUNT);
         }
         let rest = Self::held(
             "rest",
@@ -258,28 +265,12 @@ impl RigSimulator {
                 let recorded = Recorded { pressure_kpa, length_mm, bridge_v };
                 chain.run(&mut chain.memory(), Start::Settled, 0.0, openings, initial, recorded)?;
             }
-            Drive::Held { length_mm: length, pressure_kpa: pressure, is_shunted } => {
+            Drive::Held { length_mm: length, pressure_kpa: pressure, shunt } => {
                 let grid = Grid::samples(DT_S)?;
                 let sensing = Sensing::new(&params, &effects, &grid)?;
-                let mut memory = sensing.memory();
-                if *is_shunted {
-                    // Off, on, off, the memory carried over.
-                    let mut shunted = params;
-                    shunted[Key::Beta] *= 1.0 - SHUNT;
-                    let on = Sensing::new(&shunted, &effects, &grid)?;
-                    let part = samples / 4;
-                    let parts = [(0, part), (part, 3 * part), (3 * part, samples)];
-                    for (i, &(from, to)) in parts.iter().enumerate() {
-                        let stage = if i == 1 { &on } else { &sensing };
-                        let start =
-                            if i == 0 { Start::Settled } else { Start::Carried { rest_s: 0.0 } };
-                        let at_s = from as f64 * DT_S;
-                        let (l, p) = (&length[from..to], &pressure[from..to]);
-                        stage.run(&mut memory, start, at_s, l, p, &mut bridge_v[from..to])?;
-                    }
-                } else {
-                    sensing.run(&mut memory, Start::Settled, 0.0, length, pressure, bridge_v)?;
-                }
+                let (mut memory, start) = (sensing.memory(), Start::Settled);
+                let set = (length.as_slice(), shunt.as_slice());
+                sensing.run_shunted(&mut memory, start, 0.0, set, pressure, bridge_v)?;
                 let reference = Reference::new(&params, &effects, &grid)?;
                 reference.run(&mut reference.memory(), Start::Settled, length, length_mm)?;
                 pressure_kpa.copy_from_slice(pressure);

@@ -3,20 +3,24 @@
 mod chamber;
 mod experiments;
 mod extent;
+mod fixed;
 mod noises;
 mod nominal;
 mod put_right;
 mod run;
 mod session;
+mod shown;
 mod simulator;
 pub(crate) mod smooth;
 mod timing;
+mod turned;
+mod unwound;
 
 use std::path::Path;
 
 use stretch_data::DataSet;
 use stretch_gap::{Description, DescriptionSpec, TrialSpec};
-use stretch_sim::{Catalogue, Effect, EffectSet, Key, Rig, RigParams, Search, Stage};
+use stretch_sim::{Catalogue, Effect, EffectSet, Key, Rig, RigParams, Search, Stage, Tolerance};
 
 use chamber::{CHAMBERS, Chambers};
 use extent::extent_of;
@@ -47,6 +51,7 @@ pub struct RigSetup<'a> {
 #[derive(Debug, Clone)]
 pub struct RigSimulator {
     base: RigParams,
+    tolerances: [Tolerance; Key::COUNT],
     /// Effects that the rig already has.
     effects: EffectSet,
     session: Session,
@@ -123,6 +128,7 @@ impl RigSimulator {
                 dt_s,
             })?,
             base: *base,
+            tolerances: rig.tolerances,
             effects: effects.clone(),
             session,
             inputs,

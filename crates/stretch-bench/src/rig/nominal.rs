@@ -19,13 +19,15 @@ pub(super) enum Knob {
     Start,
     /// How far ahead of their rows every other command acts.
     Lead(usize),
+    /// How little of the move before the session a stage remembers.
+    Unwound(Stage),
 }
 
 impl Knob {
     pub(super) fn key(self) -> Option<Key> {
         match self {
             Self::Rig(key) => Some(key),
-            Self::Start | Self::Lead(_) => None,
+            Self::Start | Self::Lead(_) | Self::Unwound(_) => None,
         }
     }
 }
@@ -57,7 +59,28 @@ pub(super) fn parameters(rig: &Rig, kinds: &[Stage]) -> (Vec<ParameterSpec>, Vec
         .filter(|(parameter, _)| parameter.sd > 0.0)
         .chain([(start, Knob::Start)])
         .chain([0, 1].map(|which| (timing::at_rows(which), Knob::Lead(which))))
+        .chain(kinds.iter().filter_map(unwound))
         .unzip()
+}
+
+/// Share, 1 sd, by which memories at the session's start may lie off those of a rig that came from the other end of its stroke: a rig
+/// that had settled before (1) is no great surprise.
+const UNWOUND: f64 = 0.4;
+
+/// How little of the move before the session a stage remembers: 0 as if it had come from the other end of the stroke, 1 as if it had
+/// settled where it begins. Pressures of a chamber are measured.
+fn unwound(kind: &Stage) -> Option<(ParameterSpec, Knob)> {
+    let name = match kind {
+        Stage::Pneumatics | Stage::Reference => return None,
+        Stage::Sensing => "unwound_gauge",
+        Stage::Muscle | Stage::Actuation => "unwound_muscle",
+    };
+    let spec = ParameterSpec {
+        least: 0.0,
+        is_evidence: false,
+        ..ParameterSpec::new(name, "1", 0.0).within(UNWOUND)
+    };
+    Some((spec, Knob::Unwound(*kind)))
 }
 
 /// Stages with their channels, the parameters that act in them, and their noise.
@@ -69,7 +92,11 @@ pub(super) fn stages(kinds: &[Stage], keys: &[Knob], noises: &Noises) -> Vec<Sta
             _ => ("length_mm", "mm", &noises.length_mm),
         };
         // The start's pressure and the timing of commands belong to the chamber.
-        let owner = |knob: &Knob| knob.key().map_or(Stage::Pneumatics, |key| key.info().stage);
+        let owner = |knob: &Knob| match knob {
+            Knob::Rig(key) => key.info().stage,
+            Knob::Unwound(own) => *own,
+            Knob::Start | Knob::Lead(_) => Stage::Pneumatics,
+        };
         StageSpec {
             name: kind.name().into(),
             channel: channel.into(),

@@ -2,20 +2,22 @@
 
 use std::{borrow::Cow, sync::Arc};
 
-use stretch_gap::{Model, Run};
+use stretch_gap::Run;
 use stretch_sim::{
     Actuation, DEFAULT_STEP_S, EffectSet, Grid, Key, Memory, Muscle, Need, Openings, Pneumatics,
-    Reference, RigParams, Sensing, Stage, Start,
+    RigParams, Sensing, Stage, Start,
 };
 
 use super::{
     RigSimulator,
     chamber::{Pressures, causes},
-    nominal::Knob,
     session::Begin,
+    shown::Shown,
     smooth::cubic,
     timing,
     timing::Leads,
+    turned::Turned,
+    unwound::unwind,
 };
 use crate::{acting::Acting, error::BenchError};
 
@@ -40,6 +42,10 @@ struct Setting<'a> {
     grid: Grid,
     offset: f64,
     leads: Leads,
+    /// How little of the move before the session the stage remembers, 0 to 1.
+    unwound: f64,
+    /// The same of the muscle.
+    unwound_muscle: f64,
     shake: Option<u64>,
     /// Input of the stage that stands in for the measured one, all trials end to end.
     given: Option<&'a [f64]>,
@@ -53,9 +59,11 @@ pub(super) fn simulate(
     given: Option<&[f64]>,
     out: &mut [f64],
 ) -> Result<(), BenchError> {
-    let Turned { params, offset, leads } = Turned::of(rig, run.model);
-    let acting = Acting::of(&rig.effects, &rig.rows, run.model)?;
     let kind = rig.stage_kinds[run.stage];
+    let turned = Turned::of(&rig.base, &rig.knobs, run.model);
+    let Turned { params, offset, leads, unwound_muscle, unwound_gauge } = turned;
+    let unwound = if kind == Stage::Sensing { unwound_gauge } else { unwound_muscle };
+    let acting = Acting::of(&rig.effects, &rig.rows, run.model)?;
     let grid = match kind {
         // Driven by a measured input.
         Stage::Muscle | Stage::Sensing => {
@@ -72,6 +80,8 @@ pub(super) fn simulate(
         grid,
         offset,
         leads,
+        unwound,
+        unwound_muscle,
         shake: run.shake,
         given,
         kind,
@@ -89,32 +99,17 @@ pub(super) fn simulate(
     }
 }
 
-/// The parameters of a model.
-struct Turned {
-    params: RigParams,
-    /// Of the pressure at a trial's start, standard deviations.
-    offset: f64,
-    /// How far ahead of their rows commands act, samples.
-    leads: Leads,
-}
-
-impl Turned {
-    fn of(rig: &RigSimulator, model: &Model) -> Self {
-        let mut turned = Self { params: rig.base, offset: 0.0, leads: [0.0; 2] };
-        for (knob, value) in rig.knobs.iter().zip(&model.parameters) {
-            match knob {
-                Knob::Rig(key) => turned.params[*key] = *value,
-                Knob::Start => turned.offset = *value,
-                Knob::Lead(which) => turned.leads[*which] = *value,
-            }
-        }
-        turned
-    }
-}
-
 impl Setting<'_> {
     /// How a trial begins: as the one before left it, after the pause between them.
     fn start(&self, trial: usize) -> Start {
+        if trial == 0 && self.unwound > 0.0 {
+            // It is behind the memory already.
+            return Start::Carried { rest_s: 0.0 };
+        }
+        self.after_pause(trial)
+    }
+
+    fn after_pause(&self, trial: usize) -> Start {
         let trials = &self.rig.about.trials;
         let rest_s = match trial.checked_sub(1) {
             Some(before) => {
@@ -126,6 +121,21 @@ impl Setting<'_> {
         };
         // The move to the new start took a little of the pause.
         Start::Carried { rest_s: (rest_s - 1.0).max(0.0) }
+    }
+
+    /// Moves the stage's memory, left at the other end of the stroke, towards one that had settled.
+    fn unwind(
+        &self,
+        memory: &mut Memory,
+        settled: Memory,
+        begin: impl FnMut(&mut Memory, Start) -> Result<(), BenchError>,
+    ) -> Result<(), BenchError> {
+        unwind(self.unwound, self.after_pause(0), memory, settled, begin)
+    }
+
+    /// The same for what the reference remembers of the muscle.
+    fn unwind_shown(&self, shown: &mut Shown, length: &[f64]) -> Result<(), BenchError> {
+        shown.unwind(self.unwound_muscle, self.after_pause(0), length)
     }
 
     fn is_vented(&self) -> bool {
@@ -213,7 +223,7 @@ impl Setting<'_> {
         let stage = Pneumatics::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
         self.each(count, out, |trial, own| {
-            let (start, [inlet, outlet]) = (self.start(trial), self.openings(trial));
+            let (start, [inlet, outlet]) = (self.after_pause(trial), self.openings(trial));
             let openings = Openings { inlet: &inlet, outlet: &outlet };
             let initial = self.initial_kpa(trial);
             if stage.is_coupled() {
@@ -234,6 +244,12 @@ impl Setting<'_> {
         let mut filled = [0.0; 2];
         stage.run(&mut memory, Start::Settled, &[before; 2], &mut filled)?;
         shown.condition(&filled)?;
+        let first = self.input(0, true).first().copied().unwrap_or(before);
+        let mut begun = [0.0];
+        self.unwind(&mut memory, stage.memory(), |memory, start| {
+            Ok(stage.run(memory, start, &[first], &mut begun)?)
+        })?;
+        self.unwind_shown(&mut shown, &begun)?;
         self.each(count, out, |trial, own| {
             stage.run(&mut memory, self.start(trial), &self.input(trial, true), own)?;
             shown.run(self.start(trial), own)
@@ -251,6 +267,12 @@ impl Setting<'_> {
             stage.run_length(&mut memory, Start::Settled, &vec![before; nodes], &mut filled)?;
             shown.condition(&filled)?;
             let pressure = self.chamber_kpa(&stage, count)?;
+            let first = pressure.first().and_then(|p| p.first()).copied().unwrap_or(before);
+            let mut begun = [0.0];
+            self.unwind(&mut memory, stage.memory(), |memory, start| {
+                Ok(stage.run_length(memory, start, &[first], &mut begun)?)
+            })?;
+            self.unwind_shown(&mut shown, &begun)?;
             return self.each(count, out, |trial, own| {
                 stage.run_length(&mut memory, self.start(trial), &pressure[trial], own)?;
                 shown.run(self.start(trial), own)
@@ -260,6 +282,12 @@ impl Setting<'_> {
         let openings = Openings { inlet: &shut, outlet: &shut };
         stage.run(&mut memory, Start::Settled, openings, before, &mut [0.0; 2], &mut filled)?;
         shown.condition(&filled)?;
+        let (initial, mut begun) = (self.initial_kpa(0), [0.0]);
+        let shut = Openings { inlet: &[0.0], outlet: &[0.0] };
+        self.unwind(&mut memory, stage.memory(), |memory, start| {
+            Ok(stage.run(memory, start, shut, initial, &mut [0.0], &mut begun)?)
+        })?;
+        self.unwind_shown(&mut shown, &begun)?;
         let mut pressure = Vec::new();
         self.each(count, out, |trial, own| {
             pressure.resize(own.len(), 0.0);
@@ -286,7 +314,7 @@ impl Setting<'_> {
             let shut = Openings { inlet: &[0.0; 2], outlet: &[0.0; 2] };
             stage.run_pressure(&mut memory, Start::Settled, shut, before, &mut Vec::new())?;
             let one = |(trial, initial_kpa): (usize, &f64)| {
-                let (start, [inlet, outlet]) = (self.start(trial), self.openings(trial));
+                let (start, [inlet, outlet]) = (self.after_pause(trial), self.openings(trial));
                 let openings = Openings { inlet: &inlet, outlet: &outlet };
                 let mut nodes = Vec::new();
                 stage.run_pressure(&mut memory, start, openings, *initial_kpa, &mut nodes)?;
@@ -326,6 +354,17 @@ impl Setting<'_> {
                 &vec![kpa; nodes],
                 &mut volts,
             )?;
+            let first = |of_pressure: bool, other: f64| match of_pressure {
+                true if self.rig.inputs.pressure.is_empty() => other,
+                _ => self.input(0, of_pressure).first().copied().unwrap_or(other),
+            };
+            let mut length = [first(false, before)];
+            shown.undo(&mut length);
+            let (pressure, mut volts) = ([first(true, self.initial_kpa(0))], [0.0]);
+            self.unwind(&mut memory, stage.memory(), |memory, start| {
+                let start_s = self.rig.about.trials[0].start_s;
+                Ok(stage.run(memory, start, start_s, &length, &pressure, &mut volts)?)
+            })?;
         }
         let dimmed = self.dimmed(count)?;
         let hidden = self.hidden(count)?;
@@ -374,6 +413,7 @@ impl Setting<'_> {
         let mut free = self.free_length(count)?;
         let mut shown = self.shown(&alone)?;
         shown.condition(&[self.before_mm(); 2])?;
+        self.unwind_shown(&mut shown, free.get(..1).unwrap_or(&[]))?;
         self.each(count, &mut free, |trial, own| {
             let before = own.to_vec();
             shown.run(self.start(trial), own)?;
@@ -392,7 +432,9 @@ impl Setting<'_> {
         } else {
             effects.grid(&self.params, self.rig.about.dt_s, STEP_S)?
         };
-        let without = Setting { rig: self.rig, params: self.params, effects, grid, ..*self };
+        let unwound = self.unwound_muscle;
+        let without =
+            Setting { rig: self.rig, params: self.params, effects, grid, unwound, ..*self };
         let samples = self.rig.about.trials[..count].iter().map(|t| t.samples).sum();
         let mut all = vec![0.0; samples];
         if has_pressure {
@@ -432,40 +474,6 @@ impl Setting<'_> {
     }
 
     fn shown(&self, effects: &EffectSet) -> Result<Shown, BenchError> {
-        let grid = Grid::samples(self.rig.about.dt_s)?;
-        let stage = Reference::new(&self.params, effects, &grid)?;
-        let acts = effects.acting_in(Stage::Reference).next().is_some();
-        let memory = stage.memory();
-        Ok(Shown { stage, memory, acts, work: Vec::new() })
-    }
-}
-
-/// The reference at the end of a stage, skipped where nothing acts in it.
-struct Shown {
-    stage: Reference,
-    memory: Memory,
-    acts: bool,
-    work: Vec<f64>,
-}
-
-impl Shown {
-    fn condition(&mut self, length: &[f64]) -> Result<(), BenchError> {
-        let mut out = vec![0.0; length.len()];
-        Ok(self.stage.run(&mut self.memory, Start::Settled, length, &mut out)?)
-    }
-
-    fn run(&mut self, start: Start, length: &mut [f64]) -> Result<(), BenchError> {
-        if self.acts {
-            self.work.clear();
-            self.work.extend_from_slice(length);
-            self.stage.run(&mut self.memory, start, &self.work, length)?;
-        }
-        Ok(())
-    }
-
-    fn undo(&self, length: &mut [f64]) {
-        if self.acts {
-            self.stage.undo(length);
-        }
+        Shown::new(&self.params, effects, self.rig.about.dt_s)
     }
 }

@@ -167,6 +167,7 @@ fn fitted(
             found.model.parameters[p] = fitted.model.parameters[p];
         }
     }
+    fitted.parameter_sd.iter().for_each(|(p, sd)| found.parameter_sd[*p] = *sd);
     found.model.effects = fitted.model.effects;
     for misfit in fitted.misfits {
         found.misfits[misfit.stage] = misfit;

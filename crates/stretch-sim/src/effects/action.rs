@@ -5,6 +5,7 @@ use stretch_operators::{Grid, Operator, SkewSpec};
 use crate::{
     law::{Droop, Law},
     params::{Key, RigParams},
+    sketch::Quantity,
 };
 
 /// What an effect may need to know of the rig it acts in.
@@ -34,7 +35,7 @@ pub struct Surroundings<'a> {
 
 impl<'a> Surroundings<'a> {
     /// Those of the whole rig.
-    pub(crate) fn of_rig(params: &RigParams, grid: &'a Grid) -> Self {
+    pub fn of_rig(params: &RigParams, grid: &'a Grid) -> Self {
         let (stretch, k_max) = (1.0 + params[Key::E0], params[Key::KMax]);
         Self {
             grid,
@@ -48,6 +49,70 @@ impl<'a> Surroundings<'a> {
             strain_unit: 1.0,
             least_opening: params[Key::UMin],
         }
+    }
+
+    /// Those of a gauge alone, in units of its range and its span.
+    pub(crate) fn of_gauge(pressure_scale: Option<f64>, strain_unit: f64, grid: &'a Grid) -> Self {
+        Self {
+            grid,
+            strain_scale: 1.0,
+            strain_stroke: 1.0,
+            contraction_stroke: 1.0,
+            resistance_zero: 1.0,
+            length_zero: 0.0,
+            length_span: 1.0,
+            pressure_scale_kpa: pressure_scale.unwrap_or(1.0),
+            strain_unit,
+            least_opening: 0.0,
+        }
+    }
+
+    /// A signal of the rig, or what stands in its place in a gauge alone.
+    fn signal(&self, rig: (&'static str, &'static str), alone: &'static str) -> Quantity {
+        match self.strain_unit == 1.0 {
+            true => Quantity::new("x", rig.0, rig.1),
+            false => Quantity::new("x", "1", alone),
+        }
+    }
+
+    /// What effects on the strain act on.
+    pub(crate) fn strain(&self) -> Quantity {
+        let rig = ("strain", "gauge strain e, before the resistance");
+        self.signal(rig, "e = (reference - zero)/span")
+    }
+
+    /// The strain where an effect on the resistance needs it.
+    pub(crate) fn strain_beside(&self) -> Quantity {
+        let meaning = "gauge strain e, as the effects on it leave it";
+        Quantity { name: "e", meaning, ..self.strain() }
+    }
+
+    /// What effects on the resistance act on.
+    pub(crate) fn resistance(&self) -> Quantity {
+        let rig = ("ohm", "resistance R of the gauge, before the bridge");
+        self.signal(rig, "1 + e, where the signal is offset + gain e")
+    }
+
+    /// What effects on the voltage act on.
+    pub(crate) fn volts(&self) -> Quantity {
+        let rig = ("V", "amplified voltage v");
+        self.signal(rig, "(signal - offset)/gain")
+    }
+
+    /// What effects on recorded samples act on.
+    pub(crate) fn record(&self) -> Quantity {
+        let rig = ("V", "amplified voltage, sample by sample, before it is recorded");
+        let name = "v";
+        Quantity {
+            name,
+            ..self.signal(rig, "(signal - offset)/gain, sample by sample, before it is recorded")
+        }
+    }
+
+    /// What effects on the reference act on.
+    pub(crate) fn length(&self) -> Quantity {
+        let rig = ("mm", "true length, before the reference shows it");
+        self.signal(rig, "e as it is, before the reference shows it")
     }
 }
 

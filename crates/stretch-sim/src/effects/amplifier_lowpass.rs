@@ -4,6 +4,7 @@ use stretch_operators::{Lowpass, Poles};
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},
+    sketch::lowpass,
     stage::Stage,
 };
 
@@ -24,5 +25,6 @@ pub(super) static AMPLIFIER_LOWPASS: Effect = Effect {
     twins: &["channel_skew", "gauge_relaxation"],
     needs_fine_steps: true,
     starts: Some(|_| each([0.004, 0.02, 0.08])),
+    sketch: Some(|v, around| lowpass([v[0], v[1]], around.grid.dt_s(), around.volts())),
     ..Effect::PLAIN
 };

@@ -4,6 +4,7 @@ use stretch_operators::Knees;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Extent, Form, Need},
+    sketch::knees,
     stage::Stage,
 };
 
@@ -23,15 +24,21 @@ pub(super) static AMPLIFIER_SATURATION: Effect = Effect {
         EffectParameter::form("knee", "V", 0.0005, 0.06, Form { neutral: 0.01, usual: 0.01 }).log(),
     ],
     action: |values, _| {
-        let bound = |v: f64, off: f64| (v != off).then_some(v);
-        let (low, high) = (bound(values[0], LOW_V), bound(values[1], HIGH_V));
+        let [low, high] = rails(values);
         Action::Volts(Box::new(Knees { low, high, width: values[2] }))
     },
     twins: &["sleeve_slack"],
     needs: Some(Need::Amplifier),
     starts: Some(starts),
+    sketch: Some(|v, around| knees(rails(v), v[2], around.volts())),
     ..Effect::PLAIN
 };
+
+/// Those that are reached.
+fn rails(values: &[f64]) -> [Option<f64>; 2] {
+    let bound = |v: f64, off: f64| (v != off).then_some(v);
+    [bound(values[0], LOW_V), bound(values[1], HIGH_V)]
+}
 
 /// A little inside of either end, with the usual knee and one as sharp as they come: from a soft one a fit does not find there.
 fn starts(extent: &Extent) -> Vec<Vec<f64>> {

@@ -3,6 +3,7 @@
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},
     law::Law,
+    sketch::growth,
     stage::Stage,
 };
 
@@ -18,6 +19,7 @@ pub(super) static CHAMBER_VOLUME: Effect = Effect {
     ],
     action: |values, _| Action::Volume(Box::new(Growth { g: values[0], bend: values[1] })),
     starts: Some(|_| each([0.1, 1.0])),
+    sketch: Some(|v, _| growth([v[0], v[1]])),
     ..Effect::PLAIN
 };
 

@@ -4,6 +4,7 @@ use stretch_operators::SkewSpec;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},
+    sketch::skewed,
     stage::Stage,
 };
 
@@ -26,6 +27,7 @@ pub(super) static CHANNEL_SKEW: Effect = Effect {
         search.starts.extend(more.map(|skew_s| vec![skew_s, 0.0]));
     },
     starts: Some(|_| starts()),
+    sketch: Some(|v, around| skewed([v[0], v[1]], around.grid.dt_s(), around.record())),
     ..Effect::PLAIN
 };
 

@@ -4,6 +4,7 @@ use stretch_operators::{Oscillator, Swing};
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},
+    sketch::{MOVING, swinging},
     stage::Stage,
 };
 
@@ -23,5 +24,6 @@ pub(super) static CROSSBEAM_INERTIA: Effect = Effect {
     },
     twins: &["valve_delay"],
     starts: Some(|_| each([0.003, 0.01, 0.03])),
+    sketch: Some(|v, around| swinging([v[0], v[1]], around.grid.dt_s(), MOVING)),
     ..Effect::PLAIN
 };

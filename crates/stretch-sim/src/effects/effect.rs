@@ -2,6 +2,7 @@
 
 use crate::{
     effects::{Action, EffectParameter, Role, Search, Surroundings},
+    sketch::Sketch,
     stage::Stage,
 };
 
@@ -107,6 +108,8 @@ pub struct Effect {
     pub parameters: &'static [EffectParameter],
     /// Where and how it acts with these values, which are not off.
     pub action: fn(&[f64], &Surroundings<'_>) -> Action,
+    /// How somebody would type it; none where nobody has written that down.
+    pub sketch: Option<fn(&[f64], &Surroundings<'_>) -> Sketch>,
     /// What it needs beside the stage's own input.
     pub needs: Option<Need>,
     /// Names of effects that are hard to tell from it.
@@ -140,6 +143,7 @@ impl Effect {
         equation: "",
         parameters: &[],
         action: |_, _| Action::Nothing,
+        sketch: None,
         needs: None,
         twins: &[],
         counts_session: false,

@@ -4,6 +4,7 @@ use stretch_operators::{Loops, PrandtlIshlinskii};
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::pairs},
+    sketch::loops,
     stage::Stage,
 };
 
@@ -24,5 +25,6 @@ pub(super) static GAUGE_HYSTERESIS: Effect = Effect {
     },
     twins: &["sleeve_slip"],
     starts: Some(|_| pairs(0.1, [0.006, 0.016, 0.045])),
+    sketch: Some(|v, around| loops([v[0], v[1], v[2]], around.strain())),
     ..Effect::PLAIN
 };

@@ -4,6 +4,7 @@ use stretch_operators::BowedGain;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},
+    sketch::bowed_gain,
     stage::Stage,
 };
 
@@ -25,5 +26,8 @@ pub(super) static GAUGE_NONLINEARITY: Effect = Effect {
     // At half of the range, where e + 1 is 1.5, it bends by half as much again; further, it would not rise any more.
     alone: |_, search| search.reach_from(0.5),
     starts: Some(|_| each([0.005])),
+    sketch: Some(|v, around| {
+        bowed_gain([v[0], v[1], around.strain_scale], around.resistance(), around.strain_beside())
+    }),
     ..Effect::PLAIN
 };

@@ -4,6 +4,7 @@ use stretch_operators::{FadingMemory, Times};
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::pairs},
+    sketch::fading,
     stage::Stage,
 };
 
@@ -32,5 +33,6 @@ pub(super) static GAUGE_RELAXATION: Effect = Effect {
         search.starts.extend(slow);
     },
     starts: Some(|_| pairs(0.05, [0.03, 0.1, 0.35, 1.2, 3.5])),
+    sketch: Some(|v, around| fading([v[0], v[1], v[2]], around.grid.dt_s(), around.strain())),
     ..Effect::PLAIN
 };

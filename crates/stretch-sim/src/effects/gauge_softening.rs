@@ -4,6 +4,7 @@ use stretch_operators::Softening;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::pairs},
+    sketch::{Soft, softening},
     stage::Stage,
 };
 
@@ -30,6 +31,16 @@ pub(super) static GAUGE_SOFTENING: Effect = Effect {
     },
     counts_session: true,
     starts: Some(|_| pairs(0.03, [0.5, 2.5, 12.0])),
+    sketch: Some(|v, around| {
+        let soft = Soft {
+            m: v[0],
+            n: v[1],
+            tail: v[2],
+            zero: around.resistance_zero,
+            reversal: REVERSAL * around.strain_unit,
+        };
+        softening(&soft, around.resistance(), around.strain_beside())
+    }),
     ..Effect::PLAIN
 };
 

@@ -3,6 +3,7 @@
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},
     law::Law,
+    sketch::leak,
     stage::Stage,
 };
 
@@ -18,6 +19,7 @@ pub(super) static LEAK: Effect = Effect {
     ],
     action: |values, _| Action::Leak(Box::new(Leak { c: values[0], excess: values[1] - 1.0 })),
     starts: Some(|_| each([1e-11])),
+    sketch: Some(|v, _| leak([v[0], v[1], AT_PA])),
     ..Effect::PLAIN
 };
 

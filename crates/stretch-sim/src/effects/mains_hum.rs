@@ -6,6 +6,7 @@ use stretch_operators::Hum;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Line, Measured, Role},
+    sketch::hum,
     stage::Stage,
 };
 
@@ -34,6 +35,7 @@ pub(super) static MAINS_HUM: Effect = Effect {
     starts: Some(|_| {
         [50.0, 60.0].iter().flat_map(|f| [0.002, 0.02].map(|a| vec![a, *f])).collect()
     }),
+    sketch: Some(|v, around| hum([v[0], v[1], v[2]], around.record())),
     ..Effect::PLAIN
 };
 

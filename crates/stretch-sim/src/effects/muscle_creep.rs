@@ -4,6 +4,7 @@ use stretch_operators::{FadingMemory, Times};
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::pairs},
+    sketch::{STILL, fading},
     stage::Stage,
 };
 
@@ -25,5 +26,6 @@ pub(super) static MUSCLE_CREEP: Effect = Effect {
     },
     twins: &["muscle_hysteresis"],
     starts: Some(|_| pairs(0.05, [0.6, 2.0, 6.0, 20.0])),
+    sketch: Some(|v, around| fading([-v[0], v[1], v[2]], around.grid.dt_s(), STILL)),
     ..Effect::PLAIN
 };

@@ -4,6 +4,7 @@ use stretch_operators::{Loops, PrandtlIshlinskii};
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::pairs},
+    sketch::{STILL, loops},
     stage::Stage,
 };
 
@@ -24,5 +25,6 @@ pub(super) static MUSCLE_HYSTERESIS: Effect = Effect {
     },
     twins: &["muscle_creep"],
     starts: Some(|_| pairs(0.1, [0.007, 0.02, 0.05])),
+    sketch: Some(|v, _| loops([v[0], v[1], v[2]], STILL)),
     ..Effect::PLAIN
 };

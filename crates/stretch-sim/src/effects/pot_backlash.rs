@@ -4,6 +4,7 @@ use stretch_operators::Backlash;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},
+    sketch::backlash,
     stage::Stage,
 };
 
@@ -21,5 +22,6 @@ pub(super) static POT_BACKLASH: Effect = Effect {
     twins: &["sleeve_slip"],
     hides_input: true,
     starts: Some(|_| each([0.05, 0.2, 0.8])),
+    sketch: Some(|v, around| backlash([v[0], v[1]], around.length())),
     ..Effect::PLAIN
 };

@@ -4,6 +4,7 @@ use stretch_operators::Bow;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},
+    sketch::bowed,
     stage::Stage,
 };
 
@@ -23,5 +24,8 @@ pub(super) static POT_NONLINEARITY: Effect = Effect {
     },
     twins: &["gauge_nonlinearity"],
     starts: Some(|_| each([0.2])),
+    sketch: Some(|v, around| {
+        bowed([v[0], v[1]], [around.length_zero, around.length_span], around.length())
+    }),
     ..Effect::PLAIN
 };

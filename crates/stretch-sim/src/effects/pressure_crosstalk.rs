@@ -4,6 +4,7 @@ use stretch_operators::{Operator, Span};
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, Need},
+    sketch::crosstalk,
     stage::Stage,
 };
 
@@ -28,6 +29,7 @@ pub(super) static PRESSURE_CROSSTALK: Effect = Effect {
     twins: &["gauge_nonlinearity"],
     needs: Some(Need::Pressure),
     starts: Some(|_| vec![vec![0.003], vec![0.003, -0.4], vec![0.003, 0.4]]),
+    sketch: Some(|v, around| crosstalk([v[0], v[1], around.pressure_scale_kpa], around.strain())),
     ..Effect::PLAIN
 };
 

@@ -4,6 +4,7 @@ use stretch_operators::{Times, Warming};
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::pairs},
+    sketch::warming,
     stage::Stage,
 };
 
@@ -24,5 +25,6 @@ pub(super) static SELF_HEATING: Effect = Effect {
     },
     alone: |_, search| search.reach_from(0.15),
     starts: Some(|_| pairs(0.003, [1.5, 5.0, 15.0, 45.0])),
+    sketch: Some(|v, around| warming([v[0], v[1], v[2]], around.grid.dt_s(), around.resistance())),
     ..Effect::PLAIN
 };

@@ -4,6 +4,7 @@ use stretch_operators::Knees;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Extent, Form},
+    sketch::knees,
     stage::Stage,
 };
 
@@ -30,6 +31,7 @@ pub(super) static SLEEVE_SLACK: Effect = Effect {
     },
     twins: &["amplifier_saturation"],
     starts: Some(starts),
+    sketch: Some(|v, around| knees([Some(v[0]), None], v[1], around.strain())),
     ..Effect::PLAIN
 };
 

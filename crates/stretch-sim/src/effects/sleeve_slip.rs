@@ -4,6 +4,7 @@ use stretch_operators::Backlash;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},
+    sketch::backlash,
     stage::Stage,
 };
 
@@ -20,5 +21,6 @@ pub(super) static SLEEVE_SLIP: Effect = Effect {
     action: |values, _| Action::Strain(Box::new(Backlash::soft(values[0], values[1]))),
     twins: &["gauge_hysteresis", "pot_backlash"],
     starts: Some(|_| each([0.0005, 0.002, 0.01])),
+    sketch: Some(|v, around| backlash([v[0], v[1]], around.strain())),
     ..Effect::PLAIN
 };

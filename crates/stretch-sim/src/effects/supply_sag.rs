@@ -3,6 +3,7 @@
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},
     law::Droop,
+    sketch::droop,
     stage::Stage,
 };
 
@@ -18,6 +19,7 @@ pub(super) static SUPPLY_SAG: Effect = Effect {
     ],
     action: |values, _| Action::Droop(Box::new(Sag { r: values[0], lag_s: values[1] })),
     starts: Some(|_| each([3e7, 1.5e8])),
+    sketch: Some(|v, _| droop([v[0], v[1]])),
     ..Effect::PLAIN
 };
 

@@ -4,6 +4,7 @@ use stretch_operators::Drift;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},
+    sketch::drifting,
     stage::Stage,
 };
 
@@ -30,5 +31,6 @@ pub(super) static THERMAL_DRIFT: Effect = Effect {
     // It takes at most half of the signal's span away over the session.
     alone: |alone, search| search.reach_from(0.5 / alone.session_s.max(1.0)),
     starts: Some(|_| each([2e-5])),
+    sketch: Some(|v, around| drifting([v[0], v[1]], around.resistance())),
     ..Effect::PLAIN
 };

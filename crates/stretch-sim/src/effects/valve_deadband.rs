@@ -4,6 +4,7 @@ use stretch_operators::DeadBand;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},
+    sketch::{Band, dead_band},
     stage::Stage,
 };
 
@@ -26,6 +27,10 @@ pub(super) static VALVE_DEADBAND: Effect = Effect {
         Action::Commands([Box::new(valve(2.0 - outlet)), Box::new(valve(outlet))])
     },
     starts: Some(|_| starts()),
+    sketch: Some(|v, around| {
+        let &[u_db, softness, gate, outlet] = v else { return dead_band(&Band::default()) };
+        dead_band(&Band { u_db, softness, gate, outlet, least: around.least_opening })
+    }),
     ..Effect::PLAIN
 };
 

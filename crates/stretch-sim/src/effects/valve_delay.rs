@@ -2,6 +2,7 @@
 
 use crate::{
     effects::{Action, Effect, EffectParameter, search::each},
+    sketch::delayed,
     stage::Stage,
 };
 
@@ -15,5 +16,6 @@ pub(super) static VALVE_DELAY: Effect = Effect {
     action: |values, _| Action::Delay(values[0]),
     twins: &["crossbeam_inertia"],
     starts: Some(|_| each([0.004, 0.015, 0.05])),
+    sketch: Some(|v, around| delayed(v[0], around.grid.dt_s())),
     ..Effect::PLAIN
 };

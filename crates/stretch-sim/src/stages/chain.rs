@@ -19,9 +19,9 @@ pub struct Recorded<'a> {
 /// Memories of all stages of a [`Chain`], and its working space.
 #[derive(Debug, Clone, Default)]
 pub struct ChainMemory {
-    actuation: Memory,
-    sensing: Memory,
-    reference: Memory,
+    pub(super) actuation: Memory,
+    pub(super) sensing: Memory,
+    pub(super) reference: Memory,
     pressure: Vec<f64>,
     length: Vec<f64>,
 }

@@ -2,6 +2,7 @@
 
 mod actuation;
 mod chain;
+mod held;
 mod muscle;
 mod openings;
 mod pneumatics;
@@ -10,6 +11,7 @@ mod sensing;
 
 pub use actuation::Actuation;
 pub use chain::{Chain, ChainMemory, Recorded};
+pub use held::{Held, Setting};
 pub use muscle::Muscle;
 pub use openings::Openings;
 pub use pneumatics::Pneumatics;

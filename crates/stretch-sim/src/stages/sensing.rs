@@ -40,6 +40,12 @@ impl Bridge {
         }
     }
 
+    /// The same with its trim lowered by a share.
+    #[inline]
+    pub fn shunted(&self, share: f64) -> Self {
+        Self { trim: self.trim * (1.0 - share), ..*self }
+    }
+
     /// Gauge strain at a length in mm.
     #[inline]
     pub fn strain(&self, length_mm: f64) -> f64 {
@@ -122,6 +128,35 @@ impl Sensing {
         pressure_kpa: &[f64],
         bridge_v: &mut [f64],
     ) -> Result<(), SimError> {
+        self.run_shunted(memory, start, start_s, (length_mm, &[]), pressure_kpa, bridge_v)
+    }
+
+    /// As [`run`](Self::run) with a shunt that lowers the trim of the bridge by a share, one value a node beside the length; empty
+    /// without a shunt. What is behind the bridge sees the step that it makes.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    ///
+    /// ```
+    /// use stretch_sim::{EffectSet, Grid, RigParams, Sensing, Start};
+    /// let mut effects = EffectSet::new();
+    /// effects.insert("amplifier_lowpass", &[("tau", 0.1)])?;
+    /// let stage = Sensing::new(&RigParams::default(), &effects, &Grid::samples(0.01)?)?;
+    /// let (mut length, mut shunt, mut volts) = ([180.0; 200], [0.0; 200], [0.0; 200]);
+    /// shunt[100..].fill(0.02);
+    /// stage.run_shunted(&mut stage.memory(), Start::Settled, 0.0, (&length, &shunt), &[], &mut volts)?;
+    /// assert!(volts[101] - volts[0] > -0.01 && volts[199] - volts[0] < -0.05);
+    /// # Ok::<(), stretch_sim::SimError>(())
+    /// ```
+    pub fn run_shunted(
+        &self,
+        memory: &mut Memory,
+        start: Start,
+        start_s: f64,
+        (length_mm, shunt): (&[f64], &[f64]),
+        pressure_kpa: &[f64],
+        bridge_v: &mut [f64],
+    ) -> Result<(), SimError> {
         check_length("length_mm", self.grid.nodes(bridge_v.len()), length_mm.len())?;
         if let (Some(name), true) = (self.needs_pressure, pressure_kpa.is_empty()) {
             return Err(SimError::NotHere {
@@ -132,12 +167,15 @@ impl Sensing {
         if !pressure_kpa.is_empty() {
             check_length("pressure_kpa", length_mm.len(), pressure_kpa.len())?;
         }
+        if !shunt.is_empty() {
+            check_length("shunt", length_mm.len(), shunt.len())?;
+        }
         let Some(first) = length_mm.first() else { return Ok(()) };
         let start = memory.start(start);
         let bridge = &self.bridge;
         if self.strain.is_empty() && self.resistance.is_empty() && self.volts.is_empty() {
             // The nominal bridge: one pass.
-            if self.grid.pieces() == 1 && self.skew.is_none() {
+            if self.grid.pieces() == 1 && self.skew.is_none() && shunt.is_empty() {
                 for (v, length) in bridge_v.iter_mut().zip(length_mm) {
                     *v = bridge.volts(bridge.resistance(bridge.strain(*length)));
                 }
@@ -155,7 +193,8 @@ impl Sensing {
         self.resistance.begin_at(start, e[0], cells);
         let mut r = [bridge.resistance(e[0])];
         self.resistance.run(&at, cells, &mut r);
-        self.volts.begin(&at, start, bridge.volts(r[0]), cells);
+        let first_share = shunt.first().copied().unwrap_or(0.0);
+        self.volts.begin(&at, start, bridge.shunted(first_share).volts(r[0]), cells);
         let mut work = std::mem::take(&mut memory.nodes);
         let direct = grid.pieces() == 1 && self.skew.is_none();
         if !direct {
@@ -177,8 +216,13 @@ impl Sensing {
                 *v = bridge.resistance(*e);
             }
             self.resistance.run(&Span { strain, ..at }, &mut memory.cells, v);
-            for v in v.iter_mut() {
-                *v = bridge.volts(*v);
+            match shunt.get(from..from + length.len()) {
+                Some(shares) if !shares.is_empty() => {
+                    for (v, share) in v.iter_mut().zip(shares) {
+                        *v = bridge.shunted(*share).volts(*v);
+                    }
+                }
+                _ => v.iter_mut().for_each(|v| *v = bridge.volts(*v)),
             }
             self.volts.run(&at, &mut memory.cells, v);
         }

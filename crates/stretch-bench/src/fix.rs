@@ -1,0 +1,323 @@
+//! What a diagnosis found, as a rig file: the simulator that lacked it, fixed.
+
+use std::f64::consts::TAU;
+
+use stretch_data::{Remarks, RigFile};
+use stretch_gap::{
+    Candidate, Diagnosis, EffectValue, Evidence, Frame, Model, Run, Simulator, VerdictKind,
+};
+use stretch_sim::{Effect, SimError, Tolerance};
+
+/// A rig file that holds what a diagnosis found: re-tuned parameters with tolerances as found, and the effects with every
+/// parameter and form. Comments beside the entries say where each comes from.
+///
+/// A tolerance is one standard deviation of the fit, never more than it was. It holds if the model does: intervals of parameters
+/// that stand in for one another are each told as if the other were free, and together they are narrower.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fix {
+    /// The file.
+    pub file: RigFile,
+    /// The comments.
+    pub remarks: Remarks,
+}
+
+impl Fix {
+    /// The text of the file, comments included.
+    pub fn text(&self) -> String {
+        self.file.to_toml_with(&self.remarks)
+    }
+}
+
+/// Why a diagnosis leaves nothing to write.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoFix {
+    /// The record or the rig file is wrong: whatever was fitted to it is, too.
+    #[error("the record or the rig file has to be put right first: {hint}")]
+    Record {
+        /// What to check.
+        hint: String,
+    },
+    /// The catalogue does not explain the gap.
+    #[error(
+        "the gap is not explained, so that no rig file closes it; what is known of it stands in the diagnosis"
+    )]
+    Unknown,
+    /// What was found is none that a rig file may hold.
+    #[error("what was found is no rig that can be written: {0}")]
+    Refused(#[from] SimError),
+}
+
+/// What is written of a diagnosis.
+#[derive(Clone, Copy)]
+pub(crate) struct Chosen<'a> {
+    pub(crate) model: &'a Model,
+    /// One standard deviation of every nominal parameter.
+    pub(crate) sd: &'a [f64],
+    diagnosis: &'a Diagnosis,
+    /// The set of effects, where it has some.
+    found: Option<&'a Candidate>,
+}
+
+/// Standard deviations to either side that hold 95 % of a Gaussian.
+const COVERS: f64 = 1.96;
+/// Least tolerance, a share of the value: a parameter without one would count as exact.
+const LEAST: f64 = 1e-6;
+
+impl<'a> Chosen<'a> {
+    /// The first candidate where effects are named, the re-tuned nominal where none is missing.
+    pub(crate) fn of(diagnosis: &'a Diagnosis, evidence: &'a Evidence) -> Result<Self, NoFix> {
+        match diagnosis.verdict {
+            VerdictKind::Record => {
+                let hints = diagnosis.gross.iter().map(|g| format!("{} {}", g.sentence, g.hint));
+                Err(NoFix::Record { hint: hints.take(1).collect() })
+            }
+            VerdictKind::Unknown => Err(NoFix::Unknown),
+            VerdictKind::Effect | VerdictKind::Partial => {
+                let first = diagnosis.candidates.first().zip(evidence.candidates.first());
+                let (found, model) = first.ok_or(NoFix::Unknown)?;
+                let sd = evidence.candidate_sds.first().map_or(&[][..], Vec::as_slice);
+                Ok(Self { model, sd, diagnosis, found: Some(found) })
+            }
+            VerdictKind::NoGap | VerdictKind::Parameters => Ok(Self {
+                model: &evidence.retuned,
+                sd: &evidence.retuned_sd,
+                diagnosis,
+                found: None,
+            }),
+        }
+    }
+
+    /// Effects of the set that do something, with values that a file may hold.
+    pub(crate) fn effects(
+        &self,
+        rows: &[&'static Effect],
+        allowed: impl Fn(&Effect, &mut [f64]),
+    ) -> Vec<(&'static Effect, Vec<f64>)> {
+        let Some(found) = self.found else { return Vec::new() };
+        let on = self.model.effects.iter().filter_map(|(index, values)| {
+            let effect = rows.get(*index).copied()?;
+            let is_wanted = found.effects.iter().any(|name| name == effect.name);
+            (is_wanted && !effect.is_off(values)).then(|| (effect, values.clone()))
+        });
+        on.map(|(effect, mut values)| {
+            allowed(effect, &mut values);
+            (effect, values)
+        })
+        .collect()
+    }
+
+    /// Tolerance of a re-tuned parameter, in the way in which the old one was told.
+    pub(crate) fn tolerance(&self, index: usize, value: f64, old: Tolerance) -> Tolerance {
+        let found = self.sd.get(index).copied().unwrap_or(0.0);
+        let sd = found.min(old.sd(value)).max(LEAST * value.abs()).max(f64::MIN_POSITIVE);
+        match old {
+            Tolerance::Relative(_) => Tolerance::Relative(sd / value.abs()),
+            _ => Tolerance::Absolute(sd),
+        }
+    }
+
+    /// What is said behind a re-tuned parameter.
+    pub(crate) fn told(&self, index: usize, unit: &str, (was, value): (f64, f64)) -> String {
+        let sd = self.sd.get(index).copied().unwrap_or(0.0);
+        format!(
+            "was {}; 95 %: {} .. {}{}",
+            digits(was),
+            digits(value - COVERS * sd),
+            digits(value + COVERS * sd),
+            of_unit(unit)
+        )
+    }
+
+    /// Lines at the top of the file.
+    pub(crate) fn head(&self) -> Vec<String> {
+        let mut lines = vec![self.diagnosis.sentence.clone()];
+        lines.push(match self.diagnosis.verdict {
+            VerdictKind::NoGap => {
+                "Nothing is missing: parameters are re-tuned within the noise, and no effect is added.".into()
+            }
+            VerdictKind::Parameters => "Parameters are re-tuned; no effect is added.".into(),
+            VerdictKind::Partial => format!(
+                "{:.0} % of the gap stay: this file does not close it.",
+                100.0 * self.diagnosis.unexplained.as_ref().map_or(0.0, |u| u.share)
+            ),
+            _ => "Parameters are re-tuned with the effects in place.".to_owned(),
+        });
+        lines.push(
+            "Tolerances are as found: one standard deviation of the fit, if the model is right."
+                .into(),
+        );
+        lines
+    }
+
+    /// Adds what is said of an effect and its parameters.
+    pub(crate) fn tell(&self, effect: &Effect, remarks: &mut Remarks) {
+        let name = effect.name;
+        remarks.effects.insert(name.into(), self.lines(effect));
+        for p in self.numbers(effect) {
+            let key = (name.to_owned(), p.name.clone());
+            remarks.effect_parameters.insert(key, told_of_effect(&p));
+        }
+    }
+
+    /// Parameters and forms of an effect.
+    pub(crate) fn numbers(&self, effect: &Effect) -> Vec<EffectValue> {
+        let all = self.found.iter().flat_map(|c| &c.parameters);
+        all.filter(|p| p.effect == effect.name).cloned().collect()
+    }
+
+    fn lines(&self, effect: &Effect) -> Vec<String> {
+        let d = self.diagnosis;
+        let share = d.shares.iter().find(|s| s.effect == effect.name);
+        let closes = share.map_or(String::new(), |s| format!(" closes {:.0} %", 100.0 * s.closes));
+        let faint = match d.faint.iter().any(|name| name == effect.name) {
+            true => ", faint, and kept because the parameters were fitted beside it",
+            false => "",
+        };
+        let set = self.found.map_or(String::new(), |c| {
+            let [low, high] = c.closed_ci.map(|x| 100.0 * x);
+            let what = if c.effects.len() > 1 { ", the set" } else { " (95 %:" };
+            let end = if c.effects.len() > 1 { "" } else { ")" };
+            format!("{what} {low:.0} to {high:.0} %{end}; probability {:.2}", c.probability)
+        });
+        let mut lines = vec![
+            effect.words.to_owned(),
+            format!(
+                "Found by diagnosis{faint}:{closes} of the gap on trials that were not fitted{set}."
+            ),
+            effect.equation.to_owned(),
+        ];
+        if !d.tied.is_empty() && d.named.iter().any(|name| name == effect.name) {
+            lines.push(format!("These data cannot rule out {}.", d.tied.join(", ")));
+        }
+        lines
+    }
+}
+
+/// What is said behind a parameter of an effect.
+fn told_of_effect(p: &EffectValue) -> String {
+    let [low, high] = p.interval.map(digits);
+    let form = if p.is_form { "form; " } else { "" };
+    format!("{form}95 %: {low} .. {high}{}", of_unit(&p.unit))
+}
+
+fn of_unit(unit: &str) -> String {
+    if unit == "1" || unit.is_empty() { String::new() } else { format!(" {unit}") }
+}
+
+/// A number to four digits.
+pub(crate) fn digits(x: f64) -> String {
+    let rounded = format!("{x:.3e}").parse().unwrap_or(x);
+    if rounded != 0.0 && !(1e-3..1e6).contains(&f64::abs(rounded)) {
+        format!("{rounded:e}")
+    } else {
+        format!("{rounded}")
+    }
+}
+
+/// Values of an effect with amplitude and phase of its line, which a diagnosis leaves to the record: those in what a model leaves
+/// without it in the samples that are not tested on. An effect that leaves no line keeps its values. `place` is the stage that shows it, and what an amplitude of one is there.
+pub(crate) fn with_line(
+    simulator: &dyn Simulator,
+    place: (usize, f64),
+    rows: &[&'static Effect],
+    model: &Model,
+    (effect, values): (&Effect, Vec<f64>),
+) -> Vec<f64> {
+    let found = found_line(simulator, place, rows, model, (effect, &values));
+    match (found, &values[..]) {
+        (Some([amplitude, phase]), [_, rest @ ..]) => [&[amplitude], rest, &[phase]].concat(),
+        _ => values,
+    }
+}
+
+/// Amplitude and phase of an effect's line.
+fn found_line(
+    simulator: &dyn Simulator,
+    place: (usize, f64),
+    rows: &[&'static Effect],
+    model: &Model,
+    (effect, values): (&Effect, &[f64]),
+) -> Option<[f64; 2]> {
+    let line = effect.line?(values);
+    let (stage, unit) = place;
+    let is_other = |(index, _): &&(usize, Vec<f64>)| rows[*index].name != effect.name;
+    let without = Model {
+        effects: model.effects.iter().filter(is_other).cloned().collect(),
+        ..model.clone()
+    };
+    let (trials, measured) = (simulator.trials(), simulator.measured(stage));
+    let mut simulated = vec![0.0; measured.len()];
+    let run = Run { stage, model: &without, trials: trials.len(), shake: None, step: 1.0 };
+    simulator.simulate(run, &mut simulated).ok()?;
+    let mut begin = 0;
+    let mut left = Vec::new();
+    for (trial, fit) in trials.iter().zip(Frame::not_tested(trials)) {
+        let at = |i: usize| trial.start_s + i as f64 * simulator.dt_s();
+        let apart = |i: usize| (measured[begin + i] - simulated[begin + i]) / unit;
+        left.extend((0..fit).map(|i| (at(i), apart(i))));
+        begin += trial.samples;
+    }
+    Some(sine(line.hertz, &left))
+}
+
+/// Seconds in which the phase of the mains is taken as steady.
+const STEADY_S: f64 = 1.0;
+
+/// Amplitude and phase of a sine in pairs of time (s) and value: the steady one where it holds half of the power that the line has
+/// second by second, else the amplitude of the seconds with the phase of the whole.
+///
+/// On samples at twice the frequency one quadrature is never seen, and is taken as nothing.
+fn sine(hertz: f64, left: &[(f64, f64)]) -> [f64; 2] {
+    let of = |part: &[(f64, f64)]| -> [f64; 2] {
+        let mut sums = [0.0; 5];
+        for (t, r) in part {
+            let turns = hertz * t;
+            let (sin, cos) = (TAU * (turns - turns.floor())).sin_cos();
+            let products = [cos * cos, cos * sin, sin * sin, r * cos, r * sin];
+            sums.iter_mut().zip(products).for_each(|(sum, x)| *sum += x);
+        }
+        let [cc, cs, ss, rc, rs] = sums;
+        // A quadrature that is not seen has no power: a millionth of the whole stands for it.
+        let ridge = 1e-6 * (cc + ss) + f64::MIN_POSITIVE;
+        let (cc, ss) = (cc + ridge, ss + ridge);
+        let determinant = cc * ss - cs * cs;
+        [(rc * ss - rs * cs) / determinant, (rs * cc - rc * cs) / determinant]
+    };
+    let power = |[p, q]: [f64; 2]| p * p + q * q;
+    let whole = of(left);
+    let seconds: Vec<f64> = left
+        .chunk_by(|a, b| (a.0 / STEADY_S).floor() == (b.0 / STEADY_S).floor())
+        .map(|part| power(of(part)))
+        .collect();
+    let mean = seconds.iter().sum::<f64>() / seconds.len().max(1) as f64;
+    let amplitude = if power(whole) >= 0.5 * mean { power(whole) } else { mean }.sqrt();
+    [amplitude, whole[0].atan2(whole[1])]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_abs_diff_eq;
+
+    #[test]
+    fn a_sine_is_found_steady_or_wandering() {
+        let wave = |hertz: f64, phase: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
+            let at = |i: u32| 0.01 * f64::from(i);
+            (0..1000).map(at).map(|t| (t, 0.02 * (TAU * hertz * t + phase(t)).sin())).collect()
+        };
+        let [a, phase] = sine(60.0, &wave(60.0, &|_| 1.0));
+        assert_abs_diff_eq!(a, 0.02, epsilon = 1e-6);
+        assert_abs_diff_eq!(phase, 1.0, epsilon = 1e-4);
+        // At twice the frequency only the sine of the phase is seen.
+        let [a, phase] = sine(50.0, &wave(50.0, &|_| 0.7));
+        assert_abs_diff_eq!(a * phase.sin(), 0.02 * 0.7_f64.sin(), epsilon = 1e-6);
+        let [a, _] = sine(60.0, &wave(60.0, &|t| 2.0 * t));
+        assert!(a > 0.015, "{a}");
+    }
+
+    #[test]
+    fn numbers_have_four_digits() {
+        assert_eq!([0.0, 0.123456, 1e-9, 12345.678].map(digits), ["0", "0.1235", "1e-9", "12350"]);
+    }
+}

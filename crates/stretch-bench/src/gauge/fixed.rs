@@ -1,0 +1,68 @@
+//! A gauge alone with what a diagnosis found of it.
+
+use stretch_data::Remarks;
+use stretch_gap::{Diagnosis, Evidence, Simulator};
+use stretch_sim::{Gauge, GaugeRig, Grid, GridError};
+
+use super::{GAIN, GaugeSimulator, OFFSET};
+use crate::{
+    fix::{Chosen, Fix, NoFix, with_line},
+    implement::{Implementation, implementations},
+};
+
+/// Table of the file.
+const TABLE: &str = "sensing";
+
+impl GaugeSimulator {
+    /// What a diagnosis of this gauge names, as something to type: with its numbers, in units of e.
+    ///
+    /// # Errors
+    /// None for a gauge that was diagnosed: its sample time is positive.
+    pub fn implementations(
+        &self,
+        diagnosis: &Diagnosis,
+        evidence: &Evidence,
+    ) -> Result<Vec<Implementation>, GridError> {
+        let grid = Grid::samples(self.record.dt_s)?;
+        let model = evidence.candidates.first().unwrap_or(&evidence.best);
+        let around = Gauge::surroundings(&self.nominal.spec, &grid);
+        let place = (0, model.parameters[GAIN]);
+        Ok(implementations(diagnosis, evidence, &self.rows, &around, |effect, values| {
+            with_line(self, place, &self.rows, model, (effect, values))
+        }))
+    }
+
+    /// A gauge file (`kind = "gauge"`) with what a diagnosis of this gauge found: see [`Fix`]. How the gauge was wound before the
+    /// session belongs to the record and stays out.
+    ///
+    /// # Errors
+    /// [`NoFix`] where the diagnosis names nothing to fix, or a gauge that no file may hold.
+    pub fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
+        let chosen = Chosen::of(diagnosis, evidence)?;
+        let mut remarks = Remarks { head: chosen.head(), ..Remarks::default() };
+        let old = &self.nominal;
+        let mut rig = GaugeRig { spec: self.nominal(chosen.model), ..old.clone() };
+        rig.offset = chosen.tolerance(OFFSET, rig.spec.offset, old.offset);
+        rig.gain = chosen.tolerance(GAIN, rig.spec.gain, old.gain);
+        for (index, name, values) in [
+            (OFFSET, "offset", (self.nominal.spec.offset, rig.spec.offset)),
+            (GAIN, "gain", (self.nominal.spec.gain, rig.spec.gain)),
+        ] {
+            let told = chosen.told(index, &self.parameters()[index].unit, values);
+            remarks.parameters.insert((TABLE.into(), name.into()), told);
+        }
+        for effect in self.nominal.effects.iter() {
+            let own = vec!["It was in the rig file already.".to_owned()];
+            remarks.effects.insert(effect.name().into(), own);
+        }
+        let gain = rig.spec.gain;
+        for (effect, values) in chosen.effects(&self.rows, |_, _| ()) {
+            let values = with_line(self, (0, gain), &self.rows, chosen.model, (effect, values));
+            chosen.tell(effect, &mut remarks);
+            rig.effects.push(effect, &values)?;
+        }
+        let file = rig.to_file();
+        GaugeRig::from_file(&file)?;
+        Ok(Fix { file, remarks })
+    }
+}

@@ -1,0 +1,246 @@
+//! The notation of a sketch, spelt in three languages.
+
+use std::fmt::Write;
+
+use super::{Quantity, Sketch};
+
+/// A language that a sketch is spelt in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Language {
+    /// C99, with `math.h`.
+    C,
+    /// Python 3, with nothing but `math`.
+    Python,
+    /// MATLAB, and Octave.
+    Matlab,
+}
+
+impl Language {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::C, Self::Python, Self::Matlab];
+
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::C => "C",
+            Self::Python => "Python",
+            Self::Matlab => "MATLAB",
+        }
+    }
+
+    /// The ending of its files.
+    pub fn ending(self) -> &'static str {
+        match self {
+            Self::C => "c",
+            Self::Python => "py",
+            Self::Matlab => "m",
+        }
+    }
+
+    fn comment(self, text: &str) -> String {
+        match self {
+            Self::C => format!("/* {text} */"),
+            Self::Python => format!("# {text}"),
+            Self::Matlab => format!("% {text}"),
+        }
+    }
+
+    /// A function that all three have, as it is called here.
+    fn function(self, name: &str) -> String {
+        match (self, name) {
+            (Self::C, "min" | "max") => format!("f{name}"),
+            (Self::C, "abs") => "fabs".to_owned(),
+            (Self::Python, "min" | "max" | "abs") => name.to_owned(),
+            (Self::Python, _) => format!("math.{name}"),
+            _ => name.to_owned(),
+        }
+    }
+
+    /// An expression.
+    fn expression(self, text: &str) -> String {
+        let mut out = String::new();
+        let mut rest = text;
+        while let Some(c) = rest.chars().next() {
+            if c.is_ascii_alphabetic() || c == '_' {
+                let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+                let end = rest.find(|c| !is_word(c)).unwrap_or(rest.len());
+                let (word, behind) = rest.split_at(end);
+                let is_called = behind.starts_with('(');
+                match (self, word) {
+                    (Self::C, "s") if behind.starts_with('.') => {
+                        out.push_str("s->");
+                        rest = &behind[1..];
+                        continue;
+                    }
+                    (Self::C | Self::Matlab, "or") => out.push_str("||"),
+                    (Self::C | Self::Matlab, "and") => out.push_str("&&"),
+                    _ if is_called => out.push_str(&self.function(word)),
+                    _ => out.push_str(word),
+                }
+                rest = behind;
+                continue;
+            }
+            match (self, c) {
+                (Self::C, '[') => out.push_str("[(long)("),
+                (Self::Python, '[') => out.push_str("[int("),
+                (Self::Matlab, '[') => out.push('('),
+                (Self::C | Self::Python, ']') => out.push_str(")]"),
+                // Samples count from 1 there.
+                (Self::Matlab, ']') => out.push_str(" + 1)"),
+                _ => out.push(c),
+            }
+            rest = &rest[c.len_utf8()..];
+        }
+        out
+    }
+
+    /// The body, indented by `depth` steps.
+    fn body(self, body: &str, depth: usize) -> String {
+        let mut out = String::new();
+        let mut depth = depth;
+        for line in body.lines().map(str::trim).filter(|line| !line.is_empty()) {
+            let (first, rest) = line.split_once(' ').unwrap_or((line, ""));
+            if matches!(first, "else" | "end") {
+                depth -= 1;
+            }
+            let text = match (self, first) {
+                (Self::C, "let") => format!("const double {};", self.expression(rest)),
+                (Self::C, "var") => format!("double {};", self.expression(rest)),
+                (Self::C, "if") => format!("if ({}) {{", self.expression(rest)),
+                (Self::C, "else") => "} else {".to_owned(),
+                (Self::C, "end") => "}".to_owned(),
+                (Self::C, _) => format!("{};", self.expression(line)),
+                (Self::Python, "let" | "var") => self.expression(rest),
+                (Self::Python, "if") => format!("if {}:", self.expression(rest)),
+                (Self::Python, "else") => "else:".to_owned(),
+                (Self::Python, "end") => String::new(),
+                (Self::Python, _) => self.expression(line),
+                (Self::Matlab, "let" | "var") => format!("{};", self.expression(rest)),
+                (Self::Matlab, "if") => format!("if {}", self.expression(rest)),
+                (Self::Matlab, "else" | "end") => line.to_owned(),
+                (Self::Matlab, _) => format!("{};", self.expression(line)),
+            };
+            if !text.is_empty() {
+                let _ = writeln!(out, "{}{text}", "    ".repeat(depth));
+            }
+            if matches!(first, "if" | "else") {
+                depth += 1;
+            }
+        }
+        out
+    }
+}
+
+/// A number with all its digits, as all three read it.
+fn literal(x: f64) -> String {
+    format!("{x:?}")
+}
+
+impl Sketch {
+    /// The code of a function `name` that takes a sample and hands back the next one, below lines of comment.
+    ///
+    /// | language | begin | a sample |
+    /// | --- | --- | --- |
+    /// | C | `name_start(&s, x)` | `y = name(&s, x)` |
+    /// | Python | `s = name_start(x)` | `y = name(s, x)` |
+    /// | MATLAB | `s = []` | `[y, s] = name(s, x)` |
+    ///
+    /// Without a state there is neither `s` nor a beginning.
+    pub fn code(&self, language: Language, name: &str, comments: &[String]) -> String {
+        let mut out = String::new();
+        for line in comments {
+            let _ = writeln!(out, "{}", language.comment(line));
+        }
+        for q in self.inputs.iter().chain([&self.output]) {
+            let _ = writeln!(out, "{}", language.comment(&q.to_string()));
+        }
+        out + &match language {
+            Language::C => self.c(name),
+            Language::Python => self.python(name),
+            Language::Matlab => self.matlab(name),
+        }
+    }
+
+    fn names(&self) -> Vec<&str> {
+        self.inputs.iter().map(|input| input.name).collect()
+    }
+
+    /// The input that the state begins at, if it begins at one.
+    fn begins_at(&self) -> Option<&'static str> {
+        self.state.iter().map(|cell| cell.begins).find(|begins| self.names().contains(begins))
+    }
+
+    fn c(&self, name: &str) -> String {
+        let mut out = "#include <math.h>\n\n".to_owned();
+        for c in &self.constants {
+            let _ = writeln!(
+                out,
+                "static const double {} = {}; {}",
+                c.name,
+                literal(c.value),
+                Language::C.comment(&c.unit)
+            );
+        }
+        let typed = |q: &Quantity| match q.is_record {
+            true => format!("const double *{}", q.name),
+            false => format!("double {}", q.name),
+        };
+        let mut inputs: Vec<String> = self.inputs.iter().map(typed).collect();
+        if !self.state.is_empty() {
+            let cells: Vec<&str> = self.state.iter().map(|cell| cell.name).collect();
+            let _ =
+                writeln!(out, "\ntypedef struct {{ double {}; }} {name}_state;", cells.join(", "));
+            let first = self.begins_at().map_or(String::new(), |x| format!(", double {x}"));
+            let _ = writeln!(out, "\nvoid {name}_start({name}_state *s{first}) {{");
+            for cell in &self.state {
+                let _ = writeln!(out, "    s->{} = {};", cell.name, cell.begins);
+            }
+            out.push_str("}\n");
+            inputs.insert(0, format!("{name}_state *s"));
+        }
+        let _ = writeln!(out, "\ndouble {name}({}) {{", inputs.join(", "));
+        out + &Language::C.body(&self.body, 1) + "    return y;\n}\n"
+    }
+
+    fn python(&self, name: &str) -> String {
+        let mut out = "import math\n".to_owned();
+        if !self.state.is_empty() {
+            out.push_str("from types import SimpleNamespace\n");
+        }
+        out.push('\n');
+        for c in &self.constants {
+            let _ = writeln!(out, "{} = {}  # {}", c.name, literal(c.value), c.unit);
+        }
+        let mut inputs = self.names();
+        if !self.state.is_empty() {
+            let _ = writeln!(out, "\n\ndef {name}_start({}):", self.begins_at().unwrap_or(""));
+            let cell = |cell: &super::Cell| format!("{}={}", cell.name, cell.begins);
+            let cells: Vec<String> = self.state.iter().map(cell).collect();
+            let _ = writeln!(out, "    return SimpleNamespace({})", cells.join(", "));
+            inputs.insert(0, "s");
+        }
+        let _ = writeln!(out, "\n\ndef {name}({}):", inputs.join(", "));
+        out + &Language::Python.body(&self.body, 1) + "    return y\n"
+    }
+
+    fn matlab(&self, name: &str) -> String {
+        let mut inputs = self.names();
+        let has_state = !self.state.is_empty();
+        let gives = if has_state { "[y, s]" } else { "y" };
+        if has_state {
+            inputs.insert(0, "s");
+        }
+        let mut out = format!("function {gives} = {name}({})\n", inputs.join(", "));
+        for c in &self.constants {
+            let _ = writeln!(out, "    {} = {}; % {}", c.name, literal(c.value), c.unit);
+        }
+        if has_state {
+            out.push_str("    if isempty(s)\n");
+            for cell in &self.state {
+                let _ = writeln!(out, "        s.{} = {};", cell.name, cell.begins);
+            }
+            out.push_str("    end\n");
+        }
+        out + &Language::Matlab.body(&self.body, 1) + "end\n"
+    }
+}

@@ -407,9 +407,7 @@ fn a_header_has_the_defects_that_its_map_has() {
     let (pressure, crossed) = text("crosstalk");
     let (_, all) = text("all of them");
     assert!(pressure && !no_pressure);
-    for word in
-        ["stretch_feel", "plays[", "fading[", "worn(", "knee(", "poles[", "slipped", "s->baseline"]
-    {
+    for word in ["stretch_feel", "plays[", "fading[", "worn(", "knee(", "slipped", "s->baseline"] {
         assert!(!plain.contains(word), "{word}");
         assert!(all.contains(word), "{word}");
     }

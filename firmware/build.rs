@@ -44,8 +44,9 @@ fn compile_c(headers: &Path, out: &Path) -> Result<(), Box<dyn Error>> {
         let model = folder.file_name().and_then(|name| name.to_str()).ok_or("a folder's name")?;
         let symbol = model.replace(['-', '+'], "_");
         let object = out.join(format!("{symbol}.o"));
-        let is_float =
-            fs::read_to_string(&header)?.contains("stretch_step(stretch_state *s, float");
+        let text = fs::read_to_string(&header)?;
+        let is_float = text.contains("stretch_step(stretch_state *s, float");
+        let tells_sd = text.contains("#define STRETCH_TELLS_SD");
         run(Command::new("arm-none-eabi-gcc")
             .args(core)
             .args(flags)
@@ -56,19 +57,23 @@ fn compile_c(headers: &Path, out: &Path) -> Result<(), Box<dyn Error>> {
             .arg("-I")
             .arg(&folder))?;
         objects.push(object);
-        let kind = if is_float { "float" } else { "fixed" };
+        let kind = match (is_float, tells_sd) {
+            (_, true) => "float_sd",
+            (true, _) => "float",
+            _ => "fixed",
+        };
         writeln!(calls, "{kind}!({symbol}, {model:?});")?;
     }
     calls.push('}');
     fs::write(out.join("c_models.rs"), calls)?;
-    // soft float is the C compiler's own, as in a program of C alone, and hidden from Rust's
+    // soft float and the square root are the C compiler's own, as in a program of C alone, and hidden from Rust's
     let all = out.join("all.o");
     run(Command::new("arm-none-eabi-gcc")
         .args(core)
         .args(["-r", "-nostdlib", "-o"])
         .arg(&all)
         .args(&objects)
-        .arg("-lgcc"))?;
+        .args(["-lm", "-lc", "-lgcc"]))?;
     run(Command::new("arm-none-eabi-objcopy").args(["--wildcard", "-G", "c_*"]).arg(&all))?;
     println!("cargo:rustc-link-arg-bin=c={}", all.display());
     Ok(())

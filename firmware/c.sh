@@ -28,6 +28,8 @@ linear-f32-volts linear float
 poly13-f32-volts poly13 float
 observer observer float
 observer+rest observer-rest float
+diagnosed diagnosed float
+diagnosed+rest diagnosed-rest float
 MODELS
 
 for core in m3 m4f; do

@@ -114,6 +114,19 @@ fn an_arduino_library_reads_a_sample_every_period() {
 }
 
 #[test]
+fn named_defects_are_exported_in_float_alone() {
+    let scratch = Scratch::new();
+    let record =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("firmware/data/diagnosed-rest.postcard");
+    let out = scratch.path("c");
+    fails(export(&record, &out).args(["--form", "fixed"]), &["diagnosed", "--form float"]);
+    let said = runs(&mut export(&record, &out));
+    assert!(said.contains("diagnosed+rest, float") && !said.contains("stretch_feel"), "{said}");
+    let main = "#include \"stretch.h\"\nint main() { return stretch_self_test(); }\n";
+    compiled(&scratch.path("."), main, &[out]);
+}
+
+#[test]
 fn what_has_no_form_in_c_says_so_and_writes_nothing() {
     for (arguments, form, parts) in [
         (["--model", "blended"], "fixed", ["blended", "observer+rest"]),

@@ -48,7 +48,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let options = Options { form: args.form, adc: args.adc };
     let made =
         header(&calibration, &options).with_context(|| args.calibration.display().to_string())?;
-    let Header { text, form, model } = &made;
+    let Header { text, form, model, pressure } = &made;
     let files = if args.arduino {
         arduino_library(&made)
     } else {
@@ -78,6 +78,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     say(format!("wrote {out}: {model}, {form}, a self-test of {SELF_TEST_SAMPLES} samples"))?;
     for File { path, .. } in &files {
         say(format!("  {path}"))?;
+    }
+    if *pressure {
+        say("tell it the pressure with stretch_feel() before each sample")?;
     }
     say(if args.arduino {
         "put the folder into the sketchbook's libraries; the IDE then has File > Examples > StretchReceptor > Live"

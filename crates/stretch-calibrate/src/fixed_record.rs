@@ -84,6 +84,7 @@ pub fn fixed_record(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord,
         }
         Model::Blended { .. } => none("a blended model".into()),
         Model::History(_) => none("a model that remembers, other than the observer,".into()),
+        Model::Diagnosed(_) => none("a diagnosed model".into()),
         _ => none("this model".into()),
     }
 }

@@ -32,7 +32,7 @@ pub fn arduino_library(header: &Header) -> Vec<File> {
         file("library.properties", properties(header)),
         file("keywords.txt", keywords()),
         file(&format!("src/{HEADER}"), header.text.clone()),
-        file("examples/Live/Live.ino", live(header.form)),
+        file("examples/Live/Live.ino", live(header)),
     ]
 }
 
@@ -57,6 +57,7 @@ fn keywords() -> String {
                 "stretch_step",
                 "stretch_lost",
                 "stretch_start_on",
+                "stretch_feel",
                 "stretch_self_test",
             ],
         ),
@@ -83,17 +84,25 @@ fn keywords() -> String {
     kinds.into_iter().map(lines).collect()
 }
 
-fn live(form: Form) -> String {
-    let (step, estimate) = match form {
+fn live(header: &Header) -> String {
+    let feel = if header.pressure {
+        "  float pressure = 0.0f;  // yours, in the unit of the pressure that the calibration saw\n  \
+         stretch_feel(&state, pressure);\n"
+    } else {
+        ""
+    };
+    let (step, estimate) = match header.form {
         Form::Fixed => (
-            "  stretch_reading reading = stretch_step(&state, analogRead(A0));",
+            "  stretch_reading reading = stretch_step(&state, analogRead(A0));".to_owned(),
             "reading.estimate / 1000.0, 3",
         ),
         Form::Float => (
-            "  float volts = STRETCH_ADC_ZERO + STRETCH_ADC_PER_CODE * (float)analogRead(A0);\n  \
-             stretch_reading reading = stretch_step(&state, volts);",
+            format!(
+                "{feel}  float volts = STRETCH_ADC_ZERO + STRETCH_ADC_PER_CODE * (float)analogRead(A0);\n  \
+                 stretch_reading reading = stretch_step(&state, volts);"
+            ),
             "reading.estimate, 3",
         ),
     };
-    include_str!("arduino/Live.ino").replace("@STEP@", step).replace("@ESTIMATE@", estimate)
+    include_str!("arduino/Live.ino").replace("@STEP@", &step).replace("@ESTIMATE@", estimate)
 }

@@ -8,8 +8,8 @@ use stretch_core::{Calibration, Model};
 use crate::{
     ExportError, Form, Options,
     constants::Constants,
-    models::{observer_fixed, observer_float, surfaces_fixed, surfaces_float},
-    part::Part,
+    models::{diagnosed_float, observer_fixed, observer_float, surfaces_fixed, surfaces_float},
+    part::{Part, kept},
     self_test,
 };
 
@@ -28,6 +28,8 @@ pub struct Header {
     pub form: Form,
     /// The model, as `--model` calls it.
     pub model: String,
+    /// Whether the program has to tell it a pressure, by `stretch_feel`.
+    pub pressure: bool,
 }
 
 /// A calibration as a C99 header that compiles as C++11 too.
@@ -77,6 +79,7 @@ fn float(calibration: &Calibration, options: &Options) -> Result<Header, ExportE
     let part = match &calibration.model {
         Model::Linear(_) | Model::Surfaces { .. } => surfaces_float(calibration)?,
         Model::Observer(_) => observer_float(calibration)?,
+        Model::Diagnosed(_) => diagnosed_float(calibration)?,
         other => {
             let model = match other {
                 Model::Blended { .. } => "a blended model",
@@ -98,22 +101,23 @@ fn assembled(
     part: Part,
     self_test: &str,
 ) -> Header {
-    let Part { model, constants, step } = part;
-    let mut text = opening(calibration, form, &model);
+    let Part { model, constants, step, has } = part;
+    let pressure = has.contains(&"crosstalk");
+    let mut text = opening(calibration, form, &model, &has);
     text.push_str(&frame(calibration, options));
     text.push_str("\n/* ---- the record ---- */\n\n");
     text.push_str(&constants);
     text.push('\n');
     text.push_str(include_str!("c/common.h"));
-    step.iter().for_each(|part| text.push_str(part));
+    step.iter().for_each(|part| text.push_str(&kept(part, &has)));
     text.push_str(include_str!("c/start_on.h"));
     text.push_str(self_test);
     text.push_str("\n#endif\n");
-    Header { text, form, model }
+    Header { text, form, model, pressure }
 }
 
 /// What the file is, for whoever opens it.
-fn opening(calibration: &Calibration, form: Form, model: &str) -> String {
+fn opening(calibration: &Calibration, form: Form, model: &str, has: &[&str]) -> String {
     let signal = comment_safe(calibration.signal.as_str());
     let reference = comment_safe(calibration.reference.as_str());
     let (taken, given) = match form {
@@ -126,6 +130,9 @@ fn opening(calibration: &Calibration, form: Form, model: &str) -> String {
             (trials, date) if date.is_empty() => format!("{trials} trials"),
             (trials, date) => format!("{trials} trials, {date}"),
         };
+    let feel =
+        if has.contains(&"crosstalk") { " *     stretch_feel(&state, pressure);\n" } else { "" };
+    let libm = if has.contains(&"sd") { "of libm sqrtf alone" } else { "no libm" };
     let mut text = String::new();
     // writing to memory cannot fail
     let _ = write!(
@@ -133,9 +140,9 @@ fn opening(calibration: &Calibration, form: Form, model: &str) -> String {
         "/* A stretch receptor: {signal} in, {reference} out, every {period} s.\n *\n * Model {model}, form \
          {form}: {taken} in,\n * {given} out; the same bits as on the desk.\n * Written by stretch \
          {version} from a calibration of {from}.\n *\n *     stretch_state state;\n *     \
-         stretch_init(&state);\n *     then every period\n *     reading = stretch_step(&state, sample); or \
-         stretch_lost(&state) where none came\n *\n * One state a channel. C99 and C++11; no malloc, no \
-         libm. stretch_self_test() is 0 where the\n * board computes as the desk does.\n */\n\
+         stretch_init(&state);\n *     then every period\n{feel} *     reading = stretch_step(&state, sample); or \
+         stretch_lost(&state) where none came\n *\n * One state a channel. C99 and C++11; no malloc, \
+         {libm}.\n * stretch_self_test() is 0 where the board computes as the desk does.\n */\n\
          #ifndef STRETCH_H\n#define STRETCH_H\n\n#include <stdint.h>\n\n",
         period = calibration.sample_rate_hz.period_s(),
         version = env!("CARGO_PKG_VERSION"),

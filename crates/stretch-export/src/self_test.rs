@@ -3,13 +3,13 @@
 use std::fmt::Write;
 
 use stretch_calibrate::{BoardReceptor, FixedRecord};
-use stretch_core::{Branch, Calibration, Runner, Volts};
+use stretch_core::{Branch, Calibration, Crosstalk, Design, Model, Stage, Volts};
 use stretch_receptor::{
     Receptor, Withheld,
     code::{Adc, AdcCode},
 };
 
-use crate::{ExportError, Form};
+use crate::{ExportError, Form, part::kept};
 
 /// How many.
 pub(crate) const SAMPLES: usize = 200;
@@ -61,25 +61,47 @@ pub(crate) fn fixed(
         rows.push(&format!("{{{}, {}, {flags}}}", code.0, answer.map_or(0, |(e, ..)| e)));
     }
     let fields = "int32_t code;\n    int32_t estimate;";
-    Ok(rows.text(fields, "code", "reading.estimate != samples[n].estimate"))
+    Ok(kept(&rows.text(fields, "code", "reading.estimate != samples[n].estimate"), &[]))
 }
 
 /// The self-test of a form in `float`.
 pub(crate) fn float(calibration: &Calibration) -> Result<String, ExportError> {
-    let mut receptor = Runner::new(Receptor::<f32>::new(calibration)?);
+    let receptor = Receptor::<f32>::new(calibration)?;
+    let mut memory = receptor.memory();
     let (mut rows, mut branch) = (Rows::default(), Branch::Inflation);
-    for signal in signals(calibration) {
+    let map = match &calibration.model {
+        Model::Diagnosed(map) => Some(map),
+        _ => None,
+    };
+    let crosstalk = map.and_then(|map| map.crosstalk);
+    for (n, signal) in signals(calibration).enumerate() {
+        let mut row = Vec::new();
+        if let Some(Crosstalk { scale, .. }) = crosstalk {
+            // nothing to its scale, out of step with the signal
+            let pressure = (scale * (n % 90) as f64 / 90.0) as f32;
+            memory.feel(pressure);
+            row.push(pressure);
+        }
         let volts = signal.map_or(NO_VOLTS, |volts| volts as f32);
-        let answer = receptor.step(Volts(volts));
-        let answer = answer.map(|r| ((r.estimate, r.rate), r.branch, r.domain as u8));
-        let flags = flags(&answer, &mut branch);
-        let (estimate, rate) = answer.map_or((0.0, 0.0), |(numbers, ..)| numbers);
-        rows.push(&format!("{{{volts:?}f, {estimate:?}f, {rate:?}f, {flags}}}"));
+        let answer = receptor.step(&mut memory, Volts(volts));
+        let numbers = answer.map_or([0.0; 3], |r| [r.estimate, r.rate, r.sd.unwrap_or(0.0)]);
+        let flags = flags(&answer.map(|r| ((), r.branch, r.domain as u8)), &mut branch);
+        row.push(volts);
+        row.extend(&numbers[..if map.is_some() { 3 } else { 2 }]);
+        let row: Vec<String> = row.iter().map(|number| format!("{number:?}f")).collect();
+        rows.push(&format!("{{{}, {flags}}}", row.join(", ")));
     }
-    let fields = "float volts;\n    float estimate;\n    float rate;";
-    let below = "reading.estimate < samples[n].estimate || reading.estimate > samples[n].estimate";
-    let rate = "reading.rate < samples[n].rate || reading.rate > samples[n].rate";
-    Ok(rows.text(fields, "volts", &format!("{below} ||\n            {rate}")))
+    let answers = ["estimate", "rate", "sd"];
+    let answers = &answers[..if map.is_some() { 3 } else { 2 }];
+    let inputs = if crosstalk.is_some() { &["pressure", "volts"][..] } else { &["volts"] };
+    let fields: Vec<String> =
+        inputs.iter().chain(answers).map(|name| format!("float {name};")).collect();
+    let differs: Vec<String> = answers
+        .iter()
+        .map(|a| format!("reading.{a} < samples[n].{a} || reading.{a} > samples[n].{a}"))
+        .collect();
+    let text = rows.text(&fields.join("\n    "), "volts", &differs.join(" ||\n            "));
+    Ok(kept(&text, if crosstalk.is_some() { &["pressure"] } else { &[] }))
 }
 
 /// Rows of the table, as many on a line as fit.

@@ -1,4 +1,5 @@
-/* Answers every sample of standard input (32 bits in hexadecimal, x for one that did not come). */
+/* Answers every sample of standard input (32 bits in hexadecimal, x for one that did not come); where
+ * the header takes a pressure, that comes before each. */
 #include "stretch.h"
 
 #include <stdio.h>
@@ -23,20 +24,34 @@ int main(void)
     }
     stretch_init(&state);
     while (scanf("%15s", word) == 1) {
-        const uint32_t bits = (uint32_t)strtoul(word, NULL, 16);
+        uint32_t bits = (uint32_t)strtoul(word, NULL, 16);
         stretch_reading reading;
-        uint32_t rate = 0;
+        uint32_t rate = 0, sd = 0;
 #ifdef FLOAT
         float volts;
+#ifdef STRETCH_TAKES_PRESSURE
+        char sample[16];
+        memcpy(&volts, &bits, sizeof volts);
+        stretch_feel(&state, volts);
+        if (scanf("%15s", sample) != 1) {
+            return 1;
+        }
+        memcpy(word, sample, sizeof word);
+        bits = (uint32_t)strtoul(word, NULL, 16);
+#endif
         memcpy(&volts, &bits, sizeof volts);
         reading = word[0] == 'x' ? stretch_lost(&state) : stretch_step(&state, volts);
         rate = bits_of(&reading.rate);
+#ifdef STRETCH_TELLS_SD
+        sd = bits_of(&reading.sd);
+#endif
 #else
         reading = word[0] == 'x' ? stretch_lost(&state) : stretch_step(&state, (int32_t)bits);
 #endif
         if (reading.status == STRETCH_OK) {
-            printf("%u %u %08lx %08lx\n", (unsigned)reading.branch, (unsigned)reading.domain,
-                   (unsigned long)bits_of(&reading.estimate), (unsigned long)rate);
+            printf("%u %u %08lx %08lx %08lx\n", (unsigned)reading.branch, (unsigned)reading.domain,
+                   (unsigned long)bits_of(&reading.estimate), (unsigned long)rate,
+                   (unsigned long)sd);
         } else {
             printf("%s\n", reading.status == STRETCH_WARMING ? "warming" : "missing");
         }

@@ -10,11 +10,13 @@ use std::{
 
 use stretch_calibrate::{BoardReceptor, fixed_record, parse_adc, read_calibration};
 use stretch_core::{
-    Calibration, CalibrationSpec, Interval, Model, ObserverMap, Polarity, RateEstimator, Runner,
-    Values, Volts,
+    Calibration, CalibrationSpec, Crosstalk, Design, DiagnosedMap, Interval, Knee, Model,
+    ObserverMap, Plays, Polarity, RateEstimator, RestTracker, Stage, Values, Volts, Worn,
 };
-use stretch_export::{Form, HEADER, Options, header};
-use stretch_receptor::{Receptor, Withheld, code::Adc, code::AdcCode, example_observer};
+use stretch_export::{Form, HEADER, Options, arduino_library, header};
+use stretch_receptor::{
+    Receptor, Withheld, code::Adc, code::AdcCode, example_diagnosed, example_observer,
+};
 
 const WARNINGS: [&str; 5] = ["-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror"];
 const SANITIZERS: [&str; 2] =
@@ -119,12 +121,27 @@ fn volts(code: i32) -> f32 {
     }
 }
 
+/// A pressure that comes with a sample: most go up and down, some are none, one is absurd.
+fn pressure(n: usize) -> f32 {
+    match n % 97 {
+        13 => f32::NAN,
+        14 => f32::NEG_INFINITY,
+        15 => 2e18,
+        16 => -3e4,
+        at => 0.02 * at as f32,
+    }
+}
+
+fn takes_pressure(calibration: &Calibration) -> bool {
+    matches!(&calibration.model, Model::Diagnosed(map) if map.crosstalk.is_some())
+}
+
 /// What the harness should print.
 fn expected(calibration: &Calibration, form: Form, codes: &[i32]) -> String {
     let mut text = String::new();
-    let mut answer = |answer: Result<(u8, u8, u32, u32), Withheld>| match answer {
-        Ok((branch, domain, estimate, rate)) => {
-            writeln!(text, "{branch} {domain} {estimate:08x} {rate:08x}").unwrap();
+    let mut answer = |answer: Result<(u8, u8, [u32; 3]), Withheld>| match answer {
+        Ok((branch, domain, [estimate, rate, sd])) => {
+            writeln!(text, "{branch} {domain} {estimate:08x} {rate:08x} {sd:08x}").unwrap();
         }
         Err(withheld) => writeln!(text, "{withheld}").unwrap(),
     };
@@ -134,15 +151,22 @@ fn expected(calibration: &Calibration, form: Form, codes: &[i32]) -> String {
             let mut receptor = BoardReceptor::new(&record.bytes).unwrap();
             for &code in codes {
                 let reading = receptor.step(AdcCode(code));
-                answer(reading.map(|r| (r.branch as u8, r.domain as u8, r.estimate as u32, 0)));
+                answer(
+                    reading.map(|r| (r.branch as u8, r.domain as u8, [r.estimate as u32, 0, 0])),
+                );
             }
         }
         Form::Float => {
-            let mut receptor = Runner::new(Receptor::<f32>::new(calibration).unwrap());
-            for &code in codes {
-                let reading = receptor.step(Volts(volts(code)));
+            let receptor = Receptor::<f32>::new(calibration).unwrap();
+            let mut memory = receptor.memory();
+            for (n, &code) in codes.iter().enumerate() {
+                if takes_pressure(calibration) {
+                    memory.feel(pressure(n));
+                }
+                let reading = receptor.step(&mut memory, Volts(volts(code)));
                 answer(reading.map(|r| {
-                    (r.branch as u8, r.domain as u8, r.estimate.to_bits(), r.rate.to_bits())
+                    let numbers = [r.estimate, r.rate, r.sd.unwrap_or(0.0)].map(f32::to_bits);
+                    (r.branch as u8, r.domain as u8, numbers)
                 }));
             }
         }
@@ -151,9 +175,12 @@ fn expected(calibration: &Calibration, form: Form, codes: &[i32]) -> String {
 }
 
 /// The samples as the harness reads them.
-fn input(form: Form, codes: &[i32]) -> String {
+fn input(calibration: &Calibration, form: Form, codes: &[i32]) -> String {
     let mut text = String::new();
-    for &code in codes {
+    for (n, &code) in codes.iter().enumerate() {
+        if takes_pressure(calibration) {
+            write!(text, "{:x} ", pressure(n).to_bits()).unwrap();
+        }
         match (form, code) {
             (_, -1) => writeln!(text, "x").unwrap(),
             (Form::Fixed, code) => writeln!(text, "{:x}", code as u32).unwrap(),
@@ -171,7 +198,7 @@ fn compiled(folder: &Path, form: Form, compiler: &Compiler) -> PathBuf {
     if form == Form::Float {
         command.arg("-DFLOAT");
     }
-    command.arg(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/harness.c"));
+    command.arg(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/harness.c")).arg("-lm");
     let output = command.output().unwrap();
     assert!(output.status.success(), "{command:?}\n{}", String::from_utf8_lossy(&output.stderr));
     program
@@ -204,8 +231,10 @@ fn holds(name: &str, calibration: &Calibration, form: Form, compilers: &[Compile
     for compiler in compilers {
         let program = compiled(folder.path(), form, compiler);
         for codes in [trial(), wild()] {
-            let (found, expected) =
-                (run(&program, &input(form, &codes)), expected(calibration, form, &codes));
+            let (found, expected) = (
+                run(&program, &input(calibration, form, &codes)),
+                expected(calibration, form, &codes),
+            );
             let what = || format!("{name} {form} {} {:?}", compiler.program, compiler.arguments);
             for (n, (found, expected)) in found.lines().zip(expected.lines()).enumerate() {
                 assert_eq!(found, expected, "{} sample {n} of {}", what(), codes.len());
@@ -287,4 +316,107 @@ fn shapes_and_signs_give_the_same_bits() {
         spec.rate_estimator = RateEstimator::SavitzkyGolay { window: 12, degree: 3, delay: 5 };
     });
     holds("a delay", &late, Form::Float, &compilers);
+}
+
+fn diagnosed_with(change: impl FnOnce(&mut DiagnosedMap)) -> Calibration {
+    changed(&example_diagnosed(), |spec| {
+        let Model::Diagnosed(map) = &mut spec.model else { unreachable!() };
+        change(map);
+    })
+}
+
+const REST: Option<RestTracker> = Some(RestTracker { level: 1.243, catch_up_s: 0.02, leak: 0.001 });
+const PLAYS: Option<Plays> = Some(Plays { share: 0.4, radii: [0.02, 0.04, 0.08] });
+const CROSSTALK: Option<Crosstalk> = Some(Crosstalk { c: 0.1, bend: 0.3, scale: 2.0 });
+const WORN: Option<Worn> = Some(Worn { m: 0.2, n: 5.0, zero: 0.1, reversal: 0.01, travelled: 2.0 });
+
+fn knee(at: f64) -> Option<Knee> {
+    Some(Knee { at, width: 0.02 })
+}
+
+/// Nothing but a curve.
+fn none(map: &mut DiagnosedMap) {
+    (map.slip, map.relaxation) = (None, None);
+}
+
+fn defects() -> [(&'static str, Calibration); 9] {
+    let with = |name, change: fn(&mut DiagnosedMap)| (name, diagnosed_with(change));
+    [
+        with("relaxation", |map| map.slip = None),
+        with("slip and relaxation", |_| ()),
+        with("hysteresis and skew", |map| {
+            none(map);
+            (map.hysteresis, map.skew_s) = (PLAYS, 0.03);
+        }),
+        with("crosstalk", |map| {
+            none(map);
+            map.crosstalk = CROSSTALK;
+        }),
+        with("slack and lowpass", |map| {
+            none(map);
+            (map.slack_low, map.lowpass_s) = (knee(0.05), Some([0.05, 0.02]));
+        }),
+        with("worn and rest", |map| {
+            none(map);
+            (map.worn, map.rest) = (WORN, REST);
+        }),
+        with("no defect", none),
+        with("knees alone", |map| {
+            none(map);
+            (map.slack_high, map.ceiling) = (knee(0.9), knee(1.0));
+        }),
+        with("all of them", |map| {
+            (map.rest, map.hysteresis, map.crosstalk, map.worn) = (REST, PLAYS, CROSSTALK, WORN);
+            (map.slack_low, map.slack_high) = (knee(0.05), knee(0.95));
+            (map.floor, map.ceiling) = (knee(0.02), knee(1.05));
+            (map.lowpass_s, map.skew_s) = (Some([0.05, 0.02]), -0.02);
+        }),
+    ]
+}
+
+#[test]
+fn named_defects_give_the_same_bits_from_every_compiler() {
+    let compilers = compilers();
+    for (name, calibration) in defects() {
+        holds(name, &calibration, Form::Float, &compilers);
+    }
+    let falling = changed(&example_diagnosed(), |spec| {
+        spec.polarity = Polarity::Falling;
+        let Model::Diagnosed(map) = &mut spec.model else { unreachable!() };
+        let mut curve: Vec<f64> = map.curve.iter().copied().collect();
+        curve.reverse();
+        map.curve = Values::new("curve", &curve).unwrap();
+    });
+    holds("falling", &falling, Form::Float, &compilers[..1]);
+}
+
+#[test]
+fn a_header_has_the_defects_that_its_map_has() {
+    let options = Options { form: None, adc: adc() };
+    let text = |name: &str| {
+        let (_, calibration) = defects().into_iter().find(|(of, _)| *of == name).unwrap();
+        let made = header(&calibration, &options).unwrap();
+        assert_eq!(made.form, Form::Float, "{name}");
+        assert!(!made.text.contains('@'), "{name}: a mark was left");
+        let library = arduino_library(&made);
+        let live = library.iter().find(|file| file.path.ends_with(".ino")).unwrap();
+        assert_eq!(live.text.contains("stretch_feel("), made.pressure, "{name}");
+        (made.pressure, made.text)
+    };
+    let (no_pressure, plain) = text("no defect");
+    let (pressure, crossed) = text("crosstalk");
+    let (_, all) = text("all of them");
+    assert!(pressure && !no_pressure);
+    for word in ["stretch_feel", "plays[", "fading[", "worn(", "knee(", "slipped", "s->baseline"] {
+        assert!(!plain.contains(word), "{word}");
+        assert!(all.contains(word), "{word}");
+    }
+    assert!(crossed.contains("stretch_feel(&state, pressure)") && !crossed.contains("plays["));
+}
+
+#[test]
+fn integers_are_refused_for_named_defects() {
+    let options = Options { form: Some(Form::Fixed), adc: adc() };
+    let error = header(&example_diagnosed(), &options).unwrap_err().to_string();
+    assert!(error.contains("diagnosed") && error.contains("--form float"), "{error}");
 }

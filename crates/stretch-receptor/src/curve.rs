@@ -2,16 +2,21 @@
 
 use stretch_core::{Interval, MAX_KNOTS, Real};
 
-use crate::fold::rounded;
+use crate::fold::{held, rounded};
 
-/// Signed signals at the knots, rising.
+/// A rising line of signals over evenly spaced drives.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Curve<T> {
-    knots: usize,
-    values: [T; MAX_KNOTS],
-    low: T,
-    pub(crate) step: T,
-    per_step: T,
+pub struct Curve<T> {
+    /// Knots.
+    pub knots: usize,
+    /// Signed signals at them.
+    pub values: [T; MAX_KNOTS],
+    /// The drive of the first.
+    pub low: T,
+    /// From knot to knot.
+    pub step: T,
+    /// Its reciprocal.
+    pub per_step: T,
 }
 
 impl<T: Real> Curve<T> {
@@ -54,7 +59,7 @@ impl<T: Real> Curve<T> {
     pub(crate) fn forward(&self, drive: T) -> (T, T) {
         let most = T::from_f64((self.knots - 2) as f64);
         let place = (drive - self.low) * self.per_step;
-        let below = place.max(T::zero()).min(most).to_usize().unwrap_or(0).min(self.knots - 2);
+        let below = held(place, T::zero(), most).to_usize().unwrap_or(0).min(self.knots - 2);
         let rise = self.values[below + 1] - self.values[below];
         let share = place - T::from_f64(below as f64);
         (self.values[below] + share * rise, rise * self.per_step)

@@ -1,6 +1,8 @@
 //! What named defects of a gauge make of a target, sample by sample.
 
-use stretch_core::{DiagnosedMap, Fading, Knee, Plays, Real, Worn, lag_weights, play};
+use stretch_core::{DiagnosedMap, Fading, Knee, Plays, Real, Worn, lag_weights};
+
+use crate::fold::held;
 
 /// ln 2, by which a soft knee lies inside at its bound, in widths.
 const LN_2: f64 = core::f64::consts::LN_2;
@@ -26,18 +28,28 @@ const LN_2: f64 = core::f64::consts::LN_2;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Defects<T> {
-    slack_low: Option<Bound<T>>,
-    slack_high: Option<Bound<T>>,
-    slip: Option<Played<T>>,
-    crosstalk: Option<[T; 3]>,
-    hysteresis: Option<Played<T>>,
-    relaxation: Option<Relaxing<T>>,
-    worn: Option<Wearing<T>>,
-    floor: Option<Bound<T>>,
-    ceiling: Option<Bound<T>>,
-    poles: Option<[[T; 3]; 2]>,
+    /// The sleeve goes slack at low targets.
+    pub slack_low: Option<Bound<T>>,
+    /// At high ones.
+    pub slack_high: Option<Bound<T>>,
+    /// The sleeve slips.
+    pub slip: Option<Played<T>>,
+    /// Of pressure and of its square.
+    pub crosstalk: Option<[T; 3]>,
+    /// The gauge takes another way back.
+    pub hysteresis: Option<Played<T>>,
+    /// It relaxes or overshoots.
+    pub relaxation: Option<Relaxing<T>>,
+    /// It softens.
+    pub worn: Option<Wearing<T>>,
+    /// The amplifier's lower end.
+    pub floor: Option<Bound<T>>,
+    /// Its upper end.
+    pub ceiling: Option<Bound<T>>,
+    /// The amplifier is slow: weights of what came out, of the input before and of the input now.
+    pub poles: Option<[[T; 3]; 2]>,
     /// Winding at a target of zero, and by how much it grows with the target.
-    wound: [T; 2],
+    pub wound: [T; 2],
 }
 
 /// What they remember.
@@ -45,12 +57,13 @@ pub struct Defects<T> {
 pub struct DefectsMemory<T> {
     slip: [T; 3],
     hysteresis: [T; 3],
-    lags: [T; 3],
-    lagged: T,
+    /// What each lag will take from the next drive.
+    fading: [T; 3],
     travelled: T,
     reached: T,
     direction: T,
-    poles: [[T; 2]; 2],
+    /// What the past gives to the next sample of either pole.
+    poles: [T; 2],
 }
 
 /// The linear parts of one sample.
@@ -62,37 +75,50 @@ pub(crate) struct Poised<T> {
     passed: T,
 }
 
+/// A bound with a knee.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Bound<T> {
-    at: T,
+pub struct Bound<T> {
+    /// The drive that is not left.
+    pub at: T,
     /// 4 (w ln 2)^2.
-    round: T,
+    pub round: T,
 }
 
+/// Three plays.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Played<T> {
-    radii: [T; 3],
+pub struct Played<T> {
+    /// Their half-widths.
+    pub radii: [T; 3],
     /// A third of the share.
-    each: T,
+    pub each: T,
 }
 
+/// Three lags.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Relaxing<T> {
-    /// Weights of a lag before, the input before and the input now, a lag each.
-    weights: [[T; 3]; 3],
-    /// A third of the share.
-    each: T,
+pub struct Relaxing<T> {
+    /// What of a lag's share is left after a sample.
+    pub kept: [T; 3],
+    /// What a drive adds to it.
+    pub taken: [T; 3],
+    /// What it is at rest, of a drive.
+    pub settled: [T; 3],
     /// What a sample's own input gets in all.
-    own: T,
+    pub own: T,
 }
 
+/// A response that weakens as it is worked.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Wearing<T> {
-    m: T,
-    n: T,
-    zero: T,
-    reversal: T,
-    travelled: T,
+pub struct Wearing<T> {
+    /// What is lost in the end.
+    pub m: T,
+    /// The way by which half of it is lost.
+    pub n: T,
+    /// The drive at which nothing is lost.
+    pub zero: T,
+    /// Turns smaller than this do not count.
+    pub reversal: T,
+    /// The way at which a stream begins.
+    pub travelled: T,
 }
 
 impl<T: Copy> DefectsMemory<T> {
@@ -133,18 +159,35 @@ impl<T: Real> Played<T> {
         Self { radii: plays.radii.map(T::from_f64), each: T::from_f64(plays.share / 3.0) }
     }
 
+    /// How far a play stays behind u: u - play(at, u, radius) without the two ends.
+    #[inline(always)]
+    fn apart(&self, i: usize, at: T, u: T) -> T {
+        let (behind, radius) = (u - at, self.radii[i]);
+        if behind.abs() <= radius {
+            behind
+        } else if behind > T::zero() {
+            radius
+        } else {
+            -radius
+        }
+    }
+
     #[inline(always)]
     fn of(&self, at: [T; 3], u: T) -> T {
-        let apart = |i: usize| u - play(at[i], u, self.radii[i]);
+        let apart = |i: usize| self.apart(i, at[i], u);
         u - self.each * (apart(0) + apart(1) + apart(2))
     }
 
     #[inline(always)]
     fn follow(&self, at: &mut [T; 3], u: T) -> T {
+        let out = self.of(*at, u);
         for i in 0..3 {
-            at[i] = play(at[i], u, self.radii[i]);
+            let behind = u - at[i];
+            if behind.abs() > self.radii[i] {
+                at[i] = u - self.apart(i, at[i], u);
+            }
         }
-        self.of(*at, u)
+        out
     }
 
     /// As far wound as that at u.
@@ -155,29 +198,33 @@ impl<T: Real> Played<T> {
 
 impl<T: Real> Relaxing<T> {
     fn new(fading: Fading, period_s: f64) -> Self {
+        // z' = a z + b x + c x' is p + c x', p = a z + b x: the past in one number, which goes on as p' = a p + (a c + b) x'
         let exact = fading.taus_s.map(|tau| lag_weights(period_s, tau));
         let now: f64 = exact.iter().map(|w| w[2]).sum();
+        let each = -fading.share / 3.0;
         Self {
-            weights: exact.map(|w| w.map(T::from_f64)),
-            each: T::from_f64(fading.share / 3.0),
-            own: T::from_f64(1.0 + fading.share * (1.0 - now / 3.0)),
+            kept: exact.map(|[a, ..]| T::from_f64(a)),
+            taken: exact.map(|[a, b, c]| T::from_f64(each * (a * c + b))),
+            settled: exact.map(|[a, b, _]| T::from_f64(each * (a + b))),
+            own: T::from_f64(1.0 + fading.share + each * now),
         }
     }
 
     /// What the past takes from the drive: its own linear part is [`Self::own`].
     #[inline(always)]
-    fn past(&self, lags: &[T; 3], before: T) -> T {
-        let of = |i: usize| self.weights[i][0] * lags[i] + self.weights[i][1] * before;
-        -self.each * (of(0) + of(1) + of(2))
+    fn past(fading: &[T; 3]) -> T {
+        fading[0] + fading[1] + fading[2]
     }
 
     #[inline(always)]
-    fn follow(&self, lags: &mut [T; 3], before: &mut T, u: T) {
+    fn follow(&self, fading: &mut [T; 3], u: T) {
         for i in 0..3 {
-            let [a, b, c] = self.weights[i];
-            lags[i] = a * lags[i] + b * *before + c * u;
+            fading[i] = self.kept[i] * fading[i] + self.taken[i] * u;
         }
-        *before = u;
+    }
+
+    fn begin(&self, u: T) -> [T; 3] {
+        self.settled.map(|share| share * u)
     }
 }
 
@@ -243,12 +290,11 @@ impl<T: Real> Defects<T> {
         let mut memory = DefectsMemory {
             slip: [zero; 3],
             hysteresis: [zero; 3],
-            lags: [zero; 3],
-            lagged: zero,
+            fading: [zero; 3],
             travelled: self.worn.map_or(zero, |w| w.travelled),
             reached: zero,
             direction: zero,
-            poles: [[zero; 2]; 2],
+            poles: [zero; 2],
         };
         let wound = self.wound_at(y);
         let u = self.taut(y);
@@ -256,11 +302,10 @@ impl<T: Real> Defects<T> {
         let u = self.slip.map_or(u, |slip| slip.of(memory.slip, u)) + self.pressed(pressure);
         memory.hysteresis = self.hysteresis.map_or([u; 3], |h| h.begin(wound, u));
         let u = self.hysteresis.map_or(u, |h| h.of(memory.hysteresis, u));
-        memory.lags = [u; 3];
-        memory.lagged = u;
+        memory.fading = self.relaxation.map_or([zero; 3], |r| r.begin(u));
         memory.reached = u;
         let u = self.bounded(self.worn.map_or(u, |w| w.zero + (u - w.zero) * w.left(w.travelled)));
-        memory.poles = [[u; 2]; 2];
+        memory.poles = self.settled(u);
         memory
     }
 
@@ -278,21 +323,27 @@ impl<T: Real> Defects<T> {
             memory.hysteresis = before.hysteresis;
             felt = hysteresis.follow(&mut memory.hysteresis, felt);
         }
-        memory.lags = [felt; 3];
-        memory.lagged = felt;
+        if let Some(relaxation) = &self.relaxation {
+            memory.fading = relaxation.begin(felt);
+        }
         if let Some(worn) = &self.worn {
             (memory.travelled, memory.reached, memory.direction) =
                 (before.travelled, before.reached, before.direction);
             worn.go(&mut memory, felt);
             felt = worn.zero + (felt - worn.zero) * worn.left(memory.travelled);
         }
-        memory.poles = [[self.bounded(felt); 2]; 2];
+        memory.poles = self.settled(self.bounded(felt));
         memory
+    }
+
+    /// Poles that have rested at a drive.
+    fn settled(&self, u: T) -> [T; 2] {
+        self.poles.map_or([T::zero(); 2], |poles| poles.map(|[a, b, _]| (a + b) * u))
     }
 
     /// How plays stand where a stream begins.
     pub(crate) fn wound_at(&self, y: T) -> T {
-        (self.wound[0] + self.wound[1] * y).max(-T::one()).min(T::one())
+        held(self.wound[0] + self.wound[1] * y, -T::one(), T::one())
     }
 
     /// How plays stand at a target: 1 as if it had come up from far below, -1 from far above, their mean; none without plays.
@@ -302,7 +353,7 @@ impl<T: Real> Defects<T> {
         let share = |plays: &Played<T>, at: [T; 3], u: T| {
             let sum = at.iter().zip(plays.radii).fold(T::zero(), |sum, (z, radius)| {
                 let share = if radius > T::zero() { (u - *z) / radius } else { T::zero() };
-                sum + share.max(-T::one()).min(T::one())
+                sum + held(share, -T::one(), T::one())
             });
             sum / T::from_f64(3.0)
         };
@@ -334,13 +385,11 @@ impl<T: Real> Defects<T> {
     /// The linear parts of the next sample.
     #[inline(always)]
     pub(crate) fn poise(&self, memory: &DefectsMemory<T>, pressure: T) -> Poised<T> {
-        let passed = self.poles.map_or(T::zero(), |[first, second]| {
-            let z = first[0] * memory.poles[0][0] + first[1] * memory.poles[0][1];
-            second[0] * memory.poles[1][0] + second[1] * memory.poles[1][1] + second[2] * z
-        });
+        let [first, second] = memory.poles;
+        let passed = self.poles.map_or(T::zero(), |[_, [.., c]]| second + c * first);
         Poised {
             pressed: self.pressed(pressure),
-            relaxed: self.relaxation.map_or(T::zero(), |r| r.past(&memory.lags, memory.lagged)),
+            relaxed: self.relaxation.map_or(T::zero(), |_| Relaxing::past(&memory.fading)),
             worn: self.worn.map_or(T::one(), |w| w.left(memory.travelled)),
             passed,
         }
@@ -350,7 +399,8 @@ impl<T: Real> Defects<T> {
     #[inline(always)]
     pub(crate) fn drive(&self, memory: &DefectsMemory<T>, poised: &Poised<T>, y: T) -> T {
         let u = self.taut(y);
-        let u = self.slip.map_or(u, |slip| slip.of(memory.slip, u)) + poised.pressed;
+        let u = self.slip.map_or(u, |slip| slip.of(memory.slip, u));
+        let u = self.crosstalk.map_or(u, |_| u + poised.pressed);
         let u = self.hysteresis.map_or(u, |h| h.of(memory.hysteresis, u));
         let u = self.relaxation.map_or(u, |r| r.own * u + poised.relaxed);
         let u = self.worn.map_or(u, |w| w.zero + (u - w.zero) * poised.worn);
@@ -362,18 +412,26 @@ impl<T: Real> Defects<T> {
     #[inline(always)]
     pub fn advance(&self, memory: &mut DefectsMemory<T>, y: T, pressure: T) -> T {
         let poised = self.poise(memory, pressure);
+        self.follow(memory, &poised, y)
+    }
+
+    /// The same for a sample that was poised.
+    #[inline(always)]
+    pub(crate) fn follow(&self, memory: &mut DefectsMemory<T>, poised: &Poised<T>, y: T) -> T {
         let mut u = self.taut(y);
         if let Some(slip) = &self.slip {
             u = slip.follow(&mut memory.slip, u);
         }
-        u = u + poised.pressed;
+        if self.crosstalk.is_some() {
+            u = u + poised.pressed;
+        }
         if let Some(hysteresis) = &self.hysteresis {
             u = hysteresis.follow(&mut memory.hysteresis, u);
         }
         if let Some(relaxation) = &self.relaxation {
             let felt = u;
             u = relaxation.own * u + poised.relaxed;
-            relaxation.follow(&mut memory.lags, &mut memory.lagged, felt);
+            relaxation.follow(&mut memory.fading, felt);
         }
         if let Some(worn) = &self.worn {
             let felt = u;
@@ -382,10 +440,9 @@ impl<T: Real> Defects<T> {
         }
         u = self.bounded(u);
         if let Some([first, second]) = &self.poles {
-            let z = first[0] * memory.poles[0][0] + first[1] * memory.poles[0][1] + first[2] * u;
-            let out =
-                second[0] * memory.poles[1][0] + second[1] * memory.poles[1][1] + second[2] * z;
-            memory.poles = [[z, u], [out, z]];
+            let z = memory.poles[0] + first[2] * u;
+            let out = memory.poles[1] + second[2] * z;
+            memory.poles = [first[0] * z + first[1] * u, second[0] * out + second[1] * z];
             u = out;
         }
         u

@@ -9,16 +9,16 @@ use crate::{
     Domain, Front, Reading, ReceptorMemory,
     curve::Curve,
     defects::{Defects, DefectsMemory},
-    fold::{output, reference_dead_band},
+    fold::{greater, held, output, reference_dead_band},
     front::{Live, usable},
 };
 
 /// A secant is taken over at least this share of the way between knots.
-const LEAST_RUN: f64 = 0.01;
+pub const LEAST_RUN: f64 = 0.01;
 /// A drive is taken to answer a target by at least this share: what answers less cannot be asked.
-const LEAST_ANSWER: f64 = 0.05;
+pub const LEAST_ANSWER: f64 = 0.05;
 /// Share of a sample in what the signal shows, and the share of the noise's variance that is left of it: s/(2 - s).
-const SMOOTH: f64 = 0.33;
+pub const SMOOTH: f64 = 0.33;
 const SHOWN: f64 = 0.2;
 /// Standard deviations of it by which a sleeve must have come back before it is taken to have turned.
 const SURE: f64 = 6.0;
@@ -56,34 +56,50 @@ pub type DiagnosedReceptor<T> = Front<Diagnosed<T>>;
 /// The model of a [`DiagnosedReceptor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Diagnosed<T> {
-    sign: T,
-    rest: RestLevel<T>,
-    defects: Defects<T>,
-    curve: Curve<T>,
-    period_s: T,
-    /// What a rate keeps of itself in a sample, and what it wanders, squared.
-    kept: T,
-    wander: T,
+    /// Multiplies the signal: -1 where it falls as the target rises.
+    pub sign: T,
+    /// The baseline, where one is followed.
+    pub rest: RestLevel<T>,
+    /// What stands between target and curve.
+    pub defects: Defects<T>,
+    /// From drive to signal.
+    pub curve: Curve<T>,
+    /// Seconds from a sample to the next.
+    pub period_s: T,
+    /// What a rate keeps of itself in a sample.
+    pub kept: T,
+    /// The same squared.
+    pub kept_twice: T,
+    /// What it wanders, squared.
+    pub wander: T,
     /// Variance of the signal around the model.
-    noise: T,
+    pub noise: T,
     /// Greatest variance of a target.
-    widest: T,
-    low: T,
-    high: T,
+    pub widest: T,
+    /// The least target.
+    pub low: T,
+    /// The greatest.
+    pub high: T,
     /// Seconds that the estimate is ahead of the signal, as far as a rate reaches.
-    ahead_s: T,
-    spread: T,
+    pub ahead_s: T,
+    /// Reference units per standard deviation that the filter finds.
+    pub spread: T,
     /// Half-width of the sleeve's slip.
-    slip: T,
+    pub slip: T,
     /// By how much a sleeve must have come back, in signal.
-    sure: T,
-    /// Variance of a target that may be anywhere in it, and the share of it that a sample adds.
-    hideout: T,
-    hiding: T,
-    gain: T,
-    zero: T,
-    dead_band: T,
-    at_rest: T,
+    pub sure: T,
+    /// Variance of a target that may be anywhere in it.
+    pub hideout: T,
+    /// The share of it that a sample adds.
+    pub hiding: T,
+    /// Reference units per target.
+    pub gain: T,
+    /// The reference at a target of zero.
+    pub zero: T,
+    /// The largest rate of the target that keeps the branch.
+    pub dead_band: T,
+    /// The signal where the target rests, memory settled.
+    pub at_rest: T,
 }
 
 /// What a [`DiagnosedReceptor`]'s model remembers: target and rate with their covariance, the defects, the baseline, the pressure.
@@ -163,6 +179,7 @@ impl<T: Real> Diagnosed<T> {
             curve: Curve::new(values, map.drive_domain),
             period_s: T::from_f64(period_s),
             kept: T::from_f64(libm::exp(-period_s / steady)),
+            kept_twice: T::from_f64(libm::exp(-2.0 * period_s / steady)),
             wander: T::from_f64(map.agility * period_s),
             noise: T::from_f64(map.noise * map.noise),
             widest: T::from_f64(widest * widest),
@@ -187,13 +204,13 @@ impl<T: Real> Diagnosed<T> {
     /// The target that would rest at a signal, and what its defects remember.
     fn begin(&self, memory: &mut DiagnosedMemory<T>, signal: T) {
         let (to, _) = self.curve.inverse(signal);
-        let mut target = to.max(self.low).min(self.high);
+        let mut target = held(to, self.low, self.high);
         // plays that are wound stand off by a constant; a second look takes what bends
         for _ in 0..3 {
             let defects = self.defects.begin(target, memory.pressure);
             let poised = self.defects.poise(&defects, memory.pressure);
             let off = to - self.defects.drive(&defects, &poised, target);
-            target = (target + off).max(self.low).min(self.high);
+            target = held(target + off, self.low, self.high);
         }
         memory.target = target;
         memory.rate = T::zero();
@@ -217,9 +234,13 @@ impl<T: Real> Diagnosed<T> {
         let across = yr + dt * rr;
         let grown = yy + dt * (yr + across);
         // where the signal hardly answers, a variance without end would throw the target from end to end of the flat
-        let share = if grown > self.widest { self.widest / grown } else { T::one() };
-        memory.covariance =
-            [share * grown, share * (kept * across), kept * kept * rr + self.wander];
+        let (grown, across) = if grown > self.widest {
+            let share = self.widest / grown;
+            (share * grown, share * (kept * across))
+        } else {
+            (grown, kept * across)
+        };
+        memory.covariance = [grown, across, self.kept_twice * rr + self.wander];
         self.hold(memory);
     }
 
@@ -228,11 +249,11 @@ impl<T: Real> Diagnosed<T> {
     fn hold(&self, memory: &mut DiagnosedMemory<T>) {
         if memory.target < self.low {
             memory.target = self.low;
-            memory.rate = memory.rate.max(T::zero());
+            memory.rate = greater(memory.rate, T::zero());
         }
         if memory.target > self.high {
             memory.target = self.high;
-            memory.rate = memory.rate.min(T::zero());
+            memory.rate = if memory.rate < T::zero() { memory.rate } else { T::zero() };
         }
     }
 
@@ -257,7 +278,7 @@ impl<T: Real> Diagnosed<T> {
         // a spike counts as a signal one whole curve away, no more
         let (first, last) = self.curve.ends();
         let span = last - first;
-        let felt = signal.max(first - span).min(last + span);
+        let felt = held(signal, first - span, last + span);
         let (to, on_curve) = self.curve.inverse(felt);
         let (run, surprise) = (to - drive, felt - predicted);
         let least = T::from_f64(LEAST_RUN) * self.curve.step;
@@ -267,10 +288,10 @@ impl<T: Real> Diagnosed<T> {
         // the slope of the drive, as a secant to where the target would have to be
         let probe = if far { run } else { toward * least };
         let moved = self.defects.drive(&memory.defects, &poised, here + probe) - drive;
-        let answer = (moved / probe).max(T::from_f64(LEAST_ANSWER));
+        let answer = greater(moved / probe, T::from_f64(LEAST_ANSWER));
         // and of the curve, so that a flat end of it cannot throw the estimate
         let secant = if far { surprise / run } else { tangent };
-        let slope = answer * tangent.max(secant);
+        let slope = answer * greater(secant, tangent);
         let [yy, yr, rr] = memory.covariance;
         let (by_y, by_r) = (slope * yy, slope * yr);
         let share = (slope * by_y + self.noise).recip();
@@ -286,7 +307,7 @@ impl<T: Real> Diagnosed<T> {
             memory.shown = lag(memory.shown, shown, T::from_f64(SMOOTH));
             self.turn(memory);
         }
-        self.follow(memory);
+        self.defects.follow(&mut memory.defects, &poised, memory.target);
         on_curve
     }
 
@@ -308,13 +329,6 @@ impl<T: Real> Diagnosed<T> {
             memory.reached = lag(memory.reached, memory.shown, self.hiding);
             memory.hidden = lag(memory.hidden, self.hideout, self.hiding);
         }
-    }
-
-    /// The defects follow the target.
-    #[inline(always)]
-    fn follow(&self, memory: &mut DiagnosedMemory<T>) {
-        let (target, pressure) = (memory.target, memory.pressure);
-        self.defects.advance(&mut memory.defects, target, pressure);
     }
 }
 
@@ -366,7 +380,7 @@ impl<T: Real> Live for Diagnosed<T> {
         let on_curve = self.correct(memory, signal);
         let (rate, ahead) = (memory.rate, self.ahead_s);
         *branch = branch.next(rate, self.dead_band);
-        let target = (memory.target + memory.slipped + ahead * rate).max(self.low).min(self.high);
+        let target = held(memory.target + memory.slipped + ahead * rate, self.low, self.high);
         let [yy, yr, rr] = memory.covariance;
         let variance = memory.hidden + yy + ahead * (yr + yr + ahead * rr);
         Some(Reading {
@@ -374,7 +388,7 @@ impl<T: Real> Live for Diagnosed<T> {
             rate: self.gain * rate,
             branch: *branch,
             domain: Domain::from_flags(!on_curve, false),
-            sd: Some(self.spread * Real::sqrt(variance.max(T::zero()))),
+            sd: Some(self.spread * Real::sqrt(greater(variance, T::zero()))),
         })
     }
 
@@ -383,7 +397,7 @@ impl<T: Real> Live for Diagnosed<T> {
         let begun = !memory.target.is_nan();
         if begun {
             self.predict(memory);
-            self.follow(memory);
+            self.defects.advance(&mut memory.defects, memory.target, memory.pressure);
         }
         begun
     }

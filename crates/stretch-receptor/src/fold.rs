@@ -29,3 +29,18 @@ pub(crate) fn rounded<T: Real, const N: usize>(values: impl Iterator<Item = f64>
     }
     out
 }
+
+/// x held to low .. high; low for what is not a number.
+///
+/// Two comparisons: `max` and `min` are calls on a board that has no such instruction.
+#[inline(always)]
+pub(crate) fn held<T: Real>(x: T, low: T, high: T) -> T {
+    let x = greater(x, low);
+    if x < high { x } else { high }
+}
+
+/// The greater of both; the second where the first is not a number.
+#[inline(always)]
+pub(crate) fn greater<T: Real>(x: T, y: T) -> T {
+    if x > y { x } else { y }
+}

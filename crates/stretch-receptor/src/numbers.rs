@@ -12,6 +12,9 @@
 //! ```
 
 pub use crate::{
+    curve::Curve,
+    defects::{Bound, Played, Relaxing, Wearing},
+    diagnosed::{Diagnosed, LEAST_ANSWER, LEAST_RUN, SMOOTH},
     front::Direction,
     map::{Bounds, Line, Map, Sheet},
     observer::Observer,

@@ -6,17 +6,19 @@
 use std::{fmt::Write, fs, path::PathBuf};
 
 use stretch_core::{
-    Calibration, CalibrationSpec, Design, FitSummary, Hertz, HistoryMap, HistoryShape, Interval,
-    LinearMap, Model, ObserverMap, RateEstimator, RestTracker, SampleRate, Stage, Values, Volts,
+    Calibration, CalibrationSpec, Design, DiagnosedMap, FitSummary, Hertz, HistoryMap,
+    HistoryShape, Interval, LinearMap, Model, ObserverMap, RateEstimator, RestTracker, SampleRate,
+    Stage, Values, Volts,
 };
 use stretch_filter::{Differentiator, IntegerSgRate, LowPassSpec, RateFilter, SgRate};
 use stretch_receptor::{
-    BlendedReceptor, HistoryReceptor, ObserverReceptor, Reading, StretchReceptor, Withheld,
+    BlendedReceptor, DiagnosedReceptor, HistoryReceptor, ObserverReceptor, Reading,
+    StretchReceptor, Withheld,
     code::{
         Adc, AdcCode, AdcSpec, CodeArithmetic, CodeCalibration, CodeReading, CodeReceptor, Fixed,
         FixedObserver,
     },
-    example_calibration, example_observer,
+    example_calibration, example_diagnosed, example_observer,
 };
 
 #[path = "../../../firmware/src/checksum.rs"]
@@ -191,6 +193,18 @@ fn observers() -> [(&'static str, &'static str, Calibration); 2] {
     [("observer", "observer", plain), ("observer+rest", "observer-rest", followed)]
 }
 
+fn diagnosed() -> [(&'static str, &'static str, Calibration); 2] {
+    let plain = example_diagnosed();
+    let Model::Diagnosed(map) = plain.model else { unreachable!() };
+    let rest = Some(RestTracker { level: 1.243, catch_up_s: 0.02, leak: 0.0 });
+    let spec = CalibrationSpec {
+        model: Model::Diagnosed(DiagnosedMap { rest, ..map }),
+        ..plain.clone().into_spec()
+    };
+    let followed = Calibration::new(spec).unwrap();
+    [("diagnosed", "diagnosed", plain), ("diagnosed+rest", "diagnosed-rest", followed)]
+}
+
 fn fixed_observer(calibration: &Calibration) -> String {
     let receptor = FixedObserver::new(calibration, &due()).unwrap();
     let (mut memory, mut checksum) = (receptor.memory(), Checksum::default());
@@ -220,6 +234,9 @@ fn the_trial_and_the_records_are_these() {
         record(name, &calibration);
         let fixed = FixedObserver::new(&calibration, &due()).unwrap();
         record(&format!("{name}-fixed"), &fixed);
+    }
+    for (_, name, calibration) in diagnosed() {
+        record(name, &calibration);
     }
 }
 
@@ -253,6 +270,10 @@ fn the_golden_checksums_are_these() {
         let receptor = ObserverReceptor::<f32>::new(&calibration).unwrap();
         golden.push((model.to_owned(), volts_of(receptor)));
         golden.push((format!("{model}-fixed"), fixed_observer(&calibration)));
+    }
+    for (model, _, calibration) in diagnosed() {
+        let receptor = DiagnosedReceptor::<f32>::new(&calibration).unwrap();
+        golden.push((model.to_owned(), volts_of(receptor)));
     }
     for (model, checksum) in golden {
         writeln!(text, "model={model} checksum={checksum}").unwrap();

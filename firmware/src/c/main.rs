@@ -29,6 +29,17 @@ struct Float {
     domain: u8,
 }
 
+/// `stretch_reading` in `float`, of a model that knows how sure it is.
+#[repr(C)]
+struct FloatSd {
+    estimate: f32,
+    rate: f32,
+    sd: f32,
+    status: u8,
+    branch: u8,
+    domain: u8,
+}
+
 /// Room for any `stretch_state`, in words, so that it is aligned.
 const WORDS: usize = 64;
 
@@ -98,6 +109,12 @@ macro_rules! fixed {
 macro_rules! float {
     ($symbol:ident, $name:literal) => {
         model!($symbol, $name, Float, f32, trial::volts)
+    };
+}
+
+macro_rules! float_sd {
+    ($symbol:ident, $name:literal) => {
+        model!($symbol, $name, FloatSd, f32, trial::volts)
     };
 }
 

@@ -14,6 +14,9 @@
 #elif defined(__GNUC__)
 #pragma GCC push_options
 #pragma GCC optimize("fp-contract=off")
+@if sd
+#pragma GCC optimize("no-math-errno") /* a square root is one instruction where there is one */
+@end
 #endif
 
 /* A sample beyond this size, or one that is not a number, is a sample that did not come. */
@@ -23,6 +26,9 @@
 typedef struct stretch_reading {
     float estimate; /* in STRETCH_UNIT */
     float rate;     /* of the estimate, a second */
+@if sd
+    float sd;       /* standard deviation of the estimate */
+@end
     uint8_t status;
     uint8_t branch;
     uint8_t domain;
@@ -34,6 +40,9 @@ STRETCH_INLINE stretch_reading stretch_answer(uint8_t status, uint8_t branch, ui
     stretch_reading reading;
     reading.estimate = estimate;
     reading.rate = rate;
+@if sd
+    reading.sd = 0.0f;
+@end
     reading.status = status;
     reading.branch = branch;
     reading.domain = domain;

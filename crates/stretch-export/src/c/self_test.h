@@ -11,8 +11,13 @@ static STRETCH_APART int stretch_self_test(void)
     int n;
     stretch_init(&state);
     for (n = 0; n < STRETCH_SELF_TEST; n++) {
-        const stretch_reading reading = stretch_step(&state, samples[n].@INPUT@);
-        const uint8_t flags =
+        stretch_reading reading;
+        uint8_t flags;
+@if pressure
+        stretch_feel(&state, samples[n].pressure);
+@end
+        reading = stretch_step(&state, samples[n].@INPUT@);
+        flags =
             (uint8_t)(reading.status | (reading.branch << 2) | (reading.domain << 3));
         if (flags != samples[n].flags || @DIFFERS@) {
             return n + 1;

@@ -2,11 +2,13 @@
 //!
 //! A further model is a file here, its step in `../c`, and an arm in `../export.rs`.
 
+mod diagnosed_float;
 mod observer_fixed;
 mod observer_float;
 mod surfaces_fixed;
 mod surfaces_float;
 
+pub(crate) use diagnosed_float::diagnosed_float;
 pub(crate) use observer_fixed::observer_fixed;
 pub(crate) use observer_float::observer_float;
 pub(crate) use surfaces_fixed::surfaces_fixed;

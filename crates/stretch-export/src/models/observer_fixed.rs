@@ -55,6 +55,7 @@ pub(crate) fn observer_fixed(observer: &IntegerObserver) -> Part {
         model: if follows { "observer+rest" } else { "observer" }.into(),
         constants: constants.into_text(),
         step: vec![include_str!("../c/fixed.h"), include_str!("../c/observer_fixed.h")],
+        has: Vec::new(),
     }
 }
 

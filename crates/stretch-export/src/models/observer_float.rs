@@ -54,6 +54,7 @@ pub(crate) fn observer_float(calibration: &Calibration) -> Result<Part, ExportEr
             include_str!("../c/observer_float.h"),
             include_str!("../c/float_end.h"),
         ],
+        has: Vec::new(),
     })
 }
 

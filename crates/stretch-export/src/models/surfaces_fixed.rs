@@ -59,6 +59,7 @@ pub(crate) fn surfaces_fixed(numbers: &FixedNumbers) -> Part {
         model: model.into(),
         constants: constants.into_text(),
         step: vec![include_str!("../c/fixed.h"), RATE, surface, STEP],
+        has: Vec::new(),
     }
 }
 

@@ -71,6 +71,7 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
             STEP,
             include_str!("../c/float_end.h"),
         ],
+        has: Vec::new(),
     })
 }
 

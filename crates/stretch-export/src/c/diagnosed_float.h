@@ -1,0 +1,538 @@
+
+/* The only function that is not here; every library rounds it correctly. */
+#if defined(__GNUC__)
+#define STRETCH_SQRT __builtin_sqrtf
+#else
+#include <math.h>
+#define STRETCH_SQRT sqrtf
+#endif
+
+typedef struct stretch_state {
+    float target;
+    float rate;
+    float yy, yr, rr; /* variance of the target, covariance, variance of the rate */
+@if slip
+    float slipped; /* by how much the muscle is ahead of its sleeve */
+    float hidden;  /* variance of the target that the slip hides */
+    float came;    /* how far the sleeve has come where it last moved to, in signal */
+    float shown;   /* the signal without memory, a little smoothed */
+@end
+@if crosstalk
+    float pressed; /* what the pressure adds to the drive */
+@end
+@if hysteresis
+    float plays[3];
+@end
+@if relaxation
+    float fading[3]; /* what each lag adds to the next drive */
+@end
+@if worn
+    float travelled;
+    float reached;
+    float direction;
+@end
+@if rest
+    float baseline;
+    float excess;
+@end
+    uint8_t begun;
+    uint8_t branch;
+    uint8_t missing;
+} stretch_state;
+
+/* All but branch, baseline, pressure, and how far the gauge was worked. */
+static inline void stretch_forget(stretch_state *s)
+{
+@if slip
+    s->hidden = 0.0f;
+@end
+    s->begun = 0;
+}
+
+static inline void stretch_init(stretch_state *s)
+{
+    stretch_forget(s);
+    s->target = 0.0f;
+    s->rate = 0.0f;
+@if crosstalk
+    s->pressed = 0.0f;
+@end
+@if worn
+    s->travelled = STRETCH_WORN_TRAVELLED;
+@end
+@if rest
+    s->baseline = 0.0f;
+    s->excess = 0.0f;
+@end
+    s->branch = STRETCH_INFLATION;
+    s->missing = STRETCH_MAX_BRIDGED;
+}
+
+@if crosstalk
+/* The pressure of the samples to come; one that is not a number changes nothing. */
+static inline void stretch_feel(stretch_state *s, float pressure)
+{
+    if (stretch_usable(pressure)) {
+        s->pressed = pressure * (STRETCH_PRESSED + STRETCH_PRESSED_TWICE * pressure);
+    }
+}
+
+@end
+/* x held to low .. high; low for what is not a number */
+STRETCH_INLINE float stretch_held(float x, float low, float high)
+{
+    x = x > low ? x : low;
+    return x < high ? x : high;
+}
+
+@if knee
+/* A floor with a knee. */
+STRETCH_INLINE float stretch_knee(float u, float at, float round)
+{
+    const float above = u - at;
+    return at + 0.5f * (above + STRETCH_SQRT(above * above + round));
+}
+
+@end
+@if slack
+/* What a sleeve that may go slack has of a target. */
+STRETCH_INLINE float stretch_taut(float u)
+{
+@if slack_low
+    u = stretch_knee(u, STRETCH_SLACK_LOW, STRETCH_SLACK_LOW_ROUND);
+@end
+@if slack_high
+    u = -stretch_knee(-u, STRETCH_SLACK_HIGH, STRETCH_SLACK_HIGH_ROUND);
+@end
+    return u;
+}
+
+@end
+@if bounded
+/* What an amplifier with ends has of a drive. */
+STRETCH_INLINE float stretch_bounded(float u)
+{
+@if floor
+    u = stretch_knee(u, STRETCH_FLOOR, STRETCH_FLOOR_ROUND);
+@end
+@if ceiling
+    u = -stretch_knee(-u, STRETCH_CEILING, STRETCH_CEILING_ROUND);
+@end
+    return u;
+}
+
+@end
+@if hysteresis
+/* How far a play stays behind u. */
+STRETCH_INLINE float stretch_apart(float at, float u, float radius)
+{
+    const float behind = u - at;
+    const float size = behind < 0.0f ? -behind : behind;
+    return size <= radius ? behind : behind > 0.0f ? radius : -radius;
+}
+
+/* What the plays leave of a drive. */
+STRETCH_INLINE float stretch_played(const stretch_state *s, float u)
+{
+    return u - STRETCH_PLAYED * (stretch_apart(s->plays[0], u, stretch_radii[0]) +
+                                 stretch_apart(s->plays[1], u, stretch_radii[1]) +
+                                 stretch_apart(s->plays[2], u, stretch_radii[2]));
+}
+
+@end
+@if relaxation
+/* What the past adds to the drive. */
+STRETCH_INLINE float stretch_past(const stretch_state *s)
+{
+    return s->fading[0] + s->fading[1] + s->fading[2];
+}
+
+@end
+@if worn
+/* What is left of the response. */
+STRETCH_INLINE float stretch_worn(const stretch_state *s, float u)
+{
+    const float left = 1.0f - STRETCH_WORN_M * s->travelled / (STRETCH_WORN_N + s->travelled);
+    return STRETCH_WORN_ZERO + (u - STRETCH_WORN_ZERO) * left;
+}
+
+@end
+@if worn
+/* Moves the way on; turns that are smaller than a reversal do not count. */
+STRETCH_INLINE void stretch_work(stretch_state *s, float u)
+{
+    const float moved = u - s->reached;
+    const float size = moved < 0.0f ? -moved : moved;
+    if (moved * s->direction > 0.0f || size > STRETCH_WORN_REVERSAL) {
+        s->travelled = s->travelled + size;
+        s->reached = u;
+        s->direction = moved > 0.0f ? 1.0f : -1.0f;
+    }
+}
+
+@end
+@if wound
+/* How plays stand where a stream begins: 1 as if the target had come up from far below. */
+STRETCH_INLINE float stretch_wound(float y)
+{
+    return stretch_held(STRETCH_WOUND + STRETCH_WOUND_SLOPE * y, -1.0f, 1.0f);
+}
+
+@end
+/* The drive of a target in this sample. */
+STRETCH_INLINE float stretch_drive(const stretch_state *s, float y)
+{
+    float u = y;
+    (void)s;
+@if slack
+    u = stretch_taut(u);
+@end
+@if crosstalk
+    u = u + s->pressed;
+@end
+@if hysteresis
+    u = stretch_played(s, u);
+@end
+@if relaxation
+    u = STRETCH_OWN * u + stretch_past(s);
+@end
+@if worn
+    u = stretch_worn(s, u);
+@end
+@if bounded
+    u = stretch_bounded(u);
+@end
+    return u;
+}
+
+@if remembers
+/* The defects follow the target. */
+STRETCH_INLINE void stretch_follow(stretch_state *s)
+{
+    float u = s->target;
+@if hysteresis relaxation worn
+    float felt;
+@end
+@if hysteresis relaxation
+    int i;
+@end
+@if slack
+    u = stretch_taut(u);
+@end
+@if crosstalk
+    u = u + s->pressed;
+@end
+@if hysteresis
+    felt = u;
+    u = stretch_played(s, u);
+    for (i = 0; i < 3; i++) {
+        const float behind = felt - s->plays[i];
+        if ((behind < 0.0f ? -behind : behind) > stretch_radii[i]) {
+            s->plays[i] = felt - stretch_apart(s->plays[i], felt, stretch_radii[i]);
+        }
+    }
+@end
+@if relaxation
+    felt = u;
+    u = STRETCH_OWN * u + stretch_past(s);
+    for (i = 0; i < 3; i++) {
+        s->fading[i] = stretch_kept[i] * s->fading[i] + stretch_taken[i] * felt;
+    }
+@end
+@if worn
+    felt = u;
+    u = stretch_worn(s, u);
+    stretch_work(s, felt);
+@end
+@if bounded
+    u = stretch_bounded(u);
+@end
+}
+
+@end
+/* The signal at a drive and the slope there; beyond an end as the last line goes on. */
+STRETCH_INLINE float stretch_forward(float drive, float *slope)
+{
+    const float place = (drive - STRETCH_DRIVE_LOW) * STRETCH_PER_STEP;
+    const int below = (int)stretch_held(place, 0.0f, (float)(STRETCH_KNOTS - 2));
+    const float rise = stretch_curve[below + 1] - stretch_curve[below];
+    *slope = rise * STRETCH_PER_STEP;
+    return stretch_curve[below] + (place - (float)below) * rise;
+}
+
+/* The drive that a signal suggests by itself; beyond an end as the last line goes on. */
+STRETCH_INLINE float stretch_inverse(float signal)
+{
+    int below = 0, above = STRETCH_KNOTS - 1;
+    float place;
+    while (above - below > 1) {
+        const int middle = (below + above) / 2;
+        if (stretch_curve[middle] <= signal) {
+            below = middle;
+        } else {
+            above = middle;
+        }
+    }
+    place = (float)below +
+            (signal - stretch_curve[below]) / (stretch_curve[below + 1] - stretch_curve[below]);
+    return STRETCH_DRIVE_LOW + place * STRETCH_DRIVE_STEP;
+}
+
+/* What the defects remember of a target that has rested at y. */
+STRETCH_INLINE void stretch_settle(stretch_state *s, float y)
+{
+@if remembers
+    float u = y;
+@if hysteresis
+    const float wound = stretch_wound(y);
+@end
+@if hysteresis relaxation
+    int i;
+@end
+@if slack
+    u = stretch_taut(u);
+@end
+@if crosstalk
+    u = u + s->pressed;
+@end
+@if hysteresis
+    for (i = 0; i < 3; i++) {
+        s->plays[i] = u - wound * stretch_radii[i];
+    }
+    u = stretch_played(s, u);
+@end
+@if relaxation
+    for (i = 0; i < 3; i++) {
+        s->fading[i] = stretch_settled[i] * u;
+    }
+@end
+@if worn
+    s->travelled = STRETCH_WORN_TRAVELLED;
+    s->reached = u;
+    s->direction = 0.0f;
+    u = stretch_worn(s, u);
+@end
+@if bounded
+    u = stretch_bounded(u);
+@end
+@end
+    (void)s;
+    (void)y;
+}
+
+/* The target that would rest at a signal. */
+static STRETCH_APART void stretch_begin(stretch_state *s, float signal)
+{
+    const float to = stretch_inverse(signal);
+    float target = stretch_held(to, STRETCH_LOW, STRETCH_HIGH);
+    int k;
+@if slip
+    float slope;
+@end
+@if worn
+    const float travelled = s->travelled;
+@end
+    /* plays that are wound stand off by a constant; a second look takes what bends */
+    for (k = 0; k < 3; k++) {
+        stretch_settle(s, target);
+        target = stretch_held(target + (to - stretch_drive(s, target)), STRETCH_LOW, STRETCH_HIGH);
+    }
+    stretch_settle(s, target);
+@if worn
+    s->travelled = travelled;
+@end
+    s->target = target;
+    s->rate = 0.0f;
+@if slip
+    s->slipped = STRETCH_SLIP * stretch_wound(target);
+    s->shown = stretch_forward(target, &slope);
+    s->came = s->shown;
+@end
+    s->yy = STRETCH_BEGIN_YY;
+    s->yr = 0.0f;
+    s->rr = STRETCH_BEGIN_RR;
+    s->begun = 1;
+}
+
+/* Keeps target and rate where they can be. */
+STRETCH_INLINE void stretch_hold(stretch_state *s)
+{
+    if (s->target < STRETCH_LOW) {
+        s->target = STRETCH_LOW;
+        s->rate = s->rate > 0.0f ? s->rate : 0.0f;
+    }
+    if (s->target > STRETCH_HIGH) {
+        s->target = STRETCH_HIGH;
+        s->rate = s->rate < 0.0f ? s->rate : 0.0f;
+    }
+}
+
+/* Moves target, rate and covariance on by a sample. */
+STRETCH_INLINE void stretch_predict(stretch_state *s)
+{
+    float across = s->yr + STRETCH_PERIOD_S * s->rr;
+    float grown = s->yy + STRETCH_PERIOD_S * (s->yr + across);
+    s->target = s->target + STRETCH_PERIOD_S * s->rate;
+    s->rate = STRETCH_KEPT * s->rate;
+    across = STRETCH_KEPT * across;
+    /* a variance without end would throw the target from end to end of a flat */
+    if (grown > STRETCH_WIDEST) {
+        const float share = STRETCH_WIDEST / grown;
+        grown = share * grown;
+        across = share * across;
+    }
+    s->yy = grown;
+    s->yr = across;
+    s->rr = STRETCH_KEPT_TWICE * s->rr + STRETCH_WANDER;
+    stretch_hold(s);
+}
+
+@if slip
+/* The muscle is ahead of its sleeve where that last moved to; while it stands, anywhere inside. */
+STRETCH_INLINE void stretch_turn(stretch_state *s)
+{
+    const float toward = s->slipped < 0.0f ? -1.0f : 1.0f;
+    const float back = toward * (s->came - s->shown);
+    if (back <= 0.0f) {
+        s->came = s->shown;
+        s->slipped = toward * STRETCH_SLIP;
+        s->hidden = 0.0f;
+    } else if (back > STRETCH_SURE) {
+        s->came = s->shown;
+        s->slipped = -toward * STRETCH_SLIP;
+        s->hidden = 0.0f;
+    } else {
+        s->came = s->came + STRETCH_HIDING * (s->shown - s->came);
+        s->hidden = s->hidden + STRETCH_HIDING * (STRETCH_HIDEOUT - s->hidden);
+    }
+}
+
+@end
+/* Takes in a signed signal above its baseline; whether it lay on the curve. */
+STRETCH_INLINE int stretch_correct(stretch_state *s, float signal)
+{
+    const float first = stretch_curve[0], last = stretch_curve[STRETCH_KNOTS - 1];
+    const float span = last - first;
+    const float here = s->target;
+    const float drive = stretch_drive(s, here);
+    float tangent;
+    const float predicted = stretch_forward(drive, &tangent);
+    /* a spike counts as a signal one whole curve away, no more */
+    const float felt = stretch_held(signal, first - span, last + span);
+    const int on_curve = felt >= first && felt <= last;
+    const float run = stretch_inverse(felt) - drive, surprise = felt - predicted;
+    const int far = (run < 0.0f ? -run : run) > STRETCH_LEAST_RUN;
+    /* the slope of the drive, as a secant to where the target would have to be */
+    const float probe = far ? run : run < 0.0f ? -STRETCH_LEAST_RUN : STRETCH_LEAST_RUN;
+    const float asked = (stretch_drive(s, here + probe) - drive) / probe;
+    const float answer = asked > STRETCH_LEAST_ANSWER ? asked : STRETCH_LEAST_ANSWER;
+    /* and of the curve, so that a flat end of it cannot throw the estimate */
+    const float secant = far ? surprise / run : tangent;
+    const float slope = answer * (secant > tangent ? secant : tangent);
+    const float by_y = slope * s->yy, by_r = slope * s->yr;
+    const float share = 1.0f / (slope * by_y + STRETCH_NOISE);
+    const float gain_y = by_y * share, gain_r = by_r * share;
+    s->target = here + gain_y * surprise;
+    s->rate = s->rate + gain_r * surprise;
+    s->yy = s->yy - gain_y * by_y;
+    s->yr = s->yr - gain_y * by_r;
+    s->rr = s->rr - gain_r * by_r;
+    stretch_hold(s);
+@if slip
+    {
+        /* the signal of a gauge that remembers nothing */
+        const float shown = stretch_forward(here, &tangent) + surprise;
+        s->shown = s->shown + STRETCH_SMOOTH * (shown - s->shown);
+        stretch_turn(s);
+    }
+@end
+@if remembers
+    stretch_follow(s);
+@end
+    return on_curve;
+}
+
+@if rest
+/* The signal above the baseline, which is moved on. */
+STRETCH_INLINE float stretch_above_rest(stretch_state *s, float signal)
+{
+    float shift = 0.0f, slope, excess, wanted, before;
+    if (s->begun) {
+        shift = stretch_forward(stretch_drive(s, STRETCH_LOW), &slope) - STRETCH_AT_REST;
+    }
+    excess = signal - s->baseline - (STRETCH_REST_LEVEL + shift);
+    excess = stretch_held(excess, -STRETCH_REST_MOST, STRETCH_REST_MOST);
+    s->excess = s->excess + STRETCH_REST_AVERAGE * (excess - s->excess);
+    wanted = s->excess < 0.0f ? STRETCH_REST_PULL * s->excess : STRETCH_REST_LEAK;
+    before = s->baseline;
+    s->baseline = stretch_held(before + wanted, -STRETCH_REST_FURTHEST, STRETCH_REST_FURTHEST);
+    s->excess = s->excess - (s->baseline - before);
+    return signal - s->baseline;
+}
+
+@end
+static STRETCH_APART void stretch_missed(stretch_state *s)
+{
+    if (s->missing < STRETCH_MAX_BRIDGED && s->begun) {
+        /* by the motion that it predicts */
+        s->missing = (uint8_t)(s->missing + 1u);
+        stretch_predict(s);
+@if remembers
+        stretch_follow(s);
+@end
+        return;
+    }
+    stretch_forget(s);
+    s->missing = STRETCH_MAX_BRIDGED;
+}
+
+/* A sample that did not come. */
+static STRETCH_APART stretch_reading stretch_lost(stretch_state *s)
+{
+    stretch_missed(s);
+    return stretch_answer(STRETCH_MISSING, s->branch, STRETCH_INSIDE, 0.0f, 0.0f);
+}
+
+/* A sample in the signal's unit; NaN, or STRETCH_NO_VOLTS, is one that did not come. */
+static STRETCH_APART stretch_reading stretch_step(stretch_state *s, float volts)
+{
+    stretch_reading reading;
+    float signal, target, variance;
+    uint8_t domain;
+    if (!stretch_usable(volts)) {
+        return stretch_lost(s);
+    }
+    s->missing = 0;
+    signal = STRETCH_SIGN * volts;
+@if rest
+    signal = stretch_above_rest(s, signal);
+@end
+    if (s->begun) {
+        stretch_predict(s);
+    } else {
+        stretch_begin(s, signal);
+    }
+    domain = stretch_correct(s, signal) ? STRETCH_INSIDE : STRETCH_SIGNAL_CLAMPED;
+    if (s->rate > STRETCH_DEAD_BAND) {
+        s->branch = STRETCH_INFLATION;
+    } else if (s->rate < -STRETCH_DEAD_BAND) {
+        s->branch = STRETCH_DEFLATION;
+    }
+    target = s->target;
+    variance = s->yy;
+@if slip
+    target = target + s->slipped;
+    variance = s->hidden + variance;
+@end
+@if skew
+    target = target + STRETCH_AHEAD_S * s->rate;
+    variance = variance + STRETCH_AHEAD_S * (s->yr + s->yr + STRETCH_AHEAD_S * s->rr);
+@end
+    target = stretch_held(target, STRETCH_LOW, STRETCH_HIGH);
+    reading = stretch_answer(STRETCH_OK, s->branch, domain, STRETCH_ZERO + STRETCH_GAIN * target,
+                             STRETCH_GAIN * s->rate);
+    reading.sd = STRETCH_SPREAD * STRETCH_SQRT(variance > 0.0f ? variance : 0.0f);
+    /* numbers beyond all bounds: the next sample begins anew */
+    s->begun = stretch_usable(s->target) ? 1 : 0;
+    return reading;
+}

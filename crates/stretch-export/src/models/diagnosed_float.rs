@@ -1,0 +1,147 @@
+//! `diagnosed` and `diagnosed+rest` in `float`.
+
+use stretch_core::{Calibration, RestLevel};
+use stretch_filter::FilterError;
+use stretch_receptor::{
+    Defects, DiagnosedReceptor,
+    numbers::{Bound, Diagnosed, LEAST_ANSWER, LEAST_RUN, SMOOTH},
+};
+
+use crate::{ExportError, constants::Constants, part::Part};
+
+/// The constants and the step of a gauge with named defects: of those that it has.
+pub(crate) fn diagnosed_float(calibration: &Calibration) -> Result<Part, ExportError> {
+    let receptor = DiagnosedReceptor::<f32>::new(calibration).map_err(FilterError::from)?;
+    let model = receptor.model();
+    let mut constants = Constants::default();
+    filter(&mut constants, model);
+    let mut has = vec!["sd"];
+    defects(&mut constants, &mut has, &model.defects);
+    if model.slip > 0.0 {
+        has.push("slip");
+        constants
+            .define("SLIP", model.slip, "half-width of the sleeve's slip")
+            .define("SMOOTH", SMOOTH as f32, "share of a sample in what the signal shows")
+            .define("SURE", model.sure, "by how much the sleeve must have come back")
+            .define("HIDEOUT", model.hideout, "variance of a target anywhere in it")
+            .define("HIDING", model.hiding, "the share of it that a sample adds");
+    }
+    if has.contains(&"slip") || has.contains(&"hysteresis") {
+        has.push("wound");
+        let [wound, slope] = model.defects.wound;
+        constants
+            .define("WOUND", wound, "how plays stand at a target of 0 where a stream begins")
+            .define("WOUND_SLOPE", slope, "and how that grows with the target");
+    }
+    if model.ahead_s != 0.0 {
+        has.push("skew");
+        constants.define("AHEAD_S", model.ahead_s, "by which the estimate is ahead of the signal");
+    }
+    if model.rest.follows() {
+        has.push("rest");
+        let RestLevel { level, pull, leak, average, furthest, most } = model.rest;
+        constants
+            .define("AT_REST", model.at_rest, "the signal where the target rests, memory settled")
+            .define("REST_LEVEL", level, "the resting signal")
+            .define("REST_PULL", pull, "the share of an excess below rest that is taken up")
+            .define("REST_LEAK", leak, "what the baseline rises by otherwise")
+            .define("REST_AVERAGE", average, "share of a sample in the running average")
+            .define("REST_MOST", most, "what an excess counts for at most")
+            .define("REST_FURTHEST", furthest, "the furthest that the baseline goes");
+    }
+    Ok(Part {
+        model: if model.rest.follows() { "diagnosed+rest" } else { "diagnosed" }.into(),
+        constants: constants.into_text(),
+        step: vec![
+            include_str!("../c/float.h"),
+            include_str!("../c/diagnosed_float.h"),
+            include_str!("../c/float_end.h"),
+        ],
+        has,
+    })
+}
+
+/// Curve, filter and output.
+fn filter(constants: &mut Constants, model: &Diagnosed<f32>) {
+    let curve = &model.curve;
+    let span = model.high - model.low;
+    let tenth = 0.1 * span;
+    constants
+        .word("TELLS_SD", 1, "stretch_reading.sd")
+        .define("SIGN", model.sign, "-1 where the signal falls as the target rises")
+        .define("PERIOD_S", model.period_s, "from a sample to the next")
+        .define("KNOTS", curve.knots as i32, "of the curve from drive to signal")
+        .array("float", "curve", &curve.values[..curve.knots])
+        .define("DRIVE_LOW", curve.low, "the drive of the first knot")
+        .define("DRIVE_STEP", curve.step, "from knot to knot")
+        .define("PER_STEP", curve.per_step, "its reciprocal")
+        .define("LEAST_RUN", LEAST_RUN as f32 * curve.step, "the least that a secant is taken over")
+        .define("LEAST_ANSWER", LEAST_ANSWER as f32, "of a drive to a target")
+        .define("KEPT", model.kept, "what a rate keeps of itself in a sample")
+        .define("KEPT_TWICE", model.kept_twice, "the same squared")
+        .define("WANDER", model.wander, "what it wanders, squared")
+        .define("NOISE", model.noise, "variance of the signal around the model")
+        .define("WIDEST", model.widest, "greatest variance of a target")
+        .define("BEGIN_YY", tenth * tenth, "variance of the first target")
+        .define("BEGIN_RR", span * span, "variance of the first rate")
+        .define("LOW", model.low, "the least target")
+        .define("HIGH", model.high, "the greatest")
+        .define(
+            "DEAD_BAND",
+            model.dead_band,
+            "the largest rate of the target that keeps the branch",
+        )
+        .define("ZERO", model.zero, "the reference at a target of 0")
+        .define("GAIN", model.gain, "the reference per target")
+        .define("SPREAD", model.spread, "the same per standard deviation of the filter");
+}
+
+/// The defects that act at once, and what remembers.
+fn defects(constants: &mut Constants, has: &mut Vec<&'static str>, defects: &Defects<f32>) {
+    let mut knee = |word: &'static str,
+                    name: &str,
+                    group: &'static str,
+                    bound: Option<Bound<f32>>| {
+        let Some(Bound { at, round }) = bound else { return };
+        has.extend(["knee", group, word]);
+        // a ceiling is asked with both signs turned
+        constants.define(name, at, "a bound").define(&format!("{name}_ROUND"), round, "its knee");
+    };
+    knee("slack_low", "SLACK_LOW", "slack", defects.slack_low);
+    knee("slack_high", "SLACK_HIGH", "slack", defects.slack_high);
+    knee("floor", "FLOOR", "bounded", defects.floor);
+    knee("ceiling", "CEILING", "bounded", defects.ceiling);
+    if let Some([pressed, twice, _]) = defects.crosstalk {
+        has.push("crosstalk");
+        constants
+            .word("TAKES_PRESSURE", 1, "by stretch_feel, before a sample")
+            .define("PRESSED", pressed, "drive per pressure")
+            .define("PRESSED_TWICE", twice, "and per its square");
+    }
+    if let Some(plays) = defects.hysteresis {
+        has.extend(["remembers", "hysteresis"]);
+        constants.array("float", "radii", &plays.radii).define(
+            "PLAYED",
+            plays.each,
+            "the share of each play",
+        );
+    }
+    if let Some(lags) = defects.relaxation {
+        has.extend(["remembers", "relaxation"]);
+        constants
+            .define("OWN", lags.own, "what a sample's own drive counts for")
+            .array("float", "kept", &lags.kept)
+            .array("float", "taken", &lags.taken)
+            .array("float", "settled", &lags.settled);
+    }
+    if let Some(worn) = defects.worn {
+        has.extend(["remembers", "worn"]);
+        constants
+            .define("WORN_M", worn.m, "what the gauge loses in the end")
+            .define("WORN_N", worn.n, "the way by which half of it is lost")
+            .define("WORN_ZERO", worn.zero, "the drive at which nothing is lost")
+            .define("WORN_REVERSAL", worn.reversal, "turns smaller than this do not count")
+            .define("WORN_TRAVELLED", worn.travelled, "the way that it had gone before");
+    }
+    // A slow amplifier is predicted over as a skew: the live step has no poles.
+}

@@ -20,6 +20,8 @@ use crate::{
 /// The least a curve rises over its whole length, as a share of the signal's range.
 const LEAST_RISE: f64 = 1e-3;
 const ITERATIONS: usize = 14;
+/// Least slope that an error in signal is divided by, of the mean one: where the curve is flat a target is not told.
+const LEAST_SLOPE: f64 = 0.25;
 /// Rise of the likelihood's square below which a fit has ended, as a share.
 const ENDED: f64 = 1e-4;
 /// Errors of the model are correlated over as long as this, s.
@@ -36,6 +38,7 @@ const WORTH: f64 = 0.97;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct DiagnosedChoice {
     at: Vec<f64>,
+    errors_in: ErrorsIn,
     rest: Option<RestTracker>,
     agility: f64,
     steady_s: f64,
@@ -54,12 +57,14 @@ pub(crate) fn diagnosed(
     }
     let mut best: Option<(Forward, DiagnosedMap)> = None;
     for rest in trackers {
-        let record = Record::of(prepared, rest)?;
-        let begin = choice.as_ref().map_or_else(|| knobs.clone(), |c| knobs.moved(c.at.clone()));
-        let forward = record.fit(begin)?;
-        let map = match &choice {
-            Some(c) => record.judged(&forward, c.agility, c.steady_s)?,
-            None => record.tuned(&forward)?,
+        let (forward, map) = match &choice {
+            Some(c) => {
+                let record = Record::of(prepared, rest, c.errors_in)?;
+                let forward = record.fit(knobs.moved(c.at.clone()))?;
+                let map = record.judged(&forward, c.agility, c.steady_s)?;
+                (forward, map)
+            }
+            None => refined(prepared, rest, &knobs)?,
         };
         if best.as_ref().is_none_or(|(_, b)| map.fit.rmse < WORTH * b.fit.rmse) {
             best = Some((forward, map));
@@ -74,13 +79,31 @@ pub(crate) fn diagnosed(
         map.agility,
         map.steady_s,
     );
-    let (at, rest) = (forward.knobs.at, forward.rest);
-    let choice = DiagnosedChoice { at, rest, agility: map.agility, steady_s: map.steady_s };
+    let Forward { knobs, rest, errors_in, .. } = forward;
+    let at = knobs.at;
+    let choice =
+        DiagnosedChoice { at, errors_in, rest, agility: map.agility, steady_s: map.steady_s };
     Ok(((Model::Diagnosed(map), vec![report], vec![note]), choice))
+}
+
+/// Fitted to the signal, then for the error of the target, which the slope of the curve weighs otherwise; the one that errs less live.
+fn refined(
+    prepared: &Prepared,
+    rest: Option<RestTracker>,
+    knobs: &Knobs,
+) -> Result<(Forward, DiagnosedMap), CalibrateError> {
+    let record = Record::of(prepared, rest, ErrorsIn::Signal)?;
+    let forward = record.fit(knobs.clone())?;
+    let map = record.tuned(&forward)?;
+    let record = Record { errors_in: ErrorsIn::Target, ..record };
+    let fine = record.fit(forward.knobs.clone())?;
+    let fine_map = record.tuned(&fine)?;
+    Ok(if fine_map.fit.rmse < map.fit.rmse { (fine, fine_map) } else { (forward, map) })
 }
 
 /// What a fit determined.
 struct Forward {
+    errors_in: ErrorsIn,
     knobs: Knobs,
     rest: Option<RestTracker>,
     /// Signed, rising.
@@ -116,10 +139,20 @@ fn report(forward: &Forward, map: &DiagnosedMap) -> FitReport {
     FitReport::of_model(kind, &map.fit, sse, 1.0, coefficients, order)
 }
 
+/// What a fit makes small.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum ErrorsIn {
+    /// What the model leaves of the signal.
+    Signal,
+    /// What that would be of the target, by the curve's slope.
+    Target,
+}
+
 /// The trials as a forward fit sees them.
 struct Record<'a> {
     prepared: &'a Prepared,
     rest: Option<RestTracker>,
+    errors_in: ErrorsIn,
     pieces: Vec<Piece>,
     period_s: f64,
     least_step: f64,
@@ -131,6 +164,8 @@ struct Seen {
     domain: Interval,
     residuals: Vec<f64>,
     square: f64,
+    /// The same in signal, whatever errors are counted in.
+    volts: f64,
     wound: [f64; 2],
     travelled: f64,
 }
@@ -152,12 +187,16 @@ fn inner(mut all: Vec<f64>) -> Option<Interval> {
 }
 
 impl<'a> Record<'a> {
-    fn of(prepared: &'a Prepared, rest: Option<RestTracker>) -> Result<Self, CalibrateError> {
+    fn of(
+        prepared: &'a Prepared,
+        rest: Option<RestTracker>,
+        errors_in: ErrorsIn,
+    ) -> Result<Self, CalibrateError> {
         let pieces = pieces(prepared, rest)?;
         let range = crate::series::extent(pieces.iter().flat_map(|p| p.signal.iter().copied()));
         let least_step = LEAST_RISE * (range.max - range.min) / (KNOTS - 1) as f64;
         let period_s = prepared.sample_rate.period_s();
-        Ok(Self { prepared, rest, pieces, period_s, least_step })
+        Ok(Self { prepared, rest, errors_in, pieces, period_s, least_step })
     }
 
     /// Pairs of drive and signal, the drive of so long before as the skew says.
@@ -218,10 +257,22 @@ impl<'a> Record<'a> {
         }
         let solution = rows.factor().solve(|_, power| 1e-12 * (1.0 + power))?;
         let curve = rising(&solution.weights, self.least_step);
-        let left = |(drive, signal): &(f64, f64)| signal - Place::new(*drive, domain).on(&curve);
+        let mean_slope = (curve[KNOTS - 1] - curve[0]) / (domain.max - domain.min);
+        let mut volts = 0.0;
+        let left = |(drive, signal): &(f64, f64)| {
+            let place = Place::new(*drive, domain);
+            let left = signal - place.on(&curve);
+            volts += left * left;
+            match self.errors_in {
+                ErrorsIn::Signal => left,
+                ErrorsIn::Target => {
+                    left / place.slope(&curve, domain).max(LEAST_SLOPE * mean_slope)
+                }
+            }
+        };
         let residuals: Vec<f64> = pairs.iter().map(left).collect();
         let square = residuals.iter().map(|r| r * r).sum::<f64>();
-        Some(Seen { curve, domain, residuals, square, wound, travelled })
+        Some(Seen { curve, domain, residuals, square, volts, wound, travelled })
     }
 
     /// Levenberg and Marquardt over the numbers of the defects, the curve solved for at each.
@@ -278,13 +329,24 @@ impl<'a> Record<'a> {
                 break;
             }
         }
-        let noise = self.mean(&seen).sqrt();
-        let errors = self.errors(&normal, noise);
+        let errors = self.errors(&normal, self.mean(&seen).sqrt());
+        let noise = (seen.volts / seen.residuals.len() as f64).sqrt();
         let range = seen.curve[KNOTS - 1] - seen.curve[0];
         // a curve that follows noiseless data exactly still needs a noise to weigh with
         let noise = noise.max(1e-6 * range);
         let Seen { curve, domain, wound, travelled, .. } = seen;
-        Ok(Forward { knobs, rest: self.rest, curve, domain, noise, errors, wound, travelled })
+        let errors_in = self.errors_in;
+        Ok(Forward {
+            errors_in,
+            knobs,
+            rest: self.rest,
+            curve,
+            domain,
+            noise,
+            errors,
+            wound,
+            travelled,
+        })
     }
 
     fn mean(&self, seen: &Seen) -> f64 {

@@ -9,7 +9,7 @@ const LN_2: f64 = core::f64::consts::LN_2;
 
 /// The defects of a [`DiagnosedMap`] in the order in which they act, with their rates folded to one sample.
 ///
-/// What is linear in the target within a sample is [poised](Self::poise) once, so that asking for the drive of several targets
+/// What is linear in the target within a sample is poised once, so that asking for the drive of several targets
 /// costs little more than their plays.
 ///
 /// ```

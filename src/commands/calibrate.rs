@@ -207,7 +207,7 @@ impl Args {
             }
         };
         if let Some(path) = self.from.as_ref().filter(|_| is_asked) {
-            return Causes::read(path);
+            return Causes::read(path, &self.trials);
         }
         match is_asked {
             true => Causes::of(trials, options),

@@ -1,6 +1,6 @@
 //! What a calibration builds on: a diagnosis that was written before, or one of the trials themselves.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use stretch_bench::{GaugeSetup, GaugeSimulator, causes};
@@ -9,7 +9,7 @@ use stretch_data::{SessionTrial, Trial};
 use stretch_gap::{Diagnosis, Options as Diagnosing, diagnose};
 use stretch_sim::Catalogue;
 
-use super::diagnose::spinner;
+use super::diagnose::{name_of, spinner};
 
 /// The newest diagnosis that is read.
 const SCHEMA: u32 = 1;
@@ -36,8 +36,8 @@ impl Causes {
         self
     }
 
-    /// Of a diagnosis that was written.
-    pub(super) fn read(path: &Path) -> anyhow::Result<Self> {
+    /// Of a diagnosis that was written, for some trials.
+    pub(super) fn read(path: &Path, trials: &[PathBuf]) -> anyhow::Result<Self> {
         let name = || path.display().to_string();
         let text = std::fs::read_to_string(path).with_context(name)?;
         let schema: Schema = serde_json::from_str(&text).with_context(|| {
@@ -59,8 +59,18 @@ impl Causes {
                 diagnosis.sentence
             );
         }
-        let of = schema.data_set.map_or(String::new(), |set| format!(", a diagnosis of {set}"));
-        let notes = vec![format!("built on {}{of}: {}", name(), diagnosis.sentence)];
+        let of =
+            schema.data_set.as_ref().map_or(String::new(), |set| format!(", a diagnosis of {set}"));
+        let mut notes = vec![format!("built on {}{of}: {}", name(), diagnosis.sentence)];
+        // Another rig of the same make may lack the same; whose names they are is said.
+        if let ([own], Some(set)) = (trials, &schema.data_set)
+            && name_of(own) != *set
+        {
+            notes.push(format!(
+                "the diagnosis is of {set} and these trials are of {}: where that is another rig, diagnose it, or leave --from out",
+                name_of(own)
+            ));
+        }
         Ok(Self { found, notes })
     }
 

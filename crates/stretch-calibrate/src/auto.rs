@@ -261,7 +261,7 @@ fn without(trials: &[Trial], fold: &Fold) -> Vec<Trial> {
             continue;
         }
         let gap = sample_rate_hz(trial).map_or(0, |hz| (GAP_S * hz) as usize);
-        for span in [0..fold.from.saturating_sub(gap), fold.to + gap..trial.len()] {
+        for span in [0..fold.from.saturating_sub(gap), fold.to.saturating_add(gap)..trial.len()] {
             // a stub is no trial: its estimators would hardly warm up
             if span.len() > 5 * SETTLE {
                 let mut part = trial.clone();

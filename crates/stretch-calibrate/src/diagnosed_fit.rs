@@ -1,8 +1,7 @@
 //! Fits the forward model of what a diagnosis named, then the filter that inverts it.
 
 use stretch_core::{
-    Design, DiagnosedMap, FitSummary, Interval, Model, Provenance, RestTracker, Stage, Values,
-    Volts,
+    Design, DiagnosedMap, Interval, Model, Provenance, RestTracker, Stage, Values, Volts,
 };
 use stretch_operators::{Backlash, Operator};
 use stretch_receptor::{Defects, DiagnosedReceptor};
@@ -11,14 +10,13 @@ use crate::{
     CalibrateError, Coefficient, FitReport, Memory, Order,
     fitting::Fitted,
     knobs::Knobs,
-    observer_curve::{CurveRows, KNOTS, Place},
+    observer_curve::{CurveRows, KNOTS, LEAST_RISE, Place, inner},
     observer_model::{Piece, SETTLE, pieces},
-    prepared::Prepared,
+    prepared::{Prepared, Tally},
+    rest::LIVE_CATCH_UP_S,
     rising::rising,
 };
 
-/// The least a curve rises over its whole length, as a share of the signal's range.
-const LEAST_RISE: f64 = 1e-3;
 const ITERATIONS: usize = 14;
 /// Least slope that an error in signal is divided by, of the mean one: where the curve is flat a target is not told.
 const LEAST_SLOPE: f64 = 0.25;
@@ -29,8 +27,6 @@ const BLOCK_S: f64 = 2.0;
 /// Densities of the rate's wandering that are tried, in 1/s^3, and times in which a rate forgets itself, s.
 const AGILITIES: [f64; 7] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 300.0];
 const STEADY_S: [f64; 3] = [0.15, 0.5, 3.0];
-/// What the filter takes for noise, as multiples of what the forward model leaves.
-const LIVE_CATCH_UP_S: f64 = 0.02;
 /// A further part of the model must lower the error to this share to be kept.
 const WORTH: f64 = 0.97;
 
@@ -154,6 +150,8 @@ struct Record<'a> {
     rest: Option<RestTracker>,
     errors_in: ErrorsIn,
     pieces: Vec<Piece>,
+    /// From the least target to the greatest.
+    targets: Option<Interval>,
     period_s: f64,
     least_step: f64,
 }
@@ -177,15 +175,6 @@ struct Simulated {
     travelled: f64,
 }
 
-/// From the least to the greatest, without the outermost two in ten thousand at either end.
-fn inner(mut all: Vec<f64>) -> Option<Interval> {
-    let edge = all.len() / 5000;
-    let last = all.len().checked_sub(1 + edge)?;
-    let min = *all.select_nth_unstable_by(edge, f64::total_cmp).1;
-    let max = *all.select_nth_unstable_by(last, f64::total_cmp).1;
-    (min < max).then_some(Interval { min, max })
-}
-
 impl<'a> Record<'a> {
     fn of(
         prepared: &'a Prepared,
@@ -196,7 +185,8 @@ impl<'a> Record<'a> {
         let range = crate::series::extent(pieces.iter().flat_map(|p| p.signal.iter().copied()));
         let least_step = LEAST_RISE * (range.max - range.min) / (KNOTS - 1) as f64;
         let period_s = prepared.sample_rate.period_s();
-        Ok(Self { prepared, rest, errors_in, pieces, period_s, least_step })
+        let targets = inner(pieces.iter().flat_map(|p| p.smooth.iter().copied()).collect());
+        Ok(Self { prepared, rest, errors_in, pieces, targets, period_s, least_step })
     }
 
     /// Pairs of drive and signal, the drive of so long before as the skew says.
@@ -289,10 +279,7 @@ impl<'a> Record<'a> {
         let iterations = if count > 0 { ITERATIONS } else { 0 };
         for _ in 0..iterations {
             let columns = self.sensitivities(&knobs, &seen);
-            let n = columns.iter().map(Vec::len).min().unwrap_or(0).min(seen.residuals.len());
-            let dot = |a: &[f64], b: &[f64]| -> f64 {
-                a[..n].iter().zip(&b[..n]).map(|(x, y)| x * y).sum()
-            };
+            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
             normal = nalgebra::DMatrix::from_fn(count, count, |i, j| dot(&columns[i], &columns[j]));
             let mut slope =
                 nalgebra::DVector::from_fn(count, |i, _| dot(&columns[i], &seen.residuals));
@@ -411,8 +398,7 @@ impl<'a> Record<'a> {
         let calibration = prepared.calibration(Model::Diagnosed(map), Provenance::new("", []))?;
         let receptor = DiagnosedReceptor::<f64>::new(&calibration)?;
         let unit = (prepared.target.reference_per_target() * prepared.target_range.span()).abs();
-        let (mut squares, mut sum, mut power, mut count) = (0.0, 0.0, 0.0, 0.0);
-        let mut apart = 0.0;
+        let (mut tally, mut apart) = (Tally::default(), 0.0);
         for series in &prepared.series {
             let mut memory = receptor.memory();
             for (i, (&v, &target)) in series.signal.iter().zip(&series.target).enumerate() {
@@ -426,21 +412,12 @@ impl<'a> Record<'a> {
                 let truth = prepared.target_range.normalise(target);
                 let estimate = prepared.target.from_reference(reading.estimate);
                 let error = truth - prepared.target_range.normalise(estimate);
-                squares += error * error;
+                tally.take(truth, error);
                 apart += reading.sd.map_or(0.0, |sd| (error * unit / sd.max(1e-12)).powi(2));
-                sum += truth;
-                power += truth * truth;
-                count += 1.0;
             }
         }
-        let total = (power - sum * sum / f64::max(count, 1.0)).max(f64::MIN_POSITIVE);
-        let fit = FitSummary {
-            samples: count as u64,
-            r_squared: 1.0 - squares / total,
-            rmse: (squares / f64::max(count, 1.0)).sqrt(),
-        };
-        let spread = f64::max(apart / f64::max(count, 1.0), 1e-12).sqrt();
-        Ok(DiagnosedMap { fit, spread, ..map })
+        let spread = f64::max(apart / f64::max(tally.count(), 1.0), 1e-12).sqrt();
+        Ok(DiagnosedMap { fit: tally.summary(), spread, ..map })
     }
 
     fn map(
@@ -452,13 +429,12 @@ impl<'a> Record<'a> {
         let prepared = self.prepared;
         let sign = prepared.polarity.sign();
         let curve: Vec<f64> = forward.curve.iter().map(|v| sign * v).collect();
-        let targets = self.pieces.iter().flat_map(|p| p.smooth.iter().copied());
-        let estimate_domain = inner(targets.collect()).unwrap_or(forward.domain);
+        let estimate_domain = self.targets.unwrap_or(forward.domain);
         let map = forward.knobs.map();
         // the fitted curve knows where rest is, noise averaged out
-        let mut still = Defects::<f64>::new(&map, self.period_s).begin(estimate_domain.min, 0.0);
-        let at_rest =
-            Defects::<f64>::new(&map, self.period_s).advance(&mut still, estimate_domain.min, 0.0);
+        let defects = Defects::<f64>::new(&map, self.period_s);
+        let mut still = defects.begin(estimate_domain.min, 0.0);
+        let at_rest = defects.advance(&mut still, estimate_domain.min, 0.0);
         let level = Place::new(at_rest, forward.domain).on(&curve);
         let rest =
             forward.rest.map(|rest| RestTracker { level, catch_up_s: LIVE_CATCH_UP_S, ..rest });

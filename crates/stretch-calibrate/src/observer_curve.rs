@@ -9,6 +9,18 @@ pub(crate) const KNOTS: usize = 25;
 /// Weight of the curve's second differences against a sample's residual.
 const BEND: f64 = 1e-3;
 
+/// The least a curve rises over its whole length, as a share of the signal's range.
+pub(crate) const LEAST_RISE: f64 = 1e-3;
+
+/// From the least to the greatest, without the outermost two in ten thousand at either end; none where they are one.
+pub(crate) fn inner(mut all: Vec<f64>) -> Option<Interval> {
+    let edge = all.len() / 5000;
+    let last = all.len().checked_sub(1 + edge)?;
+    let min = *all.select_nth_unstable_by(edge, f64::total_cmp).1;
+    let max = *all.select_nth_unstable_by(last, f64::total_cmp).1;
+    (min < max).then_some(Interval { min, max })
+}
+
 /// A drive's place on the curve.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Place {

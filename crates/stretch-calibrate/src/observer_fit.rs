@@ -10,16 +10,15 @@ use crate::{
     CalibrateError, Coefficient, FitReport, Memory, Order,
     fitting::Fitted,
     observer_bounds::bounds,
-    observer_curve::{CurveRows, KNOTS, Place},
+    observer_curve::{CurveRows, KNOTS, LEAST_RISE, Place, inner},
     observer_model::{Forward, ObserverChoice, Piece, SETTLE, Sample, pieces},
-    prepared::Prepared,
+    prepared::{Prepared, Tally},
+    rest::LIVE_CATCH_UP_S,
     rising::rising,
 };
 
 /// Ridge on the dynamic parameters, as a share of each one's own power.
 const RIDGE: f64 = 1e-4;
-/// The least a curve rises over its whole length, as a share of the signal's range.
-const LEAST_RISE: f64 = 1e-3;
 const ITERATIONS: usize = 12;
 /// Densities of the rate's wandering that are tried, in 1/s^3.
 const AGILITIES: [f64; 8] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 300.0, 3000.0];
@@ -27,8 +26,6 @@ const AGILITIES: [f64; 8] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 300.0, 3000.0];
 const TAUS: [f64; 7] = [0.03, 0.08, 0.2, 0.4, 0.8, 1.6, 4.0];
 /// A further part of the model must lower the spread around it to this share to be kept.
 const WORTH: f64 = 0.97;
-/// How fast a live baseline gives way, in seconds: its level is exact, so at once.
-const LIVE_CATCH_UP_S: f64 = 0.02;
 
 /// Fits an observer; with `rest` the baseline is followed. A `choice` made
 /// before on more data is kept.
@@ -221,16 +218,8 @@ fn forward(
 
 /// The drives that occur, without the outermost five in ten thousand.
 fn drives(samples: &[Sample], dynamics: &[f64]) -> Result<Interval, CalibrateError> {
-    let mut all: Vec<f64> = samples.iter().map(|s| s.drive(dynamics)).collect();
-    let edge = all.len() / 5000;
-    let last = all.len() - 1 - edge;
-    let min = *all.select_nth_unstable_by(edge, f64::total_cmp).1;
-    let max = *all.select_nth_unstable_by(last, f64::total_cmp).1;
-    if min < max {
-        Ok(Interval { min, max })
-    } else {
-        Err(CalibrateError::Undetermined { model: Memory::Observer.to_string() })
-    }
+    inner(samples.iter().map(|s| s.drive(dynamics)).collect())
+        .ok_or_else(|| CalibrateError::Undetermined { model: Memory::Observer.to_string() })
 }
 
 /// Knots alone, or knots and dynamics linearised about a curve.
@@ -304,7 +293,7 @@ fn judged(prepared: &Prepared, map: ObserverMap) -> Result<ObserverMap, Calibrat
     let calibration = prepared.calibration(Model::Observer(map), Provenance::new("", []))?;
     let design = ObserverReceptor::<f64>::new(&calibration)?;
     let mut receptor = Runner::new(design);
-    let (mut squares, mut sum, mut power, mut count) = (0.0, 0.0, 0.0, 0.0);
+    let mut tally = Tally::default();
     for series in &prepared.series {
         receptor.reset();
         for (i, (&v, &target)) in series.signal.iter().zip(&series.target).enumerate() {
@@ -314,17 +303,8 @@ fn judged(prepared: &Prepared, map: ObserverMap) -> Result<ObserverMap, Calibrat
             }
             let truth = prepared.target_range.normalise(target);
             let estimate = prepared.target.from_reference(reading.estimate);
-            squares += (truth - prepared.target_range.normalise(estimate)).powi(2);
-            sum += truth;
-            power += truth * truth;
-            count += 1.0;
+            tally.take(truth, truth - prepared.target_range.normalise(estimate));
         }
     }
-    let total = (power - sum * sum / f64::max(count, 1.0)).max(f64::MIN_POSITIVE);
-    let fit = FitSummary {
-        samples: count as u64,
-        r_squared: 1.0 - squares / total,
-        rmse: (squares / f64::max(count, 1.0)).sqrt(),
-    };
-    Ok(ObserverMap { fit, ..map })
+    Ok(ObserverMap { fit: tally.summary(), ..map })
 }

@@ -1,8 +1,8 @@
 //! Trials made ready to fit: even in time, with pooled ranges.
 
 use stretch_core::{
-    Calibration, CalibrationSpec, DesignError, Interval, Label, Model, Normalisation, Polarity,
-    Provenance, Range, RangeSpec, RateEstimator, SampleRate, Schema, Target,
+    Calibration, CalibrationSpec, DesignError, FitSummary, Interval, Label, Model, Normalisation,
+    Polarity, Provenance, Range, RangeSpec, RateEstimator, SampleRate, Schema, Target,
 };
 use stretch_data::{EvenSpec, Rows, Trial};
 use stretch_filter::RateFilter;
@@ -140,6 +140,40 @@ impl Prepared {
     pub(crate) fn fold(&self, series: &Series, index: usize, before: usize, total: usize) -> usize {
         let trials = self.series.iter().map(|s| s.trial).max().map_or(0, |last| last + 1);
         if trials >= 3 { series.trial } else { (before + index) * 10 / total.max(1) }
+    }
+}
+
+/// How well estimates of normalised targets were, summed sample by sample.
+#[derive(Default)]
+pub(crate) struct Tally {
+    squares: f64,
+    sum: f64,
+    power: f64,
+    count: f64,
+}
+
+impl Tally {
+    /// Takes in a normalised target and its error.
+    pub(crate) fn take(&mut self, truth: f64, error: f64) {
+        self.squares += error * error;
+        self.sum += truth;
+        self.power += truth * truth;
+        self.count += 1.0;
+    }
+
+    /// How many were taken in.
+    pub(crate) fn count(&self) -> f64 {
+        self.count
+    }
+
+    pub(crate) fn summary(&self) -> FitSummary {
+        let count = f64::max(self.count, 1.0);
+        let total = (self.power - self.sum * self.sum / count).max(f64::MIN_POSITIVE);
+        FitSummary {
+            samples: self.count as u64,
+            r_squared: 1.0 - self.squares / total,
+            rmse: (self.squares / count).sqrt(),
+        }
     }
 }
 

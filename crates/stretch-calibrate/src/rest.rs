@@ -4,6 +4,8 @@ use stretch_core::{Design, Polarity, Range, RestLevel, RestTracker, SampleRate};
 
 use crate::{prepared::Prepared, series::noise};
 
+/// How fast a live baseline of a forward model gives way, in seconds: its level is exact, so at once.
+pub(crate) const LIVE_CATCH_UP_S: f64 = 0.02;
 /// How fast a baseline gives way to a signal below rest, in seconds.
 const CATCH_UP_S: f64 = 0.5;
 /// Leaks that are tried, as shares of the signal's range per second.

@@ -157,11 +157,7 @@ impl<'a> Comparison<'a> {
         let plain = self.runs.run(run)?;
         let mut mean = Misfit { stage, ..Misfit::default() };
         for draw in 0..DRAWS {
-            let mut shaken = self.runs.run(Run { shake: Some(draw), ..run })?;
-            let sds = &self.metrics[stage].floor.sd;
-            for ((x, y), sd) in shaken.iter_mut().zip(&plain).zip(sds) {
-                *x = (*x - y) / sd;
-            }
+            let shaken = self.arrived(Run { shake: Some(draw), ..run }, &plain)?;
             let power = |role| {
                 let parts = self.frame.of_role(role).map(|s| &shaken[s.from..s.to]);
                 let sum: f64 = parts.map(|part| dot(part, part)).sum();
@@ -178,6 +174,16 @@ impl<'a> Comparison<'a> {
         }
         mean.octaves = mean.octaves.scaled(1.0 / DRAWS as f64);
         Ok(mean)
+    }
+
+    /// What one draw of the measured input's noise makes of an output that is `plain` without it, in floors.
+    pub(crate) fn arrived(&self, run: Run<'_>, plain: &[f64]) -> Result<Vec<f64>, GapError> {
+        let mut shaken = self.runs.run(run)?;
+        let sds = &self.metrics[run.stage].floor.sd;
+        for ((x, y), sd) in shaken.iter_mut().zip(plain).zip(sds) {
+            *x = (*x - y) / sd;
+        }
+        Ok(shaken)
     }
 
     /// Sensitivity -dr/dx of the stages to one coordinate, by a one-sided difference; none where it does not act.

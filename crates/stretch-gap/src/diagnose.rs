@@ -159,10 +159,10 @@ fn run(
         VerdictKind::NoGap | VerdictKind::Parameters | VerdictKind::Record => Vec::new(),
         _ => covering_set(&weighed, simulator),
     };
-    let (runtime_s, simulations) = (begun.elapsed().as_secs_f64(), runs.count());
-    let simpler = || baselines(searched, &search.sets.tried, thresholds.null_excess);
     let is_quiet = matches!(verdict.kind, VerdictKind::NoGap | VerdictKind::Parameters);
     let null_band = is_quiet.then(|| null_band(problem, seed)).transpose()?;
+    let (runtime_s, simulations) = (begun.elapsed().as_secs_f64(), runs.count());
+    let simpler = || baselines(searched, &search.sets.tried, thresholds.null_excess);
     // Told.
     let answer = Answer {
         verdict: &verdict,

@@ -35,7 +35,7 @@ pub struct Defects<T> {
     /// The sleeve slips.
     pub slip: Option<Played<T>>,
     /// Of pressure and of its square.
-    pub crosstalk: Option<[T; 3]>,
+    pub crosstalk: Option<[T; 2]>,
     /// The gauge takes another way back.
     pub hysteresis: Option<Played<T>>,
     /// It relaxes or overshoots.
@@ -259,7 +259,7 @@ impl<T: Real> Defects<T> {
             slip: map.slip.map(Played::new),
             crosstalk: map.crosstalk.map(|c| {
                 let per = c.c / c.scale;
-                [per * (1.0 + c.bend), -per * c.bend / c.scale, 0.0].map(T::from_f64)
+                [per * (1.0 + c.bend), -per * c.bend / c.scale].map(T::from_f64)
             }),
             hysteresis: map.hysteresis.map(Played::new),
             relaxation: map.relaxation.map(|fading| Relaxing::new(fading, period_s)),
@@ -368,7 +368,7 @@ impl<T: Real> Defects<T> {
 
     #[inline(always)]
     fn pressed(&self, pressure: T) -> T {
-        self.crosstalk.map_or(T::zero(), |[a, b, _]| pressure * (a + b * pressure))
+        self.crosstalk.map_or(T::zero(), |[a, b]| pressure * (a + b * pressure))
     }
 
     /// What a sleeve that may go slack has of a target.

@@ -111,7 +111,7 @@ fn defects(constants: &mut Constants, has: &mut Vec<&'static str>, defects: &Def
     knee("slack_high", "SLACK_HIGH", "slack", defects.slack_high);
     knee("floor", "FLOOR", "bounded", defects.floor);
     knee("ceiling", "CEILING", "bounded", defects.ceiling);
-    if let Some([pressed, twice, _]) = defects.crosstalk {
+    if let Some([pressed, twice]) = defects.crosstalk {
         has.push("crosstalk");
         constants
             .word("TAKES_PRESSURE", 1, "by stretch_feel, before a sample")

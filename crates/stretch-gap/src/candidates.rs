@@ -11,7 +11,7 @@ use crate::{
     bootstrap::closed_interval,
     diagnosis::{Candidate, EffectValue, Excess, ParameterShift, StageGap},
     error::GapError,
-    evidence::{Evidence, StageEvidence, Traces},
+    evidence::{Evidence, StageEvidence},
     hypothesis::Hypothesis,
     probability::Weighed,
     problem::Problem,
@@ -42,7 +42,7 @@ fn candidate(
     seed: u64,
 ) -> Result<Candidate, GapError> {
     let stages = 0..evidence.stages.len();
-    let blocks = stages.map(|s| Ok(Traces::of(problem, s, &hypothesis.model)?.blocks));
+    let blocks = stages.map(|s| evidence.blocks(problem, s, &hypothesis.model));
     let blocks: Result<Vec<Vec<f64>>, GapError> = blocks.collect();
     let interval = closed_interval(&evidence.nominal_blocks, &blocks?, seed);
     let parameters = effect_values(problem.simulator(), hypothesis);
@@ -134,8 +134,8 @@ pub(crate) fn stage_gaps(problem: &Problem<'_>, evidence: &Evidence) -> Vec<Stag
             raw: s.excess_raw,
             excess: s.excess_retuned,
             after: s.excess_after,
-            rms: (1.0 + s.excess_retuned).max(0.0).sqrt() * floor.rms,
-            floor: floor.rms,
+            rms: (1.0 + s.excess_retuned).max(0.0).sqrt() * s.floor,
+            floor: s.floor,
             floor_source: floor.source.clone(),
             unit: spec.unit.clone(),
         }

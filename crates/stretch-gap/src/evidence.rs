@@ -1,4 +1,7 @@
 //! The evidence: every trial before and after, test trials included, which nothing has read until here.
+//!
+//! A floor is what no model could remove. Where the best set leaves X < 1 of one over the samples that were looked at, the floor was taken
+//! too high: its square is X of what it was, and excesses count from there.
 
 use crate::{
     diagnosis::Excess,
@@ -8,7 +11,7 @@ use crate::{
     linear::dot,
     probability::{Weighed, weigh},
     problem::Problem,
-    score::{excess, mean_square},
+    score::{self, excess, mean_square},
     search::Found,
     simulator::Model,
     thresholds::Thresholds,
@@ -58,6 +61,8 @@ pub struct Evidence {
     pub(crate) best_sd: Vec<f64>,
     /// Reduced chi-square of the re-tuned nominal, by stage and test block.
     pub(crate) nominal_blocks: Vec<Vec<f64>>,
+    /// Square of the floor by stage, as a share of what it was taken for: see the module's head.
+    levels: Vec<f64>,
     /// The strongest effect of the best set.
     pub(crate) best_effect: Option<usize>,
     /// How large the gap is.
@@ -65,14 +70,20 @@ pub struct Evidence {
 }
 
 /// Output of a model over the whole session, its clean residual, and its reduced chi-square by test block.
-pub(crate) struct Traces {
+struct Traces {
     output: Vec<f64>,
     residual: Vec<f64>,
-    pub(crate) blocks: Vec<f64>,
+    blocks: Vec<f64>,
 }
 
 impl Traces {
-    pub(crate) fn of(problem: &Problem<'_>, stage: usize, model: &Model) -> Result<Self, GapError> {
+    /// `level` is the square of the floor as a share of what it was taken for.
+    fn of(
+        problem: &Problem<'_>,
+        stage: usize,
+        model: &Model,
+        level: f64,
+    ) -> Result<Self, GapError> {
         let compare = &problem.compare;
         let simulator = problem.simulator();
         let output = compare.runs.output(stage, model, simulator.trials().len())?;
@@ -89,7 +100,8 @@ impl Traces {
                 line.level(&mut whole[tested.clone()], floor, simulator.dt_s());
             }
         }
-        let blocks = test_blocks(&compare.frame, &whole, &residual);
+        let mut blocks = test_blocks(&compare.frame, &whole, &residual);
+        blocks.iter_mut().for_each(|x| *x /= level);
         Ok(Self { output, residual, blocks })
     }
 }
@@ -114,24 +126,27 @@ impl Evidence {
     ) -> Result<(Self, Vec<Weighed>), GapError> {
         let mut stages = Vec::new();
         let mut nominal_blocks = Vec::new();
+        let all = 0..problem.compare.metrics.len();
+        let levels: Vec<f64> = all.map(|stage| level(problem, &found.best, stage)).collect();
         for (stage, metric) in problem.compare.metrics.iter().enumerate() {
-            let raw = Traces::of(problem, stage, &problem.shipped)?;
-            let retuned = Traces::of(problem, stage, &problem.nominal.model)?;
-            let after = Traces::of(problem, stage, &found.best.model)?;
+            let traces = |model| Traces::of(problem, stage, model, levels[stage]);
+            let raw = traces(&problem.shipped)?;
+            let retuned = traces(&problem.nominal.model)?;
+            let after = traces(&found.best.model)?;
             stages.push(StageEvidence {
                 raw: raw.output,
                 retuned: retuned.output,
                 after: after.output,
                 residual_retuned: retuned.residual,
                 residual_after: after.residual,
-                floor: metric.floor.rms,
+                floor: levels[stage].sqrt() * metric.floor.rms,
                 excess_raw: excess(mean_square(&raw.blocks)),
                 excess_retuned: excess(mean_square(&retuned.blocks)),
                 excess_after: excess(mean_square(&after.blocks)),
             });
             nominal_blocks.push(retuned.blocks);
         }
-        let gap = gap(problem, &found.best, &stages);
+        let gap = gap(problem, &found.best, &stages, &levels);
         let weighed = weigh(thresholds, &found.best, gap, &found.rivals);
         let evidence = Self {
             stages,
@@ -143,20 +158,50 @@ impl Evidence {
             candidate_sds: weighed.iter().map(|w| w.hypothesis.parameter_sd.clone()).collect(),
             best_sd: found.best.parameter_sd.clone(),
             nominal_blocks,
+            levels,
             best_effect: found.best.effects.first().copied(),
             gap,
         };
         Ok((evidence, weighed))
     }
+
+    /// Reduced chi-square of a model by test block of a stage.
+    pub(crate) fn blocks(
+        &self,
+        problem: &Problem<'_>,
+        stage: usize,
+        model: &Model,
+    ) -> Result<Vec<f64>, GapError> {
+        Ok(Traces::of(problem, stage, model, self.levels[stage])?.blocks)
+    }
+}
+
+/// Square of a stage's floor as a share of what it was taken for. Without an effect there nothing says that it was too high.
+fn level(problem: &Problem<'_>, best: &Hypothesis, stage: usize) -> f64 {
+    let effects = problem.simulator().effects();
+    let mut acting = best.effects.iter();
+    match acting.any(|e| effects[*e].touches.contains(&stage)) {
+        true => problem.compare.mean_square(&best.misfits[stage]).clamp(f64::MIN_POSITIVE, 1.0),
+        false => 1.0,
+    }
 }
 
 /// Of the fitted and the test trials the greater: a gap that only one of them shows is a gap.
-fn gap(problem: &Problem<'_>, best: &Hypothesis, stages: &[StageEvidence]) -> Excess {
+fn gap(
+    problem: &Problem<'_>,
+    best: &Hypothesis,
+    stages: &[StageEvidence],
+    levels: &[f64],
+) -> Excess {
     let tested =
         |of: fn(&StageEvidence) -> f64| -> f64 { stages.iter().map(|s| of(s).max(0.0)).sum() };
+    let fitted = |h: &Hypothesis| -> f64 {
+        let pairs = h.misfits.iter().zip(levels);
+        pairs.map(|(misfit, level)| score::gap(problem.compare.mean_square(misfit) / level)).sum()
+    };
     Excess {
         raw: tested(|s| s.excess_raw),
-        retuned: problem.gap(&problem.nominal).max(tested(|s| s.excess_retuned)),
-        left: problem.gap(best).max(tested(|s| s.excess_after)),
+        retuned: fitted(&problem.nominal).max(tested(|s| s.excess_retuned)),
+        left: fitted(best).max(tested(|s| s.excess_after)),
     }
 }

@@ -8,7 +8,8 @@
 //! ```
 //!
 //! over the samples that are not tested on (Rasmussen and Williams 2006, section 5.4.1), with lognormal priors p around what the simulator
-//! describes, wide enough for any lab. What else is left in the residual r must not be taken for a nuisance, so s is its spectral level at
+//! describes, wide enough for any lab. Where hypotheses are weighed, a and tau are integrated over, each nuisance beside the others'
+//! greatest: a record that fits at one level alone says less than one that fits at many. What else is left in the residual r must not be taken for a nuisance, so s is its spectral level at
 //! the blocks' rate: the mean square of block means times the samples of a block, the least of all that are tried, and at least the 1 of
 //! the noise alone.
 
@@ -51,9 +52,37 @@ impl Metric {
         (best, gained)
     }
 
+    /// ln of the likelihood beside a floor that is `noise` times as high, a and tau integrated over:
+    ///
+    /// ```text
+    /// ln E = L + sum over nuisances i of ln( sum_k p_k exp(L_k - L) / sum_k p_k )
+    /// ```
+    ///
+    /// where L_k has nuisance i at level k of the grid and the others as they are. It is exact for one nuisance, and as independent
+    /// ones are beyond.
+    pub(crate) fn evidence(&self, frame: &Frame, dt_s: f64, residual: &[f64], noise: f64) -> f64 {
+        let own = self.beside(frame, dt_s, residual, noise);
+        let price: f64 = self.loose().iter().map(|loose| cost(loose, loose.level)).sum();
+        let one = |which: usize| {
+            let loose = &self.loose()[which];
+            let levels: Vec<Level> = hypotheses(loose).collect();
+            if levels.is_empty() {
+                return 0.0;
+            }
+            let fit = |&level: &Level| {
+                let at = self.with(|i, own| if i == which { level } else { own }, frame, dt_s);
+                at.beside(frame, dt_s, residual, noise) - own
+            };
+            let fits: Vec<f64> = levels.par_iter().map(fit).collect();
+            let prior = levels.iter().map(|level| -cost(loose, *level));
+            log_sum_exp(fits) - log_sum_exp(prior) - cost(loose, loose.level)
+        };
+        own + price + (0..self.loose().len()).map(one).sum::<f64>()
+    }
+
     /// L of the module's head beside a floor that is `noise` times as high: V/s has nuisances that much smaller.
-    pub(crate) fn beside(&self, frame: &Frame, dt_s: f64, residual: &[f64], noise: f64) -> f64 {
-        let price: f64 = self.loose().iter().map(cost).sum();
+    fn beside(&self, frame: &Frame, dt_s: f64, residual: &[f64], noise: f64) -> f64 {
+        let price: f64 = self.loose().iter().map(|loose| cost(loose, loose.level)).sum();
         if noise == 1.0 {
             return self.likelihood(frame, residual) - price;
         }
@@ -92,10 +121,16 @@ fn hypotheses(loose: &Loose) -> impl Iterator<Item = Level> {
 }
 
 /// -ln p.
-fn cost(loose: &Loose) -> f64 {
-    let Level { size, time_s } = loose.level;
+fn cost(loose: &Loose, Level { size, time_s }: Level) -> f64 {
     let usual_s = loose.wander.map_or(time_s, |w| w.correlation_s);
     0.5 * (size.ln() / SPREAD.0).powi(2) + 0.5 * ((time_s / usual_s).ln() / SPREAD.1).powi(2)
+}
+
+/// ln sum exp x, of values of any size.
+fn log_sum_exp(values: impl IntoIterator<Item = f64>) -> f64 {
+    let values: Vec<f64> = values.into_iter().collect();
+    let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    most + values.iter().map(|x| (x - most).exp()).sum::<f64>().ln()
 }
 
 #[cfg(test)]
@@ -137,6 +172,20 @@ mod tests {
             assert!((0.4..2.6).contains(&(found_s / time_s)), "{found_s} for {time_s}");
             assert!(gained >= 0.0);
         }
+        // What is integrated over lies below the greatest, and not below what the greatest's own share of the prior leaves of it.
+        let record = residual(1.0, 3.0, &drive);
+        let (best, _) = metric.adapted(&frame, 0.01, &record);
+        let evidence = best.evidence(&frame, 0.01, &record, 1.0);
+        let most = best.likelihood(&frame, &record);
+        let count = (SIZES.len() * TIMES_S.len()) as f64;
+        assert!(evidence < most, "{evidence} {most}");
+        assert!(
+            evidence > most - cost(&best.loose()[0], best.loose()[0].level) - count.ln(),
+            "{evidence} {most}"
+        );
+        // The same integral from any level that it is begun at.
+        let begun = metric.evidence(&frame, 0.01, &record, 1.0);
+        approx::assert_abs_diff_eq!(begun, evidence, epsilon = 1e-6);
         // Noise alone: as little as there is, and nothing gained by a second look.
         let (quiet, _) = metric.adapted(&frame, 0.01, &residual(0.0, 1.0, &drive));
         assert!(quiet.loose()[0].level.size < 0.5);

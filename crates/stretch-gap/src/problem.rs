@@ -179,8 +179,8 @@ impl<'a> Problem<'a> {
         self.loose_stages().map(one).collect()
     }
 
-    /// Log-likelihood of a hypothesis in the stages with loose parameters, their nuisances marginalised, what their sizes and the
-    /// effects cost taken off, nats; `levels` as of [`Problem::levels`].
+    /// Log-likelihood of a hypothesis in the stages with loose parameters, their nuisances marginalised and the sizes of these
+    /// integrated over, what the effects cost taken off, nats; `levels` as of [`Problem::levels`].
     pub(crate) fn likelihood(
         &self,
         hypothesis: &Hypothesis,
@@ -198,7 +198,7 @@ impl<'a> Problem<'a> {
         for (stage, level) in self.loose_stages().zip(levels) {
             let residual = self.compare.residual_values(stage, &hypothesis.model)?;
             let metric = &self.compare.metrics[stage];
-            sum += metric.beside(&self.compare.frame, simulator.dt_s(), &residual, level.sqrt());
+            sum += metric.evidence(&self.compare.frame, simulator.dt_s(), &residual, level.sqrt());
         }
         Ok(sum)
     }

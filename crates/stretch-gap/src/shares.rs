@@ -7,7 +7,7 @@
 use crate::{
     diagnosis::EffectShare,
     error::GapError,
-    evidence::{Evidence, Traces},
+    evidence::Evidence,
     hypothesis::Hypothesis,
     problem::Problem,
     score::{excess, mean_square},
@@ -59,7 +59,7 @@ pub(crate) fn shares(
             // The nominal was run already.
             true => nominal.clone(),
             false => stages
-                .map(|s| Ok(above(s, &Traces::of(problem, s, &less.model)?.blocks)))
+                .map(|s| Ok(above(s, &evidence.blocks(problem, s, &less.model)?)))
                 .collect::<Result<_, GapError>>()?,
         };
         let closed = without.iter().zip(&with).map(|(without, with)| without - with);

@@ -24,6 +24,8 @@ pub(crate) enum Lack {
     Telegraph,
     /// A step at a time of its own in each trial.
     Jumps,
+    /// 0.04 V x (1 - x): the effect that the simulator knows.
+    Curve,
     /// Nothing.
     Nothing,
     /// White noise a third as large as the floor.
@@ -78,6 +80,15 @@ impl Gauge {
             }
         }
         Self { description: description(specs, 1.0), units: [1.0; 2], rod_mm, volts }
+    }
+
+    /// The same with noise taken for so many times what it is.
+    pub(crate) fn with_noise_taken_for(&self, times: f64) -> Self {
+        let mut other = self.clone();
+        let mut spec = (*self.description).clone();
+        spec.stages[0].noise = Some(stretch_gap::Noise::known(times * NOISE_V));
+        other.description = Description::new(spec).expect("a description that holds together");
+        other
     }
 
     /// The same in other units.
@@ -147,6 +158,7 @@ fn extra(lack: Lack, x: &[f64], dice: &mut Dice) -> Vec<f64> {
             }
             0.02 * level
         }
+        Lack::Curve => 0.04 * x[i] * (1.0 - x[i]),
         Lack::Nothing => 0.0,
         Lack::Whisper => NOISE_V / 3.0 * dice.gauss(),
         Lack::White => 0.01 * dice.gauss(),

@@ -2,7 +2,7 @@
 
 use super::{
     grid::{Track, listed},
-    names::clock_of,
+    names::{clock_of, time_rank},
 };
 use crate::{Channel, DataError, ReadOptions, TimeUnit, read_options::TIME};
 
@@ -55,6 +55,7 @@ impl Array {
 struct ClockArray<'a> {
     array: &'a Array,
     of: String,
+    rises: bool,
 }
 
 /// Gives each array to the clock that it runs on.
@@ -64,7 +65,11 @@ pub(super) fn tracks(
     mut notes: Vec<String>,
     options: &ReadOptions,
 ) -> Result<(Vec<Track>, Vec<String>), DataError> {
-    let clocks: Vec<ClockArray<'_>> = arrays.iter().filter_map(|a| clock(a, options)).collect();
+    let mut clocks: Vec<ClockArray<'_>> = arrays.iter().filter_map(|a| clock(a, options)).collect();
+    // One that does not rise is a clock only by its name, and told as one where there is no other.
+    if clocks.iter().any(|clock| clock.rises) {
+        clocks.retain(|clock| clock.rises);
+    }
     let others = arrays.iter().filter(|a| !clocks.iter().any(|c| std::ptr::eq(c.array, *a)));
     if clocks.is_empty() {
         return counted(file, others, notes, options);
@@ -107,7 +112,8 @@ fn clock<'a>(array: &'a Array, options: &ReadOptions) -> Option<ClockArray<'a>> 
         return None;
     };
     let rises = array.values.windows(2).all(|t| t[1] > t[0]);
-    (samples > 1 && rises).then_some(ClockArray { array, of })
+    let is_named = array.name == wanted || last == wanted || time_rank(last).is_some();
+    (samples > 1 && (rises || is_named)).then_some(ClockArray { array, of, rises })
 }
 
 /// The clock of an array: of its length, and by its name the nearest; none where two are as near.

@@ -23,8 +23,11 @@ pub(super) fn time_among(names: &[String], options: &ReadOptions) -> Option<usiz
         .or_else(|| if wanted == TIME { usual() } else { None })
 }
 
-/// A note on a time that counts from 1970 and is counted from its first sample instead.
+/// A note on a time that counts from long ago, or is a time of day, and is counted from its first sample instead.
 pub(super) fn told_epoch(first_s: f64) -> String {
+    if first_s.abs() < EPOCH_S {
+        return "time counts from the first sample".to_owned();
+    }
     format!("time counts from the first sample, {}", date(first_s))
 }
 

@@ -55,9 +55,11 @@ pub(super) fn merged(
     }
     let is_needed =
         |c: &Channel| options.required().contains(&c.name) || KNOWN.contains(&c.name.as_str());
-    if tracks.len() > 1 && tracks.iter().any(|t| t.channels.iter().any(is_needed)) {
+    // Every clock that is taken shortens what all of them cover: those that nobody asks for are not.
+    if tracks.len() > 1 && !options.required().is_empty() {
+        let is_asked = |c: &Channel| options.required().contains(&c.name);
         let (needed, other): (Vec<_>, Vec<_>) =
-            tracks.into_iter().partition(|t| t.channels.iter().any(is_needed));
+            tracks.into_iter().partition(|t| t.channels.iter().any(is_asked));
         tracks = needed;
         if !other.is_empty() {
             let clocks: Vec<&str> = other.iter().map(|t| t.clock.as_str()).collect();
@@ -85,7 +87,7 @@ pub(super) fn merged(
     let timed = timed(file, tracks, &mut notes)?;
     let recording = match &timed[..] {
         [] => {
-            let hint = "no channel of numbers has a clock; export the recording as CSV".to_owned();
+            let hint = format!("no channel of numbers has a clock ({})", notes.join("; "));
             return Err(DataError::NoTime { file: file.to_owned(), hint });
         }
         [_] if options.grid_rate().is_none() => {

@@ -6,7 +6,7 @@ use super::{
     clock::time_among,
     names::{are_units, tidy},
     rows::{BLANKS, cells, is_comment},
-    top::{name_cells, separator, uncommented},
+    top::{is_whole, name_cells, separator, uncommented},
 };
 use crate::{
     DataError, ReadOptions,
@@ -72,9 +72,9 @@ fn named<R: Read>(
 
 /// A header line, by blanks where no other separator parts it.
 fn of_line(file: &str, row: u64, line: &[u8]) -> Result<Header, DataError> {
-    let header = Header::parse(file, row, line)?;
-    if header.names.len() > 1 {
-        return Ok(header);
+    let header = Header::parse(file, row, line);
+    if header.as_ref().is_ok_and(|header| header.names.len() > 1) {
+        return header;
     }
     // Whatever stands in brackets behind a blank is a unit.
     let in_brackets = |cell: &[u8]| cell.starts_with(b"(") || cell.starts_with(b"[");
@@ -84,13 +84,14 @@ fn of_line(file: &str, row: u64, line: &[u8]) -> Result<Header, DataError> {
         Some(cells) if count > 1 => {
             Ok(Header { names: Header::named(file, row, cells)?, delimiter: BLANKS })
         }
-        _ => Ok(header),
+        _ => header,
     }
 }
 
 /// The separator of a row, where it has as many numbers as there are columns.
 pub(crate) fn separator_of(line: &[u8], columns: usize) -> Option<u8> {
-    separator(line).filter(|(_, count)| *count == columns).map(|(delimiter, _)| delimiter)
+    let found = separator(line).filter(|(delimiter, _)| is_whole(line, *delimiter, columns));
+    found.map(|(delimiter, _)| delimiter)
 }
 
 /// Whether a line below the header says units.

@@ -122,6 +122,9 @@ impl Kind {
         let mut letters = text.bytes();
         let (order, letter) = (letters.next().ok_or_else(fail)?, letters.next().ok_or_else(fail)?);
         let rest = text.get(2..).ok_or_else(fail)?;
+        if letter == b'O' {
+            return Err("Python objects are not read; save numbers".to_owned());
+        }
         let (size, unit) = rest.split_once('[').unwrap_or((rest, ""));
         let bytes = size.parse().map_err(|_| fail())?;
         let per_second = match unit.trim_end_matches(']') {
@@ -135,7 +138,6 @@ impl Kind {
             (b'f', 4 | 8) | (b'i' | b'u', 1 | 2 | 4 | 8) | (b'b', 1) | (b'M' | b'm', 8) => {
                 Ok(Self { is_big: order == b'>', letter, bytes, per_second })
             }
-            (b'O', _) => Err("Python objects are not read; save numbers".to_owned()),
             _ => Err(fail()),
         }
     }
@@ -191,8 +193,9 @@ fn parse(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<Vec<Array>, 
         .map(|s| s.parse().map_err(|_| broken()))
         .collect::<Result<_, _>>()?;
     let (fields, item) = fields(descr, name)?;
-    let count = shape.iter().try_fold(1_usize, |n, &m| n.checked_mul(m)).ok_or_else(broken)?;
-    let needed = count.checked_mul(item).ok_or_else(broken)?;
+    let product = shape.iter().try_fold(1_usize, |n, &m| n.checked_mul(m));
+    let count = product.ok_or_else(|| format!("no memory holds its shape {shape:?}"))?;
+    let needed = count.saturating_mul(item);
     let data = bytes.get(data..).filter(|d| d.len() >= needed).ok_or_else(|| {
         format!("it ends before the last of its {count} values; save it again with numpy.save")
     })?;

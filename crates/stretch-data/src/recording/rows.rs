@@ -5,6 +5,8 @@ use std::borrow::Cow;
 use super::stamps::{looks_like_stamp, nanoseconds};
 use crate::row::{Fault, Field, Role, RowFault, field, number, numbers, shown};
 
+/// Longest whole number that is read as floating point: this project writes none longer, and clocks of nanoseconds are.
+const EXACT_DIGITS: usize = 17;
 /// Separator that stands for runs of blanks and tabs.
 pub(crate) const BLANKS: u8 = b' ';
 
@@ -25,6 +27,8 @@ enum Clock {
     Number,
     /// As dates; the first of them, ns.
     Stamps(Option<i128>),
+    /// As whole numbers that 64 bits of floating point cannot hold; the first of them.
+    Counts(Option<i128>),
 }
 
 /// How the rows of a table are written, as far as the rows so far tell.
@@ -53,6 +57,11 @@ impl Dialect {
     /// The first stamp, ns.
     pub(crate) fn first_stamp(&self) -> Option<i128> {
         if let Clock::Stamps(first) = self.clock { first } else { None }
+    }
+
+    /// The first of counts that are too long for a floating-point number; the time counts from it.
+    pub(crate) fn first_count(&self) -> Option<i128> {
+        if let Clock::Counts(first) = self.clock { first } else { None }
     }
 
     /// Whether numbers have decimal commas.
@@ -89,6 +98,9 @@ impl Dialect {
             let is_number = |cell: &[u8]| number(&with_point(cell)).is_ok();
             self.clock = match self.time.and_then(|i| cells.get(i)) {
                 Some(cell) if is_stamp && !is_number(cell) => Clock::Stamps(None),
+                Some(cell) if cell.len() > EXACT_DIGITS && whole(cell).is_some() => {
+                    Clock::Counts(None)
+                }
                 _ => Clock::Number,
             };
         }
@@ -116,10 +128,15 @@ impl Dialect {
             let value = match (role, self.clock) {
                 (Role::Skipped, _) => Ok(f64::NAN),
                 (_, Clock::Stamps(first)) if Some(column) == self.time => self.stamp(cell, first),
+                (_, Clock::Counts(first)) if Some(column) == self.time => self.count(cell, first),
                 _ => self.number(cell),
             };
             out[column] = match value {
                 Ok(value) => value,
+                // Two notations in one file: nobody knows which numbers are which.
+                Err(fault @ Fault::DecimalPoint(_)) => {
+                    return Err(RowFault::Field { column, fault });
+                }
                 Err(_) if role == Role::Welcome => f64::NAN,
                 Err(fault) => return Err(RowFault::Field { column, fault }),
             };
@@ -132,6 +149,13 @@ impl Dialect {
         let first = first.unwrap_or(ns);
         self.clock = Clock::Stamps(Some(first));
         Ok((ns - first) as f64 / 1e9)
+    }
+
+    fn count(&mut self, cell: &[u8], first: Option<i128>) -> Result<f64, Fault> {
+        let count = whole(cell).ok_or_else(|| Fault::NotANumber(shown(cell)))?;
+        let first = first.unwrap_or(count);
+        self.clock = Clock::Counts(Some(first));
+        Ok((count - first) as f64)
     }
 
     fn number(&self, cell: &[u8]) -> Result<f64, Fault> {
@@ -169,12 +193,16 @@ pub(crate) fn cells(line: &[u8], delimiter: u8) -> Option<Vec<Cow<'_, [u8]>>> {
             if at == line.len() {
                 return Some(cells);
             }
-            if line[at] != b'"' {
-                let length = line[at..].iter().take_while(|b| !blank(b)).count();
-                cells.push(Cow::Borrowed(&line[at..at + length]));
-                at += length;
-                continue;
-            }
+            let is_quoted = line[at] == b'"';
+            let length = match is_quoted {
+                true => 2 + memchr::memchr(b'"', &line[at + 1..])?,
+                false => line[at..].iter().take_while(|b| !blank(b)).count(),
+            };
+            let cell = &line[at..at + length];
+            let content = if is_quoted { cell[1..length - 1].trim_ascii() } else { cell };
+            cells.push(Cow::Borrowed(content));
+            at += length;
+            continue;
         }
         let end = match field(line, at, delimiter) {
             Field::Plain(content, end) => {
@@ -210,6 +238,11 @@ fn broken(line: &[u8], delimiter: u8) -> RowFault {
 pub(crate) fn is_value(cell: &[u8], delimiter: u8) -> bool {
     let with_commas = delimiter != b',' && number(&with_point(cell)).is_ok();
     with_commas || number(cell).is_ok() || looks_like_stamp(&text(cell))
+}
+
+/// A whole number, which may be long; not so long that a difference of two is too long.
+fn whole(cell: &[u8]) -> Option<i128> {
+    text(cell).parse().ok().filter(|n: &i128| n.unsigned_abs() < 1 << 100)
 }
 
 fn with_point(cell: &[u8]) -> Cow<'_, [u8]> {

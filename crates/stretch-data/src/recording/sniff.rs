@@ -52,6 +52,12 @@ impl Format {
             _ if head.starts_with(b"\x89MCAP0\r\n") => Self::Mcap,
             _ if head.starts_with(b"PAR1") => Self::Parquet,
             _ if is_mat(head) => Self::Mat,
+            _ if is_page(head) => {
+                Self::Foreign("HTML", "a server answered in place of the file; download it again")
+            }
+            _ if is_json(head) => {
+                Self::Foreign("JSON", "write a row a sample as CSV, or messages as MCAP")
+            }
             _ => foreign.map_or(Self::Text, |(_, what, todo)| Self::Foreign(what, todo)),
         }
     }
@@ -108,6 +114,18 @@ impl Format {
             }
         }
     }
+}
+
+fn is_page(head: &[u8]) -> bool {
+    let start = head.trim_ascii_start();
+    [&b"<!doctype"[..], b"<html"]
+        .iter()
+        .any(|tag| start.get(..tag.len()).is_some_and(|s| s.eq_ignore_ascii_case(tag)))
+}
+
+fn is_json(head: &[u8]) -> bool {
+    matches!(head.trim_ascii_start(), [b'{', rest @ ..] | [b'[', b'{', rest @ ..]
+        if rest.trim_ascii_start().starts_with(b"\""))
 }
 
 /// A MAT file of version 5: its text, or its version and byte order.

@@ -127,6 +127,8 @@ impl<'a> Table<'a> {
         let first = self.values[self.time];
         if self.dialect.has_stamps() {
             self.columns.count_from(0.0, 1.0);
+        } else if let Some(count) = self.dialect.first_count() {
+            self.notes.push(told_epoch(count as f64 / self.divisor));
         } else if (first / self.divisor).abs() >= EPOCH_S {
             self.columns.count_from(first, self.divisor);
             self.notes.push(told_epoch(first / self.divisor));

@@ -61,6 +61,10 @@ impl Top {
             first = separator(line).filter(|&(_, count)| {
                 options.column_names().is_none_or(|names| names.len() == count)
             });
+            // What comes before the first whole row of a stream is the end of another.
+            first = first.filter(|&(delimiter, count)| {
+                options.column_names().is_none() || is_whole(line, delimiter, count)
+            });
         }
         match (options.column_names(), first) {
             (Some(names), first) => Self::given(file, rows, names, first),
@@ -192,13 +196,21 @@ fn texts(cells: &[Vec<u8>]) -> Vec<String> {
     cells.iter().map(|cell| String::from_utf8_lossy(cell).into_owned()).collect()
 }
 
+/// Whether each of so many cells has a number or a stamp in it.
+pub(super) fn is_whole(line: &[u8], delimiter: u8, count: usize) -> bool {
+    let cells = cells(line, delimiter).unwrap_or_default();
+    cells.len() == count && cells.iter().all(|cell| is_value(cell, delimiter))
+}
+
 /// The separator of a row of numbers and how many cells it then has; none where most cells are no numbers.
 pub(super) fn separator(line: &[u8]) -> Option<(u8, usize)> {
     let share = |delimiter: u8| {
         let cells = cells(line, delimiter)?;
         let filled = cells.iter().filter(|cell| !cell.is_empty()).count();
         let values = cells.iter().filter(|cell| is_value(cell, delimiter)).count();
-        let is_row = cells.len() > 1 && values > 0 && 2 * values >= filled;
+        // `Sample rate,100` above a table is no row of it.
+        let begins = cells.first().is_some_and(|cell| is_value(cell, delimiter));
+        let is_row = cells.len() > 1 && (2 * values > filled || (begins && 2 * values >= filled));
         is_row.then_some((delimiter, cells.len(), values as f64 / filled as f64))
     };
     let better = |best: (u8, usize, f64), next: (u8, usize, f64)| {

@@ -17,8 +17,8 @@ pub(crate) struct Recorded {
     #[arg(long, value_enum, value_name = "UNIT")]
     time_unit: Option<Unit>,
     /// Names of the columns where the recording has none: time_s,bridge_v,...
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
-    columns: Option<Vec<String>>,
+    #[arg(long = "columns", value_name = "NAMES", value_delimiter = ',')]
+    named: Option<Vec<String>>,
     /// Samples a second of a recording without any time
     #[arg(long, value_name = "HZ", value_parser = rate)]
     sample_rate: Option<f64>,
@@ -53,7 +53,7 @@ impl Recorded {
                 Unit::Ns => TimeUnit::Nanoseconds,
             });
         }
-        if let Some(names) = &self.columns {
+        if let Some(names) = &self.named {
             options = options.columns(names.iter().map(|name| name.trim()));
         }
         if let Some(rate_hz) = self.sample_rate {

@@ -1,7 +1,7 @@
 //! Names of columns as people write them: units in brackets or in a row of their own, and what may be the time.
 
 /// Names that a time column has elsewhere, the likeliest first.
-const TIMES: [&str; 32] = [
+const TIMES: [&str; 35] = [
     "time_s",
     "time",
     "t",
@@ -32,6 +32,9 @@ const TIMES: [&str; 32] = [
     "datetime",
     "date_time",
     "utc",
+    "zeit",
+    "zeit_s",
+    "zeit_ms",
     "ms",
     "us",
 ];

@@ -113,18 +113,18 @@ impl<'a> Bytes<'a> {
             let unused = 64 - 8 * item.len() as u32;
             (((whole(item) << unused) as i64) >> unused) as f64
         };
-        let (bytes, value): (usize, Box<dyn Fn(&[u8]) -> f64>) = match kind {
-            1 => (1, Box::new(signed)),
-            2 => (1, Box::new(|item| whole(item) as f64)),
-            3 => (2, Box::new(signed)),
-            4 => (2, Box::new(|item| whole(item) as f64)),
-            5 => (4, Box::new(signed)),
-            6 => (4, Box::new(|item| whole(item) as f64)),
-            7 => (4, Box::new(|item| f32::from_bits(whole(item) as u32).into())),
-            9 => (8, Box::new(|item| f64::from_bits(whole(item)))),
-            12 => (8, Box::new(signed)),
-            13 => (8, Box::new(|item| whole(item) as f64)),
+        let bytes = match kind {
+            1 | 2 => 1,
+            3 | 4 => 2,
+            5..=7 => 4,
+            9 | 12 | 13 => 8,
             _ => return None,
+        };
+        let value = |item: &[u8]| match kind {
+            1 | 3 | 5 | 12 => signed(item),
+            7 => f32::from_bits(whole(item) as u32).into(),
+            9 => f64::from_bits(whole(item)),
+            _ => whole(item) as f64,
         };
         Some(data.chunks_exact(bytes).map(value).collect())
     }

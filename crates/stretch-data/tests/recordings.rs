@@ -22,6 +22,14 @@ fn asked() -> ReadOptions {
 }
 
 /// Largest distance to the table's channel.
+#[cfg(any(
+    feature = "gzip",
+    feature = "npz",
+    feature = "mat",
+    feature = "hdf5",
+    feature = "mcap",
+    feature = "parquet"
+))]
 #[track_caller]
 fn off(trial: &Trial, channel: &str) -> f64 {
     let (own, table) = (trial.require(channel).expect("there"), plain());
@@ -30,6 +38,14 @@ fn off(trial: &Trial, channel: &str) -> f64 {
     pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
+#[cfg(any(
+    feature = "gzip",
+    feature = "npz",
+    feature = "mat",
+    feature = "hdf5",
+    feature = "mcap",
+    feature = "parquet"
+))]
 #[track_caller]
 fn is_the_table(trial: &Trial) {
     let late = trial.time_s.iter().zip(plain().time_s).map(|(a, b)| (a - b).abs());

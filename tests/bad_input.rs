@@ -93,7 +93,11 @@ fn a_dash_is_standard_input_and_output_and_never_a_file() {
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         stdout(&output)
     };
-    assert_eq!(piped(&["convert", "-", "--out", "-"]), text);
+    let converted = piped(&["convert", "-", "--out", "-"]);
+    let values = |text: &str| -> Vec<f64> {
+        text.lines().skip(1).flat_map(|l| l.split(',')).map(|x| x.parse().unwrap()).collect()
+    };
+    assert!(values(&converted) == values(&text), "other numbers, or something beside them");
     calibrate(&plain, &scratch.path("cal.json")).assert().success();
     let record = std::fs::read_to_string(scratch.path("cal.json")).unwrap();
     let own = piped(&["calibrate", "-", "--out", "-"]);

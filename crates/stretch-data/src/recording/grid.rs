@@ -1,9 +1,9 @@
 //! Channels on clocks of their own, brought to one grid.
 
 use super::{
-    Recording,
     clock::{EPOCH_S, told_epoch},
     names::tidy,
+    told::Recording,
 };
 use crate::{
     Channel, DataError, Place, ReadOptions, Trial, header::missing_column, read::KNOWN,

@@ -3,9 +3,9 @@
 use std::io::Read;
 
 use super::{
-    Recording,
     clock::{EPOCH_S, time_among, told_epoch},
     rows::{BLANKS, Dialect},
+    told::Recording,
     top::Top,
 };
 use crate::{

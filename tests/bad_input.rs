@@ -59,8 +59,9 @@ fn a_ragged_row() {
 }
 
 #[test]
-fn a_decimal_comma_is_told() {
-    refused("time_s;length_mm;bridge_v\n0;180,5;1\n", &["row 2", "length_mm", "decimal comma"]);
+fn two_notations_in_one_file_are_told() {
+    let text = "time_s;length_mm;bridge_v\n0;180.5;1\n0,01;181,5;1\n";
+    refused(text, &["row 3", "time_s", "decimal comma"]);
 }
 
 #[test]
@@ -70,11 +71,47 @@ fn crlf_bom_and_semicolons_are_understood() {
     let text = std::fs::read_to_string(&plain).unwrap();
     let foreign = format!("\u{feff}{}", text.replace(',', ";").replace('\n', "\r\n"));
     let foreign = scratch.write("foreign.csv", foreign);
-    for (trial, out) in [(&plain, "a.json"), (&foreign, "b.json")] {
+    let german = text.replace(',', ";").replace('.', ",").replace("bridge_v", "Bridge (V)");
+    let german = scratch.write("german.csv", german.replace("time_s", "Zeit [s]"));
+    for (trial, out) in [(&plain, "a.json"), (&foreign, "b.json"), (&german, "c.json")] {
         calibrate(trial, &scratch.path(out)).assert().success();
     }
     let read = |name| std::fs::read_to_string(scratch.path(name)).unwrap();
     assert_eq!(read("a.json"), read("b.json").replace("foreign.csv", "plain.csv"));
+    assert_eq!(read("a.json"), read("c.json").replace("german.csv", "plain.csv"));
+}
+
+#[test]
+fn a_dash_is_standard_input_and_output_and_never_a_file() {
+    let scratch = Scratch::new();
+    let plain = scratch.loops("plain.csv", 20.0, 1.3);
+    let text = std::fs::read_to_string(&plain).unwrap();
+    let piped = |arguments: &[&str]| {
+        let mut command = stretch();
+        command.current_dir(scratch.path("")).args(arguments).write_stdin(text.clone());
+        let output = command.output().expect("the program runs");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        stdout(&output)
+    };
+    let converted = piped(&["convert", "-", "--out", "-"]);
+    let values = |text: &str| -> Vec<f64> {
+        text.lines().skip(1).flat_map(|l| l.split(',')).map(|x| x.parse().unwrap()).collect()
+    };
+    assert!(values(&converted) == values(&text), "other numbers, or something beside them");
+    calibrate(&plain, &scratch.path("cal.json")).assert().success();
+    let record = std::fs::read_to_string(scratch.path("cal.json")).unwrap();
+    let own = piped(&["calibrate", "-", "--out", "-"]);
+    assert_eq!(own.replace("standard input", "plain.csv"), record);
+    let live = piped(&["apply", "--calibration", "cal.json", "-"]);
+    assert_eq!(piped(&["apply", "--calibration", "cal.json", "plain.csv", "--out", "-"]), live);
+    piped(&["evaluate", "--calibration", "cal.json", "-"]);
+    let mut two = stretch();
+    two.current_dir(scratch.path("")).args(["calibrate", "-", "--out", "-", "--report", "-"]);
+    fails(&mut two, &["two files cannot go to standard output"]);
+    let mut folder = stretch();
+    folder.current_dir(scratch.path("")).args(["simulate", "--protocol", "pulses", "--out", "-"]);
+    fails(&mut folder, &["folder", "standard output"]);
+    assert_eq!(scratch.names(), ["cal.json", "plain.csv"], "a file called -");
 }
 
 #[test]

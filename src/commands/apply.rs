@@ -1,16 +1,19 @@
 //! `stretch apply`: a calibration on a trial, or live on standard input.
 
 use std::{
-    io::{self, BufWriter, Read, Write},
+    io::{self, BufRead, BufReader, Read, Write},
     path::PathBuf,
 };
 
 use stretch_calibrate::{Applied, LiveReceptor, apply, pressure_column, read_calibration};
 use stretch_core::{Calibration, Model};
-use stretch_data::{ReadOptions, RowReader, Trial, push_number, write_whole};
+use stretch_data::{ReadOptions, Recording, RowReader, Trial, push_number, write_whole};
 use stretch_receptor::{Reading, Withheld};
 
-use super::stop::RecordedInput;
+use super::{
+    reading::{Recorded, read_recording, told},
+    stop::RecordedInput,
+};
 
 /// Turn a trial's voltage into length, or a stream's as it comes
 ///
@@ -37,19 +40,19 @@ pub(crate) struct Args {
     /// Where the estimates go [default: standard output]
     #[arg(long, value_name = "out.csv")]
     out: Option<PathBuf>,
-    /// Column of the time; its last part may be ms, us or ns
-    #[arg(long, default_value = "time_s", value_name = "COL")]
-    time: String,
+    #[command(flatten)]
+    recorded: Recorded,
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let calibration = read_calibration(&args.calibration)?;
-    let mut options = ReadOptions::new().time(&args.time).require(calibration.signal.as_str());
+    let mut options = args.recorded.options().require(calibration.signal.as_str());
     if let Some(pressure) = pressure_column(&calibration) {
         options = options.require(pressure);
     }
     if args.trial.as_os_str() == "-" {
-        return match &args.out {
+        let path = args.out.as_ref().filter(|path| path.as_os_str() != "-");
+        return match path {
             None => live(&calibration, io::stdin(), &options, &mut io::stdout().lock()),
             Some(path) => {
                 let mut result = Ok(());
@@ -61,16 +64,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             }
         };
     }
-    let trial = Trial::read(&args.trial, &options)?;
+    let trial = read_recording(&args.trial, &options)?;
     let applied = apply(&calibration, &trial)?;
-    match &args.out {
-        Some(path) => write_whole(path, |out| write_all(&calibration, &trial, &applied, out))?,
-        None => {
-            let mut out = BufWriter::new(io::stdout().lock());
-            write_all(&calibration, &trial, &applied, &mut out)?;
-            out.flush()?;
-        }
-    }
+    let out = args.out.as_deref().unwrap_or("-".as_ref());
+    write_whole(out, |out| write_all(&calibration, &trial, &applied, out))?;
+    tell(&trial, &applied);
+    Ok(())
+}
+
+fn tell(trial: &Trial, applied: &Applied) {
     let withheld = applied.readings.iter().filter(|r| r.is_err()).count();
     let faults = applied.faults;
     eprintln!(
@@ -79,7 +81,6 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         faults.missing,
         faults.jittered,
     );
-    Ok(())
 }
 
 /// Answers each line as it comes.
@@ -89,6 +90,15 @@ fn live(
     options: &ReadOptions,
     out: &mut dyn Write,
 ) -> anyhow::Result<()> {
+    let mut input = BufReader::new(input);
+    if !Recording::is_text(input.fill_buf()?) {
+        // Packed rows and arrays come whole.
+        let trial = told(Recording::from_reader(input, "standard input", options)?);
+        let applied = apply(calibration, &trial)?;
+        write_all(calibration, &trial, &applied, out)?;
+        tell(&trial, &applied);
+        return Ok(());
+    }
     let mut receptor = LiveReceptor::new(calibration)?;
     let mut rows = RowReader::new(input, "standard input", options)?;
     out.write_all(header(calibration).as_bytes())?;

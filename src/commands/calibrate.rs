@@ -15,7 +15,10 @@ use stretch_data::{ReadOptions, Split, Trial, write_whole};
 use stretch_receptor::code::Adc;
 
 use super::causes::Causes;
-use super::shared::{read_trials, say, say_json, write_text};
+use super::{
+    reading::{Recorded, read_trials},
+    shared::{give_stdout, say, say_json, write_text},
+};
 use crate::{
     report::{self, Context, Judged},
     table::{maybe, number, table},
@@ -23,8 +26,8 @@ use crate::{
 
 /// Fit a calibration to logged trials
 ///
-/// Each trial is a CSV file with a header line, a time_s column, the signal and
-/// the reference; a folder with a dataset.toml stands for its fit trials. The
+/// Each trial is a recording (CSV in any dialect, NPZ, MAT, ...; docs/recordings.md) with the
+/// time, the signal and the reference, - is standard input; a folder with a dataset.toml stands for its fit trials. The
 /// record that is written holds all that `apply` or a board needs: surfaces,
 /// ranges, rate estimator, dead band, domain, and where it comes from.
 ///
@@ -68,9 +71,8 @@ pub(crate) struct Args {
     /// Column of the signal, several with commas, or `auto`: the best by cross-validation
     #[arg(long, default_value = "bridge_v", value_name = "COL")]
     signal: String,
-    /// Column of the time; its last part may be ms, us or ns
-    #[arg(long, default_value = "time_s", value_name = "COL")]
-    time: String,
+    #[command(flatten)]
+    recorded: Recorded,
     /// Zero of the signal, subtracted before it is divided by its range [default: 1.24 for
     /// bridge_v, else 0]
     #[arg(long, value_name = "X", allow_hyphen_values = true)]
@@ -241,8 +243,9 @@ struct Output<'a> {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+    give_stdout([Some(args.out.as_path()), args.fixed.as_deref(), args.report.as_deref()])?;
     let mut options = args.options();
-    let mut columns = ReadOptions::new().time(&args.time).require(&args.reference);
+    let mut columns = args.recorded.options().require(&args.reference);
     if args.signal != "auto" {
         for signal in args.signal.split(',') {
             columns = columns.require(signal.trim());

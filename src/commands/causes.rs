@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use stretch_bench::{GaugeSetup, GaugeSimulator, causes};
 use stretch_calibrate::{Cause, Options};
-use stretch_data::{SessionTrial, Trial};
+use stretch_data::{SessionTrial, Trial, read_whole};
 use stretch_gap::{Diagnosis, Options as Diagnosing, diagnose};
 use stretch_sim::Catalogue;
 
@@ -39,7 +39,7 @@ impl Causes {
     /// Of a diagnosis that was written, for some trials.
     pub(super) fn read(path: &Path, trials: &[PathBuf]) -> anyhow::Result<Self> {
         let name = || path.display().to_string();
-        let text = std::fs::read_to_string(path).with_context(name)?;
+        let text = String::from_utf8(read_whole(path).with_context(name)?).with_context(name)?;
         let schema: Schema = serde_json::from_str(&text).with_context(|| {
             format!("{}: this is no diagnosis; make one with stretch diagnose --json", name())
         })?;

@@ -3,15 +3,18 @@
 use std::path::PathBuf;
 
 use anyhow::Context;
-use stretch_data::{Channel, ReadOptions, Trial};
+use stretch_data::{Channel, Trial};
 
-use super::shared::say;
+use super::{
+    reading::{Recorded, read_recording},
+    shared::{give_stdout, say},
+};
 
 /// Bring a foreign log into the format of the other commands
 ///
-/// Reads any table with a header (commas, semicolons or tabs), takes the time
-/// from a column of seconds, milliseconds, microseconds or nanoseconds, renames
-/// and scales columns, and writes a trial:
+/// Reads any recording (CSV in any dialect, NPZ, MAT, ...; docs/recordings.md),
+/// takes the time from a column of seconds, milliseconds, microseconds or
+/// nanoseconds, renames and scales columns, and writes a trial:
 ///
 ///   stretch convert log.csv --time t_ms --column length_mm=pos*1000 \
 ///     --column bridge_v=adc*0.000805861-0.2 --out trial.csv
@@ -20,19 +23,18 @@ use super::shared::say;
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
-    /// Log to read
+    /// Log to read, or - for standard input
     #[arg(value_name = "LOG.csv")]
     log: PathBuf,
-    /// Column of the time; its last part may be ms, us or ns
-    #[arg(long, default_value = "time_s", value_name = "COL")]
-    time: String,
+    #[command(flatten)]
+    recorded: Recorded,
     /// Column to write, as NEW=OLD*FACTOR+OFFSET [default: all, as they are]
     #[arg(long = "column", value_name = "NEW=OLD", value_parser = parse_column)]
     columns: Vec<Column>,
     /// Let the time begin at zero
     #[arg(long)]
     from_zero: bool,
-    /// Where the trial goes
+    /// Where the trial goes, - for standard output
     #[arg(long, value_name = "trial.csv")]
     out: PathBuf,
 }
@@ -67,11 +69,12 @@ fn parse_column(text: &str) -> Result<Column, String> {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    let mut options = ReadOptions::new().time(&args.time);
+    give_stdout([Some(args.out.as_path())])?;
+    let mut options = args.recorded.options();
     for column in &args.columns {
         options = options.require(&column.old);
     }
-    let log = Trial::read(&args.log, &options)?;
+    let log = read_recording(&args.log, &options)?;
     let channels = if args.columns.is_empty() {
         log.channels.clone()
     } else {

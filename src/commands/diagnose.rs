@@ -15,7 +15,7 @@ use super::{
     diagnosis_files::{not_read, to_json, write_fix, write_snippets},
     diagnosis_text::text,
     rails::rails,
-    shared::{say, short_name, write_text},
+    shared::{give_stdout, say, short_name, write_text},
 };
 use crate::report::{Subject, diagnosis_page};
 
@@ -41,7 +41,7 @@ use crate::report::{Subject, diagnosis_page};
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
-    /// Folder with dataset.toml, or a trial
+    /// Folder with dataset.toml, or a trial in any format, - for standard input
     #[arg(value_name = "DATASET")]
     data_set: PathBuf,
     /// Rig file: nominal parameters with their tolerances, and effects that it has already
@@ -89,7 +89,11 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    ensure!(args.data_set.exists(), "{}: there is no such file or folder", args.data_set.display());
+    let is_there = args.data_set.as_os_str() == "-" || args.data_set.exists();
+    give_stdout(
+        [&args.json, &args.report, &args.fix, &args.experiment].map(|path| path.as_deref()),
+    )?;
+    ensure!(is_there, "{}: there is no such file or folder", args.data_set.display());
     if let Some(fix) = &args.fix {
         not_read(fix, &args.data_set, args.rig.as_deref())?;
     }
@@ -257,6 +261,9 @@ pub(super) fn print(examined: &Examined) -> anyhow::Result<()> {
 
 /// What the data are called: the folder's or the file's name.
 pub(super) fn name_of(path: &Path) -> String {
+    if path.as_os_str() == "-" {
+        return "standard input".to_owned();
+    }
     let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     short_name(&real)
 }

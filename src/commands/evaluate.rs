@@ -3,9 +3,12 @@
 use std::path::PathBuf;
 
 use stretch_calibrate::{Evaluation, MethodErrors, evaluate, read_calibration};
-use stretch_data::{ReadOptions, Split};
+use stretch_data::Split;
 
-use super::shared::{read_trials, say, say_json, short_name};
+use super::{
+    reading::{Recorded, read_trials},
+    shared::{say, say_json, short_name},
+};
 use crate::table::{maybe, number, p_value, table};
 
 /// Judge calibrations on trials that have a reference
@@ -25,9 +28,8 @@ pub(crate) struct Args {
     /// Trials, or a folder with a dataset.toml for its test trials
     #[arg(required = true, value_name = "TRIAL.csv")]
     trials: Vec<PathBuf>,
-    /// Column of the time; its last part may be ms, us or ns
-    #[arg(long, default_value = "time_s", value_name = "COL")]
-    time: String,
+    #[command(flatten)]
+    recorded: Recorded,
     /// Print JSON in place of tables
     #[arg(long)]
     json: bool,
@@ -38,7 +40,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     for path in &args.calibration {
         calibrations.push((short_name(path), read_calibration(path)?));
     }
-    let mut columns = ReadOptions::new().time(&args.time);
+    let mut columns = args.recorded.options();
     for (_, calibration) in &calibrations {
         columns = columns.require(calibration.signal.as_str());
         columns = columns.require(calibration.reference.as_str());

@@ -1,46 +1,14 @@
-//! What the subcommands share: reading trials, progress, printing.
+//! What the subcommands share: progress, printing.
 
 use std::{
     io::Write,
-    path::{Path, PathBuf},
+    path::Path,
+    sync::atomic::{AtomicBool, Ordering::SeqCst},
     time::Duration,
 };
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
-use stretch_data::{DataSet, ReadOptions, Split, Trial};
-
-/// Reads trials from files; a folder with a `dataset.toml` stands for its
-/// trials of that split.
-pub(crate) fn read_trials(
-    paths: &[PathBuf],
-    split: Split,
-    options: &ReadOptions,
-) -> anyhow::Result<Vec<Trial>> {
-    let bar = progress("reading", paths.len() as u64);
-    let mut trials = Vec::new();
-    for path in paths {
-        if path.is_dir() {
-            let set = DataSet::read(path)?;
-            let before = trials.len();
-            for entry in set.entries(split) {
-                trials.push(entry.load(path, options)?);
-            }
-            if trials.len() == before {
-                let split = split.name();
-                anyhow::bail!(
-                    "{}: no trial of the data set has split = \"{split}\"; name files instead",
-                    path.display()
-                );
-            }
-        } else {
-            trials.push(Trial::read(path, options)?);
-        }
-        bar.inc(1);
-    }
-    bar.finish_and_clear();
-    Ok(trials)
-}
 
 /// A progress bar on standard error: seen on a terminal only.
 pub(crate) fn progress(what: &'static str, steps: u64) -> ProgressBar {
@@ -62,9 +30,25 @@ fn bar(what: &'static str, steps: u64, template: &str) -> ProgressBar {
     bar
 }
 
-/// Prints a text and a line end to standard output; a reader that has gone is
-/// an error like any other.
+/// Whether a file goes to standard output, where nothing else may then stand.
+static TAKEN: AtomicBool = AtomicBool::new(false);
+
+/// Gives standard output to the one of some files that is called `-`.
+pub(crate) fn give_stdout<'a>(
+    files: impl IntoIterator<Item = Option<&'a Path>>,
+) -> anyhow::Result<()> {
+    let count = files.into_iter().flatten().filter(|path| path.as_os_str() == "-").count();
+    ensure!(count < 2, "two files cannot go to standard output; name one of them");
+    TAKEN.fetch_or(count == 1, SeqCst);
+    Ok(())
+}
+
+/// Prints a text and a line end to standard output, to standard error where a file goes there; a reader that has gone
+/// is an error like any other.
 pub(crate) fn say(text: impl std::fmt::Display) -> anyhow::Result<()> {
+    if TAKEN.load(SeqCst) {
+        return writeln!(std::io::stderr().lock(), "{text}").context("standard error");
+    }
     writeln!(std::io::stdout().lock(), "{text}").context("standard output")?;
     Ok(())
 }

@@ -3,10 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
-use stretch_data::{DataSet, ReadOptions, RigFile, Trial, TrialEntry, write_folder};
+use stretch_data::{DataSet, ReadOptions, RigFile, TrialEntry, write_folder};
 use stretch_sim::{Rig, RunSettings, Session, SimError, TrialPlan, paper_preset};
 
-use super::shared::{progress, say};
+use super::{
+    reading::read_recording,
+    shared::{progress, say},
+};
 
 /// Simulate trials of the rig and write them as a data set
 ///
@@ -158,7 +161,7 @@ fn plans(args: &Args, rig: &Rig, seed: u64) -> anyhow::Result<Vec<TrialPlan>> {
     };
     let named = |path: &Path| path.display().to_string();
     if !path.is_dir() {
-        let trial = Trial::read(path, &ReadOptions::new())?;
+        let trial = read_recording(path, &ReadOptions::new())?;
         let plan = TrialPlan::from_trial(&trial, &rig.params).with_context(|| named(path))?;
         return Ok(vec![plan]);
     }

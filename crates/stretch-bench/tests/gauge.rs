@@ -180,7 +180,7 @@ fn trials(fault: Fault, strength: f64, count: usize, seed: u64) -> Vec<SessionTr
             };
             let is_test = count > 1 && number + 1 == count;
             let split = if is_test { Split::Test } else { Split::Fit };
-            SessionTrial { trial, kind: TrialKind::Other, start_s, split }
+            SessionTrial { start_s, split, ..SessionTrial::new(trial) }
         })
         .collect()
 }

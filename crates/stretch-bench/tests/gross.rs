@@ -276,6 +276,7 @@ fn gauge(seed: u64) -> Vec<SessionTrial> {
             kind: TrialKind::Arbitrary,
             start_s: 60.0 * i as f64,
             split: if i == 1 { Split::Test } else { Split::Fit },
+            notes: Vec::new(),
         }
     };
     (0..2).map(trial).collect()

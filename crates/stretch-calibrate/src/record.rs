@@ -1,9 +1,9 @@
 //! Calibration records as files: JSON for people, postcard for a board.
 
-use std::{fs, path::Path};
+use std::path::Path;
 
 use stretch_core::Calibration;
-use stretch_data::write_whole;
+use stretch_data::{read_whole, write_whole};
 
 use crate::CalibrateError;
 
@@ -21,7 +21,7 @@ fn is_postcard(path: &Path) -> bool {
 pub fn read_calibration(path: &Path) -> Result<Calibration, CalibrateError> {
     let file = path.display().to_string();
     let problem = |problem| CalibrateError::Record { file: file.clone(), problem };
-    let bytes = fs::read(path).map_err(|e| {
+    let bytes = read_whole(path).map_err(|e| {
         problem(format!("cannot read it: {e}; name a record made by stretch calibrate"))
     })?;
     let unusable =

@@ -8,7 +8,7 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    DataError, ReadOptions, RigFile, Trial, nearest,
+    DataError, ReadOptions, Recording, RigFile, Trial, nearest,
     toml_view::{View, number_text, parse_table, read_table, string_text},
     write_folder, write_whole,
 };
@@ -274,18 +274,30 @@ fn outside(path: &str) -> String {
 }
 
 impl TrialEntry {
-    /// Reads the trial from the data set's folder.
+    /// Reads the trial from the data set's folder, in whatever format.
     ///
     /// # Errors
-    /// As [`Trial::read`].
+    /// As [`Recording::read`].
     pub fn load(
         &self,
         folder: impl AsRef<Path>,
         options: &ReadOptions,
     ) -> Result<Trial, DataError> {
-        let mut trial = Trial::read(folder.as_ref().join(&self.file), options)?;
-        trial.name.clone_from(&self.file);
-        Ok(trial)
+        self.load_recording(folder, options).map(|recording| recording.trial)
+    }
+
+    /// Reads the trial, in whatever format, with notes of what had to be done for it.
+    ///
+    /// # Errors
+    /// As [`Recording::read`].
+    pub fn load_recording(
+        &self,
+        folder: impl AsRef<Path>,
+        options: &ReadOptions,
+    ) -> Result<Recording, DataError> {
+        let mut recording = Recording::read(folder.as_ref().join(&self.file), options)?;
+        recording.trial.name.clone_from(&self.file);
+        Ok(recording)
     }
 }
 

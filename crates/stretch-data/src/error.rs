@@ -57,7 +57,7 @@ pub enum DataError {
     },
     /// The first line holds numbers where names should stand.
     #[error(
-        "{file}: the first line (\"{first}\") holds numbers and no names; put a header line above it, such as time_s,length_mm,bridge_v"
+        "{file}: the first line (\"{first}\") holds numbers and no names; put a header line above it, such as time_s,length_mm,bridge_v, or name the columns with --columns"
     )]
     NoHeader {
         /// The file.
@@ -152,6 +152,110 @@ pub enum DataError {
     Quote {
         /// Where.
         at: Place,
+    },
+    /// A decimal point where the numbers so far had decimal commas.
+    #[error(
+        "{at}: \"{value}\" has a decimal point where the rows above have decimal commas; export the file again with one of them"
+    )]
+    DecimalPoint {
+        /// Where.
+        at: Place,
+        /// The field.
+        value: String,
+    },
+    /// A date or a time of day that is none.
+    #[error("{at}: \"{value}\" is not a time stamp that is understood{}", if cfg!(feature = "iso-time") { "; write it as 2024-05-01T12:00:00.250Z, or as seconds" } else { ": this program was built without the feature iso-time; write the time as seconds" })]
+    TimeStamp {
+        /// Where.
+        at: Place,
+        /// The field.
+        value: String,
+    },
+    /// Other columns than there are names for them.
+    #[error(
+        "{file}, row {row}: there are {found} numbers where {given} columns were named; name as many"
+    )]
+    Named {
+        /// The file.
+        file: String,
+        /// The row.
+        row: u64,
+        /// Numbers in the row.
+        found: usize,
+        /// Names given.
+        given: usize,
+    },
+    /// A rate at which nobody records.
+    #[error(
+        "{file}, column {column}: {rate_hz:.3e} samples a second, which is not between 1e-3 and 1e7; say what its numbers count with --time-unit s, ms, us or ns"
+    )]
+    Rate {
+        /// The file.
+        file: String,
+        /// The time.
+        column: String,
+        /// The rate as it was read.
+        rate_hz: f64,
+    },
+    /// Whole numbers in a column of seconds that count something shorter.
+    #[error("{file}, column {column}: its times are whole numbers, {step} from sample to sample: that is {rate_hz} samples a second if they are seconds and {} if they are milliseconds; say which with --time-unit s or ms, or rename it {column_ms}", 1e3 * .rate_hz)]
+    WholeSeconds {
+        /// The file.
+        file: String,
+        /// The time.
+        column: String,
+        /// From sample to sample.
+        step: f64,
+        /// The rate if they are seconds.
+        rate_hz: f64,
+        /// What the column should be called if they are milliseconds.
+        column_ms: String,
+    },
+    /// A recording without any time.
+    #[error("{file}: there is no time; {}", .hint)]
+    NoTime {
+        /// The file.
+        file: String,
+        /// What to do.
+        hint: String,
+    },
+    /// Channels that were never recorded at the same time.
+    #[error(
+        "{file}: {first} and {second} have no time in common ({first_s} s and {second_s} s); they cannot be brought to one grid: leave one of them out"
+    )]
+    NoOverlap {
+        /// The file.
+        file: String,
+        /// One clock.
+        first: String,
+        /// Its span, `from .. to`.
+        first_s: String,
+        /// The other.
+        second: String,
+        /// Its span.
+        second_s: String,
+    },
+    /// A format that this program was built without.
+    #[error(
+        "{file}: this is {format}, which this program was built without; build it with --features {feature}, or export the recording as CSV"
+    )]
+    Feature {
+        /// The file.
+        file: String,
+        /// What it is.
+        format: &'static str,
+        /// The feature that reads it.
+        feature: &'static str,
+    },
+    /// Something in a file that is no text, where a reader could not go on.
+    #[error("{file}: this {format} file cannot be read: {problem}")]
+    Format {
+        /// The file.
+        file: String,
+        /// What it is.
+        format: &'static str,
+        /// Where, what, and what to do.
+        problem: String,
     },
     /// A line longer than the reader accepts.
     #[error(
@@ -302,6 +406,8 @@ impl DataError {
             Self::NotANumber { .. }
                 | Self::EmptyField { .. }
                 | Self::DecimalComma { .. }
+                | Self::DecimalPoint { .. }
+                | Self::TimeStamp { .. }
                 | Self::NotFinite { .. }
                 | Self::NotUtf8 { .. }
                 | Self::Ragged { .. }

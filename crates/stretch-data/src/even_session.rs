@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::{DataError, DataSet, EvenSpec, ReadOptions, Rows, Split, Trial, TrialKind};
+use crate::{DataError, DataSet, EvenSpec, ReadOptions, Recording, Rows, Split, Trial, TrialKind};
 
 /// Pause between trials that do not say when they began, s.
 const PAUSE_S: f64 = 15.0;
@@ -22,12 +22,21 @@ pub struct SessionTrial {
     pub start_s: f64,
     /// Whether it may be fitted or only tested on.
     pub split: Split,
+    /// What had to be done to read it.
+    pub notes: Vec<String>,
 }
 
 impl SessionTrial {
     /// A trial that may be fitted, at the session's start; change what differs.
     pub fn new(trial: Trial) -> Self {
-        Self { trial, kind: TrialKind::Other, start_s: 0.0, split: Split::Fit }
+        let notes = Vec::new();
+        Self { trial, kind: TrialKind::Other, start_s: 0.0, split: Split::Fit, notes }
+    }
+}
+
+impl From<Recording> for SessionTrial {
+    fn from(Recording { trial, notes }: Recording) -> Self {
+        Self { notes, ..Self::new(trial) }
     }
 }
 
@@ -42,8 +51,12 @@ impl DataSet {
         options: &ReadOptions,
     ) -> Result<Vec<SessionTrial>, DataError> {
         let load = |entry: &crate::TrialEntry| {
-            let trial = entry.load(&folder, options)?;
-            Ok(SessionTrial { trial, kind: entry.kind, start_s: entry.start_s, split: entry.split })
+            Ok(SessionTrial {
+                kind: entry.kind,
+                start_s: entry.start_s,
+                split: entry.split,
+                ..entry.load_recording(&folder, options)?.into()
+            })
         };
         self.trials.iter().map(load).collect()
     }
@@ -152,6 +165,8 @@ impl EvenSession {
             let spec = EvenSpec { rate_hz, shortest, bridged_s: BRIDGED_S, over_switches: false };
             let even = one.trial.even(columns, spec)?;
             let count = even.parts.len();
+            let told = one.notes.iter().map(|note| format!("{}: {note}", one.trial.name));
+            session.notes.extend(told);
             session.rows.add(even.rows);
             session.notes.extend(even.notes);
             session.trials.extend(even.parts.into_iter().enumerate().map(|(i, part)| EvenTrial {

@@ -25,37 +25,52 @@ impl Header {
             return Err(DataError::NotUtf8 { at: place("1".into()), value: shown(line) });
         }
         let delimiter = delimiter(line);
-        let mut names: Vec<String> = Vec::new();
-        let mut seen = HashSet::new();
-        let mut at = 0;
+        let (mut cells, mut at) = (Vec::new(), 0);
         loop {
-            let column = || (names.len() + 1).to_string();
             let (content, end) = match field(line, at, delimiter) {
                 Field::Plain(content, end) => (content.to_vec(), end),
                 Field::Quoted(content, end) => (content, end),
-                Field::Broken => return Err(DataError::Quote { at: place(column()) }),
+                Field::Broken => {
+                    return Err(DataError::Quote { at: place((cells.len() + 1).to_string()) });
+                }
             };
-            let name = String::from_utf8(content).map_err(|e| DataError::NotUtf8 {
-                at: place(column()),
-                value: shown(e.as_bytes()),
-            })?;
-            if name.contains(char::is_control) {
-                let value = shown(name.as_bytes());
-                return Err(DataError::ControlCharacter { at: place(column()), value });
-            }
-            if !name.is_empty() && !seen.insert(name.clone()) {
-                return Err(DataError::DuplicateColumn { file: file.to_owned(), column: name });
-            }
-            names.push(name);
+            cells.push(content);
             if end >= line.len() {
                 break;
             }
             at = end + 1;
         }
+        let names = Self::named(file, row, cells)?;
         if names.iter().all(|name| number(name.as_bytes()).is_ok()) {
             return Err(DataError::NoHeader { file: file.to_owned(), first: shown(line) });
         }
         Ok(Self { names, delimiter })
+    }
+
+    /// Names from the cells of a header line.
+    pub(crate) fn named(
+        file: &str,
+        row: u64,
+        cells: Vec<Vec<u8>>,
+    ) -> Result<Vec<String>, DataError> {
+        let place =
+            |column: usize| Place { file: file.to_owned(), row, column: (column + 1).to_string() };
+        let (mut names, mut seen): (Vec<String>, _) = (Vec::new(), HashSet::new());
+        for (column, content) in cells.into_iter().enumerate() {
+            let name = String::from_utf8(content).map_err(|e| DataError::NotUtf8 {
+                at: place(column),
+                value: shown(e.as_bytes()),
+            })?;
+            if name.contains(char::is_control) {
+                let value = shown(name.as_bytes());
+                return Err(DataError::ControlCharacter { at: place(column), value });
+            }
+            if !name.is_empty() && !seen.insert(name.clone()) {
+                return Err(DataError::DuplicateColumn { file: file.to_owned(), column: name });
+            }
+            names.push(name);
+        }
+        Ok(names)
     }
 
     /// Where column `name` stands.

@@ -3,7 +3,7 @@
 use std::{fs::File, io::Read, path::Path};
 
 use crate::{
-    Channel, DataError, Trial,
+    Channel, DataError, ReadOptions, Trial,
     error::Place,
     header::Header,
     lines::{Line, Lines},
@@ -12,80 +12,6 @@ use crate::{
 
 /// The channels that every trial file of the format knows by name.
 pub(crate) const KNOWN: [&str; 5] = ["inlet", "outlet", "pressure_kpa", "length_mm", "bridge_v"];
-
-/// What a reader asks of a file.
-///
-/// ```
-/// use stretch_data::{ReadOptions, Trial};
-/// let text = "time_ms;angle_deg;note\n0;1.5;start\n10;1.75;\n";
-/// let options = ReadOptions::new().time("time_ms").require("angle_deg");
-/// let trial = Trial::from_reader(text.as_bytes(), "knee.csv", &options)?;
-/// assert_eq!(trial.time_s, [0.0, 0.01]);
-/// assert_eq!(trial.channel("angle_deg"), Some(&[1.5, 1.75][..]));
-/// assert_eq!(trial.channel("note"), None, "text is kept out of the way");
-/// # Ok::<(), stretch_data::DataError>(())
-/// ```
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ReadOptions {
-    time: String,
-    required: Vec<String>,
-    max_line_bytes: usize,
-}
-
-impl Default for ReadOptions {
-    fn default() -> Self {
-        Self { time: "time_s".to_owned(), required: Vec::new(), max_line_bytes: 64 * 1024 }
-    }
-}
-
-impl ReadOptions {
-    /// Asks for `time_s` only, and for lines of at most 64 KiB.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// Takes the time from another column. Its name's last part is the unit: `_ms`, `_us`,
-    /// and `_ns` are divided down to seconds, anything else is seconds.
-    pub fn time(mut self, column: impl Into<String>) -> Self {
-        self.time = column.into();
-        self
-    }
-
-    /// Asks for a column: it must be there, and each of its fields a finite number.
-    pub fn require(mut self, column: impl Into<String>) -> Self {
-        self.required.push(column.into());
-        self
-    }
-
-    /// Refuses lines longer than this many bytes; the memory for a line is bounded by it.
-    pub fn max_line_bytes(mut self, bytes: usize) -> Self {
-        self.max_line_bytes = bytes.clamp(1, 1 << 30);
-        self
-    }
-
-    /// The columns asked for by [`require`](Self::require), in order.
-    pub fn required(&self) -> &[String] {
-        &self.required
-    }
-
-    pub(crate) fn time_column(&self) -> &str {
-        &self.time
-    }
-
-    pub(crate) fn line_limit(&self) -> usize {
-        self.max_line_bytes
-    }
-
-    /// What the time column's numbers are divided by.
-    pub(crate) fn time_divisor(&self) -> f64 {
-        match self.time.rsplit('_').next() {
-            Some("ms") => 1e3,
-            Some("us") => 1e6,
-            Some("ns") => 1e9,
-            _ => 1.0,
-        }
-    }
-}
 
 impl Trial {
     /// Reads a trial from a file.
@@ -146,17 +72,23 @@ impl Trial {
 }
 
 /// Columns that grow by a row at a time.
-struct Columns {
-    roles: Vec<Role>,
+pub(crate) struct Columns {
+    pub(crate) roles: Vec<Role>,
     time: usize,
     time_column: String,
     divisor: f64,
+    /// What the time column counts from.
+    origin: f64,
     time_s: Vec<f64>,
     kept: Vec<(usize, Vec<f64>)>,
 }
 
 impl Columns {
-    fn new(file: &str, header: &Header, options: &ReadOptions) -> Result<Self, DataError> {
+    pub(crate) fn new(
+        file: &str,
+        header: &Header,
+        options: &ReadOptions,
+    ) -> Result<Self, DataError> {
         let time = header.position(file, options.time_column())?;
         for name in options.required() {
             header.position(file, name)?;
@@ -177,14 +109,25 @@ impl Columns {
             time,
             time_column: options.time_column().to_owned(),
             divisor: options.time_divisor(),
+            origin: 0.0,
             time_s: Vec::new(),
             kept,
         })
     }
 
+    /// Counts the time from `origin`, in the column's own unit, and so many counts make a second.
+    pub(crate) fn count_from(&mut self, origin: f64, divisor: f64) {
+        (self.origin, self.divisor) = (origin, divisor);
+    }
+
+    /// How many rows there are.
+    pub(crate) fn len(&self) -> usize {
+        self.time_s.len()
+    }
+
     #[inline]
-    fn push(&mut self, file: &str, row: u64, values: &[f64]) -> Result<(), DataError> {
-        let time_s = values[self.time] / self.divisor;
+    pub(crate) fn push(&mut self, file: &str, row: u64, values: &[f64]) -> Result<(), DataError> {
+        let time_s = (values[self.time] - self.origin) / self.divisor;
         if let Some(&previous_s) = self.time_s.last()
             && time_s <= previous_s
         {
@@ -215,7 +158,7 @@ impl Columns {
         }
     }
 
-    fn into_trial(self, file: &str, header: &Header) -> Result<Trial, DataError> {
+    pub(crate) fn into_trial(self, file: &str, header: &Header) -> Result<Trial, DataError> {
         if self.time_s.is_empty() {
             return Err(DataError::HeaderOnly { file: file.to_owned() });
         }
@@ -263,6 +206,8 @@ pub(crate) fn located(file: &str, row: u64, header: &Header, fault: RowFault) ->
                 Fault::NotFinite(value) => DataError::NotFinite { at, value },
                 Fault::NotUtf8(value) => DataError::NotUtf8 { at, value },
                 Fault::Quote => DataError::Quote { at },
+                Fault::DecimalPoint(value) => DataError::DecimalPoint { at, value },
+                Fault::Stamp(value) => DataError::TimeStamp { at, value },
             }
         }
     }

@@ -9,6 +9,8 @@ pub(crate) enum Fault {
     NotFinite(String),
     NotUtf8(String),
     Quote,
+    DecimalPoint(String),
+    Stamp(String),
 }
 
 /// What a row is at fault for.

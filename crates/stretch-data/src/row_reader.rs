@@ -7,8 +7,12 @@ use crate::{
     error::Place,
     header::Header,
     lines::{Line, Lines},
-    read::{located, read_header},
-    row::{Role, numbers},
+    read::located,
+    recording::{
+        live::{header, is_units, separator_of},
+        rows::Dialect,
+    },
+    row::Role,
 };
 
 /// Reads a stream a row at a time, and goes on after a malformed row.
@@ -45,6 +49,8 @@ pub struct RowReader<R> {
     header: Header,
     roles: Vec<Role>,
     fields: Vec<f64>,
+    dialect: Option<Dialect>,
+    is_begun: bool,
     time: usize,
     divisor: f64,
     previous_s: Option<f64>,
@@ -71,8 +77,10 @@ impl<R: Read> RowReader<R> {
     /// [`DataError`] when there is no header or a column is missing.
     pub fn new(reader: R, name: &str, options: &ReadOptions) -> Result<Self, DataError> {
         let mut lines = Lines::new(reader, options.line_limit());
-        let header = read_header(&mut lines, name)?;
-        let time = header.position(name, options.time_column())?;
+        let (header, time) = header(&mut lines, name, options)?;
+        // The separator of a stream without a header line is told by its first row.
+        let known = options.column_names().is_none();
+        let dialect = known.then(|| Dialect::new(header.delimiter, Some(time)));
         let wanted = options
             .required()
             .iter()
@@ -85,8 +93,10 @@ impl<R: Read> RowReader<R> {
             name: name.to_owned(),
             roles: (0..header.names.len()).map(role).collect(),
             fields: vec![f64::NAN; header.names.len()],
+            dialect,
+            is_begun: false,
             time,
-            divisor: options.time_divisor(),
+            divisor: options.divisor(&header.names[time]),
             previous_s: None,
             values: vec![f64::NAN; wanted.len()],
             wanted,
@@ -116,7 +126,9 @@ impl<R: Read> RowReader<R> {
                 return Some(Err(error));
             }
         };
-        let time_s = self.fields[self.time] / self.divisor;
+        let has_stamps = self.dialect.as_ref().is_some_and(Dialect::has_stamps);
+        let divisor = if has_stamps { 1.0 } else { self.divisor };
+        let time_s = self.fields[self.time] / divisor;
         if let Some(previous_s) = self.previous_s.replace(time_s)
             && time_s <= previous_s
         {
@@ -139,10 +151,21 @@ impl<R: Read> RowReader<R> {
                 Line::End => return Ok(None),
                 Line::Text(line) if line.trim_ascii().is_empty() => {}
                 Line::Text(line) => {
-                    let delimiter = self.header.delimiter;
-                    return numbers(line, delimiter, &self.roles, &mut self.fields)
-                        .map(|()| Some(row))
-                        .map_err(|fault| located(&self.name, row, &self.header, fault));
+                    let is_first = !std::mem::replace(&mut self.is_begun, true);
+                    if self.dialect.is_none() {
+                        let found = separator_of(line, self.roles.len());
+                        self.dialect = found.map(|d| Dialect::new(d, Some(self.time)));
+                    }
+                    // What comes before the first whole row of a stream without a header is the end of another.
+                    let Some(dialect) = &mut self.dialect else { continue };
+                    if is_first && is_units(line, dialect.delimiter) {
+                        continue;
+                    }
+                    match dialect.parse(line, &self.roles, &mut self.fields) {
+                        Ok(true) => return Ok(Some(row)),
+                        Ok(false) => {}
+                        Err(fault) => return Err(located(&self.name, row, &self.header, fault)),
+                    }
                 }
                 Line::TooLong => {
                     self.lines.skip_line().map_err(fail)?;

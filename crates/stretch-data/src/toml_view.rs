@@ -8,17 +8,23 @@ use std::{
 
 use toml::{Table, Value};
 
-use crate::{DataError, nearest::nearest};
+use crate::{DataError, nearest::nearest, read_whole};
 
 /// Largest TOML file that is read: these files are written by people.
 const LARGEST_BYTES: u64 = 4 << 20;
 
-/// Reads a file and parses it.
+/// Reads a file, `-` being standard input, and parses it.
 pub(crate) fn read_table(path: &Path) -> Result<(String, Table), DataError> {
-    let file = path.display().to_string();
+    let is_stdin = path.as_os_str() == "-";
+    let file = if is_stdin { "standard input".into() } else { path.display().to_string() };
+    let opened: Box<dyn Read> = if is_stdin {
+        let bytes = read_whole(path).map_err(|e| DataError::io(&file, "read it", e))?;
+        Box::new(io::Cursor::new(bytes))
+    } else {
+        Box::new(fs::File::open(path).map_err(|e| DataError::io(&file, "open it", e))?)
+    };
     let mut bytes = Vec::new();
-    fs::File::open(path)
-        .map_err(|e| DataError::io(&file, "open it", e))?
+    opened
         .take(LARGEST_BYTES + 1)
         .read_to_end(&mut bytes)
         .map_err(|e| DataError::io(&file, "read it", e))?;

@@ -86,15 +86,7 @@ impl Trial {
     /// approx::assert_abs_diff_eq!(trial.rate_hz().expect("steps"), 30.0, epsilon = 1e-9);
     /// ```
     pub fn rate_hz(&self) -> Option<f64> {
-        let mut steps: Vec<f64> = self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        let middle = steps.len() / 2;
-        let median = match steps.len() {
-            0 => return None,
-            _ => *steps.select_nth_unstable_by(middle, f64::total_cmp).1,
-        };
-        let short = steps.iter().filter(|step| **step < 1.5 * median);
-        let (count, sum) = short.fold((0_u32, 0.0), |(count, sum), step| (count + 1, sum + step));
-        Some(f64::from(count) / sum).filter(|rate| rate.is_finite())
+        rate_of(&self.time_s)
     }
 
     /// Refuses what no file could hold: channels of other lengths, time that does not rise, numbers that are none.
@@ -136,6 +128,19 @@ impl Trial {
         }
         Ok(())
     }
+}
+
+/// Samples a second of rising time stamps; none for fewer than two.
+pub(crate) fn rate_of(time_s: &[f64]) -> Option<f64> {
+    let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let middle = steps.len() / 2;
+    let median = match steps.len() {
+        0 => return None,
+        _ => *steps.select_nth_unstable_by(middle, f64::total_cmp).1,
+    };
+    let short = steps.iter().filter(|step| **step < 1.5 * median);
+    let (count, sum) = short.fold((0_u32, 0.0), |(count, sum), step| (count + 1, sum + step));
+    Some(f64::from(count) / sum).filter(|rate| rate.is_finite())
 }
 
 /// The unit in a column's name: its last part, after an underscore.

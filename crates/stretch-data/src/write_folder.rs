@@ -48,6 +48,9 @@ pub fn write_folder<E: From<DataError>>(
     let shown = path.display();
     let _open = Open::new(&shown)?;
     let fail = |cause| E::from(DataError::io(&shown, "write it", cause));
+    if path.as_os_str() == "-" {
+        return Err(fail(io::Error::other("a folder cannot go to standard output; name one")));
+    }
     let exists = match fs::symlink_metadata(path) {
         Ok(_) if !force => return Err(DataError::Exists { path: shown.to_string() }.into()),
         Ok(_) if !path.is_dir() => {

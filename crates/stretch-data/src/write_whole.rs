@@ -20,7 +20,7 @@ use crate::{
 /// not be written to, [`interrupt`](crate::interrupt), an error of `fill`) the temporary file
 /// goes and what stood under the target's name still stands. A symbolic link stays one: the
 /// file that it points to is replaced. Devices and pipes (`/dev/stdout`) are written to
-/// directly. Output is buffered.
+/// directly. Output is buffered. The path `-` is standard output.
 ///
 /// # Errors
 /// [`DataError::Io`] with path and cause, or [`DataError::Interrupted`].
@@ -40,6 +40,11 @@ pub fn write_whole(
     let path = path.as_ref();
     let shown = path.display();
     let _open = Open::new(&shown)?;
+    if path.as_os_str() == "-" {
+        let mut out = BufWriter::new(Stoppable(io::stdout().lock()));
+        let written = fill(&mut out).and_then(|()| out.flush());
+        return written.map_err(|cause| DataError::io("standard output", "write it", cause));
+    }
     let result = match target(path)? {
         Target::Direct => write_direct(path, fill),
         Target::Replace(real) => replace(&real, fill),

@@ -32,7 +32,7 @@ fn files_that_are_not_there_or_hold_nothing() {
     says(
         "0,1.5\n0.1,1.6\n",
         "t.csv: the first line (\"0,1.5\") holds numbers and no names; put a header line above \
-         it, such as time_s,length_mm,bridge_v",
+         it, such as time_s,length_mm,bridge_v, or name the columns with --columns",
     );
 }
 

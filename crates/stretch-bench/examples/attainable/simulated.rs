@@ -1,7 +1,7 @@
 //! Sessions of the rig itself, drawn within its tolerances, in clean noise; and their diagnoses.
 
 use stretch_bench::{RigSetup, RigSimulator, Session as Measured};
-use stretch_data::{Channel, SessionTrial, Trial};
+use stretch_data::{Channel, SessionTrial, Trial, TrialEntry};
 use stretch_gap::{Diagnosis, Options, Thresholds, diagnose};
 use stretch_sim::{Catalogue, Effect, Key, Rig, RunSettings, Session, TrialPlan};
 
@@ -97,7 +97,8 @@ fn run(rig: &Rig, settings: &RunSettings, plans: &[TrialPlan]) -> Answer<Vec<Ses
     let mut session = Session::new(rig, settings)?;
     let trial = |plan: &TrialPlan| -> Answer<SessionTrial> {
         let (entry, trial) = session.run(plan)?;
-        Ok(SessionTrial { trial, kind: entry.kind, start_s: entry.start_s, split: entry.split })
+        let TrialEntry { kind, start_s, split, .. } = entry;
+        Ok(SessionTrial { kind, start_s, split, ..SessionTrial::new(trial) })
     };
     plans.iter().map(trial).collect()
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use stretch_data::{DataSet, ReadOptions, SessionTrial, Trial};
+use stretch_data::{DataSet, ReadOptions, Recording, SessionTrial, Trial};
 use stretch_sim::Catalogue;
 
 use super::{GaugeSetup, GaugeSimulator};
@@ -33,17 +33,23 @@ impl GaugeSimulator {
             (None, Some(own)) if rig_file::is_gauge(own)? => (Some(own.as_path()), true),
             _ => (None, false),
         };
+        let mut options = ReadOptions::new();
+        if let Some((reference, signal)) = columns {
+            options = options.require(reference).require(signal);
+        }
         let first = match &set {
-            Some(set) => set.trials[0].load(path, &ReadOptions::new())?,
-            None => Trial::read(path, &ReadOptions::new())?,
+            Some(set) => set.trials[0].load_recording(path, &options)?,
+            None => Recording::read(path, &options)?,
         };
-        let Some((reference, signal)) = columns_of(&first, columns, says_so)? else {
+        let Some((reference, signal)) = columns_of(&first.trial, columns, says_so)? else {
             return Ok(None);
         };
-        let options = ReadOptions::new().require(reference).require(signal);
+        let (reference, signal) = (reference.to_owned(), signal.to_owned());
+        let (reference, signal) = (reference.as_str(), signal.as_str());
         let trials = match &set {
-            None => vec![SessionTrial::new(Trial::read(path, &options)?)],
-            Some(set) => set.load(path, &options)?,
+            // Read once: it may be standard input.
+            None => vec![SessionTrial::from(first)],
+            Some(set) => set.load(path, &ReadOptions::new().require(reference).require(signal))?,
         };
         let rig = rig.map(rig_file::gauge).transpose()?;
         let rig = rig.as_ref();

@@ -72,6 +72,7 @@ pub(crate) fn session(
                 kind: TrialKind::Arbitrary,
                 start_s: begun_s,
                 split: if trial == 3 { Split::Test } else { Split::Fit },
+                notes: Vec::new(),
             }
         })
         .collect()

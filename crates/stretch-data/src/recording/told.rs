@@ -1,0 +1,30 @@
+//! A recording as it was read.
+
+use crate::Trial;
+
+/// A trial and what had to be done to read it.
+///
+/// ```
+/// use stretch_data::{ReadOptions, Recording};
+/// let text = "# rig 2, Monday\nTime (ms);Pos (mm);bridge\nms;mm;V\n0;180,5;1,24\n10;180,25;1,25\n";
+/// let options = ReadOptions::new().require("bridge_v");
+/// let recording = Recording::from_reader(text.as_bytes(), "log.csv", &options)?;
+/// assert_eq!(recording.trial.time_s, [0.0, 0.01]);
+/// assert_eq!(recording.trial.require("pos_mm")?, [180.5, 180.25]);
+/// assert_eq!(
+///     recording.notes,
+///     [
+///         "columns named with their units: Time (ms) -> time_ms, Pos (mm) -> pos_mm, bridge -> bridge_v",
+///         "the time is column time_ms",
+///         "numbers have decimal commas",
+///     ]
+/// );
+/// # Ok::<(), stretch_data::DataError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Recording {
+    /// What was recorded, on one clock.
+    pub trial: Trial,
+    /// Sentences: what was guessed, renamed, resampled or left out. None for a file in this project's own form.
+    pub notes: Vec<String>,
+}

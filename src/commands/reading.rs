@@ -1,0 +1,112 @@
+//! How recordings are read: what the commands that take them share.
+
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+use stretch_data::{DataError, DataSet, ReadOptions, Recording, Split, TimeUnit, Trial};
+
+use super::shared::progress;
+
+/// Options for recordings that do not say all of themselves.
+#[derive(clap::Args)]
+pub(crate) struct Recorded {
+    /// Column of the time; its last part may be ms, us or ns
+    #[arg(long, default_value = "time_s", value_name = "COL")]
+    time: String,
+    /// What the time counts, whatever its name says
+    #[arg(long, value_enum, value_name = "UNIT")]
+    time_unit: Option<Unit>,
+    /// Names of the columns where the recording has none: time_s,bridge_v,...
+    #[arg(long = "columns", value_name = "NAMES", value_delimiter = ',')]
+    named: Option<Vec<String>>,
+    /// Samples a second of a recording without any time
+    #[arg(long, value_name = "HZ", value_parser = rate)]
+    sample_rate: Option<f64>,
+    /// Bring the recording onto an even grid of so many samples a second [default: as it was
+    /// recorded; several clocks to the fastest]
+    #[arg(long, value_name = "HZ", value_parser = rate)]
+    grid: Option<f64>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Unit {
+    S,
+    Ms,
+    Us,
+    Ns,
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    let rate_hz = text.parse::<f64>().ok().filter(|hz| (1e-3..=1e7).contains(hz));
+    rate_hz.ok_or_else(|| format!("\"{text}\" is not a rate between 1e-3 and 1e7 Hz"))
+}
+
+impl Recorded {
+    /// What is asked of each recording.
+    pub(crate) fn options(&self) -> ReadOptions {
+        let mut options = ReadOptions::new().time(&self.time);
+        if let Some(unit) = self.time_unit {
+            options = options.time_unit(match unit {
+                Unit::S => TimeUnit::Seconds,
+                Unit::Ms => TimeUnit::Milliseconds,
+                Unit::Us => TimeUnit::Microseconds,
+                Unit::Ns => TimeUnit::Nanoseconds,
+            });
+        }
+        if let Some(names) = &self.named {
+            options = options.columns(names.iter().map(|name| name.trim()));
+        }
+        if let Some(rate_hz) = self.sample_rate {
+            options = options.sample_rate_hz(rate_hz);
+        }
+        match self.grid {
+            Some(rate_hz) => options.grid_hz(rate_hz),
+            None => options,
+        }
+    }
+}
+
+/// Reads a recording, `-` being standard input, and tells what had to be done for it on standard error.
+pub(crate) fn read_recording(path: &Path, options: &ReadOptions) -> Result<Trial, DataError> {
+    Ok(told(Recording::read(path, options)?))
+}
+
+/// The trial of a recording, whose notes are told.
+pub(crate) fn told(Recording { trial, notes }: Recording) -> Trial {
+    for note in notes {
+        eprintln!("note: {}: {note}", trial.name);
+    }
+    trial
+}
+
+/// Reads trials from files; a folder with a `dataset.toml` stands for its
+/// trials of that split.
+pub(crate) fn read_trials(
+    paths: &[PathBuf],
+    split: Split,
+    options: &ReadOptions,
+) -> anyhow::Result<Vec<Trial>> {
+    let bar = progress("reading", paths.len() as u64);
+    let mut trials = Vec::new();
+    for path in paths {
+        if path.is_dir() {
+            let set = DataSet::read(path)?;
+            let before = trials.len();
+            for entry in set.entries(split) {
+                trials.push(told(entry.load_recording(path, options)?));
+            }
+            if trials.len() == before {
+                let split = split.name();
+                anyhow::bail!(
+                    "{}: no trial of the data set has split = \"{split}\"; name files instead",
+                    path.display()
+                );
+            }
+        } else {
+            trials.push(read_recording(path, options)?);
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(trials)
+}

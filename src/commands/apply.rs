@@ -11,6 +11,7 @@ use stretch_data::{ReadOptions, RowReader, Trial, push_number, write_whole};
 use stretch_receptor::{Reading, Withheld};
 
 use super::stop::RecordedInput;
+use crate::display::{Output, warn};
 
 /// Turn a trial's voltage into length, or a stream's as it comes
 ///
@@ -50,7 +51,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
     if args.trial.as_os_str() == "-" {
         return match &args.out {
-            None => live(&calibration, io::stdin(), &options, &mut io::stdout().lock()),
+            None => live(&calibration, io::stdin(), &options, &mut Output),
             Some(path) => {
                 let mut result = Ok(());
                 write_whole(path, |out| {
@@ -66,19 +67,19 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     match &args.out {
         Some(path) => write_whole(path, |out| write_all(&calibration, &trial, &applied, out))?,
         None => {
-            let mut out = BufWriter::new(io::stdout().lock());
+            let mut out = BufWriter::new(Output);
             write_all(&calibration, &trial, &applied, &mut out)?;
             out.flush()?;
         }
     }
     let withheld = applied.readings.iter().filter(|r| r.is_err()).count();
     let faults = applied.faults;
-    eprintln!(
+    warn(format!(
         "{} samples: {withheld} without an estimate; time stamps: {} missing, {} early or late",
         trial.len(),
         faults.missing,
         faults.jittered,
-    );
+    ));
     Ok(())
 }
 
@@ -106,7 +107,7 @@ fn live(
                 out.write_all(&line)?;
                 out.flush()?;
             }
-            Err(error) if error.is_row() => eprintln!("stretch: {error}"),
+            Err(error) if error.is_row() => warn(format!("stretch: {error}")),
             Err(error) => return Err(error.into()),
         }
     }

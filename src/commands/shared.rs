@@ -1,14 +1,14 @@
-//! What the subcommands share: reading trials, progress, printing.
+//! What the subcommands share: reading trials, progress, writing.
 
 use std::{
-    io::Write,
     path::{Path, PathBuf},
     time::Duration,
 };
 
-use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use stretch_data::{DataSet, ReadOptions, Split, Trial};
+
+pub(crate) use crate::display::{say, say_json};
 
 /// Reads trials from files; a folder with a `dataset.toml` stands for its
 /// trials of that split.
@@ -60,18 +60,6 @@ fn bar(what: &'static str, steps: u64, template: &str) -> ProgressBar {
     }
     bar.enable_steady_tick(Duration::from_millis(200));
     bar
-}
-
-/// Prints a text and a line end to standard output; a reader that has gone is
-/// an error like any other.
-pub(crate) fn say(text: impl std::fmt::Display) -> anyhow::Result<()> {
-    writeln!(std::io::stdout().lock(), "{text}").context("standard output")?;
-    Ok(())
-}
-
-/// Prints a value as JSON.
-pub(crate) fn say_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
-    say(serde_json::to_string_pretty(value)?)
 }
 
 /// Writes a text file, whole or not at all.

@@ -16,8 +16,8 @@ use std::{io::ErrorKind, process::ExitCode};
 use clap::{Parser, Subcommand};
 
 use commands::{
-    apply, blind, calibrate, convert, demo, diagnose, effects, evaluate, export, listen, rig,
-    simulate,
+    apply, blind, calibrate, convert, demo, diagnose, effects, evaluate, export, listen, record,
+    rig, simulate,
 };
 
 /// From the voltage of a stretch sensor to length, live.
@@ -54,6 +54,7 @@ enum Command {
     Rig(rig::Args),
     Listen(listen::Args),
     Export(export::Args),
+    Record(record::Args),
 }
 
 /// What the shell is told when Ctrl-C ended the program.
@@ -79,6 +80,7 @@ fn main() -> ExitCode {
         Command::Rig(args) => rig::run(args),
         Command::Listen(args) => listen::run(args),
         Command::Export(args) => export::run(args),
+        Command::Record(args) => record::run(args),
     };
     // whoever read our output has gone: nothing is wrong
     let is_unread = display::lost() == Some(ErrorKind::BrokenPipe);

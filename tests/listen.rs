@@ -18,7 +18,9 @@ use rustix::{
     pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt},
     termios,
 };
-use stretch_calibrate::{BoardReceptor, ModelKind, fixed_record, read_calibration};
+use stretch_calibrate::{
+    BoardReceptor, ModelKind, calibration_to_json, fixed_record, read_calibration,
+};
 use stretch_core::{Calibration, Runner, Volts};
 use stretch_data::{ReadOptions, Trial};
 use stretch_link::Frame;
@@ -94,7 +96,7 @@ impl Listener {
     }
 
     fn start() -> (Self, File) {
-        Self::start_with(&serde_json::to_vec(&example_calibration()).unwrap())
+        Self::start_with(calibration_to_json(&example_calibration()).unwrap().as_bytes())
     }
 
     fn start_with(record: &[u8]) -> (Self, File) {
@@ -254,7 +256,7 @@ fn a_start_that_fails_leaves_nothing_behind() {
 /// Listens to bytes on standard input and records them; what it said, and what is recorded.
 fn heard(bytes: &[u8]) -> (String, String) {
     let scratch = Scratch::new();
-    scratch.write("cal.json", serde_json::to_vec(&example_calibration()).unwrap());
+    scratch.write("cal.json", calibration_to_json(&example_calibration()).unwrap());
     scratch.write("frames", bytes);
     let output = support::stretch()
         .current_dir(scratch.path(""))
@@ -308,7 +310,7 @@ fn a_last_frame_without_newline_and_a_block_that_comes_twice_are_counted() {
 #[test]
 fn a_folder_is_no_port() {
     let scratch = Scratch::new();
-    scratch.write("cal.json", serde_json::to_vec(&example_calibration()).unwrap());
+    scratch.write("cal.json", calibration_to_json(&example_calibration()).unwrap());
     let mut command = support::stretch();
     command.current_dir(scratch.path("")).args([
         "listen",
@@ -395,7 +397,7 @@ fn killed_outright_it_leaves_every_whole_line() {
 #[test]
 fn standard_input_ends_with_its_stream_and_a_record_is_never_overwritten() {
     let folder = tempfile::tempdir().unwrap();
-    let calibration = serde_json::to_string(&example_calibration()).unwrap();
+    let calibration = calibration_to_json(&example_calibration()).unwrap();
     fs::write(folder.path().join("cal.json"), calibration).unwrap();
     let frames = board(50);
     let run = |out: &str| {
@@ -428,7 +430,7 @@ fn standard_input_ends_with_its_stream_and_a_record_is_never_overwritten() {
 #[test]
 fn on_a_terminal_it_plots() {
     let folder = tempfile::tempdir().unwrap();
-    let calibration = serde_json::to_string(&example_calibration()).unwrap();
+    let calibration = calibration_to_json(&example_calibration()).unwrap();
     fs::write(folder.path().join("cal.json"), calibration).unwrap();
     let mut port = plug(&folder.path().join("port"));
     let mut terminal = plug(&folder.path().join("terminal"));

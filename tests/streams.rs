@@ -15,6 +15,7 @@ use std::{
     time::Duration,
 };
 
+use stretch_calibrate::calibration_to_json;
 use stretch_link::Frame;
 use stretch_receptor::{
     code::{Adc, AdcSpec, FixedCalibration, FixedReceptor},
@@ -56,7 +57,7 @@ fn inputs() -> Scratch {
     let rows = fs::read_to_string(scratch.path("a_1.csv")).unwrap();
     let (head, rest) = rows.split_at(rows.find("\n1.00,").unwrap());
     scratch.write("live.csv", format!("{head}\nthis is no row{rest}"));
-    scratch.write("board.json", serde_json::to_string(&example_calibration()).unwrap());
+    scratch.write("board.json", calibration_to_json(&example_calibration()).unwrap());
     scratch.write("frames", frames(500));
     scratch
 }

@@ -18,6 +18,7 @@ pub(crate) mod export;
 pub(crate) mod listen;
 pub(crate) mod paper;
 mod rails;
+pub(crate) mod record;
 pub(crate) mod rig;
 pub(crate) mod shared;
 pub(crate) mod simulate;

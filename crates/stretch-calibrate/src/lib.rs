@@ -7,6 +7,7 @@ mod cause;
 mod choose;
 mod cost;
 mod diagnosed_fit;
+mod digest;
 mod error;
 mod evaluate;
 mod fitting;
@@ -39,4 +40,7 @@ pub use fitting::{Coefficient, FitReport, Order};
 pub use fixed_record::{BoardReceptor, FixedRecord, RecordNumbers, fixed_record, parse_adc};
 pub use options::{Memory, ModelKind, Options, Robust, SpellingError, SplitBy, parse_rate};
 pub use own_ranges::on_own_ranges;
-pub use record::{read_calibration, write_calibration};
+pub use record::{
+    RecordSummary, calibration_from_json, calibration_seal, calibration_to_json, describe_record,
+    read_calibration, seal_calibration, write_calibration,
+};

@@ -20,8 +20,11 @@ mod provenance;
 mod range;
 mod rate;
 mod real;
+#[cfg(feature = "record")]
+pub mod record;
 mod rest;
 mod rest_level;
+mod sizes;
 mod stage;
 #[cfg(feature = "proptest")]
 pub mod strategies;

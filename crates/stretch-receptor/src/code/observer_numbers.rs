@@ -104,7 +104,7 @@ pub struct Rest {
 }
 
 /// The schema of the records that this release writes, and the newest it reads.
-pub(super) const SCHEMA: u32 = 1;
+pub(super) const SCHEMA: u32 = stretch_core::CALIBRATION_SCHEMA;
 
 impl Numbers {
     pub(super) fn new(calibration: &Calibration, adc: &Adc) -> Result<Self, DesignError> {
@@ -250,7 +250,7 @@ impl Numbers {
         for size in [leak, most, furthest] {
             holds("fixed.rest", size.into(), (0..=MOST_SIGNAL).contains(&size))?;
         }
-        Ok(self)
+        Ok(Self { schema: SCHEMA, ..self })
     }
 
     /// The first number that is no code.

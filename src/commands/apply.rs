@@ -5,10 +5,12 @@ use std::{
     path::PathBuf,
 };
 
-use stretch_calibrate::{Applied, LiveReceptor, apply, pressure_column, read_calibration};
+use stretch_calibrate::{
+    Applied, LiveReceptor, apply, not_its_own, pressure_column, read_calibration,
+};
 use stretch_core::{Calibration, Model};
 use stretch_data::{ReadOptions, RowReader, Trial, push_number, write_whole};
-use stretch_receptor::{Reading, Withheld};
+use stretch_receptor::{Domain, Reading, Withheld};
 
 use super::stop::RecordedInput;
 use crate::display::{Output, warn};
@@ -72,15 +74,49 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             out.flush()?;
         }
     }
-    let withheld = applied.readings.iter().filter(|r| r.is_err()).count();
     let faults = applied.faults;
+    let mut seen = Seen::default();
+    applied.readings.iter().for_each(|reading| seen.take(reading));
     warn(format!(
-        "{} samples: {withheld} without an estimate; time stamps: {} missing, {} early or late",
-        trial.len(),
+        "{}; time stamps: {} missing, {} early or late",
+        seen.line(),
         faults.missing,
         faults.jittered,
     ));
+    seen.doubt();
     Ok(())
+}
+
+/// What came of the samples.
+#[derive(Debug, Default)]
+struct Seen {
+    samples: u64,
+    withheld: u64,
+    clamped: u64,
+}
+
+impl Seen {
+    fn take(&mut self, reading: &Result<Reading, Withheld>) {
+        self.samples += 1;
+        match reading {
+            Ok(reading) => self.clamped += u64::from(reading.domain != Domain::Inside),
+            Err(_) => self.withheld += 1,
+        }
+    }
+
+    fn line(&self) -> String {
+        let Self { samples, withheld, clamped } = self;
+        format!(
+            "{samples} samples: {withheld} without an estimate, {clamped} outside of what was calibrated"
+        )
+    }
+
+    /// Says so where the log does not look like one of the calibration's.
+    fn doubt(&self) {
+        if let Some(doubt) = not_its_own(self.clamped, self.samples - self.withheld) {
+            warn(format!("stretch: {doubt}"));
+        }
+    }
 }
 
 /// Answers each line as it comes.
@@ -94,7 +130,7 @@ fn live(
     let mut rows = RowReader::new(input, "standard input", options)?;
     out.write_all(header(calibration).as_bytes())?;
     out.flush()?;
-    let mut line = Vec::new();
+    let (mut line, mut seen) = (Vec::new(), Seen::default());
     while let Some(row) = rows.next_row() {
         match row {
             Ok(row) => {
@@ -102,6 +138,7 @@ fn live(
                     receptor.feel(*pressure);
                 }
                 let reading = receptor.step(row.time_s, row.values[0]);
+                seen.take(&reading);
                 line.clear();
                 push_line(&mut line, row.time_s, &reading, knows_sd(calibration));
                 out.write_all(&line)?;
@@ -111,6 +148,7 @@ fn live(
             Err(error) => return Err(error.into()),
         }
     }
+    seen.doubt();
     Ok(())
 }
 

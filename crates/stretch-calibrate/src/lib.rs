@@ -27,6 +27,8 @@ mod rest;
 mod rising;
 mod series;
 mod split;
+mod wild;
+mod worth;
 
 pub use apply::{Applied, Faults, LiveReceptor, apply, pressure_column, rate_delay_s};
 pub use auto::{ModelChoice, ModelRow, choose_model};
@@ -44,3 +46,5 @@ pub use record::{
     RecordSummary, calibration_from_json, calibration_seal, calibration_to_json, describe_record,
     read_calibration, seal_calibration, write_calibration,
 };
+pub use wild::without_wild;
+pub use worth::{explains_little, explains_nothing, not_its_own, worse_than_the_mean};

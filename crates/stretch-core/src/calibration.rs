@@ -1,7 +1,9 @@
 //! The calibration record: everything a receptor needs, and where it came from.
 
 use crate::{
-    DesignError, Label, Model, Polarity, Provenance, Range, RateEstimator, SampleRate, sizes,
+    DesignError, Label, Model, Polarity, Provenance, Range, RateEstimator, SampleRate,
+    folded::{Scales, line_holds, surface_holds},
+    sizes::{LEAST, MOST, RATES_HZ, extent, range},
 };
 
 /// The schema of calibration records that this release writes, and the newest it reads.
@@ -184,7 +186,7 @@ impl Calibration {
         spec.rate_estimator.validate()?;
         DesignError::check("dead_band", spec.dead_band, spec.dead_band >= 0.0)?;
         spec.model.validate()?;
-        sizes::check(&spec)?;
+        check_sizes(&spec)?;
         Ok(Self(spec))
     }
 
@@ -198,6 +200,34 @@ impl Calibration {
     /// The parts, to change and check again.
     pub fn into_spec(self) -> CalibrationSpec {
         self.0
+    }
+}
+
+/// Every size that is not the model's alone.
+fn check_sizes(spec: &CalibrationSpec) -> Result<(), DesignError> {
+    let hz = spec.sample_rate_hz.hz();
+    DesignError::check("sample_rate_hz", hz, RATES_HZ.contains(&hz))?;
+    if let Target::Contraction { rest_length } = spec.target {
+        extent("target.rest_length", rest_length)?;
+    }
+    range(["signal_range", "span of signal_range"], &spec.signal_range)?;
+    range(["target_range", "span of target_range"], &spec.target_range)?;
+    // up to the largest signal in a sample; and a band that can be divided by, or none
+    let band = spec.dead_band;
+    let fits = band == 0.0 || (LEAST * LEAST..=MOST * RATES_HZ.end()).contains(&band);
+    DesignError::check("dead_band", band, fits)?;
+    let scales = Scales {
+        gain: spec.target.reference_per_target() * spec.target_range.span(),
+        zero: spec.target.to_reference(spec.target_range.offset()),
+        signal: spec.signal_range,
+    };
+    match &spec.model {
+        Model::Linear(line) => line_holds(&scales, line),
+        Model::Surfaces { inflation, deflation } | Model::Blended { inflation, deflation } => {
+            surface_holds(&scales, inflation)?;
+            surface_holds(&scales, deflation)
+        }
+        _ => Ok(()),
     }
 }
 

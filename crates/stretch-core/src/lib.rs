@@ -7,6 +7,7 @@ mod degree;
 mod diagnosed;
 mod error;
 pub mod fixed;
+mod folded;
 mod history;
 mod hysteresis;
 mod interval;

@@ -192,8 +192,9 @@ impl Numbers {
             dead_band: target(
                 (reference_dead_band(calibration) / (gain / 1000.0)).abs() * period_s,
             )?,
-            zero: libm::ldexp(zero, (TARGET_BITS + output_bits) as i32) as i64
-                + libm::ldexp(half, (TARGET_BITS + output_bits) as i32) as i64,
+            // the cast saturates, and the sum with it: `check` refuses what does not fit
+            zero: (libm::ldexp(zero, (TARGET_BITS + output_bits) as i32) as i64)
+                .saturating_add(libm::ldexp(half, (TARGET_BITS + output_bits) as i32) as i64),
             gain: fixed::from_f64("fixed.gain", gain, output_bits)?,
             output_bits: output_bits as u8,
             rest,

@@ -1,19 +1,23 @@
 //! The `stretch` program: parse, dispatch.
 
+// these panic where nobody reads: `display` has what is said
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 mod commands;
+mod display;
 mod goal;
 mod paper_tables;
 mod plain;
 mod report;
 mod table;
 
-use std::process::ExitCode;
+use std::{io::ErrorKind, process::ExitCode};
 
 use clap::{Parser, Subcommand};
 
 use commands::{
-    apply, blind, calibrate, convert, demo, diagnose, effects, evaluate, export, listen, rig,
-    simulate,
+    apply, blind, calibrate, convert, demo, diagnose, effects, evaluate, export, listen, record,
+    rig, simulate,
 };
 
 /// From the voltage of a stretch sensor to length, live.
@@ -50,13 +54,17 @@ enum Command {
     Rig(rig::Args),
     Listen(listen::Args),
     Export(export::Args),
+    Record(record::Args),
 }
 
 /// What the shell is told when Ctrl-C ended the program.
 const INTERRUPTED: u8 = 130;
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(told) => return explain(&told),
+    };
     // Without a handler Ctrl-C still ends the program; only the cleaning up is lost.
     let _ = ctrlc::set_handler(|| commands::stop::on_ctrl_c(INTERRUPTED));
     let result = match cli.command {
@@ -72,16 +80,32 @@ fn main() -> ExitCode {
         Command::Rig(args) => rig::run(args),
         Command::Listen(args) => listen::run(args),
         Command::Export(args) => export::run(args),
+        Command::Record(args) => record::run(args),
     };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(_) if stretch_data::interrupted() => ExitCode::from(INTERRUPTED),
-        // whoever reads our output has gone: nothing is wrong
-        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("stretch: {}", message(&error));
+    // whoever read our output has gone: nothing is wrong
+    let is_unread = display::lost() == Some(ErrorKind::BrokenPipe);
+    match (result, display::lost()) {
+        (Err(_), _) if stretch_data::interrupted() => ExitCode::from(INTERRUPTED),
+        (Err(error), _) if is_unread && is_broken_pipe(&error) => ExitCode::SUCCESS,
+        (Err(error), _) => {
+            display::warn(format!("stretch: {}", message(&error)));
             ExitCode::FAILURE
         }
+        (Ok(()), Some(kind)) if !is_unread => {
+            let files = "what was to be written into files is";
+            display::warn(format!("stretch: standard output took not all: {kind}; {files}"));
+            ExitCode::FAILURE
+        }
+        (Ok(()), _) => ExitCode::SUCCESS,
+    }
+}
+
+/// Help that was asked for, or what is wrong with the arguments.
+fn explain(told: &clap::Error) -> ExitCode {
+    match told.print() {
+        _ if told.use_stderr() => ExitCode::from(2),
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => ExitCode::FAILURE,
+        _ => ExitCode::SUCCESS,
     }
 }
 

@@ -168,7 +168,7 @@ fn a_folder_that_exists_and_a_newer_record_are_refused() {
     assert_eq!(fs::read_to_string(out.join("stretch.h")).unwrap(), "mine");
 
     let newer =
-        fs::read_to_string(&calibration).unwrap().replace("\"schema\": 1", "\"schema\": 99");
+        fs::read_to_string(&calibration).unwrap().replace("\"schema\": 2", "\"schema\": 99");
     let newer = scratch.write("newer.json", newer);
     let before = scratch.names();
     fails(&mut export(&newer, &scratch.path("d")), &["newer.json", "schema", "99"]);

@@ -4,9 +4,8 @@ mod support;
 
 use std::path::{Path, PathBuf};
 
-use postcard::from_bytes;
 use stretch_calibrate::{parse_adc, read_calibration};
-use stretch_core::{Calibration, Design, Runner, Stage, Volts};
+use stretch_core::{Calibration, Design, Runner, Stage, Volts, record::load};
 use stretch_filter::RateFilter;
 use stretch_receptor::{
     ObserverReceptor, Reading, StretchReceptor, Withheld,
@@ -69,7 +68,7 @@ fn an_observer_runs_from_its_record_as_it_does_in_floats() {
     let (fit, test) = (scratch.loops("a.csv", 40.0, 1.1), scratch.loops("b.csv", 40.0, 1.5));
     for model in ["observer", "observer+rest"] {
         let (calibration, bytes) = records(&scratch, &fit, model, "FixedObserver");
-        let fixed: FixedObserver = from_bytes(&bytes).unwrap();
+        let fixed: FixedObserver = load(&bytes).unwrap();
         let float = ObserverReceptor::<f64>::new(&calibration).unwrap();
         let errors = apart(fixed, float, &codes(&test));
         assert_eq!(errors.len(), 4000, "an observer needs no warm-up");
@@ -88,7 +87,7 @@ fn a_line_and_surfaces_run_from_their_records_within_their_bound() {
     let (fit, test) = (scratch.loops("a.csv", 40.0, 1.1), scratch.loops("b.csv", 40.0, 1.5));
     for model in ["linear", "poly13"] {
         let (calibration, bytes) = records(&scratch, &fit, model, "FixedCalibration<11, 2>");
-        let fixed: FixedCalibration<11, 2> = from_bytes(&bytes).unwrap();
+        let fixed: FixedCalibration<11, 2> = load(&bytes).unwrap();
         let rate = RateFilter::<f64>::new(calibration.rate_estimator, calibration.sample_rate_hz);
         let float = StretchReceptor::with_rate(&calibration, rate.unwrap()).unwrap();
         let errors = apart(FixedReceptor::new(fixed), float, &codes(&test));

@@ -18,7 +18,9 @@ use rustix::{
     pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt},
     termios,
 };
-use stretch_calibrate::{BoardReceptor, ModelKind, fixed_record, read_calibration};
+use stretch_calibrate::{
+    BoardReceptor, ModelKind, calibration_to_json, fixed_record, read_calibration,
+};
 use stretch_core::{Calibration, Runner, Volts};
 use stretch_data::{ReadOptions, Trial};
 use stretch_link::Frame;
@@ -94,7 +96,7 @@ impl Listener {
     }
 
     fn start() -> (Self, File) {
-        Self::start_with(&serde_json::to_vec(&example_calibration()).unwrap())
+        Self::start_with(calibration_to_json(&example_calibration()).unwrap().as_bytes())
     }
 
     fn start_with(record: &[u8]) -> (Self, File) {
@@ -251,6 +253,75 @@ fn a_start_that_fails_leaves_nothing_behind() {
     }
 }
 
+/// Listens to bytes on standard input and records them; what it said, and what is recorded.
+fn heard(bytes: &[u8]) -> (String, String) {
+    let scratch = Scratch::new();
+    scratch.write("cal.json", calibration_to_json(&example_calibration()).unwrap());
+    scratch.write("frames", bytes);
+    let output = support::stretch()
+        .current_dir(scratch.path(""))
+        .args(["listen", "--port", "frames", "--calibration", "cal.json", "--out", "trial.csv"])
+        .output()
+        .unwrap();
+    assert!(output.status.success());
+    let recorded = fs::read_to_string(scratch.path("trial.csv")).unwrap_or_default();
+    (String::from_utf8_lossy(&output.stderr).into_owned(), recorded)
+}
+
+#[test]
+fn codes_beyond_the_converter_are_counted_and_nothing_is_called_compared() {
+    let mut frames = board(200);
+    frames.iter_mut().filter(|frame| frame.code >= 0).for_each(|frame| frame.code += 5000);
+    let bytes: Vec<u8> = frames.iter().flat_map(line).collect();
+    let (notes, recorded) = heard(&bytes);
+    assert!(notes.contains("198 codes up to"), "{notes}");
+    assert!(
+        notes.contains("beyond a converter of 12 bits") && notes.contains("--adc-bits"),
+        "{notes}"
+    );
+    assert!(notes.contains("2 samples that the board did not get"), "{notes}");
+    assert!(notes.contains("no estimate was compared") && !notes.contains("differs"), "{notes}");
+    assert!(recorded.is_empty());
+    // one among good ones
+    let mut frames = board(200);
+    frames[20].code = 4096;
+    let bytes: Vec<u8> = frames.iter().flat_map(line).collect();
+    let (notes, recorded) = heard(&bytes);
+    assert!(notes.contains("; 197 rows recorded;"), "{notes}");
+    assert!(notes.contains("; 1 codes up to 4096 are beyond"), "{notes}");
+    assert_eq!(recorded.lines().count(), 198);
+}
+
+#[test]
+fn a_last_frame_without_newline_and_a_block_that_comes_twice_are_counted() {
+    let frames = board(50);
+    let bytes: Vec<u8> = frames.iter().flat_map(line).collect();
+    let (notes, recorded) = heard(&bytes[..bytes.len() - 1]);
+    assert!(notes.contains("50 frames, 0 lost, 0 damaged") && notes.contains("50 rows"), "{notes}");
+    assert_eq!(without_time(&recorded), rows(&frames));
+    let (notes, _) = heard(&bytes[..bytes.len() - 5]);
+    assert!(notes.contains("49 frames, 0 lost, 1 damaged"), "{notes}");
+    let replayed = frames[..30].iter().chain(&frames[28..]).flat_map(line).collect::<Vec<u8>>();
+    let (notes, recorded) = heard(&replayed);
+    assert!(notes.contains("50 frames, 0 lost, 0 damaged, 2 repeated, 0 restarts"), "{notes}");
+    assert_eq!(without_time(&recorded), rows(&frames));
+}
+
+#[test]
+fn a_folder_is_no_port() {
+    let scratch = Scratch::new();
+    scratch.write("cal.json", calibration_to_json(&example_calibration()).unwrap());
+    let mut command = support::stretch();
+    command.current_dir(scratch.path("")).args([
+        "listen",
+        "--port",
+        ".",
+        "--calibration",
+        "cal.json",
+    ]);
+    support::fails(&mut command, &[".", "it is a folder", "name a serial port"]);
+}
+
 #[test]
 fn faults_lose_their_own_frames_and_no_others() {
     let frames = board(400);
@@ -326,7 +397,7 @@ fn killed_outright_it_leaves_every_whole_line() {
 #[test]
 fn standard_input_ends_with_its_stream_and_a_record_is_never_overwritten() {
     let folder = tempfile::tempdir().unwrap();
-    let calibration = serde_json::to_string(&example_calibration()).unwrap();
+    let calibration = calibration_to_json(&example_calibration()).unwrap();
     fs::write(folder.path().join("cal.json"), calibration).unwrap();
     let frames = board(50);
     let run = |out: &str| {
@@ -359,7 +430,7 @@ fn standard_input_ends_with_its_stream_and_a_record_is_never_overwritten() {
 #[test]
 fn on_a_terminal_it_plots() {
     let folder = tempfile::tempdir().unwrap();
-    let calibration = serde_json::to_string(&example_calibration()).unwrap();
+    let calibration = calibration_to_json(&example_calibration()).unwrap();
     fs::write(folder.path().join("cal.json"), calibration).unwrap();
     let mut port = plug(&folder.path().join("port"));
     let mut terminal = plug(&folder.path().join("terminal"));

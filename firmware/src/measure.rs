@@ -88,9 +88,9 @@ pub fn replay<D, M: ?Sized, I, R, E: Length>(
     }
 }
 
-/// A record from flash.
+/// A record from flash, its seal checked.
 pub fn load<'a, T: serde::Deserialize<'a>>(record: &'a [u8]) -> T {
-    postcard::from_bytes(record).expect("a valid record")
+    stretch_core::record::load(record).expect("a sound record")
 }
 
 /// The `main` of a program that replays the trial through a design, once for each

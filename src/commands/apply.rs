@@ -1,19 +1,22 @@
 //! `stretch apply`: a calibration on a trial, or live on standard input.
 
 use std::{
-    io::{self, BufRead, BufReader, Read, Write},
+    io::{self, BufRead, BufReader, BufWriter, Read, Write},
     path::PathBuf,
 };
 
-use stretch_calibrate::{Applied, LiveReceptor, apply, pressure_column, read_calibration};
+use stretch_calibrate::{
+    Applied, LiveReceptor, apply, not_its_own, pressure_column, read_calibration,
+};
 use stretch_core::{Calibration, Model};
 use stretch_data::{ReadOptions, Recording, RowReader, Trial, push_number, write_whole};
-use stretch_receptor::{Reading, Withheld};
+use stretch_receptor::{Domain, Reading, Withheld};
 
 use super::{
     reading::{Recorded, read_recording, told},
     stop::RecordedInput,
 };
+use crate::display::{Output, warn};
 
 /// Turn a trial's voltage into length, or a stream's as it comes
 ///
@@ -53,7 +56,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     if args.trial.as_os_str() == "-" {
         let path = args.out.as_ref().filter(|path| path.as_os_str() != "-");
         return match path {
-            None => live(&calibration, io::stdin(), &options, &mut io::stdout().lock()),
+            None => live(&calibration, io::stdin(), &options, &mut Output),
             Some(path) => {
                 let mut result = Ok(());
                 write_whole(path, |out| {
@@ -66,21 +69,62 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
     let trial = read_recording(&args.trial, &options)?;
     let applied = apply(&calibration, &trial)?;
-    let out = args.out.as_deref().unwrap_or("-".as_ref());
-    write_whole(out, |out| write_all(&calibration, &trial, &applied, out))?;
-    tell(&trial, &applied);
+    match args.out.as_ref().filter(|path| path.as_os_str() != "-") {
+        Some(path) => write_whole(path, |out| write_all(&calibration, &trial, &applied, out))?,
+        None => {
+            let mut out = BufWriter::new(Output);
+            write_all(&calibration, &trial, &applied, &mut out)?;
+            out.flush()?;
+        }
+    }
+    tell(&applied);
     Ok(())
 }
 
-fn tell(trial: &Trial, applied: &Applied) {
-    let withheld = applied.readings.iter().filter(|r| r.is_err()).count();
+/// What came of a trial, on standard error.
+fn tell(applied: &Applied) {
     let faults = applied.faults;
-    eprintln!(
-        "{} samples: {withheld} without an estimate; time stamps: {} missing, {} early or late",
-        trial.len(),
+    let mut seen = Seen::default();
+    applied.readings.iter().for_each(|reading| seen.take(reading));
+    warn(format!(
+        "{}; time stamps: {} missing, {} early or late",
+        seen.line(),
         faults.missing,
         faults.jittered,
-    );
+    ));
+    seen.doubt();
+}
+
+/// What came of the samples.
+#[derive(Debug, Default)]
+struct Seen {
+    samples: u64,
+    withheld: u64,
+    clamped: u64,
+}
+
+impl Seen {
+    fn take(&mut self, reading: &Result<Reading, Withheld>) {
+        self.samples += 1;
+        match reading {
+            Ok(reading) => self.clamped += u64::from(reading.domain != Domain::Inside),
+            Err(_) => self.withheld += 1,
+        }
+    }
+
+    fn line(&self) -> String {
+        let Self { samples, withheld, clamped } = self;
+        format!(
+            "{samples} samples: {withheld} without an estimate, {clamped} outside of what was calibrated"
+        )
+    }
+
+    /// Says so where the log does not look like one of the calibration's.
+    fn doubt(&self) {
+        if let Some(doubt) = not_its_own(self.clamped, self.samples - self.withheld) {
+            warn(format!("stretch: {doubt}"));
+        }
+    }
 }
 
 /// Answers each line as it comes.
@@ -96,14 +140,14 @@ fn live(
         let trial = told(Recording::from_reader(input, "standard input", options)?);
         let applied = apply(calibration, &trial)?;
         write_all(calibration, &trial, &applied, out)?;
-        tell(&trial, &applied);
+        tell(&applied);
         return Ok(());
     }
     let mut receptor = LiveReceptor::new(calibration)?;
     let mut rows = RowReader::new(input, "standard input", options)?;
     out.write_all(header(calibration).as_bytes())?;
     out.flush()?;
-    let mut line = Vec::new();
+    let (mut line, mut seen) = (Vec::new(), Seen::default());
     while let Some(row) = rows.next_row() {
         match row {
             Ok(row) => {
@@ -111,15 +155,17 @@ fn live(
                     receptor.feel(*pressure);
                 }
                 let reading = receptor.step(row.time_s, row.values[0]);
+                seen.take(&reading);
                 line.clear();
                 push_line(&mut line, row.time_s, &reading, knows_sd(calibration));
                 out.write_all(&line)?;
                 out.flush()?;
             }
-            Err(error) if error.is_row() => eprintln!("stretch: {error}"),
+            Err(error) if error.is_row() => warn(format!("stretch: {error}")),
             Err(error) => return Err(error.into()),
         }
     }
+    seen.doubt();
     Ok(())
 }
 

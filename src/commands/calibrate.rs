@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context as _;
+use anyhow::{Context as _, bail};
 use clap::ValueEnum;
 use serde::Serialize;
 use stretch_calibrate::{
     Calibrated, Candidate, FitReport, Memory, ModelChoice, ModelKind, ModelRow, Options, Robust,
-    SpellingError, SplitBy, calibrate, choose_model, evaluate, fixed_record, parse_adc, parse_rate,
-    rank_signals, write_calibration,
+    SpellingError, SplitBy, calibrate, choose_model, evaluate, explains_little, explains_nothing,
+    fixed_record, parse_adc, parse_rate, rank_signals, without_wild, write_calibration,
 };
 use stretch_core::{Normalisation, RateEstimator, RateSource};
 use stretch_data::{ReadOptions, Split, Trial, write_whole};
@@ -110,6 +110,9 @@ pub(crate) struct Args {
     #[arg(long, default_value = "12,0,3.3", value_name = "BITS,ZERO_V,FULL_SCALE_V",
           value_parser = parse_adc, requires = "fixed")]
     adc: Adc,
+    /// Write a calibration that explains nothing, too
+    #[arg(long)]
+    force: bool,
     /// Where a report with pictures goes
     #[arg(long, value_name = "r.html")]
     report: Option<PathBuf>,
@@ -252,6 +255,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         }
     }
     let trials = read_trials(&args.trials, Split::Fit, &columns)?;
+    // signals that are only candidates may be anything
+    let named = [args.reference.as_str(), args.signal.as_str()];
+    let (trials, wild) = without_wild(&trials, &named);
     let candidates = args.candidates(&trials);
     let ranking = if candidates.is_empty() {
         Vec::new()
@@ -271,6 +277,12 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         options.model = choice.model;
     }
     let mut calibrated = calibrate(&trials, &options)?;
+    calibrated.notes.splice(0..0, wild);
+    match explains_nothing(&calibrated.fits) {
+        Some(why) if args.force => calibrated.notes.push(format!("{why}; written by --force")),
+        Some(why) => bail!("nothing is written: {why}; --force writes it all the same"),
+        None => calibrated.notes.extend(explains_little(&calibrated.fits)),
+    }
     calibrated.notes.extend(causes.notes);
     calibrated.notes.extend(choice.iter().flat_map(|choice| choice.notes.clone()));
     // nothing is written when a part of what was asked for cannot be

@@ -2,13 +2,16 @@
 
 use std::path::PathBuf;
 
-use stretch_calibrate::{Evaluation, MethodErrors, evaluate, read_calibration};
+use stretch_calibrate::{
+    Evaluation, MethodErrors, evaluate, not_its_own, read_calibration, worse_than_the_mean,
+};
 use stretch_data::Split;
 
 use super::{
     reading::{Recorded, read_trials},
     shared::{say, say_json, short_name},
 };
+use crate::display::warn;
 use crate::table::{maybe, number, p_value, table};
 
 /// Judge calibrations on trials that have a reference
@@ -48,6 +51,13 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let trials = read_trials(&args.trials, Split::Test, &columns)?;
     let named: Vec<_> = calibrations.iter().map(|(name, c)| (name.as_str(), c)).collect();
     let evaluation = evaluate(&named, &trials)?;
+    // on standard error, so that a table and JSON are what they were
+    for errors in evaluation.pooled.iter().filter(|errors| errors.method != "raw") {
+        let doubts = [not_its_own(errors.clamped, errors.samples), worse_than_the_mean(errors)];
+        for doubt in doubts.into_iter().flatten() {
+            warn(format!("stretch: {}: {doubt}", errors.method));
+        }
+    }
     if args.json {
         return say_json(&evaluation);
     }

@@ -5,26 +5,27 @@ mod record;
 mod screen;
 mod status;
 mod twin;
+mod view;
 
 use std::{
-    io::{self, BufWriter, IsTerminal, StdoutLock, Write},
     path::{Path, PathBuf},
     sync::mpsc::RecvTimeoutError,
     time::{Duration, Instant},
 };
 
 use anyhow::Context;
-use stretch_link::{Answer, Counts, Decoder, Event};
+use stretch_link::{Answer, Decoder, Event};
 use stretch_receptor::code::{Adc, AdcCode, AdcSpec};
 
 use self::{
     port::Heard,
     record::{Clock, Recording, Sample},
-    screen::Screen,
     status::Status,
     twin::Twin,
+    view::View,
 };
 use super::stop;
+use crate::display::warn;
 
 /// Show and record what a board sends over its serial port
 ///
@@ -34,6 +35,9 @@ use super::stop;
 /// port that goes away is opened again when it comes back. Ctrl-C (or q) ends it.
 ///
 ///   stretch listen --port /dev/ttyACM0 --calibration cal.json --out trial.csv
+///
+/// What is recorded does not depend on what is shown: a reader of standard output that is slow or
+/// goes away costs no row of --out. A code that the converter of --adc-bits cannot give is counted.
 ///
 /// The board's estimates are compared with those of the calibration here, and
 /// the largest difference is told: is it the calibration that the board runs? Any
@@ -80,52 +84,67 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let recording = args.out.as_deref().map(create).transpose();
     let mut recording = recording.with_context(|| cannot_record(args.out.as_deref()))?;
     stop::record();
-    let mut view = match View::open(&twin, &header) {
-        Ok(view) => view,
-        Err(error) => {
-            recording.into_iter().for_each(Recording::discard);
-            return Err(error);
-        }
-    };
+    let mut view = View::open(&twin, &header, recording.is_some())?;
     if !twin.answers() {
         view.note("the calibration's rate looks a sample ahead: estimates are not compared");
     }
     let mut session = Session::new(twin, adc);
     let mut result = Ok(());
-    while !stop::ended() && !view.asked_to_stop()? {
-        match heard.recv_timeout(Duration::from_millis(50)) {
+    while !stop::ended() && !view.asked_to_stop() {
+        let is_last = match heard.recv_timeout(Duration::from_millis(50)) {
             Ok(Heard::Bytes(bytes)) => {
                 let samples = session.take(&bytes);
-                // what came is recorded before it is shown
-                if let Some(recording) = &mut recording {
-                    result = samples.iter().try_for_each(|sample| recording.push(sample));
-                    if result.is_err() {
-                        break;
-                    }
-                }
-                view.push(&samples)?;
+                result = keep(&samples, &mut recording, &mut view);
+                false
             }
             Ok(Heard::Connected) => {
                 session.status.connected = true;
                 view.note(&format!("{shown_port}: connected"));
+                false
             }
             Ok(Heard::Disconnected(why)) => {
-                session.disconnected();
+                let last = session.disconnected();
+                result = keep(last.as_slice(), &mut recording, &mut view);
                 view.note(&format!("{shown_port}: {why}; waiting for it"));
+                false
             }
-            Ok(Heard::Ended) | Err(RecvTimeoutError::Disconnected) => break,
-            Err(RecvTimeoutError::Timeout) => {}
+            Ok(Heard::Ended) | Err(RecvTimeoutError::Disconnected) => {
+                let last = session.disconnected();
+                result = keep(last.as_slice(), &mut recording, &mut view);
+                true
+            }
+            Err(RecvTimeoutError::Timeout) => false,
+        };
+        view.draw(&session.status);
+        // without a recording, what nobody sees is for nobody
+        if is_last || result.is_err() || (recording.is_none() && view.is_gone()) {
+            break;
         }
-        view.draw(&session.status)?;
     }
-    drop(view);
+    // safe on the disk before anybody is waited for
+    session.status.rows = recording.as_ref().map(Recording::rows);
+    let finished = recording.map_or(Ok(()), Recording::finish);
+    let unseen = view.close();
     session.status.connected = true;
-    eprintln!("{}", session.status.line());
-    if let Some(recording) = recording {
-        result
-            .and_then(|()| recording.finish())
-            .with_context(|| cannot_record(args.out.as_deref()))?;
+    warn(session.status.line());
+    if unseen > 0 {
+        warn(format!(
+            "stretch: {unseen} rows were recorded and not shown: standard output is not read"
+        ));
     }
+    result.and(finished).with_context(|| cannot_record(args.out.as_deref()))
+}
+
+/// What came is recorded before it is shown.
+fn keep(
+    samples: &[Sample],
+    recording: &mut Option<Recording>,
+    view: &mut View,
+) -> std::io::Result<()> {
+    if let Some(recording) = recording {
+        samples.iter().try_for_each(|sample| recording.push(sample))?;
+    }
+    view.push(samples);
     Ok(())
 }
 
@@ -146,10 +165,9 @@ struct Session {
 impl Session {
     fn new(twin: Twin, adc: Adc) -> Self {
         let status = Status {
-            connected: false,
-            counts: Counts::default(),
-            difference: twin.answers().then_some(0.0),
-            unit: twin.unit.clone(),
+            compared: twin.answers().then_some((0, 0.0)),
+            adc_bits: adc.spec().bits,
+            ..Status::of(&twin.unit)
         };
         // a record that does not say: a tick of the board's clock
         let clock = Clock::new(twin.period_s.unwrap_or(1e-3));
@@ -159,21 +177,33 @@ impl Session {
     fn take(&mut self, bytes: &[u8]) -> Vec<Sample> {
         let mut samples = Vec::new();
         for &byte in bytes {
-            let Some(event) = self.decoder.push(byte) else { continue };
-            let Some(frame) = event.frame() else { continue };
-            if !matches!(event, Event::Frame(_)) {
-                // the board has seen samples that did not arrive here, or forgot those
-                // that did: both agree again when the window has filled
-                self.twin.reset();
-            }
-            let restarted = matches!(event, Event::Restarted(_));
-            let time_s = self.clock.time_s(frame.time_ms, restarted, Instant::now());
-            let sample = Sample::new(time_s, frame, &self.adc);
-            self.compare(&sample);
-            samples.push(sample);
+            let event = self.decoder.push(byte);
+            samples.extend(event.and_then(|event| self.sample(event)));
         }
         self.status.counts = self.decoder.counts();
         samples
+    }
+
+    fn sample(&mut self, event: Event) -> Option<Sample> {
+        let frame = event.frame()?;
+        if !matches!(event, Event::Frame(_)) {
+            // the board has seen samples that did not arrive here, or forgot those
+            // that did: both agree again when the window has filled
+            self.twin.reset();
+        }
+        let restarted = matches!(event, Event::Restarted(_));
+        let time_s = self.clock.time_s(frame.time_ms, restarted, Instant::now());
+        let sample = Sample::new(time_s, frame, &self.adc);
+        match frame.code {
+            code if code < 0 => self.status.missing += 1,
+            code if sample.signal.is_none() => {
+                self.status.beyond += 1;
+                self.status.largest = self.status.largest.max(code);
+            }
+            _ => {}
+        }
+        self.compare(&sample);
+        Some(sample)
     }
 
     /// Where both have an estimate on the same branch, by how much they differ.
@@ -185,70 +215,17 @@ impl Session {
         };
         if let (Some(theirs), true) = (sample.estimate, branch == own) {
             let difference = (theirs - ours).abs();
-            self.status.difference = self.status.difference.map(|most| most.max(difference));
+            let compared = self.status.compared.map(|(n, most)| (n + 1, most.max(difference)));
+            self.status.compared = compared;
         }
     }
 
-    fn disconnected(&mut self) {
-        let _ = self.decoder.disconnected();
+    /// No byte follows what was begun: the last frame may lack its newline.
+    fn disconnected(&mut self) -> Option<Sample> {
+        let last = self.decoder.disconnected();
+        let last = last.and_then(|event| self.sample(event));
         self.status.counts = self.decoder.counts();
         self.status.connected = false;
-    }
-}
-
-/// A plot on a terminal, lines elsewhere.
-enum View {
-    Screen { screen: Box<Screen>, drawn: Instant },
-    Lines { out: BufWriter<StdoutLock<'static>>, line: Vec<u8> },
-}
-
-impl View {
-    fn open(twin: &Twin, header: &str) -> anyhow::Result<Self> {
-        if io::stdout().is_terminal() && io::stdin().is_terminal() {
-            let screen = Box::new(Screen::open(twin).context("the terminal")?);
-            return Ok(Self::Screen { screen, drawn: Instant::now() });
-        }
-        let mut out = BufWriter::new(io::stdout().lock());
-        out.write_all(header.as_bytes())?;
-        out.flush()?;
-        Ok(Self::Lines { out, line: Vec::new() })
-    }
-
-    fn push(&mut self, samples: &[Sample]) -> io::Result<()> {
-        match self {
-            Self::Screen { screen, .. } => samples.iter().for_each(|sample| screen.push(sample)),
-            Self::Lines { out, line } => {
-                for sample in samples {
-                    line.clear();
-                    sample.push_line(line);
-                    out.write_all(line)?;
-                }
-                out.flush()?;
-            }
-        }
-        Ok(())
-    }
-
-    fn note(&self, text: &str) {
-        if let Self::Lines { .. } = self {
-            eprintln!("stretch: {text}");
-        }
-    }
-
-    fn draw(&mut self, status: &Status) -> io::Result<()> {
-        match self {
-            Self::Screen { screen, drawn } if drawn.elapsed() >= Duration::from_millis(50) => {
-                *drawn = Instant::now();
-                screen.draw(status)
-            }
-            _ => Ok(()),
-        }
-    }
-
-    fn asked_to_stop(&self) -> io::Result<bool> {
-        match self {
-            Self::Screen { screen, .. } => screen.asked_to_stop(),
-            Self::Lines { .. } => Ok(false),
-        }
+        last
     }
 }

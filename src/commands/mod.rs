@@ -19,6 +19,7 @@ pub(crate) mod listen;
 pub(crate) mod paper;
 mod rails;
 mod reading;
+pub(crate) mod record;
 pub(crate) mod rig;
 pub(crate) mod shared;
 pub(crate) mod simulate;

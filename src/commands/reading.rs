@@ -6,6 +6,7 @@ use clap::ValueEnum;
 use stretch_data::{DataError, DataSet, ReadOptions, Recording, Split, TimeUnit, Trial};
 
 use super::shared::progress;
+use crate::display::warn;
 
 /// Options for recordings that do not say all of themselves.
 #[derive(clap::Args)]
@@ -74,7 +75,7 @@ pub(crate) fn read_recording(path: &Path, options: &ReadOptions) -> Result<Trial
 /// The trial of a recording, whose notes are told.
 pub(crate) fn told(Recording { trial, notes }: Recording) -> Trial {
     for note in notes {
-        eprintln!("note: {}: {note}", trial.name);
+        warn(format!("note: {}: {note}", trial.name));
     }
     trial
 }

@@ -52,6 +52,18 @@ pub enum BenchError {
     },
 }
 
+/// Refuses a sample time outside 1e-3 .. 1e7 Hz, before anything is counted in samples of it: stamps of another unit.
+pub(crate) fn check_rate(dt_s: f64) -> Result<(), BenchError> {
+    if (1e-7..=1e3).contains(&dt_s) {
+        return Ok(());
+    }
+    Err(BenchError::Implausible {
+        column: "time_s".into(),
+        found: format!("a sample every {dt_s} s"),
+        hint: "rates from 0.001 to 10 000 000 Hz are understood; is the time in seconds?".into(),
+    })
+}
+
 impl From<BenchError> for GapError {
     fn from(error: BenchError) -> Self {
         Self::simulator(error)

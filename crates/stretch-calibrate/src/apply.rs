@@ -113,6 +113,7 @@ pub struct Applied {
 /// [`CalibrateError::Data`] when the trial lacks the signal,
 /// [`CalibrateError::Filter`] when the estimator cannot be designed.
 pub fn apply(calibration: &Calibration, trial: &Trial) -> Result<Applied, CalibrateError> {
+    trial.check_lengths()?;
     let signal = trial.require(calibration.signal.as_str())?;
     if calibration.rate_estimator == RateEstimator::CentralDifference {
         let rate = calibration.sample_rate_hz;

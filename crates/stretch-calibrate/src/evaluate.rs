@@ -131,6 +131,7 @@ pub fn evaluate(
     let mut tests = Tests::new(names.len(), first.sample_rate_hz.hz());
     let mut rows = Vec::new();
     for trial in trials {
+        trial.check_lengths()?;
         let reference = trial.require(first.reference.as_str())?;
         let mut methods = vec![raw(first, trial)?];
         for (_, calibration) in calibrations {

@@ -3,7 +3,7 @@
 use std::{fmt, path::Path};
 
 use serde::Serialize;
-use stretch_core::{Calibration, DesignError, Model, RateEstimator, Runner, Stage};
+use stretch_core::{Calibration, Model, RateEstimator, Runner, Stage, record};
 use stretch_receptor::{
     Withheld,
     code::{
@@ -30,7 +30,7 @@ pub enum RecordNumbers {
 /// A record for a board, and what reads it there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FixedRecord {
-    /// The record in postcard: about 100 bytes, of an observer 450.
+    /// The record in postcard under its seal: about 100 bytes, of an observer 450.
     pub bytes: Vec<u8>,
     /// The type in [`stretch_receptor::code`] that it is a record of.
     pub read_as: String,
@@ -59,7 +59,7 @@ pub struct FixedRecord {
 /// let adc = parse_adc("12,0,3.3")?;
 /// let record = fixed_record(&calibration, &adc)?;
 /// assert_eq!(record.read_as, "FixedObserver");
-/// let on_board: FixedObserver = postcard::from_bytes(&record.bytes)?;
+/// let on_board: FixedObserver = stretch_core::record::load(&record.bytes)?;
 /// assert_eq!(on_board, FixedObserver::new(&calibration, &adc)?);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -80,7 +80,7 @@ pub fn fixed_record(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord,
         }
         Model::Observer(_) => {
             let fixed = FixedObserver::new(calibration, adc).map_err(CalibrateError::Fixed)?;
-            record("FixedObserver".into(), &fixed, RecordNumbers::Observer(*fixed.model()))
+            made("FixedObserver".into(), &fixed, RecordNumbers::Observer(*fixed.model()))
         }
         Model::Blended { .. } => none("a blended model".into()),
         Model::History(_) => none("a model that remembers, other than the observer,".into()),
@@ -130,19 +130,17 @@ fn surface<const WINDOW: usize, const DEGREE: usize>(
     let fixed = FixedCalibration::<WINDOW, DEGREE>::new(calibration, adc);
     let fixed = fixed.map_err(CalibrateError::Fixed)?;
     let read_as = format!("FixedCalibration<{WINDOW}, {DEGREE}>");
-    record(read_as, &fixed, RecordNumbers::Rated(fixed.numbers()))
+    made(read_as, &fixed, RecordNumbers::Rated(fixed.numbers()))
 }
 
-fn record<T: Serialize>(
+fn made<T: Serialize>(
     read_as: String,
     fixed: &T,
     numbers: RecordNumbers,
 ) -> Result<FixedRecord, CalibrateError> {
     let mut buffer = [0; BYTES];
     // there is room for every number: this cannot fail
-    let bytes = postcard::to_slice(fixed, &mut buffer)
-        .map_err(|_| DesignError::TooLarge { field: "fixed.record", asked: BYTES + 1, most: BYTES })
-        .map_err(CalibrateError::Fixed)?;
+    let bytes = record::store(fixed, &mut buffer).map_err(CalibrateError::Fixed)?;
     Ok(FixedRecord { bytes: bytes.to_vec(), read_as, numbers })
 }
 
@@ -171,7 +169,7 @@ impl BoardReceptor {
     /// [`fixed_record`] does not write.
     pub fn new(bytes: &[u8]) -> Option<Self> {
         rated_receptor(bytes).or_else(|| {
-            let observer: FixedObserver = postcard::from_bytes(bytes).ok()?;
+            let observer: FixedObserver = record::load(bytes).ok()?;
             let adc_bits = observer.adc_bits();
             Some(Self { adc_bits, running: Box::new(Runner::new(observer)) })
         })
@@ -204,7 +202,7 @@ impl BoardReceptor {
 fn surface_receptor<const WINDOW: usize, const DEGREE: usize>(
     bytes: &[u8],
 ) -> Option<BoardReceptor> {
-    let fixed: FixedCalibration<WINDOW, DEGREE> = postcard::from_bytes(bytes).ok()?;
+    let fixed: FixedCalibration<WINDOW, DEGREE> = record::load(bytes).ok()?;
     let running = Box::new(Runner::new(FixedReceptor::new(fixed)));
     Some(BoardReceptor { adc_bits: fixed.adc_bits(), running })
 }

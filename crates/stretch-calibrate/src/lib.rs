@@ -7,6 +7,7 @@ mod cause;
 mod choose;
 mod cost;
 mod diagnosed_fit;
+mod digest;
 mod error;
 mod evaluate;
 mod fitting;
@@ -26,6 +27,8 @@ mod rest;
 mod rising;
 mod series;
 mod split;
+mod wild;
+mod worth;
 
 pub use apply::{Applied, Faults, LiveReceptor, apply, pressure_column, rate_delay_s};
 pub use auto::{ModelChoice, ModelRow, choose_model};
@@ -39,4 +42,9 @@ pub use fitting::{Coefficient, FitReport, Order};
 pub use fixed_record::{BoardReceptor, FixedRecord, RecordNumbers, fixed_record, parse_adc};
 pub use options::{Memory, ModelKind, Options, Robust, SpellingError, SplitBy, parse_rate};
 pub use own_ranges::on_own_ranges;
-pub use record::{read_calibration, write_calibration};
+pub use record::{
+    RecordSummary, calibration_from_json, calibration_seal, calibration_to_json, describe_record,
+    read_calibration, seal_calibration, write_calibration,
+};
+pub use wild::without_wild;
+pub use worth::{explains_little, explains_nothing, not_its_own, worse_than_the_mean};

@@ -1,14 +1,24 @@
-//! Calibration records as files: JSON for people, postcard for a board.
+//! Calibration records as files: JSON for people, postcard for a board; both under a seal.
 
-use std::path::Path;
+use std::{fs, path::Path};
 
-use stretch_core::Calibration;
+use serde::Serialize;
+use stretch_core::{Calibration, CalibrationSpec, Schema, record};
 use stretch_data::{read_whole, write_whole};
 
-use crate::CalibrateError;
+use crate::{CalibrateError, digest};
 
 /// Room for the largest record in postcard: two poly55 surfaces and sixteen trials.
 const POSTCARD_BYTES: usize = 4096;
+
+/// What is asked of a record's seal.
+#[derive(Clone, Copy, PartialEq)]
+enum Seal {
+    /// To be that of the record.
+    Checked,
+    /// Nothing: the record was edited by hand.
+    Ignored,
+}
 
 fn is_postcard(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "postcard")
@@ -17,24 +27,66 @@ fn is_postcard(path: &Path) -> bool {
 /// A calibration from its record: postcard when the name ends in `.postcard`, else JSON.
 ///
 /// # Errors
-/// [`CalibrateError::Record`] with the file, the field and what is wrong with it.
+/// [`CalibrateError::Record`] with the file, the field and what is wrong with it: a seal that is
+/// not that of the record, too.
 pub fn read_calibration(path: &Path) -> Result<Calibration, CalibrateError> {
-    let file = path.display().to_string();
-    let problem = |problem| CalibrateError::Record { file: file.clone(), problem };
-    let bytes = read_whole(path).map_err(|e| {
-        problem(format!("cannot read it: {e}; name a record made by stretch calibrate"))
-    })?;
-    let unusable =
-        |cause: String| problem(format!("this is no calibration that can be used: {cause}"));
-    if is_postcard(path) {
-        return postcard::from_bytes(&bytes).map_err(|e| unusable(e.to_string()));
-    }
-    let mut json = serde_json::Deserializer::from_slice(&bytes);
-    serde_path_to_error::deserialize(&mut json).map_err(|error| {
-        let field = error.path().to_string();
-        let cause = error.into_inner();
-        unusable(if field == "." { cause.to_string() } else { format!("in {field}: {cause}") })
-    })
+    read(path, Seal::Checked)
+}
+
+/// A calibration from a record in JSON that is held in memory; `name` is what messages call it.
+///
+/// # Errors
+/// As [`read_calibration`].
+///
+/// ```
+/// use stretch_calibrate::{calibration_from_json, calibration_to_json};
+///
+/// let calibration = stretch_receptor::example_calibration();
+/// let text = calibration_to_json(&calibration)?;
+/// assert_eq!(calibration_from_json(&text, "cal.json")?, calibration);
+/// // edited by hand: `stretch record seal` renews the digest
+/// let edited = text.replace("\"dead_band\": 0", "\"dead_band\": 1");
+/// let error = calibration_from_json(&edited, "cal.json").unwrap_err().to_string();
+/// assert!(error.contains("stretch record seal cal.json"), "{error}");
+/// # Ok::<(), stretch_calibrate::CalibrateError>(())
+/// ```
+pub fn calibration_from_json(text: &str, name: &str) -> Result<Calibration, CalibrateError> {
+    from_json(text, name, Seal::Checked)
+}
+
+/// The record of a calibration in JSON, sealed.
+///
+/// # Errors
+/// None for a calibration: all of its numbers are finite.
+pub fn calibration_to_json(calibration: &Calibration) -> Result<String, CalibrateError> {
+    let problem = |problem| CalibrateError::Record { file: "record".to_owned(), problem };
+    let object = serde_json::to_string_pretty(&current(calibration.clone()));
+    let object = object.map_err(|error| problem(error.to_string()))?;
+    digest::join(&object).ok_or_else(|| problem("it is no object".to_owned()))
+}
+
+/// The number under which the record of a calibration is sealed: CRC-32C of its bytes in postcard.
+///
+/// Whoever holds the record in another form (constants in C, a board that is asked) says with it
+/// which calibration that is.
+///
+/// # Errors
+/// None for a calibration: there is room for the largest.
+pub fn calibration_seal(calibration: &Calibration) -> Result<u32, CalibrateError> {
+    let mut buffer = [0; POSTCARD_BYTES];
+    let bytes = record::store(&current(calibration.clone()), &mut buffer)?;
+    Ok(record::seal(bytes)?.unwrap_or_default())
+}
+
+/// Checks a record that was edited by hand, or is of an earlier schema, and writes it anew under a
+/// seal of today. A record in postcard that is damaged is refused: no hand edited it.
+///
+/// # Errors
+/// As [`read_calibration`] for all but the digest, and [`write_calibration`].
+pub fn seal_calibration(path: &Path) -> Result<Calibration, CalibrateError> {
+    let calibration = read(path, Seal::Ignored)?;
+    write_calibration(path, &calibration)?;
+    Ok(calibration)
 }
 
 /// Writes a calibration record, whole or not at all: postcard when the name ends
@@ -43,15 +95,104 @@ pub fn read_calibration(path: &Path) -> Result<Calibration, CalibrateError> {
 /// # Errors
 /// [`CalibrateError::Data`] with path and cause.
 pub fn write_calibration(path: &Path, calibration: &Calibration) -> Result<(), CalibrateError> {
-    write_whole(path, |out| {
-        if is_postcard(path) {
-            let mut buffer = [0; POSTCARD_BYTES];
-            let bytes =
-                postcard::to_slice(calibration, &mut buffer).map_err(std::io::Error::other)?;
-            return out.write_all(bytes);
-        }
-        serde_json::to_writer_pretty(&mut *out, calibration)?;
-        out.write_all(b"\n")
+    if is_postcard(path) {
+        let mut buffer = [0; POSTCARD_BYTES];
+        let bytes = record::store(&current(calibration.clone()), &mut buffer)?;
+        return Ok(write_whole(path, |out| out.write_all(bytes))?);
+    }
+    let text = calibration_to_json(calibration)?;
+    Ok(write_whole(path, |out| out.write_all(text.as_bytes()))?)
+}
+
+fn read(path: &Path, seal: Seal) -> Result<Calibration, CalibrateError> {
+    let file = path.display().to_string();
+    let problem = |problem| CalibrateError::Record { file: file.clone(), problem };
+    let bytes = read_whole(path).map_err(|e| {
+        problem(format!("cannot read it: {e}; name a record made by stretch calibrate"))
     })?;
-    Ok(())
+    if !is_postcard(path) {
+        let text = String::from_utf8(bytes);
+        let text = text.map_err(|e| problem(format!("{UNUSABLE}: it is no text: {e}")))?;
+        return from_json(&text, &file, seal);
+    }
+    // the parts, so that a message can name the field
+    let spec = record::load::<CalibrationSpec>(&bytes);
+    let made = spec.and_then(Calibration::new).map(current);
+    made.map_err(|e| problem(format!("{UNUSABLE}: {e}")))
+}
+
+const UNUSABLE: &str = "this is no calibration that can be used";
+
+fn from_json(text: &str, name: &str, seal: Seal) -> Result<Calibration, CalibrateError> {
+    let unusable = |cause: String| {
+        let problem = format!("{UNUSABLE}: {cause}");
+        CalibrateError::Record { file: name.to_owned(), problem }
+    };
+    let (object, found) = digest::split(text);
+    let mut json = serde_json::Deserializer::from_str(&object);
+    let parsed: Result<Calibration, _> = serde_path_to_error::deserialize(&mut json);
+    let calibration = parsed.map_err(|error| {
+        let field = error.path().to_string();
+        let cause = error.into_inner();
+        unusable(if field == "." { cause.to_string() } else { format!("in {field}: {cause}") })
+    })?;
+    json.end().map_err(|error| unusable(error.to_string()))?;
+    let computed = digest::digest(&object);
+    let advice = format!(
+        "check every number, then renew it with: stretch record seal {name}; or calibrate again"
+    );
+    match found {
+        _ if seal == Seal::Ignored => {}
+        Some(found) if found == computed => {}
+        Some(found) => {
+            return Err(unusable(format!(
+                "its digest is {found} and its text gives {computed}: it was edited or damaged; {advice}"
+            )));
+        }
+        // schema 1 had none
+        None if calibration.schema != Schema::CURRENT => {}
+        None => {
+            return Err(unusable(format!("it has no digest as its last field; {advice}")));
+        }
+    }
+    Ok(current(calibration))
+}
+
+/// The same under today's schema, whose fields are those of the earlier one.
+fn current(calibration: Calibration) -> Calibration {
+    calibration.under_current_schema()
+}
+
+/// What a record of any kind is.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct RecordSummary {
+    /// The model, or what reads it on a board.
+    pub kind: String,
+    /// CRC-32C of the record's bytes in postcard.
+    pub seal: u32,
+    /// Whether the file itself carries a seal: none of schema 1 does.
+    pub is_sealed: bool,
+}
+
+/// What the record of a file is: a calibration, or what `--fixed` wrote for a board.
+///
+/// # Errors
+/// As [`read_calibration`].
+pub fn describe_record(path: &Path) -> Result<RecordSummary, CalibrateError> {
+    if let Ok(bytes) = fs::read(path)
+        && let Some(receptor) = crate::BoardReceptor::new(&bytes)
+        && let Ok(found) = record::seal(&bytes)
+    {
+        let kind = format!("a receptor over codes of {} bits", receptor.adc_bits());
+        let seal = found.unwrap_or_else(|| record::checksum(&bytes));
+        return Ok(RecordSummary { kind, seal, is_sealed: found.is_some() });
+    }
+    let calibration = read_calibration(path)?;
+    let is_sealed = if is_postcard(path) {
+        fs::read(path).is_ok_and(|bytes| matches!(record::seal(&bytes), Ok(Some(_))))
+    } else {
+        fs::read_to_string(path).is_ok_and(|text| digest::split(&text).1.is_some())
+    };
+    let kind = format!("a calibration, {}", calibration.model.name());
+    Ok(RecordSummary { kind, seal: calibration_seal(&calibration)?, is_sealed })
 }

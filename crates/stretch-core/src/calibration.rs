@@ -1,9 +1,16 @@
 //! The calibration record: everything a receptor needs, and where it came from.
 
-use crate::{DesignError, Label, Model, Polarity, Provenance, Range, RateEstimator, SampleRate};
+use crate::{
+    DesignError, Label, Model, Polarity, Provenance, Range, RateEstimator, SampleRate,
+    folded::{Scales, line_holds, surface_holds},
+    sizes::{LEAST, MOST, RATES_HZ, extent, range},
+};
 
 /// The schema of calibration records that this release writes, and the newest it reads.
-pub const CALIBRATION_SCHEMA: u32 = 1;
+///
+/// 1: without a seal. 2: the same fields under a checksum, which whoever loads the bytes checks
+/// (`record::load`, or `stretch_calibrate::read_calibration`).
+pub const CALIBRATION_SCHEMA: u32 = 2;
 
 /// What is estimated, and how a normalised target becomes a number with a unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -123,7 +130,7 @@ pub struct CalibrationSpec {
     pub provenance: Provenance,
 }
 
-/// A checked calibration: every number finite and possible.
+/// A checked calibration: every number finite and possible, and so every reading.
 ///
 /// Serialised with serde as its [`CalibrationSpec`]: JSON on a desk, `postcard`
 /// on a board, where it loads without an allocator. A record that is not
@@ -166,7 +173,9 @@ pub struct CalibrationSpec {
 pub struct Calibration(CalibrationSpec);
 
 impl Calibration {
-    /// Checks the parts.
+    /// Checks the parts: every number finite, and of a size with which no finite sample can give a
+    /// reading that is not. Numbers with a unit are up to 1e9, those that are divided by from 1e-9,
+    /// rates 1e-3 to 1e7 Hz.
     ///
     /// # Errors
     /// [`DesignError`] that names the field.
@@ -177,12 +186,48 @@ impl Calibration {
         spec.rate_estimator.validate()?;
         DesignError::check("dead_band", spec.dead_band, spec.dead_band >= 0.0)?;
         spec.model.validate()?;
+        check_sizes(&spec)?;
         Ok(Self(spec))
+    }
+
+    /// The same record under the schema that this release writes: its fields are those of schema 1.
+    #[must_use]
+    pub fn under_current_schema(mut self) -> Self {
+        self.0.schema = Schema::CURRENT;
+        self
     }
 
     /// The parts, to change and check again.
     pub fn into_spec(self) -> CalibrationSpec {
         self.0
+    }
+}
+
+/// Every size that is not the model's alone.
+fn check_sizes(spec: &CalibrationSpec) -> Result<(), DesignError> {
+    let hz = spec.sample_rate_hz.hz();
+    DesignError::check("sample_rate_hz", hz, RATES_HZ.contains(&hz))?;
+    if let Target::Contraction { rest_length } = spec.target {
+        extent("target.rest_length", rest_length)?;
+    }
+    range(["signal_range", "span of signal_range"], &spec.signal_range)?;
+    range(["target_range", "span of target_range"], &spec.target_range)?;
+    // up to the largest signal in a sample; and a band that can be divided by, or none
+    let band = spec.dead_band;
+    let fits = band == 0.0 || (LEAST * LEAST..=MOST * RATES_HZ.end()).contains(&band);
+    DesignError::check("dead_band", band, fits)?;
+    let scales = Scales {
+        gain: spec.target.reference_per_target() * spec.target_range.span(),
+        zero: spec.target.to_reference(spec.target_range.offset()),
+        signal: spec.signal_range,
+    };
+    match &spec.model {
+        Model::Linear(line) => line_holds(&scales, line),
+        Model::Surfaces { inflation, deflation } | Model::Blended { inflation, deflation } => {
+            surface_holds(&scales, inflation)?;
+            surface_holds(&scales, deflation)
+        }
+        _ => Ok(()),
     }
 }
 

@@ -1,6 +1,9 @@
 //! A gauge described by its named defects, forwards, and a filter that asks which motion explains the signal.
 
-use crate::{DesignError, FitSummary, Interval, MAX_KNOTS, RestTracker, Values};
+use crate::{
+    DesignError, FitSummary, Interval, MAX_KNOTS, RestTracker, Values,
+    sizes::{MOST, apart, extent, size},
+};
 
 /// A pressure that strains the gauge: `u + c x (1 + bend (1 - x))`, `x = p/scale`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -151,6 +154,10 @@ impl DiagnosedMap {
             let step = pair[1] - pair[0];
             let is_on = step != 0.0 && (step > 0.0) == rises;
             DesignError::check("step of diagnosed.curve", step, is_on)?;
+            apart("step of diagnosed.curve", pair)?;
+        }
+        for &signal in self.curve.iter() {
+            size("diagnosed.curve", signal)?;
         }
         let drive = self.drive_domain.validate("diagnosed.drive_domain")?;
         let estimate = self.estimate_domain.validate("diagnosed.estimate_domain")?;
@@ -160,6 +167,9 @@ impl DiagnosedMap {
             if range.min >= range.max {
                 return Err(DesignError::EmptyRange { field, min: range.min, max: range.max });
             }
+            size(field, range.min)?;
+            size(field, range.max)?;
+            extent(field, range.max - range.min)?;
         }
         let skew = self.skew_s;
         DesignError::check("diagnosed.skew_s", skew, skew.abs() <= Self::MOST_SKEW_S)?;
@@ -172,32 +182,37 @@ impl DiagnosedMap {
             ("diagnosed.steady_s", self.steady_s),
             ("diagnosed.spread", self.spread),
         ] {
-            DesignError::check(field, value, value > 0.0)?;
+            extent(field, value)?;
         }
         Ok(())
     }
 
     fn check_defects(&self) -> Result<(), DesignError> {
-        let positive = |field, value: f64| DesignError::check(field, value, value > 0.0);
+        let positive = extent;
         if let Some(Crosstalk { c, bend, scale }) = self.crosstalk {
-            DesignError::check("diagnosed.crosstalk.c", c, true)?;
+            size("diagnosed.crosstalk.c", c)?;
             DesignError::check("diagnosed.crosstalk.bend", bend, bend.abs() <= 1.0)?;
             positive("diagnosed.crosstalk.scale", scale)?;
         }
         let knees = [self.slack_low, self.slack_high, self.floor, self.ceiling];
         for Knee { at, width } in knees.into_iter().flatten() {
-            DesignError::check("diagnosed knee's at", at, true)?;
+            size("diagnosed knee's at", at)?;
             positive("diagnosed knee's width", width)?;
         }
         for Plays { share, radii } in [self.slip, self.hysteresis].into_iter().flatten() {
             // A drive that falls while the target rises cannot be inverted.
             DesignError::check("diagnosed plays' share", share, (0.0..=1.0).contains(&share))?;
             for radius in radii {
-                DesignError::check("diagnosed plays' radii", radius, radius >= 0.0)?;
+                DesignError::check(
+                    "diagnosed plays' radii",
+                    radius,
+                    (0.0..=MOST).contains(&radius),
+                )?;
             }
         }
         if let Some(Fading { share, taus_s }) = self.relaxation {
             DesignError::check("diagnosed.relaxation.share", share, share > -1.0)?;
+            size("diagnosed.relaxation.share", share)?;
             for tau in taus_s {
                 positive("diagnosed.relaxation.taus_s", tau)?;
             }
@@ -205,9 +220,17 @@ impl DiagnosedMap {
         if let Some(Worn { m, n, zero, reversal, travelled }) = self.worn {
             DesignError::check("diagnosed.worn.m", m, (0.0..1.0).contains(&m))?;
             positive("diagnosed.worn.n", n)?;
-            DesignError::check("diagnosed.worn.zero", zero, true)?;
-            DesignError::check("diagnosed.worn.reversal", reversal, reversal >= 0.0)?;
-            DesignError::check("diagnosed.worn.travelled", travelled, travelled >= 0.0)?;
+            size("diagnosed.worn.zero", zero)?;
+            DesignError::check(
+                "diagnosed.worn.reversal",
+                reversal,
+                (0.0..=MOST).contains(&reversal),
+            )?;
+            DesignError::check(
+                "diagnosed.worn.travelled",
+                travelled,
+                (0.0..=MOST).contains(&travelled),
+            )?;
         }
         for tau in self.lowpass_s.into_iter().flatten() {
             positive("diagnosed.lowpass_s", tau)?;

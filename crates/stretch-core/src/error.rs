@@ -22,6 +22,15 @@ pub enum DesignError {
         /// Upper end.
         max: f64,
     },
+    /// A record whose bytes are not those that were sealed.
+    Damaged {
+        /// The seal that the record carries.
+        stored: u32,
+        /// The seal of its bytes.
+        computed: u32,
+    },
+    /// Bytes that are no record of the kind that was asked for: too few, too many, or others.
+    NoRecord,
     /// A record of a schema that this release does not know.
     Schema {
         /// The schema of the record.
@@ -67,6 +76,14 @@ impl fmt::Display for DesignError {
             }
             Self::EmptyRange { field, min, max } => {
                 write!(f, "{field} runs from {min} to {max}: it has no extent to divide by")
+            }
+            Self::Damaged { stored, computed } => write!(
+                f,
+                "the record's seal is {stored:08x} and its bytes give {computed:08x}: it was damaged or changed; copy it \
+                 again from where it was made, or calibrate again"
+            ),
+            Self::NoRecord => {
+                write!(f, "the bytes are no record of this kind, or not one alone: calibrate again")
             }
             Self::Schema { found, newest } => write!(
                 f,

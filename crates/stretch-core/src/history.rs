@@ -1,6 +1,9 @@
 //! A target read from the signal and from what the signal did before.
 
-use crate::{DesignError, FitSummary, Interval, RestTracker, Values};
+use crate::{
+    DesignError, FitSummary, Interval, RestTracker, Values,
+    sizes::{extent, size},
+};
 
 /// The most relaxations of a [`HistoryMap`].
 pub const MAX_RELAXATIONS: usize = 4;
@@ -137,10 +140,11 @@ impl HistoryMap {
         let mut before = 0.0;
         for &tau in self.relaxations_s.iter() {
             DesignError::check("history.relaxations_s", tau, tau > before)?;
+            extent("history.relaxations_s", tau)?;
             before = tau;
         }
         for &radius in self.radii.iter() {
-            DesignError::check("history.radii", radius, radius > 0.0)?;
+            extent("history.radii", radius)?;
         }
         let degree = f64::from(self.degree);
         DesignError::check(
@@ -164,8 +168,16 @@ impl HistoryMap {
             if min >= max {
                 return Err(DesignError::EmptyRange { field: "history.state", min, max });
             }
+            size("history.state_min", min)?;
+            size("history.state_max", max)?;
+            extent("history.state_max - state_min", max - min)?;
         }
-        self.estimate_domain.validate("history.estimate_domain")?;
+        for &coefficient in self.coefficients.iter() {
+            size("history.coefficients", coefficient)?;
+        }
+        let domain = self.estimate_domain.validate("history.estimate_domain")?;
+        size("history.estimate_domain", domain.min)?;
+        size("history.estimate_domain", domain.max)?;
         Ok(())
     }
 }

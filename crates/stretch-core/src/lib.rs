@@ -7,6 +7,7 @@ mod degree;
 mod diagnosed;
 mod error;
 pub mod fixed;
+mod folded;
 mod history;
 mod hysteresis;
 mod interval;
@@ -20,8 +21,11 @@ mod provenance;
 mod range;
 mod rate;
 mod real;
+#[cfg(feature = "record")]
+pub mod record;
 mod rest;
 mod rest_level;
+mod sizes;
 mod stage;
 #[cfg(feature = "proptest")]
 pub mod strategies;

@@ -2,6 +2,7 @@
 
 use crate::{
     DesignError, DiagnosedMap, FitSummary, HistoryMap, Interval, ObserverMap, Range, Surface,
+    sizes::size,
 };
 
 /// A straight line: `target = slope signal + intercept`, all normalised.
@@ -104,9 +105,11 @@ impl Model {
         };
         match self {
             Self::Linear(line) => {
-                DesignError::check("linear.slope", line.slope, true)?;
-                DesignError::check("linear.intercept", line.intercept, true)?;
-                line.signal_domain.validate("linear.signal_domain")?;
+                size("linear.slope", line.slope)?;
+                size("linear.intercept", line.intercept)?;
+                let domain = line.signal_domain.validate("linear.signal_domain")?;
+                size("linear.signal_domain", domain.min)?;
+                size("linear.signal_domain", domain.max)?;
                 fit(&line.fit)?;
             }
             Self::Surfaces { inflation, deflation } | Self::Blended { inflation, deflation } => {

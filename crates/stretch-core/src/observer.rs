@@ -1,7 +1,10 @@
 //! A gauge described as it works, forwards, and a filter that asks which
 //! motion explains the signal.
 
-use crate::{DesignError, FitSummary, Interval, RestTracker, Values};
+use crate::{
+    DesignError, FitSummary, Interval, RestTracker, Values,
+    sizes::{apart, extent, size},
+};
 
 /// The most relaxations of an [`ObserverMap`].
 pub const MAX_OBSERVER_RELAXATIONS: usize = 2;
@@ -74,6 +77,10 @@ impl ObserverMap {
                 step,
                 step != 0.0 && (step > 0.0) == rises,
             )?;
+            apart("step of observer.curve", pair)?;
+        }
+        for &signal in self.curve.iter() {
+            size("observer.curve", signal)?;
         }
         let drive = self.drive_domain.validate("observer.drive_domain")?;
         let estimate = self.estimate_domain.validate("observer.estimate_domain")?;
@@ -83,20 +90,26 @@ impl ObserverMap {
             if range.min >= range.max {
                 return Err(DesignError::EmptyRange { field, min: range.min, max: range.max });
             }
+            size(field, range.min)?;
+            size(field, range.max)?;
+            extent(field, range.max - range.min)?;
         }
         for &tau in self.relaxations_s.iter() {
-            DesignError::check("observer.relaxations_s", tau, tau > 0.0)?;
+            extent("observer.relaxations_s", tau)?;
         }
         for &radius in self.radii.iter() {
-            DesignError::check("observer.radii", radius, radius > 0.0)?;
+            extent("observer.radii", radius)?;
         }
         let (a, b) = (self.amplitudes.len(), self.play_weights.len());
         let taus = self.relaxations_s.len();
         DesignError::check("length of observer.amplitudes", a as f64, a == taus)?;
         DesignError::check("length of observer.play_weights", b as f64, b == self.radii.len())?;
+        for &weight in self.amplitudes.iter().chain(self.play_weights.iter()) {
+            size("observer.amplitudes or play_weights", weight)?;
+        }
         DesignError::check("observer.lead_s", self.lead_s, self.lead_s.abs() <= 10.0)?;
-        DesignError::check("observer.noise", self.noise, self.noise > 0.0)?;
-        DesignError::check("observer.agility", self.agility, self.agility > 0.0)?;
+        extent("observer.noise", self.noise)?;
+        extent("observer.agility", self.agility)?;
         Ok(())
     }
 }

@@ -1,6 +1,9 @@
 //! Where the signal stands at rest, followed as it drifts.
 
-use crate::DesignError;
+use crate::{
+    DesignError,
+    sizes::{MOST, extent, size},
+};
 
 /// A baseline that follows the resting signal.
 ///
@@ -43,9 +46,9 @@ impl RestTracker {
     /// # Errors
     /// [`DesignError::OutOfRange`] that names the field.
     pub fn validate(&self) -> Result<(), DesignError> {
-        DesignError::check("rest.level", self.level, true)?;
-        DesignError::check("rest.catch_up_s", self.catch_up_s, self.catch_up_s > 0.0)?;
-        DesignError::check("rest.leak", self.leak, self.leak >= 0.0)?;
+        size("rest.level", self.level)?;
+        extent("rest.catch_up_s", self.catch_up_s)?;
+        DesignError::check("rest.leak", self.leak, (0.0..=MOST).contains(&self.leak))?;
         Ok(())
     }
 }

@@ -89,6 +89,29 @@ impl Trial {
         rate_of(&self.time_s)
     }
 
+    /// Whether every channel is as long as the time: what is put together in memory need not be.
+    ///
+    /// # Errors
+    /// [`DataError::Lengths`] with the channel.
+    ///
+    /// ```
+    /// use stretch_data::{Channel, Trial};
+    /// let channels = vec![Channel { name: "length_mm".into(), values: Vec::new() }];
+    /// let trial = Trial { name: "a.csv".into(), time_s: vec![0.0], channels };
+    /// assert!(trial.check_lengths().is_err());
+    /// ```
+    pub fn check_lengths(&self) -> Result<(), DataError> {
+        match self.channels.iter().find(|channel| channel.values.len() != self.len()) {
+            None => Ok(()),
+            Some(Channel { name, values }) => Err(DataError::Lengths {
+                trial: self.name.clone(),
+                column: name.clone(),
+                found: values.len(),
+                expected: self.len(),
+            }),
+        }
+    }
+
     /// Refuses what no file could hold: channels of other lengths, time that does not rise, numbers that are none.
     pub(crate) fn check_samples(&self) -> Result<(), DataError> {
         // The header is row 1.
@@ -113,15 +136,8 @@ impl Trial {
                 previous_s,
             });
         }
+        self.check_lengths()?;
         for Channel { name, values } in &self.channels {
-            if values.len() != self.len() {
-                return Err(DataError::Lengths {
-                    trial: self.name.clone(),
-                    column: name.clone(),
-                    found: values.len(),
-                    expected: self.len(),
-                });
-            }
             if let Some(error) = not_finite(name, values) {
                 return Err(error);
             }

@@ -31,6 +31,9 @@ pub enum ExportError {
     /// A calibration that gives no receptor.
     #[error("the calibration gives no receptor: {0}")]
     Receptor(#[from] FilterError),
+    /// A calibration that is no record.
+    #[error(transparent)]
+    NoRecord(CalibrateError),
     /// A record that the desk itself does not run: there are no answers to test against.
     #[error(
         "the record in the form {form} does not run on the desk; there is nothing to hold the C against"

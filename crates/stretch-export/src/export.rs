@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use stretch_calibrate::{CalibrateError, RecordNumbers, fixed_record};
+use stretch_calibrate::{CalibrateError, RecordNumbers, calibration_seal, fixed_record};
 use stretch_core::{Calibration, Model};
 
 use crate::{
@@ -72,7 +72,9 @@ fn fixed(calibration: &Calibration, options: &Options) -> Result<Header, ExportE
         RecordNumbers::Observer(numbers) => observer_fixed(numbers),
     };
     let test = self_test::fixed(calibration, &options.adc, &record)?;
-    Ok(assembled(calibration, options, Form::Fixed, part, &test))
+    // what was just stored has a seal
+    let seal = stretch_core::record::seal(&record.bytes).ok().flatten().unwrap_or_default();
+    Ok(assembled(calibration, options, Form::Fixed, part, &test, seal))
 }
 
 fn float(calibration: &Calibration, options: &Options) -> Result<Header, ExportError> {
@@ -90,7 +92,8 @@ fn float(calibration: &Calibration, options: &Options) -> Result<Header, ExportE
         }
     };
     let test = self_test::float(calibration)?;
-    Ok(assembled(calibration, options, Form::Float, part, &test))
+    let seal = calibration_seal(calibration).map_err(ExportError::NoRecord)?;
+    Ok(assembled(calibration, options, Form::Float, part, &test, seal))
 }
 
 /// The parts in order.
@@ -100,11 +103,12 @@ fn assembled(
     form: Form,
     part: Part,
     self_test: &str,
+    seal: u32,
 ) -> Header {
     let Part { model, constants, step, has } = part;
     let pressure = has.contains(&"crosstalk");
     let mut text = opening(calibration, form, &model, &has);
-    text.push_str(&frame(calibration, options));
+    text.push_str(&frame(calibration, options, seal));
     text.push_str("\n/* ---- the record ---- */\n\n");
     text.push_str(&constants);
     text.push('\n');
@@ -151,12 +155,13 @@ fn opening(calibration: &Calibration, form: Form, model: &str, has: &[&str]) -> 
 }
 
 /// What a program around the step needs to know.
-fn frame(calibration: &Calibration, options: &Options) -> String {
+fn frame(calibration: &Calibration, options: &Options, seal: u32) -> String {
     let spec = options.adc.spec();
     let unit = comment_safe(calibration.reference.unit());
     let period_us = (1e6 * calibration.sample_rate_hz.period_s()).round() as i64;
     let mut constants = Constants::default();
     constants
+        .word("SEAL", format!("0x{seal:08x}u"), "of the record, as stretch record check says it")
         .word("UNIT", format!("\"{unit}\""), "of the reference")
         .word("PERIOD_US", format!("{period_us}L"), "from a sample to the next")
         .define("ADC_BITS", i32::from(spec.bits), "of the board's converter")

@@ -126,7 +126,8 @@ impl Description {
             effect.starts = EffectSpec::starts_of(&effect.parameters);
         }
         let whole = || "description".to_owned();
-        number(&whole, "dt_s", spec.dt_s, "above 0", |x| x > 0.0)?;
+        // from 1e-3 to 1e7 Hz: every time that is counted in samples is then a number of them
+        number(&whole, "dt_s", spec.dt_s, "1e-7 .. 1e3", |x| (1e-7..=1e3).contains(&x))?;
         filled(&whole, "stages", &spec.stages)?;
         filled(&whole, "trials", &spec.trials)?;
         unique("stage", spec.stages.iter().map(|s| &s.name))?;

@@ -1,6 +1,6 @@
 //! From bytes to frames, whatever happened to the bytes.
 
-use crate::{Frame, frame::Refused};
+use crate::{Frame, frame::Refused, recent::Recent};
 
 /// What a byte completed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,15 +56,17 @@ pub struct Counts {
 /// A streaming decoder.
 ///
 /// A frame begins at a `$` and ends at a newline; a `$` inside a frame begins a
-/// new one. A counter that steps ahead tells how many frames were lost. The same
-/// frame twice in a row is a repetition; any other step back of the counter or of
-/// the board's clock is a board that started again.
+/// new one. A counter that steps ahead tells how many frames were lost. A frame that is
+/// one of the last [`REPLAYED`](Self::REPLAYED), to the last field, is a repetition, alone or
+/// in a block that came twice; any other step back of the counter or of the board's clock is
+/// a board that started again, and so is any step back to the counter 0.
 #[derive(Debug, Clone)]
 pub struct Decoder {
     line: [u8; Frame::LONGEST],
     length: usize,
     state: State,
     last: Option<Frame>,
+    recent: Recent,
     counts: Counts,
 }
 
@@ -88,6 +90,9 @@ impl Default for Decoder {
 }
 
 impl Decoder {
+    /// How many frames are remembered: a block of so many that comes once more is skipped.
+    pub const REPLAYED: usize = Recent::MOST;
+
     /// A decoder that has seen nothing.
     pub fn new() -> Self {
         Self {
@@ -95,6 +100,7 @@ impl Decoder {
             length: 0,
             state: State::Idle,
             last: None,
+            recent: Recent::new(),
             counts: Counts::default(),
         }
     }
@@ -134,8 +140,18 @@ impl Decoder {
         }
     }
 
-    /// The stream broke off (a cable was pulled): what was begun will not be ended.
+    /// The stream ended or broke off (a cable was pulled): no byte follows what was begun.
+    ///
+    /// A frame that lacks nothing but its newline is one: the checksum is its last field.
     pub fn disconnected(&mut self) -> Option<Event> {
+        if self.state == State::Frame
+            && matches!(
+                Frame::decode(&self.line[..self.length]),
+                Ok(_) | Err(Refused::OtherVersion)
+            )
+        {
+            return self.push(b'\n');
+        }
         self.abandon()
     }
 
@@ -167,15 +183,16 @@ impl Decoder {
     fn place(&mut self, frame: Frame) -> Event {
         let event = match self.last {
             None => Event::Frame(frame),
-            Some(last) if last == frame => {
-                self.counts.repeated += 1;
-                return Event::Repeated;
-            }
             Some(last) => {
                 let ahead = frame.counter.wrapping_sub(last.counter);
                 let later = frame.time_ms.wrapping_sub(last.time_ms);
                 if later > HALF || !(1..=HALF).contains(&ahead) {
+                    if last == frame || (frame.counter != 0 && self.recent.has(&frame)) {
+                        self.counts.repeated += 1;
+                        return Event::Repeated;
+                    }
                     self.counts.restarts += 1;
+                    self.recent.forget();
                     Event::Restarted(frame)
                 } else if ahead == 1 {
                     Event::Frame(frame)
@@ -186,6 +203,7 @@ impl Decoder {
                 }
             }
         };
+        self.recent.push(frame);
         self.counts.frames += 1;
         self.last = Some(frame);
         event

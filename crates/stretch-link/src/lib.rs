@@ -3,6 +3,7 @@
 
 mod decoder;
 mod frame;
+mod recent;
 mod text;
 
 pub use decoder::{Counts, Decoder, Event};

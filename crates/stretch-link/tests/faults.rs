@@ -147,6 +147,43 @@ proptest! {
     }
 }
 
+fn after_reset(counter: u32) -> Frame {
+    Frame { counter, time_ms: 10 * counter, code: 7, answer: Answer::Warming }
+}
+
+#[test]
+fn a_block_that_comes_twice_counts_once() {
+    // as far back as is remembered, from one frame to all
+    for block in [1, 2, 3, 64, Decoder::REPLAYED as u32] {
+        let sent: Vec<Frame> =
+            (1..=200).chain(201 - block..=200).chain(201..203).map(after_reset).collect();
+        let bytes: Vec<u8> = sent.iter().flat_map(line).collect();
+        let (_, counts) = decode(&bytes);
+        let expected = Counts { frames: 202, repeated: block.into(), ..Counts::default() };
+        assert_eq!(counts, expected, "a block of {block}");
+    }
+}
+
+#[test]
+fn a_board_that_starts_again_and_answers_the_same_is_one() {
+    let sent: Vec<Frame> = (0..50).chain(0..50).map(after_reset).collect();
+    let bytes: Vec<u8> = sent.iter().flat_map(line).collect();
+    assert_eq!(decode(&bytes).1, Counts { frames: 100, restarts: 1, ..Counts::default() });
+}
+
+#[test]
+fn the_last_frame_needs_no_newline() {
+    let bytes: Vec<u8> = (0..3).map(after_reset).flat_map(|frame| line(&frame)).collect();
+    for (cut, expected) in [
+        (0, Counts { frames: 3, ..Counts::default() }),
+        (1, Counts { frames: 3, ..Counts::default() }),
+        (2, Counts { frames: 2, damaged: 1, ..Counts::default() }),
+        (20, Counts { frames: 2, damaged: 1, ..Counts::default() }),
+    ] {
+        assert_eq!(decode(&bytes[..bytes.len() - cut]).1, expected, "{cut} bytes short");
+    }
+}
+
 #[test]
 fn a_restart_is_told_from_a_repetition() {
     let frame = |(counter, time_ms)| Frame { counter, time_ms, code: 1, answer: Answer::Warming };

@@ -343,7 +343,7 @@ fn what_cannot_run_is_refused_by_name() {
     // metres instead of millimetres: a thousandth is then a millimetre
     let metres = stretch_core::Target::Contraction { rest_length: 0.18 };
     assert!(message(&|spec| spec.target = metres).contains("fixed.error"));
-    let kilometres = stretch_core::Target::Contraction { rest_length: 180e9 };
+    let kilometres = stretch_core::Target::Contraction { rest_length: 180e6 };
     assert!(message(&|spec| spec.target = kilometres).contains("fixed."));
 }
 

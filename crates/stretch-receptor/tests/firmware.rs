@@ -83,7 +83,7 @@ fn linear() -> Calibration {
 
 fn record<T: serde::Serialize>(name: &str, value: &T) {
     let mut buffer = [0; 4096];
-    let bytes = postcard::to_slice(value, &mut buffer).unwrap();
+    let bytes = stretch_core::record::store(value, &mut buffer).unwrap();
     same(&format!("data/{name}.postcard"), bytes);
 }
 

@@ -86,7 +86,7 @@ impl TrialPlan {
     /// 0.125 .. 1; 60 s. `number` chooses the file's name and an independent stream of the seed.
     pub fn arbitrary(number: usize, seed: u64) -> Self {
         let mut plan = Self::new(format!("arbitrary_{number}.csv"), TrialKind::Arbitrary, LONG_S);
-        let mut random = Random::new(seed, Random::PROTOCOL + 2 * number as u64);
+        let mut random = Random::new(seed, stream(number, 0));
         let mut at = REST;
         while at < plan.inlet.len() {
             let length = (random.between(0.15, 1.5) * RATE_HZ).round() as usize;
@@ -107,7 +107,7 @@ impl TrialPlan {
     /// 0.15 s and starting over; after a pair the outlet stays open for 1 s, then both are shut for 0.3 .. 1 s; 60 s.
     pub fn pulses(number: usize, seed: u64) -> Self {
         let mut plan = Self::new(format!("pulses_{number}.csv"), TrialKind::Pulses, LONG_S);
-        let mut random = Random::new(seed, Random::PROTOCOL + 2 * number as u64 + 1);
+        let mut random = Random::new(seed, stream(number, 1));
         let total = plan.inlet.len();
         let mut at = REST;
         let mut hold = |inlet: f64, outlet: f64, seconds: f64| {
@@ -180,6 +180,7 @@ impl TrialPlan {
     /// ```
     pub fn from_trial(trial: &Trial, rig: &RigParams) -> Result<Self, SimError> {
         check_columns(trial)?;
+        check_lengths(trial)?;
         let column =
             |name: &'static str| trial.channel(name).ok_or(SimError::MissingColumn { name });
         let (inlet, outlet) = (column("inlet")?.to_vec(), column("outlet")?.to_vec());
@@ -238,6 +239,23 @@ impl TrialPlan {
         let length = self.set_length_mm.as_ref().map(|values| column(SET_LENGTH, values));
         let shunt = self.shunt.as_ref().map(|values| column(SHUNT, values));
         [excitation, length, shunt].into_iter().flatten().collect()
+    }
+}
+
+/// The stream of random commands of a numbered trial of its kind; beyond 2^40 trials they come round again.
+fn stream(number: usize, kind: u64) -> u64 {
+    Random::PROTOCOL.wrapping_add((number as u64).wrapping_mul(2)).wrapping_add(kind)
+}
+
+/// Refuses columns of other lengths than the time.
+fn check_lengths(trial: &Trial) -> Result<(), SimError> {
+    let expected = trial.len();
+    match trial.channels.iter().find(|channel| channel.values.len() != expected) {
+        None => Ok(()),
+        Some(Channel { name, values }) => Err(SimError::Column {
+            name: name.clone(),
+            problem: format!("it has {} values for {expected} samples", values.len()),
+        }),
     }
 }
 

@@ -39,6 +39,9 @@ pub struct Session {
 /// What the channels are written to: finer than any converter, coarse enough for short numbers.
 const PLACES: [f64; 3] = [1e6, 1e6, 1e7];
 
+/// The longest pause that is simulated, in samples: a day at 100 Hz, which takes half a gigabyte.
+const MOST_PAUSE: f64 = 8_640_000.0;
+
 impl Session {
     /// A session that has not begun.
     ///
@@ -176,7 +179,16 @@ impl Session {
         if self.trials == 0 && initial_kpa == 0.0 {
             return Ok(Start::Settled);
         }
-        let samples = (pause_s * plan.rate_hz).ceil() as usize + 1;
+        let samples = pause_s * plan.rate_hz;
+        if samples > MOST_PAUSE {
+            return Err(SimError::Column {
+                name: "start_s".into(),
+                problem: format!(
+                    "a pause of {pause_s} s is {samples} samples; at most {MOST_PAUSE} are simulated"
+                ),
+            });
+        }
+        let samples = samples.ceil() as usize + 1;
         let (open, shut) = (vec![1.0; samples], vec![0.0; samples]);
         let openings = if initial_kpa > 0.0 {
             Openings { inlet: &open, outlet: &shut }

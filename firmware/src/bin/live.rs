@@ -75,7 +75,7 @@ fn run<C: Converter>(
 fn main() -> ! {
     let core = cortex_m::Peripherals::take().expect("taken once");
     let calibration: FixedCalibration<11, 2> =
-        postcard::from_bytes(RECORD).expect("a valid record");
+        stretch_core::record::load(RECORD).expect("a sound record");
     // SAFETY: an MPS2 board, emulated; the port is used here alone.
     let mut port = unsafe { Uart::take() };
     let mut pace = Pace::new(core.SYST);

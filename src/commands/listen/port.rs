@@ -25,7 +25,7 @@ const RETRY: Duration = Duration::from_millis(200);
 /// Reads a port from now on, `-` for standard input.
 ///
 /// # Errors
-/// When the port cannot be opened the first time.
+/// When the port cannot be opened the first time, or is a folder.
 pub(crate) fn listen(path: &Path, baud: u32) -> io::Result<Receiver<Heard>> {
     let (sender, heard) = channel();
     if path.as_os_str() == "-" {
@@ -36,6 +36,13 @@ pub(crate) fn listen(path: &Path, baud: u32) -> io::Result<Receiver<Heard>> {
         return Ok(heard);
     }
     let first = open(path, baud)?;
+    if first.metadata()?.is_dir() {
+        // it opens, and no byte ever comes
+        return Err(io::Error::new(
+            io::ErrorKind::IsADirectory,
+            "it is a folder; name a serial port",
+        ));
+    }
     let path = path.to_owned();
     // Reading blocks; the thread ends with the program, or when nobody listens.
     thread::spawn(move || keep_reading(first, path, baud, &sender));

@@ -95,31 +95,29 @@ pub(crate) fn header(twin: &Twin) -> String {
     format!("time_s,{},adc_code,{estimate},branch,domain\n", twin.signal)
 }
 
-/// A trial file that grows by whole lines.
+/// A trial file that grows by whole lines; one without a row goes when this does.
 pub(crate) struct Recording {
     path: PathBuf,
     file: File,
     line: Vec<u8>,
+    /// Bytes of whole lines.
+    whole: u64,
+    rows: u64,
 }
 
 impl Recording {
     /// A new file; one that exists is not touched.
     pub(crate) fn create(path: &Path, header: &str) -> io::Result<Self> {
         let file = OpenOptions::new().write(true).create_new(true).open(path)?;
-        let mut recording = Self { path: path.to_owned(), file, line: Vec::new() };
-        match recording.file.write_all(header.as_bytes()) {
-            Ok(()) => Ok(recording),
-            Err(error) => {
-                recording.discard();
-                Err(error)
-            }
-        }
+        let line = header.as_bytes().to_vec();
+        let mut recording = Self { path: path.to_owned(), file, line, whole: 0, rows: 0 };
+        recording.write()?;
+        Ok(recording)
     }
 
-    /// Takes the file away again, for a start that fails.
-    pub(crate) fn discard(self) {
-        // what made the start fail is told; that this failed too would not help
-        let _ = fs::remove_file(self.path);
+    /// Rows so far.
+    pub(crate) fn rows(&self) -> u64 {
+        self.rows
     }
 
     /// One write a sample, so that a program that is killed leaves whole lines.
@@ -130,10 +128,31 @@ impl Recording {
         }
         self.line.clear();
         sample.push_line(&mut self.line);
-        self.file.write_all(&self.line)
+        self.write()?;
+        self.rows += 1;
+        Ok(())
+    }
+
+    fn write(&mut self) -> io::Result<()> {
+        let written = self.file.write_all(&self.line);
+        match written {
+            Ok(()) => self.whole += self.line.len() as u64,
+            // a disk that is full took a part of the line: what is told is why, not that this failed too
+            Err(_) => drop(self.file.set_len(self.whole)),
+        }
+        written
     }
 
     pub(crate) fn finish(self) -> io::Result<()> {
         self.file.sync_all()
+    }
+}
+
+impl Drop for Recording {
+    /// A header alone would stand in the way of the next try.
+    fn drop(&mut self) {
+        if self.rows == 0 {
+            let _ = fs::remove_file(&self.path);
+        }
     }
 }

@@ -105,6 +105,7 @@ impl Screen {
 
 impl Drop for Screen {
     fn drop(&mut self) {
-        ratatui::restore();
+        // its own `restore` says on standard error that it failed, and panics where that is full
+        let _ = ratatui::try_restore();
     }
 }

@@ -3,15 +3,30 @@
 use stretch_link::Counts;
 
 /// How the link does.
+#[derive(Debug, Default)]
 pub(crate) struct Status {
     pub(super) connected: bool,
     pub(super) counts: Counts,
-    /// The largest difference between the board's estimate and the one here, when there is one.
-    pub(super) difference: Option<f64>,
+    /// Samples that the board did not get.
+    pub(super) missing: u64,
+    /// Codes that a converter of `adc_bits` cannot give, and the largest.
+    pub(super) beyond: u64,
+    pub(super) largest: i32,
+    pub(super) adc_bits: u8,
+    /// How many estimates of the board's were held against those here, and the largest
+    /// difference; none where the calibration cannot answer.
+    pub(super) compared: Option<(u64, f64)>,
     pub(super) unit: String,
+    /// Rows that were recorded, at the end of a recording.
+    pub(super) rows: Option<u64>,
 }
 
 impl Status {
+    /// Nothing has come yet.
+    pub(super) fn of(unit: &str) -> Self {
+        Self { unit: unit.to_owned(), ..Self::default() }
+    }
+
     pub(super) fn line(&self) -> String {
         let Counts { frames, lost, damaged, repeated, restarts, other_version } = self.counts;
         let mut text = format!(
@@ -20,9 +35,28 @@ impl Status {
         if other_version > 0 {
             text += &format!(", {other_version} of another version: update stretch or the board");
         }
-        if let (Some(difference), true) = (self.difference, frames > 0) {
-            text += format!("; differs from the calibration by {difference:.4} {}", self.unit)
-                .trim_end();
+        match self.rows {
+            Some(0) => text += "; no row was recorded, and no file is left",
+            Some(rows) => text += &format!("; {rows} rows recorded"),
+            None => {}
+        }
+        if self.missing > 0 {
+            text += &format!("; {} samples that the board did not get", self.missing);
+        }
+        let Self { beyond, largest, adc_bits, .. } = self;
+        if *beyond > 0 {
+            text += &format!(
+                "; {beyond} codes up to {largest} are beyond a converter of {adc_bits} bits and no rows: name its bits \
+                 with --adc-bits"
+            );
+        }
+        match self.compared {
+            Some((0, _)) if frames > 0 => text += "; no estimate was compared with the calibration",
+            Some((_, difference)) if frames > 0 => {
+                text += format!("; differs from the calibration by {difference:.4} {}", self.unit)
+                    .trim_end();
+            }
+            _ => {}
         }
         if !self.connected {
             text += "; waiting for the port";

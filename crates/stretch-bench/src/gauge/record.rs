@@ -5,7 +5,10 @@ use std::ops::Range;
 use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial, unit};
 use stretch_gap::{Frame, Noise, TrialSpec};
 
-use crate::{error::BenchError, lost::open};
+use crate::{
+    error::{BenchError, check_rate},
+    lost::open,
+};
 
 /// Least samples that may be fitted.
 const LEAST: usize = 300;
@@ -41,6 +44,7 @@ impl Record {
             columns.push(PRESSURE);
         }
         let session = EvenSession::new(trials, &columns, SHORTEST)?;
+        check_rate(session.dt_s())?;
         let all = |column: usize| -> Vec<f64> {
             session
                 .trials()

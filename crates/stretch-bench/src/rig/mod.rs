@@ -159,9 +159,9 @@ impl RigSimulator {
         &self.base
     }
 
-    /// Measured inputs, smoothed as the stages see them: length (mm) of a trial.
-    pub fn smooth_length(&self, trial: usize) -> &[f64] {
-        &self.inputs.length[trial].values
+    /// Measured inputs, smoothed as the stages see them: length (mm) of a trial; none for a trial that is not there.
+    pub fn smooth_length(&self, trial: usize) -> Option<&[f64]> {
+        self.inputs.length.get(trial).map(|length| length.values.as_slice())
     }
 }
 

@@ -7,7 +7,7 @@ use stretch_gap::{copied, noise_variance};
 
 use super::smooth::{Draws, Smoothed, schedule};
 use crate::{
-    error::BenchError,
+    error::{BenchError, check_rate},
     lost::{open, open_behind},
     wild::tamed,
 };
@@ -127,6 +127,7 @@ impl Session {
         let (trials, wild) = tamed(trials);
         let trials = &trials[..];
         let even = EvenSession::new(trials, &columns, SHORTEST)?;
+        check_rate(even.dt_s())?;
         let before = std::iter::once(None).chain(even.trials().iter().map(Some));
         let of =
             |(t, before): (&EvenTrial, _)| RigTrial::of(t, before, shares[t.source()], even.dt_s());

@@ -16,7 +16,7 @@ use super::{
 use crate::fold::output;
 
 /// The schema of the records that this release writes, and the newest it reads.
-pub const CODE_SCHEMA: u32 = 1;
+pub const CODE_SCHEMA: u32 = stretch_core::CALIBRATION_SCHEMA;
 
 /// A [`Calibration`] over the codes of one converter, in the arithmetic `A`,
 /// with a Savitzky-Golay rate of `WINDOW`, `DEGREE` and `DELAY`.

@@ -104,7 +104,7 @@ pub struct Rest {
 }
 
 /// The schema of the records that this release writes, and the newest it reads.
-pub(super) const SCHEMA: u32 = 1;
+pub(super) const SCHEMA: u32 = stretch_core::CALIBRATION_SCHEMA;
 
 impl Numbers {
     pub(super) fn new(calibration: &Calibration, adc: &Adc) -> Result<Self, DesignError> {
@@ -192,8 +192,9 @@ impl Numbers {
             dead_band: target(
                 (reference_dead_band(calibration) / (gain / 1000.0)).abs() * period_s,
             )?,
-            zero: libm::ldexp(zero, (TARGET_BITS + output_bits) as i32) as i64
-                + libm::ldexp(half, (TARGET_BITS + output_bits) as i32) as i64,
+            // the cast saturates, and the sum with it: `check` refuses what does not fit
+            zero: (libm::ldexp(zero, (TARGET_BITS + output_bits) as i32) as i64)
+                .saturating_add(libm::ldexp(half, (TARGET_BITS + output_bits) as i32) as i64),
             gain: fixed::from_f64("fixed.gain", gain, output_bits)?,
             output_bits: output_bits as u8,
             rest,
@@ -250,7 +251,7 @@ impl Numbers {
         for size in [leak, most, furthest] {
             holds("fixed.rest", size.into(), (0..=MOST_SIGNAL).contains(&size))?;
         }
-        Ok(self)
+        Ok(Self { schema: SCHEMA, ..self })
     }
 
     /// The first number that is no code.

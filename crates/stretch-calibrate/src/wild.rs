@@ -1,0 +1,133 @@
+//! Values that no motion can have taken: what a logger writes where it got none.
+
+use stretch_data::{Channel, Trial};
+
+/// At most this share of the rows is called wild: beyond it, two levels that a channel really has
+/// (a muscle held at two lengths) could be taken for values and their outliers. A tenth is what a
+/// location estimate of the simplest kind, the decile mean, still survives.
+const MOST_SHARE: f64 = 0.1;
+
+/// The trials without the rows in which one of `columns` is wild, and a sentence for each column
+/// that had such values.
+///
+/// A channel that was sampled while it moved leaves no hole in its values. Wild are those beyond a
+/// hole that is wider than all that the other values span, a tenth of the rows at most: `-999`
+/// among lengths, a spike to the supply. What lies inside the span is the robust fit's part.
+///
+/// ```
+/// use stretch_calibrate::without_wild;
+/// use stretch_data::{Channel, Trial};
+///
+/// let values = (0..100).map(|n| if n == 40 { -999.0 } else { 150.0 + f64::from(n % 30) });
+/// let length = Channel { name: "length_mm".into(), values: values.collect() };
+/// let time_s = (0..100).map(|n| 0.01 * f64::from(n)).collect();
+/// let trial = Trial { name: "ramp.csv".into(), time_s, channels: vec![length] };
+/// let (kept, told) = without_wild(&[trial], &["length_mm"]);
+/// assert_eq!(kept[0].len(), 99);
+/// assert!(told[0].contains("1 of 100 values of length_mm are wild (-999"), "{}", told[0]);
+/// ```
+pub fn without_wild(trials: &[Trial], columns: &[&str]) -> (Vec<Trial>, Vec<String>) {
+    let mut told = Vec::new();
+    let mut kept: Vec<Trial> = trials.to_vec();
+    for column in columns {
+        let values: Vec<f64> =
+            kept.iter().filter_map(|trial| trial.channel(column)).flatten().copied().collect();
+        let Some((low, high)) = span(&values) else { continue };
+        let is_wild = |x: f64| x < low || x > high;
+        let wild: Vec<f64> = values.iter().copied().filter(|&x| is_wild(x)).collect();
+        let (least, most) = ends(&wild);
+        let shown = if least == most { format!("{least}") } else { format!("{least} .. {most}") };
+        told.push(format!(
+            "{} of {} values of {column} are wild ({shown}, all others {low} .. {high}); their rows are left out: see \
+             what the recorder writes where it has no sample",
+            wild.len(),
+            values.len(),
+        ));
+        for trial in &mut kept {
+            // a ragged one stays as it is: whoever fits it refuses it
+            let own = trial.channel(column).filter(|_| trial.check_lengths().is_ok());
+            let Some(own) = own else { continue };
+            let stays: Vec<bool> = own.iter().map(|&x| !is_wild(x)).collect();
+            *trial = rows(trial, &stays);
+        }
+    }
+    kept.retain(|trial| !trial.is_empty());
+    (kept, told)
+}
+
+/// From the least to the greatest value that is not wild; none where no value is.
+fn span(values: &[f64]) -> Option<(f64, f64)> {
+    let mut sorted: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let most = (MOST_SHARE * sorted.len() as f64) as usize;
+    let (mut from, mut to) = (0, sorted.len().checked_sub(1)?);
+    // the widest holes lie furthest out: one end after the other, until nothing changes
+    loop {
+        let before = (from, to);
+        let left = most - (from + sorted.len() - 1 - to).min(most);
+        if let Some(cut) = (from..from + left)
+            .rev()
+            .find(|&i| i < to && sorted[i + 1] - sorted[i] > sorted[to] - sorted[i + 1])
+        {
+            from = cut + 1;
+        }
+        let left = most - (from + sorted.len() - 1 - to).min(most);
+        if let Some(cut) = (to.saturating_sub(left) + 1..=to)
+            .find(|&i| i > from && sorted[i] - sorted[i - 1] > sorted[i - 1] - sorted[from])
+        {
+            to = cut - 1;
+        }
+        if (from, to) == before {
+            break;
+        }
+    }
+    let (low, high) = (sorted[from], sorted[to]);
+    // a channel that stands still but for a few values is no range to be wild beyond
+    (low < high && (from > 0 || to + 1 < sorted.len())).then_some((low, high))
+}
+
+fn ends(values: &[f64]) -> (f64, f64) {
+    values.iter().fold((f64::MAX, f64::MIN), |(a, b), &x| (a.min(x), b.max(x)))
+}
+
+fn rows(trial: &Trial, stays: &[bool]) -> Trial {
+    let kept = |values: &[f64]| {
+        values.iter().zip(stays).filter(|(_, stays)| **stays).map(|(x, _)| *x).collect()
+    };
+    let channel =
+        |channel: &Channel| Channel { name: channel.name.clone(), values: kept(&channel.values) };
+    Trial {
+        name: trial.name.clone(),
+        time_s: kept(&trial.time_s),
+        channels: trial.channels.iter().map(channel).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::span;
+
+    #[test]
+    fn wild_is_what_lies_beyond_a_hole_wider_than_the_rest() {
+        let usual: Vec<f64> =
+            (0..1000).map(|n| 165.0 + 14.0 * (0.1 * f64::from(n)).cos()).collect();
+        assert_eq!(span(&usual), None);
+        let with = |more: &[f64]| span(&[&usual[..], more].concat());
+        let (low, high) = with(&[]).unwrap_or((151.0, 179.0));
+        for wild in [&[-999.0][..], &[-999.0; 20], &[-999.0, 9999.0], &[0.0, 1e308], &[1e30; 100]] {
+            let found = with(wild).unwrap();
+            assert!(
+                (found.0 - low).abs() < 0.1 && (found.1 - high).abs() < 0.1,
+                "{wild:?} {found:?}"
+            );
+        }
+        // beside the range, and not beyond a hole
+        assert_eq!(with(&[200.0, 140.0]), None);
+        // two levels that a muscle is held at are none
+        let held: Vec<f64> =
+            (0..100).map(|n| if n < 85 { 150.0 } else { 170.0 } + f64::from(n % 5)).collect();
+        assert_eq!(span(&held), None);
+        assert_eq!(span(&[]), None);
+        assert_eq!(span(&[1.0]), None);
+    }
+}

@@ -1,0 +1,88 @@
+//! What the program says, where whoever reads it may have gone: no work hangs on it.
+//!
+//! Standard error is a courtesy: what cannot be written there is let go. Standard output may be
+//! what was asked for: the first failure is kept, the work goes on, its files are written, and
+//! [`lost`] tells the end of the program.
+
+use std::{
+    fmt::Display,
+    io::{self, ErrorKind, Write},
+    path::Path,
+    sync::{
+        OnceLock,
+        atomic::{AtomicBool, Ordering::SeqCst},
+    },
+};
+
+use anyhow::ensure;
+
+static LOST: OnceLock<ErrorKind> = OnceLock::new();
+
+/// Whether a file goes to standard output, where nothing else may then stand.
+static TAKEN: AtomicBool = AtomicBool::new(false);
+
+/// Gives standard output to the one of some files that is called `-`.
+pub(crate) fn give_stdout<'a>(
+    files: impl IntoIterator<Item = Option<&'a Path>>,
+) -> anyhow::Result<()> {
+    let count = files.into_iter().flatten().filter(|path| path.as_os_str() == "-").count();
+    ensure!(count < 2, "two files cannot go to standard output; name one of them");
+    TAKEN.fetch_or(count == 1, SeqCst);
+    Ok(())
+}
+
+/// A text and a line end to standard output, to standard error where a file goes there.
+///
+/// # Errors
+/// None: a result, so that a command can end with what it says.
+pub(crate) fn say(text: impl Display) -> anyhow::Result<()> {
+    if TAKEN.load(SeqCst) {
+        warn(text);
+        return Ok(());
+    }
+    // what was lost is kept by `Output`
+    let _ = writeln!(Output, "{text}");
+    Ok(())
+}
+
+/// A value as JSON to standard output.
+///
+/// # Errors
+/// A value that JSON cannot hold.
+pub(crate) fn say_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
+    say(serde_json::to_string_pretty(value)?)
+}
+
+/// A text and a line end to standard error, or to nobody.
+pub(crate) fn warn(text: impl Display) {
+    let line = format!("{text}\n");
+    let _ = io::stderr().lock().write_all(line.as_bytes());
+}
+
+/// Why standard output could not take all that it was given, if it could not.
+pub(crate) fn lost() -> Option<ErrorKind> {
+    LOST.get().copied()
+}
+
+/// Standard output that keeps the first failure for [`lost`].
+#[derive(Debug)]
+pub(crate) struct Output;
+
+fn kept<T>(result: io::Result<T>) -> io::Result<T> {
+    result.inspect_err(|error| {
+        // a call that was interrupted is made again
+        if error.kind() != ErrorKind::Interrupted {
+            let _ = LOST.set(error.kind());
+        }
+    })
+}
+
+impl Write for Output {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        kept(io::stdout().lock().write(bytes))
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        kept(io::stdout().lock().flush())
+    }
+}

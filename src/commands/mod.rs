@@ -17,6 +17,7 @@ pub(crate) mod evaluate;
 pub(crate) mod export;
 pub(crate) mod listen;
 pub(crate) mod paper;
+mod problem;
 mod rails;
 pub(crate) mod rig;
 pub(crate) mod shared;

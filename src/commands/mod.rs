@@ -15,6 +15,7 @@ mod diagnosis_text;
 pub(crate) mod effects;
 pub(crate) mod evaluate;
 pub(crate) mod export;
+pub(crate) mod init;
 pub(crate) mod listen;
 pub(crate) mod paper;
 mod problem;

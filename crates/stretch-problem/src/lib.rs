@@ -5,6 +5,7 @@ mod columns;
 mod error;
 mod families;
 mod file;
+mod init;
 mod linear;
 mod problem;
 mod runs;
@@ -18,6 +19,7 @@ pub use black_box::BlackBox;
 pub use error::ProblemError;
 pub use families::{Agreed, agreed};
 pub use file::{ProblemFile, SimulatorEntry, TrialFile, WorkersEntry};
+pub use init::first_problem;
 pub use problem::Problem;
 pub use source::{
     Ask, Closure, Session, SessionColumn, SessionPart, SessionStage, Source, SourceError, closure,

@@ -169,6 +169,12 @@ pub trait Simulator: Sync {
         let _ = (stage, model, trials);
         Ok(())
     }
+    /// Whether each value of an effect is a run of something that costs, so that its sensitivities are renewed as seldom as those of the
+    /// nominal parameters.
+    fn is_costly(&self, effect: usize) -> bool {
+        let _ = effect;
+        false
+    }
     /// Runs of what is simulated, where that is not as many as simulations of stages: a black box is not run anew for what stands behind it.
     fn model_runs(&self) -> Option<ModelRuns> {
         None

@@ -88,7 +88,7 @@ pub struct ModelRuns {
     pub count: usize,
     /// How many may be made, where that is limited.
     pub budget: Option<usize>,
-    /// Whether no more may be made but those that the answer itself needs.
+    /// Whether no more may be made but those that the answer itself needs; in a diagnosis, whether the search was cut short for it.
     pub is_spent: bool,
 }
 

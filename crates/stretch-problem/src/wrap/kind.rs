@@ -27,6 +27,12 @@ pub enum Beside {
     Velocity,
 }
 
+/// Values to screen a wrapper at, from the extent of its channel.
+pub type Starts = fn(&Extent) -> Vec<Vec<f64>>;
+
+/// How much of what its family shares the numbers of a wrapper make.
+pub type Measure = fn(&[f64]) -> f64;
+
 /// What wrappers of one family agree on where data do not tell them apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Family {
@@ -59,13 +65,13 @@ pub struct Wrapper {
     /// Its numbers, their ranges from the channel's own span.
     pub parameters: fn(&Extent, &str) -> Vec<EffectParameterSpec>,
     /// Values to screen it at; without any those of [`EffectSpec::new`](stretch_gap::EffectSpec::new).
-    pub starts: Option<fn(&Extent) -> Vec<Vec<f64>>>,
+    pub starts: Option<Starts>,
     /// The operator with these values.
     pub operator: fn(&[f64], &Extent, &Grid) -> Box<dyn Operator>,
     /// Kinds that are hard to tell from it on the same channel.
     pub twins: &'static [&'static str],
     /// What it shares with others of its family that data may not tell apart, and how much of it its numbers make.
-    pub family: Option<(Family, fn(&[f64]) -> f64)>,
+    pub family: Option<(Family, Measure)>,
     /// Whether its memory goes on from trial to trial.
     pub counts_session: bool,
     /// Whether its course is found in the record (the phase of a hum).

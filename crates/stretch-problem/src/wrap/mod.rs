@@ -12,5 +12,5 @@ mod times;
 
 pub use extent::Extent;
 pub(crate) use extent::ends;
-pub use kind::{Beside, Family, Side, Wrapper, wrapper_named, wrappers};
+pub use kind::{Beside, Family, Measure, Side, Starts, Wrapper, wrapper_named, wrappers};
 pub(crate) use place::{Among, Placed, Site, Trials, placed};

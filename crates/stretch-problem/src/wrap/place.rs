@@ -6,8 +6,9 @@ use stretch_gap::EffectSpec;
 use stretch_operators::{Grid, Span, Start};
 
 use super::{
+    catalogue::wrappers,
     extent::{Extent, ends},
-    kind::{Beside, Side, Wrapper, wrappers},
+    kind::{Beside, Side, Wrapper},
 };
 use crate::{columns::Columns, error::ProblemError, velocity::Velocity};
 

@@ -16,8 +16,8 @@ use std::{io::ErrorKind, process::ExitCode};
 use clap::{Parser, Subcommand};
 
 use commands::{
-    apply, blind, calibrate, convert, demo, diagnose, effects, evaluate, export, listen, record,
-    rig, simulate,
+    apply, blind, calibrate, convert, demo, diagnose, effects, evaluate, export, init, listen,
+    record, rig, simulate,
 };
 
 /// From the voltage of a stretch sensor to length, live.
@@ -49,6 +49,7 @@ enum Command {
     Demo(demo::Args),
     Simulate(simulate::Args),
     Diagnose(diagnose::Args),
+    Init(init::Args),
     Blind(blind::Args),
     Effects(effects::Args),
     Rig(rig::Args),
@@ -75,6 +76,7 @@ fn main() -> ExitCode {
         Command::Demo(args) => demo::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Diagnose(args) => diagnose::run(args),
+        Command::Init(args) => init::run(args),
         Command::Blind(args) => blind::run(args),
         Command::Effects(args) => effects::run(args),
         Command::Rig(args) => rig::run(args),

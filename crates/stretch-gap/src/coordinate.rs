@@ -18,7 +18,7 @@ use crate::{
 /// Standard deviation of a form around its usual value, as a share of its range.
 const FORM_SD: f64 = 0.35;
 /// Tolerances within which a re-tuned parameter stays.
-const REACH: f64 = 3.0;
+pub(crate) const REACH: f64 = 3.0;
 
 /// One coordinate of a fit.
 #[derive(Debug, Clone, Copy)]
@@ -115,10 +115,19 @@ pub(crate) fn coordinates(
     model: &Model,
 ) -> Vec<(Coordinate, [f64; 2])> {
     let specs = simulator.parameters();
-    let own = stages.iter().flat_map(|&stage| &simulator.stages()[stage].parameters);
-    let tuned = own.filter(|&&index| specs[index].sd > 0.0).map(|&index| {
+    let mut own: Vec<usize> = Vec::new();
+    for &index in stages.iter().flat_map(|&stage| &simulator.stages()[stage].parameters) {
+        // What acts in two stages is one coordinate.
+        if specs[index].sd > 0.0 && !own.contains(&index) {
+            own.push(index);
+        }
+    }
+    let tuned = own.into_iter().map(|index| {
         let p = &specs[index];
-        let bounds = [((p.least - p.nominal) / p.sd).max(-REACH), REACH];
+        let bounds = [
+            ((p.least - p.nominal) / p.sd).max(-REACH),
+            ((p.greatest - p.nominal) / p.sd).min(REACH),
+        ];
         (Coordinate::Nominal { index, nominal: p.nominal, sd: p.sd }, bounds)
     });
     tuned.chain(of_effects(simulator, model)).collect()

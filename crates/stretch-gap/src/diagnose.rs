@@ -103,7 +103,7 @@ fn run(
     progress("errors of the record");
     let suspect = Suspect::of(simulator);
     let doubted = problem.beside(&suspect);
-    let doubts = match plain.is_empty() {
+    let doubts = match plain.is_empty() && !problem.is_spent() {
         true => Doubts::of(&doubted, &suspect, thresholds)?
             .closer_if(&doubted, &suspect, &found, thresholds)?,
         false => Doubts::default(),
@@ -173,7 +173,9 @@ fn run(
         null_band,
     };
     let unknown = unknown(evidence.gap, thresholds);
-    let told = tell(answer, case, simulator, &evidence, &shares);
+    let mut told = tell(answer, case, simulator, &evidence, &shares);
+    let model_runs = runs.counted();
+    told.notes.extend(model_runs.and_then(|runs| runs.note()));
     let diagnosis = Diagnosis {
         schema: 1,
         verdict: verdict.kind,
@@ -191,12 +193,14 @@ fn run(
         null_band,
         location,
         parameters: shifts(simulator, &evidence),
+        identifiability: searched.identified(),
         transfer,
         next_experiment: None,
         baselines: options.baselines.then(simpler).transpose()?,
         notes: told.notes,
         rows_used,
         simulations,
+        model_runs,
         runtime_s,
         candidates: beside_unknown(candidates, evidence.gap, unknown),
     };

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{missing::Proposed, rows::RowsUsed};
+use crate::{identify::Identified, missing::Proposed, rows::RowsUsed, simulator::ModelRuns};
 
 /// The answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -354,6 +354,9 @@ pub struct Diagnosis {
     pub location: Where,
     /// Nominal parameters.
     pub parameters: Vec<ParameterShift>,
+    /// Which nominal parameters these data determine, and which not.
+    #[serde(default)]
+    pub identifiability: Vec<Identified>,
     /// What the gap costs a calibration.
     pub transfer: Option<Transfer>,
     /// What to measure next.
@@ -368,6 +371,9 @@ pub struct Diagnosis {
     /// Simulations of one stage that it took, simpler methods left out.
     #[serde(default)]
     pub simulations: usize,
+    /// Runs of a black box, where that is what costs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model_runs: Option<ModelRuns>,
     /// Seconds it took.
     pub runtime_s: f64,
 }

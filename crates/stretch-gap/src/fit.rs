@@ -20,13 +20,14 @@
 //! Effects and nominal parameters must move together. An effect fitted with the nominal parameters held is credited with what
 //! they could have done (Brynjarsdottir and O'Hagan 2014, doi 10.1088/0266-5611/30/11/114007).
 
-use nalgebra::DMatrix;
-use rayon::prelude::*;
+use nalgebra::{DMatrix, DVector};
+use rayon::iter::ParallelIterator;
 
 use crate::{
     compare::{Comparison, Sensitivities},
     coordinate::{Coordinate, coordinates},
     error::GapError,
+    identify::Information,
     linear::{Cholesky, boxed},
     metric::Column,
     score::Misfit,
@@ -43,6 +44,8 @@ pub(crate) struct Fitted {
     pub(crate) effect_sd: Vec<Vec<f64>>,
     /// One standard deviation of each nominal parameter that was re-tuned.
     pub(crate) parameter_sd: Vec<(usize, f64)>,
+    /// What the fit says of the nominal parameters, the effects' own held.
+    pub(crate) information: Information,
 }
 
 /// How much work a fit may be.
@@ -52,12 +55,14 @@ pub(crate) struct Effort {
     iterations: usize,
     /// Iterations at which the sensitivities of the nominal parameters are taken anew.
     renewals: &'static [usize],
+    /// Whether steps of the nominal parameters may be told from a run at those that the fit starts from.
+    is_rough: bool,
 }
 
 /// Enough to see whether a candidate can compete.
-pub(crate) const COARSE: Effort = Effort { iterations: 5, renewals: &[1, 3] };
+pub(crate) const COARSE: Effort = Effort { iterations: 5, renewals: &[1, 3], is_rough: true };
 /// Until nothing is gained.
-pub(crate) const FINE: Effort = Effort { iterations: 14, renewals: &[1, 3, 6, 9] };
+pub(crate) const FINE: Effort = Effort { iterations: 14, renewals: &[1, 3, 6, 9], is_rough: false };
 
 /// Added to every diagonal: a coordinate that does nothing has no curvature.
 const RIDGE: f64 = 1e-12;
@@ -75,11 +80,15 @@ impl Comparison<'_> {
         known: &[Option<Sensitivities>],
         effort: Effort,
     ) -> Result<Fitted, GapError> {
-        let mut descent = Descent::new(self, stages, start)?;
+        let near = effort.is_rough.then(|| start.parameters.clone());
+        let mut descent = Descent::new(self, stages, start, near)?;
         for iteration in 0..effort.iterations {
             let is_first = iteration == 0;
             let renew = effort.renewals.contains(&iteration) || (is_first && known.is_empty());
             descent.linearise(known, is_first, renew)?;
+            if self.runs.is_spent() {
+                break;
+            }
             let before = descent.cost;
             let has_moved = descent.step()?;
             let is_still = before - descent.cost < LEAST_GAIN.0 + LEAST_GAIN.1 * descent.cost;
@@ -101,7 +110,7 @@ pub(crate) fn possible<T: Send>(
     for fit in all {
         match fit {
             Ok(fit) => out.push(fit),
-            Err(GapError::Stopped) => return Err(GapError::Stopped),
+            Err(error) if error.ends_all() => return Err(error),
             Err(_) => {}
         }
     }
@@ -114,6 +123,8 @@ struct Descent<'a, 'b> {
     stages: &'a [usize],
     coordinates: Vec<(Coordinate, [f64; 2])>,
     model: Model,
+    /// Parameters near which steps may be told; none where each is a run of its own.
+    near: Option<Vec<f64>>,
     /// By stage, as `stages`.
     residuals: Vec<Column>,
     cost: f64,
@@ -130,6 +141,7 @@ impl<'a, 'b> Descent<'a, 'b> {
         compare: &'a Comparison<'b>,
         stages: &'a [usize],
         mut model: Model,
+        near: Option<Vec<f64>>,
     ) -> Result<Self, GapError> {
         let coordinates = coordinates(compare.simulator(), stages, &model);
         for (c, b) in &coordinates {
@@ -148,6 +160,7 @@ impl<'a, 'b> Descent<'a, 'b> {
             lambda: 1e-3,
             coordinates,
             model,
+            near,
         };
         descent.residuals = descent.residuals_of(&descent.model)?;
         descent.cost = descent.cost_of(&descent.model, &descent.residuals);
@@ -155,7 +168,10 @@ impl<'a, 'b> Descent<'a, 'b> {
     }
 
     fn residuals_of(&self, model: &Model) -> Result<Vec<Column>, GapError> {
-        self.stages.iter().map(|&s| self.compare.residual(s, model)).collect()
+        let wanted: Vec<(usize, &Model)> = self.stages.iter().map(|&s| (s, model)).collect();
+        let values = self.compare.residuals_of(&wanted, self.near.as_deref());
+        let columns = self.stages.iter().zip(values);
+        columns.map(|(&s, v)| Ok(self.compare.metrics[s].column(&self.compare.frame, v?))).collect()
     }
 
     /// J of the module's head.
@@ -173,28 +189,41 @@ impl<'a, 'b> Descent<'a, 'b> {
         is_first: bool,
         renew: bool,
     ) -> Result<(), GapError> {
-        let due = |place: &(Coordinate, [f64; 2])| match place.0 {
-            Coordinate::Nominal { index, .. } if is_first && !known.is_empty() => {
-                let of = |&s: &usize| {
-                    let own = known.get(s).and_then(Option::as_ref)?;
-                    own.iter().find(|(p, _)| *p == index).map(|(_, c)| c.clone())
-                };
-                Ok(Some(self.stages.iter().map(of).collect()))
+        let is_known = is_first && !known.is_empty();
+        let mut due = Vec::new();
+        for (i, place) in self.coordinates.iter().enumerate() {
+            match place.0 {
+                Coordinate::Nominal { index, .. } if is_known => {
+                    let of = |&s: &usize| {
+                        let own = known.get(s).and_then(Option::as_ref)?;
+                        own.iter().find(|(p, _)| *p == index).map(|(_, c)| c.clone())
+                    };
+                    self.columns[i] = self.stages.iter().map(of).collect();
+                }
+                Coordinate::Nominal { .. } if !renew => {}
+                _ if !renew && !is_first && self.is_costly(place.0) => {}
+                _ => due.push(i),
             }
-            Coordinate::Nominal { .. } if !renew => Ok(None),
-            _ => {
-                let own =
-                    self.compare.sensitivity(self.stages, *place, &self.model, &self.residuals);
-                own.map(Some)
-            }
-        };
-        let columns: Result<Vec<Option<Vec<_>>>, GapError> =
-            self.coordinates.par_iter().map(due).collect();
-        for (column, due) in self.columns.iter_mut().zip(columns?) {
-            *column = due.unwrap_or_else(|| std::mem::take(column));
+        }
+        let places: Vec<_> = due.iter().map(|&i| self.coordinates[i]).collect();
+        let at = (&self.model, self.residuals.as_slice());
+        let near = self.near.as_deref().unwrap_or(&self.model.parameters);
+        let columns = self.compare.sensitivities(self.stages, &places, at, near)?;
+        for (i, column) in due.into_iter().zip(columns) {
+            self.columns[i] = column;
         }
         self.normal_equations();
         Ok(())
+    }
+
+    /// Whether a coordinate is that of an effect whose every value is a run that costs.
+    fn is_costly(&self, coordinate: Coordinate) -> bool {
+        match coordinate {
+            Coordinate::Nominal { .. } => false,
+            Coordinate::Linear { slot, .. } | Coordinate::Log { slot, .. } => {
+                self.compare.simulator().is_costly(self.model.effects[slot].0)
+            }
+        }
     }
 
     fn normal_equations(&mut self) {
@@ -234,18 +263,23 @@ impl<'a, 'b> Descent<'a, 'b> {
             [(bounds[0] - x[i]).max(-c.stride()), (bounds[1] - x[i]).min(c.stride())]
         };
         let (low, high): (Vec<f64>, Vec<f64>) = (0..n).map(reach).map(|[l, h]| (l, h)).unzip();
+        let is_counted = self.compare.simulator().model_runs().is_some();
         for _ in 0..TRIES {
             let mut damped = self.normal.clone();
             for i in 0..n {
                 damped[(i, i)] += self.lambda * self.normal[(i, i)] + RIDGE;
             }
             let step = boxed(&damped, &self.gradient, &low, &high);
+            // Where runs are counted, none is made for what the line itself says is nothing.
+            if is_counted && self.foretold(&step) < LEAST_GAIN.0 + LEAST_GAIN.1 * self.cost {
+                return Ok(false);
+            }
             let mut next = self.model.clone();
             for (((c, _), x), s) in self.coordinates.iter().zip(&x).zip(&step) {
                 c.write(&mut next, x + s);
             }
             match self.residuals_of(&next) {
-                Err(GapError::Stopped) => return Err(GapError::Stopped),
+                Err(error) if error.ends_all() => return Err(error),
                 // These values cannot be simulated: nearer to where it can.
                 Err(_) => {}
                 Ok(there) => {
@@ -262,10 +296,24 @@ impl<'a, 'b> Descent<'a, 'b> {
         Ok(false)
     }
 
+    /// Fall of the cost that the linearised residuals foretell of a step: -(g'd + d'N d/2).
+    fn foretold(&self, step: &[f64]) -> f64 {
+        let d = DVector::from_column_slice(step);
+        let slope: f64 = self.gradient.iter().zip(step).map(|(g, s)| g * s).sum();
+        -(slope + 0.5 * d.dot(&(&self.normal * &d)))
+    }
+
     /// Misfits, and standard deviations by Laplace's approximation: the covariance is N^-1.
     fn finish(self) -> Fitted {
         let stages = self.stages.iter().zip(&self.residuals);
         let misfits = stages.map(|(&s, r)| self.compare.misfit(s, r)).collect();
+        let is_nominal = |i: &usize| matches!(self.coordinates[*i].0, Coordinate::Nominal { .. });
+        let kept: Vec<usize> = (0..self.coordinates.len()).filter(is_nominal).collect();
+        let of = self.coordinates.iter().filter_map(|(c, _)| match c {
+            Coordinate::Nominal { index, .. } => Some(*index),
+            _ => None,
+        });
+        let information = (of.collect(), self.normal.select_rows(&kept).select_columns(&kept));
         let spread = spreads(self.normal);
         let effects = self.model.effects.iter();
         let mut effect_sd: Vec<Vec<f64>> = effects.map(|(_, v)| vec![0.0; v.len()]).collect();
@@ -282,7 +330,7 @@ impl<'a, 'b> Descent<'a, 'b> {
                 }
             }
         }
-        Fitted { model: self.model, misfits, effect_sd, parameter_sd }
+        Fitted { model: self.model, misfits, effect_sd, parameter_sd, information }
     }
 }
 

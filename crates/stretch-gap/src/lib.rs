@@ -20,10 +20,12 @@ mod floor;
 mod frame;
 mod hyper;
 mod hypothesis;
+mod identify;
 mod judge;
 mod lacking;
 mod line;
 mod linear;
+mod linked;
 mod localise;
 mod lone;
 mod metric;
@@ -66,6 +68,7 @@ pub use dice::Dice;
 pub use error::GapError;
 pub use evidence::{Evidence, StageEvidence};
 pub use frame::{BLOCK_S, Frame, Role, Segment};
+pub use identify::{Identified, Knowledge};
 pub use line::Line;
 pub use missing::{Factor, Passage, Proposed, ProposedTerm, RateForm, SignalScale, Term};
 pub use next_experiment::{Laboratory, Plan, Proposal, differences, next_experiment};
@@ -75,6 +78,6 @@ pub use record::{
     plain::copied,
 };
 pub use rows::RowsUsed;
-pub use simulator::{Model, Motion, Recorded, Run, Simulator};
+pub use simulator::{Model, ModelRuns, Motion, Recorded, Run, Simulator};
 pub use spec::{EffectParameterSpec, EffectSpec, ParameterSpec, StageSpec, TrialSpec, Wander};
 pub use thresholds::Thresholds;

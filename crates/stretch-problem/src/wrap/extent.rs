@@ -1,0 +1,92 @@
+//! How far a channel goes: what ranges of wrappers are made of.
+
+/// What was measured of a channel, without the samples that are tested on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// Least value.
+    pub low: f64,
+    /// Greatest value.
+    pub high: f64,
+    /// The quickest hundredth of its changes begins at this rate, units/s.
+    pub quickest: f64,
+    /// Sample time, s.
+    pub dt_s: f64,
+    /// Longest trial, s.
+    pub trial_s: f64,
+    /// From the first to the last sample of the session, s.
+    pub session_s: f64,
+    /// Step of the lattice that the values stand on best.
+    pub lattice: f64,
+    /// Least and greatest value of what the wrapper looks at beside the channel.
+    pub beside: [f64; 2],
+}
+
+impl Extent {
+    /// Of the parts of a channel that may be looked at.
+    pub(crate) fn of<'a>(parts: impl Iterator<Item = &'a [f64]> + Clone, dt_s: f64) -> Self {
+        let [low, high] = ends(parts.clone().flatten());
+        let mut rates: Vec<f64> =
+            parts.clone().flat_map(|p| p.windows(2).map(|w| (w[1] - w[0]).abs() / dt_s)).collect();
+        let at = rates.len() * 99 / 100;
+        let quickest = match rates.is_empty() {
+            true => 0.0,
+            false => *rates.select_nth_unstable_by(at, f64::total_cmp).1,
+        };
+        let longest = parts.clone().map(<[f64]>::len).max().unwrap_or(0);
+        let trial_s = longest as f64 * dt_s;
+        let lattice = lattice(parts.flatten(), [low, high]);
+        Self { low, high, quickest, dt_s, trial_s, session_s: trial_s, lattice, beside: [0.0; 2] }
+    }
+
+    /// From the least to the greatest value.
+    pub fn span(&self) -> f64 {
+        self.high - self.low
+    }
+
+    /// Longest delay or lag that is looked for, s: a fifth of a second or twenty samples, and no more than a tenth of a trial.
+    pub fn late_s(&self) -> f64 {
+        (20.0 * self.dt_s).max(0.2).min(0.1 * self.trial_s).max(self.dt_s)
+    }
+
+    /// Largest absolute value of what is looked at beside.
+    pub fn beside_size(&self) -> f64 {
+        self.beside[0].abs().max(self.beside[1].abs())
+    }
+}
+
+/// Steps that a span may have on a lattice, and values that are looked at.
+const STEPS: [f64; 2] = [10.0, 400.0];
+const LOOKED: usize = 2000;
+
+/// The step d for which the values stand most nearly on multiples of it: the greatest |mean of exp(2 pi i x/d)| (Rayleigh's test), over
+/// 1/d in steps that leave no phase of the span further apart than a quarter turn.
+fn lattice<'a>(values: impl Iterator<Item = &'a f64> + Clone, [low, high]: [f64; 2]) -> f64 {
+    let span = high - low;
+    if !(span.is_finite() && span > 0.0) {
+        return 0.0;
+    }
+    let every = values.clone().count().div_ceil(LOOKED).max(1);
+    let some: Vec<f64> = values.step_by(every).copied().collect();
+    let reach = span.max(low.abs()).max(high.abs());
+    let (mut best, mut most) = (span / STEPS[1], 0.0);
+    let mut per_unit = STEPS[0] / span;
+    while per_unit <= STEPS[1] / span {
+        let (mut cos, mut sin) = (0.0, 0.0);
+        for x in &some {
+            let angle = std::f64::consts::TAU * (x * per_unit);
+            cos += angle.cos();
+            sin += angle.sin();
+        }
+        // Multiples stand at phase 0.
+        if cos > most && cos > sin.abs() {
+            (best, most) = (1.0 / per_unit, cos);
+        }
+        per_unit += 0.1 / reach;
+    }
+    best
+}
+
+/// Least and greatest.
+pub(crate) fn ends<'a>(values: impl Iterator<Item = &'a f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(*x), b.max(*x)])
+}

@@ -1,0 +1,73 @@
+"""The native part of the package: use `stretch`."""
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__version__: str
+
+class StretchError(ValueError):
+    """What is wrong with the data or the question, and what to do about it, in a sentence."""
+
+class Reading:
+    """What a receptor answers for one sample."""
+
+    @property
+    def estimate(self) -> float:
+        """The estimate, in the reference's unit."""
+    @property
+    def rate(self) -> float:
+        """Its rate, in that unit per second."""
+    @property
+    def branch(self) -> str:
+        """Which way it moves: `rising` or `falling`."""
+    @property
+    def domain(self) -> str:
+        """Whether the sample lay where the calibration was fitted: `inside`, else what was clamped."""
+    @property
+    def sd(self) -> float | None:
+        """Standard deviation of the estimate, where the model knows it."""
+
+class Receptor:
+    """A calibration that takes one sample after the other and minds their time stamps."""
+
+    def step(self, time_s: float, signal: float) -> Reading | None:
+        """The reading of the next sample; None while the rate estimator warms up, and where a sample is not a number."""
+    def feel(self, pressure: float) -> None:
+        """The pressure of the samples to come, for a calibration that needs it."""
+    @property
+    def faults(self) -> dict[str, int]:
+        """What was wrong with the time stamps so far: samples missing, jittered, and running backwards."""
+
+class Record:
+    @staticmethod
+    def from_json(text: str) -> Record: ...
+    @staticmethod
+    def load(path: str | os.PathLike[str]) -> Record: ...
+    def save(self, path: str | os.PathLike[str]) -> None: ...
+    def to_json(self) -> str: ...
+    @property
+    def signal(self) -> str: ...
+    @property
+    def reference(self) -> str: ...
+    @property
+    def unit(self) -> str: ...
+    @property
+    def rate_hz(self) -> float: ...
+    @property
+    def range(self) -> tuple[float, float]: ...
+    @property
+    def needs_pressure(self) -> bool: ...
+    def receptor(self) -> Receptor: ...
+    def apply(
+        self,
+        time_s: NDArray[np.float64],
+        signal: NDArray[np.float64],
+        pressure: NDArray[np.float64] | None,
+    ) -> dict[str, Any]: ...
+
+def calibrate(recordings: Sequence[dict[str, Any]], choices: dict[str, Any]) -> tuple[Record, str]: ...
+def evaluate(calibrations: Sequence[tuple[str, Record]], recordings: Sequence[dict[str, Any]]) -> str: ...

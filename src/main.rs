@@ -1,10 +1,6 @@
 //! The `stretch` program: parse, dispatch.
 
 mod commands;
-mod goal;
-mod paper_tables;
-mod plain;
-mod report;
 mod table;
 
 use std::process::ExitCode;

@@ -118,7 +118,10 @@ pub(crate) fn coordinates(
     let own = stages.iter().flat_map(|&stage| &simulator.stages()[stage].parameters);
     let tuned = own.filter(|&&index| specs[index].sd > 0.0).map(|&index| {
         let p = &specs[index];
-        let bounds = [((p.least - p.nominal) / p.sd).max(-REACH), REACH];
+        let bounds = [
+            ((p.least - p.nominal) / p.sd).max(-REACH),
+            ((p.greatest - p.nominal) / p.sd).min(REACH),
+        ];
         (Coordinate::Nominal { index, nominal: p.nominal, sd: p.sd }, bounds)
     });
     tuned.chain(of_effects(simulator, model)).collect()

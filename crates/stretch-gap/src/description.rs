@@ -188,6 +188,15 @@ fn check_parameter(p: &ParameterSpec) -> Result<(), DescriptionError> {
             needs,
         });
     }
+    if p.greatest.is_nan() || p.greatest < p.nominal {
+        let needs = "at least the nominal value";
+        return Err(DescriptionError::Number {
+            owner: owner(),
+            what: "greatest",
+            value: p.greatest,
+            needs,
+        });
+    }
     let offset = p.per_trial_sd.unwrap_or(0.0);
     number(&owner, "per_trial_sd", offset, "0 or more", |x| x >= 0.0)?;
     if let Some(wander) = p.wander {

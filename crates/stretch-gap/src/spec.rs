@@ -62,6 +62,8 @@ pub struct ParameterSpec {
     pub sd: f64,
     /// Least value that makes sense.
     pub least: f64,
+    /// Greatest value that makes sense.
+    pub greatest: f64,
     /// Slow wander within a trial, when there is one.
     pub wander: Option<Wander>,
     /// Standard deviation of a constant offset in each trial, in the parameter's unit.
@@ -82,6 +84,7 @@ impl ParameterSpec {
             nominal,
             sd: 0.0,
             least: f64::NEG_INFINITY,
+            greatest: f64::INFINITY,
             wander: None,
             per_trial_sd: None,
             per_tick_sd: None,

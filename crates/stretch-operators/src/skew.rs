@@ -1,6 +1,9 @@
 //! Samples that show a signal of some time earlier or later.
 
-use crate::grid::Grid;
+use crate::{
+    grid::Grid,
+    operator::{Operator, Span},
+};
 
 /// By how much samples are late.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -62,6 +65,14 @@ impl Skew {
             let late_s = self.spec.skew_s + self.spec.rate * (i as f64 * self.grid.dt_s());
             *out = Reading::new(&self.grid, late_s).of(nodes, i * pieces);
         }
+    }
+}
+
+/// On samples of a whole trial.
+impl Operator for Skew {
+    fn run(&self, _span: &Span<'_>, _cells: &mut [f64], signal: &mut [f64]) {
+        let nodes = signal.to_vec();
+        self.sample(&nodes, signal);
     }
 }
 

@@ -1,0 +1,290 @@
+//! A user's simulator, wrapped, as the diagnosis takes it.
+
+use std::{borrow::Cow, sync::Arc};
+
+use stretch_gap::{
+    Column, Description, Dice, GapError, Motion, Recorded, RowsUsed, Run, Simulator,
+};
+
+use crate::{
+    problem::{Acting, Problem},
+    runs::{Inner, Runs},
+    source::{Source, SourceError},
+    wrap::{Side, Trials},
+};
+
+/// A checked problem and a source, bound together: a [`Simulator`].
+///
+/// The source is run for parameters, own effects and what stands in front of a stage; what stands behind one acts on a run that is kept.
+///
+/// ```
+/// use std::sync::Arc;
+/// use stretch_data::{Channel, SessionTrial, Trial};
+/// use stretch_gap::{Options, diagnose};
+/// use stretch_problem::{Ask, BlackBox, Parameter, Problem, ProblemSpec, Stage, Tolerance, closure};
+///
+/// // A spring that shows 0.06 s late what it is loaded with.
+/// let load = |t: f64| 20.0 * (1.3 * t).sin() + 10.0 * (3.1 * t).sin();
+/// let noise = |i: usize| 1e-2 * ((i * i * 7919) % 1000) as f64 / 1000.0;
+/// let time_s: Vec<f64> = (0..3000).map(|i| 0.01 * i as f64).collect();
+/// let channel = |name: &str, values| Channel { name: name.into(), values };
+/// let force: Vec<f64> = time_s.iter().map(|t| load(*t)).collect();
+/// let length = time_s.iter().enumerate().map(|(i, t)| 2.1 * load(t - 0.06) + noise(i)).collect();
+/// let channels = vec![channel("force_N", force), channel("length_mm", length)];
+/// let trial = Trial { name: "spring.csv".into(), time_s, channels };
+///
+/// let problem = Problem::new(ProblemSpec {
+///     stages: vec![Stage {
+///         name: "spring".into(),
+///         output: "length_mm".into(),
+///         inputs: vec!["force_N".into()],
+///         ..Stage::default()
+///     }],
+///     parameters: vec![Parameter {
+///         name: "compliance".into(),
+///         unit: "mm/N".into(),
+///         value: 2.0,
+///         tolerance: Tolerance::Relative(0.1),
+///         ..Parameter::default()
+///     }],
+///     wrap: vec!["output.skew".into(), "output.backlash".into()],
+///     trials: vec![SessionTrial::new(trial)],
+///     ..ProblemSpec::default()
+/// })?;
+/// let force = problem.session().column("force_N").unwrap().to_vec();
+/// let session = problem.session().clone();
+/// let spring = closure(move |ask: &Ask<'_>| {
+///     Ok(force[..session.samples(ask.trials)].iter().map(|f| ask.parameters[0] * f).collect())
+/// });
+/// let bench = BlackBox::new(problem, Arc::new(spring));
+/// let (diagnosis, _) = diagnose(&bench, &Options::default(), &|_| (), &|| false)?;
+/// assert_eq!(diagnosis.named, ["output.skew"]);
+/// assert!(bench.model_runs() < diagnosis.simulations);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct BlackBox {
+    problem: Problem,
+    runs: Runs,
+}
+
+impl BlackBox {
+    /// Binds a problem to the source that answers it.
+    pub fn new(problem: Problem, source: Arc<dyn Source>) -> Self {
+        Self::within(problem, source, None)
+    }
+
+    /// The same with at most so many runs of the source.
+    pub fn within(problem: Problem, source: Arc<dyn Source>, budget: Option<usize>) -> Self {
+        let samples =
+            problem.columns.is_lost.len().max(problem.parts.last().map_or(1, |p| p.0.end));
+        let stages = if source.answers_all() { problem.stages.len() } else { 1 };
+        let runs = Runs::new(source, budget, stages * samples);
+        Self { problem, runs }
+    }
+
+    /// The problem.
+    pub fn problem(&self) -> &Problem {
+        &self.problem
+    }
+
+    /// Runs of the source so far.
+    pub fn model_runs(&self) -> usize {
+        self.runs.count()
+    }
+
+    /// What the source says of its runs, and what it refused.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = self.runs.notes();
+        let refused = self.runs.refused();
+        if let Some(first) = refused.first() {
+            notes.push(format!(
+                "{} of {} model runs gave no output and took their candidate out; the first: {first}",
+                refused.len(),
+                self.runs.count()
+            ));
+        }
+        notes
+    }
+
+    /// What has to be run for a model.
+    fn inner(&self, run: &Run<'_>) -> Inner {
+        let problem = &self.problem;
+        let spec = &self.description().stages[run.stage];
+        let mut parameters: Vec<f64> = self.parameters().iter().map(|p| p.nominal).collect();
+        for &p in &spec.parameters {
+            parameters[p] = run.model.parameters[p];
+        }
+        let mut effects = problem.off.clone();
+        let mut how = Vec::new();
+        let mut before = Vec::new();
+        for (effect, values) in &run.model.effects {
+            if !self.effects()[*effect].touches.contains(&run.stage) {
+                continue;
+            }
+            match problem.acting[*effect] {
+                Acting::Own(first) => effects[first..first + values.len()].copy_from_slice(values),
+                Acting::Wrapper(at) if problem.wrappers[at].site.side == Side::Input => {
+                    before.push((at, values));
+                }
+                Acting::Wrapper(_) => {}
+            }
+        }
+        before.sort_by_key(|(at, _)| *at);
+        let noise = &problem.input_noise[run.stage];
+        let shake = run.shake.filter(|_| noise.iter().any(|sd| *sd > 0.0));
+        let inputs = (!before.is_empty() || shake.is_some()).then(|| {
+            let end = problem.session().samples(run.trials);
+            let mut inputs: Vec<Vec<f64>> =
+                problem.stage_inputs(run.stage).map(|c| c[..end].to_vec()).collect();
+            if let Some(seed) = shake {
+                how.push(seed);
+                for (i, (column, sd)) in inputs.iter_mut().zip(noise).enumerate() {
+                    let mut dice = Dice::new(seed, 1 + (run.stage * 64 + i) as u64);
+                    column.iter_mut().for_each(|x| *x += sd * dice.gauss());
+                }
+            }
+            let trials = self.trials_of();
+            for (at, values) in &before {
+                let wrapper = &problem.wrappers[*at];
+                how.push(u64::MAX - *at as u64);
+                how.extend(values.iter().map(|v| v.to_bits()));
+                wrapper.act(values, &trials, &mut inputs[wrapper.site.input]);
+            }
+            (inputs, how)
+        });
+        Inner { stage: run.stage, parameters, effects, inputs, trials: run.trials }
+    }
+
+    fn trials_of(&self) -> Trials<'_> {
+        Trials { grid: &self.problem.grid, parts: &self.problem.parts }
+    }
+
+    /// What stands behind a stage acts on its output.
+    fn behind(&self, run: &Run<'_>, out: &mut [f64]) {
+        let problem = &self.problem;
+        let mut behind: Vec<(usize, &Vec<f64>)> = Vec::new();
+        for (effect, values) in &run.model.effects {
+            if let Acting::Wrapper(at) = problem.acting[*effect] {
+                let site = &problem.wrappers[at].site;
+                if site.side == Side::Output && site.stage == run.stage {
+                    behind.push((at, values));
+                }
+            }
+        }
+        behind.sort_by_key(|(at, _)| *at);
+        let trials = self.trials_of();
+        for (at, values) in behind {
+            problem.wrappers[at].act(values, &trials, out);
+        }
+    }
+}
+
+/// What the engine makes of a source's error: where values cannot be simulated a fit turns back.
+fn refused(error: SourceError) -> GapError {
+    GapError::simulator(error)
+}
+
+impl Simulator for BlackBox {
+    fn description(&self) -> &Description {
+        self.problem.description()
+    }
+
+    fn measured(&self, stage: usize) -> &[f64] {
+        self.problem.columns.of(&self.problem.stages[stage].output).unwrap_or(&[])
+    }
+
+    fn is_lost(&self) -> &[bool] {
+        &self.problem.columns.is_lost
+    }
+
+    fn rows_used(&self) -> RowsUsed {
+        let rows = self.problem.columns.rows;
+        RowsUsed { used: rows.used(), read: rows.read }
+    }
+
+    fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
+        let mut outs = [out.to_vec()];
+        let done = self.simulate_many(&[run], &mut outs).pop().unwrap_or(Ok(()));
+        out.copy_from_slice(&outs[0]);
+        done
+    }
+
+    fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
+        let inner: Vec<Inner> = runs.iter().map(|run| self.inner(run)).collect();
+        let outputs = self.runs.outputs(self.problem.session(), &inner);
+        let each = runs.iter().zip(outputs).zip(outs);
+        each.map(|((run, output), out)| {
+            out.copy_from_slice(&output.map_err(refused)?);
+            self.behind(run, out);
+            Ok(())
+        })
+        .collect()
+    }
+
+    fn motion(&self) -> Motion<'_> {
+        let unit = self.stages().first().map_or("", |s| s.unit.as_str());
+        Motion { values: self.measured(0), unit, falling: "falling", rising: "rising" }
+    }
+
+    fn recorded(&self) -> Vec<Recorded> {
+        let session = self.problem.session();
+        let inputs = session.stages.iter().flat_map(|s| &s.inputs);
+        let mut out: Vec<Recorded> = Vec::new();
+        for name in inputs {
+            let column = session.columns.iter().find(|c| c.name == *name);
+            if let Some(column) = column.filter(|_| out.iter().all(|r| r.name != *name)) {
+                out.push(Recorded {
+                    name: name.clone(),
+                    unit: column.unit.clone(),
+                    values: column.values.clone(),
+                    is_command: is_command(&column.values),
+                });
+            }
+        }
+        if out.is_empty() {
+            let motion = self.motion();
+            let (unit, values) = (motion.unit.to_owned(), motion.values.to_vec());
+            out.push(Recorded { name: "motion".into(), unit, values, is_command: false });
+        }
+        out
+    }
+
+    fn columns(&self) -> Vec<Column<'_>> {
+        let session = self.problem.session();
+        let late = [-0.2, 0.2];
+        let column = |(stage, spec): (usize, &stretch_gap::StageSpec)| Column {
+            name: Cow::Owned(spec.channel.clone()),
+            unit: Cow::Owned(spec.unit.clone()),
+            values: Cow::Borrowed(self.measured(stage)),
+            output_of: Some(stage),
+            read_by: Vec::new(),
+            is_command: false,
+            skew_s: late,
+            hint: Cow::Borrowed("its sensor, its cable and its scale"),
+        };
+        let mut out: Vec<Column<'_>> = self.stages().iter().enumerate().map(column).collect();
+        for c in &session.columns {
+            if out.iter().any(|o| *o.name == c.name) {
+                continue;
+            }
+            out.push(Column {
+                name: Cow::Borrowed(&c.name),
+                unit: Cow::Borrowed(&c.unit),
+                values: Cow::Borrowed(&c.values),
+                output_of: None,
+                read_by: Vec::new(),
+                is_command: is_command(&c.values),
+                skew_s: late,
+                hint: Cow::Borrowed("what commands or measures it"),
+            });
+        }
+        out
+    }
+}
+
+/// Whether a column is held from sample to sample, as commands are: half of its samples are the one before.
+fn is_command(values: &[f64]) -> bool {
+    let held = values.windows(2).filter(|w| w[0] == w[1]).count();
+    2 * held >= values.len()
+}

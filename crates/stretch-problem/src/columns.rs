@@ -1,0 +1,79 @@
+//! Recorded columns on one grid, and what may be looked at of them.
+
+use std::ops::Range;
+
+use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial};
+use stretch_gap::{Frame, TrialSpec};
+
+use crate::error::ProblemError;
+
+/// Parts of a trial with fewer samples are left out.
+const SHORTEST: usize = 50;
+
+/// Columns of all trials end to end.
+#[derive(Debug, Clone)]
+pub(crate) struct Columns {
+    pub(crate) names: Vec<String>,
+    pub(crate) values: Vec<Vec<f64>>,
+    pub(crate) trials: Vec<TrialSpec>,
+    pub(crate) is_lost: Vec<bool>,
+    pub(crate) dt_s: f64,
+    pub(crate) rows: Rows,
+    pub(crate) notes: Vec<String>,
+}
+
+impl Columns {
+    pub(crate) fn read(trials: &[SessionTrial], names: Vec<String>) -> Result<Self, ProblemError> {
+        let asked: Vec<&str> = names.iter().map(String::as_str).collect();
+        let session = EvenSession::new(trials, &asked, SHORTEST)?;
+        let all = |column: usize| -> Vec<f64> {
+            session.trials().iter().flat_map(|t| t.columns()[column].iter().copied()).collect()
+        };
+        let spec = |trial: &EvenTrial| TrialSpec {
+            name: trial.name().to_owned(),
+            samples: trial.columns()[0].len(),
+            start_s: trial.start_s(),
+            is_test: trial.is_test(),
+        };
+        let is_lost: Vec<bool> =
+            session.trials().iter().flat_map(|t| t.is_lost().iter().copied()).collect();
+        Ok(Self {
+            values: (0..names.len()).map(all).collect(),
+            names,
+            trials: session.trials().iter().map(spec).collect(),
+            is_lost: if is_lost.iter().any(|lost| *lost) { is_lost } else { Vec::new() },
+            dt_s: session.dt_s(),
+            rows: session.rows(),
+            notes: session.notes().to_vec(),
+        })
+    }
+
+    pub(crate) fn of(&self, name: &str) -> Option<&[f64]> {
+        let at = self.names.iter().position(|n| n == name)?;
+        Some(&self.values[at])
+    }
+
+    /// Samples of every trial.
+    pub(crate) fn ranges(&self) -> Vec<Range<usize>> {
+        let mut end = 0;
+        let one = |trial: &TrialSpec| {
+            end += trial.samples;
+            end - trial.samples..end
+        };
+        self.trials.iter().map(one).collect()
+    }
+
+    /// Samples that may be looked at before the end.
+    pub(crate) fn looked_at(&self) -> Vec<Range<usize>> {
+        let fit = Frame::not_tested(&self.trials);
+        let parts = self.ranges().into_iter().zip(fit);
+        parts.map(|(all, fit)| all.start..all.start + fit).filter(|r| !r.is_empty()).collect()
+    }
+
+    /// From the first to the last sample, s.
+    pub(crate) fn session_s(&self) -> f64 {
+        let end_s = |t: &TrialSpec| t.start_s + t.samples as f64 * self.dt_s;
+        let begun_s = self.trials.first().map_or(0.0, |t| t.start_s);
+        self.trials.last().map_or(0.0, end_s) - begun_s
+    }
+}

@@ -1,0 +1,20 @@
+#![doc = include_str!("../README.md")]
+
+mod black_box;
+mod columns;
+mod error;
+mod problem;
+mod runs;
+mod source;
+mod spec;
+mod velocity;
+mod wrap;
+
+pub use black_box::BlackBox;
+pub use error::ProblemError;
+pub use problem::Problem;
+pub use source::{
+    Ask, Closure, Session, SessionColumn, SessionPart, SessionStage, Source, SourceError, closure,
+};
+pub use spec::{Argument, Input, OwnEffect, Parameter, ProblemSpec, Stage, Tolerance};
+pub use wrap::{Beside, Extent, Side, Wrapper, wrapper_named, wrappers};

@@ -1,0 +1,15 @@
+//! Wrappers: what may stand in front of or behind a stage that nobody can look into.
+//!
+//! One literal is one kind of wrapper; a kind at a place (an input or the output of a stage) is an effect.
+
+mod extent;
+mod forces;
+mod kind;
+mod loops;
+mod place;
+mod scales;
+mod times;
+
+pub use extent::Extent;
+pub use kind::{Beside, Side, Wrapper, wrapper_named, wrappers};
+pub(crate) use place::{Among, Placed, Site, Trials, placed};

@@ -1,0 +1,267 @@
+//! A kind of wrapper at a place: an effect of the catalogue.
+
+use std::{ops::Range, sync::Arc};
+
+use stretch_gap::EffectSpec;
+use stretch_operators::{Grid, Span, Start};
+
+use super::{
+    extent::{Extent, ends},
+    kind::{Beside, Side, Wrapper, wrappers},
+};
+use crate::{columns::Columns, error::ProblemError, velocity::Velocity};
+
+/// Units that forces and torques have.
+const FORCES: [&str; 8] = ["N", "kN", "mN", "Nm", "mNm", "N m", "N·m", "kNm"];
+
+/// A channel of a stage that wrappers can stand on.
+#[derive(Debug, Clone)]
+pub(crate) struct Site {
+    pub(crate) stage: usize,
+    pub(crate) side: Side,
+    /// Which of the stage's inputs.
+    pub(crate) input: usize,
+    pub(crate) column: String,
+    pub(crate) unit: String,
+}
+
+/// A kind of wrapper on a channel.
+#[derive(Debug, Clone)]
+pub(crate) struct Placed {
+    pub(crate) kind: &'static Wrapper,
+    pub(crate) site: Site,
+    pub(crate) name: String,
+    extent: Extent,
+    /// What it looks at beside the channel, all trials end to end.
+    beside: Option<Arc<Vec<f64>>>,
+    aliases: Vec<String>,
+}
+
+/// What wrappers are placed among.
+pub(crate) struct Among<'a> {
+    pub(crate) columns: &'a Columns,
+    /// Names of the stages.
+    pub(crate) stages: Vec<&'a str>,
+    /// By stage, what it rubs at.
+    pub(crate) velocities: &'a [Option<Velocity>],
+    /// By stage, how many inputs it has.
+    pub(crate) inputs: Vec<usize>,
+    /// Columns that may talk across.
+    pub(crate) others: Vec<String>,
+}
+
+/// Wrappers that some patterns ask for, in the order in which they act.
+pub(crate) fn placed(
+    sites: &[Site],
+    among: &Among<'_>,
+    patterns: &[String],
+    notes: &mut Vec<String>,
+) -> Result<Vec<Placed>, ProblemError> {
+    if patterns.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut all = Vec::new();
+    for site in sites {
+        let extent = extent_of(among, &site.column)?;
+        for kind in wrappers() {
+            all.extend(at(kind, site, extent, among));
+        }
+    }
+    let known = || all.iter().flat_map(|p| p.aliases.iter().map(String::as_str));
+    for pattern in patterns {
+        if !known().any(|alias| alias == pattern) {
+            return Err(refused(pattern, &all, among));
+        }
+    }
+    let rate_hz = 1.0 / among.columns.dt_s;
+    all.retain(|p| p.aliases.iter().any(|a| patterns.contains(a)));
+    all.retain(|p| {
+        let is_shown = p.kind.least_rate_hz <= rate_hz * (1.0 + 1e-6);
+        if !is_shown {
+            notes.push(format!(
+                "{} is not looked for: at {rate_hz:.4} samples a second it cannot be told; from {} on it can",
+                p.name, p.kind.least_rate_hz
+            ));
+        }
+        is_shown
+    });
+    Ok(all)
+}
+
+/// Why a pattern stands for nothing.
+fn refused(pattern: &str, all: &[Placed], among: &Among<'_>) -> ProblemError {
+    let is_friction = ["coulomb_friction", "viscous_friction", "stribeck_friction"]
+        .iter()
+        .any(|kind| pattern.ends_with(kind));
+    if is_friction && among.velocities.iter().all(Option::is_none) {
+        return ProblemError::value(
+            format!("wrap, {pattern}"),
+            "no stage says at which velocity it rubs",
+            "give the stage velocity = \"COLUMN\", or position = \"COLUMN\" whose change it is",
+        );
+    }
+    let names: Vec<&str> = all.iter().map(|p| p.name.as_str()).chain(["all"]).collect();
+    let mut shown: Vec<&str> = names.clone();
+    shown.dedup();
+    ProblemError::unknown("wrap", "wrapper", pattern, shown.iter().copied())
+}
+
+fn extent_of(among: &Among<'_>, column: &str) -> Result<Extent, ProblemError> {
+    let values = among.columns.of(column).unwrap_or(&[]);
+    let looked = among.columns.looked_at();
+    let extent = Extent::of(looked.iter().map(|r| &values[r.clone()]), among.columns.dt_s);
+    if extent.span() > 0.0 {
+        return Ok(Extent { session_s: among.columns.session_s(), ..extent });
+    }
+    Err(ProblemError::value(
+        format!("column {column}"),
+        format!("it is {} in every sample that may be fitted", extent.low),
+        "the channel is dead: check the sensor and its cable, or take no wrapper for it",
+    ))
+}
+
+/// A kind on a channel: once, or once for every channel that it may look at.
+fn at(kind: &'static Wrapper, site: &Site, extent: Extent, among: &Among<'_>) -> Vec<Placed> {
+    let own = &site.column;
+    let looked = among.columns.looked_at();
+    let with = |beside: Option<&[f64]>, label: String| {
+        let range = beside.map_or([0.0; 2], |b| ends(looked.iter().flat_map(|r| &b[r.clone()])));
+        let extent = Extent { beside: range, ..extent };
+        let name = named(site, among, &label);
+        let beside = beside.map(|b| Arc::new(b.to_vec()));
+        let aliases = aliases(kind, site, among, &label);
+        Placed { kind, site: site.clone(), name, extent, beside, aliases }
+    };
+    match kind.beside {
+        Beside::Nothing | Beside::Itself => vec![with(None, kind.name.to_owned())],
+        Beside::Velocity => {
+            let is_force = FORCES.iter().any(|unit| *unit == site.unit);
+            let velocity = among.velocities[site.stage].as_ref().filter(|_| is_force);
+            velocity.map(|v| with(Some(&v.values), kind.name.to_owned())).into_iter().collect()
+        }
+        Beside::Another => {
+            let others = among.others.iter().filter(|other| *other != own);
+            others
+                .filter_map(|other| {
+                    let placed = with(among.columns.of(other), format!("{}({other})", kind.name));
+                    (placed.extent.beside[1] > placed.extent.beside[0]).then_some(placed)
+                })
+                .collect()
+        }
+    }
+}
+
+/// What the side of a channel is called: `input`, the column where there are several, `output`.
+fn side(site: &Site, among: &Among<'_>) -> String {
+    match site.side {
+        Side::Output => "output".to_owned(),
+        Side::Input if among.inputs[site.stage] == 1 => "input".to_owned(),
+        Side::Input => site.column.clone(),
+    }
+}
+
+fn named(site: &Site, among: &Among<'_>, label: &str) -> String {
+    let place = side(site, among);
+    match among.stages.len() {
+        1 => format!("{place}.{label}"),
+        _ => format!("{}.{place}.{label}", among.stages[site.stage]),
+    }
+}
+
+/// Everything that a user may call it by.
+fn aliases(kind: &Wrapper, site: &Site, among: &Among<'_>, label: &str) -> Vec<String> {
+    let is_usual = kind.usual.contains(&site.side);
+    let word = if site.side == Side::Input { "input" } else { "output" };
+    let mut kinds = vec![label.to_owned(), kind.name.to_owned()];
+    if is_usual {
+        kinds.push("all".to_owned());
+    }
+    if kind.name.ends_with("_friction") {
+        kinds.push("friction".to_owned());
+    }
+    let mut out = Vec::new();
+    for k in &kinds {
+        for place in [word, &site.column] {
+            out.push(format!("{place}.{k}"));
+            out.push(format!("{}.{place}.{k}", among.stages[site.stage]));
+        }
+    }
+    if is_usual {
+        out.push("all".to_owned());
+    }
+    out
+}
+
+impl Placed {
+    /// As an effect of the catalogue.
+    pub(crate) fn spec(&self, among: &[Self], stage: &str) -> EffectSpec {
+        let parameters = (self.kind.parameters)(&self.extent, &self.site.unit);
+        let mut spec = EffectSpec::new(&self.name, (self.site.stage, stage), parameters);
+        if let Some(starts) = self.kind.starts {
+            spec.starts = starts(&self.extent);
+            for start in &mut spec.starts {
+                let rest = spec.parameters.iter().skip(start.len());
+                start.extend(rest.map(|p| p.form.or(p.off).unwrap_or(p.min)));
+                for (x, p) in start.iter_mut().zip(&spec.parameters) {
+                    *x = x.clamp(p.min, p.max);
+                }
+            }
+        }
+        spec.is_found = self.kind.is_found;
+        let is_twin = |other: &&Self| {
+            other.site.stage == self.site.stage
+                && other.name != self.name
+                && (self.kind.twins.contains(&other.kind.name) || other.kind.name == self.kind.name)
+        };
+        spec.twins = among.iter().filter(is_twin).map(|p| p.name.clone()).collect();
+        spec
+    }
+
+    /// Acts on a channel of one trial after the other; `found` is what was measured of it, where its course is found in there.
+    pub(crate) fn act(&self, values: &[f64], trials: &Trials<'_>, channel: &mut [f64]) {
+        let is_off = |(p, v): (stretch_gap::EffectParameterSpec, &f64)| p.off == Some(*v);
+        let parameters = (self.kind.parameters)(&self.extent, &self.site.unit);
+        let strengths = parameters.into_iter().zip(values).filter(|(p, _)| p.off.is_some());
+        if strengths.map(is_off).all(|off| off) {
+            return;
+        }
+        let operator = (self.kind.operator)(values, &self.extent, trials.grid);
+        let mut cells = vec![0.0; operator.cells()];
+        let mut ended_s: Option<f64> = None;
+        let end = channel.len();
+        for (range, start_s) in trials.parts.iter().take_while(|(r, _)| r.end <= end) {
+            let signal = &mut channel[range.clone()];
+            let Some(&first) = signal.first() else { continue };
+            let own;
+            let beside: &[f64] = match (&self.beside, self.kind.beside) {
+                (Some(beside), _) => &beside[range.clone()],
+                (None, Beside::Itself) => {
+                    own = signal.to_vec();
+                    &own
+                }
+                _ => &[],
+            };
+            let start = match ended_s.filter(|_| self.kind.counts_session) {
+                Some(ended_s) => Start::Carried { rest_s: (start_s - ended_s).max(0.0) },
+                None => Start::Settled,
+            };
+            operator.begin(start, first, &mut cells);
+            let span = Span { start_s: *start_s, strain: beside, ..Span::whole(trials.grid) };
+            // What a stage rubs with is taken off in front of it, and needed behind it.
+            let is_taken = self.kind.beside == Beside::Velocity && self.site.side == Side::Input;
+            let before = is_taken.then(|| signal.to_vec());
+            operator.run(&span, &mut cells, signal);
+            for (y, x) in signal.iter_mut().zip(before.iter().flatten()) {
+                *y = x - (*y - x);
+            }
+            ended_s = Some(start_s + signal.len() as f64 * trials.grid.dt_s());
+        }
+    }
+}
+
+/// Trials that operators act on.
+pub(crate) struct Trials<'a> {
+    pub(crate) grid: &'a Grid,
+    /// Samples and session time of each, s, from the session's start.
+    pub(crate) parts: &'a [(Range<usize>, f64)],
+}

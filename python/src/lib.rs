@@ -5,8 +5,10 @@
 
 mod calibration;
 mod error;
+mod problem;
 mod receptor;
 mod recording;
+mod source;
 mod watched;
 
 use pyo3::prelude::*;
@@ -19,7 +21,11 @@ mod _stretch {
     #[pymodule_export]
     use crate::error::StretchError;
     #[pymodule_export]
+    use crate::problem::{Problem, wrapper};
+    #[pymodule_export]
     use crate::receptor::{Reading, Receptor};
+    #[pymodule_export]
+    use crate::source::Refused;
 
     use super::*;
 

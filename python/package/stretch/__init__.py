@@ -10,18 +10,30 @@
 True
 """
 
-from ._stretch import Reading, Receptor, StretchError, __version__
+from ._stretch import Reading, Receptor, Refused, StretchError, __version__
 from .calibration import Calibration, Estimate, calibrate
+from .diagnosis import Diagnosis, diagnose
 from .evaluation import Evaluation, evaluate
+from .fix import Fix
+from .problem import Argument, Effect, Parameter, Stage, Trial
 
 __all__ = [
+    "Argument",
     "Calibration",
+    "Diagnosis",
+    "Effect",
     "Estimate",
     "Evaluation",
+    "Fix",
+    "Parameter",
     "Reading",
     "Receptor",
+    "Refused",
+    "Stage",
     "StretchError",
+    "Trial",
     "__version__",
     "calibrate",
+    "diagnose",
     "evaluate",
 ]

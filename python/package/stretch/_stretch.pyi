@@ -1,7 +1,7 @@
 """The native part of the package: use `stretch`."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,9 @@ __version__: str
 
 class StretchError(ValueError):
     """What is wrong with the data or the question, and what to do about it, in a sentence."""
+
+class Refused(StretchError):
+    """Raised by a simulator that cannot simulate these values: the fit turns back and goes on elsewhere."""
 
 class Reading:
     """What a receptor answers for one sample."""
@@ -71,3 +74,24 @@ class Record:
 
 def calibrate(recordings: Sequence[dict[str, Any]], choices: dict[str, Any]) -> tuple[Record, str]: ...
 def evaluate(calibrations: Sequence[tuple[str, Record]], recordings: Sequence[dict[str, Any]]) -> str: ...
+def wrapper(name: str) -> tuple[str, str] | None: ...
+
+class Problem:
+    def __init__(self, spec: dict[str, Any]) -> None: ...
+    @property
+    def dt_s(self) -> float: ...
+    @property
+    def trials(self) -> list[tuple[str, int, int, float]]: ...
+    @property
+    def stages(self) -> list[tuple[str, str, list[str]]]: ...
+    @property
+    def parameters(self) -> list[str]: ...
+    @property
+    def effects(self) -> list[str]: ...
+    @property
+    def catalogue(self) -> list[str]: ...
+    @property
+    def columns(self) -> dict[str, NDArray[np.float64]]: ...
+    def diagnose(
+        self, simulator: Callable[..., NDArray[np.float64]], how: dict[str, Any], progress: Callable[[str], Any] | None
+    ) -> tuple[str, str, dict[str, list[NDArray[np.float64]]]]: ...

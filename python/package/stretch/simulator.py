@@ -1,0 +1,157 @@
+"""A user's simulator, as it is asked."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from . import _stretch
+from ._stretch import StretchError
+from .recordings import Array
+
+BATCH = 64
+"""Models that are asked for at once where the simulator does not say how many (its attribute `batch`)."""
+
+
+@dataclass(frozen=True)
+class TrialSpan:
+    """A trial among the samples of all trials end to end."""
+
+    name: str
+    samples: slice
+    start_s: float
+    """Session time of its first sample, s."""
+
+
+class Asked:
+    """Turns what the diagnosis asks into calls of the user's simulator, and checks what comes back.
+
+    An object with a method `simulate` is asked for many models at once, a plain function for one at a time.
+    """
+
+    def __init__(self, simulator: Any) -> None:
+        method = getattr(simulator, "simulate", None)
+        self.many = callable(method)
+        if not self.many and not callable(simulator):
+            raise StretchError(
+                f"the simulator is a {type(simulator).__name__}; give an object with a method "
+                "simulate(params[n, p], effects) -> [n, samples], or a function of one model, "
+                "f(params, effects) -> [samples]"
+            )
+        self.call: Callable[..., Any] = method if self.many else simulator  # type: ignore[assignment]
+        self.batch = max(1, int(getattr(simulator, "batch", BATCH))) if self.many else 1
+        self.optional = self._optional()
+        self.problem: Any = None
+
+    def _optional(self) -> set[str]:
+        """Which of the arguments that may be left out the simulator takes."""
+        try:
+            names = inspect.signature(self.call).parameters
+        except (TypeError, ValueError):  # a builtin
+            return set()
+        return {name for name in ("inputs", "trials") if name in names}
+
+    @property
+    def takes_inputs(self) -> bool:
+        """Whether it can be driven by other inputs than those that were measured."""
+        return "inputs" in self.optional
+
+    def bind(self, problem: _stretch.Problem) -> None:
+        """Notes what the problem is: columns on one grid, trials, names."""
+        self.problem = problem
+        self.columns: dict[str, Array] = problem.columns
+        self.stages = problem.stages
+        self.outputs = [output for _, output, _ in self.stages]
+        self.parameters = problem.parameters
+        self.effects = problem.effects
+        self.spans = [TrialSpan(name, slice(begin, end), start_s) for name, begin, end, start_s in problem.trials]
+
+    def samples(self, trials: int) -> int:
+        """Samples of the first trials."""
+        return int(self.spans[trials - 1].samples.stop)
+
+    def __call__(
+        self,
+        stage: int,
+        trials: int,
+        params: Array,
+        effects: Array,
+        altered: Sequence[Sequence[Array]] | None,
+    ) -> Array:
+        """Outputs of some models, `[n, samples]`; with several stages those of all, one behind the other."""
+        models, samples = params.shape[0], self.samples(trials)
+        inputs = self._inputs(stage, samples, models, altered)
+        more: dict[str, Any] = {}
+        if "trials" in self.optional:
+            more["trials"] = self.spans[:trials]
+        if self.many:
+            values = {name: effects[:, i] for i, name in enumerate(self.effects)}
+            if inputs is not None:
+                more["inputs"] = inputs
+            return self._table(self.call(params, values, **more), models, samples)
+        rows = []
+        for model in range(models):
+            one = dict(zip(self.parameters, params[model].tolist()))
+            values = dict(zip(self.effects, effects[model].tolist()))
+            if inputs is not None:
+                more["inputs"] = {name: columns[model] for name, columns in inputs.items()}
+            told = self.call(one, values, **more)
+            rows.append(self._table(_first_axis(told), 1, samples))
+        return np.concatenate(rows)
+
+    def _inputs(
+        self, stage: int, samples: int, models: int, altered: Sequence[Sequence[Array]] | None
+    ) -> dict[str, Array] | None:
+        """Every column by name, `[n, samples]`: those that drive the stage as they were altered, the others as measured."""
+        if not self.takes_inputs:
+            return None
+        given = {name: np.broadcast_to(values[:samples], (models, samples)) for name, values in self.columns.items()}
+        for name, rows in zip(self.stages[stage][2], altered or ()):
+            given[name] = np.stack(rows)
+        return given
+
+    def _table(self, told: Any, models: int, samples: int) -> Array:
+        """What came back, checked; several outputs side by side."""
+        if len(self.outputs) == 1 and not isinstance(told, dict):
+            return self._rows(told, models, samples, self.outputs[0])
+        if not isinstance(told, dict):
+            raise StretchError(
+                f"the simulator returned a {type(told).__name__}; with {len(self.outputs)} outputs it must return a dict of "
+                f"arrays by output: {', '.join(self.outputs)}"
+            )
+        missing = [output for output in self.outputs if output not in told]
+        if missing:
+            raise StretchError(f"the simulator returned no {missing[0]}; it returned {', '.join(map(str, told))}")
+        return np.concatenate([self._rows(told[o], models, samples, o) for o in self.outputs], axis=1)
+
+    def _rows(self, told: Any, models: int, samples: int, output: str) -> Array:
+        try:
+            table = np.asarray(told, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise StretchError(f"the simulator returned no numbers for {output}: {error}") from None
+        if table.ndim == 1 and models == 1:
+            table = table[np.newaxis]
+        whole = self.samples(len(self.spans))
+        if table.ndim != 2 or table.shape[0] != models or table.shape[1] not in (samples, whole):
+            form = f"({models}, {samples})" if self.many else f"({samples},)"
+            also = f" or ({models}, {whole}), all trials end to end" if samples != whole and self.many else ""
+            shape = table.shape if self.many else table.shape[1:]
+            raise StretchError(
+                f"the simulator returned the shape {shape} for {output}; {form} was expected{also}: one sample for each that "
+                "was measured, trial behind trial"
+            )
+        return np.ascontiguousarray(table[:, :samples])
+
+
+def _first_axis(told: Any) -> Any:
+    """One model's outputs as a batch of one."""
+    if isinstance(told, dict):
+        return {output: np.asarray(values)[np.newaxis] for output, values in told.items()}
+    try:
+        return np.asarray(told, dtype=np.float64)[np.newaxis]
+    except (TypeError, ValueError) as error:
+        raise StretchError(f"the simulator returned no numbers: {error}") from None

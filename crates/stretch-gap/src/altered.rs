@@ -46,4 +46,8 @@ impl Simulator for Altered<'_> {
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
         self.simulator.simulate(run, out)
     }
+
+    fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
+        self.simulator.simulate_many(runs, outs)
+    }
 }

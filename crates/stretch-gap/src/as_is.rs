@@ -20,6 +20,19 @@ macro_rules! as_is {
             self.simulator.rows_used()
         }
 
+        fn model_runs(&self) -> Option<$crate::simulator::ModelRuns> {
+            self.simulator.model_runs()
+        }
+
+        fn linearise(
+            &self,
+            stage: usize,
+            model: &$crate::simulator::Model,
+            trials: usize,
+        ) -> Result<(), GapError> {
+            self.simulator.linearise(stage, model, trials)
+        }
+
         fn motion(&self) -> $crate::simulator::Motion<'_> {
             self.simulator.motion()
         }

@@ -87,10 +87,8 @@ fn signature(compare: &Comparison<'_>, ground: &Ground) -> Result<Option<usize>,
     let likeness = each_effect(compare, |effect| {
         let spec = &compare.simulator().effects()[effect];
         let mut most = 0.0_f64;
-        for values in &spec.starts {
-            if let Some((own, mixed)) = compare.change(ground, effect, values)? {
-                most = most.max(mixed.abs() / own.sqrt());
-            }
+        for (own, mixed) in compare.changes(ground, effect, &spec.starts)?.into_iter().flatten() {
+            most = most.max(mixed.abs() / own.sqrt());
         }
         Ok(most)
     })?;

@@ -92,12 +92,34 @@ impl<'a> Comparison<'a> {
         stage: usize,
         model: &Model,
     ) -> Result<Vec<f64>, GapError> {
-        let mut values = self.runs.output(stage, model, self.frame.fit_trials)?;
+        let values = self.runs.run(self.run_of(stage, model, None))?;
+        Ok(self.apart(stage, values))
+    }
+
+    /// The run of a stage over the trials that fits run; may be told from a run near by.
+    fn run_of<'m>(&self, stage: usize, model: &'m Model, near: Option<&'m [f64]>) -> Run<'m> {
+        Run { stage, model, trials: self.frame.fit_trials, shake: None, step: 1.0, near }
+    }
+
+    /// Measured minus simulated, in floors.
+    fn apart(&self, stage: usize, mut values: Vec<f64>) -> Vec<f64> {
         let measured = self.simulator().measured(stage);
         for ((x, m), sd) in values.iter_mut().zip(measured).zip(&self.metrics[stage].floor.sd) {
             *x = (m - *x) / sd;
         }
-        Ok(values)
+        values
+    }
+
+    /// [`Comparison::residual_values`] of some stages and models, in one batch.
+    pub(crate) fn residuals_of(
+        &self,
+        wanted: &[(usize, &Model)],
+        near: Option<&[f64]>,
+    ) -> Vec<Result<Vec<f64>, GapError>> {
+        let runs: Vec<Run<'_>> =
+            wanted.iter().map(|(stage, model)| self.run_of(*stage, model, near)).collect();
+        let outputs = self.runs.run_many(&runs).into_iter().zip(wanted);
+        outputs.map(|(output, (stage, _))| Ok(self.apart(*stage, output?))).collect()
     }
 
     /// The same, ready for products.
@@ -153,7 +175,8 @@ impl<'a> Comparison<'a> {
 
     /// Noise transmitted: what of the measured input's noise arrives at the output of a stage, in floors squared.
     pub(crate) fn transmitted(&self, stage: usize, model: &Model) -> Result<Misfit, GapError> {
-        let run = Run { stage, model, trials: self.frame.fit_trials, shake: None, step: 1.0 };
+        let run =
+            Run { stage, model, trials: self.frame.fit_trials, shake: None, step: 1.0, near: None };
         let plain = self.runs.run(run)?;
         let mut mean = Misfit { stage, ..Misfit::default() };
         for draw in 0..DRAWS {
@@ -186,28 +209,47 @@ impl<'a> Comparison<'a> {
         Ok(shaken)
     }
 
-    /// Sensitivity -dr/dx of the stages to one coordinate, by a one-sided difference; none where it does not act.
-    pub(crate) fn sensitivity(
+    /// Sensitivities -dr/dx of the stages to some coordinates, by one-sided differences in one batch; none where a coordinate does not act.
+    ///
+    /// The moved runs may be told from a run at the parameters `near`.
+    pub(crate) fn sensitivities(
         &self,
         stages: &[usize],
-        (coordinate, bounds): (Coordinate, [f64; 2]),
-        model: &Model,
-        residuals: &[Column],
-    ) -> Result<Vec<Option<Column>>, GapError> {
-        let x = coordinate.read(model);
-        let step = coordinate.probe(x);
-        let step = if x + step > bounds[1] { -step } else { step };
-        let mut moved = model.clone();
-        coordinate.write(&mut moved, x + step);
-        let one = |(&stage, residual): (&usize, &Column)| {
-            if !coordinate.acts_in(self.simulator(), stage, model) {
-                return Ok(None);
-            }
-            let there = self.residual_values(stage, &moved)?;
-            let values = residual.values.iter().zip(there).map(|(a, b)| (a - b) / step).collect();
-            Ok(Some(self.metrics[stage].column(&self.frame, values)))
-        };
-        stages.iter().zip(residuals).map(one).collect()
+        coordinates: &[(Coordinate, [f64; 2])],
+        (model, residuals): (&Model, &[Column]),
+        near: &[f64],
+    ) -> Result<Vec<Vec<Option<Column>>>, GapError> {
+        let moved: Vec<(f64, Model)> = coordinates
+            .iter()
+            .map(|(coordinate, bounds)| {
+                let x = coordinate.read(model);
+                let step = coordinate.probe(x);
+                let step = if x + step > bounds[1] { -step } else { step };
+                let mut moved = model.clone();
+                coordinate.write(&mut moved, x + step);
+                (step, moved)
+            })
+            .collect();
+        let acts =
+            |c: usize, s: usize| coordinates[c].0.acts_in(self.simulator(), stages[s], model);
+        let places: Vec<(usize, usize)> = (0..coordinates.len())
+            .flat_map(|c| (0..stages.len()).map(move |s| (c, s)))
+            .filter(|&(c, s)| acts(c, s))
+            .collect();
+        let wanted: Vec<(usize, &Model)> =
+            places.iter().map(|&(c, s)| (stages[s], &moved[c].1)).collect();
+        let there = self.residuals_of(&wanted, Some(near));
+        let columns = places.par_iter().zip(there).map(|(&(c, s), there)| {
+            let (step, here) = (moved[c].0, &residuals[s].values);
+            let values = here.iter().zip(there?).map(|(a, b)| (a - b) / step).collect();
+            Ok((c, s, self.metrics[stages[s]].column(&self.frame, values)))
+        });
+        let columns: Result<Vec<_>, GapError> = columns.collect();
+        let mut out = vec![vec![None; stages.len()]; coordinates.len()];
+        for (c, s, column) in columns? {
+            out[c][s] = Some(column);
+        }
+        Ok(out)
     }
 
     /// Sensitivities of a stage to its nominal parameters at a model, one standard deviation each.
@@ -218,15 +260,13 @@ impl<'a> Comparison<'a> {
         residual: &Column,
     ) -> Result<Sensitivities, GapError> {
         let bare = Model { parameters: model.parameters.clone(), effects: Vec::new() };
-        let residuals = std::slice::from_ref(residual);
-        let columns: Result<Vec<_>, GapError> = coordinates(self.simulator(), &[stage], &bare)
-            .into_par_iter()
-            .map(|coordinate| {
-                let Coordinate::Nominal { index, .. } = coordinate.0 else { return Ok(None) };
-                let column = self.sensitivity(&[stage], coordinate, model, residuals)?;
-                Ok(column.into_iter().next().flatten().map(|column| (index, column)))
-            })
-            .collect();
-        Ok(columns?.into_iter().flatten().collect())
+        let own = coordinates(self.simulator(), &[stage], &bare);
+        let at = (model, std::slice::from_ref(residual));
+        let columns = self.sensitivities(&[stage], &own, at, &model.parameters)?;
+        let pairs = own.iter().zip(columns).filter_map(|((coordinate, _), column)| {
+            let Coordinate::Nominal { index, .. } = *coordinate else { return None };
+            Some((index, column.into_iter().next().flatten()?))
+        });
+        Ok(pairs.collect())
     }
 }

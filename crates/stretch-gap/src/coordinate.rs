@@ -115,8 +115,14 @@ pub(crate) fn coordinates(
     model: &Model,
 ) -> Vec<(Coordinate, [f64; 2])> {
     let specs = simulator.parameters();
-    let own = stages.iter().flat_map(|&stage| &simulator.stages()[stage].parameters);
-    let tuned = own.filter(|&&index| specs[index].sd > 0.0).map(|&index| {
+    let mut own: Vec<usize> = Vec::new();
+    for &index in stages.iter().flat_map(|&stage| &simulator.stages()[stage].parameters) {
+        // What acts in two stages is one coordinate.
+        if specs[index].sd > 0.0 && !own.contains(&index) {
+            own.push(index);
+        }
+    }
+    let tuned = own.into_iter().map(|index| {
         let p = &specs[index];
         let bounds = [
             ((p.least - p.nominal) / p.sd).max(-REACH),

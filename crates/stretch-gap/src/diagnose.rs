@@ -103,7 +103,7 @@ fn run(
     progress("errors of the record");
     let suspect = Suspect::of(simulator);
     let doubted = problem.beside(&suspect);
-    let doubts = match plain.is_empty() {
+    let doubts = match plain.is_empty() && !problem.is_spent() {
         true => Doubts::of(&doubted, &suspect, thresholds)?
             .closer_if(&doubted, &suspect, &found, thresholds)?,
         false => Doubts::default(),
@@ -197,6 +197,7 @@ fn run(
         notes: told.notes,
         rows_used,
         simulations,
+        model_runs: problem.simulator().model_runs(),
         runtime_s,
         candidates: beside_unknown(candidates, evidence.gap, unknown),
     };

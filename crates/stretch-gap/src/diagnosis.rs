@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{missing::Proposed, rows::RowsUsed};
+use crate::{missing::Proposed, rows::RowsUsed, simulator::ModelRuns};
 
 /// The answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -368,6 +368,9 @@ pub struct Diagnosis {
     /// Simulations of one stage that it took, simpler methods left out.
     #[serde(default)]
     pub simulations: usize,
+    /// Runs of a black box, where that is what costs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model_runs: Option<ModelRuns>,
     /// Seconds it took.
     pub runtime_s: f64,
 }

@@ -48,12 +48,20 @@ pub enum GapError {
         /// The stage.
         stage: String,
     },
+    /// The simulator is gone, or answers what nobody asked for: nothing that it said since can be relied on.
+    #[error(transparent)]
+    Broken(Box<dyn std::error::Error + Send + Sync>),
     /// The caller asked to stop.
     #[error("stopped")]
     Stopped,
 }
 
 impl GapError {
+    /// Whether all ends: other errors take the candidate out whose values could not be simulated.
+    pub(crate) fn ends_all(&self) -> bool {
+        matches!(self, Self::Stopped | Self::Broken(_))
+    }
+
     /// What a simulator says for itself.
     ///
     /// ```

@@ -21,7 +21,7 @@
 //! they could have done (Brynjarsdottir and O'Hagan 2014, doi 10.1088/0266-5611/30/11/114007).
 
 use nalgebra::DMatrix;
-use rayon::prelude::*;
+use rayon::iter::ParallelIterator;
 
 use crate::{
     compare::{Comparison, Sensitivities},
@@ -52,12 +52,14 @@ pub(crate) struct Effort {
     iterations: usize,
     /// Iterations at which the sensitivities of the nominal parameters are taken anew.
     renewals: &'static [usize],
+    /// Whether steps of the nominal parameters may be told from a run at those that the fit starts from.
+    is_rough: bool,
 }
 
 /// Enough to see whether a candidate can compete.
-pub(crate) const COARSE: Effort = Effort { iterations: 5, renewals: &[1, 3] };
+pub(crate) const COARSE: Effort = Effort { iterations: 5, renewals: &[1, 3], is_rough: true };
 /// Until nothing is gained.
-pub(crate) const FINE: Effort = Effort { iterations: 14, renewals: &[1, 3, 6, 9] };
+pub(crate) const FINE: Effort = Effort { iterations: 14, renewals: &[1, 3, 6, 9], is_rough: false };
 
 /// Added to every diagonal: a coordinate that does nothing has no curvature.
 const RIDGE: f64 = 1e-12;
@@ -75,11 +77,15 @@ impl Comparison<'_> {
         known: &[Option<Sensitivities>],
         effort: Effort,
     ) -> Result<Fitted, GapError> {
-        let mut descent = Descent::new(self, stages, start)?;
+        let near = effort.is_rough.then(|| start.parameters.clone());
+        let mut descent = Descent::new(self, stages, start, near)?;
         for iteration in 0..effort.iterations {
             let is_first = iteration == 0;
             let renew = effort.renewals.contains(&iteration) || (is_first && known.is_empty());
             descent.linearise(known, is_first, renew)?;
+            if self.runs.is_spent() {
+                break;
+            }
             let before = descent.cost;
             let has_moved = descent.step()?;
             let is_still = before - descent.cost < LEAST_GAIN.0 + LEAST_GAIN.1 * descent.cost;
@@ -101,7 +107,7 @@ pub(crate) fn possible<T: Send>(
     for fit in all {
         match fit {
             Ok(fit) => out.push(fit),
-            Err(GapError::Stopped) => return Err(GapError::Stopped),
+            Err(error) if error.ends_all() => return Err(error),
             Err(_) => {}
         }
     }
@@ -114,6 +120,8 @@ struct Descent<'a, 'b> {
     stages: &'a [usize],
     coordinates: Vec<(Coordinate, [f64; 2])>,
     model: Model,
+    /// Parameters near which steps may be told; none where each is a run of its own.
+    near: Option<Vec<f64>>,
     /// By stage, as `stages`.
     residuals: Vec<Column>,
     cost: f64,
@@ -130,6 +138,7 @@ impl<'a, 'b> Descent<'a, 'b> {
         compare: &'a Comparison<'b>,
         stages: &'a [usize],
         mut model: Model,
+        near: Option<Vec<f64>>,
     ) -> Result<Self, GapError> {
         let coordinates = coordinates(compare.simulator(), stages, &model);
         for (c, b) in &coordinates {
@@ -148,6 +157,7 @@ impl<'a, 'b> Descent<'a, 'b> {
             lambda: 1e-3,
             coordinates,
             model,
+            near,
         };
         descent.residuals = descent.residuals_of(&descent.model)?;
         descent.cost = descent.cost_of(&descent.model, &descent.residuals);
@@ -155,7 +165,10 @@ impl<'a, 'b> Descent<'a, 'b> {
     }
 
     fn residuals_of(&self, model: &Model) -> Result<Vec<Column>, GapError> {
-        self.stages.iter().map(|&s| self.compare.residual(s, model)).collect()
+        let wanted: Vec<(usize, &Model)> = self.stages.iter().map(|&s| (s, model)).collect();
+        let values = self.compare.residuals_of(&wanted, self.near.as_deref());
+        let columns = self.stages.iter().zip(values);
+        columns.map(|(&s, v)| Ok(self.compare.metrics[s].column(&self.compare.frame, v?))).collect()
     }
 
     /// J of the module's head.
@@ -173,25 +186,27 @@ impl<'a, 'b> Descent<'a, 'b> {
         is_first: bool,
         renew: bool,
     ) -> Result<(), GapError> {
-        let due = |place: &(Coordinate, [f64; 2])| match place.0 {
-            Coordinate::Nominal { index, .. } if is_first && !known.is_empty() => {
-                let of = |&s: &usize| {
-                    let own = known.get(s).and_then(Option::as_ref)?;
-                    own.iter().find(|(p, _)| *p == index).map(|(_, c)| c.clone())
-                };
-                Ok(Some(self.stages.iter().map(of).collect()))
+        let is_known = is_first && !known.is_empty();
+        let mut due = Vec::new();
+        for (i, place) in self.coordinates.iter().enumerate() {
+            match place.0 {
+                Coordinate::Nominal { index, .. } if is_known => {
+                    let of = |&s: &usize| {
+                        let own = known.get(s).and_then(Option::as_ref)?;
+                        own.iter().find(|(p, _)| *p == index).map(|(_, c)| c.clone())
+                    };
+                    self.columns[i] = self.stages.iter().map(of).collect();
+                }
+                Coordinate::Nominal { .. } if !renew => {}
+                _ => due.push(i),
             }
-            Coordinate::Nominal { .. } if !renew => Ok(None),
-            _ => {
-                let own =
-                    self.compare.sensitivity(self.stages, *place, &self.model, &self.residuals);
-                own.map(Some)
-            }
-        };
-        let columns: Result<Vec<Option<Vec<_>>>, GapError> =
-            self.coordinates.par_iter().map(due).collect();
-        for (column, due) in self.columns.iter_mut().zip(columns?) {
-            *column = due.unwrap_or_else(|| std::mem::take(column));
+        }
+        let places: Vec<_> = due.iter().map(|&i| self.coordinates[i]).collect();
+        let at = (&self.model, self.residuals.as_slice());
+        let near = self.near.as_deref().unwrap_or(&self.model.parameters);
+        let columns = self.compare.sensitivities(self.stages, &places, at, near)?;
+        for (i, column) in due.into_iter().zip(columns) {
+            self.columns[i] = column;
         }
         self.normal_equations();
         Ok(())
@@ -245,7 +260,7 @@ impl<'a, 'b> Descent<'a, 'b> {
                 c.write(&mut next, x + s);
             }
             match self.residuals_of(&next) {
-                Err(GapError::Stopped) => return Err(GapError::Stopped),
+                Err(error) if error.ends_all() => return Err(error),
                 // These values cannot be simulated: nearer to where it can.
                 Err(_) => {}
                 Ok(there) => {

@@ -24,6 +24,7 @@ mod judge;
 mod lacking;
 mod line;
 mod linear;
+mod linked;
 mod localise;
 mod lone;
 mod metric;
@@ -75,6 +76,6 @@ pub use record::{
     plain::copied,
 };
 pub use rows::RowsUsed;
-pub use simulator::{Model, Motion, Recorded, Run, Simulator};
+pub use simulator::{Model, ModelRuns, Motion, Recorded, Run, Simulator};
 pub use spec::{EffectParameterSpec, EffectSpec, ParameterSpec, StageSpec, TrialSpec, Wander};
 pub use thresholds::Thresholds;

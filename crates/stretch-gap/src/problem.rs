@@ -21,6 +21,7 @@ use crate::{
     fit::{Effort, FINE, Fitted},
     frame::{Frame, Role},
     hypothesis::Hypothesis,
+    linked::groups,
     runs::Runs,
     score::{Misfit, Observations, gap, score},
     simulator::{Model, Run, Simulator},
@@ -124,6 +125,11 @@ impl<'a> Problem<'a> {
 
     pub(crate) fn stop(&self) -> &'a (dyn Fn() -> bool + Sync) {
         self.compare.runs.stop()
+    }
+
+    /// Whether the simulator's budget allows no more than what the answer itself needs.
+    pub(crate) fn is_spent(&self) -> bool {
+        self.compare.runs.is_spent()
     }
 
     /// [`Comparison::fit`], misfits at equal noise transmitted.
@@ -267,22 +273,26 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Every stage re-tuned on its own: without effects no stage knows of another.
+/// Every stage re-tuned on its own, those that share a parameter together: without effects no other stage knows of it.
 fn retuned(compare: &Comparison<'_>, start: &Model) -> Result<Hypothesis, GapError> {
-    let fits: Result<Vec<_>, GapError> = (0..compare.metrics.len())
-        .into_par_iter()
-        .map(|s| compare.fit(&[s], start.clone(), &[], FINE))
-        .collect();
+    let simulator = compare.simulator();
+    for stage in 0..compare.metrics.len() {
+        simulator.linearise(stage, start, compare.frame.fit_trials)?;
+    }
+    let groups = groups(simulator);
+    let fits: Result<Vec<_>, GapError> =
+        groups.par_iter().map(|group| compare.fit(group, start.clone(), &[], FINE)).collect();
     let mut model = start.clone();
     let mut misfits = Vec::new();
     let mut parameter_sd = vec![0.0; model.parameters.len()];
-    for (stage, fitted) in fits?.into_iter().enumerate() {
+    for (group, fitted) in groups.iter().zip(fits?) {
         fitted.parameter_sd.iter().for_each(|(p, sd)| parameter_sd[*p] = *sd);
-        for &p in &compare.simulator().stages()[stage].parameters {
+        for &p in group.iter().flat_map(|stage| &simulator.stages()[*stage].parameters) {
             model.parameters[p] = fitted.model.parameters[p];
         }
         misfits.extend(fitted.misfits);
     }
+    misfits.sort_by_key(|misfit| misfit.stage);
     let (effects, effect_sd) = (Vec::new(), BTreeMap::new());
     Ok(Hypothesis { effects, model, misfits, effect_sd, parameter_sd, score: 0.0 })
 }
@@ -290,7 +300,14 @@ fn retuned(compare: &Comparison<'_>, start: &Model) -> Result<Hypothesis, GapErr
 /// Refuses a simulator whose step of integration shows: its error would be named as an effect.
 fn solver_check(compare: &Comparison<'_>, model: &Model) -> Result<(), GapError> {
     for (stage, metric) in compare.metrics.iter().enumerate() {
-        let run = Run { stage, model, trials: compare.frame.fit_trials, shake: None, step: 1.0 };
+        let run = Run {
+            stage,
+            model,
+            trials: compare.frame.fit_trials,
+            shake: None,
+            step: 1.0,
+            near: None,
+        };
         let plain = compare.runs.run(run)?;
         let fine = compare.runs.run(Run { step: 0.5, ..run })?;
         let square: f64 = plain.iter().zip(&fine).map(|(a, b)| (a - b) * (a - b)).sum();

@@ -51,6 +51,11 @@ impl<'a> Runs<'a> {
         self.simulator
     }
 
+    /// Whether the simulator's budget allows no more than what the answer itself needs.
+    pub(crate) fn is_spent(&self) -> bool {
+        self.simulator.model_runs().is_some_and(|runs| runs.is_spent)
+    }
+
     pub(crate) fn stop(&self) -> &'a (dyn Fn() -> bool + Sync) {
         self.stop
     }
@@ -72,7 +77,7 @@ impl<'a> Runs<'a> {
         model: &Model,
         trials: usize,
     ) -> Result<Vec<f64>, GapError> {
-        self.run(Run { stage, model, trials, shake: None, step: 1.0 })
+        self.run(Run { stage, model, trials, shake: None, step: 1.0, near: None })
     }
 
     /// One run of one stage on its measured input.
@@ -80,6 +85,18 @@ impl<'a> Runs<'a> {
         let mut out = self.begin(run)?;
         self.simulator.simulate(run, &mut out)?;
         self.finite(run.stage, out)
+    }
+
+    /// Some runs at once, in one batch; each ends as [`Runs::run`] would.
+    pub(crate) fn run_many(&self, runs: &[Run<'_>]) -> Vec<Result<Vec<f64>, GapError>> {
+        let begun: Result<Vec<Vec<f64>>, GapError> = runs.iter().map(|r| self.begin(*r)).collect();
+        let mut outs = match begun {
+            Ok(outs) => outs,
+            Err(_) => return runs.iter().map(|_| Err(GapError::Stopped)).collect(),
+        };
+        let done = self.simulator.simulate_many(runs, &mut outs);
+        let each = runs.iter().zip(done).zip(outs);
+        each.map(|((run, done), out)| done.and_then(|()| self.finite(run.stage, out))).collect()
     }
 
     /// One run on an input that was not measured; none where the stage cannot.

@@ -60,6 +60,7 @@ impl Ground {
         let parts: Result<Vec<_>, GapError> = (0..stages)
             .into_par_iter()
             .map(|s| {
+                compare.runs.simulator().linearise(s, &model, compare.frame.fit_trials)?;
                 let residual = compare.residual(s, &model)?;
                 let known = compare.nominal_sensitivities(s, &model, &residual)?;
                 let solved = compare.solved(s, &known, &residual);
@@ -81,8 +82,9 @@ impl Comparison<'_> {
     pub(crate) fn screen(&self, ground: &Ground, effect: usize) -> Result<Screened, GapError> {
         let spec = &self.simulator().effects()[effect];
         let mut starts = Vec::new();
-        for values in &spec.starts {
-            let Some((own, with_residual)) = self.change(ground, effect, values)? else { continue };
+        let changes = self.changes(ground, effect, &spec.starts)?;
+        for (values, change) in spec.starts.iter().zip(changes) {
+            let Some((own, with_residual)) = change else { continue };
             // Strengths scale with the amplitude; thresholds do not scale at all.
             let scalable = spec.parameters[0].off == Some(0.0);
             let (value, range) = (values[0], &spec.parameters[0]);
@@ -111,30 +113,52 @@ impl Comparison<'_> {
         Ok(Screened { effect, starts })
     }
 
-    /// <d,d> and <d,r> of the change d that an effect makes; none where it makes none or cannot be simulated.
-    pub(crate) fn change(
+    /// <d,d> and <d,r> of the change d that an effect makes at each of some values; none where it makes none or cannot be simulated.
+    pub(crate) fn changes(
         &self,
         ground: &Ground,
         effect: usize,
-        values: &[f64],
-    ) -> Result<Option<(f64, f64)>, GapError> {
-        let mut model = ground.model.clone();
-        model.effects.push((effect, values.to_vec()));
+        starts: &[Vec<f64>],
+    ) -> Result<Vec<Option<(f64, f64)>>, GapError> {
+        let with = |values: &Vec<f64>| {
+            let mut model = ground.model.clone();
+            model.effects.push((effect, values.clone()));
+            model
+        };
+        let models: Vec<Model> = starts.iter().map(with).collect();
+        let touches = &self.simulator().effects()[effect].touches;
+        let wanted: Vec<(usize, &Model)> =
+            models.iter().flat_map(|model| touches.iter().map(move |&s| (s, model))).collect();
+        let mut there = self.residuals_of(&wanted, None).into_iter();
+        let mut out = Vec::with_capacity(starts.len());
+        for _ in starts {
+            let own: Vec<_> = there.by_ref().take(touches.len()).collect();
+            out.push(match own.into_iter().collect() {
+                Ok(own) => self.change(ground, touches, own),
+                Err(error) if error.ends_all() => return Err(error),
+                Err(_) => None,
+            });
+        }
+        Ok(out)
+    }
+
+    /// <d,d> and <d,r> of a change, from the residuals with it in the stages that it touches.
+    fn change(
+        &self,
+        ground: &Ground,
+        touches: &[usize],
+        there: Vec<Vec<f64>>,
+    ) -> Option<(f64, f64)> {
         let (mut own, mut mixed) = (0.0, 0.0);
-        for &stage in &self.simulator().effects()[effect].touches {
-            let there = match self.residual_values(stage, &model) {
-                Ok(there) => there,
-                Err(GapError::Stopped) => return Err(GapError::Stopped),
-                Err(_) => return Ok(None),
-            };
+        for (&stage, there) in touches.iter().zip(&there) {
             let here = &ground.residuals[stage].values;
-            let change = here.iter().zip(&there).map(|(a, b)| a - b).collect();
+            let change = here.iter().zip(there).map(|(a, b)| a - b).collect();
             let change = self.metrics[stage].column(&self.frame, change);
             let (squares, product) = self.projected(stage, ground, &change);
             own += squares;
             mixed += product;
         }
-        Ok((own > NO_CHANGE).then_some((own, mixed)))
+        (own > NO_CHANGE).then_some((own, mixed))
     }
 
     /// Factor L of A'V^-1 A + b I, and L^-1 A'V^-1 r.

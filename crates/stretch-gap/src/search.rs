@@ -101,7 +101,7 @@ impl<'a> Search<'a> {
         best: Hypothesis,
         progress: &dyn Fn(&str),
     ) -> Result<Hypothesis, GapError> {
-        if best.effects.len() < begun + 2 {
+        if best.effects.len() < begun + 2 || self.problem.is_spent() {
             return Ok(best);
         }
         let first_round = self.sets.tried.values().filter(|s| s.effects.len() == begun + 1);
@@ -130,6 +130,9 @@ impl<'a> Search<'a> {
     fn grow(&mut self, from: Hypothesis, progress: &dyn Fn(&str)) -> Result<Hypothesis, GapError> {
         let mut best = from;
         for round in best.effects.len()..self.depth {
+            if self.problem.is_spent() {
+                break;
+            }
             progress(&format!("screening effects, round {}", round + 1));
             let looked = self.look(&best)?;
             let Looked { ground, screened } = &*looked;
@@ -137,7 +140,8 @@ impl<'a> Search<'a> {
             let list = self.shortlist(&best, screened, kept);
             progress(&format!("fitting {} candidates, round {}", list.len(), round + 1));
             let mut next = self.first_worth(&best, ground, &list)?;
-            if next.is_none() && self.problem.gap(&best) > self.worth.thresholds.null_excess {
+            let is_open = self.problem.gap(&best) > self.worth.thresholds.null_excess;
+            if next.is_none() && is_open && !self.problem.is_spent() {
                 // A screen is a straight line: before a gap is left as it is, whatever could be in it is fitted.
                 progress(&format!("fitting the other candidates, round {}", round + 1));
                 let others: Vec<Screened> = self.others(&best, screened, &list);
@@ -244,6 +248,9 @@ impl<'a> Search<'a> {
         let mut out = Vec::new();
         let kept = if best.effects.len() > 1 { RIVALS.1 } else { RIVALS.0 };
         for &effect in &best.effects {
+            if self.problem.is_spent() {
+                break;
+            }
             let less = self.sets.without(best, effect)?;
             let looked = self.look(&less)?;
             let Looked { ground, screened: all } = &*looked;

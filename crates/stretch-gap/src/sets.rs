@@ -14,6 +14,7 @@ use crate::{
     error::GapError,
     fit::{COARSE, FINE, Fitted, possible},
     hypothesis::Hypothesis,
+    linked::linked,
     problem::Problem,
     screen::{Ground, Screened},
 };
@@ -43,9 +44,10 @@ impl<'a> Sets<'a> {
     /// which touch one of these touch.
     fn component(&self, effects: &[usize], seed: usize) -> (Vec<usize>, Vec<usize>) {
         let specs = self.problem.simulator().effects();
+        let simulator = self.problem.simulator();
         let mut stages = specs[seed].touches.clone();
         loop {
-            let mut grown = stages.clone();
+            let mut grown = linked(simulator, &stages);
             for &e in effects {
                 if specs[e].touches.iter().any(|s| grown.contains(s)) {
                     grown.extend(&specs[e].touches);

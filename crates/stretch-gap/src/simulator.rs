@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     description::Description,
@@ -49,6 +50,9 @@ pub struct Run<'a> {
     pub shake: Option<u64>,
     /// Share of the usual step of integration: 0.5 for the solver check.
     pub step: f64,
+    /// Nominal parameters so near that the output may be told from the run there and the [linearisation](Simulator::linearise), where a
+    /// run costs more than that; none where it has to be exact.
+    pub near: Option<&'a [f64]>,
 }
 
 /// The measured motion that slices go by.
@@ -75,6 +79,17 @@ pub struct Recorded {
     pub values: Vec<f64>,
     /// Whether it is commanded: it may jump, and its zero means that nothing is done.
     pub is_command: bool,
+}
+
+/// Runs of a simulator that are counted, because they cost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ModelRuns {
+    /// How many were made.
+    pub count: usize,
+    /// How many may be made, where that is limited.
+    pub budget: Option<usize>,
+    /// Whether no more may be made but those that the answer itself needs.
+    pub is_spent: bool,
 }
 
 /// A simulator bound to the measurements that it is held against.
@@ -132,6 +147,20 @@ pub trait Simulator: Sync {
     fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
         let pairs = runs.par_iter().zip(outs);
         pairs.map(|(run, out)| self.simulate(*run, out)).collect()
+    }
+    /// Takes sensitivities of a stage to its nominal parameters around a model: from here on runs that may be told
+    /// [from near by](Run::near) are told with them. Does nothing where every run is exact. It is called between searches, never while
+    /// one goes on, so that the answer does not depend on the threads.
+    ///
+    /// # Errors
+    /// When the simulation is not possible with these values.
+    fn linearise(&self, stage: usize, model: &Model, trials: usize) -> Result<(), GapError> {
+        let _ = (stage, model, trials);
+        Ok(())
+    }
+    /// Runs of what is simulated, where that is not as many as simulations of stages: a black box is not run anew for what stands behind it.
+    fn model_runs(&self) -> Option<ModelRuns> {
+        None
     }
     /// Rows that the trials stand on, of those that were read; all, where it reads none.
     fn rows_used(&self) -> RowsUsed {

@@ -1,12 +1,17 @@
 //! A user's simulator, wrapped, as the diagnosis takes it.
 
-use std::{borrow::Cow, sync::Arc};
+use std::{
+    borrow::Cow,
+    sync::{Arc, PoisonError, RwLock},
+};
 
 use stretch_gap::{
-    Column, Description, Dice, GapError, Motion, Recorded, RowsUsed, Run, Simulator,
+    Column, Description, Dice, GapError, Model, ModelRuns, Motion, Recorded, RowsUsed, Run,
+    Simulator,
 };
 
 use crate::{
+    linear::Linear,
     problem::{Acting, Problem},
     runs::{Inner, Runs},
     source::{Source, SourceError},
@@ -66,6 +71,8 @@ use crate::{
 pub struct BlackBox {
     problem: Problem,
     runs: Runs,
+    /// By stage: the last linearisation.
+    lines: RwLock<Vec<Option<Arc<Linear>>>>,
 }
 
 impl BlackBox {
@@ -80,7 +87,8 @@ impl BlackBox {
             problem.columns.is_lost.len().max(problem.parts.last().map_or(1, |p| p.0.end));
         let stages = if source.answers_all() { problem.stages.len() } else { 1 };
         let runs = Runs::new(source, budget, stages * samples);
-        Self { problem, runs }
+        let lines = RwLock::new(vec![None; problem.stages.len()]);
+        Self { problem, runs, lines }
     }
 
     /// The problem.
@@ -156,6 +164,34 @@ impl BlackBox {
         Inner { stage: run.stage, parameters, effects, inputs, trials: run.trials }
     }
 
+    /// The run that a run is told from, and how far it lies from there; the run itself where it has to be exact.
+    fn told(&self, run: &Run<'_>) -> (Inner, Option<(Arc<Linear>, Vec<f64>)>) {
+        let inner = self.inner(run);
+        let line = run.near.filter(|_| run.shake.is_none()).zip(self.line(run.stage));
+        let Some((near, line)) = line.filter(|(_, line)| line.trials() >= run.trials) else {
+            return (inner, None);
+        };
+        let mut base = inner.clone();
+        for &p in &self.description().stages[run.stage].parameters {
+            base.parameters[p] = near[p];
+        }
+        if base.parameters == inner.parameters {
+            return (inner, None);
+        }
+        let apart = inner.parameters.iter().zip(&base.parameters).map(|(a, b)| a - b).collect();
+        (base, Some((line, apart)))
+    }
+
+    fn line(&self, stage: usize) -> Option<Arc<Linear>> {
+        // A poisoned list only holds what can be made again.
+        self.lines.read().unwrap_or_else(PoisonError::into_inner)[stage].clone()
+    }
+
+    fn set_line(&self, stage: usize, line: Linear) {
+        let mut lines = self.lines.write().unwrap_or_else(PoisonError::into_inner);
+        lines[stage] = Some(Arc::new(line));
+    }
+
     fn trials_of(&self) -> Trials<'_> {
         Trials { grid: &self.problem.grid, parts: &self.problem.parts }
     }
@@ -180,9 +216,15 @@ impl BlackBox {
     }
 }
 
+/// Runs that the answer itself needs once the search is over, and more for each stage.
+const ANSWER: (usize, usize) = (20, 8);
+
 /// What the engine makes of a source's error: where values cannot be simulated a fit turns back.
 fn refused(error: SourceError) -> GapError {
-    GapError::simulator(error)
+    match error {
+        SourceError::Gone(_) | SourceError::Length { .. } => GapError::Broken(Box::new(error)),
+        _ => GapError::simulator(error),
+    }
 }
 
 impl Simulator for BlackBox {
@@ -211,15 +253,47 @@ impl Simulator for BlackBox {
     }
 
     fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
-        let inner: Vec<Inner> = runs.iter().map(|run| self.inner(run)).collect();
+        let told: Vec<(Inner, Option<(Arc<Linear>, Vec<f64>)>)> =
+            runs.iter().map(|run| self.told(run)).collect();
+        let inner: Vec<Inner> = told.iter().map(|(inner, _)| inner.clone()).collect();
         let outputs = self.runs.outputs(self.problem.session(), &inner);
-        let each = runs.iter().zip(outputs).zip(outs);
-        each.map(|((run, output), out)| {
+        let each = runs.iter().zip(&told).zip(outputs).zip(outs);
+        each.map(|(((run, (_, line)), output), out)| {
             out.copy_from_slice(&output.map_err(refused)?);
+            if let Some((line, apart)) = line {
+                line.go(apart, out);
+            }
             self.behind(run, out);
             Ok(())
         })
         .collect()
+    }
+
+    fn linearise(&self, stage: usize, model: &Model, trials: usize) -> Result<(), GapError> {
+        let run = Run { stage, model, trials, shake: None, step: 1.0, near: None };
+        let inner = self.inner(&run);
+        if self.line(stage).is_some_and(|line| line.serves(&inner, self.parameters())) {
+            return Ok(());
+        }
+        let moves = Linear::moves(&inner, &self.stages()[stage].parameters, self.parameters());
+        let wanted: Vec<Inner> =
+            std::iter::once(&inner).chain(moves.iter().map(|m| &m.inner)).cloned().collect();
+        let outputs: Result<Vec<_>, SourceError> =
+            self.runs.outputs(self.problem.session(), &wanted).into_iter().collect();
+        match outputs {
+            Ok(outputs) => self.set_line(stage, Linear::of(inner, &moves, &outputs)),
+            // Without one every run is exact.
+            Err(SourceError::Refused(_) | SourceError::NotFinite { .. }) => {}
+            Err(error) => return Err(refused(error)),
+        }
+        Ok(())
+    }
+
+    fn model_runs(&self) -> Option<ModelRuns> {
+        let (count, budget) = (self.runs.count(), self.runs.budget());
+        let kept = (ANSWER.0 + ANSWER.1 * self.problem.stages.len()).min(budget.unwrap_or(0) / 2);
+        let is_spent = budget.is_some_and(|budget| count + kept >= budget);
+        Some(ModelRuns { count, budget, is_spent })
     }
 
     fn motion(&self) -> Motion<'_> {
@@ -265,7 +339,8 @@ impl Simulator for BlackBox {
         };
         let mut out: Vec<Column<'_>> = self.stages().iter().enumerate().map(column).collect();
         for c in &session.columns {
-            if out.iter().any(|o| *o.name == c.name) {
+            // A command may stand still while the rest moves: nothing is wrong with its column then.
+            if out.iter().any(|o| *o.name == c.name) || is_command(&c.values) {
                 continue;
             }
             out.push(Column {
@@ -274,7 +349,7 @@ impl Simulator for BlackBox {
                 values: Cow::Borrowed(&c.values),
                 output_of: None,
                 read_by: Vec::new(),
-                is_command: is_command(&c.values),
+                is_command: false,
                 skew_s: late,
                 hint: Cow::Borrowed("what commands or measures it"),
             });
@@ -283,8 +358,8 @@ impl Simulator for BlackBox {
     }
 }
 
-/// Whether a column is held from sample to sample, as commands are: half of its samples are the one before.
+/// Whether a column is held from sample to sample, as commands are: a tenth of its samples are the one before.
 fn is_command(values: &[f64]) -> bool {
     let held = values.windows(2).filter(|w| w[0] == w[1]).count();
-    2 * held >= values.len()
+    10 * held >= values.len()
 }

@@ -3,11 +3,13 @@
 mod black_box;
 mod columns;
 mod error;
+mod linear;
 mod problem;
 mod runs;
 mod source;
 mod spec;
 mod velocity;
+pub mod worker;
 mod wrap;
 
 pub use black_box::BlackBox;

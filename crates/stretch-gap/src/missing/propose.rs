@@ -164,7 +164,7 @@ fn settle(residue: &Residue<'_>, choice: &Frame, sum: &Sum) -> Result<Settled, G
         let model = residue.moved(&best.model, &fit);
         let residual = match residue.compare.residual(residue.stage, &model) {
             Ok(residual) => residual,
-            Err(GapError::Stopped) => return Err(GapError::Stopped),
+            Err(error) if error.ends_all() => return Err(error),
             // Values that cannot be simulated: it stays where it was.
             Err(_) => break,
         };

@@ -70,9 +70,10 @@ impl<'a> Residue<'a> {
         let record = Record::of(simulator, &compare.frame, stage, own)?;
         let residual = compare.residual(stage, model)?;
         let (mut kept, mut columns) = (Vec::new(), Vec::new());
-        for place in coordinates(simulator, &[stage], model) {
-            let residuals = std::slice::from_ref(&residual);
-            let found = compare.sensitivity(&[stage], place, model, residuals)?;
+        let places = coordinates(simulator, &[stage], model);
+        let at = (model, std::slice::from_ref(&residual));
+        let all = compare.sensitivities(&[stage], &places, at, &model.parameters)?;
+        for (place, found) in places.into_iter().zip(all) {
             if let Some(column) = found.into_iter().next().flatten() {
                 kept.push(place);
                 columns.push(column);

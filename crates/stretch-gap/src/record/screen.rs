@@ -90,7 +90,7 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
             let ends = [self.beside_shipped(fault, size), self.beside_retuned(fault, size)];
             for (end, found) in ends.into_iter().enumerate() {
                 let found = match found {
-                    Err(GapError::Stopped) => return Err(GapError::Stopped),
+                    Err(error) if error.ends_all() => return Err(error),
                     // A rig that cannot be is no hypothesis.
                     Err(_) => continue,
                     Ok(found) => found,

@@ -6,6 +6,8 @@
 
 use std::{collections::VecDeque, sync::Mutex};
 
+use rayon::prelude::*;
+
 use crate::{
     as_is::as_is,
     description::Description,
@@ -132,6 +134,16 @@ impl Simulator for Suspect<'_> {
         self.simulator.simulate_on(Run { model: &model, ..run }, input, out)
     }
 
+    fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
+        match runs.iter().all(|run| run.model.effects.iter().all(|(e, _)| *e < self.first)) {
+            true => self.simulator.simulate_many(runs, outs),
+            false => {
+                let pairs = runs.par_iter().zip(outs);
+                pairs.map(|(run, out)| self.simulate(*run, out)).collect()
+            }
+        }
+    }
+
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
         let mut model = run.model.clone();
         let at = model.effects.iter().position(|(e, _)| *e >= self.first);
@@ -141,7 +153,7 @@ impl Simulator for Suspect<'_> {
         let (fault, size) = (&self.faults[index - self.first], values[0]);
         if let Kind::Parameter(p) = fault.kind {
             model.parameters[p] *= 1.0 + size;
-            return self.simulator.simulate(Run { model: &model, ..run }, out);
+            return self.simulator.simulate(Run { model: &model, near: None, ..run }, out);
         }
         let column = fault.column.map(|c| &self.columns[c]);
         let run = Run { model: &model, ..run };

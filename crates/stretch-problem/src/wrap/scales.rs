@@ -40,7 +40,10 @@ pub(super) static SATURATION: Wrapper = Wrapper {
         let ([low, high], s) = (rails(e), e.span());
         let within = [0.003, 0.02, 0.08, 0.2, 0.35];
         let tops = within.map(|d| vec![low, e.high - d * s, 0.005 * s]);
-        [tops, within.map(|d| vec![e.low + d * s, high, 0.005 * s])].concat()
+        let bottoms = within.map(|d| vec![e.low + d * s, high, 0.005 * s]);
+        // An actuator's ends are most often both reached.
+        let both = within.map(|d| vec![e.low + d * s, e.high - d * s, 0.005 * s]);
+        [tops, bottoms, both].concat()
     }),
     operator: |v, e, _| {
         let [low, high] = rails(e);

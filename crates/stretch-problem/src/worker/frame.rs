@@ -1,0 +1,140 @@
+//! Frames: what goes to a worker and comes back, byte by byte. Nothing here reads or writes; it only parses.
+//!
+//! ```text
+//! bytes 0..4     "STR1"
+//! bytes 4..8     length h of the header, bytes, unsigned 32 bit little-endian
+//! bytes 8..16    length b of the body, bytes, unsigned 64 bit little-endian, a multiple of 8
+//! h bytes        header: one JSON object, UTF-8
+//! b bytes        body: IEEE 754 binary64, little-endian
+//! ```
+
+/// First bytes of every frame.
+const MAGIC: [u8; 4] = *b"STR1";
+/// Bytes before the header.
+pub const PREFIX: usize = 16;
+/// Longest header, bytes.
+const HEADER: u32 = 16 << 20;
+/// Longest body, bytes.
+const BODY: u64 = 4 << 30;
+
+/// Why bytes are no frame.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FrameError {
+    /// The first bytes are something else: most often text that was printed.
+    #[error(
+        "its standard output holds {text:?} where a frame begins; only frames may go there, print to standard error"
+    )]
+    Magic {
+        /// The bytes, as text.
+        text: String,
+    },
+    /// A length that no frame has.
+    #[error("a frame says that its {part} is {bytes} bytes long; {hint}")]
+    Length {
+        /// Header or body.
+        part: &'static str,
+        /// What it says.
+        bytes: u64,
+        /// What is allowed.
+        hint: &'static str,
+    },
+    /// The header is no JSON object.
+    #[error("the header of a frame is no JSON object: {why}")]
+    Header {
+        /// What is wrong.
+        why: String,
+    },
+}
+
+/// Lengths of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Prefix {
+    /// Bytes of the header.
+    pub header: usize,
+    /// Bytes of the body.
+    pub body: usize,
+}
+
+impl Prefix {
+    /// From the first bytes of a frame.
+    ///
+    /// # Errors
+    /// [`FrameError::Magic`] and [`FrameError::Length`].
+    pub fn parse(bytes: &[u8; PREFIX]) -> Result<Self, FrameError> {
+        let [m0, m1, m2, m3, h0, h1, h2, h3, b @ ..] = *bytes;
+        if [m0, m1, m2, m3] != MAGIC {
+            return Err(FrameError::Magic { text: String::from_utf8_lossy(bytes).into_owned() });
+        }
+        let header = u32::from_le_bytes([h0, h1, h2, h3]);
+        let body = u64::from_le_bytes(b);
+        if header > HEADER {
+            let (bytes, hint) = (header.into(), "at most 16777216 are allowed");
+            return Err(FrameError::Length { part: "header", bytes, hint });
+        }
+        if body > BODY || body % 8 != 0 {
+            let hint = "it is a multiple of 8 and at most 4294967296";
+            return Err(FrameError::Length { part: "body", bytes: body, hint });
+        }
+        Ok(Self { header: header as usize, body: body as usize })
+    }
+}
+
+/// A header and the numbers behind it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// One JSON object.
+    pub header: serde_json::Map<String, serde_json::Value>,
+    /// Numbers.
+    pub body: Vec<f64>,
+}
+
+impl Frame {
+    /// From the bytes behind a prefix.
+    ///
+    /// # Errors
+    /// [`FrameError::Header`].
+    pub fn parse(header: &[u8], body: &[u8]) -> Result<Self, FrameError> {
+        let header = serde_json::from_slice(header)
+            .map_err(|e| FrameError::Header { why: e.to_string() })?;
+        let number = |b: &[u8]| f64::from_le_bytes(b.try_into().unwrap_or_default());
+        Ok(Self { header, body: body.chunks_exact(8).map(number).collect() })
+    }
+
+    /// The first frame of some bytes, and how many it takes; none where more have to come.
+    ///
+    /// # Errors
+    /// As [`Prefix::parse`] and [`Frame::parse`].
+    ///
+    /// ```
+    /// use stretch_problem::worker::Frame;
+    /// let bytes = Frame::bytes(&serde_json::json!({ "kind": "ready" }), &[1.5, -2.0]);
+    /// assert_eq!(bytes.len(), 16 + 16 + 2 * 8);
+    /// let (frame, used) = Frame::first(&bytes)?.unwrap();
+    /// assert_eq!((frame.body, used), (vec![1.5, -2.0], bytes.len()));
+    /// assert_eq!(Frame::first(&bytes[..20])?, None);
+    /// assert!(Frame::first(b"step 1 of 10 done").is_err());
+    /// # Ok::<(), stretch_problem::worker::FrameError>(())
+    /// ```
+    pub fn first(bytes: &[u8]) -> Result<Option<(Self, usize)>, FrameError> {
+        let Some((prefix, rest)) = bytes.split_first_chunk::<PREFIX>() else { return Ok(None) };
+        let Prefix { header, body } = Prefix::parse(prefix)?;
+        if rest.len() < header + body {
+            return Ok(None);
+        }
+        let (text, numbers) = rest[..header + body].split_at(header);
+        Ok(Some((Self::parse(text, numbers)?, PREFIX + header + body)))
+    }
+
+    /// A frame as it goes over the wire.
+    pub fn bytes(header: &serde_json::Value, body: &[f64]) -> Vec<u8> {
+        let header = header.to_string();
+        let mut out = Vec::with_capacity(PREFIX + header.len() + 8 * body.len());
+        out.extend_from_slice(&MAGIC);
+        out.extend_from_slice(&(header.len() as u32).to_le_bytes());
+        out.extend_from_slice(&(8 * body.len() as u64).to_le_bytes());
+        out.extend_from_slice(header.as_bytes());
+        body.iter().for_each(|x| out.extend_from_slice(&x.to_le_bytes()));
+        out
+    }
+}

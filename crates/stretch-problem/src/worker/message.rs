@@ -1,0 +1,194 @@
+//! What frames say.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::frame::Frame;
+use crate::source::{Ask, Session, SourceError};
+
+/// The version of the protocol.
+pub(super) const VERSION: u64 = 1;
+
+/// What a worker says of itself.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default)]
+pub(super) struct Hello {
+    /// Version of the protocol that it speaks.
+    pub(super) version: u64,
+    /// Models that it likes to have in one request.
+    pub(super) batch: usize,
+    /// Whether it takes altered inputs.
+    pub(super) inputs: bool,
+    /// Whether it answers all stages at once.
+    pub(super) all: bool,
+    /// Parameters that it knows; all where it does not say.
+    pub(super) parameters: Option<Vec<String>>,
+    /// Effects that it knows.
+    pub(super) effects: Option<Vec<String>>,
+    /// Units of columns as it takes and gives them.
+    pub(super) units: BTreeMap<String, String>,
+}
+
+impl Default for Hello {
+    fn default() -> Self {
+        Self {
+            version: 0,
+            batch: 1,
+            inputs: false,
+            all: false,
+            parameters: None,
+            effects: None,
+            units: BTreeMap::new(),
+        }
+    }
+}
+
+/// What is wrong with an answer.
+pub(super) type Wrong = String;
+
+/// The header's kind, or what the worker refuses.
+pub(super) fn kind(frame: &Frame, wanted: &str) -> Result<(), Wrong> {
+    let text = |key: &str| frame.header.get(key).and_then(Value::as_str);
+    match text("kind") {
+        Some(kind) if kind == wanted => Ok(()),
+        Some("error") => Err(format!("it says: {}", text("message").unwrap_or("no message"))),
+        other => Err(format!("it answers kind {other:?} where {wanted:?} is due")),
+    }
+}
+
+pub(super) fn hello() -> Vec<u8> {
+    Frame::bytes(&json!({ "kind": "hello", "version": VERSION }), &[])
+}
+
+pub(super) fn bye() -> Vec<u8> {
+    Frame::bytes(&json!({ "kind": "bye" }), &[])
+}
+
+/// What a worker says of itself, checked against the session.
+pub(super) fn read_hello(frame: &Frame, session: &Session) -> Result<Hello, Wrong> {
+    kind(frame, "hello")?;
+    let hello: Hello = serde_json::from_value(Value::Object(frame.header.clone()))
+        .map_err(|e| format!("its hello does not do: {e}"))?;
+    if hello.version != VERSION {
+        return Err(format!(
+            "it speaks version {} of the protocol, this is {VERSION}",
+            hello.version
+        ));
+    }
+    for (what, known, used) in [
+        ("parameter", &hello.parameters, &session.parameters),
+        ("effect", &hello.effects, &session.effects),
+    ] {
+        let Some(known) = known else { continue };
+        if let Some(name) = used.iter().find(|name| !known.contains(name)) {
+            return Err(format!("it has no {what} {name}; it has {}", known.join(", ")));
+        }
+    }
+    for column in &session.columns {
+        let told = hello.units.get(&column.name).filter(|u| **u != column.unit);
+        if let Some(unit) = told.filter(|_| !column.unit.is_empty()) {
+            return Err(format!(
+                "it has column {} in {unit}, the problem in {}; convert it in the simulator, or give the stage or input the unit that it has",
+                column.name, column.unit
+            ));
+        }
+    }
+    Ok(Hello { batch: hello.batch.max(1), ..hello })
+}
+
+/// What a worker has to know once.
+pub(super) fn session(session: &Session) -> Vec<u8> {
+    let trials = session
+        .trials
+        .iter()
+        .map(|t| json!({ "name": t.name, "samples": t.samples.len(), "start_s": t.start_s }));
+    let stages = session
+        .stages
+        .iter()
+        .map(|s| json!({ "name": s.name, "output": s.output, "inputs": s.inputs }));
+    let columns = session.columns.iter().map(|c| json!({ "name": c.name, "unit": c.unit }));
+    let header = json!({
+        "kind": "session",
+        "dt_s": session.dt_s,
+        "trials": trials.collect::<Vec<_>>(),
+        "stages": stages.collect::<Vec<_>>(),
+        "parameters": session.parameters,
+        "effects": session.effects,
+        "columns": columns.collect::<Vec<_>>(),
+    });
+    let body: Vec<f64> = session.columns.iter().flat_map(|c| c.values.iter().copied()).collect();
+    Frame::bytes(&header, &body)
+}
+
+/// Models to simulate.
+pub(super) fn simulate(asks: &[Ask<'_>]) -> Vec<u8> {
+    let one = |ask: &Ask<'_>| json!({ "stage": ask.stage, "trials": ask.trials, "inputs": ask.inputs.is_some() });
+    let models: Vec<Value> = asks.iter().map(one).collect();
+    let mut body = Vec::new();
+    for ask in asks {
+        body.extend_from_slice(ask.parameters);
+        body.extend_from_slice(ask.effects);
+        ask.inputs.iter().copied().flatten().for_each(|column| body.extend_from_slice(column));
+    }
+    Frame::bytes(&json!({ "kind": "simulate", "models": models }), &body)
+}
+
+/// Outputs, one for each model; lengths are as the worker says them.
+pub(super) fn read_outputs(
+    frame: &Frame,
+    count: usize,
+) -> Result<Vec<Result<Vec<f64>, SourceError>>, Wrong> {
+    kind(frame, "outputs")?;
+    let models = frame.header.get("models").and_then(Value::as_array);
+    let models = models.ok_or("its outputs have no list of models")?;
+    if models.len() != count {
+        return Err(format!("it gives {} outputs, {count} models were asked for", models.len()));
+    }
+    let (mut out, mut rest) = (Vec::with_capacity(count), frame.body.as_slice());
+    for model in models {
+        if let Some(error) = model.get("error") {
+            let text = error.as_str().map_or_else(|| error.to_string(), str::to_owned);
+            out.push(Err(SourceError::Refused(text)));
+            continue;
+        }
+        let samples = model.get("samples").and_then(Value::as_u64);
+        let samples = samples.and_then(|n| usize::try_from(n).ok()).filter(|n| *n <= rest.len());
+        let samples =
+            samples.ok_or("an output says another number of samples than the body holds")?;
+        let (own, behind) = rest.split_at(samples);
+        out.push(Ok(own.to_vec()));
+        rest = behind;
+    }
+    match rest.is_empty() {
+        true => Ok(out),
+        false => Err(format!("{} numbers are left behind the last output", rest.len())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outputs(header: Value, body: &[f64]) -> Result<Vec<Result<Vec<f64>, SourceError>>, Wrong> {
+        let (frame, _) = Frame::first(&Frame::bytes(&header, body)).unwrap().unwrap();
+        read_outputs(&frame, 2)
+    }
+
+    #[test]
+    fn outputs_are_taken_apart_and_wrong_ones_refused() {
+        let two = json!([{ "samples": 2 }, { "error": "no convergence" }]);
+        let good = outputs(json!({ "kind": "outputs", "models": two }), &[1.0, 2.0]).unwrap();
+        assert_eq!(good[0], Ok(vec![1.0, 2.0]));
+        assert_eq!(good[1], Err(SourceError::Refused("no convergence".into())));
+        let left = outputs(json!({ "kind": "outputs", "models": two }), &[1.0, 2.0, 3.0]);
+        assert!(left.unwrap_err().contains("1 numbers are left"));
+        let few = outputs(json!({ "kind": "outputs", "models": two }), &[1.0]);
+        assert!(few.unwrap_err().contains("another number of samples"));
+        let one = outputs(json!({ "kind": "outputs", "models": [{ "samples": 0 }] }), &[]);
+        assert_eq!(one.unwrap_err(), "it gives 1 outputs, 2 models were asked for");
+        let said = outputs(json!({ "kind": "error", "message": "out of memory" }), &[]);
+        assert_eq!(said.unwrap_err(), "it says: out of memory");
+    }
+}

@@ -1,0 +1,11 @@
+//! Another program as a source: long-lived workers that answer frames over standard input and output.
+//!
+//! The protocol is written down byte by byte in `docs/worker.md`.
+
+mod frame;
+mod message;
+mod pool;
+mod process;
+
+pub use frame::{Frame, FrameError, PREFIX, Prefix};
+pub use pool::{Workers, WorkersSpec};

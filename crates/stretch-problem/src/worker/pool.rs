@@ -1,0 +1,208 @@
+//! Workers of one command: started as they are needed, each batch sent to one that is idle.
+
+use std::{
+    path::PathBuf,
+    sync::{
+        Condvar, Mutex, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+    },
+    thread,
+    time::Duration,
+};
+
+use super::{
+    message::{self, Hello},
+    process::{Lost, Process},
+};
+use crate::{
+    error::ProblemError,
+    source::{Ask, Session, Source, SourceError},
+};
+
+/// What workers are started by.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WorkersSpec {
+    /// Program and arguments.
+    pub command: Vec<String>,
+    /// Folder that it is started in.
+    pub folder: PathBuf,
+    /// Most workers at once, at least 1.
+    pub jobs: usize,
+    /// Longest time that one model may take, s; a batch may take as much for each of its models.
+    pub deadline_s: f64,
+    /// Longest time that a worker may take to say hello and to take the session, s.
+    pub start_s: f64,
+}
+
+impl WorkersSpec {
+    /// A command in a folder: one worker, a minute a model, two to begin.
+    pub fn new(command: &[&str], folder: impl Into<PathBuf>) -> Self {
+        Self {
+            command: command.iter().map(|s| (*s).to_owned()).collect(),
+            folder: folder.into(),
+            jobs: 1,
+            deadline_s: 60.0,
+            start_s: 120.0,
+        }
+    }
+}
+
+/// Workers that answer asks.
+///
+/// A worker that dies, hangs or does not keep to the protocol is started anew and its batch repeated, once; then the source is
+/// [gone](SourceError::Gone), and says what the worker printed last.
+#[derive(Debug)]
+pub struct Workers {
+    spec: WorkersSpec,
+    session: Session,
+    hello: Hello,
+    crew: Mutex<Crew>,
+    free: Condvar,
+    restarts: AtomicUsize,
+}
+
+#[derive(Debug)]
+struct Crew {
+    idle: Vec<Process>,
+    /// Workers that are started or at work.
+    busy: usize,
+}
+
+impl Workers {
+    /// Starts the first worker and hands it the session.
+    ///
+    /// # Errors
+    /// A command that cannot be started, a worker that does not say hello or takes another unit than the problem.
+    pub fn start(spec: WorkersSpec, session: &Session) -> Result<Self, ProblemError> {
+        let named = |why: String| {
+            ProblemError::Simulator(format!("simulator {}: {why}", spec.command.join(" ")))
+        };
+        let begun = begin(&spec, session);
+        let (process, hello) = begun.map_err(|lost| match lost {
+            Lost::Failed(why) => named(why),
+            Lost::Interrupted => named("interrupted".into()),
+        })?;
+        let crew = Mutex::new(Crew { idle: vec![process], busy: 0 });
+        let session = session.clone();
+        Ok(Self { spec, session, hello, crew, free: Condvar::new(), restarts: AtomicUsize::new(0) })
+    }
+
+    /// An idle worker, or a new one where there may be more.
+    fn take(&self) -> Result<Process, Lost> {
+        let mut crew = self.crew.lock().unwrap_or_else(PoisonError::into_inner);
+        loop {
+            if let Some(process) = crew.idle.pop() {
+                crew.busy += 1;
+                return Ok(process);
+            }
+            if crew.busy < self.spec.jobs.max(1) {
+                crew.busy += 1;
+                drop(crew);
+                let begun = begin(&self.spec, &self.session).map(|(process, _)| process);
+                if begun.is_err() {
+                    self.left(None);
+                }
+                return begun;
+            }
+            crew = self.free.wait(crew).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// A worker that is no longer at work: idle again, or gone.
+    fn left(&self, process: Option<Process>) {
+        let mut crew = self.crew.lock().unwrap_or_else(PoisonError::into_inner);
+        crew.busy -= 1;
+        crew.idle.extend(process);
+        self.free.notify_one();
+    }
+
+    fn try_once(&self, asks: &[Ask<'_>]) -> Result<Vec<Result<Vec<f64>, SourceError>>, Lost> {
+        let mut process = self.take()?;
+        let most = Duration::from_secs_f64((self.spec.deadline_s * asks.len() as f64).max(0.001));
+        let answered = process.exchange(message::simulate(asks), most).and_then(|frame| {
+            message::read_outputs(&frame, asks.len()).map_err(|why| process.failed(&why))
+        });
+        self.left(answered.is_ok().then_some(process));
+        answered
+    }
+
+    fn answer(&self, asks: &[Ask<'_>]) -> Vec<Result<Vec<f64>, SourceError>> {
+        let all = |error: SourceError| asks.iter().map(|_| Err(error.clone())).collect();
+        let stopped = || SourceError::Refused("stopped".into());
+        let lost = match self.try_once(asks) {
+            Ok(answers) => return answers,
+            Err(Lost::Interrupted) => return all(stopped()),
+            Err(Lost::Failed(why)) => why,
+        };
+        self.restarts.fetch_add(1, Ordering::Relaxed);
+        match self.try_once(asks) {
+            Ok(answers) => answers,
+            Err(Lost::Interrupted) => all(stopped()),
+            Err(Lost::Failed(why)) => {
+                let again =
+                    if why == lost { String::new() } else { format!("\nbefore that: {lost}") };
+                all(SourceError::Gone(format!(
+                    "simulator {}: the worker failed twice on a batch of {} model(s): {why}{again}",
+                    self.spec.command.join(" "),
+                    asks.len()
+                )))
+            }
+        }
+    }
+}
+
+/// Starts a worker: hello, then the session.
+fn begin(spec: &WorkersSpec, session: &Session) -> Result<(Process, Hello), Lost> {
+    let mut process = Process::start(&spec.command, &spec.folder).map_err(Lost::Failed)?;
+    let most = Duration::from_secs_f64(spec.start_s.max(0.001));
+    let frame = process.exchange(message::hello(), most)?;
+    let hello = message::read_hello(&frame, session).map_err(|why| process.failed(&why))?;
+    let frame = process.exchange(message::session(session), most)?;
+    message::kind(&frame, "ready").map_err(|why| process.failed(&why))?;
+    Ok((process, hello))
+}
+
+impl Source for Workers {
+    fn simulate_many(&self, asks: &[Ask<'_>]) -> Vec<Result<Vec<f64>, SourceError>> {
+        if !self.hello.inputs && asks.iter().any(|ask| ask.inputs.is_some()) {
+            let why = format!(
+                "simulator {}: it takes no altered inputs (its hello says inputs = false), and a wrapper or the noise of an input needs them",
+                self.spec.command.join(" ")
+            );
+            return asks.iter().map(|_| Err(SourceError::Gone(why.clone()))).collect();
+        }
+        let share = asks.len().div_ceil(self.spec.jobs.max(1));
+        let size = share.clamp(1, self.hello.batch);
+        let batches: Vec<&[Ask<'_>]> = asks.chunks(size).collect();
+        if let [one] = batches.as_slice() {
+            return self.answer(one);
+        }
+        thread::scope(|scope| {
+            let begun: Vec<_> =
+                batches.iter().map(|batch| scope.spawn(|| self.answer(batch))).collect();
+            let ended = begun.into_iter().zip(&batches).flat_map(|(handle, batch)| {
+                handle.join().unwrap_or_else(|_| {
+                    let gone = || SourceError::Gone("a worker could not be asked".into());
+                    batch.iter().map(|_| Err(gone())).collect()
+                })
+            });
+            ended.collect()
+        })
+    }
+
+    fn answers_all(&self) -> bool {
+        self.hello.all
+    }
+
+    fn batch(&self) -> usize {
+        self.hello.batch * self.spec.jobs
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let restarts = self.restarts.load(Ordering::Relaxed);
+        let note = format!(
+            "a worker of the simulator failed and was started anew {restarts} time(s); its batch was repeated"
+        );
+        (restarts > 0).then_some(note).into_iter().collect()
+    }
+}

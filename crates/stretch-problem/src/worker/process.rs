@@ -1,0 +1,213 @@
+//! One worker: a process that answers frames, and what it printed last.
+
+use std::{
+    collections::VecDeque,
+    io::{BufRead, BufReader, Read, Write},
+    path::Path,
+    process::{Child, Command, Stdio},
+    sync::{
+        Arc, Mutex, PoisonError,
+        mpsc::{Receiver, RecvTimeoutError, Sender, channel},
+    },
+    thread,
+    time::{Duration, Instant},
+};
+
+use super::frame::{Frame, PREFIX, Prefix};
+
+/// Lines of standard error that are kept, and bytes of each.
+const LINES: usize = 12;
+const LINE_BYTES: usize = 400;
+/// How often an interrupt is looked for while a worker is waited for.
+const GLANCE: Duration = Duration::from_millis(50);
+/// How long a worker may take to leave.
+const LEAVES: Duration = Duration::from_millis(500);
+
+/// Why a worker gave no answer.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Lost {
+    /// It died, hung, or did not keep to the protocol; what happened.
+    Failed(String),
+    /// Somebody asked to stop.
+    Interrupted,
+}
+
+type Last = Arc<Mutex<VecDeque<String>>>;
+
+/// A running worker.
+#[derive(Debug)]
+pub(super) struct Process {
+    child: Child,
+    to: Option<Sender<Vec<u8>>>,
+    from: Receiver<Result<Frame, String>>,
+    last: Last,
+}
+
+impl Process {
+    /// Starts a command in a folder.
+    pub(super) fn start(command: &[String], folder: &Path) -> Result<Self, String> {
+        let (program, arguments) = command.split_first().ok_or("the command is empty")?;
+        let mut child = Command::new(program)
+            .args(arguments)
+            .current_dir(folder)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(|e| format!("{program} could not be started: {e}"))?;
+        let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
+        let (Some(mut stdin), Some(mut stdout), Some(stderr)) = pipes else {
+            return Err("its pipes could not be opened".into());
+        };
+        let (to, asked) = channel::<Vec<u8>>();
+        thread::spawn(move || {
+            for bytes in asked {
+                // Its end is seen where its answer is waited for.
+                if stdin.write_all(&bytes).and_then(|()| stdin.flush()).is_err() {
+                    break;
+                }
+            }
+        });
+        let (answered, from) = channel();
+        thread::spawn(move || {
+            loop {
+                let frame = read(&mut stdout);
+                let is_last = frame.is_err();
+                if answered.send(frame).is_err() || is_last {
+                    break;
+                }
+            }
+        });
+        let last = Last::default();
+        let kept = Arc::clone(&last);
+        thread::spawn(move || keep(stderr, &kept));
+        Ok(Self { child, to: Some(to), from, last })
+    }
+
+    /// Sends a frame and waits for the answer.
+    pub(super) fn exchange(&mut self, bytes: Vec<u8>, most: Duration) -> Result<Frame, Lost> {
+        let sent = self.to.as_ref().is_some_and(|to| to.send(bytes).is_ok());
+        if !sent {
+            return Err(self.failed("it takes no more requests"));
+        }
+        let until = Instant::now() + most;
+        loop {
+            let left = until.saturating_duration_since(Instant::now());
+            match self.from.recv_timeout(left.min(GLANCE)) {
+                Ok(Ok(frame)) => return Ok(frame),
+                Ok(Err(why)) => return Err(self.failed(&why)),
+                Err(RecvTimeoutError::Disconnected) => return Err(self.failed("it is gone")),
+                Err(RecvTimeoutError::Timeout) if stretch_data::interrupted() => {
+                    return Err(Lost::Interrupted);
+                }
+                Err(RecvTimeoutError::Timeout) if left.is_zero() => {
+                    let _ = self.child.kill();
+                    let why = format!("it did not answer within {:.1} s", most.as_secs_f64());
+                    return Err(self.failed(&why));
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+            }
+        }
+    }
+
+    /// What happened, how it ended and what it printed last.
+    pub(super) fn failed(&mut self, why: &str) -> Lost {
+        // What it printed as it died may still be under way.
+        let until = Instant::now() + LEAVES;
+        let mut ended = None;
+        while ended.is_none() && Instant::now() < until {
+            ended = self.child.try_wait().ok().flatten();
+            if ended.is_none() {
+                thread::sleep(Duration::from_millis(5));
+            }
+        }
+        thread::sleep(Duration::from_millis(20));
+        let mut text = why.to_owned();
+        if let Some(status) = ended {
+            text += &format!("; it ended with {status}");
+        }
+        let last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        match last.is_empty() {
+            true => text += "; it printed nothing to standard error",
+            false => {
+                text += "; its last lines on standard error:";
+                last.iter().for_each(|line| text += &format!("\n  {line}"));
+            }
+        }
+        Lost::Failed(text)
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        if let Some(to) = self.to.take() {
+            // A worker that is gone needs no farewell; without the sender its standard input ends.
+            let _ = to.send(super::message::bye());
+        }
+        let until = Instant::now() + LEAVES;
+        while Instant::now() < until {
+            match self.child.try_wait() {
+                Ok(None) => thread::sleep(Duration::from_millis(5)),
+                _ => return,
+            }
+        }
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// The next frame of a stream.
+fn read(from: &mut impl Read) -> Result<Frame, String> {
+    let mut prefix = [0; PREFIX];
+    let mut have = 0;
+    while have < PREFIX {
+        match from.read(&mut prefix[have..]) {
+            Ok(0) if have == 0 => return Err("it closed its standard output".into()),
+            // Whatever came is no frame, and says more than its length.
+            Ok(0) => {
+                return Err(Prefix::parse(&prefix).map_or_else(
+                    |e| e.to_string(),
+                    |_| "it closed its standard output amid a frame".into(),
+                ));
+            }
+            Ok(n) => have += n,
+            Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(e.to_string()),
+        }
+    }
+    let Prefix { header, body } = Prefix::parse(&prefix).map_err(|e| e.to_string())?;
+    // The lengths are only what it says: what is read decides how much memory is taken.
+    let mut part = |bytes: usize| {
+        let mut out = Vec::new();
+        let read = from.by_ref().take(bytes as u64).read_to_end(&mut out);
+        match read {
+            Ok(n) if n == bytes => Ok(out),
+            Ok(_) => Err("it closed its standard output amid a frame".to_owned()),
+            Err(e) => Err(e.to_string()),
+        }
+    };
+    let (header, body) = (part(header)?, part(body)?);
+    Frame::parse(&header, &body).map_err(|e| e.to_string())
+}
+
+/// Keeps the last lines of a stream.
+fn keep(from: impl Read, last: &Mutex<VecDeque<String>>) {
+    let mut lines = BufReader::new(from);
+    let mut line = Vec::new();
+    loop {
+        line.clear();
+        // A line without an end takes no more memory than is kept of it.
+        let mut short = lines.by_ref().take(1 << 16);
+        match short.read_until(b'\n', &mut line) {
+            Ok(0) | Err(_) => return,
+            Ok(_) => {
+                let text = String::from_utf8_lossy(&line[..line.len().min(LINE_BYTES)]);
+                let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
+                last.push_back(text.trim_end().to_owned());
+                if last.len() > LINES {
+                    last.pop_front();
+                }
+            }
+        }
+    }
+}

@@ -40,9 +40,7 @@ def interrupted(code, tmp_path):
     script = tmp_path / "script.py"
     script.write_text(textwrap.dedent(code))
     ready = tmp_path / "ready"
-    with subprocess.Popen(
-        [sys.executable, str(script), str(ready)], stderr=subprocess.PIPE, text=True, cwd=tmp_path
-    ) as process:
+    with subprocess.Popen([sys.executable, str(script), str(ready)], stderr=subprocess.PIPE, text=True, cwd=tmp_path) as process:
         for _ in range(600):
             if ready.exists():
                 break
@@ -69,3 +67,41 @@ def test_ctrl_c_ends_a_calibration(tmp_path):
     status, seconds, text = interrupted(code, tmp_path)
     assert "KeyboardInterrupt" in text and status != 0
     assert seconds < 20.0  # the whole takes minutes
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals are sent the POSIX way")
+@pytest.mark.parametrize("inside", ["time.sleep(60)", "sum(i for i in range(10**12))"])
+def test_ctrl_c_ends_a_simulator_that_hangs(tmp_path, inside):
+    code = f"""
+        import pathlib, sys, time
+        import numpy as np, stretch
+        x = np.sin(np.arange(3000) * 0.02)
+        def simulate(params, effects):
+            pathlib.Path(sys.argv[1]).touch()
+            {inside}
+        stretch.diagnose(simulate, {{"x": x, "y_mm": x}}, rate_hz=100.0, output="y_mm", parameters={{"a": (1.0, 0.1)}})
+    """
+    status, seconds, text = interrupted(code, tmp_path)
+    assert "KeyboardInterrupt" in text and "in simulate" in text and status != 0
+    assert seconds < 20.0
+
+
+def test_the_simulator_runs_on_the_thread_that_asked():
+    import numpy as np
+
+    x = np.sin(np.arange(3000) * 0.02)
+    threads = set()
+
+    def simulate(params, effects):
+        threads.add(threading.get_ident())
+        return params["a"] * x
+
+    stretch.diagnose(
+        simulate,
+        {"x": x, "y_mm": 1.1 * x + 1e-3 * np.cos(np.arange(3000) ** 2)},
+        rate_hz=100.0,
+        output="y_mm",
+        parameters={"a": (1.0, 0.1)},
+        wrap=None,
+    )
+    assert threads == {threading.get_ident()}

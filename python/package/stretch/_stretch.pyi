@@ -2,11 +2,12 @@
 
 import os
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+__all__: list[str]
 __version__: str
 
 class StretchError(ValueError):
@@ -15,6 +16,7 @@ class StretchError(ValueError):
 class Refused(StretchError):
     """Raised by a simulator that cannot simulate these values: the fit turns back and goes on elsewhere."""
 
+@final
 class Reading:
     """What a receptor answers for one sample."""
 
@@ -34,6 +36,7 @@ class Reading:
     def sd(self) -> float | None:
         """Standard deviation of the estimate, where the model knows it."""
 
+@final
 class Receptor:
     """A calibration that takes one sample after the other and minds their time stamps."""
 
@@ -45,6 +48,7 @@ class Receptor:
     def faults(self) -> dict[str, int]:
         """What was wrong with the time stamps so far: samples missing, jittered, and running backwards."""
 
+@final
 class Record:
     @staticmethod
     def from_json(text: str) -> Record: ...
@@ -76,8 +80,9 @@ def calibrate(recordings: Sequence[dict[str, Any]], choices: dict[str, Any]) -> 
 def evaluate(calibrations: Sequence[tuple[str, Record]], recordings: Sequence[dict[str, Any]]) -> str: ...
 def wrapper(name: str) -> tuple[str, str] | None: ...
 
+@final
 class Problem:
-    def __init__(self, spec: dict[str, Any]) -> None: ...
+    def __new__(cls, spec: dict[str, Any]) -> Problem: ...
     @property
     def dt_s(self) -> float: ...
     @property

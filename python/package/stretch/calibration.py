@@ -139,9 +139,7 @@ class Calibration:
             same_length(felt, values.size, "pressure")
         answer = self._record.apply(stamps, values, felt)
         faults = {key: answer[key] for key in ("missing", "jittered", "backwards")}
-        return Estimate(
-            answer["estimate"], answer["rate"], answer["sd"], answer["inside"], faults=faults, unit=self.unit
-        )
+        return Estimate(answer["estimate"], answer["rate"], answer["sd"], answer["inside"], faults=faults, unit=self.unit)
 
     def evaluate(
         self,
@@ -182,7 +180,14 @@ class Calibration:
         if self.models:
             head = ["model", f"RMSE {self.unit}", "worst", "delay s", "numbers", ""]
             rows = [
-                [m["model"], m["rmse"], m["worst"], m["lag_s"], m["parameters"], "chosen" if m["model"] == self.model else ""]
+                [
+                    m["model"],
+                    m["rmse"],
+                    m["worst"],
+                    m["lag_s"],
+                    m["parameters"],
+                    "chosen" if m["model"] == self.model else "",
+                ]
                 for m in self.models
             ]
             parts.append(html.table(head, rows, "on recordings left out of the fit"))

@@ -8,22 +8,19 @@ from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from typing import Any
 
-from . import _stretch, html, problem as entries
+from . import _stretch, html
+from . import problem as entries
 from ._stretch import StretchError
 from .fix import Fix, fix
 from .frames import frame
 from .recordings import Array
 from .simulator import Asked
 
-UNKNOWN = "unknown"
-
 
 class Diagnosis:
     """What is missing in a simulator, how sure that is, where it sits, and how far naming it closes the gap."""
 
-    def __init__(
-        self, told: dict[str, Any], page: str = "", curves: Mapping[str, Sequence[Array]] | None = None
-    ) -> None:
+    def __init__(self, told: dict[str, Any], page: str = "", curves: Mapping[str, Sequence[Array]] | None = None) -> None:
         self._told = told
         self._page = page
         self._curves = curves or {}
@@ -213,9 +210,15 @@ def diagnose(
     """
     if (output is None) == (stages is None):
         raise StretchError("say what is held against the measurement: output, a column's name, or stages")
-    listed = list(stages) if stages is not None else [
-        entries.Stage(str(output), tuple(inputs), unit=(units or {}).get(str(output), ""), velocity=velocity, position=position)
-    ]
+    listed = (
+        list(stages)
+        if stages is not None
+        else [
+            entries.Stage(
+                str(output), tuple(inputs), unit=(units or {}).get(str(output), ""), velocity=velocity, position=position
+            )
+        ]
+    )
     asked = Asked(simulator)
     units, noise = units or {}, noise or {}
     driven = list(dict.fromkeys(c for one in listed for c in one.inputs))
@@ -264,7 +267,5 @@ def _behind(wrappers: list[str], driven: list[str], notes: list[str]) -> list[st
                 "effects, inputs)"
             )
     if "all" in wrappers and driven:
-        notes.append(
-            "nothing was looked for on the input's side: the simulator takes no argument inputs"
-        )
+        notes.append("nothing was looked for on the input's side: the simulator takes no argument inputs")
     return ["output.all" if one == "all" else one for one in wrappers]

@@ -35,10 +35,12 @@ def times(samples: int, rate_hz: float | None, time_s: ArrayLike | None, what: s
     """Time stamps, s, from a sample rate or as they were given."""
     if (rate_hz is None) == (time_s is None):
         raise StretchError(f"{what}: give either rate_hz, the samples a second, or time_s, the time stamps")
-    if time_s is None:
-        if not (np.isfinite(rate_hz) and rate_hz > 0.0):
+    if rate_hz is not None:
+        if not 0.0 < rate_hz < float("inf"):
             raise StretchError(f"rate_hz is {rate_hz}; it must be above 0")
-        return np.arange(samples, dtype=np.float64) / float(rate_hz)  # type: ignore[arg-type]
+        stamps: Array = np.arange(samples, dtype=np.float64) / float(rate_hz)
+        return stamps
+    assert time_s is not None
     stamps = column(time_s, f"time_s of {what}")
     same_length(stamps, samples, f"time_s of {what}")
     back = np.flatnonzero(np.diff(stamps) <= 0.0)
@@ -88,7 +90,7 @@ def recordings(
     for i, name in enumerate(called):
         channels = [(key, column(values[i], f"{key} of {name}")) for key, values in given.items()]
         samples = channels[0][1].size
-        for key, values in channels[1:]:
-            same_length(values, samples, f"{key} of {name}")
+        for key, one in channels[1:]:
+            same_length(one, samples, f"{key} of {name}")
         made.append({"name": name, "time_s": times(samples, rate_hz, stamps[i], name), "channels": channels})
     return made

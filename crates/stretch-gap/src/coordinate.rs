@@ -18,7 +18,7 @@ use crate::{
 /// Standard deviation of a form around its usual value, as a share of its range.
 const FORM_SD: f64 = 0.35;
 /// Tolerances within which a re-tuned parameter stays.
-const REACH: f64 = 3.0;
+pub(crate) const REACH: f64 = 3.0;
 
 /// One coordinate of a fit.
 #[derive(Debug, Clone, Copy)]

@@ -191,6 +191,7 @@ fn run(
         null_band,
         location,
         parameters: shifts(simulator, &evidence),
+        identifiability: searched.identified(),
         transfer,
         next_experiment: None,
         baselines: options.baselines.then(simpler).transpose()?,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{missing::Proposed, rows::RowsUsed, simulator::ModelRuns};
+use crate::{identify::Identified, missing::Proposed, rows::RowsUsed, simulator::ModelRuns};
 
 /// The answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -354,6 +354,9 @@ pub struct Diagnosis {
     pub location: Where,
     /// Nominal parameters.
     pub parameters: Vec<ParameterShift>,
+    /// Which nominal parameters these data determine, and which not.
+    #[serde(default)]
+    pub identifiability: Vec<Identified>,
     /// What the gap costs a calibration.
     pub transfer: Option<Transfer>,
     /// What to measure next.

@@ -27,6 +27,7 @@ use crate::{
     compare::{Comparison, Sensitivities},
     coordinate::{Coordinate, coordinates},
     error::GapError,
+    identify::Information,
     linear::{Cholesky, boxed},
     metric::Column,
     score::Misfit,
@@ -43,6 +44,8 @@ pub(crate) struct Fitted {
     pub(crate) effect_sd: Vec<Vec<f64>>,
     /// One standard deviation of each nominal parameter that was re-tuned.
     pub(crate) parameter_sd: Vec<(usize, f64)>,
+    /// What the fit says of the nominal parameters, the effects' own held.
+    pub(crate) information: Information,
 }
 
 /// How much work a fit may be.
@@ -281,6 +284,13 @@ impl<'a, 'b> Descent<'a, 'b> {
     fn finish(self) -> Fitted {
         let stages = self.stages.iter().zip(&self.residuals);
         let misfits = stages.map(|(&s, r)| self.compare.misfit(s, r)).collect();
+        let is_nominal = |i: &usize| matches!(self.coordinates[*i].0, Coordinate::Nominal { .. });
+        let kept: Vec<usize> = (0..self.coordinates.len()).filter(is_nominal).collect();
+        let of = self.coordinates.iter().filter_map(|(c, _)| match c {
+            Coordinate::Nominal { index, .. } => Some(*index),
+            _ => None,
+        });
+        let information = (of.collect(), self.normal.select_rows(&kept).select_columns(&kept));
         let spread = spreads(self.normal);
         let effects = self.model.effects.iter();
         let mut effect_sd: Vec<Vec<f64>> = effects.map(|(_, v)| vec![0.0; v.len()]).collect();
@@ -297,7 +307,7 @@ impl<'a, 'b> Descent<'a, 'b> {
                 }
             }
         }
-        Fitted { model: self.model, misfits, effect_sd, parameter_sd }
+        Fitted { model: self.model, misfits, effect_sd, parameter_sd, information }
     }
 }
 

@@ -21,6 +21,7 @@ use crate::{
     fit::{Effort, FINE, Fitted},
     frame::{Frame, Role},
     hypothesis::Hypothesis,
+    identify::{Identified, Information, identified},
     linked::groups,
     runs::Runs,
     score::{Misfit, Observations, gap, score},
@@ -40,6 +41,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) shipped: Model,
     /// Re-tuned, without effects.
     pub(crate) nominal: Hypothesis,
+    /// What that says of the nominal parameters.
+    information: Vec<Information>,
     /// By stage: samples that count as one observation.
     memory: Vec<f64>,
     /// By stage: how much its samples count.
@@ -66,7 +69,7 @@ impl<'a> Problem<'a> {
         progress("floors");
         let rough = Comparison::around(runs.clone(), frame.clone(), &shipped, None, seed)?;
         progress("re-tuning the nominal parameters");
-        let first = retuned(&rough, &shipped)?;
+        let (first, _) = retuned(&rough, &shipped)?;
         let compare = Comparison::around(runs, frame, &first.model, None, seed)?;
         Self::of(compare, shipped, &first.model)
     }
@@ -85,7 +88,7 @@ impl<'a> Problem<'a> {
 
     /// Re-tuned in metrics that stand.
     fn of(compare: Comparison<'a>, shipped: Model, start: &Model) -> Result<Self, GapError> {
-        let nominal = retuned(&compare, start)?;
+        let (nominal, information) = retuned(&compare, start)?;
         let stages = compare.metrics.len();
         let memory: Result<Vec<f64>, GapError> = (0..stages)
             .into_par_iter()
@@ -101,7 +104,7 @@ impl<'a> Problem<'a> {
             (0..stages).into_par_iter().map(|s| compare.transmitted(s, &nominal.model)).collect();
         solver_check(&compare, &nominal.model)?;
         let transmitted = transmitted?;
-        Ok(Self { compare, shipped, nominal, memory, observations, transmitted })
+        Ok(Self { compare, shipped, nominal, information, memory, observations, transmitted })
     }
 
     /// The same problem beside another simulator of the same stages and parameters.
@@ -113,6 +116,7 @@ impl<'a> Problem<'a> {
             compare: self.compare.beside(simulator, self.compare.metrics.clone()),
             shipped: self.shipped.clone(),
             nominal: self.nominal.clone(),
+            information: self.information.clone(),
             memory: self.memory.clone(),
             observations: self.observations.clone(),
             transmitted: self.transmitted.clone(),
@@ -130,6 +134,11 @@ impl<'a> Problem<'a> {
     /// Whether the simulator's budget allows no more than what the answer itself needs.
     pub(crate) fn is_spent(&self) -> bool {
         self.compare.runs.is_spent()
+    }
+
+    /// Which nominal parameters the data determine.
+    pub(crate) fn identified(&self) -> Vec<Identified> {
+        identified(self.simulator().parameters(), &self.nominal.model, &self.information)
     }
 
     /// [`Comparison::fit`], misfits at equal noise transmitted.
@@ -274,7 +283,10 @@ impl<'a> Problem<'a> {
 }
 
 /// Every stage re-tuned on its own, those that share a parameter together: without effects no other stage knows of it.
-fn retuned(compare: &Comparison<'_>, start: &Model) -> Result<Hypothesis, GapError> {
+fn retuned(
+    compare: &Comparison<'_>,
+    start: &Model,
+) -> Result<(Hypothesis, Vec<Information>), GapError> {
     let simulator = compare.simulator();
     for stage in 0..compare.metrics.len() {
         simulator.linearise(stage, start, compare.frame.fit_trials)?;
@@ -285,16 +297,19 @@ fn retuned(compare: &Comparison<'_>, start: &Model) -> Result<Hypothesis, GapErr
     let mut model = start.clone();
     let mut misfits = Vec::new();
     let mut parameter_sd = vec![0.0; model.parameters.len()];
+    let mut information = Vec::new();
     for (group, fitted) in groups.iter().zip(fits?) {
         fitted.parameter_sd.iter().for_each(|(p, sd)| parameter_sd[*p] = *sd);
         for &p in group.iter().flat_map(|stage| &simulator.stages()[*stage].parameters) {
             model.parameters[p] = fitted.model.parameters[p];
         }
         misfits.extend(fitted.misfits);
+        information.push(fitted.information);
     }
     misfits.sort_by_key(|misfit| misfit.stage);
     let (effects, effect_sd) = (Vec::new(), BTreeMap::new());
-    Ok(Hypothesis { effects, model, misfits, effect_sd, parameter_sd, score: 0.0 })
+    let all = Hypothesis { effects, model, misfits, effect_sd, parameter_sd, score: 0.0 };
+    Ok((all, information))
 }
 
 /// Refuses a simulator whose step of integration shows: its error would be named as an effect.

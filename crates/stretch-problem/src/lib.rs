@@ -3,6 +3,7 @@
 mod black_box;
 mod columns;
 mod error;
+mod file;
 mod linear;
 mod problem;
 mod runs;
@@ -14,6 +15,7 @@ mod wrap;
 
 pub use black_box::BlackBox;
 pub use error::ProblemError;
+pub use file::{ProblemFile, SimulatorEntry, TrialFile, WorkersEntry};
 pub use problem::Problem;
 pub use source::{
     Ask, Closure, Session, SessionColumn, SessionPart, SessionStage, Source, SourceError, closure,

@@ -11,6 +11,8 @@ use crate::source::{Ask, Session, SourceError};
 /// The version of the protocol.
 pub(super) const VERSION: u64 = 1;
 
+// Keys are written in the order of the alphabet, so that a worker without a JSON parser can read them where they stand.
+
 /// What a worker says of itself.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(default)]
@@ -107,16 +109,16 @@ pub(super) fn session(session: &Session) -> Vec<u8> {
     let stages = session
         .stages
         .iter()
-        .map(|s| json!({ "name": s.name, "output": s.output, "inputs": s.inputs }));
+        .map(|s| json!({ "inputs": s.inputs, "name": s.name, "output": s.output }));
     let columns = session.columns.iter().map(|c| json!({ "name": c.name, "unit": c.unit }));
     let header = json!({
-        "kind": "session",
-        "dt_s": session.dt_s,
-        "trials": trials.collect::<Vec<_>>(),
-        "stages": stages.collect::<Vec<_>>(),
-        "parameters": session.parameters,
-        "effects": session.effects,
         "columns": columns.collect::<Vec<_>>(),
+        "dt_s": session.dt_s,
+        "effects": session.effects,
+        "kind": "session",
+        "parameters": session.parameters,
+        "stages": stages.collect::<Vec<_>>(),
+        "trials": trials.collect::<Vec<_>>(),
     });
     let body: Vec<f64> = session.columns.iter().flat_map(|c| c.values.iter().copied()).collect();
     Frame::bytes(&header, &body)

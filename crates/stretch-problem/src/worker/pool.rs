@@ -19,6 +19,9 @@ use crate::{
     source::{Ask, Session, Source, SourceError},
 };
 
+/// The worker for Python objects.
+const SHIM: &str = include_str!("shim.py");
+
 /// What workers are started by.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WorkersSpec {
@@ -44,6 +47,18 @@ impl WorkersSpec {
             deadline_s: 60.0,
             start_s: 120.0,
         }
+    }
+
+    /// An object of a Python module, `module:object`, behind the worker that comes with this crate: a function that takes parameters and
+    /// effects as dicts by name, or an object with `simulate(parameters[n, p], effects[n, e])`. Needs python3 with NumPy.
+    pub fn python(object: &str, folder: impl Into<PathBuf>) -> Self {
+        Self::new(&["python3", "-c", SHIM, object], folder)
+    }
+
+    /// The command as it is shown: the program's own text is left out.
+    fn shown(&self) -> String {
+        let parts = self.command.iter().map(|s| if s == SHIM { "(worker of stretch)" } else { s });
+        parts.collect::<Vec<_>>().join(" ")
     }
 }
 
@@ -74,9 +89,8 @@ impl Workers {
     /// # Errors
     /// A command that cannot be started, a worker that does not say hello or takes another unit than the problem.
     pub fn start(spec: WorkersSpec, session: &Session) -> Result<Self, ProblemError> {
-        let named = |why: String| {
-            ProblemError::Simulator(format!("simulator {}: {why}", spec.command.join(" ")))
-        };
+        let named =
+            |why: String| ProblemError::Simulator(format!("simulator {}: {why}", spec.shown()));
         let begun = begin(&spec, session);
         let (process, hello) = begun.map_err(|lost| match lost {
             Lost::Failed(why) => named(why),
@@ -143,7 +157,7 @@ impl Workers {
                     if why == lost { String::new() } else { format!("\nbefore that: {lost}") };
                 all(SourceError::Gone(format!(
                     "simulator {}: the worker failed twice on a batch of {} model(s): {why}{again}",
-                    self.spec.command.join(" "),
+                    self.spec.shown(),
                     asks.len()
                 )))
             }
@@ -167,7 +181,7 @@ impl Source for Workers {
         if !self.hello.inputs && asks.iter().any(|ask| ask.inputs.is_some()) {
             let why = format!(
                 "simulator {}: it takes no altered inputs (its hello says inputs = false), and a wrapper or the noise of an input needs them",
-                self.spec.command.join(" ")
+                self.spec.shown()
             );
             return asks.iter().map(|_| Err(SourceError::Gone(why.clone()))).collect();
         }

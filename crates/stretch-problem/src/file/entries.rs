@@ -1,0 +1,128 @@
+//! The tables of a problem's file, one by one.
+
+use stretch_data::Split;
+
+use super::{TrialFile, table::View};
+use crate::{
+    error::ProblemError,
+    spec::{Argument, Input, OwnEffect, Parameter, Stage, Tolerance},
+};
+
+pub(super) fn stage(view: View<'_>) -> Result<Stage, ProblemError> {
+    view.only(&["name", "output", "unit", "inputs", "noise", "velocity", "position"])?;
+    let noise = view.optional_number("noise")?;
+    if noise.is_some_and(|noise| noise < 0.0) {
+        return view.fail("noise", "it is below 0; give one standard deviation");
+    }
+    let output = view.text("output")?;
+    Ok(Stage {
+        name: view.text_or("name", &output)?,
+        unit: view.text_or("unit", "")?,
+        inputs: view.texts("inputs")?,
+        velocity: view.optional_text("velocity")?,
+        position: view.optional_text("position")?,
+        output,
+        noise,
+    })
+}
+
+pub(super) fn input(view: View<'_>) -> Result<Input, ProblemError> {
+    view.only(&["column", "unit", "noise"])?;
+    let noise = view.optional_number("noise")?.unwrap_or(0.0);
+    if noise < 0.0 {
+        return view.fail("noise", format!("{noise} is below 0; give one standard deviation"));
+    }
+    Ok(Input { column: view.text("column")?, unit: view.text_or("unit", "")?, noise })
+}
+
+pub(super) fn parameter(view: View<'_>) -> Result<Parameter, ProblemError> {
+    view.only(&["name", "unit", "value", "tolerance", "least", "greatest", "stages"])?;
+    Ok(Parameter {
+        name: view.text("name")?,
+        unit: view.text_or("unit", "")?,
+        value: view.number("value")?,
+        tolerance: tolerance(&view)?,
+        least: view.optional_number("least")?,
+        greatest: view.optional_number("greatest")?,
+        stages: view.texts("stages")?,
+    })
+}
+
+/// A number in the parameter's unit, or a text with a per cent sign; without one it is exact.
+fn tolerance(view: &View<'_>) -> Result<Tolerance, ProblemError> {
+    const KEY: &str = "tolerance";
+    if !view.has(KEY) {
+        return Ok(Tolerance::Exact);
+    }
+    let told = match view.table.get(KEY).and_then(toml::Value::as_str) {
+        Some(text) => {
+            let share = text.strip_suffix('%').and_then(|t| t.trim().parse::<f64>().ok());
+            let share = share.filter(|x| x.is_finite());
+            match share {
+                Some(share) => Tolerance::Relative(share / 100.0),
+                None => {
+                    return view.fail(
+                        KEY,
+                        format!("{text:?} is no share; write \"10 %\", or a number in its unit"),
+                    );
+                }
+            }
+        }
+        None => Tolerance::Absolute(view.number(KEY)?),
+    };
+    match told {
+        Tolerance::Absolute(x) | Tolerance::Relative(x) if x < 0.0 => {
+            view.fail(KEY, "it is below 0; give one standard deviation")
+        }
+        told => Ok(told),
+    }
+}
+
+pub(super) fn effect(view: View<'_>) -> Result<OwnEffect, ProblemError> {
+    let several = view.tables("argument")?;
+    let arguments = match several.is_empty() {
+        true => {
+            view.only(&["name", "unit", "range", "off", "log", "stages", "twins"])?;
+            vec![argument(&view, String::new())?]
+        }
+        false => {
+            view.only(&["name", "argument", "stages", "twins"])?;
+            let one = |table: &toml::Table| {
+                let own = View { table, ..view };
+                own.only(&["name", "unit", "range", "off", "log"])?;
+                argument(&own, own.text("name")?)
+            };
+            several.into_iter().map(one).collect::<Result<_, _>>()?
+        }
+    };
+    Ok(OwnEffect {
+        name: view.text("name")?,
+        arguments,
+        stages: view.texts("stages")?,
+        twins: view.texts("twins")?,
+    })
+}
+
+fn argument(view: &View<'_>, name: String) -> Result<Argument, ProblemError> {
+    let [min, max] = view.range("range")?;
+    let is_log = view.flag("log")?;
+    if is_log && min <= 0.0 {
+        return view.fail(
+            "range",
+            format!("it begins at {min}; what is searched in equal ratios is above 0"),
+        );
+    }
+    let off = view.optional_number("off")?;
+    Ok(Argument { name, unit: view.text_or("unit", "")?, min, max, off, is_log })
+}
+
+pub(super) fn trial(view: View<'_>) -> Result<TrialFile, ProblemError> {
+    view.only(&["file", "start_s", "split"])?;
+    let split = match view.text_or("split", "fit")?.as_str() {
+        "fit" => Split::Fit,
+        "test" => Split::Test,
+        other => return view.fail("split", format!("{other:?} is none of fit, test")),
+    };
+    let start_s = view.optional_number("start_s")?.unwrap_or(0.0);
+    Ok(TrialFile { file: view.text("file")?, start_s, split })
+}

@@ -1,0 +1,139 @@
+//! What simulates, as a problem's file says it.
+
+use super::table::View;
+use crate::error::ProblemError;
+
+/// What simulates.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum SimulatorEntry {
+    /// The built-in rig, on a data set.
+    Rig {
+        /// Folder of the data set, relative to the problem's.
+        data_set: String,
+        /// Rig file; the data set's own where there is none.
+        rig: Option<String>,
+    },
+    /// A gauge alone, on a data set or a trial.
+    Gauge {
+        /// Folder or file, relative to the problem's.
+        data_set: String,
+        /// Rig file.
+        rig: Option<String>,
+        /// Columns of reference and signal, where they are not the usual ones.
+        columns: Option<(String, String)>,
+    },
+    /// Another program, as workers.
+    Command {
+        /// Program and arguments, started in the problem's folder.
+        command: Vec<String>,
+        /// How it is run.
+        workers: WorkersEntry,
+    },
+    /// An object of a Python module, behind a worker that comes with the program.
+    Python {
+        /// `module:object`.
+        object: String,
+        /// How it is run.
+        workers: WorkersEntry,
+    },
+    /// A functional mock-up unit.
+    Fmu {
+        /// The file, relative to the problem's folder.
+        file: String,
+        /// How it is run.
+        workers: WorkersEntry,
+    },
+}
+
+/// How workers are run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WorkersEntry {
+    /// How many at once; the program's `--jobs` where there is none.
+    pub jobs: Option<usize>,
+    /// Longest time that one model may take, s.
+    pub deadline_s: f64,
+    /// Longest time that it may take to begin, s.
+    pub start_s: f64,
+}
+
+impl SimulatorEntry {
+    pub(super) fn of(top: &View<'_>) -> Result<Self, ProblemError> {
+        const KEY: &str = "simulator";
+        if top.table.get(KEY).is_some_and(toml::Value::is_array) {
+            let workers = WorkersEntry { jobs: None, deadline_s: 60.0, start_s: 120.0 };
+            return Ok(Self::Command { command: command(top, KEY)?, workers });
+        }
+        let Some(table) = top.table(KEY)? else {
+            return top.fail(KEY, "it is missing; write simulator = [\"python3\", \"sim.py\"], or a table [simulator]");
+        };
+        let view = View { table, name: "[simulator]", ..*top };
+        let kinds = ["builtin", "command", "python", "fmu"];
+        let given: Vec<&str> = kinds.into_iter().filter(|kind| view.has(kind)).collect();
+        match given.as_slice() {
+            ["builtin"] => Self::builtin(&view),
+            [kind] => {
+                view.only(&[kind, "jobs", "deadline_s", "start_s"])?;
+                let workers = WorkersEntry {
+                    jobs: view.optional_count("jobs")?,
+                    deadline_s: view.above_zero("deadline_s", 60.0)?,
+                    start_s: view.above_zero("start_s", 120.0)?,
+                };
+                Ok(match *kind {
+                    "command" => Self::Command { command: command(&view, kind)?, workers },
+                    "python" => {
+                        let object = view.text(kind)?;
+                        if object.split(':').count() != 2 || object.split(':').any(str::is_empty) {
+                            return view.fail(
+                                kind,
+                                format!("{object:?} is no object; write \"module:object\""),
+                            );
+                        }
+                        Self::Python { object, workers }
+                    }
+                    _ => Self::Fmu { file: view.text(kind)?, workers },
+                })
+            }
+            [] => view.fail(
+                "command",
+                "nothing says what simulates; write one of builtin, command, python, fmu",
+            ),
+            [_, second, ..] => {
+                view.fail(second, format!("{} are given; keep one", given.join(" and ")))
+            }
+        }
+    }
+
+    fn builtin(view: &View<'_>) -> Result<Self, ProblemError> {
+        let kind = view.text("builtin")?;
+        let (data_set, rig) = (view.text_or("data_set", ".")?, view.optional_text("rig")?);
+        match kind.as_str() {
+            "rig" => {
+                view.only(&["builtin", "data_set", "rig"])?;
+                Ok(Self::Rig { data_set, rig })
+            }
+            "gauge" => {
+                view.only(&["builtin", "data_set", "rig", "reference", "signal"])?;
+                let columns =
+                    match (view.optional_text("reference")?, view.optional_text("signal")?) {
+                        (Some(reference), Some(signal)) => Some((reference, signal)),
+                        (None, None) => None,
+                        _ => {
+                            return view
+                                .fail("reference", "reference and signal go together; give both");
+                        }
+                    };
+                Ok(Self::Gauge { data_set, rig, columns })
+            }
+            other => view.fail("builtin", format!("{other:?} is none of rig, gauge")),
+        }
+    }
+}
+
+fn command(view: &View<'_>, key: &str) -> Result<Vec<String>, ProblemError> {
+    let command = view.texts(key)?;
+    match command.first().is_some_and(|program| !program.is_empty()) {
+        true => Ok(command),
+        false => view.fail(key, "it is empty; write the program and its arguments"),
+    }
+}

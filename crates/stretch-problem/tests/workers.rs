@@ -1,0 +1,215 @@
+//! Workers: the reference ones agree to the bit, and what goes wrong with one is told.
+
+use std::{
+    path::{Path, PathBuf},
+    process::Command,
+    sync::Arc,
+};
+
+use stretch_data::{Channel, SessionTrial, Trial};
+use stretch_gap::{Diagnosis, Dice, Options, diagnose};
+use stretch_problem::{
+    Argument, Ask, BlackBox, OwnEffect, Parameter, Problem, ProblemSpec, Source, SourceError,
+    Stage, Tolerance,
+    worker::{Workers, WorkersSpec},
+};
+
+const SAMPLES: usize = 3000;
+
+fn examples() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/workers")
+}
+
+/// Angle of the servo of the examples, with a brake that holds 2 degrees.
+fn plant(u: &[f64]) -> Vec<f64> {
+    let mut angle = 0.0;
+    let one = |u: &f64| {
+        let before = angle;
+        let push = 10.5 * u - angle;
+        angle += 0.01 / 0.11 * (push - push.clamp(-2.0, 2.0));
+        before
+    };
+    u.iter().map(one).collect()
+}
+
+fn problem() -> Problem {
+    let mut dice = Dice::new(3, 0);
+    let mut held = 0.0;
+    let u: Vec<f64> = (0..SAMPLES)
+        .map(|i| {
+            if i % 60 == 0 {
+                held = 3.0 * dice.gauss();
+            }
+            held
+        })
+        .collect();
+    let angle = plant(&u).iter().map(|y| y + 0.05 * dice.gauss()).collect();
+    let channel = |name: &str, values| Channel { name: name.into(), values };
+    let channels = vec![channel("command_V", u), channel("angle_deg", angle)];
+    let time_s = (0..SAMPLES).map(|i| i as f64 * 0.01).collect();
+    let trial = Trial { name: "a.csv".into(), time_s, channels };
+    let parameter = |name: &str, value| Parameter {
+        name: name.into(),
+        value,
+        tolerance: Tolerance::Relative(0.1),
+        ..Parameter::default()
+    };
+    let argument = Argument { min: 0.0, max: 20.0, off: Some(0.0), ..Argument::default() };
+    Problem::new(ProblemSpec {
+        stages: vec![Stage {
+            name: "servo".into(),
+            output: "angle_deg".into(),
+            inputs: vec!["command_V".into()],
+            ..Stage::default()
+        }],
+        parameters: vec![parameter("gain", 10.0), parameter("tau", 0.1)],
+        effects: vec![OwnEffect {
+            name: "brake".into(),
+            arguments: vec![argument],
+            ..OwnEffect::default()
+        }],
+        wrap: vec!["input.dead_zone".into(), "output.backlash".into()],
+        trials: vec![SessionTrial::new(trial)],
+        ..ProblemSpec::default()
+    })
+    .unwrap()
+}
+
+fn workers(command: &[&str], jobs: usize) -> (Problem, Result<Workers, String>) {
+    let problem = problem();
+    let spec = WorkersSpec { jobs, ..WorkersSpec::new(command, examples()) };
+    let workers = Workers::start(spec, problem.session()).map_err(|e| e.to_string());
+    (problem, workers)
+}
+
+fn diagnosed(command: &[&str], jobs: usize) -> Diagnosis {
+    let (problem, workers) = workers(command, jobs);
+    let bench = BlackBox::new(problem, Arc::new(workers.unwrap()));
+    let (mut diagnosis, _) = diagnose(&bench, &Options::default(), &|_| (), &|| false).unwrap();
+    diagnosis.runtime_s = 0.0;
+    diagnosis
+}
+
+fn has_numpy() -> bool {
+    let has = Command::new("python3").args(["-c", "import numpy"]).output();
+    has.is_ok_and(|out| out.status.success())
+}
+
+#[test]
+fn a_worker_in_c_and_one_in_python_diagnose_to_the_same_bits() {
+    let folder = tempfile::tempdir().unwrap();
+    let servo = folder.path().join("servo");
+    let built = Command::new("cc")
+        .args(["-O2", "-ffp-contract=off", "-o"])
+        .arg(&servo)
+        .arg(examples().join("servo.c"))
+        .status();
+    if !built.is_ok_and(|status| status.success()) {
+        println!("SKIPPED: there is no C compiler cc");
+        return;
+    }
+    let in_c = diagnosed(&[servo.to_str().unwrap()], 2);
+    assert_eq!(in_c.named, ["brake"], "{}", in_c.sentence);
+    if !has_numpy() {
+        println!("SKIPPED: there is no python3 with NumPy");
+        return;
+    }
+    let in_python = diagnosed(&["python3", "servo.py"], 2);
+    assert_eq!(in_c, in_python);
+}
+
+/// What a worker that is a few lines of Python answers to one ask.
+fn answer(script: &str, jobs: usize) -> Result<Vec<Result<Vec<f64>, SourceError>>, String> {
+    const HEAD: &str = r#"
+import json, struct, sys, os, time
+def receive():
+    p = sys.stdin.buffer.read(16)
+    if len(p) < 16: sys.exit(0)
+    h, b = struct.unpack('<4xIQ', p)
+    return json.loads(sys.stdin.buffer.read(h)), sys.stdin.buffer.read(b)
+def send(header, body=b''):
+    t = json.dumps(header).encode()
+    sys.stdout.buffer.write(struct.pack('<4sIQ', b'STR1', len(t), len(body)) + t + body)
+    sys.stdout.buffer.flush()
+def begin(**more):
+    receive(); send({'kind': 'hello', 'version': 1, 'inputs': True, **more})
+    receive(); send({'kind': 'ready'})
+"#;
+    let problem = problem();
+    let code = format!("{HEAD}\n{script}");
+    let command = ["python3", "-c", &code];
+    let spec =
+        WorkersSpec { jobs, deadline_s: 0.5, start_s: 10.0, ..WorkersSpec::new(&command, ".") };
+    let workers = Workers::start(spec, problem.session()).map_err(|e| e.to_string())?;
+    let ask = Ask { stage: 0, parameters: &[10.0, 0.1], effects: &[0.0], inputs: None, trials: 1 };
+    Ok(workers.simulate_many(&[ask]))
+}
+
+fn has_python() -> bool {
+    let has = Command::new("python3").arg("--version").output();
+    let has = has.is_ok_and(|out| out.status.success());
+    if !has {
+        println!("SKIPPED: there is no python3");
+    }
+    has
+}
+
+#[test]
+fn what_a_worker_does_wrong_is_told_with_its_last_lines() {
+    if !has_python() {
+        return;
+    }
+    let outputs = "receive(); send({'kind': 'outputs', 'models': [{'samples': 2}]}, struct.pack('<2d', 1, 2))";
+    let cases = [
+        ("begin(); receive(); raise ValueError('no such gear')", "no such gear"),
+        ("begin(); receive(); os.abort()", "it ended with"),
+        ("begin(); receive(); time.sleep(60)", "did not answer within 0.5 s"),
+        ("begin(); receive(); print('step 1 of 10 is done')", "only frames may go there"),
+        ("begin(); receive(); send({'kind': 'outputs', 'models': []})", "0 outputs, 1 models"),
+        ("begin(); receive(); send({'kind': 'error', 'message': 'no GPU'})", "it says: no GPU"),
+    ];
+    for (script, told) in cases {
+        match &answer(script, 1).unwrap()[0] {
+            Err(SourceError::Gone(text)) => {
+                assert!(text.contains(told) && text.contains("failed twice"), "{script}: {text}");
+            }
+            other => panic!("{script}: {other:?}"),
+        }
+    }
+    let refused =
+        "begin(); receive(); send({'kind': 'outputs', 'models': [{'error': 'unstable'}]})";
+    assert_eq!(answer(refused, 1).unwrap(), [Err(SourceError::Refused("unstable".into()))]);
+    assert_eq!(answer(&format!("begin(); {outputs}"), 1).unwrap(), [Ok(vec![1.0, 2.0])]);
+}
+
+#[test]
+fn a_worker_that_dies_once_is_started_anew() {
+    if !has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mark = folder.path().join("died");
+    let script = format!(
+        "begin(); receive()\nif not os.path.exists({mark:?}):\n    open({mark:?}, 'w'); os.abort()\nsend({{'kind': 'outputs', 'models': [{{'samples': 1}}]}}, struct.pack('<d', 5))"
+    );
+    assert_eq!(answer(&script, 1).unwrap(), [Ok(vec![5.0])]);
+}
+
+#[test]
+fn a_worker_that_does_not_fit_is_refused_at_its_hello() {
+    if !has_python() {
+        return;
+    }
+    let cases = [
+        ("begin(units={'angle_deg': 'rad'})", "column angle_deg in rad, the problem in deg"),
+        ("begin(parameters=['gain'])", "it has no parameter tau; it has gain"),
+        ("receive(); send({'kind': 'hello', 'version': 9})", "it speaks version 9"),
+        ("sys.exit('no licence')", "no licence"),
+    ];
+    for (script, told) in cases {
+        let error = answer(script, 1).unwrap_err();
+        assert!(error.contains(told), "{script}: {error}");
+    }
+    let (_, none) = workers(&["no-such-program"], 1);
+    assert!(none.unwrap_err().contains("no-such-program could not be started"));
+}

@@ -1,6 +1,7 @@
 //! A simulator beside recordings: asked, and diagnosed.
 
 use std::{
+    path::PathBuf,
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering::SeqCst},
@@ -14,8 +15,10 @@ use pyo3::{prelude::*, types::PyDict};
 use stretch_data::{SessionTrial, Split};
 use stretch_gap::{Diagnosis, Evidence, Options, Simulator};
 use stretch_problem::{
-    Argument, BlackBox, Input, OwnEffect, Parameter, Problem as Checked, ProblemSpec, Stage,
-    Tolerance, wrapper_named,
+    Argument, BlackBox, Input, OwnEffect, Parameter, Problem as Checked, ProblemFile, ProblemSpec,
+    Source, Stage, Tolerance,
+    worker::{Workers, WorkersSpec},
+    wrapper_named,
 };
 use stretch_report::{Subject, diagnosis_page};
 
@@ -214,6 +217,8 @@ impl EffectIn {
 #[derive(Debug)]
 pub(crate) struct Problem {
     checked: Checked,
+    /// The file that it was read from.
+    file: Option<ProblemFile>,
 }
 
 /// What a diagnosis leaves: itself as JSON, its report, and the curves of each stage.
@@ -227,7 +232,27 @@ struct Answer {
 impl Problem {
     #[new]
     fn new(spec: SpecIn<'_>) -> PyResult<Self> {
-        Ok(Self { checked: Checked::new(spec.spec()).map_err(said)? })
+        Ok(Self { checked: Checked::new(spec.spec()).map_err(said)?, file: None })
+    }
+
+    /// From a problem.toml; `is_driven` says whether altered inputs can drive the simulator.
+    #[staticmethod]
+    fn read(path: PathBuf, is_driven: bool) -> PyResult<Self> {
+        let file = ProblemFile::read(&path).map_err(said)?;
+        let mut spec = file.load().map_err(said)?;
+        if !is_driven {
+            for one in spec.wrap.iter_mut().filter(|one| *one == "all") {
+                *one = "output.all".to_owned();
+            }
+            spec.inputs.iter_mut().for_each(|input| input.noise = 0.0);
+        }
+        Ok(Self { checked: Checked::new(spec).map_err(said)?, file: Some(file) })
+    }
+
+    /// What the problem is called.
+    #[getter]
+    fn name(&self) -> &str {
+        self.file.as_ref().map_or("data", |file| file.name.as_str())
     }
 
     /// Sample time, s.
@@ -279,19 +304,31 @@ impl Problem {
     }
 
     /// Diagnoses; gives the diagnosis as JSON, its report, and by output what was measured and simulated: as shipped,
-    /// re-tuned, and with the best effects.
+    /// re-tuned, and with the best effects. Without a simulator the workers of the problem's file answer.
     fn diagnose<'py>(
         &self,
         py: Python<'py>,
-        simulator: &Bound<'py, PyAny>,
+        simulator: Option<&Bound<'py, PyAny>>,
         how: How,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<(String, String, Bound<'py, PyDict>)> {
         let (desk, told) = mpsc::channel();
         let batch = how.batch.max(1);
-        let work = Work { checked: self.checked.clone(), how, desk };
+        let budget = self.file.as_ref().and_then(|file| file.budget);
+        let how = How { budget: how.budget.or(budget), ..how };
+        let workers = match (&self.file, simulator) {
+            (_, Some(_)) => None,
+            (Some(file), None) => file.workers(jobs(how.threads)).map_err(said)?,
+            (None, None) => None,
+        };
+        if simulator.is_none() && workers.is_none() {
+            return Err(said("there is no simulator; give one, or name it in the problem's file"));
+        }
+        let left = Arc::new(AtomicBool::new(false));
+        let work = Work { checked: self.checked.clone(), workers, how, desk, left: left.clone() };
         thread::Builder::new().name("stretch".into()).spawn(move || work.run())?;
-        let done = serve(py, told, simulator, progress, batch)?;
+        let done = serve(py, told, simulator, progress, batch)
+            .inspect_err(|_| left.store(true, SeqCst))?;
         let Answer { json, page, curves } = done.map_err(said)?;
         let shown = PyDict::new(py);
         for (output, all) in curves {
@@ -304,15 +341,32 @@ impl Problem {
 /// What the thread that works has.
 struct Work {
     checked: Checked,
+    workers: Option<WorkersSpec>,
     how: How,
     desk: mpsc::Sender<Message<Result<Answer, String>>>,
+    /// Whether nobody is at the desk any more: the caller was interrupted.
+    left: Arc<AtomicBool>,
 }
 
 impl Work {
-    fn run(self) {
-        let Self { checked, how, desk } = self;
-        let source = Asked { desk: desk.clone(), answers_all: how.answers_all, batch: how.batch };
-        let bench = BlackBox::within(checked, Arc::new(source), how.budget);
+    fn run(&self) {
+        let answered = self.answered();
+        drop(self.desk.send(Message::Done(answered)));
+    }
+
+    fn answered(&self) -> Result<Answer, String> {
+        let Self { checked, workers, how, desk, left } = self;
+        let source: Arc<dyn Source> = match workers {
+            Some(spec) => {
+                let started = Workers::start(spec.clone(), checked.session());
+                Arc::new(started.map_err(|e| e.to_string())?)
+            }
+            None => {
+                let (answers_all, batch) = (how.answers_all, how.batch);
+                Arc::new(Asked { desk: desk.clone(), answers_all, batch })
+            }
+        };
+        let bench = BlackBox::within(checked.clone(), source, how.budget);
         let options = Options {
             depth: how.depth,
             threads: how.threads,
@@ -320,19 +374,19 @@ impl Work {
             baselines: how.baselines,
             ..Options::default()
         };
-        // Nobody is at the desk any more once the caller was interrupted.
-        let left = AtomicBool::new(false);
-        let progress = |words: &str| {
-            if desk.send(Message::Progress(words.to_owned())).is_err() {
-                left.store(true, SeqCst);
-            }
-        };
+        let progress = |words: &str| drop(desk.send(Message::Progress(words.to_owned())));
         let stop = || left.load(SeqCst);
         let done = stretch_gap::diagnose(&bench, &options, &progress, &stop);
-        let answer = done
-            .map_err(|e| e.to_string())
-            .and_then(|(diagnosis, evidence)| answer(&bench, &how.name, diagnosis, &evidence));
-        drop(desk.send(Message::Done(answer)));
+        let (diagnosis, evidence) = done.map_err(|e| e.to_string())?;
+        answer(&bench, &how.name, diagnosis, &evidence)
+    }
+}
+
+/// Workers at once: as many as processors, unless told.
+fn jobs(threads: usize) -> usize {
+    match threads {
+        0 => thread::available_parallelism().map_or(1, usize::from),
+        told => told,
     }
 }
 

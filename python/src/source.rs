@@ -97,7 +97,7 @@ impl<T: Send> Source for Asked<T> {
 pub(crate) fn serve<T: Send>(
     py: Python<'_>,
     mut desk: Receiver<Message<T>>,
-    simulator: &Bound<'_, PyAny>,
+    simulator: Option<&Bound<'_, PyAny>>,
     progress: Option<&Bound<'_, PyAny>>,
     batch: usize,
 ) -> PyResult<T> {
@@ -136,6 +136,7 @@ pub(crate) fn serve<T: Send>(
             }
         }
         for group in groups {
+            let Some(simulator) = simulator else { continue };
             answer(py, simulator, group)?;
             py.check_signals()?;
         }

@@ -269,3 +269,64 @@ def test_progress_is_told_and_may_stop_it():
 
     with pytest.raises(TimeoutError, match="enough"):
         diagnose(Spring(), BENT, progress=enough)
+
+
+PROBLEM = """
+name = "spring"
+simulator = {simulator}
+wrap = "all"
+
+[[stage]]
+name = "spring"
+output = "length_mm"
+inputs = ["force_N"]
+
+[[parameter]]
+name = "compliance"
+unit = "mm/N"
+value = 2.0
+tolerance = 0.2
+
+[[effect]]
+name = "bend"
+range = [-0.05, 0.05]
+off = 0.0
+
+[[trial]]
+file = "trial.csv"
+"""
+
+WORKER = """
+import numpy as np
+
+
+class Spring:
+    def begin(self, session):
+        self.force = session["columns"]["force_N"]
+
+    def simulate(self, params, effects):
+        return params[:, :1] * self.force + effects[:, :1] * self.force**2
+"""
+
+
+@pytest.fixture
+def problem_file(tmp_path):
+    time_s = np.arange(FORCE.size) / RATE_HZ
+    columns = np.column_stack([time_s, FORCE, BENT])
+    np.savetxt(tmp_path / "trial.csv", columns, "%.9g", ",", header="time_s,force_N,length_mm", comments="")
+    (tmp_path / "worker.py").write_text(WORKER)
+    path = tmp_path / "problem.toml"
+    path.write_text(PROBLEM.replace("{simulator}", '{ python = "worker:Spring" }'))
+    return path
+
+
+def test_a_problem_that_is_a_file_takes_an_object_or_its_own_simulator(problem_file):
+    found = stretch.diagnose(Spring(), problem_file)
+    assert found.named == ["bend"]
+    assert found.parameters["compliance"] == pytest.approx(2.1, rel=0.01)
+    own = stretch.diagnose(None, str(problem_file))
+    assert own.named == ["bend"]
+    with pytest.raises(stretch.StretchError, match="says what is diagnosed"):
+        stretch.diagnose(Spring(), problem_file, output="length_mm")
+    with pytest.raises(stretch.StretchError, match="there is no simulator"):
+        stretch.diagnose(None, {"force_N": FORCE, "length_mm": BENT})

@@ -103,6 +103,11 @@ class Diagnosis:
         return dict(proposed) if proposed else None
 
     @property
+    def identifiability(self) -> list[dict[str, Any]]:
+        """Which nominal parameters these data determine and which not, with what they look like."""
+        return list(self._told.get("identifiability", []))
+
+    @property
     def notes(self) -> list[str]:
         """What was done to the recordings, what they cannot say, and what to look at."""
         return list(self._told["notes"])
@@ -194,13 +199,14 @@ def diagnose(
     """Says why a simulator and a recording disagree: which effect is missing, how sure that is, and where it acts.
 
     `simulator` is an object with `simulate(params, effects) -> [n, samples]`, asked for n models at once: `params` is an
-    array `[n, p]` in the order of `parameters`, `effects` a dict of arrays `[n]` by name. Or it is a function of one model,
-    `f(params, effects) -> [samples]`, with dicts of floats. With several outputs it returns a dict of arrays by output. Two
-    more arguments it may take by name: `inputs`, a dict of columns that it is to be driven by (without it nothing is looked
-    for on the input's side), and `trials`, the slices of the recordings, which stand end to end. What it raises comes out as
-    it is; `stretch.Refused` says that values cannot be simulated.
+    array `[n, p]` in the order of `parameters`, `effects` `[n, e]` in that of theirs; both give a column by its name, too:
+    `effects["delay_s"]`. Or it is a function of one model, `f(params, effects) -> [samples]`, with dicts of floats. With
+    several outputs it returns a dict of arrays by output. Two more arguments it may take by name: `inputs`, a dict of
+    columns that it is to be driven by (without it nothing is looked for on the input's side), and `trials`, the slices of
+    the recordings, which stand end to end. What it raises comes out as it is; `stretch.Refused` says that values cannot be simulated.
 
     `data`: a dict of arrays by column, a frame, a `Trial`, or a list of these; with `rate_hz` or a column `time_s`.
+    Or the path of a problem.toml, which says all of the following; without a simulator (None) the file's own is run.
 
     `output` is the column that the simulation is held against, `inputs` those that drive it; `stages` says the same of
     several. `velocity` or `position` is the column by which friction rubs. `parameters` by name: a `Parameter`,
@@ -208,38 +214,41 @@ def diagnose(
     greatest)`, or `(least, greatest, off)`. `wrap`: effects around the simulator, as `"input.delay"`, `"output.backlash"`,
     or all of them. `units` and `noise` by column. `budget` is the most models that may be run.
     """
-    if (output is None) == (stages is None):
-        raise StretchError("say what is held against the measurement: output, a column's name, or stages")
-    listed = (
-        list(stages)
-        if stages is not None
-        else [
-            entries.Stage(
-                str(output), tuple(inputs), unit=(units or {}).get(str(output), ""), velocity=velocity, position=position
-            )
-        ]
-    )
-    asked = Asked(simulator)
-    units, noise = units or {}, noise or {}
-    driven = list(dict.fromkeys(c for one in listed for c in one.inputs))
-    wrappers = [wrap] if isinstance(wrap, str) else list(wrap or ())
+    asked = None if simulator is None else Asked(simulator)
     notes: list[str] = []
-    if not asked.takes_inputs:
-        wrappers = _behind(wrappers, driven, notes)
-    told_inputs = [(c, units.get(c, ""), float(noise.get(c, 0.0)) if asked.takes_inputs else 0.0) for c in driven]
-    columns = entries.wanted(listed, beside)
-    checked = _stretch.Problem(
-        {
-            "stages": [entries.stage(one, i, noise) for i, one in enumerate(listed)],
-            "inputs": told_inputs,
-            "parameters": [entries.parameter(key, value) for key, value in (parameters or {}).items()],
-            "effects": [entries.effect(key, value) for key, value in (effects or {}).items()],
-            "wrap": wrappers,
-            "beside": list(beside),
-            "trials": entries.recorded(data, rate_hz, columns),
-        }
-    )
-    asked.bind(checked)
+    if isinstance(data, (str, os.PathLike)):
+        if output is not None or stages is not None or parameters or effects:
+            raise StretchError(
+                f"{os.fspath(data)} says what is diagnosed; give a simulator beside it, or None for the file's own"
+            )
+        checked = _stretch.Problem.read(data, asked is None or asked.takes_inputs)
+        name = checked.name if name == "data" else name
+    else:
+        if asked is None:
+            raise StretchError("there is no simulator; give one, or the path of a problem.toml that names it")
+        if (output is None) == (stages is None):
+            raise StretchError("say what is held against the measurement: output, a column's name, or stages")
+        listed = list(stages or [entries.Stage(str(output), tuple(inputs), velocity=velocity, position=position)])
+        units, noise = units or {}, noise or {}
+        driven = list(dict.fromkeys(c for one in listed for c in one.inputs))
+        wrappers = [wrap] if isinstance(wrap, str) else list(wrap or ())
+        if not asked.takes_inputs:
+            wrappers, noise_in = _behind(wrappers, driven, notes), {}
+        else:
+            noise_in = dict(noise)
+        checked = _stretch.Problem(
+            {
+                "stages": [entries.stage(one, i, units, noise) for i, one in enumerate(listed)],
+                "inputs": [(c, units.get(c, ""), float(noise_in.get(c, 0.0))) for c in driven],
+                "parameters": [entries.parameter(key, value) for key, value in (parameters or {}).items()],
+                "effects": [entries.effect(key, value) for key, value in (effects or {}).items()],
+                "wrap": wrappers,
+                "beside": list(beside),
+                "trials": entries.recorded(data, rate_hz, entries.wanted(listed, beside)),
+            }
+        )
+    if asked is not None:
+        asked.bind(checked)
     how = {
         "name": name,
         "depth": depth,
@@ -247,8 +256,8 @@ def diagnose(
         "threads": threads,
         "baselines": False,
         "budget": budget,
-        "batch": asked.batch,
-        "answers_all": len(listed) > 1,
+        "batch": 1 if asked is None else asked.batch,
+        "answers_all": len(checked.stages) > 1,
     }
     text, page, curves = checked.diagnose(asked, how, progress)
     told = json.loads(text)

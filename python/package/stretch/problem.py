@@ -100,8 +100,6 @@ def trials(data: Data, rate_hz: float | None) -> list[Trial]:
     """Recordings from whatever holds them: a dict of arrays, a frame, a `Trial`, or a list of these."""
     if isinstance(data, Trial):
         return [data]
-    if isinstance(data, (str, os.PathLike)):
-        raise StretchError(f"{os.fspath(data)}: read the file first, and give its columns as a dict of arrays")
     if isinstance(data, (list, tuple)):
         return [one for part in data for one in trials(part, rate_hz)]
     if hasattr(data, "columns") and not isinstance(data, Mapping):  # a frame, of whichever library
@@ -184,12 +182,12 @@ def effect(name: str, given: EffectLike) -> dict[str, Any]:
     return {"name": name, "arguments": arguments, "stages": list(given.stages), "twins": list(given.twins)}
 
 
-def stage(given: Stage, index: int, noise: Mapping[str, float]) -> dict[str, Any]:
+def stage(given: Stage, index: int, units: Mapping[str, str], noise: Mapping[str, float]) -> dict[str, Any]:
     """A stage as the native part takes it."""
     return {
         "name": given.name or (f"stage {index + 1}" if index else "simulator"),
         "output": given.output,
-        "unit": given.unit,
+        "unit": given.unit or units.get(given.output, ""),
         "inputs": list(given.inputs),
         "noise": given.noise if given.noise is not None else noise.get(given.output),
         "velocity": given.velocity,

@@ -17,6 +17,30 @@ BATCH = 64
 """Models that are asked for at once where the simulator does not say how many (its attribute `batch`)."""
 
 
+class Named(np.ndarray[Any, np.dtype[np.float64]]):
+    """An array `[n, names]` whose columns go by name, too: `effects["delay_s"]` is one number for each model."""
+
+    names: tuple[str, ...]
+
+    @classmethod
+    def of(cls, array: Array, names: Sequence[str]) -> Named:
+        """The array with names for its columns."""
+        named = array.view(cls)
+        named.names = tuple(names)
+        return named
+
+    def __array_finalize__(self, other: Any) -> None:
+        # whatever is made of it has its names, but means them only where it is still the whole table
+        self.names = getattr(other, "names", ())
+
+    def __getitem__(self, at: Any) -> Any:
+        if not isinstance(at, str):
+            return np.asarray(self)[at]
+        if at not in self.names:
+            raise KeyError(f"there is no {at}; there are {', '.join(self.names) or 'none'}")
+        return np.asarray(self)[:, self.names.index(at)]
+
+
 @dataclass(frozen=True)
 class TrialSpan:
     """A trial among the samples of all trials end to end."""
@@ -89,10 +113,10 @@ class Asked:
         if "trials" in self.optional:
             more["trials"] = self.spans[:trials]
         if self.many:
-            values = {name: effects[:, i] for i, name in enumerate(self.effects)}
             if inputs is not None:
                 more["inputs"] = inputs
-            return self._table(self.call(params, values, **more), models, samples)
+            told = self.call(Named.of(params, self.parameters), Named.of(effects, self.effects), **more)
+            return self._table(told, models, samples)
         rows = []
         for model in range(models):
             one = dict(zip(self.parameters, params[model].tolist()))

@@ -274,7 +274,7 @@ def test_progress_is_told_and_may_stop_it():
 PROBLEM = """
 name = "spring"
 simulator = {simulator}
-wrap = "all"
+wrap = ["output.backlash", "output.delay"]
 
 [[stage]]
 name = "spring"

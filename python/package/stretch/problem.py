@@ -103,7 +103,8 @@ def trials(data: Data, rate_hz: float | None) -> list[Trial]:
     if isinstance(data, (list, tuple)):
         return [one for part in data for one in trials(part, rate_hz)]
     if hasattr(data, "columns") and not isinstance(data, Mapping):  # a frame, of whichever library
-        data = {str(name): np.asarray(data[name]) for name in data.columns}
+        frame: Any = data
+        data = {str(name): np.asarray(frame[name]) for name in frame.columns}
     if not isinstance(data, Mapping):
         raise StretchError(
             f"data are a {type(data).__name__}; give a dict of arrays by column, a frame, a stretch.Trial, or a list of these"

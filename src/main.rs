@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use commands::{
-    apply, blind, calibrate, convert, demo, diagnose, effects, evaluate, export, listen, rig,
+    apply, blind, calibrate, convert, demo, diagnose, effects, evaluate, export, init, listen, rig,
     simulate,
 };
 
@@ -41,6 +41,7 @@ enum Command {
     Demo(demo::Args),
     Simulate(simulate::Args),
     Diagnose(diagnose::Args),
+    Init(init::Args),
     Blind(blind::Args),
     Effects(effects::Args),
     Rig(rig::Args),
@@ -63,6 +64,7 @@ fn main() -> ExitCode {
         Command::Demo(args) => demo::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Diagnose(args) => diagnose::run(args),
+        Command::Init(args) => init::run(args),
         Command::Blind(args) => blind::run(args),
         Command::Effects(args) => effects::run(args),
         Command::Rig(args) => rig::run(args),

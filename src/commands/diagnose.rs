@@ -15,6 +15,7 @@ use stretch_sim::Catalogue;
 use super::{
     diagnosis_files::{not_read, to_json, write_fix, write_snippets},
     diagnosis_text::text,
+    problem,
     rails::rails,
     shared::{say, short_name, write_text},
 };
@@ -35,13 +36,18 @@ use super::{
 ///   stretch diagnose bench --fix fixed.toml --snippets code
 ///   stretch diagnose bench --rig fixed.toml
 ///
+/// A simulator of your own, in any language, stands in a problem.toml with its parameters, the
+/// recordings, and what may wrap it (stretch init FOLDER writes a first one):
+///
+///   stretch diagnose problem.toml --jobs 4 --budget 400
+///
 /// Test trials are read once, at the end. Without --rig the rig file that the data set names is
 /// the simulator, else the stock rig. Its parameters may be re-tuned within their tolerances, its
 /// effects are part of it.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
-    /// Folder with dataset.toml, or a trial
+    /// Folder with dataset.toml, a trial, or problem.toml
     #[arg(value_name = "DATASET")]
     data_set: PathBuf,
     /// Rig file: nominal parameters with their tolerances, and effects that it has already
@@ -86,6 +92,12 @@ pub(crate) struct Args {
     /// Say what simpler methods would have named, too
     #[arg(long)]
     baselines: bool,
+    /// Workers of a simulator of your own that run at once, where its file does not say
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: u16,
+    /// Most runs of a simulator of your own
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(20..))]
+    budget: Option<u32>,
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
@@ -104,8 +116,24 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         ..Options::default()
     };
     let bar = spinner();
-    let rig = args.rig.as_deref();
+    let mut args = args;
+    let asked = args.data_set.display().to_string();
+    if let Some(file) = problem::read(&args.data_set)? {
+        let Some(builtin) = problem::builtin(&file) else {
+            return of_own(&args, &file, &options, &bar).context(asked);
+        };
+        args.data_set = builtin.data_set;
+        args.rig = args.rig.or(builtin.rig);
+        if let (None, Some((reference, signal))) = (&args.reference, builtin.columns) {
+            (args.reference, args.signal) = (Some(reference), Some(signal));
+        }
+    }
+    ensure!(
+        args.budget.is_none(),
+        "--budget counts runs of a simulator of your own; the built-in ones need none"
+    );
     let shown = || args.data_set.display().to_string();
+    let rig = args.rig.as_deref();
     let columns = args.reference.as_deref().zip(args.signal.as_deref());
     let catalogue = Catalogue::default().without(&args.without)?;
     let bench = Bench::read(&args.data_set, columns, rig, &catalogue).with_context(shown)?;
@@ -121,6 +149,31 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
     bar.finish_and_clear();
     conclude(&args, &examined, &bench)
+}
+
+/// A simulator of the user's own.
+fn of_own(
+    args: &Args,
+    file: &stretch_problem::ProblemFile,
+    options: &Options,
+    bar: &ProgressBar,
+) -> anyhow::Result<()> {
+    problem::refuse(&[
+        ("--rig", args.rig.is_some()),
+        ("--fix", args.fix.is_some()),
+        ("--snippets", args.snippets.is_some()),
+        ("--reference", args.reference.is_some()),
+        ("--experiment", args.experiment.is_some()),
+        ("--without", !args.without.is_empty()),
+    ])?;
+    let asked = problem::Asked {
+        options,
+        json: args.json.as_deref(),
+        report: args.report.as_deref(),
+        jobs: args.jobs.into(),
+        budget: args.budget.map(|n| n as usize),
+    };
+    problem::run(file, &asked, bar)
 }
 
 /// What is diagnosed: a whole rig, or a gauge alone.

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use stretch_bench::Implementation;
 use stretch_blind::method_in_words;
-use stretch_gap::{Candidate, Diagnosis, SliceGap, VerdictKind};
+use stretch_gap::{Candidate, Diagnosis, Knowledge, SliceGap, VerdictKind};
 use stretch_report::{effect_in_words, listed, methods, transfer_in_words};
 
 use crate::table::{number, table};
@@ -37,10 +37,20 @@ pub(crate) fn text(diagnosis: &Diagnosis, implementations: &[Implementation]) ->
     slices(&mut out, diagnosis);
     candidates(&mut out, diagnosis);
     parameters(&mut out, diagnosis);
+    identifiability(&mut out, diagnosis);
     implement(&mut out, implementations);
     transfer(&mut out, diagnosis);
     baselines(&mut out, diagnosis);
     next(&mut out, diagnosis);
+    if let Some(runs) = diagnosis.model_runs {
+        put(
+            &mut out,
+            &format!(
+                "\n{} model runs, {} simulations of stages.",
+                runs.count, diagnosis.simulations
+            ),
+        );
+    }
     if !diagnosis.notes.is_empty() {
         put(&mut out, "\nNoticed:");
         for note in &diagnosis.notes {
@@ -182,6 +192,25 @@ fn parameters(out: &mut String, diagnosis: &Diagnosis) {
     let header =
         ["parameter", "as shipped", "re-tuned", "tolerances", "bent to, without the effect"];
     put(out, &table(&header, rows));
+}
+
+/// Which nominal parameters the data determine, and what is wrong with the others.
+fn identifiability(out: &mut String, diagnosis: &Diagnosis) {
+    let all = &diagnosis.identifiability;
+    if all.is_empty() {
+        return;
+    }
+    let known = all.iter().filter(|p| p.knowledge == Knowledge::Determined).count();
+    put(
+        out,
+        &format!(
+            "\nOf {} nominal parameters these data determine {known} to a third of their tolerance or better.",
+            all.len()
+        ),
+    );
+    for sentence in all.iter().filter_map(stretch_gap::Identified::sentence) {
+        put(out, &format!("- {sentence}"));
+    }
 }
 
 /// How far a parameter was bent to hide the effect, in tolerances.

@@ -173,7 +173,9 @@ fn run(
         null_band,
     };
     let unknown = unknown(evidence.gap, thresholds);
-    let told = tell(answer, case, simulator, &evidence, &shares);
+    let mut told = tell(answer, case, simulator, &evidence, &shares);
+    let model_runs = simulator.model_runs();
+    told.notes.extend(model_runs.and_then(|runs| runs.note()));
     let diagnosis = Diagnosis {
         schema: 1,
         verdict: verdict.kind,
@@ -198,7 +200,7 @@ fn run(
         notes: told.notes,
         rows_used,
         simulations,
-        model_runs: problem.simulator().model_runs(),
+        model_runs,
         runtime_s,
         candidates: beside_unknown(candidates, evidence.gap, unknown),
     };

@@ -92,6 +92,17 @@ pub struct ModelRuns {
     pub is_spent: bool,
 }
 
+impl ModelRuns {
+    /// That the search was cut short, where it was.
+    pub(crate) fn note(&self) -> Option<String> {
+        let budget = self.budget.filter(|_| self.is_spent)?;
+        Some(format!(
+            "the budget of {budget} model runs was spent before the search was over ({} were made): the answer stands on what was fitted until then; give more to look further",
+            self.count
+        ))
+    }
+}
+
 /// A simulator bound to the measurements that it is held against.
 ///
 /// Every stage is run alone on its measured input (teacher forcing), so that what one stage gets wrong does not

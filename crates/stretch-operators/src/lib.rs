@@ -28,6 +28,7 @@ mod skew;
 mod slew_limit;
 mod softening;
 mod unplay;
+mod wandering_line;
 mod warming;
 
 pub use bouc_wen::BoucWen;
@@ -54,4 +55,5 @@ pub use skew::{Skew, SkewSpec};
 pub use slew_limit::SlewLimit;
 pub use softening::Softening;
 pub use stretch_core::play;
+pub use wandering_line::WanderingLine;
 pub use warming::Warming;

@@ -6,9 +6,11 @@ use std::{
 };
 
 use stretch_gap::{
-    Column, Description, Dice, GapError, Model, ModelRuns, Motion, Recorded, RowsUsed, Run,
+    Column, Description, Dice, GapError, Line, Model, ModelRuns, Motion, Recorded, RowsUsed, Run,
     Simulator,
 };
+
+use stretch_operators::WanderingLine;
 
 use crate::{
     linear::Linear,
@@ -211,7 +213,23 @@ impl BlackBox {
         behind.sort_by_key(|(at, _)| *at);
         let trials = self.trials_of();
         for (at, values) in behind {
-            problem.wrappers[at].act(values, &trials, out);
+            match problem.wrappers[at].kind.is_found {
+                true => self.follow(run.stage, values, out),
+                false => problem.wrappers[at].act(values, &trials, out),
+            }
+        }
+    }
+
+    /// A hum on the samples that may be fitted, its phase found in what was measured of them.
+    fn follow(&self, stage: usize, values: &[f64], out: &mut [f64]) {
+        let line = WanderingLine { a: values[0], f_hz: values[1] };
+        if line.a == 0.0 {
+            return;
+        }
+        let (measured, noise) = (self.measured(stage), self.problem.noise[stage]);
+        let end = out.len();
+        for range in self.problem.columns.looked_at().into_iter().filter(|r| r.end <= end) {
+            line.follow(&measured[range.clone()], noise, self.dt_s(), &mut out[range]);
         }
     }
 }
@@ -294,6 +312,14 @@ impl Simulator for BlackBox {
         let kept = (ANSWER.0 + ANSWER.1 * self.problem.stages.len()).min(budget.unwrap_or(0) / 2);
         let is_spent = budget.is_some_and(|budget| count + kept >= budget);
         Some(ModelRuns { count, budget, is_spent })
+    }
+
+    fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
+        let found = model.effects.iter().filter(|(effect, _)| {
+            let wrapper = self.problem.wrapper(*effect);
+            wrapper.is_some_and(|w| w.is_found) && self.effects()[*effect].touches.contains(&stage)
+        });
+        found.map(|(_, values)| Line { hertz: values[1], amplitude: values[0] }).collect()
     }
 
     fn motion(&self) -> Motion<'_> {

@@ -26,6 +26,13 @@ impl Columns {
     pub(crate) fn read(trials: &[SessionTrial], names: Vec<String>) -> Result<Self, ProblemError> {
         let asked: Vec<&str> = names.iter().map(String::as_str).collect();
         let session = EvenSession::new(trials, &asked, SHORTEST)?;
+        if session.trials().is_empty() {
+            return Err(ProblemError::value(
+                "recordings",
+                format!("no trial has {SHORTEST} samples in a row"),
+                "record at least 10 s to fit and 5 s to test on, without gaps",
+            ));
+        }
         let all = |column: usize| -> Vec<f64> {
             session.trials().iter().flat_map(|t| t.columns()[column].iter().copied()).collect()
         };

@@ -3,7 +3,9 @@
 mod black_box;
 mod columns;
 mod error;
+mod families;
 mod file;
+mod init;
 mod linear;
 mod problem;
 mod runs;
@@ -15,10 +17,12 @@ mod wrap;
 
 pub use black_box::BlackBox;
 pub use error::ProblemError;
+pub use families::{Agreed, agreed};
 pub use file::{ProblemFile, SimulatorEntry, TrialFile, WorkersEntry};
+pub use init::first_problem;
 pub use problem::Problem;
 pub use source::{
     Ask, Closure, Session, SessionColumn, SessionPart, SessionStage, Source, SourceError, closure,
 };
 pub use spec::{Argument, Input, OwnEffect, Parameter, ProblemSpec, Stage, Tolerance};
-pub use wrap::{Beside, Extent, Side, Wrapper, wrapper_named, wrappers};
+pub use wrap::{Beside, Extent, Family, Side, Wrapper, wrapper_named, wrappers};

@@ -26,6 +26,8 @@ pub struct Problem {
     pub(crate) stages: Vec<Stage>,
     /// Noise of the inputs of each stage.
     pub(crate) input_noise: Vec<Vec<f64>>,
+    /// Noise of the output of each stage, one standard deviation.
+    pub(crate) noise: Vec<f64>,
     pub(crate) wrappers: Vec<Placed>,
     /// What each effect of the catalogue is.
     pub(crate) acting: Vec<Acting>,
@@ -93,6 +95,13 @@ impl Problem {
             stage.inputs.iter().map(noise).collect()
         });
         let input_noise = input_noise.collect();
+        let noise_of = |s: &Stage| {
+            let values = columns.of(&s.output).unwrap_or(&[]);
+            let looked = columns.looked_at();
+            let parts = looked.iter().map(|r| &values[r.clone()]);
+            s.noise.unwrap_or_else(|| Noise::of_differences(parts, columns.dt_s).sd())
+        };
+        let noise = stages.iter().map(noise_of).collect();
         let begun_s = columns.trials.first().map_or(0.0, |t| t.start_s);
         let starts = columns.trials.iter().map(|t| t.start_s - begun_s);
         let parts = columns.ranges().into_iter().zip(starts).collect();
@@ -110,6 +119,7 @@ impl Problem {
             columns,
             stages,
             input_noise,
+            noise,
             wrappers,
             acting,
             off,

@@ -27,6 +27,15 @@ pub enum Beside {
     Velocity,
 }
 
+/// What wrappers of one family agree on where data do not tell them apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Family {
+    /// They are late, by so many seconds.
+    Late,
+    /// They lag behind a turn by half of a loop, in the unit of the channel.
+    Loop,
+}
+
 /// A kind of wrapper: an operator, what it is called, and how its numbers are looked for.
 ///
 /// ```
@@ -55,6 +64,8 @@ pub struct Wrapper {
     pub operator: fn(&[f64], &Extent, &Grid) -> Box<dyn Operator>,
     /// Kinds that are hard to tell from it on the same channel.
     pub twins: &'static [&'static str],
+    /// What it shares with others of its family that data may not tell apart, and how much of it its numbers make.
+    pub family: Option<(Family, fn(&[f64]) -> f64)>,
     /// Whether its memory goes on from trial to trial.
     pub counts_session: bool,
     /// Whether its course is found in the record (the phase of a hum).
@@ -75,6 +86,7 @@ impl Wrapper {
         starts: None,
         operator: |_, _, _| Box::new(stretch_operators::Offset::default()),
         twins: &[],
+        family: None,
         counts_session: false,
         is_found: false,
         least_rate_hz: 0.0,

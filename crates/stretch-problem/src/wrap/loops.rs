@@ -3,6 +3,7 @@
 use stretch_operators::{Backlash, BoucWen, DeadZone, Loops, PrandtlIshlinskii};
 
 use super::kind::{
+    Family,
     Side::{Input, Output},
     Wrapper, form, shape, strength,
 };
@@ -36,6 +37,7 @@ pub(super) static BACKLASH: Wrapper = Wrapper {
     starts: Some(|e| [0.005, 0.03, 0.1].map(|k| vec![k * e.span(), 0.2]).into()),
     operator: |v, _, _| Box::new(Backlash::soft(v[0], v[1])),
     twins: &["hysteresis", "bouc_wen", "dead_zone"],
+    family: Some((Family::Loop, |v| v[0])),
     ..Wrapper::PLAIN
 };
 
@@ -53,6 +55,7 @@ pub(super) static HYSTERESIS: Wrapper = Wrapper {
     },
     operator: |v, _, _| Box::new(PrandtlIshlinskii::new(Loops { h: v[0], s: v[1], spread: v[2] })),
     twins: &["backlash", "bouc_wen"],
+    family: Some((Family::Loop, |v| v[0] * v[1] * (1.0 + v[2] + v[2] * v[2]) / 3.0)),
     ..Wrapper::PLAIN
 };
 
@@ -69,5 +72,6 @@ pub(super) static BOUC_WEN: Wrapper = Wrapper {
     },
     operator: |v, _, _| Box::new(BoucWen { c: v[0], s: v[1] }),
     twins: &["backlash", "hysteresis"],
+    family: Some((Family::Loop, |v| v[0])),
     ..Wrapper::PLAIN
 };

@@ -11,5 +11,6 @@ mod scales;
 mod times;
 
 pub use extent::Extent;
-pub use kind::{Beside, Side, Wrapper, wrapper_named, wrappers};
+pub(crate) use extent::ends;
+pub use kind::{Beside, Family, Side, Wrapper, wrapper_named, wrappers};
 pub(crate) use place::{Among, Placed, Site, Trials, placed};

@@ -5,6 +5,7 @@ use stretch_operators::{
 };
 
 use super::kind::{
+    Family,
     Side::{Input, Output},
     Wrapper, form, log_form, shape, strength, threshold,
 };
@@ -18,6 +19,7 @@ pub(super) static DELAY: Wrapper = Wrapper {
     starts: Some(|e| [0.05, 0.2, 0.6].map(|k| vec![k * e.late_s()]).into()),
     operator: |v, _, grid| Box::new(Skew::new(grid, SkewSpec { skew_s: v[0], rate: 0.0 })),
     twins: &["skew", "lag", "second_order_lag"],
+    family: Some((Family::Late, |v| v[0])),
     ..Wrapper::PLAIN
 };
 
@@ -33,6 +35,7 @@ pub(super) static SKEW: Wrapper = Wrapper {
     starts: Some(|e| [-0.2, -0.03, 0.03, 0.1, 0.5].map(|k| vec![k * e.late_s(), 0.0]).into()),
     operator: |v, _, grid| Box::new(Skew::new(grid, SkewSpec { skew_s: v[0], rate: v[1] })),
     twins: &["delay", "lag", "second_order_lag"],
+    family: Some((Family::Late, |v| v[0])),
     ..Wrapper::PLAIN
 };
 
@@ -49,6 +52,7 @@ pub(super) static LAG: Wrapper = Wrapper {
         Box::new(Lowpass::new(Poles { tau_s: v[0].max(1e-9), second: v[1] }, grid))
     },
     twins: &["delay", "skew", "second_order_lag", "relaxation"],
+    family: Some((Family::Late, |v| v[0])),
     ..Wrapper::PLAIN
 };
 
@@ -65,6 +69,7 @@ pub(super) static SECOND_ORDER_LAG: Wrapper = Wrapper {
         Box::new(Oscillator::new(Swing { m: v[0].max(1e-9), damping: v[1] }, grid))
     },
     twins: &["lag", "delay", "skew"],
+    family: Some((Family::Late, |v| 2.0 * v[1] * v[0])),
     ..Wrapper::PLAIN
 };
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_4, TAU};
 
-use stretch_operators::Hum;
+use stretch_operators::{Hum, WanderingLine};
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Line, Measured, Role},
@@ -39,48 +39,7 @@ pub(super) static MAINS_HUM: Effect = Effect {
     ..Effect::PLAIN
 };
 
-/// Window in which the phase is taken as steady, s.
-const WINDOW_S: f64 = 1.0;
-
-/// Adds to samples that may be fitted the hum whose phase in each second is the one that the measured record shows: as much of
-/// the residual at the line's frequency as the amplitude allows; noise shrinks what it cannot tell. Each sample is foretold by
-/// the others of its second. On samples to test on nothing is found: there the hum is a [`Line`].
 fn wandering(values: &[f64], record: &Measured<'_>, simulated: &mut [f64]) {
-    let (a, f) = (values[0] * record.unit, values[1]);
-    let window = ((WINDOW_S / record.dt_s) as usize).max(8);
-    for (block, values) in simulated.chunks_mut(window).enumerate() {
-        let first = block * window;
-        let measured = &record.samples[first..first + values.len()];
-        let wave = |i: usize| {
-            let turns = f * record.dt_s * (first + i) as f64;
-            let angle = TAU * (turns - turns.floor());
-            (libm::cos(angle), libm::sin(angle))
-        };
-        let (mut cc, mut cs, mut ss, mut rc, mut rs) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        for (i, (m, v)) in measured.iter().zip(values.iter()).enumerate() {
-            let (c, s) = wave(i);
-            let r = m - v;
-            cc += c * c;
-            cs += c * s;
-            ss += s * s;
-            rc += r * c;
-            rs += r * s;
-        }
-        // Both quadratures are normal with variance a^2/2 before the record is seen.
-        let ridge = record.noise * record.noise / (0.5 * a * a + 1e-18);
-        let (cc, ss) = (cc + ridge, ss + ridge);
-        let determinant = cc * ss - cs * cs;
-        let (mut p, mut q) = ((rc * ss - rs * cs) / determinant, (rs * cc - rc * cs) / determinant);
-        let size = (p * p + q * q).sqrt();
-        if size > 1.5 * a {
-            (p, q) = (p * 1.5 * a / size, q * 1.5 * a / size);
-        }
-        for (i, (m, v)) in measured.iter().zip(values.iter_mut()).enumerate() {
-            let (c, s) = wave(i);
-            let hum = p * c + q * s;
-            // As if the sample itself had not been used to find the phase: no noise is explained away.
-            let leverage = (ss * c * c - 2.0 * cs * c * s + cc * s * s) / determinant;
-            *v = m - (m - (*v + hum)) / (1.0 - leverage.min(0.5));
-        }
-    }
+    let line = WanderingLine { a: values[0] * record.unit, f_hz: values[1] };
+    line.follow(record.samples, record.noise, record.dt_s, simulated);
 }

@@ -1,0 +1,241 @@
+//! A first problem from a folder of recordings: what is found is written, what is guessed is said in comments.
+
+use std::{
+    fmt::Write,
+    path::{Path, PathBuf},
+};
+
+use stretch_data::{ReadOptions, Trial, unit};
+
+use crate::{error::ProblemError, wrap::ends};
+
+/// Names that a column of time has.
+const TIMES: [&str; 10] =
+    ["time_s", "time_ms", "time_us", "time_ns", "time", "t_s", "t", "timestamp", "Time", "stamp_s"];
+/// Parts of names of what is commanded.
+const COMMANDS: [&str; 10] =
+    ["cmd", "command", "ref", "target", "goal", "setpoint", "action", "input", "duty", "pwm"];
+/// Most columns that are told one by one.
+const TOLD: usize = 40;
+
+/// The text of a first `problem.toml` for a folder of recordings.
+///
+/// # Errors
+/// No recording in the folder that can be read.
+///
+/// ```
+/// let folder = std::env::temp_dir().join(format!("stretch-init-{}", std::process::id()));
+/// std::fs::create_dir_all(&folder)?;
+/// let rows: String = (0..200).map(|i| format!("{},{},{}\n", 0.01 * i as f64, i / 50, 0.5 * i as f64)).collect();
+/// for name in ["a.csv", "b.csv"] {
+///     std::fs::write(folder.join(name), format!("time_s,command_V,angle_deg\n{rows}"))?;
+/// }
+/// let text = stretch_problem::first_problem(&folder)?;
+/// let file = stretch_problem::ProblemFile::parse("problem.toml", &text)?;
+/// assert_eq!(file.spec.stages[0].inputs, ["command_V"]);
+/// assert_eq!(file.spec.stages[0].output, "angle_deg");
+/// assert_eq!(file.trials[1].split, stretch_data::Split::Test);
+/// # std::fs::remove_dir_all(&folder)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn first_problem(folder: impl AsRef<Path>) -> Result<String, ProblemError> {
+    let folder = folder.as_ref();
+    let shown = folder.display().to_string();
+    let (trials, time, left) = recordings(folder)?;
+    let Some((_, first)) = trials.first() else {
+        let found = match left.first() {
+            Some(why) => format!("no recording in it could be read; the first: {why}"),
+            None => "there is no recording in it".to_owned(),
+        };
+        let hint = "put CSV files with a header and a column of time there";
+        return Err(ProblemError::value(shown, found, hint));
+    };
+    let mut out = String::new();
+    // A String takes everything.
+    let _ = write(&mut out, folder, &trials, first, &time, &left);
+    Ok(out)
+}
+
+type Found = (Vec<(String, Trial)>, String, Vec<String>);
+
+/// Recordings that can be read, their column of time, and why others cannot.
+fn recordings(folder: &Path) -> Result<Found, ProblemError> {
+    let fail = |e: std::io::Error| {
+        ProblemError::value(
+            folder.display().to_string(),
+            e.to_string(),
+            "give a folder of recordings",
+        )
+    };
+    let entries = std::fs::read_dir(folder).map_err(fail)?;
+    let mut files: Vec<PathBuf> = entries.flatten().map(|e| e.path()).collect();
+    let is_table = |p: &PathBuf| {
+        let end = p.extension().and_then(|e| e.to_str()).unwrap_or("").to_lowercase();
+        p.is_file() && ["csv", "tsv", "txt"].contains(&end.as_str())
+    };
+    files.retain(is_table);
+    files.sort();
+    let (mut trials, mut left, mut time) = (Vec::new(), Vec::new(), None::<String>);
+    for path in files {
+        let names: Vec<String> =
+            time.clone().map_or_else(|| TIMES.map(str::to_owned).to_vec(), |t| vec![t]);
+        let mut why = None;
+        let read = names.into_iter().find_map(|name| {
+            match Trial::read(&path, &ReadOptions::new().time(&name)) {
+                Ok(trial) => Some((trial, name)),
+                Err(error) => {
+                    why.get_or_insert(error);
+                    None
+                }
+            }
+        });
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        match (read, why) {
+            (Some((trial, column)), _) if !trial.channels.is_empty() => {
+                time = Some(column);
+                trials.push((name, trial));
+            }
+            (_, Some(why)) => left.push(why.to_string()),
+            _ => left.push(format!("{name}: it has no column but its time")),
+        }
+    }
+    Ok((trials, time.unwrap_or_else(|| "time_s".into()), left))
+}
+
+/// What is known of a column.
+struct Known {
+    name: String,
+    range: [f64; 2],
+    is_command: bool,
+}
+
+fn known(trials: &[(String, Trial)], first: &Trial) -> Vec<Known> {
+    let in_all = |name: &str| trials.iter().all(|(_, t)| t.channel(name).is_some());
+    let names = first.channels.iter().map(|c| c.name.clone()).filter(|name| in_all(name));
+    names
+        .map(|name| {
+            let all = || trials.iter().filter_map(|(_, t)| t.channel(&name));
+            let held: usize = all().map(|v| v.windows(2).filter(|w| w[0] == w[1]).count()).sum();
+            let samples: usize = all().map(<[f64]>::len).sum();
+            let low = name.to_lowercase();
+            let is_called = COMMANDS.iter().any(|word| low.contains(word)) || low.starts_with("u_");
+            let is_held = 2 * held > samples;
+            Known { range: ends(all().flatten()), is_command: is_called || is_held, name }
+        })
+        .collect()
+}
+
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}
+
+fn write(
+    out: &mut String,
+    folder: &Path,
+    trials: &[(String, Trial)],
+    first: &Trial,
+    time: &str,
+    left: &[String],
+) -> std::fmt::Result {
+    let columns = known(trials, first);
+    let name = folder.canonicalize().ok();
+    let name = name.as_deref().and_then(Path::file_name).map(|n| n.to_string_lossy().into_owned());
+    writeln!(
+        out,
+        "# A first problem from what stands in this folder. What was guessed says so: correct it."
+    )?;
+    writeln!(out, "name = {}", quoted(name.as_deref().unwrap_or("problem")))?;
+    if time != "time_s" {
+        writeln!(out, "time = {}", quoted(time))?;
+    }
+    for why in left {
+        writeln!(out, "# left out: {}", why.replace('\n', " "))?;
+    }
+    writeln!(
+        out,
+        "\n# Wrappers that are looked for around every stage: all, or a list as [\"input.delay\", \"output.backlash\"]."
+    )?;
+    writeln!(out, "wrap = \"all\"")?;
+    writeln!(
+        out,
+        "\n# What simulates: a worker (docs/worker.md), or python = \"module:object\", or builtin = \"rig\" or \"gauge\"."
+    )?;
+    writeln!(out, "[simulator]\ncommand = [\"python3\", \"sim.py\"]  # guessed: write it")?;
+    writeln!(out, "\n# Columns, with the least and the greatest value:")?;
+    for c in columns.iter().take(TOLD) {
+        let kind = if c.is_command { ", held or called like a command" } else { "" };
+        let unit = unit(&c.name).unwrap_or("unit not in its name");
+        writeln!(out, "#   {} ({unit}): {} to {}{kind}", c.name, c.range[0], c.range[1])?;
+    }
+    stage(out, &columns)?;
+    writeln!(
+        out,
+        "\n# Parameters of the simulator, each with one standard deviation of what it may be off."
+    )?;
+    writeln!(
+        out,
+        "# [[parameter]]\n# name = \"gain\"\n# unit = \"1\"\n# value = 1.0\n# tolerance = \"10 %\"  # or a number in its unit"
+    )?;
+    writeln!(
+        out,
+        "\n# Effects that the simulator has itself, with the value at which they do nothing."
+    )?;
+    writeln!(
+        out,
+        "# [[effect]]\n# name = \"dof_frictionloss\"\n# unit = \"Nm\"\n# range = [0, 2]\n# off = 0"
+    )?;
+    trials_of(out, trials)
+}
+
+fn stage(out: &mut String, columns: &[Known]) -> std::fmt::Result {
+    let moves = |c: &&Known| c.range[1] > c.range[0];
+    let output = columns.iter().filter(moves).rfind(|c| !c.is_command);
+    let output = output.or(columns.last());
+    let own = output.map_or("", |c| c.name.as_str());
+    let inputs: Vec<String> = columns
+        .iter()
+        .filter(moves)
+        .filter(|c| c.is_command && c.name != own)
+        .map(|c| quoted(&c.name))
+        .collect();
+    writeln!(
+        out,
+        "\n# Guessed: the last column that is no command is what is simulated, commands drive it."
+    )?;
+    writeln!(out, "[[stage]]\nname = \"plant\"\noutput = {}", quoted(own))?;
+    if unit(own).is_none() {
+        writeln!(out, "unit = \"\"  # its name tells none")?;
+    }
+    writeln!(out, "inputs = [{}]", inputs.join(", "))?;
+    writeln!(
+        out,
+        "# noise = 0.01     # one standard deviation, where it is known; else the record tells"
+    )?;
+    writeln!(
+        out,
+        "# velocity = \"COLUMN\"  # or position = \"COLUMN\": at which a force or torque rubs"
+    )
+}
+
+fn trials_of(out: &mut String, trials: &[(String, Trial)]) -> std::fmt::Result {
+    let tested = match trials.len() {
+        1 => 0,
+        n => n.div_ceil(4),
+    };
+    match tested {
+        0 => writeln!(out, "\n# One trial: its last quarter is held back and tested on.")?,
+        _ => writeln!(
+            out,
+            "\n# Guessed: the last {tested} of {} trials are tested on, read once at the end.",
+            trials.len()
+        )?,
+    }
+    for (i, (name, trial)) in trials.iter().enumerate() {
+        let split = if i + tested >= trials.len() && tested > 0 { "test" } else { "fit" };
+        let rate =
+            trial.rate_hz().map_or(String::new(), |hz| format!(", {hz:.4} samples a second"));
+        writeln!(out, "\n[[trial]]\nfile = {}  # {:.2} s{rate}", quoted(name), trial.duration_s())?;
+        writeln!(out, "split = {split:?}")?;
+    }
+    Ok(())
+}

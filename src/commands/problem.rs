@@ -1,0 +1,152 @@
+//! `stretch diagnose problem.toml`: any simulator beside any recording.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use anyhow::{Context, ensure};
+use indicatif::ProgressBar;
+use serde_json::json;
+use stretch_gap::{Diagnosis, Evidence, Options, diagnose};
+use stretch_problem::{BlackBox, Problem, ProblemFile, SimulatorEntry, agreed, worker::Workers};
+use stretch_report::{Subject, diagnosis_page};
+
+use super::{
+    diagnosis_text::text,
+    shared::{say, write_text},
+};
+
+/// What is asked of a problem's diagnosis.
+pub(super) struct Asked<'a> {
+    pub(super) options: &'a Options,
+    pub(super) json: Option<&'a Path>,
+    pub(super) report: Option<&'a Path>,
+    /// Workers at once.
+    pub(super) jobs: usize,
+    /// Most runs of the simulator.
+    pub(super) budget: Option<usize>,
+}
+
+/// A data set that the program has a simulator for, as a problem's file names it.
+pub(super) struct Builtin {
+    pub(super) data_set: PathBuf,
+    pub(super) rig: Option<PathBuf>,
+    pub(super) columns: Option<(String, String)>,
+}
+
+/// Reads a problem's file; none where the path is none.
+pub(super) fn read(path: &Path) -> anyhow::Result<Option<ProblemFile>> {
+    let inside = path.join("problem.toml");
+    let file = match path {
+        path if path.is_dir() && inside.is_file() && !path.join("dataset.toml").exists() => inside,
+        path if path.extension().is_some_and(|end| end == "toml") => path.to_owned(),
+        _ => return Ok(None),
+    };
+    Ok(Some(ProblemFile::read(file)?))
+}
+
+/// What a file names of the built-in simulators.
+pub(super) fn builtin(file: &ProblemFile) -> Option<Builtin> {
+    let (data_set, rig, columns) = match &file.simulator {
+        SimulatorEntry::Rig { data_set, rig } => (data_set, rig, None),
+        SimulatorEntry::Gauge { data_set, rig, columns } => (data_set, rig, columns.clone()),
+        _ => return None,
+    };
+    let rig = rig.as_ref().map(|rig| file.folder.join(rig));
+    Some(Builtin { data_set: file.folder.join(data_set), rig, columns })
+}
+
+/// Diagnoses a user's own simulator.
+pub(super) fn run(file: &ProblemFile, asked: &Asked<'_>, bar: &ProgressBar) -> anyhow::Result<()> {
+    let workers = file.workers(asked.jobs)?.context("the simulator is built in")?;
+    let problem = Problem::new(file.load()?)?;
+    bar.set_message("starting the simulator");
+    let source = Workers::start(workers, problem.session())?;
+    let budget = asked.budget.or(file.budget);
+    let bench = BlackBox::within(problem, Arc::new(source), budget);
+    let progress =
+        |what: &str| bar.set_message(format!("{what} ({} model runs)", bench.model_runs()));
+    let (mut diagnosis, evidence) =
+        diagnose(&bench, asked.options, &progress, &stretch_data::interrupted)?;
+    let before = bench.problem().notes().to_vec();
+    diagnosis.notes.splice(0..0, before);
+    let families = agreed(bench.problem(), &diagnosis);
+    diagnosis.notes.extend(families.iter().map(stretch_problem::Agreed::sentence));
+    diagnosis.notes.extend(bench.notes());
+    bar.finish_and_clear();
+    conclude(file, asked, &bench, &diagnosis, &evidence)
+}
+
+fn conclude(
+    file: &ProblemFile,
+    asked: &Asked<'_>,
+    bench: &BlackBox,
+    diagnosis: &Diagnosis,
+    evidence: &Evidence,
+) -> anyhow::Result<()> {
+    let mut said = Vec::new();
+    if let Some(path) = asked.json {
+        write_text(path, &to_json(file, asked, bench, diagnosis)?)?;
+        said.push(format!("wrote {}", path.display()));
+    }
+    if let Some(path) = asked.report {
+        let name = &file.name;
+        let subject = Subject { name, diagnosis, evidence, implementations: &[], simulator: bench };
+        write_text(path, &diagnosis_page(&subject))?;
+        said.push(format!("wrote {}", path.display()));
+    }
+    say(&diagnosis.sentence)?;
+    for (name, words, equation) in implement(bench, diagnosis) {
+        say(format!("  {name}: {words}; {equation}"))?;
+    }
+    say(text(diagnosis, &[]))?;
+    said.iter().try_for_each(say)
+}
+
+/// The named wrappers: name, words, equation.
+fn implement<'a>(
+    bench: &'a BlackBox,
+    diagnosis: &'a Diagnosis,
+) -> impl Iterator<Item = (&'a str, &'static str, &'static str)> {
+    let effects = &bench.problem().description().effects;
+    diagnosis.named.iter().filter_map(move |name| {
+        let at = effects.iter().position(|e| e.name == *name)?;
+        let wrapper = bench.problem().wrapper(at)?;
+        Some((name.as_str(), wrapper.words, wrapper.equation))
+    })
+}
+
+fn to_json(
+    file: &ProblemFile,
+    asked: &Asked<'_>,
+    bench: &BlackBox,
+    diagnosis: &Diagnosis,
+) -> anyhow::Result<String> {
+    let mut value = serde_json::to_value(diagnosis)?;
+    let numbers = |name: &str| {
+        let first = diagnosis.candidates.first();
+        first.map_or(Vec::new(), |c| c.parameters.iter().filter(|p| p.effect == name).collect())
+    };
+    value["implement"] = implement(bench, diagnosis)
+        .map(|(name, words, equation)| {
+            json!({ "effect": name, "words": words, "equation": equation, "numbers": numbers(name) })
+        })
+        .collect();
+    value["fixed_rig"] = serde_json::Value::Null;
+    value["data_set"] = file.name.as_str().into();
+    value["seed"] = asked.options.seed.into();
+    value["version"] = env!("CARGO_PKG_VERSION").into();
+    Ok(serde_json::to_string_pretty(&value)? + "\n")
+}
+
+/// What a black box has no answer to is refused before anything is run.
+pub(super) fn refuse(given: &[(&str, bool)]) -> anyhow::Result<()> {
+    for (option, is_given) in given {
+        ensure!(
+            !is_given,
+            "{option} is for the built-in simulators; the problem's file says what it says of its own"
+        );
+    }
+    Ok(())
+}

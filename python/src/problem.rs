@@ -15,8 +15,8 @@ use pyo3::{prelude::*, types::PyDict};
 use stretch_data::{SessionTrial, Split};
 use stretch_gap::{Diagnosis, Evidence, Options, Simulator};
 use stretch_problem::{
-    Argument, BlackBox, Input, OwnEffect, Parameter, Problem as Checked, ProblemFile, ProblemSpec,
-    Source, Stage, Tolerance,
+    Agreed, Argument, BlackBox, Input, OwnEffect, Parameter, Problem as Checked, ProblemFile,
+    ProblemSpec, Source, Stage, Tolerance, agreed,
     worker::{Workers, WorkersSpec},
     wrapper_named,
 };
@@ -397,6 +397,8 @@ fn answer(
     evidence: &Evidence,
 ) -> Result<Answer, String> {
     diagnosis.notes.splice(0..0, bench.problem().notes().iter().cloned());
+    let families = agreed(bench.problem(), &diagnosis);
+    diagnosis.notes.extend(families.iter().map(Agreed::sentence));
     diagnosis.notes.extend(bench.notes());
     let curve = |(stage, e): (usize, &stretch_gap::StageEvidence)| {
         let measured = bench.measured(stage).to_vec();
@@ -407,8 +409,21 @@ fn answer(
     let subject =
         Subject { name, diagnosis: &diagnosis, evidence, implementations: &[], simulator: bench };
     let page = diagnosis_page(&subject);
-    let json = serde_json::to_string(&diagnosis).map_err(|e| e.to_string())?;
+    let mut told = serde_json::to_value(&diagnosis).map_err(|e| e.to_string())?;
+    told["families"] = families.iter().map(family).collect();
+    told["data_set"] = name.into();
+    let json = told.to_string();
     Ok(Answer { json, page, curves })
+}
+
+/// What some effects that cannot be told apart agree on.
+fn family(agreed: &Agreed) -> serde_json::Value {
+    serde_json::json!({
+        "names": agreed.names,
+        "range": agreed.range,
+        "unit": agreed.unit,
+        "sentence": agreed.sentence(),
+    })
 }
 
 /// What a wrapper is, in words, and its equation; None for another name.

@@ -97,6 +97,11 @@ class Diagnosis:
         return list(self._told["ambiguous"])
 
     @property
+    def families(self) -> list[dict[str, Any]]:
+        """Effects that these data cannot tell apart, with what they agree on: "late by 0.10 .. 0.14 s"."""
+        return list(self._told.get("families", []))
+
+    @property
     def proposed(self) -> dict[str, Any] | None:
         """The equation that is proposed where no effect of the list explains the gap."""
         proposed = self._told.get("proposed")
@@ -263,7 +268,6 @@ def diagnose(
     text, page, curves = checked.diagnose(asked, how, progress)
     told = json.loads(text)
     told["notes"] = notes + told["notes"]
-    told["data_set"] = name
     return Diagnosis(told, page, curves)
 
 

@@ -307,6 +307,13 @@ impl Simulator for BlackBox {
         Ok(())
     }
 
+    fn is_costly(&self, effect: usize) -> bool {
+        match self.problem.acting[effect] {
+            Acting::Own(_) => true,
+            Acting::Wrapper(at) => self.problem.wrappers[at].site.side == Side::Input,
+        }
+    }
+
     fn model_runs(&self) -> Option<ModelRuns> {
         let (count, budget) = (self.runs.count(), self.runs.budget());
         let kept = (ANSWER.0 + ANSWER.1 * self.problem.stages.len()).min(budget.unwrap_or(0) / 2);

@@ -46,7 +46,7 @@ MODEL = """
 DT_S = 0.002
 EVERY = 5
 """Steps of integration between two samples: the joints are recorded at 100 Hz."""
-SECONDS = 16.0
+SECONDS = 20.0
 NOISE_RAD = 2e-4
 SIZE = (1.0, 0.3)
 """The elbow's motor is smaller than the shoulder's: torques, inertias and frictions by this factor."""
@@ -299,7 +299,7 @@ def least_rmse(measured):
         scale = high - low
         done = least_squares(
             lambda u, names=names, scale=scale: residual(measured, u * scale, names, simulator),
-            x / scale, bounds=(low / scale, high / scale), diff_step=1e-3, max_nfev=8,
+            x / scale, bounds=(low / scale, high / scale), diff_step=1e-3, max_nfev=5,
         )  # fmt: skip
         left[name or "nothing"] = float(np.sqrt(np.mean(done.fun**2)))
     return min(left, key=left.get), left, simulator.runs
@@ -324,7 +324,7 @@ def sysid(measured):
             return [np.stack(rows, axis=1)], None, None
         return [residual(measured, u * scale, names, simulator)], None, None
 
-    fitted, result = mujoco.sysid.optimize(params, left, optimizer="mujoco", verbose=False, max_iters=25)
+    fitted, result = mujoco.sysid.optimize(params, left, optimizer="mujoco", verbose=False, max_iters=8)
     end = residual(measured, fitted.as_vector() * scale, names, simulator)
     _, intervals = mujoco.sysid.calculate_intervals([end], np.asarray(result.jac))
     best = fitted.as_vector() * scale

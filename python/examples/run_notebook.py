@@ -5,6 +5,7 @@ python run_notebook.py quickstart.ipynb
 
 import ast
 import json
+import os
 import sys
 
 
@@ -13,6 +14,7 @@ def run(path):
     with open(path, encoding="utf-8") as file:
         cells = [c for c in json.load(file)["cells"] if c["cell_type"] == "code"]
     names = {"__name__": "__main__"}
+    sys.path.insert(0, os.path.dirname(os.path.abspath(path)))
     for number, cell in enumerate(cells, 1):
         tree = ast.parse("".join(cell["source"]), called(path, number))
         last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None

@@ -274,7 +274,7 @@ def test_progress_is_told_and_may_stop_it():
 PROBLEM = """
 name = "spring"
 simulator = {simulator}
-wrap = ["output.backlash", "output.delay"]
+wrap = ["input.delay", "output.backlash"]
 
 [[stage]]
 name = "spring"
@@ -297,15 +297,16 @@ file = "trial.csv"
 """
 
 WORKER = """
-import numpy as np
-
-
 class Spring:
     def begin(self, session):
-        self.force = session["columns"]["force_N"]
+        assert session["stages"][0]["output"] == "length_mm"
+        self.samples = [t["samples"] for t in session["trials"]]
 
-    def simulate(self, params, effects):
-        return params[:, :1] * self.force + effects[:, :1] * self.force**2
+    def simulate(self, params, effects, inputs, trials):
+        assert [t.samples.stop - t.samples.start for t in trials] == self.samples[: len(trials)]
+        force = inputs["force_N"]
+        assert force.shape == (len(params), trials[-1].samples.stop)
+        return params["compliance"][:, None] * force + effects["bend"][:, None] * force**2
 """
 
 
@@ -326,6 +327,11 @@ def test_a_problem_that_is_a_file_takes_an_object_or_its_own_simulator(problem_f
     assert found.parameters["compliance"] == pytest.approx(2.1, rel=0.01)
     own = stretch.diagnose(None, str(problem_file))
     assert own.named == ["bend"]
+    names = {}
+    exec(WORKER, names)
+    here = stretch.diagnose(names["Spring"](), problem_file)
+    # the same object in another process: the same bits
+    assert here.probabilities == own.probabilities and here.parameters == own.parameters
     with pytest.raises(stretch.StretchError, match="says what is diagnosed"):
         stretch.diagnose(Spring(), problem_file, output="length_mm")
     with pytest.raises(stretch.StretchError, match="there is no simulator"):

@@ -208,8 +208,9 @@ def diagnose(
     `effects["delay_s"]`. Or it is a function of one model, `f(params, effects) -> [samples]`, with dicts of floats. With
     several outputs it returns a dict of arrays by output. Two more arguments it may take by name: `inputs`, a dict of
     columns that it is to be driven by (without it nothing is looked for on the input's side), and `trials`, the slices of
-    the recordings, which stand end to end. What it raises comes out as it is; `stretch.Refused` says that values cannot be
-    simulated.
+    the recordings, which stand end to end; with `stage` by name it answers for one stage at a time. A method
+    `begin(session)` is told once what stays the same. The same object can stand in a problem.toml. What it raises comes out
+    as it is; `stretch.Refused` says that values cannot be simulated.
 
     `data`: a dict of arrays by column, a frame, a `Trial`, or a list of these; with `rate_hz` or a column `time_s`.
     Or the path of a problem.toml, which says all of the following; without a simulator (None) the file's own is run.
@@ -263,7 +264,7 @@ def diagnose(
         "baselines": False,
         "budget": budget,
         "batch": 1 if asked is None else asked.batch,
-        "answers_all": len(checked.stages) > 1,
+        "answers_all": asked is not None and asked.answers_all,
     }
     text, page, curves = checked.diagnose(asked, how, progress)
     told = json.loads(text)

@@ -66,6 +66,7 @@ class Asked:
                 "simulate(params[n, p], effects) -> [n, samples], or a function of one model, "
                 "f(params, effects) -> [samples]"
             )
+        self.simulator = simulator
         self.call: Callable[..., Any] = method if self.many else simulator  # type: ignore[assignment]
         self.batch = max(1, int(getattr(simulator, "batch", BATCH))) if self.many else 1
         self.optional = self._optional()
@@ -77,7 +78,7 @@ class Asked:
             names = inspect.signature(self.call).parameters
         except (TypeError, ValueError):  # a builtin
             return set()
-        return {name for name in ("inputs", "trials") if name in names}
+        return {name for name in ("inputs", "trials", "stage") if name in names}
 
     @property
     def takes_inputs(self) -> bool:
@@ -93,6 +94,26 @@ class Asked:
         self.parameters = problem.parameters
         self.effects = problem.effects
         self.spans = [TrialSpan(name, slice(begin, end), start_s) for name, begin, end, start_s in problem.trials]
+        begin = getattr(self.simulator, "begin", None)
+        if callable(begin):
+            begin(self._session())
+
+    def _session(self) -> dict[str, Any]:
+        """Everything that stays the same from one model to the next."""
+        spans = [(span.name, span.samples.stop - span.samples.start, span.start_s) for span in self.spans]
+        return {
+            "dt_s": self.problem.dt_s,
+            "trials": [{"name": name, "samples": samples, "start_s": start_s} for name, samples, start_s in spans],
+            "stages": [{"name": name, "output": output, "inputs": inputs} for name, output, inputs in self.stages],
+            "parameters": self.parameters,
+            "effects": self.effects,
+            "columns": self.columns,
+        }
+
+    @property
+    def answers_all(self) -> bool:
+        """Whether it answers with all outputs at once, and is not told which stage is asked for."""
+        return len(self.outputs) > 1 and "stage" not in self.optional
 
     def samples(self, trials: int) -> int:
         """Samples of the first trials."""
@@ -112,11 +133,14 @@ class Asked:
         more: dict[str, Any] = {}
         if "trials" in self.optional:
             more["trials"] = self.spans[:trials]
+        if "stage" in self.optional:
+            more["stage"] = stage
+        outputs = self.outputs if self.answers_all else [self.outputs[stage]]
         if self.many:
             if inputs is not None:
                 more["inputs"] = inputs
             told = self.call(Named.of(params, self.parameters), Named.of(effects, self.effects), **more)
-            return self._table(told, models, samples)
+            return self._table(told, models, samples, outputs)
         rows = []
         for model in range(models):
             one = dict(zip(self.parameters, params[model].tolist()))
@@ -124,7 +148,7 @@ class Asked:
             if inputs is not None:
                 more["inputs"] = {name: columns[model] for name, columns in inputs.items()}
             told = self.call(one, values, **more)
-            rows.append(self._table(_first_axis(told), 1, samples))
+            rows.append(self._table(_first_axis(told), 1, samples, outputs))
         return np.concatenate(rows)
 
     def _inputs(
@@ -138,19 +162,19 @@ class Asked:
             given[name] = np.stack(rows)
         return given
 
-    def _table(self, told: Any, models: int, samples: int) -> Array:
+    def _table(self, told: Any, models: int, samples: int, outputs: Sequence[str]) -> Array:
         """What came back, checked; several outputs side by side."""
-        if len(self.outputs) == 1 and not isinstance(told, dict):
-            return self._rows(told, models, samples, self.outputs[0])
+        if len(outputs) == 1 and not isinstance(told, dict):
+            return self._rows(told, models, samples, outputs[0])
         if not isinstance(told, dict):
             raise StretchError(
-                f"the simulator returned a {type(told).__name__}; with {len(self.outputs)} outputs it must return a dict of "
-                f"arrays by output: {', '.join(self.outputs)}"
+                f"the simulator returned a {type(told).__name__}; with {len(outputs)} outputs it must return a dict of "
+                f"arrays by output: {', '.join(outputs)}"
             )
-        missing = [output for output in self.outputs if output not in told]
+        missing = [output for output in outputs if output not in told]
         if missing:
             raise StretchError(f"the simulator returned no {missing[0]}; it returned {', '.join(map(str, told))}")
-        return np.concatenate([self._rows(told[o], models, samples, o) for o in self.outputs], axis=1)
+        return np.concatenate([self._rows(told[o], models, samples, o) for o in outputs], axis=1)
 
     def _rows(self, told: Any, models: int, samples: int, output: str) -> Array:
         try:

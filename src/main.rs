@@ -5,10 +5,6 @@
 
 mod commands;
 mod display;
-mod goal;
-mod paper_tables;
-mod plain;
-mod report;
 mod table;
 
 use std::{io::ErrorKind, process::ExitCode};

@@ -2,6 +2,8 @@
 
 use comfy_table::{CellAlignment, Table, presets};
 
+pub(crate) use stretch_report::number;
+
 /// A table with a header line; the first column reads from the left, the
 /// others are numbers and stand at the right.
 pub(crate) fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
@@ -15,19 +17,6 @@ pub(crate) fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>
         column.set_cell_alignment(CellAlignment::Right);
     }
     table.to_string()
-}
-
-/// A number with four significant digits, as people read it.
-pub(crate) fn number(x: f64) -> String {
-    if !x.is_finite() {
-        return "-".to_owned();
-    }
-    let digits = if x == 0.0 { 0 } else { x.abs().log10().floor() as i32 };
-    if (-4..7).contains(&digits) {
-        format!("{x:.*}", (3 - digits).clamp(0, 6) as usize)
-    } else {
-        format!("{x:.3e}")
-    }
 }
 
 /// A number that may be missing.

@@ -8,16 +8,13 @@ use std::{
 use stretch_bench::RigSimulator;
 use stretch_blind::{COUNTED_EXCESS, CaseKind, Label, Rate, Score};
 use stretch_gap::{Options, diagnose};
+use stretch_report::{BlindSubject, Goal, blind_page, goals};
 
 use super::{
     blind_answers::{Answers, answers},
     shared::{say, steps, write_text},
 };
-use crate::{
-    goal::{Goal, goals},
-    report::{BlindSubject, blind_page},
-    table::table,
-};
+use crate::table::table;
 
 pub(super) fn score(folder: &Path, with_oracle: bool) -> anyhow::Result<()> {
     let mut answers = answers(folder)?;

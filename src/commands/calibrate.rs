@@ -13,16 +13,14 @@ use stretch_calibrate::{
 use stretch_core::{Normalisation, RateEstimator, RateSource};
 use stretch_data::{ReadOptions, Split, Trial, write_whole};
 use stretch_receptor::code::Adc;
+use stretch_report::{Context, Judged, calibration_page};
 
 use super::causes::Causes;
 use super::{
     reading::{Recorded, read_trials},
     shared::{give_stdout, say, say_json, write_text},
 };
-use crate::{
-    report::{self, Context, Judged},
-    table::{maybe, number, table},
-};
+use crate::table::{maybe, number, table};
 
 /// Fit a calibration to logged trials
 ///
@@ -354,7 +352,7 @@ fn write_report(
         kinds: Vec::new(),
     };
     let judged = Judged { calibrated: &shown, evaluation: &evaluation, context: &context };
-    write_text(path, &report::calibration_page(&judged))
+    write_text(path, &calibration_page(&judged))
 }
 
 /// What `auto` rests on.

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use stretch_calibrate::{apply, write_calibration};
 use stretch_data::{Trial, TrialKind};
+use stretch_report::{Context, Judged, Subject, demo_page, listed, readme_picture};
 use stretch_sim::{RunSettings, TrialPlan, paper_preset};
 
 use super::{
@@ -18,7 +19,6 @@ use super::{
     shared::{say, say_json, write_text},
     simulate,
 };
-use crate::report::{self, Context, Judged, Subject};
 use job::Job;
 use sessions::{Sessions, Wanted};
 
@@ -127,7 +127,7 @@ fn simulated(folder: &Path, seed: u64) -> anyhow::Result<Sessions> {
     sessions.notes = vec![format!(
         "Simulated: the paper's session, seed {seed}, on a rig with {}. The simulator at hand has none of them, \
          and the diagnosis is not told.",
-        crate::plain::listed(&effects)
+        listed(&effects)
     )];
     Ok(sessions)
 }
@@ -175,8 +175,8 @@ fn write(out: &Path, title: String, sessions: &Sessions, job: &Job) -> anyhow::R
         implementations: &examined.implementations,
         simulator: job.bench.simulator(),
     };
-    write_text(&file("report.html"), &report::demo_page(&judged, &subject))?;
-    write_text(&file("estimate.svg"), &report::readme_picture(&shown, evaluation))
+    write_text(&file("report.html"), &demo_page(&judged, &subject))?;
+    write_text(&file("estimate.svg"), &readme_picture(&shown, evaluation))
 }
 
 fn trials(count: usize) -> String {

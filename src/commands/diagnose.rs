@@ -9,6 +9,7 @@ use stretch_data::{DataError, Trial};
 use stretch_gap::{
     Diagnosis, Evidence, GapError, Laboratory, Options, Simulator, diagnose, next_experiment,
 };
+use stretch_report::{Subject, diagnosis_page};
 use stretch_sim::Catalogue;
 
 use super::{
@@ -18,7 +19,6 @@ use super::{
     rails::rails,
     shared::{give_stdout, say, short_name, write_text},
 };
-use crate::report::{Subject, diagnosis_page};
 
 /// Say where a simulator and a measurement part, which effect causes it, and how far the gap closes
 ///

@@ -7,10 +7,10 @@ use serde_json::json;
 use stretch_bench::{Fix, Implementation, NoFix};
 use stretch_data::{DataSet, write_folder, write_whole};
 use stretch_gap::Diagnosis;
+use stretch_report::listed;
 use stretch_sim::{Language, Quantity};
 
 use super::shared::write_text;
-use crate::plain::listed;
 
 /// Refuses to write where something is read from.
 pub(super) fn not_read(fix: &Path, data_set: &Path, rig: Option<&Path>) -> anyhow::Result<()> {

@@ -5,11 +5,9 @@ use std::fmt::Write;
 use stretch_bench::Implementation;
 use stretch_blind::method_in_words;
 use stretch_gap::{Candidate, Diagnosis, Knowledge, SliceGap, VerdictKind};
+use stretch_report::{effect_in_words, listed, methods, transfer_in_words};
 
-use crate::{
-    plain::{effect_in_words, listed, methods, transfer_in_words},
-    table::{number, table},
-};
+use crate::table::{number, table};
 
 /// Most slices that are listed.
 const SLICES: usize = 8;

@@ -3,14 +3,11 @@
 use std::path::Path;
 
 use stretch_paper::{Experiment, PUBLISHED, Pipeline};
+use stretch_report::{error_rows, fit_rows, paper_page, verdicts};
 use stretch_sim::paper_preset;
 
 use super::shared::{progress, say, write_text};
-use crate::{
-    paper_tables::{error_rows, fit_rows, verdicts},
-    report,
-    table::{number, p_value, table},
-};
+use crate::table::{number, p_value, table};
 
 pub(super) fn run(out: &Path, seed: u64, json: bool) -> anyhow::Result<()> {
     let bar = progress("simulating, fitting, judging", 1);
@@ -18,7 +15,7 @@ pub(super) fn run(out: &Path, seed: u64, json: bool) -> anyhow::Result<()> {
     bar.finish_and_clear();
     std::fs::create_dir_all(out)
         .map_err(|e| anyhow::anyhow!("{}: cannot make the folder: {e}", out.display()))?;
-    write_text(&out.join("paper.html"), &report::paper_page(&experiment))?;
+    write_text(&out.join("paper.html"), &paper_page(&experiment))?;
     let text = serde_json::to_string_pretty(&experiment.to_serialise())?;
     write_text(&out.join("paper.json"), &text)?;
     if json {

@@ -10,12 +10,12 @@ use indicatif::ProgressBar;
 use serde_json::json;
 use stretch_gap::{Diagnosis, Evidence, Options, diagnose};
 use stretch_problem::{BlackBox, Problem, ProblemFile, SimulatorEntry, agreed, worker::Workers};
+use stretch_report::{Subject, diagnosis_page};
 
 use super::{
     diagnosis_text::text,
     shared::{say, write_text},
 };
-use crate::report::{Subject, diagnosis_page};
 
 /// What is asked of a problem's diagnosis.
 pub(super) struct Asked<'a> {

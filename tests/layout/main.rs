@@ -8,7 +8,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use imports::{Imports, Module, circles, imports, module, shown};
+use imports::{Imports, Module, circles, imports, module};
 
 /// The text of every file below a folder.
 fn sources(folder: &Path) -> BTreeMap<Module, String> {
@@ -31,14 +31,6 @@ fn root() -> PathBuf {
     env!("CARGO_MANIFEST_DIR").into()
 }
 
-/// Files of a report that import from a command.
-fn reports_that_know_commands(imports: &Imports) -> Vec<String> {
-    let is_in = |module: &Module, folder: &str| module.first().is_some_and(|m| m == folder);
-    let reports = imports.iter().filter(|(module, _)| is_in(module, "report"));
-    let knows = reports.filter(|(_, of)| of.iter().any(|m| is_in(m, "commands")));
-    knows.map(|(module, _)| shown(module)).collect()
-}
-
 #[test]
 fn files_of_a_crate_import_in_no_circle() {
     let crates = fs::read_dir(root().join("crates")).unwrap().map(|entry| entry.unwrap().path());
@@ -48,12 +40,6 @@ fn files_of_a_crate_import_in_no_circle() {
         assert!(!found.is_empty(), "{}: no file", folder.display());
         wrong.extend(circles(&found).iter().map(|line| format!("{}: {line}", folder.display())));
     }
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-}
-
-#[test]
-fn reports_know_no_command() {
-    let wrong = reports_that_know_commands(&imports(&sources(&root().join("src"))));
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
@@ -93,17 +79,4 @@ fn handing_on_and_testing_make_no_circle() {
     ]);
     assert_eq!(circles(&found), [""; 0]);
     assert_eq!(found[&module("b.rs")], [module("a/c.rs")].into());
-}
-
-#[test]
-fn a_planted_import_from_a_command_is_found() {
-    let found = made_up(&[
-        ("main.rs", "mod commands; mod report;"),
-        ("commands/mod.rs", "mod run; pub use run::Args;"),
-        ("commands/run.rs", "use crate::report::page; pub struct Args;"),
-        ("report/mod.rs", "mod page; mod tidy; pub use page::page;"),
-        ("report/page.rs", "use crate::commands::Args; pub fn page(_: Args) {}"),
-        ("report/tidy.rs", "use super::page;"),
-    ]);
-    assert_eq!(reports_that_know_commands(&found), ["report::page"]);
 }

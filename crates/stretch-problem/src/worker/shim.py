@@ -1,8 +1,9 @@
 """An object of a Python module as a worker: `python3 shim.py module:object`.
 
 A function is called with two dicts, parameters and effects by name, for one model at a time. An object has
-`simulate(parameters[n, p], effects[n, e])` and answers n rows. Both may take `inputs` (a dict of columns where a wrapper alters
-them, or None), `stage` and `trials` by keyword, and may have `begin(session)`.
+`simulate(parameters[n, p], effects[n, e])`, whose columns go by name as well (`effects["delay_s"]`), and answers n rows. Both may
+take by keyword `inputs` (every column by name, `[samples]` or `[n, samples]`, those that drive the stage as a wrapper alters
+them), `trials` (name, slice of samples and start_s of each that is asked for) and `stage`, and may have `begin(session)`.
 """
 import importlib
 import inspect
@@ -12,6 +13,7 @@ import os
 import struct
 import sys
 import traceback
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -40,6 +42,21 @@ def find(path):
     return found() if inspect.isclass(found) else found
 
 
+class Named(np.ndarray):
+    """An array `[n, names]` whose columns go by name, too."""
+
+    def __new__(cls, rows, names):
+        table = np.array(rows, "<f8").reshape(len(rows), len(names)).view(cls)
+        table.names = list(names)
+        return table
+
+    def __array_finalize__(self, other):
+        self.names = getattr(other, "names", [])
+
+    def __getitem__(self, at):
+        return np.asarray(self)[:, self.names.index(at)] if isinstance(at, str) else np.asarray(self)[at]
+
+
 class Worker:
     def __init__(self, path):
         self.object = find(path)
@@ -55,9 +72,12 @@ class Worker:
 
     def begin(self, session, body):
         self.session, names = session, [c["name"] for c in session["columns"]]
-        columns = dict(zip(names, body.reshape(len(names), -1)))
+        self.columns = dict(zip(names, body.reshape(len(names), -1)))
+        ends = itertools.accumulate(t["samples"] for t in session["trials"])
+        spans = [(t, slice(end - t["samples"], end)) for t, end in zip(session["trials"], ends)]
+        self.spans = [SimpleNamespace(name=t["name"], samples=span, start_s=t["start_s"]) for t, span in spans]
         if hasattr(self.object, "begin"):
-            self.object.begin({**session, "columns": columns})
+            self.object.begin({**session, "columns": self.columns})
 
     def take(self, models, body):
         """One model after the other: parameters, effects, inputs."""
@@ -82,12 +102,17 @@ class Worker:
         return [row for _, group in groups for row in self.answer(list(group))]
 
     def answer(self, group):
-        model, _, _, inputs = group[0]
-        more = {"inputs": inputs, "stage": model["stage"], "trials": model["trials"]}
+        model, _, _, altered = group[0]
+        trials = self.spans[: model["trials"]]
+        inputs = {k: v[: trials[-1].samples.stop] for k, v in self.columns.items()} | (altered or {})
+        if self.is_many:
+            inputs = {k: np.broadcast_to(v, (len(group), len(v))) for k, v in inputs.items()}
+        more = {"inputs": inputs, "stage": model["stage"], "trials": trials}
         more = {k: v for k, v in more.items() if k in self.more}
         try:
             if self.is_many:
-                p, e = np.array([g[1] for g in group]), np.array([g[2] for g in group])
+                p = Named([g[1] for g in group], self.session["parameters"])
+                e = Named([g[2] for g in group], self.session["effects"])
                 return list(np.atleast_2d(np.asarray(self.call(p, e, **more), dtype="<f8")))
             p = dict(zip(self.session["parameters"], group[0][1].tolist()))
             e = dict(zip(self.session["effects"], group[0][2].tolist()))

@@ -22,35 +22,35 @@ const DRAWN: usize = 4;
 
 /// What a report says beside the numbers.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Context {
+pub struct Context {
     /// Heading of the page.
-    pub(crate) title: String,
+    pub title: String,
     /// Trials of the fit, as files or sessions.
-    pub(crate) calibrated_on: Vec<String>,
+    pub calibrated_on: Vec<String>,
     /// Trials of the evaluation.
-    pub(crate) tested_on: Vec<String>,
+    pub tested_on: Vec<String>,
     /// Signals among which the calibrated one was chosen, best first; empty
     /// when the user named it.
-    pub(crate) signal_choice: Vec<Candidate>,
+    pub signal_choice: Vec<Candidate>,
     /// Sentences about the data: where they come from, what was done to them.
-    pub(crate) notes: Vec<String>,
+    pub notes: Vec<String>,
     /// Errors on the trials of one kind, by its name, where there are several kinds.
-    pub(crate) kinds: Vec<(String, Vec<MethodErrors>)>,
+    pub kinds: Vec<(String, Vec<MethodErrors>)>,
 }
 
 /// Calibrations and how they were judged.
-#[derive(Clone, Copy)]
-pub(crate) struct Judged<'a> {
+#[derive(Debug, Clone, Copy)]
+pub struct Judged<'a> {
     /// The calibrations by the names that `evaluation` knows them by.
-    pub(crate) calibrated: &'a [(&'a str, &'a Calibrated)],
+    pub calibrated: &'a [(&'a str, &'a Calibrated)],
     /// Their errors.
-    pub(crate) evaluation: &'a Evaluation,
+    pub evaluation: &'a Evaluation,
     /// What is said beside the numbers.
-    pub(crate) context: &'a Context,
+    pub context: &'a Context,
 }
 
 /// The report as one HTML file.
-pub(crate) fn calibration_page(judged: &Judged<'_>) -> String {
+pub fn calibration_page(judged: &Judged<'_>) -> String {
     let mut page = Page::new(&judged.context.title, &calibration_verdict(judged));
     calibration_sections(&mut page, judged);
     page.finish()
@@ -69,10 +69,7 @@ pub(crate) fn calibration_sections(page: &mut Page, subject: &Judged<'_>) {
 
 /// A picture of some seconds of the first trial for a README: an SVG file of
 /// its own, light, with its legend inside. Empty when there is nothing to draw.
-pub(crate) fn readme_picture(
-    calibrated: &[(&str, &Calibrated)],
-    evaluation: &Evaluation,
-) -> String {
+pub fn readme_picture(calibrated: &[(&str, &Calibrated)], evaluation: &Evaluation) -> String {
     let names = method_names(calibrated, evaluation);
     let first = evaluation.trials.first();
     first.map_or_else(String::new, |trial| estimate_picture(evaluation, trial, &names))

@@ -23,7 +23,7 @@ use crate::plain::{effect_in_words, listed, transfer_in_words};
 const DRAWN: usize = 6;
 
 /// The report as one HTML file.
-pub(crate) fn diagnosis_page(subject: &Subject<'_>) -> String {
+pub fn diagnosis_page(subject: &Subject<'_>) -> String {
     let mut page = Page::new(&diagnosis_title(subject), &diagnosis_verdict(subject));
     diagnosis_sections(&mut page, subject);
     page.finish()

@@ -11,7 +11,7 @@ use super::{
 use crate::paper_tables::{error_rows, fit_rows, verdicts};
 
 /// Tables beside the published ones, and the two figures that the paper asks for.
-pub(crate) fn paper_page(experiment: &Experiment) -> String {
+pub fn paper_page(experiment: &Experiment) -> String {
     let arbitrary = |method: usize| experiment.published.arbitrary.pooled[method].rmse;
     let verdict = format!(
         "On a simulated rig the published method is off by {:.2} mm on arbitrary actuation; the raw signal by {:.2} mm. \

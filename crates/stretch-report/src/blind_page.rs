@@ -15,22 +15,22 @@ use crate::goal::Goal;
 const STRENGTHS: [f64; 8] = [0.05, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
 
 /// What a blind check gave.
-#[derive(Clone, Copy)]
-pub(crate) struct BlindSubject<'a> {
+#[derive(Debug, Clone, Copy)]
+pub struct BlindSubject<'a> {
     /// Every figure.
-    pub(crate) score: &'a Score,
+    pub score: &'a Score,
     /// The labels.
-    pub(crate) truth: &'a Truth,
+    pub truth: &'a Truth,
     /// The answers.
-    pub(crate) verdicts: &'a [Verdict],
+    pub verdicts: &'a [Verdict],
     /// Goals and what was reached.
-    pub(crate) goals: &'a [Goal],
+    pub goals: &'a [Goal],
     /// Hash of the sealed labels.
-    pub(crate) sha256: &'a str,
+    pub sha256: &'a str,
 }
 
 /// The report as one HTML file.
-pub(crate) fn blind_page(subject: &BlindSubject<'_>) -> String {
+pub fn blind_page(subject: &BlindSubject<'_>) -> String {
     let mut page = Page::new("Blind check of the diagnosis", &sentence(subject.score));
     goals(&mut page, subject);
     strength(&mut page, subject);

@@ -1,14 +1,14 @@
-//! Names and findings in plain words.
+//! Names, numbers and findings in plain words.
 
 use stretch_gap::{Baselines, Transfer, TransferError};
 
 /// What an effect is, for someone who does not know its name; none for an effect of the user's own.
-pub(crate) fn effect_in_words(name: &str) -> Option<&'static str> {
+pub fn effect_in_words(name: &str) -> Option<&'static str> {
     stretch_sim::effect_named(name).map(|effect| effect.words)
 }
 
 /// Names joined as in a sentence.
-pub(crate) fn listed(names: &[String]) -> String {
+pub fn listed(names: &[String]) -> String {
     match names {
         [] => "nothing".to_owned(),
         [one] => one.clone(),
@@ -20,7 +20,7 @@ pub(crate) fn listed(names: &[String]) -> String {
 const ALIKE: f64 = 0.05;
 
 /// Why a calibration may do worse once the simulator is better; none where none does.
-pub(crate) fn transfer_in_words(transfer: &Transfer) -> Option<String> {
+pub fn transfer_in_words(transfer: &Transfer) -> Option<String> {
     let is_worse = |e: &TransferError| e.sim_with_effect > e.sim + ALIKE;
     let kinds = [("linear", &transfer.linear), ("poly13", &transfer.poly13)];
     let worse: Vec<String> =
@@ -37,12 +37,25 @@ pub(crate) fn transfer_in_words(transfer: &Transfer) -> Option<String> {
 }
 
 /// What simpler methods named, by method.
-pub(crate) fn methods(said: &Baselines) -> [(&'static str, Option<&str>); 3] {
+pub fn methods(said: &Baselines) -> [(&'static str, Option<&str>); 3] {
     [
         ("largest_drop", said.largest_drop.as_deref()),
         ("signature", said.signature.as_deref()),
         ("bic", said.bic.as_deref()),
     ]
+}
+
+/// A number with four significant digits, as people read it.
+pub fn number(x: f64) -> String {
+    if !x.is_finite() {
+        return "-".to_owned();
+    }
+    let digits = if x == 0.0 { 0 } else { x.abs().log10().floor() as i32 };
+    if (-4..7).contains(&digits) {
+        format!("{x:.*}", (3 - digits).clamp(0, 6) as usize)
+    } else {
+        format!("{x:.3e}")
+    }
 }
 
 #[cfg(test)]

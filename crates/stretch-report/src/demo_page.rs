@@ -8,7 +8,7 @@ use super::{
 };
 
 /// Both reports as one HTML file; each part is what its own page would be.
-pub(crate) fn demo_page(judged: &Judged<'_>, subject: &Subject<'_>) -> String {
+pub fn demo_page(judged: &Judged<'_>, subject: &Subject<'_>) -> String {
     let mut page = Page::new(&judged.context.title, &calibration_verdict(judged));
     calibration_sections(&mut page, judged);
     page.part(&diagnosis_title(subject), &diagnosis_verdict(subject));

@@ -3,10 +3,10 @@
 use stretch_calibrate::{Evaluation, FitReport, MethodErrors};
 use stretch_paper::{Experiment, PUBLISHED, PublishedErrors, PublishedFit};
 
-use crate::table::number;
+use crate::plain::number;
 
 /// A fit, what the paper prints, and the same fit with our decisions.
-pub(crate) fn fit_rows(experiment: &Experiment) -> Vec<Vec<String>> {
+pub fn fit_rows(experiment: &Experiment) -> Vec<Vec<String>> {
     let (there, here) = (&experiment.published, &experiment.ours);
     let row = |name: String, a: (f64, f64), paper: PublishedFit, b: (f64, f64)| {
         vec![
@@ -43,7 +43,7 @@ pub(crate) fn fit_rows(experiment: &Experiment) -> Vec<Vec<String>> {
 }
 
 /// A method's errors, what the paper prints, and the same with our decisions.
-pub(crate) fn error_rows(
+pub fn error_rows(
     there: &Evaluation,
     paper: &[PublishedErrors; 3],
     here: &Evaluation,
@@ -71,7 +71,7 @@ pub(crate) fn error_rows(
 }
 
 /// Plain sentences, each decided by the figures.
-pub(crate) fn verdicts(experiment: &Experiment) -> Vec<String> {
+pub fn verdicts(experiment: &Experiment) -> Vec<String> {
     let there = &experiment.published;
     let mut said = Vec::new();
     let mut judge = |holds: bool, agrees: &str, differs: &str| {

@@ -5,21 +5,21 @@ use stretch_blind::{Rate, Score};
 
 /// A figure, the goal it is held against, and whether it is reached.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Goal {
+pub struct Goal {
     /// What is counted.
-    pub(crate) what: &'static str,
+    pub what: &'static str,
     /// The goal in words.
-    pub(crate) goal: String,
+    pub goal: String,
     /// What was reached.
-    pub(crate) value: Option<f64>,
+    pub value: Option<f64>,
     /// Hits and cases, where it is a rate.
-    pub(crate) rate: Option<Rate>,
+    pub rate: Option<Rate>,
     /// Whether that is good enough; none without a case.
-    pub(crate) met: Option<bool>,
+    pub met: Option<bool>,
 }
 
 /// What a blind check is meant to reach, and what it did.
-pub(crate) fn goals(score: &Score) -> Vec<Goal> {
+pub fn goals(score: &Score) -> Vec<Goal> {
     let s = &score.singles;
     let least = |what, rate: Rate, least: f64| Goal {
         what,

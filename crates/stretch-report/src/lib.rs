@@ -1,0 +1,39 @@
+#![doc = include_str!("../README.md")]
+
+mod bar_figure;
+mod blind_figures;
+mod blind_page;
+mod branch;
+mod calibration_page;
+mod calibration_tables;
+mod canvas;
+mod demo_page;
+mod diagnosis_page;
+mod diagnosis_tables;
+mod error_figure;
+mod estimate_figure;
+mod figure;
+mod gap_figures;
+mod goal;
+mod markup;
+mod page;
+mod paper_page;
+mod paper_tables;
+mod plain;
+mod slice_figure;
+mod subject;
+mod surface_figure;
+mod thin;
+
+pub use blind_page::{BlindSubject, blind_page};
+pub use calibration_page::{Context, Judged, calibration_page, readme_picture};
+pub use demo_page::demo_page;
+pub use diagnosis_page::diagnosis_page;
+pub use goal::{Goal, goals};
+pub use paper_page::paper_page;
+pub use paper_tables::{error_rows, fit_rows, verdicts};
+pub use plain::{effect_in_words, listed, methods, number, transfer_in_words};
+pub use subject::Subject;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,31 @@
+//! What a report of a diagnosis is about.
+
+use std::fmt;
+
+use stretch_bench::Implementation;
+use stretch_gap::{Diagnosis, Evidence, Simulator};
+
+/// What a report is about.
+#[derive(Clone, Copy)]
+pub struct Subject<'a> {
+    /// What the data are called.
+    pub name: &'a str,
+    /// What was found.
+    pub diagnosis: &'a Diagnosis,
+    /// What it was found from.
+    pub evidence: &'a Evidence,
+    /// What is named, as something to type.
+    pub implementations: &'a [Implementation],
+    /// The simulator beside its measurements.
+    pub simulator: &'a dyn Simulator,
+}
+
+impl fmt::Debug for Subject<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { name, diagnosis, .. } = self;
+        f.debug_struct("Subject")
+            .field("name", name)
+            .field("diagnosis", diagnosis)
+            .finish_non_exhaustive()
+    }
+}

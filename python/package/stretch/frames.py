@@ -1,0 +1,14 @@
+"""Tables, with pandas or without."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def frame(rows: list[dict[str, Any]]) -> Any:
+    """Rows as a pandas frame, or as a dict of columns where there is no pandas."""
+    try:
+        import pandas  # type: ignore[import-untyped,unused-ignore]
+    except ImportError:
+        return {key: [row.get(key) for row in rows] for key in (rows[0] if rows else {})}
+    return pandas.DataFrame(rows)

@@ -1,0 +1,96 @@
+"""Arrays as people have them, checked and told apart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._stretch import StretchError
+
+Array = NDArray[np.float64]
+
+
+def column(values: ArrayLike, what: str) -> Array:
+    """One column of finite numbers, or the sentence that says which is none."""
+    try:
+        array = np.ascontiguousarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise StretchError(f"{what} does not hold numbers: {error}") from None
+    if array.ndim != 1:
+        raise StretchError(f"{what} has the shape {array.shape}; give one number a sample, in one dimension")
+    wrong = np.flatnonzero(~np.isfinite(array))
+    if wrong.size:
+        first = int(wrong[0])
+        raise StretchError(
+            f"{what}, sample {first}: {array[first]} is no number to work with ({wrong.size} of {array.size} are none); "
+            "leave those samples out (time_s says where they were) or interpolate them"
+        )
+    return array
+
+
+def times(samples: int, rate_hz: float | None, time_s: ArrayLike | None, what: str) -> Array:
+    """Time stamps, s, from a sample rate or as they were given."""
+    if (rate_hz is None) == (time_s is None):
+        raise StretchError(f"{what}: give either rate_hz, the samples a second, or time_s, the time stamps")
+    if rate_hz is not None:
+        if not 0.0 < rate_hz < float("inf"):
+            raise StretchError(f"rate_hz is {rate_hz}; it must be above 0")
+        stamps: Array = np.arange(samples, dtype=np.float64) / float(rate_hz)
+        return stamps
+    assert time_s is not None
+    stamps = column(time_s, f"time_s of {what}")
+    same_length(stamps, samples, f"time_s of {what}")
+    back = np.flatnonzero(np.diff(stamps) <= 0.0)
+    if back.size:
+        i = int(back[0]) + 1
+        raise StretchError(
+            f"time_s of {what}, sample {i}: {stamps[i]} s does not come after {stamps[i - 1]} s; sort the samples, or give "
+            "several recordings as a list"
+        )
+    return stamps
+
+
+def same_length(array: Array, samples: int, what: str) -> None:
+    """Refuses a column that is not as long as its recording."""
+    if array.size != samples:
+        raise StretchError(f"{what} has {array.size} samples, the signal {samples}; give one value for each sample")
+
+
+def is_many(values: Any) -> bool:
+    """Whether several recordings were given: a list or tuple of arrays, or an array of two dimensions."""
+    if isinstance(values, (list, tuple)):
+        return len(values) > 0 and np.ndim(values[0]) > 0
+    return bool(np.ndim(values) > 1)
+
+
+def recordings(
+    columns: Mapping[str, Any],
+    rate_hz: float | None,
+    time_s: Any,
+    names: Sequence[str] | None = None,
+) -> list[dict[str, Any]]:
+    """Recordings as the native part takes them; `columns` gives one array each, or one list of arrays each."""
+    first_name, first = next(iter(columns.items()))
+    many = is_many(first)
+    given = {name: list(values) if many else [values] for name, values in columns.items()}
+    count = len(given[first_name])
+    for name, values in given.items():
+        if len(values) != count:
+            raise StretchError(f"{name} has {len(values)} recordings, {first_name} {count}; give as many of each")
+    stamps = [None] * count if time_s is None else list(time_s) if is_many(time_s) else [time_s] * count
+    if len(stamps) != count:
+        raise StretchError(f"time_s has {len(stamps)} recordings, {first_name} {count}; give as many")
+    called = list(names) if names is not None else [f"recording {i + 1}" if many else "the recording" for i in range(count)]
+    if len(called) != count:
+        raise StretchError(f"{len(called)} names for {count} recordings; give one each")
+    made = []
+    for i, name in enumerate(called):
+        channels = [(key, column(values[i], f"{key} of {name}")) for key, values in given.items()]
+        samples = channels[0][1].size
+        for key, one in channels[1:]:
+            same_length(one, samples, f"{key} of {name}")
+        made.append({"name": name, "time_s": times(samples, rate_hz, stamps[i], name), "channels": channels})
+    return made

@@ -1,0 +1,264 @@
+//! Calibrations: made, applied, judged.
+
+use std::path::PathBuf;
+
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::{prelude::*, types::PyDict};
+use serde::Serialize;
+use stretch_bench::causes;
+use stretch_calibrate::{
+    CalibrateError, FitReport, LiveReceptor, ModelKind, ModelRow, Options, Robust, SpellingError,
+    choose_model, parse_rate, pressure_column, read_calibration, write_calibration,
+};
+use stretch_core::{Calibration, Target};
+use stretch_data::{Channel, Trial};
+use stretch_gap::Diagnosis;
+
+use crate::{
+    error::said,
+    receptor::Receptor,
+    recording::{Recording, trials},
+    watched::watched,
+};
+
+/// A calibration record.
+#[pyclass(frozen, module = "stretch")]
+#[derive(Debug)]
+pub(crate) struct Record {
+    calibration: Calibration,
+}
+
+/// What is chosen about a calibration, by the names of the package.
+#[derive(Debug, FromPyObject)]
+pub(crate) struct Choices {
+    #[pyo3(item)]
+    model: String,
+    #[pyo3(item)]
+    signal: String,
+    #[pyo3(item)]
+    reference: String,
+    #[pyo3(item)]
+    paper: bool,
+    #[pyo3(item)]
+    rate: Option<String>,
+    #[pyo3(item)]
+    robust: Option<String>,
+    #[pyo3(item)]
+    signal_zero: Option<f64>,
+    #[pyo3(item)]
+    rest_length: Option<f64>,
+    #[pyo3(item)]
+    dead_band: Option<f64>,
+    #[pyo3(item)]
+    date: String,
+    #[pyo3(item)]
+    diagnosis: Option<String>,
+}
+
+impl Choices {
+    /// As Rust takes them; no model where it is to be chosen.
+    fn options(&self) -> PyResult<(Options, Option<ModelKind>)> {
+        let base = if self.paper { Options::paper() } else { Options::default() };
+        let model = match self.model.as_str() {
+            "auto" => None,
+            name => Some(name.parse::<ModelKind>().map_err(said)?),
+        };
+        let robust = match self.robust.as_deref() {
+            None => Robust::Off,
+            Some("bisquare") => Robust::Bisquare,
+            Some("lar") => Robust::Lar,
+            Some(other) => {
+                return Err(said(SpellingError::new(other, "bisquare, lar or None")));
+            }
+        };
+        let found = match &self.diagnosis {
+            Some(json) => causes(&serde_json::from_str::<Diagnosis>(json).map_err(said)?),
+            None => Vec::new(),
+        };
+        let options = Options {
+            signal: self.signal.clone(),
+            reference: self.reference.clone(),
+            model: model.unwrap_or(base.model),
+            rate: self.rate.as_deref().map_or(Ok(base.rate), parse_rate).map_err(said)?,
+            robust,
+            signal_zero: self.signal_zero,
+            rest_length: self.rest_length,
+            dead_band: self.dead_band.or(base.dead_band),
+            date: self.date.clone(),
+            causes: found,
+            ..base
+        };
+        Ok((options, model))
+    }
+}
+
+/// What there is to say of a calibration that was just made.
+#[derive(Serialize)]
+struct Made<'a> {
+    model: String,
+    fits: &'a [FitReport],
+    models: &'a [ModelRow],
+    notes: &'a [String],
+}
+
+/// Fits a calibration; with the record comes what there is to say of the fit, as JSON.
+#[pyfunction]
+pub(crate) fn calibrate(
+    py: Python<'_>,
+    recordings: Vec<Recording<'_>>,
+    choices: Choices,
+) -> PyResult<(Record, String)> {
+    let trials = trials(&recordings);
+    let (mut options, model) = choices.options()?;
+    let work = move || -> Result<_, CalibrateError> {
+        let choice = match model {
+            None => Some(choose_model(&trials, &options)?),
+            Some(_) => None,
+        };
+        if let Some(choice) = &choice {
+            options.model = choice.model;
+        }
+        let mut made = stretch_calibrate::calibrate(&trials, &options)?;
+        made.notes.extend(choice.iter().flat_map(|choice| choice.notes.clone()));
+        let said = serde_json::to_string(&Made {
+            model: options.model.to_string(),
+            fits: &made.fits,
+            models: choice.as_ref().map_or(&[], |choice| &choice.rows),
+            notes: &made.notes,
+        });
+        Ok((made.calibration, said))
+    };
+    let (calibration, told) = watched(py, work)?.map_err(said)?;
+    Ok((Record { calibration }, told.map_err(said)?))
+}
+
+/// Judges calibrations beside the raw signal; the answer is JSON.
+#[pyfunction]
+pub(crate) fn evaluate(
+    py: Python<'_>,
+    calibrations: Vec<(String, PyRef<'_, Record>)>,
+    recordings: Vec<Recording<'_>>,
+) -> PyResult<String> {
+    let trials = trials(&recordings);
+    let calibrations: Vec<(String, Calibration)> =
+        calibrations.iter().map(|(name, r)| (name.clone(), r.calibration.clone())).collect();
+    let work = move || {
+        let named: Vec<_> = calibrations.iter().map(|(name, c)| (name.as_str(), c)).collect();
+        stretch_calibrate::evaluate(&named, &trials)
+    };
+    let evaluation = watched(py, work)?.map_err(said)?;
+    serde_json::to_string(&evaluation).map_err(said)
+}
+
+#[pymethods]
+impl Record {
+    /// From the JSON that `stretch calibrate` writes.
+    #[staticmethod]
+    fn from_json(text: &str) -> PyResult<Self> {
+        let calibration = serde_json::from_str(text)
+            .map_err(|e| said(format!("this is no calibration that can be used: {e}")))?;
+        Ok(Self { calibration })
+    }
+
+    /// From a file: postcard where its name ends in `.postcard`, else JSON.
+    #[staticmethod]
+    fn load(path: PathBuf) -> PyResult<Self> {
+        Ok(Self { calibration: read_calibration(&path).map_err(said)? })
+    }
+
+    /// Into a file, whole or not at all.
+    fn save(&self, path: PathBuf) -> PyResult<()> {
+        write_calibration(&path, &self.calibration).map_err(said)
+    }
+
+    /// The JSON that the program reads.
+    fn to_json(&self) -> PyResult<String> {
+        serde_json::to_string_pretty(&self.calibration).map(|text| text + "\n").map_err(said)
+    }
+
+    /// Column of the signal.
+    #[getter]
+    fn signal(&self) -> &str {
+        self.calibration.signal.as_str()
+    }
+
+    /// Column of the reference.
+    #[getter]
+    fn reference(&self) -> &str {
+        self.calibration.reference.as_str()
+    }
+
+    /// Unit of the estimate.
+    #[getter]
+    fn unit(&self) -> &str {
+        self.calibration.reference.unit()
+    }
+
+    /// Samples a second at which it runs.
+    #[getter]
+    fn rate_hz(&self) -> f64 {
+        self.calibration.sample_rate_hz.hz()
+    }
+
+    /// Least and greatest estimate of the recordings that were fitted.
+    #[getter]
+    fn range(&self) -> (f64, f64) {
+        let range = &self.calibration.target_range;
+        match self.calibration.target {
+            Target::Contraction { rest_length } => {
+                (rest_length * (1.0 - range.max()), rest_length * (1.0 - range.min()))
+            }
+            Target::Direct => (range.min(), range.max()),
+        }
+    }
+
+    /// Whether it needs the pressure beside the signal.
+    #[getter]
+    fn needs_pressure(&self) -> bool {
+        pressure_column(&self.calibration).is_some()
+    }
+
+    /// A receptor that runs it live.
+    fn receptor(&self) -> PyResult<Receptor> {
+        LiveReceptor::new(&self.calibration).map(Receptor::new).map_err(said)
+    }
+
+    /// Estimates of a whole recording, as it would run live: NaN where a sample has none.
+    fn apply<'py>(
+        &self,
+        py: Python<'py>,
+        time_s: PyReadonlyArray1<'py, f64>,
+        signal: PyReadonlyArray1<'py, f64>,
+        pressure: Option<PyReadonlyArray1<'py, f64>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let channel = |name: &str, values: &PyReadonlyArray1<'_, f64>| Channel {
+            name: name.to_owned(),
+            values: values.as_array().to_vec(),
+        };
+        let mut channels = vec![channel(self.signal(), &signal)];
+        let column = pressure_column(&self.calibration);
+        channels.extend(column.zip(pressure.as_ref()).map(|(name, p)| channel(name, p)));
+        let time_s = time_s.as_array().to_vec();
+        let trial = Trial { name: "the recording".into(), time_s, channels };
+        let calibration = self.calibration.clone();
+        let applied =
+            watched(py, move || stretch_calibrate::apply(&calibration, &trial))?.map_err(said)?;
+        let column = |of: &dyn Fn(&stretch_receptor::Reading) -> f64| {
+            let values = applied.readings.iter().map(|r| r.as_ref().map_or(f64::NAN, of));
+            PyArray1::from_iter(py, values)
+        };
+        let answer = PyDict::new(py);
+        answer.set_item("estimate", column(&|r| r.estimate))?;
+        answer.set_item("rate", column(&|r| r.rate))?;
+        answer.set_item("sd", column(&|r| r.sd.unwrap_or(f64::NAN)))?;
+        let inside = applied
+            .readings
+            .iter()
+            .map(|r| r.as_ref().is_ok_and(|r| r.domain == stretch_receptor::Domain::Inside));
+        answer.set_item("inside", PyArray1::from_iter(py, inside))?;
+        answer.set_item("missing", applied.faults.missing)?;
+        answer.set_item("jittered", applied.faults.jittered)?;
+        answer.set_item("backwards", applied.faults.backwards)?;
+        Ok(answer)
+    }
+}

@@ -1,0 +1,202 @@
+//! A simulator that lives in Python, asked from Rust's threads and answered on the thread that called.
+//!
+//! Python's signal handlers run on its main thread, and simulators keep things that belong to a thread. So the work goes to a
+//! thread of its own and the caller's thread stays at a desk: it takes questions, many at once where they come so, asks the
+//! user's simulator, and looks after Ctrl-C.
+
+use std::{
+    sync::mpsc::{self, Receiver, RecvTimeoutError, Sender},
+    time::Duration,
+};
+
+use numpy::{PyArray1, PyArray2, PyReadonlyArray2, ndarray::Array2};
+use pyo3::{create_exception, exceptions::PyRuntimeError, prelude::*};
+use stretch_problem::{Ask, Source, SourceError};
+
+use crate::error::StretchError;
+
+create_exception!(
+    stretch,
+    Refused,
+    StretchError,
+    "Raised by a simulator that cannot simulate these values: the fit turns back and goes on elsewhere."
+);
+
+/// How often Python is asked whether it was interrupted.
+const TICK: Duration = Duration::from_millis(50);
+
+/// One run that is asked for, and where its answer goes.
+#[derive(Debug)]
+pub(crate) struct Question {
+    stage: usize,
+    trials: usize,
+    parameters: Vec<f64>,
+    effects: Vec<f64>,
+    inputs: Option<Vec<Vec<f64>>>,
+    reply: Sender<Result<Vec<f64>, SourceError>>,
+}
+
+/// What comes to the desk.
+#[derive(Debug)]
+pub(crate) enum Message<T> {
+    /// A run is asked for.
+    Question(Question),
+    /// What goes on, in words.
+    Progress(String),
+    /// The work is done.
+    Done(T),
+}
+
+/// The simulator as Rust's threads see it.
+#[derive(Debug)]
+pub(crate) struct Asked<T> {
+    pub(crate) desk: Sender<Message<T>>,
+    pub(crate) answers_all: bool,
+    pub(crate) batch: usize,
+}
+
+fn gone() -> SourceError {
+    SourceError::Gone("the caller was interrupted".into())
+}
+
+impl<T: Send> Source for Asked<T> {
+    fn simulate_many(&self, asks: &[Ask<'_>]) -> Vec<Result<Vec<f64>, SourceError>> {
+        let send = |ask: &Ask<'_>| {
+            let (reply, answer) = mpsc::channel();
+            let question = Question {
+                stage: ask.stage,
+                trials: ask.trials,
+                parameters: ask.parameters.to_vec(),
+                effects: ask.effects.to_vec(),
+                inputs: ask.inputs.map(<[Vec<f64>]>::to_vec),
+                reply,
+            };
+            self.desk.send(Message::Question(question)).map(|()| answer).map_err(|_| gone())
+        };
+        // All are on their way before the first answer is waited for.
+        let answers: Vec<_> = asks.iter().map(send).collect();
+        answers.into_iter().map(|answer| answer?.recv().map_err(|_| gone())?).collect()
+    }
+
+    fn answers_all(&self) -> bool {
+        self.answers_all
+    }
+
+    fn batch(&self) -> usize {
+        self.batch
+    }
+}
+
+/// Answers questions with the user's simulator until the work is done.
+///
+/// `simulator` is called with stage, number of trials, parameters `[n, p]`, effects `[n, e]`, and the altered inputs, an
+/// array `[n, samples]` each, or None; it returns `[n, samples]`.
+///
+/// # Errors
+/// What the simulator raises, and KeyboardInterrupt; the work then ends by itself, for nobody answers it any more.
+pub(crate) fn serve<T: Send>(
+    py: Python<'_>,
+    mut desk: Receiver<Message<T>>,
+    simulator: Option<&Bound<'_, PyAny>>,
+    progress: Option<&Bound<'_, PyAny>>,
+    batch: usize,
+) -> PyResult<T> {
+    loop {
+        let waiting = &mut desk;
+        let first = match py.detach(move || waiting.recv_timeout(TICK)) {
+            Ok(message) => message,
+            Err(RecvTimeoutError::Timeout) => {
+                py.check_signals()?;
+                continue;
+            }
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(PyRuntimeError::new_err(
+                    "the work ended without an answer; this is an error of stretch: please report it",
+                ));
+            }
+        };
+        let mut groups: Vec<Vec<Question>> = Vec::new();
+        let mut waiting: Vec<Message<T>> = vec![first];
+        waiting.extend(desk.try_iter());
+        for message in waiting {
+            match message {
+                Message::Done(done) => return Ok(done),
+                Message::Progress(words) => {
+                    if let Some(progress) = progress {
+                        progress.call1((words,))?;
+                    }
+                }
+                Message::Question(question) => match groups
+                    .iter_mut()
+                    .find(|group| group.len() < batch && group[0].goes_with(&question))
+                {
+                    Some(group) => group.push(question),
+                    None => groups.push(vec![question]),
+                },
+            }
+        }
+        for group in groups {
+            let Some(simulator) = simulator else { continue };
+            answer(py, simulator, group)?;
+            py.check_signals()?;
+        }
+    }
+}
+
+impl Question {
+    /// Whether two can be asked in one call.
+    fn goes_with(&self, other: &Self) -> bool {
+        (self.stage, self.trials) == (other.stage, other.trials)
+            && self.inputs.is_some() == other.inputs.is_some()
+    }
+}
+
+/// Asks once for all; one by one where some of them are refused.
+fn answer(py: Python<'_>, simulator: &Bound<'_, PyAny>, group: Vec<Question>) -> PyResult<()> {
+    match call(py, simulator, &group) {
+        Ok(rows) => {
+            for (question, row) in group.into_iter().zip(rows) {
+                // Whoever asked may have gone.
+                drop(question.reply.send(Ok(row)));
+            }
+            Ok(())
+        }
+        Err(error) if error.is_instance_of::<Refused>(py) => {
+            if let [only] = group.as_slice() {
+                let words = error.value(py).to_string();
+                drop(only.reply.send(Err(SourceError::Refused(words))));
+                return Ok(());
+            }
+            group.into_iter().try_for_each(|question| answer(py, simulator, vec![question]))
+        }
+        Err(error) => Err(error),
+    }
+}
+
+fn call(
+    py: Python<'_>,
+    simulator: &Bound<'_, PyAny>,
+    group: &[Question],
+) -> PyResult<Vec<Vec<f64>>> {
+    let first = &group[0];
+    let table = |of: fn(&Question) -> &Vec<f64>| {
+        let flat = group.iter().flat_map(|q| of(q).iter().copied()).collect();
+        let array = Array2::from_shape_vec((group.len(), of(first).len()), flat);
+        array.map(|array| PyArray2::from_owned_array(py, array))
+    };
+    let wrong = |e: numpy::ndarray::ShapeError| PyRuntimeError::new_err(e.to_string());
+    let parameters = table(|q| &q.parameters).map_err(wrong)?;
+    let effects = table(|q| &q.effects).map_err(wrong)?;
+    // By input, one column for each model.
+    let inputs = first.inputs.as_ref().map(|columns| {
+        let of = |column: usize| {
+            let own = |q: &Question| q.inputs.as_ref().map(|all| all[column].clone());
+            let rows = group.iter().filter_map(own);
+            rows.map(|row| PyArray1::from_vec(py, row)).collect::<Vec<_>>()
+        };
+        (0..columns.len()).map(of).collect::<Vec<_>>()
+    });
+    let told = simulator.call1((first.stage, first.trials, parameters, effects, inputs))?;
+    let rows: PyReadonlyArray2<'_, f64> = told.extract()?;
+    Ok(rows.as_array().rows().into_iter().map(|row| row.to_vec()).collect())
+}

@@ -1,0 +1,109 @@
+import pickle
+
+import numpy as np
+import pytest
+import stretch
+from conftest import RATE_HZ, recording
+
+
+@pytest.fixture(scope="module")
+def poly13(fitted):
+    return stretch.calibrate(*fitted, RATE_HZ, model="poly13", signal_name="gauge_v", reference_name="angle_deg")
+
+
+def test_a_surface_makes_up_for_the_lag_that_a_line_keeps(fitted, tested, poly13):
+    linear = stretch.calibrate(*fitted, RATE_HZ, model="linear", signal_name="gauge_v", reference_name="angle_deg")
+    verdict = stretch.evaluate({"linear": linear, "poly13": poly13}, *tested, RATE_HZ)
+    assert list(verdict.pooled) == ["raw", "linear", "poly13"]
+    assert verdict.rmse < 0.5 * verdict.pooled["linear"]["rmse"]
+    assert verdict.unit == poly13.unit == "deg"
+    assert "poly13" in verdict._repr_html_()
+
+
+def test_errors_are_those_of_the_estimates(tested, poly13):
+    signal, angle = tested
+    estimate = poly13.apply(signal, RATE_HZ)
+    known = np.isfinite(estimate.value)
+    rmse = np.sqrt(np.mean((estimate.value - angle)[known] ** 2))
+    # both are sums of the same squares, added in another order
+    assert poly13.evaluate(signal, angle, RATE_HZ).rmse == pytest.approx(rmse, rel=1e-12)
+    assert 0 < np.count_nonzero(~known) < 20  # the rate estimator warms up on eleven samples
+
+
+def test_a_record_survives_as_text_as_file_and_as_pickle(tmp_path, tested, poly13):
+    value = poly13.apply(tested[0]).value
+    poly13.save(tmp_path / "c.json")
+    assert (tmp_path / "c.json").read_text() == poly13.to_json()
+    for copy in (
+        stretch.Calibration.from_json(poly13.to_json()),
+        stretch.Calibration.load(tmp_path / "c.json"),
+        pickle.loads(pickle.dumps(poly13)),
+    ):
+        assert copy == poly13
+        np.testing.assert_array_equal(copy.apply(tested[0]).value, value)
+    poly13.save(tmp_path / "c.postcard")
+    assert stretch.Calibration.load(tmp_path / "c.postcard") == poly13
+
+
+def test_live_steps_give_the_bits_of_the_whole_recording(tested, poly13):
+    signal = tested[0]
+    receptor = poly13.receptor()
+    readings = [receptor.step(n / RATE_HZ, x) for n, x in enumerate(signal)]
+    live = [np.nan if reading is None else reading.estimate for reading in readings]
+    np.testing.assert_array_equal(live, poly13.apply(signal, RATE_HZ).value)
+    assert receptor.faults == {"missing": 0, "jittered": 0, "backwards": 0}
+    assert readings[-1].branch in ("rising", "falling") and readings[-1].domain == "inside"
+    receptor.step(signal.size / RATE_HZ + 1.0, signal[-1])
+    assert receptor.faults["missing"] == 100
+
+
+def test_auto_shows_what_it_chose_from():
+    pairs = [recording(seed, 1.0 + 0.3 * seed, 8.0) for seed in range(3)]
+    signals, angles = zip(*pairs)
+    chosen = stretch.calibrate(list(signals), list(angles), RATE_HZ, reference_name="angle_deg")
+    named = [row["model"] for row in chosen.models]
+    assert chosen.model in named and "linear" in named
+    best = chosen.models[0]["rmse"]
+    assert next(row["rmse"] for row in chosen.models if row["model"] == "linear") > best
+    assert "chosen" in chosen._repr_html_()
+
+
+def test_integers_lists_and_strided_arrays_are_arrays(fitted):
+    signal, angle = fitted
+    spaced = np.column_stack([signal, angle])
+    options = {"rate_hz": RATE_HZ, "model": "linear"}
+    one = stretch.calibrate(signal, angle, **options)
+    assert one == stretch.calibrate(spaced[:, 0], spaced[:, 1], **options)
+    assert one == stretch.calibrate([float(x) for x in signal], [float(x) for x in angle], **options)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda s, a: (s[:-1], a), "1999"),
+        (lambda s, a: (np.where(np.arange(s.size) == 7, np.nan, s), a), "sample 7: nan"),
+        (lambda s, a: (s.reshape(2, 1000), a), "give as many"),
+        (lambda s, a: (np.zeros_like(s), a), "signal is 0 throughout"),
+        (lambda s, a: (s[:1], a[:1]), "1 samples are too few"),
+        (lambda s, a: (["x"] * s.size, a), "does not hold numbers"),
+    ],
+)
+def test_bad_columns_are_refused_in_a_sentence(fitted, spoil, words):
+    with pytest.raises(stretch.StretchError, match=words):
+        stretch.calibrate(*spoil(*fitted), RATE_HZ, model="linear")
+
+
+def test_bad_questions_are_refused_in_a_sentence(fitted, poly13):
+    with pytest.raises(stretch.StretchError, match='"poly99" is not understood; use linear'):
+        stretch.calibrate(*fitted, RATE_HZ, model="poly99")
+    with pytest.raises(stretch.StretchError, match="either rate_hz"):
+        stretch.calibrate(*fitted)
+    with pytest.raises(stretch.StretchError, match="does not come after"):
+        stretch.calibrate(*fitted, time_s=np.zeros(fitted[0].size))
+    with pytest.raises(stretch.StretchError, match="this is no calibration that can be used"):
+        stretch.Calibration.from_json('{"schema": 1}')
+    with pytest.raises(stretch.StretchError, match="cannot read it"):
+        stretch.Calibration.load("/nowhere/c.json")
+    with pytest.raises(stretch.StretchError, match="no effect of the gauge"):
+        stretch.calibrate(*fitted, RATE_HZ, model="diagnosed")
+    assert issubclass(stretch.StretchError, ValueError)

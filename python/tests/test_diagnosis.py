@@ -1,0 +1,338 @@
+import json
+
+import numpy as np
+import pytest
+import stretch
+
+RATE_HZ = 100.0
+
+
+def load(seconds=60.0):
+    """Force on a spring, N."""
+    time_s = np.arange(0.0, seconds, 1.0 / RATE_HZ)
+    return 20.0 * np.sin(1.3 * time_s) + 10.0 * np.sin(3.1 * time_s + 0.4)
+
+
+def noise(samples, seed=0):
+    return 0.02 * np.random.default_rng(seed).normal(size=samples)
+
+
+FORCE = load()
+STIFFER = 2.1 * FORCE
+"""The spring is softer than its data sheet says."""
+
+
+class Spring:
+    """A straight line, and a bend that is off."""
+
+    def __init__(self):
+        self.asked = []
+
+    def simulate(self, params, effects):
+        self.asked.append(params.shape)
+        return params[:, :1] * FORCE + effects["bend"][:, None] * FORCE**2
+
+
+def diagnose(simulator, length, **more):
+    question = {
+        "output": "length_mm",
+        "inputs": ["force_N"],
+        "rate_hz": RATE_HZ,
+        "parameters": {"compliance": stretch.Parameter(2.0, relative=0.1, unit="mm/N")},
+        "effects": {"bend": (-0.05, 0.05)},
+        "wrap": ["output.backlash", "output.delay"],
+    }
+    return stretch.diagnose(simulator, {"force_N": FORCE, "length_mm": length}, **{**question, **more})
+
+
+BENT = STIFFER + 0.02 * FORCE**2 + noise(FORCE.size)
+
+
+@pytest.fixture(scope="module")
+def bent():
+    return diagnose(Spring(), BENT)
+
+
+def test_an_effect_of_the_users_own_is_named_with_its_value(bent):
+    assert bent.verdict == "effect" and bent.named == ["bend"]
+    assert bent.probabilities["bend"] > 0.9
+    assert bent.effects["bend"]["bend"] == pytest.approx(0.02, rel=0.02)
+    assert bent.parameters["compliance"] == pytest.approx(2.1, rel=0.01)
+    assert bent.where == {"length_mm": 1.0}
+    assert bent.how_far["closed"] > 0.95
+    assert bent.how_far["with_effects"]["length_mm"] < 1.3 < bent.how_far["retuned"]["length_mm"]
+    assert "bend" in bent.sentence and bent.model_runs > 0
+
+
+def test_what_was_found_is_shown_as_text_table_page_and_code(bent, tmp_path):
+    again = stretch.Diagnosis.from_json(bent.to_json())
+    assert again.named == bent.named and again.probabilities == bent.probabilities
+    assert json.loads(bent.to_json())["schema"] == 1
+    assert list(bent.to_frame()["effects"])[0] == "bend"
+    page = bent.report(tmp_path / "d.html")
+    assert page.startswith("<!DOCTYPE html>") and page.count("<svg") > 3
+    assert (tmp_path / "d.html").read_text(encoding="utf-8") == page
+    assert "<iframe srcdoc=" in bent._repr_html_() and "<iframe" not in again._repr_html_()
+    found = {}
+    exec(bent.fix().code, found)  # what a user would paste
+    assert found["parameters"] == bent.parameters and found["bend"] == bent.effects["bend"]
+
+
+def test_curves_are_those_of_the_simulator(bent):
+    curves = bent.curves("length_mm")
+    np.testing.assert_array_equal(curves["measured"], BENT)
+    np.testing.assert_array_equal(curves["as_shipped"], 2.0 * FORCE)
+    fitted = bent.parameters["compliance"] * FORCE + bent.effects["bend"]["bend"] * FORCE**2
+    # the same two numbers, multiplied and added in the same way
+    np.testing.assert_allclose(curves["with_effects"], fitted, rtol=1e-9, atol=1e-9)
+
+
+def test_a_function_of_one_model_says_the_same_as_batches(bent):
+    def spring(params, effects):
+        return params["compliance"] * FORCE + effects["bend"] * FORCE**2
+
+    one = diagnose(spring, BENT)
+    told, batches = json.loads(one.to_json()), json.loads(bent.to_json())
+    for name in ("runtime_s", "notes"):
+        del told[name], batches[name]
+    assert told == batches
+
+
+def test_batches_are_asked_for_as_batches():
+    spring = Spring()
+    diagnose(spring, BENT)
+    assert all(columns == 1 for _, columns in spring.asked)
+    spring.batch = 1
+    spring.asked.clear()
+    diagnose(spring, BENT)
+    assert {rows for rows, _ in spring.asked} == {1}
+
+
+def test_a_wrapper_is_named_around_a_simulator_that_knows_nothing_of_it():
+    late = np.interp(np.arange(FORCE.size) - 6.0, np.arange(FORCE.size), STIFFER)
+    found = diagnose(Spring(), late + noise(FORCE.size))
+    assert found.named == ["output.delay"]
+    assert found.effects["output.delay"]["delay_s"] == pytest.approx(0.06, abs=0.003)
+    assert "y(t) = x(t - delay_s)" in found.fix().code
+
+
+def test_a_simulator_that_takes_inputs_is_driven_by_altered_ones():
+    dead = np.sign(FORCE) * np.maximum(np.abs(FORCE) - 2.0, 0.0)
+    trials_seen = set()
+
+    def spring(params, effects, inputs, trials):
+        trials_seen.add(tuple(t.name for t in trials))
+        assert inputs["force_N"].size == trials[-1].samples.stop
+        force = inputs["force_N"]
+        return params["compliance"] * force + effects["bend"] * force**2
+
+    length = 2.1 * dead + noise(FORCE.size)
+    found = diagnose(spring, length, wrap=["input.dead_zone", "input.delay", "output.delay", "output.backlash"])
+    assert found.named == ["input.dead_zone"]
+    assert found.effects["input.dead_zone"]["w"] == pytest.approx(2.0, rel=0.05)
+    assert trials_seen == {("the recording",)}
+
+
+def test_two_outputs_come_as_a_dict():
+    squared = 0.1 * FORCE**2
+    slow = [squared[0]]
+    for x in squared[1:]:  # a time constant of 0.3 s
+        slow.append(slow[-1] + (x - slow[-1]) * (1.0 - np.exp(-0.01 / 0.3)))
+
+    class Both:
+        def simulate(self, params, effects):
+            return {"length_mm": params[:, :1] * FORCE, "heat_W": params[:, 1:] * squared}
+
+    data = {
+        "force_N": FORCE,
+        "length_mm": 2.1 * FORCE + noise(FORCE.size),
+        "heat_W": 1.02 * np.array(slow) + noise(FORCE.size, 1),
+    }
+    stages = [
+        stretch.Stage("length_mm", ["force_N"], name="spring"),
+        stretch.Stage("heat_W", ["force_N"], name="heater"),
+    ]
+    found = stretch.diagnose(
+        Both(),
+        data,
+        stages=stages,
+        rate_hz=RATE_HZ,
+        parameters={
+            "compliance": stretch.Parameter(2.0, 0.2, stages=["spring"]),
+            "loss": stretch.Parameter(1.0, 0.05, stages=["heater"]),
+        },
+        wrap=["heat_W.lag", "length_mm.backlash"],
+    )
+    assert found.named == ["heater.output.lag"]
+    assert found.where["heat_W"] > 0.9
+    assert set(found.how_far["retuned"]) == {"length_mm", "heat_W"}
+
+
+def test_recordings_come_in_many_forms(bent):
+    half = FORCE.size // 2
+    parts = [
+        {"force_N": FORCE[:half], "length_mm": BENT[:half]},
+        stretch.Trial({"force_N": FORCE[half:], "length_mm": BENT[half:]}, rate_hz=RATE_HZ, name="tuesday", test=True),
+    ]
+    question = {
+        "output": "length_mm",
+        "inputs": ["force_N"],
+        "parameters": {"compliance": (2.0, 0.2)},
+        "effects": {"bend": stretch.Argument(-0.05, 0.05, unit="mm/N2")},
+        "wrap": None,
+    }
+    assert stretch.diagnose(Spring(), parts, rate_hz=RATE_HZ, **question).named == ["bend"]
+    pandas = pytest.importorskip("pandas")
+    time_s = np.arange(FORCE.size) / RATE_HZ
+    frame = pandas.DataFrame({"time_s": time_s, "force_N": FORCE, "length_mm": BENT})
+    assert stretch.diagnose(Spring(), frame, **question).named == ["bend"]
+
+
+def test_what_the_simulator_raises_comes_out_as_it_is():
+    class Broken(RuntimeError):
+        pass
+
+    error = Broken("the solver fell over")
+
+    def spring(params, effects):
+        raise error
+
+    with pytest.raises(Broken) as caught:
+        diagnose(spring, BENT)
+    assert caught.value is error
+    assert any("test_diagnosis.py" in str(entry.path) for entry in caught.traceback)
+
+
+def test_values_that_are_refused_turn_the_fit_back():
+    class Careful(Spring):
+        refused = 0
+
+        def simulate(self, params, effects):
+            if np.any(effects["bend"] < -0.005):
+                self.refused += 1
+                raise stretch.Refused("bent the other way")
+            return super().simulate(params, effects)
+
+    careful = Careful()
+    found = diagnose(careful, BENT)
+    assert careful.refused > 0 and found.named == ["bend"]
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        (lambda length: length[:-1], r"returned the shape \(5999,\) for length_mm; \(6000,\) was expected"),
+        (lambda length: np.zeros((2, length.size)), r"the shape \(2, 6000\) for length_mm; \(6000,\) was expected"),
+        (lambda length: np.where(np.arange(length.size) == 50, np.nan, length), r"gave NaN at 0\.5 s of trial"),
+        (lambda length: "six", "returned no numbers"),
+        (lambda length: {"width_mm": length}, "returned no length_mm; it returned width_mm"),
+        (lambda length: None, "returned"),
+    ],
+)
+def test_answers_that_are_none_say_what_was_expected(answer, words):
+    with pytest.raises(stretch.StretchError, match=words):
+        diagnose(lambda params, effects: answer(params["compliance"] * FORCE), BENT)
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"output": "width_mm"}, "there is no column width_mm; the columns are force_N, length_mm"),
+        ({"output": None}, "say what is held against the measurement"),
+        ({"wrap": ["output.backlsh"]}, "did you mean output.backlash"),
+        ({"wrap": ["input.delay"]}, "must take the argument inputs"),
+        ({"effects": {"bend": 0.3}}, "effect bend is 0.3; give"),
+        ({"effects": {"bend": (0.05, -0.05)}}, "the range 0.05 to -0.05 is empty"),
+        ({"parameters": {"compliance": stretch.Parameter(0.0, relative=0.1)}}, "give an absolute tolerance"),
+        ({"rate_hz": None}, "give either rate_hz"),
+    ],
+)
+def test_bad_questions_are_refused_in_a_sentence(more, words):
+    with pytest.raises(stretch.StretchError, match=words):
+        diagnose(Spring(), BENT, **more)
+    with pytest.raises(stretch.StretchError, match="give an object with a method simulate"):
+        diagnose(3, BENT)
+
+
+def test_a_dead_column_is_told_and_no_effect_is_blamed():
+    with pytest.raises(stretch.StretchError, match="dead"):
+        diagnose(Spring(), np.zeros_like(BENT))
+
+
+def test_progress_is_told_and_may_stop_it():
+    words = []
+    diagnose(Spring(), BENT, progress=words.append)
+    assert "test trials" in words
+
+    def enough(_):
+        raise TimeoutError("enough")
+
+    with pytest.raises(TimeoutError, match="enough"):
+        diagnose(Spring(), BENT, progress=enough)
+
+
+PROBLEM = """
+name = "spring"
+simulator = {simulator}
+wrap = ["input.delay", "output.backlash"]
+
+[[stage]]
+name = "spring"
+output = "length_mm"
+inputs = ["force_N"]
+
+[[parameter]]
+name = "compliance"
+unit = "mm/N"
+value = 2.0
+tolerance = 0.2
+
+[[effect]]
+name = "bend"
+range = [-0.05, 0.05]
+off = 0.0
+
+[[trial]]
+file = "trial.csv"
+"""
+
+WORKER = """
+class Spring:
+    def begin(self, session):
+        assert session["stages"][0]["output"] == "length_mm"
+        self.samples = [t["samples"] for t in session["trials"]]
+
+    def simulate(self, params, effects, inputs, trials):
+        assert [t.samples.stop - t.samples.start for t in trials] == self.samples[: len(trials)]
+        force = inputs["force_N"]
+        assert force.shape == (len(params), trials[-1].samples.stop)
+        return params["compliance"][:, None] * force + effects["bend"][:, None] * force**2
+"""
+
+
+@pytest.fixture
+def problem_file(tmp_path):
+    time_s = np.arange(FORCE.size) / RATE_HZ
+    columns = np.column_stack([time_s, FORCE, BENT])
+    np.savetxt(tmp_path / "trial.csv", columns, "%.9g", ",", header="time_s,force_N,length_mm", comments="")
+    (tmp_path / "worker.py").write_text(WORKER)
+    path = tmp_path / "problem.toml"
+    path.write_text(PROBLEM.replace("{simulator}", '{ python = "worker:Spring" }'))
+    return path
+
+
+def test_a_problem_that_is_a_file_takes_an_object_or_its_own_simulator(problem_file):
+    found = stretch.diagnose(Spring(), problem_file)
+    assert found.named == ["bend"]
+    assert found.parameters["compliance"] == pytest.approx(2.1, rel=0.01)
+    own = stretch.diagnose(None, str(problem_file))
+    assert own.named == ["bend"]
+    names = {}
+    exec(WORKER, names)
+    here = stretch.diagnose(names["Spring"](), problem_file)
+    # the same object in another process: the same bits
+    assert here.probabilities == own.probabilities and here.parameters == own.parameters
+    with pytest.raises(stretch.StretchError, match="says what is diagnosed"):
+        stretch.diagnose(Spring(), problem_file, output="length_mm")
+    with pytest.raises(stretch.StretchError, match="there is no simulator"):
+        stretch.diagnose(None, {"force_N": FORCE, "length_mm": BENT})

@@ -32,8 +32,9 @@ pub(crate) fn lacking(
     if verdict.kind == VerdictKind::Unknown {
         let is_random = instead.as_ref().is_some_and(|p| p.random);
         let is_noise = gaps.left < NOISE && (is_random || problem.is_transmitted(best));
+        let noise = VerdictKind::Parameters;
         return Ok(match is_noise && verdict.overruled.is_none() {
-            true => (Verdict { kind: VerdictKind::Parameters, ..verdict }, None),
+            true => (Verdict { kind: noise, seen: noise, ..verdict }, None),
             false => (verdict, instead),
         });
     }

@@ -8,7 +8,7 @@ mod rows;
 use approx::{abs_diff_eq, assert_abs_diff_eq};
 use rows::{PROBABILITY, with_lost_rows};
 use stretch_bench::{BenchError, GaugeSetup, GaugeSimulator};
-use stretch_data::{Channel, RigFile, SessionTrial, Split, Trial, TrialKind};
+use stretch_data::{Channel, RigFile, SessionTrial, Split, Trial};
 use stretch_gap::{Diagnosis, Options, Simulator, VerdictKind, diagnose, next_experiment};
 use stretch_sim::{Catalogue, GaugeRig};
 use support::Noise;

@@ -91,6 +91,9 @@ cargo package --quiet --locked --allow-dirty --target-dir "$packages" $(printf -
 step "fuzz targets compile"
 cargo check --quiet --locked --manifest-path fuzz/Cargo.toml
 
+step "FMUs, a workspace of their own"
+fmu/gate.sh
+
 step "firmware in the emulator"
 if [ -x firmware/gate.sh ]; then
     firmware/gate.sh

@@ -205,7 +205,9 @@ impl Instance {
             ))),
             Status::Fatal => {
                 // Not even to be freed: whatever it holds is lost.
-                self.native.take().map(mem::forget);
+                if let Some(native) = self.native.take() {
+                    mem::forget(native);
+                }
                 Err(Stopped::Fatal(format!("{call} answers fatal{said}")))
             }
         }

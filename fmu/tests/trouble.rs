@@ -84,8 +84,10 @@ fn names_and_units_that_do_not_fit_are_refused() {
     assert!(error.contains("no parameter, effect or column brak (did you mean brake?)"), "{error}");
 }
 
+type Answer = Result<Vec<f64>, SourceError>;
+
 /// What comes of a model of which one value makes trouble.
-fn troubled(fmi: u8, trouble: f64) -> Option<(Result<Vec<f64>, SourceError>, Vec<String>)> {
+fn troubled(fmi: u8, trouble: f64) -> Option<(Answer, Vec<String>)> {
     let built = servo(fmi, Wrong::Nothing)?;
     let mut spec = spec();
     let known = Parameter { name: "trouble".into(), value: trouble, ..Parameter::default() };

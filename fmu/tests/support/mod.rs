@@ -162,7 +162,7 @@ pub(crate) fn spec() -> ProblemSpec {
         let mut dice = Dice::new(3, index);
         let mut held = 0.0;
         let command = |i: usize| {
-            if i % 60 == 0 {
+            if i.is_multiple_of(60) {
                 held = 3.0 * dice.gauss();
             }
             held

@@ -20,6 +20,14 @@ macro_rules! as_is {
             self.simulator.rows_used()
         }
 
+        fn is_costly(&self, effect: usize) -> bool {
+            // Effects that were added behind its own cost what it costs.
+            match effect < self.simulator.effects().len() {
+                true => self.simulator.is_costly(effect),
+                false => self.simulator.model_runs().is_some(),
+            }
+        }
+
         fn model_runs(&self) -> Option<$crate::simulator::ModelRuns> {
             self.simulator.model_runs()
         }

@@ -174,7 +174,7 @@ fn run(
     };
     let unknown = unknown(evidence.gap, thresholds);
     let mut told = tell(answer, case, simulator, &evidence, &shares);
-    let model_runs = simulator.model_runs();
+    let model_runs = runs.counted();
     told.notes.extend(model_runs.and_then(|runs| runs.note()));
     let diagnosis = Diagnosis {
         schema: 1,

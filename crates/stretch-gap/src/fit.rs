@@ -20,7 +20,7 @@
 //! Effects and nominal parameters must move together. An effect fitted with the nominal parameters held is credited with what
 //! they could have done (Brynjarsdottir and O'Hagan 2014, doi 10.1088/0266-5611/30/11/114007).
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rayon::iter::ParallelIterator;
 
 use crate::{
@@ -201,6 +201,7 @@ impl<'a, 'b> Descent<'a, 'b> {
                     self.columns[i] = self.stages.iter().map(of).collect();
                 }
                 Coordinate::Nominal { .. } if !renew => {}
+                _ if !renew && !is_first && self.is_costly(place.0) => {}
                 _ => due.push(i),
             }
         }
@@ -213,6 +214,16 @@ impl<'a, 'b> Descent<'a, 'b> {
         }
         self.normal_equations();
         Ok(())
+    }
+
+    /// Whether a coordinate is that of an effect whose every value is a run that costs.
+    fn is_costly(&self, coordinate: Coordinate) -> bool {
+        match coordinate {
+            Coordinate::Nominal { .. } => false,
+            Coordinate::Linear { slot, .. } | Coordinate::Log { slot, .. } => {
+                self.compare.simulator().is_costly(self.model.effects[slot].0)
+            }
+        }
     }
 
     fn normal_equations(&mut self) {
@@ -252,12 +263,17 @@ impl<'a, 'b> Descent<'a, 'b> {
             [(bounds[0] - x[i]).max(-c.stride()), (bounds[1] - x[i]).min(c.stride())]
         };
         let (low, high): (Vec<f64>, Vec<f64>) = (0..n).map(reach).map(|[l, h]| (l, h)).unzip();
+        let is_counted = self.compare.simulator().model_runs().is_some();
         for _ in 0..TRIES {
             let mut damped = self.normal.clone();
             for i in 0..n {
                 damped[(i, i)] += self.lambda * self.normal[(i, i)] + RIDGE;
             }
             let step = boxed(&damped, &self.gradient, &low, &high);
+            // Where runs are counted, none is made for what the line itself says is nothing.
+            if is_counted && self.foretold(&step) < LEAST_GAIN.0 + LEAST_GAIN.1 * self.cost {
+                return Ok(false);
+            }
             let mut next = self.model.clone();
             for (((c, _), x), s) in self.coordinates.iter().zip(&x).zip(&step) {
                 c.write(&mut next, x + s);
@@ -278,6 +294,13 @@ impl<'a, 'b> Descent<'a, 'b> {
             self.lambda = (8.0 * self.lambda).max(1e-4);
         }
         Ok(false)
+    }
+
+    /// Fall of the cost that the linearised residuals foretell of a step: -(g'd + d'N d/2).
+    fn foretold(&self, step: &[f64]) -> f64 {
+        let d = DVector::from_column_slice(step);
+        let slope: f64 = self.gradient.iter().zip(step).map(|(g, s)| g * s).sum();
+        -(slope + 0.5 * d.dot(&(&self.normal * &d)))
     }
 
     /// Misfits, and standard deviations by Laplace's approximation: the covariance is N^-1.

@@ -2,12 +2,12 @@
 
 use std::sync::{
     Arc,
-    atomic::{AtomicUsize, Ordering},
+    atomic::{AtomicBool, AtomicUsize, Ordering},
 };
 
 use crate::{
     error::GapError,
-    simulator::{Model, Run, Simulator},
+    simulator::{Model, ModelRuns, Run, Simulator},
 };
 
 /// A simulator, how often it was run, and whether to go on. Clones share the count.
@@ -16,6 +16,7 @@ pub(crate) struct Runs<'a> {
     simulator: &'a dyn Simulator,
     stop: &'a (dyn Fn() -> bool + Sync),
     count: Arc<AtomicUsize>,
+    was_cut: Arc<AtomicBool>,
 }
 
 impl<'a> Runs<'a> {
@@ -27,7 +28,7 @@ impl<'a> Runs<'a> {
         simulator: &'a dyn Simulator,
         stop: &'a (dyn Fn() -> bool + Sync),
     ) -> Result<Self, GapError> {
-        let runs = Self { simulator, stop, count: Arc::default() };
+        let runs = Self { simulator, stop, count: Arc::default(), was_cut: Arc::default() };
         let needed = runs.samples(simulator.trials().len());
         for (stage, spec) in simulator.stages().iter().enumerate() {
             let finite = simulator.measured(stage).iter().take_while(|x| x.is_finite());
@@ -44,16 +45,25 @@ impl<'a> Runs<'a> {
     where
         'a: 'b,
     {
-        Runs { simulator, stop: self.stop, count: Arc::clone(&self.count) }
+        let (count, was_cut) = (Arc::clone(&self.count), Arc::clone(&self.was_cut));
+        Runs { simulator, stop: self.stop, count, was_cut }
     }
 
     pub(crate) fn simulator(&self) -> &'a dyn Simulator {
         self.simulator
     }
 
-    /// Whether the simulator's budget allows no more than what the answer itself needs.
+    /// Whether the simulator's budget allows no more than what the answer itself needs; whoever asks goes no further then.
     pub(crate) fn is_spent(&self) -> bool {
-        self.simulator.model_runs().is_some_and(|runs| runs.is_spent)
+        let is_spent = self.simulator.model_runs().is_some_and(|runs| runs.is_spent);
+        self.was_cut.fetch_or(is_spent, Ordering::Relaxed);
+        is_spent
+    }
+
+    /// Runs that the simulator counts, and whether a search was cut short for want of them.
+    pub(crate) fn counted(&self) -> Option<ModelRuns> {
+        let is_spent = self.was_cut.load(Ordering::Relaxed);
+        self.simulator.model_runs().map(|runs| ModelRuns { is_spent, ..runs })
     }
 
     pub(crate) fn stop(&self) -> &'a (dyn Fn() -> bool + Sync) {

@@ -88,7 +88,7 @@ pub struct ModelRuns {
     pub count: usize,
     /// How many may be made, where that is limited.
     pub budget: Option<usize>,
-    /// Whether no more may be made but those that the answer itself needs.
+    /// Whether no more may be made but those that the answer itself needs; in a diagnosis, whether the search was cut short for it.
     pub is_spent: bool,
 }
 
@@ -168,6 +168,12 @@ pub trait Simulator: Sync {
     fn linearise(&self, stage: usize, model: &Model, trials: usize) -> Result<(), GapError> {
         let _ = (stage, model, trials);
         Ok(())
+    }
+    /// Whether each value of an effect is a run of something that costs, so that its sensitivities are renewed as seldom as those of the
+    /// nominal parameters.
+    fn is_costly(&self, effect: usize) -> bool {
+        let _ = effect;
+        false
     }
     /// Runs of what is simulated, where that is not as many as simulations of stages: a black box is not run anew for what stands behind it.
     fn model_runs(&self) -> Option<ModelRuns> {

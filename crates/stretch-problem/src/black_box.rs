@@ -167,7 +167,7 @@ impl BlackBox {
     }
 
     /// The run that a run is told from, and how far it lies from there; the run itself where it has to be exact.
-    fn told(&self, run: &Run<'_>) -> (Inner, Option<(Arc<Linear>, Vec<f64>)>) {
+    fn told(&self, run: &Run<'_>) -> (Inner, Option<Apart>) {
         let inner = self.inner(run);
         let line = run.near.filter(|_| run.shake.is_none()).zip(self.line(run.stage));
         let Some((near, line)) = line.filter(|(_, line)| line.trials() >= run.trials) else {
@@ -234,6 +234,9 @@ impl BlackBox {
     }
 }
 
+/// A linearisation, and how far the parameters of a run lie from those of the run that it is told from.
+type Apart = (Arc<Linear>, Vec<f64>);
+
 /// Runs that the answer itself needs once the search is over, and more for each stage.
 const ANSWER: (usize, usize) = (20, 8);
 
@@ -271,8 +274,7 @@ impl Simulator for BlackBox {
     }
 
     fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
-        let told: Vec<(Inner, Option<(Arc<Linear>, Vec<f64>)>)> =
-            runs.iter().map(|run| self.told(run)).collect();
+        let told: Vec<(Inner, Option<Apart>)> = runs.iter().map(|run| self.told(run)).collect();
         let inner: Vec<Inner> = told.iter().map(|(inner, _)| inner.clone()).collect();
         let outputs = self.runs.outputs(self.problem.session(), &inner);
         let each = runs.iter().zip(&told).zip(outputs).zip(outs);
@@ -305,6 +307,13 @@ impl Simulator for BlackBox {
             Err(error) => return Err(refused(error)),
         }
         Ok(())
+    }
+
+    fn is_costly(&self, effect: usize) -> bool {
+        match self.problem.acting[effect] {
+            Acting::Own(_) => true,
+            Acting::Wrapper(at) => self.problem.wrappers[at].site.side == Side::Input,
+        }
     }
 
     fn model_runs(&self) -> Option<ModelRuns> {

@@ -25,4 +25,4 @@ pub use source::{
     Ask, Closure, Session, SessionColumn, SessionPart, SessionStage, Source, SourceError, closure,
 };
 pub use spec::{Argument, Input, OwnEffect, Parameter, ProblemSpec, Stage, Tolerance};
-pub use wrap::{Beside, Extent, Family, Side, Wrapper, wrapper_named, wrappers};
+pub use wrap::{Beside, Extent, Family, Measure, Side, Starts, Wrapper, wrapper_named, wrappers};

@@ -6,12 +6,13 @@ use std::{
     sync::Arc,
 };
 
+use proptest::prelude::*;
 use stretch_data::{Channel, SessionTrial, Trial};
 use stretch_gap::{Diagnosis, Dice, Options, diagnose};
 use stretch_problem::{
     Argument, Ask, BlackBox, OwnEffect, Parameter, Problem, ProblemSpec, Source, SourceError,
     Stage, Tolerance,
-    worker::{Workers, WorkersSpec},
+    worker::{Frame, Workers, WorkersSpec},
 };
 
 const SAMPLES: usize = 3000;
@@ -212,4 +213,31 @@ fn a_worker_that_does_not_fit_is_refused_at_its_hello() {
     }
     let (_, none) = workers(&["no-such-program"], 1);
     assert!(none.unwrap_err().contains("no-such-program could not be started"));
+}
+
+proptest! {
+    #[test]
+    fn any_bytes_are_a_frame_or_an_error(mut bytes in proptest::collection::vec(any::<u8>(), 0..200), is_framed: bool) {
+        if is_framed && bytes.len() > 16 {
+            bytes[..4].copy_from_slice(b"STR1");
+            bytes[5..8].fill(0);
+            bytes[9..16].fill(0);
+        }
+        if let Ok(Some((frame, used))) = Frame::first(&bytes) {
+            prop_assert!(used <= bytes.len());
+            prop_assert!(16 + 8 * frame.body.len() <= used);
+        }
+    }
+
+    #[test]
+    fn a_frame_is_read_as_it_was_written(body in proptest::collection::vec(any::<u64>(), 0..50), behind: Vec<u8>) {
+        let numbers: Vec<f64> = body.iter().map(|bits| f64::from_bits(*bits)).collect();
+        let mut bytes = Frame::bytes(&serde_json::json!({ "kind": "outputs" }), &numbers);
+        let whole = bytes.len();
+        prop_assert_eq!(Frame::first(&bytes[..whole - 1]), Ok(None));
+        bytes.extend(behind);
+        let (frame, used) = Frame::first(&bytes).unwrap().unwrap();
+        prop_assert_eq!(used, whole);
+        prop_assert_eq!(frame.body.iter().map(|x| x.to_bits()).collect::<Vec<_>>(), body);
+    }
 }

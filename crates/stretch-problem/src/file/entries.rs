@@ -2,11 +2,22 @@
 
 use stretch_data::Split;
 
-use super::{TrialFile, table::View};
+use super::table::View;
 use crate::{
     error::ProblemError,
     spec::{Argument, Input, OwnEffect, Parameter, Stage, Tolerance},
 };
+
+/// A trial of a problem's file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrialFile {
+    /// File, relative to the problem's folder.
+    pub file: String,
+    /// Session time of its first sample, s; trials without follow one another.
+    pub start_s: f64,
+    /// Whether it may be fitted or only tested on.
+    pub split: Split,
+}
 
 pub(super) fn stage(view: View<'_>) -> Result<Stage, ProblemError> {
     view.only(&["name", "output", "unit", "inputs", "noise", "velocity", "position"])?;

@@ -6,27 +6,17 @@ mod table;
 
 use std::path::{Path, PathBuf};
 
-use stretch_data::{ReadOptions, SessionTrial, Split, Trial, TrialKind};
+use stretch_data::{ReadOptions, SessionTrial, Trial, TrialKind};
 
 use crate::{error::ProblemError, spec::ProblemSpec, worker::WorkersSpec};
 use entries::{effect, input, parameter, stage, trial};
 use table::View;
 
+pub use entries::TrialFile;
 pub use simulator::{SimulatorEntry, WorkersEntry};
 
 /// Largest file that is read: people write these.
 const LARGEST_BYTES: usize = 4 << 20;
-
-/// A trial of a problem's file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TrialFile {
-    /// File, relative to the problem's folder.
-    pub file: String,
-    /// Session time of its first sample, s; trials without follow one another.
-    pub start_s: f64,
-    /// Whether it may be fitted or only tested on.
-    pub split: Split,
-}
 
 /// The contents of a `problem.toml`.
 ///

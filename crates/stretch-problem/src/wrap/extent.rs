@@ -15,6 +15,8 @@ pub struct Extent {
     pub trial_s: f64,
     /// From the first to the last sample of the session, s.
     pub session_s: f64,
+    /// Step of the lattice that the values stand on best.
+    pub lattice: f64,
     /// Least and greatest value of what the wrapper looks at beside the channel.
     pub beside: [f64; 2],
 }
@@ -30,9 +32,10 @@ impl Extent {
             true => 0.0,
             false => *rates.select_nth_unstable_by(at, f64::total_cmp).1,
         };
-        let longest = parts.map(<[f64]>::len).max().unwrap_or(0);
+        let longest = parts.clone().map(<[f64]>::len).max().unwrap_or(0);
         let trial_s = longest as f64 * dt_s;
-        Self { low, high, quickest, dt_s, trial_s, session_s: trial_s, beside: [0.0; 2] }
+        let lattice = lattice(parts.flatten(), [low, high]);
+        Self { low, high, quickest, dt_s, trial_s, session_s: trial_s, lattice, beside: [0.0; 2] }
     }
 
     /// From the least to the greatest value.
@@ -49,6 +52,38 @@ impl Extent {
     pub fn beside_size(&self) -> f64 {
         self.beside[0].abs().max(self.beside[1].abs())
     }
+}
+
+/// Steps that a span may have on a lattice, and values that are looked at.
+const STEPS: [f64; 2] = [10.0, 400.0];
+const LOOKED: usize = 2000;
+
+/// The step d for which the values stand most nearly on multiples of it: the greatest |mean of exp(2 pi i x/d)| (Rayleigh's test), over
+/// 1/d in steps that leave no phase of the span further apart than a quarter turn.
+fn lattice<'a>(values: impl Iterator<Item = &'a f64> + Clone, [low, high]: [f64; 2]) -> f64 {
+    let span = high - low;
+    if !(span.is_finite() && span > 0.0) {
+        return 0.0;
+    }
+    let every = values.clone().count().div_ceil(LOOKED).max(1);
+    let some: Vec<f64> = values.step_by(every).copied().collect();
+    let reach = span.max(low.abs()).max(high.abs());
+    let (mut best, mut most) = (span / STEPS[1], 0.0);
+    let mut per_unit = STEPS[0] / span;
+    while per_unit <= STEPS[1] / span {
+        let (mut cos, mut sin) = (0.0, 0.0);
+        for x in &some {
+            let angle = std::f64::consts::TAU * (x * per_unit);
+            cos += angle.cos();
+            sin += angle.sin();
+        }
+        // Multiples stand at phase 0.
+        if cos > most && cos > sin.abs() {
+            (best, most) = (1.0 / per_unit, cos);
+        }
+        per_unit += 0.1 / reach;
+    }
+    best
 }
 
 /// Least and greatest.

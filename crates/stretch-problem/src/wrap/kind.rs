@@ -3,7 +3,7 @@
 use stretch_gap::EffectParameterSpec;
 use stretch_operators::{Grid, Operator};
 
-use super::{extent::Extent, forces, loops, scales, times};
+use super::extent::Extent;
 
 /// Where a wrapper stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,6 +26,12 @@ pub enum Beside {
     /// The velocity at which the stage rubs.
     Velocity,
 }
+
+/// Values to screen a wrapper at, from the extent of its channel.
+pub type Starts = fn(&Extent) -> Vec<Vec<f64>>;
+
+/// How much of what its family shares the numbers of a wrapper make.
+pub type Measure = fn(&[f64]) -> f64;
 
 /// What wrappers of one family agree on where data do not tell them apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,13 +65,13 @@ pub struct Wrapper {
     /// Its numbers, their ranges from the channel's own span.
     pub parameters: fn(&Extent, &str) -> Vec<EffectParameterSpec>,
     /// Values to screen it at; without any those of [`EffectSpec::new`](stretch_gap::EffectSpec::new).
-    pub starts: Option<fn(&Extent) -> Vec<Vec<f64>>>,
+    pub starts: Option<Starts>,
     /// The operator with these values.
     pub operator: fn(&[f64], &Extent, &Grid) -> Box<dyn Operator>,
     /// Kinds that are hard to tell from it on the same channel.
     pub twins: &'static [&'static str],
     /// What it shares with others of its family that data may not tell apart, and how much of it its numbers make.
-    pub family: Option<(Family, fn(&[f64]) -> f64)>,
+    pub family: Option<(Family, Measure)>,
     /// Whether its memory goes on from trial to trial.
     pub counts_session: bool,
     /// Whether its course is found in the record (the phase of a hum).
@@ -91,41 +97,6 @@ impl Wrapper {
         is_found: false,
         least_rate_hz: 0.0,
     };
-}
-
-/// Every kind, in the order in which they act where several are on.
-static ALL: [&Wrapper; 21] = [
-    &forces::COULOMB,
-    &forces::VISCOUS,
-    &forces::STRIBECK,
-    &loops::DEAD_ZONE,
-    &loops::BACKLASH,
-    &loops::HYSTERESIS,
-    &loops::BOUC_WEN,
-    &scales::CURVE,
-    &scales::SOFTENING,
-    &forces::CROSSTALK,
-    &times::SLEW_LIMIT,
-    &times::LAG,
-    &times::SECOND_ORDER_LAG,
-    &times::RELAXATION,
-    &scales::SATURATION,
-    &scales::OFFSET,
-    &scales::DRIFT,
-    &times::DELAY,
-    &times::SKEW,
-    &forces::HUM,
-    &scales::QUANTISATION,
-];
-
-/// Every kind of wrapper, in the order in which they act where several are on.
-pub fn wrappers() -> impl Iterator<Item = &'static Wrapper> + Clone {
-    ALL.iter().copied()
-}
-
-/// The kind of that name.
-pub fn wrapper_named(name: &str) -> Option<&'static Wrapper> {
-    wrappers().find(|w| w.name == name)
 }
 
 /// A strength from 0, at which it does nothing, or of both signs.

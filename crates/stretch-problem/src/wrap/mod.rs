@@ -2,6 +2,7 @@
 //!
 //! One literal is one kind of wrapper; a kind at a place (an input or the output of a stage) is an effect.
 
+mod catalogue;
 mod extent;
 mod forces;
 mod kind;
@@ -10,7 +11,8 @@ mod place;
 mod scales;
 mod times;
 
+pub use catalogue::{wrapper_named, wrappers};
 pub use extent::Extent;
 pub(crate) use extent::ends;
-pub use kind::{Beside, Family, Side, Wrapper, wrapper_named, wrappers};
+pub use kind::{Beside, Family, Measure, Side, Starts, Wrapper};
 pub(crate) use place::{Among, Placed, Site, Trials, placed};

@@ -6,8 +6,9 @@ use stretch_gap::EffectSpec;
 use stretch_operators::{Grid, Span, Start};
 
 use super::{
+    catalogue::wrappers,
     extent::{Extent, ends},
-    kind::{Beside, Side, Wrapper, wrappers},
+    kind::{Beside, Side, Wrapper},
 };
 use crate::{columns::Columns, error::ProblemError, velocity::Velocity};
 
@@ -219,10 +220,9 @@ impl Placed {
 
     /// Acts on a channel of one trial after the other; `found` is what was measured of it, where its course is found in there.
     pub(crate) fn act(&self, values: &[f64], trials: &Trials<'_>, channel: &mut [f64]) {
-        let is_off = |(p, v): (stretch_gap::EffectParameterSpec, &f64)| p.off == Some(*v);
         let parameters = (self.kind.parameters)(&self.extent, &self.site.unit);
-        let strengths = parameters.into_iter().zip(values).filter(|(p, _)| p.off.is_some());
-        if strengths.map(is_off).all(|off| off) {
+        let mut strengths = parameters.iter().zip(values).filter(|(p, _)| p.off.is_some());
+        if strengths.all(|(p, v)| p.off == Some(*v)) {
             return;
         }
         let operator = (self.kind.operator)(values, &self.extent, trials.grid);

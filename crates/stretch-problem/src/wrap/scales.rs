@@ -64,7 +64,7 @@ pub(super) static QUANTISATION: Wrapper = Wrapper {
     equation: "y = step round(x/step)",
     usual: &[],
     parameters: |e, unit| vec![strength("step", unit, 0.0, 0.1 * e.span())],
-    starts: Some(|e| [0.004, 0.01, 0.025, 0.06].map(|k| vec![k * e.span()]).into()),
+    starts: Some(|e| vec![vec![e.lattice], vec![0.01 * e.span()]]),
     operator: |v, _, _| Box::new(Quantiser { step: v[0].max(1e-300) }),
     ..Wrapper::PLAIN
 };
@@ -95,10 +95,15 @@ pub(super) static DRIFT: Wrapper = Wrapper {
     ..Wrapper::PLAIN
 };
 
+/// The value that does not soften: 0 where the channel passes it, else its end nearest to 0.
+fn zero(e: &Extent) -> f64 {
+    0.0_f64.clamp(e.low, e.high)
+}
+
 pub(super) static SOFTENING: Wrapper = Wrapper {
     name: "softening",
     words: "its response weakens with the distance travelled",
-    equation: "y = low + (x - low)(1 - m (1 - (1 + tail travel/n)^(-1/tail))), travel since the session began",
+    equation: "y = zero + (x - zero)(1 - m (1 - (1 + tail travel/n)^(-1/tail))), travel since the session began",
     usual: &[Output],
     beside: Beside::Itself,
     parameters: |e, unit| {
@@ -107,11 +112,12 @@ pub(super) static SOFTENING: Wrapper = Wrapper {
             strength("m", "1", 0.0, 0.5),
             shape("n", unit, 1.5 * s, 200.0 * s),
             log_form("tail", "1", [0.05, 2.5], 1.0 / 3.0),
+            form("zero", unit, [e.low - s, e.high + s], zero(e)),
         ]
     },
     operator: |v, e, _| {
         let reversal = 2e-3 * e.span();
-        Box::new(Softening { m: v[0], n: v[1], tail: v[2], zero: e.low, reversal })
+        Box::new(Softening { m: v[0], n: v[1], tail: v[2], zero: v[3], reversal })
     },
     counts_session: true,
     ..Wrapper::PLAIN

@@ -1,0 +1,201 @@
+//! Plants that do what the servo of the simulator leaves out, each written from its equation, with no operator of the project.
+
+use super::{DT_S, plain};
+
+/// Something hidden behind or in front of the servo: its name, and the plant.
+pub(crate) type Hidden = (&'static str, Box<dyn Fn(&[f64], f64) -> Vec<f64>>);
+
+pub(crate) fn hidden() -> Vec<Hidden> {
+    vec![
+        (
+            "input.delay",
+            Box::new(|u, _| {
+                let late: Vec<f64> = (0..u.len()).map(|i| u[i.saturating_sub(7)]).collect();
+                plain(&late, 0.0)
+            }),
+        ),
+        (
+            "input.dead_zone",
+            Box::new(|u, _| {
+                let dead: Vec<f64> = u.iter().map(|u| u - u.clamp(-0.4, 0.4)).collect();
+                plain(&dead, 0.0)
+            }),
+        ),
+        (
+            "input.saturation",
+            Box::new(|u, _| {
+                let held: Vec<f64> = u.iter().map(|u| u.clamp(-3.5, 3.5)).collect();
+                plain(&held, 0.0)
+            }),
+        ),
+        (
+            "output.lag",
+            Box::new(|u, _| {
+                let mut z = None;
+                let slow = |y: f64| {
+                    let z = z.get_or_insert(y);
+                    *z += (y - *z) * (1.0 - (-DT_S / 0.04_f64).exp());
+                    *z
+                };
+                plain(u, 0.0).into_iter().map(slow).collect()
+            }),
+        ),
+        (
+            "output.backlash",
+            Box::new(|u, _| {
+                let mut z = 0.0_f64;
+                plain(u, 0.0)
+                    .into_iter()
+                    .map(|y| {
+                        z = z.clamp(y - 1.0, y + 1.0);
+                        z
+                    })
+                    .collect()
+            }),
+        ),
+        (
+            "output.curve",
+            Box::new(|u, _| plain(u, 0.0).into_iter().map(|y| y + 0.0006 * y * y).collect()),
+        ),
+        (
+            "output.saturation",
+            Box::new(|u, _| plain(u, 0.0).into_iter().map(|y| y.min(35.0)).collect()),
+        ),
+        (
+            "output.drift",
+            Box::new(|u, start_s| {
+                let y = plain(u, 0.0).into_iter().enumerate();
+                y.map(|(i, y)| y + 0.01 * (start_s + i as f64 * DT_S)).collect()
+            }),
+        ),
+        (
+            "input.slew_limit",
+            Box::new(|u, _| {
+                let mut z = u[0];
+                let slow = |u: &f64| {
+                    z += (u - z).clamp(-0.12, 0.12);
+                    z
+                };
+                plain(&u.iter().map(slow).collect::<Vec<_>>(), 0.0)
+            }),
+        ),
+        (
+            "input.backlash",
+            Box::new(|u, _| {
+                let mut z = 0.0_f64;
+                let play = |u: &f64| {
+                    z = z.clamp(u - 0.4, u + 0.4);
+                    z
+                };
+                plain(&u.iter().map(play).collect::<Vec<_>>(), 0.0)
+            }),
+        ),
+        (
+            "input.curve",
+            Box::new(|u, _| plain(&u.iter().map(|u| u + 0.012 * u * u).collect::<Vec<_>>(), 0.0)),
+        ),
+        (
+            "input.offset",
+            Box::new(|u, _| {
+                // The servo stands still until it is commanded, so that an offset of the command is none of the angle.
+                plain(&u.iter().map(|u| u + 0.5).collect::<Vec<_>>(), 0.0)
+            }),
+        ),
+        (
+            "output.skew",
+            Box::new(|u, _| {
+                let y = plain(u, 0.0);
+                (0..y.len()).map(|i| y[(i + 5).min(y.len() - 1)]).collect()
+            }),
+        ),
+        (
+            "output.second_order_lag",
+            Box::new(|u, _| {
+                let (mut x, mut v) = (0.2, 0.0);
+                let y = plain(u, 0.0).into_iter();
+                y.map(|y| {
+                    for _ in 0..20 {
+                        v += 5e-4 * (y - x - 2.0 * 0.2 * 0.05 * v) / 0.0025;
+                        x += 5e-4 * v;
+                    }
+                    x
+                })
+                .collect()
+            }),
+        ),
+        (
+            "output.relaxation",
+            Box::new(|u, _| {
+                let mut z = 0.2;
+                let y = plain(u, 0.0).into_iter();
+                y.map(|y| {
+                    z += (y - z) * DT_S / 0.8;
+                    y + 0.12 * (y - z)
+                })
+                .collect()
+            }),
+        ),
+        (
+            "output.hysteresis",
+            Box::new(|u, _| {
+                let mut z = [0.0_f64; 4];
+                let radii = [2.0, 5.0, 9.0, 14.0];
+                let y = plain(u, 0.0).into_iter();
+                y.map(|y| {
+                    z.iter_mut().zip(radii).for_each(|(z, r)| *z = z.clamp(y - r, y + r));
+                    y - 0.06 * z.iter().map(|z| y - z).sum::<f64>()
+                })
+                .collect()
+            }),
+        ),
+        (
+            "output.bouc_wen",
+            Box::new(|u, _| {
+                let (mut w, mut before) = (0.0_f64, 0.2);
+                let y = plain(u, 0.0).into_iter();
+                y.map(|y| {
+                    let dx = (y - before) / 200.0;
+                    before = y;
+                    for _ in 0..200 {
+                        w += (dx - 0.5 * dx.abs() * w - 0.5 * dx * w.abs()) / 6.0;
+                    }
+                    y - 2.0 * w
+                })
+                .collect()
+            }),
+        ),
+        (
+            "output.quantisation",
+            Box::new(|u, _| plain(u, 0.0).into_iter().map(|y| (y / 1.5).round() * 1.5).collect()),
+        ),
+        (
+            "output.softening",
+            Box::new({
+                // It goes on from trial to trial.
+                let worked = std::cell::Cell::new((0.0, 0.2));
+                move |u, _| {
+                    let soften = |y: f64| {
+                        let (travel, before) = worked.get();
+                        let travel = travel + (y - before).abs();
+                        worked.set((travel, y));
+                        -55.0 + (y + 55.0) * (1.0 - 0.08 * (1.0 - (-travel / 2500.0_f64).exp()))
+                    };
+                    plain(u, 0.0).into_iter().map(soften).collect()
+                }
+            }),
+        ),
+        (
+            "output.crosstalk(command_V)",
+            Box::new(|u, _| plain(u, 0.0).into_iter().zip(u).map(|(y, u)| y + 0.3 * u).collect()),
+        ),
+        (
+            "output.hum",
+            Box::new(|u, start_s| {
+                let y = plain(u, 0.0).into_iter().enumerate();
+                y.map(|(i, y)| y + 0.2 * (314.0 * (start_s + i as f64 * DT_S) + 0.4).sin())
+                    .collect()
+            }),
+        ),
+        ("brake", Box::new(|u, _| plain(u, 3.0))),
+    ]
+}

@@ -1,0 +1,141 @@
+//! `stretch init` and `stretch diagnose problem.toml`: any simulator beside any recording.
+
+use std::{fmt::Write, fs, path::Path, process::Command};
+
+use assert_cmd::cargo::cargo_bin_cmd;
+
+/// A servo whose brake holds 2 degrees, commanded every 0.6 s.
+fn recording(path: &Path) {
+    let (mut rows, mut held, mut angle, mut seed) = (String::new(), 0.0, 0.0_f64, 7_u64);
+    let mut random = || {
+        seed = seed.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
+        (seed >> 11) as f64 / 2_f64.powi(52) - 1.0
+    };
+    for i in 0..4000 {
+        if i % 60 == 0 {
+            held = 5.0 * random();
+        }
+        let shown = angle + 0.08 * random();
+        let push = 10.5 * held - angle;
+        angle += 0.01 / 0.11 * (push - push.clamp(-2.0, 2.0));
+        writeln!(rows, "{:.2},{held:.4},{shown:.4}", 0.01 * f64::from(i)).unwrap();
+    }
+    fs::write(path, format!("time_s,command_V,angle_deg\n{rows}")).unwrap();
+}
+
+const PARAMETERS: &str = r#"
+[[parameter]]
+name = "gain"
+unit = "deg/V"
+value = 10
+tolerance = "10 %"
+[[parameter]]
+name = "tau"
+unit = "s"
+value = 0.1
+tolerance = 0.01
+[[effect]]
+name = "brake"
+unit = "deg"
+range = [0, 20]
+off = 0
+"#;
+
+fn said(folder: &Path, more: &[&str]) -> (bool, String) {
+    let out = cargo_bin_cmd!("stretch")
+        .arg("diagnose")
+        .arg(folder.join("problem.toml"))
+        .args(more)
+        .output()
+        .unwrap();
+    let text = [out.stdout, out.stderr].concat();
+    (out.status.success(), String::from_utf8(text).unwrap())
+}
+
+#[test]
+fn a_folder_becomes_a_problem_and_a_worker_answers_it() {
+    let folder = tempfile::tempdir().unwrap();
+    recording(&folder.path().join("a.csv"));
+    cargo_bin_cmd!("stretch").arg("init").arg(folder.path()).assert().success();
+    cargo_bin_cmd!("stretch").arg("init").arg(folder.path()).assert().failure();
+    let file = folder.path().join("problem.toml");
+    let first = fs::read_to_string(&file).unwrap();
+    assert!(first.contains("# Guessed: the last column that is no command is what is simulated"));
+    let own = first
+        .replace("wrap = \"all\"", "wrap = [\"input.delay\", \"output.lag\", \"output.backlash\"]")
+        .replace("sim.py", "servo.py");
+    fs::write(&file, own.clone() + PARAMETERS).unwrap();
+    let numpy = Command::new("python3").args(["-c", "import numpy"]).output();
+    if !numpy.is_ok_and(|out| out.status.success()) {
+        println!("SKIPPED: there is no python3 with NumPy");
+        return;
+    }
+    let servo = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/workers/servo.py");
+    fs::copy(servo, folder.path().join("servo.py")).unwrap();
+    let json = folder.path().join("d.json");
+    let page = folder.path().join("d.html");
+    let files = ["--json", json.to_str().unwrap(), "--report", page.to_str().unwrap()];
+    let (is_good, text) = said(folder.path(), &files);
+    assert!(is_good && text.starts_with("The simulator lacks brake"), "{text}");
+    assert!(text.contains("these data determine 2 to a third of their tolerance"), "{text}");
+    let value: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
+    assert_eq!(value["named"][0], "brake");
+    assert!(value["model_runs"]["count"].as_u64().unwrap() < 400);
+    assert_eq!(value["identifiability"][0]["knowledge"], "determined");
+    assert!(fs::read_to_string(page).unwrap().contains("brake"));
+
+    // An object of a Python module, and one that is wrong.
+    let module = "def servo(parameters, effects):\n    raise ValueError('no such gear')\n";
+    fs::write(folder.path().join("own.py"), module).unwrap();
+    let command = "command = [\"python3\", \"servo.py\"]";
+    assert!(own.contains(command));
+    fs::write(&file, own.replace(command, "python = \"own:servo\"") + PARAMETERS).unwrap();
+    let (is_good, text) = said(folder.path(), &[]);
+    assert!(!is_good && text.contains("ValueError: no such gear"), "{text}");
+}
+
+#[test]
+fn what_is_wrong_in_a_file_is_told_with_key_and_value() {
+    let folder = tempfile::tempdir().unwrap();
+    recording(&folder.path().join("a.csv"));
+    let good = "simulator = [\"no-such-program\"]\n[[stage]]\noutput = \"angle_deg\"\ninputs = [\"command_V\"]\n[[trial]]\nfile = \"a.csv\"\n";
+    let cases = [
+        (
+            "output = \"angle_deg\"",
+            "outptu = \"angle_deg\"",
+            "key outptu: nothing reads it (did you mean output?)",
+        ),
+        ("file = \"a.csv\"", "file = \"b.csv\"", "b.csv"),
+        ("command_V", "comand_V", "there is no column comand_V (did you mean command_V?)"),
+        ("simulator = [\"no-such-program\"]", "simulator = []", "key simulator: it is empty"),
+        ("simulator = [\"no-such-program\"]", "simulator = { fmu = \"x.fmu\" }", "runs no FMU"),
+        ("[[trial]]", "[[trial]]\nsplit = \"tset\"", "\"tset\" is none of fit, test"),
+        ("simulator", "simulator", "no-such-program could not be started"),
+    ];
+    for (from, to, told) in cases {
+        fs::write(folder.path().join("problem.toml"), good.replacen(from, to, 1)).unwrap();
+        let (is_good, text) = said(folder.path(), &[]);
+        assert!(!is_good && text.contains(told), "{to}: {text}");
+    }
+    let (is_good, text) = said(folder.path(), &["--fix", "x.toml"]);
+    assert!(!is_good && text.contains("--fix is for the built-in simulators"), "{text}");
+}
+
+#[test]
+fn a_problem_of_the_built_in_gauge_is_its_data_set() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows: String = (0..4000)
+        .map(|i| {
+            let t = 0.01 * f64::from(i);
+            let rod = |t: f64| 40.0 + 20.0 * (1.3 * t).sin() + 10.0 * (3.1 * t).sin();
+            let noise = 1e-3 * f64::from((i * i) % 1000) / 1000.0;
+            format!("{t:.2},{:.5},{:.6}\n", rod(t), 0.02 * rod(t - 0.05) + noise)
+        })
+        .collect();
+    fs::write(folder.path().join("rod.csv"), format!("time_s,rod_mm,s1\n{rows}")).unwrap();
+    let text = "[simulator]\nbuiltin = \"gauge\"\ndata_set = \"rod.csv\"\nreference = \"rod_mm\"\nsignal = \"s1\"\n";
+    fs::write(folder.path().join("problem.toml"), text).unwrap();
+    let (is_good, text) = said(folder.path(), &[]);
+    assert!(is_good && text.starts_with("The simulator lacks channel_skew"), "{text}");
+}

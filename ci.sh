@@ -94,6 +94,9 @@ cargo check --quiet --locked --manifest-path fuzz/Cargo.toml
 step "Python package"
 python/gate.sh
 
+step "FMUs, a workspace of their own"
+fmu/gate.sh
+
 step "firmware in the emulator"
 if [ -x firmware/gate.sh ]; then
     firmware/gate.sh

@@ -301,10 +301,6 @@ fn session(
     columns: &Columns,
     unit_of: &impl Fn(&str) -> String,
 ) -> Session {
-    let argument = |e: &OwnEffect, name: &str| match e.arguments.len() {
-        1 => e.name.clone(),
-        _ => format!("{}.{name}", e.name),
-    };
     let ranges = columns.ranges();
     let part = |(trial, samples): (&stretch_gap::TrialSpec, Range<usize>)| SessionPart {
         name: trial.name.clone(),
@@ -326,10 +322,7 @@ fn session(
         trials: columns.trials.iter().zip(ranges).map(part).collect(),
         stages: stages.iter().map(stage).collect(),
         parameters: parameters.iter().map(|p| p.name.clone()).collect(),
-        effects: effects
-            .iter()
-            .flat_map(|e| e.arguments.iter().map(|a| argument(e, &a.name)))
-            .collect(),
+        effects: effects.iter().flat_map(|e| e.arguments.iter().map(|a| e.value_name(a))).collect(),
         columns: columns.names.iter().zip(&columns.values).map(column).collect(),
     }
 }

@@ -95,6 +95,16 @@ pub struct OwnEffect {
     pub twins: Vec<String>,
 }
 
+impl OwnEffect {
+    /// What a simulator knows the value of an argument by: the effect's name, and with several arguments `effect.argument`.
+    pub(crate) fn value_name(&self, argument: &Argument) -> String {
+        match self.arguments.len() {
+            1 => self.name.clone(),
+            _ => format!("{}.{}", self.name, argument.name),
+        }
+    }
+}
+
 /// An argument of an own effect.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Argument {

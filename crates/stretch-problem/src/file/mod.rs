@@ -151,7 +151,7 @@ impl ProblemFile {
     /// The workers that answer it, `jobs` at once where the file does not say; none for what is built in.
     ///
     /// # Errors
-    /// An FMU, which this build cannot run.
+    /// An FMU where there is no program that runs it.
     pub fn workers(&self, jobs: usize) -> Result<Option<WorkersSpec>, ProblemError> {
         let (spec, how) = match &self.simulator {
             SimulatorEntry::Rig { .. } | SimulatorEntry::Gauge { .. } => return Ok(None),
@@ -162,10 +162,9 @@ impl ProblemFile {
             SimulatorEntry::Python { object, workers } => {
                 (WorkersSpec::python(object, &self.folder), workers)
             }
-            SimulatorEntry::Fmu { file, .. } => {
-                return Err(ProblemError::Simulator(format!(
-                    "{file}: this build of the program runs no FMU; build the one that does, or run it behind a worker (docs/worker.md)"
-                )));
+            SimulatorEntry::Fmu { file, variables, workers } => {
+                let units = units(&self.spec);
+                (WorkersSpec::fmu(file, variables, &units, &self.folder)?, workers)
             }
         };
         let jobs = how.jobs.unwrap_or(jobs).max(1);
@@ -188,6 +187,15 @@ impl ProblemFile {
         }
         Ok(spec)
     }
+}
+
+/// Units of parameters and of the values of own effects, by the names that workers know them by.
+fn units(spec: &ProblemSpec) -> Vec<(String, &str)> {
+    let parameters = spec.parameters.iter().map(|p| (p.name.clone(), p.unit.as_str()));
+    let effects = spec.effects.iter().flat_map(|effect| {
+        effect.arguments.iter().map(|a| (effect.value_name(a), a.unit.as_str()))
+    });
+    parameters.chain(effects).filter(|(_, unit)| !unit.is_empty()).collect()
 }
 
 /// Every table of one kind, called by its name where it has one.

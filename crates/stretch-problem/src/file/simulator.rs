@@ -1,5 +1,7 @@
 //! What simulates, as a problem's file says it.
 
+use std::collections::BTreeMap;
+
 use super::table::View;
 use crate::error::ProblemError;
 
@@ -41,6 +43,8 @@ pub enum SimulatorEntry {
     Fmu {
         /// The file, relative to the problem's folder.
         file: String,
+        /// Variables of parameters, effects and columns that are called otherwise in it.
+        variables: BTreeMap<String, String>,
         /// How it is run.
         workers: WorkersEntry,
     },
@@ -73,7 +77,8 @@ impl SimulatorEntry {
         match given.as_slice() {
             ["builtin"] => Self::builtin(&view),
             [kind] => {
-                view.only(&[kind, "jobs", "deadline_s", "start_s"])?;
+                let own: &[&str] = if *kind == "fmu" { &["variables"] } else { &[] };
+                view.only(&[&[kind, "jobs", "deadline_s", "start_s"], own].concat())?;
                 let workers = WorkersEntry {
                     jobs: view.optional_count("jobs")?,
                     deadline_s: view.above_zero("deadline_s", 60.0)?,
@@ -91,7 +96,10 @@ impl SimulatorEntry {
                         }
                         Self::Python { object, workers }
                     }
-                    _ => Self::Fmu { file: view.text(kind)?, workers },
+                    _ => {
+                        let (file, variables) = (view.text(kind)?, variables(&view)?);
+                        Self::Fmu { file, variables, workers }
+                    }
                 })
             }
             [] => view.fail(
@@ -130,10 +138,47 @@ impl SimulatorEntry {
     }
 }
 
+/// The table `[simulator.variables]`: a name of the problem, and what the FMU calls it.
+fn variables(view: &View<'_>) -> Result<BTreeMap<String, String>, ProblemError> {
+    let Some(table) = view.table("variables")? else { return Ok(BTreeMap::new()) };
+    let own = View { table, name: "[simulator.variables]", ..*view };
+    table.keys().map(|name| Ok((name.clone(), own.text(name)?))).collect()
+}
+
 fn command(view: &View<'_>, key: &str) -> Result<Vec<String>, ProblemError> {
     let command = view.texts(key)?;
     match command.first().is_some_and(|program| !program.is_empty()) {
         true => Ok(command),
         false => view.fail(key, "it is empty; write the program and its arguments"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::file::ProblemFile;
+
+    fn parsed(simulator: &str) -> Result<SimulatorEntry, String> {
+        let rest = "[[stage]]\noutput = \"y\"\n[[trial]]\nfile = \"a.csv\"\n";
+        let file = ProblemFile::parse("p.toml", &format!("[simulator]\n{simulator}\n{rest}"));
+        file.map(|file| file.simulator).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn an_fmu_may_call_things_otherwise_and_nothing_else_may() {
+        let entry = parsed("fmu = \"a.fmu\"\nvariables = { tau = \"motor.tau\" }").unwrap();
+        let SimulatorEntry::Fmu { file, variables, workers } = entry else { panic!("{entry:?}") };
+        assert_eq!((file.as_str(), workers.deadline_s), ("a.fmu", 60.0));
+        assert_eq!(variables, BTreeMap::from([("tau".into(), "motor.tau".into())]));
+        let error = parsed("fmu = \"a.fmu\"\nvariables = { tau = 1 }").unwrap_err();
+        assert!(
+            error.starts_with("p.toml, [simulator.variables], key tau: 1 is not a text"),
+            "{error}"
+        );
+        let error = parsed("python = \"a:b\"\nvariables = {}").unwrap_err();
+        assert!(
+            error.starts_with("p.toml, [simulator], key variables: nothing reads it"),
+            "{error}"
+        );
     }
 }

@@ -124,6 +124,13 @@ pub(super) fn session(session: &Session) -> Vec<u8> {
     Frame::bytes(&header, &body)
 }
 
+/// What a worker has to say of a session: `notes`, a list of sentences, which may be left out.
+pub(super) fn read_ready(frame: &Frame) -> Result<Vec<String>, Wrong> {
+    kind(frame, "ready")?;
+    let notes = frame.header.get("notes").and_then(Value::as_array).into_iter().flatten();
+    Ok(notes.filter_map(|note| note.as_str().map(str::to_owned)).collect())
+}
+
 /// Models to simulate.
 pub(super) fn simulate(asks: &[Ask<'_>]) -> Vec<u8> {
     let one = |ask: &Ask<'_>| json!({ "stage": ask.stage, "trials": ask.trials, "inputs": ask.inputs.is_some() });

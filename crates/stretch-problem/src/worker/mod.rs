@@ -2,6 +2,7 @@
 //!
 //! The protocol is written down byte by byte in `docs/worker.md`.
 
+mod fmu;
 mod frame;
 mod message;
 mod pool;

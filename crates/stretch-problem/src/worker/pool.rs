@@ -71,6 +71,8 @@ pub struct Workers {
     spec: WorkersSpec,
     session: Session,
     hello: Hello,
+    /// What the first worker said of the session.
+    told: Vec<String>,
     crew: Mutex<Crew>,
     free: Condvar,
     restarts: AtomicUsize,
@@ -92,13 +94,14 @@ impl Workers {
         let named =
             |why: String| ProblemError::Simulator(format!("simulator {}: {why}", spec.shown()));
         let begun = begin(&spec, session);
-        let (process, hello) = begun.map_err(|lost| match lost {
+        let (process, hello, told) = begun.map_err(|lost| match lost {
             Lost::Failed(why) => named(why),
             Lost::Interrupted => named("interrupted".into()),
         })?;
         let crew = Mutex::new(Crew { idle: vec![process], busy: 0 });
         let session = session.clone();
-        Ok(Self { spec, session, hello, crew, free: Condvar::new(), restarts: AtomicUsize::new(0) })
+        let (free, restarts) = (Condvar::new(), AtomicUsize::new(0));
+        Ok(Self { spec, session, hello, told, crew, free, restarts })
     }
 
     /// An idle worker, or a new one where there may be more.
@@ -112,7 +115,7 @@ impl Workers {
             if crew.busy < self.spec.jobs.max(1) {
                 crew.busy += 1;
                 drop(crew);
-                let begun = begin(&self.spec, &self.session).map(|(process, _)| process);
+                let begun = begin(&self.spec, &self.session).map(|(process, ..)| process);
                 if begun.is_err() {
                     self.left(None);
                 }
@@ -166,14 +169,14 @@ impl Workers {
 }
 
 /// Starts a worker: hello, then the session.
-fn begin(spec: &WorkersSpec, session: &Session) -> Result<(Process, Hello), Lost> {
+fn begin(spec: &WorkersSpec, session: &Session) -> Result<(Process, Hello, Vec<String>), Lost> {
     let mut process = Process::start(&spec.command, &spec.folder).map_err(Lost::Failed)?;
     let most = Duration::from_secs_f64(spec.start_s.max(0.001));
     let frame = process.exchange(message::hello(), most)?;
     let hello = message::read_hello(&frame, session).map_err(|why| process.failed(&why))?;
     let frame = process.exchange(message::session(session), most)?;
-    message::kind(&frame, "ready").map_err(|why| process.failed(&why))?;
-    Ok((process, hello))
+    let told = message::read_ready(&frame).map_err(|why| process.failed(&why))?;
+    Ok((process, hello, told))
 }
 
 impl Source for Workers {
@@ -217,6 +220,6 @@ impl Source for Workers {
         let note = format!(
             "a worker of the simulator failed and was started anew {restarts} time(s); its batch was repeated"
         );
-        (restarts > 0).then_some(note).into_iter().collect()
+        self.told.iter().cloned().chain((restarts > 0).then_some(note)).collect()
     }
 }

@@ -1,0 +1,129 @@
+//! An FMU as a file: unpacked, read and looked through before anything of it is run.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use fmi_rs::{
+    fmi2, fmi3,
+    model_description::{
+        self, FMIMajorVersion, ModelDescriptionError, fmi2::ModelDescription as Description2,
+        fmi3::ModelDescription as Description3,
+    },
+    zip::{ZipError, extract_zip_archive},
+};
+use tempfile::TempDir;
+
+use crate::{
+    error::FmuError,
+    model::{Model, Version},
+};
+
+/// An FMU, unpacked into a folder that is removed with it.
+#[derive(Debug)]
+pub struct Fmu {
+    file: PathBuf,
+    folder: TempDir,
+    model: Model,
+}
+
+impl Fmu {
+    /// Unpacks an FMU and reads what it says of itself; nothing of it is run.
+    ///
+    /// # Errors
+    /// Files that are no FMU for co-simulation, or none for this machine.
+    ///
+    /// ```
+    /// let error = stretch_fmu::Fmu::open("no_such.fmu").unwrap_err();
+    /// assert!(error.to_string().starts_with("no_such.fmu: "));
+    /// ```
+    pub fn open(file: impl AsRef<Path>) -> Result<Self, FmuError> {
+        let file = file.as_ref().to_owned();
+        let read = |why: String| FmuError::Read { file: file.clone(), why };
+        let folder = TempDir::new().map_err(|e| read(e.to_string()))?;
+        extract_zip_archive(&file, folder.path()).map_err(|e| match e {
+            ZipError::Io(e) => read(e.to_string()),
+            ZipError::Zip(e) => FmuError::Archive { file: file.clone(), why: e.to_string() },
+            e => read(e.to_string()),
+        })?;
+        let model = described(&file, folder.path())?;
+        let fmu = Self { file, folder, model };
+        match fmu.library().is_file() {
+            true => Ok(fmu),
+            false => Err(fmu.no_library()),
+        }
+    }
+
+    /// What it says of itself.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// The file that it was opened from.
+    pub fn file(&self) -> &Path {
+        &self.file
+    }
+
+    pub(crate) fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    pub(crate) fn library(&self) -> PathBuf {
+        let name = format!("{}{}", self.model.identifier, fmi_rs::SHARED_LIBRARY_EXTENSION);
+        self.folder().join("binaries").join(self.platform()).join(name)
+    }
+
+    fn platform(&self) -> &'static str {
+        match self.model.version {
+            Version::Fmi2 => fmi2::PLATFORM,
+            Version::Fmi3 => fmi3::native::PLATFORM_TUPLE,
+        }
+    }
+
+    fn no_library(&self) -> FmuError {
+        let folders = fs::read_dir(self.folder().join("binaries")).into_iter().flatten();
+        let mut found: Vec<String> = folders
+            .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+            .map(|name| format!("binaries/{name}"))
+            .collect();
+        found.sort();
+        let wanted = self.library();
+        let wanted = wanted.strip_prefix(self.folder()).unwrap_or(&wanted);
+        FmuError::Platform {
+            file: self.file.clone(),
+            wanted: wanted.display().to_string(),
+            found: match found.is_empty() {
+                true => "no binaries at all".into(),
+                false => found.join(", "),
+            },
+        }
+    }
+}
+
+fn described(file: &Path, folder: &Path) -> Result<Model, FmuError> {
+    let path = folder.join("modelDescription.xml");
+    let fail = |why: String| FmuError::Description { file: file.to_owned(), why };
+    if !path.is_file() {
+        return Err(fail("there is none".into()));
+    }
+    let told = |e: ModelDescriptionError| match e {
+        ModelDescriptionError::UnsupportedVersion(version)
+        | ModelDescriptionError::UnknownVersion(version) => {
+            FmuError::Version { file: file.to_owned(), version }
+        }
+        ModelDescriptionError::Io(e) => fail(e.to_string()),
+        e => fail(e.to_string()),
+    };
+    let model = match model_description::peek_fmi_major_version(&path).map_err(told)? {
+        FMIMajorVersion::V2 => Model::of_fmi2(&Description2::from_path(&path).map_err(told)?),
+        FMIMajorVersion::V3 => Model::of_fmi3(&Description3::from_path(&path).map_err(told)?),
+    };
+    let model = model.ok_or_else(|| FmuError::Exchange { file: file.to_owned() })?;
+    // The identifier becomes a part of a path.
+    let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    match model.identifier.chars().all(is_word) && !model.identifier.is_empty() {
+        true => Ok(model),
+        false => Err(fail(format!("{:?} is no model identifier", model.identifier))),
+    }
+}

@@ -1,0 +1,238 @@
+//! Names of a problem beside variables of an FMU.
+
+use std::collections::BTreeMap;
+
+use stretch_data::nearest;
+use stretch_problem::Session;
+
+use crate::{
+    error::FmuError,
+    instance::Slots,
+    model::{Kind, Model, Role, Variable},
+};
+
+/// Names that are listed at most in a message.
+const LISTED: usize = 12;
+
+/// What a problem says of names beyond the session.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Names {
+    /// Variable of the FMU for a parameter, an effect's value or a column, where it is called otherwise there.
+    pub variables: BTreeMap<String, String>,
+    /// Units of parameters and effects' values in the problem; those of columns are in the session.
+    pub units: BTreeMap<String, String>,
+}
+
+/// What of an FMU is set and read in a session.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Bound {
+    /// Parameters, then effects, in the session's order.
+    pub(crate) values: Slots,
+    /// Columns that drive it, each once.
+    pub(crate) inputs: Vec<String>,
+    pub(crate) inputs_at: Slots,
+    /// Outputs of the stages, in their order.
+    pub(crate) outputs: Slots,
+    /// What there is to say.
+    pub(crate) notes: Vec<String>,
+}
+
+impl Bound {
+    pub(crate) fn new(model: &Model, session: &Session, names: &Names) -> Result<Self, FmuError> {
+        check_mapped(session, names)?;
+        let mut bound = Self {
+            values: Slots::default(),
+            inputs: Vec::new(),
+            inputs_at: Slots::default(),
+            outputs: Slots::default(),
+            notes: Vec::new(),
+        };
+        let mut set: Vec<&str> = Vec::new();
+        let parameters = session.parameters.iter().map(|name| ("parameter", name));
+        for (what, name) in parameters.chain(session.effects.iter().map(|name| ("effect", name))) {
+            let unit = names.units.get(name).map_or("", String::as_str);
+            let asked = Asked { what, name, unit, roles: &[Role::Parameter] };
+            let variable = asked.of(model, names)?;
+            asked.once(variable, &mut set)?;
+            bound.values.push(variable);
+        }
+        let unit = |column: &str| {
+            let column = session.columns.iter().find(|c| c.name == column);
+            column.map_or("", |c| c.unit.as_str())
+        };
+        for column in session.stages.iter().flat_map(|stage| &stage.inputs) {
+            if bound.inputs.contains(column) {
+                continue;
+            }
+            let (what, unit) = ("input", unit(column));
+            let asked = Asked { what, name: column, unit, roles: &[Role::Input] };
+            let variable = asked.of(model, names)?;
+            asked.once(variable, &mut set)?;
+            bound.inputs.push(column.clone());
+            bound.inputs_at.push(variable);
+        }
+        for stage in &session.stages {
+            let (what, unit) = ("output", unit(&stage.output));
+            let roles = &[Role::Output, Role::Local];
+            let asked = Asked { what, name: &stage.output, unit, roles };
+            bound.outputs.push(asked.of(model, names)?);
+        }
+        let is_set = |v: &Variable| set.contains(&v.name.as_str());
+        for input in model.variables.iter().filter(|v| v.role == Role::Input && !is_set(v)) {
+            let start = input.start.map_or("its start value".into(), |x| x.to_string());
+            let name = &input.name;
+            bound.notes.push(format!(
+                "input {name} of the FMU is driven by no column and stays at {start}"
+            ));
+        }
+        bound.notes.extend(step_note(model, session.dt_s));
+        Ok(bound)
+    }
+}
+
+fn step_note(model: &Model, dt_s: f64) -> Option<String> {
+    let step_s = model.inner_step_s.filter(|s| s.is_finite() && *s > 0.0)?;
+    let steps = dt_s / step_s;
+    let is_whole = (steps - steps.round()).abs() < 1e-6 * steps && steps > 0.5;
+    Some(match is_whole {
+        true => format!(
+            "the FMU steps by {step_s} s inside, {} of them to a sample of {dt_s} s",
+            steps.round()
+        ),
+        false => format!(
+            "the FMU steps by {step_s} s inside, and a sample of {dt_s} s is no whole number of them: what it gives may be up to one of its steps off in time"
+        ),
+    })
+}
+
+fn check_mapped(session: &Session, names: &Names) -> Result<(), FmuError> {
+    let columns = session.columns.iter().map(|c| &c.name);
+    let known: Vec<&str> = session
+        .parameters
+        .iter()
+        .chain(&session.effects)
+        .chain(columns)
+        .map(String::as_str)
+        .collect();
+    match names.variables.keys().find(|name| !known.contains(&name.as_str())) {
+        None => Ok(()),
+        Some(name) => {
+            let near = nearest(name, known.iter().copied());
+            let near = near.map_or(String::new(), |near| format!(" (did you mean {near}?)"));
+            Err(FmuError::Mapped { name: name.clone(), near })
+        }
+    }
+}
+
+/// A name that is looked for.
+struct Asked<'a> {
+    what: &'static str,
+    name: &'a str,
+    unit: &'a str,
+    roles: &'a [Role],
+}
+
+impl Asked<'_> {
+    fn of<'m>(&self, model: &'m Model, names: &Names) -> Result<&'m Variable, FmuError> {
+        let mapped = names.variables.get(self.name).map(String::as_str);
+        let named = |name: &str| model.variables.iter().find(|v| v.name == name);
+        // A column says its unit in its name, as angle_deg; a variable of an FMU has it beside its name.
+        let bare = || self.name.strip_suffix(self.unit)?.strip_suffix('_').and_then(named);
+        let found = match mapped {
+            Some(name) => named(name),
+            None => named(self.name).or_else(|| bare().filter(|_| !self.unit.is_empty())),
+        };
+        let variable = found.ok_or_else(|| self.unknown(model, mapped.unwrap_or(self.name)))?;
+        let fail = |found: &str, hint| FmuError::Variable {
+            what: self.what,
+            name: self.name.into(),
+            variable: variable.name.clone(),
+            found: found.into(),
+            hint,
+        };
+        if !self.roles.contains(&variable.role) {
+            let hint = match self.what {
+                "input" => "a column drives an input",
+                "output" => "an output or a local variable is held against a column",
+                _ => "only a parameter that is fixed or tunable can be fitted",
+            };
+            return Err(fail(variable.role.shown(), hint));
+        }
+        if let Kind::Other(kind) = variable.kind {
+            return Err(fail(
+                kind,
+                "only a single number on a continuous scale does, Real of FMI 2, Float64 or Float32 of FMI 3",
+            ));
+        }
+        match variable.unit.as_deref().filter(|unit| !is_same(unit, self.unit)) {
+            Some(unit) => Err(FmuError::Unit {
+                what: self.what,
+                name: self.name.into(),
+                problem: self.unit.into(),
+                variable: variable.name.clone(),
+                found: unit.into(),
+            }),
+            None => Ok(variable),
+        }
+    }
+
+    /// Refuses a variable that something else sets already.
+    fn once<'m>(&self, variable: &'m Variable, set: &mut Vec<&'m str>) -> Result<(), FmuError> {
+        if set.contains(&variable.name.as_str()) {
+            return Err(FmuError::Variable {
+                what: self.what,
+                name: self.name.into(),
+                variable: variable.name.clone(),
+                found: "set by another name of the problem, too".into(),
+                hint: "let one name set it",
+            });
+        }
+        set.push(&variable.name);
+        Ok(())
+    }
+
+    fn unknown(&self, model: &Model, variable: &str) -> FmuError {
+        let fits =
+            |v: &&Variable| self.roles.contains(&v.role) && !matches!(v.kind, Kind::Other(_));
+        let all: Vec<&str> = model.variables.iter().filter(fits).map(|v| v.name.as_str()).collect();
+        // Names have several parts in most FMUs: the last one, or a part of it, is what a person remembers.
+        let lower = variable.to_lowercase();
+        let last = |name: &str| name.rsplit('.').next().unwrap_or(name).to_lowercase();
+        let is_near = |name: &str| {
+            let last = last(name);
+            nearest(&lower, [last.as_str()]).is_some()
+                || last.contains(&lower)
+                || lower.contains(&last)
+        };
+        let near: Vec<&str> =
+            all.iter().copied().filter(|name| is_near(name)).take(LISTED).collect();
+        let listed = &all[..all.len().min(LISTED)];
+        let more = match all.len() - listed.len() {
+            0 => String::new(),
+            n => format!(" and {n} more"),
+        };
+        FmuError::Unknown {
+            what: self.what,
+            name: self.name.into(),
+            variable: variable.into(),
+            near: match near.is_empty() {
+                true => String::new(),
+                false => format!(" (did you mean {}?)", near.join(" or ")),
+            },
+            known: match listed.is_empty() {
+                true => "none that would do".into(),
+                false => listed.join(", ") + &more,
+            },
+        }
+    }
+}
+
+/// Whether two units are written alike; an unknown one fits any.
+fn is_same(a: &str, b: &str) -> bool {
+    let plain = |unit: &str| -> String {
+        let unit = unit.trim().replace(['·', '*', ' '], ".");
+        if unit == "1" { String::new() } else { unit }
+    };
+    let (a, b) = (plain(a), plain(b));
+    a.is_empty() || b.is_empty() || a == b
+}

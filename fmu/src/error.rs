@@ -1,0 +1,139 @@
+//! Why an FMU cannot be a simulator of a problem.
+
+use std::path::PathBuf;
+
+/// Why an FMU cannot be a simulator of a problem; says what to do.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FmuError {
+    /// The file cannot be read or unpacked.
+    #[error("{}: {why}", file.display())]
+    Read {
+        /// The file.
+        file: PathBuf,
+        /// What went wrong.
+        why: String,
+    },
+    /// The file is no ZIP archive.
+    #[error("{}: it is no ZIP archive, so it is no FMU ({why}); give the .fmu file itself", file.display())]
+    Archive {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// The description is missing or does not do.
+    #[error("{}: its modelDescription.xml does not do: {why}", file.display())]
+    Description {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// Another version of the standard.
+    #[error("{}: it is of FMI {version}; FMI 2.0 and FMI 3.0 are run, export it as one of them", file.display())]
+    Version {
+        /// The file.
+        file: PathBuf,
+        /// What it says.
+        version: String,
+    },
+    /// Model exchange: it brings no solver.
+    #[error("{}: it is for model exchange alone and brings no solver; export it for co-simulation", file.display())]
+    Exchange {
+        /// The file.
+        file: PathBuf,
+    },
+    /// No library for this machine.
+    #[error(
+        "{}: it holds no {wanted} and cannot run on this machine; it holds {found}; export it for this platform", file.display()
+    )]
+    Platform {
+        /// The file.
+        file: PathBuf,
+        /// The library that is looked for.
+        wanted: String,
+        /// Platforms that it has libraries for.
+        found: String,
+    },
+    /// The library cannot be loaded.
+    #[error("{}: its library cannot be loaded: {why}", file.display())]
+    Library {
+        /// The file.
+        file: PathBuf,
+        /// What the loader says.
+        why: String,
+    },
+    /// The library lacks a function of the standard.
+    #[error(
+        "{}: its library has no function {name}, which every FMU of FMI {version} has; export it anew", file.display()
+    )]
+    Function {
+        /// The file.
+        file: PathBuf,
+        /// The function.
+        name: String,
+        /// Version of FMI.
+        version: u8,
+    },
+    /// It gives no instance of itself.
+    #[error("{}: it gives no instance of itself{said}", file.display())]
+    Instance {
+        /// The file.
+        file: PathBuf,
+        /// What it says of that.
+        said: String,
+    },
+    /// A name that stands for no variable.
+    #[error("{what} {name}: the FMU has no variable {variable}{near}; it has {known}")]
+    Unknown {
+        /// Parameter, effect, input or output.
+        what: &'static str,
+        /// Name in the problem.
+        name: String,
+        /// Name that was looked for in the FMU.
+        variable: String,
+        /// What may be meant, in parentheses.
+        near: String,
+        /// Variables that would do.
+        known: String,
+    },
+    /// A variable that cannot be used as the problem wants to.
+    #[error("{what} {name}: variable {variable} of the FMU is {found}; {hint}")]
+    Variable {
+        /// Parameter, effect, input or output.
+        what: &'static str,
+        /// Name in the problem.
+        name: String,
+        /// The variable.
+        variable: String,
+        /// What it is.
+        found: String,
+        /// What to do.
+        hint: &'static str,
+    },
+    /// Two units for the same number.
+    #[error(
+        "{what} {name} is in {problem}, variable {variable} of the FMU in {found}; convert the recording or the value, or give it the unit that it has"
+    )]
+    Unit {
+        /// Parameter, effect, input or output.
+        what: &'static str,
+        /// Name in the problem.
+        name: String,
+        /// Unit in the problem.
+        problem: String,
+        /// The variable.
+        variable: String,
+        /// Unit in the FMU.
+        found: String,
+    },
+    /// A name in a mapping that the problem does not have.
+    #[error("variables: the problem has no parameter, effect or column {name}{near}")]
+    Mapped {
+        /// The name.
+        name: String,
+        /// What may be meant, in parentheses.
+        near: String,
+    },
+}

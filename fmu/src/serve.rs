@@ -1,0 +1,219 @@
+//! The worker's side of the protocol: frames come in, frames go out. The protocol is in `docs/worker.md`.
+
+use std::io::{ErrorKind, Read, Write};
+
+use serde_json::{Map, Value, json};
+use stretch_problem::{
+    Ask, Session, SessionColumn, SessionPart, SessionStage, Source, SourceError,
+    worker::{Frame, FrameError, PREFIX, Prefix},
+};
+
+/// Version of the protocol.
+const VERSION: u64 = 1;
+
+/// Why a worker ends before it is told to.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ServeError {
+    /// Standard input or output.
+    #[error("{0}")]
+    Io(#[from] std::io::Error),
+    /// What came is no frame.
+    #[error("{0}")]
+    Frame(#[from] FrameError),
+    /// What came is a frame, and yet not what was due.
+    #[error("{0}")]
+    Protocol(String),
+    /// The simulator will not do or is gone.
+    #[error("{0}")]
+    Simulator(String),
+}
+
+fn wrong(what: &str) -> ServeError {
+    ServeError::Protocol(format!("the {what} cannot be read; do both programs belong together?"))
+}
+
+/// Answers frames until the other side says bye or is gone; `begin` makes the simulator of a session.
+///
+/// What will not do is told to the other side before this ends.
+///
+/// # Errors
+/// What cannot be read or written, and simulators that do not begin or are gone.
+pub fn serve<S, E>(
+    mut from: impl Read,
+    mut to: impl Write,
+    begin: impl Fn(&Session) -> Result<S, E>,
+) -> Result<(), ServeError>
+where
+    S: Source,
+    E: std::fmt::Display,
+{
+    let ended = answer(&mut from, &mut to, begin);
+    if let Err(error @ (ServeError::Simulator(_) | ServeError::Protocol(_))) = &ended {
+        let told = json!({ "kind": "error", "message": error.to_string() });
+        to.write_all(&Frame::bytes(&told, &[]))?;
+        to.flush()?;
+    }
+    ended
+}
+
+fn answer<S, E>(
+    from: &mut impl Read,
+    to: &mut impl Write,
+    begin: impl Fn(&Session) -> Result<S, E>,
+) -> Result<(), ServeError>
+where
+    S: Source,
+    E: std::fmt::Display,
+{
+    let mut open: Option<(Session, S)> = None;
+    while let Some(frame) = receive(from)? {
+        let bytes = match frame.header.get("kind").and_then(Value::as_str) {
+            Some("hello") => {
+                let hello = json!({ "all": true, "batch": 1, "inputs": true, "kind": "hello", "version": VERSION });
+                Frame::bytes(&hello, &[])
+            }
+            Some("session") => {
+                let session = read_session(&frame).ok_or_else(|| wrong("session"))?;
+                let source = begin(&session).map_err(|e| ServeError::Simulator(e.to_string()))?;
+                let notes = source.notes();
+                open = Some((session, source));
+                Frame::bytes(&json!({ "kind": "ready", "notes": notes }), &[])
+            }
+            Some("simulate") => {
+                let (session, source) = open.as_ref().ok_or_else(|| wrong("order of frames"))?;
+                simulate(&frame, session, source)?
+            }
+            Some("bye") => return Ok(()),
+            other => {
+                let kind = other.unwrap_or("none");
+                return Err(ServeError::Protocol(format!("frames of kind {kind} are not known")));
+            }
+        };
+        to.write_all(&bytes)?;
+        to.flush()?;
+    }
+    Ok(())
+}
+
+/// The next frame; none where the other side is gone.
+fn receive(from: &mut impl Read) -> Result<Option<Frame>, ServeError> {
+    let mut prefix = [0; PREFIX];
+    match from.read_exact(&mut prefix) {
+        Err(e) if e.kind() == ErrorKind::UnexpectedEof => return Ok(None),
+        read => read?,
+    }
+    let Prefix { header, body } = Prefix::parse(&prefix)?;
+    // The lengths are only what it says: what is read decides how much memory is taken.
+    let mut part = |bytes: usize| {
+        let mut out = Vec::new();
+        let read = from.take(bytes as u64).read_to_end(&mut out)?;
+        if read < bytes { Err(wrong("end of a frame")) } else { Ok(out) }
+    };
+    let (header, body) = (part(header)?, part(body)?);
+    Ok(Some(Frame::parse(&header, &body)?))
+}
+
+fn text(of: &Value, key: &str) -> Option<String> {
+    of.get(key)?.as_str().map(str::to_owned)
+}
+
+fn texts(of: &Value) -> Option<Vec<String>> {
+    of.as_array()?.iter().map(|t| t.as_str().map(str::to_owned)).collect()
+}
+
+fn each<T>(
+    of: &Map<String, Value>,
+    key: &str,
+    read: impl FnMut(&Value) -> Option<T>,
+) -> Option<Vec<T>> {
+    of.get(key)?.as_array()?.iter().map(read).collect()
+}
+
+fn read_session(frame: &Frame) -> Option<Session> {
+    let header = &frame.header;
+    let mut end = 0;
+    let trials = each(header, "trials", |t| {
+        let from = end;
+        end += usize::try_from(t.get("samples")?.as_u64()?).ok()?;
+        let start_s = t.get("start_s")?.as_f64()?;
+        Some(SessionPart { name: text(t, "name")?, samples: from..end, start_s })
+    })?;
+    let stages = each(header, "stages", |s| {
+        let (name, output) = (text(s, "name")?, text(s, "output")?);
+        Some(SessionStage { name, output, inputs: texts(s.get("inputs")?)? })
+    })?;
+    let mut rest = frame.body.as_slice();
+    let columns = each(header, "columns", |c| {
+        let (values, behind) = rest.split_at_checked(end)?;
+        rest = behind;
+        let (name, unit) = (text(c, "name")?, text(c, "unit")?);
+        Some(SessionColumn { name, unit, values: values.to_vec() })
+    })?;
+    Some(Session {
+        dt_s: header.get("dt_s")?.as_f64()?,
+        trials,
+        stages,
+        parameters: texts(header.get("parameters")?)?,
+        effects: texts(header.get("effects")?)?,
+        columns,
+    })
+}
+
+/// An ask, and its altered inputs where it has some.
+struct Owned<'a> {
+    stage: usize,
+    parameters: &'a [f64],
+    effects: &'a [f64],
+    inputs: Option<Vec<Vec<f64>>>,
+    trials: usize,
+}
+
+fn read_asks<'a>(frame: &'a Frame, session: &Session) -> Option<Vec<Owned<'a>>> {
+    let mut rest = frame.body.as_slice();
+    let mut take = |count: usize| {
+        let (own, behind) = rest.split_at_checked(count)?;
+        rest = behind;
+        Some(own)
+    };
+    each(&frame.header, "models", |model| {
+        let index = |key: &str| usize::try_from(model.get(key)?.as_u64()?).ok();
+        let (stage, trials) = (index("stage")?, index("trials")?);
+        if trials > session.trials.len() {
+            return None;
+        }
+        let samples = session.samples(trials);
+        let parameters = take(session.parameters.len())?;
+        let effects = take(session.effects.len())?;
+        let count = session.stages.get(stage)?.inputs.len();
+        let inputs = match model.get("inputs")?.as_bool()? {
+            true => Some(
+                (0..count).map(|_| take(samples).map(<[f64]>::to_vec)).collect::<Option<_>>()?,
+            ),
+            false => None,
+        };
+        Some(Owned { stage, parameters, effects, inputs, trials })
+    })
+}
+
+fn simulate(frame: &Frame, session: &Session, source: &impl Source) -> Result<Vec<u8>, ServeError> {
+    let asks = read_asks(frame, session).ok_or_else(|| wrong("models"))?;
+    let ask = |own: &Owned<'_>| -> Result<Vec<f64>, SourceError> {
+        let Owned { stage, parameters, effects, ref inputs, trials } = *own;
+        let asked = Ask { stage, parameters, effects, inputs: inputs.as_deref(), trials };
+        let mut answers = source.simulate_many(&[asked]);
+        answers.pop().unwrap_or_else(|| Err(SourceError::Gone("there is no answer".into())))
+    };
+    let (mut models, mut body) = (Vec::with_capacity(asks.len()), Vec::new());
+    for own in &asks {
+        models.push(match ask(own) {
+            Ok(values) => {
+                body.extend_from_slice(&values);
+                json!({ "samples": values.len() })
+            }
+            Err(SourceError::Gone(why)) => return Err(ServeError::Simulator(why)),
+            Err(refused) => json!({ "error": refused.to_string() }),
+        });
+    }
+    Ok(Frame::bytes(&json!({ "kind": "outputs", "models": models }), &body))
+}

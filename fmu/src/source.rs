@@ -1,0 +1,139 @@
+//! An FMU as a source of samples.
+
+use std::{
+    borrow::Cow,
+    sync::{Mutex, PoisonError},
+    thread,
+};
+
+use stretch_problem::{Ask, Session, SessionPart, Source, SourceError};
+
+use crate::{
+    archive::Fmu,
+    bind::{Bound, Names},
+    deep::STACK,
+    error::FmuError,
+    instance::{Instance, Stopped},
+};
+
+/// An FMU that answers the asks of a session.
+///
+/// Each trial of each model is run by an instance of its own: parameters and effects are set before its initialization, the first sample of
+/// the inputs in it, and the others at every sample, where they are held until the next. An output is read at every sample, before the step
+/// to the next one. Time begins with 0 in every trial.
+///
+/// Runs of one source follow one another: the library of an FMU may hold numbers that all its instances share. What is to run at the same
+/// time runs in processes of its own, as the worker `stretch-fmu` does. There a crash or a hang takes nothing else with it; here it does.
+#[derive(Debug)]
+pub struct FmuSource {
+    fmu: Fmu,
+    session: Session,
+    bound: Bound,
+    /// One run at a time.
+    turn: Mutex<()>,
+}
+
+impl FmuSource {
+    /// Binds the names of a session to variables, and makes one instance to see that it can be made.
+    ///
+    /// # Errors
+    /// Names without a variable, variables that cannot be used so, units that differ, and libraries that cannot be loaded.
+    pub fn new(fmu: Fmu, session: Session, names: &Names) -> Result<Self, FmuError> {
+        let bound = Bound::new(fmu.model(), &session, names)?;
+        let gone =
+            || FmuError::Instance { file: fmu.file().to_owned(), said: ": no thread".into() };
+        apart(|| Instance::new(&fmu).map(drop)).unwrap_or_else(|| Err(gone()))?;
+        Ok(Self { fmu, session, bound, turn: Mutex::new(()) })
+    }
+
+    fn answer(&self, ask: &Ask<'_>) -> Result<Vec<f64>, SourceError> {
+        let stages = self.session.stages.len();
+        let samples = self.session.samples(ask.trials);
+        let inputs = self.inputs(ask)?;
+        let values: Vec<f64> = ask.parameters.iter().chain(ask.effects).copied().collect();
+        let mut out = vec![0.0; stages * samples];
+        for trial in &self.session.trials[..ask.trials] {
+            self.run(trial, &values, &inputs, &mut out, samples).map_err(|stopped| {
+                let told = |why: String| format!("trial {}: {why}", trial.name);
+                match stopped {
+                    Stopped::Refused(why) => SourceError::Refused(told(why)),
+                    Stopped::Fatal(why) => SourceError::Gone(told(why)),
+                }
+            })?;
+        }
+        Ok(out)
+    }
+
+    /// Columns that drive it: those of the stage asked for as the ask has them, all others as measured.
+    fn inputs<'a>(&'a self, ask: &Ask<'a>) -> Result<Vec<Cow<'a, [f64]>>, SourceError> {
+        let own = &self.session.stages[ask.stage].inputs;
+        let samples = self.session.samples(ask.trials);
+        let one = |name: &String| {
+            let altered = ask.inputs.and_then(|columns| {
+                Some(columns.get(own.iter().position(|o| o == name)?)?.as_slice())
+            });
+            let column = altered.or_else(|| self.session.column(name));
+            let column = column.filter(|column| column.len() >= samples);
+            column.map(Cow::Borrowed).ok_or_else(|| {
+                SourceError::Gone(format!("column {name} does not reach to the end of the trials"))
+            })
+        };
+        self.bound.inputs.iter().map(one).collect()
+    }
+
+    fn run(
+        &self,
+        trial: &SessionPart,
+        values: &[f64],
+        inputs: &[Cow<'_, [f64]>],
+        out: &mut [f64],
+        samples: usize,
+    ) -> Result<(), Stopped> {
+        let Bound { values: set, inputs_at, outputs, .. } = &self.bound;
+        let dt_s = self.session.dt_s;
+        let mut instance =
+            Instance::new(&self.fmu).map_err(|error| Stopped::Fatal(error.to_string()))?;
+        instance.set(set, values)?;
+        instance.begin()?;
+        let mut now = vec![0.0; inputs.len()];
+        let mut told = vec![0.0; outputs.len()];
+        for (i, sample) in trial.samples.clone().enumerate() {
+            now.iter_mut().zip(inputs).for_each(|(now, column)| *now = column[sample]);
+            instance.set(inputs_at, &now)?;
+            if i == 0 {
+                instance.begun()?;
+            }
+            instance.read(outputs, &mut told)?;
+            told.iter().enumerate().for_each(|(stage, x)| out[stage * samples + sample] = *x);
+            if sample + 1 < trial.samples.end {
+                instance.step(i as f64 * dt_s, dt_s)?;
+            }
+        }
+        instance.end()
+    }
+}
+
+/// Runs something on a thread with room for [`deep`](crate::deep::deep); none where there is no thread to be had.
+fn apart<T: Send>(run: impl FnOnce() -> T + Send) -> Option<T> {
+    thread::scope(|scope| {
+        let begun = thread::Builder::new().stack_size(STACK).spawn_scoped(scope, run);
+        begun.ok()?.join().ok()
+    })
+}
+
+impl Source for FmuSource {
+    fn simulate_many(&self, asks: &[Ask<'_>]) -> Vec<Result<Vec<f64>, SourceError>> {
+        let _turn = self.turn.lock().unwrap_or_else(PoisonError::into_inner);
+        let gone = || asks.iter().map(|_| Err(SourceError::Gone("no thread for the FMU".into())));
+        let run = || asks.iter().map(|ask| self.answer(ask)).collect();
+        apart(run).unwrap_or_else(|| gone().collect())
+    }
+
+    fn answers_all(&self) -> bool {
+        true
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.bound.notes.clone()
+    }
+}

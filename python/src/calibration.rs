@@ -8,7 +8,8 @@ use serde::Serialize;
 use stretch_bench::causes;
 use stretch_calibrate::{
     CalibrateError, FitReport, LiveReceptor, ModelKind, ModelRow, Options, Robust, SpellingError,
-    choose_model, parse_rate, pressure_column, read_calibration, write_calibration,
+    calibration_from_json, calibration_to_json, choose_model, parse_rate, pressure_column,
+    read_calibration, write_calibration,
 };
 use stretch_core::{Calibration, Target};
 use stretch_data::{Channel, Trial};
@@ -155,9 +156,7 @@ impl Record {
     /// From the JSON that `stretch calibrate` writes.
     #[staticmethod]
     fn from_json(text: &str) -> PyResult<Self> {
-        let calibration = serde_json::from_str(text)
-            .map_err(|e| said(format!("this is no calibration that can be used: {e}")))?;
-        Ok(Self { calibration })
+        Ok(Self { calibration: calibration_from_json(text, "the text").map_err(said)? })
     }
 
     /// From a file: postcard where its name ends in `.postcard`, else JSON.
@@ -173,7 +172,7 @@ impl Record {
 
     /// The JSON that the program reads.
     fn to_json(&self) -> PyResult<String> {
-        serde_json::to_string_pretty(&self.calibration).map(|text| text + "\n").map_err(said)
+        calibration_to_json(&self.calibration).map_err(said)
     }
 
     /// Column of the signal.

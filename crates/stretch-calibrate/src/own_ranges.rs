@@ -27,11 +27,11 @@ use crate::{
 ///     time_s: (0..100).map(|n| n as f64 * 0.01).collect(),
 ///     channels: vec![Channel {
 ///         name: "bridge_v".into(),
-///         values: (0..100).map(|n| 1.3 + 0.004 * (n as f64)).collect(),
+///         values: (0..100).map(|n| 1.3 + 4e-5 * f64::from(n * n)).collect(),
 ///     }],
 /// };
 /// let own = on_own_ranges(&calibration, &trial)?;
-/// approx::assert_abs_diff_eq!(own.signal_range.span(), 0.396, epsilon = 1e-9);
+/// approx::assert_abs_diff_eq!(own.signal_range.span(), 0.39204, epsilon = 1e-9);
 /// # Ok::<(), stretch_calibrate::CalibrateError>(())
 /// ```
 pub fn on_own_ranges(

@@ -56,7 +56,7 @@ impl Recording {
     /// that all of them cover: by straight lines, the commands `inlet` and `outlet` held.
     ///
     /// # Errors
-    /// As [`Trial::read`], and what the format has to say; a rate outside 1e-3 .. 1e7 Hz; seconds that must be
+    /// As [`Trial::read`](crate::Trial::read), and what the format has to say; a rate outside 1e-3 .. 1e7 Hz; seconds that must be
     /// milliseconds; a format whose feature is off.
     pub fn read(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self, DataError> {
         let path = path.as_ref();

@@ -109,7 +109,7 @@ fn what_is_wrong_in_a_file_is_told_with_key_and_value() {
         ("file = \"a.csv\"", "file = \"b.csv\"", "b.csv"),
         ("command_V", "comand_V", "there is no column comand_V (did you mean command_V?)"),
         ("simulator = [\"no-such-program\"]", "simulator = []", "key simulator: it is empty"),
-        ("simulator = [\"no-such-program\"]", "simulator = { fmu = \"x.fmu\" }", "runs no FMU"),
+        ("simulator = [\"no-such-program\"]", "simulator = { fmu = \"x.fmu\" }", "STRETCH_FMU"),
         ("[[trial]]", "[[trial]]\nsplit = \"tset\"", "\"tset\" is none of fit, test"),
         ("simulator", "simulator", "no-such-program could not be started"),
     ];

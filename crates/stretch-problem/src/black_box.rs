@@ -137,7 +137,7 @@ impl BlackBox {
                 Acting::Wrapper(at) if problem.wrappers[at].site.side == Side::Input => {
                     before.push((at, values));
                 }
-                Acting::Wrapper(_) => {}
+                Acting::Wrapper(_) | Acting::Recorder => {}
             }
         }
         before.sort_by_key(|(at, _)| *at);
@@ -203,12 +203,7 @@ impl BlackBox {
         let problem = &self.problem;
         let mut behind: Vec<(usize, &Vec<f64>)> = Vec::new();
         for (effect, values) in &run.model.effects {
-            if let Acting::Wrapper(at) = problem.acting[*effect] {
-                let site = &problem.wrappers[at].site;
-                if site.side == Side::Output && site.stage == run.stage {
-                    behind.push((at, values));
-                }
-            }
+            behind.extend(problem.behind(*effect, run.stage).map(|at| (at, values)));
         }
         behind.sort_by_key(|(at, _)| *at);
         let trials = self.trials_of();
@@ -313,6 +308,7 @@ impl Simulator for BlackBox {
         match self.problem.acting[effect] {
             Acting::Own(_) => true,
             Acting::Wrapper(at) => self.problem.wrappers[at].site.side == Side::Input,
+            Acting::Recorder => false,
         }
     }
 

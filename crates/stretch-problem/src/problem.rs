@@ -46,7 +46,12 @@ pub(crate) enum Acting {
     Own(usize),
     /// A wrapper.
     Wrapper(usize),
+    /// The clock of the recorder: the skew that all outputs have, whichever wrapper moves each.
+    Recorder,
 }
+
+/// What is late in every output alike: not the sensors, but the recorder that took the outputs beside the inputs.
+const RECORDER: &str = "record.skew";
 
 impl Problem {
     /// Checks a problem and brings its recordings onto one grid.
@@ -75,7 +80,8 @@ impl Problem {
             inputs: stages.iter().map(|s| s.inputs.len()).collect(),
             others: columns.names.clone(),
         };
-        let wrappers = placed(&sites(&stages, &unit_of), &among, &wrap, &mut notes)?;
+        let asked: Vec<String> = wrap.iter().map(|pattern| outputs_of(pattern)).collect();
+        let wrappers = placed(&sites(&stages, &unit_of), &among, &asked, &mut notes)?;
         let (own, off) = own_effects(&effects, &stages)?;
         let mut acting: Vec<Acting> = Vec::new();
         let mut catalogue = Vec::new();
@@ -88,6 +94,12 @@ impl Problem {
         for (i, wrapper) in wrappers.iter().enumerate() {
             acting.push(Acting::Wrapper(i));
             catalogue.push(wrapper.spec(&wrappers, &stages[wrapper.site.stage].name));
+        }
+        if let Some(spec) = recorder(&wrappers, &catalogue) {
+            let own = catalogue.iter_mut().filter(|own| spec.twins.contains(&own.name));
+            own.for_each(|own| own.twins.push(RECORDER.to_owned()));
+            acting.push(Acting::Recorder);
+            catalogue.push(spec);
         }
         let input_noise = stages.iter().map(|stage| {
             let noise =
@@ -148,6 +160,20 @@ impl Problem {
     pub fn wrapper(&self, effect: usize) -> Option<&'static crate::wrap::Wrapper> {
         match *self.acting.get(effect)? {
             Acting::Wrapper(at) => Some(self.wrappers[at].kind),
+            Acting::Recorder => skews(&self.wrappers).next().map(|(_, w)| w.kind),
+            Acting::Own(_) => None,
+        }
+    }
+
+    /// The wrapper behind a stage that an effect of the catalogue is, if it is one.
+    pub(crate) fn behind(&self, effect: usize, stage: usize) -> Option<usize> {
+        let is_here = |at: usize| {
+            let site = &self.wrappers[at].site;
+            site.side == Side::Output && site.stage == stage
+        };
+        match self.acting[effect] {
+            Acting::Wrapper(at) => is_here(at).then_some(at),
+            Acting::Recorder => skews(&self.wrappers).map(|(at, _)| at).find(|at| is_here(*at)),
             Acting::Own(_) => None,
         }
     }
@@ -155,6 +181,31 @@ impl Problem {
     pub(crate) fn stage_inputs(&self, stage: usize) -> impl Iterator<Item = &[f64]> {
         self.stages[stage].inputs.iter().map(|c| self.columns.of(c).unwrap_or(&[]))
     }
+}
+
+/// A pattern of wrappers; the recorder's clock is made of the skews of the outputs.
+fn outputs_of(pattern: &str) -> String {
+    if pattern == RECORDER { "output.skew".to_owned() } else { pattern.to_owned() }
+}
+
+/// Skews of outputs among some wrappers.
+fn skews(wrappers: &[Placed]) -> impl Iterator<Item = (usize, &Placed)> {
+    let all = wrappers.iter().enumerate();
+    all.filter(|(_, w)| w.kind.name == "skew" && w.site.side == Side::Output)
+}
+
+/// The skew that all outputs share, where there are several: one number for what each alone would need its own for. A shift that all
+/// have is the recorder's, one that a single output has is its sensor's.
+fn recorder(wrappers: &[Placed], catalogue: &[EffectSpec]) -> Option<EffectSpec> {
+    let of = |w: &Placed| catalogue.iter().find(|spec| spec.name == w.name);
+    let own: Vec<&EffectSpec> = skews(wrappers).filter_map(|(_, w)| of(w)).collect();
+    let first = own.first().filter(|_| own.len() > 1)?;
+    Some(EffectSpec {
+        name: RECORDER.to_owned(),
+        touches: own.iter().flat_map(|spec| spec.touches.clone()).collect(),
+        twins: own.iter().map(|spec| spec.name.clone()).collect(),
+        ..(*first).clone()
+    })
 }
 
 fn inputs_of(inputs: &[crate::spec::Input]) -> Vec<&str> {

@@ -1,9 +1,9 @@
 //! The rig as a [`Simulator`](stretch_gap::Simulator): pneumatics, muscle (or both as actuation) and sensing, each on measured inputs.
 
-mod chamber;
 mod experiments;
 mod extent;
 mod fixed;
+mod found;
 mod noises;
 mod nominal;
 mod put_right;
@@ -12,6 +12,7 @@ mod session;
 mod shown;
 mod simulator;
 pub(crate) mod smooth;
+mod stand_ins;
 mod timing;
 mod turned;
 mod unwound;
@@ -22,8 +23,8 @@ use stretch_data::DataSet;
 use stretch_gap::{Description, DescriptionSpec, TrialSpec};
 use stretch_sim::{Catalogue, Effect, EffectSet, Key, Rig, RigParams, Search, Stage, Tolerance};
 
-use chamber::{CHAMBERS, Chambers};
 use extent::extent_of;
+use found::Found;
 use noises::Noises;
 use nominal::{Knob, parameters, stages};
 use session::Inputs;
@@ -66,7 +67,7 @@ pub struct RigSimulator {
     is_lost: Vec<bool>,
     /// The bridge voltage that effects may be found in.
     bridge: FitRecord,
-    chambers: Chambers,
+    found: Found,
     notes: Vec<String>,
 }
 
@@ -139,7 +140,7 @@ impl RigSimulator {
             measured,
             is_lost,
             bridge,
-            chambers: Chambers::new(CHAMBERS),
+            found: Found::new(),
             notes,
         })
     }

@@ -9,20 +9,13 @@ use stretch_sim::{
 };
 
 use super::{
-    RigSimulator,
-    chamber::{Pressures, causes},
-    session::Begin,
-    shown::Shown,
-    smooth::cubic,
-    timing,
-    timing::Leads,
-    turned::Turned,
-    unwound::unwind,
+    RigSimulator, session::Begin, shown::Shown, smooth::cubic, timing, timing::Leads,
+    turned::Turned, unwound::unwind,
 };
 use crate::{acting::Acting, error::BenchError};
 
 /// Step of integration while fitting, s.
-const STEP_S: f64 = 2.0 * DEFAULT_STEP_S;
+pub(super) const STEP_S: f64 = 2.0 * DEFAULT_STEP_S;
 /// Pieces of a sample where an effect needs fine steps: between samples the length is no straight line.
 const PIECES: f64 = 4.0;
 /// Offset of a vented chamber, kPa: as a rule a little above the atmosphere (mean, 1 sd).
@@ -35,21 +28,21 @@ const LENGTH_KPA: f64 = 3.0;
 const MOVING_KPA: f64 = 10.0;
 
 /// What a run needs beside the rig.
-struct Setting<'a> {
-    rig: &'a RigSimulator,
-    params: RigParams,
-    effects: EffectSet,
-    grid: Grid,
-    offset: f64,
-    leads: Leads,
+pub(super) struct Setting<'a> {
+    pub(super) rig: &'a RigSimulator,
+    pub(super) params: RigParams,
+    pub(super) effects: EffectSet,
+    pub(super) grid: Grid,
+    pub(super) offset: f64,
+    pub(super) leads: Leads,
     /// How little of the move before the session the stage remembers, 0 to 1.
-    unwound: f64,
+    pub(super) unwound: f64,
     /// The same of the muscle.
-    unwound_muscle: f64,
-    shake: Option<u64>,
+    pub(super) unwound_muscle: f64,
+    pub(super) shake: Option<u64>,
     /// Input of the stage that stands in for the measured one, all trials end to end.
-    given: Option<&'a [f64]>,
-    kind: Stage,
+    pub(super) given: Option<&'a [f64]>,
+    pub(super) kind: Stage,
 }
 
 /// Simulates one stage, on the measured input unless another one is given.
@@ -101,7 +94,7 @@ pub(super) fn simulate(
 
 impl Setting<'_> {
     /// How a trial begins: as the one before left it, after the pause between them.
-    fn start(&self, trial: usize) -> Start {
+    pub(super) fn start(&self, trial: usize) -> Start {
         if trial == 0 && self.unwound > 0.0 {
             // It is behind the memory already.
             return Start::Carried { rest_s: 0.0 };
@@ -109,7 +102,7 @@ impl Setting<'_> {
         self.after_pause(trial)
     }
 
-    fn after_pause(&self, trial: usize) -> Start {
+    pub(super) fn after_pause(&self, trial: usize) -> Start {
         let trials = &self.rig.about.trials;
         let rest_s = match trial.checked_sub(1) {
             Some(before) => {
@@ -134,7 +127,7 @@ impl Setting<'_> {
     }
 
     /// The same for what the reference remembers of the muscle.
-    fn unwind_shown(&self, shown: &mut Shown, length: &[f64]) -> Result<(), BenchError> {
+    pub(super) fn unwind_shown(&self, shown: &mut Shown, length: &[f64]) -> Result<(), BenchError> {
         shown.unwind(self.unwound_muscle, self.after_pause(0), length)
     }
 
@@ -145,17 +138,17 @@ impl Setting<'_> {
     }
 
     /// Pressure before the session: a muscle that begins it vented was filled, and the other way round.
-    fn before_kpa(&self) -> f64 {
+    pub(super) fn before_kpa(&self) -> f64 {
         if self.is_vented() { 1e-3 * self.params[Key::PS] } else { 0.0 }
     }
 
     /// Length before the session.
-    fn before_mm(&self) -> f64 {
+    pub(super) fn before_mm(&self) -> f64 {
         let (filled, vented) = self.rig.inputs.stroke;
         if self.is_vented() { filled } else { vented }
     }
 
-    fn initial_kpa(&self, trial: usize) -> f64 {
+    pub(super) fn initial_kpa(&self, trial: usize) -> f64 {
         let supply = 1e-3 * self.params[Key::PS];
         match self.rig.inputs.begin[trial] {
             Begin::Empty => EMPTY_KPA.0 + self.offset * EMPTY_KPA.1,
@@ -179,7 +172,7 @@ impl Setting<'_> {
     }
 
     /// Inlet and outlet as they act.
-    fn openings(&self, trial: usize) -> [Cow<'_, [f64]>; 2] {
+    pub(super) fn openings(&self, trial: usize) -> [Cow<'_, [f64]>; 2] {
         let own = &self.rig.session.trials[trial];
         timing::ahead(&own.inlet, &own.outlet, self.leads)
     }
@@ -205,7 +198,7 @@ impl Setting<'_> {
     }
 
     /// Trials with their part of the output.
-    fn each(
+    pub(super) fn each(
         &self,
         count: usize,
         mut out: &mut [f64],
@@ -219,7 +212,7 @@ impl Setting<'_> {
         Ok(())
     }
 
-    fn pneumatics(&self, count: usize, out: &mut [f64]) -> Result<(), BenchError> {
+    pub(super) fn pneumatics(&self, count: usize, out: &mut [f64]) -> Result<(), BenchError> {
         let stage = Pneumatics::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
         self.each(count, out, |trial, own| {
@@ -236,7 +229,7 @@ impl Setting<'_> {
         })
     }
 
-    fn muscle(&self, count: usize, out: &mut [f64]) -> Result<(), BenchError> {
+    pub(super) fn muscle(&self, count: usize, out: &mut [f64]) -> Result<(), BenchError> {
         let stage = Muscle::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
         let mut shown = self.shown(&self.effects)?;
@@ -256,7 +249,7 @@ impl Setting<'_> {
         })
     }
 
-    fn actuation(&self, count: usize, out: &mut [f64]) -> Result<(), BenchError> {
+    pub(super) fn actuation(&self, count: usize, out: &mut [f64]) -> Result<(), BenchError> {
         let stage = Actuation::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
         let mut shown = self.shown(&self.effects)?;
@@ -304,26 +297,6 @@ impl Setting<'_> {
         })
     }
 
-    /// By trial, the chamber's pressure at every node where it does not depend on the muscle: what acts in the muscle alone finds it kept.
-    fn chamber_kpa(&self, stage: &Actuation, count: usize) -> Result<Arc<Pressures>, BenchError> {
-        let initial: Vec<f64> = (0..count).map(|trial| self.initial_kpa(trial)).collect();
-        let key = causes(&self.params, &self.effects, &self.grid, self.leads, &initial);
-        self.rig.chambers.or_make(key, || {
-            let mut memory = stage.memory();
-            let before = self.before_kpa();
-            let shut = Openings { inlet: &[0.0; 2], outlet: &[0.0; 2] };
-            stage.run_pressure(&mut memory, Start::Settled, shut, before, &mut Vec::new())?;
-            let one = |(trial, initial_kpa): (usize, &f64)| {
-                let (start, [inlet, outlet]) = (self.after_pause(trial), self.openings(trial));
-                let openings = Openings { inlet: &inlet, outlet: &outlet };
-                let mut nodes = Vec::new();
-                stage.run_pressure(&mut memory, start, openings, *initial_kpa, &mut nodes)?;
-                Ok(nodes)
-            };
-            initial.iter().enumerate().map(one).collect()
-        })
-    }
-
     fn sensing(
         &self,
         count: usize,
@@ -337,10 +310,10 @@ impl Setting<'_> {
             .effects
             .acting_in(Stage::Sensing)
             .any(|e| e.effect().needs == Some(Need::Pressure));
-        let mut pressures = Vec::new();
-        if needs_pressure && self.rig.inputs.pressure.is_empty() {
-            pressures = self.simulated_pressure(count)?;
-        }
+        let pressures = match needs_pressure && self.rig.inputs.pressure.is_empty() {
+            true => self.simulated_pressure(count)?,
+            false => Arc::default(),
+        };
         // What counts from the session's start allows no move before it.
         if !self.effects.iter().any(|e| e.effect().counts_session) {
             let (before, kpa) = (self.before_mm(), self.before_kpa());
@@ -379,7 +352,7 @@ impl Setting<'_> {
             let pressure = match (needs_pressure, self.rig.inputs.pressure.is_empty()) {
                 (false, _) => Vec::new(),
                 (true, false) => self.input(trial, true),
-                (true, true) => std::mem::take(&mut pressures[trial]),
+                (true, true) => pressures[trial].clone(),
             };
             let start_s = self.rig.about.trials[trial].start_s;
             let (length, pressure) = (self.refined(length), self.refined(pressure));
@@ -403,48 +376,6 @@ impl Setting<'_> {
         self.rig.session.trials[..count].iter().map(|t| one(t.excitation)).collect()
     }
 
-    /// What play in the reference hides of the length: the model of the motion says which flank it lies on, the record how
-    /// long the muscle is.
-    fn hidden(&self, count: usize) -> Result<Option<Vec<f64>>, BenchError> {
-        let alone = self.effects.only(|e| e.hides_input);
-        if alone.acting_in(Stage::Reference).next().is_none() {
-            return Ok(None);
-        }
-        let mut free = self.free_length(count)?;
-        let mut shown = self.shown(&alone)?;
-        shown.condition(&[self.before_mm(); 2])?;
-        self.unwind_shown(&mut shown, free.get(..1).unwrap_or(&[]))?;
-        self.each(count, &mut free, |trial, own| {
-            let before = own.to_vec();
-            shown.run(self.start(trial), own)?;
-            own.iter_mut().zip(before).for_each(|(shown, free)| *shown = free - *shown);
-            Ok(())
-        })?;
-        Ok(Some(free))
-    }
-
-    /// Length that the model of the motion shows without play in the reference.
-    fn free_length(&self, count: usize) -> Result<Vec<f64>, BenchError> {
-        let effects = self.effects.only(|e| !e.hides_input);
-        let has_pressure = !self.rig.inputs.pressure.is_empty();
-        let grid = if has_pressure {
-            Grid::samples(self.rig.about.dt_s)?
-        } else {
-            effects.grid(&self.params, self.rig.about.dt_s, STEP_S)?
-        };
-        let unwound = self.unwound_muscle;
-        let without =
-            Setting { rig: self.rig, params: self.params, effects, grid, unwound, ..*self };
-        let samples = self.rig.about.trials[..count].iter().map(|t| t.samples).sum();
-        let mut all = vec![0.0; samples];
-        if has_pressure {
-            without.muscle(count, &mut all)?;
-        } else {
-            without.actuation(count, &mut all)?;
-        }
-        Ok(all)
-    }
-
     /// By cubics through four samples where the grid is finer.
     fn refined(&self, samples: Vec<f64>) -> Vec<f64> {
         let pieces = self.grid.pieces();
@@ -457,23 +388,7 @@ impl Setting<'_> {
             .collect()
     }
 
-    /// Pressure of the nominal pneumatics: what there is without a pressure column.
-    fn simulated_pressure(&self, count: usize) -> Result<Vec<Vec<f64>>, BenchError> {
-        let effects = &self.rig.effects;
-        let grid = effects.grid(&self.params, self.rig.about.dt_s, STEP_S)?;
-        let nominal = Setting { rig: self.rig, effects: effects.clone(), grid, ..*self };
-        let samples = self.rig.about.trials[..count].iter().map(|t| t.samples).sum();
-        let mut all = vec![0.0; samples];
-        nominal.pneumatics(count, &mut all)?;
-        let mut own = Vec::with_capacity(count);
-        self.each(count, &mut all, |_, values| {
-            own.push(values.to_vec());
-            Ok(())
-        })?;
-        Ok(own)
-    }
-
-    fn shown(&self, effects: &EffectSet) -> Result<Shown, BenchError> {
+    pub(super) fn shown(&self, effects: &EffectSet) -> Result<Shown, BenchError> {
         Shown::new(&self.params, effects, self.rig.about.dt_s)
     }
 }

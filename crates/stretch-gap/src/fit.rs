@@ -38,6 +38,8 @@ use crate::{
 #[derive(Debug, Clone)]
 pub(crate) struct Fitted {
     pub(crate) model: Model,
+    /// J of the module's head.
+    pub(crate) cost: f64,
     /// Of the stages that were fitted.
     pub(crate) misfits: Vec<Misfit>,
     /// One standard deviation of each effect parameter, in the order of the model's effects.
@@ -59,8 +61,10 @@ pub(crate) struct Effort {
     is_rough: bool,
 }
 
+/// Enough to see which of several starts goes furthest.
+pub(crate) const GLANCE: Effort = Effort { iterations: 2, renewals: &[], is_rough: true };
 /// Enough to see whether a candidate can compete.
-pub(crate) const COARSE: Effort = Effort { iterations: 5, renewals: &[1, 3], is_rough: true };
+pub(crate) const COARSE: Effort = Effort { iterations: 5, renewals: &[2], is_rough: true };
 /// Until nothing is gained.
 pub(crate) const FINE: Effort = Effort { iterations: 14, renewals: &[1, 3, 6, 9], is_rough: false };
 
@@ -330,7 +334,8 @@ impl<'a, 'b> Descent<'a, 'b> {
                 }
             }
         }
-        Fitted { model: self.model, misfits, effect_sd, parameter_sd, information }
+        let (model, cost) = (self.model, self.cost);
+        Fitted { model, cost, misfits, effect_sd, parameter_sd, information }
     }
 }
 

@@ -12,11 +12,12 @@ use rayon::prelude::*;
 
 use crate::{
     error::GapError,
-    fit::{COARSE, FINE, Fitted, possible},
+    fit::{COARSE, FINE, Fitted, GLANCE, possible},
     hypothesis::Hypothesis,
     linked::linked,
     problem::Problem,
     screen::{Ground, Screened},
+    simulator::Model,
 };
 
 /// Starts of one effect that are fitted, and the share of the best one's promise that the others need.
@@ -91,21 +92,33 @@ impl<'a> Sets<'a> {
         Ok(self.join(set, set.effects.clone(), &stages, fitted))
     }
 
-    /// Fits `base` with one effect more, from a start, as far as it takes to see whether it can compete.
+    /// A model with one effect more.
+    fn begin(&self, base: &Hypothesis, effect: usize, values: &[f64]) -> Model {
+        let mut model = base.model.clone();
+        model.effects.push((effect, values.to_vec()));
+        model
+    }
+
+    /// The stages that a new effect of `base` hangs together with, and that part of a model.
+    fn part(&self, base: &Hypothesis, effect: usize, model: &Model) -> (Vec<usize>, Model) {
+        let effects: Vec<usize> = base.effects.iter().copied().chain([effect]).collect();
+        let (stages, own) = self.component(&effects, effect);
+        let mut model = model.clone();
+        model.effects.retain(|(e, _)| own.contains(e));
+        (stages, model)
+    }
+
+    /// Fits `base` with one effect more, from a model that holds it, as far as it takes to see whether it can compete.
     fn extend(
         &self,
         base: &Hypothesis,
         ground: &Ground,
         effect: usize,
-        values: &[f64],
+        model: &Model,
     ) -> Result<Hypothesis, GapError> {
-        let mut effects = base.effects.clone();
-        effects.push(effect);
-        let (stages, own) = self.component(&effects, effect);
-        let mut model = base.model.clone();
-        model.effects.retain(|(e, _)| own.contains(e));
-        model.effects.push((effect, values.to_vec()));
+        let (stages, model) = self.part(base, effect, model);
         let fitted = self.problem.fit(&stages, model, &ground.known, COARSE)?;
+        let effects = base.effects.iter().copied().chain([effect]).collect();
         Ok(self.join(base, effects, &stages, fitted))
     }
 
@@ -172,29 +185,44 @@ impl<'a> Sets<'a> {
         Ok(found)
     }
 
-    /// The best coarse fit of every effect.
+    /// The best coarse fit of every effect: where there are several starts, a glance at each says from which.
     fn coarse(
         &self,
         base: &Hypothesis,
         ground: &Ground,
         screened: &[&Screened],
     ) -> Result<BTreeMap<usize, Hypothesis>, GapError> {
-        let starts = screened.iter().flat_map(|screen| {
-            let worth = screen.starts.iter().filter(|s| s.1 > WORTH_A_START * screen.gain());
-            worth.take(STARTS).map(|s| (screen.effect, &s.0))
+        let starts: Vec<(usize, Vec<&Vec<f64>>)> = screened
+            .iter()
+            .map(|screen| {
+                let worth = screen.starts.iter().filter(|s| s.1 > WORTH_A_START * screen.gain());
+                (screen.effect, worth.take(STARTS).map(|s| &s.0).collect())
+            })
+            .collect();
+        let (several, one): (Vec<_>, Vec<_>) = starts.into_iter().partition(|s| s.1.len() > 1);
+        let glances: Vec<(usize, &Vec<f64>)> =
+            several.iter().flat_map(|(e, starts)| starts.iter().map(|s| (*e, *s))).collect();
+        let looked = glances.par_iter().map(|&(effect, values)| {
+            let (stages, model) = self.part(base, effect, &self.begin(base, effect, values));
+            let fitted = self.problem.compare.fit(&stages, model, &ground.known, GLANCE)?;
+            Ok((effect, fitted))
         });
-        let jobs: Vec<(usize, &Vec<f64>)> = starts.collect();
-        let fits = jobs
-            .par_iter()
-            .map(|&(effect, values)| Ok((effect, self.extend(base, ground, effect, values)?)));
-        let mut best: BTreeMap<usize, Hypothesis> = BTreeMap::new();
-        for (effect, set) in possible(fits)? {
+        let mut best: BTreeMap<usize, Fitted> = BTreeMap::new();
+        for (effect, fitted) in possible(looked)? {
             match best.get(&effect) {
-                Some(other) if other.score >= set.score => {}
-                _ => drop(best.insert(effect, set)),
+                Some(other) if other.cost <= fitted.cost => {}
+                _ => drop(best.insert(effect, fitted)),
             }
         }
-        Ok(best)
+        let begun = one.iter().filter_map(|(effect, starts)| {
+            Some((*effect, self.begin(base, *effect, starts.first()?)))
+        });
+        let begun: Vec<(usize, Model)> =
+            begun.chain(best.into_iter().map(|(effect, fitted)| (effect, fitted.model))).collect();
+        let fits = begun
+            .into_par_iter()
+            .map(|(effect, model)| Ok((effect, self.extend(base, ground, effect, &model)?)));
+        Ok(possible(fits)?.into_iter().collect())
     }
 
     /// Fits to the end of what may still win.

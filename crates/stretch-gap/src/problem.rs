@@ -31,6 +31,9 @@ use crate::{
 /// Root mean square change in floors that a halved step of integration may make: a tenth, a hundredth of the floor's square.
 const SOLVED: f64 = 0.1;
 
+/// Steps of integration that are tried first, as a multiple of the simulator's own.
+const LONGER: f64 = 2.0;
+
 /// Rise of the nuisances' likelihood for which all is done again, nats: what a parameter costs.
 const LEARNT: f64 = 5.0;
 
@@ -64,6 +67,18 @@ impl<'a> Problem<'a> {
         progress: &dyn Fn(&str),
     ) -> Result<Self, GapError> {
         let runs = Runs::new(simulator, stop)?;
+        // Twice the step, where that is within what half of it may change; runs that are counted may be another's program.
+        if simulator.model_runs().is_none() {
+            match Self::at(runs.at_step(LONGER), seed, progress) {
+                Err(GapError::Solver { .. }) => {}
+                prepared => return prepared,
+            }
+        }
+        Self::at(runs, seed, progress)
+    }
+
+    fn at(runs: Runs<'a>, seed: u64, progress: &dyn Fn(&str)) -> Result<Self, GapError> {
+        let simulator = runs.simulator();
         let frame = Frame::of(simulator)?;
         let shipped = Model::nominal(simulator);
         progress("floors");

@@ -17,6 +17,8 @@ pub(crate) struct Runs<'a> {
     stop: &'a (dyn Fn() -> bool + Sync),
     count: Arc<AtomicUsize>,
     was_cut: Arc<AtomicBool>,
+    /// What steps of integration are multiplied by.
+    step: f64,
 }
 
 impl<'a> Runs<'a> {
@@ -28,7 +30,8 @@ impl<'a> Runs<'a> {
         simulator: &'a dyn Simulator,
         stop: &'a (dyn Fn() -> bool + Sync),
     ) -> Result<Self, GapError> {
-        let runs = Self { simulator, stop, count: Arc::default(), was_cut: Arc::default() };
+        let (count, was_cut) = (Arc::default(), Arc::default());
+        let runs = Self { simulator, stop, count, was_cut, step: 1.0 };
         let needed = runs.samples(simulator.trials().len());
         for (stage, spec) in simulator.stages().iter().enumerate() {
             let finite = simulator.measured(stage).iter().take_while(|x| x.is_finite());
@@ -46,7 +49,12 @@ impl<'a> Runs<'a> {
         'a: 'b,
     {
         let (count, was_cut) = (Arc::clone(&self.count), Arc::clone(&self.was_cut));
-        Runs { simulator, stop: self.stop, count, was_cut }
+        Runs { simulator, stop: self.stop, count, was_cut, step: self.step }
+    }
+
+    /// The same with steps of integration so many times as long.
+    pub(crate) fn at_step(&self, step: f64) -> Self {
+        Self { step, ..self.clone() }
     }
 
     pub(crate) fn simulator(&self) -> &'a dyn Simulator {
@@ -93,7 +101,7 @@ impl<'a> Runs<'a> {
     /// One run of one stage on its measured input.
     pub(crate) fn run(&self, run: Run<'_>) -> Result<Vec<f64>, GapError> {
         let mut out = self.begin(run)?;
-        self.simulator.simulate(run, &mut out)?;
+        self.simulator.simulate(self.stepped(run), &mut out)?;
         self.finite(run.stage, out)
     }
 
@@ -104,7 +112,8 @@ impl<'a> Runs<'a> {
             Ok(outs) => outs,
             Err(_) => return runs.iter().map(|_| Err(GapError::Stopped)).collect(),
         };
-        let done = self.simulator.simulate_many(runs, &mut outs);
+        let stepped: Vec<Run<'_>> = runs.iter().map(|run| self.stepped(*run)).collect();
+        let done = self.simulator.simulate_many(&stepped, &mut outs);
         let each = runs.iter().zip(done).zip(outs);
         each.map(|((run, done), out)| done.and_then(|()| self.finite(run.stage, out))).collect()
     }
@@ -112,10 +121,14 @@ impl<'a> Runs<'a> {
     /// One run on an input that was not measured; none where the stage cannot.
     pub(crate) fn run_on(&self, run: Run<'_>, input: &[f64]) -> Result<Option<Vec<f64>>, GapError> {
         let mut out = self.begin(run)?;
-        match self.simulator.simulate_on(run, input, &mut out)? {
+        match self.simulator.simulate_on(self.stepped(run), input, &mut out)? {
             true => self.finite(run.stage, out).map(Some),
             false => Ok(None),
         }
+    }
+
+    fn stepped<'m>(&self, run: Run<'m>) -> Run<'m> {
+        Run { step: self.step * run.step, ..run }
     }
 
     fn begin(&self, run: Run<'_>) -> Result<Vec<f64>, GapError> {

@@ -15,7 +15,7 @@ use super::{
 use crate::{acting::Acting, error::BenchError};
 
 /// Step of integration while fitting, s.
-pub(super) const STEP_S: f64 = 2.0 * DEFAULT_STEP_S;
+const STEP_S: f64 = 2.0 * DEFAULT_STEP_S;
 /// Pieces of a sample where an effect needs fine steps: between samples the length is no straight line.
 const PIECES: f64 = 4.0;
 /// Offset of a vented chamber, kPa: as a rule a little above the atmosphere (mean, 1 sd).
@@ -32,6 +32,8 @@ pub(super) struct Setting<'a> {
     pub(super) rig: &'a RigSimulator,
     pub(super) params: RigParams,
     pub(super) effects: EffectSet,
+    /// Step of integration where commands drive, s.
+    pub(super) step_s: f64,
     pub(super) grid: Grid,
     pub(super) offset: f64,
     pub(super) leads: Leads,
@@ -57,19 +59,21 @@ pub(super) fn simulate(
     let Turned { params, offset, leads, unwound_muscle, unwound_gauge } = turned;
     let unwound = if kind == Stage::Sensing { unwound_gauge } else { unwound_muscle };
     let acting = Acting::of(&rig.effects, &rig.rows, run.model)?;
+    let step_s = run.step * STEP_S;
     let grid = match kind {
         // Driven by a measured input.
         Stage::Muscle | Stage::Sensing => {
             let is_fine = acting.inside.acting_in(kind).any(|e| e.effect().needs_fine_steps);
             let pieces = if is_fine { PIECES } else { 1.0 };
-            Grid::new(rig.about.dt_s, run.step * rig.about.dt_s / pieces, 0.0)?
+            Grid::new(rig.about.dt_s, run.step.min(1.0) * rig.about.dt_s / pieces, 0.0)?
         }
-        _ => acting.inside.grid(&params, rig.about.dt_s, run.step * STEP_S)?,
+        _ => acting.inside.grid(&params, rig.about.dt_s, step_s)?,
     };
     let setting = Setting {
         rig,
         params,
         effects: acting.inside.clone(),
+        step_s,
         grid,
         offset,
         leads,

@@ -6,7 +6,7 @@ use stretch_sim::{Actuation, Grid, Openings, Stage, Start};
 
 use super::{
     found::{Pressures, causes},
-    run::{STEP_S, Setting},
+    run::Setting,
 };
 use crate::error::BenchError;
 
@@ -63,7 +63,7 @@ impl Setting<'_> {
         let grid = if has_pressure {
             Grid::samples(self.rig.about.dt_s)?
         } else {
-            effects.grid(&self.params, self.rig.about.dt_s, STEP_S)?
+            effects.grid(&self.params, self.rig.about.dt_s, self.step_s)?
         };
         let unwound = self.unwound_muscle;
         let without =
@@ -99,7 +99,7 @@ impl Setting<'_> {
     /// Pressure of the nominal pneumatics: what there is without a pressure column.
     pub(super) fn simulated_pressure(&self, count: usize) -> Result<Arc<Pressures>, BenchError> {
         let effects = &self.rig.effects;
-        let grid = effects.grid(&self.params, self.rig.about.dt_s, STEP_S)?;
+        let grid = effects.grid(&self.params, self.rig.about.dt_s, self.step_s)?;
         let nominal = Setting { rig: self.rig, effects: effects.clone(), grid, ..*self };
         let make = || {
             let mut all = vec![0.0; self.samples(count)];

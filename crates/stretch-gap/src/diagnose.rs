@@ -90,14 +90,15 @@ fn run(
     let simulator = problem.simulator();
     // Searched, once more where the nuisances turn out to be others.
     let mut search = Search::new(&problem, thresholds, depth);
-    let mut found = search.run(&from, progress)?;
+    let mut best = search.best(&from, progress)?;
     progress("nuisances");
-    let settled = settled(&problem, &mut search.sets, &found.best, seed)?;
+    let settled = settled(&problem, &mut search.sets, &best, seed)?;
     let problem = settled.as_ref().map_or(&problem, |(problem, _)| problem);
     if let Some((problem, from)) = &settled {
         search = Search::new(problem, thresholds, depth);
-        found = search.run(from, progress)?;
+        best = search.best(from, progress)?;
     }
+    let found = search.rivalled(best, progress)?;
     let peeled = peeled(&mut search.sets, &found.best)?;
     // Doubted: an error of the record or of the rig file has one number and leaves noise.
     progress("errors of the record");

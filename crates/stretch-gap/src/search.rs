@@ -69,17 +69,25 @@ impl<'a> Search<'a> {
         Self { problem, worth, sets: Sets::new(problem), depth, looked: Vec::new() }
     }
 
-    /// The best set that grows from one of this or another problem, and its rivals: effects are added as long as they are worth it, and one that stands better in the
-    /// place of another takes it, for the strongest comes first and may have stood in for several.
-    pub(crate) fn run(
+    /// The best set that grows from one of this or another problem: effects are added as long as they are worth it.
+    pub(crate) fn best(
         &mut self,
         from: &Hypothesis,
         progress: &dyn Fn(&str),
-    ) -> Result<Found, GapError> {
+    ) -> Result<Hypothesis, GapError> {
         let from = self.sets.refit(from)?;
         let begun = from.effects.len();
         let first = self.grow(from, progress)?;
-        let mut best = self.second_line(begun, first, progress)?;
+        self.second_line(begun, first, progress)
+    }
+
+    /// A set held against its rivals: one that stands better in the place of another takes it, for the strongest comes first and may
+    /// have stood in for several.
+    pub(crate) fn rivalled(
+        &mut self,
+        mut best: Hypothesis,
+        progress: &dyn Fn(&str),
+    ) -> Result<Found, GapError> {
         let mut exchanges = 0;
         loop {
             progress("rivals");

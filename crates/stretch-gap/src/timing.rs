@@ -47,8 +47,8 @@ pub(crate) fn likelier<'a>(
         return Ok((at_rows, plain));
     }
     let best = |problem: &Problem<'_>| -> Result<(f64, Hypothesis), GapError> {
-        let found = Search::new(problem, thresholds, depth).run(&problem.nominal, progress)?;
-        Ok((problem.log_likelihood(&found.best), found.best))
+        let best = Search::new(problem, thresholds, depth).best(&problem.nominal, progress)?;
+        Ok((problem.log_likelihood(&best), best))
     };
     let ((own, from), (other, from_other)) = (best(&at_rows)?, best(&between)?);
     Ok(if other > own { (between, from_other) } else { (at_rows, from) })

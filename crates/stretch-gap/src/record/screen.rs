@@ -10,6 +10,8 @@
 //! one or two simulations a stage say what is left, from either end: from the rig as shipped, after one step of all parameters within
 //! their tolerances, for a large error bends what was re-tuned; and from the re-tuned rig, for a small one does not.
 
+use rayon::prelude::*;
+
 use crate::{
     error::GapError,
     frame::Role,
@@ -248,7 +250,8 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
             let (power, mixed) = (xx - x * x / n, xy - x * y / n);
             mixed * mixed.abs() / power.max(f64::MIN_POSITIVE)
         };
-        let best = (-reach..=reach).max_by(|a, b| likeness(*a).total_cmp(&likeness(*b)))?;
+        let all = (-reach..=reach).into_par_iter().map(|shift| (shift, likeness(shift)));
+        let (best, _) = all.max_by(|a, b| a.1.total_cmp(&b.1))?;
         (best != 0).then_some(best as f64 * dt_s)
     }
 

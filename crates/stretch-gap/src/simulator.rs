@@ -55,6 +55,13 @@ pub struct Run<'a> {
     pub near: Option<&'a [f64]>,
 }
 
+impl<'a> Run<'a> {
+    /// An exact run on the inputs as they were measured, at the usual step.
+    pub fn exact(stage: usize, model: &'a Model, trials: usize) -> Self {
+        Self { stage, model, trials, shake: None, step: 1.0, near: None }
+    }
+}
+
 /// The measured motion that slices go by.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion<'a> {

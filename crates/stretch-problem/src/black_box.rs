@@ -285,7 +285,7 @@ impl Simulator for BlackBox {
     }
 
     fn linearise(&self, stage: usize, model: &Model, trials: usize) -> Result<(), GapError> {
-        let run = Run { stage, model, trials, shake: None, step: 1.0, near: None };
+        let run = Run::exact(stage, model, trials);
         let inner = self.inner(&run);
         if self.line(stage).is_some_and(|line| line.serves(&inner, self.parameters())) {
             return Ok(());

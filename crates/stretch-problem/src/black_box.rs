@@ -6,12 +6,14 @@ use std::{
 };
 
 use stretch_gap::{
-    Column, Description, Dice, GapError, Line, Model, ModelRuns, Recorded, RowsUsed, Run, Simulator,
+    Column, Description, Diagnosis, Dice, GapError, Line, Model, ModelRuns, Recorded, RowsUsed,
+    Run, Simulator,
 };
 
 use stretch_operators::WanderingLine;
 
 use crate::{
+    families::{Agreed, agreed},
     linear::Linear,
     problem::{Acting, Problem},
     runs::{Inner, Runs},
@@ -100,6 +102,16 @@ impl BlackBox {
     /// Runs of the source so far.
     pub fn model_runs(&self) -> usize {
         self.runs.count()
+    }
+
+    /// Adds to the notes of a diagnosis what was done to the recordings, what effects that cannot be told apart agree on, and what the
+    /// source says of its runs; returns those effects.
+    pub fn annotate(&self, diagnosis: &mut Diagnosis) -> Vec<Agreed> {
+        let families = agreed(&self.problem, diagnosis);
+        diagnosis.notes.splice(0..0, self.problem.notes().iter().cloned());
+        diagnosis.notes.extend(families.iter().map(Agreed::sentence));
+        diagnosis.notes.extend(self.notes());
+        families
     }
 
     /// What the source says of its runs, and what it refused.

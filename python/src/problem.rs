@@ -16,7 +16,7 @@ use stretch_data::{SessionTrial, Split};
 use stretch_gap::{Diagnosis, Evidence, Options, Simulator};
 use stretch_problem::{
     Agreed, Argument, BlackBox, Input, OwnEffect, Parameter, Problem as Checked, ProblemFile,
-    ProblemSpec, Source, Stage, Tolerance, agreed,
+    ProblemSpec, Source, Stage, Tolerance,
     worker::{Workers, WorkersSpec},
     wrapper_named,
 };
@@ -396,10 +396,7 @@ fn answer(
     mut diagnosis: Diagnosis,
     evidence: &Evidence,
 ) -> Result<Answer, String> {
-    diagnosis.notes.splice(0..0, bench.problem().notes().iter().cloned());
-    let families = agreed(bench.problem(), &diagnosis);
-    diagnosis.notes.extend(families.iter().map(Agreed::sentence));
-    diagnosis.notes.extend(bench.notes());
+    let families = bench.annotate(&mut diagnosis);
     let curve = |(stage, e): (usize, &stretch_gap::StageEvidence)| {
         let measured = bench.measured(stage).to_vec();
         let curves = [measured, e.raw.clone(), e.retuned.clone(), e.after.clone()];

@@ -13,7 +13,7 @@ use stretch_report::{Subject, diagnosis_page};
 use stretch_sim::Catalogue;
 
 use super::{
-    diagnosis_files::{not_read, to_json, write_fix, write_snippets},
+    diagnosis_files::{implement_json, not_read, to_json, write_fix, write_snippets},
     diagnosis_text::text,
     problem,
     rails::rails,
@@ -287,7 +287,9 @@ fn conclude(args: &Args, examined: &Examined, bench: &Bench) -> anyhow::Result<(
     let fix = bench.fixed(examined);
     let mut said = Vec::new();
     if let Some(path) = &args.json {
-        write_text(path, &to_json(diagnosis, implementations, &fix, &name, args.seed)?)?;
+        let implement = implementations.iter().map(implement_json).collect();
+        let fixed_rig = fix.as_ref().ok().map(|fix| &fix.file);
+        write_text(path, &to_json(diagnosis, implement, fixed_rig, &name, args.seed)?)?;
         said.push(format!("wrote {}", path.display()));
     }
     if let Some(path) = &args.report {

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::ensure;
 use serde_json::json;
 use stretch_bench::{Fix, Implementation, NoFix};
-use stretch_data::{DataSet, write_folder, write_whole};
+use stretch_data::{DataSet, RigFile, write_folder, write_whole};
 use stretch_gap::Diagnosis;
 use stretch_report::listed;
 use stretch_sim::{Language, Quantity};
@@ -74,14 +74,14 @@ pub(super) fn write_snippets(folder: &Path, all: &[Implementation]) -> anyhow::R
 /// The diagnosis in its schema, with what it was made from, what is named as something to implement, and the rig file that comes of it.
 pub(super) fn to_json(
     diagnosis: &Diagnosis,
-    implementations: &[Implementation],
-    fix: &Result<Fix, NoFix>,
+    implement: Vec<serde_json::Value>,
+    fixed_rig: Option<&RigFile>,
     name: &str,
     seed: u64,
 ) -> anyhow::Result<String> {
     let mut value = serde_json::to_value(diagnosis)?;
-    value["implement"] = implementations.iter().map(implement_json).collect();
-    value["fixed_rig"] = serde_json::to_value(fix.as_ref().ok().map(|fix| &fix.file))?;
+    value["implement"] = implement.into();
+    value["fixed_rig"] = serde_json::to_value(fixed_rig)?;
     value["data_set"] = name.into();
     value["seed"] = seed.into();
     value["version"] = env!("CARGO_PKG_VERSION").into();
@@ -89,7 +89,7 @@ pub(super) fn to_json(
 }
 
 /// A named effect as something to implement.
-fn implement_json(one: &Implementation) -> serde_json::Value {
+pub(super) fn implement_json(one: &Implementation) -> serde_json::Value {
     let quantity = |q: &Quantity| json!({ "name": q.name, "unit": q.unit, "meaning": q.meaning });
     let sketch = one.sketch.as_ref();
     json!({

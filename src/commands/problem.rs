@@ -9,10 +9,11 @@ use anyhow::{Context, ensure};
 use indicatif::ProgressBar;
 use serde_json::json;
 use stretch_gap::{Diagnosis, Evidence, Options, diagnose};
-use stretch_problem::{BlackBox, Problem, ProblemFile, SimulatorEntry, agreed, worker::Workers};
+use stretch_problem::{BlackBox, Problem, ProblemFile, SimulatorEntry, worker::Workers};
 use stretch_report::{Subject, diagnosis_page};
 
 use super::{
+    diagnosis_files::to_json,
     diagnosis_text::text,
     shared::{say, write_text},
 };
@@ -69,11 +70,7 @@ pub(super) fn run(file: &ProblemFile, asked: &Asked<'_>, bar: &ProgressBar) -> a
         |what: &str| bar.set_message(format!("{what} ({} model runs)", bench.model_runs()));
     let (mut diagnosis, evidence) =
         diagnose(&bench, asked.options, &progress, &stretch_data::interrupted)?;
-    let before = bench.problem().notes().to_vec();
-    diagnosis.notes.splice(0..0, before);
-    let families = agreed(bench.problem(), &diagnosis);
-    diagnosis.notes.extend(families.iter().map(stretch_problem::Agreed::sentence));
-    diagnosis.notes.extend(bench.notes());
+    bench.annotate(&mut diagnosis);
     bar.finish_and_clear();
     conclude(file, asked, &bench, &diagnosis, &evidence)
 }
@@ -87,7 +84,9 @@ fn conclude(
 ) -> anyhow::Result<()> {
     let mut said = Vec::new();
     if let Some(path) = asked.json {
-        write_text(path, &to_json(file, asked, bench, diagnosis)?)?;
+        let named = implement(bench, diagnosis).map(|one| implement_json(diagnosis, one));
+        let json = to_json(diagnosis, named.collect(), None, &file.name, asked.options.seed)?;
+        write_text(path, &json)?;
         said.push(format!("wrote {}", path.display()));
     }
     if let Some(path) = asked.report {
@@ -117,27 +116,15 @@ fn implement<'a>(
     })
 }
 
-fn to_json(
-    file: &ProblemFile,
-    asked: &Asked<'_>,
-    bench: &BlackBox,
+/// A named wrapper as something to implement.
+fn implement_json(
     diagnosis: &Diagnosis,
-) -> anyhow::Result<String> {
-    let mut value = serde_json::to_value(diagnosis)?;
-    let numbers = |name: &str| {
-        let first = diagnosis.candidates.first();
-        first.map_or(Vec::new(), |c| c.parameters.iter().filter(|p| p.effect == name).collect())
-    };
-    value["implement"] = implement(bench, diagnosis)
-        .map(|(name, words, equation)| {
-            json!({ "effect": name, "words": words, "equation": equation, "numbers": numbers(name) })
-        })
-        .collect();
-    value["fixed_rig"] = serde_json::Value::Null;
-    value["data_set"] = file.name.as_str().into();
-    value["seed"] = asked.options.seed.into();
-    value["version"] = env!("CARGO_PKG_VERSION").into();
-    Ok(serde_json::to_string_pretty(&value)? + "\n")
+    (name, words, equation): (&str, &str, &str),
+) -> serde_json::Value {
+    let first = diagnosis.candidates.first();
+    let numbers: Vec<_> =
+        first.map_or(Vec::new(), |c| c.parameters.iter().filter(|p| p.effect == name).collect());
+    json!({ "effect": name, "words": words, "equation": equation, "numbers": numbers })
 }
 
 /// What a black box has no answer to is refused before anything is run.

@@ -248,8 +248,7 @@ fn found_line(
     };
     let (trials, measured) = (simulator.trials(), simulator.measured(stage));
     let mut simulated = vec![0.0; measured.len()];
-    let run =
-        Run { stage, model: &without, trials: trials.len(), shake: None, step: 1.0, near: None };
+    let run = Run::exact(stage, &without, trials.len());
     simulator.simulate(run, &mut simulated).ok()?;
     let mut begin = 0;
     let mut left = Vec::new();

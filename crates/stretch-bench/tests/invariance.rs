@@ -199,7 +199,7 @@ fn nothing_follows_what_is_tested_on() {
         model.effects.push((index, vec![0.02, 50.0]));
         let (stage, trials) = (simulator.stages().len() - 1, simulator.trials().len());
         let mut out = vec![0.0; simulator.trials().iter().map(|t| t.samples).sum()];
-        let run = Run { stage, model: &model, trials, shake: None, step: 1.0, near: None };
+        let run = Run::exact(stage, &model, trials);
         simulator.simulate(run, &mut out).expect("a run");
         out
     };

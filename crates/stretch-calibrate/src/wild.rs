@@ -1,6 +1,9 @@
 //! Values that no motion can have taken: what a logger writes where it got none.
 
+use stretch_core::Interval;
 use stretch_data::{Channel, Trial};
+
+use crate::series::extent;
 
 /// At most this share of the rows is called wild: beyond it, two levels that a channel really has
 /// (a muscle held at two lengths) could be taken for values and their outliers. A tenth is what a
@@ -35,7 +38,7 @@ pub fn without_wild(trials: &[Trial], columns: &[&str]) -> (Vec<Trial>, Vec<Stri
         let Some((low, high)) = span(&values) else { continue };
         let is_wild = |x: f64| x < low || x > high;
         let wild: Vec<f64> = values.iter().copied().filter(|&x| is_wild(x)).collect();
-        let (least, most) = ends(&wild);
+        let Interval { min: least, max: most } = extent(wild.iter().copied());
         let shown = if least == most { format!("{least}") } else { format!("{least} .. {most}") };
         told.push(format!(
             "{} of {} values of {column} are wild ({shown}, all others {low} .. {high}); their rows are left out: see \
@@ -84,10 +87,6 @@ fn span(values: &[f64]) -> Option<(f64, f64)> {
     let (low, high) = (sorted[from], sorted[to]);
     // a channel that stands still but for a few values is no range to be wild beyond
     (low < high && (from > 0 || to + 1 < sorted.len())).then_some((low, high))
-}
-
-fn ends(values: &[f64]) -> (f64, f64) {
-    values.iter().fold((f64::MAX, f64::MIN), |(a, b), &x| (a.min(x), b.max(x)))
 }
 
 fn rows(trial: &Trial, stays: &[bool]) -> Trial {

@@ -2,6 +2,7 @@
 
 use crate::{
     BranchSurface, DesignError, Interval, LinearMap, MAX_DEGREE, Range,
+    power::power,
     sizes::{MOST_PRODUCT, MOST_SLOPE, range, size},
 };
 
@@ -51,7 +52,7 @@ pub(crate) fn surface_holds(scales: &Scales, branch: &BranchSurface) -> Result<(
         let (mut row, mut rise) = (0.0, 0.0);
         for j in (0..=MAX_DEGREE as u8).rev() {
             // as they are folded: per signal and per rate, not per range
-            let scale = libm::pow(signal.span(), j.into()) * libm::pow(rate.span(), i.into());
+            let scale = power(signal.span(), j) * power(rate.span(), i);
             let c = gain * branch.surface.coefficient(i, j).abs() / scale;
             rise = rise * v + row;
             row = row * v + c;

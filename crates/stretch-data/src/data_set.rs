@@ -8,8 +8,8 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    DataError, ReadOptions, Recording, RigFile, Trial, nearest,
-    toml_view::{View, number_text, parse_table, read_table, string_text},
+    DataError, ReadOptions, Recording, RigFile, TomlFile, TomlView, Trial, nearest,
+    toml_text::{number_text, string_text},
     write_folder, write_whole,
 };
 
@@ -82,17 +82,16 @@ impl DataSet {
     /// [`DataError::Io`], [`DataError::NotToml`], or [`DataError::Key`] with table and key.
     pub fn read(folder: impl AsRef<Path>) -> Result<Self, DataError> {
         let folder = folder.as_ref();
-        let (file, table) = read_table(&folder.join(FILE))?;
-        let set = Self::from_table(&file, &table)?;
+        let file = TomlFile::read(folder.join(FILE))?;
+        let set = Self::from_file(&file)?;
         for (i, entry) in set.trials.iter().enumerate() {
             if !folder.join(&entry.file).is_file() {
-                let view = View { file: &file, name: &trial_name(i), table: &table };
+                let view = file.top().called(trial_name(i));
                 return view.fail("file", format!("there is no file {} in the folder", entry.file));
             }
         }
         if let Some(rig) = set.rig.as_ref().filter(|rig| !folder.join(rig).is_file()) {
-            let view = View { file: &file, name: TOP, table: &table };
-            return view.fail("rig", format!("there is no file {rig} in the folder"));
+            return file.top().fail("rig", format!("there is no file {rig} in the folder"));
         }
         Ok(set)
     }
@@ -119,7 +118,7 @@ impl DataSet {
     /// # Ok::<(), stretch_data::DataError>(())
     /// ```
     pub fn parse(name: &str, text: &str) -> Result<Self, DataError> {
-        Self::from_table(name, &parse_table(name, text)?)
+        Self::from_file(&TomlFile::parse(name, text)?)
     }
 
     /// The trials of one split, in order.
@@ -195,8 +194,8 @@ impl DataSet {
         Ok(())
     }
 
-    fn from_table(file: &str, table: &toml::Table) -> Result<Self, DataError> {
-        let top = View { file, name: TOP, table };
+    fn from_file(file: &TomlFile) -> Result<Self, DataError> {
+        let top = file.top();
         let rate_hz = top.number("rate_hz")?;
         if rate_hz <= 0.0 {
             return top.fail("rate_hz", format!("{rate_hz} is not above 0 samples a second"));
@@ -207,9 +206,8 @@ impl DataSet {
         }
         let name = top.text("name")?.to_owned();
         let mut set = Self { name, rate_hz, rig, trials: Vec::new() };
-        for (i, table) in top.tables("trial")?.into_iter().enumerate() {
-            let view = View { file, name: &trial_name(i), table };
-            let entry = entry(view)?;
+        for view in top.tables("trial")? {
+            let entry = entry(&view)?;
             if let Some(k) = set.trials.iter().position(|other| other.file == entry.file) {
                 let earlier = trial_name(k);
                 return view.fail("file", format!("{} is the file of {earlier}, too", entry.file));
@@ -223,13 +221,11 @@ impl DataSet {
     }
 }
 
-const TOP: &str = "the top of the file";
-
 fn trial_name(index: usize) -> String {
     format!("[[trial]] {}", index + 1)
 }
 
-fn entry(view: View<'_>) -> Result<TrialEntry, DataError> {
+fn entry(view: &TomlView<'_>) -> Result<TrialEntry, DataError> {
     let file = view.text("file")?.to_owned();
     if !stands_in_folder(&file) {
         return view.fail("file", outside(&file));
@@ -248,7 +244,7 @@ fn entry(view: View<'_>) -> Result<TrialEntry, DataError> {
 }
 
 fn choice<T: Copy>(
-    view: View<'_>,
+    view: &TomlView<'_>,
     key: &str,
     all: &[T],
     name: fn(T) -> &'static str,

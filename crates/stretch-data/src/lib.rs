@@ -17,6 +17,8 @@ mod row;
 mod row_reader;
 #[cfg(feature = "proptest")]
 pub mod strategies;
+mod toml_file;
+mod toml_text;
 mod toml_view;
 mod trial;
 mod write;
@@ -34,6 +36,8 @@ pub use read_whole::read_whole;
 pub use recording::Recording;
 pub use rig_file::{EffectEntry, Parameter, Remarks, RigFile};
 pub use row_reader::{Row, RowReader};
+pub use toml_file::TomlFile;
+pub use toml_view::TomlView;
 pub use trial::{Channel, Trial, unit};
 pub use write::push_number;
 pub use write_folder::write_folder;

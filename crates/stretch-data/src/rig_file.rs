@@ -3,11 +3,10 @@
 use std::{collections::BTreeMap, fmt::Write, path::Path};
 
 use serde::{Deserialize, Serialize};
-use toml::Value;
 
 use crate::{
-    DataError,
-    toml_view::{View, key_text, number_text, parse_table, read_table, string_text},
+    DataError, TomlFile, TomlView,
+    toml_text::{key_text, number_text, string_text},
     write_whole,
 };
 
@@ -80,8 +79,7 @@ impl RigFile {
     /// # Errors
     /// [`DataError::Io`], [`DataError::NotToml`], or [`DataError::Key`] with table and key.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, DataError> {
-        let (file, table) = read_table(path.as_ref())?;
-        Self::from_table(&file, &table)
+        Self::from_file(&TomlFile::read(path)?)
     }
 
     /// Parses the text of a rig file; `name` stands for the file in messages.
@@ -102,7 +100,7 @@ impl RigFile {
     /// # Ok::<(), stretch_data::DataError>(())
     /// ```
     pub fn parse(name: &str, text: &str) -> Result<Self, DataError> {
-        Self::from_table(name, &parse_table(name, text)?)
+        Self::from_file(&TomlFile::parse(name, text)?)
     }
 
     /// Writes the rig file, whole or not at all; numbers read back to the same bits.
@@ -163,23 +161,20 @@ impl RigFile {
         Ok(())
     }
 
-    fn from_table(file: &str, table: &toml::Table) -> Result<Self, DataError> {
-        let top = View { file, name: "the top of the file", table };
+    fn from_file(file: &TomlFile) -> Result<Self, DataError> {
+        let top = file.top();
         let mut rig =
             Self { kind: top.optional_text("kind")?.map(str::to_owned), ..Self::default() };
-        for (i, table) in top.tables("effect")?.into_iter().enumerate() {
-            rig.effects.push(effect(file, i, table)?);
-        }
-        for (stage, value) in table.iter().filter(|(key, _)| *key != "kind" && *key != "effect") {
-            let Value::Table(parameters) = value else {
+        rig.effects = top.tables("effect")?.iter().map(effect).collect::<Result<_, _>>()?;
+        for stage in top.keys().filter(|key| !["kind", "effect"].contains(key)) {
+            let Ok(Some(view)) = top.table(stage) else {
                 return top.fail(stage, "it stands outside the tables of the stages");
             };
-            let view = View { file, name: &format!("[{stage}]"), table: parameters };
-            let parameters = parameters
-                .iter()
-                .map(|(name, value)| Ok((name.clone(), parameter(view, name, value)?)))
+            let parameters = view
+                .keys()
+                .map(|name| Ok((name.to_owned(), parameter(&view, name)?)))
                 .collect::<Result<_, DataError>>()?;
-            rig.stages.insert(stage.clone(), parameters);
+            rig.stages.insert(stage.to_owned(), parameters);
         }
         Ok(rig)
     }
@@ -200,28 +195,23 @@ fn one_line(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
-fn effect(file: &str, index: usize, table: &toml::Table) -> Result<EffectEntry, DataError> {
-    let name = format!("[[effect]] {}", index + 1);
-    let view = View { file, name: &name, table };
-    let parameters = table
+fn effect(view: &TomlView<'_>) -> Result<EffectEntry, DataError> {
+    let parameters = view
         .keys()
         .filter(|key| *key != "name")
-        .map(|key| Ok((key.clone(), view.number(key)?)))
+        .map(|key| Ok((key.to_owned(), view.number(key)?)))
         .collect::<Result<_, DataError>>()?;
     Ok(EffectEntry { name: view.text("name")?.to_owned(), parameters })
 }
 
-fn parameter(stage: View<'_>, name: &str, value: &Value) -> Result<Parameter, DataError> {
-    let Value::Table(table) = value else {
+fn parameter(stage: &TomlView<'_>, name: &str) -> Result<Parameter, DataError> {
+    let Ok(Some(view)) = stage.table(name) else {
+        let value = stage.value(name)?;
         let how = format!("write {} = {{ value = {value} }}", key_text(name));
         return stage.fail(name, format!("{value} is not a table with a value; {how}"));
     };
-    let within = format!("{} {name}", stage.name);
-    let view = View { file: stage.file, name: &within, table };
-    let known = ["value", "tolerance", "tolerance_abs"];
-    if let Some(key) = table.keys().find(|key| !known.contains(&key.as_str())) {
-        return view.fail(key, format!("it is none of {}", known.join(", ")));
-    }
+    let view = view.called(format!("{} {name}", stage.name()));
+    view.only(&["value", "tolerance", "tolerance_abs"])?;
     let parameter = Parameter {
         value: view.number("value")?,
         tolerance: view.optional_number("tolerance")?,

@@ -267,7 +267,11 @@ fn data_sets() {
     let good = DataSet::parse("d", SET).expect("good");
     assert_eq!((good.trials[0].start_s, good.trials[0].opening), (0.0, Some(0.5)));
     for (from, to, message) in [
-        ("rate_hz = 100", "rate = 100", "d, the top of the file, key rate_hz: it is missing"),
+        (
+            "rate_hz = 100",
+            "rate = 100",
+            "d, the top of the file, key rate_hz: it is missing; write it",
+        ),
         ("100", "0", "d, the top of the file, key rate_hz: 0 is not above 0 samples a second"),
         ("100", "'fast'", "d, the top of the file, key rate_hz: \"fast\" is not a finite number"),
         ("0.5", "1.5", "d, [[trial]] 1, key opening: 1.5 is not between 0 and 1"),
@@ -333,7 +337,10 @@ fn rig_files() {
             "[muscle]\ntau_m = 0.03",
             "r, [muscle], key tau_m: 0.03 is not a table with a value; write tau_m = { value = 0.03 }",
         ),
-        ("[muscle]\ntau_m = { tolerance = 0.5 }", "r, [muscle] tau_m, key value: it is missing"),
+        (
+            "[muscle]\ntau_m = { tolerance = 0.5 }",
+            "r, [muscle] tau_m, key value: it is missing; write it",
+        ),
         (
             "[muscle]\ntau_m = { value = nan }",
             "r, [muscle] tau_m, key value: nan is not a finite number",
@@ -344,13 +351,13 @@ fn rig_files() {
         ),
         (
             "[muscle]\ntau_m = { value = 1, tolerence = 0.5 }",
-            "r, [muscle] tau_m, key tolerence: it is none of value, tolerance, tolerance_abs",
+            "r, [muscle] tau_m, key tolerence: nothing reads it (did you mean tolerance?); known are value, tolerance, tolerance_abs",
         ),
         (
             "seed = 3",
             "r, the top of the file, key seed: it stands outside the tables of the stages",
         ),
-        ("[[effect]]\nh = 0.2", "r, [[effect]] 1, key name: it is missing"),
+        ("[[effect]]\nh = 0.2", "r, [[effect]] 1, key name: it is missing; write it"),
         (
             "[[effect]]\nname = 'leak'\nc = 'big'",
             "r, [[effect]] 1, key c: \"big\" is not a finite number",

@@ -98,7 +98,7 @@ impl<'a> Comparison<'a> {
 
     /// The run of a stage over the trials that fits run; may be told from a run near by.
     fn run_of<'m>(&self, stage: usize, model: &'m Model, near: Option<&'m [f64]>) -> Run<'m> {
-        Run { stage, model, trials: self.frame.fit_trials, shake: None, step: 1.0, near }
+        Run { near, ..Run::exact(stage, model, self.frame.fit_trials) }
     }
 
     /// Measured minus simulated, in floors.
@@ -175,8 +175,7 @@ impl<'a> Comparison<'a> {
 
     /// Noise transmitted: what of the measured input's noise arrives at the output of a stage, in floors squared.
     pub(crate) fn transmitted(&self, stage: usize, model: &Model) -> Result<Misfit, GapError> {
-        let run =
-            Run { stage, model, trials: self.frame.fit_trials, shake: None, step: 1.0, near: None };
+        let run = Run::exact(stage, model, self.frame.fit_trials);
         let plain = self.runs.run(run)?;
         let mut mean = Misfit { stage, ..Misfit::default() };
         for draw in 0..DRAWS {

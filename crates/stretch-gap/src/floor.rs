@@ -111,7 +111,7 @@ fn transmitted(
     seed: u64,
 ) -> Result<Vec<f64>, GapError> {
     let trials = runs.simulator().trials().len();
-    let run = Run { stage, model, trials, shake: None, step: 1.0, near: None };
+    let run = Run::exact(stage, model, trials);
     let mut arrived = vec![0.0; plain.len()];
     for draw in 0..DRAWS {
         let shaken = runs.run(Run { shake: Some(seed + 1000 * draw), ..run })?;

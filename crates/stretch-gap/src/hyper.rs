@@ -55,14 +55,13 @@ impl Metric {
     /// ln of the likelihood beside a floor that is `noise` times as high, a and tau integrated over:
     ///
     /// ```text
-    /// ln E = L + sum over nuisances i of ln( sum_k p_k exp(L_k - L) / sum_k p_k )
+    /// ln E = l + sum over nuisances i of ln( sum_k p_k exp(l_k - l) / sum_k p_k )
     /// ```
     ///
-    /// where L_k has nuisance i at level k of the grid and the others as they are. It is exact for one nuisance, and as independent
-    /// ones are beyond.
+    /// where l is L of the module's head without ln p, and l_k has nuisance i at level k of the grid and the others as they are. It is
+    /// exact for one nuisance, and as independent ones are beyond.
     pub(crate) fn evidence(&self, frame: &Frame, dt_s: f64, residual: &[f64], noise: f64) -> f64 {
-        let own = self.beside(frame, dt_s, residual, noise);
-        let price: f64 = self.loose().iter().map(|loose| cost(loose, loose.level)).sum();
+        let own = self.likelihood_beside(frame, dt_s, residual, noise);
         let one = |which: usize| {
             let loose = &self.loose()[which];
             let levels: Vec<Level> = hypotheses(loose).collect();
@@ -71,24 +70,29 @@ impl Metric {
             }
             let fit = |&level: &Level| {
                 let at = self.with(|i, own| if i == which { level } else { own }, frame, dt_s);
-                at.beside(frame, dt_s, residual, noise) - own
+                at.likelihood_beside(frame, dt_s, residual, noise) - own - cost(loose, level)
             };
             let fits: Vec<f64> = levels.par_iter().map(fit).collect();
             let prior = levels.iter().map(|level| -cost(loose, *level));
-            log_sum_exp(fits) - log_sum_exp(prior) - cost(loose, loose.level)
+            log_sum_exp(fits) - log_sum_exp(prior)
         };
-        own + price + (0..self.loose().len()).map(one).sum::<f64>()
+        own + (0..self.loose().len()).map(one).sum::<f64>()
     }
 
-    /// L of the module's head beside a floor that is `noise` times as high: V/s has nuisances that much smaller.
+    /// L of the module's head beside a floor that is `noise` times as high.
     fn beside(&self, frame: &Frame, dt_s: f64, residual: &[f64], noise: f64) -> f64 {
         let price: f64 = self.loose().iter().map(|loose| cost(loose, loose.level)).sum();
+        self.likelihood_beside(frame, dt_s, residual, noise) - price
+    }
+
+    /// The likelihood beside a floor that is `noise` times as high: V/s has nuisances that much smaller.
+    fn likelihood_beside(&self, frame: &Frame, dt_s: f64, residual: &[f64], noise: f64) -> f64 {
         if noise == 1.0 {
-            return self.likelihood(frame, residual) - price;
+            return self.likelihood(frame, residual);
         }
         let smaller = |_, level: Level| Level { size: level.size / noise, ..level };
         let scaled: Vec<f64> = residual.iter().map(|r| r / noise).collect();
-        self.with(smaller, frame, dt_s).likelihood(frame, &scaled) - price
+        self.with(smaller, frame, dt_s).likelihood(frame, &scaled)
     }
 
     /// -(r'V^-1 r + ln det V)/2 over the samples that are not tested on.

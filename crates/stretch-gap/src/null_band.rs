@@ -60,7 +60,7 @@ fn arrives(problem: &Problem<'_>, stage: usize) -> Result<Vec<f64>, GapError> {
     }
     let compare = &problem.compare;
     let (model, trials) = (&problem.nominal.model, compare.frame.fit_trials);
-    let run = Run { stage, model, trials, shake: None, step: 1.0, near: None };
+    let run = Run::exact(stage, model, trials);
     let plain = compare.runs.run(run)?;
     let metric = &compare.metrics[stage];
     let samples = compare.frame.count(Role::Fit) + compare.frame.count(Role::Held);

@@ -330,14 +330,7 @@ fn retuned(
 /// Refuses a simulator whose step of integration shows: its error would be named as an effect.
 fn solver_check(compare: &Comparison<'_>, model: &Model) -> Result<(), GapError> {
     for (stage, metric) in compare.metrics.iter().enumerate() {
-        let run = Run {
-            stage,
-            model,
-            trials: compare.frame.fit_trials,
-            shake: None,
-            step: 1.0,
-            near: None,
-        };
+        let run = Run::exact(stage, model, compare.frame.fit_trials);
         let plain = compare.runs.run(run)?;
         let fine = compare.runs.run(Run { step: 0.5, ..run })?;
         let square: f64 = plain.iter().zip(&fine).map(|(a, b)| (a - b) * (a - b)).sum();

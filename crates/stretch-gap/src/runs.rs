@@ -95,7 +95,7 @@ impl<'a> Runs<'a> {
         model: &Model,
         trials: usize,
     ) -> Result<Vec<f64>, GapError> {
-        self.run(Run { stage, model, trials, shake: None, step: 1.0, near: None })
+        self.run(Run::exact(stage, model, trials))
     }
 
     /// One run of one stage on its measured input.

@@ -1,7 +1,5 @@
 //! The one trait through which any simulator is diagnosed.
 
-use std::borrow::Cow;
-
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -55,6 +53,13 @@ pub struct Run<'a> {
     pub near: Option<&'a [f64]>,
 }
 
+impl<'a> Run<'a> {
+    /// An exact run on the inputs as they were measured, at the usual step.
+    pub fn exact(stage: usize, model: &'a Model, trials: usize) -> Self {
+        Self { stage, model, trials, shake: None, step: 1.0, near: None }
+    }
+}
+
 /// The measured motion that slices go by.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion<'a> {
@@ -79,6 +84,20 @@ pub struct Recorded {
     pub values: Vec<f64>,
     /// Whether it is commanded: it may jump, and its zero means that nothing is done.
     pub is_command: bool,
+}
+
+impl Recorded {
+    /// A signal that is no command.
+    pub fn measured(name: &str, unit: &str, values: Vec<f64>) -> Self {
+        Self { name: name.to_owned(), unit: unit.to_owned(), values, is_command: false }
+    }
+}
+
+impl From<Motion<'_>> for Recorded {
+    /// The motion, where nothing else was recorded.
+    fn from(motion: Motion<'_>) -> Self {
+        Self::measured("motion", motion.unit, motion.values.to_vec())
+    }
 }
 
 /// Runs of a simulator that are counted, because they cost.
@@ -219,20 +238,14 @@ pub trait Simulator: Sync {
     /// Everything that a missing term may be a function of: by default what the stages are fed with, under the name of the
     /// channel before, or the motion where they are fed with nothing.
     fn recorded(&self) -> Vec<Recorded> {
-        let signal = |(name, unit): (&str, &str), values| Recorded {
-            name: name.to_owned(),
-            unit: unit.to_owned(),
-            values,
-            is_command: false,
-        };
         let fed = (1..self.stages().len()).filter_map(|stage| {
             let before = &self.stages()[stage - 1];
-            Some(signal((&before.channel, &before.unit), self.input(stage)?))
+            Some(Recorded::measured(&before.channel, &before.unit, self.input(stage)?))
         });
         let fed: Vec<Recorded> = fed.collect();
         let motion = self.motion();
         match fed.is_empty() {
-            true => vec![signal(("motion", motion.unit), motion.values.to_vec())],
+            true => vec![motion.into()],
             false => fed,
         }
     }
@@ -246,17 +259,8 @@ pub trait Simulator: Sync {
     }
     /// Columns of the record: those of the stages' outputs, unless more are known.
     fn columns(&self) -> Vec<Column<'_>> {
-        let column = |(stage, spec): (usize, &'_ StageSpec)| Column {
-            name: Cow::Owned(spec.channel.clone()),
-            unit: Cow::Owned(spec.unit.clone()),
-            values: Cow::Borrowed(self.measured(stage)),
-            output_of: Some(stage),
-            read_by: Vec::new(),
-            is_command: false,
-            skew_s: [0.0; 2],
-            hint: Cow::Borrowed("its sensor, its cable and its scale"),
-        };
-        self.stages().iter().enumerate().map(column).collect()
+        let stages = self.stages().iter().enumerate();
+        stages.map(|(i, spec)| Column::output(i, spec, self.measured(i))).collect()
     }
     /// The same simulator driven by one column of the record put right; none where no stage is driven by it.
     ///

@@ -85,7 +85,7 @@ fn records(
     let mut output = first[..samples].to_vec();
     let mut before = None;
     for stage in 1..=sensor {
-        let run = Run { stage, model, trials, shake: None, step: 1.0, near: None };
+        let run = Run::exact(stage, model, trials);
         let Some(next) = runs.run_on(run, &output)? else { return Ok(None) };
         before = Some(std::mem::replace(&mut output, next));
     }

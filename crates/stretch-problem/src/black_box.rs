@@ -6,13 +6,14 @@ use std::{
 };
 
 use stretch_gap::{
-    Column, Description, Dice, GapError, Line, Model, ModelRuns, Motion, Recorded, RowsUsed, Run,
-    Simulator,
+    Column, Description, Diagnosis, Dice, GapError, Line, Model, ModelRuns, Recorded, RowsUsed,
+    Run, Simulator,
 };
 
 use stretch_operators::WanderingLine;
 
 use crate::{
+    families::{Agreed, agreed},
     linear::Linear,
     problem::{Acting, Problem},
     runs::{Inner, Runs},
@@ -101,6 +102,16 @@ impl BlackBox {
     /// Runs of the source so far.
     pub fn model_runs(&self) -> usize {
         self.runs.count()
+    }
+
+    /// Adds to the notes of a diagnosis what was done to the recordings, what effects that cannot be told apart agree on, and what the
+    /// source says of its runs; returns those effects.
+    pub fn annotate(&self, diagnosis: &mut Diagnosis) -> Vec<Agreed> {
+        let families = agreed(&self.problem, diagnosis);
+        diagnosis.notes.splice(0..0, self.problem.notes().iter().cloned());
+        diagnosis.notes.extend(families.iter().map(Agreed::sentence));
+        diagnosis.notes.extend(self.notes());
+        families
     }
 
     /// What the source says of its runs, and what it refused.
@@ -285,7 +296,7 @@ impl Simulator for BlackBox {
     }
 
     fn linearise(&self, stage: usize, model: &Model, trials: usize) -> Result<(), GapError> {
-        let run = Run { stage, model, trials, shake: None, step: 1.0, near: None };
+        let run = Run::exact(stage, model, trials);
         let inner = self.inner(&run);
         if self.line(stage).is_some_and(|line| line.serves(&inner, self.parameters())) {
             return Ok(());
@@ -327,11 +338,6 @@ impl Simulator for BlackBox {
         found.map(|(_, values)| Line { hertz: values[1], amplitude: values[0] }).collect()
     }
 
-    fn motion(&self) -> Motion<'_> {
-        let unit = self.stages().first().map_or("", |s| s.unit.as_str());
-        Motion { values: self.measured(0), unit, falling: "falling", rising: "rising" }
-    }
-
     fn recorded(&self) -> Vec<Recorded> {
         let session = self.problem.session();
         let inputs = session.stages.iter().flat_map(|s| &s.inputs);
@@ -340,17 +346,13 @@ impl Simulator for BlackBox {
             let column = session.columns.iter().find(|c| c.name == *name);
             if let Some(column) = column.filter(|_| out.iter().all(|r| r.name != *name)) {
                 out.push(Recorded {
-                    name: name.clone(),
-                    unit: column.unit.clone(),
-                    values: column.values.clone(),
                     is_command: is_command(&column.values),
+                    ..Recorded::measured(name, &column.unit, column.values.clone())
                 });
             }
         }
         if out.is_empty() {
-            let motion = self.motion();
-            let (unit, values) = (motion.unit.to_owned(), motion.values.to_vec());
-            out.push(Recorded { name: "motion".into(), unit, values, is_command: false });
+            out.push(self.motion().into());
         }
         out
     }
@@ -358,17 +360,12 @@ impl Simulator for BlackBox {
     fn columns(&self) -> Vec<Column<'_>> {
         let session = self.problem.session();
         let late = [-0.2, 0.2];
-        let column = |(stage, spec): (usize, &stretch_gap::StageSpec)| Column {
-            name: Cow::Owned(spec.channel.clone()),
-            unit: Cow::Owned(spec.unit.clone()),
-            values: Cow::Borrowed(self.measured(stage)),
-            output_of: Some(stage),
-            read_by: Vec::new(),
-            is_command: false,
+        let stages = self.stages().iter().enumerate();
+        let output = |(stage, spec)| Column {
             skew_s: late,
-            hint: Cow::Borrowed("its sensor, its cable and its scale"),
+            ..Column::output(stage, spec, self.measured(stage))
         };
-        let mut out: Vec<Column<'_>> = self.stages().iter().enumerate().map(column).collect();
+        let mut out: Vec<Column<'_>> = stages.map(output).collect();
         for c in &session.columns {
             // A command may stand still while the rest moves: nothing is wrong with its column then.
             if out.iter().any(|o| *o.name == c.name) || is_command(&c.values) {

@@ -7,7 +7,7 @@ use stretch_gap::{DescriptionError, GapError};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProblemError {
-    /// The recordings could not be read or brought onto one grid.
+    /// The problem's file or its recordings could not be read, or the recordings not be brought onto one grid.
     #[error(transparent)]
     Data(#[from] DataError),
     /// What the problem is made of does not hold together.
@@ -36,18 +36,6 @@ pub enum ProblemError {
         found: String,
         /// What to do.
         hint: String,
-    },
-    /// A key of a problem's file.
-    #[error("{file}, {table}, key {key}: {problem}")]
-    Key {
-        /// The file.
-        file: String,
-        /// The table.
-        table: String,
-        /// The key.
-        key: String,
-        /// What is wrong, and what to do.
-        problem: String,
     },
     /// A simulator that could not be started.
     #[error("{0}")]

@@ -6,6 +6,7 @@
 
 use stretch_core::{
     Branch, BranchSurface, Calibration, DesignError, Interval, LinearMap, Poly13, Real, Surface,
+    power,
 };
 
 use crate::{Domain, fold::output};
@@ -188,9 +189,4 @@ fn fold_surface(
         rate_offset: sign * branch.rate_range.offset(),
         surface: Surface::new(degree, &folded[..degree.terms()])?,
     })
-}
-
-/// `x^n` by multiplication: `powi` may differ from platform to platform.
-fn power(x: f64, n: u8) -> f64 {
-    (0..n).map(|_| x).product()
 }

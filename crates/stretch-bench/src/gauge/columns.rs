@@ -13,16 +13,10 @@ const SKEW_S: [f64; 2] = [-1.0, 1.0];
 impl GaugeSimulator {
     /// The signal, and the reference that drives it.
     pub(super) fn record_columns(&self) -> Vec<Column<'_>> {
-        let stage = &self.about.stages[0];
         let signal = Column {
-            name: Cow::Borrowed(&stage.channel),
-            unit: Cow::Borrowed(&stage.unit),
-            values: Cow::Borrowed(&self.record.signal),
-            output_of: Some(0),
-            read_by: Vec::new(),
-            is_command: false,
             skew_s: skew_of(&self.about, SKEW_S),
             hint: Cow::Borrowed("the gauge, its wires and its amplifier"),
+            ..Column::output(0, &self.about.stages[0], &self.record.signal)
         };
         let reference = Column {
             name: Cow::Borrowed(&self.reference),

@@ -238,16 +238,10 @@ impl Simulator for GaugeSimulator {
 
     /// The reference as it drives the gauge, and the pressure where it was recorded.
     fn recorded(&self) -> Vec<Recorded> {
-        let signal = |name: &str, unit: &str, values| Recorded {
-            name: name.into(),
-            unit: unit.into(),
-            values,
-            is_command: false,
-        };
         let driving = self.inputs.iter().flat_map(|s| &s.values).copied().collect();
-        let mut out = vec![signal(&self.reference, unit_of(&self.reference), driving)];
+        let mut out = vec![Recorded::measured(&self.reference, unit_of(&self.reference), driving)];
         if !self.record.pressure.is_empty() {
-            out.push(signal("pressure_kpa", "kPa", self.record.pressure.clone()));
+            out.push(Recorded::measured("pressure_kpa", "kPa", self.record.pressure.clone()));
         }
         out
     }

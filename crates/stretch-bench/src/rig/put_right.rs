@@ -50,13 +50,10 @@ impl RigSimulator {
             };
             Column {
                 name: Cow::Borrowed(name),
-                unit: Cow::Borrowed(&self.about.stages[stage].unit),
-                values: Cow::Borrowed(&self.measured[stage]),
-                output_of: Some(stage),
                 read_by,
-                is_command: false,
                 skew_s,
                 hint: Cow::Borrowed(hint),
+                ..Column::output(stage, &self.about.stages[stage], &self.measured[stage])
             }
         };
         let commanded =

@@ -84,20 +84,19 @@ pub(super) fn merged(
     if tracks.len() > 1 {
         tracks.retain(|t| t.counts.len() > 1);
     }
-    let timed = timed(file, tracks, &mut notes)?;
-    let recording = match &timed[..] {
-        [] => {
-            let hint = format!("no channel of numbers has a clock ({})", notes.join("; "));
-            return Err(DataError::NoTime { file: file.to_owned(), hint });
-        }
-        [_] if options.grid_rate().is_none() => {
-            let one = timed.into_iter().next().unwrap_or_else(|| unreachable!("there is one"));
-            let clock = one.clock.clone();
-            let trial = Trial { name: file.to_owned(), time_s: one.time_s, channels: one.channels };
-            return Ok((Recording { trial, notes }, clock));
-        }
-        _ => on_one_grid(file, &timed, options.grid_rate(), notes)?,
-    };
+    let mut timed = timed(file, tracks, &mut notes)?;
+    if timed.is_empty() {
+        let hint = format!("no channel of numbers has a clock ({})", notes.join("; "));
+        return Err(DataError::NoTime { file: file.to_owned(), hint });
+    }
+    if timed.len() == 1
+        && options.grid_rate().is_none()
+        && let Some(Timed { clock, time_s, channels, .. }) = timed.pop()
+    {
+        let trial = Trial { name: file.to_owned(), time_s, channels };
+        return Ok((Recording { trial, notes }, clock));
+    }
+    let recording = on_one_grid(file, &timed, options.grid_rate(), notes)?;
     let clock = timed[fastest(&timed)].clock.clone();
     Ok((recording, clock))
 }

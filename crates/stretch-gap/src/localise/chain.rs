@@ -40,7 +40,7 @@ pub(super) fn shapley(runs: &Runs<'_>, evidence: &Evidence) -> Result<Vec<f64>, 
         let Some(base) = base else { return Ok(Vec::new()) };
         let mut next = Vec::with_capacity(2 * variants.len());
         for variant in variants {
-            let run = Run { stage, model, trials, shake: None, step: 1.0, near: None };
+            let run = Run::exact(stage, model, trials);
             let output = match &variant.output {
                 None => alone.clone(),
                 Some(input) => match runs.run_on(run, input)? {

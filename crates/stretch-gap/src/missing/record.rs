@@ -87,12 +87,7 @@ impl Record {
         };
         let mut all = simulator.recorded();
         all.retain(|s| s.name != spec.channel && s.values.len() >= begin);
-        all.push(Recorded {
-            name: spec.channel.clone(),
-            unit: spec.unit.clone(),
-            values: own,
-            is_command: false,
-        });
+        all.push(Recorded::measured(&spec.channel, &spec.unit, own));
         for signal in all {
             let Some(signal) = Signal::of(signal, frame, dt_s) else { continue };
             if record.signals.iter().all(|other| alike(other, &signal, frame) < SAME) {

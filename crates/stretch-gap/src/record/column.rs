@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+use crate::spec::StageSpec;
+
 /// What a recorder made of a channel: recorded(t) = offset + scale true(t - delay_s).
 ///
 /// ```
@@ -76,6 +78,22 @@ pub struct Column<'a> {
     pub skew_s: [f64; 2],
     /// What to look at when it is wrong, for the end of a sentence.
     pub hint: Cow<'a, str>,
+}
+
+impl<'a> Column<'a> {
+    /// The column of a stage's output, where nothing more is known of it.
+    pub fn output(stage: usize, spec: &'a StageSpec, measured: &'a [f64]) -> Self {
+        Self {
+            name: Cow::Borrowed(&spec.channel),
+            unit: Cow::Borrowed(&spec.unit),
+            values: Cow::Borrowed(measured),
+            output_of: Some(stage),
+            read_by: Vec::new(),
+            is_command: false,
+            skew_s: [0.0; 2],
+            hint: Cow::Borrowed("its sensor, its cable and its scale"),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -194,11 +194,6 @@ impl Simulator for Gauge {
     }
 
     fn recorded(&self) -> Vec<Recorded> {
-        vec![Recorded {
-            name: "rod_mm".into(),
-            unit: "mm".into(),
-            values: self.rod_mm.clone(),
-            is_command: false,
-        }]
+        vec![Recorded::measured("rod_mm", "mm", self.rod_mm.clone())]
     }
 }

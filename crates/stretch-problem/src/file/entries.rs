@@ -1,12 +1,8 @@
 //! The tables of a problem's file, one by one.
 
-use stretch_data::Split;
+use stretch_data::{DataError, Split, TomlView};
 
-use super::table::View;
-use crate::{
-    error::ProblemError,
-    spec::{Argument, Input, OwnEffect, Parameter, Stage, Tolerance},
-};
+use crate::spec::{Argument, Input, OwnEffect, Parameter, Stage, Tolerance};
 
 /// A trial of a problem's file.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,7 +15,7 @@ pub struct TrialFile {
     pub split: Split,
 }
 
-pub(super) fn stage(view: View<'_>) -> Result<Stage, ProblemError> {
+pub(super) fn stage(view: &TomlView<'_>) -> Result<Stage, DataError> {
     view.only(&["name", "output", "unit", "inputs", "noise", "velocity", "position"])?;
     let noise = view.optional_number("noise")?;
     if noise.is_some_and(|noise| noise < 0.0) {
@@ -27,32 +23,32 @@ pub(super) fn stage(view: View<'_>) -> Result<Stage, ProblemError> {
     }
     let output = view.text("output")?;
     Ok(Stage {
-        name: view.text_or("name", &output)?,
-        unit: view.text_or("unit", "")?,
+        name: view.optional_text("name")?.unwrap_or(output).to_owned(),
+        unit: unit(view)?,
         inputs: view.texts("inputs")?,
-        velocity: view.optional_text("velocity")?,
-        position: view.optional_text("position")?,
-        output,
+        velocity: view.optional_text("velocity")?.map(str::to_owned),
+        position: view.optional_text("position")?.map(str::to_owned),
+        output: output.to_owned(),
         noise,
     })
 }
 
-pub(super) fn input(view: View<'_>) -> Result<Input, ProblemError> {
+pub(super) fn input(view: &TomlView<'_>) -> Result<Input, DataError> {
     view.only(&["column", "unit", "noise"])?;
     let noise = view.optional_number("noise")?.unwrap_or(0.0);
     if noise < 0.0 {
         return view.fail("noise", format!("{noise} is below 0; give one standard deviation"));
     }
-    Ok(Input { column: view.text("column")?, unit: view.text_or("unit", "")?, noise })
+    Ok(Input { column: view.text("column")?.to_owned(), unit: unit(view)?, noise })
 }
 
-pub(super) fn parameter(view: View<'_>) -> Result<Parameter, ProblemError> {
+pub(super) fn parameter(view: &TomlView<'_>) -> Result<Parameter, DataError> {
     view.only(&["name", "unit", "value", "tolerance", "least", "greatest", "stages"])?;
     Ok(Parameter {
-        name: view.text("name")?,
-        unit: view.text_or("unit", "")?,
+        name: view.text("name")?.to_owned(),
+        unit: unit(view)?,
         value: view.number("value")?,
-        tolerance: tolerance(&view)?,
+        tolerance: tolerance(view)?,
         least: view.optional_number("least")?,
         greatest: view.optional_number("greatest")?,
         stages: view.texts("stages")?,
@@ -60,13 +56,13 @@ pub(super) fn parameter(view: View<'_>) -> Result<Parameter, ProblemError> {
 }
 
 /// A number in the parameter's unit, or a text with a per cent sign; without one it is exact.
-fn tolerance(view: &View<'_>) -> Result<Tolerance, ProblemError> {
+fn tolerance(view: &TomlView<'_>) -> Result<Tolerance, DataError> {
     const KEY: &str = "tolerance";
     if !view.has(KEY) {
         return Ok(Tolerance::Exact);
     }
-    let told = match view.table.get(KEY).and_then(toml::Value::as_str) {
-        Some(text) => {
+    let told = match view.text(KEY) {
+        Ok(text) => {
             let share = text.strip_suffix('%').and_then(|t| t.trim().parse::<f64>().ok());
             let share = share.filter(|x| x.is_finite());
             match share {
@@ -79,7 +75,7 @@ fn tolerance(view: &View<'_>) -> Result<Tolerance, ProblemError> {
                 }
             }
         }
-        None => Tolerance::Absolute(view.number(KEY)?),
+        Err(_) => Tolerance::Absolute(view.number(KEY)?),
     };
     match told {
         Tolerance::Absolute(x) | Tolerance::Relative(x) if x < 0.0 => {
@@ -89,17 +85,17 @@ fn tolerance(view: &View<'_>) -> Result<Tolerance, ProblemError> {
     }
 }
 
-pub(super) fn effect(view: View<'_>) -> Result<OwnEffect, ProblemError> {
+pub(super) fn effect(view: &TomlView<'_>) -> Result<OwnEffect, DataError> {
     let several = view.tables("argument")?;
     let arguments = match several.is_empty() {
         true => {
             view.only(&["name", "unit", "range", "off", "log", "stages", "twins"])?;
-            vec![argument(&view, String::new())?]
+            vec![argument(view, "")?]
         }
         false => {
             view.only(&["name", "argument", "stages", "twins"])?;
-            let one = |table: &toml::Table| {
-                let own = View { table, ..view };
+            let one = |own: TomlView<'_>| {
+                let own = own.called(view.name());
                 own.only(&["name", "unit", "range", "off", "log"])?;
                 argument(&own, own.text("name")?)
             };
@@ -107,14 +103,14 @@ pub(super) fn effect(view: View<'_>) -> Result<OwnEffect, ProblemError> {
         }
     };
     Ok(OwnEffect {
-        name: view.text("name")?,
+        name: view.text("name")?.to_owned(),
         arguments,
         stages: view.texts("stages")?,
         twins: view.texts("twins")?,
     })
 }
 
-fn argument(view: &View<'_>, name: String) -> Result<Argument, ProblemError> {
+fn argument(view: &TomlView<'_>, name: &str) -> Result<Argument, DataError> {
     let [min, max] = view.range("range")?;
     let is_log = view.flag("log")?;
     if is_log && min <= 0.0 {
@@ -124,16 +120,21 @@ fn argument(view: &View<'_>, name: String) -> Result<Argument, ProblemError> {
         );
     }
     let off = view.optional_number("off")?;
-    Ok(Argument { name, unit: view.text_or("unit", "")?, min, max, off, is_log })
+    Ok(Argument { name: name.to_owned(), unit: unit(view)?, min, max, off, is_log })
 }
 
-pub(super) fn trial(view: View<'_>) -> Result<TrialFile, ProblemError> {
+pub(super) fn trial(view: &TomlView<'_>) -> Result<TrialFile, DataError> {
     view.only(&["file", "start_s", "split"])?;
-    let split = match view.text_or("split", "fit")?.as_str() {
+    let split = match view.optional_text("split")?.unwrap_or("fit") {
         "fit" => Split::Fit,
         "test" => Split::Test,
         other => return view.fail("split", format!("{other:?} is none of fit, test")),
     };
     let start_s = view.optional_number("start_s")?.unwrap_or(0.0);
-    Ok(TrialFile { file: view.text("file")?, start_s, split })
+    Ok(TrialFile { file: view.text("file")?.to_owned(), start_s, split })
+}
+
+/// A unit, empty where none is given.
+fn unit(view: &TomlView<'_>) -> Result<String, DataError> {
+    Ok(view.optional_text("unit")?.unwrap_or_default().to_owned())
 }

@@ -2,21 +2,16 @@
 
 mod entries;
 mod simulator;
-mod table;
 
 use std::path::{Path, PathBuf};
 
-use stretch_data::{ReadOptions, Recording, SessionTrial};
+use stretch_data::{DataError, ReadOptions, Recording, SessionTrial, TomlFile, TomlView};
 
 use crate::{error::ProblemError, spec::ProblemSpec, worker::WorkersSpec};
 use entries::{effect, input, parameter, stage, trial};
-use table::View;
 
 pub use entries::TrialFile;
 pub use simulator::{SimulatorEntry, WorkersEntry};
-
-/// Largest file that is read: people write these.
-const LARGEST_BYTES: usize = 4 << 20;
 
 /// The contents of a `problem.toml`.
 ///
@@ -63,24 +58,16 @@ pub struct ProblemFile {
     pub budget: Option<usize>,
 }
 
-const TOP: &str = "the top of the file";
-
 impl ProblemFile {
     /// Reads a problem's file.
     ///
     /// # Errors
-    /// Files that cannot be read, text that is no TOML, and [`ProblemError::Key`] with table and key.
+    /// Files that cannot be read, text that is no TOML, and [`DataError::Key`] with table and key.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, ProblemError> {
         let path = path.as_ref();
-        let shown = path.display().to_string();
-        let fail = |why: String| ProblemError::value(&shown, why, "give a problem.toml");
-        let text = std::fs::read_to_string(path).map_err(|e| fail(e.to_string()))?;
-        if text.len() > LARGEST_BYTES {
-            return Err(fail(format!("it is larger than {LARGEST_BYTES} bytes")));
-        }
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
         let folder = folder.unwrap_or_else(|| Path::new(".")).to_owned();
-        Ok(Self { folder, ..Self::parse(&shown, &text)? })
+        Ok(Self { folder, ..Self::from_file(&TomlFile::read(path)?)? })
     }
 
     /// Parses the text of a problem's file; `file` stands for it in messages.
@@ -88,14 +75,11 @@ impl ProblemFile {
     /// # Errors
     /// As [`ProblemFile::read`].
     pub fn parse(file: &str, text: &str) -> Result<Self, ProblemError> {
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        let table: toml::Table = text.parse().map_err(|e: toml::de::Error| {
-            let upto = e.span().map_or(0, |span| span.start.min(text.len()));
-            let row = 1 + text.as_bytes()[..upto].iter().filter(|&&b| b == b'\n').count();
-            let message = e.message().split_whitespace().collect::<Vec<_>>().join(" ");
-            ProblemError::value(format!("{file}, row {row}"), message, "write TOML there")
-        })?;
-        let top = View { file, name: TOP, table: &table };
+        Ok(Self::from_file(&TomlFile::parse(file, text)?)?)
+    }
+
+    fn from_file(file: &TomlFile) -> Result<Self, DataError> {
+        let top = file.top();
         top.only(&[
             "name",
             "simulator",
@@ -110,19 +94,16 @@ impl ProblemFile {
             "trial",
         ])?;
         let simulator = SimulatorEntry::of(&top)?;
-        let each = |key: &str| -> Result<Vec<_>, ProblemError> {
-            Ok(top.tables(key)?.into_iter().enumerate().collect())
-        };
         let spec = ProblemSpec {
-            stages: named(&top, "stage", each("stage")?, stage)?,
-            inputs: named(&top, "input", each("input")?, input)?,
-            parameters: named(&top, "parameter", each("parameter")?, parameter)?,
-            effects: named(&top, "effect", each("effect")?, effect)?,
+            stages: named(&top, "stage", stage)?,
+            inputs: named(&top, "input", input)?,
+            parameters: named(&top, "parameter", parameter)?,
+            effects: named(&top, "effect", effect)?,
             wrap: top.texts("wrap")?,
             beside: top.texts("beside")?,
             trials: Vec::new(),
         };
-        let trials = named(&top, "trial", each("trial")?, trial)?;
+        let trials = named(&top, "trial", trial)?;
         let is_builtin =
             matches!(simulator, SimulatorEntry::Rig { .. } | SimulatorEntry::Gauge { .. });
         if !is_builtin {
@@ -138,12 +119,12 @@ impl ProblemFile {
             }
         }
         Ok(Self {
-            name: top.text_or("name", "problem")?,
+            name: top.optional_text("name")?.unwrap_or("problem").to_owned(),
             folder: PathBuf::from("."),
             simulator,
             spec,
             trials,
-            time: top.text_or("time", "time_s")?,
+            time: top.optional_text("time")?.unwrap_or("time_s").to_owned(),
             budget: top.optional_count("budget")?,
         })
     }
@@ -200,15 +181,16 @@ fn units(spec: &ProblemSpec) -> Vec<(String, &str)> {
 
 /// Every table of one kind, called by its name where it has one.
 fn named<T>(
-    top: &View<'_>,
+    top: &TomlView<'_>,
     kind: &str,
-    tables: Vec<(usize, &toml::Table)>,
-    read: fn(View<'_>) -> Result<T, ProblemError>,
-) -> Result<Vec<T>, ProblemError> {
-    let one = |(i, table): (usize, &toml::Table)| {
-        let own = ["name", "file", "column"].iter().find_map(|key| table.get(*key)?.as_str());
-        let own = own.map_or_else(|| (i + 1).to_string(), str::to_owned);
-        read(View { file: top.file, name: &format!("[[{kind}]] {own}"), table })
+    read: fn(&TomlView<'_>) -> Result<T, DataError>,
+) -> Result<Vec<T>, DataError> {
+    let one = |view: TomlView<'_>| {
+        let own = ["name", "file", "column"].iter().find_map(|key| view.text(key).ok());
+        match own {
+            Some(own) => read(&view.called(format!("[[{kind}]] {own}"))),
+            None => read(&view),
+        }
     };
-    tables.into_iter().map(one).collect()
+    top.tables(kind)?.into_iter().map(one).collect()
 }

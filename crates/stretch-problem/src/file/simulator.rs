@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::table::View;
-use crate::error::ProblemError;
+use stretch_data::{DataError, TomlView};
 
 /// What simulates.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,16 +61,15 @@ pub struct WorkersEntry {
 }
 
 impl SimulatorEntry {
-    pub(super) fn of(top: &View<'_>) -> Result<Self, ProblemError> {
+    pub(super) fn of(top: &TomlView<'_>) -> Result<Self, DataError> {
         const KEY: &str = "simulator";
-        if top.table.get(KEY).is_some_and(toml::Value::is_array) {
+        if top.is_list(KEY) {
             let workers = WorkersEntry { jobs: None, deadline_s: 60.0, start_s: 120.0 };
             return Ok(Self::Command { command: command(top, KEY)?, workers });
         }
-        let Some(table) = top.table(KEY)? else {
+        let Some(view) = top.table(KEY)? else {
             return top.fail(KEY, "it is missing; write simulator = [\"python3\", \"sim.py\"], or a table [simulator]");
         };
-        let view = View { table, name: "[simulator]", ..*top };
         let kinds = ["builtin", "command", "python", "fmu"];
         let given: Vec<&str> = kinds.into_iter().filter(|kind| view.has(kind)).collect();
         match given.as_slice() {
@@ -81,13 +79,13 @@ impl SimulatorEntry {
                 view.only(&[&[kind, "jobs", "deadline_s", "start_s"], own].concat())?;
                 let workers = WorkersEntry {
                     jobs: view.optional_count("jobs")?,
-                    deadline_s: view.above_zero("deadline_s", 60.0)?,
-                    start_s: view.above_zero("start_s", 120.0)?,
+                    deadline_s: view.above_zero("deadline_s")?.unwrap_or(60.0),
+                    start_s: view.above_zero("start_s")?.unwrap_or(120.0),
                 };
                 Ok(match *kind {
                     "command" => Self::Command { command: command(&view, kind)?, workers },
                     "python" => {
-                        let object = view.text(kind)?;
+                        let object = view.text(kind)?.to_owned();
                         if object.split(':').count() != 2 || object.split(':').any(str::is_empty) {
                             return view.fail(
                                 kind,
@@ -97,7 +95,7 @@ impl SimulatorEntry {
                         Self::Python { object, workers }
                     }
                     _ => {
-                        let (file, variables) = (view.text(kind)?, variables(&view)?);
+                        let (file, variables) = (view.text(kind)?.to_owned(), variables(&view)?);
                         Self::Fmu { file, variables, workers }
                     }
                 })
@@ -112,10 +110,11 @@ impl SimulatorEntry {
         }
     }
 
-    fn builtin(view: &View<'_>) -> Result<Self, ProblemError> {
+    fn builtin(view: &TomlView<'_>) -> Result<Self, DataError> {
         let kind = view.text("builtin")?;
-        let (data_set, rig) = (view.text_or("data_set", ".")?, view.optional_text("rig")?);
-        match kind.as_str() {
+        let data_set = view.optional_text("data_set")?.unwrap_or(".").to_owned();
+        let rig = view.optional_text("rig")?.map(str::to_owned);
+        match kind {
             "rig" => {
                 view.only(&["builtin", "data_set", "rig"])?;
                 Ok(Self::Rig { data_set, rig })
@@ -124,7 +123,9 @@ impl SimulatorEntry {
                 view.only(&["builtin", "data_set", "rig", "reference", "signal"])?;
                 let columns =
                     match (view.optional_text("reference")?, view.optional_text("signal")?) {
-                        (Some(reference), Some(signal)) => Some((reference, signal)),
+                        (Some(reference), Some(signal)) => {
+                            Some((reference.to_owned(), signal.to_owned()))
+                        }
                         (None, None) => None,
                         _ => {
                             return view
@@ -139,13 +140,13 @@ impl SimulatorEntry {
 }
 
 /// The table `[simulator.variables]`: a name of the problem, and what the FMU calls it.
-fn variables(view: &View<'_>) -> Result<BTreeMap<String, String>, ProblemError> {
-    let Some(table) = view.table("variables")? else { return Ok(BTreeMap::new()) };
-    let own = View { table, name: "[simulator.variables]", ..*view };
-    table.keys().map(|name| Ok((name.clone(), own.text(name)?))).collect()
+fn variables(view: &TomlView<'_>) -> Result<BTreeMap<String, String>, DataError> {
+    let Some(own) = view.table("variables")? else { return Ok(BTreeMap::new()) };
+    let own = own.called("[simulator.variables]");
+    own.keys().map(|name| Ok((name.to_owned(), own.text(name)?.to_owned()))).collect()
 }
 
-fn command(view: &View<'_>, key: &str) -> Result<Vec<String>, ProblemError> {
+fn command(view: &TomlView<'_>, key: &str) -> Result<Vec<String>, DataError> {
     let command = view.texts(key)?;
     match command.first().is_some_and(|program| !program.is_empty()) {
         true => Ok(command),

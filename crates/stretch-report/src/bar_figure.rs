@@ -8,6 +8,7 @@ use plotters::{
 use super::{
     canvas::Ink,
     figure::{Area, Drawn, Figure, Frame, dot, px, stroke, words},
+    live::{BarRow, Pick, bars_json},
     markup::{number, tick},
 };
 
@@ -73,6 +74,42 @@ pub(crate) fn bar_figure(description: &str, rows: &[Row], scale: Scale, x_label:
     Figure::new(description)
         .draw(Frame { width: 400, height }, draw)
         .draw(Frame { width: 880, height }, draw)
+        .live(bars_json(GAP, &told(rows, &[], x_label)))
+}
+
+/// Plots over time in which a bar shows its samples.
+pub(crate) const GAP: &str = "gap";
+
+/// Where every row stands and what it says, with the samples that are its own.
+fn told(rows: &[Row], picks: &[Option<Pick>], unit: &str) -> Vec<BarRow> {
+    let mut y = 2.0;
+    let mut one = |(index, row): (usize, &Row)| {
+        let top = y;
+        y += LABEL + row.bars.len() as f64 * (BAR + 3.0) + 5.0;
+        let said = |bar: &Bar| match bar.text.is_empty() {
+            true => format!("{} {unit}", number(bar.value, 2)),
+            false => bar.text.clone(),
+        };
+        BarRow {
+            label: row.label.clone(),
+            top: px(top),
+            bottom: px(y - 3.0),
+            text: row.bars.iter().map(said).collect::<Vec<_>>().join("; "),
+            pick: picks.get(index).cloned().flatten(),
+        }
+    };
+    rows.iter().enumerate().map(&mut one).collect()
+}
+
+/// A narrow figure whose bars show their samples.
+pub(crate) fn picking_figure(
+    description: &str,
+    rows: &[Row],
+    picks: &[Option<Pick>],
+    unit: &str,
+) -> Figure {
+    narrow_bar_figure(description, rows, Scale::Floors, unit)
+        .live(bars_json(GAP, &told(rows, picks, unit)))
 }
 
 /// The same in one shape, for figures that stand side by side.

@@ -23,6 +23,7 @@ pub(crate) fn reliability_figure(calibration: &Calibration) -> Figure {
         y: 0.0..1.0,
         x_label: "probability stated".to_owned(),
         y_label: "share that came true (number of cases)".to_owned(),
+        is_log: false,
     };
     Figure::new("Reliability diagram: probability stated against share that came true").draw(
         Frame::NARROW,
@@ -75,6 +76,7 @@ pub(crate) fn time_figure(times: &[f64]) -> Figure {
         y: 0.0..102.0,
         x_label: "time of a diagnosis, s".to_owned(),
         y_label: "% of the cases".to_owned(),
+        is_log: false,
     };
     let draw = |area: &Area<'_>| {
         plot(area, &axes, |chart| {

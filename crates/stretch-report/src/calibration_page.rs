@@ -12,6 +12,7 @@ use super::{
     error_figure::{Against, error_figure, residual_figure},
     estimate_figure::{closest_look, estimate_figure, estimate_picture},
     markup::{fixed, number, with_unit},
+    memory_figure::{loop_figure, remembers, step_figure},
     page::Page,
     slice_figure::slice_figure,
     surface_figure::surface_figure,
@@ -63,7 +64,7 @@ pub(crate) fn calibration_sections(page: &mut Page, subject: &Judged<'_>) {
     judged(page, evaluation, &names, context);
     over_time(page, evaluation, &names);
     errors(page, evaluation, &names);
-    surfaces(page, calibrated);
+    shapes(page, calibrated, &evaluation.unit);
     fits(page, calibrated, context);
 }
 
@@ -197,15 +198,43 @@ fn errors(page: &mut Page, evaluation: &Evaluation, names: &[String]) {
     page.figure(&residual_figure(evaluation, names), "How often each error occurs.");
 }
 
+fn shapes(page: &mut Page, calibrated: &[(&str, &Calibrated)], unit: &str) {
+    let memories: Vec<_> = calibrated.iter().filter(|(_, c)| remembers(c)).collect();
+    for (name, calibrated) in &memories {
+        page.section(
+            &format!("What it remembers ({name})"),
+            "No surface shows a model that remembers: here is what it makes of a signal that leaps, and of one that goes up \
+             and down evenly through the middle half of its range. Without memory the loops would lie on one line.",
+        );
+        page.figures(&[
+            (
+                step_figure(name, calibrated, unit),
+                "The signal leaps up after 5 s and down after 10 s.".to_owned(),
+            ),
+            (
+                loop_figure(name, calibrated, unit),
+                "Estimate over signal, by the time of one way up and down.".to_owned(),
+            ),
+        ]);
+    }
+    if memories.is_empty() {
+        surfaces(page, calibrated);
+    } else if calibrated.iter().any(|(_, c)| !BranchView::all(c).is_empty()) {
+        page.folded("The surfaces of the models without memory", |page| surfaces(page, calibrated));
+    }
+}
+
 fn surfaces(page: &mut Page, calibrated: &[(&str, &Calibrated)]) {
     for (name, calibrated) in calibrated {
         let views = BranchView::all(calibrated);
         if views.is_empty() {
             continue;
         }
-        let intro = "One surface serves rising targets, one falling ones. Each is drawn where \
-                     samples support it; the outermost percent of rates is left out.";
-        page.section(&format!("The surfaces ({name})"), intro);
+        page.heading(&format!("The surfaces ({name})"));
+        page.text(
+            "One surface serves rising targets, one falling ones. It is filled where samples support it and a bare net \
+             where it goes beyond them; no net where it leaves the frame. The outermost percent of rates is left out.",
+        );
         let inks = [Ink::Fourth, Ink::Fifth];
         let solid: Vec<_> = views
             .iter()

@@ -4,7 +4,7 @@ use stretch_gap::{Diagnosis, Gross, VerdictKind};
 use stretch_sim::Language;
 
 use super::{
-    bar_figure::{Bar, Row, Scale, bar_figure, narrow_bar_figure},
+    bar_figure::{Bar, Row, Scale, bar_figure, narrow_bar_figure, picking_figure},
     canvas::Ink,
     diagnosis_tables::{
         baseline_table, candidate_table, parameter_table, slice_table, stage_table, transfer_table,
@@ -13,7 +13,9 @@ use super::{
     gap_figures::{
         AFTER, Against, BEFORE, after_name, has_after, left_figure, trace_figures, worst,
     },
+    live::Pick,
     markup::{number, percent, with_unit},
+    multiple::multiple,
     page::Page,
     subject::Subject,
 };
@@ -36,7 +38,72 @@ pub(crate) fn diagnosis_title(subject: &Subject<'_>) -> String {
 
 /// The result in one sentence.
 pub(crate) fn diagnosis_verdict(subject: &Subject<'_>) -> String {
-    subject.diagnosis.sentence.replace(" %", "\u{a0}%")
+    let d = subject.diagnosis;
+    let sentence = d.sentence.replace(" %", "\u{a0}%");
+    // a probability is one among the candidates, and is told as such
+    let told = d.candidates.first().and_then(|c| {
+        let (before, after) = sentence.split_once("; probability ")?;
+        let rest = after.get("0.00".len()..)?;
+        Some(format!("{before}; probability {} {GIVEN}{rest}", percent(c.probability)))
+    });
+    told.unwrap_or(sentence)
+}
+
+/// What every probability stands under.
+const GIVEN: &str = "given this catalogue";
+
+/// Named effects, and what may stand in their place.
+fn to_add(d: &Diagnosis) -> String {
+    match (&d.named[..], &d.tied[..]) {
+        (_, []) => listed(&d.named),
+        ([one], tied) => {
+            let all: Vec<&str> = std::iter::once(one).chain(tied).map(String::as_str).collect();
+            format!("{}: these data cannot tell which", all.join(" or "))
+        }
+        (_, tied) => {
+            format!(
+                "{} (or {} in the place of one: these data cannot tell)",
+                listed(&d.named),
+                tied.join(" or ")
+            )
+        }
+    }
+}
+
+/// What to do now, in a sentence.
+fn to_do(d: &Diagnosis) -> String {
+    let experiment = d.next_experiment.as_ref().map(|next| {
+        let seconds = 60.0 * next.minutes;
+        let long = if seconds < 120.0 {
+            format!("{} s", number(seconds, 2))
+        } else {
+            format!("{} min", number(next.minutes, 2))
+        };
+        format!(
+            "Measure \u{201c}{}\u{201d} ({long}): it would tell {} apart.",
+            next.name.replace('_', " "),
+            listed(&next.separates)
+        )
+    });
+    let now = match d.verdict {
+        VerdictKind::Effect | VerdictKind::Partial if d.tied.is_empty() => {
+            "Put the code below into the simulator, then diagnose again."
+        }
+        VerdictKind::Effect | VerdictKind::Partial => {
+            "Run an experiment that tells them apart before you build on one."
+        }
+        VerdictKind::Parameters => "Set them, then diagnose again.",
+        VerdictKind::Record => "Put the record right, then diagnose again.",
+        VerdictKind::Unknown => "Look where the gap sits, below; give the catalogue what it lacks.",
+        VerdictKind::NoGap => "Nothing: use it.",
+    };
+    match (experiment, d.verdict) {
+        (Some(experiment), VerdictKind::Effect | VerdictKind::Partial) if d.tied.is_empty() => {
+            format!("{now} {experiment}")
+        }
+        (Some(experiment), _) => experiment,
+        (None, _) => now.to_owned(),
+    }
 }
 
 /// The sections of the report: a page of their own, or a part of a longer one.
@@ -74,7 +141,7 @@ fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
         .max_by(|a, b| a.share.total_cmp(&b.share))
         .map_or_else(String::new, |s| format!("{} ({} of the gap)", s.stage, percent(s.share)));
     let fix = match d.verdict {
-        VerdictKind::Effect | VerdictKind::Partial => format!("Add {}.", listed(&d.named)),
+        VerdictKind::Effect | VerdictKind::Partial => format!("Add {}.", to_add(d)),
         VerdictKind::Parameters => {
             let moved = moved(d);
             if moved.is_empty() {
@@ -94,15 +161,17 @@ fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
         (VerdictKind::Effect | VerdictKind::Partial, Some(c)) => {
             let rivals: Vec<String> =
                 d.ambiguous.iter().filter(|n| !d.named.contains(n)).cloned().collect();
-            let rest = if rivals.is_empty() {
+            let rest = if !d.tied.is_empty() {
+                format!("a tie with {}", listed(&d.tied))
+            } else if rivals.is_empty() {
                 "nothing else explains these data as well".to_owned()
             } else {
                 format!("these data cannot rule out {}", listed(&rivals))
             };
-            format!("Probability {}: {rest}.", percent(c.probability))
+            format!("Probability {} {GIVEN}: {rest}.", percent(c.probability))
         }
         (VerdictKind::Record, Some(c)) if !d.gross.iter().any(Gross::is_plain) => {
-            format!("Probability {} beside every set of effects.", percent(c.probability))
+            format!("Probability {} beside every set of effects, {GIVEN}.", percent(c.probability))
         }
         (VerdictKind::Record, _) => "The columns alone say so, whatever the simulator is.".to_owned(),
         (VerdictKind::Unknown, _) => {
@@ -120,7 +189,12 @@ fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
         VerdictKind::Parameters => "The whole gap closes by re-tuning.".to_owned(),
         VerdictKind::NoGap => "The simulator can be used as it is.".to_owned(),
     };
-    vec![("Fix in the simulator", fix), ("How sure", sure), ("What it gains", gain)]
+    vec![
+        ("What to change", fix),
+        ("How sure", sure),
+        ("What it gains", gain),
+        ("What to do next", to_do(d)),
+    ]
 }
 
 /// What a calibration gains, where it gains anything to speak of.
@@ -170,7 +244,7 @@ fn seen(page: &mut Page, subject: &Subject<'_>) {
     page.section(
         "Measured against simulated",
         "The stage with the largest gap, driven by its measured input, on the test trial where it is farthest \
-         off. One floor is the noise that no simulator could remove.",
+         off. The noise is what no simulator could remove.",
     );
     let (top, below, trial) = trace_figures(subject, stage);
     let caption = format!(
@@ -178,7 +252,7 @@ fn seen(page: &mut Page, subject: &Subject<'_>) {
         spec.name, spec.channel
     );
     page.figure(&top, &caption);
-    page.figure(&below, "What is left, in floors: within two of them it is noise.");
+    page.figure(&below, "What is left, in multiples of the noise: within two of them it is noise.");
     let level = (
         left_figure(subject, stage, Against::Level),
         "Against the level of the motion, all trials: what has the wrong shape.".to_owned(),
@@ -198,9 +272,9 @@ fn located(page: &mut Page, subject: &Subject<'_>) {
     page.section(
         "Where the gap sits",
         "Every stage is run on its measured input, so that no stage pays for another. The scale is the root mean \
-         square of what is left on the test trials, in floors: at 1 only noise is left.",
+         square of what is left on the test trials, in multiples of the noise: at 1 only noise is left.",
     );
-    let rms = |excess: f64| (1.0 + excess).max(1.0).sqrt();
+    let rms = |excess: f64| multiple(excess).max(1.0);
     let after = has_after(subject);
     let rows: Vec<Row> = d
         .location
@@ -219,8 +293,8 @@ fn located(page: &mut Page, subject: &Subject<'_>) {
     if after {
         legend.push((AFTER, after_name(d)));
     }
-    let figure =
-        bar_figure("What is left, by stage", &rows, Scale::Floors, "floors").legend(legend);
+    let figure = bar_figure("What is left, by stage", &rows, Scale::Floors, "\u{d7} the noise")
+        .legend(legend);
     page.figure(&figure, "What is left, stage by stage.");
     if !d.location.end_to_end.is_empty() {
         let share = |s: &stretch_gap::StageShare| Row {
@@ -235,16 +309,41 @@ fn located(page: &mut Page, subject: &Subject<'_>) {
              (Shapley value).",
         );
     }
-    slices(page, d);
+    slices(page, subject);
 }
 
-fn slices(page: &mut Page, d: &Diagnosis) {
+/// The samples of a slice, from what it is called; none for what a plot of one trial cannot show.
+fn pick(by: &str, slice: &str, [falling, rising]: &[&str; 2]) -> Option<Pick> {
+    let sides = |from: f64, to: f64| Some(Pick { by: "rate", from, to, size: false });
+    let most = 1e300;
+    if by == "regime" {
+        return match slice {
+            s if s == *falling => sides(-most, -0.0),
+            s if s == *rising => sides(0.0, most),
+            _ => None,
+        };
+    }
+    let by = ["level", "rate", "time"].into_iter().find(|known| *known == by)?;
+    let numbers: Vec<f64> = slice.split(' ').filter_map(|word| word.parse().ok()).collect();
+    let [from, to] = match (numbers[..].as_ref(), slice.split(' ').next()) {
+        ([from, to], _) => [*from, *to],
+        ([to], Some("first")) => [0.0, *to],
+        ([from], Some("after")) => [*from, most],
+        _ => return None,
+    };
+    Some(Pick { by, from, to, size: by == "rate" })
+}
+
+fn slices(page: &mut Page, subject: &Subject<'_>) {
+    let d = subject.diagnosis;
+    let motion = subject.simulator.motion();
+    let words = [motion.falling, motion.rising];
     let stages = &d.location.stages;
     let stage = stages.get(worst(d)).map_or("", |s| s.stage.as_str());
     let of = |by: &str| -> Option<(Figure, String)> {
         let slices: Vec<_> =
             d.location.slices.iter().filter(|s| s.by == by && s.stage == stage).collect();
-        let rms = |excess: f64| (1.0 + excess).max(1.0).sqrt();
+        let rms = |excess: f64| multiple(excess).max(1.0);
         let rows: Vec<Row> = slices
             .iter()
             .map(|s| Row {
@@ -266,7 +365,9 @@ fn slices(page: &mut Page, d: &Diagnosis) {
             _ => "By trial",
         };
         (!rows.is_empty()).then(|| {
-            let figure = narrow_bar_figure(title, &rows, Scale::Floors, "floors");
+            let picks: Vec<Option<Pick>> =
+                slices.iter().map(|s| pick(by, &s.slice, &words)).collect();
+            let figure = picking_figure(title, &rows, &picks, "\u{d7} the noise");
             (figure, format!("{title}."))
         })
     };
@@ -321,17 +422,21 @@ fn named(page: &mut Page, subject: &Subject<'_>) {
     page.figures(&[
         (
             narrow_bar_figure("Probability of every candidate", &odds, Scale::Percent, "%"),
-            "Probability among the candidates.".to_owned(),
+            "Probability among the candidates, given this catalogue.".to_owned(),
         ),
         (
             narrow_bar_figure("Closed gap of every candidate", &closed, Scale::Percent, "%"),
             "Share of the gap that closes on the test trials, with its 95 % interval.".to_owned(),
         ),
     ]);
-    if d.ambiguous.len() > 1 {
+    // effects of one set stand together: only what may take the place of one is a rival
+    let rivals: Vec<String> =
+        d.ambiguous.iter().filter(|name| !d.named.contains(name)).cloned().collect();
+    if !rivals.is_empty() && !d.named.is_empty() {
         page.text(&format!(
-            "These data cannot tell {} apart with 95 % probability.",
-            listed(&d.ambiguous)
+            "These data cannot tell {} from {} with 95 % probability, {GIVEN}.",
+            listed(&d.named),
+            listed(&rivals)
         ));
     }
     page.table(&candidate_table(&d.candidates));
@@ -365,8 +470,7 @@ fn gained(page: &mut Page, subject: &Subject<'_>) {
     page.section("How far the gap closes", "");
     page.table(&stage_table(&d.location.stages, has_after(subject)));
     page.text(
-        "Gaps are mean squares over the floor, minus 1: at 0 nothing but noise is left, at 1 the error is as large as \
-         the noise.",
+        "At 1\u{a0}\u{d7} nothing but noise is left; at 2\u{a0}\u{d7} the root mean square is twice that of the noise.",
     );
     if let Some(transfer) = &d.transfer {
         page.table(&transfer_table(transfer));
@@ -392,7 +496,7 @@ fn next(page: &mut Page, d: &Diagnosis) {
     let Some(next) = &d.next_experiment else { return };
     page.section("What to measure next", "");
     page.text(&format!(
-        "{} ({} min) would tell {} apart: whatever their parameters, they differ by {} floors. {}",
+        "{} ({} min) would tell {} apart: whatever their parameters, they differ by {} times the noise. {}",
         next.name.replace('_', " "),
         number(next.minutes, 2),
         listed(&next.separates),
@@ -409,7 +513,7 @@ fn numbers(page: &mut Page, d: &Diagnosis) {
     page.section("All numbers", "");
     page.list(&d.notes);
     for stage in &d.location.stages {
-        page.text(&format!("Floor of {}: {}.", stage.stage, stage.floor_source));
+        page.text(&format!("Noise of {}: {}.", stage.stage, stage.floor_source));
         if let Some(table) = slice_table(&d.location.slices, &stage.stage) {
             page.folded(&format!("{}: every slice", stage.stage), |page| {
                 page.table(&table);

@@ -3,6 +3,7 @@
 use stretch_blind::method_in_words;
 use stretch_gap::{Baselines, Candidate, Diagnosis, SliceGap, StageGap, Transfer};
 
+use super::multiple::{both, times};
 use super::{
     markup::{NONE, fixed, number, percent, with_unit},
     page::Table,
@@ -22,23 +23,16 @@ pub(crate) fn stage_table(stages: &[StageGap], has_after: bool) -> Table {
     let row = |s: &StageGap| {
         vec![
             s.stage.clone(),
-            number(s.raw, 3),
-            number(s.excess, 3),
-            if has_after { number(s.after, 3) } else { NONE.to_owned() },
-            with_unit(&number(s.rms, 3), &s.unit),
             with_unit(&number(s.floor, 3), &s.unit),
+            both(s.raw, s.floor, &s.unit),
+            both(s.excess, s.floor, &s.unit),
+            if has_after { both(s.after, s.floor, &s.unit) } else { NONE.to_owned() },
         ]
     };
     Table {
-        caption: "Gap on the test trials, in floors".to_owned(),
-        head: cells([
-            "Stage",
-            "As shipped",
-            "Re-tuned",
-            "With the effect",
-            "Left, re-tuned",
-            "Floor",
-        ]),
+        caption: "What is left on the test trials: root mean square, and in multiples (\u{d7}) of the noise"
+            .to_owned(),
+        head: cells(["Stage", "Noise", "As shipped", "Re-tuned", "With the effect"]),
         rows: stages.iter().map(row).collect(),
         highlight: None,
     }
@@ -64,21 +58,22 @@ pub(crate) fn candidate_table(candidates: &[Candidate]) -> Table {
         vec![
             effects,
             fixed(c.probability, 3),
-            number(c.gap_before, 3),
-            number(c.gap_after, 3),
+            times(c.gap_before),
+            times(c.gap_after),
             percent(c.closed),
             interval(c.closed_ci, percent),
             values.join("; "),
         ]
     };
     Table {
-        caption: "Candidates, the most probable first; gaps are summed over the channels"
+        caption: "Candidates, the most probable first: probability given this catalogue; what is left before and after in multiples of the noise, \
+                  all channels with a gap together; the share that closes on trials that were not fitted"
             .to_owned(),
         head: cells([
             "Effects",
             "Probability",
-            "Gap before",
-            "After",
+            "Left before",
+            "Left after",
             "Closes",
             "95 % interval",
             "Parameters",
@@ -150,15 +145,17 @@ pub(crate) fn slice_table(slices: &[SliceGap], stage: &str) -> Option<Table> {
             vec![
                 format!("{}: {}", s.by, s.slice),
                 percent(s.share),
-                number(s.excess, 3),
-                interval(s.excess_ci, |x| number(x, 3)),
+                times(s.excess),
+                interval(s.excess_ci, times),
                 if s.stands_out { "yes" } else { "" }.to_owned(),
             ]
         })
         .collect();
     (!rows.is_empty()).then(|| Table {
-        caption: format!("{stage}: gap by slice, re-tuned, all trials"),
-        head: cells(["Slice", "Share", "Gap", "95 % interval", "Stands out"]),
+        caption: format!(
+            "{stage}: what is left by slice in multiples of the noise, re-tuned, all trials"
+        ),
+        head: cells(["Slice", "Share of the gap", "Left", "95 % interval", "Stands out"]),
         rows,
         highlight: None,
     })

@@ -8,6 +8,7 @@ use stretch_calibrate::{Evaluation, TrialErrors};
 use super::{
     canvas::Ink,
     figure::{Axes, Figure, Frame, plot, stroke},
+    live::TimePlot,
     markup::{number, with_unit},
     thin::{curve, extent, padded},
 };
@@ -22,7 +23,8 @@ pub(crate) fn estimate_figure(
     names: &[String],
 ) -> Figure {
     match extent(trial.time_s.iter().copied()) {
-        Some(time) if time.end > time.start => window_figure(evaluation, trial, names, &time),
+        Some(time) if time.end > time.start => window_figure(evaluation, trial, names, &time)
+            .live(live(evaluation, trial, names, liveliest(trial).unwrap_or(time), true)),
         _ => Figure::missing("There is no stretch of time to draw."),
     }
 }
@@ -34,9 +36,37 @@ pub(crate) fn closest_look(
     names: &[String],
 ) -> Figure {
     match liveliest(trial) {
-        Some(window) => window_figure(evaluation, trial, names, &window),
+        Some(window) => window_figure(evaluation, trial, names, &window)
+            .live(live(evaluation, trial, names, window, false)),
         None => Figure::missing("The trial is too short for a closer look."),
     }
+}
+
+/// The curves of a trial: the closer look brings them, the whole recording marks what it shows.
+fn live(
+    evaluation: &Evaluation,
+    trial: &TrialErrors,
+    names: &[String],
+    view: Range<f64>,
+    is_second: bool,
+) -> Option<String> {
+    let is_whole = is_second && liveliest(trial).is_some();
+    let estimates = trial.estimates.iter().zip(names).enumerate();
+    let lines = std::iter::once(("reference", Ink::Truth, 2.8, &trial.reference[..]))
+        .chain(estimates.map(|(i, (y, name))| (name.as_str(), Ink::of(i), 1.4, &y[..])));
+    let unit = with_unit("reference and estimates,", &evaluation.unit);
+    TimePlot {
+        link: trial.trial.clone(),
+        labels: ["time, s", unit.trim_end_matches(',')],
+        unit: &evaluation.unit,
+        height: Frame::WIDE.height,
+        time: &trial.time_s,
+        view,
+        is_whole,
+        lines: lines.collect(),
+        keys: Vec::new(),
+    }
+    .json()
 }
 
 /// A picture that stands alone, such as in a README: light, its legend inside.
@@ -79,6 +109,7 @@ fn window_figure(
         y_label: with_unit("reference and estimates,", &evaluation.unit)
             .trim_end_matches(',')
             .to_owned(),
+        is_log: false,
     };
     let from_to = [window.start, window.end].map(|t| number(t, 3)).join(" to ");
     let description = format!(

@@ -10,7 +10,7 @@ use plotters::{
 
 use super::{
     canvas::{Canvas, Ink, STEPS},
-    markup::{escape, tick},
+    markup::{escape, number, tick},
 };
 
 /// Size of words and numbers, in pixels of the figure.
@@ -56,6 +56,8 @@ pub(crate) struct Figure {
     pub(crate) legend: Vec<(Ink, String)>,
     /// Why it is not drawn.
     pub(crate) missing: Option<String>,
+    /// What the page's script draws in its place, as JSON.
+    pub(crate) live: Option<String>,
     drawings: Vec<(Frame, String)>,
 }
 
@@ -95,6 +97,13 @@ impl Figure {
     #[must_use]
     pub(crate) fn legend(mut self, entries: impl IntoIterator<Item = (Ink, String)>) -> Self {
         self.legend.extend(entries);
+        self
+    }
+
+    /// Adds what the page's script draws in its place, or answers with.
+    #[must_use]
+    pub(crate) fn live(mut self, json: impl Into<Option<String>>) -> Self {
+        self.live = json.into();
         self
     }
 
@@ -163,6 +172,8 @@ pub(crate) struct Axes {
     pub(crate) x_label: String,
     /// Above, at the left end.
     pub(crate) y_label: String,
+    /// Whether horizontal places are logarithms to base ten: the numbers are then those that they stand for.
+    pub(crate) is_log: bool,
 }
 
 /// Text in an ink, held at `h` and `v`.
@@ -204,9 +215,11 @@ pub(crate) fn plot<'b>(
     let most = |pixels: u32, each: i32| (pixels as i32 / px(f64::from(each))).max(2) as usize;
     chart
         .configure_mesh()
-        .x_labels(most(width, 75))
+        .x_labels(if axes.is_log { x_span.floor() as usize + 1 } else { most(width, 75) })
         .y_labels(most(height, 32))
-        .x_label_formatter(&|v| tick(*v, x_span))
+        .x_label_formatter(&|v| {
+            if axes.is_log { number(10f64.powf(*v), 1) } else { tick(*v, x_span) }
+        })
         .y_label_formatter(&|v| tick(*v, y_span))
         .label_style(numbers)
         .axis_style(stroke(Ink::Axis.color(), 1.0))

@@ -6,9 +6,10 @@ use plotters::prelude::*;
 use stretch_gap::{Diagnosis, Role, StageEvidence};
 
 use super::{
+    bar_figure::GAP,
     canvas::Ink,
     figure::{Area, Axes, Figure, Frame, dot, plot, px, stroke},
-    markup::with_unit,
+    live::{Panel, TimePlot, scatter_json},
     subject::Subject,
     thin::{binned, curve, extent, padded, quantile, sample, sorted},
 };
@@ -56,6 +57,7 @@ pub(crate) fn trace_figures(subject: &Subject<'_>, stage: usize) -> (Figure, Fig
         return (missing(), missing(), String::new());
     };
     let (evidence, spec) = (&subject.evidence.stages[stage], &subject.simulator.stages()[stage]);
+    let span = trial.clone();
     let measured = &subject.simulator.measured(stage)[trial.clone()];
     let after = has_after(subject);
     let mut lines = vec![
@@ -72,9 +74,34 @@ pub(crate) fn trace_figures(subject: &Subject<'_>, stage: usize) -> (Figure, Fig
         left.push((AFTER, 1.4, evidence.residual_after[trial].to_vec()));
         legend.push((AFTER, format!("simulated, {}", after_name(subject.diagnosis))));
     }
-    let name = with_unit(&spec.channel, "");
-    let top = lines_figure(&time, &lines, &window, &name, 280).legend(legend);
-    let below = lines_figure(&time, &left, &window, "measured - simulated, floors", 190);
+    let name = if spec.unit.is_empty() {
+        spec.channel.clone()
+    } else {
+        format!("{}, {}", spec.channel, spec.unit)
+    };
+    let motion = subject.simulator.motion().values;
+    let keys = [("level", motion.to_vec()), ("rate", rates(subject, motion))]
+        .map(|(key, values)| (key, values.get(span.clone()).unwrap_or_default().to_vec()));
+    let names: Vec<&str> = legend.iter().map(|(_, name)| name.as_str()).collect();
+    let live = |lines: &[(Ink, f64, Vec<f64>)], names: &[&str], is_first: bool| {
+        let lines = lines.iter().zip(names).map(|((ink, w, y), name)| (*name, *ink, *w, &y[..]));
+        TimePlot {
+            link: GAP.to_owned(),
+            labels: ["time in the trial, s", if is_first { &name } else { LEFT }],
+            unit: if is_first { &spec.unit } else { "\u{d7} the noise" },
+            height: if is_first { 280 } else { 190 },
+            time: &time,
+            view: window.clone(),
+            is_whole: false,
+            lines: lines.collect(),
+            keys: keys.iter().filter(|_| is_first).map(|(key, y)| (*key, &y[..])).collect(),
+        }
+        .json()
+    };
+    let (told, told_left) = (live(&lines, &names, true), live(&left, &names[1..], false));
+    let left_legend = legend[1..].to_vec();
+    let top = lines_figure(&time, &lines, &window, &name, 280).legend(legend).live(told);
+    let below = lines_figure(&time, &left, &window, LEFT, 190).legend(left_legend).live(told_left);
     let trial_name = trial_name(subject, stage);
     (top, below, trial_name)
 }
@@ -99,6 +126,7 @@ fn lines_figure(
         y: padded(&y, 0.06),
         x_label: "time in the trial, s".to_owned(),
         y_label: y_label.to_owned(),
+        is_log: false,
     };
     let draw = |lines: Vec<Line>| {
         let axes = &axes;
@@ -154,6 +182,9 @@ fn begin_of(subject: &Subject<'_>, trial: usize) -> usize {
     subject.simulator.trials()[..trial].iter().map(|t| t.samples).sum()
 }
 
+/// What is left, above its axis.
+const LEFT: &str = "measured \u{2212} simulated, multiples of the noise";
+
 /// What the residual is drawn against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Against {
@@ -192,51 +223,71 @@ pub(crate) fn left_figure(subject: &Subject<'_>, stage: usize, against: Against)
     }
     let height = 165;
     let frame = Frame { width: 400, height: height * panels.len() as u32 + 20 };
-    let description = format!("Measured minus simulated in floors against {x_label}");
-    Figure::new(&description).draw(frame, |area| {
-        let mut rest = area.clone();
-        for (i, (ink, name, points)) in panels.iter().enumerate() {
-            let last = i + 1 == panels.len();
-            let tall = if last { height + 20 } else { height };
-            let (here, below) = rest.split_vertically(px(f64::from(tall)));
-            rest = below;
-            let axes = Axes {
-                x: x.clone(),
-                y: -most..most,
-                x_label: if last { x_label.clone() } else { String::new() },
-                y_label: format!("{name}, floors"),
-            };
-            let bins = binned(points, &x, SLOTS);
-            plot(&here, &axes, |chart| {
-                let zero = [(x.start, 0.0), (x.end, 0.0)];
-                chart.draw_series(LineSeries::new(zero, stroke(Ink::Axis.color(), 1.0)))?;
-                let inside: Vec<_> = points
-                    .iter()
-                    .copied()
-                    .filter(|(a, r)| x.contains(a) && r.abs() < most)
-                    .collect();
-                let dots = spread_over(&inside, &x).into_iter();
-                chart.draw_series(dots.map(|at| Circle::new(at, px(0.9), dot(*ink, 0.5))))?;
-                let cut = |r: f64| r.clamp(-most, most);
-                if bins.len() > 1 {
-                    let rim = bins.iter().map(|b| (b.x, cut(b.low)));
-                    let back = bins.iter().rev().map(|b| (b.x, cut(b.high)));
-                    let band: Vec<_> = rim.chain(back).collect();
-                    chart.draw_series([Polygon::new(band, ink.faint(0.18))])?;
-                    let median = bins.iter().map(|b| (b.x, cut(b.median)));
-                    chart.draw_series(LineSeries::new(median, stroke(Ink::Truth.color(), 2.2)))?;
-                }
-                Ok(())
-            })?;
-        }
-        Ok(())
-    })
+    let description =
+        format!("Measured minus simulated in multiples of the noise against {x_label}");
+    let told: Vec<Panel> = (0..panels.len() as u32)
+        .zip(&panels)
+        .map(|(i, (_, name, _))| {
+            let is_last = i as usize + 1 == panels.len();
+            let ends = [i * height, (i + 1) * height + if is_last { 20 } else { 0 }];
+            Panel::new(format!("left {name}"), ends, !is_last, [-most, most])
+        })
+        .collect();
+    let by = match against {
+        Against::Level => "level",
+        Against::Rate => "rate",
+    };
+    let live = scatter_json(GAP, Some(by), &x, [by, &unit, "\u{d7} the noise"], &told);
+    Figure::new(&description)
+        .draw(frame, |area| {
+            let mut rest = area.clone();
+            for (i, (ink, name, points)) in panels.iter().enumerate() {
+                let last = i + 1 == panels.len();
+                let tall = if last { height + 20 } else { height };
+                let (here, below) = rest.split_vertically(px(f64::from(tall)));
+                rest = below;
+                let axes = Axes {
+                    x: x.clone(),
+                    y: -most..most,
+                    x_label: if last { x_label.clone() } else { String::new() },
+                    y_label: format!("{name}, multiples of the noise"),
+                    is_log: false,
+                };
+                let bins = binned(points, &x, SLOTS);
+                plot(&here, &axes, |chart| {
+                    let zero = [(x.start, 0.0), (x.end, 0.0)];
+                    chart.draw_series(LineSeries::new(zero, stroke(Ink::Axis.color(), 1.0)))?;
+                    let inside: Vec<_> = points
+                        .iter()
+                        .copied()
+                        .filter(|(a, r)| x.contains(a) && r.abs() < most)
+                        .collect();
+                    let dots = spread_over(&inside, &x).into_iter();
+                    chart.draw_series(dots.map(|at| Circle::new(at, px(0.9), dot(*ink, 0.5))))?;
+                    let cut = |r: f64| r.clamp(-most, most);
+                    if bins.len() > 1 {
+                        let rim = bins.iter().map(|b| (b.x, cut(b.low)));
+                        let back = bins.iter().rev().map(|b| (b.x, cut(b.high)));
+                        let band: Vec<_> = rim.chain(back).collect();
+                        chart.draw_series([Polygon::new(band, ink.faint(0.18))])?;
+                        let median = bins.iter().map(|b| (b.x, cut(b.median)));
+                        chart.draw_series(LineSeries::new(
+                            median,
+                            stroke(Ink::Truth.color(), 2.2),
+                        ))?;
+                    }
+                    Ok(())
+                })?;
+            }
+            Ok(())
+        })
+        .live(live)
 }
 
 /// Colour, name, and points of each panel.
-type Panel = (Ink, &'static str, Vec<(f64, f64)>);
+type Cloud = (Ink, &'static str, Vec<(f64, f64)>);
 
-fn panels(subject: &Subject<'_>, evidence: &StageEvidence, place: &[f64]) -> Vec<Panel> {
+fn panels(subject: &Subject<'_>, evidence: &StageEvidence, place: &[f64]) -> Vec<Cloud> {
     let join = |residual: &[f64]| place.iter().copied().zip(residual.iter().copied()).collect();
     let mut panels = vec![(BEFORE, "before", join(&evidence.residual_retuned))];
     if has_after(subject) {

@@ -2,7 +2,12 @@
 
 use std::fmt::Write as _;
 
-use super::{canvas::Ink, figure::Figure, markup::escape};
+use super::{canvas::Ink, figure::Figure, live::embedded, markup::escape, script};
+
+/// Columns from which a row is a card on a phone.
+const CARDS: usize = 4;
+/// Letters from which a cell is words, which wrap.
+const WORDS: usize = 24;
 
 /// The look: colours, type, and what a phone and a printer change.
 const STYLE: &str = include_str!("style.css");
@@ -57,6 +62,11 @@ impl Page {
         if intro.is_empty() { self } else { self.text(intro) }
     }
 
+    /// A heading within what is open already.
+    pub(crate) fn heading(&mut self, heading: &str) -> &mut Self {
+        self.put(&format!("<h2>{}</h2>\n", escape(heading)))
+    }
+
     /// A paragraph.
     pub(crate) fn text(&mut self, text: &str) -> &mut Self {
         self.put(&format!("<p>{}</p>\n", escape(text)))
@@ -99,10 +109,15 @@ impl Page {
             }
             self.put("</div>\n");
         }
+        let live = figure.live.as_ref().filter(|_| figure.missing.is_none());
         match &figure.missing {
             Some(why) => self.put(&format!("<p class=\"missing\">{}</p>\n", escape(why))),
             None => self.put(&figure.svg()),
         };
+        if let Some(json) = live {
+            let json = embedded(json);
+            self.put(&format!("<script type=\"application/json\">{json}</script>\n"));
+        }
         self.put(&format!("<figcaption>{}</figcaption></figure>\n", escape(caption)))
     }
 
@@ -118,11 +133,12 @@ impl Page {
     /// A table that scrolls in its own frame when it is too wide.
     pub(crate) fn table(&mut self, table: &Table) -> &mut Self {
         let caption = escape(&table.caption);
+        let cards = if table.head.len() >= CARDS { " class=\"cards\"" } else { "" };
         // the caption stands outside: it must not scroll away
         self.put(&format!(
             "<p class=\"caption\">{caption}</p>\n\
              <div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{caption}\">\
-             <table aria-label=\"{caption}\">\n<thead><tr>"
+             <table{cards} aria-label=\"{caption}\">\n<thead><tr>"
         ));
         for head in &table.head {
             self.put(&format!("<th scope=\"col\">{}</th>", escape(head)));
@@ -135,7 +151,12 @@ impl Page {
                 let cell = escape(cell);
                 self.put(&match column {
                     0 => format!("<th scope=\"row\">{cell}</th>"),
-                    _ => format!("<td>{cell}</td>"),
+                    _ => {
+                        let head = escape(table.head.get(column).map_or("", String::as_str));
+                        let class =
+                            if cell.chars().count() > WORDS { " class=\"words\"" } else { "" };
+                        format!("<td{class} data-head=\"{head}\">{cell}</td>")
+                    }
                 });
             }
             self.put("</tr>\n");
@@ -154,13 +175,14 @@ impl Page {
     pub(crate) fn finish(mut self) -> String {
         self.close();
         let title = escape(&self.title);
-        let body = self.body;
+        let (body, script, policy) = (self.body, script::element(), script::policy());
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/>\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n\
+             <meta http-equiv=\"Content-Security-Policy\" content=\"{policy}\"/>\n\
              <meta name=\"color-scheme\" content=\"light dark\"/>\n\
              <title>{title}</title>\n<style>\n{STYLE}</style></head>\n<body><main>\n{body}\
-             </main></body></html>\n"
+             </main>\n{script}</body></html>\n"
         )
     }
 

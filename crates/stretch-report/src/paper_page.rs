@@ -116,6 +116,7 @@ fn gap_figure(experiment: &Experiment) -> Figure {
         y: 0.0..top(&curves),
         x_label: "gap between the pulses, s".to_owned(),
         y_label: "RMSE, mm".to_owned(),
+        is_log: false,
     };
     let names = ["raw", "non-linear, as published", "non-linear, ours", "observer"];
     curves_figure(
@@ -127,13 +128,14 @@ fn gap_figure(experiment: &Experiment) -> Figure {
     .legend(names.into_iter().enumerate().map(|(i, name)| (Ink::of(i), name.to_owned())))
 }
 
-/// Frequencies stand on a logarithmic axis: its numbers are powers of ten.
+/// Frequencies stand on a logarithmic axis.
 fn frequency_axes(y: std::ops::Range<f64>, y_label: &str) -> Axes {
     Axes {
         x: -1.75..1.15,
         y,
-        x_label: "log10 of the frequency in Hz".to_owned(),
+        x_label: "frequency, Hz".to_owned(),
         y_label: y_label.to_owned(),
+        is_log: true,
     }
 }
 

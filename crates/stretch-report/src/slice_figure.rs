@@ -34,6 +34,7 @@ pub(crate) fn slice_figure(view: &BranchView<'_>) -> Figure {
         y: padded(&view.target, 0.05),
         x_label: signal.clone(),
         y_label: target.clone(),
+        is_log: false,
     };
     let paces = ["slow", "middle", "fast"];
     let legend = curves.iter().zip(INKS).zip(paces).map(|(((rate, _), ink), pace)| {

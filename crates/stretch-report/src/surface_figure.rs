@@ -31,7 +31,52 @@ pub(crate) fn surface_figure(view: &BranchView<'_>, ink: Ink) -> Figure {
     Figure::new(&description)
         .draw(Frame { width: 400, height: 340 }, |area| draw(area, view, ink))
         .legend(legend)
+        .live(live(view, ink))
 }
+
+/// Samples that a script shows with their distance to the surface.
+const STEMS: usize = 400;
+
+/// The surface as JSON: heights over the corners of its cells, and samples, in thousandths of the cube.
+fn live(view: &BranchView<'_>, ink: Ink) -> String {
+    let cube = Cube(view);
+    let at = |i: usize| i as f64 / CELLS as f64;
+    let thousandths = |x: f64| (1000.0 * x).round() as i64;
+    let corners = (0..=CELLS).flat_map(|i| (0..=CELLS).map(move |j| (i, j)));
+    let heights: Vec<Option<i64>> = corners
+        .map(|(i, j)| cube.height(at(i), at(j)))
+        .map(|z| INSIDE.contains(&z).then(|| thousandths(z)))
+        .collect();
+    let points: Vec<i64> = sample(&view.cloud, STEMS)
+        .into_iter()
+        .map(|[rate, signal, target]| (cube.u(signal), cube.r(rate), cube.z(target)))
+        .filter(|(_, r, _)| (0.0..=1.0).contains(r))
+        .flat_map(|(u, r, z)| [u, r, z, z - cube.height(u, r)].map(thousandths))
+        .collect();
+    let on: String = cube.supported().iter().map(|on| if *on { '1' } else { '0' }).collect();
+    let signal = match view.falling {
+        true => [view.signal.end, view.signal.start],
+        false => [view.signal.start, view.signal.end],
+    };
+    let spans = [[view.rate.start, view.rate.end], signal, [view.target.start, view.target.end]];
+    let axes: Vec<serde_json::Value> = view
+        .labels
+        .iter()
+        .zip(spans)
+        .map(|(label, span)| {
+            let (name, unit) = label.rsplit_once(", ").unwrap_or((label, ""));
+            serde_json::json!({"name": name, "unit": unit, "span": span})
+        })
+        .collect();
+    serde_json::json!({
+        "kind": "surface", "axes": axes, "ink": ink.class(), "cells": CELLS, "z": heights, "on": on,
+        "points": points,
+    })
+    .to_string()
+}
+
+/// Heights that are drawn: a polynomial may leave the box where samples are few.
+const INSIDE: std::ops::RangeInclusive<f64> = -0.15..=1.15;
 
 /// From the unit cube to the page: signal to the right, rate to the left, target up.
 #[derive(Clone, Copy)]
@@ -156,20 +201,22 @@ fn mesh(area: &Area<'_>, cube: &Cube<'_>, eye: &View, ink: Ink) -> Drawn {
     let supported = cube.supported();
     let at = |i: usize| i as f64 / CELLS as f64;
     let mut cells: Vec<(usize, usize)> =
-        (0..CELLS * CELLS).filter(|c| supported[*c]).map(|c| (c / CELLS, c % CELLS)).collect();
+        (0..CELLS * CELLS).map(|c| (c / CELLS, c % CELLS)).collect();
     cells.sort_by(|a, b| eye.depth(at(b.0), at(b.1)).total_cmp(&eye.depth(at(a.0), at(a.1))));
     for (i, j) in cells {
         let corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
             .map(|(i, j)| [at(i), at(j), cube.height(at(i), at(j))]);
-        // a polynomial may leave the box where samples are few
-        if corners.iter().any(|c| !(-0.15..=1.15).contains(&c[2])) {
+        if corners.iter().any(|c| !INSIDE.contains(&c[2])) {
             continue;
         }
         let slope = (corners[1][2] - corners[0][2]) * CELLS as f64;
         let shade = 0.25 + 0.3 * (slope / 2.0).clamp(0.0, 1.0);
         let places = corners.map(|c| eye.place(c));
-        area.draw(&Polygon::new(places.to_vec(), ink.faint(shade)))?;
-        let edge = stroke(ink.faint(0.8), 0.5);
+        let lit = supported[i * CELLS + j];
+        if lit {
+            area.draw(&Polygon::new(places.to_vec(), ink.faint(shade)))?;
+        }
+        let edge = stroke(ink.faint(if lit { 0.8 } else { 0.3 }), 0.5);
         area.draw(&PathElement::new(places[..3].to_vec(), edge))?;
     }
     Ok(())

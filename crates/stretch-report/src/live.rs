@@ -1,0 +1,301 @@
+//! What the script of a page draws: the data of a figure as compact JSON.
+//!
+//! A curve is told on an even grid of time, once over the whole recording and once, finer, around what is shown first.
+//! Where a slot of the grid holds several samples it is told by its least and its greatest, in their order, so that no
+//! peak is lost. Values are whole multiples of `q` above `o`, each told as its step from the one before.
+
+use std::ops::Range;
+
+use serde::Serialize;
+
+use super::{
+    canvas::{Ink, STEPS},
+    thin::extent,
+};
+
+/// Slots over a whole recording, and around the window that is shown first.
+const COARSE: usize = 600;
+const FINE: usize = 800;
+/// Steps of a value over the span of its curve.
+const FINENESS: f64 = 2000.0;
+
+/// A curve on an even grid.
+#[derive(Debug, Serialize)]
+struct Packed {
+    t: f64,
+    dt: f64,
+    o: f64,
+    q: f64,
+    d: Vec<Option<i64>>,
+}
+
+/// A curve with its looks.
+#[derive(Debug, Serialize)]
+struct Series<'a> {
+    name: &'a str,
+    ink: &'static str,
+    w: f64,
+    levels: Vec<Packed>,
+}
+
+/// Which samples belong to a bar.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Pick {
+    /// `level`, `rate` or `time`.
+    pub(crate) by: &'static str,
+    /// From this value.
+    pub(crate) from: f64,
+    /// To this one.
+    pub(crate) to: f64,
+    /// Whether the sign does not count.
+    pub(crate) size: bool,
+}
+
+/// A plot over time.
+#[derive(Debug)]
+pub(crate) struct TimePlot<'a> {
+    /// Plots of one name zoom together.
+    pub(crate) link: String,
+    /// Below and above.
+    pub(crate) labels: [&'a str; 2],
+    /// Of the values.
+    pub(crate) unit: &'a str,
+    /// Height in pixels.
+    pub(crate) height: u32,
+    /// Of the samples.
+    pub(crate) time: &'a [f64],
+    /// What is shown first.
+    pub(crate) view: Range<f64>,
+    /// Whether it always shows the whole recording, and marks what the others show; it then draws their curves.
+    pub(crate) is_whole: bool,
+    /// Name, colour, width in pixels, values.
+    pub(crate) lines: Vec<(&'a str, Ink, f64, &'a [f64])>,
+    /// What samples are picked by.
+    pub(crate) keys: Vec<(&'static str, &'a [f64])>,
+}
+
+impl TimePlot<'_> {
+    /// As JSON; nothing without a stretch of time.
+    pub(crate) fn json(&self) -> Option<String> {
+        let span = extent(self.time.iter().copied()).filter(|s| s.end > s.start)?;
+        let levels = |values: &[f64]| levels(self.time, values, &span, &self.view);
+        let lines = if self.is_whole { &[][..] } else { &self.lines[..] };
+        let series: Vec<Series<'_>> = lines
+            .iter()
+            .map(|(name, ink, w, y)| Series { name, ink: ink.class(), w: *w, levels: levels(y) })
+            .collect();
+        let keys: serde_json::Map<_, _> = self
+            .keys
+            .iter()
+            .map(|(key, values)| ((*key).to_owned(), serde_json::json!(levels(values))))
+            .collect();
+        let told = serde_json::json!({
+            "kind": "time",
+            "link": self.link,
+            "x": self.labels[0],
+            "y": self.labels[1],
+            "unit": self.unit,
+            "height": self.height,
+            "span": [span.start, span.end],
+            "view": [self.view.start, self.view.end],
+            "all": self.is_whole,
+            "series": series,
+            "keys": keys,
+        });
+        Some(told.to_string())
+    }
+}
+
+/// The whole recording, and the view with half of itself on either side.
+fn levels(time: &[f64], values: &[f64], span: &Range<f64>, view: &Range<f64>) -> Vec<Packed> {
+    let half = 0.5 * (view.end - view.start);
+    let around = (view.start - half).max(span.start)..(view.end + half).min(span.end);
+    let whole = packed(time, values, span, COARSE);
+    let fine = packed(time, values, &around, FINE);
+    let is_finer = fine.dt < 0.99 * whole.dt;
+    [Some(whole), is_finer.then_some(fine)].into_iter().flatten().collect()
+}
+
+/// Samples inside a window on at most `2 slots` places.
+fn packed(time: &[f64], values: &[f64], window: &Range<f64>, slots: usize) -> Packed {
+    let inside: Vec<(f64, f64)> = time
+        .iter()
+        .copied()
+        .zip(values.iter().copied())
+        .filter(|(t, _)| *t >= window.start && *t <= window.end)
+        .collect();
+    let span = window.end - window.start;
+    let few = inside.len() <= 2 * slots;
+    let (t, dt, told) = if few {
+        let dt = span / inside.len().saturating_sub(1).max(1) as f64;
+        let mut told = vec![None; inside.len().max(1)];
+        for (t, y) in &inside {
+            let at = ((t - window.start) / dt).round() as usize;
+            if let Some(place) = told.get_mut(at) {
+                *place = Some(*y);
+            }
+        }
+        (window.start, dt, told)
+    } else {
+        let width = span / slots as f64;
+        let slot = |t: f64| (((t - window.start) / width) as usize).min(slots - 1);
+        let mut told = vec![None; 2 * slots];
+        for part in inside.chunk_by(|a, b| slot(a.0) == slot(b.0)) {
+            let real = || part.iter().filter(|p| p.1.is_finite());
+            let low = real().min_by(|a, b| a.1.total_cmp(&b.1));
+            let high = real().max_by(|a, b| a.1.total_cmp(&b.1));
+            if let (Some(low), Some(high)) = (low, high) {
+                let (first, second) = if low.0 <= high.0 { (low, high) } else { (high, low) };
+                let at = 2 * slot(part[0].0);
+                (told[at], told[at + 1]) = (Some(first.1), Some(second.1));
+            }
+        }
+        (window.start + 0.25 * width, 0.5 * width, told)
+    };
+    steps(t, dt, &told)
+}
+
+/// Values as whole steps.
+fn steps(t: f64, dt: f64, values: &[Option<f64>]) -> Packed {
+    let real = values.iter().flatten().copied().filter(|y| y.is_finite());
+    let span = extent(real).unwrap_or(0.0..0.0);
+    let q = ((span.end - span.start) / FINENESS).max(f64::MIN_POSITIVE);
+    let mut last = 0;
+    let mut step = |value: &Option<f64>| {
+        let at = ((value.filter(|y| y.is_finite())? - span.start) / q).round() as i64;
+        Some(at - std::mem::replace(&mut last, at))
+    };
+    Packed { t, dt, o: span.start, q, d: values.iter().map(&mut step).collect() }
+}
+
+/// One row of a bar figure: where it stands, and what it says.
+#[derive(Debug, Serialize)]
+pub(crate) struct BarRow {
+    /// Its label.
+    pub(crate) label: String,
+    /// Upper end, in steps of the drawing.
+    pub(crate) top: i32,
+    /// Lower end.
+    pub(crate) bottom: i32,
+    /// Its values.
+    pub(crate) text: String,
+    /// The samples that belong to it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) pick: Option<Pick>,
+}
+
+/// The rows of a bar figure as JSON.
+pub(crate) fn bars_json(link: &str, rows: &[BarRow]) -> String {
+    serde_json::json!({"kind": "bars", "link": link, "rows": rows}).to_string()
+}
+
+/// One panel of a scatter, in steps of the drawing.
+#[derive(Debug, Serialize)]
+pub(crate) struct Panel {
+    top: f64,
+    bottom: f64,
+    left: f64,
+    right: f64,
+    y: [f64; 2],
+    name: String,
+}
+
+impl Panel {
+    /// A panel of [`super::figure::plot`] between `top` and `bottom`, in pixels.
+    pub(crate) fn new(name: String, [top, bottom]: [u32; 2], is_bare: bool, y: [f64; 2]) -> Self {
+        let steps = |pixels: u32| f64::from(pixels * STEPS);
+        let below = if is_bare { 28 } else { 42 };
+        Self {
+            top: steps(top + 24),
+            bottom: steps(bottom - below),
+            left: steps(52),
+            right: steps(400 - 14),
+            y,
+            name,
+        }
+    }
+}
+
+/// A scatter as JSON: a brush over it picks by `by`.
+pub(crate) fn scatter_json(
+    link: &str,
+    by: Option<&str>,
+    x: &Range<f64>,
+    [x_name, x_unit, y_unit]: [&str; 3],
+    panels: &[Panel],
+) -> String {
+    serde_json::json!({
+        "kind": "scatter",
+        "link": link,
+        "x": [x.start, x.end],
+        "xname": x_name,
+        "xunit": x_unit,
+        "yunit": y_unit,
+        "by": by,
+        "panels": panels,
+    })
+    .to_string()
+}
+
+/// JSON that no name in it can end: its markup is written in numbers.
+pub(crate) fn embedded(json: &str) -> String {
+    json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn unpacked(packed: &Packed) -> Vec<Option<f64>> {
+        let mut at = 0;
+        let one = |d: &Option<i64>| {
+            at += (*d)?;
+            Some(packed.o + packed.q * at as f64)
+        };
+        packed.d.iter().map(one).collect()
+    }
+
+    #[test]
+    fn peaks_and_holes_outlive_the_packing() {
+        let time: Vec<f64> = (0..40_000).map(|i| f64::from(i) * 0.005).collect();
+        let mut values: Vec<f64> = time.iter().map(|t| t.sin()).collect();
+        values[12_345] = 7.0;
+        values[20_000..30_000].fill(f64::NAN);
+        let packed = packed(&time, &values, &(0.0..199.995), 600);
+        let told = unpacked(&packed);
+        assert_eq!(told.len(), 1200);
+        let most = told.iter().flatten().copied().fold(f64::MIN, f64::max);
+        assert!((most - 7.0).abs() <= packed.q);
+        let at = told.iter().position(|y| y.is_some_and(|y| y > 6.0)).unwrap();
+        assert!((packed.t + packed.dt * at as f64 - time[12_345]).abs() <= 2.0 * packed.dt);
+        assert!(told[700..800].iter().all(Option::is_none));
+    }
+
+    #[test]
+    fn few_samples_are_told_one_by_one() {
+        let time: Vec<f64> = (0..100).map(|i| 2.0 + f64::from(i) * 0.01).collect();
+        let values: Vec<f64> = (0..100).map(|i| f64::from(i * i)).collect();
+        let packed = packed(&time, &values, &(2.0..2.99), 800);
+        let told = unpacked(&packed);
+        assert_eq!(told.len(), 100);
+        assert!(told.iter().zip(&values).all(|(a, b)| (a.unwrap() - b).abs() <= packed.q));
+    }
+
+    #[test]
+    fn no_name_ends_the_data() {
+        let json = bars_json(
+            "x",
+            &[BarRow {
+                label: "</script><b>&".into(),
+                top: 0,
+                bottom: 1,
+                text: String::new(),
+                pick: None,
+            }],
+        );
+        let safe = embedded(&json);
+        assert!(!safe.contains(['<', '>', '&']));
+        let read: serde_json::Value = serde_json::from_str(&safe).unwrap();
+        assert_eq!(read["rows"][0]["label"], "</script><b>&");
+    }
+}

@@ -1,0 +1,160 @@
+//! What a calibration that remembers does: its answer to a step, and its loops on triangles.
+
+use plotters::prelude::*;
+use stretch_calibrate::{Calibrated, LiveReceptor};
+use stretch_core::{Calibration, Model};
+
+use super::{
+    canvas::Ink,
+    figure::{Axes, Figure, Frame, plot, stroke},
+    live::TimePlot,
+    thin::{extent, padded},
+};
+
+/// Seconds of rest before a step, and at each of its two levels.
+const HOLD_S: f64 = 5.0;
+/// Periods of the triangles, slow to fast, s.
+const PERIODS_S: [f64; 3] = [16.0, 4.0, 1.0];
+const INKS: [Ink; 3] = [Ink::Low, Ink::Middle, Ink::High];
+
+/// Whether an estimate depends on more than the signal and its rate.
+pub(crate) fn remembers(calibrated: &Calibrated) -> bool {
+    matches!(
+        calibrated.calibration.model,
+        Model::History(_) | Model::Observer(_) | Model::Diagnosed(_)
+    )
+}
+
+/// A signal on its grid of time, and what the calibration makes of it; NaN where it has no answer.
+struct Answer {
+    time_s: Vec<f64>,
+    signal: Vec<f64>,
+    estimate: Vec<f64>,
+}
+
+impl Answer {
+    fn new(calibration: &Calibration, seconds: f64, share: impl Fn(f64) -> f64) -> Option<Self> {
+        let mut live = LiveReceptor::new(calibration).ok()?;
+        let (low, span) = (calibration.signal_range.min(), calibration.signal_range.span());
+        let dt_s = calibration.sample_rate_hz.period_s();
+        let count = (seconds / dt_s).clamp(2.0, 200_000.0) as usize;
+        let mut answer = Self { time_s: Vec::new(), signal: Vec::new(), estimate: Vec::new() };
+        for n in 0..count {
+            let t = n as f64 * dt_s;
+            // the middle half of what it was calibrated on
+            let signal = low + span * (0.25 + 0.5 * share(t));
+            answer.estimate.push(live.step(t, signal).map_or(f64::NAN, |reading| reading.estimate));
+            answer.time_s.push(t);
+            answer.signal.push(signal);
+        }
+        answer.estimate.iter().any(|y| y.is_finite()).then_some(answer)
+    }
+}
+
+/// The estimate after the signal leaps up and down again.
+pub(crate) fn step_figure(name: &str, calibrated: &Calibrated, unit: &str) -> Figure {
+    let calibration = &calibrated.calibration;
+    let up = |t: f64| if (HOLD_S..2.0 * HOLD_S).contains(&t) { 1.0 } else { 0.0 };
+    let Some(answer) = Answer::new(calibration, 3.0 * HOLD_S, up) else {
+        return Figure::missing(
+            "This calibration needs more than the signal: it cannot be shown alone.",
+        );
+    };
+    let Some(y) = extent(answer.estimate.iter().copied()) else {
+        return Figure::missing("There is no estimate to draw.");
+    };
+    let y_label = labelled("estimate", unit);
+    let axes = Axes {
+        x: 0.0..3.0 * HOLD_S,
+        y: padded(&y, 0.06),
+        x_label: "time, s".to_owned(),
+        y_label: y_label.clone(),
+        is_log: false,
+    };
+    let points: Vec<(f64, f64)> =
+        answer.time_s.iter().copied().zip(answer.estimate.iter().copied()).collect();
+    let live = TimePlot {
+        link: format!("step of {name}"),
+        labels: ["time, s", &y_label],
+        unit,
+        height: 290,
+        time: &answer.time_s,
+        view: axes.x.clone(),
+        is_whole: false,
+        lines: vec![("estimate", Ink::Third, 2.0, &answer.estimate)],
+        keys: Vec::new(),
+    };
+    Figure::new(&format!("Answer of {name} to a step of the signal"))
+        .draw(Frame::NARROW, |area| {
+            plot(area, &axes, |chart| {
+                for run in points.split(|(_, y)| !y.is_finite()) {
+                    let line = super::thin::sample_in_order(run, 900);
+                    chart.draw_series(LineSeries::new(line, stroke(Ink::Third.color(), 2.0)))?;
+                }
+                Ok(())
+            })
+        })
+        .live(live.json())
+}
+
+/// The estimate over the signal when that goes up and down evenly: a model without memory draws one line.
+pub(crate) fn loop_figure(name: &str, calibrated: &Calibrated, unit: &str) -> Figure {
+    let calibration = &calibrated.calibration;
+    let loops: Vec<Vec<(f64, f64)>> = PERIODS_S
+        .iter()
+        .filter_map(|period_s| {
+            let triangle = |t: f64| 1.0 - (2.0 * (t / period_s).fract() - 1.0).abs();
+            let answer = Answer::new(calibration, 3.0 * period_s, triangle)?;
+            let pairs = answer.time_s.iter().zip(&answer.signal).zip(&answer.estimate);
+            // the last period: by then it has forgotten how it began
+            let last = pairs.filter(|((t, _), y)| **t >= 2.0 * period_s && y.is_finite());
+            Some(last.map(|((_, x), y)| (*x, *y)).collect())
+        })
+        .collect();
+    let all = || loops.iter().flatten();
+    let (Some(x), Some(y)) = (extent(all().map(|p| p.0)), extent(all().map(|p| p.1))) else {
+        return Figure::missing(
+            "This calibration needs more than the signal: it cannot be shown alone.",
+        );
+    };
+    let axes = Axes {
+        x: padded(&x, 0.02),
+        y: padded(&y, 0.06),
+        x_label: calibration.signal.to_string(),
+        y_label: labelled("estimate", unit),
+        is_log: false,
+    };
+    let legend = PERIODS_S.iter().zip(INKS).map(|(s, ink)| (ink, format!("up and down in {s} s")));
+    Figure::new(&format!("Estimate of {name} over the signal on triangles of three speeds"))
+        .draw(Frame::NARROW, |area| {
+            plot(area, &axes, |chart| {
+                for (points, ink) in loops.iter().zip(INKS) {
+                    let line = super::thin::sample_in_order(points, 400);
+                    chart.draw_series(LineSeries::new(line, stroke(ink.color(), 1.8)))?;
+                }
+                Ok(())
+            })
+        })
+        .legend(legend)
+}
+
+fn labelled(name: &str, unit: &str) -> String {
+    if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use stretch_receptor::example_observer;
+
+    use super::*;
+
+    #[test]
+    fn what_remembers_answers_a_step_and_a_triangle() {
+        let calibration = example_observer();
+        let up = |t: f64| if t > 5.0 { 1.0 } else { 0.0 };
+        let answer = Answer::new(&calibration, 15.0, up).expect("it needs the signal alone");
+        let near = |t: f64| answer.time_s.iter().position(|x| *x >= t).unwrap();
+        let (before, after) = (answer.estimate[near(4.9)], answer.estimate[near(14.9)]);
+        assert!((after - before).abs() > 1.0, "{before} {after}");
+    }
+}

@@ -1,0 +1,31 @@
+//! One unit for gaps on a page: the root mean square of what is left, in multiples of the noise.
+
+use super::markup::{number, with_unit};
+
+/// Root mean square over the noise, of an excess (mean square over that of the noise, minus 1): `sqrt(1 + excess)`.
+pub(crate) fn multiple(excess: f64) -> f64 {
+    // noise that came out smaller than it was taken for is no less than none
+    if excess.is_finite() { (1.0 + excess).max(0.0).sqrt() } else { f64::NAN }
+}
+
+/// The same with its sign of multiplication.
+pub(crate) fn times(excess: f64) -> String {
+    with_unit(&number(multiple(excess), 2), "\u{d7}")
+}
+
+/// In the unit of the channel, and as a multiple of its noise.
+pub(crate) fn both(excess: f64, noise: f64, unit: &str) -> String {
+    format!("{} ({})", with_unit(&number(multiple(excess) * noise, 3), unit), times(excess))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ratio_of_squares_becomes_a_ratio_of_roots() {
+        assert_eq!((multiple(0.0), multiple(8.0), multiple(-2.0)), (1.0, 3.0, 0.0));
+        assert_eq!(both(8.0, 0.002, "V"), "0.00600\u{a0}V (3.0\u{a0}\u{d7})");
+        assert!(multiple(f64::NAN).is_nan());
+    }
+}

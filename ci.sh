@@ -94,6 +94,9 @@ cargo check --quiet --locked --manifest-path fuzz/Cargo.toml
 step "Python package"
 python/gate.sh
 
+step "the reports' script, in a browser"
+web/gate.sh
+
 step "FMUs, a workspace of their own"
 fmu/gate.sh
 

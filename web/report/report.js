@@ -289,7 +289,7 @@
         svg("path", { class: "line ink-grid", d: `M${place(t)} ${MARGIN.top}V${low}` }, box);
         text(box, place(t), low + 17, tick(t, across.decimals), "middle");
       }
-      const up = ticks(y[0], y[1], Math.floor(height / 45));
+      const up = ticks(y[0], y[1], Math.floor(height / 34));
       for (const v of up.values) {
         svg("path", { class: "line ink-grid", d: `M${MARGIN.left} ${rise(v)}H${wide}` }, box);
         text(box, MARGIN.left - 6, rise(v) + 5, tick(v, up.decimals), "end");

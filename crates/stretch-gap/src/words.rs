@@ -106,10 +106,10 @@ fn seen(
             let worst = all.max_by(|a, b| a.0.excess_after.total_cmp(&b.0.excess_after));
             let best = evidence.best_effect.map(|e| simulator.effects()[e].name.as_str());
             format!(
-                "There is a gap in {} that the catalogue does not explain: {:.2} floors are left of {:.2} after the best ({}).",
+                "There is a gap in {} that the catalogue does not explain: what is left is {:.2} times the noise of {:.2} after the best ({}).",
                 worst.map_or("", |(_, spec)| spec.name.as_str()),
-                gap.left,
-                gap.retuned,
+                multiple(gap.left),
+                multiple(gap.retuned),
                 best.unwrap_or("none")
             ) + &parts(shares)
         }
@@ -119,8 +119,9 @@ fn seen(
                 "Simulator and rig agree within the noise floor.".into()
             }
             _ => format!(
-                "No effect is missing: with its parameters re-tuned within their tolerances the simulator agrees with the rig (gap {:.1} floors as shipped, {:.2} re-tuned).",
-                gap.raw, gap.retuned
+                "No effect is missing: with its parameters re-tuned within their tolerances the simulator agrees with the rig (what is left is {:.1} times the noise as shipped, {:.2} re-tuned).",
+                multiple(gap.raw),
+                multiple(gap.retuned)
             ),
         },
     }
@@ -131,10 +132,11 @@ fn too_faint(gap: Excess, band: f64, evidence: &Evidence, simulator: &dyn Simula
     let all = evidence.stages.iter().zip(simulator.stages());
     let worst = all.max_by(|a, b| a.0.excess_retuned.total_cmp(&b.0.excess_retuned));
     format!(
-        "Too faint to name: with its parameters re-tuned the simulator leaves {:.2} floors, most of them in {}. Noise as it is described \
-         stays below {band:.2} in 19 of 20 records like this one: it is larger, or something is missing.",
-        gap.retuned,
-        worst.map_or("", |(_, spec)| spec.name.as_str())
+        "Too faint to name: with its parameters re-tuned the simulator leaves {:.3} times the noise, most of it in {}. Noise as it is described \
+         stays below {:.3} in 19 of 20 records like this one: it is larger, or something is missing.",
+        multiple(gap.retuned),
+        worst.map_or("", |(_, spec)| spec.name.as_str()),
+        multiple(band)
     )
 }
 
@@ -173,6 +175,11 @@ fn beside(naming: &Naming) -> String {
     out
 }
 
+/// Root mean square of what is left, in multiples of the noise, from an excess (mean square over the noise's, minus 1).
+fn multiple(excess: f64) -> f64 {
+    (1.0 + excess).max(0.0).sqrt()
+}
+
 /// Which effects close parts of a gap that no set of them explains.
 fn parts(shares: &[EffectShare]) -> String {
     let told = shares.iter().filter(|s| s.closes >= TOLD).map(|s| {
@@ -208,11 +215,11 @@ fn wrong(overruled: &Overruled, simulator: &dyn Simulator) -> String {
         Overruled::Strained(strained) => {
             let names = strained.ended.iter().map(|&p| simulator.parameters()[p].name.as_str());
             format!(
-                "The parameters of {} do not fit within their tolerances: {} stand at the end of them, and a gap of {:.1} floors is left \
+                "The parameters of {} do not fit within their tolerances: {} stand at the end of them, and {:.1} times the noise is left \
                  all the same. Is it the right rig? If its parameters are right, something is missing that is not in the catalogue.",
                 simulator.stages()[strained.stage].name,
                 names.collect::<Vec<_>>().join(", "),
-                strained.left
+                multiple(strained.left)
             )
         }
     }

@@ -20,9 +20,10 @@ pub(crate) fn reliability_figure(calibration: &Calibration) -> Figure {
     }
     let axes = Axes {
         x: 0.0..1.0,
-        y: 0.0..1.0,
+        // below the axis of no case there is room for the counts: none of them lies on a point
+        y: -0.13..1.0,
         x_label: "probability stated".to_owned(),
-        y_label: "share that came true (number of cases)".to_owned(),
+        y_label: "share that came true (below: number of cases)".to_owned(),
         is_log: false,
     };
     Figure::new("Reliability diagram: probability stated against share that came true").draw(
@@ -40,16 +41,13 @@ pub(crate) fn reliability_figure(calibration: &Calibration) -> Figure {
                     }
                     let at = (bin.stated, share);
                     chart.draw_series([Circle::new(at, px(3.0), dot(Ink::Third, 1.0))])?;
-                    let (h, side) = match bin.stated > 0.9 {
-                        true => (HPos::Right, -8.0),
-                        false => (HPos::Left, 8.0),
-                    };
+                    let h = if bin.stated > 0.95 { HPos::Right } else { HPos::Center };
                     let count = Text::new(
                         bin.right.cases.to_string(),
-                        (px(side), 0),
+                        (0, 0),
                         words(Ink::Text, h, VPos::Center),
                     );
-                    chart.draw_series([EmptyElement::at(at) + count])?;
+                    chart.draw_series([EmptyElement::at((bin.stated, -0.07)) + count])?;
                 }
                 Ok(())
             })

@@ -204,7 +204,7 @@ fn shapes(page: &mut Page, calibrated: &[(&str, &Calibrated)], unit: &str) {
         page.section(
             &format!("What it remembers ({name})"),
             "No surface shows a model that remembers: here is what it makes of a signal that leaps, and of one that goes up \
-             and down evenly through the middle half of its range. Without memory the loops would lie on one line.",
+             and down evenly through the middle half of its range. Without memory and rate the loops would lie on one line.",
         );
         page.figures(&[
             (

@@ -67,7 +67,7 @@ pub(crate) fn candidate_table(candidates: &[Candidate]) -> Table {
     };
     Table {
         caption: "Candidates, the most probable first: probability given this catalogue; what is left before and after in multiples of the noise, \
-                  all channels with a gap together; the share that closes on trials that were not fitted"
+                  all channels with a gap together; the share that closes on trials that were not fitted; \u{b1} is one standard deviation"
             .to_owned(),
         head: cells([
             "Effects",

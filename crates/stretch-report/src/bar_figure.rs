@@ -57,13 +57,39 @@ pub(crate) enum Scale {
     Floors,
 }
 
+/// Letters of a label that stand side by side on a phone, and the height of each further line in pixels.
+const LETTERS: usize = 48;
+const LINE: f64 = 17.0;
+
+/// A label in lines that a phone can hold, broken between words.
+fn label_lines(label: &str) -> Vec<String> {
+    let mut lines: Vec<String> = vec![String::new()];
+    for word in label.split(' ') {
+        let last = lines.last().map_or(0, |line| line.chars().count());
+        match lines.last_mut() {
+            Some(line) if last == 0 => line.push_str(word),
+            Some(line) if last + 1 + word.chars().count() <= LETTERS => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+fn label_px(row: &Row) -> f64 {
+    LABEL + LINE * (label_lines(&row.label).len() - 1) as f64
+}
+
 /// Draws rows of bars.
 pub(crate) fn bar_figure(description: &str, rows: &[Row], scale: Scale, x_label: &str) -> Figure {
     if rows.is_empty() {
         return Figure::missing("There is nothing to draw here.");
     }
     let bars: usize = rows.iter().map(|r| r.bars.len()).sum();
-    let height = (rows.len() as f64 * (LABEL + 5.0) + bars as f64 * (BAR + 3.0) + AXIS) as u32;
+    let labels: f64 = rows.iter().map(label_px).sum();
+    let height = (labels + rows.len() as f64 * 5.0 + bars as f64 * (BAR + 3.0) + AXIS) as u32;
     let most = rows
         .iter()
         .flat_map(|r| &r.bars)
@@ -85,7 +111,7 @@ fn told(rows: &[Row], picks: &[Option<Pick>], unit: &str) -> Vec<BarRow> {
     let mut y = 2.0;
     let mut one = |(index, row): (usize, &Row)| {
         let top = y;
-        y += LABEL + row.bars.len() as f64 * (BAR + 3.0) + 5.0;
+        y += label_px(row) + row.bars.len() as f64 * (BAR + 3.0) + 5.0;
         let said = |bar: &Bar| match bar.text.is_empty() {
             true => format!("{} {unit}", number(bar.value, 2)),
             false => bar.text.clone(),
@@ -170,13 +196,11 @@ fn draw(area: &Area<'_>, rows: &[Row], scale: Scale, most: f64, x_label: &str) -
     }
     let mut y = px(2.0);
     for row in rows {
-        let middle = y + px(0.5 * LABEL - 1.0);
-        area.draw(&Text::new(
-            row.label.clone(),
-            (left + px(5.0), middle),
-            words(Ink::Text, HPos::Left, VPos::Center),
-        ))?;
-        y += px(LABEL);
+        for (k, line) in label_lines(&row.label).into_iter().enumerate() {
+            let at = (left + px(5.0), y + px(0.5 * LABEL - 1.0 + LINE * k as f64));
+            area.draw(&Text::new(line, at, words(Ink::Text, HPos::Left, VPos::Center)))?;
+        }
+        y += px(label_px(row));
         for bar in &row.bars {
             let (top, low) = (y, y + px(BAR));
             let x = place(bar.value).max(left + px(1.0));
@@ -209,5 +233,18 @@ fn ticks_start(scale: Scale) -> f64 {
     match scale {
         Scale::Percent => 0.0,
         Scale::Floors => 1.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_label_breaks_between_words() {
+        let label = "gauge_nonlinearity + muscle_hysteresis + pressure_crosstalk";
+        let lines = label_lines(label);
+        assert_eq!(lines, ["gauge_nonlinearity + muscle_hysteresis +", "pressure_crosstalk"]);
+        assert_eq!(label_lines("short"), ["short"]);
     }
 }

@@ -2,7 +2,8 @@
 
 use super::{
     calibration_page::{Judged, calibration_sections, calibration_verdict},
-    diagnosis_page::{diagnosis_sections, diagnosis_title, diagnosis_verdict},
+    diagnosis_page::{diagnosis_sections, diagnosis_title},
+    first_seconds::diagnosis_verdict,
     page::Page,
     subject::Subject,
 };

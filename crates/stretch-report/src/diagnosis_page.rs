@@ -1,6 +1,6 @@
 //! The report of a diagnosis: what to fix in the simulator, how sure that is, and what it gains.
 
-use stretch_gap::{Diagnosis, Gross, VerdictKind};
+use stretch_gap::Diagnosis;
 use stretch_sim::Language;
 
 use super::{
@@ -10,16 +10,17 @@ use super::{
         baseline_table, candidate_table, parameter_table, slice_table, stage_table, transfer_table,
     },
     figure::Figure,
+    first_seconds::{GIVEN, causes, diagnosis_verdict, facts},
     gap_figures::{
         AFTER, Against, BEFORE, after_name, has_after, left_figure, trace_figures, worst,
     },
     live::Pick,
-    markup::{number, percent, with_unit},
+    markup::{number, percent},
     multiple::multiple,
     page::Page,
     subject::Subject,
 };
-use crate::plain::{effect_in_words, listed, transfer_in_words};
+use crate::plain::{listed, transfer_in_words};
 
 /// Candidates that are drawn.
 const DRAWN: usize = 6;
@@ -34,76 +35,6 @@ pub fn diagnosis_page(subject: &Subject<'_>) -> String {
 /// What the report is called.
 pub(crate) fn diagnosis_title(subject: &Subject<'_>) -> String {
     format!("{}: simulator against rig", subject.name)
-}
-
-/// The result in one sentence.
-pub(crate) fn diagnosis_verdict(subject: &Subject<'_>) -> String {
-    let d = subject.diagnosis;
-    let sentence = d.sentence.replace(" %", "\u{a0}%");
-    // a probability is one among the candidates, and is told as such
-    let told = d.candidates.first().and_then(|c| {
-        let (before, after) = sentence.split_once("; probability ")?;
-        let rest = after.get("0.00".len()..)?;
-        Some(format!("{before}; probability {} {GIVEN}{rest}", percent(c.probability)))
-    });
-    told.unwrap_or(sentence)
-}
-
-/// What every probability stands under.
-const GIVEN: &str = "given this catalogue";
-
-/// Named effects, and what may stand in their place.
-fn to_add(d: &Diagnosis) -> String {
-    match (&d.named[..], &d.tied[..]) {
-        (_, []) => listed(&d.named),
-        ([one], tied) => {
-            let all: Vec<&str> = std::iter::once(one).chain(tied).map(String::as_str).collect();
-            format!("{}: these data cannot tell which", all.join(" or "))
-        }
-        (_, tied) => {
-            format!(
-                "{} (or {} in the place of one: these data cannot tell)",
-                listed(&d.named),
-                tied.join(" or ")
-            )
-        }
-    }
-}
-
-/// What to do now, in a sentence.
-fn to_do(d: &Diagnosis) -> String {
-    let experiment = d.next_experiment.as_ref().map(|next| {
-        let seconds = 60.0 * next.minutes;
-        let long = if seconds < 120.0 {
-            format!("{} s", number(seconds, 2))
-        } else {
-            format!("{} min", number(next.minutes, 2))
-        };
-        format!(
-            "Measure \u{201c}{}\u{201d} ({long}): it would tell {} apart.",
-            next.name.replace('_', " "),
-            listed(&next.separates)
-        )
-    });
-    let now = match d.verdict {
-        VerdictKind::Effect | VerdictKind::Partial if d.tied.is_empty() => {
-            "Put the code below into the simulator, then diagnose again."
-        }
-        VerdictKind::Effect | VerdictKind::Partial => {
-            "Run an experiment that tells them apart before you build on one."
-        }
-        VerdictKind::Parameters => "Set them, then diagnose again.",
-        VerdictKind::Record => "Put the record right, then diagnose again.",
-        VerdictKind::Unknown => "Look where the gap sits, below; give the catalogue what it lacks.",
-        VerdictKind::NoGap => "Nothing: use it.",
-    };
-    match (experiment, d.verdict) {
-        (Some(experiment), VerdictKind::Effect | VerdictKind::Partial) if d.tied.is_empty() => {
-            format!("{now} {experiment}")
-        }
-        (Some(experiment), _) => experiment,
-        (None, _) => now.to_owned(),
-    }
 }
 
 /// The sections of the report: a page of their own, or a part of a longer one.
@@ -121,121 +52,6 @@ pub(crate) fn diagnosis_sections(page: &mut Page, subject: &Subject<'_>) {
     gained(page, subject);
     next(page, diagnosis);
     numbers(page, diagnosis);
-}
-
-/// Three answers at a glance.
-fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
-    let best = d.candidates.first();
-    let gain = best.map_or_else(String::new, |c| {
-        format!(
-            "{} of the gap closes on trials that were not fitted ({} to {}).",
-            percent(c.closed),
-            percent(c.closed_ci[0]),
-            percent(c.closed_ci[1])
-        )
-    });
-    let place = d
-        .location
-        .stages
-        .iter()
-        .max_by(|a, b| a.share.total_cmp(&b.share))
-        .map_or_else(String::new, |s| format!("{} ({} of the gap)", s.stage, percent(s.share)));
-    let fix = match d.verdict {
-        VerdictKind::Effect | VerdictKind::Partial => format!("Add {}.", to_add(d)),
-        VerdictKind::Parameters => {
-            let moved = moved(d);
-            if moved.is_empty() {
-                "Take the re-tuned parameters below.".to_owned()
-            } else {
-                format!("Set {}.", listed(&moved))
-            }
-        }
-        VerdictKind::Unknown => format!("Nothing that the catalogue knows. Look at {place}."),
-        VerdictKind::NoGap => "Nothing.".to_owned(),
-        VerdictKind::Record => {
-            let what: Vec<&str> = d.gross.iter().map(|g| g.hint.as_str()).take(1).collect();
-            format!("Nothing before the record is right: {}.", what.concat())
-        }
-    };
-    let sure = match (d.verdict, best) {
-        (VerdictKind::Effect | VerdictKind::Partial, Some(c)) => {
-            let rivals: Vec<String> =
-                d.ambiguous.iter().filter(|n| !d.named.contains(n)).cloned().collect();
-            let rest = if !d.tied.is_empty() {
-                format!("a tie with {}", listed(&d.tied))
-            } else if rivals.is_empty() {
-                "nothing else explains these data as well".to_owned()
-            } else {
-                format!("these data cannot rule out {}", listed(&rivals))
-            };
-            format!("Probability {} {GIVEN}: {rest}.", percent(c.probability))
-        }
-        (VerdictKind::Record, Some(c)) if !d.gross.iter().any(Gross::is_plain) => {
-            format!("Probability {} beside every set of effects, {GIVEN}.", percent(c.probability))
-        }
-        (VerdictKind::Record, _) => "The columns alone say so, whatever the simulator is.".to_owned(),
-        (VerdictKind::Unknown, _) => {
-            "That there is a gap is certain; what the catalogue offers explains at best a part of it.".to_owned()
-        }
-        _ => "What is left is within the noise floor on trials that were not fitted.".to_owned(),
-    };
-    let gain = match d.verdict {
-        VerdictKind::Effect | VerdictKind::Partial => format!("{gain}{}", cheaper(d)),
-        VerdictKind::Unknown => format!("The best that the catalogue offers: {gain}"),
-        VerdictKind::Record if d.gross.iter().any(Gross::is_plain) => {
-            "A record from which something can be learnt.".to_owned()
-        }
-        VerdictKind::Record => format!("{gain} Then what effects do can be seen."),
-        VerdictKind::Parameters => "The whole gap closes by re-tuning.".to_owned(),
-        VerdictKind::NoGap => "The simulator can be used as it is.".to_owned(),
-    };
-    vec![
-        ("What to change", fix),
-        ("How sure", sure),
-        ("What it gains", gain),
-        ("What to do next", to_do(d)),
-    ]
-}
-
-/// What a calibration gains, where it gains anything to speak of.
-fn cheaper(d: &Diagnosis) -> String {
-    let poly13 = d.transfer.as_ref().map(|t| t.poly13);
-    match poly13.filter(|e| e.sim_with_effect < 0.9 * e.sim) {
-        Some(e) => format!(
-            " A poly13 calibration trained in the simulator then errs {} in place of {} of full scale.",
-            percent(0.01 * e.sim_with_effect),
-            percent(0.01 * e.sim)
-        ),
-        None => String::new(),
-    }
-}
-
-/// Parameters that re-tuning moved by more than a tolerance, as assignments.
-fn moved(d: &Diagnosis) -> Vec<String> {
-    let far = d.parameters.iter().filter(|p| p.is_evidence && p.sigmas.abs() > 1.0);
-    far.map(|p| format!("{} to {}", p.name, unit_number(p.fitted, &p.unit))).collect()
-}
-
-/// Every named effect in words, with its values.
-fn causes(d: &Diagnosis) -> Vec<String> {
-    let Some(first) = d.candidates.first().filter(|c| c.effects == d.named) else {
-        return Vec::new();
-    };
-    let one = |name: &String| {
-        let values: Vec<String> = first
-            .parameters
-            .iter()
-            .filter(|p| p.effect == *name)
-            .map(|p| {
-                format!("{} = {} \u{b1} {}", p.name, number(p.value, 3), unit_number(p.sd, &p.unit))
-            })
-            .collect();
-        let words = effect_in_words(name).map_or(String::new(), |w| format!(": {w}"));
-        let values =
-            if values.is_empty() { String::new() } else { format!(" ({})", values.join(", ")) };
-        format!("{name}{words}{values}.")
-    };
-    d.named.iter().map(one).collect()
 }
 
 fn seen(page: &mut Page, subject: &Subject<'_>) {
@@ -523,7 +339,19 @@ fn numbers(page: &mut Page, d: &Diagnosis) {
     page.text(&format!("The diagnosis took {} s.", number(d.runtime_s, 2)));
 }
 
-fn unit_number(x: f64, unit: &str) -> String {
-    let unit = if unit == "1" { "" } else { unit };
-    with_unit(&number(x, 3), unit)
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slice_knows_its_samples_by_what_it_is_called() {
+        let words = ["deflation", "inflation"];
+        let ends = |by: &str, slice: &str| pick(by, slice, &words).map(|p| (p.from, p.to, p.size));
+        assert_eq!(ends("level", "151 to 157 mm"), Some((151.0, 157.0, false)));
+        assert_eq!(ends("rate", "8.96 to 22.6 mm/s"), Some((8.96, 22.6, true)));
+        assert_eq!(ends("time", "first 3 s"), Some((0.0, 3.0, false)));
+        assert_eq!(ends("time", "after 60 s").map(|e| e.0), Some(60.0));
+        assert_eq!(ends("regime", "inflation").map(|e| e.0), Some(0.0));
+        assert_eq!(ends("frequency", "0.4 to 0.8 Hz"), None);
+    }
 }

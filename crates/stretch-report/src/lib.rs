@@ -13,6 +13,7 @@ mod diagnosis_tables;
 mod error_figure;
 mod estimate_figure;
 mod figure;
+mod first_seconds;
 mod gap_figures;
 mod goal;
 mod live;

@@ -435,3 +435,39 @@ fn a_part_closes_what_stands_before_it() {
     let count = |name: &str| names.iter().filter(|n| *n == name).count();
     assert_eq!(["h1", "h2", "header", "section"].map(count), [2; 4]);
 }
+
+#[test]
+fn a_logarithmic_axis_bears_the_numbers_it_stands_for() {
+    let axes = Axes {
+        x: -1.75..1.15,
+        y: 0.0..1.0,
+        x_label: "frequency, Hz".into(),
+        y_label: "gain".into(),
+        is_log: true,
+    };
+    let figure = Figure::new("a gain").draw(Frame::NARROW, |area| plot(area, &axes, |_| Ok(())));
+    let svg = figure.svg();
+    for number in [">0.1<", ">1<", ">10<"] {
+        assert!(svg.contains(number), "{number} in {svg}");
+    }
+    assert!(!svg.contains(">\u{2212}1<"));
+}
+
+#[test]
+fn rows_of_a_wide_table_carry_their_heads_to_a_phone() {
+    let mut page = Page::new("t", "v");
+    page.table(&Table {
+        caption: "wide".into(),
+        head: ["a", "b", "c", "<d>"].map(str::to_owned).to_vec(),
+        rows: vec![
+            ["r", "1", "2", "a cell of words that is longer than a number"]
+                .map(str::to_owned)
+                .to_vec(),
+        ],
+        highlight: None,
+    });
+    let html = page.finish();
+    elements(&html);
+    assert!(html.contains("<table class=\"cards\""));
+    assert!(html.contains("<td class=\"words\" data-head=\"&lt;d&gt;\">a cell of words"));
+}

@@ -1,0 +1,218 @@
+//! The first ten seconds of a diagnosis: what to change, how sure that is, what it gains, what to do next.
+
+use stretch_gap::{Diagnosis, Gross, VerdictKind};
+
+use super::{
+    markup::{number, percent, with_unit},
+    subject::Subject,
+};
+use crate::plain::{effect_in_words, listed};
+
+/// The result in one sentence.
+pub(crate) fn diagnosis_verdict(subject: &Subject<'_>) -> String {
+    let d = subject.diagnosis;
+    let sentence = d.sentence.replace(" %", "\u{a0}%");
+    // a probability is one among the candidates, and is told as such
+    let told = d.candidates.first().and_then(|c| {
+        let (before, after) = sentence.split_once("; probability ")?;
+        let rest = after.get("0.00".len()..)?;
+        Some(format!("{before}; probability {} {GIVEN}{rest}", percent(c.probability)))
+    });
+    told.unwrap_or(sentence)
+}
+
+/// What every probability stands under.
+pub(crate) const GIVEN: &str = "given this catalogue";
+
+/// Named effects, and what may stand in their place.
+fn to_add(named: &[String], tied: &[String]) -> String {
+    match (named, tied) {
+        (_, []) => listed(named),
+        ([one], tied) => {
+            let all: Vec<&str> = std::iter::once(one).chain(tied).map(String::as_str).collect();
+            format!("{}: these data cannot tell which", all.join(" or "))
+        }
+        (_, tied) => {
+            format!(
+                "{} (or {} in the place of one: these data cannot tell)",
+                listed(named),
+                tied.join(" or ")
+            )
+        }
+    }
+}
+
+/// What to do now, in a sentence.
+fn to_do(d: &Diagnosis) -> String {
+    let experiment = d.next_experiment.as_ref().map(|next| {
+        let seconds = 60.0 * next.minutes;
+        let long = if seconds < 120.0 {
+            format!("{} s", number(seconds, 2))
+        } else {
+            format!("{} min", number(next.minutes, 2))
+        };
+        format!(
+            "Measure \u{201c}{}\u{201d} ({long}): it would tell {} apart.",
+            next.name.replace('_', " "),
+            listed(&next.separates)
+        )
+    });
+    let now = match d.verdict {
+        VerdictKind::Effect | VerdictKind::Partial if d.tied.is_empty() => {
+            "Put the code below into the simulator, then diagnose again."
+        }
+        VerdictKind::Effect | VerdictKind::Partial => {
+            "Run an experiment that tells them apart before you build on one."
+        }
+        VerdictKind::Parameters => "Set them, then diagnose again.",
+        VerdictKind::Record => "Put the record right, then diagnose again.",
+        VerdictKind::Unknown => "Look where the gap sits, below; give the catalogue what it lacks.",
+        VerdictKind::NoGap => "Nothing: use it.",
+    };
+    match (experiment, d.verdict) {
+        (Some(experiment), VerdictKind::Effect | VerdictKind::Partial) if d.tied.is_empty() => {
+            format!("{now} {experiment}")
+        }
+        (Some(experiment), _) => experiment,
+        (None, _) => now.to_owned(),
+    }
+}
+
+/// Four answers at a glance.
+pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
+    let best = d.candidates.first();
+    let gain = best.map_or_else(String::new, |c| {
+        format!(
+            "{} of the gap closes on trials that were not fitted ({} to {}).",
+            percent(c.closed),
+            percent(c.closed_ci[0]),
+            percent(c.closed_ci[1])
+        )
+    });
+    let place = d
+        .location
+        .stages
+        .iter()
+        .max_by(|a, b| a.share.total_cmp(&b.share))
+        .map_or_else(String::new, |s| format!("{} ({} of the gap)", s.stage, percent(s.share)));
+    let fix = match d.verdict {
+        VerdictKind::Effect | VerdictKind::Partial => format!("Add {}.", to_add(&d.named, &d.tied)),
+        VerdictKind::Parameters => {
+            let moved = moved(d);
+            if moved.is_empty() {
+                "Take the re-tuned parameters below.".to_owned()
+            } else {
+                format!("Set {}.", listed(&moved))
+            }
+        }
+        VerdictKind::Unknown => format!("Nothing that the catalogue knows. Look at {place}."),
+        VerdictKind::NoGap => "Nothing.".to_owned(),
+        VerdictKind::Record => {
+            let what: Vec<&str> = d.gross.iter().map(|g| g.hint.as_str()).take(1).collect();
+            format!("Nothing before the record is right: {}.", what.concat())
+        }
+    };
+    let sure = match (d.verdict, best) {
+        (VerdictKind::Effect | VerdictKind::Partial, Some(c)) => {
+            let rivals: Vec<String> =
+                d.ambiguous.iter().filter(|n| !d.named.contains(n)).cloned().collect();
+            let rest = if !d.tied.is_empty() {
+                format!("a tie with {}", listed(&d.tied))
+            } else if rivals.is_empty() {
+                "nothing else explains these data as well".to_owned()
+            } else {
+                format!("these data cannot rule out {}", listed(&rivals))
+            };
+            format!("Probability {} {GIVEN}: {rest}.", percent(c.probability))
+        }
+        (VerdictKind::Record, Some(c)) if !d.gross.iter().any(Gross::is_plain) => {
+            format!("Probability {} beside every set of effects, {GIVEN}.", percent(c.probability))
+        }
+        (VerdictKind::Record, _) => "The columns alone say so, whatever the simulator is.".to_owned(),
+        (VerdictKind::Unknown, _) => {
+            "That there is a gap is certain; what the catalogue offers explains at best a part of it.".to_owned()
+        }
+        _ => "What is left is within the noise floor on trials that were not fitted.".to_owned(),
+    };
+    let gain = match d.verdict {
+        VerdictKind::Effect | VerdictKind::Partial => format!("{gain}{}", cheaper(d)),
+        VerdictKind::Unknown => format!("The best that the catalogue offers: {gain}"),
+        VerdictKind::Record if d.gross.iter().any(Gross::is_plain) => {
+            "A record from which something can be learnt.".to_owned()
+        }
+        VerdictKind::Record => format!("{gain} Then what effects do can be seen."),
+        VerdictKind::Parameters => "The whole gap closes by re-tuning.".to_owned(),
+        VerdictKind::NoGap => "The simulator can be used as it is.".to_owned(),
+    };
+    vec![
+        ("What to change", fix),
+        ("How sure", sure),
+        ("What it gains", gain),
+        ("What to do next", to_do(d)),
+    ]
+}
+
+/// What a calibration gains, where it gains anything to speak of.
+fn cheaper(d: &Diagnosis) -> String {
+    let poly13 = d.transfer.as_ref().map(|t| t.poly13);
+    match poly13.filter(|e| e.sim_with_effect < 0.9 * e.sim) {
+        Some(e) => format!(
+            " A poly13 calibration trained in the simulator then errs {} in place of {} of full scale.",
+            percent(0.01 * e.sim_with_effect),
+            percent(0.01 * e.sim)
+        ),
+        None => String::new(),
+    }
+}
+
+/// Parameters that re-tuning moved by more than a tolerance, as assignments.
+fn moved(d: &Diagnosis) -> Vec<String> {
+    let far = d.parameters.iter().filter(|p| p.is_evidence && p.sigmas.abs() > 1.0);
+    far.map(|p| format!("{} to {}", p.name, unit_number(p.fitted, &p.unit))).collect()
+}
+
+/// Every named effect in words, with its values.
+pub(crate) fn causes(d: &Diagnosis) -> Vec<String> {
+    let Some(first) = d.candidates.first().filter(|c| c.effects == d.named) else {
+        return Vec::new();
+    };
+    let one = |name: &String| {
+        let values: Vec<String> = first
+            .parameters
+            .iter()
+            .filter(|p| p.effect == *name)
+            .map(|p| {
+                format!("{} = {} \u{b1} {}", p.name, number(p.value, 3), unit_number(p.sd, &p.unit))
+            })
+            .collect();
+        let words = effect_in_words(name).map_or(String::new(), |w| format!(": {w}"));
+        let values =
+            if values.is_empty() { String::new() } else { format!(" ({})", values.join(", ")) };
+        format!("{name}{words}{values}.")
+    };
+    d.named.iter().map(one).collect()
+}
+
+fn unit_number(x: f64, unit: &str) -> String {
+    let unit = if unit == "1" { "" } else { unit };
+    with_unit(&number(x, 3), unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tie_is_told_as_a_tie() {
+        let names = |names: &[&str]| names.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>();
+        assert_eq!(to_add(&names(&["slip", "lag"]), &[]), "slip and lag");
+        assert_eq!(
+            to_add(&names(&["slip"]), &names(&["lag"])),
+            "slip or lag: these data cannot tell which"
+        );
+        assert!(
+            to_add(&names(&["slip", "sag"]), &names(&["lag"]))
+                .contains("or lag in the place of one")
+        );
+    }
+}

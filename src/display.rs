@@ -15,17 +15,18 @@ use std::{
 };
 
 use anyhow::ensure;
+use stretch_data::is_standard_output;
 
 static LOST: OnceLock<ErrorKind> = OnceLock::new();
 
 /// Whether a file goes to standard output, where nothing else may then stand.
 static TAKEN: AtomicBool = AtomicBool::new(false);
 
-/// Gives standard output to the one of some files that is called `-`.
+/// Gives standard output to the one of some files that is called `-`, or so.
 pub(crate) fn give_stdout<'a>(
     files: impl IntoIterator<Item = Option<&'a Path>>,
 ) -> anyhow::Result<()> {
-    let count = files.into_iter().flatten().filter(|path| path.as_os_str() == "-").count();
+    let count = files.into_iter().flatten().filter(|path| is_standard_output(path)).count();
     ensure!(count < 2, "two files cannot go to standard output; name one of them");
     TAKEN.fetch_or(count == 1, SeqCst);
     Ok(())

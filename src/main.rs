@@ -116,7 +116,7 @@ fn message(error: &anyhow::Error) -> String {
             told = format!("{told}: {cause}");
         }
     }
-    told
+    stretch_data::without_temporary_names(&told)
 }
 
 fn is_broken_pipe(error: &anyhow::Error) -> bool {

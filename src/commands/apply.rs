@@ -9,7 +9,9 @@ use stretch_calibrate::{
     Applied, LiveReceptor, apply, not_its_own, pressure_column, read_calibration,
 };
 use stretch_core::{Calibration, Model};
-use stretch_data::{ReadOptions, Recording, RowReader, Trial, push_number, write_whole};
+use stretch_data::{
+    ReadOptions, Recording, RowReader, Trial, is_standard_output, push_number, write_whole,
+};
 use stretch_receptor::{Domain, Reading, Withheld};
 
 use super::{
@@ -54,7 +56,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         options = options.require(pressure);
     }
     if args.trial.as_os_str() == "-" {
-        let path = args.out.as_ref().filter(|path| path.as_os_str() != "-");
+        let path = args.out.as_ref().filter(|path| !is_standard_output(path));
         return match path {
             None => live(&calibration, io::stdin(), &options, &mut Output),
             Some(path) => {
@@ -69,7 +71,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
     let trial = read_recording(&args.trial, &options)?;
     let applied = apply(&calibration, &trial)?;
-    match args.out.as_ref().filter(|path| path.as_os_str() != "-") {
+    match args.out.as_ref().filter(|path| !is_standard_output(path)) {
         Some(path) => write_whole(path, |out| write_all(&calibration, &trial, &applied, out))?,
         None => {
             let mut out = BufWriter::new(Output);

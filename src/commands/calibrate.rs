@@ -7,18 +7,18 @@ use clap::ValueEnum;
 use serde::Serialize;
 use stretch_calibrate::{
     Calibrated, Candidate, FitReport, Memory, ModelChoice, ModelKind, ModelRow, Options, Robust,
-    SpellingError, SplitBy, calibrate, choose_model, evaluate, explains_little, explains_nothing,
-    fixed_record, parse_adc, parse_rate, rank_signals, without_wild, write_calibration,
+    SpellingError, SplitBy, calibrate, calibration_bytes, choose_model, evaluate, explains_little,
+    explains_nothing, fixed_record, parse_adc, parse_rate, rank_signals, without_wild,
 };
 use stretch_core::{Normalisation, RateEstimator, RateSource};
-use stretch_data::{ReadOptions, Split, Trial, write_whole};
+use stretch_data::{Outputs, ReadOptions, Split, Trial};
 use stretch_receptor::code::Adc;
 use stretch_report::{Context, Judged, calibration_page};
 
 use super::causes::Causes;
 use super::{
     reading::{Recorded, read_trials},
-    shared::{give_stdout, say, say_json, write_text},
+    shared::{give_stdout, say, say_json, stage_text},
 };
 use crate::table::{maybe, number, table};
 
@@ -290,13 +290,17 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         made.map(|record| (path, record))
     });
     let fixed = fixed.transpose()?;
-    write_calibration(&args.out, &calibrated.calibration)?;
+    let mut outputs = Outputs::default();
+    let record = calibration_bytes(&args.out, &calibrated.calibration)?;
+    outputs.file(&args.out, |out| out.write_all(&record))?;
     if let Some((path, record)) = &fixed {
-        write_whole(path, |out| out.write_all(&record.bytes))?;
+        outputs.file(path, |out| out.write_all(&record.bytes))?;
     }
     if let Some(path) = &args.report {
-        write_report(&args, path, &trials, &columns, &calibrated, &ranking, &options)?;
+        let page = report(&args, &trials, &columns, &calibrated, &ranking, &options)?;
+        stage_text(&mut outputs, path, &page)?;
     }
+    outputs.keep()?;
     if args.json {
         return say_json(&Output {
             signal: &options.signal,
@@ -322,15 +326,14 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
 }
 
-fn write_report(
+fn report(
     args: &Args,
-    path: &std::path::Path,
     trials: &[Trial],
     columns: &ReadOptions,
     calibrated: &Calibrated,
     ranking: &[Candidate],
     options: &Options,
-) -> anyhow::Result<()> {
+) -> anyhow::Result<String> {
     let test = read_trials(&args.test, Split::Test, columns)?;
     let judged = if test.is_empty() { trials } else { &test };
     // the line is the yardstick that every surface is held against
@@ -352,7 +355,7 @@ fn write_report(
         kinds: Vec::new(),
     };
     let judged = Judged { calibrated: &shown, evaluation: &evaluation, context: &context };
-    write_text(path, &calibration_page(&judged))
+    Ok(calibration_page(&judged))
 }
 
 /// What `auto` rests on.

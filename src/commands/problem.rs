@@ -8,13 +8,14 @@ use std::{
 use anyhow::{Context, ensure};
 use indicatif::ProgressBar;
 use serde_json::json;
+use stretch_data::Outputs;
 use stretch_gap::{Diagnosis, Evidence, Options, diagnose};
 use stretch_problem::{BlackBox, Problem, ProblemFile, SimulatorEntry, agreed, worker::Workers};
 use stretch_report::{Subject, diagnosis_page};
 
 use super::{
     diagnosis_text::text,
-    shared::{say, write_text},
+    shared::{say, stage_text},
 };
 
 /// What is asked of a problem's diagnosis.
@@ -85,17 +86,18 @@ fn conclude(
     diagnosis: &Diagnosis,
     evidence: &Evidence,
 ) -> anyhow::Result<()> {
-    let mut said = Vec::new();
+    let (mut said, mut outputs) = (Vec::new(), Outputs::default());
     if let Some(path) = asked.json {
-        write_text(path, &to_json(file, asked, bench, diagnosis)?)?;
+        stage_text(&mut outputs, path, &to_json(file, asked, bench, diagnosis)?)?;
         said.push(format!("wrote {}", path.display()));
     }
     if let Some(path) = asked.report {
         let name = &file.name;
         let subject = Subject { name, diagnosis, evidence, implementations: &[], simulator: bench };
-        write_text(path, &diagnosis_page(&subject))?;
+        stage_text(&mut outputs, path, &diagnosis_page(&subject))?;
         said.push(format!("wrote {}", path.display()));
     }
+    outputs.keep()?;
     say(&diagnosis.sentence)?;
     for (name, words, equation) in implement(bench, diagnosis) {
         say(format!("  {name}: {words}; {equation}"))?;

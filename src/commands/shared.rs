@@ -2,8 +2,11 @@
 
 use std::{path::Path, time::Duration};
 
+use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
+use stretch_data::{DataError, Outputs};
 
+use crate::display::warn;
 pub(crate) use crate::display::{give_stdout, say, say_json};
 
 /// A progress bar on standard error: seen on a terminal only.
@@ -24,6 +27,28 @@ fn bar(what: &'static str, steps: u64, template: &str) -> ProgressBar {
     }
     bar.enable_steady_tick(Duration::from_millis(200));
     bar
+}
+
+/// Puts right what a run that was killed left of a folder, and says so.
+pub(crate) fn recover(folder: &Path) -> anyhow::Result<()> {
+    let told = stretch_data::recover(folder).with_context(|| folder.display().to_string())?;
+    told.into_iter().for_each(warn);
+    Ok(())
+}
+
+/// Says how a folder that is in the way can be replaced.
+pub(crate) fn or_force(error: anyhow::Error) -> anyhow::Error {
+    match error.downcast_ref::<DataError>() {
+        Some(DataError::Exists { .. }) => anyhow::anyhow!(
+            "{error}, or --force: files of the same name are then replaced, your own are kept"
+        ),
+        _ => error,
+    }
+}
+
+/// A text file among what one command writes.
+pub(crate) fn stage_text(outputs: &mut Outputs, path: &Path, text: &str) -> anyhow::Result<()> {
+    Ok(outputs.file(path, |out| out.write_all(text.as_bytes()))?)
 }
 
 /// Writes a text file, whole or not at all.

@@ -15,6 +15,7 @@ use stretch_data::{
 use stretch_receptor::{Domain, Reading, Withheld};
 
 use super::{
+    pace::Pace,
     reading::{Recorded, read_recording, told},
     stop::RecordedInput,
 };
@@ -71,6 +72,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
     let trial = read_recording(&args.trial, &options)?;
     let applied = apply(&calibration, &trial)?;
+    let mut pace = Pace::of(calibration.sample_rate_hz.hz());
+    let told = trial.time_s.iter().find_map(|&time_s| pace.take(time_s));
     match args.out.as_ref().filter(|path| !is_standard_output(path)) {
         Some(path) => write_whole(path, |out| write_all(&calibration, &trial, &applied, out))?,
         None => {
@@ -80,6 +83,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         }
     }
     tell(&applied);
+    if let Some(told) = told {
+        warn(format!("stretch: {}: {told}", trial.name));
+    }
     Ok(())
 }
 
@@ -150,6 +156,7 @@ fn live(
     out.write_all(header(calibration).as_bytes())?;
     out.flush()?;
     let (mut line, mut seen) = (Vec::new(), Seen::default());
+    let mut pace = Pace::of(calibration.sample_rate_hz.hz());
     while let Some(row) = rows.next_row() {
         match row {
             Ok(row) => {
@@ -158,6 +165,9 @@ fn live(
                 }
                 let reading = receptor.step(row.time_s, row.values[0]);
                 seen.take(&reading);
+                if let Some(told) = pace.take(row.time_s) {
+                    warn(format!("stretch: {told}"));
+                }
                 line.clear();
                 push_line(&mut line, row.time_s, &reading, knows_sd(calibration));
                 out.write_all(&line)?;

@@ -2,13 +2,14 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context as _, bail};
+use anyhow::{Context as _, anyhow};
 use clap::ValueEnum;
 use serde::Serialize;
 use stretch_calibrate::{
-    Calibrated, Candidate, FitReport, Memory, ModelChoice, ModelKind, ModelRow, Options, Robust,
-    SpellingError, SplitBy, calibrate, calibration_bytes, choose_model, evaluate, explains_little,
-    explains_nothing, fixed_record, parse_adc, parse_rate, rank_signals, without_wild,
+    CalibrateError, Calibrated, Candidate, FitReport, Memory, ModelChoice, ModelKind, ModelRow,
+    Options, Robust, SpellingError, SplitBy, calibrate, calibration_bytes, choose_model, evaluate,
+    explains_little, explains_nothing, fixed_record, parse_adc, parse_rate, rank_signals,
+    without_wild,
 };
 use stretch_core::{Normalisation, RateEstimator, RateSource};
 use stretch_data::{Outputs, ReadOptions, Split, Trial};
@@ -18,7 +19,7 @@ use stretch_report::{Context, Judged, calibration_page};
 use super::causes::Causes;
 use super::{
     reading::{Recorded, read_trials},
-    shared::{give_stdout, say, say_json, stage_text},
+    shared::{give_stdout, of_files, say, say_json, stage_text},
 };
 use crate::table::{maybe, number, table};
 
@@ -256,11 +257,12 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     // signals that are only candidates may be anything
     let named = [args.reference.as_str(), args.signal.as_str()];
     let (trials, wild) = without_wild(&trials, &named);
+    let named = |error: CalibrateError| of_files(error, &args.trials);
     let candidates = args.candidates(&trials);
     let ranking = if candidates.is_empty() {
         Vec::new()
     } else {
-        rank_signals(&trials, &candidates, &options)?
+        rank_signals(&trials, &candidates, &options).map_err(named)?
     };
     if let Some(best) = ranking.first() {
         options.signal.clone_from(&best.signal);
@@ -268,17 +270,20 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let causes = args.causes(&trials, &options)?.felt(&trials, &options);
     options.causes.clone_from(&causes.found);
     let choice = match args.model {
-        Model::Auto => Some(choose_model(&trials, &options)?),
+        Model::Auto => Some(choose_model(&trials, &options).map_err(named)?),
         Model::One(_) => None,
     };
     if let Some(choice) = &choice {
         options.model = choice.model;
     }
-    let mut calibrated = calibrate(&trials, &options)?;
+    let mut calibrated = calibrate(&trials, &options).map_err(named)?;
     calibrated.notes.splice(0..0, wild);
     match explains_nothing(&calibrated.fits) {
         Some(why) if args.force => calibrated.notes.push(format!("{why}; written by --force")),
-        Some(why) => bail!("nothing is written: {why}; --force writes it all the same"),
+        Some(why) => {
+            let told = anyhow!("nothing is written: {why}; --force writes it all the same");
+            return Err(of_files(told, &args.trials));
+        }
         None => calibrated.notes.extend(explains_little(&calibrated.fits)),
     }
     calibrated.notes.extend(causes.notes);

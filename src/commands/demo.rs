@@ -6,6 +6,7 @@ mod sessions;
 
 use std::path::{Path, PathBuf};
 
+use anyhow::Context as _;
 use stretch_calibrate::{apply, write_calibration};
 use stretch_data::{Trial, TrialKind, write_folder};
 use stretch_report::{Context, Judged, Subject, demo_page, listed, readme_picture};
@@ -126,7 +127,7 @@ fn whole_job(args: &Args, out: &Path) -> anyhow::Result<(Sessions, Job)> {
     if !args.json {
         sessions.notes.iter().try_for_each(say)?;
     }
-    let job = Job::of(&sessions)?;
+    let job = Job::of(&sessions).with_context(|| sessions.name.clone())?;
     write(out, title, &sessions, &job)?;
     Ok((sessions, job))
 }

@@ -142,10 +142,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     );
     let shown = || args.data_set.display().to_string();
     let rig = args.rig.as_deref();
+    // what a simulation makes of numbers is the rig file's matter as much as the data's
+    let beside = || match rig {
+        Some(rig) => format!("{} beside {}", shown(), rig.display()),
+        None => shown(),
+    };
     let columns = args.reference.as_deref().zip(args.signal.as_deref());
     let catalogue = Catalogue::default().without(&args.without)?;
     let bench = Bench::read(&args.data_set, columns, rig, &catalogue).with_context(shown)?;
-    let mut examined = bench.examine(&options, !args.no_next, &bar).with_context(shown)?;
+    let mut examined = bench.examine(&options, !args.no_next, &bar).with_context(beside)?;
     if args.experiment.is_some() && examined.experiment.is_none() {
         let none = "no experiment is recommended: there are no rivals to tell apart";
         examined.diagnosis.notes.push(none.to_owned());

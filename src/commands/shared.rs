@@ -1,6 +1,9 @@
 //! What the subcommands share: progress, writing.
 
-use std::{path::Path, time::Duration};
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -43,6 +46,22 @@ pub(crate) fn or_force(error: anyhow::Error) -> anyhow::Error {
             "{error}, or --force: files of the same name are then replaced, your own are kept"
         ),
         _ => error,
+    }
+}
+
+/// An error with the files that it came of, where it does not name them itself.
+pub(crate) fn of_files(error: impl Into<anyhow::Error>, paths: &[PathBuf]) -> anyhow::Error {
+    let (error, told) = (error.into(), |path: &Path| path.display().to_string());
+    let message = format!("{error:#}");
+    let is_named = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+        message.contains(&*name)
+    };
+    match paths {
+        [] => error,
+        paths if paths.iter().any(is_named) => error,
+        [path] => error.context(told(path)),
+        [first, others @ ..] => error.context(format!("{} and {} more", told(first), others.len())),
     }
 }
 

@@ -161,10 +161,10 @@ impl<W: Write> Write for Stoppable<W> {
             return Err(io::Error::other("interrupted"));
         }
         ask(DiskCall::Write)?;
-        self.0.write(bytes)
+        self.0.write(bytes).map_err(without_path)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.0.flush()
+        self.0.flush().map_err(without_path)
     }
 }

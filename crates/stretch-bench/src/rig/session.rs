@@ -5,6 +5,7 @@ use std::path::Path;
 use stretch_data::{DataSet, EvenSession, EvenTrial, ReadOptions, Rows, SessionTrial, Split};
 use stretch_gap::{copied, noise_variance};
 
+use super::directions;
 use super::smooth::{Draws, Smoothed, schedule};
 use crate::{
     error::{BenchError, check_rate},
@@ -303,46 +304,14 @@ impl Session {
             }
         }
         if against > AGAINST * widest * stroke {
-            let (column, hint) = self.against();
+            let (column, hint) = directions::against(&self.trials, self.dt_s);
             return Err(BenchError::Implausible {
                 column: column.into(),
                 found: "the muscle lengthens while the inlet is open".into(),
-                hint: hint.into(),
+                hint,
             });
         }
         Ok(())
-    }
-}
-
-impl Session {
-    /// Which columns are wrong where length and valves disagree: the pressure is the witness.
-    fn against(&self) -> (&'static str, &'static str) {
-        let (mut with, mut seen) = (0.0, false);
-        for trial in &self.trials {
-            let Some(pressure) = &trial.pressure_kpa else { continue };
-            seen = true;
-            let valves = trial.inlet.iter().zip(&trial.outlet).map(|(i, o)| i - o);
-            with += valves.zip(pressure.windows(2)).map(|(u, p)| u * (p[1] - p[0])).sum::<f64>();
-        }
-        let length = self.range(|t| &t.length_mm);
-        let pressure = self.range(|t| t.pressure_kpa.as_deref().unwrap_or(&[]));
-        // A muscle keeps most of its length, a chamber none of its pressure.
-        let is_length = |(low, high): (f64, f64)| low > 0.5 * high;
-        if seen && is_length(pressure) && !is_length(length) {
-            ("length_mm, pressure_kpa", "they look swapped: exchange the two names")
-        } else if seen && with > 0.0 {
-            (
-                "length_mm",
-                "it looks upside down, for the pressure goes with the valves: check the potentiometer's polarity",
-            )
-        } else if seen {
-            ("inlet, outlet", "they look swapped: exchange the two names")
-        } else {
-            (
-                "inlet, outlet",
-                "they look swapped: exchange the two names, unless length_mm is upside down",
-            )
-        }
     }
 }
 

@@ -14,7 +14,7 @@ use support::{Scratch, stretch};
 const PROBLEM: &str = r#"name = "servo"
 wrap = "all"
 [simulator]
-command = ["cat", "frames.bin"]
+command = ["sh", "-c", "cat frames.bin; sleep 0.3"]
 start_s = 5
 [[stage]]
 name = "plant"

@@ -191,10 +191,9 @@ impl Session {
         others.iter().any(|other| copied(other, &volts).is_some())
     }
 
-    /// Whether a pressure of such a range moves by no more than its noise does.
-    fn is_noise(&self, (low, high): (f64, f64)) -> bool {
-        let trials = self.trials.iter().filter_map(|t| t.pressure_kpa.as_deref());
-        high - low < NOISE_SPAN * noise_variance(trials, self.dt_s).sqrt()
+    /// Whether a column of such a span moves by no more than its noise does.
+    fn is_noise<'a>(&self, trials: impl Iterator<Item = &'a [f64]>, span: f64) -> bool {
+        span < NOISE_SPAN * noise_variance(trials, self.dt_s).sqrt()
     }
 
     fn check_units(&self) -> Result<(), BenchError> {
@@ -237,7 +236,8 @@ impl Session {
                 return bad("pressure_kpa", format!("{} in every sample", pressure.0), hint);
             }
             // Noise alone has no unit: the diagnosis says that the channel is dead.
-            if self.is_noise(pressure) {
+            let pressures = self.trials.iter().filter_map(|t| t.pressure_kpa.as_deref());
+            if self.is_noise(pressures, pressure.1 - pressure.0) {
                 return self.check_directions();
             }
             if pressure.1 > 10_000.0 {
@@ -303,7 +303,9 @@ impl Session {
                 }
             }
         }
-        if against > AGAINST * widest * stroke {
+        // Noise alone has no direction: the diagnosis says that the channel is dead.
+        let lengths = self.trials.iter().map(|t| t.length_mm.as_slice());
+        if against > AGAINST * widest * stroke && !self.is_noise(lengths, stroke) {
             let (column, hint) = directions::against(&self.trials, self.dt_s);
             return Err(BenchError::Implausible {
                 column: column.into(),

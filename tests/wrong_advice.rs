@@ -89,7 +89,9 @@ fn what_goes_against_the_valves_is_told_by_what_is_wrong_with_it() {
     let without_pressure = |change: &dyn Fn(&mut Rows), rows: &mut Rows| {
         change(rows);
         rows.0.remove(3);
-        rows.1.iter_mut().for_each(|row| drop(row.remove(3)));
+        rows.1.iter_mut().for_each(|row| {
+            row.remove(3);
+        });
     };
     let negated = column("length_mm", |l, _| -l);
     let contraction = column("length_mm", |l, _| 180.0 - l);

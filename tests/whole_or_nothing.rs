@@ -71,7 +71,7 @@ const WRITING: [Writing; 14] = [
 
 /// What every command works on, and what it replaces.
 fn prepared() -> Scratch {
-    let scratch = Scratch::new();
+    let scratch = Scratch::in_memory();
     scratch.loops("a.csv", 20.0, 1.1);
     scratch.calibration("cal.json");
     scratch.write("board.json", calibration_to_json(&example_calibration()).unwrap());
@@ -142,7 +142,7 @@ fn killed_at_random(kills: usize, seed: u64) -> usize {
     let expected: Vec<_> = WRITING
         .iter()
         .map(|writing| {
-            let after = Scratch::new();
+            let after = Scratch::in_memory();
             copy(&before.path(""), &after.path(""));
             let begun = Instant::now();
             assert!(command(&after, writing.line).status().unwrap().success(), "{}", writing.line);
@@ -160,7 +160,7 @@ fn killed_at_random(kills: usize, seed: u64) -> usize {
             turns[(dice.roll() * turns.len() as f64) as usize]
         };
         let (writing, (new, takes)) = (&WRITING[at], &expected[at]);
-        let scratch = Scratch::new();
+        let scratch = Scratch::in_memory();
         copy(&before.path(""), &scratch.path(""));
         let mut child = command(&scratch, writing.line).spawn().unwrap();
         if kill % 2 == 0 {

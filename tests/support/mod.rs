@@ -2,6 +2,7 @@
 #![allow(dead_code)] // each test file uses its part
 
 pub(crate) mod round_trip;
+pub(crate) mod written;
 
 use std::{
     fmt::Write,

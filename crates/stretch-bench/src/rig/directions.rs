@@ -1,6 +1,13 @@
 //! Which columns are wrong where the muscle goes against its valves: each way to be wrong is weighed.
 
-use super::session::RigTrial;
+/// What the valves of a trial did, and what came of it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Motion<'a> {
+    pub(super) inlet: &'a [f64],
+    pub(super) outlet: &'a [f64],
+    pub(super) pressure_kpa: Option<&'a [f64]>,
+    pub(super) length_mm: &'a [f64],
+}
 
 /// Seconds that are told as one.
 const BLOCK_S: f64 = 0.1;
@@ -15,16 +22,16 @@ const LEAST: f64 = 0.1;
 /// (`x` from empty to full, `u` the openings) with the columns exchanged, with time
 /// reversed, or with the commands so much early or late: that of the least squares wins, a shift by as much
 /// more as a search of so many shifts gains by chance.
-pub(super) fn against(trials: &[RigTrial], dt_s: f64) -> (&'static str, String) {
+pub(super) fn against(trials: &[Motion<'_>], dt_s: f64) -> (&'static str, String) {
     let (mut with, mut seen) = (0.0, false);
     for trial in trials {
-        let Some(pressure) = &trial.pressure_kpa else { continue };
+        let Some(pressure) = trial.pressure_kpa else { continue };
         seen = true;
-        let valves = trial.inlet.iter().zip(&trial.outlet).map(|(i, o)| i - o);
+        let valves = trial.inlet.iter().zip(trial.outlet).map(|(i, o)| i - o);
         with += valves.zip(pressure.windows(2)).map(|(u, p)| u * (p[1] - p[0])).sum::<f64>();
     }
-    let length = range(trials.iter().map(|t| t.length_mm.as_slice()));
-    let pressure = range(trials.iter().filter_map(|t| t.pressure_kpa.as_deref()));
+    let length = range(trials.iter().map(|t| t.length_mm));
+    let pressure = range(trials.iter().filter_map(|t| t.pressure_kpa));
     // A muscle keeps most of its length, a chamber none of its pressure.
     let is_length = |(low, high): (f64, f64)| low > 0.5 * high;
     if seen && is_length(pressure) && !is_length(length) {
@@ -86,7 +93,7 @@ struct Blocks {
     outlet: Vec<f64>,
 }
 
-fn likeliest(trials: &[RigTrial], dt_s: f64) -> Option<Wrong> {
+fn likeliest(trials: &[Motion<'_>], dt_s: f64) -> Option<Wrong> {
     let trials = blocks(trials, dt_s);
     let steps: Vec<f64> =
         trials.iter().flat_map(|t| t.full.windows(2)).map(|x| x[1] - x[0]).collect();
@@ -104,11 +111,11 @@ fn likeliest(trials: &[RigTrial], dt_s: f64) -> Option<Wrong> {
     (left < (1.0 - LEAST) * all).then_some(wrong)
 }
 
-fn blocks(trials: &[RigTrial], dt_s: f64) -> Vec<Blocks> {
+fn blocks(trials: &[Motion<'_>], dt_s: f64) -> Vec<Blocks> {
     let length = ((BLOCK_S / dt_s).round() as usize).max(1);
-    let witness = |t: &RigTrial| -> Vec<f64> {
-        match &t.pressure_kpa {
-            Some(pressure) => pressure.clone(),
+    let witness = |t: &Motion<'_>| -> Vec<f64> {
+        match t.pressure_kpa {
+            Some(pressure) => pressure.to_vec(),
             None => t.length_mm.iter().map(|l| -l).collect(),
         }
     };
@@ -117,10 +124,10 @@ fn blocks(trials: &[RigTrial], dt_s: f64) -> Vec<Blocks> {
     let mean = |values: &[f64]| -> Vec<f64> {
         values.chunks(length).map(|c| c.iter().sum::<f64>() / c.len() as f64).collect()
     };
-    let one = |(t, full): (&RigTrial, &Vec<f64>)| Blocks {
+    let one = |(t, full): (&Motion<'_>, &Vec<f64>)| Blocks {
         full: mean(full).iter().map(|x| (x - low) / (high - low).max(f64::MIN_POSITIVE)).collect(),
-        inlet: mean(&t.inlet),
-        outlet: mean(&t.outlet),
+        inlet: mean(t.inlet),
+        outlet: mean(t.outlet),
     };
     trials.iter().zip(&all).map(one).collect()
 }

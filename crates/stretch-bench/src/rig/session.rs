@@ -5,7 +5,7 @@ use std::path::Path;
 use stretch_data::{DataSet, EvenSession, EvenTrial, ReadOptions, Rows, SessionTrial, Split};
 use stretch_gap::{copied, noise_variance};
 
-use super::directions;
+use super::directions::{self, Motion};
 use super::smooth::{Draws, Smoothed, schedule};
 use crate::{
     error::{BenchError, check_rate},
@@ -306,7 +306,13 @@ impl Session {
         // Noise alone has no direction: the diagnosis says that the channel is dead.
         let lengths = self.trials.iter().map(|t| t.length_mm.as_slice());
         if against > AGAINST * widest * stroke && !self.is_noise(lengths, stroke) {
-            let (column, hint) = directions::against(&self.trials, self.dt_s);
+            let motions = self.trials.iter().map(|t| Motion {
+                inlet: &t.inlet,
+                outlet: &t.outlet,
+                pressure_kpa: t.pressure_kpa.as_deref(),
+                length_mm: &t.length_mm,
+            });
+            let (column, hint) = directions::against(&motions.collect::<Vec<_>>(), self.dt_s);
             return Err(BenchError::Implausible {
                 column: column.into(),
                 found: "the muscle lengthens while the inlet is open".into(),

@@ -11,12 +11,13 @@ use std::{
 
 use anyhow::{Context, bail, ensure};
 use stretch_blind::{Clutter, Family, Plan, Protocol, make};
+use stretch_data::write_folder;
 
 use super::{
     blind_answers::{ANSWER, cases},
     blind_room::Room,
     blind_score,
-    shared::{say, steps, write_text},
+    shared::{recover, say, steps, write_text},
     stop,
 };
 
@@ -41,7 +42,7 @@ pub(crate) struct Args {
     /// Seed of the cases; those below 1000000 are for development
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Folder that the cases, the answers and the report go to
+    /// Folder that the cases, the answers and the report go to; it must not hold anything
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -68,7 +69,7 @@ struct MakeArgs {
     /// Seed; those below 1000000 are for development
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Folder that the cases go to
+    /// Folder that the cases go to; it must not hold anything
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
@@ -172,13 +173,20 @@ fn make_cases(args: &MakeArgs) -> anyhow::Result<()> {
     let bar = steps("making cases", args.cases);
     let Forms { family: Families(family), clutter, protocol } = args.forms;
     let plan = Plan { family, clutter, protocol, ..Plan::of(args.cases) };
-    let seal = make(&args.out, args.seed, &plan, &|done| bar.set_position(done as u64))?;
+    recover(&args.out)?;
+    let mut seal = None;
+    let told = |done| bar.set_position(done as u64);
+    // whoever opened a seal must not get another under its name: nothing is ever replaced
+    write_folder(&args.out, false, |folder| {
+        seal = Some(make(folder, args.seed, &plan, &told)?);
+        anyhow::Ok(())
+    })?;
     bar.finish_and_clear();
+    let sha256 = seal.map_or(String::new(), |seal| seal.sha256().to_owned());
     say(format!(
-        "made {} cases in {}; labels sealed, SHA-256 {}",
+        "made {} cases in {}; labels sealed, SHA-256 {sha256}",
         args.cases,
         args.out.display(),
-        seal.sha256()
     ))
 }
 

@@ -11,6 +11,11 @@ pub enum CalibrateError {
     /// No trial at all.
     #[error("there is no trial to calibrate on; name at least one file")]
     NoTrials,
+    /// No model can be judged on samples that were left out of its fit.
+    #[error(
+        "no model can be judged on samples that are left out of its fit: these are too few; record more, or name one with --model"
+    )]
+    TooFewToJudge,
     /// The time stamps give no sample rate.
     #[error("{trial}: {samples} samples are too few to tell a sample rate from; record more")]
     TooShort {

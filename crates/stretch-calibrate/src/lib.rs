@@ -43,8 +43,8 @@ pub use fixed_record::{BoardReceptor, FixedRecord, RecordNumbers, fixed_record, 
 pub use options::{Memory, ModelKind, Options, Robust, SpellingError, SplitBy, parse_rate};
 pub use own_ranges::on_own_ranges;
 pub use record::{
-    RecordSummary, calibration_from_json, calibration_seal, calibration_to_json, describe_record,
-    read_calibration, seal_calibration, write_calibration,
+    RecordSummary, calibration_bytes, calibration_from_json, calibration_seal, calibration_to_json,
+    describe_record, read_calibration, seal_calibration, write_calibration,
 };
 pub use wild::without_wild;
 pub use worth::{explains_little, explains_nothing, not_its_own, worse_than_the_mean};

@@ -78,7 +78,15 @@ impl Prepared {
         };
         let signal_range =
             range(&options.signal, options.zero(), &mut pairs.clone().map(|(v, _)| v))?;
-        let target_range = range(&options.reference, 0.0, &mut pairs.map(|(_, t)| t))?;
+        let target_range = range(&options.reference, 0.0, &mut pairs.map(|(_, t)| t));
+        let target_range = target_range.map_err(|error| match (error, pieces.first()) {
+            // what stands in the file, not the contraction that it is
+            (CalibrateError::Constant { column, .. }, Some((_, [_, reference, _]))) => {
+                let value = reference.first().copied().unwrap_or_default();
+                CalibrateError::Constant { column, value }
+            }
+            (other, _) => other,
+        })?;
         let noise_v = noise(pieces.iter().map(|(_, [v, ..])| v.as_slice()));
         let signal_dead = match options.dead_band {
             Some(dead_band) => dead_band,

@@ -2,6 +2,7 @@
 
 #[cfg(any(feature = "npz", feature = "mat", feature = "hdf5"))]
 mod arrays;
+mod blocks;
 #[cfg(feature = "mcap")]
 mod cdr;
 mod clock;

@@ -9,8 +9,8 @@ use crate::{
 };
 
 /// Rows in all beyond which a log is not held as a whole where the model does not need it: at a hundred bytes a row,
-/// two hundred megabytes.
-pub const LONGEST: u64 = 2_000_000;
+/// a quarter of a gigabyte with what is read and fitted.
+pub const LONGEST: u64 = 1_500_000;
 
 /// A log that can be read again and again, block by block.
 ///

@@ -17,6 +17,8 @@ mod mat;
 #[cfg(feature = "mcap")]
 mod mcap;
 #[cfg(feature = "mcap")]
+mod mcap_messages;
+#[cfg(feature = "mcap")]
 mod messages;
 mod names;
 #[cfg(feature = "npz")]

@@ -11,7 +11,7 @@ fn log(path: &Path, rows: u32, step_s: f64) {
     let mut text = String::from("time_s,length_mm,bridge_v\n");
     for n in 0..rows {
         let length = 165.0 + 14.0 * (0.01 * f64::from(n)).sin();
-        let volts = 1.24 + 0.03 * (180.0 - length) + 1e-3 * f64::from(n * 7919 % 101) / 101.0;
+        let volts = 1.24 + 0.03 * (180.0 - length) + 1e-3 * f64::from(n % 101 * 41 % 101) / 101.0;
         let _ = writeln!(text, "{:e},{length:.3},{volts:.5}", f64::from(n) * step_s);
     }
     fs::write(path, text).unwrap();

@@ -9,9 +9,10 @@ use std::{
     thread,
 };
 
+use stretch_calibrate::calibration_to_json;
 use stretch_core::Branch;
 use stretch_link::{Answer, Frame};
-use stretch_receptor::Domain;
+use stretch_receptor::{Domain, example_calibration};
 use support::Scratch;
 
 /// What the way does, drawn for every frame; the same in every run.
@@ -113,9 +114,11 @@ fn number(text: &str, word: &str) -> u64 {
 
 fn every_frame_is_accounted_for(frames: u32) {
     let scratch = Scratch::new();
+    let record = calibration_to_json(&example_calibration()).unwrap();
+    scratch.write("cal.json", record);
     let mut child = Command::new(env!("CARGO_BIN_EXE_stretch"))
         .current_dir(scratch.path(""))
-        .args(["listen", "--out", "day.csv"])
+        .args(["listen", "--port", "-", "--calibration", "cal.json", "--out", "day.csv"])
         .stdin(Stdio::piped())
         .stdout(Stdio::null())
         .stderr(Stdio::piped())

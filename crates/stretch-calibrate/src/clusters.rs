@@ -67,7 +67,8 @@ impl<const MOST: usize> Clusters<MOST> {
         loop {
             let before = (from, to);
             let mut seen = below;
-            for i in from..to {
+            let (first, last) = before;
+            for i in first..last {
                 seen += all[i].count;
                 if seen + above > most {
                     break;
@@ -77,7 +78,8 @@ impl<const MOST: usize> Clusters<MOST> {
                 }
             }
             let mut seen = above;
-            for i in (from + 1..=to).rev() {
+            let first = from;
+            for i in (first + 1..=last).rev() {
                 seen += all[i].count;
                 if seen + below > most {
                     break;

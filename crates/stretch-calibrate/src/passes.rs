@@ -19,6 +19,9 @@ use crate::{
 /// Sentences about single blocks; more are counted.
 const MOST_NOTES: usize = 12;
 
+/// Rows that a block has at least, but the first.
+const SHORTEST: usize = 100;
+
 /// Everything that a pass needs.
 pub(crate) struct Passes<'a> {
     pub log: &'a Log<'a>,
@@ -40,6 +43,11 @@ struct Extents {
 }
 
 impl Extents {
+    fn new() -> Self {
+        let (mean, noises) = ([0.0; 2], Vec::new());
+        Self { signal: NOTHING, reference: NOTHING, mean, product: 0.0, samples: 0, noises }
+    }
+
     fn take(&mut self, [signal, reference, _]: &[Vec<f64>; 3]) {
         self.signal = joined(self.signal, extent(signal.iter().copied()));
         self.reference = joined(self.reference, extent(reference.iter().copied()));
@@ -56,11 +64,44 @@ impl Extents {
     }
 }
 
+/// What became of the rows, and what is said of it.
+#[derive(Default)]
+struct Told {
+    rows: Rows,
+    first: Vec<String>,
+    more: usize,
+}
+
+impl Told {
+    fn take(&mut self, evened: Evened) {
+        self.rows.add(evened.rows);
+        for note in evened.notes {
+            if self.first.len() < MOST_NOTES { self.first.push(note) } else { self.more += 1 }
+        }
+    }
+
+    fn notes(self) -> Vec<String> {
+        let more = (self.more > 0).then(|| format!("{} more sentences like these", self.more));
+        let read = self.rows.read;
+        let how = format!(
+            "{read} rows are more than {LONGEST}: they were read block by block, several times"
+        );
+        self.first.into_iter().chain(more).chain(self.rows.note()).chain([how]).collect()
+    }
+}
+
 fn joined(a: Interval, b: Interval) -> Interval {
     Interval { min: a.min.min(b.min), max: a.max.max(b.max) }
 }
 
 const NOTHING: Interval = Interval { min: f64::INFINITY, max: f64::NEG_INFINITY };
+
+const BRANCHES: [&str; 2] = ["inflation", "deflation"];
+
+/// Which of them.
+fn place(branch: Branch) -> usize {
+    usize::from(branch == Branch::Deflation)
+}
 
 /// What one branch's samples span, and how many there are.
 #[derive(Clone, Copy)]
@@ -119,9 +160,10 @@ impl Passes<'_> {
     ) -> Result<(), CalibrateError> {
         (self.log)(&mut |index, block| {
             let block = self.wild.without(block);
-            // what is left at the end of a trial may be too short to tell a rate from
-            if block.len() < 3 && first.is_some() {
-                return Ok(());
+            // what is left at the end of a trial may be too short to tell its rate from
+            if block.len() < SHORTEST && first.is_some() {
+                let rows = Rows { read: block.len(), bridged: 0, dropped: block.len() };
+                return take(Evened { rows, ..Evened::default() });
             }
             if first.is_none() {
                 *first = Some((block.name.clone(), SampleRate::new(sample_rate_hz(&block)?)?));
@@ -136,36 +178,18 @@ impl Passes<'_> {
     /// The second pass: ranges, polarity and dead bands, and how many samples there are.
     pub(crate) fn prepared(&self, names: &[String]) -> Result<(Prepared, u64), CalibrateError> {
         let options = self.options;
-        let mut seen = Extents {
-            signal: NOTHING,
-            reference: NOTHING,
-            mean: [0.0; 2],
-            product: 0.0,
-            samples: 0,
-            noises: Vec::new(),
-        };
-        let (mut rows, mut notes, mut more) = (Rows::default(), Vec::new(), 0);
+        let mut seen = Extents::new();
+        let mut told = Told::default();
         let mut first = None;
         self.evened(&mut first, &mut |evened| {
-            rows.add(evened.rows);
-            for note in evened.notes {
-                if notes.len() < MOST_NOTES { notes.push(note) } else { more += 1 }
-            }
             evened.pieces.iter().for_each(|(_, piece)| seen.take(piece));
+            told.take(evened);
             Ok(())
         })?;
         let Some((first, sample_rate)) = first else { return Err(CalibrateError::NoTrials) };
         if seen.samples == 0 {
-            return Err(CalibrateError::TooShort { trial: first, samples: rows.read });
+            return Err(CalibrateError::TooShort { trial: first, samples: told.rows.read });
         }
-        if more > 0 {
-            notes.push(format!("{more} more sentences like these"));
-        }
-        notes.extend(rows.note());
-        notes.push(format!(
-            "{} rows are more than {LONGEST}: they were read block by block, several times",
-            rows.read
-        ));
         let target = target_below(options, seen.reference.max)?;
         let [low, high] = [seen.reference.min, seen.reference.max]
             .map(|reference| target.from_reference(reference));
@@ -189,7 +213,7 @@ impl Passes<'_> {
             signal_range,
             target_range,
             dead,
-            notes,
+            notes: told.notes(),
             options,
             first: names.first().cloned().unwrap_or(first),
         };
@@ -285,16 +309,10 @@ impl Passes<'_> {
         Ok((Model::Linear(line), vec![report]))
     }
 
-    /// The third and the fourth pass of surfaces: the rates' ranges by branch, then a triangle a branch and fold.
-    pub(crate) fn surfaces(
-        &self,
-        prepared: &Prepared,
-        degree: Degree,
-        total: u64,
-    ) -> Result<(Model, Vec<FitReport>), CalibrateError> {
+    /// The third pass of surfaces: what each branch spans.
+    fn spans(&self, prepared: &Prepared, degree: Degree) -> Result<[Span; 2], CalibrateError> {
         let none = Span { signal: NOTHING, signal_rate: NOTHING, target_rate: NOTHING, samples: 0 };
         let mut spans = [none; 2];
-        let place = |branch| usize::from(branch == Branch::Deflation);
         self.raw(prepared, &mut |branch, raw| {
             let span = &mut spans[place(branch)];
             let point = |x| Interval { min: x, max: x };
@@ -304,12 +322,22 @@ impl Passes<'_> {
             span.samples += 1;
             Ok(())
         })?;
-        let names = ["inflation", "deflation"];
-        for (Span { samples, .. }, branch) in spans.into_iter().zip(names) {
+        for (Span { samples, .. }, branch) in spans.into_iter().zip(BRANCHES) {
             if samples <= degree.terms() as u64 {
                 return Err(CalibrateError::OneBranch { branch, samples, terms: degree.terms() });
             }
         }
+        Ok(spans)
+    }
+
+    /// The third and the fourth pass of surfaces: the rates' ranges by branch, then a triangle a branch and fold.
+    pub(crate) fn surfaces(
+        &self,
+        prepared: &Prepared,
+        degree: Degree,
+        total: u64,
+    ) -> Result<(Model, Vec<FitReport>), CalibrateError> {
+        let (spans, names) = (self.spans(prepared, degree)?, BRANCHES);
         let range = |name: &str, Interval { min, max }: Interval| {
             Range::new(RangeSpec { mode: self.options.normalisation, zero: 0.0, min, max }).map_err(
                 |_| CalibrateError::Constant {

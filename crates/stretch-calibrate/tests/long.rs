@@ -100,6 +100,17 @@ fn one_block_gives_the_same_bits() {
     assert_eq!(long.calibration, whole.calibration);
 }
 
+/// A handful of rows at the end, a sample among them lost, say another rate: they are left out and counted.
+#[test]
+fn the_rest_of_a_log_may_be_too_short_to_be_a_block() {
+    let mut trial = log("a", 6006, 0);
+    trial.time_s.remove(6002);
+    trial.channels.iter_mut().for_each(|channel| drop(channel.values.remove(6002)));
+    let long = in_blocks(std::slice::from_ref(&trial), 2000, &Options::default()).unwrap();
+    let said = "rows: 6000 of 6005 used, 5 left out";
+    assert!(long.notes.iter().any(|note| note.contains(said)), "{:?}", long.notes);
+}
+
 #[test]
 fn wild_values_and_several_trials_are_told_as_of_the_whole() {
     let trials = [log("a", 9000, 500), log("b", 7000, 0), log("c", 8001, 900)];

@@ -85,8 +85,11 @@ impl Recording {
     }
 }
 
-/// A file that is a table of text, unpacked, and what it is called in messages; none of anything else.
-fn table(path: &Path) -> Result<Option<(Box<dyn Read>, String)>, DataError> {
+/// A table of text, unpacked, and what it is called in messages.
+type Table = (Box<dyn Read>, String);
+
+/// A file that is a table of text; none of anything else.
+fn table(path: &Path) -> Result<Option<Table>, DataError> {
     let file = path.display().to_string();
     let mut reader = File::open(path).map_err(|e| DataError::io(&file, "open it", e))?;
     let (head, format) = sniff::head(&mut reader, &file)?;

@@ -8,6 +8,8 @@ use support::{Scratch, calibrate, fails, runs, stretch};
 
 /// Rows of a trial with their columns' names.
 type Rows = (Vec<String>, Vec<Vec<f64>>);
+/// What a record is called, what was done to it, and what must be said.
+type Case<'a> = (&'a str, &'a dyn Fn(&mut Rows), &'a [&'a str]);
 
 /// A simulated data set of which every trial was changed, as by a recorder: without digests.
 fn changed(scratch: &Scratch, name: &str, change: &dyn Fn(&mut Rows)) -> PathBuf {
@@ -95,7 +97,7 @@ fn what_goes_against_the_valves_is_told_by_what_is_wrong_with_it() {
     };
     let negated = column("length_mm", |l, _| -l);
     let contraction = column("length_mm", |l, _| 180.0 - l);
-    let cases: [(&str, &dyn Fn(&mut Rows), &[&str]); 13] = [
+    let cases: [Case<'_>; 13] = [
         ("negated", &negated, &["length_mm", "sign looks reversed"]),
         ("contraction", &contraction, &["length_mm", "looks like a contraction"]),
         ("upside_down", &column("length_mm", |l, _| 330.0 - l), &["length_mm", "upside down"]),

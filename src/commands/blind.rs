@@ -37,7 +37,7 @@ pub(crate) struct Args {
     #[command(subcommand)]
     step: Option<Step>,
     /// How many cases
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count)]
     cases: Option<usize>,
     /// Seed of the cases; those below 1000000 are for development
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -61,10 +61,18 @@ enum Step {
     Score(ScoreArgs),
 }
 
+/// Most cases: a case is a megabyte or two, so that these fill a disk.
+const MOST_CASES: usize = 100_000;
+
+fn count(text: &str) -> Result<usize, String> {
+    let cases = text.parse::<usize>().ok().filter(|cases| *cases <= MOST_CASES);
+    cases.ok_or_else(|| format!("\"{text}\" is not a number of cases up to {MOST_CASES}"))
+}
+
 #[derive(clap::Args)]
 struct MakeArgs {
     /// How many cases: single effects, none, several, foreign ones and ones struck out
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count)]
     cases: usize,
     /// Seed; those below 1000000 are for development
     #[arg(long, value_name = "N", default_value_t = 1)]

@@ -8,7 +8,7 @@ use serde::Serialize;
 use stretch_calibrate::{
     CalibrateError, Calibrated, Candidate, FitReport, Memory, ModelChoice, ModelKind, ModelRow,
     Options, Robust, SpellingError, SplitBy, calibrate, calibration_bytes, choose_model, evaluate,
-    explains_little, explains_nothing, fixed_record, parse_adc, parse_rate, rank_signals,
+    explains_little, explains_nothing, fixed_record, is_plain, parse_adc, parse_rate, rank_signals,
     without_wild,
 };
 use stretch_core::{Normalisation, RateEstimator, RateSource};
@@ -18,6 +18,7 @@ use stretch_report::{Context, Judged, calibration_page};
 
 use super::causes::Causes;
 use super::{
+    long::Long,
     reading::{Recorded, read_trials},
     shared::{give_stdout, of_files, say, say_json, stage_text},
 };
@@ -253,7 +254,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             columns = columns.require(signal.trim());
         }
     }
-    let trials = read_trials(&args.trials, Split::Fit, &columns)?;
+    let is_plain = args.model != Model::Auto
+        && args.signal != "auto"
+        && !args.signal.contains(',')
+        && is_plain(&options);
+    let long = Long::of(&args.trials, &columns, is_plain)?;
+    let trials = match &long {
+        Some(long) => long.beginnings()?,
+        None => read_trials(&args.trials, Split::Fit, &columns)?,
+    };
     // signals that are only candidates may be anything
     let named = [args.reference.as_str(), args.signal.as_str()];
     let (trials, wild) = without_wild(&trials, &named);
@@ -276,8 +285,16 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     if let Some(choice) = &choice {
         options.model = choice.model;
     }
-    let mut calibrated = calibrate(&trials, &options).map_err(named)?;
-    calibrated.notes.splice(0..0, wild);
+    let fit = |options: &Options| {
+        let fitted = match &long {
+            Some(long) => long.calibrate(options),
+            None => calibrate(&trials, options),
+        };
+        fitted.map_err(named)
+    };
+    let mut calibrated = fit(&options)?;
+    // those of a long log are told by its own passes
+    calibrated.notes.splice(0..0, if long.is_some() { Vec::new() } else { wild });
     match explains_nothing(&calibrated.fits) {
         Some(why) if args.force => calibrated.notes.push(format!("{why}; written by --force")),
         Some(why) => {
@@ -302,7 +319,14 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         outputs.file(path, |out| out.write_all(&record.bytes))?;
     }
     if let Some(path) = &args.report {
-        let page = report(&args, &trials, &columns, &calibrated, &ranking, &options)?;
+        if let Some(trial) = trials.first().filter(|_| long.is_some() && args.test.is_empty()) {
+            let rows = trial.len();
+            calibrated.notes.push(format!("the report judges the first {rows} rows of each trial"));
+        }
+        // the line is the yardstick that every surface is held against
+        let linear = fit(&Options { model: ModelKind::Linear, ..options.clone() })?;
+        let fitted = [&linear, &calibrated];
+        let page = report(&args, &trials, &columns, fitted, &ranking, &options)?;
         stage_text(&mut outputs, path, &page)?;
     }
     outputs.keep()?;
@@ -335,16 +359,14 @@ fn report(
     args: &Args,
     trials: &[Trial],
     columns: &ReadOptions,
-    calibrated: &Calibrated,
+    [linear, calibrated]: [&Calibrated; 2],
     ranking: &[Candidate],
     options: &Options,
 ) -> anyhow::Result<String> {
     let test = read_trials(&args.test, Split::Test, columns)?;
     let judged = if test.is_empty() { trials } else { &test };
-    // the line is the yardstick that every surface is held against
-    let linear = calibrate(trials, &Options { model: ModelKind::Linear, ..options.clone() })?;
     let name = options.model.to_string();
-    let mut shown = vec![("linear", &linear)];
+    let mut shown = vec![("linear", linear)];
     if options.model != ModelKind::Linear {
         shown.push((name.as_str(), calibrated));
     }

@@ -153,6 +153,17 @@ pub enum CalibrateError {
         /// What is wrong with it, and where.
         problem: String,
     },
+    /// A log that cannot be held as a whole, for a model that needs that.
+    #[error(
+        "{model} is fitted to a whole log, of at most {most} rows; fit a line or a surface by least squares (--model poly13), or \
+         give fewer rows (--grid HZ, a part of the log)"
+    )]
+    TooLong {
+        /// What was to be fitted.
+        model: String,
+        /// Most rows.
+        most: u64,
+    },
     /// A file that cannot be read or written.
     #[error(transparent)]
     Data(#[from] stretch_data::DataError),

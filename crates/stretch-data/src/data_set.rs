@@ -131,6 +131,29 @@ impl DataSet {
         self.trials.iter().filter(move |entry| entry.split == split)
     }
 
+    /// A sentence with both where the stamps of a trial say another rate than [`DataSet::rate_hz`], by more than a twentieth.
+    ///
+    /// ```
+    /// use stretch_data::{DataSet, Trial};
+    /// let set = DataSet { name: "b".into(), rate_hz: 250.0, rig: None, trials: Vec::new() };
+    /// let time_s = (0..50).map(|n| 0.01 * f64::from(n)).collect();
+    /// let trial = Trial { name: "a.csv".into(), time_s, ..Trial::default() };
+    /// let told = set.rate_told(&trial).expect("they differ");
+    /// assert!(told.contains("rate_hz = 250") && told.contains("100.00 Hz"), "{told}");
+    /// assert_eq!(DataSet { rate_hz: 100.0, ..set }.rate_told(&trial), None);
+    /// ```
+    pub fn rate_told(&self, trial: &Trial) -> Option<String> {
+        let stamped_hz = trial.rate_hz()?;
+        let differs = (stamped_hz / self.rate_hz - 1.0).abs() > 0.05;
+        differs.then(|| {
+            format!(
+                "dataset.toml says rate_hz = {}, the stamps of {} say {stamped_hz:.2} Hz: the stamps are believed; correct \
+                 whichever is wrong",
+                self.rate_hz, trial.name
+            )
+        })
+    }
+
     /// The rig file beside it, if it names one.
     ///
     /// # Errors

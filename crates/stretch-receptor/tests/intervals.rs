@@ -403,9 +403,9 @@ fn numbers_beyond_the_checks_are_not_proved() {
     assert!(prove_observer(&observer).is_ok());
     let spoils: [fn(&mut IntegerObserver); 4] = [
         |o| o.numbers.low = i32::MIN,
-        |o| o.numbers.curve[1] = i32::MAX,
+        |o| o.numbers.curve[..2].copy_from_slice(&[i32::MIN, i32::MAX]),
         |o| o.numbers.radii[0] = i32::MIN + 1,
-        |o| o.numbers.zero = i64::MAX,
+        |o| (o.numbers.zero, o.numbers.gain) = (i64::MAX, i32::MAX),
     ];
     let proved = spoils.iter().enumerate().filter_map(|(n, spoil)| {
         let mut spoilt = observer;

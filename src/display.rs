@@ -15,17 +15,18 @@ use std::{
 };
 
 use anyhow::ensure;
+use stretch_data::is_standard_output;
 
 static LOST: OnceLock<ErrorKind> = OnceLock::new();
 
 /// Whether a file goes to standard output, where nothing else may then stand.
 static TAKEN: AtomicBool = AtomicBool::new(false);
 
-/// Gives standard output to the one of some files that is called `-`.
+/// Gives standard output to the one of some files that is called `-`, or so.
 pub(crate) fn give_stdout<'a>(
     files: impl IntoIterator<Item = Option<&'a Path>>,
 ) -> anyhow::Result<()> {
-    let count = files.into_iter().flatten().filter(|path| path.as_os_str() == "-").count();
+    let count = files.into_iter().flatten().filter(|path| is_standard_output(path)).count();
     ensure!(count < 2, "two files cannot go to standard output; name one of them");
     TAKEN.fetch_or(count == 1, SeqCst);
     Ok(())
@@ -41,7 +42,7 @@ pub(crate) fn say(text: impl Display) -> anyhow::Result<()> {
         return Ok(());
     }
     // what was lost is kept by `Output`
-    let _ = writeln!(Output, "{text}");
+    let _ = writeln!(Output, "{}", plain(&text.to_string()));
     Ok(())
 }
 
@@ -55,8 +56,29 @@ pub(crate) fn say_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
 
 /// A text and a line end to standard error, or to nobody.
 pub(crate) fn warn(text: impl Display) {
-    let line = format!("{text}\n");
+    let line = plain(&text.to_string()) + "\n";
     let _ = io::stderr().lock().write_all(line.as_bytes());
+}
+
+/// A text without what a terminal acts on, or what turns the text around it or hides: names come from
+/// files of anybody. What is written in its place is an escape of JSON, too.
+fn plain(text: &str) -> String {
+    let mut told = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '\n' | '\t' => told.push(c),
+            '\u{61c}'
+            | '\u{200b}'..='\u{200f}'
+            | '\u{2028}'..='\u{202e}'
+            | '\u{2066}'..='\u{2069}'
+            | '\u{feff}' => {
+                told += &format!("\\u{:04x}", u32::from(c));
+            }
+            c if c.is_control() => told += &format!("\\u{:04x}", u32::from(c)),
+            c => told.push(c),
+        }
+    }
+    told
 }
 
 /// Why standard output could not take all that it was given, if it could not.

@@ -110,11 +110,21 @@ fn explain(told: &clap::Error) -> ExitCode {
 /// The error and its causes as one sentence; a cause that is already told is
 /// not told again.
 fn message(error: &anyhow::Error) -> String {
-    let mut told = error.to_string();
-    for cause in error.chain().skip(1).map(ToString::to_string) {
+    let mut told = without_numbers(&error.to_string());
+    for cause in error.chain().skip(1).map(|cause| without_numbers(&cause.to_string())) {
         if !told.contains(&cause) {
             told = format!("{told}: {cause}");
         }
+    }
+    stretch_data::without_temporary_names(&told)
+}
+
+/// A text without Rust's `(os error 28)`, which says what stands before it again.
+fn without_numbers(text: &str) -> String {
+    let mut parts = text.split(" (os error ");
+    let mut told = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        told += part.split_once(')').map_or(part, |(_, rest)| rest);
     }
     told
 }

@@ -1,17 +1,13 @@
-//! Any stream of voltages: every reading is finite.
+//! Any record that loads, then any stream of voltages: every reading is finite, in both widths.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use stretch_core::{Runner, Volts};
-use stretch_receptor::{StretchReceptor, example_calibration};
+use stretch_core::Calibration;
+use stretch_fuzz::steps;
 
 fuzz_target!(|bytes: &[u8]| {
-    let calibration = example_calibration();
-    let mut receptor = Runner::new(StretchReceptor::<f32>::new(&calibration).expect("valid"));
-    for sample in bytes.chunks_exact(4) {
-        let volts = f32::from_le_bytes([sample[0], sample[1], sample[2], sample[3]]);
-        if let Ok(reading) = receptor.step(Volts(volts)) {
-            assert!(reading.estimate.is_finite() && reading.rate.is_finite());
-        }
+    if let Ok((calibration, stream)) = postcard::take_from_bytes::<Calibration>(bytes) {
+        steps::<f64>(&calibration, stream);
+        steps::<f32>(&calibration, stream);
     }
 });

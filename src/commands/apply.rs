@@ -9,10 +9,13 @@ use stretch_calibrate::{
     Applied, LiveReceptor, apply, not_its_own, pressure_column, read_calibration,
 };
 use stretch_core::{Calibration, Model};
-use stretch_data::{ReadOptions, Recording, RowReader, Trial, push_number, write_whole};
+use stretch_data::{
+    ReadOptions, Recording, RowReader, Trial, is_standard_output, push_number, write_whole,
+};
 use stretch_receptor::{Domain, Reading, Withheld};
 
 use super::{
+    pace::Pace,
     reading::{Recorded, read_recording, told},
     stop::RecordedInput,
 };
@@ -54,7 +57,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         options = options.require(pressure);
     }
     if args.trial.as_os_str() == "-" {
-        let path = args.out.as_ref().filter(|path| path.as_os_str() != "-");
+        let path = args.out.as_ref().filter(|path| !is_standard_output(path));
         return match path {
             None => live(&calibration, io::stdin(), &options, &mut Output),
             Some(path) => {
@@ -69,7 +72,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
     let trial = read_recording(&args.trial, &options)?;
     let applied = apply(&calibration, &trial)?;
-    match args.out.as_ref().filter(|path| path.as_os_str() != "-") {
+    let mut pace = Pace::of(calibration.sample_rate_hz.hz());
+    let told = trial.time_s.iter().find_map(|&time_s| pace.take(time_s));
+    match args.out.as_ref().filter(|path| !is_standard_output(path)) {
         Some(path) => write_whole(path, |out| write_all(&calibration, &trial, &applied, out))?,
         None => {
             let mut out = BufWriter::new(Output);
@@ -78,6 +83,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         }
     }
     tell(&applied);
+    if let Some(told) = told {
+        warn(format!("stretch: {}: {told}", trial.name));
+    }
     Ok(())
 }
 
@@ -148,6 +156,7 @@ fn live(
     out.write_all(header(calibration).as_bytes())?;
     out.flush()?;
     let (mut line, mut seen) = (Vec::new(), Seen::default());
+    let mut pace = Pace::of(calibration.sample_rate_hz.hz());
     while let Some(row) = rows.next_row() {
         match row {
             Ok(row) => {
@@ -156,6 +165,9 @@ fn live(
                 }
                 let reading = receptor.step(row.time_s, row.values[0]);
                 seen.take(&reading);
+                if let Some(told) = pace.take(row.time_s) {
+                    warn(format!("stretch: {told}"));
+                }
                 line.clear();
                 push_line(&mut line, row.time_s, &reading, knows_sd(calibration));
                 out.write_all(&line)?;

@@ -11,12 +11,13 @@ use std::{
 
 use anyhow::{Context, bail, ensure};
 use stretch_blind::{Clutter, Family, Plan, Protocol, make};
+use stretch_data::write_folder;
 
 use super::{
     blind_answers::{ANSWER, cases},
     blind_room::Room,
     blind_score,
-    shared::{say, steps, write_text},
+    shared::{recover, say, steps, write_text},
     stop,
 };
 
@@ -36,12 +37,12 @@ pub(crate) struct Args {
     #[command(subcommand)]
     step: Option<Step>,
     /// How many cases
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count)]
     cases: Option<usize>,
     /// Seed of the cases; those below 1000000 are for development
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Folder that the cases, the answers and the report go to
+    /// Folder that the cases, the answers and the report go to; it must not hold anything
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -60,15 +61,23 @@ enum Step {
     Score(ScoreArgs),
 }
 
+/// Most cases: a case is a megabyte or two, so that these fill a disk.
+const MOST_CASES: usize = 100_000;
+
+fn count(text: &str) -> Result<usize, String> {
+    let cases = text.parse::<usize>().ok().filter(|cases| *cases <= MOST_CASES);
+    cases.ok_or_else(|| format!("\"{text}\" is not a number of cases up to {MOST_CASES}"))
+}
+
 #[derive(clap::Args)]
 struct MakeArgs {
     /// How many cases: single effects, none, several, foreign ones and ones struck out
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count)]
     cases: usize,
     /// Seed; those below 1000000 are for development
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Folder that the cases go to
+    /// Folder that the cases go to; it must not hold anything
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
@@ -172,13 +181,20 @@ fn make_cases(args: &MakeArgs) -> anyhow::Result<()> {
     let bar = steps("making cases", args.cases);
     let Forms { family: Families(family), clutter, protocol } = args.forms;
     let plan = Plan { family, clutter, protocol, ..Plan::of(args.cases) };
-    let seal = make(&args.out, args.seed, &plan, &|done| bar.set_position(done as u64))?;
+    recover(&args.out)?;
+    let mut seal = None;
+    let told = |done| bar.set_position(done as u64);
+    // whoever opened a seal must not get another under its name: nothing is ever replaced
+    write_folder(&args.out, false, |folder| {
+        seal = Some(make(folder, args.seed, &plan, &told)?);
+        anyhow::Ok(())
+    })?;
     bar.finish_and_clear();
+    let sha256 = seal.map_or(String::new(), |seal| seal.sha256().to_owned());
     say(format!(
-        "made {} cases in {}; labels sealed, SHA-256 {}",
+        "made {} cases in {}; labels sealed, SHA-256 {sha256}",
         args.cases,
         args.out.display(),
-        seal.sha256()
     ))
 }
 

@@ -7,12 +7,13 @@ use std::{
 
 use stretch_bench::RigSimulator;
 use stretch_blind::{COUNTED_EXCESS, CaseKind, Label, Rate, Score};
+use stretch_data::Outputs;
 use stretch_gap::{Options, diagnose};
 use stretch_report::{BlindSubject, Goal, blind_page, goals};
 
 use super::{
     blind_answers::{Answers, answers},
-    shared::{say, steps, write_text},
+    shared::{say, stage_text, steps},
 };
 use crate::table::table;
 
@@ -30,9 +31,12 @@ pub(super) fn score(folder: &Path, with_oracle: bool) -> anyhow::Result<()> {
         goals: &goals,
         sha256: answers.seal.sha256(),
     };
-    write_text(&folder.join("blind.html"), &blind_page(&subject))?;
+    let mut outputs = Outputs::default();
+    stage_text(&mut outputs, &folder.join("blind.html"), &blind_page(&subject))?;
     let json = serde_json::json!({ "score": score, "goals": goals });
-    write_text(&folder.join("score.json"), &(serde_json::to_string_pretty(&json)? + "\n"))?;
+    let json = serde_json::to_string_pretty(&json)? + "\n";
+    stage_text(&mut outputs, &folder.join("score.json"), &json)?;
+    outputs.keep()?;
     say(format!("seal intact, SHA-256 {}\n", answers.seal.sha256()))?;
     say(table(&["goal", "asked", "reached", "count", "95 % interval", ""], rows(&goals)))?;
     say(format!("\n{score}"))?;

@@ -2,23 +2,25 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context as _, bail};
+use anyhow::{Context as _, anyhow};
 use clap::ValueEnum;
 use serde::Serialize;
 use stretch_calibrate::{
-    Calibrated, Candidate, FitReport, Memory, ModelChoice, ModelKind, ModelRow, Options, Robust,
-    SpellingError, SplitBy, calibrate, choose_model, evaluate, explains_little, explains_nothing,
-    fixed_record, parse_adc, parse_rate, rank_signals, without_wild, write_calibration,
+    CalibrateError, Calibrated, Candidate, FitReport, Memory, ModelChoice, ModelKind, ModelRow,
+    Options, Robust, SpellingError, SplitBy, calibrate, calibration_bytes, choose_model, evaluate,
+    explains_little, explains_nothing, fixed_record, is_plain, parse_adc, parse_rate, rank_signals,
+    without_wild,
 };
 use stretch_core::{Normalisation, RateEstimator, RateSource};
-use stretch_data::{ReadOptions, Split, Trial, write_whole};
+use stretch_data::{Outputs, ReadOptions, Split, Trial};
 use stretch_receptor::code::Adc;
 use stretch_report::{Context, Judged, calibration_page};
 
 use super::causes::Causes;
 use super::{
+    long::Long,
     reading::{Recorded, read_trials},
-    shared::{give_stdout, say, say_json, write_text},
+    shared::{give_stdout, of_files, say, say_json, stage_text},
 };
 use crate::table::{maybe, number, table};
 
@@ -252,15 +254,24 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             columns = columns.require(signal.trim());
         }
     }
-    let trials = read_trials(&args.trials, Split::Fit, &columns)?;
+    let is_plain = args.model != Model::Auto
+        && args.signal != "auto"
+        && !args.signal.contains(',')
+        && is_plain(&options);
+    let long = Long::of(&args.trials, &columns, is_plain)?;
+    let trials = match &long {
+        Some(long) => long.beginnings()?,
+        None => read_trials(&args.trials, Split::Fit, &columns)?,
+    };
     // signals that are only candidates may be anything
     let named = [args.reference.as_str(), args.signal.as_str()];
     let (trials, wild) = without_wild(&trials, &named);
+    let named = |error: CalibrateError| of_files(error, &args.trials);
     let candidates = args.candidates(&trials);
     let ranking = if candidates.is_empty() {
         Vec::new()
     } else {
-        rank_signals(&trials, &candidates, &options)?
+        rank_signals(&trials, &candidates, &options).map_err(named)?
     };
     if let Some(best) = ranking.first() {
         options.signal.clone_from(&best.signal);
@@ -268,17 +279,28 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let causes = args.causes(&trials, &options)?.felt(&trials, &options);
     options.causes.clone_from(&causes.found);
     let choice = match args.model {
-        Model::Auto => Some(choose_model(&trials, &options)?),
+        Model::Auto => Some(choose_model(&trials, &options).map_err(named)?),
         Model::One(_) => None,
     };
     if let Some(choice) = &choice {
         options.model = choice.model;
     }
-    let mut calibrated = calibrate(&trials, &options)?;
-    calibrated.notes.splice(0..0, wild);
+    let fit = |options: &Options| {
+        let fitted = match &long {
+            Some(long) => long.calibrate(options),
+            None => calibrate(&trials, options),
+        };
+        fitted.map_err(named)
+    };
+    let mut calibrated = fit(&options)?;
+    // those of a long log are told by its own passes
+    calibrated.notes.splice(0..0, if long.is_some() { Vec::new() } else { wild });
     match explains_nothing(&calibrated.fits) {
         Some(why) if args.force => calibrated.notes.push(format!("{why}; written by --force")),
-        Some(why) => bail!("nothing is written: {why}; --force writes it all the same"),
+        Some(why) => {
+            let told = anyhow!("nothing is written: {why}; --force writes it all the same");
+            return Err(of_files(told, &args.trials));
+        }
         None => calibrated.notes.extend(explains_little(&calibrated.fits)),
     }
     calibrated.notes.extend(causes.notes);
@@ -290,13 +312,24 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         made.map(|record| (path, record))
     });
     let fixed = fixed.transpose()?;
-    write_calibration(&args.out, &calibrated.calibration)?;
+    let mut outputs = Outputs::default();
+    let record = calibration_bytes(&args.out, &calibrated.calibration)?;
+    outputs.file(&args.out, |out| out.write_all(&record))?;
     if let Some((path, record)) = &fixed {
-        write_whole(path, |out| out.write_all(&record.bytes))?;
+        outputs.file(path, |out| out.write_all(&record.bytes))?;
     }
     if let Some(path) = &args.report {
-        write_report(&args, path, &trials, &columns, &calibrated, &ranking, &options)?;
+        if let Some(trial) = trials.first().filter(|_| long.is_some() && args.test.is_empty()) {
+            let rows = trial.len();
+            calibrated.notes.push(format!("the report judges the first {rows} rows of each trial"));
+        }
+        // the line is the yardstick that every surface is held against
+        let linear = fit(&Options { model: ModelKind::Linear, ..options.clone() })?;
+        let fitted = [&linear, &calibrated];
+        let page = report(&args, &trials, &columns, fitted, &ranking, &options)?;
+        stage_text(&mut outputs, path, &page)?;
     }
+    outputs.keep()?;
     if args.json {
         return say_json(&Output {
             signal: &options.signal,
@@ -322,21 +355,18 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
 }
 
-fn write_report(
+fn report(
     args: &Args,
-    path: &std::path::Path,
     trials: &[Trial],
     columns: &ReadOptions,
-    calibrated: &Calibrated,
+    [linear, calibrated]: [&Calibrated; 2],
     ranking: &[Candidate],
     options: &Options,
-) -> anyhow::Result<()> {
+) -> anyhow::Result<String> {
     let test = read_trials(&args.test, Split::Test, columns)?;
     let judged = if test.is_empty() { trials } else { &test };
-    // the line is the yardstick that every surface is held against
-    let linear = calibrate(trials, &Options { model: ModelKind::Linear, ..options.clone() })?;
     let name = options.model.to_string();
-    let mut shown = vec![("linear", &linear)];
+    let mut shown = vec![("linear", linear)];
     if options.model != ModelKind::Linear {
         shown.push((name.as_str(), calibrated));
     }
@@ -352,7 +382,7 @@ fn write_report(
         kinds: Vec::new(),
     };
     let judged = Judged { calibrated: &shown, evaluation: &evaluation, context: &context };
-    write_text(path, &calibration_page(&judged))
+    Ok(calibration_page(&judged))
 }
 
 /// What `auto` rests on.

@@ -6,8 +6,9 @@ mod sessions;
 
 use std::path::{Path, PathBuf};
 
+use anyhow::Context as _;
 use stretch_calibrate::{apply, write_calibration};
-use stretch_data::{Trial, TrialKind};
+use stretch_data::{Trial, TrialKind, write_folder};
 use stretch_report::{Context, Judged, Subject, demo_page, listed, readme_picture};
 use stretch_sim::{RunSettings, TrialPlan, paper_preset};
 
@@ -16,7 +17,7 @@ use super::{
     calibrate::{print as print_calibration, print_models},
     diagnose::print as print_diagnosis,
     evaluate::print_errors,
-    shared::{say, say_json, write_text},
+    shared::{or_force, recover, say, say_json, write_text},
     simulate,
 };
 use job::Job;
@@ -64,6 +65,9 @@ pub(crate) struct Args {
     /// Column of the signal [default: bridge_v, else the best by cross-validation]
     #[arg(long, requires = "data", value_name = "COL")]
     signal: Option<String>,
+    /// Replace a demo that exists, in one step; files of your own in its folder are kept
+    #[arg(long)]
+    force: bool,
     /// The paper's tables instead: every figure of its experiment, simulated, beside the published
     #[arg(long)]
     paper: bool,
@@ -76,31 +80,17 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+    recover(&args.out)?;
     if args.paper {
-        return super::paper::run(&args.out, args.seed, args.json);
+        return super::paper::run(&args.out, args.force, args.seed, args.json);
     }
-    std::fs::create_dir_all(&args.out)
-        .map_err(|e| anyhow::anyhow!("{}: cannot make the folder: {e}", args.out.display()))?;
-    let (title, sessions) = match &args.data {
-        Some(path) => {
-            let wanted = Wanted {
-                sessions: args.sessions.as_deref(),
-                reference: args.reference.as_deref(),
-                signal: args.signal.as_deref(),
-            };
-            let sessions = Sessions::read(path, &wanted)?;
-            (format!("{}: {} from a stretch sensor", sessions.name, sessions.reference), sessions)
-        }
-        None => {
-            let sessions = simulated(&args.out.join("bench"), args.seed)?;
-            (format!("The paper's experiment, simulated (seed {})", args.seed), sessions)
-        }
-    };
-    if !args.json {
-        sessions.notes.iter().try_for_each(say)?;
-    }
-    let job = Job::of(&sessions)?;
-    write(&args.out, title, &sessions, &job)?;
+    let mut done = None;
+    let written = write_folder(&args.out, args.force, |folder| {
+        done = Some(whole_job(&args, folder)?);
+        anyhow::Ok(())
+    });
+    written.map_err(or_force)?;
+    let Some((sessions, job)) = done else { return Ok(()) };
     if args.json {
         return say_json(&serde_json::json!({
             "seed": args.data.is_none().then_some(args.seed),
@@ -117,11 +107,36 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     ))
 }
 
+/// Does the job and writes what comes of it into a folder.
+fn whole_job(args: &Args, out: &Path) -> anyhow::Result<(Sessions, Job)> {
+    let (title, sessions) = match &args.data {
+        Some(path) => {
+            let wanted = Wanted {
+                sessions: args.sessions.as_deref(),
+                reference: args.reference.as_deref(),
+                signal: args.signal.as_deref(),
+            };
+            let sessions = Sessions::read(path, &wanted)?;
+            (format!("{}: {} from a stretch sensor", sessions.name, sessions.reference), sessions)
+        }
+        None => {
+            let sessions = simulated(&out.join("bench"), args.seed)?;
+            (format!("The paper's experiment, simulated (seed {})", args.seed), sessions)
+        }
+    };
+    if !args.json {
+        sessions.notes.iter().try_for_each(say)?;
+    }
+    let job = Job::of(&sessions).with_context(|| sessions.name.clone())?;
+    write(out, title, &sessions, &job)?;
+    Ok((sessions, job))
+}
+
 /// The paper's session on its preset, written as a data set and read back as one.
 fn simulated(folder: &Path, seed: u64) -> anyhow::Result<Sessions> {
     let rig = paper_preset()?;
     let settings = RunSettings { seed, ..RunSettings::default() };
-    simulate::write(folder, true, &rig, &settings, &TrialPlan::paper(seed))?;
+    simulate::write(folder, false, &rig, &settings, &TrialPlan::paper(seed))?;
     let mut sessions = Sessions::read(folder, &Wanted::default())?;
     let effects: Vec<String> = rig.effects.iter().map(|e| e.name().to_owned()).collect();
     sessions.notes = vec![format!(

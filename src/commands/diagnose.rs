@@ -1,11 +1,14 @@
 //! `stretch diagnose`: where simulator and measurement part, which effect causes it, how far the gap closes.
 
-use std::path::{Path, PathBuf};
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
 
 use anyhow::{Context, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use stretch_bench::{Fix, GaugeSimulator, Implementation, NoFix, RigSimulator};
-use stretch_data::{DataError, Trial};
+use stretch_data::{DataError, Outputs, Trial};
 use stretch_gap::{
     Diagnosis, Evidence, GapError, Laboratory, Options, Simulator, diagnose, next_experiment,
 };
@@ -17,7 +20,7 @@ use super::{
     diagnosis_text::text,
     problem,
     rails::rails,
-    shared::{give_stdout, say, short_name, write_text},
+    shared::{give_stdout, say, short_name, stage_text},
 };
 
 /// Say where a simulator and a measurement part, which effect causes it, and how far the gap closes
@@ -110,7 +113,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         not_read(fix, &args.data_set, args.rig.as_deref())?;
     }
     if let Some(folder) = args.snippets.as_deref().filter(|folder| folder.exists()) {
-        return Err(DataError::Exists { path: folder.display().to_string() }.into());
+        let is_empty = std::fs::read_dir(folder).is_ok_and(|mut held| held.next().is_none());
+        ensure!(is_empty, DataError::Exists { path: folder.display().to_string() });
     }
     let options = Options {
         depth: args.depth.into(),
@@ -138,18 +142,18 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     );
     let shown = || args.data_set.display().to_string();
     let rig = args.rig.as_deref();
+    // what a simulation makes of numbers is the rig file's matter as much as the data's
+    let beside = || match rig {
+        Some(rig) => format!("{} beside {}", shown(), rig.display()),
+        None => shown(),
+    };
     let columns = args.reference.as_deref().zip(args.signal.as_deref());
     let catalogue = Catalogue::default().without(&args.without)?;
     let bench = Bench::read(&args.data_set, columns, rig, &catalogue).with_context(shown)?;
-    let mut examined = bench.examine(&options, !args.no_next, &bar).with_context(shown)?;
-    if let Some(path) = &args.experiment {
-        match &examined.experiment {
-            Some(trial) => trial.write(path)?,
-            None => examined
-                .diagnosis
-                .notes
-                .push("no experiment is recommended: there are no rivals to tell apart".into()),
-        }
+    let mut examined = bench.examine(&options, !args.no_next, &bar).with_context(beside)?;
+    if args.experiment.is_some() && examined.experiment.is_none() {
+        let none = "no experiment is recommended: there are no rivals to tell apart";
+        examined.diagnosis.notes.push(none.to_owned());
     }
     bar.finish_and_clear();
     conclude(&args, &examined, &bench)
@@ -280,30 +284,36 @@ fn examine<L: Laboratory>(
     Ok(Examined { diagnosis, evidence, experiment, implementations: Vec::new() })
 }
 
-/// Writes the files first: a message that they are there is then true.
+/// Writes the files first, all or none: a message that they are there is then true.
 fn conclude(args: &Args, examined: &Examined, bench: &Bench) -> anyhow::Result<()> {
     let Examined { diagnosis, evidence, implementations, .. } = examined;
     let name = name_of(&args.data_set);
     let fix = bench.fixed(examined);
-    let mut said = Vec::new();
+    let (mut said, mut outputs) = (Vec::new(), Outputs::default());
+    if let (Some(path), Some(trial)) = (&args.experiment, &examined.experiment) {
+        trial.check()?;
+        outputs.file(path, |out| trial.write_to(out).map_err(io::Error::other))?;
+    }
     if let Some(path) = &args.json {
         let implement = implementations.iter().map(implement_json).collect();
         let fixed_rig = fix.as_ref().ok().map(|fix| &fix.file);
-        write_text(path, &to_json(diagnosis, implement, fixed_rig, &name, args.seed)?)?;
+        let json = to_json(diagnosis, implement, fixed_rig, &name, args.seed)?;
+        stage_text(&mut outputs, path, &json)?;
         said.push(format!("wrote {}", path.display()));
     }
     if let Some(path) = &args.report {
         let simulator = bench.simulator();
         let subject = Subject { name: &name, diagnosis, evidence, implementations, simulator };
-        write_text(path, &diagnosis_page(&subject))?;
+        stage_text(&mut outputs, path, &diagnosis_page(&subject))?;
         said.push(format!("wrote {}", path.display()));
     }
     if let Some(path) = &args.fix {
-        said.push(write_fix(path, &fix, &name, args.seed)?);
+        said.push(write_fix(&mut outputs, path, &fix, &name, args.seed)?);
     }
     if let Some(folder) = &args.snippets {
-        said.push(write_snippets(folder, implementations)?);
+        said.push(write_snippets(&mut outputs, folder, implementations)?);
     }
+    outputs.keep()?;
     print(examined)?;
     said.iter().try_for_each(say)
 }

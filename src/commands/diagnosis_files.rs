@@ -5,12 +5,12 @@ use std::path::Path;
 use anyhow::ensure;
 use serde_json::json;
 use stretch_bench::{Fix, Implementation, NoFix};
-use stretch_data::{DataSet, RigFile, write_folder, write_whole};
+use stretch_data::{DataSet, Outputs, RigFile, write_whole};
 use stretch_gap::Diagnosis;
 use stretch_report::listed;
 use stretch_sim::{Language, Quantity};
 
-use super::shared::write_text;
+use super::shared::stage_text;
 
 /// Refuses to write where something is read from.
 pub(super) fn not_read(fix: &Path, data_set: &Path, rig: Option<&Path>) -> anyhow::Result<()> {
@@ -29,6 +29,7 @@ pub(super) fn not_read(fix: &Path, data_set: &Path, rig: Option<&Path>) -> anyho
 
 /// Writes the rig file where there is something to write; says what it did.
 pub(super) fn write_fix(
+    outputs: &mut Outputs,
     path: &Path,
     fix: &Result<Fix, NoFix>,
     name: &str,
@@ -43,7 +44,7 @@ pub(super) fn write_fix(
         format!("Found by stretch {} diagnose {name}, seed {seed}.", env!("CARGO_PKG_VERSION"));
     fix.remarks.head.insert(0, from);
     let is_there = path.exists();
-    write_text(path, &fix.text())?;
+    stage_text(outputs, path, &fix.text())?;
     let effects: Vec<String> = fix.file.effects.iter().map(|e| e.name.clone()).collect();
     let with = if effects.is_empty() { "no effect".to_owned() } else { listed(&effects) };
     let replaced = if is_there { ", in place of the file that was there" } else { "" };
@@ -51,7 +52,11 @@ pub(super) fn write_fix(
 }
 
 /// Writes the code of what is named where there is something; says what it did.
-pub(super) fn write_snippets(folder: &Path, all: &[Implementation]) -> anyhow::Result<String> {
+pub(super) fn write_snippets(
+    outputs: &mut Outputs,
+    folder: &Path,
+    all: &[Implementation],
+) -> anyhow::Result<String> {
     let shown = folder.display();
     let mut files = Vec::new();
     for one in all {
@@ -63,7 +68,7 @@ pub(super) fn write_snippets(folder: &Path, all: &[Implementation]) -> anyhow::R
     if files.is_empty() {
         return Ok(format!("{shown} is not written: no effect is named"));
     }
-    write_folder(folder, false, |folder| {
+    outputs.folder(folder, false, |folder| {
         files.iter().try_for_each(|(name, code)| {
             write_whole(folder.join(name), |out| out.write_all(code.as_bytes()))
         })

@@ -27,7 +27,7 @@ pub(crate) struct Args {
     /// Calibration record, from `stretch calibrate`
     #[arg(long, value_name = "cal.json")]
     calibration: PathBuf,
-    /// Folder for the header; it must not exist
+    /// Folder for the header; it must not hold anything
     #[arg(long, value_name = "DIR")]
     c: PathBuf,
     /// Make the folder a library that the Arduino IDE takes
@@ -70,7 +70,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     })
     .map_err(|error| match error {
         DataError::Exists { path } => {
-            anyhow!("{path}: it exists; name a folder that does not: nothing is overwritten")
+            anyhow!("{path}: it exists; name a folder that does not, or an empty one: nothing is overwritten")
         }
         other => other.into(),
     })?;

@@ -17,6 +17,8 @@ pub(crate) mod evaluate;
 pub(crate) mod export;
 pub(crate) mod init;
 pub(crate) mod listen;
+mod long;
+mod pace;
 pub(crate) mod paper;
 mod problem;
 mod rails;

@@ -2,22 +2,28 @@
 
 use std::path::Path;
 
+use stretch_data::write_folder;
 use stretch_paper::{Experiment, PUBLISHED, Pipeline};
 use stretch_report::{error_rows, fit_rows, paper_page, verdicts};
 use stretch_sim::paper_preset;
 
-use super::shared::{progress, say, write_text};
+use super::shared::{or_force, progress, say, write_text};
 use crate::table::{number, p_value, table};
 
-pub(super) fn run(out: &Path, seed: u64, json: bool) -> anyhow::Result<()> {
-    let bar = progress("simulating, fitting, judging", 1);
-    let experiment = Experiment::run(&paper_preset()?, seed)?;
-    bar.finish_and_clear();
-    std::fs::create_dir_all(out)
-        .map_err(|e| anyhow::anyhow!("{}: cannot make the folder: {e}", out.display()))?;
-    write_text(&out.join("paper.html"), &paper_page(&experiment))?;
-    let text = serde_json::to_string_pretty(&experiment.to_serialise())?;
-    write_text(&out.join("paper.json"), &text)?;
+pub(super) fn run(out: &Path, force: bool, seed: u64, json: bool) -> anyhow::Result<()> {
+    let mut done = None;
+    let written = write_folder(out, force, |folder| {
+        let bar = progress("simulating, fitting, judging", 1);
+        let experiment = Experiment::run(&paper_preset()?, seed)?;
+        bar.finish_and_clear();
+        write_text(&folder.join("paper.html"), &paper_page(&experiment))?;
+        let text = serde_json::to_string_pretty(&experiment.to_serialise())?;
+        write_text(&folder.join("paper.json"), &text)?;
+        done = Some((experiment, text));
+        anyhow::Ok(())
+    });
+    written.map_err(or_force)?;
+    let Some((experiment, text)) = done else { return Ok(()) };
     if json {
         return say(text);
     }

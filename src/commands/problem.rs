@@ -8,6 +8,7 @@ use std::{
 use anyhow::{Context, ensure};
 use indicatif::ProgressBar;
 use serde_json::json;
+use stretch_data::Outputs;
 use stretch_gap::{Diagnosis, Evidence, Options, diagnose};
 use stretch_problem::{BlackBox, Problem, ProblemFile, SimulatorEntry, worker::Workers};
 use stretch_report::{Subject, diagnosis_page};
@@ -15,7 +16,7 @@ use stretch_report::{Subject, diagnosis_page};
 use super::{
     diagnosis_files::to_json,
     diagnosis_text::text,
-    shared::{say, write_text},
+    shared::{say, stage_text},
 };
 
 /// What is asked of a problem's diagnosis.
@@ -82,19 +83,20 @@ fn conclude(
     diagnosis: &Diagnosis,
     evidence: &Evidence,
 ) -> anyhow::Result<()> {
-    let mut said = Vec::new();
+    let (mut said, mut outputs) = (Vec::new(), Outputs::default());
     if let Some(path) = asked.json {
         let named = implement(bench, diagnosis).map(|one| implement_json(diagnosis, one));
         let json = to_json(diagnosis, named.collect(), None, &file.name, asked.options.seed)?;
-        write_text(path, &json)?;
+        stage_text(&mut outputs, path, &json)?;
         said.push(format!("wrote {}", path.display()));
     }
     if let Some(path) = asked.report {
         let name = &file.name;
         let subject = Subject { name, diagnosis, evidence, implementations: &[], simulator: bench };
-        write_text(path, &diagnosis_page(&subject))?;
+        stage_text(&mut outputs, path, &diagnosis_page(&subject))?;
         said.push(format!("wrote {}", path.display()));
     }
+    outputs.keep()?;
     say(&diagnosis.sentence)?;
     for (name, words, equation) in implement(bench, diagnosis) {
         say(format!("  {name}: {words}; {equation}"))?;

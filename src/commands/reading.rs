@@ -96,6 +96,9 @@ pub(crate) fn read_trials(
             for entry in set.entries(split) {
                 trials.push(told(entry.load_recording(path, options)?));
             }
+            // once: what is wrong is one line of dataset.toml
+            let wrong = trials[before..].iter().find_map(|trial| set.rate_told(trial));
+            wrong.into_iter().for_each(|note| warn(format!("note: {note}")));
             if trials.len() == before {
                 let split = split.name();
                 anyhow::bail!(

@@ -1,9 +1,15 @@
 //! What the subcommands share: progress, writing.
 
-use std::{path::Path, time::Duration};
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
+use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
+use stretch_data::{DataError, Outputs};
 
+use crate::display::warn;
 pub(crate) use crate::display::{give_stdout, say, say_json};
 
 /// A progress bar on standard error: seen on a terminal only.
@@ -24,6 +30,44 @@ fn bar(what: &'static str, steps: u64, template: &str) -> ProgressBar {
     }
     bar.enable_steady_tick(Duration::from_millis(200));
     bar
+}
+
+/// Puts right what a run that was killed left of a folder, and says so.
+pub(crate) fn recover(folder: &Path) -> anyhow::Result<()> {
+    let told = stretch_data::recover(folder).with_context(|| folder.display().to_string())?;
+    told.into_iter().for_each(warn);
+    Ok(())
+}
+
+/// Says how a folder that is in the way can be replaced.
+pub(crate) fn or_force(error: anyhow::Error) -> anyhow::Error {
+    match error.downcast_ref::<DataError>() {
+        Some(DataError::Exists { .. }) => anyhow::anyhow!(
+            "{error}, or --force: files of the same name are then replaced, your own are kept"
+        ),
+        _ => error,
+    }
+}
+
+/// An error with the files that it came of, where it does not name them itself.
+pub(crate) fn of_files(error: impl Into<anyhow::Error>, paths: &[PathBuf]) -> anyhow::Error {
+    let (error, told) = (error.into(), |path: &Path| path.display().to_string());
+    let message = format!("{error:#}");
+    let is_named = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+        message.contains(&*name)
+    };
+    match paths {
+        [] => error,
+        paths if paths.iter().any(is_named) => error,
+        [path] => error.context(told(path)),
+        [first, others @ ..] => error.context(format!("{} and {} more", told(first), others.len())),
+    }
+}
+
+/// A text file among what one command writes.
+pub(crate) fn stage_text(outputs: &mut Outputs, path: &Path, text: &str) -> anyhow::Result<()> {
+    Ok(outputs.file(path, |out| out.write_all(text.as_bytes()))?)
 }
 
 /// Writes a text file, whole or not at all.

@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
-use stretch_data::{DataSet, ReadOptions, RigFile, TrialEntry, write_folder};
+use stretch_data::{DataError, DataSet, ReadOptions, RigFile, TrialEntry, write_folder};
 use stretch_sim::{Rig, RunSettings, Session, SimError, TrialPlan, paper_preset};
 
 use super::{
     reading::read_recording,
-    shared::{progress, say},
+    shared::{of_files, or_force, progress, recover, say},
 };
 
 /// Simulate trials of the rig and write them as a data set
@@ -56,7 +56,7 @@ pub(crate) struct Args {
     /// Folder that the data set goes to
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Write into a folder that exists; files of the same name are replaced, nothing is deleted
+    /// Replace a data set that exists, in one step; files of your own in its folder are kept
     #[arg(long)]
     force: bool,
 }
@@ -138,7 +138,12 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     settings.seed = args.seed.unwrap_or(settings.seed);
     settings.noise = args.noise.map_or(settings.noise, |noise| noise == Switch::On);
     let plans = plans(&args, &rig, settings.seed)?;
-    write(&args.out, args.force, &rig, &settings, &plans)?;
+    recover(&args.out)?;
+    let written = write(&args.out, args.force, &rig, &settings, &plans);
+    written.map_err(|error| match error.downcast_ref::<DataError>() {
+        Some(DataError::Exists { .. } | DataError::Io { .. }) => or_force(error),
+        _ => of_files(error, args.rig.as_slice()),
+    })?;
 
     let seconds: f64 = plans.iter().map(|p| p.inlet.len() as f64 / p.rate_hz).sum();
     let effects: Vec<&str> = rig.effects.iter().map(|e| e.name()).collect();
@@ -201,6 +206,7 @@ pub(super) fn write(
         let mut session = Session::new(rig, settings)?;
         for plan in plans {
             let (entry, trial) = session.run(plan)?;
+            trial.check().context("the simulation gave what no trial can hold")?;
             trial.write(folder.join(&entry.file))?;
             set.trials.push(entry);
             bar.inc(1);
@@ -209,6 +215,7 @@ pub(super) fn write(
         if !is_stock {
             nominal.to_file(None).write(folder.join("nominal.toml"))?;
         }
+        set.take_digests(folder)?;
         set.write(folder)?;
         anyhow::Ok(())
     })?;

@@ -1,5 +1,7 @@
 //! Imports between files go one way.
 
+mod api;
+mod dependencies;
 mod imports;
 
 use std::{
@@ -79,4 +81,81 @@ fn handing_on_and_testing_make_no_circle() {
     ]);
     assert_eq!(circles(&found), [""; 0]);
     assert_eq!(found[&module("b.rs")], [module("a/c.rs")].into());
+}
+
+/// Crates that firmware is built on: what they show is kept in `docs/api`, so that a release cannot take it away unseen.
+const SHOWN: [&str; 7] = [
+    "stretch-core",
+    "stretch-filter",
+    "stretch-fit",
+    "stretch-metrics",
+    "stretch-operators",
+    "stretch-receptor",
+    "stretch-link",
+];
+
+/// `STRETCH_API=write cargo test --test layout public` writes the listings anew: then look at what git says has changed.
+#[test]
+fn public_items_are_those_that_are_listed() {
+    let is_writing = std::env::var("STRETCH_API").is_ok_and(|what| what == "write");
+    let mut changed = Vec::new();
+    for name in SHOWN {
+        let source = root().join("crates").join(name).join("src");
+        let lines = api::listing(&texts(&source));
+        assert!(lines.len() > 5, "{name}: {lines:?}");
+        let path = root().join("docs/api").join(format!("{name}.txt"));
+        if is_writing {
+            fs::create_dir_all(root().join("docs/api")).unwrap();
+            fs::write(&path, lines.join("\n") + "\n").unwrap();
+            continue;
+        }
+        let listed = fs::read_to_string(&path).unwrap_or_default();
+        let listed: Vec<&str> = listed.lines().collect();
+        let gone = listed.iter().filter(|old| !lines.iter().any(|new| new == *old));
+        changed.extend(gone.map(|line| format!("{name} - {line}")));
+        let came = lines.iter().filter(|new| !listed.contains(&new.as_str()));
+        changed.extend(came.map(|line| format!("{name} + {line}")));
+    }
+    assert!(
+        changed.is_empty(),
+        "public items are others than docs/api says. Where that is meant, say it in the crate's CHANGELOG.md and run\n    \
+         STRETCH_API=write cargo test --test layout public\n{}",
+        changed.join("\n")
+    );
+}
+
+/// The text of every file below a folder, by its path there.
+fn texts(folder: &Path) -> BTreeMap<String, String> {
+    let (mut found, mut folders) = (BTreeMap::new(), vec![folder.to_owned()]);
+    while let Some(next) = folders.pop() {
+        for entry in fs::read_dir(&next).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|end| end == "rs") {
+                let below = path.strip_prefix(folder).unwrap().to_str().unwrap().replace('\\', "/");
+                found.insert(below, fs::read_to_string(&path).unwrap());
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn a_public_item_that_goes_or_changes_is_seen() {
+    let list = |text: &str| api::listing(&BTreeMap::from([("a.rs".to_owned(), text.to_owned())]));
+    let before = "#[derive(Clone)] pub struct A { pub x: f64, y: u8 }\nimpl A { pub fn x(&self) -> f64 { self.x } }";
+    let lines = list(before);
+    assert_eq!(lines.len(), 2, "{lines:?}");
+    // bodies, private fields' types and comments are nobody's business
+    let same = before.replace("y: u8", "y: u16").replace("{ self.x }", "{ 1.0 }");
+    assert_eq!(list(&same), lines);
+    for other in [
+        before.replace("pub x: f64", "x: f64"),
+        before.replace("-> f64", "-> f32"),
+        before.replace("#[derive(Clone)] ", ""),
+        before.replace("pub fn", "pub(crate) fn"),
+    ] {
+        assert_ne!(list(&other), lines, "{other}");
+    }
 }

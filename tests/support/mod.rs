@@ -2,6 +2,7 @@
 #![allow(dead_code)] // each test file uses its part
 
 pub(crate) mod round_trip;
+pub(crate) mod written;
 
 use std::{
     fmt::Write,
@@ -23,6 +24,14 @@ pub(crate) struct Scratch(TempDir);
 impl Scratch {
     pub(crate) fn new() -> Self {
         Self(tempfile::tempdir().expect("a temporary folder"))
+    }
+
+    /// One where syncing takes no time, if there is such a place.
+    pub(crate) fn in_memory() -> Self {
+        match tempfile::tempdir_in("/dev/shm") {
+            Ok(folder) => Self(folder),
+            Err(_) => Self::new(),
+        }
     }
 
     pub(crate) fn path(&self, name: &str) -> PathBuf {

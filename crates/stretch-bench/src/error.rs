@@ -45,7 +45,9 @@ pub enum BenchError {
         hint: String,
     },
     /// A simulated output was not finite.
-    #[error("{stage}: the simulation gave a number that is not finite")]
+    #[error(
+        "{stage}: the simulation gave a number that is not finite; a parameter of the rig is too large or too small"
+    )]
     NotFinite {
         /// The stage.
         stage: String,

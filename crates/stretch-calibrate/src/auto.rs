@@ -169,7 +169,9 @@ pub fn choose_model(trials: &[Trial], options: &Options) -> Result<ModelChoice, 
         .filter(|&i| good(&found[i]).is_some())
         .min_by(|&a, &b| good(&found[a]).unwrap_or(0.0).total_cmp(&good(&found[b]).unwrap_or(0.0)));
     let Some(best) = best else {
-        return Err(first_problem.unwrap_or(CalibrateError::NoTrials));
+        // a part without a sample has no trial; the user named some
+        let first = first_problem.filter(|problem| !matches!(problem, CalibrateError::NoTrials));
+        return Err(first.unwrap_or(CalibrateError::TooFewToJudge));
     };
     let memory_shows = turning.iter().any(|&t| t);
     let eligible = |kind: ModelKind| memory_shows || !matches!(kind, ModelKind::Remembering { .. });

@@ -11,6 +11,11 @@ pub enum CalibrateError {
     /// No trial at all.
     #[error("there is no trial to calibrate on; name at least one file")]
     NoTrials,
+    /// No model can be judged on samples that were left out of its fit.
+    #[error(
+        "no model can be judged on samples that are left out of its fit: these are too few; record more, or name one with --model"
+    )]
+    TooFewToJudge,
     /// The time stamps give no sample rate.
     #[error("{trial}: {samples} samples are too few to tell a sample rate from; record more")]
     TooShort {
@@ -147,6 +152,17 @@ pub enum CalibrateError {
         file: String,
         /// What is wrong with it, and where.
         problem: String,
+    },
+    /// A log that cannot be held as a whole, for a model that needs that.
+    #[error(
+        "{model} is fitted to a whole log, of at most {most} rows; fit a line or a surface by least squares (--model poly13), or \
+         give fewer rows (--grid HZ, a part of the log)"
+    )]
+    TooLong {
+        /// What was to be fitted.
+        model: String,
+        /// Most rows.
+        most: u64,
     },
     /// A file that cannot be read or written.
     #[error(transparent)]

@@ -149,7 +149,13 @@ impl FitReport {
     }
 }
 
-type Factors = Vec<Factor<f64, MAX_TERMS>>;
+/// A triangle a fold.
+pub(crate) type Factors = Vec<Factor<f64, MAX_TERMS>>;
+
+/// The degree that the order table around a surface asks for; of a line its own.
+pub(crate) fn widest(branch: Option<Branch>, degree: Degree) -> Degree {
+    if branch.is_some() { OrderTable::<f64>::covering(degree) } else { degree }
+}
 
 /// Fits `degree` to samples.
 pub(crate) fn fit(
@@ -160,7 +166,7 @@ pub(crate) fn fit(
     robust: Robust,
 ) -> Result<(FitReport, Surface), CalibrateError> {
     let failed = |cause| CalibrateError::Fit { branch: name, cause };
-    let wide = if branch.is_some() { OrderTable::<f64>::covering(degree) } else { degree };
+    let wide = widest(branch, degree);
     let folds = factors(samples, wide).map_err(failed)?;
     let whole = merged(&folds).map_err(failed)?;
     let mut rejected = None;
@@ -176,6 +182,27 @@ pub(crate) fn fit(
             robust.fit
         }
     };
+    let step = samples.len().div_ceil(CLOUD).max(1);
+    let cloud = samples.iter().step_by(step).map(|s| [s.rate, s.signal, s.target]).collect();
+    told(name, branch, degree, &folds, fitted, Seen { rejected, cloud })
+}
+
+/// What is told of a fit beside its numbers.
+pub(crate) struct Seen {
+    pub rejected: Option<u64>,
+    pub cloud: Vec<[f64; 3]>,
+}
+
+/// The report of a fit, whose folds hold the orders around it, too.
+pub(crate) fn told(
+    name: &'static str,
+    branch: Option<Branch>,
+    degree: Degree,
+    folds: &Factors,
+    fitted: Fit<f64, MAX_TERMS>,
+    Seen { rejected, cloud }: Seen,
+) -> Result<(FitReport, Surface), CalibrateError> {
+    let failed = |cause| CalibrateError::Fit { branch: name, cause };
     let bounds = fitted.confidence(0.95).map_err(failed)?;
     let coefficients = degree
         .exponents()
@@ -193,11 +220,10 @@ pub(crate) fn fit(
         })
         .collect();
     let (orders, recommended) = match branch {
-        Some(_) => orders(&folds, degree).map_err(failed)?,
+        Some(_) => orders(folds, degree).map_err(failed)?,
         None => (Vec::new(), None),
     };
     let model = if branch.is_some() { degree.to_string() } else { "linear".to_owned() };
-    let step = samples.len().div_ceil(CLOUD).max(1);
     let report = FitReport {
         name: name.to_owned(),
         branch,
@@ -212,14 +238,14 @@ pub(crate) fn fit(
         coefficients,
         orders,
         recommended,
-        cloud: samples.iter().step_by(step).map(|s| [s.rate, s.signal, s.target]).collect(),
+        cloud,
         surface: fitted.surface(),
     };
     Ok((report, fitted.surface()))
 }
 
 /// Points in a picture at most.
-const CLOUD: usize = 3000;
+pub(crate) const CLOUD: usize = 3000;
 
 /// One triangle a fold, of the widest degree that the order table asks for.
 fn factors(samples: &[Sample], degree: Degree) -> Result<Factors, FitError> {
@@ -236,7 +262,7 @@ fn factors(samples: &[Sample], degree: Degree) -> Result<Factors, FitError> {
     Ok(factors)
 }
 
-fn merged(folds: &Factors) -> Result<Factor<f64, MAX_TERMS>, FitError> {
+pub(crate) fn merged(folds: &Factors) -> Result<Factor<f64, MAX_TERMS>, FitError> {
     let too_few = FitError::TooFewSamples { needed: 1, got: 0 };
     let (first, rest) = folds.split_first().ok_or(too_few)?;
     let mut whole = *first;

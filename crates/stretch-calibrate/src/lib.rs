@@ -2,9 +2,11 @@
 
 mod apply;
 mod auto;
+mod blocks;
 mod calibrate;
 mod cause;
 mod choose;
+mod clusters;
 mod cost;
 mod diagnosed_fit;
 mod digest;
@@ -15,12 +17,14 @@ mod fixed_record;
 mod history_fit;
 mod knobs;
 mod least_squares;
+mod long;
 mod observer_bounds;
 mod observer_curve;
 mod observer_fit;
 mod observer_model;
 mod options;
 mod own_ranges;
+mod passes;
 mod prepared;
 mod record;
 mod rest;
@@ -32,6 +36,7 @@ mod worth;
 
 pub use apply::{Applied, Faults, LiveReceptor, apply, pressure_column, rate_delay_s};
 pub use auto::{ModelChoice, ModelRow, choose_model};
+pub use blocks::{LONGEST, Log};
 pub use calibrate::{Calibrated, calibrate};
 pub use cause::Cause;
 pub use choose::{Candidate, rank_signals};
@@ -40,11 +45,12 @@ pub use error::CalibrateError;
 pub use evaluate::{Comparison, Evaluation, MethodErrors, TrialErrors, evaluate};
 pub use fitting::{Coefficient, FitReport, Order};
 pub use fixed_record::{BoardReceptor, FixedRecord, RecordNumbers, fixed_record, parse_adc};
+pub use long::{calibrate_long, is_plain};
 pub use options::{Memory, ModelKind, Options, Robust, SpellingError, SplitBy, parse_rate};
 pub use own_ranges::on_own_ranges;
 pub use record::{
-    RecordSummary, calibration_from_json, calibration_seal, calibration_to_json, describe_record,
-    read_calibration, seal_calibration, write_calibration,
+    RecordSummary, calibration_bytes, calibration_from_json, calibration_seal, calibration_to_json,
+    describe_record, read_calibration, seal_calibration, write_calibration,
 };
 pub use wild::without_wild;
 pub use worth::{explains_little, explains_nothing, not_its_own, worse_than_the_mean};

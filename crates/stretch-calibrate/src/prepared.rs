@@ -27,42 +27,18 @@ pub(crate) struct Prepared {
     pub dead: DeadBands,
     pub notes: Vec<String>,
     pub options: Options,
-    first: String,
+    pub first: String,
 }
 
 impl Prepared {
     pub(crate) fn new(trials: &[Trial], options: &Options) -> Result<Self, CalibrateError> {
         let first = trials.first().ok_or(CalibrateError::NoTrials)?;
-        let first_hz = sample_rate_hz(first)?;
-        let sample_rate = SampleRate::new(first_hz)?;
-        let mut pieces = Vec::new();
-        let mut notes = Vec::new();
-        let mut rows = Rows::default();
+        let sample_rate = SampleRate::new(sample_rate_hz(first)?)?;
+        let mut evened = Evened::default();
         for (index, trial) in trials.iter().enumerate() {
-            let rate_hz = sample_rate_hz(trial)?;
-            if (rate_hz / first_hz - 1.0).abs() > 0.05 {
-                let (trial, first) = (trial.name.clone(), first.name.clone());
-                return Err(CalibrateError::SampleRates { trial, rate_hz, first, first_hz });
-            }
-            let mut columns = vec![options.signal.as_str(), options.reference.as_str()];
-            // Only where it was recorded: a cause that needs it says so when it is missing.
-            let has_pressure =
-                options.needs_pressure() && trial.channel(&options.pressure).is_some();
-            columns.extend(has_pressure.then_some(options.pressure.as_str()));
-            let rate_hz = sample_rate.hz();
-            let spec =
-                EvenSpec { rate_hz, shortest: SHORTEST, bridged_s: 0.0, over_switches: true };
-            let even = trial.even(&columns, spec)?;
-            rows.add(even.rows);
-            notes.extend(even.notes);
-            pieces.extend(even.parts.into_iter().filter_map(|part| {
-                let mut columns = part.columns.into_iter();
-                Some((
-                    index,
-                    [columns.next()?, columns.next()?, columns.next().unwrap_or_default()],
-                ))
-            }));
+            evened.take(index, trial, (&first.name, sample_rate), options)?;
         }
+        let Evened { pieces, rows, mut notes } = evened;
         notes.extend(rows.note());
         if pieces.is_empty() {
             let (trial, samples) = (first.name.clone(), first.len());
@@ -74,20 +50,21 @@ impl Prepared {
         });
         let polarity = polarity(pairs.clone());
         let range = |column: &str, zero, values: &mut dyn Iterator<Item = f64>| {
-            pooled_range(column, options.normalisation, zero, values)
+            pooled_range(column, options.normalisation, zero, extent(values))
         };
         let signal_range =
             range(&options.signal, options.zero(), &mut pairs.clone().map(|(v, _)| v))?;
-        let target_range = range(&options.reference, 0.0, &mut pairs.map(|(_, t)| t))?;
+        let target_range = range(&options.reference, 0.0, &mut pairs.map(|(_, t)| t));
+        let target_range = target_range.map_err(|error| match (error, pieces.first()) {
+            // what stands in the file, not the contraction that it is
+            (CalibrateError::Constant { column, .. }, Some((_, [_, reference, _]))) => {
+                let value = reference.first().copied().unwrap_or_default();
+                CalibrateError::Constant { column, value }
+            }
+            (other, _) => other,
+        })?;
         let noise_v = noise(pieces.iter().map(|(_, [v, ..])| v.as_slice()));
-        let signal_dead = match options.dead_band {
-            Some(dead_band) => dead_band,
-            None => 3.0 * noise_v * noise_gain(options.rate, sample_rate)?,
-        };
-        let dead = DeadBands {
-            signal: signal_dead,
-            target: signal_dead * target_range.span() / signal_range.span(),
-        };
+        let dead = dead_bands(options, sample_rate, noise_v, signal_range, target_range)?;
         let series = pieces
             .into_iter()
             .map(|(trial, piece)| series(trial, piece, target, polarity, options.rate, sample_rate))
@@ -143,6 +120,60 @@ impl Prepared {
     }
 }
 
+/// The dead bands: three standard deviations of the rate's noise, where nobody says another.
+pub(crate) fn dead_bands(
+    options: &Options,
+    sample_rate: SampleRate,
+    noise_v: f64,
+    signal_range: Range,
+    target_range: Range,
+) -> Result<DeadBands, CalibrateError> {
+    let signal = match options.dead_band {
+        Some(dead_band) => dead_band,
+        None => 3.0 * noise_v * noise_gain(options.rate, sample_rate)?,
+    };
+    Ok(DeadBands { signal, target: signal * target_range.span() / signal_range.span() })
+}
+
+/// Trials, or their parts between gaps, on the grid of the first, and what became of their rows.
+#[derive(Default)]
+pub(crate) struct Evened {
+    pub pieces: Vec<Piece>,
+    pub rows: Rows,
+    pub notes: Vec<String>,
+}
+
+impl Evened {
+    /// Takes in a trial; `first` says whose grid it is brought to.
+    pub(crate) fn take(
+        &mut self,
+        index: usize,
+        trial: &Trial,
+        (first, sample_rate): (&str, SampleRate),
+        options: &Options,
+    ) -> Result<(), CalibrateError> {
+        let (rate_hz, first_hz) = (sample_rate_hz(trial)?, sample_rate.hz());
+        if (rate_hz / first_hz - 1.0).abs() > 0.05 {
+            let (trial, first) = (trial.name.clone(), first.to_owned());
+            return Err(CalibrateError::SampleRates { trial, rate_hz, first, first_hz });
+        }
+        let mut columns = vec![options.signal.as_str(), options.reference.as_str()];
+        // Only where it was recorded: a cause that needs it says so when it is missing.
+        let has_pressure = options.needs_pressure() && trial.channel(&options.pressure).is_some();
+        columns.extend(has_pressure.then_some(options.pressure.as_str()));
+        let rate_hz = first_hz;
+        let spec = EvenSpec { rate_hz, shortest: SHORTEST, bridged_s: 0.0, over_switches: true };
+        let even = trial.even(&columns, spec)?;
+        self.rows.add(even.rows);
+        self.notes.extend(even.notes);
+        self.pieces.extend(even.parts.into_iter().filter_map(|part| {
+            let mut columns = part.columns.into_iter();
+            Some((index, [columns.next()?, columns.next()?, columns.next().unwrap_or_default()]))
+        }));
+        Ok(())
+    }
+}
+
 /// How well estimates of normalised targets were, summed sample by sample.
 #[derive(Default)]
 pub(crate) struct Tally {
@@ -186,18 +217,18 @@ fn noise_gain(estimator: RateEstimator, rate: SampleRate) -> Result<f64, Calibra
 }
 
 /// Trial; signal, reference and, where it is needed, the pressure.
-type Pieces = [(usize, [Vec<f64>; 3])];
+pub(crate) type Piece = (usize, [Vec<f64>; 3]);
 
-fn target(options: &Options, pieces: &Pieces) -> Result<Target, CalibrateError> {
-    let longest = || {
-        pieces
-            .iter()
-            .flat_map(|(_, [_, reference, _])| reference.iter().copied())
-            .fold(f64::MIN, f64::max)
-    };
+fn target(options: &Options, pieces: &[Piece]) -> Result<Target, CalibrateError> {
+    let all = pieces.iter().flat_map(|(_, [_, reference, _])| reference.iter().copied());
+    target_below(options, all.fold(f64::MIN, f64::max))
+}
+
+/// What is estimated of a reference whose greatest value is `longest`.
+pub(crate) fn target_below(options: &Options, longest: f64) -> Result<Target, CalibrateError> {
     let rest_length = match options.rest_length {
         Some(rest_length) => Some(rest_length),
-        None => options.reference.starts_with("length").then(longest),
+        None => options.reference.starts_with("length").then_some(longest),
     };
     Ok(match rest_length {
         Some(rest_length) => {
@@ -208,13 +239,13 @@ fn target(options: &Options, pieces: &Pieces) -> Result<Target, CalibrateError> 
     })
 }
 
-fn pooled_range(
+/// The range of a column from its extent.
+pub(crate) fn pooled_range(
     column: &str,
     mode: Normalisation,
     zero: f64,
-    values: &mut dyn Iterator<Item = f64>,
+    Interval { min, max }: Interval,
 ) -> Result<Range, CalibrateError> {
-    let Interval { min, max } = extent(values);
     Range::new(RangeSpec { mode, zero, min, max })
         .map_err(|_| CalibrateError::Constant { column: column.to_owned(), value: min })
 }

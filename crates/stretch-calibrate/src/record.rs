@@ -95,13 +95,24 @@ pub fn seal_calibration(path: &Path) -> Result<Calibration, CalibrateError> {
 /// # Errors
 /// [`CalibrateError::Data`] with path and cause.
 pub fn write_calibration(path: &Path, calibration: &Calibration) -> Result<(), CalibrateError> {
+    let bytes = calibration_bytes(path, calibration)?;
+    Ok(write_whole(path, |out| out.write_all(&bytes))?)
+}
+
+/// What the record of a calibration is in a file of that name: postcard when the name ends in
+/// `.postcard`, else JSON.
+///
+/// # Errors
+/// None for a calibration: there is room for the largest, and all of its numbers are finite.
+pub fn calibration_bytes(
+    path: &Path,
+    calibration: &Calibration,
+) -> Result<Vec<u8>, CalibrateError> {
     if is_postcard(path) {
         let mut buffer = [0; POSTCARD_BYTES];
-        let bytes = record::store(&current(calibration.clone()), &mut buffer)?;
-        return Ok(write_whole(path, |out| out.write_all(bytes))?);
+        return Ok(record::store(&current(calibration.clone()), &mut buffer)?.to_vec());
     }
-    let text = calibration_to_json(calibration)?;
-    Ok(write_whole(path, |out| out.write_all(text.as_bytes()))?)
+    Ok(calibration_to_json(calibration)?.into_bytes())
 }
 
 fn read(path: &Path, seal: Seal) -> Result<Calibration, CalibrateError> {

@@ -8,7 +8,7 @@ use crate::series::extent;
 /// At most this share of the rows is called wild: beyond it, two levels that a channel really has
 /// (a muscle held at two lengths) could be taken for values and their outliers. A tenth is what a
 /// location estimate of the simplest kind, the decile mean, still survives.
-const MOST_SHARE: f64 = 0.1;
+pub(crate) const MOST_SHARE: f64 = 0.1;
 
 /// The trials without the rows in which one of `columns` is wild, and a sentence for each column
 /// that had such values.
@@ -39,13 +39,8 @@ pub fn without_wild(trials: &[Trial], columns: &[&str]) -> (Vec<Trial>, Vec<Stri
         let is_wild = |x: f64| x < low || x > high;
         let wild: Vec<f64> = values.iter().copied().filter(|&x| is_wild(x)).collect();
         let Interval { min: least, max: most } = extent(wild.iter().copied());
-        let shown = if least == most { format!("{least}") } else { format!("{least} .. {most}") };
-        told.push(format!(
-            "{} of {} values of {column} are wild ({shown}, all others {low} .. {high}); their rows are left out: see \
-             what the recorder writes where it has no sample",
-            wild.len(),
-            values.len(),
-        ));
+        let counts = (wild.len() as u64, values.len() as u64);
+        told.push(sentence(column, counts, (least, most), (low, high)));
         for trial in &mut kept {
             // a ragged one stays as it is: whoever fits it refuses it
             let own = trial.channel(column).filter(|_| trial.check_lengths().is_ok());
@@ -58,8 +53,22 @@ pub fn without_wild(trials: &[Trial], columns: &[&str]) -> (Vec<Trial>, Vec<Stri
     (kept, told)
 }
 
+/// What to say of the wild values of a column, so many of so many, from their least to their greatest.
+pub(crate) fn sentence(
+    column: &str,
+    (wild, of): (u64, u64),
+    (least, most): (f64, f64),
+    (low, high): (f64, f64),
+) -> String {
+    let shown = if least == most { format!("{least}") } else { format!("{least} .. {most}") };
+    format!(
+        "{wild} of {of} values of {column} are wild ({shown}, all others {low} .. {high}); their rows are left out: see \
+         what the recorder writes where it has no sample"
+    )
+}
+
 /// From the least to the greatest value that is not wild; none where no value is.
-fn span(values: &[f64]) -> Option<(f64, f64)> {
+pub(crate) fn span(values: &[f64]) -> Option<(f64, f64)> {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
     let most = (MOST_SHARE * sorted.len() as f64) as usize;
@@ -89,7 +98,7 @@ fn span(values: &[f64]) -> Option<(f64, f64)> {
     (low < high && (from > 0 || to + 1 < sorted.len())).then_some((low, high))
 }
 
-fn rows(trial: &Trial, stays: &[bool]) -> Trial {
+pub(crate) fn rows(trial: &Trial, stays: &[bool]) -> Trial {
     let kept = |values: &[f64]| {
         values.iter().zip(stays).filter(|(_, stays)| **stays).map(|(x, _)| *x).collect()
     };

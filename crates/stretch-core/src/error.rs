@@ -71,6 +71,10 @@ impl DesignError {
 impl fmt::Display for DesignError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
+            // hundreds of digits say no more
+            Self::OutOfRange { field, value } if value.abs() >= 1e16 && value.is_finite() => {
+                write!(f, "{field} is {value:e}, which is outside what it may be")
+            }
             Self::OutOfRange { field, value } => {
                 write!(f, "{field} is {value}, which is not finite or outside what it may be")
             }

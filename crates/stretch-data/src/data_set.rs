@@ -8,7 +8,9 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    DataError, ReadOptions, Recording, RigFile, TomlFile, TomlView, Trial, nearest,
+    DataError, ReadOptions, Recording, RigFile, TomlFile, TomlView, Trial,
+    digest::{digest_of, is_digest},
+    nearest,
     toml_text::{number_text, string_text},
     write_folder, write_whole,
 };
@@ -43,6 +45,9 @@ pub struct TrialEntry {
     pub start_s: f64,
     /// Whether it may be fitted or only tested on.
     pub split: Split,
+    /// Digest of the file that the data set was written with; what was recorded by hand has none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub digest: Option<String>,
 }
 
 /// What was done in a trial.
@@ -126,12 +131,49 @@ impl DataSet {
         self.trials.iter().filter(move |entry| entry.split == split)
     }
 
+    /// A sentence with both where the stamps of a trial say another rate than [`DataSet::rate_hz`], by more than a twentieth.
+    ///
+    /// ```
+    /// use stretch_data::{DataSet, Trial};
+    /// let set = DataSet { name: "b".into(), rate_hz: 250.0, rig: None, trials: Vec::new() };
+    /// let time_s = (0..50).map(|n| 0.01 * f64::from(n)).collect();
+    /// let trial = Trial { name: "a.csv".into(), time_s, ..Trial::default() };
+    /// let told = set.rate_told(&trial).expect("they differ");
+    /// assert!(told.contains("rate_hz = 250") && told.contains("100.00 Hz"), "{told}");
+    /// assert_eq!(DataSet { rate_hz: 100.0, ..set }.rate_told(&trial), None);
+    /// ```
+    pub fn rate_told(&self, trial: &Trial) -> Option<String> {
+        let stamped_hz = trial.rate_hz()?;
+        let differs = (stamped_hz / self.rate_hz - 1.0).abs() > 0.05;
+        differs.then(|| {
+            format!(
+                "dataset.toml says rate_hz = {}, the stamps of {} say {stamped_hz:.2} Hz: the stamps are believed; correct \
+                 whichever is wrong",
+                self.rate_hz, trial.name
+            )
+        })
+    }
+
     /// The rig file beside it, if it names one.
     ///
     /// # Errors
     /// As [`RigFile::read`].
     pub fn read_rig(&self, folder: impl AsRef<Path>) -> Result<Option<RigFile>, DataError> {
         self.rig.as_ref().map(|rig| RigFile::read(folder.as_ref().join(rig))).transpose()
+    }
+
+    /// Takes down the digest of each trial's file in a folder: from then on a trial that was put
+    /// there from another data set is refused when it is loaded.
+    ///
+    /// # Errors
+    /// [`DataError::Io`] for a file that cannot be read.
+    pub fn take_digests(&mut self, folder: impl AsRef<Path>) -> Result<(), DataError> {
+        for entry in &mut self.trials {
+            let path = folder.as_ref().join(&entry.file);
+            let digest = digest_of(&path);
+            entry.digest = Some(digest.map_err(|e| DataError::io(path.display(), "read it", e))?);
+        }
+        Ok(())
     }
 
     /// Writes `dataset.toml` into a folder that exists, whole or not at all.
@@ -190,6 +232,9 @@ impl DataSet {
             }
             writeln!(out, "start_s = {}", number_text(entry.start_s))?;
             writeln!(out, "split = {}", string_text(entry.split.name()))?;
+            if let Some(digest) = &entry.digest {
+                writeln!(out, "digest = {}", string_text(digest))?;
+            }
         }
         Ok(())
     }
@@ -234,7 +279,13 @@ fn entry(view: &TomlView<'_>) -> Result<TrialEntry, DataError> {
     if let Some(opening) = opening.filter(|opening| !(0.0..=1.0).contains(opening)) {
         return view.fail("opening", format!("{opening} is not between 0 and 1"));
     }
+    let digest = view.optional_text("digest")?.map(str::to_owned);
+    if let Some(digest) = digest.as_deref().filter(|digest| !is_digest(digest)) {
+        let form = "write crc32c and eight hexadecimal digits, or leave it out";
+        return view.fail("digest", format!("{digest:?} is no digest; {form}"));
+    }
     Ok(TrialEntry {
+        digest,
         file,
         kind: choice(view, "kind", &TrialKind::ALL, TrialKind::name)?,
         opening,
@@ -291,9 +342,31 @@ impl TrialEntry {
         folder: impl AsRef<Path>,
         options: &ReadOptions,
     ) -> Result<Recording, DataError> {
-        let mut recording = Recording::read(folder.as_ref().join(&self.file), options)?;
+        let path = folder.as_ref().join(&self.file);
+        self.check_digest(folder.as_ref(), &path)?;
+        let mut recording = Recording::read(path, options)?;
         recording.trial.name.clone_from(&self.file);
         Ok(recording)
+    }
+}
+
+impl TrialEntry {
+    /// Whether the file is the one that the data set was written with, where that is known.
+    fn check_digest(&self, folder: &Path, path: &Path) -> Result<(), DataError> {
+        let Some(written) = &self.digest else { return Ok(()) };
+        let found = digest_of(path).map_err(|e| DataError::io(path.display(), "open it", e))?;
+        if found == *written {
+            return Ok(());
+        }
+        let file = &self.file;
+        Err(DataError::Key {
+            file: folder.join(FILE).display().to_string(),
+            table: format!("the [[trial]] of {file}"),
+            key: "digest".to_owned(),
+            problem: format!(
+                "{file} is not the file that this data set was written with ({found}): files of two data sets may be mixed in this folder; write it anew, or remove this line if {file} was changed on purpose"
+            ),
+        })
     }
 }
 

@@ -336,12 +336,10 @@ pub enum DataError {
         /// What is wrong.
         problem: String,
     },
-    /// A folder that exists and may not be written to.
-    #[error(
-        "{path}: it exists; choose another folder, or force it to replace the files of the same name"
-    )]
+    /// Something that is in the way of a folder.
+    #[error("{path}: it exists and is not an empty folder; choose another name")]
     Exists {
-        /// The folder.
+        /// What is there.
         path: String,
     },
     /// Stopped by [`interrupt`](crate::interrupt).

@@ -50,12 +50,18 @@ impl DataSet {
         folder: impl AsRef<Path>,
         options: &ReadOptions,
     ) -> Result<Vec<SessionTrial>, DataError> {
+        let mut is_told = false;
         let load = |entry: &crate::TrialEntry| {
+            let mut recording = entry.load_recording(&folder, options)?;
+            // once for all trials: what is wrong is one line of dataset.toml
+            let told = self.rate_told(&recording.trial).filter(|_| !is_told);
+            is_told |= told.is_some();
+            recording.notes.extend(told);
             Ok(SessionTrial {
                 kind: entry.kind,
                 start_s: entry.start_s,
                 split: entry.split,
-                ..entry.load_recording(&folder, options)?.into()
+                ..recording.into()
             })
         };
         self.trials.iter().map(load).collect()

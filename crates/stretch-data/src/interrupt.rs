@@ -2,15 +2,15 @@
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
 
-use crate::DataError;
+use crate::{DataError, temporary::remove_unfinished};
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 static OPEN: AtomicUsize = AtomicUsize::new(0);
 
 /// Tells every writer to stop and clean up, and says how many are open.
 ///
-/// A signal handler calls it. At 0 no writer is open and none can open any more, so the
-/// handler may leave the process at once; otherwise the writers fail with
+/// A signal handler calls it. At 0 no writer is open and none can open any more, and folders that
+/// were being built are gone, so the handler may leave the process at once; otherwise the writers fail with
 /// [`DataError::Interrupted`] at their next write, nothing half-written stays, and the
 /// program leaves when that error reaches it:
 ///
@@ -24,7 +24,11 @@ pub fn interrupt() -> usize {
     // Stored before the count is read; a writer counts itself before it reads the flag:
     // one of the two always sees the other.
     INTERRUPTED.store(true, SeqCst);
-    writers_open()
+    let open = writers_open();
+    if open == 0 {
+        remove_unfinished();
+    }
+    open
 }
 
 /// Whether [`interrupt`] was called: long work inside a writer's closure may ask.
@@ -32,7 +36,7 @@ pub fn interrupted() -> bool {
     INTERRUPTED.load(SeqCst)
 }
 
-/// How many files and folders are being written.
+/// How many files are being written, and folders being given their names.
 pub fn writers_open() -> usize {
     OPEN.load(SeqCst)
 }

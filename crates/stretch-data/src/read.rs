@@ -79,6 +79,8 @@ pub(crate) struct Columns {
     divisor: f64,
     /// What the time column counts from.
     origin: f64,
+    /// The last time of what was cut off.
+    previous_s: Option<f64>,
     time_s: Vec<f64>,
     kept: Vec<(usize, Vec<f64>)>,
 }
@@ -110,6 +112,7 @@ impl Columns {
             time_column: options.time_column().to_owned(),
             divisor: options.time_divisor(),
             origin: 0.0,
+            previous_s: None,
             time_s: Vec::new(),
             kept,
         })
@@ -128,7 +131,7 @@ impl Columns {
     #[inline]
     pub(crate) fn push(&mut self, file: &str, row: u64, values: &[f64]) -> Result<(), DataError> {
         let time_s = (values[self.time] - self.origin) / self.divisor;
-        if let Some(&previous_s) = self.time_s.last()
+        if let Some(previous_s) = self.time_s.last().copied().or(self.previous_s)
             && time_s <= previous_s
         {
             let at = Place { file: file.to_owned(), row, column: self.time_column.clone() };
@@ -158,16 +161,20 @@ impl Columns {
         }
     }
 
-    pub(crate) fn into_trial(self, file: &str, header: &Header) -> Result<Trial, DataError> {
+    /// What there is so far; rows go on behind it.
+    pub(crate) fn cut(&mut self, file: &str, header: &Header) -> Trial {
+        self.previous_s = self.time_s.last().copied().or(self.previous_s);
+        let kept = self.kept.iter_mut().map(|(i, values)| (*i, std::mem::take(values)));
+        let channel = |(i, values): (usize, _)| Channel { name: header.names[i].clone(), values };
+        let channels = kept.map(channel).collect();
+        Trial { name: file.to_owned(), time_s: std::mem::take(&mut self.time_s), channels }
+    }
+
+    pub(crate) fn into_trial(mut self, file: &str, header: &Header) -> Result<Trial, DataError> {
         if self.time_s.is_empty() {
             return Err(DataError::HeaderOnly { file: file.to_owned() });
         }
-        let channels = self
-            .kept
-            .into_iter()
-            .map(|(i, values)| Channel { name: header.names[i].clone(), values })
-            .collect();
-        Ok(Trial { name: file.to_owned(), time_s: self.time_s, channels })
+        Ok(self.cut(file, header))
     }
 }
 

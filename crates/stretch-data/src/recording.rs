@@ -2,6 +2,7 @@
 
 #[cfg(any(feature = "npz", feature = "mat", feature = "hdf5"))]
 mod arrays;
+mod blocks;
 #[cfg(feature = "mcap")]
 mod cdr;
 mod clock;
@@ -15,6 +16,8 @@ pub(crate) mod live;
 mod mat;
 #[cfg(feature = "mcap")]
 mod mcap;
+#[cfg(feature = "mcap")]
+mod mcap_messages;
 #[cfg(feature = "mcap")]
 mod messages;
 mod names;

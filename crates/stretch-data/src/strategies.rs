@@ -102,6 +102,7 @@ pub fn data_set() -> impl Strategy<Value = DataSet> {
                 opening,
                 start_s,
                 split: if test { Split::Test } else { Split::Fit },
+                digest: (i % 2 == 1).then(|| format!("crc32c {i:08x}")),
             };
             let trials = entries.into_iter().enumerate().map(trial).collect();
             DataSet { name, rate_hz, rig: rig.then(|| "rig.toml".to_owned()), trials }

@@ -40,7 +40,7 @@ impl Trial {
             return fail("it has no sample".to_owned());
         }
         for (i, Channel { name, .. }) in self.channels.iter().enumerate() {
-            if name.trim().is_empty() || name == "time_s" || name.contains(char::is_control) {
+            if !can_name(name) {
                 return fail(format!("{name:?} cannot be the name of a channel"));
             }
             if self.channels[..i].iter().any(|other| other.name == *name) {
@@ -101,4 +101,9 @@ pub(crate) fn push_name(line: &mut Vec<u8>, name: &str) {
     } else {
         line.extend_from_slice(name.as_bytes());
     }
+}
+
+/// Whether a channel can be called so: a name that is there, no control characters, and not the time's.
+pub(crate) fn can_name(name: &str) -> bool {
+    !(name.trim().is_empty() || name == "time_s" || name.contains(char::is_control))
 }

@@ -1,7 +1,7 @@
 //! A file that is written whole or not at all.
 
 use std::{
-    fs::{self, File, OpenOptions},
+    fs,
     io::{self, BufWriter, Write},
     path::{Path, PathBuf},
 };
@@ -10,7 +10,10 @@ use tempfile::{Builder, NamedTempFile};
 
 use crate::{
     DataError,
+    disk::{self, DiskCall, ask},
     interrupt::{Open, check, interrupted},
+    stream,
+    temporary::without_path,
 };
 
 /// Writes a file whole or not at all.
@@ -19,8 +22,11 @@ use crate::{
 /// only when everything has reached the disk. On any error (a full disk, a folder that may
 /// not be written to, [`interrupt`](crate::interrupt), an error of `fill`) the temporary file
 /// goes and what stood under the target's name still stands. A symbolic link stays one: the
-/// file that it points to is replaced. Devices and pipes (`/dev/stdout`) are written to
-/// directly. Output is buffered. The path `-` is standard output.
+/// file that it points to is replaced. Output is buffered.
+///
+/// The path `-` is standard output, and so is `/dev/stdout`. Pipes and devices are written to as
+/// the bytes come; a pipe that nobody reads is refused after two seconds, and so are standard
+/// input and disks. Several files that belong together: [`Outputs`](crate::Outputs).
 ///
 /// # Errors
 /// [`DataError::Io`] with path and cause, or [`DataError::Interrupted`].
@@ -38,83 +44,95 @@ pub fn write_whole(
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), DataError> {
     let path = path.as_ref();
-    let shown = path.display();
-    let _open = Open::new(&shown)?;
-    if path.as_os_str() == "-" {
-        let mut out = BufWriter::new(Stoppable(io::stdout().lock()));
-        let written = fill(&mut out).and_then(|()| out.flush());
-        return written.map_err(|cause| DataError::io("standard output", "write it", cause));
-    }
-    let result = match target(path)? {
-        Target::Direct => write_direct(path, fill),
-        Target::Replace(real) => replace(&real, fill),
-    };
-    result.map_err(|cause| {
-        // A writer that was stopped fails with some error; the reason is the interrupt.
-        match check(&shown) {
-            Err(interrupted) => interrupted,
-            Ok(()) => DataError::io(shown, "write it", cause),
+    match target(path)? {
+        Target::Stream(stream) => write_stream(path, stream, fill),
+        Target::File(real) => {
+            let _open = Open::new(&path.display())?;
+            let whole = stage(&real, fill).and_then(|file| replace(file, &real));
+            whole.map_err(|cause| cannot_write(path, cause))
         }
-    })
+    }
 }
 
-enum Target {
-    Direct,
-    Replace(PathBuf),
+/// What stands at a path, and which file is behind it.
+pub(crate) enum Target {
+    Stream(Box<dyn Write>),
+    File(PathBuf),
 }
 
-/// What stands at the path, and which file is behind it.
-fn target(path: &Path) -> Result<Target, DataError> {
+pub(crate) fn target(path: &Path) -> Result<Target, DataError> {
+    check(&path.display())?;
     let fail = |cause| DataError::io(path.display(), "write it", cause);
     let meta = match fs::metadata(path) {
-        Ok(meta) => meta,
-        Err(e) if e.kind() == io::ErrorKind::NotFound => {
-            return Ok(Target::Replace(path.to_owned()));
-        }
+        Ok(meta) if meta.is_dir() => return Err(fail(io::Error::other("it is a folder"))),
+        Ok(meta) => Some(meta),
+        Err(e) if e.kind() == io::ErrorKind::NotFound => None,
         Err(e) => return Err(fail(e)),
     };
-    if meta.is_dir() {
-        return Err(fail(io::Error::other("it is a folder")));
+    if let Some(stream) = stream::open(path, meta.as_ref()).map_err(fail)? {
+        return Ok(Target::Stream(stream));
     }
-    if !meta.is_file() || path.starts_with("/dev") || path.starts_with("/proc") {
-        return Ok(Target::Direct);
-    }
+    let Some(meta) = meta else { return Ok(Target::File(path.to_owned())) };
     if meta.permissions().readonly() {
         return Err(fail(io::Error::other("it is read-only")));
     }
-    fs::canonicalize(path).map(Target::Replace).map_err(fail)
+    fs::canonicalize(path).map(Target::File).map_err(fail)
 }
 
-fn write_direct(
+/// What `fill` writes, as it comes: nothing has to be cleaned up, so Ctrl-C need not wait.
+pub(crate) fn write_stream(
     path: &Path,
+    stream: Box<dyn Write>,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> io::Result<()> {
-    let file = OpenOptions::new().write(true).open(path)?;
-    let mut out = BufWriter::new(Stoppable(file));
-    fill(&mut out)?;
-    out.flush()
+) -> Result<(), DataError> {
+    let mut out = BufWriter::new(Stoppable(stream));
+    let written = fill(&mut out).and_then(|()| out.flush());
+    // what nobody took is not tried again
+    let _ = out.into_parts();
+    let is_stdout = stream::is_standard_output(path);
+    written.map_err(|cause| match is_stdout {
+        true => DataError::io("standard output", "write it", cause),
+        false => cannot_write(path, cause),
+    })
 }
 
-fn replace(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
-    let folder = folder_of(path);
-    let temporary = temporary_file(folder)?;
-    let mut out = BufWriter::with_capacity(1 << 16, Stoppable(temporary));
+/// A file beside the target that holds everything, on the disk.
+pub(crate) fn stage(
+    real: &Path,
+    fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<NamedTempFile> {
+    let mut out = BufWriter::with_capacity(1 << 16, Stoppable(temporary_file(folder_of(real))?));
     fill(&mut out)?;
     out.flush()?;
     let Stoppable(temporary) = out.into_inner().map_err(io::IntoInnerError::into_error)?;
-    if let Ok(meta) = fs::metadata(path) {
+    if let Ok(meta) = fs::metadata(real) {
         temporary.as_file().set_permissions(meta.permissions())?;
     }
-    temporary.as_file().sync_all()?;
+    disk::sync(temporary.as_file())?;
+    Ok(temporary)
+}
+
+/// Gives a staged file its name.
+fn replace(file: NamedTempFile, real: &Path) -> io::Result<()> {
     if interrupted() {
         return Err(io::Error::other("interrupted"));
     }
-    temporary.persist(path).map_err(|e| e.error)?;
-    sync_folder(folder);
+    ask(DiskCall::Rename)?;
+    file.persist(real).map_err(|e| e.error)?;
+    disk::sync_folder(folder_of(real));
     Ok(())
 }
 
+/// A writer that was stopped fails with some error; the reason is the interrupt.
+pub(crate) fn cannot_write(path: &Path, cause: io::Error) -> DataError {
+    match check(&path.display()) {
+        Err(interrupted) => interrupted,
+        Ok(()) => DataError::io(path.display(), "write it", cause),
+    }
+}
+
 fn temporary_file(folder: &Path) -> io::Result<NamedTempFile> {
+    ask(DiskCall::Create)?;
     let mut builder = Builder::new();
     builder.prefix(".stretch-").suffix(".tmp");
     #[cfg(unix)]
@@ -126,28 +144,11 @@ fn temporary_file(folder: &Path) -> io::Result<NamedTempFile> {
     builder.tempfile_in(folder).map_err(without_path)
 }
 
-/// The cause alone: the name of a temporary file would only puzzle.
-pub(crate) fn without_path(error: io::Error) -> io::Error {
-    let text = error.to_string();
-    match text.rsplit_once(" at path ") {
-        Some((cause, _)) => io::Error::new(error.kind(), cause.to_owned()),
-        None => error,
-    }
-}
-
 /// The folder that a path stands in.
 pub(crate) fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
-    }
-}
-
-/// Makes a rename durable, where the system can.
-pub(crate) fn sync_folder(folder: &Path) {
-    if let Ok(folder) = File::open(folder) {
-        // Not every file system syncs folders; the rename itself has happened.
-        let _ = folder.sync_all();
     }
 }
 
@@ -159,10 +160,11 @@ impl<W: Write> Write for Stoppable<W> {
         if interrupted() {
             return Err(io::Error::other("interrupted"));
         }
-        self.0.write(bytes)
+        ask(DiskCall::Write)?;
+        self.0.write(bytes).map_err(without_path)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.0.flush()
+        self.0.flush().map_err(without_path)
     }
 }

@@ -3,8 +3,8 @@
 use std::{fs, io, path::Path};
 
 use stretch_data::{
-    Channel, DataError, DataSet, Split, Trial, TrialEntry, TrialKind, write_folder, write_whole,
-    writers_open,
+    Channel, DataError, DataSet, Outputs, Split, Trial, TrialEntry, TrialKind, write_folder,
+    write_whole, writers_open,
 };
 
 fn names(folder: &Path) -> Vec<String> {
@@ -123,10 +123,7 @@ fn a_folder_is_refused_or_filled_and_nothing_else_goes() {
     let error = write_folder(&out, false, two_files).expect_err("exists");
     assert_eq!(
         error.to_string(),
-        format!(
-            "{}: it exists; choose another folder, or force it to replace the files of the same name",
-            out.display()
-        )
+        format!("{}: it exists and is not an empty folder; choose another name", out.display())
     );
     assert_eq!(fs::read(out.join("a")).expect("there"), b"old a");
     write_folder(&out, true, two_files).expect("forced");
@@ -166,6 +163,7 @@ fn a_data_set_comes_back() {
         opening: None,
         start_s: 2.5,
         split,
+        digest: None,
     };
     let set = DataSet {
         name: "bench \"07\"".to_owned(),
@@ -192,4 +190,151 @@ fn a_data_set_comes_back() {
         "a.csv, row 3, column time_s: \"NaN\" is not a finite number; correct it or remove that row"
     );
     assert_eq!(DataSet::read(&out).expect("still there"), set);
+}
+
+#[test]
+fn what_is_the_users_comes_along_and_what_the_last_data_set_was_goes() {
+    let parent = tempfile::tempdir().expect("a folder");
+    let out = parent.path().join("set");
+    let entry = |file: &str| TrialEntry {
+        file: file.to_owned(),
+        kind: TrialKind::Other,
+        opening: None,
+        start_s: 0.0,
+        split: Split::Fit,
+        digest: None,
+    };
+    let write = |files: &[&str], length_mm: f64| {
+        let mut set = DataSet {
+            name: "bench".to_owned(),
+            rate_hz: 100.0,
+            rig: None,
+            trials: files.iter().map(|file| entry(file)).collect(),
+        };
+        write_folder(&out, true, |folder| {
+            for file in files {
+                let channel =
+                    Channel { name: "length_mm".to_owned(), values: vec![length_mm, 181.0] };
+                let time_s = vec![0.0, 0.01];
+                Trial { name: (*file).to_owned(), time_s, channels: vec![channel] }
+                    .write(folder.join(file))?;
+            }
+            set.take_digests(folder)?;
+            set.write(folder)
+        })
+    };
+    write(&["a.csv", "b.csv", "c.csv"], 180.0).expect("written");
+    fs::write(out.join("b.csv"), "edited by hand").expect("written");
+    fs::create_dir_all(out.join("own/deep")).expect("made");
+    fs::write(out.join("own/deep/notes.txt"), "mine").expect("written");
+    write(&["a.csv"], 170.0).expect("written");
+    assert_eq!(names(&out), ["a.csv", "b.csv", "dataset.toml", "own"]);
+    assert_eq!(fs::read_to_string(out.join("own/deep/notes.txt")).expect("there"), "mine");
+    assert_eq!(fs::read_to_string(out.join("b.csv")).expect("there"), "edited by hand");
+
+    // A trial of another data set under the name of one of this one.
+    let set = DataSet::read(&out).expect("read");
+    set.trials[0].load(&out, &Default::default()).expect("its own");
+    fs::write(out.join("a.csv"), "time_s,length_mm\n0,180\n0.01,181\n").expect("written");
+    let error = set.trials[0].load(&out, &Default::default()).expect_err("not its own");
+    for part in ["dataset.toml", "a.csv", "two data sets may be mixed", "remove this line"] {
+        assert!(error.to_string().contains(part), "{error}");
+    }
+    // What is written by hand has no digest.
+    let mut by_hand = set.trials[0].clone();
+    by_hand.digest = None;
+    by_hand.load(&out, &Default::default()).expect("read");
+}
+
+#[test]
+fn the_folder_one_is_in_is_not_replaced() {
+    let here = std::env::current_dir().expect("a folder");
+    let before = names(&here);
+    let error = write_folder(&here, true, |_| Ok::<_, DataError>(())).expect_err("here");
+    assert!(error.to_string().contains("in which a program is run"), "{error}");
+    assert_eq!(names(&here), before);
+}
+
+#[test]
+fn an_empty_folder_is_filled_and_a_file_is_in_the_way() {
+    let parent = tempfile::tempdir().expect("a folder");
+    let out = parent.path().join("set");
+    fs::create_dir(&out).expect("made");
+    write_folder(&out, false, two_files).expect("it was empty");
+    assert_eq!(names(&out), ["a", "sub"]);
+    fs::write(parent.path().join("file"), "mine").expect("written");
+    for force in [false, true] {
+        write_folder(parent.path().join("file"), force, two_files).expect_err("a file");
+    }
+    assert_eq!(fs::read_to_string(parent.path().join("file")).expect("there"), "mine");
+    assert_eq!(names(parent.path()), ["file", "set"]);
+}
+
+#[test]
+fn of_two_writers_at_once_one_has_written_all() {
+    let parent = tempfile::tempdir().expect("a folder");
+    for force in [false, true] {
+        let out = parent.path().join(format!("set_{force}"));
+        if force {
+            fs::create_dir(&out).expect("made");
+            fs::write(out.join("mine"), "mine").expect("written");
+        }
+        let write = |who: &str| {
+            write_folder(&out, force, |folder| {
+                for name in ["a", "b", "c"] {
+                    write_whole(folder.join(name), |file| file.write_all(who.as_bytes()))?;
+                }
+                Ok::<_, DataError>(())
+            })
+        };
+        let results: Vec<_> = std::thread::scope(|scope| {
+            let writers =
+                ["one", "two", "three", "four"].map(|who| scope.spawn(move || write(who)));
+            writers.into_iter().map(|writer| writer.join().expect("no panic")).collect()
+        });
+        let done = results.iter().filter(|result| result.is_ok()).count();
+        assert!(if force { done == 4 } else { done == 1 }, "{results:?}");
+        for failed in results.iter().filter_map(|result| result.as_ref().err()) {
+            assert!(matches!(failed, DataError::Exists { .. }), "{failed}");
+        }
+        let whose = ["a", "b", "c"].map(|name| fs::read(out.join(name)).expect("there"));
+        assert!(whose[0] == whose[1] && whose[1] == whose[2], "mixed");
+        assert_eq!(out.join("mine").exists(), force);
+    }
+    assert_eq!(names(parent.path()).len(), 2, "nothing stays beside them");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_is_written_to_and_one_without_a_reader_is_refused() {
+    use std::process::Command;
+    let folder = tempfile::tempdir().expect("a folder");
+    let pipe = folder.path().join("pipe");
+    if !Command::new("mkfifo").arg(&pipe).status().is_ok_and(|status| status.success()) {
+        println!("SKIPPED: there is no mkfifo");
+        return;
+    }
+    let error = write_whole(&pipe, |out| out.write_all(b"x")).expect_err("nobody reads");
+    assert!(error.to_string().contains("a pipe that nobody reads"), "{error}");
+    let read = std::thread::spawn({
+        let pipe = pipe.clone();
+        move || fs::read(pipe).expect("read")
+    });
+    // more than a pipe holds, so that it waits for its reader
+    let text = vec![b'x'; 1 << 18];
+    write_whole(&pipe, |out| out.write_all(&text)).expect("written");
+    assert!(read.join().expect("no panic") == text);
+    let read = std::thread::spawn({
+        let pipe = pipe.clone();
+        move || fs::read(pipe).expect("read")
+    });
+    let mut outputs = Outputs::default();
+    outputs.file(&pipe, |out| out.write_all(b"streamed")).expect("kept");
+    outputs.file(folder.path().join("file"), |out| out.write_all(b"whole")).expect("staged");
+    outputs.keep().expect("written");
+    assert_eq!(read.join().expect("no panic"), b"streamed");
+    use std::os::unix::fs::FileTypeExt;
+    assert!(fs::metadata(&pipe).expect("there").file_type().is_fifo(), "still a pipe");
+    let error = write_whole("/dev/stdin", |_| Ok(())).expect_err("it is read");
+    assert!(error.to_string().contains("standard input, which is read"), "{error}");
 }

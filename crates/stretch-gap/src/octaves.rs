@@ -48,10 +48,12 @@ impl Octaves {
         }
     }
 
-    /// At equal noise transmitted, as mean squares are: `own` is what the hypothesis lets through; a tenth stays at least.
-    pub(crate) fn at_equal_noise(mut self, nominal: &Self, own: &Self) -> Self {
+    /// At equal noise transmitted, as mean squares are: `own` is what the hypothesis lets through, `larger` what noise that it does not
+    /// is multiplied by; a tenth stays at least.
+    pub(crate) fn at_equal_noise(mut self, nominal: &Self, own: &Self, larger: f64) -> Self {
         for ((x, nominal), own) in self.sums.iter_mut().zip(nominal.sums).zip(own.sums) {
-            *x = (*x + nominal - own).max(0.1 * *x);
+            let known = if nominal > own { larger } else { 1.0 };
+            *x = (*x + known * (nominal - own)).max(0.1 * *x);
         }
         self
     }

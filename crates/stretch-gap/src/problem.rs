@@ -172,7 +172,8 @@ impl<'a> Problem<'a> {
             let nominal = &self.transmitted[stage];
             if nominal.fit > 0.0 && fitted.model.effects.iter().any(acts) {
                 let own = self.compare.transmitted(stage, &fitted.model)?;
-                *misfit = misfit.at_equal_noise(nominal, &own);
+                let gap = self.gap_in(&self.nominal, stage);
+                *misfit = misfit.at_equal_noise(nominal, &own, gap);
             }
         }
         Ok(fitted)

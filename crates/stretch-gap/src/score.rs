@@ -43,6 +43,8 @@ pub(crate) struct Observations {
     pub(crate) held: f64,
 }
 
+/// Share by which the noise of an input may be larger than was taken: heavy tails pass for little where a robust deviation is asked.
+const LARGER: f64 = 0.5;
 /// Share of a mean square that is left at least when noise is taken from it.
 const LEAST_KEPT: f64 = 0.1;
 
@@ -66,14 +68,19 @@ impl Misfit {
     ///
     /// X holds what arrives of that noise at the output. A slow amplifier or a slipping sleeve transmits less of it, and would
     /// win wherever the input is noisy, whether it exists or not. So hypotheses are compared at equal noise transmitted:
-    /// X + T_nominal - T, where T is the noise transmitted, in floors.
-    pub(crate) fn at_equal_noise(self, nominal: &Self, own: &Self) -> Self {
+    /// X + k (T_nominal - T), where T is the noise transmitted, in floors. It is known to a factor only, and a gap may be noise that is
+    /// larger than was taken: k is what would make the nominal's gap of it, [`LARGER`] at most, where less is transmitted.
+    pub(crate) fn at_equal_noise(self, nominal: &Self, own: &Self, gap: f64) -> Self {
+        let larger = 1.0 + (gap / nominal.fit.max(f64::MIN_POSITIVE)).min(LARGER);
         // Where the noise is known too large, more could be taken away than there is.
-        let level = |x: f64, nominal: f64, own: f64| (x + nominal - own).max(LEAST_KEPT * x);
+        let level = |x: f64, nominal: f64, own: f64| {
+            let known = if nominal > own { larger } else { 1.0 };
+            (x + known * (nominal - own)).max(LEAST_KEPT * x)
+        };
         Self {
             fit: level(self.fit, nominal.fit, own.fit),
             held: level(self.held, nominal.held, own.held),
-            octaves: self.octaves.at_equal_noise(&nominal.octaves, &own.octaves),
+            octaves: self.octaves.at_equal_noise(&nominal.octaves, &own.octaves, larger),
             ..self
         }
     }
@@ -138,8 +145,12 @@ mod tests {
     #[test]
     fn what_is_transmitted_less_is_no_better_fit() {
         let of = |x: f64| Misfit { fit: x, held: x, ..Misfit::default() };
-        let level = of(1.2).at_equal_noise(&of(0.5), &of(0.2));
-        approx::assert_relative_eq!(level.fit, 1.5, max_relative = F64_ROUNDING);
-        assert_eq!(of(1.0).at_equal_noise(&of(0.0), &of(5.0)).held, LEAST_KEPT);
+        let level = |gap| of(1.2).at_equal_noise(&of(0.5), &of(0.2), gap).fit;
+        approx::assert_relative_eq!(level(0.0), 1.5, max_relative = F64_ROUNDING);
+        // A gap of a tenth could be noise a fifth larger; one of ten floors could not.
+        approx::assert_relative_eq!(level(0.1), 1.56, max_relative = F64_ROUNDING);
+        approx::assert_relative_eq!(level(10.0), 1.65, max_relative = F64_ROUNDING);
+        // What transmits more is helped by no doubt.
+        assert_eq!(of(1.0).at_equal_noise(&of(0.0), &of(5.0), 9.0).held, LEAST_KEPT);
     }
 }

@@ -120,6 +120,7 @@ impl Session {
             opening: plan.opening,
             start_s,
             split: plan.split,
+            digest: None,
         };
         let names = ["inlet", "outlet", "pressure_kpa", "length_mm", "bridge_v"];
         let columns = [plan.inlet.clone(), plan.outlet.clone()].into_iter().chain(out);

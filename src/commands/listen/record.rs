@@ -1,8 +1,8 @@
 //! The trial that is recorded: a line a sample, on the disk as it comes.
 
 use std::{
-    fs::{self, File, OpenOptions},
-    io::{self, Write},
+    fs::{self, File, OpenOptions, TryLockError},
+    io::{self, Read, Seek, Write},
     path::{Path, PathBuf},
     time::Instant,
 };
@@ -106,9 +106,23 @@ pub(crate) struct Recording {
 }
 
 impl Recording {
-    /// A new file; one that exists is not touched.
+    /// A new file; one that exists is not touched, save for what a recording that was killed before
+    /// its first row has left.
     pub(crate) fn create(path: &Path, header: &str) -> io::Result<Self> {
-        let file = OpenOptions::new().write(true).create_new(true).open(path)?;
+        let file = match OpenOptions::new().write(true).create_new(true).open(path) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => without_a_row(path)?
+                .ok_or_else(|| {
+                    io::Error::other(
+                        "it exists, and a recording replaces nothing; name another file",
+                    )
+                })?,
+            other => other?,
+        };
+        // where files cannot be locked, two recordings into one are not told from one after the other
+        if let Err(TryLockError::WouldBlock) = file.try_lock() {
+            return Err(io::Error::other("another recording goes there"));
+        }
+        file.set_len(0)?;
         let line = header.as_bytes().to_vec();
         let mut recording = Self { path: path.to_owned(), file, line, whole: 0, rows: 0 };
         recording.write()?;
@@ -146,6 +160,27 @@ impl Recording {
     pub(crate) fn finish(self) -> io::Result<()> {
         self.file.sync_all()
     }
+}
+
+/// A file that holds nothing but a header of ours, opened at its begin.
+fn without_a_row(path: &Path) -> io::Result<Option<File>> {
+    // to open a pipe would wait for its reader
+    if !fs::symlink_metadata(path)?.is_file() {
+        return Ok(None);
+    }
+    let mut file = OpenOptions::new().read(true).write(true).open(path)?;
+    let mut text = String::new();
+    let longest = 4096;
+    if (&mut file).take(longest).read_to_string(&mut text).is_err() {
+        return Ok(None);
+    }
+    let is_header = text.starts_with("time_s,") && text.contains(",adc_code,");
+    let has_a_row = text.trim_end_matches('\n').contains('\n') || text.len() as u64 == longest;
+    if has_a_row || !(is_header || text.is_empty()) {
+        return Ok(None);
+    }
+    file.rewind()?;
+    Ok(Some(file))
 }
 
 impl Drop for Recording {

@@ -1,5 +1,6 @@
 //! The rig as a [`Simulator`](stretch_gap::Simulator): pneumatics, muscle (or both as actuation) and sensing, each on measured inputs.
 
+mod directions;
 mod experiments;
 mod extent;
 mod fixed;

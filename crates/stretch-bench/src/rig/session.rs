@@ -5,6 +5,7 @@ use std::path::Path;
 use stretch_data::{DataSet, EvenSession, EvenTrial, ReadOptions, Rows, SessionTrial, Split};
 use stretch_gap::{copied, noise_variance};
 
+use super::directions::{self, Motion};
 use super::smooth::{Draws, Smoothed, schedule};
 use crate::{
     error::{BenchError, check_rate},
@@ -190,10 +191,9 @@ impl Session {
         others.iter().any(|other| copied(other, &volts).is_some())
     }
 
-    /// Whether a pressure of such a range moves by no more than its noise does.
-    fn is_noise(&self, (low, high): (f64, f64)) -> bool {
-        let trials = self.trials.iter().filter_map(|t| t.pressure_kpa.as_deref());
-        high - low < NOISE_SPAN * noise_variance(trials, self.dt_s).sqrt()
+    /// Whether a column of such a span moves by no more than its noise does.
+    fn is_noise<'a>(&self, trials: impl Iterator<Item = &'a [f64]>, span: f64) -> bool {
+        span < NOISE_SPAN * noise_variance(trials, self.dt_s).sqrt()
     }
 
     fn check_units(&self) -> Result<(), BenchError> {
@@ -236,7 +236,8 @@ impl Session {
                 return bad("pressure_kpa", format!("{} in every sample", pressure.0), hint);
             }
             // Noise alone has no unit: the diagnosis says that the channel is dead.
-            if self.is_noise(pressure) {
+            let pressures = self.trials.iter().filter_map(|t| t.pressure_kpa.as_deref());
+            if self.is_noise(pressures, pressure.1 - pressure.0) {
                 return self.check_directions();
             }
             if pressure.1 > 10_000.0 {
@@ -302,47 +303,23 @@ impl Session {
                 }
             }
         }
-        if against > AGAINST * widest * stroke {
-            let (column, hint) = self.against();
+        // Noise alone has no direction: the diagnosis says that the channel is dead.
+        let lengths = self.trials.iter().map(|t| t.length_mm.as_slice());
+        if against > AGAINST * widest * stroke && !self.is_noise(lengths, stroke) {
+            let motions = self.trials.iter().map(|t| Motion {
+                inlet: &t.inlet,
+                outlet: &t.outlet,
+                pressure_kpa: t.pressure_kpa.as_deref(),
+                length_mm: &t.length_mm,
+            });
+            let (column, hint) = directions::against(&motions.collect::<Vec<_>>(), self.dt_s);
             return Err(BenchError::Implausible {
                 column: column.into(),
                 found: "the muscle lengthens while the inlet is open".into(),
-                hint: hint.into(),
+                hint,
             });
         }
         Ok(())
-    }
-}
-
-impl Session {
-    /// Which columns are wrong where length and valves disagree: the pressure is the witness.
-    fn against(&self) -> (&'static str, &'static str) {
-        let (mut with, mut seen) = (0.0, false);
-        for trial in &self.trials {
-            let Some(pressure) = &trial.pressure_kpa else { continue };
-            seen = true;
-            let valves = trial.inlet.iter().zip(&trial.outlet).map(|(i, o)| i - o);
-            with += valves.zip(pressure.windows(2)).map(|(u, p)| u * (p[1] - p[0])).sum::<f64>();
-        }
-        let length = self.range(|t| &t.length_mm);
-        let pressure = self.range(|t| t.pressure_kpa.as_deref().unwrap_or(&[]));
-        // A muscle keeps most of its length, a chamber none of its pressure.
-        let is_length = |(low, high): (f64, f64)| low > 0.5 * high;
-        if seen && is_length(pressure) && !is_length(length) {
-            ("length_mm, pressure_kpa", "they look swapped: exchange the two names")
-        } else if seen && with > 0.0 {
-            (
-                "length_mm",
-                "it looks upside down, for the pressure goes with the valves: check the potentiometer's polarity",
-            )
-        } else if seen {
-            ("inlet, outlet", "they look swapped: exchange the two names")
-        } else {
-            (
-                "inlet, outlet",
-                "they look swapped: exchange the two names, unless length_mm is upside down",
-            )
-        }
     }
 }
 

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     Channel, DataError, Place, ReadOptions, Trial, header::missing_column, read::KNOWN,
-    trial::rate_of,
+    trial::rate_of, write::can_name,
 };
 
 /// Channels that a device holds from one sample to the next.
@@ -163,8 +163,9 @@ fn whole_channels(
             let at = Place { file: file.to_owned(), row: hole as u64 + 1, column: channel.name };
             return Err(DataError::NotFinite { at, value });
         }
-        if hole.is_some() || kept.iter().any(|other| other.name == channel.name) {
-            left_out.push(channel.name);
+        let is_twice = kept.iter().any(|other| other.name == channel.name);
+        if hole.is_some() || is_twice || !can_name(&channel.name) {
+            left_out.push(channel.name.escape_debug().to_string());
         } else {
             kept.push(channel);
         }

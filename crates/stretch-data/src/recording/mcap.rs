@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use ::mcap::{Channel as Source, MessageStream, read::Options};
+use ::mcap::Channel as Source;
 use serde_json::Value;
 
 use super::{
@@ -10,6 +10,7 @@ use super::{
     clock::{EPOCH_S, told_epoch},
     grid::{Track, listed},
     leaves::{Leaves, Topic},
+    mcap_messages::Messages,
     messages::Schema,
 };
 use crate::{Channel, DataError, ReadOptions};
@@ -31,12 +32,9 @@ pub(super) fn read(
     _: &ReadOptions,
 ) -> Result<(Vec<Track>, Vec<String>), DataError> {
     let fail = |problem| DataError::Format { file: file.to_owned(), format: "MCAP", problem };
-    let stream = MessageStream::new_with_options(bytes, Options::IgnoreEndMagic.into());
-    let stream =
-        stream.map_err(|e| fail(format!("{e}; record it again, or try `mcap recover`")))?;
     let mut bag = Bag::default();
     let mut notes = Vec::new();
-    for (count, message) in stream.enumerate() {
+    for (count, message) in Messages::new(bytes).enumerate() {
         match message {
             Ok(message) => bag.take(&message.channel, message.log_time.into(), &message.data),
             Err(e) if count > 0 => {

@@ -9,7 +9,7 @@ use super::{
     top::Top,
 };
 use crate::{
-    DataError, ReadOptions,
+    DataError, ReadOptions, Trial,
     header::{Header, missing_column},
     lines::{Line, Lines},
     read::{Columns, located},
@@ -22,6 +22,17 @@ pub(super) fn read(
     file: &str,
     options: &ReadOptions,
 ) -> Result<(Recording, String), DataError> {
+    read_blocks(reader, file, options, usize::MAX, &mut |_, _| Ok(()))
+}
+
+/// The same, every `most` rows given away with the name of the time column; what is left, and the notes of all, come back.
+pub(super) fn read_blocks<E: From<DataError>>(
+    reader: impl Read,
+    file: &str,
+    options: &ReadOptions,
+    most: usize,
+    give: &mut dyn FnMut(Trial, &str) -> Result<(), E>,
+) -> Result<(Recording, String), E> {
     let mut lines = Lines::new(reader, options.line_limit());
     let mut top = Top::read(&mut lines, file, options)?;
     top.tidy(options);
@@ -33,12 +44,16 @@ pub(super) fn read(
     loop {
         let (row, limit) = (lines.row() + 1, lines.limit());
         match lines.next().map_err(|e| DataError::io(file, "read it", e))? {
-            Line::End => return table.finish(),
+            Line::End => return Ok(table.finish()?),
             Line::TooLong => {
-                return Err(DataError::LineTooLong { file: file.to_owned(), row, limit });
+                return Err(DataError::LineTooLong { file: file.to_owned(), row, limit }.into());
             }
             Line::Text(line) if line.trim_ascii().is_empty() => {}
             Line::Text(line) => table.take(row, line)?,
+        }
+        if table.columns.len() >= most {
+            table.given += table.columns.len();
+            give(table.columns.cut(file, &table.header), &table.header.names[table.time])?;
         }
     }
 }
@@ -49,6 +64,8 @@ struct Table<'a> {
     header: Header,
     dialect: Dialect,
     columns: Columns,
+    /// Rows that were given away.
+    given: usize,
     values: Vec<f64>,
     /// Fields of a row: all columns but a time that is counted.
     fields: usize,
@@ -91,6 +108,7 @@ impl<'a> Table<'a> {
             header,
             dialect,
             columns,
+            given: 0,
             values,
             fields,
             time,
@@ -113,9 +131,10 @@ impl<'a> Table<'a> {
             Err(fault) => return Err(located(self.file, row, &self.header, fault)),
         }
         if let Some(rate_hz) = self.counted_hz {
-            self.values[self.time] = self.columns.len() as f64 / rate_hz * self.divisor;
+            self.values[self.time] =
+                (self.given + self.columns.len()) as f64 / rate_hz * self.divisor;
         }
-        if self.columns.len() == 0 {
+        if self.given + self.columns.len() == 0 {
             self.begin();
         }
         self.columns.push(self.file, row, &self.values)
@@ -150,7 +169,10 @@ impl<'a> Table<'a> {
             1 => self.notes.push("a comment between the rows is passed over".to_owned()),
             n => self.notes.push(format!("{n} comments between the rows are passed over")),
         }
-        let trial = self.columns.into_trial(self.file, &self.header)?;
+        let trial = match self.given {
+            0 => self.columns.into_trial(self.file, &self.header)?,
+            _ => self.columns.cut(self.file, &self.header),
+        };
         let missing = self.header.names.iter().enumerate().filter(|(i, name)| {
             *i != self.time && !name.is_empty() && trial.channel(name).is_none()
         });

@@ -1,0 +1,97 @@
+//! A calibration on logs that are longer than what may be held at once: pass by pass over blocks of rows.
+//!
+//! ```text
+//! pass 1   values in clusters                 -> what is wild
+//! pass 2   extents, covariance, noise, count  -> ranges, polarity, dead band
+//! pass 3   extents of the rates by branch     -> ranges of the rates
+//! pass 4   a triangle a branch and fold       -> the fit
+//! ```
+//!
+//! A block is taken for a part of a trial behind a gap: at its beginning the estimator of the rate warms up anew, which
+//! costs ten samples of hundreds of thousands. The noise is the median of the blocks' own. All else is what
+//! [`calibrate`](crate::calibrate) does with the whole log.
+
+use stretch_core::{Model, Provenance};
+
+use crate::{
+    CalibrateError, Calibrated, FitReport, ModelKind, Options, Robust, SplitBy,
+    blocks::{LONGEST, Log, Wild},
+    passes::Passes,
+};
+
+/// Whether a calibration can be fitted block by block: a line or surfaces, by least squares, samples given to the branches one
+/// by one. Models that remember are searched on the whole log, robust weights need its residuals.
+pub fn is_plain(options: &Options) -> bool {
+    !matches!(options.model, ModelKind::Remembering { .. })
+        && options.robust == Robust::Off
+        && options.split == SplitBy::Rate
+}
+
+/// Fits a calibration to trials that are read block by block, four times; `names` are those of the trials.
+///
+/// Memory is that of a block, however long the log is. Wild values are looked for, as
+/// [`without_wild`](crate::without_wild) does, in signal and reference.
+///
+/// # Errors
+/// As [`calibrate`](crate::calibrate), those of the log, and [`CalibrateError::TooLong`] where not [`is_plain`].
+///
+/// ```
+/// use stretch_calibrate::{Options, calibrate, calibrate_long};
+/// use stretch_data::{Channel, Trial};
+/// # let time_s: Vec<f64> = (0..6000).map(|n| f64::from(n) * 0.01).collect();
+/// # let length_mm: Vec<f64> = time_s.iter().map(|t| 165.0 + 15.0 * (0.7 * t).cos()).collect();
+/// # let bridge_v = length_mm.iter().map(|l| 1.24 + 0.03 * (180.0 - l)).collect();
+/// # let channel = |name: &str, values| Channel { name: name.into(), values };
+/// # let channels = vec![channel("length_mm", length_mm), channel("bridge_v", bridge_v)];
+/// # let trial = Trial { name: "loop".into(), time_s, channels };
+/// let options = Options::default();
+/// let block = |from: usize, to: usize| Trial {
+///     name: trial.name.clone(),
+///     time_s: trial.time_s[from..to].to_vec(),
+///     channels: trial.channels.iter()
+///         .map(|c| Channel { name: c.name.clone(), values: c.values[from..to].to_vec() })
+///         .collect(),
+/// };
+/// let long = calibrate_long(
+///     &["loop".into()],
+///     &|take| (0..6000).step_by(2000).try_for_each(|from| take(0, block(from, from + 2000))),
+///     &options,
+/// )?;
+/// let whole = calibrate(std::slice::from_ref(&trial), &options)?;
+/// assert_eq!(long.calibration.signal_range, whole.calibration.signal_range);
+/// approx::assert_relative_eq!(long.fits[0].r_squared, whole.fits[0].r_squared, epsilon = 1e-6);
+/// # Ok::<(), stretch_calibrate::CalibrateError>(())
+/// ```
+pub fn calibrate_long(
+    names: &[String],
+    log: &Log<'_>,
+    options: &Options,
+) -> Result<Calibrated, CalibrateError> {
+    let too_long = || CalibrateError::TooLong { model: options.model.to_string(), most: LONGEST };
+    if !is_plain(options) {
+        return Err(too_long());
+    }
+    let columns = [options.reference.as_str(), options.signal.as_str()];
+    let wild = Wild::of(log, columns)?;
+    let long = Passes { log, wild: &wild, options, trials: names.len() };
+    let (prepared, total) = long.prepared(names)?;
+    let (model, fits) = match options.model {
+        ModelKind::Linear => long.line(&prepared, total)?,
+        ModelKind::Surface(degree) => long.surfaces(&prepared, degree, total)?,
+        ModelKind::Blended(degree) => match long.surfaces(&prepared, degree, total)? {
+            (Model::Surfaces { inflation, deflation }, fits) => {
+                (Model::Blended { inflation, deflation }, fits)
+            }
+            other => other,
+        },
+        // refused above
+        ModelKind::Remembering { .. } => return Err(too_long()),
+    };
+    let mut notes = wild.told;
+    notes.extend(prepared.notes.iter().cloned());
+    if !matches!(options.model, ModelKind::Linear) {
+        notes.extend(fits.iter().filter_map(FitReport::note));
+    }
+    let provenance = Provenance::new(&options.date, names.iter().map(String::as_str));
+    Ok(Calibrated { calibration: prepared.calibration(model, provenance)?, fits, notes })
+}

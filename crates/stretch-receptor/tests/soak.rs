@@ -1,0 +1,181 @@
+//! Long streams with everything that a sensor, a cable and a converter do: nothing drifts, nothing ends, nothing grows.
+
+use std::fmt::Debug;
+
+use proptest::{
+    strategy::{Strategy, ValueTree},
+    test_runner::TestRunner,
+};
+use stretch_core::{Calibration, Design, Model, Real, Runner, Stage, Volts, strategies};
+use stretch_receptor::{
+    Reading, Receptor, Withheld,
+    code::{Adc, AdcCode, AdcSpec, CodeReading, FixedCalibration, FixedObserver, FixedReceptor},
+    example_calibration, example_diagnosed, example_observer,
+};
+
+/// What a stream is made of: a muscle that moves, now and then something that is no motion.
+struct Faults {
+    seed: u64,
+    phase: f64,
+    stuck: Option<(u32, f64)>,
+    jump: f64,
+}
+
+impl Faults {
+    fn new() -> Self {
+        Self { seed: 0x9e37_79b9_7f4a_7c15, phase: 0.0, stuck: None, jump: 0.0 }
+    }
+
+    /// xorshift64*: Vigna 2016, doi:10.1145/2845077.
+    fn draw(&mut self) -> u64 {
+        self.seed ^= self.seed >> 12;
+        self.seed ^= self.seed << 25;
+        self.seed ^= self.seed >> 27;
+        self.seed.wrapping_mul(0x2545_f491_4f6c_dd1d)
+    }
+
+    /// The next sample as a share of the calibrated range.
+    fn next(&mut self) -> f64 {
+        // a triangle of changing speed: no transcendental, so that 1e8 samples take seconds
+        let draw = self.draw();
+        self.phase += 1e-4 + 3e-2 * (draw & 0xff) as f64 / 255.0;
+        self.phase -= self.phase.floor();
+        let clean = 0.05 + 1.8 * (self.phase - 0.5).abs();
+        match (draw >> 8) % 1000 {
+            0..4 => return f64::NAN,
+            4 => return 1e30,
+            5 => return -1e30,
+            6 => return f64::INFINITY,
+            7..9 => self.stuck = Some(((draw >> 40) as u32 % 300, clean)),
+            9..12 => self.jump = ((draw >> 40) % 200) as f64 / 100.0 - 1.0,
+            12..16 => self.jump = 0.0,
+            _ => {}
+        }
+        if let Some((left, value)) = self.stuck {
+            self.stuck = left.checked_sub(1).map(|left| (left, value));
+            return value;
+        }
+        clean + self.jump
+    }
+}
+
+/// A clean motion over the whole range, and at its end at rest: the sample after so many.
+fn clean(n: u32) -> f64 {
+    let phase = f64::from(n % 400) / 400.0;
+    0.05 + 1.8 * (phase - 0.5).abs()
+}
+
+/// Clean samples after which a memory must have forgotten what was wrong: the slowest time constants are of minutes.
+const FORGOTTEN: u32 = 100_000;
+
+/// Steps a receptor through `samples` faulty ones, then, beside a fresh one, through clean ones; by how much the two
+/// differ then.
+fn soak<D, S, O>(
+    design: D,
+    samples: u64,
+    sample: impl Fn(f64) -> S,
+    estimate: impl Fn(O) -> f64,
+) -> f64
+where
+    D: Design + Stage<S, Out = Result<O, Withheld>> + Copy,
+    // what is copied bit by bit owns nothing that could grow
+    D::Memory: Copy + Debug,
+{
+    let (mut receptor, mut faults) = (Runner::new(design), Faults::new());
+    let mut answered = 0u64;
+    for n in 0..samples {
+        if let Ok(reading) = receptor.step(sample(faults.next())) {
+            let estimate = estimate(reading);
+            assert!(estimate.is_finite(), "sample {n}: {estimate}");
+            answered += 1;
+        }
+    }
+    assert!(answered > samples / 2, "{answered} of {samples} answered");
+    let mut fresh = Runner::new(design);
+    let mut apart = f64::INFINITY;
+    for n in 0..FORGOTTEN {
+        let both = (receptor.step(sample(clean(n))), fresh.step(sample(clean(n))));
+        if let (Ok(old), Ok(new)) = both {
+            apart = (estimate(old) - estimate(new)).abs();
+        }
+    }
+    apart
+}
+
+/// Records of every model; the same in every run.
+fn records() -> Vec<(String, Calibration)> {
+    let mut runner = TestRunner::deterministic();
+    let mut all = vec![
+        ("poly13".to_owned(), example_calibration()),
+        ("observer".to_owned(), example_observer()),
+        ("diagnosed".to_owned(), example_diagnosed()),
+    ];
+    for n in 0..4 {
+        let mut draw = |name: &str, tree: proptest::strategy::BoxedStrategy<Calibration>| {
+            let record = tree.new_tree(&mut runner).expect("a record").current();
+            (format!("{name} {n}"), record)
+        };
+        all.push(draw("surfaces or line", strategies::paper_calibration().boxed()));
+        all.push(draw("blended", strategies::blended_calibration().boxed()));
+        all.push(draw("history", strategies::history_calibration().boxed()));
+        all.push(draw("observer", strategies::observer_calibration().boxed()));
+        all.push(draw("diagnosed", strategies::diagnosed_calibration().boxed()));
+    }
+    all
+}
+
+/// Share of the range that a soaked receptor may differ by from a fresh one that saw the same clean samples since.
+///
+/// None for what remembers a window of samples: it was all replaced. Filters that forget exponentially come as close as
+/// rounding lets them; where two states answer the same signal, as plays do, they stay apart by what is never swept.
+fn allowed(calibration: &Calibration, rounding: f64) -> f64 {
+    match &calibration.model {
+        Model::Linear(_) | Model::Surfaces { .. } | Model::Blended { .. } => rounding,
+        _ => 0.02,
+    }
+}
+
+fn soak_floats<T: Real>(samples: u64, rounding: f64) {
+    for (name, calibration) in records() {
+        let Ok(receptor) = Receptor::<T>::new(&calibration) else { continue };
+        let range = calibration.signal_range;
+        let volts = |share: f64| Volts(T::from_f64(range.min() + share * range.span()));
+        let apart = soak(receptor, samples, volts, |r: Reading<T>| r.estimate.as_f64());
+        let span = calibration.target.reference_per_target() * calibration.target_range.span();
+        let share = apart / span.abs();
+        println!("{name}: {samples} samples, {share:.1e} of the range apart");
+        assert!(share <= allowed(&calibration, rounding), "{name}: {share:e} of the range apart");
+    }
+}
+
+fn soak_codes(samples: u64) {
+    let adc = Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 }).unwrap();
+    // what is no number becomes a code that no converter has
+    let code = |share: f64| {
+        if share.abs() < 10.0 { AdcCode((4095.0 * share) as i32) } else { AdcCode(-1) }
+    };
+    let estimate = |r: CodeReading<i32>| f64::from(r.estimate);
+    let fixed = FixedCalibration::<11, 2>::new(&example_calibration(), &adc).unwrap();
+    let apart = soak(FixedReceptor::new(fixed), samples, code, estimate);
+    println!("poly13 in integers: {samples} samples, {apart} um apart");
+    assert_eq!(apart, 0.0);
+    let observer = FixedObserver::new(&example_observer(), &adc).unwrap();
+    let apart = soak(observer, samples, code, estimate);
+    println!("observer in integers: {samples} samples, {apart} um apart");
+    assert!(apart <= 2.0);
+}
+
+#[test]
+fn streams_with_faults_leave_nothing_behind() {
+    soak_floats::<f64>(100_000, 1e-9);
+    soak_floats::<f32>(100_000, 1e-4);
+    soak_codes(1_000_000);
+}
+
+#[test]
+#[ignore = "minutes: 1e8 samples a receptor; run it in release"]
+fn a_hundred_million_samples_leave_nothing_behind() {
+    soak_floats::<f64>(100_000_000, 1e-9);
+    soak_floats::<f32>(100_000_000, 1e-4);
+    soak_codes(100_000_000);
+}

@@ -1,0 +1,21 @@
+//! Any record as C: refused, or a header of printable characters, in both arithmetics.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use stretch_core::Calibration;
+use stretch_export::{Form, Options, arduino_library, header};
+use stretch_fuzz::adc;
+
+fuzz_target!(|bytes: &[u8]| {
+    let Some((which, bytes)) = bytes.split_first() else { return };
+    let Ok(calibration) = postcard::from_bytes::<Calibration>(bytes) else { return };
+    let Some(adc) = adc(&calibration, which / 3) else { return };
+    let form = [None, Some(Form::Fixed), Some(Form::Float)][usize::from(which % 3)];
+    if let Ok(header) = header(&calibration, &Options { form, adc }) {
+        for file in arduino_library(&header) {
+            let is_plain = |c: char| matches!(c, '\n' | '\t') || !c.is_control();
+            assert!(file.text.chars().all(is_plain), "{}", file.text);
+            assert!(!file.text.contains("NaN") && !file.text.contains("inf,"), "{}", file.text);
+        }
+    }
+});

@@ -1,0 +1,53 @@
+//! Whether samples come as often as a calibration takes them to.
+
+/// Intervals that the pace is told from.
+const INTERVALS: usize = 51;
+/// Share of the calibration's interval by which the usual one may differ: as much as counts as on time.
+const TOLERANCE: f64 = 0.2;
+
+/// The usual interval of a stream beside the calibration's.
+#[derive(Debug)]
+pub(super) struct Pace {
+    rate_hz: f64,
+    last_s: Option<f64>,
+    intervals_s: Vec<f64>,
+    is_told: bool,
+}
+
+impl Pace {
+    pub(super) fn of(rate_hz: f64) -> Self {
+        Self { rate_hz, last_s: None, intervals_s: Vec::new(), is_told: false }
+    }
+
+    /// Takes the time of a sample; says so, once, where the usual interval is another. Each sample that does not come in
+    /// time counts as one that is missing, so that a slower stream has right rates, but gaps; a faster
+    /// one has wrong rates.
+    pub(super) fn take(&mut self, time_s: f64) -> Option<String> {
+        let before_s = self.last_s.replace(time_s)?;
+        if self.is_told || time_s <= before_s {
+            return None;
+        }
+        self.intervals_s.push(time_s - before_s);
+        if self.intervals_s.len() < INTERVALS {
+            return None;
+        }
+        self.is_told = true;
+        let mut sorted = std::mem::take(&mut self.intervals_s);
+        sorted.sort_by(f64::total_cmp);
+        let usual_s = sorted[INTERVALS / 2];
+        let (share, rate_hz) = (usual_s * self.rate_hz, self.rate_hz);
+        if (share - 1.0).abs() <= TOLERANCE {
+            return None;
+        }
+        let what = if share < 1.0 {
+            "its rates, and estimates that rest on them, are wrong"
+        } else {
+            "the samples in between count as missing"
+        };
+        Some(format!(
+            "{:.4} samples a second come where the calibration was recorded at {rate_hz:.4}: {what}; log at that rate, or bring \
+             the log there with --grid {rate_hz}",
+            1.0 / usual_s
+        ))
+    }
+}

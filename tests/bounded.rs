@@ -1,0 +1,67 @@
+//! Work and memory of a command are bounded by what it reads.
+
+mod support;
+
+use std::{fmt::Write as _, fs, path::Path, process::Command};
+
+use support::Scratch;
+
+/// A log of a muscle that goes up and down, and a gauge that follows it.
+fn log(path: &Path, rows: u32, step_s: f64) {
+    let mut text = String::from("time_s,length_mm,bridge_v\n");
+    for n in 0..rows {
+        let length = 165.0 + 14.0 * (0.01 * f64::from(n)).sin();
+        let volts = 1.24 + 0.03 * (180.0 - length) + 1e-3 * f64::from(n % 101 * 41 % 101) / 101.0;
+        let _ = writeln!(text, "{:e},{length:.3},{volts:.5}", f64::from(n) * step_s);
+    }
+    fs::write(path, text).unwrap();
+}
+
+/// Whether a command succeeds, and what it says on standard error.
+fn told(scratch: &Scratch, arguments: &[&str]) -> (bool, String) {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_stretch"));
+    let out = program.current_dir(scratch.path("")).args(arguments).output().unwrap();
+    (out.status.success(), String::from_utf8_lossy(&out.stderr).into_owned())
+}
+
+#[test]
+fn a_long_log_is_calibrated_on_in_the_memory_of_a_block() {
+    let scratch = Scratch::new();
+    log(&scratch.path("long.csv"), 3_000_000, 0.01);
+    // 300 MB of data; as a whole the log takes a third more
+    let limited = "ulimit -d 300000; exec \"$0\" calibrate long.csv --out cal.json";
+    let mut shell = Command::new("sh");
+    shell.current_dir(scratch.path("")).args(["-c", limited, env!("CARGO_BIN_EXE_stretch")]);
+    let out = shell.output().unwrap();
+    let said = String::from_utf8_lossy(&out.stdout);
+    assert!(out.status.success(), "{said}{}", String::from_utf8_lossy(&out.stderr));
+    assert!(
+        said.contains("3000000 rows are more than 1500000: they were read block by block"),
+        "{said}"
+    );
+    assert!(scratch.path("cal.json").exists());
+}
+
+#[test]
+fn times_and_counts_that_nobody_means_are_refused() {
+    let scratch = Scratch::new();
+    log(&scratch.path("ps.csv"), 500, 1e-12);
+    let (done, said) = told(&scratch, &["calibrate", "ps.csv", "--out", "cal.json"]);
+    assert!(!done && said.contains("1.000e12 samples a second"), "{said}");
+    let asked = ["blind", "make", "--cases", "99999999999", "--out", "cases"];
+    let (done, said) = told(&scratch, &asked);
+    assert!(!done && said.contains("not a number of cases up to 100000"), "{said}");
+    assert!(!scratch.path("cases").exists());
+}
+
+#[test]
+fn a_data_set_that_says_another_rate_than_its_stamps_is_told_both() {
+    let scratch = Scratch::new();
+    fs::create_dir(scratch.path("set")).unwrap();
+    log(&scratch.path("set/a.csv"), 1500, 0.01);
+    let set =
+        "name = 'set'\nrate_hz = 250\n[[trial]]\nfile = 'a.csv'\nkind = 'other'\nsplit = 'fit'\n";
+    fs::write(scratch.path("set/dataset.toml"), set).unwrap();
+    let (done, said) = told(&scratch, &["calibrate", "set", "--out", "cal.json"]);
+    assert!(done && said.contains("rate_hz = 250") && said.contains("100.00 Hz"), "{said}");
+}

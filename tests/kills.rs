@@ -1,0 +1,165 @@
+//! Commands that write, killed at any moment: what is there is old or new.
+#![cfg(unix)]
+
+mod support;
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::Path,
+    thread,
+    time::{Duration, Instant},
+};
+
+use support::{
+    Scratch,
+    written::{command, prepared, tree, writes},
+};
+
+/// A command that writes; the folder that it replaces or makes in one step, or the files of which each is whole.
+struct Writing {
+    line: &'static str,
+    /// How often it is killed for each time that the others are.
+    weight: usize,
+    /// Whether all of it appears at once.
+    at_once: bool,
+}
+
+const fn writing(line: &'static str, weight: usize, at_once: bool) -> Writing {
+    Writing { line, weight, at_once }
+}
+
+const WRITING: [Writing; 14] = [
+    writing("simulate --protocol pulses --out new", 4, true),
+    writing("simulate --protocol paper --out bench --force", 8, true),
+    writing("simulate --protocol pulses --out bench --force", 8, true),
+    writing("export --calibration board.json --c c --arduino", 3, true),
+    writing("blind make --cases 1 --out cases", 1, true),
+    writing("demo --paper --out demo", 1, true),
+    writing("demo --paper --out bench --force", 1, true),
+    writing("calibrate a.csv --out cal.json --report cal.html --fixed cal.postcard", 8, false),
+    writing(
+        "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json d.json --report d.html --fix fixed.toml",
+        3,
+        false,
+    ),
+    writing("apply --calibration cal.json a.csv --out out.csv", 3, true),
+    writing("convert a.csv --out out.csv", 3, true),
+    writing("record seal cal.json", 3, true),
+    writing("init logs --force", 3, true),
+    writing("evaluate --calibration cal.json a.csv", 1, true),
+];
+
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap().flatten() {
+        let target = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            copy(&entry.path(), &target);
+        } else {
+            fs::copy(entry.path(), target).unwrap();
+        }
+    }
+}
+
+/// Numbers that follow nothing, from 0 to 1.
+struct Dice(u64);
+
+impl Dice {
+    fn roll(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// Whether a file is the new one. A diagnosis says how long it took: there it is the length and the end that count.
+fn is_new(name: &str, bytes: &[u8], new: &BTreeMap<String, Vec<u8>>) -> bool {
+    let Some(expected) = new.get(name) else { return false };
+    let end = |bytes: &[u8]| bytes[bytes.len().saturating_sub(8)..].to_vec();
+    let is_timed = ["d.json", "d.html"].contains(&name);
+    bytes == expected
+        || (is_timed && bytes.len().abs_diff(expected.len()) < 32 && end(bytes) == end(expected))
+}
+
+/// Kills the commands at random, half of them once they write; how many were hit before they ended.
+fn killed_at_random(kills: usize, seed: u64) -> usize {
+    let before = prepared();
+    let expected: Vec<_> = WRITING
+        .iter()
+        .map(|writing| {
+            let after = Scratch::in_memory();
+            copy(&before.path(""), &after.path(""));
+            let begun = Instant::now();
+            assert!(command(&after, writing.line).status().unwrap().success(), "{}", writing.line);
+            (tree(&after.path("")), begun.elapsed())
+        })
+        .collect();
+    let old = tree(&before.path(""));
+    let turns: Vec<usize> =
+        WRITING.iter().enumerate().flat_map(|(i, w)| vec![i; w.weight]).collect();
+    let (mut dice, mut hit, mut new_ones) = (Dice(seed), 0, 0);
+    for kill in 0..kills {
+        let at = if kill < WRITING.len() {
+            kill
+        } else {
+            turns[(dice.roll() * turns.len() as f64) as usize]
+        };
+        let (writing, (new, takes)) = (&WRITING[at], &expected[at]);
+        let scratch = Scratch::in_memory();
+        copy(&before.path(""), &scratch.path(""));
+        let mut child = command(&scratch, writing.line).spawn().unwrap();
+        if kill % 2 == 0 {
+            let begun = Instant::now();
+            while !writes(&scratch.path(""))
+                && begun.elapsed() < 3 * *takes
+                && child.try_wait().unwrap().is_none()
+            {
+                thread::sleep(Duration::from_micros(200));
+            }
+            thread::sleep(Duration::from_micros((dice.roll() * 30_000.0) as u64));
+        } else {
+            thread::sleep(takes.mul_f64(1.2 * dice.roll()));
+        }
+        let _ = child.kill();
+        let status = child.wait().unwrap();
+        hit += usize::from(!status.success());
+        let found = tree(&scratch.path(""));
+        let case = format!("kill {kill}, {}", writing.line);
+        let names = |tree: &BTreeMap<String, Vec<u8>>| tree.keys().cloned().collect::<Vec<_>>();
+        if writing.at_once {
+            assert!(found == old || found == *new, "{case}: {:?}", names(&found));
+            new_ones += usize::from(found == *new && !status.success());
+        }
+        for (name, bytes) in &found {
+            let is_whole = old.get(name) == Some(bytes) || is_new(name, bytes, new);
+            assert!(is_whole, "{case}: {name} is neither old nor new");
+        }
+        for name in old.keys().filter(|name| new.contains_key(*name)) {
+            assert!(found.contains_key(name), "{case}: {name} is gone");
+        }
+        // the next try is not in the way of this one
+        if kill % 4 == 0 {
+            let again = command(&scratch, writing.line).status().unwrap();
+            let found = tree(&scratch.path(""));
+            assert!(again.success() || status.success() || writing.at_once, "{case}: again");
+            assert_eq!(names(&found), names(new), "{case}: again");
+            let is_all_new = found.iter().all(|(name, bytes)| is_new(name, bytes, new));
+            assert!(is_all_new, "{case}: again");
+        }
+    }
+    println!("{kills} kills, {hit} before the end, {new_ones} of them with all written");
+    hit
+}
+
+#[test]
+fn a_kill_leaves_the_old_or_the_new() {
+    let kills = 40;
+    assert!(killed_at_random(kills, 1) > kills / 4);
+}
+
+#[test]
+#[ignore = "ten minutes"]
+fn five_hundred_kills_leave_the_old_or_the_new() {
+    let kills = 500;
+    assert!(killed_at_random(kills, 2) > kills / 4);
+}

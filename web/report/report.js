@@ -20,6 +20,9 @@
   /** @typedef {{kind: "surface", axes: Axis[], ink: string, cells: number, z: (number|null)[], on: string, points: number[]}} SurfaceData */
   /** @typedef {{window: number[], pick: Pick|null, cursor: number|null, series: Series[], keys: Map<string, Level[]>, plots: {draw: () => void, point: () => void}[]}} Link */
 
+  /** No number: what is compared with it is false. */
+  const NONE = 0 / 0;
+  const isNone = (/** @type {number} */ x) => x !== x;
   const MARGIN = { left: 58, right: 14, top: 26, bottom: 40 };
   const still = document.querySelector("figure svg");
   if (!still) return;
@@ -79,7 +82,7 @@
     const y = new Float64Array(d.length);
     let sum = 0;
     d.forEach((step, i) => {
-      if (step === null) y[i] = NaN;
+      if (step === null) y[i] = NONE;
       else y[i] = o + q * (sum += step);
     });
     return { t, dt, y };
@@ -266,15 +269,15 @@
       const [first, last] = within(level);
       /** @type {number[][]} */
       const found = [];
-      let begin = NaN;
+      let begin = NONE;
       for (let i = first; i <= last + 1; i += 1) {
         const value = pick.size ? Math.abs(level.y[i]) : level.y[i];
         const inside = i <= last && value >= pick.from && value <= pick.to;
         const t = level.t + i * level.dt;
-        if (inside && Number.isNaN(begin)) begin = t;
-        if (!inside && !Number.isNaN(begin)) {
+        if (inside && isNone(begin)) begin = t;
+        if (!inside && !isNone(begin)) {
           found.push([Math.max(begin, from), Math.min(t, to)]);
-          begin = NaN;
+          begin = NONE;
         }
       }
       return found;
@@ -307,7 +310,7 @@
       let pen = false;
       for (let i = first; i <= last; i += 1) {
         const value = level.y[i];
-        if (Number.isNaN(value)) { pen = false; continue; }
+        if (isNone(value)) { pen = false; continue; }
         d += `${pen ? "L" : "M"}${place(level.t + i * level.dt).toFixed(1)} ${rise(value).toFixed(1)}`;
         pen = true;
       }
@@ -476,12 +479,12 @@
         const up = (rect.bottom - event.clientY) / rect.height;
         return [low + share * (high - low), panel.y[0] + up * (panel.y[1] - panel.y[0])];
       };
-      let begin = NaN;
+      let begin = NONE;
       hit.addEventListener("pointermove", (event) => {
         const [x, y] = at(event);
         show([`${data.xname}: ${withUnit(number(x, high - low), data.xunit)}`,
           `${panel.name}: ${withUnit(number(y, panel.y[1] - panel.y[0]), data.yunit)}`], event.clientX, event.clientY);
-        if (Number.isNaN(begin) || !data.by) return;
+        if (isNone(begin) || !data.by) return;
         const [from, to] = [Math.min(begin, x), Math.max(begin, x)];
         const across = (/** @type {number} */ v) => size.x + ((v - low) / (high - low)) * size.width;
         brush.setAttribute("x", String(across(from)));
@@ -496,7 +499,7 @@
         hit.setPointerCapture(event.pointerId);
         pickIn(data.link, null);
       });
-      const end = () => { begin = NaN; };
+      const end = () => { begin = NONE; };
       hit.addEventListener("pointerup", end);
       hit.addEventListener("pointercancel", end);
     }

@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use super::{
     canvas::{Ink, STEPS},
+    markup::hides,
     thin::extent,
 };
 
@@ -239,7 +240,16 @@ pub(crate) fn scatter_json(
 
 /// JSON that no name in it can end: its markup is written in numbers.
 pub(crate) fn embedded(json: &str) -> String {
-    json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
+    let mut safe = String::with_capacity(json.len());
+    for c in json.chars() {
+        match c {
+            '<' | '>' | '&' => safe.push_str(&format!("\\u{:04x}", u32::from(c))),
+            // what is read from it is the name as a page shows it
+            c if hides(c) => safe.push_str(&format!("\\\\u{:04x}", u32::from(c))),
+            c => safe.push(c),
+        }
+    }
+    safe
 }
 
 #[cfg(test)]

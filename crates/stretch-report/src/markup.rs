@@ -12,18 +12,16 @@ pub(crate) fn escape(text: &str) -> String {
             '\'' => safe.push_str("&#39;"),
             '\n' | '\t' => safe.push(c),
             c if c.is_control() => safe.push('\u{fffd}'),
-            // a name that turns the text around it, or hides a part of itself, is shown as what it is
-            '\u{61c}'
-            | '\u{200b}'..='\u{200f}'
-            | '\u{2028}'..='\u{202e}'
-            | '\u{2066}'..='\u{2069}'
-            | '\u{feff}' => {
-                safe.push_str(&format!("\\u{:04x}", u32::from(c)));
-            }
+            c if hides(c) => safe.push_str(&format!("\\u{:04x}", u32::from(c))),
             c => safe.push(c),
         }
     }
     safe
+}
+
+/// Whether a name with it would turn the text around it, or hide a part of itself: it is shown as what it is.
+pub(crate) fn hides(c: char) -> bool {
+    matches!(c, '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
 }
 
 /// What stands where there is no number.

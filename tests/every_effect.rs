@@ -70,8 +70,12 @@ const MISMATCH: f64 = 0.005;
 /// Root mean square distance, in noises, of a replay with noise off from a measurement: 1 is the noise alone.
 const REPLAYED: f64 = 1.15;
 
-/// Takes the pressure out of every trial of a data set.
+/// Takes the pressure out of every trial of a data set, and with it the digests of what the trials were.
 fn without_pressure(folder: &Path) {
+    let index = folder.join("dataset.toml");
+    let text = fs::read_to_string(&index).unwrap();
+    let kept = text.lines().filter(|line| !line.starts_with("digest"));
+    fs::write(index, kept.map(|line| format!("{line}\n")).collect::<String>()).unwrap();
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_none_or(|ending| ending != "csv") {

@@ -127,7 +127,7 @@ fn a_simulated_effect_is_named_and_reported() {
     runs(&mut run("1", &again));
     assert!(d == read(&again));
     let page = fs::read_to_string(page).unwrap();
-    assert!(page.contains("Fix in the simulator") && page.contains("Add gauge_hysteresis"));
+    assert!(page.contains("What to change") && page.contains("Add gauge_hysteresis"));
     assert!(page.contains("trained in the simulator then errs"));
     assert!(page.contains("simpler methods") && page.contains("by where the calibration"));
     assert!(!page.contains("http") && !page.contains("NaN") && !page.contains("class=\"missing\""));

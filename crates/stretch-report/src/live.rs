@@ -246,6 +246,7 @@ pub(crate) fn embedded(json: &str) -> String {
             '<' | '>' | '&' => safe.push_str(&format!("\\u{:04x}", u32::from(c))),
             // what is read from it is the name as a page shows it
             c if hides(c) => safe.push_str(&format!("\\\\u{:04x}", u32::from(c))),
+            c if c.is_control() => safe.push('\u{fffd}'),
             c => safe.push(c),
         }
     }

@@ -130,7 +130,12 @@ fn a_simulated_effect_is_named_and_reported() {
     assert!(page.contains("What to change") && page.contains("Add gauge_hysteresis"));
     assert!(page.contains("trained in the simulator then errs"));
     assert!(page.contains("simpler methods") && page.contains("by where the calibration"));
-    assert!(!page.contains("http") && !page.contains("NaN") && !page.contains("class=\"missing\""));
+    assert!(
+        !page.contains("http://")
+            && !page.contains("https://")
+            && !page.contains("NaN")
+            && !page.contains("class=\"missing\"")
+    );
     // With its entry struck out nobody else takes the blame with the same right.
     let without = scratch.path("without.json");
     runs(diagnose(&folder).args(["--without", "gauge_hysteresis"]).arg("--json").arg(&without));

@@ -104,7 +104,11 @@ fn write() -> Done {
         put("log_of_record", name, &[bytes.clone(), rows(3, 80)].concat())?;
         put("export_record", name, &[vec![2], bytes.clone()].concat())?;
         put("calibration_record", name, &bytes)?;
-        put("calibration_record", &format!("{name}.json"), calibration_to_json(&record)?.as_bytes())?;
+        put(
+            "calibration_record",
+            &format!("{name}.json"),
+            calibration_to_json(&record)?.as_bytes(),
+        )?;
         if let Ok(fixed) = fixed_record(&record, &adc) {
             put("calibration_record", &format!("{name}.fixed"), &fixed.bytes)?;
         }
@@ -146,14 +150,23 @@ fn write() -> Done {
 }
 
 fn texts() -> Done {
-    let csv = "time_s,length_mm,bridge_v\n0,180,1.24\n0.01,179.5,1.25\n0.02,179,1.27\n0.03,178,1.30\n";
+    let csv =
+        "time_s,length_mm,bridge_v\n0,180,1.24\n0.01,179.5,1.25\n0.02,179,1.27\n0.03,178,1.30\n";
     put("trial_csv", "plain", csv.as_bytes())?;
     put("recording_text", "plain", csv.as_bytes())?;
     put("recording_text", "units", b"Zeit (ms);Weg (mm);U [V]\n0;180,0;1,24\n10;179,5;1,25\n")?;
-    put("recording_text", "stamps", b"# a logger's\n2024-05-01T10:00:00.000Z\t1.5\n2024-05-01T10:00:00.010Z\t1.6\n")?;
+    put(
+        "recording_text",
+        "stamps",
+        b"# a logger's\n2024-05-01T10:00:00.000Z\t1.5\n2024-05-01T10:00:00.010Z\t1.6\n",
+    )?;
     let rig = stretch_sim::default_rig_text();
     put("rig_file", "stock", rig.as_bytes())?;
-    put("rig_file", "effect", format!("{rig}\n[effects]\ngauge_hysteresis = {{ h = 0.2, s = 0.012 }}\n").as_bytes())?;
+    put(
+        "rig_file",
+        "effect",
+        format!("{rig}\n[effects]\ngauge_hysteresis = {{ h = 0.2, s = 0.012 }}\n").as_bytes(),
+    )?;
     let set = "name = 'two'\nrate_hz = 100\nrig = 'rig.toml'\n[[trial]]\nfile = 'a.csv'\nkind = 'other'\nsplit = 'fit'\n\
          [[trial]]\nfile = 'b.csv'\nkind = 'other'\nsplit = 'test'\nstart_s = 30\n";
     put("data_set_toml", "two", set.as_bytes())?;
@@ -162,7 +175,8 @@ fn texts() -> Done {
          [[stage]]\nname = \"servo\"\noutput = \"angle_deg\"\ninputs = [\"command_V\"]\n\
          [[parameter]]\nname = \"gain\"\nvalue = 10\ntolerance = \"10 %\"\n[[trial]]\nfile = \"monday.csv\"\n";
     put("problem_toml", "servo", problem.as_bytes())?;
-    let header = serde_json::json!({ "kind": "outputs", "models": [{ "samples": 2 }, { "error": "no" }] });
+    let header =
+        serde_json::json!({ "kind": "outputs", "models": [{ "samples": 2 }, { "error": "no" }] });
     let frame = Frame::bytes(&header, &[1.0, 2.0]);
     put("worker_frames", "two", &[frame.clone(), frame].concat())?;
     for (name, text) in [

@@ -22,7 +22,8 @@ fuzz_target!(|bytes: &[u8]| {
     let options = Options {
         model: kind,
         normalisation: [Normalisation::Range, Normalisation::MinMax][usize::from(how >> 1 & 1)],
-        robust: [Robust::Off, Robust::Off, Robust::Bisquare, Robust::Lar][usize::from(how >> 2 & 3)],
+        robust: [Robust::Off, Robust::Off, Robust::Bisquare, Robust::Lar]
+            [usize::from(how >> 2 & 3)],
         rate: match how >> 4 & 3 {
             0 => RateEstimator::Differentiator { cutoff_hz: 8.0 },
             1 => RateEstimator::Tracker { tracking_index: 0.1 },
@@ -32,7 +33,8 @@ fuzz_target!(|bytes: &[u8]| {
     };
     let columns = [("length_mm", 150.0, 180.0), ("bridge_v", 1.24, 2.1)];
     let most = if is_quick { 600 } else { 120 };
-    let (first, second) = stream.split_at(if how & 64 == 0 { stream.len() } else { stream.len() / 2 });
+    let (first, second) =
+        stream.split_at(if how & 64 == 0 { stream.len() } else { stream.len() / 2 });
     let mut trials = vec![trial(first, &columns, most)];
     if !second.is_empty() {
         trials.push(trial(second, &columns, most));

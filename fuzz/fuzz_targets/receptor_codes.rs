@@ -11,8 +11,7 @@ fuzz_target!(|bytes: &[u8]| {
     // records as they lie in flash, as if their seal had held
     match which % 4 {
         0 => {
-            if let Ok((fixed, stream)) =
-                postcard::take_from_bytes::<FixedCalibration<11, 2>>(bytes)
+            if let Ok((fixed, stream)) = postcard::take_from_bytes::<FixedCalibration<11, 2>>(bytes)
             {
                 code_steps(Ok::<_, ()>(fixed), stream);
             }

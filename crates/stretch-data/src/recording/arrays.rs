@@ -20,8 +20,11 @@ pub(super) struct Array {
 }
 
 impl Array {
-    /// Rows and columns; none where it has more than two lengths above 1.
+    /// Rows and columns; none where it has more than two lengths above 1, or no values: beside a length of 0 any other may be told.
     fn matrix(&self) -> Option<(usize, usize)> {
+        if self.values.is_empty() {
+            return None;
+        }
         let long: Vec<usize> = self.shape.iter().copied().filter(|&n| n != 1).collect();
         match (long[..].len(), &self.shape[..]) {
             (0, _) => Some((1, 1)),

@@ -8,7 +8,7 @@
 # makes by flags that stable has. A target of its own (--target) keeps them out of build scripts.
 # JOBS targets run at once (2 where nothing is said). Inputs that reach something new are kept in
 # fuzz/target/corpus, those that crash in fuzz/target/crashes; what is committed is only read.
-# SEED is what chance begins with, 20261122 where nothing is said.
+# RUNS is the most executions a target, without a limit where nothing is said; SEED is what chance begins with, 20261122 where nothing is said.
 # Address sanitizer, with a nightly compiler: TOOLCHAIN=+nightly SANITIZER=address fuzz/run.sh ...
 set -euo pipefail
 cd "$(dirname "$0")"
@@ -46,7 +46,7 @@ one() {
     [ "$name" != "${name#recording_}" ] && [ -d "$odd" ] && folders+=("$odd")
     local most=4096
     [ "$name" = recording_parquet ] || [ "$name" = recording_hdf5 ] && most=16384
-    if ! "target/$triple/release/$name" -seed="${SEED:-20261122}" -max_total_time="$seconds" -max_len="$most" -timeout=60 \
+    if ! "target/$triple/release/$name" -seed="${SEED:-20261122}" -runs="${RUNS:--1}" -max_total_time="$seconds" -max_len="$most" -timeout=60 \
         -rss_limit_mb=2048 -print_final_stats=1 -artifact_prefix="$crashes/" "${folders[@]}" >"$log" 2>&1; then
         printf '%s FAILED; what did it is in fuzz/%s\n' "$name" "$crashes"
         grep -aE 'panicked|ERROR|assertion|left:|right:|Test unit written' -A 2 "$log" | tail -n 20

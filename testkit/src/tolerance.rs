@@ -349,3 +349,6 @@ pub const PLANTED_TERM: f64 = 0.08;
 /// A coefficient fitted in other units: factors that are no powers of two round every sample, and a search of its parameters by
 /// differences ends where their steps do.
 pub const RESCALED: f64 = 1e-4;
+
+/// Sums of ten thousand squares in another order, and a difference that is added again.
+pub const TURNED: f64 = 1e-9;

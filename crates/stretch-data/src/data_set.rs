@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     DataError, ReadOptions, Recording, RigFile, TomlFile, TomlView, Trial,
-    digest::{digest_of, is_digest},
+    digest::{digest_of, digest_of_bytes, is_digest},
     nearest,
     toml_text::{number_text, string_text},
     write_folder, write_whole,
@@ -87,6 +87,9 @@ impl DataSet {
     /// [`DataError::Io`], [`DataError::NotToml`], or [`DataError::Key`] with table and key.
     pub fn read(folder: impl AsRef<Path>) -> Result<Self, DataError> {
         let folder = folder.as_ref();
+        if folder.is_dir() && !folder.join(FILE).exists() {
+            return Err(DataError::no_data_set(folder));
+        }
         let file = TomlFile::read(folder.join(FILE))?;
         let set = Self::from_file(&file)?;
         for (i, entry) in set.trials.iter().enumerate() {
@@ -343,24 +346,43 @@ impl TrialEntry {
         options: &ReadOptions,
     ) -> Result<Recording, DataError> {
         let path = folder.as_ref().join(&self.file);
-        self.check_digest(folder.as_ref(), &path)?;
+        let found = || digest_of(&path).map_err(|e| DataError::io(path.display(), "open it", e));
+        self.check_digest(&folder.as_ref().join(FILE), found)?;
         let mut recording = Recording::read(path, options)?;
         recording.trial.name.clone_from(&self.file);
         Ok(recording)
+    }
+
+    /// Reads the trial from the bytes of its file, which stands in no folder.
+    ///
+    /// # Errors
+    /// As [`Recording::read`].
+    pub fn recording_of(
+        &self,
+        bytes: &[u8],
+        options: &ReadOptions,
+    ) -> Result<Recording, DataError> {
+        let found = || digest_of_bytes(bytes).map_err(|e| DataError::io(&self.file, "read it", e));
+        self.check_digest(Path::new(FILE), found)?;
+        Recording::from_reader(bytes, &self.file, options)
     }
 }
 
 impl TrialEntry {
     /// Whether the file is the one that the data set was written with, where that is known.
-    fn check_digest(&self, folder: &Path, path: &Path) -> Result<(), DataError> {
+    fn check_digest(
+        &self,
+        description: &Path,
+        found: impl FnOnce() -> Result<String, DataError>,
+    ) -> Result<(), DataError> {
         let Some(written) = &self.digest else { return Ok(()) };
-        let found = digest_of(path).map_err(|e| DataError::io(path.display(), "open it", e))?;
+        let found = found()?;
         if found == *written {
             return Ok(());
         }
         let file = &self.file;
         Err(DataError::Key {
-            file: folder.join(FILE).display().to_string(),
+            file: description.display().to_string(),
             table: format!("the [[trial]] of {file}"),
             key: "digest".to_owned(),
             problem: format!(

@@ -16,9 +16,13 @@ const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
 /// What a digest begins with.
 const KIND: &str = "crc32c ";
 
-/// The digest of a file's bytes: `crc32c`, and eight hexadecimal digits.
+/// The digest of a file's bytes.
 pub(crate) fn digest_of(path: &Path) -> io::Result<String> {
-    let mut file = File::open(path)?;
+    digest_of_bytes(File::open(path)?)
+}
+
+/// `crc32c`, and eight hexadecimal digits.
+pub(crate) fn digest_of_bytes(mut file: impl Read) -> io::Result<String> {
     let (mut digest, mut buffer) = (CRC.digest(), vec![0; 1 << 16]);
     loop {
         match file.read(&mut buffer) {

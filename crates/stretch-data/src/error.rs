@@ -1,6 +1,6 @@
 //! What can be wrong with a file, with the evidence.
 
-use std::{fmt, io};
+use std::{fmt, fs, io, path::Path};
 
 /// Where in a file something stands.
 ///
@@ -38,6 +38,14 @@ pub enum DataError {
         /// What the system said.
         #[source]
         cause: io::Error,
+    },
+    /// A folder that is no data set.
+    #[error("{folder}: there is no dataset.toml in it; {hint}")]
+    NoDataSet {
+        /// The folder.
+        folder: String,
+        /// What to do, by what is in it.
+        hint: String,
     },
     /// A file without a byte, or with blank lines only.
     #[error(
@@ -379,7 +387,11 @@ impl DataError {
 
     /// Whether the file or folder is not there.
     pub fn is_not_found(&self) -> bool {
-        matches!(self, Self::Io { cause, .. } if cause.kind() == io::ErrorKind::NotFound)
+        match self {
+            Self::Io { cause, .. } => cause.kind() == io::ErrorKind::NotFound,
+            Self::NoDataSet { .. } => true,
+            _ => false,
+        }
     }
 
     /// Whether whoever read the output has gone: a pipe into `head`, say.
@@ -418,6 +430,32 @@ impl DataError {
     /// Whether [`interrupt`](crate::interrupt) stopped it.
     pub fn is_interrupted(&self) -> bool {
         matches!(self, Self::Interrupted { .. })
+    }
+
+    /// What a folder without a `dataset.toml` may be meant for.
+    pub(crate) fn no_data_set(folder: &Path) -> Self {
+        let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+        let is_table = |name: &String| name.ends_with(".csv") || name.ends_with(".csv.gz");
+        let mut tables: Vec<String> = entries
+            .map(|entry| entry.file_name().to_string_lossy().into_owned())
+            .filter(is_table)
+            .collect();
+        tables.sort();
+        let shown = folder.display();
+        let hint = match tables.first() {
+            None => "name a data set, or recordings one by one".to_owned(),
+            Some(first) => {
+                let held = match tables.len() {
+                    1 => first.clone(),
+                    many => format!("{many} CSV files"),
+                };
+                format!(
+                    "it holds {held}: name recordings one by one ({shown}/{first}; {shown}/*.csv where several may be \
+                     named), or write a dataset.toml that says which are fitted and which test"
+                )
+            }
+        };
+        Self::NoDataSet { folder: shown.to_string(), hint }
     }
 
     pub(crate) fn io(path: impl fmt::Display, action: &'static str, cause: io::Error) -> Self {

@@ -50,9 +50,30 @@ impl DataSet {
         folder: impl AsRef<Path>,
         options: &ReadOptions,
     ) -> Result<Vec<SessionTrial>, DataError> {
+        self.session(|entry| entry.load_recording(&folder, options))
+    }
+
+    /// Every trial, read by `read`: for files that stand in no folder.
+    ///
+    /// # Errors
+    /// Those of `read`.
+    ///
+    /// ```
+    /// use stretch_data::{DataError, DataSet, ReadOptions, Split};
+    /// let text = "name = 'b'\nrate_hz = 100\n[[trial]]\nfile = 'a.csv'\nkind = 'other'\nsplit = 'test'";
+    /// let set = DataSet::parse("dataset.toml", text)?;
+    /// let bytes = b"time_s,bridge_v\n0,1.5\n0.01,1.6\n";
+    /// let trials = set.session(|entry| entry.recording_of(bytes, &ReadOptions::new()))?;
+    /// assert_eq!((trials[0].trial.name.as_str(), trials[0].split), ("a.csv", Split::Test));
+    /// # Ok::<(), DataError>(())
+    /// ```
+    pub fn session<E>(
+        &self,
+        mut read: impl FnMut(&crate::TrialEntry) -> Result<Recording, E>,
+    ) -> Result<Vec<SessionTrial>, E> {
         let mut is_told = false;
         let load = |entry: &crate::TrialEntry| {
-            let mut recording = entry.load_recording(&folder, options)?;
+            let mut recording = read(entry)?;
             // once for all trials: what is wrong is one line of dataset.toml
             let told = self.rate_told(&recording.trial).filter(|_| !is_told);
             is_told |= told.is_some();

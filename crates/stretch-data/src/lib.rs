@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod carry;
+mod column;
 mod data_set;
 mod digest;
 mod disk;
@@ -23,6 +24,7 @@ mod row_reader;
 pub mod strategies;
 mod stream;
 mod temporary;
+mod time;
 mod toml_file;
 mod toml_text;
 mod toml_view;
@@ -31,6 +33,7 @@ mod write;
 mod write_folder;
 mod write_whole;
 
+pub use column::{tidy_column, unit, unit_of, written_unit};
 pub use data_set::{DataSet, Split, TrialEntry, TrialKind};
 pub use disk::DiskCall;
 #[doc(hidden)]
@@ -48,9 +51,10 @@ pub use rig_file::{EffectEntry, Parameter, Remarks, RigFile};
 pub use row_reader::{Row, RowReader};
 pub use stream::is_standard_output;
 pub use temporary::without_temporary_names;
+pub use time::tidy_time;
 pub use toml_file::TomlFile;
 pub use toml_view::TomlView;
-pub use trial::{Channel, Trial, unit};
+pub use trial::{Channel, Trial};
 pub use write::push_number;
 pub use write_folder::{recover, write_folder};
 pub use write_whole::write_whole;

@@ -39,6 +39,7 @@ use std::{
 };
 
 use crate::{DataError, ReadOptions};
+pub(crate) use names::tidy;
 use sniff::Format;
 pub use told::Recording;
 

@@ -158,14 +158,3 @@ pub(crate) fn rate_of(time_s: &[f64]) -> Option<f64> {
     let (count, sum) = short.fold((0_u32, 0.0), |(count, sum), step| (count + 1, sum + step));
     Some(f64::from(count) / sum).filter(|rate| rate.is_finite())
 }
-
-/// The unit in a column's name: its last part, after an underscore.
-///
-/// ```
-/// use stretch_data::unit;
-/// assert_eq!(unit("length_mm"), Some("mm"));
-/// assert_eq!(unit("s2"), None);
-/// ```
-pub fn unit(column: &str) -> Option<&str> {
-    column.rsplit_once('_').map(|(_, unit)| unit).filter(|unit| !unit.is_empty())
-}

@@ -323,7 +323,9 @@ fn data_sets() {
 fn data_sets_whose_files_are_missing() {
     let folder = tempfile::tempdir().expect("a folder");
     let read = || DataSet::read(folder.path()).expect_err("not whole").to_string();
-    assert!(read().ends_with("dataset.toml: cannot open it: No such file or directory"));
+    assert!(read().ends_with("name a data set, or recordings one by one"), "{}", read());
+    std::fs::write(folder.path().join("b.csv"), "time_s\n").expect("written");
+    assert!(read().contains("it holds b.csv: name recordings one by one ("), "{}", read());
     std::fs::write(folder.path().join("dataset.toml"), SET).expect("written");
     assert!(read().ends_with("[[trial]] 1, key file: there is no file a.csv in the folder"));
     std::fs::write(folder.path().join("dataset.toml"), b"name = '\xff'").expect("written");

@@ -12,6 +12,7 @@
 use std::{fs, path::Path};
 
 use stretch_data::{ReadOptions, Recording};
+use testkit::corpus::is_as_it_should;
 
 /// What comes of a file, in a line.
 fn told(folder: &Path, name: &str) -> String {
@@ -35,29 +36,14 @@ fn told(folder: &Path, name: &str) -> String {
     }
 }
 
-fn is_as_it_should(reader: &str) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus").join(reader);
-    let entries = fs::read_dir(&folder).expect("a folder of the corpus");
-    let mut names: Vec<String> = entries
-        .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
-        .filter(|name| name != "sentences.txt")
-        .collect();
-    names.sort();
-    assert!(!names.is_empty());
-    let expected = fs::read_to_string(folder.join("sentences.txt")).unwrap_or_default();
-    let mut lines = expected.lines();
-    for name in &names {
-        assert_eq!(told(&folder, name), lines.next().unwrap_or_default(), "{reader}/{name}");
-    }
-    assert_eq!(lines.next(), None, "a sentence without a file");
-}
-
 /// A test a folder.
 macro_rules! readers {
     ($($reader:ident)*) => {$(
         #[test]
         fn $reader() {
-            is_as_it_should(stringify!($reader));
+            let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus");
+            let folder = folder.join(stringify!($reader));
+            is_as_it_should(&folder, |name| told(&folder, name));
         }
     )*};
 }

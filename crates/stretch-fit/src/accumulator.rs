@@ -202,6 +202,31 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
         self.factor.merge(&other.factor())
     }
 
+    /// Goes on with the samples of another factor, and gives that of all samples so far: one
+    /// block serves many logs, of which each keeps its factor alone.
+    ///
+    /// # Errors
+    /// [`FitError::MissingTerm`] when the degrees differ; nothing changes then.
+    ///
+    /// ```
+    /// use stretch_core::Degree;
+    /// use stretch_fit::SurfaceAccumulator;
+    ///
+    /// let mut block: SurfaceAccumulator<f64, 2, 8> = SurfaceAccumulator::new(Degree::new(0, 1).unwrap())?;
+    /// let empty = block.factor();
+    /// block.extend([(0.0, 0.0, 1.0), (0.0, 1.0, 3.0)])?;
+    /// let first = block.exchange(empty)?;
+    /// assert_eq!((first.samples(), block.samples()), (2, 0));
+    /// # Ok::<(), stretch_fit::FitError>(())
+    /// ```
+    pub fn exchange(&mut self, other: Factor<T, TERMS>) -> Result<Factor<T, TERMS>, FitError> {
+        self.factor.same_degree(other.degree())?;
+        if self.filled > 0 {
+            self.fold();
+        }
+        Ok(core::mem::replace(&mut self.factor, other))
+    }
+
     /// The triangular factor of all samples so far: what merges, what gives
     /// fits of this and lower degrees, and all there is to keep of a log.
     pub fn factor(&self) -> Factor<T, TERMS> {

@@ -4,14 +4,13 @@ use stretch_core::{Degree, Real};
 
 use crate::FitError;
 
-/// Where each term comes from: the term one power lower, which stands before
-/// it in the order of `Degree::exponents`, times the rate or the voltage.
-fn parents(degree: Degree) -> impl Iterator<Item = (usize, bool)> {
-    degree.exponents().skip(1).map(move |(i, j)| {
-        let by_volts = j > 0;
-        let lower = if by_volts { (i, j - 1) } else { (i - 1, j) };
-        (position(degree, lower).unwrap_or(0), by_volts)
-    })
+/// The powers of each term in an array, which is walked faster than they are found.
+pub(crate) fn exponents<const TERMS: usize>(degree: Degree) -> [(u8, u8); TERMS] {
+    let mut terms = [(0, 0); TERMS];
+    for (place, term) in terms.iter_mut().zip(degree.exponents()) {
+        *place = term;
+    }
+    terms
 }
 
 /// The place of a term in the order of `Degree::exponents`.
@@ -44,9 +43,15 @@ impl<const TERMS: usize> Basis<TERMS> {
         if terms > TERMS {
             return Err(FitError::TooManyTerms { terms, room: TERMS });
         }
+        // each term is one that stands before it, times the rate or the voltage
+        let powers = exponents::<TERMS>(degree);
         let mut steps = [(0, false); TERMS];
-        for (step, (parent, by_volts)) in steps.iter_mut().skip(1).zip(parents(degree)) {
-            *step = (parent as u8, by_volts);
+        for k in 1..terms {
+            let (i, j) = powers[k];
+            let by_volts = j > 0;
+            let lower = if by_volts { (i, j - 1) } else { (i - 1, j) };
+            let parent = powers[..k].iter().position(|&term| term == lower);
+            steps[k] = (parent.unwrap_or(0) as u8, by_volts);
         }
         Ok(Self { degree, steps })
     }

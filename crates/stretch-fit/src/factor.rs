@@ -33,7 +33,83 @@ pub struct Factor<T, const TERMS: usize> {
     folds: u64,
 }
 
+/// The numbers of a [`Factor`], to be stored or sent; [`Factor::new`] checks them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FactorSpec<T, const TERMS: usize> {
+    /// The degree that the samples were accumulated for.
+    pub degree: Degree,
+    /// The voltage that powers are taken about.
+    pub centre: T,
+    /// The triangle, by row; nothing is read below its diagonal or beyond the degree's terms.
+    pub r: [[T; TERMS]; TERMS],
+    /// `Q^T z`, a number a term.
+    pub q: [T; TERMS],
+    /// Residual sum of squares, and what its last addition rounded off.
+    pub residual: (T, T),
+    /// Samples of a weight above zero.
+    pub samples: u64,
+    /// Blocks and triangles folded in.
+    pub folds: u64,
+}
+
 impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
+    /// A factor from its numbers, as [`spec`](Self::spec) gave them, bit for bit.
+    ///
+    /// # Errors
+    /// [`FitError::TooManyTerms`] when the degree has more than `TERMS` terms,
+    /// [`FitError::NotFinite`] for a number that is not finite.
+    ///
+    /// ```
+    /// use stretch_core::Degree;
+    /// use stretch_fit::{Factor, FitError, SurfaceAccumulator};
+    ///
+    /// let mut line: SurfaceAccumulator<f64, 2, 8> = SurfaceAccumulator::new(Degree::new(0, 1).unwrap())?;
+    /// line.extend([(0.0, 0.0, 1.0), (0.0, 1.0, 3.0), (0.0, 2.0, 4.0)])?;
+    /// let spec = line.factor().spec();
+    /// assert_eq!(Factor::new(spec)?, line.factor());
+    /// let damaged = stretch_fit::FactorSpec { centre: f64::NAN, ..spec };
+    /// assert_eq!(Factor::new(damaged), Err(FitError::NotFinite));
+    /// # Ok::<(), FitError>(())
+    /// ```
+    pub fn new(spec: FactorSpec<T, TERMS>) -> Result<Self, FitError> {
+        let FactorSpec { degree, centre, r, q, residual, samples, folds } = spec;
+        let mut factor = Self::empty(Basis::new(degree)?);
+        let terms = factor.basis.terms();
+        let mut sound = centre.is_finite() && residual.0.is_finite() && residual.1.is_finite();
+        for row in 0..terms {
+            for column in row..terms {
+                sound &= r[row][column].is_finite();
+                factor.r[row][column] = r[row][column];
+            }
+            sound &= q[row].is_finite();
+            factor.q[row] = q[row];
+        }
+        let factor = Self { centre, residual, samples, folds, ..factor };
+        if sound { Ok(factor) } else { Err(FitError::NotFinite) }
+    }
+
+    /// The numbers of which it consists.
+    pub fn spec(&self) -> FactorSpec<T, TERMS> {
+        FactorSpec {
+            degree: self.degree(),
+            centre: self.centre,
+            r: self.r,
+            q: self.q,
+            residual: self.residual,
+            samples: self.samples,
+            folds: self.folds,
+        }
+    }
+
+    /// The same samples with voltages counted from `origin`: what was `volts` is `volts - origin`.
+    ///
+    /// Coefficients of raw volts that vary little cancel; those about an origin within the samples
+    /// do not, and no digit is lost on the way.
+    #[must_use]
+    pub fn counted_from(self, origin: T) -> Self {
+        Self { centre: self.centre - origin, ..self }
+    }
+
     pub(crate) fn empty(basis: Basis<TERMS>) -> Self {
         Self {
             basis,
@@ -89,8 +165,8 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         self.basis.columns(root_weights, rates, volts, block);
         let squares = fold(self.basis.terms(), &mut self.r, &mut self.q, block, values);
         self.add_residual(squares);
-        self.samples += samples as u64;
-        self.folds += 1;
+        self.samples = self.samples.saturating_add(samples as u64);
+        self.folds = self.folds.saturating_add(1);
     }
 
     /// Adds the samples of another factor: equal to one pass over both logs up
@@ -99,7 +175,7 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
     /// # Errors
     /// [`FitError::MissingTerm`] when the degrees differ; nothing changes then.
     pub fn merge(&mut self, other: &Self) -> Result<(), FitError> {
-        self.same_degree(other)?;
+        self.same_degree(other.degree())?;
         if other.samples == 0 {
             return Ok(());
         }
@@ -122,13 +198,17 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         let squares = fold(terms, &mut self.r, &mut self.q, &mut block, &mut values);
         self.add_residual(squares);
         self.add_residual(other.residual_sum());
-        self.samples += other.samples;
-        self.folds += other.folds + 1;
+        // what was stored may have been damaged: counts stay counts
+        self.samples = self.samples.saturating_add(other.samples);
+        self.folds = self.folds.saturating_add(other.folds).saturating_add(1);
         Ok(())
     }
 
-    fn same_degree(&self, other: &Self) -> Result<(), FitError> {
-        let (a, b) = (self.degree(), other.degree());
+    pub(crate) fn same_degree(&self, b: Degree) -> Result<(), FitError> {
+        let a = self.degree();
+        if a == b {
+            return Ok(());
+        }
         let odd = a
             .exponents()
             .find(|&term| position(b, term).is_none())
@@ -178,6 +258,12 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
     /// samples, `|R c - q|^2 + rest`, from its coefficients in the order of
     /// `Degree::exponents`; those beyond the end count as zero.
     pub fn residual_of(&self, coefficients: &[T]) -> T {
+        let missed = self.missed(coefficients);
+        missed.iter().fold(T::zero(), |sum, &x| sum + x * x) + self.residual_sum()
+    }
+
+    /// `q - R c`.
+    fn missed(&self, coefficients: &[T]) -> [T; TERMS] {
         let terms = self.basis.terms();
         let mut raw = [T::zero(); TERMS];
         for (place, &c) in raw[..terms].iter_mut().zip(coefficients) {
@@ -185,9 +271,29 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         }
         let centred = apply(terms, &shift(self.degree(), self.centre), &raw);
         let reached = apply(terms, &self.r, &centred);
-        let missed = reached[..terms].iter().zip(&self.q);
-        let sum = missed.fold(T::zero(), |sum, (&a, &q)| sum + (a - q) * (a - q));
-        sum + self.residual_sum()
+        let mut missed = [T::zero(); TERMS];
+        for (missed, (&a, &q)) in missed[..terms].iter_mut().zip(reached.iter().zip(&self.q)) {
+            *missed = q - a;
+        }
+        missed
+    }
+
+    /// The same of a surface of this very degree.
+    pub(crate) fn missed_by(
+        &self,
+        degree: Degree,
+        coefficients: &[T],
+    ) -> Result<[T; TERMS], FitError> {
+        self.same_degree(degree)?;
+        Ok(self.missed(coefficients))
+    }
+
+    pub(crate) fn centre(&self) -> T {
+        self.centre
+    }
+
+    pub(crate) fn triangle(&self) -> &[[T; TERMS]; TERMS] {
+        &self.r
     }
 
     /// The weighted sum of squares of the values about their weighted mean.

@@ -13,6 +13,7 @@ mod line;
 mod order_table;
 mod quantile;
 mod robust;
+mod scores;
 mod shift;
 #[cfg(feature = "proptest")]
 pub mod strategies;
@@ -21,7 +22,7 @@ pub use accumulator::SurfaceAccumulator;
 pub use confidence::{Bounds, Confidence};
 pub use cross_validation::{CrossValidation, HeldOut, cross_validate, held_out};
 pub use error::FitError;
-pub use factor::Factor;
+pub use factor::{Factor, FactorSpec};
 pub use fit::Fit;
 pub use line::{LineAccumulator, LineFit};
 pub use order_table::{OrderEntry, OrderRow, OrderTable};

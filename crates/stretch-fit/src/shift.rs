@@ -10,7 +10,9 @@
 // Triangles are walked by index, as in the textbooks.
 #![allow(clippy::needless_range_loop)]
 
-use stretch_core::{Degree, Real};
+use stretch_core::{Degree, MAX_DEGREE, Real};
+
+use crate::basis::exponents;
 
 /// `C(n, k)` for powers up to 5.
 fn binomial(n: u8, k: u8) -> f64 {
@@ -22,12 +24,18 @@ fn binomial(n: u8, k: u8) -> f64 {
 /// For coefficients of one surface: those in `v` are `S` times those in
 /// `v + by`.
 pub(crate) fn shift<T: Real, const TERMS: usize>(degree: Degree, by: T) -> [[T; TERMS]; TERMS] {
+    let terms = exponents::<TERMS>(degree);
+    let mut powers = [T::one(); MAX_DEGREE + 1];
+    for j in 1..powers.len() {
+        powers[j] = powers[j - 1] * by;
+    }
     let mut s = [[T::zero(); TERMS]; TERMS];
-    for (row, (i, m)) in s.iter_mut().zip(degree.exponents()) {
-        for (entry, (k, j)) in row.iter_mut().zip(degree.exponents()) {
+    for row in 0..degree.terms().min(TERMS) {
+        let (i, m) = terms[row];
+        for column in row..degree.terms().min(TERMS) {
+            let (k, j) = terms[column];
             if k == i && j >= m {
-                let power = (m..j).fold(T::one(), |power, _| power * by);
-                *entry = T::from_f64(binomial(j, m)) * power;
+                s[row][column] = T::from_f64(binomial(j, m)) * powers[usize::from(j - m)];
             }
         }
     }

@@ -47,6 +47,24 @@ pub struct Agreement<T> {
     products: Sum<T>,
 }
 
+/// The numbers of an [`Agreement`], to be stored or sent; [`Agreement::from_spec`] takes them back.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AgreementSpec<T> {
+    /// Pairs taken.
+    pub count: u64,
+    /// Pairs not taken.
+    pub skipped: u64,
+    /// Of the error: mean and squared deviations, magnitudes, each with what rounding lost, and the
+    /// largest magnitude.
+    pub errors: [T; 7],
+    /// Of the truth: mean and squared deviations, each with what rounding lost; least and greatest.
+    pub truth: [T; 6],
+    /// The same of the estimate.
+    pub estimate: [T; 6],
+    /// Products of the deviations of both, and what rounding lost.
+    pub products: [T; 2],
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Spread<T> {
     moments: Moments<T>,
@@ -69,6 +87,15 @@ impl<T: Real> Spread<T> {
         self.moments.merge(&other.moments);
         self.min = self.min.min(other.min);
         self.max = self.max.max(other.max);
+    }
+
+    fn parts(&self) -> [T; 6] {
+        let [a, b, c, d] = self.moments.parts();
+        [a, b, c, d, self.min, self.max]
+    }
+
+    fn of(count: u64, [a, b, c, d, min, max]: [T; 6]) -> Self {
+        Self { moments: Moments::of(count, [a, b, c, d]), min, max }
     }
 
     fn range(&self) -> Option<(T, T)> {
@@ -123,6 +150,38 @@ impl<T: Real> Agreement<T> {
         self.errors.merge(&other.errors);
         self.truth.merge(&other.truth);
         self.estimate.merge(&other.estimate);
+    }
+
+    /// The numbers of which it consists.
+    pub fn spec(&self) -> AgreementSpec<T> {
+        AgreementSpec {
+            count: self.count(),
+            skipped: self.skipped(),
+            errors: self.errors.parts(),
+            truth: self.truth.parts(),
+            estimate: self.estimate.parts(),
+            products: self.products.parts(),
+        }
+    }
+
+    /// From the numbers that [`spec`](Self::spec) gave, bit for bit; `None` when one of them is not
+    /// finite.
+    ///
+    /// ```
+    /// use stretch_metrics::Agreement;
+    /// let mut agreement = Agreement::<f64>::new();
+    /// agreement.push(150.0, 152.0);
+    /// assert_eq!(Agreement::from_spec(agreement.spec()), Some(agreement));
+    /// ```
+    pub fn from_spec(spec: AgreementSpec<T>) -> Option<Self> {
+        let AgreementSpec { count, skipped, errors, truth, estimate, products } = spec;
+        let mut all = errors.iter().chain(&truth).chain(&estimate).chain(&products);
+        all.all(|x| x.is_finite()).then(|| Self {
+            errors: ErrorStats::of(count, skipped, errors),
+            truth: Spread::of(count, truth),
+            estimate: Spread::of(count, estimate),
+            products: Sum::of(products),
+        })
     }
 
     /// Bias, MAE, RMSE and the rest, in the unit of the signals.

@@ -72,7 +72,7 @@ impl<T: Real> ErrorStats<T> {
         self.moments.merge(&other.moments);
         self.absolute.merge(&other.absolute);
         self.largest = self.largest.max(other.largest);
-        self.skipped += other.skipped;
+        self.skipped = self.skipped.saturating_add(other.skipped);
     }
 
     /// Pairs taken.
@@ -108,6 +108,16 @@ impl<T: Real> ErrorStats<T> {
     /// The largest magnitude of the error. `None` when empty.
     pub fn max_abs(&self) -> Option<T> {
         (self.count() > 0).then_some(self.largest)
+    }
+
+    pub(crate) fn parts(&self) -> [T; 7] {
+        let ([a, b, c, d], [e, f]) = (self.moments.parts(), self.absolute.parts());
+        [a, b, c, d, e, f, self.largest]
+    }
+
+    pub(crate) fn of(count: u64, skipped: u64, [a, b, c, d, e, f, largest]: [T; 7]) -> Self {
+        let (moments, absolute) = (Moments::of(count, [a, b, c, d]), Sum::of([e, f]));
+        Self { moments, absolute, largest, skipped }
     }
 
     /// Sum of the squared errors.

@@ -12,7 +12,7 @@ pub mod strategies;
 pub mod student_t;
 mod sum;
 
-pub use agreement::{Agreement, Delta};
+pub use agreement::{Agreement, AgreementSpec, Delta};
 pub use blocks::{BlockMeans, PairedBlocks};
 pub use error::MetricsError;
 pub use error_stats::ErrorStats;

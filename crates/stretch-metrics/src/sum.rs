@@ -32,6 +32,14 @@ impl<T: Real> Sum<T> {
     pub(crate) fn value(&self) -> T {
         self.high + self.low
     }
+
+    pub(crate) fn parts(&self) -> [T; 2] {
+        [self.high, self.low]
+    }
+
+    pub(crate) fn of([high, low]: [T; 2]) -> Self {
+        Self { high, low }
+    }
 }
 
 /// Count, mean and sum of squared deviations (Welford, doi:10.1080/00401706.1962.10490022),
@@ -68,7 +76,7 @@ impl<T: Real> Moments<T> {
             *self = *other;
             return;
         }
-        let count = self.count + other.count;
+        let count = self.count.saturating_add(other.count);
         let delta = other.mean.value() - self.mean.value();
         let share = real::<T>(other.count) / real(count);
         self.squares.merge(&other.squares);
@@ -79,6 +87,15 @@ impl<T: Real> Moments<T> {
 
     pub(crate) fn count(&self) -> u64 {
         self.count
+    }
+
+    pub(crate) fn parts(&self) -> [T; 4] {
+        let ([a, b], [c, d]) = (self.mean.parts(), self.squares.parts());
+        [a, b, c, d]
+    }
+
+    pub(crate) fn of(count: u64, [a, b, c, d]: [T; 4]) -> Self {
+        Self { count, mean: Sum::of([a, b]), squares: Sum::of([c, d]) }
     }
 
     pub(crate) fn mean(&self) -> T {

@@ -135,9 +135,33 @@ impl<T: Real, R, A: Across<T>> Front<Surfaces<T, R, A>> {
         Ok(Self { model })
     }
 
+    /// The reading of a signal whose rate is known, on a branch that is known: no memory, so that
+    /// samples may come in any order. `R` can be `()`.
+    ///
+    /// ```
+    /// use stretch_core::Branch;
+    /// use stretch_receptor::{StretchReceptor, example_calibration};
+    /// let receptor = StretchReceptor::<f64, ()>::with_rate(&example_calibration(), ())?;
+    /// let reading = receptor.at(Branch::Inflation, 0.4, 1.5);
+    /// assert!(reading.estimate > 150.0 && reading.estimate < 180.0);
+    /// # Ok::<(), stretch_core::DesignError>(())
+    /// ```
+    pub fn at(&self, branch: Branch, rate: T, signal: T) -> Reading<T> {
+        self.model.reading(branch, rate, signal)
+    }
+
     /// The rate estimator.
     pub fn rate_design(&self) -> &R {
         &self.model.rate
+    }
+}
+
+impl<T: Real, R, A: Across<T>> Surfaces<T, R, A> {
+    #[inline(always)]
+    fn reading(&self, branch: Branch, rate: T, signal: T) -> Reading<T> {
+        let point = self.across.point(&self.map, self.direction, branch, rate, signal);
+        let Point { estimate, slope, domain } = point;
+        Reading { estimate, rate: slope * rate, branch, domain, sd: None }
     }
 }
 
@@ -171,9 +195,7 @@ impl<T: Real, R: Stage<T, Out = Option<T>>, A: Across<T>> Live for Surfaces<T, R
         let rate = self.rate.step(&mut memory.rate, signal)?;
         memory.last_rate = rate;
         *branch = self.direction.next(*branch, rate);
-        let point = self.across.point(&self.map, self.direction, *branch, rate, signal);
-        let Point { estimate, slope, domain } = point;
-        Some(Reading { estimate, rate: slope * rate, branch: *branch, domain, sd: None })
+        Some(self.reading(*branch, rate, signal))
     }
 
     /// By the last sample, moved on by the last rate.

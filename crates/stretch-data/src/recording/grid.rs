@@ -6,7 +6,7 @@ use super::{
     told::Recording,
 };
 use crate::{
-    Channel, DataError, Place, ReadOptions, Trial, header::missing_column, read::KNOWN,
+    Channel, DataError, Place, ReadOptions, Trial, header::missing_column, read::KNOWN, tidy_time,
     trial::rate_of, write::can_name,
 };
 
@@ -267,8 +267,10 @@ fn even(from_s: f64, to_s: f64, rate_hz: f64, file: &str) -> Result<Vec<f64>, Da
         let (file, column) = (file.to_owned(), "grid".to_owned());
         return Err(DataError::Rate { file, column, rate_hz });
     }
+    let largest_s = from_s.abs().max(to_s.abs());
+    let at = |i: u64| tidy_time(from_s + i as f64 / rate_hz, largest_s);
     // Rounding must not push the last instant beyond the last sample.
-    Ok((0..=count as u64).map(|i| (from_s + i as f64 / rate_hz).min(to_s)).collect())
+    Ok((0..=count as u64).map(|i| at(i).min(to_s)).collect())
 }
 
 /// Takes instants out of the grid that stand where a track has a gap: a line across it would be invented.

@@ -1,8 +1,70 @@
 //! From a diagnosis to what a calibration can use of it.
 
-use stretch_calibrate::Cause;
-use stretch_gap::{Candidate, Diagnosis, VerdictKind};
-use stretch_sim::{Gauge, Stage, effect_named};
+use stretch_calibrate::{Cause, Options};
+use stretch_data::{SessionTrial, Trial};
+use stretch_gap::{Candidate, Diagnosis, Options as Diagnosing, VerdictKind, diagnose};
+use stretch_sim::{Catalogue, Gauge, Stage, effect_named};
+
+use crate::{GaugeSetup, GaugeSimulator};
+
+/// What a calibration builds on: effects of the gauge, and what there is to say of how they were found.
+#[derive(Debug, Clone, Default)]
+pub struct Causes {
+    /// The effects.
+    pub found: Vec<Cause>,
+    /// Sentences.
+    pub notes: Vec<String>,
+}
+
+impl Causes {
+    /// Of trials, diagnosed as a gauge alone; none where they cannot be, which is said.
+    ///
+    /// `progress` and `stop` as [`diagnose`] takes them.
+    pub fn of(
+        trials: &[Trial],
+        options: &Options,
+        progress: &(dyn Fn(&str) + Sync),
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Self {
+        let session: Vec<SessionTrial> = trials.iter().cloned().map(SessionTrial::new).collect();
+        let catalogue = Catalogue::default();
+        let gauge = GaugeSimulator::new(&GaugeSetup {
+            trials: &session,
+            reference: &options.reference,
+            signal: &options.signal,
+            rig: None,
+            catalogue: &catalogue,
+        });
+        let done = gauge.map_err(|error| error.to_string()).and_then(|gauge| {
+            let done = diagnose(&gauge, &Diagnosing::default(), progress, stop);
+            done.map(|(diagnosis, _)| diagnosis).map_err(|error| error.to_string())
+        });
+        match done {
+            Ok(diagnosis) => {
+                let notes = vec![format!("the gauge alone: {}", diagnosis.sentence)];
+                Self { found: causes(&diagnosis), notes }
+            }
+            Err(error) => {
+                let notes = vec![format!("the trials could not be diagnosed: {error}")];
+                Self { found: Vec::new(), notes }
+            }
+        }
+    }
+
+    /// Without those that need a pressure, where some trial has none; which is said.
+    pub fn felt(mut self, trials: &[Trial], options: &Options) -> Self {
+        let has_pressure = trials.iter().all(|t| t.channel(&options.pressure).is_some());
+        let needs = |cause: &Cause| cause.effect == "pressure_crosstalk" && !has_pressure;
+        if self.found.iter().any(needs) {
+            self.found.retain(|cause| !needs(cause));
+            self.notes.push(format!(
+                "pressure_crosstalk needs the pressure, and no {} was recorded: it is left out",
+                options.pressure
+            ));
+        }
+        self
+    }
+}
 
 /// The effects of the gauge and its reference in the best set of a diagnosis, with their values in shares of the reference's range:
 /// those of the whole rig divided by its strokes, those of a gauge alone as they are. Empty where the simulator

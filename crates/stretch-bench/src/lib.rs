@@ -2,7 +2,9 @@
 
 mod acting;
 mod causes;
+mod ends;
 mod error;
+mod examined;
 mod fix;
 mod gauge;
 mod implement;
@@ -13,8 +15,9 @@ mod rig_file;
 mod specs;
 mod wild;
 
-pub use causes::causes;
+pub use causes::{Causes, causes};
 pub use error::BenchError;
+pub use examined::{Bench, Examined};
 pub use fix::{Fix, NoFix};
 pub use gauge::{GaugeSetup, GaugeSimulator};
 pub use implement::Implementation;

@@ -12,16 +12,16 @@ mod rigs;
 #[path = "support/session.rs"]
 mod simulated;
 
-use approx::{abs_diff_eq, assert_abs_diff_eq};
+use approx::{abs_diff_eq, assert_abs_diff_eq, assert_relative_eq};
 use effects::effect;
 use rigs::own_rig;
 use rows::{PROBABILITY, with_lost_rows};
 use simulated::session;
 use stretch_bench::{RigSetup, RigSimulator, Session};
 use stretch_data::{RigFile, SessionTrial, Split};
-use stretch_gap::{Diagnosis, Options, Simulator, VerdictKind, diagnose};
+use stretch_gap::{Diagnosis, Evidence, Options, Run, Simulator, VerdictKind, diagnose};
 use stretch_sim::{Catalogue, EffectSet, Rig, RigParams, SimError, default_rig_text};
-use testkit::tolerance::{FLOW_FOUND, GAP_NULL, LAG_FOUND, POLE_FOUND_S, TRAINED_AGAIN};
+use testkit::tolerance::{FLOW_FOUND, GAP_NULL, LAG_FOUND, POLE_FOUND_S, TRAINED_AGAIN, TURNED};
 
 /// The stock rig beside trials.
 fn setup<'a>(trials: &[SessionTrial], catalogue: &'a Catalogue) -> RigSetup<'a> {
@@ -33,6 +33,10 @@ fn run(trials: Vec<SessionTrial>, without: &[&str], options: &Options) -> Diagno
     let catalogue = Catalogue::default().without(without).expect("known names");
     let simulator = RigSimulator::new(setup(&trials, &catalogue)).expect("a simulator");
     diagnose(&simulator, options, &|_| (), &|| false).expect("a diagnosis").0
+}
+
+fn run_of(simulator: &dyn Simulator) -> Evidence {
+    diagnose(simulator, &shallow(), &|_| (), &|| false).expect("a diagnosis").1
 }
 
 fn shallow() -> Options {
@@ -86,6 +90,42 @@ fn a_slow_amplifier_is_named_and_measured_whatever_the_number_of_threads() {
         serde_json::to_string(&Diagnosis { runtime_s: 0.0, ..d.clone() }).expect("JSON")
     };
     assert_eq!(text(&one), text(&two));
+}
+
+#[test]
+fn turned_numbers_answer_as_the_simulator_does() {
+    let effects = effect("gauge_relaxation", &[("c", 0.3), ("tau", 0.1)]);
+    let trials = session(&own_rig(), &effects, false, 7);
+    let catalogue = Catalogue::default();
+    let simulator = RigSimulator::new(setup(&trials, &catalogue)).expect("a simulator");
+    let options = Options { responses: true, ..shallow() };
+    let (diagnosis, evidence) =
+        diagnose(&simulator, &options, &|_| (), &|| false).expect("a diagnosis");
+    let responses = evidence.responses.as_ref().expect("an effect that can be turned");
+    let stage = responses.stage;
+    assert_eq!(diagnosis.location.worst(), Some(stage));
+    assert_eq!(responses.parameters[0].effect, diagnosis.named[0]);
+    // what is left at the fit is what the tables say
+    let own = &evidence.stages[stage];
+    assert_relative_eq!(responses.products[0][0], 1.0 + own.excess_after, max_relative = TURNED);
+    for (turned, one) in responses.parameters.iter().enumerate() {
+        assert!(one.answers.len() >= 3, "{}", one.name);
+        assert!(one.answers.is_sorted_by(|a, b| a.value < b.value));
+        let answer = &one.answers[0];
+        let mut model = evidence.best.clone();
+        model.effects[0].1[turned] = answer.value;
+        let mut out = vec![0.0; own.after.len()];
+        let run = Run::exact(stage, &model, simulator.trials().len());
+        simulator.simulate(run, &mut out).expect("a run");
+        let told = own.after.iter().zip(&answer.output).map(|(y, change)| y + change);
+        assert!(out.iter().zip(told).all(|(y, told)| (y - told).abs() <= TURNED * y.abs()));
+        // the fit is the best there is on trials of the same rig
+        let k = 1 + responses.parameters[..turned].iter().map(|p| p.answers.len()).sum::<usize>();
+        let products = &responses.products;
+        let left = products[0][0] - 2.0 * products[0][k] + products[k][k];
+        assert!(left > products[0][0], "{}: {left}", one.name);
+    }
+    assert!(run_of(&simulator).responses.is_none(), "nobody asked");
 }
 
 #[test]

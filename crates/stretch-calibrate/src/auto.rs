@@ -1,12 +1,13 @@
 //! Which model to calibrate with, by errors on trials left out.
 
 use rayon::prelude::*;
-use serde::Serialize;
-use stretch_data::Trial;
+use serde::{Deserialize, Serialize};
+use stretch_data::{Trial, unit_of};
 use stretch_metrics::lag;
 
 use crate::{
     CalibrateError, Memory, ModelKind, Options, apply,
+    auto_words::{Grounds, Seen, why},
     calibrate::{Choice, calibrate_with},
     cost::{m3_instructions, m3_instructions_fixed},
     series::{extent, sample_rate_hz},
@@ -69,6 +70,8 @@ pub struct ModelChoice {
     /// The model to use.
     #[serde(skip)]
     pub model: ModelKind,
+    /// Why that one, with the figures that were compared.
+    pub why: String,
     /// What the data cannot say, one sentence each.
     pub notes: Vec<String>,
 }
@@ -107,8 +110,17 @@ struct Fold {
     to: usize,
 }
 
+/// What became of one model on everything left out: what [`choose_among`] chooses from. It travels as JSON, so that models can be
+/// judged by workers that share no memory.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Judged {
+    /// Numbers that the fit determines.
+    parameters: usize,
+    errors: Errors,
+}
+
 /// Errors of one model on everything left out.
-#[derive(Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 struct Errors {
     /// Mean squared error of each part left out; none where nothing was estimated.
     parts: Vec<Option<f64>>,
@@ -135,44 +147,89 @@ struct Errors {
 /// # Errors
 /// [`CalibrateError`] of the simplest model when none can be fitted.
 pub fn choose_model(trials: &[Trial], options: &Options) -> Result<ModelChoice, CalibrateError> {
-    let mut turning = Vec::new();
-    for trial in trials {
-        turning.push(reverses(trial.require(&options.reference)?));
-    }
-    let folds = folds(trials);
-    let mut found = Vec::new();
-    let mut first_problem = None;
-    // A model of what a diagnosis named exists where one named something.
+    let judged: Vec<_> = candidate_models(options)
+        .into_par_iter()
+        .map(|kind| (kind, judge_model(trials, options, kind)))
+        .collect();
+    let told = |judged: &Result<Judged, CalibrateError>| match judged {
+        Ok(judged) => Ok(judged.clone()),
+        Err(error) => Err(error.to_string()),
+    };
+    let found = judged.iter().map(|(kind, judged)| (*kind, told(judged))).collect();
+    choose_among(trials, options, found).ok_or_else(|| {
+        // a part without a sample has no trial; the user named some
+        let first = judged.into_iter().find_map(|(_, judged)| judged.err());
+        let first = first.filter(|problem| !matches!(problem, CalibrateError::NoTrials));
+        first.unwrap_or(CalibrateError::TooFewToJudge)
+    })
+}
+
+/// The models that [`choose_model`] judges: all that have a name; one of what a diagnosis named exists where one named something.
+pub fn candidate_models(options: &Options) -> Vec<ModelKind> {
     let is_here = |kind: &ModelKind| {
         let diagnosed = matches!(kind, ModelKind::Remembering { kind: Memory::Diagnosed, .. });
         !(diagnosed && options.causes.is_empty())
     };
-    let kinds: Vec<ModelKind> = ModelKind::named().into_iter().filter(is_here).collect();
-    let judged: Vec<_> = kinds
-        .into_par_iter()
-        .map(|kind| (kind, judge(trials, &folds, &turning, options, kind)))
+    ModelKind::named().into_iter().filter(is_here).collect()
+}
+
+/// Judges one model as [`choose_model`] does.
+///
+/// # Errors
+/// As [`calibrate`](crate::calibrate).
+pub fn judge_model(
+    trials: &[Trial],
+    options: &Options,
+    kind: ModelKind,
+) -> Result<Judged, CalibrateError> {
+    judge(trials, &folds(trials), &turning(trials, options)?, options, kind)
+}
+
+/// Which trials reverse.
+fn turning(trials: &[Trial], options: &Options) -> Result<Vec<bool>, CalibrateError> {
+    let one = |trial: &Trial| Ok(reverses(trial.require(&options.reference)?));
+    trials.iter().map(one).collect()
+}
+
+/// Chooses by the rule of [`choose_model`] among models that were judged, each with what became of it or why nothing did; none
+/// where nothing became of any.
+///
+/// ```
+/// use stretch_calibrate::{ModelKind, Options, choose_among, judge_model};
+/// # use stretch_data::{Channel, Trial};
+/// # let time_s: Vec<f64> = (0..1200).map(|n| f64::from(n) * 0.01).collect();
+/// # let length_mm: Vec<f64> = time_s.iter().map(|t| 165.0 + 15.0 * (2.1 * t).cos()).collect();
+/// # let bridge_v = length_mm.iter().map(|l| 1.24 + 0.03 * (180.0 - l)).collect();
+/// # let channel = |name: &str, values| Channel { name: name.into(), values };
+/// # let channels = vec![channel("length_mm", length_mm), channel("bridge_v", bridge_v)];
+/// # let trials = [Trial { name: "loop".into(), time_s, channels }];
+/// let options = Options::default();
+/// let judge = |kind| (kind, judge_model(&trials, &options, kind).map_err(|error| error.to_string()));
+/// let judged = vec![judge(ModelKind::Linear), judge("poly13".parse()?)];
+/// let choice = choose_among(&trials, &options, judged).expect("a line fits a line");
+/// assert_eq!(choice.model, ModelKind::Linear);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn choose_among(
+    trials: &[Trial],
+    options: &Options,
+    judged: Vec<(ModelKind, Result<Judged, String>)>,
+) -> Option<ModelChoice> {
+    let turning = turning(trials, options).ok()?;
+    let found: Vec<_> = judged
+        .into_iter()
+        .map(|(kind, judged)| match judged {
+            Ok(Judged { parameters, errors }) => (kind, parameters, Ok(errors)),
+            Err(problem) => (kind, 0, Err(problem)),
+        })
         .collect();
-    for (kind, outcome) in judged {
-        match outcome {
-            Ok((parameters, errors)) => found.push((kind, parameters, Ok(errors))),
-            Err(error) => {
-                found.push((kind, 0, Err(error.to_string())));
-                first_problem.get_or_insert(error);
-            }
-        }
-    }
     let good = |f: &(ModelKind, usize, Result<Errors, String>)| {
         let errors = f.2.as_ref().ok()?;
         rmse(all(errors)).filter(|r| r.is_finite())
     };
-    let best = (0..found.len())
-        .filter(|&i| good(&found[i]).is_some())
-        .min_by(|&a, &b| good(&found[a]).unwrap_or(0.0).total_cmp(&good(&found[b]).unwrap_or(0.0)));
-    let Some(best) = best else {
-        // a part without a sample has no trial; the user named some
-        let first = first_problem.filter(|problem| !matches!(problem, CalibrateError::NoTrials));
-        return Err(first.unwrap_or(CalibrateError::TooFewToJudge));
-    };
+    let best = (0..found.len()).filter(|&i| good(&found[i]).is_some()).min_by(|&a, &b| {
+        good(&found[a]).unwrap_or(0.0).total_cmp(&good(&found[b]).unwrap_or(0.0))
+    })?;
     let memory_shows = turning.iter().any(|&t| t);
     let eligible = |kind: ModelKind| memory_shows || !matches!(kind, ModelKind::Remembering { .. });
     let excesses: Vec<_> = found
@@ -203,6 +260,25 @@ pub fn choose_model(trials: &[Trial], options: &Options) -> Result<ModelChoice, 
         let premium = good(&found[i]).zip(good(&found[model])).map(|(own, bare)| own / bare);
         twin && is_length(options) && premium.is_some_and(|premium| premium <= PREMIUM)
     });
+    let seen: Vec<Seen> = found.iter().map(|f| seen(f, good(f))).collect();
+    let others = (0..found.len()).filter(|&i| i != bar && eligible(found[i].0));
+    let second = others
+        .filter(|&i| good(&found[i]).is_some())
+        .min_by(|&a, &b| seen[a].rmse.total_cmp(&seen[b].rmse));
+    let between = match (&found[model].2, &found[bar].2) {
+        (Ok(own), Ok(least)) => excess(&own.parts, &least.parts),
+        _ => None,
+    };
+    let why = why(&Grounds {
+        best: &seen[bar],
+        second: second.map(|i| &seen[i]),
+        simplest: &seen[model],
+        excess: between,
+        insured: insured.map(|i| &seen[i]),
+        unit: &unit_of(&options.reference),
+        memory_shows,
+        as_good: AS_GOOD,
+    });
     let model = found[insured.unwrap_or(model)].0;
     let mut rows: Vec<ModelRow> = found
         .into_iter()
@@ -211,7 +287,14 @@ pub fn choose_model(trials: &[Trial], options: &Options) -> Result<ModelChoice, 
         .collect();
     let key = |r: &ModelRow| r.rmse.unwrap_or(f64::INFINITY);
     rows.sort_by(|a, b| key(a).total_cmp(&key(b)));
-    Ok(ModelChoice { rows, model, notes: notes(trials, memory_shows) })
+    Some(ModelChoice { rows, model, why, notes: notes(trials, memory_shows) })
+}
+
+fn seen(
+    (kind, numbers, _): &(ModelKind, usize, Result<Errors, String>),
+    rmse: Option<f64>,
+) -> Seen {
+    Seen { model: kind.to_string(), rmse: rmse.unwrap_or(f64::NAN), numbers: *numbers }
 }
 
 /// Whether the target is a contraction, which has a stop.
@@ -284,7 +367,7 @@ fn judge(
     turning: &[bool],
     options: &Options,
     kind: ModelKind,
-) -> Result<(usize, Errors), CalibrateError> {
+) -> Result<Judged, CalibrateError> {
     let options = Options { model: kind, ..options.clone() };
     let (whole, choice): (_, Option<Choice>) = calibrate_with(trials, &options, None)?;
     let parameters = whole
@@ -313,7 +396,7 @@ fn judge(
         };
         errors.take(reference, &estimates, fold, period_s, which);
     }
-    Ok((parameters, errors))
+    Ok(Judged { parameters, errors })
 }
 
 impl Errors {

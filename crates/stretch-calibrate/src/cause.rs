@@ -10,7 +10,7 @@
 /// let cause = Cause::new("gauge_relaxation", &[("c", 0.2), ("tau", 0.4)]);
 /// assert_eq!((cause.value("tau"), cause.value("spread")), (Some(0.4), None));
 /// ```
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Cause {
     /// The effect.
     pub effect: String,

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use stretch_core::{Calibration, Polarity};
-use stretch_data::Trial;
+use stretch_data::{Trial, unit_of};
 use stretch_metrics::{Agreement, Delta, PairedBlocks, PairedT, TTest, lag};
 use stretch_receptor::Domain;
 
@@ -73,7 +73,7 @@ pub struct Comparison {
 /// Errors a trial and pooled, and tests between the methods.
 #[derive(Debug, Clone, Serialize)]
 pub struct Evaluation {
-    /// Unit of the reference: `mm`.
+    /// Unit of the reference as it is written: `mm`, `N`.
     pub unit: String,
     /// Errors by trial, the methods in one order.
     pub trials: Vec<TrialErrors>,
@@ -159,7 +159,7 @@ pub fn evaluate(
     let pooled =
         names.iter().zip(&pooled).map(|(name, tally)| tally.errors(name).ok_or_else(nothing));
     Ok(Evaluation {
-        unit: first.reference.unit().to_owned(),
+        unit: unit_of(first.reference.as_str()),
         trials: rows,
         pooled: pooled.collect::<Result<_, _>>()?,
         comparisons: tests.compare(&names),

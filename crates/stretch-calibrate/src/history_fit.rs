@@ -240,10 +240,10 @@ pub(crate) fn history(
         },
     );
     let note = format!(
-        "{kind}: {} terms, time constants {:?} s, radii {:?} of the range, ridge {}{}",
+        "{kind}: {} terms{}{}, ridge {}{}",
         weights.len(),
-        choice.design.relaxations_s,
-        choice.design.radii,
+        several("time constants of", choice.design.relaxations_s, "s"),
+        several("plays of", choice.design.radii, "of the range"),
         choice.ridge,
         match choice.rest {
             Some(rest) => format!(", baseline leaking {:.3} a second", rest.leak),
@@ -251,6 +251,16 @@ pub(crate) fn history(
         }
     );
     Ok(((Model::History(map), vec![report], vec![note]), choice))
+}
+
+/// What a model remembers with, in words; nothing where it has none of the kind.
+fn several(what: &str, values: &[f64], unit: &str) -> String {
+    let values: Vec<String> = values.iter().map(f64::to_string).collect();
+    match &values[..] {
+        [] => String::new(),
+        [one] => format!(", {what} {one} {unit}"),
+        [all @ .., last] => format!(", {what} {} and {last} {unit}", all.join(", ")),
+    }
 }
 
 fn choose(prepared: &Prepared, kind: Memory, rest: bool) -> Result<Trained, CalibrateError> {

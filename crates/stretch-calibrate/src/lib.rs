@@ -2,6 +2,7 @@
 
 mod apply;
 mod auto;
+mod auto_words;
 mod blocks;
 mod calibrate;
 mod cause;
@@ -26,6 +27,8 @@ mod options;
 mod own_ranges;
 mod passes;
 mod prepared;
+mod rated;
+mod reach;
 mod record;
 mod rest;
 mod rising;
@@ -35,7 +38,9 @@ mod wild;
 mod worth;
 
 pub use apply::{Applied, Faults, LiveReceptor, apply, pressure_column, rate_delay_s};
-pub use auto::{ModelChoice, ModelRow, choose_model};
+pub use auto::{
+    Judged, ModelChoice, ModelRow, candidate_models, choose_among, choose_model, judge_model,
+};
 pub use blocks::{LONGEST, Log};
 pub use calibrate::{Calibrated, calibrate};
 pub use cause::Cause;
@@ -48,6 +53,8 @@ pub use fixed_record::{BoardReceptor, FixedRecord, RecordNumbers, fixed_record, 
 pub use long::{calibrate_long, is_plain};
 pub use options::{Memory, ModelKind, Options, Robust, SpellingError, SplitBy, parse_rate};
 pub use own_ranges::on_own_ranges;
+pub use rated::{Rated, RatedPart, rated};
+pub use reach::Reach;
 pub use record::{
     RecordSummary, calibration_bytes, calibration_from_json, calibration_seal, calibration_to_json,
     describe_record, read_calibration, seal_calibration, write_calibration,

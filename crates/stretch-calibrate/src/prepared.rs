@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// Parts of a trial with fewer samples have no rate.
-const SHORTEST: usize = 3;
+pub(crate) const SHORTEST: usize = 3;
 
 /// All trials, even in time, with pooled ranges.
 pub(crate) struct Prepared {
@@ -209,7 +209,10 @@ impl Tally {
 }
 
 /// Standard deviation of an estimator's rate for white noise of one.
-fn noise_gain(estimator: RateEstimator, rate: SampleRate) -> Result<f64, CalibrateError> {
+pub(crate) fn noise_gain(
+    estimator: RateEstimator,
+    rate: SampleRate,
+) -> Result<f64, CalibrateError> {
     match estimator {
         RateEstimator::CentralDifference => Ok(rate.hz() / 2f64.sqrt()),
         live => Ok(RateFilter::<f64>::new(live, rate)?.noise_gain()),

@@ -1,7 +1,5 @@
 //! The flow: a problem is prepared, searched, its evidence gathered, judged, and told. Nothing flows back.
 
-use std::time::Instant;
-
 use crate::{
     baselines::baselines,
     candidates::{beside_unknown, candidates, shifts, stage_gaps},
@@ -17,11 +15,13 @@ use crate::{
     probability::{covering_set, unknown},
     problem::Problem,
     record::{examine::Doubts, plain::plain, suspect::Suspect, weigh::weighed},
+    responses::responses,
     sanity::Sanity,
     search::Search,
     settle::settled,
     shares::{peeled, shares},
     simulator::Simulator,
+    stopwatch::Stopwatch,
     thresholds::Thresholds,
     timing,
     transfer::transfer,
@@ -39,13 +39,22 @@ pub struct Options {
     pub seed: u64,
     /// Whether simpler methods are run beside.
     pub baselines: bool,
+    /// Whether [answers](crate::Responses) to the numbers of the best set are gathered, for a page where they can be turned.
+    pub responses: bool,
     /// Calibrated numbers.
     pub thresholds: Thresholds,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { depth: 4, threads: 0, seed: 1, baselines: false, thresholds: Thresholds::frozen() }
+        Self {
+            depth: 4,
+            threads: 0,
+            seed: 1,
+            baselines: false,
+            responses: false,
+            thresholds: Thresholds::frozen(),
+        }
     }
 }
 
@@ -77,7 +86,7 @@ fn run(
     progress: &(dyn Fn(&str) + Sync),
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<(Diagnosis, Evidence), GapError> {
-    let (begun, seed, thresholds) = (Instant::now(), options.seed, &options.thresholds);
+    let (begun, seed, thresholds) = (Stopwatch::start(), options.seed, &options.thresholds);
     // What the columns alone say: with one of them copied or dead, effects mean nothing.
     let plain = plain(&simulator.columns(), simulator.trials(), simulator.dt_s());
     let depth = if plain.is_empty() { options.depth } else { 0 };
@@ -118,7 +127,7 @@ fn run(
     let (simulator, runs) = (problem.simulator(), &problem.compare.runs);
     // Gathered: from here on test trials are read.
     progress("test trials");
-    let (evidence, weighed) = Evidence::gather(problem, thresholds, &found)?;
+    let (mut evidence, weighed) = Evidence::gather(problem, thresholds, &found)?;
     let candidates = candidates(problem, &evidence, &weighed, seed)?;
     let shares = shares(problem, &evidence, &found.best, &peeled, thresholds.null_excess)?;
     let sanity = Sanity::of(problem, &found.best, &evidence)?;
@@ -162,7 +171,7 @@ fn run(
     };
     let is_quiet = matches!(verdict.kind, VerdictKind::NoGap | VerdictKind::Parameters);
     let null_band = is_quiet.then(|| null_band(problem, seed)).transpose()?;
-    let (runtime_s, simulations) = (begun.elapsed().as_secs_f64(), runs.count());
+    let (runtime_s, simulations) = (begun.elapsed_s(), runs.count());
     let simpler = || baselines(searched, &search.sets.tried, thresholds.null_excess);
     // Told.
     let answer = Answer {
@@ -173,10 +182,17 @@ fn run(
         gross: &gross,
         null_band,
     };
+    // What is told of a candidate is its probability beside what the catalogue lacks.
     let unknown = unknown(evidence.gap, thresholds);
+    let beside = beside_unknown(candidates.clone(), evidence.gap, unknown);
+    let case = Case { first: beside.first(), ..case };
     let mut told = tell(answer, case, simulator, &evidence, &shares);
     let model_runs = runs.counted();
     told.notes.extend(model_runs.and_then(|runs| runs.note()));
+    // What a page needs beside the answer counts as none of its cost.
+    if let (true, Some(stage)) = (options.responses, location.worst()) {
+        evidence.responses = responses(problem, &evidence, &found.best, stage)?;
+    }
     let diagnosis = Diagnosis {
         schema: 1,
         verdict: verdict.kind,
@@ -203,7 +219,7 @@ fn run(
         simulations,
         model_runs,
         runtime_s,
-        candidates: beside_unknown(candidates, evidence.gap, unknown),
+        candidates: beside,
     };
     Ok((diagnosis, evidence))
 }

@@ -224,6 +224,14 @@ pub struct Where {
     pub end_to_end: Vec<StageShare>,
 }
 
+impl Where {
+    /// The stage with the largest gap; none without a stage.
+    pub fn worst(&self) -> Option<usize> {
+        let stages = self.stages.iter().enumerate();
+        stages.max_by(|a, b| a.1.share.total_cmp(&b.1.share)).map(|(i, _)| i)
+    }
+}
+
 /// A nominal parameter, re-tuned.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ParameterShift {

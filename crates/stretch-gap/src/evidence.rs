@@ -11,6 +11,7 @@ use crate::{
     linear::dot,
     probability::{Weighed, weigh},
     problem::Problem,
+    response::Responses,
     score::{self, excess, mean_square},
     search::Found,
     simulator::Model,
@@ -67,6 +68,9 @@ pub struct Evidence {
     pub(crate) best_effect: Option<usize>,
     /// How large the gap is.
     pub(crate) gap: Excess,
+    /// How the stage with the largest gap answers to the numbers of the best set; none unless [asked for](crate::Options::responses), or
+    /// where no effect acts in it.
+    pub responses: Option<Responses>,
 }
 
 /// Output of a model over the whole session, its clean residual, and its reduced chi-square by test block.
@@ -87,23 +91,37 @@ impl Traces {
         let compare = &problem.compare;
         let simulator = problem.simulator();
         let output = compare.runs.output(stage, model, simulator.trials().len())?;
-        let metric = &compare.metrics[stage];
-        let apart = simulator.measured(stage).iter().zip(&output).zip(&metric.floor.sd);
-        let mut whole: Vec<f64> = apart.map(|((m, s), sd)| (m - s) / sd).collect();
-        let mut residual = whole.clone();
-        metric.clean(&compare.frame, &mut residual);
-        let lines = simulator.lines(stage, model);
-        for tested in compare.frame.of_role(Role::Test).map(|s| s.from..s.to) {
-            let floor = &metric.floor.sd[tested.clone()];
-            for line in &lines {
-                line.level(&mut residual[tested.clone()], floor, simulator.dt_s());
-                line.level(&mut whole[tested.clone()], floor, simulator.dt_s());
-            }
-        }
+        let apart = simulator.measured(stage).iter().zip(&output);
+        let apart: Vec<f64> = apart.map(|(m, s)| m - s).collect();
+        let (whole, residual) = held_out(problem, stage, model, &apart);
         let mut blocks = test_blocks(&compare.frame, &whole, &residual);
         blocks.iter_mut().for_each(|x| *x /= level);
         Ok(Self { output, residual, blocks })
     }
+}
+
+/// A difference of outputs in floors, and that without the most likely nuisances; without the lines that a model leaves where it is not
+/// fitted. Both are linear in it.
+pub(crate) fn held_out(
+    problem: &Problem<'_>,
+    stage: usize,
+    model: &Model,
+    apart: &[f64],
+) -> (Vec<f64>, Vec<f64>) {
+    let (compare, simulator) = (&problem.compare, problem.simulator());
+    let metric = &compare.metrics[stage];
+    let mut whole: Vec<f64> = apart.iter().zip(&metric.floor.sd).map(|(x, sd)| x / sd).collect();
+    let mut residual = whole.clone();
+    metric.clean(&compare.frame, &mut residual);
+    let lines = simulator.lines(stage, model);
+    for tested in compare.frame.of_role(Role::Test).map(|s| s.from..s.to) {
+        let floor = &metric.floor.sd[tested.clone()];
+        for line in &lines {
+            line.level(&mut residual[tested.clone()], floor, simulator.dt_s());
+            line.level(&mut whole[tested.clone()], floor, simulator.dt_s());
+        }
+    }
+    (whole, residual)
 }
 
 /// r V^-1 r by block: V^-1 r is the residual without its most likely nuisances, whose own improbability so counts.
@@ -161,8 +179,21 @@ impl Evidence {
             levels,
             best_effect: found.best.effects.first().copied(),
             gap,
+            responses: None,
         };
         Ok((evidence, weighed))
+    }
+
+    /// What the best set leaves of a stage, as [`held_out`] tells it.
+    pub(crate) fn left(&self, problem: &Problem<'_>, stage: usize) -> (Vec<f64>, Vec<f64>) {
+        let measured = problem.simulator().measured(stage).iter();
+        let apart: Vec<f64> = measured.zip(&self.stages[stage].after).map(|(m, s)| m - s).collect();
+        held_out(problem, stage, &self.best, &apart)
+    }
+
+    /// Square of a stage's floor as a share of what it was taken for.
+    pub(crate) fn level(&self, stage: usize) -> f64 {
+        self.levels[stage]
     }
 
     /// Reduced chi-square of a model by test block of a stage.

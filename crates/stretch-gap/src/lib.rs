@@ -13,6 +13,7 @@ mod description;
 mod diagnose;
 mod diagnosis;
 mod dice;
+mod ends;
 mod error;
 mod evidence;
 mod fit;
@@ -39,6 +40,8 @@ mod octaves;
 mod probability;
 mod problem;
 mod record;
+mod response;
+mod responses;
 mod rows;
 mod runs;
 mod sanity;
@@ -50,6 +53,7 @@ mod settle;
 mod shares;
 mod simulator;
 mod spec;
+mod stopwatch;
 mod thin;
 mod thresholds;
 mod timing;
@@ -77,6 +81,7 @@ pub use record::{
     column::{Column, Distortion},
     plain::copied,
 };
+pub use response::{Answered, Response, Responses};
 pub use rows::RowsUsed;
 pub use simulator::{Model, ModelRuns, Motion, Recorded, Run, Simulator};
 pub use spec::{EffectParameterSpec, EffectSpec, ParameterSpec, StageSpec, TrialSpec, Wander};

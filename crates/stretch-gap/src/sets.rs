@@ -92,18 +92,10 @@ impl<'a> Sets<'a> {
         Ok(self.join(set, set.effects.clone(), &stages, fitted))
     }
 
-    /// A model with one effect more.
-    fn begin(&self, base: &Hypothesis, effect: usize, values: &[f64]) -> Model {
-        let mut model = base.model.clone();
-        model.effects.push((effect, values.to_vec()));
-        model
-    }
-
     /// The stages that a new effect of `base` hangs together with, and that part of a model.
-    fn part(&self, base: &Hypothesis, effect: usize, model: &Model) -> (Vec<usize>, Model) {
+    fn part(&self, base: &Hypothesis, effect: usize, mut model: Model) -> (Vec<usize>, Model) {
         let effects: Vec<usize> = base.effects.iter().copied().chain([effect]).collect();
         let (stages, own) = self.component(&effects, effect);
-        let mut model = model.clone();
         model.effects.retain(|(e, _)| own.contains(e));
         (stages, model)
     }
@@ -114,7 +106,7 @@ impl<'a> Sets<'a> {
         base: &Hypothesis,
         ground: &Ground,
         effect: usize,
-        model: &Model,
+        model: Model,
     ) -> Result<Hypothesis, GapError> {
         let (stages, model) = self.part(base, effect, model);
         let fitted = self.problem.fit(&stages, model, &ground.known, COARSE)?;
@@ -203,25 +195,24 @@ impl<'a> Sets<'a> {
         let glances: Vec<(usize, &Vec<f64>)> =
             several.iter().flat_map(|(e, starts)| starts.iter().map(|s| (*e, *s))).collect();
         let looked = glances.par_iter().map(|&(effect, values)| {
-            let (stages, model) = self.part(base, effect, &self.begin(base, effect, values));
+            let (stages, model) = self.part(base, effect, with(base, effect, values));
             let fitted = self.problem.compare.fit(&stages, model, &ground.known, GLANCE)?;
             Ok((effect, fitted))
         });
         let mut best: BTreeMap<usize, Fitted> = BTreeMap::new();
         for (effect, fitted) in possible(looked)? {
-            match best.get(&effect) {
-                Some(other) if other.cost <= fitted.cost => {}
-                _ => drop(best.insert(effect, fitted)),
+            if best.get(&effect).is_none_or(|other| fitted.cost < other.cost) {
+                best.insert(effect, fitted);
             }
         }
-        let begun = one.iter().filter_map(|(effect, starts)| {
-            Some((*effect, self.begin(base, *effect, starts.first()?)))
-        });
+        let begun = one
+            .iter()
+            .filter_map(|(effect, starts)| Some((*effect, with(base, *effect, starts.first()?))));
         let begun: Vec<(usize, Model)> =
             begun.chain(best.into_iter().map(|(effect, fitted)| (effect, fitted.model))).collect();
         let fits = begun
             .into_par_iter()
-            .map(|(effect, model)| Ok((effect, self.extend(base, ground, effect, &model)?)));
+            .map(|(effect, model)| Ok((effect, self.extend(base, ground, effect, model)?)));
         Ok(possible(fits)?.into_iter().collect())
     }
 
@@ -271,4 +262,11 @@ impl<'a> Sets<'a> {
         self.tried.insert(key, better.clone());
         Ok(better)
     }
+}
+
+/// The model of a set with one effect more.
+fn with(base: &Hypothesis, effect: usize, values: &[f64]) -> Model {
+    let mut model = base.model.clone();
+    model.effects.push((effect, values.to_vec()));
+    model
 }

@@ -46,7 +46,7 @@ pub struct Run<'a> {
     /// Adds another draw of their noise to the measured inputs, from this seed: tells how much of it arrives at
     /// the output.
     pub shake: Option<u64>,
-    /// Share of the usual step of integration: 0.5 for the solver check.
+    /// Multiple of the usual step of integration: 0.5 for the check of the solver, 2 where that check allows longer steps.
     pub step: f64,
     /// Nominal parameters so near that the output may be told from the run there and the [linearisation](Simulator::linearise), where a
     /// run costs more than that; none where it has to be exact.

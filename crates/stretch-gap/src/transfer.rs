@@ -11,6 +11,7 @@ use stretch_data::{Channel, Trial};
 use crate::{
     diagnosis::{Transfer, TransferError},
     dice::Dice,
+    ends::ends,
     error::GapError,
     evidence::Evidence,
     frame::{Frame, Role},
@@ -153,7 +154,6 @@ fn error(kind: ModelKind, trained: &[Trial], tested: &[Trial]) -> Result<f64, Ca
 }
 
 fn span<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
-    let (low, high) =
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+    let (low, high) = ends(values);
     high - low
 }

@@ -7,7 +7,7 @@ mod lag;
 mod record;
 mod source;
 
-use stretch_data::{SessionTrial, unit};
+use stretch_data::{SessionTrial, unit, written_unit};
 use stretch_gap::{
     Column, Description, DescriptionSpec, GapError, Line, Model, Motion, Noise, ParameterSpec,
     Recorded, RowsUsed, Run, Simulator, StageSpec, TrialSpec,
@@ -262,7 +262,7 @@ impl Simulator for GaugeSimulator {
 
 /// Unit of a column, empty where its name gives none.
 fn unit_of(column: &str) -> &str {
-    unit(column).unwrap_or("")
+    unit(column).map_or("", written_unit)
 }
 
 /// Trials with their part of a column.

@@ -6,6 +6,7 @@ use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial, unit};
 use stretch_gap::{Frame, Noise, TrialSpec};
 
 use crate::{
+    ends::ends,
     error::{BenchError, check_rate},
     lost::open,
 };
@@ -86,9 +87,7 @@ impl Record {
 
     /// Least and greatest of a column over the trials that are fitted.
     pub(super) fn range(&self, values: &[f64]) -> (f64, f64) {
-        self.fitted()
-            .flat_map(|r| &values[r])
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)))
+        ends(self.fitted().flat_map(|r| &values[r]))
     }
 
     /// Noise of a column from the median of its second differences in the trials that are fitted.

@@ -1,5 +1,7 @@
 //! Which columns are wrong where the muscle goes against its valves: each way to be wrong is weighed.
 
+use crate::ends::ends;
+
 /// What the valves of a trial did, and what came of it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Motion<'a> {
@@ -30,8 +32,8 @@ pub(super) fn against(trials: &[Motion<'_>], dt_s: f64) -> (&'static str, String
         let valves = trial.inlet.iter().zip(trial.outlet).map(|(i, o)| i - o);
         with += valves.zip(pressure.windows(2)).map(|(u, p)| u * (p[1] - p[0])).sum::<f64>();
     }
-    let length = range(trials.iter().map(|t| t.length_mm));
-    let pressure = range(trials.iter().filter_map(|t| t.pressure_kpa));
+    let length = ends(trials.iter().flat_map(|t| t.length_mm));
+    let pressure = ends(trials.iter().filter_map(|t| t.pressure_kpa).flatten());
     // A muscle keeps most of its length, a chamber none of its pressure.
     let is_length = |(low, high): (f64, f64)| low > 0.5 * high;
     if seen && is_length(pressure) && !is_length(length) {
@@ -71,10 +73,6 @@ pub(super) fn against(trials: &[Motion<'_>], dt_s: f64) -> (&'static str, String
                 .into(),
         ),
     }
-}
-
-fn range<'a>(columns: impl Iterator<Item = &'a [f64]>) -> (f64, f64) {
-    columns.flatten().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)))
 }
 
 /// A way to be wrong.
@@ -120,7 +118,7 @@ fn blocks(trials: &[Motion<'_>], dt_s: f64) -> Vec<Blocks> {
         }
     };
     let all: Vec<Vec<f64>> = trials.iter().map(witness).collect();
-    let (low, high) = range(all.iter().map(Vec::as_slice));
+    let (low, high) = ends(all.iter().flatten());
     let mean = |values: &[f64]| -> Vec<f64> {
         values.chunks(length).map(|c| c.iter().sum::<f64>() / c.len() as f64).collect()
     };

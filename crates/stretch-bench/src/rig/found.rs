@@ -5,7 +5,7 @@
 
 use std::num::NonZeroUsize;
 
-use stretch_sim::{EffectSet, Grid, PARAMETERS, ParameterInfo, RigParams, Stage};
+use stretch_sim::{ActiveEffect, EffectSet, Grid, PARAMETERS, ParameterInfo, RigParams, Stage};
 
 use crate::kept::Kept;
 
@@ -56,5 +56,5 @@ pub(super) fn causes(
         .chain(grid.steps().iter().copied())
         .chain(others)
         .map(f64::to_bits);
-    (acting().map(stretch_sim::ActiveEffect::name).collect(), numbers.collect())
+    (acting().map(ActiveEffect::name).collect(), numbers.collect())
 }

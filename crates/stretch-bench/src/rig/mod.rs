@@ -8,6 +8,7 @@ mod found;
 mod noises;
 mod nominal;
 mod put_right;
+mod rails;
 mod run;
 mod session;
 mod shown;

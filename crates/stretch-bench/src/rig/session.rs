@@ -8,6 +8,7 @@ use stretch_gap::{copied, noise_variance};
 use super::directions::{self, Motion};
 use super::smooth::{Draws, Smoothed, schedule};
 use crate::{
+    ends::ends,
     error::{BenchError, check_rate},
     lost::{open, open_behind},
     wild::tamed,
@@ -175,10 +176,7 @@ impl Session {
     }
 
     fn range(&self, column: impl Fn(&RigTrial) -> &[f64]) -> (f64, f64) {
-        self.trials
-            .iter()
-            .flat_map(|t| column(t).iter())
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)))
+        ends(self.trials.iter().flat_map(column))
     }
 
     /// Whether the voltage is a copy of another column, which is no matter of units: the diagnosis says so.
@@ -257,9 +255,7 @@ fn excitation(one: &SessionTrial) -> Result<f64, BenchError> {
     let share = shares.first().copied().unwrap_or(1.0);
     let is_sound = share > 0.0 && share <= 2.0 && shares.iter().all(|s| *s == share);
     is_sound.then_some(share).ok_or_else(|| {
-        let (low, high) = shares
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+        let (low, high) = ends(shares);
         BenchError::Implausible {
             column: format!("{}, {EXCITATION}", one.trial.name),
             found: format!("values from {low} to {high}"),
@@ -276,8 +272,8 @@ impl Session {
     /// An open inlet shortens the muscle, an open outlet lets it out; and no channel stands still while the muscle moves.
     fn check_directions(&self) -> Result<(), BenchError> {
         let span = |values: &[f64]| {
-            let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-            values.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low
+            let (low, high) = ends(values);
+            high - low
         };
         let (mut against, mut widest, mut stroke) = (0.0, 0.0_f64, 0.0_f64);
         for trial in &self.trials {
@@ -359,10 +355,7 @@ impl Inputs {
         let trials = &session.trials;
         let length: Vec<_> =
             trials.iter().map(|t| smooth(t, &t.length_mm, length_sd, false)).collect();
-        let stroke = length
-            .iter()
-            .flat_map(|l| &l.values)
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+        let stroke = ends(length.iter().flat_map(|l| &l.values));
         let pressure = trials
             .iter()
             .filter_map(|t| t.pressure_kpa.as_ref().map(|p| smooth(t, p, pressure_sd, true)))

@@ -6,6 +6,7 @@
 use stretch_filter::log::second_differences;
 
 use crate::{
+    ends::ends,
     frame::Frame,
     simulator::{Motion, Simulator},
 };
@@ -156,9 +157,7 @@ impl Axis {
     }
 
     fn level(course: &Course, unit: &str) -> Self {
-        let ends = course.level.iter().filter(|x| x.is_finite());
-        let (low, high) =
-            ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+        let (low, high) = ends(course.level.iter().filter(|x| x.is_finite()));
         Self::even("level", &course.level, low, high, 5, short, unit)
     }
 

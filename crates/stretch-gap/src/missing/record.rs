@@ -13,6 +13,7 @@ use std::ops::Range;
 use stretch_operators::Grid;
 
 use crate::{
+    ends::ends,
     error::GapError,
     frame::{Frame, Role},
     simulator::{Recorded, Simulator},
@@ -122,12 +123,8 @@ impl Signal {
     /// None where it does not move in what is fitted.
     fn of(recorded: Recorded, frame: &Frame, dt_s: f64) -> Option<Self> {
         let Recorded { name, unit, mut values, is_command } = recorded;
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for segment in frame.of_role(Role::Fit) {
-            for x in &values[segment.from..segment.to] {
-                (low, high) = (low.min(*x), high.max(*x));
-            }
-        }
+        let (low, high) =
+            ends(frame.of_role(Role::Fit).flat_map(|part| &values[part.from..part.to]));
         if !(high - low > 0.0 && (high - low).is_finite()) {
             return None;
         }

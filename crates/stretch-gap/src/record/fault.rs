@@ -1,6 +1,7 @@
 //! The hypotheses: one error of the record or of the rig file each, as an effect with one number.
 
 use crate::{
+    ends::ends,
     record::column::{Column, Distortion},
     simulator::Simulator,
     spec::{EffectParameterSpec, EffectSpec},
@@ -122,6 +123,6 @@ impl Fault {
 
 /// Greatest less least.
 pub(crate) fn span(values: &[f64]) -> f64 {
-    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-    (values.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low).max(0.0)
+    let (low, high) = ends(values);
+    (high - low).max(0.0)
 }

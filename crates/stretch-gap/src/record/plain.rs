@@ -14,6 +14,7 @@
 
 use crate::{
     diagnosis::Gross,
+    ends::ends,
     record::{column::Column, fault::DELAY_S},
     spec::TrialSpec,
 };
@@ -143,16 +144,10 @@ fn alike(a: &[f64], b: &[f64]) -> f64 {
     ab.abs() / (aa * bb).sqrt().max(f64::MIN_POSITIVE)
 }
 
-/// Least and greatest.
-fn ends(values: &[f64]) -> (f64, f64) {
-    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-    (low, values.iter().copied().fold(f64::NEG_INFINITY, f64::max))
-}
-
 /// Whether one of the others moves by a share of its range within a stretch.
 fn others_move(others: &[&[f64]], (from, to): (usize, usize), share: f64) -> bool {
     others.iter().any(|other| {
-        let ((low, high), (a, b)) = (ends(other), ends(&other[from..to]));
+        let ((low, high), (a, b)) = (ends(*other), ends(&other[from..to]));
         high > low && b - a >= share * (high - low)
     })
 }

@@ -11,18 +11,17 @@
   /** @typedef {{name: string, ink: string, w: number, levels: Packed[]}} PackedSeries */
   /** @typedef {{name: string, ink: string, w: number, levels: Level[]}} Series */
   /** @typedef {{by: string, from: number, to: number, size?: boolean}} Pick */
-  /** @typedef {{kind: "time", link: string, x: string, y: string, unit: string, height: number, span: number[], view: number[], all?: boolean, series: PackedSeries[], keys?: Record<string, Packed[]>}} TimeData */
+  /** @typedef {{kind: "time", link: string, x: string, y: string, unit: string, height: number, span: number[], view: number[], all?: boolean, series: PackedSeries[], keys?: Record<string, Packed[]>, moves: "out"|"left"|null}} TimeData */
   /** @typedef {{label: string, top: number, bottom: number, text: string, pick?: Pick}} BarRow */
   /** @typedef {{kind: "bars", link: string, rows: BarRow[]}} BarsData */
   /** @typedef {{top: number, bottom: number, left: number, right: number, y: number[], name: string}} Panel */
   /** @typedef {{kind: "scatter", link: string, x: number[], xname: string, xunit: string, yunit: string, by?: string, panels: Panel[]}} ScatterData */
+  /** @typedef {{name: string, unit: string, at: number, values: number[], out: Packed[][], left: Packed[][], x: number[], panel: Panel}} Turned */
+  /** @typedef {{kind: "turn", link: string, ink: string, unit: string, noise: number, products: number[][], parameters: Turned[]}} TurnData */
   /** @typedef {{name: string, unit: string, span: number[]}} Axis */
   /** @typedef {{kind: "surface", axes: Axis[], ink: string, cells: number, z: (number|null)[], on: string, points: number[]}} SurfaceData */
-  /** @typedef {{window: number[], pick: Pick|null, cursor: number|null, series: Series[], keys: Map<string, Level[]>, plots: {draw: () => void, point: () => void}[]}} Link */
+  /** @typedef {{window: number[], pick: Pick|null, cursor: number|null, series: Series[], keys: Map<string, Level[]>, moving: {by: "out"|"left", series: Series[]}[], plots: {draw: () => void, point: () => void}[]}} Link */
 
-  /** No number: what is compared with it is false. */
-  const NONE = 0 / 0;
-  const isNone = (/** @type {number} */ x) => x !== x;
   const MARGIN = { left: 58, right: 14, top: 26, bottom: 40 };
   const still = document.querySelector("figure svg");
   if (!still) return;
@@ -82,7 +81,7 @@
     const y = new Float64Array(d.length);
     let sum = 0;
     d.forEach((step, i) => {
-      if (step === null) y[i] = NONE;
+      if (step === null) y[i] = NaN;
       else y[i] = o + q * (sum += step);
     });
     return { t, dt, y };
@@ -101,7 +100,7 @@
     const found = links.get(name);
     if (found) return found;
     /** @type {Link} */
-    const link = { window: [...window], pick: null, cursor: null, series: [], keys: new Map(), plots: [] };
+    const link = { window: [...window], pick: null, cursor: null, series: [], keys: new Map(), moving: [], plots: [] };
     links.set(name, link);
     return link;
   };
@@ -215,6 +214,7 @@
     // the plot of the whole recording draws what the closer look brought
     const series = own.length > 0 ? own : link.series;
     link.series = series;
+    if (data.moves) link.moving.push({ by: data.moves, series: own });
     const { keys } = link;
     for (const [key, levels] of Object.entries(data.keys || {})) keys.set(key, levels.map(unpacked));
     const box = stage(figure,
@@ -269,15 +269,15 @@
       const [first, last] = within(level);
       /** @type {number[][]} */
       const found = [];
-      let begin = NONE;
+      let begin = NaN;
       for (let i = first; i <= last + 1; i += 1) {
         const value = pick.size ? Math.abs(level.y[i]) : level.y[i];
         const inside = i <= last && value >= pick.from && value <= pick.to;
         const t = level.t + i * level.dt;
-        if (inside && isNone(begin)) begin = t;
-        if (!inside && !isNone(begin)) {
+        if (inside && Number.isNaN(begin)) begin = t;
+        if (!inside && !Number.isNaN(begin)) {
           found.push([Math.max(begin, from), Math.min(t, to)]);
-          begin = NONE;
+          begin = NaN;
         }
       }
       return found;
@@ -310,7 +310,7 @@
       let pen = false;
       for (let i = first; i <= last; i += 1) {
         const value = level.y[i];
-        if (isNone(value)) { pen = false; continue; }
+        if (Number.isNaN(value)) { pen = false; continue; }
         d += `${pen ? "L" : "M"}${place(level.t + i * level.dt).toFixed(1)} ${rise(value).toFixed(1)}`;
         pen = true;
       }
@@ -479,12 +479,12 @@
         const up = (rect.bottom - event.clientY) / rect.height;
         return [low + share * (high - low), panel.y[0] + up * (panel.y[1] - panel.y[0])];
       };
-      let begin = NONE;
+      let begin = NaN;
       hit.addEventListener("pointermove", (event) => {
         const [x, y] = at(event);
         show([`${data.xname}: ${withUnit(number(x, high - low), data.xunit)}`,
           `${panel.name}: ${withUnit(number(y, panel.y[1] - panel.y[0]), data.yunit)}`], event.clientX, event.clientY);
-        if (isNone(begin) || !data.by) return;
+        if (Number.isNaN(begin) || !data.by) return;
         const [from, to] = [Math.min(begin, x), Math.max(begin, x)];
         const across = (/** @type {number} */ v) => size.x + ((v - low) / (high - low)) * size.width;
         brush.setAttribute("x", String(across(from)));
@@ -499,7 +499,7 @@
         hit.setPointerCapture(event.pointerId);
         pickIn(data.link, null);
       });
-      const end = () => { begin = NONE; };
+      const end = () => { begin = NaN; };
       hit.addEventListener("pointerup", end);
       hit.addEventListener("pointercancel", end);
     }
@@ -666,6 +666,91 @@
     draw();
   };
 
+  /**
+   * Numbers to turn: a slider stops at the values that were simulated and goes straight between them.
+   * @param {HTMLElement} figure
+   * @param {TurnData} data
+   */
+  const turn = (figure, data) => {
+    const drawing = figure.querySelector("svg");
+    const link = links.get(data.link);
+    if (!drawing || !link) return;
+    const moved = link.moving.flatMap(({ by, series }) => series.filter((s) => s.ink === data.ink)
+      .flatMap((s) => s.levels.map(({ y }, grid) => ({ by, y, grid, base: y.slice() }))));
+    let row = 0;
+    const turned = data.parameters.map((one) => {
+      const knots = one.values.map((value, k) => {
+        row += 1;
+        return { value, row, out: one.out[k].map(unpacked), left: one.left[k].map(unpacked) };
+      });
+      const fitted = { value: one.at, row: 0, out: /** @type {Level[]} */ ([]), left: /** @type {Level[]} */ ([]) };
+      const all = [...knots, fitted].sort((a, b) => a.value - b.value);
+      const home = all.indexOf(fitted);
+      return { ...one, all, home, place: home };
+    });
+    /** @param {typeof turned[0]} one The two values on either side, and their shares. */
+    const between = ({ all, place }) => {
+      const below = Math.min(Math.floor(place), all.length - 1);
+      const share = place - below;
+      return [{ knot: all[below], share: 1 - share }, { knot: all[Math.min(below + 1, all.length - 1)], share }]
+        .filter((part) => part.share > 0);
+    };
+    const valueOf = (/** @type {typeof turned[0]} */ one) => between(one).reduce((sum, { knot, share }) => sum + share * knot.value, 0);
+
+    const board = document.createElement("div");
+    board.className = "turns";
+    const said = document.createElement("p");
+    said.className = "left";
+    said.setAttribute("role", "status");
+    const rows = turned.map((one) => {
+      const label = document.createElement("label");
+      const [name, slider, value] = [document.createElement("span"), document.createElement("input"), document.createElement("output")];
+      name.textContent = one.name;
+      Object.assign(slider, { type: "range", min: "0", max: String(one.all.length - 1), step: "0.02", value: String(one.place) });
+      label.append(name, slider, value);
+      board.append(label);
+      const mark = svg("path", { class: "line ink-axis cursor", "stroke-width": 1 }, drawing);
+      slider.addEventListener("input", () => { one.place = Number(slider.value); told(); });
+      return { one, slider, value, mark };
+    });
+    const back = document.createElement("button");
+    back.type = "button";
+    back.textContent = "As fitted";
+    back.addEventListener("click", () => { for (const { one, slider } of rows) { one.place = one.home; slider.value = String(one.home); } told(); });
+    board.append(back, said);
+    drawing.before(board);
+
+    const told = () => {
+      const parts = turned.flatMap(between).filter(({ knot }) => knot.row > 0);
+      for (const { by, y, grid, base } of moved) {
+        const sign = by === "out" ? 1 : -1;
+        y.set(base);
+        for (const { knot, share } of parts) {
+          const change = knot[by][grid].y;
+          for (let i = 0; i < y.length; i += 1) y[i] += sign * share * change[i];
+        }
+      }
+      // x' V^-1 x of what is left, with the fitted set first and the changes taken from it
+      const weights = [{ row: 0, w: 1 }, ...parts.map(({ knot, share }) => ({ row: knot.row, w: -share }))];
+      let squares = 0;
+      for (const a of weights) for (const b of weights) squares += a.w * b.w * data.products[a.row][b.row];
+      const times = Math.sqrt(Math.max(squares, 0));
+      said.textContent = `Left on the test trials: ${withUnit((times * data.noise).toPrecision(3), data.unit)} (${times.toPrecision(3)}\u00a0\u00d7 the noise)`;
+      said.dataset.times = String(times);
+      for (const { one, slider, value, mark } of rows) {
+        const now = valueOf(one);
+        const words = withUnit(number(now, one.x[1] - one.x[0]), one.unit);
+        value.textContent = words;
+        slider.setAttribute("aria-valuetext", words);
+        const { left, right, top, bottom } = one.panel;
+        const x = left + ((now - one.x[0]) / (one.x[1] - one.x[0])) * (right - left);
+        mark.setAttribute("d", `M${x} ${top}V${bottom}`);
+      }
+      redraw(link);
+    };
+    told();
+  };
+
   /** @param {HTMLElement} figure What a legend switches off in a still drawing. */
   const hidden = (figure) => {
     const off = switches(figure, () => {
@@ -677,7 +762,7 @@
   };
 
   document.documentElement.classList.add("answers");
-  const order = ["time", "surface", "scatter", "bars"];
+  const order = ["time", "surface", "scatter", "bars", "turn"];
   const figures = [...document.querySelectorAll("figure")].map((figure) => {
     const script = figure.querySelector('script[type="application/json"]');
     return { figure, data: script ? JSON.parse(script.textContent || "{}") : { kind: "none" } };
@@ -688,6 +773,7 @@
     else if (data.kind === "surface") surface(figure, data);
     else if (data.kind === "scatter") scatter(figure, data);
     else if (data.kind === "bars") bars(figure, data);
+    else if (data.kind === "turn") turn(figure, data);
     else hidden(figure);
   }
 })();

@@ -6,6 +6,7 @@ import { chromium } from "playwright-core";
 import { mkdirSync } from "node:fs";
 import { basename, resolve } from "node:path";
 import { pathToFileURL } from "node:url";
+import { faults } from "./layout.mjs";
 
 const FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update",
   "--disable-sync", "--no-first-run"];
@@ -21,58 +22,27 @@ const check = (good, what) => {
   console.log(`WRONG ${what}`);
 };
 
-/** What a layout must not do, told in words; runs in the page. */
-const faults = () => {
-  const said = [];
-  const root = document.documentElement;
-  if (root.scrollWidth > root.clientWidth) said.push(`the page is ${root.scrollWidth} px wide, the window ${root.clientWidth}`);
-  const named = (element) => (element.textContent || "").trim().slice(0, 40);
-  for (const details of document.querySelectorAll("details")) details.open = true;
-  for (const cell of document.querySelectorAll("td, th, p, li, dd, h1, h2, button, figcaption")) {
-    if (!cell.getClientRects().length) continue;
-    if (cell.scrollWidth > cell.clientWidth + 1 && getComputedStyle(cell).display !== "inline") said.push(`clipped: ${named(cell)}`);
-  }
-  // what scrolls in its own frame shows that it does; figures must not need to
-  for (const drawing of document.querySelectorAll("figure svg")) {
-    if (!drawing.getClientRects().length) continue;
-    const frame = drawing.getBoundingClientRect();
-    const texts = [...drawing.querySelectorAll("text")].map((t) => ({ t, r: t.getBoundingClientRect() }));
-    for (const { t, r } of texts) {
-      if (r.left < frame.left - 2 || r.right > frame.right + 2) said.push(`beyond its figure: ${named(t)} (${drawing.getAttribute("aria-label")?.slice(0, 40)})`);
-    }
-    for (let i = 0; i < texts.length; i += 1) {
-      for (let k = i + 1; k < texts.length; k += 1) {
-        const [a, b] = [texts[i].r, texts[k].r];
-        const across = Math.min(a.right, b.right) - Math.max(a.left, b.left);
-        const down = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
-        if (across > 2 && down > 5) said.push(`overlap: ${named(texts[i].t)} | ${named(texts[k].t)} (${drawing.getAttribute("aria-label")?.slice(0, 40)})`);
-      }
-    }
-  }
-  const part = (c) => { const v = c / 255; return v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4; };
-  const light = (color) => {
-    const [r, g, b] = color.match(/[\d.]+/g).map(Number);
-    return 0.2126 * part(r) + 0.7152 * part(g) + 0.0722 * part(b);
-  };
-  const behind = (element) => {
-    for (let e = element; e; e = e.parentElement) {
-      const color = getComputedStyle(e).backgroundColor;
-      if (!/rgba\(.*, 0\)|transparent/.test(color)) return color;
-    }
-    return "rgb(255, 255, 255)";
-  };
-  for (const element of document.querySelectorAll("p, td, th, li, dd, dt, h1, h2, button, summary, figcaption, svg text")) {
-    if (!element.getClientRects().length) continue;
-    const style = getComputedStyle(element);
-    const [a, b] = [light(element instanceof SVGElement ? style.fill : style.color), light(behind(element))];
-    const contrast = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
-    if (contrast < 4.5) said.push(`contrast ${contrast.toFixed(1)}: ${named(element)}`);
-  }
-  return [...new Set(said)];
+/** Two fingers that part, as the browser's own touch input sends them. */
+const pinched = async (page, plot, size, name) => {
+  const device = await page.context().newCDPSession(page);
+  await plot.scrollIntoViewIfNeeded();
+  const box = await plot.boundingBox();
+  const [x, y, before] = [box.x + box.width / 2, box.y + box.height / 2, await size()];
+  const send = (type, apart) => device.send("Input.dispatchTouchEvent", {
+    type, touchPoints: apart ? [{ x: x - apart, y, id: 0 }, { x: x + apart, y, id: 1 }] : [],
+  });
+  await send("touchStart", 20);
+  for (const apart of [30, 45, 60]) await send("touchMove", apart);
+  await send("touchEnd", 0);
+  await page.waitForTimeout(60);
+  check(await size() < 0.8 * before, `${name}: two fingers zoom`);
+  await plot.focus();
+  await page.keyboard.press("0");
 };
 
 /** @param {import("playwright-core").Page} page Touches the figures and looks at what they do. */
 const touched = async (page, name) => {
+  await page.evaluate(() => document.querySelectorAll("details").forEach((details) => { details.open = true; }));
   const plot = page.locator("svg.live[data-from]").first();
   if (await plot.count()) {
     await plot.scrollIntoViewIfNeeded();
@@ -108,6 +78,7 @@ const touched = async (page, name) => {
       return others.filter((o) => o.dataset.from === e.dataset.from && o.dataset.to === e.dataset.to).length;
     });
     check(same >= 1, `${name}: linked plots`);
+    await pinched(page, plot, size, name);
     const button = page.locator("figure:has(svg.live[data-from]) .legend button").first();
     const lines = async () => plot.locator("g path.line").count();
     const all = await lines();
@@ -131,6 +102,22 @@ const touched = async (page, name) => {
     check(marked > 0, `${name}: a bar marks its samples`);
     check(await page.locator("svg.live[data-from] .picked").count() === 0, `${name}: and lets them go`);
   }
+  const sliders = page.locator(".turns input");
+  if (await sliders.count()) {
+    const told = page.locator(".turns .left");
+    const times = async () => Number(await told.getAttribute("data-times"));
+    const curves = () => page.locator("svg.live[data-from] g path.line").evaluateAll((all) => all.map((p) => p.getAttribute("d")).join());
+    const [fitted, drawn] = [await times(), await curves()];
+    const table = await page.evaluate(() => document.body.textContent || "");
+    check(table.includes((await told.innerText()).match(/\(([\d.]{3})/)?.[1] || "none"), `${name}: what is left is what the tables say`);
+    await sliders.first().scrollIntoViewIfNeeded();
+    await sliders.first().focus();
+    for (let k = 0; k < 80; k += 1) await page.keyboard.press("ArrowRight");
+    check(Math.abs(await times() - fitted) > 1e-6, `${name}: a slider changes what is left`);
+    check(await curves() !== drawn, `${name}: and the curve`);
+    await page.locator(".turns button").click();
+    check(Math.abs(await times() - fitted) < 1e-12 && await curves() === drawn, `${name}: and back`);
+  }
   const surface = page.locator("svg.live[data-yaw]").first();
   if (await surface.count()) {
     await surface.focus();
@@ -147,7 +134,7 @@ for (const report of words) {
   const url = pathToFileURL(resolve(report)).href;
   for (const [width, scheme] of [[390, "light"], [390, "dark"], [1280, "light"], [1280, "dark"]]) {
     const name = `${basename(report, ".html")} ${width} ${scheme}`;
-    const context = await browser.newContext({ viewport: { width, height: 844 }, colorScheme: scheme, reducedMotion: "reduce" });
+    const context = await browser.newContext({ viewport: { width, height: 844 }, colorScheme: scheme, hasTouch: true, reducedMotion: "reduce" });
     const page = await context.newPage();
     page.on("request", (request) => check(request.url() === url, `${name}: asks for ${request.url()}`));
     page.on("pageerror", (error) => check(false, `${name}: ${error.message}`));
@@ -156,6 +143,7 @@ for (const report of words) {
     if (shots) await page.screenshot({ path: `${shots}/${name.replaceAll(" ", "-")}.png`, fullPage: true });
     check(await page.evaluate(() => document.documentElement.classList.contains("answers")), `${name}: the script runs`);
     await touched(page, name);
+    check(await page.evaluate(() => window.injected === undefined), `${name}: a name ran as a program`);
     for (const fault of await page.evaluate(faults)) check(false, `${name}: ${fault}`);
     await context.close();
   }

@@ -75,7 +75,7 @@ fn goals(page: &mut Page, subject: &BlindSubject<'_>) {
             g.rate.map_or_else(String::new, |r| format!("{} of {}", r.hits, r.cases)),
             interval
                 .map_or_else(String::new, |(a, b)| format!("{} .. {}", fixed(a, 3), fixed(b, 3))),
-            g.met.map_or("", |met| if met { "yes" } else { "no" }).to_owned(),
+            g.verdict().to_owned(),
         ]
     };
     page.table(&Table {

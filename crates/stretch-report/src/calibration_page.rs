@@ -157,11 +157,26 @@ fn judged(page: &mut Page, evaluation: &Evaluation, names: &[String], context: &
     }
 }
 
+/// How far the reference of a recording goes in a second, there and back.
+fn travel_per_second(trial: &TrialErrors) -> f64 {
+    let steps = trial.reference.windows(2).map(|w| (w[1] - w[0]).abs());
+    let travel: f64 = steps.filter(|step| step.is_finite()).sum();
+    let ends = trial.time_s.first().zip(trial.time_s.last());
+    ends.map_or(0.0, |(first, last)| travel / (last - first).max(f64::MIN_POSITIVE))
+}
+
 fn over_time(page: &mut Page, evaluation: &Evaluation, names: &[String]) {
     page.section("Estimate and reference over time", "");
     let caption = |trial: &TrialErrors| format!("{}, the whole recording.", trial.trial);
     let closer = "The eight seconds with the most motion, away from the ends.";
-    for (index, trial) in evaluation.trials.iter().take(DRAWN).enumerate() {
+    let mut drawn: Vec<&TrialErrors> = evaluation.trials.iter().collect();
+    // what a model is worth shows where there is motion
+    let pace = |i: &usize| travel_per_second(&evaluation.trials[*i]);
+    let first = (0..drawn.len()).rev().max_by(|a, b| pace(a).total_cmp(&pace(b)));
+    if let Some(first) = first {
+        drawn[..=first].rotate_right(1);
+    }
+    for (index, trial) in drawn.into_iter().take(DRAWN).enumerate() {
         let both = |page: &mut Page| {
             page.figure(&closest_look(evaluation, trial, names), closer);
             page.figure(&estimate_figure(evaluation, trial, names), &caption(trial));

@@ -12,13 +12,14 @@ use super::{
     figure::Figure,
     first_seconds::{GIVEN, causes, diagnosis_verdict, facts},
     gap_figures::{
-        AFTER, Against, BEFORE, after_name, has_after, left_figure, trace_figures, worst,
+        AFTER, Against, BEFORE, after_name, has_after, left_figure, shown, trace_figures,
     },
     live::Pick,
     markup::{number, percent},
     multiple::multiple,
     page::Page,
     subject::Subject,
+    turn_figure::turn_figure,
 };
 use crate::plain::{listed, transfer_in_words};
 
@@ -54,21 +55,34 @@ pub(crate) fn diagnosis_sections(page: &mut Page, subject: &Subject<'_>) {
     numbers(page, diagnosis);
 }
 
+/// What can be said of turned numbers.
+const TURNED: &str = "What is left on the test trials as each number of the effect is turned, all else as it was fitted: the dot is \
+    the fit. Between the values that were simulated, where the line has its corners, it is straight; of several numbers that are turned at \
+    once the changes are added.";
+
 fn seen(page: &mut Page, subject: &Subject<'_>) {
-    let stage = worst(subject.diagnosis);
+    let stage = subject.diagnosis.location.worst().unwrap_or(0);
     let spec = &subject.simulator.stages()[stage];
     page.section(
         "Measured against simulated",
         "The stage with the largest gap, driven by its measured input, on the test trial where it is farthest \
          off. The noise is what no simulator could remove.",
     );
-    let (top, below, trial) = trace_figures(subject, stage);
-    let caption = format!(
-        "{}: {} in {trial}, the eight seconds with the largest gap.",
-        spec.name, spec.channel
-    );
-    page.figure(&top, &caption);
-    page.figure(&below, "What is left, in multiples of the noise: within two of them it is noise.");
+    if let Some(shown) = shown(subject, stage) {
+        let (top, below) = trace_figures(subject, stage, &shown);
+        let caption = format!(
+            "{}: {} in {}, the eight seconds with the largest gap.",
+            spec.name, spec.channel, shown.name
+        );
+        page.figure(&top, &caption);
+        let caption = "What is left, in multiples of the noise: within two of them it is noise.";
+        page.figure(&below, caption);
+        if let Some(turned) = turn_figure(subject, stage, &shown) {
+            page.figures(&[(turned, TURNED.to_owned())]);
+        }
+    } else {
+        page.figure(&Figure::missing("There is no test trial to draw."), "");
+    }
     let level = (
         left_figure(subject, stage, Against::Level),
         "Against the level of the motion, all trials: what has the wrong shape.".to_owned(),
@@ -155,7 +169,7 @@ fn slices(page: &mut Page, subject: &Subject<'_>) {
     let motion = subject.simulator.motion();
     let words = [motion.falling, motion.rising];
     let stages = &d.location.stages;
-    let stage = stages.get(worst(d)).map_or("", |s| s.stage.as_str());
+    let stage = d.location.worst().map_or("", |i| stages[i].stage.as_str());
     let of = |by: &str| -> Option<(Figure, String)> {
         let slices: Vec<_> =
             d.location.slices.iter().filter(|s| s.by == by && s.stage == stage).collect();

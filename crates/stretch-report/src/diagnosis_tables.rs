@@ -19,7 +19,7 @@ fn interval([low, high]: [f64; 2], text: impl Fn(f64) -> String) -> String {
 }
 
 /// Gap of every stage.
-pub(crate) fn stage_table(stages: &[StageGap], has_after: bool) -> Table {
+pub fn stage_table(stages: &[StageGap], has_after: bool) -> Table {
     let row = |s: &StageGap| {
         vec![
             s.stage.clone(),
@@ -39,7 +39,7 @@ pub(crate) fn stage_table(stages: &[StageGap], has_after: bool) -> Table {
 }
 
 /// Every candidate.
-pub(crate) fn candidate_table(candidates: &[Candidate]) -> Table {
+pub fn candidate_table(candidates: &[Candidate]) -> Table {
     let row = |c: &Candidate| {
         let values: Vec<String> = c
             .parameters
@@ -104,7 +104,7 @@ pub(crate) fn parameter_table(d: &Diagnosis) -> Option<Table> {
 }
 
 /// What the gap costs a calibration.
-pub(crate) fn transfer_table(transfer: &Transfer) -> Table {
+pub fn transfer_table(transfer: &Transfer) -> Table {
     let rows = [("linear", transfer.linear), ("poly13", transfer.poly13)].map(|(name, e)| {
         vec![name.to_owned(), number(e.real, 3), number(e.sim, 3), number(e.sim_with_effect, 3)]
     });
@@ -124,7 +124,7 @@ pub(crate) fn transfer_table(transfer: &Transfer) -> Table {
 }
 
 /// What simpler methods named.
-pub(crate) fn baseline_table(said: &Baselines) -> Table {
+pub fn baseline_table(said: &Baselines) -> Table {
     let row = |(method, name): (&str, Option<&str>)| {
         vec![method_in_words(method).to_owned(), name.unwrap_or("nothing").to_owned()]
     };

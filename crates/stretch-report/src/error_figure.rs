@@ -1,23 +1,18 @@
 //! Where the errors are: against rate, against the reference, and how often.
 
-use std::ops::Range;
-
 use plotters::prelude::*;
 use stretch_calibrate::Evaluation;
 
 use super::{
     canvas::Ink,
-    figure::{Axes, Figure, Frame, dot, plot, px, stroke},
-    live::{Panel, scatter_json},
+    dots_figure::{Dots, Shared, dots_figure},
+    figure::{Axes, Figure, Frame, plot, stroke},
     markup::{number, with_unit},
-    thin::{binned, extent, padded, quantile, sample, sorted},
+    thin::{extent, padded, quantile, sorted},
 };
 
 /// Dots of one method at most.
 const DOTS: usize = 720;
-
-/// Parts of the axis that have dots and a median of their own.
-const SLOTS: usize = 24;
 
 /// Half the span of the difference that gives the reference's rate, in samples.
 const REACH: usize = 5;
@@ -53,74 +48,26 @@ pub(crate) fn error_figure(evaluation: &Evaluation, names: &[String], against: A
         "Error of {} against {x_label}: dots are samples, the line their median, the band 80 %",
         names.join(", ")
     );
-    let panel = 165;
-    let told: Vec<Panel> = (0..names.len() as u32)
+    let (x_name, x_unit) = x_label.rsplit_once(", ").unwrap_or((&x_label, ""));
+    let against = Shared {
+        x,
+        x_label: &x_label,
+        names: [x_name, x_unit, unit],
+        most,
+        dots: DOTS,
+        brush: ("", None),
+    };
+    let panels: Vec<Dots> = (0..)
         .zip(names)
-        .map(|(i, name)| {
-            let is_last = i as usize + 1 == names.len();
-            let ends = [i * panel, (i + 1) * panel + if is_last { 20 } else { 0 }];
-            Panel::new(format!("error of {name}"), ends, !is_last, [-most, most])
+        .zip(methods)
+        .map(|((i, name), points)| Dots {
+            ink: Ink::of(i),
+            name: format!("error of {name}"),
+            y_label: joined(&format!("{name}: error"), unit),
+            points,
         })
         .collect();
-    let (x_name, x_unit) = x_label.rsplit_once(", ").unwrap_or((&x_label, ""));
-    let live = scatter_json("", None, &x, [x_name, x_unit, unit], &told);
-    let frame = Frame { width: 400, height: panel * names.len() as u32 + 20 };
-    Figure::new(&description)
-        .draw(frame, |area| {
-            let mut rest = area.clone();
-            for (i, (name, points)) in names.iter().zip(&methods).enumerate() {
-                let last = i + 1 == names.len();
-                let height = if last { panel + 20 } else { panel };
-                let (here, below) = rest.split_vertically(px(f64::from(height)));
-                rest = below;
-                let axes = Axes {
-                    x: x.clone(),
-                    y: -most..most,
-                    x_label: if last { x_label.clone() } else { String::new() },
-                    y_label: joined(&format!("{name}: error"), unit),
-                    is_log: false,
-                };
-                let bins = binned(points, &x, SLOTS);
-                let inside: Vec<_> = points
-                    .iter()
-                    .copied()
-                    .filter(|(a, e)| x.contains(a) && e.abs() < most)
-                    .collect();
-                plot(&here, &axes, |chart| {
-                    let ink = Ink::of(i);
-                    let zero = [(x.start, 0.0), (x.end, 0.0)];
-                    chart.draw_series(LineSeries::new(zero, stroke(Ink::Axis.color(), 1.0)))?;
-                    let dots = spread_over(&inside, &x).into_iter();
-                    chart.draw_series(dots.map(|at| Circle::new(at, px(0.9), dot(ink, 0.55))))?;
-                    let cut = |e: f64| e.clamp(-most, most);
-                    let rim = bins.iter().map(|b| (b.x, cut(b.low)));
-                    let back = bins.iter().rev().map(|b| (b.x, cut(b.high)));
-                    let band: Vec<_> = rim.chain(back).collect();
-                    if bins.len() > 1 {
-                        chart.draw_series([Polygon::new(band, ink.faint(0.18))])?;
-                        let median = bins.iter().map(|b| (b.x, cut(b.median)));
-                        chart.draw_series(LineSeries::new(
-                            median,
-                            stroke(Ink::Truth.color(), 2.2),
-                        ))?;
-                    }
-                    Ok(())
-                })?;
-            }
-            Ok(())
-        })
-        .live(live)
-}
-
-/// Dots from every part of the axis: most samples of a log are at rest, in one place.
-fn spread_over(points: &[(f64, f64)], span: &Range<f64>) -> Vec<(f64, f64)> {
-    let width = (span.end - span.start) / SLOTS as f64;
-    let mut slots = vec![Vec::new(); SLOTS];
-    for &point in points {
-        let index = ((point.0 - span.start) / width) as usize;
-        slots[index.min(SLOTS - 1)].push(point);
-    }
-    slots.iter().flat_map(|slot| sample(slot, DOTS / SLOTS)).collect()
+    dots_figure(&description, &against, &panels)
 }
 
 /// How often each error occurs, one outline a method.

@@ -65,6 +65,7 @@ fn live(
         is_whole,
         lines: lines.collect(),
         keys: Vec::new(),
+        moves: None,
     }
     .json()
 }

@@ -8,16 +8,16 @@ use stretch_gap::{Diagnosis, Role, StageEvidence};
 use super::{
     bar_figure::GAP,
     canvas::Ink,
-    figure::{Area, Axes, Figure, Frame, dot, plot, px, stroke},
-    live::{Panel, TimePlot, scatter_json},
+    dots_figure::{Dots, Shared, dots_figure},
+    figure::{Area, Axes, Figure, Frame, plot, stroke},
+    live::TimePlot,
     subject::Subject,
-    thin::{binned, curve, extent, padded, quantile, sample, sorted},
+    thin::{curve, extent, padded, quantile, sorted},
 };
 
 /// Length of the window that is drawn, s.
 const WINDOW_S: f64 = 8.0;
-/// Parts of the axis with a median of their own, and dots in all.
-const SLOTS: usize = 24;
+/// Dots of a panel at most.
 const DOTS: usize = 900;
 /// Samples on each side of a rate.
 const REACH: usize = 10;
@@ -29,12 +29,6 @@ pub(crate) const AFTER: Ink = Ink::Third;
 
 /// Its ink, its width in pixels, and its pieces.
 type Line = (Ink, f64, Vec<Vec<(f64, f64)>>);
-
-/// The stage with the largest gap.
-pub(crate) fn worst(diagnosis: &Diagnosis) -> usize {
-    let stages = diagnosis.location.stages.iter().enumerate();
-    stages.max_by(|a, b| a.1.share.total_cmp(&b.1.share)).map_or(0, |(i, _)| i)
-}
 
 /// Whether there is an effect to draw beside the re-tuned simulator.
 pub(crate) fn has_after(subject: &Subject<'_>) -> bool {
@@ -50,12 +44,25 @@ pub(crate) fn after_name(diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// The eight seconds of a test trial in which the re-tuned simulator is farthest off: output, and what is left.
-pub(crate) fn trace_figures(subject: &Subject<'_>, stage: usize) -> (Figure, Figure, String) {
-    let Some((trial, time, window)) = window(subject, stage) else {
-        let missing = || Figure::missing("There is no test trial to draw.");
-        return (missing(), missing(), String::new());
-    };
+/// The test trial that is drawn.
+pub(crate) struct Shown {
+    /// What it is called.
+    pub(crate) name: String,
+    /// Its samples among those of all trials end to end.
+    pub(crate) samples: Range<usize>,
+    /// Their times, s.
+    pub(crate) time_s: Vec<f64>,
+    /// What is seen of it first, s.
+    pub(crate) window: Range<f64>,
+}
+
+/// Eight seconds of a test trial: output, and what is left.
+pub(crate) fn trace_figures(
+    subject: &Subject<'_>,
+    stage: usize,
+    shown: &Shown,
+) -> (Figure, Figure) {
+    let Shown { samples: trial, time_s: time, window, .. } = shown;
     let (evidence, spec) = (&subject.evidence.stages[stage], &subject.simulator.stages()[stage]);
     let span = trial.clone();
     let measured = &subject.simulator.measured(stage)[trial.clone()];
@@ -71,7 +78,7 @@ pub(crate) fn trace_figures(subject: &Subject<'_>, stage: usize) -> (Figure, Fig
     ];
     if after {
         lines.push((AFTER, 1.5, evidence.after[trial.clone()].to_vec()));
-        left.push((AFTER, 1.4, evidence.residual_after[trial].to_vec()));
+        left.push((AFTER, 1.4, evidence.residual_after[trial.clone()].to_vec()));
         legend.push((AFTER, format!("simulated, {}", after_name(subject.diagnosis))));
     }
     let name = if spec.unit.is_empty() {
@@ -90,20 +97,20 @@ pub(crate) fn trace_figures(subject: &Subject<'_>, stage: usize) -> (Figure, Fig
             labels: ["time in the trial, s", if is_first { &name } else { LEFT }],
             unit: if is_first { &spec.unit } else { "\u{d7} the noise" },
             height: if is_first { 280 } else { 190 },
-            time: &time,
+            time,
             view: window.clone(),
             is_whole: false,
             lines: lines.collect(),
             keys: keys.iter().filter(|_| is_first).map(|(key, y)| (*key, &y[..])).collect(),
+            moves: Some(if is_first { "out" } else { "left" }),
         }
         .json()
     };
     let (told, told_left) = (live(&lines, &names, true), live(&left, &names[1..], false));
     let left_legend = legend[1..].to_vec();
-    let top = lines_figure(&time, &lines, &window, &name, 280).legend(legend).live(told);
-    let below = lines_figure(&time, &left, &window, LEFT, 190).legend(left_legend).live(told_left);
-    let trial_name = trial_name(subject, stage);
-    (top, below, trial_name)
+    let top = lines_figure(time, &lines, window, &name, 280).legend(legend).live(told);
+    let below = lines_figure(time, &left, window, LEFT, 190).legend(left_legend).live(told_left);
+    (top, below)
 }
 
 fn lines_figure(
@@ -146,8 +153,8 @@ fn lines_figure(
         .draw(Frame { width: 880, height }, draw(wide))
 }
 
-/// Samples of the test trial with the largest gap, its times, and the window.
-fn window(subject: &Subject<'_>, stage: usize) -> Option<(Range<usize>, Vec<f64>, Range<f64>)> {
+/// The test trial with the largest gap, and the eight seconds of it in which the re-tuned simulator is farthest off.
+pub(crate) fn shown(subject: &Subject<'_>, stage: usize) -> Option<Shown> {
     let segment = worst_segment(subject, stage)?;
     let dt_s = subject.simulator.dt_s();
     let range = segment.from..segment.to;
@@ -160,7 +167,8 @@ fn window(subject: &Subject<'_>, stage: usize) -> Option<(Range<usize>, Vec<f64>
     let starts = (0..=(residual.len() - length) / step).map(|k| k * step);
     let from = starts.max_by(|a, b| sum(*a).total_cmp(&sum(*b)))?;
     let (start, end) = (time[from], time[(from + length).min(time.len()) - 1]);
-    (end > start).then_some((range, time, start..end))
+    let name = subject.simulator.trials()[segment.trial].name.clone();
+    (end > start).then_some(Shown { name, samples: range, time_s: time, window: start..end })
 }
 
 fn worst_segment<'a>(subject: &'a Subject<'_>, stage: usize) -> Option<&'a stretch_gap::Segment> {
@@ -171,11 +179,6 @@ fn worst_segment<'a>(subject: &'a Subject<'_>, stage: usize) -> Option<&'a stret
     };
     let tests = subject.evidence.frame.of_role(Role::Test).filter(|s| s.to - s.from > 20);
     tests.max_by(|a, b| gap(a).total_cmp(&gap(b)))
-}
-
-fn trial_name(subject: &Subject<'_>, stage: usize) -> String {
-    let segment = worst_segment(subject, stage);
-    segment.map_or_else(String::new, |s| subject.simulator.trials()[s.trial].name.clone())
 }
 
 fn begin_of(subject: &Subject<'_>, trial: usize) -> usize {
@@ -211,7 +214,7 @@ pub(crate) fn left_figure(subject: &Subject<'_>, stage: usize, against: Against)
         Against::Rate => format!("rate, {unit}"),
     };
     let panels = panels(subject, evidence, &place);
-    let sizes = sorted(panels.iter().flat_map(|p| &p.2).map(|(_, r)| r.abs()));
+    let sizes = sorted(panels.iter().flat_map(|p| &p.points).map(|(_, r)| r.abs()));
     let places = sorted(place.iter().copied());
     let most = 1.05 * quantile(&sizes, 0.998).max(3.0);
     let x = match against {
@@ -221,77 +224,33 @@ pub(crate) fn left_figure(subject: &Subject<'_>, stage: usize, against: Against)
     if !(most.is_finite() && x.end > x.start) {
         return Figure::missing("There is no motion to draw against.");
     }
-    let height = 165;
-    let frame = Frame { width: 400, height: height * panels.len() as u32 + 20 };
     let description =
         format!("Measured minus simulated in multiples of the noise against {x_label}");
-    let told: Vec<Panel> = (0..panels.len() as u32)
-        .zip(&panels)
-        .map(|(i, (_, name, _))| {
-            let is_last = i as usize + 1 == panels.len();
-            let ends = [i * height, (i + 1) * height + if is_last { 20 } else { 0 }];
-            Panel::new(format!("left {name}"), ends, !is_last, [-most, most])
-        })
-        .collect();
     let by = match against {
         Against::Level => "level",
         Against::Rate => "rate",
     };
-    let live = scatter_json(GAP, Some(by), &x, [by, &unit, "\u{d7} the noise"], &told);
-    Figure::new(&description)
-        .draw(frame, |area| {
-            let mut rest = area.clone();
-            for (i, (ink, name, points)) in panels.iter().enumerate() {
-                let last = i + 1 == panels.len();
-                let tall = if last { height + 20 } else { height };
-                let (here, below) = rest.split_vertically(px(f64::from(tall)));
-                rest = below;
-                let axes = Axes {
-                    x: x.clone(),
-                    y: -most..most,
-                    x_label: if last { x_label.clone() } else { String::new() },
-                    y_label: format!("{name}, multiples of the noise"),
-                    is_log: false,
-                };
-                let bins = binned(points, &x, SLOTS);
-                plot(&here, &axes, |chart| {
-                    let zero = [(x.start, 0.0), (x.end, 0.0)];
-                    chart.draw_series(LineSeries::new(zero, stroke(Ink::Axis.color(), 1.0)))?;
-                    let inside: Vec<_> = points
-                        .iter()
-                        .copied()
-                        .filter(|(a, r)| x.contains(a) && r.abs() < most)
-                        .collect();
-                    let dots = spread_over(&inside, &x).into_iter();
-                    chart.draw_series(dots.map(|at| Circle::new(at, px(0.9), dot(*ink, 0.5))))?;
-                    let cut = |r: f64| r.clamp(-most, most);
-                    if bins.len() > 1 {
-                        let rim = bins.iter().map(|b| (b.x, cut(b.low)));
-                        let back = bins.iter().rev().map(|b| (b.x, cut(b.high)));
-                        let band: Vec<_> = rim.chain(back).collect();
-                        chart.draw_series([Polygon::new(band, ink.faint(0.18))])?;
-                        let median = bins.iter().map(|b| (b.x, cut(b.median)));
-                        chart.draw_series(LineSeries::new(
-                            median,
-                            stroke(Ink::Truth.color(), 2.2),
-                        ))?;
-                    }
-                    Ok(())
-                })?;
-            }
-            Ok(())
-        })
-        .live(live)
+    let against = Shared {
+        x,
+        x_label: &x_label,
+        names: [by, &unit, "\u{d7} the noise"],
+        most,
+        dots: DOTS,
+        brush: (GAP, Some(by)),
+    };
+    dots_figure(&description, &against, &panels)
 }
 
-/// Colour, name, and points of each panel.
-type Cloud = (Ink, &'static str, Vec<(f64, f64)>);
-
-fn panels(subject: &Subject<'_>, evidence: &StageEvidence, place: &[f64]) -> Vec<Cloud> {
-    let join = |residual: &[f64]| place.iter().copied().zip(residual.iter().copied()).collect();
-    let mut panels = vec![(BEFORE, "before", join(&evidence.residual_retuned))];
+fn panels(subject: &Subject<'_>, evidence: &StageEvidence, place: &[f64]) -> Vec<Dots> {
+    let panel = |ink, name: &str, residual: &[f64]| Dots {
+        ink,
+        name: format!("left {name}"),
+        y_label: format!("{name}, multiples of the noise"),
+        points: place.iter().copied().zip(residual.iter().copied()).collect(),
+    };
+    let mut panels = vec![panel(BEFORE, "before", &evidence.residual_retuned)];
     if has_after(subject) {
-        panels.push((AFTER, "after", join(&evidence.residual_after)));
+        panels.push(panel(AFTER, "after", &evidence.residual_after));
     }
     panels
 }
@@ -311,15 +270,4 @@ fn rates(subject: &Subject<'_>, values: &[f64]) -> Vec<f64> {
         from = to;
     }
     rates
-}
-
-/// Dots from every part of the axis: most samples of a session are at rest, in one place.
-fn spread_over(points: &[(f64, f64)], span: &Range<f64>) -> Vec<(f64, f64)> {
-    let width = (span.end - span.start) / SLOTS as f64;
-    let mut slots = vec![Vec::new(); SLOTS];
-    for &point in points {
-        let index = ((point.0 - span.start) / width) as usize;
-        slots[index.min(SLOTS - 1)].push(point);
-    }
-    slots.iter().flat_map(|slot| sample(slot, DOTS / SLOTS)).collect()
 }

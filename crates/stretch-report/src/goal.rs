@@ -14,8 +14,27 @@ pub struct Goal {
     pub value: Option<f64>,
     /// Hits and cases, where it is a rate.
     pub rate: Option<Rate>,
-    /// Whether that is good enough; none without a case.
+    /// Whether that is good enough; none without a case, or where a single one decides.
     pub met: Option<bool>,
+}
+
+impl Goal {
+    /// Whether it is reached, in a word: where a single case decides, there are too few to say.
+    pub fn verdict(&self) -> &'static str {
+        match (self.met, self.value) {
+            (Some(true), _) => "yes",
+            (Some(false), _) => "no",
+            (None, Some(_)) => "too few",
+            (None, None) => "",
+        }
+    }
+}
+
+/// Whether so many cases, of which some missed, say anything of a goal that lets a share of them miss: one may miss, or more
+/// than one did.
+fn is_telling(cases: usize, missed: usize, may_miss: f64) -> bool {
+    // a share of 1 - 0.95 is a little less than a twentieth
+    may_miss * cases as f64 >= 1.0 - 1e-9 || missed > 1
 }
 
 /// What a blind check is meant to reach, and what it did.
@@ -26,14 +45,17 @@ pub fn goals(score: &Score) -> Vec<Goal> {
         goal: format!(">= {least}"),
         value: rate.share(),
         rate: Some(rate),
-        met: rate.share().map(|x| x >= least),
+        met: rate
+            .share()
+            .map(|x| x >= least)
+            .filter(|_| is_telling(rate.cases, rate.cases - rate.hits, 1.0 - least)),
     };
     let most = |what, rate: Rate, most: f64| Goal {
         what,
         goal: format!("<= {most}"),
         value: rate.share(),
         rate: Some(rate),
-        met: rate.share().map(|x| x <= most),
+        met: rate.share().map(|x| x <= most).filter(|_| is_telling(rate.cases, rate.hits, most)),
     };
     let below = |what, value: Option<f64>, most: f64| Goal {
         what,

@@ -22,7 +22,7 @@ const FINENESS: f64 = 2000.0;
 
 /// A curve on an even grid.
 #[derive(Debug, Serialize)]
-struct Packed {
+pub(crate) struct Packed {
     t: f64,
     dt: f64,
     o: f64,
@@ -73,13 +73,15 @@ pub(crate) struct TimePlot<'a> {
     pub(crate) lines: Vec<(&'a str, Ink, f64, &'a [f64])>,
     /// What samples are picked by.
     pub(crate) keys: Vec<(&'static str, &'a [f64])>,
+    /// What moves a curve as numbers are turned: `out` adds to it, `left` takes from it.
+    pub(crate) moves: Option<&'static str>,
 }
 
 impl TimePlot<'_> {
     /// As JSON; nothing without a stretch of time.
     pub(crate) fn json(&self) -> Option<String> {
         let span = extent(self.time.iter().copied()).filter(|s| s.end > s.start)?;
-        let levels = |values: &[f64]| levels(self.time, values, &span, &self.view);
+        let levels = |values: &[f64]| levels(self.time, values, [&span, &self.view], ends);
         let lines = if self.is_whole { &[][..] } else { &self.lines[..] };
         let series: Vec<Series<'_>> = lines
             .iter()
@@ -102,23 +104,58 @@ impl TimePlot<'_> {
             "all": self.is_whole,
             "series": series,
             "keys": keys,
+            "moves": self.moves,
         });
         Some(told.to_string())
     }
 }
 
+/// What turning a number adds to a curve, on the grids of the curve.
+pub(crate) fn change(time: &[f64], values: &[f64], view: &Range<f64>) -> Vec<Packed> {
+    let span = extent(time.iter().copied()).unwrap_or(0.0..0.0);
+    levels(time, values, [&span, view], mean)
+}
+
+/// How the samples of a slot are told on its two places.
+type Told = fn(&[(f64, f64)]) -> Option<[f64; 2]>;
+
+/// By the least and the greatest, in their order.
+fn ends(part: &[(f64, f64)]) -> Option<[f64; 2]> {
+    let real = || part.iter().filter(|p| p.1.is_finite());
+    let low = real().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let high = real().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(if low.0 <= high.0 { [low.1, high.1] } else { [high.1, low.1] })
+}
+
+/// By their mean, twice: it moves both ends.
+fn mean(part: &[(f64, f64)]) -> Option<[f64; 2]> {
+    let mean = part.iter().map(|p| p.1).sum::<f64>() / part.len() as f64;
+    mean.is_finite().then_some([mean; 2])
+}
+
 /// The whole recording, and the view with half of itself on either side.
-fn levels(time: &[f64], values: &[f64], span: &Range<f64>, view: &Range<f64>) -> Vec<Packed> {
+fn levels(
+    time: &[f64],
+    values: &[f64],
+    [span, view]: [&Range<f64>; 2],
+    of_slot: Told,
+) -> Vec<Packed> {
     let half = 0.5 * (view.end - view.start);
     let around = (view.start - half).max(span.start)..(view.end + half).min(span.end);
-    let whole = packed(time, values, span, COARSE);
-    let fine = packed(time, values, &around, FINE);
+    let whole = packed(time, values, span, COARSE, of_slot);
+    let fine = packed(time, values, &around, FINE, of_slot);
     let is_finer = fine.dt < 0.99 * whole.dt;
     [Some(whole), is_finer.then_some(fine)].into_iter().flatten().collect()
 }
 
 /// Samples inside a window on at most `2 slots` places.
-fn packed(time: &[f64], values: &[f64], window: &Range<f64>, slots: usize) -> Packed {
+fn packed(
+    time: &[f64],
+    values: &[f64],
+    window: &Range<f64>,
+    slots: usize,
+    of_slot: Told,
+) -> Packed {
     let inside: Vec<(f64, f64)> = time
         .iter()
         .copied()
@@ -142,13 +179,9 @@ fn packed(time: &[f64], values: &[f64], window: &Range<f64>, slots: usize) -> Pa
         let slot = |t: f64| (((t - window.start) / width) as usize).min(slots - 1);
         let mut told = vec![None; 2 * slots];
         for part in inside.chunk_by(|a, b| slot(a.0) == slot(b.0)) {
-            let real = || part.iter().filter(|p| p.1.is_finite());
-            let low = real().min_by(|a, b| a.1.total_cmp(&b.1));
-            let high = real().max_by(|a, b| a.1.total_cmp(&b.1));
-            if let (Some(low), Some(high)) = (low, high) {
-                let (first, second) = if low.0 <= high.0 { (low, high) } else { (high, low) };
+            if let Some(pair) = of_slot(part) {
                 let at = 2 * slot(part[0].0);
-                (told[at], told[at + 1]) = (Some(first.1), Some(second.1));
+                (told[at], told[at + 1]) = (Some(pair[0]), Some(pair[1]));
             }
         }
         (window.start + 0.25 * width, 0.5 * width, told)
@@ -272,7 +305,7 @@ mod tests {
         let mut values: Vec<f64> = time.iter().map(|t| t.sin()).collect();
         values[12_345] = 7.0;
         values[20_000..30_000].fill(f64::NAN);
-        let packed = packed(&time, &values, &(0.0..199.995), 600);
+        let packed = packed(&time, &values, &(0.0..199.995), 600, ends);
         let told = unpacked(&packed);
         assert_eq!(told.len(), 1200);
         let most = told.iter().flatten().copied().fold(f64::MIN, f64::max);
@@ -286,7 +319,7 @@ mod tests {
     fn few_samples_are_told_one_by_one() {
         let time: Vec<f64> = (0..100).map(|i| 2.0 + f64::from(i) * 0.01).collect();
         let values: Vec<f64> = (0..100).map(|i| f64::from(i * i)).collect();
-        let packed = packed(&time, &values, &(2.0..2.99), 800);
+        let packed = packed(&time, &values, &(2.0..2.99), 800, ends);
         let told = unpacked(&packed);
         assert_eq!(told.len(), 100);
         assert!(told.iter().zip(&values).all(|(a, b)| (a.unwrap() - b).abs() <= packed.q));

@@ -57,12 +57,14 @@ pub(crate) fn fixed(x: f64, decimals: usize) -> String {
     minus(if zero { text.trim_start_matches('-').to_owned() } else { text })
 }
 
-/// A share in percent, to two digits, below 10 % to one.
-pub(crate) fn percent(share: f64) -> String {
-    format!(
-        "{}\u{a0}%",
-        number((1000.0 * share).round() / 10.0, if share.abs() < 0.0995 { 1 } else { 2 })
-    )
+/// A share in whole percent, rounded once; below one to a digit.
+pub fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    let told = match percent.abs() < 0.95 {
+        true => number((10.0 * percent).round() / 10.0, 1),
+        false => fixed(percent, 0),
+    };
+    format!("{told}\u{a0}%")
 }
 
 /// A number on an axis that spans `span`.

@@ -83,6 +83,7 @@ pub(crate) fn step_figure(name: &str, calibrated: &Calibrated, unit: &str) -> Fi
         is_whole: false,
         lines: vec![("estimate", Ink::Third, 2.0, &answer.estimate)],
         keys: Vec::new(),
+        moves: None,
     };
     Figure::new(&format!("Answer of {name} to a step of the signal"))
         .draw(Frame::NARROW, |area| {

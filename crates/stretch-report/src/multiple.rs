@@ -8,8 +8,8 @@ pub(crate) fn multiple(excess: f64) -> f64 {
     if excess.is_finite() { (1.0 + excess).max(0.0).sqrt() } else { f64::NAN }
 }
 
-/// The same with its sign of multiplication.
-pub(crate) fn times(excess: f64) -> String {
+/// What an excess leaves, root mean square, in multiples of the noise: `2.0 ×`.
+pub fn times(excess: f64) -> String {
     with_unit(&number(multiple(excess), 2), "\u{d7}")
 }
 

@@ -14,15 +14,15 @@ const STYLE: &str = include_str!("style.css");
 
 /// A table: the first column names its rows, the others hold numbers.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Table {
+pub struct Table {
     /// What it shows.
-    pub(crate) caption: String,
+    pub caption: String,
     /// Heads of the columns.
-    pub(crate) head: Vec<String>,
+    pub head: Vec<String>,
     /// Cells, row by row.
-    pub(crate) rows: Vec<Vec<String>>,
+    pub rows: Vec<Vec<String>>,
     /// The row to look at first.
-    pub(crate) highlight: Option<usize>,
+    pub highlight: Option<usize>,
 }
 
 /// A report under construction; [`Page::finish`] gives the file.

@@ -7,6 +7,8 @@ use stretch_calibrate::{
 use stretch_core::Degree;
 use stretch_data::{Channel, Trial};
 
+use testkit::page::without_program;
+
 use super::{
     Context, Judged, calibration_page,
     canvas::Ink,
@@ -77,13 +79,6 @@ fn context(tested_on: &str) -> Context {
         notes: vec!["resampled <twice>".into()],
         kinds: Vec::new(),
     }
-}
-
-/// The page without the text of its own script, which is a section of characters to XML.
-fn without_program(page: &str) -> String {
-    let Some((before, rest)) = page.split_once("/*<![CDATA[*/") else { return page.to_owned() };
-    let (_, after) = rest.split_once("/*]]>*/").expect("the section ends");
-    before.to_owned() + after
 }
 
 /// Checks that tags nest, attributes are quoted and once each, and text holds

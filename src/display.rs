@@ -12,10 +12,41 @@ use std::{
         OnceLock,
         atomic::{AtomicBool, Ordering::SeqCst},
     },
+    time::Instant,
 };
 
 use anyhow::ensure;
 use stretch_data::is_standard_output;
+
+use crate::terminal::{self, Ink, wrapped};
+
+/// How much is said beside results and errors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Volume {
+    /// `-q`: nothing.
+    Quiet,
+    /// What was written, what to look at, and progress on a terminal.
+    Usual,
+    /// `-v`: also what is read and chosen, and how long it takes, in lines of their own.
+    Verbose,
+}
+
+/// When the program began, and how much it says.
+static BEGUN: OnceLock<(Instant, Volume)> = OnceLock::new();
+
+/// Says how much is said from now on, once.
+pub(crate) fn begin(volume: Volume) {
+    let _ = BEGUN.set((Instant::now(), volume));
+}
+
+fn volume() -> Volume {
+    BEGUN.get().map_or(Volume::Usual, |(_, volume)| *volume)
+}
+
+/// Whether progress is drawn: what `-v` says stands in lines of its own.
+pub(crate) fn shows_progress() -> bool {
+    volume() == Volume::Usual
+}
 
 static LOST: OnceLock<ErrorKind> = OnceLock::new();
 
@@ -32,32 +63,78 @@ pub(crate) fn give_stdout<'a>(
     Ok(())
 }
 
-/// A text and a line end to standard output, to standard error where a file goes there.
+/// A result: a text and a line end to standard output, to standard error where a file goes there. Lines are as wide as the
+/// terminal at most.
 ///
 /// # Errors
 /// None: a result, so that a command can end with what it says.
 pub(crate) fn say(text: impl Display) -> anyhow::Result<()> {
+    say_as_is(wrapped(&plain(&text.to_string())))
+}
+
+/// The result that all others explain: bold where that is shown.
+///
+/// # Errors
+/// None, as [`say`].
+pub(crate) fn say_first(text: impl Display) -> anyhow::Result<()> {
+    let text = wrapped(&plain(&text.to_string()));
+    match TAKEN.load(SeqCst) {
+        true => say_as_is(text),
+        false => write_out(&terminal::painted(&text, Ink::Strong, &io::stdout())),
+    }
+}
+
+/// A result that other programs read, in lines of its own: code, JSON, TOML.
+///
+/// # Errors
+/// None, as [`say`].
+pub(crate) fn say_as_is(text: impl Display) -> anyhow::Result<()> {
+    let text = plain(&text.to_string());
     if TAKEN.load(SeqCst) {
-        warn(text);
+        write_err(&text);
         return Ok(());
     }
+    write_out(&text)
+}
+
+fn write_out(text: &str) -> anyhow::Result<()> {
     // what was lost is kept by `Output`
-    let _ = writeln!(Output, "{}", plain(&text.to_string()));
+    let _ = writeln!(Output, "{text}");
     Ok(())
 }
 
-/// A value as JSON to standard output.
+/// What was done beside the result, such as a file that was written; not with `-q`.
 ///
 /// # Errors
-/// A value that JSON cannot hold.
-pub(crate) fn say_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
-    say(serde_json::to_string_pretty(value)?)
+/// None, as [`say`].
+pub(crate) fn tell(text: impl Display) -> anyhow::Result<()> {
+    if volume() == Volume::Quiet { Ok(()) } else { say(text) }
 }
 
-/// A text and a line end to standard error, or to nobody.
+/// What is read, chosen, or begun, and when: with `-v`, on standard error.
+pub(crate) fn detail(text: impl Display) {
+    if let Some((begun, Volume::Verbose)) = BEGUN.get() {
+        let line = format!("[{:7.2} s] {text}", begun.elapsed().as_secs_f64());
+        write_err(&wrapped(&plain(&line)));
+    }
+}
+
+/// What to look at: a text and a line end to standard error, or to nobody; not with `-q`.
 pub(crate) fn warn(text: impl Display) {
-    let line = plain(&text.to_string()) + "\n";
-    let _ = io::stderr().lock().write_all(line.as_bytes());
+    if volume() != Volume::Quiet {
+        write_err(&wrapped(&plain(&text.to_string())));
+    }
+}
+
+/// What went wrong: to standard error, always, behind the program's name.
+pub(crate) fn fail(text: impl Display) {
+    let text = wrapped(&plain(&format!("stretch: {text}")));
+    let (name, rest) = text.split_at("stretch:".len());
+    write_err(&(terminal::painted(name, Ink::Alarm, &io::stderr()) + rest));
+}
+
+fn write_err(text: &str) {
+    let _ = io::stderr().lock().write_all(format!("{text}\n").as_bytes());
 }
 
 /// A text without what a terminal acts on, or what turns the text around it or hides: names come from

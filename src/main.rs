@@ -6,15 +6,17 @@
 mod commands;
 mod display;
 mod table;
+mod terminal;
 
 use std::{io::ErrorKind, process::ExitCode};
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand, error::ErrorKind as ArgumentError};
 
 use commands::{
-    apply, blind, calibrate, convert, demo, diagnose, effects, evaluate, export, init, listen,
-    record, rig, simulate,
+    apply, blind, calibrate, completions, convert, demo, diagnose, effects, evaluate, export,
+    fleet, init, json, listen, man, page, record, rig, simulate,
 };
+use display::Volume;
 
 /// From the voltage of a stretch sensor to length, live.
 ///
@@ -30,11 +32,28 @@ use commands::{
 /// judges, says why simulator and rig disagree, and writes one report;
 /// `stretch demo --data DIR` does the same on measured sessions.
 #[derive(Parser)]
-#[command(version, verbatim_doc_comment, max_term_width = 100)]
+#[command(version, verbatim_doc_comment, max_term_width = 100, after_help = STATUSES)]
 struct Cli {
+    /// Say nothing but results and errors
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Say also what is read and chosen, and how long it takes, on standard error
+    #[arg(short, long, global = true)]
+    verbose: bool,
     #[command(subcommand)]
     command: Command,
 }
+
+/// Told once, for all commands.
+const STATUSES: &str = "\
+Where a file is read or written, - is standard input or output.
+
+Exit status:
+  0    done
+  1    not done: standard error says why, and nothing is half-written
+  2    the arguments are not understood
+  3    done, and the verdict of `stretch diagnose` is one that --fail-on names
+  130  ended by Ctrl-C";
 
 #[derive(Subcommand)]
 enum Command {
@@ -51,7 +70,11 @@ enum Command {
     Rig(rig::Args),
     Listen(listen::Args),
     Export(export::Args),
+    Page(page::Args),
     Record(record::Args),
+    Completions(completions::Args),
+    Man(man::Args),
+    Fleet(fleet::Args),
 }
 
 /// What the shell is told when Ctrl-C ended the program.
@@ -64,6 +87,12 @@ fn main() -> ExitCode {
     };
     // Without a handler Ctrl-C still ends the program; only the cleaning up is lost.
     let _ = ctrlc::set_handler(|| commands::stop::on_ctrl_c(INTERRUPTED));
+    display::begin(match (cli.quiet, cli.verbose) {
+        (true, _) => Volume::Quiet,
+        (_, true) => Volume::Verbose,
+        _ => Volume::Usual,
+    });
+    let mut done = ExitCode::SUCCESS;
     let result = match cli.command {
         Command::Calibrate(args) => calibrate::run(args),
         Command::Apply(args) => apply::run(args),
@@ -71,35 +100,48 @@ fn main() -> ExitCode {
         Command::Convert(args) => convert::run(args),
         Command::Demo(args) => demo::run(args),
         Command::Simulate(args) => simulate::run(args),
-        Command::Diagnose(args) => diagnose::run(args),
+        Command::Diagnose(args) => diagnose::run(args).map(|status| done = status),
         Command::Init(args) => init::run(args),
         Command::Blind(args) => blind::run(args),
         Command::Effects(args) => effects::run(args),
         Command::Rig(args) => rig::run(args),
         Command::Listen(args) => listen::run(args),
         Command::Export(args) => export::run(args),
+        Command::Page(args) => page::run(args),
         Command::Record(args) => record::run(args),
+        Command::Completions(args) => completions::run(&args, Cli::command()),
+        Command::Man(args) => man::run(&args, Cli::command()),
+        Command::Fleet(args) => fleet::run(args),
     };
+    display::detail("the end");
     // whoever read our output has gone: nothing is wrong
     let is_unread = display::lost() == Some(ErrorKind::BrokenPipe);
     match (result, display::lost()) {
         (Err(_), _) if stretch_data::interrupted() => ExitCode::from(INTERRUPTED),
         (Err(error), _) if is_unread && is_broken_pipe(&error) => ExitCode::SUCCESS,
         (Err(error), _) => {
-            display::warn(format!("stretch: {}", message(&error)));
+            display::fail(message(&error));
             ExitCode::FAILURE
         }
         (Ok(()), Some(kind)) if !is_unread => {
             let files = "what was to be written into files is";
-            display::warn(format!("stretch: standard output took not all: {kind}; {files}"));
+            display::fail(format!("standard output took not all: {kind}; {files}"));
             ExitCode::FAILURE
         }
-        (Ok(()), _) => ExitCode::SUCCESS,
+        (Ok(()), _) => done,
     }
 }
 
 /// Help that was asked for, or what is wrong with the arguments.
 fn explain(told: &clap::Error) -> ExitCode {
+    let is_surplus =
+        matches!(told.kind(), ArgumentError::UnknownArgument | ArgumentError::TooManyValues);
+    let arguments: Vec<String> =
+        std::env::args_os().map(|argument| argument.to_string_lossy().into_owned()).collect();
+    if let Some(meant) = json::meant_a_file(&arguments).filter(|_| is_surplus) {
+        display::fail(meant);
+        return ExitCode::from(2);
+    }
     match told.print() {
         _ if told.use_stderr() => ExitCode::from(2),
         Err(error) if error.kind() != ErrorKind::BrokenPipe => ExitCode::FAILURE,
@@ -112,7 +154,9 @@ fn explain(told: &clap::Error) -> ExitCode {
 fn message(error: &anyhow::Error) -> String {
     let mut told = without_numbers(&error.to_string());
     for cause in error.chain().skip(1).map(|cause| without_numbers(&cause.to_string())) {
-        if !told.contains(&cause) {
+        if cause.starts_with(&format!("{told}:")) {
+            told = cause;
+        } else if !told.contains(&cause) {
             told = format!("{told}: {cause}");
         }
     }

@@ -1,22 +1,102 @@
 //! Tables on a terminal.
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, Width, presets};
 
 pub(crate) use stretch_report::number;
 
-/// A table with a header line; the first column reads from the left, the
-/// others are numbers and stand at the right.
+use crate::terminal::width;
+
+/// A cell of so many characters is not broken, where that is not more than a third of the line: it is a number, an interval
+/// or a name.
+const WHOLE: usize = 24;
+/// What stands around a cell.
+const AROUND: usize = 3;
+
+/// A table with a header line; the first column reads from the left, the others are numbers and stand at the right.
+///
+/// It is as wide as the terminal at most: long texts break between words, and columns for which there is no room stand in a
+/// further table below, behind the first column again. Nothing is left out.
 pub(crate) fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    let rows: Vec<Vec<String>> = rows.into_iter().collect();
+    fitted(header, &rows, width())
+}
+
+fn fitted(header: &[&str], rows: &[Vec<String>], width: usize) -> String {
+    let whole = WHOLE.min(width / 3);
+    let least: Vec<usize> = (0..header.len()).map(|i| least(header[i], rows, i, whole)).collect();
+    let Some((&first, others)) = least.split_first() else { return String::new() };
+    let mut groups: Vec<Vec<usize>> = vec![Vec::new()];
+    let mut used = 1 + first + AROUND;
+    for (i, own) in others.iter().enumerate() {
+        let is_full = used + own + AROUND > width;
+        if is_full && groups.last().is_some_and(|group| !group.is_empty()) {
+            groups.push(Vec::new());
+            used = 1 + first + AROUND;
+        }
+        used += own + AROUND;
+        groups.last_mut().into_iter().for_each(|group| group.push(i + 1));
+    }
+    let drawn = groups.iter().map(|group| drawn(header, rows, group, &least, width));
+    drawn.collect::<Vec<_>>().join("\n")
+}
+
+/// The first column and some others.
+fn drawn(
+    header: &[&str],
+    rows: &[Vec<String>],
+    group: &[usize],
+    least: &[usize],
+    width: usize,
+) -> String {
+    let columns: Vec<usize> = std::iter::once(0).chain(group.iter().copied()).collect();
     let mut table = Table::new();
     table.load_preset(presets::ASCII_MARKDOWN);
-    table.set_header(header.iter().copied());
+    table.set_content_arrangement(ContentArrangement::Dynamic);
+    table.set_width(u16::try_from(width).unwrap_or(u16::MAX));
+    table.set_header(columns.iter().map(|&i| header[i]));
     for row in rows {
-        table.add_row(row);
+        table.add_row(columns.iter().map(|&i| row.get(i).map_or("", String::as_str)));
     }
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
+    for (at, column) in table.column_iter_mut().enumerate() {
+        let room = u16::try_from(least[columns[at]] + 2).unwrap_or(u16::MAX);
+        column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(room)));
+        if at > 0 {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
     }
     table.to_string()
+}
+
+/// Least width of a column: its longest word, and its longest cell as far as that is not broken.
+fn least(head: &str, rows: &[Vec<String>], column: usize, whole: usize) -> usize {
+    let longest_word = |text: &str| text.split(' ').map(length).max().unwrap_or(0);
+    let of_cell = |text: &String| longest_word(text).max(length(text).min(whole));
+    let cells = rows.iter().filter_map(|row| row.get(column)).map(of_cell).max();
+    longest_word(head).max(cells.unwrap_or(0)).max(1)
+}
+
+fn length(text: &str) -> usize {
+    text.chars().count()
+}
+
+/// A text whose Markdown tables are drawn as [`table`] draws them.
+pub(crate) fn drawn_tables(text: &str) -> String {
+    let mut out: Vec<String> = Vec::new();
+    let mut held: Vec<Vec<String>> = Vec::new();
+    for line in text.lines().chain([""]) {
+        match line.strip_prefix('|').and_then(|line| line.trim_end().strip_suffix('|')) {
+            Some(row) => held.push(row.split('|').map(|cell| cell.trim().to_owned()).collect()),
+            None => {
+                if let Some((header, rows)) = std::mem::take(&mut held).split_first() {
+                    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+                    // the line of dashes is drawn again
+                    out.push(table(&header, rows.iter().skip(1).cloned()));
+                }
+                out.push(line.to_owned());
+            }
+        }
+    }
+    out.join("\n").trim_end().to_owned()
 }
 
 /// A number that may be missing.
@@ -30,5 +110,33 @@ pub(crate) fn p_value(p: Option<f64>) -> String {
         None => "-".to_owned(),
         Some(p) if p < 1e-4 => "< 0.0001".to_owned(),
         Some(p) => format!("{p:.4}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_that_is_too_wide_goes_on_below() {
+        let rest = ["0.001368", "12.05 .. 376.8", "-", "a long remark of many words here"];
+        let row = |name: &str| [name].into_iter().chain(rest).map(str::to_owned).collect();
+        let rows: Vec<Vec<String>> = ["first", "second"].map(row).to_vec();
+        let header = ["name", "value", "95 % interval", "mark", "what there is to say"];
+        for width in [30, 40, 60, 80, 100] {
+            let told = fitted(&header, &rows, width);
+            assert!(told.lines().all(|line| length(line) <= width), "{width}:\n{told}");
+            for cell in ["0.001368", "12.05", "376.8", "second", "remark", "words"] {
+                assert!(told.contains(cell), "{width}: {cell} is lost:\n{told}");
+            }
+        }
+        assert_eq!(fitted(&header, &rows, 100).lines().count(), 4);
+        assert!(fitted(&header, &rows, 40).matches("first").count() > 1);
+    }
+
+    #[test]
+    fn markdown_is_drawn_and_all_else_stays() {
+        let told = drawn_tables("one\n| a | b |\n| --- | --- |\n| long | 1 |\n\n- two");
+        assert_eq!(told, "one\n| a    | b |\n|------|---|\n| long | 1 |\n\n- two");
     }
 }

@@ -112,8 +112,8 @@ fn a_dash_is_standard_input_and_output_and_never_a_file() {
     two.current_dir(scratch.path("")).args(["calibrate", "-", "--out", "-", "--report", "-"]);
     fails(&mut two, &["two files cannot go to standard output"]);
     let mut folder = stretch();
-    folder.current_dir(scratch.path("")).args(["simulate", "--protocol", "pulses", "--out", "-"]);
-    fails(&mut folder, &["folder", "standard output"]);
+    folder.current_dir(scratch.path("")).args(["simulate", "--protocol", "paper", "--out", "-"]);
+    fails(&mut folder, &["17 trials", "standard output"]);
     assert_eq!(scratch.names(), ["cal.json", "plain.csv"], "a file called -");
 }
 

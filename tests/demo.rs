@@ -6,10 +6,11 @@ use std::{fs, path::Path};
 
 use serde_json::Value;
 use support::{Scratch, fails, runs, stretch};
+use testkit::page::without_program;
 
 /// Both parts in one page that needs no network.
 fn holds_both_parts(out: &Path) {
-    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    let page = without_program(&fs::read_to_string(out.join("report.html")).unwrap());
     for heading in
         ["How good it is", "The surfaces (non-linear)", "Where the gap sits", "Which effect"]
     {

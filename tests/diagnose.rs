@@ -10,8 +10,8 @@ use std::{
 use approx::assert_abs_diff_eq;
 use assert_cmd::Command;
 use serde_json::Value;
-use support::{Scratch, fails, runs, stretch};
-use testkit::tolerance::TRAINED_APART;
+use support::{Scratch, fails, prints, runs, stretch};
+use testkit::{page::without_program, tolerance::TRAINED_APART};
 
 /// What a run that succeeds prints.
 /// A simulated data set: one arbitrary trial to fit, one to test, with effects.
@@ -89,7 +89,7 @@ fn a_simulated_effect_is_named_and_reported() {
     let (json, page) = (scratch.path("d.json"), scratch.path("d.html"));
     let run = |threads: &str, json: &Path| {
         let mut command = diagnose(&folder);
-        command.arg("--json").arg(json).args(["--threads", threads, "--baselines"]);
+        command.arg("--json-out").arg(json).args(["--threads", threads, "--baselines"]);
         command
     };
     let text = runs(run("2", &json).arg("--report").arg(&page));
@@ -121,12 +121,16 @@ fn a_simulated_effect_is_named_and_reported() {
     assert_abs_diff_eq!(with, real, epsilon = TRAINED_APART * real);
     // The parameters are as shipped: then the simplest method does, too.
     assert_eq!(d["baselines"]["largest_drop"], "gauge_hysteresis");
-    assert!(text.contains("What it costs") && text.contains("simpler methods"), "{text}");
+    assert!(
+        text.contains("by where the calibration was trained")
+            && text.contains("Methods that leave one step out"),
+        "{text}"
+    );
     // Whatever the number of threads, the same bits.
     let again = scratch.path("again.json");
     runs(&mut run("1", &again));
     assert!(d == read(&again));
-    let page = fs::read_to_string(page).unwrap();
+    let page = without_program(&fs::read_to_string(page).unwrap());
     assert!(page.contains("What to change") && page.contains("Add gauge_hysteresis"));
     assert!(page.contains("trained in the simulator then errs"));
     assert!(page.contains("simpler methods") && page.contains("by where the calibration"));
@@ -138,7 +142,7 @@ fn a_simulated_effect_is_named_and_reported() {
     );
     // With its entry struck out nobody else takes the blame with the same right.
     let without = scratch.path("without.json");
-    runs(diagnose(&folder).args(["--without", "gauge_hysteresis"]).arg("--json").arg(&without));
+    runs(diagnose(&folder).args(["--without", "gauge_hysteresis"]).arg("--json-out").arg(&without));
     let w = read(&without);
     assert_ne!(w["named"][0], "gauge_hysteresis");
     assert!(w["candidates"][0]["closed"].as_f64() < d["candidates"][0]["closed"].as_f64());
@@ -209,7 +213,7 @@ fn data_that_are_not_what_they_say_are_refused_by_name() {
     fails(&mut diagnose(&good.join("fit.csv")), &["--reference", "--signal"]);
     fails(&mut diagnose(&scratch.path("nowhere")), &["nowhere", "no such"]);
     let json = scratch.path("d.json");
-    fails(diagnose(&metres).arg("--json").arg(&json), &["metres"]);
+    fails(diagnose(&metres).arg("--json-out").arg(&json), &["metres"]);
     assert!(!json.exists());
 }
 
@@ -228,7 +232,7 @@ fn odd_data_get_an_honest_verdict() {
         "{text}"
     );
     // The rig of somebody else: the gap is everything, and no effect takes the blame.
-    let rig = runs(stretch().arg("rig"));
+    let rig = prints(stretch().arg("rig"));
     let other = rig
         .replace("value = 180.0", "value = 300.0")
         .replace("value = 25e-6", "value = 200e-6")
@@ -243,7 +247,7 @@ fn odd_data_get_an_honest_verdict() {
 #[test]
 fn a_simulator_that_has_the_effect_agrees() {
     let scratch = Scratch::new();
-    let stock = runs(stretch().arg("rig"));
+    let stock = prints(stretch().arg("rig"));
     let agrees = |command: &mut Command, name: &str| {
         let text = runs(command);
         let first = text.lines().next().unwrap();
@@ -276,7 +280,7 @@ fn a_simulator_that_has_the_effect_agrees() {
 fn a_wrong_rig_is_no_effect_and_a_strong_effect_is_no_wrong_rig() {
     let scratch = Scratch::new();
     let folder = bench(&scratch, "bench", &[]);
-    let stock = runs(stretch().arg("rig"));
+    let stock = prints(stretch().arg("rig"));
     // Each a rig that the data do not come from, none of which the tolerances reach.
     let others = [
         ("amplifier", "G = { value = 10.0", "G = { value = 8.0"),
@@ -323,7 +327,7 @@ fn ctrl_c_leaves_nothing_half_written() {
     let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_stretch"))
         .args(["diagnose", "--threads", "1"])
         .arg(&folder)
-        .arg("--json")
+        .arg("--json-out")
         .arg(out.join("d.json"))
         .arg("--report")
         .arg(out.join("d.html"))
@@ -356,11 +360,11 @@ fn a_blind_check_keeps_its_labels_sealed() {
     assert!(runs(stretch().args(["blind", "run"]).arg(&out)).contains("answered 2 of 2"));
     let text = runs(stretch().args(["blind", "score", "--no-oracle"]).arg(&out));
     assert!(text.contains(&hash) && text.contains("false alarms on nulls"), "{text}");
-    assert!(text.contains("| this diagnosis |") && text.contains("| BIC alone |"), "{text}");
+    assert!(text.contains("| this diagnosis ") && text.contains("| BIC alone "), "{text}");
     let json: Value =
         serde_json::from_str(&fs::read_to_string(out.join("score.json")).unwrap()).unwrap();
     assert!(json["score"]["baselines"]["signature"]["top1"]["cases"].is_u64(), "{json}");
-    let page = fs::read_to_string(out.join("blind.html")).unwrap();
+    let page = without_program(&fs::read_to_string(out.join("blind.html")).unwrap());
     assert!(page.contains("largest drop of the error"));
     assert!(page.contains(&hash) && page.contains("Every miss") && !page.contains("NaN"));
     // A label that was altered afterwards is found out.
@@ -413,7 +417,7 @@ fn a_gauge_alone_is_diagnosed_beside_its_reference() {
     let first = text.lines().next().unwrap();
     assert!(first.contains("channel_skew") || first.contains("amplifier_lowpass"), "{text}");
     assert!(text.contains("skew_s = 0.03") || text.contains("skew_s = 0.029"), "{text}");
-    assert!(!fs::read_to_string(page).unwrap().contains("NaN"));
+    assert!(!without_program(&fs::read_to_string(page).unwrap()).contains("NaN"));
     let dead = scratch.write("dead.csv", fs::read_to_string(&trial).unwrap());
     alter(&dead, "bridge_v", |_, _| 1.0);
     fails(diagnose(&dead).args(columns), &["bridge_v", "dead"]);

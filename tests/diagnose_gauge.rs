@@ -10,8 +10,8 @@ use std::{
 
 use approx::assert_abs_diff_eq;
 use serde_json::Value;
-use support::{Scratch, fails, runs, stretch};
-use testkit::tolerance::SKEW_FOUND_S;
+use support::{Scratch, fails, prints, runs, stretch};
+use testkit::{page::without_program, tolerance::SKEW_FOUND_S};
 
 /// A little noise that comes out the same everywhere.
 fn noise(i: usize) -> f64 {
@@ -72,13 +72,13 @@ fn a_gauge_is_told_by_columns_rig_file_or_missing_openings() {
     let (json, page) = (scratch.path("d.json"), scratch.path("d.html"));
     let mut command = stretch();
     command.arg("diagnose").arg(&file).args(["--reference", "angle_deg", "--signal", "s2"]);
-    named(&runs(command.arg("--json").arg(&json).arg("--report").arg(&page)));
+    named(&runs(command.arg("--json-out").arg(&json).arg("--report").arg(&page)));
     let d: Value = serde_json::from_str(&fs::read_to_string(&json).unwrap()).unwrap();
     assert_eq!((d["verdict"].as_str(), &d["named"][0]), (Some("effect"), &"channel_skew".into()));
     let skew = d["candidates"][0]["parameters"]["skew_s"].as_f64().unwrap();
     assert_abs_diff_eq!(skew, 0.12, epsilon = SKEW_FOUND_S);
     assert_eq!(d["shares"][0]["effect"], "channel_skew");
-    let page = fs::read_to_string(page).unwrap();
+    let page = without_program(&fs::read_to_string(page).unwrap());
     assert!(page.contains("channel_skew") && page.contains("deg") && !page.contains("NaN"));
     // A data set whose rig file says so, its columns named; the usual columns need no naming.
     let set = folder(&scratch, "kind", "time_s,angle_deg,s2", Some(GAUGE));
@@ -89,7 +89,7 @@ fn a_gauge_is_told_by_columns_rig_file_or_missing_openings() {
     named(&runs(stretch().arg("diagnose").arg(&set)));
     // A rig file of a whole rig does not describe a gauge.
     let rig = scratch.path("rig.toml");
-    fs::write(&rig, runs(stretch().arg("rig"))).unwrap();
+    fs::write(&rig, prints(stretch().arg("rig"))).unwrap();
     let mut command = stretch();
     command.arg("diagnose").arg(&file).args(columns).arg("--rig").arg(&rig);
     fails(&mut command, &["joint.csv", "kind"]);

@@ -69,7 +69,7 @@ fn a_name_makes_the_calibration_better_and_goes_to_the_board() {
     assert!(last[5].parse::<f64>().unwrap() > 0.0, "{last:?}");
 
     // On a diagnosis of the whole rig, and as C.
-    runs(stretch().arg("diagnose").arg(&bench).arg("--no-next").arg("--json").arg(&d));
+    runs(stretch().arg("diagnose").arg(&bench).arg("--no-next").arg("--json-out").arg(&d));
     let said = runs(
         stretch()
             .arg("calibrate")
@@ -121,13 +121,13 @@ fn a_diagnosis_that_cannot_help_is_refused_with_what_to_do() {
         fails(command.arg("--out").arg(&out), says);
         assert!(!out.exists());
     };
-    ask("no.json", "{\"rows\": 3}", &["no.json", "stretch diagnose --json"]);
+    ask("no.json", "{\"rows\": 3}", &["no.json", "stretch diagnose --json-out"]);
     ask("newer.json", "{\"schema\": 7}", &["newer.json", "schema 7", "newer"]);
     // A diagnosis without any effect, and one of another stage alone.
     let folder = scratch.path("quiet");
     runs(stretch().args(["simulate", "--protocol", "pulses", "--out"]).arg(&folder));
     let d = scratch.path("quiet.json");
-    runs(stretch().arg("diagnose").arg(&folder).arg("--json").arg(&d));
+    runs(stretch().arg("diagnose").arg(&folder).arg("--json-out").arg(&d));
     let quiet = fs::read_to_string(&d).unwrap();
     ask("none.json", &quiet, &["none.json", "no effect of the gauge", "--model observer"]);
 }

@@ -37,7 +37,7 @@ fn is_named_when_it_is_simulated() {
         let given = spelled(effect);
         stretch().args(["simulate", "--effect", &given, "--out"]).arg(&folder).assert().success();
         let mut command = stretch();
-        command.arg("diagnose").arg(&folder).args(["--no-next", "--json"]).arg(&json);
+        command.arg("diagnose").arg(&folder).args(["--no-next", "--json-out"]).arg(&json);
         command.assert().success();
         let d: Value = serde_json::from_str(&fs::read_to_string(&json).unwrap()).unwrap();
         let first = &d["candidates"][0];

@@ -140,7 +140,7 @@ fn a_gauge_alone_is_written_and_agrees() {
     let text = fs::read_to_string(&fixed).unwrap();
     assert!(text.contains("kind = \"gauge\"") && text.contains("skew_s = 0.0"), "{text}");
     let json = scratch.path("d.json");
-    runs(run(&["--rig"]).arg(&fixed).arg("--json").arg(&json));
+    runs(run(&["--rig"]).arg(&fixed).arg("--json-out").arg(&json));
     let again: Value = serde_json::from_str(&fs::read_to_string(&json).unwrap()).unwrap();
     assert!(is_agreed(&again), "{}", again["sentence"]);
 }

@@ -39,7 +39,7 @@ const WRITING: [Writing; 14] = [
     writing("demo --paper --out bench --force", 1, true),
     writing("calibrate a.csv --out cal.json --report cal.html --fixed cal.postcard", 8, false),
     writing(
-        "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json d.json --report d.html --fix fixed.toml",
+        "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json-out d.json --report d.html --fix fixed.toml",
         3,
         false,
     ),

@@ -265,7 +265,7 @@ fn heard(bytes: &[u8]) -> (String, String) {
         .unwrap();
     assert!(output.status.success());
     let recorded = fs::read_to_string(scratch.path("trial.csv")).unwrap_or_default();
-    (String::from_utf8_lossy(&output.stderr).into_owned(), recorded)
+    (support::unbroken(&String::from_utf8_lossy(&output.stderr)), recorded)
 }
 
 #[test]

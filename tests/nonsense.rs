@@ -4,7 +4,7 @@ mod support;
 
 use std::{fmt::Write, fs};
 
-use support::{Scratch, calibrate, fails, runs, stretch};
+use support::{Scratch, calibrate, fails, one_line, runs, stretch};
 
 /// The rows of a trial, each changed by its number.
 fn changed(
@@ -26,7 +26,7 @@ fn changed(
 fn warned(command: &mut assert_cmd::Command) -> String {
     let output = command.output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8_lossy(&output.stderr).into_owned()
+    one_line(&String::from_utf8_lossy(&output.stderr))
 }
 
 /// Noise that follows nothing, from 0 to 1.
@@ -115,8 +115,8 @@ fn a_log_that_does_not_belong_to_the_record_is_said_to_be_none_of_its_own() {
         cells[2] = format!("{:.2}", 1000.0 * cells[2].parse::<f64>().unwrap());
     });
     for said in [apply(&other_unit), evaluate(&other_unit)] {
-        assert!(said.contains("% of the samples lie outside"), "{said}");
-        assert!(said.contains("is this a log of that sensor, in that unit?"), "{said}");
+        assert!(said.contains("samples lie outside the range of the calibration"), "{said}");
+        assert!(said.contains("are they in mV? divided by 1000,"), "{said}");
     }
     // metres for millimetres
     let other_reference = changed(&scratch, "metres.csv", |_, cells| {
@@ -129,5 +129,5 @@ fn a_log_that_does_not_belong_to_the_record_is_said_to_be_none_of_its_own() {
     let mut command = stretch();
     command.args(["apply", "-", "--calibration"]).arg(&record);
     let said = warned(command.write_stdin(fs::read(&other_unit).unwrap()));
-    assert!(said.contains("is this a log of that sensor"), "{said}");
+    assert!(said.contains("are they in mV?"), "{said}");
 }

@@ -133,7 +133,7 @@ fn convert_renames_and_scales() {
         .assert()
         .success();
     let text = std::fs::read_to_string(out).unwrap();
-    assert_eq!(text, "time_s,length_mm,bridge_v\n0,180,1.24\n0.010000000000000009,179,1.25\n");
+    assert_eq!(text, "time_s,length_mm,bridge_v\n0,180,1.24\n0.01,179,1.25\n");
 }
 
 #[test]

@@ -4,7 +4,7 @@ mod support;
 
 use std::fs;
 
-use support::{Scratch, fails, runs, stretch};
+use support::{Scratch, fails, prints, runs, stretch};
 
 /// What a run that succeeds prints.
 #[test]
@@ -44,7 +44,7 @@ fn a_run_is_repeated_from_its_own_rig_file() {
 #[test]
 fn a_rig_of_ones_own_is_named_without_its_effects() {
     let scratch = Scratch::new();
-    let text = runs(stretch().arg("rig"));
+    let text = prints(stretch().arg("rig"));
     assert!(text.contains("tau_m") && text.contains("# Lag of the muscle (s)"));
     let text =
         text.replace("value = 180.0", "value = 200.0") + "[[effect]]\nname = \"leak\"\nc = 1e-10\n";
@@ -210,7 +210,7 @@ fn wrong_input_is_named() {
     commands(&format!("{header}0,0,0\n0.01,1.2,0\n"), &["commands.csv", "inlet", "1.2", "0 .. 1"]);
     let gap = format!("{header}0,0,0\n0.01,0,0\n0.02,0,0\n0.05,0,0\n0.06,0,0\n");
     commands(&gap, &["commands.csv", "sample 3", "0.01 s"]);
-    let rig = runs(stretch().arg("rig"));
+    let rig = prints(stretch().arg("rig"));
     let file = scratch.write("rig.toml", rig.replace("value = 0.35", "value = -0.35"));
     let with = |file: &std::path::Path, parts: &[&str]| {
         fails(stretch().args(["simulate", "--rig"]).arg(file).arg("--out").arg(&out), parts);
@@ -232,7 +232,7 @@ fn the_catalogue_is_listed() {
     assert_eq!(json.as_array().unwrap().len(), 23);
     assert_eq!(json[0]["parameters"][0]["name"], "r");
     assert_eq!(json[0]["parameters"][1]["role"], "form");
-    let code = runs(stretch().args(["effects", "leak", "--code", "python"]));
+    let code = prints(stretch().args(["effects", "leak", "--code", "python"]));
     assert!(code.contains("def leak(p):") && code.contains("kg/(s Pa)"), "{code}");
     fails(stretch().args(["effects", "lek"]), &["did you mean `leak`?"]);
 }

@@ -60,11 +60,11 @@ fn a_report_that_fails_leaves_no_record_behind() {
         ("calibrate a.csv --out cal.json --report logs", "logs"),
         ("calibrate a.csv --out new.json --report new.json", "two files of this command"),
         (
-            "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json new.json --report logs",
+            "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json-out new.json --report logs",
             "logs",
         ),
         (
-            "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json new.json --fix /proc/none",
+            "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json-out new.json --fix /proc/none",
             "/proc/none",
         ),
     ] {
@@ -228,7 +228,7 @@ const ONTO_A_DISK: [&str; 9] = [
     "blind make --cases 1 --out disk/cases",
     "export --calibration board.json --c disk/c",
     "calibrate a.csv --out disk/cal.json --report disk/cal.html",
-    "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json disk/d.json --report disk/d.html",
+    "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json-out disk/d.json --report disk/d.html",
     "apply --calibration cal.json a.csv --out disk/out.csv",
     "init disk/logs --force",
 ];

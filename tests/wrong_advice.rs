@@ -4,7 +4,7 @@ mod support;
 
 use std::{fmt::Write, fs, path::PathBuf};
 
-use support::{Scratch, calibrate, fails, runs, stretch};
+use support::{Scratch, calibrate, fails, one_line, prints, runs, stretch};
 
 /// Rows of a trial with their columns' names.
 type Rows = (Vec<String>, Vec<Vec<f64>>);
@@ -76,7 +76,7 @@ fn noise(n: usize) -> f64 {
 
 fn said(folder: &PathBuf) -> String {
     let output = stretch().args(["diagnose", "--no-next"]).arg(folder).output().unwrap();
-    String::from_utf8([output.stdout, output.stderr].concat()).unwrap()
+    one_line(&String::from_utf8([output.stdout, output.stderr].concat()).unwrap())
 }
 
 #[test]
@@ -152,7 +152,7 @@ fn a_rig_file_is_named_in_what_is_wrong_with_it() {
     let scratch = Scratch::new();
     let bench = scratch.path("bench");
     runs(stretch().args(["simulate", "--protocol", "arbitrary", "--out"]).arg(&bench));
-    let stock = runs(stretch().arg("rig"));
+    let stock = prints(stretch().arg("rig"));
     for (from, to) in [
         ("value = 0.35", "value = -0.35"),
         ("tau_m", "tau_mm"),

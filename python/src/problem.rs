@@ -372,6 +372,7 @@ impl Work {
             threads: how.threads,
             seed: how.seed,
             baselines: how.baselines,
+            responses: true,
             ..Options::default()
         };
         let progress = |words: &str| drop(desk.send(Message::Progress(words.to_owned())));

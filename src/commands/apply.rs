@@ -6,11 +6,11 @@ use std::{
 };
 
 use stretch_calibrate::{
-    Applied, LiveReceptor, apply, not_its_own, pressure_column, read_calibration,
+    Applied, LiveReceptor, Reach, apply, not_its_own, pressure_column, read_calibration,
 };
 use stretch_core::{Calibration, Model};
 use stretch_data::{
-    ReadOptions, Recording, RowReader, Trial, is_standard_output, push_number, write_whole,
+    ReadOptions, Recording, RowReader, Trial, is_standard_output, push_number, unit, write_whole,
 };
 use stretch_receptor::{Domain, Reading, Withheld};
 
@@ -82,7 +82,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             out.flush()?;
         }
     }
-    tell(&applied);
+    tell(&calibration, &trial, &applied);
     if let Some(told) = told {
         warn(format!("stretch: {}: {told}", trial.name));
     }
@@ -90,10 +90,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
 }
 
 /// What came of a trial, on standard error.
-fn tell(applied: &Applied) {
+fn tell(calibration: &Calibration, trial: &Trial, applied: &Applied) {
     let faults = applied.faults;
-    let mut seen = Seen::default();
-    applied.readings.iter().for_each(|reading| seen.take(reading));
+    let mut seen = Seen::of(calibration);
+    let signal = trial.channel(calibration.signal.as_str()).into_iter().flatten();
+    applied.readings.iter().zip(signal).for_each(|(reading, signal)| seen.take(reading, *signal));
     warn(format!(
         "{}; time stamps: {} missing, {} early or late",
         seen.line(),
@@ -104,16 +105,22 @@ fn tell(applied: &Applied) {
 }
 
 /// What came of the samples.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Seen {
     samples: u64,
     withheld: u64,
     clamped: u64,
+    reach: Reach,
 }
 
 impl Seen {
-    fn take(&mut self, reading: &Result<Reading, Withheld>) {
+    fn of(calibration: &Calibration) -> Self {
+        Self { samples: 0, withheld: 0, clamped: 0, reach: Reach::of(calibration) }
+    }
+
+    fn take(&mut self, reading: &Result<Reading, Withheld>, signal: f64) {
         self.samples += 1;
+        self.reach.take(signal);
         match reading {
             Ok(reading) => self.clamped += u64::from(reading.domain != Domain::Inside),
             Err(_) => self.withheld += 1,
@@ -121,7 +128,7 @@ impl Seen {
     }
 
     fn line(&self) -> String {
-        let Self { samples, withheld, clamped } = self;
+        let Self { samples, withheld, clamped, .. } = self;
         format!(
             "{samples} samples: {withheld} without an estimate, {clamped} outside of what was calibrated"
         )
@@ -129,7 +136,8 @@ impl Seen {
 
     /// Says so where the log does not look like one of the calibration's.
     fn doubt(&self) {
-        if let Some(doubt) = not_its_own(self.clamped, self.samples - self.withheld) {
+        let clamped = || not_its_own(self.clamped, self.samples - self.withheld);
+        if let Some(doubt) = self.reach.doubt().or_else(clamped) {
             warn(format!("stretch: {doubt}"));
         }
     }
@@ -148,14 +156,14 @@ fn live(
         let trial = told(Recording::from_reader(input, "standard input", options)?);
         let applied = apply(calibration, &trial)?;
         write_all(calibration, &trial, &applied, out)?;
-        tell(&applied);
+        tell(calibration, &trial, &applied);
         return Ok(());
     }
     let mut receptor = LiveReceptor::new(calibration)?;
     let mut rows = RowReader::new(input, "standard input", options)?;
     out.write_all(header(calibration).as_bytes())?;
     out.flush()?;
-    let (mut line, mut seen) = (Vec::new(), Seen::default());
+    let (mut line, mut seen) = (Vec::new(), Seen::of(calibration));
     let mut pace = Pace::of(calibration.sample_rate_hz.hz());
     while let Some(row) = rows.next_row() {
         match row {
@@ -164,7 +172,7 @@ fn live(
                     receptor.feel(*pressure);
                 }
                 let reading = receptor.step(row.time_s, row.values[0]);
-                seen.take(&reading);
+                seen.take(&reading, row.values[0]);
                 if let Some(told) = pace.take(row.time_s) {
                     warn(format!("stretch: {told}"));
                 }
@@ -200,10 +208,8 @@ fn write_all(
 /// `time_s,estimate_mm,rate_mm_per_s,branch,domain`, the unit that of the reference; `sd_mm` behind it where the model knows how sure
 /// it is.
 pub(super) fn header(calibration: &Calibration) -> String {
-    let unit = match calibration.reference.unit() {
-        "" => String::new(),
-        unit => format!("_{unit}"),
-    };
+    let unit =
+        unit(calibration.reference.as_str()).map_or(String::new(), |unit| format!("_{unit}"));
     let sd = if knows_sd(calibration) { format!(",sd{unit}") } else { String::new() };
     format!("time_s,estimate{unit},rate{unit}_per_s,branch,domain{sd}\n")
 }

@@ -17,7 +17,8 @@ use super::{
     blind_answers::{ANSWER, cases},
     blind_room::Room,
     blind_score,
-    shared::{recover, say, steps, write_text},
+    json::Json,
+    shared::{recover, steps, tell, write_text},
     stop,
 };
 
@@ -49,6 +50,8 @@ pub(crate) struct Args {
     forms: Forms,
     #[command(flatten)]
     options: RunOptions,
+    #[command(flatten)]
+    json: Json,
 }
 
 #[derive(clap::Subcommand)]
@@ -153,6 +156,8 @@ struct ScoreArgs {
     /// Leave out the fits that know the labels
     #[arg(long)]
     no_oracle: bool,
+    #[command(flatten)]
+    json: Json,
 }
 
 /// Why there is none.
@@ -164,16 +169,19 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     match args.step {
         Some(Step::Make(args)) => return make_cases(&args),
         Some(Step::Run(args)) => return answer(&args.folder, &args.options),
-        Some(Step::Score(args)) => return blind_score::score(&args.folder, !args.no_oracle),
+        Some(Step::Score(args)) => {
+            return blind_score::score(&args.folder, !args.no_oracle, &args.json);
+        }
         None => {}
     }
+    args.json.share_stdout([])?;
     let (Some(cases), Some(out)) = (args.cases, args.out) else {
         bail!("say how many cases and where to: stretch blind --cases 360 --seed 7 --out check");
     };
     let make = MakeArgs { cases, seed: args.seed, out, forms: args.forms };
     make_cases(&make)?;
     answer(&make.out, &args.options)?;
-    blind_score::score(&make.out, true)
+    blind_score::score(&make.out, true, &args.json)
 }
 
 fn make_cases(args: &MakeArgs) -> anyhow::Result<()> {
@@ -191,7 +199,7 @@ fn make_cases(args: &MakeArgs) -> anyhow::Result<()> {
     })?;
     bar.finish_and_clear();
     let sha256 = seal.map_or(String::new(), |seal| seal.sha256().to_owned());
-    say(format!(
+    tell(format!(
         "made {} cases in {}; labels sealed, SHA-256 {sha256}",
         args.cases,
         args.out.display(),
@@ -243,14 +251,14 @@ fn answer(folder: &Path, options: &RunOptions) -> anyhow::Result<()> {
     }
     let refused = all.iter().filter(|(_, path)| !path.join(ANSWER).is_file()).count();
     let answered = all.len() - refused;
-    say(format!("answered {answered} of {} cases, {refused} refused", all.len()))
+    tell(format!("answered {answered} of {} cases, {refused} refused", all.len()))
 }
 
 /// Diagnoses one case in a process that is given a copy of its data and nothing else.
 fn one(program: &Path, case: &Path, alone: bool, options: &RunOptions) -> anyhow::Result<()> {
     let room = Room::of(case, &[ANSWER, REFUSAL, HINT])?;
     let mut command = room.command(program);
-    command.args(["diagnose", ".", "--json", ANSWER, "--no-next"]);
+    command.args(["diagnose", ".", "--json-out", ANSWER, "--no-next"]);
     for name in struck(case)? {
         command.args(["--without", &name]);
     }

@@ -13,11 +13,12 @@ use stretch_report::{BlindSubject, Goal, blind_page, goals};
 
 use super::{
     blind_answers::{Answers, answers},
-    shared::{say, stage_text, steps},
+    json::Json,
+    shared::{say, stage_text, steps, tell},
 };
-use crate::table::table;
+use crate::table::{drawn_tables, table};
 
-pub(super) fn score(folder: &Path, with_oracle: bool) -> anyhow::Result<()> {
+pub(super) fn score(folder: &Path, with_oracle: bool, json: &Json) -> anyhow::Result<()> {
     let mut answers = answers(folder)?;
     if with_oracle {
         oracle(folder, &mut answers)?;
@@ -33,14 +34,17 @@ pub(super) fn score(folder: &Path, with_oracle: bool) -> anyhow::Result<()> {
     };
     let mut outputs = Outputs::default();
     stage_text(&mut outputs, &folder.join("blind.html"), &blind_page(&subject))?;
-    let json = serde_json::json!({ "score": score, "goals": goals });
-    let json = serde_json::to_string_pretty(&json)? + "\n";
-    stage_text(&mut outputs, &folder.join("score.json"), &json)?;
+    let answer = serde_json::json!({ "score": score, "goals": goals });
+    let text = serde_json::to_string_pretty(&answer)? + "\n";
+    stage_text(&mut outputs, &folder.join("score.json"), &text)?;
+    json.stage(&mut outputs, &answer)?;
     outputs.keep()?;
-    say(format!("seal intact, SHA-256 {}\n", answers.seal.sha256()))?;
-    say(table(&["goal", "asked", "reached", "count", "95 % interval", ""], rows(&goals)))?;
-    say(format!("\n{score}"))?;
-    say(format!("wrote {}", folder.join("blind.html").display()))
+    json.say(&answer, || {
+        say(format!("seal intact, SHA-256 {}\n", answers.seal.sha256()))?;
+        say(table(&["goal", "asked", "reached", "count", "95 % interval", "met"], rows(&goals)))?;
+        say(format!("too few: a single case decides.\n\n{}", drawn_tables(&score.to_string())))?;
+        tell(format!("wrote {}", folder.join("blind.html").display()))
+    })
 }
 
 /// Share, count and Wilson's interval of a rate.
@@ -64,11 +68,7 @@ fn rows(goals: &[Goal]) -> impl Iterator<Item = Vec<String>> + '_ {
             }
             (rate, _) => row.extend(rate_cells(rate.as_ref())),
         }
-        row.push(match g.met {
-            None => String::new(),
-            Some(true) => "yes".to_owned(),
-            Some(false) => "no".to_owned(),
-        });
+        row.push(g.verdict().to_owned());
         row
     })
 }

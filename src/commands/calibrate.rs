@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, anyhow};
 use clap::ValueEnum;
 use serde::Serialize;
+use stretch_bench::Causes;
 use stretch_calibrate::{
     CalibrateError, Calibrated, Candidate, FitReport, Memory, ModelChoice, ModelKind, ModelRow,
     Options, Robust, SpellingError, SplitBy, calibrate, calibration_bytes, choose_model, evaluate,
@@ -12,17 +13,18 @@ use stretch_calibrate::{
     without_wild,
 };
 use stretch_core::{Normalisation, RateEstimator, RateSource};
-use stretch_data::{Outputs, ReadOptions, Split, Trial};
+use stretch_data::{Outputs, ReadOptions, Split, Trial, tidy_column};
 use stretch_receptor::code::Adc;
 use stretch_report::{Context, Judged, calibration_page};
 
-use super::causes::Causes;
 use super::{
+    calibration_text::{print, print_models},
+    causes,
+    json::Json,
     long::Long,
-    reading::{Recorded, read_trials},
-    shared::{give_stdout, of_files, say, say_json, stage_text},
+    reading::{Recorded, column, read_trials},
+    shared::{detail, of_files, stage_text, tell},
 };
-use crate::table::{maybe, number, table};
 
 /// Fit a calibration to logged trials
 ///
@@ -65,11 +67,11 @@ pub(crate) struct Args {
     /// The method as published: central differences, strain rate, a branch a trial, no dead band
     #[arg(long, conflicts_with_all = ["rate", "rate_source", "branch_by", "dead_band"])]
     paper: bool,
-    /// Column of the reference; its last part is the unit of the estimate
-    #[arg(long, default_value = "length_mm", value_name = "COL")]
+    /// Column of the reference; its last part is the unit of the estimate (`Pos (mm)` is pos_mm)
+    #[arg(long, default_value = "length_mm", value_name = "COL", value_parser = column)]
     reference: String,
     /// Column of the signal, several with commas, or `auto`: the best by cross-validation
-    #[arg(long, default_value = "bridge_v", value_name = "COL")]
+    #[arg(long, default_value = "bridge_v", value_name = "COL", value_parser = columns)]
     signal: String,
     #[command(flatten)]
     recorded: Recorded,
@@ -94,7 +96,7 @@ pub(crate) struct Args {
     /// Trials that the report judges the calibration on [default: those that were fitted]
     #[arg(long, value_name = "TRIAL.csv", num_args = 1..)]
     test: Vec<PathBuf>,
-    /// A diagnosis (`stretch diagnose --json d.json`) whose named effects --model diagnosed and auto build on [default: the
+    /// A diagnosis (`stretch diagnose --json-out d.json`) whose named effects --model diagnosed and auto build on [default: the
     /// trials are diagnosed as a gauge alone]
     #[arg(long, value_name = "d.json")]
     from: Option<PathBuf>,
@@ -116,9 +118,13 @@ pub(crate) struct Args {
     /// Where a report with pictures goes
     #[arg(long, value_name = "r.html")]
     report: Option<PathBuf>,
-    /// Print JSON in place of tables
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    json: Json,
+}
+
+/// Several columns, with commas.
+fn columns(names: &str) -> Result<String, std::convert::Infallible> {
+    Ok(names.split(',').map(|name| tidy_column(name.trim())).collect::<Vec<_>>().join(","))
 }
 
 /// A model, or the choice of one.
@@ -212,10 +218,10 @@ impl Args {
             }
         };
         if let Some(path) = self.from.as_ref().filter(|_| is_asked) {
-            return Causes::read(path, &self.trials);
+            return causes::read(path, &self.trials);
         }
         match is_asked {
-            true => Causes::of(trials, options),
+            true => Ok(causes::of(trials, options)),
             false => Ok(Causes::default()),
         }
     }
@@ -241,12 +247,14 @@ struct Output<'a> {
     candidates: &'a [Candidate],
     models: &'a [ModelRow],
     model: String,
+    why: Option<&'a str>,
     fits: &'a [FitReport],
     notes: &'a [String],
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    give_stdout([Some(args.out.as_path()), args.fixed.as_deref(), args.report.as_deref()])?;
+    let files = [Some(args.out.as_path()), args.fixed.as_deref(), args.report.as_deref()];
+    args.json.share_stdout(files)?;
     let mut options = args.options();
     let mut columns = args.recorded.options().require(&args.reference);
     if args.signal != "auto" {
@@ -275,6 +283,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     };
     if let Some(best) = ranking.first() {
         options.signal.clone_from(&best.signal);
+        detail(format!("chose the signal {} of {}", best.signal, ranking.len()));
     }
     let causes = args.causes(&trials, &options)?.felt(&trials, &options);
     options.causes.clone_from(&causes.found);
@@ -284,6 +293,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     };
     if let Some(choice) = &choice {
         options.model = choice.model;
+        detail(format!("chose a model: {}", choice.why));
     }
     let fit = |options: &Options| {
         let fitted = match &long {
@@ -293,6 +303,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         fitted.map_err(named)
     };
     let mut calibrated = fit(&options)?;
+    detail(format!("fitted {} to {} on {}", options.model, options.reference, options.signal));
     // those of a long log are told by its own passes
     calibrated.notes.splice(0..0, if long.is_some() { Vec::new() } else { wild });
     match explains_nothing(&calibrated.fits) {
@@ -326,33 +337,35 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         // the line is the yardstick that every surface is held against
         let linear = fit(&Options { model: ModelKind::Linear, ..options.clone() })?;
         let fitted = [&linear, &calibrated];
-        let page = report(&args, &trials, &columns, fitted, &ranking, &options)?;
+        let page = report(&args, &trials, &columns, fitted, (&ranking, choice.as_ref()), &options)?;
         stage_text(&mut outputs, path, &page)?;
     }
+    let answer = Output {
+        signal: &options.signal,
+        candidates: &ranking,
+        models: choice.as_ref().map_or(&[], |choice| &choice.rows),
+        model: options.model.to_string(),
+        why: choice.as_ref().map(|choice| choice.why.as_str()),
+        fits: &calibrated.fits,
+        notes: &calibrated.notes,
+    };
+    args.json.stage(&mut outputs, &answer)?;
     outputs.keep()?;
-    if args.json {
-        return say_json(&Output {
-            signal: &options.signal,
-            candidates: &ranking,
-            models: choice.as_ref().map_or(&[], |choice| &choice.rows),
-            model: options.model.to_string(),
-            fits: &calibrated.fits,
-            notes: &calibrated.notes,
-        });
-    }
-    if let Some(choice) = &choice {
-        print_models(choice, &options.reference)?;
-    }
-    print(&calibrated, &ranking)?;
-    say(format!("wrote {}", args.out.display()))?;
-    if let Some((path, record)) = &fixed {
-        let (bytes, read_as) = (record.bytes.len(), &record.read_as);
-        say(format!("wrote {}: {bytes} bytes, a board reads it as {read_as}", path.display()))?;
-    }
-    match &args.report {
-        Some(path) => say(format!("wrote {}", path.display())),
-        None => Ok(()),
-    }
+    args.json.say(&answer, || {
+        if let Some(choice) = &choice {
+            print_models(choice, &options.reference)?;
+        }
+        print(&calibrated, &ranking)?;
+        tell(format!("wrote {}", args.out.display()))?;
+        if let Some((path, record)) = &fixed {
+            let (bytes, read_as) = (record.bytes.len(), &record.read_as);
+            tell(format!(
+                "wrote {}: {bytes} bytes, a board reads it as {read_as}",
+                path.display()
+            ))?;
+        }
+        args.report.iter().try_for_each(|path| tell(format!("wrote {}", path.display())))
+    })
 }
 
 fn report(
@@ -360,7 +373,7 @@ fn report(
     trials: &[Trial],
     columns: &ReadOptions,
     [linear, calibrated]: [&Calibrated; 2],
-    ranking: &[Candidate],
+    (ranking, choice): (&[Candidate], Option<&ModelChoice>),
     options: &Options,
 ) -> anyhow::Result<String> {
     let test = read_trials(&args.test, Split::Test, columns)?;
@@ -378,116 +391,13 @@ fn report(
         calibrated_on: names(trials),
         tested_on: names(&test),
         signal_choice: ranking.to_vec(),
-        notes: calibrated.notes.clone(),
+        notes: choice
+            .map(|choice| choice.why.clone())
+            .into_iter()
+            .chain(calibrated.notes.clone())
+            .collect(),
         kinds: Vec::new(),
     };
     let judged = Judged { calibrated: &shown, evaluation: &evaluation, context: &context };
     Ok(calibration_page(&judged))
-}
-
-/// What `auto` rests on.
-pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Result<()> {
-    let unit = reference.rsplit_once('_').map_or("", |(_, unit)| unit);
-    say(format!("Models, RMSE in {unit} on trials left out of the fit:"))?;
-    let row = |r: &ModelRow| {
-        if let Some(problem) = &r.problem {
-            return vec![r.model.clone(), problem.clone()];
-        }
-        let excess = |(mean, error): (f64, f64)| format!("{} +- {}", number(mean), number(error));
-        vec![
-            r.model.clone(),
-            maybe(r.rmse),
-            maybe(r.rmse_arbitrary),
-            maybe(r.rmse_pulses),
-            maybe(r.rmse_ramps),
-            r.lag_s.map_or("-".to_owned(), |lag| format!("{:.0}", 1e3 * lag)),
-            maybe(r.worst),
-            r.parameters.to_string(),
-            instructions(r),
-            r.excess.map_or("-".to_owned(), excess),
-            if r.model == choice.model.to_string() { "chosen".to_owned() } else { String::new() },
-        ]
-    };
-    let header = [
-        "model",
-        "all",
-        "arbitrary",
-        "pulses",
-        "ramps",
-        "delay ms",
-        "worst",
-        "numbers",
-        "M3 instr.",
-        "over the best, squared",
-        "",
-    ];
-    say(table(&header, choice.rows.iter().map(row)))?;
-    say("M3 instr.: instructions a sample on a Cortex-M3, f32 (fixed point), as measured.")
-}
-
-/// From volts in `f32`, and in fixed point where the model has that form.
-fn instructions(row: &ModelRow) -> String {
-    match (row.m3_instructions, row.m3_instructions_fixed) {
-        (Some(float), Some(fixed)) => format!("{float:.0} ({fixed:.0})"),
-        (Some(float), None) => format!("{float:.0}"),
-        _ => "-".to_owned(),
-    }
-}
-
-/// The tables of a calibration, as the paper prints them.
-pub(super) fn print(calibrated: &Calibrated, ranking: &[Candidate]) -> anyhow::Result<()> {
-    if !ranking.is_empty() {
-        say("Signals, by error on data left out of the fit (normalised):")?;
-        let row = |c: &Candidate| {
-            let shown = c.problem.clone().unwrap_or_else(|| maybe(c.cross_validated_rmse));
-            vec![c.signal.clone(), shown]
-        };
-        say(table(&["signal", "cross-validated RMSE"], ranking.iter().map(row)))?;
-    }
-    let row = |fit: &FitReport| {
-        vec![
-            fit.name.clone(),
-            fit.model.clone(),
-            fit.samples.to_string(),
-            format!("{:.4}", fit.r_squared),
-            number(100.0 * fit.rmse),
-            number(fit.condition),
-        ]
-    };
-    let header = ["fit", "model", "samples", "R^2", "RMSE % of range", "condition"];
-    say(table(&header, calibrated.fits.iter().map(row)))?;
-    say("Coefficients (normalised rate r, signal V) with 95 % bounds:")?;
-    let rows = calibrated.fits.iter().flat_map(|fit| {
-        fit.coefficients.iter().map(|c| {
-            vec![
-                format!("{} {}", fit.name, c.name),
-                number(c.estimate),
-                number(c.lower),
-                number(c.upper),
-            ]
-        })
-    });
-    say(table(&["coefficient", "estimate", "lower", "upper"], rows))?;
-    if calibrated.fits.iter().any(|fit| !fit.orders.is_empty()) {
-        say("Orders beside it (CV: on data left out of the fit):")?;
-        let rows = calibrated.fits.iter().flat_map(|fit| {
-            fit.orders.iter().map(|order| {
-                let chosen = Some(&order.model) == fit.recommended.as_ref();
-                vec![
-                    format!("{} {}", fit.name, order.model),
-                    order.terms.to_string(),
-                    order.r_squared.map_or("-".to_owned(), |r| format!("{r:.4}")),
-                    maybe(order.rmse.map(|x| 100.0 * x)),
-                    maybe(order.cross_validated_rmse.map(|x| 100.0 * x)),
-                    if chosen { "recommended".to_owned() } else { String::new() },
-                ]
-            })
-        });
-        let header = ["order", "terms", "R^2", "RMSE %", "CV RMSE %", ""];
-        say(table(&header, rows))?;
-    }
-    for note in &calibrated.notes {
-        say(format!("note: {note}"))?;
-    }
-    Ok(())
 }

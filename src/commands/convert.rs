@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use anyhow::Context;
-use stretch_data::{Channel, Trial};
+use stretch_data::{Channel, Trial, tidy_time};
 
 use super::{
     reading::{Recorded, read_recording},
-    shared::{give_stdout, say},
+    shared::{give_stdout, tell},
 };
 
 /// Bring a foreign log into the format of the other commands
@@ -86,11 +86,12 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         args.columns.iter().map(convert).collect::<anyhow::Result<_>>()?
     };
     let start_s = if args.from_zero { log.time_s[0] } else { 0.0 };
-    let time_s = log.time_s.iter().map(|t| t - start_s).collect();
+    let largest_s = log.time_s.iter().fold(0.0, |most: f64, t| most.max(t.abs()));
+    let time_s = log.time_s.iter().map(|t| tidy_time(t - start_s, largest_s)).collect();
     let trial = Trial { name: log.name.clone(), time_s, channels };
     trial.write(&args.out).context("nothing was written")?;
     let names: Vec<_> = trial.channels.iter().map(|c| c.name.as_str()).collect();
-    say(format!("wrote {}: {} samples of {}", args.out.display(), trial.len(), names.join(", ")))
+    tell(format!("wrote {}: {} samples of {}", args.out.display(), trial.len(), names.join(", ")))
 }
 
 #[cfg(test)]

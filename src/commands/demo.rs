@@ -14,10 +14,12 @@ use stretch_sim::{RunSettings, TrialPlan, paper_preset};
 
 use super::{
     apply::estimates_csv,
-    calibrate::{print as print_calibration, print_models},
+    calibration_text::{print as print_calibration, print_models},
     diagnose::print as print_diagnosis,
     evaluate::print_errors,
-    shared::{or_force, recover, say, say_json, write_text},
+    json::Json,
+    reading::column,
+    shared::{or_force, recover, say, tell, write_text},
     simulate,
 };
 use job::Job;
@@ -60,10 +62,10 @@ pub(crate) struct Args {
     #[arg(long, requires = "data", value_name = "NAME")]
     sessions: Option<String>,
     /// Column of the reference [default: length_mm or angle_deg]
-    #[arg(long, requires = "data", value_name = "COL")]
+    #[arg(long, requires = "data", value_name = "COL", value_parser = column)]
     reference: Option<String>,
     /// Column of the signal [default: bridge_v, else the best by cross-validation]
-    #[arg(long, requires = "data", value_name = "COL")]
+    #[arg(long, requires = "data", value_name = "COL", value_parser = column)]
     signal: Option<String>,
     /// Replace a demo that exists, in one step; files of your own in its folder are kept
     #[arg(long)]
@@ -74,15 +76,14 @@ pub(crate) struct Args {
     /// Seed of the simulated experiment
     #[arg(long, default_value_t = 3, value_name = "N")]
     seed: u64,
-    /// Print JSON in place of tables
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    json: Json,
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     recover(&args.out)?;
     if args.paper {
-        return super::paper::run(&args.out, args.force, args.seed, args.json);
+        return super::paper::run(&args.out, args.force, args.seed, &args.json);
     }
     let mut done = None;
     let written = write_folder(&args.out, args.force, |folder| {
@@ -91,16 +92,17 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     });
     written.map_err(or_force)?;
     let Some((sessions, job)) = done else { return Ok(()) };
-    if args.json {
-        return say_json(&serde_json::json!({
-            "seed": args.data.is_none().then_some(args.seed),
-            "evaluation": job.calibrations.evaluation,
-            "kinds": job.calibrations.kinds,
-            "diagnosis": job.examined.diagnosis,
-        }));
+    let answer = serde_json::json!({
+        "seed": args.data.is_none().then_some(args.seed),
+        "evaluation": job.calibrations.evaluation,
+        "kinds": job.calibrations.kinds,
+        "diagnosis": job.examined.diagnosis,
+    });
+    args.json.answer(&answer, || print(&sessions, &job))?;
+    if args.json.is_printed() {
+        return Ok(());
     }
-    print(&sessions, &job)?;
-    say(format!(
+    tell(format!(
         "\nwrote {}: report.html (open it), estimate.svg, linear.json, poly13.json, chosen.json, estimates.csv{}",
         args.out.display(),
         if args.data.is_none() { ", bench/ (the data set)" } else { "" }
@@ -124,8 +126,8 @@ fn whole_job(args: &Args, out: &Path) -> anyhow::Result<(Sessions, Job)> {
             (format!("The paper's experiment, simulated (seed {})", args.seed), sessions)
         }
     };
-    if !args.json {
-        sessions.notes.iter().try_for_each(say)?;
+    if !args.json.is_printed() {
+        sessions.notes.iter().try_for_each(tell)?;
     }
     let job = Job::of(&sessions).with_context(|| sessions.name.clone())?;
     write(out, title, &sessions, &job)?;
@@ -171,6 +173,7 @@ fn write(out: &Path, title: String, sessions: &Sessions, job: &Job) -> anyhow::R
             sessions.fit.len()
         ));
     }
+    notes.push(calibrations.choice.why.clone());
     notes.extend(calibrations.surfaces.notes.iter().chain(&calibrations.choice.notes).cloned());
     let context = Context {
         title,

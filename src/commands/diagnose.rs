@@ -3,25 +3,30 @@
 use std::{
     io,
     path::{Path, PathBuf},
+    process::ExitCode,
 };
 
 use anyhow::{Context, ensure};
-use indicatif::{ProgressBar, ProgressStyle};
-use stretch_bench::{Fix, GaugeSimulator, Implementation, NoFix, RigSimulator};
-use stretch_data::{DataError, Outputs, Trial};
-use stretch_gap::{
-    Diagnosis, Evidence, GapError, Laboratory, Options, Simulator, diagnose, next_experiment,
-};
+use indicatif::ProgressBar;
+use stretch_bench::{Bench, Examined, GaugeSimulator, RigSimulator};
+use stretch_data::{DataError, Outputs};
+use stretch_gap::{Diagnosis, Options};
 use stretch_report::{Subject, diagnosis_page};
 use stretch_sim::Catalogue;
 
 use super::{
     diagnosis_files::{implement_json, not_read, to_json, write_fix, write_snippets},
     diagnosis_text::text,
+    fail_on::FailOn,
+    json::Json,
     problem,
-    rails::rails,
-    shared::{give_stdout, say, short_name, stage_text},
+    reading::column,
+    shared::{detail, say, say_first, short_name, spinner, stage_text, tell},
 };
+use crate::display::fail;
+
+/// Status of a diagnosis whose verdict is one that `--fail-on` names.
+const FAILED_ON: u8 = 3;
 
 /// Say where a simulator and a measurement part, which effect causes it, and how far the gap closes
 ///
@@ -44,6 +49,10 @@ use super::{
 ///
 ///   stretch diagnose problem.toml --jobs 4 --budget 400
 ///
+/// In a laboratory's checks, where a rig must stay what its simulator says (exit status 3 where it does not):
+///
+///   stretch diagnose bench --rig fixed.toml --quiet --fail-on gap
+///
 /// Test trials are read once, at the end. Without --rig the rig file that the data set names is
 /// the simulator, else the stock rig. Its parameters may be re-tuned within their tolerances, its
 /// effects are part of it.
@@ -56,9 +65,8 @@ pub(crate) struct Args {
     /// Rig file: nominal parameters with their tolerances, and effects that it has already
     #[arg(long, value_name = "rig.toml")]
     rig: Option<PathBuf>,
-    /// Write the diagnosis as JSON
-    #[arg(long, value_name = "d.json")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: Json,
     /// Write a report that opens in any browser
     #[arg(long, value_name = "d.html")]
     report: Option<PathBuf>,
@@ -81,10 +89,10 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Reference column of a gauge alone
-    #[arg(long, value_name = "COLUMN", requires = "signal")]
+    #[arg(long, value_name = "COLUMN", requires = "signal", value_parser = column)]
     reference: Option<String>,
     /// Signal column of a gauge alone
-    #[arg(long, value_name = "COLUMN", requires = "reference")]
+    #[arg(long, value_name = "COLUMN", requires = "reference", value_parser = column)]
     signal: Option<String>,
     /// Write the recommended experiment as a trial file
     #[arg(long, value_name = "next.csv")]
@@ -101,13 +109,32 @@ pub(crate) struct Args {
     /// Most runs of a simulator of your own
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(20..))]
     budget: Option<u32>,
+    /// Exit with status 3 where the verdict is one of these, several with commas: effect (one is named, wholly or in part),
+    /// unknown (a gap, or a part of one, that nothing explains), record (a column or the rig file is wrong), faint (more
+    /// than noise, too little to name), parameters (they agree once re-tuned), gap (effect, unknown or record), any (all
+    /// but plain agreement)
+    #[arg(
+        long,
+        value_name = "VERDICT",
+        value_enum,
+        value_delimiter = ',',
+        hide_possible_values = true
+    )]
+    fail_on: Vec<FailOn>,
 }
 
-pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+/// Diagnoses, and says with which status the program ends.
+pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let fail_on = args.fail_on.clone();
+    let diagnosis = diagnosed(args)?;
+    let is_failure = fail_on.iter().any(|on| on.covers(&diagnosis));
+    Ok(if is_failure { ExitCode::from(FAILED_ON) } else { ExitCode::SUCCESS })
+}
+
+fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
     let is_there = args.data_set.as_os_str() == "-" || args.data_set.exists();
-    give_stdout(
-        [&args.json, &args.report, &args.fix, &args.experiment].map(|path| path.as_deref()),
-    )?;
+    let files = [&args.report, &args.fix, &args.experiment].map(|path| path.as_deref());
+    args.json.share_stdout(files)?;
     ensure!(is_there, "{}: there is no such file or folder", args.data_set.display());
     if let Some(fix) = &args.fix {
         not_read(fix, &args.data_set, args.rig.as_deref())?;
@@ -121,6 +148,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         threads: args.threads,
         seed: args.seed,
         baselines: args.baselines,
+        responses: args.report.is_some(),
         ..Options::default()
     };
     let bar = spinner();
@@ -149,14 +177,13 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     };
     let columns = args.reference.as_deref().zip(args.signal.as_deref());
     let catalogue = Catalogue::default().without(&args.without)?;
-    let bench = Bench::read(&args.data_set, columns, rig, &catalogue).with_context(shown)?;
-    let mut examined = bench.examine(&options, !args.no_next, &bar).with_context(beside)?;
-    if args.experiment.is_some() && examined.experiment.is_none() {
-        let none = "no experiment is recommended: there are no rivals to tell apart";
-        examined.diagnosis.notes.push(none.to_owned());
-    }
+    let bench = read_bench(&args.data_set, columns, rig, &catalogue).with_context(shown)?;
+    detail(format!("read {}", beside()));
+    let (looks_on, stop) = (!args.no_next, &stretch_data::interrupted);
+    let examined = bench.examine(&options, looks_on, &told_on(&bar), stop).with_context(beside)?;
     bar.finish_and_clear();
-    conclude(&args, &examined, &bench)
+    conclude(&args, &examined, &bench)?;
+    Ok(examined.diagnosis)
 }
 
 /// A simulator of the user's own.
@@ -165,7 +192,7 @@ fn of_own(
     file: &stretch_problem::ProblemFile,
     options: &Options,
     bar: &ProgressBar,
-) -> anyhow::Result<()> {
+) -> anyhow::Result<Diagnosis> {
     problem::refuse(&[
         ("--rig", args.rig.is_some()),
         ("--fix", args.fix.is_some()),
@@ -176,7 +203,7 @@ fn of_own(
     ])?;
     let asked = problem::Asked {
         options,
-        json: args.json.as_deref(),
+        json: &args.json,
         report: args.report.as_deref(),
         jobs: args.jobs.into(),
         budget: args.budget.map(|n| n as usize),
@@ -184,104 +211,30 @@ fn of_own(
     problem::run(file, &asked, bar)
 }
 
-/// What is diagnosed: a whole rig, or a gauge alone.
-pub(super) enum Bench {
-    Rig(Box<RigSimulator>),
-    Gauge(Box<GaugeSimulator>),
+/// A data set's folder, or a trial of which `columns` are reference and signal.
+pub(super) fn read_bench(
+    path: &Path,
+    columns: Option<(&str, &str)>,
+    rig: Option<&Path>,
+    catalogue: &Catalogue,
+) -> anyhow::Result<Bench> {
+    if let Some(gauge) = GaugeSimulator::read(path, columns, rig, catalogue)? {
+        return Ok(gauge.into());
+    }
+    ensure!(
+        path.is_dir(),
+        "a single trial is diagnosed as a gauge alone: say which columns with --reference and --signal, \
+         or give the folder of a data set"
+    );
+    Ok(RigSimulator::read(path, rig, catalogue)?.into())
 }
 
-/// A diagnosis, what it was found from, and the experiment that it recommends.
-pub(super) struct Examined {
-    pub(super) diagnosis: Diagnosis,
-    pub(super) evidence: Evidence,
-    pub(super) experiment: Option<Trial>,
-    /// What is named, as something to type.
-    pub(super) implementations: Vec<Implementation>,
-}
-
-impl Bench {
-    /// A data set's folder, or a trial of which `columns` are reference and signal.
-    pub(super) fn read(
-        path: &Path,
-        columns: Option<(&str, &str)>,
-        rig: Option<&Path>,
-        catalogue: &Catalogue,
-    ) -> anyhow::Result<Self> {
-        if let Some(gauge) = GaugeSimulator::read(path, columns, rig, catalogue)? {
-            return Ok(Self::Gauge(Box::new(gauge)));
-        }
-        ensure!(
-            path.is_dir(),
-            "a single trial is diagnosed as a gauge alone: say which columns with --reference and --signal, \
-             or give the folder of a data set"
-        );
-        Ok(Self::Rig(Box::new(RigSimulator::read(path, rig, catalogue)?)))
+/// Tells what goes on: beside a bar, or with `-v` in lines.
+pub(super) fn told_on(bar: &ProgressBar) -> impl Fn(&str) + Sync {
+    move |what| {
+        detail(what);
+        bar.set_message(what.to_owned());
     }
-
-    pub(super) fn simulator(&self) -> &dyn Simulator {
-        match self {
-            Self::Rig(rig) => rig.as_ref(),
-            Self::Gauge(gauge) => gauge.as_ref(),
-        }
-    }
-
-    /// The rig or the gauge with what was found of it.
-    fn fixed(&self, examined: &Examined) -> Result<Fix, NoFix> {
-        let Examined { diagnosis, evidence, .. } = examined;
-        match self {
-            Self::Rig(rig) => rig.fixed(diagnosis, evidence),
-            Self::Gauge(gauge) => gauge.fixed(diagnosis, evidence),
-        }
-    }
-
-    /// Diagnoses; with `look_on` it looks for the experiment that would tell rivals apart.
-    pub(super) fn examine(
-        &self,
-        options: &Options,
-        look_on: bool,
-        bar: &ProgressBar,
-    ) -> Result<Examined, GapError> {
-        let examined = match self {
-            Self::Gauge(gauge) => {
-                examine(gauge.as_ref(), options, look_on, bar, gauge.notes(), &[])
-            }
-            Self::Rig(rig) => {
-                let rails = rails(rig.nominal(), rig.session());
-                examine(rig.as_ref(), options, look_on, bar, rig.notes(), &rails)
-            }
-        }?;
-        let Examined { diagnosis, evidence, .. } = &examined;
-        let implementations = match self {
-            Self::Rig(rig) => rig.implementations(diagnosis, evidence),
-            Self::Gauge(gauge) => gauge.implementations(diagnosis, evidence),
-        };
-        // A sample time that was diagnosed is one.
-        Ok(Examined { implementations: implementations.unwrap_or_default(), ..examined })
-    }
-}
-
-/// `before` and `after` are notes around the diagnosis' own.
-fn examine<L: Laboratory>(
-    simulator: &L,
-    options: &Options,
-    look_on: bool,
-    bar: &ProgressBar,
-    before: &[String],
-    after: &[String],
-) -> Result<Examined, GapError> {
-    let progress = |what: &str| bar.set_message(what.to_owned());
-    let (mut diagnosis, evidence) =
-        diagnose(simulator, options, &progress, &stretch_data::interrupted)?;
-    let mut proposal = None;
-    if diagnosis.ambiguous.len() > 1 && look_on {
-        bar.set_message("the next experiment");
-        proposal = next_experiment(simulator, &diagnosis, &evidence)?;
-    }
-    diagnosis.next_experiment = proposal.as_ref().map(|p| p.next.clone());
-    diagnosis.notes.extend_from_slice(after);
-    diagnosis.notes.splice(0..0, before.iter().cloned());
-    let experiment = proposal.map(|p| p.trial);
-    Ok(Examined { diagnosis, evidence, experiment, implementations: Vec::new() })
 }
 
 /// Writes the files first, all or none: a message that they are there is then true.
@@ -289,18 +242,24 @@ fn conclude(args: &Args, examined: &Examined, bench: &Bench) -> anyhow::Result<(
     let Examined { diagnosis, evidence, implementations, .. } = examined;
     let name = name_of(&args.data_set);
     let fix = bench.fixed(examined);
-    let (mut said, mut outputs) = (Vec::new(), Outputs::default());
-    if let (Some(path), Some(trial)) = (&args.experiment, &examined.experiment) {
-        trial.check()?;
-        outputs.file(path, |out| trial.write_to(out).map_err(io::Error::other))?;
+    let (mut said, mut missing, mut outputs) = (Vec::new(), Vec::new(), Outputs::default());
+    match (&args.experiment, &examined.experiment) {
+        (Some(path), Some(trial)) => {
+            trial.check()?;
+            outputs.file(path, |out| trial.write_to(out).map_err(io::Error::other))?;
+            said.push(format!("wrote {}", path.display()));
+        }
+        // a script that goes on with the file must not wonder
+        (Some(path), None) => missing.push(format!(
+            "{} is not written: no experiment is recommended, there are no rivals to tell apart",
+            path.display()
+        )),
+        _ => {}
     }
-    if let Some(path) = &args.json {
-        let implement = implementations.iter().map(implement_json).collect();
-        let fixed_rig = fix.as_ref().ok().map(|fix| &fix.file);
-        let json = to_json(diagnosis, implement, fixed_rig, &name, args.seed)?;
-        stage_text(&mut outputs, path, &json)?;
-        said.push(format!("wrote {}", path.display()));
-    }
+    let implement = implementations.iter().map(implement_json).collect();
+    let fixed_rig = fix.as_ref().ok().map(|fix| &fix.file);
+    let answer = to_json(diagnosis, implement, fixed_rig, &name, args.seed)?;
+    args.json.stage(&mut outputs, &answer)?;
     if let Some(path) = &args.report {
         let simulator = bench.simulator();
         let subject = Subject { name: &name, diagnosis, evidence, implementations, simulator };
@@ -314,13 +273,17 @@ fn conclude(args: &Args, examined: &Examined, bench: &Bench) -> anyhow::Result<(
         said.push(write_snippets(&mut outputs, folder, implementations)?);
     }
     outputs.keep()?;
-    print(examined)?;
-    said.iter().try_for_each(say)
+    args.json.say(&answer, || {
+        print(examined)?;
+        said.iter().try_for_each(tell)
+    })?;
+    missing.iter().for_each(fail);
+    Ok(())
 }
 
 /// The sentence, and everything behind it.
 pub(super) fn print(examined: &Examined) -> anyhow::Result<()> {
-    say(&examined.diagnosis.sentence)?;
+    say_first(&examined.diagnosis.sentence)?;
     say(text(&examined.diagnosis, &examined.implementations))
 }
 
@@ -331,15 +294,4 @@ pub(super) fn name_of(path: &Path) -> String {
     }
     let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     short_name(&real)
-}
-
-/// Seen on a terminal only: what goes on, and for how long already.
-pub(super) fn spinner() -> ProgressBar {
-    let bar = ProgressBar::new_spinner().with_message("reading");
-    // the template is a constant: were it wrong, the plain spinner is shown
-    if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed}") {
-        bar.set_style(style);
-    }
-    bar.enable_steady_tick(std::time::Duration::from_millis(120));
-    bar
 }

@@ -83,14 +83,14 @@ pub(super) fn to_json(
     fixed_rig: Option<&RigFile>,
     name: &str,
     seed: u64,
-) -> anyhow::Result<String> {
+) -> anyhow::Result<serde_json::Value> {
     let mut value = serde_json::to_value(diagnosis)?;
     value["implement"] = implement.into();
     value["fixed_rig"] = serde_json::to_value(fixed_rig)?;
     value["data_set"] = name.into();
     value["seed"] = seed.into();
     value["version"] = env!("CARGO_PKG_VERSION").into();
-    Ok(serde_json::to_string_pretty(&value)? + "\n")
+    Ok(value)
 }
 
 /// A named effect as something to implement.

@@ -3,10 +3,13 @@
 use std::fmt::Write;
 
 use stretch_bench::Implementation;
-use stretch_blind::method_in_words;
-use stretch_gap::{Candidate, Diagnosis, Knowledge, SliceGap, VerdictKind};
-use stretch_report::{effect_in_words, listed, methods, transfer_in_words};
+use stretch_gap::{Candidate, Diagnosis, Knowledge, SliceGap, VerdictKind, Where};
+use stretch_report::{
+    Table, baseline_table, candidate_table, effect_in_words, listed, stage_table, times,
+    transfer_in_words, transfer_table,
+};
 
+use super::fail_on::is_faint;
 use crate::table::{number, table};
 
 /// Most slices that are listed.
@@ -65,53 +68,69 @@ fn put(out: &mut String, line: &str) {
     let _ = writeln!(out, "{line}");
 }
 
+/// A share as the report tells it.
 fn percent(share: f64) -> String {
-    format!("{:.0} %", 100.0 * share)
+    unbroken(&stretch_report::percent(share))
+}
+
+/// A text of a page: its spaces are those of a terminal.
+fn unbroken(text: &str) -> String {
+    text.replace('\u{a0}', " ")
+}
+
+/// A table of the report: the same words and numbers.
+fn put_table(out: &mut String, report: &Table) {
+    put(out, &format!("\n{}:", unbroken(&report.caption)));
+    put(out, &drawn(report));
+}
+
+fn drawn(report: &Table) -> String {
+    let head: Vec<&str> = report.head.iter().map(String::as_str).collect();
+    let rows = report.rows.iter().map(|row| row.iter().map(|cell| unbroken(cell)).collect());
+    table(&head, rows)
 }
 
 fn stages(out: &mut String, diagnosis: &Diagnosis) {
-    put(out, "\nWhere, stage by stage on its measured input (gaps on test trials, in floors):");
-    let end_to_end = &diagnosis.location.end_to_end;
-    let mut header =
-        vec!["stage", "share", "as shipped", "re-tuned", "with effect", "left", "floor"];
-    if !end_to_end.is_empty() {
-        header.push("end to end");
+    let Where { stages, end_to_end, .. } = &diagnosis.location;
+    let mut report = stage_table(stages, !diagnosis.named.is_empty());
+    report.head.push("Share".to_owned());
+    for (row, stage) in report.rows.iter_mut().zip(stages) {
+        row.push(percent(stage.share));
     }
-    let rows = diagnosis.location.stages.iter().map(|s| {
-        let mut row = vec![
-            s.stage.clone(),
-            percent(s.share),
-            number(s.raw),
-            number(s.excess),
-            if diagnosis.named.is_empty() { "-".to_owned() } else { number(s.after) },
-            format!("{} {}", number(s.rms), s.unit),
-            format!("{} {}", number(s.floor), s.unit),
-        ];
-        let share = end_to_end.iter().find(|e| e.stage == s.stage);
-        row.extend(share.map(|e| percent(e.share)));
-        row
-    });
-    put(out, &table(&header, rows));
+    put(out, "\nWhere, stage by stage on its measured input.");
+    put(out, &format!("{}; its share of the gap:", unbroken(&report.caption)));
+    put(out, &drawn(&report));
+    if !end_to_end.is_empty() {
+        let shares = end_to_end.iter().map(|e| format!("{} {}", e.stage, percent(e.share)));
+        let shares: Vec<String> = shares.collect();
+        put(out, &format!("Of the gap at the end, from the commands alone: {}.", listed(&shares)));
+    }
 }
 
 fn slices(out: &mut String, diagnosis: &Diagnosis) {
+    // of those that agree one in twenty stands out by chance
+    let agrees = matches!(diagnosis.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
+    if agrees && !is_faint(diagnosis) {
+        return;
+    }
     let mut loud: Vec<&SliceGap> =
         diagnosis.location.slices.iter().filter(|s| s.stands_out && s.by != "trial").collect();
     loud.sort_by(|a, b| b.excess.total_cmp(&a.excess));
     if loud.is_empty() {
         return;
     }
-    put(out, "\nWhere it stands out (all trials, re-tuned):");
+    put(out, "\nWhere it stands out, in multiples of the noise, re-tuned, all trials:");
+    let left = |excess: f64| unbroken(&times(excess));
     let rows = loud.iter().take(SLICES).map(|s| {
         let [low, high] = s.excess_ci;
         vec![
             format!("{}, {}: {}", s.stage, s.by, s.slice),
             percent(s.share),
-            number(s.excess),
-            format!("{} .. {}", number(low), number(high)),
+            left(s.excess),
+            format!("{} .. {}", left(low), left(high)),
         ]
     });
-    put(out, &table(&["slice", "share", "gap", "95 % interval"], rows));
+    put(out, &table(&["Slice", "Share of the gap", "Left", "95 % interval"], rows));
     if loud.len() > SLICES {
         put(out, &format!("({} more in the JSON and the report)", loud.len() - SLICES));
     }
@@ -123,28 +142,8 @@ fn candidates(out: &mut String, diagnosis: &Diagnosis) {
     if shown.is_empty() || diagnosis.verdict == VerdictKind::NoGap {
         return;
     }
-    put(out, "\nWhich:");
-    let rows = shown.iter().take(CANDIDATES).map(|c| {
-        let [low, high] = c.closed_ci;
-        let values: Vec<String> = c
-            .parameters
-            .iter()
-            .map(|p| {
-                let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
-                format!("{} = {}{unit} +- {}", p.name, number(p.value), number(p.sd))
-            })
-            .collect();
-        vec![
-            c.effects.join(" + "),
-            format!("{:.3}", c.probability),
-            format!("{} -> {}", number(c.gap_before), number(c.gap_after)),
-            percent(c.closed),
-            format!("{} .. {}", percent(low), percent(high)),
-            values.join(", "),
-        ]
-    });
-    let header = ["effects", "probability", "gap", "closes", "95 % interval", "parameters"];
-    put(out, &table(&header, rows));
+    let shown: Vec<Candidate> = shown.into_iter().take(CANDIDATES).cloned().collect();
+    put_table(out, &candidate_table(&shown));
     if diagnosis.ambiguous.len() > 1 {
         put(
             out,
@@ -222,15 +221,7 @@ fn bent(p: &stretch_gap::ParameterShift) -> f64 {
 
 fn transfer(out: &mut String, diagnosis: &Diagnosis) {
     let Some(transfer) = &diagnosis.transfer else { return };
-    put(
-        out,
-        "\nWhat it costs: error on measured trials of a calibration trained elsewhere, % of full scale",
-    );
-    let rows = [("linear", transfer.linear), ("poly13", transfer.poly13)].map(|(name, e)| {
-        vec![name.to_owned(), number(e.real), number(e.sim), number(e.sim_with_effect)]
-    });
-    let header = ["calibration", "trained on measured", "in the simulator", "with the effect"];
-    put(out, &table(&header, rows));
+    put_table(out, &transfer_table(transfer));
     if let Some(words) = transfer_in_words(transfer) {
         put(out, &words);
     }
@@ -238,11 +229,7 @@ fn transfer(out: &mut String, diagnosis: &Diagnosis) {
 
 fn baselines(out: &mut String, diagnosis: &Diagnosis) {
     let Some(said) = &diagnosis.baselines else { return };
-    put(out, "\nWhat simpler methods would have said:");
-    let rows = methods(said).map(|(method, name)| {
-        vec![method_in_words(method).to_owned(), name.unwrap_or("nothing").to_owned()]
-    });
-    put(out, &table(&["method", "names"], rows));
+    put_table(out, &baseline_table(said));
 }
 
 fn next(out: &mut String, diagnosis: &Diagnosis) {
@@ -250,7 +237,7 @@ fn next(out: &mut String, diagnosis: &Diagnosis) {
     put(
         out,
         &format!(
-            "\nNext experiment: {} ({:.1} min) would tell {} apart: they differ by {} floors. {}",
+            "\nNext experiment: {} ({:.1} min) would tell {} apart: they differ by {} times the noise. {}",
             next.name,
             next.minutes,
             listed(&next.separates),

@@ -6,7 +6,10 @@ use stretch_sim::{
     Surroundings, effect_named,
 };
 
-use super::shared::{say, say_json};
+use super::{
+    json::Json,
+    shared::{say, say_as_is},
+};
 
 /// List the effects that can be added to the simulated rig
 ///
@@ -26,16 +29,15 @@ pub(crate) struct Args {
     /// Effects to list [default: all]
     #[arg(value_name = "NAME")]
     names: Vec<String>,
-    /// Print JSON
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    json: Json,
     /// Print code with the typical numbers, for a record at 100 Hz
     #[arg(
         long,
         value_enum,
         value_name = "c|python|matlab",
         hide_possible_values = true,
-        conflicts_with = "json",
+        conflicts_with_all = ["json", "json_out"],
         requires = "names"
     )]
     code: Option<Code>,
@@ -62,9 +64,6 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         };
         args.names.iter().map(find).collect::<Result<_, _>>()?
     };
-    if args.json {
-        return say_json(&chosen.iter().map(|e| json(e)).collect::<Vec<_>>());
-    }
     if let Some(code) = args.code {
         let language = match code {
             Code::C => Language::C,
@@ -73,23 +72,30 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         };
         return chosen
             .iter()
-            .try_for_each(|effect| say(typical_code(effect, language)?.trim_end()));
+            .try_for_each(|effect| say_as_is(typical_code(effect, language)?.trim_end()));
     }
+    let answer: Vec<_> = chosen.iter().map(|effect| json(effect)).collect();
+    args.json.answer(&answer, || list(&chosen))
+}
+
+/// The catalogue as text.
+fn list(chosen: &[&Effect]) -> anyhow::Result<()> {
     let mut stage = None;
     for effect in chosen {
         if stage != Some(effect.stage) {
             say(format!("{}{}", if stage.is_some() { "\n" } else { "" }, effect.stage))?;
             stage = Some(effect.stage);
         }
-        say(format!("  {:22} {}", effect.name, effect.equation))?;
+        say(format!("  {}: {}", effect.name, effect.words))?;
+        say(format!("      {}", effect.equation))?;
         let of = |is_form: bool| {
             let own = effect.parameters.iter();
             own.filter(move |p| matches!(p.role, Role::Form { .. }) == is_form).map(range)
         };
-        say(format!("  {:22}   {}", "", of(false).collect::<Vec<_>>().join("; ")))?;
+        say(format!("      {}", of(false).collect::<Vec<_>>().join("; ")))?;
         let forms: Vec<String> = of(true).collect();
         if !forms.is_empty() {
-            say(format!("  {:22}   form {}", "", forms.join("; ")))?;
+            say(format!("      form {}", forms.join("; ")))?;
         }
     }
     Ok(())

@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 
 use stretch_calibrate::{
-    Evaluation, MethodErrors, evaluate, not_its_own, read_calibration, worse_than_the_mean,
+    Evaluation, MethodErrors, Reach, evaluate, not_its_own, read_calibration, worse_than_the_mean,
 };
 use stretch_data::Split;
 
 use super::{
+    json::Json,
     reading::{Recorded, read_trials},
-    shared::{say, say_json, short_name},
+    shared::{say, short_name},
 };
 use crate::display::warn;
 use crate::table::{maybe, number, p_value, table};
@@ -33,9 +34,8 @@ pub(crate) struct Args {
     trials: Vec<PathBuf>,
     #[command(flatten)]
     recorded: Recorded,
-    /// Print JSON in place of tables
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    json: Json,
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
@@ -52,16 +52,17 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let named: Vec<_> = calibrations.iter().map(|(name, c)| (name.as_str(), c)).collect();
     let evaluation = evaluate(&named, &trials)?;
     // on standard error, so that a table and JSON are what they were
-    for errors in evaluation.pooled.iter().filter(|errors| errors.method != "raw") {
-        let doubts = [not_its_own(errors.clamped, errors.samples), worse_than_the_mean(errors)];
-        for doubt in doubts.into_iter().flatten() {
+    let own = evaluation.pooled.iter().filter(|errors| errors.method != "raw");
+    for (errors, (_, calibration)) in own.zip(&calibrations) {
+        let mut reach = Reach::of(calibration);
+        let signals = trials.iter().filter_map(|trial| trial.channel(calibration.signal.as_str()));
+        signals.flatten().for_each(|value| reach.take(*value));
+        let outside = reach.doubt().or_else(|| not_its_own(errors.clamped, errors.samples));
+        for doubt in [outside, worse_than_the_mean(errors)].into_iter().flatten() {
             warn(format!("stretch: {}: {doubt}", errors.method));
         }
     }
-    if args.json {
-        return say_json(&evaluation);
-    }
-    print(&evaluation)
+    args.json.answer(&evaluation, || print(&evaluation))
 }
 
 /// The paper's table of some trials.
@@ -70,7 +71,7 @@ pub(super) fn print_errors(
     methods: &[MethodErrors],
     unit: &str,
 ) -> anyhow::Result<()> {
-    let rmse = format!("RMSE {unit}");
+    let rmse = format!("RMSE {unit}").trim_end().to_owned();
     let header =
         ["method", "average error %", "of reference %", &rmse, "RMSE %", "R^2", "lag s", "clamped"];
     let row = |m: &MethodErrors| {
@@ -99,13 +100,13 @@ pub(super) fn print(evaluation: &Evaluation) -> anyhow::Result<()> {
         print_errors("All trials", &evaluation.pooled, unit)?;
     }
     say(
-        "Average error: mean |reference - estimate| over the range of the estimate (the paper's),",
+        "Average error: mean |reference - estimate| over the range of the estimate (the paper's), and over that of the \
+         reference. Lag: positive when the estimate runs behind.",
     )?;
-    say("and over that of the reference. Lag: positive when the estimate runs behind.")?;
     if !evaluation.comparisons.is_empty() {
-        let mean = format!("difference of mean |error|, {unit}");
-        let header =
-            ["first - second", &mean, "95 % interval", "P, samples", "P, blocks", "blocks"];
+        let mean = format!("difference of mean error, {unit}");
+        let mean = mean.trim_end_matches(", ");
+        let header = ["first - second", mean, "95 % interval", "P, samples", "P, blocks", "blocks"];
         let rows = evaluation.comparisons.iter().map(|c| {
             let interval = c.interval_95;
             vec![

@@ -2,15 +2,15 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, anyhow};
+use anyhow::{Context, anyhow, ensure};
 use stretch_calibrate::{parse_adc, read_calibration};
-use stretch_data::{DataError, write_folder, write_whole};
+use stretch_data::{DataError, is_standard_output, write_folder, write_whole};
 use stretch_export::{
     File, Form, HEADER, Header, Options, SELF_TEST_SAMPLES, arduino_library, header,
 };
 use stretch_receptor::code::Adc;
 
-use super::shared::say;
+use super::shared::tell;
 
 /// Write a calibration in C, for a board
 ///
@@ -27,7 +27,7 @@ pub(crate) struct Args {
     /// Calibration record, from `stretch calibrate`
     #[arg(long, value_name = "cal.json")]
     calibration: PathBuf,
-    /// Folder for the header; it must not hold anything
+    /// Folder for the header; it must not hold anything; - writes the header to standard output
     #[arg(long, value_name = "DIR")]
     c: PathBuf,
     /// Make the folder a library that the Arduino IDE takes
@@ -49,6 +49,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let made =
         header(&calibration, &options).with_context(|| args.calibration.display().to_string())?;
     let Header { text, form, model, pressure } = &made;
+    if is_standard_output(&args.c) {
+        ensure!(!args.arduino, "-: a library is several files; name a folder");
+        return Ok(write_whole(&args.c, |out| out.write_all(text.as_bytes()))?);
+    }
     let files = if args.arduino {
         arduino_library(&made)
     } else {
@@ -75,14 +79,14 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         other => other.into(),
     })?;
     let out = args.c.display();
-    say(format!("wrote {out}: {model}, {form}, a self-test of {SELF_TEST_SAMPLES} samples"))?;
+    tell(format!("wrote {out}: {model}, {form}, a self-test of {SELF_TEST_SAMPLES} samples"))?;
     for File { path, .. } in &files {
-        say(format!("  {path}"))?;
+        tell(format!("  {path}"))?;
     }
     if *pressure {
-        say("tell it the pressure with stretch_feel() before each sample")?;
+        tell("tell it the pressure with stretch_feel() before each sample")?;
     }
-    say(if args.arduino {
+    tell(if args.arduino {
         "put the folder into the sketchbook's libraries; the IDE then has File > Examples > StretchReceptor > Live"
     } else {
         "include it in one file of the program; stretch_self_test() is 0 where the board computes as the desk does"

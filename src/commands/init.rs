@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::ensure;
 use stretch_problem::first_problem;
 
-use super::shared::{say, write_text};
+use super::shared::{tell, write_text};
 
 /// Write a first problem.toml from the recordings in a folder
 ///
@@ -33,7 +33,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         path.display()
     );
     write_text(&path, &first_problem(&args.folder)?)?;
-    say(format!(
+    tell(format!(
         "wrote {}: read its comments, write the simulator, then stretch diagnose it",
         path.display()
     ))

@@ -7,10 +7,13 @@ use stretch_paper::{Experiment, PUBLISHED, Pipeline};
 use stretch_report::{error_rows, fit_rows, paper_page, verdicts};
 use stretch_sim::paper_preset;
 
-use super::shared::{or_force, progress, say, write_text};
+use super::{
+    json::Json,
+    shared::{or_force, progress, say, tell, write_text},
+};
 use crate::table::{number, p_value, table};
 
-pub(super) fn run(out: &Path, force: bool, seed: u64, json: bool) -> anyhow::Result<()> {
+pub(super) fn run(out: &Path, force: bool, seed: u64, json: &Json) -> anyhow::Result<()> {
     let mut done = None;
     let written = write_folder(out, force, |folder| {
         let bar = progress("simulating, fitting, judging", 1);
@@ -19,20 +22,25 @@ pub(super) fn run(out: &Path, force: bool, seed: u64, json: bool) -> anyhow::Res
         write_text(&folder.join("paper.html"), &paper_page(&experiment))?;
         let text = serde_json::to_string_pretty(&experiment.to_serialise())?;
         write_text(&folder.join("paper.json"), &text)?;
-        done = Some((experiment, text));
+        done = Some(experiment);
         anyhow::Ok(())
     });
     written.map_err(or_force)?;
-    let Some((experiment, text)) = done else { return Ok(()) };
-    if json {
-        return say(text);
+    let Some(experiment) = done else { return Ok(()) };
+    json.answer(&experiment.to_serialise(), || print(&experiment, seed))?;
+    if json.is_printed() {
+        return Ok(());
     }
+    tell(format!("\nwrote {}: paper.html (open it), paper.json", out.display()))
+}
 
+/// The paper's tables beside ours.
+fn print(experiment: &Experiment, seed: u64) -> anyhow::Result<()> {
     say(format!("The paper's experiment on the simulated rig, preset `paper`, seed {seed}"))?;
     say("\nFits, normalised (next lower and next higher order below each):")?;
     let header =
         ["fit", "R^2", "R^2, paper", "RMSE %", "RMSE %, paper", "R^2, ours", "RMSE %, ours"];
-    say(table(&header, fit_rows(&experiment)))?;
+    say(table(&header, fit_rows(experiment)))?;
     let (a, b) = line(&experiment.published);
     say(format!(
         "Line: strain = {a:.4} V + {b:.4}; paper: {} V + {}\n",
@@ -85,10 +93,10 @@ pub(super) fn run(out: &Path, force: bool, seed: u64, json: bool) -> anyhow::Res
     });
     say(table(&["Hz", "gain mV/mm", "lead deg"], rows))?;
     say("\nWhat agrees and what does not:")?;
-    for sentence in verdicts(&experiment) {
+    for sentence in verdicts(experiment) {
         say(format!("- {sentence}"))?;
     }
-    say(format!("\nwrote {}: paper.html (open it), paper.json", out.display()))
+    Ok(())
 }
 
 /// Slope and intercept of the linear fit.

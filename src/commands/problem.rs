@@ -16,13 +16,14 @@ use stretch_report::{Subject, diagnosis_page};
 use super::{
     diagnosis_files::to_json,
     diagnosis_text::text,
-    shared::{say, stage_text},
+    json::Json,
+    shared::{detail, say, say_first, stage_text, tell},
 };
 
 /// What is asked of a problem's diagnosis.
 pub(super) struct Asked<'a> {
     pub(super) options: &'a Options,
-    pub(super) json: Option<&'a Path>,
+    pub(super) json: &'a Json,
     pub(super) report: Option<&'a Path>,
     /// Workers at once.
     pub(super) jobs: usize,
@@ -60,20 +61,28 @@ pub(super) fn builtin(file: &ProblemFile) -> Option<Builtin> {
 }
 
 /// Diagnoses a user's own simulator.
-pub(super) fn run(file: &ProblemFile, asked: &Asked<'_>, bar: &ProgressBar) -> anyhow::Result<()> {
+pub(super) fn run(
+    file: &ProblemFile,
+    asked: &Asked<'_>,
+    bar: &ProgressBar,
+) -> anyhow::Result<Diagnosis> {
     let workers = file.workers(asked.jobs)?.context("the simulator is built in")?;
     let problem = Problem::new(file.load()?)?;
     bar.set_message("starting the simulator");
     let source = Workers::start(workers, problem.session())?;
     let budget = asked.budget.or(file.budget);
     let bench = BlackBox::within(problem, Arc::new(source), budget);
-    let progress =
-        |what: &str| bar.set_message(format!("{what} ({} model runs)", bench.model_runs()));
+    let progress = |what: &str| {
+        let told = format!("{what} ({} model runs)", bench.model_runs());
+        detail(&told);
+        bar.set_message(told);
+    };
     let (mut diagnosis, evidence) =
         diagnose(&bench, asked.options, &progress, &stretch_data::interrupted)?;
     bench.annotate(&mut diagnosis);
     bar.finish_and_clear();
-    conclude(file, asked, &bench, &diagnosis, &evidence)
+    conclude(file, asked, &bench, &diagnosis, &evidence)?;
+    Ok(diagnosis)
 }
 
 fn conclude(
@@ -84,12 +93,9 @@ fn conclude(
     evidence: &Evidence,
 ) -> anyhow::Result<()> {
     let (mut said, mut outputs) = (Vec::new(), Outputs::default());
-    if let Some(path) = asked.json {
-        let named = implement(bench, diagnosis).map(|one| implement_json(diagnosis, one));
-        let json = to_json(diagnosis, named.collect(), None, &file.name, asked.options.seed)?;
-        stage_text(&mut outputs, path, &json)?;
-        said.push(format!("wrote {}", path.display()));
-    }
+    let named = implement(bench, diagnosis).map(|one| implement_json(diagnosis, one));
+    let answer = to_json(diagnosis, named.collect(), None, &file.name, asked.options.seed)?;
+    asked.json.stage(&mut outputs, &answer)?;
     if let Some(path) = asked.report {
         let name = &file.name;
         let subject = Subject { name, diagnosis, evidence, implementations: &[], simulator: bench };
@@ -97,12 +103,14 @@ fn conclude(
         said.push(format!("wrote {}", path.display()));
     }
     outputs.keep()?;
-    say(&diagnosis.sentence)?;
-    for (name, words, equation) in implement(bench, diagnosis) {
-        say(format!("  {name}: {words}; {equation}"))?;
-    }
-    say(text(diagnosis, &[]))?;
-    said.iter().try_for_each(say)
+    asked.json.say(&answer, || {
+        say_first(&diagnosis.sentence)?;
+        for (name, words, equation) in implement(bench, diagnosis) {
+            say(format!("  {name}: {words}; {equation}"))?;
+        }
+        say(text(diagnosis, &[]))?;
+        said.iter().try_for_each(tell)
+    })
 }
 
 /// The named wrappers: name, words, equation.

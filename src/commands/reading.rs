@@ -3,10 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use stretch_data::{DataError, DataSet, ReadOptions, Recording, Split, TimeUnit, Trial};
+use stretch_data::{
+    DataError, DataSet, ReadOptions, Recording, Split, TimeUnit, Trial, tidy_column,
+};
 
 use super::shared::progress;
-use crate::display::warn;
+use crate::display::{detail, warn};
 
 /// Options for recordings that do not say all of themselves.
 #[derive(clap::Args)]
@@ -40,6 +42,11 @@ enum Unit {
 fn rate(text: &str) -> Result<f64, String> {
     let rate_hz = text.parse::<f64>().ok().filter(|hz| (1e-3..=1e7).contains(hz));
     rate_hz.ok_or_else(|| format!("\"{text}\" is not a rate between 1e-3 and 1e7 Hz"))
+}
+
+/// The name of a column as recordings are read: `Pos (mm)` is pos_mm.
+pub(crate) fn column(name: &str) -> Result<String, std::convert::Infallible> {
+    Ok(tidy_column(name))
 }
 
 impl Recorded {
@@ -77,6 +84,9 @@ pub(crate) fn told(Recording { trial, notes }: Recording) -> Trial {
     for note in notes {
         warn(format!("note: {}: {note}", trial.name));
     }
+    let names: Vec<&str> = trial.channels.iter().map(|channel| channel.name.as_str()).collect();
+    let rate = trial.rate_hz().map_or(String::new(), |hz| format!(", {hz:.4} a second"));
+    detail(format!("read {}: {} samples of {}{rate}", trial.name, trial.len(), names.join(", ")));
     trial
 }
 

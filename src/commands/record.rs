@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use stretch_calibrate::{RecordSummary, describe_record, seal_calibration};
 
-use super::shared::say;
+use super::{json::Json, shared::say};
 
 /// Check the seal of a calibration record, or renew it after a hand edit
 ///
@@ -27,6 +27,8 @@ enum Step {
         /// Record from `stretch calibrate`: of --out, or of --fixed
         #[arg(required = true, value_name = "cal.json")]
         records: Vec<PathBuf>,
+        #[command(flatten)]
+        json: Json,
     },
     /// Check all but the seal and write the record anew under one: after a hand edit, or for a
     /// record of an earlier release
@@ -34,14 +36,18 @@ enum Step {
         /// Record from `stretch calibrate --out`
         #[arg(required = true, value_name = "cal.json")]
         records: Vec<PathBuf>,
+        #[command(flatten)]
+        json: Json,
     },
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    let (records, is_sealing) = match args.step {
-        Step::Check { records } => (records, false),
-        Step::Seal { records } => (records, true),
+    let (records, json, is_sealing) = match args.step {
+        Step::Check { records, json } => (records, json, false),
+        Step::Seal { records, json } => (records, json, true),
     };
+    let mut answer = Vec::new();
+    let mut lines = Vec::new();
     for path in &records {
         if is_sealing {
             seal_calibration(path)?;
@@ -54,7 +60,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
                 "of an earlier release, without a seal: stretch record seal makes one"
             }
         };
-        say(format!("{}: {kind}, {seal:08x}, {told}", path.display()))?;
+        let (path, seal) = (path.display().to_string(), format!("{seal:08x}"));
+        lines.push(format!("{path}: {kind}, {seal}, {told}"));
+        answer.push(serde_json::json!({
+            "record": path, "kind": kind, "seal": seal, "is_sealed": is_sealing || is_sealed,
+        }));
     }
-    Ok(())
+    json.answer(&answer, || lines.iter().try_for_each(say))
 }

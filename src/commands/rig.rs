@@ -2,7 +2,7 @@
 
 use stretch_sim::default_rig_text;
 
-use super::shared::say;
+use super::shared::say_as_is;
 
 /// Print the stock rig as a rig file, with units and meanings
 ///
@@ -12,5 +12,5 @@ use super::shared::say;
 pub(crate) struct Args {}
 
 pub(crate) fn run(_args: Args) -> anyhow::Result<()> {
-    say(default_rig_text().trim_end())
+    say_as_is(default_rig_text().trim_end())
 }

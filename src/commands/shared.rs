@@ -6,11 +6,11 @@ use std::{
 };
 
 use anyhow::Context;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use stretch_data::{DataError, Outputs};
 
-use crate::display::warn;
-pub(crate) use crate::display::{give_stdout, say, say_json};
+pub(crate) use crate::display::{detail, give_stdout, say, say_as_is, say_first, tell};
+use crate::display::{shows_progress, warn};
 
 /// A progress bar on standard error: seen on a terminal only.
 pub(crate) fn progress(what: &'static str, steps: u64) -> ProgressBar {
@@ -28,7 +28,25 @@ fn bar(what: &'static str, steps: u64, template: &str) -> ProgressBar {
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style);
     }
-    bar.enable_steady_tick(Duration::from_millis(200));
+    ticking(bar)
+}
+
+/// Seen on a terminal only: what goes on, and for how long already.
+pub(crate) fn spinner() -> ProgressBar {
+    let bar = ProgressBar::new_spinner().with_message("reading");
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed}") {
+        bar.set_style(style);
+    }
+    ticking(bar)
+}
+
+/// A bar that moves, or one that nobody sees.
+fn ticking(bar: ProgressBar) -> ProgressBar {
+    if shows_progress() {
+        bar.enable_steady_tick(Duration::from_millis(150));
+    } else {
+        bar.set_draw_target(ProgressDrawTarget::hidden());
+    }
     bar
 }
 

@@ -2,13 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, ensure};
-use stretch_data::{DataError, DataSet, ReadOptions, RigFile, TrialEntry, write_folder};
+use anyhow::{Context, bail, ensure};
+use stretch_data::{
+    DataError, DataSet, ReadOptions, RigFile, TrialEntry, is_standard_output, write_folder,
+};
 use stretch_sim::{Rig, RunSettings, Session, SimError, TrialPlan, paper_preset};
 
 use super::{
+    json::Json,
     reading::read_recording,
-    shared::{of_files, or_force, progress, recover, say},
+    shared::{detail, of_files, or_force, progress, recover, tell},
 };
 
 /// Simulate trials of the rig and write them as a data set
@@ -53,12 +56,14 @@ pub(crate) struct Args {
     /// Seed of noise and random commands [default: the rig file's, or 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=RunSettings::MOST_SEED))]
     seed: Option<u64>,
-    /// Folder that the data set goes to
+    /// Folder that the data set goes to; - for standard output, where one trial alone is simulated
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Replace a data set that exists, in one step; files of your own in its folder are kept
     #[arg(long)]
     force: bool,
+    #[command(flatten)]
+    json: Json,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -137,7 +142,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let mut settings = written.unwrap_or_default();
     settings.seed = args.seed.unwrap_or(settings.seed);
     settings.noise = args.noise.map_or(settings.noise, |noise| noise == Switch::On);
+    args.json.share_stdout([Some(args.out.as_path())])?;
     let plans = plans(&args, &rig, settings.seed)?;
+    if is_standard_output(&args.out) {
+        return alone(&args.out, &rig, &settings, &plans);
+    }
     recover(&args.out)?;
     let written = write(&args.out, args.force, &rig, &settings, &plans);
     written.map_err(|error| match error.downcast_ref::<DataError>() {
@@ -147,13 +156,31 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
 
     let seconds: f64 = plans.iter().map(|p| p.inlet.len() as f64 / p.rate_hz).sum();
     let effects: Vec<&str> = rig.effects.iter().map(|e| e.name()).collect();
+    let (trials, seed) = (plans.len(), settings.seed);
+    let answer = serde_json::json!({
+        "data_set": args.out.display().to_string(), "trials": trials, "duration_s": seconds, "effects": effects, "seed": seed,
+    });
     let effects = if effects.is_empty() { "no effect".to_owned() } else { effects.join(", ") };
-    say(format!(
-        "wrote {}: {} trials, {seconds:.0} s, {effects}, seed {}",
-        args.out.display(),
-        plans.len(),
-        settings.seed
-    ))
+    let told = format!(
+        "wrote {}: {trials} trials, {seconds:.0} s, {effects}, seed {seed}",
+        args.out.display()
+    );
+    args.json.answer(&answer, || tell(told))
+}
+
+/// One trial as a stream: a folder cannot be one.
+fn alone(out: &Path, rig: &Rig, settings: &RunSettings, plans: &[TrialPlan]) -> anyhow::Result<()> {
+    let [plan] = plans else {
+        bail!(
+            "-: these are {} trials, and only one can go to standard output; --protocol arbitrary or pulses, or --commands \
+             with one trial, give one",
+            plans.len()
+        );
+    };
+    let (_, trial) = Session::new(rig, settings)?.run(plan)?;
+    trial.check().context("the simulation gave what no trial can hold")?;
+    trial.write(out)?;
+    Ok(())
 }
 
 fn plans(args: &Args, rig: &Rig, seed: u64) -> anyhow::Result<Vec<TrialPlan>> {
@@ -202,6 +229,7 @@ pub(super) fn write(
         ensure!(plans.iter().all(|p| p.file != own), "a trial cannot be called {own}");
     }
     let bar = progress("simulating", plans.len() as u64);
+    detail(format!("simulating {} trials, seed {}", plans.len(), settings.seed));
     write_folder(out, force, |folder| {
         let mut session = Session::new(rig, settings)?;
         for plan in plans {

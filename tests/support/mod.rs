@@ -79,19 +79,50 @@ pub(crate) fn stdout(output: &Output) -> String {
     String::from_utf8(output.stdout.clone()).expect("UTF-8")
 }
 
-/// What a command says that succeeds.
+/// A text as it was before its lines were broken at a hundred columns: a line that had no room for the first word of the next
+/// goes on with it.
+pub(crate) fn unbroken(text: &str) -> String {
+    let mut told = String::new();
+    let mut room = 100;
+    for line in text.split_inclusive('\n') {
+        let word = line.split_whitespace().next().unwrap_or("").chars().count();
+        if room < word + 1 && word > 0 {
+            told.truncate(told.trim_end().len());
+            told.push(' ');
+            told.push_str(line.trim_start());
+        } else {
+            told.push_str(line);
+        }
+        let own = line.trim_end_matches('\n').chars().count();
+        room = if line.starts_with('|') { 100 } else { 100_usize.saturating_sub(own) };
+    }
+    told
+}
+
+/// What a command says that succeeds, each sentence in a line.
 #[track_caller]
 pub(crate) fn runs(command: &mut Command) -> String {
+    unbroken(&prints(command))
+}
+
+/// What a command prints for other programs.
+#[track_caller]
+pub(crate) fn prints(command: &mut Command) -> String {
     let output = command.output().expect("the program runs");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     stdout(&output)
+}
+
+/// A text in one line: how wide a terminal is says where its lines break.
+pub(crate) fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// Runs to a failure with exit code 1 and a message that has all of `parts`.
 #[track_caller]
 pub(crate) fn fails(command: &mut Command, parts: &[&str]) {
     let output = command.output().expect("the program runs");
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    let message = one_line(&String::from_utf8_lossy(&output.stderr));
     assert_eq!(output.status.code(), Some(1), "{message}");
     assert!(!message.contains("panicked"), "{message}");
     for part in parts {

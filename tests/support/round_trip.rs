@@ -15,7 +15,7 @@ pub(crate) fn diagnosed(
 ) -> Value {
     let json = scratch.path("round_trip.json");
     let mut command = stretch();
-    command.arg("diagnose").arg(folder).args(["--no-next", "--json"]).arg(&json);
+    command.arg("diagnose").arg(folder).args(["--no-next", "--json-out"]).arg(&json);
     for (option, path) in [("--rig", rig), ("--fix", fix)] {
         if let Some(path) = path {
             command.arg(option).arg(path);

@@ -27,7 +27,7 @@ class Diagnosis:
 
     @staticmethod
     def from_json(text: str) -> Diagnosis:
-        """From what `to_json` or `stretch diagnose --json` wrote; figures are not in there."""
+        """From what `to_json` or `stretch diagnose --json-out` wrote; figures are not in there."""
         return Diagnosis(json.loads(text))
 
     @property

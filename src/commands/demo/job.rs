@@ -1,6 +1,7 @@
 //! What a lab does with its trials: calibrate, judge, and ask why the simulator disagrees.
 
 use indicatif::{MultiProgress, ProgressBar};
+use stretch_bench::{Bench, Examined};
 use stretch_calibrate::{
     Calibrated, Candidate, Evaluation, MethodErrors, ModelChoice, ModelKind, Options, calibrate,
     choose_model, evaluate, rank_signals,
@@ -8,7 +9,7 @@ use stretch_calibrate::{
 use stretch_data::{Trial, TrialKind};
 
 use super::sessions::Sessions;
-use crate::commands::diagnose::{Bench, Examined, spinner};
+use crate::commands::{diagnose::told_on, shared::spinner};
 
 /// Everything that was found.
 pub(super) struct Job {
@@ -50,7 +51,9 @@ impl Job {
         let (calibrations, examined) = std::thread::scope(|scope| {
             let asked = scope.spawn(|| -> anyhow::Result<(Bench, Examined)> {
                 let bench = sessions.bench(&options.signal)?;
-                let examined = bench.examine(&stretch_gap::Options::default(), true, &asking)?;
+                let options = stretch_gap::Options { responses: true, ..Default::default() };
+                let examined =
+                    bench.examine(&options, true, &told_on(&asking), &stretch_data::interrupted)?;
                 asking.finish_and_clear();
                 Ok((bench, examined))
             });

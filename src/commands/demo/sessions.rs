@@ -7,13 +7,13 @@ use std::{
 };
 
 use anyhow::{Context, bail, ensure};
-use stretch_bench::{GaugeSetup, GaugeSimulator};
+use stretch_bench::{Bench, GaugeSetup, GaugeSimulator};
 use stretch_data::{DataSet, ReadOptions, SessionTrial, Split, Trial, TrialKind};
 use stretch_sim::Catalogue;
 
 use super::published::{self, COMMIT, REPOSITORY};
 use crate::commands::{
-    diagnose::{Bench, name_of},
+    diagnose::{name_of, read_bench},
     shared::short_name,
 };
 
@@ -109,7 +109,7 @@ impl Sessions {
         if let Some(folder) = &self.folder {
             let fit = self.fit.iter().map(|(_, trial)| trial);
             let is_rig = fit.clone().all(|t| t.channel("inlet").or(t.channel("outlet")).is_some());
-            return Bench::read(folder, columns.filter(|_| !is_rig), None, &catalogue);
+            return read_bench(folder, columns.filter(|_| !is_rig), None, &catalogue);
         }
         // A session has its own zero, and nobody knows the pause before the next.
         let first = self.fit.iter().take(1);
@@ -122,7 +122,7 @@ impl Sessions {
             rig: None,
             catalogue: &catalogue,
         };
-        Ok(Bench::Gauge(Box::new(GaugeSimulator::new(&setup)?)))
+        Ok(GaugeSimulator::new(&setup)?.into())
     }
 }
 

@@ -1,0 +1,119 @@
+//! A calibration as text on a terminal.
+
+use stretch_calibrate::{Calibrated, Candidate, FitReport, ModelChoice, ModelRow};
+use stretch_data::unit_of;
+
+use super::shared::{say, tell};
+use crate::table::{maybe, number, table};
+
+/// What `auto` rests on.
+pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Result<()> {
+    let unit = unit_of(reference);
+    let unit = if unit.is_empty() { unit } else { format!(" in {unit}") };
+    say(format!("Models, RMSE{unit} on trials left out of the fit:"))?;
+    let row = |r: &ModelRow| {
+        if let Some(problem) = &r.problem {
+            return vec![r.model.clone(), problem.clone()];
+        }
+        let excess =
+            |(mean, error): (f64, f64)| format!("{} \u{b1} {}", number(mean), number(error));
+        vec![
+            r.model.clone(),
+            maybe(r.rmse),
+            maybe(r.rmse_arbitrary),
+            maybe(r.rmse_pulses),
+            maybe(r.rmse_ramps),
+            r.lag_s.map_or("-".to_owned(), |lag| format!("{:.0}", 1e3 * lag)),
+            maybe(r.worst),
+            r.parameters.to_string(),
+            instructions(r),
+            r.excess.map_or("-".to_owned(), excess),
+            if r.model == choice.model.to_string() { "chosen".to_owned() } else { String::new() },
+        ]
+    };
+    let header = [
+        "model",
+        "all",
+        "arbitrary",
+        "pulses",
+        "ramps",
+        "delay ms",
+        "worst",
+        "numbers",
+        "M3 instr.",
+        "over the best, squared",
+        "",
+    ];
+    say(table(&header, choice.rows.iter().map(row)))?;
+    say(
+        "M3 instr.: instructions a sample on a Cortex-M3, f32 (fixed point), as measured. \u{b1}: one standard error.",
+    )?;
+    say(format!("Chosen: {}.", choice.why))
+}
+
+/// From volts in `f32`, and in fixed point where the model has that form.
+fn instructions(row: &ModelRow) -> String {
+    match (row.m3_instructions, row.m3_instructions_fixed) {
+        (Some(float), Some(fixed)) => format!("{float:.0} ({fixed:.0})"),
+        (Some(float), None) => format!("{float:.0}"),
+        _ => "-".to_owned(),
+    }
+}
+
+/// The tables of a calibration, as the paper prints them.
+pub(super) fn print(calibrated: &Calibrated, ranking: &[Candidate]) -> anyhow::Result<()> {
+    if !ranking.is_empty() {
+        say("Signals, by error on data left out of the fit (normalised):")?;
+        let row = |c: &Candidate| {
+            let shown = c.problem.clone().unwrap_or_else(|| maybe(c.cross_validated_rmse));
+            vec![c.signal.clone(), shown]
+        };
+        say(table(&["signal", "cross-validated RMSE"], ranking.iter().map(row)))?;
+    }
+    let row = |fit: &FitReport| {
+        vec![
+            fit.name.clone(),
+            fit.model.clone(),
+            fit.samples.to_string(),
+            format!("{:.4}", fit.r_squared),
+            number(100.0 * fit.rmse),
+            number(fit.condition),
+        ]
+    };
+    let header = ["fit", "model", "samples", "R^2", "RMSE % of range", "condition"];
+    say(table(&header, calibrated.fits.iter().map(row)))?;
+    say("Coefficients (normalised rate r, signal V) with 95 % bounds:")?;
+    let rows = calibrated.fits.iter().flat_map(|fit| {
+        fit.coefficients.iter().map(|c| {
+            vec![
+                format!("{} {}", fit.name, c.name),
+                number(c.estimate),
+                number(c.lower),
+                number(c.upper),
+            ]
+        })
+    });
+    say(table(&["coefficient", "estimate", "lower", "upper"], rows))?;
+    if calibrated.fits.iter().any(|fit| !fit.orders.is_empty()) {
+        say("Orders beside it (CV: on data left out of the fit):")?;
+        let rows = calibrated.fits.iter().flat_map(|fit| {
+            fit.orders.iter().map(|order| {
+                let chosen = Some(&order.model) == fit.recommended.as_ref();
+                vec![
+                    format!("{} {}", fit.name, order.model),
+                    order.terms.to_string(),
+                    order.r_squared.map_or("-".to_owned(), |r| format!("{r:.4}")),
+                    maybe(order.rmse.map(|x| 100.0 * x)),
+                    maybe(order.cross_validated_rmse.map(|x| 100.0 * x)),
+                    if chosen { "recommended".to_owned() } else { String::new() },
+                ]
+            })
+        });
+        let header = ["order", "terms", "R^2", "RMSE %", "CV RMSE %", ""];
+        say(table(&header, rows))?;
+    }
+    for note in &calibrated.notes {
+        tell(format!("note: {note}"))?;
+    }
+    Ok(())
+}

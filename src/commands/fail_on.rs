@@ -1,0 +1,39 @@
+//! Verdicts that end a diagnosis with a status of their own.
+
+use stretch_gap::{Diagnosis, VerdictKind};
+
+/// What `stretch diagnose --fail-on` names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum FailOn {
+    Effect,
+    Unknown,
+    Record,
+    Faint,
+    Parameters,
+    Gap,
+    Any,
+}
+
+impl FailOn {
+    /// Whether a diagnosis is one of those.
+    pub(super) fn covers(self, diagnosis: &Diagnosis) -> bool {
+        use VerdictKind::{Effect, NoGap, Parameters, Partial, Record, Unknown};
+        let verdict = diagnosis.verdict;
+        match self {
+            // a partial answer names an effect, and leaves what nothing explains
+            Self::Effect => matches!(verdict, Effect | Partial),
+            Self::Unknown => matches!(verdict, Unknown | Partial),
+            Self::Record => verdict == Record,
+            Self::Faint => is_faint(diagnosis),
+            Self::Parameters => verdict == Parameters,
+            Self::Gap => matches!(verdict, Effect | Partial | Unknown | Record),
+            Self::Any => verdict != NoGap || is_faint(diagnosis),
+        }
+    }
+}
+
+/// Whether more is left than noise as it is described, and too little to name.
+pub(super) fn is_faint(diagnosis: &Diagnosis) -> bool {
+    let agrees = matches!(diagnosis.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
+    agrees && diagnosis.null_band.is_some_and(|band| diagnosis.gap.retuned > band)
+}

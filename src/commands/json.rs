@@ -1,0 +1,130 @@
+//! Results as JSON: the same two options in every command that has a result.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::ensure;
+use serde::Serialize;
+use stretch_data::{Outputs, is_standard_output};
+
+use super::shared::{give_stdout, say_as_is, stage_text, tell};
+
+/// Where JSON goes.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Json {
+    /// Print JSON to standard output in place of text
+    #[arg(long)]
+    json: bool,
+    /// Write the same JSON into a file, too; - is standard output, as --json
+    #[arg(long, value_name = "FILE.json")]
+    json_out: Option<PathBuf>,
+}
+
+impl Json {
+    /// Whether it stands on standard output, in place of text.
+    pub(crate) fn is_printed(&self) -> bool {
+        self.json || self.json_out.as_deref().is_some_and(is_standard_output)
+    }
+
+    fn file(&self) -> Option<&Path> {
+        self.json_out.as_deref().filter(|path| !is_standard_output(path))
+    }
+
+    /// Gives standard output to the JSON, or to the one of some files that is called `-`.
+    ///
+    /// # Errors
+    /// Two for one.
+    pub(crate) fn share_stdout<'a>(
+        &self,
+        files: impl IntoIterator<Item = Option<&'a Path>>,
+    ) -> anyhow::Result<()> {
+        let files: Vec<_> = files.into_iter().collect();
+        let is_taken = files.iter().flatten().any(is_standard_output);
+        ensure!(
+            !(is_taken && self.is_printed()),
+            "a file and JSON cannot both go to standard output; write --json-out FILE.json, or name the file"
+        );
+        give_stdout(files)
+    }
+
+    /// Puts the JSON among the files of a command, where it is one of them.
+    ///
+    /// # Errors
+    /// A file that cannot be written, a value that JSON cannot hold.
+    pub(crate) fn stage(
+        &self,
+        outputs: &mut Outputs,
+        value: &impl Serialize,
+    ) -> anyhow::Result<()> {
+        match self.file() {
+            Some(path) => stage_text(outputs, path, &(serde_json::to_string_pretty(value)? + "\n")),
+            None => Ok(()),
+        }
+    }
+
+    /// Says the result, as JSON or as text, once all files are there.
+    ///
+    /// # Errors
+    /// A value that JSON cannot hold.
+    pub(crate) fn say(
+        &self,
+        value: &impl Serialize,
+        text: impl FnOnce() -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
+        if self.is_printed() {
+            return say_as_is(serde_json::to_string_pretty(value)?);
+        }
+        text()?;
+        self.file().map_or(Ok(()), |path| tell(format!("wrote {}", path.display())))
+    }
+
+    /// [`Json::stage`] and [`Json::say`] of a command that writes no other file.
+    ///
+    /// # Errors
+    /// As those.
+    pub(crate) fn answer(
+        &self,
+        value: &impl Serialize,
+        text: impl FnOnce() -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
+        let mut outputs = Outputs::default();
+        self.stage(&mut outputs, value)?;
+        outputs.keep()?;
+        self.say(value, text)
+    }
+}
+
+/// What to write in place of `--json FILE`, where that is what was meant.
+pub(crate) fn meant_a_file(arguments: &[String]) -> Option<String> {
+    let glued = arguments.iter().find_map(|argument| argument.strip_prefix("--json="));
+    let behind = || {
+        let at = arguments.iter().position(|argument| argument == "--json")?;
+        let next = arguments.get(at + 1)?;
+        (next == "-" || next.ends_with(".json")).then_some(next.as_str())
+    };
+    let file = glued.or_else(behind)?;
+    Some(match file {
+        "-" => "--json is a flag and prints to standard output by itself: write --json alone"
+            .to_owned(),
+        file => format!(
+            "--json is a flag and prints to standard output: write --json-out {file} for a file"
+        ),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::meant_a_file;
+
+    #[test]
+    fn a_path_behind_the_flag_is_told_where_it_belongs() {
+        let told =
+            |line: &str| meant_a_file(&line.split(' ').map(str::to_owned).collect::<Vec<_>>());
+        assert!(
+            told("diagnose bench --json d.json").unwrap().contains("--json-out d.json for a file")
+        );
+        assert!(told("diagnose bench --json=d.txt").unwrap().contains("--json-out d.txt"));
+        assert!(told("diagnose --json - bench").unwrap().contains("--json alone"));
+        assert_eq!(told("diagnose --json bench --bogus"), None);
+        assert_eq!(told("diagnose bench --json-out d.json"), None);
+    }
+}

@@ -1,0 +1,46 @@
+//! `stretch man`: the help as man pages.
+
+use std::{fs, path::PathBuf};
+
+use anyhow::{Context, ensure};
+use clap_mangen::Man;
+use stretch_data::{Outputs, is_standard_output};
+
+use super::shared::tell;
+
+/// Write the help as man pages, one a command
+///
+///   stretch man --out ~/.local/share/man/man1
+///   man stretch-diagnose
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(crate) struct Args {
+    /// Folder that the pages go to, beside what it holds; it is made where there is none
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+pub(crate) fn run(args: &Args, mut program: clap::Command) -> anyhow::Result<()> {
+    let out = &args.out;
+    ensure!(!is_standard_output(out), "-: pages are several files; name a folder");
+    fs::create_dir_all(out).with_context(|| format!("{}: cannot make it", out.display()))?;
+    program.build();
+    let mut pages = Vec::new();
+    collect(&program, &mut pages)?;
+    let mut outputs = Outputs::default();
+    for (name, page) in &pages {
+        outputs.file(out.join(format!("{name}.1")), |file| file.write_all(page))?;
+    }
+    outputs.keep()?;
+    tell(format!("wrote {}: {} pages, stretch.1 the first", out.display(), pages.len()))
+}
+
+/// The page of a command and of those below it.
+fn collect(command: &clap::Command, pages: &mut Vec<(String, Vec<u8>)>) -> anyhow::Result<()> {
+    let name = command.get_display_name().unwrap_or(command.get_name()).to_owned();
+    let mut page = Vec::new();
+    Man::new(command.clone()).render(&mut page)?;
+    pages.push((name, page));
+    let mut below = command.get_subcommands().filter(|c| c.get_name() != "help");
+    below.try_for_each(|command| collect(command, pages))
+}

@@ -1,0 +1,82 @@
+//! `stretch page`: the page that needs no installation.
+
+use std::{
+    env, fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use anyhow::{Context, bail, ensure};
+use stretch_data::{write_folder, write_whole};
+
+use super::shared::{or_force, recover, say};
+use crate::display::warn;
+
+/// The page's one file.
+const FILE: &str = "index.html";
+
+/// Write the page that needs no installation: calibrate, diagnose and listen in a browser
+///
+/// One HTML file with the same crates in it, compiled to WASM. It opens from a disk, works offline,
+/// and sends nothing anywhere: give it to whoever has recordings and a browser.
+///
+///   stretch page --out page
+///
+/// The page is taken from where STRETCH_PAGE says, or from the folder page beside this program;
+/// in the source tree that this program was built from it is built (rustup target add
+/// wasm32-unknown-unknown).
+#[derive(clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(crate) struct Args {
+    /// Folder for index.html
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Replace a page that exists; files of your own in its folder are kept
+    #[arg(long)]
+    force: bool,
+}
+
+pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+    recover(&args.out)?;
+    let from = page()?;
+    let page = fs::read(&from).with_context(|| from.display().to_string())?;
+    let is_page = page.starts_with(b"<!DOCTYPE html>") && page.ends_with(b"</html>\n");
+    ensure!(is_page, "{}: this is no page of stretch; build it with web/build.sh", from.display());
+    write_folder(&args.out, args.force, |folder| {
+        Ok(write_whole(folder.join(FILE), |out| out.write_all(&page))?)
+    })
+    .map_err(or_force)?;
+    say(format!(
+        "wrote {}: open it in a browser; {:.1} MB, and nothing else is needed",
+        args.out.join(FILE).display(),
+        page.len() as f64 / 1e6
+    ))
+}
+
+/// Where the page is.
+fn page() -> anyhow::Result<PathBuf> {
+    if let Some(asked) = env::var_os("STRETCH_PAGE") {
+        let asked = PathBuf::from(asked);
+        let file = if asked.is_dir() { asked.join(FILE) } else { asked };
+        ensure!(file.is_file(), "STRETCH_PAGE: {}: there is no such file", file.display());
+        return Ok(file);
+    }
+    let program = env::current_exe().ok();
+    let beside = program.as_deref().and_then(Path::parent).map(|at| at.join("page").join(FILE));
+    if let Some(beside) = beside.filter(|file| file.is_file()) {
+        return Ok(beside);
+    }
+    let web = Path::new(env!("CARGO_MANIFEST_DIR")).join("web");
+    let script = web.join("build.sh");
+    if !script.is_file() {
+        bail!(
+            "there is no page beside this program, and its source tree is gone: set STRETCH_PAGE to the folder that \
+             web/build.sh made (web/target/page), or put that folder beside the program as page"
+        );
+    }
+    warn("stretch: building the page, some minutes the first time");
+    let built = Command::new(&script).status();
+    let built = built.with_context(|| format!("{}: it could not be run", script.display()))?;
+    ensure!(built.success(), "{}: it did not build the page", script.display());
+    Ok(web.join("target/page").join(FILE))
+}

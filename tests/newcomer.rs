@@ -1,0 +1,171 @@
+//! What somebody sees who has never used the program: own names, own units, own folders.
+
+mod support;
+
+use std::fmt::Write;
+
+use support::{Scratch, calibrate, fails, one_line, runs, stretch};
+
+/// A trial with columns and a scale of its own: a reference of 151 to 179 and a gauge of 1.27 to 2.2 times `times`.
+fn trial(scratch: &Scratch, name: &str, header: &str, times: f64) -> std::path::PathBuf {
+    let mut text = format!("{header}\n");
+    for n in 0..3000 {
+        let t = 0.01 * f64::from(n);
+        let length = 165.0 + 14.0 * (1.1 * t).cos() * (0.31 * t).cos();
+        let wobble = f64::from(n * 7919 % 101) * 1e-5;
+        let gauge = times * (1.24 + 0.033 * (180.0 - length) + wobble);
+        writeln!(text, "{t:.2},{length:.4},{gauge:.6}").unwrap();
+    }
+    scratch.write(name, text)
+}
+
+#[test]
+fn own_columns_keep_their_units() {
+    let scratch = Scratch::new();
+    let log = trial(&scratch, "own.csv", "Time (s),Pos (mm),Gauge (V)", 1.0);
+    let record = scratch.path("own.json");
+    runs(calibrate(&log, &record).args(["--reference", "Pos (mm)", "--signal", "Gauge (V)"]));
+    let mut apply = stretch();
+    let told = runs(apply.args(["apply", "--calibration"]).arg(&record).arg(&log));
+    assert!(
+        told.starts_with("time_s,estimate_mm,rate_mm_per_s,branch,domain\n"),
+        "{}",
+        &told[..60]
+    );
+    let mut evaluate = stretch();
+    let told = runs(evaluate.args(["evaluate", "--calibration"]).arg(&record).arg(&log));
+    assert!(told.contains("RMSE mm"), "{told}");
+    // a unit is written as people write it
+    let log = trial(&scratch, "force.csv", "time_s,force_n,gauge_v", 1.0);
+    let record = scratch.path("force.json");
+    runs(calibrate(&log, &record).args(["--reference", "force_n", "--signal", "gauge_v"]));
+    let mut evaluate = stretch();
+    let told = runs(evaluate.args(["evaluate", "--calibration"]).arg(&record).arg(&log));
+    assert!(told.contains("RMSE N") && !told.contains("RMSE n"), "{told}");
+}
+
+#[test]
+fn a_gauge_in_another_unit_is_told_by_its_power_of_ten() {
+    let scratch = Scratch::new();
+    let (volts, millivolts) = (
+        trial(&scratch, "volts.csv", "time_s,length_mm,bridge_v", 1.0),
+        trial(&scratch, "millivolts.csv", "time_s,length_mm,bridge_v", 1000.0),
+    );
+    let record = scratch.path("cal.json");
+    runs(&mut calibrate(&volts, &record));
+    let says = "3,000 of 3,000 samples lie outside the range of the calibration, 1.273 to 2.196 V, and were clamped to it: \
+                are they in mV? divided by 1000, 2,999 would lie inside";
+    let told = |command: &str, log: &std::path::Path| {
+        let output =
+            stretch().args([command, "--calibration"]).arg(&record).arg(log).output().unwrap();
+        assert!(output.status.success());
+        one_line(&String::from_utf8(output.stderr).unwrap())
+    };
+    for command in ["apply", "evaluate"] {
+        assert!(told(command, &millivolts).contains(says), "{}", told(command, &millivolts));
+        assert!(!told(command, &volts).contains("samples lie outside"), "{command}");
+    }
+    let live = std::fs::read_to_string(&millivolts).unwrap();
+    let mut command = stretch();
+    let output = command.args(["apply", "--calibration"]).arg(&record).write_stdin(live).output();
+    assert!(one_line(&String::from_utf8(output.unwrap().stderr).unwrap()).contains(says), "live");
+}
+
+#[test]
+fn a_folder_of_csv_files_is_told_what_to_do() {
+    let scratch = Scratch::new();
+    std::fs::create_dir(scratch.path("logs")).unwrap();
+    trial(&scratch, "logs/monday.csv", "time_s,length_mm,bridge_v", 1.0);
+    let with = |line: &str| {
+        let mut command = stretch();
+        command.current_dir(scratch.path("")).args(line.split(' '));
+        command
+    };
+    runs(&mut with("calibrate logs/monday.csv --out cal.json"));
+    for line in [
+        "calibrate logs --out x.json",
+        "evaluate --calibration cal.json logs",
+        "diagnose logs",
+        "simulate --commands logs --out x",
+    ] {
+        let says = ["logs: there is no dataset.toml in it", "it holds monday.csv", "logs/*.csv"];
+        fails(&mut with(line), &says);
+    }
+    std::fs::create_dir(scratch.path("empty")).unwrap();
+    fails(&mut with("diagnose empty"), &["empty: there is no dataset.toml in it; name a data set"]);
+}
+
+#[test]
+fn times_that_begin_at_zero_have_the_digits_of_the_log() {
+    let scratch = Scratch::new();
+    let mut text = String::from("t_ms,length_mm\n");
+    (0..500).for_each(|n| writeln!(text, "{:.3},170", 12345.678 + 10.0 * f64::from(n)).unwrap());
+    let log = scratch.write("log.csv", text);
+    let mut command = stretch();
+    command.arg("convert").arg(log).args(["--time", "t_ms", "--from-zero", "--out", "-"]);
+    for (n, line) in runs(&mut command).lines().skip(1).enumerate() {
+        let expected = format!("{:.2}", 0.01 * n as f64);
+        let expected = expected.trim_end_matches('0').trim_end_matches('.');
+        assert_eq!(line.split(',').next(), Some(expected), "row {n}");
+    }
+}
+
+#[test]
+fn a_choice_is_explained_with_its_figures() {
+    let scratch = Scratch::new();
+    let logs = [scratch.loops("a.csv", 30.0, 1.1), scratch.loops("b.csv", 30.0, 1.7)];
+    let mut command = calibrate(&logs[0], &scratch.path("cal.json"));
+    let told = one_line(&runs(command.arg(&logs[1]).args(["--model", "auto"])));
+    let why = told.split("Chosen: ").nth(1).expect("a sentence");
+    let why = &why[..why.find(". ").unwrap()];
+    assert!(why.contains("on what was left out of the fit") && why.contains(" mm"), "{why}");
+    assert!(!told.contains("[]"), "{told}");
+    let history = runs(calibrate(&logs[0], &scratch.path("cal.json")).args(["--model", "history"]));
+    assert!(!history.contains("[]") && history.contains("time constants of 0.05"), "{history}");
+}
+
+#[test]
+fn a_diagnosis_says_what_its_page_says() {
+    let scratch = Scratch::new();
+    let (bench, page) = (scratch.path("bench"), scratch.path("d.html"));
+    let mut command = stretch();
+    command.args([
+        "simulate",
+        "--protocol",
+        "pulses",
+        "--effect",
+        "gauge_hysteresis:h=0.2,s=0.012",
+    ]);
+    runs(command.arg("--out").arg(&bench));
+    let mut command = stretch();
+    let told =
+        runs(command.arg("diagnose").arg(&bench).arg("--no-next").arg("--report").arg(&page));
+    let html = std::fs::read_to_string(&page).unwrap().replace('\u{a0}', " ");
+    assert!(
+        !told.contains("floors") && one_line(&told).contains("\u{b1} is one standard deviation")
+    );
+    let rows: Vec<&str> = told.lines().filter(|l| l.starts_with("| sensing ")).collect();
+    let cells = rows[0].split('|').map(str::trim).filter(|cell| cell.contains('\u{d7}'));
+    let cells: Vec<&str> = cells.collect();
+    assert_eq!(cells.len(), 3, "{told}");
+    for cell in cells {
+        assert!(html.contains(cell), "{cell} is not on the page");
+    }
+    // no rivals, no experiment: whoever asked for the file is told, -q or not
+    let file = scratch.path("next.csv");
+    let mut command = stretch();
+    command.arg("-q").arg("diagnose").arg(&bench).arg("--experiment").arg(&file);
+    let output = command.output().unwrap();
+    let error = one_line(&String::from_utf8(output.stderr).unwrap());
+    assert!(output.status.success() && !file.exists());
+    assert!(error.contains("next.csv is not written: no experiment is recommended"), "{error}");
+}
+
+#[test]
+fn what_agrees_has_no_slices_that_stand_out() {
+    let scratch = Scratch::new();
+    let bench = scratch.path("bench");
+    runs(stretch().args(["simulate", "--protocol", "pulses", "--out"]).arg(&bench));
+    let told = one_line(&runs(stretch().arg("diagnose").arg(&bench).arg("--no-next")));
+    assert!(told.contains("agree") && !told.contains("stands out"), "{told}");
+}

@@ -1,0 +1,39 @@
+//! `stretch page`: written whole from where it was built, or a sentence.
+
+mod support;
+
+use std::fs;
+
+use support::{Scratch, fails, runs, stretch};
+
+const PAGE: &str = "<!DOCTYPE html>\n<html><body>a page</body></html>\n";
+
+#[test]
+fn a_page_that_was_built_is_written_and_never_replaced_unasked() {
+    let scratch = Scratch::new();
+    let (built, out) = (scratch.path("built"), scratch.path("out"));
+    fs::create_dir(&built).unwrap();
+    fs::write(built.join("index.html"), PAGE).unwrap();
+    let command = || {
+        let mut command = stretch();
+        command.env("STRETCH_PAGE", &built).arg("page").arg("--out").arg(&out);
+        command
+    };
+    let said = runs(&mut command());
+    assert!(said.contains("index.html"), "{said}");
+    assert_eq!(fs::read_to_string(out.join("index.html")).unwrap(), PAGE);
+    fails(&mut command(), &["--force"]);
+    runs(command().arg("--force"));
+}
+
+#[test]
+fn what_is_no_page_is_refused_and_nothing_is_left() {
+    let scratch = Scratch::new();
+    let (built, out) = (scratch.path("other.html"), scratch.path("out"));
+    fs::write(&built, &PAGE[..20]).unwrap();
+    for (from, says) in [(&built, "no page of stretch"), (&scratch.path("none"), "no such file")] {
+        let mut command = stretch();
+        fails(command.env("STRETCH_PAGE", from).arg("page").arg("--out").arg(&out), &[says]);
+        assert!(!out.exists());
+    }
+}

@@ -1,0 +1,267 @@
+//! What every command has in common on a terminal: how much it says, how wide, in which colours, as JSON, through `-`, and with
+//! which status it ends.
+
+mod support;
+
+use std::fs;
+
+use serde_json::Value;
+use support::{Scratch, calibrate, fails, one_line, runs, stdout, stretch};
+
+/// A rig with hysteresis, which a diagnosis names, and one without any effect.
+fn benches() -> Scratch {
+    let scratch = Scratch::new();
+    for (name, effect) in [("bench", Some("gauge_hysteresis:h=0.2,s=0.012")), ("plain", None)] {
+        let mut command = stretch();
+        command.args(["simulate", "--protocol", "pulses", "--out"]).arg(scratch.path(name));
+        effect.into_iter().for_each(|effect| {
+            command.args(["--effect", effect]);
+        });
+        runs(&mut command);
+    }
+    scratch
+}
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap_or_else(|e| panic!("{e}: {text}"))
+}
+
+#[test]
+fn verdicts_that_are_named_have_a_status_of_their_own() {
+    let scratch = benches();
+    let status = |folder: &str, on: &str| {
+        let mut command = stretch();
+        command.arg("diagnose").arg(scratch.path(folder)).args(["--no-next", "--fail-on", on]);
+        let output = command.output().unwrap();
+        // the answer stands there whatever the status
+        assert!(stdout(&output).lines().count() > 5, "{folder} {on}");
+        output.status.code()
+    };
+    for (folder, on, code) in [
+        ("bench", "effect", 3),
+        ("bench", "record,gap", 3),
+        ("bench", "any", 3),
+        ("bench", "unknown,record,faint,parameters", 0),
+        ("plain", "effect,unknown,record,gap", 0),
+    ] {
+        assert_eq!(status(folder, on), Some(code), "{folder} --fail-on {on}");
+    }
+    let mut unknown = stretch();
+    unknown.args(["diagnose", "bench", "--fail-on", "sorrow"]);
+    assert_eq!(unknown.output().unwrap().status.code(), Some(2));
+    let told = runs(stretch().arg("--help"));
+    for status in ["0    done", "1    not done", "2    the arguments", "3    done", "130  ended"] {
+        assert!(told.contains(status), "{status}");
+    }
+}
+
+#[test]
+fn json_is_a_flag_and_a_file_has_an_option() {
+    let scratch = benches();
+    let bench = scratch.path("bench");
+    let mut command = stretch();
+    let printed = runs(command.arg("diagnose").arg(&bench).args(["--no-next", "--json"]));
+    let file = scratch.path("d.json");
+    let mut command = stretch();
+    command.arg("diagnose").arg(&bench).args(["--no-next", "--json-out"]).arg(&file);
+    let text = runs(&mut command);
+    let mut by_dash = stretch();
+    by_dash.current_dir(scratch.path("")).args("diagnose bench --no-next --json-out -".split(' '));
+    let dashed = runs(&mut by_dash);
+    assert!(text.contains("wrote ") && one_line(&text).contains("The simulator lacks"), "{text}");
+    let whole = |text: &str| {
+        let mut value = json(text);
+        value["runtime_s"] = Value::Null;
+        value
+    };
+    let written = whole(&fs::read_to_string(&file).unwrap());
+    assert_eq!(whole(&printed), written);
+    assert_eq!(whole(&dashed), written);
+    assert_eq!(written["verdict"], "effect");
+    // other commands
+    let trial = scratch.loops("a.csv", 20.0, 1.1);
+    let cal = scratch.path("cal.json");
+    let told = json(&runs(calibrate(&trial, &cal).arg("--json")));
+    assert_eq!(told["model"], "poly13");
+    let seen = |mut command: assert_cmd::Command| json(&runs(command.arg("--json")));
+    let with = |line: &str| {
+        let mut command = stretch();
+        command.current_dir(scratch.path("")).args(line.split(' '));
+        command
+    };
+    assert_eq!(seen(with("evaluate --calibration cal.json a.csv"))["unit"], "mm");
+    assert_eq!(seen(with("effects gauge_hysteresis"))[0]["name"], "gauge_hysteresis");
+    assert_eq!(seen(with("record check cal.json"))[0]["is_sealed"], true);
+    assert_eq!(seen(with("simulate --protocol pulses --seed 4 --out again"))["seed"], 4);
+    let file = scratch.path("e.json");
+    runs(with("evaluate --calibration cal.json a.csv").arg("--json-out").arg(&file));
+    assert_eq!(json(&fs::read_to_string(file).unwrap())["unit"], "mm");
+    // what was written before
+    for (line, says) in [
+        ("diagnose bench --json d.json", "write --json-out d.json for a file"),
+        ("diagnose --json d.json bench", "write --json-out d.json for a file"),
+        ("diagnose bench --json=d.json", "write --json-out d.json for a file"),
+        ("diagnose bench --json -", "write --json alone"),
+    ] {
+        let output = with(line).output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{line}");
+        let told = one_line(&String::from_utf8(output.stderr).unwrap());
+        assert!(told.contains(says) && told.lines().count() == 1, "{line}: {told}");
+    }
+    let both = "diagnose bench --no-next --json --report -";
+    fails(&mut with(both), &["cannot both go to standard output", "--json-out"]);
+}
+
+#[test]
+fn a_dash_is_a_stream_and_never_a_file() {
+    let scratch = benches();
+    scratch.loops("a.csv", 20.0, 1.1);
+    runs(&mut calibrate(&scratch.path("a.csv"), &scratch.path("cal.json")));
+    let with = |line: &str| {
+        let mut command = stretch();
+        command.current_dir(scratch.path("")).args(line.split(' '));
+        command
+    };
+    let before = scratch.names();
+    let out = |line: &str| runs(&mut with(line));
+    assert!(out("convert a.csv --out -").starts_with("time_s,length_mm,bridge_v\n0,"));
+    assert_eq!(json(&out("calibrate a.csv --out -"))["signal"], "bridge_v");
+    assert!(out("calibrate a.csv --out x.json --report -").starts_with("<!DOCTYPE html>"));
+    fs::remove_file(scratch.path("x.json")).unwrap();
+    assert!(out("apply --calibration cal.json a.csv --out -").starts_with("time_s,estimate_mm"));
+    assert!(out("diagnose bench --no-next --report -").starts_with("<!DOCTYPE html>"));
+    assert!(out("diagnose bench --no-next --fix -").contains("gauge_hysteresis"));
+    assert!(out("export --calibration cal.json --c -").contains("stretch_step("));
+    let trial = out("simulate --protocol pulses --out -");
+    assert!(trial == fs::read_to_string(scratch.path("plain/pulses_1.csv")).unwrap());
+    fails(&mut with("simulate --protocol paper --out -"), &["17 trials", "--commands"]);
+    for line in [
+        "export --calibration cal.json --c - --arduino",
+        "diagnose bench --no-next --snippets -",
+        "demo --out -",
+        "blind make --cases 1 --out -",
+        "man --out -",
+    ] {
+        fails(&mut with(line), &["name"]);
+    }
+    assert_eq!(scratch.names(), before, "nothing is called -, and nothing else is left");
+}
+
+#[test]
+fn quiet_says_results_and_errors_and_verbose_says_how() {
+    let scratch = Scratch::new();
+    let trial = scratch.loops("a.csv", 20.0, 1.1);
+    let said = |flag: Option<&str>| {
+        let mut command = calibrate(&trial, &scratch.path("cal.json"));
+        let output = command.args(flag).output().unwrap();
+        assert!(output.status.success());
+        (stdout(&output), String::from_utf8(output.stderr).unwrap())
+    };
+    let ((usual, aside), (quiet, nothing), (_, verbose)) =
+        (said(None), said(Some("--quiet")), said(Some("-v")));
+    assert!(usual.contains("\nwrote ") && aside.is_empty(), "{usual}{aside}");
+    assert!(
+        quiet.contains("R^2") && !quiet.contains("wrote") && !quiet.contains("note:"),
+        "{quiet}"
+    );
+    assert_eq!(nothing, "");
+    for part in [" s] read a.csv: 2000 samples", " s] fitted poly13 to length_mm", " s] the end"] {
+        assert!(verbose.contains(part), "{part}: {verbose}");
+    }
+    let mut command = stretch();
+    fails(command.args(["-q", "evaluate", "--calibration", "none.json", "a.csv"]), &["none.json"]);
+    let both = stretch().args(["-q", "-v", "rig"]).output().unwrap();
+    assert_eq!(both.status.code(), Some(2));
+}
+
+/// What a command says beside what `COLUMNS` says.
+fn at_width(scratch: &Scratch, line: &str, columns: Option<usize>) -> String {
+    let mut command = stretch();
+    command.current_dir(scratch.path("")).args(line.split(' ')).env_remove("COLUMNS");
+    columns.into_iter().for_each(|columns| {
+        command.env("COLUMNS", columns.to_string());
+    });
+    let output = command.output().unwrap();
+    stdout(&output) + &String::from_utf8(output.stderr).unwrap()
+}
+
+#[test]
+fn no_line_is_wider_than_the_terminal_or_a_hundred_columns() {
+    let scratch = benches();
+    scratch.loops("a.csv", 20.0, 1.1);
+    runs(&mut calibrate(&scratch.path("a.csv"), &scratch.path("cal.json")));
+    let lines = [
+        "calibrate a.csv --model auto --out x.json",
+        "evaluate --calibration cal.json a.csv",
+        "diagnose bench --no-next --baselines",
+        "diagnose plain --no-next",
+        "effects",
+        "demo --data nowhere --out nothing",
+    ];
+    let mut helps: Vec<String> = vec!["--help".to_owned()];
+    let listed = runs(stretch().arg("help"));
+    let commands = listed.lines().skip_while(|line| *line != "Commands:").skip(1);
+    let names =
+        commands.take_while(|line| !line.is_empty()).filter(|line| !line.starts_with("   "));
+    helps.extend(names.map(|line| format!("{} --help", line.split_whitespace().next().unwrap())));
+    assert!(helps.len() > 16, "{helps:?}");
+    for line in lines.iter().copied().chain(helps.iter().map(String::as_str)) {
+        let told = at_width(&scratch, line, None);
+        let widest = told.lines().map(|line| line.chars().count()).max().unwrap_or(0);
+        assert!((20..=100).contains(&widest), "{line}: {widest}:\n{told}");
+    }
+    for line in &lines[..5] {
+        let narrow = at_width(&scratch, line, Some(60));
+        for row in narrow.lines().filter(|row| row.chars().count() > 60) {
+            assert!(
+                !row.trim().contains(' '),
+                "{line}: a word that cannot break stands alone: {row}"
+            );
+        }
+        // narrower, not less
+        let words = |text: &str| -> std::collections::BTreeSet<String> {
+            let own =
+                text.split_whitespace().filter(|word| word.chars().any(char::is_alphanumeric));
+            own.map(str::to_owned).collect()
+        };
+        let wide = words(&at_width(&scratch, line, Some(100)));
+        let lost: Vec<_> = wide.difference(&words(&narrow)).cloned().collect();
+        assert!(lost.is_empty(), "{line}: {lost:?}");
+    }
+}
+
+#[test]
+fn colours_follow_the_terminal_and_no_color() {
+    let scratch = benches();
+    let said = |set: &[(&str, &str)]| {
+        let mut command = stretch();
+        command.arg("diagnose").arg(scratch.path("plain")).arg("--no-next");
+        for name in ["NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE", "CI"] {
+            command.env_remove(name);
+        }
+        runs(command.envs(set.iter().copied()))
+    };
+    assert!(!said(&[]).contains('\u{1b}'), "there is no terminal");
+    let coloured = said(&[("CLICOLOR_FORCE", "1")]);
+    assert!(coloured.starts_with("\u{1b}[1m") && coloured.contains("\u{1b}[0m"), "{coloured}");
+    assert!(!said(&[("NO_COLOR", "1")]).contains('\u{1b}'));
+}
+
+#[test]
+fn shells_complete_and_man_has_pages() {
+    let scratch = Scratch::new();
+    for (shell, part) in
+        [("bash", "_stretch()"), ("zsh", "#compdef stretch"), ("fish", "complete -c stretch")]
+    {
+        let text = runs(stretch().args(["completions", shell]));
+        assert!(text.contains(part) && text.contains("fail-on"), "{shell}");
+    }
+    let folder = scratch.path("man1");
+    fs::create_dir(&folder).unwrap();
+    fs::write(folder.join("mine.1"), "mine").unwrap();
+    runs(stretch().args(["man", "--out"]).arg(&folder));
+    let page = |name: &str| fs::read_to_string(folder.join(name)).unwrap();
+    assert!(page("stretch.1").contains("stretch\\-diagnose(1)") && page("mine.1") == "mine");
+    assert!(page("stretch-diagnose.1").contains("fail\\-on"));
+    assert!(page("stretch-record-check.1").contains("json\\-out"));
+}

@@ -1,26 +1,44 @@
 #!/usr/bin/env bash
-# The gate of the reports' script, the same on a desk and in CI: its types, its size, and reports touched in a browser at
-# the width of a phone and of a desk, in light and dark. It says SKIPPED and why where there is no node, npm or Chromium.
+# The gate of the reports' script and of the page, the same on a desk and in CI: types, sizes, reports touched in a browser and the
+# page used there, at the width of a phone and of a desk, in light and dark. It says SKIPPED and why where there is no node, npm,
+# Chromium or WASM target.
 # CHROMIUM names another browser, STRETCH another program than a fresh build, SHOTS a folder for pictures of the pages.
 set -euo pipefail
 cd "$(dirname "$0")"
 
-skip() { printf 'SKIPPED: the reports in a browser: %s\n' "$1"; exit 0; }
+skip() { printf 'SKIPPED: %s: %s\n' "${part:-the reports in a browser}" "$1"; }
+has_wasm() { [ -d "$(rustc --print sysroot)/lib/rustlib/wasm32-unknown-unknown" ]; }
 
 size=$(wc -c <report/report.js)
 [ "$size" -lt 60000 ] || { echo "the script has $size bytes, more than 60000"; exit 1; }
 echo "$size bytes: the script"
 
-command -v node >/dev/null 2>&1 || skip "there is no node"
-command -v npm >/dev/null 2>&1 || skip "there is no npm"
+cargo fmt --check
+if has_wasm; then
+    cargo clippy --quiet --locked --release --target wasm32-unknown-unknown -p stretch-page -- -D warnings
+    cargo clippy --quiet --locked -p stretch-pack -- -D warnings
+    ./build.sh
+    size=$(gzip -9 -c target/page/index.html | wc -c)
+    [ "$size" -lt 3000000 ] || { echo "the page has $size bytes compressed, more than 3000000"; exit 1; }
+else
+    part="the page" skip "there is no standard library of wasm32-unknown-unknown: rustup target add wasm32-unknown-unknown"
+fi
+
+command -v node >/dev/null 2>&1 || { skip "there is no node"; exit 0; }
+command -v npm >/dev/null 2>&1 || { skip "there is no npm"; exit 0; }
 fresh=$(mktemp -d)
 trap 'rm -rf "$fresh"' EXIT
 cp package.json tests/*.mjs "$fresh"
-(cd "$fresh" && npm install --silent --no-audit --no-fund >/dev/null 2>&1) || skip "npm cannot install playwright-core and typescript"
-"$fresh/node_modules/.bin/tsc" --noEmit --allowJs --checkJs --strict --target es2022 --lib es2022,dom,dom.iterable report/report.js
+(cd "$fresh" && npm install --silent --no-audit --no-fund >/dev/null 2>&1) \
+    || { skip "npm cannot install playwright-core and typescript"; exit 0; }
+typed() {
+    "$fresh/node_modules/.bin/tsc" --noEmit --allowJs --checkJs --strict --target es2022 --lib es2022,dom,dom.iterable "$@"
+}
+typed report/report.js
+typed site/types.d.ts site/*.js
 
 export CHROMIUM=${CHROMIUM:-/usr/bin/chromium}
-[ -x "$CHROMIUM" ] || skip "there is no $CHROMIUM"
+[ -x "$CHROMIUM" ] || { skip "there is no $CHROMIUM"; exit 0; }
 
 if [ -n "${STRETCH:-}" ]; then
     stretch() { "$STRETCH" "$@"; }
@@ -30,10 +48,28 @@ else
 fi
 bench=$fresh/bench
 stretch simulate --protocol paper --preset paper --out "$bench" >/dev/null
-trials=("$bench"/inflation_50.csv "$bench"/deflation_50.csv "$bench"/arbitrary_1.csv)
+# a name that would run, were it not written as text
+named="$fresh/<img src=x onerror=window.injected=1>.csv"
+cp "$bench"/arbitrary_1.csv "$named"
+trials=("$bench"/inflation_50.csv "$bench"/deflation_50.csv "$named")
 stretch calibrate "${trials[@]}" --model poly13 --out "$fresh/surface.json" --report "$fresh/surface.html" >/dev/null
 stretch calibrate "${trials[@]}" --model observer --out "$fresh/memory.json" --report "$fresh/memory.html" >/dev/null
-stretch diagnose "$bench" --report "$fresh/diagnosis.html" >/dev/null
-reports=("$fresh"/surface.html "$fresh"/memory.html "$fresh"/diagnosis.html)
+stretch diagnose "$bench" --report "$fresh/diagnosis.html" --json-out "$fresh/diagnosis.json" >/dev/null
+stretch demo --out "$fresh/demo" >/dev/null
+stretch demo --paper --out "$fresh/paper" >/dev/null
+stretch blind make --cases 4 --seed 3 --out "$fresh/blind" >/dev/null
+stretch blind run "$fresh/blind" >/dev/null
+stretch blind score --no-oracle "$fresh/blind" >/dev/null
+reports=("$fresh"/{surface,memory,diagnosis}.html "$fresh"/demo/report.html "$fresh"/paper/paper.html "$fresh"/blind/blind.html)
 ls -l "${reports[@]}" | awk '{ n = split($9, part, "/"); print $5 " bytes: " part[n] }'
 node "$fresh/report.mjs" ${SHOTS:+--shots "$SHOTS"} "${reports[@]}"
+
+has_wasm || exit 0
+# what the page saves is held against what the program writes
+stretch calibrate "$bench" --model poly13 --out "$fresh/poly13.json" >/dev/null
+stretch calibrate "$bench" --model observer --out "$fresh/observer.json" >/dev/null
+stretch export --calibration "$fresh/observer.json" --c "$fresh/header" >/dev/null
+node "$fresh/frames.mjs" >"$fresh/linked.txt"
+stretch listen --port - --calibration "$fresh/poly13.json" --out "$fresh/linked.csv" \
+    <"$fresh/linked.txt" >/dev/null 2>"$fresh/linked.told"
+node "$fresh/page.mjs" ${SHOTS:+--shots "$SHOTS"} target/page/index.html "$bench" "$fresh" ../firmware/golden.txt

@@ -1,0 +1,120 @@
+//! Puts the page into one file: HTML, style, scripts, and the WASM in it, packed.
+//!
+//! `stretch-pack PAGE.wasm SOURCES OUT` writes `OUT/index.html` from `SOURCES/index.html`, whose lines `<!-- style FILE -->`,
+//! `<!-- script FILE ... -->`, `<!-- worker FILE ... -->`, `<!-- wasm -->` and `POLICY` it replaces. What a browser may do with the
+//! page is named by digests: those of its scripts, and that of the reports' script, for a report opens inside.
+
+use std::{env, error::Error, fs, io::Write, path::Path};
+
+use flate2::{Compression, write::GzEncoder};
+use wasm_bindgen_cli_support::Bindgen;
+
+// one way to write policies, that of the reports
+#[path = "../../../crates/stretch-report/src/script.rs"]
+#[allow(dead_code)]
+mod script;
+
+type Outcome<T> = Result<T, Box<dyn Error>>;
+
+fn main() -> Outcome<()> {
+    let arguments: Vec<String> = env::args().skip(1).collect();
+    let [wasm, sources, out] = arguments.as_slice() else {
+        return Err("stretch-pack PAGE.wasm SOURCES OUT".into());
+    };
+    let (sources, out) = (Path::new(sources), Path::new(out));
+    fs::create_dir_all(out)?;
+    let glue = Glue::of(Path::new(wasm), out)?;
+    let template = fs::read_to_string(sources.join("index.html"))?;
+    let (mut html, mut digests) = (String::new(), vec![report_digest()?]);
+    for line in template.lines() {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        match words.as_slice() {
+            ["<!--", "style", files @ .., "-->"] => {
+                html += &format!("<style>\n{}</style>\n", joined(sources, files)?);
+            }
+            ["<!--", "script", files @ .., "-->"] => {
+                let text = joined(sources, files)?;
+                digests.push(script::digest(&text));
+                html += &format!("<script>{text}</script>\n");
+            }
+            ["<!--", "worker", files @ .., "-->"] => {
+                let text = glue.js.clone() + &joined(sources, files)?;
+                html += &format!("<script type=\"text/plain\" id=\"worker\">{text}</script>\n");
+            }
+            ["<!--", "wasm", "-->"] => {
+                let packed = script::base64(&gzip(&glue.wasm)?);
+                html +=
+                    &format!("<script type=\"application/gzip\" id=\"wasm\">{packed}</script>\n");
+            }
+            _ => html += &format!("{line}\n"),
+        }
+    }
+    let html = html.replace("POLICY", &policy(&digests));
+    fs::write(out.join("index.html"), &html)?;
+    println!(
+        "{} bytes: index.html; {} compressed; {} of WASM in it",
+        html.len(),
+        gzip(html.as_bytes())?.len(),
+        glue.wasm.len()
+    );
+    Ok(())
+}
+
+/// What a browser may do: the scripts with these digests, WASM, workers made of the page's own text, and nothing else; no request.
+fn policy(digests: &[String]) -> String {
+    format!(
+        "default-src 'none'; script-src {} 'wasm-unsafe-eval'; style-src 'unsafe-inline'; worker-src blob:; frame-src blob:; \
+         base-uri 'none'; form-action 'none'",
+        digests.join(" ")
+    )
+}
+
+/// The digest that reports name in their own policy.
+fn report_digest() -> Outcome<String> {
+    let policy = script::policy();
+    let found = policy.split([' ', ';']).find(|word| word.starts_with("'sha256-"));
+    Ok(found.ok_or("the reports' policy names no digest")?.to_owned())
+}
+
+/// The module, and what wasm-bindgen puts beside it.
+struct Glue {
+    js: String,
+    wasm: Vec<u8>,
+}
+
+impl Glue {
+    fn of(wasm: &Path, out: &Path) -> Outcome<Self> {
+        let folder = out.join("glue");
+        let mut bindgen = Bindgen::new();
+        bindgen.input_path(wasm).no_modules(true)?.typescript(false).out_name("page");
+        bindgen.remove_name_section(true).remove_producers_section(true);
+        bindgen.generate(&folder)?;
+        let js = fs::read_to_string(folder.join("page.js"))?;
+        let wasm = fs::read(folder.join("page_bg.wasm"))?;
+        fs::remove_dir_all(folder)?;
+        Ok(Self { js: checked(js)?, wasm })
+    }
+}
+
+/// Files one behind the other.
+fn joined(sources: &Path, files: &[&str]) -> Outcome<String> {
+    let mut text = String::new();
+    for file in files {
+        text += &fs::read_to_string(sources.join(file)).map_err(|e| format!("{file}: {e}"))?;
+    }
+    checked(text)
+}
+
+/// A text that can stand in an element.
+fn checked(text: String) -> Outcome<String> {
+    match text.contains("</script") || text.contains("<!--") {
+        true => Err("a script holds what ends an element".into()),
+        false => Ok(text),
+    }
+}
+
+fn gzip(bytes: &[u8]) -> Outcome<Vec<u8>> {
+    let mut out = GzEncoder::new(Vec::new(), Compression::best());
+    out.write_all(bytes)?;
+    Ok(out.finish()?)
+}

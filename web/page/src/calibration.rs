@@ -1,0 +1,209 @@
+//! A calibration, step by step as `stretch calibrate` makes it.
+
+use serde::{Deserialize, Serialize};
+use stretch_bench::Causes;
+use stretch_calibrate::{
+    Calibrated, Cause, Evaluation, Judged, ModelChoice, ModelKind, ModelRow, Options, calibrate,
+    calibration_to_json, candidate_models, choose_among, evaluate, explains_little,
+    explains_nothing, judge_model, parse_adc, without_wild,
+};
+use stretch_data::{Split, Trial};
+use stretch_export::header;
+use stretch_report::{Context, calibration_page};
+
+use crate::{
+    files::Files,
+    progress,
+    said::{Said, to_json},
+};
+
+/// What a user chose, and what earlier steps found out.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct Choices {
+    pub(crate) reference: String,
+    pub(crate) signal: String,
+    /// A model's name, or `auto`.
+    model: String,
+    causes: Vec<Cause>,
+    cause_notes: Vec<String>,
+    judged: Vec<(String, Result<Judged, String>)>,
+}
+
+impl Choices {
+    fn options(&self) -> Result<Options, Said> {
+        let base = Options::default();
+        let model = match self.model.as_str() {
+            "" | "auto" => base.model,
+            name => name.parse()?,
+        };
+        Ok(Options {
+            reference: self.reference.clone(),
+            signal: self.signal.clone(),
+            causes: self.causes.clone(),
+            model,
+            ..base
+        })
+    }
+
+    /// Trials to fit, without what no motion can have made, and what was left out.
+    fn trials(&self, files: &Files) -> Result<(Vec<Trial>, Vec<String>), Said> {
+        let trials = files.trials(Split::Fit)?;
+        if trials.is_empty() {
+            return Err(Said("there is no recording to fit: drop one".to_owned()));
+        }
+        Ok(without_wild(&trials, &[&self.reference, &self.signal]))
+    }
+}
+
+/// What models that build on a diagnosis build on.
+#[derive(Debug, Serialize)]
+pub(crate) struct Built {
+    causes: Vec<Cause>,
+    cause_notes: Vec<String>,
+}
+
+pub(crate) fn causes(files: &Files, choices: &Choices) -> Result<Built, Said> {
+    let (options, (trials, _)) = (choices.options()?, choices.trials(files)?);
+    let Causes { found, notes } =
+        Causes::of(&trials, &options, &progress, &|| false).felt(&trials, &options);
+    Ok(Built { causes: found, cause_notes: notes })
+}
+
+pub(crate) fn models(choices: &Choices) -> Result<Vec<String>, Said> {
+    Ok(candidate_models(&choices.options()?).iter().map(ModelKind::to_string).collect())
+}
+
+pub(crate) fn judge(
+    files: &Files,
+    choices: &Choices,
+    model: &str,
+) -> Result<Result<Judged, String>, Said> {
+    let (options, (trials, _)) = (choices.options()?, choices.trials(files)?);
+    Ok(judge_model(&trials, &options, model.parse()?).map_err(|error| Said::from(error).0))
+}
+
+/// A calibration and what it rests on.
+#[derive(Debug)]
+pub(crate) struct Made {
+    options: Options,
+    choice: Option<ModelChoice>,
+    calibrated: Calibrated,
+    trials: Vec<Trial>,
+    judged: Option<(Calibrated, Judgement)>,
+}
+
+/// Errors, and whether they are those of trials that were not fitted.
+#[derive(Debug, Serialize)]
+pub(crate) struct Judgement {
+    evaluation: Evaluation,
+    held_out: bool,
+}
+
+#[derive(Serialize)]
+struct Told<'a> {
+    model: String,
+    unit: &'a str,
+    models: &'a [ModelRow],
+    notes: &'a [String],
+}
+
+impl Made {
+    pub(crate) fn of(files: &Files, choices: &Choices) -> Result<Self, Said> {
+        let mut options = choices.options()?;
+        let (trials, mut notes) = choices.trials(files)?;
+        let choice = match choices.model.as_str() {
+            "auto" => Some(chosen(&trials, &options, &choices.judged)?),
+            _ => None,
+        };
+        if let Some(choice) = &choice {
+            options.model = choice.model;
+        }
+        let mut calibrated = calibrate(&trials, &options)?;
+        notes.append(&mut calibrated.notes);
+        if let Some(why) = explains_nothing(&calibrated.fits) {
+            return Err(Said(why));
+        }
+        notes.extend(explains_little(&calibrated.fits));
+        notes.extend(choices.cause_notes.iter().cloned());
+        notes.extend(choice.iter().flat_map(|choice| choice.notes.clone()));
+        calibrated.notes = notes;
+        Ok(Self { options, choice, calibrated, trials, judged: None })
+    }
+
+    pub(crate) fn told(&self) -> Result<String, Said> {
+        to_json(&Told {
+            model: self.options.model.to_string(),
+            unit: self.calibrated.calibration.reference.unit(),
+            models: self.choice.as_ref().map_or(&[], |choice| &choice.rows),
+            notes: &self.calibrated.notes,
+        })
+    }
+
+    pub(crate) fn record(&self) -> Result<String, Said> {
+        Ok(calibration_to_json(&self.calibrated.calibration)?)
+    }
+
+    pub(crate) fn header(&self, adc: &str) -> Result<String, Said> {
+        let options = stretch_export::Options { form: None, adc: parse_adc(adc)? };
+        Ok(header(&self.calibrated.calibration, &options)?.text)
+    }
+
+    /// Errors on what was fitted, where no trial is for testing, beside a line: the yardstick of every surface.
+    pub(crate) fn judged(&mut self, files: &Files) -> Result<&Judgement, Said> {
+        if self.judged.is_none() {
+            let options = Options { model: ModelKind::Linear, ..self.options.clone() };
+            let linear = calibrate(&self.trials, &options)?;
+            let test = files.trials(Split::Test)?;
+            let name = self.options.model.to_string();
+            let mut shown = vec![("linear", &linear.calibration)];
+            if self.options.model != ModelKind::Linear {
+                shown.push((&name, &self.calibrated.calibration));
+            }
+            let held_out = !test.is_empty();
+            let evaluation = evaluate(&shown, if held_out { &test } else { &self.trials })?;
+            self.judged = Some((linear, Judgement { evaluation, held_out }));
+        }
+        match &self.judged {
+            Some((_, judgement)) => Ok(judgement),
+            None => Err(Said(String::new())),
+        }
+    }
+
+    pub(crate) fn report(&mut self, files: &Files) -> Result<String, Said> {
+        self.judged(files)?;
+        let Some((linear, Judgement { evaluation, .. })) = &self.judged else {
+            return Ok(String::new());
+        };
+        let name = self.options.model.to_string();
+        let mut shown = vec![("linear", linear)];
+        if self.options.model != ModelKind::Linear {
+            shown.push((name.as_str(), &self.calibrated));
+        }
+        let names = |trials: &[Trial]| trials.iter().map(|trial| trial.name.clone()).collect();
+        let context = Context {
+            title: format!("Calibration of {} on {}", self.options.reference, self.options.signal),
+            calibrated_on: names(&self.trials),
+            tested_on: names(&files.trials(Split::Test)?),
+            notes: self.calibrated.notes.clone(),
+            ..Context::default()
+        };
+        let judged = stretch_report::Judged { calibrated: &shown, evaluation, context: &context };
+        Ok(calibration_page(&judged))
+    }
+}
+
+/// The choice among models that workers judged.
+fn chosen(
+    trials: &[Trial],
+    options: &Options,
+    judged: &[(String, Result<Judged, String>)],
+) -> Result<ModelChoice, Said> {
+    let first = judged.iter().find_map(|(_, judged)| judged.as_ref().err().cloned());
+    let kind = |(name, judged): &(String, Result<Judged, String>)| {
+        Ok::<_, Said>((name.parse::<ModelKind>()?, judged.clone()))
+    };
+    let judged = judged.iter().map(kind).collect::<Result<Vec<_>, _>>()?;
+    let none = || first.unwrap_or_else(|| "no model could be judged".to_owned());
+    choose_among(trials, options, judged).ok_or_else(|| Said(none()))
+}

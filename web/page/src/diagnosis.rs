@@ -1,0 +1,123 @@
+//! A diagnosis as `stretch diagnose` makes it.
+
+use serde::{Deserialize, Serialize};
+use stretch_bench::{
+    Bench, Examined, Fix, GaugeSetup, GaugeSimulator, NoFix, RigSetup, RigSimulator, Session,
+};
+use stretch_gap::Options;
+use stretch_report::{Subject, diagnosis_page};
+use stretch_sim::{Catalogue, GaugeRig, Rig};
+use wasm_bindgen::prelude::*;
+
+use crate::{files::Files, progress, said::Said};
+
+#[wasm_bindgen]
+extern "C" {
+    /// Milliseconds of the browser's clock.
+    #[wasm_bindgen(js_namespace = performance)]
+    fn now() -> f64;
+}
+
+/// What is asked.
+#[derive(Debug, Deserialize)]
+pub(crate) struct Asked {
+    reference: String,
+    signal: String,
+    /// Whether the gauge is diagnosed alone.
+    alone: bool,
+    #[serde(default = "first")]
+    seed: u64,
+}
+
+fn first() -> u64 {
+    1
+}
+
+/// What was found.
+#[derive(Debug)]
+pub(crate) struct Found {
+    name: String,
+    seed: u64,
+    bench: Bench,
+    examined: Examined,
+}
+
+/// The first ten seconds of it.
+#[derive(Serialize)]
+pub(crate) struct Told<'a> {
+    sentence: &'a str,
+    notes: &'a [String],
+    seconds: f64,
+    /// Candidates with what they close of the gap.
+    candidates: Vec<(String, f64, f64)>,
+    /// Why no rig file can be written.
+    no_rig: Option<String>,
+}
+
+impl Found {
+    pub(crate) fn of(files: &Files, asked: &Asked) -> Result<Self, Said> {
+        let bench = bench(files, asked)?;
+        let options = Options { seed: asked.seed, responses: true, ..Options::default() };
+        let begun_ms = now();
+        let mut examined = bench.examine(&options, true, &progress, &|| false)?;
+        examined.diagnosis.runtime_s = 1e-3 * (now() - begun_ms);
+        Ok(Self { name: files.name(), seed: asked.seed, bench, examined })
+    }
+
+    pub(crate) fn told(&self) -> Told<'_> {
+        let one = |c: &stretch_gap::Candidate| (c.effects.join(" and "), c.probability, c.closed);
+        Told {
+            sentence: &self.examined.diagnosis.sentence,
+            notes: &self.examined.diagnosis.notes,
+            seconds: self.examined.diagnosis.runtime_s,
+            candidates: self.examined.diagnosis.candidates.iter().map(one).collect(),
+            no_rig: self.fix().err().map(|why| why.to_string()),
+        }
+    }
+
+    pub(crate) fn report(&self) -> String {
+        let Examined { diagnosis, evidence, implementations, .. } = &self.examined;
+        let simulator = self.bench.simulator();
+        let name = &self.name;
+        diagnosis_page(&Subject { name, diagnosis, evidence, implementations, simulator })
+    }
+
+    /// The diagnosis as `stretch calibrate --from` reads it.
+    pub(crate) fn json(&self) -> Result<String, Said> {
+        let mut value = serde_json::to_value(&self.examined.diagnosis)?;
+        value["data_set"] = self.name.clone().into();
+        value["seed"] = self.seed.into();
+        value["version"] = env!("CARGO_PKG_VERSION").into();
+        Ok(serde_json::to_string_pretty(&value)? + "\n")
+    }
+
+    pub(crate) fn fixed_rig(&self) -> Result<String, Said> {
+        Ok(self.fix()?.text())
+    }
+
+    fn fix(&self) -> Result<Fix, NoFix> {
+        self.bench.fixed(&self.examined)
+    }
+}
+
+/// What was dropped, as something to diagnose.
+fn bench(files: &Files, asked: &Asked) -> Result<Bench, Said> {
+    let (session, catalogue) = (files.session()?, Catalogue::default());
+    let file = files.rig()?;
+    if !asked.alone {
+        let rig = file.map(Rig::from_file).transpose()?.unwrap_or_default();
+        let session = Session::new(&session)?;
+        let setup = RigSetup { session, rig, catalogue: &catalogue };
+        return Ok(RigSimulator::new(setup)?.into());
+    }
+    let rig = file.filter(|file| file.kind.as_deref() == Some("gauge"));
+    let rig = rig.map(GaugeRig::from_file).transpose()?;
+    Ok(GaugeSimulator::new(&GaugeSetup {
+        trials: &session,
+        reference: &asked.reference,
+        signal: &asked.signal,
+        rig: rig.as_ref(),
+        catalogue: &catalogue,
+    })?
+    .into())
+}

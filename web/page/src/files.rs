@@ -1,0 +1,196 @@
+//! Files that were dropped: recordings, and what says of them how they belong together.
+
+use serde::{Deserialize, Serialize};
+use stretch_calibrate::calibration_from_json;
+use stretch_data::{
+    DataSet, ReadOptions, Recording, RigFile, SessionTrial, Split, TimeUnit, Trial, unit,
+};
+
+use crate::{Read, said::Said};
+
+/// How recordings are read that do not say all of themselves; empty texts ask for nothing.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct Asked {
+    time: String,
+    time_unit: String,
+    columns: String,
+    sample_rate_hz: Option<f64>,
+    /// Columns that must be there, and hold numbers throughout.
+    require: Vec<String>,
+}
+
+impl Asked {
+    fn options(&self) -> ReadOptions {
+        let mut options = self.require.iter().fold(ReadOptions::new(), |o, name| o.require(name));
+        if !self.time.is_empty() {
+            options = options.time(&self.time);
+        }
+        options = match self.time_unit.as_str() {
+            "s" => options.time_unit(TimeUnit::Seconds),
+            "ms" => options.time_unit(TimeUnit::Milliseconds),
+            "us" => options.time_unit(TimeUnit::Microseconds),
+            "ns" => options.time_unit(TimeUnit::Nanoseconds),
+            _ => options,
+        };
+        if !self.columns.is_empty() {
+            options = options.columns(self.columns.split(',').map(str::trim));
+        }
+        match self.sample_rate_hz {
+            Some(hz) => options.sample_rate_hz(hz),
+            None => options,
+        }
+    }
+}
+
+/// What there is to say of a recording.
+#[derive(Debug, Serialize)]
+pub(crate) struct About {
+    name: String,
+    rows: usize,
+    seconds: f64,
+    rate_hz: Option<f64>,
+    columns: Vec<Column>,
+    notes: Vec<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct Column {
+    name: String,
+    unit: String,
+    least: f64,
+    greatest: f64,
+}
+
+impl About {
+    fn of(name: &str, Recording { trial, notes }: &Recording) -> Self {
+        let column = |channel: &stretch_data::Channel| Column {
+            name: channel.name.clone(),
+            unit: unit(&channel.name).unwrap_or_default().to_owned(),
+            least: channel.values.iter().copied().fold(f64::INFINITY, f64::min),
+            greatest: channel.values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        };
+        Self {
+            name: name.to_owned(),
+            rows: trial.len(),
+            seconds: trial.duration_s(),
+            rate_hz: trial.rate_hz(),
+            columns: trial.channels.iter().map(column).collect(),
+            notes: notes.clone(),
+        }
+    }
+}
+
+/// All that was read so far.
+#[derive(Debug, Default)]
+pub(crate) struct Files {
+    set: Option<DataSet>,
+    rigs: Vec<(String, RigFile)>,
+    recordings: Vec<(String, Recording)>,
+}
+
+impl Files {
+    /// Reads a file; one of the same name is replaced.
+    pub(crate) fn take(&mut self, name: &str, bytes: &[u8], asked: &Asked) -> Result<Read, Said> {
+        if name.ends_with(".toml") {
+            return self.take_toml(name, bytes);
+        }
+        if name.ends_with(".json") {
+            let record = calibration_from_json(text(name, bytes)?, name)?;
+            return Ok(Read::Record {
+                name: name.to_owned(),
+                signal: record.signal.as_str().to_owned(),
+                reference: record.reference.as_str().to_owned(),
+                rate_hz: record.sample_rate_hz.hz(),
+            });
+        }
+        let entry = self.set.iter().flat_map(|set| &set.trials).find(|entry| entry.file == name);
+        let recording = match entry {
+            Some(entry) => entry.recording_of(bytes, &asked.options())?,
+            None => Recording::from_reader(bytes, name, &asked.options())?,
+        };
+        let about = About::of(name, &recording);
+        self.recordings.retain(|(other, _)| other != name);
+        self.recordings.push((name.to_owned(), recording));
+        Ok(Read::Recording(about))
+    }
+
+    fn take_toml(&mut self, name: &str, bytes: &[u8]) -> Result<Read, Said> {
+        let text = text(name, bytes)?;
+        if name == "problem.toml" {
+            return Err(Said(format!(
+                "{name}: a simulator of your own runs outside of a browser: stretch diagnose {name}"
+            )));
+        }
+        if name == "dataset.toml" {
+            let set = DataSet::parse(name, text)?;
+            let trials = set.trials.len();
+            self.set = Some(set);
+            return Ok(Read::DataSet { name: name.to_owned(), trials });
+        }
+        let rig = RigFile::parse(name, text)?;
+        let gauge = rig.kind.as_deref() == Some("gauge");
+        self.rigs.retain(|(other, _)| other != name);
+        self.rigs.push((name.to_owned(), rig));
+        Ok(Read::Rig { name: name.to_owned(), gauge })
+    }
+
+    /// What the data are called.
+    pub(crate) fn name(&self) -> String {
+        match (&self.set, self.recordings.as_slice()) {
+            (Some(set), _) => set.name.clone(),
+            (None, [(name, _)]) => name.clone(),
+            (None, [(first, _), others @ ..]) => format!("{first} and {} more", others.len()),
+            (None, []) => String::new(),
+        }
+    }
+
+    /// The rig file that the data set names.
+    pub(crate) fn rig(&self) -> Result<Option<&RigFile>, Said> {
+        let Some(name) = self.set.as_ref().and_then(|set| set.rig.as_ref()) else {
+            return Ok(None);
+        };
+        let found = self.rigs.iter().find(|(own, _)| own == name).map(|(_, rig)| rig);
+        match found {
+            Some(rig) => Ok(Some(rig)),
+            None => Err(missing(name)),
+        }
+    }
+
+    /// Every trial: those that `dataset.toml` lists, else all that were dropped.
+    pub(crate) fn session(&self) -> Result<Vec<SessionTrial>, Said> {
+        let all = || self.recordings.iter();
+        match &self.set {
+            None => Ok(all().map(|(_, recording)| recording.clone().into()).collect()),
+            Some(set) => set.session(|entry| {
+                let found = all().find(|(name, _)| *name == entry.file);
+                found.map(|(_, one)| one.clone()).ok_or_else(|| missing(&entry.file))
+            }),
+        }
+    }
+
+    /// Trials that may be fitted, or those that are only tested on.
+    pub(crate) fn trials(&self, split: Split) -> Result<Vec<Trial>, Said> {
+        let session = self.session()?.into_iter();
+        Ok(session.filter(|one| one.split == split).map(|one| one.trial).collect())
+    }
+
+    /// At most `most` rows of a recording, evenly taken: time and two columns, flat.
+    pub(crate) fn points(&self, name: &str, columns: [&str; 2], most: usize) -> Vec<f64> {
+        let found = self.recordings.iter().find(|(own, _)| own == name);
+        let Some(trial) = found.map(|(_, recording)| &recording.trial) else { return Vec::new() };
+        let [a, b] = columns.map(|column| trial.channel(column).unwrap_or(&[]));
+        let at = |column: &[f64], i: usize| column.get(i).copied().unwrap_or(f64::NAN);
+        let step = trial.len().div_ceil(most.max(1)).max(1);
+        let rows = (0..trial.len()).step_by(step);
+        rows.flat_map(|i| [trial.time_s[i], at(a, i), at(b, i)]).collect()
+    }
+}
+
+fn missing(file: &str) -> Said {
+    Said(format!("dataset.toml names {file}, and it was not dropped: drop it, too"))
+}
+
+fn text<'a>(name: &str, bytes: &'a [u8]) -> Result<&'a str, Said> {
+    std::str::from_utf8(bytes).map_err(|_| Said(format!("{name}: it is not UTF-8 text")))
+}

@@ -1,0 +1,136 @@
+//! The same bits here as on a desk and on boards: every receptor of `firmware/` replays the trial that boards replay.
+
+use std::fmt::Write;
+
+use serde::Deserialize;
+use stretch_core::{Calibration, Hertz, RateEstimator, Stage, Volts, record};
+use stretch_filter::{Differentiator, IntegerSgRate, LowPassSpec, RateFilter, SgRate};
+use stretch_receptor::{
+    BlendedReceptor, DiagnosedReceptor, HistoryReceptor, ObserverReceptor, Reading,
+    StretchReceptor, Withheld,
+    code::{AdcCode, CodeCalibration, CodeReading, CodeReceptor, Fixed, FixedObserver},
+};
+
+use crate::said::Said;
+
+#[path = "../../../firmware/src/checksum.rs"]
+#[allow(missing_docs, missing_debug_implementations, unreachable_pub)]
+mod checksum;
+#[path = "../../../firmware/src/trial.rs"]
+#[allow(missing_docs, unreachable_pub)]
+mod trial;
+
+use checksum::{Bits, Checksum};
+
+/// A record of `firmware/data`, its seal checked.
+macro_rules! record {
+    ($name:expr) => {
+        load(include_bytes!(concat!("../../../firmware/data/", $name, ".postcard")))?
+    };
+}
+
+/// What a desk answers, and boards.
+const GOLDEN: &str = include_str!("../../../firmware/golden.txt");
+
+/// How many receptors answer here as there.
+pub(crate) fn sound() -> Result<usize, Said> {
+    let golden = GOLDEN.lines().filter(|line| !line.starts_with('#'));
+    let found = checksums()?;
+    match found.lines().eq(golden) {
+        true => Ok(found.lines().count()),
+        false => Err(Said(
+            "this browser computes other bits than the program: use the program, and tell whoever makes stretch which browser it is"
+                .to_owned(),
+        )),
+    }
+}
+
+/// A line a receptor: `model=NAME checksum=HEX`.
+pub(crate) fn checksums() -> Result<String, Said> {
+    let mut out = String::new();
+    let poly13: Calibration = record!("poly13");
+    let linear: Calibration = record!("linear");
+    let hz = poly13.sample_rate_hz;
+    let sg = SgRate::<f32, 11, 2>::new(hz)?;
+    let low_pass = LowPassSpec { cutoff: Hertz(5.0), sample_rate: hz };
+    let tracker = RateEstimator::Tracker { tracking_index: 0.1 };
+
+    let code: CodeCalibration<Fixed, 11, 2> = record!("poly13-fixed");
+    codes(&mut out, "poly13-fixed", CodeReceptor::new(code));
+    let code: CodeCalibration<Fixed, 11, 2> = record!("linear-fixed");
+    codes(&mut out, "linear-fixed", CodeReceptor::new(code));
+    let code: CodeCalibration<f32, 11, 2> = record!("poly13-f32");
+    codes(&mut out, "poly13-f32", CodeReceptor::new(code));
+    let code: CodeCalibration<f32, 11, 2> = record!("linear-f32");
+    codes(&mut out, "linear-f32", CodeReceptor::new(code));
+
+    let named = |model: &str| format!("poly13-f32-{model}");
+    volts(&mut out, &named("volts"), StretchReceptor::with_rate(&poly13, sg)?);
+    volts(&mut out, "linear-f32-volts", StretchReceptor::with_rate(&linear, sg)?);
+    let rate = IntegerSgRate::<11, 2>::new(hz, 3.3)?;
+    volts(&mut out, &named("volts-integer"), StretchReceptor::with_rate(&poly13, rate)?);
+    let rate = Differentiator::new(low_pass)?;
+    volts(&mut out, &named("differentiator"), StretchReceptor::with_rate(&poly13, rate)?);
+    let rate = RateFilter::<f32>::new(tracker, hz)?;
+    volts(&mut out, &named("tracker"), StretchReceptor::with_rate(&poly13, rate)?);
+    volts(&mut out, "blended", BlendedReceptor::with_rate(&record!("blended"), sg)?);
+
+    let histories: [(&str, Calibration); 8] = [
+        ("hysteresis", record!("hysteresis")),
+        ("relaxation", record!("relaxation")),
+        ("both", record!("both")),
+        ("history", record!("history")),
+        ("hysteresis+rest", record!("hysteresis-rest")),
+        ("relaxation+rest", record!("relaxation-rest")),
+        ("both+rest", record!("both-rest")),
+        ("history+rest", record!("history-rest")),
+    ];
+    for (model, calibration) in histories {
+        volts(&mut out, model, HistoryReceptor::with_rate(&calibration, sg)?);
+    }
+    volts(&mut out, "observer", ObserverReceptor::<f32>::new(&record!("observer"))?);
+    let fixed: FixedObserver = record!("observer-fixed");
+    codes(&mut out, "observer-fixed", fixed);
+    volts(&mut out, "observer+rest", ObserverReceptor::<f32>::new(&record!("observer-rest"))?);
+    let fixed: FixedObserver = record!("observer-rest-fixed");
+    codes(&mut out, "observer+rest-fixed", fixed);
+    volts(&mut out, "diagnosed", DiagnosedReceptor::<f32>::new(&record!("diagnosed"))?);
+    volts(&mut out, "diagnosed+rest", DiagnosedReceptor::<f32>::new(&record!("diagnosed-rest"))?);
+    Ok(out)
+}
+
+fn load<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, Said> {
+    Ok(record::load(bytes)?)
+}
+
+/// From converter codes.
+fn codes<R, E: Bits>(out: &mut String, model: &str, receptor: R)
+where
+    R: Stage<AdcCode, Out = Result<CodeReading<E>, Withheld>>,
+{
+    let (mut memory, mut checksum) = (receptor.memory(), Checksum::default());
+    trial::codes().for_each(|code| checksum.answer(receptor.step(&mut memory, code)));
+    line(out, model, checksum);
+}
+
+/// From volts.
+fn volts<R>(out: &mut String, model: &str, receptor: R)
+where
+    R: Stage<Volts<f32>, Out = Result<Reading<f32>, Withheld>>,
+{
+    let (mut memory, mut checksum) = (receptor.memory(), Checksum::default());
+    for code in trial::codes() {
+        let answer = receptor.step(&mut memory, Volts(trial::volts(code)));
+        checksum.answer(answer.map(|Reading { estimate, branch, domain, .. }| CodeReading {
+            estimate,
+            branch,
+            domain,
+        }));
+    }
+    line(out, model, checksum);
+}
+
+fn line(out: &mut String, model: &str, Checksum(sum): Checksum) {
+    // a string takes every write
+    let _ = writeln!(out, "model={model} checksum={sum:08x}");
+}

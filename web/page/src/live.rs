@@ -1,0 +1,315 @@
+//! A board's live link, or bare numbers a line: shown, recorded, and estimated where there is a record.
+
+use std::fmt::Write;
+
+use stretch_calibrate::{LiveReceptor, calibration_from_json, parse_adc};
+use stretch_core::{Calibration, Runner, Volts};
+use stretch_data::push_number;
+use stretch_link::{Answer, Decoder, Event, Frame};
+use stretch_receptor::{
+    Receptor,
+    code::{Adc, AdcCode},
+};
+use wasm_bindgen::prelude::*;
+
+use crate::said::Said;
+
+/// Longest line of bare numbers.
+const LONGEST: usize = 256;
+
+/// What listens to a port.
+#[wasm_bindgen]
+#[derive(Debug)]
+pub struct Live {
+    source: Source,
+    signal: String,
+    unit: String,
+    /// Lines of the recording that were not fetched yet.
+    lines: String,
+}
+
+#[derive(Debug)]
+enum Source {
+    Frames(Box<Frames>),
+    Numbers(Box<Numbers>),
+}
+
+#[wasm_bindgen]
+impl Live {
+    /// Listens for the frames of a board with a converter of `adc`; `record` may be empty.
+    ///
+    /// # Errors
+    /// A record or a converter that is none.
+    pub fn frames(adc: &str, record: &str) -> Result<Self, JsError> {
+        let calibration = read(record)?;
+        let frames = Frames::new(parse_adc(adc).map_err(Said::from)?, calibration.as_ref())?;
+        Ok(Self::of(Source::Frames(Box::new(frames)), calibration))
+    }
+
+    /// Listens for lines of numbers: a signal; time in seconds and signal; or time, reference and signal. A signal alone is
+    /// one of `rate_hz` a second.
+    ///
+    /// # Errors
+    /// A record that is none, or whose rate looks ahead.
+    pub fn numbers(rate_hz: f64, record: &str) -> Result<Self, JsError> {
+        let calibration = read(record)?;
+        let numbers = Numbers::new(rate_hz, calibration.as_ref())?;
+        Ok(Self::of(Source::Numbers(Box::new(numbers)), calibration))
+    }
+
+    fn of(source: Source, calibration: Option<Calibration>) -> Self {
+        let signal = calibration.as_ref().map_or("bridge_v", |c| c.signal.as_str()).to_owned();
+        let unit = calibration.as_ref().map_or("", |c| c.reference.unit()).to_owned();
+        Self { source, signal, unit, lines: String::new() }
+    }
+
+    /// Takes what came, at a time of the browser's clock; gives time, signal and estimate of each sample, flat, NaN where
+    /// there is none.
+    pub fn take(&mut self, bytes: &[u8], now_s: f64) -> Vec<f64> {
+        let mut out = Vec::new();
+        for &byte in bytes {
+            let row = match &mut self.source {
+                Source::Frames(frames) => frames.push(byte, now_s, &mut self.lines),
+                Source::Numbers(numbers) => numbers.push(byte, &mut self.lines),
+            };
+            if let Some(row) = row {
+                out.extend(row);
+            }
+        }
+        out
+    }
+
+    /// The lines of the recording since the last call.
+    pub fn lines(&mut self) -> String {
+        std::mem::take(&mut self.lines)
+    }
+
+    /// The header of these lines.
+    pub fn header(&self) -> String {
+        let unit = if self.unit.is_empty() { String::new() } else { format!("_{}", self.unit) };
+        match &self.source {
+            Source::Frames(_) => {
+                format!("time_s,{},adc_code,estimate{unit},branch,domain\n", self.signal)
+            }
+            Source::Numbers(_) => format!("time_s,{},reference,estimate{unit}\n", self.signal),
+        }
+    }
+
+    /// How the link does, in a sentence.
+    pub fn status(&self) -> String {
+        match &self.source {
+            Source::Frames(frames) => frames.status(&self.unit),
+            Source::Numbers(numbers) => {
+                format!("{} lines, {} without numbers", numbers.lines, numbers.damaged)
+            }
+        }
+    }
+}
+
+fn read(record: &str) -> Result<Option<Calibration>, Said> {
+    match record {
+        "" => Ok(None),
+        text => Ok(Some(calibration_from_json(text, "the record")?)),
+    }
+}
+
+/// Frames of the live link, on one time line over restarts of the board.
+#[derive(Debug)]
+struct Frames {
+    decoder: Decoder,
+    adc: Adc,
+    period_s: f64,
+    last: Option<(u32, f64, f64)>,
+    twin: Option<Runner<Receptor<f64>>>,
+    /// Estimates held against those here, and the largest difference.
+    compared: (u64, f64),
+    /// Samples that the board did not get.
+    missing: u64,
+    /// Codes that the converter cannot give, and the largest.
+    beyond: (u64, i32),
+}
+
+impl Frames {
+    fn new(adc: Adc, calibration: Option<&Calibration>) -> Result<Self, Said> {
+        Ok(Self {
+            decoder: Decoder::new(),
+            adc,
+            period_s: calibration.map_or(1e-3, |c| c.sample_rate_hz.period_s()),
+            last: None,
+            twin: calibration.map(Receptor::new).transpose()?.map(Runner::new),
+            compared: (0, 0.0),
+            missing: 0,
+            beyond: (0, 0),
+        })
+    }
+
+    fn push(&mut self, byte: u8, now_s: f64, lines: &mut String) -> Option<[f64; 3]> {
+        let event = self.decoder.push(byte)?;
+        let frame = event.frame()?;
+        if let Some(twin) = self.twin.as_mut().filter(|_| !matches!(event, Event::Frame(_))) {
+            // the board has seen samples that did not arrive here
+            twin.reset();
+        }
+        let time_s = self.time_s(&frame, matches!(event, Event::Restarted(_)), now_s);
+        let signal = self.adc.volts(AdcCode(frame.code));
+        let own = self.twin.as_mut().map(|twin| twin.step(Volts(signal.unwrap_or(f64::NAN))));
+        let estimate = match frame.answer {
+            Answer::Reading { thousandths, branch, .. } => {
+                let estimate = f64::from(thousandths) / 1000.0;
+                if let Some(Ok(own)) = own.filter(|own| own.is_ok_and(|own| own.branch == branch)) {
+                    let worst = self.compared.1.max((estimate - own.estimate).abs());
+                    self.compared = (self.compared.0 + 1, worst);
+                }
+                estimate
+            }
+            _ => f64::NAN,
+        };
+        match signal {
+            Some(signal) => push_line(lines, time_s, signal, &frame),
+            None if frame.code < 0 => self.missing += 1,
+            None => self.beyond = (self.beyond.0 + 1, self.beyond.1.max(frame.code)),
+        }
+        Some([time_s, signal.unwrap_or(f64::NAN), estimate])
+    }
+
+    /// Seconds since the first frame; after a restart the time that passed here stands in for the board's.
+    fn time_s(&mut self, frame: &Frame, restarted: bool, now_s: f64) -> f64 {
+        let time_s = match self.last {
+            None => 0.0,
+            Some((_, before_s, heard_s)) if restarted => {
+                before_s + (now_s - heard_s).max(self.period_s)
+            }
+            Some((before_ms, before_s, _)) => {
+                let step_s = f64::from(frame.time_ms.wrapping_sub(before_ms)) / 1000.0;
+                // two frames within a millisecond of the board's clock
+                before_s + if step_s > 0.0 { step_s } else { 1e-6 }
+            }
+        };
+        // to the microsecond: sums of steps carry dust
+        let time_s = (time_s * 1e6).round() / 1e6;
+        self.last = Some((frame.time_ms, time_s, now_s));
+        time_s
+    }
+
+    fn status(&self, unit: &str) -> String {
+        let c = self.decoder.counts();
+        let mut text = format!(
+            "{} frames, {} lost, {} damaged, {} repeated, {} restarts",
+            c.frames, c.lost, c.damaged, c.repeated, c.restarts
+        );
+        if c.other_version > 0 {
+            text +=
+                &format!(", {} of another version: update the page or the board", c.other_version);
+        }
+        if self.missing > 0 {
+            text += &format!("; {} samples that the board did not get", self.missing);
+        }
+        if let (1.., largest) = self.beyond {
+            let (count, bits) = (self.beyond.0, self.adc.spec().bits);
+            text += &format!(
+                "; {count} codes up to {largest} are beyond a converter of {bits} bits and no rows"
+            );
+        }
+        if self.compared.0 > 0 {
+            text += &format!("; differs from the record by {:.4} {unit}", self.compared.1);
+        }
+        text
+    }
+}
+
+/// A row as `stretch listen` records it.
+fn push_line(lines: &mut String, time_s: f64, signal: f64, frame: &Frame) {
+    push(lines, time_s);
+    lines.push(',');
+    push(lines, signal);
+    let code = frame.code;
+    // a string takes every write
+    let _ = match frame.answer {
+        Answer::Reading { thousandths, branch, domain } => {
+            let (sign, size) = (if thousandths < 0 { "-" } else { "" }, thousandths.unsigned_abs());
+            writeln!(lines, ",{code},{sign}{}.{:03},{branch},{domain}", size / 1000, size % 1000)
+        }
+        Answer::Warming => writeln!(lines, ",{code},,,warming"),
+        Answer::Missing => writeln!(lines, ",{code},,,missing"),
+    };
+}
+
+fn push(lines: &mut String, value: f64) {
+    let mut number = Vec::new();
+    push_number(&mut number, value);
+    lines.push_str(&String::from_utf8_lossy(&number));
+}
+
+/// Bare numbers, a line a sample.
+#[derive(Debug)]
+struct Numbers {
+    line: Vec<u8>,
+    rate_hz: f64,
+    lines: u64,
+    damaged: u64,
+    samples: u64,
+    receptor: Option<LiveReceptor>,
+}
+
+impl Numbers {
+    fn new(rate_hz: f64, calibration: Option<&Calibration>) -> Result<Self, Said> {
+        if !(1e-3..=1e7).contains(&rate_hz) {
+            return Err(Said(format!("{rate_hz} is not a rate between 1e-3 and 1e7 Hz")));
+        }
+        Ok(Self {
+            line: Vec::new(),
+            rate_hz,
+            lines: 0,
+            damaged: 0,
+            samples: 0,
+            receptor: calibration.map(LiveReceptor::new).transpose()?,
+        })
+    }
+
+    fn push(&mut self, byte: u8, lines: &mut String) -> Option<[f64; 3]> {
+        if byte != b'\n' {
+            if self.line.len() < LONGEST {
+                self.line.push(byte);
+            }
+            return None;
+        }
+        let line = std::mem::take(&mut self.line);
+        self.lines += 1;
+        let Some((time_s, reference, signal)) = self.parse(&line) else {
+            self.damaged += u64::from(!line.trim_ascii().is_empty());
+            return None;
+        };
+        self.samples += 1;
+        let reading = self.receptor.as_mut().and_then(|r| r.step(time_s, signal).ok());
+        push(lines, time_s);
+        lines.push(',');
+        push(lines, signal);
+        lines.push(',');
+        if let Some(reference) = reference {
+            push(lines, reference);
+        }
+        lines.push(',');
+        if let Some(reading) = reading {
+            let _ = write!(lines, "{:.6}", reading.estimate);
+        }
+        lines.push('\n');
+        Some([time_s, signal, reading.map_or(f64::NAN, |r| r.estimate)])
+    }
+
+    /// Time, reference and signal of a line.
+    fn parse(&self, line: &[u8]) -> Option<(f64, Option<f64>, f64)> {
+        let text = std::str::from_utf8(line).ok()?;
+        let fields = text.split([',', ';', ' ', '\t']).map(str::trim).filter(|f| !f.is_empty());
+        let numbers: Vec<f64> = fields.map(|field| field.parse().ok()).collect::<Option<_>>()?;
+        let counted_s = self.samples as f64 / self.rate_hz;
+        if !numbers.iter().all(|x| x.is_finite()) {
+            return None;
+        }
+        match numbers[..] {
+            [signal] => Some((counted_s, None, signal)),
+            [time_s, signal] => Some((time_s, None, signal)),
+            [time_s, reference, signal] => Some((time_s, Some(reference), signal)),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! Errors as the program says them, and JSON.
+
+use std::{error::Error, fmt};
+
+use serde::{Serialize, de::DeserializeOwned};
+
+/// A sentence: what is wrong, where, and what to do.
+#[derive(Debug)]
+pub(crate) struct Said(pub(crate) String);
+
+impl fmt::Display for Said {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl From<Said> for wasm_bindgen::JsError {
+    fn from(said: Said) -> Self {
+        Self::new(&said.0)
+    }
+}
+
+impl<E: Error> From<E> for Said {
+    /// The error and its causes; a cause that is already told is not told again.
+    fn from(error: E) -> Self {
+        let mut told = error.to_string();
+        let mut cause = error.source();
+        while let Some(one) = cause {
+            let text = one.to_string();
+            if !told.contains(&text) {
+                told = format!("{told}: {text}");
+            }
+            cause = one.source();
+        }
+        Self(told)
+    }
+}
+
+pub(crate) fn to_json(value: &impl Serialize) -> Result<String, Said> {
+    Ok(serde_json::to_string(value)?)
+}
+
+pub(crate) fn from_json<T: DeserializeOwned>(text: &str) -> Result<T, Said> {
+    Ok(serde_json::from_str(text)?)
+}

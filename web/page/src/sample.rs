@@ -1,0 +1,41 @@
+//! The sample: the paper's session on a rig with the paper's effects, as `stretch simulate --preset paper` writes it.
+
+use serde::Serialize;
+use stretch_data::DataSet;
+use stretch_sim::{Rig, RunSettings, Session, TrialPlan, paper_preset};
+
+use crate::{progress, said::Said};
+
+/// A file as it would stand on a disk.
+#[derive(Debug, Serialize)]
+pub(crate) struct File {
+    name: String,
+    text: String,
+}
+
+/// All files of the data set, but the rig's own with its effects: that is the answer.
+pub(crate) fn files(seed: u64) -> Result<Vec<File>, Said> {
+    let rig = paper_preset()?;
+    let settings = RunSettings { seed, ..RunSettings::default() };
+    let plans = TrialPlan::paper(seed);
+    let nominal = Rig { effects: Default::default(), ..rig.clone() };
+    let mut set = DataSet {
+        name: format!("sample-{seed}"),
+        rate_hz: plans[0].rate_hz,
+        rig: Some("nominal.toml".to_owned()),
+        trials: Vec::new(),
+    };
+    let mut session = Session::new(&rig, &settings)?;
+    let mut files = Vec::new();
+    for plan in &plans {
+        progress(&format!("simulating {}", plan.file));
+        let (entry, trial) = session.run(plan)?;
+        let mut text = Vec::new();
+        trial.write_to(&mut text)?;
+        files.push(File { name: entry.file.clone(), text: String::from_utf8(text)? });
+        set.trials.push(entry);
+    }
+    files.push(File { name: "nominal.toml".to_owned(), text: nominal.to_file(None).to_toml() });
+    files.push(File { name: "dataset.toml".to_owned(), text: set.to_toml() });
+    Ok(files)
+}

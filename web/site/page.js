@@ -1,0 +1,244 @@
+/*
+ * What is dropped, read and shown; and which button does what.
+ */
+
+/** Columns that say what was done, not what came of it. */
+const COMMANDS = ["inlet", "outlet", "pressure_kpa", "excitation_share", "set_length_mm", "shunt_share"];
+/** Seed of the sample. */
+const SAMPLE = 1;
+/** Recordings whose rows are shown without being asked for. */
+const MOST_OPEN = 4;
+/** Points of the picture. */
+const MOST_POINTS = 1500;
+
+const page = {
+  /** @param {Map<string, File>} files Reads what was dropped beside what is there. */
+  take: (files) => tell.busy("reading", async () => {
+    for (const [name, file] of files) {
+      state.files.set(name, file);
+      crew.hands.forEach((hand) => hand.has.delete(name));
+    }
+    // a description comes first, so that others are read as it says
+    const isFirst = (/** @type {string} */ name) => (name === "dataset.toml" ? 0 : name.endsWith(".toml") ? 1 : 2);
+    const names = [...files.keys()].sort((a, b) => isFirst(a) - isFirst(b));
+    const hand = crew.hand(CALIBRATOR);
+    const wrong = [];
+    for (const [i, name] of names.entries()) {
+      const file = files.get(name);
+      if (!file) continue;
+      tell.doing(`reading ${name}${names.length > 1 ? ` (${i + 1} of ${names.length})` : ""}`);
+      try {
+        await page.told(await crew.read(hand, name, file), file);
+        page.refused.delete(name);
+      } catch (error) {
+        if (error instanceof Cancelled) throw error;
+        state.files.delete(name);
+        state.recordings.delete(name);
+        page.refused.set(name, file);
+        wrong.push(error instanceof Error ? error.message : String(error));
+      }
+    }
+    await page.show();
+    if (wrong.length) tell.wrong(wrong.join("\n"));
+  }),
+
+  /** @param {any} about @param {File} file */
+  async told(about, file) {
+    if (about.kind === "recording") state.recordings.set(about.name, about);
+    if (about.kind === "record") {
+      state.files.delete(about.name);
+      state.record = await file.text();
+      live.use(`${about.name}, ${about.reference} on ${about.signal}`);
+    }
+  },
+
+  async show() {
+    const all = [...state.recordings.values()];
+    for (const id of ["calibration", "diagnosis"]) html(id).hidden = !all.length;
+    html("recordings").hidden = !all.length && !page.refused.size;
+    html("clear").hidden = html("recordings").hidden;
+    tell.table("list", all.map((a) =>
+      [a.name, String(a.rows), shown(a.seconds, 5), shown(a.rate_hz, 4), a.columns.map((c) => c.name).join(", ")]));
+    const sum = (/** @type {(a: About) => number} */ of) => all.reduce((before, a) => before + of(a), 0);
+    html("counted").textContent =
+      `${all.length === 1 ? "1 recording" : `${all.length} recordings`}, ${sum((a) => a.rows)} rows, ${shown(sum((a) => a.seconds), 6)} s`;
+    part("each", HTMLDetailsElement).open = all.length <= MOST_OPEN;
+    tell.list("notes", all.flatMap((a) => a.notes.map((note) => `${a.name}: ${note}`)));
+    page.guess(all);
+    page.options("shown", all.map((a) => a.name), select("shown").value);
+    await page.look();
+  },
+
+  /** @param {string} id @param {string[]} names @param {string} wanted */
+  options(id, names, wanted) {
+    select(id).replaceChildren(...names.map((name) => new Option(name, name)));
+    if (names.includes(wanted)) select(id).value = wanted;
+  },
+
+  /** Which columns are reference and signal: what was chosen before, the usual names, units. @param {About[]} all */
+  guess(all) {
+    const columns = [...new Map(all.flatMap((a) => a.columns).map((c) => [c.name, c])).values()];
+    const free = columns.filter((c) => !COMMANDS.includes(c.name));
+    const by = (/** @type {string[]} */ units, /** @type {RegExp} */ name) =>
+      free.find((c) => units.includes(c.unit.toLowerCase())) ?? free.find((c) => name.test(c.name.toLowerCase()));
+    const usual = (/** @type {string} */ name) => free.find((c) => c.name === name);
+    const reference = usual("length_mm") ?? by(["mm", "cm", "m", "deg", "rad"], /length|angle|pos|ref|truth/) ?? free[0];
+    const others = free.filter((c) => c !== reference);
+    const signal = usual("bridge_v") ?? others.find((c) => ["v", "mv", "ohm", "kohm"].includes(c.unit.toLowerCase())) ?? others[0];
+    const names = columns.map((c) => c.name);
+    for (const [id, found] of /** @type {[string, Column|undefined][]} */ ([["reference", reference], ["signal", signal]])) {
+      const before = select(id).value;
+      page.options(id, names, names.includes(before) ? before : found?.name ?? "");
+    }
+    const isRig = all.length > 0 && all.every((a) => ["inlet", "outlet", "length_mm", "bridge_v"].every((n) => a.columns.some((c) => c.name === n)));
+    const rig = select("subject").options[0];
+    if (rig.disabled === isRig) select("subject").value = isRig ? "rig" : "gauge";
+    rig.disabled = !isRig;
+  },
+
+  async look() {
+    const [name, reference, signal] = ["shown", "reference", "signal"].map((id) => select(id).value);
+    if (!name) return;
+    const hand = await crew.stocked(CALIBRATOR);
+    const points = await hand.call("points", name, reference, signal, MOST_POINTS);
+    const column = (/** @type {number} */ k) => Float64Array.from({ length: points.length / 3 }, (_, i) => points[3 * i + k]);
+    const canvas = part("look", HTMLCanvasElement);
+    canvas.setAttribute("aria-label", `${reference} and ${signal} of ${name} over ${shown(state.recordings.get(name)?.seconds)} s`);
+    page.lines = [{ name: reference, ink: "truth", x: column(0), y: column(1) }, { name: signal, ink: "two", x: column(0), y: column(2) }];
+    plot.draw(canvas, page.lines);
+  },
+  /** @type {Line[]} */
+  lines: [],
+
+  again: () => {
+    const rate = Number(input("rate").value);
+    state.asked = {
+      time: input("time").value.trim(), time_unit: select("time-unit").value, columns: input("columns").value.trim(),
+      ...(rate > 0 ? { sample_rate_hz: rate } : {}),
+    };
+    state.edition += 1;
+    return page.take(new Map([...state.files, ...page.refused]));
+  },
+  /** What could not be read: it may be, read otherwise. @type {Map<string, File>} */
+  refused: new Map(),
+
+  clear() {
+    crew.end();
+    state.files.clear();
+    state.recordings.clear();
+    page.refused.clear();
+    for (const id of ["calibrated", "diagnosed"]) html(id).hidden = true;
+    report.close();
+    tell.wrong("");
+    page.show();
+  },
+
+  sample: () => {
+    /** @type {Map<string, File>} */
+    const files = new Map();
+    const made = tell.busy("simulating a session", async () => {
+      for (const { name, text } of JSON.parse(await crew.hand(CALIBRATOR).call("sample", SAMPLE))) files.set(name, new File([text], name));
+    });
+    return made.then(() => (files.size ? page.take(files) : undefined));
+  },
+};
+
+/** Files of what is dropped, folders opened: names are those inside the folder. */
+const dropped = {
+  /** @param {Entry} entry @param {string} path @param {Map<string, File>} into @returns {Promise<void>} */
+  async walk(entry, path, into) {
+    if (entry.isFile) {
+      into.set(path, await new Promise((/** @type {(file: File) => void} */ take, fail) => entry.file(take, fail)));
+      return;
+    }
+    const reader = entry.createReader();
+    for (;;) {
+      const some = await new Promise((/** @type {(entries: Entry[]) => void} */ take, fail) => reader.readEntries(take, fail));
+      if (!some.length) return;
+      for (const one of some) await dropped.walk(one, path ? `${path}/${one.name}` : one.name, into);
+    }
+  },
+
+  /** @param {Handle} handle @param {string} path @param {Map<string, File>} into @returns {Promise<void>} */
+  async open(handle, path, into) {
+    if (handle.kind === "file") {
+      into.set(path, await handle.getFile());
+      return;
+    }
+    for await (const one of handle.values()) await dropped.open(one, path ? `${path}/${one.name}` : one.name, into);
+  },
+
+  /** @param {DataTransfer} data */
+  async files(data) {
+    /** @type {Map<string, File>} */
+    const into = new Map();
+    // all asked at once: a moment later what was dropped is gone
+    const plain = [...data.files];
+    const items = [...data.items].filter((item) => item.kind === "file");
+    const entries = items.map((item) => /** @type {Entry|null} */ (/** @type {any} */ (item).webkitGetAsEntry?.() ?? null));
+    if (!entries.some((entry) => entry && !entry.isFile)) {
+      plain.forEach((file) => into.set(file.name, file));
+      return into;
+    }
+    // of a page from a disk Chromium gives a folder by its handle only, Firefox and Safari by its entry
+    const handles = items.map((item) => /** @type {Promise<Handle>|undefined} */ (/** @type {any} */ (item).getAsFileSystemHandle?.()));
+    for (const [i, entry] of entries.entries()) {
+      const handle = await handles[i];
+      const path = entry && !entry.isFile ? "" : entry?.name ?? "";
+      if (handle) await dropped.open(handle, path, into);
+      else if (entry) await dropped.walk(entry, path, into);
+    }
+    return into;
+  },
+};
+
+(() => {
+  const zone = html("drop");
+  const over = (/** @type {boolean} */ is) => (/** @type {DragEvent} */ event) => {
+    event.preventDefault();
+    zone.classList.toggle("over", is);
+  };
+  document.addEventListener("dragover", over(true));
+  document.addEventListener("dragleave", over(false));
+  document.addEventListener("drop", (event) => {
+    over(false)(event);
+    if (event.dataTransfer) dropped.files(event.dataTransfer).then((files) => page.take(files), tell.wrong);
+  });
+  input("choose").onchange = () => {
+    const files = [...(input("choose").files ?? [])];
+    page.take(new Map(files.map((file) => [file.name, file])));
+    input("choose").value = "";
+  };
+  button("sample").onclick = page.sample;
+  button("clear").onclick = page.clear;
+  button("cancel").onclick = crew.cancel;
+  button("again").onclick = page.again;
+  for (const id of ["reference", "signal", "shown"]) select(id).onchange = () => { page.look().catch(tell.wrong); };
+  button("calibrate").onclick = calibration.run;
+  button("save-record").onclick = () => calibration.save("calibration.json", "record");
+  button("save-header").onclick = () => calibration.save("stretch.h", "header", input("adc").value);
+  button("see-calibration").onclick = () => tell.busy("drawing the report", async () => {
+    report.open("calibration.html", await crew.hand(CALIBRATOR).call("report"));
+  });
+  button("diagnose").onclick = diagnosis.run;
+  button("see-diagnosis").onclick = () => tell.busy("drawing the report", async () => {
+    report.open("diagnosis.html", await crew.hand(DIAGNOSER).call("diagnosis", "report"));
+  });
+  button("save-diagnosis").onclick = () => diagnosis.save("diagnosis.json", "json");
+  button("save-rig").onclick = () => diagnosis.save("fixed.toml", "rig");
+  button("save-report").onclick = () => tell.save(report.name, report.text, "text/html");
+  button("close-report").onclick = report.close;
+  window.addEventListener("resize", () => { if (page.lines.length) plot.draw(part("look", HTMLCanvasElement), page.lines); });
+  live.wire();
+  // the first worker begins with the page, so that the first file does not wait for it
+  const first = crew.hand(CALIBRATOR);
+  first.ready.then(async ({ version, models }) => {
+    html("version").textContent = version;
+    page.options("model", ["auto", ...models], "poly13");
+    for (const option of select("model").options) {
+      if (option.value === "auto") option.text = "auto: the best on trials left out";
+      if (option.value === "poly13") option.text = "poly13: as published";
+    }
+    html("bits").textContent = `${await first.call("sound")} receptors were just run here and answer bit by bit as on a desk and on boards`;
+  }).catch(tell.wrong);
+})();

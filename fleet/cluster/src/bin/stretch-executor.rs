@@ -1,0 +1,9 @@
+//! `stretch-executor`: see the crate.
+
+use clap::Parser;
+use stretch_fleet_cluster::{ExecutorOptions, run_executor};
+
+#[tokio::main]
+async fn main() -> anyhow::Result<()> {
+    run_executor(ExecutorOptions::parse()).await
+}

@@ -1,0 +1,9 @@
+//! `stretch-scheduler`: see the crate.
+
+use clap::Parser;
+use stretch_fleet_cluster::{SchedulerOptions, run_scheduler};
+
+#[tokio::main]
+async fn main() -> anyhow::Result<()> {
+    run_scheduler(SchedulerOptions::parse()).await
+}

@@ -1,0 +1,201 @@
+//! Plans that say which release of the functions they were made with.
+//!
+//! A function goes into a plan by its name alone; what answers to that name on another machine may
+//! compute something else. So the release goes with it, and who decodes a plan of another release
+//! refuses it by name: the scheduler what a client sends, an executor what the scheduler sends.
+
+use std::{fmt::Debug, sync::Arc};
+
+use datafusion::{
+    arrow::datatypes::SchemaRef,
+    catalog::TableProvider,
+    common::{Result, TableReference, exec_err, not_impl_err},
+    datasource::file_format::FileFormatFactory,
+    execution::TaskContext,
+    logical_expr::{AggregateUDF, Extension, LogicalPlan, ScalarUDF},
+    physical_plan::ExecutionPlan,
+};
+use datafusion_proto::{
+    logical_plan::LogicalExtensionCodec,
+    physical_plan::{PhysicalExtensionCodec, PhysicalProtoConverterExtension},
+};
+
+const MARK: &str = "stretch-fleet ";
+
+/// A release of the functions, and who has it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Release {
+    /// Such as `executor 10.0.0.7:50051`.
+    pub who: String,
+    /// Such as `0.1.0`.
+    pub version: String,
+}
+
+impl Release {
+    /// The release that this program was built with.
+    pub fn own(who: impl Into<String>) -> Self {
+        Self { who: who.into(), version: stretch_fleet::VERSION.to_owned() }
+    }
+
+    fn write(&self, is_ours: bool, buffer: &mut Vec<u8>) {
+        if is_ours {
+            buffer.extend_from_slice(MARK.as_bytes());
+            buffer.extend_from_slice(self.version.as_bytes());
+        }
+    }
+
+    /// Whether a function of the plan is one of ours, and of our release.
+    fn check(&self, function: &str, buffer: &[u8]) -> Result<()> {
+        let text = std::str::from_utf8(buffer).ok().and_then(|text| text.strip_prefix(MARK));
+        match text {
+            Some(version) if version == self.version => Ok(()),
+            Some(version) => exec_err!(
+                "{} has stretch-fleet {}, and this query's {function} is of {version}: install one release on all \
+                 machines, or stop this one",
+                self.who,
+                self.version
+            ),
+            None => not_impl_err!("{} does not know the function {function}", self.who),
+        }
+    }
+}
+
+fn aggregate(name: &str) -> Option<Arc<AggregateUDF>> {
+    stretch_fleet::aggregates().into_iter().find(|function| function.name() == name)
+}
+
+fn scalar(name: &str) -> Option<Arc<ScalarUDF>> {
+    stretch_fleet::scalars().into_iter().find(|function| function.name() == name)
+}
+
+/// A codec of Ballista's, with the release on every function of ours.
+#[derive(Debug)]
+pub(crate) struct Marked<C> {
+    release: Release,
+    inner: C,
+}
+
+impl<C: Default> Marked<C> {
+    pub(crate) fn new(release: &Release) -> Arc<Self> {
+        Arc::new(Self { release: release.clone(), inner: C::default() })
+    }
+}
+
+impl<C> Marked<C> {
+    fn decoded_aggregate(&self, name: &str, buffer: &[u8]) -> Result<Arc<AggregateUDF>> {
+        self.release.check(name, buffer)?;
+        aggregate(name).map_or_else(|| not_impl_err!("{name} is no aggregate"), Ok)
+    }
+
+    fn decoded_scalar(&self, name: &str, buffer: &[u8]) -> Result<Arc<ScalarUDF>> {
+        self.release.check(name, buffer)?;
+        scalar(name).map_or_else(|| not_impl_err!("{name} is no scalar function"), Ok)
+    }
+}
+
+impl<C: LogicalExtensionCodec> LogicalExtensionCodec for Marked<C> {
+    fn try_decode(
+        &self,
+        buffer: &[u8],
+        inputs: &[LogicalPlan],
+        context: &TaskContext,
+    ) -> Result<Extension> {
+        self.inner.try_decode(buffer, inputs, context)
+    }
+
+    fn try_encode(&self, node: &Extension, buffer: &mut Vec<u8>) -> Result<()> {
+        self.inner.try_encode(node, buffer)
+    }
+
+    fn try_decode_table_provider(
+        &self,
+        buffer: &[u8],
+        table: &TableReference,
+        schema: SchemaRef,
+        context: &TaskContext,
+    ) -> Result<Arc<dyn TableProvider>> {
+        self.inner.try_decode_table_provider(buffer, table, schema, context)
+    }
+
+    fn try_encode_table_provider(
+        &self,
+        table: &TableReference,
+        node: Arc<dyn TableProvider>,
+        buffer: &mut Vec<u8>,
+    ) -> Result<()> {
+        self.inner.try_encode_table_provider(table, node, buffer)
+    }
+
+    fn try_decode_file_format(
+        &self,
+        buffer: &[u8],
+        context: &TaskContext,
+    ) -> Result<Arc<dyn FileFormatFactory>> {
+        self.inner.try_decode_file_format(buffer, context)
+    }
+
+    fn try_encode_file_format(
+        &self,
+        buffer: &mut Vec<u8>,
+        node: Arc<dyn FileFormatFactory>,
+    ) -> Result<()> {
+        self.inner.try_encode_file_format(buffer, node)
+    }
+
+    fn try_decode_udf(&self, name: &str, buffer: &[u8]) -> Result<Arc<ScalarUDF>> {
+        self.decoded_scalar(name, buffer)
+    }
+
+    fn try_encode_udf(&self, node: &ScalarUDF, buffer: &mut Vec<u8>) -> Result<()> {
+        self.release.write(scalar(node.name()).is_some(), buffer);
+        Ok(())
+    }
+
+    fn try_decode_udaf(&self, name: &str, buffer: &[u8]) -> Result<Arc<AggregateUDF>> {
+        self.decoded_aggregate(name, buffer)
+    }
+
+    fn try_encode_udaf(&self, node: &AggregateUDF, buffer: &mut Vec<u8>) -> Result<()> {
+        self.release.write(aggregate(node.name()).is_some(), buffer);
+        Ok(())
+    }
+}
+
+impl<C: PhysicalExtensionCodec> PhysicalExtensionCodec for Marked<C> {
+    fn try_decode(
+        &self,
+        buffer: &[u8],
+        inputs: &[Arc<dyn ExecutionPlan>],
+        context: &TaskContext,
+        converter: &dyn PhysicalProtoConverterExtension,
+    ) -> Result<Arc<dyn ExecutionPlan>> {
+        self.inner.try_decode(buffer, inputs, context, converter)
+    }
+
+    fn try_encode(
+        &self,
+        node: Arc<dyn ExecutionPlan>,
+        buffer: &mut Vec<u8>,
+        converter: &dyn PhysicalProtoConverterExtension,
+    ) -> Result<()> {
+        self.inner.try_encode(node, buffer, converter)
+    }
+
+    fn try_decode_udf(&self, name: &str, buffer: &[u8]) -> Result<Arc<ScalarUDF>> {
+        self.decoded_scalar(name, buffer)
+    }
+
+    fn try_encode_udf(&self, node: &ScalarUDF, buffer: &mut Vec<u8>) -> Result<()> {
+        self.release.write(scalar(node.name()).is_some(), buffer);
+        Ok(())
+    }
+
+    fn try_decode_udaf(&self, name: &str, buffer: &[u8]) -> Result<Arc<AggregateUDF>> {
+        self.decoded_aggregate(name, buffer)
+    }
+
+    fn try_encode_udaf(&self, node: &AggregateUDF, buffer: &mut Vec<u8>) -> Result<()> {
+        self.release.write(aggregate(node.name()).is_some(), buffer);
+        Ok(())
+    }
+}

@@ -1,0 +1,98 @@
+//! An executor: asks the scheduler for tasks, and computes them.
+
+use std::{path::PathBuf, sync::Arc};
+
+use anyhow::{Context, anyhow};
+use ballista_core::{
+    config::TaskSchedulingPolicy,
+    registry::BallistaFunctionRegistry,
+    serde::{BallistaLogicalExtensionCodec, BallistaPhysicalExtensionCodec},
+};
+use ballista_executor::executor_process::{ExecutorProcessConfig, start_executor_process};
+
+use crate::{
+    codec::{Marked, Release},
+    ports::chosen,
+};
+
+/// What an executor is started with.
+#[derive(Debug, Clone, clap::Parser)]
+#[command(name = "stretch-executor", version, about = "Computes the tasks that a scheduler gives")]
+pub struct ExecutorOptions {
+    /// The scheduler: host:port.
+    #[arg(long, default_value = "127.0.0.1:50050")]
+    pub scheduler: String,
+    /// Address to listen on.
+    #[arg(long, default_value = "127.0.0.1")]
+    pub bind_host: String,
+    /// Host under which other machines reach this one, where it is not the address.
+    #[arg(long)]
+    pub external_host: Option<String>,
+    /// Port on which others fetch results; 0 is a free one.
+    #[arg(long, default_value_t = 0)]
+    pub port: u16,
+    /// Tasks at once; 0 is one a core.
+    #[arg(long, default_value_t = 0)]
+    pub tasks: usize,
+    /// Folder for what stages hand on; a temporary one where there is none.
+    #[arg(long)]
+    pub work_dir: Option<PathBuf>,
+    /// Memory for all tasks, in megabytes, beyond which groups spill to the folder; nine tenths of
+    /// the machine where there is none.
+    #[arg(long)]
+    pub memory_mb: Option<u64>,
+    /// Claims another release than this program is of, to see how a cluster takes it.
+    #[arg(long, hide = true)]
+    pub claim_release: Option<String>,
+}
+
+/// Runs an executor until it is stopped. Waits up to a minute for its scheduler.
+///
+/// # Errors
+/// A scheduler that does not answer, a port that is taken.
+pub async fn run_executor(options: ExecutorOptions) -> anyhow::Result<()> {
+    let (host, port) = options
+        .scheduler
+        .trim_start_matches("df://")
+        .rsplit_once(':')
+        .with_context(|| format!("--scheduler {}: write host:port", options.scheduler))?;
+    let scheduler_port: u16 = port
+        .parse()
+        .with_context(|| format!("--scheduler {}: {port} is no port", options.scheduler))?;
+    let port = chosen(&options.bind_host, options.port)?;
+    let shown = options.external_host.as_ref().unwrap_or(&options.bind_host);
+    let mut release = Release::own(format!("executor {shown}:{port}"));
+    if let Some(version) = options.claim_release {
+        release.version = version;
+    }
+    let mut functions = BallistaFunctionRegistry::default();
+    for aggregate in stretch_fleet::aggregates() {
+        functions.aggregate_functions.insert(aggregate.name().to_owned(), aggregate);
+    }
+    for scalar in stretch_fleet::scalars() {
+        functions.scalar_functions.insert(scalar.name().to_owned(), scalar);
+    }
+    // removed when the executor stops, but not when it is killed
+    let temporary = tempfile::Builder::new().prefix("stretch-executor-").tempdir()?;
+    let work_dir = options.work_dir.unwrap_or_else(|| temporary.path().to_owned());
+    let defaults = ExecutorProcessConfig::default();
+    let config = ExecutorProcessConfig {
+        grpc_port: chosen(&options.bind_host, 0)?,
+        bind_host: options.bind_host,
+        external_host: options.external_host,
+        port,
+        scheduler_host: host.to_owned(),
+        scheduler_port,
+        scheduler_connect_timeout_seconds: 60,
+        vcores: options.tasks,
+        task_scheduling_policy: TaskSchedulingPolicy::PullStaged,
+        work_dir: Some(work_dir.display().to_string()),
+        memory_pool_size: options.memory_mb.map(|mb| mb << 20),
+        override_function_registry: Some(Arc::new(functions)),
+        override_logical_codec: Some(Marked::<BallistaLogicalExtensionCodec>::new(&release)),
+        override_physical_codec: Some(Marked::<BallistaPhysicalExtensionCodec>::new(&release)),
+        ..defaults
+    };
+    println!("{} {} for df://{host}:{scheduler_port}", release.who, release.version);
+    start_executor_process(Arc::new(config)).await.map_err(|e| anyhow!("{}: {e}", release.who))
+}

@@ -1,0 +1,83 @@
+//! The scheduler: takes queries from clients and gives tasks to executors that ask for them.
+
+use std::{net::SocketAddr, sync::Arc};
+
+use anyhow::{Context, anyhow};
+use ballista_core::{
+    config::TaskSchedulingPolicy,
+    extension::SessionConfigExt,
+    serde::{BallistaLogicalExtensionCodec, BallistaPhysicalExtensionCodec},
+};
+use ballista_scheduler::{
+    cluster::BallistaCluster, config::SchedulerConfig, scheduler_process::start_server,
+};
+use datafusion::{execution::SessionStateBuilder, prelude::SessionConfig};
+
+use crate::{
+    codec::{Marked, Release},
+    ports::chosen,
+};
+
+/// What a scheduler is started with.
+#[derive(Debug, Clone, clap::Parser)]
+#[command(name = "stretch-scheduler", version, about = "Gives the tasks of queries to executors")]
+pub struct SchedulerOptions {
+    /// Address to listen on.
+    #[arg(long, default_value = "127.0.0.1")]
+    pub bind_host: String,
+    /// Port to listen on; 0 is a free one.
+    #[arg(long, default_value_t = 50050)]
+    pub port: u16,
+    /// Seconds without a sign of life after which an executor's tasks go to others.
+    #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u64).range(2..))]
+    pub executor_timeout_s: u64,
+}
+
+/// Runs a scheduler until it is stopped. Prints one line when it is about to listen.
+///
+/// # Errors
+/// A port that is taken, an address that is none.
+pub async fn run_scheduler(options: SchedulerOptions) -> anyhow::Result<()> {
+    let port = chosen(&options.bind_host, options.port)?;
+    let text = format!("{}:{port}", options.bind_host);
+    let address: SocketAddr = text.parse().with_context(|| format!("{text} is no address"))?;
+    let release = Release::own(format!("scheduler {address}"));
+    let timeout = options.executor_timeout_s;
+    let config = SchedulerConfig {
+        bind_host: options.bind_host.clone(),
+        external_host: options.bind_host,
+        bind_port: port,
+        // executors ask for work: one that hangs is never waited for
+        scheduling_policy: TaskSchedulingPolicy::PullStaged,
+        executor_timeout_seconds: timeout,
+        expire_dead_executor_interval_seconds: (timeout / 2).max(1),
+        no_executors_grace_period_seconds: timeout,
+        override_config_producer: Some(Arc::new(SessionConfig::new_with_ballista)),
+        override_session_builder: Some(Arc::new(|config: SessionConfig| {
+            let state =
+                SessionStateBuilder::new().with_default_features().with_config(config).build();
+            Ok(with_functions(state))
+        })),
+        override_logical_codec: Some(Marked::<BallistaLogicalExtensionCodec>::new(&release)),
+        override_physical_codec: Some(Marked::<BallistaPhysicalExtensionCodec>::new(&release)),
+        ..SchedulerConfig::default()
+    };
+    println!("scheduler {} at df://{address}", release.version);
+    let cluster = BallistaCluster::new_from_config(&config).await.map_err(|e| anyhow!("{e}"))?;
+    start_server(cluster, address, Arc::new(config)).await.map_err(|e| anyhow!("{address}: {e}"))
+}
+
+/// A session's state, with our functions.
+pub(crate) fn with_functions(
+    mut state: datafusion::execution::SessionState,
+) -> datafusion::execution::SessionState {
+    use datafusion::execution::FunctionRegistry;
+    for aggregate in stretch_fleet::aggregates() {
+        // replaces one of the same name; there is none
+        let _ = state.register_udaf(aggregate);
+    }
+    for scalar in stretch_fleet::scalars() {
+        let _ = state.register_udf(scalar);
+    }
+    state
+}

@@ -1,0 +1,208 @@
+//! `agreement(reference, estimate)`: the metrics as an aggregate.
+
+use std::sync::Arc;
+
+use datafusion::{
+    arrow::{
+        array::{
+            Array, ArrayRef, BinaryBuilder, BooleanArray, Float64Builder, StructArray,
+            UInt64Builder,
+        },
+        datatypes::{DataType, Field, FieldRef, Fields},
+    },
+    common::{Result, exec_datafusion_err, exec_err},
+    logical_expr::{
+        Accumulator, AggregateUDF, AggregateUDFImpl, EmitTo, GroupsAccumulator, Signature,
+        Volatility,
+        function::{AccumulatorArgs, StateFieldsArgs},
+    },
+};
+use stretch_metrics::{Agreement, AgreementSpec, Delta};
+
+use crate::{
+    columns::{bytes, floats},
+    one::One,
+};
+
+const NAME: &str = "agreement";
+
+/// What is told of a group beside its counts.
+const FIGURES: [(&str, Figure); 13] = [
+    ("bias", |a| a.errors().bias()),
+    ("mae", |a| a.errors().mae()),
+    ("rmse", |a| a.errors().rmse()),
+    ("std_dev", |a| a.errors().std_dev()),
+    ("max_abs_error", |a| a.errors().max_abs()),
+    ("average_error_percent", |a| a.average_error_percent(Delta::Truth)),
+    ("rmse_percent", |a| a.rmse_percent(Delta::Truth)),
+    ("r_squared", Agreement::r_squared),
+    ("correlation", Agreement::correlation),
+    ("reference_min", |a| a.truth_range().map(|range| range.0)),
+    ("reference_max", |a| a.truth_range().map(|range| range.1)),
+    ("estimate_min", |a| a.estimate_range().map(|range| range.0)),
+    ("estimate_max", |a| a.estimate_range().map(|range| range.1)),
+];
+
+type Figure = fn(&Agreement<f64>) -> Option<f64>;
+
+fn fields() -> Fields {
+    let count = |name: &str| Field::new(name, DataType::UInt64, true);
+    let figures = FIGURES.iter().map(|(name, _)| Field::new(*name, DataType::Float64, true));
+    [count("rows"), count("rows_left_out")].into_iter().chain(figures).collect()
+}
+
+#[derive(Debug, PartialEq, Eq, Hash)]
+struct AgreementFunction {
+    signature: Signature,
+}
+
+/// The function.
+pub(crate) fn function() -> Arc<AggregateUDF> {
+    let signature = Signature::exact(vec![DataType::Float64; 2], Volatility::Immutable);
+    Arc::new(AggregateUDF::new_from_impl(AgreementFunction { signature }))
+}
+
+impl AggregateUDFImpl for AgreementFunction {
+    fn name(&self) -> &str {
+        NAME
+    }
+
+    fn signature(&self) -> &Signature {
+        &self.signature
+    }
+
+    fn return_type(&self, _: &[DataType]) -> Result<DataType> {
+        Ok(DataType::Struct(fields()))
+    }
+
+    fn state_fields(&self, args: StateFieldsArgs) -> Result<Vec<FieldRef>> {
+        let name = format!("{}[state]", args.name);
+        Ok(vec![Arc::new(Field::new(name, DataType::Binary, true))])
+    }
+
+    fn accumulator(&self, _: AccumulatorArgs) -> Result<Box<dyn Accumulator>> {
+        Ok(Box::new(One::new(NAME, Agreements::default())))
+    }
+
+    fn groups_accumulator_supported(&self, args: AccumulatorArgs) -> bool {
+        !args.is_distinct
+    }
+
+    fn create_groups_accumulator(&self, _: AccumulatorArgs) -> Result<Box<dyn GroupsAccumulator>> {
+        Ok(Box::new(Agreements::default()))
+    }
+
+    fn order_sensitivity(&self) -> datafusion::logical_expr::utils::AggregateOrderSensitivity {
+        datafusion::logical_expr::utils::AggregateOrderSensitivity::Insensitive
+    }
+}
+
+/// The agreements of many groups: 200 bytes each.
+#[derive(Debug, Default)]
+struct Agreements(Vec<Agreement<f64>>);
+
+impl GroupsAccumulator for Agreements {
+    fn update_batch(
+        &mut self,
+        values: &[ArrayRef],
+        groups: &[usize],
+        filter: Option<&BooleanArray>,
+        total: usize,
+    ) -> Result<()> {
+        self.0.resize(total.max(self.0.len()), Agreement::new());
+        let [reference, estimate] = values else {
+            return exec_err!("agreement takes a reference and an estimate");
+        };
+        let (reference, estimate) = (floats(reference)?, floats(estimate)?);
+        for (row, &group) in groups.iter().enumerate() {
+            if filter.is_some_and(|kept| !(kept.is_valid(row) && kept.value(row))) {
+                continue;
+            }
+            let value = |array: &datafusion::arrow::array::Float64Array| {
+                if array.is_valid(row) { array.value(row) } else { f64::NAN }
+            };
+            // what is not finite is left out, and counted there
+            self.0[group].push(value(reference), value(estimate));
+        }
+        Ok(())
+    }
+
+    fn merge_batch(&mut self, states: &[ArrayRef], groups: &[usize], total: usize) -> Result<()> {
+        self.0.resize(total.max(self.0.len()), Agreement::new());
+        if let [states] = states {
+            for (state, &group) in bytes(states)?.zip(groups) {
+                let Some(state) = state else { continue };
+                let other = read(state)
+                    .ok_or_else(|| exec_datafusion_err!("agreement: a partial state is damaged"))?;
+                self.0[group].merge(&other);
+            }
+        }
+        Ok(())
+    }
+
+    fn state(&mut self, emit: EmitTo) -> Result<Vec<ArrayRef>> {
+        let mut builder = BinaryBuilder::new();
+        for agreement in emit.take_needed(&mut self.0) {
+            builder.append_value(write(&agreement));
+        }
+        Ok(vec![Arc::new(builder.finish())])
+    }
+
+    fn evaluate(&mut self, emit: EmitTo) -> Result<ArrayRef> {
+        let (mut rows, mut left_out) = (UInt64Builder::new(), UInt64Builder::new());
+        let mut figures = FIGURES.map(|_| Float64Builder::new());
+        for agreement in emit.take_needed(&mut self.0) {
+            rows.append_value(agreement.count());
+            left_out.append_value(agreement.skipped());
+            for (builder, (_, figure)) in figures.iter_mut().zip(FIGURES) {
+                builder.append_option(figure(&agreement));
+            }
+        }
+        let counts = [Arc::new(rows.finish()) as ArrayRef, Arc::new(left_out.finish())];
+        let figures = figures.iter_mut().map(|builder| Arc::new(builder.finish()) as ArrayRef);
+        let arrays = counts.into_iter().chain(figures).collect();
+        Ok(Arc::new(StructArray::new(fields(), arrays, None)))
+    }
+
+    fn convert_to_state(
+        &self,
+        values: &[ArrayRef],
+        filter: Option<&BooleanArray>,
+    ) -> Result<Vec<ArrayRef>> {
+        let mut each = Self::default();
+        let rows = values.first().map_or(0, |array| array.len());
+        let groups: Vec<usize> = (0..rows).collect();
+        each.update_batch(values, &groups, filter, rows)?;
+        each.state(EmitTo::All)
+    }
+
+    fn size(&self) -> usize {
+        size_of::<Self>() + self.0.capacity() * size_of::<Agreement<f64>>()
+    }
+}
+
+/// Counts and numbers, little-endian. Passed between the stages of one query, never stored.
+fn write(agreement: &Agreement<f64>) -> Vec<u8> {
+    let AgreementSpec { count, skipped, errors, truth, estimate, products } = agreement.spec();
+    let numbers = errors.iter().chain(&truth).chain(&estimate).chain(&products);
+    let counts = [count.to_le_bytes(), skipped.to_le_bytes()];
+    counts.into_iter().chain(numbers.map(|x| x.to_le_bytes())).flatten().collect()
+}
+
+fn read(bytes: &[u8]) -> Option<Agreement<f64>> {
+    let (words, []) = bytes.as_chunks::<8>() else { return None };
+    let [count, skipped, numbers @ ..] = words else { return None };
+    let numbers: [f64; 21] =
+        numbers.iter().map(|word| f64::from_le_bytes(*word)).collect::<Vec<_>>().try_into().ok()?;
+    let [e0, e1, e2, e3, e4, e5, e6, rest @ ..] = numbers;
+    let [t0, t1, t2, t3, t4, t5, rest @ ..] = rest;
+    let [s0, s1, s2, s3, s4, s5, p0, p1] = rest;
+    Agreement::from_spec(AgreementSpec {
+        count: u64::from_le_bytes(*count),
+        skipped: u64::from_le_bytes(*skipped),
+        errors: [e0, e1, e2, e3, e4, e5, e6],
+        truth: [t0, t1, t2, t3, t4, t5],
+        estimate: [s0, s1, s2, s3, s4, s5],
+        products: [p0, p1],
+    })
+}

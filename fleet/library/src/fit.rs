@@ -1,0 +1,260 @@
+//! Fits as aggregates: `poly13_fit`, `linear_fit`, `polyij_fit`, `poly13_state`, `poly13_merge`.
+
+use std::sync::Arc;
+
+use datafusion::{
+    arrow::{
+        array::{ArrayRef, BinaryBuilder, BooleanArray},
+        datatypes::{DataType, Field, FieldRef},
+    },
+    common::{Result, ScalarValue, plan_datafusion_err},
+    logical_expr::{
+        Accumulator, AggregateUDF, AggregateUDFImpl, EmitTo, GroupsAccumulator, Signature,
+        TypeSignature, Volatility,
+        function::{AccumulatorArgs, StateFieldsArgs},
+    },
+    physical_expr::expressions::Literal,
+    physical_plan::PhysicalExpr,
+};
+use stretch_core::{Degree, MAX_DEGREE, MAX_TERMS};
+
+use crate::{
+    about::About,
+    columns::{bytes, floats},
+    fitted::{answers, fields},
+    one::One,
+    triangles::{Outcome, Triangles},
+};
+
+/// Which fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Kind {
+    Poly13,
+    Line,
+    PolyIj,
+    State,
+    Merge,
+}
+
+impl Kind {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Poly13 => "poly13_fit",
+            Self::Line => "linear_fit",
+            Self::PolyIj => "polyij_fit",
+            Self::State => "poly13_state",
+            Self::Merge => "poly13_merge",
+        }
+    }
+
+    fn signature(self) -> Signature {
+        use DataType::{Binary, BinaryView, Float64, Int64, LargeBinary};
+        let types = match self {
+            Self::Poly13 | Self::State => TypeSignature::Exact(vec![Float64; 3]),
+            Self::Line => TypeSignature::Exact(vec![Float64; 2]),
+            Self::PolyIj => TypeSignature::Exact(vec![Int64, Int64, Float64, Float64, Float64]),
+            Self::Merge => TypeSignature::Uniform(1, vec![BinaryView, Binary, LargeBinary]),
+        };
+        Signature::new(types, Volatility::Immutable)
+    }
+
+    /// Arguments before the columns.
+    fn literals(self) -> usize {
+        if self == Self::PolyIj { 2 } else { 0 }
+    }
+}
+
+/// A fit by its name in SQL.
+#[derive(Debug, PartialEq, Eq, Hash)]
+struct FitFunction {
+    kind: Kind,
+    signature: Signature,
+}
+
+/// All fits.
+pub(crate) fn functions() -> impl Iterator<Item = Arc<AggregateUDF>> {
+    [Kind::Poly13, Kind::Line, Kind::PolyIj, Kind::State, Kind::Merge].into_iter().map(|kind| {
+        let signature = kind.signature();
+        Arc::new(AggregateUDF::new_from_impl(FitFunction { kind, signature }))
+    })
+}
+
+impl FitFunction {
+    fn degree(&self, args: &AccumulatorArgs) -> Result<Degree> {
+        match self.kind {
+            Kind::PolyIj => {
+                let (rate, signal) = (power(&args.exprs[0], "i")?, power(&args.exprs[1], "j")?);
+                Degree::new(rate, signal)
+                    .map_err(|error| plan_datafusion_err!("polyij_fit: {error}"))
+            }
+            Kind::Line => Degree::new(0, 1).map_err(|error| plan_datafusion_err!("{error}")),
+            _ => Ok(Degree::POLY13),
+        }
+    }
+
+    fn fits<const TERMS: usize>(
+        &self,
+        degree: Degree,
+        args: &AccumulatorArgs,
+    ) -> Result<Fits<TERMS>> {
+        let about = match self.kind {
+            Kind::Merge => About::new(&[args.expr_fields[0].clone(), args.expr_fields[0].clone()])?,
+            kind => About::new(&args.expr_fields[kind.literals()..])?,
+        };
+        let sides = if self.kind == Kind::Line { 1 } else { 2 };
+        let triangles = Triangles::new(degree, sides, &about)
+            .map_err(|error| plan_datafusion_err!("{}: {error}", self.kind.name()))?;
+        Ok(Fits { kind: self.kind, triangles })
+    }
+}
+
+/// A power that is written in the query.
+fn power(expr: &Arc<dyn PhysicalExpr>, name: &str) -> Result<u8> {
+    let literal = expr.downcast_ref::<Literal>().map(Literal::value);
+    match literal {
+        Some(ScalarValue::Int64(Some(power))) if (0..=MAX_DEGREE as i64).contains(power) => {
+            Ok(*power as u8)
+        }
+        _ => Err(plan_datafusion_err!(
+            "polyij_fit: {name} is {expr}, but must be a number from 0 to {MAX_DEGREE} that stands in the query"
+        )),
+    }
+}
+
+impl AggregateUDFImpl for FitFunction {
+    fn name(&self) -> &str {
+        self.kind.name()
+    }
+
+    fn signature(&self) -> &Signature {
+        &self.signature
+    }
+
+    fn return_type(&self, _: &[DataType]) -> Result<DataType> {
+        Ok(if self.kind == Kind::State { DataType::Binary } else { DataType::Struct(fields()) })
+    }
+
+    fn state_fields(&self, args: StateFieldsArgs) -> Result<Vec<FieldRef>> {
+        let name = format!("{}[state]", args.name);
+        Ok(vec![Arc::new(Field::new(name, DataType::Binary, true))])
+    }
+
+    fn accumulator(&self, args: AccumulatorArgs) -> Result<Box<dyn Accumulator>> {
+        let name = self.name();
+        let degree = self.degree(&args)?;
+        Ok(match degree.terms() {
+            0..=2 => Box::new(One::new(name, self.fits::<2>(degree, &args)?)),
+            3..=7 => Box::new(One::new(name, self.fits::<7>(degree, &args)?)),
+            _ => Box::new(One::new(name, self.fits::<MAX_TERMS>(degree, &args)?)),
+        })
+    }
+
+    fn groups_accumulator_supported(&self, args: AccumulatorArgs) -> bool {
+        !args.is_distinct
+    }
+
+    fn create_groups_accumulator(
+        &self,
+        args: AccumulatorArgs,
+    ) -> Result<Box<dyn GroupsAccumulator>> {
+        let degree = self.degree(&args)?;
+        Ok(match degree.terms() {
+            0..=2 => Box::new(self.fits::<2>(degree, &args)?),
+            3..=7 => Box::new(self.fits::<7>(degree, &args)?),
+            _ => Box::new(self.fits::<MAX_TERMS>(degree, &args)?),
+        })
+    }
+
+    fn order_sensitivity(&self) -> datafusion::logical_expr::utils::AggregateOrderSensitivity {
+        datafusion::logical_expr::utils::AggregateOrderSensitivity::Insensitive
+    }
+}
+
+/// The fits of many groups.
+#[derive(Debug)]
+struct Fits<const TERMS: usize> {
+    kind: Kind,
+    triangles: Triangles<TERMS>,
+}
+
+impl<const TERMS: usize> Fits<TERMS> {
+    fn bytes(&self, outcomes: &[Outcome<TERMS>]) -> ArrayRef {
+        let mut builder = BinaryBuilder::new();
+        let mut state = Vec::new();
+        for outcome in outcomes {
+            state.clear();
+            self.triangles.write(&mut state, outcome);
+            builder.append_value(&state);
+        }
+        Arc::new(builder.finish())
+    }
+
+    fn merge(
+        &mut self,
+        states: &[ArrayRef],
+        groups: &[usize],
+        filter: Option<&BooleanArray>,
+        total: usize,
+    ) -> Result<()> {
+        match states {
+            [states] => self.triangles.states(bytes(states)?, groups, filter, total),
+            _ => self.triangles.states(std::iter::empty(), groups, filter, total),
+        }
+        Ok(())
+    }
+}
+
+impl<const TERMS: usize> GroupsAccumulator for Fits<TERMS> {
+    fn update_batch(
+        &mut self,
+        values: &[ArrayRef],
+        groups: &[usize],
+        filter: Option<&BooleanArray>,
+        total: usize,
+    ) -> Result<()> {
+        if self.kind == Kind::Merge {
+            return self.merge(values, groups, filter, total);
+        }
+        let columns = values[self.kind.literals()..].iter().map(floats);
+        let columns = match columns.collect::<Result<Vec<_>>>()?[..] {
+            // a line has no rate: the signal stands in its place and is multiplied by nothing
+            [signal, reference] => [signal, signal, reference],
+            [rate, signal, reference] => [rate, signal, reference],
+            _ => return Err(plan_datafusion_err!("{}: columns are missing", self.kind.name())),
+        };
+        self.triangles.rows(columns, groups, filter, total)
+    }
+
+    fn merge_batch(&mut self, states: &[ArrayRef], groups: &[usize], total: usize) -> Result<()> {
+        self.merge(states, groups, None, total)
+    }
+
+    fn state(&mut self, emit: EmitTo) -> Result<Vec<ArrayRef>> {
+        let outcomes = self.triangles.outcomes(emit)?;
+        Ok(vec![self.bytes(&outcomes)])
+    }
+
+    fn evaluate(&mut self, emit: EmitTo) -> Result<ArrayRef> {
+        let outcomes = self.triangles.outcomes(emit)?;
+        Ok(match self.kind {
+            Kind::State => self.bytes(&outcomes),
+            kind => answers(self.triangles.degree(), kind == Kind::Line, &outcomes),
+        })
+    }
+
+    fn convert_to_state(
+        &self,
+        values: &[ArrayRef],
+        filter: Option<&BooleanArray>,
+    ) -> Result<Vec<ArrayRef>> {
+        let mut each = Self { kind: self.kind, triangles: self.triangles.of_no_group() };
+        let rows = values.first().map_or(0, |array| array.len());
+        let groups: Vec<usize> = (0..rows).collect();
+        each.update_batch(values, &groups, filter, rows)?;
+        each.state(EmitTo::All)
+    }
+
+    fn size(&self) -> usize {
+        self.triangles.size()
+    }
+}

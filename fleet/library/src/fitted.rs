@@ -1,0 +1,191 @@
+//! What a fit answers, a row a group.
+
+use std::sync::Arc;
+
+use datafusion::arrow::{
+    array::{ArrayRef, Float64Builder, ListBuilder, StringBuilder, StructArray, UInt64Builder},
+    datatypes::{DataType, Field, Fields},
+};
+use stretch_core::{Degree, Polarity};
+use stretch_fit::{Factor, FitError};
+
+use crate::{
+    about::About,
+    record::{Side, Whole},
+    span::Span,
+    state::Partial,
+    triangles::Outcome,
+};
+
+/// The columns of numbers that stand between the counts and the coefficients.
+const NUMBERS: [&str; 7] =
+    ["rmse", "rate_min", "rate_max", "signal_min", "signal_max", "reference_min", "reference_max"];
+
+/// The fields of a fit's answer.
+pub(crate) fn fields() -> Fields {
+    let number = |name: &str| Field::new(name, DataType::Float64, true);
+    let count = |name: &str| Field::new(name, DataType::UInt64, true);
+    let list = DataType::List(Arc::new(Field::new_list_field(DataType::Float64, true)));
+    let text = |name: &str| Field::new(name, DataType::Utf8, true);
+    [count("rows"), count("rows_left_out")]
+        .into_iter()
+        .chain(NUMBERS.map(number))
+        .chain([Field::new("coefficients", list, true), text("record"), text("refused")])
+        .collect()
+}
+
+/// A fit's answer.
+struct Answer<const TERMS: usize> {
+    rows: u64,
+    left_out: u64,
+    rmse: Option<f64>,
+    span: Option<Span>,
+    coefficients: Option<Vec<f64>>,
+    record: Option<String>,
+    refused: Option<String>,
+}
+
+/// The answers of many groups, as an array of structs. A line has no rate.
+pub(crate) fn answers<const TERMS: usize>(
+    degree: Degree,
+    is_line: bool,
+    outcomes: &[Outcome<TERMS>],
+) -> ArrayRef {
+    let (mut rows, mut left_out) = (UInt64Builder::new(), UInt64Builder::new());
+    let mut numbers = NUMBERS.map(|_| Float64Builder::new());
+    let mut coefficients = ListBuilder::new(Float64Builder::new());
+    let (mut record, mut refused) = (StringBuilder::new(), StringBuilder::new());
+    for outcome in outcomes {
+        let answer = answer(degree, is_line, outcome);
+        rows.append_value(answer.rows);
+        left_out.append_value(answer.left_out);
+        numbers[0].append_option(answer.rmse);
+        for column in 0..3 {
+            let span = answer.span.filter(|_| column > 0 || !is_line);
+            numbers[1 + 2 * column].append_option(span.map(|span| span.least[column]));
+            numbers[2 + 2 * column].append_option(span.map(|span| span.most[column]));
+        }
+        coefficients.append_option(answer.coefficients.map(|all| all.into_iter().map(Some)));
+        record.append_option(answer.record);
+        refused.append_option(answer.refused);
+    }
+    let arrays = [Arc::new(rows.finish()) as ArrayRef, Arc::new(left_out.finish())]
+        .into_iter()
+        .chain(numbers.iter_mut().map(|numbers| Arc::new(numbers.finish()) as ArrayRef))
+        .chain([
+            Arc::new(coefficients.finish()) as ArrayRef,
+            Arc::new(record.finish()),
+            Arc::new(refused.finish()),
+        ])
+        .collect();
+    Arc::new(StructArray::new(fields(), arrays, None))
+}
+
+fn answer<const TERMS: usize>(
+    degree: Degree,
+    is_line: bool,
+    outcome: &Outcome<TERMS>,
+) -> Answer<TERMS> {
+    let nothing = Answer {
+        rows: 0,
+        left_out: 0,
+        rmse: None,
+        span: None,
+        coefficients: None,
+        record: None,
+        refused: None,
+    };
+    let partial = match outcome {
+        Ok(partial) => partial,
+        Err(sentence) => return Answer { refused: Some(sentence.to_string()), ..nothing },
+    };
+    let sides = partial.sides.iter().flatten();
+    let rows = sides.fold(0, |rows: u64, (factor, _)| rows.saturating_add(factor.samples()));
+    let counted = Answer { rows, left_out: partial.left_out, ..nothing };
+    match fitted(degree, is_line, partial, rows) {
+        Err(sentence) => Answer { refused: Some(sentence), ..counted },
+        Ok((sides, polarity)) => {
+            let span = sides.iter().fold(Span::EMPTY, |span, side| span.joined(&side.span));
+            let dof = sides.iter().fold(0, |dof: u64, side| dof.saturating_add(side.fit.dof()));
+            let sse: f64 = sides.iter().map(|side| side.fit.sse()).sum();
+            let whole = Whole { sides: &sides, polarity, span };
+            // a text that this library wrote; of damaged bytes nothing is known
+            let about = serde_json::from_str::<About>(&partial.about).ok();
+            let record = about.map_or(Ok(None), |about| whole.record(&about));
+            Answer {
+                rmse: (dof > 0).then(|| (sse / dof as f64).sqrt()),
+                span: Some(span),
+                coefficients: Some(
+                    sides.iter().flat_map(|side| side.fit.coefficients().to_vec()).collect(),
+                ),
+                refused: record.as_ref().err().map(|why| format!("no record: {why}")),
+                record: record.ok().flatten(),
+                ..counted
+            }
+        }
+    }
+}
+
+/// The fits of all sides, inflation first, and how signal and reference move together.
+fn fitted<const TERMS: usize>(
+    degree: Degree,
+    is_line: bool,
+    partial: &Partial<TERMS>,
+    rows: u64,
+) -> Result<(Vec<Side<TERMS>>, Polarity), String> {
+    if rows == 0 {
+        return Err(match partial.left_out {
+            0 => "there are no rows".to_owned(),
+            n => format!("all {n} rows lack a finite number"),
+        });
+    }
+    let [up, down] = partial.sides;
+    let all = [up, down].into_iter().flatten();
+    let span = all.clone().fold(Span::EMPTY, |span, (_, side)| span.joined(&side));
+    for (name, column) in [("signal", 1), ("reference", 2)] {
+        if span.width(column) == 0.0 {
+            let value = span.least[column];
+            return Err(format!("the {name} is {value} in all {rows} rows: nothing can be fitted"));
+        }
+    }
+    let polarity = polarity(all.map(|(factor, _)| factor))?;
+    let (sides, names) = match (up, down) {
+        (Some(line), None) if is_line => (vec![line], ["the line", ""]),
+        (Some(up), Some(down)) => match polarity {
+            Polarity::Rising => (vec![up, down], ["inflation", "deflation"]),
+            Polarity::Falling => (vec![down, up], ["inflation", "deflation"]),
+        },
+        (Some(_), None) => return Err(one_branch("falls", "a rate of 0 or above", rows)),
+        _ => return Err(one_branch("rises", "a rate below 0", rows)),
+    };
+    let mut fitted = Vec::with_capacity(sides.len());
+    for ((factor, span), name) in sides.into_iter().zip(names) {
+        let fit = factor.fit().map_err(|error| match error {
+            FitError::TooFewSamples { needed, got } => {
+                format!("{name}: {got} rows are too few for the {needed} terms of {degree}")
+            }
+            other => format!("{name}: {other}"),
+        })?;
+        fitted.push(Side { factor, span, fit });
+    }
+    Ok((fitted, polarity))
+}
+
+fn one_branch(moves: &str, have: &str, rows: u64) -> String {
+    format!("the signal never {moves} (all {rows} rows have {have}): one branch is no calibration")
+}
+
+/// Whether the signal rises with the reference: the sign of the slope over all rows.
+fn polarity<const TERMS: usize>(
+    mut factors: impl Iterator<Item = Factor<f64, TERMS>>,
+) -> Result<Polarity, String> {
+    let sentence = |error: FitError| format!("signal against reference: {error}");
+    let mut all = factors.next().ok_or("there are no rows")?;
+    for factor in factors {
+        all.merge(&factor).map_err(sentence)?;
+    }
+    let line = Degree::new(0, 1).map_err(|error| error.to_string())?;
+    let fit = all.fit_degree(line).map_err(sentence)?;
+    let falls = fit.coefficients().get(1).is_some_and(|slope| *slope < 0.0);
+    Ok(if falls { Polarity::Falling } else { Polarity::Rising })
+}

@@ -1,0 +1,46 @@
+#![doc = include_str!("../README.md")]
+
+mod about;
+mod agreement;
+mod columns;
+mod estimate;
+mod fit;
+mod fitted;
+mod one;
+mod record;
+mod span;
+mod state;
+mod triangles;
+
+use std::sync::Arc;
+
+use datafusion::{
+    logical_expr::{AggregateUDF, ScalarUDF},
+    prelude::SessionContext,
+};
+
+pub use about::{RATE_ESTIMATOR_KEY, SAMPLE_RATE_KEY};
+pub use state::{STATE_VERSION, StateError, poly13_factors};
+
+/// The release of the functions: machines that answer one query together must have the same.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// The aggregates, for a session or the registry of an executor.
+pub fn aggregates() -> Vec<Arc<AggregateUDF>> {
+    fit::functions().chain([agreement::function()]).collect()
+}
+
+/// The scalar functions, for a session or the registry of an executor.
+pub fn scalars() -> Vec<Arc<ScalarUDF>> {
+    vec![estimate::function()]
+}
+
+/// Makes all functions known to a session.
+pub fn register(session: &SessionContext) {
+    for aggregate in aggregates() {
+        session.register_udaf(aggregate.as_ref().clone());
+    }
+    for scalar in scalars() {
+        session.register_udf(scalar.as_ref().clone());
+    }
+}

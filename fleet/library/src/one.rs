@@ -1,0 +1,74 @@
+//! A query without groups is a query of one group.
+
+use std::fmt;
+
+use datafusion::{
+    arrow::array::ArrayRef,
+    common::{Result, ScalarValue, not_impl_err},
+    logical_expr::{Accumulator, EmitTo, GroupsAccumulator},
+};
+
+/// The accumulator of one group, by the one of many.
+pub(crate) struct One<G> {
+    name: String,
+    groups: G,
+    zeros: Vec<usize>,
+}
+
+impl<G> fmt::Debug for One<G> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "One({})", self.name)
+    }
+}
+
+impl<G: GroupsAccumulator + Sync> One<G> {
+    pub(crate) fn new(name: &str, groups: G) -> Self {
+        Self { name: name.to_owned(), groups, zeros: Vec::new() }
+    }
+
+    /// As many rows of the one group.
+    fn indices(&mut self, values: &[ArrayRef]) {
+        self.zeros.resize(values.first().map_or(0, |array| array.len()), 0);
+    }
+}
+
+impl<G: GroupsAccumulator + Sync> Accumulator for One<G> {
+    fn update_batch(&mut self, values: &[ArrayRef]) -> Result<()> {
+        self.indices(values);
+        self.groups.update_batch(values, &self.zeros, None, 1)
+    }
+
+    fn merge_batch(&mut self, states: &[ArrayRef]) -> Result<()> {
+        self.indices(states);
+        self.groups.merge_batch(states, &self.zeros, 1)
+    }
+
+    /// The answer so far. A window asks again after more rows, so that what was answered goes on.
+    fn evaluate(&mut self) -> Result<ScalarValue> {
+        let state = self.state()?;
+        let arrays = state.iter().map(ScalarValue::to_array).collect::<Result<Vec<_>>>()?;
+        self.merge_batch(&arrays)?;
+        let answer = self.groups.evaluate(EmitTo::All)?;
+        self.merge_batch(&arrays)?;
+        ScalarValue::try_from_array(&answer, 0)
+    }
+
+    fn state(&mut self) -> Result<Vec<ScalarValue>> {
+        // a group even where there were no rows
+        self.groups.merge_batch(&[], &[], 1)?;
+        let state = self.groups.state(EmitTo::All)?;
+        state.iter().map(|array| ScalarValue::try_from_array(array, 0)).collect()
+    }
+
+    fn size(&self) -> usize {
+        self.groups.size() + self.zeros.capacity() * size_of::<usize>()
+    }
+
+    fn retract_batch(&mut self, _: &[ArrayRef]) -> Result<()> {
+        not_impl_err!(
+            "{} takes no row back, for a triangle does not say what one row did to it: use a frame that begins at \
+             UNBOUNDED PRECEDING, or group by the time",
+            self.name
+        )
+    }
+}

@@ -1,0 +1,256 @@
+//! The bytes of a partial fit.
+//!
+//! All numbers are little-endian, whatever the machine:
+//!
+//! ```text
+//! 4   magic "STRF"
+//! 1   version, 1
+//! 1   kind: 1 a line, 2 a surface a branch, 255 a refusal
+//! of a refusal: its sentence, UTF-8, to the end
+//! 1   degree in the rate        1   degree in the signal
+//! 8   rows left out
+//! 2   bytes of the text         n   text: JSON of the columns and of the rates' estimator
+//! then a side each (a line has one, a surface two: rate >= 0, rate < 0):
+//! 8   rows; nothing more of this side where it is 0
+//! 8   folds          8   centre          16  residual sum of squares, and its rounding
+//! 8 T (T + 1)/2      the upper triangle, by row, of T terms
+//! 8 T                Q^T z
+//! 48  least rate, signal, reference; greatest
+//! ```
+
+use std::sync::Arc;
+
+use stretch_core::Degree;
+use stretch_fit::{Factor, FactorSpec};
+
+use crate::span::Span;
+
+/// The version of stored states that this release writes and reads.
+pub const STATE_VERSION: u8 = 1;
+
+const MAGIC: &[u8; 4] = b"STRF";
+const REFUSAL: u8 = 255;
+
+/// A partial fit: a side, or one a branch.
+#[derive(Debug, Clone)]
+pub(crate) struct Partial<const TERMS: usize> {
+    pub left_out: u64,
+    pub about: Arc<str>,
+    pub sides: [Option<(Factor<f64, TERMS>, Span)>; 2],
+}
+
+/// What stands in a state.
+#[derive(Debug, Clone)]
+pub(crate) enum Stored<const TERMS: usize> {
+    Partial(Partial<TERMS>),
+    Refusal(String),
+}
+
+/// Why bytes are no state that can be used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum StateError {
+    /// Bytes that no aggregate of this library wrote.
+    #[error("it does not begin with \"STRF\": these bytes are no state of a fit")]
+    NoState,
+    /// A state of another release.
+    #[error(
+        "it is of version {found}, and this release reads version {STATE_VERSION}: merge it with the release that stored it"
+    )]
+    Version {
+        /// The version found.
+        found: u8,
+    },
+    /// A state of another fit.
+    #[error("it is of {found}, where {expected} is merged")]
+    Kind {
+        /// What it is a state of.
+        found: String,
+        /// What was to be merged.
+        expected: String,
+    },
+    /// A state of other columns, or of rates of another estimator.
+    #[error("it is of {found}, where {expected} is merged: merge them apart")]
+    Columns {
+        /// What it is of.
+        found: String,
+        /// What was merged before.
+        expected: String,
+    },
+    /// A state that stands for a refusal.
+    #[error("{sentence}")]
+    Refused {
+        /// Why.
+        sentence: String,
+    },
+    /// Too few or too many bytes, or numbers that no fit leaves behind.
+    #[error("it is damaged ({what}): compute it again from its rows")]
+    Damaged {
+        /// What is wrong.
+        what: &'static str,
+    },
+}
+
+fn name(kind: u8, degree: Degree) -> String {
+    if kind == 1 { "a line".to_owned() } else { degree.to_string() }
+}
+
+/// Appends the state of a partial fit; `kind` is the number of its sides.
+pub(crate) fn write<const TERMS: usize>(
+    out: &mut Vec<u8>,
+    kind: u8,
+    degree: Degree,
+    partial: &Partial<TERMS>,
+) {
+    out.extend_from_slice(MAGIC);
+    out.extend_from_slice(&[STATE_VERSION, kind, degree.rate(), degree.volts()]);
+    out.extend_from_slice(&partial.left_out.to_le_bytes());
+    let about = partial.about.as_bytes();
+    // a text of names and an estimator; one that is longer says nothing
+    let about = if about.len() <= usize::from(u16::MAX) { about } else { &[] };
+    out.extend_from_slice(&(about.len() as u16).to_le_bytes());
+    out.extend_from_slice(about);
+    for side in partial.sides.iter().take(kind.into()) {
+        let Some((factor, span)) = side else {
+            out.extend_from_slice(&0_u64.to_le_bytes());
+            continue;
+        };
+        let spec = factor.spec();
+        out.extend_from_slice(&spec.samples.to_le_bytes());
+        out.extend_from_slice(&spec.folds.to_le_bytes());
+        let terms = degree.terms();
+        let rows = spec.r[..terms].iter().enumerate();
+        let triangle = rows.flat_map(|(k, row)| &row[k..terms]);
+        let head = [spec.centre, spec.residual.0, spec.residual.1];
+        let numbers = head.iter().chain(triangle).chain(&spec.q[..terms]);
+        for x in numbers.chain(&span.least).chain(&span.most) {
+            out.extend_from_slice(&x.to_le_bytes());
+        }
+    }
+}
+
+/// Appends the state of a fit that is refused already.
+pub(crate) fn write_refusal(out: &mut Vec<u8>, sentence: &str) {
+    out.extend_from_slice(MAGIC);
+    out.extend_from_slice(&[STATE_VERSION, REFUSAL]);
+    out.extend_from_slice(sentence.as_bytes());
+}
+
+/// A state of `kind` and `degree`; the text of `known` is shared where it is the same.
+pub(crate) fn read<const TERMS: usize>(
+    bytes: &[u8],
+    kind: u8,
+    degree: Degree,
+    known: &Arc<str>,
+) -> Result<Stored<TERMS>, StateError> {
+    let rest = bytes.strip_prefix(MAGIC).ok_or(StateError::NoState)?;
+    let mut from = Bytes(rest);
+    let [version, found] = from.take()?;
+    if version != STATE_VERSION {
+        return Err(StateError::Version { found: version });
+    }
+    if found == REFUSAL {
+        return Ok(Stored::Refusal(String::from_utf8_lossy(from.0).into_owned()));
+    }
+    let [rate, volts] = from.take()?;
+    let its = Degree::new(rate, volts).map_err(|_| damaged("its degree"))?;
+    if !matches!(found, 1 | 2) {
+        return Err(damaged("its kind"));
+    }
+    if found != kind || its != degree {
+        let (found, expected) = (name(found, its), name(kind, degree));
+        return Err(StateError::Kind { found, expected });
+    }
+    let left_out = from.count()?;
+    let length = u16::from_le_bytes(from.take()?);
+    let text = from.slice(length.into())?;
+    let about = if text == known.as_bytes() {
+        known.clone()
+    } else {
+        Arc::from(std::str::from_utf8(text).map_err(|_| damaged("its text"))?)
+    };
+    let mut sides = [None, None];
+    for side in sides.iter_mut().take(kind.into()) {
+        *side = from.side(degree)?;
+    }
+    if !from.0.is_empty() {
+        return Err(damaged("bytes behind its end"));
+    }
+    Ok(Stored::Partial(Partial { left_out, about, sides }))
+}
+
+/// The triangles of a state of `poly13_state`, of rows whose rate is not below zero and of those below: for tests between
+/// stored states, a day each.
+///
+/// # Errors
+/// [`StateError`]; a refused fit is one of another kind.
+pub fn poly13_factors(state: &[u8]) -> Result<[Option<Factor<f64, 7>>; 2], StateError> {
+    match read::<7>(state, 2, Degree::POLY13, &Arc::from(""))? {
+        Stored::Partial(partial) => Ok(partial.sides.map(|side| side.map(|(factor, _)| factor))),
+        Stored::Refusal(sentence) => {
+            Err(StateError::Kind { found: sentence, expected: Degree::POLY13.to_string() })
+        }
+    }
+}
+
+fn damaged(what: &'static str) -> StateError {
+    StateError::Damaged { what }
+}
+
+/// What is left to read.
+struct Bytes<'a>(&'a [u8]);
+
+impl<'a> Bytes<'a> {
+    fn slice(&mut self, length: usize) -> Result<&'a [u8], StateError> {
+        let (taken, rest) =
+            self.0.split_at_checked(length).ok_or_else(|| damaged("it ends too early"))?;
+        self.0 = rest;
+        Ok(taken)
+    }
+
+    fn take<const N: usize>(&mut self) -> Result<[u8; N], StateError> {
+        let (taken, rest) =
+            self.0.split_first_chunk().ok_or_else(|| damaged("it ends too early"))?;
+        self.0 = rest;
+        Ok(*taken)
+    }
+
+    fn count(&mut self) -> Result<u64, StateError> {
+        self.take().map(u64::from_le_bytes)
+    }
+
+    fn fill(&mut self, out: &mut [f64]) -> Result<(), StateError> {
+        let bytes = self.slice(8 * out.len())?;
+        for (place, bytes) in out.iter_mut().zip(bytes.as_chunks().0) {
+            *place = f64::from_le_bytes(*bytes);
+        }
+        Ok(())
+    }
+
+    fn side<const TERMS: usize>(
+        &mut self,
+        degree: Degree,
+    ) -> Result<Option<(Factor<f64, TERMS>, Span)>, StateError> {
+        let samples = self.count()?;
+        if samples == 0 {
+            return Ok(None);
+        }
+        let folds = self.count()?;
+        let mut head = [0.0; 3];
+        self.fill(&mut head)?;
+        let [centre, sum, lost] = head;
+        let (mut r, mut q) = ([[0.0; TERMS]; TERMS], [0.0; TERMS]);
+        let terms = degree.terms().min(TERMS);
+        for (k, row) in r[..terms].iter_mut().enumerate() {
+            self.fill(&mut row[k..terms])?;
+        }
+        self.fill(&mut q[..terms])?;
+        let mut span = Span::EMPTY;
+        self.fill(&mut span.least)?;
+        self.fill(&mut span.most)?;
+        let residual = (sum, lost);
+        let spec = FactorSpec { degree, centre, r, q, residual, samples, folds };
+        let factor = Factor::new(spec).map_err(|_| damaged("a number that is not finite"))?;
+        let ordered = span.least.iter().zip(&span.most).all(|(a, b)| a <= b && (b - a).is_finite());
+        if ordered { Ok(Some((factor, span))) } else { Err(damaged("its ranges")) }
+    }
+}

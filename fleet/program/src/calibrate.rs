@@ -1,0 +1,98 @@
+//! `stretch-fleet calibrate`: a record a sensor.
+
+use std::path::PathBuf;
+
+use anyhow::ensure;
+use chrono::NaiveDate;
+use serde::Serialize;
+
+use crate::{
+    flat::{flat, table},
+    lake::{Refused, write_parquet},
+    records::write_records,
+    show::{say, say_json, warn_of},
+    sql::On,
+    states::bring_up,
+};
+
+/// Sensors that a table on the terminal shows.
+const SHOWN: usize = 20;
+
+/// Fit a calibration to every sensor of a lake
+///
+///   stretch fleet calibrate --lake lake --out calibrations
+///   stretch fleet calibrate --lake lake --out january --from 2026-01-01 --to 2026-01-31
+///
+/// Writes a record a sensor, which stretch apply takes, and calibrations.parquet with what there is to say of each fit. Partial
+/// fits, a day each, are stored in the lake's folder states as they are computed: a run that was killed goes on where it was,
+/// and a year is merged in seconds.
+#[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    on: On,
+    /// Folder for the records and calibrations.parquet
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// First day
+    #[arg(long)]
+    from: Option<NaiveDate>,
+    /// Last day
+    #[arg(long)]
+    to: Option<NaiveDate>,
+    /// Print JSON in place of a table
+    #[arg(long)]
+    json: bool,
+}
+
+/// What came out.
+#[derive(Debug, Serialize)]
+struct Summary {
+    months_computed: usize,
+    sensors: usize,
+    records: usize,
+    refused: Vec<Refused>,
+}
+
+pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
+    let (lake, session) = args.on.open().await?;
+    let months_computed = bring_up(&lake, &session).await?;
+    let dates = lake.files.iter().map(|file| file.place.date);
+    let (first, last) = (dates.clone().min(), dates.max());
+    let (from, to) =
+        (args.from.or(first).unwrap_or_default(), args.to.or(last).unwrap_or_default());
+    let query = format!(
+        "select site, rig, sensor, poly13_merge(state) as fit from states \
+         where date between date '{from}' and date '{to}' group by site, rig, sensor order by site, rig, sensor"
+    );
+    let batches = session.sql(&query).await?.collect().await?;
+    ensure!(
+        batches.iter().any(|batch| batch.num_rows() > 0),
+        "there is no trial from {from} to {to}"
+    );
+    let answer = flat(&batches)?;
+    std::fs::create_dir_all(&args.out)?;
+    let (records, refused) = write_records(&lake, &answer, &args.out)?;
+    write_parquet(&args.out.join("calibrations.parquet"), &answer, Vec::new(), None)?;
+    let summary = Summary { months_computed, sensors: answer.num_rows(), records, refused };
+    if args.json {
+        return say_json(&summary);
+    }
+    let first = answer.slice(0, SHOWN.min(answer.num_rows()));
+    let narrow = ["site", "rig", "sensor", "rows", "rows_left_out", "rmse", "refused"];
+    let places = narrow.iter().filter_map(|name| first.schema().index_of(name).ok());
+    say(table(&first.project(&places.collect::<Vec<_>>())?)?)?;
+    if answer.num_rows() > SHOWN {
+        say(format!(
+            "... and {} more sensors, all in calibrations.parquet",
+            answer.num_rows() - SHOWN
+        ))?;
+    }
+    warn_of("no record of", &summary.refused);
+    say(format!(
+        "{}: {records} records of {} sensors, {} refused; {months_computed} months of rigs computed now",
+        args.out.display(),
+        summary.sensors,
+        summary.refused.len()
+    ))
+}

@@ -1,0 +1,74 @@
+//! The command line: parse, dispatch.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use crate::{calibrate, diagnose, drift, ingest, make, show::warn, sql};
+
+/// Years of logs and thousands of sensors: a lake of trials, and what to ask of it.
+#[derive(Debug, Parser)]
+#[command(name = "stretch-fleet", bin_name = "stretch fleet", version, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Ingest(ingest::Args),
+    Make(make::Args),
+    Sql(sql::Args),
+    Calibrate(calibrate::Args),
+    Drift(drift::Args),
+    Diagnose(diagnose::Args),
+}
+
+/// What the shell is told when Ctrl-C ended the program.
+const INTERRUPTED: u8 = 130;
+
+/// The program `stretch-fleet`.
+pub fn run() -> ExitCode {
+    let cli = Cli::parse();
+    let runtime = match tokio::runtime::Builder::new_multi_thread().enable_all().build() {
+        Ok(runtime) => runtime,
+        Err(e) => {
+            warn(format!("stretch fleet: no thread can be started: {e}"));
+            return ExitCode::FAILURE;
+        }
+    };
+    runtime.spawn(async {
+        if tokio::signal::ctrl_c().await.is_ok() && stretch_data::interrupt() == 0 {
+            std::process::exit(INTERRUPTED.into());
+        }
+    });
+    let result = runtime.block_on(async {
+        match cli.command {
+            Command::Ingest(args) => tokio::task::block_in_place(|| ingest::run(args)),
+            Command::Make(args) => tokio::task::block_in_place(|| make::run(args)),
+            Command::Sql(args) => sql::run(args).await,
+            Command::Calibrate(args) => calibrate::run(args).await,
+            Command::Drift(args) => drift::run(args).await,
+            Command::Diagnose(args) => tokio::task::block_in_place(|| diagnose::run(args)),
+        }
+    });
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(_) if stretch_data::interrupted() => ExitCode::from(INTERRUPTED),
+        Err(error) => {
+            warn(format!("stretch fleet: {}", sentence(&error)));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The error and its causes; a cause that is told already is not told again.
+fn sentence(error: &anyhow::Error) -> String {
+    let mut told = error.to_string();
+    for cause in error.chain().skip(1).map(ToString::to_string) {
+        if !told.contains(&cause) {
+            told = format!("{told}: {cause}");
+        }
+    }
+    stretch_data::without_temporary_names(&told)
+}

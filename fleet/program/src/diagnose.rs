@@ -1,0 +1,267 @@
+//! `stretch-fleet diagnose`: every partition of a lake as a data set.
+
+use std::{collections::BTreeMap, fs::File, path::PathBuf, sync::Arc};
+
+use anyhow::{Context, ensure};
+use datafusion::{
+    arrow::{
+        array::{Array, ArrayRef, AsArray, Float64Array, RecordBatch, StringArray, UInt64Array},
+        compute::{cast, concat_batches},
+        datatypes::{DataType, Field, Float64Type, Schema},
+    },
+    parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder,
+};
+use stretch_bench::{GaugeSetup, GaugeSimulator, RigSetup, RigSimulator, Session};
+use stretch_data::{Channel, SessionTrial, Trial};
+use stretch_gap::{Diagnosis, Options, diagnose};
+use stretch_sim::{Catalogue, Rig};
+
+use crate::{
+    flat::table,
+    lake::{Lake, LakeFile, digest, write_parquet},
+    show::{bar, say, say_json, warn_of},
+};
+
+/// Say of every sensor and day which effect causes a gap
+///
+///   stretch fleet diagnose --lake lake --out verdicts
+///   stretch fleet diagnose --lake lake --out verdicts --by sensor --share 1/3
+///
+/// Trials of a sensor and a day (or of a sensor, or of a sensor and a month) are a data set: of a whole rig where they have
+/// the openings inlet and outlet, of a gauge alone where they have not. A verdict is written whole as it comes, and not asked
+/// for again by the next run; verdicts.parquet holds all of them. Diagnoses do not depend on each other: with --share 1/3, 2/3
+/// and 3/3 three machines share them.
+#[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(crate) struct Args {
+    /// Folder of the lake
+    #[arg(long, value_name = "DIR")]
+    lake: PathBuf,
+    /// Folder for verdicts.parquet
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// What a data set is
+    #[arg(long, value_enum, default_value_t = By::Day)]
+    by: By,
+    /// Which of how many shares of the data sets is diagnosed here
+    #[arg(long, default_value = "1/1", value_parser = share)]
+    share: (usize, usize),
+    /// Threads of each diagnosis, 0 for all; the verdict is the same
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    threads: usize,
+    /// Seed of the intervals
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Print JSON in place of a table
+    #[arg(long)]
+    json: bool,
+}
+
+/// What a data set is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum By {
+    /// A sensor's trials of a day
+    Day,
+    /// A sensor's trials of a month
+    Month,
+    /// All trials of a sensor
+    Sensor,
+}
+
+fn share(text: &str) -> Result<(usize, usize), String> {
+    let (which, of) = text.split_once('/').unwrap_or_default();
+    match (which.parse(), of.parse()) {
+        (Ok(which), Ok(of)) if (1..=of).contains(&which) => Ok((which, of)),
+        _ => Err(format!("{text:?} is no share: write 1/3, 2/3 or 3/3")),
+    }
+}
+
+pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+    let lake = Lake::open(&args.lake)?;
+    warn_of("set aside:", &lake.refused);
+    ensure!(!lake.files.is_empty(), "{}: there is no trial in it", args.lake.display());
+    let mut sets: BTreeMap<[String; 4], Vec<&LakeFile>> = BTreeMap::new();
+    for file in &lake.files {
+        let when = match args.by {
+            By::Day => file.place.date.to_string(),
+            By::Month => file.place.month(),
+            By::Sensor => "all".to_owned(),
+        };
+        let [site, rig, sensor] = file.place.gauge().map(str::to_owned);
+        sets.entry([site, rig, sensor, when]).or_default().push(file);
+    }
+    let parts = args.out.join("verdicts");
+    std::fs::create_dir_all(&parts).with_context(|| parts.display().to_string())?;
+    let (which, of) = args.share;
+    let open: Vec<_> = sets
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| i % of == which - 1)
+        .map(|(_, (name, files))| (parts.join(part(name, files, args.seed)), name, files))
+        .filter(|(path, ..)| !path.exists())
+        .collect();
+    let bar = bar("data sets", open.len());
+    for (path, name, files) in &open {
+        bar.set_message(name.join("/"));
+        let verdict = verdict(&lake, files, &args);
+        ensure!(!stretch_data::interrupted(), "interrupted");
+        write_parquet(path, &row(name, files.len(), verdict)?, Vec::new(), None)?;
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let done: Vec<PathBuf> = sets
+        .iter()
+        .map(|(name, files)| parts.join(part(name, files, args.seed)))
+        .filter(|path| path.exists())
+        .collect();
+    let all = read(&done)?;
+    write_parquet(&args.out.join("verdicts.parquet"), &all, Vec::new(), None)?;
+    if args.json {
+        let counts = serde_json::json!({
+            "data_sets": sets.len(), "diagnosed_now": open.len(), "verdicts": all.num_rows()
+        });
+        return say_json(&counts);
+    }
+    say(table(&all)?)?;
+    say(format!(
+        "{}: {} of {} data sets have a verdict, {} diagnosed now",
+        args.out.join("verdicts.parquet").display(),
+        all.num_rows(),
+        sets.len(),
+        open.len()
+    ))
+}
+
+/// The name of a verdict: with other trials it is another.
+fn part(name: &[String; 4], files: &[&LakeFile], seed: u64) -> String {
+    let seed = seed.to_le_bytes();
+    let of = files.iter().map(|file| file.footer.digest.as_bytes());
+    let of = digest(std::iter::once(&seed[..]).chain(of));
+    format!("{}-{}.parquet", name.join(","), &of[..16])
+}
+
+const DAY_S: f64 = 86400.0;
+
+/// The diagnosis of a data set, or why there is none.
+fn verdict(lake: &Lake, files: &[&LakeFile], args: &Args) -> anyhow::Result<Diagnosis> {
+    let first = files.iter().map(|file| file.place.date).min();
+    let mut trials = Vec::new();
+    for file in files {
+        let mut trial = trial(file)?;
+        let days = first.map_or(0, |first| (file.place.date - first).num_days());
+        trial.start_s += DAY_S * days as f64;
+        trials.push(trial);
+    }
+    trials.sort_by(|a, b| {
+        a.start_s.total_cmp(&b.start_s).then_with(|| a.trial.name.cmp(&b.trial.name))
+    });
+    let options = Options { threads: args.threads, seed: args.seed, ..Options::default() };
+    let catalogue = Catalogue::default();
+    let is_rig = trials.iter().all(|t| t.trial.channel("inlet").is_some());
+    let (told, stop) = (|_: &str| (), stretch_data::interrupted);
+    let (diagnosis, _) = if is_rig {
+        let (session, rig) = (Session::new(&trials)?, Rig::default());
+        let simulator = RigSimulator::new(RigSetup { session, rig, catalogue: &catalogue })?;
+        diagnose(&simulator, &options, &told, &stop)?
+    } else {
+        let simulator = GaugeSimulator::new(&GaugeSetup {
+            trials: &trials,
+            reference: &lake.about.reference,
+            signal: &lake.about.signal,
+            rig: None,
+            catalogue: &catalogue,
+        })?;
+        diagnose(&simulator, &options, &told, &stop)?
+    };
+    Ok(diagnosis)
+}
+
+/// A trial as it was recorded: samples that were lost are lost again.
+fn trial(file: &LakeFile) -> anyhow::Result<SessionTrial> {
+    let shown = || file.path.display().to_string();
+    let batch = read(std::slice::from_ref(&file.path))?;
+    let bridged = batch.column_by_name("is_bridged").and_then(|array| array.as_boolean_opt());
+    let kept: Vec<usize> = (0..batch.num_rows())
+        .filter(|&row| !bridged.is_some_and(|bridged| bridged.is_valid(row) && bridged.value(row)))
+        .collect();
+    let values = |name: &str| -> anyhow::Result<Vec<f64>> {
+        let array =
+            batch.column_by_name(name).with_context(|| format!("{}: no column {name}", shown()))?;
+        let array = cast(array, &DataType::Float64)?;
+        let array = array.as_primitive::<Float64Type>();
+        Ok(kept
+            .iter()
+            .map(|&row| if array.is_null(row) { f64::NAN } else { array.value(row) })
+            .collect())
+    };
+    let own = ["trial", "time_s", "rate", "contraction", "is_bridged"];
+    let schema = batch.schema();
+    let names = schema.fields().iter().map(|field| field.name().as_str());
+    let channels = names
+        .filter(|name| !own.contains(name) || *name == file.footer.about.reference)
+        .map(|name| Ok(Channel { name: name.to_owned(), values: values(name)? }))
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    let footer = &file.footer;
+    let trial = Trial { name: footer.trial.clone(), time_s: values("time_s")?, channels };
+    Ok(SessionTrial {
+        kind: footer.kind,
+        start_s: footer.start_s,
+        split: footer.split,
+        notes: footer.notes.clone(),
+        ..SessionTrial::new(trial)
+    })
+}
+
+/// All rows of some files of one layout.
+fn read(paths: &[PathBuf]) -> anyhow::Result<RecordBatch> {
+    let mut batches = Vec::new();
+    for path in paths {
+        let told = || path.display().to_string();
+        let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(path).with_context(told)?);
+        for batch in reader.with_context(told)?.build()? {
+            batches.push(batch.with_context(told)?);
+        }
+    }
+    let schema = batches.first().map_or_else(|| Arc::new(Schema::empty()), RecordBatch::schema);
+    Ok(concat_batches(&schema, &batches)?)
+}
+
+/// A verdict as a row: what is named, how probable that is, how much of the held-out gap it closes, and what is left.
+fn row(
+    name: &[String; 4],
+    trials: usize,
+    verdict: anyhow::Result<Diagnosis>,
+) -> anyhow::Result<RecordBatch> {
+    let text = |value: Option<String>| Arc::new(StringArray::from(vec![value])) as ArrayRef;
+    let number = |value: Option<f64>| Arc::new(Float64Array::from(vec![value])) as ArrayRef;
+    let (diagnosis, refused) = match verdict {
+        Ok(diagnosis) => (Some(diagnosis), None),
+        Err(why) => (None, Some(format!("{why:#}"))),
+    };
+    let diagnosis = diagnosis.as_ref();
+    let kind = diagnosis.map(|d| serde_json::to_value(d.verdict)).transpose()?;
+    let named = diagnosis.map(|d| d.named.join(" "));
+    let best = diagnosis.and_then(|d| {
+        d.candidates.iter().find(|candidate| !d.named.is_empty() && candidate.effects == d.named)
+    });
+    let left = diagnosis.and_then(|d| d.unexplained.as_ref().map(|left| left.share));
+    let left = left.or(best.map(|best| 1.0 - best.closed));
+    let columns: Vec<(&str, ArrayRef)> = vec![
+        ("site", text(Some(name[0].clone()))),
+        ("rig", text(Some(name[1].clone()))),
+        ("sensor", text(Some(name[2].clone()))),
+        ("when", text(Some(name[3].clone()))),
+        ("trials", Arc::new(UInt64Array::from(vec![trials as u64])) as ArrayRef),
+        ("verdict", text(kind.and_then(|kind| Some(kind.as_str()?.to_owned())))),
+        ("named", text(named)),
+        ("probability", number(best.map(|best| best.probability))),
+        ("closed", number(best.map(|best| best.closed))),
+        ("left", number(left)),
+        ("sentence", text(diagnosis.map(|d| d.sentence.clone()))),
+        ("refused", text(refused)),
+    ];
+    let fields =
+        columns.iter().map(|(name, array)| Field::new(*name, array.data_type().clone(), true));
+    let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
+    Ok(RecordBatch::try_new(schema, columns.into_iter().map(|(_, array)| array).collect())?)
+}

@@ -1,0 +1,358 @@
+//! `stretch-fleet ingest`: trials into a lake.
+
+use std::{
+    collections::{BTreeMap, HashMap},
+    fs,
+    path::{Path, PathBuf},
+    sync::Mutex,
+};
+
+use anyhow::{Context, bail, ensure};
+use rayon::prelude::*;
+use serde::Serialize;
+use stretch_calibrate::{parse_rate, rated};
+use stretch_core::RateEstimator;
+use stretch_data::{ReadOptions, Trial, unit};
+
+use crate::{
+    lake::{About, Footer, Lake, LakeFile, Place, Refused, Samples, accept, digest, refuse, write},
+    show::{bar, say, say_json, warn_of},
+    sources::{Source, Where, sources},
+};
+
+/// Bring trials into a lake, rates computed
+///
+///   stretch fleet ingest logs --lake lake --from-path '{site}/{rig}/{sensor}/{date}_*.csv'
+///   stretch fleet ingest monday/*.csv --lake lake --sensor 0042 --date 2026-11-21
+///
+/// A trial is a recording in any format that stretch reads; a folder with a dataset.toml stands for its trials, any other
+/// folder for every file below it. Each becomes one Parquet file, whole or not at all. What is in the lake already is
+/// left as it is; what cannot be read is named in the lake's folder refused, and the rest goes on.
+#[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
+pub(crate) struct Args {
+    /// Trials, or folders of them
+    #[arg(required = true, value_name = "TRIAL")]
+    trials: Vec<PathBuf>,
+    /// Folder of the lake; made where there is none
+    #[arg(long, value_name = "DIR")]
+    lake: PathBuf,
+    #[command(flatten)]
+    places: Where,
+    /// Column that rates are of [default: the lake's, else bridge_v]
+    #[arg(long, value_name = "COL")]
+    signal: Option<String>,
+    /// Column of the reference [default: the lake's, else length_mm]
+    #[arg(long, value_name = "COL")]
+    reference: Option<String>,
+    /// Estimator of the rate [default: the lake's, else savgol:11,2]
+    #[arg(long, value_parser = parse_rate)]
+    rate: Option<RateEstimator>,
+    /// Length at a contraction of zero [default: the greatest of a sensor's first trial]
+    #[arg(long, value_name = "X")]
+    rest_length: Option<f64>,
+    /// Column of the time; its last part may be ms, us or ns
+    #[arg(long, default_value = "time_s", value_name = "COL")]
+    time: String,
+    /// Print JSON in place of sentences
+    #[arg(long)]
+    json: bool,
+}
+
+/// What became of the trials.
+#[derive(Debug, Default, Serialize)]
+struct Summary {
+    written: usize,
+    rows: u64,
+    there_already: usize,
+    refused: Vec<Refused>,
+}
+
+pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+    if let Some(length) = args.rest_length {
+        ensure!(length.is_finite() && length > 0.0, "--rest-length {length} is no length above 0");
+    }
+    fs::create_dir_all(&args.lake).with_context(|| args.lake.display().to_string())?;
+    let sources = sources(&args.trials, &args.places)?;
+    ensure!(!sources.is_empty(), "there is no file among what was named");
+    let about = about(&args, &sources)?;
+    let there = Lake::open(&args.lake)?;
+    let ingest = Ingest {
+        folder: &there.folder,
+        about: &about,
+        options: args.options(&about),
+        rest_length: args.rest_length,
+        there: there.files.iter().map(|file| (file.footer.digest.as_str(), file)).collect(),
+    };
+    let mut by_gauge: BTreeMap<[String; 3], Vec<&Source>> = BTreeMap::new();
+    let mut summary = Summary::default();
+    for source in &sources {
+        match &source.place {
+            Ok(place) => {
+                by_gauge.entry(place.gauge().map(str::to_owned)).or_default().push(source);
+            }
+            Err(why) => {
+                summary.refused.push(refuse(&there.folder, &source.path, &format!("{why:#}"))?);
+            }
+        }
+    }
+    let rests = rest_lengths(&there);
+    let bar = bar("trials", sources.len());
+    let summary = Mutex::new(summary);
+    // trials of one sensor in order: the first says what its rest length is
+    by_gauge.par_iter().try_for_each(|(gauge, sources)| {
+        let mut rest = rests.get(gauge).copied();
+        for source in sources {
+            let done = ingest.one(source, &mut rest)?;
+            bar.inc(1);
+            let mut summary = summary.lock().map_err(|_| anyhow::anyhow!("a thread has failed"))?;
+            match done {
+                Done::Written(rows) => {
+                    summary.written += 1;
+                    summary.rows += rows;
+                }
+                Done::There => summary.there_already += 1,
+                Done::Refused(refused) => summary.refused.push(refused),
+            }
+        }
+        anyhow::Ok(())
+    })?;
+    bar.finish_and_clear();
+    let mut summary = summary.into_inner().map_err(|_| anyhow::anyhow!("a thread has failed"))?;
+    summary.refused.extend(there.refused);
+    tell(&args, &summary)
+}
+
+fn tell(args: &Args, summary: &Summary) -> anyhow::Result<()> {
+    if args.json {
+        return say_json(summary);
+    }
+    warn_of("refused:", &summary.refused);
+    let Summary { written, rows, there_already, refused } = summary;
+    say(format!(
+        "{}: {written} trials written ({rows} rows), {there_already} there already, {} refused",
+        args.lake.display(),
+        refused.len()
+    ))
+}
+
+impl Args {
+    fn options(&self, about: &About) -> ReadOptions {
+        ReadOptions::new().time(&self.time).require(&about.signal).require(&about.reference)
+    }
+}
+
+/// What the lake says of itself; of a new one what was asked for, at the rate of the first trial that can be read.
+fn about(args: &Args, sources: &[Source]) -> anyhow::Result<About> {
+    let there = About::read(&args.lake)?;
+    let said = |given: &Option<String>, own: Option<&String>, usual: &str| {
+        given.as_ref().or(own).map_or_else(|| usual.to_owned(), Clone::clone)
+    };
+    let signal = said(&args.signal, there.as_ref().map(|about| &about.signal), "bridge_v");
+    let reference =
+        said(&args.reference, there.as_ref().map(|about| &about.reference), "length_mm");
+    let own = there.as_ref().map(|about| about.rate);
+    let rate = args.rate.or(own).unwrap_or(RateEstimator::SAVGOL_11_2);
+    if let Some(there) = there {
+        let asked = About::new(&signal, &reference, rate, there.sample_rate()?);
+        let shown = args.lake.display();
+        return match there.check(&asked) {
+            Ok(()) => Ok(there),
+            Err(why) => bail!("{shown}: what is asked for is not as the lake: {why}"),
+        };
+    }
+    let options = ReadOptions::new().time(&args.time).require(&signal).require(&reference);
+    let mut first = None;
+    for source in sources {
+        let rated = source.read(&options).map_err(anyhow::Error::from).and_then(|recording| {
+            Ok(rated(&recording.trial, &signal, &[], rate, None)?.sample_rate)
+        });
+        match (rated, &first) {
+            (Ok(sample_rate), _) => {
+                let about = About::new(&signal, &reference, rate, sample_rate);
+                about.write(&args.lake)?;
+                return Ok(about);
+            }
+            (Err(why), None) => first = Some(format!("{}: {why:#}", source.path.display())),
+            _ => {}
+        }
+    }
+    bail!("none of {} trials can be read; the first, {}", sources.len(), first.unwrap_or_default())
+}
+
+fn rest_lengths(lake: &Lake) -> HashMap<[String; 3], f64> {
+    let known =
+        |file: &LakeFile| Some((file.place.gauge().map(str::to_owned), file.footer.rest_length?));
+    lake.files.iter().filter_map(known).collect()
+}
+
+/// What trials are brought into.
+struct Ingest<'a> {
+    folder: &'a Path,
+    about: &'a About,
+    options: ReadOptions,
+    rest_length: Option<f64>,
+    /// Files of the lake by the digests of what they came from.
+    there: HashMap<&'a str, &'a LakeFile>,
+}
+
+enum Done {
+    Written(u64),
+    There,
+    Refused(Refused),
+}
+
+impl Ingest<'_> {
+    fn one(&self, source: &Source, rest: &mut Option<f64>) -> anyhow::Result<Done> {
+        let Ok(place) = &source.place else { return Ok(Done::There) };
+        let refused = |why: &str| refuse(self.folder, &source.path, why).map(Done::Refused);
+        let bytes = match fs::read(&source.path) {
+            Ok(bytes) => bytes,
+            Err(e) => return refused(&format!("it cannot be read: {e}")),
+        };
+        let of_file = digest([bytes.as_slice()]);
+        drop(bytes);
+        let path = self.folder.join("trials").join(place.folder());
+        let path = path.join(format!("{}.parquet", &of_file[..16]));
+        match self.there.get(of_file.as_str()) {
+            Some(there) if there.place == *place => return Ok(Done::There),
+            Some(there) => {
+                return refused(&format!(
+                    "the lake has it already as a trial of {}, and here it is said to be of {place}: take it out there, or leave it",
+                    there.place
+                ));
+            }
+            None => {}
+        }
+        let read = source.read(&self.options).map_err(anyhow::Error::from);
+        let made = read.and_then(|recording| {
+            let notes = recording.notes;
+            let (footer, samples) = self.samples(recording.trial, source, *rest)?;
+            Ok((Footer { notes, digest: of_file, ..footer }, samples))
+        });
+        let (footer, samples) = match made {
+            Ok(made) => made,
+            Err(why) if stretch_data::interrupted() => return Err(why),
+            Err(why) => return refused(&format!("{why:#}")),
+        };
+        if let Some(why) = self.second(&footer, place) {
+            return refused(&why);
+        }
+        let rows = samples.time_s.len() as u64;
+        write(&path, &footer, samples)?;
+        accept(self.folder, &source.path)?;
+        *rest = footer.rest_length;
+        Ok(Done::Written(rows))
+    }
+
+    /// Rows and description of a trial; `known` is the sensor's rest length where the lake has it.
+    fn samples(
+        &self,
+        trial: Trial,
+        source: &Source,
+        known: Option<f64>,
+    ) -> anyhow::Result<(Footer, Samples)> {
+        let About { signal, reference, rate, .. } = self.about;
+        let of_samples = samples_digest(&trial);
+        let reserved =
+            ["trial", "rate", "is_bridged", "contraction", "site", "rig", "sensor", "date"];
+        let others: Vec<&str> = trial
+            .channels
+            .iter()
+            .map(|channel| channel.name.as_str())
+            .filter(|name| name != signal && (name == reference || !reserved.contains(name)))
+            .collect();
+        let names: Vec<String> = std::iter::once(signal.as_str())
+            .chain(others.iter().copied())
+            .map(str::to_owned)
+            .collect();
+        let rated = rated(&trial, signal, &others, *rate, Some(self.about.sample_rate()?))?;
+        let period_s = trial.rate_hz().map_or(1.0 / self.about.sample_rate_hz, |hz| 1.0 / hz);
+        let mut samples = Samples {
+            channels: names.iter().map(|name| (name.clone(), Vec::new())).collect(),
+            ..Samples::default()
+        };
+        for part in rated.parts {
+            let begin_s = trial.time_s[0] + part.even.begin_s;
+            samples.time_s.extend((0..part.even.len()).map(|i| begin_s + i as f64 * period_s));
+            samples.is_bridged.extend(&part.even.is_lost);
+            for ((_, values), column) in samples.channels.iter_mut().zip(part.even.columns) {
+                values.extend(column);
+            }
+            samples.rate.extend(part.rate);
+        }
+        let mut rest = None;
+        if self.about.is_contraction {
+            let own = samples.channels.iter().find(|(name, _)| name == reference);
+            let lengths = own.map_or(&[][..], |(_, values)| values);
+            if let (Some(known), Some(given)) = (known, self.rest_length)
+                && known != given
+            {
+                bail!(
+                    "its sensor rests at {known} in the lake, and --rest-length says {given}: one fit cannot have two zeros"
+                );
+            }
+            let longest = || lengths.iter().copied().fold(f64::MIN, f64::max);
+            let own = known.or(self.rest_length).unwrap_or_else(longest);
+            ensure!(own > 0.0, "{reference} is {own} at most: no length above 0 to be at rest at");
+            rest = Some(own);
+            samples.contraction = Some(lengths.iter().map(|x| (own - x) / own).collect());
+        }
+        let units = names.iter().filter_map(|name| Some((name.clone(), unit(name)?.to_owned())));
+        let footer = Footer {
+            about: self.about.clone(),
+            units: units.collect(),
+            rest_length: rest,
+            dead_band: rated.dead_band,
+            kind: source.kind(),
+            split: source.split(),
+            start_s: source.start_s(),
+            source: source.path.display().to_string(),
+            samples: of_samples,
+            trial: trial.name,
+            digest: String::new(),
+            notes: Vec::new(),
+        };
+        Ok((footer, samples))
+    }
+
+    /// Why a trial is in the lake already, in another file.
+    fn second(&self, footer: &Footer, place: &Place) -> Option<String> {
+        let stem = |name: &str| Path::new(name).file_stem().map(|stem| stem.to_owned());
+        let mut beside = self.beside(place);
+        beside.find_map(|other| {
+            if other.samples == footer.samples {
+                return Some(format!(
+                    "its samples are those of {}, which is in the lake already: a trial counted twice would weigh double",
+                    other.source
+                ));
+            }
+            (stem(&other.trial) == stem(&footer.trial)).then(|| {
+                format!(
+                    "it is a second record of trial {} of {place}, with other samples than {}, which stays: rename it if it is \
+                     another trial, or take that one out of the lake",
+                    footer.trial, other.source
+                )
+            })
+        })
+    }
+
+    /// The footers of a place, those written just now too.
+    fn beside(&self, place: &Place) -> impl Iterator<Item = Footer> {
+        let folder = self.folder.join("trials").join(place.folder());
+        let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+        entries.filter_map(|entry| Footer::read(&entry.path()).ok())
+    }
+}
+
+/// A digest of time stamps and channels that does not depend on the format they were recorded in.
+fn samples_digest(trial: &Trial) -> String {
+    let mut bytes = Vec::new();
+    let mut take = |name: &str, values: &[f64]| {
+        bytes.extend_from_slice(name.as_bytes());
+        bytes.extend(values.iter().flat_map(|x| x.to_le_bytes()));
+    };
+    take("time_s", &trial.time_s);
+    trial.channels.iter().for_each(|channel| take(&channel.name, &channel.values));
+    digest([bytes.as_slice()])
+}

@@ -1,0 +1,100 @@
+//! A trial as a Parquet file, written whole.
+
+use std::{path::Path, sync::Arc};
+
+use datafusion::{
+    arrow::{
+        array::{ArrayRef, BooleanArray, Float64Array, RecordBatch, StringArray},
+        datatypes::{DataType, Field, Schema},
+    },
+    parquet::{
+        arrow::ArrowWriter,
+        basic::Compression,
+        file::{
+            metadata::{KeyValue, SortingColumn},
+            properties::WriterProperties,
+        },
+        schema::types::ColumnPath,
+    },
+};
+
+use super::{Footer, footer::KEY};
+
+/// Most rows of a row group: what one core reads at once.
+const GROUP_ROWS: usize = 1 << 20;
+
+/// The rows of a trial.
+#[derive(Debug, Default)]
+pub(crate) struct Samples {
+    pub time_s: Vec<f64>,
+    /// The trial's channels, with their names.
+    pub channels: Vec<(String, Vec<f64>)>,
+    /// Rate of the signal; none while the estimator warms up.
+    pub rate: Vec<Option<f64>>,
+    /// Contraction of the reference, where that is a length.
+    pub contraction: Option<Vec<f64>>,
+    /// Whether the sample was lost and is bridged.
+    pub is_bridged: Vec<bool>,
+}
+
+impl Samples {
+    fn batch(self, trial: &str) -> anyhow::Result<RecordBatch> {
+        let number = |name: &str, values| {
+            let field = Field::new(name, DataType::Float64, true);
+            (field, Arc::new(Float64Array::from(values)) as ArrayRef)
+        };
+        let names = StringArray::from_iter_values((0..self.time_s.len()).map(|_| trial));
+        let mut columns = vec![
+            (Field::new("trial", DataType::Utf8, false), Arc::new(names) as ArrayRef),
+            number("time_s", self.time_s),
+        ];
+        columns.extend(self.channels.into_iter().map(|(name, values)| number(&name, values)));
+        let rate = Arc::new(Float64Array::from(self.rate));
+        columns.push((Field::new("rate", DataType::Float64, true), rate));
+        columns.extend(self.contraction.map(|values| number("contraction", values)));
+        let bridged = Arc::new(BooleanArray::from(self.is_bridged));
+        columns.push((Field::new("is_bridged", DataType::Boolean, false), bridged));
+        let (fields, arrays): (Vec<Field>, Vec<ArrayRef>) = columns.into_iter().unzip();
+        Ok(RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays)?)
+    }
+}
+
+/// Writes a trial, whole or not at all; the folder is made.
+pub(crate) fn write(path: &Path, footer: &Footer, samples: Samples) -> anyhow::Result<()> {
+    let about = KeyValue::new(KEY.to_owned(), serde_json::to_string(footer)?);
+    let batch = samples.batch(&footer.trial)?;
+    write_parquet(path, &batch, vec![about], Some("time_s"))
+}
+
+/// Writes a table, whole or not at all; the folder is made.
+///
+/// Measured numbers neither repeat nor compress: they stand as they are, which is what is read fastest.
+pub(crate) fn write_parquet(
+    path: &Path,
+    batch: &RecordBatch,
+    about: Vec<KeyValue>,
+    sorted_by: Option<&str>,
+) -> anyhow::Result<()> {
+    let schema = batch.schema();
+    let place = sorted_by.and_then(|name| schema.index_of(name).ok());
+    let sorting = place.and_then(|i| i32::try_from(i).ok()).map(|column_idx| {
+        vec![SortingColumn { column_idx, descending: false, nulls_first: false }]
+    });
+    let mut properties = WriterProperties::builder()
+        .set_compression(Compression::UNCOMPRESSED)
+        .set_max_row_group_row_count(Some(GROUP_ROWS))
+        .set_key_value_metadata(Some(about))
+        .set_sorting_columns(sorting);
+    for field in schema.fields().iter().filter(|field| field.data_type().is_floating()) {
+        let column = ColumnPath::from(field.name().as_str());
+        properties = properties.set_column_dictionary_enabled(column, false);
+    }
+    let mut bytes = Vec::new();
+    let mut writer = ArrowWriter::try_new(&mut bytes, schema.clone(), Some(properties.build()))?;
+    writer.write(batch)?;
+    writer.close()?;
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder)?;
+    }
+    Ok(stretch_data::write_whole(path, |out| out.write_all(&bytes))?)
+}

@@ -1,0 +1,21 @@
+//! Lakes of trials: what the program `stretch-fleet` does.
+
+mod calibrate;
+mod command;
+mod diagnose;
+mod drift;
+mod false_discovery;
+mod flat;
+mod from_path;
+mod ingest;
+mod lake;
+mod make;
+mod month_test;
+mod records;
+mod session;
+mod show;
+mod sources;
+mod sql;
+mod states;
+
+pub use command::run;

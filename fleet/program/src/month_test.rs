@@ -1,0 +1,225 @@
+//! Whether a sensor's fit of one month is that of another.
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use stretch_fit::{Factor, Fit};
+
+/// The triangles of a day: rows whose rate is not below zero, and those below.
+pub(crate) type Day = [Option<Factor<f64, 7>>; 2];
+
+const TERMS: usize = 7;
+
+/// Fewest days of a month that its scatter can be told from.
+const LEAST_DAYS: usize = 4;
+
+/// What a comparison of two months says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Compared {
+    /// Root mean square change of the fit over the rows of both months, in units of the reference.
+    pub change: f64,
+    /// Rows that weigh as much as one independent one.
+    pub design_effect: f64,
+    /// Statistic, and its degrees of freedom.
+    pub f: f64,
+    pub freedom: [f64; 2],
+    /// Probability of so large a change where the sensor has not moved.
+    pub p: f64,
+}
+
+/// Tests whether one pair of surfaces fits both months.
+///
+/// With `u_d` the score of a day at the fit to both months, `U` their sum over the first month, and `H` its share of the
+/// information, `Q = U^T (H (1 - H))^-1 U` is what two fits explain over one: were residuals white, `Q` would be chi-square. They
+/// are not: rows of a day share its temperature, its donning, its slow motion. So days are taken for independent, and no row is:
+/// the scatter of the `u_d` about their month's mean gives the covariance of `U`, and `K = (H (1 - H))^-1 Cov(U)` its design
+/// effects. `Q` over their sum is referred to F with `(tr K)^2 / tr K^2` and that times the days less two degrees of freedom (Rao
+/// and Scott 1984, doi 10.1214/aos/1176346391, second order; Thomas and Rao, J. Am. Stat. Assoc. 82, 1987). Surfaces of
+/// both branches are tested as one model, each in units of its own residual.
+pub(crate) fn compare(first: &[Day], second: &[Day]) -> Result<Compared, String> {
+    for (which, days) in [("first", first), ("second", second)] {
+        if days.len() < LEAST_DAYS {
+            return Err(format!(
+                "{} days in the {which} month are too few to tell its scatter from: {LEAST_DAYS} are needed",
+                days.len()
+            ));
+        }
+    }
+    let branches = [0, 1].map(|branch| Branch::new(branch, first, second));
+    let [rising, falling] = branches;
+    let branches = [rising?, falling?];
+    let size = TERMS * branches.len();
+    let mut share = DMatrix::<f64>::zeros(size, size);
+    for (i, branch) in branches.iter().enumerate() {
+        share.view_mut((i * TERMS, i * TERMS), (TERMS, TERMS)).copy_from(&branch.share);
+    }
+    let rest = DMatrix::identity(size, size) - &share;
+    let scores = |days: &[Day]| -> Result<Vec<DVector<f64>>, String> {
+        days.iter().map(|day| score(&branches, day)).collect()
+    };
+    let (a, b) = (scores(first)?, scores(second)?);
+    let moved: DVector<f64> = a.iter().sum();
+    let undetermined = || "one of the months does not determine the surfaces by itself".to_owned();
+    let inverse = (&share * &rest).try_inverse().ok_or_else(undetermined)?;
+    let apart = &inverse * &moved;
+    let q = moved.dot(&apart);
+    let covariance =
+        &rest * scatter(&a) * rest.transpose() + &share * scatter(&b) * share.transpose();
+    let effects = inverse * covariance;
+    let sum = effects.trace();
+    let freedom = sum * sum / (&effects * &effects).trace();
+    let days = (first.len() + second.len() - 2) as f64;
+    let freedom = [freedom, freedom * days];
+    let f = q / sum;
+    let known = [sum, freedom[0], f].iter().all(|x| x.is_finite() && *x > 0.0);
+    let reference = FisherSnedecor::new(freedom[0], freedom[1]).ok().filter(|_| known);
+    let reference = reference.ok_or_else(undetermined)?;
+    Ok(Compared {
+        change: change(&branches, &apart),
+        design_effect: sum / size as f64,
+        f,
+        freedom,
+        p: reference.sf(f),
+    })
+}
+
+/// The fit of a branch to both months.
+struct Branch {
+    place: usize,
+    fit: Fit<f64, TERMS>,
+    /// Share of the first month of the information.
+    share: DMatrix<f64>,
+    /// Standard deviation of residuals about the fits of the months.
+    deviation: f64,
+}
+
+impl Branch {
+    fn new(place: usize, first: &[Day], second: &[Day]) -> Result<Self, String> {
+        let name = ["rising", "falling"][place];
+        let pooled = |days: &[Day]| {
+            let mut all = days.iter().filter_map(|day| day[place]);
+            let none = || format!("a month has no rows with a {name} signal");
+            let first = all.next().ok_or_else(none)?;
+            all.try_fold(first, |mut sum, day| sum.merge(&day).map(|()| sum))
+                .map_err(|e| format!("{name} signal: {e}"))
+        };
+        let months = [pooled(first)?, pooled(second)?];
+        let mut both = months[0];
+        both.merge(&months[1]).map_err(|e| e.to_string())?;
+        let told =
+            |factor: &Factor<f64, TERMS>| factor.fit().map_err(|e| format!("{name} signal: {e}"));
+        let (fit, apart) = (told(&both)?, [told(&months[0])?, told(&months[1])?]);
+        let freedom: u64 = apart.iter().map(Fit::dof).sum();
+        let squares: f64 = apart.iter().map(Fit::sse).sum();
+        let deviation = (squares / freedom.max(1) as f64).sqrt();
+        if !(deviation.is_finite() && deviation > 0.0) {
+            return Err(format!(
+                "{name} signal: the fit leaves nothing, so that nothing can be told from it"
+            ));
+        }
+        let share = fit.information(&months[0]).map_err(|e| e.to_string())?;
+        let share = DMatrix::from_fn(TERMS, TERMS, |i, j| share[i][j]);
+        Ok(Self { place, fit, share, deviation })
+    }
+}
+
+/// The scores of a day at both fits, in units of the residuals.
+fn score(branches: &[Branch; 2], day: &Day) -> Result<DVector<f64>, String> {
+    let mut all = DVector::zeros(TERMS * branches.len());
+    for (i, branch) in branches.iter().enumerate() {
+        let Some(part) = &day[branch.place] else { continue };
+        let scores = branch.fit.scores(part).map_err(|e| e.to_string())?;
+        for (k, score) in scores.iter().enumerate() {
+            all[i * TERMS + k] = score / branch.deviation;
+        }
+    }
+    Ok(all)
+}
+
+/// Covariance of the sum of the scores of independent days.
+fn scatter(scores: &[DVector<f64>]) -> DMatrix<f64> {
+    let count = scores.len() as f64;
+    let mean = scores.iter().sum::<DVector<f64>>() / count;
+    let squares = scores.iter().map(|score| (score - &mean) * (score - &mean).transpose());
+    squares.sum::<DMatrix<f64>>() * (count / (count - 1.0))
+}
+
+/// `sqrt(sum over rows of the change of the fit squared, by rows)`.
+fn change(branches: &[Branch; 2], apart: &DVector<f64>) -> f64 {
+    let own = branches.iter().enumerate().map(|(i, branch)| {
+        let part = apart.rows(i * TERMS, TERMS);
+        let squares = part.norm_squared() * branch.deviation * branch.deviation;
+        (squares, branch.fit.samples() as f64)
+    });
+    let (squares, rows) = own.fold((0.0, 0.0), |(a, b), (c, d)| (a + c, b + d));
+    (squares / rows).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stretch_core::Degree;
+    use stretch_fit::SurfaceAccumulator;
+    use stretch_gap::Dice;
+
+    /// A day whose rows share an error, beside one that goes slowly: white noise would be a wrong null.
+    fn day(dice: &mut Dice, gain: f64) -> Day {
+        let degree = Degree::POLY13;
+        let mut sides = [(); 2].map(|()| SurfaceAccumulator::<f64, 7, 64>::new(degree).unwrap());
+        let (shared, mut slow) = (0.004 * dice.gauss(), 0.0);
+        let begin = 6.0 * dice.unit();
+        for n in 0..200 {
+            let t = begin + 0.15 * f64::from(n);
+            let (v, rate) = (
+                0.5 - 0.5 * (1.3 * t).cos() + 0.2 * (3.1 * t).sin(),
+                (1.3 * t).sin() + (3.1 * t).cos(),
+            );
+            slow = 0.97 * slow + 0.001 * dice.gauss();
+            let x = 0.16 * gain * (v - 0.1 * rate + 0.1 * v * v) + shared + slow;
+            sides[usize::from(rate < 0.0)].push(rate, v, x).unwrap();
+        }
+        sides.map(|side| Some(side.factor()))
+    }
+
+    fn month(dice: &mut Dice, days: usize, gain: f64) -> Vec<Day> {
+        (0..days).map(|_| day(dice, gain)).collect()
+    }
+
+    /// Under the null P below 0.05 comes in a twentieth of the sensors, whatever rows of a day share: of 400 in 20 +- 4.4 where P
+    /// is exact. The F of the second order is an approximation, so that up to twice as many are let pass; white noise would call
+    /// nearly all of them.
+    #[test]
+    fn p_is_what_it_says_where_nothing_has_moved() {
+        let mut dice = Dice::new(5, 0);
+        for days in [8, 20] {
+            let mut called = 0;
+            let mut effect = 0.0;
+            for _ in 0..400 {
+                let compared =
+                    compare(&month(&mut dice, days, 1.0), &month(&mut dice, days, 1.0)).unwrap();
+                called += usize::from(compared.p < 0.05);
+                effect += compared.design_effect / 400.0;
+            }
+            println!("{days} days: {called} of 400 below 0.05, design effect {effect:.1}");
+            assert!((4..=40).contains(&called), "{days} days: {called} of 400");
+            assert!(effect > 5.0, "rows of a day belong together: {effect}");
+        }
+    }
+
+    #[test]
+    fn a_gain_that_moved_is_seen() {
+        let mut dice = Dice::new(6, 0);
+        let compared = compare(&month(&mut dice, 20, 1.0), &month(&mut dice, 20, 1.05)).unwrap();
+        assert!(compared.p < 1e-3, "{compared:?}");
+        // five hundredths of what moves between 0 and about 0.2
+        assert!((0.002..0.02).contains(&compared.change), "{compared:?}");
+    }
+
+    #[test]
+    fn what_cannot_be_compared_says_why() {
+        let mut dice = Dice::new(7, 0);
+        let whole = month(&mut dice, 6, 1.0);
+        assert!(compare(&whole[..3], &whole).unwrap_err().contains("3 days in the first month"));
+        let half: Vec<Day> = whole.iter().map(|day| [day[0], None]).collect();
+        assert!(compare(&whole, &half).unwrap_err().contains("no rows with a falling signal"));
+    }
+}

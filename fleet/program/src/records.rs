@@ -1,0 +1,98 @@
+//! Records that `stretch apply` takes, from the fits of a query.
+
+use std::path::Path;
+
+use anyhow::{Context, ensure};
+use datafusion::arrow::array::RecordBatch;
+use stretch_calibrate::{calibration_from_json, calibration_to_json};
+use stretch_core::{Calibration, Label, Provenance, Target};
+
+use crate::{
+    flat::{column, texts},
+    lake::{Lake, LakeFile, Refused},
+};
+
+/// Writes a record a row, in folders of site and rig where the answer has them; rows whose fit or record is refused come back with the reason.
+pub(crate) fn write_records(
+    lake: &Lake,
+    answer: &RecordBatch,
+    folder: &Path,
+) -> anyhow::Result<(usize, Vec<Refused>)> {
+    let records = column(answer, "record").context(
+        "the answer has no column record: select a fit, such as poly13_fit(rate, bridge_v, contraction)",
+    )?;
+    let records = texts(records)?;
+    let reasons = column(answer, "refused").map(texts).transpose()?;
+    let keys = ["site", "rig", "sensor", "date"];
+    let keys: Vec<_> = keys.iter().filter_map(|key| Some((*key, column(answer, key)?))).collect();
+    let keys: Vec<_> =
+        keys.into_iter().map(|(key, own)| Ok((key, texts(own)?))).collect::<anyhow::Result<_>>()?;
+    ensure!(
+        !keys.is_empty() || records.len() == 1,
+        "nothing names the {} records: select site, rig or sensor beside the fit",
+        records.len()
+    );
+    std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    let (mut written, mut refused) = (0, Vec::new());
+    for (row, record) in records.iter().enumerate() {
+        let of: Vec<(&str, &str)> =
+            keys.iter().map(|(key, own)| (*key, own[row].as_str())).collect();
+        let names: Vec<&str> = of.iter().map(|(_, name)| *name).collect();
+        let name = if names.is_empty() { "record".to_owned() } else { names.join("/") };
+        let reason = reasons.as_ref().map_or("", |reasons| &reasons[row]);
+        let made = match (record.is_empty(), reason) {
+            (false, _) => completed(lake, record, &of),
+            (true, "") => Err(anyhow::anyhow!(
+                "its fit has no record: the columns must be those of the lake, rate and signal among them"
+            )),
+            (true, reason) => Err(anyhow::anyhow!("{reason}")),
+        };
+        match made {
+            Ok(text) => {
+                let path = folder.join(format!("{name}.json"));
+                std::fs::create_dir_all(path.parent().unwrap_or(folder))?;
+                stretch_data::write_whole(path, |out| out.write_all(text.as_bytes()))?;
+                written += 1;
+            }
+            Err(why) => refused.push(Refused { file: name, why: format!("{why:#}") }),
+        }
+    }
+    Ok((written, refused))
+}
+
+/// A fit's record with what only the lake knows: the length behind a contraction, the dead band, and the trials.
+///
+/// A dead band cannot be told from sums. It is the median of those of the trials, three standard deviations of their rate's
+/// noise, as calibrate takes it.
+pub(crate) fn completed(lake: &Lake, record: &str, of: &[(&str, &str)]) -> anyhow::Result<String> {
+    let is_of = |file: &&LakeFile| {
+        of.iter().all(|(key, value)| match *key {
+            "site" => file.place.site == *value,
+            "rig" => file.place.rig == *value,
+            "sensor" => file.place.sensor == *value,
+            _ => file.place.date.to_string() == *value,
+        })
+    };
+    let files: Vec<&LakeFile> = lake.files.iter().filter(is_of).collect();
+    let mut spec = calibration_from_json(record, "record")?.into_spec();
+    if lake.about.is_contraction && spec.reference.as_str() == lake.about.target() {
+        let mut rests = files.iter().filter_map(|file| file.footer.rest_length);
+        let rest_length = rests.next().context("no trial says its rest length")?;
+        if let Some(other) = rests.find(|other| *other != rest_length) {
+            anyhow::bail!(
+                "its trials have rest lengths {rest_length} and {other}: contractions of two scales are fitted as one; fit {} instead, or each sensor by itself",
+                lake.about.reference
+            );
+        }
+        spec.target = Target::Contraction { rest_length };
+        spec.reference = Label::new(&lake.about.reference)?;
+    }
+    let mut bands: Vec<f64> = files.iter().map(|file| file.footer.dead_band).collect();
+    bands.sort_by(f64::total_cmp);
+    spec.dead_band = bands.get(bands.len() / 2).copied().unwrap_or(0.0);
+    let trials = files.iter().map(|file| file.footer.trial.as_str());
+    let last = files.iter().map(|file| file.place.date).max();
+    let date = last.map_or(String::new(), |date| date.to_string());
+    spec.provenance = Provenance::new(&date, trials);
+    Ok(calibration_to_json(&Calibration::new(spec)?)?)
+}

@@ -1,0 +1,35 @@
+//! Where queries run: here, or on a cluster.
+
+use std::sync::Arc;
+
+use datafusion::{
+    execution::runtime_env::RuntimeEnvBuilder,
+    prelude::{SessionConfig, SessionContext},
+};
+use stretch_fleet_cluster::connect;
+
+/// How much of the listing of a lake is kept from query to query: some hundred bytes a file.
+const LISTING_BYTES: usize = 256 << 20;
+
+/// A session with the functions of the library.
+///
+/// # Errors
+/// A URL that names no scheduler. One that does not answer is an error of the first query.
+pub(crate) async fn session(
+    cluster: Option<&str>,
+    threads: Option<usize>,
+) -> anyhow::Result<SessionContext> {
+    // Statistics of a file leave NaN out: a column of one number and NaN beside it would be read as that number throughout.
+    let mut config =
+        SessionConfig::new().with_information_schema(true).with_collect_statistics(false);
+    if let Some(threads) = threads {
+        config = config.with_target_partitions(threads.max(1));
+    }
+    let runtime = RuntimeEnvBuilder::new().with_object_list_cache_limit(LISTING_BYTES).build()?;
+    if let Some(url) = cluster {
+        return Ok(connect(url, config, Arc::new(runtime)).await?);
+    }
+    let session = SessionContext::new_with_config_rt(config, Arc::new(runtime));
+    stretch_fleet::register(&session);
+    Ok(session)
+}

@@ -1,0 +1,124 @@
+//! Partial fits, a day each: computed once, stored, and merged by whoever asks.
+
+use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
+
+use anyhow::Context;
+use chrono::NaiveDate;
+use datafusion::{
+    arrow::{
+        array::RecordBatch,
+        compute::concat_batches,
+        datatypes::{DataType, Field, Schema, SchemaRef},
+    },
+    parquet::{arrow::arrow_reader::ArrowReaderMetadata, file::metadata::KeyValue},
+    prelude::SessionContext,
+};
+
+use crate::{
+    lake::{Lake, LakeFile, digest, register_folder, write_parquet},
+    show::bar,
+};
+
+/// The key of what a file of states was computed from.
+const SOURCES: &str = "stretch.sources";
+
+/// Trials of a rig in a month: what one file of states is of.
+struct Unit<'a> {
+    path: PathBuf,
+    month: String,
+    files: Vec<&'a LakeFile>,
+}
+
+impl Unit<'_> {
+    /// A digest of the trials and of the functions' release: with other ones it is another.
+    fn sources(&self) -> String {
+        let version = format!("poly13 {} {}", stretch_fleet::VERSION, stretch_fleet::STATE_VERSION);
+        let names = self.files.iter().map(|file| file.footer.digest.as_bytes());
+        digest(std::iter::once(version.as_bytes()).chain(names))
+    }
+
+    fn is_done(&self) -> bool {
+        let file = std::fs::File::open(&self.path).ok();
+        let parquet =
+            file.and_then(|file| ArrowReaderMetadata::load(&file, Default::default()).ok());
+        let own = parquet.as_ref().and_then(|parquet| {
+            let pairs = parquet.metadata().file_metadata().key_value_metadata()?;
+            pairs.iter().find(|pair| pair.key == SOURCES)?.value.clone()
+        });
+        own == Some(self.sources())
+    }
+
+    /// Computes the states of all sensors and days in one pass, and writes them whole.
+    async fn compute(&self, lake: &Lake, session: &SessionContext) -> anyhow::Result<()> {
+        let Some(first) = self.files.first() else { return Ok(()) };
+        let [site, rig, _] = first.place.gauge();
+        let dates = self.files.iter().map(|file| file.place.date);
+        let (from, to) = dates.fold((NaiveDate::MAX, NaiveDate::MIN), |(from, to), date| {
+            (from.min(date), to.max(date))
+        });
+        let query = format!(
+            "select sensor, date, poly13_state(rate, \"{}\", \"{}\") as state from trials \
+             where site = '{site}' and rig = '{rig}' and date between date '{from}' and date '{to}' \
+             group by sensor, date order by sensor, date",
+            lake.about.signal,
+            lake.about.target()
+        );
+        let batches = session.sql(&query).await?.collect().await?;
+        let batch = plain(&batches)?;
+        let sources = KeyValue::new(SOURCES.to_owned(), self.sources());
+        write_parquet(&self.path, &batch, vec![sources], None)
+    }
+}
+
+/// The states as this program stores them, whatever types the engine gave texts.
+fn schema() -> SchemaRef {
+    Arc::new(Schema::new(vec![
+        Field::new("sensor", DataType::Utf8, true),
+        Field::new("date", DataType::Date32, true),
+        Field::new("state", DataType::Binary, true),
+    ]))
+}
+
+fn plain(batches: &[RecordBatch]) -> anyhow::Result<RecordBatch> {
+    let first = batches.first().context("the states of a month have no row")?;
+    let whole = concat_batches(&first.schema(), batches)?;
+    let schema = schema();
+    let columns = whole.columns().iter().zip(schema.fields());
+    let columns = columns
+        .map(|(array, field)| datafusion::arrow::compute::cast(array, field.data_type()))
+        .collect::<Result<_, _>>()?;
+    Ok(RecordBatch::try_new(schema, columns)?)
+}
+
+/// Computes the states that are not stored yet, or no longer of the trials that are there, and makes all of them the table
+/// `states`: site, rig, sensor, date, state. How many months were computed comes back.
+///
+/// A month of a rig is written whole; what a kill left undone is all that the next run does.
+pub(crate) async fn bring_up(lake: &Lake, session: &SessionContext) -> anyhow::Result<usize> {
+    let folder = lake.folder.join("states/poly13");
+    std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+    let mut units: BTreeMap<PathBuf, Unit<'_>> = BTreeMap::new();
+    for file in &lake.files {
+        let ([site, rig, _], month) = (file.place.gauge(), file.place.month());
+        let path = folder.join(format!("site={site}/rig={rig}/{month}.parquet"));
+        let unit = units.entry(path.clone());
+        unit.or_insert(Unit { path, month, files: Vec::new() }).files.push(file);
+    }
+    // states of trials that are gone
+    for path in crate::lake::files(&folder)? {
+        if !units.contains_key(&path) {
+            std::fs::remove_file(&path).with_context(|| path.display().to_string())?;
+        }
+    }
+    let open: Vec<_> = units.values().filter(|unit| !unit.is_done()).collect();
+    let bar = bar("months of rigs", open.len());
+    for unit in &open {
+        bar.set_message(format!("month {} of a rig", unit.month));
+        unit.compute(lake, session).await?;
+        bar.inc(1);
+        anyhow::ensure!(!stretch_data::interrupted(), "interrupted");
+    }
+    bar.finish_and_clear();
+    register_folder(session, "states", &folder, &["site", "rig"], schema())?;
+    Ok(open.len())
+}

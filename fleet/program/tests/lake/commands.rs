@@ -1,0 +1,127 @@
+//! The ready commands.
+
+use std::fs;
+
+use datafusion::arrow::array::{AsArray, BooleanArray};
+use stretch_data::{Channel, Trial};
+
+use crate::support::{bytes, file, fleet, parquet, refused, said, trial};
+
+/// Sensors that drift are found, others are not: four of ten sensors lose a twentieth of their gain.
+#[test]
+fn drift_names_the_sensors_that_moved() {
+    let folder = tempfile::tempdir().unwrap();
+    let (lake, table) = (folder.path().join("lake"), folder.path().join("drift.parquet"));
+    said(
+        "make --lake {} --sensors 10 --days 62 --rows 300 --drifting 0.4 --drift 0.05 --seed 3",
+        &[&lake],
+    );
+    let made = fs::read_to_string(lake.join("made.json")).unwrap();
+    let made: serde_json::Value = serde_json::from_str(&made).unwrap();
+    let drifting = made["drifting"].as_array().unwrap();
+    assert!((2..9).contains(&drifting.len()), "{made}");
+    let told =
+        said("drift --lake {} --from 2026-01 --to 2026-02 --out {} --json", &[&lake, &table]);
+    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
+    let moved: Vec<&str> =
+        told["moved"].as_array().unwrap().iter().filter_map(|name| name.as_str()).collect();
+    let names = drifting.iter().map(|name| format!("site-0/rig-00/{}", name.as_str().unwrap()));
+    assert_eq!(moved, names.collect::<Vec<_>>());
+    let (rows, _) = parquet(&table);
+    let column: &BooleanArray = rows.column_by_name("moved").unwrap().as_boolean();
+    assert_eq!((rows.num_rows(), column.true_count()), (10, moved.len()));
+    // a month of three days
+    let told = said("drift --lake {} --from 2026-01 --to 2026-03", &[&lake]);
+    assert!(told.contains("3 days in the second month are too few"), "{told}");
+    assert!(
+        refused("drift --lake {} --from 2026-01 --to 2026-01", &[&lake]).contains("against itself")
+    );
+    assert!(refused("drift --lake {} --from 1.26 --to 2026-01", &[&lake]).contains("is no month"));
+}
+
+#[test]
+fn answers_come_as_a_table_csv_and_records() {
+    let folder = tempfile::tempdir().unwrap();
+    let (lake, out) = (folder.path().join("lake"), folder.path().join("out"));
+    for sensor in ["a", "b"] {
+        let path = file(
+            folder.path(),
+            &trial(&format!("{sensor}.csv"), 1.0 + f64::from(sensor.as_bytes()[0])),
+        );
+        said(
+            &format!("ingest {{}} --lake {{}} --sensor {sensor} --date 2026-01-01"),
+            &[&path, &lake],
+        );
+    }
+    let ask = |more: &[&str], query: &str| {
+        let lake = lake.display().to_string();
+        let mut words = vec!["sql", "--lake", &lake, query];
+        words.extend(more);
+        let output =
+            std::process::Command::new(crate::support::PROGRAM).args(words).output().unwrap();
+        let (said, told) =
+            (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+        format!("{said}{told}")
+    };
+    let fit = "select sensor, poly13_fit(rate, bridge_v, contraction) as fit from trials group by sensor order by sensor";
+    let shown = ask(&[], fit);
+    assert!(
+        shown.contains("| sensor | rows | rows_left_out | rmse") && !shown.contains("schema"),
+        "{shown}"
+    );
+    let csv = ask(&["--csv"], fit);
+    assert!(csv.starts_with("sensor,rows,rows_left_out,rmse,"), "{csv}");
+    assert!(ask(&["--csv"], "select 1 as a where 1 = 2").starts_with('a'));
+    let told = ask(&["--records", &out.display().to_string()], fit);
+    assert!(told.contains("2 records, 0 refused"), "{told}");
+    let record = stretch_calibrate::read_calibration(&out.join("a.json")).unwrap();
+    assert_eq!((record.signal.as_str(), record.reference.as_str()), ("bridge_v", "length_mm"));
+    let told = ask(&["--records", &out.display().to_string()], "select count(*) from trials");
+    assert!(told.contains("the answer has no column record"), "{told}");
+    let told = ask(&[], "select nonsense from trials");
+    assert!(told.contains("nonsense"), "{told}");
+    // a query of its own, on what a record estimates
+    let text = fs::read_to_string(out.join("a.json")).unwrap().replace('\n', "");
+    let agreed = format!(
+        "select agreement(contraction, strain_estimate('{text}', rate, bridge_v)) as a from trials where sensor = 'a'"
+    );
+    let told = ask(&["--csv"], &agreed);
+    assert!(told.contains("rmse"), "{told}");
+}
+
+/// A gauge that is late by a twentieth of a second, diagnosed as what it is; the second run has nothing left to do.
+#[test]
+fn a_partition_is_diagnosed_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let (lake, out) = (folder.path().join("lake"), folder.path().join("out"));
+    let rod = |t: f64| 40.0 + 20.0 * (1.3 * t).sin() + 10.0 * (3.1 * t).sin();
+    let time_s: Vec<f64> = (0..4000).map(|i| 0.01 * f64::from(i)).collect();
+    let noise = |i: usize| 1e-3 * ((i * i * 7919) % 1000) as f64 / 1000.0;
+    let channel = |name: &str, values| Channel { name: name.into(), values };
+    let rod_mm = time_s.iter().map(|t| rod(*t)).collect();
+    let signal = time_s.iter().enumerate().map(|(i, t)| 0.02 * rod(t - 0.05) + noise(i)).collect();
+    let channels = vec![channel("rod_mm", rod_mm), channel("s1", signal)];
+    let path = file(folder.path(), &Trial { name: "rod.csv".into(), time_s, channels });
+    said(
+        "ingest {} --lake {} --sensor 1 --date 2026-01-01 --reference rod_mm --signal s1",
+        &[&path, &lake],
+    );
+    let told = said("diagnose --lake {} --out {}", &[&lake, &out]);
+    assert!(told.contains("1 of 1 data sets have a verdict, 1 diagnosed now"), "{told}");
+    let (verdict, _) = parquet(&out.join("verdicts.parquet"));
+    let text =
+        |name: &str| verdict.column_by_name(name).unwrap().as_string::<i32>().value(0).to_owned();
+    assert_eq!((text("verdict").as_str(), text("named").as_str()), ("effect", "channel_skew"));
+    for (name, least) in [("probability", 0.5), ("closed", 0.8)] {
+        let column = verdict.column_by_name(name).unwrap();
+        let value = column.as_primitive::<datafusion::arrow::datatypes::Float64Type>().value(0);
+        assert!((least..=1.0).contains(&value), "{name} {value}");
+    }
+    let before = bytes(&out.join("verdicts"));
+    let told = said("diagnose --lake {} --out {}", &[&lake, &out]);
+    assert!(told.contains("0 diagnosed now"), "{told}");
+    assert!(bytes(&out.join("verdicts")) == before);
+    assert!(
+        fleet("diagnose --lake {} --out {} --share 4/3", &[&lake, &out]).status.code() == Some(2)
+    );
+}

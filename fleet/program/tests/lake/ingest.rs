@@ -1,0 +1,151 @@
+//! From trials to a lake.
+
+use std::{fs, path::Path};
+
+use stretch_calibrate::{Options, calibrate, rated, read_calibration};
+use stretch_core::RateEstimator;
+
+use crate::support::{bytes, file, fleet, only, parquet, refused, rows, said, trial};
+
+#[test]
+fn a_trial_is_a_file_and_a_second_ingest_changes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let (logs, lake) = (folder.path().join("logs"), folder.path().join("lake"));
+    file(&logs, &trial("ulm/r2/0042/20260103_a.csv", 0.0));
+    file(&logs, &trial("ulm/r2/0043/20260103_a.csv", 1.0));
+    let line = "ingest {} --lake {} --from-path {site}/{rig}/{sensor}/{date}_*.csv";
+    assert!(
+        said(line, &[&logs, &lake])
+            .contains("2 trials written (1200 rows), 0 there already, 0 refused")
+    );
+    let before = bytes(&lake);
+    let found = only(&lake.join("trials/site=ulm/rig=r2/sensor=0042/date=2026-01-03"));
+    let (batch, about) = parquet(&found);
+    let schema = batch.schema();
+    let names: Vec<&str> = schema.fields().iter().map(|f| f.name().as_str()).collect();
+    assert_eq!(
+        names,
+        ["trial", "time_s", "bridge_v", "length_mm", "rate", "contraction", "is_bridged"]
+    );
+    let text = about[0].value.clone().unwrap();
+    for said in
+        [r#""units":{"bridge_v":"v","length_mm":"mm"}"#, r#""savitzky_golay""#, r#""digest":""#]
+    {
+        assert!(text.contains(said), "{said} is not in {text}");
+    }
+    assert!(
+        said(line, &[&logs, &lake])
+            .contains("0 trials written (0 rows), 2 there already, 0 refused")
+    );
+    assert!(bytes(&lake) == before, "a second ingest changed something");
+}
+
+/// Rates are those that `calibrate` fits on, bit for bit.
+#[test]
+fn rates_are_those_of_a_calibration() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut one = trial("a.csv", 0.3);
+    // a gap: what warms up anew behind it has no rate
+    for values in
+        std::iter::once(&mut one.time_s).chain(one.channels.iter_mut().map(|c| &mut c.values))
+    {
+        values.drain(300..320);
+    }
+    let path = file(folder.path(), &one);
+    let lake = folder.path().join("lake");
+    said("ingest {} --lake {} --sensor 1 --date 2026-01-01", &[&path, &lake]);
+    let read = stretch_data::Trial::read(&path, &stretch_data::ReadOptions::new()).unwrap();
+    let rated = rated(&read, "bridge_v", &[], RateEstimator::SAVGOL_11_2, None).unwrap();
+    let expected: Vec<f64> =
+        rated.parts.iter().flat_map(|part| part.rate.iter().flatten().copied()).collect();
+    let told = rows(&lake, "select time_s, rate from trials order by time_s");
+    assert_eq!((told.len(), rated.parts.len()), (580, 2));
+    let found: Vec<f64> = told.iter().filter_map(|row| row[1].parse().ok()).collect();
+    assert_eq!(found, expected);
+    assert_eq!(told[300][0].parse::<f64>().unwrap(), 3.2);
+}
+
+/// The record of a fleet is that of `stretch calibrate` without a dead band, up to the order of sums.
+#[test]
+fn a_record_is_that_of_a_calibration() {
+    let folder = tempfile::tempdir().unwrap();
+    let trials = [trial("a.csv", 0.0), trial("b.csv", 2.0)];
+    let paths = trials.each_ref().map(|one| file(folder.path(), one));
+    let (lake, out) = (folder.path().join("lake"), folder.path().join("out"));
+    said(
+        "ingest {} {} --lake {} --sensor 1 --date 2026-01-01 --rest-length 180",
+        &[&paths[0], &paths[1], &lake],
+    );
+    assert!(
+        said("calibrate --lake {} --out {}", &[&lake, &out])
+            .contains("1 records of 1 sensors, 0 refused")
+    );
+    let found = read_calibration(&out.join("site/rig/1.json")).unwrap();
+    let read =
+        |path: &Path| stretch_data::Trial::read(path, &stretch_data::ReadOptions::new()).unwrap();
+    let read = paths.each_ref().map(|path| read(path));
+    let options = Options { dead_band: Some(0.0), rest_length: Some(180.0), ..Options::default() };
+    let expected = calibrate(&read, &options).unwrap().calibration;
+    assert_eq!((found.target, found.polarity), (expected.target, expected.polarity));
+    assert_eq!(found.provenance.trial_count(), 2);
+    assert!(found.dead_band > 0.0);
+    // estimates agree wherever the branch does: the bands are not the same
+    let mut found = found.into_spec();
+    found.dead_band = 0.0;
+    let found = stretch_core::Calibration::new(found).unwrap();
+    let estimates = |calibration| stretch_calibrate::apply(calibration, &read[0]).unwrap();
+    let (a, b) = (estimates(&found), estimates(&expected));
+    let both = a
+        .readings
+        .iter()
+        .zip(&b.readings)
+        .filter_map(|(a, b)| a.as_ref().ok().zip(b.as_ref().ok()));
+    let worst = both.map(|(a, b)| (a.estimate - b.estimate).abs()).fold(0.0, f64::max);
+    // millimetres; a surface of 600 samples in other units and another order of sums
+    assert!(worst < 1e-6, "{worst}");
+}
+
+#[test]
+fn a_damaged_trial_is_named_and_the_rest_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let (logs, lake) = (folder.path().join("logs"), folder.path().join("lake"));
+    file(&logs, &trial("1_20260101.csv", 0.0));
+    file(&logs, &trial("2_20260101.csv", 1.0));
+    let text = fs::read_to_string(logs.join("2_20260101.csv")).unwrap();
+    fs::write(logs.join("2_20260101.csv"), text.replacen("\n0.05,", "\nnonsense,", 1)).unwrap();
+    fs::write(logs.join("notes.txt"), "to do: coffee").unwrap();
+    let line = "ingest {} --lake {} --from-path {sensor}_{date}.csv";
+    let told = said(line, &[&logs, &lake]);
+    assert!(told.contains("1 trials written (600 rows), 0 there already, 2 refused"), "{told}");
+    assert!(told.contains("2_20260101.csv") && told.contains("nonsense"), "{told}");
+    assert!(told.contains("does not fit the pattern"), "{told}");
+    assert_eq!(bytes(&lake.join("refused")).len(), 2);
+    // put right, it is in the lake, and no longer named
+    fs::write(logs.join("2_20260101.csv"), text).unwrap();
+    assert!(
+        said(line, &[&logs, &lake])
+            .contains("1 trials written (600 rows), 1 there already, 1 refused")
+    );
+    assert_eq!(bytes(&lake.join("refused")).len(), 1);
+}
+
+#[test]
+fn what_nobody_says_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = file(folder.path(), &trial("a.csv", 0.0));
+    let lake = folder.path().join("lake");
+    let told = said("ingest {} --lake {} --date 2026-01-01", &[&path, &lake]);
+    assert!(told.contains("which sensor it is of: --sensor NAME"), "{told}");
+    let told = said("ingest {} --lake {} --sensor 1", &[&path, &lake]);
+    assert!(told.contains("of which day it is: --date"), "{told}");
+    let told = said("ingest {} --lake {} --sensor a/b --date 2026-01-01", &[&path, &lake]);
+    assert!(told.contains("cannot be a sensor"), "{told}");
+    let told = said("ingest {} --lake {} --sensor 1 --date 3.1.2026", &[&path, &lake]);
+    assert!(told.contains("is no date: write 2026-11-21"), "{told}");
+    let told = refused("sql --lake {} x", &[folder.path()]);
+    assert!(told.contains("is no lake"), "{told}");
+    let told =
+        refused("ingest {} --lake {} --signal knee_v", &[&path, &folder.path().join("other")]);
+    assert!(told.contains("knee_v"), "{told}");
+    assert!(fleet("ingest", &[]).status.code() == Some(2));
+}

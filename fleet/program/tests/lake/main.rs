@@ -1,0 +1,8 @@
+//! The program `stretch-fleet`, run as it is run.
+
+mod bad_input;
+mod cluster;
+mod commands;
+mod ingest;
+mod kills;
+mod support;

@@ -1,0 +1,141 @@
+//! Trials, lakes, and the program.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output},
+    sync::Arc,
+};
+
+use datafusion::{
+    arrow::array::{ArrayRef, RecordBatch},
+    parquet::{
+        arrow::{ArrowWriter, arrow_reader::ParquetRecordBatchReaderBuilder},
+        file::{metadata::KeyValue, properties::WriterProperties},
+    },
+};
+use stretch_data::{Channel, Trial};
+
+pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_stretch-fleet");
+
+/// Runs the program; a word a piece of `line`, {} standing for the paths.
+pub(crate) fn fleet(line: &str, paths: &[&Path]) -> Output {
+    let mut paths = paths.iter();
+    let words = line.split_whitespace().map(|word| match word {
+        "{}" => paths.next().expect("a path").display().to_string(),
+        word => word.to_owned(),
+    });
+    Command::new(PROGRAM).args(words.collect::<Vec<_>>()).output().expect("the program runs")
+}
+
+/// What it says, having succeeded.
+pub(crate) fn said(line: &str, paths: &[&Path]) -> String {
+    let output = fleet(line, paths);
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{line}: {told}");
+    format!("{}{told}", String::from_utf8_lossy(&output.stdout))
+}
+
+/// What it says, having failed.
+pub(crate) fn refused(line: &str, paths: &[&Path]) -> String {
+    let output = fleet(line, paths);
+    assert!(!output.status.success(), "{line} did not fail");
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// The answer of a query as CSV, a line a row.
+pub(crate) fn rows(lake: &Path, query: &str) -> Vec<Vec<String>> {
+    let output = Command::new(PROGRAM)
+        .args(["sql", "--csv", "--lake", &lake.display().to_string(), query])
+        .output()
+        .expect("the program runs");
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{query}: {told}");
+    let text = String::from_utf8_lossy(&output.stdout);
+    text.lines().skip(1).map(|line| line.split(',').map(str::to_owned).collect()).collect()
+}
+
+/// A sleeve that goes up and down twice, with millivolts of noise; `phase` makes it another trial.
+pub(crate) fn trial(name: &str, phase: f64) -> Trial {
+    let time_s: Vec<f64> = (0..600).map(|n| f64::from(n) * 0.01).collect();
+    let shape = |t: f64| 0.08 - 0.06 * (2.1 * t + phase).cos() - 0.015 * (5.3 * t + phase).cos();
+    let noise = |n: usize| 1e-3 * ((n * n * 7919 % 1009) as f64 / 504.5 - 1.0);
+    let length = time_s.iter().map(|&t| 180.0 * (1.0 - shape(t))).collect();
+    let bridge = time_s.iter().enumerate();
+    let bridge = bridge.map(|(n, &t)| 1.24 + 6.0 * shape(t - 0.04) + noise(n)).collect();
+    let channel = |name: &str, values| Channel { name: name.into(), values };
+    let channels = vec![channel("length_mm", length), channel("bridge_v", bridge)];
+    Trial { name: name.into(), time_s, channels }
+}
+
+/// Writes a trial as CSV; its path comes back.
+pub(crate) fn file(folder: &Path, trial: &Trial) -> PathBuf {
+    let path = folder.join(&trial.name);
+    fs::create_dir_all(path.parent().expect("a folder")).expect("a folder can be made");
+    trial.write(&path).expect("a trial can be written");
+    path
+}
+
+/// Every file below a folder with its bytes.
+pub(crate) fn bytes(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let (mut found, mut folders) = (Vec::new(), vec![folder.to_owned()]);
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+            match entry.path() {
+                path if path.is_dir() => folders.push(path),
+                path => found.push((path.clone(), fs::read(path).expect("it can be read"))),
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+/// The one Parquet file below a folder.
+pub(crate) fn only(folder: &Path) -> PathBuf {
+    let all = bytes(folder);
+    let mut all = all.into_iter().map(|(path, _)| path);
+    let found = all.find(|path| path.extension().is_some_and(|ending| ending == "parquet"));
+    found.expect("a file of the lake")
+}
+
+/// A Parquet file's rows, and what its footer says.
+pub(crate) fn parquet(path: &Path) -> (RecordBatch, Vec<KeyValue>) {
+    let file = fs::File::open(path).expect("it can be opened");
+    let builder = ParquetRecordBatchReaderBuilder::try_new(file).expect("it is Parquet");
+    let about = builder.metadata().file_metadata().key_value_metadata().cloned();
+    let about = about.unwrap_or_default().into_iter().filter(|pair| pair.key != "ARROW:schema");
+    let about = about.collect();
+    let mut batches = builder.with_batch_size(1 << 20).build().expect("it can be read");
+    (batches.next().expect("a row").expect("rows"), about)
+}
+
+/// Writes a file of a lake anew with a column changed, or left out.
+pub(crate) fn altered(
+    path: &Path,
+    column: &str,
+    with: Option<ArrayRef>,
+    about: &dyn Fn(String) -> String,
+) {
+    let (batch, pairs) = parquet(path);
+    let schema = batch.schema();
+    let kept = schema.fields().iter().zip(batch.columns());
+    let kept = kept.filter_map(|(field, array)| match (field.name() == column, &with) {
+        (false, _) => Some((field.name().clone(), array.clone())),
+        (true, Some(with)) => Some((column.to_owned(), with.clone())),
+        (true, None) => None,
+    });
+    let batch = RecordBatch::try_from_iter(kept).expect("columns of one length");
+    let pairs =
+        pairs.into_iter().map(|pair| KeyValue::new(pair.key, pair.value.map(about))).collect();
+    let properties = WriterProperties::builder().set_key_value_metadata(Some(pairs)).build();
+    let file = fs::File::create(path).expect("it can be written");
+    let mut writer = ArrowWriter::try_new(file, batch.schema(), Some(properties)).expect("Parquet");
+    writer.write(&batch).expect("rows");
+    writer.close().expect("a footer");
+}
+
+/// Numbers as a column.
+pub(crate) fn numbers(values: impl IntoIterator<Item = f64>) -> ArrayRef {
+    Arc::new(values.into_iter().collect::<datafusion::arrow::array::Float64Array>())
+}

@@ -112,6 +112,9 @@ web/gate.sh
 step "FMUs, a workspace of their own"
 fmu/gate.sh
 
+step "fleet, a workspace of its own"
+fleet/gate.sh
+
 step "firmware in the emulator"
 if [ -x firmware/gate.sh ]; then
     firmware/gate.sh

@@ -10,6 +10,8 @@ TARGETS="thumbv7m-none-eabi thumbv7em-none-eabihf"
 step() { printf '\n=== %s (%ss)\n' "$1" "$SECONDS"; }
 skip() { printf 'SKIPPED: %s\n' "$1"; }
 have() { command -v "$1" >/dev/null 2>&1; }
+# a machine that is thrown away has no use for what was built, and may have no room for all of it
+spare() { [ "${STRETCH_SPARE_DISK:-0}" != 1 ] || rm -rf "$@"; }
 
 step "format"
 cargo fmt --all --check
@@ -92,6 +94,7 @@ step "fuzzing, twenty seconds a target"
 # a third of a minute or 200,000 executions each, two at a time: the same in every run, so that what it finds is of the change
 # at hand; it fails where a target crashes
 RUNS=200000 fuzz/run.sh 0.34
+spare fuzz/target
 
 step "Miri on the no_std crates"
 # proptest's cases are few there: a step is a thousand times slower
@@ -105,15 +108,15 @@ fi
 
 step "Python package"
 python/gate.sh
+spare python/target
 
 step "the reports' script, in a browser"
 web/gate.sh
+spare web/target
 
 step "FMUs, a workspace of their own"
 fmu/gate.sh
-
-step "fleet, a workspace of its own"
-fleet/gate.sh
+spare fmu/target
 
 step "firmware in the emulator"
 if [ -x firmware/gate.sh ]; then
@@ -121,6 +124,11 @@ if [ -x firmware/gate.sh ]; then
 else
     skip "there is no firmware yet"
 fi
+
+spare firmware/target target/debug
+step "fleet, a workspace of its own"
+fleet/gate.sh
+spare fleet/target
 
 step "oldest supported compiler"
 skip "only the toolchain of rust-toolchain.toml can be installed here; rust-version in Cargo.toml is what the dependencies ask for"

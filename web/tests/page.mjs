@@ -5,33 +5,16 @@
  *   BENCH a data set, WANTED a folder with what the program made of it: poly13.json, observer.json, header/stretch.h, diagnosis.json;
  *   and of linked.txt, which a board sent: linked.csv, linked.told
  */
-import { chromium } from "playwright-core";
-import { mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
+import { mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { join, resolve } from "node:path";
 import { tmpdir } from "node:os";
 import { pathToFileURL } from "node:url";
 import { faults } from "./layout.mjs";
+import { browser, check, ended, named, shots } from "./support.mjs";
 
-const FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update",
-  "--disable-sync", "--no-first-run"];
-const words = process.argv.slice(2);
-const option = (name) => {
-  const at = words.indexOf(name);
-  return at < 0 ? null : words.splice(at, 2)[1];
-};
-const shots = option("--shots");
-const [file, bench, wanted, golden] = words;
-if (shots) mkdirSync(shots, { recursive: true });
-
-let wrong = 0;
-const check = (good, what) => {
-  if (good) return;
-  wrong += 1;
-  console.log(`WRONG ${what}`);
-};
+const [file, bench, wanted, golden] = named;
 const text = (path) => readFileSync(path, "utf8");
 
-const browser = await chromium.launch({ executablePath: process.env.CHROMIUM || "/usr/bin/chromium", headless: true, args: FLAGS });
 const url = pathToFileURL(resolve(file)).href;
 
 /** A fresh page; whatever it asks for beyond itself, and whatever it complains of, is wrong. */
@@ -289,5 +272,4 @@ for (const [name, step] of Object.entries(steps)) {
   await step().catch((error) => check(false, `${name}: ${error.message}`));
   console.log(`${name}: ${((performance.now() - begun) / 1000).toFixed(0)} s`);
 }
-await browser.close();
-if (wrong) process.exit(1);
+await ended();

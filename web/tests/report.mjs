@@ -2,25 +2,10 @@
  * Opens reports in a browser, at the width of a phone and of a desk, in light and dark, and touches them.
  * node report.mjs [--shots DIR] REPORT.html ...
  */
-import { chromium } from "playwright-core";
-import { mkdirSync } from "node:fs";
 import { basename, resolve } from "node:path";
 import { pathToFileURL } from "node:url";
 import { faults } from "./layout.mjs";
-
-const FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update",
-  "--disable-sync", "--no-first-run"];
-const words = process.argv.slice(2);
-const at = words.indexOf("--shots");
-const shots = at < 0 ? null : words.splice(at, 2)[1];
-if (shots) mkdirSync(shots, { recursive: true });
-
-let wrong = 0;
-const check = (good, what) => {
-  if (good) return;
-  wrong += 1;
-  console.log(`WRONG ${what}`);
-};
+import { browser, check, ended, named, shots } from "./support.mjs";
 
 /** Two fingers that part, as the browser's own touch input sends them. */
 const pinched = async (page, plot, size, name) => {
@@ -129,8 +114,7 @@ const touched = async (page, name) => {
   }
 };
 
-const browser = await chromium.launch({ executablePath: process.env.CHROMIUM || "/usr/bin/chromium", headless: true, args: FLAGS });
-for (const report of words) {
+for (const report of named) {
   const url = pathToFileURL(resolve(report)).href;
   for (const [width, scheme] of [[390, "light"], [390, "dark"], [1280, "light"], [1280, "dark"]]) {
     const name = `${basename(report, ".html")} ${width} ${scheme}`;
@@ -153,6 +137,5 @@ for (const report of words) {
   check(await page.locator("figure svg:visible").count() > 0, `${basename(report)}: without script the drawings stand`);
   await still.close();
 }
-await browser.close();
-console.log(wrong === 0 ? `${words.length} reports at two widths and in two lights` : `${wrong} faults`);
-process.exit(wrong === 0 ? 0 : 1);
+console.log(`${named.length} reports at two widths and in two lights`);
+await ended();

@@ -50,6 +50,26 @@ proptest! {
     }
 
     #[test]
+    fn columns_are_samples_pushed_one_by_one(
+        log in observations(Degree::POLY13, 0.5, 1..200),
+        cut in 0.0..1.0_f64,
+    ) {
+        let mut columns: SurfaceAccumulator<f64, 21, 16> = SurfaceAccumulator::new(Degree::POLY13).unwrap();
+        let (before, after) = log.samples.split_at((cut * log.samples.len() as f64) as usize);
+        for part in [before, after] {
+            let column = |of: fn(&Sample) -> f64| part.iter().map(of).collect::<Vec<f64>>();
+            columns.push_columns(&column(|s| s.0), &column(|s| s.1), &column(|s| s.2)).unwrap();
+        }
+        let one_by_one = accumulate::<16>(Degree::POLY13, &log.samples);
+        prop_assert_eq!(columns.factor(), one_by_one.factor());
+        // one that cannot be taken leaves all of its column out
+        let refused = columns.push_columns(&[1.0, f64::INFINITY], &[0.0; 2], &[0.0; 2]);
+        let is_refused = matches!(refused, Err(FitError::OutOfRange { field: "rate", .. }));
+        prop_assert!(is_refused, "{refused:?}");
+        prop_assert_eq!(columns.factor(), one_by_one.factor());
+    }
+
+    #[test]
     fn merging_parts_in_any_order_equals_one_pass(
         log in observations(Degree::POLY13, 0.5, 60..200),
         cuts in (0.0..1.0_f64, 0.0..1.0_f64),

@@ -12,7 +12,7 @@ use ballista_executor::executor_process::{ExecutorProcessConfig, start_executor_
 
 use crate::{
     codec::{Marked, Release},
-    ports::chosen,
+    ports::{chosen, say},
 };
 
 /// What an executor is started with.
@@ -93,6 +93,6 @@ pub async fn run_executor(options: ExecutorOptions) -> anyhow::Result<()> {
         override_physical_codec: Some(Marked::<BallistaPhysicalExtensionCodec>::new(&release)),
         ..defaults
     };
-    println!("{} {} for df://{host}:{scheduler_port}", release.who, release.version);
+    say(format_args!("{} {} for df://{host}:{scheduler_port}", release.who, release.version));
     start_executor_process(Arc::new(config)).await.map_err(|e| anyhow!("{}: {e}", release.who))
 }

@@ -1,6 +1,10 @@
-//! Ports that nobody listens on.
+//! Where a process of the cluster listens, chosen and told.
 
-use std::net::TcpListener;
+use std::{
+    fmt,
+    io::{self, Write},
+    net::TcpListener,
+};
 
 use anyhow::Context;
 
@@ -12,4 +16,9 @@ pub(crate) fn chosen(host: &str, port: u16) -> anyhow::Result<u16> {
     let listener =
         TcpListener::bind((host, 0)).with_context(|| format!("no free port at {host}"))?;
     Ok(listener.local_addr()?.port())
+}
+
+/// Tells where it is; whoever has closed standard output does not want to know.
+pub(crate) fn say(line: fmt::Arguments<'_>) {
+    let _ = writeln!(io::stdout().lock(), "{line}");
 }

@@ -15,7 +15,7 @@ use datafusion::{execution::SessionStateBuilder, prelude::SessionConfig};
 
 use crate::{
     codec::{Marked, Release},
-    ports::chosen,
+    ports::{chosen, say},
 };
 
 /// What a scheduler is started with.
@@ -62,7 +62,7 @@ pub async fn run_scheduler(options: SchedulerOptions) -> anyhow::Result<()> {
         override_physical_codec: Some(Marked::<BallistaPhysicalExtensionCodec>::new(&release)),
         ..SchedulerConfig::default()
     };
-    println!("scheduler {} at df://{address}", release.version);
+    say(format_args!("scheduler {} at df://{address}", release.version));
     let cluster = BallistaCluster::new_from_config(&config).await.map_err(|e| anyhow!("{e}"))?;
     start_server(cluster, address, Arc::new(config)).await.map_err(|e| anyhow!("{address}: {e}"))
 }

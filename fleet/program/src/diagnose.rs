@@ -11,9 +11,9 @@ use datafusion::{
     },
     parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder,
 };
-use stretch_bench::{GaugeSetup, GaugeSimulator, RigSetup, RigSimulator, Session};
+use stretch_bench::{Bench, GaugeSetup, GaugeSimulator, RigSetup, RigSimulator, Session};
 use stretch_data::{Channel, SessionTrial, Trial};
-use stretch_gap::{Diagnosis, Options, diagnose};
+use stretch_gap::{Diagnosis, Options};
 use stretch_sim::{Catalogue, Rig};
 
 use crate::{
@@ -158,22 +158,20 @@ fn verdict(lake: &Lake, files: &[&LakeFile], args: &Args) -> anyhow::Result<Diag
     let options = Options { threads: args.threads, seed: args.seed, ..Options::default() };
     let catalogue = Catalogue::default();
     let is_rig = trials.iter().all(|t| t.trial.channel("inlet").is_some());
-    let (told, stop) = (|_: &str| (), stretch_data::interrupted);
-    let (diagnosis, _) = if is_rig {
+    let bench: Bench = if is_rig {
         let (session, rig) = (Session::new(&trials)?, Rig::default());
-        let simulator = RigSimulator::new(RigSetup { session, rig, catalogue: &catalogue })?;
-        diagnose(&simulator, &options, &told, &stop)?
+        RigSimulator::new(RigSetup { session, rig, catalogue: &catalogue })?.into()
     } else {
-        let simulator = GaugeSimulator::new(&GaugeSetup {
+        let setup = GaugeSetup {
             trials: &trials,
             reference: &lake.about.reference,
             signal: &lake.about.signal,
             rig: None,
             catalogue: &catalogue,
-        })?;
-        diagnose(&simulator, &options, &told, &stop)?
+        };
+        GaugeSimulator::new(&setup)?.into()
     };
-    Ok(diagnosis)
+    Ok(bench.examine(&options, false, &|_| (), &stretch_data::interrupted)?.diagnosis)
 }
 
 /// A trial as it was recorded: samples that were lost are lost again.

@@ -31,7 +31,7 @@ fn dot<T: Real, const ROWS: usize>(v: &[T; ROWS], a: &[T; ROWS]) -> T {
     for (&v, &a) in v_tail.iter().zip(a_tail) {
         tail = tail + v * a;
     }
-    ((sums[0] + sums[1]) + (sums[2] + sums[3])) + tail
+    ((sums[0] + sums[2]) + (sums[1] + sums[3])) + tail
 }
 
 /// `a - s v` into each `a`, and `next . a` of the result: several columns at
@@ -65,7 +65,7 @@ fn reflect_then_dot<T: Real, const COLUMNS: usize, const ROWS: usize>(
     }
     let mut dots = [T::zero(); COLUMNS];
     for ((dot, sums), tail) in dots.iter_mut().zip(sums).zip(tails) {
-        *dot = ((sums[0] + sums[1]) + (sums[2] + sums[3])) + tail;
+        *dot = ((sums[0] + sums[2]) + (sums[1] + sums[3])) + tail;
     }
     dots
 }
@@ -88,7 +88,7 @@ fn reflect_then_square<T: Real, const ROWS: usize>(a: &mut [T; ROWS], s: T, v: &
         *a = *a - s * v;
         tail = tail + *a * *a;
     }
-    ((sums[0] + sums[1]) + (sums[2] + sums[3])) + tail
+    ((sums[0] + sums[2]) + (sums[1] + sums[3])) + tail
 }
 
 /// One reflection `I - beta w w^T` with `w = (head, v)`: what it takes to
@@ -110,12 +110,10 @@ impl<T: Real> Reflection<T> {
             return Self { head: T::zero(), beta: T::zero() };
         }
         let norm = square.sqrt();
-        let (head, beta) = if *d > T::zero() {
-            (*d + norm, T::one() / (norm * (norm + *d)))
-        } else {
-            (*d - norm, T::one() / (norm * (norm - *d)))
-        };
-        *d = if *d > T::zero() { -norm } else { norm };
+        // a choice of a number, not of a way: the sign changes from fold to fold, and a wrong guess costs more than the arithmetic
+        let signed = if *d > T::zero() { norm } else { -norm };
+        let (head, beta) = (*d + signed, T::one() / (norm * (norm + d.abs())));
+        *d = -signed;
         Self { head, beta }
     }
 

@@ -16,3 +16,4 @@ else
     echo "SKIPPED lints of fleet: rustup knows no clippy-driver"
 fi
 cargo test --quiet --locked --workspace
+python/gate.sh

@@ -14,10 +14,23 @@ use stretch_core::{Degree, MAX_DEGREE, Real};
 
 use crate::basis::exponents;
 
-/// `C(n, k)` for powers up to 5.
-fn binomial(n: u8, k: u8) -> f64 {
-    (0..k).fold(1.0, |c, m| c * f64::from(n - m) / f64::from(m + 1))
-}
+const POWERS: usize = MAX_DEGREE + 1;
+
+/// `C(n, k)` for all powers: Pascal's triangle.
+const BINOMIALS: [[f64; POWERS]; POWERS] = {
+    let mut c = [[0.0; POWERS]; POWERS];
+    let mut n = 0;
+    while n < POWERS {
+        c[n][0] = 1.0;
+        let mut k = 1;
+        while k <= n {
+            c[n][k] = c[n - 1][k - 1] + c[n - 1][k];
+            k += 1;
+        }
+        n += 1;
+    }
+    c
+};
 
 /// The upper triangle `S` with `(columns in v + by) = (columns in v) S`.
 ///
@@ -25,7 +38,7 @@ fn binomial(n: u8, k: u8) -> f64 {
 /// `v + by`.
 pub(crate) fn shift<T: Real, const TERMS: usize>(degree: Degree, by: T) -> [[T; TERMS]; TERMS] {
     let terms = exponents::<TERMS>(degree);
-    let mut powers = [T::one(); MAX_DEGREE + 1];
+    let mut powers = [T::one(); POWERS];
     for j in 1..powers.len() {
         powers[j] = powers[j - 1] * by;
     }
@@ -35,7 +48,8 @@ pub(crate) fn shift<T: Real, const TERMS: usize>(degree: Degree, by: T) -> [[T; 
         for column in row..degree.terms().min(TERMS) {
             let (k, j) = terms[column];
             if k == i && j >= m {
-                s[row][column] = T::from_f64(binomial(j, m)) * powers[usize::from(j - m)];
+                let (j, m) = (usize::from(j), usize::from(m));
+                s[row][column] = T::from_f64(BINOMIALS[j][m]) * powers[j - m];
             }
         }
     }

@@ -3,11 +3,12 @@
 //! ```sh
 //! cargo build --release --workspace --example speed
 //! target/release/examples/speed rows FOLDER 20000000 100    # rows, sensors; the files stay for others to read
+//! target/release/examples/speed once FOLDER 1000000000 10000 # the same, scan and fit alone, once: for minutes of rows
 //! target/release/examples/speed groups 10000 2000           # sensors, rows of each, in turn
 //! target/release/examples/speed states FOLDER 10000 365     # sensors, states of each
 //! ```
 //!
-//! Each line is a query: threads, seconds (the shortest of three), nanoseconds a row by the clock and computed by all threads,
+//! Each line is a query: threads, seconds (the shortest of seven), nanoseconds a row by the clock and computed by all threads,
 //! and the most memory that the process had until then.
 
 use std::{fs, path::Path, sync::Arc, time::Instant};
@@ -29,7 +30,33 @@ use stretch_fit::SurfaceAccumulator;
 const FILE: usize = 1 << 20;
 
 /// Repetitions, of which the shortest counts.
-const TIMES: usize = 3;
+const TIMES: usize = 7;
+
+/// What is asked of rows.
+const QUERIES: [(&str, &str); 7] = [
+    ("scan", "select sum(rate), sum(bridge_v), sum(contraction) from trials"),
+    (
+        "scan by sensor",
+        "select sensor, sum(rate), sum(bridge_v), sum(contraction) from trials group by sensor",
+    ),
+    (
+        "regr_slope by sensor",
+        "select sensor, regr_slope(contraction, bridge_v) from trials group by sensor",
+    ),
+    (
+        "linear_fit by sensor",
+        "select sensor, linear_fit(bridge_v, contraction) from trials group by sensor",
+    ),
+    ("poly13_fit", "select poly13_fit(rate, bridge_v, contraction) from trials"),
+    (
+        "poly13_fit by sensor",
+        "select sensor, poly13_fit(rate, bridge_v, contraction) from trials group by sensor",
+    ),
+    (
+        "agreement by sensor",
+        "select sensor, agreement(contraction, bridge_v) from trials group by sensor",
+    ),
+];
 
 fn schema() -> SchemaRef {
     let number = |name: &str| Field::new(name, DataType::Float64, true);
@@ -86,28 +113,30 @@ fn most_memory_mb() -> u64 {
     line.and_then(|line| line.trim().strip_suffix(" kB")?.parse::<u64>().ok()).unwrap_or(0) / 1024
 }
 
+/// Asks queries in turn, so that what else the machine does meets all of them alike, and tells the shortest of each.
 async fn timed(
-    name: &str,
     session: &SessionContext,
-    threads: usize,
-    rows: usize,
-    sql: &str,
+    (threads, rows, times): (usize, usize, usize),
+    queries: &[(&str, &str)],
 ) -> Result<()> {
-    let (mut shortest, mut computed) = (f64::INFINITY, f64::INFINITY);
-    let mut groups = 0;
-    for _ in 0..TIMES {
-        let (begin, before) = (Instant::now(), computed_s());
-        let batches = session.sql(sql).await?.collect().await?;
-        shortest = shortest.min(begin.elapsed().as_secs_f64());
-        computed = computed.min(computed_s() - before);
-        groups = batches.iter().map(RecordBatch::num_rows).sum();
+    let mut best = vec![(f64::INFINITY, f64::INFINITY, 0); queries.len()];
+    for _ in 0..times {
+        for ((_, sql), (shortest, computed, groups)) in queries.iter().zip(&mut best) {
+            let (begin, before) = (Instant::now(), computed_s());
+            let batches = session.sql(sql).await?.collect().await?;
+            *shortest = shortest.min(begin.elapsed().as_secs_f64());
+            *computed = computed.min(computed_s() - before);
+            *groups = batches.iter().map(RecordBatch::num_rows).sum::<usize>();
+        }
     }
-    println!(
-        "{name:<26} {threads} threads {shortest:8.3} s {:8.2} ns a row {:8.2} ns computed {groups:6} groups {:6} MB",
-        1e9 * shortest / rows as f64,
-        1e9 * computed / rows as f64,
-        most_memory_mb()
-    );
+    for ((name, _), (shortest, computed, groups)) in queries.iter().zip(best) {
+        println!(
+            "{name:<26} {threads} threads {shortest:8.3} s {:8.2} ns a row {:8.2} ns computed {groups:6} groups {:6} MB",
+            1e9 * shortest / rows as f64,
+            1e9 * computed / rows as f64,
+            most_memory_mb()
+        );
+    }
     Ok(())
 }
 
@@ -133,47 +162,28 @@ fn plain(rows: usize) {
     );
 }
 
-async fn rows(folder: &Path, rows: usize, sensors: usize) -> Result<()> {
+/// Writes the files that are missing.
+fn lake(folder: &Path, rows: usize, sensors: usize) -> Result<()> {
     fs::create_dir_all(folder)?;
     let each = rows.div_ceil(sensors);
+    let begin = Instant::now();
     for (file, from) in (0..rows).step_by(FILE).enumerate() {
         let path = folder.join(format!("{file:05}.parquet"));
         if !path.exists() {
             write(&path, &batch(from, (from + FILE).min(rows), |k| k / each)?)?;
         }
     }
+    println!("{rows} rows written in {:.0} s", begin.elapsed().as_secs_f64());
+    Ok(())
+}
+
+async fn rows(folder: &Path, rows: usize, asked: &[(&str, &str)], times: usize) -> Result<()> {
     plain(rows);
     let path = folder.display().to_string();
     for threads in [1, 2] {
         let session = session(threads);
         session.register_parquet("trials", &path, ParquetReadOptions::default()).await?;
-        let queries = [
-            ("scan", "select sum(rate), sum(bridge_v), sum(contraction) from trials"),
-            (
-                "scan by sensor",
-                "select sensor, sum(rate), sum(bridge_v), sum(contraction) from trials group by sensor",
-            ),
-            (
-                "regr_slope by sensor",
-                "select sensor, regr_slope(contraction, bridge_v) from trials group by sensor",
-            ),
-            (
-                "linear_fit by sensor",
-                "select sensor, linear_fit(bridge_v, contraction) from trials group by sensor",
-            ),
-            ("poly13_fit", "select poly13_fit(rate, bridge_v, contraction) from trials"),
-            (
-                "poly13_fit by sensor",
-                "select sensor, poly13_fit(rate, bridge_v, contraction) from trials group by sensor",
-            ),
-            (
-                "agreement by sensor",
-                "select sensor, agreement(contraction, bridge_v) from trials group by sensor",
-            ),
-        ];
-        for (name, sql) in queries {
-            timed(name, &session, threads, rows, sql).await?;
-        }
+        timed(&session, (threads, rows, times), asked).await?;
     }
     Ok(())
 }
@@ -200,9 +210,9 @@ async fn groups(sensors: usize, each: usize) -> Result<()> {
     session.register_table("trials", Arc::new(MemTable::try_new(schema(), partitions)?))?;
     let sum =
         "select sensor, sum(rate), sum(bridge_v), sum(contraction) from trials group by sensor";
-    timed("scan by sensor", &session, 2, rows, sum).await?;
     let fit = "select sensor, poly13_fit(rate, bridge_v, contraction) from trials group by sensor";
-    timed("poly13_fit by sensor", &session, 2, rows, fit).await
+    timed(&session, (2, rows, TIMES), &[("scan by sensor", sum), ("poly13_fit by sensor", fit)])
+        .await
 }
 
 /// Stored states, a day's rows behind each, and the fits of all days.
@@ -240,9 +250,10 @@ async fn states(folder: &Path, sensors: usize, days: usize) -> Result<()> {
     let path = folder.display().to_string();
     session.register_parquet("states", &path, ParquetReadOptions::default()).await?;
     let rows = sensors * days;
-    timed("scan of states", &session, 2, rows, "select max(state) from states").await?;
+    let scan = "select max(state) from states";
     let sql = "select sensor, poly13_merge(state) from states group by sensor";
-    timed("poly13_merge by sensor", &session, 2, rows, sql).await
+    timed(&session, (2, rows, TIMES), &[("scan of states", scan), ("poly13_merge by sensor", sql)])
+        .await
 }
 
 #[tokio::main(flavor = "multi_thread", worker_threads = 2)]
@@ -250,8 +261,13 @@ async fn main() -> Result<()> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let number = |at: usize| args.get(at).and_then(|text| text.parse::<usize>().ok());
     match (args.first().map(String::as_str), number(1), number(2), number(3)) {
-        (Some("rows"), _, Some(count), Some(sensors)) => {
-            rows(args[1].as_ref(), count, sensors).await
+        (Some(how @ ("rows" | "once")), _, Some(count), Some(sensors)) => {
+            let folder = args[1].as_ref();
+            lake(folder, count, sensors)?;
+            match how {
+                "once" => rows(folder, count, &[QUERIES[0], QUERIES[5]], 1).await,
+                _ => rows(folder, count, &QUERIES, TIMES).await,
+            }
         }
         (Some("groups"), Some(sensors), Some(each), _) => groups(sensors, each).await,
         (Some("states"), _, Some(sensors), Some(days)) => {
@@ -259,7 +275,7 @@ async fn main() -> Result<()> {
         }
         _ => {
             eprintln!(
-                "speed rows FOLDER ROWS SENSORS | groups SENSORS ROWS | states FOLDER SENSORS DAYS"
+                "speed rows|once FOLDER ROWS SENSORS | groups SENSORS ROWS | states FOLDER SENSORS DAYS"
             );
             std::process::exit(2)
         }

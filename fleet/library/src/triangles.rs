@@ -116,24 +116,46 @@ impl<const TERMS: usize> Triangles<TERMS> {
         self.waiting.resize(total * self.sides, [[0.0; ROWS]; 3]);
         let nulls = NullBuffer::union(rate.nulls(), signal.nulls());
         let nulls = NullBuffer::union(nulls.as_ref(), reference.nulls());
-        let (rates, signals, references) = (rate.values(), signal.values(), reference.values());
-        for (row, &group) in groups.iter().enumerate() {
-            if filter.is_some_and(|kept| !(kept.is_valid(row) && kept.value(row))) {
-                continue;
+        let columns = [rate, signal, reference].map(|column| &column.values()[..groups.len()]);
+        let sides = self.sides;
+        let is_row = |row: usize| filter.is_none_or(|kept| kept.is_valid(row) && kept.value(row));
+        // false for NaN, too
+        let is_sound = |row: usize| {
+            let [r, v, x] = columns.map(|values| values[row].abs() <= MOST);
+            r & v & x & nulls.as_ref().is_none_or(|nulls| nulls.is_valid(row))
+        };
+        let place =
+            |row: usize| groups[row] * sides + usize::from(sides == 2 && columns[0][row] < 0.0);
+        let mut row = 0;
+        while row < groups.len() {
+            let mut end = row + 1;
+            if is_row(row) && is_sound(row) {
+                // rows of a trial come one after the other, and a branch lasts for many of them
+                let own = place(row);
+                while end < groups.len() && is_row(end) && is_sound(end) && place(end) == own {
+                    end += 1;
+                }
+                self.take(own, columns.map(|values| &values[row..end]))?;
+            } else if is_row(row) {
+                self.left_out[groups[row]] += 1;
             }
-            let (r, v, x) = (rates[row], signals[row], references[row]);
-            // false for NaN, too
-            let sound = r.abs() <= MOST && v.abs() <= MOST && x.abs() <= MOST;
-            if !sound || nulls.as_ref().is_some_and(|nulls| nulls.is_null(row)) {
-                self.left_out[group] += 1;
-                continue;
-            }
-            let place = group * self.sides + usize::from(r < 0.0 && self.sides == 2);
+            row = end;
+        }
+        Ok(())
+    }
+
+    /// Takes a place's rows in.
+    fn take(&mut self, place: usize, mut columns: [&[f64]; 3]) -> Result<()> {
+        while !columns[0].is_empty() {
             let filled = usize::from(self.filled[place]);
-            let [to_r, to_v, to_x] = &mut self.waiting[place];
-            (to_r[filled], to_v[filled], to_x[filled]) = (r, v, x);
-            self.filled[place] += 1;
-            if filled + 1 == ROWS {
+            let some = columns[0].len().min(ROWS - filled);
+            for (waiting, column) in self.waiting[place].iter_mut().zip(&mut columns) {
+                let (now, later) = column.split_at(some);
+                waiting[filled..filled + some].copy_from_slice(now);
+                *column = later;
+            }
+            self.filled[place] += some as u8;
+            if filled + some == ROWS {
                 self.fold(place)?;
             }
         }

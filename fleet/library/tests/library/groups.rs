@@ -40,14 +40,14 @@ fn groups_are_what_each_is_alone() {
     }
 }
 
-/// Ten thousand groups in a pool of 200 MB: nothing is spilled, for there is nowhere to spill to.
+/// Ten thousand groups in a pool of 512 MB: nothing is spilled, for there is nowhere to spill to.
 #[test]
 fn ten_thousand_groups_are_held_in_little_memory() {
     let rows = mixed(10_000, 20);
     let plain = session(&rows, 2);
     let table = plain.deregister_table("trials").unwrap().unwrap();
     let runtime = RuntimeEnvBuilder::new()
-        .with_memory_limit(200 << 20, 1.0)
+        .with_memory_limit(512 << 20, 1.0)
         .with_disk_manager_builder(
             datafusion::execution::disk_manager::DiskManagerBuilder::default()
                 .with_mode(datafusion::execution::disk_manager::DiskManagerMode::Disabled),

@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::support::{PROGRAM, bytes, only, said};
+use crate::support::{PROGRAM, bytes, file, only, said, trial};
 
 /// Starts the program, kills it once `is_reached`, and says whether it was still running then.
 fn killed(words: &[&str], is_reached: impl Fn() -> bool) -> bool {
@@ -35,6 +35,17 @@ fn count(folder: &Path) -> usize {
     bytes(folder).iter().filter(|(path, _)| is_parquet(path)).count()
 }
 
+/// Whether two lakes have the same files of trials, to the bit.
+fn same_trials(a: &Path, b: &Path) -> bool {
+    let relative = |lake: &Path| -> Vec<_> {
+        let all = bytes(&lake.join("trials")).into_iter();
+        let whole =
+            all.filter(|(path, _)| path.extension().is_some_and(|ending| ending == "parquet"));
+        whole.map(|(path, bytes)| (path.strip_prefix(lake).unwrap().to_owned(), bytes)).collect()
+    };
+    relative(a) == relative(b)
+}
+
 #[test]
 fn a_lake_that_was_killed_is_made_to_its_end() {
     let folder = tempfile::tempdir().unwrap();
@@ -49,13 +60,36 @@ fn a_lake_that_was_killed_is_made_to_its_end() {
     said("make --lake {} --sensors 6 --days 20 --rows 300", &[&killed_lake]);
     said("make --lake {} --sensors 6 --days 20 --rows 300", &[&whole]);
     assert!((5..120).contains(&left) && count(&killed_lake.join("trials")) == 120);
-    let relative = |lake: &Path| -> Vec<_> {
-        let all = bytes(&lake.join("trials")).into_iter();
-        let whole =
-            all.filter(|(path, _)| path.extension().is_some_and(|ending| ending == "parquet"));
-        whole.map(|(path, bytes)| (path.strip_prefix(lake).unwrap().to_owned(), bytes)).collect()
-    };
-    assert!(relative(&killed_lake) == relative(&whole), "a killed lake is another");
+    assert!(same_trials(&killed_lake, &whole), "a killed lake is another");
+}
+
+#[test]
+fn what_an_ingest_wrote_before_it_was_killed_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let [logs, killed_lake, whole] =
+        ["logs", "killed", "whole"].map(|name| folder.path().join(name));
+    let mut one = trial("", 0.0);
+    for k in 0..300 {
+        one.name = format!("ulm/r2/{:04}/20260103_a.csv", k);
+        // no two files have the same bytes: they would be the same trial
+        one.channels[1].values[0] = 1.24 + 1e-6 * f64::from(k);
+        file(&logs, &one);
+    }
+    let from_path = "{site}/{rig}/{sensor}/{date}_*.csv";
+    let [shown, to] = [&logs, &killed_lake].map(|path| path.display().to_string());
+    let words = ["ingest", &shown, "--lake", &to, "--from-path", from_path];
+    let trials = killed_lake.join("trials");
+    assert!(killed(&words, || count(&trials) >= 5), "it was too fast to be killed");
+    let left = count(&trials);
+    let before = fs::read(only(&trials)).unwrap();
+    let line = "ingest {} --lake {} --from-path {site}/{rig}/{sensor}/{date}_*.csv";
+    let told = said(line, &[&logs, &killed_lake]);
+    let missing = 300 - left;
+    assert!(told.contains(&format!("{missing} trials written")), "{left} were there: {told}");
+    assert!(told.contains(&format!("{left} there already, 0 refused")), "{told}");
+    assert!(fs::read(only(&trials)).unwrap() == before, "what was done was done again");
+    said(line, &[&logs, &whole]);
+    assert!(same_trials(&killed_lake, &whole), "a killed lake is another");
 }
 
 #[test]

@@ -4,16 +4,15 @@ use std::sync::Arc;
 
 use datafusion::{
     arrow::{
-        array::{ArrayRef, BinaryBuilder, BooleanArray},
-        datatypes::{DataType, Field, FieldRef},
+        array::{ArrayRef, BinaryBuilder, BooleanArray, RecordBatch},
+        datatypes::{DataType, Field, FieldRef, Schema},
     },
     common::{Result, ScalarValue, plan_datafusion_err},
     logical_expr::{
-        Accumulator, AggregateUDF, AggregateUDFImpl, EmitTo, GroupsAccumulator, Signature,
-        TypeSignature, Volatility,
+        Accumulator, AggregateUDF, AggregateUDFImpl, ColumnarValue, EmitTo, GroupsAccumulator,
+        Signature, TypeSignature, Volatility,
         function::{AccumulatorArgs, StateFieldsArgs},
     },
-    physical_expr::expressions::Literal,
     physical_plan::PhysicalExpr,
 };
 use stretch_core::{Degree, MAX_DEGREE, MAX_TERMS};
@@ -110,10 +109,13 @@ impl FitFunction {
 
 /// A power that is written in the query.
 fn power(expr: &Arc<dyn PhysicalExpr>, name: &str) -> Result<u8> {
-    let literal = expr.downcast_ref::<Literal>().map(Literal::value);
-    match literal {
-        Some(ScalarValue::Int64(Some(power))) if (0..=MAX_DEGREE as i64).contains(power) => {
-            Ok(*power as u8)
+    // what needs no column is known before there are rows; asked in this way it may be another library's, too
+    let nothing = RecordBatch::new_empty(Arc::new(Schema::empty()));
+    match expr.evaluate(&nothing) {
+        Ok(ColumnarValue::Scalar(ScalarValue::Int64(Some(power))))
+            if (0..=MAX_DEGREE as i64).contains(&power) =>
+        {
+            Ok(power as u8)
         }
         _ => Err(plan_datafusion_err!(
             "polyij_fit: {name} is {expr}, but must be a number from 0 to {MAX_DEGREE} that stands in the query"

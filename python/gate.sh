@@ -32,6 +32,8 @@ ls -l "$fresh"/wheels/*.whl | awk '{ print $5 " bytes: the wheel" }'
 # from elsewhere, so that it is the installed package that is tested
 tests=$PWD/tests notebook=$PWD/examples
 cd "$fresh"
+# as in an environment that is active: a problem.toml starts workers by the name python3
+export PATH=$fresh/use/bin:$PATH
 "$fresh/use/bin/python" -m doctest "$tests/../README.md"
 "$fresh/use/bin/pytest" -q -p no:cacheprovider "$tests"
 "$fresh/use/bin/python" "$notebook/run_notebook.py" "$notebook/quickstart.ipynb" >/dev/null

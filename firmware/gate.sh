@@ -80,7 +80,7 @@ printf '%s\n' "$measured" | awk '
 ' golden.txt "$budget" -
 
 if [ -z "$compiler" ]; then
-    echo "SKIPPED firmware in C: there is no arm-none-eabi-gcc (Debian: apt-get install gcc-arm-none-eabi)"
+    echo "SKIPPED firmware in C: there is no arm-none-eabi-gcc (Debian: apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi)"
     exit 0
 fi
 if ! grep -q "arm-none-eabi-gcc $compiler " c_budget.txt; then

@@ -17,6 +17,12 @@ use stretch_core::Real;
 /// Numbers that one pass of an inner loop handles side by side.
 const LANES: usize = 4;
 
+/// All lanes: halves first, as they lie in registers, or the compiler shuffles in the loops before.
+#[inline(always)]
+fn total<T: Real>(sums: [T; LANES]) -> T {
+    (sums[0] + sums[2]) + (sums[1] + sums[3])
+}
+
 /// `v . a`, in lanes.
 #[inline(always)]
 fn dot<T: Real, const ROWS: usize>(v: &[T; ROWS], a: &[T; ROWS]) -> T {
@@ -31,7 +37,7 @@ fn dot<T: Real, const ROWS: usize>(v: &[T; ROWS], a: &[T; ROWS]) -> T {
     for (&v, &a) in v_tail.iter().zip(a_tail) {
         tail = tail + v * a;
     }
-    ((sums[0] + sums[2]) + (sums[1] + sums[3])) + tail
+    total(sums) + tail
 }
 
 /// `a - s v` into each `a`, and `next . a` of the result: several columns at
@@ -65,7 +71,7 @@ fn reflect_then_dot<T: Real, const COLUMNS: usize, const ROWS: usize>(
     }
     let mut dots = [T::zero(); COLUMNS];
     for ((dot, sums), tail) in dots.iter_mut().zip(sums).zip(tails) {
-        *dot = ((sums[0] + sums[2]) + (sums[1] + sums[3])) + tail;
+        *dot = total(sums) + tail;
     }
     dots
 }
@@ -88,7 +94,7 @@ fn reflect_then_square<T: Real, const ROWS: usize>(a: &mut [T; ROWS], s: T, v: &
         *a = *a - s * v;
         tail = tail + *a * *a;
     }
-    ((sums[0] + sums[2]) + (sums[1] + sums[3])) + tail
+    total(sums) + tail
 }
 
 /// One reflection `I - beta w w^T` with `w = (head, v)`: what it takes to

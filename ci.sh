@@ -51,10 +51,10 @@ cargo run --quiet --release --locked -p stretch-gap --example motor >/dev/null
 echo motor
 
 step "every effect of the catalogue, simulated, diagnosed, written into the rig file and diagnosed again"
-cargo test --quiet --release --locked --test every_effect -- --ignored
+cargo test --quiet --release --locked --test it -- --ignored every_effect::
 
 step "errors of records and rig files, none of them given an effect's name"
-cargo test --quiet --release --locked -p stretch-bench --test gross -- --ignored
+cargo test --quiet --release --locked -p stretch-bench --test it -- --ignored gross::
 
 step "benches, each run once"
 cargo test --benches --locked --quiet >/dev/null

@@ -1,11 +1,9 @@
 //! Input that is wrong: each time a sentence that names the place, exit code 1,
 //! and nothing written.
 
-mod support;
-
 use std::fs::File;
 
-use support::{Scratch, calibrate, fails, stdout, stretch};
+use crate::support::{Scratch, calibrate, fails, stdout, stretch};
 
 #[track_caller]
 fn refused(text: &str, parts: &[&str]) {

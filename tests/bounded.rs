@@ -1,10 +1,8 @@
 //! Work and memory of a command are bounded by what it reads.
 
-mod support;
-
 use std::{fmt::Write as _, fs, path::Path, process::Command};
 
-use support::Scratch;
+use crate::support::Scratch;
 
 /// A log of a muscle that goes up and down, and a gauge that follows it.
 fn log(path: &Path, rows: u32, step_s: f64) {

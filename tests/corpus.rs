@@ -2,13 +2,11 @@
 //! exit code and the last line of standard error). Recordings in other formats than CSV have their own, in
 //! the crate that reads them.
 
-mod support;
-
 use std::{fs, path::Path};
 
+use crate::support::{Scratch, stretch, unbroken};
 use stretch_calibrate::calibration_to_json;
 use stretch_receptor::example_calibration;
-use support::{Scratch, stretch, unbroken};
 use testkit::corpus::is_as_it_should;
 
 /// A servo's problem whose worker answers with what a file holds.

@@ -1,11 +1,9 @@
 //! `stretch demo`, as a user runs it.
 
-mod support;
-
 use std::{fs, path::Path};
 
+use crate::support::{Scratch, fails, runs, stretch};
 use serde_json::Value;
-use support::{Scratch, fails, runs, stretch};
 use testkit::page::without_program;
 
 /// Both parts in one page that needs no network.

@@ -1,16 +1,14 @@
 //! `stretch diagnose` and `stretch blind` as a user runs them.
 
-mod support;
-
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
+use crate::support::{Scratch, fails, prints, runs, stretch};
 use approx::assert_abs_diff_eq;
 use assert_cmd::Command;
 use serde_json::Value;
-use support::{Scratch, fails, prints, runs, stretch};
 use testkit::{page::without_program, tolerance::TRAINED_APART};
 
 /// What a run that succeeds prints.

@@ -1,16 +1,14 @@
 //! `stretch diagnose` on a gauge alone, as a user runs it.
 
-mod support;
-
 use std::{
     f64::consts::TAU,
     fs,
     path::{Path, PathBuf},
 };
 
+use crate::support::{Scratch, fails, prints, runs, stretch};
 use approx::assert_abs_diff_eq;
 use serde_json::Value;
-use support::{Scratch, fails, prints, runs, stretch};
 use testkit::{page::without_program, tolerance::SKEW_FOUND_S};
 
 /// A little noise that comes out the same everywhere.

@@ -1,10 +1,8 @@
 //! The loop as a newcomer types it: a name, a simulator that agrees, a calibration that uses it, and C for a board.
 
-mod support;
-
 use std::{fs, process::Command};
 
-use support::{Scratch, fails, runs, stretch};
+use crate::support::{Scratch, fails, runs, stretch};
 
 /// A data set of the paper's protocol with an effect of the gauge.
 fn bench(scratch: &Scratch, effect: &str) -> std::path::PathBuf {

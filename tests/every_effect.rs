@@ -1,16 +1,14 @@
 //! Every effect of the catalogue, simulated and diagnosed as a newcomer would type it.
 
-mod support;
-
 use std::{fs, path::Path};
 
-use serde_json::Value;
-use stretch_sim::{CATALOGUE, Effect};
-use support::{
+use crate::support::{
     Scratch,
     round_trip::{diagnosed, is_agreed, replayed},
     stretch,
 };
+use serde_json::Value;
+use stretch_sim::{CATALOGUE, Effect};
 
 /// The effect at the middle of its range's first half, one threshold of several, its shapes at their typical values.
 fn spelled(effect: &Effect) -> String {

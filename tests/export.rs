@@ -1,14 +1,12 @@
 //! `stretch export`: from trials to C that a compiler takes, and what is refused.
 
-mod support;
-
 use std::{
     fs,
     path::{Path, PathBuf},
     process::Command,
 };
 
-use support::{Scratch, calibrate, fails, runs, stdout, stretch};
+use crate::support::{Scratch, calibrate, fails, runs, stdout, stretch};
 
 /// A calibration of that model, and the command that exports it to `c`.
 fn calibrated(scratch: &Scratch, arguments: &[&str]) -> PathBuf {

@@ -1,15 +1,13 @@
 //! `stretch diagnose --fix` and `--snippets`: from a name to a simulator that agrees, as a newcomer types it.
 
-mod support;
-
 use std::{fs, path::Path};
 
-use serde_json::Value;
-use support::{
+use crate::support::{
     Scratch, fails,
     round_trip::{diagnosed, is_agreed, replayed},
     runs, stretch,
 };
+use serde_json::Value;
 
 /// Two sessions of one arbitrary trial: one to fit, one to test.
 fn bench(scratch: &Scratch, effects: &[&str]) -> std::path::PathBuf {

@@ -1,9 +1,8 @@
 //! `stretch calibrate --fixed`: the record that a board reads, run on converter codes.
 
-mod support;
-
 use std::path::{Path, PathBuf};
 
+use crate::support::{Scratch, calibrate, fails, stdout};
 use stretch_calibrate::{parse_adc, read_calibration};
 use stretch_core::{Calibration, Design, Runner, Stage, Volts, record::load};
 use stretch_filter::RateFilter;
@@ -11,7 +10,6 @@ use stretch_receptor::{
     ObserverReceptor, Reading, StretchReceptor, Withheld,
     code::{Adc, AdcCode, CodeReading, FixedCalibration, FixedObserver, FixedReceptor},
 };
-use support::{Scratch, calibrate, fails, stdout};
 
 const ADC: &str = "12,0,3.3";
 

@@ -1,11 +1,9 @@
 //! `stretch fleet` hands on to the program beside it, or says where that comes from.
 #![cfg(unix)]
 
-mod support;
-
 use std::{fs, os::unix::fs::PermissionsExt};
 
-use support::{Scratch, stretch};
+use crate::support::{Scratch, stretch};
 
 #[test]
 fn without_the_program_it_says_how_to_build_it() {

@@ -1,8 +1,6 @@
 //! Commands that write, killed at any moment: what is there is old or new.
 #![cfg(unix)]
 
-mod support;
-
 use std::{
     collections::BTreeMap,
     fs,
@@ -11,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use support::{
+use crate::support::{
     Scratch,
     written::{command, prepared, tree, writes},
 };

@@ -1,8 +1,6 @@
 //! `stretch listen` on a pseudo-terminal, with everything that a cable does.
 #![cfg(unix)]
 
-mod support;
-
 use std::{
     fs::{self, File},
     io::{BufRead, BufReader, Read, Write},
@@ -13,6 +11,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use crate::support::{Scratch, calibrate, runs};
 use rustix::{
     process::{Pid, Signal, kill_process},
     pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt},
@@ -29,7 +28,6 @@ use stretch_receptor::{
     code::{Adc, AdcCode, AdcSpec, CodeReading, FixedCalibration, FixedReceptor},
     example_calibration,
 };
-use support::{Scratch, calibrate, runs};
 
 fn due() -> Adc {
     Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 }).unwrap()
@@ -246,9 +244,9 @@ fn a_start_that_fails_leaves_nothing_behind() {
             ["12 bits", "--adc-bits 12"],
         ),
     ] {
-        let mut command = support::stretch();
+        let mut command = crate::support::stretch();
         command.arg("listen").args(["--out", "trial.csv"]).args(arguments);
-        support::fails(command.current_dir(scratch.path("")), &parts);
+        crate::support::fails(command.current_dir(scratch.path("")), &parts);
         assert_eq!(scratch.names(), before, "{arguments:?}");
     }
 }
@@ -258,14 +256,14 @@ fn heard(bytes: &[u8]) -> (String, String) {
     let scratch = Scratch::new();
     scratch.write("cal.json", calibration_to_json(&example_calibration()).unwrap());
     scratch.write("frames", bytes);
-    let output = support::stretch()
+    let output = crate::support::stretch()
         .current_dir(scratch.path(""))
         .args(["listen", "--port", "frames", "--calibration", "cal.json", "--out", "trial.csv"])
         .output()
         .unwrap();
     assert!(output.status.success());
     let recorded = fs::read_to_string(scratch.path("trial.csv")).unwrap_or_default();
-    (support::unbroken(&String::from_utf8_lossy(&output.stderr)), recorded)
+    (crate::support::unbroken(&String::from_utf8_lossy(&output.stderr)), recorded)
 }
 
 #[test]
@@ -311,7 +309,7 @@ fn a_last_frame_without_newline_and_a_block_that_comes_twice_are_counted() {
 fn a_folder_is_no_port() {
     let scratch = Scratch::new();
     scratch.write("cal.json", calibration_to_json(&example_calibration()).unwrap());
-    let mut command = support::stretch();
+    let mut command = crate::support::stretch();
     command.current_dir(scratch.path("")).args([
         "listen",
         "--port",
@@ -319,7 +317,7 @@ fn a_folder_is_no_port() {
         "--calibration",
         "cal.json",
     ]);
-    support::fails(&mut command, &[".", "it is a folder", "name a serial port"]);
+    crate::support::fails(&mut command, &[".", "it is a folder", "name a serial port"]);
 }
 
 #[test]

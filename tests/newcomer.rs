@@ -1,10 +1,8 @@
 //! What somebody sees who has never used the program: own names, own units, own folders.
 
-mod support;
-
 use std::fmt::Write;
 
-use support::{Scratch, calibrate, fails, one_line, runs, stretch};
+use crate::support::{Scratch, calibrate, fails, one_line, runs, stretch};
 
 /// A trial with columns and a scale of its own: a reference of 151 to 179 and a gauge of 1.27 to 2.2 times `times`.
 fn trial(scratch: &Scratch, name: &str, header: &str, times: f64) -> std::path::PathBuf {

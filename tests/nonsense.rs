@@ -1,10 +1,8 @@
 //! Logs and records that do not belong to what is asked of them: it is said, and nothing is written.
 
-mod support;
-
 use std::{fmt::Write, fs};
 
-use support::{Scratch, calibrate, fails, one_line, runs, stretch};
+use crate::support::{Scratch, calibrate, fails, one_line, runs, stretch};
 
 /// The rows of a trial, each changed by its number.
 fn changed(

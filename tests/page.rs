@@ -1,10 +1,8 @@
 //! `stretch page`: written whole from where it was built, or a sentence.
 
-mod support;
-
 use std::fs;
 
-use support::{Scratch, fails, runs, stretch};
+use crate::support::{Scratch, fails, runs, stretch};
 
 const PAGE: &str = "<!DOCTYPE html>\n<html><body>a page</body></html>\n";
 

@@ -1,15 +1,13 @@
 //! The program as a user runs it.
 
-mod support;
-
 use std::{
     io::{BufRead, BufReader, Write},
     process::{Command, Stdio},
     time::Duration,
 };
 
+use crate::support::{Scratch, calibrate, stdout, stretch};
 use serde_json::Value;
-use support::{Scratch, calibrate, stdout, stretch};
 
 #[test]
 fn calibrate_apply_evaluate() {

@@ -1,10 +1,8 @@
 //! `stretch simulate`, `effects` and `rig` as a user runs them.
 
-mod support;
-
 use std::fs;
 
-use support::{Scratch, fails, prints, runs, stretch};
+use crate::support::{Scratch, fails, prints, runs, stretch};
 
 /// What a run that succeeds prints.
 #[test]

@@ -1,7 +1,5 @@
 //! A day on the line, as fast as the pipe: every frame that was sent is a row or is said to be lost.
 
-mod support;
-
 use std::{
     fs,
     io::{BufWriter, Write},
@@ -9,11 +7,11 @@ use std::{
     thread,
 };
 
+use crate::support::Scratch;
 use stretch_calibrate::calibration_to_json;
 use stretch_core::Branch;
 use stretch_link::{Answer, Frame};
 use stretch_receptor::{Domain, example_calibration};
-use support::Scratch;
 
 /// What the way does, drawn for every frame; the same in every run.
 struct Way {

@@ -2,8 +2,6 @@
 //! exit codes are right.
 #![cfg(unix)]
 
-mod support;
-
 use std::{
     collections::BTreeMap,
     fs::{self, File},
@@ -15,13 +13,13 @@ use std::{
     time::Duration,
 };
 
+use crate::support::Scratch;
 use stretch_calibrate::calibration_to_json;
 use stretch_link::Frame;
 use stretch_receptor::{
     code::{Adc, AdcSpec, FixedCalibration, FixedReceptor},
     example_calibration,
 };
-use support::Scratch;
 
 /// What stands behind a stream.
 #[derive(Debug, Clone, Copy, PartialEq)]

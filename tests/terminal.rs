@@ -1,12 +1,10 @@
 //! What every command has in common on a terminal: how much it says, how wide, in which colours, as JSON, through `-`, and with
 //! which status it ends.
 
-mod support;
-
 use std::fs;
 
+use crate::support::{Scratch, calibrate, fails, one_line, runs, stdout, stretch};
 use serde_json::Value;
-use support::{Scratch, calibrate, fails, one_line, runs, stdout, stretch};
 
 /// A rig with hysteresis, which a diagnosis names, and one without any effect.
 fn benches() -> Scratch {

@@ -1,8 +1,6 @@
 //! What a command writes is all there or not at all, whatever stands in its way.
 #![cfg(unix)]
 
-mod support;
-
 use std::{
     fs,
     os::unix::fs::FileTypeExt,
@@ -12,7 +10,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use support::{
+use crate::support::{
     fails, runs, stretch,
     written::{command, prepared, tree, writes},
 };

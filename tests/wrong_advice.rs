@@ -1,10 +1,8 @@
 //! What is said of a record that is wrong is what is wrong with it, and where.
 
-mod support;
-
 use std::{fmt::Write, fs, path::PathBuf};
 
-use support::{Scratch, calibrate, fails, one_line, prints, runs, stretch};
+use crate::support::{Scratch, calibrate, fails, one_line, prints, runs, stretch};
 
 /// Rows of a trial with their columns' names.
 type Rows = (Vec<String>, Vec<Vec<f64>>);

@@ -1,5 +1,4 @@
 //! What the tests of the program share: a scratch folder, trials, running.
-#![allow(dead_code)] // each test file uses its part
 
 pub(crate) mod round_trip;
 pub(crate) mod written;

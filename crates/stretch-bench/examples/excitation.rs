@@ -4,22 +4,15 @@
 //!
 //! `cargo run --release -p stretch-bench --example excitation`
 
-#[path = "../tests/support/effects.rs"]
-mod effects;
-#[path = "../tests/support/rigs.rs"]
-mod rigs;
-#[path = "../tests/support/session.rs"]
-mod simulated;
 #[path = "../tests/support/mod.rs"]
+#[allow(dead_code, reason = "the tests use the rest")]
 mod support;
 
-use effects::effect;
-use rigs::own_rig;
-use simulated::session;
 use stretch_bench::{RigSetup, RigSimulator, Session};
 use stretch_data::{Channel, SessionTrial};
 use stretch_gap::{Diagnosis, Options, diagnose};
 use stretch_sim::{Catalogue, EffectSet, Key, Rig};
+use support::{effects::effect, rigs::own_rig, session::session};
 
 /// Share of the excitation in the further trial.
 const LOW: f64 = 0.7;

@@ -1,17 +1,12 @@
 //! Gauges alone, with effects in forms that the catalogue does not have, diagnosed from end to end.
 
-mod support;
-
-#[path = "support/rows.rs"]
-mod rows;
-
+use crate::support::Noise;
+use crate::support::rows::{PROBABILITY, with_lost_rows};
 use approx::{abs_diff_eq, assert_abs_diff_eq};
-use rows::{PROBABILITY, with_lost_rows};
 use stretch_bench::{BenchError, GaugeSetup, GaugeSimulator};
 use stretch_data::{Channel, RigFile, SessionTrial, Split, Trial};
 use stretch_gap::{Diagnosis, Options, Simulator, VerdictKind, diagnose, next_experiment};
 use stretch_sim::{Catalogue, GaugeRig};
-use support::Noise;
 use testkit::tolerance::{FIT_WELL, GAIN_FOUND, RESUMED_S, SKEW_FOUND_S};
 
 const DT_S: f64 = 0.01;

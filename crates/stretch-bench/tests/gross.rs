@@ -1,16 +1,9 @@
 //! Errors of the record and of the rig file: told as what they are, never given an effect's name.
 
-#[path = "support/rigs.rs"]
-mod rigs;
-#[path = "support/rows.rs"]
-mod rows;
-#[path = "support/session.rs"]
-mod session;
-mod support;
-
-use rigs::own_rig;
-use rows::{PROBABILITY, with_lost_rows};
-use session::{DT_S, session};
+use crate::support::Noise;
+use crate::support::rigs::own_rig;
+use crate::support::rows::{PROBABILITY, with_lost_rows};
+use crate::support::session::{DT_S, session};
 use stretch_bench::{GaugeSetup, GaugeSimulator, RigSetup, RigSimulator, Session};
 use stretch_data::{Channel, SessionTrial, Split, Trial, TrialKind};
 use stretch_gap::{Diagnosis, GrossKind, Options, Simulator, VerdictKind, diagnose};
@@ -216,7 +209,7 @@ fn delayed(trial: &mut SessionTrial, name: &str, samples: i64) {
 
 /// Does it to a record.
 fn do_to(trials: &mut [SessionTrial], done: Done) {
-    let mut noise = support::Noise(7);
+    let mut noise = Noise(7);
     for (i, trial) in trials.iter_mut().enumerate() {
         match done {
             Column(name, of) => {
@@ -262,7 +255,7 @@ fn do_to(trials: &mut [SessionTrial], done: Done) {
 
 /// A gauge alone on a rod that is moved by hand, nothing wrong with it: two trials, the second to test on.
 fn gauge(seed: u64) -> Vec<SessionTrial> {
-    let mut noise = support::Noise(seed);
+    let mut noise = Noise(seed);
     let trial = |i: usize| {
         let rod = |t: f64| 170.0 + 8.0 * (1.3 * t + i as f64).sin() + 4.0 * (3.1 * t).sin();
         let time_s: Vec<f64> = (0..3000).map(|i| DT_S * i as f64).collect();

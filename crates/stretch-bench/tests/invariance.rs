@@ -1,23 +1,14 @@
 //! What must not change a name: rows dropped, time shifted, units scaled, trials permuted or one less, noise of a known level; and
 //! that nothing follows what is tested on.
 
-mod support;
-
-#[path = "support/effects.rs"]
-mod effects;
-#[path = "support/rigs.rs"]
-mod rigs;
-#[path = "support/session.rs"]
-mod simulated;
-
-use effects::effect;
-use rigs::own_rig;
-use simulated::{DT_S, session};
+use crate::support::Noise;
+use crate::support::effects::effect;
+use crate::support::rigs::own_rig;
+use crate::support::session::{DT_S, session};
 use stretch_bench::{GaugeSetup, GaugeSimulator, RigSetup, RigSimulator, Session};
 use stretch_data::{Channel, SessionTrial, Split};
 use stretch_gap::{Diagnosis, Model, Options, Run, Simulator, VerdictKind, diagnose};
 use stretch_sim::{Catalogue, EffectSet, Key, Rig, RigParams};
-use support::Noise;
 
 /// A rig as it stands in its file, and effects that the real one has.
 struct Case {

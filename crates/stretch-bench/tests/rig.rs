@@ -1,22 +1,10 @@
 //! Small sessions simulated by the catalogue's own rig, diagnosed from end to end.
 
-mod support;
-
-#[path = "support/rows.rs"]
-mod rows;
-
-#[path = "support/effects.rs"]
-mod effects;
-#[path = "support/rigs.rs"]
-mod rigs;
-#[path = "support/session.rs"]
-mod simulated;
-
+use crate::support::effects::effect;
+use crate::support::rigs::own_rig;
+use crate::support::rows::{PROBABILITY, with_lost_rows};
+use crate::support::session::session;
 use approx::{abs_diff_eq, assert_abs_diff_eq, assert_relative_eq};
-use effects::effect;
-use rigs::own_rig;
-use rows::{PROBABILITY, with_lost_rows};
-use simulated::session;
 use stretch_bench::{RigSetup, RigSimulator, Session};
 use stretch_data::{RigFile, SessionTrial, Split};
 use stretch_gap::{Diagnosis, Evidence, Options, Run, Simulator, VerdictKind, diagnose};

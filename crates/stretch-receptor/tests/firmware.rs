@@ -1,7 +1,7 @@
 //! The firmware's data files and golden checksums are those of this code on this host.
 //!
 //! After a change that is meant to alter them, write them anew with
-//! `STRETCH_WRITE_FIRMWARE=1 cargo test -p stretch-receptor --test firmware`.
+//! `STRETCH_WRITE_FIRMWARE=1 cargo test -p stretch-receptor --test it firmware`.
 
 use std::{fmt::Write, fs, path::PathBuf};
 

@@ -1,4 +1,9 @@
-//! Seeded noise for the tests.
+//! What the tests share: seeded noise, effects by name, a rig that is not as shipped, lost rows, small sessions.
+
+pub(crate) mod effects;
+pub(crate) mod rigs;
+pub(crate) mod rows;
+pub(crate) mod session;
 
 /// Uniform numbers from a congruential generator, and sums of twelve of them as noise.
 pub(crate) struct Noise(pub(crate) u64);

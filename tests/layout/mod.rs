@@ -45,6 +45,30 @@ fn files_of_a_crate_import_in_no_circle() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+#[test]
+fn every_file_of_tests_is_compiled() {
+    let crates = fs::read_dir(root().join("crates")).unwrap().map(|entry| entry.unwrap().path());
+    let mut forgotten = Vec::new();
+    for folder in crates.chain([root()]) {
+        let manifest = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
+        if !manifest.contains("autotests = false") {
+            continue;
+        }
+        let main = fs::read_to_string(folder.join("tests/main.rs")).unwrap();
+        for entry in fs::read_dir(folder.join("tests")).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_stem().unwrap().to_str().unwrap();
+            let is_source = path.extension().is_some_and(|end| end == "rs") && name != "main";
+            let is_named = main.contains(&format!("mod {name};"))
+                || manifest.contains(&format!("[[test]]\nname = \"{name}\"\n"));
+            if (is_source || path.join("mod.rs").exists()) && !is_named {
+                forgotten.push(path);
+            }
+        }
+    }
+    assert!(forgotten.is_empty(), "no test program has {forgotten:?}");
+}
+
 /// Imports of a made-up crate, by path below `src`.
 fn made_up(files: &[(&str, &str)]) -> Imports {
     imports(&files.iter().map(|(path, text)| (module(path), (*text).to_owned())).collect())
@@ -94,7 +118,7 @@ const SHOWN: [&str; 7] = [
     "stretch-link",
 ];
 
-/// `STRETCH_API=write cargo test --test layout public` writes the listings anew: then look at what git says has changed.
+/// `STRETCH_API=write cargo test --test it public` writes the listings anew: then look at what git says has changed.
 #[test]
 fn public_items_are_those_that_are_listed() {
     let is_writing = std::env::var("STRETCH_API").is_ok_and(|what| what == "write");
@@ -119,7 +143,7 @@ fn public_items_are_those_that_are_listed() {
     assert!(
         changed.is_empty(),
         "public items are others than docs/api says. Where that is meant, say it in the crate's CHANGELOG.md and run\n    \
-         STRETCH_API=write cargo test --test layout public\n{}",
+         STRETCH_API=write cargo test --test it public\n{}",
         changed.join("\n")
     );
 }

@@ -1,0 +1,30 @@
+//! The tests of the program from outside, one program: linking takes longer than most of them.
+
+mod bad_input;
+mod bounded;
+mod corpus;
+mod demo;
+mod diagnose;
+mod diagnose_gauge;
+mod diagnosed;
+mod every_effect;
+mod export;
+mod fix;
+mod fixed_record;
+mod fleet;
+mod kills;
+mod layout;
+mod listen;
+mod newcomer;
+mod nonsense;
+mod own_data;
+mod page;
+mod problem;
+mod program;
+mod simulate;
+mod soak;
+mod streams;
+mod support;
+mod terminal;
+mod whole_or_nothing;
+mod wrong_advice;

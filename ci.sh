@@ -54,7 +54,7 @@ step "every effect of the catalogue, simulated, diagnosed, written into the rig 
 cargo test --quiet --release --locked --test it -- --ignored every_effect::
 
 step "errors of records and rig files, none of them given an effect's name"
-cargo test --quiet --release --locked -p stretch-bench --test it -- --ignored gross::
+cargo test --quiet --release --locked -p stretch-problem --test it -- --ignored gross::
 
 step "benches, each run once"
 cargo test --benches --locked --quiet >/dev/null

@@ -6,10 +6,10 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use libfuzzer_sys::fuzz_target;
-use stretch_bench::{GaugeSetup, GaugeSimulator, RigSetup, RigSimulator, Session};
 use stretch_data::SessionTrial;
 use stretch_fuzz::trial;
 use stretch_gap::{Options, Simulator, diagnose};
+use stretch_problem::{GaugeSetup, GaugeSimulator, RigSession, RigSetup, RigSimulator};
 use stretch_sim::{Catalogue, Rig};
 
 /// Times that it may ask.
@@ -43,7 +43,7 @@ fuzz_target!(|bytes: &[u8]| {
         }
         return;
     }
-    let made = Session::new(&trials).and_then(|session| {
+    let made = RigSession::new(&trials).and_then(|session| {
         RigSimulator::new(RigSetup { session, rig: Rig::default(), catalogue: &catalogue })
     });
     if let Ok(rig) = made {

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::{prelude::*, types::PyDict};
 use serde::Serialize;
-use stretch_bench::causes;
 use stretch_calibrate::{
     CalibrateError, FitReport, LiveReceptor, ModelKind, ModelRow, Options, Robust, SpellingError,
     calibration_from_json, calibration_to_json, choose_model, parse_rate, pressure_column,
@@ -14,6 +13,7 @@ use stretch_calibrate::{
 use stretch_core::{Calibration, Target};
 use stretch_data::{Channel, Trial};
 use stretch_gap::Diagnosis;
+use stretch_problem::causes;
 
 use crate::{
     error::said,

@@ -5,10 +5,10 @@ use std::{
     sync::atomic::{AtomicUsize, Ordering::SeqCst},
 };
 
-use stretch_bench::RigSimulator;
 use stretch_blind::{COUNTED_EXCESS, CaseKind, Label, Rate, Score};
 use stretch_data::Outputs;
 use stretch_gap::{Options, diagnose};
+use stretch_problem::RigSimulator;
 use stretch_report::{BlindSubject, Goal, blind_page, goals};
 
 use super::{

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use anyhow::{Context as _, anyhow};
 use clap::ValueEnum;
 use serde::Serialize;
-use stretch_bench::Causes;
 use stretch_calibrate::{
     CalibrateError, Calibrated, Candidate, FitReport, Memory, ModelChoice, ModelKind, ModelRow,
     Options, Robust, SpellingError, SplitBy, calibrate, calibration_bytes, choose_model, evaluate,
@@ -14,6 +13,7 @@ use stretch_calibrate::{
 };
 use stretch_core::{Normalisation, RateEstimator, RateSource};
 use stretch_data::{Outputs, ReadOptions, Split, Trial, tidy_column};
+use stretch_problem::Causes;
 use stretch_receptor::code::Adc;
 use stretch_report::{Context, Judged, calibration_page};
 

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use stretch_bench::{Causes, causes};
 use stretch_calibrate::Options;
 use stretch_data::{Trial, read_whole};
 use stretch_gap::Diagnosis;
+use stretch_problem::{Causes, causes};
 
 use super::{diagnose::name_of, shared::spinner};
 

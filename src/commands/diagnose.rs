@@ -8,9 +8,9 @@ use std::{
 
 use anyhow::{Context, ensure};
 use indicatif::ProgressBar;
-use stretch_bench::{Bench, Examined, GaugeSimulator, RigSimulator};
 use stretch_data::{DataError, Outputs};
 use stretch_gap::{Diagnosis, Options};
+use stretch_problem::{Bench, Examined, GaugeSimulator, RigSimulator};
 use stretch_report::{Subject, diagnosis_page};
 use stretch_sim::Catalogue;
 

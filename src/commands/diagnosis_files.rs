@@ -4,9 +4,9 @@ use std::path::Path;
 
 use anyhow::ensure;
 use serde_json::json;
-use stretch_bench::{Fix, Implementation, NoFix};
 use stretch_data::{DataSet, Outputs, RigFile, write_whole};
 use stretch_gap::Diagnosis;
+use stretch_problem::{Fix, Implementation, NoFix};
 use stretch_report::listed;
 use stretch_sim::{Language, Quantity};
 

@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use stretch_bench::Implementation;
 use stretch_gap::{Candidate, Diagnosis, Knowledge, SliceGap, VerdictKind, Where};
+use stretch_problem::Implementation;
 use stretch_report::{
     Table, baseline_table, candidate_table, effect_in_words, listed, stage_table, times,
     transfer_in_words, transfer_table,

@@ -1,5 +1,13 @@
 //! The tests of stretch-problem from outside, one program: linking takes longer than most of them.
 
+mod effects;
+mod experiments;
+mod gauge;
+mod gross;
+mod in_memory;
+mod invariance;
 mod plant;
+mod rig;
 mod several;
+mod support;
 mod workers;

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use stretch_bench::Implementation;
 use stretch_gap::{Diagnosis, Evidence, Simulator};
+use stretch_problem::Implementation;
 
 /// What a report is about.
 #[derive(Clone, Copy)]

@@ -11,9 +11,9 @@ use datafusion::{
     },
     parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder,
 };
-use stretch_bench::{Bench, GaugeSetup, GaugeSimulator, RigSetup, RigSimulator, Session};
 use stretch_data::{Channel, SessionTrial, Trial};
 use stretch_gap::{Diagnosis, Options};
+use stretch_problem::{Bench, GaugeSetup, GaugeSimulator, RigSession, RigSetup, RigSimulator};
 use stretch_sim::{Catalogue, Rig};
 
 use crate::{
@@ -159,7 +159,7 @@ fn verdict(lake: &Lake, files: &[&LakeFile], args: &Args) -> anyhow::Result<Diag
     let catalogue = Catalogue::default();
     let is_rig = trials.iter().all(|t| t.trial.channel("inlet").is_some());
     let bench: Bench = if is_rig {
-        let (session, rig) = (Session::new(&trials)?, Rig::default());
+        let (session, rig) = (RigSession::new(&trials)?, Rig::default());
         RigSimulator::new(RigSetup { session, rig, catalogue: &catalogue })?.into()
     } else {
         let setup = GaugeSetup {

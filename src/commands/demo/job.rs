@@ -1,12 +1,12 @@
 //! What a lab does with its trials: calibrate, judge, and ask why the simulator disagrees.
 
 use indicatif::{MultiProgress, ProgressBar};
-use stretch_bench::{Bench, Examined};
 use stretch_calibrate::{
     Calibrated, Candidate, Evaluation, MethodErrors, ModelChoice, ModelKind, Options, calibrate,
     choose_model, evaluate, rank_signals,
 };
 use stretch_data::{Trial, TrialKind};
+use stretch_problem::{Bench, Examined};
 
 use super::sessions::Sessions;
 use crate::commands::{diagnose::told_on, shared::spinner};

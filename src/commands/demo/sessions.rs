@@ -7,8 +7,8 @@ use std::{
 };
 
 use anyhow::{Context, bail, ensure};
-use stretch_bench::{Bench, GaugeSetup, GaugeSimulator};
 use stretch_data::{DataSet, ReadOptions, SessionTrial, Split, Trial, TrialKind};
+use stretch_problem::{Bench, GaugeSetup, GaugeSimulator};
 use stretch_sim::Catalogue;
 
 use super::published::{self, COMMIT, REPOSITORY};

@@ -1,7 +1,6 @@
 //! A calibration, step by step as `stretch calibrate` makes it.
 
 use serde::{Deserialize, Serialize};
-use stretch_bench::Causes;
 use stretch_calibrate::{
     Calibrated, Cause, Evaluation, Judged, ModelChoice, ModelKind, ModelRow, Options, calibrate,
     calibration_to_json, candidate_models, choose_among, evaluate, explains_little,
@@ -9,6 +8,7 @@ use stretch_calibrate::{
 };
 use stretch_data::{Split, Trial};
 use stretch_export::header;
+use stretch_problem::Causes;
 use stretch_report::{Context, calibration_page};
 
 use crate::{

@@ -1,10 +1,10 @@
 //! A diagnosis as `stretch diagnose` makes it.
 
 use serde::{Deserialize, Serialize};
-use stretch_bench::{
+use stretch_gap::Options;
+use stretch_problem::{
     Bench, Examined, Fix, GaugeSetup, GaugeSimulator, NoFix, RigSetup, RigSimulator, Session,
 };
-use stretch_gap::Options;
 use stretch_report::{Subject, diagnosis_page};
 use stretch_sim::{Catalogue, GaugeRig, Rig};
 use wasm_bindgen::prelude::*;

@@ -2,7 +2,7 @@
 
 use stretch_data::{DataError, Split, TomlView};
 
-use crate::spec::{Argument, Input, OwnEffect, Parameter, Stage, Tolerance};
+use crate::black_box::spec::{Argument, Input, OwnEffect, Parameter, Stage, Tolerance};
 
 /// A trial of a problem's file.
 #[derive(Debug, Clone, PartialEq)]

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use stretch_data::{DataError, ReadOptions, Recording, SessionTrial, TomlFile, TomlView};
 
-use crate::{error::ProblemError, spec::ProblemSpec, worker::WorkersSpec};
+use crate::{black_box::spec::ProblemSpec, error::ProblemError, worker::WorkersSpec};
 use entries::{effect, input, parameter, stage, trial};
 
 pub use entries::TrialFile;

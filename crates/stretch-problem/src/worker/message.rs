@@ -6,7 +6,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::frame::Frame;
-use crate::source::{Ask, Session, SourceError};
+use crate::black_box::source::{Ask, Session, SourceError};
 
 /// The version of the protocol.
 pub(super) const VERSION: u64 = 1;

@@ -15,8 +15,8 @@ use super::{
     process::{Lost, Process},
 };
 use crate::{
+    black_box::source::{Ask, Session, Source, SourceError},
     error::ProblemError,
-    source::{Ask, Session, Source, SourceError},
 };
 
 /// The worker for Python objects.

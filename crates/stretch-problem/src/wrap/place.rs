@@ -10,7 +10,10 @@ use super::{
     extent::{Extent, ends},
     kind::{Beside, Side, Wrapper},
 };
-use crate::{columns::Columns, error::ProblemError, velocity::Velocity};
+use crate::{
+    black_box::{columns::Columns, velocity::Velocity},
+    error::ProblemError,
+};
 
 /// Units that forces and torques have.
 const FORCES: [&str; 8] = ["N", "kN", "mN", "Nm", "mNm", "N m", "N·m", "kNm"];

@@ -1,0 +1,104 @@
+//! What a diagnosis says once a known effect has been put into a measured record, beside what it said before.
+//!
+//! Eight records of a knitted sleeve on a knee, each with an unknown gap of its own; five effects, three strengths.
+//! `docs/injections.md` has the tables and says how to read them.
+//!
+//! `cargo run --release -p stretch-problem --example injections -- ../shared/data/knit_sleeve`
+
+#[path = "injections/inject.rs"]
+mod inject;
+#[path = "support/shared_out.rs"]
+mod shared_out;
+#[path = "injections/told.rs"]
+mod told;
+
+use std::path::Path;
+
+use inject::{ALL, Injection};
+use shared_out::{Answer, shared_out};
+use stretch_data::{Channel, ReadOptions, SessionTrial, Trial};
+use stretch_gap::{Options, diagnose};
+use stretch_problem::{GaugeSetup, GaugeSimulator};
+use stretch_sim::Catalogue;
+use told::{Said, tables};
+
+/// Every session and every sensor at least once; the last two get a `partial` answer in their whole length.
+const RECORDS: [(&str, &str); 8] = [
+    ("heel_curl_45_1", "s1"),
+    ("heel_curl_45_2", "s2"),
+    ("heel_curl_90_1", "s3"),
+    ("heel_curl_90_2", "s4"),
+    ("lift_up_1", "s5"),
+    ("lift_up_2", "s1"),
+    ("heel_curl_90_2", "s3"),
+    ("lift_up_1", "s3"),
+];
+const REFERENCE: &str = "angle_deg";
+/// What is taken of a session, s.
+const LENGTH_S: f64 = 120.0;
+const WORKERS: usize = 2;
+
+/// The first [`LENGTH_S`] of a session: the reference and one sensor.
+fn record(folder: &Path, session: &str, sensor: &str) -> Answer<Trial> {
+    let options = ReadOptions::new().require(REFERENCE).require(sensor);
+    let whole = Trial::read(folder.join(format!("{session}.csv")), &options)?;
+    let samples = whole.time_s.iter().take_while(|t| **t < LENGTH_S).count();
+    let cut = |name: &str| -> Answer<Channel> {
+        Ok(Channel { name: name.into(), values: whole.require(name)?[..samples].to_vec() })
+    };
+    let channels = vec![cut(REFERENCE)?, cut(sensor)?];
+    Ok(Trial { name: whole.name.clone(), time_s: whole.time_s[..samples].to_vec(), channels })
+}
+
+/// The record as it is, or with an effect in its signal, diagnosed.
+fn said(record: &Trial, injected: Option<(&Injection, usize)>) -> Answer<Said> {
+    let mut trial = record.clone();
+    if let Some((injection, which)) = injected {
+        let (time_s, signal) = (&record.time_s, &mut trial.channels[1].values);
+        injection.apply(injection.strengths[which], time_s, signal);
+    }
+    let signal = trial.channels[1].name.clone();
+    let trials = [SessionTrial::new(trial)];
+    let gauge = GaugeSimulator::new(&GaugeSetup {
+        trials: &trials,
+        reference: REFERENCE,
+        signal: &signal,
+        rig: None,
+        catalogue: &Catalogue::default(),
+    })?;
+    // One thread each: the answers are the same, and records are shared out.
+    let options = Options { threads: 1, ..Options::default() };
+    let (diagnosis, _) = diagnose(&gauge, &options, &|_| (), &|| false)?;
+    Ok(Said { diagnosis, noticed: gauge.notes().to_vec() })
+}
+
+fn main() -> Answer<()> {
+    let Some(folder) = std::env::args().nth(1) else {
+        println!("SKIPPED: no folder was given; one with {}.csv holds the records", RECORDS[0].0);
+        return Ok(());
+    };
+    let folder = Path::new(&folder);
+    if !folder.is_dir() {
+        println!("SKIPPED: there is no folder {}", folder.display());
+        return Ok(());
+    }
+    let records = RECORDS
+        .iter()
+        .map(|(session, sensor)| record(folder, session, sensor))
+        .collect::<Answer<Vec<_>>>()?;
+    // Case 0 of a record is the record as it is.
+    let cases: Vec<Option<(&Injection, usize)>> = std::iter::once(None)
+        .chain(ALL.iter().flat_map(|i| (0..i.strengths.len()).map(move |which| Some((i, which)))))
+        .collect();
+    let all = shared_out(WORKERS, records.len() * cases.len(), |at| {
+        let (case, which) = (cases[at / records.len()], at % records.len());
+        let said = said(&records[which], case)?;
+        let (session, sensor) = RECORDS[which];
+        let told = case.map_or("untouched".into(), |(i, s)| i.in_words(i.strengths[s]));
+        eprintln!("{session} {sensor}, {told}: {}", said.in_short());
+        Ok(said)
+    })?;
+    let by_case: Vec<&[Said]> = all.chunks(records.len()).collect();
+    print!("{}", tables(by_case[0], &by_case[1..]));
+    Ok(())
+}

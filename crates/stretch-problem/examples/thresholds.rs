@@ -1,0 +1,53 @@
+//! Calibrates what turns scores into probabilities and gaps into `unknown`, on labelled cases that were diagnosed:
+//! `cargo run --release -p stretch-problem --example thresholds -- [--write] FOLDER...`.
+//!
+//! `stretch blind make` and `stretch blind run` make such folders, `dev_score` too. The thresholds that steer the search
+//! itself (`null_excess`, `rise`, `share`, `mismatch`) act while a case is diagnosed: they are kept as they are.
+
+#[path = "support/calibration.rs"]
+mod calibration;
+
+use std::{fs, path::Path};
+
+use calibration::{Case, calibrated};
+use stretch_blind::Seal;
+use stretch_gap::Diagnosis;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut folders: Vec<String> = std::env::args().skip(1).collect();
+    let is_written = folders.first().is_some_and(|a| a == "--write");
+    if is_written {
+        folders.remove(0);
+    }
+    if folders.is_empty() {
+        eprintln!("usage: thresholds [--write] FOLDER...");
+        std::process::exit(2);
+    }
+    let mut cases: Vec<Case> = Vec::new();
+    let mut seeds = Vec::new();
+    for folder in &folders {
+        let (_, truth) = Seal::open(Path::new(folder))?;
+        seeds.extend(truth.seed.map(|seed| seed.to_string()));
+        for (name, label) in truth.cases {
+            let file = Path::new(folder).join(&name).join("diagnosis.json");
+            if let Ok(text) = fs::read_to_string(&file) {
+                cases.push((label, serde_json::from_str::<Diagnosis>(&text)?));
+            }
+        }
+    }
+    let after = calibrated(&cases.iter().collect::<Vec<_>>());
+    let text = format!(
+        "# temperature, rho, unknown_excess, unknown_share and unknown_soft: calibrated on {} development cases, seeds {}, with\n\
+         #   cargo run --release -p stretch-problem --example thresholds -- --write FOLDER...\n\
+         # The others steer the search; they were set while such cases were looked at.\n{}",
+        cases.len(),
+        seeds.join(", "),
+        toml::to_string(&after)?
+    );
+    print!("{text}");
+    if is_written {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stretch-gap/thresholds.toml");
+        fs::write(path, text)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,27 @@
+//! Rig files as simulation and diagnosis both read them, with the file's name in every error.
+
+use std::path::Path;
+
+use stretch_data::RigFile;
+use stretch_sim::{GaugeRig, Rig, SimError};
+
+use crate::bench::error::BenchError;
+
+fn located(path: &Path, cause: SimError) -> BenchError {
+    BenchError::RigFile { file: path.display().to_string(), cause }
+}
+
+/// A whole rig.
+pub(crate) fn rig(path: &Path) -> Result<Rig, BenchError> {
+    Rig::from_file(&RigFile::read(path)?).map_err(|cause| located(path, cause))
+}
+
+/// A gauge alone.
+pub(crate) fn gauge(path: &Path) -> Result<GaugeRig, BenchError> {
+    GaugeRig::from_file(&RigFile::read(path)?).map_err(|cause| located(path, cause))
+}
+
+/// Whether the file describes a gauge alone.
+pub(crate) fn is_gauge(path: &Path) -> Result<bool, BenchError> {
+    Ok(RigFile::read(path)?.kind.as_deref() == Some("gauge"))
+}

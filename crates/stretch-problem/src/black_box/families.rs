@@ -1,0 +1,103 @@
+//! What wrappers that data do not tell apart agree on.
+
+use stretch_gap::{Candidate, Diagnosis};
+
+use super::problem::Problem;
+use crate::wrap::Family;
+
+/// Wrappers of one family, any of which may be what is missing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Agreed {
+    /// Their names, the most probable first.
+    pub names: Vec<String>,
+    /// What they agree on.
+    pub family: Family,
+    /// From the least to the greatest that any of them says, with its uncertainty.
+    pub range: [f64; 2],
+    /// Unit of the range.
+    pub unit: String,
+}
+
+impl Agreed {
+    /// In a sentence.
+    pub fn sentence(&self) -> String {
+        let [low, high] = self.range;
+        let how = match self.family {
+            Family::Late => "late by",
+            Family::Loop => "behind after a turn by",
+        };
+        format!(
+            "these data do not tell {} apart; what they agree on: {how} {} .. {} {}",
+            self.names.join(" from "),
+            digits(low),
+            digits(high),
+            self.unit
+        )
+        .trim_end()
+        .to_owned()
+    }
+}
+
+fn digits(x: f64) -> String {
+    let places = (2.0 - x.abs().max(1e-12).log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{x:.places$}")
+}
+
+/// Families among the effects that a diagnosis names and those that may stand in their place.
+pub fn agreed(problem: &Problem, diagnosis: &Diagnosis) -> Vec<Agreed> {
+    let effects = &problem.description().effects;
+    let kind = |name: &str| {
+        let at = effects.iter().position(|e| e.name == name)?;
+        Some((at, problem.wrapper(at)?.family?))
+    };
+    let mut out: Vec<Agreed> = Vec::new();
+    for name in &diagnosis.named {
+        let Some((own, (family, _))) = kind(name) else { continue };
+        let stage = &effects[own].touches;
+        let is_rival = |other: &&String| {
+            *other != name
+                && kind(other)
+                    .is_some_and(|(at, (f, _))| f == family && effects[at].touches == *stage)
+        };
+        let mut rivals: Vec<&String> = Vec::new();
+        for other in diagnosis.tied.iter().chain(&diagnosis.ambiguous).filter(is_rival) {
+            if !rivals.contains(&other) {
+                rivals.push(other);
+            }
+        }
+        if rivals.is_empty() {
+            continue;
+        }
+        let names: Vec<&String> = std::iter::once(name).chain(rivals).collect();
+        let told =
+            names.iter().filter_map(|n| kind(n).and_then(|(_, (_, of))| said(diagnosis, n, of)));
+        let range = told.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], [low, high]| {
+            [a.min(low), b.max(high)]
+        });
+        let unit = match family {
+            Family::Late => "s".to_owned(),
+            Family::Loop => problem.description().stages[stage[0]].unit.clone(),
+        };
+        if range[0] <= range[1] {
+            out.push(Agreed { names: names.into_iter().cloned().collect(), family, range, unit });
+        }
+    }
+    out
+}
+
+/// What the most probable candidate with an effect says of its family's quantity, with two standard deviations of its first number.
+fn said(diagnosis: &Diagnosis, name: &str, of: fn(&[f64]) -> f64) -> Option<[f64; 2]> {
+    let holds = |c: &&Candidate| c.effects.iter().any(|e| e == name);
+    let candidate = diagnosis.candidates.iter().find(holds)?;
+    let own: Vec<_> = candidate.parameters.iter().filter(|p| p.effect == name).collect();
+    let with = |shift: f64| {
+        let values: Vec<f64> = own
+            .iter()
+            .enumerate()
+            .map(|(i, p)| if i == 0 { p.value + shift * p.sd } else { p.value })
+            .collect();
+        of(&values)
+    };
+    let ends = [with(-1.96), with(1.96)];
+    Some([ends[0].min(ends[1]), ends[0].max(ends[1])])
+}

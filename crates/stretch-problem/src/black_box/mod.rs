@@ -1,0 +1,405 @@
+//! A user's simulator, wrapped, as the diagnosis takes it.
+
+pub(crate) mod columns;
+mod families;
+mod linear;
+mod problem;
+mod runs;
+pub(crate) mod source;
+pub(crate) mod spec;
+pub(crate) mod velocity;
+
+use std::{
+    borrow::Cow,
+    sync::{Arc, PoisonError, RwLock},
+};
+
+use stretch_gap::{
+    Column, Description, Diagnosis, Dice, GapError, Line, Model, ModelRuns, Recorded, RowsUsed,
+    Run, Simulator,
+};
+
+use stretch_operators::WanderingLine;
+
+use crate::wrap::{Side, Trials};
+use linear::Linear;
+use problem::Acting;
+use runs::{Inner, Runs};
+
+pub use families::{Agreed, agreed};
+pub use problem::Problem;
+pub use source::{
+    Ask, Closure, Session, SessionColumn, SessionPart, SessionStage, Source, SourceError, closure,
+};
+pub use spec::{Argument, Input, OwnEffect, Parameter, ProblemSpec, Stage, Tolerance};
+
+/// A checked problem and a source, bound together: a [`Simulator`].
+///
+/// The source is run for parameters, own effects and what stands in front of a stage; what stands behind one acts on a run that is kept.
+///
+/// ```
+/// use std::sync::Arc;
+/// use stretch_data::{Channel, SessionTrial, Trial};
+/// use stretch_gap::{Options, diagnose};
+/// use stretch_problem::{Ask, BlackBox, Parameter, Problem, ProblemSpec, Stage, Tolerance, closure};
+///
+/// // A spring that shows 0.06 s late what it is loaded with.
+/// let load = |t: f64| 20.0 * (1.3 * t).sin() + 10.0 * (3.1 * t).sin();
+/// let noise = |i: usize| 1e-2 * ((i * i * 7919) % 1000) as f64 / 1000.0;
+/// let time_s: Vec<f64> = (0..3000).map(|i| 0.01 * i as f64).collect();
+/// let channel = |name: &str, values| Channel { name: name.into(), values };
+/// let force: Vec<f64> = time_s.iter().map(|t| load(*t)).collect();
+/// let length = time_s.iter().enumerate().map(|(i, t)| 2.1 * load(t - 0.06) + noise(i)).collect();
+/// let channels = vec![channel("force_N", force), channel("length_mm", length)];
+/// let trial = Trial { name: "spring.csv".into(), time_s, channels };
+///
+/// let problem = Problem::new(ProblemSpec {
+///     stages: vec![Stage {
+///         name: "spring".into(),
+///         output: "length_mm".into(),
+///         inputs: vec!["force_N".into()],
+///         ..Stage::default()
+///     }],
+///     parameters: vec![Parameter {
+///         name: "compliance".into(),
+///         unit: "mm/N".into(),
+///         value: 2.0,
+///         tolerance: Tolerance::Relative(0.1),
+///         ..Parameter::default()
+///     }],
+///     wrap: vec!["output.skew".into(), "output.backlash".into()],
+///     trials: vec![SessionTrial::new(trial)],
+///     ..ProblemSpec::default()
+/// })?;
+/// let force = problem.session().column("force_N").unwrap().to_vec();
+/// let session = problem.session().clone();
+/// let spring = closure(move |ask: &Ask<'_>| {
+///     Ok(force[..session.samples(ask.trials)].iter().map(|f| ask.parameters[0] * f).collect())
+/// });
+/// let bench = BlackBox::new(problem, Arc::new(spring));
+/// let (diagnosis, _) = diagnose(&bench, &Options::default(), &|_| (), &|| false)?;
+/// assert_eq!(diagnosis.named, ["output.skew"]);
+/// assert!(bench.model_runs() < diagnosis.simulations);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct BlackBox {
+    problem: Problem,
+    runs: Runs,
+    /// By stage: the last linearisation.
+    lines: RwLock<Vec<Option<Arc<Linear>>>>,
+}
+
+impl BlackBox {
+    /// Binds a problem to the source that answers it.
+    pub fn new(problem: Problem, source: Arc<dyn Source>) -> Self {
+        Self::within(problem, source, None)
+    }
+
+    /// The same with at most so many runs of the source.
+    pub fn within(problem: Problem, source: Arc<dyn Source>, budget: Option<usize>) -> Self {
+        let samples =
+            problem.columns.is_lost.len().max(problem.parts.last().map_or(1, |p| p.0.end));
+        let stages = if source.answers_all() { problem.stages.len() } else { 1 };
+        let runs = Runs::new(source, budget, stages * samples);
+        let lines = RwLock::new(vec![None; problem.stages.len()]);
+        Self { problem, runs, lines }
+    }
+
+    /// The problem.
+    pub fn problem(&self) -> &Problem {
+        &self.problem
+    }
+
+    /// Runs of the source so far.
+    pub fn model_runs(&self) -> usize {
+        self.runs.count()
+    }
+
+    /// Adds to the notes of a diagnosis what was done to the recordings, what effects that cannot be told apart agree on, and what the
+    /// source says of its runs; returns those effects.
+    pub fn annotate(&self, diagnosis: &mut Diagnosis) -> Vec<Agreed> {
+        let families = agreed(&self.problem, diagnosis);
+        diagnosis.notes.splice(0..0, self.problem.notes().iter().cloned());
+        diagnosis.notes.extend(families.iter().map(Agreed::sentence));
+        diagnosis.notes.extend(self.notes());
+        families
+    }
+
+    /// What the source says of its runs, and what it refused.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = self.runs.notes();
+        let refused = self.runs.refused();
+        if let Some(first) = refused.first() {
+            notes.push(format!(
+                "{} of {} model runs gave no output and took their candidate out; the first: {first}",
+                refused.len(),
+                self.runs.count()
+            ));
+        }
+        notes
+    }
+
+    /// What has to be run for a model.
+    fn inner(&self, run: &Run<'_>) -> Inner {
+        let problem = &self.problem;
+        let spec = &self.description().stages[run.stage];
+        let mut parameters: Vec<f64> = self.parameters().iter().map(|p| p.nominal).collect();
+        for &p in &spec.parameters {
+            parameters[p] = run.model.parameters[p];
+        }
+        let mut effects = problem.off.clone();
+        let mut how = Vec::new();
+        let mut before = Vec::new();
+        for (effect, values) in &run.model.effects {
+            if !self.effects()[*effect].touches.contains(&run.stage) {
+                continue;
+            }
+            match problem.acting[*effect] {
+                Acting::Own(first) => effects[first..first + values.len()].copy_from_slice(values),
+                Acting::Wrapper(at) if problem.wrappers[at].site.side == Side::Input => {
+                    before.push((at, values));
+                }
+                Acting::Wrapper(_) | Acting::Recorder => {}
+            }
+        }
+        before.sort_by_key(|(at, _)| *at);
+        let noise = &problem.input_noise[run.stage];
+        let shake = run.shake.filter(|_| noise.iter().any(|sd| *sd > 0.0));
+        let inputs = (!before.is_empty() || shake.is_some()).then(|| {
+            let end = problem.session().samples(run.trials);
+            let mut inputs: Vec<Vec<f64>> =
+                problem.stage_inputs(run.stage).map(|c| c[..end].to_vec()).collect();
+            if let Some(seed) = shake {
+                how.push(seed);
+                for (i, (column, sd)) in inputs.iter_mut().zip(noise).enumerate() {
+                    let mut dice = Dice::new(seed, 1 + (run.stage * 64 + i) as u64);
+                    column.iter_mut().for_each(|x| *x += sd * dice.gauss());
+                }
+            }
+            let trials = self.trials_of();
+            for (at, values) in &before {
+                let wrapper = &problem.wrappers[*at];
+                how.push(u64::MAX - *at as u64);
+                how.extend(values.iter().map(|v| v.to_bits()));
+                wrapper.act(values, &trials, &mut inputs[wrapper.site.input]);
+            }
+            (inputs, how)
+        });
+        Inner { stage: run.stage, parameters, effects, inputs, trials: run.trials }
+    }
+
+    /// The run that a run is told from, and how far it lies from there; the run itself where it has to be exact.
+    fn told(&self, run: &Run<'_>) -> (Inner, Option<Apart>) {
+        let inner = self.inner(run);
+        let line = run.near.filter(|_| run.shake.is_none()).zip(self.line(run.stage));
+        let Some((near, line)) = line.filter(|(_, line)| line.trials() >= run.trials) else {
+            return (inner, None);
+        };
+        let mut base = inner.clone();
+        for &p in &self.description().stages[run.stage].parameters {
+            base.parameters[p] = near[p];
+        }
+        if base.parameters == inner.parameters {
+            return (inner, None);
+        }
+        let apart = inner.parameters.iter().zip(&base.parameters).map(|(a, b)| a - b).collect();
+        (base, Some((line, apart)))
+    }
+
+    fn line(&self, stage: usize) -> Option<Arc<Linear>> {
+        // A poisoned list only holds what can be made again.
+        self.lines.read().unwrap_or_else(PoisonError::into_inner)[stage].clone()
+    }
+
+    fn set_line(&self, stage: usize, line: Linear) {
+        let mut lines = self.lines.write().unwrap_or_else(PoisonError::into_inner);
+        lines[stage] = Some(Arc::new(line));
+    }
+
+    fn trials_of(&self) -> Trials<'_> {
+        Trials { grid: &self.problem.grid, parts: &self.problem.parts }
+    }
+
+    /// What stands behind a stage acts on its output.
+    fn behind(&self, run: &Run<'_>, out: &mut [f64]) {
+        let problem = &self.problem;
+        let mut behind: Vec<(usize, &Vec<f64>)> = Vec::new();
+        for (effect, values) in &run.model.effects {
+            behind.extend(problem.behind(*effect, run.stage).map(|at| (at, values)));
+        }
+        behind.sort_by_key(|(at, _)| *at);
+        let trials = self.trials_of();
+        for (at, values) in behind {
+            match problem.wrappers[at].kind.is_found {
+                true => self.follow(run.stage, values, out),
+                false => problem.wrappers[at].act(values, &trials, out),
+            }
+        }
+    }
+
+    /// A hum on the samples that may be fitted, its phase found in what was measured of them.
+    fn follow(&self, stage: usize, values: &[f64], out: &mut [f64]) {
+        let line = WanderingLine { a: values[0], f_hz: values[1] };
+        if line.a == 0.0 {
+            return;
+        }
+        let (measured, noise) = (self.measured(stage), self.problem.noise[stage]);
+        let end = out.len();
+        for range in self.problem.columns.looked_at().into_iter().filter(|r| r.end <= end) {
+            line.follow(&measured[range.clone()], noise, self.dt_s(), &mut out[range]);
+        }
+    }
+}
+
+/// A linearisation, and how far the parameters of a run lie from those of the run that it is told from.
+type Apart = (Arc<Linear>, Vec<f64>);
+
+/// Runs that the answer itself needs once the search is over, and more for each stage.
+const ANSWER: (usize, usize) = (20, 8);
+
+/// What the engine makes of a source's error: where values cannot be simulated a fit turns back.
+fn refused(error: SourceError) -> GapError {
+    match error {
+        SourceError::Gone(_) | SourceError::Length { .. } => GapError::Broken(Box::new(error)),
+        _ => GapError::simulator(error),
+    }
+}
+
+impl Simulator for BlackBox {
+    fn description(&self) -> &Description {
+        self.problem.description()
+    }
+
+    fn measured(&self, stage: usize) -> &[f64] {
+        self.problem.columns.of(&self.problem.stages[stage].output).unwrap_or(&[])
+    }
+
+    fn is_lost(&self) -> &[bool] {
+        &self.problem.columns.is_lost
+    }
+
+    fn rows_used(&self) -> RowsUsed {
+        let rows = self.problem.columns.rows;
+        RowsUsed { used: rows.used(), read: rows.read }
+    }
+
+    fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
+        let mut outs = [out.to_vec()];
+        let done = self.simulate_many(&[run], &mut outs).pop().unwrap_or(Ok(()));
+        out.copy_from_slice(&outs[0]);
+        done
+    }
+
+    fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
+        let told: Vec<(Inner, Option<Apart>)> = runs.iter().map(|run| self.told(run)).collect();
+        let inner: Vec<Inner> = told.iter().map(|(inner, _)| inner.clone()).collect();
+        let outputs = self.runs.outputs(self.problem.session(), &inner);
+        let each = runs.iter().zip(&told).zip(outputs).zip(outs);
+        each.map(|(((run, (_, line)), output), out)| {
+            out.copy_from_slice(&output.map_err(refused)?);
+            if let Some((line, apart)) = line {
+                line.go(apart, out);
+            }
+            self.behind(run, out);
+            Ok(())
+        })
+        .collect()
+    }
+
+    fn linearise(&self, stage: usize, model: &Model, trials: usize) -> Result<(), GapError> {
+        let run = Run::exact(stage, model, trials);
+        let inner = self.inner(&run);
+        if self.line(stage).is_some_and(|line| line.serves(&inner, self.parameters())) {
+            return Ok(());
+        }
+        let moves = Linear::moves(&inner, &self.stages()[stage].parameters, self.parameters());
+        let wanted: Vec<Inner> =
+            std::iter::once(&inner).chain(moves.iter().map(|m| &m.inner)).cloned().collect();
+        let outputs: Result<Vec<_>, SourceError> =
+            self.runs.outputs(self.problem.session(), &wanted).into_iter().collect();
+        match outputs {
+            Ok(outputs) => self.set_line(stage, Linear::of(inner, &moves, &outputs)),
+            // Without one every run is exact.
+            Err(SourceError::Refused(_) | SourceError::NotFinite { .. }) => {}
+            Err(error) => return Err(refused(error)),
+        }
+        Ok(())
+    }
+
+    fn is_costly(&self, effect: usize) -> bool {
+        match self.problem.acting[effect] {
+            Acting::Own(_) => true,
+            Acting::Wrapper(at) => self.problem.wrappers[at].site.side == Side::Input,
+            Acting::Recorder => false,
+        }
+    }
+
+    fn model_runs(&self) -> Option<ModelRuns> {
+        let (count, budget) = (self.runs.count(), self.runs.budget());
+        let kept = (ANSWER.0 + ANSWER.1 * self.problem.stages.len()).min(budget.unwrap_or(0) / 2);
+        let is_spent = budget.is_some_and(|budget| count + kept >= budget);
+        Some(ModelRuns { count, budget, is_spent })
+    }
+
+    fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
+        let found = model.effects.iter().filter(|(effect, _)| {
+            let wrapper = self.problem.wrapper(*effect);
+            wrapper.is_some_and(|w| w.is_found) && self.effects()[*effect].touches.contains(&stage)
+        });
+        found.map(|(_, values)| Line { hertz: values[1], amplitude: values[0] }).collect()
+    }
+
+    fn recorded(&self) -> Vec<Recorded> {
+        let session = self.problem.session();
+        let inputs = session.stages.iter().flat_map(|s| &s.inputs);
+        let mut out: Vec<Recorded> = Vec::new();
+        for name in inputs {
+            let column = session.columns.iter().find(|c| c.name == *name);
+            if let Some(column) = column.filter(|_| out.iter().all(|r| r.name != *name)) {
+                out.push(Recorded {
+                    is_command: is_command(&column.values),
+                    ..Recorded::measured(name, &column.unit, column.values.clone())
+                });
+            }
+        }
+        if out.is_empty() {
+            out.push(self.motion().into());
+        }
+        out
+    }
+
+    fn columns(&self) -> Vec<Column<'_>> {
+        let session = self.problem.session();
+        let late = [-0.2, 0.2];
+        let stages = self.stages().iter().enumerate();
+        let output = |(stage, spec)| Column {
+            skew_s: late,
+            ..Column::output(stage, spec, self.measured(stage))
+        };
+        let mut out: Vec<Column<'_>> = stages.map(output).collect();
+        for c in &session.columns {
+            // A command may stand still while the rest moves: nothing is wrong with its column then.
+            if out.iter().any(|o| *o.name == c.name) || is_command(&c.values) {
+                continue;
+            }
+            out.push(Column {
+                name: Cow::Borrowed(&c.name),
+                unit: Cow::Borrowed(&c.unit),
+                values: Cow::Borrowed(&c.values),
+                output_of: None,
+                read_by: Vec::new(),
+                is_command: false,
+                skew_s: late,
+                hint: Cow::Borrowed("what commands or measures it"),
+            });
+        }
+        out
+    }
+}
+
+/// Whether a column is held from sample to sample, as commands are: a tenth of its samples are the one before.
+fn is_command(values: &[f64]) -> bool {
+    let held = values.windows(2).filter(|w| w[0] == w[1]).count();
+    10 * held >= values.len()
+}

@@ -1,0 +1,233 @@
+//! Runs of a user's simulator: none is made twice, all are counted, and no more are made than may be.
+
+use std::{
+    collections::HashSet,
+    num::NonZeroUsize,
+    sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
+};
+
+use lru::LruCache;
+
+use crate::black_box::source::{Ask, Session, Source, SourceError};
+
+/// Samples that are kept, of all runs together: a quarter of a gigabyte.
+const KEPT: usize = 1 << 25;
+/// Fewest runs that are kept.
+const FEWEST: usize = 32;
+
+/// What a run depends on, bit by bit.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) struct Key {
+    stage: usize,
+    bits: Vec<u64>,
+}
+
+/// One run of a user's simulator.
+#[derive(Debug, Clone)]
+pub(crate) struct Inner {
+    pub(crate) stage: usize,
+    pub(crate) parameters: Vec<f64>,
+    pub(crate) effects: Vec<f64>,
+    /// Altered inputs, and the numbers that say how.
+    pub(crate) inputs: Option<(Vec<Vec<f64>>, Vec<u64>)>,
+    pub(crate) trials: usize,
+}
+
+type Answer = Result<Arc<Vec<f64>>, SourceError>;
+
+/// Runs that were made.
+struct Made {
+    kept: LruCache<Key, (usize, Answer)>,
+    under_way: HashSet<Key>,
+    count: usize,
+    refused: Vec<String>,
+}
+
+/// A source, and what it has answered.
+pub(crate) struct Runs {
+    source: Arc<dyn Source>,
+    budget: Option<usize>,
+    made: Mutex<Made>,
+    done: Condvar,
+    answers_all: bool,
+}
+
+impl std::fmt::Debug for Runs {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Runs").field("count", &self.count()).finish_non_exhaustive()
+    }
+}
+
+impl Runs {
+    pub(crate) fn new(source: Arc<dyn Source>, budget: Option<usize>, samples: usize) -> Self {
+        let most = NonZeroUsize::new((KEPT / samples.max(1)).max(FEWEST));
+        let kept = LruCache::new(most.unwrap_or(NonZeroUsize::MIN));
+        let made = Made { kept, under_way: HashSet::new(), count: 0, refused: Vec::new() };
+        let answers_all = source.answers_all();
+        Self { source, budget, made: Mutex::new(made), done: Condvar::new(), answers_all }
+    }
+
+    /// How many were made.
+    pub(crate) fn count(&self) -> usize {
+        self.lock().count
+    }
+
+    pub(crate) fn budget(&self) -> Option<usize> {
+        self.budget
+    }
+
+    pub(crate) fn notes(&self) -> Vec<String> {
+        self.source.notes()
+    }
+
+    /// What was refused, the first few words of it.
+    pub(crate) fn refused(&self) -> Vec<String> {
+        self.lock().refused.clone()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Made> {
+        // A poisoned list only holds what can be made again.
+        self.made.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn key(&self, run: &Inner) -> Key {
+        let numbers = run.parameters.iter().chain(&run.effects).map(|x| x.to_bits());
+        let inputs = run.inputs.iter().flat_map(|(_, how)| how.iter().copied());
+        let is_whole = self.answers_all && run.inputs.is_none();
+        Key {
+            stage: if is_whole { usize::MAX } else { run.stage },
+            bits: numbers.chain(inputs).collect(),
+        }
+    }
+
+    /// The part of an answer that a run asks for; none where it is not long enough.
+    fn part(&self, session: &Session, run: &Inner, kept: &(usize, Answer)) -> Option<Answer> {
+        let (trials, answer) = kept;
+        if *trials < run.trials {
+            return None;
+        }
+        let own = session.samples(run.trials);
+        Some(match answer {
+            Err(error) => Err(error.clone()),
+            Ok(all) => {
+                let from = if self.answers_all { run.stage * session.samples(*trials) } else { 0 };
+                match from == 0 && all.len() == own {
+                    true => Ok(Arc::clone(all)),
+                    false => Ok(Arc::new(all[from..from + own].to_vec())),
+                }
+            }
+        })
+    }
+
+    /// Outputs of some runs, those that are new in one batch.
+    ///
+    /// What another thread is at is waited for. The source is asked from a thread of its own, so that nothing that it does in parallel can
+    /// take up work that waits for it.
+    pub(crate) fn outputs(&self, session: &Session, wanted: &[Inner]) -> Vec<Answer> {
+        let keys: Vec<Key> = wanted.iter().map(|run| self.key(run)).collect();
+        let mut out: Vec<Option<Answer>> = vec![None; wanted.len()];
+        loop {
+            let mut mine: Vec<usize> = Vec::new();
+            let mut made = self.lock();
+            let mut waits = false;
+            for (i, (run, key)) in wanted.iter().zip(&keys).enumerate() {
+                if out[i].is_some() {
+                    continue;
+                }
+                if let Some(answer) = made.kept.get(key).and_then(|k| self.part(session, run, k)) {
+                    out[i] = Some(answer);
+                } else if made.under_way.contains(key) {
+                    waits = true;
+                } else if self.budget.is_some_and(|budget| made.count >= budget) {
+                    let budget = self.budget.unwrap_or(0);
+                    out[i] = Some(Err(SourceError::Spent { budget }));
+                } else {
+                    made.under_way.insert(key.clone());
+                    made.count += 1;
+                    mine.push(i);
+                }
+            }
+            if mine.is_empty() && !waits {
+                break;
+            }
+            if mine.is_empty() {
+                drop(self.done.wait(made).unwrap_or_else(PoisonError::into_inner));
+                continue;
+            }
+            drop(made);
+            self.make(session, wanted, &keys, &mine, &mut out);
+        }
+        out.into_iter().flatten().collect()
+    }
+
+    fn make(
+        &self,
+        session: &Session,
+        wanted: &[Inner],
+        keys: &[Key],
+        mine: &[usize],
+        out: &mut [Option<Answer>],
+    ) {
+        let asks: Vec<Ask<'_>> = mine.iter().map(|&i| ask(&wanted[i])).collect();
+        let source = &*self.source;
+        let answers = std::thread::scope(|scope| {
+            let asked = scope.spawn(|| source.simulate_many(&asks)).join();
+            asked.unwrap_or_else(|_| vec![Err(SourceError::Gone("the simulator panicked".into()))])
+        });
+        let mut answers = answers.into_iter();
+        let mut made = self.lock();
+        for &i in mine {
+            let run = &wanted[i];
+            let nothing =
+                || Err(SourceError::Gone("the simulator gave fewer answers than asks".into()));
+            let answer = answers.next().unwrap_or_else(nothing);
+            let answer = answer.and_then(|values| self.checked(session, run, values)).map(Arc::new);
+            if let Err(error) = &answer {
+                made.refused.push(error.to_string());
+            }
+            let kept = (run.trials, answer);
+            out[i] = self.part(session, run, &kept);
+            made.under_way.remove(&keys[i]);
+            made.kept.put(keys[i].clone(), kept);
+        }
+        drop(made);
+        self.done.notify_all();
+    }
+
+    /// As many finite numbers as were asked for.
+    fn checked(
+        &self,
+        session: &Session,
+        run: &Inner,
+        values: Vec<f64>,
+    ) -> Result<Vec<f64>, SourceError> {
+        let samples = session.samples(run.trials);
+        let stages = if self.answers_all { session.stages.len() } else { 1 };
+        let stage =
+            |at: usize| session.stages[if stages > 1 { at } else { run.stage }].name.clone();
+        let (found, needed) = (values.len(), stages * samples);
+        if found != needed {
+            let stage = stage(run.stage);
+            return Err(SourceError::Length { stage, found, needed, trials: run.trials });
+        }
+        let Some(at) = values.iter().position(|x| !x.is_finite()) else { return Ok(values) };
+        let sample = at % samples;
+        let trial = session.trials.iter().find(|t| t.samples.contains(&sample));
+        Err(SourceError::NotFinite {
+            stage: stage(at / samples),
+            value: values[at],
+            trial: trial.map_or(String::new(), |t| t.name.clone()),
+            time_s: trial.map_or(0.0, |t| (sample - t.samples.start) as f64 * session.dt_s),
+        })
+    }
+}
+
+fn ask(run: &Inner) -> Ask<'_> {
+    Ask {
+        stage: run.stage,
+        parameters: &run.parameters,
+        effects: &run.effects,
+        inputs: run.inputs.as_ref().map(|(columns, _)| columns.as_slice()),
+        trials: run.trials,
+    }
+}

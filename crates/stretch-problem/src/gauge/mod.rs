@@ -1,0 +1,340 @@
+//! A gauge alone beside a reference: a rig of one stage.
+
+mod columns;
+mod experiments;
+mod fixed;
+mod lag;
+mod record;
+mod source;
+
+use stretch_data::{SessionTrial, unit, written_unit};
+use stretch_gap::{
+    Column, Description, DescriptionSpec, GapError, Line, Model, Motion, Noise, ParameterSpec,
+    Recorded, RowsUsed, Run, Simulator, StageSpec, TrialSpec,
+};
+use stretch_sim::{
+    Alone, Catalogue, Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Start, Tolerance,
+};
+
+use lag::lag;
+use record::Record;
+
+use crate::{
+    bench::{
+        acting::{Acting, FitRecord, lines},
+        error::BenchError,
+        specs::{Place, shown, spec as spec_of},
+    },
+    rig::smooth::{Draws, Smoothed, unscheduled},
+};
+
+/// Where the parameters stand.
+const OFFSET: usize = 0;
+const GAIN: usize = 1;
+/// The one that says how the memories of the gauge begin the session: wound from below (1), from above (-1), settled.
+const WINDING: usize = 2;
+
+/// What a [`GaugeSimulator`] is made of.
+#[derive(Debug, Clone, Copy)]
+pub struct GaugeSetup<'a> {
+    /// Trials, each with both columns; `pressure_kpa` is welcome.
+    pub trials: &'a [SessionTrial],
+    /// Column of the reference: what the gauge measures.
+    pub reference: &'a str,
+    /// Column of the signal: what the gauge says.
+    pub signal: &'a str,
+    /// The gauge as it should be; without one zero, span, offset and gain are those of the record.
+    pub rig: Option<&'a GaugeRig>,
+    /// Effects that are looked for, those that the gauge has apart.
+    pub catalogue: &'a Catalogue,
+}
+
+/// Any stretch sensor with a reference: y = offset + gain e, e the reference over its range in the fit trials.
+///
+/// Offset and gain are free unless a rig file (`kind = "gauge"`) gives them; its effects act in every run. Effects of the catalogue act on e in place
+/// of the strain and on (y - offset)/gain in place of resistance and voltage. The reference is smoothed as far as its own
+/// noise allows; what of that noise arrives at the signal belongs to the floor. Noise comes from second differences:
+/// it is what changes from sample to sample, and errors that last longer count as gap.
+///
+/// ```
+/// use stretch_data::{Channel, SessionTrial, Trial};
+/// use stretch_problem::{GaugeSetup, GaugeSimulator};
+/// use stretch_gap::{Options, VerdictKind, diagnose};
+/// use stretch_sim::Catalogue;
+/// // A sensor that shows 0.05 s late what a rod does.
+/// let rod = |t: f64| 40.0 + 20.0 * (1.3 * t).sin() + 10.0 * (3.1 * t).sin();
+/// let time_s: Vec<f64> = (0..4000).map(|i| 0.01 * i as f64).collect();
+/// let noise = |i: usize| 1e-3 * ((i * i * 7919) % 1000) as f64 / 1000.0;
+/// let channel = |name: &str, values| Channel { name: name.into(), values };
+/// let length = time_s.iter().map(|t| rod(*t)).collect();
+/// let signal = time_s.iter().enumerate().map(|(i, t)| 0.02 * rod(t - 0.05) + noise(i)).collect();
+/// let channels = vec![channel("rod_mm", length), channel("s1", signal)];
+/// let trial = Trial { name: "rod.csv".into(), time_s, channels };
+/// let trials = [SessionTrial::new(trial)];
+/// let gauge = GaugeSimulator::new(&GaugeSetup {
+///     trials: &trials,
+///     reference: "rod_mm",
+///     signal: "s1",
+///     rig: None,
+///     catalogue: &Catalogue::default(),
+/// })?;
+/// let (diagnosis, _) = diagnose(&gauge, &Options::default(), &|_| (), &|| false)?;
+/// assert_eq!(diagnosis.verdict, VerdictKind::Effect);
+/// assert_eq!(diagnosis.named, ["channel_skew"]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct GaugeSimulator {
+    about: Description,
+    /// The gauge as shipped, with the effects that it already has.
+    nominal: GaugeRig,
+    rows: Vec<&'static Effect>,
+    record: Record,
+    /// The reference of each trial as it drives the gauge.
+    inputs: Vec<Smoothed>,
+    draws: Draws,
+    /// Column of the reference.
+    reference: String,
+    reference_noise: Noise,
+    /// Noise of the signal, one standard deviation.
+    noise: f64,
+    /// Range of the signal.
+    spread: f64,
+    /// The signal that effects may be found in.
+    found_in: FitRecord,
+    notes: Vec<String>,
+}
+
+impl GaugeSimulator {
+    /// Binds a gauge to trials and two of their columns; the effects of the catalogue that can act in it and that it does
+    /// not have are looked for.
+    ///
+    /// # Errors
+    /// Columns that are missing, dead, hold too few numbers or look swapped.
+    pub fn new(setup: &GaugeSetup<'_>) -> Result<Self, BenchError> {
+        let GaugeSetup { trials, reference, signal, rig, catalogue } = *setup;
+        let record = Record::read(trials, reference, signal)?;
+        let nominal = nominal(&record, rig);
+        let (least, greatest) = record.range(&record.signal);
+        let (reference_noise, noise) =
+            (record.noise(&record.reference), record.noise(&record.signal).sd());
+        let inputs = parts(&record.trials, &record.reference)
+            .map(|(_, x)| Smoothed::of(x, reference_noise.sd(), &unscheduled(x.len())))
+            .collect();
+        let alone = alone(&record);
+        let has_pressure = nominal.spec.pressure_scale.is_some();
+        let is_missing = |e: &&Effect| nominal.effects.find(e.name).is_none();
+        let place = |effect: &Effect| Place {
+            touches: vec![0],
+            search: Gauge::search(effect, &alone),
+            unit: Gauge::unit,
+        };
+        let missing = catalogue.iter().filter(|e| Gauge::accepts(e, has_pressure) && is_missing(e));
+        let mut notes = record.notes.clone();
+        let (rows, places) = shown(missing.map(|e| (e, place(e))), record.dt_s, &mut notes);
+        let effects =
+            rows.iter().zip(places).map(|(effect, place)| spec_of(effect, place)).collect();
+        let stage = StageSpec::new("sensing", signal, unit_of(signal), &[OFFSET, GAIN, WINDING]);
+        let parameters = parameters(&nominal, signal, rig.is_some());
+        let (trials, dt_s) = (record.trials.clone(), record.dt_s);
+        Ok(Self {
+            about: Description::new(DescriptionSpec {
+                stages: vec![stage],
+                parameters,
+                effects,
+                trials,
+                dt_s,
+            })?,
+            rows,
+            inputs,
+            reference: reference.into(),
+            draws: Draws::new(),
+            reference_noise,
+            noise,
+            spread: greatest - least,
+            found_in: FitRecord::of(&record.trials, &record.signal, dt_s),
+            notes,
+            record,
+            nominal,
+        })
+    }
+
+    /// What was noticed while it was read.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    fn nominal(&self, model: &Model) -> GaugeSpec {
+        GaugeSpec {
+            offset: model.parameters[OFFSET],
+            gain: model.parameters[GAIN],
+            ..self.nominal.spec
+        }
+    }
+}
+
+impl GaugeSimulator {
+    /// The signal over the trials of a run.
+    fn signal(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), BenchError> {
+        let acting = Acting::of(&self.nominal.effects, &self.rows, run.model)?;
+        let gauge = Gauge::new(self.nominal(run.model), &acting.inside, self.dt_s())?;
+        let mut memory = gauge.memory();
+        // What was done to the gauge before the session nobody knows.
+        let mut start = Start::Wound(run.model.parameters[WINDING]);
+        let mut from = 0;
+        for (i, trial) in self.record.trials[..run.trials].iter().enumerate() {
+            let to = from + trial.samples;
+            let input = match run.shake {
+                None => self.inputs[i].values.clone(),
+                Some(seed) => self.draws.shaken(&self.inputs, &self.reference_noise, seed, i),
+            };
+            let pressure = self.record.pressure.get(from..to).unwrap_or(&[]);
+            gauge.run(&mut memory, start, trial.start_s, &input, pressure, &mut out[from..to])?;
+            let record = self.found_in.of_trial(i, self.noise, self.spread);
+            acting.follow(record, &mut out[from..to]);
+            let next = self.record.trials.get(i + 1).map_or(f64::INFINITY, |t| t.start_s);
+            let rest_s = (next - trial.start_s - trial.samples as f64 * self.dt_s()).max(0.0);
+            start = Start::Carried { rest_s };
+            from = to;
+        }
+        match out.iter().all(|x| x.is_finite()) {
+            true => Ok(()),
+            false => Err(BenchError::NotFinite { stage: "sensing".into() }),
+        }
+    }
+}
+
+impl Simulator for GaugeSimulator {
+    fn description(&self) -> &Description {
+        &self.about
+    }
+
+    fn measured(&self, _stage: usize) -> &[f64] {
+        &self.record.signal
+    }
+
+    fn is_lost(&self) -> &[bool] {
+        &self.record.is_lost
+    }
+
+    fn rows_used(&self) -> RowsUsed {
+        RowsUsed { used: self.record.rows.used(), read: self.record.rows.read }
+    }
+
+    fn lines(&self, _stage: usize, model: &Model) -> Vec<Line> {
+        lines(&self.nominal.effects, &self.rows, model, self.spread)
+    }
+
+    fn motion(&self) -> Motion<'_> {
+        Motion {
+            values: &self.record.reference,
+            unit: unit_of(&self.reference),
+            falling: "falling",
+            rising: "rising",
+        }
+    }
+
+    fn sensor(&self) -> Option<usize> {
+        Some(0)
+    }
+
+    /// The reference as it drives the gauge, and the pressure where it was recorded.
+    fn recorded(&self) -> Vec<Recorded> {
+        let driving = self.inputs.iter().flat_map(|s| &s.values).copied().collect();
+        let mut out = vec![Recorded::measured(&self.reference, unit_of(&self.reference), driving)];
+        if !self.record.pressure.is_empty() {
+            out.push(Recorded::measured("pressure_kpa", "kPa", self.record.pressure.clone()));
+        }
+        out
+    }
+
+    fn columns(&self) -> Vec<Column<'_>> {
+        self.record_columns()
+    }
+
+    /// A line follows whatever it is fitted to; where it does not follow half of it, the two have little to do with each other.
+    fn foreign_share(&self) -> f64 {
+        0.5
+    }
+
+    fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
+        Ok(self.signal(run, out)?)
+    }
+}
+
+/// Unit of a column, empty where its name gives none.
+fn unit_of(column: &str) -> &str {
+    unit(column).map_or("", written_unit)
+}
+
+/// Trials with their part of a column.
+fn parts<'a>(
+    trials: &'a [TrialSpec],
+    values: &'a [f64],
+) -> impl Iterator<Item = (&'a TrialSpec, &'a [f64])> {
+    let mut rest = values;
+    trials.iter().map(move |trial| {
+        let (own, behind) = rest.split_at(trial.samples);
+        rest = behind;
+        (trial, own)
+    })
+}
+
+/// The gauge of a rig file; without one that of the record, its offset and gain free.
+fn nominal(record: &Record, rig: Option<&GaugeRig>) -> GaugeRig {
+    let (low, high) = record.range(&record.reference);
+    let (least, greatest) = record.range(&record.signal);
+    let scale = (!record.pressure.is_empty()).then(|| record.range(&record.pressure).1);
+    let pressure_scale = scale.filter(|scale| *scale > 0.0);
+    if let Some(rig) = rig {
+        let mut rig = rig.clone();
+        rig.spec.pressure_scale = rig.spec.pressure_scale.or(pressure_scale);
+        return rig;
+    }
+    let mut spec =
+        GaugeSpec { zero: low, span: high - low, offset: 0.0, gain: 1.0, pressure_scale };
+    (spec.offset, spec.gain) = line(record, &spec);
+    let free = Tolerance::Absolute(3.0 * (greatest - least));
+    GaugeRig { spec, offset: free, gain: free, effects: EffectSet::new() }
+}
+
+fn parameters(rig: &GaugeRig, signal: &str, is_evidence: bool) -> Vec<ParameterSpec> {
+    let parameter = |name: &str, nominal: f64, tolerance: Tolerance| ParameterSpec {
+        is_evidence,
+        ..ParameterSpec::new(name, unit_of(signal), nominal).within(tolerance.sd(nominal))
+    };
+    vec![
+        parameter("offset", rig.spec.offset, rig.offset),
+        parameter("gain", rig.spec.gain, rig.gain),
+        ParameterSpec {
+            is_evidence: false,
+            ..ParameterSpec::new("winding", "1", 0.0).within(1.0 / 3.0)
+        },
+    ]
+}
+
+fn alone(record: &Record) -> Alone {
+    let end_s = |t: &TrialSpec| t.start_s + t.samples as f64 * record.dt_s;
+    let begun_s = record.trials.first().map_or(0.0, |t| t.start_s);
+    let longest = record.fitted().max_by_key(ExactSizeIterator::len).unwrap_or(0..0);
+    Alone {
+        session_s: record.trials.last().map_or(0.0, end_s) - begun_s,
+        lag_s: lag(&record.reference[longest.clone()], &record.signal[longest], record.dt_s),
+    }
+}
+
+/// Offset and gain of the straight line of the signal over e, in the trials that are fitted.
+fn line(record: &Record, spec: &GaugeSpec) -> (f64, f64) {
+    let pairs = || {
+        record.fitted().flat_map(|r| {
+            let e = record.reference[r.clone()].iter().map(|x| (x - spec.zero) / spec.span);
+            e.zip(&record.signal[r])
+        })
+    };
+    let (n, e, y) = pairs().fold((0.0, 0.0, 0.0), |(n, a, b), (e, y)| (n + 1.0, a + e, b + y));
+    let (e, y) = (e / n, y / n);
+    let (ee, ey) = pairs()
+        .fold((0.0, 0.0), |(ee, ey), (x, z)| (ee + (x - e) * (x - e), ey + (x - e) * (z - y)));
+    let gain = if ee > 0.0 && ey != 0.0 { ey / ee } else { 1.0 };
+    (y - gain * e, gain)
+}

@@ -1,0 +1,162 @@
+//! The measured trials of a gauge alone: two columns, evenly sampled, and what was noticed of them.
+
+use std::ops::Range;
+
+use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial, unit};
+use stretch_gap::{Frame, Noise, TrialSpec};
+
+use crate::bench::{
+    ends::ends,
+    error::{BenchError, check_rate},
+    lost::open,
+};
+
+/// Least samples that may be fitted.
+const LEAST: usize = 300;
+/// Parts of a trial with fewer samples are left out.
+const SHORTEST: usize = 100;
+/// Column of the pressure.
+const PRESSURE: &str = "pressure_kpa";
+
+/// All trials end to end.
+#[derive(Debug)]
+pub(super) struct Record {
+    pub(super) trials: Vec<TrialSpec>,
+    pub(super) reference: Vec<f64>,
+    pub(super) signal: Vec<f64>,
+    /// Empty unless every trial has one.
+    pub(super) pressure: Vec<f64>,
+    pub(super) is_lost: Vec<bool>,
+    pub(super) dt_s: f64,
+    pub(super) rows: Rows,
+    pub(super) notes: Vec<String>,
+}
+
+impl Record {
+    /// # Errors
+    /// Columns that are missing, dead or hold what is no number, rates that differ, too little to fit.
+    pub(super) fn read(
+        trials: &[SessionTrial],
+        reference: &str,
+        signal: &str,
+    ) -> Result<Self, BenchError> {
+        let mut columns = vec![reference, signal];
+        if trials.iter().all(|t| t.trial.channel(PRESSURE).is_some()) {
+            columns.push(PRESSURE);
+        }
+        let session = EvenSession::new(trials, &columns, SHORTEST)?;
+        check_rate(session.dt_s())?;
+        let all = |column: usize| -> Vec<f64> {
+            session
+                .trials()
+                .iter()
+                .filter_map(|t| t.columns().get(column))
+                .flatten()
+                .copied()
+                .collect()
+        };
+        let spec = |trial: &EvenTrial| TrialSpec {
+            name: trial.name().to_owned(),
+            samples: trial.columns()[0].len(),
+            start_s: trial.start_s(),
+            is_test: trial.is_test(),
+        };
+        let mut record = Self {
+            trials: session.trials().iter().map(spec).collect(),
+            reference: all(0),
+            signal: all(1),
+            pressure: all(2),
+            is_lost: session.trials().iter().flat_map(|t| open(t.is_lost())).collect(),
+            dt_s: session.dt_s(),
+            rows: session.rows(),
+            notes: session.notes().to_vec(),
+        };
+        record.check(reference, signal)?;
+        Ok(record)
+    }
+
+    /// Samples that may be looked at before the end.
+    pub(super) fn fitted(&self) -> impl Iterator<Item = Range<usize>> {
+        let mut begin = 0;
+        self.trials.iter().zip(Frame::not_tested(&self.trials)).filter_map(move |(t, fit)| {
+            let own = begin..begin + fit;
+            begin += t.samples;
+            (fit > 0).then_some(own)
+        })
+    }
+
+    /// Least and greatest of a column over the trials that are fitted.
+    pub(super) fn range(&self, values: &[f64]) -> (f64, f64) {
+        ends(self.fitted().flat_map(|r| &values[r]))
+    }
+
+    /// Noise of a column from the median of its second differences in the trials that are fitted.
+    pub(super) fn noise(&self, values: &[f64]) -> Noise {
+        Noise::of_differences(self.fitted().map(|r| &values[r]), self.dt_s)
+    }
+
+    fn check(&mut self, reference: &str, signal: &str) -> Result<(), BenchError> {
+        let samples: usize = self.fitted().map(|r| r.len()).sum();
+        if samples < LEAST {
+            return Err(BenchError::TooLittle {
+                what: format!("the trials to fit have {samples} samples"),
+                hint: format!("at least {LEAST} are needed to tell anything"),
+            });
+        }
+        if reference == "bridge_v" || signal == "length_mm" {
+            return Err(BenchError::Implausible {
+                column: format!("--reference {reference}, --signal {signal}"),
+                found: "the two look swapped".into(),
+                hint: "the reference is the length, the signal what the gauge says".into(),
+            });
+        }
+        let mut shares = Vec::new();
+        for (name, values) in [(reference, &self.reference), (signal, &self.signal)] {
+            let (low, high) = self.range(values);
+            if high <= low {
+                return Err(BenchError::Implausible {
+                    column: name.into(),
+                    found: format!("{low} in every sample"),
+                    hint: "the channel is dead: check the sensor and its cable".into(),
+                });
+            }
+            shares.push(self.noise(values).sd() / (high - low));
+        }
+        let mut notes = Vec::new();
+        if shares[0] > 3.0 * shares[1] {
+            notes.push(format!(
+                "{reference} is noisier than {signal}, each held against its own range: are reference and signal swapped?"
+            ));
+        }
+        for (name, values) in [(reference, &self.reference), (signal, &self.signal)] {
+            let (low, high) = self.range(values);
+            if unit(name) == Some("mm") && high.abs().max(low.abs()) < 1.0 {
+                notes.push(format!(
+                    "{name} goes from {low} to {high}: this looks like metres; the verdict does not depend on it"
+                ));
+            }
+            for (end, which) in [(low, "least"), (high, "greatest")] {
+                let share = self.standing(values, end);
+                if share > 0.01 {
+                    notes.push(format!(
+                        "{name} stands at its {which} value, {end}, in {:.1} % of the samples: if that is an end of its converter, what happened there is lost",
+                        100.0 * share
+                    ));
+                }
+            }
+        }
+        self.notes.append(&mut notes);
+        Ok(())
+    }
+
+    /// Share of the samples at a value, in rows of at least five.
+    fn standing(&self, values: &[f64], end: f64) -> f64 {
+        let (mut count, mut all) = (0, 0);
+        for range in self.fitted() {
+            all += range.len();
+            let rows = values[range].chunk_by(|a, b| (*a == end) == (*b == end));
+            count += rows.filter(|r| r[0] == end && r.len() >= 5).map(<[f64]>::len).sum::<usize>();
+        }
+        count as f64 / all.max(1) as f64
+    }
+}

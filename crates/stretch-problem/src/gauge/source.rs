@@ -1,0 +1,85 @@
+//! Which columns of which trials: a gauge alone as it lies on a disk.
+
+use std::path::Path;
+
+use stretch_data::{DataSet, ReadOptions, Recording, SessionTrial, Trial};
+use stretch_sim::Catalogue;
+
+use super::{GaugeSetup, GaugeSimulator};
+use crate::bench::{error::BenchError, rig_file};
+
+/// Columns that need no naming.
+const USUAL: (&str, &str) = ("length_mm", "bridge_v");
+
+impl GaugeSimulator {
+    /// Reads a gauge alone: a trial, or the folder of a data set. `columns` are reference and signal; without them
+    /// `length_mm` and `bridge_v` are taken. None when it is no gauge alone: nothing says so, and the trials have openings.
+    ///
+    /// A gauge is told by its columns, by a rig file of `kind = "gauge"` (given, or named by the data set), or by trials
+    /// without openings.
+    ///
+    /// # Errors
+    /// Files that cannot be read, columns that have to be named, and as [`GaugeSimulator::new`].
+    pub fn read(
+        path: &Path,
+        columns: Option<(&str, &str)>,
+        rig: Option<&Path>,
+        catalogue: &Catalogue,
+    ) -> Result<Option<Self>, BenchError> {
+        let set = if path.is_dir() { Some(DataSet::read(path)?) } else { None };
+        let own = set.as_ref().and_then(|set| Some(path.join(set.rig.as_ref()?)));
+        let (rig, says_so) = match (rig, &own) {
+            (Some(rig), _) => (Some(rig), rig_file::is_gauge(rig)?),
+            (None, Some(own)) if rig_file::is_gauge(own)? => (Some(own.as_path()), true),
+            _ => (None, false),
+        };
+        let mut options = ReadOptions::new();
+        if let Some((reference, signal)) = columns {
+            options = options.require(reference).require(signal);
+        }
+        let first = match &set {
+            Some(set) => set.trials[0].load_recording(path, &options)?,
+            None => Recording::read(path, &options)?,
+        };
+        let Some((reference, signal)) = columns_of(&first.trial, columns, says_so)? else {
+            return Ok(None);
+        };
+        let (reference, signal) = (reference.to_owned(), signal.to_owned());
+        let (reference, signal) = (reference.as_str(), signal.as_str());
+        let trials = match &set {
+            // Read once: it may be standard input.
+            None => vec![SessionTrial::from(first)],
+            Some(set) => set.load(path, &ReadOptions::new().require(reference).require(signal))?,
+        };
+        let rig = rig.map(rig_file::gauge).transpose()?;
+        let rig = rig.as_ref();
+        Self::new(&GaugeSetup { trials: &trials, reference, signal, rig, catalogue }).map(Some)
+    }
+}
+
+/// Reference and signal; none where the trial is of a whole rig.
+fn columns_of<'a>(
+    first: &Trial,
+    named: Option<(&'a str, &'a str)>,
+    says_so: bool,
+) -> Result<Option<(&'a str, &'a str)>, BenchError> {
+    let has = |name: &str| first.channel(name).is_some();
+    match named {
+        Some(columns) => Ok(Some(columns)),
+        None if !says_so && (has("inlet") || has("outlet")) => Ok(None),
+        None if has(USUAL.0) && has(USUAL.1) => Ok(Some(USUAL)),
+        None => {
+            let names: Vec<&str> = first.channels.iter().map(|c| c.name.as_str()).collect();
+            Err(BenchError::TooLittle {
+                what: format!(
+                    "{} is a gauge alone, and nothing says which columns are the reference and the signal",
+                    first.name
+                ),
+                hint: format!(
+                    "name them with --reference and --signal; the columns are {}",
+                    names.join(", ")
+                ),
+            })
+        }
+    }
+}

@@ -1,0 +1,308 @@
+//! A menu of experiments on the rig, and what a model predicts of each.
+
+use stretch_data::{Channel, Trial};
+use stretch_gap::{GapError, Laboratory, Model, Plan};
+use stretch_sim::{
+    Chain, DEFAULT_STEP_S, EffectSet, Grid, Key, Openings, Recorded, Reference, RigParams, Sensing,
+    Stage, Start, TrialPlan,
+};
+
+use super::RigSimulator;
+use crate::bench::{acting::unrecorded, error::BenchError};
+
+/// Sample time of an experiment, s.
+const DT_S: f64 = 0.01;
+/// Step of integration, s: four times the usual; differences between rivals are wanted, not digits.
+const STEP_S: f64 = 4.0 * DEFAULT_STEP_S;
+/// Share by which the shunt changes the bridge's trim.
+const SHUNT: f64 = 0.02;
+
+/// What is done to the rig.
+#[derive(Debug, Clone, PartialEq)]
+enum Drive {
+    /// Openings; whether the chamber begins full.
+    Valves { full: bool },
+    /// The length (mm) is held or set from outside, the pressure (kPa) follows its own course.
+    /// Share by which a shunt lowers the bridge's trim; empty without one.
+    Held { length_mm: Vec<f64>, pressure_kpa: Vec<f64>, shunt: Vec<f64> },
+}
+
+/// An experiment on the rig.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Experiment {
+    /// Name in the menu.
+    name: &'static str,
+    /// How to do it, in a sentence.
+    how: &'static str,
+    /// Time to prepare it, minutes.
+    prepare_min: f64,
+    inlet: Vec<f64>,
+    outlet: Vec<f64>,
+    drive: Drive,
+    /// Excitation as a share of the usual.
+    excitation: f64,
+}
+
+impl Experiment {
+    fn plan(&self) -> Plan {
+        let (name, how, trial) = (self.name.to_owned(), self.how.to_owned(), self.trial());
+        Plan { name, how, prepare_min: self.prepare_min, trial }
+    }
+
+    /// The trial that runs it: openings, and what is set from outside.
+    fn trial(&self) -> Trial {
+        let samples = self.inlet.len();
+        let channel =
+            |name: &str, values: &[f64]| Channel { name: name.into(), values: values.to_vec() };
+        let mut channels = vec![channel("inlet", &self.inlet), channel("outlet", &self.outlet)];
+        if let Drive::Held { length_mm, shunt, .. } = &self.drive {
+            channels.push(channel("set_length_mm", length_mm));
+            if !shunt.is_empty() {
+                channels.push(channel("shunt_share", shunt));
+            }
+        }
+        if self.excitation != 1.0 {
+            channels.push(channel("excitation_share", &vec![self.excitation; samples]));
+        }
+        Trial {
+            name: self.name.into(),
+            time_s: (0..samples).map(|i| (i as f64 * DT_S * 100.0).round() / 100.0).collect(),
+            channels,
+        }
+    }
+
+    fn of(plan: TrialPlan, name: &'static str, how: &'static str, prepare_min: f64) -> Self {
+        Self {
+            name,
+            how,
+            prepare_min,
+            inlet: plan.inlet,
+            outlet: plan.outlet,
+            drive: Drive::Valves { full: plan.full },
+            excitation: 1.0,
+        }
+    }
+
+    /// Openings by pieces of (inlet, outlet, seconds), after a second of rest.
+    fn pieces(name: &'static str, how: &'static str, pieces: &[(f64, f64, f64)]) -> Self {
+        let (mut inlet, mut outlet) = (vec![0.0; 100], vec![0.0; 100]);
+        for &(i, o, s) in pieces {
+            let samples = (s / DT_S).round() as usize;
+            inlet.extend(std::iter::repeat_n(i, samples));
+            outlet.extend(std::iter::repeat_n(o, samples));
+        }
+        let drive = Drive::Valves { full: false };
+        Self { name, how, prepare_min: 0.25, inlet, outlet, drive, excitation: 1.0 }
+    }
+
+    fn held(
+        name: &'static str,
+        how: &'static str,
+        prepare_min: f64,
+        length_mm: Vec<f64>,
+        pressure_kpa: Vec<f64>,
+    ) -> Self {
+        let samples = length_mm.len();
+        Self {
+            name,
+            how,
+            prepare_min,
+            inlet: vec![0.0; samples],
+            outlet: vec![0.0; samples],
+            drive: Drive::Held { length_mm, pressure_kpa, shunt: Vec::new() },
+            excitation: 1.0,
+        }
+    }
+
+    /// The menu for a rig whose length goes from `stroke.0` to `stroke.1` mm and whose supply is at `supply_kpa`.
+    fn all(stroke: (f64, f64), supply_kpa: f64) -> Vec<Self> {
+        let at = |share: f64| stroke.0 + share * (stroke.1 - stroke.0);
+        let repeat = |piece: &[(f64, f64, f64)], times: usize| piece.repeat(times);
+        let mut ramps: Vec<(f64, f64, f64)> = Vec::new();
+        for opening in [0.125, 0.5, 1.0] {
+            ramps.extend([(opening, 0.0, 6.0), (0.0, opening, 6.0)]);
+        }
+        let mut loops = repeat(&[(0.02, 0.0, 5.0), (0.0, 0.02, 5.0)], 3);
+        loops.extend(repeat(&[(1.0, 0.0, 0.3), (0.0, 1.0, 0.4)], 40));
+        let mut minor = vec![(0.5, 0.0, 0.4)];
+        minor.extend(repeat(
+            &[(0.25, 0.0, 0.25), (0.0, 0.0, 0.3), (0.0, 0.25, 0.35), (0.0, 0.0, 0.3)],
+            40,
+        ));
+        let dwells = repeat(
+            &[
+                (1.0, 0.0, 0.15),
+                (0.0, 0.0, 4.0),
+                (1.0, 0.0, 0.3),
+                (0.0, 0.0, 4.0),
+                (0.0, 1.0, 1.0),
+                (0.0, 0.0, 4.0),
+            ],
+            4,
+        );
+        let mut chirp = Vec::new();
+        let mut half_s: f64 = 2.0;
+        while half_s > 0.06 {
+            chirp.extend([(0.5, 0.0, half_s), (0.0, 0.5, 1.15 * half_s)]);
+            half_s *= 0.9;
+        }
+        let seconds = |s: f64| (s / DT_S) as usize;
+        let sweep: Vec<f64> = (0..seconds(40.0))
+            .map(|i| {
+                let turn = (i as f64 * DT_S / 10.0).fract();
+                supply_kpa * (1.0 - (2.0 * turn - 1.0).abs())
+            })
+            .collect();
+        let mut clamped = Self::held(
+            "clamped_pressure",
+            "Clamp the crossbeam at half its stroke and sweep the pressure.",
+            2.0,
+            vec![at(0.5); sweep.len()],
+            sweep,
+        );
+        for (i, (inlet, outlet)) in clamped.inlet.iter_mut().zip(&mut clamped.outlet).enumerate() {
+            let fills = (i / seconds(5.0)).is_multiple_of(2);
+            *if fills { inlet } else { outlet } = 0.1;
+        }
+        // Ten seconds on each of three blocks, and three to go from one to the next.
+        let blocks: Vec<f64> = (0..seconds(36.0))
+            .map(|i| {
+                let (block, s) = (i / seconds(13.0), (i % seconds(13.0)) as f64 * DT_S);
+                at(0.1 + 0.4 * (block as f64 + ((s - 10.0) / 3.0).max(0.0)))
+            })
+            .collect();
+        let blocks = Self::held(
+            "gauge_blocks",
+            "Set three lengths with gauge blocks: the reference is then the blocks', not the potentiometer's.",
+            3.0,
+            blocks.clone(),
+            vec![0.0; blocks.len()],
+        );
+        let mut shunt = Self::held(
+            "shunt_step",
+            "At rest, switch a shunt across the bridge on and off: only what is electrical answers.",
+            1.0,
+            vec![at(1.0); seconds(8.0)],
+            vec![0.0; seconds(8.0)],
+        );
+        if let Drive::Held { length_mm, shunt, .. } = &mut shunt.drive {
+            // Off, on, off.
+            *shunt = vec![0.0; length_mm.len()];
+            let part = length_mm.len() / 4;
+            shunt[part..3 * part].fill(SHUNT);
+        }
+        let rest = Self::held(
+            "rest",
+            "Leave the rig alone for two minutes with the bridge powered: what changes does not come from motion.",
+            0.0,
+            vec![at(1.0); seconds(120.0)],
+            vec![0.0; seconds(120.0)],
+        );
+        let mut low = Self::of(
+            TrialPlan::arbitrary(8, 3),
+            "excitation_0.7",
+            "Repeat an arbitrary trial with the excitation at 0.7 of its value.",
+            0.5,
+        );
+        low.excitation = 0.7;
+        vec![
+            Self::pieces("ramps", "Fill and vent at three openings.", &ramps),
+            Self::of(
+                TrialPlan::arbitrary(8, 3),
+                "arbitrary",
+                "One minute of random segments.",
+                0.25,
+            ),
+            Self::pieces(
+                "slow_fast_loops",
+                "Half a minute of slow loops, half a minute of fast ones.",
+                &loops,
+            ),
+            Self::pieces("minor_loops", "Small loops around the middle of the stroke.", &minor),
+            Self::pieces(
+                "steps_with_dwells",
+                "Steps, each followed by four seconds with both valves shut.",
+                &dwells,
+            ),
+            Self::pieces("chirp", "Filling and venting in turn, ever faster.", &chirp),
+            clamped,
+            low,
+            blocks,
+            shunt,
+            rest,
+        ]
+    }
+}
+
+impl RigSimulator {
+    /// Rig and effects of a model.
+    fn rig_of(&self, model: &Model) -> Result<(RigParams, EffectSet), BenchError> {
+        let mut params = self.base;
+        for (knob, value) in self.knobs.iter().zip(&model.parameters) {
+            if let Some(key) = knob.key() {
+                params[key] = *value;
+            }
+        }
+        Ok((params, unrecorded(&self.effects, &self.rows, model)?))
+    }
+
+    /// Every recorded channel of an experiment, in units of its noise.
+    fn prediction(
+        &self,
+        model: &Model,
+        experiment: &Experiment,
+    ) -> Result<Vec<Vec<f64>>, BenchError> {
+        let (mut params, effects) = self.rig_of(model)?;
+        params[Key::VExc] *= experiment.excitation;
+        let samples = experiment.inlet.len();
+        let mut out = [(); 3].map(|()| vec![0.0; samples]);
+        let [pressure_kpa, length_mm, bridge_v] = &mut out;
+        match &experiment.drive {
+            Drive::Valves { full } => {
+                let chain = Chain::new(&params, &effects, DT_S, STEP_S)?;
+                let openings = Openings { inlet: &experiment.inlet, outlet: &experiment.outlet };
+                let initial = if *full { 1e-3 * params[Key::PS] } else { 0.0 };
+                let recorded = Recorded { pressure_kpa, length_mm, bridge_v };
+                chain.run(&mut chain.memory(), Start::Settled, 0.0, openings, initial, recorded)?;
+            }
+            Drive::Held { length_mm: length, pressure_kpa: pressure, shunt } => {
+                let grid = Grid::samples(DT_S)?;
+                let sensing = Sensing::new(&params, &effects, &grid)?;
+                let (mut memory, start) = (sensing.memory(), Start::Settled);
+                let set = (length.as_slice(), shunt.as_slice());
+                sensing.run_shunted(&mut memory, start, 0.0, set, pressure, bridge_v)?;
+                let reference = Reference::new(&params, &effects, &grid)?;
+                reference.run(&mut reference.memory(), Start::Settled, length, length_mm)?;
+                pressure_kpa.copy_from_slice(pressure);
+            }
+        }
+        let has_pressure = self.stage_kinds.contains(&Stage::Pneumatics);
+        let sds = [1e-3 * params[Key::SigmaP], params[Key::SigmaL], params[Key::SigmaV]];
+        let channels = out.into_iter().zip(sds).enumerate();
+        Ok(channels
+            .filter(|(i, _)| *i > 0 || has_pressure)
+            .map(|(_, (mut values, sd))| {
+                values.iter_mut().for_each(|x| *x /= sd);
+                values
+            })
+            .collect())
+    }
+}
+
+impl Laboratory for RigSimulator {
+    type Setting = Experiment;
+
+    fn menu(&self) -> Vec<(Plan, Experiment)> {
+        let all = Experiment::all(self.inputs.stroke, 1e-3 * self.base[Key::PS]);
+        all.into_iter().map(|x| (x.plan(), x)).collect()
+    }
+
+    /// An arbitrary trial.
+    fn done(&self) -> Experiment {
+        Experiment::of(TrialPlan::arbitrary(9, 3), "done", "", 0.0)
+    }
+
+    fn predict(&self, model: &Model, experiment: &Experiment) -> Result<Vec<Vec<f64>>, GapError> {
+        Ok(self.prediction(model, experiment)?)
+    }
+}

@@ -1,0 +1,194 @@
+//! The rig as a [`Simulator`](stretch_gap::Simulator): pneumatics, muscle (or both as actuation) and sensing, each on measured inputs.
+
+mod directions;
+mod experiments;
+mod extent;
+mod fixed;
+mod found;
+mod noises;
+mod nominal;
+mod put_right;
+mod rails;
+mod run;
+mod session;
+mod shown;
+mod simulator;
+pub(crate) mod smooth;
+mod stand_ins;
+mod timing;
+mod turned;
+mod unwound;
+
+use std::path::Path;
+
+use stretch_data::DataSet;
+use stretch_gap::{Description, DescriptionSpec, TrialSpec};
+use stretch_sim::{Catalogue, Effect, EffectSet, Key, Rig, RigParams, Search, Stage, Tolerance};
+
+use extent::extent_of;
+use found::Found;
+use noises::Noises;
+use nominal::{Knob, parameters, stages};
+use session::Inputs;
+pub use session::{RigSession, RigTrial};
+
+use crate::bench::{
+    acting::FitRecord,
+    error::BenchError,
+    rig_file,
+    specs::{Place, shown, spec},
+};
+
+/// What a [`RigSimulator`] is made of.
+#[derive(Debug, Clone)]
+pub struct RigSetup<'a> {
+    /// What was measured.
+    pub session: RigSession,
+    /// The rig beside it: parameters, how far each may be wrong, and the effects that it already has.
+    pub rig: Rig,
+    /// Effects that are looked for, those of the rig apart.
+    pub catalogue: &'a Catalogue,
+}
+
+/// A whole rig beside its recorded session.
+#[derive(Debug, Clone)]
+pub struct RigSimulator {
+    base: RigParams,
+    tolerances: [Tolerance; Key::COUNT],
+    /// Effects that the rig already has.
+    effects: EffectSet,
+    session: RigSession,
+    inputs: Inputs,
+    noises: Noises,
+    about: Description,
+    stage_kinds: Vec<Stage>,
+    /// What each parameter turns.
+    knobs: Vec<Knob>,
+    rows: Vec<&'static Effect>,
+    measured: Vec<Vec<f64>>,
+    is_lost: Vec<bool>,
+    /// The bridge voltage that effects may be found in.
+    bridge: FitRecord,
+    found: Found,
+    notes: Vec<String>,
+}
+
+impl RigSimulator {
+    /// Reads a data set's folder: its trials, and its rig file unless another is given.
+    ///
+    /// # Errors
+    /// A rig file that cannot be read, and as [`RigSession::read`] and [`RigSimulator::new`].
+    pub fn read(
+        folder: &Path,
+        rig: Option<&Path>,
+        catalogue: &Catalogue,
+    ) -> Result<Self, BenchError> {
+        let set = DataSet::read(folder)?;
+        let own = set.rig.as_ref().map(|file| folder.join(file));
+        let rig = rig.or(own.as_deref()).map(rig_file::rig).transpose()?.unwrap_or_default();
+        let session = RigSession::read(folder, &set)?;
+        Self::new(RigSetup { session, rig, catalogue })
+    }
+
+    /// Binds a rig to a session. The effects of the rig act in every run and are not looked for.
+    ///
+    /// # Errors
+    /// A rig beyond its limits.
+    pub fn new(setup: RigSetup<'_>) -> Result<Self, BenchError> {
+        let RigSetup { session, rig, catalogue } = setup;
+        rig.check()?;
+        let Rig { params: base, effects, .. } = &rig;
+        let noises = Noises::of(base, &session);
+        let (length_sd, pressure_sd) = (noises.length_mm.sd(), noises.pressure_kpa.sd());
+        let inputs = Inputs::of(&session, length_sd, pressure_sd, 1e-3 * base[Key::PS]);
+        let stage_kinds = match session.trials[0].pressure_kpa {
+            Some(_) => vec![Stage::Pneumatics, Stage::Muscle, Stage::Sensing],
+            None => vec![Stage::Actuation, Stage::Sensing],
+        };
+        let (parameters, knobs) = parameters(&rig, &stage_kinds);
+        let stages = stages(&stage_kinds, &knobs, &noises);
+        let dt_s = session.dt_s();
+        let trials: Vec<_> = session.trials.iter().map(trial_spec).collect();
+        let measured: Vec<_> = stage_kinds.iter().map(|kind| measured(&session, *kind)).collect();
+        let bridge = FitRecord::of(&trials, measured.last().map_or(&[], Vec::as_slice), dt_s);
+        let extent = extent_of(base, &inputs, &bridge);
+        let place = |effect: &Effect| Place {
+            touches: touched(&stage_kinds, effect.stage),
+            search: Search::of(effect, &extent),
+            unit: |_| 1.0,
+        };
+        let missing = catalogue.iter().filter(|e| effects.find(e.name).is_none());
+        let mut notes = session.notes.clone();
+        let (rows, places) = shown(missing.map(|e| (e, place(e))), dt_s, &mut notes);
+        let missing = rows.iter().zip(places).map(|(effect, place)| spec(effect, place)).collect();
+        let is_lost = session.trials.iter().flat_map(|t| &t.is_lost).copied().collect();
+        Ok(Self {
+            about: Description::new(DescriptionSpec {
+                stages,
+                parameters,
+                effects: missing,
+                trials,
+                dt_s,
+            })?,
+            base: *base,
+            tolerances: rig.tolerances,
+            effects: effects.clone(),
+            session,
+            inputs,
+            noises,
+            stage_kinds,
+            knobs,
+            rows,
+            measured,
+            is_lost,
+            bridge,
+            found: Found::new(),
+            notes,
+        })
+    }
+
+    /// The session that it is bound to.
+    pub fn session(&self) -> &RigSession {
+        &self.session
+    }
+
+    /// What was noticed, in sentences for a report: of the session, and what it cannot show.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// Nominal parameters as shipped.
+    pub fn nominal(&self) -> &RigParams {
+        &self.base
+    }
+
+    /// Measured inputs, smoothed as the stages see them: length (mm) of a trial; none for a trial that is not there.
+    pub fn smooth_length(&self, trial: usize) -> Option<&[f64]> {
+        self.inputs.length.get(trial).map(|length| length.values.as_slice())
+    }
+}
+
+/// Stages whose output an effect of a stage changes.
+fn touched(kinds: &[Stage], stage: Stage) -> Vec<usize> {
+    let shows = |kind: Stage| stage == Stage::Reference && kind != Stage::Pneumatics;
+    (0..kinds.len()).filter(|&i| kinds[i].holds(stage) || shows(kinds[i])).collect()
+}
+
+fn trial_spec(trial: &RigTrial) -> TrialSpec {
+    TrialSpec {
+        name: trial.name.clone(),
+        samples: trial.length_mm.len(),
+        start_s: trial.start_s,
+        is_test: trial.is_test,
+    }
+}
+
+/// What was measured of a stage, all trials end to end.
+fn measured(session: &RigSession, stage: Stage) -> Vec<f64> {
+    let channel = |trial: &'_ RigTrial| match stage {
+        Stage::Pneumatics => trial.pressure_kpa.clone().unwrap_or_default(),
+        Stage::Sensing => trial.bridge_v.clone(),
+        _ => trial.length_mm.clone(),
+    };
+    session.trials.iter().flat_map(channel).collect()
+}

@@ -1,0 +1,78 @@
+//! Noise of the rig's channels: what the record bears out of what the rig file says.
+
+use stretch_gap::{Noise, WINDOW};
+use stretch_sim::{Key, RigParams};
+
+use super::session::{RigSession, RigTrial};
+
+/// Share of the quiet windows that are listened to, those the longest after a command, and how many at least.
+const LISTENED: (f64, usize) = (0.5, 24);
+
+/// Time after a command from which a muscle stands still but for what a parabola follows, s: a few of its time constants.
+const SETTLED_S: f64 = 2.0;
+
+/// Noise of every channel, steps of the converters included.
+#[derive(Debug, Clone)]
+pub(super) struct Noises {
+    pub(super) length_mm: Noise,
+    pub(super) volts: Noise,
+    pub(super) pressure_kpa: Noise,
+}
+
+impl Noises {
+    /// From the windows of the trials to fit in which nothing was commanded; where there are too few of them, as the
+    /// rig file says.
+    pub(super) fn of(params: &RigParams, session: &RigSession) -> Self {
+        // A step adds a uniform error of variance step^2/12.
+        let with_step = |sigma: Key, full_scale: Key| {
+            let step = params[full_scale] / (params[Key::Bits].exp2() - 1.0);
+            (params[sigma].powi(2) + step * step / 12.0).sqrt()
+        };
+        let quiet = quiet(session);
+        let of = |stated: f64, channel: fn(&RigTrial) -> &[f64]| {
+            let window = |&(trial, from): &(usize, usize)| {
+                let values = channel(&session.trials()[trial]);
+                values.get(from..from + WINDOW).unwrap_or(&[]).to_vec()
+            };
+            let windows: Vec<Vec<f64>> = quiet.places.iter().map(window).collect();
+            Noise::of_windows(&windows, Some(stated), quiet.is_still, session.dt_s())
+                .unwrap_or_else(|| Noise::known(stated))
+        };
+        Self {
+            length_mm: of(with_step(Key::SigmaL, Key::Travel), |t| &t.length_mm),
+            volts: of(with_step(Key::SigmaV, Key::VFs), |t| &t.bridge_v),
+            pressure_kpa: of(1e-3 * params[Key::SigmaP], |t| t.pressure_kpa().unwrap_or(&[])),
+        }
+    }
+}
+
+/// Windows without a command: trial and first sample.
+struct Quiet {
+    places: Vec<(usize, usize)>,
+    /// Whether all of them begin long after a command.
+    is_still: bool,
+}
+
+fn quiet(session: &RigSession) -> Quiet {
+    let mut all: Vec<(usize, (usize, usize))> = Vec::new();
+    for (i, trial) in session.trials().iter().enumerate().filter(|(_, t)| !t.is_test) {
+        let commands: Vec<(f64, f64)> =
+            trial.inlet.iter().copied().zip(trial.outlet.iter().copied()).collect();
+        let mut from = 0;
+        for still in commands.chunk_by(|a, b| a == b) {
+            let mut at = 0;
+            while at + WINDOW <= still.len() {
+                all.push((at, (i, from + at)));
+                at += WINDOW / 2;
+            }
+            from += still.len();
+        }
+    }
+    all.sort_by_key(|window| std::cmp::Reverse(window.0));
+    let listened = ((LISTENED.0 * all.len() as f64) as usize).max(LISTENED.1);
+    let settled = (SETTLED_S / session.dt_s()) as usize;
+    let count = all.iter().filter(|(since, _)| *since >= settled).count();
+    let is_still = count >= LISTENED.1;
+    all.truncate(if is_still { listened.min(count) } else { listened });
+    Quiet { places: all.into_iter().map(|(_, place)| place).collect(), is_still }
+}

@@ -1,0 +1,91 @@
+//! Channels that ran into an end of their recorder.
+
+use stretch_filter::log::{noise_of_differences, second_differences};
+use stretch_sim::{Key, RigParams};
+
+use super::{RigSession, RigSimulator, RigTrial};
+
+/// Share of the samples at one value from which it is no accident.
+const SHARE: f64 = 0.002;
+/// Share of the stated noise that a record must show: without noise a channel at rest repeats itself.
+const NOISY: f64 = 0.3;
+
+impl RigSimulator {
+    /// A sentence for every end of a channel at which more samples stand than noise would leave there.
+    pub fn rails(&self) -> Vec<String> {
+        rails(self.nominal(), self.session())
+    }
+}
+
+fn rails(params: &RigParams, session: &RigSession) -> Vec<String> {
+    type Channel = fn(&RigTrial) -> Option<&[f64]>;
+    let channels: [(&str, &str, f64, Channel); 3] = [
+        ("bridge_v", "V", params[Key::SigmaV], |t| Some(t.bridge_v())),
+        ("length_mm", "mm", params[Key::SigmaL], |t| Some(t.length_mm())),
+        ("pressure_kpa", "kPa", 1e-3 * params[Key::SigmaP], RigTrial::pressure_kpa),
+    ];
+    let mut said = Vec::new();
+    for (column, unit, sigma, of) in channels {
+        let values: Vec<f64> = session.trials().iter().filter_map(of).flatten().copied().collect();
+        let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        for (end, which) in [(low, "least"), (high, "greatest")] {
+            let share =
+                values.iter().filter(|v| **v == end).count() as f64 / values.len().max(1) as f64;
+            if share > SHARE && noise_off(&values, end) > NOISY * sigma {
+                said.push(format!(
+                    "{column} stands at {end} {unit}, its {which} value, in {:.1} % of the samples: its recorder looks saturated, \
+                     and what happened there is lost; change range, gain or zero",
+                    100.0 * share
+                ));
+            }
+        }
+    }
+    said
+}
+
+/// Noise of a record from its median second difference, away from one value.
+fn noise_off(values: &[f64], end: f64) -> f64 {
+    let away = values.windows(3).filter(|w| w.iter().all(|v| *v != end));
+    let mut bends: Vec<f64> = away.flat_map(second_differences).collect();
+    noise_of_differences(&mut bends).unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use stretch_data::{Channel, SessionTrial, Trial};
+
+    use super::*;
+
+    #[test]
+    fn an_end_is_told_from_a_rest() {
+        let noise = |i: usize| ((i * i * 31 + i * 7919) % 1009) as f64 / 1009.0 - 0.5;
+        let at = |clip: f64, size: f64| -> Vec<f64> {
+            (0..3000).map(|i| ((0.01 * i as f64).sin() + size * noise(i)).min(clip)).collect()
+        };
+        let length: Vec<f64> =
+            (0..3000).map(|i| 170.0 - 0.001 * i as f64 + 0.1 * noise(i)).collect();
+        let channel = |name: &str, values| Channel { name: name.into(), values };
+        let said = |bridge_v| {
+            let trial = Trial {
+                name: "a".into(),
+                time_s: (0..3000).map(|i| 0.01 * f64::from(i)).collect(),
+                channels: vec![
+                    channel("inlet", vec![0.5; 3000]),
+                    channel("outlet", vec![0.0; 3000]),
+                    channel("length_mm", length.clone()),
+                    channel("bridge_v", bridge_v),
+                ],
+            };
+            let session = RigSession::new(&[SessionTrial::new(trial)]).expect("a session");
+            rails(&RigParams::default(), &session)
+        };
+        assert!(said(at(9.0, 0.01)).is_empty());
+        let clipped = said(at(0.5, 0.01));
+        assert!(
+            clipped.len() == 1 && clipped[0].contains("bridge_v stands at 0.5 V, its greatest")
+        );
+        // As clean as a simulation without noise.
+        assert!(said(at(0.5, 0.0)).is_empty());
+    }
+}

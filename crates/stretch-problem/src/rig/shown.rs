@@ -1,0 +1,61 @@
+//! The reference at the end of a stage.
+
+use stretch_sim::{EffectSet, Grid, Memory, Reference, RigParams, Stage, Start};
+
+use super::unwound::unwind;
+use crate::bench::error::BenchError;
+
+/// The reference at the end of a stage, skipped where nothing acts in it.
+pub(super) struct Shown {
+    stage: Reference,
+    memory: Memory,
+    acts: bool,
+    work: Vec<f64>,
+}
+
+impl Shown {
+    pub(super) fn new(
+        params: &RigParams,
+        effects: &EffectSet,
+        dt_s: f64,
+    ) -> Result<Self, BenchError> {
+        let stage = Reference::new(params, effects, &Grid::samples(dt_s)?)?;
+        let acts = effects.acting_in(Stage::Reference).next().is_some();
+        let memory = stage.memory();
+        Ok(Self { stage, memory, acts, work: Vec::new() })
+    }
+
+    /// Moves what it remembers towards having settled at a length.
+    pub(super) fn unwind(
+        &mut self,
+        share: f64,
+        after_pause: Start,
+        length: &[f64],
+    ) -> Result<(), BenchError> {
+        let Self { stage, memory, .. } = self;
+        let mut out = vec![0.0; length.len()];
+        unwind(share, after_pause, memory, stage.memory(), |memory, start| {
+            Ok(stage.run(memory, start, length, &mut out)?)
+        })
+    }
+
+    pub(super) fn condition(&mut self, length: &[f64]) -> Result<(), BenchError> {
+        let mut out = vec![0.0; length.len()];
+        Ok(self.stage.run(&mut self.memory, Start::Settled, length, &mut out)?)
+    }
+
+    pub(super) fn run(&mut self, start: Start, length: &mut [f64]) -> Result<(), BenchError> {
+        if self.acts {
+            self.work.clear();
+            self.work.extend_from_slice(length);
+            self.stage.run(&mut self.memory, start, &self.work, length)?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn undo(&self, length: &mut [f64]) {
+        if self.acts {
+            self.stage.undo(length);
+        }
+    }
+}

@@ -1,0 +1,214 @@
+//! Smoothing of a measured input, as wide as the commands allow.
+
+use std::{convert::Infallible, num::NonZeroUsize};
+
+use stretch_gap::{Dice, Noise};
+
+use crate::bench::kept::Kept;
+
+/// Widest half-width, in samples.
+const WIDEST: usize = 15;
+/// Narrowest half-width.
+const NARROWEST: usize = 2;
+/// A window reaches no further than this share of the time since the last command, less its wake.
+const SHARE: f64 = 0.125;
+/// Time that the wake of a command lasts at least, s.
+const WAKE_S: f64 = 0.1;
+/// Standard deviations of its own by which a residual sum of squares may exceed its mean: noise alone hardly ever does.
+const PATIENCE: f64 = 4.0;
+
+/// For every sample the half-width of the parabola, by least squares, that replaces it; 0 leaves it as it is.
+///
+/// Windows are chosen by what was commanded, not by the record: a choice by the record would favour noise that happens
+/// to look smooth, and what it leaves would pose as a gap. Only where a parabola is far off is a window narrowed.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Smoother {
+    halves: Vec<u8>,
+}
+
+/// Sums of x^2 and x^4 over -h .. h, and the number of samples.
+fn moments(h: usize) -> (f64, f64, f64) {
+    let sum = |power: i32| 2.0 * (1..=h).map(|i| (i as f64).powi(power)).sum::<f64>();
+    (sum(2), sum(4), (2 * h + 1) as f64)
+}
+
+/// Value and residual sum of squares of the parabola around sample `i`.
+fn parabola(record: &[f64], i: usize, h: usize) -> (f64, f64) {
+    let (s2, s4, n) = moments(h);
+    let middle = record[i];
+    let (mut y0, mut y1, mut y2, mut yy) = (0.0, 0.0, 0.0, 0.0);
+    for (k, value) in record[i - h..=i + h].iter().enumerate() {
+        let x = k as f64 - h as f64;
+        let y = value - middle;
+        y0 += y;
+        y1 += x * y;
+        y2 += x * x * y;
+        yy += y * y;
+    }
+    let determinant = n * s4 - s2 * s2;
+    let a = (s4 * y0 - s2 * y2) / determinant;
+    let c = (n * y2 - s2 * y0) / determinant;
+    (middle + a, (yy - a * y0 - y1 * y1 / s2 - c * y2).max(0.0))
+}
+
+/// Half-widths that the commands allow: narrow behind a change, wider the longer nothing was changed, never beyond the next
+/// change. A signal with corners (`sharp`) is not smoothed across a change at all.
+pub(crate) fn schedule(inlet: &[f64], outlet: &[f64], dt_s: f64, sharp: bool) -> Vec<u8> {
+    let changes = |i: usize| i > 0 && (inlet[i] != inlet[i - 1] || outlet[i] != outlet[i - 1]);
+    let mut halves = vec![0_u8; inlet.len()];
+    // A trial begins at rest: nothing was changed for long.
+    let mut since = (1.0 / dt_s) as usize;
+    for (i, half) in halves.iter_mut().enumerate() {
+        since = if changes(i) { 0 } else { since + 1 };
+        let reach = SHARE * (since as f64 - WAKE_S / dt_s);
+        *half = (reach.max(0.0) as usize).clamp(NARROWEST, WIDEST) as u8;
+        if sharp {
+            *half = (*half).min(since.min(WIDEST) as u8);
+        }
+    }
+    let least = if sharp { 0 } else { NARROWEST };
+    let mut until = WIDEST;
+    for i in (0..halves.len()).rev() {
+        halves[i] = halves[i].min(until.max(least) as u8);
+        until = if changes(i) { 0 } else { (until + 1).min(WIDEST) };
+    }
+    halves
+}
+
+impl Smoother {
+    /// Chooses for a record with noise of standard deviation `sd` and half-widths that the commands allow.
+    pub(crate) fn choose(record: &[f64], sd: f64, allowed: &[u8]) -> Self {
+        let variance = sd * sd;
+        let halves = allowed
+            .iter()
+            .enumerate()
+            .map(|(i, &allowed)| {
+                let mut h = usize::from(allowed).min(i).min(record.len() - 1 - i);
+                while h >= NARROWEST {
+                    let free = (2 * h - 2) as f64;
+                    if parabola(record, i, h).1
+                        <= variance * (free + PATIENCE * (2.0 * free).sqrt())
+                    {
+                        return h as u8;
+                    }
+                    h = if h > NARROWEST { (h / 2).max(NARROWEST) } else { 0 };
+                }
+                0
+            })
+            .collect();
+        Self { halves }
+    }
+
+    /// The record smoothed.
+    pub(crate) fn apply(&self, record: &[f64]) -> Vec<f64> {
+        let each = self.halves.iter().enumerate();
+        each.map(|(i, &h)| match usize::from(h) {
+            0 => record[i],
+            h => parabola(record, i, h).0,
+        })
+        .collect()
+    }
+}
+
+/// A measured input as a stage is fed with it.
+#[derive(Debug, Clone)]
+pub(crate) struct Smoothed {
+    smoother: Smoother,
+    pub(crate) values: Vec<f64>,
+}
+
+impl Smoothed {
+    /// A record with noise of standard deviation `sd`, smoothed over half-widths that are allowed.
+    pub(crate) fn of(record: &[f64], sd: f64, allowed: &[u8]) -> Self {
+        let smoother = Smoother::choose(record, sd, allowed);
+        let values = smoother.apply(record);
+        Self { smoother, values }
+    }
+
+    /// Another draw of the noise, as far as the smoothing lets it pass.
+    fn drawn(&self, noise: &Noise, dice: &mut Dice) -> Vec<f64> {
+        self.smoother.apply(&noise.samples(self.values.len(), dice))
+    }
+}
+
+/// Draws of a channel's noise that are kept: those of the floors and of what is transmitted.
+const DRAWS: NonZeroUsize = NonZeroUsize::new(16).expect("not 0");
+
+/// Draws of the noise of a measured input, every model given the same.
+#[derive(Debug, Clone)]
+pub(crate) struct Draws(Kept<u64, Vec<Vec<f64>>>);
+
+impl Draws {
+    pub(crate) fn new() -> Self {
+        Self(Kept::new(DRAWS))
+    }
+
+    /// A trial of an input with the draw of a seed.
+    pub(crate) fn shaken(
+        &self,
+        inputs: &[Smoothed],
+        noise: &Noise,
+        seed: u64,
+        trial: usize,
+    ) -> Vec<f64> {
+        let draw =
+            |(i, input): (usize, &Smoothed)| input.drawn(noise, &mut Dice::new(seed, i as u64));
+        let all = || Ok::<_, Infallible>(inputs.iter().enumerate().map(draw).collect());
+        let Ok(drawn) = self.0.or_make(seed, all);
+        inputs[trial].values.iter().zip(&drawn[trial]).map(|(x, n)| x + n).collect()
+    }
+}
+
+/// Half-widths where nothing is commanded: as wide as the record itself lets a parabola be.
+pub(crate) fn unscheduled(samples: usize) -> Vec<u8> {
+    vec![WIDEST as u8; samples]
+}
+
+/// Value a share of the way from sample `i` to the next, on a cubic through four samples (Catmull and Rom 1974); the
+/// first and last value are held.
+pub(super) fn cubic(samples: &[f64], i: usize, share: f64) -> f64 {
+    let at = |i: usize| samples[i.min(samples.len() - 1)];
+    let (a, b, c, d) = (at(i.saturating_sub(1)), at(i), at(i + 1), at(i + 2));
+    let t = share;
+    b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_abs_diff_eq;
+    use testkit::tolerance::{CORNER_KEPT, LOCAL_VALUE};
+
+    #[test]
+    fn keeps_parabolas_and_corners() {
+        let wide = vec![WIDEST as u8; 50];
+        let line: Vec<f64> = (0..50).map(|i| 0.01 * f64::from(i * i)).collect();
+        let same = Smoother::choose(&line, 0.05, &wide).apply(&line);
+        assert_abs_diff_eq!(line.as_slice(), same.as_slice(), epsilon = LOCAL_VALUE);
+        let corner: Vec<f64> = (0..50).map(|i| f64::from((i - 25).max(0))).collect();
+        let same = Smoother::choose(&corner, 0.05, &wide).apply(&corner);
+        assert_abs_diff_eq!(corner.as_slice(), same.as_slice(), epsilon = CORNER_KEPT);
+    }
+
+    #[test]
+    fn takes_noise_out_where_nothing_is_commanded() {
+        let mut dice = Dice::new(1, 1);
+        let noise: Vec<f64> = (0..20_000).map(|_| 0.05 * dice.gauss()).collect();
+        let shut = vec![0.0; noise.len()];
+        let allowed = schedule(&shut, &shut, 0.01, false);
+        let out = Smoother::choose(&noise, 0.05, &allowed).apply(&noise);
+        let power = |x: &[f64]| x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64;
+        assert!(power(&out) < 0.1 * power(&noise));
+    }
+
+    #[test]
+    fn windows_shrink_at_commands() {
+        let mut inlet = vec![0.0; 300];
+        inlet[150..].fill(1.0);
+        let halves = schedule(&inlet, &[0.0; 300], 0.01, false);
+        assert_eq!(schedule(&inlet, &[0.0; 300], 0.01, true)[150], 0);
+        assert_eq!(usize::from(halves[130]), WIDEST.min(20));
+        assert!(halves[145..165].iter().all(|h| *h <= 5));
+        assert_eq!(usize::from(halves[299]), WIDEST);
+    }
+}

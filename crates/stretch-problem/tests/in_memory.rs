@@ -1,0 +1,172 @@
+//! What no file could hold, put together in memory: refused with a reason, without a panic.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use stretch_calibrate::{Options, apply, calibrate, evaluate, without_wild};
+use stretch_data::{Channel, EvenSession, SessionTrial, Split, Trial};
+use stretch_gap::{Description, DescriptionSpec};
+use stretch_problem::{GaugeSetup, GaugeSimulator, RigSession, RigSetup, RigSimulator};
+use stretch_sim::{Catalogue, Rig, RigParams, RunSettings, TrialPlan};
+
+const COLUMNS: [&str; 5] = ["inlet", "outlet", "length_mm", "bridge_v", "pressure_kpa"];
+
+fn trial() -> Trial {
+    let channel = |(k, name): (usize, &&str)| Channel {
+        name: (*name).to_owned(),
+        values: (0..1500)
+            .map(|i| 0.5 + 0.4 * (0.01 * f64::from(i) * (k + 1) as f64).sin())
+            .collect(),
+    };
+    Trial {
+        name: "a.csv".into(),
+        time_s: (0..1500).map(|i| 0.01 * f64::from(i)).collect(),
+        channels: COLUMNS.iter().enumerate().map(channel).collect(),
+    }
+}
+
+/// Every way in which a trial can be none, with what it is called.
+fn spoilt() -> Vec<(String, Trial)> {
+    let mut all = vec![("no sample".to_owned(), Trial { time_s: Vec::new(), ..trial() })];
+    all.push(("nothing".to_owned(), Trial::default()));
+    for k in 0..COLUMNS.len() {
+        for length in [0, 1, 700, 1600] {
+            let mut one = trial();
+            one.channels[k].values.resize(length, 0.5);
+            all.push((format!("{} of {length} values", COLUMNS[k]), one));
+        }
+    }
+    for (name, change) in [
+        ("time stands", (|t: &mut Vec<f64>| t.fill(1.0)) as fn(&mut Vec<f64>)),
+        ("time runs back", |t| t.reverse()),
+        ("time is none", |t| t[7] = f64::NAN),
+        ("time is endless", |t| t[1499] = f64::INFINITY),
+        ("a step of 1e-30 s", |t| t.iter_mut().for_each(|t| *t *= 1e-28)),
+        ("a step of 1e30 s", |t| t.iter_mut().for_each(|t| *t *= 1e32)),
+    ] {
+        let mut one = trial();
+        change(&mut one.time_s);
+        all.push((name.to_owned(), one));
+    }
+    all
+}
+
+/// Whether a call refuses; a panic is told with what it was given.
+#[track_caller]
+fn refuses<T, E: std::fmt::Display>(what: &str, call: impl FnOnce() -> Result<T, E>) {
+    match catch_unwind(AssertUnwindSafe(call)) {
+        Err(_) => panic!("{what}: it panicked"),
+        Ok(Ok(_)) => panic!("{what}: it was taken"),
+        Ok(Err(error)) => assert!(!error.to_string().is_empty(), "{what}"),
+    }
+}
+
+/// The same, where both answers are right.
+#[track_caller]
+fn survives<T>(what: &str, call: impl FnOnce() -> T) {
+    assert!(catch_unwind(AssertUnwindSafe(call)).is_ok(), "{what}: it panicked");
+}
+
+#[test]
+fn trials_that_are_none_are_refused_by_every_simulator() {
+    let catalogue = Catalogue::default();
+    for (what, trial) in spoilt() {
+        let trials = [SessionTrial::new(trial)];
+        refuses(&format!("session, {what}"), || {
+            let session = RigSession::new(&trials)?;
+            RigSimulator::new(RigSetup { session, rig: Rig::default(), catalogue: &catalogue })
+        });
+        if what.contains("inlet") || what.contains("outlet") {
+            continue; // a gauge looks at neither
+        }
+        let (reference, signal) = ("length_mm", "bridge_v");
+        let setup =
+            GaugeSetup { trials: &trials, reference, signal, rig: None, catalogue: &catalogue };
+        if what.contains("pressure") {
+            survives(&format!("gauge, {what}"), || GaugeSimulator::new(&setup).map(drop));
+        } else {
+            refuses(&format!("gauge, {what}"), || GaugeSimulator::new(&setup).map(drop));
+        }
+    }
+    refuses("a session of no trial", || RigSession::new(&[]));
+    refuses("an even session of no trial", || EvenSession::new(&[], &["length_mm"], 50));
+    let test = SessionTrial { split: Split::Test, ..SessionTrial::new(trial()) };
+    refuses("a session to test on alone", || RigSession::new(&[test]));
+}
+
+#[test]
+fn trials_that_are_none_are_refused_by_calibrations() {
+    let calibration = stretch_receptor::example_calibration();
+    for (what, trial) in spoilt() {
+        let trials = [trial];
+        survives(&format!("wild, {what}"), || without_wild(&trials, &["length_mm", "bridge_v"]));
+        survives(&format!("calibrate, {what}"), || calibrate(&trials, &Options::default()).is_ok());
+        survives(&format!("apply, {what}"), || apply(&calibration, &trials[0]).is_ok());
+        survives(&format!("evaluate, {what}"), || {
+            evaluate(&[("poly13", &calibration)], &trials).is_ok()
+        });
+        if what.contains("values") {
+            refuses(&format!("apply, {what}"), || apply(&calibration, &trials[0]));
+            refuses(&format!("replay, {what}"), || {
+                TrialPlan::from_trial(&trials[0], &RigParams::default())
+            });
+        }
+    }
+    refuses("no calibration", || evaluate(&[], &[trial()]));
+    refuses("no trial", || calibrate(&[], &Options::default()));
+}
+
+#[test]
+fn plans_that_cannot_be_are_refused() {
+    for number in [0, 1, usize::MAX / 2, usize::MAX - 1, usize::MAX] {
+        survives("arbitrary", || TrialPlan::arbitrary(number, u64::MAX));
+        survives("pulses", || TrialPlan::pulses(number, u64::MAX));
+    }
+    let plan = || TrialPlan::inflation(0.5);
+    let held = || TrialPlan { set_length_mm: Some(vec![170.0; 1500]), ..plan() };
+    let plans = [
+        ("opening", TrialPlan::inflation(f64::NAN)),
+        ("opening of 7", TrialPlan::deflation(7.0)),
+        ("one valve", TrialPlan { outlet: Vec::new(), ..plan() }),
+        ("rate of 0", TrialPlan { rate_hz: 0.0, ..plan() }),
+        ("rate of NaN", TrialPlan { rate_hz: f64::NAN, ..plan() }),
+        ("start of NaN", TrialPlan { start_s: Some(f64::NAN), ..plan() }),
+        ("short length", TrialPlan { set_length_mm: Some(vec![170.0; 3]), ..plan() }),
+        ("short shunt", TrialPlan { shunt: Some(vec![0.1; 3]), ..held() }),
+        ("late start", TrialPlan { start_s: Some(1e300), ..plan() }),
+        ("very late start", TrialPlan { start_s: Some(1e15), full: true, ..plan() }),
+    ];
+    for (what, plan) in plans {
+        refuses(what, || {
+            let mut session = stretch_sim::Session::new(&Rig::default(), &RunSettings::default())?;
+            session.run(&TrialPlan::pulses(1, 1))?;
+            session.run(&plan)
+        });
+    }
+}
+
+#[test]
+fn a_sample_time_that_cannot_be_is_refused() {
+    for dt_s in [0.0, -0.01, f64::NAN, f64::INFINITY, 1e-30, 1e-12, 1e30] {
+        refuses(&format!("dt_s of {dt_s}"), || {
+            Description::new(DescriptionSpec {
+                stages: Vec::new(),
+                parameters: Vec::new(),
+                effects: Vec::new(),
+                trials: Vec::new(),
+                dt_s,
+            })
+        });
+    }
+}
+
+#[test]
+fn a_trial_that_is_not_there_has_no_length() {
+    let mut session = stretch_sim::Session::new(&Rig::default(), &RunSettings::default()).unwrap();
+    let (_, trial) = session.run(&TrialPlan::pulses(1, 1)).unwrap();
+    let session = RigSession::new(&[SessionTrial::new(trial)]).unwrap();
+    let catalogue = Catalogue::default();
+    let rig = RigSimulator::new(RigSetup { session, rig: Rig::default(), catalogue: &catalogue })
+        .unwrap();
+    assert!(rig.smooth_length(0).is_some());
+    assert_eq!(rig.smooth_length(99), None);
+}

@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")"
 
-LIBRARIES="stretch-core stretch-filter stretch-fit stretch-metrics stretch-operators stretch-receptor stretch-link"
+LIBRARIES="stretch-core stretch-filter stretch-fit stretch-metrics stretch-effects stretch-receptor stretch-link"
 TARGETS="thumbv7m-none-eabi thumbv7em-none-eabihf"
 
 step() { printf '\n=== %s (%ss)\n' "$1" "$SECONDS"; }

@@ -113,7 +113,7 @@ const SHOWN: [&str; 7] = [
     "stretch-filter",
     "stretch-fit",
     "stretch-metrics",
-    "stretch-operators",
+    "stretch-effects",
     "stretch-receptor",
     "stretch-link",
 ];

@@ -3,7 +3,7 @@
 use stretch_core::{
     Design, DiagnosedMap, Interval, Model, Provenance, RestTracker, Stage, Values, Volts,
 };
-use stretch_operators::{Backlash, Operator};
+use stretch_effects::{Backlash, Operator};
 use stretch_receptor::{Defects, DiagnosedReceptor};
 
 use crate::{

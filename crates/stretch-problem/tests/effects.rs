@@ -2,8 +2,8 @@
 
 use approx::assert_relative_eq;
 use stretch_data::{EffectEntry, SessionTrial, Split};
+use stretch_effects::Hum;
 use stretch_gap::{Laboratory, Model, Options, Simulator, VerdictKind, diagnose, differences};
-use stretch_operators::Hum;
 use stretch_problem::{GaugeSetup, GaugeSimulator, RigSession, RigSetup, RigSimulator};
 use stretch_sim::{
     Action, CATALOGUE, Catalogue, Effect, EffectParameter, EffectSet, GaugeRig, GaugeSpec, Rig,

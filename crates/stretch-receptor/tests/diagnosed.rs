@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use stretch_core::{
     Calibration, Crosstalk, Design, DiagnosedMap, Fading, Knee, Model, Plays, Stage, Volts, Worn,
 };
-use stretch_operators::{
+use stretch_effects::{
     Backlash, FadingMemory, Grid, Loops, Lowpass, Operator, Poles, PrandtlIshlinskii, Span, Start,
     Times,
 };

@@ -148,8 +148,8 @@ pub enum SimError {
     },
 }
 
-impl From<stretch_operators::GridError> for SimError {
-    fn from(error: stretch_operators::GridError) -> Self {
+impl From<stretch_effects::GridError> for SimError {
+    fn from(error: stretch_effects::GridError) -> Self {
         Self::NotPositive { name: error.name, value: error.value }
     }
 }

@@ -1,6 +1,6 @@
 //! A gauge alone: any stretch sensor with a reference is a rig of one stage.
 
-use stretch_operators::{Grid, Skew, Span, Start};
+use stretch_effects::{Grid, Skew, Span, Start};
 
 use crate::{
     SimError,

@@ -39,4 +39,4 @@ pub use stages::{
     Sensing, Setting,
 };
 pub use static_law::StaticLaw;
-pub use stretch_operators::{DEFAULT_STEP_S, Grid, GridError, Operator, Span, Start};
+pub use stretch_effects::{DEFAULT_STEP_S, Grid, GridError, Operator, Span, Start};

@@ -8,7 +8,7 @@ use std::{
     process::{Command, Stdio},
 };
 
-use stretch_operators::{Skew, Span};
+use stretch_effects::{Skew, Span};
 use stretch_sim::{
     Action, CATALOGUE, Effect, Grid, Language, Operator, RigParams, Role, Sketch, Start,
     Surroundings,

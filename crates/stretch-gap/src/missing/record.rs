@@ -10,7 +10,7 @@
 
 use std::ops::Range;
 
-use stretch_operators::Grid;
+use stretch_effects::Grid;
 
 use crate::{
     ends::ends,

@@ -4,7 +4,7 @@
 //! ([`serde`]), with the scales of its signals beside it, so that a simulator can be given it.
 
 use serde::{Deserialize, Serialize};
-use stretch_operators::{Backlash, MeanReversion, Operator, Span, Start};
+use stretch_effects::{Backlash, MeanReversion, Operator, Span, Start};
 
 use super::record::{Record, Signal};
 

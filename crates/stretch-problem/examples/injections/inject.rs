@@ -1,6 +1,6 @@
 //! Effects in forms of their own, put into a signal that was measured.
 
-use stretch_operators::play;
+use stretch_effects::play;
 
 /// What is done to a signal.
 #[derive(Debug, Clone, Copy)]

@@ -19,7 +19,7 @@ use stretch_gap::{
     Run, Simulator,
 };
 
-use stretch_operators::WanderingLine;
+use stretch_effects::WanderingLine;
 
 use crate::wrap::{Side, Trials};
 use linear::Linear;

@@ -3,10 +3,10 @@
 use std::ops::Range;
 
 use stretch_data::unit;
+use stretch_effects::Grid;
 use stretch_gap::{
     Description, DescriptionSpec, EffectParameterSpec, EffectSpec, Noise, ParameterSpec, StageSpec,
 };
-use stretch_operators::Grid;
 
 use super::{
     columns::Columns,

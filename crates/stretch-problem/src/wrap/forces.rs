@@ -1,6 +1,6 @@
 //! Wrappers that add something: friction, other channels, the mains.
 
-use stretch_operators::{Crosstalk, Friction, Hum};
+use stretch_effects::{Crosstalk, Friction, Hum};
 
 use super::kind::{
     Beside,

@@ -1,7 +1,7 @@
 //! What a kind of wrapper is.
 
+use stretch_effects::{Grid, Operator};
 use stretch_gap::EffectParameterSpec;
-use stretch_operators::{Grid, Operator};
 
 use super::extent::Extent;
 
@@ -90,7 +90,7 @@ impl Wrapper {
         beside: Beside::Nothing,
         parameters: |_, _| Vec::new(),
         starts: None,
-        operator: |_, _, _| Box::new(stretch_operators::Offset::default()),
+        operator: |_, _, _| Box::new(stretch_effects::Offset::default()),
         twins: &[],
         family: None,
         counts_session: false,

@@ -1,6 +1,6 @@
 //! Wrappers that take another path on the way back, and those that take none at first.
 
-use stretch_operators::{Backlash, BoucWen, DeadZone, Loops, PrandtlIshlinskii};
+use stretch_effects::{Backlash, BoucWen, DeadZone, Loops, PrandtlIshlinskii};
 
 use super::kind::{
     Family,

@@ -2,8 +2,8 @@
 
 use std::{ops::Range, sync::Arc};
 
+use stretch_effects::{Grid, Span, Start};
 use stretch_gap::EffectSpec;
-use stretch_operators::{Grid, Span, Start};
 
 use super::{
     catalogue::wrappers,

@@ -1,6 +1,6 @@
 //! Wrappers that show another value: curves, bounds, steps, offsets, and what changes them.
 
-use stretch_operators::{Bow, Knees, Offset, Quantiser, Softening};
+use stretch_effects::{Bow, Knees, Offset, Quantiser, Softening};
 
 use super::kind::{
     Beside,

@@ -1,6 +1,6 @@
 //! Wrappers that are late.
 
-use stretch_operators::{
+use stretch_effects::{
     FadingMemory, Lowpass, Oscillator, Poles, Skew, SkewSpec, SlewLimit, Swing, Times,
 };
 

@@ -1,6 +1,6 @@
 //! Where and how an effect acts, and what it may need to know of the rig around it.
 
-use stretch_operators::{Grid, Operator, SkewSpec};
+use stretch_effects::{Grid, Operator, SkewSpec};
 
 use crate::{
     law::{Droop, Law},

@@ -1,6 +1,6 @@
 //! The amplifier is slow.
 
-use stretch_operators::{Lowpass, Poles};
+use stretch_effects::{Lowpass, Poles};
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},

@@ -1,6 +1,6 @@
 //! The amplifier's output is bounded.
 
-use stretch_operators::Knees;
+use stretch_effects::Knees;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Extent, Form, Need},

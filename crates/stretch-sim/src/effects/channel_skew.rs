@@ -1,6 +1,6 @@
 //! The channels are not sampled at the same time.
 
-use stretch_operators::SkewSpec;
+use stretch_effects::SkewSpec;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},

@@ -1,6 +1,6 @@
 //! The crossbeam has a mass, on the spring of the muscle.
 
-use stretch_operators::{Oscillator, Swing};
+use stretch_effects::{Oscillator, Swing};
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},

@@ -78,7 +78,7 @@ pub struct Alone {
 /// [`EffectSet::push`](crate::EffectSet::push) to be simulated and to [`Catalogue::with`](crate::Catalogue::with) to be diagnosed.
 ///
 /// ```
-/// use stretch_operators::Backlash;
+/// use stretch_effects::Backlash;
 /// use stretch_sim::{Action, Effect, EffectParameter, EffectSet, Stage};
 /// static CLAMP_PLAY: Effect = Effect {
 ///     name: "clamp_play",

@@ -1,6 +1,6 @@
 //! The gauge remembers its strain.
 
-use stretch_operators::{Loops, PrandtlIshlinskii};
+use stretch_effects::{Loops, PrandtlIshlinskii};
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::pairs},

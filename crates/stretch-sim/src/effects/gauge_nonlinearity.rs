@@ -1,6 +1,6 @@
 //! The gauge is not quite linear.
 
-use stretch_operators::BowedGain;
+use stretch_effects::BowedGain;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},

@@ -1,6 +1,6 @@
 //! The gauge overshoots a quick strain and relaxes.
 
-use stretch_operators::{FadingMemory, Times};
+use stretch_effects::{FadingMemory, Times};
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::pairs},

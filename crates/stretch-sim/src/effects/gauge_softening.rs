@@ -1,6 +1,6 @@
 //! The gauge softens as it is worked.
 
-use stretch_operators::Softening;
+use stretch_effects::Softening;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::pairs},

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_4, TAU};
 
-use stretch_operators::{Hum, WanderingLine};
+use stretch_effects::{Hum, WanderingLine};
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Line, Measured, Role},

@@ -1,6 +1,6 @@
 //! The rubber of the muscle creeps.
 
-use stretch_operators::{FadingMemory, Times};
+use stretch_effects::{FadingMemory, Times};
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::pairs},

@@ -1,6 +1,6 @@
 //! Friction in the braid: the static contraction depends on its history.
 
-use stretch_operators::{Loops, PrandtlIshlinskii};
+use stretch_effects::{Loops, PrandtlIshlinskii};
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::pairs},

@@ -1,6 +1,6 @@
 //! The potentiometer has backlash.
 
-use stretch_operators::Backlash;
+use stretch_effects::Backlash;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},

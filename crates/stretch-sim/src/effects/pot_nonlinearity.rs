@@ -1,6 +1,6 @@
 //! The potentiometer is not quite linear.
 
-use stretch_operators::Bow;
+use stretch_effects::Bow;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},

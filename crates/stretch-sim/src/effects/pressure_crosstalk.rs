@@ -1,6 +1,6 @@
 //! The pressure inside the muscle stretches the gauge.
 
-use stretch_operators::{Operator, Span};
+use stretch_effects::{Operator, Span};
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, Need},

@@ -1,6 +1,6 @@
 //! The excitation warms the gauge.
 
-use stretch_operators::{Times, Warming};
+use stretch_effects::{Times, Warming};
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::pairs},

@@ -3,7 +3,7 @@
 use super::{Action, CATALOGUE, Effect, EffectParameter, Role, Surroundings, effect_named};
 use stretch_data::EffectEntry;
 
-use stretch_operators::Grid;
+use stretch_effects::Grid;
 
 use crate::{SimError, nearest::nearest, params::RigParams, stage::Stage};
 

@@ -1,6 +1,6 @@
 //! The sleeve goes slack: the gauge cannot be compressed.
 
-use stretch_operators::Knees;
+use stretch_effects::Knees;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Extent, Form},

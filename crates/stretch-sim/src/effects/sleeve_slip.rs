@@ -1,6 +1,6 @@
 //! The sleeve slips on the muscle.
 
-use stretch_operators::Backlash;
+use stretch_effects::Backlash;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},

@@ -1,6 +1,6 @@
 //! The gauge drifts while the session lasts.
 
-use stretch_operators::Drift;
+use stretch_effects::Drift;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},

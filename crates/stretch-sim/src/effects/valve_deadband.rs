@@ -1,6 +1,6 @@
 //! The valves stay shut up to a least command.
 
-use stretch_operators::DeadBand;
+use stretch_effects::DeadBand;
 
 use crate::{
     effects::{Action, Effect, EffectParameter, Form, search::each},

@@ -1,6 +1,6 @@
 //! Stage `actuation`: openings to pressure and length, both stages as one.
 
-use stretch_operators::{Grid, Start};
+use stretch_effects::{Grid, Start};
 
 use super::{Muscle, Openings, Pneumatics, check_length, pneumatics::Drive};
 use crate::{SimError, effects::EffectSet, memory::Memory, params::RigParams};

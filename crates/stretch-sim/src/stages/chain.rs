@@ -1,6 +1,6 @@
 //! The whole rig: every stage on the outputs of the one before.
 
-use stretch_operators::{Grid, Start};
+use stretch_effects::{Grid, Start};
 
 use super::{Actuation, Openings, Reference, Sensing, check_length};
 use crate::{SimError, effects::EffectSet, memory::Memory, params::RigParams};

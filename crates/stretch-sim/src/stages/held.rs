@@ -1,6 +1,6 @@
 //! The rig at a length that is set from outside.
 
-use stretch_operators::{Grid, Start};
+use stretch_effects::{Grid, Start};
 
 use super::{ChainMemory, Openings, Pneumatics, Recorded, Reference, Sensing, check_length};
 use crate::{SimError, effects::EffectSet, params::RigParams};

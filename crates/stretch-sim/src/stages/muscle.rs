@@ -1,6 +1,6 @@
 //! Stage `muscle`: chamber pressure to length.
 
-use stretch_operators::{Grid, MeanReversion, Row, Span, Start};
+use stretch_effects::{Grid, MeanReversion, Row, Span, Start};
 
 use super::check_length;
 use crate::{

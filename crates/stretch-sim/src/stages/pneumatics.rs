@@ -1,6 +1,6 @@
 //! Stage `pneumatics`: openings of the valves to chamber pressure.
 
-use stretch_operators::{Grid, Row, Span, Start};
+use stretch_effects::{Grid, Row, Span, Start};
 
 use super::{check_length, openings::Openings};
 use crate::{

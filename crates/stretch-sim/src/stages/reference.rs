@@ -1,6 +1,6 @@
 //! Stage `reference`: true length to the length that the potentiometer shows.
 
-use stretch_operators::{Grid, Row, Span, Start};
+use stretch_effects::{Grid, Row, Span, Start};
 
 use super::{check_length, sensing::pick};
 use crate::{

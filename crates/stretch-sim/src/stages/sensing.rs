@@ -1,6 +1,6 @@
 //! Stage `sensing`: length to bridge voltage.
 
-use stretch_operators::{Grid, Row, Skew, SkewSpec, Span, Start};
+use stretch_effects::{Grid, Row, Skew, SkewSpec, Span, Start};
 
 use super::check_length;
 use crate::{

@@ -18,12 +18,12 @@ pub struct SkewSpec {
 /// the first and the last value are held beyond the ends, and beside an end the cubic becomes a line.
 ///
 /// ```
-/// use stretch_operators::{Grid, Skew, SkewSpec};
+/// use stretch_effects::{Grid, Skew, SkewSpec};
 /// let line: Vec<f64> = (0..100).map(f64::from).collect();
 /// let mut shown = vec![0.0; 100];
 /// Skew::new(&Grid::samples(0.01)?, SkewSpec { skew_s: 0.025, rate: 0.0 }).sample(&line, &mut shown);
 /// assert!((shown[50] - 47.5).abs() < 1e-9 && shown[0] == 0.0);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Skew {

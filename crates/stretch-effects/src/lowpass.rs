@@ -22,7 +22,7 @@ pub struct Poles {
 /// It is powered and settled before every trial, whatever came before.
 ///
 /// ```
-/// use stretch_operators::{Grid, Lowpass, Operator, Poles, Span, Start};
+/// use stretch_effects::{Grid, Lowpass, Operator, Poles, Span, Start};
 /// let grid = Grid::samples(0.01)?;
 /// for second in [0.0, 0.3] {
 ///     let slow = Lowpass::new(Poles { tau_s: 0.1, second }, &grid);
@@ -33,7 +33,7 @@ pub struct Poles {
 ///     // A ramp is trailed by tau, whatever the poles; the second takes the first's output as linear between samples.
 ///     assert!((ramp[299] - (2.99 - 0.1)).abs() < 1e-9);
 /// }
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lowpass {

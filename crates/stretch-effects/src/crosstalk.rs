@@ -5,12 +5,12 @@ use crate::operator::{Operator, Span};
 /// y = x + c z (1 + bend z), z = (other - middle)/span, the other channel where the [`Span`] holds the strain.
 ///
 /// ```
-/// use stretch_operators::{Crosstalk, Grid, Operator, Span};
+/// use stretch_effects::{Crosstalk, Grid, Operator, Span};
 /// let talk = Crosstalk { c: 0.5, bend: 0.0, middle: 10.0, span: 20.0 };
 /// let (grid, mut shown) = (Grid::samples(0.01)?, [1.0, 1.0]);
 /// talk.run(&Span { strain: &[10.0, 20.0], ..Span::whole(&grid) }, &mut [], &mut shown);
 /// assert_eq!(shown, [1.0, 1.25]);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crosstalk {

@@ -12,7 +12,7 @@ use crate::{
 /// Remembers what is still to warm up, one number a time constant.
 ///
 /// ```
-/// use stretch_operators::{Grid, Operator, Span, Start, Times, Warming};
+/// use stretch_effects::{Grid, Operator, Span, Start, Times, Warming};
 /// let grid = Grid::samples(0.1)?;
 /// let heats = Warming::new(0.02, Times { tau_s: 1.0, spread: 1.0 }, &grid);
 /// let (mut cells, mut gain) = ([0.0], vec![1.0; 200]);
@@ -20,7 +20,7 @@ use crate::{
 /// heats.run(&Span::whole(&grid), &mut cells, &mut gain);
 /// assert_eq!(gain[0], 1.0);
 /// assert!((gain[10] - (1.0 + 0.02 * (1.0 - (-1.0_f64).exp()))).abs() < 1e-12);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Warming {

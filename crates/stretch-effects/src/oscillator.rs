@@ -20,7 +20,7 @@ pub struct Swing {
 /// linear between nodes. Remembers position, velocity and the last input.
 ///
 /// ```
-/// use stretch_operators::{Grid, Operator, Oscillator, Span, Start, Swing};
+/// use stretch_effects::{Grid, Operator, Oscillator, Span, Start, Swing};
 /// let grid = Grid::samples(0.001)?;
 /// let beam = Oscillator::new(Swing { m: 0.02, damping: 0.25 }, &grid);
 /// let (mut cells, mut signal) = ([0.0; 3], vec![1.0; 2000]);
@@ -29,7 +29,7 @@ pub struct Swing {
 /// // A step overshoots by exp(-pi damping/sqrt(1 - damping^2)) = 44 %, then settles.
 /// let top = signal.iter().copied().fold(0.0, f64::max);
 /// assert!((top - 1.444).abs() < 2e-3 && (signal[1999] - 1.0).abs() < 1e-6);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Oscillator {

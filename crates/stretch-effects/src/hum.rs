@@ -7,13 +7,13 @@ use crate::operator::{Operator, Span};
 /// A sine on samples: y = x + a sin(2 pi f t + phase), t session time.
 ///
 /// ```
-/// use stretch_operators::{Grid, Hum, Operator, Span};
+/// use stretch_effects::{Grid, Hum, Operator, Span};
 /// let hum = Hum { a: 0.1, f_hz: 60.0, phase: 1.0 };
 /// let mut volts = [0.0; 100];
 /// hum.run(&Span::whole(&Grid::samples(0.01)?), &mut [], &mut volts);
 /// let wanted = |i: f64| 0.1 * (std::f64::consts::TAU * 60.0 * 0.01 * i + 1.0).sin();
 /// assert!((volts[0] - wanted(0.0)).abs() < 1e-12 && (volts[99] - wanted(99.0)).abs() < 1e-12);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hum {

@@ -13,7 +13,7 @@ use crate::operator::{Operator, Span, Start};
 /// Source: Wen 1976, Journal of the Engineering Mechanics Division 102(2), 249-263.
 ///
 /// ```
-/// use stretch_operators::{BoucWen, Grid, Operator, Span, Start};
+/// use stretch_effects::{BoucWen, Grid, Operator, Span, Start};
 /// let gear = BoucWen { c: 0.1, s: 0.5 };
 /// let (mut cells, mut signal) = ([0.0; 2], [0.0, 20.0, 19.5, 0.0]);
 /// gear.begin(Start::Settled, signal[0], &mut cells);
@@ -21,7 +21,7 @@ use crate::operator::{Operator, Span, Start};
 /// // On a long way up it is c behind, halfway back by s it is where it should be, then c ahead.
 /// assert!((signal[1] - 19.9).abs() < 1e-12 && (signal[2] - 19.5).abs() < 1e-12);
 /// assert!((signal[3] - 0.1).abs() < 1e-12);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoucWen {

@@ -12,7 +12,7 @@ use crate::{
 /// First-order lag (mean reversion) z' = (x - z)/tau, exact for an input that is linear between nodes.
 ///
 /// ```
-/// use stretch_operators::{Grid, MeanReversion, Span, Start};
+/// use stretch_effects::{Grid, MeanReversion, Span, Start};
 /// let grid = Grid::samples(0.01)?;
 /// let lag = MeanReversion::new(0.1, 1.0, &grid);
 /// let mut cells = [0.0; MeanReversion::CELLS];
@@ -21,7 +21,7 @@ use crate::{
 /// let mut signal: Vec<f64> = (0..101).map(|i| 0.01 * i as f64).collect();
 /// lag.run(&Span::whole(&grid), &mut cells, &mut signal, |_, z| z);
 /// assert!((signal[100] - (1.0 - 0.1 * (1.0 - (-10.0_f64).exp()))).abs() < 1e-12);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeanReversion {

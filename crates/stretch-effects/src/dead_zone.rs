@@ -6,14 +6,14 @@ use crate::operator::{Operator, Span};
 /// y = sign(x) softplus(|x| - w) of width s w, less its value at zero.
 ///
 /// ```
-/// use stretch_operators::{DeadZone, Grid, Operator, Span};
+/// use stretch_effects::{DeadZone, Grid, Operator, Span};
 /// let mut torque = [-1.0, -0.25, 0.0, 0.25, 2.0];
 /// DeadZone { w: 0.5, softness: 0.0 }.run(&Span::whole(&Grid::samples(0.01)?), &mut [], &mut torque);
 /// assert_eq!(torque, [-0.5, 0.0, 0.0, 0.0, 1.5]);
 /// let mut soft = [0.0, 0.5];
 /// DeadZone { w: 0.5, softness: 0.2 }.run(&Span::whole(&Grid::samples(0.01)?), &mut [], &mut soft);
 /// assert!(soft[0] == 0.0 && soft[1] > 0.0 && soft[1] < 0.1);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeadZone {

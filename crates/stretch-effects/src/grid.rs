@@ -30,14 +30,14 @@ pub const DEFAULT_STEP_S: f64 = 0.0025;
 /// Node 0 is the first sample; sample i is node `i * pieces()`.
 ///
 /// ```
-/// use stretch_operators::Grid;
+/// use stretch_effects::Grid;
 /// // A hundred samples a second, steps of at most 5 ms, commands that act 13.5 ms late.
 /// let grid = Grid::new(0.01, 0.005, 0.0135)?;
 /// assert_eq!(grid.pieces(), 3); // 3.5 ms, then twice 3.25 ms
 /// assert_eq!(grid.nodes(101), 301);
 /// assert_eq!(grid.command(10, 0), Some(8)); // the switch falls behind the first piece
 /// assert_eq!(grid.command(10, 1), Some(9));
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {

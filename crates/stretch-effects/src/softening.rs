@@ -9,7 +9,7 @@ use crate::operator::{Operator, Span, Start};
 /// tail: stretched forms of the Mullins effect, Diani 2009, doi:10.1016/j.eurpolymj.2008.11.017.
 ///
 /// ```
-/// use stretch_operators::{Grid, Operator, Softening, Span, Start};
+/// use stretch_effects::{Grid, Operator, Softening, Span, Start};
 /// let gauge = Softening { m: 0.3, n: 2.0, tail: 0.0, zero: 1.0, reversal: 1e-3 };
 /// let (grid, mut cells, mut ohm) = (Grid::samples(0.01)?, [0.0; 3], [3.0, 3.0, 3.0]);
 /// gauge.begin(Start::Settled, 0.0, &mut cells);
@@ -17,7 +17,7 @@ use crate::operator::{Operator, Span, Start};
 /// gauge.run(&span, &mut cells, &mut ohm);
 /// assert_eq!((ohm[0], cells[0]), (3.0, 2.0)); // up by one and down again
 /// assert!((ohm[2] - (1.0 + 2.0 * (1.0 - 0.3 * (1.0 - (-1.0_f64).exp())))).abs() < 1e-12);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Softening {

@@ -5,7 +5,7 @@ use crate::operator::{Operator, Span};
 /// A soft lower bound: low + w ln(1 + exp((x - low)/w)); within rounding of x or of `low` from 37 w on.
 ///
 /// ```
-/// use stretch_operators::soft_floor;
+/// use stretch_effects::soft_floor;
 /// assert_eq!(soft_floor(5.0, 1.0, 0.01), 5.0);
 /// assert!((soft_floor(1.0, 1.0, 0.01) - (1.0 + 0.01 * 2f64.ln())).abs() < 1e-15);
 /// ```
@@ -24,7 +24,7 @@ pub fn soft_floor(x: f64, low: f64, w: f64) -> f64 {
 /// A soft upper bound, the mirror image of [`soft_floor`].
 ///
 /// ```
-/// use stretch_operators::soft_ceiling;
+/// use stretch_effects::soft_ceiling;
 /// assert_eq!(soft_ceiling(1.0, 5.0, 0.01), 1.0);
 /// assert!(soft_ceiling(9.0, 5.0, 0.01) <= 5.0);
 /// ```
@@ -36,12 +36,12 @@ pub fn soft_ceiling(x: f64, high: f64, w: f64) -> f64 {
 /// Bounds that a signal cannot leave: [`soft_floor`] at `low`, then [`soft_ceiling`] at `high`, where there is one.
 ///
 /// ```
-/// use stretch_operators::{Grid, Knees, Operator, Span};
+/// use stretch_effects::{Grid, Knees, Operator, Span};
 /// let rails = Knees { low: Some(0.5), high: Some(2.0), width: 0.01 };
 /// let mut volts = [0.0, 1.2, 3.0];
 /// rails.run(&Span::whole(&Grid::samples(0.01)?), &mut [], &mut volts);
 /// assert!(volts[0] >= 0.5 && volts[1] == 1.2 && volts[2] <= 2.0);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Knees {

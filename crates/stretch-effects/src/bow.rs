@@ -5,7 +5,7 @@ use crate::operator::{Operator, Span};
 /// c 4 x (1 - x)(1 + skew (2 x - 1)): zero at 0 and 1, c in the middle, its top off the middle where skewed.
 ///
 /// ```
-/// use stretch_operators::bow;
+/// use stretch_effects::bow;
 /// assert_eq!(bow(0.1, 0.5, 0.3), 0.1);
 /// assert_eq!((bow(0.1, 0.0, 0.3), bow(0.1, 1.0, 0.3)), (0.0, 0.0));
 /// assert!(bow(0.1, 0.75, 0.3) > bow(0.1, 0.25, 0.3));
@@ -21,14 +21,14 @@ pub fn bow(c: f64, x: f64, skew: f64) -> f64 {
 /// rounds by the slope of the bow, 4 c/span.
 ///
 /// ```
-/// use stretch_operators::{Bow, Grid, Operator, Span};
+/// use stretch_effects::{Bow, Grid, Operator, Span};
 /// let scale = Bow { c: 0.5, skew: 0.2, zero: 0.0, span: 30.0 };
 /// let mut shown = [0.0, 15.0, 30.0];
 /// scale.run(&Span::whole(&Grid::samples(0.01)?), &mut [], &mut shown);
 /// assert_eq!(shown, [0.0, 15.5, 30.0]);
 /// scale.undo(&mut shown);
 /// assert!((shown[1] - 15.0).abs() < 1e-9);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bow {
@@ -71,13 +71,13 @@ impl Operator for Bow {
 /// A gain that bends with the strain e: y = x (1 + [`bow`]`(c, e/scale, skew))`.
 ///
 /// ```
-/// use stretch_operators::{BowedGain, Grid, Operator, Span};
+/// use stretch_effects::{BowedGain, Grid, Operator, Span};
 /// let gauge = BowedGain { c: 0.1, skew: 0.0, scale: 0.2 };
 /// let grid = Grid::samples(0.01)?;
 /// let mut ohm = [4.0, 4.0];
 /// gauge.run(&Span { strain: &[0.0, 0.1], ..Span::whole(&grid) }, &mut [], &mut ohm);
 /// assert_eq!(ohm, [4.0, 4.4]);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BowedGain {

@@ -5,11 +5,11 @@ use crate::operator::{Operator, Span};
 /// Rounds to steps: y = step round(x/step), halves away from zero.
 ///
 /// ```
-/// use stretch_operators::{Grid, Operator, Quantiser, Span};
+/// use stretch_effects::{Grid, Operator, Quantiser, Span};
 /// let mut length_mm = [0.1, 0.4, -0.25];
 /// Quantiser { step: 0.25 }.run(&Span::whole(&Grid::samples(0.01)?), &mut [], &mut length_mm);
 /// assert_eq!(length_mm, [0.0, 0.5, -0.25]);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quantiser {

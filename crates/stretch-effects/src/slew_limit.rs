@@ -5,13 +5,13 @@ use crate::operator::{Operator, Span, Start};
 /// Bounds the rate: y goes towards x by at most rate h in a step of length h. Remembers y.
 ///
 /// ```
-/// use stretch_operators::{Grid, Operator, SlewLimit, Span, Start};
+/// use stretch_effects::{Grid, Operator, SlewLimit, Span, Start};
 /// let (mut cells, mut signal) = ([0.0], [0.0, 1.0, 1.0, 1.0, 0.875]);
 /// let valve = SlewLimit { rate: 4.0 };
 /// valve.begin(Start::Settled, signal[0], &mut cells);
 /// valve.run(&Span::whole(&Grid::samples(0.125)?), &mut cells, &mut signal);
 /// assert_eq!(signal, [0.0, 0.5, 1.0, 1.0, 0.875]);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SlewLimit {

@@ -23,14 +23,14 @@ pub struct Loops {
 /// Source: Kuhnen 2003, doi:10.3166/ejc.9.407-418.
 ///
 /// ```
-/// use stretch_operators::{Grid, Loops, Operator, PrandtlIshlinskii, Span, Start};
+/// use stretch_effects::{Grid, Loops, Operator, PrandtlIshlinskii, Span, Start};
 /// let gauge = PrandtlIshlinskii::new(Loops { h: 0.3, s: 0.4, spread: 0.5 });
 /// let (mut cells, mut signal) = ([0.0; 3], [0.0, 1.0, 0.0]);
 /// gauge.begin(Start::Settled, signal[0], &mut cells);
 /// gauge.run(&Span::whole(&Grid::samples(0.01)?), &mut cells, &mut signal);
 /// // Rising it is h mean(r) behind, falling as much ahead: mean(r) = (0.1 + 0.2 + 0.4)/3.
 /// assert!((signal[1] - (1.0 - 0.07)).abs() < 1e-15 && (signal[2] - 0.07).abs() < 1e-15);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PrandtlIshlinskii {

@@ -11,12 +11,12 @@ use crate::operator::{Operator, Span};
 /// Source of the form: Armstrong-Helouvry, Dupont and Canudas de Wit 1994, doi:10.1016/0005-1098(94)90209-7.
 ///
 /// ```
-/// use stretch_operators::{Friction, Grid, Operator, Span};
+/// use stretch_effects::{Friction, Grid, Operator, Span};
 /// let rail = Friction { coulomb: 20.0, viscous: 2.0, ..Friction::default() };
 /// let (grid, mut force) = (Grid::samples(0.01)?, [0.0, 0.0, 0.0]);
 /// rail.run(&Span { strain: &[-1.0, 0.0, 0.5], ..Span::whole(&grid) }, &mut [], &mut force);
 /// assert_eq!(force, [-22.0, 0.0, 21.0]);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Friction {

@@ -5,12 +5,12 @@ use crate::operator::{Operator, Span};
 /// An offset with session time t: y = x + at_start + per_s t.
 ///
 /// ```
-/// use stretch_operators::{Grid, Offset, Operator, Span};
+/// use stretch_effects::{Grid, Offset, Operator, Span};
 /// let grid = Grid::samples(1.0)?;
 /// let mut shown = [1.0, 1.0];
 /// Offset { at_start: 0.5, per_s: 0.25 }.run(&Span { start_s: 2.0, ..Span::whole(&grid) }, &mut [], &mut shown);
 /// assert_eq!(shown, [2.0, 2.25]);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Offset {

@@ -73,7 +73,7 @@ impl Span<'_> {
 /// The memory is the caller's: the operator itself never changes, so one serves many channels.
 ///
 /// ```
-/// use stretch_operators::{Grid, Operator, Span, Start};
+/// use stretch_effects::{Grid, Operator, Span, Start};
 ///
 /// /// y = x - x before.
 /// #[derive(Debug)]
@@ -95,7 +95,7 @@ impl Span<'_> {
 /// Difference.begin(Start::Settled, signal[0], &mut cells);
 /// Difference.run(&Span::whole(&Grid::samples(0.01)?), &mut cells, &mut signal);
 /// assert_eq!(signal, [0.0, 3.0, -1.0]);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 pub trait Operator: fmt::Debug + Send + Sync {
     /// How many numbers it remembers.

@@ -12,7 +12,7 @@ const BARELY: f64 = 1e-12;
 /// than the least conductance passes as pulses of it, a share of the samples, evenly spread. Remembers the pulses owed.
 ///
 /// ```
-/// use stretch_operators::{DeadBand, Grid, Operator, Span, Start};
+/// use stretch_effects::{DeadBand, Grid, Operator, Span, Start};
 /// let grid = Grid::samples(0.01)?;
 /// let taken = |valve: DeadBand, commands: &[f64]| {
 ///     let (mut cells, mut openings) = ([0.0], commands.to_vec());
@@ -26,7 +26,7 @@ const BARELY: f64 = 1e-12;
 /// let gated = DeadBand { u_db: 0.01, softness: 1.5, gate: 0.9, least: 0.02 };
 /// let open = taken(gated, &[0.0025; 1000]).iter().filter(|u| **u > 0.0).count();
 /// assert!((200..320).contains(&open));
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeadBand {

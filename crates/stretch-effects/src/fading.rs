@@ -21,7 +21,7 @@ impl Times {
     /// The time constants: tau, or tau {1/spread, 1, spread}.
     ///
     /// ```
-    /// use stretch_operators::Times;
+    /// use stretch_effects::Times;
     /// assert_eq!(Times { tau_s: 3.0, spread: 1.0 }.all(), [3.0]);
     /// assert_eq!(Times { tau_s: 3.0, spread: 2.0 }.all(), [1.5, 3.0, 6.0]);
     /// ```
@@ -39,7 +39,7 @@ impl Times {
 /// A step of the input comes through as 1 + share and fades to 1.
 ///
 /// ```
-/// use stretch_operators::{FadingMemory, Grid, Operator, Span, Start, Times};
+/// use stretch_effects::{FadingMemory, Grid, Operator, Span, Start, Times};
 /// let grid = Grid::samples(0.01)?;
 /// let relaxes = FadingMemory::new(0.5, Times { tau_s: 0.1, spread: 1.6 }, 1.0, &grid);
 /// let mut cells = vec![0.0; relaxes.cells()];
@@ -47,7 +47,7 @@ impl Times {
 /// relaxes.begin(Start::Settled, 0.0, &mut cells);
 /// relaxes.run(&Span::whole(&grid), &mut cells, &mut signal);
 /// assert!(signal[1] > 1.4 && (signal[499] - 1.0).abs() < 1e-9);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct FadingMemory {

@@ -15,14 +15,14 @@ use crate::{
 /// linearly while it dwells (of a soft one, as if it were hard).
 ///
 /// ```
-/// use stretch_operators::{Backlash, Grid, Operator, Span, Start};
+/// use stretch_effects::{Backlash, Grid, Operator, Span, Start};
 /// let slip = Backlash::hard(1.0);
 /// let (mut cells, mut signal) = ([0.0], [0.0, 0.5, 3.0, 2.5]);
 /// slip.begin(Start::Settled, signal[0], &mut cells);
 /// slip.run(&Span::whole(&Grid::samples(0.01)?), &mut cells, &mut signal);
 /// assert_eq!(signal, [0.0, 0.0, 2.0, 2.0]);
 /// assert_eq!(Backlash::soft(1.0, 0.3).cells(), 3);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Backlash {

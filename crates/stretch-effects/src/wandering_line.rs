@@ -8,7 +8,7 @@ const WINDOW_S: f64 = 1.0;
 /// A hum of known amplitude and frequency whose phase nothing foretells.
 ///
 /// ```
-/// use stretch_operators::WanderingLine;
+/// use stretch_effects::WanderingLine;
 /// let wave = |i: usize| 0.1 * (std::f64::consts::TAU * 50.0 * 0.004 * i as f64 + 0.7).sin();
 /// let measured: Vec<f64> = (0..500).map(wave).collect();
 /// let mut simulated = vec![0.0; 500];

@@ -7,7 +7,7 @@ use crate::operator::{Operator, Span, Start};
 /// Operators that act one after the other on one signal, and where each keeps its memory in a caller's cells.
 ///
 /// ```
-/// use stretch_operators::{Backlash, Drift, Grid, Row, Span, Start};
+/// use stretch_effects::{Backlash, Drift, Grid, Row, Span, Start};
 /// let row = Row::new(vec![Box::new(Backlash::hard(0.5)), Box::new(Drift::straight(0.1))], 0);
 /// let grid = Grid::samples(1.0)?;
 /// let span = Span::whole(&grid);
@@ -16,7 +16,7 @@ use crate::operator::{Operator, Span, Start};
 /// row.begin(&span, Start::Settled, signal[0], &mut cells);
 /// row.run(&span, &mut cells, &mut signal);
 /// assert_eq!(signal, [0.0, 1.5 * 1.1, 1.5 * 1.2]);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Default)]
 pub struct Row {

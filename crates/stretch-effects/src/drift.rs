@@ -5,7 +5,7 @@ use crate::operator::{Operator, Span};
 /// Drift of a gain with session time t: y = x (1 + d (1 - exp(-settle t))/settle), or x (1 + d t) where it never settles.
 ///
 /// ```
-/// use stretch_operators::{Drift, Grid, Operator, Span};
+/// use stretch_effects::{Drift, Grid, Operator, Span};
 /// let grid = Grid::samples(1.0)?;
 /// let after = |drift: Drift| {
 ///     let mut gain = [1.0];
@@ -14,7 +14,7 @@ use crate::operator::{Operator, Span};
 /// };
 /// assert_eq!(after(Drift::straight(1e-4)), 1.2);
 /// assert!((after(Drift { per_s: 1e-4, settle_per_s: 0.01 }) - 1.01).abs() < 1e-9);
-/// # Ok::<(), stretch_operators::GridError>(())
+/// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drift {

@@ -13,8 +13,8 @@ use std::{io::ErrorKind, process::ExitCode};
 use clap::{CommandFactory, Parser, Subcommand, error::ErrorKind as ArgumentError};
 
 use commands::{
-    apply, blind, calibrate, completions, convert, demo, diagnose, effects, evaluate, export,
-    fleet, init, json, listen, man, page, record, rig, simulate,
+    apply, calibrate, completions, convert, demo, diagnose, effects, evaluate, export, fleet, init,
+    json, listen, man, page, record, rig, simulate,
 };
 use display::Volume;
 
@@ -65,7 +65,6 @@ enum Command {
     Simulate(simulate::Args),
     Diagnose(diagnose::Args),
     Init(init::Args),
-    Blind(blind::Args),
     Effects(effects::Args),
     Rig(rig::Args),
     Listen(listen::Args),
@@ -102,7 +101,6 @@ fn main() -> ExitCode {
         Command::Simulate(args) => simulate::run(args),
         Command::Diagnose(args) => diagnose::run(args).map(|status| done = status),
         Command::Init(args) => init::run(args),
-        Command::Blind(args) => blind::run(args),
         Command::Effects(args) => effects::run(args),
         Command::Rig(args) => rig::run(args),
         Command::Listen(args) => listen::run(args),

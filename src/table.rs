@@ -79,26 +79,6 @@ fn length(text: &str) -> usize {
     text.chars().count()
 }
 
-/// A text whose Markdown tables are drawn as [`table`] draws them.
-pub(crate) fn drawn_tables(text: &str) -> String {
-    let mut out: Vec<String> = Vec::new();
-    let mut held: Vec<Vec<String>> = Vec::new();
-    for line in text.lines().chain([""]) {
-        match line.strip_prefix('|').and_then(|line| line.trim_end().strip_suffix('|')) {
-            Some(row) => held.push(row.split('|').map(|cell| cell.trim().to_owned()).collect()),
-            None => {
-                if let Some((header, rows)) = std::mem::take(&mut held).split_first() {
-                    let header: Vec<&str> = header.iter().map(String::as_str).collect();
-                    // the line of dashes is drawn again
-                    out.push(table(&header, rows.iter().skip(1).cloned()));
-                }
-                out.push(line.to_owned());
-            }
-        }
-    }
-    out.join("\n").trim_end().to_owned()
-}
-
 /// A number that may be missing.
 pub(crate) fn maybe(x: Option<f64>) -> String {
     x.map_or_else(|| "-".to_owned(), number)
@@ -132,11 +112,5 @@ mod tests {
         }
         assert_eq!(fitted(&header, &rows, 100).lines().count(), 4);
         assert!(fitted(&header, &rows, 40).matches("first").count() > 1);
-    }
-
-    #[test]
-    fn markdown_is_drawn_and_all_else_stays() {
-        let told = drawn_tables("one\n| a | b |\n| --- | --- |\n| long | 1 |\n\n- two");
-        assert_eq!(told, "one\n| a    | b |\n|------|---|\n| long | 1 |\n\n- two");
     }
 }

@@ -1,4 +1,4 @@
-//! `stretch diagnose` and `stretch blind` as a user runs them.
+//! `stretch diagnose` as a user runs it.
 
 use std::{
     fs,
@@ -339,69 +339,6 @@ fn ctrl_c_leaves_nothing_half_written() {
     // A machine on which it was done by then has written both.
     let files = fs::read_dir(&out).unwrap().count();
     assert!((code, files) == (Some(130), 0) || (code, files) == (Some(0), 2), "{code:?} {files}");
-}
-
-#[test]
-fn a_blind_check_keeps_its_labels_sealed() {
-    let scratch = Scratch::new();
-    let out = scratch.path("check");
-    let text =
-        runs(stretch().args(["blind", "make", "--cases", "2", "--seed", "11", "--out"]).arg(&out));
-    let hash = text.split_whitespace().last().unwrap().to_owned();
-    assert_eq!(hash.len(), 64);
-    fails(stretch().args(["blind", "make", "--cases", "2", "--out"]).arg(&out), &["check"]);
-    // One case is answered already: it is left as it is.
-    let answer = r#"{"schema":1,"verdict":"no_gap","named":[],"ambiguous":[],"candidates":[],"runtime_s":0.5,
-        "baselines":{"largest_drop":"leak","signature":null,"bic":null}}"#;
-    fs::write(out.join("case-000/diagnosis.json"), answer).unwrap();
-    fs::write(out.join("case-001/diagnosis.json"), answer).unwrap();
-    assert!(runs(stretch().args(["blind", "run"]).arg(&out)).contains("answered 2 of 2"));
-    let text = runs(stretch().args(["blind", "score", "--no-oracle"]).arg(&out));
-    assert!(text.contains(&hash) && text.contains("false alarms on nulls"), "{text}");
-    assert!(text.contains("| this diagnosis ") && text.contains("| BIC alone "), "{text}");
-    let json: Value =
-        serde_json::from_str(&fs::read_to_string(out.join("score.json")).unwrap()).unwrap();
-    assert!(json["score"]["baselines"]["signature"]["top1"]["cases"].is_u64(), "{json}");
-    let page = without_program(&fs::read_to_string(out.join("blind.html")).unwrap());
-    assert!(page.contains("largest drop of the error"));
-    assert!(page.contains(&hash) && page.contains("Every miss") && !page.contains("NaN"));
-    // A label that was altered afterwards is found out.
-    let labels = out.join("sealed/truth.json");
-    let text = fs::read_to_string(&labels).unwrap();
-    fs::write(&labels, text.replacen("\"excess\": ", "\"excess\": 1", 1)).unwrap();
-    fails(stretch().args(["blind", "score"]).arg(&out), &["seal"]);
-}
-
-#[test]
-fn a_blind_case_is_diagnosed_away_from_its_label() {
-    let scratch = Scratch::new();
-    let check = scratch.path("check");
-    fs::create_dir(&check).unwrap();
-    let case = check.join("case-000");
-    fs::rename(bench(&scratch, "bench", &[]), &case).unwrap();
-    let truth = stretch_blind::Truth { schema: 1, seed: None, cases: Default::default() };
-    stretch_blind::Seal::close(&check, &truth).unwrap();
-    let rooms = scratch.path("rooms");
-    fs::create_dir(&rooms).unwrap();
-    let mut command = stretch();
-    command.args(["blind", "run", "--no-baselines"]).arg(&check).env("TMPDIR", &rooms);
-    assert!(runs(&mut command).contains("answered 1 of 1 cases, 0 refused"));
-    let d: Value =
-        serde_json::from_str(&fs::read_to_string(case.join("diagnosis.json")).unwrap()).unwrap();
-    assert_eq!(
-        (d["data_set"].as_str(), d["named"].as_array().unwrap().len()),
-        (Some("case-000"), 0)
-    );
-    assert_eq!(fs::read_dir(&rooms).unwrap().count(), 0);
-    // A case that cannot be diagnosed says why, and is no answer.
-    fs::remove_file(case.join("diagnosis.json")).unwrap();
-    alter(&case.join("fit.csv"), "inlet", |_, _| 3.0);
-    let mut command = stretch();
-    command.args(["blind", "run"]).arg(&check).env("TMPDIR", &rooms);
-    assert!(runs(&mut command).contains("answered 0 of 1 cases, 1 refused"));
-    let why = fs::read_to_string(case.join("refusal.txt")).unwrap();
-    assert!(why.contains("inlet") && why.contains("from 0 to 1"), "{why}");
-    assert_eq!(fs::read_dir(&rooms).unwrap().count(), 0);
 }
 
 #[test]

@@ -27,12 +27,11 @@ const fn writing(line: &'static str, weight: usize, at_once: bool) -> Writing {
     Writing { line, weight, at_once }
 }
 
-const WRITING: [Writing; 14] = [
+const WRITING: [Writing; 13] = [
     writing("simulate --protocol pulses --out new", 4, true),
     writing("simulate --protocol paper --out bench --force", 8, true),
     writing("simulate --protocol pulses --out bench --force", 8, true),
     writing("export --calibration board.json --c c --arduino", 3, true),
-    writing("blind make --cases 1 --out cases", 1, true),
     writing("demo --paper --out demo", 1, true),
     writing("demo --paper --out bench --force", 1, true),
     writing("calibrate a.csv --out cal.json --report cal.html --fixed cal.postcard", 8, false),

@@ -76,7 +76,7 @@ fn frames(samples: u32) -> Vec<u8> {
 }
 
 /// Every command, with what it reads from standard input.
-const COMMANDS: [(&str, Option<&str>); 13] = [
+const COMMANDS: [(&str, Option<&str>); 12] = [
     ("calibrate a_1.csv --out new.json --fixed new.postcard --report new.html", None),
     ("apply --calibration cal.json a_1.csv --out out.csv", None),
     ("apply --calibration cal.json - --out out.csv", Some("live.csv")),
@@ -85,7 +85,6 @@ const COMMANDS: [(&str, Option<&str>); 13] = [
     ("convert a_1.csv --column angle_deg=length_mm*2 --out converted.csv", None),
     ("simulate --protocol pulses --out simulated", None),
     ("diagnose a_1.csv --reference length_mm --signal bridge_v --fix fixed.toml --no-next", None),
-    ("blind make --cases 2 --out blind", None),
     ("effects", None),
     ("rig", None),
     ("listen --port frames --calibration board.json --out trial.csv", None),

@@ -137,7 +137,6 @@ fn a_dash_is_a_stream_and_never_a_file() {
         "export --calibration cal.json --c - --arduino",
         "diagnose bench --no-next --snippets -",
         "demo --out -",
-        "blind make --cases 1 --out -",
         "man --out -",
     ] {
         fails(&mut with(line), &["name"]);

@@ -88,10 +88,6 @@ fn folders_that_hold_something_are_refused_and_replaced_when_forced() {
     {
         fails(&mut said(line), &["bench", "it exists", "--force", "your own are kept"]);
     }
-    fails(
-        &mut said("blind make --cases 1 --out bench"),
-        &["bench", "it exists", "choose another name"],
-    );
     fails(&mut said("export --calibration board.json --c bench"), &["bench", "it exists"]);
     assert!(tree(&scratch.path("")) == before);
     runs(&mut said("simulate --protocol pulses --out bench --force"));
@@ -219,11 +215,10 @@ impl Drop for Mount {
 }
 
 /// Commands with their output below a folder `disk`.
-const ONTO_A_DISK: [&str; 9] = [
+const ONTO_A_DISK: [&str; 8] = [
     "simulate --protocol paper --out disk/new",
     "simulate --protocol paper --out disk/bench --force",
     "demo --paper --out disk/demo",
-    "blind make --cases 1 --out disk/cases",
     "export --calibration board.json --c disk/c",
     "calibrate a.csv --out disk/cal.json --report disk/cal.html",
     "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json-out disk/d.json --report disk/d.html",
@@ -287,11 +282,7 @@ fn a_quota_that_is_reached_is_like_a_full_disk() {
     let scratch = prepared();
     let before = tree(&scratch.path(""));
     // a limit of the size of a file stands for it; its signal is ignored, so that the write fails
-    for line in [
-        "simulate --protocol paper --out bench --force",
-        "demo --paper --out new",
-        "blind make --cases 1 --out cases",
-    ] {
+    for line in ["simulate --protocol paper --out bench --force", "demo --paper --out new"] {
         let script = format!("trap '' XFSZ; ulimit -f 8; exec \"$0\" {line}");
         let output = Command::new("bash")
             .current_dir(scratch.path(""))

@@ -1,10 +1,6 @@
 //! One file a subcommand, and what they share.
 
 pub(crate) mod apply;
-pub(crate) mod blind;
-mod blind_answers;
-mod blind_room;
-mod blind_score;
 pub(crate) mod calibrate;
 mod calibration_text;
 mod causes;

@@ -14,18 +14,9 @@ use crate::display::{shows_progress, warn};
 
 /// A progress bar on standard error: seen on a terminal only.
 pub(crate) fn progress(what: &'static str, steps: u64) -> ProgressBar {
-    bar(what, steps, "{msg} [{bar:30}] {pos}/{len} {elapsed}")
-}
-
-/// One that says how long it will still take.
-pub(crate) fn steps(what: &'static str, count: usize) -> ProgressBar {
-    bar(what, count as u64, "{msg} [{bar:30}] {pos}/{len}, {elapsed} gone, {eta} to go")
-}
-
-fn bar(what: &'static str, steps: u64, template: &str) -> ProgressBar {
     let bar = ProgressBar::new(steps).with_message(what);
     // the template is a constant: were it wrong, the plain bar is shown
-    if let Ok(style) = ProgressStyle::with_template(template) {
+    if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:30}] {pos}/{len} {elapsed}") {
         bar.set_style(style);
     }
     ticking(bar)

@@ -1,6 +1,5 @@
-//! Ctrl-C: a live recording ends like a stream that ends, work in temporary
-//! folders takes them away first; anything else stops at once and leaves nothing
-//! half-written.
+//! Ctrl-C: a live recording ends like a stream that ends; anything else stops at
+//! once and leaves nothing half-written.
 
 use std::{
     io::{self, Read},
@@ -13,27 +12,15 @@ use std::{
 
 static RECORDING: AtomicBool = AtomicBool::new(false);
 static ENDED: AtomicBool = AtomicBool::new(false);
-static TIDYING: AtomicBool = AtomicBool::new(false);
 
-/// What the handler of Ctrl-C does; the second Ctrl-C stops a recording, too, and
-/// whatever tidies up.
+/// What the handler of Ctrl-C does; the second Ctrl-C stops a recording, too.
 pub(crate) fn on_ctrl_c(exit_code: u8) {
-    if TIDYING.load(SeqCst) && !stretch_data::interrupted() {
-        stretch_data::interrupt();
-        return;
-    }
     if RECORDING.load(SeqCst) && !ENDED.swap(true, SeqCst) {
         return;
     }
     if stretch_data::interrupt() == 0 {
         std::process::exit(exit_code.into());
     }
-}
-
-/// From now on the first Ctrl-C only sets what [`stretch_data::interrupted`]
-/// tells: whoever calls this asks it often, cleans up and leaves.
-pub(crate) fn tidy() {
-    TIDYING.store(true, SeqCst);
 }
 
 /// From now on the first Ctrl-C only sets what [`ended`] tells.

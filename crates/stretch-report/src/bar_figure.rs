@@ -21,36 +21,36 @@ const NUMBER: f64 = 88.0;
 
 /// One bar.
 #[derive(Debug, Clone)]
-pub(crate) struct Bar {
+pub struct Bar {
     /// Its colour.
-    pub(crate) ink: Ink,
+    pub ink: Ink,
     /// How long it is.
-    pub(crate) value: f64,
+    pub value: f64,
     /// An interval around its end.
-    pub(crate) interval: Option<[f64; 2]>,
+    pub interval: Option<[f64; 2]>,
     /// What stands behind it; the value when empty.
-    pub(crate) text: String,
+    pub text: String,
 }
 
 impl Bar {
     /// A bar with its value behind it.
-    pub(crate) fn new(ink: Ink, value: f64) -> Self {
+    pub fn new(ink: Ink, value: f64) -> Self {
         Self { ink, value, interval: None, text: String::new() }
     }
 }
 
 /// Bars under one label.
 #[derive(Debug, Clone)]
-pub(crate) struct Row {
+pub struct Row {
     /// What they belong to.
-    pub(crate) label: String,
+    pub label: String,
     /// The bars.
-    pub(crate) bars: Vec<Bar>,
+    pub bars: Vec<Bar>,
 }
 
 /// How lengths stand for values.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Scale {
+pub enum Scale {
     /// From 0 to 1, in percent.
     Percent,
     /// Equal ratios from 1, the noise floor.
@@ -83,7 +83,7 @@ fn label_px(row: &Row) -> f64 {
 }
 
 /// Draws rows of bars.
-pub(crate) fn bar_figure(description: &str, rows: &[Row], scale: Scale, x_label: &str) -> Figure {
+pub fn bar_figure(description: &str, rows: &[Row], scale: Scale, x_label: &str) -> Figure {
     if rows.is_empty() {
         return Figure::missing("There is nothing to draw here.");
     }
@@ -139,12 +139,7 @@ pub(crate) fn picking_figure(
 }
 
 /// The same in one shape, for figures that stand side by side.
-pub(crate) fn narrow_bar_figure(
-    description: &str,
-    rows: &[Row],
-    scale: Scale,
-    x_label: &str,
-) -> Figure {
+pub fn narrow_bar_figure(description: &str, rows: &[Row], scale: Scale, x_label: &str) -> Figure {
     let mut figure = bar_figure(description, rows, scale, x_label);
     figure.keep_narrowest();
     figure

@@ -19,11 +19,11 @@ use plotters_backend::{
 use super::markup::escape;
 
 /// Steps of the drawing grid in one pixel of the figure: plotters places on whole steps.
-pub(crate) const STEPS: u32 = 4;
+pub const STEPS: u32 = 4;
 
 /// A colour by what it stands for; the style sheet says what it looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Ink {
+pub enum Ink {
     /// Words and numbers.
     Text,
     /// Axes.
@@ -77,13 +77,13 @@ impl Ink {
     }
 
     /// The stand-in that plotters carries to the backend.
-    pub(crate) fn color(self) -> RGBColor {
+    pub fn color(self) -> RGBColor {
         let index = Self::ALL.iter().position(|(ink, _)| *ink == self).unwrap_or(0);
         RGBColor(index as u8, 0, 0)
     }
 
     /// The same, letting `1 - opacity` of what is behind shine through.
-    pub(crate) fn faint(self, opacity: f64) -> RGBAColor {
+    pub fn faint(self, opacity: f64) -> RGBAColor {
         RGBAColor(self.color().0, 0, 0, opacity)
     }
 }
@@ -105,7 +105,7 @@ struct Dots {
 
 /// The backend: writes the inside of an `svg` element into a string.
 #[derive(Debug)]
-pub(crate) struct Canvas<'a> {
+pub struct Canvas<'a> {
     body: &'a mut String,
     size: (u32, u32),
     dots: Option<Dots>,

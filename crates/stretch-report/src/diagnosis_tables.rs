@@ -1,6 +1,5 @@
 //! The tables of a diagnosis's report.
 
-use stretch_blind::method_in_words;
 use stretch_gap::{Baselines, Candidate, Diagnosis, SliceGap, StageGap, Transfer};
 
 use super::multiple::{both, times};
@@ -126,7 +125,7 @@ pub fn transfer_table(transfer: &Transfer) -> Table {
 /// What simpler methods named.
 pub fn baseline_table(said: &Baselines) -> Table {
     let row = |(method, name): (&str, Option<&str>)| {
-        vec![method_in_words(method).to_owned(), name.unwrap_or("nothing").to_owned()]
+        vec![method.to_owned(), name.unwrap_or("nothing").to_owned()]
     };
     Table {
         caption: "Methods that leave one step out, on the same data".to_owned(),

@@ -14,67 +14,66 @@ use super::{
 };
 
 /// Size of words and numbers, in pixels of the figure.
-pub(crate) const TEXT_PX: u32 = 14;
+pub const TEXT_PX: u32 = 14;
 
 /// Where figures are drawn.
-pub(crate) type Area<'a> = DrawingArea<Canvas<'a>, Shift>;
+pub type Area<'a> = DrawingArea<Canvas<'a>, Shift>;
 
 /// Axes with a place for the data.
-pub(crate) type Chart<'a, 'b> =
-    ChartContext<'a, Canvas<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+pub type Chart<'a, 'b> = ChartContext<'a, Canvas<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 /// Drawing cannot fail but for a fault in the figure itself.
-pub(crate) type Drawn = Result<(), DrawingAreaErrorKind<Infallible>>;
+pub type Drawn = Result<(), DrawingAreaErrorKind<Infallible>>;
 
 /// Pixels as steps of the drawing grid.
-pub(crate) fn px(pixels: f64) -> i32 {
+pub fn px(pixels: f64) -> i32 {
     (pixels * f64::from(STEPS)).round() as i32
 }
 
 /// The size of a drawing, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Frame {
+pub struct Frame {
     /// Width.
-    pub(crate) width: u32,
+    pub width: u32,
     /// Height.
-    pub(crate) height: u32,
+    pub height: u32,
 }
 
 impl Frame {
     /// For half a desktop page or a whole phone: its text stays legible at 360 px.
-    pub(crate) const NARROW: Self = Self { width: 400, height: 290 };
+    pub const NARROW: Self = Self { width: 400, height: 290 };
     /// For the whole width of a desktop page.
-    pub(crate) const WIDE: Self = Self { width: 880, height: 320 };
+    pub const WIDE: Self = Self { width: 880, height: 320 };
 }
 
 /// A drawing, maybe in two shapes, with a legend in words; or why there is none.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Figure {
+pub struct Figure {
     /// What a reader who cannot see it is told.
-    pub(crate) description: String,
+    pub description: String,
     /// Colours and what they stand for.
-    pub(crate) legend: Vec<(Ink, String)>,
+    pub legend: Vec<(Ink, String)>,
     /// Why it is not drawn.
-    pub(crate) missing: Option<String>,
+    pub missing: Option<String>,
     /// What the page's script draws in its place, as JSON.
-    pub(crate) live: Option<String>,
+    pub live: Option<String>,
     drawings: Vec<(Frame, String)>,
 }
 
 impl Figure {
     /// A figure with this description and nothing drawn yet.
-    pub(crate) fn new(description: &str) -> Self {
+    pub fn new(description: &str) -> Self {
         Self { description: description.to_owned(), ..Self::default() }
     }
 
     /// Nothing to draw, and why.
-    pub(crate) fn missing(why: &str) -> Self {
+    pub fn missing(why: &str) -> Self {
         Self { missing: Some(why.to_owned()), ..Self::default() }
     }
 
     /// Draws it in one frame; the narrowest of several is for phones.
     #[must_use]
-    pub(crate) fn draw(mut self, frame: Frame, draw: impl FnOnce(&Area<'_>) -> Drawn) -> Self {
+    pub fn draw(mut self, frame: Frame, draw: impl FnOnce(&Area<'_>) -> Drawn) -> Self {
         let mut body = String::new();
         let done = {
             let area = Canvas::new(&mut body, frame.width, frame.height).into_drawing_area();
@@ -88,27 +87,27 @@ impl Figure {
     }
 
     /// Keeps the shape for phones alone: for figures that stand side by side.
-    pub(crate) fn keep_narrowest(&mut self) {
+    pub fn keep_narrowest(&mut self) {
         let narrowest = self.drawings.iter().map(|(frame, _)| frame.width).min();
         self.drawings.retain(|(frame, _)| Some(frame.width) == narrowest);
     }
 
     /// Adds a legend.
     #[must_use]
-    pub(crate) fn legend(mut self, entries: impl IntoIterator<Item = (Ink, String)>) -> Self {
+    pub fn legend(mut self, entries: impl IntoIterator<Item = (Ink, String)>) -> Self {
         self.legend.extend(entries);
         self
     }
 
     /// Adds what the page's script draws in its place, or answers with.
     #[must_use]
-    pub(crate) fn live(mut self, json: impl Into<Option<String>>) -> Self {
+    pub fn live(mut self, json: impl Into<Option<String>>) -> Self {
         self.live = json.into();
         self
     }
 
     /// The drawings as inline SVG; of two, the style sheet shows the one that fits.
-    pub(crate) fn svg(&self) -> String {
+    pub fn svg(&self) -> String {
         let both = self.drawings.len() > 1;
         let narrowest = self.drawings.iter().map(|(frame, _)| frame.width).min();
         let label = escape(&self.description);
@@ -128,7 +127,7 @@ impl Figure {
     }
 
     /// The widest drawing as a file of its own, light, its legend inside.
-    pub(crate) fn standalone(&self) -> String {
+    pub fn standalone(&self) -> String {
         let Some((frame, body)) = self.drawings.iter().max_by_key(|(frame, _)| frame.width) else {
             return String::new();
         };
@@ -163,39 +162,39 @@ const LEGEND_PX: u32 = 28;
 
 /// What stands on two axes, and what they span.
 #[derive(Debug, Clone)]
-pub(crate) struct Axes {
+pub struct Axes {
     /// Horizontal span.
-    pub(crate) x: Range<f64>,
+    pub x: Range<f64>,
     /// Vertical span.
-    pub(crate) y: Range<f64>,
+    pub y: Range<f64>,
     /// Below, at the right end; empty for an axis whose numbers another panel bears.
-    pub(crate) x_label: String,
+    pub x_label: String,
     /// Above, at the left end.
-    pub(crate) y_label: String,
+    pub y_label: String,
     /// Whether horizontal places are logarithms to base ten: the numbers are then those that they stand for.
-    pub(crate) is_log: bool,
+    pub is_log: bool,
 }
 
 /// Text in an ink, held at `h` and `v`.
-pub(crate) fn words(ink: Ink, h: HPos, v: VPos) -> TextStyle<'static> {
+pub fn words(ink: Ink, h: HPos, v: VPos) -> TextStyle<'static> {
     let mut style = TextStyle::from(("sans-serif", TEXT_PX * STEPS).into_font());
     style.color = ink.color().to_backend_color();
     style.pos(Pos::new(h, v))
 }
 
 /// A line of `pixels` in width.
-pub(crate) fn stroke(color: impl Into<RGBAColor>, pixels: f64) -> ShapeStyle {
+pub fn stroke(color: impl Into<RGBAColor>, pixels: f64) -> ShapeStyle {
     let stroke_width = px(pixels).unsigned_abs();
     ShapeStyle { color: color.into(), filled: false, stroke_width }
 }
 
 /// A dot's style.
-pub(crate) fn dot(ink: Ink, opacity: f64) -> ShapeStyle {
+pub fn dot(ink: Ink, opacity: f64) -> ShapeStyle {
     ShapeStyle { color: ink.faint(opacity), filled: true, stroke_width: 0 }
 }
 
 /// Draws axes and then the data.
-pub(crate) fn plot<'b>(
+pub fn plot<'b>(
     area: &Area<'b>,
     axes: &Axes,
     data: impl FnOnce(&mut Chart<'_, 'b>) -> Drawn,

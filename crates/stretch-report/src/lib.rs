@@ -1,8 +1,6 @@
 #![doc = include_str!("../README.md")]
 
 mod bar_figure;
-mod blind_figures;
-mod blind_page;
 mod branch;
 mod calibration_page;
 mod calibration_tables;
@@ -16,7 +14,7 @@ mod estimate_figure;
 mod figure;
 mod first_seconds;
 mod gap_figures;
-mod goal;
+pub mod kit;
 mod live;
 mod markup;
 mod memory_figure;
@@ -32,18 +30,16 @@ mod surface_figure;
 mod thin;
 mod turn_figure;
 
-pub use blind_page::{BlindSubject, blind_page};
 pub use calibration_page::{Context, Judged, calibration_page, readme_picture};
 pub use demo_page::demo_page;
 pub use diagnosis_page::diagnosis_page;
 pub use diagnosis_tables::{baseline_table, candidate_table, stage_table, transfer_table};
-pub use goal::{Goal, goals};
 pub use markup::percent;
 pub use multiple::times;
 pub use page::Table;
 pub use paper_page::paper_page;
 pub use paper_tables::{error_rows, fit_rows, verdicts};
-pub use plain::{effect_in_words, listed, methods, number, transfer_in_words};
+pub use plain::{effect_in_words, listed, number, transfer_in_words};
 pub use subject::Subject;
 
 #[cfg(test)]

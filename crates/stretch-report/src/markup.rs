@@ -29,7 +29,7 @@ pub(crate) const NONE: &str = "\u{2013}";
 
 /// `x` to `digits` significant digits, in plain notation from 0.0001 to a
 /// million; a dash when it is not finite.
-pub(crate) fn number(x: f64, digits: usize) -> String {
+pub fn number(x: f64, digits: usize) -> String {
     if !x.is_finite() {
         return NONE.to_owned();
     }
@@ -48,7 +48,7 @@ pub(crate) fn number(x: f64, digits: usize) -> String {
 
 /// `x` with `decimals` digits behind the point and a true minus sign; a dash
 /// when it is not finite.
-pub(crate) fn fixed(x: f64, decimals: usize) -> String {
+pub fn fixed(x: f64, decimals: usize) -> String {
     if !x.is_finite() {
         return NONE.to_owned();
     }

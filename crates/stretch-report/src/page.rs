@@ -27,7 +27,7 @@ pub struct Table {
 
 /// A report under construction; [`Page::finish`] gives the file.
 #[derive(Debug, Clone)]
-pub(crate) struct Page {
+pub struct Page {
     title: String,
     body: String,
     in_section: bool,
@@ -35,7 +35,7 @@ pub(crate) struct Page {
 
 impl Page {
     /// A page whose first words are its title and one plain sentence with the result.
-    pub(crate) fn new(title: &str, verdict: &str) -> Self {
+    pub fn new(title: &str, verdict: &str) -> Self {
         let body = format!(
             "<header><h1>{}</h1>\n<p class=\"verdict\">{}</p></header>\n",
             escape(title),
@@ -45,7 +45,7 @@ impl Page {
     }
 
     /// Begins a part of a report that has several: its own title and sentence.
-    pub(crate) fn part(&mut self, title: &str, verdict: &str) -> &mut Self {
+    pub fn part(&mut self, title: &str, verdict: &str) -> &mut Self {
         self.close();
         self.put(&format!(
             "<header class=\"part\"><h1>{}</h1>\n<p class=\"verdict\">{}</p></header>\n",
@@ -55,7 +55,7 @@ impl Page {
     }
 
     /// Begins a section; `intro` may be empty.
-    pub(crate) fn section(&mut self, heading: &str, intro: &str) -> &mut Self {
+    pub fn section(&mut self, heading: &str, intro: &str) -> &mut Self {
         self.close();
         self.in_section = true;
         self.put(&format!("<section><h2>{}</h2>\n", escape(heading)));
@@ -63,22 +63,22 @@ impl Page {
     }
 
     /// A heading within what is open already.
-    pub(crate) fn heading(&mut self, heading: &str) -> &mut Self {
+    pub fn heading(&mut self, heading: &str) -> &mut Self {
         self.put(&format!("<h2>{}</h2>\n", escape(heading)))
     }
 
     /// A paragraph.
-    pub(crate) fn text(&mut self, text: &str) -> &mut Self {
+    pub fn text(&mut self, text: &str) -> &mut Self {
         self.put(&format!("<p>{}</p>\n", escape(text)))
     }
 
     /// Code, as it is typed.
-    pub(crate) fn code(&mut self, code: &str) -> &mut Self {
+    pub fn code(&mut self, code: &str) -> &mut Self {
         self.put(&format!("<pre>{}</pre>\n", escape(code)))
     }
 
     /// Notes, one a line; nothing when there are none.
-    pub(crate) fn list(&mut self, items: &[String]) -> &mut Self {
+    pub fn list(&mut self, items: &[String]) -> &mut Self {
         if items.is_empty() {
             return self;
         }
@@ -90,7 +90,7 @@ impl Page {
     }
 
     /// Short answers side by side, each under its question.
-    pub(crate) fn facts(&mut self, facts: &[(&str, String)]) -> &mut Self {
+    pub fn facts(&mut self, facts: &[(&str, String)]) -> &mut Self {
         self.put("<dl class=\"facts\">\n");
         for (question, answer) in facts {
             let (question, answer) = (escape(question), escape(answer));
@@ -100,7 +100,7 @@ impl Page {
     }
 
     /// A figure over the whole width.
-    pub(crate) fn figure(&mut self, figure: &Figure, caption: &str) -> &mut Self {
+    pub fn figure(&mut self, figure: &Figure, caption: &str) -> &mut Self {
         self.put("<figure>");
         if !figure.legend.is_empty() {
             self.put("<div class=\"legend\">");
@@ -122,7 +122,7 @@ impl Page {
     }
 
     /// Figures side by side where there is room, one above the other on a phone.
-    pub(crate) fn figures(&mut self, figures: &[(Figure, String)]) -> &mut Self {
+    pub fn figures(&mut self, figures: &[(Figure, String)]) -> &mut Self {
         self.put("<div class=\"side\">\n");
         for (figure, caption) in figures {
             self.figure(figure, caption);
@@ -131,7 +131,7 @@ impl Page {
     }
 
     /// A table that scrolls in its own frame when it is too wide.
-    pub(crate) fn table(&mut self, table: &Table) -> &mut Self {
+    pub fn table(&mut self, table: &Table) -> &mut Self {
         let caption = escape(&table.caption);
         let cards = if table.head.len() >= CARDS { " class=\"cards\"" } else { "" };
         // the caption stands outside: it must not scroll away
@@ -165,14 +165,14 @@ impl Page {
     }
 
     /// Content behind a line that opens it.
-    pub(crate) fn folded(&mut self, summary: &str, content: impl FnOnce(&mut Self)) -> &mut Self {
+    pub fn folded(&mut self, summary: &str, content: impl FnOnce(&mut Self)) -> &mut Self {
         self.put(&format!("<details><summary>{}</summary>\n", escape(summary)));
         content(self);
         self.put("</details>\n")
     }
 
     /// The whole file: HTML that is also well-formed XML.
-    pub(crate) fn finish(mut self) -> String {
+    pub fn finish(mut self) -> String {
         self.close();
         let title = escape(&self.title);
         let (body, script, policy) = (self.body, script::element(), script::policy());

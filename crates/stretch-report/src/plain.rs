@@ -36,12 +36,12 @@ pub fn transfer_in_words(transfer: &Transfer) -> Option<String> {
     })
 }
 
-/// What simpler methods named, by method.
-pub fn methods(said: &Baselines) -> [(&'static str, Option<&str>); 3] {
+/// Simpler methods in words, each with the effect that it named.
+pub(crate) fn methods(said: &Baselines) -> [(&'static str, Option<&str>); 3] {
     [
-        ("largest_drop", said.largest_drop.as_deref()),
-        ("signature", said.signature.as_deref()),
-        ("bic", said.bic.as_deref()),
+        ("largest drop of the error, parameters as shipped", said.largest_drop.as_deref()),
+        ("likeness of a one-step signature", said.signature.as_deref()),
+        ("BIC alone", said.bic.as_deref()),
     ]
 }
 

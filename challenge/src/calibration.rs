@@ -20,7 +20,7 @@ const LEAST_UNKNOWN: f64 = 0.05;
 const DEAR: f64 = 3.0;
 
 /// Thresholds of labelled cases that were diagnosed; those that steer the search stay as they are.
-pub(crate) fn calibrated(cases: &[&Case]) -> Thresholds {
+pub fn calibrated(cases: &[&Case]) -> Thresholds {
     let (temperature, rho) = probabilities(cases);
     let (unknown_excess, unknown_share, unknown_soft, unknown_odds) = unknowns(cases);
     Thresholds {
@@ -34,7 +34,8 @@ pub(crate) fn calibrated(cases: &[&Case]) -> Thresholds {
     }
 }
 
-pub(crate) type Case = (Label, Diagnosis);
+/// A label, and what the diagnosis said of its case.
+pub type Case = (Label, Diagnosis);
 
 /// Temperature and its growth under which the truths of single effects are most likely.
 fn probabilities(cases: &[&Case]) -> (f64, f64) {

@@ -28,6 +28,19 @@ impl Goal {
             (None, None) => "",
         }
     }
+
+    /// What a table says of it: what is counted, the goal, what was reached, the count, Wilson's interval, whether that is met.
+    pub fn cells(&self) -> [String; 6] {
+        let interval = self.rate.and_then(|rate| rate.wilson());
+        [
+            self.what.to_owned(),
+            self.goal.clone(),
+            self.value.map_or_else(|| "no case".to_owned(), |value| format!("{value:.3}")),
+            self.rate.map_or_else(String::new, |rate| format!("{} of {}", rate.hits, rate.cases)),
+            interval.map_or_else(String::new, |(low, high)| format!("{low:.3} .. {high:.3}")),
+            self.verdict().to_owned(),
+        ]
+    }
 }
 
 /// Whether so many cases, of which some missed, say anything of a goal that lets a share of them miss: one may miss, or more

@@ -6,10 +6,8 @@ use plotters::{
 };
 use stretch_blind::{Calibration, Score};
 
-use super::{
-    canvas::{Ink, STEPS},
-    figure::{Area, Axes, Drawn, Figure, Frame, TEXT_PX, dot, plot, px, stroke, words},
-    thin::sorted,
+use stretch_report::kit::{
+    Area, Axes, Drawn, Figure, Frame, Ink, STEPS, TEXT_PX, dot, plot, px, stroke, words,
 };
 
 /// Probability stated against how often it came true, with Wilson's interval.
@@ -57,7 +55,8 @@ pub(crate) fn reliability_figure(calibration: &Calibration) -> Figure {
 
 /// Share of the cases done within a time.
 pub(crate) fn time_figure(times: &[f64]) -> Figure {
-    let times = sorted(times.iter().copied());
+    let mut times = times.to_vec();
+    times.sort_by(f64::total_cmp);
     let Some(&longest) = times.last().filter(|t| **t > 0.0) else {
         return Figure::missing("No time was taken.");
     };

@@ -4,10 +4,9 @@ use std::{fmt::Write, ops::Range};
 
 use stretch_gap::{Diagnosis, Thresholds, VerdictKind};
 
-use crate::{
-    shared_out::{Answer, shared_out},
-    simulated::{Protocol, Source},
-};
+use stretch_challenge::shared_out;
+
+use crate::simulated::{Protocol, Source};
 
 /// What one null says.
 struct Null {
@@ -26,7 +25,7 @@ fn without_hurdles() -> Thresholds {
     Thresholds { rise: none, faint_rise: none, share: 0.0, mismatch: 0.0, ..Thresholds::frozen() }
 }
 
-fn null(seed: u64, protocol: Protocol) -> Answer<Null> {
+fn null(seed: u64, protocol: Protocol) -> anyhow::Result<Null> {
     let source = Source { seed, effect: None };
     let Diagnosis { gap, verdict, named, .. } =
         source.diagnosed(protocol, 4, Thresholds::frozen())?;
@@ -45,7 +44,7 @@ fn null(seed: u64, protocol: Protocol) -> Answer<Null> {
 }
 
 /// The table of the null band.
-pub(crate) fn band(seeds: Range<u64>) -> Answer<String> {
+pub(crate) fn band(seeds: Range<u64>) -> anyhow::Result<String> {
     let each = seeds.clone().count();
     let jobs = Protocol::ALL.len() * each;
     let all = shared_out(rayon::current_num_threads(), jobs, |at| {

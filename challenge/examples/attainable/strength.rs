@@ -1,12 +1,10 @@
 //! How strong an effect has to be for a stated excess.
 
+use anyhow::Context;
 use stretch_gap::Thresholds;
 use stretch_sim::{Effect, EffectParameter};
 
-use crate::{
-    shared_out::Answer,
-    simulated::{Protocol, Source},
-};
+use crate::simulated::{Protocol, Source};
 
 /// Most sessions that are simulated for one excess.
 const MOST: usize = 12;
@@ -45,7 +43,7 @@ impl Strengths {
 
     /// The source whose excess on the trials of the paper comes near an aim, and that excess. Where the range ends before, what is at
     /// its end; where the excess jumps over the aim, what is behind the jump.
-    pub(crate) fn near(&mut self, aim: f64) -> Answer<(Source, f64)> {
+    pub(crate) fn near(&mut self, aim: f64) -> anyhow::Result<(Source, f64)> {
         let off_by = |p: &Point| (p.excess / aim).ln().abs();
         for step in 0..MOST {
             let nearest = self.points.iter().min_by(|a, b| off_by(a).total_cmp(&off_by(b)));
@@ -58,7 +56,8 @@ impl Strengths {
         }
         let near = self.points.iter().filter(|p| off_by(p) <= NEAR.ln());
         let near = near.min_by(|a, b| off_by(a).total_cmp(&off_by(b)));
-        let point = near.or(self.above(aim)).or(self.below(aim)).ok_or("nothing was simulated")?;
+        let point =
+            near.or(self.above(aim)).or(self.below(aim)).context("nothing was simulated")?;
         Ok((self.source(point.share), point.excess))
     }
 
@@ -94,7 +93,7 @@ impl Strengths {
         }
     }
 
-    fn excess(&self, share: f64) -> Answer<f64> {
+    fn excess(&self, share: f64) -> anyhow::Result<f64> {
         // Nothing counts as unknown: only the excess is asked for, not what may be behind it.
         let thresholds = Thresholds { unknown_excess: f64::INFINITY, ..Thresholds::frozen() };
         let diagnosis = self.source(share).diagnosed(Protocol::Paper, 0, thresholds)?;

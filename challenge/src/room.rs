@@ -13,14 +13,14 @@ use tempfile::TempDir;
 ///
 /// The process that diagnoses works in it: neither its working folder nor an argument nor its environment leads to the labels.
 /// A program that went looking for them could still find them, as any program of the same user could.
-pub(super) struct Room {
+pub(crate) struct Room {
     dir: TempDir,
     folder: PathBuf,
 }
 
 impl Room {
     /// Copies a case's files, but not those called in `without`.
-    pub(super) fn of(case: &Path, without: &[&str]) -> anyhow::Result<Self> {
+    pub(crate) fn of(case: &Path, without: &[&str]) -> anyhow::Result<Self> {
         let dir =
             tempfile::Builder::new().prefix("stretch-").tempdir().context("temporary folder")?;
         let name = case.file_name().map_or_else(|| "case".into(), ToOwned::to_owned);
@@ -42,7 +42,7 @@ impl Room {
     }
 
     /// A command that runs in the folder and is told of no other.
-    pub(super) fn command(&self, program: &Path) -> Command {
+    pub(crate) fn command(&self, program: &Path) -> Command {
         let mut command = Command::new(program);
         command.current_dir(&self.folder).env("PWD", &self.folder).env_remove("OLDPWD");
         // The shell's own record of what was typed, with the folder's name.
@@ -51,13 +51,13 @@ impl Room {
     }
 
     /// A file that was written there.
-    pub(super) fn read(&self, file: &str) -> anyhow::Result<String> {
+    pub(crate) fn read(&self, file: &str) -> anyhow::Result<String> {
         let path = self.folder.join(file);
         fs::read_to_string(&path).with_context(|| path.display().to_string())
     }
 
     /// Takes the folder away, and says why not.
-    pub(super) fn close(self) -> anyhow::Result<()> {
+    pub(crate) fn close(self) -> anyhow::Result<()> {
         let shown = self.dir.path().display().to_string();
         self.dir.close().with_context(|| format!("{shown}: it cannot be removed"))
     }

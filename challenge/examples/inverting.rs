@@ -1,7 +1,7 @@
 //! What a calibration is worth that uses the diagnosis, beside one that is told the truth:
-//! `cargo run --release -p stretch-problem --example inverting -- FOLDER [CASES]`.
+//! `cargo run --release --manifest-path challenge/Cargo.toml --example inverting -- FOLDER [CASES]`.
 //!
-//! FOLDER holds sealed cases (`stretch blind make`). Of them the first CASES (20) are taken whose effects are one to three of the sensing
+//! FOLDER holds sealed cases (`challenge make`). Of them the first CASES (20) are taken whose effects are one to three of the sensing
 //! stage with an excess of 5 or more. Each is calibrated on its fit trials with the published method, poly13, the observer and
 //! on what a diagnosis of the gauge alone names, and judged on its test trials.
 //!

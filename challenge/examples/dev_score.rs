@@ -1,14 +1,13 @@
 //! Diagnoses a folder of labelled cases, leaves the answer beside each, and scores:
-//! `cargo run --release -p stretch-problem --example dev_score -- FOLDER [case-000 ...]`.
+//! `cargo run --release --manifest-path challenge/Cargo.toml --example dev_score -- FOLDER [case-000 ...]`.
 
 use std::{fs, path::Path, time::Instant};
 
 use stretch_blind::{CaseKind, Score, Seal, Truth, Verdict};
-use stretch_gap::{Options, diagnose};
-use stretch_problem::RigSimulator;
-use stretch_sim::Catalogue;
+use stretch_challenge::{ANSWER, diagnosed};
+use stretch_gap::Options;
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let Some((folder, wanted)) = arguments.split_first() else {
         eprintln!("usage: dev_score FOLDER [case-000 ...]");
@@ -25,15 +24,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             continue;
         }
         let struck: Vec<&String> = label.struck.iter().collect();
-        let catalogue = Catalogue::default().without(&struck)?;
         let begun = Instant::now();
-        let simulator = RigSimulator::read(&folder.join(name), None, &catalogue)?;
         let progress = |what: &str| {
             if !wanted.is_empty() {
                 eprintln!("{:6.1} s: {what}", begun.elapsed().as_secs_f64());
             }
         };
-        let result = diagnose(&simulator, &Options::default(), &progress, &|| false);
+        let result = diagnosed(&folder.join(name), &struck, &Options::default(), &progress);
         let (diagnosis, evidence) = match result {
             Ok(done) => done,
             Err(error) => {
@@ -42,7 +39,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             }
         };
         let json = serde_json::to_value(&diagnosis)?;
-        fs::write(folder.join(name).join("diagnosis.json"), json.to_string())?;
+        fs::write(folder.join(name).join(ANSWER), json.to_string())?;
         let verdict = Verdict::from_diagnosis(name, &json)?;
         let right = match label.kind {
             CaseKind::Null => verdict.answer().is_empty() && verdict.verdict != "unknown",

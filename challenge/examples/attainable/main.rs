@@ -4,30 +4,22 @@
 //! Two tables: how far nulls stray, and which effects cannot be told apart, for the trials of the paper with and without a
 //! pressure column and for the paper's with one trial more at 0.7 of the excitation. `docs/blind.md` says how to read them.
 //!
-//! `cargo run --release -p stretch-problem --example attainable -- [NULLS [SEEDS]]`: nulls of each protocol (20), sessions of each effect
+//! `cargo run --release --manifest-path challenge/Cargo.toml --example attainable -- [NULLS [SEEDS]]`: nulls of each protocol (20), sessions of each effect
 //! and strength (1). As many at a time as `RAYON_NUM_THREADS` says, else as there are cores.
 
-#[path = "attainable/nulls.rs"]
 mod nulls;
-#[path = "support/shared_out.rs"]
-mod shared_out;
-#[path = "attainable/simulated.rs"]
 mod simulated;
-#[path = "attainable/strength.rs"]
 mod strength;
-#[path = "attainable/ties.rs"]
 mod ties;
 
 use std::time::Instant;
-
-use shared_out::Answer;
 
 /// Seed of the first null; nulls and effects have seeds of their own.
 const FIRST_NULL: u64 = 5001;
 /// Seed of the first session with an effect.
 const FIRST_EFFECT: u64 = 6001;
 
-fn main() -> Answer<()> {
+fn main() -> anyhow::Result<()> {
     let mut given = std::env::args().skip(1);
     let mut count = |usual: u64| given.next().map_or(Ok(usual), |text| text.parse());
     let (nulls, seeds) = (count(20)?, count(1)?);

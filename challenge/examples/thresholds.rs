@@ -1,16 +1,13 @@
 //! Calibrates what turns scores into probabilities and gaps into `unknown`, on labelled cases that were diagnosed:
-//! `cargo run --release -p stretch-problem --example thresholds -- [--write] FOLDER...`.
+//! `cargo run --release --manifest-path challenge/Cargo.toml --example thresholds -- [--write] FOLDER...`.
 //!
-//! `stretch blind make` and `stretch blind run` make such folders, `dev_score` too. The thresholds that steer the search
+//! `challenge make` and `challenge run` make such folders, `dev_score` too. The thresholds that steer the search
 //! itself (`null_excess`, `rise`, `share`, `mismatch`) act while a case is diagnosed: they are kept as they are.
-
-#[path = "support/calibration.rs"]
-mod calibration;
 
 use std::{fs, path::Path};
 
-use calibration::{Case, calibrated};
 use stretch_blind::Seal;
+use stretch_challenge::{ANSWER, Case, calibrated};
 use stretch_gap::Diagnosis;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -29,7 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let (_, truth) = Seal::open(Path::new(folder))?;
         seeds.extend(truth.seed.map(|seed| seed.to_string()));
         for (name, label) in truth.cases {
-            let file = Path::new(folder).join(&name).join("diagnosis.json");
+            let file = Path::new(folder).join(&name).join(ANSWER);
             if let Ok(text) = fs::read_to_string(&file) {
                 cases.push((label, serde_json::from_str::<Diagnosis>(&text)?));
             }
@@ -38,7 +35,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let after = calibrated(&cases.iter().collect::<Vec<_>>());
     let text = format!(
         "# temperature, rho, unknown_excess, unknown_share and unknown_soft: calibrated on {} development cases, seeds {}, with\n\
-         #   cargo run --release -p stretch-problem --example thresholds -- --write FOLDER...\n\
+         #   cargo run --release --manifest-path challenge/Cargo.toml --example thresholds -- --write FOLDER...\n\
          # The others steer the search; they were set while such cases were looked at.\n{}",
         cases.len(),
         seeds.join(", "),
@@ -46,7 +43,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     print!("{text}");
     if is_written {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stretch-gap/thresholds.toml");
+        let path =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates/stretch-gap/thresholds.toml");
         fs::write(path, text)?;
     }
     Ok(())

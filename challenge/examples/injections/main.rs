@@ -3,19 +3,15 @@
 //! Eight records of a knitted sleeve on a knee, each with an unknown gap of its own; five effects, three strengths.
 //! `docs/injections.md` has the tables and says how to read them.
 //!
-//! `cargo run --release -p stretch-problem --example injections -- ../shared/data/knit_sleeve`
+//! `cargo run --release --manifest-path challenge/Cargo.toml --example injections -- ../shared/data/knit_sleeve`
 
-#[path = "injections/inject.rs"]
 mod inject;
-#[path = "support/shared_out.rs"]
-mod shared_out;
-#[path = "injections/told.rs"]
 mod told;
 
 use std::path::Path;
 
 use inject::{ALL, Injection};
-use shared_out::{Answer, shared_out};
+use stretch_challenge::shared_out;
 use stretch_data::{Channel, ReadOptions, SessionTrial, Trial};
 use stretch_gap::{Options, diagnose};
 use stretch_problem::{GaugeSetup, GaugeSimulator};
@@ -39,11 +35,11 @@ const LENGTH_S: f64 = 120.0;
 const WORKERS: usize = 2;
 
 /// The first [`LENGTH_S`] of a session: the reference and one sensor.
-fn record(folder: &Path, session: &str, sensor: &str) -> Answer<Trial> {
+fn record(folder: &Path, session: &str, sensor: &str) -> anyhow::Result<Trial> {
     let options = ReadOptions::new().require(REFERENCE).require(sensor);
     let whole = Trial::read(folder.join(format!("{session}.csv")), &options)?;
     let samples = whole.time_s.iter().take_while(|t| **t < LENGTH_S).count();
-    let cut = |name: &str| -> Answer<Channel> {
+    let cut = |name: &str| -> anyhow::Result<Channel> {
         Ok(Channel { name: name.into(), values: whole.require(name)?[..samples].to_vec() })
     };
     let channels = vec![cut(REFERENCE)?, cut(sensor)?];
@@ -51,7 +47,7 @@ fn record(folder: &Path, session: &str, sensor: &str) -> Answer<Trial> {
 }
 
 /// The record as it is, or with an effect in its signal, diagnosed.
-fn said(record: &Trial, injected: Option<(&Injection, usize)>) -> Answer<Said> {
+fn said(record: &Trial, injected: Option<(&Injection, usize)>) -> anyhow::Result<Said> {
     let mut trial = record.clone();
     if let Some((injection, which)) = injected {
         let (time_s, signal) = (&record.time_s, &mut trial.channels[1].values);
@@ -72,7 +68,7 @@ fn said(record: &Trial, injected: Option<(&Injection, usize)>) -> Answer<Said> {
     Ok(Said { diagnosis, noticed: gauge.notes().to_vec() })
 }
 
-fn main() -> Answer<()> {
+fn main() -> anyhow::Result<()> {
     let Some(folder) = std::env::args().nth(1) else {
         println!("SKIPPED: no folder was given; one with {}.csv holds the records", RECORDS[0].0);
         return Ok(());
@@ -85,7 +81,7 @@ fn main() -> Answer<()> {
     let records = RECORDS
         .iter()
         .map(|(session, sensor)| record(folder, session, sensor))
-        .collect::<Answer<Vec<_>>>()?;
+        .collect::<anyhow::Result<Vec<_>>>()?;
     // Case 0 of a record is the record as it is.
     let cases: Vec<Option<(&Injection, usize)>> = std::iter::once(None)
         .chain(ALL.iter().flat_map(|i| (0..i.strengths.len()).map(move |which| Some((i, which)))))

@@ -1,36 +1,34 @@
 //! The report of a blind check: how often the diagnosis was right, and every case in which it was not.
 
-use stretch_blind::{CaseKind, Rate, Score, Truth, Verdict, method_in_words};
-
-use super::{
-    bar_figure::{Bar, Row, Scale, bar_figure, narrow_bar_figure},
-    blind_figures::{confusion_figure, reliability_figure, time_figure},
-    canvas::Ink,
-    markup::{fixed, number, percent},
-    page::{Page, Table},
+use stretch_blind::{
+    Baseline, COUNTED_EXCESS, CaseKind, Miss, Rate, Score, Verdict, method_in_words,
 };
-use crate::goal::Goal;
+use stretch_report::kit::{
+    Bar, Ink, Page, Row, Scale, Table, bar_figure, fixed, narrow_bar_figure, number, percent,
+};
+
+use crate::{
+    answers::Answers,
+    figures::{confusion_figure, reliability_figure, time_figure},
+    goals::Goal,
+};
 
 /// Ends of the classes of strength.
 const STRENGTHS: [f64; 8] = [0.05, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
 
 /// What a blind check gave.
 #[derive(Debug, Clone, Copy)]
-pub struct BlindSubject<'a> {
+pub struct Subject<'a> {
     /// Every figure.
     pub score: &'a Score,
-    /// The labels.
-    pub truth: &'a Truth,
-    /// The answers.
-    pub verdicts: &'a [Verdict],
+    /// The labels, their seal, and what was answered.
+    pub answers: &'a Answers,
     /// Goals and what was reached.
     pub goals: &'a [Goal],
-    /// Hash of the sealed labels.
-    pub sha256: &'a str,
 }
 
 /// The report as one HTML file.
-pub fn blind_page(subject: &BlindSubject<'_>) -> String {
+pub fn page(subject: &Subject<'_>) -> String {
     let mut page = Page::new("Blind check of the diagnosis", &sentence(subject.score));
     goals(&mut page, subject);
     strength(&mut page, subject);
@@ -59,31 +57,19 @@ fn sentence(score: &Score) -> String {
     )
 }
 
-fn goals(page: &mut Page, subject: &BlindSubject<'_>) {
+fn goals(page: &mut Page, subject: &Subject<'_>) {
     page.section(
         "What was reached",
         "The cases come from a second simulator that shares no code with the catalogue and gives every effect another \
          form. Their labels were sealed before the diagnosis ran.",
     );
-    page.text(&format!("SHA-256 of the labels: {}", subject.sha256));
-    let row = |g: &Goal| {
-        let interval = g.rate.and_then(|r| r.wilson());
-        vec![
-            g.what.to_owned(),
-            g.goal.clone(),
-            g.value.map_or_else(|| "no case".to_owned(), |v| fixed(v, 3)),
-            g.rate.map_or_else(String::new, |r| format!("{} of {}", r.hits, r.cases)),
-            interval
-                .map_or_else(String::new, |(a, b)| format!("{} .. {}", fixed(a, 3), fixed(b, 3))),
-            g.verdict().to_owned(),
-        ]
-    };
+    page.text(&format!("SHA-256 of the labels: {}", subject.answers.seal.sha256()));
     page.table(&Table {
         caption: "Goals; an excess of 1 means an error as large as the noise".to_owned(),
         head: ["Figure", "Goal", "Reached", "Count", "95 % interval", "Met"]
             .map(str::to_owned)
             .to_vec(),
-        rows: subject.goals.iter().map(row).collect(),
+        rows: subject.goals.iter().map(|goal| goal.cells().to_vec()).collect(),
         highlight: None,
     });
     methods(page, subject.score);
@@ -99,10 +85,9 @@ fn methods(page: &mut Page, score: &Score) {
         "Each leaves one step out: the largest drop of the error does not re-tune the simulator, the signature fits \
          nothing, BIC counts every sample as independent and asks for no confirmation on other trials.",
     );
-    let top1 = |(method, b): (&String, &stretch_blind::Baseline)| {
-        rate_row(method_in_words(method), &b.top1, Ink::First)
-    };
-    let nulls = |(method, b): (&String, &stretch_blind::Baseline)| {
+    let top1 =
+        |(method, b): (&String, &Baseline)| rate_row(method_in_words(method), &b.top1, Ink::First);
+    let nulls = |(method, b): (&String, &Baseline)| {
         rate_row(method_in_words(method), &b.false_names, Ink::First)
     };
     let mut right = vec![rate_row("this diagnosis", &score.singles.top1, Ink::Third)];
@@ -154,11 +139,11 @@ fn rate_row(label: &str, rate: &Rate, ink: Ink) -> Row {
     Row { label: label.to_owned(), bars: vec![Bar { interval, text, ..Bar::new(ink, share) }] }
 }
 
-fn strength(page: &mut Page, subject: &BlindSubject<'_>) {
+fn strength(page: &mut Page, subject: &Subject<'_>) {
     page.section("Accuracy against strength", "");
     let mut rates = vec![Rate::default(); STRENGTHS.len() + 1];
-    for verdict in subject.verdicts {
-        let Some(label) = subject.truth.cases.get(&verdict.case) else { continue };
+    for verdict in &subject.answers.verdicts {
+        let Some(label) = subject.answers.truth.cases.get(&verdict.case) else { continue };
         if label.kind == CaseKind::Single {
             let class = STRENGTHS.iter().filter(|s| label.excess >= **s).count();
             rates[class].cases += 1;
@@ -195,40 +180,42 @@ fn strength(page: &mut Page, subject: &BlindSubject<'_>) {
     });
 }
 
-fn sets(page: &mut Page, subject: &BlindSubject<'_>) {
+fn sets(page: &mut Page, subject: &Subject<'_>) {
     let score = subject.score;
     page.section("Are the probabilities honest?", "");
-    let sizes: Vec<Row> = (0..=4_usize)
-        .filter_map(|size| {
-            let counted = subject.verdicts.iter().filter(|v| {
-                subject.truth.cases.get(&v.case).is_some_and(|l| {
-                    l.kind == CaseKind::Single && l.excess >= stretch_blind::COUNTED_EXCESS
+    let sizes: Vec<Row> =
+        (0..=4_usize)
+            .filter_map(|size| {
+                let counted =
+                    subject.answers.verdicts.iter().filter(|v| {
+                        subject.answers.truth.cases.get(&v.case).is_some_and(|l| {
+                            l.kind == CaseKind::Single && l.excess >= COUNTED_EXCESS
+                        })
+                    });
+                let of_size = |v: &&Verdict| v.ambiguous.len().min(4) == size;
+                let (all, here) = (counted.clone().count(), counted.filter(of_size));
+                let mut rate = Rate { hits: 0, cases: 0 };
+                for verdict in here {
+                    rate.cases += 1;
+                    let label = &subject.answers.truth.cases[&verdict.case];
+                    rate.hits +=
+                        usize::from(label.effects.iter().all(|e| verdict.ambiguous.contains(e)));
+                }
+                let name = match size {
+                    0 => "no name".to_owned(),
+                    4 => "4 or more names".to_owned(),
+                    1 => "1 name".to_owned(),
+                    n => format!("{n} names"),
+                };
+                (rate.cases > 0).then(|| Row {
+                    label: name,
+                    bars: vec![Bar {
+                        text: format!("{}, {} right", rate.cases, rate.hits),
+                        ..Bar::new(Ink::Third, rate.cases as f64 / all.max(1) as f64)
+                    }],
                 })
-            });
-            let of_size = |v: &&Verdict| v.ambiguous.len().min(4) == size;
-            let (all, here) = (counted.clone().count(), counted.filter(of_size));
-            let mut rate = Rate { hits: 0, cases: 0 };
-            for verdict in here {
-                rate.cases += 1;
-                let label = &subject.truth.cases[&verdict.case];
-                rate.hits +=
-                    usize::from(label.effects.iter().all(|e| verdict.ambiguous.contains(e)));
-            }
-            let name = match size {
-                0 => "no name".to_owned(),
-                4 => "4 or more names".to_owned(),
-                1 => "1 name".to_owned(),
-                n => format!("{n} names"),
-            };
-            (rate.cases > 0).then(|| Row {
-                label: name,
-                bars: vec![Bar {
-                    text: format!("{}, {} right", rate.cases, rate.hits),
-                    ..Bar::new(Ink::Third, rate.cases as f64 / all.max(1) as f64)
-                }],
             })
-        })
-        .collect();
+            .collect();
     page.figures(&[
         (
             reliability_figure(&score.calibration),
@@ -245,7 +232,7 @@ fn sets(page: &mut Page, subject: &BlindSubject<'_>) {
             ),
         ),
     ]);
-    let times: Vec<f64> = subject.verdicts.iter().map(|v| v.runtime_s).collect();
+    let times: Vec<f64> = subject.answers.verdicts.iter().map(|v| v.runtime_s).collect();
     page.figure(
         &time_figure(&times),
         "How long a diagnosis took: share of the cases that were done.",
@@ -262,7 +249,7 @@ fn confusion(page: &mut Page, score: &Score) {
 
 fn misses(page: &mut Page, score: &Score) {
     page.section(&format!("Every miss ({} of {})", score.misses.len(), score.cases), "");
-    let row = |m: &stretch_blind::Miss| {
+    let row = |m: &Miss| {
         let or_none = |names: &[String]| {
             if names.is_empty() { "nothing".to_owned() } else { names.join(", ") }
         };

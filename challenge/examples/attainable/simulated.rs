@@ -1,11 +1,10 @@
 //! Sessions of the rig itself, drawn within its tolerances, in clean noise; and their diagnoses.
 
+use anyhow::Context;
 use stretch_data::{Channel, SessionTrial, Trial, TrialEntry};
 use stretch_gap::{Diagnosis, Options, Thresholds, diagnose};
 use stretch_problem::{RigSession, RigSetup, RigSimulator};
 use stretch_sim::{Catalogue, Effect, Key, Rig, RunSettings, Session, TrialPlan};
-
-use crate::shared_out::Answer;
 
 /// Share of the excitation in the further trial of `paper+`.
 const LOW: f64 = 0.7;
@@ -45,8 +44,8 @@ pub(crate) struct Source {
 }
 
 impl Source {
-    fn rig(&self) -> Answer<Rig> {
-        let mut rig = Rig::default().draw(self.seed).ok_or("no rig could be drawn")?;
+    fn rig(&self) -> anyhow::Result<Rig> {
+        let mut rig = Rig::default().draw(self.seed).context("no rig could be drawn")?;
         if let Some((effect, values)) = &self.effect {
             rig.effects.push(effect, values)?;
         }
@@ -54,7 +53,7 @@ impl Source {
     }
 
     /// The session as it would be recorded.
-    pub(crate) fn recorded(&self, protocol: Protocol) -> Answer<Vec<SessionTrial>> {
+    pub(crate) fn recorded(&self, protocol: Protocol) -> anyhow::Result<Vec<SessionTrial>> {
         let rig = self.rig()?;
         let settings = RunSettings { seed: self.seed, ..RunSettings::default() };
         let mut plans = TrialPlan::paper(self.seed);
@@ -70,7 +69,8 @@ impl Source {
                 let mut low = rig.clone();
                 low.params[Key::VExc] *= LOW;
                 plans.push(TrialPlan::arbitrary(FURTHER, self.seed));
-                let more = run(&low, &settings, &plans)?.pop().ok_or("a session without trials")?;
+                let more =
+                    run(&low, &settings, &plans)?.pop().context("a session without trials")?;
                 trials.push(at_low_excitation(more));
             }
         }
@@ -83,7 +83,7 @@ impl Source {
         protocol: Protocol,
         depth: usize,
         thresholds: Thresholds,
-    ) -> Answer<Diagnosis> {
+    ) -> anyhow::Result<Diagnosis> {
         let catalogue = Catalogue::default();
         let session = RigSession::new(&self.recorded(protocol)?)?;
         let setup = RigSetup { session, rig: Rig::default(), catalogue: &catalogue };
@@ -93,9 +93,13 @@ impl Source {
     }
 }
 
-fn run(rig: &Rig, settings: &RunSettings, plans: &[TrialPlan]) -> Answer<Vec<SessionTrial>> {
+fn run(
+    rig: &Rig,
+    settings: &RunSettings,
+    plans: &[TrialPlan],
+) -> anyhow::Result<Vec<SessionTrial>> {
     let mut session = Session::new(rig, settings)?;
-    let trial = |plan: &TrialPlan| -> Answer<SessionTrial> {
+    let trial = |plan: &TrialPlan| -> anyhow::Result<SessionTrial> {
         let (entry, trial) = session.run(plan)?;
         let TrialEntry { kind, start_s, split, .. } = entry;
         Ok(SessionTrial { kind, start_s, split, ..SessionTrial::new(trial) })

@@ -8,11 +8,9 @@ use std::{
 use stretch_gap::{Diagnosis, Thresholds, VerdictKind};
 use stretch_sim::{Catalogue, Effect};
 
-use crate::{
-    shared_out::{Answer, shared_out},
-    simulated::Protocol,
-    strength::Strengths,
-};
+use stretch_challenge::shared_out;
+
+use crate::{simulated::Protocol, strength::Strengths};
 
 /// Excesses aimed at: a weak and a strong effect.
 const AIMS: [f64; 2] = [0.55, 10.0];
@@ -79,11 +77,11 @@ fn nearest(truth: &str, diagnosis: &Diagnosis) -> Option<(String, f64)> {
 }
 
 /// One effect on one rig at both strengths.
-fn row(effect: &'static Effect, seed: u64) -> Answer<Row> {
+fn row(effect: &'static Effect, seed: u64) -> anyhow::Result<Row> {
     let mut strengths = Strengths::of(effect, seed);
-    let cell = |aim| -> Answer<Cell> {
+    let cell = |aim| -> anyhow::Result<Cell> {
         let (source, excess) = strengths.near(aim)?;
-        let one = |protocol: Protocol| -> Answer<Said> {
+        let one = |protocol: Protocol| -> anyhow::Result<Said> {
             let diagnosis = source.diagnosed(protocol, 1, Thresholds::frozen())?;
             let said = Said::of(effect.name, &diagnosis);
             let values = source.effect.as_ref().map(|e| &e.1[..]).unwrap_or(&[]);
@@ -98,7 +96,7 @@ fn row(effect: &'static Effect, seed: u64) -> Answer<Row> {
 }
 
 /// The table of ties, a row an effect; where sessions of several seeds differ, each has its part of a cell.
-pub(crate) fn matrix(seeds: Range<u64>) -> Answer<String> {
+pub(crate) fn matrix(seeds: Range<u64>) -> anyhow::Result<String> {
     let effects: Vec<&'static Effect> = Catalogue::default().iter().collect();
     let each = seeds.clone().count();
     let rows = shared_out(rayon::current_num_threads(), effects.len() * each, |at| {

@@ -1,0 +1,58 @@
+//! How often slack and saturation are parted with and without one trial at 0.7 of the excitation.
+//!
+//! Twenty simulated sessions, ten of each effect, in the catalogue's own forms; each is diagnosed as it stands, without its pressure,
+//! and with the further trial.
+//!
+//! `cargo run --release --manifest-path challenge/Cargo.toml --example excitation`
+
+#[path = "attainable/simulated.rs"]
+mod simulated;
+
+use anyhow::Context;
+use simulated::{Protocol, Source};
+use stretch_gap::Thresholds;
+use stretch_sim::{EffectParameter, effect_named};
+
+/// Sessions of each effect.
+const EACH: u64 = 10;
+
+/// A session with one effect of this strength, its other parameters as usual.
+fn source(name: &str, parameter: &str, value: f64, seed: u64) -> anyhow::Result<Source> {
+    let effect = effect_named(name).context("an effect of the catalogue")?;
+    let one = |p: &EffectParameter| match p.name == parameter {
+        true => value,
+        false => p.off().unwrap_or_else(|| p.usual()),
+    };
+    let fitted: Vec<f64> = effect.fitted().map(one).collect();
+    Ok(Source { seed, effect: Some((effect, effect.with_stand_ins(&fitted))) })
+}
+
+fn main() -> anyhow::Result<()> {
+    // right alone, right or tied, wrong
+    let mut counts = [[0_usize; 3]; Protocol::ALL.len()];
+    for case in 0..2 * EACH {
+        let strength = 0.3 + 0.07 * (case / 2) as f64;
+        let (name, parameter, value) = match case % 2 {
+            0 => ("sleeve_slack", "e_s", 0.03 + 0.07 * strength),
+            _ => ("amplifier_saturation", "v_hi", 2.33 - 0.3 * strength),
+        };
+        let source = source(name, parameter, value, 20 + case)?;
+        for (count, protocol) in counts.iter_mut().zip(Protocol::ALL) {
+            let found = source.diagnosed(protocol, 2, Thresholds::frozen())?;
+            let is = |names: &[String]| names.iter().any(|n| n == name);
+            let kind = match (is(&found.named), is(&found.tied), found.tied.is_empty()) {
+                (true, _, true) => 0,
+                (true, ..) | (_, true, _) => 1,
+                _ => 2,
+            };
+            count[kind] += 1;
+            let (named, tied, protocol) = (&found.named, &found.tied, protocol.name());
+            println!("{name} {strength:.2}, {protocol}: {named:?} tied {tied:?}");
+        }
+    }
+    println!("| trials | right | tied | wrong |\n|---|---|---|---|");
+    for (protocol, [right, tied, wrong]) in Protocol::ALL.iter().zip(counts) {
+        println!("| {} | {right} | {tied} | {wrong} |", protocol.name());
+    }
+    Ok(())
+}

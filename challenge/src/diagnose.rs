@@ -1,0 +1,53 @@
+//! The diagnosis of one case, which knows its data and what its hint strikes out of the catalogue.
+
+use std::path::Path;
+
+use stretch_data::write_whole;
+use stretch_gap::{Diagnosis, Evidence, Options, diagnose};
+use stretch_problem::{Bench, RigSimulator};
+use stretch_sim::Catalogue;
+
+/// What is asked of a diagnosis beside its data.
+#[derive(Debug, Clone, Default)]
+pub struct Asked {
+    /// Effects that the catalogue must do without.
+    pub without: Vec<String>,
+    /// Threads, 0 for all; the result is the same.
+    pub threads: usize,
+    /// Whether simpler methods are asked, too.
+    pub baselines: bool,
+}
+
+/// Diagnoses the data set of a folder as `stretch diagnose FOLDER` does, and writes its JSON.
+///
+/// # Errors
+/// Data that the diagnosis refuses, a file that cannot be written.
+pub fn write_diagnosis(folder: &Path, asked: &Asked, file: &Path) -> anyhow::Result<()> {
+    let catalogue = Catalogue::default().without(&asked.without)?;
+    let bench = Bench::from(RigSimulator::read(folder, None, &catalogue)?);
+    let Asked { threads, baselines, .. } = *asked;
+    let options = Options { threads, baselines, ..Options::default() };
+    let examined = bench.examine(&options, false, &|_| (), &stretch_data::interrupted)?;
+    let name = folder.canonicalize()?;
+    let mut answer = serde_json::to_value(&examined.diagnosis)?;
+    answer["data_set"] = name.file_name().unwrap_or_default().to_string_lossy().into();
+    answer["seed"] = options.seed.into();
+    answer["version"] = env!("CARGO_PKG_VERSION").into();
+    let text = serde_json::to_string_pretty(&answer)? + "\n";
+    Ok(write_whole(file, |out| out.write_all(text.as_bytes()))?)
+}
+
+/// The diagnosis of a case in this process, by an engine with options of its own: for instruments that know the label.
+///
+/// # Errors
+/// Data that the diagnosis refuses, an effect to strike out that there is none.
+pub fn diagnosed(
+    folder: &Path,
+    without: &[impl AsRef<str>],
+    options: &Options,
+    progress: &(dyn Fn(&str) + Sync),
+) -> anyhow::Result<(Diagnosis, Evidence)> {
+    let catalogue = Catalogue::default().without(without)?;
+    let simulator = RigSimulator::read(folder, None, &catalogue)?;
+    Ok(diagnose(&simulator, options, progress, &stretch_data::interrupted)?)
+}

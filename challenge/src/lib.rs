@@ -1,0 +1,25 @@
+#![doc = include_str!("../README.md")]
+
+mod answers;
+mod calibration;
+mod diagnose;
+mod figures;
+mod goals;
+mod make;
+mod page;
+mod room;
+mod run;
+mod score;
+mod shared_out;
+mod text;
+
+pub use answers::{ANSWER, Answers, case_folders};
+pub use calibration::{Case, calibrated};
+pub use diagnose::{Asked, diagnosed, write_diagnosis};
+pub use goals::{Goal, goals};
+pub use make::make_cases;
+pub use page::{Subject, page};
+pub use run::{RunOptions, on_ctrl_c, run_cases};
+pub use score::score_answers;
+pub use shared_out::shared_out;
+pub use text::{Progress, aligned, say};

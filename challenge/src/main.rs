@@ -1,0 +1,189 @@
+//! `challenge`: does the diagnosis name causes that were sealed before it ran?
+
+use std::{path::PathBuf, process::ExitCode};
+
+use clap::Parser;
+use stretch_blind::{Clutter, Family, Plan, Protocol};
+use stretch_challenge::{
+    Asked, RunOptions, aligned, make_cases, on_ctrl_c, run_cases, say, score_answers,
+    write_diagnosis,
+};
+
+/// Check the diagnosis on cases whose causes are sealed until it has answered
+///
+///   challenge --cases 360 --seed 7 --out check
+///
+/// makes the cases, prints the hash of the sealed labels, diagnoses a copy of every case in a
+/// temporary folder and a process of its own that is not told where the labels are, and only then
+/// opens the seal, scores and writes a page. The cases come from a second simulator that shares no
+/// code with the first and draws other forms of every effect, and what is around each rig. The
+/// three steps can be run one by one; `run` goes on where it was stopped.
+#[derive(clap::Parser)]
+#[command(
+    name = "challenge",
+    version,
+    verbatim_doc_comment,
+    args_conflicts_with_subcommands = true
+)]
+#[command(max_term_width = 100)]
+struct Args {
+    #[command(subcommand)]
+    step: Option<Step>,
+    #[command(flatten)]
+    make: Option<Make>,
+    #[command(flatten)]
+    options: RunOptions,
+}
+
+#[derive(clap::Subcommand)]
+enum Step {
+    /// Make the cases and seal their labels
+    Make(Make),
+    /// Diagnose every case without its label
+    Run {
+        /// Folder with the cases
+        #[arg(value_name = "DIR")]
+        folder: PathBuf,
+        #[command(flatten)]
+        options: RunOptions,
+    },
+    /// Open the seal, score the answers, write score.json and report.html
+    Score {
+        /// Folder with the cases and their answers
+        #[arg(value_name = "DIR")]
+        folder: PathBuf,
+        /// Leave out the fits that know the labels
+        #[arg(long)]
+        no_oracle: bool,
+    },
+    /// Diagnose one folder, as `run` has it done in a process of its own
+    #[command(hide = true)]
+    Diagnose(Diagnose),
+}
+
+/// What is made, and where.
+#[derive(clap::Args)]
+struct Make {
+    /// How many cases: single effects, none, several, foreign ones and ones struck out
+    #[arg(long, value_name = "N", value_parser = count)]
+    cases: usize,
+    /// Seed; those below 1000000 are for development
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Folder that the cases go to; it must not hold anything
+    #[arg(long, value_name = "DIR", default_value = "challenge-check")]
+    out: PathBuf,
+    /// Family that the forms are drawn from: written, splines, spectra, rate_laws, asymmetric, or
+    /// all of them in turn
+    #[arg(long, value_name = "NAME|all", default_value = "all", value_parser = family)]
+    family: Families,
+    /// Supply, noise, clock and pauses: plain is the same for every rig, drawn another for each
+    #[arg(long, value_name = "plain|drawn", default_value = "drawn", value_parser = clutter)]
+    clutter: Clutter,
+    /// Trials of a session: paper, or paper+ with one more at 0.7 of the excitation
+    #[arg(long, value_name = "paper|paper+", default_value = "paper", value_parser = protocol)]
+    protocol: Protocol,
+}
+
+#[derive(clap::Args)]
+struct Diagnose {
+    folder: PathBuf,
+    #[arg(long)]
+    json_out: PathBuf,
+    #[arg(long)]
+    without: Vec<String>,
+    #[arg(long, default_value_t = 0)]
+    threads: usize,
+    #[arg(long)]
+    baselines: bool,
+    /// No further experiment is ever looked for; `stretch diagnose` is told so by this
+    #[arg(long)]
+    no_next: bool,
+}
+
+/// Most cases: a case is a megabyte or two, so that these fill a disk.
+const MOST_CASES: usize = 100_000;
+
+fn count(text: &str) -> Result<usize, String> {
+    let cases = text.parse::<usize>().ok().filter(|cases| *cases <= MOST_CASES);
+    cases.ok_or_else(|| format!("\"{text}\" is not a number of cases up to {MOST_CASES}"))
+}
+
+/// One family, or all in turn.
+#[derive(Clone, Copy)]
+struct Families(Option<Family>);
+
+fn family(name: &str) -> Result<Families, String> {
+    if name == "all" {
+        return Ok(Families(None));
+    }
+    let known = || Family::ALL.map(Family::name).join(", ");
+    Family::named(name)
+        .map(|family| Families(Some(family)))
+        .ok_or_else(|| format!("there are {}, all", known()))
+}
+
+fn clutter(name: &str) -> Result<Clutter, String> {
+    let found = Clutter::ALL.into_iter().find(|clutter| clutter.name() == name);
+    found.ok_or_else(|| "there are plain, drawn".to_owned())
+}
+
+fn protocol(name: &str) -> Result<Protocol, String> {
+    let found = Protocol::ALL.into_iter().find(|protocol| protocol.name() == name);
+    found.ok_or_else(|| "there are paper, paper+".to_owned())
+}
+
+fn main() -> ExitCode {
+    // without a handler Ctrl-C still ends the program; only the cleaning up is lost
+    let _ = ctrlc::set_handler(on_ctrl_c);
+    match run(Args::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(_) if stretch_data::interrupted() => ExitCode::from(130),
+        Err(error) => {
+            eprintln!(
+                "challenge: {}",
+                stretch_data::without_temporary_names(&format!("{error:#}"))
+            );
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(args: Args) -> anyhow::Result<()> {
+    match (args.step, args.make) {
+        (Some(Step::Make(make)), _) => made(&make),
+        (Some(Step::Run { folder, options }), _) => answered(&folder, &options),
+        (Some(Step::Score { folder, no_oracle }), _) => scored(&folder, !no_oracle),
+        (Some(Step::Diagnose(asked)), _) => {
+            let Diagnose { without, threads, baselines, .. } = asked;
+            write_diagnosis(&asked.folder, &Asked { without, threads, baselines }, &asked.json_out)
+        }
+        (None, Some(make)) => {
+            made(&make)?;
+            answered(&make.out, &args.options)?;
+            scored(&make.out, true)
+        }
+        (None, None) => anyhow::bail!("say how many cases: challenge --cases 100"),
+    }
+}
+
+fn made(make: &Make) -> anyhow::Result<()> {
+    let Make { family: Families(family), clutter, protocol, .. } = *make;
+    let plan = Plan { family, clutter, protocol, ..Plan::of(make.cases) };
+    let seal = make_cases(&make.out, make.seed, &plan)?;
+    let (cases, out) = (make.cases, make.out.display());
+    say(format!("made {cases} cases in {out}; labels sealed, SHA-256 {}", seal.sha256()));
+    Ok(())
+}
+
+fn answered(folder: &std::path::Path, options: &RunOptions) -> anyhow::Result<()> {
+    let (answered, cases) = run_cases(folder, options)?;
+    say(format!("answered {answered} of {cases} cases, {} refused", cases - answered));
+    Ok(())
+}
+
+fn scored(folder: &std::path::Path, with_oracle: bool) -> anyhow::Result<()> {
+    say(aligned(&score_answers(folder, with_oracle)?));
+    say(format!("wrote {}", folder.join("report.html").display()));
+    Ok(())
+}

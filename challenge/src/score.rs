@@ -1,0 +1,86 @@
+//! The seal opened: answers against labels, the goals, and fits that know the labels beside.
+
+use std::{fmt::Write as _, path::Path};
+
+use anyhow::ensure;
+use stretch_blind::{COUNTED_EXCESS, CaseKind, Label, Score};
+use stretch_data::Outputs;
+use stretch_gap::Options;
+
+use crate::{
+    answers::Answers,
+    diagnose::diagnosed,
+    goals::{Goal, goals},
+    page::{Subject, page},
+    shared_out::{cores, shared_out},
+    text::Progress,
+};
+
+/// Scores the answers of a folder, writes `score.json` and `report.html` beside them, and hands back the score as text.
+///
+/// `with_oracle` fits every counted single effect with a catalogue of that effect alone: what it closes is the most that could be
+/// closed.
+///
+/// # Errors
+/// A seal that is broken, answers that are none, a file that cannot be written, Ctrl-C.
+pub fn score_answers(folder: &Path, with_oracle: bool) -> anyhow::Result<String> {
+    let mut answers = Answers::read(folder)?;
+    if with_oracle {
+        oracle(folder, &mut answers)?;
+    }
+    let score = Score::of(&answers.truth, &answers.verdicts)?;
+    let goals = goals(&score);
+    let subject = Subject { score: &score, answers: &answers, goals: &goals };
+    let json = serde_json::json!({ "score": score, "goals": goals });
+    let mut outputs = Outputs::default();
+    for (file, text) in [
+        ("report.html", page(&subject)),
+        ("score.json", serde_json::to_string_pretty(&json)? + "\n"),
+    ] {
+        outputs.file(folder.join(file), |out| out.write_all(text.as_bytes()))?;
+    }
+    outputs.keep()?;
+    Ok(text(&score, &goals, answers.seal.sha256()))
+}
+
+fn text(score: &Score, goals: &[Goal], sha256: &str) -> String {
+    let mut text = format!("seal intact, SHA-256 {sha256}\n\n");
+    text.push_str("| goal | asked | reached | count | 95 % interval | met |\n");
+    text.push_str("| --- | --- | --- | --- | --- | --- |\n");
+    for goal in goals {
+        // a string takes every write
+        let _ = writeln!(text, "| {} |", goal.cells().join(" | "));
+    }
+    text + "too few: a single case decides.\n\n" + &score.to_string()
+}
+
+/// Adds to every counted single effect what a fit closes whose catalogue holds the true effect alone.
+fn oracle(folder: &Path, answers: &mut Answers) -> anyhow::Result<()> {
+    let is_counted =
+        |label: &&Label| label.kind == CaseKind::Single && label.excess >= COUNTED_EXCESS;
+    let label = |case: &String| answers.truth.cases.get(case).filter(is_counted);
+    let verdicts = answers.verdicts.iter().enumerate();
+    let wanted: Vec<(usize, &Label)> =
+        verdicts.filter_map(|(i, v)| Some((i, label(&v.case)?))).collect();
+    let progress = Progress::new("fits that know the label", wanted.len());
+    let found = shared_out(cores(), wanted.len(), |at| {
+        let (i, label) = wanted[at];
+        ensure!(!stretch_data::interrupted(), "interrupted");
+        let closed = closed_by(&folder.join(&answers.verdicts[i].case), &label.effects);
+        progress.step();
+        Ok((i, closed))
+    })?;
+    for (i, closed) in found {
+        answers.verdicts[i].closed_oracle = closed;
+    }
+    Ok(())
+}
+
+/// The share of the gap that these effects close where the catalogue has no other.
+fn closed_by(case: &Path, effects: &[String]) -> Option<f64> {
+    let names = stretch_sim::CATALOGUE.iter().map(|e| e.name);
+    let without: Vec<&str> = names.filter(|name| effects.iter().all(|e| e != name)).collect();
+    let options = Options { threads: 1, ..Options::default() };
+    let (diagnosis, _) = diagnosed(case, &without, &options, &|_| ()).ok()?;
+    diagnosis.candidates.first().map(|c| c.closed)
+}

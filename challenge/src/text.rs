@@ -1,0 +1,75 @@
+//! What the program says: lines, tables, and how far it is.
+
+use std::{
+    fmt::Display,
+    io::{IsTerminal, Write, stderr, stdout},
+    sync::atomic::{AtomicUsize, Ordering::Relaxed},
+};
+
+/// A text and a line end to standard output; where nobody reads any more the work goes on.
+pub fn say(text: impl Display) {
+    let _ = writeln!(stdout(), "{text}");
+}
+
+/// How many of a number of steps are done, on a terminal only.
+#[derive(Debug)]
+pub struct Progress {
+    what: &'static str,
+    steps: usize,
+    done: AtomicUsize,
+}
+
+impl Progress {
+    /// Nothing is done yet of so many steps.
+    pub fn new(what: &'static str, steps: usize) -> Self {
+        Self { what, steps, done: AtomicUsize::new(0) }
+    }
+
+    /// One more step is done.
+    pub fn step(&self) {
+        let done = self.done.fetch_add(1, Relaxed) + 1;
+        if stderr().is_terminal() {
+            let end = if done == self.steps { "\n" } else { "" };
+            let _ = write!(stderr(), "\r{}: {done} of {}{end}", self.what, self.steps);
+        }
+    }
+}
+
+/// A text whose Markdown tables have columns of one width each.
+///
+/// ```
+/// let text = "one\n| a | b |\n| --- | --- |\n| long | 1 |\n- two";
+/// let aligned = stretch_challenge::aligned(text);
+/// assert_eq!(aligned, "one\n| a    | b |\n| ---- | - |\n| long | 1 |\n- two");
+/// ```
+pub fn aligned(text: &str) -> String {
+    let cells = |line: &str| -> Option<Vec<String>> {
+        let inside = line.strip_prefix('|')?.strip_suffix('|')?;
+        Some(inside.split('|').map(|cell| cell.trim().to_owned()).collect())
+    };
+    let lines: Vec<&str> = text.lines().collect();
+    let tables = lines.chunk_by(|a, b| a.starts_with('|') == b.starts_with('|'));
+    let block = |block: &[&str]| match block.iter().map(|line| cells(line)).collect() {
+        Some(rows) => table(rows),
+        None => block.join("\n"),
+    };
+    tables.map(block).collect::<Vec<_>>().join("\n")
+}
+
+fn table(rows: Vec<Vec<String>>) -> String {
+    let is_rule = |cell: &String| cell.starts_with("---");
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let of_column =
+        |i: usize| rows.iter().filter_map(move |row| row.get(i)).filter(|c| !is_rule(c));
+    let wide = |i: usize| of_column(i).map(|cell| cell.chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..columns).map(wide).collect();
+    let cell = |(cell, width): (&String, &usize)| match is_rule(cell) {
+        true => "-".repeat(*width),
+        false => format!("{cell:width$}"),
+    };
+    let line = |row: &Vec<String>| {
+        let cells: Vec<String> = row.iter().zip(&widths).map(cell).collect();
+        format!("| {} |", cells.join(" | "))
+    };
+    rows.iter().map(line).collect::<Vec<_>>().join("\n")
+}

@@ -1,31 +1,30 @@
 //! The flow: a problem is prepared, searched, its evidence gathered, judged, and told. Nothing flows back.
 
 use crate::{
-    baselines::baselines,
-    candidates::{beside_unknown, candidates, shifts, stage_gaps},
-    coverage::{carried, is_short, thin},
-    diagnosis::{Candidate, Diagnosis, Unexplained, VerdictKind, Where},
-    error::GapError,
-    evidence::Evidence,
-    judge::{Case, judge},
-    lacking::lacking,
-    localise,
-    naming::Naming,
-    null_band::null_band,
-    probability::{covering_set, unknown},
-    problem::Problem,
-    record::{examine::Doubts, plain::plain, suspect::Suspect, weigh::weighed},
-    responses::responses,
-    sanity::Sanity,
-    search::Search,
-    settle::settled,
-    shares::{peeled, shares},
-    simulator::Simulator,
-    stopwatch::Stopwatch,
-    thresholds::Thresholds,
-    timing,
-    transfer::transfer,
-    words::{Answer, tell},
+    evidence::{
+        candidates::{Candidate, beside_unknown, candidates, shifts, stage_gaps},
+        gathered::Evidence,
+        localise::{self, location::Where},
+        null_band::null_band,
+        probability::{covering_set, unknown},
+        responses::responses,
+        sanity::Sanity,
+        shares::{peeled, shares},
+        transfer::transfer,
+    },
+    fit::prepared::Problem,
+    numerics::stopwatch::Stopwatch,
+    problem::{error::GapError, simulator::Simulator, thresholds::Thresholds},
+    record::{columns_alone::plain, examine::Doubts, suspect::Suspect, weigh::weighed},
+    search::{baselines::baselines, command_timing, re_estimate::settled, selection::Search},
+    verdict::{
+        coverage::{carried, is_short, thin},
+        diagnosis::{Diagnosis, Unexplained, VerdictKind},
+        judge::{Case, judge},
+        naming::Naming,
+        proposal::lacking,
+        sentence::{Answer, tell},
+    },
 };
 
 /// How to diagnose.
@@ -92,10 +91,10 @@ fn run(
     let depth = if plain.is_empty() { options.depth } else { 0 };
     // Prepared.
     let at_rows = Problem::prepare(simulator, stop, seed, progress)?;
-    let between_rows = timing::between_rows(simulator);
+    let between_rows = command_timing::between_rows(simulator);
     let between_rows = between_rows.as_ref();
     let (problem, from) =
-        timing::likelier(at_rows, between_rows, (thresholds, depth), seed, progress)?;
+        command_timing::likelier(at_rows, between_rows, (thresholds, depth), seed, progress)?;
     let simulator = problem.simulator();
     // Searched, once more where the nuisances turn out to be others.
     let mut search = Search::new(&problem, thresholds, depth);

@@ -18,8 +18,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::{
-    frame::{Frame, Role},
-    linear::Cholesky,
+    numerics::linear::Cholesky,
+    problem::frame::{Frame, Role},
 };
 
 /// Order of the autoregression.

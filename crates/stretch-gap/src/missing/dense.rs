@@ -5,7 +5,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::linear::Cholesky;
+use crate::numerics::linear::Cholesky;
 
 /// Ridges that are tried, as shares of each diagonal element.
 const RIDGES: [f64; 5] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1];

@@ -11,11 +11,11 @@
 //!
 //! A nominal's own constants take out what of a term they could have been, so that terms need not be centred.
 
-use super::{
-    record::Record,
+use crate::missing::{
+    signals::Record,
     term::{Factor, Passage, RateForm, Term},
 };
-use crate::frame::Frame;
+use crate::problem::frame::Frame;
 
 use Factor::{
     Above, Below, Bend, Cosine, High, Lag, Late, Low, Peak, Play, Power, Rate, Session, Sine, Time,

@@ -3,14 +3,19 @@
 //! A discrepancy between simulator and rig can be learnt as a few terms of a library (Kaheman et al. 2019,
 //! arXiv 1909.08574), but whatever nominal parameters could have done has to be fitted with it, or terms stand in for
 //! parameters (Brynjarsdottir and O'Hagan 2014, doi 10.1088/0266-5611/30/11/114007).
+//!
+//! In: a prepared problem and its best hypothesis. Out: a [`Proposed`] sum of terms, or none.
+//! Recorded [`signals`] span a [`library`] of [`term`]s; [`sparse`] regression on the [`residue`] chooses a few; [`coloured`] noise says
+//! whether they are more than chance; [`mod@propose`] does it all.
+//! Imports: `numerics`, `problem`, `fit`.
 
 mod coloured;
 mod dense;
 mod library;
 mod propose;
 mod proposed;
-mod record;
 mod residue;
+mod signals;
 mod sparse;
 mod term;
 

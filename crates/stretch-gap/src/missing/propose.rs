@@ -1,6 +1,6 @@
 //! From what a model leaves to what is proposed.
 
-use super::{
+use crate::missing::{
     coloured::odds,
     proposed::{Proposed, ProposedTerm, acts, equation, scales, sentence, words},
     residue::{Products, Residue},
@@ -8,12 +8,12 @@ use super::{
     term::Term,
 };
 use crate::{
-    error::GapError,
-    frame::{Frame, Role},
-    hypothesis::Hypothesis,
-    metric::Column,
-    problem::Problem,
-    simulator::Model,
+    fit::{hypothesis::Hypothesis, metric::Column, prepared::Problem},
+    problem::{
+        error::GapError,
+        frame::{Frame, Role},
+        simulator::Model,
+    },
 };
 
 /// Steps of Gauss and Newton with a whole run of the moved model.

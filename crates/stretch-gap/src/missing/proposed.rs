@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{
-    record::Record,
+use crate::missing::{
+    signals::Record,
     term::{Factor, Passage, RateForm, Term},
 };
 
@@ -77,7 +77,7 @@ pub struct Proposed {
 
 /// Signals of a record that terms speak of.
 pub(crate) fn scales(record: &Record) -> Vec<SignalScale> {
-    let one = |s: &super::record::Signal| SignalScale {
+    let one = |s: &super::signals::Signal| SignalScale {
         name: s.name.clone(),
         unit: s.unit.clone(),
         offset: s.offset,

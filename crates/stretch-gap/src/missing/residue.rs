@@ -7,21 +7,25 @@
 //! J = 0.5/b (r - A d - D c)' V^-1 (r - A d - D c) - ln p(x + d) + 0.5 sum (c_k/s_k)^2
 //! ```
 //!
-//! in the metric V of the stage and with the priors and bounds of the [coordinates](crate::coordinate); b are the samples of a block. The
+//! in the metric V of the stage and with the priors and bounds of the [coordinates](crate::fit::coordinate); b are the samples of a block. The
 //! ridge s_k is the coefficient at which a term alone is as large as the residual. Everything that a choice of terms
 //! needs are products of columns, over the fitted samples and over those held out.
 
 use nalgebra::DMatrix;
 
-use super::{record::Record, term::Term};
+use crate::missing::{signals::Record, term::Term};
 use crate::{
-    compare::Comparison,
-    coordinate::{Coordinate, coordinates},
-    error::GapError,
-    frame::{Frame, Role},
-    linear::{Cholesky, boxed},
-    metric::Column,
-    simulator::Model,
+    fit::{
+        comparison::Comparison,
+        coordinate::{Coordinate, coordinates},
+        metric::Column,
+    },
+    numerics::linear::{Cholesky, boxed},
+    problem::{
+        error::GapError,
+        frame::{Frame, Role},
+        simulator::Model,
+    },
 };
 
 /// Added to every diagonal: a coordinate that does nothing has no curvature.

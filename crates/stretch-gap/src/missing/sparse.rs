@@ -10,16 +10,16 @@
 //! Of every family (terms that differ in a width or a time alone) the most promising is fitted, the best of them are refined in
 //! their shapes, and the one that leaves least of the samples held out comes in, as long as it closes a share of their gap.
 
-use super::{
+use crate::missing::{
     dense::{Rows, ridge},
     library::library,
     residue::{Fit, Products, Residue},
     term::Term,
 };
 use crate::{
-    frame::{Frame, Role},
-    linear::{Cholesky, dot},
-    metric::Column,
+    fit::metric::Column,
+    numerics::linear::{Cholesky, dot},
+    problem::frame::{Frame, Role},
 };
 
 /// Most terms of a sum.

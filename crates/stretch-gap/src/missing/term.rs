@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize};
 use stretch_effects::{Backlash, MeanReversion, Operator, Span, Start};
 
-use super::record::{Record, Signal};
+use crate::missing::signals::{Record, Signal};
 
 /// A function of one signal's rate v.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

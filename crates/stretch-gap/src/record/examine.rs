@@ -5,20 +5,23 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use crate::{
-    error::GapError,
-    fit::{COARSE, Effort, FINE, possible},
-    hypothesis::Hypothesis,
-    problem::Problem,
+    fit::{
+        hypothesis::Hypothesis,
+        levenberg_marquardt::{COARSE, Effort, FINE, possible},
+        prepared::Problem,
+    },
+    problem::{
+        error::GapError,
+        simulator::{Model, Simulator},
+        thresholds::Thresholds,
+    },
     record::{
         fault::{Kind, span},
         screen::{Bench, END, Promising, REACH},
         suspect::Suspect,
         weigh::allowed,
     },
-    screen::Ground,
-    search::Found,
-    simulator::{Model, Simulator},
-    thresholds::Thresholds,
+    search::{screen::Ground, selection::Found},
 };
 
 /// Share of the gap of the stages that it touches which an error must promise: it is exact, and a look at it nearly so.

@@ -1,10 +1,12 @@
 //! The hypotheses: one error of the record or of the rig file each, as an effect with one number.
 
 use crate::{
-    ends::ends,
-    record::column::{Column, Distortion},
-    simulator::Simulator,
-    spec::{EffectParameterSpec, EffectSpec},
+    numerics::extent::ends,
+    problem::{
+        column::{Column, Distortion},
+        simulator::Simulator,
+        spec::{EffectParameterSpec, EffectSpec},
+    },
 };
 
 /// Factors that are looked for, as deviations from 1.

@@ -13,17 +13,14 @@
 use rayon::prelude::*;
 
 use crate::{
-    error::GapError,
-    frame::Role,
-    linear::dot,
-    metric::Column as Weighted,
-    problem::Problem,
+    fit::{metric::Column as Weighted, prepared::Problem},
+    numerics::linear::dot,
+    problem::{error::GapError, frame::Role, simulator::Model},
     record::{
         fault::{DELAY_S, Fault, Kind},
         suspect::Suspect,
     },
-    screen::Ground,
-    simulator::Model,
+    search::screen::Ground,
 };
 
 /// Delays looked at: coarsest step, in samples.

@@ -9,15 +9,15 @@ use std::{collections::VecDeque, sync::Mutex};
 use rayon::prelude::*;
 
 use crate::{
-    as_is::as_is,
-    description::Description,
-    error::GapError,
-    line::Line,
-    record::{
+    problem::{
+        as_is::as_is,
         column::Column,
-        fault::{Fault, Kind},
+        description::Description,
+        error::GapError,
+        simulator::{Model, Run, Simulator},
+        spectral_line::Line,
     },
-    simulator::{Model, Run, Simulator},
+    record::fault::{Fault, Kind},
 };
 
 /// Simulators with a column put right that are kept: those of the probes and steps of the fits under way.

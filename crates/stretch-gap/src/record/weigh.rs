@@ -4,8 +4,10 @@
 //! best set of effects, by the score that both are held by, and leaves no more than a set that is named may.
 
 use crate::{
-    diagnosis::Gross, hypothesis::Hypothesis, problem::Problem, record::suspect::Suspect,
-    search::Found, thresholds::Thresholds,
+    fit::{hypothesis::Hypothesis, prepared::Problem},
+    problem::thresholds::Thresholds,
+    record::{gross::Gross, suspect::Suspect},
+    search::selection::Found,
 };
 
 /// No effect of the best set: the rival stands in the place of the whole.

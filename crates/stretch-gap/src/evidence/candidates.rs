@@ -1,0 +1,233 @@
+//! Candidates, stages and parameters as the diagnosis lists them.
+//!
+//! A candidate's closed-gap fraction is 1 - sum_c max(0, e_c with its effects)/sum_c max(0, e_c re-tuned) of the excesses e_c of
+//! the channels on the test trials.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    evidence::{
+        bootstrap::closed_interval,
+        excess::Excess,
+        gathered::{Evidence, StageEvidence},
+        localise::location::StageGap,
+        probability::Weighed,
+    },
+    fit::{hypothesis::Hypothesis, prepared::Problem},
+    problem::{error::GapError, simulator::Simulator, spec::EffectParameterSpec},
+};
+
+/// A set of effects that was held against the data.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Candidate {
+    /// Its effects, the strongest first; `unknown` stands for whatever the catalogue lacks and is always the last candidate.
+    pub effects: Vec<String>,
+    /// Probability among the candidates.
+    pub probability: f64,
+    /// Score against the re-tuned nominal, nats.
+    pub score: f64,
+    /// Excess of the re-tuned nominal on the test trials, summed over channels.
+    pub gap_before: f64,
+    /// Excess with the effects.
+    pub gap_after: f64,
+    /// Closed-gap fraction.
+    pub closed: f64,
+    /// Its 95 % interval, by block bootstrap.
+    pub closed_ci: [f64; 2],
+    /// Whether the mean square error falls on the test trials, by the same bootstrap.
+    pub is_confirmed: bool,
+    /// Values of the effects' parameters by name; with several effects by `effect.parameter`.
+    #[serde(rename = "parameters")]
+    pub by_name: BTreeMap<String, f64>,
+    /// The same with units and standard deviations.
+    #[serde(rename = "parameter_values")]
+    pub parameters: Vec<EffectValue>,
+}
+
+/// A fitted parameter of an effect.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EffectValue {
+    /// Effect.
+    pub effect: String,
+    /// Parameter.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Fitted value.
+    pub value: f64,
+    /// One standard deviation, from the curvature of the fit with one observation per 0.5 s.
+    pub sd: f64,
+    /// Its 95 % interval, within the range that it was looked for in.
+    #[serde(default)]
+    pub interval: [f64; 2],
+    /// Whether it only gives the effect its form.
+    #[serde(default)]
+    pub is_form: bool,
+}
+
+/// A nominal parameter, re-tuned.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ParameterShift {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Value as shipped.
+    pub nominal: f64,
+    /// Value in the final model.
+    pub fitted: f64,
+    /// One standard deviation of it, as that of an [`EffectValue`].
+    #[serde(default)]
+    pub sd: f64,
+    /// Distance in tolerances.
+    pub sigmas: f64,
+    /// Value that the nominal simulator without the effects was bent to.
+    pub bent: f64,
+    /// Whether the value is evidence by itself.
+    pub is_evidence: bool,
+}
+
+/// Standard deviations to either side that hold 95 % of a Gaussian.
+const COVERS: f64 = 1.96;
+
+/// Name of what the catalogue lacks.
+const UNKNOWN: &str = "unknown";
+
+/// Every weighed hypothesis on the test trials.
+pub(crate) fn candidates(
+    problem: &Problem<'_>,
+    evidence: &Evidence,
+    weighed: &[Weighed],
+    seed: u64,
+) -> Result<Vec<Candidate>, GapError> {
+    weighed.par_iter().map(|one| candidate(problem, evidence, one, seed)).collect()
+}
+
+fn candidate(
+    problem: &Problem<'_>,
+    evidence: &Evidence,
+    Weighed { hypothesis, probability }: &Weighed,
+    seed: u64,
+) -> Result<Candidate, GapError> {
+    let stages = 0..evidence.stages.len();
+    let blocks = stages.map(|s| evidence.blocks(problem, s, &hypothesis.model));
+    let blocks: Result<Vec<Vec<f64>>, GapError> = blocks.collect();
+    let interval = closed_interval(&evidence.nominal_blocks, &blocks?, seed);
+    let parameters = effect_values(problem.simulator(), hypothesis);
+    let is_alone = hypothesis.effects.len() == 1;
+    let name = |p: &EffectValue| match is_alone {
+        true => p.name.clone(),
+        false => format!("{}.{}", p.effect, p.name),
+    };
+    let specs = problem.simulator().effects();
+    Ok(Candidate {
+        by_name: parameters.iter().map(|p| (name(p), p.value)).collect(),
+        effects: hypothesis.effects.iter().map(|&e| specs[e].name.clone()).collect(),
+        probability: *probability,
+        score: hypothesis.score,
+        gap_before: interval.before,
+        gap_after: interval.after,
+        closed: interval.closed,
+        closed_ci: interval.interval,
+        is_confirmed: interval.falls,
+        parameters,
+    })
+}
+
+/// The candidates with what the catalogue lacks behind them, of a probability that the others share the rest of.
+pub(crate) fn beside_unknown(
+    mut candidates: Vec<Candidate>,
+    gap: Excess,
+    probability: f64,
+) -> Vec<Candidate> {
+    candidates.iter_mut().for_each(|c| c.probability *= 1.0 - probability);
+    candidates.push(Candidate {
+        effects: vec![UNKNOWN.into()],
+        probability,
+        score: 0.0,
+        gap_before: gap.retuned,
+        gap_after: gap.retuned,
+        closed: 0.0,
+        closed_ci: [0.0; 2],
+        is_confirmed: false,
+        by_name: BTreeMap::new(),
+        parameters: Vec::new(),
+    });
+    candidates
+}
+
+fn effect_values(simulator: &dyn Simulator, hypothesis: &Hypothesis) -> Vec<EffectValue> {
+    let mut all = Vec::new();
+    for &e in &hypothesis.effects {
+        let spec = &simulator.effects()[e];
+        let values = hypothesis.model.effect(e).unwrap_or(&[]);
+        let sds = hypothesis.effect_sd.get(&e);
+        for (i, (p, value)) in spec.parameters.iter().zip(values).enumerate() {
+            let sd = sds.and_then(|s| s.get(i)).copied().unwrap_or(0.0);
+            all.push(EffectValue {
+                effect: spec.name.clone(),
+                name: p.name.clone(),
+                unit: p.unit.clone(),
+                value: *value,
+                sd,
+                interval: interval(p, *value, sd),
+                is_form: p.form.is_some(),
+            });
+        }
+    }
+    all
+}
+
+/// 95 % interval of a fitted parameter, as far as its range goes: of what is fitted in equal ratios in equal ratios.
+fn interval(p: &EffectParameterSpec, value: f64, sd: f64) -> [f64; 2] {
+    let ends = match p.is_log && value > 0.0 {
+        true => [-COVERS, COVERS].map(|k| value * libm::exp(k * sd / value)),
+        false => [-COVERS, COVERS].map(|k| value + k * sd),
+    };
+    // A value outside of its range (a threshold that is off) is its own end.
+    let (low, high) = (p.min.min(value), p.max.max(value));
+    ends.map(|end| end.clamp(low, high))
+}
+
+/// The gap of every stage on the test trials.
+pub(crate) fn stage_gaps(problem: &Problem<'_>, evidence: &Evidence) -> Vec<StageGap> {
+    let total: f64 = evidence.stages.iter().map(|s| s.excess_retuned.max(0.0)).sum();
+    let one = |(stage, s): (usize, &StageEvidence)| {
+        let spec = &problem.simulator().stages()[stage];
+        let floor = &problem.compare.metrics[stage].floor;
+        StageGap {
+            stage: spec.name.clone(),
+            channel: spec.channel.clone(),
+            share: if total > 0.0 { s.excess_retuned.max(0.0) / total } else { 0.0 },
+            raw: s.excess_raw,
+            excess: s.excess_retuned,
+            after: s.excess_after,
+            rms: (1.0 + s.excess_retuned).max(0.0).sqrt() * s.floor,
+            floor: s.floor,
+            floor_source: floor.source.clone(),
+            unit: spec.unit.clone(),
+        }
+    };
+    evidence.stages.iter().enumerate().map(one).collect()
+}
+
+/// How far every parameter with a tolerance moved.
+pub(crate) fn shifts(simulator: &dyn Simulator, evidence: &Evidence) -> Vec<ParameterShift> {
+    let (fitted, bent) = (&evidence.best.parameters, &evidence.retuned.parameters);
+    let all = simulator.parameters().iter().enumerate().filter(|(_, p)| p.sd > 0.0);
+    all.map(|(i, p)| ParameterShift {
+        name: p.name.clone(),
+        unit: p.unit.clone(),
+        nominal: p.nominal,
+        fitted: fitted[i],
+        sd: evidence.best_sd[i],
+        sigmas: (fitted[i] - p.nominal) / p.sd,
+        bent: bent[i],
+        is_evidence: p.is_evidence,
+    })
+    .collect()
+}

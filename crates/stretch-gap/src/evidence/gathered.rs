@@ -1,0 +1,244 @@
+//! The evidence: every trial before and after, test trials included, which nothing has read until here.
+//!
+//! A floor is what no model could remove. Where the best set leaves X < 1 of one over the samples that were looked at, the floor was taken
+//! too high: its square is X of what it was, and excesses count from there.
+
+use crate::{
+    evidence::{
+        excess::Excess,
+        probability::{Weighed, weigh},
+        response::Responses,
+    },
+    fit::{
+        hypothesis::Hypothesis,
+        prepared::Problem,
+        score::{self, excess, mean_square},
+    },
+    numerics::linear::dot,
+    problem::{
+        error::GapError,
+        frame::{Frame, Role, Segment},
+        simulator::Model,
+        thresholds::Thresholds,
+    },
+    search::selection::Found,
+};
+
+/// One stage over the whole session, all trials end to end.
+#[derive(Debug, Clone)]
+pub struct StageEvidence {
+    /// Output simulated with the parameters as shipped.
+    pub raw: Vec<f64>,
+    /// Output of the re-tuned nominal.
+    pub retuned: Vec<f64>,
+    /// Output with the best set of effects.
+    pub after: Vec<f64>,
+    /// Residual of the re-tuned nominal in floors, slow wander and trial offsets taken out.
+    pub residual_retuned: Vec<f64>,
+    /// The same with the effects.
+    pub residual_after: Vec<f64>,
+    /// Floor, one standard deviation in the unit of the output.
+    pub floor: f64,
+    /// Excess on the test trials with the parameters as shipped.
+    pub excess_raw: f64,
+    /// Excess of the re-tuned nominal on the test trials.
+    pub excess_retuned: f64,
+    /// Excess with the effects on the test trials.
+    pub excess_after: f64,
+}
+
+/// Everything that a report draws, beside the measured channels that the simulator holds.
+#[derive(Debug, Clone)]
+pub struct Evidence {
+    /// By stage.
+    pub stages: Vec<StageEvidence>,
+    /// How the session was cut.
+    pub frame: Frame,
+    /// Re-tuned nominal.
+    pub retuned: Model,
+    /// Best set of effects, whether the verdict names it or not.
+    pub best: Model,
+    /// Fitted model of every candidate, in the order of the diagnosis.
+    pub candidates: Vec<Model>,
+    /// One standard deviation of every nominal parameter of the re-tuned nominal, 0 where it is exact.
+    pub retuned_sd: Vec<f64>,
+    /// The same of every candidate.
+    pub candidate_sds: Vec<Vec<f64>>,
+    /// One standard deviation of every nominal parameter with the best set.
+    pub(crate) best_sd: Vec<f64>,
+    /// Reduced chi-square of the re-tuned nominal, by stage and test block.
+    pub(crate) nominal_blocks: Vec<Vec<f64>>,
+    /// Square of the floor by stage, as a share of what it was taken for: see the module's head.
+    levels: Vec<f64>,
+    /// The strongest effect of the best set.
+    pub(crate) best_effect: Option<usize>,
+    /// How large the gap is.
+    pub(crate) gap: Excess,
+    /// How the stage with the largest gap answers to the numbers of the best set; none unless [asked for](crate::Options::responses), or
+    /// where no effect acts in it.
+    pub responses: Option<Responses>,
+}
+
+/// Output of a model over the whole session, its clean residual, and its reduced chi-square by test block.
+struct Traces {
+    output: Vec<f64>,
+    residual: Vec<f64>,
+    blocks: Vec<f64>,
+}
+
+impl Traces {
+    /// `level` is the square of the floor as a share of what it was taken for.
+    fn of(
+        problem: &Problem<'_>,
+        stage: usize,
+        model: &Model,
+        level: f64,
+    ) -> Result<Self, GapError> {
+        let compare = &problem.compare;
+        let simulator = problem.simulator();
+        let output = compare.runs.output(stage, model, simulator.trials().len())?;
+        let apart = simulator.measured(stage).iter().zip(&output);
+        let apart: Vec<f64> = apart.map(|(m, s)| m - s).collect();
+        let (whole, residual) = held_out(problem, stage, model, &apart);
+        let mut blocks = test_blocks(&compare.frame, &whole, &residual);
+        blocks.iter_mut().for_each(|x| *x /= level);
+        Ok(Self { output, residual, blocks })
+    }
+}
+
+/// A difference of outputs in floors, and that without the most likely nuisances; without the lines that a model leaves where it is not
+/// fitted. Both are linear in it.
+pub(crate) fn held_out(
+    problem: &Problem<'_>,
+    stage: usize,
+    model: &Model,
+    apart: &[f64],
+) -> (Vec<f64>, Vec<f64>) {
+    let (compare, simulator) = (&problem.compare, problem.simulator());
+    let metric = &compare.metrics[stage];
+    let mut whole: Vec<f64> = apart.iter().zip(&metric.floor.sd).map(|(x, sd)| x / sd).collect();
+    let mut residual = whole.clone();
+    metric.clean(&compare.frame, &mut residual);
+    let lines = simulator.lines(stage, model);
+    for tested in compare.frame.of_role(Role::Test).map(|s| s.from..s.to) {
+        let floor = &metric.floor.sd[tested.clone()];
+        for line in &lines {
+            line.level(&mut residual[tested.clone()], floor, simulator.dt_s());
+            line.level(&mut whole[tested.clone()], floor, simulator.dt_s());
+        }
+    }
+    (whole, residual)
+}
+
+/// r V^-1 r by block: V^-1 r is the residual without its most likely nuisances, whose own improbability so counts.
+fn test_blocks(frame: &Frame, whole: &[f64], clean: &[f64]) -> Vec<f64> {
+    let block = |s: &Segment| {
+        let parts = whole[s.from..s.to].chunks_exact(frame.block);
+        let pairs = parts.zip(clean[s.from..s.to].chunks_exact(frame.block));
+        pairs.map(|(r, c)| dot(r, c) / r.len() as f64).collect::<Vec<f64>>()
+    };
+    frame.of_role(Role::Test).flat_map(block).collect()
+}
+
+impl Evidence {
+    /// Runs the simulator as shipped, re-tuned and with the best set over every trial, and weighs the best set against its
+    /// rivals.
+    pub(crate) fn gather(
+        problem: &Problem<'_>,
+        thresholds: &Thresholds,
+        found: &Found,
+    ) -> Result<(Self, Vec<Weighed>), GapError> {
+        let mut stages = Vec::new();
+        let mut nominal_blocks = Vec::new();
+        let all = 0..problem.compare.metrics.len();
+        let levels: Vec<f64> = all.map(|stage| level(problem, &found.best, stage)).collect();
+        for (stage, metric) in problem.compare.metrics.iter().enumerate() {
+            let traces = |model| Traces::of(problem, stage, model, levels[stage]);
+            let raw = traces(&problem.shipped)?;
+            let retuned = traces(&problem.nominal.model)?;
+            let after = traces(&found.best.model)?;
+            stages.push(StageEvidence {
+                raw: raw.output,
+                retuned: retuned.output,
+                after: after.output,
+                residual_retuned: retuned.residual,
+                residual_after: after.residual,
+                floor: levels[stage].sqrt() * metric.floor.rms,
+                excess_raw: excess(mean_square(&raw.blocks)),
+                excess_retuned: excess(mean_square(&retuned.blocks)),
+                excess_after: excess(mean_square(&after.blocks)),
+            });
+            nominal_blocks.push(retuned.blocks);
+        }
+        let gap = gap(problem, &found.best, &stages, &levels);
+        let weighed = weigh(thresholds, &found.best, gap, &found.rivals);
+        let evidence = Self {
+            stages,
+            frame: problem.compare.frame.clone(),
+            retuned: problem.nominal.model.clone(),
+            best: found.best.model.clone(),
+            candidates: weighed.iter().map(|w| w.hypothesis.model.clone()).collect(),
+            retuned_sd: problem.nominal.parameter_sd.clone(),
+            candidate_sds: weighed.iter().map(|w| w.hypothesis.parameter_sd.clone()).collect(),
+            best_sd: found.best.parameter_sd.clone(),
+            nominal_blocks,
+            levels,
+            best_effect: found.best.effects.first().copied(),
+            gap,
+            responses: None,
+        };
+        Ok((evidence, weighed))
+    }
+
+    /// What the best set leaves of a stage, as [`held_out`] tells it.
+    pub(crate) fn left(&self, problem: &Problem<'_>, stage: usize) -> (Vec<f64>, Vec<f64>) {
+        let measured = problem.simulator().measured(stage).iter();
+        let apart: Vec<f64> = measured.zip(&self.stages[stage].after).map(|(m, s)| m - s).collect();
+        held_out(problem, stage, &self.best, &apart)
+    }
+
+    /// Square of a stage's floor as a share of what it was taken for.
+    pub(crate) fn level(&self, stage: usize) -> f64 {
+        self.levels[stage]
+    }
+
+    /// Reduced chi-square of a model by test block of a stage.
+    pub(crate) fn blocks(
+        &self,
+        problem: &Problem<'_>,
+        stage: usize,
+        model: &Model,
+    ) -> Result<Vec<f64>, GapError> {
+        Ok(Traces::of(problem, stage, model, self.levels[stage])?.blocks)
+    }
+}
+
+/// Square of a stage's floor as a share of what it was taken for. Without an effect there nothing says that it was too high.
+fn level(problem: &Problem<'_>, best: &Hypothesis, stage: usize) -> f64 {
+    let effects = problem.simulator().effects();
+    let mut acting = best.effects.iter();
+    match acting.any(|e| effects[*e].touches.contains(&stage)) {
+        true => problem.compare.mean_square(&best.misfits[stage]).clamp(f64::MIN_POSITIVE, 1.0),
+        false => 1.0,
+    }
+}
+
+/// Of the fitted and the test trials the greater: a gap that only one of them shows is a gap.
+fn gap(
+    problem: &Problem<'_>,
+    best: &Hypothesis,
+    stages: &[StageEvidence],
+    levels: &[f64],
+) -> Excess {
+    let tested =
+        |of: fn(&StageEvidence) -> f64| -> f64 { stages.iter().map(|s| of(s).max(0.0)).sum() };
+    let fitted = |h: &Hypothesis| -> f64 {
+        let pairs = h.misfits.iter().zip(levels);
+        pairs.map(|(misfit, level)| score::gap(problem.compare.mean_square(misfit) / level)).sum()
+    };
+    Excess {
+        raw: tested(|s| s.excess_raw),
+        retuned: fitted(&problem.nominal).max(tested(|s| s.excess_retuned)),
+        left: fitted(best).max(tested(|s| s.excess_after)),
+    }
+}

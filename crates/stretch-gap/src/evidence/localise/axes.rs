@@ -1,0 +1,306 @@
+//! Which slice every sample belongs to.
+//!
+//! Level and rate come from the measured motion by a straight line over 21 samples, whose slope has the standard deviation
+//! sigma/(dt sqrt(2 sum_1^10 k^2)) for noise sigma of one sample; motion slower than four of these is rest.
+
+use stretch_filter::log::second_differences;
+
+use crate::{
+    numerics::extent::ends,
+    problem::{
+        frame::Frame,
+        simulator::{Motion, Simulator},
+    },
+};
+
+/// Samples on each side that a rate is fitted over.
+const REACH: usize = 10;
+/// Time around a reversal that counts as turnaround, s.
+const TURN_S: f64 = 0.15;
+/// A dwell shorter than this inside a reversal belongs to it, s.
+const SHORT_DWELL_S: f64 = 0.3;
+/// Least share of the fastest rate that counts as motion.
+const MOVING: f64 = 0.02;
+/// Ends of the slices of time in a trial, s.
+const TIMES_S: [f64; 6] = [1.0, 3.0, 7.0, 15.0, 30.0, 60.0];
+
+/// One way to cut the samples; those of no slice hold [`Axis::NONE`].
+pub(super) struct Axis {
+    pub(super) by: &'static str,
+    pub(super) labels: Vec<String>,
+    pub(super) of: Vec<u16>,
+}
+
+/// The motion that the slices go by.
+pub(super) struct Course {
+    level: Vec<f64>,
+    rate: Vec<f64>,
+    /// Rate below which nothing moves.
+    still: f64,
+    /// Distance travelled since the session began.
+    travel: Vec<f64>,
+    /// First sample of every trial, and the end of the last.
+    starts: Vec<usize>,
+}
+
+impl Course {
+    pub(super) fn of(simulator: &dyn Simulator, frame: &Frame) -> Self {
+        let Motion { values, .. } = simulator.motion();
+        let dt_s = simulator.dt_s();
+        let mut starts = vec![0];
+        for trial in simulator.trials() {
+            starts.push(starts[starts.len() - 1] + trial.samples);
+        }
+        let samples = frame.samples(simulator.trials().len()).min(values.len());
+        let mut level = vec![0.0; samples];
+        let mut rate = vec![0.0; samples];
+        for trial in starts.windows(2) {
+            let (from, to) = (trial[0], trial[1].min(samples));
+            for i in from..to {
+                let (a, b) = (i.saturating_sub(REACH).max(from), (i + REACH + 1).min(to));
+                (level[i], rate[i]) = line(&values[a..b], i - a, dt_s);
+            }
+        }
+        let mut sizes: Vec<f64> = rate.iter().map(|r| r.abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        let fastest = sizes.get(sizes.len() * 99 / 100).copied().unwrap_or(0.0);
+        let squares = (1..=REACH).map(|k| (k * k) as f64).sum::<f64>();
+        let noise = noise(values) / (dt_s * (2.0 * squares).sqrt());
+        let still = (MOVING * fastest).max(4.0 * noise);
+        let mut travel = Vec::with_capacity(samples);
+        let (mut sum, mut last, mut next) = (0.0, level.first().copied().unwrap_or(0.0), 0);
+        for (i, (&x, r)) in level.iter().zip(&rate).enumerate() {
+            // What moved in the pause counts, too.
+            if starts[next] == i {
+                sum += f64::abs(x - last);
+                next += 1;
+            }
+            sum += if r.abs() > still { r.abs() * dt_s } else { 0.0 };
+            travel.push(sum);
+            last = x;
+        }
+        Self { level, rate, still, travel, starts }
+    }
+
+    fn len(&self) -> usize {
+        self.level.len()
+    }
+
+    /// -1, 0, 1: falls, rests, rises.
+    fn sense(&self, i: usize) -> i8 {
+        match self.rate[i] {
+            r if r > self.still => 1,
+            r if r < -self.still => -1,
+            _ => 0,
+        }
+    }
+
+    /// Samples where the motion turns round.
+    fn reversals(&self, dt_s: f64) -> Vec<usize> {
+        let mut found = Vec::new();
+        for trial in self.starts.windows(2) {
+            let mut last: Option<(i8, usize)> = None;
+            for i in trial[0]..trial[1].min(self.len()) {
+                let sense = self.sense(i);
+                if sense == 0 {
+                    continue;
+                }
+                if let Some((before, at)) = last.filter(|l| l.0 != sense) {
+                    let dwell_s = (i - at) as f64 * dt_s;
+                    found.push(if dwell_s < SHORT_DWELL_S { (i + at) / 2 } else { i });
+                    let _ = before;
+                }
+                last = Some((sense, i));
+            }
+        }
+        found
+    }
+}
+
+impl Axis {
+    pub(super) const NONE: u16 = u16::MAX;
+
+    pub(super) fn all(course: &Course, simulator: &dyn Simulator, frame: &Frame) -> Vec<Self> {
+        let mut axes = vec![
+            Self::regime(course, simulator),
+            Self::level(course, simulator.motion().unit),
+            Self::rate(course, simulator.motion().unit),
+        ];
+        axes.extend(Self::clocks(course, simulator));
+        let mut of = vec![Self::NONE; course.len()];
+        for segment in &frame.segments {
+            let end = segment.to.min(of.len());
+            of[segment.from.min(end)..end].fill(segment.trial as u16);
+        }
+        let labels = simulator.trials().iter().map(|t| t.name.clone()).collect();
+        axes.push(Self { by: "trial", labels, of });
+        axes
+    }
+
+    fn regime(course: &Course, simulator: &dyn Simulator) -> Self {
+        let motion = simulator.motion();
+        let labels = [motion.falling, motion.rising, "dwell", "turnaround"].map(str::to_owned);
+        let mut of: Vec<u16> = (0..course.len())
+            .map(|i| match course.sense(i) {
+                -1 => 0,
+                1 => 1,
+                _ => 2,
+            })
+            .collect();
+        let around = (TURN_S / simulator.dt_s()).round() as usize;
+        let reversals = course.reversals(simulator.dt_s());
+        for trial in course.starts.windows(2) {
+            let end = trial[1].min(of.len());
+            for &at in reversals.iter().filter(|at| (trial[0]..end).contains(*at)) {
+                of[at.saturating_sub(around).max(trial[0])..(at + around + 1).min(end)].fill(3);
+            }
+        }
+        Self { by: "regime", labels: labels.into(), of }
+    }
+
+    fn level(course: &Course, unit: &str) -> Self {
+        let (low, high) = ends(course.level.iter().filter(|x| x.is_finite()));
+        Self::even("level", &course.level, low, high, 5, short, unit)
+    }
+
+    /// Quarters of the moving samples, by the size of their rate.
+    fn rate(course: &Course, unit: &str) -> Self {
+        let mut sizes: Vec<f64> =
+            course.rate.iter().map(|r| r.abs()).filter(|r| *r > course.still).collect();
+        sizes.sort_by(f64::total_cmp);
+        let at = |k: usize| sizes.get((k * sizes.len() / 4).min(sizes.len().saturating_sub(1)));
+        let ends: Vec<f64> = (0..=4).filter_map(at).copied().collect();
+        let per = if unit.is_empty() { "1/s".to_owned() } else { format!("{unit}/s") };
+        let labels =
+            ends.windows(2).map(|e| format!("{} to {} {per}", short(e[0]), short(e[1]))).collect();
+        let of = course
+            .rate
+            .iter()
+            .map(|r| match r.abs() {
+                r if r <= course.still => Self::NONE,
+                r => (1..4).filter(|&k| ends.get(k).is_some_and(|e| r > *e)).count() as u16,
+            })
+            .collect();
+        Self { by: "rate", labels, of }
+    }
+
+    /// Time in the trial, time in the session, and distance travelled.
+    fn clocks(course: &Course, simulator: &dyn Simulator) -> [Self; 3] {
+        let dt_s = simulator.dt_s();
+        let mut time = Vec::with_capacity(course.len());
+        let mut session = Vec::with_capacity(course.len());
+        for (spec, trial) in simulator.trials().iter().zip(course.starts.windows(2)) {
+            for i in 0..trial[1].min(course.len()).saturating_sub(trial[0]) {
+                time.push(i as f64 * dt_s);
+                session.push(spec.start_s + i as f64 * dt_s);
+            }
+        }
+        let longest = time.iter().copied().fold(0.0, f64::max);
+        let count = TIMES_S.iter().filter(|t| **t < longest).count() + 1;
+        let label = |k: usize| match (k.checked_sub(1).map(|j| TIMES_S[j]), TIMES_S.get(k)) {
+            (None, Some(to)) => format!("first {to} s"),
+            (Some(from), Some(to)) if k + 1 < count || *to <= longest + 1.0 => {
+                format!("{from} to {to} s")
+            }
+            (Some(from), _) => format!("after {from} s"),
+            (None, None) => "all".to_owned(),
+        };
+        let slot = |t: &f64| TIMES_S.iter().filter(|end| *t >= **end).count() as u16;
+        let in_trial = Self {
+            by: "time",
+            labels: (0..count).map(label).collect(),
+            of: time.iter().map(slot).collect(),
+        };
+        let (first, last) =
+            (session.first().copied().unwrap_or(0.0), session.last().copied().unwrap_or(0.0));
+        let all = course.travel.last().copied().unwrap_or(0.0);
+        let motion = simulator.motion();
+        [
+            in_trial,
+            Self::even("session", &session, first, last, 4, |x| format!("{x:.0}"), "s"),
+            Self::even("travel", &course.travel, 0.0, all, 4, |x| format!("{x:.0}"), motion.unit),
+        ]
+    }
+
+    fn even(
+        by: &'static str,
+        values: &[f64],
+        low: f64,
+        high: f64,
+        count: usize,
+        text: impl Fn(f64) -> String,
+        unit: &str,
+    ) -> Self {
+        let width = (high - low) / count as f64;
+        if !(width.is_finite() && width > 0.0) {
+            return Self { by, labels: Vec::new(), of: vec![Self::NONE; values.len()] };
+        }
+        let edge = |k: usize| text(low + k as f64 * width);
+        let labels = (0..count)
+            .map(|k| format!("{} to {} {unit}", edge(k), edge(k + 1)).trim_end().to_owned())
+            .collect();
+        let of = values
+            .iter()
+            .map(|x| (((x - low) / width).max(0.0) as usize).min(count - 1) as u16)
+            .collect();
+        Self { by, labels, of }
+    }
+}
+
+/// Three significant digits.
+fn short(x: f64) -> String {
+    let digits = if x == 0.0 { 0 } else { x.abs().log10().floor() as i32 };
+    format!("{x:.*}", (2 - digits).clamp(0, 6) as usize)
+}
+
+/// Value and slope at `at` of the straight line through evenly spaced samples.
+fn line(samples: &[f64], at: usize, dt_s: f64) -> (f64, f64) {
+    let n = samples.len() as f64;
+    let middle = 0.5 * (n - 1.0);
+    let mean = samples.iter().sum::<f64>() / n;
+    let (mut xx, mut xy) = (0.0, 0.0);
+    for (i, y) in samples.iter().enumerate() {
+        let x = i as f64 - middle;
+        xx += x * x;
+        xy += x * (y - mean);
+    }
+    let slope = if xx > 0.0 { xy / xx } else { 0.0 };
+    (mean + slope * (at as f64 - middle), slope / dt_s)
+}
+
+/// Noise of a record from the median of its second differences.
+fn noise(values: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = second_differences(values).map(f64::abs).collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes.get(sizes.len() / 2).map_or(0.0, |m| m / 0.6745 / 6f64.sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use testkit::tolerance::{LOCAL_VALUE, MEDIAN_SPREAD};
+
+    #[test]
+    fn a_line_is_found_at_any_place() {
+        let samples: Vec<f64> = (0..15).map(|i| 3.0 - 0.5 * f64::from(i)).collect();
+        for at in [0, 7, 14] {
+            let (value, slope) = line(&samples, at, 0.01);
+            assert_relative_eq!(
+                value,
+                samples[at],
+                max_relative = LOCAL_VALUE,
+                epsilon = LOCAL_VALUE
+            );
+            assert_relative_eq!(slope, -50.0, max_relative = LOCAL_VALUE, epsilon = 0.0);
+        }
+    }
+
+    #[test]
+    fn noise_is_that_of_the_record() {
+        let mut dice = crate::numerics::random::Dice::new(3, 1);
+        let values: Vec<f64> =
+            (0..20_000).map(|i| 1e-3 * f64::from(i) + 0.2 * dice.gauss()).collect();
+        assert_relative_eq!(noise(&values), 0.2, max_relative = MEDIAN_SPREAD, epsilon = 0.0);
+    }
+}

@@ -1,0 +1,122 @@
+//! The residual by octaves of frequency.
+
+use std::f64::consts::TAU;
+
+use super::excess::Cells;
+use crate::problem::frame::Frame;
+
+/// Samples of a window; neighbours overlap by half.
+const WINDOW: usize = 512;
+/// Octaves counted down from half the sample rate; the last takes all that is below.
+const BANDS: usize = 8;
+
+/// Power in octave bands by window (Welch's method with Hann's window): white noise of one floor has power 1 in
+/// every line. Segments shorter than a window are left out.
+pub(super) fn cells(frame: &Frame, residual: &[f64], dt_s: f64) -> (Vec<String>, Cells) {
+    let window: Vec<f64> =
+        (0..WINDOW).map(|i| 0.5 - 0.5 * (TAU * i as f64 / WINDOW as f64).cos()).collect();
+    let power: f64 = window.iter().map(|w| w * w).sum();
+    let mut cells = Vec::new();
+    for segment in &frame.segments {
+        let mut from = segment.from;
+        while from + WINDOW <= segment.to.min(residual.len()) {
+            let mut wave: Vec<(f64, f64)> = residual[from..from + WINDOW]
+                .iter()
+                .zip(&window)
+                .map(|(r, w)| (r * w, 0.0))
+                .collect();
+            transform(&mut wave);
+            let base = cells.len();
+            cells.resize(base + BANDS, (0.0, 0.0));
+            for (line, (re, im)) in wave.iter().enumerate().take(WINDOW / 2) {
+                let cell = &mut cells[base + band(line)];
+                cell.0 += (re * re + im * im) / power;
+                cell.1 += 1.0;
+            }
+            from += WINDOW / 2;
+        }
+    }
+    if cells.is_empty() {
+        return (Vec::new(), Cells::new(0, cells));
+    }
+    let hertz = |band: usize| {
+        let f = 0.5 / dt_s / (1 << band) as f64;
+        if f < 1.0 { format!("{f:.1}") } else { format!("{}", (f * 10.0).round() / 10.0) }
+    };
+    let labels = (0..BANDS)
+        .map(|b| match b + 1 {
+            BANDS => format!("below {} Hz", hertz(b)),
+            next => format!("{} to {} Hz", hertz(next), hertz(b)),
+        })
+        .collect();
+    (labels, Cells::new(BANDS, cells))
+}
+
+/// Band of a spectral line, the highest first.
+fn band(line: usize) -> usize {
+    (1..BANDS).take_while(|b| line <= (WINDOW / 2) >> b).count()
+}
+
+/// Discrete Fourier transform in place of a power of two of values (Cooley and Tukey).
+fn transform(x: &mut [(f64, f64)]) {
+    let n = x.len();
+    let mut j = 0;
+    for i in 1..n {
+        let mut bit = n >> 1;
+        while j & bit != 0 {
+            j ^= bit;
+            bit >>= 1;
+        }
+        j |= bit;
+        if i < j {
+            x.swap(i, j);
+        }
+    }
+    let mut length = 2;
+    while length <= n {
+        let half = length / 2;
+        let turns: Vec<(f64, f64)> =
+            (0..half).map(|k| (-TAU * k as f64 / length as f64).sin_cos()).collect();
+        for part in x.chunks_exact_mut(length) {
+            let (a, b) = part.split_at_mut(half);
+            for ((a, b), (s, c)) in a.iter_mut().zip(b).zip(&turns) {
+                let t = (b.0 * c - b.1 * s, b.0 * s + b.1 * c);
+                *b = (a.0 - t.0, a.1 - t.1);
+                *a = (a.0 + t.0, a.1 + t.1);
+            }
+        }
+        length *= 2;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_abs_diff_eq;
+    use testkit::tolerance::LOCAL_VALUE;
+
+    #[test]
+    fn the_transform_is_the_sum_it_stands_for() {
+        let mut dice = crate::numerics::random::Dice::new(9, 2);
+        let x: Vec<f64> = (0..32).map(|_| dice.gauss()).collect();
+        let mut fast: Vec<(f64, f64)> = x.iter().map(|x| (*x, 0.0)).collect();
+        transform(&mut fast);
+        for (k, (re, im)) in fast.iter().enumerate() {
+            let (mut c, mut s) = (0.0, 0.0);
+            for (i, x) in x.iter().enumerate() {
+                let angle = -TAU * (i * k) as f64 / 32.0;
+                c += x * angle.cos();
+                s += x * angle.sin();
+            }
+            // The largest of 32 lines of noise is some 10.
+            assert_abs_diff_eq!(*re, c, epsilon = LOCAL_VALUE);
+            assert_abs_diff_eq!(*im, s, epsilon = LOCAL_VALUE);
+        }
+    }
+
+    #[test]
+    fn lines_fall_into_octaves() {
+        assert_eq!(band(255), 0);
+        assert_eq!((band(129), band(128), band(64), band(3), band(2), band(0)), (0, 1, 2, 6, 7, 7));
+    }
+}

@@ -1,0 +1,118 @@
+//! The stages run one on the other: who causes the gap of the last output.
+//!
+//! Errors of a stage pass through those behind it, so shares depend on the order in which stages are corrected. The Shapley value (1953,
+//! doi 10.1515/9781400881970-018) averages over all orders,
+//!
+//! ```text
+//! phi_s = sum over sets T without s of |T|! (n - |T| - 1)!/n! (gap(T + s) - gap(T))
+//! ```
+//!
+//! where gap(T) is the mean square error of the last output with the stages of T simulated and the others corrected by what they get
+//! wrong on their measured input.
+
+use crate::{
+    evidence::gathered::Evidence,
+    problem::{error::GapError, frame::Role, runs::Runs, simulator::Run},
+};
+
+/// A variant of what one stage hands to the next.
+struct Variant {
+    /// Stages that are simulated, a bit each; the others are corrected.
+    simulated: usize,
+    /// Values; none where they are the measured ones.
+    output: Option<Vec<f64>>,
+}
+
+/// Share of every stage; empty where a stage cannot be run on another's output or there is nothing to share.
+pub(super) fn shapley(runs: &Runs<'_>, evidence: &Evidence) -> Result<Vec<f64>, GapError> {
+    let simulator = runs.simulator();
+    let stages = simulator.stages().len();
+    let trials = simulator.trials().len();
+    let model = &evidence.retuned;
+    if !(2..=6).contains(&stages) {
+        return Ok(Vec::new());
+    }
+    let mut variants = vec![Variant { simulated: 0, output: None }];
+    for stage in 0..stages {
+        let alone = &evidence.stages[stage].retuned;
+        // What a correction is added to: the measurement as the next stage is fed with it.
+        let base = match stage + 1 {
+            next if next == stages => Some(simulator.measured(stage).to_vec()),
+            next => simulator.input(next),
+        };
+        let Some(base) = base else { return Ok(Vec::new()) };
+        let mut next = Vec::with_capacity(2 * variants.len());
+        for variant in variants {
+            let run = Run::exact(stage, model, trials);
+            let output = match &variant.output {
+                None => alone.clone(),
+                Some(input) => match runs.run_on(run, input)? {
+                    Some(output) => output,
+                    None => return Ok(Vec::new()),
+                },
+            };
+            let corrected = variant.output.as_ref().map(|_| {
+                base.iter().zip(output.iter().zip(alone)).map(|(b, (o, a))| b + o - a).collect()
+            });
+            next.push(Variant { simulated: variant.simulated, output: corrected });
+            let simulated = variant.simulated | 1 << stage;
+            next.push(Variant { simulated, output: Some(output) });
+        }
+        variants = next;
+    }
+    let last = stages - 1;
+    let floor = evidence.stages[last].floor;
+    let mut gaps = vec![0.0; 1 << stages];
+    for variant in &variants {
+        let Some(output) = &variant.output else { continue };
+        let (mut sum, mut count) = (0.0, 0_usize);
+        let measured = simulator.measured(last);
+        for segment in evidence.frame.of_role(Role::Test) {
+            for i in segment.from..segment.to {
+                sum += (measured[i] - output[i]).powi(2);
+            }
+            count += segment.to - segment.from;
+        }
+        // A corrected last stage leaves no noise.
+        let noise = if variant.simulated >> last & 1 == 1 { floor * floor } else { 0.0 };
+        gaps[variant.simulated] = sum / count.max(1) as f64 - noise;
+    }
+    if gaps[(1 << stages) - 1] <= 0.1 * floor * floor {
+        return Ok(Vec::new());
+    }
+    Ok(shares(&gaps, stages))
+}
+
+/// Shapley values (1953) of a game whose worth is given for every set of players, as shares of their sum; none
+/// below 0.
+fn shares(worth: &[f64], players: usize) -> Vec<f64> {
+    let factorial = |n: usize| (1..=n).map(|i| i as f64).product::<f64>();
+    let mut values = vec![0.0; players];
+    for (player, value) in values.iter_mut().enumerate() {
+        for set in (0..1_usize << players).filter(|set| set >> player & 1 == 0) {
+            let size = set.count_ones() as usize;
+            let weight = factorial(size) * factorial(players - size - 1) / factorial(players);
+            *value += weight * (worth[set | 1 << player] - worth[set]);
+        }
+    }
+    let total: f64 = values.iter().map(|v| v.max(0.0)).sum();
+    values.iter().map(|v| if total > 0.0 { v.max(0.0) / total } else { 0.0 }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use testkit::tolerance::F64_ROUNDING;
+
+    #[test]
+    fn shares_are_those_of_the_glove_game() {
+        // Two left gloves and one right: 1/6, 1/6, 4/6 (any textbook).
+        let pairs = |set: usize| if set & 4 != 0 && set & 3 != 0 { 1.0 } else { 0.0 };
+        let worth: Vec<f64> = (0..8).map(pairs).collect();
+        let shares = shares(&worth, 3);
+        for (share, expected) in shares.iter().zip([1.0 / 6.0, 1.0 / 6.0, 4.0 / 6.0]) {
+            assert_relative_eq!(*share, expected, max_relative = F64_ROUNDING, epsilon = 0.0);
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Where the gap sits, as a diagnosis lists it.
+
+use serde::{Deserialize, Serialize};
+
+/// Gap of one stage on the test trials, every stage on its measured input.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StageGap {
+    /// Stage.
+    pub stage: String,
+    /// Output channel.
+    pub channel: String,
+    /// Share of the gap of the re-tuned nominal.
+    pub share: f64,
+    /// Excess with the parameters as shipped.
+    pub raw: f64,
+    /// Excess of the re-tuned nominal.
+    pub excess: f64,
+    /// Excess with the named (or best) effects.
+    pub after: f64,
+    /// Root mean square of what the re-tuned nominal leaves, nuisance taken out.
+    pub rms: f64,
+    /// Floor, one standard deviation.
+    pub floor: f64,
+    /// Where the floor comes from.
+    pub floor_source: String,
+    /// Unit of the two.
+    pub unit: String,
+}
+
+/// One slice of the gap; see [`SliceGap::by`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SliceGap {
+    /// `regime`, `level`, `rate`, `time` (in the trial), `session` (time), `travel`, `trial` or `frequency`.
+    pub by: String,
+    /// Which slice.
+    pub slice: String,
+    /// Stage whose output it is.
+    pub stage: String,
+    /// Share of the stage's gap.
+    pub share: f64,
+    /// Excess within the slice.
+    pub excess: f64,
+    /// 95 % interval of the excess.
+    pub excess_ci: [f64; 2],
+    /// Whether it stands out after a false-discovery correction.
+    pub stands_out: bool,
+}
+
+/// Share of one stage when the stages run one on the other.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StageShare {
+    /// Stage.
+    pub stage: String,
+    /// Its Shapley value as a share of the gap of the last output.
+    pub share: f64,
+}
+
+/// Where the gap sits.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Where {
+    /// By stage.
+    pub stages: Vec<StageGap>,
+    /// By slices of the trials.
+    pub slices: Vec<SliceGap>,
+    /// By stage in the gap of the last output, when nothing but the commands is given; empty where that cannot be told.
+    #[serde(default)]
+    pub end_to_end: Vec<StageShare>,
+}
+
+impl Where {
+    /// The stage with the largest gap; none without a stage.
+    pub fn worst(&self) -> Option<usize> {
+        let stages = self.stages.iter().enumerate();
+        stages.max_by(|a, b| a.1.share.total_cmp(&b.1.share)).map(|(i, _)| i)
+    }
+}

@@ -1,0 +1,86 @@
+//! Where the gap sits: by regime, level, rate, frequency, time and trial, and by stage from end to end.
+
+mod axes;
+mod bands;
+mod chain;
+mod excess;
+pub(crate) mod location;
+
+use crate::{
+    evidence::{
+        gathered::{Evidence, StageEvidence},
+        localise::location::{SliceGap, StageShare},
+    },
+    problem::{error::GapError, runs::Runs, simulator::Simulator},
+};
+
+use axes::{Axis, Course};
+use excess::{Cells, Sliced};
+
+/// Cuts the residual of the re-tuned nominal, over all trials, along every axis.
+///
+/// The excess of a slice is the mean square in it, in floors, minus 1; its interval is a bootstrap over blocks of
+/// 0.5 s (over windows for frequency bands). A slice stands out when its excess is above 0 and above that of the
+/// rest of the stage, after Benjamini and Hochberg's correction (doi 10.1111/j.2517-6161.1995.tb02031.x) over
+/// all slices.
+pub(crate) fn slices(
+    simulator: &dyn Simulator,
+    evidence: &Evidence,
+    of: fn(&StageEvidence) -> &[f64],
+    seed: u64,
+) -> Vec<SliceGap> {
+    let course = Course::of(simulator, &evidence.frame);
+    let axes = Axis::all(&course, simulator, &evidence.frame);
+    let mut found: Vec<(SliceGap, f64)> = Vec::new();
+    for (stage, traces) in evidence.stages.iter().enumerate() {
+        let name = &simulator.stages()[stage].name;
+        let residual = of(traces);
+        let mut cut: Vec<(&str, Vec<String>, Cells)> = axes
+            .iter()
+            .map(|a| (a.by, a.labels.clone(), Cells::of_samples(&evidence.frame, residual, a)))
+            .collect();
+        let (labels, cells) = bands::cells(&evidence.frame, residual, simulator.dt_s());
+        cut.push(("frequency", labels, cells));
+        for (number, (by, labels, cells)) in cut.into_iter().enumerate() {
+            let stream = (stage * 16 + number) as u64;
+            for (slice, sliced) in labels.into_iter().zip(cells.sliced(seed, stream)) {
+                let Sliced { share, excess, interval, p } = sliced;
+                let gap = SliceGap {
+                    by: by.to_owned(),
+                    slice,
+                    stage: name.clone(),
+                    share,
+                    excess,
+                    excess_ci: interval,
+                    stands_out: false,
+                };
+                found.push((gap, p));
+            }
+        }
+    }
+    let accepted = excess::discoveries(&found.iter().map(|f| f.1).collect::<Vec<_>>());
+    found
+        .into_iter()
+        .zip(accepted)
+        .map(|((gap, _), stands_out)| SliceGap {
+            stands_out: stands_out && gap.excess_ci[0] > 0.0,
+            ..gap
+        })
+        .collect()
+}
+
+/// Share of every stage in the gap of the last output when the stages run one on the other, by Shapley value.
+///
+/// A stage outside the set is corrected by what it gets wrong on its measured input, so that errors of the
+/// stages before it still pass through it. Empty where a stage cannot be run on another's output.
+///
+/// # Errors
+/// What the simulator says.
+pub(crate) fn end_to_end(
+    runs: &Runs<'_>,
+    evidence: &Evidence,
+) -> Result<Vec<StageShare>, GapError> {
+    let shares = chain::shapley(runs, evidence)?;
+    let names = runs.simulator().stages().iter().map(|s| s.name.clone());
+    Ok(names.zip(shares).map(|(stage, share)| StageShare { stage, share }).collect())
+}

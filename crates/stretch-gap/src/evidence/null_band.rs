@@ -1,0 +1,76 @@
+//! What noise alone leaves in data like these: below it a gap is chance, above it something is missing, though it may be too faint to name.
+//!
+//! Draws of a record in which nothing is missing, of the trials and the noise at hand. In the metric the output's own noise is white
+//! whatever its nuisances are, so that N samples leave a chi-square; noise of the measured input, t, arrives through the stage as the
+//! simulator transmits it, slow as it may be, and has the share u of the floor:
+//!
+//! ```text
+//! X = ((1 - u)|z|^2 + 2 g sqrt((1 - u) t'V^-1 t) + t'V^-1 t) / N,     z ~ N(0, I), g ~ N(0, 1)
+//! ```
+//!
+//! Re-tuning would take some of it away, which is left out: the band errs to the wide side.
+
+use rayon::prelude::*;
+
+use crate::{
+    fit::{prepared::Problem, score::gap},
+    numerics::random::Dice,
+    problem::{error::GapError, frame::Role, simulator::Run},
+};
+
+/// Records that are drawn, and the share of them that lies within the band.
+const RECORDS: usize = 40;
+const WITHIN: f64 = 0.95;
+
+/// The excess that 19 of 20 records stay below in which nothing is missing; as every gap the greater of fitted and tested, summed over
+/// stages.
+pub(crate) fn null_band(problem: &Problem<'_>, seed: u64) -> Result<f64, GapError> {
+    let stages = 0..problem.compare.metrics.len();
+    let arrives: Result<Vec<Vec<f64>>, GapError> =
+        stages.map(|stage| arrives(problem, stage)).collect();
+    let arrives = arrives?;
+    let one = |record| excess(problem, &arrives, record, Dice::new(seed, record as u64));
+    let mut excesses: Vec<f64> = (0..RECORDS).map(one).collect();
+    excesses.sort_by(f64::total_cmp);
+    let last = (WITHIN * RECORDS as f64).ceil() as usize - 1;
+    Ok(excesses[last])
+}
+
+/// Excess of one record.
+fn excess(problem: &Problem<'_>, arrives: &[Vec<f64>], record: usize, mut dice: Dice) -> f64 {
+    let frame = &problem.compare.frame;
+    let looked = (frame.count(Role::Fit) + frame.count(Role::Held)) as f64;
+    let (mut fitted, mut tested) = (0.0, 0.0);
+    for (stage, arrives) in arrives.iter().enumerate() {
+        let own = (1.0 - problem.transmits(stage)).max(0.0);
+        let mut chance = |samples: f64| {
+            // The sum of N squares, nearly normal: mean N, variance 2N.
+            let white = own * (samples + (2.0 * samples).sqrt() * dice.gauss());
+            let other = arrives[record] * samples;
+            gap((white + 2.0 * dice.gauss() * (own * other).sqrt() + other) / samples)
+        };
+        fitted += chance(looked);
+        tested += chance((frame.count(Role::Test) as f64).max(1.0));
+    }
+    f64::max(fitted, tested)
+}
+
+/// t'V^-1 t a sample, by record.
+fn arrives(problem: &Problem<'_>, stage: usize) -> Result<Vec<f64>, GapError> {
+    if problem.transmits(stage) == 0.0 {
+        return Ok(vec![0.0; RECORDS]);
+    }
+    let compare = &problem.compare;
+    let (model, trials) = (&problem.nominal.model, compare.frame.fit_trials);
+    let run = Run::exact(stage, model, trials);
+    let plain = compare.runs.run(run)?;
+    let metric = &compare.metrics[stage];
+    let samples = compare.frame.count(Role::Fit) + compare.frame.count(Role::Held);
+    let one = |record: usize| {
+        let shaken = compare.arrived(Run { shake: Some(record as u64), ..run }, &plain)?;
+        let column = metric.column(&compare.frame, shaken);
+        let square = |role| metric.product(&compare.frame, &column, &column, role);
+        Ok((square(Role::Fit) + square(Role::Held)) / samples.max(1) as f64)
+    };
+    (0..RECORDS).into_par_iter().map(one).collect()
+}

@@ -1,0 +1,144 @@
+//! Gathers how a stage answers to the numbers of its effects: a run for each value.
+
+use rayon::prelude::*;
+
+use crate::{
+    evidence::{
+        gathered::{Evidence, held_out},
+        response::{Answered, Response, Responses},
+    },
+    fit::{hypothesis::Hypothesis, levenberg_marquardt::possible, prepared::Problem},
+    numerics::linear::dot,
+    problem::{error::GapError, frame::Role, spec::EffectParameterSpec},
+};
+
+/// Where the values lie: shares of the reach on either side of the fitted one.
+const STEPS: [f64; 6] = [-1.0, -0.5, -0.25, 0.25, 0.5, 1.0];
+/// Reach in fitted values, or in standard deviations where that is more; of what is searched in equal ratios, a ratio.
+const DEVIATIONS: f64 = 3.0;
+const RATIO: f64 = 4.0;
+
+/// A number that is turned.
+struct Turned<'a> {
+    effect: usize,
+    parameter: usize,
+    spec: &'a EffectParameterSpec,
+    fitted: f64,
+    values: Vec<f64>,
+}
+
+/// The answers of a stage around the best set; none where no number of an effect acts in it that may be turned at no great cost.
+pub(crate) fn responses(
+    problem: &Problem<'_>,
+    evidence: &Evidence,
+    best: &Hypothesis,
+    stage: usize,
+) -> Result<Option<Responses>, GapError> {
+    let turned = turned(problem, best, stage);
+    if turned.is_empty() || problem.is_spent() {
+        return Ok(None);
+    }
+    let (simulator, own) = (problem.simulator(), &evidence.stages[stage]);
+    let answer = |at: &Turned<'_>, value: f64| {
+        let mut model = best.model.clone();
+        let acting = model.effects.iter_mut().filter(|(effect, _)| *effect == at.effect);
+        acting.for_each(|(_, values)| values[at.parameter] = value);
+        let run = problem.compare.runs.output(stage, &model, simulator.trials().len())?;
+        let output: Vec<f64> = run.iter().zip(&own.after).map(|(y, at)| y - at).collect();
+        let (whole, residual) = held_out(problem, stage, &best.model, &output);
+        Ok((whole, Answered { value, output, residual }))
+    };
+    let answered = turned
+        .par_iter()
+        .map(|at| possible(at.values.par_iter().map(|value| answer(at, *value))))
+        .collect::<Result<Vec<Vec<_>>, GapError>>()?;
+    let (left, clean) = evidence.left(problem, stage);
+    let columns: Vec<(&[f64], &[f64])> = std::iter::once((&left[..], &clean[..]))
+        .chain(answered.iter().flatten().map(|(whole, one)| (&whole[..], &one.residual[..])))
+        .collect();
+    let products = products(problem, evidence.level(stage), &columns);
+    let parameters = turned.iter().zip(answered).filter(|(_, answers)| !answers.is_empty());
+    let parameters = parameters.map(|(at, answers)| Response {
+        effect: simulator.effects()[at.effect].name.clone(),
+        name: at.spec.name.clone(),
+        unit: at.spec.unit.clone(),
+        fitted: at.fitted,
+        answers: answers.into_iter().map(|(_, one)| one).collect(),
+    });
+    Ok(Some(Responses { stage, parameters: parameters.collect(), products }))
+}
+
+/// The numbers of a set's effects that act in a stage and may be turned at no great cost.
+fn turned<'a>(problem: &Problem<'a>, best: &Hypothesis, stage: usize) -> Vec<Turned<'a>> {
+    let simulator = problem.simulator();
+    let mut turned = Vec::new();
+    for &effect in &best.effects {
+        let own = &simulator.effects()[effect];
+        if !own.touches.contains(&stage) || own.is_found || simulator.is_costly(effect) {
+            continue;
+        }
+        let fitted = best.model.effect(effect).unwrap_or_default();
+        let sd = best.effect_sd.get(&effect).map_or(&[][..], Vec::as_slice);
+        for (parameter, (spec, &fitted)) in own.parameters.iter().zip(fitted).enumerate() {
+            let values = values(spec, fitted, sd.get(parameter).copied().unwrap_or(0.0));
+            if spec.is_fitted && !values.is_empty() {
+                turned.push(Turned { effect, parameter, spec, fitted, values });
+            }
+        }
+    }
+    turned
+}
+
+/// Values around a fitted one, within what is plausible.
+fn values(spec: &EffectParameterSpec, fitted: f64, sd: f64) -> Vec<f64> {
+    let at = |share: f64| match spec.is_log && fitted > 0.0 {
+        true => fitted * libm::pow(RATIO, share),
+        false => fitted + share * fitted.abs().max(DEVIATIONS * sd),
+    };
+    let mut values: Vec<f64> = STEPS.map(|share| at(share).clamp(spec.min, spec.max)).into();
+    values.dedup();
+    values.retain(|value| *value != fitted && value.is_finite());
+    values
+}
+
+/// x' V^-1 y of every pair, a mean over the blocks of the test trials; `columns` hold x and V^-1 x, in floors whose square is `level` of
+/// what they were taken for.
+fn products(problem: &Problem<'_>, level: f64, columns: &[(&[f64], &[f64])]) -> Vec<Vec<f64>> {
+    let frame = &problem.compare.frame;
+    let blocks: Vec<std::ops::Range<usize>> = frame
+        .of_role(Role::Test)
+        .flat_map(|s| {
+            let count = (s.to - s.from) / frame.block;
+            (0..count).map(move |k| s.from + k * frame.block..s.from + (k + 1) * frame.block)
+        })
+        .collect();
+    let samples = (blocks.len() * frame.block).max(1) as f64;
+    let product = |x: &[f64], y: &[f64]| {
+        blocks.iter().map(|b| dot(&x[b.clone()], &y[b.clone()])).sum::<f64>() / samples / level
+    };
+    let row = |(i, (x, _)): (usize, &(&[f64], &[f64]))| -> Vec<f64> {
+        // V^-1 is symmetric up to rounding: a pair has one number
+        let pair = |j: usize, y: &[f64]| match j < i {
+            true => product(columns[j].0, columns[i].1),
+            false => product(x, y),
+        };
+        columns.iter().enumerate().map(|(j, (_, y))| pair(j, y)).collect()
+    };
+    columns.iter().enumerate().map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_stay_plausible_and_leave_out_the_fitted_one() {
+        let strength = EffectParameterSpec::strength("c", "1", 0.0..=1.0);
+        assert_eq!(values(&strength, 0.5, 0.0), [0.0, 0.25, 0.375, 0.625, 0.75, 1.0]);
+        assert_eq!(values(&strength, 0.5, 0.25), [0.0, 0.125, 0.3125, 0.6875, 0.875, 1.0]);
+        assert_eq!(values(&strength, 0.0, 0.0), [0.0; 0]);
+        let shape = EffectParameterSpec::shape("tau", "s", 0.01..=10.0);
+        assert_eq!(values(&shape, 5.0, 0.0).last(), Some(&10.0));
+        assert_eq!(values(&shape, 1.0, 0.0)[..2], [0.25, 0.5]);
+    }
+}

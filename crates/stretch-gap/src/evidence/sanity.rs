@@ -1,0 +1,135 @@
+//! Is it the right simulator at all? What the judge is told of that.
+//!
+//! Two signs that data come from something else than the simulator is of:
+//!
+//! * *foreign*: more of a channel's variance is left on the test trials than a missing effect leaves
+//!   ([`Simulator::foreign_share`]): another rig, or a column that is not what its name says. The share is that of
+//!   1 - R^2, noise taken off: (sum (y - y_sim)^2 - N floor^2)/sum (y - mean y)^2;
+//! * *strained*: two parameters of a stage stand at the end of their tolerances and more than noise is left all the same. If the
+//!   same two, set loose, explain as much without any effect, what bends them is no effect but other parameters.
+
+use crate::{
+    evidence::gathered::Evidence,
+    fit::{hypothesis::Hypothesis, levenberg_marquardt::FINE, prepared::Problem, score::gap},
+    problem::{
+        altered_parameters::Altered, error::GapError, frame::Role, simulator::Simulator,
+        spec::ParameterSpec,
+    },
+};
+
+/// Tolerances at which a parameter stands at its end: two of the five or so of a stage do so by chance in one rig of a few
+/// thousand.
+const END: f64 = 2.75;
+/// Excess that must be left for that to count: more error than noise.
+const LEFT: f64 = 1.0;
+/// What the tolerances of such parameters are multiplied by to see whether they would explain all.
+const LOOSE: f64 = 5.0;
+/// Share of its nominal value that a parameter keeps then.
+const KEPT: f64 = 0.02;
+
+/// What was found out.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Sanity {
+    /// By stage: share of its channel's variance that the best effects leave.
+    pub(crate) left: Vec<f64>,
+    /// Share that may be left before names of effects mean nothing.
+    pub(crate) allowed: f64,
+    /// The stage whose parameters are strained most, if any.
+    pub(crate) strained: Option<Strained>,
+}
+
+/// A stage with two or more parameters at the end of their tolerances.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Strained {
+    pub(crate) stage: usize,
+    /// These parameters.
+    pub(crate) ended: Vec<usize>,
+    /// Excess that is left on the test trials.
+    pub(crate) left: f64,
+    /// Excess over the fitted trials with the best effects, and with these parameters set loose and no effect; none where
+    /// there is no effect to compare with.
+    pub(crate) rivals: Option<(f64, f64)>,
+}
+
+impl Sanity {
+    pub(crate) fn of(
+        problem: &Problem<'_>,
+        best: &Hypothesis,
+        evidence: &Evidence,
+    ) -> Result<Self, GapError> {
+        let simulator = problem.simulator();
+        let left = (0..evidence.stages.len()).map(|stage| left(simulator, evidence, stage));
+        Ok(Self {
+            left: left.collect(),
+            allowed: simulator.foreign_share(),
+            strained: strained(problem, best, evidence)?,
+        })
+    }
+}
+
+fn left(simulator: &dyn Simulator, evidence: &Evidence, stage: usize) -> f64 {
+    let (traces, measured) = (&evidence.stages[stage], simulator.measured(stage));
+    let (mut count, mut sum, mut squares, mut left) = (0.0, 0.0, 0.0, 0.0);
+    for segment in evidence.frame.of_role(Role::Test) {
+        for i in segment.from..segment.to {
+            count += 1.0;
+            sum += measured[i];
+            squares += measured[i] * measured[i];
+            left += (measured[i] - traces.after[i]).powi(2);
+        }
+    }
+    let variance = squares - sum * sum / f64::max(count, 1.0);
+    // What is noise is nobody's fault.
+    let noise = count * traces.floor * traces.floor;
+    (left - noise) / variance.max(noise).max(f64::MIN_POSITIVE)
+}
+
+fn strained(
+    problem: &Problem<'_>,
+    best: &Hypothesis,
+    evidence: &Evidence,
+) -> Result<Option<Strained>, GapError> {
+    let simulator = problem.simulator();
+    let at_end = |index: &usize| {
+        let spec = &simulator.parameters()[*index];
+        spec.sd > 0.0 && (evidence.best.parameters[*index] - spec.nominal).abs() >= END * spec.sd
+    };
+    let all = simulator.stages().iter().zip(&evidence.stages).enumerate();
+    let worst = all
+        .filter(|(_, (_, traces))| traces.excess_after > LEFT)
+        .map(|(stage, (spec, traces))| {
+            let ended: Vec<usize> = spec.parameters.iter().copied().filter(at_end).collect();
+            Strained { stage, ended, left: traces.excess_after, rivals: None }
+        })
+        .filter(|strained| strained.ended.len() >= 2)
+        .max_by(|a, b| a.left.total_cmp(&b.left));
+    let Some(worst) = worst else { return Ok(None) };
+    let rivals = match best.effects.is_empty() {
+        true => None,
+        false => {
+            let loose = loosened(problem, evidence, worst.stage, &worst.ended)?;
+            Some((problem.gap_in(best, worst.stage), loose))
+        }
+    };
+    Ok(Some(Strained { rivals, ..worst }))
+}
+
+/// Excess of a stage without effects, some of its parameters set loose.
+fn loosened(
+    problem: &Problem<'_>,
+    evidence: &Evidence,
+    stage: usize,
+    ended: &[usize],
+) -> Result<f64, GapError> {
+    let loose = Altered::of(problem.simulator(), |i, p| match ended.contains(&i) {
+        true => ParameterSpec {
+            sd: LOOSE * p.sd,
+            least: p.least.min(KEPT * p.nominal.abs()),
+            ..p.clone()
+        },
+        false => p.clone(),
+    });
+    let free = problem.compare.beside(&loose, problem.compare.metrics.clone());
+    let fitted = free.fit(&[stage], evidence.retuned.clone(), &[], FINE)?;
+    Ok(fitted.misfits.iter().map(|m| gap(free.mean_square(m))).sum())
+}

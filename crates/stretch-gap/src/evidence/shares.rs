@@ -1,0 +1,97 @@
+//! What each effect of the best set closes, so that an answer without a name still says what is known.
+//!
+//! Effects overlap: what each closes alone adds up to more than the whole. Taken out from the weakest to the strongest, with the rest
+//! fitted anew each time, their shares (gap without - gap with)/gap of the nominal telescope to what the set closes. Gaps are those of
+//! the test trials: what is fitted can close anything.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    evidence::gathered::Evidence,
+    fit::{
+        hypothesis::Hypothesis,
+        prepared::Problem,
+        score::{excess, mean_square},
+    },
+    problem::error::GapError,
+    search::sets::Sets,
+};
+
+/// What one effect of the best set closes of the gap in the trials that were not fitted.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EffectShare {
+    /// Effect.
+    pub effect: String,
+    /// Share of the re-tuned nominal's gap that opens again when it is taken out, those that closed less than it gone
+    /// before: the shares add up to what the set closes.
+    pub closes: f64,
+    /// Greatest share of the gap of one stage that it closes, of those that have one: a stage with little noise must not hide
+    /// what is wrong in another.
+    #[serde(default)]
+    pub closes_of_stage: f64,
+    /// Whether one of its parameters went to an end of its range: it then rather stands in for something else.
+    pub at_bound: bool,
+}
+
+/// The best set with its effects taken out one after the other, the weakest first: the effect, and what is left without it.
+pub(crate) fn peeled(
+    sets: &mut Sets<'_>,
+    best: &Hypothesis,
+) -> Result<Vec<(usize, Hypothesis)>, GapError> {
+    let problem = sets.problem;
+    let (mut set, mut out) = (best.clone(), Vec::new());
+    while !set.effects.is_empty() {
+        let mut weakest: Option<(usize, Hypothesis)> = None;
+        for effect in set.effects.clone() {
+            let less = sets.without(&set, effect)?;
+            if weakest.as_ref().is_none_or(|(_, w)| problem.gap(&less) < problem.gap(w)) {
+                weakest = Some((effect, less));
+            }
+        }
+        let Some((effect, less)) = weakest else { break };
+        out.push((effect, less.clone()));
+        set = less;
+    }
+    Ok(out)
+}
+
+/// What each effect closes of the held-out gap, the strongest first. Stages whose gap is below `least_gap` have none.
+pub(crate) fn shares(
+    problem: &Problem<'_>,
+    evidence: &Evidence,
+    best: &Hypothesis,
+    peeled: &[(usize, Hypothesis)],
+    least_gap: f64,
+) -> Result<Vec<EffectShare>, GapError> {
+    // Floors are known to some per cent: what the best set leaves is the noise where it is less than they say.
+    let least: Vec<f64> = evidence.stages.iter().map(|s| s.excess_after.min(0.0)).collect();
+    let above =
+        |stage: usize, blocks: &[f64]| (excess(mean_square(blocks)) - least[stage]).max(0.0);
+    let blocks = evidence.nominal_blocks.iter().enumerate();
+    let nominal: Vec<f64> = blocks.map(|(stage, blocks)| above(stage, blocks)).collect();
+    let whole = nominal.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+    let mut with: Vec<f64> = evidence.stages.iter().map(|s| s.excess_after.max(0.0)).collect();
+    let mut out = Vec::new();
+    for (effect, less) in peeled {
+        let stages = 0..nominal.len();
+        let without: Vec<f64> = match less.effects.is_empty() {
+            // The nominal was run already.
+            true => nominal.clone(),
+            false => stages
+                .map(|s| Ok(above(s, &evidence.blocks(problem, s, &less.model)?)))
+                .collect::<Result<_, GapError>>()?,
+        };
+        let closed = without.iter().zip(&with).map(|(without, with)| without - with);
+        let of_stages = closed.clone().zip(&nominal).filter(|(_, whole)| **whole >= least_gap);
+        let spec = &problem.simulator().effects()[*effect];
+        out.push(EffectShare {
+            effect: spec.name.clone(),
+            closes: closed.sum::<f64>() / whole,
+            closes_of_stage: of_stages.map(|(closed, whole)| closed / whole).fold(0.0, f64::max),
+            at_bound: best.model.effect(*effect).is_some_and(|values| spec.is_at_bound(values)),
+        });
+        with = without;
+    }
+    out.sort_by(|a: &EffectShare, b| b.closes.total_cmp(&a.closes));
+    Ok(out)
+}

@@ -1,0 +1,183 @@
+//! What the gap costs whoever trains a calibration in the simulator and runs it on the rig.
+//!
+//! The *transfer gap* is the error on measured test trials of a calibration trained in the simulator minus that of one trained on measured
+//! trials. It is what a user pays; the chi-square is not: a true effect can close the gap and leave a calibration as it was.
+
+use rayon::prelude::*;
+use stretch_calibrate::{CalibrateError, ModelKind, Options, apply, calibrate};
+use stretch_core::Degree;
+use stretch_data::{Channel, Trial};
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    evidence::gathered::Evidence,
+    numerics::{extent::ends, random::Dice},
+    problem::{
+        error::GapError,
+        frame::{Frame, Role},
+        runs::Runs,
+        simulator::{Model, Run},
+    },
+};
+
+/// What the gap costs a user.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Transfer {
+    /// Straight line.
+    pub linear: TransferError,
+    /// Surface poly13.
+    pub poly13: TransferError,
+    /// `percent_full_scale`.
+    pub unit: String,
+}
+
+/// Error of a calibration trained in one place and applied to measured trials.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TransferError {
+    /// Trained on measured trials.
+    pub real: f64,
+    /// Trained in the re-tuned nominal simulator.
+    pub sim: f64,
+    /// Trained in the simulator with the named effects.
+    pub sim_with_effect: f64,
+}
+
+const SIGNAL: &str = "signal";
+const REFERENCE: &str = "reference";
+
+/// What a calibration is trained on or applied to: the motion and the signal, all trials end to end.
+struct Records {
+    reference: Vec<f64>,
+    signal: Vec<f64>,
+}
+
+/// Errors on the measured test trials of calibrations that were trained on the measured fit trials, in the re-tuned
+/// simulator, and in the simulator with the effects; `None` where the simulator has no sensor, or the records do not
+/// determine a calibration.
+///
+/// In the simulator nothing is measured but the commands: the stages run one on the other, and its reference and its
+/// signal get the noise that the channels are known to have. A sensor that is the first stage sees the measured motion.
+pub(crate) fn transfer(
+    runs: &Runs<'_>,
+    evidence: &Evidence,
+    seed: u64,
+) -> Result<Option<Transfer>, GapError> {
+    let simulator = runs.simulator();
+    let Some(sensor) = simulator.sensor() else { return Ok(None) };
+    let motion = simulator.motion().values;
+    let real = Records { reference: motion.to_vec(), signal: simulator.measured(sensor).to_vec() };
+    let first = &evidence.stages[0];
+    let models = [(&evidence.retuned, &first.retuned), (&evidence.best, &first.after)];
+    let simulated: Result<Vec<_>, GapError> = models
+        .par_iter()
+        .map(|(model, first)| records(runs, evidence, sensor, model, first, seed))
+        .collect();
+    let [Some(retuned), Some(best)] = &simulated?[..] else { return Ok(None) };
+    let frame = &evidence.frame;
+    let dt_s = simulator.dt_s();
+    let trained = [&real, retuned, best].map(|records| trials(records, frame, dt_s, false));
+    let tested = trials(&real, frame, dt_s, true);
+    let scale = span(trained[0].iter().flat_map(|t| &t.channels[0].values));
+    let kinds = [ModelKind::Linear, ModelKind::Surface(Degree::POLY13)];
+    let jobs: Vec<_> = kinds.iter().flat_map(|k| trained.iter().map(move |t| (*k, t))).collect();
+    let errors: Result<Vec<f64>, CalibrateError> =
+        jobs.par_iter().map(|(kind, trained)| error(*kind, trained, &tested)).collect();
+    let Ok(errors) = errors else { return Ok(None) };
+    let of = |at: usize| TransferError {
+        real: 100.0 * errors[at] / scale,
+        sim: 100.0 * errors[at + 1] / scale,
+        sim_with_effect: 100.0 * errors[at + 2] / scale,
+    };
+    let is_sound = scale > 0.0 && errors.iter().all(|e| e.is_finite());
+    let unit = "percent_full_scale".to_owned();
+    Ok(is_sound.then(|| Transfer { linear: of(0), poly13: of(3), unit }))
+}
+
+/// The fitted trials as a model records them, whose first stage gave `first`; `None` where the stages cannot run one on the
+/// other.
+fn records(
+    runs: &Runs<'_>,
+    evidence: &Evidence,
+    sensor: usize,
+    model: &Model,
+    first: &[f64],
+    seed: u64,
+) -> Result<Option<Records>, GapError> {
+    let simulator = runs.simulator();
+    let trials = evidence.frame.fit_trials;
+    let samples = evidence.frame.samples(trials);
+    let mut output = first[..samples].to_vec();
+    let mut before = None;
+    for stage in 1..=sensor {
+        let run = Run::exact(stage, model, trials);
+        let Some(next) = runs.run_on(run, &output)? else { return Ok(None) };
+        before = Some(std::mem::replace(&mut output, next));
+    }
+    let noisy = |mut values: Vec<f64>, stage: usize| {
+        let sd = simulator.stages()[stage]
+            .noise
+            .as_ref()
+            .map_or(evidence.stages[stage].floor, crate::problem::noise::Noise::sd);
+        let mut dice = Dice::new(seed, 900 + stage as u64);
+        values.iter_mut().for_each(|x| *x += sd * dice.gauss());
+        values
+    };
+    let reference = match before {
+        Some(motion) => noisy(motion, sensor - 1),
+        None => simulator.motion().values[..samples].to_vec(),
+    };
+    Ok(Some(Records { reference, signal: noisy(output, sensor) }))
+}
+
+/// The trials to train on, or to test on.
+fn trials(records: &Records, frame: &Frame, dt_s: f64, is_test: bool) -> Vec<Trial> {
+    let mut spans: Vec<(usize, usize, usize)> = Vec::new();
+    for segment in frame.segments.iter().filter(|s| (s.role == Role::Test) == is_test) {
+        match spans.last_mut() {
+            Some((trial, _, to)) if *trial == segment.trial && *to == segment.from => {
+                *to = segment.to;
+            }
+            _ => spans.push((segment.trial, segment.from, segment.to)),
+        }
+    }
+    let channel = |name: &str, values: &[f64]| Channel { name: name.into(), values: values.into() };
+    spans
+        .into_iter()
+        .map(|(trial, from, to)| Trial {
+            name: format!("trial {}", trial + 1),
+            time_s: (0..to - from).map(|i| i as f64 * dt_s).collect(),
+            channels: vec![
+                channel(REFERENCE, &records.reference[from..to]),
+                channel(SIGNAL, &records.signal[from..to]),
+            ],
+        })
+        .collect()
+}
+
+/// Root mean square error on the test trials of a calibration that runs live.
+fn error(kind: ModelKind, trained: &[Trial], tested: &[Trial]) -> Result<f64, CalibrateError> {
+    let options = Options {
+        signal: SIGNAL.into(),
+        reference: REFERENCE.into(),
+        model: kind,
+        ..Options::default()
+    };
+    let calibration = calibrate(trained, &options)?.calibration;
+    let (mut sum, mut count) = (0.0, 0_usize);
+    for trial in tested {
+        let readings = apply(&calibration, trial)?.readings;
+        for (reading, truth) in readings.iter().zip(trial.require(REFERENCE)?) {
+            if let Ok(reading) = reading {
+                sum += (reading.estimate - truth).powi(2);
+                count += 1;
+            }
+        }
+    }
+    Ok((sum / count as f64).sqrt())
+}
+
+fn span<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
+    let (low, high) = ends(values);
+    high - low
+}

@@ -1,0 +1,275 @@
+//! A simulator beside its measurements, every stage on its measured input and in its own metric.
+
+use rayon::prelude::*;
+
+use crate::{
+    fit::{
+        coordinate::{Coordinate, coordinates},
+        metric::{Column, Metric},
+        noise_level::floors_of,
+        octaves::Octaves,
+        score::{Misfit, samples_per_observation},
+    },
+    numerics::linear::dot,
+    problem::{
+        error::GapError,
+        frame::{Frame, Role},
+        runs::Runs,
+        simulator::{Model, Run, Simulator},
+    },
+};
+
+/// Draws of the measured input's noise; the same for every model, so that differences of models are none of the draws'.
+const DRAWS: u64 = 4;
+
+/// What a fit needs to know.
+#[derive(Clone)]
+pub(crate) struct Comparison<'a> {
+    pub(crate) runs: Runs<'a>,
+    pub(crate) frame: Frame,
+    /// One per stage.
+    pub(crate) metrics: Vec<Metric>,
+}
+
+/// Sensitivities of the nominal parameters of one stage, by parameter.
+pub(crate) type Sensitivities = Vec<(usize, Column)>;
+
+impl<'a> Comparison<'a> {
+    /// Floors and metrics around a model; nuisances as large as those of `like`, where there is one.
+    pub(crate) fn around(
+        runs: Runs<'a>,
+        frame: Frame,
+        model: &Model,
+        like: Option<&[Metric]>,
+        seed: u64,
+    ) -> Result<Self, GapError> {
+        let floors = floors_of(&runs, &frame, model, seed)?;
+        let floors: Vec<_> = floors.into_iter().enumerate().collect();
+        let metrics: Result<Vec<Metric>, GapError> = floors
+            .into_par_iter()
+            .map(|(stage, floor)| {
+                Metric::of(&runs, &frame, stage, floor, model, like.map(|l| &l[stage]))
+            })
+            .collect();
+        Ok(Self { metrics: metrics?, runs, frame })
+    }
+
+    /// Nuisances as large and as quick as the residual of a model has them; the rise of their likelihood, nats.
+    pub(crate) fn adapt(&mut self, model: &Model) -> Result<f64, GapError> {
+        let dt_s = self.simulator().dt_s();
+        let mut gained = 0.0;
+        for stage in 0..self.metrics.len() {
+            if !self.metrics[stage].loose().is_empty() {
+                let residual = self.residual_values(stage, model)?;
+                let (metric, more) = self.metrics[stage].adapted(&self.frame, dt_s, &residual);
+                self.metrics[stage] = metric;
+                gained += more;
+            }
+        }
+        Ok(gained)
+    }
+
+    /// The same session beside another simulator, in metrics of its own.
+    pub(crate) fn beside<'b>(
+        &self,
+        simulator: &'b dyn Simulator,
+        metrics: Vec<Metric>,
+    ) -> Comparison<'b>
+    where
+        'a: 'b,
+    {
+        Comparison { runs: self.runs.beside(simulator), frame: self.frame.clone(), metrics }
+    }
+
+    pub(crate) fn simulator(&self) -> &'a dyn Simulator {
+        self.runs.simulator()
+    }
+
+    /// An observation for each block: what the cost of a fit counts, whatever the residual's own memory is.
+    pub(crate) fn weight(&self) -> f64 {
+        1.0 / self.frame.block as f64
+    }
+
+    /// Measured minus simulated, in floors, over the trials that fits run.
+    pub(crate) fn residual_values(
+        &self,
+        stage: usize,
+        model: &Model,
+    ) -> Result<Vec<f64>, GapError> {
+        let values = self.runs.run(self.run_of(stage, model, None))?;
+        Ok(self.apart(stage, values))
+    }
+
+    /// The run of a stage over the trials that fits run; may be told from a run near by.
+    fn run_of<'m>(&self, stage: usize, model: &'m Model, near: Option<&'m [f64]>) -> Run<'m> {
+        Run { near, ..Run::exact(stage, model, self.frame.fit_trials) }
+    }
+
+    /// Measured minus simulated, in floors.
+    fn apart(&self, stage: usize, mut values: Vec<f64>) -> Vec<f64> {
+        let measured = self.simulator().measured(stage);
+        for ((x, m), sd) in values.iter_mut().zip(measured).zip(&self.metrics[stage].floor.sd) {
+            *x = (m - *x) / sd;
+        }
+        values
+    }
+
+    /// [`Comparison::residual_values`] of some stages and models, in one batch.
+    pub(crate) fn residuals_of(
+        &self,
+        wanted: &[(usize, &Model)],
+        near: Option<&[f64]>,
+    ) -> Vec<Result<Vec<f64>, GapError>> {
+        let runs: Vec<Run<'_>> =
+            wanted.iter().map(|(stage, model)| self.run_of(*stage, model, near)).collect();
+        let outputs = self.runs.run_many(&runs).into_iter().zip(wanted);
+        outputs.map(|(output, (stage, _))| Ok(self.apart(*stage, output?))).collect()
+    }
+
+    /// The same, ready for products.
+    pub(crate) fn residual(&self, stage: usize, model: &Model) -> Result<Column, GapError> {
+        let values = self.residual_values(stage, model)?;
+        Ok(self.metrics[stage].column(&self.frame, values))
+    }
+
+    /// x'V^-1 y of a stage over the fitted samples.
+    pub(crate) fn product(&self, stage: usize, x: &Column, y: &Column) -> f64 {
+        self.metrics[stage].product(&self.frame, x, y, Role::Fit)
+    }
+
+    /// Reduced chi-squares of a residual, at the noise that its own model transmits.
+    pub(crate) fn misfit(&self, stage: usize, residual: &Column) -> Misfit {
+        let mean = |role| {
+            let n = self.frame.count(role) as f64;
+            let sum = self.metrics[stage].product(&self.frame, residual, residual, role);
+            if n > 0.0 { sum / n } else { 1.0 }
+        };
+        let octaves = self.octaves(stage, &residual.values);
+        Misfit { stage, fit: mean(Role::Fit), held: mean(Role::Held), octaves }
+    }
+
+    /// Reduced chi-square over fitted and held-out samples together.
+    pub(crate) fn mean_square(&self, misfit: &Misfit) -> f64 {
+        let (fit, held) = (self.frame.blocks(Role::Fit), self.frame.blocks(Role::Held));
+        (fit * misfit.fit + held * misfit.held) / (fit + held)
+    }
+
+    /// Samples of a stage that count as one observation of its misfit at a model.
+    pub(crate) fn samples_per_observation(
+        &self,
+        stage: usize,
+        model: &Model,
+    ) -> Result<f64, GapError> {
+        let mut values = self.residual_values(stage, model)?;
+        self.metrics[stage].clean(&self.frame, &mut values);
+        let parts = self.frame.of_role(Role::Fit).map(|s| &values[s.from..s.to]);
+        Ok(samples_per_observation(&parts.collect::<Vec<_>>(), self.frame.block))
+    }
+
+    /// Octaves of a residual in floors over fitted and held-out samples.
+    fn octaves(&self, stage: usize, residual: &[f64]) -> Octaves {
+        let mut clean = residual.to_vec();
+        self.metrics[stage].clean(&self.frame, &mut clean);
+        let mut octaves = Octaves::default();
+        for s in self.frame.looked_at() {
+            octaves.add(&residual[s.from..s.to], &clean[s.from..s.to]);
+        }
+        octaves
+    }
+
+    /// Noise transmitted: what of the measured input's noise arrives at the output of a stage, in floors squared.
+    pub(crate) fn transmitted(&self, stage: usize, model: &Model) -> Result<Misfit, GapError> {
+        let run = Run::exact(stage, model, self.frame.fit_trials);
+        let plain = self.runs.run(run)?;
+        let mut mean = Misfit { stage, ..Misfit::default() };
+        for draw in 0..DRAWS {
+            let shaken = self.arrived(Run { shake: Some(draw), ..run }, &plain)?;
+            let power = |role| {
+                let parts = self.frame.of_role(role).map(|s| &shaken[s.from..s.to]);
+                let sum: f64 = parts.map(|part| dot(part, part)).sum();
+                sum / (self.frame.count(role) as f64).max(1.0)
+            };
+            mean.fit += power(Role::Fit) / DRAWS as f64;
+            mean.held += power(Role::Held) / DRAWS as f64;
+            for s in self.frame.looked_at() {
+                mean.octaves.add(&shaken[s.from..s.to], &shaken[s.from..s.to]);
+            }
+            if mean.fit == 0.0 {
+                break;
+            }
+        }
+        mean.octaves = mean.octaves.scaled(1.0 / DRAWS as f64);
+        Ok(mean)
+    }
+
+    /// What one draw of the measured input's noise makes of an output that is `plain` without it, in floors.
+    pub(crate) fn arrived(&self, run: Run<'_>, plain: &[f64]) -> Result<Vec<f64>, GapError> {
+        let mut shaken = self.runs.run(run)?;
+        let sds = &self.metrics[run.stage].floor.sd;
+        for ((x, y), sd) in shaken.iter_mut().zip(plain).zip(sds) {
+            *x = (*x - y) / sd;
+        }
+        Ok(shaken)
+    }
+
+    /// Sensitivities -dr/dx of the stages to some coordinates, by one-sided differences in one batch; none where a coordinate does not act.
+    ///
+    /// The moved runs may be told from a run at the parameters `near`.
+    pub(crate) fn sensitivities(
+        &self,
+        stages: &[usize],
+        coordinates: &[(Coordinate, [f64; 2])],
+        (model, residuals): (&Model, &[Column]),
+        near: &[f64],
+    ) -> Result<Vec<Vec<Option<Column>>>, GapError> {
+        let moved: Vec<(f64, Model)> = coordinates
+            .iter()
+            .map(|(coordinate, bounds)| {
+                let x = coordinate.read(model);
+                let step = coordinate.probe(x);
+                let step = if x + step > bounds[1] { -step } else { step };
+                let mut moved = model.clone();
+                coordinate.write(&mut moved, x + step);
+                (step, moved)
+            })
+            .collect();
+        let acts =
+            |c: usize, s: usize| coordinates[c].0.acts_in(self.simulator(), stages[s], model);
+        let places: Vec<(usize, usize)> = (0..coordinates.len())
+            .flat_map(|c| (0..stages.len()).map(move |s| (c, s)))
+            .filter(|&(c, s)| acts(c, s))
+            .collect();
+        let wanted: Vec<(usize, &Model)> =
+            places.iter().map(|&(c, s)| (stages[s], &moved[c].1)).collect();
+        let there = self.residuals_of(&wanted, Some(near));
+        let columns = places.par_iter().zip(there).map(|(&(c, s), there)| {
+            let (step, here) = (moved[c].0, &residuals[s].values);
+            let values = here.iter().zip(there?).map(|(a, b)| (a - b) / step).collect();
+            Ok((c, s, self.metrics[stages[s]].column(&self.frame, values)))
+        });
+        let columns: Result<Vec<_>, GapError> = columns.collect();
+        let mut out = vec![vec![None; stages.len()]; coordinates.len()];
+        for (c, s, column) in columns? {
+            out[c][s] = Some(column);
+        }
+        Ok(out)
+    }
+
+    /// Sensitivities of a stage to its nominal parameters at a model, one standard deviation each.
+    pub(crate) fn nominal_sensitivities(
+        &self,
+        stage: usize,
+        model: &Model,
+        residual: &Column,
+    ) -> Result<Sensitivities, GapError> {
+        let bare = Model { parameters: model.parameters.clone(), effects: Vec::new() };
+        let own = coordinates(self.simulator(), &[stage], &bare);
+        let at = (model, std::slice::from_ref(residual));
+        let columns = self.sensitivities(&[stage], &own, at, &model.parameters)?;
+        let pairs = own.iter().zip(columns).filter_map(|((coordinate, _), column)| {
+            let Coordinate::Nominal { index, .. } = *coordinate else { return None };
+            Some((index, column.into_iter().next().flatten()?))
+        });
+        Ok(pairs.collect())
+    }
+}

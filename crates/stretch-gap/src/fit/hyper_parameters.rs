@@ -1,0 +1,198 @@
+//! How large and how quick the nuisances of a stage are, from the record.
+//!
+//! A supply wanders by a tenth of a per cent or by half of one, in half a second or in thirty; who assumes one of these finds an effect in
+//! the difference. So size a and correlation time tau of every wander, and the size of offsets, are those of the greatest
+//!
+//! ```text
+//! L = -(r'V^-1 r + ln det V)/2 + ln p(a, tau),     V = s I + C P^-1 C'
+//! ```
+//!
+//! over the samples that are not tested on (Rasmussen and Williams 2006, section 5.4.1), with lognormal priors p around what the simulator
+//! describes, wide enough for any lab. Where hypotheses are weighed, a and tau are integrated over, each nuisance beside the others'
+//! greatest: a record that fits at one level alone says less than one that fits at many. What else is left in the residual r must not be taken for a nuisance, so s is its spectral level at
+//! the blocks' rate: the mean square of block means times the samples of a block, the least of all that are tried, and at least the 1 of
+//! the noise alone.
+
+use rayon::prelude::*;
+
+use crate::{
+    fit::metric::{Level, Loose, Metric},
+    problem::frame::{Frame, Role},
+};
+
+/// Sizes that are tried, as multiples of what the simulator describes.
+const SIZES: [f64; 6] = [0.2, 0.4, 0.7, 1.0, 1.6, 2.5];
+/// Correlation times that are tried, s.
+const TIMES_S: [f64; 7] = [0.3, 0.7, 1.5, 3.0, 6.0, 12.0, 30.0];
+/// Deviations of the priors of ln a and of ln tau: a factor of two, and of three.
+const SPREAD: (f64, f64) = (0.7, 1.1);
+
+impl Metric {
+    /// The metric with nuisances of the greatest likelihood for a residual in floors, and by how many nats it is greater than with
+    /// those of this one.
+    pub(crate) fn adapted(&self, frame: &Frame, dt_s: f64, residual: &[f64]) -> (Self, f64) {
+        let (mut best, mut gained) = (self.clone(), 0.0);
+        for which in 0..self.loose().len() {
+            let own = best.loose()[which].level;
+            let levels = hypotheses(&best.loose()[which]).chain([own]);
+            let one = |level| best.with(|i, own| if i == which { level } else { own }, frame, dt_s);
+            let levels: Vec<Level> = levels.collect();
+            let tried: Vec<Self> = levels.into_par_iter().map(one).collect();
+            let noise = tried.par_iter().map(|m| m.spectral_level(frame, residual));
+            let noise = noise.reduce(|| f64::INFINITY, f64::min).max(1.0).sqrt();
+            let fit = |m: &Self| m.beside(frame, dt_s, residual, noise);
+            let fits: Vec<f64> = tried.par_iter().map(fit).collect();
+            let before = fits.last().copied().unwrap_or(0.0);
+            let all = fits.iter().copied().zip(&tried);
+            if let Some((most, metric)) = all.max_by(|a, b| a.0.total_cmp(&b.0)) {
+                gained += most - before;
+                best = metric.clone();
+            }
+        }
+        (best, gained)
+    }
+
+    /// ln of the likelihood beside a floor that is `noise` times as high, a and tau integrated over:
+    ///
+    /// ```text
+    /// ln E = l + sum over nuisances i of ln( sum_k p_k exp(l_k - l) / sum_k p_k )
+    /// ```
+    ///
+    /// where l is L of the module's head without ln p, and l_k has nuisance i at level k of the grid and the others as they are. It is
+    /// exact for one nuisance, and as independent ones are beyond.
+    pub(crate) fn evidence(&self, frame: &Frame, dt_s: f64, residual: &[f64], noise: f64) -> f64 {
+        let own = self.likelihood_beside(frame, dt_s, residual, noise);
+        let one = |which: usize| {
+            let loose = &self.loose()[which];
+            let levels: Vec<Level> = hypotheses(loose).collect();
+            if levels.is_empty() {
+                return 0.0;
+            }
+            let fit = |&level: &Level| {
+                let at = self.with(|i, own| if i == which { level } else { own }, frame, dt_s);
+                at.likelihood_beside(frame, dt_s, residual, noise) - own - cost(loose, level)
+            };
+            let fits: Vec<f64> = levels.par_iter().map(fit).collect();
+            let prior = levels.iter().map(|level| -cost(loose, *level));
+            log_sum_exp(fits) - log_sum_exp(prior)
+        };
+        own + (0..self.loose().len()).map(one).sum::<f64>()
+    }
+
+    /// L of the module's head beside a floor that is `noise` times as high.
+    fn beside(&self, frame: &Frame, dt_s: f64, residual: &[f64], noise: f64) -> f64 {
+        let price: f64 = self.loose().iter().map(|loose| cost(loose, loose.level)).sum();
+        self.likelihood_beside(frame, dt_s, residual, noise) - price
+    }
+
+    /// The likelihood beside a floor that is `noise` times as high: V/s has nuisances that much smaller.
+    fn likelihood_beside(&self, frame: &Frame, dt_s: f64, residual: &[f64], noise: f64) -> f64 {
+        if noise == 1.0 {
+            return self.likelihood(frame, residual);
+        }
+        let smaller = |_, level: Level| Level { size: level.size / noise, ..level };
+        let scaled: Vec<f64> = residual.iter().map(|r| r / noise).collect();
+        self.with(smaller, frame, dt_s).likelihood(frame, &scaled)
+    }
+
+    /// -(r'V^-1 r + ln det V)/2 over the samples that are not tested on.
+    fn likelihood(&self, frame: &Frame, residual: &[f64]) -> f64 {
+        let column = self.column(frame, residual.to_vec());
+        let square = |role| self.product(frame, &column, &column, role);
+        let ln_det = self.ln_det(frame, Role::Fit) + self.ln_det(frame, Role::Held);
+        -0.5 * (square(Role::Fit) + square(Role::Held) + ln_det)
+    }
+
+    /// s of the module's head for one residual.
+    pub(crate) fn spectral_level(&self, frame: &Frame, residual: &[f64]) -> f64 {
+        let mut clean = residual.to_vec();
+        self.clean(frame, &mut clean);
+        let looked = frame.looked_at().filter(|s| s.to <= clean.len());
+        let blocks = looked.flat_map(|s| clean[s.from..s.to].chunks_exact(frame.block));
+        let means = blocks.map(|b| b.iter().sum::<f64>() / b.len() as f64);
+        let (count, sum) = means.fold((0.0, 0.0), |(n, sum), mean| (n + 1.0, sum + mean * mean));
+        frame.block as f64 * sum / f64::max(count, 1.0)
+    }
+}
+
+fn hypotheses(loose: &Loose) -> impl Iterator<Item = Level> {
+    let times_s: Vec<f64> = match loose.wander {
+        _ if loose.is_by_tick => Vec::new(),
+        Some(_) => TIMES_S.into(),
+        None => vec![loose.level.time_s],
+    };
+    times_s.into_iter().flat_map(|time_s| SIZES.map(|size| Level { size, time_s }))
+}
+
+/// -ln p.
+fn cost(loose: &Loose, Level { size, time_s }: Level) -> f64 {
+    let usual_s = loose.wander.map_or(time_s, |w| w.correlation_s);
+    0.5 * (size.ln() / SPREAD.0).powi(2) + 0.5 * ((time_s / usual_s).ln() / SPREAD.1).powi(2)
+}
+
+/// ln sum exp x, of values of any size.
+fn log_sum_exp(values: impl IntoIterator<Item = f64>) -> f64 {
+    let values: Vec<f64> = values.into_iter().collect();
+    let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    most + values.iter().map(|x| (x - most).exp()).sum::<f64>().ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{fit::noise_level::Floor, numerics::random::Dice, problem::frame::Segment};
+
+    /// A residual of noise and a wander that acts with changing strength.
+    fn residual(size: f64, time_s: f64, drive: &[f64]) -> Vec<f64> {
+        let mut dice = Dice::new(12, (100.0 * time_s) as u64);
+        let kept = (-0.01 / time_s).exp();
+        let mut wander = dice.gauss();
+        let one = |drive: &f64| {
+            wander = kept * wander + (1.0 - kept * kept).sqrt() * dice.gauss();
+            size * drive * wander + dice.gauss()
+        };
+        drive.iter().map(one).collect()
+    }
+
+    #[test]
+    fn size_and_time_of_a_wander_are_found_again() {
+        let samples = 20_000;
+        let drive: Vec<f64> = (0..samples).map(|i| 2.0 + (0.003 * i as f64).sin()).collect();
+        let floor = Floor { sd: vec![1.0; samples], rms: 1.0, source: String::new() };
+        let frame = Frame {
+            segments: vec![Segment { trial: 0, from: 0, to: samples, role: Role::Fit }],
+            block: 50,
+            fit_trials: 1,
+            borrowed_test: false,
+        };
+        let described = crate::problem::spec::Wander { sd: 1.0, correlation_s: 4.0 };
+        let metric = Metric::with_wander(floor, drive.clone(), described, &frame, 0.01);
+        for (size, time_s) in [(0.4, 0.7), (1.6, 3.0), (1.0, 12.0)] {
+            let record = residual(size, time_s, &drive);
+            let (adapted, gained) = metric.adapted(&frame, 0.01, &record);
+            let Level { size: found, time_s: found_s } = adapted.loose()[0].level;
+            // The next one of the grid at most.
+            assert!((0.55..1.8).contains(&(found / size)), "{found} for {size}");
+            assert!((0.4..2.6).contains(&(found_s / time_s)), "{found_s} for {time_s}");
+            assert!(gained >= 0.0);
+        }
+        // What is integrated over lies below the greatest, and not below what the greatest's own share of the prior leaves of it.
+        let record = residual(1.0, 3.0, &drive);
+        let (best, _) = metric.adapted(&frame, 0.01, &record);
+        let evidence = best.evidence(&frame, 0.01, &record, 1.0);
+        let most = best.likelihood(&frame, &record);
+        let count = (SIZES.len() * TIMES_S.len()) as f64;
+        assert!(evidence < most, "{evidence} {most}");
+        assert!(
+            evidence > most - cost(&best.loose()[0], best.loose()[0].level) - count.ln(),
+            "{evidence} {most}"
+        );
+        // The same integral from any level that it is begun at.
+        let begun = metric.evidence(&frame, 0.01, &record, 1.0);
+        approx::assert_abs_diff_eq!(begun, evidence, epsilon = 1e-6);
+        // Noise alone: as little as there is, and nothing gained by a second look.
+        let (quiet, _) = metric.adapted(&frame, 0.01, &residual(0.0, 1.0, &drive));
+        assert!(quiet.loose()[0].level.size < 0.5);
+        assert_eq!(quiet.adapted(&frame, 0.01, &residual(0.0, 1.0, &drive)).1, 0.0);
+    }
+}

@@ -1,0 +1,22 @@
+//! A hypothesis: which effects the rig has and the simulator lacks, with everything fitted under it.
+
+use std::collections::BTreeMap;
+
+use crate::{fit::score::Misfit, problem::simulator::Model};
+
+/// A set of effects, fitted together with every nominal parameter; the re-tuned nominal is the one without effects.
+#[derive(Debug, Clone)]
+pub(crate) struct Hypothesis {
+    /// Indices of the effects, in the order in which they came in.
+    pub(crate) effects: Vec<usize>,
+    /// Maximum a posteriori.
+    pub(crate) model: Model,
+    /// By stage.
+    pub(crate) misfits: Vec<Misfit>,
+    /// One standard deviation of the parameters of each effect.
+    pub(crate) effect_sd: BTreeMap<usize, Vec<f64>>,
+    /// One standard deviation of every nominal parameter that was re-tuned, 0 of the others.
+    pub(crate) parameter_sd: Vec<f64>,
+    /// Log-likelihood against the re-tuned nominal, nats, with penalties: see [`crate::fit::score`].
+    pub(crate) score: f64,
+}

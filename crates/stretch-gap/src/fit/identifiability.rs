@@ -1,0 +1,199 @@
+//! Which nominal parameters the data determine, and which not.
+//!
+//! A fit of the nominal parameters, in units of their tolerances, has the normal matrix N = D + I: what the data say and the prior. So
+//!
+//! ```text
+//! sd_i = sqrt((N^-1)_ii),     alone_i = 1/sqrt(D_ii + 1),     like_ij = D_ij/sqrt(D_ii D_jj)
+//! ```
+//!
+//! are a parameter's posterior standard deviation, what it would be if all others were known, and how alike two parameters act. Without
+//! data sd_i is 1. A parameter with D_ii = 0 does nothing; two that are alike to within the noise of the data do the same (Raue et al. 2009,
+//! doi 10.1093/bioinformatics/btp358, for the terms).
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    numerics::linear::Cholesky,
+    problem::{simulator::Model, spec::ParameterSpec},
+};
+
+/// Share of its tolerance to which a parameter is known where the data determine it, and where they say little of it.
+const DETERMINED: f64 = 1.0 / 3.0;
+const WEAKLY: f64 = 0.9;
+/// Information, tolerances to the minus two, below which a parameter does nothing that could be seen.
+const DEAD: f64 = 1e-6;
+/// Likeness from which two parameters do the same, and by how much the others then blur each of them.
+const ALIKE: f64 = 0.98;
+const BLURRED: f64 = 2.0;
+/// Share of the way to a bound within which a parameter stands at it.
+const AT_BOUND: f64 = 0.995;
+
+/// How well a parameter is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Knowledge {
+    /// To a third of its tolerance or better.
+    Determined,
+    /// Better than its tolerance says, but not by much.
+    Weakly,
+    /// No better than its tolerance says.
+    Not,
+    /// It changes nothing that was measured.
+    Dead,
+}
+
+/// What the data say of one nominal parameter.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Identified {
+    /// Its name.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// How well it is known.
+    pub knowledge: Knowledge,
+    /// Its tolerance, one standard deviation.
+    pub tolerance: f64,
+    /// Its standard deviation with the data, re-tuned without effects.
+    pub sd: f64,
+    /// The same if all others were known.
+    pub sd_alone: f64,
+    /// Parameters that do the same as far as these data tell: only together are they known.
+    pub like: Vec<String>,
+    /// Whether the re-tuned value stands at the end of its tolerances or of its range.
+    pub at_bound: bool,
+}
+
+impl Identified {
+    /// In a sentence; none for a parameter that is determined and within its bounds.
+    ///
+    /// ```
+    /// use stretch_gap::{Identified, Knowledge};
+    /// let gear = Identified {
+    ///     name: "gear".into(),
+    ///     unit: "1".into(),
+    ///     knowledge: Knowledge::Dead,
+    ///     tolerance: 0.1,
+    ///     sd: 0.1,
+    ///     sd_alone: 0.1,
+    ///     like: vec![],
+    ///     at_bound: false,
+    /// };
+    /// assert_eq!(gear.sentence().unwrap(), "gear does nothing in these data: it is dead, or nothing excites it");
+    /// ```
+    pub fn sentence(&self) -> Option<String> {
+        let name = &self.name;
+        let sd = 100.0 * self.sd / self.tolerance;
+        let mut said = match self.knowledge {
+            Knowledge::Dead => {
+                return Some(format!(
+                    "{name} does nothing in these data: it is dead, or nothing excites it"
+                ));
+            }
+            _ if !self.like.is_empty() => {
+                format!("{name} is not told apart from {}: they do the same", self.like.join(", "))
+            }
+            Knowledge::Not => {
+                format!("{name} is not determined: {sd:.0} % of its tolerance is left")
+            }
+            Knowledge::Weakly => {
+                format!("{name} is weakly determined: {sd:.0} % of its tolerance is left")
+            }
+            Knowledge::Determined if !self.at_bound => return None,
+            Knowledge::Determined => String::new(),
+        };
+        if self.at_bound {
+            let at = "at the end of what its tolerance allows";
+            said = match said.is_empty() {
+                true => format!("{name} stands {at}"),
+                false => format!("{said}; it stands {at}"),
+            };
+        }
+        Some(said)
+    }
+}
+
+/// What a fit says of the nominal parameters that it moved: their indices, and N.
+pub(crate) type Information = (Vec<usize>, DMatrix<f64>);
+
+/// What some fits say of every parameter with a tolerance, in the order of the simulator.
+pub(crate) fn identified(
+    specs: &[ParameterSpec],
+    retuned: &Model,
+    fits: &[Information],
+) -> Vec<Identified> {
+    let mut all: Vec<(usize, Identified)> = Vec::new();
+    for (indices, normal) in fits {
+        let n = indices.len();
+        let covariance = Cholesky::of(normal.clone()).inverse();
+        let data = |i: usize, j: usize| normal[(i, j)] - f64::from(u8::from(i == j));
+        for (i, &p) in indices.iter().enumerate() {
+            let spec = &specs[p];
+            let own = data(i, i).max(0.0);
+            let (sd, alone) = (covariance[(i, i)].max(0.0).sqrt(), 1.0 / (own + 1.0).sqrt());
+            let is_like = |j: &usize| {
+                let size = (own * data(*j, *j).max(0.0)).sqrt();
+                *j != i && size > DEAD && (data(i, *j) / size).abs() > ALIKE
+            };
+            let is_blurred = sd > BLURRED * alone;
+            let like = (0..n).filter(|_| is_blurred).filter(is_like);
+            let like = like.map(|j| specs[indices[j]].name.clone()).collect();
+            let knowledge = match sd {
+                _ if own < DEAD => Knowledge::Dead,
+                sd if sd <= DETERMINED => Knowledge::Determined,
+                sd if sd <= WEAKLY => Knowledge::Weakly,
+                _ => Knowledge::Not,
+            };
+            all.push((
+                p,
+                Identified {
+                    name: spec.name.clone(),
+                    unit: spec.unit.clone(),
+                    knowledge,
+                    tolerance: spec.sd,
+                    sd: sd * spec.sd,
+                    sd_alone: alone * spec.sd,
+                    like,
+                    at_bound: is_at_bound(spec, retuned.parameters[p]),
+                },
+            ));
+        }
+    }
+    all.sort_by_key(|(p, _)| *p);
+    all.into_iter().map(|(_, one)| one).collect()
+}
+
+fn is_at_bound(spec: &ParameterSpec, value: f64) -> bool {
+    let reach = crate::fit::coordinate::REACH * spec.sd;
+    let (low, high) =
+        (spec.least.max(spec.nominal - reach), spec.greatest.min(spec.nominal + reach));
+    // A parameter whose nominal value is its bound (no friction) may stay there.
+    let near =
+        |end: f64| end != spec.nominal && (value - spec.nominal) / (end - spec.nominal) > AT_BOUND;
+    near(low) || near(high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dead_one_and_two_that_do_the_same_are_told() {
+        let spec = |name: &str| ParameterSpec::new(name, "1", 1.0).within(0.1);
+        let specs = [spec("a"), spec("b"), spec("c"), spec("d")];
+        // a and b act alike, c does nothing, d is known well.
+        let data =
+            [[400.0, 399.9, 0.0, 0.0], [399.9, 400.0, 0.0, 0.0], [0.0; 4], [0.0, 0.0, 0.0, 1e4]];
+        let normal = DMatrix::from_fn(4, 4, |i, j| data[i][j] + f64::from(u8::from(i == j)));
+        let at = Model { parameters: vec![1.0, 1.0, 1.0, 1.3], effects: vec![] };
+        let all = identified(&specs, &at, &[(vec![0, 1, 2, 3], normal)]);
+        assert_eq!(
+            (all[0].like.as_slice(), all[1].like.as_slice()),
+            (&["b".to_owned()][..], &["a".to_owned()][..])
+        );
+        assert_eq!(all[2].knowledge, Knowledge::Dead);
+        assert_eq!(all[3].knowledge, Knowledge::Determined);
+        assert!(all[3].at_bound && !all[0].at_bound);
+        assert!((all[3].sd - 0.1 / 10001.0_f64.sqrt()).abs() < 1e-9);
+    }
+}

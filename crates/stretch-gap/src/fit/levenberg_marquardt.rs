@@ -1,0 +1,349 @@
+//! Joint fits: nominal parameters of the stages concerned and those of the effects, maximum a posteriori in a box.
+//!
+//! With residuals r(x) in the [metric](crate::fit::metric) V and priors p of the [coordinates](crate::fit::coordinate) the cost is
+//!
+//! ```text
+//! J(x) = 0.5/b sum over stages r' V^-1 r - sum ln p(x_i)
+//! ```
+//!
+//! where b, the samples of a block, keeps neighbours from counting as independent. Levenberg-Marquardt (Marquardt 1963,
+//! doi 10.1137/0111030) minimises it: with sensitivities A = -dr/dx
+//!
+//! ```text
+//! (N + lambda diag N) d = -g,    N = A'V^-1 A/b + P'',    g = -A'V^-1 r/b + P',    low <= x + d <= high
+//! ```
+//!
+//! and each damped step is solved *within* its box ([`boxed`]) rather than clipped to it, which would leave the face along
+//! which the cost still falls. Sensitivities of the nominal parameters change little and cost one simulation each: they are renewed
+//! at a few iterations only, those of the effect at every one.
+//!
+//! Effects and nominal parameters must move together. An effect fitted with the nominal parameters held is credited with what
+//! they could have done (Brynjarsdottir and O'Hagan 2014, doi 10.1088/0266-5611/30/11/114007).
+
+use nalgebra::{DMatrix, DVector};
+use rayon::iter::ParallelIterator;
+
+use crate::{
+    fit::{
+        comparison::{Comparison, Sensitivities},
+        coordinate::{Coordinate, coordinates},
+        identifiability::Information,
+        metric::Column,
+        score::Misfit,
+    },
+    numerics::linear::{Cholesky, boxed},
+    problem::{error::GapError, simulator::Model},
+};
+
+/// A fit of some stages with some effects.
+#[derive(Debug, Clone)]
+pub(crate) struct Fitted {
+    pub(crate) model: Model,
+    /// J of the module's head.
+    pub(crate) cost: f64,
+    /// Of the stages that were fitted.
+    pub(crate) misfits: Vec<Misfit>,
+    /// One standard deviation of each effect parameter, in the order of the model's effects.
+    pub(crate) effect_sd: Vec<Vec<f64>>,
+    /// One standard deviation of each nominal parameter that was re-tuned.
+    pub(crate) parameter_sd: Vec<(usize, f64)>,
+    /// What the fit says of the nominal parameters, the effects' own held.
+    pub(crate) information: Information,
+}
+
+/// How much work a fit may be.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Effort {
+    /// Most iterations.
+    iterations: usize,
+    /// Iterations at which the sensitivities of the nominal parameters are taken anew.
+    renewals: &'static [usize],
+    /// Whether steps of the nominal parameters may be told from a run at those that the fit starts from.
+    is_rough: bool,
+}
+
+/// Enough to see which of several starts goes furthest.
+pub(crate) const GLANCE: Effort = Effort { iterations: 2, renewals: &[], is_rough: true };
+/// Enough to see whether a candidate can compete.
+pub(crate) const COARSE: Effort = Effort { iterations: 5, renewals: &[2], is_rough: true };
+/// Until nothing is gained.
+pub(crate) const FINE: Effort = Effort { iterations: 14, renewals: &[1, 3, 6, 9], is_rough: false };
+
+/// Added to every diagonal: a coordinate that does nothing has no curvature.
+const RIDGE: f64 = 1e-12;
+/// Dampings tried in one iteration.
+const TRIES: usize = 5;
+/// An iteration that lowers the cost by less, nats and as a share of it, has gained nothing.
+const LEAST_GAIN: (f64, f64) = (0.03, 2e-5);
+
+impl Comparison<'_> {
+    /// Fits from a starting model. `known` holds sensitivities of the nominal parameters near the start, by stage.
+    pub(crate) fn fit(
+        &self,
+        stages: &[usize],
+        start: Model,
+        known: &[Option<Sensitivities>],
+        effort: Effort,
+    ) -> Result<Fitted, GapError> {
+        let near = effort.is_rough.then(|| start.parameters.clone());
+        let mut descent = Descent::new(self, stages, start, near)?;
+        for iteration in 0..effort.iterations {
+            let is_first = iteration == 0;
+            let renew = effort.renewals.contains(&iteration) || (is_first && known.is_empty());
+            descent.linearise(known, is_first, renew)?;
+            if self.runs.is_spent() {
+                break;
+            }
+            let before = descent.cost;
+            let has_moved = descent.step()?;
+            let is_still = before - descent.cost < LEAST_GAIN.0 + LEAST_GAIN.1 * descent.cost;
+            // With old sensitivities a stand-still may only mean that they are old.
+            if is_still && (renew || (!has_moved && descent.lambda > 1e3)) {
+                break;
+            }
+        }
+        Ok(descent.finish())
+    }
+}
+
+/// Fits that were possible; a simulation that fails takes its candidate out, a stop ends all.
+pub(crate) fn possible<T: Send>(
+    fits: impl ParallelIterator<Item = Result<T, GapError>>,
+) -> Result<Vec<T>, GapError> {
+    let all: Vec<Result<T, GapError>> = fits.collect();
+    let mut out = Vec::with_capacity(all.len());
+    for fit in all {
+        match fit {
+            Ok(fit) => out.push(fit),
+            Err(error) if error.ends_all() => return Err(error),
+            Err(_) => {}
+        }
+    }
+    Ok(out)
+}
+
+/// A fit under way.
+struct Descent<'a, 'b> {
+    compare: &'a Comparison<'b>,
+    stages: &'a [usize],
+    coordinates: Vec<(Coordinate, [f64; 2])>,
+    model: Model,
+    /// Parameters near which steps may be told; none where each is a run of its own.
+    near: Option<Vec<f64>>,
+    /// By stage, as `stages`.
+    residuals: Vec<Column>,
+    cost: f64,
+    /// Sensitivities by coordinate, then by stage; none where a coordinate does not act.
+    columns: Vec<Vec<Option<Column>>>,
+    /// N, undamped.
+    normal: DMatrix<f64>,
+    gradient: Vec<f64>,
+    lambda: f64,
+}
+
+impl<'a, 'b> Descent<'a, 'b> {
+    fn new(
+        compare: &'a Comparison<'b>,
+        stages: &'a [usize],
+        mut model: Model,
+        near: Option<Vec<f64>>,
+    ) -> Result<Self, GapError> {
+        let coordinates = coordinates(compare.simulator(), stages, &model);
+        for (c, b) in &coordinates {
+            let x = c.read(&model);
+            c.write(&mut model, x.clamp(b[0], b[1]));
+        }
+        let n = coordinates.len();
+        let mut descent = Self {
+            compare,
+            stages,
+            residuals: Vec::new(),
+            cost: f64::INFINITY,
+            columns: vec![Vec::new(); n],
+            normal: DMatrix::zeros(n, n),
+            gradient: vec![0.0; n],
+            lambda: 1e-3,
+            coordinates,
+            model,
+            near,
+        };
+        descent.residuals = descent.residuals_of(&descent.model)?;
+        descent.cost = descent.cost_of(&descent.model, &descent.residuals);
+        Ok(descent)
+    }
+
+    fn residuals_of(&self, model: &Model) -> Result<Vec<Column>, GapError> {
+        let wanted: Vec<(usize, &Model)> = self.stages.iter().map(|&s| (s, model)).collect();
+        let values = self.compare.residuals_of(&wanted, self.near.as_deref());
+        let columns = self.stages.iter().zip(values);
+        columns.map(|(&s, v)| Ok(self.compare.metrics[s].column(&self.compare.frame, v?))).collect()
+    }
+
+    /// J of the module's head.
+    fn cost_of(&self, model: &Model, residuals: &[Column]) -> f64 {
+        let stages = self.stages.iter().zip(residuals);
+        let data: f64 = stages.map(|(&s, r)| self.compare.product(s, r, r)).sum();
+        let prior: f64 = self.coordinates.iter().map(|(c, _)| c.prior(c.read(model)).cost).sum();
+        0.5 * self.compare.weight() * data + prior
+    }
+
+    /// Sensitivities where they are due, then N and g.
+    fn linearise(
+        &mut self,
+        known: &[Option<Sensitivities>],
+        is_first: bool,
+        renew: bool,
+    ) -> Result<(), GapError> {
+        let is_known = is_first && !known.is_empty();
+        let mut due = Vec::new();
+        for (i, place) in self.coordinates.iter().enumerate() {
+            match place.0 {
+                Coordinate::Nominal { index, .. } if is_known => {
+                    let of = |&s: &usize| {
+                        let own = known.get(s).and_then(Option::as_ref)?;
+                        own.iter().find(|(p, _)| *p == index).map(|(_, c)| c.clone())
+                    };
+                    self.columns[i] = self.stages.iter().map(of).collect();
+                }
+                Coordinate::Nominal { .. } if !renew => {}
+                _ if !renew && !is_first && self.is_costly(place.0) => {}
+                _ => due.push(i),
+            }
+        }
+        let places: Vec<_> = due.iter().map(|&i| self.coordinates[i]).collect();
+        let at = (&self.model, self.residuals.as_slice());
+        let near = self.near.as_deref().unwrap_or(&self.model.parameters);
+        let columns = self.compare.sensitivities(self.stages, &places, at, near)?;
+        for (i, column) in due.into_iter().zip(columns) {
+            self.columns[i] = column;
+        }
+        self.normal_equations();
+        Ok(())
+    }
+
+    /// Whether a coordinate is that of an effect whose every value is a run that costs.
+    fn is_costly(&self, coordinate: Coordinate) -> bool {
+        match coordinate {
+            Coordinate::Nominal { .. } => false,
+            Coordinate::Linear { slot, .. } | Coordinate::Log { slot, .. } => {
+                self.compare.simulator().is_costly(self.model.effects[slot].0)
+            }
+        }
+    }
+
+    fn normal_equations(&mut self) {
+        let n = self.coordinates.len();
+        let weight = self.compare.weight();
+        for i in 0..n {
+            for j in 0..=i {
+                let mut sum = 0.0;
+                for (s, &stage) in self.stages.iter().enumerate() {
+                    if let (Some(a), Some(b)) = (&self.columns[i][s], &self.columns[j][s]) {
+                        sum += self.compare.product(stage, a, b);
+                    }
+                }
+                self.normal[(i, j)] = weight * sum;
+                self.normal[(j, i)] = self.normal[(i, j)];
+            }
+            self.gradient[i] = 0.0;
+            for (s, &stage) in self.stages.iter().enumerate() {
+                if let Some(a) = &self.columns[i][s] {
+                    let product = self.compare.product(stage, a, &self.residuals[s]);
+                    self.gradient[i] -= weight * product;
+                }
+            }
+            let c = self.coordinates[i].0;
+            let prior = c.prior(c.read(&self.model));
+            self.gradient[i] += prior.slope;
+            self.normal[(i, i)] += prior.curvature;
+        }
+    }
+
+    /// One step downhill with as little damping as will do; says whether there was one.
+    fn step(&mut self) -> Result<bool, GapError> {
+        let n = self.coordinates.len();
+        let x: Vec<f64> = self.coordinates.iter().map(|(c, _)| c.read(&self.model)).collect();
+        let reach = |i: usize| {
+            let (c, bounds) = self.coordinates[i];
+            [(bounds[0] - x[i]).max(-c.stride()), (bounds[1] - x[i]).min(c.stride())]
+        };
+        let (low, high): (Vec<f64>, Vec<f64>) = (0..n).map(reach).map(|[l, h]| (l, h)).unzip();
+        let is_counted = self.compare.simulator().model_runs().is_some();
+        for _ in 0..TRIES {
+            let mut damped = self.normal.clone();
+            for i in 0..n {
+                damped[(i, i)] += self.lambda * self.normal[(i, i)] + RIDGE;
+            }
+            let step = boxed(&damped, &self.gradient, &low, &high);
+            // Where runs are counted, none is made for what the line itself says is nothing.
+            if is_counted && self.foretold(&step) < LEAST_GAIN.0 + LEAST_GAIN.1 * self.cost {
+                return Ok(false);
+            }
+            let mut next = self.model.clone();
+            for (((c, _), x), s) in self.coordinates.iter().zip(&x).zip(&step) {
+                c.write(&mut next, x + s);
+            }
+            match self.residuals_of(&next) {
+                Err(error) if error.ends_all() => return Err(error),
+                // These values cannot be simulated: nearer to where it can.
+                Err(_) => {}
+                Ok(there) => {
+                    let cost = self.cost_of(&next, &there);
+                    if cost < self.cost {
+                        (self.model, self.residuals, self.cost) = (next, there, cost);
+                        self.lambda = (0.2 * self.lambda).max(1e-7);
+                        return Ok(true);
+                    }
+                }
+            }
+            self.lambda = (8.0 * self.lambda).max(1e-4);
+        }
+        Ok(false)
+    }
+
+    /// Fall of the cost that the linearised residuals foretell of a step: -(g'd + d'N d/2).
+    fn foretold(&self, step: &[f64]) -> f64 {
+        let d = DVector::from_column_slice(step);
+        let slope: f64 = self.gradient.iter().zip(step).map(|(g, s)| g * s).sum();
+        -(slope + 0.5 * d.dot(&(&self.normal * &d)))
+    }
+
+    /// Misfits, and standard deviations by Laplace's approximation: the covariance is N^-1.
+    fn finish(self) -> Fitted {
+        let stages = self.stages.iter().zip(&self.residuals);
+        let misfits = stages.map(|(&s, r)| self.compare.misfit(s, r)).collect();
+        let is_nominal = |i: &usize| matches!(self.coordinates[*i].0, Coordinate::Nominal { .. });
+        let kept: Vec<usize> = (0..self.coordinates.len()).filter(is_nominal).collect();
+        let of = self.coordinates.iter().filter_map(|(c, _)| match c {
+            Coordinate::Nominal { index, .. } => Some(*index),
+            _ => None,
+        });
+        let information = (of.collect(), self.normal.select_rows(&kept).select_columns(&kept));
+        let spread = spreads(self.normal);
+        let effects = self.model.effects.iter();
+        let mut effect_sd: Vec<Vec<f64>> = effects.map(|(_, v)| vec![0.0; v.len()]).collect();
+        let mut parameter_sd = Vec::new();
+        for ((c, _), spread) in self.coordinates.iter().zip(spread) {
+            match *c {
+                Coordinate::Nominal { index, sd, .. } => parameter_sd.push((index, spread * sd)),
+                Coordinate::Linear { slot, index, range, .. } => {
+                    effect_sd[slot][index] = spread * range;
+                }
+                // d value = value d ln value
+                Coordinate::Log { slot, index, .. } => {
+                    effect_sd[slot][index] = spread * self.model.effects[slot].1[index];
+                }
+            }
+        }
+        let (model, cost) = (self.model, self.cost);
+        Fitted { model, cost, misfits, effect_sd, parameter_sd, information }
+    }
+}
+
+/// Square roots of the diagonal of the inverse of a normal matrix.
+fn spreads(mut normal: DMatrix<f64>) -> Vec<f64> {
+    for i in 0..normal.nrows() {
+        normal[(i, i)] += RIDGE;
+    }
+    Cholesky::of(normal).inverse().diagonal().iter().map(|v| v.max(0.0).sqrt()).collect()
+}

@@ -1,0 +1,243 @@
+//! The metric of one stage: residuals in floors, nuisances marginalised.
+//!
+//! Within one segment the residual r has the covariance V = I + C P^-1 C' of the [nuisance](crate::fit::nuisance): white noise
+//! of one floor, and what wander and offsets of parameters may change. Segments are independent, so that the squared Mahalanobis
+//! length of a residual, its chi-square, is
+//!
+//! ```text
+//! chi^2 = sum over segments of r' V^-1 r
+//! ```
+//!
+//! and products x'V^-1 y of sensitivities make the normal equations of every fit. This is the generative discrepancy of
+//! Kennedy and O'Hagan (2001, doi 10.1111/1467-9868.00294), confined to what the simulator's own parameters could do.
+
+use std::sync::Arc;
+
+use crate::{
+    fit::{
+        noise_level::Floor,
+        nuisance::{Nuisance, Patch, Wandering},
+    },
+    numerics::linear::dot,
+    problem::{
+        error::GapError,
+        frame::{Frame, Role, Segment},
+        runs::Runs,
+        simulator::Model,
+        spec::Wander,
+    },
+};
+
+/// The metric of one stage.
+#[derive(Debug, Clone)]
+pub(crate) struct Metric {
+    /// One standard deviation of the noise, sample by sample.
+    pub(crate) floor: Floor,
+    /// Parameters of the stage that wander or are offset in each trial.
+    loose: Vec<Loose>,
+    /// By segment of the frame; none where no parameter of the stage is loose.
+    nuisances: Vec<Option<Nuisance>>,
+}
+
+/// A parameter that wanders or is offset in each trial.
+#[derive(Debug, Clone)]
+pub(crate) struct Loose {
+    /// Change of the output, in floors, for one standard deviation as the simulator describes it.
+    column: Arc<[f64]>,
+    /// See [`Simulator::wander_clock`](crate::Simulator::wander_clock).
+    clock: Arc<[u32]>,
+    /// How it wanders as the simulator describes it; none for an offset.
+    pub(crate) wander: Option<Wander>,
+    /// Whether each tick of the clock has an offset of its own, as large as the simulator describes it.
+    pub(crate) is_by_tick: bool,
+    /// How it is taken to.
+    pub(crate) level: Level,
+}
+
+/// Size of a nuisance, as a multiple of what the simulator describes, and its correlation time, s (of no meaning for an offset).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Level {
+    pub(crate) size: f64,
+    pub(crate) time_s: f64,
+}
+
+/// A residual or a sensitivity over whole segments, in floors, ready for products.
+#[derive(Debug, Clone)]
+pub(crate) struct Column {
+    pub(crate) values: Vec<f64>,
+    /// L^-1 C'x by segment.
+    tails: Vec<Vec<f64>>,
+}
+
+impl Metric {
+    /// The metric of a stage around a model: its sensitivities to the parameters that wander or are offset in each trial
+    /// tell what of a residual can be theirs. They wander as the simulator describes it, unless `like` says otherwise.
+    pub(crate) fn of(
+        runs: &Runs<'_>,
+        frame: &Frame,
+        stage: usize,
+        floor: Floor,
+        model: &Model,
+        like: Option<&Self>,
+    ) -> Result<Self, GapError> {
+        let simulator = runs.simulator();
+        let specs = simulator.parameters();
+        let sd = |p: usize| {
+            let spec = &specs[p];
+            spec.wander.map(|w| w.sd).or(spec.per_trial_sd).or(spec.per_tick_sd)
+        };
+        let is_loose = |p: &usize| sd(*p).is_some();
+        let own = simulator.stages()[stage].parameters.iter().copied();
+        let parameters: Vec<usize> = own.filter(is_loose).collect();
+        let mut metric = Self { floor, loose: Vec::new(), nuisances: Vec::new() };
+        let trials = simulator.trials();
+        let plain = match parameters.is_empty() {
+            true => Vec::new(),
+            false => runs.output(stage, model, trials.len())?,
+        };
+        for &p in &parameters {
+            let spec = &specs[p];
+            let mut moved = model.clone();
+            moved.parameters[p] += sd(p).unwrap_or(0.0);
+            let mut column = runs.output(stage, &moved, trials.len())?;
+            for ((x, y), sd) in column.iter_mut().zip(&plain).zip(&metric.floor.sd) {
+                *x = (*x - y) / sd;
+            }
+            let always = || trials.iter().flat_map(|t| 0..t.samples as u32).collect();
+            let clock = simulator.wander_clock(p).unwrap_or_else(always);
+            if clock.len() < column.len() {
+                let (name, found, needed) = (&spec.name, clock.len(), column.len());
+                let what = format!("the wander clock of {name} has {found} samples of {needed}");
+                return Err(GapError::simulator(what));
+            }
+            let level = Level { size: 1.0, time_s: spec.wander.map_or(1.0, |w| w.correlation_s) };
+            let is_by_tick = spec.per_tick_sd.is_some();
+            let (column, clock) = (column.into(), clock.into());
+            metric.loose.push(Loose { column, clock, wander: spec.wander, is_by_tick, level });
+        }
+        if let Some(like) = like {
+            let pairs = metric.loose.iter_mut().zip(&like.loose);
+            pairs.for_each(|(own, other)| own.level = other.level);
+        }
+        metric.marginalise(frame, simulator.dt_s());
+        Ok(metric)
+    }
+
+    /// Factors of the nuisances as the loose parameters now are.
+    fn marginalise(&mut self, frame: &Frame, dt_s: f64) {
+        let one = |segment: &Segment| {
+            let range = segment.from..segment.to;
+            let (mut offsets, mut wandering) = (Vec::new(), Vec::new());
+            for loose in &self.loose {
+                let Level { size, time_s } = loose.level;
+                let part: Vec<f64> = loose.column[range.clone()].iter().map(|x| size * x).collect();
+                let clock = &loose.clock[range.clone()];
+                if loose.is_by_tick {
+                    let mut from = 0;
+                    for tick in clock.chunk_by(|a, b| a == b) {
+                        let values = part[from..from + tick.len()].to_vec();
+                        offsets.push(Patch { from, values });
+                        from += tick.len();
+                    }
+                } else if loose.wander.is_some() {
+                    wandering.push(Wandering::new(part, clock, time_s, dt_s));
+                } else {
+                    offsets.push(Patch { from: 0, values: part });
+                }
+            }
+            (!self.loose.is_empty()).then(|| Nuisance::new(offsets, wandering))
+        };
+        self.nuisances = frame.segments.iter().map(one).collect();
+    }
+
+    /// Parameters of the stage that wander or are offset in each trial.
+    pub(crate) fn loose(&self) -> &[Loose] {
+        &self.loose
+    }
+
+    /// The same with all of them at other levels.
+    pub(crate) fn with(
+        &self,
+        level: impl Fn(usize, Level) -> Level,
+        frame: &Frame,
+        dt_s: f64,
+    ) -> Self {
+        let mut other = self.clone();
+        let each = other.loose.iter_mut().enumerate();
+        each.for_each(|(i, loose)| loose.level = level(i, loose.level));
+        other.marginalise(frame, dt_s);
+        other
+    }
+
+    /// A column of values in floors over the first trials.
+    pub(crate) fn column(&self, frame: &Frame, values: Vec<f64>) -> Column {
+        let tails = frame
+            .segments
+            .iter()
+            .zip(&self.nuisances)
+            .map(|(segment, nuisance)| match nuisance {
+                Some(nuisance) if segment.to <= values.len() => {
+                    nuisance.tail(&values[segment.from..segment.to])
+                }
+                _ => Vec::new(),
+            })
+            .collect();
+        Column { values, tails }
+    }
+
+    /// x'V^-1 y over the segments in a role.
+    pub(crate) fn product(&self, frame: &Frame, x: &Column, y: &Column, role: Role) -> f64 {
+        let mut sum = 0.0;
+        for (i, segment) in frame.segments.iter().enumerate() {
+            if segment.role != role || segment.to > x.values.len() {
+                continue;
+            }
+            let range = segment.from..segment.to;
+            sum += dot(&x.values[range.clone()], &y.values[range]);
+            sum -= dot(&x.tails[i], &y.tails[i]);
+        }
+        sum
+    }
+
+    /// ln det V over the segments in a role.
+    pub(crate) fn ln_det(&self, frame: &Frame, role: Role) -> f64 {
+        let pairs = frame.segments.iter().zip(&self.nuisances).filter(|(s, _)| s.role == role);
+        pairs.filter_map(|(_, nuisance)| Some(nuisance.as_ref()?.ln_determinant())).sum()
+    }
+
+    /// 2 sum ln s over the segments in a role: what floors s add to it in the unit of the output.
+    pub(crate) fn ln_floors(&self, frame: &Frame, role: Role) -> f64 {
+        let own = frame.segments.iter().filter(|s| s.role == role);
+        let floors = own.flat_map(|s| &self.floor.sd[s.from..s.to]).filter(|sd| sd.is_finite());
+        2.0 * floors.map(|sd| sd.ln()).sum::<f64>()
+    }
+
+    /// Takes the most likely nuisances out of a residual in floors.
+    pub(crate) fn clean(&self, frame: &Frame, values: &mut [f64]) {
+        for (segment, nuisance) in frame.segments.iter().zip(&self.nuisances) {
+            if let Some(nuisance) = nuisance.as_ref().filter(|_| segment.to <= values.len()) {
+                nuisance.clean(&mut values[segment.from..segment.to]);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+impl Metric {
+    /// One parameter that wanders in one trial.
+    pub(crate) fn with_wander(
+        floor: Floor,
+        column: Vec<f64>,
+        wander: Wander,
+        frame: &Frame,
+        dt_s: f64,
+    ) -> Self {
+        let clock = (0..column.len() as u32).collect();
+        let column = column.into();
+        let level = Level { size: 1.0, time_s: wander.correlation_s };
+        let loose = vec![Loose { column, clock, wander: Some(wander), is_by_tick: false, level }];
+        let mut metric = Self { floor, loose, nuisances: Vec::new() };
+        metric.marginalise(frame, dt_s);
+        metric
+    }
+}

@@ -1,0 +1,23 @@
+//! Fits of one hypothesis, and what a fit is measured by.
+//!
+//! In: the runs and the frame of a problem. Out: a [`prepared::Problem`], re-tuned, in which any set of effects becomes a
+//! [`hypothesis::Hypothesis`]: a model, what it leaves of every stage, and a score.
+//! In the order of use: the noise of every stage ([`noise_level`], less [`isolated_outliers`]); residuals in multiples of it with
+//! slow drift and offsets marginalised ([`metric`], [`nuisance`], [`hyper_parameters`]); residuals and sensitivities of the
+//! stages ([`comparison`]); bounded Levenberg-Marquardt in scaled [`coordinate`]s ([`levenberg_marquardt`]); reduced
+//! chi-square and scores ([`score`], [`octaves`]); which parameters the data determine ([`identifiability`]).
+//! Imports: `numerics`, `problem`.
+
+pub(crate) mod comparison;
+pub(crate) mod coordinate;
+pub(crate) mod hyper_parameters;
+pub(crate) mod hypothesis;
+pub(crate) mod identifiability;
+pub(crate) mod isolated_outliers;
+pub(crate) mod levenberg_marquardt;
+pub(crate) mod metric;
+pub(crate) mod noise_level;
+pub(crate) mod nuisance;
+pub(crate) mod octaves;
+pub(crate) mod prepared;
+pub(crate) mod score;

@@ -1,0 +1,137 @@
+//! The floor of every stage: what no deterministic model could remove.
+//!
+//! ```text
+//! sigma_i^2 = sigma_own^2 + mean over draws and neighbours of (f(x + noise)_i - f(x)_i)^2
+//! ```
+//!
+//! Teacher forcing feeds a stage f with a *measured* input x, whose noise the stage transmits: an error in variables, which would pose
+//! as a gap where the output is steep.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use crate::{
+    fit::isolated_outliers::lone,
+    problem::{
+        error::GapError,
+        frame::Frame,
+        noise::Noise,
+        runs::Runs,
+        simulator::{Model, Run, Simulator},
+    },
+};
+
+/// Floor of one stage.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Floor {
+    /// One standard deviation at every sample of all trials, in the unit of the output; infinite where nothing was measured and where a
+    /// sample [stands alone](crate::fit::isolated_outliers).
+    pub(crate) sd: Vec<f64>,
+    /// Root mean square of it.
+    pub(crate) rms: f64,
+    pub(crate) source: String,
+}
+
+/// Draws of the inputs' noise.
+const DRAWS: u64 = 12;
+/// Half-width over which what arrives of them is averaged, in samples.
+const NEAR: usize = 12;
+
+/// Floors of all stages around a model.
+///
+/// The variance of the floor is that of the output's own noise, known or taken from the record's second differences,
+/// plus the *noise transmitted*: what of the measured input's noise arrives at the output, by Monte Carlo with the
+/// same draws for every model. It is larger where the output is steep or the input too quick to be smoothed, so the floor is one
+/// of every sample.
+pub(crate) fn floors_of(
+    runs: &Runs<'_>,
+    frame: &Frame,
+    model: &Model,
+    seed: u64,
+) -> Result<Vec<Floor>, GapError> {
+    let stages = 0..runs.simulator().stages().len();
+    stages.into_par_iter().map(|stage| floor(runs, frame, stage, model, seed)).collect()
+}
+
+fn floor(
+    runs: &Runs<'_>,
+    frame: &Frame,
+    stage: usize,
+    model: &Model,
+    seed: u64,
+) -> Result<Floor, GapError> {
+    let simulator = runs.simulator();
+    let output = runs.output(stage, model, simulator.trials().len())?;
+    let arrived = transmitted(runs, stage, model, &output, seed)?;
+    let samples = arrived.len();
+    let noise = match &simulator.stages()[stage].noise {
+        Some(noise) => noise.clone(),
+        None => of_record(simulator, frame, stage),
+    };
+    let (own, mut source) = (noise.sd().powi(2), noise.source().to_owned());
+    let mean = arrived.iter().sum::<f64>() / samples.max(1) as f64;
+    if mean > 1e-4 * own {
+        source += ", and the measured input's noise";
+    }
+    let mut end = 0;
+    let trials = simulator.trials().iter().map(|trial| {
+        end += trial.samples;
+        end - trial.samples..end
+    });
+    let trials: Vec<Range<usize>> = trials.collect();
+    let mut sd = Vec::with_capacity(samples);
+    for trial in &trials {
+        let part = &arrived[trial.clone()];
+        for i in 0..part.len() {
+            // A dozen draws tell a variance to 40 % only: neighbours of the same trial lend theirs.
+            let near = &part[i.saturating_sub(NEAR)..(i + NEAR + 1).min(part.len())];
+            let local = near.iter().sum::<f64>() / near.len() as f64;
+            sd.push((own + local).sqrt().max(1e-12));
+        }
+    }
+    // What was not measured weighs nothing, and what stands alone.
+    for (sd, _) in sd.iter_mut().zip(simulator.is_lost()).filter(|(_, lost)| **lost) {
+        *sd = f64::INFINITY;
+    }
+    let apart = simulator.measured(stage).iter().zip(&output).zip(&sd);
+    let residual: Vec<f64> = apart.map(|((m, s), sd)| (m - s) / sd).collect();
+    let lone = lone(&residual, trials.into_iter());
+    lone.iter().for_each(|&i| sd[i] = f64::INFINITY);
+    if !lone.is_empty() {
+        source += &format!("; samples that stand alone and do not count: {}", lone.len());
+    }
+    Ok(Floor { sd, rms: (own + mean).sqrt().max(1e-12), source })
+}
+
+/// Variance that the measured input's noise causes at every sample of the output, which is `plain` without it.
+fn transmitted(
+    runs: &Runs<'_>,
+    stage: usize,
+    model: &Model,
+    plain: &[f64],
+    seed: u64,
+) -> Result<Vec<f64>, GapError> {
+    let trials = runs.simulator().trials().len();
+    let run = Run::exact(stage, model, trials);
+    let mut arrived = vec![0.0; plain.len()];
+    for draw in 0..DRAWS {
+        let shaken = runs.run(Run { shake: Some(seed + 1000 * draw), ..run })?;
+        let mut any = false;
+        for ((sum, a), b) in arrived.iter_mut().zip(plain).zip(&shaken) {
+            *sum += (a - b) * (a - b) / DRAWS as f64;
+            any |= a != b;
+        }
+        // A stage whose input is commanded transmits nothing.
+        if !any {
+            break;
+        }
+    }
+    Ok(arrived)
+}
+
+/// Noise of the output of a stage, from the samples that may be looked at.
+fn of_record(simulator: &dyn Simulator, frame: &Frame, stage: usize) -> Noise {
+    let measured = simulator.measured(stage);
+    Noise::of_differences(frame.looked_at().map(|s| &measured[s.from..s.to]), simulator.dt_s())
+}

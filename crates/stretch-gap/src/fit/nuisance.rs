@@ -1,0 +1,276 @@
+//! Nuisances of one stretch of samples: slow wander and trial offsets of parameters, marginalised out of a residual.
+//!
+//! With columns C of what the nuisances could change (in floors, per unit of each), amplitudes b with prior precision P and
+//! white noise of one floor, a residual r has the covariance V = I + C P^-1 C'. By the matrix inversion lemma
+//!
+//! ```text
+//! x' V^-1 y = x'y - (L^-1 C'x)' (L^-1 C'y),     L L' = C'C + P
+//! ```
+//!
+//! (Rasmussen and Williams 2006, appendix A.3), so that a product of two columns costs a projection and a triangular solve each,
+//! and never a matrix as large as the record. The most likely amplitudes, with which a residual is drawn, are
+//! b = (C'C + P)^-1 C'r.
+
+use std::ops::Range;
+
+use crate::numerics::{
+    arrowhead::{Arrow, ArrowFactor},
+    linear::dot,
+};
+
+/// Distance of the knots, s: the process is rough, and straight lines between wide knots would pass what it does on the way to a
+/// quicker one.
+const KNOT_S: f64 = 0.1;
+
+/// Nuisances of one segment of one stage.
+#[derive(Debug, Clone)]
+pub(super) struct Nuisance {
+    /// Columns of offsets; their amplitudes have prior precision 1.
+    offsets: Vec<Patch>,
+    /// Columns of parameters that wander.
+    wandering: Vec<Wandering>,
+    /// L of the module's head.
+    factor: ArrowFactor,
+    ln_determinant: f64,
+}
+
+/// Sensitivity to an offset from one sample on, for as long as it lasts.
+#[derive(Debug, Clone)]
+pub(super) struct Patch {
+    pub(super) from: usize,
+    pub(super) values: Vec<f64>,
+}
+
+impl Patch {
+    fn dot(&self, x: &[f64]) -> f64 {
+        dot(&self.values, &x[self.from..self.from + self.values.len()])
+    }
+
+    /// Product with another one where both last.
+    fn overlap(&self, other: &Self) -> f64 {
+        let from = self.from.max(other.from);
+        let to = (self.from + self.values.len()).min(other.from + other.values.len());
+        if from >= to {
+            return 0.0;
+        }
+        dot(
+            &self.values[from - self.from..to - self.from],
+            &other.values[from - other.from..to - other.from],
+        )
+    }
+}
+
+/// Sensitivity to a wandering parameter, and the knots that each sample lies between.
+///
+/// The wander is linear between knots: sample i at the share w between knots k and k + 1 moves by
+/// s_i ((1 - w) b_k + w b_(k+1)). The clock of a sample is the time at which the wander last had a way into the output.
+#[derive(Debug, Clone)]
+pub(super) struct Wandering {
+    sensitivity: Vec<f64>,
+    /// Knot before, and share of the way to the next.
+    place: Vec<(u32, f64)>,
+    knots: usize,
+    /// Correlation of neighbouring knots, exp(-distance/correlation time).
+    kept: f64,
+}
+
+impl Wandering {
+    /// Of a wander of variance 1 and correlation time `time_s`; `clock` counts samples of `dt_s`.
+    pub(super) fn new(sensitivity: Vec<f64>, clock: &[u32], time_s: f64, dt_s: f64) -> Self {
+        let knot = ((KNOT_S / dt_s) as usize).max(1);
+        let first = clock.first().copied().unwrap_or(0);
+        let place: Vec<(u32, f64)> = clock
+            .iter()
+            .map(|c| {
+                let at = c.saturating_sub(first) as usize;
+                ((at / knot) as u32, (at % knot) as f64 / knot as f64)
+            })
+            .collect();
+        let knots = place.iter().map(|p| p.0 as usize).max().unwrap_or(0) + 2;
+        let step_s = knot as f64 * dt_s;
+        Self { sensitivity, place, knots, kept: (-step_s / time_s).exp() }
+    }
+
+    /// Sample, knot, weights of that knot and the next.
+    fn each(&self) -> impl Iterator<Item = (usize, usize, f64, f64)> {
+        self.within(0..self.place.len())
+    }
+
+    fn within(&self, samples: Range<usize>) -> impl Iterator<Item = (usize, usize, f64, f64)> {
+        samples.map(|i| {
+            let (s, (k, share)) = (self.sensitivity[i], self.place[i]);
+            (i, k as usize, (1.0 - share) * s, share * s)
+        })
+    }
+}
+
+impl Nuisance {
+    pub(super) fn new(offsets: Vec<Patch>, wandering: Vec<Wandering>) -> Self {
+        let factor = precision(&offsets, &wandering).factor();
+        // ln det P of chains of correlation rho with variance 1: -(K - 1) ln(1 - rho^2).
+        let prior = |w: &Wandering| -(w.knots as f64 - 1.0) * (1.0 - w.kept * w.kept).ln();
+        let prior: f64 = wandering.iter().map(prior).sum();
+        let ln_determinant = factor.ln_determinant() - prior;
+        Self { offsets, wandering, factor, ln_determinant }
+    }
+
+    /// ln det V = ln det(C'C + P) - ln det P.
+    pub(super) fn ln_determinant(&self) -> f64 {
+        self.ln_determinant
+    }
+
+    /// L^-1 C'x: what a product of columns loses to the nuisances.
+    pub(super) fn tail(&self, x: &[f64]) -> Vec<f64> {
+        let mut tail = project(&self.offsets, &self.wandering, x);
+        self.factor.forward(&mut tail);
+        tail
+    }
+
+    /// Takes the most likely nuisance out of a residual.
+    pub(super) fn clean(&self, x: &mut [f64]) {
+        let mut b = project(&self.offsets, &self.wandering, x);
+        self.factor.solve(&mut b);
+        let mut base = 0;
+        for wandering in &self.wandering {
+            for (i, k, this, next) in wandering.each() {
+                x[i] -= this * b[base + k] + next * b[base + k + 1];
+            }
+            base += wandering.knots;
+        }
+        for (offset, b) in self.offsets.iter().zip(&b[base..]) {
+            x[offset.from..].iter_mut().zip(&offset.values).for_each(|(x, d)| *x -= b * d);
+        }
+    }
+}
+
+/// C'x: the knots of what wanders, then the offsets.
+fn project(offsets: &[Patch], wandering: &[Wandering], x: &[f64]) -> Vec<f64> {
+    let mut out = Vec::new();
+    for wandering in wandering {
+        let base = out.len();
+        out.resize(base + wandering.knots, 0.0);
+        for (i, k, this, next) in wandering.each() {
+            out[base + k] += this * x[i];
+            out[base + k + 1] += next * x[i];
+        }
+    }
+    out.extend(offsets.iter().map(|d| d.dot(x)));
+    out
+}
+
+/// Posterior precision C'C + P. Two wanders of one stage are taken as orthogonal.
+fn precision(offsets: &[Patch], wandering: &[Wandering]) -> Arrow {
+    let knots = wandering.iter().map(|w| w.knots).sum();
+    let mut a = Arrow::zeros(knots, offsets.len());
+    for (i, column) in offsets.iter().enumerate() {
+        let mut base = 0;
+        for wandering in wandering {
+            let span = column.from..column.from + column.values.len();
+            for (sample, k, this, next) in wandering.within(span) {
+                let x = column.values[sample - column.from];
+                a.border[i][base + k] += this * x;
+                a.border[i][base + k + 1] += next * x;
+            }
+            base += wandering.knots;
+        }
+        for (j, other) in offsets.iter().enumerate() {
+            a.corner[i][j] = column.overlap(other);
+        }
+        a.corner[i][i] += 1.0;
+    }
+    let mut base = 0;
+    for wandering in wandering {
+        // A sample lies between two knots: C'C is tridiagonal there.
+        for (_, k, x, y) in wandering.each() {
+            let k = base + k;
+            a.diagonal[k] += x * x;
+            a.beside[k] += x * y;
+            a.diagonal[k + 1] += y * y;
+        }
+        // Inverse covariance of an Ornstein-Uhlenbeck process at even knots, of correlation rho between neighbours:
+        // (1, 1 + rho^2, ..., 1)/(1 - rho^2) on the diagonal, -rho/(1 - rho^2) beside it.
+        let (knots, kept) = (wandering.knots, wandering.kept);
+        let scale = 1.0 / (1.0 - kept * kept);
+        for k in 0..knots {
+            let inner = k > 0 && k + 1 < knots;
+            a.diagonal[base + k] += scale * if inner { 1.0 + kept * kept } else { 1.0 };
+            if k + 1 < knots {
+                a.beside[base + k] -= scale * kept;
+            }
+        }
+        base += knots;
+    }
+    a
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::random::Dice;
+    use testkit::tolerance::FIT_WELL;
+
+    const SAMPLES: usize = 60;
+
+    fn patch(from: usize, samples: usize) -> Patch {
+        Patch { from, values: vec![0.5; samples] }
+    }
+
+    fn nuisance() -> Nuisance {
+        let clock: Vec<u32> = (0..SAMPLES as u32).collect();
+        let slope: Vec<f64> = (0..SAMPLES).map(|i| 0.1 * i as f64).collect();
+        Nuisance::new(vec![patch(0, SAMPLES)], vec![Wandering::new(slope, &clock, 0.3, 0.01)])
+    }
+
+    /// x'V^-1 y = x'(y - C b) with the most likely b: two ways to the same product.
+    #[test]
+    fn the_product_is_that_with_a_cleaned_column() {
+        let mut dice = Dice::new(2, 0);
+        let [x, y] = [0, 1].map(|_| (0..SAMPLES).map(|_| dice.gauss()).collect::<Vec<f64>>());
+        let nuisance = nuisance();
+        let product = dot(&x, &y) - dot(&nuisance.tail(&x), &nuisance.tail(&y));
+        let mut cleaned = y.clone();
+        nuisance.clean(&mut cleaned);
+        approx::assert_relative_eq!(
+            product,
+            dot(&x, &cleaned),
+            max_relative = FIT_WELL,
+            epsilon = FIT_WELL
+        );
+    }
+
+    /// Two equal offsets at the same samples have twice the variance of one; at other samples they do not know of each other.
+    #[test]
+    fn offsets_share_what_they_explain() {
+        let mut dice = Dice::new(5, 0);
+        let x: Vec<f64> = (0..SAMPLES).map(|_| dice.gauss()).collect();
+        let lost = |nuisance: &Nuisance| dot(&nuisance.tail(&x), &nuisance.tail(&x));
+        let both = Nuisance::new(vec![patch(10, 20), patch(10, 20)], Vec::new());
+        let wide = Patch { from: 10, values: vec![0.5 * 2.0_f64.sqrt(); 20] };
+        let single = Nuisance::new(vec![wide], Vec::new());
+        approx::assert_relative_eq!(lost(&both), lost(&single), max_relative = FIT_WELL);
+        let apart = Nuisance::new(vec![patch(10, 20), patch(30, 20)], Vec::new());
+        let [one, other] = [10, 30].map(|from| Nuisance::new(vec![patch(from, 20)], Vec::new()));
+        approx::assert_relative_eq!(
+            lost(&apart),
+            lost(&one) + lost(&other),
+            max_relative = FIT_WELL
+        );
+    }
+
+    /// An offset alone against the closed form: V = I + cc', so 1'V^-1 1 = n - (n/2)^2/(1 + n/4) at c = 1/2.
+    #[test]
+    fn an_offset_is_taken_out_as_far_as_its_prior_says() {
+        let nuisance = Nuisance::new(vec![patch(0, SAMPLES)], Vec::new());
+        let (ones, n) = (vec![1.0; SAMPLES], SAMPLES as f64);
+        let tail = nuisance.tail(&ones);
+        let expected = n - (0.5 * n).powi(2) / (1.0 + 0.25 * n);
+        // A difference of numbers as large as n.
+        approx::assert_abs_diff_eq!(n - dot(&tail, &tail), expected, epsilon = FIT_WELL * n);
+        let ln_determinant = (1.0 + 0.25 * n).ln();
+        approx::assert_abs_diff_eq!(
+            nuisance.ln_determinant(),
+            ln_determinant,
+            epsilon = FIT_WELL * n
+        );
+    }
+}

@@ -1,0 +1,349 @@
+//! The problem, prepared: a simulator beside its measurements, re-tuned, with everything that hypotheses are scored by.
+//!
+//! Preparation runs once, in an order in which each part needs the ones before:
+//!
+//! 1. the frame; floors and metrics around the parameters as shipped;
+//! 2. a first re-tuning: maximum a posteriori within the tolerances;
+//! 3. floors and metrics around what it found, for sensitivities have moved; a second re-tuning in them;
+//! 4. the effective sample size of every stage and the noise transmitted, both at the re-tuned nominal, so that they are the same
+//!    for every hypothesis.
+//!
+//! What exists is complete: nothing of a [`Problem`] is set later.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use crate::{
+    fit::{
+        comparison::{Comparison, Sensitivities},
+        coordinate::{choice_cost, form_cost, free_parameters},
+        hypothesis::Hypothesis,
+        identifiability::{Identified, Information, identified},
+        levenberg_marquardt::{Effort, FINE, Fitted},
+        score::{Misfit, Observations, gap, score},
+    },
+    problem::{
+        error::GapError,
+        frame::{Frame, Role},
+        linked_stages::groups,
+        runs::Runs,
+        simulator::{Model, Run, Simulator},
+    },
+};
+
+/// Root mean square change in floors that a halved step of integration may make: a tenth, a hundredth of the floor's square.
+const SOLVED: f64 = 0.1;
+
+/// Steps of integration that are tried first, as a multiple of the simulator's own.
+const LONGER: f64 = 2.0;
+
+/// Rise of the nuisances' likelihood for which all is done again, nats: what a parameter costs.
+const LEARNT: f64 = 5.0;
+
+/// Everything that a search needs.
+pub(crate) struct Problem<'a> {
+    pub(crate) compare: Comparison<'a>,
+    /// Parameters as shipped.
+    pub(crate) shipped: Model,
+    /// Re-tuned, without effects.
+    pub(crate) nominal: Hypothesis,
+    /// What that says of the nominal parameters.
+    information: Vec<Information>,
+    /// By stage: samples that count as one observation.
+    memory: Vec<f64>,
+    /// By stage: how much its samples count.
+    observations: Vec<Observations>,
+    /// By stage: noise that the re-tuned nominal transmits.
+    transmitted: Vec<Misfit>,
+}
+
+impl<'a> Problem<'a> {
+    /// Frame, floors, metrics, re-tuning, sample sizes and noise transmitted.
+    ///
+    /// # Errors
+    /// [`GapError::Solver`] when the step of integration shows, [`GapError::TooLittle`] without anything to fit,
+    /// [`GapError::Measured`] where measurements are missing, and what the simulator says.
+    pub(crate) fn prepare(
+        simulator: &'a dyn Simulator,
+        stop: &'a (dyn Fn() -> bool + Sync),
+        seed: u64,
+        progress: &dyn Fn(&str),
+    ) -> Result<Self, GapError> {
+        let runs = Runs::new(simulator, stop)?;
+        // Twice the step, where that is within what half of it may change; runs that are counted may be another's program.
+        if simulator.model_runs().is_none() {
+            match Self::at(runs.at_step(LONGER), seed, progress) {
+                Err(GapError::Solver { .. }) => {}
+                prepared => return prepared,
+            }
+        }
+        Self::at(runs, seed, progress)
+    }
+
+    fn at(runs: Runs<'a>, seed: u64, progress: &dyn Fn(&str)) -> Result<Self, GapError> {
+        let simulator = runs.simulator();
+        let frame = Frame::of(simulator)?;
+        let shipped = Model::nominal(simulator);
+        progress("floors");
+        let rough = Comparison::around(runs.clone(), frame.clone(), &shipped, None, seed)?;
+        progress("re-tuning the nominal parameters");
+        let (first, _) = retuned(&rough, &shipped)?;
+        let compare = Comparison::around(runs, frame, &first.model, None, seed)?;
+        Self::of(compare, shipped, &first.model)
+    }
+
+    /// The problem with nuisances as large and as quick as a model leaves them; none where they are so already.
+    pub(crate) fn adapted(&self, model: &Model, seed: u64) -> Result<Option<Self>, GapError> {
+        let mut compare = self.compare.clone();
+        if compare.adapt(model)? < LEARNT {
+            return Ok(None);
+        }
+        let (runs, frame) = (compare.runs.clone(), compare.frame.clone());
+        let like = Some(compare.metrics.as_slice());
+        let compare = Comparison::around(runs, frame, &self.nominal.model, like, seed)?;
+        Self::of(compare, self.shipped.clone(), &self.nominal.model).map(Some)
+    }
+
+    /// Re-tuned in metrics that stand.
+    fn of(compare: Comparison<'a>, shipped: Model, start: &Model) -> Result<Self, GapError> {
+        let (nominal, information) = retuned(&compare, start)?;
+        let stages = compare.metrics.len();
+        let memory: Result<Vec<f64>, GapError> = (0..stages)
+            .into_par_iter()
+            .map(|s| compare.samples_per_observation(s, &nominal.model))
+            .collect();
+        let memory = memory?;
+        let count = |role, memory: f64| compare.frame.count(role) as f64 / memory;
+        let observations = memory
+            .iter()
+            .map(|&m| Observations { fit: count(Role::Fit, m), held: count(Role::Held, m) })
+            .collect();
+        let transmitted: Result<_, GapError> =
+            (0..stages).into_par_iter().map(|s| compare.transmitted(s, &nominal.model)).collect();
+        solver_check(&compare, &nominal.model)?;
+        let transmitted = transmitted?;
+        Ok(Self { compare, shipped, nominal, information, memory, observations, transmitted })
+    }
+
+    /// The same problem beside another simulator of the same stages and parameters.
+    pub(crate) fn beside<'b>(&self, simulator: &'b dyn Simulator) -> Problem<'b>
+    where
+        'a: 'b,
+    {
+        Problem {
+            compare: self.compare.beside(simulator, self.compare.metrics.clone()),
+            shipped: self.shipped.clone(),
+            nominal: self.nominal.clone(),
+            information: self.information.clone(),
+            memory: self.memory.clone(),
+            observations: self.observations.clone(),
+            transmitted: self.transmitted.clone(),
+        }
+    }
+
+    pub(crate) fn simulator(&self) -> &'a dyn Simulator {
+        self.compare.simulator()
+    }
+
+    pub(crate) fn stop(&self) -> &'a (dyn Fn() -> bool + Sync) {
+        self.compare.runs.stop()
+    }
+
+    /// Whether the simulator's budget allows no more than what the answer itself needs.
+    pub(crate) fn is_spent(&self) -> bool {
+        self.compare.runs.is_spent()
+    }
+
+    /// Which nominal parameters the data determine.
+    pub(crate) fn identified(&self) -> Vec<Identified> {
+        identified(self.simulator().parameters(), &self.nominal.model, &self.information)
+    }
+
+    /// [`Comparison::fit`], misfits at equal noise transmitted.
+    pub(crate) fn fit(
+        &self,
+        stages: &[usize],
+        start: Model,
+        known: &[Option<Sensitivities>],
+        effort: Effort,
+    ) -> Result<Fitted, GapError> {
+        let mut fitted = self.compare.fit(stages, start, known, effort)?;
+        let effects = self.simulator().effects();
+        for misfit in &mut fitted.misfits {
+            let stage = misfit.stage;
+            let acts = |(e, _): &(usize, Vec<f64>)| effects[*e].touches.contains(&stage);
+            let nominal = &self.transmitted[stage];
+            if nominal.fit > 0.0 && fitted.model.effects.iter().any(acts) {
+                let own = self.compare.transmitted(stage, &fitted.model)?;
+                let gap = self.gap_in(&self.nominal, stage);
+                *misfit = misfit.at_equal_noise(nominal, &own, gap);
+            }
+        }
+        Ok(fitted)
+    }
+
+    /// Score of a hypothesis's misfits and model against the re-tuned nominal, nats.
+    pub(crate) fn score(&self, misfits: &[Misfit], model: &Model) -> f64 {
+        let simulator = self.simulator();
+        let free = free_parameters(simulator, model);
+        let blocks = self.compare.frame.blocks(Role::Fit);
+        score(&self.nominal.misfits, misfits, &self.observations, free, blocks)
+            - form_cost(simulator, model)
+            - choice_cost(simulator, model)
+    }
+
+    /// Stages whose parameters wander or are offset in each trial.
+    pub(crate) fn loose_stages(&self) -> impl Iterator<Item = usize> {
+        let all = self.compare.metrics.iter().enumerate();
+        all.filter(|(_, m)| !m.loose().is_empty()).map(|(stage, _)| stage)
+    }
+
+    /// Effects that act in a stage with loose parameters: what they do, nuisances may have done.
+    pub(crate) fn is_in_loose_stage(&self, effect: usize) -> bool {
+        let touches = &self.simulator().effects()[effect].touches;
+        self.loose_stages().any(|stage| touches.contains(&stage))
+    }
+
+    /// Least spectral level of what a hypothesis leaves in each stage with loose parameters.
+    pub(crate) fn levels(&self, hypothesis: &Hypothesis) -> Result<Vec<f64>, GapError> {
+        let one = |stage| {
+            let residual = self.compare.residual_values(stage, &hypothesis.model)?;
+            Ok(self.compare.metrics[stage].spectral_level(&self.compare.frame, &residual).max(1.0))
+        };
+        self.loose_stages().map(one).collect()
+    }
+
+    /// Log-likelihood of a hypothesis in the stages with loose parameters, their nuisances marginalised and the sizes of these
+    /// integrated over, what the effects cost taken off, nats; `levels` as of [`Problem::levels`].
+    pub(crate) fn likelihood(
+        &self,
+        hypothesis: &Hypothesis,
+        levels: &[f64],
+    ) -> Result<f64, GapError> {
+        let mut model = hypothesis.model.clone();
+        model.effects.retain(|(e, _)| self.is_in_loose_stage(*e));
+        let simulator = self.simulator();
+        let blocks = self.compare.frame.blocks(Role::Fit);
+        let free = free_parameters(simulator, &model) as f64;
+        let price = 0.5 * free * blocks.ln()
+            + form_cost(simulator, &model)
+            + choice_cost(simulator, &model);
+        let mut sum = -price;
+        for (stage, level) in self.loose_stages().zip(levels) {
+            let residual = self.compare.residual_values(stage, &hypothesis.model)?;
+            let metric = &self.compare.metrics[stage];
+            sum += metric.evidence(&self.compare.frame, simulator.dt_s(), &residual, level.sqrt());
+        }
+        Ok(sum)
+    }
+
+    /// Log-likelihood of a hypothesis, nats: of the records themselves, so that two problems of the same records compare.
+    ///
+    /// ```text
+    /// l = -(1/block) sum over stages [ (N/2) ln max(X, 1) + (1/2) ln det V + sum ln s_i ] - penalties
+    /// ```
+    ///
+    /// with floors s_i, the metric V and the reduced chi-square X over fitted and held-out samples: a model may leave more than its
+    /// noise, but noise that is foretold too large is no better for it. One observation a block, whatever the residual's own memory is.
+    pub(crate) fn log_likelihood(&self, hypothesis: &Hypothesis) -> f64 {
+        let (compare, frame) = (&self.compare, &self.compare.frame);
+        let mut sum = 0.0;
+        for (misfit, metric) in hypothesis.misfits.iter().zip(&compare.metrics) {
+            for (role, x) in [(Role::Fit, misfit.fit), (Role::Held, misfit.held)] {
+                sum += 0.5 * frame.count(role) as f64 * x.max(1.0).ln();
+                sum += 0.5 * (metric.ln_det(frame, role) + metric.ln_floors(frame, role));
+            }
+        }
+        let free = free_parameters(self.simulator(), &hypothesis.model) as f64;
+        -compare.weight() * sum - 0.5 * free * frame.blocks(Role::Fit).ln()
+    }
+
+    /// Rise of the log-likelihood from one hypothesis to another by the [octaves](crate::fit::octaves) of what they leave, nats.
+    pub(crate) fn rise(&self, base: &Hypothesis, next: &Hypothesis) -> f64 {
+        let pairs = base.misfits.iter().zip(&next.misfits);
+        pairs.map(|(a, b)| a.octaves.rise(&b.octaves)).sum()
+    }
+
+    /// Whether what is left where most is left is less than the noise of the measured input that arrives there.
+    pub(crate) fn is_transmitted(&self, hypothesis: &Hypothesis) -> bool {
+        let left = |stage: &usize| self.gap_in(hypothesis, *stage);
+        let stages = 0..hypothesis.misfits.len();
+        let worst = stages.max_by(|a, b| left(a).total_cmp(&left(b)));
+        worst.is_some_and(|stage| left(&stage) < self.transmitted[stage].fit)
+    }
+
+    /// Share of a stage's floor that noise of its measured input makes.
+    pub(crate) fn transmits(&self, stage: usize) -> f64 {
+        self.transmitted[stage].fit
+    }
+
+    /// Excess of one stage over fitted and held-out samples together.
+    pub(crate) fn gap_in(&self, hypothesis: &Hypothesis, stage: usize) -> f64 {
+        gap(self.compare.mean_square(&hypothesis.misfits[stage]))
+    }
+
+    /// What a hypothesis closes of one stage that another leaves. Floors are known to some per cent: what is closed below them
+    /// counts as well.
+    pub(crate) fn closes(&self, base: &Hypothesis, next: &Hypothesis, stage: usize) -> f64 {
+        let mean_square = |h: &Hypothesis| self.compare.mean_square(&h.misfits[stage]);
+        mean_square(base) - mean_square(next)
+    }
+
+    /// The same summed over stages.
+    pub(crate) fn gap(&self, hypothesis: &Hypothesis) -> f64 {
+        (0..hypothesis.misfits.len()).map(|stage| self.gap_in(hypothesis, stage)).sum()
+    }
+
+    /// Least samples per observation of all stages, as a share of a block.
+    pub(crate) fn finest(&self) -> f64 {
+        let memory = self.memory.iter().copied().fold(f64::INFINITY, f64::min);
+        (memory / self.compare.frame.block as f64).min(1.0)
+    }
+}
+
+/// Every stage re-tuned on its own, those that share a parameter together: without effects no other stage knows of it.
+fn retuned(
+    compare: &Comparison<'_>,
+    start: &Model,
+) -> Result<(Hypothesis, Vec<Information>), GapError> {
+    let simulator = compare.simulator();
+    for stage in 0..compare.metrics.len() {
+        simulator.linearise(stage, start, compare.frame.fit_trials)?;
+    }
+    let groups = groups(simulator);
+    let fits: Result<Vec<_>, GapError> =
+        groups.par_iter().map(|group| compare.fit(group, start.clone(), &[], FINE)).collect();
+    let mut model = start.clone();
+    let mut misfits = Vec::new();
+    let mut parameter_sd = vec![0.0; model.parameters.len()];
+    let mut information = Vec::new();
+    for (group, fitted) in groups.iter().zip(fits?) {
+        fitted.parameter_sd.iter().for_each(|(p, sd)| parameter_sd[*p] = *sd);
+        for &p in group.iter().flat_map(|stage| &simulator.stages()[*stage].parameters) {
+            model.parameters[p] = fitted.model.parameters[p];
+        }
+        misfits.extend(fitted.misfits);
+        information.push(fitted.information);
+    }
+    misfits.sort_by_key(|misfit| misfit.stage);
+    let (effects, effect_sd) = (Vec::new(), BTreeMap::new());
+    let all = Hypothesis { effects, model, misfits, effect_sd, parameter_sd, score: 0.0 };
+    Ok((all, information))
+}
+
+/// Refuses a simulator whose step of integration shows: its error would be named as an effect.
+fn solver_check(compare: &Comparison<'_>, model: &Model) -> Result<(), GapError> {
+    for (stage, metric) in compare.metrics.iter().enumerate() {
+        let run = Run::exact(stage, model, compare.frame.fit_trials);
+        let plain = compare.runs.run(run)?;
+        let fine = compare.runs.run(Run { step: 0.5, ..run })?;
+        let square: f64 = plain.iter().zip(&fine).map(|(a, b)| (a - b) * (a - b)).sum();
+        let moved = (square / plain.len().max(1) as f64).sqrt() / metric.floor.rms;
+        if moved > SOLVED {
+            let stage = compare.simulator().stages()[stage].name.clone();
+            return Err(GapError::Solver { stage, moved });
+        }
+    }
+    Ok(())
+}

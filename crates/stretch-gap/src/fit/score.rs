@@ -1,0 +1,156 @@
+//! What a residual is worth: reduced chi-square, effective sample size, and the score of one hypothesis beside another.
+//!
+//! Residuals r are in units of the floor, nuisance taken out. Their mean square is the *reduced chi-square*
+//!
+//! ```text
+//! X = (1/N) sum r_i^2,     excess = X - 1
+//! ```
+//!
+//! 1 where only noise is left; the *excess* is what a model gets wrong, in units of the noise's variance. Neighbouring
+//! residuals are alike, so N samples count as the *effective sample size* N/m only, where the integral
+//! time of the squares is (Bartlett 1946, doi 10.2307/2983611)
+//!
+//! ```text
+//! m = 1 + 2 sum_k rho_k^2
+//! ```
+//!
+//! With the noise's variance profiled out, the Gaussian log-likelihood of N/m observations is -(N/2m) ln X; two
+//! hypotheses differ in it by
+//!
+//! ```text
+//! S = sum over stages of (N/2m) ln(X_nominal/X) - (k/2) ln(blocks)
+//! ```
+//!
+//! with Schwarz's penalty for k free parameters (1978, doi 10.1214/aos/1176344136), counted in blocks. Held-out samples
+//! enter with their own N and X and need no penalty.
+
+use crate::{fit::octaves::Octaves, numerics::linear::dot};
+
+/// Mean squares of one stage in units of its floor: the reduced chi-square over fitted and over held-out samples.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Misfit {
+    pub(crate) stage: usize,
+    pub(crate) fit: f64,
+    pub(crate) held: f64,
+    /// Of both together.
+    pub(crate) octaves: Octaves,
+}
+
+/// How much the samples of one stage count: fitted, held out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Observations {
+    pub(crate) fit: f64,
+    pub(crate) held: f64,
+}
+
+/// Share by which the noise of an input may be larger than was taken: heavy tails pass for little where a robust deviation is asked.
+const LARGER: f64 = 0.5;
+/// Share of a mean square that is left at least when noise is taken from it.
+const LEAST_KEPT: f64 = 0.1;
+
+/// The one definition: reduced chi-square minus one.
+pub(crate) fn excess(reduced_chi_square: f64) -> f64 {
+    reduced_chi_square - 1.0
+}
+
+/// The gap that an excess stands for: chance may leave less than the floor, which is no gap.
+pub(crate) fn gap(reduced_chi_square: f64) -> f64 {
+    excess(reduced_chi_square).max(0.0)
+}
+
+/// Mean of the blocks' mean squares; 1, which is no excess, where there is no block.
+pub(crate) fn mean_square(blocks: &[f64]) -> f64 {
+    if blocks.is_empty() { 1.0 } else { blocks.iter().sum::<f64>() / blocks.len() as f64 }
+}
+
+impl Misfit {
+    /// Misfit of a hypothesis beside the re-tuned nominal, each with the noise of the *measured input* that it transmits.
+    ///
+    /// X holds what arrives of that noise at the output. A slow amplifier or a slipping sleeve transmits less of it, and would
+    /// win wherever the input is noisy, whether it exists or not. So hypotheses are compared at equal noise transmitted:
+    /// X + k (T_nominal - T), where T is the noise transmitted, in floors. It is known to a factor only, and a gap may be noise that is
+    /// larger than was taken: k is what would make the nominal's gap of it, [`LARGER`] at most, where less is transmitted.
+    pub(crate) fn at_equal_noise(self, nominal: &Self, own: &Self, gap: f64) -> Self {
+        let larger = 1.0 + (gap / nominal.fit.max(f64::MIN_POSITIVE)).min(LARGER);
+        // Where the noise is known too large, more could be taken away than there is.
+        let level = |x: f64, nominal: f64, own: f64| {
+            let known = if nominal > own { larger } else { 1.0 };
+            (x + known * (nominal - own)).max(LEAST_KEPT * x)
+        };
+        Self {
+            fit: level(self.fit, nominal.fit, own.fit),
+            held: level(self.held, nominal.held, own.held),
+            octaves: self.octaves.at_equal_noise(&nominal.octaves, &own.octaves, larger),
+            ..self
+        }
+    }
+}
+
+/// Samples of a residual that count as one observation of its mean square: m of the module's head, at most a block.
+///
+/// `parts` are stretches without a break; correlations are summed up to two blocks.
+pub(crate) fn samples_per_observation(parts: &[&[f64]], block: usize) -> f64 {
+    let product = |lag: usize| -> f64 {
+        let long = parts.iter().filter(|p| p.len() > lag);
+        long.map(|p| dot(&p[lag..], &p[..p.len() - lag])).sum()
+    };
+    let power = product(0).max(1e-300);
+    let sum: f64 = (1..=2 * block).map(|lag| (product(lag) / power).powi(2)).sum();
+    (1.0 + 2.0 * sum).min(block as f64)
+}
+
+/// S of the module's head, before the priors of forms.
+pub(crate) fn score(
+    nominal: &[Misfit],
+    misfits: &[Misfit],
+    observations: &[Observations],
+    free: usize,
+    blocks: f64,
+) -> f64 {
+    let mut sum = -0.5 * free as f64 * blocks.ln();
+    for (a, b) in nominal.iter().zip(misfits) {
+        let n = &observations[a.stage];
+        sum += 0.5 * n.fit * (a.fit / b.fit).ln() + 0.5 * n.held * (a.held / b.held).ln();
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::random::Dice;
+    use testkit::tolerance::{EFFECTIVE_SIZE, F64_ROUNDING};
+
+    #[test]
+    fn samples_count_as_far_as_they_are_alike() {
+        let mut dice = Dice::new(4, 0);
+        let white: Vec<f64> = (0..40_000).map(|_| dice.gauss()).collect();
+        let kept = 0.8_f64;
+        let mut x = 0.0;
+        let red: Vec<f64> = white
+            .iter()
+            .map(|w| {
+                x = kept * x + w;
+                x
+            })
+            .collect();
+        // Of a first-order process 1 + 2 sum rho^2k = (1 + rho^2)/(1 - rho^2); 100 chance correlations of 1/40 000 each add.
+        let theory = (1.0 + kept * kept) / (1.0 - kept * kept);
+        let found = samples_per_observation(&[&red], 50);
+        approx::assert_relative_eq!(found, theory, epsilon = 0.0, max_relative = EFFECTIVE_SIZE);
+        let found = samples_per_observation(&[&white], 50);
+        approx::assert_relative_eq!(found, 1.0, epsilon = 0.0, max_relative = EFFECTIVE_SIZE);
+    }
+
+    #[test]
+    fn what_is_transmitted_less_is_no_better_fit() {
+        let of = |x: f64| Misfit { fit: x, held: x, ..Misfit::default() };
+        let level = |gap| of(1.2).at_equal_noise(&of(0.5), &of(0.2), gap).fit;
+        approx::assert_relative_eq!(level(0.0), 1.5, max_relative = F64_ROUNDING);
+        // A gap of a tenth could be noise a fifth larger; one of ten floors could not.
+        approx::assert_relative_eq!(level(0.1), 1.56, max_relative = F64_ROUNDING);
+        approx::assert_relative_eq!(level(10.0), 1.65, max_relative = F64_ROUNDING);
+        // What transmits more is helped by no doubt.
+        assert_eq!(of(1.0).at_equal_noise(&of(0.0), &of(5.0), 9.0).held, LEAST_KEPT);
+    }
+}

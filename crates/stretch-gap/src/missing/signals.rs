@@ -1,0 +1,189 @@
+//! What was recorded, as terms see it: signals on a scale of their own, so that no term depends on a unit.
+//!
+//! ```text
+//! x = (signal - offset)/scale      0 .. 1 over the samples that are fitted; a command as it is
+//! v = (dx/dt)/rate                 of root mean square 1 there
+//! ```
+//!
+//! Scales are taken from fitted samples only, memories begin anew with every trial and look back only, and rates are
+//! differences within what may be fitted or within what is tested: nothing that is fitted has seen a test sample.
+
+use std::ops::Range;
+
+use stretch_effects::Grid;
+
+use crate::{
+    numerics::extent::ends,
+    problem::{
+        error::GapError,
+        frame::{Frame, Role},
+        simulator::{Recorded, Simulator},
+    },
+};
+
+/// A signal on its own scale.
+#[derive(Debug, Clone)]
+pub(crate) struct Signal {
+    pub(crate) name: String,
+    pub(crate) unit: String,
+    pub(crate) offset: f64,
+    pub(crate) scale: f64,
+    /// What v is counted in, 1/s.
+    pub(crate) rate: f64,
+    pub(crate) is_command: bool,
+    /// x, all trials end to end.
+    pub(crate) x: Vec<f64>,
+    /// v, the same.
+    pub(crate) v: Vec<f64>,
+}
+
+/// Signals, trials and clocks of a session.
+#[derive(Debug, Clone)]
+pub(crate) struct Record {
+    pub(crate) signals: Vec<Signal>,
+    /// Samples of each trial.
+    pub(crate) trials: Vec<Range<usize>>,
+    /// Session time of each trial's first sample since the first one's, s.
+    pub(crate) starts_s: Vec<f64>,
+    /// Longest fitted stretch and length of the session up to the last fitted sample, s: what time is counted in.
+    pub(crate) trial_s: f64,
+    pub(crate) session_s: f64,
+    /// One step a sample.
+    pub(crate) grid: Grid,
+}
+
+/// Squared correlation above which two signals say the same.
+const SAME: f64 = 0.998;
+
+impl Record {
+    /// Signals that may act in a stage: everything recorded but its own channel, in whose place stands what the model makes
+    /// of it (`own`, all trials end to end), which holds no noise.
+    pub(crate) fn of(
+        simulator: &dyn Simulator,
+        frame: &Frame,
+        stage: usize,
+        own: Vec<f64>,
+    ) -> Result<Self, GapError> {
+        let spec = &simulator.stages()[stage];
+        let (trials, dt_s) = (simulator.trials(), simulator.dt_s());
+        let mut ranges = Vec::new();
+        let mut begin = 0;
+        for trial in trials {
+            ranges.push(begin..begin + trial.samples);
+            begin += trial.samples;
+        }
+        let grid = Grid::samples(dt_s).map_err(|e| GapError::simulator(e.to_string()))?;
+        let first_s = trials.first().map_or(0.0, |t| t.start_s);
+        let fitted = || frame.of_role(Role::Fit);
+        let end_s = |s: &crate::problem::frame::Segment| {
+            let trial = &ranges[s.trial];
+            trials[s.trial].start_s - first_s + (s.to - trial.start) as f64 * dt_s
+        };
+        let longest = fitted().map(|s| s.to - s.from).max().unwrap_or(1);
+        let mut record = Self {
+            signals: Vec::new(),
+            starts_s: trials.iter().map(|t| t.start_s - first_s).collect(),
+            trial_s: longest as f64 * dt_s,
+            session_s: fitted().map(end_s).fold(dt_s, f64::max),
+            trials: ranges,
+            grid,
+        };
+        let mut all = simulator.recorded();
+        all.retain(|s| s.name != spec.channel && s.values.len() >= begin);
+        all.push(Recorded::measured(&spec.channel, &spec.unit, own));
+        for signal in all {
+            let Some(signal) = Signal::of(signal, frame, dt_s) else { continue };
+            if record.signals.iter().all(|other| alike(other, &signal, frame) < SAME) {
+                record.signals.push(signal);
+            }
+        }
+        Ok(record)
+    }
+
+    /// Samples of the first `trials` trials.
+    pub(crate) fn samples(&self, trials: usize) -> usize {
+        self.trials[..trials].last().map_or(0, |t| t.end)
+    }
+
+    /// Indices of signals that are commands, or that are not.
+    pub(crate) fn of_kind(&self, commands: bool) -> Vec<usize> {
+        (0..self.signals.len()).filter(|&i| self.signals[i].is_command == commands).collect()
+    }
+
+    /// x at a quantile of the fitted samples.
+    pub(crate) fn quantile(&self, signal: usize, share: f64, frame: &Frame) -> f64 {
+        let x = &self.signals[signal].x;
+        let mut sorted: Vec<f64> =
+            frame.of_role(Role::Fit).flat_map(|s| &x[s.from..s.to]).copied().collect();
+        sorted.sort_by(f64::total_cmp);
+        let at = (share * (sorted.len().max(1) - 1) as f64) as usize;
+        sorted.get(at).copied().unwrap_or(share)
+    }
+}
+
+impl Signal {
+    /// None where it does not move in what is fitted.
+    fn of(recorded: Recorded, frame: &Frame, dt_s: f64) -> Option<Self> {
+        let Recorded { name, unit, mut values, is_command } = recorded;
+        let (low, high) =
+            ends(frame.of_role(Role::Fit).flat_map(|part| &values[part.from..part.to]));
+        if !(high - low > 0.0 && (high - low).is_finite()) {
+            return None;
+        }
+        let (offset, scale) = if is_command { (0.0, 1.0) } else { (low, high - low) };
+        values.iter_mut().for_each(|x| *x = (*x - offset) / scale);
+        let mut v = rates(&values, frame, dt_s);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for segment in frame.of_role(Role::Fit) {
+            sum += v[segment.from..segment.to].iter().map(|v| v * v).sum::<f64>();
+            count += (segment.to - segment.from) as f64;
+        }
+        let rate = (sum / f64::max(count, 1.0)).sqrt().max(f64::MIN_POSITIVE);
+        v.iter_mut().for_each(|v| *v /= rate);
+        Some(Self { name, unit, offset, scale, rate, is_command, x: values, v })
+    }
+}
+
+/// Central differences within what is tested and within what is not, 1/s.
+fn rates(x: &[f64], frame: &Frame, dt_s: f64) -> Vec<f64> {
+    let mut out = vec![0.0; x.len()];
+    let mut parts: Vec<(usize, bool, Range<usize>)> = Vec::new();
+    for s in &frame.segments {
+        let is_test = s.role == Role::Test;
+        match parts.last_mut() {
+            Some((trial, tested, range))
+                if *trial == s.trial && *tested == is_test && range.end == s.from =>
+            {
+                range.end = s.to;
+            }
+            _ => parts.push((s.trial, is_test, s.from..s.to)),
+        }
+    }
+    for (_, _, range) in parts {
+        let last = range.end - 1;
+        for i in range.clone() {
+            let (a, b) = (i.saturating_sub(1).max(range.start), (i + 1).min(last));
+            if b > a {
+                out[i] = (x[b] - x[a]) / ((b - a) as f64 * dt_s);
+            }
+        }
+    }
+    out
+}
+
+/// Squared correlation over the fitted samples.
+fn alike(a: &Signal, b: &Signal, frame: &Frame) -> f64 {
+    let (mut n, mut x, mut y, mut xx, mut yy, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    for s in frame.of_role(Role::Fit) {
+        for (a, b) in a.x[s.from..s.to].iter().zip(&b.x[s.from..s.to]) {
+            n += 1.0;
+            x += a;
+            y += b;
+            xx += a * a;
+            yy += b * b;
+            xy += a * b;
+        }
+    }
+    let own = (xx - x * x / n) * (yy - y * y / n);
+    if own > 0.0 { (xy - x * y / n).powi(2) / own } else { 0.0 }
+}

@@ -1,0 +1,114 @@
+//! Columns of a record, and what may have happened to one between the rig and the file.
+
+use std::borrow::Cow;
+
+use crate::problem::spec::StageSpec;
+
+/// What a recorder made of a channel: recorded(t) = offset + scale true(t - delay_s).
+///
+/// ```
+/// use stretch_gap::Distortion;
+/// let late = Distortion { scale: 2.0, offset: 1.0, delay_s: 0.1 };
+/// // A ramp of one unit a second, sampled ten times a second, begins one sample late and is held until then.
+/// assert_eq!(late.distorted(&[0.0, 0.1, 0.2], 0.1), [1.0, 1.0, 1.2]);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Distortion {
+    /// Factor, not 0.
+    pub scale: f64,
+    /// Offset, in the unit of the column.
+    pub offset: f64,
+    /// Delay, s.
+    pub delay_s: f64,
+}
+
+impl Default for Distortion {
+    /// None.
+    fn default() -> Self {
+        Self { scale: 1.0, offset: 0.0, delay_s: 0.0 }
+    }
+}
+
+impl Distortion {
+    /// What the recorder would have written of one trial of a true channel, sampled every `dt_s` seconds.
+    pub fn distorted(&self, channel: &[f64], dt_s: f64) -> Vec<f64> {
+        let late = shifted(channel, -self.delay_s / dt_s);
+        late.into_iter().map(|x| self.offset + self.scale * x).collect()
+    }
+
+    /// The true channel of one recorded trial.
+    pub fn undone(&self, column: &[f64], dt_s: f64) -> Vec<f64> {
+        let early = shifted(column, self.delay_s / dt_s);
+        early.into_iter().map(|x| (x - self.offset) / self.scale).collect()
+    }
+}
+
+/// Values so many samples later, on straight lines between samples, the first and the last held.
+fn shifted(values: &[f64], samples: f64) -> Vec<f64> {
+    if samples == 0.0 || values.is_empty() {
+        return values.to_vec();
+    }
+    let (whole, last) = (samples.floor(), values.len() as i64 - 1);
+    let share = samples - whole;
+    let at = |i: i64| values[i.clamp(0, last) as usize];
+    (0..=last)
+        .map(|i| {
+            let i = i + whole as i64;
+            at(i) + share * (at(i + 1) - at(i))
+        })
+        .collect()
+}
+
+/// A column of the record as the stages of a simulator use it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column<'a> {
+    /// Its name.
+    pub name: Cow<'a, str>,
+    /// Unit, `1` where it has none.
+    pub unit: Cow<'a, str>,
+    /// All trials end to end; empty for a group of columns (commands) that is looked at as a whole.
+    pub values: Cow<'a, [f64]>,
+    /// The stage whose output it is.
+    pub output_of: Option<usize>,
+    /// Stages that are driven by it: [`Simulator::put_right`](crate::Simulator::put_right) can put it right for them.
+    pub read_by: Vec<usize>,
+    /// Whether a scale can be told from the simulator's own parameters; a command has nothing but a scale.
+    pub is_command: bool,
+    /// Delays that an effect of the catalogue stands for, s: none of these is an error of the record.
+    pub skew_s: [f64; 2],
+    /// What to look at when it is wrong, for the end of a sentence.
+    pub hint: Cow<'a, str>,
+}
+
+impl<'a> Column<'a> {
+    /// The column of a stage's output, where nothing more is known of it.
+    pub fn output(stage: usize, spec: &'a StageSpec, measured: &'a [f64]) -> Self {
+        Self {
+            name: Cow::Borrowed(&spec.channel),
+            unit: Cow::Borrowed(&spec.unit),
+            values: Cow::Borrowed(measured),
+            output_of: Some(stage),
+            read_by: Vec::new(),
+            is_command: false,
+            skew_s: [0.0; 2],
+            hint: Cow::Borrowed("its sensor, its cable and its scale"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use testkit::tolerance::F64_ROUNDING;
+
+    #[test]
+    fn what_was_distorted_is_undone() {
+        let channel: Vec<f64> = (0..50).map(|i| 0.3 * f64::from(i)).collect();
+        let error = Distortion { scale: -1.7, offset: 3.0, delay_s: 0.025 };
+        let back = error.undone(&error.distorted(&channel, 0.01), 0.01);
+        // Three samples at either end were held.
+        for (a, b) in channel[3..47].iter().zip(&back[3..47]) {
+            approx::assert_relative_eq!(*a, *b, max_relative = 1e3 * F64_ROUNDING);
+        }
+    }
+}

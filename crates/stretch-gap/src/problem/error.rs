@@ -1,0 +1,75 @@
+//! Why a diagnosis was refused.
+
+use crate::problem::description::DescriptionError;
+
+/// Why a diagnosis was refused; carries the evidence.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum GapError {
+    /// The simulator's description does not hold together.
+    #[error(transparent)]
+    Description(#[from] DescriptionError),
+    /// A measured channel does not have as many finite samples as the trials.
+    #[error(
+        "{stage}: {found} measured samples in a row are finite, the trials hold {needed}; give one finite number for each sample"
+    )]
+    Measured {
+        /// The stage.
+        stage: String,
+        /// Finite samples from the first.
+        found: usize,
+        /// Samples of all trials.
+        needed: usize,
+    },
+    /// The simulator refused these values, or could not be bound to its measurements.
+    #[error(transparent)]
+    Simulator(Box<dyn std::error::Error + Send + Sync>),
+    /// There is nothing to fit on.
+    #[error("{what}: {hint}")]
+    TooLittle {
+        /// What is missing.
+        what: String,
+        /// What to do.
+        hint: String,
+    },
+    /// Integration is too coarse for the floor.
+    #[error(
+        "{stage}: halving the step of integration moves the output by {moved} of its floor, so that what is computed is not yet what its equations say: a number of the rig file makes this stage much faster than a rig is (a volume that is too small, a conductance, friction or time constant in another unit); of a simulator of your own, shorten the step"
+    )]
+    Solver {
+        /// The stage.
+        stage: String,
+        /// Root mean square change in units of the floor.
+        moved: f64,
+    },
+    /// A simulated output was not finite.
+    #[error("{stage}: the simulation gave a number that is not finite")]
+    NotFinite {
+        /// The stage.
+        stage: String,
+    },
+    /// The simulator is gone, or answers what nobody asked for: nothing that it said since can be relied on.
+    #[error(transparent)]
+    Broken(Box<dyn std::error::Error + Send + Sync>),
+    /// The caller asked to stop.
+    #[error("stopped")]
+    Stopped,
+}
+
+impl GapError {
+    /// Whether all ends: other errors take the candidate out whose values could not be simulated.
+    pub(crate) fn ends_all(&self) -> bool {
+        matches!(self, Self::Stopped | Self::Broken(_))
+    }
+
+    /// What a simulator says for itself.
+    ///
+    /// ```
+    /// use stretch_gap::GapError;
+    /// let error = GapError::simulator("the solver did not converge");
+    /// assert_eq!(error.to_string(), "the solver did not converge");
+    /// ```
+    pub fn simulator(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
+        Self::Simulator(error.into())
+    }
+}

@@ -1,0 +1,144 @@
+//! Which samples are fitted, held out and tested.
+//!
+//! Selection by what was fitted is optimistic, and information criteria alone mislead where models are wrong (Schoniger et al.
+//! 2014, doi 10.1002/2014WR016062): so long trials lend their last part to compare fits on, and test trials are read once, when all
+//! else is decided.
+
+use serde::Serialize;
+
+use crate::problem::{error::GapError, simulator::Simulator, spec::TrialSpec};
+
+/// What a stretch of samples is used for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// Fitted.
+    Fit,
+    /// Held out of every fit, used to compare fits.
+    Held,
+    /// Read once, at the end.
+    Test,
+}
+
+/// A stretch of one trial in one role; sample numbers count over all trials end to end.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Segment {
+    /// Which trial.
+    pub trial: usize,
+    /// First sample.
+    pub from: usize,
+    /// Sample behind the last.
+    pub to: usize,
+    /// What it is used for.
+    pub role: Role,
+}
+
+/// Length of a block: residuals within one are taken as one observation, s.
+pub const BLOCK_S: f64 = 0.5;
+/// Trials at least this long lend their last part to be held out, s.
+const LONG_S: f64 = 30.0;
+/// Share of a long trial that is held out.
+const HELD: f64 = 0.3;
+/// Share of every trial that is tested on where there is no test trial.
+const TESTED: f64 = 0.25;
+
+/// The session cut into segments.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    /// Segments in order of time.
+    pub segments: Vec<Segment>,
+    /// Samples a block.
+    pub block: usize,
+    /// Trials that hold samples to fit, from the first.
+    pub fit_trials: usize,
+    /// Whether the test samples are the last parts of the trials that are fitted.
+    pub borrowed_test: bool,
+}
+
+/// Samples from a trial's start that are not tested on.
+fn may_fit(trial: &TrialSpec, borrowed_test: bool) -> usize {
+    let share = if borrowed_test { TESTED } else { 0.0 };
+    if trial.is_test { 0 } else { trial.samples - (share * trial.samples as f64) as usize }
+}
+
+impl Frame {
+    /// By trial: samples from its start that are not tested on, which is all that a simulator may look at before the end.
+    ///
+    /// ```
+    /// use stretch_gap::{Frame, TrialSpec};
+    /// let fit = TrialSpec::new("a", 400, 0.0, false);
+    /// let test = TrialSpec::new("b", 400, 10.0, true);
+    /// assert_eq!(Frame::not_tested(&[fit.clone(), test]), [400, 0]);
+    /// assert_eq!(Frame::not_tested(&[fit]), [300]); // without a test trial the last quarter is held back
+    /// ```
+    pub fn not_tested(trials: &[TrialSpec]) -> Vec<usize> {
+        let borrowed_test = trials.iter().all(|t| !t.is_test);
+        trials.iter().map(|t| may_fit(t, borrowed_test)).collect()
+    }
+
+    /// Cuts a session.
+    ///
+    /// # Errors
+    /// [`GapError::TooLittle`] without anything to fit.
+    pub fn of(simulator: &dyn Simulator) -> Result<Self, GapError> {
+        let trials = simulator.trials();
+        let dt_s = simulator.dt_s();
+        let borrowed_test = trials.iter().all(|t| !t.is_test);
+        let mut segments = Vec::new();
+        let mut begin = 0;
+        for (trial, spec) in trials.iter().enumerate() {
+            let end = begin + spec.samples;
+            let mut add = |from: usize, to: usize, role: Role| {
+                if to > from {
+                    segments.push(Segment { trial, from, to, role });
+                }
+            };
+            let test = begin + may_fit(spec, borrowed_test);
+            if spec.is_test {
+                add(begin, end, Role::Test);
+            } else {
+                let is_long = (test - begin) as f64 * dt_s >= LONG_S;
+                let held = if is_long { HELD * (test - begin) as f64 } else { 0.0 };
+                let fit = test - held as usize;
+                add(begin, fit, Role::Fit);
+                add(fit, test, Role::Held);
+                add(test, end, Role::Test);
+            }
+            begin = end;
+        }
+        let fitted = segments.iter().filter(|s| s.role == Role::Fit);
+        let Some(last) = fitted.map(|s| s.trial).max() else {
+            return Err(GapError::TooLittle {
+                what: "no trial may be fitted".into(),
+                hint: "give at least one trial split = \"fit\"".into(),
+            });
+        };
+        let block = ((BLOCK_S / dt_s).round() as usize).max(1);
+        Ok(Self { segments, block, fit_trials: last + 1, borrowed_test })
+    }
+
+    /// How many samples the first `trials` trials have.
+    pub fn samples(&self, trials: usize) -> usize {
+        self.segments.iter().filter(|s| s.trial < trials).map(|s| s.to).max().unwrap_or(0)
+    }
+
+    /// Samples in a role.
+    pub fn count(&self, role: Role) -> usize {
+        self.of_role(role).map(|s| s.to - s.from).sum()
+    }
+
+    /// Blocks in a role.
+    pub fn blocks(&self, role: Role) -> f64 {
+        self.count(role) as f64 / self.block as f64
+    }
+
+    /// Segments that may be looked at before the end: all but those that are tested on.
+    pub(crate) fn looked_at(&self) -> impl Iterator<Item = &Segment> {
+        self.segments.iter().filter(|s| s.role != Role::Test)
+    }
+
+    /// Segments in a role.
+    pub fn of_role(&self, role: Role) -> impl Iterator<Item = &Segment> {
+        self.segments.iter().filter(move |s| s.role == role)
+    }
+}

@@ -1,0 +1,42 @@
+//! Numbers that were calibrated on development cases, in one file.
+
+use serde::{Deserialize, Serialize};
+
+/// Thresholds of the decision, read from `thresholds.toml`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Thresholds {
+    /// Excess, summed over channels, below which there is no gap.
+    pub null_excess: f64,
+    /// Least rise of the score for an effect that closes a gap, nats.
+    pub rise: f64,
+    /// The same for one that closes less than what counts as a gap.
+    pub faint_rise: f64,
+    /// Least share of the gap left that an effect must close.
+    pub share: f64,
+    /// Share of what was closed in a stage that mismatch of form may leave to a further effect.
+    pub mismatch: f64,
+    /// Temperature of the probabilities, nats.
+    pub temperature: f64,
+    /// Growth of the temperature with the share of the gap that the best set leaves, nats.
+    pub rho: f64,
+    /// Excess that may be left whatever it was before.
+    pub unknown_excess: f64,
+    /// Share of the excess that mismatch of form may leave.
+    pub unknown_share: f64,
+    /// Width of the border to `unknown`, in logarithms of the excess left.
+    pub unknown_soft: f64,
+    /// Odds of `unknown` at its border.
+    pub unknown_odds: f64,
+    /// Least share of the held-out gap that a name in the headline closes.
+    pub least_share: f64,
+    /// Share of the held-out gap that one effect closes at least where it is named though more is left than its form explains.
+    pub partial_share: f64,
+}
+
+impl Thresholds {
+    /// Those frozen in this version.
+    pub fn frozen() -> Self {
+        toml::from_str(include_str!("../../thresholds.toml")).expect("a test reads it")
+    }
+}

@@ -1,0 +1,280 @@
+//! What a look at the columns alone says, before any simulation: copied, dead and stuck channels.
+//!
+//! Every test asks whether *noise* can be what was recorded. Noise of standard deviation s is told by differences of second and of
+//! fourth order, which pass white noise alike and what moves slowly not at all:
+//!
+//! ```text
+//! s2^2 = median(d2^2)/(6 * 0.4549),   s4^2 = median(d4^2)/(70 * 0.4549),   white where s4 is about s2
+//! ```
+//!
+//! * copied: the line of one column over another leaves less than half of what two independent noises would, and the second
+//!   differences of the two go together: a hum in one of them would pass for its noise;
+//! * dead: a column keeps within its noise while another goes through most of its range (a loose sleeve hides less);
+//! * stuck: a column repeats one number, not an end of its range, so often that its own noise would do so once in a billion records.
+
+use crate::{
+    numerics::extent::ends,
+    problem::{column::Column, spec::TrialSpec},
+    record::{fault::DELAY_S, gross::Gross},
+};
+
+/// Share of independent noise's standard deviation that a copy leaves at most.
+const COPY: f64 = 0.5;
+/// Correlation of second differences from which they are of one noise.
+const ALIKE: f64 = 0.9;
+/// Ratios of s4 to s2 of what is white.
+const WHITE: (f64, f64) = (0.7, 1.4);
+/// Share of its range that another column goes through while one is dead.
+const RANGE: f64 = 0.8;
+/// Standard deviations of a block's mean within which a dead column keeps.
+const KEEPS: f64 = 4.0;
+/// Samples of such a block.
+const BLOCK: usize = 10;
+/// Share of its range that another column moves by, at least, while one is stuck: play in a sensor is less.
+const MOVES: f64 = 0.3;
+/// ln of the probability that noise repeats itself like that.
+const CHANCE: f64 = -20.7;
+
+/// Everything that is wrong with the columns of a session; empty, as a rule.
+pub(crate) fn plain(columns: &[Column<'_>], trials: &[TrialSpec], dt_s: f64) -> Vec<Gross> {
+    let own: Vec<&Column<'_>> = columns.iter().filter(|c| !c.values.is_empty()).collect();
+    let mut out = Vec::new();
+    for (i, a) in own.iter().enumerate() {
+        for b in &own[i + 1..] {
+            if let Some(factor) = copied(&a.values, &b.values) {
+                out.push(Gross::copied(b, a, factor));
+            }
+        }
+    }
+    let Some(shortest) = own.iter().map(|c| c.values.len()).min() else { return out };
+    let mut from = 0;
+    let bounds: Vec<(usize, usize)> = trials
+        .iter()
+        .map(|trial| {
+            from += trial.samples;
+            (from - trial.samples, from)
+        })
+        .filter(|(_, to)| *to <= shortest)
+        .collect();
+    for (i, column) in own.iter().enumerate() {
+        let others: Vec<&[f64]> =
+            own.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, c)| &*c.values).collect();
+        let dead = dead(&column.values, &others, &bounds, (DELAY_S / dt_s) as usize);
+        let stretches = match dead.is_empty() {
+            true => stuck(&column.values, &others, &bounds),
+            false => dead,
+        };
+        let placed = |(from, to): (usize, usize)| {
+            let trial = bounds.iter().position(|(_, end)| from < *end).unwrap_or(0);
+            let s = |at: usize| (at - bounds[trial].0) as f64 * dt_s;
+            (trials[trial].name.clone(), s(from), s(to))
+        };
+        let places: Vec<(String, f64, f64)> = stretches.into_iter().map(placed).collect();
+        if let Some(first) = places.first() {
+            out.push(Gross::still(column, first, places.len()));
+        }
+    }
+    out
+}
+
+/// Standard deviation of white noise by differences of order two and four.
+fn noise(values: &[f64]) -> (f64, f64) {
+    let of = |weights: &[f64]| {
+        let power: f64 = weights.iter().map(|w| w * w).sum();
+        let mut squares: Vec<f64> = values
+            .windows(weights.len())
+            .map(|w| w.iter().zip(weights).map(|(x, w)| x * w).sum::<f64>().powi(2) / power)
+            .collect();
+        let middle = squares.len() / 2;
+        match squares.is_empty() {
+            true => 0.0,
+            // The median of a squared normal variable is 0.4549 of its mean.
+            false => (*squares.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.4549).sqrt(),
+        }
+    };
+    (of(&[1.0, -2.0, 1.0]), of(&[1.0, -4.0, 6.0, -4.0, 1.0]))
+}
+
+/// Factor by which column `b` is a copy of column `a`, noise and all; none where it is none.
+///
+/// Two channels of independent noise leave sqrt(s_b^2 + factor^2 s_a^2) when one is laid over the other; a copy leaves nothing but
+/// rounding. Where there is no white noise nothing is said: a good sensor would look the same.
+///
+/// ```
+/// use stretch_gap::{Dice, copied};
+/// let mut dice = Dice::new(1, 0);
+/// let a: Vec<f64> = (0..1000).map(|i| 0.01 * f64::from(i) + 0.1 * dice.gauss()).collect();
+/// let b: Vec<f64> = a.iter().map(|x| 2.0 * x + 1.0).collect();
+/// let c: Vec<f64> = (0..1000).map(|i| 0.02 * f64::from(i) + 0.1 * dice.gauss()).collect();
+/// assert!(copied(&a, &b).is_some_and(|factor| (factor - 2.0).abs() < 1e-9));
+/// assert_eq!(copied(&a, &c), None);
+/// ```
+pub fn copied(a: &[f64], b: &[f64]) -> Option<f64> {
+    let n = a.len().min(b.len());
+    let (a, b) = (&a[..n], &b[..n]);
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / n as f64;
+    let (ma, mb) = (mean(a), mean(b));
+    let sum = |f: &dyn Fn(f64, f64) -> f64| -> f64 {
+        a.iter().zip(b).map(|(x, y)| f(x - ma, y - mb)).sum::<f64>() / n as f64
+    };
+    let (xx, xy, yy) = (sum(&|x, _| x * x), sum(&|x, y| x * y), sum(&|_, y| y * y));
+    if n < 10 || xx <= 0.0 || yy <= 0.0 {
+        return None;
+    }
+    let factor = xy / xx;
+    let left = sum(&|x, y| (y - factor * x).powi(2));
+    let ((a2, a4), (b2, b4)) = (noise(a), noise(b));
+    let is_white = |s2: f64, s4: f64| (WHITE.0 * s2..=WHITE.1 * s2).contains(&s4) && s2 > 0.0;
+    let independent = b2 * b2 + factor * factor * a2 * a2;
+    let is_copy = left < COPY * COPY * independent && alike(a, b) > ALIKE;
+    (is_copy && is_white(a2, a4) && is_white(b2, b4)).then_some(factor)
+}
+
+/// Size of the correlation of second differences.
+fn alike(a: &[f64], b: &[f64]) -> f64 {
+    let bend = |w: &[f64]| w[0] - 2.0 * w[1] + w[2];
+    let (mut aa, mut ab, mut bb) = (0.0, 0.0, 0.0);
+    for (x, y) in a.windows(3).zip(b.windows(3)) {
+        let (x, y) = (bend(x), bend(y));
+        aa += x * x;
+        ab += x * y;
+        bb += y * y;
+    }
+    ab.abs() / (aa * bb).sqrt().max(f64::MIN_POSITIVE)
+}
+
+/// Whether one of the others moves by a share of its range within a stretch.
+fn others_move(others: &[&[f64]], (from, to): (usize, usize), share: f64) -> bool {
+    others.iter().any(|other| {
+        let ((low, high), (a, b)) = (ends(*other), ends(&other[from..to]));
+        high > low && b - a >= share * (high - low)
+    })
+}
+
+/// Stretches in which a column is noise only while another goes through its range.
+fn dead(
+    values: &[f64],
+    others: &[&[f64]],
+    trials: &[(usize, usize)],
+    late: usize,
+) -> Vec<(usize, usize)> {
+    let (sd, _) = noise(values);
+    let reach = 2.0 * KEEPS * sd / (BLOCK as f64).sqrt();
+    let mut out = Vec::new();
+    for &(begin, end) in trials {
+        let blocks = (end - begin) / BLOCK;
+        let mean = |i: usize| {
+            let from = begin + i * BLOCK;
+            values[from..from + BLOCK].iter().sum::<f64>() / BLOCK as f64
+        };
+        let (mut first, mut low, mut high) = (0, f64::INFINITY, f64::NEG_INFINITY);
+        for i in 0..=blocks {
+            let next = if i < blocks { mean(i) } else { f64::INFINITY };
+            if high.max(next) - low.min(next) > reach {
+                let run = (begin + first * BLOCK, begin + i * BLOCK);
+                // Late is not dead: so far from its ends the others stand still if it is only that.
+                let inner = (run.0 + late, run.1.saturating_sub(late));
+                if inner.1 > inner.0 && others_move(others, inner, RANGE) {
+                    out.push(run);
+                }
+                (first, low, high) = (i, next, next);
+            } else {
+                (low, high) = (low.min(next), high.max(next));
+            }
+        }
+    }
+    out
+}
+
+/// Stretches in which a column repeats one number that is no end of its range.
+fn stuck(values: &[f64], others: &[&[f64]], trials: &[(usize, usize)]) -> Vec<(usize, usize)> {
+    let (low, high) = ends(values);
+    let mut runs: Vec<(usize, usize)> = Vec::new();
+    for &(begin, end) in trials {
+        let mut from = begin;
+        for i in begin + 1..=end {
+            if i == end || values[i] != values[from] {
+                runs.push((from, i));
+                from = i;
+            }
+        }
+    }
+    runs.sort_by_key(|(from, to)| std::cmp::Reverse(to - from));
+    // What repeats itself elsewhere: the longest runs are those in doubt.
+    let doubted = |(from, to): &(usize, usize)| to - from > 20;
+    let (mut equal, mut all) = (1.0, 2.0);
+    for (from, to) in runs.iter().filter(|run| !doubted(run)) {
+        equal += (to - from - 1) as f64;
+        all += (to - from) as f64;
+    }
+    let (samples, repeats) = ((values.len() as f64).ln(), f64::ln(equal / all));
+    let is_chance = |(from, to): (usize, usize)| samples + (to - from) as f64 * repeats > CHANCE;
+    let is_end = |from: usize| values[from] == low || values[from] == high;
+    runs.retain(|run| doubted(run) && !is_chance(*run) && !is_end(run.0));
+    runs.retain(|run| others_move(others, *run, MOVES));
+    runs.sort_unstable();
+    runs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::random::Dice;
+
+    const N: usize = 4000;
+
+    fn wave(noise: f64, seed: u64) -> Vec<f64> {
+        let mut dice = Dice::new(seed, 0);
+        let rounded = |x: f64| (x * 1e3).round() * 1e-3;
+        (0..N).map(|i| rounded(10.0 * (5e-3 * i as f64).sin() + noise * dice.gauss())).collect()
+    }
+
+    #[test]
+    fn a_copy_shares_its_noise_and_a_line_does_not() {
+        let (a, b) = (wave(0.05, 1), wave(0.05, 2));
+        let copy: Vec<f64> = a.iter().map(|x| 3.0 - 2.0 * x).collect();
+        assert!(copied(&a, &copy).is_some_and(|factor| (factor + 2.0).abs() < 1e-3));
+        assert_eq!(copied(&a, &b), None);
+        // A hum that is larger than what the line leaves is no copy either.
+        let hum = |i: usize| if i.is_multiple_of(2) { 0.2 } else { -0.2 };
+        let humming: Vec<f64> = b.iter().enumerate().map(|(i, x)| x + hum(i)).collect();
+        assert_eq!(copied(&a, &humming), None);
+        // Without noise nothing tells a copy from a sensor that is as good as that.
+        let smooth: Vec<f64> = (0..N).map(|i| 10.0 * (5e-3 * i as f64).sin()).collect();
+        assert_eq!(copied(&smooth, &smooth), None);
+    }
+
+    #[test]
+    fn a_dead_channel_is_told_from_a_loose_sleeve() {
+        let other = wave(0.05, 1);
+        let mut dice = Dice::new(3, 0);
+        let trials = [(0, N / 2), (N / 2, N)];
+        let mut died = wave(0.05, 2);
+        died[N / 2..].iter_mut().for_each(|x| *x = 4.0 + 0.05 * dice.gauss());
+        let found = dead(&died, &[&other], &trials, 100);
+        assert!(matches!(found[..], [(from, to)] if from >= N / 2 - BLOCK && to == N), "{found:?}");
+        // Half of the stroke is not seen.
+        let slack: Vec<f64> =
+            wave(0.0, 2).iter().map(|x| x.max(0.0) + 0.05 * dice.gauss()).collect();
+        assert_eq!(dead(&slack, &[&other], &trials, 100), []);
+    }
+
+    #[test]
+    fn what_repeats_itself_is_stuck_and_a_rail_is_not() {
+        let other = wave(0.05, 1);
+        let trials = [(0, N)];
+        let mut held = wave(0.05, 2);
+        assert_eq!(stuck(&held, &[&other], &trials), []);
+        let value = held[1000];
+        held[1000..1300].iter_mut().for_each(|x| *x = value);
+        let found = stuck(&held, &[&other], &trials);
+        assert!(
+            matches!(found[..], [(from, to)] if from.abs_diff(1000) < 3 && to.abs_diff(1300) < 3)
+        );
+        let railed: Vec<f64> = wave(0.05, 2).iter().map(|x| x.min(5.0)).collect();
+        assert_eq!(stuck(&railed, &[&other], &trials), []);
+        // A converter of few bits repeats itself all the time.
+        let coarse: Vec<f64> = wave(0.05, 2).iter().map(|x| (2.0 * x).round() / 2.0).collect();
+        assert_eq!(stuck(&coarse, &[&other], &trials), []);
+    }
+}

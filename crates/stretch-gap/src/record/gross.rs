@@ -1,0 +1,63 @@
+//! What an error of the record or of the rig file says of itself in a diagnosis.
+
+use serde::{Deserialize, Serialize};
+
+/// What may be wrong with a record or a rig file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GrossKind {
+    /// A column is too large by a factor.
+    Scale,
+    /// A column has an offset.
+    Offset,
+    /// A column is late or early.
+    Delay,
+    /// A column is upside down.
+    Sign,
+    /// A nominal parameter is not what the rig file says.
+    Parameter,
+    /// A column is a copy of another.
+    Copied,
+    /// A column stands still while others move.
+    Dead,
+}
+
+/// An error of the record or of the rig file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Gross {
+    /// What is wrong.
+    pub what: GrossKind,
+    /// With which column.
+    pub column: Option<String>,
+    /// With which nominal parameter.
+    pub parameter: Option<String>,
+    /// Factor by which the column, or the rig's parameter, is larger than it is said to be.
+    pub factor: Option<f64>,
+    /// Offset of the column, in `unit`; of one upside down the sum of what is and what should be.
+    pub offset: Option<f64>,
+    /// Delay of the column, s.
+    pub delay_s: Option<f64>,
+    /// What the rig file says of the parameter.
+    pub says: Option<f64>,
+    /// What was found of the parameter.
+    pub found: Option<f64>,
+    /// Unit of the column or the parameter.
+    pub unit: String,
+    /// First trial in which it shows, of what shows in stretches.
+    pub trial: Option<String>,
+    /// Where that stretch begins, s from the trial's start.
+    pub from_s: Option<f64>,
+    /// Where it ends, s.
+    pub to_s: Option<f64>,
+    /// What is wrong, in words.
+    pub sentence: String,
+    /// What to check.
+    pub hint: String,
+}
+
+impl Gross {
+    /// Whether the columns alone say so, whatever the simulator is.
+    pub fn is_plain(&self) -> bool {
+        matches!(self.what, GrossKind::Copied | GrossKind::Dead)
+    }
+}

@@ -1,0 +1,173 @@
+//! Errors of the record and of the rig file in plain words: what is wrong, and what to look at.
+
+use crate::{
+    fit::hypothesis::Hypothesis,
+    problem::{column::Column, simulator::Simulator},
+    record::{
+        fault::Kind,
+        gross::{Gross, GrossKind},
+        suspect::Suspect,
+    },
+};
+
+impl Gross {
+    fn of(what: GrossKind) -> Self {
+        Self {
+            what,
+            column: None,
+            parameter: None,
+            factor: None,
+            offset: None,
+            delay_s: None,
+            says: None,
+            found: None,
+            unit: String::new(),
+            trial: None,
+            from_s: None,
+            to_s: None,
+            sentence: String::new(),
+            hint: String::new(),
+        }
+    }
+
+    fn of_column(what: GrossKind, column: &Column<'_>) -> Self {
+        Self {
+            column: Some(column.name.clone().into_owned()),
+            unit: column.unit.clone().into_owned(),
+            hint: format!("check {}", column.hint),
+            ..Self::of(what)
+        }
+    }
+
+    /// `column` is `factor` times `source`, noise and all.
+    pub(crate) fn copied(column: &Column<'_>, source: &Column<'_>, factor: f64) -> Self {
+        Self {
+            factor: Some(factor),
+            sentence: format!(
+                "{} is a copy of {} ({} times it, noise and all)",
+                column.name,
+                source.name,
+                short(factor)
+            ),
+            hint: "check which channels the recorder wrote into the two columns".into(),
+            ..Self::of_column(GrossKind::Copied, column)
+        }
+    }
+
+    /// A column stands still, first in a stretch of a trial, `count` times in all.
+    pub(crate) fn still(
+        column: &Column<'_>,
+        (trial, from_s, to_s): &(String, f64, f64),
+        count: usize,
+    ) -> Self {
+        let more = match count - 1 {
+            0 => String::new(),
+            more => format!(", and {more} more times"),
+        };
+        Self {
+            sentence: format!(
+                "{} stands still while the others move ({trial}, {from_s:.2} to {to_s:.2} s{more})",
+                column.name
+            ),
+            trial: Some(trial.clone()),
+            from_s: Some(*from_s),
+            to_s: Some(*to_s),
+            ..Self::of_column(GrossKind::Dead, column)
+        }
+    }
+
+    /// The error of a hypothesis with its size; none where it has none.
+    pub(crate) fn found(suspect: &Suspect<'_>, hypothesis: &Hypothesis) -> Option<Self> {
+        let (fault, size) = suspect.error_of(&hypothesis.model)?;
+        if let Kind::Parameter(p) = fault.kind {
+            let spec = &suspect.parameters()[p];
+            let value = hypothesis.model.parameters[p] * (1.0 + size);
+            let unit = if spec.unit == "1" { String::new() } else { format!(" {}", spec.unit) };
+            return Some(Self {
+                parameter: Some(spec.name.clone()),
+                factor: Some(value / spec.nominal),
+                says: Some(spec.nominal),
+                found: Some(value),
+                unit: spec.unit.clone(),
+                sentence: format!(
+                    "{} is {}{unit}, the rig file says {}",
+                    spec.name,
+                    short(value),
+                    short(spec.nominal)
+                ),
+                hint: "correct the rig file, or what is set on the rig".into(),
+                ..Self::of(GrossKind::Parameter)
+            });
+        }
+        let column = &suspect.columns()[fault.column?];
+        let name = &column.name;
+        Some(match fault.kind {
+            Kind::Scale => {
+                let factor = 1.0 + size;
+                let sentence = match factor >= 1.0 {
+                    true => format!("{name} looks {factor:.3} times too large"),
+                    false => format!("{name} looks {factor:.3} times as large as it should be"),
+                };
+                Self { factor: Some(factor), sentence, ..Self::of_column(GrossKind::Scale, column) }
+            }
+            Kind::Offset => {
+                let side = if size > 0.0 { "high" } else { "low" };
+                Self {
+                    offset: Some(size),
+                    sentence: format!(
+                        "{name} lies {} {} too {side}",
+                        short(size.abs()),
+                        column.unit
+                    ),
+                    ..Self::of_column(GrossKind::Offset, column)
+                }
+            }
+            Kind::Delay => {
+                let side = if size > 0.0 { "late" } else { "early" };
+                Self {
+                    delay_s: Some(size),
+                    sentence: format!("{name} comes {:.3} s {side}", size.abs()),
+                    hint: "check the clocks of the recorders, and filters before them".into(),
+                    ..Self::of_column(GrossKind::Delay, column)
+                }
+            }
+            _ => Self {
+                factor: Some(-1.0),
+                offset: Some(size),
+                sentence: format!("{name} is upside down: it falls where it should rise"),
+                hint: format!("check the polarity: {}", column.hint),
+                ..Self::of_column(GrossKind::Sign, column)
+            },
+        })
+    }
+}
+
+/// Four digits, without an exponent where none is needed.
+fn short(x: f64) -> String {
+    let size = x.abs();
+    if size != 0.0 && !(1e-3..1e5).contains(&size) {
+        return format!("{x:.3e}");
+    }
+    let digits = (3 - size.max(1e-3).log10().floor() as i32).max(0) as usize;
+    let text = format!("{x:.digits$}");
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
+}
+
+/// What is wrong, in one sentence: the first, what may stand in its place, and what to do.
+pub(crate) fn sentence(gross: &[Gross]) -> String {
+    let Some(first) = gross.first() else { return String::new() };
+    let rest: Vec<&str> = gross[1..].iter().map(|g| g.sentence.as_str()).collect();
+    let other = match (rest.is_empty(), first.is_plain()) {
+        (true, _) => String::new(),
+        (false, true) => format!("; {}", rest.join("; ")),
+        (false, false) => format!(" (or {}: these data cannot tell)", rest.join(", or ")),
+    };
+    let wrong = match first.what {
+        GrossKind::Parameter => "The rig file does not fit the rig",
+        _ => "The record is wrong",
+    };
+    format!("{wrong}: {}{other}; {}.", first.sentence, first.hint)
+}

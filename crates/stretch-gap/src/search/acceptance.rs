@@ -1,0 +1,74 @@
+//! What an effect must bring to be taken: more than chance, more than what counts, more than mismatch of form.
+//!
+//! Four hurdles, all of them in [`Thresholds`]. What is closed is more than chance makes of noise of this colour: `rise` nats by the
+//! [octaves](crate::fit::octaves). The score rises by as much, and by `faint_rise` where what is closed would not count as a gap: so little may be
+//! mismatch of form within the noise. At least `share` of the gap that is left in the effect's stages closes. And in one of these stages more
+//! closes than *mismatch of form* could explain: the rig's backlash is not the textbook's; an effect in the right place leaves a share
+//! `mismatch` of what it closes, with the shape of a further effect, and evidence grows with the samples while that share does not.
+
+use crate::{
+    fit::{hypothesis::Hypothesis, prepared::Problem},
+    problem::thresholds::Thresholds,
+};
+
+/// The hurdles of a problem.
+#[derive(Clone, Copy)]
+pub(crate) struct Worth<'a> {
+    pub(crate) problem: &'a Problem<'a>,
+    pub(crate) thresholds: &'a Thresholds,
+}
+
+impl Worth<'_> {
+    /// Whether `next`, which has one effect more than `base`, takes every hurdle.
+    pub(crate) fn is_worth(&self, base: &Hypothesis, next: &Hypothesis) -> bool {
+        let Some(&new) = next.effects.iter().find(|e| !base.effects.contains(e)) else {
+            return false;
+        };
+        let all = 0..base.misfits.len();
+        let closed: f64 = all.map(|stage| self.problem.closes(base, next, stage)).sum();
+        next.score - base.score > self.least_rise(closed)
+            && self.problem.rise(base, next) > self.thresholds.rise
+            && closed >= self.thresholds.share * self.left(base, new)
+            && self.is_no_mismatch(base, next, new)
+    }
+
+    /// Whether a parameter of an effect stands at an end of its range: such an effect is announced by nobody.
+    pub(crate) fn is_at_bound(&self, set: &Hypothesis, effect: usize) -> bool {
+        let spec = &self.problem.simulator().effects()[effect];
+        set.model.effect(effect).is_some_and(|values| spec.is_at_bound(values))
+    }
+
+    /// Whether an effect on top of `base` can be more than what mismatch of form left.
+    pub(crate) fn is_possible(&self, base: &Hypothesis, effect: usize) -> bool {
+        let mut touched = self.touched(effect).iter();
+        touched.any(|&s| self.problem.gap_in(base, s) >= self.mismatch(base, s))
+    }
+
+    /// Rise of the score that one effect more has to bring, if it closes that much.
+    pub(crate) fn least_rise(&self, closed: f64) -> f64 {
+        let is_faint = closed < self.thresholds.null_excess;
+        if is_faint { self.thresholds.faint_rise } else { self.thresholds.rise }
+    }
+
+    /// Gap that is left in the stages that an effect touches.
+    pub(crate) fn left(&self, base: &Hypothesis, effect: usize) -> f64 {
+        self.touched(effect).iter().map(|&s| self.problem.gap_in(base, s)).sum()
+    }
+
+    fn is_no_mismatch(&self, base: &Hypothesis, next: &Hypothesis, new: usize) -> bool {
+        self.touched(new).iter().any(|&s| {
+            let closed = self.problem.closes(base, next, s);
+            closed > 0.0 && closed >= self.mismatch(base, s)
+        })
+    }
+
+    /// Gap that mismatch of form may leave of what a set closes in a stage.
+    fn mismatch(&self, base: &Hypothesis, stage: usize) -> f64 {
+        let gap = |set: &Hypothesis| self.problem.gap_in(set, stage);
+        self.thresholds.mismatch * (gap(&self.problem.nominal) - gap(base)).max(0.0)
+    }
+
+    fn touched(&self, effect: usize) -> &[usize] {
+        &self.problem.simulator().effects()[effect].touches
+    }
+}

@@ -1,0 +1,180 @@
+//! What simpler methods say of the same data: what is gained by the longer way shows beside them.
+//!
+//! | method | leaves out |
+//! | --- | --- |
+//! | largest drop | re-tuning: nominal parameters stay as shipped |
+//! | signature | the fit: one change of the output, correlated with the residual |
+//! | BIC | correlation of samples, held-out data, and sets of several effects |
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    fit::{
+        comparison::Comparison,
+        hypothesis::Hypothesis,
+        levenberg_marquardt::{COARSE, Fitted, possible},
+        metric::Metric,
+        prepared::Problem,
+        score::Misfit,
+    },
+    problem::{
+        altered_parameters::Altered, error::GapError, frame::Role, simulator::Model,
+        spec::ParameterSpec,
+    },
+    search::screen::Ground,
+};
+
+/// What simpler methods would have said of the same data.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Baselines {
+    /// Effect with the largest drop of the error, nominal parameters left as shipped.
+    pub largest_drop: Option<String>,
+    /// Effect whose one-step signature resembles the residual most, nominal sensitivities projected out.
+    pub signature: Option<String>,
+    /// Single effect with the best information criterion, each fitted jointly, samples counted as independent.
+    pub bic: Option<String>,
+}
+
+/// Single effects that an information criterion is asked about: the best of the screen.
+const KEPT: usize = 8;
+/// A correlation that noise alone hardly ever reaches, in its standard deviations, samples counted as independent.
+const FAR: f64 = 4.0;
+/// Starts that are fitted.
+const STARTS: usize = 2;
+
+/// Three methods that leave out one step each.
+pub(crate) fn baselines(
+    problem: &Problem<'_>,
+    tried: &BTreeMap<Vec<usize>, Hypothesis>,
+    null_excess: f64,
+) -> Result<Baselines, GapError> {
+    let name =
+        |effect: Option<usize>| effect.map(|e| problem.simulator().effects()[e].name.clone());
+    let ground = Ground::around(&problem.compare, problem.nominal.model.clone())?;
+    Ok(Baselines {
+        largest_drop: name(largest_drop(problem, null_excess)?),
+        signature: name(signature(&problem.compare, &ground)?),
+        bic: name(criterion(problem, &ground, tried)?),
+    })
+}
+
+/// The effect whose own parameters, fitted alone, take most from the mean square error in floors, all parameters of the
+/// simulator left as shipped; none where that is less than what counts as a gap.
+fn largest_drop(problem: &Problem<'_>, null_excess: f64) -> Result<Option<usize>, GapError> {
+    // Nothing is re-tuned, nothing wanders.
+    let compare = &problem.compare;
+    let frozen = Altered::of(problem.simulator(), |_, p| ParameterSpec {
+        sd: 0.0,
+        wander: None,
+        per_trial_sd: None,
+        per_tick_sd: None,
+        ..p.clone()
+    });
+    let (runs, shipped) = (compare.runs.beside(&frozen), Model::nominal(&frozen));
+    let metrics = compare.metrics.iter().enumerate().map(|(stage, metric)| {
+        Metric::of(&runs, &compare.frame, stage, metric.floor.clone(), &shipped, Some(metric))
+    });
+    let rigid = compare.beside(&frozen, metrics.collect::<Result<_, _>>()?);
+    let ground = Ground::around(&rigid, shipped)?;
+    let before: Vec<Misfit> =
+        ground.residuals.iter().enumerate().map(|(s, r)| rigid.misfit(s, r)).collect();
+    let drops = each_effect(&rigid, |effect| {
+        let mut most = 0.0_f64;
+        let fit = |stages: &[usize], model| rigid.fit(stages, model, &ground.known, COARSE);
+        for misfits in fits(&rigid, &ground, effect, fit)? {
+            let drop = |m: &Misfit| rigid.mean_square(&before[m.stage]) - rigid.mean_square(m);
+            most = most.max(misfits.iter().map(drop).sum());
+        }
+        Ok(most)
+    })?;
+    Ok(best(drops).filter(|(_, drop)| *drop > null_excess).map(|(effect, _)| effect))
+}
+
+/// The effect whose change, taken once, correlates best with what the re-tuned simulator leaves, all that its
+/// parameters can do taken out of both; none where noise could do as well.
+fn signature(compare: &Comparison<'_>, ground: &Ground) -> Result<Option<usize>, GapError> {
+    let likeness = each_effect(compare, |effect| {
+        let spec = &compare.simulator().effects()[effect];
+        let mut most = 0.0_f64;
+        for (own, mixed) in compare.changes(ground, effect, &spec.starts)?.into_iter().flatten() {
+            most = most.max(mixed.abs() / own.sqrt());
+        }
+        Ok(most)
+    })?;
+    let stages = ground.residuals.iter().enumerate();
+    let (squares, count) = stages.fold((0.0, 0.0), |(squares, count), (s, residual)| {
+        let own = compare.product(s, residual, residual);
+        (squares + own, count + compare.frame.count(Role::Fit) as f64)
+    });
+    // Correlation r = product / sqrt(own squares); its standard deviation without a likeness is 1 / sqrt(count).
+    let least = FAR * (squares / f64::max(count, 1.0)).sqrt();
+    Ok(best(likeness).filter(|(_, product)| *product > least).map(|(effect, _)| effect))
+}
+
+/// The single effect, fitted together with all parameters, with the lowest BIC = n ln(mean square) + k ln(n), every
+/// sample counted as independent; none where no effect has the lowest (Schwarz 1978, doi 10.1214/aos/1176344136).
+fn criterion(
+    problem: &Problem<'_>,
+    ground: &Ground,
+    tried: &BTreeMap<Vec<usize>, Hypothesis>,
+) -> Result<Option<usize>, GapError> {
+    let (compare, nominal) = (&problem.compare, &problem.nominal);
+    let gains = each_effect(compare, |effect| Ok(compare.screen(ground, effect)?.gain()))?;
+    let mut order: Vec<usize> = (0..gains.len()).collect();
+    order.sort_by(|a, b| gains[*b].total_cmp(&gains[*a]));
+    let samples = compare.frame.count(Role::Fit) as f64;
+    let falls = each_effect(compare, |effect| {
+        if !order[..KEPT.min(order.len())].contains(&effect) {
+            return Ok(0.0);
+        }
+        let spec = &compare.simulator().effects()[effect];
+        let free = spec.parameters.iter().filter(|p| p.is_fitted && p.form.is_none()).count();
+        let all = samples * nominal.misfits.len() as f64;
+        let fall = |misfits: &[Misfit]| {
+            let gain = |m: &Misfit| samples * (nominal.misfits[m.stage].fit / m.fit).ln();
+            misfits.iter().map(gain).sum::<f64>() - free as f64 * all.ln()
+        };
+        let fit = |stages: &[usize], model| problem.fit(stages, model, &ground.known, COARSE);
+        let known = tried.get(&vec![effect]).map(|set| vec![set.misfits.clone()]);
+        let fitted = match known {
+            Some(known) => known,
+            None => fits(compare, ground, effect, fit)?,
+        };
+        Ok(fitted.iter().map(|m| fall(m)).fold(0.0, f64::max))
+    })?;
+    Ok(best(falls).map(|(effect, _)| effect))
+}
+
+/// A number for every effect.
+fn each_effect(
+    compare: &Comparison<'_>,
+    of: impl Fn(usize) -> Result<f64, GapError> + Sync + Send,
+) -> Result<Vec<f64>, GapError> {
+    (0..compare.simulator().effects().len()).into_par_iter().map(of).collect()
+}
+
+/// The effect with the greatest number above 0.
+fn best(numbers: Vec<f64>) -> Option<(usize, f64)> {
+    let above = numbers.into_iter().enumerate().filter(|(_, x)| *x > 0.0);
+    above.max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// What is left in the stages that an effect touches when it is fitted on top of a ground, from its best starts.
+fn fits(
+    compare: &Comparison<'_>,
+    ground: &Ground,
+    effect: usize,
+    fit: impl Fn(&[usize], Model) -> Result<Fitted, GapError> + Sync,
+) -> Result<Vec<Vec<Misfit>>, GapError> {
+    let mut starts = compare.screen(ground, effect)?.starts;
+    starts.truncate(STARTS);
+    possible(starts.into_par_iter().map(|(values, _)| {
+        let mut model = ground.model.clone();
+        model.effects.push((effect, values));
+        Ok(fit(&compare.simulator().effects()[effect].touches, model)?.misfits)
+    }))
+}

@@ -1,0 +1,59 @@
+//! Whether commands switch at rows of the record or anywhere between two: two hypotheses, weighed by what each explains in the end.
+//!
+//! A record of which every second row was dropped shows a switch up to a row late. The [parameter](crate::Simulator::command_timing) that says
+//! how far ahead of its row a switch acts in the mean is then re-tuned, and that each switch has its own is a nuisance, marginalised. A
+//! true effect (a late valve) gains by such freedom as well, as long as it is not in the model: so both ways are searched to the end and
+//! the better likelihood of the records decides.
+
+use crate::{
+    fit::{hypothesis::Hypothesis, prepared::Problem},
+    problem::{
+        altered_parameters::Altered, error::GapError, simulator::Simulator, spec::ParameterSpec,
+        thresholds::Thresholds,
+    },
+    search::selection::Search,
+};
+
+/// A simulator whose commands switch between rows; none where it has no such commands.
+pub(crate) fn between_rows(simulator: &dyn Simulator) -> Option<Altered<'_>> {
+    let timing = simulator.command_timing();
+    let told = |i: usize, p: &ParameterSpec| {
+        let other = timing.iter().find(|(index, _)| *index == i);
+        other.map_or(p, |(_, spec)| spec).clone()
+    };
+    (!timing.is_empty()).then(|| Altered::of(simulator, told))
+}
+
+/// The problem in which the records are likelier, and the set to go on from; that of commands between rows is prepared where there are
+/// such commands and a gap that they could explain.
+pub(crate) fn likelier<'a>(
+    at_rows: Problem<'a>,
+    between_rows: Option<&'a Altered<'a>>,
+    (thresholds, depth): (&Thresholds, usize),
+    seed: u64,
+    progress: &dyn Fn(&str),
+) -> Result<(Problem<'a>, Hypothesis), GapError> {
+    let plain = at_rows.nominal.clone();
+    let Some(between_rows) = between_rows else { return Ok((at_rows, plain)) };
+    let simulator = at_rows.simulator();
+    let timing = simulator.command_timing();
+    let is_timed = |stage: &usize| {
+        timing.iter().any(|(index, _)| simulator.stages()[*stage].parameters.contains(index))
+    };
+    let commanded = (0..simulator.stages().len()).filter(is_timed);
+    let gap: f64 = commanded.map(|stage| at_rows.gap_in(&at_rows.nominal, stage)).sum();
+    if gap < thresholds.null_excess {
+        return Ok((at_rows, plain));
+    }
+    progress("when commands switch");
+    let between = Problem::prepare(between_rows, at_rows.stop(), seed, progress)?;
+    if between.log_likelihood(&between.nominal) <= at_rows.log_likelihood(&at_rows.nominal) {
+        return Ok((at_rows, plain));
+    }
+    let best = |problem: &Problem<'_>| -> Result<(f64, Hypothesis), GapError> {
+        let best = Search::new(problem, thresholds, depth).best(&problem.nominal, progress)?;
+        Ok((problem.log_likelihood(&best), best))
+    };
+    let ((own, from), (other, from_other)) = (best(&at_rows)?, best(&between)?);
+    Ok(if other > own { (between, from_other) } else { (at_rows, from) })
+}

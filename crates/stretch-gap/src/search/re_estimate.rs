@@ -1,0 +1,38 @@
+//! The nuisances of a record beside what was found in it.
+//!
+//! What an effect explains, a larger nuisance of the same stage may explain as well, so that the one is sized beside the other: the
+//! nuisances beside the best set, and those beside what is left of it without the effects of their stage, are two hypotheses, weighed by their
+//! likelihoods.
+
+use crate::{
+    fit::{hypothesis::Hypothesis, prepared::Problem},
+    problem::error::GapError,
+    search::sets::Sets,
+};
+
+/// The problem with the nuisances that the record has, and the set to go on from; none where they are as described.
+pub(crate) fn settled<'a>(
+    problem: &Problem<'a>,
+    sets: &mut Sets<'_>,
+    best: &Hypothesis,
+    seed: u64,
+) -> Result<Option<(Problem<'a>, Hypothesis)>, GapError> {
+    let mut bare = best.clone();
+    for effect in best.effects.iter().copied().filter(|e| problem.is_in_loose_stage(*e)) {
+        bare = sets.without(&bare, effect)?;
+    }
+    let beside_best = problem.adapted(&best.model, seed)?;
+    if bare.effects.len() == best.effects.len() {
+        return Ok(beside_best.map(|problem| (problem, best.clone())));
+    }
+    let Some(beside_bare) = problem.adapted(&bare.model, seed)? else {
+        return Ok(beside_best.map(|problem| (problem, best.clone())));
+    };
+    let own = beside_best.as_ref().unwrap_or(problem);
+    let (levels, others) = (own.levels(best)?, beside_bare.levels(&bare)?);
+    let levels: Vec<f64> = levels.iter().zip(&others).map(|(a, b)| a.min(*b)).collect();
+    if beside_bare.likelihood(&bare, &levels)? > own.likelihood(best, &levels)? {
+        return Ok(Some((beside_bare, bare)));
+    }
+    Ok(beside_best.map(|problem| (problem, best.clone())))
+}

@@ -1,0 +1,205 @@
+//! Cheap look at every effect: the change that it would make, nominal sensitivities projected out.
+//!
+//! Let d be the change of the output, in floors, that an effect of finite severity makes, r the residual and A the sensitivities of the
+//! nominal parameters, whose prior precision is 1. What the parameters can do is marginalised as nuisances are:
+//!
+//! ```text
+//! <x, y> = x'V^-1 y - x'V^-1 A (A'V^-1 A + b I)^-1 A'V^-1 y
+//! ```
+//!
+//! An effect a times as strong changes the cost by (0.5 a^2 <d,d> - a <d,r>)/b, which is least at a = <d,r>/<d,d>. The reduction
+//! there is the *gain*, half the score statistic of Rao (1948, doi 10.1017/S0305004100023987) for the effect, b samples a block:
+//! one simulation a start instead of a fit. Strengths scale so; thresholds do not, and are judged as they are.
+//! A kink bends the change, so gains only say what is worth a fit.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use crate::{
+    fit::{
+        comparison::{Comparison, Sensitivities},
+        metric::Column,
+    },
+    numerics::linear::Cholesky,
+    problem::{error::GapError, simulator::Model},
+};
+
+/// Times by which the first start's strength may be scaled.
+const SCALED: f64 = 8.0;
+/// A change smaller than this, in floors squared over all samples, is none.
+const NO_CHANGE: f64 = 1e-9;
+
+/// What a screen says of one effect.
+#[derive(Debug, Clone)]
+pub(crate) struct Screened {
+    pub(crate) effect: usize,
+    /// Starting points for a fit, the best first, with the reduction of the cost each promises.
+    pub(crate) starts: Vec<(Vec<f64>, f64)>,
+}
+
+impl Screened {
+    pub(crate) fn gain(&self) -> f64 {
+        self.starts.first().map_or(0.0, |s| s.1)
+    }
+}
+
+/// State of a stage that screens start from.
+pub(crate) struct Ground {
+    pub(crate) model: Model,
+    /// Residuals by stage.
+    pub(crate) residuals: Vec<Column>,
+    /// Sensitivities of nominal parameters by stage.
+    pub(crate) known: Vec<Option<Sensitivities>>,
+    /// Factor of their normal matrix (with the prior), and what it makes of the residual, by stage.
+    pub(crate) solved: Vec<(Cholesky, Vec<f64>)>,
+}
+
+impl Ground {
+    /// Around a model.
+    pub(crate) fn around(compare: &Comparison<'_>, model: Model) -> Result<Self, GapError> {
+        let stages = compare.metrics.len();
+        let parts: Result<Vec<_>, GapError> = (0..stages)
+            .into_par_iter()
+            .map(|s| {
+                compare.runs.simulator().linearise(s, &model, compare.frame.fit_trials)?;
+                let residual = compare.residual(s, &model)?;
+                let known = compare.nominal_sensitivities(s, &model, &residual)?;
+                let solved = compare.solved(s, &known, &residual);
+                Ok((residual, Some(known), solved))
+            })
+            .collect();
+        let (mut residuals, mut knowns, mut solveds) = (Vec::new(), Vec::new(), Vec::new());
+        for (residual, known, solved) in parts? {
+            residuals.push(residual);
+            knowns.push(known);
+            solveds.push(solved);
+        }
+        Ok(Self { model, residuals, known: knowns, solved: solveds })
+    }
+}
+
+impl Comparison<'_> {
+    /// Screens one effect on top of a model.
+    pub(crate) fn screen(&self, ground: &Ground, effect: usize) -> Result<Screened, GapError> {
+        let spec = &self.simulator().effects()[effect];
+        let mut starts = Vec::new();
+        let changes = self.changes(ground, effect, &spec.starts)?;
+        for (values, change) in spec.starts.iter().zip(changes) {
+            let Some((own, with_residual)) = change else { continue };
+            // Strengths scale with the amplitude; thresholds do not scale at all.
+            let scalable = spec.parameters[0].off == Some(0.0);
+            let (value, range) = (values[0], &spec.parameters[0]);
+            let alpha = with_residual / own;
+            let (least, most) = if scalable && value != 0.0 {
+                let (a, b) = (range.min / value, range.max / value);
+                (a.min(b).max(-SCALED), a.max(b).min(SCALED))
+            } else {
+                (0.0, 1.5)
+            };
+            let alpha = alpha.clamp(least, most);
+            let promise = |a: f64| self.weight() * (a * with_residual - 0.5 * a * a * own);
+            let gain = promise(alpha);
+            // A threshold has the sign of a strength and bends the change: as it was simulated, its promise is kept.
+            if scalable && promise(1.0) > 0.0 {
+                starts.push((values.clone(), promise(1.0)));
+            }
+            let mut start = values.clone();
+            if scalable {
+                let size = if alpha.abs() < 0.02 { 0.02 * alpha.signum() } else { alpha };
+                start[0] = (value * size).clamp(range.min, range.max);
+            }
+            starts.push((start, gain));
+        }
+        starts.sort_by(|a, b| b.1.total_cmp(&a.1));
+        Ok(Screened { effect, starts })
+    }
+
+    /// <d,d> and <d,r> of the change d that an effect makes at each of some values; none where it makes none or cannot be simulated.
+    pub(crate) fn changes(
+        &self,
+        ground: &Ground,
+        effect: usize,
+        starts: &[Vec<f64>],
+    ) -> Result<Vec<Option<(f64, f64)>>, GapError> {
+        let with = |values: &Vec<f64>| {
+            let mut model = ground.model.clone();
+            model.effects.push((effect, values.clone()));
+            model
+        };
+        let models: Vec<Model> = starts.iter().map(with).collect();
+        let touches = &self.simulator().effects()[effect].touches;
+        let wanted: Vec<(usize, &Model)> =
+            models.iter().flat_map(|model| touches.iter().map(move |&s| (s, model))).collect();
+        let mut there = self.residuals_of(&wanted, None).into_iter();
+        let mut out = Vec::with_capacity(starts.len());
+        for _ in starts {
+            let own: Vec<_> = there.by_ref().take(touches.len()).collect();
+            out.push(match own.into_iter().collect() {
+                Ok(own) => self.change(ground, touches, own),
+                Err(error) if error.ends_all() => return Err(error),
+                Err(_) => None,
+            });
+        }
+        Ok(out)
+    }
+
+    /// <d,d> and <d,r> of a change, from the residuals with it in the stages that it touches.
+    fn change(
+        &self,
+        ground: &Ground,
+        touches: &[usize],
+        there: Vec<Vec<f64>>,
+    ) -> Option<(f64, f64)> {
+        let (mut own, mut mixed) = (0.0, 0.0);
+        for (&stage, there) in touches.iter().zip(&there) {
+            let here = &ground.residuals[stage].values;
+            let change = here.iter().zip(there).map(|(a, b)| a - b).collect();
+            let change = self.metrics[stage].column(&self.frame, change);
+            let (squares, product) = self.projected(stage, ground, &change);
+            own += squares;
+            mixed += product;
+        }
+        (own > NO_CHANGE).then_some((own, mixed))
+    }
+
+    /// Factor L of A'V^-1 A + b I, and L^-1 A'V^-1 r.
+    pub(crate) fn solved(
+        &self,
+        stage: usize,
+        known: &Sensitivities,
+        residual: &Column,
+    ) -> (Cholesky, Vec<f64>) {
+        let product = |a: &Column, b: &Column| self.product(stage, a, b);
+        let n = known.len();
+        let mut normal = DMatrix::zeros(n, n);
+        for i in 0..n {
+            for j in 0..=i {
+                let p = product(&known[i].1, &known[j].1);
+                normal[(i, j)] = p;
+                normal[(j, i)] = p;
+            }
+            // The prior: one standard deviation is 1, and a block counts as one sample.
+            normal[(i, i)] += self.frame.block as f64;
+        }
+        let factor = Cholesky::of(normal);
+        let mut of_residual: Vec<f64> = known.iter().map(|(_, k)| product(k, residual)).collect();
+        factor.forward(&mut of_residual);
+        (factor, of_residual)
+    }
+
+    /// <d,d> and <d,r> of a change in one stage.
+    fn projected(&self, stage: usize, ground: &Ground, change: &Column) -> (f64, f64) {
+        let residual = &ground.residuals[stage];
+        let product = |a: &Column, b: &Column| self.product(stage, a, b);
+        let mut own = product(change, change);
+        let mut mixed = product(change, residual);
+        let (factor, of_residual) = &ground.solved[stage];
+        if let Some(known) = ground.known[stage].as_ref().filter(|k| !k.is_empty()) {
+            let mut of_change: Vec<f64> = known.iter().map(|(_, k)| product(k, change)).collect();
+            factor.forward(&mut of_change);
+            own -= of_change.iter().map(|x| x * x).sum::<f64>();
+            mixed -= of_change.iter().zip(of_residual).map(|(x, y)| x * y).sum::<f64>();
+        }
+        (own.max(0.0), mixed)
+    }
+}

@@ -1,0 +1,135 @@
+//! What a diagnosis says: its serde form is `diagnosis.json`, schema 1.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    evidence::{
+        candidates::{Candidate, ParameterShift},
+        excess::Excess,
+        localise::location::Where,
+        shares::EffectShare,
+        transfer::Transfer,
+    },
+    fit::identifiability::Identified,
+    missing::Proposed,
+    problem::{rows_used::RowsUsed, simulator::ModelRuns},
+    record::gross::Gross,
+    search::baselines::Baselines,
+};
+
+/// The answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum VerdictKind {
+    /// Simulation and measurement agree within the floor.
+    NoGap,
+    /// They agree once parameters are re-tuned within their tolerances.
+    Parameters,
+    /// A column of the record or a number of the rig file is wrong, and is told.
+    Record,
+    /// Effects of the catalogue are missing, and are named.
+    Effect,
+    /// An effect of the catalogue is missing, is named, and leaves more than the mismatch of its form explains.
+    Partial,
+    /// There is a gap that no effect of the catalogue explains.
+    Unknown,
+}
+
+/// What the named effects leave of the gap.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Unexplained {
+    /// Share of the held-out gap.
+    pub share: f64,
+    /// Stage where most of it sits.
+    pub stage: String,
+    /// Slices of that stage where it stands out, the loudest first.
+    pub sits: Vec<String>,
+}
+
+/// The experiment that would tell rivals apart.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NextExperiment {
+    /// Name in the menu.
+    pub name: String,
+    /// Rivals that it separates.
+    pub separates: Vec<String>,
+    /// Difference that no re-tuning removes, in floors.
+    pub d: f64,
+    /// Minutes that it takes.
+    pub minutes: f64,
+    /// Why, in a sentence.
+    pub why: String,
+}
+
+/// The diagnosis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Diagnosis {
+    /// Version of this schema: 1.
+    pub schema: u32,
+    /// The answer.
+    pub verdict: VerdictKind,
+    /// The answer in one plain sentence.
+    pub sentence: String,
+    /// Effects named, the strongest first; empty unless the verdict is `effect` or `partial`.
+    pub named: Vec<String>,
+    /// Effects that these data cannot tell from one that is named.
+    #[serde(default)]
+    pub tied: Vec<String>,
+    /// Effects that were found but close less of the held-out gap than `least_share`.
+    #[serde(default)]
+    pub faint: Vec<String>,
+    /// Least share of the held-out gap that a name closes.
+    #[serde(default)]
+    pub least_share: f64,
+    /// What a partial answer leaves.
+    #[serde(default)]
+    pub unexplained: Option<Unexplained>,
+    /// What the catalogue lacks, where a gap is left that its effects do not explain.
+    #[serde(default)]
+    pub proposed: Option<Proposed>,
+    /// What is wrong with record or rig file: what the columns alone say, or one error and those that these data cannot
+    /// tell from it. Empty unless the verdict is `record`.
+    #[serde(default)]
+    pub gross: Vec<Gross>,
+    /// The 95 % set: effects that these data cannot tell apart.
+    pub ambiguous: Vec<String>,
+    /// Sets of effects, the most probable first.
+    pub candidates: Vec<Candidate>,
+    /// What each effect of the best set closes of the held-out gap, the strongest first; named or not.
+    #[serde(default)]
+    pub shares: Vec<EffectShare>,
+    /// How large the gap is.
+    #[serde(default)]
+    pub gap: Excess,
+    /// Gap that 19 of 20 records like this one stay below in which nothing is missing; none where something is named, or the record
+    /// itself is wrong.
+    #[serde(default)]
+    pub null_band: Option<f64>,
+    /// Where the gap sits.
+    #[serde(rename = "where")]
+    pub location: Where,
+    /// Nominal parameters.
+    pub parameters: Vec<ParameterShift>,
+    /// Which nominal parameters these data determine, and which not.
+    #[serde(default)]
+    pub identifiability: Vec<Identified>,
+    /// What the gap costs a calibration.
+    pub transfer: Option<Transfer>,
+    /// What to measure next.
+    pub next_experiment: Option<NextExperiment>,
+    /// What simpler methods say.
+    pub baselines: Option<Baselines>,
+    /// What was noticed and assumed.
+    pub notes: Vec<String>,
+    /// Rows that it stands on, of those that were read.
+    #[serde(default)]
+    pub rows_used: RowsUsed,
+    /// Simulations of one stage that it took, simpler methods left out.
+    #[serde(default)]
+    pub simulations: usize,
+    /// Runs of a black box, where that is what costs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model_runs: Option<ModelRuns>,
+    /// Seconds it took.
+    pub runtime_s: f64,
+}

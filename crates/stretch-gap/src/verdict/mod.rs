@@ -1,0 +1,16 @@
+//! The verdict, and how it is told.
+//!
+//! In: the evidence, the errors of the record and the thresholds. Out: a [`diagnosis::Diagnosis`].
+//! [`judge`] decides what kind of answer the evidence carries, [`naming`] which effects are named, tied or faint, [`coverage`]
+//! whether the record carries a name at all ([`too_little`]), [`proposal`] whether a sum of terms outside the catalogue beats it;
+//! [`sentence`] puts the answer into words. [`next_experiment`] asks of a finished diagnosis what to measure next.
+//! Imports: every folder but none of this one's callers.
+
+pub(crate) mod coverage;
+pub(crate) mod diagnosis;
+pub(crate) mod judge;
+pub(crate) mod naming;
+pub(crate) mod next_experiment;
+pub(crate) mod proposal;
+pub(crate) mod sentence;
+pub(crate) mod too_little;

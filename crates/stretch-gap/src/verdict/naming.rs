@@ -1,0 +1,152 @@
+//! Which names stand in the headline, which beside it, and which below.
+//!
+//! Evidence is not importance: with 50 000 samples sixty nats stand for a hundred-thousandth of the gap. So a name closes a stated share of
+//! the gap that was *held out* in one of its stages, or is told as faint. And names that the data tell apart no better than a coin does are a tie: two
+//! sets that differ in one effect, the probability of the second at least [`TIE`] of the first's.
+
+use crate::{
+    evidence::{candidates::Candidate, shares::EffectShare},
+    problem::thresholds::Thresholds,
+};
+
+/// Ratio of probabilities from which two sets are told as one or the other: one to three, less than a nat and a half.
+const TIE: f64 = 1.0 / 3.0;
+
+/// Effects of the first candidate by what may be said of them.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Naming {
+    /// For the headline, the strongest first.
+    pub(crate) named: Vec<String>,
+    /// What may stand in the place of a name: the name, and the other.
+    pub(crate) ties: Vec<(String, String)>,
+    /// Found, but they close less than counts.
+    pub(crate) faint: Vec<String>,
+}
+
+impl Naming {
+    /// Of the most probable candidate and its rivals; shares are of the held-out gap.
+    pub(crate) fn of(
+        candidates: &[Candidate],
+        shares: &[EffectShare],
+        thresholds: &Thresholds,
+        is_short: bool,
+    ) -> Self {
+        let Some(first) = candidates.first() else { return Self::default() };
+        let share =
+            |name: &str| shares.iter().find(|s| s.effect == name).map(|s| s.closes_of_stage);
+        // A rival that came out first was not taken apart: it stands where an effect that was stood.
+        let counts = |name: &&String| share(name).is_none_or(|s| s >= thresholds.least_share);
+        let (mut named, mut faint): (Vec<String>, Vec<String>) =
+            first.effects.iter().cloned().partition(|name| counts(&name));
+        if named.is_empty() && !faint.is_empty() {
+            named.push(faint.remove(0));
+        }
+        // Where every size stands at an end of its range, the set stands in for something else.
+        let is_bound = |name: &String| shares.iter().any(|s| s.effect == *name && s.at_bound);
+        if named.iter().all(is_bound) {
+            faint.splice(0..0, named.drain(..));
+        }
+        // On a short record probabilities part what the held-out gap does not.
+        let closes_alike = |c: &Candidate| is_short && c.closed >= first.closed_ci[0];
+        let is_tied = |c: &&Candidate| c.probability >= TIE * first.probability || closes_alike(c);
+        let rivals = candidates[1..].iter().filter(is_tied);
+        let mut ties = Vec::new();
+        for rival in rivals.filter(|c| c.effects.len() == first.effects.len()) {
+            let lost: Vec<&String> =
+                first.effects.iter().filter(|e| !rival.effects.contains(e)).collect();
+            let new: Vec<&String> =
+                rival.effects.iter().filter(|e| !first.effects.contains(e)).collect();
+            if let ([lost], [new]) = (&lost[..], &new[..])
+                && named.contains(lost)
+            {
+                ties.push(((*lost).clone(), (*new).clone()));
+            }
+        }
+        Self { named, ties, faint }
+    }
+
+    /// Every name that may stand in the place of another, once.
+    pub(crate) fn tied(&self) -> Vec<String> {
+        let mut tied: Vec<String> = Vec::new();
+        for (_, other) in &self.ties {
+            if !tied.contains(other) {
+                tied.push(other.clone());
+            }
+        }
+        tied
+    }
+
+    /// The headline's names, each with what may stand in its place.
+    pub(crate) fn alternatives(&self) -> Vec<String> {
+        let one = |name: &String| {
+            let others = self.ties.iter().filter(|(own, _)| own == name).map(|(_, other)| other);
+            let all: Vec<&str> = std::iter::once(name).chain(others).map(String::as_str).collect();
+            all.join(" or ")
+        };
+        self.named.iter().map(one).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn candidate(effects: &[&str], probability: f64) -> Candidate {
+        Candidate {
+            effects: effects.iter().map(|e| (*e).to_owned()).collect(),
+            probability,
+            score: 0.0,
+            gap_before: 1.0,
+            gap_after: 0.1,
+            closed: 0.9,
+            closed_ci: [0.8, 1.0],
+            is_confirmed: true,
+            parameters: Vec::new(),
+            by_name: Default::default(),
+        }
+    }
+
+    fn share(effect: &str, closes: f64) -> EffectShare {
+        EffectShare { effect: effect.into(), closes, closes_of_stage: closes, at_bound: false }
+    }
+
+    #[test]
+    fn what_closes_nothing_is_faint_and_a_coin_is_a_tie() {
+        let candidates = [
+            candidate(&["slack", "sag"], 0.5),
+            candidate(&["saturation", "sag"], 0.4),
+            candidate(&["slack", "leak"], 0.1),
+        ];
+        let shares = [share("slack", 0.95), share("sag", 0.0)];
+        let naming = Naming::of(&candidates, &shares, &Thresholds::frozen(), false);
+        assert_eq!(
+            (naming.named.as_slice(), naming.faint.as_slice()),
+            (&["slack".to_owned()][..], &["sag".to_owned()][..])
+        );
+        assert_eq!(naming.alternatives(), ["slack or saturation"]);
+        // On a short record what closes as much is a tie, whatever its probability.
+        let short = Naming::of(&candidates, &shares, &Thresholds::frozen(), true);
+        assert_eq!(short.ties.len(), 1);
+        let sure = [candidate(&["slip"], 0.999), candidate(&["lowpass"], 0.001)];
+        let alike = |is_short| {
+            let shares = [share("slip", 0.9)];
+            Naming::of(&sure, &shares, &Thresholds::frozen(), is_short).alternatives()
+        };
+        assert_eq!(
+            (alike(false), alike(true)),
+            (vec!["slip".into()], vec!["slip or lowpass".into()])
+        );
+        // Something is named where an effect is, however little it closes.
+        let weak = Naming::of(
+            &candidates,
+            &[share("slack", 0.0), share("sag", 0.0)],
+            &Thresholds::frozen(),
+            false,
+        );
+        assert_eq!(weak.named, ["slack"]);
+        assert_eq!(
+            Naming::of(&[candidate(&[], 1.0)], &[], &Thresholds::frozen(), false),
+            Naming::default()
+        );
+    }
+}

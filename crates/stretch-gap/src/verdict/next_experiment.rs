@@ -1,0 +1,292 @@
+//! The experiment that tells rivals apart.
+//!
+//! Discrimination between models after Atkinson and Fedorov (1975, doi 10.1093/biomet/62.1.57), T-optimality: the best experiment is that
+//! in which the rival, its parameters free within what is already known, comes least near to the truth. With tangents A of the rival's
+//! predictions and differences d between the two, over what was measured (index 0) and the experiment (1),
+//!
+//! ```text
+//! x = argmin of 0.5/b (|d_0 + A_0 x|^2 + |d_1 + A_1 x|^2) + 0.5 |x|^2 in its box,     D^2 = |d_1 + A_1 x|^2/samples
+//! ```
+//!
+//! Which of the two is true nobody knows: both are tried, and the smaller D counts.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use stretch_data::Trial;
+
+use crate::{
+    evidence::gathered::Evidence,
+    numerics::linear::{boxed, dot},
+    problem::{
+        error::GapError,
+        frame::BLOCK_S,
+        simulator::{Model, Simulator},
+    },
+    verdict::diagnosis::{Diagnosis, NextExperiment},
+};
+
+/// Evidence that tells two rivals apart with 95 % probability, nats.
+const ENOUGH: f64 = 3.0;
+/// Share of an effect parameter's range that a sensitivity is taken over.
+const SMALL: f64 = 0.02;
+
+/// An experiment in words, and the trial that does it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// Name in the menu.
+    pub name: String,
+    /// How to do it, in a sentence.
+    pub how: String,
+    /// Time to prepare it, minutes.
+    pub prepare_min: f64,
+    /// What is commanded or set from outside, evenly sampled.
+    pub trial: Trial,
+}
+
+impl Plan {
+    /// Minutes with the preparation.
+    pub fn minutes(&self) -> f64 {
+        self.prepare_min + self.runs_min()
+    }
+
+    fn runs_min(&self) -> f64 {
+        self.trial.len() as f64 * self.dt_s() / 60.0
+    }
+
+    fn dt_s(&self) -> f64 {
+        self.trial.rate_hz().map_or(0.01, |rate| 1.0 / rate)
+    }
+}
+
+/// A simulator that can tell what it would show in experiments that nobody has done yet.
+pub trait Laboratory: Simulator {
+    /// What it takes to simulate an experiment.
+    type Setting: Sync;
+    /// Experiments to choose from, all with the same sample time.
+    fn menu(&self) -> Vec<(Plan, Self::Setting)>;
+    /// An experiment that stands for what has been measured.
+    fn done(&self) -> Self::Setting;
+    /// What a model predicts of an experiment: every recorded channel in units of its noise.
+    ///
+    /// # Errors
+    /// When the simulation is not possible with these values.
+    fn predict(&self, model: &Model, setting: &Self::Setting) -> Result<Vec<Vec<f64>>, GapError>;
+}
+
+/// What to measure next, and the trial that does it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Proposal {
+    /// The recommendation.
+    pub next: NextExperiment,
+    /// Openings by time, and what is to be set from outside.
+    pub trial: Trial,
+    /// Every experiment of the menu: name, difference in floors, minutes; the best first.
+    pub menu: Vec<(String, f64, f64)>,
+}
+
+/// Recommends an experiment when the 95 % set of a diagnosis holds more than one effect.
+///
+/// D(x) is the root mean square difference between the predictions of the two leading rivals for the experiment x, in
+/// floors, that is left when one rival's nominal and effect parameters are moved, within their tolerances and at the
+/// price of what has been measured already, to come as near to the other as they can (linearised); both ways, the
+/// smaller. The experiment with the largest D^2 times blocks a minute wins: evidence adds up in squares. The
+/// preparation counts into the minutes.
+///
+/// # Errors
+/// What the simulator says.
+pub fn next_experiment<L: Laboratory>(
+    simulator: &L,
+    diagnosis: &Diagnosis,
+    evidence: &Evidence,
+) -> Result<Option<Proposal>, GapError> {
+    let Some((one, two, separates)) = rivals(simulator, diagnosis, evidence) else {
+        return Ok(None);
+    };
+    let menu = simulator.menu();
+    let rated = rate(simulator, one, two, &menu)?.into_iter().enumerate();
+    let worth = |&(i, d): &(usize, f64)| {
+        let plan = &menu[i].0;
+        d * d * plan.runs_min() / plan.minutes()
+    };
+    let mut rated: Vec<(usize, f64)> = rated.collect();
+    rated.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
+    let Some(&(best, d)) = rated.first().filter(|r| r.1.is_finite()) else { return Ok(None) };
+    let chosen = &menu[best].0;
+    let next = NextExperiment {
+        name: chosen.name.clone(),
+        separates,
+        d,
+        minutes: chosen.minutes(),
+        why: chosen.how.clone() + &repeats(d, chosen.runs_min()),
+    };
+    let trial = chosen.trial.clone();
+    let rated = rated.iter().map(|&(i, d)| (menu[i].0.name.clone(), d, menu[i].0.minutes()));
+    Ok(Some(Proposal { next, trial, menu: rated.collect() }))
+}
+
+/// D of every experiment of the menu for two models, in floors: see [`next_experiment`].
+///
+/// # Errors
+/// What the simulator says.
+pub fn differences<L: Laboratory>(
+    simulator: &L,
+    one: &Model,
+    two: &Model,
+) -> Result<Vec<(String, f64)>, GapError> {
+    let menu = simulator.menu();
+    let rated = rate(simulator, one, two, &menu)?;
+    Ok(menu.into_iter().map(|(plan, _)| plan.name).zip(rated).collect())
+}
+
+fn rate<L: Laboratory>(
+    simulator: &L,
+    one: &Model,
+    two: &Model,
+    menu: &[(Plan, L::Setting)],
+) -> Result<Vec<f64>, GapError> {
+    let done = simulator.done();
+    let block = menu.first().map_or(1.0, |(plan, _)| BLOCK_S / plan.dt_s());
+    let known = [Tangent::of(simulator, one, &done)?, Tangent::of(simulator, two, &done)?];
+    menu.par_iter()
+        .map(|(_, experiment)| {
+            let here = [
+                Tangent::of(simulator, one, experiment)?,
+                Tangent::of(simulator, two, experiment)?,
+            ];
+            let there = left(block, &known[0], &known[1], &here[0], &here[1]);
+            let back = left(block, &known[1], &known[0], &here[1], &here[0]);
+            Ok(there.min(back))
+        })
+        .collect()
+}
+
+/// How often it has to be done until it tells, where once is not enough.
+fn repeats(d: f64, minutes: f64) -> String {
+    let told = 0.5 * d * d * 60.0 * minutes / BLOCK_S;
+    match (ENOUGH / told).ceil() {
+        n if n <= 1.0 => String::new(),
+        n if n <= 20.0 => format!(" Once will hardly do: plan {n} runs."),
+        _ => {
+            " The rivals are so alike that no experiment of the menu is likely to part them.".into()
+        }
+    }
+}
+
+/// The first candidate, the most probable one with an effect of the 95 % set that the first lacks, and the effects in
+/// which they differ.
+fn rivals<'a>(
+    simulator: &dyn Simulator,
+    diagnosis: &Diagnosis,
+    evidence: &'a Evidence,
+) -> Option<(&'a Model, &'a Model, Vec<String>)> {
+    let one = evidence.candidates.first()?;
+    let own = &diagnosis.candidates.first()?.effects;
+    let at = diagnosis.candidates.iter().position(|c| {
+        c.effects.iter().any(|e| diagnosis.ambiguous.contains(e) && !own.contains(e))
+    })?;
+    let others = &diagnosis.candidates[at].effects;
+    let mut separates: Vec<String> = own.iter().filter(|e| !others.contains(e)).cloned().collect();
+    separates.extend(others.iter().filter(|e| !own.contains(e)).cloned());
+    let two = evidence.candidates.get(at)?;
+    let specs = simulator.effects();
+    let holds = |m: &Model| m.effects.iter().all(|(e, _)| *e < specs.len());
+    (holds(one) && holds(two)).then_some((one, two, separates))
+}
+
+/// What a model predicts of an experiment, and how that moves with each of its parameters.
+struct Tangent {
+    values: Vec<f64>,
+    slopes: Vec<Vec<f64>>,
+    /// How far each parameter may go down and up, in its own units of one.
+    bounds: Vec<[f64; 2]>,
+    channels: usize,
+}
+
+impl Tangent {
+    fn of<L: Laboratory>(
+        simulator: &L,
+        model: &Model,
+        experiment: &L::Setting,
+    ) -> Result<Self, GapError> {
+        let run = |model: &Model| -> Result<(Vec<f64>, usize), GapError> {
+            let channels = simulator.predict(model, experiment)?;
+            let count = channels.len();
+            Ok((channels.into_iter().flatten().collect(), count))
+        };
+        let (values, channels) = run(model)?;
+        let mut slopes = Vec::new();
+        let mut bounds = Vec::new();
+        let mut slope = |moved: &Model, step: f64| -> Result<(), GapError> {
+            let (there, _) = run(moved)?;
+            slopes.push(there.iter().zip(&values).map(|(a, b)| (a - b) / step).collect());
+            Ok(())
+        };
+        for (i, p) in simulator.parameters().iter().enumerate().filter(|(_, p)| p.sd > 0.0) {
+            let at = (model.parameters[i] - p.nominal) / p.sd;
+            let step = if at > 0.0 { -0.3 } else { 0.3 };
+            let mut moved = model.clone();
+            moved.parameters[i] += step * p.sd;
+            slope(&moved, step)?;
+            bounds.push([-3.0 - at, 3.0 - at]);
+        }
+        for (slot, (effect, effect_values)) in model.effects.iter().enumerate() {
+            let specs = &simulator.effects()[*effect].parameters;
+            for (k, p) in specs.iter().enumerate().filter(|(_, p)| p.is_fitted) {
+                let range = p.max - p.min;
+                let x = effect_values[k];
+                let step = if x > p.min + 0.5 * range { -SMALL } else { SMALL };
+                // Small beside the value where the range is wide.
+                let step = if p.is_log && x > 0.0 {
+                    step.signum() * (0.1 * x / range).min(SMALL)
+                } else {
+                    step
+                };
+                let mut moved = model.clone();
+                moved.effects[slot].1[k] = x + step * range;
+                slope(&moved, step)?;
+                bounds.push([(p.min - x) / range, (p.max - x) / range]);
+            }
+        }
+        Ok(Self { values, slopes, bounds, channels })
+    }
+
+    fn samples(&self) -> f64 {
+        self.values.len() as f64 / self.channels.max(1) as f64
+    }
+}
+
+/// Root mean square difference, summed over channels, that stays when `rival` comes as near to `truth` as it can;
+/// residuals are correlated, and `block` samples count as one observation.
+fn left(
+    block: f64,
+    truth_known: &Tangent,
+    rival_known: &Tangent,
+    truth: &Tangent,
+    rival: &Tangent,
+) -> f64 {
+    let n = rival.slopes.len();
+    // The prior: one tolerance is 1.
+    let mut normal = DMatrix::identity(n, n);
+    let mut slope = vec![0.0; n];
+    for (truth, rival) in [(truth_known, rival_known), (truth, rival)] {
+        let gap: Vec<f64> = rival.values.iter().zip(&truth.values).map(|(a, b)| a - b).collect();
+        for i in 0..n {
+            slope[i] += dot(&rival.slopes[i], &gap) / block;
+            for j in 0..=i {
+                let product = dot(&rival.slopes[i], &rival.slopes[j]) / block;
+                normal[(i, j)] += product;
+                if i != j {
+                    normal[(j, i)] += product;
+                }
+            }
+        }
+    }
+    let low: Vec<f64> = rival.bounds.iter().map(|b| b[0].min(0.0)).collect();
+    let high: Vec<f64> = rival.bounds.iter().map(|b| b[1].max(0.0)).collect();
+    let step = boxed(&normal, &slope, &low, &high);
+    let mut gap: Vec<f64> = rival.values.iter().zip(&truth.values).map(|(a, b)| a - b).collect();
+    for (slopes, x) in rival.slopes.iter().zip(&step) {
+        gap.iter_mut().zip(slopes).for_each(|(g, s)| *g += x * s);
+    }
+    (gap.iter().map(|g| g * g).sum::<f64>() / rival.samples()).sqrt()
+}

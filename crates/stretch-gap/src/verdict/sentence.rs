@@ -1,0 +1,228 @@
+//! The answer in words, made from the verdict when nothing can change any more.
+
+use crate::{
+    evidence::{excess::Excess, gathered::Evidence, shares::EffectShare},
+    missing::Proposed,
+    problem::simulator::Simulator,
+    record::{gross::Gross, sentence::sentence},
+    verdict::{
+        diagnosis::{Unexplained, VerdictKind},
+        judge::{Case, Overruled, Verdict},
+        naming::Naming,
+    },
+};
+
+/// Least share of the gap that is told of an effect that is not named.
+const TOLD: f64 = 0.05;
+
+/// Share that is told as a number.
+const LEAST_TOLD: f64 = 0.01;
+
+/// What is told: the answer in one sentence, and what was noticed and assumed.
+pub(crate) struct Told {
+    pub(crate) sentence: String,
+    pub(crate) notes: Vec<String>,
+}
+
+/// The verdict with its names, and what a partial one leaves.
+#[derive(Clone, Copy)]
+pub(crate) struct Answer<'a> {
+    pub(crate) verdict: &'a Verdict,
+    pub(crate) naming: &'a Naming,
+    pub(crate) unexplained: Option<&'a Unexplained>,
+    pub(crate) proposed: Option<&'a Proposed>,
+    /// What is wrong with the record or the rig file.
+    pub(crate) gross: &'a [Gross],
+    /// Gap that noise alone may leave, where nothing is named.
+    pub(crate) null_band: Option<f64>,
+}
+
+/// Tells a verdict.
+pub(crate) fn tell(
+    answer: Answer<'_>,
+    case: Case<'_>,
+    simulator: &dyn Simulator,
+    evidence: &Evidence,
+    shares: &[EffectShare],
+) -> Told {
+    let mut notes = Vec::new();
+    if evidence.frame.borrowed_test {
+        let held =
+            "there is no test trial: the last quarter of every trial is held back and tested on";
+        notes.push(held.into());
+    }
+    let seen = seen(answer, case, simulator, evidence, shares);
+    let sentence = match &answer.verdict.overruled {
+        None => seen,
+        Some(overruled) => {
+            notes.push(format!("before that was seen: {seen}"));
+            wrong(overruled, simulator)
+        }
+    };
+    let proposed = answer.proposed.map_or(String::new(), |p| format!(" {}", p.sentence));
+    Told { sentence: sentence + &proposed, notes }
+}
+
+fn seen(
+    answer: Answer<'_>,
+    case: Case<'_>,
+    simulator: &dyn Simulator,
+    evidence: &Evidence,
+    shares: &[EffectShare],
+) -> String {
+    let gap = case.gap;
+    let naming = answer.naming;
+    match (answer.verdict.seen, case.first) {
+        (VerdictKind::Record, Some(first)) if !answer.gross.iter().any(Gross::is_plain) => {
+            sentence(answer.gross)
+                + &format!(
+                    " With that put right {:.0} % of the gap close ({:.0} to {:.0} %) on trials that were not fitted; probability {:.2}.",
+                    100.0 * first.closed,
+                    100.0 * first.closed_ci[0],
+                    100.0 * first.closed_ci[1],
+                    first.probability
+                )
+        }
+        (VerdictKind::Record, _) => {
+            sentence(answer.gross) + " Nothing can be said of effects until that is put right."
+        }
+        (VerdictKind::Effect, Some(first)) => {
+            // Overruled, nothing was named: what was seen is told as it stood.
+            let names = match naming.named.is_empty() {
+                true => first.effects.clone(),
+                false => naming.alternatives(),
+            };
+            format!(
+                "The simulator lacks {}: {} {:.0} % of the gap ({:.0} to {:.0} %) on trials that were not fitted; probability {:.2}.",
+                names.join(" and "),
+                if names.len() > 1 { "together they close" } else { "it closes" },
+                100.0 * first.closed,
+                100.0 * first.closed_ci[0],
+                100.0 * first.closed_ci[1],
+                first.probability
+            ) + &beside(naming)
+        }
+        (VerdictKind::Partial, Some(_)) => partial(answer, shares) + &beside(naming),
+        (VerdictKind::Effect | VerdictKind::Partial | VerdictKind::Unknown, _) => {
+            let all = evidence.stages.iter().zip(simulator.stages());
+            let worst = all.max_by(|a, b| a.0.excess_after.total_cmp(&b.0.excess_after));
+            let best = evidence.best_effect.map(|e| simulator.effects()[e].name.as_str());
+            format!(
+                "There is a gap in {} that the catalogue does not explain: what is left is {:.2} times the noise of {:.2} after the best ({}).",
+                worst.map_or("", |(_, spec)| spec.name.as_str()),
+                multiple(gap.left),
+                multiple(gap.retuned),
+                best.unwrap_or("none")
+            ) + &parts(shares)
+        }
+        (VerdictKind::Parameters | VerdictKind::NoGap, _) => match answer.null_band {
+            Some(band) if gap.retuned > band => too_faint(gap, band, evidence, simulator),
+            _ if answer.verdict.seen == VerdictKind::NoGap => {
+                "Simulator and rig agree within the noise floor.".into()
+            }
+            _ => format!(
+                "No effect is missing: with its parameters re-tuned within their tolerances the simulator agrees with the rig (what is left is {:.1} times the noise as shipped, {:.2} re-tuned).",
+                multiple(gap.raw),
+                multiple(gap.retuned)
+            ),
+        },
+    }
+}
+
+/// More than chance, and nothing that a name could stand on.
+fn too_faint(gap: Excess, band: f64, evidence: &Evidence, simulator: &dyn Simulator) -> String {
+    let all = evidence.stages.iter().zip(simulator.stages());
+    let worst = all.max_by(|a, b| a.0.excess_retuned.total_cmp(&b.0.excess_retuned));
+    format!(
+        "Too faint to name: with its parameters re-tuned the simulator leaves {:.3} times the noise, most of it in {}. Noise as it is described \
+         stays below {:.3} in 19 of 20 records like this one: it is larger, or something is missing.",
+        multiple(gap.retuned),
+        worst.map_or("", |(_, spec)| spec.name.as_str()),
+        multiple(band)
+    )
+}
+
+/// Mostly this, and so much else.
+fn partial(answer: Answer<'_>, shares: &[EffectShare]) -> String {
+    let closes =
+        |name: &String| shares.iter().find(|s| s.effect == *name).map_or(0.0, |s| s.closes);
+    let in_words = |share: f64| match share < LEAST_TOLD {
+        true => " (below 1 %)".to_owned(),
+        false => format!(" ({:.0} %)", 100.0 * share),
+    };
+    let pairs = answer.naming.named.iter().zip(answer.naming.alternatives());
+    let mut names: Vec<(f64, String)> = pairs.map(|(name, told)| (closes(name), told)).collect();
+    names.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let names: Vec<String> =
+        names.into_iter().map(|(share, told)| told + &in_words(share)).collect();
+    let rest = answer.unexplained.map_or(String::new(), |u| {
+        let sits = match u.sits.is_empty() {
+            true => String::new(),
+            false => format!(", most of it at {}", u.sits.join("; ")),
+        };
+        format!("{:.0} % are not explained: they sit in {}{sits}.", 100.0 * u.share, u.stage)
+    });
+    format!("Mostly {} of the gap on trials that were not fitted. {rest}", names.join(", "))
+}
+
+/// Ties and what is faint, behind the headline.
+fn beside(naming: &Naming) -> String {
+    let mut out = String::new();
+    if !naming.ties.is_empty() {
+        out += " These data cannot tell which.";
+    }
+    if !naming.faint.is_empty() {
+        out += &format!(" Also seen, faint: {}.", naming.faint.join(", "));
+    }
+    out
+}
+
+/// Root mean square of what is left, in multiples of the noise, from an excess (mean square over the noise's, minus 1).
+fn multiple(excess: f64) -> f64 {
+    (1.0 + excess).max(0.0).sqrt()
+}
+
+/// Which effects close parts of a gap that no set of them explains.
+fn parts(shares: &[EffectShare]) -> String {
+    let told = shares.iter().filter(|s| s.closes >= TOLD).map(|s| {
+        let end = if s.at_bound { " (at the end of its range)" } else { "" };
+        format!("{} {:.0} %{end}", s.effect, 100.0 * s.closes)
+    });
+    let told: Vec<String> = told.collect();
+    let all: f64 = shares.iter().map(|s| s.closes).sum();
+    match told.is_empty() {
+        true => String::new(),
+        false => format!(
+            " Parts of it close: {} ({:.0} % together, on trials that were not fitted).",
+            told.join(", "),
+            100.0 * all
+        ),
+    }
+}
+
+/// Why it may not be the right simulator.
+fn wrong(overruled: &Overruled, simulator: &dyn Simulator) -> String {
+    match overruled {
+        Overruled::Foreign { stage, share } => {
+            let spec = &simulator.stages()[*stage];
+            format!(
+                "The gap is everything: {:.0} % of what {} does is not in the simulator of {}. Is it the right rig, and is every \
+                 column what its name says?",
+                100.0 * share.min(1.0),
+                spec.channel,
+                spec.name
+            )
+        }
+        Overruled::Thin(thin) => thin.words(),
+        Overruled::Strained(strained) => {
+            let names = strained.ended.iter().map(|&p| simulator.parameters()[p].name.as_str());
+            format!(
+                "The parameters of {} do not fit within their tolerances: {} stand at the end of them, and {:.1} times the noise is left \
+                 all the same. Is it the right rig? If its parameters are right, something is missing that is not in the catalogue.",
+                simulator.stages()[strained.stage].name,
+                names.collect::<Vec<_>>().join(", "),
+                multiple(strained.left)
+            )
+        }
+    }
+}

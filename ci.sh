@@ -88,7 +88,7 @@ step "packages of the library crates"
 packages=$(mktemp -d)
 trap 'rm -rf "$packages"' EXIT
 # shellcheck disable=SC2046,SC2086
-cargo package --quiet --locked --allow-dirty --target-dir "$packages" $(printf -- '-p %s ' $LIBRARIES stretch-data stretch-calibrate stretch-export stretch-sim)
+cargo package --quiet --locked --allow-dirty --target-dir "$packages" $(printf -- '-p %s ' $LIBRARIES stretch-files stretch-data stretch-recording stretch-calibrate stretch-export stretch-sim)
 
 step "fuzzing, twenty seconds a target"
 # a third of a minute or 200,000 executions each, two at a time: the same in every run, so that what it finds is of the change

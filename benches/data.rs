@@ -4,7 +4,8 @@ use std::{hint::black_box, time::Duration};
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use serde::Deserialize;
-use stretch_data::{Channel, ReadOptions, RowReader, Trial};
+use stretch_data::{Channel, Trial};
+use stretch_recording::{ReadOptions, Recording, RowReader};
 
 const ROWS: usize = 1_000_000;
 const SIX: [&str; 5] = ["inlet", "outlet", "pressure_kpa", "length_mm", "bridge_v"];
@@ -93,7 +94,9 @@ fn read(c: &mut Criterion) {
         group.warm_up_time(Duration::from_secs(1)).measurement_time(Duration::from_secs(5));
         let options = ReadOptions::new().require("length_mm").require("bridge_v");
         group.bench_function("stretch", |b| {
-            b.iter(|| Trial::from_reader(black_box(&text[..]), "bench", &options).expect("a trial"))
+            b.iter(|| {
+                Recording::from_reader(black_box(&text[..]), "bench", &options).expect("a trial")
+            })
         });
         group.bench_function("stretch_live", |b| {
             b.iter(|| {

@@ -42,7 +42,7 @@ one() {
     local folders=("$own")
     [ -d "corpus/$name" ] && folders+=("corpus/$name")
     # recordings begin with the odd files that their readers are tested on
-    local odd=../crates/stretch-data/tests/corpus/${name#recording_}
+    local odd=../crates/stretch-recording/tests/corpus/${name#recording_}
     [ "$name" != "${name#recording_}" ] && [ -d "$odd" ] && folders+=("$odd")
     local most=4096
     [ "$name" = recording_parquet ] || [ "$name" = recording_hdf5 ] && most=16384

@@ -115,7 +115,7 @@ fn main() -> ExitCode {
     // whoever read our output has gone: nothing is wrong
     let is_unread = display::lost() == Some(ErrorKind::BrokenPipe);
     match (result, display::lost()) {
-        (Err(_), _) if stretch_data::interrupted() => ExitCode::from(INTERRUPTED),
+        (Err(_), _) if stretch_files::interrupted() => ExitCode::from(INTERRUPTED),
         (Err(error), _) if is_unread && is_broken_pipe(&error) => ExitCode::SUCCESS,
         (Err(error), _) => {
             display::fail(message(&error));
@@ -158,7 +158,7 @@ fn message(error: &anyhow::Error) -> String {
             told = format!("{told}: {cause}");
         }
     }
-    stretch_data::without_temporary_names(&told)
+    stretch_files::without_temporary_names(&told)
 }
 
 /// A text without Rust's `(os error 28)`, which says what stands before it again.

@@ -21,13 +21,13 @@ use stretch_calibrate::{
     BoardReceptor, ModelKind, calibration_to_json, fixed_record, read_calibration,
 };
 use stretch_core::{Calibration, Runner, Volts};
-use stretch_data::{ReadOptions, Trial};
 use stretch_link::Frame;
 use stretch_receptor::{
     Receptor, Withheld,
     code::{Adc, AdcCode, AdcSpec, CodeReading, FixedCalibration, FixedReceptor},
     example_calibration,
 };
+use stretch_recording::{ReadOptions, Recording};
 
 fn due() -> Adc {
     Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 }).unwrap()
@@ -146,7 +146,7 @@ impl Listener {
         let recorded = self.recorded();
         let signal = recorded.split(',').nth(1).unwrap();
         let columns = ReadOptions::new().require(signal).require("adc_code");
-        let trial = Trial::read(self.folder.path().join("trial.csv"), &columns);
+        let trial = Recording::read(self.folder.path().join("trial.csv"), &columns);
         assert!(trial.is_ok(), "{trial:?}");
         (status, notes, recorded)
     }

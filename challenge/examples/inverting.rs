@@ -14,10 +14,11 @@ use rayon::prelude::*;
 use stretch_blind::{Label, Seal};
 use stretch_calibrate::{Cause, Memory, ModelKind, Options, calibrate, evaluate};
 use stretch_core::{Calibration, Design, DiagnosedMap, Model, RestLevel};
-use stretch_data::{DataSet, ReadOptions, SessionTrial, Split, Trial};
+use stretch_data::{DataSet, SessionTrial, Split, Trial};
 use stretch_gap::{Dice, Options as Diagnosing, diagnose};
 use stretch_problem::{GaugeSetup, GaugeSimulator, causes};
 use stretch_receptor::{Defects, DefectsMemory};
+use stretch_recording::{ReadOptions, Recording};
 use stretch_sim::{Catalogue, Stage, effect_named};
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
@@ -75,7 +76,8 @@ fn row(folder: &Path, name: &str, label: &Label) -> Result<Row, Failure> {
     let set = DataSet::read(&folder)?;
     let load = |split| {
         let entries = set.entries(split);
-        entries.map(|e| e.load(&folder, &ReadOptions::new())).collect::<Result<Vec<_>, _>>()
+        let read = |e| Ok(Recording::of_entry(e, &folder, &ReadOptions::new())?.trial);
+        entries.map(read).collect::<Result<Vec<_>, Failure>>()
     };
     let (fit, test) = (load(Split::Fit)?, load(Split::Test)?);
     let of = |options: &Options| -> Result<Errors, Failure> {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use stretch_data::write_whole;
+use stretch_files::write_whole;
 use stretch_gap::{Diagnosis, Evidence, Options, diagnose};
 use stretch_problem::{Bench, RigSimulator};
 use stretch_sim::Catalogue;
@@ -27,7 +27,7 @@ pub fn write_diagnosis(folder: &Path, asked: &Asked, file: &Path) -> anyhow::Res
     let bench = Bench::from(RigSimulator::read(folder, None, &catalogue)?);
     let Asked { threads, baselines, .. } = *asked;
     let options = Options { threads, baselines, ..Options::default() };
-    let examined = bench.examine(&options, false, &|_| (), &stretch_data::interrupted)?;
+    let examined = bench.examine(&options, false, &|_| (), &stretch_files::interrupted)?;
     let name = folder.canonicalize()?;
     let mut answer = serde_json::to_value(&examined.diagnosis)?;
     answer["data_set"] = name.file_name().unwrap_or_default().to_string_lossy().into();
@@ -49,5 +49,5 @@ pub fn diagnosed(
 ) -> anyhow::Result<(Diagnosis, Evidence)> {
     let catalogue = Catalogue::default().without(without)?;
     let simulator = RigSimulator::read(folder, None, &catalogue)?;
-    Ok(diagnose(&simulator, options, progress, &stretch_data::interrupted)?)
+    Ok(diagnose(&simulator, options, progress, &stretch_files::interrupted)?)
 }

@@ -138,11 +138,11 @@ fn main() -> ExitCode {
     let _ = ctrlc::set_handler(on_ctrl_c);
     match run(Args::parse()) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(_) if stretch_data::interrupted() => ExitCode::from(130),
+        Err(_) if stretch_files::interrupted() => ExitCode::from(130),
         Err(error) => {
             eprintln!(
                 "challenge: {}",
-                stretch_data::without_temporary_names(&format!("{error:#}"))
+                stretch_files::without_temporary_names(&format!("{error:#}"))
             );
             ExitCode::FAILURE
         }

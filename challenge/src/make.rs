@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::ensure;
 use stretch_blind::{Plan, Seal, make};
-use stretch_data::write_folder;
+use stretch_files::write_folder;
 
 use crate::text::Progress;
 
@@ -16,7 +16,7 @@ use crate::text::Progress;
 pub fn make_cases(folder: &Path, seed: u64, plan: &Plan) -> anyhow::Result<Seal> {
     let cases = plan.cases();
     ensure!(cases > 0, "--cases 0: there is nothing to make");
-    stretch_data::recover(folder)?;
+    stretch_files::recover(folder)?;
     let progress = Progress::new("making cases", cases);
     let mut seal = None;
     write_folder(folder, false, |draft| {

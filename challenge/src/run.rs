@@ -7,7 +7,7 @@ use std::{
 };
 
 use anyhow::{Context, ensure};
-use stretch_data::write_whole;
+use stretch_files::write_whole;
 
 use crate::{
     answers::{ANSWER, case_folders},
@@ -44,8 +44,8 @@ static RUNNING: AtomicBool = AtomicBool::new(false);
 
 /// What the handler of Ctrl-C does: while cases are diagnosed the first one lets their rooms be taken away, any other ends the program.
 pub fn on_ctrl_c() {
-    let was = stretch_data::interrupted();
-    let open = stretch_data::interrupt();
+    let was = stretch_files::interrupted();
+    let open = stretch_files::interrupt();
     if was || open == 0 && !RUNNING.load(SeqCst) {
         std::process::exit(130);
     }
@@ -73,7 +73,7 @@ pub fn run_cases(folder: &Path, options: &RunOptions) -> anyhow::Result<(usize, 
     let jobs = options.jobs.unwrap_or_else(cores).clamp(1, waiting.len().max(1));
     shared_out(jobs, waiting.len(), |at| {
         let (name, path) = waiting[at];
-        ensure!(!stretch_data::interrupted(), "interrupted");
+        ensure!(!stretch_files::interrupted(), "interrupted");
         answer(&program, path, jobs > 1, options).with_context(|| name.clone())?;
         progress.step();
         Ok(())

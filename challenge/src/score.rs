@@ -4,7 +4,7 @@ use std::{fmt::Write as _, path::Path};
 
 use anyhow::ensure;
 use stretch_blind::{COUNTED_EXCESS, CaseKind, Label, Score};
-use stretch_data::Outputs;
+use stretch_files::Outputs;
 use stretch_gap::Options;
 
 use crate::{
@@ -65,7 +65,7 @@ fn oracle(folder: &Path, answers: &mut Answers) -> anyhow::Result<()> {
     let progress = Progress::new("fits that know the label", wanted.len());
     let found = shared_out(cores(), wanted.len(), |at| {
         let (i, label) = wanted[at];
-        ensure!(!stretch_data::interrupted(), "interrupted");
+        ensure!(!stretch_files::interrupted(), "interrupted");
         let closed = closed_by(&folder.join(&answers.verdicts[i].case), &label.effects);
         progress.step();
         Ok((i, closed))

@@ -4,7 +4,8 @@
 use std::path::Path;
 
 use stretch_calibrate::{Options, calibrate, choose_model, rank_signals};
-use stretch_data::{ReadOptions, Trial};
+use stretch_data::Trial;
+use stretch_recording::{ReadOptions, Recording};
 
 use crate::{
     Sheet,
@@ -31,9 +32,10 @@ pub(crate) fn pairs(data: &Path) -> anyhow::Result<Vec<Pair>> {
     let Some(sleeve) = testkit::measured::folder_in(data, "knit_sleeve") else { return Ok(pairs) };
     for [first, second] in SESSIONS {
         for (fit, test) in [(first, second), (second, first)] {
-            let read =
-                |name: &str| Trial::read(sleeve.join(format!("{name}.csv")), &ReadOptions::new());
-            let (fit, test) = (read(fit)?, read(test)?);
+            let read = |name: &str| {
+                Recording::read(sleeve.join(format!("{name}.csv")), &ReadOptions::new())
+            };
+            let (fit, test) = (read(fit)?.trial, read(test)?.trial);
             let base = Options { reference: "angle_deg".into(), ..Options::default() };
             let signals = ["s1", "s2", "s3", "s4", "s5"].map(String::from);
             let ranking = rank_signals(std::slice::from_ref(&fit), &signals, &base)?;

@@ -2,7 +2,7 @@
 //!
 //! It is linked as the targets are, and ends before the first input.
 //!
-//! A few inputs a target, each of a kilobyte or two. Recordings begin with those of `stretch-data/tests/corpus`.
+//! A few inputs a target, each of a kilobyte or two. Recordings begin with those of `stretch-recording/tests/corpus`.
 #![no_main]
 
 use std::{error::Error, fs, path::Path};

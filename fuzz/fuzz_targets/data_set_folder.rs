@@ -4,7 +4,8 @@
 use std::{fs, path::PathBuf, sync::OnceLock};
 
 use libfuzzer_sys::fuzz_target;
-use stretch_data::{DataSet, ReadOptions};
+use stretch_data::DataSet;
+use stretch_recording::{ReadOptions, Recording};
 
 /// Between two files.
 const CUT: u8 = 0;
@@ -30,7 +31,7 @@ fuzz_target!(|bytes: &[u8]| {
     }
     let Ok(set) = DataSet::read(folder) else { return };
     let _ = set.read_rig(folder);
-    if let Ok(trials) = set.load(folder, &ReadOptions::new()) {
+    if let Ok(trials) = Recording::session(&set, folder, &ReadOptions::new()) {
         assert!(trials.iter().all(|trial| trial.trial.check_lengths().is_ok()));
     }
 });

@@ -2,14 +2,14 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use stretch_data::{ReadOptions, Recording};
+use stretch_recording::{ReadOptions, Recording};
 
 fuzz_target!(|bytes: &[u8]| {
     let options = ReadOptions::new().sample_rate_hz(100.0);
     if let Ok(recording) = Recording::from_reader(bytes, "fuzz", &options) {
         assert!(recording.trial.check().is_ok());
     }
-    if let Ok(mut rows) = stretch_data::RowReader::new(bytes, "fuzz", &options) {
+    if let Ok(mut rows) = stretch_recording::RowReader::new(bytes, "fuzz", &options) {
         while let Some(row) = rows.next_row() {
             assert!(row.map_or(true, |row| row.time_s.is_finite()));
         }

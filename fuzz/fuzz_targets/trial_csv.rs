@@ -2,16 +2,16 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use stretch_data::{ReadOptions, RowReader, Trial};
+use stretch_recording::{ReadOptions, Recording, RowReader};
 
 fuzz_target!(|bytes: &[u8]| {
     let options = ReadOptions::new();
-    if let Ok(trial) = Trial::from_reader(bytes, "fuzz", &options) {
+    if let Ok(Recording { trial, .. }) = Recording::from_reader(bytes, "fuzz", &options) {
         assert!(trial.time_s.iter().all(|t| t.is_finite()));
         let mut text = Vec::new();
         if trial.write_to(&mut text).is_ok() {
-            let again = Trial::from_reader(text.as_slice(), "fuzz", &options).expect("own output");
-            assert_eq!(trial, again);
+            let again = Recording::from_reader(text.as_slice(), "fuzz", &options).expect("own output");
+            assert_eq!(trial, again.trial);
         }
     }
     if let Ok(mut rows) = RowReader::new(bytes, "fuzz", &options) {

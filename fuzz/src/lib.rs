@@ -1,7 +1,8 @@
 //! What the targets share: bytes as streams, trials and recordings, and what must hold of all that is made of them.
 
 use stretch_core::{Calibration, Real, Runner, Volts};
-use stretch_data::{Channel, ReadOptions, Recording, Trial};
+use stretch_data::{Channel, Trial};
+use stretch_recording::{ReadOptions, Recording};
 use stretch_receptor::{
     Receptor,
     code::{Adc, AdcCode, AdcSpec, CodeArithmetic, CodeCalibration, CodeReceptor, FixedObserver},

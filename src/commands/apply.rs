@@ -9,10 +9,10 @@ use stretch_calibrate::{
     Applied, LiveReceptor, Reach, apply, not_its_own, pressure_column, read_calibration,
 };
 use stretch_core::{Calibration, Model};
-use stretch_data::{
-    ReadOptions, Recording, RowReader, Trial, is_standard_output, push_number, unit, write_whole,
-};
+use stretch_data::{Trial, push_number, unit};
+use stretch_files::{is_standard_output, write_whole};
 use stretch_receptor::{Domain, Reading, Withheld};
+use stretch_recording::{ReadOptions, Recording, RowReader};
 
 use super::{
     pace::Pace,

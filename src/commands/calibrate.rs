@@ -12,9 +12,11 @@ use stretch_calibrate::{
     without_wild,
 };
 use stretch_core::{Normalisation, RateEstimator, RateSource};
-use stretch_data::{Outputs, ReadOptions, Split, Trial, tidy_column};
+use stretch_data::{Split, Trial};
+use stretch_files::Outputs;
 use stretch_problem::Causes;
 use stretch_receptor::code::Adc;
+use stretch_recording::{ReadOptions, tidy_column};
 use stretch_report::{Context, Judged, calibration_page};
 
 use super::{

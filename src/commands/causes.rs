@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use stretch_calibrate::Options;
-use stretch_data::{Trial, read_whole};
+use stretch_data::Trial;
+use stretch_files::read_whole;
 use stretch_gap::Diagnosis;
 use stretch_problem::{Causes, causes};
 
@@ -56,7 +57,7 @@ pub(super) fn of(trials: &[Trial], options: &Options) -> Causes {
     let bar = spinner();
     bar.set_message("diagnosing the gauge");
     let told = |text: &str| bar.set_message(text.to_owned());
-    let causes = Causes::of(trials, options, &told, &stretch_data::interrupted);
+    let causes = Causes::of(trials, options, &told, &stretch_files::interrupted);
     bar.finish_and_clear();
     causes
 }

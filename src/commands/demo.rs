@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use stretch_calibrate::{apply, write_calibration};
-use stretch_data::{Trial, TrialKind, write_folder};
+use stretch_data::{Trial, TrialKind};
+use stretch_files::write_folder;
 use stretch_report::{Context, Judged, Subject, demo_page, listed, readme_picture};
 use stretch_sim::{RunSettings, TrialPlan, paper_preset};
 
@@ -160,7 +161,7 @@ fn write(out: &Path, title: String, sessions: &Sessions, job: &Job) -> anyhow::R
     if let Some((_, trial)) = sessions.test.first() {
         let chosen = &calibrations.chosen.calibration;
         let estimates = estimates_csv(chosen, trial, &apply(chosen, trial)?)?;
-        stretch_data::write_whole(file("estimates.csv"), |out| out.write_all(&estimates))?;
+        stretch_files::write_whole(file("estimates.csv"), |out| out.write_all(&estimates))?;
     }
     let names =
         |trials: &[(TrialKind, Trial)]| trials.iter().map(|(_, t)| t.name.clone()).collect();

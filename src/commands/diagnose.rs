@@ -8,7 +8,7 @@ use std::{
 
 use anyhow::{Context, ensure};
 use indicatif::ProgressBar;
-use stretch_data::{DataError, Outputs};
+use stretch_files::{FileError, Outputs};
 use stretch_gap::{Diagnosis, Options};
 use stretch_problem::{Bench, Examined, GaugeSimulator, RigSimulator};
 use stretch_report::{Subject, diagnosis_page};
@@ -141,7 +141,7 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
     }
     if let Some(folder) = args.snippets.as_deref().filter(|folder| folder.exists()) {
         let is_empty = std::fs::read_dir(folder).is_ok_and(|mut held| held.next().is_none());
-        ensure!(is_empty, DataError::Exists { path: folder.display().to_string() });
+        ensure!(is_empty, FileError::Exists { path: folder.display().to_string() });
     }
     let options = Options {
         depth: args.depth.into(),
@@ -179,7 +179,7 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
     let catalogue = Catalogue::default().without(&args.without)?;
     let bench = read_bench(&args.data_set, columns, rig, &catalogue).with_context(shown)?;
     detail(format!("read {}", beside()));
-    let (looks_on, stop) = (!args.no_next, &stretch_data::interrupted);
+    let (looks_on, stop) = (!args.no_next, &stretch_files::interrupted);
     let examined = bench.examine(&options, looks_on, &told_on(&bar), stop).with_context(beside)?;
     bar.finish_and_clear();
     conclude(&args, &examined, &bench)?;

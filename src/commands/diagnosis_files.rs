@@ -4,7 +4,8 @@ use std::path::Path;
 
 use anyhow::ensure;
 use serde_json::json;
-use stretch_data::{DataSet, Outputs, RigFile, write_whole};
+use stretch_data::{DataSet, RigFile};
+use stretch_files::{Outputs, write_whole};
 use stretch_gap::Diagnosis;
 use stretch_problem::{Fix, Implementation, NoFix};
 use stretch_report::listed;

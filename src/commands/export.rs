@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::{Context, anyhow, ensure};
 use stretch_calibrate::{parse_adc, read_calibration};
-use stretch_data::{DataError, is_standard_output, write_folder, write_whole};
 use stretch_export::{
     File, Form, HEADER, Header, Options, SELF_TEST_SAMPLES, arduino_library, header,
 };
+use stretch_files::{FileError, is_standard_output, write_folder, write_whole};
 use stretch_receptor::code::Adc;
 
 use super::shared::tell;
@@ -62,7 +62,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         for File { path, text } in &files {
             let path = folder.join(path);
             if let Some(parent) = path.parent() {
-                std::fs::create_dir_all(parent).map_err(|cause| DataError::Io {
+                std::fs::create_dir_all(parent).map_err(|cause| FileError::Io {
                     path: parent.display().to_string(),
                     action: "make it",
                     cause,
@@ -73,7 +73,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         Ok(())
     })
     .map_err(|error| match error {
-        DataError::Exists { path } => {
+        FileError::Exists { path } => {
             anyhow!("{path}: it exists; name a folder that does not, or an empty one: nothing is overwritten")
         }
         other => other.into(),

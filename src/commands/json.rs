@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
 use serde::Serialize;
-use stretch_data::{Outputs, is_standard_output};
+use stretch_files::{Outputs, is_standard_output};
 
 use super::shared::{give_stdout, say_as_is, stage_text, tell};
 

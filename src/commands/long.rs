@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
 use stretch_calibrate::{CalibrateError, Calibrated, LONGEST, Options, calibrate_long};
-use stretch_data::{DataSet, ReadOptions, Recording, Split, Trial};
+use stretch_data::{DataSet, Split, Trial};
+use stretch_recording::{ReadOptions, Recording, RecordingError};
 
 /// Values of all columns that are held at once.
 const MOST_VALUES: usize = 4_000_000;
@@ -77,11 +78,11 @@ impl Long {
         let mut first = None;
         let read = Recording::read_blocks(path, &self.columns, self.rows, &mut |trial| {
             first = Some(trial);
-            Err(Enough::Had)
+            Err(Stop::Own(()))
         });
         match (first, read) {
             (Some(trial), _) => take(trial),
-            (None, Err(Enough::Not(error))) => return Err(error.into()),
+            (None, Err(Stop::Read(error))) => return Err(error.into()),
             (None, _) => {}
         }
         Ok(())
@@ -98,9 +99,13 @@ impl Long {
                     block.channels.retain(|channel| {
                         channel.name == options.signal || channel.name == options.reference
                     });
-                    take(trial, block)
+                    take(trial, block).map_err(Stop::Own)
                 })
-                .map(|_| ())
+                .map(drop)
+                .map_err(|stop| match stop {
+                    Stop::Own(error) => error,
+                    Stop::Read(error) => CalibrateError::Log(error.into()),
+                })
             })
         };
         calibrate_long(&self.names, &log, options)
@@ -108,14 +113,14 @@ impl Long {
 }
 
 /// Why a file is not read on.
-enum Enough {
-    Had,
-    Not(stretch_data::DataError),
+enum Stop<E> {
+    Read(RecordingError),
+    Own(E),
 }
 
-impl From<stretch_data::DataError> for Enough {
-    fn from(error: stretch_data::DataError) -> Self {
-        Self::Not(error)
+impl<E> From<RecordingError> for Stop<E> {
+    fn from(error: RecordingError) -> Self {
+        Self::Read(error)
     }
 }
 

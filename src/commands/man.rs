@@ -4,7 +4,7 @@ use std::{fs, path::PathBuf};
 
 use anyhow::{Context, ensure};
 use clap_mangen::Man;
-use stretch_data::{Outputs, is_standard_output};
+use stretch_files::{Outputs, is_standard_output};
 
 use super::shared::tell;
 

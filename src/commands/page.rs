@@ -7,7 +7,7 @@ use std::{
 };
 
 use anyhow::{Context, bail, ensure};
-use stretch_data::{write_folder, write_whole};
+use stretch_files::{write_folder, write_whole};
 
 use super::shared::{or_force, recover, say};
 use crate::display::warn;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use stretch_data::write_folder;
+use stretch_files::write_folder;
 use stretch_paper::{Experiment, PUBLISHED, Pipeline};
 use stretch_report::{error_rows, fit_rows, paper_page, verdicts};
 use stretch_sim::paper_preset;

@@ -8,7 +8,7 @@ use std::{
 use anyhow::{Context, ensure};
 use indicatif::ProgressBar;
 use serde_json::json;
-use stretch_data::Outputs;
+use stretch_files::Outputs;
 use stretch_gap::{Diagnosis, Evidence, Options, diagnose};
 use stretch_problem::{BlackBox, Problem, ProblemFile, SimulatorEntry, worker::Workers};
 use stretch_report::{Subject, diagnosis_page};
@@ -78,7 +78,7 @@ pub(super) fn run(
         bar.set_message(told);
     };
     let (mut diagnosis, evidence) =
-        diagnose(&bench, asked.options, &progress, &stretch_data::interrupted)?;
+        diagnose(&bench, asked.options, &progress, &stretch_files::interrupted)?;
     bench.annotate(&mut diagnosis);
     bar.finish_and_clear();
     conclude(file, asked, &bench, &diagnosis, &evidence)?;

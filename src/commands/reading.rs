@@ -3,9 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use stretch_data::{
-    DataError, DataSet, ReadOptions, Recording, Split, TimeUnit, Trial, tidy_column,
-};
+use stretch_data::{DataSet, Split, Trial};
+use stretch_recording::{ReadOptions, Recording, RecordingError, TimeUnit, tidy_column};
 
 use super::shared::progress;
 use crate::display::{detail, warn};
@@ -75,7 +74,7 @@ impl Recorded {
 }
 
 /// Reads a recording, `-` being standard input, and tells what had to be done for it on standard error.
-pub(crate) fn read_recording(path: &Path, options: &ReadOptions) -> Result<Trial, DataError> {
+pub(crate) fn read_recording(path: &Path, options: &ReadOptions) -> Result<Trial, RecordingError> {
     Ok(told(Recording::read(path, options)?))
 }
 
@@ -104,7 +103,7 @@ pub(crate) fn read_trials(
             let set = DataSet::read(path)?;
             let before = trials.len();
             for entry in set.entries(split) {
-                trials.push(told(entry.load_recording(path, options)?));
+                trials.push(told(Recording::of_entry(entry, path, options)?));
             }
             // once: what is wrong is one line of dataset.toml
             let wrong = trials[before..].iter().find_map(|trial| set.rate_told(trial));

@@ -7,7 +7,7 @@ use std::{
 
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use stretch_data::{DataError, Outputs};
+use stretch_files::{FileError, Outputs};
 
 pub(crate) use crate::display::{detail, give_stdout, say, say_as_is, say_first, tell};
 use crate::display::{shows_progress, warn};
@@ -43,15 +43,15 @@ fn ticking(bar: ProgressBar) -> ProgressBar {
 
 /// Puts right what a run that was killed left of a folder, and says so.
 pub(crate) fn recover(folder: &Path) -> anyhow::Result<()> {
-    let told = stretch_data::recover(folder).with_context(|| folder.display().to_string())?;
+    let told = stretch_files::recover(folder).with_context(|| folder.display().to_string())?;
     told.into_iter().for_each(warn);
     Ok(())
 }
 
 /// Says how a folder that is in the way can be replaced.
 pub(crate) fn or_force(error: anyhow::Error) -> anyhow::Error {
-    match error.downcast_ref::<DataError>() {
-        Some(DataError::Exists { .. }) => anyhow::anyhow!(
+    match error.downcast_ref::<FileError>() {
+        Some(FileError::Exists { .. }) => anyhow::anyhow!(
             "{error}, or --force: files of the same name are then replaced, your own are kept"
         ),
         _ => error,
@@ -81,7 +81,7 @@ pub(crate) fn stage_text(outputs: &mut Outputs, path: &Path, text: &str) -> anyh
 
 /// Writes a text file, whole or not at all.
 pub(crate) fn write_text(path: &Path, text: &str) -> anyhow::Result<()> {
-    Ok(stretch_data::write_whole(path, |out| out.write_all(text.as_bytes()))?)
+    Ok(stretch_files::write_whole(path, |out| out.write_all(text.as_bytes()))?)
 }
 
 /// A file's name without folder and ending, for a table.

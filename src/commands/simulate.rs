@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
-use stretch_data::{
-    DataError, DataSet, ReadOptions, RigFile, TrialEntry, is_standard_output, write_folder,
-};
+use stretch_data::{DataError, DataSet, RigFile, TrialEntry};
+use stretch_files::{FileError, is_standard_output, write_folder};
+use stretch_recording::{ReadOptions, Recording};
 use stretch_sim::{Rig, RunSettings, Session, SimError, TrialPlan, paper_preset};
 
 use super::{
@@ -150,7 +150,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     recover(&args.out)?;
     let written = write(&args.out, args.force, &rig, &settings, &plans);
     written.map_err(|error| match error.downcast_ref::<DataError>() {
-        Some(DataError::Exists { .. } | DataError::Io { .. }) => or_force(error),
+        Some(DataError::File(_)) => error,
+        _ if error.is::<FileError>() => or_force(error),
         _ => of_files(error, args.rig.as_slice()),
     })?;
 
@@ -200,7 +201,7 @@ fn plans(args: &Args, rig: &Rig, seed: u64) -> anyhow::Result<Vec<TrialPlan>> {
     let set = DataSet::read(path)?;
     let one = |entry: &TrialEntry| {
         let file = path.join(&entry.file);
-        let trial = entry.load(path, &ReadOptions::new())?;
+        let trial = Recording::of_entry(entry, path, &ReadOptions::new())?.trial;
         let plan = TrialPlan::from_trial(&trial, &rig.params).with_context(|| named(&file))?;
         let (kind, opening, split) = (entry.kind, entry.opening, entry.split);
         anyhow::Ok(TrialPlan { kind, opening, split, start_s: Some(entry.start_s), ..plan })

@@ -18,7 +18,7 @@ pub(crate) fn on_ctrl_c(exit_code: u8) {
     if RECORDING.load(SeqCst) && !ENDED.swap(true, SeqCst) {
         return;
     }
-    if stretch_data::interrupt() == 0 {
+    if stretch_files::interrupt() == 0 {
         std::process::exit(exit_code.into());
     }
 }

@@ -12,7 +12,8 @@ use std::path::Path;
 
 use inject::{ALL, Injection};
 use stretch_challenge::shared_out;
-use stretch_data::{Channel, ReadOptions, SessionTrial, Trial};
+use stretch_data::{Channel, SessionTrial, Trial};
+use stretch_recording::{ReadOptions, Recording};
 use stretch_gap::{Options, diagnose};
 use stretch_problem::{GaugeSetup, GaugeSimulator};
 use stretch_sim::Catalogue;
@@ -37,7 +38,7 @@ const WORKERS: usize = 2;
 /// The first [`LENGTH_S`] of a session: the reference and one sensor.
 fn record(folder: &Path, session: &str, sensor: &str) -> anyhow::Result<Trial> {
     let options = ReadOptions::new().require(REFERENCE).require(sensor);
-    let whole = Trial::read(folder.join(format!("{session}.csv")), &options)?;
+    let whole = Recording::read(folder.join(format!("{session}.csv")), &options)?.trial;
     let samples = whole.time_s.iter().take_while(|t| **t < LENGTH_S).count();
     let cut = |name: &str| -> anyhow::Result<Channel> {
         Ok(Channel { name: name.into(), values: whole.require(name)?[..samples].to_vec() })

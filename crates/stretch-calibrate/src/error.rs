@@ -164,9 +164,15 @@ pub enum CalibrateError {
         /// Most rows.
         most: u64,
     },
-    /// A file that cannot be read or written.
+    /// A trial that does not hold together, or lacks a column.
     #[error(transparent)]
     Data(#[from] stretch_data::DataError),
+    /// A file that cannot be read or written.
+    #[error(transparent)]
+    File(#[from] stretch_files::FileError),
+    /// A log could not be read.
+    #[error(transparent)]
+    Log(Box<dyn std::error::Error + Send + Sync>),
     /// Nothing to compare: every sample was withheld.
     #[error(
         "{trial}: no sample has an estimate; it is shorter than the warm-up of the rate estimator"

@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use serde::Serialize;
 use stretch_core::{Calibration, CalibrationSpec, Schema, record};
-use stretch_data::{read_whole, write_whole};
+use stretch_files::{read_whole, write_whole};
 
 use crate::{CalibrateError, digest};
 

@@ -1,18 +1,5 @@
 //! What the name of a column says of its unit.
 
-use crate::recording::tidy;
-
-/// A column's name in this project's way: `pos_mm` for `Pos (mm)`, `force_n` for `force[N]`; any other as it is.
-///
-/// ```
-/// use stretch_data::tidy_column;
-/// assert_eq!(tidy_column("Pos (mm)"), "pos_mm");
-/// assert_eq!(tidy_column("length_mm"), "length_mm");
-/// ```
-pub fn tidy_column(name: &str) -> String {
-    tidy(name, None).unwrap_or_else(|| name.to_owned())
-}
-
 /// The unit in a column's name as columns spell it: its last part, after an underscore.
 ///
 /// ```

@@ -2,17 +2,17 @@
 
 use std::{
     fmt::Write,
+    fs::File,
     path::{Component, Path},
 };
 
 use serde::{Deserialize, Serialize};
 
+use stretch_files::{FileError, digest_of, is_digest, write_folder, write_whole};
+
 use crate::{
-    DataError, ReadOptions, Recording, RigFile, TomlFile, TomlView, Trial,
-    digest::{digest_of, digest_of_bytes, is_digest},
-    nearest,
+    DataError, RigFile, TomlFile, TomlView, Trial, nearest,
     toml_text::{number_text, string_text},
-    write_folder, write_whole,
 };
 
 /// The contents of `dataset.toml`.
@@ -81,10 +81,10 @@ const FILE: &str = "dataset.toml";
 
 impl DataSet {
     /// Reads `dataset.toml` in a folder and checks it, as [`DataSet::parse`], and that the
-    /// files it names are there. Trials are read one by one with [`TrialEntry::load`].
+    /// files it names are there. Its trials are read by the crate `stretch-recording`.
     ///
     /// # Errors
-    /// [`DataError::Io`], [`DataError::NotToml`], or [`DataError::Key`] with table and key.
+    /// [`DataError::File`], [`DataError::NotToml`], or [`DataError::Key`] with table and key.
     pub fn read(folder: impl AsRef<Path>) -> Result<Self, DataError> {
         let folder = folder.as_ref();
         if folder.is_dir() && !folder.join(FILE).exists() {
@@ -169,11 +169,11 @@ impl DataSet {
     /// there from another data set is refused when it is loaded.
     ///
     /// # Errors
-    /// [`DataError::Io`] for a file that cannot be read.
+    /// [`DataError::File`] for a file that cannot be read.
     pub fn take_digests(&mut self, folder: impl AsRef<Path>) -> Result<(), DataError> {
         for entry in &mut self.trials {
             let path = folder.as_ref().join(&entry.file);
-            let digest = digest_of(&path);
+            let digest = File::open(&path).and_then(digest_of);
             entry.digest = Some(digest.map_err(|e| DataError::io(path.display(), "read it", e))?);
         }
         Ok(())
@@ -187,15 +187,15 @@ impl DataSet {
         let path = folder.as_ref().join(FILE);
         let text = self.to_toml();
         Self::parse(&path.display().to_string(), &text)?;
-        write_whole(path, |out| out.write_all(text.as_bytes()))
+        Ok(write_whole(path, |out| out.write_all(text.as_bytes()))?)
     }
 
     /// Writes a folder with `dataset.toml`, the rig file, and each trial as `trial` makes it,
-    /// whole or not at all, as [`write_folder`](crate::write_folder()).
+    /// whole or not at all, as [`write_folder`](stretch_files::write_folder()).
     ///
     /// # Errors
-    /// As [`write_folder`](crate::write_folder()), or what `trial` says.
-    pub fn write_folder<E: From<DataError>>(
+    /// As [`write_folder`](stretch_files::write_folder()), or what `trial` says.
+    pub fn write_folder<E: From<DataError> + From<FileError>>(
         &self,
         folder: impl AsRef<Path>,
         force: bool,
@@ -324,52 +324,26 @@ fn outside(path: &str) -> String {
 }
 
 impl TrialEntry {
-    /// Reads the trial from the data set's folder, in whatever format.
+    /// Refuses a file that is not the one that the data set was written with, where that is known.
     ///
     /// # Errors
-    /// As [`Recording::read`].
-    pub fn load(
-        &self,
-        folder: impl AsRef<Path>,
-        options: &ReadOptions,
-    ) -> Result<Trial, DataError> {
-        self.load_recording(folder, options).map(|recording| recording.trial)
-    }
-
-    /// Reads the trial, in whatever format, with notes of what had to be done for it.
-    ///
-    /// # Errors
-    /// As [`Recording::read`].
-    pub fn load_recording(
-        &self,
-        folder: impl AsRef<Path>,
-        options: &ReadOptions,
-    ) -> Result<Recording, DataError> {
+    /// [`DataError::Key`] with both digests; [`DataError::File`] where there is no such file.
+    pub fn check_file(&self, folder: impl AsRef<Path>) -> Result<(), DataError> {
         let path = folder.as_ref().join(&self.file);
-        let found = || digest_of(&path).map_err(|e| DataError::io(path.display(), "open it", e));
-        self.check_digest(&folder.as_ref().join(FILE), found)?;
-        let mut recording = Recording::read(path, options)?;
-        recording.trial.name.clone_from(&self.file);
-        Ok(recording)
+        let found = || File::open(&path).and_then(digest_of);
+        let found = || found().map_err(|e| DataError::io(path.display(), "open it", e));
+        self.check_digest(&folder.as_ref().join(FILE), found)
     }
 
-    /// Reads the trial from the bytes of its file, which stands in no folder.
+    /// The same of the bytes of a file that stands in no folder.
     ///
     /// # Errors
-    /// As [`Recording::read`].
-    pub fn recording_of(
-        &self,
-        bytes: &[u8],
-        options: &ReadOptions,
-    ) -> Result<Recording, DataError> {
-        let found = || digest_of_bytes(bytes).map_err(|e| DataError::io(&self.file, "read it", e));
-        self.check_digest(Path::new(FILE), found)?;
-        Recording::from_reader(bytes, &self.file, options)
+    /// [`DataError::Key`] with both digests.
+    pub fn check_bytes(&self, bytes: &[u8]) -> Result<(), DataError> {
+        let found = || digest_of(bytes).map_err(|e| DataError::io(&self.file, "read it", e));
+        self.check_digest(Path::new(FILE), found)
     }
-}
 
-impl TrialEntry {
-    /// Whether the file is the one that the data set was written with, where that is known.
     fn check_digest(
         &self,
         description: &Path,

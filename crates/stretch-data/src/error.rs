@@ -2,6 +2,10 @@
 
 use std::{fmt, fs, io, path::Path};
 
+use stretch_files::FileError;
+
+use crate::nearest::nearest;
+
 /// Where in a file something stands.
 ///
 /// Rows count from 1 and include the header, as an editor shows them.
@@ -28,17 +32,9 @@ impl fmt::Display for Place {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DataError {
-    /// The system refused to open, read, write, or rename.
-    #[error("{path}: cannot {action}: {}", Cause(.cause))]
-    Io {
-        /// The file or folder.
-        path: String,
-        /// What was tried: `open it`, `write it`.
-        action: &'static str,
-        /// What the system said.
-        #[source]
-        cause: io::Error,
-    },
+    /// A file or folder that could not be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// A folder that is no data set.
     #[error("{folder}: there is no dataset.toml in it; {hint}")]
     NoDataSet {
@@ -46,32 +42,6 @@ pub enum DataError {
         folder: String,
         /// What to do, by what is in it.
         hint: String,
-    },
-    /// A file without a byte, or with blank lines only.
-    #[error(
-        "{file}: the file is empty; it needs a header line with the names of its columns, then a row a sample"
-    )]
-    Empty {
-        /// The file.
-        file: String,
-    },
-    /// A header and nothing below it.
-    #[error(
-        "{file}: there is a header line and no sample below it; record the trial again or leave the file out"
-    )]
-    HeaderOnly {
-        /// The file.
-        file: String,
-    },
-    /// The first line holds numbers where names should stand.
-    #[error(
-        "{file}: the first line (\"{first}\") holds numbers and no names; put a header line above it, such as time_s,length_mm,bridge_v, or name the columns with --columns"
-    )]
-    NoHeader {
-        /// The file.
-        file: String,
-        /// The first line, shortened.
-        first: String,
     },
     /// A column that is needed is not there.
     #[error("{file}: there is no column {column}{}; the columns are {}", Nearest(.nearest), .present.join(", "))]
@@ -85,46 +55,6 @@ pub enum DataError {
         /// The one whose name is nearest.
         nearest: Option<String>,
     },
-    /// Two columns of one name.
-    #[error("{file}: the header names column {column} twice; rename or remove one of them")]
-    DuplicateColumn {
-        /// The file.
-        file: String,
-        /// The name.
-        column: String,
-    },
-    /// A name that a line end or another control character stands in.
-    #[error(
-        "{at}: the name \"{value}\" holds a control character; if the lines end in CR alone, save the file with LF"
-    )]
-    ControlCharacter {
-        /// Where.
-        at: Place,
-        /// The name, shortened.
-        value: String,
-    },
-    /// Text where a number should stand.
-    #[error("{at}: \"{value}\" is not a number; correct it or remove that row")]
-    NotANumber {
-        /// Where.
-        at: Place,
-        /// The field, shortened.
-        value: String,
-    },
-    /// A field without a character.
-    #[error("{at}: the field is empty; fill it in or remove that row")]
-    EmptyField {
-        /// Where.
-        at: Place,
-    },
-    /// A decimal comma.
-    #[error("{at}: \"{value}\" has a decimal comma; export the file again with decimal points")]
-    DecimalComma {
-        /// Where.
-        at: Place,
-        /// The field.
-        value: String,
-    },
     /// NaN, an infinity, or a number too large for 64 bits.
     #[error("{at}: \"{value}\" is not a finite number; correct it or remove that row")]
     NotFinite {
@@ -132,150 +62,6 @@ pub enum DataError {
         at: Place,
         /// The field.
         value: String,
-    },
-    /// Bytes that are no UTF-8 text.
-    #[error("{at}: \"{value}\" is not UTF-8 text; save the file with the encoding UTF-8")]
-    NotUtf8 {
-        /// Where.
-        at: Place,
-        /// The bytes, the foreign ones escaped.
-        value: String,
-    },
-    /// A row with more or fewer fields than the header.
-    #[error(
-        "{file}, row {row}: there are {found} fields where the header has {expected}; complete or remove that row"
-    )]
-    Ragged {
-        /// The file.
-        file: String,
-        /// The row.
-        row: u64,
-        /// Fields of the row.
-        found: usize,
-        /// Fields of the header.
-        expected: usize,
-    },
-    /// A quotation mark that is not closed in its line, or text after it.
-    #[error("{at}: the quotation marks do not pair up within the line; remove or double them")]
-    Quote {
-        /// Where.
-        at: Place,
-    },
-    /// A decimal point where the numbers so far had decimal commas.
-    #[error(
-        "{at}: \"{value}\" has a decimal point where the rows above have decimal commas; export the file again with one of them"
-    )]
-    DecimalPoint {
-        /// Where.
-        at: Place,
-        /// The field.
-        value: String,
-    },
-    /// A date or a time of day that is none.
-    #[error("{at}: \"{value}\" is not a time stamp that is understood{}", if cfg!(feature = "iso-time") { "; write it as 2024-05-01T12:00:00.250Z, or as seconds" } else { ": this program was built without the feature iso-time; write the time as seconds" })]
-    TimeStamp {
-        /// Where.
-        at: Place,
-        /// The field.
-        value: String,
-    },
-    /// Other columns than there are names for them.
-    #[error(
-        "{file}, row {row}: there are {found} numbers where {given} columns were named; name as many"
-    )]
-    Named {
-        /// The file.
-        file: String,
-        /// The row.
-        row: u64,
-        /// Numbers in the row.
-        found: usize,
-        /// Names given.
-        given: usize,
-    },
-    /// A rate at which nobody records.
-    #[error(
-        "{file}, column {column}: {rate_hz:.3e} samples a second, which is not between 1e-3 and 1e7; say what its numbers count with --time-unit s, ms, us or ns"
-    )]
-    Rate {
-        /// The file.
-        file: String,
-        /// The time.
-        column: String,
-        /// The rate as it was read.
-        rate_hz: f64,
-    },
-    /// Whole numbers in a column of seconds that count something shorter.
-    #[error("{file}, column {column}: its times are whole numbers, {step} from sample to sample: that is {rate_hz} samples a second if they are seconds and {} if they are milliseconds; say which with --time-unit s or ms, or rename it {column_ms}", 1e3 * .rate_hz)]
-    WholeSeconds {
-        /// The file.
-        file: String,
-        /// The time.
-        column: String,
-        /// From sample to sample.
-        step: f64,
-        /// The rate if they are seconds.
-        rate_hz: f64,
-        /// What the column should be called if they are milliseconds.
-        column_ms: String,
-    },
-    /// A recording without any time.
-    #[error("{file}: there is no time; {}", .hint)]
-    NoTime {
-        /// The file.
-        file: String,
-        /// What to do.
-        hint: String,
-    },
-    /// Channels that were never recorded at the same time.
-    #[error(
-        "{file}: {first} and {second} have no time in common ({first_s} s and {second_s} s); they cannot be brought to one grid: leave one of them out"
-    )]
-    NoOverlap {
-        /// The file.
-        file: String,
-        /// One clock.
-        first: String,
-        /// Its span, `from .. to`.
-        first_s: String,
-        /// The other.
-        second: String,
-        /// Its span.
-        second_s: String,
-    },
-    /// A format that this program was built without.
-    #[error(
-        "{file}: this is {format}, which this program was built without; build it with --features {feature}, or export the recording as CSV"
-    )]
-    Feature {
-        /// The file.
-        file: String,
-        /// What it is.
-        format: &'static str,
-        /// The feature that reads it.
-        feature: &'static str,
-    },
-    /// Something in a file that is no text, where a reader could not go on.
-    #[error("{file}: this {format} file cannot be read: {problem}")]
-    Format {
-        /// The file.
-        file: String,
-        /// What it is.
-        format: &'static str,
-        /// Where, what, and what to do.
-        problem: String,
-    },
-    /// A line longer than the reader accepts.
-    #[error(
-        "{file}, row {row}: the line is longer than {limit} bytes; this is not a table of samples with a line each"
-    )]
-    LineTooLong {
-        /// The file.
-        file: String,
-        /// The row.
-        row: u64,
-        /// The longest line that is accepted.
-        limit: usize,
     },
     /// Time that stands still or goes back.
     #[error("{at}: time {} from {previous_s} to {time_s}; time must rise from row to row: sort the rows or split the recordings", if .time_s == .previous_s { "stands still" } else { "goes back" })]
@@ -344,28 +130,6 @@ pub enum DataError {
         /// What is wrong.
         problem: String,
     },
-    /// Something that is in the way of a folder.
-    #[error("{path}: it exists and is not an empty folder; choose another name")]
-    Exists {
-        /// What is there.
-        path: String,
-    },
-    /// Stopped by [`interrupt`](crate::interrupt).
-    #[error("{path}: interrupted; nothing was written")]
-    Interrupted {
-        /// What was being written.
-        path: String,
-    },
-}
-
-/// A cause without Rust's `(os error 28)`.
-struct Cause<'a>(&'a io::Error);
-
-impl fmt::Display for Cause<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let text = self.0.to_string();
-        f.write_str(text.split(" (os error").next().unwrap_or(&text))
-    }
 }
 
 struct Nearest<'a>(&'a Option<String>);
@@ -380,58 +144,6 @@ impl fmt::Display for Nearest<'_> {
 }
 
 impl DataError {
-    /// Whether the system refused something, such as a missing file or a full disk.
-    pub fn is_io(&self) -> bool {
-        matches!(self, Self::Io { .. })
-    }
-
-    /// Whether the file or folder is not there.
-    pub fn is_not_found(&self) -> bool {
-        match self {
-            Self::Io { cause, .. } => cause.kind() == io::ErrorKind::NotFound,
-            Self::NoDataSet { .. } => true,
-            _ => false,
-        }
-    }
-
-    /// Whether whoever read the output has gone: a pipe into `head`, say.
-    pub fn is_broken_pipe(&self) -> bool {
-        matches!(self, Self::Io { cause, .. } if cause.kind() == io::ErrorKind::BrokenPipe)
-    }
-
-    /// Whether a column that is needed is not there.
-    pub fn is_missing_column(&self) -> bool {
-        matches!(self, Self::MissingColumn { .. })
-    }
-
-    /// Whether time stood still or went back.
-    pub fn is_time(&self) -> bool {
-        matches!(self, Self::TimeNotRising { .. })
-    }
-
-    /// Whether one row is at fault, so that a stream may go on with the next.
-    pub fn is_row(&self) -> bool {
-        matches!(
-            self,
-            Self::NotANumber { .. }
-                | Self::EmptyField { .. }
-                | Self::DecimalComma { .. }
-                | Self::DecimalPoint { .. }
-                | Self::TimeStamp { .. }
-                | Self::NotFinite { .. }
-                | Self::NotUtf8 { .. }
-                | Self::Ragged { .. }
-                | Self::Quote { .. }
-                | Self::LineTooLong { .. }
-                | Self::TimeNotRising { .. }
-        )
-    }
-
-    /// Whether [`interrupt`](crate::interrupt) stopped it.
-    pub fn is_interrupted(&self) -> bool {
-        matches!(self, Self::Interrupted { .. })
-    }
-
     /// What a folder without a `dataset.toml` may be meant for.
     pub(crate) fn no_data_set(folder: &Path) -> Self {
         let entries = fs::read_dir(folder).into_iter().flatten().flatten();
@@ -459,6 +171,34 @@ impl DataError {
     }
 
     pub(crate) fn io(path: impl fmt::Display, action: &'static str, cause: io::Error) -> Self {
-        Self::Io { path: path.to_string(), action, cause }
+        FileError::io(path, action, cause).into()
+    }
+
+    /// The error that names the columns that are there, and the nearest of them.
+    pub fn missing_column<'a>(
+        file: &str,
+        column: &str,
+        present: impl Iterator<Item = &'a str>,
+    ) -> Self {
+        let present: Vec<String> =
+            present.filter(|name| !name.is_empty()).map(|name| shown(name.as_bytes())).collect();
+        let nearest = nearest(column, present.iter().map(String::as_str)).map(str::to_owned);
+        Self::MissingColumn { file: file.to_owned(), column: column.to_owned(), present, nearest }
+    }
+}
+
+/// A field for a message: at most 40 characters, nothing that a terminal would obey.
+pub fn shown(content: &[u8]) -> String {
+    const LONGEST: usize = 40;
+    let mut text = String::new();
+    for chunk in content[..content.len().min(4 * LONGEST)].utf8_chunks() {
+        text.extend(chunk.valid().chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }));
+        for byte in chunk.invalid() {
+            text.push_str(&format!("\\x{byte:02x}"));
+        }
+    }
+    match text.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text,
     }
 }

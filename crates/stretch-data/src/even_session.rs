@@ -1,8 +1,6 @@
 //! A session: its trials on one even grid of time, in the order in which they were recorded.
 
-use std::path::Path;
-
-use crate::{DataError, DataSet, EvenSpec, ReadOptions, Recording, Rows, Split, Trial, TrialKind};
+use crate::{DataError, EvenSpec, Rows, Split, Trial, TrialKind};
 
 /// Pause between trials that do not say when they began, s.
 const PAUSE_S: f64 = 15.0;
@@ -31,61 +29,6 @@ impl SessionTrial {
     pub fn new(trial: Trial) -> Self {
         let notes = Vec::new();
         Self { trial, kind: TrialKind::Other, start_s: 0.0, split: Split::Fit, notes }
-    }
-}
-
-impl From<Recording> for SessionTrial {
-    fn from(Recording { trial, notes }: Recording) -> Self {
-        Self { notes, ..Self::new(trial) }
-    }
-}
-
-impl DataSet {
-    /// Reads every trial.
-    ///
-    /// # Errors
-    /// As [`Trial::read`].
-    pub fn load(
-        &self,
-        folder: impl AsRef<Path>,
-        options: &ReadOptions,
-    ) -> Result<Vec<SessionTrial>, DataError> {
-        self.session(|entry| entry.load_recording(&folder, options))
-    }
-
-    /// Every trial, read by `read`: for files that stand in no folder.
-    ///
-    /// # Errors
-    /// Those of `read`.
-    ///
-    /// ```
-    /// use stretch_data::{DataError, DataSet, ReadOptions, Split};
-    /// let text = "name = 'b'\nrate_hz = 100\n[[trial]]\nfile = 'a.csv'\nkind = 'other'\nsplit = 'test'";
-    /// let set = DataSet::parse("dataset.toml", text)?;
-    /// let bytes = b"time_s,bridge_v\n0,1.5\n0.01,1.6\n";
-    /// let trials = set.session(|entry| entry.recording_of(bytes, &ReadOptions::new()))?;
-    /// assert_eq!((trials[0].trial.name.as_str(), trials[0].split), ("a.csv", Split::Test));
-    /// # Ok::<(), DataError>(())
-    /// ```
-    pub fn session<E>(
-        &self,
-        mut read: impl FnMut(&crate::TrialEntry) -> Result<Recording, E>,
-    ) -> Result<Vec<SessionTrial>, E> {
-        let mut is_told = false;
-        let load = |entry: &crate::TrialEntry| {
-            let mut recording = read(entry)?;
-            // once for all trials: what is wrong is one line of dataset.toml
-            let told = self.rate_told(&recording.trial).filter(|_| !is_told);
-            is_told |= told.is_some();
-            recording.notes.extend(told);
-            Ok(SessionTrial {
-                kind: entry.kind,
-                start_s: entry.start_s,
-                split: entry.split,
-                ..recording.into()
-            })
-        };
-        self.trials.iter().map(load).collect()
     }
 }
 

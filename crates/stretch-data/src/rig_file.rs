@@ -4,10 +4,11 @@ use std::{collections::BTreeMap, fmt::Write, path::Path};
 
 use serde::{Deserialize, Serialize};
 
+use stretch_files::write_whole;
+
 use crate::{
     DataError, TomlFile, TomlView,
     toml_text::{key_text, number_text, string_text},
-    write_whole,
 };
 
 /// The contents of a `rig.toml`: names are checked by whoever simulates it.
@@ -77,7 +78,7 @@ impl RigFile {
     /// Reads a rig file. Whether the names are those of a rig is for whoever simulates it.
     ///
     /// # Errors
-    /// [`DataError::Io`], [`DataError::NotToml`], or [`DataError::Key`] with table and key.
+    /// [`DataError::File`], [`DataError::NotToml`], or [`DataError::Key`] with table and key.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, DataError> {
         Self::from_file(&TomlFile::read(path)?)
     }
@@ -108,7 +109,7 @@ impl RigFile {
     /// # Errors
     /// As [`write_whole`].
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), DataError> {
-        write_whole(path, |out| out.write_all(self.to_toml().as_bytes()))
+        Ok(write_whole(path, |out| out.write_all(self.to_toml().as_bytes()))?)
     }
 
     /// The text of the rig file.

@@ -8,7 +8,9 @@ use std::{
 
 use toml::Table;
 
-use crate::{DataError, read_whole, toml_view::TomlView};
+use stretch_files::read_whole;
+
+use crate::{DataError, toml_view::TomlView};
 
 /// Largest TOML file that is read: these files are written by people.
 const LARGEST_BYTES: u64 = 4 << 20;
@@ -36,7 +38,7 @@ impl TomlFile {
     /// Reads a file, `-` being standard input, and parses it.
     ///
     /// # Errors
-    /// [`DataError::Io`], also for what is larger than 4 MiB, and [`DataError::NotToml`].
+    /// [`DataError::File`], also for what is larger than 4 MiB, and [`DataError::NotToml`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, DataError> {
         let path = path.as_ref();
         let is_stdin = path.as_os_str() == "-";

@@ -2,7 +2,7 @@
 
 use std::iter;
 
-use crate::{DataError, Place, header::missing_column};
+use crate::{DataError, Place};
 
 /// A recording: time stamps and, beside them, named channels of the same length.
 ///
@@ -62,8 +62,9 @@ impl Trial {
     /// ```
     pub fn require(&self, name: &str) -> Result<&[f64], DataError> {
         let names = self.channels.iter().map(|channel| channel.name.as_str());
-        self.channel(name)
-            .ok_or_else(|| missing_column(&self.name, name, iter::once("time_s").chain(names)))
+        self.channel(name).ok_or_else(|| {
+            DataError::missing_column(&self.name, name, iter::once("time_s").chain(names))
+        })
     }
 
     /// Seconds from the first sample to the last; 0 for fewer than two.
@@ -147,7 +148,7 @@ impl Trial {
 }
 
 /// Samples a second of rising time stamps; none for fewer than two.
-pub(crate) fn rate_of(time_s: &[f64]) -> Option<f64> {
+pub fn rate_of(time_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let middle = steps.len() / 2;
     let median = match steps.len() {

@@ -5,7 +5,9 @@ use std::{
     path::Path,
 };
 
-use crate::{Channel, DataError, Trial, write_whole};
+use stretch_files::write_whole;
+
+use crate::{Channel, DataError, Trial};
 
 impl Trial {
     /// Writes the trial to a file, whole or not at all: `time_s`, then the channels.
@@ -16,13 +18,13 @@ impl Trial {
     /// [`DataError::Unwritable`] when [`Trial::check`] fails, else as [`write_whole`].
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), DataError> {
         self.check()?;
-        write_whole(path, |out| self.write_rows(out))
+        Ok(write_whole(path, |out| self.write_rows(out))?)
     }
 
     /// Writes the trial to a stream, which should be buffered.
     ///
     /// # Errors
-    /// [`DataError::Unwritable`] when [`Trial::check`] fails, else [`DataError::Io`].
+    /// [`DataError::Unwritable`] when [`Trial::check`] fails, else [`DataError::File`].
     pub fn write_to(&self, mut out: impl Write) -> Result<(), DataError> {
         self.check()?;
         self.write_rows(&mut out).map_err(|e| DataError::io(&self.name, "write it", e))
@@ -104,6 +106,6 @@ pub(crate) fn push_name(line: &mut Vec<u8>, name: &str) {
 }
 
 /// Whether a channel can be called so: a name that is there, no control characters, and not the time's.
-pub(crate) fn can_name(name: &str) -> bool {
+pub fn can_name(name: &str) -> bool {
     !(name.trim().is_empty() || name == "time_s" || name.contains(char::is_control))
 }

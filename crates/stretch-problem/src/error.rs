@@ -2,6 +2,7 @@
 
 use stretch_data::DataError;
 use stretch_gap::{DescriptionError, GapError};
+use stretch_recording::RecordingError;
 
 /// Why a problem was refused; says where and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -10,6 +11,9 @@ pub enum ProblemError {
     /// The problem's file or its recordings could not be read, or the recordings not be brought onto one grid.
     #[error(transparent)]
     Data(#[from] DataError),
+    /// A recording could not be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
     /// What the problem is made of does not hold together.
     #[error(transparent)]
     Description(#[from] DescriptionError),

@@ -5,7 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use stretch_data::{ReadOptions, Recording, Trial, unit};
+use stretch_data::{Trial, unit};
+use stretch_recording::{ReadOptions, Recording};
 
 use crate::{error::ProblemError, wrap::ends};
 

@@ -38,7 +38,7 @@ pub fn run() -> ExitCode {
         }
     };
     runtime.spawn(async {
-        if tokio::signal::ctrl_c().await.is_ok() && stretch_data::interrupt() == 0 {
+        if tokio::signal::ctrl_c().await.is_ok() && stretch_files::interrupt() == 0 {
             std::process::exit(INTERRUPTED.into());
         }
     });
@@ -54,7 +54,7 @@ pub fn run() -> ExitCode {
     });
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        Err(_) if stretch_data::interrupted() => ExitCode::from(INTERRUPTED),
+        Err(_) if stretch_files::interrupted() => ExitCode::from(INTERRUPTED),
         Err(error) => {
             warn(format!("stretch fleet: {}", sentence(&error)));
             ExitCode::FAILURE
@@ -70,5 +70,5 @@ fn sentence(error: &anyhow::Error) -> String {
             told = format!("{told}: {cause}");
         }
     }
-    stretch_data::without_temporary_names(&told)
+    stretch_files::without_temporary_names(&told)
 }

@@ -104,7 +104,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     for (path, name, files) in &open {
         bar.set_message(name.join("/"));
         let verdict = verdict(&lake, files, &args);
-        ensure!(!stretch_data::interrupted(), "interrupted");
+        ensure!(!stretch_files::interrupted(), "interrupted");
         write_parquet(path, &row(name, files.len(), verdict)?, Vec::new(), None)?;
         bar.inc(1);
     }
@@ -171,7 +171,7 @@ fn verdict(lake: &Lake, files: &[&LakeFile], args: &Args) -> anyhow::Result<Diag
         };
         GaugeSimulator::new(&setup)?.into()
     };
-    Ok(bench.examine(&options, false, &|_| (), &stretch_data::interrupted)?.diagnosis)
+    Ok(bench.examine(&options, false, &|_| (), &stretch_files::interrupted)?.diagnosis)
 }
 
 /// A trial as it was recorded: samples that were lost are lost again.

@@ -12,7 +12,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 use stretch_calibrate::{parse_rate, rated};
 use stretch_core::RateEstimator;
-use stretch_data::{ReadOptions, Trial, unit};
+use stretch_data::{Trial, unit};
+use stretch_recording::ReadOptions;
 
 use crate::{
     lake::{About, Footer, Lake, LakeFile, Place, Refused, Samples, accept, digest, refuse, write},
@@ -232,7 +233,7 @@ impl Ingest<'_> {
         });
         let (footer, samples) = match made {
             Ok(made) => made,
-            Err(why) if stretch_data::interrupted() => return Err(why),
+            Err(why) if stretch_files::interrupted() => return Err(why),
             Err(why) => return refused(&format!("{why:#}")),
         };
         if let Some(why) = self.second(&footer, place) {

@@ -113,7 +113,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         drifting: drifting.collect(),
     };
     let text = serde_json::to_string_pretty(&made)? + "\n";
-    stretch_data::write_whole(lake.join("made.json"), |out| out.write_all(text.as_bytes()))?;
+    stretch_files::write_whole(lake.join("made.json"), |out| out.write_all(text.as_bytes()))?;
     if args.json {
         return say_json(&made);
     }

@@ -51,7 +51,7 @@ pub(crate) fn write_records(
             Ok(text) => {
                 let path = folder.join(format!("{name}.json"));
                 std::fs::create_dir_all(path.parent().unwrap_or(folder))?;
-                stretch_data::write_whole(path, |out| out.write_all(text.as_bytes()))?;
+                stretch_files::write_whole(path, |out| out.write_all(text.as_bytes()))?;
                 written += 1;
             }
             Err(why) => refused.push(Refused { file: name, why: format!("{why:#}") }),

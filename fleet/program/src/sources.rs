@@ -6,7 +6,8 @@ use std::{
 };
 
 use anyhow::{Context, bail};
-use stretch_data::{DataError, DataSet, ReadOptions, Recording, Split, TrialEntry, TrialKind};
+use stretch_data::{DataSet, Split, TrialEntry, TrialKind};
+use stretch_recording::{ReadOptions, Recording, RecordingError};
 
 use crate::{from_path::Pattern, lake::Place};
 
@@ -81,9 +82,9 @@ impl Source {
         self.entry.as_ref().map_or(0.0, |(_, entry)| entry.start_s)
     }
 
-    pub(crate) fn read(&self, options: &ReadOptions) -> Result<Recording, DataError> {
+    pub(crate) fn read(&self, options: &ReadOptions) -> Result<Recording, RecordingError> {
         match &self.entry {
-            Some((folder, entry)) => entry.load_recording(folder, options),
+            Some((folder, entry)) => Recording::of_entry(entry, folder, options),
             None => Recording::read(&self.path, options),
         }
     }

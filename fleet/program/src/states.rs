@@ -116,7 +116,7 @@ pub(crate) async fn bring_up(lake: &Lake, session: &SessionContext) -> anyhow::R
         bar.set_message(format!("month {} of a rig", unit.month));
         unit.compute(lake, session).await?;
         bar.inc(1);
-        anyhow::ensure!(!stretch_data::interrupted(), "interrupted");
+        anyhow::ensure!(!stretch_files::interrupted(), "interrupted");
     }
     bar.finish_and_clear();
     register_folder(session, "states", &folder, &["site", "rig"], schema())?;

@@ -52,8 +52,12 @@ impl Job {
             let asked = scope.spawn(|| -> anyhow::Result<(Bench, Examined)> {
                 let bench = sessions.bench(&options.signal)?;
                 let options = stretch_gap::Options { responses: true, ..Default::default() };
-                let examined =
-                    bench.examine(&options, true, &told_on(&asking), &stretch_data::interrupted)?;
+                let examined = bench.examine(
+                    &options,
+                    true,
+                    &told_on(&asking),
+                    &stretch_files::interrupted,
+                )?;
                 asking.finish_and_clear();
                 Ok((bench, examined))
             });

@@ -7,8 +7,9 @@ use std::{
 };
 
 use anyhow::{Context, bail, ensure};
-use stretch_data::{DataSet, ReadOptions, SessionTrial, Split, Trial, TrialKind};
+use stretch_data::{DataSet, SessionTrial, Split, Trial, TrialEntry, TrialKind};
 use stretch_problem::{Bench, GaugeSetup, GaugeSimulator};
+use stretch_recording::{ReadOptions, Recording};
 use stretch_sim::Catalogue;
 
 use super::published::{self, COMMIT, REPOSITORY};
@@ -133,8 +134,9 @@ fn data_set(folder: &Path) -> anyhow::Result<Parts> {
     let set = DataSet::read(folder)?;
     let of = |split: Split| -> anyhow::Result<Vec<(TrialKind, Trial)>> {
         let entries = set.entries(split);
-        let load = |e: &stretch_data::TrialEntry| e.load(folder, &ReadOptions::new());
-        let trials = entries.map(|e| Ok((e.kind, load(e)?))).collect::<anyhow::Result<Vec<_>>>()?;
+        let load = |entry: &TrialEntry| Recording::of_entry(entry, folder, &ReadOptions::new());
+        let trials =
+            entries.map(|e| Ok((e.kind, load(e)?.trial))).collect::<anyhow::Result<Vec<_>>>()?;
         let split = split.name();
         ensure!(
             !trials.is_empty(),
@@ -168,7 +170,7 @@ fn loose(path: &Path, wanted: Option<&str>) -> anyhow::Result<Parts> {
                 converted = true;
                 sessions.extend(trials);
             }
-            None => sessions.push(Trial::read(file, &ReadOptions::new())?),
+            None => sessions.push(Recording::read(file, &ReadOptions::new())?.trial),
         }
     }
     let mut fit: Vec<_> = sessions.into_iter().map(|trial| (TrialKind::Other, trial)).collect();

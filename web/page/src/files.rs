@@ -2,9 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 use stretch_calibrate::calibration_from_json;
-use stretch_data::{
-    DataSet, ReadOptions, Recording, RigFile, SessionTrial, Split, TimeUnit, Trial, unit,
-};
+use stretch_data::{DataSet, RigFile, SessionTrial, Split, Trial, unit};
+use stretch_recording::{ReadOptions, Recording, TimeUnit};
 
 use crate::{Read, said::Said};
 
@@ -106,7 +105,7 @@ impl Files {
         }
         let entry = self.set.iter().flat_map(|set| &set.trials).find(|entry| entry.file == name);
         let recording = match entry {
-            Some(entry) => entry.recording_of(bytes, &asked.options())?,
+            Some(entry) => Recording::of_bytes(entry, bytes, &asked.options())?,
             None => Recording::from_reader(bytes, name, &asked.options())?,
         };
         let about = About::of(name, &recording);
@@ -162,7 +161,7 @@ impl Files {
         let all = || self.recordings.iter();
         match &self.set {
             None => Ok(all().map(|(_, recording)| recording.clone().into()).collect()),
-            Some(set) => set.session(|entry| {
+            Some(set) => Recording::session_by(set, |entry| {
                 let found = all().find(|(name, _)| *name == entry.file);
                 found.map(|(_, one)| one.clone()).ok_or_else(|| missing(&entry.file))
             }),

@@ -2,6 +2,7 @@
 
 use stretch_data::DataError;
 use stretch_gap::{DescriptionError, GapError};
+use stretch_recording::RecordingError;
 use stretch_sim::{GridError, SimError};
 
 /// Why measurements could not be bound to a simulator, or a simulation was refused; carries the evidence.
@@ -11,6 +12,9 @@ pub enum BenchError {
     /// The data could not be read.
     #[error(transparent)]
     Data(#[from] DataError),
+    /// A recording could not be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
     /// The rig or an effect was refused.
     #[error(transparent)]
     Sim(#[from] SimError),

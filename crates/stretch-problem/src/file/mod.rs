@@ -5,7 +5,8 @@ mod simulator;
 
 use std::path::{Path, PathBuf};
 
-use stretch_data::{DataError, ReadOptions, Recording, SessionTrial, TomlFile, TomlView};
+use stretch_data::{DataError, SessionTrial, TomlFile, TomlView};
+use stretch_recording::{ReadOptions, Recording};
 
 use crate::{black_box::spec::ProblemSpec, error::ProblemError, worker::WorkersSpec};
 use entries::{effect, input, parameter, stage, trial};

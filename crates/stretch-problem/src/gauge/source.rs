@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use stretch_data::{DataSet, ReadOptions, Recording, SessionTrial, Trial};
+use stretch_data::{DataSet, SessionTrial, Trial};
+use stretch_recording::{ReadOptions, Recording};
 use stretch_sim::Catalogue;
 
 use super::{GaugeSetup, GaugeSimulator};
@@ -38,7 +39,7 @@ impl GaugeSimulator {
             options = options.require(reference).require(signal);
         }
         let first = match &set {
-            Some(set) => set.trials[0].load_recording(path, &options)?,
+            Some(set) => Recording::of_entry(&set.trials[0], path, &options)?,
             None => Recording::read(path, &options)?,
         };
         let Some((reference, signal)) = columns_of(&first.trial, columns, says_so)? else {
@@ -49,7 +50,10 @@ impl GaugeSimulator {
         let trials = match &set {
             // Read once: it may be standard input.
             None => vec![SessionTrial::from(first)],
-            Some(set) => set.load(path, &ReadOptions::new().require(reference).require(signal))?,
+            Some(set) => {
+                let options = ReadOptions::new().require(reference).require(signal);
+                Recording::session(set, path, &options)?
+            }
         };
         let rig = rig.map(rig_file::gauge).transpose()?;
         let rig = rig.as_ref();

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use stretch_data::{DataSet, EvenSession, EvenTrial, ReadOptions, Rows, SessionTrial, Split};
+use stretch_data::{DataSet, EvenSession, EvenTrial, Rows, SessionTrial, Split};
 use stretch_gap::{copied, noise_variance};
+use stretch_recording::{ReadOptions, Recording};
 
 use super::directions::{self, Motion};
 use super::smooth::{Draws, Smoothed, schedule};
@@ -102,7 +103,7 @@ impl RigSession {
     pub fn read(folder: &Path, set: &DataSet) -> Result<Self, BenchError> {
         let options =
             NEEDED.iter().fold(ReadOptions::new(), |options, name| options.require(*name));
-        Self::new(&set.load(folder, &options)?)
+        Self::new(&Recording::session(set, folder, &options)?)
     }
 
     /// Binds trials with the columns `inlet`, `outlet` (0..1), `length_mm`, `bridge_v` and, where it was recorded,

@@ -97,7 +97,7 @@ impl Process {
                 Ok(Ok(frame)) => return Ok(frame),
                 Ok(Err(why)) => return Err(self.failed(&why)),
                 Err(RecvTimeoutError::Disconnected) => return Err(self.failed("it is gone")),
-                Err(RecvTimeoutError::Timeout) if stretch_data::interrupted() => {
+                Err(RecvTimeoutError::Timeout) if stretch_files::interrupted() => {
                     return Err(Lost::Interrupted);
                 }
                 Err(RecvTimeoutError::Timeout) if left.is_zero() => {

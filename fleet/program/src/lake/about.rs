@@ -66,7 +66,7 @@ impl About {
 
     pub(crate) fn write(&self, lake: &Path) -> anyhow::Result<()> {
         let text = serde_json::to_string_pretty(self)? + "\n";
-        Ok(stretch_data::write_whole(lake.join(FILE), |out| out.write_all(text.as_bytes()))?)
+        Ok(stretch_files::write_whole(lake.join(FILE), |out| out.write_all(text.as_bytes()))?)
     }
 
     /// The column that is fitted: the contraction of a length, else the reference itself.

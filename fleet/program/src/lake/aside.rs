@@ -21,7 +21,7 @@ pub(crate) fn refuse(lake: &Path, file: &Path, why: &str) -> anyhow::Result<Refu
     let folder = lake.join("refused");
     fs::create_dir_all(&folder)?;
     let text = format!("{}: {why}\n", refused.file);
-    stretch_data::write_whole(folder.join(note(file)), |out| out.write_all(text.as_bytes()))?;
+    stretch_files::write_whole(folder.join(note(file)), |out| out.write_all(text.as_bytes()))?;
     Ok(refused)
 }
 

@@ -96,5 +96,5 @@ pub(crate) fn write_parquet(
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)?;
     }
-    Ok(stretch_data::write_whole(path, |out| out.write_all(&bytes))?)
+    Ok(stretch_files::write_whole(path, |out| out.write_all(&bytes))?)
 }

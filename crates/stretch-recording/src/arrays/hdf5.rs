@@ -1,0 +1,73 @@
+//! HDF5, and with it MATLAB's files of version 7.3: every data set of numbers in every group.
+
+use hdf5_pure::{File, Group};
+
+use crate::{
+    ReadOptions, RecordingError,
+    arrays::{Array, tracks},
+    grid::{Track, listed},
+};
+
+/// Groups within groups.
+const DEEPEST: usize = 16;
+/// Where MATLAB keeps what nobody asked for.
+const INTERNAL: &str = "#";
+
+/// Reads a file's data sets.
+pub(crate) fn read(
+    bytes: Vec<u8>,
+    file: &str,
+    options: &ReadOptions,
+) -> Result<(Vec<Track>, Vec<String>), RecordingError> {
+    let fail = |problem| RecordingError::Format { file: file.to_owned(), format: "HDF5", problem };
+    let broken = |e: hdf5_pure::Error| fail(format!("{e}; write it again, or export it as CSV"));
+    let opened = File::from_bytes(bytes).map_err(broken)?;
+    let mut found = Found::default();
+    found.group(&opened.root(), "", 0).map_err(broken)?;
+    let other: Vec<&str> = found.other.iter().map(String::as_str).collect();
+    if found.arrays.is_empty() {
+        let told = if other.is_empty() { "nothing".to_owned() } else { listed(&other) };
+        return Err(fail(format!("there is no data set of numbers in it, but {told}")));
+    }
+    let mut notes = Vec::new();
+    if !other.is_empty() {
+        notes.push(format!("left out: {}", listed(&other)));
+    }
+    tracks(file, &found.arrays, notes, options)
+}
+
+#[derive(Default)]
+struct Found {
+    arrays: Vec<Array>,
+    other: Vec<String>,
+}
+
+impl Found {
+    fn group(&mut self, group: &Group, path: &str, depth: usize) -> Result<(), hdf5_pure::Error> {
+        for name in group.datasets()? {
+            let full = format!("{path}{name}");
+            match array(group, &name, &full) {
+                Ok(array) => self.arrays.push(array),
+                Err(e) => self.other.push(format!("{full} ({e})")),
+            }
+        }
+        if depth < DEEPEST {
+            for name in group.groups()? {
+                if !name.starts_with(INTERNAL) {
+                    self.group(&group.group(&name)?, &format!("{path}{name}/"), depth + 1)?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn array(group: &Group, name: &str, full: &str) -> Result<Array, hdf5_pure::Error> {
+    let set = group.dataset(name)?;
+    let values = set.read_f64()?;
+    let shape: Vec<usize> = set.shape()?.into_iter().map(|n| n as usize).collect();
+    // A shape that does not go with the values is none.
+    let whole = shape.iter().try_fold(1_usize, |n, &m| n.checked_mul(m)) == Some(values.len());
+    let shape = if whole { shape } else { vec![values.len()] };
+    Ok(Array { name: full.to_owned(), shape, values })
+}

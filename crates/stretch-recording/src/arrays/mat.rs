@@ -1,0 +1,205 @@
+//! MATLAB's files of version 5 (`save` up to -v7): matrices of numbers, and structures of them.
+
+use std::io::Read;
+
+use crate::{
+    ReadOptions, RecordingError,
+    arrays::{Array, tracks},
+    grid::{Track, listed},
+};
+
+/// Structures within structures; a file that says more is broken.
+const DEEPEST: usize = 16;
+const HEADER_BYTES: usize = 128;
+/// Largest block once it is unpacked.
+const LARGEST_BYTES: u64 = 8 << 30;
+
+/// Types of data elements.
+const COMPRESSED: u32 = 15;
+const MATRIX: u32 = 14;
+
+/// Reads a file's arrays.
+pub(crate) fn read(
+    bytes: &[u8],
+    file: &str,
+    options: &ReadOptions,
+) -> Result<(Vec<Track>, Vec<String>), RecordingError> {
+    let fail = |problem| RecordingError::Format { file: file.to_owned(), format: "MAT", problem };
+    let is_big = bytes.get(126..128) == Some(b"MI");
+    let mut found = Found::default();
+    let mut rest = Bytes { bytes: bytes.get(HEADER_BYTES..).unwrap_or_default(), is_big };
+    let mut block = 0_usize;
+    while !rest.bytes.is_empty() {
+        block += 1;
+        let broken =
+            || fail(format!("variable {block} ends before its end; save the file again with -v7"));
+        let (kind, data) = rest.element(false).ok_or_else(broken)?;
+        if kind == COMPRESSED {
+            let mut unpacked = Vec::new();
+            let reader = flate2::read::ZlibDecoder::new(data);
+            reader.take(LARGEST_BYTES).read_to_end(&mut unpacked).map_err(|_| broken())?;
+            let mut inner = Bytes { bytes: &unpacked, is_big };
+            let (kind, data) = inner.element(false).ok_or_else(broken)?;
+            if kind == MATRIX {
+                found.matrix(Bytes { bytes: data, is_big }, "", 0).ok_or_else(broken)?;
+            }
+        } else if kind == MATRIX {
+            found.matrix(Bytes { bytes: data, is_big }, "", 0).ok_or_else(broken)?;
+        }
+    }
+    let mut notes = Vec::new();
+    let other: Vec<&str> = found.other.iter().map(String::as_str).collect();
+    if found.arrays.is_empty() {
+        return Err(fail(match other[..] {
+            [] => "there is no variable in it".to_owned(),
+            _ => format!(
+                "none of its variables is a matrix of numbers: {}; save their arrays",
+                listed(&other)
+            ),
+        }));
+    }
+    if !other.is_empty() {
+        notes.push(format!("left out: {}", listed(&other)));
+    }
+    tracks(file, &found.arrays, notes, options)
+}
+
+/// What is left of a block.
+#[derive(Debug, Clone, Copy)]
+struct Bytes<'a> {
+    bytes: &'a [u8],
+    is_big: bool,
+}
+
+impl<'a> Bytes<'a> {
+    fn take(&mut self, count: usize) -> Option<&'a [u8]> {
+        let (head, rest) = self.bytes.split_at_checked(count)?;
+        self.bytes = rest;
+        Some(head)
+    }
+
+    fn word(&self, bytes: &[u8]) -> Option<u32> {
+        let bytes: [u8; 4] = bytes.get(..4)?.try_into().ok()?;
+        Some(if self.is_big { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) })
+    }
+
+    /// The next data element: its type and its data. Small ones hold both in eight bytes.
+    fn element(&mut self, padded: bool) -> Option<(u32, &'a [u8])> {
+        let tag = self.take(8)?;
+        let first = self.word(tag)?;
+        if first >> 16 != 0 {
+            let count = (first >> 16) as usize;
+            return Some((first & 0xffff, tag.get(4..4 + count)?));
+        }
+        let count = self.word(&tag[4..])? as usize;
+        let data = self.take(count)?;
+        let padding = if padded { (8 - count % 8) % 8 } else { 0 };
+        self.take(padding.min(self.bytes.len()))?;
+        Some((first, data))
+    }
+
+    /// The numbers of an element of type `kind`.
+    fn numbers(&self, kind: u32, data: &[u8]) -> Option<Vec<f64>> {
+        let is_big = self.is_big;
+        let whole = |item: &[u8]| {
+            let mut word = 0_u64;
+            for i in 0..item.len() {
+                let byte = if is_big { item[i] } else { item[item.len() - 1 - i] };
+                word = word << 8 | u64::from(byte);
+            }
+            word
+        };
+        let signed = |item: &[u8]| {
+            let unused = 64 - 8 * item.len() as u32;
+            (((whole(item) << unused) as i64) >> unused) as f64
+        };
+        let bytes = match kind {
+            1 | 2 => 1,
+            3 | 4 => 2,
+            5..=7 => 4,
+            9 | 12 | 13 => 8,
+            _ => return None,
+        };
+        let value = |item: &[u8]| match kind {
+            1 | 3 | 5 | 12 => signed(item),
+            7 => f32::from_bits(whole(item) as u32).into(),
+            9 => f64::from_bits(whole(item)),
+            _ => whole(item) as f64,
+        };
+        Some(data.chunks_exact(bytes).map(value).collect())
+    }
+}
+
+/// Variables that hold numbers, and those that do not.
+#[derive(Default)]
+struct Found {
+    arrays: Vec<Array>,
+    other: Vec<String>,
+}
+
+impl Found {
+    /// Takes a matrix below `path`; none where it ends before its end.
+    fn matrix(&mut self, mut rest: Bytes<'_>, path: &str, depth: usize) -> Option<()> {
+        if rest.bytes.is_empty() {
+            return Some(());
+        }
+        let (_, flags) = rest.element(true)?;
+        let flags = rest.word(flags)?;
+        let class = flags & 0xff;
+        let (kind, dims) = rest.element(true)?;
+        let dims: Vec<usize> =
+            rest.numbers(kind, dims)?.into_iter().map(|n| n.max(0.0) as usize).collect();
+        let (_, own) = rest.element(true)?;
+        let own = String::from_utf8_lossy(own).into_owned();
+        let name = match (path, &own[..]) {
+            ("", _) => own,
+            (_, "") => path.to_owned(),
+            _ => format!("{path}.{own}"),
+        };
+        match class {
+            6..=15 => {
+                let (kind, data) = rest.element(true)?;
+                let values = rest.numbers(kind, data)?;
+                let count = dims.iter().try_fold(1_usize, |n, &m| n.checked_mul(m))?;
+                if values.len() != count {
+                    return None;
+                }
+                if flags & 0x0800 != 0 {
+                    self.other.push(format!("{name} (complex)"));
+                } else {
+                    // Columns first in the file: the other way round the last index is the fastest.
+                    let shape = dims.into_iter().rev().collect();
+                    self.arrays.push(Array { name, shape, values });
+                }
+            }
+            2 if dims.iter().product::<usize>() == 1 && depth < DEEPEST => {
+                self.structure(rest, &name, depth)?;
+            }
+            2 => self.other.push(format!("{name} (an array of structures)")),
+            1 => self.other.push(format!("{name} (cells)")),
+            4 => self.other.push(format!("{name} (text)")),
+            5 => self.other.push(format!("{name} (sparse)")),
+            _ => self.other.push(format!("{name} (an object)")),
+        }
+        Some(())
+    }
+
+    fn structure(&mut self, mut rest: Bytes<'_>, name: &str, depth: usize) -> Option<()> {
+        let (kind, length) = rest.element(true)?;
+        let length = *rest.numbers(kind, length)?.first()? as usize;
+        let (_, names) = rest.element(true)?;
+        if length == 0 {
+            return Some(());
+        }
+        for field in names.chunks_exact(length) {
+            let end = field.iter().position(|&b| b == 0).unwrap_or(length);
+            let field = String::from_utf8_lossy(&field[..end]);
+            let (kind, data) = rest.element(true)?;
+            if kind == MATRIX {
+                let inner = Bytes { bytes: data, is_big: rest.is_big };
+                self.matrix(inner, &format!("{name}.{field}"), depth + 1)?;
+            }
+        }
+        Some(())
+    }
+}

@@ -1,0 +1,198 @@
+//! Named arrays, as NPZ, MAT and HDF5 hold them: which of them are clocks, and whose.
+
+#[cfg(feature = "hdf5")]
+pub(crate) mod hdf5;
+#[cfg(feature = "mat")]
+pub(crate) mod mat;
+#[cfg(feature = "npz")]
+pub(crate) mod npy;
+
+use stretch_data::Channel;
+
+use crate::{
+    ReadOptions, RecordingError, TimeUnit,
+    grid::{Track, listed},
+    names::{clock_of, time_rank},
+    options::TIME,
+};
+
+/// Columns of one array that are taken.
+const MOST_COLUMNS: usize = 64;
+
+/// One array of numbers, the last index running fastest.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Array {
+    /// Path within the file.
+    pub(crate) name: String,
+    /// Lengths, the slowest index first.
+    pub(crate) shape: Vec<usize>,
+    pub(crate) values: Vec<f64>,
+}
+
+impl Array {
+    /// Rows and columns; none where it has more than two lengths above 1, or no values: beside a length of 0 any other may be told.
+    fn matrix(&self) -> Option<(usize, usize)> {
+        if self.values.is_empty() {
+            return None;
+        }
+        let long: Vec<usize> = self.shape.iter().copied().filter(|&n| n != 1).collect();
+        match (long[..].len(), &self.shape[..]) {
+            (0, _) => Some((1, 1)),
+            (1, _) => Some((long[0], 1)),
+            (2, _) => Some((long[0], long[1])),
+            _ => None,
+        }
+    }
+
+    /// Its columns over `samples` instants, whichever way it lies; none where it has another length.
+    fn columns(&self, samples: usize) -> Option<Vec<Channel>> {
+        let (rows, columns) = self.matrix()?;
+        let (count, step, next) = match (rows == samples, columns == samples) {
+            (true, _) => (columns, columns, 1),
+            (_, true) => (rows, 1, columns),
+            _ => return None,
+        };
+        if count > MOST_COLUMNS {
+            return None;
+        }
+        let name = |i: usize| match count {
+            1 => self.name.clone(),
+            _ => format!("{}.{i}", self.name),
+        };
+        let values = |i: usize| (0..samples).map(|k| self.values[k * step + i * next]).collect();
+        Some((0..count).map(|i| Channel { name: name(i), values: values(i) }).collect())
+    }
+}
+
+/// A clock among the arrays.
+struct ClockArray<'a> {
+    array: &'a Array,
+    of: String,
+    rises: bool,
+}
+
+/// Gives each array to the clock that it runs on.
+pub(crate) fn tracks(
+    file: &str,
+    arrays: &[Array],
+    mut notes: Vec<String>,
+    options: &ReadOptions,
+) -> Result<(Vec<Track>, Vec<String>), RecordingError> {
+    let mut clocks: Vec<ClockArray<'_>> = arrays.iter().filter_map(|a| clock(a, options)).collect();
+    // One that does not rise is a clock only by its name, and told as one where there is no other.
+    if clocks.iter().any(|clock| clock.rises) {
+        clocks.retain(|clock| clock.rises);
+    }
+    let others = arrays.iter().filter(|a| !clocks.iter().any(|c| std::ptr::eq(c.array, *a)));
+    if clocks.is_empty() {
+        return counted(file, others, notes, options);
+    }
+    let mut tracks: Vec<Track> = clocks
+        .iter()
+        .map(|clock| Track {
+            clock: clock.array.name.clone(),
+            counts: clock.array.values.clone(),
+            per_second: options.divisor(&clock.array.name),
+            channels: Vec::new(),
+        })
+        .collect();
+    let mut left_out = Vec::new();
+    for array in others {
+        match on(array, &clocks) {
+            Some((i, columns)) => tracks[i].channels.extend(columns),
+            None => left_out.push(array.name.as_str()),
+        }
+    }
+    if !left_out.is_empty() {
+        notes.push(format!(
+            "left out, no clock has their length or two clocks have: {}",
+            listed(&left_out)
+        ));
+    }
+    Ok((tracks, notes))
+}
+
+/// The array as a clock, if it can be one: named so, of one dimension, and rising.
+fn clock<'a>(array: &'a Array, options: &ReadOptions) -> Option<ClockArray<'a>> {
+    let (samples, 1) = array.matrix()? else { return None };
+    let last = array.name.rsplit(['/', '.']).next().unwrap_or_default();
+    let wanted = options.time_column();
+    let of = if array.name == wanted || last == wanted {
+        array.name.rsplit_once(['/', '.']).map_or(String::new(), |(group, _)| group.to_owned())
+    } else if wanted == TIME {
+        clock_of(&array.name)?
+    } else {
+        return None;
+    };
+    let rises = array.values.windows(2).all(|t| t[1] > t[0]);
+    let is_named = array.name == wanted || last == wanted || time_rank(last).is_some();
+    (samples > 1 && (rises || is_named)).then_some(ClockArray { array, of, rises })
+}
+
+/// The clock of an array: of its length, and by its name the nearest; none where two are as near.
+fn on(array: &Array, clocks: &[ClockArray<'_>]) -> Option<(usize, Vec<Channel>)> {
+    let fits = clocks.iter().enumerate().filter_map(|(i, clock)| {
+        let columns = array.columns(clock.array.values.len())?;
+        Some((nearness(&array.name, &clock.of), i, columns))
+    });
+    let mut fits: Vec<_> = fits.collect();
+    fits.sort_by_key(|(near, ..)| std::cmp::Reverse(*near));
+    match &fits[..] {
+        [first, second, ..] if first.0 == second.0 => {
+            let (a, b) = (clocks[first.1].array, clocks[second.1].array);
+            (a.values == b.values).then(|| (first.1, first.2.clone()))
+        }
+        [first, ..] => Some((first.1, first.2.clone())),
+        [] => None,
+    }
+}
+
+/// How much a name says that it runs on the clock of `of`: its letters, if it is in that group or named after it.
+fn nearness(name: &str, of: &str) -> usize {
+    let path = name.to_lowercase().replace('.', "/");
+    let of = of.to_lowercase().replace('.', "/");
+    let parts = path.split(['/', '_']);
+    match () {
+        () if of.is_empty() => 1,
+        () if path.starts_with(&format!("{of}/")) || path.starts_with(&format!("{of}_")) => {
+            1 + of.len()
+        }
+        () if parts.into_iter().any(|part| part == of) => 1 + of.len(),
+        () => 0,
+    }
+}
+
+/// Arrays without a clock, at a rate that the file or somebody says.
+fn counted<'a>(
+    file: &str,
+    others: impl Iterator<Item = &'a Array>,
+    mut notes: Vec<String>,
+    options: &ReadOptions,
+) -> Result<(Vec<Track>, Vec<String>), RecordingError> {
+    let others: Vec<&Array> = others.collect();
+    let scalar = |names: &[&str]| {
+        others.iter().find_map(|a| match a.values[..] {
+            [value] if names.contains(&a.name.to_lowercase().as_str()) => Some(value),
+            _ => None,
+        })
+    };
+    let own = scalar(&["fs", "fs_hz", "rate_hz", "sample_rate", "sample_rate_hz", "sampling_rate"])
+        .or_else(|| scalar(&["dt", "dt_s", "ts", "sample_time"]).map(|dt| 1.0 / dt));
+    let samples = others.iter().filter_map(|a| a.matrix()).map(|(r, c)| r.max(c)).max();
+    let (Some(rate_hz), Some(samples)) = (options.sample_rate().or(own), samples) else {
+        let names: Vec<&str> = others.iter().map(|a| a.name.as_str()).collect();
+        let hint = format!(
+            "save it as an array {} beside the others ({}), or say --sample-rate",
+            options.time_column(),
+            listed(&names)
+        );
+        return Err(RecordingError::NoTime { file: file.to_owned(), hint });
+    };
+    let said = if options.sample_rate().is_some() { "was said" } else { "the file says" };
+    notes.push(format!("there is no time: {rate_hz} samples a second, as {said}"));
+    let per_second = options.unit_of_time().unwrap_or(TimeUnit::Seconds).per_second();
+    let channels = others.iter().filter(|a| a.values.len() > 1).filter_map(|a| a.columns(samples));
+    let channels = channels.flatten().collect();
+    let counts = (0..samples).map(|i| i as f64 / rate_hz * per_second).collect();
+    Ok((vec![Track { clock: TIME.to_owned(), counts, per_second, channels }], notes))
+}

@@ -1,0 +1,258 @@
+//! NumPy's arrays: one in an NPY file, several in an NPZ archive.
+
+use std::io::{Cursor, Read};
+
+use crate::{
+    ReadOptions, RecordingError,
+    arrays::{Array, tracks},
+    grid::{Track, listed},
+    names::time_rank,
+};
+
+type Tracks = (Vec<Track>, Vec<String>);
+
+/// Reads one array: columns with names, or those that somebody names.
+pub(crate) fn read(
+    bytes: &[u8],
+    file: &str,
+    options: &ReadOptions,
+) -> Result<Tracks, RecordingError> {
+    let fail = |problem| RecordingError::Format { file: file.to_owned(), format: "NPY", problem };
+    let mut arrays = parse(bytes, "", options).map_err(fail)?;
+    if let (Some(names), [array]) = (options.column_names(), &mut arrays[..]) {
+        arrays = named(array, names).map_err(fail)?;
+    }
+    let has_time =
+        arrays.iter().any(|a| a.name == options.time_column() || time_rank(&a.name).is_some());
+    if arrays.len() == 1
+        && arrays[0].name.is_empty()
+        && options.sample_rate().is_none()
+        && !has_time
+    {
+        let shape = &arrays[0].shape;
+        return Err(fail(format!(
+            "an array of {shape:?} without names; name its columns with --columns, or save several arrays with numpy.savez"
+        )));
+    }
+    for (i, array) in arrays.iter_mut().enumerate().filter(|(_, a)| a.name.is_empty()) {
+        array.name = format!("column_{i}");
+    }
+    tracks(file, &arrays, Vec::new(), options)
+}
+
+/// Reads an archive of arrays.
+pub(crate) fn read_archive(
+    bytes: Vec<u8>,
+    file: &str,
+    options: &ReadOptions,
+) -> Result<Tracks, RecordingError> {
+    let fail = |problem| RecordingError::Format { file: file.to_owned(), format: "NPZ", problem };
+    let broken = |e: zip::result::ZipError| {
+        fail(format!("the archive is broken: {e}; save it again with numpy.savez"))
+    };
+    let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(broken)?;
+    let (mut arrays, mut other) = (Vec::new(), Vec::new());
+    for i in 0..archive.len() {
+        let mut member = archive.by_index(i).map_err(broken)?;
+        let path = member.name().map_err(broken)?.into_owned();
+        if path.starts_with("xl/") {
+            return Err(fail("it is an Excel workbook; save the sheet as CSV".to_owned()));
+        }
+        let Some(name) = path.strip_suffix(".npy") else { continue };
+        let mut content = Vec::new();
+        let read = member.read_to_end(&mut content);
+        read.map_err(|e| fail(format!("array {name}: {e}; save it again with numpy.savez")))?;
+        match parse(&content, name, options) {
+            Ok(found) => arrays.extend(found),
+            Err(problem) => other.push(format!("{name} ({problem})")),
+        }
+    }
+    if arrays.is_empty() {
+        let told: Vec<&str> = other.iter().map(String::as_str).collect();
+        return Err(fail(match told[..] {
+            [] => "there is no array in it; give the recording itself, or save arrays with numpy.savez".to_owned(),
+            _ => format!("none of its arrays is of numbers: {}", listed(&told)),
+        }));
+    }
+    let mut notes = Vec::new();
+    if !other.is_empty() {
+        let told: Vec<&str> = other.iter().map(String::as_str).collect();
+        notes.push(format!("left out: {}", listed(&told)));
+    }
+    tracks(file, &arrays, notes, options)
+}
+
+/// The columns of a matrix by the names that somebody gives.
+fn named(array: &Array, names: &[String]) -> Result<Vec<Array>, String> {
+    let (rows, columns) = match array.shape[..] {
+        [rows] => (rows, 1),
+        [rows, columns] => (rows, columns),
+        _ => return Err(format!("an array of {:?} has no columns to name", array.shape)),
+    };
+    let count = names.len();
+    let (step, next, samples) = match (columns == count, rows == count) {
+        (true, _) => (columns, 1, rows),
+        (_, true) => (1, columns, columns),
+        _ => {
+            return Err(format!(
+                "an array of {:?} where {count} columns were named; name as many",
+                array.shape
+            ));
+        }
+    };
+    let values = |i: usize| (0..samples).map(|k| array.values[k * step + i * next]).collect();
+    let one = |(i, name): (usize, &String)| Array {
+        name: name.clone(),
+        shape: vec![samples],
+        values: values(i),
+    };
+    Ok(names.iter().enumerate().map(one).collect())
+}
+
+/// A number in memory: where it stands in an item, and how it is written.
+#[derive(Debug, Clone, PartialEq)]
+struct Kind {
+    is_big: bool,
+    letter: u8,
+    bytes: usize,
+    /// Of a date: in a second.
+    per_second: f64,
+}
+
+impl Kind {
+    /// From NumPy's spelling: `<f8`, `|b1`, `<M8[ns]`.
+    fn parse(text: &str) -> Result<Self, String> {
+        let fail = || format!("numbers of type {text} are not read; save them as float64");
+        let mut letters = text.bytes();
+        let (order, letter) = (letters.next().ok_or_else(fail)?, letters.next().ok_or_else(fail)?);
+        let rest = text.get(2..).ok_or_else(fail)?;
+        if letter == b'O' {
+            return Err("Python objects are not read; save numbers".to_owned());
+        }
+        let (size, unit) = rest.split_once('[').unwrap_or((rest, ""));
+        let bytes = size.parse().map_err(|_| fail())?;
+        let per_second = match unit.trim_end_matches(']') {
+            "" | "s" => 1.0,
+            "ms" => 1e3,
+            "us" => 1e6,
+            "ns" => 1e9,
+            _ => return Err(fail()),
+        };
+        match (letter, bytes) {
+            (b'f', 4 | 8) | (b'i' | b'u', 1 | 2 | 4 | 8) | (b'b', 1) | (b'M' | b'm', 8) => {
+                Ok(Self { is_big: order == b'>', letter, bytes, per_second })
+            }
+            _ => Err(fail()),
+        }
+    }
+
+    fn value(&self, item: &[u8]) -> f64 {
+        let mut bytes = [0_u8; 8];
+        for (to, from) in bytes.iter_mut().zip(item) {
+            *to = *from;
+        }
+        if self.is_big {
+            bytes[..self.bytes].reverse();
+        }
+        let word = u64::from_le_bytes(bytes);
+        let unused = 64 - 8 * self.bytes as u32;
+        match (self.letter, self.bytes) {
+            (b'f', 8) => f64::from_bits(word),
+            (b'f', _) => f32::from_bits(word as u32).into(),
+            (b'i' | b'M' | b'm', _) => (((word << unused) as i64) >> unused) as f64,
+            _ => word as f64,
+        }
+    }
+}
+
+/// A field of an item: its name, where it begins, what it is.
+type Place = (String, usize, Kind);
+
+/// The arrays of one NPY file: one, or one a field.
+fn parse(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<Vec<Array>, String> {
+    let broken = || "it ends within its header; save it again with numpy.save".to_owned();
+    let wide = bytes.get(6).is_some_and(|&version| version >= 2);
+    let length = match bytes.get(8..12) {
+        Some(&[a, b, c, d]) if wide => u32::from_le_bytes([a, b, c, d]) as usize,
+        Some(&[a, b, ..]) => u16::from_le_bytes([a, b]).into(),
+        _ => return Err(broken()),
+    };
+    let begin = if wide { 12_usize } else { 10 };
+    let data = begin.checked_add(length).ok_or_else(broken)?;
+    let header = bytes.get(begin..data).ok_or_else(broken)?;
+    let header = String::from_utf8_lossy(header);
+    let after = |key: &str| {
+        let (_, rest) = header.split_once(&format!("'{key}'"))?;
+        Some(rest.split_once(':')?.1.trim_start())
+    };
+    let descr = after("descr").ok_or_else(broken)?;
+    let is_fortran = after("fortran_order").ok_or_else(broken)?.starts_with("True");
+    let shape = after("shape").and_then(|s| s.strip_prefix('(')).and_then(|s| s.split_once(')'));
+    let mut shape: Vec<usize> = shape
+        .ok_or_else(broken)?
+        .0
+        .split(',')
+        .map(str::trim)
+        .filter(|s| !s.is_empty())
+        .map(|s| s.parse().map_err(|_| broken()))
+        .collect::<Result<_, _>>()?;
+    let (fields, item) = fields(descr, name)?;
+    let product = shape.iter().try_fold(1_usize, |n, &m| n.checked_mul(m));
+    let count = product.ok_or_else(|| format!("no memory holds its shape {shape:?}"))?;
+    let needed = count.saturating_mul(item);
+    let data = bytes.get(data..).filter(|d| d.len() >= needed).ok_or_else(|| {
+        format!("it ends before the last of its {count} values; save it again with numpy.save")
+    })?;
+    if is_fortran {
+        shape.reverse();
+    }
+    let array = |(name, at, kind): Place| {
+        // A date is counted in what the name of its column says.
+        let scale = match kind.letter {
+            b'M' | b'm' => options.divisor(&name) / kind.per_second,
+            _ => 1.0,
+        };
+        let value = |i: usize| kind.value(&data[i * item + at..i * item + at + kind.bytes]) * scale;
+        Array { name, shape: shape.clone(), values: (0..count).map(value).collect() }
+    };
+    Ok(fields.into_iter().map(array).collect())
+}
+
+/// Fields of an item and its length in bytes.
+fn fields(descr: &str, name: &str) -> Result<(Vec<Place>, usize), String> {
+    let quoted = |text: &str| -> Vec<String> {
+        text.split('\'').skip(1).step_by(2).map(str::to_owned).collect()
+    };
+    let Some(list) = descr.strip_prefix('[') else {
+        let text = quoted(descr).into_iter().next().unwrap_or_default();
+        let kind = Kind::parse(&text)?;
+        let bytes = kind.bytes;
+        return Ok((vec![(name.to_owned(), 0, kind)], bytes));
+    };
+    let list = list.split_once(']').map_or(list, |(list, _)| list);
+    // `[ns]` of a date closes a bracket, too.
+    let whole = descr.rsplit_once("],").map_or(list, |(list, _)| list.trim_start_matches('['));
+    let (mut places, mut at) = (Vec::new(), 0);
+    for field in whole.split("),").filter(|f| f.contains('\'')) {
+        let [field_name, text] = &quoted(field)[..] else {
+            return Err("fields that hold fields are not read; save plain columns".to_owned());
+        };
+        if field
+            .trim_end()
+            .trim_end_matches(')')
+            .trim_end()
+            .rsplit('\'')
+            .next()
+            .is_some_and(|r| r.contains('('))
+        {
+            return Err(format!("field {field_name} holds arrays; save plain columns"));
+        }
+        let kind = Kind::parse(text)?;
+        let path =
+            if name.is_empty() { field_name.clone() } else { format!("{name}.{field_name}") };
+        let bytes = kind.bytes;
+        places.push((path, at, kind));
+        at += bytes;
+    }
+    Ok((places, at))
+}

@@ -1,0 +1,256 @@
+//! Names of columns as people write them: units in brackets or in a row of their own, and what may be the time.
+
+/// Names that a time column has elsewhere, the likeliest first.
+const TIMES: [&str; 35] = [
+    "time_s",
+    "time",
+    "t",
+    "t_s",
+    "time_ms",
+    "t_ms",
+    "time_us",
+    "t_us",
+    "time_ns",
+    "t_ns",
+    "timestamp",
+    "timestamp_s",
+    "timestamp_ms",
+    "timestamp_us",
+    "timestamp_ns",
+    "timestamps",
+    "time_stamp",
+    "stamp",
+    "seconds",
+    "sec",
+    "secs",
+    "elapsed",
+    "elapsed_s",
+    "elapsed_time",
+    "elapsed_time_s",
+    "millis",
+    "micros",
+    "datetime",
+    "date_time",
+    "utc",
+    "zeit",
+    "zeit_s",
+    "zeit_ms",
+    "ms",
+    "us",
+];
+
+/// The unit in this project's spelling: `mm`, `n`, `m_per_s2`, `percent`; empty for a pure number, none where it is no unit.
+pub(crate) fn unit(text: &str) -> Option<String> {
+    let text = text.trim();
+    if matches!(text, "" | "-" | "1" | "--") {
+        return Some(String::new());
+    }
+    let mut parts = text.split('/');
+    let mut spelt = factor(parts.next()?)?.to_owned();
+    for part in parts {
+        spelt.push_str("_per_");
+        spelt.push_str(factor(part)?);
+    }
+    Some(spelt)
+}
+
+/// Units without a stroke. Letters keep their meaning by the whole word: mPa is not among them, MPa is.
+fn factor(text: &str) -> Option<&'static str> {
+    Some(match text.trim() {
+        "s" | "sec" | "secs" | "seconds" | "S" => "s",
+        "ms" | "msec" => "ms",
+        "us" | "µs" | "μs" | "usec" => "us",
+        "ns" => "ns",
+        "min" => "min",
+        "s^2" | "s²" | "s2" | "s**2" => "s2",
+        "m" | "M" => "m",
+        "cm" => "cm",
+        "mm" | "MM" => "mm",
+        "um" | "µm" | "μm" => "um",
+        "nm" => "nanom",
+        "in" | "inch" => "in",
+        "m^2" | "m²" => "m2",
+        "N" => "n",
+        "kN" => "kn",
+        "mN" => "mn",
+        "Nm" | "N·m" | "N m" | "N*m" | "N.m" => "nm",
+        "V" | "volt" | "volts" => "v",
+        "mV" => "mv",
+        "uV" | "µV" | "μV" => "uv",
+        "A" => "a",
+        "mA" => "ma",
+        "W" => "w",
+        "Pa" => "pa",
+        "hPa" => "hpa",
+        "kPa" | "kpa" => "kpa",
+        "MPa" => "mpa",
+        "bar" => "bar",
+        "mbar" => "mbar",
+        "psi" => "psi",
+        "rad" => "rad",
+        "deg" | "°" | "degree" | "degrees" => "deg",
+        "rpm" | "RPM" => "rpm",
+        "Hz" => "hz",
+        "kHz" => "khz",
+        "K" => "k",
+        "°C" | "degC" | "C" => "degc",
+        "kg" => "kg",
+        "g" => "g",
+        "%" => "percent",
+        "Ohm" | "ohm" | "Ω" => "ohm",
+        "kOhm" | "kΩ" => "kohm",
+        "T" => "t",
+        "mT" => "mt",
+        "LSB" | "lsb" | "counts" | "count" => "counts",
+        "ticks" => "ticks",
+        _ => return None,
+    })
+}
+
+/// Small letters, digits and underscores.
+fn plain(text: &str) -> String {
+    let mut name = String::new();
+    for c in text.trim().chars() {
+        if c.is_alphanumeric() {
+            name.extend(c.to_lowercase());
+        } else if !name.is_empty() && !name.ends_with('_') {
+            name.push('_');
+        }
+    }
+    name.trim_end_matches('_').to_owned()
+}
+
+/// A column's name in this project's way: `pos_mm` for `Pos (mm)`, `force_n` for `force[N]`; any other as it is.
+///
+/// ```
+/// use stretch_recording::tidy_column;
+/// assert_eq!(tidy_column("Pos (mm)"), "pos_mm");
+/// assert_eq!(tidy_column("length_mm"), "length_mm");
+/// ```
+pub fn tidy_column(name: &str) -> String {
+    tidy(name, None).unwrap_or_else(|| name.to_owned())
+}
+
+/// A name with its unit as its last part, from `Pos (mm)`, `force[N]`, `pos, mm` or from a unit that stands below it;
+/// none where the name says no unit in such a way.
+pub(crate) fn tidy(name: &str, below: Option<&str>) -> Option<String> {
+    let (base, unit) = match below.filter(|b| !b.is_empty()) {
+        Some(below) => (name, unit(unbracketed(below))?),
+        None => bracketed(name)?,
+    };
+    let base = plain(base);
+    Some(match &unit[..] {
+        _ if base.is_empty() => return None,
+        "" => base,
+        unit if base.rsplit_once('_').is_some_and(|(_, last)| last == unit) => base,
+        unit => format!("{base}_{unit}"),
+    })
+}
+
+/// A name without the unit that stands behind it, and that unit.
+fn bracketed(name: &str) -> Option<(&str, String)> {
+    let name = name.trim();
+    for (open, close) in [('(', ')'), ('[', ']'), ('{', '}')] {
+        if let Some((base, rest)) = name.strip_suffix(close).and_then(|n| n.rsplit_once(open)) {
+            return Some((base, unit(rest)?));
+        }
+    }
+    let (base, rest) = name.rsplit_once(", ").or_else(|| name.rsplit_once(" / "))?;
+    Some((base, unit(rest)?))
+}
+
+fn unbracketed(text: &str) -> &str {
+    text.trim().trim_start_matches(['(', '[', '{']).trim_end_matches([')', ']', '}'])
+}
+
+/// Whether a row holds units: each field is one or empty, one at least is.
+pub(crate) fn are_units<'a>(fields: impl Iterator<Item = &'a str>) -> bool {
+    let mut any = false;
+    for field in fields {
+        match unit(unbracketed(field)) {
+            None => return false,
+            Some(unit) => any |= !unit.is_empty(),
+        }
+    }
+    any
+}
+
+/// How likely a name is that of the time, 0 first; none where it is not.
+pub(crate) fn time_rank(name: &str) -> Option<usize> {
+    let name = plain(name);
+    TIMES.iter().position(|time| *time == name)
+}
+
+/// What a clock called `name` is the clock of: `imu` for `imu_t`, `t_imu`, `imu/time_s`; empty for a clock that says nothing.
+#[cfg(any(test, feature = "npz", feature = "mat", feature = "hdf5"))]
+pub(crate) fn clock_of(name: &str) -> Option<String> {
+    let (group, last) = name.rsplit_once(['/', '.']).unwrap_or(("", name));
+    let within = |tag: &str| match (group, tag) {
+        (group, "") => group.to_owned(),
+        ("", tag) => tag.to_owned(),
+        (group, tag) => format!("{group}/{tag}"),
+    };
+    let last = plain(last);
+    if time_rank(&last).is_some() {
+        return Some(within(""));
+    }
+    let (mut best, mut tag) = (0, None);
+    for time in TIMES {
+        let tail = last.strip_suffix(time).and_then(|tag| tag.strip_suffix('_'));
+        let head = last.strip_prefix(time).and_then(|tag| tag.strip_prefix('_'));
+        // `us` and `ms` beside a name are units of something else.
+        let found = tail.or(head).filter(|_| !matches!(time, "us" | "ms"));
+        if let Some(found) = found.filter(|f| !f.is_empty() && time.len() > best) {
+            (best, tag) = (time.len(), Some(found));
+        }
+    }
+    tag.map(within)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{are_units, clock_of, tidy, time_rank};
+
+    #[test]
+    fn units_come_out_of_brackets_and_rows() {
+        for (name, below, tidied) in [
+            ("Pos (mm)", None, Some("pos_mm")),
+            ("force[N]", None, Some("force_n")),
+            ("Knee Angle [°]", None, Some("knee_angle_deg")),
+            ("Acc X (m/s^2)", None, Some("acc_x_m_per_s2")),
+            ("Weg / mm", None, Some("weg_mm")),
+            ("Pos", Some("mm"), Some("pos_mm")),
+            ("pos_mm", Some("[mm]"), Some("pos_mm")),
+            ("ratio (-)", None, Some("ratio")),
+            ("pos (raw)", None, None),
+            ("pos_mm", None, None),
+            ("s2", Some(""), None),
+        ] {
+            assert_eq!(tidy(name, below).as_deref(), tidied, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_row_of_units_is_one() {
+        assert!(are_units(["s", "mm", "[N]", ""].into_iter()));
+        assert!(!are_units(["", "", "-"].into_iter()));
+        assert!(!are_units(["s", "oops"].into_iter()));
+    }
+
+    #[test]
+    fn clocks_say_whose_they_are() {
+        for (name, of) in [
+            ("t", Some("")),
+            ("imu_t", Some("imu")),
+            ("t_imu", Some("imu")),
+            ("imu/time_s", Some("imu")),
+            ("arm.imu_time_s", Some("arm/imu")),
+            ("length_mm", None),
+            ("status", None),
+            ("current_ms", None),
+        ] {
+            assert_eq!(clock_of(name).as_deref(), of, "{name}");
+        }
+        assert!(time_rank("Time") < time_rank("Timestamp"));
+    }
+}

@@ -1,0 +1,265 @@
+//! One row of whatever dialect: comments, separators, decimal commas, time stamps.
+
+use std::borrow::Cow;
+
+use stretch_data::shown;
+
+use crate::{
+    stamps::{looks_like_stamp, nanoseconds},
+    text::row::{Fault, Field, Role, RowFault, field, number, numbers},
+};
+
+/// Longest whole number that is read as floating point: this project writes none longer, and clocks of nanoseconds are.
+const EXACT_DIGITS: usize = 17;
+/// Separator that stands for runs of blanks and tabs.
+pub(crate) const BLANKS: u8 = b' ';
+
+/// What stands between a number's whole part and its fraction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Mark {
+    /// No number had a fraction yet.
+    Open,
+    Point,
+    Comma,
+}
+
+/// How a row's time is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Clock {
+    /// No row came yet.
+    Open,
+    Number,
+    /// As dates; the first of them, ns.
+    Stamps(Option<i128>),
+    /// As whole numbers that 64 bits of floating point cannot hold; the first of them.
+    Counts(Option<i128>),
+}
+
+/// How the rows of a table are written, as far as the rows so far tell.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Dialect {
+    pub(crate) delimiter: u8,
+    time: Option<usize>,
+    mark: Mark,
+    clock: Clock,
+    is_plain: bool,
+}
+
+impl Dialect {
+    /// Rows between `delimiter`s, the time in column `time`.
+    pub(crate) fn new(delimiter: u8, time: Option<usize>) -> Self {
+        // A comma between columns cannot stand in numbers, too.
+        let mark = if delimiter == b',' { Mark::Point } else { Mark::Open };
+        Self { delimiter, time, mark, clock: Clock::Open, is_plain: false }
+    }
+
+    /// Whether the time comes in stamps; it then counts seconds from the first.
+    pub(crate) fn has_stamps(&self) -> bool {
+        matches!(self.clock, Clock::Stamps(_))
+    }
+
+    /// The first stamp, ns.
+    pub(crate) fn first_stamp(&self) -> Option<i128> {
+        if let Clock::Stamps(first) = self.clock { first } else { None }
+    }
+
+    /// The first of counts that are too long for a floating-point number; the time counts from it.
+    pub(crate) fn first_count(&self) -> Option<i128> {
+        if let Clock::Counts(first) = self.clock { first } else { None }
+    }
+
+    /// Whether numbers have decimal commas.
+    pub(crate) fn has_commas(&self) -> bool {
+        self.mark == Mark::Comma
+    }
+
+    /// Reads a row into `out`; false where the line is a comment.
+    #[inline]
+    pub(crate) fn parse(
+        &mut self,
+        line: &[u8],
+        roles: &[Role],
+        out: &mut [f64],
+    ) -> Result<bool, RowFault> {
+        if is_comment(line) {
+            return Ok(false);
+        }
+        if self.is_plain {
+            return numbers(line, self.delimiter, roles, out).map(|()| true);
+        }
+        self.learn(line);
+        self.is_plain =
+            self.delimiter != BLANKS && self.mark == Mark::Point && self.clock == Clock::Number;
+        self.parse_loosely(line, roles, out).map(|()| true)
+    }
+
+    /// What this row tells that no row before it did.
+    fn learn(&mut self, line: &[u8]) {
+        let Some(cells) = cells(line, self.delimiter) else { return };
+        if self.clock == Clock::Open {
+            let cell = self.time.and_then(|i| cells.get(i)).map(|cell| text(cell));
+            let is_stamp = cell.is_some_and(|cell| looks_like_stamp(&cell));
+            let is_number = |cell: &[u8]| number(&with_point(cell)).is_ok();
+            self.clock = match self.time.and_then(|i| cells.get(i)) {
+                Some(cell) if is_stamp && !is_number(cell) => Clock::Stamps(None),
+                Some(cell) if cell.len() > EXACT_DIGITS && whole(cell).is_some() => {
+                    Clock::Counts(None)
+                }
+                _ => Clock::Number,
+            };
+        }
+        if self.mark == Mark::Open {
+            let marked = cells.iter().find_map(|cell| match number(cell) {
+                Ok(_) => cell.contains(&b'.').then_some(Mark::Point),
+                Err(Fault::DecimalComma(_)) => Some(Mark::Comma),
+                Err(_) => None,
+            });
+            self.mark = marked.unwrap_or(Mark::Open);
+        }
+    }
+
+    fn parse_loosely(
+        &mut self,
+        line: &[u8],
+        roles: &[Role],
+        out: &mut [f64],
+    ) -> Result<(), RowFault> {
+        let cells = cells(line, self.delimiter).ok_or_else(|| broken(line, self.delimiter))?;
+        if cells.len() != roles.len() {
+            return Err(RowFault::Ragged { found: cells.len(), expected: roles.len() });
+        }
+        for (column, (cell, &role)) in cells.iter().zip(roles).enumerate() {
+            let value = match (role, self.clock) {
+                (Role::Skipped, _) => Ok(f64::NAN),
+                (_, Clock::Stamps(first)) if Some(column) == self.time => self.stamp(cell, first),
+                (_, Clock::Counts(first)) if Some(column) == self.time => self.count(cell, first),
+                _ => self.number(cell),
+            };
+            out[column] = match value {
+                Ok(value) => value,
+                // Two notations in one file: nobody knows which numbers are which.
+                Err(fault @ Fault::DecimalPoint(_)) => {
+                    return Err(RowFault::Field { column, fault });
+                }
+                Err(_) if role == Role::Welcome => f64::NAN,
+                Err(fault) => return Err(RowFault::Field { column, fault }),
+            };
+        }
+        Ok(())
+    }
+
+    fn stamp(&mut self, cell: &[u8], first: Option<i128>) -> Result<f64, Fault> {
+        let ns = nanoseconds(&text(cell)).ok_or_else(|| Fault::Stamp(shown(cell)))?;
+        let first = first.unwrap_or(ns);
+        self.clock = Clock::Stamps(Some(first));
+        Ok((ns - first) as f64 / 1e9)
+    }
+
+    fn count(&mut self, cell: &[u8], first: Option<i128>) -> Result<f64, Fault> {
+        let count = whole(cell).ok_or_else(|| Fault::NotANumber(shown(cell)))?;
+        let first = first.unwrap_or(count);
+        self.clock = Clock::Counts(Some(first));
+        Ok((count - first) as f64)
+    }
+
+    fn number(&self, cell: &[u8]) -> Result<f64, Fault> {
+        match self.mark {
+            Mark::Comma if cell.contains(&b'.') && number(cell).is_ok() => {
+                Err(Fault::DecimalPoint(shown(cell)))
+            }
+            Mark::Comma if cell.contains(&b',') => {
+                number(&with_point(cell)).map_err(|_| Fault::NotANumber(shown(cell)))
+            }
+            _ => number(cell),
+        }
+    }
+}
+
+/// A line that people wrote for people.
+pub(crate) fn is_comment(line: &[u8]) -> bool {
+    // Nearly every line begins with a digit or a sign.
+    match line.first() {
+        Some(b'0'..=b'9' | b'-' | b'+' | b'.') | None => false,
+        Some(_) => {
+            let line = line.trim_ascii_start();
+            line.starts_with(b"#") || line.starts_with(b"%") || line.starts_with(b"//")
+        }
+    }
+}
+
+/// The cells of a line; none where its quotation marks do not pair up.
+pub(crate) fn cells(line: &[u8], delimiter: u8) -> Option<Vec<Cow<'_, [u8]>>> {
+    let (mut cells, mut at) = (Vec::new(), 0);
+    let blank = |b: &&u8| matches!(b, b' ' | b'\t');
+    loop {
+        if delimiter == BLANKS {
+            at += line[at..].iter().take_while(blank).count();
+            if at == line.len() {
+                return Some(cells);
+            }
+            let is_quoted = line[at] == b'"';
+            let length = match is_quoted {
+                true => 2 + memchr::memchr(b'"', &line[at + 1..])?,
+                false => line[at..].iter().take_while(|b| !blank(b)).count(),
+            };
+            let cell = &line[at..at + length];
+            let content = if is_quoted { cell[1..length - 1].trim_ascii() } else { cell };
+            cells.push(Cow::Borrowed(content));
+            at += length;
+            continue;
+        }
+        let end = match field(line, at, delimiter) {
+            Field::Plain(content, end) => {
+                cells.push(Cow::Borrowed(content));
+                end
+            }
+            Field::Quoted(content, end) => {
+                cells.push(Cow::Owned(content.trim_ascii().to_vec()));
+                end
+            }
+            Field::Broken => return None,
+        };
+        if end >= line.len() {
+            return Some(cells);
+        }
+        at = end + 1;
+    }
+}
+
+/// The first cell whose quotation marks do not pair up.
+fn broken(line: &[u8], delimiter: u8) -> RowFault {
+    let (mut column, mut at) = (0, 0);
+    while let Field::Plain(_, end) | Field::Quoted(_, end) = field(line, at, delimiter) {
+        if end >= line.len() {
+            break;
+        }
+        (column, at) = (column + 1, end + 1);
+    }
+    RowFault::Field { column, fault: Fault::Quote }
+}
+
+/// Whether a cell is a number in either notation, or a time stamp.
+pub(crate) fn is_value(cell: &[u8], delimiter: u8) -> bool {
+    let with_commas = delimiter != b',' && number(&with_point(cell)).is_ok();
+    with_commas || number(cell).is_ok() || looks_like_stamp(&text(cell))
+}
+
+/// A whole number, which may be long; not so long that a difference of two is too long.
+fn whole(cell: &[u8]) -> Option<i128> {
+    text(cell).parse().ok().filter(|n: &i128| n.unsigned_abs() < 1 << 100)
+}
+
+fn with_point(cell: &[u8]) -> Cow<'_, [u8]> {
+    match memchr::memchr(b',', cell) {
+        None => Cow::Borrowed(cell),
+        Some(at) => {
+            let mut pointed = cell.to_vec();
+            pointed[at] = b'.';
+            Cow::Owned(pointed)
+        }
+    }
+}
+
+fn text(cell: &[u8]) -> Cow<'_, str> {
+    String::from_utf8_lossy(cell)
+}

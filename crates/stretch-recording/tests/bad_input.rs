@@ -1,0 +1,261 @@
+//! Every way in which a file can be wrong, and the sentence that says so.
+
+use std::io::{self, Read};
+
+use stretch_data::Trial;
+use stretch_recording::{ReadOptions, Recording, RecordingError, RowReader};
+
+fn read(text: impl AsRef<[u8]>) -> Result<Trial, RecordingError> {
+    let options = ReadOptions::new().require("bridge_v");
+    Recording::from_reader(text.as_ref(), "t.csv", &options).map(|recording| recording.trial)
+}
+
+#[track_caller]
+fn says(text: impl AsRef<[u8]>, message: &str) {
+    let error = read(text).expect_err("it is wrong");
+    assert_eq!(error.to_string(), message, "{error:?}");
+}
+
+#[test]
+fn files_that_are_not_there_or_hold_nothing() {
+    let error = Recording::read("no/such.csv", &ReadOptions::new()).expect_err("no file");
+    assert_eq!(error.to_string(), "no/such.csv: cannot open it: No such file or directory");
+    assert!(!error.is_row());
+    let empty = "t.csv: the file is empty; it needs a header line with the names of its columns, \
+                 then a row a sample";
+    says("", empty);
+    says("\u{feff}\r\n\n", empty);
+    says(
+        "time_s,bridge_v\n",
+        "t.csv: there is a header line and no sample below it; record the trial again or leave \
+         the file out",
+    );
+    says(
+        "0,1.5\n0.1,1.6\n",
+        "t.csv: the first line (\"0,1.5\") holds numbers and no names; put a header line above \
+         it, such as time_s,length_mm,bridge_v, or name the columns with --columns",
+    );
+}
+
+#[test]
+fn columns() {
+    says(
+        "time_s,brdige_v,s1\n0,1,2\n",
+        "t.csv: there is no column bridge_v (did you mean brdige_v?); the columns are time_s, \
+         brdige_v, s1",
+    );
+    says("x,bridge_v\n0,1\n", "t.csv: there is no column time_s; the columns are x, bridge_v");
+    says(
+        "time_s,bridge_v,bridge_v\n0,1,1\n",
+        "t.csv: the header names column bridge_v twice; rename or remove one of them",
+    );
+}
+
+#[test]
+fn line_ends_of_another_age() {
+    says(
+        "time_s,bridge_v\r0,1\r0.1,2\r",
+        "t.csv, row 1, column 2: the name \"bridge_v\u{fffd}0\" holds a control character; if the \
+         lines end in CR alone, save the file with LF",
+    );
+}
+
+#[test]
+fn fields() {
+    says(
+        "time_s,bridge_v\n0,1\n0.1,oops\n",
+        "t.csv, row 3, column bridge_v: \"oops\" is not a number; correct it or remove that row",
+    );
+    // A column that the format knows is held to it even where nobody requires it.
+    says(
+        "time_s,bridge_v,length_mm\n0,1,180mm\n",
+        "t.csv, row 2, column length_mm: \"180mm\" is not a number; correct it or remove that row",
+    );
+    for value in ["NaN", "-inf", "1e999", "\"Infinity\""] {
+        let shown = value.trim_matches('"');
+        says(
+            format!("bridge_v,time_s\n1,0\n{value},1\n"),
+            &format!(
+                "t.csv, row 3, column bridge_v: \"{shown}\" is not a finite number; correct it \
+                 or remove that row"
+            ),
+        );
+    }
+    says(
+        "time_s,bridge_v\n0,\n",
+        "t.csv, row 2, column bridge_v: the field is empty; fill it in or remove that row",
+    );
+    says(
+        "time_s,bridge_v\n0,\"1,5\"\n",
+        "t.csv, row 2, column bridge_v: \"1,5\" has a decimal comma; export the file again with \
+         decimal points",
+    );
+    says(
+        "time_s,bridge_v\n0,\"1\n",
+        "t.csv, row 2, column bridge_v: the quotation marks do not pair up within the line; \
+         remove or double them",
+    );
+    says(
+        format!("time_s,bridge_v\n0,{}\n", "x".repeat(5000)),
+        &format!(
+            "t.csv, row 2, column bridge_v: \"{}...\" is not a number; correct it or remove that row",
+            "x".repeat(40)
+        ),
+    );
+}
+
+#[test]
+fn bytes_that_are_no_text() {
+    says(
+        b"time_s,bridge_v\n0,1\xb0\n",
+        "t.csv, row 2, column bridge_v: \"1\\xb0\" is not UTF-8 text; save the file with the \
+         encoding UTF-8",
+    );
+    says(
+        b"time_s,bridge_v,T_\xb0C\n0,1,2\n",
+        "t.csv, row 1, column 3: \"T_\\xb0C\" is not UTF-8 text; save the file with the \
+         encoding UTF-8",
+    );
+    let utf16: Vec<u8> =
+        "\u{feff}time_s,bridge_v\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+    assert!(matches!(read(utf16), Err(RecordingError::NotUtf8 { .. })));
+    // A control character never reaches the terminal.
+    let error = read("time_s,bridge_v\n0,\u{1b}[2J\n").expect_err("no number").to_string();
+    assert!(!error.contains('\u{1b}'), "{error:?}");
+}
+
+#[test]
+fn rows_and_time() {
+    says(
+        "time_s,bridge_v\n\n0,1\n0.1\n",
+        "t.csv, row 4: there are 1 fields where the header has 2; complete or remove that row",
+    );
+    says(
+        "time_s,bridge_v\n0,1,7,8\n",
+        "t.csv, row 2: there are 4 fields where the header has 2; complete or remove that row",
+    );
+    says(
+        "time_s,bridge_v\n0.5,1\n0.25,1\n",
+        "t.csv, row 3, column time_s: time goes back from 0.5 to 0.25; time must rise from row \
+         to row: sort the rows or split the recordings",
+    );
+    says(
+        "time_s,bridge_v\n0.5,1\n0.5,1\n",
+        "t.csv, row 3, column time_s: time stands still from 0.5 to 0.5; time must rise from row \
+         to row: sort the rows or split the recordings",
+    );
+}
+
+/// A gigabyte without a line end, which counts what is taken from it.
+struct Endless {
+    left: u64,
+    head: &'static [u8],
+}
+
+impl Read for Endless {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        if !self.head.is_empty() {
+            return self.head.read(out);
+        }
+        let count = (out.len() as u64).min(self.left);
+        self.left -= count;
+        out[..count as usize].fill(b'7');
+        Ok(count as usize)
+    }
+}
+
+#[test]
+fn a_line_of_a_gigabyte_is_refused_after_a_piece_of_it() {
+    for head in [&b""[..], b"time_s,bridge_v\n0,1\n"] {
+        let mut stream = Endless { left: 1 << 30, head };
+        let error = Recording::from_reader(&mut stream, "t.csv", &ReadOptions::new());
+        let error = error.expect_err("too long");
+        let row = if head.is_empty() { 1 } else { 3 };
+        assert_eq!(
+            error.to_string(),
+            format!(
+                "t.csv, row {row}: the line is longer than 65536 bytes; this is not a table of \
+                 samples with a line each"
+            )
+        );
+        assert!(stream.left > (1 << 30) - (1 << 20), "it read {} bytes", (1 << 30) - stream.left);
+    }
+}
+
+#[test]
+fn what_other_programs_write_is_understood() {
+    for text in [
+        "\u{feff}time_s,bridge_v\r\n0,1.5\r\n1,2.5\r\n",
+        "bridge_v;time_s\n1.5;0\n2.5;1",
+        "\"time_s\"\t\"bridge_v\"\n0\t1.5\n\n1\t2.5\n\n",
+        " time_s , bridge_v \n 0 , +1.5 \n 1 , \"2.5\" \n",
+        "time_s,note,bridge_v,\n0,\"a, \"\"b\"\"\",1.5,\n1,x,25e-1,\n",
+        "time_s,bridge_v,s1,s2\n0,1.5,1,NaN\n1,2.5,,7\n",
+    ] {
+        let trial = read(text).unwrap_or_else(|e| panic!("{text:?}: {e}"));
+        assert_eq!(trial.time_s, [0.0, 1.0], "{text:?}");
+        assert_eq!(trial.channel("bridge_v"), Some(&[1.5, 2.5][..]), "{text:?}");
+        assert_eq!(trial.channels.len(), 1, "{text:?}: the others hold something else");
+    }
+}
+
+#[test]
+fn a_stream_survives_its_rows() {
+    let long = "9".repeat(100_000);
+    let text = format!(
+        "time_s,note,bridge_v\n0,a,1\n1,b,two\n2,c\n3,d,4\n{long}\n\n3,e,5\n1,f,6\n2,\",\",7"
+    );
+    let options = ReadOptions::new().require("bridge_v");
+    let mut rows = RowReader::new(text.as_bytes(), "live", &options).expect("a header");
+    assert_eq!(rows.columns().collect::<Vec<_>>(), ["time_s", "note", "bridge_v"]);
+    let mut seen = Vec::new();
+    while let Some(row) = rows.next_row() {
+        seen.push(match row {
+            Ok(row) => format!("{} {} {}", row.row, row.time_s, row.values[0]),
+            Err(error) => {
+                assert!(error.is_row());
+                format!("{} {}", if error.is_time() { "time:" } else { "row:" }, error)
+                    .chars()
+                    .take(22)
+                    .collect()
+            }
+        });
+    }
+    assert_eq!(
+        seen,
+        [
+            "2 0 1",
+            "row: live, row 3, colu",
+            "row: live, row 4: ther",
+            "5 3 4",
+            "row: live, row 6: the ",
+            "time: live, row 8, col",
+            "time: live, row 9, col",
+            "10 2 7",
+        ]
+    );
+}
+
+#[test]
+fn a_stream_answers_each_line_before_it_asks_for_more() {
+    /// Fails when it is asked for more than its lines.
+    struct Lines(Vec<&'static [u8]>);
+    impl Read for Lines {
+        fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+            if self.0.is_empty() {
+                return Err(io::ErrorKind::BrokenPipe.into());
+            }
+            let line = self.0.remove(0);
+            out[..line.len()].copy_from_slice(line);
+            Ok(line.len())
+        }
+    }
+    let stream = Lines(vec![b"time_s,v\n", b"0,1\n", b"1,", b"2\n"]);
+    let options = ReadOptions::new().require("v");
+    let mut rows = RowReader::new(stream, "live", &options).expect("a header");
+    assert_eq!(rows.next_row().expect("a row").expect("good").values, [1.0]);
+    assert_eq!(rows.next_row().expect("a row").expect("good").values, [2.0]);
+    let error = rows.next_row().expect("an error").expect_err("the stream broke");
+    assert!(!error.is_row());
+    assert!(rows.next_row().is_none());
+}

@@ -1,0 +1,9 @@
+//! The tests of stretch-recording from outside, one program: linking takes longer than most of them.
+
+mod bad_input;
+mod corpus;
+mod data_sets;
+mod dialects;
+mod found;
+mod recordings;
+mod round_trips;

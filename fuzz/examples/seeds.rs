@@ -104,6 +104,8 @@ fn write() -> Done {
         put("log_of_record", name, &[bytes.clone(), rows(3, 80)].concat())?;
         put("export_record", name, &[vec![2], bytes.clone()].concat())?;
         put("calibration_record", name, &bytes)?;
+        // the release before wrote schema 1, without a seal
+        put("calibration_record", &format!("{name}.schema_1"), &[&[1], &bytes[1..]].concat())?;
         put(
             "calibration_record",
             &format!("{name}.json"),

@@ -60,7 +60,7 @@ pub fn calibration_from_json(text: &str, name: &str) -> Result<Calibration, Cali
 /// None for a calibration: all of its numbers are finite.
 pub fn calibration_to_json(calibration: &Calibration) -> Result<String, CalibrateError> {
     let problem = |problem| CalibrateError::Record { file: "record".to_owned(), problem };
-    let object = serde_json::to_string_pretty(&current(calibration.clone()));
+    let object = serde_json::to_string_pretty(calibration);
     let object = object.map_err(|error| problem(error.to_string()))?;
     digest::join(&object).ok_or_else(|| problem("it is no object".to_owned()))
 }
@@ -74,7 +74,7 @@ pub fn calibration_to_json(calibration: &Calibration) -> Result<String, Calibrat
 /// None for a calibration: there is room for the largest.
 pub fn calibration_seal(calibration: &Calibration) -> Result<u32, CalibrateError> {
     let mut buffer = [0; POSTCARD_BYTES];
-    let bytes = record::store(&current(calibration.clone()), &mut buffer)?;
+    let bytes = record::store(calibration, &mut buffer)?;
     Ok(record::seal(bytes)?.unwrap_or_default())
 }
 
@@ -110,7 +110,7 @@ pub fn calibration_bytes(
 ) -> Result<Vec<u8>, CalibrateError> {
     if is_postcard(path) {
         let mut buffer = [0; POSTCARD_BYTES];
-        return Ok(record::store(&current(calibration.clone()), &mut buffer)?.to_vec());
+        return Ok(record::store(calibration, &mut buffer)?.to_vec());
     }
     Ok(calibration_to_json(calibration)?.into_bytes())
 }
@@ -128,7 +128,7 @@ fn read(path: &Path, seal: Seal) -> Result<Calibration, CalibrateError> {
     }
     // the parts, so that a message can name the field
     let spec = record::load::<CalibrationSpec>(&bytes);
-    let made = spec.and_then(Calibration::new).map(current);
+    let made = spec.and_then(Calibration::new);
     made.map_err(|e| problem(format!("{UNUSABLE}: {e}")))
 }
 
@@ -141,8 +141,8 @@ fn from_json(text: &str, name: &str, seal: Seal) -> Result<Calibration, Calibrat
     };
     let (object, found) = digest::split(text);
     let mut json = serde_json::Deserializer::from_str(&object);
-    let parsed: Result<Calibration, _> = serde_path_to_error::deserialize(&mut json);
-    let calibration = parsed.map_err(|error| {
+    let parsed: Result<CalibrationSpec, _> = serde_path_to_error::deserialize(&mut json);
+    let spec = parsed.map_err(|error| {
         let field = error.path().to_string();
         let cause = error.into_inner();
         unusable(if field == "." { cause.to_string() } else { format!("in {field}: {cause}") })
@@ -161,17 +161,12 @@ fn from_json(text: &str, name: &str, seal: Seal) -> Result<Calibration, Calibrat
             )));
         }
         // schema 1 had none
-        None if calibration.schema != Schema::CURRENT => {}
+        None if spec.schema != Schema::CURRENT => {}
         None => {
             return Err(unusable(format!("it has no digest as its last field; {advice}")));
         }
     }
-    Ok(current(calibration))
-}
-
-/// The same under today's schema, whose fields are those of the earlier one.
-fn current(calibration: Calibration) -> Calibration {
-    calibration.under_current_schema()
+    Calibration::new(spec).map_err(|error| unusable(error.to_string()))
 }
 
 /// What a record of any kind is.

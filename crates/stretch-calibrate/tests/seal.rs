@@ -134,6 +134,9 @@ fn records_of_schema_1_are_read_and_sealed_when_asked() {
     let folder = tempfile::tempdir().unwrap();
     for calibration in kinds() {
         let (json, bytes) = of_schema_1(&calibration);
+        // whichever way a record comes in
+        assert_eq!(serde_json::from_str::<Calibration>(&json).unwrap(), calibration);
+        assert_eq!(record::load::<Calibration>(&bytes).unwrap(), calibration);
         for (name, content) in [("cal.json", json.as_bytes()), ("cal.postcard", &bytes)] {
             let path = folder.path().join(name);
             fs::write(&path, content).unwrap();

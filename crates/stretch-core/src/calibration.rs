@@ -177,9 +177,13 @@ impl Calibration {
     /// reading that is not. Numbers with a unit are up to 1e9, those that are divided by from 1e-9,
     /// rates 1e-3 to 1e7 Hz.
     ///
+    /// The schema says how a record was written, which is no part of what is calibrated: from here on it is
+    /// [`Schema::CURRENT`], whose fields are those of schema 1.
+    ///
     /// # Errors
     /// [`DesignError`] that names the field.
-    pub fn new(spec: CalibrationSpec) -> Result<Self, DesignError> {
+    pub fn new(mut spec: CalibrationSpec) -> Result<Self, DesignError> {
+        spec.schema = Schema::CURRENT;
         if let Target::Contraction { rest_length } = spec.target {
             DesignError::check("target.rest_length", rest_length, rest_length > 0.0)?;
         }
@@ -188,13 +192,6 @@ impl Calibration {
         spec.model.validate()?;
         check_sizes(&spec)?;
         Ok(Self(spec))
-    }
-
-    /// The same record under the schema that this release writes: its fields are those of schema 1.
-    #[must_use]
-    pub fn under_current_schema(mut self) -> Self {
-        self.0.schema = Schema::CURRENT;
-        self
     }
 
     /// The parts, to change and check again.

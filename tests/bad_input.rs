@@ -3,7 +3,7 @@
 
 use std::fs::File;
 
-use crate::support::{Scratch, calibrate, fails, stdout, stretch};
+use crate::support::{Scratch, calibrate, fails, program, stdout, stretch};
 
 #[track_caller]
 fn refused(text: &str, parts: &[&str]) {
@@ -173,7 +173,8 @@ fn a_full_disk_leaves_nothing_half_written() {
     let script =
         "trap '' XFSZ; ulimit -f 8; exec \"$0\" apply --calibration \"$1\" \"$2\" --out \"$3\"";
     let output = std::process::Command::new("bash")
-        .args(["-c", script, env!("CARGO_BIN_EXE_stretch")])
+        .args(["-c", script])
+        .arg(program())
         .args([&calibration, &trial, &scratch.path("out.csv")])
         .output()
         .unwrap();

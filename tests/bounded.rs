@@ -2,7 +2,7 @@
 
 use std::{fmt::Write as _, fs, path::Path, process::Command};
 
-use crate::support::Scratch;
+use crate::support::{Scratch, program};
 
 /// A log of a muscle that goes up and down, and a gauge that follows it.
 fn log(path: &Path, rows: u32, step_s: f64) {
@@ -17,7 +17,7 @@ fn log(path: &Path, rows: u32, step_s: f64) {
 
 /// Whether a command succeeds, and what it says on standard error.
 fn told(scratch: &Scratch, arguments: &[&str]) -> (bool, String) {
-    let mut program = Command::new(env!("CARGO_BIN_EXE_stretch"));
+    let mut program = Command::new(program());
     let out = program.current_dir(scratch.path("")).args(arguments).output().unwrap();
     (out.status.success(), String::from_utf8_lossy(&out.stderr).into_owned())
 }
@@ -29,7 +29,7 @@ fn a_long_log_is_calibrated_on_in_the_memory_of_a_block() {
     // 300 MB of data; as a whole the log takes a third more
     let limited = "ulimit -d 300000; exec \"$0\" calibrate long.csv --out cal.json";
     let mut shell = Command::new("sh");
-    shell.current_dir(scratch.path("")).args(["-c", limited, env!("CARGO_BIN_EXE_stretch")]);
+    shell.current_dir(scratch.path("")).args(["-c", limited]).arg(program());
     let out = shell.output().unwrap();
     let said = String::from_utf8_lossy(&out.stdout);
     assert!(out.status.success(), "{said}{}", String::from_utf8_lossy(&out.stderr));

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::support::{Scratch, fails, prints, runs, stretch};
+use crate::support::{Scratch, fails, prints, program, runs, stretch};
 use approx::assert_abs_diff_eq;
 use assert_cmd::Command;
 use serde_json::Value;
@@ -322,7 +322,7 @@ fn ctrl_c_leaves_nothing_half_written() {
     let folder = bench(&scratch, "bench", &[]);
     let out = scratch.path("out");
     fs::create_dir(&out).unwrap();
-    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_stretch"))
+    let mut child = std::process::Command::new(program())
         .args(["diagnose", "--threads", "1"])
         .arg(&folder)
         .arg("--json-out")

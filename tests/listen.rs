@@ -11,7 +11,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::support::{Scratch, calibrate, runs};
+use crate::support::{Scratch, calibrate, program, runs};
 use rustix::{
     process::{Pid, Signal, kill_process},
     pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt},
@@ -101,7 +101,7 @@ impl Listener {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("cal.json"), record).unwrap();
         let master = plug(&Self::port(folder.path()));
-        let mut child = Command::new(env!("CARGO_BIN_EXE_stretch"))
+        let mut child = Command::new(program())
             .current_dir(folder.path())
             .args(["listen", "--port", "port", "--calibration", "cal.json", "--out", "trial.csv"])
             .stdin(Stdio::null())
@@ -399,7 +399,7 @@ fn standard_input_ends_with_its_stream_and_a_record_is_never_overwritten() {
     fs::write(folder.path().join("cal.json"), calibration).unwrap();
     let frames = board(50);
     let run = |out: &str| {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_stretch"))
+        let mut child = Command::new(program())
             .current_dir(folder.path())
             .args(["listen", "--port", "-", "--calibration", "cal.json", "--out", out])
             .stdin(Stdio::piped())
@@ -439,7 +439,7 @@ fn on_a_terminal_it_plots() {
         termios::tcsetwinsize(&file, size).unwrap();
         file
     };
-    let mut child = Command::new(env!("CARGO_BIN_EXE_stretch"))
+    let mut child = Command::new(program())
         .current_dir(folder.path())
         .args(["listen", "--port", "port", "--calibration", "cal.json"])
         .env("TERM", "xterm")

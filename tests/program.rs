@@ -6,7 +6,7 @@ use std::{
     time::Duration,
 };
 
-use crate::support::{Scratch, calibrate, stdout, stretch};
+use crate::support::{Scratch, calibrate, program, stdout, stretch};
 use serde_json::Value;
 
 #[test]
@@ -138,7 +138,7 @@ fn convert_renames_and_scales() {
 fn live_each_line_is_answered_as_it_comes() {
     let scratch = Scratch::new();
     let calibration = scratch.calibration("cal.json");
-    let mut child = Command::new(env!("CARGO_BIN_EXE_stretch"))
+    let mut child = Command::new(program())
         .args(["apply", "--calibration"])
         .arg(&calibration)
         .arg("-")
@@ -173,7 +173,7 @@ fn ctrl_c_ends_a_recording_and_keeps_what_came() {
     let scratch = Scratch::new();
     let calibration = scratch.calibration("cal.json");
     let out = scratch.path("live.csv");
-    let mut child = Command::new(env!("CARGO_BIN_EXE_stretch"))
+    let mut child = Command::new(program())
         .args(["apply", "--calibration"])
         .arg(&calibration)
         .arg("-")
@@ -204,7 +204,7 @@ fn ctrl_c_in_the_middle_leaves_no_partial_file() {
     let fifo = scratch.path("pipe.csv");
     assert!(Command::new("mkfifo").arg(&fifo).status().unwrap().success());
     let before = scratch.names();
-    let child = Command::new(env!("CARGO_BIN_EXE_stretch"))
+    let child = Command::new(program())
         .args(["apply", "--calibration"])
         .arg(&calibration)
         .arg(&fifo)

@@ -13,7 +13,7 @@ use std::{
     time::Duration,
 };
 
-use crate::support::Scratch;
+use crate::support::{Scratch, program};
 use stretch_calibrate::calibration_to_json;
 use stretch_link::Frame;
 use stretch_receptor::{
@@ -96,7 +96,7 @@ fn run(scratch: &Scratch, (line, input): (&str, Option<&str>), out: End, err: En
     let close =
         |end: End, n: u8| if end == End::Closed { format!(" {n}>&-") } else { String::new() };
     let script = format!("exec \"$@\"{}{}", close(out, 1), close(err, 2));
-    command.args(["-c", &script, "sh", env!("CARGO_BIN_EXE_stretch")]).args(line.split(' '));
+    command.args(["-c", &script, "sh"]).arg(program()).args(line.split(' '));
     let stdin = match input {
         Some(name) => File::open(scratch.path(name)).unwrap().into(),
         None => Stdio::null(),
@@ -175,7 +175,7 @@ fn a_recording_does_not_wait_for_a_reader_that_does_not_read() {
     // more than a pipe holds
     let rows = 5000;
     scratch.write("frames", frames(rows));
-    let mut child = Command::new(env!("CARGO_BIN_EXE_stretch"))
+    let mut child = Command::new(program())
         .current_dir(scratch.path(""))
         .args(["listen", "--port", "frames", "--calibration", "board.json", "--out", "trial.csv"])
         .stdin(Stdio::null())

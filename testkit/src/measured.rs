@@ -11,16 +11,20 @@ pub fn root() -> PathBuf {
     env::var_os("STRETCH_DATA").map_or_else(beside, PathBuf::from)
 }
 
-/// The folder of one data set; none, and a line that says so, where it is not there.
+/// The folder of one data set. A test that asks for it is `#[ignore]`d: `./ci.sh` runs it where the data are.
 ///
+/// # Panics
+/// Where it is not there, with what to do.
+///
+/// ```should_panic
+/// testkit::measured::folder("nobody_recorded_this");
 /// ```
-/// assert_eq!(testkit::measured::folder("nobody_recorded_this"), None);
-/// ```
-pub fn folder(name: &str) -> Option<PathBuf> {
-    folder_in(&root(), name)
+pub fn folder(name: &str) -> PathBuf {
+    let folder = folder_in(&root(), name);
+    folder.unwrap_or_else(|| panic!("no {name}: STRETCH_DATA names the folder that holds it"))
 }
 
-/// The same below another folder than [`root`].
+/// The folder of one data set below another folder than [`root`]; none, and a line that says so, where it is not there.
 pub fn folder_in(root: &Path, name: &str) -> Option<PathBuf> {
     let folder = root.join(name);
     let found = folder.is_dir();

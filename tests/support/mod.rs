@@ -12,9 +12,16 @@ use std::{
 use assert_cmd::Command;
 use tempfile::TempDir;
 
+/// The program's path: the one that was built with the tests, or what `STRETCH_PROGRAM` names, which is a release build where
+/// `./ci.sh` runs the slow ones.
+pub(crate) fn program() -> PathBuf {
+    std::env::var_os("STRETCH_PROGRAM")
+        .map_or_else(|| env!("CARGO_BIN_EXE_stretch").into(), PathBuf::from)
+}
+
 /// The program.
 pub(crate) fn stretch() -> Command {
-    Command::new(env!("CARGO_BIN_EXE_stretch"))
+    Command::new(program())
 }
 
 /// A folder that goes with the test.

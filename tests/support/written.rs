@@ -51,7 +51,7 @@ pub(crate) fn prepared() -> Scratch {
 }
 
 pub(crate) fn command(scratch: &Scratch, line: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_stretch"));
+    let mut command = Command::new(super::program());
     command.current_dir(scratch.path("")).args(line.split(' '));
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     command

@@ -214,10 +214,7 @@ fn a_pipe_is_written_to_and_one_without_a_reader_is_refused() {
     use std::process::Command;
     let folder = tempfile::tempdir().expect("a folder");
     let pipe = folder.path().join("pipe");
-    if !Command::new("mkfifo").arg(&pipe).status().is_ok_and(|status| status.success()) {
-        println!("SKIPPED: there is no mkfifo");
-        return;
-    }
+    assert!(Command::new("mkfifo").arg(&pipe).status().is_ok_and(|status| status.success()));
     let error = write_whole(&pipe, |out| out.write_all(b"x")).expect_err("nobody reads");
     assert!(error.to_string().contains("a pipe that nobody reads"), "{error}");
     let read = std::thread::spawn({

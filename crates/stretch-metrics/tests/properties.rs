@@ -1,5 +1,4 @@
 //! What must hold for any signals.
-#![cfg(feature = "proptest")]
 
 use approx::{assert_abs_diff_eq, relative_eq};
 use proptest::prelude::*;

@@ -437,39 +437,3 @@ fn a_swapped_pair_and_a_foreign_signal_get_no_name() {
     let d = run(&foreign, &[]);
     assert!(d.named.is_empty() && d.verdict == VerdictKind::Unknown, "{}", d.sentence);
 }
-
-/// A table for whoever wants to see them all: `cargo test -p stretch-gap --test gauge -- --ignored --nocapture`.
-#[test]
-#[ignore = "a table, not a check"]
-fn table() {
-    for count in [3, 1] {
-        for (fault, name, _) in FAULTS {
-            for strength in [0.1, 0.3, 1.0] {
-                for seed in [11, 12] {
-                    let d = run(&trials(fault, strength, count, seed), &[]);
-                    let best = d.candidates.first();
-                    println!(
-                        "{count} trials, {fault:?} ({name}) at {strength}, seed {seed}: {:?} {:?} of {:?}, gap {:.2} -> {:.2}, shares {:?}",
-                        d.verdict,
-                        d.named,
-                        d.ambiguous,
-                        best.map_or(0.0, |c| c.gap_before),
-                        best.map_or(0.0, |c| c.gap_after),
-                        d.shares
-                            .iter()
-                            .map(|s| format!("{} {:.2}", s.effect, s.closes))
-                            .collect::<Vec<_>>(),
-                    );
-                }
-            }
-        }
-    }
-    for seed in 0..10 {
-        let d = run(&trials(Fault::None, 0.0, if seed < 5 { 3 } else { 1 }, seed), &[]);
-        println!("null {seed}: {:?} {:?}", d.verdict, d.named);
-    }
-    for seed in 0..3 {
-        let d = run(&trials(Fault::DirectionStep, 1.0, 3, seed), &[]);
-        println!("direction {seed}: {:?} {:?} {}", d.verdict, d.named, d.sentence);
-    }
-}

@@ -91,13 +91,20 @@ fn diagnosed(command: &[&str], jobs: usize) -> Diagnosis {
     diagnosis
 }
 
-fn has_numpy() -> bool {
-    let has = Command::new("python3").args(["-c", "import numpy"]).output();
-    has.is_ok_and(|out| out.status.success())
+#[test]
+fn a_worker_in_c_is_diagnosed() {
+    let in_c = in_c();
+    assert_eq!(in_c.named, ["brake"], "{}", in_c.sentence);
 }
 
 #[test]
-fn a_worker_in_c_and_one_in_python_diagnose_to_the_same_bits() {
+#[ignore = "needs python3 with NumPy; ./ci.sh runs it"]
+fn with_numpy_a_worker_in_c_and_one_in_python_diagnose_to_the_same_bits() {
+    assert_eq!(in_c(), diagnosed(&["python3", "servo.py"], 2));
+}
+
+/// The servo of the examples, built by the compiler that Rust links with.
+fn in_c() -> Diagnosis {
     let folder = tempfile::tempdir().unwrap();
     let servo = folder.path().join("servo");
     let built = Command::new("cc")
@@ -105,18 +112,8 @@ fn a_worker_in_c_and_one_in_python_diagnose_to_the_same_bits() {
         .arg(&servo)
         .arg(examples().join("servo.c"))
         .status();
-    if !built.is_ok_and(|status| status.success()) {
-        println!("SKIPPED: there is no C compiler cc");
-        return;
-    }
-    let in_c = diagnosed(&[servo.to_str().unwrap()], 2);
-    assert_eq!(in_c.named, ["brake"], "{}", in_c.sentence);
-    if !has_numpy() {
-        println!("SKIPPED: there is no python3 with NumPy");
-        return;
-    }
-    let in_python = diagnosed(&["python3", "servo.py"], 2);
-    assert_eq!(in_c, in_python);
+    assert!(built.is_ok_and(|status| status.success()), "the servo does not compile");
+    diagnosed(&[servo.to_str().unwrap()], 2)
 }
 
 /// What a worker that is a few lines of Python answers to one ask.
@@ -146,20 +143,9 @@ def begin(**more):
     Ok(workers.simulate_many(&[ask]))
 }
 
-fn has_python() -> bool {
-    let has = Command::new("python3").arg("--version").output();
-    let has = has.is_ok_and(|out| out.status.success());
-    if !has {
-        println!("SKIPPED: there is no python3");
-    }
-    has
-}
-
 #[test]
-fn what_a_worker_does_wrong_is_told_with_its_last_lines() {
-    if !has_python() {
-        return;
-    }
+#[ignore = "needs python3; ./ci.sh runs it"]
+fn with_python_what_a_worker_does_wrong_is_told_with_its_last_lines() {
     let outputs = "receive(); send({'kind': 'outputs', 'models': [{'samples': 2}]}, struct.pack('<2d', 1, 2))";
     let cases = [
         ("begin(); receive(); raise ValueError('no such gear')", "no such gear"),
@@ -184,10 +170,8 @@ fn what_a_worker_does_wrong_is_told_with_its_last_lines() {
 }
 
 #[test]
-fn a_worker_that_dies_once_is_started_anew() {
-    if !has_python() {
-        return;
-    }
+#[ignore = "needs python3; ./ci.sh runs it"]
+fn with_python_a_worker_that_dies_once_is_started_anew() {
     let folder = tempfile::tempdir().unwrap();
     let mark = folder.path().join("died");
     let script = format!(
@@ -197,10 +181,8 @@ fn a_worker_that_dies_once_is_started_anew() {
 }
 
 #[test]
-fn a_worker_that_does_not_fit_is_refused_at_its_hello() {
-    if !has_python() {
-        return;
-    }
+#[ignore = "needs python3; ./ci.sh runs it"]
+fn with_python_a_worker_that_does_not_fit_is_refused_at_its_hello() {
     let cases = [
         ("begin(units={'angle_deg': 'rad'})", "column angle_deg in rad, the problem in deg"),
         ("begin(parameters=['gain'])", "it has no parameter tau; it has gain"),

@@ -164,6 +164,9 @@ step "the blind check's own tests"
 step "Python package"
 CARGO_TARGET_DIR=$target python/gate.sh
 
+step "challenge, a workspace of its own"
+challenge/gate.sh
+
 step "the reports' script, in a browser"
 STRETCH=$target/release/stretch web/gate.sh
 spare web/target

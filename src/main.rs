@@ -140,6 +140,13 @@ fn explain(told: &clap::Error) -> ExitCode {
         display::fail(meant);
         return ExitCode::from(2);
     }
+    let is_command = told.kind() == ArgumentError::InvalidSubcommand;
+    if is_command && arguments.get(1).is_some_and(|command| command == "blind") {
+        display::fail(
+            "the blind check is a program of its own: cargo run --release --manifest-path challenge/Cargo.toml -- --cases 100",
+        );
+        return ExitCode::from(2);
+    }
     match told.print() {
         _ if told.use_stderr() => ExitCode::from(2),
         Err(error) if error.kind() != ErrorKind::BrokenPipe => ExitCode::FAILURE,

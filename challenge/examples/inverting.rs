@@ -1,11 +1,11 @@
-//! What a calibration is worth that uses the diagnosis, beside one that is told the truth:
+//! What a calibration gains that uses the diagnosis, beside one that knows the truth:
 //! `cargo run --release --manifest-path challenge/Cargo.toml --example inverting -- FOLDER [CASES]`.
 //!
 //! FOLDER holds sealed cases (`challenge make`). Of them the first CASES (20) are taken whose effects are one to three of the sensing
 //! stage with an excess of 5 or more. Each is calibrated on its fit trials with the published method, poly13, the observer and
 //! on what a diagnosis of the gauge alone names, and judged on its test trials.
 //!
-//! The **oracle** is told the true effects, their numbers from fit and test trials together, and inverts them with a thousand particles: what is
+//! The **oracle** knows the true effects, their numbers from fit and test trials together, and inverts them with a thousand particles: what is
 //! left of its error no filter of that motion prior could know.
 
 use std::path::Path;
@@ -26,7 +26,7 @@ type Failure = Box<dyn std::error::Error + Send + Sync>;
 /// Cases unless said otherwise, and the least excess of one.
 const CASES: usize = 20;
 const LEAST_EXCESS: f64 = 5.0;
-/// Densities of the rate's wandering that the oracle tries, in 1/s^3; the best on the test trials counts.
+/// Densities of the random walk of the rate that the oracle tries, in 1/s^3; the best on the test trials counts.
 const AGILITIES: [f64; 3] = [3.0, 30.0, 300.0];
 /// Particles of the oracle.
 const PARTICLES: usize = 1000;
@@ -95,12 +95,12 @@ fn row(folder: &Path, name: &str, label: &Label) -> Result<Row, Failure> {
     let own = built(named.clone());
     let found = |name: &String| named.iter().find(|c| c.effect == *name).cloned();
     let truth = |name: &String| found(name).unwrap_or_else(|| Cause::new(name, &[]));
-    let told = built(label.effects.iter().map(truth).collect());
+    let known = built(label.effects.iter().map(truth).collect());
     let both: Vec<Trial> = fit.iter().chain(&test).cloned().collect();
-    let oracle = match told.causes.is_empty() {
+    let oracle = match known.causes.is_empty() {
         true => [f64::NAN; 2],
         false => {
-            let calibration = calibrate(&both, &told)?.calibration;
+            let calibration = calibrate(&both, &known)?.calibration;
             let all: Result<Vec<Errors>, Failure> =
                 AGILITIES.iter().map(|a| oracle(&calibration, *a, &test)).collect();
             let least = |kind: usize| {
@@ -152,7 +152,7 @@ fn errors(calibration: &Calibration, trials: &[Trial]) -> Result<Errors, Failure
     Ok([mean(false), mean(true)])
 }
 
-/// The same of a filter of particles on a map that was told everything.
+/// The errors of a particle filter on a map that was fitted with the true effects.
 fn oracle(calibration: &Calibration, agility: f64, trials: &[Trial]) -> Result<Errors, Failure> {
     let mut sums = [(0.0, 0.0); 2];
     for trial in trials {
@@ -194,7 +194,7 @@ fn particles(calibration: &Calibration, agility: f64, trial: &Trial) -> Result<V
         true => -map.steady_s * (-map.skew_s / map.steady_s).exp_m1(),
         false => map.skew_s,
     };
-    let mut dice = Dice::new(7, 0);
+    let mut random = Dice::new(7, 0);
     let pressures = trial.channel("pressure_kpa");
     let pressure = |i: usize| pressures.map_or(0.0, |p| p[i]);
     let volts = trial.require("bridge_v")?;
@@ -213,8 +213,8 @@ fn particles(calibration: &Calibration, agility: f64, trial: &Trial) -> Result<V
         let v = polarity.sign() * level.step(&mut baseline, polarity.sign() * v, 0.0);
         let mut total = 0.0;
         for (particle, weight) in cloud.iter_mut().zip(&mut weights) {
-            let leap = if dice.unit() < LEAPS { LEAP } else { 1.0 };
-            particle.rate = kept * particle.rate + leap * wander * dice.gauss();
+            let leap = if random.unit() < LEAPS { LEAP } else { 1.0 };
+            particle.rate = kept * particle.rate + leap * wander * random.gauss();
             particle.y = (particle.y + dt_s * particle.rate).clamp(range.min, range.max);
             let drive = defects.advance(&mut particle.defects, particle.y, pressure(i));
             let apart = (v - on_curve(map, drive)) / map.noise;
@@ -227,7 +227,7 @@ fn particles(calibration: &Calibration, agility: f64, trial: &Trial) -> Result<V
         let y = calibration.target_range.denormalise(mean);
         estimates.push(calibration.target.to_reference(y));
         if 1.0 / weights.iter().map(|w| w * w).sum::<f64>() < 0.5 * PARTICLES as f64 {
-            cloud = resampled(&cloud, &weights, dice.unit());
+            cloud = resampled(&cloud, &weights, random.unit());
             weights.fill(1.0 / PARTICLES as f64);
         }
     }
@@ -262,18 +262,18 @@ fn print(rows: &[Row]) {
         "| case | effects | named by the gauge alone | published | poly13 | observer | diagnosed | oracle |"
     );
     println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
-    let told = |e: &Errors| format!("{:.3} / {:.3}", e[0], e[1]);
+    let shown = |e: &Errors| format!("{:.3} / {:.3}", e[0], e[1]);
     for row in rows {
         println!(
             "| {} | {} | {} | {} | {} | {} | {} | {} |",
             row.name,
             row.effects,
             row.named,
-            told(&row.published),
-            told(&row.poly13),
-            told(&row.observer),
-            row.diagnosed.as_ref().map_or("-".into(), told),
-            told(&row.oracle)
+            shown(&row.published),
+            shown(&row.poly13),
+            shown(&row.observer),
+            row.diagnosed.as_ref().map_or("-".into(), shown),
+            shown(&row.oracle)
         );
     }
     type Of = fn(&Row) -> Option<Errors>;

@@ -14,7 +14,7 @@ const SOFT: [f64; 6] = [0.2, 0.3, 0.45, 0.7, 1.0, 1.5];
 const ODDS: [f64; 6] = [0.05, 0.1, 0.165, 0.3, 0.55, 1.0];
 /// Room for rigs that no generator of ours made: `unknown` begins at this many times the greatest gap of a null that was called so.
 const ROOM: f64 = 1.5;
-/// Excess below which nothing is called unknown: floors are known to a twentieth.
+/// Excess below which nothing is called unknown: the noise is known to a twentieth.
 const LEAST_UNKNOWN: f64 = 0.05;
 /// What a false `unknown` costs, in overlooked ones.
 const DEAR: f64 = 3.0;
@@ -83,7 +83,7 @@ fn probabilities(cases: &[&Case]) -> (f64, f64) {
     (round(t), round(rho))
 }
 
-/// Excess and share of it that mismatch of form may leave, between cases that an effect explains and those that none does.
+/// Excess (reduced chi-square minus one) and share of it that model discrepancy may leave, between cases that an effect explains and those that none does.
 fn unknowns(cases: &[&Case]) -> (f64, f64, f64, f64) {
     let is_counted = |label: &Label, d: &Diagnosis| {
         label.excess >= COUNTED_EXCESS && d.gap.retuned > Thresholds::frozen().null_excess
@@ -97,7 +97,7 @@ fn unknowns(cases: &[&Case]) -> (f64, f64, f64, f64) {
         match label.kind {
             CaseKind::Null => {
                 let is_called = d.verdict == VerdictKind::Unknown;
-                // What is told as noise has no gap to be called unknown.
+                // What is called noise has no gap to be called unknown.
                 nulls.push(if is_called { d.gap } else { Excess { left: 0.0, ..d.gap } });
             }
             CaseKind::OutOfCatalogue if is_counted(label, d) => foreign.push(d.gap),
@@ -126,14 +126,14 @@ fn unknowns(cases: &[&Case]) -> (f64, f64, f64, f64) {
         let sum: f64 = gaps.iter().map(|g| of(g, excess, share, SOFT[0])).sum();
         sum / gaps.len().max(1) as f64
     };
-    let worth = |excess: f64, share: f64| {
+    let gain = |excess: f64, share: f64| {
         called(&foreign, excess, share)
             - DEAR * (called(&explained, excess, share) + called(&nulls, excess, share))
     };
     let least = (ROOM * nulls.iter().map(|gap| gap.left).fold(0.0, f64::max)).max(LEAST_UNKNOWN);
     let excesses = (0..20).map(|i| least * 1.1_f64.powi(i));
     let grid = excesses.flat_map(|e| (0..50).map(move |i| (e, 0.004 * f64::from(i))));
-    let best = grid.max_by(|a, b| worth(a.0, a.1).total_cmp(&worth(b.0, b.1)));
+    let best = grid.max_by(|a, b| gain(a.0, a.1).total_cmp(&gain(b.0, b.1)));
     let (excess, share) = best.unwrap_or((0.1, 0.08));
     eprintln!(
         "called unknown: {:.3} of {} foreign, {:.3} of {} explained, {:.3} of {} nulls",

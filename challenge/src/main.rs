@@ -3,7 +3,7 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::Parser;
-use stretch_blind::{Clutter, Family, Plan, Protocol};
+use stretch_blind::{Disturbances, Family, Plan, Protocol};
 use stretch_challenge::{
     Asked, RunOptions, aligned, make_cases, on_ctrl_c, run_cases, say, score_answers,
     write_diagnosis,
@@ -14,7 +14,7 @@ use stretch_challenge::{
 ///   challenge --cases 360 --seed 7 --out check
 ///
 /// makes the cases, prints the hash of the sealed labels, diagnoses a copy of every case in a
-/// temporary folder and a process of its own that is not told where the labels are, and only then
+/// temporary folder and a process of its own that does not know where the labels are, and only then
 /// opens the seal, scores and writes a page. The cases come from a second simulator that shares no
 /// code with the first and draws other forms of every effect, and what is around each rig. The
 /// three steps can be run one by one; `run` goes on where it was stopped.
@@ -78,8 +78,8 @@ struct Make {
     #[arg(long, value_name = "NAME|all", default_value = "all", value_parser = family)]
     family: Families,
     /// Supply, noise, clock and pauses: plain is the same for every rig, drawn another for each
-    #[arg(long, value_name = "plain|drawn", default_value = "drawn", value_parser = clutter)]
-    clutter: Clutter,
+    #[arg(long, alias = "clutter", value_name = "plain|drawn", default_value = "drawn", value_parser = disturbances)]
+    disturbances: Disturbances,
     /// Trials of a session: paper, or paper+ with one more at 0.7 of the excitation
     #[arg(long, value_name = "paper|paper+", default_value = "paper", value_parser = protocol)]
     protocol: Protocol,
@@ -96,7 +96,7 @@ struct Diagnose {
     threads: usize,
     #[arg(long)]
     baselines: bool,
-    /// No further experiment is ever looked for; `stretch diagnose` is told so by this
+    /// No further experiment is ever looked for; `stretch diagnose` asks for that with this
     #[arg(long)]
     no_next: bool,
 }
@@ -123,8 +123,8 @@ fn family(name: &str) -> Result<Families, String> {
         .ok_or_else(|| format!("there are {}, all", known()))
 }
 
-fn clutter(name: &str) -> Result<Clutter, String> {
-    let found = Clutter::ALL.into_iter().find(|clutter| clutter.name() == name);
+fn disturbances(name: &str) -> Result<Disturbances, String> {
+    let found = Disturbances::ALL.into_iter().find(|disturbances| disturbances.name() == name);
     found.ok_or_else(|| "there are plain, drawn".to_owned())
 }
 
@@ -168,8 +168,8 @@ fn run(args: Args) -> anyhow::Result<()> {
 }
 
 fn made(make: &Make) -> anyhow::Result<()> {
-    let Make { family: Families(family), clutter, protocol, .. } = *make;
-    let plan = Plan { family, clutter, protocol, ..Plan::of(make.cases) };
+    let Make { family: Families(family), disturbances, protocol, .. } = *make;
+    let plan = Plan { family, disturbances, protocol, ..Plan::of(make.cases) };
     let seal = make_cases(&make.out, make.seed, &plan)?;
     let (cases, out) = (make.cases, make.out.display());
     say(format!("made {cases} cases in {out}; labels sealed, SHA-256 {}", seal.sha256()));

@@ -41,7 +41,7 @@ impl Room {
         Ok(Self { dir, folder })
     }
 
-    /// A command that runs in the folder and is told of no other.
+    /// A command that runs in the folder and knows of no other.
     pub(crate) fn command(&self, program: &Path) -> Command {
         let mut command = Command::new(program);
         command.current_dir(&self.folder).env("PWD", &self.folder).env_remove("OLDPWD");

@@ -18,7 +18,7 @@ use crate::{
 
 /// Why there is no answer.
 const REFUSAL: &str = "refusal.txt";
-/// What the diagnosis is told beside the data.
+/// What the diagnosis may know beside the data.
 const HINT: &str = "hint.toml";
 
 /// How the cases are diagnosed.

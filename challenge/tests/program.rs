@@ -123,6 +123,6 @@ fn counts_that_nobody_means_are_refused() {
     let asked = ["--cases", "99999999999"];
     fails(&mut challenge(scratch.path(), &asked), 2, "not a number of cases up to 100000");
     fails(&mut challenge(scratch.path(), &["--cases", "0"]), 1, "there is nothing to make");
-    fails(&mut challenge(scratch.path(), &[]), 1, "say how many cases");
+    fails(&mut challenge(scratch.path(), &[]), 2, "--cases");
     assert_eq!(fs::read_dir(scratch.path()).unwrap().count(), 0);
 }

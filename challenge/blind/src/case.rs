@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use crate::clutter::{Clutter, Surroundings};
-use crate::dice::Dice;
+use crate::disturbances::{Disturbances, Surroundings};
 use crate::effect::{Cause, Causes, Kind};
 use crate::error::BlindError;
 use crate::excess::Yardstick;
 use crate::family::Family;
 use crate::plan::{Order, Plan};
 use crate::protocol::{RATE_HZ, Script, session, with_pauses};
+use crate::random::RandomGenerator;
 use crate::rig::{L_STEP, LEAST_STRAIN, Rig, UNCERTAIN, V_FS, V_STEP};
 use crate::session::{Conditions, FINE, Trace, run};
 use crate::truth::{Acting, CaseKind, Label};
@@ -49,25 +49,25 @@ impl Case {
     ) -> Result<Self, BlindError> {
         // Streams of its own for every case: the order in which cases are made cannot matter.
         let base = 16 * (number as u64 + 1);
-        let mut protocol_dice = Dice::new(seed, base);
-        let mut rig_dice = Dice::new(seed, base + 1);
-        let mut effect_dice = Dice::new(seed, base + 2);
-        let mut noise_dice = Dice::new(seed, base + 3);
-        let mut clutter_dice = Dice::new(seed, base + 4);
-        let mut scripts = session(plan.protocol, &mut protocol_dice);
-        let around = match plan.clutter {
-            Clutter::Plain => Surroundings::plain(),
-            Clutter::Drawn => Surroundings::draw(&mut clutter_dice),
+        let mut protocol_random = RandomGenerator::new(seed, base);
+        let mut rig_random = RandomGenerator::new(seed, base + 1);
+        let mut effect_random = RandomGenerator::new(seed, base + 2);
+        let mut noise_random = RandomGenerator::new(seed, base + 3);
+        let mut disturbances_random = RandomGenerator::new(seed, base + 4);
+        let mut scripts = session(plan.protocol, &mut protocol_random);
+        let around = match plan.disturbances {
+            Disturbances::Plain => Surroundings::plain(),
+            Disturbances::Drawn => Surroundings::draw(&mut disturbances_random),
         };
         if let Some(drawn) = around.drawn {
-            scripts = with_pauses(scripts, || drawn.pause(&mut clutter_dice));
+            scripts = with_pauses(scripts, || drawn.pause(&mut disturbances_random));
         }
         for _ in 0..TRIES {
-            let rig = Rig::draw(&mut rig_dice);
-            let conditions = Conditions::draw(&scripts, &around, &mut rig_dice);
+            let rig = Rig::draw(&mut rig_random);
+            let conditions = Conditions::draw(&scripts, &around, &mut rig_random);
             let column = order.pressure_column;
             let mut yardstick = Yardstick::new(&rig, &scripts, &conditions, &around, column);
-            let chosen = choose(order, plan, &mut yardstick, &mut effect_dice);
+            let chosen = choose(order, plan, &mut yardstick, &mut effect_random);
             let causes = Causes::new(&chosen.iter().map(|c| c.0).collect::<Vec<_>>());
             let (excess, least) = match chosen.as_slice() {
                 [] => (0.0, f64::INFINITY),
@@ -77,12 +77,12 @@ impl Case {
                 continue;
             }
             let mut label = label(order, &rig, &chosen, excess);
-            label.clutter = around.facts();
+            label.disturbances = around.facts();
             let traces = run(&rig, &causes, &scripts, &conditions, FINE);
             let recordings =
                 scripts.iter().zip(traces).enumerate().map(|(trial, (script, trace))| {
                     let offsets = conditions.offsets(trial);
-                    record(script, trace, offsets, (&around, column), &mut noise_dice)
+                    record(script, trace, offsets, (&around, column), &mut noise_random)
                 });
             let recordings = recordings.collect();
             let noise = around.stated.then(|| around.noise.map(|noise| noise.sigma));
@@ -98,16 +98,16 @@ fn record(
     trace: Trace,
     offsets: &[f64],
     (around, pressure_column): (&Surroundings, bool),
-    dice: &mut Dice,
+    random: &mut RandomGenerator,
 ) -> Recording {
     let count = script.openings.len();
     let [p, l, v] = around.noise;
     let noisy = |values: &[f64], noise: Vec<f64>| -> Vec<f64> {
         values.iter().zip(noise).map(|(x, n)| x + n).collect()
     };
-    let pressure = noisy(&trace.pressure, p.samples(count, dice));
-    let length = noisy(&trace.length, l.samples(count, dice));
-    let volts = noisy(&trace.volts, v.samples(count, dice));
+    let pressure = noisy(&trace.pressure, p.samples(count, random));
+    let length = noisy(&trace.length, l.samples(count, random));
+    let volts = noisy(&trace.volts, v.samples(count, random));
     let shown = |v: f64| (v.clamp(0.0, V_FS) / V_STEP).round() * V_STEP;
     let stamped = around.drawn.is_some_and(|d| d.stamped) && !offsets.is_empty();
     let stamp = |(i, late): (usize, &f64)| i as f64 / RATE_HZ as f64 + late;
@@ -117,7 +117,7 @@ fn record(
         length_mm: length.iter().map(|l| (l / L_STEP).round() * L_STEP).collect(),
         bridge_v: volts.into_iter().map(shown).collect(),
         stamps: stamped.then(|| offsets.iter().enumerate().map(stamp).collect()),
-        missing: around.drawn.map_or_else(Vec::new, |d| d.missing(count, dice)),
+        missing: around.drawn.map_or_else(Vec::new, |d| d.missing(count, random)),
     }
 }
 
@@ -150,7 +150,7 @@ fn label(order: Order, rig: &Rig, chosen: &[(Cause, f64)], excess: f64) -> Label
             .collect(),
         parameters,
         family: order.family,
-        clutter: BTreeMap::new(),
+        disturbances: BTreeMap::new(),
     }
 }
 
@@ -159,7 +159,7 @@ fn choose(
     order: Order,
     plan: &Plan,
     yardstick: &mut Yardstick<'_>,
-    dice: &mut Dice,
+    random: &mut RandomGenerator,
 ) -> Vec<(Cause, f64)> {
     let Some(lead) = order.lead else { return Vec::new() };
     let (least, most) = plan.excess;
@@ -167,22 +167,24 @@ fn choose(
     match order.kind {
         CaseKind::Null => Vec::new(),
         CaseKind::Single | CaseKind::OutOfCatalogue | CaseKind::Struck => {
-            vec![tuned(Cause::draw(lead, family, dice), least, most, yardstick, dice)]
+            vec![tuned(Cause::draw(lead, family, random), least, most, yardstick, random)]
         }
         CaseKind::Compound => {
             // Each visible on its own, and neither drowned by the other.
-            let first = tuned(Cause::draw(lead, family, dice), 1.0, most.max(1.0), yardstick, dice);
+            let first =
+                tuned(Cause::draw(lead, family, random), 1.0, most.max(1.0), yardstick, random);
             let range = ((0.2 * first.1).max(0.5), 5.0 * first.1.max(1.0));
-            let other = companion(&[lead], family, range, yardstick, dice);
+            let other = companion(&[lead], family, range, yardstick, random);
             vec![first, other]
         }
         CaseKind::Dominant => {
-            let first = tuned(Cause::draw(lead, family, dice), 8.0, most.max(8.0), yardstick, dice);
+            let first =
+                tuned(Cause::draw(lead, family, random), 8.0, most.max(8.0), yardstick, random);
             let range = (0.02 * first.1, 0.12 * first.1);
             let mut kinds = vec![lead];
             let mut chosen = vec![first];
             while chosen.len() < 4 {
-                let small = companion(&kinds, family, range, yardstick, dice);
+                let small = companion(&kinds, family, range, yardstick, random);
                 kinds.push(small.0.kind);
                 chosen.push(small);
             }
@@ -197,25 +199,25 @@ fn companion(
     family: Family,
     range: (f64, f64),
     yardstick: &mut Yardstick<'_>,
-    dice: &mut Dice,
+    random: &mut RandomGenerator,
 ) -> (Cause, f64) {
     let mut last = None;
     for _ in 0..12 {
-        let cause = Cause::draw(partner(taken, dice), family, dice);
-        let found = tuned(cause, range.0, range.1, yardstick, dice);
+        let cause = Cause::draw(partner(taken, random), family, random);
+        let found = tuned(cause, range.0, range.1, yardstick, random);
         if found.1 >= range.0 / 1.5 && found.1 <= range.1 * 1.5 {
             return found;
         }
         last = Some(found);
     }
-    last.unwrap_or_else(|| (Cause::draw(partner(taken, dice), family, dice), 0.0))
+    last.unwrap_or_else(|| (Cause::draw(partner(taken, random), family, random), 0.0))
 }
 
 /// A kind of the catalogue that is not among those taken.
-fn partner(taken: &[Kind], dice: &mut Dice) -> Kind {
+fn partner(taken: &[Kind], random: &mut RandomGenerator) -> Kind {
     let free: Vec<Kind> =
         Kind::catalogued().iter().copied().filter(|kind| !taken.contains(kind)).collect();
-    dice.pick(&free)
+    random.pick(&free)
 }
 
 /// Sets the strength of a cause so that its excess is log-uniform between `low` and `high`, as
@@ -225,12 +227,12 @@ fn tuned(
     low: f64,
     high: f64,
     yardstick: &mut Yardstick<'_>,
-    dice: &mut Dice,
+    random: &mut RandomGenerator,
 ) -> (Cause, f64) {
     let mut measure = |strength: f64| yardstick.excess(&Causes::new(&[cause.at(strength)])).0;
     let spec = cause.kind.spec();
     let full = measure(cause.most());
-    let target = dice.log_between(low, high.min(full).max(1.01 * low));
+    let target = random.log_between(low, high.min(full).max(1.01 * low));
     if full <= target {
         return (cause, full);
     }
@@ -262,7 +264,7 @@ fn tuned(
             return (cause.at(spec.least), faintest);
         }
         // The excess jumps over the target (a threshold): any strength beyond the jump will do.
-        let strength = dice.log_between(strong.exp(), cause.most());
+        let strength = random.log_between(strong.exp(), cause.most());
         return (cause.at(strength), measure(strength));
     }
     best
@@ -276,19 +278,19 @@ mod tests {
 
     #[test]
     fn strengths_span_the_range_wanted_for_every_effect() {
-        let scripts = session(Protocol::Paper, &mut Dice::new(2, 1));
-        let mut dice = Dice::new(2, 2);
-        let rig = Rig::draw(&mut dice);
+        let scripts = session(Protocol::Paper, &mut RandomGenerator::new(2, 1));
+        let mut random = RandomGenerator::new(2, 2);
+        let rig = Rig::draw(&mut random);
         let around = Surroundings::plain();
-        let conditions = Conditions::draw(&scripts, &around, &mut dice);
+        let conditions = Conditions::draw(&scripts, &around, &mut random);
         let mut yardstick = Yardstick::new(&rig, &scripts, &conditions, &around, true);
         let kinds = Kind::catalogued().iter().filter(|&&k| k != Kind::ValveDeadband);
         for (i, &kind) in kinds.enumerate() {
             // Every family has its turn.
             let family = Family::ALL[i % Family::ALL.len()];
             for (low, high) in [(0.05, 0.06), (5.0, 6.0)] {
-                let cause = Cause::draw(kind, family, &mut dice);
-                let (tuned, excess) = tuned(cause, low, high, &mut yardstick, &mut dice);
+                let cause = Cause::draw(kind, family, &mut random);
+                let (tuned, excess) = tuned(cause, low, high, &mut yardstick, &mut random);
                 assert!(tuned.strength <= tuned.most());
                 let name = kind.spec().name;
                 // A factor of two, or the end of the range.

@@ -1,6 +1,6 @@
 //! A function of one variable as a table, and how smooth random ones are drawn.
 
-use crate::dice::Dice;
+use crate::random::RandomGenerator;
 
 /// Intervals of a table: the curve between its knots is the truth itself, not an approximation.
 const INTERVALS: usize = 240;
@@ -81,8 +81,8 @@ pub(crate) struct Wiggle(Vec<f64>);
 
 impl Wiggle {
     /// `knots` (at least 2) values of standard deviation `sd`.
-    pub(crate) fn draw(knots: usize, sd: f64, dice: &mut Dice) -> Self {
-        Self((0..knots.max(2)).map(|_| sd * dice.gauss()).collect())
+    pub(crate) fn draw(knots: usize, sd: f64, random: &mut RandomGenerator) -> Self {
+        Self((0..knots.max(2)).map(|_| sd * random.gauss()).collect())
     }
 
     /// Value at `x`.
@@ -101,8 +101,8 @@ pub(crate) fn hermite([a, b, c, d]: [f64; 4], t: f64) -> f64 {
 }
 
 /// Positive random weights that sum to 1; `sd` is that of their logarithms.
-pub(crate) fn weights(count: usize, sd: f64, dice: &mut Dice) -> Vec<f64> {
-    let raw: Vec<f64> = (0..count).map(|_| (sd * dice.gauss()).exp()).collect();
+pub(crate) fn weights(count: usize, sd: f64, random: &mut RandomGenerator) -> Vec<f64> {
+    let raw: Vec<f64> = (0..count).map(|_| (sd * random.gauss()).exp()).collect();
     let sum: f64 = raw.iter().sum();
     raw.into_iter().map(|w| w / sum).collect()
 }
@@ -130,12 +130,12 @@ mod tests {
 
     #[test]
     fn splines_pass_through_their_knots_and_weights_sum_to_one() {
-        let mut dice = Dice::new(1, 9);
-        let wiggle = Wiggle::draw(5, 1.0, &mut dice);
+        let mut random = RandomGenerator::new(1, 9);
+        let wiggle = Wiggle::draw(5, 1.0, &mut random);
         for (i, knot) in wiggle.0.iter().enumerate() {
             assert_abs_diff_eq!(wiggle.at(0.25 * i as f64), *knot, epsilon = BLIND_CURVE);
         }
-        let sum = weights(6, 1.0, &mut dice).iter().sum::<f64>();
+        let sum = weights(6, 1.0, &mut random).iter().sum::<f64>();
         assert_relative_eq!(sum, 1.0, epsilon = 0.0, max_relative = F64_ROUNDING);
     }
 }

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::dice::Dice;
 use crate::family::Family;
+use crate::random::RandomGenerator;
 
 /// Part of the rig that a cause acts in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -147,12 +147,12 @@ pub(crate) struct Cause {
 
 impl Cause {
     /// A form, a sign and the secondary parameters drawn; the strength still at its most.
-    pub(crate) fn draw(kind: Kind, family: Family, dice: &mut Dice) -> Self {
-        let form = dice.below(kind.spec().forms.len());
-        let negative = kind.spec().negative > 0.0 && dice.unit() < 0.5;
+    pub(crate) fn draw(kind: Kind, family: Family, random: &mut RandomGenerator) -> Self {
+        let form = random.below(kind.spec().forms.len());
+        let negative = kind.spec().negative > 0.0 && random.unit() < 0.5;
         let sign = if negative { -1.0 } else { 1.0 };
-        let aux = std::array::from_fn(|_| dice.unit());
-        let seed = dice.bits();
+        let aux = std::array::from_fn(|_| random.unit());
+        let seed = random.bits();
         let family = if kind.is_catalogued() { family } else { Family::Written };
         let mut cause = Self { kind, family, form, strength: 0.0, sign, aux, seed };
         cause.strength = cause.most();
@@ -170,8 +170,8 @@ impl Cause {
     }
 
     /// Random numbers of its form: the same at every strength.
-    pub(crate) fn dice(&self, purpose: u64) -> Dice {
-        Dice::new(self.seed, 1000 + purpose)
+    pub(crate) fn random(&self, purpose: u64) -> RandomGenerator {
+        RandomGenerator::new(self.seed, 1000 + purpose)
     }
 
     /// Greatest strength in the direction of its sign.

@@ -1,12 +1,12 @@
 //! Laws of the electrical side that are drawn: knees, static laws, settling, softening, filters.
 
 use crate::curve::Curve;
-use crate::dice::Dice;
 use crate::effect::{Cause, Causes, Kind};
 use crate::family::Family;
 use crate::filter::LowPass;
 use crate::knee::Knee;
 use crate::laws::{bump, path, rising, settling};
+use crate::random::RandomGenerator;
 
 /// Length of a session that a drift is tabled for, s.
 const SESSION_S: f64 = 735.0;
@@ -45,14 +45,14 @@ pub(crate) struct Softening {
 }
 
 impl Softening {
-    fn draw(family: Family, dice: &mut Dice) -> Self {
-        let law = settling(family, dice);
+    fn draw(family: Family, random: &mut RandomGenerator) -> Self {
+        let law = settling(family, random);
         let stretching = match family {
-            Family::Asymmetric => 2.0 * f64::from(u8::from(dice.unit() < 0.5)),
+            Family::Asymmetric => 2.0 * f64::from(u8::from(random.unit() < 0.5)),
             _ => 1.0,
         };
         let memory_s = match family {
-            Family::RateLaws => dice.log_between(500.0, 5000.0),
+            Family::RateLaws => random.log_between(500.0, 5000.0),
             _ => f64::INFINITY,
         };
         Self { law, travel: 0.0, stretching, memory_s }
@@ -71,16 +71,16 @@ impl Electric {
         let find = |kind| causes.find(kind).filter(Cause::is_drawn);
         Self {
             slack: find(Kind::SleeveSlack)
-                .map(|c| Knee::draw(c.family, 0.003, 0.04, &mut c.dice(1)).within(c.strength)),
+                .map(|c| Knee::draw(c.family, 0.003, 0.04, &mut c.random(1)).within(c.strength)),
             saturation: find(Kind::AmplifierSaturation).map(saturation),
-            crosstalk: find(Kind::PressureCrosstalk).map(|c| rising(c.family, &mut c.dice(1))),
-            nonlinearity: find(Kind::GaugeNonlinearity).map(|c| bump(c.family, &mut c.dice(1))),
-            drift: find(Kind::ThermalDrift).map(|c| path(c.family, &mut c.dice(1))),
-            heating: find(Kind::SelfHeating).map(|c| settling(c.family, &mut c.dice(1))),
+            crosstalk: find(Kind::PressureCrosstalk).map(|c| rising(c.family, &mut c.random(1))),
+            nonlinearity: find(Kind::GaugeNonlinearity).map(|c| bump(c.family, &mut c.random(1))),
+            drift: find(Kind::ThermalDrift).map(|c| path(c.family, &mut c.random(1))),
+            heating: find(Kind::SelfHeating).map(|c| settling(c.family, &mut c.random(1))),
             softening: find(Kind::GaugeSoftening)
-                .map(|c| Softening::draw(c.family, &mut c.dice(1))),
+                .map(|c| Softening::draw(c.family, &mut c.random(1))),
             lowpass: find(Kind::AmplifierLowpass)
-                .map(|c| LowPass::draw(c.family, c.strength, &mut c.dice(1))),
+                .map(|c| LowPass::draw(c.family, c.strength, &mut c.random(1))),
         }
     }
 
@@ -125,11 +125,11 @@ impl Electric {
 }
 
 fn saturation(c: Cause) -> Saturation {
-    let mut dice = c.dice(1);
-    let knee = Knee::draw(c.family, 0.008, 0.15, &mut dice).within(0.5 * c.strength);
+    let mut random = c.random(1);
+    let knee = Knee::draw(c.family, 0.008, 0.15, &mut random).within(0.5 * c.strength);
     let both = if c.family == Family::Asymmetric { 0.5 } else { 0.15 };
-    let (top, bottom) = match dice.unit() {
-        x if x < both => (Some(1.0), Some(dice.between(0.3, 0.9))),
+    let (top, bottom) = match random.unit() {
+        x if x < both => (Some(1.0), Some(random.between(0.3, 0.9))),
         x if x < both + 0.65 * (1.0 - both) => (Some(1.0), None),
         _ => (None, Some(1.0)),
     };

@@ -1,12 +1,12 @@
-//! How strong a case is: the excess over the floor that re-tuning the nominal rig would leave.
+//! How strong a case is: the excess over the noise that re-tuning the nominal rig would leave.
 
-use crate::clutter::Surroundings;
+use crate::disturbances::Surroundings;
 use crate::effect::{Causes, Stage};
 use crate::protocol::{Script, Split};
 use crate::rig::{L_0, L_STEP, Rig, UNCERTAIN, V_STEP};
 use crate::session::{COARSE, Conditions, Trace, run};
 
-/// Residuals and sensitivities of three channels (pressure, length, voltage), in floor units, for
+/// Residuals and sensitivities of three channels (pressure, length, voltage), in noise units, for
 /// samples to fit and samples to test on.
 type Channels = [Vec<f64>; 3];
 
@@ -19,7 +19,7 @@ pub(crate) struct Yardstick<'a> {
     pressure_column: bool,
     nominal: Vec<Trace>,
     moved: Vec<Option<Vec<Trace>>>,
-    floor: [f64; 3],
+    noise: [f64; 3],
 }
 
 impl<'a> Yardstick<'a> {
@@ -36,9 +36,9 @@ impl<'a> Yardstick<'a> {
         let slope = (rig.nominal_volts(full) - rig.nominal_volts(0.0)) / (full * L_0);
         // Length noise reaches the voltage of a gauge that is driven by the measured length.
         let volts = sigma_v.powi(2) + V_STEP.powi(2) / 12.0 + (slope * sigma_l).powi(2);
-        let floor = [sigma_p, (sigma_l.powi(2) + L_STEP.powi(2) / 12.0).sqrt(), volts.sqrt()];
+        let noise = [sigma_p, (sigma_l.powi(2) + L_STEP.powi(2) / 12.0).sqrt(), volts.sqrt()];
         let moved = vec![None; UNCERTAIN.len()];
-        Self { rig, scripts, conditions, pressure_column, nominal, moved, floor }
+        Self { rig, scripts, conditions, pressure_column, nominal, moved, noise }
     }
 
     /// Excess summed over the channels on the test trials, after the nominal parameters took up
@@ -79,14 +79,14 @@ impl<'a> Yardstick<'a> {
     fn join<F: Fn(&Trace, &Trace, usize) -> f64>(
         &self,
         truth: &[Trace],
-        floor: f64,
+        noise: f64,
         f: F,
     ) -> Vec<f64> {
         let pairs = truth.iter().zip(&self.nominal);
         pairs
             .flat_map(|(t, n)| {
                 let f = &f;
-                (0..t.length.len()).map(move |i| f(t, n, i) / floor)
+                (0..t.length.len()).map(move |i| f(t, n, i) / noise)
             })
             .collect()
     }
@@ -94,16 +94,16 @@ impl<'a> Yardstick<'a> {
     /// Every stage fed with its measured input: what the nominal rig leaves in each channel.
     fn residual(&self, truth: &[Trace]) -> Channels {
         let pressure = if self.pressure_column {
-            self.join(truth, self.floor[0], |t, n, i| t.pressure[i] - n.pressure[i])
+            self.join(truth, self.noise[0], |t, n, i| t.pressure[i] - n.pressure[i])
         } else {
             Vec::new()
         };
         let length = if self.pressure_column {
-            self.join(truth, self.floor[1], |t, _, i| t.length[i] - t.shadow[i])
+            self.join(truth, self.noise[1], |t, _, i| t.length[i] - t.shadow[i])
         } else {
-            self.join(truth, self.floor[1], |t, n, i| t.length[i] - n.length[i])
+            self.join(truth, self.noise[1], |t, n, i| t.length[i] - n.length[i])
         };
-        let volts = self.join(truth, self.floor[2], |t, _, i| {
+        let volts = self.join(truth, self.noise[2], |t, _, i| {
             t.volts[i] - self.rig.volts(1.0 - t.length[i] / L_0, t.excitation)
         });
         [pressure, length, volts]
@@ -126,7 +126,7 @@ impl<'a> Yardstick<'a> {
         let step = 0.25 * parameter.sd;
         if parameter.stage == Stage::Sensing {
             let rig = self.rig.moved(index, step);
-            let scale = 0.25 * self.floor[2];
+            let scale = 0.25 * self.noise[2];
             let volts = self.join(truth, scale, |t, _, i| {
                 let k = 1.0 - t.length[i] / L_0;
                 rig.volts(k, t.excitation) - self.rig.volts(k, t.excitation)
@@ -141,14 +141,14 @@ impl<'a> Yardstick<'a> {
         }
         let moved = self.moved[index].as_deref().unwrap_or_default();
         let pressure = if self.pressure_column {
-            self.join(moved, 0.25 * self.floor[0], |t, n, i| t.pressure[i] - n.pressure[i])
+            self.join(moved, 0.25 * self.noise[0], |t, n, i| t.pressure[i] - n.pressure[i])
         } else {
             Vec::new()
         };
         let length = if self.pressure_column && parameter.stage == Stage::Pneumatics {
             Vec::new()
         } else {
-            self.join(moved, 0.25 * self.floor[1], |t, n, i| t.length[i] - n.length[i])
+            self.join(moved, 0.25 * self.noise[1], |t, n, i| t.length[i] - n.length[i])
         };
         let total = self.nominal.iter().map(|t| t.length.len()).sum();
         let fill = |v: Vec<f64>| if v.is_empty() { vec![0.0; total] } else { v };

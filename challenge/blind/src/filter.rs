@@ -1,9 +1,9 @@
 //! Low passes drawn: of any order, with a kernel of any shape, of spread poles, or uneven.
 
 use crate::curve::weights;
-use crate::dice::Dice;
 use crate::family::Family;
 use crate::laws::sign;
+use crate::random::RandomGenerator;
 
 /// First-order lags in a row or side by side, and what of each is heard.
 #[derive(Debug, Clone)]
@@ -17,28 +17,28 @@ pub(crate) struct LowPass {
 
 impl LowPass {
     /// A filter whose mean delay is `delay` s.
-    pub(crate) fn draw(family: Family, delay: f64, dice: &mut Dice) -> Self {
+    pub(crate) fn draw(family: Family, delay: f64, random: &mut RandomGenerator) -> Self {
         let mut filter = match family {
             Family::Written => Self::of(vec![1.0], vec![1.0], true),
             // The kernel of four equal poles in a row, each heard with a weight of its own.
-            Family::Splines => Self::of(vec![1.0; 4], weights(4, 0.8, dice), true),
+            Family::Splines => Self::of(vec![1.0; 4], weights(4, 0.8, random), true),
             // Poles side by side over more than a decade.
             Family::Spectra => {
-                let count = 2 + dice.below(4);
-                let poles = (0..count).map(|_| dice.log_between(0.25, 4.0)).collect();
-                Self::of(poles, weights(count, 0.6, dice), false)
+                let count = 2 + random.below(4);
+                let poles = (0..count).map(|_| random.log_between(0.25, 4.0)).collect();
+                Self::of(poles, weights(count, 0.6, random), false)
             }
             // Two to four poles in a row, shared out at random.
             Family::RateLaws => {
-                let order = 2 + dice.below(3);
+                let order = 2 + random.below(3);
                 let mut taps = vec![0.0; order];
                 taps[order - 1] = 1.0;
-                Self::of(weights(order, 0.8, dice), taps, true)
+                Self::of(weights(order, 0.8, random), taps, true)
             }
             // Rises slower than it falls, or the other way round.
             Family::Asymmetric => {
                 let mut one = Self::of(vec![1.0], vec![1.0], true);
-                let ratio = dice.log_between(1.2, 1.8).powf(sign(dice)).sqrt();
+                let ratio = random.log_between(1.2, 1.8).powf(sign(random)).sqrt();
                 one.poles[0] = (ratio, 1.0 / ratio);
                 one
             }
@@ -92,17 +92,17 @@ mod tests {
 
     #[test]
     fn the_mean_delay_is_the_one_asked_for_and_none_is_no_filter() {
-        let mut dice = Dice::new(9, 3);
+        let mut random = RandomGenerator::new(9, 3);
         for family in Family::ALL {
             for _ in 0..20 {
-                let mut filter = LowPass::draw(family, 0.05, &mut dice);
+                let mut filter = LowPass::draw(family, 0.05, &mut random);
                 filter.push(0.0, 1e-4);
                 // Integral of 1 - step response; uneven ones rise with their own constant.
                 let delay: f64 = (0..40_000).map(|_| (1.0 - filter.push(1.0, 1e-4)) * 1e-4).sum();
                 let uneven =
                     if family == Family::Asymmetric { BLIND_UNEVEN_S } else { BLIND_DELAY_S };
                 assert!(abs_diff_eq!(delay, 0.05, epsilon = uneven), "{family} {delay}");
-                let mut none = LowPass::draw(family, 1e-9, &mut dice);
+                let mut none = LowPass::draw(family, 1e-9, &mut random);
                 none.push(0.0, 1e-3);
                 let passed = none.push(1.0, 1e-3);
                 assert!(abs_diff_eq!(passed, 1.0, epsilon = BLIND_NO_FILTER), "{family}");

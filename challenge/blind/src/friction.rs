@@ -2,9 +2,9 @@
 //! direction.
 
 use crate::curve::{Wiggle, weights};
-use crate::dice::Dice;
 use crate::family::Family;
 use crate::laws::sign;
+use crate::random::RandomGenerator;
 
 /// One play: share of the whole, reach when it rises and when it falls, where it stands.
 #[derive(Debug, Clone, Copy)]
@@ -35,26 +35,31 @@ pub(crate) struct Friction {
 
 impl Friction {
     /// A loop of a family; `sharp` ones turn within their reach, as a backlash does.
-    pub(crate) fn draw(family: Family, reach: f64, sharp: bool, dice: &mut Dice) -> Self {
+    pub(crate) fn draw(
+        family: Family,
+        reach: f64,
+        sharp: bool,
+        random: &mut RandomGenerator,
+    ) -> Self {
         let law = match family {
-            Family::RateLaws => Self::rate(sharp, dice),
-            _ => Law::Plays(plays(family, sharp, dice)),
+            Family::RateLaws => Self::rate(sharp, random),
+            _ => Law::Plays(plays(family, sharp, random)),
         };
         Self { law, reach, last: None }
     }
 
-    fn rate(sharp: bool, dice: &mut Dice) -> Law {
-        let dahl = dice.unit() < 0.5;
+    fn rate(sharp: bool, random: &mut RandomGenerator) -> Law {
+        let dahl = random.unit() < 0.5;
         let exponent = match (dahl, sharp) {
-            (true, true) => dice.between(0.3, 0.8),
-            (true, false) => dice.between(0.7, 2.0),
-            (false, true) => dice.between(2.0, 6.0),
-            (false, false) => dice.between(1.0, 2.5),
+            (true, true) => random.between(0.3, 0.8),
+            (true, false) => random.between(0.7, 2.0),
+            (false, true) => random.between(2.0, 6.0),
+            (false, false) => random.between(1.0, 2.5),
         };
-        let share = dice.between(0.5, 0.9);
-        let rest = if dice.unit() < 0.5 { dice.between(0.1, 0.4) } else { 0.0 };
+        let share = random.between(0.5, 0.9);
+        let rest = if random.unit() < 0.5 { random.between(0.1, 0.4) } else { 0.0 };
         // In reaches a second.
-        let speed = dice.log_between(2.0, 40.0);
+        let speed = random.log_between(2.0, 40.0);
         Law::Rate { dahl, exponent, share, rest, speed, z: 0.0 }
     }
 
@@ -96,36 +101,37 @@ impl Friction {
 }
 
 /// Plays whose shares sum to 1 and whose mean reach is 1.
-fn plays(family: Family, sharp: bool, dice: &mut Dice) -> Vec<Element> {
+fn plays(family: Family, sharp: bool, random: &mut RandomGenerator) -> Vec<Element> {
     let mut radii: Vec<(f64, f64)> = match family {
         // A density of radii that is a random spline.
         Family::Splines => {
             let (low, high) = if sharp { (0.6, 1.4) } else { (0.1, 2.2) };
-            let density = Wiggle::draw(4, 0.8, dice);
+            let density = Wiggle::draw(4, 0.8, random);
             let at = |i: usize| (i as f64 + 0.5) / 10.0;
             (0..10).map(|i| (low + (high - low) * at(i), density.at(at(i)).exp())).collect()
         }
         // A power law of radii, shaken.
         Family::Spectra => {
-            let decades = if sharp { dice.between(0.15, 0.4) } else { dice.between(0.7, 1.6) };
-            let power = dice.between(-0.4, 1.0);
-            let shaken = weights(8, 0.5, dice);
+            let decades = if sharp { random.between(0.15, 0.4) } else { random.between(0.7, 1.6) };
+            let power = random.between(-0.4, 1.0);
+            let shaken = weights(8, 0.5, random);
             let radius = |i: usize| 10f64.powf(decades * (i as f64 / 7.0 - 0.5));
             (0..8).map(|i| (radius(i), shaken[i] * radius(i).powf(-power))).collect()
         }
         _ => {
-            let spread = if sharp { 0.12 } else { dice.between(0.4, 0.9) };
+            let spread = if sharp { 0.12 } else { random.between(0.4, 0.9) };
             (0..5).map(|i| (10f64.powf(spread * (f64::from(i) / 4.0 - 0.5)), 0.2)).collect()
         }
     };
     let total: f64 = radii.iter().map(|r| r.1).sum();
     let mean: f64 = radii.iter().map(|r| r.0 * r.1).sum::<f64>() / total;
     radii.iter_mut().for_each(|r| *r = (r.0 / mean, r.1 / total));
-    let lean = if family == Family::Asymmetric { sign(dice) * dice.between(0.2, 0.5) } else { 0.0 };
+    let lean =
+        if family == Family::Asymmetric { sign(random) * random.between(0.2, 0.5) } else { 0.0 };
     radii
         .into_iter()
         .map(|(radius, share)| {
-            let own = lean * if lean == 0.0 { 0.0 } else { dice.between(0.7, 1.3) };
+            let own = lean * if lean == 0.0 { 0.0 } else { random.between(0.7, 1.3) };
             Element { share, up: radius * (1.0 + own), down: radius * (1.0 - own), at: 0.0 }
         })
         .collect()
@@ -139,11 +145,11 @@ mod tests {
 
     #[test]
     fn loops_start_elastic_turn_at_a_reversal_and_stay_within_their_reach() {
-        let mut dice = Dice::new(9, 1);
+        let mut random = RandomGenerator::new(9, 1);
         for family in &Family::ALL[1..] {
             for draw in 0..40 {
                 let sharp = draw % 2 == 0;
-                let mut one = Friction::draw(*family, 0.02, sharp, &mut dice);
+                let mut one = Friction::draw(*family, 0.02, sharp, &mut random);
                 one.push(0.0, 1e-3);
                 let early = one.push(1e-6, 1e-3);
                 let elastic = abs_diff_eq!(early, 1e-6, epsilon = BLIND_ELASTIC * 1e-6);

@@ -1,11 +1,11 @@
 //! Sleeve, gauge, bridge and amplifier, and the potentiometer beside them.
 
 use crate::curve::Curve;
-use crate::dice::Dice;
 use crate::effect::{Cause, Causes, Kind, Stage};
 use crate::electric::Electric;
 use crate::laws::bump;
 use crate::memory::{Lags, Loop, at_least};
+use crate::random::RandomGenerator;
 use crate::rig::{L_0, P_ATM, P_REF, Rig, V_STEP};
 use crate::timing::mains;
 
@@ -32,7 +32,7 @@ pub(crate) struct Gauge<'a> {
     slewed: Option<f64>,
     late: Vec<f64>,
     pickup: (f64, (f64, f64)),
-    contact: (bool, Dice),
+    contact: (bool, RandomGenerator),
     drawn: Electric,
     /// Share of the nominal excitation.
     excitation: f64,
@@ -58,7 +58,7 @@ impl<'a> Gauge<'a> {
             slewed: None,
             late: Vec::new(),
             pickup: (0.0, (0.0, 0.0)),
-            contact: (false, Dice::new(contact_seed, 7)),
+            contact: (false, RandomGenerator::new(contact_seed, 7)),
             drawn: Electric::of(causes),
             excitation: 1.0,
             causes: causes.clone(),
@@ -181,10 +181,10 @@ impl<'a> Gauge<'a> {
             ohm *= 1.0 + c.signed() * warm * self.excitation.powi(2);
         }
         if let Some(c) = self.causes.find(Kind::IntermittentContact) {
-            let (open, dice) = &mut self.contact;
+            let (open, random) = &mut self.contact;
             // Mean stay: 80 ms open, 1.5 s made.
             let leave = h / if *open { 0.08 } else { 1.5 };
-            if dice.unit() < leave {
+            if random.unit() < leave {
                 *open = !*open;
             }
             ohm *= 1.0 + if *open { c.strength } else { 0.0 };
@@ -270,14 +270,14 @@ pub(crate) fn hum(causes: &Causes, trial: usize, samples: usize, offsets: &[f64]
     if c.is_drawn() {
         return mains(c, trial, samples, offsets);
     }
-    let mut dice = Dice::new(c.seed, trial as u64);
+    let mut random = RandomGenerator::new(c.seed, trial as u64);
     let mains = if c.form == 0 { 50.0 } else { 60.0 };
-    let mut phase = dice.between(0.0, std::f64::consts::TAU);
-    let mut wander = 0.03 * dice.gauss();
+    let mut phase = random.between(0.0, std::f64::consts::TAU);
+    let mut wander = 0.03 * random.gauss();
     let h = 0.01_f64;
     (0..samples)
         .map(|i| {
-            wander += -wander * h / 20.0 + 0.03 * (2.0 * h / 20.0).sqrt() * dice.gauss();
+            wander += -wander * h / 20.0 + 0.03 * (2.0 * h / 20.0).sqrt() * random.gauss();
             phase += std::f64::consts::TAU * (mains + wander) * h;
             let late = offsets.get(i).map_or(0.0, |late| std::f64::consts::TAU * mains * late);
             let now = phase + late;
@@ -298,16 +298,16 @@ pub(crate) fn spoil_samples(causes: &Causes, trial: usize, volts: &mut [f64]) {
         }
     }
     if let Some(c) = causes.find(Kind::FrozenSamples) {
-        let mut dice = Dice::new(c.seed, 100 + trial as u64);
+        let mut random = RandomGenerator::new(c.seed, 100 + trial as u64);
         let mut held = 0.0;
         let mut left = 0usize;
         for v in volts.iter_mut() {
             if left > 0 {
                 *v = held;
                 left -= 1;
-            } else if dice.unit() < 0.004 {
+            } else if random.unit() < 0.004 {
                 held = *v;
-                left = (c.strength * 100.0 * (0.5 + dice.unit())).round() as usize;
+                left = (c.strength * 100.0 * (0.5 + random.unit())).round() as usize;
             }
         }
     }
@@ -328,7 +328,7 @@ impl<'a> Pot<'a> {
             rig,
             nonlinearity: causes
                 .find(Kind::PotNonlinearity)
-                .map(|c| (c, c.is_drawn().then(|| bump(c.family, &mut c.dice(1))))),
+                .map(|c| (c, c.is_drawn().then(|| bump(c.family, &mut c.random(1))))),
             backlash: causes.find(Kind::PotBacklash).map(|c| Loop::of(&c, c.strength, true)),
             stiction: causes.find(Kind::PotStiction).map(|c| (c.strength, None)),
         }

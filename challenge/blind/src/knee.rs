@@ -1,9 +1,9 @@
 //! Knees of any shape: what cannot fall below a floor, or almost cannot.
 
 use crate::curve::Curve;
-use crate::dice::Dice;
 use crate::family::Family;
 use crate::laws::rising;
+use crate::random::RandomGenerator;
 
 /// max(x, floor) whose slope goes from a small rest to 1 over a width, as a drawn law rises.
 #[derive(Debug, Clone)]
@@ -19,17 +19,17 @@ pub(crate) struct Knee {
 
 impl Knee {
     /// A knee with a half-width log-uniform between `low` and `high`.
-    pub(crate) fn draw(family: Family, low: f64, high: f64, dice: &mut Dice) -> Self {
-        let slope = rising(family, dice);
+    pub(crate) fn draw(family: Family, low: f64, high: f64, random: &mut RandomGenerator) -> Self {
+        let slope = rising(family, random);
         // Twice: u runs over an interval of length 2.
         let turn = slope.integral().times(2.0);
         let offset = 1.0 - turn.at(1.0);
         let rest = match family {
-            Family::RateLaws => dice.between(0.0, 0.06),
-            Family::Asymmetric if dice.unit() < 0.5 => dice.between(0.01, 0.08),
+            Family::RateLaws => random.between(0.0, 0.06),
+            Family::Asymmetric if random.unit() < 0.5 => random.between(0.01, 0.08),
             _ => 0.0,
         };
-        Self { turn, offset, width: dice.log_between(low, high), rest }
+        Self { turn, offset, width: random.log_between(low, high), rest }
     }
 
     /// The same knee, no wider than `most`.
@@ -60,10 +60,10 @@ mod tests {
 
     #[test]
     fn knees_are_continuous_and_monotone_and_leave_what_is_far_above() {
-        let mut dice = Dice::new(6, 1);
+        let mut random = RandomGenerator::new(6, 1);
         for family in Family::ALL {
             for _ in 0..40 {
-                let knee = Knee::draw(family, 0.01, 0.1, &mut dice);
+                let knee = Knee::draw(family, 0.01, 0.1, &mut random);
                 let mut last = knee.at_least(-1.0, 0.2);
                 assert!(last >= 0.2 - 0.08 * 1.2 - 1e-12);
                 for i in 1..=4000 {

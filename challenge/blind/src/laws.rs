@@ -1,28 +1,28 @@
 //! Static laws drawn from function spaces: rising ones, bumps, paths, and damping.
 
 use crate::curve::{Curve, Wiggle, weights};
-use crate::dice::Dice;
 use crate::family::Family;
+use crate::random::RandomGenerator;
 
 /// A random sign.
-pub(crate) fn sign(dice: &mut Dice) -> f64 {
-    if dice.unit() < 0.5 { -1.0 } else { 1.0 }
+pub(crate) fn sign(random: &mut RandomGenerator) -> f64 {
+    if random.unit() < 0.5 { -1.0 } else { 1.0 }
 }
 
 /// A law that rises from (0, 0) to (1, 1) and never falls.
-pub(crate) fn rising(family: Family, dice: &mut Dice) -> Curve {
+pub(crate) fn rising(family: Family, random: &mut RandomGenerator) -> Curve {
     match family {
         Family::Written => Curve::table(|x| x),
         Family::Splines => {
-            let slope = Wiggle::draw(4 + dice.below(4), 0.6, dice);
+            let slope = Wiggle::draw(4 + random.below(4), 0.6, random);
             Curve::risen(|x| slope.at(x).exp())
         }
         // Elements that saturate or grow, each with a scale of its own.
         Family::Spectra => {
-            let count = 3 + dice.below(4);
-            let parts: Vec<(f64, f64)> = weights(count, 0.8, dice)
+            let count = 3 + random.below(4);
+            let parts: Vec<(f64, f64)> = weights(count, 0.8, random)
                 .into_iter()
-                .map(|w| (w, sign(dice) * dice.log_between(0.12, 2.0)))
+                .map(|w| (w, sign(random) * random.log_between(0.12, 2.0)))
                 .collect();
             Curve::table(move |x| {
                 parts.iter().map(|(w, s)| w * (-x / s).exp_m1() / (-1.0 / s).exp_m1()).sum()
@@ -30,11 +30,11 @@ pub(crate) fn rising(family: Family, dice: &mut Dice) -> Curve {
         }
         // df/dx = (1 + c f)^m, or a power of x.
         Family::RateLaws => {
-            if dice.unit() < 0.4 {
-                let exponent = dice.log_between(0.6, 1.8);
+            if random.unit() < 0.4 {
+                let exponent = random.log_between(0.6, 1.8);
                 return Curve::table(|x| x.powf(exponent));
             }
-            let (c, m) = (dice.between(-0.75, 1.5), dice.between(0.5, 2.5));
+            let (c, m) = (random.between(-0.75, 1.5), random.between(0.5, 2.5));
             let steps = 4000;
             let mut f = 0.0;
             let mut path = vec![0.0];
@@ -48,16 +48,16 @@ pub(crate) fn rising(family: Family, dice: &mut Dice) -> Curve {
         }
         // One or two kinks, or another power on either side of a point.
         Family::Asymmetric => {
-            let at = dice.between(0.25, 0.75);
-            if dice.unit() < 0.5 {
-                let ratio = dice.log_between(1.5, 3.5).powf(sign(dice));
-                let other = (dice.between(0.1, 0.9), dice.log_between(0.7, 1.4));
+            let at = random.between(0.25, 0.75);
+            if random.unit() < 0.5 {
+                let ratio = random.log_between(1.5, 3.5).powf(sign(random));
+                let other = (random.between(0.1, 0.9), random.log_between(0.7, 1.4));
                 return Curve::risen(|x| {
                     (if x < at { 1.0 } else { ratio }) * if x < other.0 { 1.0 } else { other.1 }
                 });
             }
-            let (below, above) = (dice.log_between(0.6, 1.7), dice.log_between(0.6, 1.7));
-            let middle = at + dice.between(-0.1, 0.1);
+            let (below, above) = (random.log_between(0.6, 1.7), random.log_between(0.6, 1.7));
+            let middle = at + random.between(-0.1, 0.1);
             Curve::table(|x| {
                 if x < at {
                     middle * (x / at).powf(below)
@@ -77,32 +77,32 @@ fn reach(c: f64, m: f64) -> f64 {
 }
 
 /// A bump over 0..1 of size 1, near 0 at both ends.
-pub(crate) fn bump(family: Family, dice: &mut Dice) -> Curve {
+pub(crate) fn bump(family: Family, random: &mut RandomGenerator) -> Curve {
     let raw = match family {
         Family::Written => Curve::table(|x| 4.0 * x * (1.0 - x)),
         Family::Splines => {
-            let height = Wiggle::draw(5, 0.45, dice);
-            let lift = Wiggle::draw(3, 0.05, dice);
+            let height = Wiggle::draw(5, 0.45, random);
+            let lift = Wiggle::draw(3, 0.05, random);
             Curve::table(|x| 4.0 * x * (1.0 - x) * height.at(x).exp() + lift.at(x))
         }
         Family::Spectra => {
             let modes: Vec<f64> =
-                (2..7).map(|k| 0.4 * dice.gauss() / f64::from(k).powf(1.2)).collect();
+                (2..7).map(|k| 0.4 * random.gauss() / f64::from(k).powf(1.2)).collect();
             Curve::table(|x| {
                 let wave = |k: usize| (std::f64::consts::PI * k as f64 * x).sin();
                 wave(1) + modes.iter().enumerate().map(|(i, a)| a * wave(i + 2)).sum::<f64>()
             })
         }
         Family::RateLaws => {
-            let (p, q) = (dice.log_between(0.6, 1.7), dice.log_between(0.6, 1.7));
+            let (p, q) = (random.log_between(0.6, 1.7), random.log_between(0.6, 1.7));
             Curve::table(|x| x.powf(p) * (1.0 - x).powf(q))
         }
         // A rounded tent whose top is anywhere; a flat stretch on one side.
         Family::Asymmetric => {
-            let top = dice.between(0.28, 0.72);
-            let flat = dice.between(0.0, 0.2);
-            let round = dice.between(1.2, 2.2);
-            let low = dice.unit() < 0.5;
+            let top = random.between(0.28, 0.72);
+            let flat = random.between(0.0, 0.2);
+            let round = random.between(1.2, 2.2);
+            let low = random.unit() < 0.5;
             Curve::table(|x| {
                 let x = if low { x } else { 1.0 - x };
                 let side = if x < top {
@@ -121,13 +121,13 @@ pub(crate) fn bump(family: Family, dice: &mut Dice) -> Curve {
 /// What has been reached of a settling, over 1 - exp(-t/tau): rises from (0, 0) to (1, 1).
 ///
 /// A sum of exponentials is a sum of powers of exp(-t/tau).
-pub(crate) fn settling(family: Family, dice: &mut Dice) -> Curve {
+pub(crate) fn settling(family: Family, random: &mut RandomGenerator) -> Curve {
     match family {
         Family::Spectra => {
-            let count = 2 + dice.below(4);
-            let parts: Vec<(f64, f64)> = weights(count, 0.7, dice)
+            let count = 2 + random.below(4);
+            let parts: Vec<(f64, f64)> = weights(count, 0.7, random)
                 .into_iter()
-                .map(|w| (w, dice.log_between(0.25, 5.0)))
+                .map(|w| (w, random.log_between(0.25, 5.0)))
                 .collect();
             Curve::table(|s| {
                 1.0 - parts.iter().map(|(w, scale)| w * (1.0 - s).powf(1.0 / scale)).sum::<f64>()
@@ -135,32 +135,32 @@ pub(crate) fn settling(family: Family, dice: &mut Dice) -> Curve {
         }
         // dx/dt = -x^n: a hyperbola or a power law, (1 + t / (m tau))^-m.
         Family::RateLaws => {
-            let m = dice.log_between(0.4, 3.0);
+            let m = random.log_between(0.4, 3.0);
             // The table ends after twenty time constants.
             let reached = |s: f64| 1.0 - (1.0 - (1.0 - s).max(1e-9).ln() / m).powf(-m);
             Curve::table(|s| reached(s) / reached(1.0))
         }
-        other => rising(other, dice),
+        other => rising(other, random),
     }
 }
 
 /// A drift over 0..1 that goes from 0 to 1 by and large.
-pub(crate) fn path(family: Family, dice: &mut Dice) -> Curve {
+pub(crate) fn path(family: Family, random: &mut RandomGenerator) -> Curve {
     let raw = match family {
         Family::Written => Curve::table(|x| x),
         Family::Splines => {
-            let trend = rising(family, dice);
-            let wiggle = Wiggle::draw(7, 0.08, dice);
+            let trend = rising(family, random);
+            let wiggle = Wiggle::draw(7, 0.08, random);
             let begin = wiggle.at(0.0);
             Curve::table(|x| trend.at(x) + wiggle.at(x) - begin)
         }
-        Family::Spectra => settling(family, dice),
+        Family::Spectra => settling(family, random),
         // Integrated Ornstein-Uhlenbeck: the rate of the drift wanders.
         Family::RateLaws => {
-            let (mut rate, decay) = (dice.gauss(), dice.between(0.9, 0.99));
+            let (mut rate, decay) = (random.gauss(), random.between(0.9, 0.99));
             let rates: Vec<f64> = (0..200)
                 .map(|_| {
-                    rate = rate * decay + (1.0 - decay * decay).sqrt() * dice.gauss();
+                    rate = rate * decay + (1.0 - decay * decay).sqrt() * random.gauss();
                     1.0 + 0.6 * rate
                 })
                 .collect();
@@ -174,8 +174,8 @@ pub(crate) fn path(family: Family, dice: &mut Dice) -> Curve {
         }
         // Two rates, and a stretch at rest.
         Family::Asymmetric => {
-            let (rest, long) = (dice.between(0.1, 0.7), dice.between(0.1, 0.25));
-            let ratio = dice.log_between(0.4, 2.5);
+            let (rest, long) = (random.between(0.1, 0.7), random.between(0.1, 0.25));
+            let ratio = random.log_between(0.4, 2.5);
             Curve::risen(|x| match x {
                 x if x < rest => 1.0,
                 x if x < rest + long => 0.02,
@@ -191,17 +191,17 @@ pub(crate) fn path(family: Family, dice: &mut Dice) -> Curve {
 
 /// Damping force over speed in units of a tenth of the natural one, as a damping ratio times the
 /// speed; table over -2..2 (x = (u + 2) / 4).
-pub(crate) fn damping(family: Family, dice: &mut Dice) -> Curve {
-    let base = dice.between(0.16, 0.3);
+pub(crate) fn damping(family: Family, random: &mut RandomGenerator) -> Curve {
+    let base = random.between(0.16, 0.3);
     let over = |force: &dyn Fn(f64) -> f64| Curve::table(|x| force(4.0 * x - 2.0));
     match family {
         Family::Written => over(&|u| 0.25 * u),
         Family::Splines => {
-            let ratio = Wiggle::draw(5, 0.35, dice);
+            let ratio = Wiggle::draw(5, 0.35, random);
             over(&|u| base * ratio.at(u.abs() / 2.0).exp() * u)
         }
         Family::Spectra => {
-            let w = weights(4, 0.7, dice);
+            let w = weights(4, 0.7, random);
             over(&|u| {
                 let terms = [0.5, 1.0, 1.5, 2.0].iter().zip(&w);
                 // The root is linear at rest: its slope there would be infinite.
@@ -209,12 +209,12 @@ pub(crate) fn damping(family: Family, dice: &mut Dice) -> Curve {
             })
         }
         Family::RateLaws => {
-            let (viscous, square) = (dice.between(0.4, 1.0), dice.between(0.0, 0.6));
-            let coulomb = dice.between(0.005, 0.03);
+            let (viscous, square) = (random.between(0.4, 1.0), random.between(0.0, 0.6));
+            let coulomb = random.between(0.005, 0.03);
             over(&|u| base * u * (viscous + square * u.abs()) + coulomb * (u / 0.1).tanh())
         }
         Family::Asymmetric => {
-            let ratio = dice.log_between(1.4, 3.0).powf(sign(dice)).sqrt();
+            let ratio = random.log_between(1.4, 3.0).powf(sign(random)).sqrt();
             over(&|u| base * u * if u > 0.0 { ratio } else { 1.0 / ratio })
         }
     }
@@ -228,10 +228,10 @@ mod tests {
 
     #[test]
     fn rising_laws_rise_from_nought_to_one() {
-        let mut dice = Dice::new(4, 4);
+        let mut random = RandomGenerator::new(4, 4);
         for family in Family::ALL {
             for draw in 0..60 {
-                for law in [rising(family, &mut dice), settling(family, &mut dice)] {
+                for law in [rising(family, &mut random), settling(family, &mut random)] {
                     let (start, end) = (law.at(0.0), law.at(1.0));
                     let from = abs_diff_eq!(start, 0.0, epsilon = BLIND_LAW_START);
                     assert!(from, "{family} {draw} {start}");
@@ -249,14 +249,14 @@ mod tests {
 
     #[test]
     fn bumps_are_of_size_one_and_paths_end_away_from_where_they_began() {
-        let mut dice = Dice::new(4, 5);
+        let mut random = RandomGenerator::new(4, 5);
         for family in Family::ALL {
             for _ in 0..60 {
-                let bump = bump(family, &mut dice);
+                let bump = bump(family, &mut random);
                 assert!(abs_diff_eq!(bump.size(), 1.0, epsilon = BLIND_CURVE), "{family}");
                 assert!(bump.at(0.0).abs() < 0.4 && bump.at(1.0).abs() < 0.4, "{family}");
                 assert!(bump.mean().abs() > 0.2, "{family}: {}", bump.mean());
-                let path = path(family, &mut dice);
+                let path = path(family, &mut random);
                 assert!(abs_diff_eq!(path.at(0.0), 0.0, epsilon = BLIND_LAW_START), "{family}");
                 assert!(path.size() < 3.0, "{family}");
             }
@@ -265,10 +265,10 @@ mod tests {
 
     #[test]
     fn damping_always_brakes() {
-        let mut dice = Dice::new(4, 6);
+        let mut random = RandomGenerator::new(4, 6);
         for family in Family::ALL {
             for _ in 0..60 {
-                let force = damping(family, &mut dice);
+                let force = damping(family, &mut random);
                 for u in [-2.0, -0.7, -0.05, 0.05, 0.4, 1.9] {
                     assert!(force.at((u + 2.0) / 4.0) * u > 0.0, "{family} {u}");
                 }
@@ -279,8 +279,10 @@ mod tests {
     #[test]
     fn families_differ() {
         for f in [rising, bump, settling, path, damping] {
-            let laws: Vec<Curve> =
-                Family::ALL.into_iter().map(|family| f(family, &mut Dice::new(4, 7))).collect();
+            let laws: Vec<Curve> = Family::ALL
+                .into_iter()
+                .map(|family| f(family, &mut RandomGenerator::new(4, 7)))
+                .collect();
             for (i, a) in laws.iter().enumerate() {
                 for b in &laws[i + 1..] {
                     let apart =

@@ -1,9 +1,8 @@
 #![doc = include_str!("../README.md")]
 mod by_family;
 mod case;
-mod clutter;
 mod curve;
-mod dice;
+mod disturbances;
 mod effect;
 mod electric;
 mod error;
@@ -20,6 +19,7 @@ mod memory;
 mod plan;
 mod plant;
 mod protocol;
+mod random;
 mod rate;
 mod relaxation;
 mod rig;
@@ -33,7 +33,7 @@ mod truth;
 mod valves;
 mod verdict;
 pub use by_family::FamilyRow;
-pub use clutter::Clutter;
+pub use disturbances::Disturbances;
 pub use effect::Stage;
 pub use error::BlindError;
 pub use family::Family;

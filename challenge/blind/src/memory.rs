@@ -53,7 +53,7 @@ impl Loop {
         if !cause.is_drawn() {
             return Self::new(cause.form, reach, cause.aux[1], sharp);
         }
-        let law = Law::Drawn(Friction::draw(cause.family, reach, sharp, &mut cause.dice(2)));
+        let law = Law::Drawn(Friction::draw(cause.family, reach, sharp, &mut cause.random(2)));
         Self { law, reach, z: 0.0, last: None }
     }
 
@@ -119,7 +119,7 @@ impl Lags {
     pub(crate) fn of(cause: &Cause, tau: f64, scale: f64) -> Self {
         let drawn = cause
             .is_drawn()
-            .then(|| Relaxation::draw(cause.family, tau, scale, &mut cause.dice(3)));
+            .then(|| Relaxation::draw(cause.family, tau, scale, &mut cause.random(3)));
         Self { drawn, ..Self::new(cause.form, tau) }
     }
 

@@ -2,14 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::clutter::Clutter;
-use crate::dice::Dice;
+use crate::disturbances::Disturbances;
 use crate::effect::Kind;
 use crate::family::Family;
 use crate::protocol::Protocol;
+use crate::random::RandomGenerator;
 use crate::truth::CaseKind;
 
-/// Numbers of cases by kind, the range of the strengths, and where forms and clutter come from.
+/// Numbers of cases by kind, the range of the strengths, and where forms and disturbances come from.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     /// One effect of the catalogue, every effect in turn.
@@ -28,8 +28,8 @@ pub struct Plan {
     pub excess: (f64, f64),
     /// Family that every form is drawn from; `None` is every family in turn.
     pub family: Option<Family>,
-    /// What is around the rigs.
-    pub clutter: Clutter,
+    /// What disturbs the rigs.
+    pub disturbances: Disturbances,
     /// Trials of a session.
     pub protocol: Protocol,
 }
@@ -37,7 +37,7 @@ pub struct Plan {
 impl Plan {
     /// Shares out `cases` as 34 % single, 28 % null, 8 % compound, 6 % dominant, 10 % out of the
     /// catalogue, the rest struck, with excesses from 0.05 to 100, every family of forms in turn,
-    /// drawn clutter and the paper's trials.
+    /// drawn disturbances and the paper's trials.
     ///
     /// ```
     /// let plan = stretch_blind::Plan::of(360);
@@ -61,21 +61,21 @@ impl Plan {
             struck,
             excess: (0.05, 100.0),
             family: None,
-            clutter: Clutter::Drawn,
+            disturbances: Disturbances::Drawn,
             protocol: Protocol::Paper,
         }
     }
 
-    /// The plan of the hand-written forms alone, with the same clutter around every rig.
+    /// The plan of the hand-written forms alone, with the same disturbances around every rig.
     ///
     /// ```
-    /// use stretch_blind::{Clutter, Family, Plan};
+    /// use stretch_blind::{Disturbances, Family, Plan};
     /// let plan = Plan::of(20).plain();
-    /// assert_eq!((plan.family, plan.clutter), (Some(Family::Written), Clutter::Plain));
+    /// assert_eq!((plan.family, plan.disturbances), (Some(Family::Written), Disturbances::Plain));
     /// ```
     #[must_use]
     pub fn plain(self) -> Self {
-        Self { family: Some(Family::Written), clutter: Clutter::Plain, ..self }
+        Self { family: Some(Family::Written), disturbances: Disturbances::Plain, ..self }
     }
 
     /// Cases in all.
@@ -92,7 +92,7 @@ impl Plan {
     /// What each case is to be, in random order; half of every kind with a pressure column, the
     /// families in turn for every kind and every effect.
     pub(crate) fn orders(&self, seed: u64) -> Vec<Order> {
-        let mut dice = Dice::new(seed, 0);
+        let mut random = RandomGenerator::new(seed, 0);
         let mut orders = Vec::with_capacity(self.cases());
         let counts = [
             (CaseKind::Single, self.single, Kind::catalogued()),
@@ -105,8 +105,8 @@ impl Plan {
         for (kind, count, pool) in counts {
             // Every effect in turn; with and without a pressure column in turn for each.
             let mut pool = pool.to_vec();
-            dice.shuffle(&mut pool);
-            let first = dice.below(2);
+            random.shuffle(&mut pool);
+            let first = random.below(2);
             for i in 0..count {
                 let lead = (!pool.is_empty()).then(|| pool[i % pool.len()]);
                 let turn = if pool.is_empty() { i } else { i / pool.len() + i % pool.len() };
@@ -118,7 +118,7 @@ impl Plan {
                 });
             }
         }
-        dice.shuffle(&mut orders);
+        random.shuffle(&mut orders);
         if self.family.is_none() {
             rotate(&mut orders, seed);
         }
@@ -128,12 +128,12 @@ impl Plan {
 
 /// Gives every effect of every kind of case all families in turn, from one drawn for it.
 fn rotate(orders: &mut [Order], seed: u64) {
-    let mut dice = Dice::new(seed, 1);
+    let mut random = RandomGenerator::new(seed, 1);
     let mut turns: Vec<((CaseKind, Option<Kind>), usize)> = Vec::new();
     for order in orders {
         let key = (order.kind, order.lead);
         let place = turns.iter().position(|(k, _)| *k == key).unwrap_or_else(|| {
-            turns.push((key, dice.below(Family::ALL.len())));
+            turns.push((key, random.below(Family::ALL.len())));
             turns.len() - 1
         });
         let turn = &mut turns[place].1;

@@ -59,12 +59,12 @@ impl Drawn {
     fn of(causes: &Causes) -> Self {
         let find = |kind| causes.find(kind).filter(Cause::is_drawn);
         Self {
-            sag: find(Kind::SupplySag).map(|c| Sag::draw(c.family, c.strength, &mut c.dice(1))),
-            leak: find(Kind::Leak).map(|c| rising(c.family, &mut c.dice(1))),
-            volume: find(Kind::ChamberVolume).map(|c| rising(c.family, &mut c.dice(1))),
-            damping: find(Kind::CrossbeamInertia).map(|c| damping(c.family, &mut c.dice(1))),
-            deadband: find(Kind::ValveDeadband).map(|c| DeadBand::draw(c.family, &mut c.dice(1))),
-            delay: find(Kind::ValveDelay).map(|c| Delay::draw(c.family, &mut c.dice(1))),
+            sag: find(Kind::SupplySag).map(|c| Sag::draw(c.family, c.strength, &mut c.random(1))),
+            leak: find(Kind::Leak).map(|c| rising(c.family, &mut c.random(1))),
+            volume: find(Kind::ChamberVolume).map(|c| rising(c.family, &mut c.random(1))),
+            damping: find(Kind::CrossbeamInertia).map(|c| damping(c.family, &mut c.random(1))),
+            deadband: find(Kind::ValveDeadband).map(|c| DeadBand::draw(c.family, &mut c.random(1))),
+            delay: find(Kind::ValveDelay).map(|c| Delay::draw(c.family, &mut c.random(1))),
         }
     }
 }

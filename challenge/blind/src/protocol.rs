@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::dice::Dice;
+use crate::random::RandomGenerator;
 
 /// Samples a second.
 pub(crate) const RATE_HZ: usize = 100;
@@ -70,7 +70,7 @@ const RAMPS: [(f64, &str); 6] =
 
 /// The trials of a session: six inflations, six deflations, then two trials to fit and three to
 /// test on; then whatever more the protocol has.
-pub(crate) fn session(protocol: Protocol, dice: &mut Dice) -> Vec<Script> {
+pub(crate) fn session(protocol: Protocol, random: &mut RandomGenerator) -> Vec<Script> {
     let mut scripts = Vec::new();
     let mut start_s = 0.0;
     let (pause_s, excitation) = (PAUSE_S, 1.0);
@@ -97,13 +97,13 @@ pub(crate) fn session(protocol: Protocol, dice: &mut Dice) -> Vec<Script> {
         let file = format!("deflation_{label}.csv");
         add(file, "deflation", Some(opening), Split::Fit, true, ramp((0.0, opening)));
     }
-    add("arbitrary_1.csv".into(), "arbitrary", None, Split::Fit, false, arbitrary(dice));
-    add("pulses_1.csv".into(), "pulses", None, Split::Fit, false, pulses(dice));
-    add("arbitrary_2.csv".into(), "arbitrary", None, Split::Test, false, arbitrary(dice));
-    add("arbitrary_3.csv".into(), "arbitrary", None, Split::Test, false, arbitrary(dice));
-    add("pulses_2.csv".into(), "pulses", None, Split::Test, false, pulses(dice));
+    add("arbitrary_1.csv".into(), "arbitrary", None, Split::Fit, false, arbitrary(random));
+    add("pulses_1.csv".into(), "pulses", None, Split::Fit, false, pulses(random));
+    add("arbitrary_2.csv".into(), "arbitrary", None, Split::Test, false, arbitrary(random));
+    add("arbitrary_3.csv".into(), "arbitrary", None, Split::Test, false, arbitrary(random));
+    add("pulses_2.csv".into(), "pulses", None, Split::Test, false, pulses(random));
     if protocol == Protocol::PaperPlus {
-        add("arbitrary_low.csv".into(), "arbitrary", None, Split::Fit, false, arbitrary(dice));
+        add("arbitrary_low.csv".into(), "arbitrary", None, Split::Fit, false, arbitrary(random));
         scripts.iter_mut().skip(17).for_each(|script| script.excitation = LOW_EXCITATION);
     }
     scripts
@@ -135,13 +135,13 @@ fn hold(openings: &mut Vec<(f64, f64)>, seconds: f64, opening: (f64, f64)) {
 }
 
 /// One minute of random segments: inflate, deflate or hold.
-fn arbitrary(dice: &mut Dice) -> Vec<(f64, f64)> {
+fn arbitrary(random: &mut RandomGenerator) -> Vec<(f64, f64)> {
     let mut openings = Vec::new();
     hold(&mut openings, 1.0, (0.0, 0.0));
     while openings.len() < 60 * RATE_HZ {
-        let seconds = dice.between(0.15, 1.5);
-        let opening = dice.pick(&[0.125, 0.25, 0.5, 0.75, 1.0]);
-        let choice = dice.unit();
+        let seconds = random.between(0.15, 1.5);
+        let opening = random.pick(&[0.125, 0.25, 0.5, 0.75, 1.0]);
+        let choice = random.unit();
         let segment = match choice {
             c if c < 0.42 => (opening, 0.0),
             c if c < 0.84 => (0.0, opening),
@@ -154,9 +154,9 @@ fn arbitrary(dice: &mut Dice) -> Vec<(f64, f64)> {
 }
 
 /// One minute of pulse pairs whose inner gap falls by 18 % a pair and starts over.
-fn pulses(dice: &mut Dice) -> Vec<(f64, f64)> {
-    let vent = (0.0, dice.pick(&[0.5, 0.75, 1.0]));
-    let rest_s = dice.between(0.3, 1.0);
+fn pulses(random: &mut RandomGenerator) -> Vec<(f64, f64)> {
+    let vent = (0.0, random.pick(&[0.5, 0.75, 1.0]));
+    let rest_s = random.between(0.3, 1.0);
     let mut openings = Vec::new();
     hold(&mut openings, 1.0, (0.0, 0.0));
     let mut gap_s = 1.4;
@@ -178,7 +178,7 @@ mod tests {
 
     #[test]
     fn a_session_has_seventeen_trials_and_480_s() {
-        let scripts = session(Protocol::Paper, &mut Dice::new(1, 1));
+        let scripts = session(Protocol::Paper, &mut RandomGenerator::new(1, 1));
         assert_eq!(scripts.len(), 17);
         assert_eq!(scripts.iter().map(|s| s.openings.len()).sum::<usize>(), 480 * RATE_HZ);
         assert_eq!(scripts.iter().filter(|s| s.split == Split::Test).count(), 3);
@@ -192,7 +192,7 @@ mod tests {
 
     #[test]
     fn paper_plus_is_the_paper_and_one_trial_more() {
-        let [paper, plus] = Protocol::ALL.map(|p| session(p, &mut Dice::new(1, 1)));
+        let [paper, plus] = Protocol::ALL.map(|p| session(p, &mut RandomGenerator::new(1, 1)));
         assert_eq!(paper, plus[..17]);
         let more = &plus[17];
         assert_eq!((plus.len(), more.split, more.excitation), (18, Split::Fit, LOW_EXCITATION));

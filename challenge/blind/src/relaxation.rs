@@ -2,9 +2,9 @@
 //! ones that differ by direction.
 
 use crate::curve::{Wiggle, weights};
-use crate::dice::Dice;
 use crate::family::Family;
 use crate::laws::sign;
+use crate::random::RandomGenerator;
 
 /// One lag: its share, its time constants rising and falling in s, where it stands.
 #[derive(Debug, Clone, Copy)]
@@ -26,7 +26,7 @@ pub(crate) struct Relaxation {
 
 impl Relaxation {
     /// Lags of a family around `tau` s; `scale` is the span of what is fed.
-    pub(crate) fn draw(family: Family, tau: f64, scale: f64, dice: &mut Dice) -> Self {
+    pub(crate) fn draw(family: Family, tau: f64, scale: f64, random: &mut RandomGenerator) -> Self {
         let mut hurry = (0.0, 1.0);
         let even = |parts: Vec<(f64, f64)>| -> Vec<Part> {
             let total: f64 = parts.iter().map(|p| p.1).sum();
@@ -42,7 +42,7 @@ impl Relaxation {
             Family::Written => even(vec![(1.0, 1.0)]),
             // A continuous spectrum whose logarithm is a random spline over 1.6 decades.
             Family::Splines => {
-                let density = Wiggle::draw(4, 0.8, dice);
+                let density = Wiggle::draw(4, 0.8, random);
                 let at = |i: i32| f64::from(i) / 6.0;
                 even(
                     (0..7)
@@ -51,29 +51,29 @@ impl Relaxation {
                 )
             }
             // A few of them anywhere in two decades, or a power law.
-            Family::Spectra if dice.unit() < 0.5 => {
-                let count = 2 + dice.below(4);
-                let shares = weights(count, 0.8, dice);
-                even(shares.into_iter().map(|w| (dice.log_between(0.12, 8.0), w)).collect())
+            Family::Spectra if random.unit() < 0.5 => {
+                let count = 2 + random.below(4);
+                let shares = weights(count, 0.8, random);
+                even(shares.into_iter().map(|w| (random.log_between(0.12, 8.0), w)).collect())
             }
             Family::Spectra => {
-                let power = dice.between(-0.5, 0.5);
+                let power = random.between(-0.5, 0.5);
                 let scale = |i: i32| 10f64.powf(0.5 * f64::from(i) - 1.0);
                 even((0..5).map(|i| (scale(i), scale(i).powf(power))).collect())
             }
             Family::RateLaws => {
-                hurry = (scale * dice.log_between(0.02, 0.2), dice.between(0.5, 2.0));
-                let second = dice.log_between(1.0, 4.0);
-                let share = dice.between(0.4, 1.0);
+                hurry = (scale * random.log_between(0.02, 0.2), random.between(0.5, 2.0));
+                let second = random.log_between(1.0, 4.0);
+                let share = random.between(0.4, 1.0);
                 even(vec![(1.5, share), (1.5 * second, 1.0 - share)])
             }
             Family::Asymmetric => {
-                let apart = dice.log_between(1.0, 3.0);
+                let apart = random.log_between(1.0, 3.0);
                 even(vec![(1.0 / apart, 0.5), (apart, 0.5)])
             }
         };
         if family == Family::Asymmetric {
-            let ratio = dice.log_between(1.4, 2.6).powf(sign(dice)).sqrt();
+            let ratio = random.log_between(1.4, 2.6).powf(sign(random)).sqrt();
             for part in &mut parts {
                 part.rising_s *= ratio;
                 part.falling_s /= ratio;
@@ -110,10 +110,10 @@ mod tests {
 
     #[test]
     fn lags_stay_between_and_settle_at_their_input() {
-        let mut dice = Dice::new(9, 2);
+        let mut random = RandomGenerator::new(9, 2);
         for family in Family::ALL {
             for _ in 0..40 {
-                let mut lags = Relaxation::draw(family, 0.1, 1.0, &mut dice);
+                let mut lags = Relaxation::draw(family, 0.1, 1.0, &mut random);
                 assert_eq!(lags.push(0.0, 1e-3), 0.0);
                 let mut last = 0.0;
                 for _ in 0..20_000 {

@@ -1,7 +1,7 @@
 //! A rig of its own: nominal parameters, their tolerances, and the static force law.
 
-use crate::dice::Dice;
 use crate::effect::Stage;
+use crate::random::RandomGenerator;
 
 /// Atmosphere, Pa.
 pub(crate) const P_ATM: f64 = 101_325.0;
@@ -108,12 +108,12 @@ impl Rig {
 
     /// A rig from the tolerances: Gaussians cut at 2.5 sd and at 0.2 of the nominal value,
     /// drawn again until the sleeve stays stretched over the static stroke.
-    pub(crate) fn draw(dice: &mut Dice) -> Self {
+    pub(crate) fn draw(random: &mut RandomGenerator) -> Self {
         loop {
             let rig = Self::new(std::array::from_fn(|i| {
                 let Uncertain { value, sd, .. } = UNCERTAIN[i];
                 loop {
-                    let z = dice.gauss();
+                    let z = random.gauss();
                     let drawn = value + z * sd;
                     if z.abs() <= 2.5 && drawn >= 0.2 * value {
                         break drawn;
@@ -198,9 +198,9 @@ mod tests {
 
     #[test]
     fn drawn_rigs_stay_within_their_tolerances() {
-        let mut dice = Dice::new(3, 0);
+        let mut random = RandomGenerator::new(3, 0);
         for _ in 0..200 {
-            let rig = Rig::draw(&mut dice);
+            let rig = Rig::draw(&mut random);
             for (value, p) in rig.values.iter().zip(&UNCERTAIN) {
                 assert!((value - p.value).abs() <= 2.5 * p.sd * (1.0 + 1e-12), "{}", p.name);
                 assert!(*value >= 0.2 * p.value, "{}", p.name);

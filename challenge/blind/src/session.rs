@@ -1,12 +1,12 @@
 //! One session on a rig: every trial after the other, memories carried through the pauses.
 
-use crate::clutter::{Drawn, Surroundings};
 use crate::curve::hermite;
-use crate::dice::Dice;
+use crate::disturbances::{Drawn, Surroundings};
 use crate::effect::{Cause, Causes, Kind};
 use crate::gauge::{Gauge, Instant, Pot, hum, skew, spoil_samples};
 use crate::plant::Plant;
 use crate::protocol::{PAUSE_S, RATE_HZ, Script};
+use crate::random::RandomGenerator;
 use crate::rig::{P_ATM, Rig};
 use crate::timing::Wander;
 
@@ -34,20 +34,20 @@ pub(crate) struct Conditions {
 impl Conditions {
     /// A supply that wanders by 0.25 % (1 sd) over some 15 s, and start pressures 0.1 kPa above
     /// the atmosphere or 0.1 % below the supply, roughly.
-    pub(crate) fn plain(scripts: &[Script], dice: &mut Dice) -> Self {
+    pub(crate) fn plain(scripts: &[Script], random: &mut RandomGenerator) -> Self {
         let knots = knots(scripts);
         let (slow_s, smooth_s) = (15.0, 1.5);
-        let mut slow = dice.gauss();
+        let mut slow = random.gauss();
         let mut smooth = slow;
         let supply = (0..knots)
             .map(|_| {
-                slow += -slow * KNOT_S / slow_s + (2.0 * KNOT_S / slow_s).sqrt() * dice.gauss();
+                slow += -slow * KNOT_S / slow_s + (2.0 * KNOT_S / slow_s).sqrt() * random.gauss();
                 smooth += (slow - smooth) * KNOT_S / smooth_s;
                 0.0025 * smooth
             })
             .collect();
         let start_error = scripts.iter().map(|script| {
-            let error = dice.gauss().abs();
+            let error = random.gauss().abs();
             if script.from_full { 0.001 * error } else { 100.0 * error }
         });
         Self {
@@ -58,18 +58,22 @@ impl Conditions {
     }
 
     /// As the surroundings have it.
-    pub(crate) fn draw(scripts: &[Script], around: &Surroundings, dice: &mut Dice) -> Self {
-        let Some(drawn) = around.drawn else { return Self::plain(scripts, dice) };
-        Self::of(scripts, &drawn, dice)
+    pub(crate) fn draw(
+        scripts: &[Script],
+        around: &Surroundings,
+        random: &mut RandomGenerator,
+    ) -> Self {
+        let Some(drawn) = around.drawn else { return Self::plain(scripts, random) };
+        Self::of(scripts, &drawn, random)
     }
 
-    fn of(scripts: &[Script], drawn: &Drawn, dice: &mut Dice) -> Self {
-        let supply = drawn.supply.knots(knots(scripts), KNOT_S, dice);
+    fn of(scripts: &[Script], drawn: &Drawn, random: &mut RandomGenerator) -> Self {
+        let supply = drawn.supply.knots(knots(scripts), KNOT_S, random);
         let error = |script: &Script| {
-            if script.from_full { drawn.starts.full(dice) } else { drawn.starts.empty(dice) }
+            if script.from_full { drawn.starts.full(random) } else { drawn.starts.empty(random) }
         };
         let start_error = scripts.iter().map(error).collect();
-        let offsets = scripts.iter().map(|s| drawn.offsets(s.openings.len(), dice)).collect();
+        let offsets = scripts.iter().map(|s| drawn.offsets(s.openings.len(), random)).collect();
         Self { supply, start_error, offsets }
     }
 
@@ -301,7 +305,7 @@ mod tests {
     };
 
     fn short_session() -> Vec<Script> {
-        let mut scripts = session(Protocol::Paper, &mut Dice::new(8, 1));
+        let mut scripts = session(Protocol::Paper, &mut RandomGenerator::new(8, 1));
         // One fast inflation, one fast deflation, 20 s of pulses.
         scripts = vec![scripts[5].clone(), scripts[11].clone(), scripts[13].clone()];
         scripts[2].openings.truncate(2000);
@@ -319,16 +323,16 @@ mod tests {
     #[test]
     fn every_form_acts_in_its_own_stage_and_no_earlier() {
         let scripts = short_session();
-        let mut dice = Dice::new(8, 2);
+        let mut random = RandomGenerator::new(8, 2);
         let rig = Rig::nominal();
-        let conditions = Conditions::plain(&scripts, &mut dice);
+        let conditions = Conditions::plain(&scripts, &mut random);
         let nominal = run(&rig, &Causes::default(), &scripts, &conditions, COARSE);
         for &kind in KINDS {
             let written = (0..kind.spec().forms.len()).map(|form| (Family::Written, form));
             let drawn = Family::ALL[1..].iter().map(|&family| (family, 0));
             let drawn = drawn.filter(|_| kind.is_catalogued());
             for (family, form) in written.chain(drawn) {
-                let mut cause = Cause::draw(kind, family, &mut dice);
+                let mut cause = Cause::draw(kind, family, &mut random);
                 cause.form = form;
                 let causes = Causes::new(&[cause.at(0.5 * cause.most())]);
                 let acting = run(&rig, &causes, &scripts, &conditions, COARSE);
@@ -364,7 +368,7 @@ mod tests {
         let mut scripts = short_session();
         // Dead bands differ where the valve is hardly open.
         scripts[0].openings.iter_mut().for_each(|u| u.0 *= 0.08);
-        let mut dice = Dice::new(8, 6);
+        let mut random = RandomGenerator::new(8, 6);
         let rig = Rig::nominal();
         // Knees count from the strain and the voltage at the nominal supply.
         let (supply, offsets) = (vec![0.0; 4000], vec![Vec::new(); 3]);
@@ -373,11 +377,11 @@ mod tests {
             |causes: &[Cause]| run(&rig, &Causes::new(causes), &scripts, &conditions, COARSE);
         let nominal = session(&[]);
         for &kind in Kind::catalogued() {
-            let seed = dice.bits();
+            let seed = random.bits();
             let mut strongest: Vec<Vec<Trace>> = Vec::new();
             for family in Family::ALL {
                 // One cause but for where its form comes from.
-                let cause = Cause::draw(kind, family, &mut Dice::new(seed, 0));
+                let cause = Cause::draw(kind, family, &mut RandomGenerator::new(seed, 0));
                 let name = format!("{} {family}", kind.spec().name);
                 let at = |share: f64| session(&[cause.at(share * cause.most())]);
                 // A muscle on a spring of 2 ms has inertia still, and none is not simulated.
@@ -402,7 +406,7 @@ mod tests {
     fn a_finer_step_changes_nothing_that_shows() {
         let scripts = short_session();
         let rig = Rig::nominal();
-        let conditions = Conditions::plain(&scripts, &mut Dice::new(8, 3));
+        let conditions = Conditions::plain(&scripts, &mut RandomGenerator::new(8, 3));
         let fine = run(&rig, &Causes::default(), &scripts, &conditions, FINE);
         let finer = run(&rig, &Causes::default(), &scripts, &conditions, 2 * FINE);
         // 1e-4 of full scale: 62 Pa, 5 um, 0.33 mV.
@@ -438,9 +442,9 @@ mod tests {
     fn memories_are_wound_before_a_trial_begins() {
         let scripts = short_session();
         let rig = Rig::nominal();
-        let conditions = Conditions::plain(&scripts, &mut Dice::new(8, 4));
-        let dice = &mut Dice::new(8, 5);
-        let mut cause = Cause::draw(Kind::SleeveSlip, Family::Written, dice);
+        let conditions = Conditions::plain(&scripts, &mut RandomGenerator::new(8, 4));
+        let random = &mut RandomGenerator::new(8, 5);
+        let mut cause = Cause::draw(Kind::SleeveSlip, Family::Written, random);
         cause.form = 0;
         let causes = Causes::new(&[cause.at(0.01)]);
         let traces = run(&rig, &causes, &scripts, &conditions, COARSE);

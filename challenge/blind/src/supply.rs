@@ -1,9 +1,9 @@
 //! A supply that sags under load, drawn: how much a load draws it down, and how it comes back.
 
 use crate::curve::{Curve, weights};
-use crate::dice::Dice;
 use crate::family::Family;
 use crate::laws::{rising, sign};
+use crate::random::RandomGenerator;
 
 /// Flow at which the sag is scaled, kg/s.
 const Q_REF: f64 = 6e-4;
@@ -23,31 +23,31 @@ pub(crate) struct Sag {
 
 impl Sag {
     /// A sag of `strength` Pa s/kg at the reference flow.
-    pub(crate) fn draw(family: Family, strength: f64, dice: &mut Dice) -> Self {
-        let tau = dice.log_between(0.25, 0.9);
+    pub(crate) fn draw(family: Family, strength: f64, random: &mut RandomGenerator) -> Self {
+        let tau = random.log_between(0.25, 0.9);
         let mut load = Curve::table(|x| 2.0 * x);
         let mut parts = vec![(1.0, tau, tau, 0.0)];
         let mut power = 1.0;
         match family {
             Family::Written => {}
             Family::Splines => {
-                load = rising(family, dice);
+                load = rising(family, random);
                 // 1 at the reference flow, the middle of the table.
                 let middle = load.at(0.5);
                 load = load.times(1.0 / middle);
             }
             Family::Spectra => {
-                let count = 2 + dice.below(2);
-                let shares = weights(count, 0.6, dice);
+                let count = 2 + random.below(2);
+                let shares = weights(count, 0.6, random);
                 let part = |w| {
-                    let tau = dice.log_between(0.08, 3.0);
+                    let tau = random.log_between(0.08, 3.0);
                     (w, tau, tau, 0.0)
                 };
                 parts = shares.into_iter().map(part).collect();
             }
-            Family::RateLaws => power = dice.log_between(0.5, 2.0),
+            Family::RateLaws => power = random.log_between(0.5, 2.0),
             Family::Asymmetric => {
-                let ratio = dice.log_between(1.5, 4.0).powf(sign(dice)).sqrt();
+                let ratio = random.log_between(1.5, 4.0).powf(sign(random)).sqrt();
                 parts = vec![(1.0, tau / ratio, tau * ratio, 0.0)];
             }
         }
@@ -87,10 +87,10 @@ mod tests {
 
     #[test]
     fn a_steady_load_draws_down_what_the_strength_says_and_it_comes_back() {
-        let mut dice = Dice::new(9, 4);
+        let mut random = RandomGenerator::new(9, 4);
         for family in Family::ALL {
             for _ in 0..20 {
-                let mut sag = Sag::draw(family, 1e8, &mut dice);
+                let mut sag = Sag::draw(family, 1e8, &mut random);
                 let drawn = (0..40_000).map(|_| sag.push(Q_REF, 1e-3)).last().expect("steps");
                 let settled = abs_diff_eq!(drawn, 6e4, epsilon = BLIND_DRAWN * 6e4);
                 assert!(settled, "{family} {drawn}");

@@ -1,9 +1,9 @@
 //! Clocks and mains drawn: a skew that wanders, and hum of any shape.
 
 use crate::curve::{Wiggle, weights};
-use crate::dice::Dice;
 use crate::effect::Cause;
 use crate::family::Family;
+use crate::random::RandomGenerator;
 
 /// Longest session that a wandering skew is tabled for, s; it stands still from there on.
 const LONGEST_S: f64 = 1000.0;
@@ -32,21 +32,21 @@ enum Law {
 impl Wander {
     /// The wander of a skew cause.
     pub(crate) fn draw(cause: Cause) -> Self {
-        let mut dice = cause.dice(1);
-        let size = cause.strength * dice.between(0.04, 0.12);
+        let mut random = cause.random(1);
+        let size = cause.strength * random.between(0.04, 0.12);
         let law = match cause.family {
             Family::Written => Law::Rate(0.0),
-            Family::Splines => Law::Path(Wiggle::draw(12, 0.7 * size, &mut dice)),
+            Family::Splines => Law::Path(Wiggle::draw(12, 0.7 * size, &mut random)),
             Family::Spectra => {
-                let shares = weights(4, 0.7, &mut dice);
+                let shares = weights(4, 0.7, &mut random);
                 let mut wave = |w: f64| {
-                    let omega = dice.log_between(0.02, 2.0);
-                    (1.4 * size * w, omega, dice.between(0.0, std::f64::consts::TAU))
+                    let omega = random.log_between(0.02, 2.0);
+                    (1.4 * size * w, omega, random.between(0.0, std::f64::consts::TAU))
                 };
                 Law::Waves(shares.into_iter().map(&mut wave).collect())
             }
             Family::RateLaws => {
-                let rate = 2e-4 * dice.between(-1.0, 1.0);
+                let rate = 2e-4 * random.between(-1.0, 1.0);
                 Law::Rate(rate * (cause.strength / 0.02).min(1.0))
             }
             Family::Asymmetric => Law::Starts(size),
@@ -57,7 +57,8 @@ impl Wander {
     /// A trial begins.
     pub(crate) fn begin(&mut self, trial: usize) {
         if let Law::Starts(size) = self.law {
-            self.trial = size * Dice::new(self.cause.seed, 2000 + trial as u64).between(-1.0, 1.0);
+            self.trial = size
+                * RandomGenerator::new(self.cause.seed, 2000 + trial as u64).between(-1.0, 1.0);
         }
     }
 
@@ -77,8 +78,8 @@ impl Wander {
 /// Mains on the samples of a trial, V; `offsets` are how much later than on the grid each was
 /// taken (none: on the grid).
 pub(crate) fn mains(cause: Cause, trial: usize, samples: usize, offsets: &[f64]) -> Vec<f64> {
-    let mut shape = cause.dice(1);
-    let mut dice = Dice::new(cause.seed, trial as u64);
+    let mut shape = cause.random(1);
+    let mut random = RandomGenerator::new(cause.seed, trial as u64);
     let hertz = if cause.aux[0] < 0.5 { 50.0 } else { 60.0 };
     let (spread, memory_s) = (shape.log_between(0.01, 0.08), shape.log_between(3.0, 60.0));
     // Share of harmonics 2, 3, 5 and 7.
@@ -91,13 +92,14 @@ pub(crate) fn mains(cause: Cause, trial: usize, samples: usize, offsets: &[f64])
         Family::RateLaws => vec![(3.0, -shape.between(0.05, 0.2))],
         _ => Vec::new(),
     };
-    let swell = (cause.family == Family::Splines).then(|| Wiggle::draw(8, 0.25, &mut dice));
-    let mut phase = dice.between(0.0, std::f64::consts::TAU);
-    let mut wander = spread * dice.gauss();
+    let swell = (cause.family == Family::Splines).then(|| Wiggle::draw(8, 0.25, &mut random));
+    let mut phase = random.between(0.0, std::f64::consts::TAU);
+    let mut wander = spread * random.gauss();
     let h = 0.01_f64;
     (0..samples)
         .map(|i| {
-            wander += -wander * h / memory_s + spread * (2.0 * h / memory_s).sqrt() * dice.gauss();
+            wander +=
+                -wander * h / memory_s + spread * (2.0 * h / memory_s).sqrt() * random.gauss();
             phase += std::f64::consts::TAU * (hertz + wander) * h;
             let late = offsets.get(i).copied().unwrap_or(0.0);
             let now = phase + std::f64::consts::TAU * hertz * late;

@@ -79,8 +79,8 @@ pub struct Label {
     pub stages: Vec<Stage>,
     /// Whether the pressure was recorded.
     pub pressure_column: bool,
-    /// Mean square of what the re-tuned nominal rig leaves over the floor, in units of the
-    /// floor, summed over channels on the test trials; linear, good to a factor of two.
+    /// Reduced chi-square minus one of the re-tuned nominal rig, summed over channels on the test
+    /// trials: a mean square in units of the variance of the noise; linear, good to a factor of two.
     pub excess: f64,
     /// Entry that the diagnosis may not use.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -97,9 +97,11 @@ pub struct Label {
     /// Nominal parameters of this rig, SI (V and mm as in rig files).
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub parameters: BTreeMap<String, f64>,
-    /// What was around the rig, where that was drawn: levels, times in s, shares.
+    /// Disturbances of the rig, where they were drawn: levels, times in s, shares. Labels write `clutter`, as those did whose hashes are
+    /// published.
+    #[serde(rename = "clutter", alias = "disturbances")]
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub clutter: BTreeMap<String, f64>,
+    pub disturbances: BTreeMap<String, f64>,
 }
 
 fn is_written(family: &Family) -> bool {

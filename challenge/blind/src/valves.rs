@@ -1,9 +1,9 @@
 //! Valves drawn: openings that act late, and dead bands of any shape.
 
 use crate::curve::{Curve, weights};
-use crate::dice::Dice;
 use crate::family::Family;
 use crate::laws::{rising, sign};
+use crate::random::RandomGenerator;
 
 /// How a command reaches the valves.
 #[derive(Debug, Clone)]
@@ -20,26 +20,26 @@ pub(crate) enum Delay {
 
 impl Delay {
     /// Delays of a family, of mean 1.
-    pub(crate) fn draw(family: Family, dice: &mut Dice) -> Self {
+    pub(crate) fn draw(family: Family, random: &mut RandomGenerator) -> Self {
         match family {
             Family::Written => Self::Spread(vec![(1.0, 1.0)]),
             Family::Splines => {
-                let law = rising(family, dice);
-                let span = sign(dice) * dice.between(0.2, 0.6);
+                let law = rising(family, random);
+                let span = sign(random) * random.between(0.2, 0.6);
                 let mean = law.mean();
                 Self::Graded(Curve::table(|u| 1.0 + span * (law.at(u) - mean)))
             }
             Family::Spectra => {
-                let count = 3 + dice.below(2);
-                let shares = weights(count, 0.5, dice);
-                let raw: Vec<f64> = (0..count).map(|_| dice.between(0.5, 1.6)).collect();
+                let count = 3 + random.below(2);
+                let shares = weights(count, 0.5, random);
+                let raw: Vec<f64> = (0..count).map(|_| random.between(0.5, 1.6)).collect();
                 let mean: f64 = shares.iter().zip(&raw).map(|(w, d)| w * d).sum();
                 Self::Spread(shares.into_iter().zip(raw).map(|(w, d)| (w, d / mean)).collect())
             }
-            Family::RateLaws => Self::Lagged { dead: dice.between(0.35, 0.9) },
+            Family::RateLaws => Self::Lagged { dead: random.between(0.35, 0.9) },
             Family::Asymmetric => {
                 let raw: [[f64; 2]; 2] =
-                    std::array::from_fn(|_| std::array::from_fn(|_| dice.between(0.6, 1.4)));
+                    std::array::from_fn(|_| std::array::from_fn(|_| random.between(0.6, 1.4)));
                 let mean = raw.iter().flatten().sum::<f64>() / 4.0;
                 Self::Sided(raw.map(|side| side.map(|d| d / mean)))
             }
@@ -91,15 +91,15 @@ pub(crate) struct DeadBand {
 
 impl DeadBand {
     /// A dead band of a family.
-    pub(crate) fn draw(family: Family, dice: &mut Dice) -> Self {
-        let mut sides = [1.0, dice.between(0.85, 1.15)];
+    pub(crate) fn draw(family: Family, random: &mut RandomGenerator) -> Self {
+        let mut sides = [1.0, random.between(0.85, 1.15)];
         // Shut up to `begin` bands; from there on the slope rises to 1 as a drawn law does.
-        let begin = if dice.unit() < 0.6 { dice.between(0.3, 0.85) } else { 0.0 };
-        let mut law = rising(family, dice);
+        let begin = if random.unit() < 0.6 { random.between(0.3, 0.85) } else { 0.0 };
+        let mut law = rising(family, random);
         let mut long = (1.0 - begin) / (1.0 - law.mean());
         if family == Family::Asymmetric {
             // Hard, and the two valves far apart.
-            sides = [dice.between(0.6, 1.4), dice.between(0.6, 1.4)];
+            sides = [random.between(0.6, 1.4), random.between(0.6, 1.4)];
             law = Curve::table(|_| 0.0);
             long = 1.0 - begin;
         }
@@ -128,10 +128,10 @@ mod tests {
 
     #[test]
     fn dead_bands_never_fall_and_lose_one_band_of_what_is_far_open() {
-        let mut dice = Dice::new(9, 5);
+        let mut random = RandomGenerator::new(9, 5);
         for family in Family::ALL {
             for _ in 0..40 {
-                let band = DeadBand::draw(family, &mut dice);
+                let band = DeadBand::draw(family, &mut random);
                 let mut last = 0.0;
                 for i in 0..=1000 {
                     let left = band.pass(f64::from(i) / 1000.0, 0.05, 0);
@@ -148,11 +148,11 @@ mod tests {
 
     #[test]
     fn a_step_arrives_after_the_mean_delay() {
-        let mut dice = Dice::new(9, 6);
+        let mut random = RandomGenerator::new(9, 6);
         let h = 1e-4;
         for family in Family::ALL {
             for _ in 0..20 {
-                let delay = Delay::draw(family, &mut dice);
+                let delay = Delay::draw(family, &mut random);
                 let mut lag = 0.0;
                 let missing = |side| {
                     (0..5000)

@@ -14,7 +14,7 @@ fn files(dir: &Path, found: &mut Vec<PathBuf>) {
 }
 
 #[test]
-fn written_forms_and_plain_clutter_keep_their_bits() {
+fn written_forms_and_plain_disturbances_keep_their_bits() {
     let plan = Plan {
         single: 1,
         null: 1,

@@ -19,7 +19,7 @@ fn label(kind: CaseKind, effects: &[(&str, Stage)], excess: f64) -> Label {
         family: Family::Written,
         acting: Vec::new(),
         parameters: BTreeMap::new(),
-        clutter: BTreeMap::new(),
+        disturbances: BTreeMap::new(),
     }
 }
 

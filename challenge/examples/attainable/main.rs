@@ -1,5 +1,5 @@
-//! What the diagnosis tells at best: rigs of its own equations, effects in the catalogue's own forms, noise that is clean and known.
-//! What is missed or confounded here is missed for no form and no clutter.
+//! What the diagnosis finds at best: rigs of its own equations, effects in the catalogue's own forms, noise that is clean and known.
+//! What is missed or confounded here is missed for no form and no disturbance.
 //!
 //! Two tables: how far nulls stray, and which effects cannot be told apart, for the trials of the paper with and without a
 //! pressure column and for the paper's with one trial more at 0.7 of the excitation. `docs/blind.md` says how to read them.

@@ -19,8 +19,8 @@ struct Null {
     named: Vec<String>,
 }
 
-/// Without hurdles: the single effect with the greatest score is taken whatever it closes.
-fn without_hurdles() -> Thresholds {
+/// Without acceptance criteria: the single effect with the greatest score is taken whatever it closes.
+fn without_criteria() -> Thresholds {
     let none = f64::NEG_INFINITY;
     Thresholds { rise: none, faint_rise: none, share: 0.0, mismatch: 0.0, ..Thresholds::frozen() }
 }
@@ -29,7 +29,7 @@ fn null(seed: u64, protocol: Protocol) -> anyhow::Result<Null> {
     let source = Source { seed, effect: None };
     let Diagnosis { gap, verdict, named, .. } =
         source.diagnosed(protocol, 4, Thresholds::frozen())?;
-    let loose = source.diagnosed(protocol, 1, without_hurdles())?;
+    let loose = source.diagnosed(protocol, 1, without_criteria())?;
     // `unknown`, and the empty set where nothing was taken, are no effects.
     let singles =
         loose.candidates.iter().filter(|c| c.effects.len() == 1 && !c.parameters.is_empty());
@@ -67,8 +67,8 @@ pub(crate) fn band(seeds: Range<u64>) -> anyhow::Result<String> {
             .collect();
         let others = if others.is_empty() { "-".into() } else { others.join(", ") };
         let [a, b, c] = excess.map(|x| format!("{x:.4}"));
-        let told = |x: f64| if x.is_finite() { format!("{x:.1}") } else { "none".into() };
-        let [d, e, f] = scores.map(told);
+        let shown = |x: f64| if x.is_finite() { format!("{x:.1}") } else { "none".into() };
+        let [d, e, f] = scores.map(shown);
         let by_score = |a: &&(f64, String), b: &&(f64, String)| a.0.total_cmp(&b.0);
         let greatest = nulls.iter().filter_map(|n| n.best.as_ref()).max_by(by_score);
         let whose = greatest.map_or("-", |(_, effect)| effect.as_str());

@@ -1,4 +1,4 @@
-//! Which effects cannot be told apart: every effect of the catalogue at two strengths.
+//! Which effects cannot be answer apart: every effect of the catalogue at two strengths.
 
 use std::{
     fmt::{Display, Formatter, Write},
@@ -17,7 +17,7 @@ const AIMS: [f64; 2] = [0.55, 10.0];
 /// Protocols that are compared.
 const PROTOCOLS: [Protocol; 2] = [Protocol::Paper, Protocol::Plus];
 
-/// A rival so few nats behind the true effect, or beyond it, is told in the table: at the temperature of the probabilities, five nats, it has a
+/// A rival so few nats behind the true effect, or beyond it, stands in the table: at the temperature of the probabilities, five nats, it has a
 /// four-hundredth of the true one's probability.
 const NEAR_NATS: f64 = 30.0;
 
@@ -25,7 +25,7 @@ const NEAR_NATS: f64 = 30.0;
 #[derive(Debug)]
 struct Said {
     /// In the words of the table.
-    told: String,
+    answer: String,
     /// The best of the other effects, and how many nats it lies beyond the true one.
     nearest: Option<(String, f64)>,
 }
@@ -42,12 +42,12 @@ type Row = [Cell; 2];
 
 impl Said {
     fn of(truth: &str, diagnosis: &Diagnosis) -> Self {
-        Self { told: told(truth, diagnosis), nearest: nearest(truth, diagnosis) }
+        Self { answer: answer(truth, diagnosis), nearest: nearest(truth, diagnosis) }
     }
 }
 
 /// Whether the true name stands alone, is tied, or is not there.
-fn told(truth: &str, diagnosis: &Diagnosis) -> String {
+fn answer(truth: &str, diagnosis: &Diagnosis) -> String {
     let Diagnosis { verdict, named, tied, gross, .. } = diagnosis;
     let is_truth = |name: &&String| *name == truth;
     let all = || named.iter().chain(tied);
@@ -119,17 +119,17 @@ pub(crate) fn matrix(seeds: Range<u64>) -> anyhow::Result<String> {
 }
 
 /// What sessions say, once where all say the same.
-fn in_one(told: impl Iterator<Item = String>) -> String {
-    let mut told: Vec<String> = told.collect();
-    told.dedup();
-    told.join("; ")
+fn in_one(answer: impl Iterator<Item = String>) -> String {
+    let mut answer: Vec<String> = answer.collect();
+    answer.dedup();
+    answer.join("; ")
 }
 
 impl Display for Said {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.told)?;
+        f.write_str(&self.answer)?;
         match self.nearest.as_ref().filter(|(_, nats)| nats.abs() < NEAR_NATS) {
-            Some((name, nats)) if self.told.ends_with(name) => write!(f, " ({nats:+.0})"),
+            Some((name, nats)) if self.answer.ends_with(name) => write!(f, " ({nats:+.0})"),
             Some((name, nats)) => write!(f, " ({name} {nats:+.0})"),
             None => Ok(()),
         }

@@ -6,7 +6,7 @@
 //! `cargo run --release --manifest-path challenge/Cargo.toml --example injections -- ../shared/data/knit_sleeve`
 
 mod inject;
-mod told;
+mod tables;
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use stretch_recording::{ReadOptions, Recording};
 use stretch_gap::{Options, diagnose};
 use stretch_problem::{GaugeSetup, GaugeSimulator};
 use stretch_sim::Catalogue;
-use told::{Said, tables};
+use tables::{Said, tables};
 
 /// Every session and every sensor at least once; the last two get a `partial` answer in their whole length.
 const RECORDS: [(&str, &str); 8] = [
@@ -91,8 +91,8 @@ fn main() -> anyhow::Result<()> {
         let (case, which) = (cases[at / records.len()], at % records.len());
         let said = said(&records[which], case)?;
         let (session, sensor) = RECORDS[which];
-        let told = case.map_or("untouched".into(), |(i, s)| i.in_words(i.strengths[s]));
-        eprintln!("{session} {sensor}, {told}: {}", said.in_short());
+        let what = case.map_or("untouched".into(), |(i, s)| i.in_words(i.strengths[s]));
+        eprintln!("{session} {sensor}, {what}: {}", said.in_short());
         Ok(said)
     })?;
     let by_case: Vec<&[Said]> = all.chunks(records.len()).collect();

@@ -1,16 +1,16 @@
-//! Clutter: everything that is not the rig and not an effect, as it was or drawn for each rig.
+//! Disturbances: everything that is not the rig and not an effect, as it was or drawn for each rig.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::dice::Dice;
+use crate::random::RandomGenerator;
 use crate::rig::{SIGMA_L, SIGMA_P, SIGMA_V};
 
 /// How supply, noise, clock, pauses and start pressures of a case come about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Clutter {
+pub enum Disturbances {
     /// The same in every rig: white Gaussian noise as the data sheet says, a supply that wanders by
     /// 0.25 % over 15 s, pauses of 15 s, samples on the grid.
     Plain,
@@ -19,7 +19,7 @@ pub enum Clutter {
     Drawn,
 }
 
-impl Clutter {
+impl Disturbances {
     /// Both, in the order of reports.
     pub const ALL: [Self; 2] = [Self::Plain, Self::Drawn];
 
@@ -53,41 +53,41 @@ impl Noise {
         Self { sigma, slow: 0.0, memory: 1.0, freedom: 0, outliers: 0.0, outlier_size: 0.0 }
     }
 
-    fn draw(sigma: f64, dice: &mut Dice) -> Self {
-        let mut noise = Self::white(sigma * dice.log_between(0.5, 2.0));
-        if dice.unit() < 0.5 {
-            noise.slow = dice.between(0.1, 0.7);
-            noise.memory = dice.log_between(1.5, 30.0);
+    fn draw(sigma: f64, random: &mut RandomGenerator) -> Self {
+        let mut noise = Self::white(sigma * random.log_between(0.5, 2.0));
+        if random.unit() < 0.5 {
+            noise.slow = random.between(0.1, 0.7);
+            noise.memory = random.log_between(1.5, 30.0);
         }
-        if dice.unit() < 0.5 {
-            noise.freedom = dice.pick(&[3, 4, 5, 7, 10]);
+        if random.unit() < 0.5 {
+            noise.freedom = random.pick(&[3, 4, 5, 7, 10]);
         }
-        if dice.unit() < 0.4 {
-            noise.outliers = dice.log_between(1e-5, 3e-4);
-            noise.outlier_size = dice.log_between(8.0, 60.0);
+        if random.unit() < 0.4 {
+            noise.outliers = random.log_between(1e-5, 3e-4);
+            noise.outlier_size = random.log_between(8.0, 60.0);
         }
         noise
     }
 
     /// Noise of so many samples.
-    pub(crate) fn samples(&self, count: usize, dice: &mut Dice) -> Vec<f64> {
-        let mut slow = if self.slow > 0.0 { dice.gauss() } else { 0.0 };
+    pub(crate) fn samples(&self, count: usize, random: &mut RandomGenerator) -> Vec<f64> {
+        let mut slow = if self.slow > 0.0 { random.gauss() } else { 0.0 };
         let keep = (-1.0 / self.memory).exp();
         (0..count)
             .map(|_| {
-                let mut unit = dice.gauss();
+                let mut unit = random.gauss();
                 if self.freedom > 0 {
                     let n = self.freedom as f64;
-                    let square: f64 = (0..self.freedom).map(|_| dice.gauss().powi(2)).sum();
+                    let square: f64 = (0..self.freedom).map(|_| random.gauss().powi(2)).sum();
                     // Variance n / (n - 2) without the last factor.
                     unit *= (n / square).sqrt() * ((n - 2.0) / n).sqrt();
                 }
                 if self.slow > 0.0 {
-                    slow = keep * slow + (1.0 - keep * keep).sqrt() * dice.gauss();
+                    slow = keep * slow + (1.0 - keep * keep).sqrt() * random.gauss();
                     unit = (1.0 - self.slow).sqrt() * unit + self.slow.sqrt() * slow;
                 }
-                if self.outliers > 0.0 && dice.unit() < self.outliers {
-                    unit += self.outlier_size * if dice.unit() < 0.5 { -1.0 } else { 1.0 };
+                if self.outliers > 0.0 && random.unit() < self.outliers {
+                    unit += self.outlier_size * if random.unit() < 0.5 { -1.0 } else { 1.0 };
                 }
                 self.sigma * unit
             })
@@ -107,7 +107,12 @@ pub(crate) struct SupplyWander {
 
 impl SupplyWander {
     /// Shares by which the supply is off, at knots `step_s` apart.
-    pub(crate) fn knots(&self, count: usize, step_s: f64, dice: &mut Dice) -> Vec<f64> {
+    pub(crate) fn knots(
+        &self,
+        count: usize,
+        step_s: f64,
+        random: &mut RandomGenerator,
+    ) -> Vec<f64> {
         // Lags in a row share the memory.
         let keep = (-step_s * self.order as f64 / self.memory_s).exp();
         let through = |at: &mut [f64], mut x: f64| {
@@ -123,9 +128,9 @@ impl SupplyWander {
         let scale = self.sd / response.map(|x| x * x).sum::<f64>().sqrt();
         let mut at = vec![0.0; self.order];
         for _ in 0..settle {
-            through(&mut at, dice.gauss());
+            through(&mut at, random.gauss());
         }
-        (0..count).map(|_| scale * through(&mut at, dice.gauss())).collect()
+        (0..count).map(|_| scale * through(&mut at, random.gauss())).collect()
     }
 }
 
@@ -140,13 +145,13 @@ pub(crate) struct StartErrors {
 
 impl StartErrors {
     /// Share of the supply that a full start lacks (below 0: has too much).
-    pub(crate) fn full(&self, dice: &mut Dice) -> f64 {
-        self.full.0 + self.full.1 * dice.gauss()
+    pub(crate) fn full(&self, random: &mut RandomGenerator) -> f64 {
+        self.full.0 + self.full.1 * random.gauss()
     }
 
     /// Pa above the atmosphere of an empty start.
-    pub(crate) fn empty(&self, dice: &mut Dice) -> f64 {
-        -self.empty_pa * (1.0 - dice.unit()).ln()
+    pub(crate) fn empty(&self, random: &mut RandomGenerator) -> f64 {
+        -self.empty_pa * (1.0 - random.unit()).ln()
     }
 }
 
@@ -161,7 +166,7 @@ pub(crate) struct Surroundings {
     pub(crate) drawn: Option<Drawn>,
 }
 
-/// What only drawn clutter has.
+/// What only drawn disturbances have.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Drawn {
     pub(crate) supply: SupplyWander,
@@ -182,29 +187,29 @@ impl Surroundings {
         Self { noise, stated: false, drawn: None }
     }
 
-    pub(crate) fn draw(dice: &mut Dice) -> Self {
-        let stated = dice.unit() < 0.5;
-        let noise = [SIGMA_P, SIGMA_L, SIGMA_V].map(|sigma| Noise::draw(sigma, dice));
+    pub(crate) fn draw(random: &mut RandomGenerator) -> Self {
+        let stated = random.unit() < 0.5;
+        let noise = [SIGMA_P, SIGMA_L, SIGMA_V].map(|sigma| Noise::draw(sigma, random));
         let supply = SupplyWander {
-            sd: dice.log_between(0.001, 0.005),
-            memory_s: dice.log_between(0.3, 30.0),
-            order: 1 + dice.below(3),
+            sd: random.log_between(0.001, 0.005),
+            memory_s: random.log_between(0.3, 30.0),
+            order: 1 + random.below(3),
         };
         let starts = StartErrors {
-            full: (dice.between(-0.001, 0.003), dice.log_between(3e-4, 3e-3)),
-            empty_pa: dice.log_between(20.0, 600.0),
+            full: (random.between(-0.001, 0.003), random.log_between(3e-4, 3e-3)),
+            empty_pa: random.log_between(20.0, 600.0),
         };
-        let jitter_s = if dice.unit() < 0.5 { dice.log_between(2e-5, 3e-4) } else { 0.0 };
-        let stamped = jitter_s > 0.0 && dice.unit() < 0.5;
-        let dropped = if dice.unit() < 0.5 { dice.log_between(1e-4, 1e-2) } else { 0.0 };
+        let jitter_s = if random.unit() < 0.5 { random.log_between(2e-5, 3e-4) } else { 0.0 };
+        let stamped = jitter_s > 0.0 && random.unit() < 0.5;
+        let dropped = if random.unit() < 0.5 { random.log_between(1e-4, 1e-2) } else { 0.0 };
         let drawn = Drawn {
             supply,
             starts,
-            pause_s: (dice.between(9.0, 20.0), dice.between(0.0, 4.0)),
+            pause_s: (random.between(9.0, 20.0), random.between(0.0, 4.0)),
             jitter_s,
             stamped,
             dropped,
-            in_a_row: if dice.unit() < 0.5 { 1.0 } else { dice.between(1.0, 6.0) },
+            in_a_row: if random.unit() < 0.5 { 1.0 } else { random.between(1.0, 6.0) },
         };
         Self { noise, stated, drawn: Some(drawn) }
     }
@@ -246,34 +251,34 @@ impl Surroundings {
 
 impl Drawn {
     /// One pause, s.
-    pub(crate) fn pause(&self, dice: &mut Dice) -> f64 {
+    pub(crate) fn pause(&self, random: &mut RandomGenerator) -> f64 {
         let (mean, spread) = self.pause_s;
-        ((mean + spread * dice.gauss()).clamp(8.0, 25.0) * 100.0).round() / 100.0
+        ((mean + spread * random.gauss()).clamp(8.0, 25.0) * 100.0).round() / 100.0
     }
 
     /// How much later than on the grid each sample is taken, s; empty when on the grid.
-    pub(crate) fn offsets(&self, count: usize, dice: &mut Dice) -> Vec<f64> {
+    pub(crate) fn offsets(&self, count: usize, random: &mut RandomGenerator) -> Vec<f64> {
         if self.jitter_s == 0.0 {
             return Vec::new();
         }
         // The order of samples is kept: they are 10 ms apart.
-        let late = |i| if i == 0 { 0.0 } else { self.jitter_s * dice.gauss() };
+        let late = |i| if i == 0 { 0.0 } else { self.jitter_s * random.gauss() };
         (0..count).map(late).map(|late: f64| late.clamp(-2e-3, 2e-3)).collect()
     }
 
     /// Which samples are missing; empty when none is. The first one is always there.
-    pub(crate) fn missing(&self, count: usize, dice: &mut Dice) -> Vec<bool> {
+    pub(crate) fn missing(&self, count: usize, random: &mut RandomGenerator) -> Vec<bool> {
         if self.dropped == 0.0 {
             return Vec::new();
         }
         let mut left = 0.0;
         (0..count)
             .map(|i| {
-                if left < 0.5 && dice.unit() < self.dropped / self.in_a_row {
+                if left < 0.5 && random.unit() < self.dropped / self.in_a_row {
                     // A geometric length of this mean.
                     let more = 1.0 - 1.0 / self.in_a_row;
                     left = if more > 0.0 {
-                        1.0 + ((1.0 - dice.unit()).ln() / more.ln()).floor()
+                        1.0 + ((1.0 - random.unit()).ln() / more.ln()).floor()
                     } else {
                         1.0
                     };
@@ -298,10 +303,10 @@ mod tests {
 
     #[test]
     fn noise_has_the_level_it_says_whatever_its_colour_and_tails() {
-        let mut dice = Dice::new(7, 1);
+        let mut random = RandomGenerator::new(7, 1);
         for (slow, freedom) in [(0.0, 0), (0.5, 0), (0.0, 5), (0.5, 7)] {
             let noise = Noise { slow, memory: 5.0, freedom, ..Noise::white(0.3) };
-            let x = noise.samples(200_000, &mut dice);
+            let x = noise.samples(200_000, &mut random);
             let level = abs_diff_eq!(sd(&x), 0.3, epsilon = BLIND_NOISE * 0.3);
             assert!(level, "{slow} {freedom}: {}", sd(&x));
             let lag: f64 = x.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / x.len() as f64 / 0.09;
@@ -311,11 +316,11 @@ mod tests {
 
     #[test]
     fn the_supply_wanders_by_its_level_and_for_its_time() {
-        let mut dice = Dice::new(7, 2);
+        let mut random = RandomGenerator::new(7, 2);
         for order in 1..=3 {
             for memory_s in [0.3, 5.0] {
                 let wander = SupplyWander { sd: 0.003, memory_s, order };
-                let x = wander.knots(400_000, 0.1, &mut dice);
+                let x = wander.knots(400_000, 0.1, &mut random);
                 let level = abs_diff_eq!(sd(&x), 0.003, epsilon = BLIND_SUPPLY * 0.003);
                 assert!(level, "{order} {memory_s} {}", sd(&x));
                 let lag = (memory_s / 0.1) as usize;
@@ -329,11 +334,11 @@ mod tests {
 
     #[test]
     fn as_many_rows_are_missing_as_are_said_to_be() {
-        let mut dice = Dice::new(7, 3);
-        let mut drawn = Surroundings::draw(&mut dice).drawn.expect("drawn");
+        let mut random = RandomGenerator::new(7, 3);
+        let mut drawn = Surroundings::draw(&mut random).drawn.expect("drawn");
         for in_a_row in [1.0, 4.0] {
             drawn = Drawn { dropped: 0.01, in_a_row, ..drawn };
-            let gone = drawn.missing(400_000, &mut dice);
+            let gone = drawn.missing(400_000, &mut random);
             let share = gone.iter().filter(|&&g| g).count() as f64 / 400_000.0;
             assert!(!gone[0]);
             assert_abs_diff_eq!(share, 0.01, epsilon = BLIND_ROWS * 0.01);

@@ -5,9 +5,9 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 
 /// A seeded source of uniform and Gaussian numbers.
 #[derive(Debug, Clone)]
-pub(crate) struct Dice(ChaCha8Rng);
+pub(crate) struct RandomGenerator(ChaCha8Rng);
 
-impl Dice {
+impl RandomGenerator {
     /// Stream `stream` of `seed`: streams of one seed do not overlap.
     pub(crate) fn new(seed: u64, stream: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -66,14 +66,14 @@ mod tests {
 
     #[test]
     fn moments_are_those_of_the_distributions() {
-        let mut dice = Dice::new(5, 1);
+        let mut random = RandomGenerator::new(5, 1);
         let n = 40_000;
-        let draws: Vec<f64> = (0..n).map(|_| dice.gauss()).collect();
+        let draws: Vec<f64> = (0..n).map(|_| random.gauss()).collect();
         let mean = draws.iter().sum::<f64>() / n as f64;
         let var = draws.iter().map(|x| x * x).sum::<f64>() / n as f64;
         // Five standard errors: 1/sqrt(n) of the mean, sqrt(2/n) of the variance.
         assert_abs_diff_eq!(mean, 0.0, epsilon = 5.0 / (n as f64).sqrt());
         assert_abs_diff_eq!(var, 1.0, epsilon = 5.0 * (2.0 / n as f64).sqrt());
-        assert_ne!(Dice::new(5, 1).bits(), Dice::new(5, 2).bits());
+        assert_ne!(RandomGenerator::new(5, 1).bits(), RandomGenerator::new(5, 2).bits());
     }
 }

@@ -1,0 +1,15 @@
+#!/bin/sh
+# Format, lints, tests and a check of four cases, which the gate of the project calls. What it builds stands in the target folder
+# of the project, for most of it is built there already.
+set -eu
+cd "$(dirname "$0")"
+export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/../target}"
+
+cargo fmt --check --package stretch-challenge --package stretch-blind
+cargo clippy --quiet --locked --workspace --all-targets -- -D warnings
+cargo test --quiet --locked --workspace --lib --bins --tests
+cargo test --quiet --locked --workspace --doc
+# the page is then looked at in a browser, by web/gate.sh
+check="$CARGO_TARGET_DIR/challenge-check"
+rm -rf "$check"
+cargo run --quiet --locked -- --cases 4 --seed 3 --out "$check"

@@ -2,11 +2,11 @@
 
 use stretch_core::{Calibration, Real, Runner, Volts};
 use stretch_data::{Channel, Trial};
-use stretch_recording::{ReadOptions, Recording};
 use stretch_receptor::{
     Receptor,
     code::{Adc, AdcCode, AdcSpec, CodeArithmetic, CodeCalibration, CodeReceptor, FixedObserver},
 };
+use stretch_recording::{ReadOptions, Recording};
 
 /// Samples that loggers and broken sensors bring.
 const ODD: [f64; 16] = [

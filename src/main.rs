@@ -5,6 +5,7 @@
 
 mod commands;
 mod display;
+mod paper;
 mod table;
 mod terminal;
 

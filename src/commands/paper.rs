@@ -3,14 +3,13 @@
 use std::path::Path;
 
 use stretch_files::write_folder;
-use stretch_paper::{Experiment, PUBLISHED, Pipeline};
-use stretch_report::{error_rows, fit_rows, paper_page, verdicts};
 use stretch_sim::paper_preset;
 
 use super::{
     json::Json,
     shared::{or_force, progress, say, tell, write_text},
 };
+use crate::paper::{Experiment, PUBLISHED, Pipeline, error_rows, fit_rows, paper_page, verdicts};
 use crate::table::{number, p_value, table};
 
 pub(super) fn run(out: &Path, force: bool, seed: u64, json: &Json) -> anyhow::Result<()> {

@@ -67,7 +67,7 @@ impl Ink {
     ];
 
     /// The ink of the `index`-th thing compared; a sixth looks like the first.
-    pub(crate) fn of(index: usize) -> Self {
+    pub fn of(index: usize) -> Self {
         [Self::First, Self::Second, Self::Third, Self::Fourth, Self::Fifth][index % 5]
     }
 

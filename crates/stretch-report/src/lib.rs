@@ -20,8 +20,6 @@ mod markup;
 mod memory_figure;
 mod multiple;
 mod page;
-mod paper_page;
-mod paper_tables;
 mod plain;
 mod script;
 mod slice_figure;
@@ -37,8 +35,6 @@ pub use diagnosis_tables::{baseline_table, candidate_table, stage_table, transfe
 pub use markup::percent;
 pub use multiple::times;
 pub use page::Table;
-pub use paper_page::paper_page;
-pub use paper_tables::{error_rows, fit_rows, verdicts};
 pub use plain::{effect_in_words, listed, number, transfer_in_words};
 pub use subject::Subject;
 

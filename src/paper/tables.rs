@@ -1,12 +1,15 @@
 //! The paper's experiment beside the published figures: rows and sentences, for a terminal and a page.
 
 use stretch_calibrate::{Evaluation, FitReport, MethodErrors};
-use stretch_paper::{Experiment, PUBLISHED, PublishedErrors, PublishedFit};
+use stretch_report::number;
 
-use crate::plain::number;
+use super::{
+    experiment::Experiment,
+    published::{PUBLISHED, PublishedErrors, PublishedFit},
+};
 
 /// A fit, what the paper prints, and the same fit with our decisions.
-pub fn fit_rows(experiment: &Experiment) -> Vec<Vec<String>> {
+pub(crate) fn fit_rows(experiment: &Experiment) -> Vec<Vec<String>> {
     let (there, here) = (&experiment.published, &experiment.ours);
     let row = |name: String, a: (f64, f64), paper: PublishedFit, b: (f64, f64)| {
         vec![
@@ -43,7 +46,7 @@ pub fn fit_rows(experiment: &Experiment) -> Vec<Vec<String>> {
 }
 
 /// A method's errors, what the paper prints, and the same with our decisions.
-pub fn error_rows(
+pub(crate) fn error_rows(
     there: &Evaluation,
     paper: &[PublishedErrors; 3],
     here: &Evaluation,
@@ -71,7 +74,7 @@ pub fn error_rows(
 }
 
 /// Plain sentences, each decided by the figures.
-pub fn verdicts(experiment: &Experiment) -> Vec<String> {
+pub(crate) fn verdicts(experiment: &Experiment) -> Vec<String> {
     let there = &experiment.published;
     let mut said = Vec::new();
     let mut judge = |holds: bool, agrees: &str, differs: &str| {

@@ -4,40 +4,40 @@ use serde::Serialize;
 
 /// A fit as published.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct PublishedFit {
+pub(crate) struct PublishedFit {
     /// Coefficient of determination.
-    pub r_squared: f64,
+    pub(crate) r_squared: f64,
     /// RMSE in percent of normalised strain; none for the linear fit.
-    pub rmse_percent: Option<f64>,
+    pub(crate) rmse_percent: Option<f64>,
 }
 
 /// A method's errors as published: average error in percent, RMSE in
-/// millimetres (printed as percent; see the crate's front page of limits).
+/// millimetres (the paper prints them as percent).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct PublishedErrors {
+pub(crate) struct PublishedErrors {
     /// `raw`, `linear` or `non-linear`.
-    pub method: &'static str,
+    pub(crate) method: &'static str,
     /// Average error, percent.
-    pub average_error_percent: f64,
+    pub(crate) average_error_percent: f64,
     /// RMSE, millimetres.
-    pub rmse_mm: f64,
+    pub(crate) rmse_mm: f64,
 }
 
 /// Everything that the paper prints and an experiment can be held against.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct PublishedFigures {
+pub(crate) struct PublishedFigures {
     /// The linear fit.
-    pub linear: PublishedFit,
+    pub(crate) linear: PublishedFit,
     /// Its slope and intercept.
-    pub line: (f64, f64),
+    pub(crate) line: (f64, f64),
     /// poly13 on inflations: next lower order, chosen, next higher.
-    pub inflation: [PublishedFit; 3],
+    pub(crate) inflation: [PublishedFit; 3],
     /// poly13 on deflations: next lower order, chosen, next higher.
-    pub deflation: [PublishedFit; 3],
+    pub(crate) deflation: [PublishedFit; 3],
     /// Raw, linear and non-linear on arbitrary actuation.
-    pub arbitrary: [PublishedErrors; 3],
+    pub(crate) arbitrary: [PublishedErrors; 3],
     /// Raw, linear and non-linear on pulses.
-    pub pulses: [PublishedErrors; 3],
+    pub(crate) pulses: [PublishedErrors; 3],
 }
 
 const fn fit(r_squared: f64, rmse_percent: f64) -> PublishedFit {
@@ -49,12 +49,7 @@ const fn errors(method: &'static str, average_error_percent: f64, rmse_mm: f64) 
 }
 
 /// What the paper prints.
-///
-/// ```
-/// use stretch_paper::PUBLISHED;
-/// assert_eq!(PUBLISHED.line, (0.9744, 0.1757));
-/// ```
-pub const PUBLISHED: PublishedFigures = PublishedFigures {
+pub(crate) const PUBLISHED: PublishedFigures = PublishedFigures {
     linear: PublishedFit { r_squared: 0.9680, rmse_percent: None },
     line: (0.9744, 0.1757),
     inflation: [fit(0.9806, 4.890), fit(0.9934, 2.851), fit(0.9938, 2.765)],

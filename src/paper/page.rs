@@ -1,17 +1,17 @@
 //! The paper's experiment as a page.
 
 use plotters::prelude::*;
-use stretch_paper::{Experiment, PUBLISHED};
+use stretch_report::kit::{Area, Axes, Drawn, Figure, Frame, Ink, Page, Table, plot, stroke};
 
 use super::{
-    canvas::Ink,
-    figure::{Area, Axes, Drawn, Figure, Frame, plot, stroke},
-    page::{Page, Table},
+    experiment::Experiment,
+    gaps::GapPoint,
+    published::PUBLISHED,
+    tables::{error_rows, fit_rows, verdicts},
 };
-use crate::paper_tables::{error_rows, fit_rows, verdicts};
 
 /// Tables beside the published ones, and the two figures that the paper asks for.
-pub fn paper_page(experiment: &Experiment) -> String {
+pub(crate) fn paper_page(experiment: &Experiment) -> String {
     let arbitrary = |method: usize| experiment.published.arbitrary.pooled[method].rmse;
     let verdict = format!(
         "On a simulated rig the published method is off by {:.2} mm on arbitrary actuation; the raw signal by {:.2} mm. \
@@ -102,7 +102,7 @@ fn top(curves: &[Curve]) -> f64 {
 }
 
 fn gap_figure(experiment: &Experiment) -> Figure {
-    let curve = |of: fn(&stretch_paper::GapPoint) -> f64| {
+    let curve = |of: fn(&GapPoint) -> f64| {
         experiment.gaps.iter().map(|point| (point.gap_s, of(point))).collect::<Vec<_>>()
     };
     let curves = [

@@ -5,25 +5,26 @@ use stretch_calibrate::Options;
 use stretch_data::TrialKind;
 use stretch_sim::{Rig, RunSettings, Session, TrialPlan};
 
-use crate::{
-    FrequencyPoint, GapPoint, PaperError, Pipeline, frequency_response, pipeline::SerialPipeline,
-    pulse_gaps,
+use super::{
+    frequency::{FrequencyPoint, frequency_response},
+    gaps::{GapPoint, pulse_gaps},
+    pipeline::{Pipeline, SerialPipeline},
 };
 
 /// The paper's experiment on a simulated rig.
 #[derive(Debug, Clone)]
-pub struct Experiment {
+pub(crate) struct Experiment {
     /// Seed of commands and noise.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Central differences, strain rate at calibration and voltage rate at use,
     /// each trial normalised by its own range, no dead band.
-    pub published: Pipeline,
+    pub(crate) published: Pipeline,
     /// Live rates at calibration and use, ranges frozen, dead band.
-    pub ours: Pipeline,
+    pub(crate) ours: Pipeline,
     /// Error against the gap between two pulses.
-    pub gaps: Vec<GapPoint>,
+    pub(crate) gaps: Vec<GapPoint>,
     /// What the sensor makes of sines.
-    pub frequency: Vec<FrequencyPoint>,
+    pub(crate) frequency: Vec<FrequencyPoint>,
 }
 
 /// The serialisable part of an [`Experiment`].
@@ -38,10 +39,7 @@ pub(crate) struct Serial<'a> {
 
 impl Experiment {
     /// Runs it all: twelve ramps to fit, an arbitrary and a pulse trial to judge.
-    ///
-    /// # Errors
-    /// [`PaperError`] for a rig that cannot be simulated or calibrated.
-    pub fn run(rig: &Rig, seed: u64) -> Result<Self, PaperError> {
+    pub(crate) fn run(rig: &Rig, seed: u64) -> anyhow::Result<Self> {
         let settings = RunSettings { seed, ..RunSettings::default() };
         let mut session = Session::new(rig, &settings)?;
         let (mut ramps, mut arbitrary, mut pulses) = (Vec::new(), Vec::new(), Vec::new());
@@ -61,7 +59,7 @@ impl Experiment {
     }
 
     /// All tables, for a file.
-    pub fn to_serialise(&self) -> impl Serialize + '_ {
+    pub(crate) fn to_serialise(&self) -> impl Serialize + '_ {
         Serial {
             seed: self.seed,
             published: self.published.serial(),

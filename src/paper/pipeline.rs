@@ -7,21 +7,19 @@ use stretch_calibrate::{
 };
 use stretch_data::Trial;
 
-use crate::PaperError;
-
 /// Both calibrations, fitted and applied one way.
 #[derive(Debug, Clone)]
-pub struct Pipeline {
+pub(crate) struct Pipeline {
     /// The linear calibration.
-    pub linear: Calibrated,
+    pub(crate) linear: Calibrated,
     /// Two poly13 surfaces.
-    pub non_linear: Calibrated,
+    pub(crate) non_linear: Calibrated,
     /// A model that remembers, fitted to the same ramps; ours alone.
-    pub observer: Option<Calibrated>,
+    pub(crate) observer: Option<Calibrated>,
     /// Raw, linear, non-linear and the observer on arbitrary actuation.
-    pub arbitrary: Evaluation,
+    pub(crate) arbitrary: Evaluation,
     /// Raw, linear, non-linear and the observer on pulses.
-    pub pulses: Evaluation,
+    pub(crate) pulses: Evaluation,
 }
 
 #[derive(Debug, Serialize)]
@@ -38,7 +36,7 @@ impl Pipeline {
         arbitrary: &[Trial],
         pulses: &[Trial],
         own_ranges: bool,
-    ) -> Result<Self, PaperError> {
+    ) -> anyhow::Result<Self> {
         let linear = calibrate(ramps, &Options { model: ModelKind::Linear, ..options.clone() })?;
         let non_linear = calibrate(ramps, options)?;
         // the paper's way has no such model
@@ -54,11 +52,7 @@ impl Pipeline {
     }
 
     /// All methods on other trials, ranges frozen or each trial's own.
-    pub(crate) fn judge(
-        &self,
-        trials: &[Trial],
-        own_ranges: bool,
-    ) -> Result<Evaluation, PaperError> {
+    pub(crate) fn judge(&self, trials: &[Trial], own_ranges: bool) -> anyhow::Result<Evaluation> {
         judge(&self.linear, &self.non_linear, self.observer.as_ref(), trials, own_ranges)
     }
 
@@ -81,7 +75,7 @@ fn judge(
     observer: Option<&Calibrated>,
     trials: &[Trial],
     own_ranges: bool,
-) -> Result<Evaluation, PaperError> {
+) -> anyhow::Result<Evaluation> {
     let (mut line, mut surfaces) = (linear.calibration.clone(), non_linear.calibration.clone());
     if own_ranges && let [trial] = trials {
         line = on_own_ranges(&line, trial)?;

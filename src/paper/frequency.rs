@@ -5,8 +5,6 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 use stretch_sim::{Grid, Key, Rig, Sensing, SimError, Start};
 
-use crate::PaperError;
-
 /// Frequencies, in hertz.
 const FREQUENCIES_HZ: [f64; 12] = [0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.6, 2.5, 4.0, 7.0, 12.0];
 
@@ -21,22 +19,19 @@ const RATE_HZ: f64 = 500.0;
 
 /// Gain and phase of the bridge voltage at one frequency.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub struct FrequencyPoint {
+pub(crate) struct FrequencyPoint {
     /// Frequency of the length, in hertz.
-    pub frequency_hz: f64,
+    pub(crate) frequency_hz: f64,
     /// Amplitude of the voltage's fundamental over that of the length, in volts
     /// per millimetre.
-    pub gain_v_per_mm: f64,
+    pub(crate) gain_v_per_mm: f64,
     /// Phase by which the voltage leads the contraction, in degrees.
-    pub lead_deg: f64,
+    pub(crate) lead_deg: f64,
 }
 
 /// Drives the sensing stage by sines of 3 mm about the middle of the stroke, at
 /// constant pressure, without noise, and fits the fundamental by least squares.
-///
-/// # Errors
-/// [`PaperError`] for a rig that cannot be simulated.
-pub fn frequency_response(rig: &Rig) -> Result<Vec<FrequencyPoint>, PaperError> {
+pub(crate) fn frequency_response(rig: &Rig) -> anyhow::Result<Vec<FrequencyPoint>> {
     let grid = Grid::samples(1.0 / RATE_HZ).map_err(SimError::from)?;
     let stage = Sensing::new(&rig.params, &rig.effects, &grid)?;
     let middle_mm = rig.params[Key::L0] * (1.0 - 0.5 * rig.params[Key::KMax]);

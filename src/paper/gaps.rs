@@ -4,7 +4,7 @@ use serde::Serialize;
 use stretch_data::{Split, TrialKind};
 use stretch_sim::{RATE_HZ, Session, TrialPlan};
 
-use crate::{PaperError, Pipeline};
+use super::pipeline::Pipeline;
 
 /// Gaps that are tried, in seconds: the paper's range and a little beyond.
 const GAPS_S: [f64; 9] = [0.10, 0.15, 0.22, 0.32, 0.46, 0.66, 0.95, 1.4, 2.0];
@@ -14,27 +14,24 @@ const TRIAL_S: f64 = 30.0;
 
 /// Errors on a trial whose pulse pairs all have one gap.
 #[derive(Debug, Clone, Serialize)]
-pub struct GapPoint {
+pub(crate) struct GapPoint {
     /// From the end of the first pulse to the start of the second, in seconds.
-    pub gap_s: f64,
+    pub(crate) gap_s: f64,
     /// RMSE of raw, linear and non-linear as published, in millimetres.
-    pub published_rmse_mm: [f64; 3],
+    pub(crate) published_rmse_mm: [f64; 3],
     /// RMSE of raw, linear, non-linear and the observer as decided here, in millimetres.
-    pub ours_rmse_mm: [f64; 4],
+    pub(crate) ours_rmse_mm: [f64; 4],
 }
 
 /// Goes on with a session: a trial of pulse pairs for each gap.
 ///
 /// Pulses are 0.25 s of full inlet; the outlet is open in the gap and for 1 s
 /// after a pair, then both valves are shut for 0.5 s.
-///
-/// # Errors
-/// [`PaperError`] when a trial cannot be simulated or judged.
-pub fn pulse_gaps(
+pub(crate) fn pulse_gaps(
     session: &mut Session,
     published: &Pipeline,
     ours: &Pipeline,
-) -> Result<Vec<GapPoint>, PaperError> {
+) -> anyhow::Result<Vec<GapPoint>> {
     let mut points = Vec::new();
     for gap_s in GAPS_S {
         let (_, trial) = session.run(&pairs(gap_s))?;

@@ -401,7 +401,7 @@ fn answer(
     let curve = |(stage, e): (usize, &stretch_gap::StageEvidence)| {
         let measured = bench.measured(stage).to_vec();
         let curves = [measured, e.raw.clone(), e.retuned.clone(), e.after.clone()];
-        (bench.stages()[stage].channel.clone(), curves)
+        (bench.description().stages[stage].channel.clone(), curves)
     };
     let curves = evidence.stages.iter().enumerate().map(curve).collect();
     let subject =

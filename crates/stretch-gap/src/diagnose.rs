@@ -141,7 +141,7 @@ fn run(
         sanity: &sanity,
         is_record: !gross.is_empty(),
     };
-    let rows_used = simulator.rows_used();
+    let rows_used = simulator.description().rows_used();
     let thin = thin(&evidence.frame, rows_used, simulator.dt_s());
     let is_short = is_short(&evidence.frame, simulator.dt_s());
     let judged = carried(judge(case, thresholds), thin);

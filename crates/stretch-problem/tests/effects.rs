@@ -73,14 +73,14 @@ fn unseen<L: Laboratory>(simulator: &L) -> Vec<String> {
             all.any(|((_, x), plain)| simulator.predict(model, x).unwrap() != *plain)
         })
     };
-    let names = simulator.effects().iter().enumerate();
+    let names = simulator.description().effects.iter().enumerate();
     names.filter(|(i, _)| !is_seen(*i)).map(|(_, e)| e.name.clone()).collect()
 }
 
 #[test]
 fn every_effect_changes_an_experiment() {
     let rig = simulator(&Rig::default(), 1, &Catalogue::default());
-    assert_eq!(rig.effects().len(), CATALOGUE.len());
+    assert_eq!(rig.description().effects.len(), CATALOGUE.len());
     assert_eq!(unseen(&rig), [""; 0]);
     assert_eq!(unseen(&gauge()), [""; 0]);
 }
@@ -88,7 +88,7 @@ fn every_effect_changes_an_experiment() {
 #[test]
 fn every_effect_can_be_told_by_an_experiment() {
     let rig = simulator(&Rig::default(), 1, &Catalogue::default());
-    for (i, effect) in rig.effects().iter().enumerate() {
+    for (i, effect) in rig.description().effects.iter().enumerate() {
         let model = models(&rig, i).pop().unwrap();
         let d = differences(&rig, &model, &Model::nominal(&rig)).unwrap();
         assert!(d.iter().all(|x| x.1.is_finite()), "{}: {d:?}", effect.name);
@@ -99,7 +99,7 @@ fn every_effect_can_be_told_by_an_experiment() {
 #[test]
 fn what_a_diagnosis_answers_is_what_a_simulation_takes() {
     let rig = simulator(&Rig::default(), 1, &Catalogue::default());
-    for effect in rig.effects() {
+    for effect in &rig.description().effects {
         for start in &effect.starts {
             let names = effect.parameters.iter().map(|p| p.name.as_str());
             let given: Vec<(&str, f64)> = names.zip(start.iter().copied()).collect();
@@ -118,7 +118,7 @@ fn what_a_diagnosis_answers_is_what_a_simulation_takes() {
         gain: Tolerance::Exact,
         effects: EffectSet::new(),
     };
-    for effect in gauge().effects() {
+    for effect in &gauge().description().effects {
         for start in &effect.starts {
             let names = effect.parameters.iter().map(|p| p.name.clone());
             let parameters = names.zip(start.iter().copied()).collect();
@@ -135,7 +135,7 @@ fn an_effect_of_ones_own_is_simulated_listed_and_named() {
     rig.effects.push(&CHARGER, &[0.02]).unwrap();
     let catalogue = Catalogue::default().with(&CHARGER).unwrap();
     let simulator = simulator(&rig, 3, &catalogue);
-    assert_eq!(simulator.effects().last().unwrap().name, "charger_ripple");
+    assert_eq!(simulator.description().effects.last().unwrap().name, "charger_ripple");
     let options = Options { depth: 1, ..Options::default() };
     let (diagnosis, _) = diagnose(&simulator, &options, &|_| (), &|| false).unwrap();
     assert_eq!(diagnosis.verdict, VerdictKind::Effect, "{}", diagnosis.sentence);

@@ -238,9 +238,9 @@ fn what_a_rate_cannot_show_is_not_looked_for() {
     let session = RigSession::new(&trials).expect("a session");
     let setup = RigSetup { session, rig: Rig::default(), catalogue: &catalogue };
     let rig = RigSimulator::new(setup).expect("a rig");
-    assert!(rig.effects().iter().all(|e| e.name != "mains_hum"));
+    assert!(rig.description().effects.iter().all(|e| e.name != "mains_hum"));
     assert!(rig.notes().iter().any(|n| n.starts_with("mains_hum is not looked for")));
-    assert_eq!(rig.dt_s(), 2.0 * DT_S);
+    assert_eq!(rig.description().dt_s, 2.0 * DT_S);
 }
 
 /// Slack and a saturated amplifier bend the same end of the voltage; at 0.7 of the excitation only one of them moves with it. The trial

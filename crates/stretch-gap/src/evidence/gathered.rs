@@ -119,7 +119,7 @@ pub(crate) fn held_out(
     let mut whole: Vec<f64> = apart.iter().zip(&metric.floor.sd).map(|(x, sd)| x / sd).collect();
     let mut residual = whole.clone();
     metric.clean(&compare.frame, &mut residual);
-    let lines = simulator.lines(stage, model);
+    let lines = simulator.spectral_lines().map_or_else(Vec::new, |s| s.lines(stage, model));
     for tested in compare.frame.of_role(Role::Test).map(|s| s.from..s.to) {
         let floor = &metric.floor.sd[tested.clone()];
         for line in &lines {

@@ -74,7 +74,8 @@ fn turned<'a>(problem: &Problem<'a>, best: &Hypothesis, stage: usize) -> Vec<Tur
     let mut turned = Vec::new();
     for &effect in &best.effects {
         let own = &simulator.effects()[effect];
-        if !own.touches.contains(&stage) || own.is_found || simulator.is_costly(effect) {
+        let is_costly = simulator.costly().is_some_and(|c| c.is_costly(effect));
+        if !own.touches.contains(&stage) || own.is_found || is_costly {
             continue;
         }
         let fitted = best.model.effect(effect).unwrap_or_default();

@@ -3,7 +3,7 @@
 //! Two signs that data come from something else than the simulator is of:
 //!
 //! * *foreign*: more of a channel's variance is left on the test trials than a missing effect leaves
-//!   ([`Simulator::foreign_share`]): another rig, or a column that is not what its name says. The share is that of
+//!   ([`RecordFacts::gross_misfit_share`](crate::RecordFacts::gross_misfit_share)): another rig, or a column that is not what its name says. The share is that of
 //!   1 - R^2, noise taken off: (sum (y - y_sim)^2 - N floor^2)/sum (y - mean y)^2;
 //! * *strained*: two parameters of a stage stand at the end of their tolerances and more than noise is left all the same. If the
 //!   same two, set loose, explain as much without any effect, what bends them is no effect but other parameters.
@@ -61,7 +61,7 @@ impl Sanity {
         let left = (0..evidence.stages.len()).map(|stage| left(simulator, evidence, stage));
         Ok(Self {
             left: left.collect(),
-            allowed: simulator.foreign_share(),
+            allowed: simulator.record().gross_misfit_share,
             strained: strained(problem, best, evidence)?,
         })
     }

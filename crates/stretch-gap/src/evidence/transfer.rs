@@ -64,7 +64,7 @@ pub(crate) fn transfer(
     seed: u64,
 ) -> Result<Option<Transfer>, GapError> {
     let simulator = runs.simulator();
-    let Some(sensor) = simulator.sensor() else { return Ok(None) };
+    let Some(sensor) = simulator.record().sensor else { return Ok(None) };
     let motion = simulator.motion().values;
     let real = Records { reference: motion.to_vec(), signal: simulator.measured(sensor).to_vec() };
     let first = &evidence.stages[0];

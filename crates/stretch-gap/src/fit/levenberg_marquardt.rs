@@ -226,7 +226,8 @@ impl<'a, 'b> Descent<'a, 'b> {
         match coordinate {
             Coordinate::Nominal { .. } => false,
             Coordinate::Linear { slot, .. } | Coordinate::Log { slot, .. } => {
-                self.compare.simulator().is_costly(self.model.effects[slot].0)
+                let costly = self.compare.simulator().costly();
+                costly.is_some_and(|c| c.is_costly(self.model.effects[slot].0))
             }
         }
     }
@@ -268,7 +269,7 @@ impl<'a, 'b> Descent<'a, 'b> {
             [(bounds[0] - x[i]).max(-c.stride()), (bounds[1] - x[i]).min(c.stride())]
         };
         let (low, high): (Vec<f64>, Vec<f64>) = (0..n).map(reach).map(|[l, h]| (l, h)).unzip();
-        let is_counted = self.compare.simulator().model_runs().is_some();
+        let is_counted = self.compare.simulator().costly().is_some();
         for _ in 0..TRIES {
             let mut damped = self.normal.clone();
             for i in 0..n {

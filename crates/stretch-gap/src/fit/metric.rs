@@ -44,7 +44,7 @@ pub(crate) struct Metric {
 pub(crate) struct Loose {
     /// Change of the output, in floors, for one standard deviation as the simulator describes it.
     column: Arc<[f64]>,
-    /// See [`Simulator::wander_clock`](crate::Simulator::wander_clock).
+    /// See [`RecordFacts::drift_clocks`](crate::RecordFacts::drift_clocks).
     clock: Arc<[u32]>,
     /// How it wanders as the simulator describes it; none for an offset.
     pub(crate) wander: Option<Wander>,
@@ -104,12 +104,7 @@ impl Metric {
                 *x = (*x - y) / sd;
             }
             let always = || trials.iter().flat_map(|t| 0..t.samples as u32).collect();
-            let clock = simulator.wander_clock(p).unwrap_or_else(always);
-            if clock.len() < column.len() {
-                let (name, found, needed) = (&spec.name, clock.len(), column.len());
-                let what = format!("the wander clock of {name} has {found} samples of {needed}");
-                return Err(GapError::simulator(what));
-            }
+            let clock = simulator.record().drift_clock(p).map_or_else(always, <[u32]>::to_vec);
             let level = Level { size: 1.0, time_s: spec.wander.map_or(1.0, |w| w.correlation_s) };
             let is_by_tick = spec.per_tick_sd.is_some();
             let (column, clock) = (column.into(), clock.into());

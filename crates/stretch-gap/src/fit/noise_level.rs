@@ -91,7 +91,7 @@ fn floor(
         }
     }
     // What was not measured weighs nothing, and what stands alone.
-    for (sd, _) in sd.iter_mut().zip(simulator.is_lost()).filter(|(_, lost)| **lost) {
+    for (sd, _) in sd.iter_mut().zip(&simulator.record().is_lost).filter(|(_, lost)| **lost) {
         *sd = f64::INFINITY;
     }
     let apart = simulator.measured(stage).iter().zip(&output).zip(&sd);

@@ -72,7 +72,7 @@ impl<'a> Problem<'a> {
     ) -> Result<Self, GapError> {
         let runs = Runs::new(simulator, stop)?;
         // Twice the step, where that is within what half of it may change; runs that are counted may be another's program.
-        if simulator.model_runs().is_none() {
+        if simulator.costly().is_none() {
             match Self::at(runs.at_step(LONGER), seed, progress) {
                 Err(GapError::Solver { .. }) => {}
                 prepared => return prepared,
@@ -308,8 +308,10 @@ fn retuned(
     start: &Model,
 ) -> Result<(Hypothesis, Vec<Information>), GapError> {
     let simulator = compare.simulator();
-    for stage in 0..compare.metrics.len() {
-        simulator.linearise(stage, start, compare.frame.fit_trials)?;
+    if let Some(costly) = simulator.costly() {
+        for stage in 0..compare.metrics.len() {
+            costly.linearise(stage, start, compare.frame.fit_trials)?;
+        }
     }
     let groups = groups(simulator);
     let fits: Result<Vec<_>, GapError> =

@@ -44,7 +44,8 @@ pub(crate) fn propose(
     let Some(stage) = largest else { return Ok(None) };
     let residue = Residue::of(&problem.compare, stage, &base.model)?;
     let choice = choice(&problem.compare.frame);
-    let is_commanded = simulator.input(stage).is_none() && !residue.record.of_kind(true).is_empty();
+    let is_commanded = simulator.driven().is_none_or(|d| d.input(stage).is_none())
+        && !residue.record.of_kind(true).is_empty();
     let sum = pursue(&residue, &choice, is_commanded);
     let settled = settle(&residue, &choice, &sum)?;
     let weighed = weigh(&residue, &choice, &sum, &settled);

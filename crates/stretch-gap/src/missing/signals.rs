@@ -17,7 +17,8 @@ use crate::{
     problem::{
         error::GapError,
         frame::{Frame, Role},
-        simulator::{Recorded, Simulator},
+        record_facts::Recorded,
+        simulator::Simulator,
     },
 };
 
@@ -88,7 +89,7 @@ impl Record {
             trials: ranges,
             grid,
         };
-        let mut all = simulator.recorded();
+        let mut all = recorded(simulator);
         all.retain(|s| s.name != spec.channel && s.values.len() >= begin);
         all.push(Recorded::measured(&spec.channel, &spec.unit, own));
         for signal in all {
@@ -118,6 +119,26 @@ impl Record {
         sorted.sort_by(f64::total_cmp);
         let at = (share * (sorted.len().max(1) - 1) as f64) as usize;
         sorted.get(at).copied().unwrap_or(share)
+    }
+}
+
+/// Everything that a missing term may be a function of: what the record says there is, or else what the stages are fed with, under
+/// the name of the channel before, or else the motion.
+fn recorded(simulator: &dyn Simulator) -> Vec<Recorded> {
+    let known = &simulator.record().signals;
+    if !known.is_empty() {
+        return known.clone();
+    }
+    let fed = (1..simulator.stages().len()).filter_map(|stage| {
+        let before = &simulator.stages()[stage - 1];
+        let input = simulator.driven()?.input(stage)?;
+        Some(Recorded::measured(&before.channel, &before.unit, input))
+    });
+    let fed: Vec<Recorded> = fed.collect();
+    let motion = simulator.motion();
+    match fed.is_empty() {
+        true => vec![Recorded::measured("motion", motion.unit, motion.values.to_vec())],
+        false => fed,
     }
 }
 

@@ -4,50 +4,54 @@
 //! effects are credited with.
 
 use crate::problem::{
-    as_is::as_is,
     description::Description,
     error::GapError,
-    simulator::{Model, Run, Simulator},
+    simulator::{Batch, Costly, Driven, Run, Simulator, SpectralLines},
     spec::ParameterSpec,
-    spectral_line::Line,
 };
 
-/// A simulator whose parameters are told another way: held, or set loose.
+/// A simulator whose parameters are described another way: held, or set loose.
 pub(crate) struct Altered<'a> {
     simulator: &'a dyn Simulator,
     about: Description,
 }
 
 impl<'a> Altered<'a> {
-    /// Every parameter, with its index, as `told`.
+    /// A simulator with every parameter, given with its index, as `altered` makes it.
     pub(crate) fn of(
         simulator: &'a dyn Simulator,
-        told: impl Fn(usize, &ParameterSpec) -> ParameterSpec,
+        altered: impl Fn(usize, &ParameterSpec) -> ParameterSpec,
     ) -> Self {
-        Self { simulator, about: simulator.description().with_parameters(told) }
+        Self { simulator, about: simulator.description().with_parameters(altered) }
     }
 }
 
 impl Simulator for Altered<'_> {
-    as_is!();
-
     fn description(&self) -> &Description {
         &self.about
     }
 
-    fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
-        self.simulator.lines(stage, model)
-    }
-
-    fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {
-        self.simulator.simulate_on(run, input, out)
+    fn measured(&self, stage: usize) -> &[f64] {
+        self.simulator.measured(stage)
     }
 
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
         self.simulator.simulate(run, out)
     }
 
-    fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
-        self.simulator.simulate_many(runs, outs)
+    fn batch(&self) -> Option<&dyn Batch> {
+        self.simulator.batch()
+    }
+
+    fn costly(&self) -> Option<&dyn Costly> {
+        self.simulator.costly()
+    }
+
+    fn driven(&self) -> Option<&dyn Driven> {
+        self.simulator.driven()
+    }
+
+    fn spectral_lines(&self) -> Option<&dyn SpectralLines> {
+        self.simulator.spectral_lines()
     }
 }

@@ -66,11 +66,12 @@ pub struct Column<'a> {
     pub name: Cow<'a, str>,
     /// Unit, `1` where it has none.
     pub unit: Cow<'a, str>,
-    /// All trials end to end; empty for a group of columns (commands) that is looked at as a whole.
+    /// All trials end to end; empty for a group of columns (commands) that is looked at as a whole, and among the
+    /// [facts of a record](crate::RecordFacts) for the output of a stage, whose values the simulator has.
     pub values: Cow<'a, [f64]>,
     /// The stage whose output it is.
     pub output_of: Option<usize>,
-    /// Stages that are driven by it: [`Simulator::put_right`](crate::Simulator::put_right) can put it right for them.
+    /// Stages that are driven by it: [`Driven::corrected`](crate::Driven::corrected) can correct it for them.
     pub read_by: Vec<usize>,
     /// Whether a scale can be told from the simulator's own parameters; a command has nothing but a scale.
     pub is_command: bool,
@@ -81,17 +82,29 @@ pub struct Column<'a> {
 }
 
 impl<'a> Column<'a> {
-    /// The column of a stage's output, where nothing more is known of it.
-    pub fn output(stage: usize, spec: &'a StageSpec, measured: &'a [f64]) -> Self {
+    /// The column of a stage's output, where nothing more is known of it; without its values.
+    pub fn output(stage: usize, spec: &StageSpec) -> Self {
         Self {
-            name: Cow::Borrowed(&spec.channel),
-            unit: Cow::Borrowed(&spec.unit),
-            values: Cow::Borrowed(measured),
+            name: Cow::Owned(spec.channel.clone()),
+            unit: Cow::Owned(spec.unit.clone()),
+            values: Cow::Borrowed(&[]),
             output_of: Some(stage),
             read_by: Vec::new(),
             is_command: false,
             skew_s: [0.0; 2],
             hint: Cow::Borrowed("its sensor, its cable and its scale"),
+        }
+    }
+
+    /// The same column, its texts and values borrowed.
+    pub(crate) fn borrowed(&self) -> Column<'_> {
+        Column {
+            name: Cow::Borrowed(&self.name),
+            unit: Cow::Borrowed(&self.unit),
+            values: Cow::Borrowed(&self.values),
+            hint: Cow::Borrowed(&self.hint),
+            read_by: self.read_by.clone(),
+            ..*self
         }
     }
 }

@@ -1,10 +1,14 @@
 //! A simulator's description, checked once: whatever indexes it afterwards cannot miss.
 
-use std::ops::Deref;
+use std::{ops::Deref, sync::Arc};
 
 use serde::Serialize;
 
-use crate::problem::spec::{EffectParameterSpec, EffectSpec, ParameterSpec, StageSpec, TrialSpec};
+use crate::problem::{
+    record_facts::RecordFacts,
+    rows_used::RowsUsed,
+    spec::{EffectParameterSpec, EffectSpec, ParameterSpec, StageSpec, TrialSpec},
+};
 
 /// What a simulator is made of and what was recorded beside it, as it is written down; [`Description::new`] checks it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -48,7 +52,11 @@ pub struct DescriptionSpec {
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(transparent)]
-pub struct Description(DescriptionSpec);
+pub struct Description {
+    spec: DescriptionSpec,
+    #[serde(skip)]
+    record: Arc<RecordFacts>,
+}
 
 /// What is wrong with a description: where, what was found, what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -146,24 +154,45 @@ impl Description {
             number(&owner, "samples", trial.samples as f64, "1 or more", |x| x >= 1.0)?;
             number(&owner, "start_s", trial.start_s, "finite", f64::is_finite)?;
         }
-        Ok(Self(spec))
+        Ok(Self { spec, record: Arc::default() })
+    }
+
+    /// The same with what is known of the record.
+    ///
+    /// # Errors
+    /// [`DescriptionError`] where an index or a length does not fit the stages, the parameters or the trials.
+    pub fn with_record(self, record: RecordFacts) -> Result<Self, DescriptionError> {
+        record.check(&self.spec)?;
+        Ok(Self { record: Arc::new(record), ..self })
+    }
+
+    /// What is known of the record.
+    pub fn record(&self) -> &RecordFacts {
+        &self.record
+    }
+
+    /// Rows that the trials stand on, of those that were read.
+    pub fn rows_used(&self) -> RowsUsed {
+        let used = self.trials.iter().map(|t| t.samples).sum();
+        self.record.rows_used.unwrap_or(RowsUsed { used, read: used })
     }
 
     /// The same with more effects, which are valid.
     pub(crate) fn with_effects(&self, more: impl Iterator<Item = EffectSpec>) -> Self {
-        let mut spec = self.0.clone();
-        spec.effects.extend(more);
-        Self(spec)
+        let mut out = self.clone();
+        out.spec.effects.extend(more);
+        out
     }
 
-    /// The same with other tolerances: `told` gives every parameter anew, and keeps it valid.
+    /// The same with other tolerances: `altered` gives every parameter anew, and keeps it valid.
     pub(crate) fn with_parameters(
         &self,
-        told: impl Fn(usize, &ParameterSpec) -> ParameterSpec,
+        altered: impl Fn(usize, &ParameterSpec) -> ParameterSpec,
     ) -> Self {
-        let mut spec = self.0.clone();
-        spec.parameters = spec.parameters.iter().enumerate().map(|(i, p)| told(i, p)).collect();
-        Self(spec)
+        let parameters = self.parameters.iter().enumerate().map(|(i, p)| altered(i, p)).collect();
+        let mut out = self.clone();
+        out.spec.parameters = parameters;
+        out
     }
 }
 
@@ -171,11 +200,11 @@ impl Deref for Description {
     type Target = DescriptionSpec;
 
     fn deref(&self) -> &DescriptionSpec {
-        &self.0
+        &self.spec
     }
 }
 
-fn check_parameter(p: &ParameterSpec) -> Result<(), DescriptionError> {
+pub(super) fn check_parameter(p: &ParameterSpec) -> Result<(), DescriptionError> {
     let owner = || format!("parameter `{}`", p.name);
     number(&owner, "nominal", p.nominal, "finite", f64::is_finite)?;
     number(&owner, "sd", p.sd, "0 or more", |x| x >= 0.0)?;
@@ -264,7 +293,7 @@ fn unique<'a>(kind: &str, names: impl Iterator<Item = &'a String>) -> Result<(),
     Ok(())
 }
 
-fn indices(
+pub(super) fn indices(
     owner: &dyn Fn() -> String,
     what: &'static str,
     indices: &[usize],
@@ -277,7 +306,7 @@ fn indices(
 }
 
 /// Refuses what is not finite or does not meet `is_met`.
-fn number(
+pub(super) fn number(
     owner: &dyn Fn() -> String,
     what: &'static str,
     value: f64,

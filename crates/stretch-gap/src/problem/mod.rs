@@ -1,20 +1,21 @@
 //! The problem as its owner poses it: a simulator bound to the measurements that it is held against.
 //!
 //! In: what a user writes, an implementation of [`simulator::Simulator`] with a validated [`description::Description`] of its
-//! stages, parameters, effects and trials ([`spec`]), its noise ([`noise`]) and the columns of its record ([`mod@column`]).
+//! stages, parameters, effects and trials ([`spec`]), its noise ([`noise`]), and what is known of
+//! the record ([`record_facts`], [`mod@column`]).
 //! Out: the samples that are fitted, held out and tested ([`frame`]), and every run, counted, stoppable and finite
 //! ([`runs`]). Two simulators stand before another one: one alters parameters ([`altered_parameters`]), one corrects a
 //! column (in `record`). [`thresholds`] are the calibrated numbers of the decisions.
 //! Imports: `numerics` alone.
 
 pub(crate) mod altered_parameters;
-pub(crate) mod as_is;
 pub(crate) mod column;
 pub(crate) mod description;
 pub(crate) mod error;
 pub(crate) mod frame;
 pub(crate) mod linked_stages;
 pub(crate) mod noise;
+pub(crate) mod record_facts;
 pub(crate) mod rows_used;
 pub(crate) mod runs;
 pub(crate) mod simulator;

@@ -68,7 +68,7 @@ pub struct ParameterSpec {
     pub wander: Option<Wander>,
     /// Standard deviation of a constant offset in each trial, in the parameter's unit.
     pub per_trial_sd: Option<f64>,
-    /// Standard deviation of an offset of its own for each tick of its [wander clock](crate::Simulator::wander_clock), in the
+    /// Standard deviation of an offset of its own for each tick of its [drift clock](crate::RecordFacts::drift_clocks), in the
     /// parameter's unit: what differs from event to event.
     pub per_tick_sd: Option<f64>,
     /// Whether its re-tuned value says anything by itself (not when others can stand in for it).

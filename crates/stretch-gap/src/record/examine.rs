@@ -186,7 +186,7 @@ fn is_large(suspect: &Suspect<'_>, model: &Model, sd: f64) -> bool {
     let sure = |least: f64| size.abs() - SURE * sd > least;
     match (fault.kind, column) {
         (Kind::Parameter(p), _) => {
-            let spec = &suspect.parameters()[p];
+            let spec = &suspect.description().parameters[p];
             let value = model.parameters[p] * (1.0 + size);
             (value - spec.nominal).abs() > REACH * spec.sd
         }
@@ -195,7 +195,7 @@ fn is_large(suspect: &Suspect<'_>, model: &Model, sd: f64) -> bool {
         (Kind::Delay, Some(column)) => {
             let [early, late] = column.skew_s;
             let is_skew = (early - SURE * sd..=late + SURE * sd).contains(&size);
-            sure(LEAST_SAMPLES * suspect.dt_s()) && !is_skew
+            sure(LEAST_SAMPLES * suspect.description().dt_s) && !is_skew
         }
         (Kind::Sign, _) => true,
         _ => false,

@@ -80,7 +80,7 @@ impl Gross {
     pub(crate) fn found(suspect: &Suspect<'_>, hypothesis: &Hypothesis) -> Option<Self> {
         let (fault, size) = suspect.error_of(&hypothesis.model)?;
         if let Kind::Parameter(p) = fault.kind {
-            let spec = &suspect.parameters()[p];
+            let spec = &suspect.description().parameters[p];
             let value = hypothesis.model.parameters[p] * (1.0 + size);
             let unit = if spec.unit == "1" { String::new() } else { format!(" {}", spec.unit) };
             return Some(Self {

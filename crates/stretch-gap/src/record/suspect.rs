@@ -1,32 +1,32 @@
 //! A simulator beside a record, or a rig file, that may be wrong.
 //!
 //! An error is an effect like any other, so that one fit moves it and the nominal parameters together. What was recorded stays what it
-//! is: an output is distorted as the column would be, and a stage that a column drives is driven by the column put right. So every
+//! is: an output is distorted as the column would be, and a stage that a column drives is driven by the corrected column. So every
 //! hypothesis is held against the same numbers.
 
 use std::{collections::VecDeque, sync::Mutex};
 
-use rayon::prelude::*;
-
 use crate::{
     problem::{
-        as_is::as_is,
-        column::Column,
+        column::{Column, Distortion},
         description::Description,
         error::GapError,
-        simulator::{Model, Run, Simulator},
+        simulator::{
+            Batch, Costly, Driven, Model, ModelRuns, Run, Simulator, SpectralLines, side_by_side,
+            simulate_many,
+        },
         spectral_line::Line,
     },
     record::fault::{Fault, Kind},
 };
 
-/// Simulators with a column put right that are kept: those of the probes and steps of the fits under way.
+/// Simulators with a corrected column that are kept: those of the probes and steps of the fits under way.
 const KEPT: usize = 8;
 
-type Driven<'a> = std::sync::Arc<dyn Simulator + Send + 'a>;
+type Corrected<'a> = std::sync::Arc<dyn Simulator + Send + 'a>;
 
-/// Which error, how large (bits), and the simulator driven by the column put right; none where nothing is driven by it.
-type Entry<'a> = (usize, u64, Option<Driven<'a>>);
+/// Which error, how large (bits), and the simulator driven by the corrected column; none where that column drives nothing.
+type Entry<'a> = (usize, u64, Option<Corrected<'a>>);
 
 /// The simulator with its possible errors in the place of the effects.
 pub(crate) struct Suspect<'a> {
@@ -34,7 +34,7 @@ pub(crate) struct Suspect<'a> {
     about: Description,
     columns: Vec<Column<'a>>,
     faults: Vec<Fault>,
-    driven: Mutex<VecDeque<Entry<'a>>>,
+    corrected: Mutex<VecDeque<Entry<'a>>>,
     /// Index of the first error: effects of the catalogue come before.
     first: usize,
 }
@@ -50,7 +50,7 @@ impl<'a> Suspect<'a> {
             simulator,
             columns,
             faults,
-            driven: Mutex::default(),
+            corrected: Mutex::default(),
         }
     }
 
@@ -80,24 +80,24 @@ impl<'a> Suspect<'a> {
         model
     }
 
-    /// The simulator driven by a column put right.
-    fn driven(&self, fault: usize, size: f64) -> Result<Option<Driven<'a>>, GapError> {
+    /// The simulator driven by a corrected column.
+    fn corrected_by(&self, fault: usize, size: f64) -> Result<Option<Corrected<'a>>, GapError> {
         let key = (fault, size.to_bits());
         let found = |kept: &VecDeque<Entry<'a>>| {
             kept.iter().find(|(f, s, _)| (*f, *s) == key).map(|(_, _, driven)| driven.clone())
         };
         // A poisoned list is only a list of what can be made again.
-        let lock = || self.driven.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let lock = || self.corrected.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if let Some(driven) = found(&lock()) {
             return Ok(driven);
         }
         let one = &self.faults[fault];
         let column = one.column.map(|c| &self.columns[c]).filter(|c| !c.read_by.is_empty());
-        let made = match column {
-            None => None,
-            Some(column) => {
-                self.simulator.put_right(&column.name, one.distortion(size))?.map(Driven::from)
+        let made = match (column, self.simulator.driven()) {
+            (Some(column), Some(driven)) => {
+                driven.corrected(&column.name, one.distortion(size))?.map(Corrected::from)
             }
+            _ => None,
         };
         let mut kept = lock();
         kept.push_back((key.0, key.1, made.clone()));
@@ -119,29 +119,12 @@ impl<'a> Suspect<'a> {
 }
 
 impl Simulator for Suspect<'_> {
-    as_is!();
-
     fn description(&self) -> &Description {
         &self.about
     }
 
-    fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
-        self.simulator.lines(stage, &self.without_errors(model))
-    }
-
-    fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {
-        let model = self.without_errors(run.model);
-        self.simulator.simulate_on(Run { model: &model, ..run }, input, out)
-    }
-
-    fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
-        match runs.iter().all(|run| run.model.effects.iter().all(|(e, _)| *e < self.first)) {
-            true => self.simulator.simulate_many(runs, outs),
-            false => {
-                let pairs = runs.par_iter().zip(outs);
-                pairs.map(|(run, out)| self.simulate(*run, out)).collect()
-            }
-        }
+    fn measured(&self, stage: usize) -> &[f64] {
+        self.simulator.measured(stage)
     }
 
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
@@ -158,7 +141,7 @@ impl Simulator for Suspect<'_> {
         let column = fault.column.map(|c| &self.columns[c]);
         let run = Run { model: &model, ..run };
         let is_driven = column.is_some_and(|c| c.read_by.contains(&run.stage));
-        match self.driven(index - self.first, size)?.filter(|_| is_driven) {
+        match self.corrected_by(index - self.first, size)?.filter(|_| is_driven) {
             Some(driven) => driven.simulate(run, out)?,
             None => self.simulator.simulate(run, out)?,
         }
@@ -166,5 +149,72 @@ impl Simulator for Suspect<'_> {
             self.distorted(fault, size, run.trials, out);
         }
         Ok(())
+    }
+
+    fn batch(&self) -> Option<&dyn Batch> {
+        self.simulator.batch().map(|_| self as &dyn Batch)
+    }
+
+    fn costly(&self) -> Option<&dyn Costly> {
+        self.simulator.costly().map(|_| self as &dyn Costly)
+    }
+
+    fn driven(&self) -> Option<&dyn Driven> {
+        self.simulator.driven().map(|_| self as &dyn Driven)
+    }
+
+    fn spectral_lines(&self) -> Option<&dyn SpectralLines> {
+        self.simulator.spectral_lines().map(|_| self as &dyn SpectralLines)
+    }
+}
+
+impl Batch for Suspect<'_> {
+    fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
+        match runs.iter().all(|run| run.model.effects.iter().all(|(e, _)| *e < self.first)) {
+            true => simulate_many(self.simulator, runs, outs),
+            false => side_by_side(self, runs, outs),
+        }
+    }
+}
+
+impl Costly for Suspect<'_> {
+    fn model_runs(&self) -> ModelRuns {
+        self.simulator.costly().map_or_else(ModelRuns::default, Costly::model_runs)
+    }
+
+    fn is_costly(&self, effect: usize) -> bool {
+        // An error of the record costs what the simulator costs.
+        effect >= self.first || self.simulator.costly().is_some_and(|c| c.is_costly(effect))
+    }
+
+    fn linearise(&self, stage: usize, model: &Model, trials: usize) -> Result<(), GapError> {
+        self.simulator.costly().map_or(Ok(()), |c| c.linearise(stage, model, trials))
+    }
+}
+
+impl Driven for Suspect<'_> {
+    fn input(&self, stage: usize) -> Option<Vec<f64>> {
+        self.simulator.driven()?.input(stage)
+    }
+
+    fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {
+        let model = self.without_errors(run.model);
+        let run = Run { model: &model, ..run };
+        self.simulator.driven().map_or(Ok(false), |d| d.simulate_on(run, input, out))
+    }
+
+    fn corrected(
+        &self,
+        column: &str,
+        error: Distortion,
+    ) -> Result<Option<Box<dyn Simulator + Send + '_>>, GapError> {
+        self.simulator.driven().map_or(Ok(None), |d| d.corrected(column, error))
+    }
+}
+
+impl SpectralLines for Suspect<'_> {
+    fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
+        let lines = |s: &dyn SpectralLines| s.lines(stage, &self.without_errors(model));
+        self.simulator.spectral_lines().map_or_else(Vec::new, lines)
     }
 }

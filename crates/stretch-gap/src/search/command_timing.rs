@@ -1,6 +1,6 @@
 //! Whether commands switch at rows of the record or anywhere between two: two hypotheses, weighed by what each explains in the end.
 //!
-//! A record of which every second row was dropped shows a switch up to a row late. The [parameter](crate::Simulator::command_timing) that says
+//! A record of which every second row was dropped shows a switch up to a row late. The [parameter](crate::RecordFacts::command_timing) that says
 //! how far ahead of its row a switch acts in the mean is then re-tuned, and that each switch has its own is a nuisance, marginalised. A
 //! true effect (a late valve) gains by such freedom as well, as long as it is not in the model: so both ways are searched to the end and
 //! the better likelihood of the records decides.
@@ -16,12 +16,12 @@ use crate::{
 
 /// A simulator whose commands switch between rows; none where it has no such commands.
 pub(crate) fn between_rows(simulator: &dyn Simulator) -> Option<Altered<'_>> {
-    let timing = simulator.command_timing();
-    let told = |i: usize, p: &ParameterSpec| {
+    let timing = &simulator.record().command_timing;
+    let altered = |i: usize, p: &ParameterSpec| {
         let other = timing.iter().find(|(index, _)| *index == i);
         other.map_or(p, |(_, spec)| spec).clone()
     };
-    (!timing.is_empty()).then(|| Altered::of(simulator, told))
+    (!timing.is_empty()).then(|| Altered::of(simulator, altered))
 }
 
 /// The problem in which the records are likelier, and the set to go on from; that of commands between rows is prepared where there are
@@ -36,7 +36,7 @@ pub(crate) fn likelier<'a>(
     let plain = at_rows.nominal.clone();
     let Some(between_rows) = between_rows else { return Ok((at_rows, plain)) };
     let simulator = at_rows.simulator();
-    let timing = simulator.command_timing();
+    let timing = &simulator.record().command_timing;
     let is_timed = |stage: &usize| {
         timing.iter().any(|(index, _)| simulator.stages()[*stage].parameters.contains(index))
     };

@@ -61,7 +61,9 @@ impl Ground {
         let parts: Result<Vec<_>, GapError> = (0..stages)
             .into_par_iter()
             .map(|s| {
-                compare.runs.simulator().linearise(s, &model, compare.frame.fit_trials)?;
+                if let Some(costly) = compare.runs.simulator().costly() {
+                    costly.linearise(s, &model, compare.frame.fit_trials)?;
+                }
                 let residual = compare.residual(s, &model)?;
                 let known = compare.nominal_sensitivities(s, &model, &residual)?;
                 let solved = compare.solved(s, &known, &residual);

@@ -221,7 +221,9 @@ impl Tangent {
             slopes.push(there.iter().zip(&values).map(|(a, b)| (a - b) / step).collect());
             Ok(())
         };
-        for (i, p) in simulator.parameters().iter().enumerate().filter(|(_, p)| p.sd > 0.0) {
+        for (i, p) in
+            simulator.description().parameters.iter().enumerate().filter(|(_, p)| p.sd > 0.0)
+        {
             let at = (model.parameters[i] - p.nominal) / p.sd;
             let step = if at > 0.0 { -0.3 } else { 0.3 };
             let mut moved = model.clone();
@@ -230,7 +232,7 @@ impl Tangent {
             bounds.push([-3.0 - at, 3.0 - at]);
         }
         for (slot, (effect, effect_values)) in model.effects.iter().enumerate() {
-            let specs = &simulator.effects()[*effect].parameters;
+            let specs = &simulator.description().effects[*effect].parameters;
             for (k, p) in specs.iter().enumerate().filter(|(_, p)| p.is_fitted) {
                 let range = p.max - p.min;
                 let x = effect_values[k];

@@ -1,8 +1,8 @@
 //! A gauge with one stage, straight but for what it lacks.
 
 use stretch_gap::{
-    Description, DescriptionSpec, Dice, EffectParameterSpec, EffectSpec, GapError, Motion,
-    ParameterSpec, Recorded, Run, Simulator, StageSpec, TrialSpec,
+    Description, DescriptionSpec, Dice, EffectParameterSpec, EffectSpec, GapError, MotionSpec,
+    ParameterSpec, RecordFacts, Recorded, Run, Simulator, StageSpec, TrialSpec,
 };
 
 /// Samples of a trial, and their time, s.
@@ -79,7 +79,7 @@ impl Gauge {
                 volts.push(0.3 + 1.02 * GAIN * x + extra + NOISE_V * dice.gauss());
             }
         }
-        Self { description: description(specs, 1.0), units: [1.0; 2], rod_mm, volts }
+        Self { description: description(specs, 1.0, &rod_mm), units: [1.0; 2], rod_mm, volts }
     }
 
     /// The same with noise taken for so many times what it is.
@@ -87,17 +87,19 @@ impl Gauge {
         let mut other = self.clone();
         let mut spec = (*self.description).clone();
         spec.stages[0].noise = Some(stretch_gap::Noise::known(times * NOISE_V));
-        other.description = Description::new(spec).expect("a description that holds together");
+        let known = self.description.record().clone();
+        let description = Description::new(spec).and_then(|d| d.with_record(known));
+        other.description = description.expect("a description that holds together");
         other
     }
 
     /// The same in other units.
     pub(crate) fn scaled(&self, rod: f64, output: f64) -> Self {
-        let trials = self.trials().to_vec();
+        let rod_mm: Vec<f64> = self.rod_mm.iter().map(|x| rod * x).collect();
         Self {
-            description: description(trials, output),
+            description: description(self.description.trials.clone(), output, &rod_mm),
             units: [rod, output],
-            rod_mm: self.rod_mm.iter().map(|x| rod * x).collect(),
+            rod_mm,
             volts: self.volts.iter().map(|x| output * x).collect(),
         }
     }
@@ -115,7 +117,7 @@ impl Gauge {
     }
 }
 
-fn description(trials: Vec<TrialSpec>, volt: f64) -> Description {
+fn description(trials: Vec<TrialSpec>, volt: f64, rod_mm: &[f64]) -> Description {
     let gain = ParameterSpec::new("gain", "V", GAIN * volt).within(0.05 * volt);
     let offset = ParameterSpec::new("offset", "V", 0.3 * volt).within(0.05 * volt);
     let mut stage = StageSpec::new("gauge", "volts", "V", &[0, 1]);
@@ -127,6 +129,13 @@ fn description(trials: Vec<TrialSpec>, volt: f64) -> Description {
         effects: vec![EffectSpec::new("curve", (0, "gauge"), quadratic)],
         trials,
         dt_s: DT_S,
+    })
+    .and_then(|description| {
+        description.with_record(RecordFacts {
+            motion: Some(MotionSpec::new(rod_mm.to_vec(), "mm")),
+            signals: vec![Recorded::measured("rod_mm", "mm", rod_mm.to_vec())],
+            ..RecordFacts::default()
+        })
     })
     .expect("a description that holds together")
 }
@@ -187,13 +196,5 @@ impl Simulator for Gauge {
             *out = p[1] + p[0] * (x + curve * x * (1.0 - x));
         }
         Ok(())
-    }
-
-    fn motion(&self) -> Motion<'_> {
-        Motion { values: &self.rod_mm, unit: "mm", falling: "falling", rising: "rising" }
-    }
-
-    fn recorded(&self) -> Vec<Recorded> {
-        vec![Recorded::measured("rod_mm", "mm", self.rod_mm.clone())]
     }
 }

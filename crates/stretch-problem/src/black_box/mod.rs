@@ -1,6 +1,7 @@
 //! A user's simulator, wrapped, as the diagnosis takes it.
 
 pub(crate) mod columns;
+mod facts;
 mod families;
 mod linear;
 mod problem;
@@ -9,14 +10,11 @@ pub(crate) mod source;
 pub(crate) mod spec;
 pub(crate) mod velocity;
 
-use std::{
-    borrow::Cow,
-    sync::{Arc, PoisonError, RwLock},
-};
+use std::sync::{Arc, PoisonError, RwLock};
 
 use stretch_gap::{
-    Column, Description, Diagnosis, Dice, GapError, Line, Model, ModelRuns, Recorded, RowsUsed,
-    Run, Simulator,
+    Batch, Costly, Description, Diagnosis, Dice, GapError, Line, Model, ModelRuns, Run, Simulator,
+    SpectralLines,
 };
 
 use stretch_effects::WanderingLine;
@@ -144,7 +142,8 @@ impl BlackBox {
     fn inner(&self, run: &Run<'_>) -> Inner {
         let problem = &self.problem;
         let spec = &self.description().stages[run.stage];
-        let mut parameters: Vec<f64> = self.parameters().iter().map(|p| p.nominal).collect();
+        let mut parameters: Vec<f64> =
+            self.description().parameters.iter().map(|p| p.nominal).collect();
         for &p in &spec.parameters {
             parameters[p] = run.model.parameters[p];
         }
@@ -152,7 +151,7 @@ impl BlackBox {
         let mut how = Vec::new();
         let mut before = Vec::new();
         for (effect, values) in &run.model.effects {
-            if !self.effects()[*effect].touches.contains(&run.stage) {
+            if !self.description().effects[*effect].touches.contains(&run.stage) {
                 continue;
             }
             match problem.acting[*effect] {
@@ -247,7 +246,7 @@ impl BlackBox {
         let (measured, noise) = (self.measured(stage), self.problem.noise[stage]);
         let end = out.len();
         for range in self.problem.columns.looked_at().into_iter().filter(|r| r.end <= end) {
-            line.follow(&measured[range.clone()], noise, self.dt_s(), &mut out[range]);
+            line.follow(&measured[range.clone()], noise, self.description().dt_s, &mut out[range]);
         }
     }
 }
@@ -275,15 +274,6 @@ impl Simulator for BlackBox {
         self.problem.columns.of(&self.problem.stages[stage].output).unwrap_or(&[])
     }
 
-    fn is_lost(&self) -> &[bool] {
-        &self.problem.columns.is_lost
-    }
-
-    fn rows_used(&self) -> RowsUsed {
-        let rows = self.problem.columns.rows;
-        RowsUsed { used: rows.used(), read: rows.read }
-    }
-
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
         let mut outs = [out.to_vec()];
         let done = self.simulate_many(&[run], &mut outs).pop().unwrap_or(Ok(()));
@@ -291,6 +281,20 @@ impl Simulator for BlackBox {
         done
     }
 
+    fn batch(&self) -> Option<&dyn Batch> {
+        Some(self)
+    }
+
+    fn costly(&self) -> Option<&dyn Costly> {
+        Some(self)
+    }
+
+    fn spectral_lines(&self) -> Option<&dyn SpectralLines> {
+        Some(self)
+    }
+}
+
+impl Batch for BlackBox {
     fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
         let told: Vec<(Inner, Option<Apart>)> = runs.iter().map(|run| self.told(run)).collect();
         let inner: Vec<Inner> = told.iter().map(|(inner, _)| inner.clone()).collect();
@@ -306,14 +310,21 @@ impl Simulator for BlackBox {
         })
         .collect()
     }
+}
 
+impl Costly for BlackBox {
     fn linearise(&self, stage: usize, model: &Model, trials: usize) -> Result<(), GapError> {
         let run = Run::exact(stage, model, trials);
         let inner = self.inner(&run);
-        if self.line(stage).is_some_and(|line| line.serves(&inner, self.parameters())) {
+        if self.line(stage).is_some_and(|line| line.serves(&inner, &self.description().parameters))
+        {
             return Ok(());
         }
-        let moves = Linear::moves(&inner, &self.stages()[stage].parameters, self.parameters());
+        let moves = Linear::moves(
+            &inner,
+            &self.description().stages[stage].parameters,
+            &self.description().parameters,
+        );
         let wanted: Vec<Inner> =
             std::iter::once(&inner).chain(moves.iter().map(|m| &m.inner)).cloned().collect();
         let outputs: Result<Vec<_>, SourceError> =
@@ -335,71 +346,21 @@ impl Simulator for BlackBox {
         }
     }
 
-    fn model_runs(&self) -> Option<ModelRuns> {
+    fn model_runs(&self) -> ModelRuns {
         let (count, budget) = (self.runs.count(), self.runs.budget());
         let kept = (ANSWER.0 + ANSWER.1 * self.problem.stages.len()).min(budget.unwrap_or(0) / 2);
         let is_spent = budget.is_some_and(|budget| count + kept >= budget);
-        Some(ModelRuns { count, budget, is_spent })
-    }
-
-    fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
-        let found = model.effects.iter().filter(|(effect, _)| {
-            let wrapper = self.problem.wrapper(*effect);
-            wrapper.is_some_and(|w| w.is_found) && self.effects()[*effect].touches.contains(&stage)
-        });
-        found.map(|(_, values)| Line { hertz: values[1], amplitude: values[0] }).collect()
-    }
-
-    fn recorded(&self) -> Vec<Recorded> {
-        let session = self.problem.session();
-        let inputs = session.stages.iter().flat_map(|s| &s.inputs);
-        let mut out: Vec<Recorded> = Vec::new();
-        for name in inputs {
-            let column = session.columns.iter().find(|c| c.name == *name);
-            if let Some(column) = column.filter(|_| out.iter().all(|r| r.name != *name)) {
-                out.push(Recorded {
-                    is_command: is_command(&column.values),
-                    ..Recorded::measured(name, &column.unit, column.values.clone())
-                });
-            }
-        }
-        if out.is_empty() {
-            out.push(self.motion().into());
-        }
-        out
-    }
-
-    fn columns(&self) -> Vec<Column<'_>> {
-        let session = self.problem.session();
-        let late = [-0.2, 0.2];
-        let stages = self.stages().iter().enumerate();
-        let output = |(stage, spec)| Column {
-            skew_s: late,
-            ..Column::output(stage, spec, self.measured(stage))
-        };
-        let mut out: Vec<Column<'_>> = stages.map(output).collect();
-        for c in &session.columns {
-            // A command may stand still while the rest moves: nothing is wrong with its column then.
-            if out.iter().any(|o| *o.name == c.name) || is_command(&c.values) {
-                continue;
-            }
-            out.push(Column {
-                name: Cow::Borrowed(&c.name),
-                unit: Cow::Borrowed(&c.unit),
-                values: Cow::Borrowed(&c.values),
-                output_of: None,
-                read_by: Vec::new(),
-                is_command: false,
-                skew_s: late,
-                hint: Cow::Borrowed("what commands or measures it"),
-            });
-        }
-        out
+        ModelRuns { count, budget, is_spent }
     }
 }
 
-/// Whether a column is held from sample to sample, as commands are: a tenth of its samples are the one before.
-fn is_command(values: &[f64]) -> bool {
-    let held = values.windows(2).filter(|w| w[0] == w[1]).count();
-    10 * held >= values.len()
+impl SpectralLines for BlackBox {
+    fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
+        let found = model.effects.iter().filter(|(effect, _)| {
+            let wrapper = self.problem.wrapper(*effect);
+            wrapper.is_some_and(|w| w.is_found)
+                && self.description().effects[*effect].touches.contains(&stage)
+        });
+        found.map(|(_, values)| Line { hertz: values[1], amplitude: values[0] }).collect()
+    }
 }

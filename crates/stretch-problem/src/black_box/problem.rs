@@ -10,6 +10,7 @@ use stretch_gap::{
 
 use super::{
     columns::Columns,
+    facts::facts,
     source::{Session, SessionColumn, SessionPart, SessionStage},
     spec::{OwnEffect, Parameter, ProblemSpec, Stage, Tolerance},
     velocity::Velocity,
@@ -127,8 +128,9 @@ impl Problem {
             dt_s: columns.dt_s,
         })?;
         let session = session(&stages, &parameters, &effects, &columns, &unit_of);
+        let known = facts(&about, &session, &columns);
         Ok(Self {
-            about,
+            about: about.with_record(known)?,
             session,
             columns,
             stages,

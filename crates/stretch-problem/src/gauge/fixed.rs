@@ -1,7 +1,7 @@
 //! A gauge alone with what a diagnosis found of it.
 
 use stretch_data::Remarks;
-use stretch_gap::{Diagnosis, Evidence, Simulator};
+use stretch_gap::{Diagnosis, Evidence};
 use stretch_sim::{Gauge, GaugeRig, Grid, GridError};
 
 use super::{GAIN, GaugeSimulator, OFFSET};
@@ -48,7 +48,7 @@ impl GaugeSimulator {
             (OFFSET, "offset", (self.nominal.spec.offset, rig.spec.offset)),
             (GAIN, "gain", (self.nominal.spec.gain, rig.spec.gain)),
         ] {
-            let told = chosen.told(index, &self.parameters()[index].unit, values);
+            let told = chosen.told(index, &self.about.parameters[index].unit, values);
             remarks.parameters.insert((TABLE.into(), name.into()), told);
         }
         for effect in self.nominal.effects.iter() {

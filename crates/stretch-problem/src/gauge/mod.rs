@@ -1,7 +1,7 @@
 //! A gauge alone beside a reference: a rig of one stage.
 
-mod columns;
 mod experiments;
+mod facts;
 mod fixed;
 mod lag;
 mod record;
@@ -9,13 +9,14 @@ mod source;
 
 use stretch_data::{SessionTrial, unit, written_unit};
 use stretch_gap::{
-    Column, Description, DescriptionSpec, GapError, Line, Model, Motion, Noise, ParameterSpec,
-    Recorded, RowsUsed, Run, Simulator, StageSpec, TrialSpec,
+    Description, DescriptionSpec, GapError, Line, Model, Noise, ParameterSpec, Run, Simulator,
+    SpectralLines, StageSpec, TrialSpec,
 };
 use stretch_sim::{
     Alone, Catalogue, Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Start, Tolerance,
 };
 
+use facts::facts;
 use lag::lag;
 use record::Record;
 
@@ -118,7 +119,7 @@ impl GaugeSimulator {
         let (least, greatest) = record.range(&record.signal);
         let (reference_noise, noise) =
             (record.noise(&record.reference), record.noise(&record.signal).sd());
-        let inputs = parts(&record.trials, &record.reference)
+        let inputs: Vec<Smoothed> = parts(&record.trials, &record.reference)
             .map(|(_, x)| Smoothed::of(x, reference_noise.sd(), &unscheduled(x.len())))
             .collect();
         let alone = alone(&record);
@@ -137,14 +138,11 @@ impl GaugeSimulator {
         let stage = StageSpec::new("sensing", signal, unit_of(signal), &[OFFSET, GAIN, WINDING]);
         let parameters = parameters(&nominal, signal, rig.is_some());
         let (trials, dt_s) = (record.trials.clone(), record.dt_s);
+        let about = DescriptionSpec { stages: vec![stage], parameters, effects, trials, dt_s };
+        let about = Description::new(about)?;
+        let known = facts(&about, reference, &record, &inputs);
         Ok(Self {
-            about: Description::new(DescriptionSpec {
-                stages: vec![stage],
-                parameters,
-                effects,
-                trials,
-                dt_s,
-            })?,
+            about: about.with_record(known)?,
             rows,
             inputs,
             reference: reference.into(),
@@ -177,7 +175,7 @@ impl GaugeSimulator {
     /// The signal over the trials of a run.
     fn signal(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), BenchError> {
         let acting = Acting::of(&self.nominal.effects, &self.rows, run.model)?;
-        let gauge = Gauge::new(self.nominal(run.model), &acting.inside, self.dt_s())?;
+        let gauge = Gauge::new(self.nominal(run.model), &acting.inside, self.about.dt_s)?;
         let mut memory = gauge.memory();
         // What was done to the gauge before the session nobody knows.
         let mut start = Start::Wound(run.model.parameters[WINDING]);
@@ -193,7 +191,7 @@ impl GaugeSimulator {
             let record = self.found_in.of_trial(i, self.noise, self.spread);
             acting.follow(record, &mut out[from..to]);
             let next = self.record.trials.get(i + 1).map_or(f64::INFINITY, |t| t.start_s);
-            let rest_s = (next - trial.start_s - trial.samples as f64 * self.dt_s()).max(0.0);
+            let rest_s = (next - trial.start_s - trial.samples as f64 * self.about.dt_s).max(0.0);
             start = Start::Carried { rest_s };
             from = to;
         }
@@ -213,52 +211,18 @@ impl Simulator for GaugeSimulator {
         &self.record.signal
     }
 
-    fn is_lost(&self) -> &[bool] {
-        &self.record.is_lost
-    }
-
-    fn rows_used(&self) -> RowsUsed {
-        RowsUsed { used: self.record.rows.used(), read: self.record.rows.read }
-    }
-
-    fn lines(&self, _stage: usize, model: &Model) -> Vec<Line> {
-        lines(&self.nominal.effects, &self.rows, model, self.spread)
-    }
-
-    fn motion(&self) -> Motion<'_> {
-        Motion {
-            values: &self.record.reference,
-            unit: unit_of(&self.reference),
-            falling: "falling",
-            rising: "rising",
-        }
-    }
-
-    fn sensor(&self) -> Option<usize> {
-        Some(0)
-    }
-
-    /// The reference as it drives the gauge, and the pressure where it was recorded.
-    fn recorded(&self) -> Vec<Recorded> {
-        let driving = self.inputs.iter().flat_map(|s| &s.values).copied().collect();
-        let mut out = vec![Recorded::measured(&self.reference, unit_of(&self.reference), driving)];
-        if !self.record.pressure.is_empty() {
-            out.push(Recorded::measured("pressure_kpa", "kPa", self.record.pressure.clone()));
-        }
-        out
-    }
-
-    fn columns(&self) -> Vec<Column<'_>> {
-        self.record_columns()
-    }
-
-    /// A line follows whatever it is fitted to; where it does not follow half of it, the two have little to do with each other.
-    fn foreign_share(&self) -> f64 {
-        0.5
-    }
-
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
         Ok(self.signal(run, out)?)
+    }
+
+    fn spectral_lines(&self) -> Option<&dyn SpectralLines> {
+        Some(self)
+    }
+}
+
+impl SpectralLines for GaugeSimulator {
+    fn lines(&self, _stage: usize, model: &Model) -> Vec<Line> {
+        lines(&self.nominal.effects, &self.rows, model, self.spread)
     }
 }
 

@@ -1,7 +1,7 @@
 //! The rig with what a diagnosis found of it.
 
 use stretch_data::Remarks;
-use stretch_gap::{Diagnosis, Evidence, Simulator};
+use stretch_gap::{Diagnosis, Evidence};
 use stretch_sim::{Effect, Grid, GridError, Rig, Surroundings};
 
 use super::{RigSimulator, nominal::Knob};
@@ -29,7 +29,7 @@ impl RigSimulator {
             }
         }
         let around = Surroundings::of_rig(&params, &grid);
-        let place = (self.sensor().unwrap_or(0), 1.0);
+        let place = (self.about.record().sensor.unwrap_or(0), 1.0);
         Ok(implementations(diagnosis, evidence, &self.rows, &around, |effect, values| {
             with_line(self, place, &self.rows, model, (effect, values))
         }))
@@ -67,7 +67,7 @@ impl RigSimulator {
                 *x = x.clamp(*p.allowed().start(), *p.allowed().end());
             }
         };
-        let stage = self.sensor().unwrap_or(0);
+        let stage = self.about.record().sensor.unwrap_or(0);
         for (effect, values) in chosen.effects(&self.rows, within) {
             let values = with_line(self, (stage, 1.0), &self.rows, chosen.model, (effect, values));
             chosen.tell(effect, &mut remarks);

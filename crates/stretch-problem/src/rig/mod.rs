@@ -1,14 +1,16 @@
 //! The rig as a [`Simulator`](stretch_gap::Simulator): pneumatics, muscle (or both as actuation) and sensing, each on measured inputs.
 
+mod corrected;
 mod directions;
 mod experiments;
 mod extent;
+mod facts;
 mod fixed;
 mod found;
 mod noises;
 mod nominal;
-mod put_right;
 mod rails;
+mod record_columns;
 mod run;
 mod session;
 mod shown;
@@ -26,6 +28,7 @@ use stretch_gap::{Description, DescriptionSpec, TrialSpec};
 use stretch_sim::{Catalogue, Effect, EffectSet, Key, Rig, RigParams, Search, Stage, Tolerance};
 
 use extent::extent_of;
+use facts::facts;
 use found::Found;
 use noises::Noises;
 use nominal::{Knob, parameters, stages};
@@ -66,7 +69,6 @@ pub struct RigSimulator {
     knobs: Vec<Knob>,
     rows: Vec<&'static Effect>,
     measured: Vec<Vec<f64>>,
-    is_lost: Vec<bool>,
     /// The bridge voltage that effects may be found in.
     bridge: FitRecord,
     found: Found,
@@ -121,15 +123,11 @@ impl RigSimulator {
         let mut notes = session.notes.clone();
         let (rows, places) = shown(missing.map(|e| (e, place(e))), dt_s, &mut notes);
         let missing = rows.iter().zip(places).map(|(effect, place)| spec(effect, place)).collect();
-        let is_lost = session.trials.iter().flat_map(|t| &t.is_lost).copied().collect();
+        let about = DescriptionSpec { stages, parameters, effects: missing, trials, dt_s };
+        let about = Description::new(about)?;
+        let known = facts(&about, &session, &inputs, (&stage_kinds, &knobs), &measured);
         Ok(Self {
-            about: Description::new(DescriptionSpec {
-                stages,
-                parameters,
-                effects: missing,
-                trials,
-                dt_s,
-            })?,
+            about: about.with_record(known)?,
             base: *base,
             tolerances: rig.tolerances,
             effects: effects.clone(),
@@ -140,7 +138,6 @@ impl RigSimulator {
             knobs,
             rows,
             measured,
-            is_lost,
             bridge,
             found: Found::new(),
             notes,

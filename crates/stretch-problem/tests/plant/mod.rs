@@ -10,7 +10,7 @@ use std::sync::{
 use hidden::hidden;
 use stretch_data::{Channel, SessionTrial, Split, Trial};
 use stretch_gap::{
-    Column, Description, Diagnosis, Dice, GapError, Knowledge, Options, Run, Simulator, diagnose,
+    Description, Diagnosis, Dice, GapError, Knowledge, Options, Run, Simulator, diagnose,
 };
 use stretch_problem::{
     Argument, Ask, BlackBox, OwnEffect, Parameter, Problem, ProblemSpec, Stage, Tolerance, agreed,
@@ -181,10 +181,6 @@ impl Simulator for Plain<'_> {
 
     fn measured(&self, stage: usize) -> &[f64] {
         self.0.measured(stage)
-    }
-
-    fn columns(&self) -> Vec<Column<'_>> {
-        self.0.columns()
     }
 
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {

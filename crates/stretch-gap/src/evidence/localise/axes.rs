@@ -7,10 +7,7 @@ use stretch_filter::log::second_differences;
 
 use crate::{
     numerics::extent::ends,
-    problem::{
-        frame::Frame,
-        simulator::{Motion, Simulator},
-    },
+    problem::{frame::Frame, record_facts::Motion, simulator::Simulator},
 };
 
 /// Samples on each side that a rate is fitted over.

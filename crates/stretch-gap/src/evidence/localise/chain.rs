@@ -38,7 +38,7 @@ pub(super) fn shapley(runs: &Runs<'_>, evidence: &Evidence) -> Result<Vec<f64>, 
         // What a correction is added to: the measurement as the next stage is fed with it.
         let base = match stage + 1 {
             next if next == stages => Some(simulator.measured(stage).to_vec()),
-            next => simulator.input(next),
+            next => simulator.driven().and_then(|d| d.input(next)),
         };
         let Some(base) = base else { return Ok(Vec::new()) };
         let mut next = Vec::with_capacity(2 * variants.len());

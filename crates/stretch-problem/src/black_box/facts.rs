@@ -1,0 +1,67 @@
+//! What is known of the recordings of a user's simulator.
+
+use std::borrow::Cow;
+
+use stretch_gap::{Column, Description, RecordFacts, Recorded, RowsUsed};
+
+use super::{columns::Columns, source::Session};
+
+/// Delays that skews of the catalogue stand for, s.
+const SKEW_S: [f64; 2] = [-0.2, 0.2];
+
+/// The facts of recordings.
+pub(super) fn facts(about: &Description, session: &Session, columns: &Columns) -> RecordFacts {
+    let rows = columns.rows;
+    RecordFacts {
+        is_lost: columns.is_lost.clone(),
+        rows_used: Some(RowsUsed { used: rows.used(), read: rows.read }),
+        signals: signals(session),
+        columns: record_columns(about, session),
+        ..RecordFacts::default()
+    }
+}
+
+/// What the stages are fed with, once each.
+fn signals(session: &Session) -> Vec<Recorded> {
+    let mut out: Vec<Recorded> = Vec::new();
+    for name in session.stages.iter().flat_map(|s| &s.inputs) {
+        let column = session.columns.iter().find(|c| c.name == *name);
+        if let Some(column) = column.filter(|_| out.iter().all(|r| r.name != *name)) {
+            out.push(Recorded {
+                is_command: is_command(&column.values),
+                ..Recorded::measured(name, &column.unit, column.values.clone())
+            });
+        }
+    }
+    out
+}
+
+/// The outputs of the stages, and every other column but commands: one may stand still while the rest moves, and nothing is wrong
+/// with it then.
+fn record_columns(about: &Description, session: &Session) -> Vec<Column<'static>> {
+    let stages = about.stages.iter().enumerate();
+    let output = |(stage, spec)| Column { skew_s: SKEW_S, ..Column::output(stage, spec) };
+    let mut out: Vec<Column<'static>> = stages.map(output).collect();
+    for c in &session.columns {
+        if out.iter().any(|o| *o.name == c.name) || is_command(&c.values) {
+            continue;
+        }
+        out.push(Column {
+            name: Cow::Owned(c.name.clone()),
+            unit: Cow::Owned(c.unit.clone()),
+            values: Cow::Owned(c.values.clone()),
+            output_of: None,
+            read_by: Vec::new(),
+            is_command: false,
+            skew_s: SKEW_S,
+            hint: Cow::Borrowed("what commands or measures it"),
+        });
+    }
+    out
+}
+
+/// Whether a column is held from sample to sample, as commands are: a tenth of its samples are the one before.
+fn is_command(values: &[f64]) -> bool {
+    let held = values.windows(2).filter(|w| w[0] == w[1]).count();
+    10 * held >= values.len()
+}

@@ -10,6 +10,13 @@ mod record;
 mod search;
 mod verdict;
 
+#[cfg(test)]
+extern crate self as stretch_gap;
+/// The simulators that tests from outside are made of, for tests from inside.
+#[cfg(test)]
+#[path = "../tests/toys/mod.rs"]
+mod toys;
+
 pub use diagnose::{Options, diagnose};
 pub use evidence::{
     candidates::{Candidate, EffectValue, ParameterShift},

@@ -1,6 +1,6 @@
 //! A gauge that lacks something that no catalogue holds: is it found again, and is what is random called so?
 
-use crate::support::{Gauge, Lack, RANGE_MM};
+use crate::gauge::{Gauge, Lack, RANGE_MM};
 use approx::assert_relative_eq;
 use stretch_gap::{Factor, Options, Passage, Proposed, RateForm, VerdictKind, diagnose};
 use testkit::tolerance::{F64_ROUNDING, PLANTED_TERM, RESCALED};

@@ -1,6 +1,6 @@
 //! A floor that is taken too high hides no effect: what the effect leaves is the noise.
 
-use crate::support::{Gauge, Lack};
+use crate::gauge::{Gauge, Lack};
 use stretch_gap::{Diagnosis, Options, VerdictKind, diagnose};
 
 fn diagnosed(lack: Lack, times: f64, seed: u64) -> Diagnosis {

@@ -1,6 +1,6 @@
 //! Records in which nothing is missing stay within the band of noise, and what is above it but carries no name is told so.
 
-use crate::support::{Gauge, Lack};
+use crate::gauge::{Gauge, Lack};
 use stretch_gap::{Diagnosis, Options, VerdictKind, diagnose};
 
 fn diagnosed(lack: Lack, seed: u64) -> Diagnosis {

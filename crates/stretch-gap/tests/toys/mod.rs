@@ -1,0 +1,268 @@
+//! Simulators whose answers are known: a line, a lag, an oscillator, a delay, alone or one behind the other, beside a record that the same
+//! equations made with other parameters, hidden effects and noise of a known size.
+//!
+//! A [`Toy`] is plain data: a test alters what it needs and asks for the record. Everything that depends on the trait [`Simulator`] stands
+//! in this folder. The crate's own unit tests use it, too.
+//!
+//! ```text
+//! let toy = Toy { hidden: vec![(0, Effect::Quadratic, vec![0.1])], ..Toy::of(&[Law::Line]) };
+//! let (diagnosis, evidence) = toy.measured(1).diagnosed();
+//! ```
+
+#![allow(dead_code)] // The program of the tests from outside and that of the unit tests use a part each.
+
+mod laws;
+mod simulator;
+
+pub(crate) use laws::{Effect, Law};
+pub(crate) use simulator::Measured;
+use stretch_gap::{Description, DescriptionSpec, Dice, Noise, ParameterSpec, StageSpec, TrialSpec};
+
+/// A simulator and the bench beside it.
+#[derive(Debug, Clone)]
+pub(crate) struct Toy {
+    /// Its stages: the first is driven by the column `x`, every other by what was measured of the one before.
+    pub(crate) laws: Vec<Law>,
+    /// Parameters of all stages in their order: as they ship, with tolerances.
+    pub(crate) parameters: Vec<ParameterSpec>,
+    /// What they are on the bench.
+    pub(crate) truth: Vec<f64>,
+    /// Effects that the simulator may lack, each with its stage.
+    pub(crate) catalogue: Vec<(usize, Effect)>,
+    /// What the bench has, with its values.
+    pub(crate) hidden: Vec<(usize, Effect, Vec<f64>)>,
+    /// A parameter that moves on the bench: what is added to it at every sample of all trials.
+    pub(crate) courses: Vec<(usize, Vec<f64>)>,
+    /// Standard deviation of the noise of every output.
+    pub(crate) noise: f64,
+    /// What the simulator says that the noise is, as a multiple of it; none where the record has to tell.
+    pub(crate) stated: Option<f64>,
+    /// Standard deviation of the noise of the recorded `x`.
+    pub(crate) input_noise: f64,
+    /// Samples of every trial, and whether it is tested on.
+    pub(crate) trials: Vec<(usize, bool)>,
+    /// Sample time, s.
+    pub(crate) dt_s: f64,
+    /// Step of integration, s.
+    pub(crate) step_s: f64,
+    /// What the unit of `x`, and that of the outputs, is divided by: 1000 writes millivolts for volts.
+    pub(crate) units: [f64; 2],
+    /// Runs that may be made, where they are counted.
+    pub(crate) budget: Option<usize>,
+    /// Samples of all trials end to end that were not measured.
+    pub(crate) is_lost: Vec<bool>,
+}
+
+/// Session time from the start of a trial to the start of the next, s.
+const APART_S: f64 = 60.0;
+
+impl Toy {
+    /// Agrees with its bench but for noise of a hundredth: three trials of 10 s to fit, one of 10 s to test, no effects.
+    pub(crate) fn of(laws: &[Law]) -> Self {
+        let parameters: Vec<ParameterSpec> = laws.iter().flat_map(|law| law.parameters()).collect();
+        Self {
+            laws: laws.to_vec(),
+            truth: parameters.iter().map(|p| p.nominal).collect(),
+            parameters,
+            catalogue: Vec::new(),
+            hidden: Vec::new(),
+            courses: Vec::new(),
+            noise: 0.01,
+            stated: Some(1.0),
+            input_noise: 0.0,
+            trials: vec![(1000, false), (1000, false), (1000, false), (1000, true)],
+            dt_s: 0.01,
+            step_s: 0.0025,
+            units: [1.0; 2],
+            budget: None,
+            is_lost: Vec::new(),
+        }
+    }
+
+    /// The same with some effects of the first stage in its catalogue.
+    pub(crate) fn may_lack(self, effects: &[Effect]) -> Self {
+        Self { catalogue: effects.iter().map(|effect| (0, *effect)).collect(), ..self }
+    }
+
+    /// The same with effects of the first stage on its bench.
+    pub(crate) fn hiding(self, effects: &[(Effect, &[f64])]) -> Self {
+        let hidden = effects.iter().map(|(effect, values)| (0, *effect, values.to_vec()));
+        Self { hidden: hidden.collect(), ..self }
+    }
+
+    /// The same with parameters of the bench so many tolerances off.
+    pub(crate) fn off_by(mut self, tolerances: &[f64]) -> Self {
+        for ((truth, p), off) in self.truth.iter_mut().zip(&self.parameters).zip(tolerances) {
+            *truth = p.nominal + off * p.sd;
+        }
+        self
+    }
+
+    /// Samples of all trials.
+    pub(crate) fn samples(&self) -> usize {
+        self.trials.iter().map(|(samples, _)| samples).sum()
+    }
+
+    /// Index of a parameter by its name, `line.gain`.
+    pub(crate) fn parameter(&self, name: &str) -> usize {
+        self.parameters.iter().position(|p| p.name == name).expect("a parameter of that name")
+    }
+
+    /// Name of an effect of the catalogue: its own in the first stage, with the stage's number in the others.
+    pub(crate) fn name(stage: usize, effect: Effect) -> String {
+        if stage == 0 { effect.name().to_owned() } else { format!("{}_{stage}", effect.name()) }
+    }
+
+    /// What the simulator is made of, in the units that the toy is written in.
+    pub(crate) fn description(&self) -> Description {
+        let mut own = 0;
+        let stages = self.laws.iter().enumerate().map(|(i, law)| {
+            let indices: Vec<usize> = (own..own + law.parameters().len()).collect();
+            own += indices.len();
+            let channel = format!("y{i}");
+            let mut stage = StageSpec::new(law.name(), &channel, "u", &indices);
+            stage.noise = self.stated.map(|times| Noise::known(times * self.noise * self.units[1]));
+            stage
+        });
+        let trials = self.trials.iter().enumerate().map(|(i, (samples, is_test))| {
+            TrialSpec::new(&format!("trial {i}"), *samples, APART_S * i as f64, *is_test)
+        });
+        let effects = self.catalogue.iter();
+        Description::new(DescriptionSpec {
+            stages: stages.collect(),
+            parameters: self.parameters.iter().map(|p| self.in_units(p)).collect(),
+            effects: effects.map(|(stage, effect)| effect.spec(*stage)).collect(),
+            trials: trials.collect(),
+            dt_s: self.dt_s,
+        })
+        .expect("a description that holds together")
+    }
+
+    /// A parameter in the units that the toy is written in.
+    fn in_units(&self, p: &ParameterSpec) -> ParameterSpec {
+        let unit = laws::unit(&p.unit, self.units);
+        let mut p = p.clone();
+        for value in [&mut p.nominal, &mut p.sd, &mut p.least, &mut p.greatest] {
+            *value *= unit;
+        }
+        for value in [&mut p.per_trial_sd, &mut p.per_tick_sd].into_iter().flatten() {
+            *value *= unit;
+        }
+        if let Some(wander) = &mut p.wander {
+            wander.sd *= unit;
+        }
+        p
+    }
+
+    /// The record that the bench makes, drawn from a seed: `x` is four tones a trial, with values within -1..1.
+    pub(crate) fn measured(&self, seed: u64) -> Measured {
+        let x = self.trials.iter().enumerate().flat_map(|(trial, (samples, _))| {
+            let mut dice = Dice::new(seed, 100 + trial as u64);
+            let tones: Vec<[f64; 2]> = (0..4)
+                .map(|k| [0.5 + 1.1 * f64::from(k) + 0.7 * dice.unit(), 6.3 * dice.unit()])
+                .collect();
+            let at = move |i: usize, dt_s: f64| {
+                let t = dt_s * i as f64;
+                0.25 * tones.iter().map(|[w, p]| (w * t + p).sin()).sum::<f64>()
+            };
+            let dt_s = self.dt_s;
+            (0..*samples).map(move |i| at(i, dt_s)).collect::<Vec<f64>>()
+        });
+        self.driven_by(x.collect(), seed)
+    }
+
+    /// The record that the bench makes of an input of one's own, in the units of -1..1.
+    pub(crate) fn driven_by(&self, x: Vec<f64>, seed: u64) -> Measured {
+        assert_eq!(x.len(), self.samples(), "one sample of x for each of the trials");
+        let mut dice = Dice::new(seed, 7);
+        let mut outputs: Vec<Vec<f64>> = Vec::new();
+        for stage in 0..self.laws.len() {
+            let input = outputs.last().unwrap_or(&x);
+            let mut y = self.of_bench(stage, input);
+            y.iter_mut().for_each(|y| *y += self.noise * dice.gauss());
+            outputs.push(y);
+        }
+        let x = x.iter().map(|x| self.units[0] * (x + self.input_noise * dice.gauss())).collect();
+        let outputs = outputs.into_iter().map(|y| y.iter().map(|y| self.units[1] * y).collect());
+        Measured::new(self.clone(), x, outputs.collect())
+    }
+
+    /// What a stage of the bench makes of its input, without noise.
+    fn of_bench(&self, stage: usize, input: &[f64]) -> Vec<f64> {
+        let own = self.own(stage);
+        let effects: Vec<(Effect, &[f64])> = self
+            .hidden
+            .iter()
+            .filter(|(s, _, _)| *s == stage)
+            .map(|(_, effect, values)| (*effect, values.as_slice()))
+            .collect();
+        let mut out = vec![0.0; input.len()];
+        for (trial, range) in self.ranges().into_iter().enumerate() {
+            let courses: Vec<(usize, &[f64])> = self
+                .courses
+                .iter()
+                .filter(|(p, _)| own.contains(p))
+                .map(|(p, course)| (p - own.start, &course[range.clone()]))
+                .collect();
+            let bench = laws::Plant {
+                parameters: &self.truth[own.clone()],
+                courses: &courses,
+                effects: &effects,
+                dt_s: self.dt_s,
+                step_s: self.step_s,
+                start_s: APART_S * trial as f64,
+            };
+            bench.run(self.laws[stage], &input[range.clone()], &mut out[range]);
+        }
+        out
+    }
+
+    /// Indices of a stage's parameters.
+    pub(crate) fn own(&self, stage: usize) -> std::ops::Range<usize> {
+        let count = |laws: &[Law]| laws.iter().map(|law| law.parameters().len()).sum();
+        let from = count(&self.laws[..stage]);
+        from..from + count(&self.laws[stage..=stage])
+    }
+
+    /// Samples of every trial.
+    pub(crate) fn ranges(&self) -> Vec<std::ops::Range<usize>> {
+        let mut end = 0;
+        let one = |(samples, _): &(usize, bool)| {
+            end += samples;
+            end - samples..end
+        };
+        self.trials.iter().map(one).collect()
+    }
+}
+
+/// An Ornstein-Uhlenbeck process of a standard deviation and a correlation time, both s and samples of `dt_s` seconds: what a parameter that
+/// drifts slowly does.
+pub(crate) fn slow(
+    sd: f64,
+    correlation_s: f64,
+    (samples, dt_s): (usize, f64),
+    seed: u64,
+) -> Vec<f64> {
+    let mut dice = Dice::new(seed, 55);
+    let kept = (-dt_s / correlation_s).exp();
+    let mut x = dice.gauss();
+    let next = |_| {
+        x = kept * x + (1.0 - kept * kept).sqrt() * dice.gauss();
+        sd * x
+    };
+    (0..samples).map(next).collect()
+}
+
+/// The greatest count that a binomial variable of `n` draws of probability `p` exceeds with a probability of at most `chance`: what a
+/// test that counts over seeds may allow.
+pub(crate) fn binomial_bound(n: usize, p: f64, chance: f64) -> usize {
+    let (mut each, mut within) = ((1.0 - p).powi(n as i32), 0.0);
+    for k in 0..=n {
+        within += each;
+        if 1.0 - within <= chance {
+            return k;
+        }
+        each *= (n - k) as f64 / (k + 1) as f64 * p / (1.0 - p);
+    }
+    n
+}

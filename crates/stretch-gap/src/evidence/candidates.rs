@@ -231,3 +231,71 @@ pub(crate) fn shifts(simulator: &dyn Simulator, evidence: &Evidence) -> Vec<Para
     })
     .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use testkit::tolerance::F64_ROUNDING;
+
+    fn candidate(effect: &str, probability: f64) -> Candidate {
+        let mut unknown = beside_unknown(Vec::new(), Excess::default(), probability);
+        let candidate = unknown.remove(0);
+        Candidate { effects: vec![effect.into()], ..candidate }
+    }
+
+    /// 95 % of a Gaussian lie within 1.96 standard deviations; where the range is searched in equal ratios, of the logarithm.
+    #[test]
+    fn intervals_reach_two_deviations_to_either_side() {
+        let strength = EffectParameterSpec::strength("c", "1", -1.0..=1.0);
+        assert_eq!(interval(&strength, 0.2, 0.1), [0.2 - 0.196, 0.2 + 0.196]);
+        let shape = EffectParameterSpec::shape("tau", "s", 0.01..=10.0);
+        let [low, high] = interval(&shape, 1.0, 0.1);
+        assert_relative_eq!(low * high, 1.0, epsilon = 0.0, max_relative = F64_ROUNDING);
+        assert_relative_eq!(high.ln(), 0.196, epsilon = 0.0, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn intervals_stay_in_the_range_and_hold_the_value() {
+        let strength = EffectParameterSpec::strength("c", "1", 0.0..=1.0);
+        let shape = EffectParameterSpec::shape("tau", "s", 0.01..=10.0);
+        for (spec, values) in [(&strength, [0.0, 0.03, 0.5, 1.0]), (&shape, [0.01, 0.1, 3.0, 10.0])]
+        {
+            for value in values {
+                for sd in [0.0, 0.02, 0.4, 50.0] {
+                    let [low, high] = interval(spec, value, sd);
+                    assert!(spec.min <= low && high <= spec.max, "{value} {sd}: {low} {high}");
+                    assert!(low <= value && value <= high, "{value} {sd}: {low} {high}");
+                }
+            }
+        }
+    }
+
+    /// A threshold that is off may stand outside of its range: it is its own end.
+    #[test]
+    fn a_value_outside_of_its_range_is_an_end() {
+        let mut spec = EffectParameterSpec::strength("threshold", "V", 1.0..=2.0);
+        spec.off = Some(9.0);
+        assert_eq!(interval(&spec, 9.0, 100.0), [1.0, 9.0]);
+        assert_eq!(interval(&spec, 9.0, 0.0), [9.0, 9.0]);
+    }
+
+    #[test]
+    fn unknown_stands_last_and_takes_its_part_of_all() {
+        let gap = Excess { raw: 9.0, retuned: 4.0, left: 1.0 };
+        let named = vec![candidate("a", 0.7), candidate("b", 0.3)];
+        for probability in [0.0, 0.1, 0.9, 1.0] {
+            let all = beside_unknown(named.clone(), gap, probability);
+            let sum: f64 = all.iter().map(|c| c.probability).sum();
+            assert_relative_eq!(sum, 1.0, epsilon = 0.0, max_relative = F64_ROUNDING);
+            let last = &all[2];
+            assert_eq!(
+                (last.effects.as_slice(), last.probability),
+                (&["unknown".to_owned()][..], probability)
+            );
+            assert_eq!((last.gap_before, last.gap_after, last.closed), (4.0, 4.0, 0.0));
+            // The odds of the others among each other stay.
+            assert!(all[0].probability >= all[1].probability);
+        }
+    }
+}

@@ -82,3 +82,138 @@ pub(crate) fn covering_set(weighed: &[Weighed], simulator: &dyn Simulator) -> Ve
     }
     names
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::problem::simulator::Model;
+    use approx::assert_relative_eq;
+    use testkit::tolerance::F64_ROUNDING;
+
+    fn hypothesis(effects: &[usize], score: f64) -> Hypothesis {
+        Hypothesis {
+            effects: effects.into(),
+            model: Model::default(),
+            misfits: Vec::new(),
+            effect_sd: Default::default(),
+            parameter_sd: Vec::new(),
+            score,
+        }
+    }
+
+    /// A gap of ten times the noise's variance of which the best set leaves a share.
+    fn gap(share_left: f64) -> Excess {
+        Excess { raw: 20.0, retuned: 10.0, left: 10.0 * share_left }
+    }
+
+    /// Rivals in the place of effect 0, with these scores.
+    fn rivals(scores: &[f64]) -> Vec<(usize, Hypothesis)> {
+        let one = |(i, score): (usize, &f64)| (0, hypothesis(&[i + 1], *score));
+        scores.iter().enumerate().map(one).collect()
+    }
+
+    fn probabilities(best: f64, scores: &[f64], share_left: f64) -> Vec<f64> {
+        let (best, thresholds) = (hypothesis(&[0], best), Thresholds::frozen());
+        let weighed = weigh(&thresholds, &best, gap(share_left), &rivals(scores));
+        weighed.iter().map(|w| w.probability).collect()
+    }
+
+    #[test]
+    fn probabilities_are_ordered_as_scores_and_sum_to_one() {
+        let scores = [90.0, -300.0, 99.5, 40.0, 90.0];
+        let thresholds = Thresholds::frozen();
+        let weighed = weigh(&thresholds, &hypothesis(&[0], 100.0), gap(0.02), &rivals(&scores));
+        let sum: f64 = weighed.iter().map(|w| w.probability).sum();
+        assert_relative_eq!(sum, 1.0, epsilon = 0.0, max_relative = F64_ROUNDING);
+        for pair in weighed.windows(2) {
+            assert!(pair[0].probability >= pair[1].probability);
+            assert!(pair[0].hypothesis.score >= pair[1].hypothesis.score);
+        }
+        assert!(weighed.iter().all(|w| (0.0..=1.0).contains(&w.probability)));
+        // Equal scores are equally probable: the two of 90.
+        assert_eq!(weighed[2].probability, weighed[3].probability);
+    }
+
+    /// ln p_i/p_j = (S_i - S_j)/(T + rho share).
+    #[test]
+    fn odds_are_the_tempered_likelihood_ratio() {
+        let thresholds = Thresholds::frozen();
+        for share in [0.0, 0.01, 0.3, 1.0] {
+            let p = probabilities(100.0, &[93.0], share);
+            let temperature = thresholds.temperature + thresholds.rho * share;
+            // A logarithm of a ratio of two rounded exponentials.
+            let (found, expected) = ((p[0] / p[1]).ln(), 7.0 / temperature);
+            assert_relative_eq!(found, expected, epsilon = F64_ROUNDING, max_relative = 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_more_is_left_the_less_a_score_says() {
+        let first = [0.0, 0.01, 0.1, 0.5, 1.0].map(|share| probabilities(100.0, &[80.0], share)[0]);
+        assert!(first.windows(2).all(|pair| pair[0] > pair[1]), "{first:?}");
+        assert!(
+            first.iter().all(|p| *p > 0.5),
+            "the better score stays the more probable: {first:?}"
+        );
+    }
+
+    #[test]
+    fn only_differences_of_scores_count() {
+        let (low, high) =
+            (probabilities(10.0, &[3.0, -5.0], 0.1), probabilities(510.0, &[503.0, 495.0], 0.1));
+        for (low, high) in low.iter().zip(&high) {
+            assert_relative_eq!(low, high, epsilon = 0.0, max_relative = F64_ROUNDING);
+        }
+    }
+
+    /// Ten thousand nats apart, better or worse, nothing is NaN and nothing is lost.
+    #[test]
+    fn far_scores_stay_finite() {
+        let p = probabilities(0.0, &[-1e4, -1e5], 0.0);
+        assert_eq!(p, [1.0, 0.0, 0.0]);
+        // Where there is no gap at all the least one that counts stands in the share.
+        let none = Excess { raw: 0.0, retuned: 0.0, left: 0.0 };
+        let weighed = weigh(&Thresholds::frozen(), &hypothesis(&[0], 0.0), none, &rivals(&[-5.0]));
+        assert!(weighed.iter().all(|w| w.probability.is_finite()));
+    }
+
+    #[test]
+    fn without_rivals_the_best_set_has_all_and_it_may_be_empty() {
+        assert_eq!(probabilities(3.0, &[], 0.5), [1.0]);
+        let none = weigh(&Thresholds::frozen(), &hypothesis(&[], 0.0), gap(1.0), &[]);
+        assert!(none[0].hypothesis.effects.is_empty());
+    }
+
+    #[test]
+    fn a_rival_stands_where_the_effect_stood() {
+        let best = hypothesis(&[4, 2, 7], 100.0);
+        // The search lists what it kept first, the newcomer last.
+        let rival = (2, hypothesis(&[4, 7, 5], 95.0));
+        let weighed = weigh(&Thresholds::frozen(), &best, gap(0.1), &[rival]);
+        assert_eq!(weighed[0].hypothesis.effects, [4, 2, 7]);
+        assert_eq!(weighed[1].hypothesis.effects, [4, 5, 7]);
+    }
+
+    #[test]
+    fn unknown_has_its_odds_at_the_border_and_grows_with_what_is_left() {
+        let thresholds = Thresholds::frozen();
+        let allowed = thresholds.unknown_excess + thresholds.unknown_share * 10.0;
+        let at = |left: f64| unknown(Excess { raw: 20.0, retuned: 10.0, left }, &thresholds);
+        let odds = at(allowed) / (1.0 - at(allowed));
+        assert_relative_eq!(odds, thresholds.unknown_odds, epsilon = 0.0, max_relative = 1e-12);
+        let rising = [0.0, 1e-6, 0.1, 1.0, 5.0, 10.0, 1e6].map(at);
+        assert!(rising.windows(2).all(|pair| pair[0] < pair[1]), "{rising:?}");
+        assert!(rising.iter().all(|p| (0.0..=1.0).contains(p)), "{rising:?}");
+        // Odds are proportional to what is left where the border is as soft as a logistic: twice as much, twice the odds.
+        let twice = at(2.0 * allowed) / (1.0 - at(2.0 * allowed));
+        let expected = odds * libm::pow(2.0, 1.0 / thresholds.unknown_soft);
+        assert_relative_eq!(twice, expected, epsilon = 0.0, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn a_larger_gap_may_leave_more() {
+        let thresholds = Thresholds::frozen();
+        let of = |retuned: f64| unknown(Excess { raw: 1e3, retuned, left: 1.0 }, &thresholds);
+        assert!(of(1.0) > of(10.0) && of(10.0) > of(100.0));
+    }
+}

@@ -300,4 +300,97 @@ mod tests {
             (0..20_000).map(|i| 1e-3 * f64::from(i) + 0.2 * dice.gauss()).collect();
         assert_relative_eq!(noise(&values), 0.2, max_relative = MEDIAN_SPREAD, epsilon = 0.0);
     }
+
+    /// A course at 100 Hz that goes by these rates a second, from 0, without noise.
+    fn course(rate: Vec<f64>) -> Course {
+        let mut at = 0.0;
+        let level = rate
+            .iter()
+            .map(|r| {
+                at += 0.01 * r;
+                at
+            })
+            .collect();
+        let mut way = 0.0;
+        let travel = rate
+            .iter()
+            .map(|r| {
+                way += 0.01 * r.abs();
+                way
+            })
+            .collect();
+        Course { starts: vec![0, rate.len()], level, rate, still: 0.1, travel }
+    }
+
+    #[test]
+    fn a_reversal_lies_where_the_motion_turns() {
+        let triangle = course([vec![1.0; 100], vec![-1.0; 100], vec![1.0; 50]].concat());
+        // Half-way between the last sample before and the first behind.
+        assert_eq!(triangle.reversals(0.01), [99, 199]);
+        assert!(course(vec![1.0; 100]).reversals(0.01).is_empty());
+        assert!(course(vec![0.0; 100]).reversals(0.01).is_empty());
+    }
+
+    /// A pause is no reversal where it goes on the same way; a long one before it goes back is a dwell, and the turn is at its end.
+    #[test]
+    fn pauses_are_told_from_turns() {
+        let paused = |pause: usize, then: f64| {
+            course([vec![1.0; 100], vec![0.0; pause], vec![then; 100]].concat()).reversals(0.01)
+        };
+        assert!(paused(20, 1.0).is_empty() && paused(200, 1.0).is_empty());
+        assert_eq!(paused(20, -1.0), [109]);
+        assert_eq!(paused(200, -1.0), [300]);
+    }
+
+    #[test]
+    fn trials_turn_by_themselves() {
+        let mut two = course([vec![1.0; 100], vec![-1.0; 100]].concat());
+        two.starts = vec![0, 100, 200];
+        // The one rises, the next falls: between them nothing turned.
+        assert!(two.reversals(0.01).is_empty());
+    }
+
+    #[test]
+    fn rates_are_cut_into_equal_quarters_of_what_moves() {
+        let mut rates: Vec<f64> = (0..400).map(|i| 1.0 + 0.01 * f64::from(i)).collect();
+        rates.iter_mut().skip(1).step_by(2).for_each(|r| *r = -*r);
+        rates.extend([0.0; 100]);
+        let axis = Axis::rate(&course(rates), "mm");
+        assert_eq!(axis.labels.len(), 4);
+        for quarter in 0..4_u16 {
+            let count = axis.of.iter().filter(|of| **of == quarter).count();
+            // An end belongs to one of its two neighbours.
+            assert!((99..=101).contains(&count), "{quarter}: {count}");
+        }
+        assert!(axis.of[400..].iter().all(|of| *of == Axis::NONE));
+        assert!(axis.labels[0].starts_with("1.00 to ") && axis.labels[0].ends_with(" mm/s"));
+        // What never moves has no rates to cut.
+        let still = Axis::rate(&course(vec![0.0; 50]), "");
+        assert!(still.of.iter().all(|of| *of == Axis::NONE));
+    }
+
+    #[test]
+    fn levels_are_cut_evenly_and_ends_belong_to_them() {
+        let values: Vec<f64> = (0..=100).map(|i| f64::from(i) / 10.0).collect();
+        let axis = Axis::even("level", &values, 0.0, 10.0, 5, short, "mm");
+        assert_eq!(
+            (axis.labels[0].as_str(), axis.labels[4].as_str()),
+            ("0.00 to 2.00 mm", "8.00 to 10.0 mm")
+        );
+        let count = |slice: u16| axis.of.iter().filter(|of| **of == slice).count();
+        assert_eq!([0, 1, 2, 3, 4].map(count), [20, 20, 20, 20, 21]);
+        // What lies outside goes to the nearest; a range of nothing, or of nonsense, is not cut.
+        let out = Axis::even("level", &[-5.0, 50.0], 0.0, 10.0, 5, short, "");
+        assert_eq!(out.of, [0, 4]);
+        for high in [0.0, f64::NAN, f64::INFINITY] {
+            let none = Axis::even("level", &[0.0, 0.0], 0.0, high, 5, short, "mm");
+            assert!(none.labels.is_empty() && none.of == [Axis::NONE; 2]);
+        }
+    }
+
+    #[test]
+    fn numbers_are_told_with_three_digits() {
+        let told = [0.0, 0.012_345, 1.234_5, 12.345, 123.45, -1234.5].map(short);
+        assert_eq!(told, ["0.00", "0.0123", "1.23", "12.3", "123", "-1234"]);
+    }
 }

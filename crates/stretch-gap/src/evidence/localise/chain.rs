@@ -115,4 +115,63 @@ mod tests {
             assert_relative_eq!(*share, expected, max_relative = F64_ROUNDING, epsilon = 0.0);
         }
     }
+
+    /// What every set of three players is worth, by a rule on who is in it.
+    fn game(worth: impl Fn([bool; 3]) -> f64) -> Vec<f64> {
+        (0..8).map(|set: usize| worth([set & 1 != 0, set & 2 != 0, set & 4 != 0])).collect()
+    }
+
+    #[test]
+    fn shares_sum_to_the_whole_and_a_stage_without_gap_has_none() {
+        // The errors of two stages add up before they are squared, the third makes none.
+        let worth =
+            game(|[a, b, _]| (2.0 * f64::from(u8::from(a)) + f64::from(u8::from(b))).powi(2));
+        let found = shares(&worth, 3);
+        // Orders a b and b a: 4 and 5, 8 and 1; means 6 and 3 of 9.
+        for (share, expected) in found.iter().zip([6.0 / 9.0, 3.0 / 9.0, 0.0]) {
+            assert_relative_eq!(*share, expected, max_relative = F64_ROUNDING, epsilon = 0.0);
+        }
+        assert_relative_eq!(found.iter().sum::<f64>(), 1.0, max_relative = F64_ROUNDING);
+    }
+
+    /// Where errors do not meet, every stage has what it makes alone.
+    #[test]
+    fn independent_errors_are_shared_as_they_are() {
+        let alone = [5.0, 0.25, 2.0];
+        let worth =
+            game(|on| on.iter().zip(alone).map(|(on, x)| f64::from(u8::from(*on)) * x).sum());
+        for (share, own) in shares(&worth, 3).iter().zip(alone) {
+            assert_relative_eq!(*share, own / 7.25, max_relative = F64_ROUNDING, epsilon = 0.0);
+        }
+    }
+
+    /// Values of random games: the sum is the worth of all minus that of none, twins share alike, names do not matter, and neither does the unit.
+    #[test]
+    fn shares_do_not_depend_on_names_or_units() {
+        let mut dice = crate::numerics::random::Dice::new(1, 0);
+        for _ in 0..50 {
+            let worth: Vec<f64> =
+                (0..8_u32).map(|set| f64::from(set.count_ones()) + dice.unit()).collect();
+            let own = shares(&worth, 3);
+            assert_relative_eq!(own.iter().sum::<f64>(), 1.0, max_relative = F64_ROUNDING);
+            let scaled: Vec<f64> = worth.iter().map(|w| 1e6 * w).collect();
+            // The first and the last stage change places: bits 0 and 2 of every set.
+            let swap = |set: usize| set & 2 | (set & 1) << 2 | set >> 2;
+            let swapped: Vec<f64> = (0..8).map(|set| worth[swap(set)]).collect();
+            let (scaled, swapped) = (shares(&scaled, 3), shares(&swapped, 3));
+            for i in 0..3 {
+                assert_relative_eq!(own[i], scaled[i], max_relative = 1e-12);
+                assert_relative_eq!(own[i], swapped[2 - i], max_relative = 1e-12);
+            }
+        }
+    }
+
+    /// A stage whose error makes up for another's has no negative share, and nothing has a share of nothing.
+    #[test]
+    fn no_share_is_negative() {
+        let helps = game(|[a, b, _]| if a && !b { 4.0 } else { f64::from(u8::from(a)) });
+        let found = shares(&helps, 3);
+        assert_eq!(found, [1.0, 0.0, 0.0]);
+        assert_eq!(shares(&[0.0; 8], 3), [0.0; 3]);
+    }
 }

@@ -177,4 +177,167 @@ mod tests {
         assert!(sliced[0].interval[0] < 0.1 && sliced[0].interval[1] > -0.1);
         assert_eq!(cells.sliced(1, 0), sliced);
     }
+
+    /// Cells of `blocks` blocks of 25 samples in each slice, of the standard deviations given.
+    fn drawn(sds: &[f64], blocks: usize, dice: &mut Dice) -> Cells {
+        let mut cells = Vec::new();
+        for _ in 0..blocks {
+            for sd in sds {
+                cells.push(((0..25).map(|_| (sd * dice.gauss()).powi(2)).sum::<f64>(), 25.0));
+            }
+        }
+        Cells::new(sds.len(), cells)
+    }
+
+    #[test]
+    fn shares_sum_to_the_whole_and_quiet_slices_have_none() {
+        let sliced = drawn(&[1.5, 0.5, 3.0], 60, &mut Dice::new(1, 0)).sliced(1, 0);
+        let sum: f64 = sliced.iter().map(|s| s.share).sum();
+        approx::assert_relative_eq!(sum, 1.0, max_relative = testkit::tolerance::F64_ROUNDING);
+        assert_eq!((sliced[1].share, sliced[1].excess < 0.0), (0.0, true));
+        // A gap of 1.25 beside one of 8; sums of 1500 squares are known to 4 %, the ratio to 6 %: three of these.
+        approx::assert_relative_eq!(sliced[0].share, 1.25 / 9.25, max_relative = 0.2);
+        for s in &sliced {
+            assert!(s.interval[0] <= s.excess && s.excess <= s.interval[1], "{s:?}");
+        }
+    }
+
+    /// Two slices are each other's rest: what the one is worse than, the other is better than, with the same variance.
+    #[test]
+    fn of_two_slices_one_p_value_is_the_others_complement() {
+        let mut dice = Dice::new(2, 0);
+        for sd in [0.7, 1.0, 1.1] {
+            let sliced = drawn(&[1.0, sd], 30, &mut dice).sliced(1, 0);
+            approx::assert_relative_eq!(sliced[0].p + sliced[1].p, 1.0, max_relative = 1e-12);
+        }
+    }
+
+    /// Of 400 records in which no slice is worse, 5 in 100 have a p below 0.05: 20, standard deviation 4.4; three of these to either side.
+    #[test]
+    fn p_values_are_as_rare_as_they_say() {
+        let mut dice = Dice::new(3, 0);
+        let mut is_rare = |_: &u64| drawn(&[1.0; 4], 60, &mut dice).sliced(1, 0)[2].p < 0.05;
+        let rare = (0..400).filter(|record| is_rare(record)).count();
+        assert!((7..=33).contains(&rare), "{rare} of 400");
+    }
+
+    /// Of 300 intervals 285 should hold the truth; a percentile bootstrap of 60 blocks holds some 93 %. Four standard deviations, 4.4 each,
+    /// below 280; an interval that always holds says nothing.
+    #[test]
+    fn intervals_of_an_excess_hold_it() {
+        let mut dice = Dice::new(4, 0);
+        let mut is_held = |record: &u64| {
+            let [low, high] = drawn(&[2.0, 1.0], 60, &mut dice).sliced(*record, 0)[0].interval;
+            low <= 3.0 && 3.0 <= high
+        };
+        let held = (0..300).filter(|record| is_held(record)).count();
+        assert!((262..300).contains(&held), "{held} of 300");
+    }
+
+    #[test]
+    fn a_handful_of_blocks_is_no_evidence() {
+        let mut dice = Dice::new(5, 0);
+        let few = drawn(&[1.0, 9.0], LEAST_BLOCKS - 1, &mut dice).sliced(1, 0);
+        assert!(few.iter().all(|s| s.p == 1.0));
+        let enough = drawn(&[1.0, 9.0], LEAST_BLOCKS, &mut dice).sliced(1, 0);
+        assert!(enough[1].p < 0.01, "{:?}", enough[1]);
+    }
+
+    #[test]
+    fn nothing_is_said_of_what_has_no_samples() {
+        assert!(Cells::new(0, Vec::new()).sliced(1, 0).is_empty());
+        let cells = (0..20).flat_map(|_| [(30.0, 25.0), (0.0, 0.0)]).collect();
+        let sliced = Cells::new(2, cells).sliced(1, 0);
+        assert_eq!(sliced[1], Sliced { share: 0.0, excess: 0.0, interval: [0.0; 2], p: 1.0 });
+        // The only slice that there is has no rest to stand out from.
+        assert_eq!((sliced[0].share, sliced[0].p), (1.0, 1.0));
+    }
+
+    /// Samples count once, in the block and the slice that they lie in; those of no slice and those of no segment count nowhere.
+    #[test]
+    fn samples_are_summed_by_block_and_slice() {
+        use crate::problem::frame::{Role, Segment};
+        let segment = |from, to, role| Segment { trial: 0, from, to, role };
+        let frame = Frame {
+            segments: vec![segment(0, 5, Role::Fit), segment(7, 10, Role::Test)],
+            block: 2,
+            fit_trials: 1,
+            borrowed_test: true,
+        };
+        let axis = Axis {
+            by: "half",
+            labels: vec!["low".into(), "high".into()],
+            of: vec![0, 1, 1, 0, Axis::NONE, 0, 0, 1, 1, 0],
+        };
+        let residual: Vec<f64> = (1..=10).map(f64::from).collect();
+        let cells = Cells::of_samples(&frame, &residual, &axis);
+        // Blocks 1 2, 3 4, 5, 8 9, 10: the fifth is of no slice, the sixth and seventh of no segment.
+        let expected = [
+            [(1.0, 1.0), (4.0, 1.0)],
+            [(16.0, 1.0), (9.0, 1.0)],
+            [(0.0, 0.0), (0.0, 0.0)],
+            [(0.0, 0.0), (64.0 + 81.0, 2.0)],
+            [(100.0, 1.0), (0.0, 0.0)],
+        ];
+        assert_eq!(cells.cells, expected.concat());
+    }
+
+    /// Whatever stands above Bonferroni's limit stands above this one, nothing above 0.05 does, and a smaller p never falls where a larger one
+    /// stands; the order does not matter.
+    #[test]
+    fn discoveries_lie_between_bonferroni_and_the_level() {
+        let mut dice = Dice::new(6, 0);
+        for count in [1_usize, 2, 7, 40] {
+            for _ in 0..50 {
+                let p: Vec<f64> = (0..count).map(|_| dice.unit().powi(3)).collect();
+                let found = discoveries(&p);
+                for (i, p_i) in p.iter().enumerate() {
+                    assert!(found[i] || *p_i > FALSE_DISCOVERIES / count as f64);
+                    assert!(!found[i] || *p_i <= FALSE_DISCOVERIES);
+                    assert!(p.iter().zip(&found).all(|(p, f)| !found[i] || *p > *p_i || *f));
+                }
+                let (turned, mut back): (Vec<f64>, _) =
+                    (p.iter().rev().copied().collect(), found.clone());
+                back.reverse();
+                assert_eq!(discoveries(&turned), back);
+            }
+        }
+    }
+
+    /// Where nothing is there, something is found in 5 of 100 records exactly (their theorem, for independent p-values): of 2000 in 100, standard
+    /// deviation 9.7; three of these to either side.
+    #[test]
+    fn false_discoveries_are_as_rare_as_allowed() {
+        let mut dice = Dice::new(7, 0);
+        let mut any = |_: &u32| {
+            let p: Vec<f64> = (0..30).map(|_| dice.unit()).collect();
+            discoveries(&p).contains(&true)
+        };
+        let alarms = (0..2000).filter(|record| any(record)).count();
+        assert!((71..=129).contains(&alarms), "{alarms} of 2000");
+    }
+
+    /// Twenty of forty are real: of what is found, 0.05 times 20/40 are false on average. The share in one record spreads by some 0.035, its mean
+    /// over 500 by 0.0016: five of these.
+    #[test]
+    fn among_true_ones_few_are_false() {
+        let mut dice = Dice::new(8, 0);
+        let (mut false_share, mut true_share) = (0.0, 0.0);
+        for _ in 0..500 {
+            let p: Vec<f64> = (0..40)
+                .map(|i| match i < 20 {
+                    true => 0.5 * libm::erfc((4.0 + dice.gauss()) / 2_f64.sqrt()),
+                    false => dice.unit(),
+                })
+                .collect();
+            let found = discoveries(&p);
+            let count = |part: &[bool]| part.iter().filter(|f| **f).count() as f64;
+            let (right, wrong) = (count(&found[..20]), count(&found[20..]));
+            false_share += wrong / f64::max(right + wrong, 1.0) / 500.0;
+            true_share += right / 20.0 / 500.0;
+        }
+        assert!((false_share - 0.025).abs() < 0.008, "{false_share}");
+        // Four standard deviations stand beyond the limit of some 0.025, 1.96, with probability 0.98.
+        assert!(true_share > 0.95, "{true_share}");
+    }
 }

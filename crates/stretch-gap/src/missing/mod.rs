@@ -18,6 +18,8 @@ mod residue;
 mod signals;
 mod sparse;
 mod term;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use propose::propose;
 pub use proposed::{Proposed, ProposedTerm, SignalScale};

@@ -1,0 +1,67 @@
+//! What terms, the library and the weighing of sums do by themselves, on records whose every sample is known.
+
+mod shelf;
+mod terms;
+mod weighing;
+mod words;
+
+use crate::{
+    missing::signals::{Record, Signal},
+    problem::frame::{Frame, Role, Segment},
+};
+use stretch_effects::Grid;
+
+/// Sample time, s.
+const DT_S: f64 = 0.01;
+
+/// A signal on its own scale whose rate is that of central differences.
+fn signal(name: &str, x: Vec<f64>, is_command: bool) -> Signal {
+    let last = x.len() - 1;
+    let rate = |i: usize| {
+        let (a, b) = (i.saturating_sub(1), (i + 1).min(last));
+        (x[b] - x[a]) / ((b - a) as f64 * DT_S)
+    };
+    let v = (0..x.len()).map(rate).collect();
+    let (name, unit) = (name.to_owned(), "mm".to_owned());
+    Signal { name, unit, offset: 40.0, scale: 25.0, rate: 1.0, is_command, x, v }
+}
+
+/// Signals over trials of so many samples, a minute apart.
+fn record(signals: Vec<Signal>, samples: &[usize]) -> Record {
+    let mut end = 0;
+    let trials: Vec<std::ops::Range<usize>> = samples
+        .iter()
+        .map(|samples| {
+            end += samples;
+            end - samples..end
+        })
+        .collect();
+    Record {
+        signals,
+        starts_s: (0..trials.len()).map(|i| 60.0 * i as f64).collect(),
+        trial_s: DT_S * samples[0] as f64,
+        session_s: 60.0 * trials.len() as f64,
+        trials,
+        grid: Grid::samples(DT_S).expect("a grid"),
+    }
+}
+
+/// Every trial fitted but for its last part.
+fn frame(samples: &[usize], held: usize) -> Frame {
+    let mut end = 0;
+    let mut segments = Vec::new();
+    for (trial, samples) in samples.iter().enumerate() {
+        let from = end;
+        end += samples;
+        segments.push(Segment { trial, from, to: end - held, role: Role::Fit });
+        if held > 0 {
+            segments.push(Segment { trial, from: end - held, to: end, role: Role::Held });
+        }
+    }
+    Frame { segments, block: 50, fit_trials: samples.len(), borrowed_test: false }
+}
+
+/// Up, down and up again between 0 and 1.
+fn wave(samples: usize) -> Vec<f64> {
+    (0..samples).map(|i| 0.5 - 0.5 * (0.02 * i as f64).cos()).collect()
+}

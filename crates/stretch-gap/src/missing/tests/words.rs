@@ -1,0 +1,92 @@
+//! How proposals are put into words.
+
+use super::{record, signal, wave};
+use crate::missing::{
+    proposed::{Proposed, ProposedTerm, acts, equation, scales, sentence, words},
+    term::{Factor, Passage, RateForm, Term},
+};
+
+fn signals() -> Vec<crate::missing::SignalScale> {
+    let signals = vec![signal("rod_mm", wave(100), false), signal("valve", wave(100), true)];
+    scales(&record(signals, &[100]))
+}
+
+fn term(factors: &[Factor], passage: Passage, coefficient: f64) -> ProposedTerm {
+    let form = Term::new(factors, passage);
+    ProposedTerm { name: words(&form, &signals()), coefficient, sd: 0.01, unit: "V".into(), form }
+}
+
+fn proposed(terms: Vec<ProposedTerm>, random: bool) -> Proposed {
+    Proposed {
+        stage: "gauge".into(),
+        channel: "volts".into(),
+        equation: equation("volts", &terms, &signals()),
+        acts: acts("gauge", &terms),
+        terms,
+        signals: signals(),
+        time_scales_s: [10.0, 100.0],
+        initial: "settled at the start of every trial".into(),
+        closes_held: 0.9,
+        closes_test: 0.834,
+        random,
+        log_odds: 3.0,
+        foretold: 0.95,
+        sentence: String::new(),
+    }
+}
+
+#[test]
+fn an_equation_tells_each_of_its_letters_once() {
+    let x = Factor::Power { signal: 0, power: 1.0 };
+    let v = Factor::Rate { signal: 0, form: RateForm::Magnitude };
+    let terms =
+        [term(&[x, v], Passage::Direct, 0.0123), term(&[x], Passage::Lag { tau_s: 2.0 }, -1.5)];
+    let told = equation("volts", &terms, &signals());
+    let (sum, letters) = told.split_once("; ").expect("letters are told");
+    assert_eq!(sum, "volts += 0.0123 V x[rod_mm] |v[rod_mm]| + -1.50 V lag(x[rod_mm], 2.00 s)");
+    assert_eq!(
+        letters,
+        "x[rod_mm] = (rod_mm - 40.0 mm)/(25.0 mm), v[rod_mm] = (d rod_mm/dt)/(25.0 mm/s)"
+    );
+    // A command is what it is.
+    let command = [term(&[Factor::Power { signal: 1, power: 2.0 }], Passage::Direct, 2.0)];
+    assert_eq!(
+        equation("volts", &command, &signals()),
+        "volts += 2.00 V x[valve]^2; x[valve] = valve"
+    );
+    // A constant and a clock have no letters.
+    let clock = [term(&[Factor::Time { power: 0.5 }], Passage::Direct, 2e-9)];
+    assert_eq!(equation("volts", &clock, &signals()), "volts += 2.00e-9 V (time in trial/T)^0.5");
+    assert_eq!(equation("volts", &[], &signals()), "");
+}
+
+#[test]
+fn a_sentence_says_which_of_three_it_is() {
+    let x = Factor::Power { signal: 0, power: 2.0 };
+    let found = sentence(&proposed(vec![term(&[x], Passage::Direct, 0.5)], false));
+    assert_eq!(
+        found,
+        "What is missing in gauge may be volts += 0.500 V x[rod_mm]^2: it closes 83 % of what is left there on trials that were not fitted."
+    );
+    let dense = sentence(&proposed(Vec::new(), false));
+    assert!(dense.contains("follows what was recorded, but no short sum"), "{dense}");
+    let random = sentence(&proposed(Vec::new(), true));
+    assert!(random.contains("random in time"), "{random}");
+}
+
+#[test]
+fn what_leaks_acts_in_the_rate() {
+    let x = Factor::Power { signal: 0, power: 1.0 };
+    let direct = term(&[x], Passage::Direct, 1.0);
+    let leak = term(&[x], Passage::Leak { tau_s: 0.3 }, 1.0);
+    assert_eq!(acts("valve", std::slice::from_ref(&direct)), "output of valve");
+    assert_eq!(acts("valve", &[direct, leak]), "rate of the output of valve");
+}
+
+#[test]
+fn a_proposal_goes_through_json_whole() {
+    let x = Factor::Above { signal: 0, at: 0.25, power: 2.0 };
+    let told = proposed(vec![term(&[x], Passage::Rest { tau_s: 0.5 }, 0.5)], false);
+    let text = serde_json::to_string(&told).expect("written");
+    assert_eq!(serde_json::from_str::<Proposed>(&text).expect("read"), told);
+}

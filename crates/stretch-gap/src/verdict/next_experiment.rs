@@ -292,3 +292,98 @@ fn left(
     }
     (gap.iter().map(|g| g * g).sum::<f64>() / rival.samples()).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    use approx::assert_relative_eq;
+    use testkit::tolerance::F64_ROUNDING;
+
+    /// One channel, with parameters that may go three tolerances either way.
+    fn tangent(values: &[f64], slopes: &[&[f64]]) -> Tangent {
+        Tangent {
+            values: values.into(),
+            slopes: slopes.iter().map(|s| s.to_vec()).collect(),
+            bounds: vec![[-3.0, 3.0]; slopes.len()],
+            channels: 1,
+        }
+    }
+
+    fn wave(step: f64) -> Vec<f64> {
+        (0..400).map(|i| (step * f64::from(i)).sin()).collect()
+    }
+
+    #[test]
+    fn rivals_that_foretell_the_same_are_not_parted() {
+        let (one, two) = (tangent(&wave(0.1), &[]), tangent(&wave(0.1), &[&wave(0.1)]));
+        assert_eq!(left(50.0, &one, &two, &one, &two), 0.0);
+    }
+
+    /// Nothing can be re-tuned: what is left is the root mean square of the difference.
+    #[test]
+    fn without_parameters_the_difference_stays() {
+        let (one, two) = (tangent(&[0.0; 100], &[]), tangent(&[0.3; 100], &[]));
+        let d = left(50.0, &one, &two, &one, &two);
+        assert_relative_eq!(d, 0.3, epsilon = 0.0, max_relative = F64_ROUNDING);
+        // Two channels of which one differs: summed, not averaged.
+        let wide = |values| Tangent { channels: 2, ..tangent(values, &[]) };
+        let both = [[0.3; 100], [0.0; 100]].concat();
+        let d = left(50.0, &one, &two, &wide(&[0.0; 200]), &wide(&both));
+        assert_relative_eq!(d, 0.3, epsilon = 0.0, max_relative = F64_ROUNDING);
+    }
+
+    /// One parameter whose sensitivity is the difference itself, at noise level b: with n/b observations of size s^2 in what was measured and
+    /// in the experiment, x = -2 n s^2/b/(2 n s^2/b + 1), and 1 + x of the difference is left.
+    #[test]
+    fn what_re_tuning_can_do_is_taken_out_at_its_price() {
+        let (n, s, block) = (200_usize, 0.4, 50.0);
+        let values = vec![s; n];
+        let (truth, rival) = (tangent(&vec![0.0; n], &[]), tangent(&values, &[&values]));
+        let told = 2.0 * n as f64 * s * s / block;
+        let d = left(block, &truth, &rival, &truth, &rival);
+        // The solver lifts the diagonal by 1e-13.
+        assert_relative_eq!(d, s / (told + 1.0), epsilon = 0.0, max_relative = 1e-9);
+    }
+
+    /// Data that were measured forbid what would explain the experiment away: the rival may not move where it was pinned.
+    #[test]
+    fn what_is_known_pins_the_rival() {
+        let [none, one, much, half] = [0.0, 1.0, 100.0, 0.5].map(|value| vec![value; 200]);
+        let (truth, rival) = (tangent(&none, &[]), tangent(&half, &[&one]));
+        let d = |slope: &[f64]| left(50.0, &truth, &tangent(&none, &[slope]), &truth, &rival);
+        // Not pinned, the four blocks of the experiment pull against the prior: 1/(4 + 1) of 0.5 stays.
+        assert_relative_eq!(d(&none), 0.1, epsilon = 0.0, max_relative = 1e-9);
+        // Pinned by 1e4 times as much evidence, 4e4, all but 4/(4e4 + 5) of it stays.
+        let kept = 1.0 - 4.0 / 40_005.0;
+        assert_relative_eq!(d(&much), 0.5 * kept, epsilon = 0.0, max_relative = 1e-9);
+    }
+
+    #[test]
+    fn no_parameter_leaves_its_box() {
+        let (flat, slope) = (vec![0.0; 4000], vec![1.0; 4000]);
+        let truth = tangent(&flat, &[]);
+        let far = tangent(&vec![10.0; 4000], &[&slope]);
+        // Three tolerances of the ten: seven stay.
+        let d = left(50.0, &truth, &tangent(&flat, &[&flat]), &truth, &far);
+        assert_relative_eq!(d, 7.0, epsilon = 0.0, max_relative = 1e-9);
+    }
+
+    /// Evidence is half the squared difference by blocks: 3 nats are enough.
+    #[test]
+    fn runs_are_planned_where_one_will_hardly_do() {
+        // A minute holds 120 blocks: d^2 of 0.05 gives 3 nats.
+        assert_eq!(repeats(0.05_f64.sqrt() + 1e-9, 1.0), "");
+        assert_eq!(repeats(0.02_f64.sqrt() + 1e-9, 1.0), " Once will hardly do: plan 3 runs.");
+        assert!(repeats(1e-3, 1.0).contains("so alike that no experiment"));
+        assert!(repeats(0.0, 1.0).contains("so alike that no experiment"));
+    }
+
+    #[test]
+    fn a_plan_takes_its_samples_and_its_preparation() {
+        let time_s: Vec<f64> = (0..6000).map(|i| 0.01 * f64::from(i)).collect();
+        let trial = Trial { time_s, ..Trial::default() };
+        let plan = Plan { name: "slow".into(), how: "slowly.".into(), prepare_min: 2.0, trial };
+        assert_relative_eq!(plan.minutes(), 3.0, epsilon = 0.0, max_relative = 1e-6);
+    }
+}

@@ -51,6 +51,21 @@ pub(crate) struct Toy {
     pub(crate) budget: Option<usize>,
     /// Samples of all trials end to end that were not measured.
     pub(crate) is_lost: Vec<bool>,
+    /// Stages whose first parameter is another one: the stage, and the parameter.
+    pub(crate) shared: Vec<(usize, usize)>,
+    /// What happens instead of some runs.
+    pub(crate) fails: Option<Fails>,
+}
+
+/// How a simulator may fail.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Fails {
+    /// It refuses values of a parameter above this one.
+    Above(usize, f64),
+    /// Its output is no number.
+    NotFinite,
+    /// It is gone after so many runs.
+    GoneAfter(usize),
 }
 
 /// Session time from the start of a trial to the start of the next, s.
@@ -76,6 +91,8 @@ impl Toy {
             units: [1.0; 2],
             budget: None,
             is_lost: Vec::new(),
+            shared: Vec::new(),
+            fails: None,
         }
     }
 
@@ -115,12 +132,8 @@ impl Toy {
 
     /// What the simulator is made of, in the units that the toy is written in.
     pub(crate) fn description(&self) -> Description {
-        let mut own = 0;
         let stages = self.laws.iter().enumerate().map(|(i, law)| {
-            let indices: Vec<usize> = (own..own + law.parameters().len()).collect();
-            own += indices.len();
-            let channel = format!("y{i}");
-            let mut stage = StageSpec::new(law.name(), &channel, "u", &indices);
+            let mut stage = StageSpec::new(law.name(), &format!("y{i}"), "u", &self.own(i));
             stage.noise = self.stated.map(|times| Noise::known(times * self.noise * self.units[1]));
             stage
         });
@@ -190,6 +203,7 @@ impl Toy {
     /// What a stage of the bench makes of its input, without noise.
     fn of_bench(&self, stage: usize, input: &[f64]) -> Vec<f64> {
         let own = self.own(stage);
+        let parameters: Vec<f64> = own.iter().map(|p| self.truth[*p]).collect();
         let effects: Vec<(Effect, &[f64])> = self
             .hidden
             .iter()
@@ -201,11 +215,12 @@ impl Toy {
             let courses: Vec<(usize, &[f64])> = self
                 .courses
                 .iter()
-                .filter(|(p, _)| own.contains(p))
-                .map(|(p, course)| (p - own.start, &course[range.clone()]))
+                .filter_map(|(p, course)| {
+                    Some((own.iter().position(|q| q == p)?, &course[range.clone()]))
+                })
                 .collect();
             let bench = laws::Plant {
-                parameters: &self.truth[own.clone()],
+                parameters: &parameters,
                 courses: &courses,
                 effects: &effects,
                 dt_s: self.dt_s,
@@ -218,10 +233,14 @@ impl Toy {
     }
 
     /// Indices of a stage's parameters.
-    pub(crate) fn own(&self, stage: usize) -> std::ops::Range<usize> {
+    pub(crate) fn own(&self, stage: usize) -> Vec<usize> {
         let count = |laws: &[Law]| laws.iter().map(|law| law.parameters().len()).sum();
-        let from = count(&self.laws[..stage]);
-        from..from + count(&self.laws[stage..=stage])
+        let from: usize = count(&self.laws[..stage]);
+        let mut own: Vec<usize> = (from..from + self.laws[stage].parameters().len()).collect();
+        if let Some((_, other)) = self.shared.iter().find(|(s, _)| *s == stage) {
+            own[0] = *other;
+        }
+        own
     }
 
     /// Samples of every trial.

@@ -2,13 +2,13 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::{Effect, Toy, laws::Plant};
+use super::{Effect, Fails, Toy, laws::Plant};
 use stretch_gap::{
-    Column, Description, Diagnosis, Dice, Distortion, Evidence, GapError, ModelRuns, Motion,
-    Options, Recorded, Run, Simulator, diagnose,
+    Column, Costly, Description, Diagnosis, Dice, Distortion, Driven, Evidence, GapError,
+    ModelRuns, MotionSpec, Options, RecordFacts, Recorded, Run, Simulator, diagnose,
 };
 
-/// A toy beside its record. What was recorded may be altered; what the simulator computes is then driven by that.
+/// A toy beside its record. Outputs may be altered in place; for `x`, which the simulator is driven by, see [`Measured::rewritten`].
 #[derive(Debug)]
 pub(crate) struct Measured {
     pub(crate) toy: Toy,
@@ -24,7 +24,35 @@ pub(crate) struct Measured {
 impl Measured {
     pub(super) fn new(toy: Toy, x: Vec<f64>, outputs: Vec<Vec<f64>>) -> Self {
         let description = toy.description();
+        let stages = description.stages.iter().enumerate();
+        let read = stages.map(|(i, spec)| Column {
+            read_by: (i + 1..outputs.len()).take(1).collect(),
+            ..Column::output(i, spec)
+        });
+        let driving = Column {
+            name: "x".into(),
+            unit: "v".into(),
+            values: x.clone().into(),
+            output_of: None,
+            read_by: vec![0],
+            ..Column::output(0, &description.stages[0])
+        };
+        let known = RecordFacts {
+            is_lost: toy.is_lost.clone(),
+            motion: Some(MotionSpec::new(x.clone(), "v")),
+            signals: vec![Recorded::measured("x", "v", x.clone())],
+            columns: std::iter::once(driving).chain(read).collect(),
+            ..RecordFacts::default()
+        };
+        let description = description.with_record(known).expect("facts that fit the toy");
         Self { toy, description, x, outputs, runs: AtomicUsize::new(0) }
+    }
+
+    /// The same toy beside a record that says something else of `x` and of the outputs.
+    pub(crate) fn rewritten(self, by: impl FnOnce(&mut Vec<f64>, &mut [Vec<f64>])) -> Self {
+        let Self { toy, mut x, mut outputs, .. } = self;
+        by(&mut x, &mut outputs);
+        Self::new(toy, x, outputs)
     }
 
     /// The diagnosis with options as they are.
@@ -42,7 +70,7 @@ impl Measured {
     }
 
     /// The same toy beside a column as it was before an error.
-    fn corrected(&self, column: &str, error: Distortion) -> Option<Self> {
+    fn without(&self, column: &str, error: Distortion) -> Option<Self> {
         let (mut x, mut outputs) = (self.x.clone(), self.outputs.clone());
         let values = match column {
             "x" => &mut x,
@@ -68,22 +96,13 @@ impl Measured {
         }
         x
     }
-}
 
-impl Simulator for Measured {
-    fn description(&self) -> &Description {
-        &self.description
-    }
-
-    fn measured(&self, stage: usize) -> &[f64] {
-        &self.outputs[stage]
-    }
-
-    fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
-        self.runs.fetch_add(1, Ordering::Relaxed);
+    /// The output of a stage on an input in the units of -1..1, over the first trials.
+    fn compute(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) {
         let toy = &self.toy;
         let own = toy.own(run.stage);
         let parameters: Vec<f64> = own
+            .into_iter()
             .map(|p| {
                 run.model.parameters[p] / super::laws::unit(&toy.parameters[p].unit, toy.units)
             })
@@ -95,7 +114,6 @@ impl Simulator for Measured {
             .filter(|(e, _)| toy.catalogue[*e].0 == run.stage)
             .map(|(e, values)| (toy.catalogue[*e].1, values.as_slice()))
             .collect();
-        let input = self.input_of(run.stage, run.shake);
         for (trial, range) in toy.ranges().into_iter().enumerate().take(run.trials) {
             let plant = Plant {
                 parameters: &parameters,
@@ -108,49 +126,76 @@ impl Simulator for Measured {
             plant.run(toy.laws[run.stage], &input[range.clone()], &mut out[range]);
         }
         out.iter_mut().for_each(|y| *y *= toy.units[1]);
+    }
+}
+
+impl Simulator for Measured {
+    fn description(&self) -> &Description {
+        &self.description
+    }
+
+    fn measured(&self, stage: usize) -> &[f64] {
+        &self.outputs[stage]
+    }
+
+    fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
+        let before = self.runs.fetch_add(1, Ordering::Relaxed);
+        let toy = &self.toy;
+        match toy.fails {
+            Some(Fails::Above(p, most)) if run.model.parameters[p] > most => {
+                return Err(GapError::simulator("a value that it refuses"));
+            }
+            Some(Fails::GoneAfter(runs)) if before >= runs => {
+                return Err(GapError::Broken("it is gone".into()));
+            }
+            Some(Fails::NotFinite) => {
+                out.fill(f64::NAN);
+                return Ok(());
+            }
+            _ => {}
+        }
+        let input = self.input_of(run.stage, run.shake);
+        self.compute(run, &input, out);
         Ok(())
     }
 
-    fn is_lost(&self) -> &[bool] {
-        &self.toy.is_lost
+    fn costly(&self) -> Option<&dyn Costly> {
+        self.toy.budget.map(|_| self as &dyn Costly)
     }
 
-    fn model_runs(&self) -> Option<ModelRuns> {
-        let budget = self.toy.budget?;
-        let count = self.runs();
-        Some(ModelRuns { count, budget: Some(budget), is_spent: count >= budget })
+    fn driven(&self) -> Option<&dyn Driven> {
+        Some(self)
+    }
+}
+
+impl Costly for Measured {
+    fn model_runs(&self) -> ModelRuns {
+        let (count, budget) = (self.runs(), self.toy.budget);
+        ModelRuns { count, budget, is_spent: budget.is_some_and(|most| count >= most) }
     }
 
-    fn motion(&self) -> Motion<'_> {
-        Motion { values: &self.x, unit: "v", falling: "falling", rising: "rising" }
+    fn is_costly(&self, _effect: usize) -> bool {
+        true
+    }
+}
+
+impl Driven for Measured {
+    fn input(&self, stage: usize) -> Option<Vec<f64>> {
+        (stage > 0).then(|| self.outputs[stage - 1].clone())
     }
 
-    fn recorded(&self) -> Vec<Recorded> {
-        vec![Recorded::measured("x", "v", self.x.clone())]
+    fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {
+        let unit = if run.stage == 0 { self.toy.units[0] } else { self.toy.units[1] };
+        let input: Vec<f64> = input.iter().map(|x| x / unit).collect();
+        self.compute(run, &input, out);
+        Ok(true)
     }
 
-    fn columns(&self) -> Vec<Column<'_>> {
-        let stages = self.description.stages.iter().enumerate();
-        let outputs = stages.map(|(i, spec)| Column {
-            read_by: (i + 1..self.outputs.len()).take(1).collect(),
-            ..Column::output(i, spec, &self.outputs[i])
-        });
-        let x = Column {
-            name: "x".into(),
-            unit: "v".into(),
-            values: self.x.as_slice().into(),
-            output_of: None,
-            read_by: vec![0],
-            ..Column::output(0, &self.description.stages[0], &[])
-        };
-        std::iter::once(x).chain(outputs).collect()
-    }
-
-    fn put_right(
+    fn corrected(
         &self,
         column: &str,
         error: Distortion,
     ) -> Result<Option<Box<dyn Simulator + Send + '_>>, GapError> {
-        Ok(self.corrected(column, error).map(|one| Box::new(one) as _))
+        Ok(self.without(column, error).map(|one| Box::new(one) as _))
     }
 }

@@ -6,11 +6,11 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use stretch_fmu::{Fmu, FmuSource, Names};
 use stretch_gap::{Diagnosis, Options, diagnose};
-use stretch_problem::{Ask, BlackBox, Problem, Source, closure, worker::Workers};
+use stretch_problem::{Ask, BlackBox, Checked, Source, closure, worker::Workers};
 use support::{Wrong, answer, servo, spec, worker};
 
 fn diagnosed(source: Arc<dyn Source>) -> Diagnosis {
-    let bench = BlackBox::new(Problem::new(spec()).unwrap(), source);
+    let bench = BlackBox::new(Checked::new(spec()).unwrap(), source);
     let (mut diagnosis, _) = diagnose(&bench, &Options::default(), &|_| (), &|| false).unwrap();
     diagnosis.runtime_s = 0.0;
     diagnosis
@@ -18,12 +18,12 @@ fn diagnosed(source: Arc<dyn Source>) -> Diagnosis {
 
 #[test]
 fn fmi_2_and_fmi_3_diagnose_as_the_same_equations_in_rust() {
-    let problem = Problem::new(spec()).unwrap();
+    let problem = Checked::new(spec()).unwrap();
     let in_rust = diagnosed(Arc::new(closure(move |ask: &Ask<'_>| answer(&problem, ask))));
     assert_eq!(in_rust.named, ["brake"], "{}", in_rust.sentence);
     for fmi in [2, 3] {
         let Some(built) = servo(fmi, Wrong::Nothing) else { return };
-        let problem = Problem::new(spec()).unwrap();
+        let problem = Checked::new(spec()).unwrap();
         let spec = stretch_problem::worker::WorkersSpec { jobs: 2, ..worker(&built.file, &[]) };
         let workers = Workers::start(spec, problem.session()).unwrap();
         // The same operations in the same order: not one bit is another.
@@ -33,7 +33,7 @@ fn fmi_2_and_fmi_3_diagnose_as_the_same_equations_in_rust() {
 
 #[test]
 fn samples_are_those_of_the_equations_and_runs_leave_nothing_behind() {
-    let problem = Problem::new(spec()).unwrap();
+    let problem = Checked::new(spec()).unwrap();
     let session = problem.session();
     let variables = BTreeMap::from([("tau".to_owned(), "servo.tau".to_owned())]);
     let names = Names { variables, units: BTreeMap::new() };

@@ -5,7 +5,7 @@ mod support;
 use std::{env, fmt::Write, fs};
 
 use stretch_fmu::{Fmu, describe};
-use stretch_problem::{Ask, Problem, ProblemFile, Source, worker::Workers};
+use stretch_problem::{Ask, Checked, ProblemFile, Source, worker::Workers};
 use support::{SAMPLES, Wrong, answer, servo, spec};
 
 const TEXT: &str = r#"
@@ -59,7 +59,7 @@ fn a_problem_is_read_and_its_fmu_found_and_run() {
     fs::hard_link(env!("CARGO_BIN_EXE_stretch-fmu"), &beside).unwrap();
 
     let file = ProblemFile::read(&file).unwrap();
-    let problem = Problem::new(file.load().unwrap()).unwrap();
+    let problem = Checked::new(file.load().unwrap()).unwrap();
     let spec = file.workers(1).unwrap().unwrap();
     assert_eq!((spec.jobs, spec.deadline_s), (1, 20.0));
     for pair in [["--variable", "tau=servo.tau"], ["--unit", "tau=s"], ["--unit", "brake=deg"]] {

@@ -6,14 +6,14 @@ use std::fs;
 
 use stretch_fmu::{Fmu, FmuError};
 use stretch_problem::{
-    Ask, Parameter, Problem, ProblemSpec, Source, SourceError,
+    Ask, Parameter, Checked, ProblemSpec, Source, SourceError,
     worker::{Workers, WorkersSpec},
 };
 use support::{Wrong, servo, spec, worker};
 
 /// What the worker says of an FMU at its start.
 fn started(spec: ProblemSpec, workers: WorkersSpec) -> Result<Workers, String> {
-    let problem = Problem::new(spec).unwrap();
+    let problem = Checked::new(spec).unwrap();
     Workers::start(workers, problem.session()).map_err(|e| e.to_string())
 }
 
@@ -92,7 +92,7 @@ fn troubled(fmi: u8, trouble: f64) -> Option<(Answer, Vec<String>)> {
     let mut spec = spec();
     let known = Parameter { name: "trouble".into(), value: trouble, ..Parameter::default() };
     spec.parameters.push(known);
-    let problem = Problem::new(spec).unwrap();
+    let problem = Checked::new(spec).unwrap();
     // Whoever hangs is waited for no longer than a test has time; all others may wait for a busy machine.
     let deadline_s = if trouble == 2.0 { 1.0 } else { 60.0 };
     let workers = WorkersSpec { deadline_s, ..worker(&built.file, &[]) };

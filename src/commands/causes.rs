@@ -7,9 +7,9 @@ use stretch_calibrate::Options;
 use stretch_data::Trial;
 use stretch_files::read_whole;
 use stretch_gap::Diagnosis;
-use stretch_problem::{Causes, causes};
+use stretch_problem::{Causes, causes, name_of};
 
-use super::{diagnose::name_of, shared::spinner};
+use super::shared::spinner;
 
 /// The newest diagnosis that is read.
 const SCHEMA: u32 = 1;

@@ -97,7 +97,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         "seed": args.data.is_none().then_some(args.seed),
         "evaluation": job.calibrations.evaluation,
         "kinds": job.calibrations.kinds,
-        "diagnosis": job.examined.diagnosis,
+        "diagnosis": job.examined.to_json(),
     });
     args.json.answer(&answer, || print(&sessions, &job))?;
     if args.json.is_printed() {
@@ -186,14 +186,7 @@ fn write(out: &Path, title: String, sessions: &Sessions, job: &Job) -> anyhow::R
     };
     let evaluation = &calibrations.evaluation;
     let judged = Judged { calibrated: &shown, evaluation, context: &context };
-    let examined = &job.examined;
-    let subject = Subject {
-        name: &sessions.name,
-        diagnosis: &examined.diagnosis,
-        evidence: &examined.evidence,
-        implementations: &examined.implementations,
-        simulator: job.bench.simulator(),
-    };
+    let subject = Subject::of(&job.problem, &job.examined);
     write_text(&file("report.html"), &demo_page(&judged, &subject))?;
     write_text(&file("estimate.svg"), &readme_picture(&shown, evaluation))
 }

@@ -1,30 +1,27 @@
 //! `stretch diagnose`: where simulator and measurement part, which effect causes it, how far the gap closes.
 
-use std::{
-    io,
-    path::{Path, PathBuf},
-    process::ExitCode,
-};
+use std::{io, path::PathBuf, process::ExitCode};
 
-use anyhow::{Context, ensure};
+use anyhow::{Context, bail, ensure};
 use indicatif::ProgressBar;
 use stretch_files::{FileError, Outputs};
 use stretch_gap::{Diagnosis, Options};
-use stretch_problem::{Bench, Examined, GaugeSimulator, RigSimulator};
+use stretch_problem::{Examined, Problem, Reading};
 use stretch_report::{Subject, diagnosis_page};
-use stretch_sim::Catalogue;
 
 use super::{
-    diagnosis_files::{implement_json, not_read, to_json, write_fix, write_snippets},
+    diagnosis_files::{write_fix, write_snippets},
     diagnosis_text::text,
     fail_on::FailOn,
     json::Json,
-    problem,
     reading::column,
-    shared::{detail, say, say_first, short_name, spinner, stage_text, tell},
+    shared::{detail, say, say_first, spinner, stage_text, tell},
 };
 use crate::display::fail;
 
+/// What is said where there are rivals, and still no experiment.
+const NOT_FORETOLD: &str =
+    " that the simulator could foretell: it takes no altered inputs, or its runs are spent";
 /// Status of a diagnosis whose verdict is one that `--fail-on` names.
 const FAILED_ON: u8 = 3;
 
@@ -136,9 +133,6 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
     let files = [&args.report, &args.fix, &args.experiment].map(|path| path.as_deref());
     args.json.share_stdout(files)?;
     ensure!(is_there, "{}: there is no such file or folder", args.data_set.display());
-    if let Some(fix) = &args.fix {
-        not_read(fix, &args.data_set, args.rig.as_deref())?;
-    }
     if let Some(folder) = args.snippets.as_deref().filter(|folder| folder.exists()) {
         let is_empty = std::fs::read_dir(folder).is_ok_and(|mut held| held.next().is_none());
         ensure!(is_empty, FileError::Exists { path: folder.display().to_string() });
@@ -152,81 +146,36 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
         ..Options::default()
     };
     let bar = spinner();
-    let mut args = args;
-    let asked = args.data_set.display().to_string();
-    if let Some(file) = problem::read(&args.data_set)? {
-        let Some(builtin) = problem::builtin(&file) else {
-            return of_own(&args, &file, &options, &bar).context(asked);
-        };
-        args.data_set = builtin.data_set;
-        args.rig = args.rig.or(builtin.rig);
-        if let (None, Some((reference, signal))) = (&args.reference, builtin.columns) {
-            (args.reference, args.signal) = (Some(reference), Some(signal));
-        }
-    }
-    ensure!(
-        args.budget.is_none(),
-        "--budget counts runs of a simulator of your own; the built-in ones need none"
-    );
+    bar.set_message("reading; a simulator of your own is started");
     let shown = || args.data_set.display().to_string();
-    let rig = args.rig.as_deref();
-    // what a simulation makes of numbers is the rig file's matter as much as the data's
-    let beside = || match rig {
-        Some(rig) => format!("{} beside {}", shown(), rig.display()),
-        None => shown(),
-    };
-    let columns = args.reference.as_deref().zip(args.signal.as_deref());
-    let catalogue = Catalogue::default().without(&args.without)?;
-    let bench = read_bench(&args.data_set, columns, rig, &catalogue).with_context(shown)?;
-    detail(format!("read {}", beside()));
-    let (looks_on, stop) = (!args.no_next, &stretch_files::interrupted);
-    let examined = bench.examine(&options, looks_on, &told_on(&bar), stop).with_context(beside)?;
-    bar.finish_and_clear();
-    conclude(&args, &examined, &bench)?;
-    Ok(examined.diagnosis)
-}
-
-/// A simulator of the user's own.
-fn of_own(
-    args: &Args,
-    file: &stretch_problem::ProblemFile,
-    options: &Options,
-    bar: &ProgressBar,
-) -> anyhow::Result<Diagnosis> {
-    problem::refuse(&[
-        ("--rig", args.rig.is_some()),
-        ("--fix", args.fix.is_some()),
-        ("--snippets", args.snippets.is_some()),
-        ("--reference", args.reference.is_some()),
-        ("--experiment", args.experiment.is_some()),
-        ("--without", !args.without.is_empty()),
-    ])?;
-    let asked = problem::Asked {
-        options,
-        json: &args.json,
-        report: args.report.as_deref(),
+    let reading = Reading {
+        rig: args.rig.as_deref(),
+        columns: args.reference.as_deref().zip(args.signal.as_deref()),
+        without: &args.without,
         jobs: args.jobs.into(),
         budget: args.budget.map(|n| n as usize),
     };
-    problem::run(file, &asked, bar)
-}
-
-/// A data set's folder, or a trial of which `columns` are reference and signal.
-pub(super) fn read_bench(
-    path: &Path,
-    columns: Option<(&str, &str)>,
-    rig: Option<&Path>,
-    catalogue: &Catalogue,
-) -> anyhow::Result<Bench> {
-    if let Some(gauge) = GaugeSimulator::read(path, columns, rig, catalogue)? {
-        return Ok(gauge.into());
+    let problem = Problem::read(&args.data_set, &reading).with_context(shown)?;
+    if let Some(fix) = args.fix.as_deref().filter(|fix| problem.is_read_from(fix)) {
+        bail!("{}: --fix would replace a file that is read; give it another name", fix.display());
     }
-    ensure!(
-        path.is_dir(),
-        "a single trial is diagnosed as a gauge alone: say which columns with --reference and --signal, \
-         or give the folder of a data set"
-    );
-    Ok(RigSimulator::read(path, rig, catalogue)?.into())
+    // what a simulation makes of numbers is the rig file's matter as much as the data's
+    let beside = || match &args.rig {
+        Some(rig) => format!("{} beside {}", shown(), rig.display()),
+        None => shown(),
+    };
+    detail(format!("read {}", beside()));
+    // of a simulator whose runs cost the next experiment is looked for where it is asked for
+    let looks_on = match problem.simulator().costly() {
+        Some(_) => args.experiment.is_some(),
+        None => !args.no_next,
+    };
+    let stop = &stretch_files::interrupted;
+    let examined =
+        problem.examine(&options, looks_on, &told_on(&bar), stop).with_context(beside)?;
+    bar.finish_and_clear();
+    conclude(&args, &examined, &problem)?;
+    Ok(examined.diagnosis)
 }
 
 /// Tells what goes on: beside a bar, or with `-v` in lines.
@@ -238,10 +187,7 @@ pub(super) fn told_on(bar: &ProgressBar) -> impl Fn(&str) + Sync {
 }
 
 /// Writes the files first, all or none: a message that they are there is then true.
-fn conclude(args: &Args, examined: &Examined, bench: &Bench) -> anyhow::Result<()> {
-    let Examined { diagnosis, evidence, implementations, .. } = examined;
-    let name = name_of(&args.data_set);
-    let fix = bench.fixed(examined);
+fn conclude(args: &Args, examined: &Examined, problem: &Problem) -> anyhow::Result<()> {
     let (mut said, mut missing, mut outputs) = (Vec::new(), Vec::new(), Outputs::default());
     match (&args.experiment, &examined.experiment) {
         (Some(path), Some(trial)) => {
@@ -251,26 +197,24 @@ fn conclude(args: &Args, examined: &Examined, bench: &Bench) -> anyhow::Result<(
         }
         // a script that goes on with the file must not wonder
         (Some(path), None) => missing.push(format!(
-            "{} is not written: no experiment is recommended, there are no rivals to tell apart",
-            path.display()
+            "{} is not written: no experiment is recommended, there are no rivals to tell apart{}",
+            path.display(),
+            if examined.diagnosis.ambiguous.len() > 1 { NOT_FORETOLD } else { "" }
         )),
         _ => {}
     }
-    let implement = implementations.iter().map(implement_json).collect();
-    let fixed_rig = fix.as_ref().ok().map(|fix| &fix.file);
-    let answer = to_json(diagnosis, implement, fixed_rig, &name, args.seed)?;
+    let answer = examined.to_json();
     args.json.stage(&mut outputs, &answer)?;
     if let Some(path) = &args.report {
-        let simulator = bench.simulator();
-        let subject = Subject { name: &name, diagnosis, evidence, implementations, simulator };
-        stage_text(&mut outputs, path, &diagnosis_page(&subject))?;
+        let page = diagnosis_page(&Subject::of(problem, examined));
+        stage_text(&mut outputs, path, &page)?;
         said.push(format!("wrote {}", path.display()));
     }
     if let Some(path) = &args.fix {
-        said.push(write_fix(&mut outputs, path, &fix, &name, args.seed)?);
+        said.push(write_fix(&mut outputs, path, examined)?);
     }
     if let Some(folder) = &args.snippets {
-        said.push(write_snippets(&mut outputs, folder, implementations)?);
+        said.push(write_snippets(&mut outputs, folder, &examined.implementations)?);
     }
     outputs.keep()?;
     args.json.say(&answer, || {
@@ -285,13 +229,4 @@ fn conclude(args: &Args, examined: &Examined, bench: &Bench) -> anyhow::Result<(
 pub(super) fn print(examined: &Examined) -> anyhow::Result<()> {
     say_first(&examined.diagnosis.sentence)?;
     say(text(&examined.diagnosis, &examined.implementations))
-}
-
-/// What the data are called: the folder's or the file's name.
-pub(super) fn name_of(path: &Path) -> String {
-    if path.as_os_str() == "-" {
-        return "standard input".to_owned();
-    }
-    let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    short_name(&real)
 }

@@ -5,8 +5,8 @@ use std::fmt::Write;
 use stretch_gap::{Candidate, Diagnosis, Knowledge, SliceGap, VerdictKind, Where};
 use stretch_problem::Implementation;
 use stretch_report::{
-    Table, baseline_table, candidate_table, effect_in_words, listed, stage_table, times,
-    transfer_in_words, transfer_table,
+    Table, baseline_table, candidate_table, listed, stage_table, times, transfer_in_words,
+    transfer_table,
 };
 
 use super::fail_on::is_faint;
@@ -20,10 +20,8 @@ const CANDIDATES: usize = 6;
 /// Everything behind the sentence: where, which, how far, and what to do next.
 pub(crate) fn text(diagnosis: &Diagnosis, implementations: &[Implementation]) -> String {
     let mut out = String::new();
-    for name in &diagnosis.named {
-        if let Some(words) = effect_in_words(name) {
-            put(&mut out, &format!("  {name}: {words}"));
-        }
+    for one in implementations {
+        put(&mut out, &format!("  {}: {}", one.name, one.words));
     }
     if let Some(proposed) = diagnosis.proposed.as_ref().filter(|p| !p.equation.is_empty()) {
         put(&mut out, &format!("  proposed, on the {}: {}", proposed.acts, proposed.equation));
@@ -159,7 +157,7 @@ fn implement(out: &mut String, all: &[Implementation]) {
     }
     put(out, "\nTo implement (--snippets DIR or the report has the code in C, Python and MATLAB):");
     for one in all {
-        put(out, &format!("- {}: {}", one.effect.name, one.equation()));
+        put(out, &format!("- {}: {}", one.name, one.equation()));
         if let Some(sketch) = &one.sketch {
             for q in &sketch.inputs {
                 put(out, &format!("  {q}"));

@@ -23,7 +23,6 @@ pub(crate) mod man;
 mod pace;
 pub(crate) mod page;
 pub(crate) mod paper;
-mod problem;
 mod reading;
 pub(crate) mod record;
 pub(crate) mod rig;

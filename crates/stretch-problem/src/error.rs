@@ -3,6 +3,7 @@
 use stretch_data::DataError;
 use stretch_gap::{DescriptionError, GapError};
 use stretch_recording::RecordingError;
+use stretch_sim::{GridError, SimError};
 
 /// Why a problem was refused; says where and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -44,6 +45,62 @@ pub enum ProblemError {
     /// A simulator that could not be started.
     #[error("{0}")]
     Simulator(String),
+    /// The rig or an effect was refused.
+    #[error(transparent)]
+    Sim(#[from] SimError),
+    /// A rig file was refused.
+    #[error("{file}: {cause}")]
+    RigFile {
+        /// The file.
+        file: String,
+        /// What is wrong in it.
+        #[source]
+        cause: SimError,
+    },
+    /// A column is not what its name says.
+    #[error("{column}: {found}; {hint}")]
+    Implausible {
+        /// The column.
+        column: String,
+        /// What is wrong.
+        found: String,
+        /// What to do.
+        hint: String,
+    },
+    /// There is nothing to fit on.
+    #[error("{what}: {hint}")]
+    TooLittle {
+        /// What is missing.
+        what: String,
+        /// What to do.
+        hint: String,
+    },
+    /// A simulated output was not finite.
+    #[error(
+        "{stage}: the simulation gave a number that is not finite; a parameter of the rig is too large or too small"
+    )]
+    NotFinite {
+        /// The stage.
+        stage: String,
+    },
+}
+
+/// Refuses a sample time outside 1e-3 .. 1e7 Hz, before anything is counted in samples of it: stamps of another unit.
+pub(crate) fn check_rate(dt_s: f64) -> Result<(), ProblemError> {
+    if (1e-7..=1e3).contains(&dt_s) {
+        return Ok(());
+    }
+    Err(ProblemError::Implausible {
+        column: "time_s".into(),
+        found: format!("a sample every {dt_s} s"),
+        hint: "rates from 0.001 to 10 000 000 Hz are understood; is the time in seconds?".into(),
+    })
+}
+
+impl From<GridError> for ProblemError {
+    fn from(error: GridError) -> Self {
+        Self::Sim(error.into())
+    }
 }
 
 impl ProblemError {

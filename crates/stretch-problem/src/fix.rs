@@ -1,14 +1,17 @@
-//! What a diagnosis found, as a rig file: the simulator that lacked it, fixed.
+//! What a diagnosis found, as a file: the simulator that lacked it, fixed.
 
-use std::f64::consts::TAU;
+use std::{f64::consts::TAU, path::Path};
 
 use stretch_data::{Remarks, RigFile};
 use stretch_gap::{
-    Candidate, Diagnosis, EffectValue, Evidence, Frame, Model, Run, Simulator, VerdictKind,
+    Candidate, Diagnosis, EffectSpec, EffectValue, Evidence, Frame, Model, Run, Simulator,
+    VerdictKind,
 };
 use stretch_sim::{Effect, SimError, Tolerance};
 
-/// A rig file that holds what a diagnosis found: re-tuned parameters with tolerances as found, and the effects with every
+use crate::file::ProblemFile;
+
+/// A rig file or a problem's file that holds what a diagnosis found: re-tuned parameters with tolerances as found, and the effects with every
 /// parameter and form. Comments beside the entries say where each comes from.
 ///
 /// A tolerance is one standard deviation of the fit, never more than it was. It holds if the model does: intervals of parameters
@@ -16,15 +19,43 @@ use stretch_sim::{Effect, SimError, Tolerance};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fix {
     /// The file.
-    pub file: RigFile,
+    pub file: Fixed,
+    /// Names of the effects that were added.
+    pub effects: Vec<String>,
     /// The comments.
     pub remarks: Remarks,
 }
 
+/// What a fix is written as.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Fixed {
+    /// The built-in rig, or a gauge alone.
+    Rig(RigFile),
+    /// A simulator of a user's own: its problem, the parameters re-tuned, what was found around it under `[[wrapped]]`.
+    Problem(Box<ProblemFile>),
+}
+
 impl Fix {
-    /// The text of the file, comments included.
-    pub fn text(&self) -> String {
-        self.file.to_toml_with(&self.remarks)
+    /// The text of the file as it stands at `path`, comments included.
+    pub fn text(&self, path: &Path) -> String {
+        match &self.file {
+            Fixed::Rig(rig) => rig.to_toml_with(&self.remarks),
+            Fixed::Problem(problem) => problem.to_toml_with(path, &self.remarks),
+        }
+    }
+}
+
+/// What an effect of a fix is.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Meaning<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) words: &'a str,
+    pub(crate) equation: &'a str,
+}
+
+impl From<&Effect> for Meaning<'static> {
+    fn from(effect: &Effect) -> Self {
+        Self { name: effect.name, words: effect.words, equation: effect.equation }
     }
 }
 
@@ -40,7 +71,7 @@ pub enum NoFix {
     },
     /// The catalogue does not explain the gap.
     #[error(
-        "the gap is not explained, so that no rig file closes it; what is known of it stands in the diagnosis"
+        "the gap is not explained, so that no file closes it; what is known of it stands in the diagnosis"
     )]
     Unknown,
     /// What was found is none that a rig file may hold.
@@ -88,23 +119,29 @@ impl<'a> Chosen<'a> {
         }
     }
 
-    /// Effects of the set that do something, with values that a file may hold.
+    /// Effects of the set that do something: index in a simulator's catalogue, values.
     pub(crate) fn effects(
         &self,
-        rows: &[&'static Effect],
-        allowed: impl Fn(&Effect, &mut [f64]),
-    ) -> Vec<(&'static Effect, Vec<f64>)> {
-        let Some(found) = self.found else { return Vec::new() };
-        let on = self.model.effects.iter().filter_map(|(index, values)| {
-            let effect = rows.get(*index).copied()?;
-            let is_wanted = found.effects.iter().any(|name| name == effect.name);
-            (is_wanted && !effect.is_off(values)).then(|| (effect, values.clone()))
-        });
-        on.map(|(effect, mut values)| {
-            allowed(effect, &mut values);
-            (effect, values)
+        catalogue: &'a [EffectSpec],
+    ) -> impl Iterator<Item = (usize, &'a [f64])> {
+        let wanted = self.found.map_or(&[][..], |found| &found.effects);
+        self.model.effects.iter().filter_map(move |(index, values)| {
+            let spec = catalogue.get(*index)?;
+            let mut strengths = spec.parameters.iter().zip(values);
+            let is_off = strengths.all(|(p, value)| p.off.is_none_or(|off| *value == off));
+            (wanted.contains(&spec.name) && !is_off).then_some((*index, values.as_slice()))
         })
-        .collect()
+    }
+
+    /// Those that the diagnosis names, in its order.
+    pub(crate) fn named(&self, catalogue: &'a [EffectSpec]) -> Vec<(usize, &'a [f64])> {
+        let place = |index: usize| {
+            self.diagnosis.named.iter().position(|name| *name == catalogue[index].name)
+        };
+        let named = self.effects(catalogue).filter(|(index, _)| place(*index).is_some());
+        let mut named: Vec<_> = named.collect();
+        named.sort_by_key(|(index, _)| place(*index));
+        named
     }
 
     /// Tolerance of a re-tuned parameter, in the way in which the old one was told.
@@ -151,22 +188,22 @@ impl<'a> Chosen<'a> {
     }
 
     /// Adds what is said of an effect and its parameters.
-    pub(crate) fn tell(&self, effect: &Effect, remarks: &mut Remarks) {
+    pub(crate) fn tell(&self, effect: Meaning<'_>, remarks: &mut Remarks) {
         let name = effect.name;
         remarks.effects.insert(name.into(), self.lines(effect));
-        for p in self.numbers(effect) {
+        for p in self.numbers(name) {
             let key = (name.to_owned(), p.name.clone());
             remarks.effect_parameters.insert(key, told_of_effect(&p));
         }
     }
 
     /// Parameters and forms of an effect.
-    pub(crate) fn numbers(&self, effect: &Effect) -> Vec<EffectValue> {
+    pub(crate) fn numbers(&self, effect: &str) -> Vec<EffectValue> {
         let all = self.found.iter().flat_map(|c| &c.parameters);
-        all.filter(|p| p.effect == effect.name).cloned().collect()
+        all.filter(|p| p.effect == effect).cloned().collect()
     }
 
-    fn lines(&self, effect: &Effect) -> Vec<String> {
+    fn lines(&self, effect: Meaning<'_>) -> Vec<String> {
         let d = self.diagnosis;
         let share = d.shares.iter().find(|s| s.effect == effect.name);
         let closes = share.map_or(String::new(), |s| format!(" closes {:.0} %", 100.0 * s.closes));
@@ -192,6 +229,11 @@ impl<'a> Chosen<'a> {
         }
         lines
     }
+}
+
+/// Names of the effects of a rig file.
+pub(crate) fn names(file: &RigFile) -> Vec<String> {
+    file.effects.iter().map(|effect| effect.name.clone()).collect()
 }
 
 /// What is said behind a parameter of an effect.

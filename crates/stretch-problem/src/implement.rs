@@ -1,6 +1,6 @@
 //! What a diagnosis names, as something to type into a simulator.
 
-use stretch_gap::{Diagnosis, EffectValue, Evidence};
+use stretch_gap::{Diagnosis, EffectSpec, EffectValue, Evidence};
 use stretch_sim::{Effect, Language, Sketch, Surroundings};
 
 use crate::fix::{Chosen, digits};
@@ -8,11 +8,17 @@ use crate::fix::{Chosen, digits};
 /// A named effect with the numbers that were fitted: its equation, its initial state, and its code.
 #[derive(Debug, Clone)]
 pub struct Implementation {
-    /// The effect.
-    pub effect: &'static Effect,
+    /// The effect's name.
+    pub name: String,
+    /// What it is, for someone who does not know its name.
+    pub words: String,
+    /// The stage that it belongs to.
+    pub stage: String,
+    /// Its equation, in its parameters' names.
+    pub formula: String,
     /// Its parameters and forms, with intervals.
     pub numbers: Vec<EffectValue>,
-    /// How it is typed; none for an effect of a user's own that says nothing of that.
+    /// How it is typed; none for an effect that says nothing of that.
     pub sketch: Option<Sketch>,
 }
 
@@ -21,8 +27,8 @@ impl Implementation {
     pub fn equation(&self) -> String {
         let numbers: Vec<String> = self.numbers.iter().map(told).collect();
         match numbers.is_empty() {
-            true => self.effect.equation.to_owned(),
-            false => format!("{}; with {}", self.effect.equation, numbers.join(", ")),
+            true => self.formula.clone(),
+            false => format!("{}; with {}", self.formula, numbers.join(", ")),
         }
     }
 
@@ -35,38 +41,38 @@ impl Implementation {
     /// A function of its name that takes a sample and hands back the next one.
     pub fn code(&self, language: Language) -> Option<String> {
         let comments = [
-            format!("{}: {}.", self.effect.name, self.effect.words),
+            format!("{}: {}.", self.name, self.words),
             self.equation(),
             format!("State: {}.", self.state()),
         ];
         let sketch = self.sketch.as_ref()?;
-        Some(sketch.code(language, self.effect.name, &comments))
+        let name = self.name.replace(|c: char| !c.is_ascii_alphanumeric(), "_");
+        Some(sketch.code(language, &name, &comments))
     }
 }
 
-/// The effects that a diagnosis names; `complete` finds what it leaves to the record.
+/// The effects of the built-in catalogue that a diagnosis names; `complete` finds what it leaves to the record.
 pub(crate) fn implementations(
-    diagnosis: &Diagnosis,
-    evidence: &Evidence,
+    (diagnosis, evidence): (&Diagnosis, &Evidence),
+    catalogue: &[EffectSpec],
     rows: &[&'static Effect],
     around: &Surroundings<'_>,
     complete: impl Fn(&Effect, Vec<f64>) -> Vec<f64>,
 ) -> Vec<Implementation> {
     let Ok(chosen) = Chosen::of(diagnosis, evidence) else { return Vec::new() };
-    let is_named = |effect: &Effect| diagnosis.named.iter().any(|name| name == effect.name);
-    let effects = chosen.effects(rows, |_, _| ()).into_iter();
-    let one = |(effect, values): (&'static Effect, Vec<f64>)| {
-        let values = complete(effect, values);
+    let one = |(index, values): (usize, &[f64])| {
+        let effect = rows[index];
+        let values = complete(effect, values.to_vec());
         Implementation {
-            effect,
-            numbers: chosen.numbers(effect),
+            name: effect.name.to_owned(),
+            words: effect.words.to_owned(),
+            stage: effect.stage.name().to_owned(),
+            formula: effect.equation.to_owned(),
+            numbers: chosen.numbers(effect.name),
             sketch: effect.sketch.map(|sketch| sketch(&values, around)),
         }
     };
-    let mut all: Vec<Implementation> = effects.filter(|(e, _)| is_named(e)).map(one).collect();
-    let place = |i: &Implementation| diagnosis.named.iter().position(|n| n == i.effect.name);
-    all.sort_by_key(place);
-    all
+    chosen.named(catalogue).into_iter().map(one).collect()
 }
 
 /// A number with its unit and its 95 % interval.

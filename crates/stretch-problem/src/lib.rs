@@ -4,29 +4,31 @@ mod bench;
 mod black_box;
 mod causes;
 mod error;
-mod examined;
+mod examine;
 mod file;
 mod fix;
 mod gauge;
 mod implement;
 mod init;
+mod problem;
 mod rig;
 pub mod worker;
 mod wrap;
 
-pub use bench::error::BenchError;
 pub use black_box::{
-    Agreed, Argument, Ask, BlackBox, Closure, Input, OwnEffect, Parameter, Problem, ProblemSpec,
-    Session, SessionColumn, SessionPart, SessionStage, Source, SourceError, Stage, Tolerance,
+    Agreed, Argument, Ask, BlackBox, Checked, Closure, Input, OwnEffect, Parameter, ProblemSpec,
+    Sensor, Session, SessionColumn, SessionPart, SessionStage, Source, SourceError, Stage, Wrapped,
     agreed, closure,
 };
 pub use causes::{Causes, causes};
 pub use error::ProblemError;
-pub use examined::{Bench, Examined};
+pub use examine::Examined;
 pub use file::{ProblemFile, SimulatorEntry, TrialFile, WorkersEntry};
-pub use fix::{Fix, NoFix};
+pub use fix::{Fix, Fixed, NoFix};
 pub use gauge::{GaugeSetup, GaugeSimulator};
 pub use implement::Implementation;
 pub use init::first_problem;
+pub use problem::{Diagnosable, Problem, Reading, name_of};
 pub use rig::{RigSession, RigSetup, RigSimulator, RigTrial};
+pub use stretch_sim::Tolerance;
 pub use wrap::{Beside, Extent, Family, Measure, Side, Starts, Wrapper, wrapper_named, wrappers};

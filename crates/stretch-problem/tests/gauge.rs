@@ -5,7 +5,7 @@ use crate::support::rows::{PROBABILITY, with_lost_rows};
 use approx::{abs_diff_eq, assert_abs_diff_eq};
 use stretch_data::{Channel, RigFile, SessionTrial, Split, Trial};
 use stretch_gap::{Diagnosis, Options, Simulator, VerdictKind, diagnose, next_experiment};
-use stretch_problem::{BenchError, GaugeSetup, GaugeSimulator};
+use stretch_problem::{GaugeSetup, GaugeSimulator, ProblemError};
 use stretch_sim::{Catalogue, GaugeRig};
 use testkit::tolerance::{FIT_WELL, GAIN_FOUND, RESUMED_S, SKEW_FOUND_S};
 
@@ -416,7 +416,7 @@ fn columns_that_cannot_be_what_they_say_are_refused_or_told() {
         t.channels.iter_mut().for_each(|c| c.values.truncate(250));
     };
     refused(&short, "rod_mm", "s1", &["to fit have 188 samples", "300"]);
-    let noted = |g: Result<GaugeSimulator, BenchError>, words: &[&str]| {
+    let noted = |g: Result<GaugeSimulator, ProblemError>, words: &[&str]| {
         let notes = g.expect("a gauge").notes().join("; ");
         assert!(words.iter().all(|w| notes.contains(w)), "{notes}");
     };

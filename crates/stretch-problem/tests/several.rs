@@ -5,7 +5,7 @@ use std::sync::Arc;
 use stretch_data::{Channel, SessionTrial, Split, Trial};
 use stretch_gap::{Diagnosis, Dice, Options, diagnose};
 use stretch_problem::{
-    Ask, BlackBox, Parameter, Problem, ProblemSpec, Stage, Tolerance, agreed, closure,
+    Ask, BlackBox, Checked, Parameter, ProblemSpec, Stage, Tolerance, agreed, closure,
 };
 
 const DT_S: f64 = 0.01;
@@ -67,7 +67,7 @@ fn diagnosed(late_s: [f64; 3], tau_s: f64) -> (Diagnosis, Vec<String>) {
         stages: vec![name.into()],
         ..Parameter::default()
     };
-    let problem = Problem::new(ProblemSpec {
+    let problem = Checked::new(ProblemSpec {
         stages: SIGNALS.iter().map(stage).collect(),
         parameters: ["grip", "bend", "turn"].map(scale).into(),
         wrap: ["skew", "lag", "backlash", "offset"].map(|k| format!("output.{k}")).into(),

@@ -10,7 +10,7 @@ use proptest::prelude::*;
 use stretch_data::{Channel, SessionTrial, Trial};
 use stretch_gap::{Diagnosis, Dice, Options, diagnose};
 use stretch_problem::{
-    Argument, Ask, BlackBox, OwnEffect, Parameter, Problem, ProblemSpec, Source, SourceError,
+    Argument, Ask, BlackBox, Checked, OwnEffect, Parameter, ProblemSpec, Source, SourceError,
     Stage, Tolerance,
     worker::{Frame, Workers, WorkersSpec},
 };
@@ -33,7 +33,7 @@ fn plant(u: &[f64]) -> Vec<f64> {
     u.iter().map(one).collect()
 }
 
-fn problem() -> Problem {
+fn problem() -> Checked {
     let mut dice = Dice::new(3, 0);
     let mut held = 0.0;
     let u: Vec<f64> = (0..SAMPLES)
@@ -56,7 +56,7 @@ fn problem() -> Problem {
         ..Parameter::default()
     };
     let argument = Argument { min: 0.0, max: 20.0, off: Some(0.0), ..Argument::default() };
-    Problem::new(ProblemSpec {
+    Checked::new(ProblemSpec {
         stages: vec![Stage {
             name: "servo".into(),
             output: "angle_deg".into(),
@@ -76,7 +76,7 @@ fn problem() -> Problem {
     .unwrap()
 }
 
-fn workers(command: &[&str], jobs: usize) -> (Problem, Result<Workers, String>) {
+fn workers(command: &[&str], jobs: usize) -> (Checked, Result<Workers, String>) {
     let problem = problem();
     let spec = WorkersSpec { jobs, ..WorkersSpec::new(command, examples()) };
     let workers = Workers::start(spec, problem.session()).map_err(|e| e.to_string());

@@ -42,7 +42,7 @@ pub(crate) fn diagnosis_title(subject: &Subject<'_>) -> String {
 pub(crate) fn diagnosis_sections(page: &mut Page, subject: &Subject<'_>) {
     let diagnosis = subject.diagnosis;
     page.facts(&facts(diagnosis));
-    page.list(&causes(diagnosis));
+    page.list(&causes(subject));
     if let Some(proposed) = diagnosis.proposed.as_ref().filter(|p| !p.equation.is_empty()) {
         page.text(&format!("Proposed, on the {}: {}.", proposed.acts, proposed.equation));
     }
@@ -283,10 +283,10 @@ fn implemented(page: &mut Page, subject: &Subject<'_>) {
          takes a sample and hands back the next one.",
     );
     for one in subject.implementations {
-        page.text(&format!("{}: {}. State: {}.", one.effect.name, one.equation(), one.state()));
+        page.text(&format!("{}: {}. State: {}.", one.name, one.equation(), one.state()));
         for language in Language::ALL {
             if let Some(code) = one.code(language) {
-                let summary = format!("{} in {}", one.effect.name, language.name());
+                let summary = format!("{} in {}", one.name, language.name());
                 page.folded(&summary, |page| {
                     page.code(&code);
                 });

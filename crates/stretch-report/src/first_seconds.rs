@@ -6,7 +6,7 @@ use super::{
     markup::{number, percent, with_unit},
     subject::Subject,
 };
-use crate::plain::{effect_in_words, listed};
+use crate::plain::listed;
 
 /// The result in one sentence.
 pub(crate) fn diagnosis_verdict(subject: &Subject<'_>) -> String {
@@ -172,7 +172,8 @@ fn moved(d: &Diagnosis) -> Vec<String> {
 }
 
 /// Every named effect in words, with its values.
-pub(crate) fn causes(d: &Diagnosis) -> Vec<String> {
+pub(crate) fn causes(subject: &Subject<'_>) -> Vec<String> {
+    let d = subject.diagnosis;
     let Some(first) = d.candidates.first().filter(|c| c.effects == d.named) else {
         return Vec::new();
     };
@@ -185,7 +186,8 @@ pub(crate) fn causes(d: &Diagnosis) -> Vec<String> {
                 format!("{} = {} \u{b1} {}", p.name, number(p.value, 3), unit_number(p.sd, &p.unit))
             })
             .collect();
-        let words = effect_in_words(name).map_or(String::new(), |w| format!(": {w}"));
+        let own = subject.implementations.iter().find(|own| own.name == *name);
+        let words = own.map_or(String::new(), |own| format!(": {}", own.words));
         let values =
             if values.is_empty() { String::new() } else { format!(" ({})", values.join(", ")) };
         format!("{name}{words}{values}.")

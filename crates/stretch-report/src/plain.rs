@@ -2,11 +2,6 @@
 
 use stretch_gap::{Baselines, Transfer, TransferError};
 
-/// What an effect is, for someone who does not know its name; none for an effect of the user's own.
-pub fn effect_in_words(name: &str) -> Option<&'static str> {
-    stretch_sim::effect_named(name).map(|effect| effect.words)
-}
-
 /// Names joined as in a sentence.
 pub fn listed(names: &[String]) -> String {
     match names {

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use stretch_gap::{Diagnosis, Evidence, Simulator};
-use stretch_problem::Implementation;
+use stretch_problem::{Examined, Implementation, Problem};
 
 /// What a report is about.
 #[derive(Clone, Copy)]
@@ -18,6 +18,14 @@ pub struct Subject<'a> {
     pub implementations: &'a [Implementation],
     /// The simulator beside its measurements.
     pub simulator: &'a dyn Simulator,
+}
+
+impl<'a> Subject<'a> {
+    /// A problem that was examined.
+    pub fn of(problem: &'a Problem, examined: &'a Examined) -> Self {
+        let Examined { name, diagnosis, evidence, implementations, .. } = examined;
+        Self { name, diagnosis, evidence, implementations, simulator: problem.simulator() }
+    }
 }
 
 impl fmt::Debug for Subject<'_> {

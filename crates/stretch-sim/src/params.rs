@@ -7,9 +7,10 @@ use stretch_data::Parameter;
 use crate::stage::Stage;
 
 /// How far a nominal parameter may be wrong without that being an unmodelled effect: one standard deviation.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Tolerance {
     /// Known exactly: never re-tuned.
+    #[default]
     Exact,
     /// A share of the nominal value.
     Relative(f64),

@@ -10,7 +10,7 @@ use std::{
 use stretch_data::{Channel, SessionTrial, Trial};
 use stretch_gap::Dice;
 use stretch_problem::{
-    Argument, Ask, OwnEffect, Parameter, Problem, ProblemSpec, SourceError, Stage, Tolerance,
+    Argument, Ask, OwnEffect, Parameter, Checked, ProblemSpec, SourceError, Stage, Tolerance,
     worker::WorkersSpec,
 };
 use tempfile::TempDir;
@@ -146,7 +146,7 @@ pub(crate) fn angle(dt_s: f64, gain: f64, tau: f64, brake: f64, u: &[f64]) -> Ve
 }
 
 /// Answers an ask as the FMU has to.
-pub(crate) fn answer(problem: &Problem, ask: &Ask<'_>) -> Result<Vec<f64>, SourceError> {
+pub(crate) fn answer(problem: &Checked, ask: &Ask<'_>) -> Result<Vec<f64>, SourceError> {
     let session = problem.session();
     let samples = session.samples(ask.trials);
     let measured = session.column("command_V").unwrap();

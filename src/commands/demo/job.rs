@@ -6,7 +6,7 @@ use stretch_calibrate::{
     choose_model, evaluate, rank_signals,
 };
 use stretch_data::{Trial, TrialKind};
-use stretch_problem::{Bench, Examined};
+use stretch_problem::{Examined, Problem};
 
 use super::sessions::Sessions;
 use crate::commands::{diagnose::told_on, shared::spinner};
@@ -15,7 +15,7 @@ use crate::commands::{diagnose::told_on, shared::spinner};
 pub(super) struct Job {
     /// Signals by error, the best first.
     pub(super) ranking: Vec<Candidate>,
-    pub(super) bench: Bench,
+    pub(super) problem: Problem,
     pub(super) examined: Examined,
     pub(super) calibrations: Calibrations,
 }
@@ -49,27 +49,27 @@ impl Job {
         let options = Options { signal: best.cloned().unwrap_or_default(), ..options };
         // neither waits for the other
         let (calibrations, examined) = std::thread::scope(|scope| {
-            let asked = scope.spawn(|| -> anyhow::Result<(Bench, Examined)> {
-                let bench = sessions.bench(&options.signal)?;
+            let asked = scope.spawn(|| -> anyhow::Result<(Problem, Examined)> {
+                let problem = sessions.problem(&options.signal)?;
                 let options = stretch_gap::Options { responses: true, ..Default::default() };
-                let examined = bench.examine(
+                let examined = problem.examine(
                     &options,
                     true,
                     &told_on(&asking),
                     &stretch_files::interrupted,
                 )?;
                 asking.finish_and_clear();
-                Ok((bench, examined))
+                Ok((problem, examined))
             });
             let calibrations = Calibrations::of(sessions, &fit, &options, &fitting);
             fitting.finish_and_clear();
             (calibrations, asked.join())
         });
-        let (bench, examined) = match examined {
+        let (problem, examined) = match examined {
             Ok(examined) => examined?,
             Err(panic) => std::panic::resume_unwind(panic),
         };
-        Ok(Self { ranking, bench, examined, calibrations: calibrations? })
+        Ok(Self { ranking, problem, examined, calibrations: calibrations? })
     }
 }
 

@@ -8,15 +8,12 @@ use std::{
 
 use anyhow::{Context, bail, ensure};
 use stretch_data::{DataSet, SessionTrial, Split, Trial, TrialEntry, TrialKind};
-use stretch_problem::{Bench, GaugeSetup, GaugeSimulator};
+use stretch_problem::{GaugeSetup, GaugeSimulator, Problem, Reading, name_of};
 use stretch_recording::{ReadOptions, Recording};
 use stretch_sim::Catalogue;
 
 use super::published::{self, COMMIT, REPOSITORY};
-use crate::commands::{
-    diagnose::{name_of, read_bench},
-    shared::short_name,
-};
+use crate::commands::shared::short_name;
 
 /// References and signals that need no naming, the first that is there.
 const REFERENCES: [&str; 2] = ["length_mm", "angle_deg"];
@@ -104,13 +101,14 @@ impl Sessions {
     ///
     /// # Errors
     /// Trials that cannot be diagnosed.
-    pub(super) fn bench(&self, signal: &str) -> anyhow::Result<Bench> {
+    pub(super) fn problem(&self, signal: &str) -> anyhow::Result<Problem> {
         let columns = Some((self.reference.as_str(), signal));
-        let catalogue = Catalogue::default();
         if let Some(folder) = &self.folder {
             let fit = self.fit.iter().map(|(_, trial)| trial);
             let is_rig = fit.clone().all(|t| t.channel("inlet").or(t.channel("outlet")).is_some());
-            return read_bench(folder, columns.filter(|_| !is_rig), None, &catalogue);
+            let columns = columns.filter(|_| !is_rig);
+            let reading = Reading { columns, ..Reading::default() };
+            return Ok(Problem::read(folder, &reading)?.named(&self.name));
         }
         // A session has its own zero, and nobody knows the pause before the next.
         let first = self.fit.iter().take(1);
@@ -121,9 +119,9 @@ impl Sessions {
             reference: &self.reference,
             signal,
             rig: None,
-            catalogue: &catalogue,
+            catalogue: &Catalogue::default(),
         };
-        Ok(GaugeSimulator::new(&setup)?.into())
+        Ok(Problem::from(GaugeSimulator::new(&setup)?).named(&self.name))
     }
 }
 

@@ -1,8 +1,8 @@
 //! What a whole rig and a gauge alone share: how records are read and cleaned, and how effects of the catalogue act.
 
 pub(crate) mod acting;
+pub(crate) mod courses;
 pub(crate) mod ends;
-pub(crate) mod error;
 pub(crate) mod kept;
 pub(crate) mod lost;
 pub(crate) mod rig_file;

@@ -5,23 +5,23 @@ use std::path::Path;
 use stretch_data::RigFile;
 use stretch_sim::{GaugeRig, Rig, SimError};
 
-use crate::bench::error::BenchError;
+use crate::error::ProblemError;
 
-fn located(path: &Path, cause: SimError) -> BenchError {
-    BenchError::RigFile { file: path.display().to_string(), cause }
+fn located(path: &Path, cause: SimError) -> ProblemError {
+    ProblemError::RigFile { file: path.display().to_string(), cause }
 }
 
 /// A whole rig.
-pub(crate) fn rig(path: &Path) -> Result<Rig, BenchError> {
+pub(crate) fn rig(path: &Path) -> Result<Rig, ProblemError> {
     Rig::from_file(&RigFile::read(path)?).map_err(|cause| located(path, cause))
 }
 
 /// A gauge alone.
-pub(crate) fn gauge(path: &Path) -> Result<GaugeRig, BenchError> {
+pub(crate) fn gauge(path: &Path) -> Result<GaugeRig, ProblemError> {
     GaugeRig::from_file(&RigFile::read(path)?).map_err(|cause| located(path, cause))
 }
 
 /// Whether the file describes a gauge alone.
-pub(crate) fn is_gauge(path: &Path) -> Result<bool, BenchError> {
+pub(crate) fn is_gauge(path: &Path) -> Result<bool, ProblemError> {
     Ok(RigFile::read(path)?.kind.as_deref() == Some("gauge"))
 }

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use stretch_gap::{Column, Description, RecordFacts, Recorded, RowsUsed};
+use stretch_gap::{Column, Description, MotionSpec, RecordFacts, Recorded, RowsUsed};
 
 use super::{columns::Columns, source::Session};
 
@@ -10,10 +10,18 @@ use super::{columns::Columns, source::Session};
 const SKEW_S: [f64; 2] = [-0.2, 0.2];
 
 /// The facts of recordings.
-pub(super) fn facts(about: &Description, session: &Session, columns: &Columns) -> RecordFacts {
+pub(super) fn facts(
+    about: &Description,
+    session: &Session,
+    columns: &Columns,
+    sensor: Option<&(usize, String)>,
+) -> RecordFacts {
+    let motion = sensor.and_then(|(_, name)| session.columns.iter().find(|c| c.name == *name));
     let rows = columns.rows;
     RecordFacts {
         is_lost: columns.is_lost.clone(),
+        motion: motion.map(|c| MotionSpec::new(c.values.clone(), &c.unit)),
+        sensor: sensor.map(|(stage, _)| *stage),
         rows_used: Some(RowsUsed { used: rows.used(), read: rows.read }),
         signals: signals(session),
         columns: record_columns(about, session),

@@ -2,7 +2,7 @@
 
 use stretch_gap::{Candidate, Diagnosis};
 
-use super::problem::Problem;
+use super::checked::Checked;
 use crate::wrap::Family;
 
 /// Wrappers of one family, any of which may be what is missing.
@@ -44,7 +44,7 @@ fn digits(x: f64) -> String {
 }
 
 /// Families among the effects that a diagnosis names and those that may stand in their place.
-pub fn agreed(problem: &Problem, diagnosis: &Diagnosis) -> Vec<Agreed> {
+pub fn agreed(problem: &Checked, diagnosis: &Diagnosis) -> Vec<Agreed> {
     let effects = &problem.description().effects;
     let kind = |name: &str| {
         let at = effects.iter().position(|e| e.name == name)?;

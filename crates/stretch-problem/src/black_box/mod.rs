@@ -1,10 +1,13 @@
 //! A user's simulator, wrapped, as the diagnosis takes it.
 
+mod catalogue;
+mod checked;
 pub(crate) mod columns;
+mod experiments;
 mod facts;
 mod families;
+mod fixed;
 mod linear;
-mod problem;
 mod runs;
 pub(crate) mod source;
 pub(crate) mod spec;
@@ -13,23 +16,26 @@ pub(crate) mod velocity;
 use std::sync::{Arc, PoisonError, RwLock};
 
 use stretch_gap::{
-    Batch, Costly, Description, Diagnosis, Dice, GapError, Line, Model, ModelRuns, Run, Simulator,
+    Batch, Costly, Description, Dice, GapError, Line, Model, ModelRuns, Run, Simulator,
     SpectralLines,
 };
 
 use stretch_effects::WanderingLine;
 
-use crate::wrap::{Side, Trials};
+use crate::{
+    file::ProblemFile,
+    wrap::{Side, Trials},
+};
+use catalogue::Acting;
 use linear::Linear;
-use problem::Acting;
 use runs::{Inner, Runs};
 
+pub use checked::Checked;
 pub use families::{Agreed, agreed};
-pub use problem::Problem;
 pub use source::{
     Ask, Closure, Session, SessionColumn, SessionPart, SessionStage, Source, SourceError, closure,
 };
-pub use spec::{Argument, Input, OwnEffect, Parameter, ProblemSpec, Stage, Tolerance};
+pub use spec::{Argument, Input, OwnEffect, Parameter, ProblemSpec, Sensor, Stage, Wrapped};
 
 /// A checked problem and a source, bound together: a [`Simulator`].
 ///
@@ -39,7 +45,7 @@ pub use spec::{Argument, Input, OwnEffect, Parameter, ProblemSpec, Stage, Tolera
 /// use std::sync::Arc;
 /// use stretch_data::{Channel, SessionTrial, Trial};
 /// use stretch_gap::{Options, diagnose};
-/// use stretch_problem::{Ask, BlackBox, Parameter, Problem, ProblemSpec, Stage, Tolerance, closure};
+/// use stretch_problem::{Ask, BlackBox, Checked, Parameter, ProblemSpec, Stage, Tolerance, closure};
 ///
 /// // A spring that shows 0.06 s late what it is loaded with.
 /// let load = |t: f64| 20.0 * (1.3 * t).sin() + 10.0 * (3.1 * t).sin();
@@ -51,7 +57,7 @@ pub use spec::{Argument, Input, OwnEffect, Parameter, ProblemSpec, Stage, Tolera
 /// let channels = vec![channel("force_N", force), channel("length_mm", length)];
 /// let trial = Trial { name: "spring.csv".into(), time_s, channels };
 ///
-/// let problem = Problem::new(ProblemSpec {
+/// let problem = Checked::new(ProblemSpec {
 ///     stages: vec![Stage {
 ///         name: "spring".into(),
 ///         output: "length_mm".into(),
@@ -82,7 +88,8 @@ pub use spec::{Argument, Input, OwnEffect, Parameter, ProblemSpec, Stage, Tolera
 /// ```
 #[derive(Debug)]
 pub struct BlackBox {
-    problem: Problem,
+    problem: Checked,
+    file: Option<ProblemFile>,
     runs: Runs,
     /// By stage: the last linearisation.
     lines: RwLock<Vec<Option<Arc<Linear>>>>,
@@ -90,22 +97,22 @@ pub struct BlackBox {
 
 impl BlackBox {
     /// Binds a problem to the source that answers it.
-    pub fn new(problem: Problem, source: Arc<dyn Source>) -> Self {
+    pub fn new(problem: Checked, source: Arc<dyn Source>) -> Self {
         Self::within(problem, source, None)
     }
 
     /// The same with at most so many runs of the source.
-    pub fn within(problem: Problem, source: Arc<dyn Source>, budget: Option<usize>) -> Self {
+    pub fn within(problem: Checked, source: Arc<dyn Source>, budget: Option<usize>) -> Self {
         let samples =
             problem.columns.is_lost.len().max(problem.parts.last().map_or(1, |p| p.0.end));
         let stages = if source.answers_all() { problem.stages.len() } else { 1 };
         let runs = Runs::new(source, budget, stages * samples);
         let lines = RwLock::new(vec![None; problem.stages.len()]);
-        Self { problem, runs, lines }
+        Self { problem, file: None, runs, lines }
     }
 
     /// The problem.
-    pub fn problem(&self) -> &Problem {
+    pub fn problem(&self) -> &Checked {
         &self.problem
     }
 
@@ -114,77 +121,67 @@ impl BlackBox {
         self.runs.count()
     }
 
-    /// Adds to the notes of a diagnosis what was done to the recordings, what effects that cannot be told apart agree on, and what the
-    /// source says of its runs; returns those effects.
-    pub fn annotate(&self, diagnosis: &mut Diagnosis) -> Vec<Agreed> {
-        let families = agreed(&self.problem, diagnosis);
-        diagnosis.notes.splice(0..0, self.problem.notes().iter().cloned());
-        diagnosis.notes.extend(families.iter().map(Agreed::sentence));
-        diagnosis.notes.extend(self.notes());
-        families
+    /// Says which file it was read from: a [fix](crate::Fix) is that file with what was found.
+    pub(crate) fn from_file(self, file: ProblemFile) -> Self {
+        Self { file: Some(file), ..self }
     }
 
-    /// What the source says of its runs, and what it refused.
-    pub fn notes(&self) -> Vec<String> {
-        let mut notes = self.runs.notes();
-        let refused = self.runs.refused();
-        if let Some(first) = refused.first() {
-            notes.push(format!(
-                "{} of {} model runs gave no output and took their candidate out; the first: {first}",
-                refused.len(),
-                self.runs.count()
-            ));
+    /// Wrappers that act on one side of a stage, in their order, with their values: those that a model has, and those that act in every run.
+    fn acting<'a>(&'a self, run: &Run<'a>, side: Side) -> Vec<(usize, &'a Vec<f64>)> {
+        let problem = &self.problem;
+        let mut all: Vec<(usize, &Vec<f64>)> = problem.standing(run.stage, side).collect();
+        for (effect, values) in &run.model.effects {
+            all.extend(problem.around(*effect, run.stage, side).map(|at| (at, values)));
         }
-        notes
+        all.sort_by_key(|(at, _)| *at);
+        all
     }
 
     /// What has to be run for a model.
     fn inner(&self, run: &Run<'_>) -> Inner {
         let problem = &self.problem;
-        let spec = &self.description().stages[run.stage];
-        let mut parameters: Vec<f64> =
-            self.description().parameters.iter().map(|p| p.nominal).collect();
-        for &p in &spec.parameters {
-            parameters[p] = run.model.parameters[p];
-        }
-        let mut effects = problem.off.clone();
-        let mut how = Vec::new();
-        let mut before = Vec::new();
-        for (effect, values) in &run.model.effects {
-            if !self.description().effects[*effect].touches.contains(&run.stage) {
-                continue;
-            }
-            match problem.acting[*effect] {
-                Acting::Own(first) => effects[first..first + values.len()].copy_from_slice(values),
-                Acting::Wrapper(at) if problem.wrappers[at].site.side == Side::Input => {
-                    before.push((at, values));
-                }
-                Acting::Wrapper(_) | Acting::Recorder => {}
-            }
-        }
-        before.sort_by_key(|(at, _)| *at);
+        let before = self.acting(run, Side::Input);
         let noise = &problem.input_noise[run.stage];
         let shake = run.shake.filter(|_| noise.iter().any(|sd| *sd > 0.0));
-        let inputs = (!before.is_empty() || shake.is_some()).then(|| {
-            let end = problem.session().samples(run.trials);
-            let mut inputs: Vec<Vec<f64>> =
-                problem.stage_inputs(run.stage).map(|c| c[..end].to_vec()).collect();
-            if let Some(seed) = shake {
-                how.push(seed);
-                for (i, (column, sd)) in inputs.iter_mut().zip(noise).enumerate() {
-                    let mut dice = Dice::new(seed, 1 + (run.stage * 64 + i) as u64);
-                    column.iter_mut().for_each(|x| *x += sd * dice.gauss());
-                }
+        if before.is_empty() && shake.is_none() {
+            return self.driven_by(run, None);
+        }
+        let end = problem.session().samples(run.trials);
+        let mut inputs: Vec<Vec<f64>> =
+            problem.stage_inputs(run.stage).map(|c| c[..end].to_vec()).collect();
+        let mut how = Vec::new();
+        if let Some(seed) = shake {
+            how.push(seed);
+            for (i, (column, sd)) in inputs.iter_mut().zip(noise).enumerate() {
+                let mut dice = Dice::new(seed, 1 + (run.stage * 64 + i) as u64);
+                column.iter_mut().for_each(|x| *x += sd * dice.gauss());
             }
-            let trials = self.trials_of();
-            for (at, values) in &before {
-                let wrapper = &problem.wrappers[*at];
-                how.push(u64::MAX - *at as u64);
-                how.extend(values.iter().map(|v| v.to_bits()));
-                wrapper.act(values, &trials, &mut inputs[wrapper.site.input]);
+        }
+        let trials = self.trials_of();
+        for (at, values) in &before {
+            let wrapper = &problem.wrappers[*at];
+            how.push(u64::MAX - *at as u64);
+            how.extend(values.iter().map(|v| v.to_bits()));
+            wrapper.act(values, &trials, &mut inputs[wrapper.site.input]);
+        }
+        self.driven_by(run, Some((inputs, how)))
+    }
+
+    /// The run of a model on inputs that were altered, with the numbers that say how.
+    fn driven_by(&self, run: &Run<'_>, inputs: Option<(Vec<Vec<f64>>, Vec<u64>)>) -> Inner {
+        let mut parameters: Vec<f64> = self.description().parameters.iter().map(|p| p.nominal).collect();
+        for &p in &self.description().stages[run.stage].parameters {
+            parameters[p] = run.model.parameters[p];
+        }
+        let mut effects = self.problem.off.clone();
+        for (effect, values) in &run.model.effects {
+            let touches = self.description().effects[*effect].touches.contains(&run.stage);
+            if let Acting::Own(first) = self.problem.acting[*effect]
+                && touches
+            {
+                effects[first..first + values.len()].copy_from_slice(values);
             }
-            (inputs, how)
-        });
+        }
         Inner { stage: run.stage, parameters, effects, inputs, trials: run.trials }
     }
 
@@ -222,17 +219,12 @@ impl BlackBox {
 
     /// What stands behind a stage acts on its output.
     fn behind(&self, run: &Run<'_>, out: &mut [f64]) {
-        let problem = &self.problem;
-        let mut behind: Vec<(usize, &Vec<f64>)> = Vec::new();
-        for (effect, values) in &run.model.effects {
-            behind.extend(problem.behind(*effect, run.stage).map(|at| (at, values)));
-        }
-        behind.sort_by_key(|(at, _)| *at);
         let trials = self.trials_of();
-        for (at, values) in behind {
-            match problem.wrappers[at].kind.is_found {
+        for (at, values) in self.acting(run, Side::Output) {
+            let wrapper = &self.problem.wrappers[at];
+            match wrapper.kind.is_found {
                 true => self.follow(run.stage, values, out),
-                false => problem.wrappers[at].act(values, &trials, out),
+                false => wrapper.act(values, &trials, out),
             }
         }
     }
@@ -361,6 +353,9 @@ impl SpectralLines for BlackBox {
             wrapper.is_some_and(|w| w.is_found)
                 && self.description().effects[*effect].touches.contains(&stage)
         });
-        found.map(|(_, values)| Line { hertz: values[1], amplitude: values[0] }).collect()
+        let own = self.problem.standing(stage, Side::Output);
+        let own = own.filter(|(at, _)| self.problem.wrappers[*at].kind.is_found);
+        let all = found.map(|(_, values)| values).chain(own.map(|(_, values)| values));
+        all.map(|values| Line { hertz: values[1], amplitude: values[0] }).collect()
     }
 }

@@ -76,6 +76,11 @@ impl Runs {
         self.budget
     }
 
+    /// Whether it takes inputs that were altered.
+    pub(crate) fn takes_inputs(&self) -> bool {
+        self.source.takes_inputs()
+    }
+
     pub(crate) fn notes(&self) -> Vec<String> {
         self.source.notes()
     }

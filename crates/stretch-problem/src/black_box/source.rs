@@ -150,6 +150,11 @@ pub trait Source: Send + Sync {
         false
     }
 
+    /// Whether it can be driven by other inputs than those that were measured.
+    fn takes_inputs(&self) -> bool {
+        true
+    }
+
     /// How many asks at once make it fast; more than one where a batch costs little more than a run.
     fn batch(&self) -> usize {
         1

@@ -1,8 +1,9 @@
 //! The tables of a problem's file, one by one.
 
 use stretch_data::{DataError, Split, TomlView};
+use stretch_sim::Tolerance;
 
-use crate::black_box::spec::{Argument, Input, OwnEffect, Parameter, Stage, Tolerance};
+use crate::black_box::spec::{Argument, Input, OwnEffect, Parameter, Stage, Wrapped, share};
 
 /// A trial of a problem's file.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,19 +63,15 @@ fn tolerance(view: &TomlView<'_>) -> Result<Tolerance, DataError> {
         return Ok(Tolerance::Exact);
     }
     let told = match view.text(KEY) {
-        Ok(text) => {
-            let share = text.strip_suffix('%').and_then(|t| t.trim().parse::<f64>().ok());
-            let share = share.filter(|x| x.is_finite());
-            match share {
-                Some(share) => Tolerance::Relative(share / 100.0),
-                None => {
-                    return view.fail(
-                        KEY,
-                        format!("{text:?} is no share; write \"10 %\", or a number in its unit"),
-                    );
-                }
+        Ok(text) => match share(text) {
+            Some(share) => Tolerance::Relative(share),
+            None => {
+                return view.fail(
+                    KEY,
+                    format!("{text:?} is no share; write \"10 %\", or a number in its unit"),
+                );
             }
-        }
+        },
         Err(_) => Tolerance::Absolute(view.number(KEY)?),
     };
     match told {
@@ -89,14 +86,14 @@ pub(super) fn effect(view: &TomlView<'_>) -> Result<OwnEffect, DataError> {
     let several = view.tables("argument")?;
     let arguments = match several.is_empty() {
         true => {
-            view.only(&["name", "unit", "range", "off", "log", "stages", "twins"])?;
+            view.only(&["name", "unit", "range", "off", "log", "value", "stages", "twins"])?;
             vec![argument(view, "")?]
         }
         false => {
             view.only(&["name", "argument", "stages", "twins"])?;
             let one = |own: TomlView<'_>| {
                 let own = own.called(view.name());
-                own.only(&["name", "unit", "range", "off", "log"])?;
+                own.only(&["name", "unit", "range", "off", "log", "value"])?;
                 argument(&own, own.text("name")?)
             };
             several.into_iter().map(one).collect::<Result<_, _>>()?
@@ -119,8 +116,15 @@ fn argument(view: &TomlView<'_>, name: &str) -> Result<Argument, DataError> {
             format!("it begins at {min}; what is searched in equal ratios is above 0"),
         );
     }
-    let off = view.optional_number("off")?;
-    Ok(Argument { name: name.to_owned(), unit: unit(view)?, min, max, off, is_log })
+    let (off, value) = (view.optional_number("off")?, view.optional_number("value")?);
+    Ok(Argument { name: name.to_owned(), unit: unit(view)?, min, max, off, is_log, value })
+}
+
+pub(super) fn wrapped(view: &TomlView<'_>) -> Result<Wrapped, DataError> {
+    let values = view.keys().filter(|key| *key != "name");
+    let values = values.map(|key| Ok((key.to_owned(), view.number(key)?)));
+    let values = values.collect::<Result<_, DataError>>()?;
+    Ok(Wrapped { name: view.text("name")?.to_owned(), values })
 }
 
 pub(super) fn trial(view: &TomlView<'_>) -> Result<TrialFile, DataError> {

@@ -2,14 +2,19 @@
 
 mod entries;
 mod simulator;
+mod write;
 
 use std::path::{Path, PathBuf};
 
 use stretch_data::{DataError, SessionTrial, TomlFile, TomlView};
 use stretch_recording::{ReadOptions, Recording};
 
-use crate::{black_box::spec::ProblemSpec, error::ProblemError, worker::WorkersSpec};
-use entries::{effect, input, parameter, stage, trial};
+use crate::{
+    black_box::spec::{ProblemSpec, Sensor},
+    error::ProblemError,
+    worker::WorkersSpec,
+};
+use entries::{effect, input, parameter, stage, trial, wrapped};
 
 pub use entries::TrialFile;
 pub use simulator::{SimulatorEntry, WorkersEntry};
@@ -68,7 +73,24 @@ impl ProblemFile {
         let path = path.as_ref();
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
         let folder = folder.unwrap_or_else(|| Path::new(".")).to_owned();
-        Ok(Self { folder, ..Self::from_file(&TomlFile::read(path)?)? })
+        let file = Self::from_file(&TomlFile::read(path)?)?;
+        Ok(Self { folder: folder.join(&file.folder), ..file })
+    }
+
+    /// Reads the problem's file that a path means: itself where it ends in `.toml`, or the `problem.toml` of a folder that is no data
+    /// set; none where it means none.
+    ///
+    /// # Errors
+    /// As [`ProblemFile::read`].
+    pub fn at(path: &Path) -> Result<Option<Self>, ProblemError> {
+        let inside = path.join("problem.toml");
+        match path {
+            path if path.is_dir() && inside.is_file() && !path.join("dataset.toml").exists() => {
+                Self::read(inside).map(Some)
+            }
+            path if path.extension().is_some_and(|end| end == "toml") => Self::read(path).map(Some),
+            _ => Ok(None),
+        }
     }
 
     /// Parses the text of a problem's file; `file` stands for it in messages.
@@ -83,9 +105,14 @@ impl ProblemFile {
         let top = file.top();
         top.only(&[
             "name",
+            "folder",
             "simulator",
             "wrap",
+            "wrapped",
+            "without",
             "beside",
+            "reference",
+            "signal",
             "time",
             "budget",
             "stage",
@@ -101,7 +128,10 @@ impl ProblemFile {
             parameters: named(&top, "parameter", parameter)?,
             effects: named(&top, "effect", effect)?,
             wrap: top.texts("wrap")?,
+            wrapped: named(&top, "wrapped", wrapped)?,
+            without: top.texts("without")?,
             beside: top.texts("beside")?,
+            sensor: sensor(&top)?,
             trials: Vec::new(),
         };
         let trials = named(&top, "trial", trial)?;
@@ -121,7 +151,7 @@ impl ProblemFile {
         }
         Ok(Self {
             name: top.optional_text("name")?.unwrap_or("problem").to_owned(),
-            folder: PathBuf::from("."),
+            folder: PathBuf::from(top.optional_text("folder")?.unwrap_or(".")),
             simulator,
             spec,
             trials,
@@ -136,7 +166,9 @@ impl ProblemFile {
     /// An FMU where there is no program that runs it.
     pub fn workers(&self, jobs: usize) -> Result<Option<WorkersSpec>, ProblemError> {
         let (spec, how) = match &self.simulator {
-            SimulatorEntry::Rig { .. } | SimulatorEntry::Gauge { .. } => return Ok(None),
+            SimulatorEntry::Rig { .. } | SimulatorEntry::Gauge { .. } | SimulatorEntry::Caller => {
+                return Ok(None);
+            }
             SimulatorEntry::Command { command, workers } => {
                 let command: Vec<&str> = command.iter().map(String::as_str).collect();
                 (WorkersSpec::new(&command, &self.folder), workers)
@@ -168,6 +200,17 @@ impl ProblemFile {
             spec.trials.push(trial);
         }
         Ok(spec)
+    }
+}
+
+/// The columns of reference and signal, where they are named.
+fn sensor(top: &TomlView<'_>) -> Result<Option<Sensor>, DataError> {
+    match (top.optional_text("reference")?, top.optional_text("signal")?) {
+        (Some(reference), Some(signal)) => {
+            Ok(Some(Sensor { reference: reference.to_owned(), signal: signal.to_owned() }))
+        }
+        (None, None) => Ok(None),
+        _ => top.fail("reference", "reference and signal go together; give both"),
     }
 }
 

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use stretch_data::{DataError, TomlView};
 
+use super::sensor;
+
 /// What simulates.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
@@ -47,6 +49,8 @@ pub enum SimulatorEntry {
         /// How it is run.
         workers: WorkersEntry,
     },
+    /// In the memory of the caller: no file can name it.
+    Caller,
 }
 
 /// How workers are run.
@@ -121,17 +125,7 @@ impl SimulatorEntry {
             }
             "gauge" => {
                 view.only(&["builtin", "data_set", "rig", "reference", "signal"])?;
-                let columns =
-                    match (view.optional_text("reference")?, view.optional_text("signal")?) {
-                        (Some(reference), Some(signal)) => {
-                            Some((reference.to_owned(), signal.to_owned()))
-                        }
-                        (None, None) => None,
-                        _ => {
-                            return view
-                                .fail("reference", "reference and signal go together; give both");
-                        }
-                    };
+                let columns = sensor(view)?.map(|s| (s.reference, s.signal));
                 Ok(Self::Gauge { data_set, rig, columns })
             }
             other => view.fail("builtin", format!("{other:?} is none of rig, gauge")),

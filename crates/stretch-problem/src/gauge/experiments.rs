@@ -5,7 +5,13 @@ use stretch_gap::{GapError, Laboratory, Model, Plan};
 use stretch_sim::{Gauge, Stage, Start};
 
 use super::GaugeSimulator;
-use crate::bench::{acting::unrecorded, error::BenchError};
+use crate::{
+    bench::{
+        acting::unrecorded,
+        courses::{Points, begin, course, loops, moving},
+    },
+    error::ProblemError,
+};
 
 /// An experiment on a gauge: the course of e.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,78 +23,22 @@ pub struct Course {
     pressure: Vec<f64>,
 }
 
-/// A course through points (e, seconds to get there), the first where it begins; eased where it turns.
-fn course(points: &[(f64, f64)], dt_s: f64) -> Course {
-    let mut e = Vec::new();
-    for pair in points.windows(2) {
-        let (from, (to, seconds)) = (pair[0].0, pair[1]);
-        let samples = ((seconds / dt_s).round() as usize).max(1);
-        let way = |i: usize| i as f64 / samples as f64;
-        e.extend((0..samples).map(|i| {
-            let x = way(i);
-            from + (to - from) * x * x * (3.0 - 2.0 * x)
-        }));
-    }
-    Course { pressure: vec![0.0; e.len()], e, is_known: false }
+/// A course that gauge blocks may hold, without a pressure.
+fn held(points: &[(f64, f64)], is_known: bool, dt_s: f64) -> Course {
+    let e = course(points, dt_s);
+    Course { pressure: vec![0.0; e.len()], e, is_known }
 }
 
 /// The gauge held in the middle while the pressure goes up and down.
 fn held_under_pressure(dt_s: f64) -> Course {
-    let swept = course(&[vec![(0.0, 0.0), (0.0, 1.0)], loops(0.0, 1.0, 4.0, 4)].concat(), dt_s);
-    Course { e: vec![0.5; swept.e.len()], is_known: true, pressure: swept.e }
+    let pressure = course(&begin(&[loops(0.0, 1.0, 4.0, 4)]), dt_s);
+    Course { e: vec![0.5; pressure.len()], is_known: true, pressure }
 }
 
-/// Up and down between two levels, `times` times, `half_s` each way.
-fn loops(low: f64, high: f64, half_s: f64, times: usize) -> Vec<(f64, f64)> {
-    [(high, half_s), (low, half_s)].repeat(times)
-}
-
-/// What is on the menu: name, how, minutes to prepare, points, whether blocks hold it.
-type Dish = (&'static str, &'static str, f64, Vec<(f64, f64)>, bool);
-
-fn dishes() -> Vec<Dish> {
-    let begin = |more: &[Vec<(f64, f64)>]| [vec![(0.0, 0.0), (0.0, 1.0)], more.concat()].concat();
-    let mut chirp = Vec::new();
-    let mut half_s: f64 = 4.0;
-    while half_s > 0.2 {
-        chirp.extend([(1.0, half_s), (0.0, half_s)]);
-        half_s *= 0.88;
-    }
-    let dwell = |e: f64| [(e, 0.3), (e, 6.0)];
-    let steps = [dwell(0.3), dwell(0.7), dwell(1.0), dwell(0.4), dwell(0.0)].concat().repeat(2);
+/// Held at known lengths with blocks, and left alone: name, how, minutes to prepare, points, whether blocks hold it.
+fn still() -> [(&'static str, &'static str, f64, Points, bool); 2] {
     let block = |e: f64| [(e, 3.0), (e, 10.0)];
-    vec![
-        (
-            "slow_fast_loops",
-            "Half a minute of slow loops over the whole range, half a minute of fast ones.",
-            0.25,
-            begin(&[loops(0.0, 1.0, 5.0, 3), loops(0.0, 1.0, 0.5, 30)]),
-            false,
-        ),
-        (
-            "minor_loops",
-            "Small loops at three levels, reached from below and from above.",
-            0.25,
-            begin(&[
-                vec![(0.2, 1.0)],
-                loops(0.2, 0.4, 0.8, 6),
-                vec![(0.7, 1.0)],
-                loops(0.7, 0.9, 0.8, 6),
-                vec![(1.0, 1.0), (0.6, 1.0)],
-                loops(0.6, 0.4, 0.8, 6),
-                vec![(0.0, 1.0)],
-                loops(0.0, 0.1, 0.8, 6),
-            ]),
-            false,
-        ),
-        (
-            "steps_with_dwells",
-            "Quick steps, each followed by six seconds at rest.",
-            0.25,
-            begin(&[steps]),
-            false,
-        ),
-        ("chirp", "Loops over the whole range, ever faster.", 0.25, begin(&[chirp]), false),
+    [
         (
             "gauge_blocks",
             "Hold the gauge at known lengths with blocks: the reference is then the blocks', not the recorder's.",
@@ -108,7 +58,7 @@ fn dishes() -> Vec<Dish> {
 
 impl GaugeSimulator {
     /// The signal over a course, in units of its noise.
-    fn prediction(&self, model: &Model, course: &Course) -> Result<Vec<Vec<f64>>, BenchError> {
+    fn prediction(&self, model: &Model, course: &Course) -> Result<Vec<Vec<f64>>, ProblemError> {
         let (mut model, mut base) = (model.clone(), self.nominal.effects.clone());
         if course.is_known {
             model.effects.retain(|(i, _)| self.rows[*i].stage != Stage::Reference);
@@ -170,11 +120,12 @@ impl Laboratory for GaugeSimulator {
 
     fn menu(&self) -> Vec<(Plan, Course)> {
         let dt_s = self.record.dt_s;
-        let plan = |(name, how, prepare_min, points, is_known): Dish| {
-            let course = Course { is_known, ..course(&points, dt_s) };
-            self.experiment((name, how), prepare_min, course)
-        };
-        let mut menu: Vec<(Plan, Course)> = dishes().into_iter().map(plan).collect();
+        let moving =
+            moving().into_iter().map(|(name, how, points)| (name, how, 0.25, points, false));
+        let all = moving.chain(still()).map(|(name, how, prepare_min, points, is_known)| {
+            self.experiment((name, how), prepare_min, held(&points, is_known, dt_s))
+        });
+        let mut menu: Vec<(Plan, Course)> = all.collect();
         if !self.record.pressure.is_empty() {
             let how =
                 "Hold the gauge at one length, with a block, while the pressure goes up and down.";

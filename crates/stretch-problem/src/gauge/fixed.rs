@@ -1,13 +1,14 @@
 //! A gauge alone with what a diagnosis found of it.
 
 use stretch_data::Remarks;
-use stretch_gap::{Diagnosis, Evidence};
-use stretch_sim::{Gauge, GaugeRig, Grid, GridError};
+use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, next_experiment};
+use stretch_sim::{Gauge, GaugeRig, Grid};
 
 use super::{GAIN, GaugeSimulator, OFFSET};
 use crate::{
-    fix::{Chosen, Fix, NoFix, with_line},
+    fix::{Chosen, Fix, Fixed, NoFix, names, with_line},
     implement::{Implementation, implementations},
+    problem::Diagnosable,
 };
 
 /// Table of the file.
@@ -15,21 +16,16 @@ const TABLE: &str = "sensing";
 
 impl GaugeSimulator {
     /// What a diagnosis of this gauge names, as something to type: with its numbers, in units of e.
-    ///
-    /// # Errors
-    /// None for a gauge that was diagnosed: its sample time is positive.
-    pub fn implementations(
-        &self,
-        diagnosis: &Diagnosis,
-        evidence: &Evidence,
-    ) -> Result<Vec<Implementation>, GridError> {
-        let grid = Grid::samples(self.record.dt_s)?;
+    fn typed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
+        // a sample time that was diagnosed is one
+        let Ok(grid) = Grid::samples(self.record.dt_s) else { return Vec::new() };
         let model = evidence.candidates.first().unwrap_or(&evidence.best);
         let around = Gauge::surroundings(&self.nominal.spec, &grid);
         let place = (0, model.parameters[GAIN]);
-        Ok(implementations(diagnosis, evidence, &self.rows, &around, |effect, values| {
+        let answer = (diagnosis, evidence);
+        implementations(answer, &self.about.effects, &self.rows, &around, |effect, values| {
             with_line(self, place, &self.rows, model, (effect, values))
-        }))
+        })
     }
 
     /// A gauge file (`kind = "gauge"`) with what a diagnosis of this gauge found: see [`Fix`]. How the gauge was wound before the
@@ -37,7 +33,7 @@ impl GaugeSimulator {
     ///
     /// # Errors
     /// [`NoFix`] where the diagnosis names nothing to fix, or a gauge that no file may hold.
-    pub fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
+    fn written(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
         let chosen = Chosen::of(diagnosis, evidence)?;
         let mut remarks = Remarks { head: chosen.head(), ..Remarks::default() };
         let old = &self.nominal;
@@ -56,13 +52,37 @@ impl GaugeSimulator {
             remarks.effects.insert(effect.name().into(), own);
         }
         let gain = rig.spec.gain;
-        for (effect, values) in chosen.effects(&self.rows, |_, _| ()) {
-            let values = with_line(self, (0, gain), &self.rows, chosen.model, (effect, values));
-            chosen.tell(effect, &mut remarks);
+        for (index, values) in chosen.effects(&self.about.effects) {
+            let effect = self.rows[index];
+            let found = (effect, values.to_vec());
+            let values = with_line(self, (0, gain), &self.rows, chosen.model, found);
+            chosen.tell(effect.into(), &mut remarks);
             rig.effects.push(effect, &values)?;
         }
         let file = rig.to_file();
         GaugeRig::from_file(&file)?;
-        Ok(Fix { file, remarks })
+        Ok(Fix { effects: names(&file), file: Fixed::Rig(file), remarks })
+    }
+}
+
+impl Diagnosable for GaugeSimulator {
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+
+    fn next(
+        &self,
+        diagnosis: &Diagnosis,
+        evidence: &Evidence,
+    ) -> Result<Option<Proposal>, GapError> {
+        next_experiment(self, diagnosis, evidence)
+    }
+
+    fn implementations(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
+        self.typed(diagnosis, evidence)
+    }
+
+    fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
+        self.written(diagnosis, evidence)
     }
 }

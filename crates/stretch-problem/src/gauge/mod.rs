@@ -23,9 +23,9 @@ use record::Record;
 use crate::{
     bench::{
         acting::{Acting, FitRecord, lines},
-        error::BenchError,
         specs::{Place, shown, spec as spec_of},
     },
+    error::ProblemError,
     rig::smooth::{Draws, Smoothed, unscheduled},
 };
 
@@ -112,7 +112,7 @@ impl GaugeSimulator {
     ///
     /// # Errors
     /// Columns that are missing, dead, hold too few numbers or look swapped.
-    pub fn new(setup: &GaugeSetup<'_>) -> Result<Self, BenchError> {
+    pub fn new(setup: &GaugeSetup<'_>) -> Result<Self, ProblemError> {
         let GaugeSetup { trials, reference, signal, rig, catalogue } = *setup;
         let record = Record::read(trials, reference, signal)?;
         let nominal = nominal(&record, rig);
@@ -173,7 +173,7 @@ impl GaugeSimulator {
 
 impl GaugeSimulator {
     /// The signal over the trials of a run.
-    fn signal(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), BenchError> {
+    fn signal(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), ProblemError> {
         let acting = Acting::of(&self.nominal.effects, &self.rows, run.model)?;
         let gauge = Gauge::new(self.nominal(run.model), &acting.inside, self.about.dt_s)?;
         let mut memory = gauge.memory();
@@ -197,7 +197,7 @@ impl GaugeSimulator {
         }
         match out.iter().all(|x| x.is_finite()) {
             true => Ok(()),
-            false => Err(BenchError::NotFinite { stage: "sensing".into() }),
+            false => Err(ProblemError::NotFinite { stage: "sensing".into() }),
         }
     }
 }

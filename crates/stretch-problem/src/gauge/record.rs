@@ -5,10 +5,9 @@ use std::ops::Range;
 use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial, unit};
 use stretch_gap::{Frame, Noise, TrialSpec};
 
-use crate::bench::{
-    ends::ends,
-    error::{BenchError, check_rate},
-    lost::open,
+use crate::{
+    bench::{ends::ends, lost::open},
+    error::{ProblemError, check_rate},
 };
 
 /// Least samples that may be fitted.
@@ -39,7 +38,7 @@ impl Record {
         trials: &[SessionTrial],
         reference: &str,
         signal: &str,
-    ) -> Result<Self, BenchError> {
+    ) -> Result<Self, ProblemError> {
         let mut columns = vec![reference, signal];
         if trials.iter().all(|t| t.trial.channel(PRESSURE).is_some()) {
             columns.push(PRESSURE);
@@ -95,16 +94,16 @@ impl Record {
         Noise::of_differences(self.fitted().map(|r| &values[r]), self.dt_s)
     }
 
-    fn check(&mut self, reference: &str, signal: &str) -> Result<(), BenchError> {
+    fn check(&mut self, reference: &str, signal: &str) -> Result<(), ProblemError> {
         let samples: usize = self.fitted().map(|r| r.len()).sum();
         if samples < LEAST {
-            return Err(BenchError::TooLittle {
+            return Err(ProblemError::TooLittle {
                 what: format!("the trials to fit have {samples} samples"),
                 hint: format!("at least {LEAST} are needed to tell anything"),
             });
         }
         if reference == "bridge_v" || signal == "length_mm" {
-            return Err(BenchError::Implausible {
+            return Err(ProblemError::Implausible {
                 column: format!("--reference {reference}, --signal {signal}"),
                 found: "the two look swapped".into(),
                 hint: "the reference is the length, the signal what the gauge says".into(),
@@ -114,7 +113,7 @@ impl Record {
         for (name, values) in [(reference, &self.reference), (signal, &self.signal)] {
             let (low, high) = self.range(values);
             if high <= low {
-                return Err(BenchError::Implausible {
+                return Err(ProblemError::Implausible {
                     column: name.into(),
                     found: format!("{low} in every sample"),
                     hint: "the channel is dead: check the sensor and its cable".into(),

@@ -7,7 +7,7 @@ use stretch_recording::{ReadOptions, Recording};
 use stretch_sim::Catalogue;
 
 use super::{GaugeSetup, GaugeSimulator};
-use crate::bench::{error::BenchError, rig_file};
+use crate::{bench::rig_file, error::ProblemError};
 
 /// Columns that need no naming.
 const USUAL: (&str, &str) = ("length_mm", "bridge_v");
@@ -26,7 +26,7 @@ impl GaugeSimulator {
         columns: Option<(&str, &str)>,
         rig: Option<&Path>,
         catalogue: &Catalogue,
-    ) -> Result<Option<Self>, BenchError> {
+    ) -> Result<Option<Self>, ProblemError> {
         let set = if path.is_dir() { Some(DataSet::read(path)?) } else { None };
         let own = set.as_ref().and_then(|set| Some(path.join(set.rig.as_ref()?)));
         let (rig, says_so) = match (rig, &own) {
@@ -66,7 +66,7 @@ fn columns_of<'a>(
     first: &Trial,
     named: Option<(&'a str, &'a str)>,
     says_so: bool,
-) -> Result<Option<(&'a str, &'a str)>, BenchError> {
+) -> Result<Option<(&'a str, &'a str)>, ProblemError> {
     let has = |name: &str| first.channel(name).is_some();
     match named {
         Some(columns) => Ok(Some(columns)),
@@ -74,7 +74,7 @@ fn columns_of<'a>(
         None if has(USUAL.0) && has(USUAL.1) => Ok(Some(USUAL)),
         None => {
             let names: Vec<&str> = first.channels.iter().map(|c| c.name.as_str()).collect();
-            Err(BenchError::TooLittle {
+            Err(ProblemError::TooLittle {
                 what: format!(
                     "{} is a gauge alone, and nothing says which columns are the reference and the signal",
                     first.name

@@ -8,7 +8,7 @@ use stretch_sim::{
 };
 
 use super::RigSimulator;
-use crate::bench::{acting::unrecorded, error::BenchError};
+use crate::{bench::acting::unrecorded, error::ProblemError};
 
 /// Sample time of an experiment, s.
 const DT_S: f64 = 0.01;
@@ -236,7 +236,7 @@ impl Experiment {
 
 impl RigSimulator {
     /// Rig and effects of a model.
-    fn rig_of(&self, model: &Model) -> Result<(RigParams, EffectSet), BenchError> {
+    fn rig_of(&self, model: &Model) -> Result<(RigParams, EffectSet), ProblemError> {
         let mut params = self.base;
         for (knob, value) in self.knobs.iter().zip(&model.parameters) {
             if let Some(key) = knob.key() {
@@ -251,7 +251,7 @@ impl RigSimulator {
         &self,
         model: &Model,
         experiment: &Experiment,
-    ) -> Result<Vec<Vec<f64>>, BenchError> {
+    ) -> Result<Vec<Vec<f64>>, ProblemError> {
         let (mut params, effects) = self.rig_of(model)?;
         params[Key::VExc] *= experiment.excitation;
         let samples = experiment.inlet.len();

@@ -1,26 +1,21 @@
 //! The rig with what a diagnosis found of it.
 
 use stretch_data::Remarks;
-use stretch_gap::{Diagnosis, Evidence};
-use stretch_sim::{Effect, Grid, GridError, Rig, Surroundings};
+use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, next_experiment};
+use stretch_sim::{EffectParameter, Grid, Rig, Surroundings};
 
 use super::{RigSimulator, nominal::Knob};
 use crate::{
-    fix::{Chosen, Fix, NoFix, with_line},
+    fix::{Chosen, Fix, Fixed, NoFix, names, with_line},
     implement::{Implementation, implementations},
+    problem::Diagnosable,
 };
 
 impl RigSimulator {
     /// What a diagnosis of this rig names, as something to type: with its numbers, in the rig as it was re-tuned.
-    ///
-    /// # Errors
-    /// None for a rig that was diagnosed: its sample time is positive.
-    pub fn implementations(
-        &self,
-        diagnosis: &Diagnosis,
-        evidence: &Evidence,
-    ) -> Result<Vec<Implementation>, GridError> {
-        let grid = Grid::samples(self.about.dt_s)?;
+    fn typed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
+        // a sample time that was diagnosed is one
+        let Ok(grid) = Grid::samples(self.about.dt_s) else { return Vec::new() };
         let mut params = self.base;
         let model = evidence.candidates.first().unwrap_or(&evidence.best);
         for (knob, value) in self.knobs.iter().zip(&model.parameters) {
@@ -30,9 +25,10 @@ impl RigSimulator {
         }
         let around = Surroundings::of_rig(&params, &grid);
         let place = (self.about.record().sensor.unwrap_or(0), 1.0);
-        Ok(implementations(diagnosis, evidence, &self.rows, &around, |effect, values| {
+        let answer = (diagnosis, evidence);
+        implementations(answer, &self.about.effects, &self.rows, &around, |effect, values| {
             with_line(self, place, &self.rows, model, (effect, values))
-        }))
+        })
     }
 
     /// A rig file with what a diagnosis of this rig found: see [`Fix`]. Held against the same record it says `no_gap`.
@@ -42,7 +38,7 @@ impl RigSimulator {
     ///
     /// # Errors
     /// [`NoFix`] where the diagnosis names nothing to fix, or a rig that no file may hold.
-    pub fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
+    fn written(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
         let chosen = Chosen::of(diagnosis, evidence)?;
         let mut remarks = Remarks { head: chosen.head(), ..Remarks::default() };
         let mut rig =
@@ -61,21 +57,46 @@ impl RigSimulator {
             let own = vec!["It was in the rig file already.".to_owned()];
             remarks.effects.insert(effect.name().into(), own);
         }
-        // A fit in equal ratios may end a rounding beyond its range.
-        let within = |effect: &Effect, values: &mut [f64]| {
-            for (p, x) in effect.parameters.iter().zip(values) {
-                *x = x.clamp(*p.allowed().start(), *p.allowed().end());
-            }
-        };
         let stage = self.about.record().sensor.unwrap_or(0);
-        for (effect, values) in chosen.effects(&self.rows, within) {
-            let values = with_line(self, (stage, 1.0), &self.rows, chosen.model, (effect, values));
-            chosen.tell(effect, &mut remarks);
+        for (index, values) in chosen.effects(&self.about.effects) {
+            let effect = self.rows[index];
+            // A fit in equal ratios may end a rounding beyond its range.
+            let allowed = effect.parameters.iter().map(EffectParameter::allowed);
+            let within = allowed.zip(values).map(|(ends, x)| x.clamp(*ends.start(), *ends.end()));
+            let found = (effect, within.collect());
+            let values = with_line(self, (stage, 1.0), &self.rows, chosen.model, found);
+            chosen.tell(effect.into(), &mut remarks);
             rig.effects.push(effect, &values)?;
         }
         let file = rig.to_file(None);
         // Whatever could not be read again is refused here.
         Rig::from_file(&file)?;
-        Ok(Fix { file, remarks })
+        Ok(Fix { effects: names(&file), file: Fixed::Rig(file), remarks })
+    }
+}
+
+impl Diagnosable for RigSimulator {
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+
+    fn afterwards(&self) -> Vec<String> {
+        self.rails()
+    }
+
+    fn next(
+        &self,
+        diagnosis: &Diagnosis,
+        evidence: &Evidence,
+    ) -> Result<Option<Proposal>, GapError> {
+        next_experiment(self, diagnosis, evidence)
+    }
+
+    fn implementations(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
+        self.typed(diagnosis, evidence)
+    }
+
+    fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
+        self.written(diagnosis, evidence)
     }
 }

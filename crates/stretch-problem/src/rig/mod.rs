@@ -35,11 +35,13 @@ use nominal::{Knob, parameters, stages};
 use session::Inputs;
 pub use session::{RigSession, RigTrial};
 
-use crate::bench::{
-    acting::FitRecord,
-    error::BenchError,
-    rig_file,
-    specs::{Place, shown, spec},
+use crate::{
+    bench::{
+        acting::FitRecord,
+        rig_file,
+        specs::{Place, shown, spec},
+    },
+    error::ProblemError,
 };
 
 /// What a [`RigSimulator`] is made of.
@@ -84,7 +86,7 @@ impl RigSimulator {
         folder: &Path,
         rig: Option<&Path>,
         catalogue: &Catalogue,
-    ) -> Result<Self, BenchError> {
+    ) -> Result<Self, ProblemError> {
         let set = DataSet::read(folder)?;
         let own = set.rig.as_ref().map(|file| folder.join(file));
         let rig = rig.or(own.as_deref()).map(rig_file::rig).transpose()?.unwrap_or_default();
@@ -96,7 +98,7 @@ impl RigSimulator {
     ///
     /// # Errors
     /// A rig beyond its limits.
-    pub fn new(setup: RigSetup<'_>) -> Result<Self, BenchError> {
+    pub fn new(setup: RigSetup<'_>) -> Result<Self, ProblemError> {
         let RigSetup { session, rig, catalogue } = setup;
         rig.check()?;
         let Rig { params: base, effects, .. } = &rig;

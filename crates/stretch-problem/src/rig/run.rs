@@ -12,7 +12,7 @@ use super::{
     RigSimulator, session::Begin, shown::Shown, smooth::cubic, timing, timing::Leads,
     turned::Turned, unwound::unwind,
 };
-use crate::bench::{acting::Acting, error::BenchError};
+use crate::{bench::acting::Acting, error::ProblemError};
 
 /// Step of integration while fitting, s.
 const STEP_S: f64 = 2.0 * DEFAULT_STEP_S;
@@ -53,7 +53,7 @@ pub(super) fn simulate(
     run: Run<'_>,
     given: Option<&[f64]>,
     out: &mut [f64],
-) -> Result<(), BenchError> {
+) -> Result<(), ProblemError> {
     let kind = rig.stage_kinds[run.stage];
     let turned = Turned::of(&rig.base, &rig.knobs, run.model);
     let Turned { params, offset, leads, unwound_muscle, unwound_gauge } = turned;
@@ -92,7 +92,7 @@ pub(super) fn simulate(
     if out.iter().all(|x| x.is_finite()) {
         Ok(())
     } else {
-        Err(BenchError::NotFinite { stage: rig.about.stages[run.stage].name.clone() })
+        Err(ProblemError::NotFinite { stage: rig.about.stages[run.stage].name.clone() })
     }
 }
 
@@ -125,13 +125,17 @@ impl Setting<'_> {
         &self,
         memory: &mut Memory,
         settled: Memory,
-        begin: impl FnMut(&mut Memory, Start) -> Result<(), BenchError>,
-    ) -> Result<(), BenchError> {
+        begin: impl FnMut(&mut Memory, Start) -> Result<(), ProblemError>,
+    ) -> Result<(), ProblemError> {
         unwind(self.unwound, self.after_pause(0), memory, settled, begin)
     }
 
     /// The same for what the reference remembers of the muscle.
-    pub(super) fn unwind_shown(&self, shown: &mut Shown, length: &[f64]) -> Result<(), BenchError> {
+    pub(super) fn unwind_shown(
+        &self,
+        shown: &mut Shown,
+        length: &[f64],
+    ) -> Result<(), ProblemError> {
         shown.unwind(self.unwound_muscle, self.after_pause(0), length)
     }
 
@@ -206,8 +210,8 @@ impl Setting<'_> {
         &self,
         count: usize,
         mut out: &mut [f64],
-        mut visit: impl FnMut(usize, &mut [f64]) -> Result<(), BenchError>,
-    ) -> Result<(), BenchError> {
+        mut visit: impl FnMut(usize, &mut [f64]) -> Result<(), ProblemError>,
+    ) -> Result<(), ProblemError> {
         for (trial, spec) in self.rig.about.trials[..count].iter().enumerate() {
             let (own, rest) = out.split_at_mut(spec.samples);
             visit(trial, own)?;
@@ -216,7 +220,7 @@ impl Setting<'_> {
         Ok(())
     }
 
-    pub(super) fn pneumatics(&self, count: usize, out: &mut [f64]) -> Result<(), BenchError> {
+    pub(super) fn pneumatics(&self, count: usize, out: &mut [f64]) -> Result<(), ProblemError> {
         let stage = Pneumatics::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
         self.each(count, out, |trial, own| {
@@ -233,7 +237,7 @@ impl Setting<'_> {
         })
     }
 
-    pub(super) fn muscle(&self, count: usize, out: &mut [f64]) -> Result<(), BenchError> {
+    pub(super) fn muscle(&self, count: usize, out: &mut [f64]) -> Result<(), ProblemError> {
         let stage = Muscle::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
         let mut shown = self.shown(&self.effects)?;
@@ -253,7 +257,7 @@ impl Setting<'_> {
         })
     }
 
-    pub(super) fn actuation(&self, count: usize, out: &mut [f64]) -> Result<(), BenchError> {
+    pub(super) fn actuation(&self, count: usize, out: &mut [f64]) -> Result<(), ProblemError> {
         let stage = Actuation::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
         let mut shown = self.shown(&self.effects)?;
@@ -306,7 +310,7 @@ impl Setting<'_> {
         count: usize,
         acting: &Acting<'_>,
         out: &mut [f64],
-    ) -> Result<(), BenchError> {
+    ) -> Result<(), ProblemError> {
         let stage = Sensing::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
         let shown = self.shown(&self.effects.only(|e| !e.hides_input))?;
@@ -369,8 +373,8 @@ impl Setting<'_> {
     }
 
     /// By trial: sensing where the bridge is excited otherwise than usual. The memory is that of the one gauge.
-    fn dimmed(&self, count: usize) -> Result<Vec<Option<Sensing>>, BenchError> {
-        let one = |excitation: f64| -> Result<Option<Sensing>, BenchError> {
+    fn dimmed(&self, count: usize) -> Result<Vec<Option<Sensing>>, ProblemError> {
+        let one = |excitation: f64| -> Result<Option<Sensing>, ProblemError> {
             let mut params = self.params;
             params[Key::VExc] *= excitation;
             let is_usual = excitation == 1.0;
@@ -392,7 +396,7 @@ impl Setting<'_> {
             .collect()
     }
 
-    pub(super) fn shown(&self, effects: &EffectSet) -> Result<Shown, BenchError> {
+    pub(super) fn shown(&self, effects: &EffectSet) -> Result<Shown, ProblemError> {
         Shown::new(&self.params, effects, self.rig.about.dt_s)
     }
 }

@@ -8,11 +8,13 @@ use stretch_recording::{ReadOptions, Recording};
 
 use super::directions::{self, Motion};
 use super::smooth::{Draws, Smoothed, schedule};
-use crate::bench::{
-    ends::ends,
-    error::{BenchError, check_rate},
-    lost::{open, open_behind},
-    wild::tamed,
+use crate::{
+    bench::{
+        ends::ends,
+        lost::{open, open_behind},
+        wild::tamed,
+    },
+    error::{ProblemError, check_rate},
 };
 
 /// Columns that a rig needs; a pressure is welcome.
@@ -100,7 +102,7 @@ impl RigSession {
     ///
     /// # Errors
     /// Files that cannot be read, and as [`RigSession::new`].
-    pub fn read(folder: &Path, set: &DataSet) -> Result<Self, BenchError> {
+    pub fn read(folder: &Path, set: &DataSet) -> Result<Self, ProblemError> {
         let options =
             NEEDED.iter().fold(ReadOptions::new(), |options, name| options.require(*name));
         Self::new(&Recording::session(set, folder, &options)?)
@@ -113,14 +115,14 @@ impl RigSession {
     ///
     /// # Errors
     /// Columns that are missing or are not what their names say, trials of different rates, too little to fit.
-    pub fn new(trials: &[SessionTrial]) -> Result<Self, BenchError> {
+    pub fn new(trials: &[SessionTrial]) -> Result<Self, ProblemError> {
         let with = trials.iter().filter(|t| t.trial.channel(PRESSURE).is_some()).count();
         let mut columns = NEEDED.to_vec();
         if with == trials.len() {
             columns.push(PRESSURE);
         }
         if trials.iter().all(|t| t.split == Split::Test) {
-            return Err(BenchError::TooLittle {
+            return Err(ProblemError::TooLittle {
                 what: "no trial may be fitted".into(),
                 hint: "give at least one trial split = \"fit\"".into(),
             });
@@ -165,10 +167,10 @@ impl RigSession {
         self.dt_s
     }
 
-    fn check(&self) -> Result<(), BenchError> {
+    fn check(&self) -> Result<(), ProblemError> {
         let fit: usize = self.trials.iter().filter(|t| !t.is_test).map(|t| t.inlet.len()).sum();
         if fit < LEAST {
-            return Err(BenchError::TooLittle {
+            return Err(ProblemError::TooLittle {
                 what: format!("the trials to fit have {fit} samples"),
                 hint: format!("at least {LEAST} are needed to tell anything"),
             });
@@ -195,11 +197,11 @@ impl RigSession {
         span < NOISE_SPAN * noise_variance(trials, self.dt_s).sqrt()
     }
 
-    fn check_units(&self) -> Result<(), BenchError> {
+    fn check_units(&self) -> Result<(), ProblemError> {
         let length = self.range(|t| &t.length_mm);
         let volts = self.range(|t| &t.bridge_v);
         let bad = |column: &str, found: String, hint: &str| {
-            Err(BenchError::Implausible { column: column.into(), found, hint: hint.into() })
+            Err(ProblemError::Implausible { column: column.into(), found, hint: hint.into() })
         };
         let spread = |(low, high): (f64, f64)| format!("values from {low} to {high}");
         if length.1 < 10.0 && volts.1 > 10.0 {
@@ -251,13 +253,13 @@ impl RigSession {
 }
 
 /// Share of the nominal excitation that a trial was recorded at.
-fn excitation(one: &SessionTrial) -> Result<f64, BenchError> {
+fn excitation(one: &SessionTrial) -> Result<f64, ProblemError> {
     let Some(shares) = one.trial.channel(EXCITATION) else { return Ok(1.0) };
     let share = shares.first().copied().unwrap_or(1.0);
     let is_sound = share > 0.0 && share <= 2.0 && shares.iter().all(|s| *s == share);
     is_sound.then_some(share).ok_or_else(|| {
         let (low, high) = ends(shares);
-        BenchError::Implausible {
+        ProblemError::Implausible {
             column: format!("{}, {EXCITATION}", one.trial.name),
             found: format!("values from {low} to {high}"),
             hint: "give the share of the nominal excitation, one number in every row of a trial"
@@ -271,7 +273,7 @@ const AGAINST: f64 = 0.5;
 
 impl RigSession {
     /// An open inlet shortens the muscle, an open outlet lets it out; and no channel stands still while the muscle moves.
-    fn check_directions(&self) -> Result<(), BenchError> {
+    fn check_directions(&self) -> Result<(), ProblemError> {
         let span = |values: &[f64]| {
             let (low, high) = ends(values);
             high - low
@@ -292,7 +294,7 @@ impl RigSession {
             ];
             for (column, values) in others {
                 if let Some(values) = values.filter(|values| moved > 1.0 && span(values) <= 0.0) {
-                    return Err(BenchError::Implausible {
+                    return Err(ProblemError::Implausible {
                         column: format!("{}, {column}", trial.name),
                         found: format!("{} in every sample, while the muscle moves", values[0]),
                         hint: "the channel is dead: check the sensor and its cable".into(),
@@ -310,7 +312,7 @@ impl RigSession {
                 length_mm: &t.length_mm,
             });
             let (column, hint) = directions::against(&motions.collect::<Vec<_>>(), self.dt_s);
-            return Err(BenchError::Implausible {
+            return Err(ProblemError::Implausible {
                 column: column.into(),
                 found: "the muscle lengthens while the inlet is open".into(),
                 hint,

@@ -3,7 +3,7 @@
 use stretch_sim::{EffectSet, Grid, Memory, Reference, RigParams, Stage, Start};
 
 use super::unwound::unwind;
-use crate::bench::error::BenchError;
+use crate::error::ProblemError;
 
 /// The reference at the end of a stage, skipped where nothing acts in it.
 pub(super) struct Shown {
@@ -18,7 +18,7 @@ impl Shown {
         params: &RigParams,
         effects: &EffectSet,
         dt_s: f64,
-    ) -> Result<Self, BenchError> {
+    ) -> Result<Self, ProblemError> {
         let stage = Reference::new(params, effects, &Grid::samples(dt_s)?)?;
         let acts = effects.acting_in(Stage::Reference).next().is_some();
         let memory = stage.memory();
@@ -31,7 +31,7 @@ impl Shown {
         share: f64,
         after_pause: Start,
         length: &[f64],
-    ) -> Result<(), BenchError> {
+    ) -> Result<(), ProblemError> {
         let Self { stage, memory, .. } = self;
         let mut out = vec![0.0; length.len()];
         unwind(share, after_pause, memory, stage.memory(), |memory, start| {
@@ -39,12 +39,12 @@ impl Shown {
         })
     }
 
-    pub(super) fn condition(&mut self, length: &[f64]) -> Result<(), BenchError> {
+    pub(super) fn condition(&mut self, length: &[f64]) -> Result<(), ProblemError> {
         let mut out = vec![0.0; length.len()];
         Ok(self.stage.run(&mut self.memory, Start::Settled, length, &mut out)?)
     }
 
-    pub(super) fn run(&mut self, start: Start, length: &mut [f64]) -> Result<(), BenchError> {
+    pub(super) fn run(&mut self, start: Start, length: &mut [f64]) -> Result<(), ProblemError> {
         if self.acts {
             self.work.clear();
             self.work.extend_from_slice(length);

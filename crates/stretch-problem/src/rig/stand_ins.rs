@@ -8,7 +8,7 @@ use super::{
     found::{Pressures, causes},
     run::Setting,
 };
-use crate::bench::error::BenchError;
+use crate::error::ProblemError;
 
 impl Setting<'_> {
     /// By trial, the chamber's pressure at every node where it does not depend on the muscle: what acts in the muscle alone finds it kept.
@@ -16,7 +16,7 @@ impl Setting<'_> {
         &self,
         stage: &Actuation,
         count: usize,
-    ) -> Result<Arc<Pressures>, BenchError> {
+    ) -> Result<Arc<Pressures>, ProblemError> {
         let begun = self.begun(count);
         let key = causes(&[Stage::Pneumatics], &self.params, &self.effects, &self.grid, begun);
         self.rig.found.nodes.or_make(key, || {
@@ -38,7 +38,7 @@ impl Setting<'_> {
 
     /// What play in the reference hides of the length: the model of the motion says which flank it lies on, the record how
     /// long the muscle is.
-    pub(super) fn hidden(&self, count: usize) -> Result<Option<Vec<f64>>, BenchError> {
+    pub(super) fn hidden(&self, count: usize) -> Result<Option<Vec<f64>>, ProblemError> {
         let alone = self.effects.only(|e| e.hides_input);
         if alone.acting_in(Stage::Reference).next().is_none() {
             return Ok(None);
@@ -57,7 +57,7 @@ impl Setting<'_> {
     }
 
     /// Length that the model of the motion shows without play in the reference.
-    fn free_length(&self, count: usize) -> Result<Arc<Vec<f64>>, BenchError> {
+    fn free_length(&self, count: usize) -> Result<Arc<Vec<f64>>, ProblemError> {
         let effects = self.effects.only(|e| !e.hides_input);
         let has_pressure = !self.rig.inputs.pressure.is_empty();
         let grid = if has_pressure {
@@ -97,7 +97,7 @@ impl Setting<'_> {
     }
 
     /// Pressure of the nominal pneumatics: what there is without a pressure column.
-    pub(super) fn simulated_pressure(&self, count: usize) -> Result<Arc<Pressures>, BenchError> {
+    pub(super) fn simulated_pressure(&self, count: usize) -> Result<Arc<Pressures>, ProblemError> {
         let effects = &self.rig.effects;
         let grid = effects.grid(&self.params, self.rig.about.dt_s, self.step_s)?;
         let nominal = Setting { rig: self.rig, effects: effects.clone(), grid, ..*self };

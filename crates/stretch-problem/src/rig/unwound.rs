@@ -11,7 +11,7 @@
 
 use stretch_sim::{Memory, Start};
 
-use crate::bench::error::BenchError;
+use crate::error::ProblemError;
 
 /// Moves a memory that was left at the other end of the stroke towards that of a stage that settled where the session begins.
 /// `begin` lets a memory begin there; the trial then goes on without a pause.
@@ -20,8 +20,8 @@ pub(super) fn unwind(
     after_pause: Start,
     memory: &mut Memory,
     mut settled: Memory,
-    mut begin: impl FnMut(&mut Memory, Start) -> Result<(), BenchError>,
-) -> Result<(), BenchError> {
+    mut begin: impl FnMut(&mut Memory, Start) -> Result<(), ProblemError>,
+) -> Result<(), ProblemError> {
     if share > 0.0 {
         begin(memory, after_pause)?;
         begin(&mut settled, Start::Settled)?;

@@ -180,6 +180,10 @@ fn begin(spec: &WorkersSpec, session: &Session) -> Result<(Process, Hello, Vec<S
 }
 
 impl Source for Workers {
+    fn takes_inputs(&self) -> bool {
+        self.hello.inputs
+    }
+
     fn simulate_many(&self, asks: &[Ask<'_>]) -> Vec<Result<Vec<f64>, SourceError>> {
         if !self.hello.inputs && asks.iter().any(|ask| ask.inputs.is_some()) {
             let why = format!(

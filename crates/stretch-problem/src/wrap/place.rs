@@ -3,7 +3,7 @@
 use std::{ops::Range, sync::Arc};
 
 use stretch_effects::{Grid, Span, Start};
-use stretch_gap::EffectSpec;
+use stretch_gap::{EffectParameterSpec, EffectSpec};
 
 use super::{
     catalogue::wrappers,
@@ -197,10 +197,19 @@ fn aliases(kind: &Wrapper, site: &Site, among: &Among<'_>, label: &str) -> Vec<S
 }
 
 impl Placed {
+    /// Whether a name or a pattern (`all`) means it.
+    pub(crate) fn is_called(&self, name: &str) -> bool {
+        self.name == name || self.aliases.iter().any(|alias| alias == name)
+    }
+
+    /// Its numbers, with their ranges.
+    pub(crate) fn parameters(&self) -> Vec<EffectParameterSpec> {
+        (self.kind.parameters)(&self.extent, &self.site.unit)
+    }
+
     /// As an effect of the catalogue.
     pub(crate) fn spec(&self, among: &[Self], stage: &str) -> EffectSpec {
-        let parameters = (self.kind.parameters)(&self.extent, &self.site.unit);
-        let mut spec = EffectSpec::new(&self.name, (self.site.stage, stage), parameters);
+        let mut spec = EffectSpec::new(&self.name, (self.site.stage, stage), self.parameters());
         if let Some(starts) = self.kind.starts {
             spec.starts = starts(&self.extent);
             for start in &mut spec.starts {
@@ -223,7 +232,7 @@ impl Placed {
 
     /// Acts on a channel of one trial after the other; `found` is what was measured of it, where its course is found in there.
     pub(crate) fn act(&self, values: &[f64], trials: &Trials<'_>, channel: &mut [f64]) {
-        let parameters = (self.kind.parameters)(&self.extent, &self.site.unit);
+        let parameters = self.parameters();
         let mut strengths = parameters.iter().zip(values).filter(|(p, _)| p.off.is_some());
         if strengths.all(|(p, v)| p.off == Some(*v)) {
             return;

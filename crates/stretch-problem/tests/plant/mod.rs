@@ -13,7 +13,7 @@ use stretch_gap::{
     Description, Diagnosis, Dice, GapError, Knowledge, Options, Run, Simulator, diagnose,
 };
 use stretch_problem::{
-    Argument, Ask, BlackBox, OwnEffect, Parameter, Problem, ProblemSpec, Stage, Tolerance, agreed,
+    Argument, Ask, BlackBox, Checked, OwnEffect, Parameter, ProblemSpec, Stage, Tolerance, agreed,
     closure,
 };
 
@@ -113,7 +113,7 @@ fn problem(trials: Vec<SessionTrial>, wrap: &[&str]) -> ProblemSpec {
 
 /// Diagnoses; hands back how often the servo was run, too.
 fn diagnosed(spec: ProblemSpec, budget: Option<usize>) -> (Diagnosis, usize) {
-    let problem = Problem::new(spec).unwrap();
+    let problem = Checked::new(spec).unwrap();
     let measured = problem.session().column("command_V").unwrap().to_vec();
     let calls = Arc::new(AtomicUsize::new(0));
     let counted = Arc::clone(&calls);
@@ -194,7 +194,7 @@ fn a_black_box_is_run_less_than_half_as_often_as_it_is_simulated() {
         let plant = hidden().into_iter().find(|(n, _)| *n == name).unwrap().1;
         let spec = problem(recorded(plant), &MANY);
         let (_, runs) = diagnosed(spec.clone(), None);
-        let problem = Problem::new(spec).unwrap();
+        let problem = Checked::new(spec).unwrap();
         let measured = problem.session().column("command_V").unwrap().to_vec();
         let source = closure(move |ask: &Ask<'_>| Ok(servo_of(ask, &measured)));
         let bench = BlackBox::new(problem, Arc::new(source));
@@ -259,7 +259,7 @@ fn friction_is_found_from_the_inverse_form_at_a_difference_of_positions() {
         trials: rail(2),
         ..ProblemSpec::default()
     };
-    let problem = Problem::new(spec).unwrap();
+    let problem = Checked::new(spec).unwrap();
     let a = problem.session().column("acceleration").unwrap().to_vec();
     let source = closure(move |ask: &Ask<'_>| {
         Ok(a[..ask.trials * SAMPLES].iter().map(|a| ask.parameters[0] * a).collect())
@@ -301,7 +301,7 @@ fn parameters_that_do_nothing_do_the_same_or_stand_at_a_bound_are_said() {
     // Nothing reads the inertia; the gear acts as the gain does.
     spec.parameters.push(parameter("gear", "1", 1.0, Tolerance::Relative(0.1)));
     spec.parameters.push(parameter("inertia", "kg m2", 3.0, Tolerance::Relative(0.1)));
-    let problem = Problem::new(spec).unwrap();
+    let problem = Checked::new(spec).unwrap();
     let measured = problem.session().column("command_V").unwrap().to_vec();
     let source = closure(move |ask: &Ask<'_>| {
         let mut p = ask.parameters.to_vec();
@@ -321,7 +321,7 @@ fn parameters_that_do_nothing_do_the_same_or_stand_at_a_bound_are_said() {
 #[test]
 fn what_a_simulator_answers_wrongly_is_told() {
     let with = |answer: fn(Vec<f64>) -> Vec<f64>| {
-        let problem = Problem::new(problem(recorded(|u, _| plain(u, 0.0)), &[])).unwrap();
+        let problem = Checked::new(problem(recorded(|u, _| plain(u, 0.0)), &[])).unwrap();
         let measured = problem.session().column("command_V").unwrap().to_vec();
         let source = closure(move |ask: &Ask<'_>| Ok(answer(servo_of(ask, &measured))));
         let bench = BlackBox::new(problem, Arc::new(source));
@@ -341,7 +341,7 @@ fn wrong_problems_are_refused_with_what_to_do() {
     let refused = |change: fn(&mut ProblemSpec)| {
         let mut spec = problem(recorded(|u, _| plain(u, 0.0)), &[]);
         change(&mut spec);
-        Problem::new(spec).unwrap_err().to_string()
+        Checked::new(spec).unwrap_err().to_string()
     };
     let told = refused(|s| s.wrap = vec!["output.backlahs".into()]);
     assert!(
@@ -386,7 +386,7 @@ fn what_one_sine_cannot_part_is_told_as_a_family() {
         trials: vec![one(0)],
         ..ProblemSpec::default()
     };
-    let problem = Problem::new(spec).unwrap();
+    let problem = Checked::new(spec).unwrap();
     let rod = problem.session().column("rod_mm").unwrap().to_vec();
     let source =
         closure(move |ask: &Ask<'_>| Ok(rod.iter().map(|x| ask.parameters[0] * x).collect()));

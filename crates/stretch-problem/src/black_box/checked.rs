@@ -1,28 +1,29 @@
-//! A problem, checked: recordings on one grid, stages, parameters, effects, and what a source has to know of them.
+//! A problem of a user's own, checked: recordings on one grid, stages, parameters, effects, and what a source has to know of them.
 
 use std::ops::Range;
 
 use stretch_data::unit;
 use stretch_effects::Grid;
-use stretch_gap::{
-    Description, DescriptionSpec, EffectParameterSpec, EffectSpec, Noise, ParameterSpec, StageSpec,
-};
+use stretch_gap::{Description, DescriptionSpec, Noise, ParameterSpec, StageSpec};
+
+use stretch_sim::Tolerance;
 
 use super::{
+    catalogue::{Acting, Around, own_effects, skews},
     columns::Columns,
     facts::facts,
     source::{Session, SessionColumn, SessionPart, SessionStage},
-    spec::{OwnEffect, Parameter, ProblemSpec, Stage, Tolerance},
+    spec::{OwnEffect, Parameter, ProblemSpec, Sensor, Stage},
     velocity::Velocity,
 };
 use crate::{
     error::ProblemError,
-    wrap::{Among, Placed, Side, Site, placed},
+    wrap::{Among, Placed, Side, Site},
 };
 
 /// A [`ProblemSpec`] that was checked, with its recordings on one grid.
 #[derive(Debug, Clone)]
-pub struct Problem {
+pub struct Checked {
     about: Description,
     session: Session,
     pub(crate) columns: Columns,
@@ -34,37 +35,29 @@ pub struct Problem {
     pub(crate) wrappers: Vec<Placed>,
     /// What each effect of the catalogue is.
     pub(crate) acting: Vec<Acting>,
-    /// Values of the own effects' arguments where they are off.
+    /// Values of the own effects' arguments where none is looked for: off, or as they were found before.
     pub(crate) off: Vec<f64>,
+    /// Wrappers that act in every run, with their values.
+    pub(crate) standing: Vec<(usize, Vec<f64>)>,
+    /// Everything that was asked for, the recordings apart.
+    pub(crate) spec: ProblemSpec,
     pub(crate) grid: Grid,
     /// Samples and session time of each trial, s, from the session's start.
     pub(crate) parts: Vec<(Range<usize>, f64)>,
     notes: Vec<String>,
 }
 
-/// What an effect of the catalogue is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Acting {
-    /// The user's own: its first argument among all of them.
-    Own(usize),
-    /// A wrapper.
-    Wrapper(usize),
-    /// The clock of the recorder: the skew that all outputs have, whichever wrapper moves each.
-    Recorder,
-}
-
-/// What is late in every output alike: not the sensors, but the recorder that took the outputs beside the inputs.
-const RECORDER: &str = "record.skew";
-
-impl Problem {
+impl Checked {
     /// Checks a problem and brings its recordings onto one grid.
     ///
     /// # Errors
     /// Names that stand for nothing, values that do not do, and recordings that cannot be read.
     pub fn new(spec: ProblemSpec) -> Result<Self, ProblemError> {
-        let ProblemSpec { stages, inputs, parameters, effects, wrap, beside, trials } = spec;
-        check_known(&stages, &parameters, &effects)?;
-        let columns = Columns::read(&trials, used(&stages, &inputs_of(&inputs), &beside))?;
+        let (trials, spec) = (spec.trials.clone(), ProblemSpec { trials: Vec::new(), ..spec });
+        let ProblemSpec { stages, inputs, parameters, effects, .. } = &spec;
+        check_known(stages, parameters, effects)?;
+        let columns = Columns::read(&trials, used(&spec))?;
+        let sensor = spec.sensor.as_ref().map(|s| sensor_of(s, stages)).transpose()?;
         let mut notes = columns.notes.clone();
         let grid = Grid::samples(columns.dt_s)
             .map_err(|e| ProblemError::value("recordings", e.to_string(), "check their time"))?;
@@ -83,27 +76,12 @@ impl Problem {
             inputs: stages.iter().map(|s| s.inputs.len()).collect(),
             others: columns.names.clone(),
         };
-        let asked: Vec<String> = wrap.iter().map(|pattern| outputs_of(pattern)).collect();
-        let wrappers = placed(&sites(&stages, &unit_of), &among, &asked, &mut notes)?;
-        let (own, off) = own_effects(&effects, &stages)?;
-        let mut acting: Vec<Acting> = Vec::new();
-        let mut catalogue = Vec::new();
-        let mut first = 0;
-        for (effect, spec) in effects.iter().zip(own) {
-            acting.push(Acting::Own(first));
-            catalogue.push(spec);
-            first += effect.arguments.len();
-        }
-        for (i, wrapper) in wrappers.iter().enumerate() {
-            acting.push(Acting::Wrapper(i));
-            catalogue.push(wrapper.spec(&wrappers, &stages[wrapper.site.stage].name));
-        }
-        if let Some(spec) = recorder(&wrappers, &catalogue) {
-            let own = catalogue.iter_mut().filter(|own| spec.twins.contains(&own.name));
-            own.for_each(|own| own.twins.push(RECORDER.to_owned()));
-            acting.push(Acting::Recorder);
-            catalogue.push(spec);
-        }
+        let around = Around::of(&spec, &sites(stages, &unit_of), &among, &mut notes)?;
+        let (mut looked_for, off) = own_effects(effects, stages)?;
+        looked_for.extend(around.looked_for(stages));
+        let looked_for = around.without(looked_for, &spec.without)?;
+        let (acting, catalogue) = looked_for.into_iter().unzip();
+        let Around { wrappers, standing, .. } = around;
         let input_noise = stages.iter().map(|stage| {
             let noise =
                 |c: &String| inputs.iter().find(|i| i.column == *c).map_or(0.0, |i| i.noise);
@@ -121,27 +99,29 @@ impl Problem {
         let starts = columns.trials.iter().map(|t| t.start_s - begun_s);
         let parts = columns.ranges().into_iter().zip(starts).collect();
         let about = Description::new(DescriptionSpec {
-            stages: stages.iter().map(|s| stage_spec(s, &parameters, &unit_of)).collect(),
+            stages: stages.iter().map(|s| stage_spec(s, parameters, &unit_of)).collect(),
             parameters: parameters.iter().map(parameter_spec).collect::<Result<_, _>>()?,
             effects: catalogue,
             trials: columns.trials.clone(),
             dt_s: columns.dt_s,
         })?;
-        let session = session(&stages, &parameters, &effects, &columns, &unit_of);
-        let known = facts(&about, &session, &columns);
+        let session = session(stages, parameters, effects, &columns, &unit_of);
+        let known = facts(&about, &session, &columns, sensor.as_ref());
         Ok(Self {
             about: about.with_record(known)?,
             session,
             columns,
-            stages,
+            stages: stages.clone(),
             input_noise,
             noise,
             wrappers,
             acting,
             off,
+            standing,
             grid,
             parts,
             notes,
+            spec,
         })
     }
 
@@ -169,11 +149,11 @@ impl Problem {
         }
     }
 
-    /// The wrapper behind a stage that an effect of the catalogue is, if it is one.
-    pub(crate) fn behind(&self, effect: usize, stage: usize) -> Option<usize> {
+    /// The wrapper on one side of a stage that an effect of the catalogue is, if it is one.
+    pub(crate) fn around(&self, effect: usize, stage: usize, side: Side) -> Option<usize> {
         let is_here = |at: usize| {
             let site = &self.wrappers[at].site;
-            site.side == Side::Output && site.stage == stage
+            (site.stage, site.side) == (stage, side)
         };
         match self.acting[effect] {
             Acting::Wrapper(at) => is_here(at).then_some(at),
@@ -182,48 +162,40 @@ impl Problem {
         }
     }
 
+    /// Wrappers that act in every run of a stage, on one of its sides, with their values.
+    pub(crate) fn standing(
+        &self,
+        stage: usize,
+        side: Side,
+    ) -> impl Iterator<Item = (usize, &Vec<f64>)> {
+        let is_here = move |at: usize| {
+            let site = &self.wrappers[at].site;
+            (site.stage, site.side) == (stage, side)
+        };
+        self.standing.iter().filter(move |(at, _)| is_here(*at)).map(|(at, values)| (*at, values))
+    }
+
+    /// The unit of a column, empty where none is known.
+    pub(crate) fn unit(&self, column: &str) -> &str {
+        let own = self.session.columns.iter().find(|c| c.name == column);
+        own.map_or("", |c| c.unit.as_str())
+    }
+
     pub(crate) fn stage_inputs(&self, stage: usize) -> impl Iterator<Item = &[f64]> {
         self.stages[stage].inputs.iter().map(|c| self.columns.of(c).unwrap_or(&[]))
     }
 }
 
-/// A pattern of wrappers; the recorder's clock is made of the skews of the outputs.
-fn outputs_of(pattern: &str) -> String {
-    if pattern == RECORDER { "output.skew".to_owned() } else { pattern.to_owned() }
-}
-
-/// Skews of outputs among some wrappers.
-fn skews(wrappers: &[Placed]) -> impl Iterator<Item = (usize, &Placed)> {
-    let all = wrappers.iter().enumerate();
-    all.filter(|(_, w)| w.kind.name == "skew" && w.site.side == Side::Output)
-}
-
-/// The skew that all outputs share, where there are several: one number for what each alone would need its own for. A shift that all
-/// have is the recorder's, one that a single output has is its sensor's.
-fn recorder(wrappers: &[Placed], catalogue: &[EffectSpec]) -> Option<EffectSpec> {
-    let of = |w: &Placed| catalogue.iter().find(|spec| spec.name == w.name);
-    let own: Vec<&EffectSpec> = skews(wrappers).filter_map(|(_, w)| of(w)).collect();
-    let first = own.first().filter(|_| own.len() > 1)?;
-    Some(EffectSpec {
-        name: RECORDER.to_owned(),
-        touches: own.iter().flat_map(|spec| spec.touches.clone()).collect(),
-        twins: own.iter().map(|spec| spec.name.clone()).collect(),
-        ..(*first).clone()
-    })
-}
-
-fn inputs_of(inputs: &[crate::black_box::spec::Input]) -> Vec<&str> {
-    inputs.iter().map(|i| i.column.as_str()).collect()
-}
-
 /// Every column that is used, once each.
-fn used(stages: &[Stage], inputs: &[&str], beside: &[String]) -> Vec<String> {
+fn used(spec: &ProblemSpec) -> Vec<String> {
     let of_stage = |s: &Stage| {
         let more = s.velocity.iter().chain(&s.position).cloned();
         std::iter::once(s.output.clone()).chain(s.inputs.clone()).chain(more).collect::<Vec<_>>()
     };
-    let all = stages.iter().flat_map(of_stage);
-    let all = all.chain(inputs.iter().map(|&c| c.to_owned())).chain(beside.iter().cloned());
+    let all = spec.stages.iter().flat_map(of_stage);
+    let all = all.chain(spec.inputs.iter().map(|i| i.column.clone()));
+    let all = all.chain(spec.beside.iter().cloned());
+    let all = all.chain(spec.sensor.iter().map(|s| s.reference.clone()));
     let mut out: Vec<String> = Vec::new();
     for name in all {
         if !out.contains(&name) {
@@ -231,6 +203,15 @@ fn used(stages: &[Stage], inputs: &[&str], beside: &[String]) -> Vec<String> {
         }
     }
     out
+}
+
+/// The stage of a sensor, and the column that it measures.
+fn sensor_of(sensor: &Sensor, stages: &[Stage]) -> Result<(usize, String), ProblemError> {
+    let at = stages.iter().position(|s| s.output == sensor.signal);
+    let outputs = stages.iter().map(|s| s.output.as_str());
+    let at =
+        at.ok_or_else(|| ProblemError::unknown("signal", "output", &sensor.signal, outputs))?;
+    Ok((at, sensor.reference.clone()))
 }
 
 fn velocity(stage: &Stage, columns: &Columns) -> Option<Velocity> {
@@ -267,86 +248,21 @@ fn stage_spec(
 }
 
 fn parameter_spec(p: &Parameter) -> Result<ParameterSpec, ProblemError> {
-    let sd = match p.tolerance {
-        Tolerance::Exact => 0.0,
-        Tolerance::Absolute(sd) => sd,
-        Tolerance::Relative(share) if p.value != 0.0 => share * p.value.abs(),
-        Tolerance::Relative(share) => {
-            return Err(ProblemError::value(
-                format!("parameter {}", p.name),
-                format!("its tolerance is {share} of its value, which is 0"),
-                "give an absolute tolerance, in its unit",
-            ));
-        }
-    };
-    let spec = ParameterSpec::new(&p.name, &p.unit, p.value).within(sd);
+    if let Tolerance::Relative(share) = p.tolerance
+        && p.value == 0.0
+    {
+        return Err(ProblemError::value(
+            format!("parameter {}", p.name),
+            format!("its tolerance is {share} of its value, which is 0"),
+            "give an absolute tolerance, in its unit",
+        ));
+    }
+    let spec = ParameterSpec::new(&p.name, &p.unit, p.value).within(p.tolerance.sd(p.value));
     Ok(ParameterSpec {
         least: p.least.unwrap_or(f64::NEG_INFINITY),
         greatest: p.greatest.unwrap_or(f64::INFINITY),
         ..spec
     })
-}
-
-/// The user's own effects, and the values of their arguments where they are off.
-fn own_effects(
-    effects: &[OwnEffect],
-    stages: &[Stage],
-) -> Result<(Vec<EffectSpec>, Vec<f64>), ProblemError> {
-    let (mut specs, mut off) = (Vec::new(), Vec::new());
-    for effect in effects {
-        let all: Vec<usize> = (0..stages.len())
-            .filter(|s| effect.stages.is_empty() || effect.stages.contains(&stages[*s].name))
-            .collect();
-        if effect.arguments.is_empty() || effect.arguments.iter().all(|a| a.off.is_none()) {
-            return Err(ProblemError::value(
-                format!("effect {}", effect.name),
-                "no argument says at which value it does nothing",
-                "give off = VALUE",
-            ));
-        }
-        let mut parameters = Vec::new();
-        for a in &effect.arguments {
-            let name = if a.name.is_empty() { &effect.name } else { &a.name };
-            let middle = if a.is_log { (a.min * a.max).sqrt() } else { 0.5 * (a.min + a.max) };
-            off.push(a.off.unwrap_or(middle));
-            parameters.push(EffectParameterSpec {
-                off: a.off,
-                is_log: a.is_log && a.off.is_none(),
-                ..EffectParameterSpec::strength(name, &a.unit, a.min..=a.max)
-            });
-        }
-        let place = (all.first().copied().unwrap_or(0), stages[all[0]].name.as_str());
-        let mut spec = EffectSpec::new(&effect.name, place, parameters);
-        spec.touches = all;
-        spec.twins.clone_from(&effect.twins);
-        shift_starts(&mut spec);
-        specs.push(spec);
-    }
-    Ok((specs, off))
-}
-
-/// Starts of strengths whose off value is not 0 are shares of the way from there.
-fn shift_starts(spec: &mut EffectSpec) {
-    let points = |p: &EffectParameterSpec| match p.off {
-        Some(off) if off != 0.0 => {
-            let ends = [p.min, p.max].into_iter().filter(|end| (end - off).abs() > 0.0);
-            Some(ends.flat_map(|end| [0.05, 0.2, 0.6].map(|k| off + k * (end - off))).collect())
-        }
-        _ => None,
-    };
-    let is_shifted = spec.parameters.iter().any(|p| points(p).is_some());
-    if !is_shifted {
-        return;
-    }
-    let plain = |p: &EffectParameterSpec| -> Vec<f64> {
-        let alone = EffectSpec::new("", (0, ""), vec![p.clone()]);
-        alone.starts.into_iter().map(|s| s[0]).collect()
-    };
-    spec.starts = spec.parameters.iter().fold(vec![Vec::new()], |starts, p| {
-        let points: Vec<f64> = points(p).unwrap_or_else(|| plain(p));
-        let with = |s: &Vec<f64>, x: &f64| [s.as_slice(), &[*x]].concat();
-        starts.iter().flat_map(|s| points.iter().map(move |x| with(s, x))).collect()
-    });
 }
 
 fn session(

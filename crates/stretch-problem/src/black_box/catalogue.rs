@@ -1,0 +1,215 @@
+//! The catalogue of a user's own problem: what is looked for, and what acts in every run.
+
+use stretch_gap::{EffectParameterSpec, EffectSpec};
+
+use super::spec::{OwnEffect, ProblemSpec, Stage, Wrapped};
+use crate::{
+    error::ProblemError,
+    wrap::{Among, Placed, Side, Site, placed},
+};
+
+/// What an effect of the catalogue is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Acting {
+    /// The user's own: its first argument among all of them.
+    Own(usize),
+    /// A wrapper.
+    Wrapper(usize),
+    /// The clock of the recorder: the skew that all outputs have, whichever wrapper moves each.
+    Recorder,
+}
+
+/// An effect that is looked for.
+pub(crate) type Entry = (Acting, EffectSpec);
+
+/// What is late in every output alike: not the sensors, but the recorder that took the outputs beside the inputs.
+const RECORDER: &str = "record.skew";
+
+/// Wrappers around the stages.
+pub(crate) struct Around {
+    /// All of them, in the order in which they act.
+    pub(crate) wrappers: Vec<Placed>,
+    /// Those that act in every run, with their values.
+    pub(crate) standing: Vec<(usize, Vec<f64>)>,
+    /// Whether each is looked for.
+    is_open: Vec<bool>,
+    /// Whether the recorder's clock is known.
+    is_clock_known: bool,
+}
+
+impl Around {
+    /// Wrappers that a problem looks for, and those that it has.
+    ///
+    /// # Errors
+    /// Names that stand for nothing, values that are missing.
+    pub(crate) fn of(
+        spec: &ProblemSpec,
+        sites: &[Site],
+        among: &Among<'_>,
+        notes: &mut Vec<String>,
+    ) -> Result<Self, ProblemError> {
+        let asked: Vec<String> = spec.wrap.iter().map(|name| outputs_of(name)).collect();
+        let known = spec.wrapped.iter().map(|w| outputs_of(&w.name));
+        let all: Vec<String> = asked.iter().cloned().chain(known).collect();
+        let wrappers = placed(sites, among, &all, notes)?;
+        let mut is_open: Vec<bool> =
+            wrappers.iter().map(|w| asked.iter().any(|name| w.is_called(name))).collect();
+        let mut standing = Vec::new();
+        for known in &spec.wrapped {
+            let name = outputs_of(&known.name);
+            for (at, wrapper) in wrappers.iter().enumerate().filter(|(_, w)| w.is_called(&name)) {
+                is_open[at] &= known.name == RECORDER;
+                standing.push((at, values_of(wrapper, known)?));
+            }
+        }
+        let is_clock_known = spec.wrapped.iter().any(|w| w.name == RECORDER);
+        Ok(Self { wrappers, standing, is_open, is_clock_known })
+    }
+
+    /// Those that are looked for, as effects.
+    pub(crate) fn looked_for(&self, stages: &[Stage]) -> Vec<Entry> {
+        let open = || self.wrappers.iter().enumerate().filter(|(at, _)| self.is_open[*at]);
+        let among: Vec<Placed> = open().map(|(_, w)| w.clone()).collect();
+        let spec = |w: &Placed| w.spec(&among, &stages[w.site.stage].name);
+        let mut out: Vec<Entry> = open().map(|(at, w)| (Acting::Wrapper(at), spec(w))).collect();
+        if let Some(clock) = recorder(&among, &out).filter(|_| !self.is_clock_known) {
+            let own = out.iter_mut().filter(|(_, own)| clock.twins.contains(&own.name));
+            own.for_each(|(_, own)| own.twins.push(RECORDER.to_owned()));
+            out.push((Acting::Recorder, clock));
+        }
+        out
+    }
+
+    /// A catalogue without some effects; a wrapper is also known by its kind or its place.
+    ///
+    /// # Errors
+    /// A name that stands for none of them.
+    pub(crate) fn without(
+        &self,
+        catalogue: Vec<Entry>,
+        names: &[String],
+    ) -> Result<Vec<Entry>, ProblemError> {
+        let is_called = |(acting, spec): &Entry, name: &str| {
+            let wrapper = match acting {
+                Acting::Wrapper(at) => Some(&self.wrappers[*at]),
+                _ => None,
+            };
+            spec.name == name || wrapper.is_some_and(|w| w.kind.name == name || w.is_called(name))
+        };
+        for name in names {
+            if !catalogue.iter().any(|entry| is_called(entry, name)) {
+                let known = catalogue.iter().map(|(_, spec)| spec.name.as_str());
+                return Err(ProblemError::unknown("without", "effect", name, known));
+            }
+        }
+        let is_left = |entry: &Entry| !names.iter().any(|name| is_called(entry, name));
+        Ok(catalogue.into_iter().filter(is_left).collect())
+    }
+}
+
+/// A name of wrappers; the recorder's clock is made of the skews of the outputs.
+fn outputs_of(name: &str) -> String {
+    if name == RECORDER { "output.skew".to_owned() } else { name.to_owned() }
+}
+
+/// Values of a wrapper that acts in every run, in the order of its parameters.
+fn values_of(wrapper: &Placed, known: &Wrapped) -> Result<Vec<f64>, ProblemError> {
+    let owner = || format!("[[wrapped]] {}", known.name);
+    let parameters = wrapper.parameters();
+    let names = || parameters.iter().map(|p| p.name.as_str());
+    if let Some(name) = known.values.keys().find(|name| names().all(|n| n != name.as_str())) {
+        return Err(ProblemError::unknown(owner(), "parameter", name, names()));
+    }
+    let value = |p: &EffectParameterSpec| {
+        known.values.get(&p.name).copied().or(p.form).ok_or_else(|| {
+            let found = format!("it has no {}", p.name);
+            ProblemError::value(owner(), found, format!("write {} = VALUE", p.name))
+        })
+    };
+    parameters.iter().map(value).collect()
+}
+
+/// Skews of outputs among some wrappers.
+pub(crate) fn skews(wrappers: &[Placed]) -> impl Iterator<Item = (usize, &Placed)> {
+    let all = wrappers.iter().enumerate();
+    all.filter(|(_, w)| w.kind.name == "skew" && w.site.side == Side::Output)
+}
+
+/// The skew that all outputs share, where there are several: one number for what each alone would need its own for. A shift that all
+/// have is the recorder's, one that a single output has is its sensor's.
+fn recorder(wrappers: &[Placed], catalogue: &[Entry]) -> Option<EffectSpec> {
+    let of = |w: &Placed| catalogue.iter().map(|(_, spec)| spec).find(|spec| spec.name == w.name);
+    let own: Vec<&EffectSpec> = skews(wrappers).filter_map(|(_, w)| of(w)).collect();
+    let first = own.first().filter(|_| own.len() > 1)?;
+    Some(EffectSpec {
+        name: RECORDER.to_owned(),
+        touches: own.iter().flat_map(|spec| spec.touches.clone()).collect(),
+        twins: own.iter().map(|spec| spec.name.clone()).collect(),
+        ..(*first).clone()
+    })
+}
+
+/// The user's own effects that are looked for, and the values of all their arguments where none is.
+pub(crate) fn own_effects(
+    effects: &[OwnEffect],
+    stages: &[Stage],
+) -> Result<(Vec<Entry>, Vec<f64>), ProblemError> {
+    let (mut specs, mut off) = (Vec::new(), Vec::new());
+    for effect in effects {
+        let all: Vec<usize> = (0..stages.len())
+            .filter(|s| effect.stages.is_empty() || effect.stages.contains(&stages[*s].name))
+            .collect();
+        if effect.arguments.is_empty() || effect.arguments.iter().all(|a| a.off.is_none()) {
+            return Err(ProblemError::value(
+                format!("effect {}", effect.name),
+                "no argument says at which value it does nothing",
+                "give off = VALUE",
+            ));
+        }
+        let first = off.len();
+        let mut parameters = Vec::new();
+        for a in &effect.arguments {
+            let name = if a.name.is_empty() { &effect.name } else { &a.name };
+            let middle = if a.is_log { (a.min * a.max).sqrt() } else { 0.5 * (a.min + a.max) };
+            off.push(a.value.or(a.off).unwrap_or(middle));
+            parameters.push(EffectParameterSpec {
+                off: a.off,
+                is_log: a.is_log && a.off.is_none(),
+                ..EffectParameterSpec::strength(name, &a.unit, a.min..=a.max)
+            });
+        }
+        let place = (all.first().copied().unwrap_or(0), stages[all[0]].name.as_str());
+        let mut spec = EffectSpec::new(&effect.name, place, parameters);
+        spec.touches = all;
+        spec.twins.clone_from(&effect.twins);
+        shift_starts(&mut spec);
+        if !effect.is_standing() {
+            specs.push((Acting::Own(first), spec));
+        }
+    }
+    Ok((specs, off))
+}
+
+/// Starts of strengths whose off value is not 0 are shares of the way from there.
+fn shift_starts(spec: &mut EffectSpec) {
+    let points = |p: &EffectParameterSpec| match p.off {
+        Some(off) if off != 0.0 => {
+            let ends = [p.min, p.max].into_iter().filter(|end| (end - off).abs() > 0.0);
+            Some(ends.flat_map(|end| [0.05, 0.2, 0.6].map(|k| off + k * (end - off))).collect())
+        }
+        _ => None,
+    };
+    let is_shifted = spec.parameters.iter().any(|p| points(p).is_some());
+    if !is_shifted {
+        return;
+    }
+    let plain = |p: &EffectParameterSpec| -> Vec<f64> {
+        let alone = EffectSpec::new("", (0, ""), vec![p.clone()]);
+        alone.starts.into_iter().map(|s| s[0]).collect()
+    };
+    spec.starts = spec.parameters.iter().fold(vec![Vec::new()], |starts, p| {
+        let points: Vec<f64> = points(p).unwrap_or_else(|| plain(p));
+        let with = |s: &Vec<f64>, x: &f64| [s.as_slice(), &[*x]].concat();
+        starts.iter().flat_map(|s| points.iter().map(move |x| with(s, x))).collect()
+    });
+}

@@ -1,0 +1,215 @@
+//! Candidate experiments on a user's own simulator, and what a model foretells of each.
+//!
+//! A candidate moves one input over the range in which it was measured, for as long as the first trial lasted; the others rest at their
+//! median. The simulator is asked for it as for any altered input, so that whatever takes these can foretell experiments.
+
+use std::{
+    collections::hash_map::DefaultHasher,
+    hash::{Hash, Hasher},
+};
+
+use stretch_data::{Channel, Trial};
+use stretch_gap::{GapError, Laboratory, Model, Plan, Run, Simulator};
+
+use super::{BlackBox, source::SourceError};
+use crate::{
+    bench::{
+        courses::{course, moving},
+        ends::ends,
+    },
+    wrap::{Beside, Side},
+};
+
+/// Most inputs that candidates move.
+const MOVED: usize = 3;
+/// Minutes to prepare a candidate.
+const PREPARE_MIN: f64 = 0.25;
+/// Least noise of an output, a share of what it spans.
+const LEAST_NOISE: f64 = 1e-6;
+
+/// What drives the simulator from outside, by column, for the samples of the first trial.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Course(Vec<(String, Vec<f64>)>);
+
+impl Course {
+    fn of(&self, column: &str) -> Option<&[f64]> {
+        let own = self.0.iter().find(|(name, _)| name == column);
+        own.map(|(_, values)| values.as_slice())
+    }
+
+    fn plan(&self, (name, how): (String, String), dt_s: f64) -> Plan {
+        let channel = |(name, values): &(String, Vec<f64>)| Channel {
+            name: name.clone(),
+            values: values.clone(),
+        };
+        let samples = self.0.first().map_or(0, |(_, values)| values.len());
+        let trial = Trial {
+            name: name.clone(),
+            time_s: (0..samples).map(|i| i as f64 * dt_s).collect(),
+            channels: self.0.iter().map(channel).collect(),
+        };
+        Plan { name, how, prepare_min: PREPARE_MIN, trial }
+    }
+}
+
+/// An input that comes from outside: its name, its range and its median where it may be looked at.
+struct Driven {
+    name: String,
+    range: (f64, f64),
+    median: f64,
+}
+
+impl BlackBox {
+    /// Inputs that are no output of a stage.
+    fn driven(&self) -> Vec<Driven> {
+        let session = self.problem.session();
+        let is_output = |name: &str| session.stages.iter().any(|s| s.output == name);
+        let mut out: Vec<Driven> = Vec::new();
+        for name in session.stages.iter().flat_map(|s| &s.inputs) {
+            if is_output(name) || out.iter().any(|d| d.name == *name) {
+                continue;
+            }
+            let column = self.problem.columns.of(name).unwrap_or(&[]);
+            let looked = self.problem.columns.looked_at();
+            let mut values: Vec<f64> =
+                looked.iter().flat_map(|r| &column[r.clone()]).copied().collect();
+            if values.is_empty() {
+                continue;
+            }
+            let range = ends(&values);
+            let middle = values.len() / 2;
+            let median = *values.select_nth_unstable_by(middle, f64::total_cmp).1;
+            out.push(Driven { name: name.clone(), range, median });
+        }
+        out
+    }
+
+    /// All inputs at rest but one, which goes through shares of its range.
+    fn moved(&self, all: &[Driven], moved: Option<(usize, &[f64])>) -> Course {
+        let samples = self.problem.session().samples(1);
+        let one = |(at, d): (usize, &Driven)| {
+            let values = match moved.filter(|(own, _)| *own == at) {
+                Some((_, shares)) => {
+                    let (low, high) = d.range;
+                    let last = shares.last().copied().unwrap_or(0.0);
+                    let share = |i| shares.get(i).copied().unwrap_or(last);
+                    (0..samples).map(|i| low + (high - low) * share(i)).collect()
+                }
+                None => vec![d.median; samples],
+            };
+            (d.name.clone(), values)
+        };
+        Course(all.iter().enumerate().map(one).collect())
+    }
+
+    /// What drives a stage in an experiment in which the stages before it gave `outputs`.
+    fn inputs_in(
+        &self,
+        stage: usize,
+        course: &Course,
+        outputs: &[Vec<f64>],
+    ) -> Result<Vec<Vec<f64>>, GapError> {
+        let session = self.problem.session();
+        let of = |column: &String| {
+            let before = session.stages[..stage].iter().position(|s| s.output == *column);
+            let known = course.of(column).or(before.map(|at| outputs[at].as_slice()));
+            known.map(<[f64]>::to_vec).ok_or_else(|| {
+                let stage = &session.stages[stage].name;
+                let why = format!("{stage} is driven by {column}, the output of a later stage");
+                GapError::simulator(SourceError::Refused(why))
+            })
+        };
+        session.stages[stage].inputs.iter().map(of).collect()
+    }
+
+    /// Wrappers that stand around a stage in an experiment, on one of its sides, with their values.
+    fn around<'a>(
+        &'a self,
+        run: &Run<'a>,
+        side: Side,
+    ) -> Result<Vec<(usize, &'a Vec<f64>)>, GapError> {
+        let all = self.acting(run, side);
+        let unforetold = |(at, _): &&(usize, &Vec<f64>)| {
+            matches!(self.problem.wrappers[*at].kind.beside, Beside::Velocity | Beside::Another)
+        };
+        match all.iter().find(unforetold) {
+            Some((at, _)) => {
+                let name = &self.problem.wrappers[*at].name;
+                let why = format!("{name} looks at a column that no experiment foretells");
+                Err(GapError::simulator(SourceError::Refused(why)))
+            }
+            None => Ok(all),
+        }
+    }
+}
+
+impl Laboratory for BlackBox {
+    type Setting = Course;
+
+    fn menu(&self) -> Vec<(Plan, Course)> {
+        let all = self.driven();
+        let dt_s = self.description().dt_s;
+        let lasts_s = self.problem.session().samples(1) as f64 * dt_s;
+        if all.is_empty() || !self.runs.takes_inputs() {
+            return Vec::new();
+        }
+        let mut menu = Vec::new();
+        for (at, d) in all.iter().enumerate().filter(|(_, d)| d.range.0 < d.range.1).take(MOVED) {
+            for (name, how, points) in moving() {
+                let whole_s: f64 = points.iter().skip(1).map(|(_, seconds)| seconds).sum();
+                let scaled: Vec<(f64, f64)> =
+                    points.iter().map(|(share, s)| (*share, s * lasts_s / whole_s)).collect();
+                let setting = self.moved(&all, Some((at, &course(&scaled, dt_s))));
+                let (name, how) = match all.len() {
+                    1 => (name.to_owned(), how.to_owned()),
+                    _ => (format!("{name} of {}", d.name), format!("{how} By {}.", d.name)),
+                };
+                menu.push((setting.plan((name, how), dt_s), setting));
+            }
+        }
+        let rest = self.moved(&all, None);
+        let how = "Leave all inputs at their median: what changes does not come from motion.";
+        menu.push((rest.plan(("rest".to_owned(), how.to_owned()), dt_s), rest));
+        menu
+    }
+
+    /// The first trial.
+    fn done(&self) -> Course {
+        let samples = self.problem.session().samples(1);
+        let measured = |d: Driven| {
+            let column = self.problem.columns.of(&d.name).unwrap_or(&[]);
+            (d.name, column[..samples].to_vec())
+        };
+        Course(self.driven().into_iter().map(measured).collect())
+    }
+
+    fn predict(&self, model: &Model, course: &Course) -> Result<Vec<Vec<f64>>, GapError> {
+        let session = self.problem.session();
+        let trials = self.trials_of();
+        let mut outputs: Vec<Vec<f64>> = Vec::new();
+        for stage in 0..session.stages.len() {
+            let run = Run::exact(stage, model, 1);
+            let mut inputs = self.inputs_in(stage, course, &outputs)?;
+            for (at, values) in self.around(&run, Side::Input)? {
+                let wrapper = &self.problem.wrappers[at];
+                wrapper.act(values, &trials, &mut inputs[wrapper.site.input]);
+            }
+            let mut hasher = DefaultHasher::new();
+            inputs.iter().flatten().for_each(|x| x.to_bits().hash(&mut hasher));
+            let inner = self.driven_by(&run, Some((inputs, vec![u64::MAX, hasher.finish()])));
+            let told = self.runs.outputs(session, &[inner]).pop();
+            let told = told.unwrap_or_else(|| Err(SourceError::Gone("no answer".into())));
+            let mut output = told.map_err(super::refused)?.to_vec();
+            for (at, values) in self.around(&run, Side::Output)? {
+                self.problem.wrappers[at].act(values, &trials, &mut output);
+            }
+            outputs.push(output);
+        }
+        for (stage, output) in outputs.iter_mut().enumerate() {
+            let (low, high) = ends(self.measured(stage));
+            let noise = self.problem.noise[stage].max(LEAST_NOISE * (high - low));
+            output.iter_mut().for_each(|y| *y /= noise);
+        }
+        Ok(outputs)
+    }
+}

@@ -1,0 +1,136 @@
+//! A user's own problem with what a diagnosis found of it.
+
+use stretch_data::Remarks;
+use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, Simulator, next_experiment};
+
+use super::{Agreed, BlackBox, agreed, catalogue::Acting, spec::Wrapped};
+use crate::{
+    file::{ProblemFile, SimulatorEntry},
+    fix::{Chosen, Fix, Fixed, Meaning, NoFix},
+    implement::Implementation,
+    problem::Diagnosable,
+};
+
+/// What an argument of the simulator's own is called where its equation stands.
+const OWN: (&str, &str) = ("an effect that the simulator has itself", "arguments of the simulator");
+
+impl BlackBox {
+    /// What an effect of the catalogue is.
+    fn meaning(&self, effect: usize) -> Meaning<'_> {
+        let name = self.description().effects[effect].name.as_str();
+        match self.problem.wrapper(effect) {
+            Some(kind) => Meaning { name, words: kind.words, equation: kind.equation },
+            None => Meaning { name, words: OWN.0, equation: OWN.1 },
+        }
+    }
+
+    /// The problem as a file: the one that it was read from, or one that says what is in memory.
+    fn as_file(&self) -> ProblemFile {
+        let spec = self.problem.spec.clone();
+        match &self.file {
+            Some(file) => ProblemFile { spec, ..file.clone() },
+            None => ProblemFile {
+                name: "problem".into(),
+                folder: ".".into(),
+                simulator: SimulatorEntry::Caller,
+                spec,
+                trials: Vec::new(),
+                time: "time_s".into(),
+                budget: self.runs.budget(),
+            },
+        }
+    }
+
+    /// Gives an effect that was found its values in every run from now on.
+    fn add(&self, file: &mut ProblemFile, effect: usize, values: &[f64]) {
+        let spec = &self.description().effects[effect];
+        let named = || spec.parameters.iter().map(|p| p.name.clone()).zip(values.iter().copied());
+        match self.problem.acting[effect] {
+            Acting::Own(_) => {
+                let own = file.spec.effects.iter_mut().find(|own| own.name == spec.name);
+                let arguments = own.into_iter().flat_map(|own| &mut own.arguments);
+                arguments.zip(values).for_each(|(a, value)| a.value = Some(*value));
+            }
+            Acting::Wrapper(_) | Acting::Recorder => {
+                let (name, values) = (spec.name.clone(), named().collect());
+                file.spec.wrapped.push(Wrapped { name, values });
+            }
+        }
+    }
+}
+
+impl Diagnosable for BlackBox {
+    fn notes(&self) -> Vec<String> {
+        self.problem.notes().to_vec()
+    }
+
+    /// What the source says of its runs, and what it refused.
+    fn afterwards(&self) -> Vec<String> {
+        let mut notes = self.runs.notes();
+        let refused = self.runs.refused();
+        if let Some(first) = refused.first() {
+            notes.push(format!(
+                "{} of {} model runs gave no output and took their candidate out; the first: {first}",
+                refused.len(),
+                self.runs.count()
+            ));
+        }
+        notes
+    }
+
+    fn families(&self, diagnosis: &Diagnosis) -> Vec<Agreed> {
+        agreed(&self.problem, diagnosis)
+    }
+
+    fn next(
+        &self,
+        diagnosis: &Diagnosis,
+        evidence: &Evidence,
+    ) -> Result<Option<Proposal>, GapError> {
+        match next_experiment(self, diagnosis, evidence) {
+            // Where the runs are spent, or a model cannot be run on other inputs, nothing is foretold.
+            Err(GapError::Simulator(_)) => Ok(None),
+            told => told,
+        }
+    }
+
+    fn implementations(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
+        let Ok(chosen) = Chosen::of(diagnosis, evidence) else { return Vec::new() };
+        let one = |(effect, _): (usize, &[f64])| {
+            let Meaning { name, words, equation } = self.meaning(effect);
+            Implementation {
+                name: name.to_owned(),
+                words: words.to_owned(),
+                stage: self.description().effects[effect].stage.clone(),
+                formula: equation.to_owned(),
+                numbers: chosen.numbers(name),
+                sketch: None,
+            }
+        };
+        chosen.named(&self.description().effects).into_iter().map(one).collect()
+    }
+
+    fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
+        let chosen = Chosen::of(diagnosis, evidence)?;
+        let mut remarks = Remarks { head: chosen.head(), ..Remarks::default() };
+        let mut file = self.as_file();
+        let tuned = file.spec.parameters.iter_mut().zip(&chosen.model.parameters).enumerate();
+        for (index, (parameter, value)) in tuned {
+            if self.description().parameters[index].sd == 0.0 {
+                continue;
+            }
+            let told = chosen.told(index, &parameter.unit, (parameter.value, *value));
+            remarks.parameters.insert(("parameter".into(), parameter.name.clone()), told);
+            parameter.tolerance = chosen.tolerance(index, *value, parameter.tolerance);
+            parameter.value = *value;
+        }
+        let mut effects = Vec::new();
+        for (effect, values) in chosen.effects(&self.description().effects) {
+            let meaning = self.meaning(effect);
+            chosen.tell(meaning, &mut remarks);
+            self.add(&mut file, effect, values);
+            effects.push(meaning.name.to_owned());
+        }
+        Ok(Fix { file: Fixed::Problem(Box::new(file)), effects, remarks })
+    }
+}

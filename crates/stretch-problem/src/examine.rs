@@ -1,0 +1,159 @@
+//! The one flow: a problem is diagnosed, and everything that follows from the diagnosis is made.
+
+use std::fmt;
+
+use serde_json::{Value, json};
+use stretch_data::Trial;
+use stretch_gap::{Costly, Diagnosis, Evidence, GapError, Options, diagnose};
+use stretch_sim::{Quantity, Sketch};
+
+use crate::{
+    black_box::Agreed,
+    fix::{Fix, Fixed, NoFix},
+    implement::Implementation,
+    problem::Problem,
+};
+
+/// A diagnosis, what it was found from, and what follows from it.
+pub struct Examined {
+    /// What the data are called.
+    pub name: String,
+    /// Seed of the intervals.
+    pub seed: u64,
+    /// What was found, with the notes of the record around its own.
+    pub diagnosis: Diagnosis,
+    /// What a report draws.
+    pub evidence: Evidence,
+    /// The experiment that would tell rivals apart, where it was looked for and there is one.
+    pub experiment: Option<Trial>,
+    /// What is named, as something to type.
+    pub implementations: Vec<Implementation>,
+    /// What effects agree on that are not told apart.
+    pub families: Vec<Agreed>,
+    /// The simulator with what was found of it, or why there is no such file.
+    pub fix: Result<Fix, NoFix>,
+}
+
+impl fmt::Debug for Examined {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Examined").field("diagnosis", &self.diagnosis).finish_non_exhaustive()
+    }
+}
+
+impl Problem {
+    /// Diagnoses; with `looks_on` also looks for the experiment that would tell rivals apart, where there are any. `progress` and `stop` as
+    /// [`diagnose`] takes them.
+    ///
+    /// # Errors
+    /// Those of [`diagnose`] and [`next_experiment`](stretch_gap::next_experiment).
+    ///
+    /// ```
+    /// # use stretch_data::{Channel, SessionTrial, Trial};
+    /// # use stretch_problem::{GaugeSetup, GaugeSimulator, Problem};
+    /// # use stretch_gap::Options;
+    /// # use stretch_sim::Catalogue;
+    /// # let rod = |t: f64| 40.0 + 20.0 * (1.3 * t).sin() + 10.0 * (3.1 * t).sin();
+    /// # let time_s: Vec<f64> = (0..4000).map(|i| 0.01 * i as f64).collect();
+    /// # let noise = |i: usize| 1e-3 * ((i * i * 7919) % 1000) as f64 / 1000.0;
+    /// # let channel = |name: &str, values| Channel { name: name.into(), values };
+    /// # let length = time_s.iter().map(|t| rod(*t)).collect();
+    /// # let signal = time_s.iter().enumerate().map(|(i, t)| 0.02 * rod(t - 0.05) + noise(i)).collect();
+    /// # let channels = vec![channel("rod_mm", length), channel("s1", signal)];
+    /// # let trials = [SessionTrial::new(Trial { name: "rod.csv".into(), time_s, channels })];
+    /// # let catalogue = Catalogue::default();
+    /// # let (reference, signal, rig, catalogue) = ("rod_mm", "s1", None, &catalogue);
+    /// let gauge = GaugeSimulator::new(&GaugeSetup { trials: &trials, reference, signal, rig, catalogue })?;
+    /// let examined = Problem::from(gauge).examine(&Options::default(), false, &|_| (), &|| false)?;
+    /// assert_eq!(examined.diagnosis.named, ["channel_skew"]);
+    /// assert_eq!(examined.implementations[0].name, "channel_skew");
+    /// assert_eq!(examined.to_json()["seed"], 1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn examine(
+        &self,
+        options: &Options,
+        looks_on: bool,
+        progress: &(dyn Fn(&str) + Sync),
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Examined, GapError> {
+        let source = self.source();
+        let told = |what: &str| match self.simulator().costly().map(Costly::model_runs) {
+            Some(runs) => progress(&format!("{what} ({} model runs)", runs.count)),
+            None => progress(what),
+        };
+        let (mut diagnosis, evidence) = diagnose(self.simulator(), options, &told, stop)?;
+        let mut proposal = None;
+        if diagnosis.ambiguous.len() > 1 && looks_on {
+            told("the next experiment");
+            proposal = source.next(&diagnosis, &evidence)?;
+        }
+        diagnosis.next_experiment = proposal.as_ref().map(|p| p.next.clone());
+        let families = source.families(&diagnosis);
+        let notes = &mut diagnosis.notes;
+        notes.splice(0..0, source.notes());
+        notes.extend(families.iter().map(Agreed::sentence).chain(source.afterwards()));
+        Ok(Examined {
+            name: self.name.clone(),
+            seed: options.seed,
+            experiment: proposal.map(|p| p.trial),
+            implementations: source.implementations(&diagnosis, &evidence),
+            families,
+            fix: source.fixed(&diagnosis, &evidence),
+            diagnosis,
+            evidence,
+        })
+    }
+}
+
+impl Examined {
+    /// Everything as JSON: the diagnosis in its schema, what it was made from, and what follows from it.
+    ///
+    /// Beside the keys of the diagnosis stand `data_set`, `seed` and `version` of what made it, `implement` (what is named, with equation,
+    /// numbers and initial state), `families`, and `fixed_rig` or `fixed_problem`, the file with what was found; both are null where
+    /// there is none.
+    pub fn to_json(&self) -> Value {
+        // a diagnosis has no key that JSON could not hold
+        let mut value = serde_json::to_value(&self.diagnosis).unwrap_or_default();
+        let fixed = self.fix.as_ref().ok().map(|fix| &fix.file);
+        value["implement"] = self.implementations.iter().map(implementation).collect();
+        value["families"] = self.families.iter().map(family).collect();
+        value["fixed_rig"] = match fixed {
+            Some(Fixed::Rig(rig)) => json!(rig),
+            _ => Value::Null,
+        };
+        value["fixed_problem"] = match fixed {
+            Some(Fixed::Problem(file)) => json!(file.to_toml()),
+            _ => Value::Null,
+        };
+        value["data_set"] = self.name.clone().into();
+        value["seed"] = self.seed.into();
+        value["version"] = env!("CARGO_PKG_VERSION").into();
+        value
+    }
+}
+
+/// A named effect as something to implement.
+fn implementation(one: &Implementation) -> Value {
+    let quantity = |q: &Quantity| json!({ "name": q.name, "unit": q.unit, "meaning": q.meaning });
+    let sketch = one.sketch.as_ref();
+    json!({
+        "effect": one.name,
+        "words": one.words,
+        "stage": one.stage,
+        "equation": one.formula,
+        "numbers": one.numbers,
+        "inputs": sketch.map(|s| s.inputs.iter().map(quantity).collect::<Vec<_>>()),
+        "output": sketch.map(|s| quantity(&s.output)),
+        "state": sketch.and_then(Sketch::initial_state),
+    })
+}
+
+/// What some effects that cannot be told apart agree on.
+fn family(agreed: &Agreed) -> Value {
+    json!({
+        "names": agreed.names,
+        "range": agreed.range,
+        "unit": agreed.unit,
+        "sentence": agreed.sentence(),
+    })
+}

@@ -1,0 +1,196 @@
+//! One problem: a simulator beside one session of recordings, whatever simulates.
+
+use std::{
+    fmt::Debug,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use stretch_data::DataSet;
+use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, Simulator};
+use stretch_sim::Catalogue;
+
+use crate::{
+    black_box::{Agreed, BlackBox, Checked},
+    error::ProblemError,
+    file::{ProblemFile, SimulatorEntry},
+    fix::{Fix, NoFix},
+    gauge::GaugeSimulator,
+    implement::Implementation,
+    rig::RigSimulator,
+    worker::Workers,
+};
+
+/// A simulator beside its recordings: everything that [`Problem::examine`] asks of it. A new kind of simulator implements this.
+pub trait Diagnosable: Simulator + Debug + Send {
+    /// What was done to the recordings, and what is not looked for, in sentences.
+    fn notes(&self) -> Vec<String>;
+
+    /// What there is to say once it was diagnosed, in sentences.
+    fn afterwards(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// What effects agree on that a diagnosis cannot tell apart.
+    fn families(&self, _diagnosis: &Diagnosis) -> Vec<Agreed> {
+        Vec::new()
+    }
+
+    /// The experiment that would tell the rivals of a diagnosis apart; none where there is none, or the simulator foretells none.
+    ///
+    /// # Errors
+    /// What the simulator says.
+    fn next(
+        &self,
+        diagnosis: &Diagnosis,
+        evidence: &Evidence,
+    ) -> Result<Option<Proposal>, GapError>;
+
+    /// What a diagnosis names, as something to type.
+    fn implementations(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation>;
+
+    /// The simulator with what was found of it, as a file.
+    ///
+    /// # Errors
+    /// Why there is no such file.
+    fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix>;
+}
+
+/// A simulator beside one session of recordings, ready to be [examined](Problem::examine).
+#[derive(Debug)]
+pub struct Problem {
+    /// What the data are called.
+    pub name: String,
+    source: Box<dyn Diagnosable>,
+    /// Files that must not be written over.
+    read: Vec<PathBuf>,
+}
+
+impl<S: Diagnosable + 'static> From<S> for Problem {
+    fn from(source: S) -> Self {
+        Self { name: "data".to_owned(), source: Box::new(source), read: Vec::new() }
+    }
+}
+
+/// How a problem is read from a path.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Reading<'a> {
+    /// Rig file in place of the data's own.
+    pub rig: Option<&'a Path>,
+    /// Columns of reference and signal: of a gauge alone, or of a stage that is a sensor.
+    pub columns: Option<(&'a str, &'a str)>,
+    /// Effects that are not looked for.
+    pub without: &'a [String],
+    /// Workers at once, where the problem's file does not say.
+    pub jobs: usize,
+    /// Most runs of a simulator that is not built in.
+    pub budget: Option<usize>,
+}
+
+impl Problem {
+    /// Reads what stands at a path: the folder of a data set, a trial of a gauge alone (`-` is standard input), or a problem's file. The
+    /// workers of a simulator that is not built in are started.
+    ///
+    /// # Errors
+    /// Files that cannot be read, names that stand for nothing, and options that mean nothing to the simulator.
+    pub fn read(path: &Path, reading: &Reading<'_>) -> Result<Self, ProblemError> {
+        let Some(file) = ProblemFile::at(path)? else { return Self::built_in(path, reading) };
+        let (data_set, rig, columns) = match &file.simulator {
+            SimulatorEntry::Rig { data_set, rig } => (data_set, rig, &None),
+            SimulatorEntry::Gauge { data_set, rig, columns } => (data_set, rig, columns),
+            _ => return Self::of_file(path, file, reading),
+        };
+        let rig = rig.as_ref().map(|rig| file.folder.join(rig));
+        let own = columns.as_ref().map(|(reference, signal)| (reference.as_str(), signal.as_str()));
+        let reading = Reading {
+            rig: reading.rig.or(rig.as_deref()),
+            columns: reading.columns.or(own),
+            ..*reading
+        };
+        let mut problem = Self::built_in(&file.folder.join(data_set), &reading)?;
+        problem.read.push(path.to_owned());
+        Ok(problem)
+    }
+
+    /// A data set's folder, or a trial.
+    fn built_in(path: &Path, reading: &Reading<'_>) -> Result<Self, ProblemError> {
+        if reading.budget.is_some() {
+            let hint = "the built-in ones need none";
+            return Err(no_option("--budget", "it counts runs of a simulator of your own", hint));
+        }
+        let Reading { rig, columns, .. } = *reading;
+        let catalogue = Catalogue::default().without(reading.without)?;
+        let source: Box<dyn Diagnosable> = match GaugeSimulator::read(
+            path, columns, rig, &catalogue,
+        )? {
+            Some(gauge) => Box::new(gauge),
+            None if path.is_dir() => Box::new(RigSimulator::read(path, rig, &catalogue)?),
+            None => {
+                return Err(ProblemError::TooLittle {
+                        what: "a single trial is diagnosed as a gauge alone".into(),
+                        hint: "say which columns with --reference and --signal, or give the folder of a data set".into(),
+                    });
+            }
+        };
+        let own = DataSet::read(path).ok().and_then(|set| set.rig).map(|file| path.join(file));
+        let read = [Some(path.to_owned()), rig.map(Path::to_owned), own];
+        Ok(Self { name: name_of(path), source, read: read.into_iter().flatten().collect() })
+    }
+
+    /// A simulator that is not built in, behind its workers.
+    fn of_file(
+        path: &Path,
+        mut file: ProblemFile,
+        reading: &Reading<'_>,
+    ) -> Result<Self, ProblemError> {
+        if reading.rig.is_some() {
+            let hint = "its parameters stand in the problem's file";
+            return Err(no_option("--rig", "it is for the built-in simulators", hint));
+        }
+        file.spec.set_sensor(reading.columns);
+        file.spec.without.extend(reading.without.iter().cloned());
+        file.budget = reading.budget.or(file.budget);
+        let workers = file.workers(reading.jobs)?;
+        let workers = workers.ok_or_else(|| ProblemError::Simulator("it is built in".into()))?;
+        let checked = Checked::new(file.load()?)?;
+        let source = Workers::start(workers, checked.session())?;
+        let name = file.name.clone();
+        let own = BlackBox::within(checked, Arc::new(source), file.budget).from_file(file);
+        Ok(Self { name, source: Box::new(own), read: vec![path.to_owned()] })
+    }
+
+    /// The same under another name.
+    pub fn named(self, name: impl Into<String>) -> Self {
+        Self { name: name.into(), ..self }
+    }
+
+    /// The simulator beside its measurements.
+    pub fn simulator(&self) -> &dyn Simulator {
+        &*self.source
+    }
+
+    /// The same with all that is asked of it.
+    pub(crate) fn source(&self) -> &dyn Diagnosable {
+        &*self.source
+    }
+
+    /// Whether a path is one of the files that it was read from.
+    pub fn is_read_from(&self, path: &Path) -> bool {
+        let real = |path: &Path| path.canonicalize().ok();
+        let real_path = real(path);
+        real_path.is_some() && self.read.iter().any(|file| real(file) == real_path)
+    }
+}
+
+fn no_option(option: &str, found: &str, hint: &str) -> ProblemError {
+    ProblemError::value(option, found, hint)
+}
+
+/// What data are called: the folder's or the file's name.
+pub fn name_of(path: &Path) -> String {
+    if path.as_os_str() == "-" {
+        return "standard input".to_owned();
+    }
+    let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    real.file_stem().unwrap_or(real.as_os_str()).to_string_lossy().into_owned()
+}

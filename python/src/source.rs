@@ -53,6 +53,7 @@ pub(crate) struct Asked<T> {
     pub(crate) desk: Sender<Message<T>>,
     pub(crate) answers_all: bool,
     pub(crate) batch: usize,
+    pub(crate) takes_inputs: bool,
 }
 
 fn gone() -> SourceError {
@@ -80,6 +81,10 @@ impl<T: Send> Source for Asked<T> {
 
     fn answers_all(&self) -> bool {
         self.answers_all
+    }
+
+    fn takes_inputs(&self) -> bool {
+        self.takes_inputs
     }
 
     fn batch(&self) -> usize {

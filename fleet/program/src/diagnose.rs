@@ -13,7 +13,7 @@ use datafusion::{
 };
 use stretch_data::{Channel, SessionTrial, Trial};
 use stretch_gap::{Diagnosis, Options};
-use stretch_problem::{Bench, GaugeSetup, GaugeSimulator, RigSession, RigSetup, RigSimulator};
+use stretch_problem::{GaugeSetup, GaugeSimulator, Problem, RigSession, RigSetup, RigSimulator};
 use stretch_sim::{Catalogue, Rig};
 
 use crate::{
@@ -158,7 +158,7 @@ fn verdict(lake: &Lake, files: &[&LakeFile], args: &Args) -> anyhow::Result<Diag
     let options = Options { threads: args.threads, seed: args.seed, ..Options::default() };
     let catalogue = Catalogue::default();
     let is_rig = trials.iter().all(|t| t.trial.channel("inlet").is_some());
-    let bench: Bench = if is_rig {
+    let problem: Problem = if is_rig {
         let (session, rig) = (RigSession::new(&trials)?, Rig::default());
         RigSimulator::new(RigSetup { session, rig, catalogue: &catalogue })?.into()
     } else {
@@ -171,7 +171,7 @@ fn verdict(lake: &Lake, files: &[&LakeFile], args: &Args) -> anyhow::Result<Diag
         };
         GaugeSimulator::new(&setup)?.into()
     };
-    Ok(bench.examine(&options, false, &|_| (), &stretch_files::interrupted)?.diagnosis)
+    Ok(problem.examine(&options, false, &|_| (), &stretch_files::interrupted)?.diagnosis)
 }
 
 /// A trial as it was recorded: samples that were lost are lost again.

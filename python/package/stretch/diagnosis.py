@@ -20,10 +20,17 @@ from .simulator import Asked
 class Diagnosis:
     """What is missing in a simulator, how sure that is, where it sits, and how far naming it closes the gap."""
 
-    def __init__(self, told: dict[str, Any], page: str = "", curves: Mapping[str, Sequence[Array]] | None = None) -> None:
+    def __init__(
+        self,
+        told: dict[str, Any],
+        page: str = "",
+        curves: Mapping[str, Sequence[Array]] | None = None,
+        experiment: Mapping[str, Array] | None = None,
+    ) -> None:
         self._told = told
         self._page = page
         self._curves = curves or {}
+        self._experiment = experiment
 
     @staticmethod
     def from_json(text: str) -> Diagnosis:
@@ -100,6 +107,12 @@ class Diagnosis:
     def families(self) -> list[dict[str, Any]]:
         """Effects that these data cannot tell apart, with what they agree on: "late by 0.10 .. 0.14 s"."""
         return list(self._told.get("families", []))
+
+    @property
+    def next_experiment(self) -> dict[str, Any] | None:
+        """The experiment that would tell rivals apart, where it was looked for: name, why, minutes, and `columns` to command."""
+        found = self._told.get("next_experiment")
+        return {**found, "columns": dict(self._experiment or {})} if found else None
 
     @property
     def proposed(self) -> dict[str, Any] | None:
@@ -194,6 +207,9 @@ def diagnose(
     velocity: str | None = None,
     position: str | None = None,
     beside: Sequence[str] = (),
+    without: Sequence[str] = (),
+    reference: str | None = None,
+    experiment: bool = False,
     budget: int | None = None,
     depth: int = 4,
     seed: int = 1,
@@ -219,7 +235,9 @@ def diagnose(
     several. `velocity` or `position` is the column by which friction rubs. `parameters` by name: a `Parameter`,
     `(value, tolerance)` or an exact number. `effects` that the simulator has itself: an `Effect`, an `Argument`, `(least,
     greatest)`, or `(least, greatest, off)`. `wrap`: effects around the simulator, as `"input.delay"`, `"output.backlash"`,
-    or all of them. `units` and `noise` by column. `budget` is the most models that may be run.
+    or all of them; `without` leaves some out, by name or by kind. `units` and `noise` by column. `reference` is the column that
+    the output senses: what a calibration of it loses by the gap is told then. With `experiment` the next one is looked for that
+    would tell rivals apart, where the simulator takes `inputs`. `budget` is the most models that may be run.
     """
     asked = None if simulator is None else Asked(simulator)
     notes: list[str] = []
@@ -243,19 +261,20 @@ def diagnose(
             wrappers, noise_in = _behind(wrappers, driven, notes), {}
         else:
             noise_in = dict(noise)
-        checked = _stretch.Problem(
-            {
-                "stages": [entries.stage(one, i, units, noise) for i, one in enumerate(listed)],
-                "inputs": [(c, units.get(c, ""), float(noise_in.get(c, 0.0))) for c in driven],
-                "parameters": [entries.parameter(key, value) for key, value in (parameters or {}).items()],
-                "effects": [entries.effect(key, value) for key, value in (effects or {}).items()],
-                "wrap": wrappers,
-                "beside": list(beside),
-                "trials": entries.recorded(data, rate_hz, entries.wanted(listed, beside)),
-            }
-        )
+        problem = {
+            "stages": [entries.stage(one, i, units, noise) for i, one in enumerate(listed)],
+            "inputs": [{"column": c, "unit": units.get(c, ""), "noise": float(noise_in.get(c, 0.0))} for c in driven],
+            "parameters": [entries.parameter(key, value) for key, value in (parameters or {}).items()],
+            "effects": [entries.effect(key, value) for key, value in (effects or {}).items()],
+            "wrap": wrappers,
+            "without": list(without),
+            "beside": list(beside),
+            "sensor": {"reference": reference, "signal": output or listed[-1].output} if reference else None,
+        }
+        wanted = entries.wanted(listed, [*beside, *([reference] if reference else [])])
+        checked = _stretch.Problem(json.dumps(problem), entries.recorded(data, rate_hz, wanted))
     if asked is not None:
-        asked.bind(checked)
+        asked.bind({**json.loads(checked.session), "columns": checked.columns})
     how = {
         "name": name,
         "depth": depth,
@@ -265,11 +284,13 @@ def diagnose(
         "budget": budget,
         "batch": 1 if asked is None else asked.batch,
         "answers_all": asked is not None and asked.answers_all,
+        "takes_inputs": asked is None or asked.takes_inputs,
+        "experiment": experiment,
     }
-    text, page, curves = checked.diagnose(asked, how, progress)
+    text, page, curves, trial = checked.diagnose(asked, json.dumps(how), progress)
     told = json.loads(text)
     told["notes"] = notes + told["notes"]
-    return Diagnosis(told, page, curves)
+    return Diagnosis(told, page, curves, trial)
 
 
 def _behind(wrappers: list[str], driven: list[str], notes: list[str]) -> list[str]:

@@ -154,12 +154,12 @@ def parameter(name: str, given: ParameterLike) -> dict[str, Any]:
         given = Parameter(*given)
     elif not isinstance(given, Parameter):
         given = Parameter(float(given))
+    share = None if given.relative is None else f"{100.0 * given.relative!r} %"
     return {
         "name": name,
         "unit": given.unit,
         "value": float(given.value),
-        "tolerance": given.tolerance,
-        "relative": given.relative,
+        "tolerance": share if given.tolerance is None else float(given.tolerance),
         "least": given.least,
         "greatest": given.greatest,
         "stages": list(given.stages),

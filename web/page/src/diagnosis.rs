@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use stretch_gap::Options;
 use stretch_problem::{
-    Bench, Examined, Fix, GaugeSetup, GaugeSimulator, NoFix, RigSetup, RigSimulator, Session,
+    Examined, GaugeSetup, GaugeSimulator, Problem, RigSession, RigSetup, RigSimulator,
 };
 use stretch_report::{Subject, diagnosis_page};
 use stretch_sim::{Catalogue, GaugeRig, Rig};
@@ -36,9 +36,7 @@ fn first() -> u64 {
 /// What was found.
 #[derive(Debug)]
 pub(crate) struct Found {
-    name: String,
-    seed: u64,
-    bench: Bench,
+    problem: Problem,
     examined: Examined,
 }
 
@@ -56,12 +54,12 @@ pub(crate) struct Told<'a> {
 
 impl Found {
     pub(crate) fn of(files: &Files, asked: &Asked) -> Result<Self, Said> {
-        let bench = bench(files, asked)?;
+        let problem = problem(files, asked)?.named(files.name());
         let options = Options { seed: asked.seed, responses: true, ..Options::default() };
         let begun_ms = now();
-        let mut examined = bench.examine(&options, true, &progress, &|| false)?;
+        let mut examined = problem.examine(&options, true, &progress, &|| false)?;
         examined.diagnosis.runtime_s = 1e-3 * (now() - begun_ms);
-        Ok(Self { name: files.name(), seed: asked.seed, bench, examined })
+        Ok(Self { problem, examined })
     }
 
     pub(crate) fn told(&self) -> Told<'_> {
@@ -71,42 +69,32 @@ impl Found {
             notes: &self.examined.diagnosis.notes,
             seconds: self.examined.diagnosis.runtime_s,
             candidates: self.examined.diagnosis.candidates.iter().map(one).collect(),
-            no_rig: self.fix().err().map(|why| why.to_string()),
+            no_rig: self.examined.fix.as_ref().err().map(ToString::to_string),
         }
     }
 
     pub(crate) fn report(&self) -> String {
-        let Examined { diagnosis, evidence, implementations, .. } = &self.examined;
-        let simulator = self.bench.simulator();
-        let name = &self.name;
-        diagnosis_page(&Subject { name, diagnosis, evidence, implementations, simulator })
+        diagnosis_page(&Subject::of(&self.problem, &self.examined))
     }
 
     /// The diagnosis as `stretch calibrate --from` reads it.
     pub(crate) fn json(&self) -> Result<String, Said> {
-        let mut value = serde_json::to_value(&self.examined.diagnosis)?;
-        value["data_set"] = self.name.clone().into();
-        value["seed"] = self.seed.into();
-        value["version"] = env!("CARGO_PKG_VERSION").into();
-        Ok(serde_json::to_string_pretty(&value)? + "\n")
+        Ok(serde_json::to_string_pretty(&self.examined.to_json())? + "\n")
     }
 
     pub(crate) fn fixed_rig(&self) -> Result<String, Said> {
-        Ok(self.fix()?.text())
-    }
-
-    fn fix(&self) -> Result<Fix, NoFix> {
-        self.bench.fixed(&self.examined)
+        let fix = self.examined.fix.as_ref().map_err(|why| Said(why.to_string()))?;
+        Ok(fix.text("rig.toml".as_ref()))
     }
 }
 
 /// What was dropped, as something to diagnose.
-fn bench(files: &Files, asked: &Asked) -> Result<Bench, Said> {
+fn problem(files: &Files, asked: &Asked) -> Result<Problem, Said> {
     let (session, catalogue) = (files.session()?, Catalogue::default());
     let file = files.rig()?;
     if !asked.alone {
         let rig = file.map(Rig::from_file).transpose()?.unwrap_or_default();
-        let session = Session::new(&session)?;
+        let session = RigSession::new(&session)?;
         let setup = RigSetup { session, rig, catalogue: &catalogue };
         return Ok(RigSimulator::new(setup)?.into());
     }

@@ -122,7 +122,7 @@ impl BlackBox {
     }
 
     /// Says which file it was read from: a [fix](crate::Fix) is that file with what was found.
-    pub(crate) fn from_file(self, file: ProblemFile) -> Self {
+    pub fn from_file(self, file: ProblemFile) -> Self {
         Self { file: Some(file), ..self }
     }
 

@@ -102,6 +102,12 @@ pub(super) fn read_hello(frame: &Frame, session: &Session) -> Result<Hello, Wron
 
 /// What a worker has to know once.
 pub(super) fn session(session: &Session) -> Vec<u8> {
+    let body: Vec<f64> = session.columns.iter().flat_map(|c| c.values.iter().copied()).collect();
+    Frame::bytes(&session_header(session), &body)
+}
+
+/// What a simulator has to know once, the values of the columns apart: the header of the frame `session`.
+pub fn session_header(session: &Session) -> Value {
     let trials = session
         .trials
         .iter()
@@ -111,7 +117,7 @@ pub(super) fn session(session: &Session) -> Vec<u8> {
         .iter()
         .map(|s| json!({ "inputs": s.inputs, "name": s.name, "output": s.output }));
     let columns = session.columns.iter().map(|c| json!({ "name": c.name, "unit": c.unit }));
-    let header = json!({
+    json!({
         "columns": columns.collect::<Vec<_>>(),
         "dt_s": session.dt_s,
         "effects": session.effects,
@@ -119,9 +125,7 @@ pub(super) fn session(session: &Session) -> Vec<u8> {
         "parameters": session.parameters,
         "stages": stages.collect::<Vec<_>>(),
         "trials": trials.collect::<Vec<_>>(),
-    });
-    let body: Vec<f64> = session.columns.iter().flat_map(|c| c.values.iter().copied()).collect();
-    Frame::bytes(&header, &body)
+    })
 }
 
 /// What a worker has to say of a session: `notes`, a list of sentences, which may be left out.

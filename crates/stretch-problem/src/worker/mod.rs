@@ -9,4 +9,5 @@ mod pool;
 mod process;
 
 pub use frame::{Frame, FrameError, PREFIX, Prefix};
+pub use message::session_header;
 pub use pool::{Workers, WorkersSpec};

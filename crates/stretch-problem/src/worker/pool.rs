@@ -19,8 +19,8 @@ use crate::{
     error::ProblemError,
 };
 
-/// The worker for Python objects.
-const SHIM: &str = include_str!("shim.py");
+/// The worker for Python objects: how a simulator is called, as the Python package calls it, and the frames around that.
+const SHIM: &str = concat!(include_str!("calling.py"), include_str!("serving.py"));
 
 /// What workers are started by.
 #[derive(Debug, Clone, PartialEq)]

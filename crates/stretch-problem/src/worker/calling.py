@@ -1,0 +1,212 @@
+"""How a simulator in Python is called: the wheel calls one that it was handed, a worker one that a problem's file names.
+
+An object has a method `simulate(params[n, p], effects[n, e]) -> [n, samples]`, asked for many models at once (at most its attribute `batch`);
+a function takes two dicts for one model and returns `[samples]`. Both may take by keyword `inputs` (every column by name, those that drive
+the stage as they were altered), `trials` (name, slice and start_s of each that is asked for) and `stage`; `**kw` takes all of them. With
+several outputs a simulator that does not take `stage` returns a dict of arrays by output. A method `begin(session)` is told once what stays
+the same.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from ._stretch import StretchError
+else:
+    try:
+        from ._stretch import StretchError
+    except ImportError:  # a worker is started from this text alone
+
+        class StretchError(ValueError):
+            """What is wrong with the simulator, in a sentence."""
+
+
+Array = NDArray[np.float64]
+
+BATCH = 64
+"""Models that are asked for at once where the simulator does not say how many (its attribute `batch`)."""
+
+
+class Named(np.ndarray[Any, np.dtype[np.float64]]):
+    """An array `[n, names]` whose columns go by name, too: `effects["delay_s"]` is one number for each model."""
+
+    names: tuple[str, ...]
+
+    @classmethod
+    def of(cls, array: Array, names: Sequence[str]) -> Named:
+        """The array with names for its columns."""
+        named = array.view(cls)
+        named.names = tuple(names)
+        return named
+
+    def __array_finalize__(self, other: Any) -> None:
+        # whatever is made of it has its names, but means them only where it is still the whole table
+        self.names = getattr(other, "names", ())
+
+    def __getitem__(self, at: Any) -> Any:
+        if not isinstance(at, str):
+            return np.asarray(self)[at]
+        if at not in self.names:
+            raise KeyError(f"there is no {at}; there are {', '.join(self.names) or 'none'}")
+        return np.asarray(self)[:, self.names.index(at)]
+
+
+@dataclass(frozen=True)
+class TrialSpan:
+    """A trial among the samples of all trials end to end."""
+
+    name: str
+    samples: slice
+    start_s: float
+    """Session time of its first sample, s."""
+
+
+class Asked:
+    """Turns what the diagnosis asks into calls of the user's simulator, and checks what comes back."""
+
+    def __init__(self, simulator: Any) -> None:
+        method = getattr(simulator, "simulate", None)
+        self.many = callable(method)
+        if not self.many and not callable(simulator):
+            raise StretchError(
+                f"the simulator is a {type(simulator).__name__}; give an object with a method "
+                "simulate(params[n, p], effects) -> [n, samples], or a function of one model, "
+                "f(params, effects) -> [samples]"
+            )
+        self.simulator = simulator
+        self.call: Callable[..., Any] = method if self.many else simulator  # type: ignore[assignment]
+        self.batch = max(1, int(getattr(simulator, "batch", BATCH))) if self.many else 1
+        self.optional = self._optional()
+
+    def _optional(self) -> set[str]:
+        """Which of the arguments that may be left out the simulator takes."""
+        known = {"inputs", "trials", "stage"}
+        try:
+            taken = inspect.signature(self.call).parameters
+        except (TypeError, ValueError):  # a builtin
+            return set()
+        if any(p.kind is inspect.Parameter.VAR_KEYWORD for p in taken.values()):
+            return known
+        return known & set(taken)
+
+    @property
+    def takes_inputs(self) -> bool:
+        """Whether it can be driven by other inputs than those that were measured."""
+        return "inputs" in self.optional
+
+    @property
+    def answers_all(self) -> bool:
+        """Whether it answers with all outputs at once, and is not told which stage is asked for."""
+        return "stage" not in self.optional
+
+    def bind(self, session: Mapping[str, Any]) -> None:
+        """Notes what stays the same from one model to the next: columns on one grid, trials, names."""
+        self.columns: dict[str, Array] = session["columns"]
+        self.inputs: list[list[str]] = [stage["inputs"] for stage in session["stages"]]
+        self.outputs: list[str] = [stage["output"] for stage in session["stages"]]
+        self.parameters: list[str] = session["parameters"]
+        self.effects: list[str] = session["effects"]
+        self.spans: list[TrialSpan] = []
+        for trial in session["trials"]:
+            first = self.samples(len(self.spans))
+            samples = slice(first, first + trial["samples"])
+            self.spans.append(TrialSpan(trial["name"], samples, trial["start_s"]))
+        begin = getattr(self.simulator, "begin", None)
+        if callable(begin):
+            begin(session)
+
+    def samples(self, trials: int) -> int:
+        """Samples of the first trials."""
+        return int(self.spans[trials - 1].samples.stop) if trials else 0
+
+    def __call__(
+        self,
+        stage: int,
+        trials: int,
+        params: Array,
+        effects: Array,
+        altered: Sequence[Sequence[Array]] | None,
+    ) -> Array:
+        """Outputs of some models, `[n, samples]`; with several stages those of all, one behind the other."""
+        models, samples = params.shape[0], self.samples(trials)
+        inputs = self._inputs(stage, samples, models, altered)
+        more: dict[str, Any] = {}
+        if "trials" in self.optional:
+            more["trials"] = self.spans[:trials]
+        if "stage" in self.optional:
+            more["stage"] = stage
+        outputs = self.outputs if self.answers_all else [self.outputs[stage]]
+        if self.many:
+            if inputs is not None:
+                more["inputs"] = inputs
+            told = self.call(Named.of(params, self.parameters), Named.of(effects, self.effects), **more)
+            return self._table(told, models, samples, outputs)
+        rows = []
+        for model in range(models):
+            one = dict(zip(self.parameters, params[model].tolist()))
+            values = dict(zip(self.effects, effects[model].tolist()))
+            if inputs is not None:
+                more["inputs"] = {name: columns[model] for name, columns in inputs.items()}
+            told = self.call(one, values, **more)
+            rows.append(self._table(_first_axis(told), 1, samples, outputs))
+        return np.concatenate(rows)
+
+    def _inputs(
+        self, stage: int, samples: int, models: int, altered: Sequence[Sequence[Array]] | None
+    ) -> dict[str, Array] | None:
+        """Every column by name, `[n, samples]`: those that drive the stage as they were altered, the others as measured."""
+        if not self.takes_inputs:
+            return None
+        given = {name: np.broadcast_to(values[:samples], (models, samples)) for name, values in self.columns.items()}
+        for name, rows in zip(self.inputs[stage], altered or ()):
+            given[name] = np.stack(rows)
+        return given
+
+    def _table(self, told: Any, models: int, samples: int, outputs: Sequence[str]) -> Array:
+        """What came back, checked; several outputs side by side."""
+        if len(outputs) == 1 and not isinstance(told, dict):
+            return self._rows(told, models, samples, outputs[0])
+        if not isinstance(told, dict):
+            raise StretchError(
+                f"the simulator returned a {type(told).__name__}; with {len(outputs)} outputs it must return a dict of "
+                f"arrays by output: {', '.join(outputs)}"
+            )
+        missing = [output for output in outputs if output not in told]
+        if missing:
+            raise StretchError(f"the simulator returned no {missing[0]}; it returned {', '.join(map(str, told))}")
+        return np.concatenate([self._rows(told[o], models, samples, o) for o in outputs], axis=1)
+
+    def _rows(self, told: Any, models: int, samples: int, output: str) -> Array:
+        try:
+            table = np.asarray(told, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise StretchError(f"the simulator returned no numbers for {output}: {error}") from None
+        if table.ndim == 1 and models == 1:
+            table = table[np.newaxis]
+        whole = self.samples(len(self.spans))
+        if table.ndim != 2 or table.shape[0] != models or table.shape[1] not in (samples, whole):
+            form = f"({models}, {samples})" if self.many else f"({samples},)"
+            also = f" or ({models}, {whole}), all trials end to end" if samples != whole and self.many else ""
+            shape = table.shape if self.many else table.shape[1:]
+            raise StretchError(
+                f"the simulator returned the shape {shape} for {output}; {form} was expected{also}: one sample for each that "
+                "was measured, trial behind trial"
+            )
+        return np.ascontiguousarray(table[:, :samples])
+
+
+def _first_axis(told: Any) -> Any:
+    """One model's outputs as a batch of one."""
+    if isinstance(told, dict):
+        return {output: np.asarray(values)[np.newaxis] for output, values in told.items()}
+    try:
+        return np.asarray(told, dtype=np.float64)[np.newaxis]
+    except (TypeError, ValueError) as error:
+        raise StretchError(f"the simulator returned no numbers: {error}") from None

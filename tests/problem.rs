@@ -41,9 +41,11 @@ range = [0, 20]
 off = 0
 "#;
 
-fn said(folder: &Path, more: &[&str]) -> (bool, String) {
-    let out =
-        stretch().arg("diagnose").arg(folder.join("problem.toml")).args(more).output().unwrap();
+/// What a diagnosis of a problem's file says, or of the one in a folder.
+fn said(path: &Path, more: &[&str]) -> (bool, String) {
+    let inside = path.join("problem.toml");
+    let file = if inside.exists() { &inside } else { path };
+    let out = stretch().arg("diagnose").arg(file).args(more).output().unwrap();
     let text = [out.stdout, out.stderr].concat();
     let text = String::from_utf8(text).unwrap();
     // how wide a terminal is says where lines break
@@ -78,6 +80,21 @@ fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
     assert!(value["model_runs"]["count"].as_u64().unwrap() < 400);
     assert_eq!(value["identifiability"][0]["knowledge"], "determined");
     assert!(fs::read_to_string(page).unwrap().contains("brake"));
+    assert_eq!((&value["seed"], &value["data_set"]), (&1.into(), &"problem".into()));
+
+    // What was found is written into the problem, and nothing is missing then.
+    let fixed = folder.path().join("fixed.toml");
+    let (is_good, text) = said(folder.path(), &["--fix", fixed.to_str().unwrap()]);
+    assert!(is_good && text.contains("the problem re-tuned, with brake"), "{text}");
+    let (is_good, text) = said(folder.path(), &["--fix", file.to_str().unwrap()]);
+    assert!(!is_good && text.contains("--fix would replace a file that is read"), "{text}");
+    assert!(fs::read_to_string(&fixed).unwrap().contains("value = "));
+    let json = folder.path().join("again.json");
+    let (is_good, text) = said(&fixed, &["--json-out", json.to_str().unwrap()]);
+    let again: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
+    let agrees = ["no_gap", "parameters"].contains(&again["verdict"].as_str().unwrap());
+    assert!(is_good && agrees, "{text}");
 
     // An object of a Python module, and one that is wrong.
     let module = "def servo(parameters, effects):\n    raise ValueError('no such gear')\n";
@@ -112,8 +129,8 @@ fn what_is_wrong_in_a_file_is_told_with_key_and_value() {
         let (is_good, text) = said(folder.path(), &[]);
         assert!(!is_good && text.contains(told), "{to}: {text}");
     }
-    let (is_good, text) = said(folder.path(), &["--fix", "x.toml"]);
-    assert!(!is_good && text.contains("--fix is for the built-in simulators"), "{text}");
+    let (is_good, text) = said(folder.path(), &["--rig", "x.toml"]);
+    assert!(!is_good && text.contains("--rig: it is for the built-in simulators"), "{text}");
 }
 
 #[test]

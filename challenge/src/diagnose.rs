@@ -4,7 +4,7 @@ use std::path::Path;
 
 use stretch_files::write_whole;
 use stretch_gap::{Diagnosis, Evidence, Options, diagnose};
-use stretch_problem::{Bench, RigSimulator};
+use stretch_problem::{Problem, Reading, RigSimulator};
 use stretch_sim::Catalogue;
 
 /// What is asked of a diagnosis beside its data.
@@ -23,17 +23,11 @@ pub struct Asked {
 /// # Errors
 /// Data that the diagnosis refuses, a file that cannot be written.
 pub fn write_diagnosis(folder: &Path, asked: &Asked, file: &Path) -> anyhow::Result<()> {
-    let catalogue = Catalogue::default().without(&asked.without)?;
-    let bench = Bench::from(RigSimulator::read(folder, None, &catalogue)?);
+    let problem = Problem::read(folder, &Reading { without: &asked.without, ..Reading::default() })?;
     let Asked { threads, baselines, .. } = *asked;
     let options = Options { threads, baselines, ..Options::default() };
-    let examined = bench.examine(&options, false, &|_| (), &stretch_files::interrupted)?;
-    let name = folder.canonicalize()?;
-    let mut answer = serde_json::to_value(&examined.diagnosis)?;
-    answer["data_set"] = name.file_name().unwrap_or_default().to_string_lossy().into();
-    answer["seed"] = options.seed.into();
-    answer["version"] = env!("CARGO_PKG_VERSION").into();
-    let text = serde_json::to_string_pretty(&answer)? + "\n";
+    let examined = problem.examine(&options, false, &|_| (), &stretch_files::interrupted)?;
+    let text = serde_json::to_string_pretty(&examined.to_json())? + "\n";
     Ok(write_whole(file, |out| out.write_all(text.as_bytes()))?)
 }
 

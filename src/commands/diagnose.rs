@@ -44,7 +44,8 @@ const FAILED_ON: u8 = 3;
 /// A simulator of your own, in any language, stands in a problem.toml with its parameters, the
 /// recordings, and what may wrap it (stretch init FOLDER writes a first one):
 ///
-///   stretch diagnose problem.toml --jobs 4 --budget 400
+///   stretch diagnose problem.toml --jobs 4 --budget 400 --fix fixed.toml
+///   stretch diagnose fixed.toml
 ///
 /// In a laboratory's checks, where a rig must stay what its simulator says (exit status 3 where it does not):
 ///
@@ -67,7 +68,7 @@ pub(crate) struct Args {
     /// Write a report that opens in any browser
     #[arg(long, value_name = "d.html")]
     report: Option<PathBuf>,
-    /// Write a rig file with what was found: parameters re-tuned, effects added; a file that exists is replaced
+    /// Write a rig file, or a problem's file, with what was found: parameters re-tuned, effects added; a file that exists is replaced
     #[arg(long, value_name = "fixed.toml")]
     fix: Option<PathBuf>,
     /// Write the code of each named effect in C, Python and MATLAB into a new folder
@@ -85,10 +86,10 @@ pub(crate) struct Args {
     /// Seed of the intervals
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Reference column of a gauge alone
+    /// Reference column of a gauge alone, or what an output of your own simulator senses
     #[arg(long, value_name = "COLUMN", requires = "signal", value_parser = column)]
     reference: Option<String>,
-    /// Signal column of a gauge alone
+    /// Signal column of a gauge alone, or that output
     #[arg(long, value_name = "COLUMN", requires = "reference", value_parser = column)]
     signal: Option<String>,
     /// Write the recommended experiment as a trial file

@@ -2,6 +2,7 @@
 
 mod effects;
 mod experiments;
+mod flow;
 mod gauge;
 mod gross;
 mod in_memory;

@@ -1,0 +1,324 @@
+//! The one flow, by toy simulators: a line, an oscillator's command, a delay. What is named is written into the problem, after which it
+//! agrees; what is asked for beside the diagnosis is there for any simulator.
+
+use std::sync::Arc;
+
+use stretch_data::{Channel, SessionTrial, Split, Trial};
+use stretch_gap::{Dice, Options, VerdictKind};
+use stretch_problem::{
+    Argument, Ask, BlackBox, Checked, Examined, Fixed, NoFix, OwnEffect, Parameter, Problem,
+    ProblemFile, ProblemSpec, Sensor, Session, Stage, Tolerance, Wrapped, closure,
+};
+
+const DT_S: f64 = 0.01;
+const SAMPLES: usize = 1500;
+
+fn shaft(trial: usize, t: f64) -> f64 {
+    10.0 * (0.9 * t + trial as f64).sin() + 6.0 * (2.3 * t).sin()
+}
+
+/// What a toy is.
+type Toy = fn(gain: f64, bend: f64, x: &[f64]) -> Vec<f64>;
+
+fn line(gain: f64, bend: f64, x: &[f64]) -> Vec<f64> {
+    x.iter().map(|x| gain * x + bend * x * x).collect()
+}
+
+/// A first-order lag of 50 ms, trial by trial.
+fn lagging(gain: f64, _bend: f64, x: &[f64]) -> Vec<f64> {
+    let kept = (-DT_S / 0.05_f64).exp();
+    let one = |x: &[f64]| {
+        let mut y = gain * x[0];
+        x.iter()
+            .map(|x| {
+                y = kept * y + (1.0 - kept) * gain * x;
+                y
+            })
+            .collect::<Vec<_>>()
+    };
+    x.chunks(SAMPLES).flat_map(one).collect()
+}
+
+fn play(w: f64, x: &[f64]) -> Vec<f64> {
+    let one = |x: &[f64]| {
+        let mut held = x[0];
+        x.iter()
+            .map(|x| {
+                held = held.clamp(x - w, x + w);
+                held
+            })
+            .collect::<Vec<_>>()
+    };
+    x.chunks(SAMPLES).flat_map(one).collect()
+}
+
+/// Three trials of what a real toy shows for its shaft.
+fn recorded(real: impl Fn(&[f64]) -> Vec<f64>) -> Vec<SessionTrial> {
+    let one = |trial: usize| {
+        let mut dice = Dice::new(7, trial as u64);
+        let time_s: Vec<f64> = (0..SAMPLES).map(|i| i as f64 * DT_S).collect();
+        let x: Vec<f64> = time_s.iter().map(|t| shaft(trial, *t)).collect();
+        let y = real(&x).iter().map(|y| y + 0.02 * dice.gauss()).collect();
+        let channel = |name: &str, values| Channel { name: name.into(), values };
+        let channels = vec![channel("gear_deg", y), channel("shaft_deg", x)];
+        let recorded = Trial { name: format!("t{trial}.csv"), time_s, channels };
+        let split = if trial == 2 { Split::Test } else { Split::Fit };
+        SessionTrial { start_s: 60.0 * trial as f64, split, ..SessionTrial::new(recorded) }
+    };
+    (0..3).map(one).collect()
+}
+
+/// The toy as its owner describes it: its ratio is 3, more or less, and it has an argument that bends.
+fn described(trials: Vec<SessionTrial>, wrap: &[&str]) -> ProblemSpec {
+    ProblemSpec {
+        stages: vec![Stage {
+            name: "gear".into(),
+            output: "gear_deg".into(),
+            inputs: vec!["shaft_deg".into()],
+            ..Stage::default()
+        }],
+        parameters: vec![Parameter {
+            name: "ratio".into(),
+            unit: "1".into(),
+            value: 3.0,
+            tolerance: Tolerance::Relative(0.05),
+            ..Parameter::default()
+        }],
+        effects: vec![OwnEffect {
+            name: "bend".into(),
+            arguments: vec![Argument {
+                unit: "1/deg".into(),
+                min: -0.1,
+                max: 0.1,
+                off: Some(0.0),
+                ..Argument::default()
+            }],
+            ..OwnEffect::default()
+        }],
+        wrap: wrap.iter().map(|w| (*w).to_owned()).collect(),
+        trials,
+        ..ProblemSpec::default()
+    }
+}
+
+fn problem(spec: ProblemSpec, toy: Toy) -> Problem {
+    let checked = Checked::new(spec).expect("a problem");
+    let session: Session = checked.session().clone();
+    let source = closure(move |ask: &Ask<'_>| {
+        let own = &session.column("shaft_deg").expect("the shaft")[..session.samples(ask.trials)];
+        let x = ask.inputs.map_or(own, |inputs| &inputs[0]);
+        Ok(toy(ask.parameters[0], ask.effects[0], x))
+    });
+    BlackBox::new(checked, Arc::new(source)).into()
+}
+
+fn examined(spec: ProblemSpec, toy: Toy) -> Examined {
+    let options = Options { seed: 5, ..Options::default() };
+    problem(spec, toy).examine(&options, true, &|_| (), &|| false).expect("a diagnosis")
+}
+
+/// The problem that a fix writes, on the same recordings.
+fn fixed(examined: &Examined, trials: Vec<SessionTrial>) -> (ProblemSpec, String) {
+    let fix = examined.fix.as_ref().expect("a fix");
+    let Fixed::Problem(file) = &fix.file else { panic!("{:?}", fix.file) };
+    (ProblemSpec { trials, ..file.spec.clone() }, fix.text("fixed.toml".as_ref()))
+}
+
+fn agrees(examined: &Examined) -> bool {
+    matches!(examined.diagnosis.verdict, VerdictKind::NoGap | VerdictKind::Parameters)
+}
+
+#[test]
+fn hidden_play_is_named_written_into_the_problem_and_agrees_then() {
+    let trials = recorded(|x| play(0.4, &line(3.05, 0.0, x)));
+    let wrap = ["output.backlash", "output.skew", "output.curve"];
+    let found = examined(described(trials.clone(), &wrap), line);
+    assert_eq!(found.diagnosis.named, ["output.backlash"], "{}", found.diagnosis.sentence);
+    let one = &found.implementations[0];
+    assert_eq!((one.name.as_str(), one.stage.as_str()), ("output.backlash", "gear"));
+    assert!(
+        one.equation().contains("play(x, w") && one.equation().contains("w = 0.4"),
+        "{}",
+        one.equation()
+    );
+    let (spec, text) = fixed(&found, trials);
+    assert_eq!(spec.wrapped.len(), 1);
+    assert!((spec.wrapped[0].values["w"] - 0.4).abs() < 0.03, "{:?}", spec.wrapped);
+    assert!((spec.parameters[0].value - 3.05).abs() < 0.01);
+    assert!(text.contains("[[wrapped]]") && text.contains("was 3; 95 %:"), "{text}");
+    let again = examined(spec, line);
+    assert!(agrees(&again), "{}", again.diagnosis.sentence);
+}
+
+#[test]
+fn what_stands_in_front_of_a_simulator_is_written_as_well() {
+    let late = |x: &[f64]| {
+        let shifted: Vec<f64> = (0..x.len()).map(|i| x[i.saturating_sub(6)]).collect();
+        lagging(3.0, 0.0, &shifted)
+    };
+    let trials = recorded(late);
+    let found = examined(described(trials.clone(), &["input.delay", "output.backlash"]), lagging);
+    assert_eq!(found.diagnosis.named, ["input.delay"], "{}", found.diagnosis.sentence);
+    let (spec, _) = fixed(&found, trials);
+    let again = examined(spec, lagging);
+    assert!(agrees(&again), "{}", again.diagnosis.sentence);
+}
+
+#[test]
+fn an_effect_that_the_simulator_has_itself_gets_its_value() {
+    let trials = recorded(|x| line(3.0, 0.02, x));
+    let found = examined(described(trials.clone(), &["output.backlash"]), line);
+    assert_eq!(found.diagnosis.named, ["bend"], "{}", found.diagnosis.sentence);
+    let (spec, text) = fixed(&found, trials);
+    let value = spec.effects[0].arguments[0].value.expect("a value");
+    assert!((value - 0.02).abs() < 0.001, "{value}");
+    assert!(text.contains("value = 0.0"), "{text}");
+    let again = examined(spec, line);
+    assert!(agrees(&again), "{}", again.diagnosis.sentence);
+    let names: Vec<&str> = again.evidence.candidates.iter().map(|_| "").collect();
+    assert!(names.len() < 10);
+}
+
+#[test]
+fn rivals_are_parted_by_an_experiment_that_the_simulator_foretells() {
+    // Slow motion alone: a delay and a lag are the same.
+    let trials = recorded(|x| {
+        let late = |i: usize| 0.5 * (x[i.saturating_sub(5)] + x[i.saturating_sub(6)]);
+        (0..x.len()).map(|i| 3.0 * late(i)).collect()
+    });
+    let spec = described(trials, &["output.skew", "output.lag"]);
+    let found = examined(spec, line);
+    if found.diagnosis.ambiguous.len() < 2 {
+        assert!(found.experiment.is_none());
+        return;
+    }
+    let trial = found.experiment.as_ref().expect("an experiment");
+    trial.check().expect("a trial");
+    let shaft = &trial.channels[0];
+    assert_eq!((shaft.name.as_str(), trial.len()), ("shaft_deg", SAMPLES));
+    let widest = shaft.values.iter().fold(0.0_f64, |a, x| a.max(x.abs()));
+    assert!(widest <= 16.0, "within the range that was measured: {widest}");
+    assert!(found.diagnosis.next_experiment.as_ref().expect("one").d > 0.0);
+}
+
+#[test]
+fn the_one_json_has_version_seed_and_what_follows() {
+    let trials = recorded(|x| play(0.4, &line(3.0, 0.0, x)));
+    let found = examined(described(trials, &["output.backlash"]), line);
+    let json = found.to_json();
+    assert_eq!((&json["schema"], &json["seed"]), (&1.into(), &5.into()));
+    assert_eq!(json["version"], env!("CARGO_PKG_VERSION"));
+    assert_eq!(json["implement"][0]["effect"], "output.backlash");
+    assert!(json["fixed_rig"].is_null());
+    assert!(json["fixed_problem"].as_str().expect("a text").contains("[[wrapped]]"));
+}
+
+#[test]
+fn effects_are_left_out_by_name_by_kind_and_by_place() {
+    let trials = recorded(|x| play(0.4, &line(3.0, 0.0, x)));
+    let names = |without: &[&str]| {
+        let mut spec =
+            described(trials.clone(), &["output.backlash", "input.delay", "output.curve"]);
+        spec.without = without.iter().map(|w| (*w).to_owned()).collect();
+        let checked = Checked::new(spec).map_err(|e| e.to_string())?;
+        let effects = &checked.description().effects;
+        Ok::<_, String>(effects.iter().map(|e| e.name.clone()).collect::<Vec<_>>())
+    };
+    assert_eq!(names(&["bend", "curve"]).unwrap(), ["input.delay", "output.backlash"]);
+    assert_eq!(names(&["output.all"]).unwrap(), ["bend", "input.delay"]);
+    let refused = names(&["outptu.backlash"]).unwrap_err();
+    assert!(refused.contains("did you mean output.backlash?"), "{refused}");
+}
+
+#[test]
+fn a_stage_that_is_a_sensor_tells_what_a_calibration_loses() {
+    let trials = recorded(|x| play(4.0, &line(3.0, 0.0, x)));
+    let mut spec = described(trials, &["output.backlash"]);
+    spec.sensor = Some(Sensor { reference: "shaft_deg".into(), signal: "gear_deg".into() });
+    let found = examined(spec.clone(), line);
+    assert!(found.diagnosis.transfer.is_some(), "{}", found.diagnosis.sentence);
+    spec.sensor = Some(Sensor { reference: "shaft_deg".into(), signal: "gera_deg".into() });
+    let refused = Checked::new(spec).unwrap_err().to_string();
+    assert!(refused.contains("did you mean gear_deg?"), "{refused}");
+}
+
+#[test]
+fn nothing_is_written_where_nothing_explains_the_gap() {
+    let trials = recorded(|x| x.iter().map(|x| 30.0 * (0.3 * x).sin().abs()).collect());
+    let found = examined(described(trials, &["output.backlash"]), line);
+    assert!(matches!(found.fix, Err(NoFix::Unknown | NoFix::Record { .. })), "{:?}", found.fix);
+    assert!(found.to_json()["fixed_problem"].is_null());
+}
+
+#[test]
+fn a_problem_file_with_everything_in_it_is_written_and_read_back() {
+    let text = r#"
+name = "servo"
+simulator = { fmu = "a.fmu", variables = { tau = "motor.tau" }, jobs = 2 }
+wrap = ["input.delay"]
+without = ["curve"]
+beside = ["supply_V"]
+reference = "rod_mm"
+signal = "angle_deg"
+budget = 400
+[[stage]]
+name = "servo"
+output = "angle_deg"
+inputs = ["command_V"]
+noise = 0.1
+[[input]]
+column = "command_V"
+noise = 0.01
+[[parameter]]
+name = "gain"
+unit = "deg/V"
+value = 10
+tolerance = "10 %"
+least = 0
+[[parameter]]
+name = "tau"
+value = 0.1
+tolerance = 0.02
+stages = ["servo"]
+[[effect]]
+name = "brake"
+range = [0, 3]
+off = 0
+value = 0.5
+[[effect]]
+name = "two"
+[[effect.argument]]
+name = "a"
+range = [0.1, 3]
+off = 0.1
+log = true
+[[effect.argument]]
+name = "b"
+range = [0, 1]
+[[wrapped]]
+name = "output.backlash"
+w = 0.4
+softness = 0.2
+[[trial]]
+file = "monday.csv"
+[[trial]]
+file = "tuesday.csv"
+start_s = 100
+split = "test"
+"#;
+    let file = ProblemFile::parse("p.toml", text).expect("a problem");
+    assert_eq!(file.spec.wrapped[0].values["w"], 0.4);
+    let again = ProblemFile::parse("p.toml", &file.to_toml()).expect("the same");
+    assert_eq!(again, file, "{}", file.to_toml());
+    // Wrappers with values that are not theirs are refused.
+    let trials = recorded(|x| line(3.0, 0.0, x));
+    let with = |values: &[(&str, f64)]| {
+        let mut spec = described(trials.clone(), &[]);
+        let values = values.iter().map(|(name, x)| ((*name).to_owned(), *x)).collect();
+        spec.wrapped = vec![Wrapped { name: "output.backlash".into(), values }];
+        Checked::new(spec).map(drop).map_err(|e| e.to_string())
+    };
+    with(&[("w", 0.4)]).expect("the form is usual where it is left out");
+    assert!(with(&[]).unwrap_err().contains("it has no w; write w = VALUE"));
+    assert!(with(&[("w", 0.4), ("sofness", 0.1)]).unwrap_err().contains("did you mean softness?"));
+}

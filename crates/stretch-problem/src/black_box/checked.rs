@@ -175,12 +175,6 @@ impl Checked {
         self.standing.iter().filter(move |(at, _)| is_here(*at)).map(|(at, values)| (*at, values))
     }
 
-    /// The unit of a column, empty where none is known.
-    pub(crate) fn unit(&self, column: &str) -> &str {
-        let own = self.session.columns.iter().find(|c| c.name == column);
-        own.map_or("", |c| c.unit.as_str())
-    }
-
     pub(crate) fn stage_inputs(&self, stage: usize) -> impl Iterator<Item = &[f64]> {
         self.stages[stage].inputs.iter().map(|c| self.columns.of(c).unwrap_or(&[]))
     }

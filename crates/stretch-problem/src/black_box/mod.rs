@@ -169,7 +169,8 @@ impl BlackBox {
 
     /// The run of a model on inputs that were altered, with the numbers that say how.
     fn driven_by(&self, run: &Run<'_>, inputs: Option<(Vec<Vec<f64>>, Vec<u64>)>) -> Inner {
-        let mut parameters: Vec<f64> = self.description().parameters.iter().map(|p| p.nominal).collect();
+        let mut parameters: Vec<f64> =
+            self.description().parameters.iter().map(|p| p.nominal).collect();
         for &p in &self.description().stages[run.stage].parameters {
             parameters[p] = run.model.parameters[p];
         }

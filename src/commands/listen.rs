@@ -1,5 +1,6 @@
 //! `stretch listen`: a board's live link, shown and recorded.
 
+mod plot;
 mod port;
 mod record;
 mod screen;

@@ -1,24 +1,27 @@
 //! The live plot.
 
-use std::{collections::VecDeque, io, time::Duration};
-
-use ratatui::{
-    DefaultTerminal,
-    crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers},
-    layout::{Constraint, Layout},
-    style::{Color, Style},
-    symbols::Marker,
-    text::Line,
-    widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph},
+use std::{
+    collections::VecDeque,
+    io::{self, Read, Write},
 };
 
-use super::{record::Sample, status::Status, twin::Twin};
+use terminal_size::{Height, Width, terminal_size};
+
+use super::{plot::curve, record::Sample, status::Status, twin::Twin};
 
 /// Seconds that the plot shows.
 const SPAN_S: f64 = 20.0;
+/// Columns of the numbers at the left of the plot.
+const NUMBERS: usize = 10;
+/// Rows around the plot: the estimate above; time, status and what ends it below.
+const AROUND: usize = 4;
+/// Another screen, without a cursor; and back.
+const ENTER: &str = "\x1b[?1049h\x1b[?25l";
+const LEAVE: &str = "\x1b[?25h\x1b[?1049l";
 
 pub(crate) struct Screen {
-    terminal: DefaultTerminal,
+    #[cfg(unix)]
+    before: rustix::termios::Termios,
     points: VecDeque<(f64, f64)>,
     unit: String,
     /// What the axis shows at least: the calibrated span, where it is known.
@@ -26,14 +29,27 @@ pub(crate) struct Screen {
 }
 
 impl Screen {
-    /// Takes the terminal; it is given back by `drop`, and when the program panics.
+    /// Takes the terminal, whose keys then come one by one and unseen; it is given back by `drop`.
+    #[cfg(unix)]
     pub(crate) fn open(twin: &Twin) -> io::Result<Self> {
-        Ok(Self {
-            terminal: ratatui::try_init()?,
-            points: VecDeque::new(),
-            unit: twin.unit.clone(),
-            bounds: twin.span,
-        })
+        use rustix::termios::{OptionalActions, SpecialCodeIndex, tcgetattr, tcsetattr};
+        let before = tcgetattr(io::stdin())?;
+        let mut raw = before.clone();
+        raw.make_raw();
+        // a read that finds no key hands back none
+        raw.special_codes[SpecialCodeIndex::VMIN] = 0;
+        raw.special_codes[SpecialCodeIndex::VTIME] = 0;
+        tcsetattr(io::stdin(), OptionalActions::Now, &raw)?;
+        let screen =
+            Self { before, points: VecDeque::new(), unit: twin.unit.clone(), bounds: twin.span };
+        show(ENTER)?;
+        Ok(screen)
+    }
+
+    /// Keys that come one by one are asked for on Unix only.
+    #[cfg(not(unix))]
+    pub(crate) fn open(_twin: &Twin) -> io::Result<Self> {
+        Err(io::ErrorKind::Unsupported.into())
     }
 
     pub(crate) fn push(&mut self, sample: &Sample) {
@@ -47,20 +63,17 @@ impl Screen {
 
     /// Whether a key asked for the end: q, Escape, or Ctrl-C, which is no signal here.
     pub(crate) fn asked_to_stop(&self) -> io::Result<bool> {
-        while event::poll(Duration::ZERO)? {
-            if let Event::Key(key) = event::read()? {
-                let ctrl_c =
-                    key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
-                let stop = matches!(key.code, KeyCode::Char('q') | KeyCode::Esc) || ctrl_c;
-                if key.kind == KeyEventKind::Press && stop {
-                    return Ok(true);
-                }
-            }
-        }
-        Ok(false)
+        let mut keys = [0; 64];
+        let count = io::stdin().read(&mut keys)?;
+        // other keys begin with an escape, too
+        let is_escape = keys[..count] == [0x1b];
+        let is_end = |key: &u8| [b'q', 0x03].contains(key);
+        Ok(is_escape || keys[0] != 0x1b && keys[..count].iter().any(is_end))
     }
 
     pub(crate) fn draw(&mut self, status: &Status) -> io::Result<()> {
+        let (columns, rows) = terminal_size().map_or((80, 24), |(Width(w), Height(h))| (w, h));
+        let (columns, rows) = (usize::from(columns), usize::from(rows));
         let points: &[(f64, f64)] = self.points.make_contiguous();
         let newest = points.last().copied();
         let end = newest.map_or(SPAN_S, |(t, _)| t.max(SPAN_S));
@@ -68,44 +81,47 @@ impl Screen {
         let bounds = self.bounds.unwrap_or(around);
         let [low, high] =
             points.iter().fold(bounds, |[low, high], &(_, y)| [low.min(y), high.max(y)]);
-        let unit = &self.unit;
         let title = match newest {
-            Some((_, estimate)) => format!(" {estimate:.3} {unit} "),
-            None => " no estimate yet ".to_owned(),
+            Some((_, estimate)) => format!("{estimate:.3} {}", self.unit),
+            None => "no estimate yet".to_owned(),
         };
-        let label = |x: f64| Line::from(format!("{x:.1}"));
-        let chart = Chart::new(vec![
-            Dataset::default()
-                .marker(Marker::Braille)
-                .graph_type(GraphType::Line)
-                .style(Style::default().fg(Color::Cyan))
-                .data(points),
-        ])
-        .block(Block::bordered().title(title))
-        .x_axis(Axis::default().title("s").bounds([end - SPAN_S, end]).labels([
-            label(end - SPAN_S),
-            label(end - SPAN_S / 2.0),
-            label(end),
-        ]))
-        .y_axis(Axis::default().title(unit.as_str()).bounds([low, high]).labels([
-            label(low),
-            label(0.5 * (low + high)),
-            label(high),
-        ]));
-        let foot = Paragraph::new(vec![Line::from(status.line()), Line::from("q ends it")]);
-        self.terminal.draw(|frame| {
-            let [plot, below] =
-                Layout::vertical([Constraint::Min(5), Constraint::Length(2)]).areas(frame.area());
-            frame.render_widget(chart, plot);
-            frame.render_widget(foot, below);
-        })?;
-        Ok(())
+        let (wide, tall) = (columns.saturating_sub(NUMBERS), rows.saturating_sub(AROUND));
+        let drawn = curve(points, [[end - SPAN_S, end], [low, high]], (wide, tall));
+        let number = |row: usize| match row {
+            0 => format!("{high:.1}"),
+            row if row + 1 == tall => format!("{low:.1}"),
+            row if row == tall / 2 => format!("{:.1}", 0.5 * (low + high)),
+            _ => String::new(),
+        };
+        let mut lines = vec![title];
+        let bordered = drawn.iter().enumerate();
+        lines.extend(bordered.map(|(row, text)| format!("{:>8} \u{2502}{text}", number(row))));
+        let begin = format!("{:.1} s", end - SPAN_S);
+        let far = wide.saturating_sub(begin.len());
+        lines.push(format!("{:NUMBERS$}{begin}{:>far$}", "", format!("{end:.1} s")));
+        lines.extend([status.line(), "q ends it".to_owned()]);
+        let cut = |line: &String| line.chars().take(columns).collect::<String>();
+        let lines: Vec<String> = lines.iter().take(rows).map(cut).collect();
+        // from the upper left corner, each line to its end, and nothing below
+        show(&format!("\x1b[H{}\x1b[J", lines.join("\x1b[K\r\n")))
     }
+}
+
+fn show(text: &str) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    out.write_all(text.as_bytes())?;
+    out.flush()
 }
 
 impl Drop for Screen {
     fn drop(&mut self) {
-        // its own `restore` says on standard error that it failed, and panics where that is full
-        let _ = ratatui::try_restore();
+        // where the terminal has gone there is nothing to give back
+        let _ = show(LEAVE);
+        #[cfg(unix)]
+        let _ = rustix::termios::tcsetattr(
+            io::stdin(),
+            rustix::termios::OptionalActions::Now,
+            &self.before,
+        );
     }
 }

@@ -52,7 +52,7 @@ pub(crate) enum Shown {
 
 impl View {
     pub(crate) fn open(twin: &Twin, header: &str, is_recorded: bool) -> anyhow::Result<Self> {
-        if io::stdout().is_terminal() && io::stdin().is_terminal() {
+        if cfg!(unix) && io::stdout().is_terminal() && io::stdin().is_terminal() {
             let screen = Box::new(Screen::open(twin).context("the terminal")?);
             return Ok(Self::Screen { screen, drawn: Instant::now() });
         }

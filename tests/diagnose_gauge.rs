@@ -9,14 +9,7 @@ use std::{
 use crate::support::{Scratch, fails, prints, runs, stretch};
 use approx::assert_abs_diff_eq;
 use serde_json::Value;
-use testkit::{page::without_program, tolerance::SKEW_FOUND_S};
-
-/// A little noise that comes out the same everywhere.
-fn noise(i: usize) -> f64 {
-    let mut z = (i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-}
+use testkit::{page::without_program, random::unit, tolerance::SKEW_FOUND_S};
 
 /// Position of a joint, degrees, at a time.
 fn joint(t: f64) -> f64 {
@@ -28,8 +21,8 @@ fn record(file: &Path, header: &str, scale: f64, begin_s: f64) {
     let mut text = header.to_owned() + "\n";
     for i in 0..6000 {
         let t = 0.01 * i as f64;
-        let x = scale * (joint(begin_s + t) + 0.01 * noise(7 * i + 1));
-        let y = 0.3 + 0.02 * joint(begin_s + t - 0.12) + 0.004 * noise(7 * i + 3);
+        let x = scale * (joint(begin_s + t) + 0.01 * (2.0 * unit(7 * i + 1) - 1.0));
+        let y = 0.3 + 0.02 * joint(begin_s + t - 0.12) + 0.004 * (2.0 * unit(7 * i + 3) - 1.0);
         text += &format!("{t:.2},{x:.6},{y:.5}\n");
     }
     fs::write(file, text).unwrap();

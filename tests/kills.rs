@@ -9,6 +9,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use testkit::random::Random;
+
 use crate::support::{
     Scratch,
     written::{command, prepared, tree, writes},
@@ -59,16 +61,6 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// Numbers that follow nothing, from 0 to 1.
-struct Dice(u64);
-
-impl Dice {
-    fn roll(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
-
 /// Whether a file is the new one. A diagnosis says how long it took: there it is the length and the end that count.
 fn is_new(name: &str, bytes: &[u8], new: &BTreeMap<String, Vec<u8>>) -> bool {
     let Some(expected) = new.get(name) else { return false };
@@ -94,12 +86,12 @@ fn killed_at_random(kills: usize, seed: u64) -> usize {
     let old = tree(&before.path(""));
     let turns: Vec<usize> =
         WRITING.iter().enumerate().flat_map(|(i, w)| vec![i; w.weight]).collect();
-    let (mut dice, mut hit, mut new_ones) = (Dice(seed), 0, 0);
+    let (mut random, mut hit, mut new_ones) = (Random(seed), 0, 0);
     for kill in 0..kills {
         let at = if kill < WRITING.len() {
             kill
         } else {
-            turns[(dice.roll() * turns.len() as f64) as usize]
+            turns[(random.unit() * turns.len() as f64) as usize]
         };
         let (writing, (new, takes)) = (&WRITING[at], &expected[at]);
         let scratch = Scratch::in_memory();
@@ -113,9 +105,9 @@ fn killed_at_random(kills: usize, seed: u64) -> usize {
             {
                 thread::sleep(Duration::from_micros(200));
             }
-            thread::sleep(Duration::from_micros((dice.roll() * 30_000.0) as u64));
+            thread::sleep(Duration::from_micros((random.unit() * 30_000.0) as u64));
         } else {
-            thread::sleep(takes.mul_f64(1.2 * dice.roll()));
+            thread::sleep(takes.mul_f64(1.2 * random.unit()));
         }
         let _ = child.kill();
         let status = child.wait().unwrap();

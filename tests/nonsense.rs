@@ -3,6 +3,7 @@
 use std::{fmt::Write, fs};
 
 use crate::support::{Scratch, calibrate, fails, one_line, runs, stretch};
+use testkit::random::unit;
 
 /// The rows of a trial, each changed by its number.
 fn changed(
@@ -25,13 +26,6 @@ fn warned(command: &mut assert_cmd::Command) -> String {
     let output = command.output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     one_line(&String::from_utf8_lossy(&output.stderr))
-}
-
-/// Noise that follows nothing, from 0 to 1.
-fn noise(n: usize) -> f64 {
-    let mut x = (n as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    ((x ^ (x >> 27)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
 #[test]
@@ -67,11 +61,11 @@ fn a_fit_that_explains_nothing_is_refused_and_written_when_forced() {
     let scratch = Scratch::new();
     let out = scratch.path("cal.json");
     let dead = changed(&scratch, "dead.csv", |n, cells| {
-        cells[2] = format!("{:.5}", 1.65 + 0.002 * noise(n));
+        cells[2] = format!("{:.5}", 1.65 + 0.002 * unit(n));
     });
     // a recorder that made up more than can be told from a motion: half of the lengths, in between
     let made_up = changed(&scratch, "made_up.csv", |n, cells| {
-        cells[1] = format!("{:.4}", 150.0 + 30.0 * noise(n));
+        cells[1] = format!("{:.4}", 150.0 + 30.0 * unit(n));
     });
     // a dead sensor has no branches either: a surface is refused for that
     for (log, models) in [(dead, &["linear"][..]), (made_up, &["linear", "poly13", "blended"])] {

@@ -3,6 +3,7 @@
 use std::{fmt::Write, fs, path::PathBuf};
 
 use crate::support::{Scratch, calibrate, fails, one_line, prints, runs, stretch};
+use testkit::random::noise;
 
 /// Rows of a trial with their columns' names.
 type Rows = (Vec<String>, Vec<Vec<f64>>);
@@ -59,17 +60,6 @@ fn shifted(by: isize) -> impl Fn(&mut Rows) {
             row[1..3].copy_from_slice(&from);
         }
     }
-}
-
-/// The sum of twelve rolls: noise of one standard deviation.
-fn noise(n: usize) -> f64 {
-    let roll = |k: usize| {
-        let mut x = (12 * n + k + 1) as u64;
-        x = x.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        ((x ^ (x >> 27)) >> 11) as f64 / (1u64 << 53) as f64
-    };
-    (0..12).map(roll).sum::<f64>() - 6.0
 }
 
 fn said(folder: &PathBuf) -> String {

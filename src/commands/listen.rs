@@ -15,12 +15,12 @@ use std::{
 };
 
 use anyhow::Context;
-use stretch_link::{Answer, Decoder, Event};
+use stretch_link::{Answer, Decoder, Event, TimeLine};
 use stretch_receptor::code::{Adc, AdcCode, AdcSpec};
 
 use self::{
     port::Heard,
-    record::{Clock, Recording, Sample},
+    record::{Recording, Sample},
     status::Status,
     twin::Twin,
     view::View,
@@ -156,7 +156,8 @@ fn cannot_record(path: Option<&Path>) -> String {
 /// From bytes to samples.
 struct Session {
     decoder: Decoder,
-    clock: Clock,
+    time_line: TimeLine,
+    begun: Instant,
     adc: Adc,
     /// The calibration here, on the board's codes.
     twin: Twin,
@@ -171,8 +172,8 @@ impl Session {
             ..Status::of(&twin.unit)
         };
         // a record that does not say: a tick of the board's clock
-        let clock = Clock::new(twin.period_s.unwrap_or(1e-3));
-        Self { decoder: Decoder::new(), clock, adc, twin, status }
+        let time_line = TimeLine::new(twin.period_s.unwrap_or(1e-3));
+        Self { decoder: Decoder::new(), time_line, begun: Instant::now(), adc, twin, status }
     }
 
     fn take(&mut self, bytes: &[u8]) -> Vec<Sample> {
@@ -192,8 +193,7 @@ impl Session {
             // that did: both agree again when the window has filled
             self.twin.reset();
         }
-        let restarted = matches!(event, Event::Restarted(_));
-        let time_s = self.clock.time_s(frame.time_ms, restarted, Instant::now());
+        let time_s = self.time_line.time_s(&event, self.begun.elapsed().as_secs_f64())?;
         let sample = Sample::new(time_s, frame, &self.adc);
         match frame.code {
             code if code < 0 => self.status.missing += 1,

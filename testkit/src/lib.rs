@@ -5,5 +5,6 @@
 pub mod corpus;
 pub mod measured;
 pub mod page;
+pub mod random;
 pub mod tolerance;
 pub mod vectors;

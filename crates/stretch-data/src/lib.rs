@@ -26,5 +26,5 @@ pub use rig_file::{EffectEntry, Parameter, Remarks, RigFile};
 pub use time::tidy_time;
 pub use toml_file::TomlFile;
 pub use toml_view::TomlView;
-pub use trial::{Channel, Trial, rate_of};
+pub use trial::{Channel, Trial, ends, rate_of};
 pub use write::{can_name, push_number};

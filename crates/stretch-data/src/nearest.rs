@@ -9,30 +9,11 @@
 /// assert_eq!(stretch_data::nearest("pressure_kpa", names), None);
 /// ```
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    const LONGEST: usize = 64;
-    let name: Vec<char> = name.to_lowercase().chars().take(LONGEST).collect();
-    candidates
-        .into_iter()
-        .map(|candidate| {
-            let other: Vec<char> = candidate.to_lowercase().chars().take(LONGEST).collect();
-            (distance(&name, &other), candidate)
-        })
-        .filter(|(edits, _)| *edits <= 2 && 2 * edits < name.len().max(1))
+    // a longer name is nobody's, and the distance takes the product of two lengths
+    let short = |text: &str| text.to_lowercase().chars().take(64).collect::<String>();
+    let name = short(name);
+    let near = candidates.into_iter().map(|one| (strsim::levenshtein(&name, &short(one)), one));
+    near.filter(|(edits, _)| *edits <= 2 && 2 * edits < name.chars().count().max(1))
         .min_by_key(|(edits, _)| *edits)
-        .map(|(_, candidate)| candidate)
-}
-
-/// Levenshtein's distance, one row at a time; a swap of neighbours costs two.
-fn distance(a: &[char], b: &[char]) -> usize {
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.iter().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, y) in b.iter().enumerate() {
-            let replaced = diagonal + usize::from(x != y);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
+        .map(|(_, one)| one)
 }

@@ -147,6 +147,15 @@ impl Trial {
     }
 }
 
+/// Least and greatest of the values that are numbers; +infinity and -infinity where none is.
+///
+/// ```
+/// assert_eq!(stretch_data::ends(&[3.0, f64::NAN, -1.0]), (-1.0, 3.0));
+/// ```
+pub fn ends<'a>(values: impl IntoIterator<Item = &'a f64>) -> (f64, f64) {
+    values.into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)))
+}
+
 /// Samples a second of rising time stamps; none for fewer than two.
 pub fn rate_of(time_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();

@@ -1,10 +1,12 @@
 #![doc = include_str!("../README.md")]
 #![no_std]
 
+mod clock;
 mod decoder;
 mod frame;
 mod recent;
 mod text;
 
+pub use clock::TimeLine;
 pub use decoder::{Counts, Decoder, Event};
 pub use frame::{Answer, Frame};

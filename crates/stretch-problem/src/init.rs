@@ -5,10 +5,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use stretch_data::{Trial, unit};
+use stretch_data::{Trial, ends, unit};
 use stretch_recording::{ReadOptions, Recording};
 
-use crate::{error::ProblemError, wrap::ends};
+use crate::error::ProblemError;
 
 /// Names that a column of time has.
 const TIMES: [&str; 10] =
@@ -124,7 +124,7 @@ fn known(trials: &[(String, Trial)], first: &Trial) -> Vec<Known> {
             let low = name.to_lowercase();
             let is_called = COMMANDS.iter().any(|word| low.contains(word)) || low.starts_with("u_");
             let is_held = 2 * held > samples;
-            Known { range: ends(all().flatten()), is_command: is_called || is_held, name }
+            Known { range: ends(all().flatten()).into(), is_command: is_called || is_held, name }
         })
         .collect()
 }

@@ -12,7 +12,7 @@ use stretch_effects::{
 use stretch_receptor::{
     Defects, DiagnosedReceptor, Receptor, Withheld, example_diagnosed, example_observer,
 };
-use testkit::tolerance::F64_ROUNDING;
+use testkit::{random::noise, tolerance::F64_ROUNDING};
 
 const DT_S: f64 = 0.01;
 const SLIP: Plays = Plays { share: 1.0, radii: [0.014, 0.02, 0.026] };
@@ -89,18 +89,6 @@ fn forwards_it_is_the_operators() {
         let found = defects.advance(&mut memory, *y, 0.0);
         assert_relative_eq!(found, expected, epsilon = 1e-12, max_relative = 100.0 * F64_ROUNDING);
     }
-}
-
-/// Noise of one standard deviation, nearly normal, the same on every machine.
-fn noise(i: usize) -> f64 {
-    let mut z = 0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(i as u64 + 1);
-    let mut sum = 0.0;
-    for _ in 0..12 {
-        z ^= z >> 30;
-        z = z.wrapping_mul(0xbf58_476d_1ce4_e5b9) ^ (z >> 27);
-        sum += (z >> 11) as f64 / (1_u64 << 53) as f64;
-    }
-    sum - 6.0
 }
 
 /// Root mean square error in target, and of the error in standard deviations that the reading says.

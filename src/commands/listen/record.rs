@@ -4,7 +4,6 @@ use std::{
     fs::{self, File, OpenOptions, TryLockError},
     io::{self, Read, Seek, Write},
     path::{Path, PathBuf},
-    time::Instant,
 };
 
 use stretch_data::push_number;
@@ -12,38 +11,6 @@ use stretch_link::{Answer, Frame};
 use stretch_receptor::code::{Adc, AdcCode};
 
 use super::twin::Twin;
-
-/// One time line over restarts of the board and the wrap of its clock.
-pub(crate) struct Clock {
-    period_s: f64,
-    last: Option<(u32, f64, Instant)>,
-}
-
-impl Clock {
-    pub(crate) fn new(period_s: f64) -> Self {
-        Self { period_s, last: None }
-    }
-
-    /// Seconds since the first frame; rising. After a restart the time that
-    /// passed here stands in for the board's.
-    pub(crate) fn time_s(&mut self, time_ms: u32, restarted: bool, now: Instant) -> f64 {
-        let time_s = match self.last {
-            None => 0.0,
-            Some((_, before_s, heard)) if restarted => {
-                before_s + (now - heard).as_secs_f64().max(self.period_s)
-            }
-            Some((before_ms, before_s, _)) => {
-                let step_s = f64::from(time_ms.wrapping_sub(before_ms)) / 1000.0;
-                // two frames within a millisecond of the board's clock
-                before_s + if step_s > 0.0 { step_s } else { 1e-6 }
-            }
-        };
-        // to the microsecond: sums of steps carry dust
-        let time_s = (time_s * 1e6).round() / 1e6;
-        self.last = Some((time_ms, time_s, now));
-        time_s
-    }
-}
 
 /// One sample as it is shown and recorded.
 #[derive(Debug, Clone, Copy)]

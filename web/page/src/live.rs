@@ -5,7 +5,7 @@ use std::fmt::Write;
 use stretch_calibrate::{LiveReceptor, calibration_from_json, parse_adc};
 use stretch_core::{Calibration, Runner, Volts};
 use stretch_data::push_number;
-use stretch_link::{Answer, Decoder, Event, Frame};
+use stretch_link::{Answer, Decoder, Event, Frame, TimeLine};
 use stretch_receptor::{
     Receptor,
     code::{Adc, AdcCode},
@@ -118,8 +118,7 @@ fn read(record: &str) -> Result<Option<Calibration>, Said> {
 struct Frames {
     decoder: Decoder,
     adc: Adc,
-    period_s: f64,
-    last: Option<(u32, f64, f64)>,
+    time_line: TimeLine,
     twin: Option<Runner<Receptor<f64>>>,
     /// Estimates held against those here, and the largest difference.
     compared: (u64, f64),
@@ -134,8 +133,7 @@ impl Frames {
         Ok(Self {
             decoder: Decoder::new(),
             adc,
-            period_s: calibration.map_or(1e-3, |c| c.sample_rate_hz.period_s()),
-            last: None,
+            time_line: TimeLine::new(calibration.map_or(1e-3, |c| c.sample_rate_hz.period_s())),
             twin: calibration.map(Receptor::new).transpose()?.map(Runner::new),
             compared: (0, 0.0),
             missing: 0,
@@ -150,7 +148,7 @@ impl Frames {
             // the board has seen samples that did not arrive here
             twin.reset();
         }
-        let time_s = self.time_s(&frame, matches!(event, Event::Restarted(_)), now_s);
+        let time_s = self.time_line.time_s(&event, now_s)?;
         let signal = self.adc.volts(AdcCode(frame.code));
         let own = self.twin.as_mut().map(|twin| twin.step(Volts(signal.unwrap_or(f64::NAN))));
         let estimate = match frame.answer {
@@ -170,25 +168,6 @@ impl Frames {
             None => self.beyond = (self.beyond.0 + 1, self.beyond.1.max(frame.code)),
         }
         Some([time_s, signal.unwrap_or(f64::NAN), estimate])
-    }
-
-    /// Seconds since the first frame; after a restart the time that passed here stands in for the board's.
-    fn time_s(&mut self, frame: &Frame, restarted: bool, now_s: f64) -> f64 {
-        let time_s = match self.last {
-            None => 0.0,
-            Some((_, before_s, heard_s)) if restarted => {
-                before_s + (now_s - heard_s).max(self.period_s)
-            }
-            Some((before_ms, before_s, _)) => {
-                let step_s = f64::from(frame.time_ms.wrapping_sub(before_ms)) / 1000.0;
-                // two frames within a millisecond of the board's clock
-                before_s + if step_s > 0.0 { step_s } else { 1e-6 }
-            }
-        };
-        // to the microsecond: sums of steps carry dust
-        let time_s = (time_s * 1e6).round() / 1e6;
-        self.last = Some((frame.time_ms, time_s, now_s));
-        time_s
     }
 
     fn status(&self, unit: &str) -> String {

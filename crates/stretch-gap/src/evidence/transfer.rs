@@ -6,13 +6,13 @@
 use rayon::prelude::*;
 use stretch_calibrate::{CalibrateError, ModelKind, Options, apply, calibrate};
 use stretch_core::Degree;
-use stretch_data::{Channel, Trial};
+use stretch_data::{Channel, Trial, ends};
 
 use serde::{Deserialize, Serialize};
 
 use crate::{
     evidence::gathered::Evidence,
-    numerics::{extent::ends, random::Dice},
+    numerics::random::Dice,
     problem::{
         error::GapError,
         frame::{Frame, Role},

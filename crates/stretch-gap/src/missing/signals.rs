@@ -12,14 +12,13 @@ use std::ops::Range;
 
 use stretch_effects::Grid;
 
-use crate::{
-    numerics::extent::ends,
-    problem::{
-        error::GapError,
-        frame::{Frame, Role},
-        record_facts::Recorded,
-        simulator::Simulator,
-    },
+use stretch_data::ends;
+
+use crate::problem::{
+    error::GapError,
+    frame::{Frame, Role},
+    record_facts::Recorded,
+    simulator::Simulator,
 };
 
 /// A signal on its own scale.

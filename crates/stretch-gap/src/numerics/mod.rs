@@ -1,11 +1,10 @@
 //! Arithmetic that knows nothing of simulators.
 //!
 //! In: numbers. Out: factors of normal matrices and least squares within a box ([`linear`], [`arrowhead`]), seeded random
-//! numbers ([`random`]), the least and the greatest of some numbers ([`extent`]), and elapsed seconds ([`stopwatch`]).
+//! numbers ([`random`]), and elapsed seconds ([`stopwatch`]).
 //! Nothing of the crate is imported here.
 
 pub(crate) mod arrowhead;
-pub(crate) mod extent;
 pub(crate) mod linear;
 pub(crate) mod random;
 pub(crate) mod stopwatch;

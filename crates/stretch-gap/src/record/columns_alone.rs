@@ -12,8 +12,9 @@
 //! * dead: a column keeps within its noise while another goes through most of its range (a loose sleeve hides less);
 //! * stuck: a column repeats one number, not an end of its range, so often that its own noise would do so once in a billion records.
 
+use stretch_data::ends;
+
 use crate::{
-    numerics::extent::ends,
     problem::{column::Column, spec::TrialSpec},
     record::{fault::DELAY_S, gross::Gross},
 };

@@ -1,12 +1,11 @@
 //! The hypotheses: one error of the record or of the rig file each, as an effect with one number.
 
-use crate::{
-    numerics::extent::ends,
-    problem::{
-        column::{Column, Distortion},
-        simulator::Simulator,
-        spec::{EffectParameterSpec, EffectSpec},
-    },
+use stretch_data::ends;
+
+use crate::problem::{
+    column::{Column, Distortion},
+    simulator::Simulator,
+    spec::{EffectParameterSpec, EffectSpec},
 };
 
 /// Factors that are looked for, as deviations from 1.

@@ -2,7 +2,6 @@
 
 pub(crate) mod acting;
 pub(crate) mod courses;
-pub(crate) mod ends;
 pub(crate) mod kept;
 pub(crate) mod lost;
 pub(crate) mod rig_file;

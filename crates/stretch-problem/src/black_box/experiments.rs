@@ -8,15 +8,12 @@ use std::{
     hash::{Hash, Hasher},
 };
 
-use stretch_data::{Channel, Trial};
+use stretch_data::{Channel, Trial, ends};
 use stretch_gap::{GapError, Laboratory, Model, Plan, Run, Simulator};
 
 use super::{BlackBox, source::SourceError};
 use crate::{
-    bench::{
-        courses::{course, moving},
-        ends::ends,
-    },
+    bench::courses::{course, moving},
     wrap::{Beside, Side},
 };
 

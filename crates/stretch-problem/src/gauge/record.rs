@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial, unit};
+use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial, ends, unit};
 use stretch_gap::{Frame, Noise, TrialSpec};
 
 use crate::{
-    bench::{ends::ends, lost::open},
+    bench::lost::open,
     error::{ProblemError, check_rate},
 };
 

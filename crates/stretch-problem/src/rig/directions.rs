@@ -1,6 +1,6 @@
 //! Which columns are wrong where the muscle goes against its valves: each way to be wrong is weighed.
 
-use crate::bench::ends::ends;
+use stretch_data::ends;
 
 /// What the valves of a trial did, and what came of it.
 #[derive(Debug, Clone, Copy)]

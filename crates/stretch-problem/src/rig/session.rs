@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use stretch_data::{DataSet, EvenSession, EvenTrial, Rows, SessionTrial, Split};
+use stretch_data::{DataSet, EvenSession, EvenTrial, Rows, SessionTrial, Split, ends};
 use stretch_gap::{copied, noise_variance};
 use stretch_recording::{ReadOptions, Recording};
 
@@ -10,7 +10,6 @@ use super::directions::{self, Motion};
 use super::smooth::{Draws, Smoothed, schedule};
 use crate::{
     bench::{
-        ends::ends,
         lost::{open, open_behind},
         wild::tamed,
     },

@@ -1,5 +1,7 @@
 //! How far a channel goes: what ranges of wrappers are made of.
 
+use stretch_data::ends;
+
 /// What was measured of a channel, without the samples that are tested on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
@@ -24,7 +26,7 @@ pub struct Extent {
 impl Extent {
     /// Of the parts of a channel that may be looked at.
     pub(crate) fn of<'a>(parts: impl Iterator<Item = &'a [f64]> + Clone, dt_s: f64) -> Self {
-        let [low, high] = ends(parts.clone().flatten());
+        let (low, high) = ends(parts.clone().flatten());
         let mut rates: Vec<f64> =
             parts.clone().flat_map(|p| p.windows(2).map(|w| (w[1] - w[0]).abs() / dt_s)).collect();
         let at = rates.len() * 99 / 100;
@@ -84,9 +86,4 @@ fn lattice<'a>(values: impl Iterator<Item = &'a f64> + Clone, [low, high]: [f64;
         per_unit += 0.1 / reach;
     }
     best
-}
-
-/// Least and greatest.
-pub(crate) fn ends<'a>(values: impl Iterator<Item = &'a f64>) -> [f64; 2] {
-    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(*x), b.max(*x)])
 }

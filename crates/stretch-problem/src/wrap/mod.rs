@@ -13,6 +13,5 @@ mod times;
 
 pub use catalogue::{wrapper_named, wrappers};
 pub use extent::Extent;
-pub(crate) use extent::ends;
 pub use kind::{Beside, Family, Measure, Side, Starts, Wrapper};
 pub(crate) use place::{Among, Placed, Site, Trials, placed};

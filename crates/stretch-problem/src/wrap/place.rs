@@ -2,12 +2,13 @@
 
 use std::{ops::Range, sync::Arc};
 
+use stretch_data::ends;
 use stretch_effects::{Grid, Span, Start};
 use stretch_gap::{EffectParameterSpec, EffectSpec};
 
 use super::{
     catalogue::wrappers,
-    extent::{Extent, ends},
+    extent::Extent,
     kind::{Beside, Side, Wrapper},
 };
 use crate::{
@@ -129,7 +130,8 @@ fn at(kind: &'static Wrapper, site: &Site, extent: Extent, among: &Among<'_>) ->
     let own = &site.column;
     let looked = among.columns.looked_at();
     let with = |beside: Option<&[f64]>, label: String| {
-        let range = beside.map_or([0.0; 2], |b| ends(looked.iter().flat_map(|r| &b[r.clone()])));
+        let range =
+            beside.map_or([0.0; 2], |b| ends(looked.iter().flat_map(|r| &b[r.clone()])).into());
         let extent = Extent { beside: range, ..extent };
         let name = named(site, among, &label);
         let beside = beside.map(|b| Arc::new(b.to_vec()));

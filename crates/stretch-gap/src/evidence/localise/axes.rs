@@ -5,10 +5,9 @@
 
 use stretch_filter::log::second_differences;
 
-use crate::{
-    numerics::extent::ends,
-    problem::{frame::Frame, record_facts::Motion, simulator::Simulator},
-};
+use stretch_data::ends;
+
+use crate::problem::{frame::Frame, record_facts::Motion, simulator::Simulator};
 
 /// Samples on each side that a rate is fitted over.
 const REACH: usize = 10;

@@ -40,7 +40,7 @@ fn wild_values_are_counted_told_and_left_out() {
         });
         let told = runs(&mut calibrate(&log, &out));
         assert!(told.contains("80 of 4000 values of"), "{value}: {told}");
-        assert!(told.contains("are wild") && told.contains(value), "{told}");
+        assert!(told.contains("are gross errors") && told.contains(value), "{told}");
         let whole = scratch.path("whole.csv");
         let mut evaluate = stretch();
         evaluate.args(["evaluate", "--json", "--calibration"]).arg(&out).arg(&whole);

@@ -7,7 +7,7 @@ use plotters::{
 use stretch_blind::{Calibration, Score};
 
 use stretch_report::kit::{
-    Area, Axes, Drawn, Figure, Frame, Ink, STEPS, TEXT_PX, dot, plot, px, stroke, words,
+    Area, Axes, Drawn, Figure, FigureSize, Ink, STEPS, TEXT_PX, dot, plot, px, stroke, words,
 };
 
 /// Probability stated against how often it came true, with Wilson's interval.
@@ -25,7 +25,7 @@ pub(crate) fn reliability_figure(calibration: &Calibration) -> Figure {
         is_log: false,
     };
     Figure::new("Reliability diagram: probability stated against share that came true").draw(
-        Frame::NARROW,
+        FigureSize::NARROW,
         |area| {
             plot(area, &axes, |chart| {
                 let ideal = [(0.0, 0.0), (1.0, 1.0)];
@@ -83,8 +83,8 @@ pub(crate) fn time_figure(times: &[f64]) -> Figure {
         })
     };
     Figure::new("Share of the cases done within a time")
-        .draw(Frame { height: 220, ..Frame::NARROW }, draw)
-        .draw(Frame { height: 220, ..Frame::WIDE }, draw)
+        .draw(FigureSize { height: 220, ..FigureSize::NARROW }, draw)
+        .draw(FigureSize { height: 220, ..FigureSize::WIDE }, draw)
 }
 
 /// Truth against the first name given: a matrix where there is room, the wrong answers in words on a phone.
@@ -109,7 +109,7 @@ pub(crate) fn confusion_figure(score: &Score) -> Figure {
     let cell = ((880.0 - 170.0) / columns.len() as f64).min(30.0);
     let row_px = 21.0;
     let height = (rows.len() as f64 * row_px + 160.0) as u32;
-    let list = Frame { width: 400, height: (wrong.len().max(1) * 21 + 12) as u32 };
+    let list = FigureSize { width: 400, height: (wrong.len().max(1) * 21 + 12) as u32 };
     Figure::new("Confusion matrix: what was there against the first name given")
         .draw(list, |area| {
             if wrong.is_empty() {
@@ -127,7 +127,7 @@ pub(crate) fn confusion_figure(score: &Score) -> Figure {
             }
             Ok(())
         })
-        .draw(Frame { width: 880, height }, |area| {
+        .draw(FigureSize { width: 880, height }, |area| {
             matrix(area, score, &rows, &columns, cell, row_px)
         })
 }

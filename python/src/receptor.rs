@@ -61,8 +61,8 @@ impl Receptor {
     }
 
     /// The pressure of the samples to come, for a calibration that needs it.
-    fn feel(&mut self, pressure: f64) {
-        self.live.feel(pressure);
+    fn set_pressure(&mut self, pressure: f64) {
+        self.live.set_pressure(pressure);
     }
 
     /// What was wrong with the time stamps so far: samples missing, jittered, and running backwards.

@@ -169,7 +169,7 @@ fn live(
         match row {
             Ok(row) => {
                 if let Some(pressure) = row.values.get(1) {
-                    receptor.feel(*pressure);
+                    receptor.set_pressure(*pressure);
                 }
                 let reading = receptor.step(row.time_s, row.values[0]);
                 seen.take(&reading, row.values[0]);

@@ -9,7 +9,7 @@ use stretch_calibrate::{
     CalibrateError, Calibrated, Candidate, FitReport, Memory, ModelChoice, ModelKind, ModelRow,
     Options, Robust, SpellingError, SplitBy, calibrate, calibration_bytes, choose_model, evaluate,
     explains_little, explains_nothing, fixed_record, is_plain, parse_adc, parse_rate, rank_signals,
-    without_wild,
+    without_gross_errors,
 };
 use stretch_core::{Normalisation, RateEstimator, RateSource};
 use stretch_data::{Split, Trial};
@@ -275,7 +275,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     };
     // signals that are only candidates may be anything
     let named = [args.reference.as_str(), args.signal.as_str()];
-    let (trials, wild) = without_wild(&trials, &named);
+    let (trials, wild) = without_gross_errors(&trials, &named);
     let named = |error: CalibrateError| of_files(error, &args.trials);
     let candidates = args.candidates(&trials);
     let ranking = if candidates.is_empty() {

@@ -84,7 +84,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         tell(format!("  {path}"))?;
     }
     if *pressure {
-        tell("tell it the pressure with stretch_feel() before each sample")?;
+        tell("tell it the pressure with stretch_set_pressure() before each sample")?;
     }
     tell(if args.arduino {
         "put the folder into the sketchbook's libraries; the IDE then has File > Examples > StretchReceptor > Live"

@@ -2,9 +2,9 @@
 
 mod plot;
 mod port;
-mod record;
 mod screen;
 mod status;
+mod trial_file;
 mod twin;
 mod view;
 
@@ -20,8 +20,8 @@ use stretch_receptor::code::{Adc, AdcCode, AdcSpec};
 
 use self::{
     port::Heard,
-    record::{Recording, Sample},
     status::Status,
+    trial_file::{Sample, TrialFile},
     twin::Twin,
     view::View,
 };
@@ -79,9 +79,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let twin = Twin::read(&args.calibration, args.adc_bits)?;
     let shown_port = args.port.display();
     let heard = port::listen(&args.port, args.baud).with_context(|| format!("{shown_port}"))?;
-    let header = record::header(&twin);
+    let header = trial_file::header(&twin);
     // last of what can fail: a start that fails leaves nothing behind
-    let create = |path| Recording::create(path, &header);
+    let create = |path| TrialFile::create(path, &header);
     let recording = args.out.as_deref().map(create).transpose();
     let mut recording = recording.with_context(|| cannot_record(args.out.as_deref()))?;
     stop::record();
@@ -89,7 +89,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     if !twin.answers() {
         view.note("the calibration's rate looks a sample ahead: estimates are not compared");
     }
-    let mut session = Session::new(twin, adc);
+    let mut session = Samples::new(twin, adc);
     let mut result = Ok(());
     while !stop::ended() && !view.asked_to_stop() {
         let is_last = match heard.recv_timeout(Duration::from_millis(50)) {
@@ -123,8 +123,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         }
     }
     // safe on the disk before anybody is waited for
-    session.status.rows = recording.as_ref().map(Recording::rows);
-    let finished = recording.map_or(Ok(()), Recording::finish);
+    session.status.rows = recording.as_ref().map(TrialFile::rows);
+    let finished = recording.map_or(Ok(()), TrialFile::finish);
     let unseen = view.close();
     session.status.connected = true;
     warn(session.status.line());
@@ -139,7 +139,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
 /// What came is recorded before it is shown.
 fn keep(
     samples: &[Sample],
-    recording: &mut Option<Recording>,
+    recording: &mut Option<TrialFile>,
     view: &mut View,
 ) -> std::io::Result<()> {
     if let Some(recording) = recording {
@@ -154,7 +154,7 @@ fn cannot_record(path: Option<&Path>) -> String {
 }
 
 /// From bytes to samples.
-struct Session {
+struct Samples {
     decoder: Decoder,
     time_line: TimeLine,
     begun: Instant,
@@ -164,7 +164,7 @@ struct Session {
     status: Status,
 }
 
-impl Session {
+impl Samples {
     fn new(twin: Twin, adc: Adc) -> Self {
         let status = Status {
             compared: twin.answers().then_some((0, 0.0)),

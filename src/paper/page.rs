@@ -1,7 +1,7 @@
 //! The paper's experiment as a page.
 
 use plotters::prelude::*;
-use stretch_report::kit::{Area, Axes, Drawn, Figure, Frame, Ink, Page, Table, plot, stroke};
+use stretch_report::kit::{Area, Axes, Drawn, Figure, FigureSize, Ink, Page, Table, plot, stroke};
 
 use super::{
     experiment::Experiment,
@@ -82,7 +82,12 @@ pub(crate) fn paper_page(experiment: &Experiment) -> String {
 
 type Curve = (Ink, Vec<(f64, f64)>);
 
-fn curves_figure(description: &str, axes: &Axes, curves: &[Curve], frames: &[Frame]) -> Figure {
+fn curves_figure(
+    description: &str,
+    axes: &Axes,
+    curves: &[Curve],
+    frames: &[FigureSize],
+) -> Figure {
     let draw = |area: &Area<'_>| -> Drawn {
         plot(area, axes, |chart| {
             for (ink, points) in curves {
@@ -123,7 +128,7 @@ fn gap_figure(experiment: &Experiment) -> Figure {
         "RMSE against the gap between two pulses",
         &axes,
         &curves,
-        &[Frame::NARROW, Frame::WIDE],
+        &[FigureSize::NARROW, FigureSize::WIDE],
     )
     .legend(names.into_iter().enumerate().map(|(i, name)| (Ink::of(i), name.to_owned())))
 }
@@ -144,7 +149,7 @@ fn gain_figure(experiment: &Experiment) -> Figure {
         experiment.frequency.iter().map(|p| (p.frequency_hz.log10(), 1e3 * p.gain_v_per_mm));
     let curves = [(Ink::of(2), points.collect())];
     let axes = frequency_axes(0.0..top(&curves), "gain, mV/mm");
-    curves_figure("Gain of the sensor against frequency", &axes, &curves, &[Frame::NARROW])
+    curves_figure("Gain of the sensor against frequency", &axes, &curves, &[FigureSize::NARROW])
 }
 
 fn lead_figure(experiment: &Experiment) -> Figure {
@@ -153,5 +158,10 @@ fn lead_figure(experiment: &Experiment) -> Figure {
     let values = || curves[0].1.iter().map(|p| p.1);
     let (low, high) = (values().fold(0.0, f64::min), values().fold(0.0, f64::max));
     let axes = frequency_axes(low - 2.0..high + 2.0, "lead, degrees");
-    curves_figure("Phase lead of the sensor against frequency", &axes, &curves, &[Frame::NARROW])
+    curves_figure(
+        "Phase lead of the sensor against frequency",
+        &axes,
+        &curves,
+        &[FigureSize::NARROW],
+    )
 }

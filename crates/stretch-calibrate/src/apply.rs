@@ -85,8 +85,8 @@ impl LiveReceptor {
     }
 
     /// The pressure of the samples to come, for a calibration that [needs](pressure_column) it.
-    pub fn feel(&mut self, pressure: f64) {
-        self.memory.feel(pressure);
+    pub fn set_pressure(&mut self, pressure: f64) {
+        self.memory.set_pressure(pressure);
     }
 
     /// What was wrong with the time stamps so far.
@@ -129,7 +129,7 @@ pub fn apply(calibration: &Calibration, trial: &Trial) -> Result<Applied, Calibr
     };
     let one = |(i, (&t, &v)): (usize, (&f64, &f64))| {
         if let Some(pressure) = pressure {
-            live.feel(pressure[i]);
+            live.set_pressure(pressure[i]);
         }
         live.step(t, v)
     };

@@ -5,7 +5,7 @@ use stretch_data::Trial;
 use crate::{
     CalibrateError,
     clusters::Clusters,
-    wild::{MOST_SHARE, rows, sentence},
+    gross_errors::{MOST_SHARE, rows, sentence},
 };
 
 /// Rows in all beyond which a log is not held as a whole where the model does not need it: at a hundred bytes a row,
@@ -18,15 +18,15 @@ pub const LONGEST: u64 = 1_500_000;
 pub type Log<'a> = dyn Fn(&mut dyn FnMut(usize, Trial) -> Result<(), CalibrateError>) -> Result<(), CalibrateError>
     + 'a;
 
-/// What is wild in each column.
-pub(crate) struct Wild<'a> {
+/// What has a gross error in each column.
+pub(crate) struct GrossErrors<'a> {
     spans: Vec<(&'a str, f64, f64)>,
     /// A sentence for each column that has some.
     pub told: Vec<String>,
 }
 
-impl<'a> Wild<'a> {
-    /// The first pass: what is wild in the reference and in the signal.
+impl<'a> GrossErrors<'a> {
+    /// The first pass: what has a gross error in the reference and in the signal.
     pub(crate) fn of(log: &Log<'_>, columns: [&'a str; 2]) -> Result<Self, CalibrateError> {
         let mut seen: [Clusters; 2] = Default::default();
         log(&mut |_, block| {
@@ -47,7 +47,7 @@ impl<'a> Wild<'a> {
         Ok(Self { spans, told })
     }
 
-    /// A block without the rows in which a column is wild.
+    /// A block without the rows in which a column has a gross error.
     pub(crate) fn without(&self, mut block: Trial) -> Trial {
         for (column, low, high) in &self.spans {
             let Some(own) = block.channel(column) else { continue };

@@ -8,7 +8,7 @@ struct Cluster {
     count: u64,
 }
 
-/// What came so far, sorted, in `MOST` clusters: a wild value takes one, so do the widest holes among usual ones. Where there
+/// What came so far, sorted, in `MOST` clusters: a gross error takes one, so do the widest holes among usual ones. Where there
 /// are more the narrowest hole is closed, so that wide ones stay as they are.
 #[derive(Debug, Clone)]
 pub(crate) struct Clusters<const MOST: usize = 1024> {
@@ -108,7 +108,7 @@ mod tests {
     use proptest::{collection::vec, prelude::*};
 
     use super::*;
-    use crate::wild::span;
+    use crate::gross_errors::span;
 
     const MOST: usize = 64;
 
@@ -122,13 +122,13 @@ mod tests {
         #[test]
         fn wild_is_what_all_values_at_once_say(
             usual in vec(-1.0..1.0f64, 20..500),
-            wild in vec((-300.0..300.0f64, any::<bool>()), 0..40),
+            gross in vec((-300.0..300.0f64, any::<bool>()), 0..40),
         ) {
-            // wild ones anywhere among the usual ones
-            let wild: Vec<f64> = wild.iter()
+            // gross errors anywhere among the usual ones
+            let gross: Vec<f64> = gross.iter()
                 .map(|(x, is_far)| if *is_far { x.signum() * 10f64.powf(x.abs()) } else { *x }).collect();
             let mut all = usual.clone();
-            for (i, x) in wild.iter().enumerate() {
+            for (i, x) in gross.iter().enumerate() {
                 all.insert(i * 7919 % all.len(), *x);
             }
             let found = clusters(&all).span((0.1 * all.len() as f64) as u64);
@@ -148,7 +148,7 @@ mod tests {
         all[123_456] = 1e300;
         let clusters = clusters(&all);
         assert_eq!(clusters.all.len(), MOST);
-        let (low, high, beyond) = clusters.span(20_000).expect("two are wild");
+        let (low, high, beyond) = clusters.span(20_000).expect("two are gross errors");
         assert!(low >= 0.0 && high <= 1.0);
         assert_eq!(beyond, 2);
         assert_eq!(clusters.beyond(low, high), (-999.0, 1e300));

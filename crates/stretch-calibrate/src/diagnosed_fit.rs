@@ -403,7 +403,7 @@ impl<'a> Record<'a> {
             let mut memory = receptor.memory();
             for (i, (&v, &target)) in series.signal.iter().zip(&series.target).enumerate() {
                 if let Some(&p) = series.pressure.get(i) {
-                    memory.feel(p);
+                    memory.set_pressure(p);
                 }
                 let Ok(reading) = receptor.step(&mut memory, Volts(v)) else { continue };
                 if i < SETTLE {

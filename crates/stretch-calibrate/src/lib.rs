@@ -5,6 +5,7 @@ mod auto;
 mod auto_words;
 mod blocks;
 mod calibrate;
+mod calibration_file;
 mod cause;
 mod choose;
 mod clusters;
@@ -15,6 +16,7 @@ mod error;
 mod evaluate;
 mod fitting;
 mod fixed_record;
+mod gross_errors;
 mod history_fit;
 mod knobs;
 mod least_squares;
@@ -29,12 +31,10 @@ mod passes;
 mod prepared;
 mod rated;
 mod reach;
-mod record;
 mod rest;
 mod rising;
 mod series;
 mod split;
-mod wild;
 mod worth;
 
 pub use apply::{Applied, Faults, LiveReceptor, apply, pressure_column, rate_delay_s};
@@ -43,6 +43,10 @@ pub use auto::{
 };
 pub use blocks::{LONGEST, Log};
 pub use calibrate::{Calibrated, calibrate};
+pub use calibration_file::{
+    RecordSummary, calibration_bytes, calibration_from_json, calibration_seal, calibration_to_json,
+    describe_record, read_calibration, seal_calibration, write_calibration,
+};
 pub use cause::Cause;
 pub use choose::{Candidate, rank_signals};
 pub use cost::{m3_instructions, m3_instructions_fixed};
@@ -50,14 +54,10 @@ pub use error::CalibrateError;
 pub use evaluate::{Comparison, Evaluation, MethodErrors, TrialErrors, evaluate};
 pub use fitting::{Coefficient, FitReport, Order};
 pub use fixed_record::{BoardReceptor, FixedRecord, RecordNumbers, fixed_record, parse_adc};
+pub use gross_errors::without_gross_errors;
 pub use long::{calibrate_long, is_plain};
 pub use options::{Memory, ModelKind, Options, Robust, SpellingError, SplitBy, parse_rate};
 pub use own_ranges::on_own_ranges;
 pub use rated::{Rated, RatedPart, rated};
 pub use reach::Reach;
-pub use record::{
-    RecordSummary, calibration_bytes, calibration_from_json, calibration_seal, calibration_to_json,
-    describe_record, read_calibration, seal_calibration, write_calibration,
-};
-pub use wild::without_wild;
 pub use worth::{explains_little, explains_nothing, not_its_own, worse_than_the_mean};

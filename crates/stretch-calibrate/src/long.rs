@@ -1,7 +1,7 @@
 //! A calibration on logs that are longer than what may be held at once: pass by pass over blocks of rows.
 //!
 //! ```text
-//! pass 1   values in clusters                 -> what is wild
+//! pass 1   values in clusters                 -> what has a gross error
 //! pass 2   extents, covariance, noise, count  -> ranges, polarity, dead band
 //! pass 3   extents of the rates by branch     -> ranges of the rates
 //! pass 4   a triangle a branch and fold       -> the fit
@@ -15,7 +15,7 @@ use stretch_core::{Model, Provenance};
 
 use crate::{
     CalibrateError, Calibrated, FitReport, ModelKind, Options, Robust, SplitBy,
-    blocks::{LONGEST, Log, Wild},
+    blocks::{GrossErrors, LONGEST, Log},
     passes::Passes,
 };
 
@@ -29,8 +29,8 @@ pub fn is_plain(options: &Options) -> bool {
 
 /// Fits a calibration to trials that are read block by block, four times; `names` are those of the trials.
 ///
-/// Memory is that of a block, however long the log is. Wild values are looked for, as
-/// [`without_wild`](crate::without_wild) does, in signal and reference.
+/// Memory is that of a block, however long the log is. Gross errors are looked for, as
+/// [`without_gross_errors`](crate::without_gross_errors) does, in signal and reference.
 ///
 /// # Errors
 /// As [`calibrate`](crate::calibrate), those of the log, and [`CalibrateError::TooLong`] where not [`is_plain`].
@@ -72,8 +72,8 @@ pub fn calibrate_long(
         return Err(too_long());
     }
     let columns = [options.reference.as_str(), options.signal.as_str()];
-    let wild = Wild::of(log, columns)?;
-    let long = Passes { log, wild: &wild, options, trials: names.len() };
+    let gross = GrossErrors::of(log, columns)?;
+    let long = Passes { log, gross: &gross, options, trials: names.len() };
     let (prepared, total) = long.prepared(names)?;
     let (model, fits) = match options.model {
         ModelKind::Linear => long.line(&prepared, total)?,
@@ -87,7 +87,7 @@ pub fn calibrate_long(
         // refused above
         ModelKind::Remembering { .. } => return Err(too_long()),
     };
-    let mut notes = wild.told;
+    let mut notes = gross.told;
     notes.extend(prepared.notes.iter().cloned());
     if !matches!(options.model, ModelKind::Linear) {
         notes.extend(fits.iter().filter_map(FitReport::note));

@@ -1,4 +1,4 @@
-//! The passes over a long log behind the first, which looks for wild values.
+//! The passes over a long log behind the first, which looks for gross errors.
 
 use stretch_core::{
     Branch, BranchSurface, Degree, Interval, LinearMap, MAX_TERMS, Model, Polarity, Range,
@@ -9,7 +9,7 @@ use stretch_fit::{FitError, SurfaceAccumulator};
 
 use crate::{
     CalibrateError, FitReport, Options,
-    blocks::{LONGEST, Log, Wild},
+    blocks::{GrossErrors, LONGEST, Log},
     fitting::{CLOUD, Factors, Sample, Seen, merged, told, widest},
     prepared::{Evened, Prepared, dead_bands, pooled_range, target_below},
     series::{Series, extent, noise, sample_rate_hz, series},
@@ -25,7 +25,7 @@ const SHORTEST: usize = 100;
 /// Everything that a pass needs.
 pub(crate) struct Passes<'a> {
     pub log: &'a Log<'a>,
-    pub wild: &'a Wild<'a>,
+    pub gross: &'a GrossErrors<'a>,
     pub options: &'a Options,
     /// How many trials there are.
     pub trials: usize,
@@ -159,7 +159,7 @@ impl Passes<'_> {
         take: &mut dyn FnMut(Evened) -> Result<(), CalibrateError>,
     ) -> Result<(), CalibrateError> {
         (self.log)(&mut |index, block| {
-            let block = self.wild.without(block);
+            let block = self.gross.without(block);
             // what is left at the end of a trial may be too short to tell its rate from
             if block.len() < SHORTEST && first.is_some() {
                 let rows = Rows { read: block.len(), bridged: 0, dropped: block.len() };

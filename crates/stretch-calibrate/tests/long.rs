@@ -2,7 +2,7 @@
 
 use stretch_calibrate::{
     CalibrateError, Calibrated, ModelKind, Options, calibrate, calibrate_long, evaluate,
-    without_wild,
+    without_gross_errors,
 };
 use stretch_core::{Normalisation, RateSource};
 use stretch_data::{Channel, Trial};
@@ -116,7 +116,7 @@ fn the_rest_of_a_log_may_be_too_short_to_be_a_block() {
 #[test]
 fn wild_values_and_several_trials_are_told_as_of_the_whole() {
     let trials = [log("a", 9000, 500), log("b", 7000, 0), log("c", 8001, 900)];
-    let (kept, told) = without_wild(&trials, &["length_mm", "bridge_v"]);
+    let (kept, told) = without_gross_errors(&trials, &["length_mm", "bridge_v"]);
     let whole = calibrate(&kept, &Options::default()).unwrap();
     let long = in_blocks(&trials, 2000, &Options::default()).unwrap();
     assert_eq!(long.notes[0], told[0]);

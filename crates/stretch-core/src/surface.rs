@@ -195,7 +195,7 @@ mod record {
     use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
     #[derive(Serialize, Deserialize)]
-    struct Record<T> {
+    struct Stored<T> {
         degree: Degree,
         coefficients: heapless::Vec<T, MAX_TERMS>,
     }
@@ -203,13 +203,13 @@ mod record {
     impl<T: Real + Serialize> Serialize for Surface<T> {
         fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
             let coefficients = self.coefficients().into_iter().take(self.degree.terms()).collect();
-            Record { degree: self.degree, coefficients }.serialize(serializer)
+            Stored { degree: self.degree, coefficients }.serialize(serializer)
         }
     }
 
     impl<'de, T: Real + Deserialize<'de>> Deserialize<'de> for Surface<T> {
         fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-            let record = Record::<T>::deserialize(deserializer)?;
+            let record = Stored::<T>::deserialize(deserializer)?;
             Self::new(record.degree, &record.coefficients).map_err(D::Error::custom)
         }
     }

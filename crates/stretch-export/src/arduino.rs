@@ -57,7 +57,7 @@ fn keywords() -> String {
                 "stretch_step",
                 "stretch_lost",
                 "stretch_start_on",
-                "stretch_feel",
+                "stretch_set_pressure",
                 "stretch_self_test",
             ],
         ),
@@ -85,9 +85,9 @@ fn keywords() -> String {
 }
 
 fn live(header: &Header) -> String {
-    let feel = if header.pressure {
+    let pressure = if header.pressure {
         "  float pressure = 0.0f;  // yours, in the unit of the pressure that the calibration saw\n  \
-         stretch_feel(&state, pressure);\n"
+         stretch_set_pressure(&state, pressure);\n"
     } else {
         ""
     };
@@ -98,7 +98,7 @@ fn live(header: &Header) -> String {
         ),
         Form::Float => (
             format!(
-                "{feel}  float volts = STRETCH_ADC_ZERO + STRETCH_ADC_PER_CODE * (float)analogRead(A0);\n  \
+                "{pressure}  float volts = STRETCH_ADC_ZERO + STRETCH_ADC_PER_CODE * (float)analogRead(A0);\n  \
                  stretch_reading reading = stretch_step(&state, volts);"
             ),
             "reading.estimate, 3",

@@ -79,7 +79,7 @@ pub(crate) fn float(calibration: &Calibration) -> Result<String, ExportError> {
         if let Some(Crosstalk { scale, .. }) = crosstalk {
             // nothing to its scale, out of step with the signal
             let pressure = (scale * (n % 90) as f64 / 90.0) as f32;
-            memory.feel(pressure);
+            memory.set_pressure(pressure);
             row.push(pressure);
         }
         let volts = signal.map_or(NO_VOLTS, |volts| volts as f32);

@@ -32,7 +32,7 @@ int main(void)
 #ifdef STRETCH_TAKES_PRESSURE
         char sample[16];
         memcpy(&volts, &bits, sizeof volts);
-        stretch_feel(&state, volts);
+        stretch_set_pressure(&state, volts);
         if (scanf("%15s", sample) != 1) {
             return 1;
         }

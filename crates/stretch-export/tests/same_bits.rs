@@ -151,7 +151,7 @@ fn expected(calibration: &Calibration, form: Form, codes: &[i32]) -> String {
             let mut memory = receptor.memory();
             for (n, &code) in codes.iter().enumerate() {
                 if takes_pressure(calibration) {
-                    memory.feel(pressure(n));
+                    memory.set_pressure(pressure(n));
                 }
                 let reading = receptor.step(&mut memory, Volts(volts(code)));
                 answer(reading.map(|r| {
@@ -408,18 +408,22 @@ fn a_header_has_the_defects_that_its_map_has() {
         assert!(!made.text.contains('@'), "{name}: a mark was left");
         let library = arduino_library(&made);
         let live = library.iter().find(|file| file.path.ends_with(".ino")).unwrap();
-        assert_eq!(live.text.contains("stretch_feel("), made.pressure, "{name}");
+        assert_eq!(live.text.contains("stretch_set_pressure("), made.pressure, "{name}");
         (made.pressure, made.text)
     };
     let (no_pressure, plain) = text("no defect");
     let (pressure, crossed) = text("crosstalk");
     let (_, all) = text("all of them");
     assert!(pressure && !no_pressure);
-    for word in ["stretch_feel", "plays[", "fading[", "worn(", "knee(", "slipped", "s->baseline"] {
+    for word in
+        ["stretch_set_pressure", "plays[", "fading[", "worn(", "knee(", "slipped", "s->baseline"]
+    {
         assert!(!plain.contains(word), "{word}");
         assert!(all.contains(word), "{word}");
     }
-    assert!(crossed.contains("stretch_feel(&state, pressure)") && !crossed.contains("plays["));
+    assert!(
+        crossed.contains("stretch_set_pressure(&state, pressure)") && !crossed.contains("plays[")
+    );
 }
 
 #[test]

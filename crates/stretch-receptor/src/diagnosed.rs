@@ -39,7 +39,7 @@ const BEYOND: f64 = 0.003;
 ///
 /// So what a play, a clipped end or a delay hides is told by the motion, and [`Reading::sd`] says how surely. A skew is predicted
 /// over: the estimate is of now. It answers from the first sample on. Where the map has a crosstalk, tell it the pressure
-/// with [`ReceptorMemory::feel`] before a sample.
+/// with [`ReceptorMemory::set_pressure`] before a sample.
 ///
 /// ```
 /// use stretch_core::{Design, Stage, Volts};
@@ -139,13 +139,13 @@ impl<T: Real> DiagnosedReceptor<T> {
 
 impl<T: Real> ReceptorMemory<DiagnosedMemory<T>> {
     /// The pressure of the samples to come, in the unit of the map's crosstalk.
-    pub fn feel(&mut self, pressure: T) {
-        self.model.feel(pressure);
+    pub fn set_pressure(&mut self, pressure: T) {
+        self.model.set_pressure(pressure);
     }
 }
 
 impl<T: Real> DiagnosedMemory<T> {
-    pub(crate) fn feel(&mut self, pressure: T) {
+    pub(crate) fn set_pressure(&mut self, pressure: T) {
         if let Some(pressure) = usable(pressure) {
             self.pressure = pressure;
         }

@@ -105,9 +105,9 @@ impl<T: Real, R> Receptor<T, R> {
 
 impl<T: Real, M> ReceptorMemory<AnyMemory<T, M>> {
     /// The pressure of the samples to come, for a [`DiagnosedReceptor`] with a crosstalk; others do not mind it.
-    pub fn feel(&mut self, pressure: T) {
+    pub fn set_pressure(&mut self, pressure: T) {
         if let AnyMemory::Diagnosed(memory) = &mut self.model {
-            memory.feel(pressure);
+            memory.set_pressure(pressure);
         }
     }
 }

@@ -112,7 +112,7 @@ fn inverted(map: DiagnosedMap, pressure: impl Fn(f64) -> f64) -> (f64, f64) {
     let (mut squares, mut apart, mut count) = (0.0, 0.0, 0.0);
     for (i, y) in motion.iter().enumerate() {
         let shown = (i as isize - late).clamp(0, drives.len() as isize - 1) as usize;
-        memory.feel(pressure(motion[shown]));
+        memory.set_pressure(pressure(motion[shown]));
         let volts = curve(drives[shown]) + map.noise * noise(i);
         let reading = receptor.step(&mut memory, Volts(volts)).unwrap();
         // an 180 mm muscle whose stroke is 0.165 of it
@@ -233,7 +233,7 @@ proptest! {
         let receptor = DiagnosedReceptor::<f64>::new(&calibration).unwrap();
         let (range, target) = (calibration.target_range, calibration.target);
         let mut memory = receptor.memory();
-        memory.feel(pressure);
+        memory.set_pressure(pressure);
         for volts in stream {
             let Ok(reading) = receptor.step(&mut memory, Volts(volts)) else { continue };
             prop_assert!(reading.rate.is_finite() && reading.sd.unwrap().is_finite());

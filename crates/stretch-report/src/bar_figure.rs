@@ -7,7 +7,7 @@ use plotters::{
 
 use super::{
     canvas::Ink,
-    figure::{Area, Drawn, Figure, Frame, dot, px, stroke, words},
+    figure::{Area, Drawn, Figure, FigureSize, dot, px, stroke, words},
     live::{BarRow, Pick, bars_json},
     markup::{number, tick},
 };
@@ -98,8 +98,8 @@ pub fn bar_figure(description: &str, rows: &[Row], scale: Scale, x_label: &str) 
         .fold(1.0, f64::max);
     let draw = |area: &Area<'_>| draw(area, rows, scale, most, x_label);
     Figure::new(description)
-        .draw(Frame { width: 400, height }, draw)
-        .draw(Frame { width: 880, height }, draw)
+        .draw(FigureSize { width: 400, height }, draw)
+        .draw(FigureSize { width: 880, height }, draw)
         .live(bars_json(GAP, &told(rows, &[], x_label)))
 }
 

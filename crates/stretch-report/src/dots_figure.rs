@@ -6,7 +6,7 @@ use plotters::prelude::*;
 
 use super::{
     canvas::Ink,
-    figure::{Area, Axes, Drawn, Figure, Frame, dot, plot, px, stroke},
+    figure::{Area, Axes, Drawn, Figure, FigureSize, dot, plot, px, stroke},
     live::{Panel, scatter_json},
     thin::{binned, sample},
 };
@@ -59,7 +59,7 @@ pub(crate) fn dots_figure(description: &str, against: &Shared<'_>, panels: &[Dot
         .collect();
     let (link, by) = against.brush;
     let live = scatter_json(link, by, &against.x, against.names, &told);
-    let frame = Frame { width: 400, height: PANEL * panels.len() as u32 + LABEL };
+    let frame = FigureSize { width: 400, height: PANEL * panels.len() as u32 + LABEL };
     Figure::new(description)
         .draw(frame, |area| {
             let mut rest = area.clone();

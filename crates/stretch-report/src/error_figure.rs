@@ -6,7 +6,7 @@ use stretch_calibrate::Evaluation;
 use super::{
     canvas::Ink,
     dots_figure::{Dots, Shared, dots_figure},
-    figure::{Axes, Figure, Frame, plot, stroke},
+    figure::{Axes, Figure, FigureSize, plot, stroke},
     markup::{number, with_unit},
     thin::{extent, padded, quantile, sorted},
 };
@@ -114,7 +114,10 @@ pub(crate) fn residual_figure(evaluation: &Evaluation, names: &[String]) -> Figu
         })
     };
     let legend = names.iter().enumerate().map(|(i, name)| (Ink::of(i), name.clone()));
-    Figure::new(&description).draw(Frame::NARROW, draw).draw(Frame::WIDE, draw).legend(legend)
+    Figure::new(&description)
+        .draw(FigureSize::NARROW, draw)
+        .draw(FigureSize::WIDE, draw)
+        .legend(legend)
 }
 
 /// Places and errors of each method over all trials.

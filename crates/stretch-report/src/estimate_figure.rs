@@ -7,7 +7,7 @@ use stretch_calibrate::{Evaluation, TrialErrors};
 
 use super::{
     canvas::Ink,
-    figure::{Axes, Figure, Frame, plot, stroke},
+    figure::{Axes, Figure, FigureSize, plot, stroke},
     live::TimePlot,
     markup::{number, with_unit},
     thin::{curve, extent, padded},
@@ -59,7 +59,7 @@ fn live(
         link: trial.trial.clone(),
         labels: ["time, s", unit.trim_end_matches(',')],
         unit: &evaluation.unit,
-        height: Frame::WIDE.height,
+        height: FigureSize::WIDE.height,
         time: &trial.time_s,
         view,
         is_whole,
@@ -88,8 +88,8 @@ fn window_figure(
     names: &[String],
     window: &Range<f64>,
 ) -> Figure {
-    let bins = |frame: Frame| if frame == Frame::WIDE { 750 } else { 360 };
-    let lines = |frame: Frame| {
+    let bins = |frame: FigureSize| if frame == FigureSize::WIDE { 750 } else { 360 };
+    let lines = |frame: FigureSize| {
         let thin = |values: &[f64]| curve(&trial.time_s, values, window, bins(frame));
         let estimates = trial.estimates.iter().enumerate();
         // a broad reference below: where an estimate is right, it lies inside
@@ -98,7 +98,7 @@ fn window_figure(
         let estimates = estimates.map(|(i, y)| (Ink::of(i), 1.4, thin(y)));
         reference.into_iter().chain(estimates).collect::<Vec<_>>()
     };
-    let wide = lines(Frame::WIDE);
+    let wide = lines(FigureSize::WIDE);
     let all = wide.iter().flat_map(|(_, _, pieces)| pieces.iter().flatten());
     let Some(y) = extent(all.map(|(_, y)| *y)) else {
         return Figure::missing("Reference and estimates hold no number here.");
@@ -117,7 +117,7 @@ fn window_figure(
         "Reference and estimates of {} over time, from {from_to} s; unit: {}",
         trial.trial, evaluation.unit
     );
-    let narrow = lines(Frame::NARROW);
+    let narrow = lines(FigureSize::NARROW);
     let draw = |lines: Vec<Line>| {
         let axes = &axes;
         move |area: &super::figure::Area<'_>| {
@@ -133,8 +133,8 @@ fn window_figure(
     };
     let methods = names.iter().enumerate().map(|(i, name)| (Ink::of(i), name.clone()));
     Figure::new(&description)
-        .draw(Frame::NARROW, draw(narrow))
-        .draw(Frame::WIDE, draw(wide))
+        .draw(FigureSize::NARROW, draw(narrow))
+        .draw(FigureSize::WIDE, draw(wide))
         .legend([(Ink::Truth, "reference".to_owned())])
         .legend(methods)
 }

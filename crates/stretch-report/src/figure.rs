@@ -32,14 +32,14 @@ pub fn px(pixels: f64) -> i32 {
 
 /// The size of a drawing, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Frame {
+pub struct FigureSize {
     /// Width.
     pub width: u32,
     /// Height.
     pub height: u32,
 }
 
-impl Frame {
+impl FigureSize {
     /// For half a desktop page or a whole phone: its text stays legible at 360 px.
     pub const NARROW: Self = Self { width: 400, height: 290 };
     /// For the whole width of a desktop page.
@@ -57,7 +57,7 @@ pub struct Figure {
     pub missing: Option<String>,
     /// What the page's script draws in its place, as JSON.
     pub live: Option<String>,
-    drawings: Vec<(Frame, String)>,
+    drawings: Vec<(FigureSize, String)>,
 }
 
 impl Figure {
@@ -73,7 +73,7 @@ impl Figure {
 
     /// Draws it in one frame; the narrowest of several is for phones.
     #[must_use]
-    pub fn draw(mut self, frame: Frame, draw: impl FnOnce(&Area<'_>) -> Drawn) -> Self {
+    pub fn draw(mut self, frame: FigureSize, draw: impl FnOnce(&Area<'_>) -> Drawn) -> Self {
         let mut body = String::new();
         let done = {
             let area = Canvas::new(&mut body, frame.width, frame.height).into_drawing_area();
@@ -111,7 +111,7 @@ impl Figure {
         let both = self.drawings.len() > 1;
         let narrowest = self.drawings.iter().map(|(frame, _)| frame.width).min();
         let label = escape(&self.description);
-        let drawing = |(frame, body): &(Frame, String)| {
+        let drawing = |(frame, body): &(FigureSize, String)| {
             let class = match (both, Some(frame.width) == narrowest) {
                 (false, _) => "",
                 (true, true) => " class=\"narrow\"",

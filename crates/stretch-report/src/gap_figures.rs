@@ -9,7 +9,7 @@ use super::{
     bar_figure::GAP,
     canvas::Ink,
     dots_figure::{Dots, Shared, dots_figure},
-    figure::{Area, Axes, Figure, Frame, plot, stroke},
+    figure::{Area, Axes, Figure, FigureSize, plot, stroke},
     live::TimePlot,
     subject::Subject,
     thin::{curve, extent, padded, quantile, sorted},
@@ -149,8 +149,8 @@ fn lines_figure(
         }
     };
     Figure::new(&format!("{y_label} over time, eight seconds of a test trial"))
-        .draw(Frame { width: 400, height: height.min(250) }, draw(thin(360)))
-        .draw(Frame { width: 880, height }, draw(wide))
+        .draw(FigureSize { width: 400, height: height.min(250) }, draw(thin(360)))
+        .draw(FigureSize { width: 880, height }, draw(wide))
 }
 
 /// The test trial with the largest gap, and the eight seconds of it in which the re-tuned simulator is farthest off.

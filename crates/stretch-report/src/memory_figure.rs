@@ -6,7 +6,7 @@ use stretch_core::{Calibration, Model};
 
 use super::{
     canvas::Ink,
-    figure::{Axes, Figure, Frame, plot, stroke},
+    figure::{Axes, Figure, FigureSize, plot, stroke},
     live::TimePlot,
     thin::{extent, padded},
 };
@@ -86,7 +86,7 @@ pub(crate) fn step_figure(name: &str, calibrated: &Calibrated, unit: &str) -> Fi
         moves: None,
     };
     Figure::new(&format!("Answer of {name} to a step of the signal"))
-        .draw(Frame::NARROW, |area| {
+        .draw(FigureSize::NARROW, |area| {
             plot(area, &axes, |chart| {
                 for run in points.split(|(_, y)| !y.is_finite()) {
                     let line = super::thin::sample_in_order(run, 900);
@@ -127,7 +127,7 @@ pub(crate) fn loop_figure(name: &str, calibrated: &Calibrated, unit: &str) -> Fi
     };
     let legend = PERIODS_S.iter().zip(INKS).map(|(s, ink)| (ink, format!("up and down in {s} s")));
     Figure::new(&format!("Estimate of {name} over the signal on triangles of three speeds"))
-        .draw(Frame::NARROW, |area| {
+        .draw(FigureSize::NARROW, |area| {
             plot(area, &axes, |chart| {
                 for (points, ink) in loops.iter().zip(INKS) {
                     let line = super::thin::sample_in_order(points, 400);

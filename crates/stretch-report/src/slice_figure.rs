@@ -7,7 +7,7 @@ use plotters::prelude::*;
 use super::{
     branch::BranchView,
     canvas::Ink,
-    figure::{Axes, Figure, Frame, dot, plot, px, stroke},
+    figure::{Axes, Figure, FigureSize, dot, plot, px, stroke},
     markup::number,
     thin::{padded, quantile, sample, sorted},
 };
@@ -43,7 +43,7 @@ pub(crate) fn slice_figure(view: &BranchView<'_>) -> Figure {
         (ink, format!("{pace}: {rate}{unit}"))
     });
     Figure::new(&description)
-        .draw(Frame::NARROW, |area| {
+        .draw(FigureSize::NARROW, |area| {
             plot(area, &axes, |chart| {
                 for (third, ink) in thirds.iter().zip(INKS) {
                     let dots = sample(third, DOTS).into_iter();

@@ -8,7 +8,7 @@ use plotters::{
 use super::{
     branch::BranchView,
     canvas::Ink,
-    figure::{Area, Drawn, Figure, Frame, dot, px, stroke, words},
+    figure::{Area, Drawn, Figure, FigureSize, dot, px, stroke, words},
     markup::tick,
     thin::sample,
 };
@@ -29,7 +29,7 @@ pub(crate) fn surface_figure(view: &BranchView<'_>, ink: Ink) -> Figure {
     let legend =
         [(ink, format!("{} surface", view.name())), (Ink::Truth, "samples of the fit".to_owned())];
     Figure::new(&description)
-        .draw(Frame { width: 400, height: 340 }, |area| draw(area, view, ink))
+        .draw(FigureSize { width: 400, height: 340 }, |area| draw(area, view, ink))
         .legend(legend)
         .live(live(view, ink))
 }

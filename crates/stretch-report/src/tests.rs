@@ -12,7 +12,7 @@ use testkit::page::without_program;
 use super::{
     Context, Judged, calibration_page,
     canvas::Ink,
-    figure::{Axes, Figure, Frame, plot},
+    figure::{Axes, Figure, FigureSize, plot},
     markup::{escape, fixed, number, tick},
     page::{Page, Table},
     readme_picture, thin,
@@ -352,7 +352,7 @@ fn the_frame_serves_other_reports() {
         is_log: false,
     };
     let figure = Figure::new("an empty figure")
-        .draw(Frame::NARROW, |area| plot(area, &axes, |_| Ok(())))
+        .draw(FigureSize::NARROW, |area| plot(area, &axes, |_| Ok(())))
         .legend([(Ink::Second, "nothing".to_owned())]);
     let mut page = Page::new("t", "v");
     page.section("one", "").figure(&figure, "c").figure(&Figure::missing("no data"), "d");
@@ -440,7 +440,8 @@ fn a_logarithmic_axis_bears_the_numbers_it_stands_for() {
         y_label: "gain".into(),
         is_log: true,
     };
-    let figure = Figure::new("a gain").draw(Frame::NARROW, |area| plot(area, &axes, |_| Ok(())));
+    let figure =
+        Figure::new("a gain").draw(FigureSize::NARROW, |area| plot(area, &axes, |_| Ok(())));
     let svg = figure.svg();
     for number in [">0.1<", ">1<", ">10<"] {
         assert!(svg.contains(number), "{number} in {svg}");

@@ -9,7 +9,7 @@ use stretch_gap::{Answered, Response, Responses};
 use super::{
     bar_figure::GAP,
     canvas::Ink,
-    figure::{Area, Axes, Drawn, Figure, Frame, plot, px, stroke},
+    figure::{Area, Axes, Drawn, Figure, FigureSize, plot, px, stroke},
     gap_figures::{AFTER, Shown},
     live::{Packed, Panel, change},
     subject::Subject,
@@ -75,7 +75,7 @@ pub(crate) fn turn_figure(subject: &Subject<'_>, stage: usize, shown: &Shown) ->
         "products": responses.products,
         "parameters": turned,
     });
-    let frame = Frame { width: 400, height: PANEL * responses.parameters.len() as u32 };
+    let frame = FigureSize { width: 400, height: PANEL * responses.parameters.len() as u32 };
     let figure = Figure::new("What is left on the test trials against every number of the effect")
         .draw(frame, |area| {
             let mut rest = area.clone();

@@ -42,7 +42,7 @@ class Receptor:
 
     def step(self, time_s: float, signal: float) -> Reading | None:
         """The reading of the next sample; None while the rate estimator warms up, and where a sample is not a number."""
-    def feel(self, pressure: float) -> None:
+    def set_pressure(self, pressure: float) -> None:
         """The pressure of the samples to come, for a calibration that needs it."""
     @property
     def faults(self) -> dict[str, int]:

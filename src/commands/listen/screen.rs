@@ -7,7 +7,7 @@ use std::{
 
 use terminal_size::{Height, Width, terminal_size};
 
-use super::{plot::curve, record::Sample, status::Status, twin::Twin};
+use super::{plot::curve, status::Status, trial_file::Sample, twin::Twin};
 
 /// Seconds that the plot shows.
 const SPAN_S: f64 = 20.0;

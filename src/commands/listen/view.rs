@@ -13,7 +13,7 @@ use std::{
 
 use anyhow::Context;
 
-use super::{record::Sample, screen::Screen, twin::Twin};
+use super::{screen::Screen, trial_file::Sample, twin::Twin};
 use crate::{
     commands::stop,
     display::{Output, warn},

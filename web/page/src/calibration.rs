@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use stretch_calibrate::{
     Calibrated, Cause, Evaluation, Judged, ModelChoice, ModelKind, ModelRow, Options, calibrate,
     calibration_to_json, candidate_models, choose_among, evaluate, explains_little,
-    explains_nothing, judge_model, parse_adc, without_wild,
+    explains_nothing, judge_model, parse_adc, without_gross_errors,
 };
 use stretch_data::{Split, Trial};
 use stretch_export::header;
@@ -52,7 +52,7 @@ impl Choices {
         if trials.is_empty() {
             return Err(Said("there is no recording to fit: drop one".to_owned()));
         }
-        Ok(without_wild(&trials, &[&self.reference, &self.signal]))
+        Ok(without_gross_errors(&trials, &[&self.reference, &self.signal]))
     }
 }
 

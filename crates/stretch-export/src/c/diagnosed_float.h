@@ -70,7 +70,7 @@ static inline void stretch_init(stretch_state *s)
 
 @if crosstalk
 /* The pressure of the samples to come; one that is not a number changes nothing. */
-static inline void stretch_feel(stretch_state *s, float pressure)
+static inline void stretch_set_pressure(stretch_state *s, float pressure)
 {
     if (stretch_usable(pressure)) {
         s->pressed = pressure * (STRETCH_PRESSED + STRETCH_PRESSED_TWICE * pressure);

@@ -14,7 +14,7 @@ static STRETCH_APART int stretch_self_test(void)
         stretch_reading reading;
         uint8_t flags;
 @if pressure
-        stretch_feel(&state, samples[n].pressure);
+        stretch_set_pressure(&state, samples[n].pressure);
 @end
         reading = stretch_step(&state, samples[n].@INPUT@);
         flags =

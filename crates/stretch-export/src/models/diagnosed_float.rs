@@ -114,7 +114,7 @@ fn defects(constants: &mut Constants, has: &mut Vec<&'static str>, defects: &Def
     if let Some([pressed, twice]) = defects.crosstalk {
         has.push("crosstalk");
         constants
-            .word("TAKES_PRESSURE", 1, "by stretch_feel, before a sample")
+            .word("TAKES_PRESSURE", 1, "by stretch_set_pressure, before a sample")
             .define("PRESSED", pressed, "drive per pressure")
             .define("PRESSED_TWICE", twice, "and per its square");
     }

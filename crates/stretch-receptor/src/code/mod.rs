@@ -20,6 +20,8 @@
 mod adc;
 mod arithmetic;
 mod calibration;
+#[cfg(feature = "serde")]
+mod code_record;
 mod fixed_arithmetic;
 mod float_arithmetic;
 mod fold;
@@ -27,8 +29,6 @@ mod observer;
 mod observer_numbers;
 mod reading;
 mod receptor;
-#[cfg(feature = "serde")]
-mod record;
 mod sheet;
 
 pub use adc::{Adc, AdcCode, AdcSpec};

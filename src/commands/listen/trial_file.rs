@@ -63,7 +63,7 @@ pub(crate) fn header(twin: &Twin) -> String {
 }
 
 /// A trial file that grows by whole lines; one without a row goes when this does.
-pub(crate) struct Recording {
+pub(crate) struct TrialFile {
     path: PathBuf,
     file: File,
     line: Vec<u8>,
@@ -72,7 +72,7 @@ pub(crate) struct Recording {
     rows: u64,
 }
 
-impl Recording {
+impl TrialFile {
     /// A new file; one that exists is not touched, save for what a recording that was killed before
     /// its first row has left.
     pub(crate) fn create(path: &Path, header: &str) -> io::Result<Self> {
@@ -150,7 +150,7 @@ fn without_a_row(path: &Path) -> io::Result<Option<File>> {
     Ok(Some(file))
 }
 
-impl Drop for Recording {
+impl Drop for TrialFile {
     /// A header alone would stand in the way of the next try.
     fn drop(&mut self) {
         if self.rows == 0 {

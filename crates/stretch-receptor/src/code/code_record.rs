@@ -10,7 +10,7 @@ use super::{
 };
 
 #[derive(Serialize, Deserialize)]
-struct Record<L, P> {
+struct CodeRecord<L, P> {
     /// First, so that a newer record is refused before the rest is read.
     schema: u32,
     /// Window, degree and delay of the rate.
@@ -29,7 +29,7 @@ where
     A::Surface: Serialize,
 {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        Record {
+        CodeRecord {
             schema: CODE_SCHEMA,
             shape: (WINDOW as u16, DEGREE as u8, DELAY as u16),
             adc_bits: self.bits,
@@ -49,7 +49,7 @@ where
     A::Surface: Deserialize<'de>,
 {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let record = Record::<A::Line, A::Surface>::deserialize(deserializer)?;
+        let record = CodeRecord::<A::Line, A::Surface>::deserialize(deserializer)?;
         Self::check(record).map_err(D::Error::custom)
     }
 }
@@ -57,8 +57,9 @@ where
 impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
     CodeCalibration<A, WINDOW, DEGREE, DELAY>
 {
-    fn check(record: Record<A::Line, A::Surface>) -> Result<Self, DesignError> {
-        let Record { schema, shape, adc_bits, sample_rate_hz, falling, dead_band, sheets } = record;
+    fn check(record: CodeRecord<A::Line, A::Surface>) -> Result<Self, DesignError> {
+        let CodeRecord { schema, shape, adc_bits, sample_rate_hz, falling, dead_band, sheets } =
+            record;
         if !(1..=CODE_SCHEMA).contains(&schema) {
             return Err(DesignError::Schema { found: schema, newest: CODE_SCHEMA });
         }

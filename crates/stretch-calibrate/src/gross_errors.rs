@@ -5,47 +5,47 @@ use stretch_data::{Channel, Trial};
 
 use crate::series::extent;
 
-/// At most this share of the rows is called wild: beyond it, two levels that a channel really has
+/// At most this share of the rows is called a gross error: beyond it, two levels that a channel really has
 /// (a muscle held at two lengths) could be taken for values and their outliers. A tenth is what a
 /// location estimate of the simplest kind, the decile mean, still survives.
 pub(crate) const MOST_SHARE: f64 = 0.1;
 
-/// The trials without the rows in which one of `columns` is wild, and a sentence for each column
+/// The trials without the rows in which one of `columns` has a gross error, and a sentence for each column
 /// that had such values.
 ///
-/// A channel that was sampled while it moved leaves no hole in its values. Wild are those beyond a
+/// A channel that was sampled while it moved leaves no hole in its values. Gross errors are those beyond a
 /// hole that is wider than all that the other values span, a tenth of the rows at most: `-999`
 /// among lengths, a spike to the supply. What lies inside the span is the robust fit's part.
 ///
 /// ```
-/// use stretch_calibrate::without_wild;
+/// use stretch_calibrate::without_gross_errors;
 /// use stretch_data::{Channel, Trial};
 ///
 /// let values = (0..100).map(|n| if n == 40 { -999.0 } else { 150.0 + f64::from(n % 30) });
 /// let length = Channel { name: "length_mm".into(), values: values.collect() };
 /// let time_s = (0..100).map(|n| 0.01 * f64::from(n)).collect();
 /// let trial = Trial { name: "ramp.csv".into(), time_s, channels: vec![length] };
-/// let (kept, told) = without_wild(&[trial], &["length_mm"]);
+/// let (kept, told) = without_gross_errors(&[trial], &["length_mm"]);
 /// assert_eq!(kept[0].len(), 99);
-/// assert!(told[0].contains("1 of 100 values of length_mm are wild (-999"), "{}", told[0]);
+/// assert!(told[0].contains("1 of 100 values of length_mm are gross errors (-999"), "{}", told[0]);
 /// ```
-pub fn without_wild(trials: &[Trial], columns: &[&str]) -> (Vec<Trial>, Vec<String>) {
+pub fn without_gross_errors(trials: &[Trial], columns: &[&str]) -> (Vec<Trial>, Vec<String>) {
     let mut told = Vec::new();
     let mut kept: Vec<Trial> = trials.to_vec();
     for column in columns {
         let values: Vec<f64> =
             kept.iter().filter_map(|trial| trial.channel(column)).flatten().copied().collect();
         let Some((low, high)) = span(&values) else { continue };
-        let is_wild = |x: f64| x < low || x > high;
-        let wild: Vec<f64> = values.iter().copied().filter(|&x| is_wild(x)).collect();
-        let Interval { min: least, max: most } = extent(wild.iter().copied());
-        let counts = (wild.len() as u64, values.len() as u64);
+        let is_gross = |x: f64| x < low || x > high;
+        let gross: Vec<f64> = values.iter().copied().filter(|&x| is_gross(x)).collect();
+        let Interval { min: least, max: most } = extent(gross.iter().copied());
+        let counts = (gross.len() as u64, values.len() as u64);
         told.push(sentence(column, counts, (least, most), (low, high)));
         for trial in &mut kept {
             // a ragged one stays as it is: whoever fits it refuses it
             let own = trial.channel(column).filter(|_| trial.check_lengths().is_ok());
             let Some(own) = own else { continue };
-            let stays: Vec<bool> = own.iter().map(|&x| !is_wild(x)).collect();
+            let stays: Vec<bool> = own.iter().map(|&x| !is_gross(x)).collect();
             *trial = rows(trial, &stays);
         }
     }
@@ -53,21 +53,21 @@ pub fn without_wild(trials: &[Trial], columns: &[&str]) -> (Vec<Trial>, Vec<Stri
     (kept, told)
 }
 
-/// What to say of the wild values of a column, so many of so many, from their least to their greatest.
+/// What to say of the gross errors of a column, so many of so many, from their least to their greatest.
 pub(crate) fn sentence(
     column: &str,
-    (wild, of): (u64, u64),
+    (gross, of): (u64, u64),
     (least, most): (f64, f64),
     (low, high): (f64, f64),
 ) -> String {
     let shown = if least == most { format!("{least}") } else { format!("{least} .. {most}") };
     format!(
-        "{wild} of {of} values of {column} are wild ({shown}, all others {low} .. {high}); their rows are left out: see \
+        "{gross} of {of} values of {column} are gross errors ({shown}, all others {low} .. {high}); their rows are left out: see \
          what the recorder writes where it has no sample"
     )
 }
 
-/// From the least to the greatest value that is not wild; none where no value is.
+/// From the least to the greatest value that is no gross error; none where no value is.
 pub(crate) fn span(values: &[f64]) -> Option<(f64, f64)> {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
@@ -94,7 +94,7 @@ pub(crate) fn span(values: &[f64]) -> Option<(f64, f64)> {
         }
     }
     let (low, high) = (sorted[from], sorted[to]);
-    // a channel that stands still but for a few values is no range to be wild beyond
+    // a channel that stands still but for a few values is no range to err beyond
     (low < high && (from > 0 || to + 1 < sorted.len())).then_some((low, high))
 }
 
@@ -122,11 +122,12 @@ mod tests {
         assert_eq!(span(&usual), None);
         let with = |more: &[f64]| span(&[&usual[..], more].concat());
         let (low, high) = with(&[]).unwrap_or((151.0, 179.0));
-        for wild in [&[-999.0][..], &[-999.0; 20], &[-999.0, 9999.0], &[0.0, 1e308], &[1e30; 100]] {
-            let found = with(wild).unwrap();
+        for gross in [&[-999.0][..], &[-999.0; 20], &[-999.0, 9999.0], &[0.0, 1e308], &[1e30; 100]]
+        {
+            let found = with(gross).unwrap();
             assert!(
                 (found.0 - low).abs() < 0.1 && (found.1 - high).abs() < 0.1,
-                "{wild:?} {found:?}"
+                "{gross:?} {found:?}"
             );
         }
         // beside the range, and not beyond a hole

@@ -17,8 +17,8 @@ use stretch_data::{Channel, SessionTrial, Split, Trial};
 use stretch_gap::Options;
 use stretch_problem::{
     BlackBox, Checked, Examined, Problem, ProblemFile, ProblemSpec, Source,
+    kind_named,
     worker::{Workers, WorkersSpec, session_header},
-    wrapper_named,
 };
 use stretch_report::{Subject, diagnosis_page};
 
@@ -242,5 +242,5 @@ fn answer(problem: &Problem, examined: Examined) -> Answer {
 /// What a wrapper is, in words, and its equation; None for another name.
 #[pyfunction]
 pub(crate) fn wrapper(name: &str) -> Option<(&'static str, &'static str)> {
-    wrapper_named(name).map(|kind| (kind.words, kind.equation))
+    kind_named(name).map(|kind| (kind.words, kind.equation))
 }

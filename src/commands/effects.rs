@@ -1,10 +1,11 @@
 //! `stretch effects`: the catalogue of what a rig may do beside its nominal physics.
 
 use anyhow::Context;
-use stretch_sim::{
-    CATALOGUE, Effect, EffectParameter, Grid, Language, RATE_HZ, RigParams, Role, SimError,
-    Surroundings, effect_named,
+use stretch_effects::{
+    Effect, EffectParameter, Extent, Grid, KINDS, Kind, Language, Quantity, Role, Signals, Sketch,
+    kind_named,
 };
+use stretch_sim::{CATALOGUE, RATE_HZ, RigParams, SimError, effect_named};
 
 use super::{
     json::Json,
@@ -23,12 +24,18 @@ use super::{
 /// or type them into a simulator of your own:
 ///
 ///   stretch effects gauge_hysteresis --code python
+///
+/// With --kinds the kinds that they are made of: what `wrap` in a problem file puts in
+/// front of or behind any simulator, with ranges for a channel from 0 to 1.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
     /// Effects to list [default: all]
     #[arg(value_name = "NAME")]
     names: Vec<String>,
+    /// List kinds, for any channel, in place of the rig's effects
+    #[arg(long)]
+    kinds: bool,
     #[command(flatten)]
     json: Json,
     /// Print code with the typical numbers, for a record at 100 Hz
@@ -51,18 +58,65 @@ enum Code {
     Matlab,
 }
 
-pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    let chosen: Vec<&Effect> = if args.names.is_empty() {
-        CATALOGUE.to_vec()
-    } else {
-        let find = |name: &String| {
-            effect_named(name).ok_or_else(|| {
-                let names = CATALOGUE.iter().map(|e| e.name);
-                let nearest = stretch_data::nearest(name, names).map(str::to_owned);
-                SimError::UnknownEffect { name: name.clone(), nearest }
-            })
+/// An effect of the rig, or a kind for any channel.
+enum Entry {
+    Effect(&'static Effect),
+    Kind(&'static Kind),
+}
+
+impl Entry {
+    fn named(name: &str, kinds: bool) -> Result<Self, SimError> {
+        let effect = effect_named(name).filter(|_| !kinds).map(Self::Effect);
+        effect.or_else(|| kind_named(name).map(Self::Kind)).ok_or_else(|| {
+            let names = CATALOGUE.iter().map(|e| e.name).chain(KINDS.iter().map(|k| k.name));
+            let nearest = stretch_data::nearest(name, names).map(str::to_owned);
+            SimError::UnknownEffect { name: name.to_owned(), nearest }
+        })
+    }
+
+    /// Name, words, equation, and where it acts.
+    fn told(&self) -> [&'static str; 4] {
+        match self {
+            Self::Effect(e) => [e.name, e.words, e.equation, e.stage.name()],
+            Self::Kind(k) => [k.name, k.words, k.equation, "any channel"],
+        }
+    }
+
+    fn parameters(&self) -> Vec<EffectParameter> {
+        match self {
+            Self::Effect(effect) => effect.parameters.to_vec(),
+            Self::Kind(kind) => (kind.parameters)(&CHANNEL, "1"),
+        }
+    }
+
+    /// How it is typed with these values.
+    fn sketch(&self, values: &[f64]) -> anyhow::Result<Sketch> {
+        let grid = Grid::samples(1.0 / RATE_HZ)?;
+        let sketch = match self {
+            Self::Effect(effect) => {
+                effect.sketch(values, &RigParams::default().surroundings(&grid))
+            }
+            Self::Kind(kind) => {
+                let x = Quantity::new("x", "1", "the channel");
+                let beside = Quantity::new("e", "1", "what is beside it");
+                let signals = Signals { x, beside, dt_s: grid.dt_s() };
+                kind.sketch.map(|sketch| sketch(values, &CHANNEL, &signals))
+            }
         };
-        args.names.iter().map(find).collect::<Result<_, _>>()?
+        sketch.context("nobody has written its code down")
+    }
+}
+
+/// A channel from 0 to 1.
+const CHANNEL: Extent = Extent::between(0.0, 1.0);
+
+pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+    let chosen: Vec<Entry> = match (args.names.is_empty(), args.kinds) {
+        (true, true) => KINDS.iter().copied().map(Entry::Kind).collect(),
+        (true, false) => CATALOGUE.iter().copied().map(Entry::Effect).collect(),
+        (false, kinds) => {
+            args.names.iter().map(|name| Entry::named(name, kinds)).collect::<Result<_, _>>()?
+        }
     };
     if let Some(code) = args.code {
         let language = match code {
@@ -72,43 +126,43 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         };
         return chosen
             .iter()
-            .try_for_each(|effect| say_as_is(typical_code(effect, language)?.trim_end()));
+            .try_for_each(|entry| say_as_is(typical_code(entry, language)?.trim_end()));
     }
-    let answer: Vec<_> = chosen.iter().map(|effect| json(effect)).collect();
+    let answer: Vec<_> = chosen.iter().map(json).collect();
     args.json.answer(&answer, || list(&chosen))
 }
 
 /// The catalogue as text.
-fn list(chosen: &[&Effect]) -> anyhow::Result<()> {
-    let mut stage = None;
-    for effect in chosen {
-        if stage != Some(effect.stage) {
-            say(format!("{}{}", if stage.is_some() { "\n" } else { "" }, effect.stage))?;
-            stage = Some(effect.stage);
+fn list(chosen: &[Entry]) -> anyhow::Result<()> {
+    let mut before = None;
+    for entry in chosen {
+        let [name, words, equation, place] = entry.told();
+        if before != Some(place) {
+            say(format!("{}{place}", if before.is_some() { "\n" } else { "" }))?;
+            before = Some(place);
         }
-        say(format!("  {}: {}", effect.name, effect.words))?;
-        say(format!("      {}", effect.equation))?;
+        say(format!("  {name}: {words}"))?;
+        say(format!("      {equation}"))?;
+        let parameters = entry.parameters();
         let of = |is_form: bool| {
-            let own = effect.parameters.iter();
-            own.filter(move |p| matches!(p.role, Role::Form { .. }) == is_form).map(range)
+            let own = parameters.iter().filter(|p| p.is_form() == is_form);
+            own.map(range).collect::<Vec<_>>().join("; ")
         };
-        say(format!("      {}", of(false).collect::<Vec<_>>().join("; ")))?;
-        let forms: Vec<String> = of(true).collect();
+        say(format!("      {}", of(false)))?;
+        let forms = of(true);
         if !forms.is_empty() {
-            say(format!("      form {}", forms.join("; ")))?;
+            say(format!("      form {forms}"))?;
         }
     }
     Ok(())
 }
 
 /// The code of an effect as a usual rig has it.
-fn typical_code(effect: &Effect, language: Language) -> anyhow::Result<String> {
-    let (params, grid) = (RigParams::default(), Grid::samples(1.0 / RATE_HZ)?);
-    let values: Vec<f64> = effect.parameters.iter().map(EffectParameter::usual).collect();
-    let sketch = effect.sketch.context("nobody has written its code down")?;
-    let sketch = sketch(&values, &Surroundings::of_rig(&params, &grid));
-    let comments = [format!("{}: {}.", effect.name, effect.words), effect.equation.to_owned()];
-    Ok(sketch.code(language, effect.name, &comments))
+fn typical_code(entry: &Entry, language: Language) -> anyhow::Result<String> {
+    let values: Vec<f64> = entry.parameters().iter().map(EffectParameter::usual).collect();
+    let [name, words, equation, _] = entry.told();
+    let comments = [format!("{name}: {words}."), equation.to_owned()];
+    Ok(entry.sketch(&values)?.code(language, name, &comments))
 }
 
 /// `h: 0 .. 0.6`, with the unit where there is one.
@@ -130,19 +184,16 @@ fn range(p: &EffectParameter) -> String {
     format!("{}: {} .. {}{unit}{default}", p.name, number(*allowed.start()), number(*allowed.end()))
 }
 
-fn json(effect: &Effect) -> serde_json::Value {
-    let parameters: Vec<serde_json::Value> = effect
-        .parameters
-        .iter()
-        .map(|p| {
-            serde_json::json!({
-                "name": p.name, "role": p.role.name(), "unit": p.unit, "min": p.allowed().start(), "max": p.allowed().end(),
-                "off": p.off(), "typical": p.typical, "usual": p.usual(),
-            })
+fn json(entry: &Entry) -> serde_json::Value {
+    let one = |p: &EffectParameter| {
+        serde_json::json!({
+            "name": p.name, "role": p.role.name(), "unit": p.unit, "min": p.allowed().start(), "max": p.allowed().end(),
+            "off": p.off(), "typical": p.typical, "usual": p.usual(),
         })
-        .collect();
+    };
+    let parameters: Vec<serde_json::Value> = entry.parameters().iter().map(one).collect();
+    let [name, words, equation, place] = entry.told();
     serde_json::json!({
-        "name": effect.name, "words": effect.words, "stage": effect.stage.name(), "equation": effect.equation,
-        "parameters": parameters,
+        "name": name, "words": words, "stage": place, "equation": equation, "parameters": parameters,
     })
 }

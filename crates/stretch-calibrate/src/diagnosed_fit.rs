@@ -3,13 +3,12 @@
 use stretch_core::{
     Design, DiagnosedMap, Interval, Model, Provenance, RestTracker, Stage, Values, Volts,
 };
-use stretch_effects::{Backlash, Operator};
-use stretch_receptor::{Defects, DiagnosedReceptor};
+use stretch_receptor::{Defects as LiveDefects, DiagnosedReceptor};
 
 use crate::{
     CalibrateError, Coefficient, FitReport, Memory, Order,
+    defects::Defects,
     fitting::Fitted,
-    knobs::Knobs,
     observer_curve::{CurveRows, KNOTS, LEAST_RISE, Place, inner},
     observer_model::{Piece, SETTLE, pieces},
     prepared::{Prepared, Tally},
@@ -46,9 +45,9 @@ pub(crate) fn diagnosed(
     rest: bool,
     choice: Option<DiagnosedChoice>,
 ) -> Result<(Fitted, DiagnosedChoice), CalibrateError> {
-    let knobs = Knobs::of(prepared)?;
+    let defects = Defects::of(prepared)?;
     let mut trackers = vec![choice.as_ref().and_then(|c| c.rest)];
-    if choice.is_none() && (rest || knobs.drifts()) {
+    if choice.is_none() && (rest || defects.drifts()) {
         trackers = crate::rest::candidates(prepared).into_iter().map(Some).collect();
     }
     let mut best: Option<(Forward, DiagnosedMap)> = None;
@@ -56,11 +55,11 @@ pub(crate) fn diagnosed(
         let (forward, map) = match &choice {
             Some(c) => {
                 let record = Record::of(prepared, rest, c.errors_in)?;
-                let forward = record.fit(knobs.moved(c.at.clone()))?;
+                let forward = record.fit(defects.moved_to(c.at.clone()))?;
                 let map = record.judged(&forward, c.agility, c.steady_s)?;
                 (forward, map)
             }
-            None => refined(prepared, rest, &knobs)?,
+            None => refined(prepared, rest, &defects)?,
         };
         if best.as_ref().is_none_or(|(_, b)| map.fit.rmse < WORTH * b.fit.rmse) {
             best = Some((forward, map));
@@ -75,8 +74,8 @@ pub(crate) fn diagnosed(
         map.agility,
         map.steady_s,
     );
-    let Forward { knobs, rest, errors_in, .. } = forward;
-    let at = knobs.at;
+    let Forward { defects, rest, errors_in, .. } = forward;
+    let at = defects.at;
     let choice =
         DiagnosedChoice { at, errors_in, rest, agility: map.agility, steady_s: map.steady_s };
     Ok(((Model::Diagnosed(map), vec![report], vec![note]), choice))
@@ -86,13 +85,13 @@ pub(crate) fn diagnosed(
 fn refined(
     prepared: &Prepared,
     rest: Option<RestTracker>,
-    knobs: &Knobs,
+    defects: &Defects,
 ) -> Result<(Forward, DiagnosedMap), CalibrateError> {
     let record = Record::of(prepared, rest, ErrorsIn::Signal)?;
-    let forward = record.fit(knobs.clone())?;
+    let forward = record.fit(defects.clone())?;
     let map = record.tuned(&forward)?;
     let record = Record { errors_in: ErrorsIn::Target, ..record };
-    let fine = record.fit(forward.knobs.clone())?;
+    let fine = record.fit(forward.defects.clone())?;
     let fine_map = record.tuned(&fine)?;
     Ok(if fine_map.fit.rmse < map.fit.rmse { (fine, fine_map) } else { (forward, map) })
 }
@@ -100,7 +99,7 @@ fn refined(
 /// What a fit determined.
 struct Forward {
     errors_in: ErrorsIn,
-    knobs: Knobs,
+    defects: Defects,
     rest: Option<RestTracker>,
     /// Signed, rising.
     curve: Vec<f64>,
@@ -116,10 +115,9 @@ struct Forward {
 
 fn report(forward: &Forward, map: &DiagnosedMap) -> FitReport {
     let named = |(i, error): (usize, &f64)| {
-        let knob = &forward.knobs.knobs[i];
-        let value = forward.knobs.value(knob.effect, knob.name).unwrap_or(f64::NAN);
-        let name = format!("{} {}", knob.effect, knob.name);
-        Coefficient::named(name, value, 1.96 * knob.error(value, *error))
+        let parameter = &forward.defects.moved[i];
+        let value = parameter.value(forward.defects.at[i]);
+        Coefficient::named(parameter.name(), value, 1.96 * parameter.error(value, *error))
     };
     let coefficients: Vec<Coefficient> = forward.errors.iter().enumerate().map(named).collect();
     let kind = Memory::Diagnosed.to_string();
@@ -190,30 +188,28 @@ impl<'a> Record<'a> {
     }
 
     /// Pairs of drive and signal, the drive of so long before as the skew says.
-    fn pairs(&self, knobs: &Knobs) -> Simulated {
-        let map = knobs.map();
-        let defects = Defects::<f64>::new(&map, self.period_s);
+    fn pairs(&self, defects: &Defects) -> Simulated {
+        let map = defects.map();
+        let live = LiveDefects::<f64>::new(&map, self.period_s);
         let late = map.skew_s / self.period_s;
         let mut memory = None;
         let (mut pairs, mut windings) = (Vec::new(), Vec::new());
         for piece in &self.pieces {
             let mut targets = piece.smooth.clone();
-            if let Some(w) = knobs.backlash() {
-                Backlash::hard(w).undo(&mut targets);
-            }
+            defects.undo(self.period_s, &mut targets);
             let pressure = |i: usize| piece.pressure.get(i).copied().unwrap_or(0.0);
             let mut now = match &memory {
-                None => defects.begin(targets[0], pressure(0)),
+                None => live.begin(targets[0], pressure(0)),
                 Some(before) => {
-                    let now = defects.carry(before, targets[0], pressure(0));
-                    let stands = defects.winding(&now, targets[0], pressure(0));
+                    let now = live.carry(before, targets[0], pressure(0));
+                    let stands = live.winding(&now, targets[0], pressure(0));
                     windings.extend(stands.map(|share| (targets[0], share)));
                     now
                 }
             };
             let each = targets.iter().enumerate();
             let drives: Vec<f64> =
-                each.map(|(i, &y)| defects.advance(&mut now, y, pressure(i))).collect();
+                each.map(|(i, &y)| live.advance(&mut now, y, pressure(i))).collect();
             memory = Some(now);
             for (i, &signal) in piece.signal.iter().enumerate().skip(SETTLE) {
                 // Behind an end it is held: so every value of the skew leaves as many pairs.
@@ -235,9 +231,9 @@ impl<'a> Record<'a> {
     }
 
     /// The curve that leaves least, and what it leaves.
-    fn look(&self, knobs: &Knobs) -> Option<Seen> {
-        let Simulated { pairs, wound, travelled } = self.pairs(knobs);
-        if pairs.len() <= KNOTS + knobs.at.len() {
+    fn look(&self, defects: &Defects) -> Option<Seen> {
+        let Simulated { pairs, wound, travelled } = self.pairs(defects);
+        if pairs.len() <= KNOTS + defects.at.len() {
             return None;
         }
         let domain = inner(pairs.iter().map(|(drive, _)| *drive).collect())?;
@@ -266,30 +262,30 @@ impl<'a> Record<'a> {
     }
 
     /// Levenberg and Marquardt over the numbers of the defects, the curve solved for at each.
-    fn fit(&self, begin: Knobs) -> Result<Forward, CalibrateError> {
+    fn fit(&self, begin: Defects) -> Result<Forward, CalibrateError> {
         let undetermined = || CalibrateError::Undetermined { model: Memory::Diagnosed.to_string() };
         // a block counts as one observation, so does where the diagnosis saw it
         let block = (BLOCK_S / self.period_s).max(1.0);
-        let strayed = |knobs: &Knobs| knobs.strayed(&begin);
-        let mut knobs = begin.clone();
-        let mut seen = self.look(&knobs).ok_or_else(undetermined)?;
-        let count = knobs.at.len();
+        let strayed = |defects: &Defects| defects.strayed(&begin);
+        let mut defects = begin.clone();
+        let mut seen = self.look(&defects).ok_or_else(undetermined)?;
+        let count = defects.at.len();
         let mut damping = 1e-2;
         let mut normal = nalgebra::DMatrix::zeros(count, count);
         let iterations = if count > 0 { ITERATIONS } else { 0 };
         for _ in 0..iterations {
-            let columns = self.sensitivities(&knobs, &seen);
+            let columns = self.sensitivities(&defects, &seen);
             let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
             normal = nalgebra::DMatrix::from_fn(count, count, |i, j| dot(&columns[i], &columns[j]));
             let mut slope =
                 nalgebra::DVector::from_fn(count, |i, _| dot(&columns[i], &seen.residuals));
             let level = self.mean(&seen) * block;
-            let cost = |seen: &Seen, knobs: &Knobs| {
-                let stray: f64 = strayed(knobs).iter().map(|(d, w)| w * d * d).sum();
+            let cost = |seen: &Seen, defects: &Defects| {
+                let stray: f64 = strayed(defects).iter().map(|(d, w)| w * d * d).sum();
                 seen.square + level * stray
             };
-            let before = cost(&seen, &knobs);
-            for (i, (distance, weight)) in strayed(&knobs).into_iter().enumerate() {
+            let before = cost(&seen, &defects);
+            for (i, (distance, weight)) in strayed(&defects).into_iter().enumerate() {
                 normal[(i, i)] += level * weight;
                 slope[i] += level * weight * distance;
             }
@@ -300,12 +296,12 @@ impl<'a> Record<'a> {
                     damped[(i, i)] += damping * damped[(i, i)] + 1e-12 * before;
                 }
                 let Some(step) = damped.lu().solve(&slope) else { break };
-                let at = knobs.at.iter().zip(step.iter()).map(|(x, dx)| x - dx).collect();
-                let next = knobs.moved(at);
+                let at = defects.at.iter().zip(step.iter()).map(|(x, dx)| x - dx).collect();
+                let next = defects.moved_to(at);
                 match self.look(&next).filter(|s| cost(s, &next) < now) {
                     Some(better) => {
                         now = cost(&better, &next);
-                        (knobs, seen) = (next, better);
+                        (defects, seen) = (next, better);
                         damping = (damping * 0.3).max(1e-6);
                         break;
                     }
@@ -325,7 +321,7 @@ impl<'a> Record<'a> {
         let errors_in = self.errors_in;
         Ok(Forward {
             errors_in,
-            knobs,
+            defects,
             rest: self.rest,
             curve,
             domain,
@@ -341,15 +337,15 @@ impl<'a> Record<'a> {
     }
 
     /// By how much each number moves what is left.
-    fn sensitivities(&self, knobs: &Knobs, seen: &Seen) -> Vec<Vec<f64>> {
+    fn sensitivities(&self, defects: &Defects, seen: &Seen) -> Vec<Vec<f64>> {
         use rayon::prelude::*;
         let one = |i: usize| {
-            let knob = &knobs.knobs[i];
-            let mut at = knobs.at.clone();
-            let step = knob.step();
-            at[i] = if knob.held(at[i] + step) == at[i] { at[i] - step } else { at[i] + step };
-            let next = knobs.moved(at);
-            let moved = next.at[i] - knobs.at[i];
+            let parameter = &defects.moved[i];
+            let mut at = defects.at.clone();
+            let step = parameter.step();
+            at[i] = if parameter.held(at[i] + step) == at[i] { at[i] - step } else { at[i] + step };
+            let next = defects.moved_to(at);
+            let moved = next.at[i] - defects.at[i];
             match self.look(&next).filter(|_| moved != 0.0) {
                 Some(there) => {
                     let pairs = there.residuals.iter().zip(&seen.residuals);
@@ -358,7 +354,7 @@ impl<'a> Record<'a> {
                 None => vec![0.0; seen.residuals.len()],
             }
         };
-        (0..knobs.at.len()).into_par_iter().map(one).collect()
+        (0..defects.at.len()).into_par_iter().map(one).collect()
     }
 
     /// Standard errors, with one observation in a block.
@@ -430,11 +426,11 @@ impl<'a> Record<'a> {
         let sign = prepared.polarity.sign();
         let curve: Vec<f64> = forward.curve.iter().map(|v| sign * v).collect();
         let estimate_domain = self.targets.unwrap_or(forward.domain);
-        let map = forward.knobs.map();
+        let map = forward.defects.map();
         // the fitted curve knows where rest is, noise averaged out
-        let defects = Defects::<f64>::new(&map, self.period_s);
-        let mut still = defects.begin(estimate_domain.min, 0.0);
-        let at_rest = defects.advance(&mut still, estimate_domain.min, 0.0);
+        let live = LiveDefects::<f64>::new(&map, self.period_s);
+        let mut still = live.begin(estimate_domain.min, 0.0);
+        let at_rest = live.advance(&mut still, estimate_domain.min, 0.0);
         let level = Place::new(at_rest, forward.domain).on(&curve);
         let rest =
             forward.rest.map(|rest| RestTracker { level, catch_up_s: LIVE_CATCH_UP_S, ..rest });

@@ -1,6 +1,13 @@
 //! Bouc-Wen hysteresis.
 
-use crate::operator::{Operator, Span, Start};
+use alloc::{boxed::Box, vec};
+
+use crate::{
+    kind::{Family, Kind, Side},
+    operator::{Operator, Span, Start},
+    parameter::EffectParameter,
+    sketch::Sketch,
+};
 
 /// A smooth loop without a rate: y = x - c u, with a state u between -1 and 1 that follows the moves of the signal,
 ///
@@ -69,3 +76,50 @@ impl BoucWen {
         if dx < 0.0 { -along } else { along }
     }
 }
+
+/// Hysteresis that turns smoothly.
+pub static BOUC_WEN: Kind = Kind {
+    name: "bouc_wen",
+    words: "it turns back on a smooth loop (Bouc-Wen)",
+    equation: "y = x - c u, du = dx/s (1 - u sign(dx)) where u dx > 0, else dx/s",
+    usual: &[Side::Output],
+    parameters: |e, unit| {
+        let most = 0.15 * e.span();
+        vec![
+            EffectParameter::sized("c", unit, -most..=most),
+            EffectParameter::shaped("s", unit, 0.01 * e.span()..=0.5 * e.span()),
+        ]
+    },
+    operator: |v, _, _| Box::new(BoucWen { c: v[0], s: v[1] }),
+    sketch: Some(|v, _, signals| {
+        let body = "let dx = x - s.last
+            let way = abs(dx) / S
+            var along = s.u
+            if dx < 0
+            along = -s.u
+            end
+            if along >= 0
+            along = 1 - (1 - along) * exp(-way)
+            else
+            if way <= -along
+            along = along + way
+            else
+            along = -expm1(-(way + along))
+            end
+            end
+            s.u = along
+            if dx < 0
+            s.u = -along
+            end
+            s.last = x
+            let y = x - C * s.u";
+        let unit = &*signals.x.unit;
+        Sketch::of(signals.x.clone(), body)
+            .with_all(&[("C", v[0], unit), ("S", v[1], unit)])
+            .remembering(["last"])
+            .cells(["u"], "1", "0")
+    }),
+    twins: &["backlash", "hysteresis"],
+    family: Some((Family::Loop, |v| v[0])),
+    ..Kind::PLAIN
+};

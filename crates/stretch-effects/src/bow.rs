@@ -1,6 +1,17 @@
 //! Curves that are not quite lines.
 
-use crate::operator::{Operator, Span};
+use alloc::{boxed::Box, vec};
+
+use crate::{
+    effect::{Acts, Effect, each},
+    kind::{Beside, Kind, Side},
+    live::Live,
+    operator::{Operator, Span},
+    parameter::{EffectParameter, Form},
+    place::Place,
+    sketch::Sketch,
+    stage::Stage,
+};
 
 /// c 4 x (1 - x)(1 + skew (2 x - 1)): zero at 0 and 1, c in the middle, its top off the middle where skewed.
 ///
@@ -96,3 +107,83 @@ impl Operator for BowedGain {
         }
     }
 }
+
+/// A scale that bends.
+pub static CURVE: Kind = Kind {
+    name: "curve",
+    words: "its scale is bent",
+    equation: "y = x + 4 c z (1 - z)(1 + skew (2 z - 1)), z = (x - low)/span",
+    usual: &[Side::Input, Side::Output],
+    parameters: |e, unit| {
+        let most = 0.2 * e.span();
+        let skew = EffectParameter::formed("skew", "1", -1.0..=1.0, 0.0);
+        vec![EffectParameter::sized("c", unit, -most..=most), skew]
+    },
+    operator: |v, e, _| Box::new(Bow { c: v[0], skew: v[1], zero: e.low, span: e.span() }),
+    sketch: Some(|v, e, signals| {
+        let unit = signals.x.unit.clone();
+        let body = "let u = (x - ZERO) / SPAN
+            let y = x + C * 4 * u * (1 - u) * (1 + SKEW * (2 * u - 1))";
+        let place = [("ZERO", e.low, &*unit), ("SPAN", e.span(), &unit)];
+        let sketch = Sketch::of(signals.x.clone(), body);
+        sketch.with_all(&[("C", v[0], &*unit), ("SKEW", v[1], "1")]).with_all(&place)
+    }),
+    ..Kind::PLAIN
+};
+
+/// A gain that bends with what is beside the signal.
+pub static GAIN_CURVE: Kind = Kind {
+    name: "gain_curve",
+    words: "its gain bends",
+    equation: "y = x (1 + 4 c z (1 - z)(1 + skew (2 z - 1))), z = x over its largest size",
+    beside: Beside::Itself,
+    parameters: |_, _| {
+        let skew = EffectParameter::formed("skew", "1", -1.0..=1.0, 0.0);
+        vec![EffectParameter::sized("c", "1", -0.3..=0.3), skew]
+    },
+    operator: |v, e, _| Box::new(BowedGain { c: v[0], skew: v[1], scale: e.beside_size() }),
+    sketch: Some(|v, e, signals| {
+        let body = "let u = e / SCALE
+            let y = x * (1 + C * 4 * u * (1 - u) * (1 + SKEW * (2 * u - 1)))";
+        let sketch = Sketch::of(signals.x.clone(), body).beside(signals.beside.clone());
+        let scale = ("SCALE", e.beside_size(), &*signals.beside.unit);
+        sketch.with_all(&[("C", v[0], "1"), ("SKEW", v[1], "1"), scale])
+    }),
+    twins: &["curve"],
+    ..Kind::PLAIN
+};
+
+/// The gauge is not quite linear.
+pub(crate) static GAUGE_NONLINEARITY: Effect = Effect {
+    name: "gauge_nonlinearity",
+    words: "the gauge's resistance bends away from the ideal curve",
+    equation: "R -> R (1 + c 4 x (1 - x)(1 + skew (2 x - 1))), x = e/e0",
+    parameters: &[
+        EffectParameter::strength("c", "1", -0.1, 0.1, 0.02),
+        EffectParameter::form("skew", "1", -0.6, 0.6, Form { neutral: 0.0, usual: 0.0 }),
+    ],
+    acts: Acts::at(&GAIN_CURVE, Place::Resistance),
+    twins: &["pot_nonlinearity", "pressure_crosstalk"],
+    // At half of the range, where e + 1 is 1.5, it bends by half as much again; further, it would not rise any more.
+    alone: |_, search| search.reach_from(0.5),
+    starts: Some(|_| each([0.005])),
+    live: Some(Live::BY_CURVE),
+    ..Effect::PLAIN
+};
+
+/// The potentiometer is not quite linear.
+pub(crate) static POT_NONLINEARITY: Effect = Effect {
+    name: "pot_nonlinearity",
+    words: "the potentiometer's scale bends",
+    stage: Stage::Reference,
+    equation: "L_meas = L + c 4 y (1 - y)(1 + skew (2 y - 1)), y = k/k_max",
+    parameters: &[
+        EffectParameter::strength("c", "mm", -3.0, 3.0, 0.5),
+        EffectParameter::form("skew", "1", -0.6, 0.6, Form { neutral: 0.0, usual: 0.0 }),
+    ],
+    acts: Acts::at(&CURVE, Place::Length),
+    twins: &["gauge_nonlinearity"],
+    starts: Some(|_| each([0.2])),
+    live: Some(Live::BY_CURVE),
+    ..Effect::PLAIN
+};

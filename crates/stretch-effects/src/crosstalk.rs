@@ -1,6 +1,16 @@
 //! Another channel that talks across.
 
-use crate::operator::{Operator, Span};
+use alloc::{boxed::Box, vec};
+
+use crate::{
+    effect::{Acts, Effect, Need},
+    kind::{Beside, Kind, Side},
+    live::Live,
+    operator::{Operator, Span},
+    parameter::{EffectParameter, Form},
+    place::Action,
+    sketch::{Quantity, Sketch},
+};
 
 /// y = x + c z (1 + bend z), z = (other - middle)/span, the other channel where the [`Span`] holds the strain.
 ///
@@ -29,6 +39,94 @@ impl Operator for Crosstalk {
         for (x, other) in signal.iter_mut().zip(span.strain) {
             let z = (other - self.middle) / self.span;
             *x += self.c * z * (1.0 + self.bend * z);
+        }
+    }
+}
+
+/// Another channel.
+pub static CROSSTALK: Kind = Kind {
+    name: "crosstalk",
+    words: "another channel talks across to it",
+    equation: "y = x + c z (1 + bend z), z the other channel from its middle, over its span",
+    usual: &[Side::Output],
+    beside: Beside::Another,
+    parameters: |e, unit| {
+        let most = 0.3 * e.span();
+        let bend = EffectParameter::formed("bend", "1", -0.6..=0.6, 0.0);
+        vec![EffectParameter::sized("c", unit, -most..=most), bend]
+    },
+    starts: Some(|e| [-0.03, 0.03].map(|k| vec![k * e.span(), 0.0]).into()),
+    operator: |v, e, _| {
+        let [low, high] = e.beside;
+        Box::new(Crosstalk { c: v[0], bend: v[1], middle: 0.5 * (low + high), span: high - low })
+    },
+    sketch: Some(|v, e, signals| {
+        let [low, high] = e.beside;
+        let unit = &*signals.beside.unit;
+        let body = "let z = (e - MIDDLE) / SPAN
+            let y = x + C * z * (1 + BEND * z)";
+        Sketch::of(signals.x.clone(), body)
+            .beside(signals.beside.clone())
+            .with_all(&[("C", v[0], &*signals.x.unit), ("BEND", v[1], "1")])
+            .with_all(&[("MIDDLE", 0.5 * (low + high), unit), ("SPAN", high - low, unit)])
+    }),
+    ..Kind::PLAIN
+};
+
+/// The pressure inside the muscle stretches the gauge: with a zero that is the pressure's own, a term that no [`CROSSTALK`] is.
+pub(crate) static PRESSURE_CROSSTALK: Effect = Effect {
+    name: "pressure_crosstalk",
+    words: "the pressure itself strains the gauge",
+    equation: "e -> e + c x (1 + bend (1 - x)), x = (p - P_atm)/P_ref",
+    parameters: &[
+        EffectParameter::strength("c", "strain", -0.05, 0.05, 0.01),
+        EffectParameter::form("bend", "1", -0.6, 0.6, Form { neutral: 0.0, usual: 0.0 }),
+    ],
+    acts: Acts::Own {
+        action: |v, around| {
+            let scale_kpa = around.pressure_scale_kpa;
+            let per_kpa = v[0] / scale_kpa;
+            Action::Strain(Box::new(Pressed { per_kpa, bend: v[1], scale_kpa }))
+        },
+        sketch: Some(|v, around| {
+            let x = around.strain();
+            let body = "let u = p / P_REF
+                let y = x + C * u * (1 + BEND * (1 - u))";
+            Sketch::of(x.clone(), body)
+                .beside(Quantity::new("p", "kPa", "pressure above the atmosphere"))
+                .with_all(&[("C", v[0], &*x.unit), ("BEND", v[1], "1")])
+                .with("P_REF", around.pressure_scale_kpa, "kPa")
+        }),
+    },
+    twins: &["gauge_nonlinearity"],
+    needs: Some(Need::Pressure),
+    starts: Some(|_| vec![vec![0.003], vec![0.003, -0.4], vec![0.003, 0.4]]),
+    live: Some(Live {
+        parameters: &[
+            EffectParameter::strength("c", "1", -0.6, 0.6, 0.02),
+            EffectParameter::form("bend", "1", -0.8, 0.8, Form { neutral: 0.0, usual: 0.0 }),
+        ],
+        set: |v, target, map| {
+            let c = if target.falls { -v[0] } else { v[0] };
+            let (bend, scale) = (v[1], target.pressure);
+            map.crosstalk = Some(stretch_core::Crosstalk { c, bend, scale });
+        },
+        ..Live::BY_CURVE
+    }),
+    ..Effect::PLAIN
+};
+
+#[derive(Debug)]
+struct Pressed {
+    per_kpa: f64,
+    bend: f64,
+    scale_kpa: f64,
+}
+
+impl Operator for Pressed {
+    fn run(&self, span: &Span<'_>, _cells: &mut [f64], signal: &mut [f64]) {
+        for (e, p) in signal.iter_mut().zip(span.pressure_kpa) {
+            *e += self.per_kpa * p * (1.0 + self.bend * (1.0 - p / self.scale_kpa));
         }
     }
 }

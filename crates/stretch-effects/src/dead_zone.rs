@@ -1,6 +1,13 @@
 //! Small values that do nothing.
 
-use crate::operator::{Operator, Span};
+use alloc::{boxed::Box, vec};
+
+use crate::{
+    kind::{Kind, Side},
+    operator::{Operator, Span},
+    parameter::EffectParameter,
+    sketch::Sketch,
+};
 
 /// A dead zone on both sides of zero: y = x - clamp(x, -w, w); with a softness s the edge is left gradually,
 /// y = sign(x) softplus(|x| - w) of width s w, less its value at zero.
@@ -38,3 +45,40 @@ impl Operator for DeadZone {
         }
     }
 }
+
+/// Small values that do nothing.
+pub static DEAD_ZONE: Kind = Kind {
+    name: "dead_zone",
+    words: "small values do nothing",
+    equation: "y = x - clamp(x, -w, w)",
+    usual: &[Side::Input],
+    parameters: |e, unit| {
+        let size = e.low.abs().max(e.high.abs());
+        let softness = EffectParameter::formed("softness", "1", 0.0..=1.0, 0.0);
+        vec![EffectParameter::sized("w", unit, 0.0..=0.5 * size), softness]
+    },
+    starts: Some(|e| {
+        let size = e.low.abs().max(e.high.abs());
+        [0.02, 0.1, 0.25].map(|k| vec![k * size, 0.0]).into()
+    }),
+    operator: |v, _, _| Box::new(DeadZone { w: v[0], softness: v[1] }),
+    sketch: Some(|v, _, signals| {
+        let x = signals.x.clone();
+        let sketch = match v[1] {
+            0.0 => Sketch::of(x, "let y = x - max(-W, min(W, x))"),
+            softness => {
+                let body = "let knee = SOFTNESS * W
+                    let z = (abs(x) - W) / knee
+                    let at_zero = log1p(exp(-1 / SOFTNESS))
+                    var y = knee * (max(z, 0) + log1p(exp(-abs(z))) - at_zero)
+                    if x < 0
+                    y = -y
+                    end";
+                Sketch::of(x, body).with("SOFTNESS", softness, "1")
+            }
+        };
+        sketch.with("W", v[0], &signals.x.unit)
+    }),
+    twins: &["backlash"],
+    ..Kind::PLAIN
+};

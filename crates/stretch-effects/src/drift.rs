@@ -1,6 +1,16 @@
 //! A gain that drifts.
 
-use crate::operator::{Operator, Span};
+use alloc::{boxed::Box, vec};
+
+use crate::{
+    effect::{Acts, Effect, each},
+    kind::Kind,
+    live::Live,
+    operator::{Operator, Span},
+    parameter::{EffectParameter, Form},
+    place::Place,
+    sketch::{Quantity, Sketch},
+};
 
 /// Drift of a gain with session time t: y = x (1 + d (1 - exp(-settle t))/settle), or x (1 + d t) where it never settles.
 ///
@@ -46,3 +56,57 @@ impl Operator for Drift {
         }
     }
 }
+
+/// A gain that drifts with session time.
+pub static GAIN_DRIFT: Kind = Kind {
+    name: "gain_drift",
+    words: "its gain drifts with session time",
+    equation: "y = x (1 + d (1 - exp(-settle_per_s t))/settle_per_s), t since the session began",
+    parameters: |e, _| {
+        let (most, session_s) = (0.3 / e.session_s, e.session_s);
+        let settle = 0.1 / session_s..=10.0 / session_s;
+        vec![
+            EffectParameter::sized("d", "1/s", -most..=most),
+            EffectParameter::formed("settle_per_s", "1/s", settle, 0.3 / session_s).log(),
+        ]
+    },
+    operator: |v, _, _| Box::new(Drift { per_s: v[0], settle_per_s: v[1] }),
+    sketch: Some(|v, _, signals| {
+        let x = signals.x.clone();
+        let sketch = match v[1] {
+            0.0 => Sketch::of(x, "let y = x * (1 + D * t)").with("D", v[0], "1/s"),
+            settle => {
+                let body = "let y = x * (1 - D / SETTLE_PER_S * expm1(-SETTLE_PER_S * t))";
+                let numbers = [("D", v[0], "1/s"), ("SETTLE_PER_S", settle, "1/s")];
+                Sketch::of(x, body).with_all(&numbers)
+            }
+        };
+        sketch.beside(Quantity::SESSION_TIME)
+    }),
+    twins: &["drift"],
+    ..Kind::PLAIN
+};
+
+/// The gauge drifts while the session lasts.
+pub(crate) static THERMAL_DRIFT: Effect = Effect {
+    name: "thermal_drift",
+    words: "the gauge drifts with time",
+    equation: "R -> R (1 + d (1 - exp(-settle_per_s t))/settle_per_s), 1 + d t at 0; t since the session began",
+    parameters: &[
+        EffectParameter::strength("d", "1/s", -4e-4, 4e-4, 5e-5),
+        EffectParameter::form(
+            "settle_per_s",
+            "1/s",
+            5e-5,
+            1.0 / 150.0,
+            Form { neutral: 0.0, usual: 1.0 / 3e3 },
+        )
+        .log(),
+    ],
+    acts: Acts::at(&GAIN_DRIFT, Place::Resistance),
+    // It takes at most half of the signal's span away over the session.
+    alone: |alone, search| search.reach_from(0.5 / alone.session_s.max(1.0)),
+    starts: Some(|_| each([2e-5])),
+    live: Some(Live { drifts: true, ..Live::BY_CURVE }),
+    ..Effect::PLAIN
+};

@@ -1,11 +1,20 @@
 //! Memory that fades, with one time constant or several.
 
-use alloc::vec::Vec;
+use alloc::{boxed::Box, format, vec, vec::Vec};
+
+use stretch_core::Fading;
 
 use crate::{
+    effect::{Acts, Effect, pairs},
+    extent::Extent,
     grid::Grid,
+    kind::{Kind, Side, Signals},
+    live::Live,
     mean_reversion::MeanReversion,
     operator::{Operator, Span, Start},
+    parameter::{EffectParameter, Form},
+    place::Place,
+    sketch::Sketch,
 };
 
 /// One time constant, or three of equal weight around it.
@@ -87,3 +96,86 @@ impl Operator for FadingMemory {
         });
     }
 }
+
+/// Memory that fades with a time constant, or three.
+pub static RELAXATION: Kind = Kind {
+    name: "relaxation",
+    words: "it overshoots a quick change and relaxes, or creeps after it",
+    equation: "y = x + c (x - mean of mean_rev(x, tau_s {1/spread, 1, spread}))",
+    usual: &[Side::Output],
+    parameters: |e, _| {
+        let longest = (0.5 * e.trial_s).max(20.0 * e.dt_s);
+        vec![
+            EffectParameter::sized("c", "1", -0.5..=0.6),
+            EffectParameter::shaped("tau_s", "s", 4.0 * e.dt_s..=longest),
+            EffectParameter::formed("spread", "1", 1.0..=8.0, 1.6).log(),
+        ]
+    },
+    operator: |v, e, grid| {
+        Box::new(FadingMemory::new(v[0], Times { tau_s: v[1], spread: v[2] }, e.span(), grid))
+    },
+    sketch: Some(sketch),
+    twins: &["lag"],
+    ..Kind::PLAIN
+};
+
+/// A lag is taken exactly for an input that is a straight line from sample to sample: with k = exp(-DT/tau) and m = (1 - k) tau/DT
+/// it is z = k z + (m - k) last + (1 - m) x.
+fn sketch(v: &[f64], _: &Extent, signals: &Signals) -> Sketch {
+    let one = |z: &str, t: &str| {
+        format!(
+            "let k{z} = exp(-DT / ({t}))
+            let m{z} = (1 - k{z}) * ({t}) / DT
+            s.{z} = k{z} * s.{z} + (m{z} - k{z}) * s.last + (1 - m{z}) * x\n"
+        )
+    };
+    let of = |lags: &str, mean: &str| {
+        let body = format!("{lags}s.last = x\nlet y = x + SHARE * (x - {mean})");
+        Sketch::of(signals.x.clone(), body).with_all(&[("SHARE", v[0], "1"), ("TAU", v[1], "s")])
+    };
+    let sketch = match v[2] {
+        1.0 => of(&one("z", "TAU"), "s.z").remembering(["z", "last"]),
+        spread => {
+            let lags = one("p", "TAU / SPREAD") + &one("q", "TAU") + &one("r", "TAU * SPREAD");
+            let sketch = of(&lags, "(s.p + s.q + s.r) / 3").with("SPREAD", spread, "1");
+            sketch.remembering(["p", "q", "r", "last"])
+        }
+    };
+    sketch.with("DT", signals.dt_s, "s")
+}
+
+/// The gauge overshoots a quick strain and relaxes.
+pub(crate) static GAUGE_RELAXATION: Effect = Effect {
+    name: "gauge_relaxation",
+    words: "the gauge relaxes (or overshoots) after a change of strain",
+    equation: "e -> e + c (e - mean of mean_rev(e, tau {1/spread, 1, spread}))",
+    parameters: &[
+        EffectParameter::strength("c", "1", -0.3, 0.6, 0.1),
+        EffectParameter::shape("tau", "s", 0.02, 4.0, 0.3),
+        EffectParameter::form("spread", "1", 1.0, 8.0, Form { neutral: 1.0, usual: 1.6 }).log(),
+    ],
+    acts: Acts::at(&RELAXATION, Place::Strain),
+    twins: &["amplifier_lowpass"],
+    // A gauge that is no foil gives way by more of a step, and more slowly.
+    alone: |_, search| {
+        search.reach(0.6);
+        search.ranges[1][1] = 20.0;
+        let slow = search.starts.last().map(|s| [&[s[0], 10.0], &s[2..]].concat());
+        search.starts.extend(slow);
+    },
+    starts: Some(|_| pairs(0.05, [0.03, 0.1, 0.35, 1.2, 3.5])),
+    live: Some(Live {
+        parameters: &[
+            EffectParameter::strength("c", "1", -0.8, 1.5, 0.1),
+            EffectParameter::shape("tau", "s", 0.01, 40.0, 0.3),
+            EffectParameter::form("spread", "1", 1.0, 10.0, Form { neutral: 1.6, usual: 1.6 })
+                .log(),
+        ],
+        set: |v, _, map| {
+            let (share, taus_s) = (v[0], [v[1] / v[2], v[1], v[1] * v[2]]);
+            map.relaxation = Some(Fading { share, taus_s });
+        },
+        ..Live::BY_CURVE
+    }),
+    ..Effect::PLAIN
+};

@@ -1,6 +1,13 @@
 //! Friction by direction and speed.
 
-use crate::operator::{Operator, Span};
+use alloc::{boxed::Box, format, vec};
+
+use crate::{
+    kind::{Beside, Kind, Side, Signals},
+    operator::{Operator, Span},
+    parameter::EffectParameter,
+    sketch::Sketch,
+};
 
 /// A force that rubs: y = x + F(v), with the velocity v where the [`Span`] holds the strain,
 ///
@@ -56,5 +63,106 @@ impl Operator for Friction {
         for (x, v) in signal.iter_mut().zip(span.strain) {
             *x += self.force(*v);
         }
+    }
+}
+
+/// Where friction is looked for: on forces and torques only, whichever side they are on.
+const FORCES: &[Side] = &[Side::Input, Side::Output];
+
+/// Friction by direction.
+pub static COULOMB_FRICTION: Kind = Kind {
+    name: "coulomb_friction",
+    words: "it rubs by direction, whatever the speed",
+    equation: "y = x + f tanh(v/width)(1 + lopsided sign(v)) behind the stage, x - the same in front of it",
+    usual: FORCES,
+    beside: Beside::Velocity,
+    parameters: |e, unit| {
+        vec![
+            EffectParameter::sized("f", unit, 0.0..=0.5 * e.span()),
+            width(e.beside_size()),
+            EffectParameter::formed("lopsided", "1", -0.5..=0.5, 0.0),
+        ]
+    },
+    operator: |v, _, _| Box::new(coulomb(v)),
+    sketch: Some(|v, _, signals| coulomb(v).sketch(signals)),
+    twins: &["stribeck_friction", "viscous_friction"],
+    ..Kind::PLAIN
+};
+
+/// Friction by speed.
+pub static VISCOUS_FRICTION: Kind = Kind {
+    name: "viscous_friction",
+    words: "it rubs in proportion to the speed",
+    equation: "y = x + b v behind the stage, x - b v in front of it",
+    usual: FORCES,
+    beside: Beside::Velocity,
+    parameters: |e, unit| {
+        let most = 0.5 * e.span() / e.beside_size().max(1e-300);
+        vec![EffectParameter::sized("b", &format!("{unit}/velocity"), -0.2 * most..=most)]
+    },
+    operator: |v, _, _| Box::new(Friction { viscous: v[0], ..Friction::default() }),
+    sketch: Some(|v, _, signals| Friction { viscous: v[0], ..Friction::default() }.sketch(signals)),
+    twins: &["coulomb_friction"],
+    ..Kind::PLAIN
+};
+
+/// Friction that is larger while it is slow.
+pub static STRIBECK_FRICTION: Kind = Kind {
+    name: "stribeck_friction",
+    words: "it rubs more while it is slow",
+    equation: "y = x + tanh(v/width) more exp(-(v/slow)^2) behind the stage, x - the same in front of it",
+    usual: FORCES,
+    beside: Beside::Velocity,
+    parameters: |e, unit| {
+        let v = e.beside_size();
+        vec![
+            EffectParameter::sized("more", unit, 0.0..=0.5 * e.span()),
+            EffectParameter::shaped("slow", "velocity", 0.01 * v..=0.5 * v),
+            width(v),
+        ]
+    },
+    operator: |v, _, _| Box::new(stribeck(v)),
+    sketch: Some(|v, _, signals| stribeck(v).sketch(signals)),
+    twins: &["coulomb_friction"],
+    ..Kind::PLAIN
+};
+
+/// Velocity at which the direction is told.
+fn width(v: f64) -> EffectParameter {
+    EffectParameter::formed("width", "velocity", 1e-4 * v..=0.1 * v, 0.01 * v).log()
+}
+
+fn coulomb(v: &[f64]) -> Friction {
+    Friction { coulomb: v[0], width: v[1], lopsided: v[2], ..Friction::default() }
+}
+
+fn stribeck(v: &[f64]) -> Friction {
+    Friction { more: v[0], slow: v[1], width: v[2], ..Friction::default() }
+}
+
+impl Friction {
+    /// With the velocity beside the signal.
+    fn sketch(&self, signals: &Signals) -> Sketch {
+        let [x, v] = [&signals.x, &signals.beside].map(|q| &*q.unit);
+        let viscous = ("B", self.viscous, "force/velocity");
+        let beside = signals.beside.clone().named("v");
+        if self.coulomb == 0.0 && self.more == 0.0 {
+            let body = "var y = x + B * v";
+            return Sketch::of(signals.x.clone(), body).beside(beside).with_all(&[viscous]);
+        }
+        let body = "var way = 0
+            if v > 0
+            way = 1
+            end
+            if v < 0
+            way = -1
+            end
+            let slow = MORE * exp(-(v / SLOW) * (v / SLOW))
+            var y = x + tanh(v / WIDTH) * (F + slow) * (1 + LOPSIDED * way)";
+        let slow = if self.more == 0.0 { 1.0 } else { self.slow };
+        Sketch::of(signals.x.clone(), body)
+            .beside(beside)
+            .with_all(&[("F", self.coulomb, x), ("MORE", self.more, x), ("SLOW", slow, v)])
+            .with_all(&[("WIDTH", self.width, v), ("LOPSIDED", self.lopsided, "1")])
     }
 }

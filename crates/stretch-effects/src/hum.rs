@@ -1,8 +1,19 @@
 //! Mains hum on recorded samples.
 
-use core::f64::consts::TAU;
+use alloc::{boxed::Box, vec};
 
-use crate::operator::{Operator, Span};
+use core::f64::consts::{FRAC_PI_4, TAU};
+
+use crate::{
+    effect::{Acts, Effect},
+    kind::{Kind, Line, Measured, Side},
+    live::Live,
+    operator::{Operator, Span},
+    parameter::{EffectParameter, Role},
+    place::Place,
+    sketch::{Quantity, Sketch},
+    wandering_line::WanderingLine,
+};
 
 /// A sine on samples: y = x + a sin(2 pi f t + phase), t session time.
 ///
@@ -44,3 +55,67 @@ impl Operator for Hum {
         }
     }
 }
+
+/// The mains, picked up with a phase that only a record tells.
+pub static HUM: Kind = Kind {
+    name: "hum",
+    words: "it picks up the mains",
+    equation: "y = x + a sin(2 pi f t + phase), the phase found in the record second by second",
+    usual: &[Side::Output],
+    parameters: |e, unit| {
+        vec![EffectParameter::sized("a", unit, 0.0..=0.1 * e.span()), MAINS, PHASE]
+    },
+    starts: Some(|e| {
+        let one = |f: f64| [0.002, 0.02].map(|k| vec![k * e.span(), f]);
+        [one(50.0), one(60.0)].concat()
+    }),
+    operator: |v, _, _| {
+        let phase = v.get(2).copied().unwrap_or(FRAC_PI_4);
+        Box::new(Hum { a: v[0], f_hz: v[1], phase })
+    },
+    sketch: Some(|v, _, signals| {
+        let phase = v.get(2).copied().unwrap_or(FRAC_PI_4);
+        let body = "let turns = F * t
+            let y = x + A * sin(6.283185307179586 * (turns - floor(turns)) + PHASE)";
+        Sketch::of(signals.x.clone(), body).beside(Quantity::SESSION_TIME).with_all(&[
+            ("A", v[0], &*signals.x.unit),
+            ("F", v[1], "Hz"),
+            ("PHASE", phase, "rad"),
+        ])
+    }),
+    find: Some(find),
+    line: Some(|values| Line { hertz: values[1], amplitude: values[0] }),
+    // At fs the hum shows at |f - k fs|. From 1.5 f on that is a third of fs at least and f/2 = 25 Hz at least, where no muscle
+    // moves; a slower record shows it anywhere, down to a slow wave that passes for motion or drift.
+    shown_from_hz: Some(|values| 1.5 * values[1]),
+    ..Kind::PLAIN
+};
+
+/// Frequency of the mains.
+const MAINS: EffectParameter =
+    EffectParameter::shape("f", "Hz", 50.0, 60.0, 50.0).linear().with_role(Role::Choice);
+/// On samples at twice the mains' frequency a hum is as large as the sine of its phase: one that stands for all.
+const PHASE: EffectParameter = EffectParameter::shape("phase", "rad", -TAU, TAU, 0.0)
+    .linear()
+    .with_role(Role::Found { stand_in: FRAC_PI_4 });
+
+fn find(values: &[f64], record: &Measured<'_>, simulated: &mut [f64]) {
+    let line = WanderingLine { a: values[0] * record.unit, f_hz: values[1] };
+    if line.a != 0.0 {
+        line.follow(record.samples, record.noise, record.dt_s, simulated);
+    }
+}
+
+/// The mains couple into the bridge.
+pub(crate) static MAINS_HUM: Effect = Effect {
+    name: "mains_hum",
+    words: "mains hum is picked up",
+    equation: "v -> v + a sin(2 pi f t + phase), not skewed",
+    parameters: &[EffectParameter::strength("a", "V", 0.0, 0.1, 0.02), MAINS, PHASE],
+    acts: Acts::at(&HUM, Place::Record),
+    starts: Some(|_| {
+        [50.0, 60.0].iter().flat_map(|f| [0.002, 0.02].map(|a| vec![a, *f])).collect()
+    }),
+    live: Some(Live::BY_CURVE),
+    ..Effect::PLAIN
+};

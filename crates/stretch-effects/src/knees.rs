@@ -1,6 +1,19 @@
 //! Bounds with a knee of any sharpness.
 
-use crate::operator::{Operator, Span};
+use alloc::{boxed::Box, vec};
+
+use stretch_core::Knee;
+
+use crate::{
+    effect::{Acts, Effect, Need},
+    extent::Extent,
+    kind::{Kind, Side},
+    live::Live,
+    operator::{Operator, Span},
+    parameter::{EffectParameter, Form},
+    place::Place,
+    sketch::Sketch,
+};
 
 /// A soft lower bound: low + w ln(1 + exp((x - low)/w)); within rounding of x or of `low` from 37 w on.
 ///
@@ -63,3 +76,148 @@ impl Operator for Knees {
         }
     }
 }
+
+/// An end at either side, or at both.
+pub static SATURATION: Kind = Kind {
+    name: "saturation",
+    words: "it runs into an end",
+    equation: "y cannot leave [low, high], soft knees of the width given",
+    usual: &[Side::Input, Side::Output],
+    parameters: |e, unit| {
+        let ([low, high], s) = (ends(e), e.span());
+        vec![
+            EffectParameter::sized("low", unit, low..=e.high - 0.1 * s).off_at(low),
+            EffectParameter::sized("high", unit, e.low + 0.1 * s..=high).off_at(high),
+            EffectParameter::formed("knee", unit, 1e-4 * s..=0.03 * s, 0.005 * s).log(),
+        ]
+    },
+    starts: Some(|e| {
+        let ([low, high], s) = (ends(e), e.span());
+        let within = [0.003, 0.02, 0.08, 0.2, 0.35];
+        let tops = within.map(|d| vec![low, e.high - d * s, 0.005 * s]);
+        let bottoms = within.map(|d| vec![e.low + d * s, high, 0.005 * s]);
+        // An actuator's ends are most often both reached.
+        let both = within.map(|d| vec![e.low + d * s, e.high - d * s, 0.005 * s]);
+        [tops, bottoms, both].concat()
+    }),
+    operator: |v, e, _| {
+        let [low, high] = reached(v, e);
+        Box::new(Knees { low, high, width: v[2] })
+    },
+    sketch: Some(|v, e, signals| {
+        let [low, high] = reached(v, e);
+        let unit = signals.x.unit.clone();
+        let mut sketch = Sketch::of(signals.x.clone(), "var y = x\n").with("KNEE", v[2], &unit);
+        if let Some(low) = low {
+            sketch = sketch.with("LOW", low, &unit);
+            sketch.body += "let below = (y - LOW) / KNEE
+                y = LOW + KNEE * (max(below, 0) + log1p(exp(-abs(below))))\n";
+        }
+        if let Some(high) = high {
+            sketch = sketch.with("HIGH", high, &unit);
+            sketch.body += "let above = (HIGH - y) / KNEE
+                y = HIGH - KNEE * (max(above, 0) + log1p(exp(-abs(above))))\n";
+        }
+        sketch
+    }),
+    ..Kind::PLAIN
+};
+
+/// Ends that nothing reaches: what was commanded or measured goes no further, and a simulation rarely half as far again.
+fn ends(e: &Extent) -> [f64; 2] {
+    [e.low - e.span(), e.high + e.span()]
+}
+
+/// The ends that are there: one at infinity, or where nothing reaches it, is none.
+fn reached(values: &[f64], e: &Extent) -> [Option<f64>; 2] {
+    let off = ends(e);
+    [0, 1].map(|i| Some(values[i]).filter(|v| v.is_finite() && *v != off[i]))
+}
+
+/// The sleeve goes slack: the gauge cannot be compressed.
+pub(crate) static SLEEVE_SLACK: Effect = Effect {
+    name: "sleeve_slack",
+    words: "the sleeve goes slack when the muscle is short",
+    equation: "e -> e_s + knee ln(1 + exp((e - e_s)/knee)): cannot fall below e_s",
+    parameters: &[
+        // Where the pre-stretch is not known, neither is where the sleeve goes slack: below nothing by the nominal rig's count.
+        EffectParameter::strength("e_s", "strain", -0.05, 0.2, 0.08).off_at(-0.05),
+        EffectParameter::form(
+            "knee",
+            "strain",
+            0.0001,
+            0.015,
+            Form { neutral: 0.003, usual: 0.003 },
+        )
+        .log(),
+    ],
+    acts: Acts::with(&SATURATION, Place::Strain, |v, _| vec![v[0], f64::INFINITY, v[1]]),
+    twins: &["amplifier_saturation"],
+    // A little above the least strain, with the usual knee and one as sharp as they come: from a soft one a fit does not find there.
+    starts: Some(|strain| {
+        let above = [0.001, 0.004, 0.01, 0.03, 0.07];
+        let above = above.map(|above| (strain.low + above).max(-0.049));
+        let with = |knee: f64| above.map(|e_s| vec![e_s, knee]);
+        [with(0.003), with(0.15 * 0.003)].concat()
+    }),
+    live: Some(Live {
+        parameters: &[
+            EffectParameter::strength("e_s", "1", -0.3, 0.95, 0.1),
+            EffectParameter::form("knee", "1", 5e-4, 0.1, Form { neutral: 0.015, usual: 0.015 })
+                .log(),
+        ],
+        set: |v, target, map| {
+            let knee = Some(Knee { at: target.at(v[0]), width: v[1] });
+            *(if target.falls { &mut map.slack_high } else { &mut map.slack_low }) = knee;
+        },
+        ..Live::BY_CURVE
+    }),
+    ..Effect::PLAIN
+};
+
+/// Rails that no signal reaches, V.
+const RAILS_V: [f64; 2] = [0.5, 3.3];
+
+/// The amplifier's output is bounded.
+pub(crate) static AMPLIFIER_SATURATION: Effect = Effect {
+    name: "amplifier_saturation",
+    words: "the amplifier runs into its limit",
+    equation: "v cannot leave [v_lo, v_hi], soft knees of the width given",
+    parameters: &[
+        EffectParameter::strength("v_lo", "V", RAILS_V[0], 2.2, 1.4).off_at(RAILS_V[0]),
+        EffectParameter::strength("v_hi", "V", 1.2, RAILS_V[1], 2.1).off_at(RAILS_V[1]),
+        EffectParameter::form("knee", "V", 0.0005, 0.06, Form { neutral: 0.01, usual: 0.01 }).log(),
+    ],
+    acts: Acts::with(&SATURATION, Place::Volts, |v, _| {
+        let low = if v[0] == RAILS_V[0] { f64::NEG_INFINITY } else { v[0] };
+        let high = if v[1] == RAILS_V[1] { f64::INFINITY } else { v[1] };
+        vec![low, high, v[2]]
+    }),
+    twins: &["sleeve_slack"],
+    needs: Some(Need::Amplifier),
+    // A little inside of either end, with the usual knee and one as sharp as they come.
+    starts: Some(|volts| {
+        let within = [0.004, 0.015, 0.05, 0.15, 0.4];
+        let with = |knee: f64| {
+            let tops = within.map(|d| vec![RAILS_V[0], (volts.high - d).max(1.25), knee]);
+            let bottoms = within.map(|d| vec![(volts.low + d).max(0.51), RAILS_V[1], knee]);
+            [tops, bottoms].concat()
+        };
+        [with(0.01), with(0.15 * 0.01)].concat()
+    }),
+    live: Some(Live {
+        parameters: &[
+            EffectParameter::strength("v_lo", "1", -0.3, 0.9, -0.3),
+            EffectParameter::strength("v_hi", "1", 0.1, 1.3, 1.3),
+            EffectParameter::form("knee", "1", 5e-4, 0.1, Form { neutral: 0.01, usual: 0.01 })
+                .log(),
+        ],
+        set: |v, target, map| {
+            let [low, high] = [v[0], v[1]].map(|at| Knee { at: target.at(at), width: v[2] });
+            let [floor, ceiling] = if target.falls { [high, low] } else { [low, high] };
+            (map.floor, map.ceiling) = (Some(floor), Some(ceiling));
+        },
+        ..Live::BY_CURVE
+    }),
+    ..Effect::PLAIN
+};

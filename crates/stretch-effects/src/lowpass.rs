@@ -1,11 +1,17 @@
 //! A slow channel: one pole or two.
 
-use alloc::vec::Vec;
+use alloc::{boxed::Box, vec, vec::Vec};
 
 use crate::{
+    effect::{Acts, Effect, each},
     grid::Grid,
+    kind::{Family, Kind, Side},
+    live::Live,
     mean_reversion::MeanReversion,
     operator::{Operator, Span, Start},
+    parameter::{EffectParameter, Form},
+    place::Place,
+    sketch::Sketch,
 };
 
 /// The numbers of a [`Lowpass`].
@@ -71,3 +77,75 @@ impl Operator for Lowpass {
         }
     }
 }
+
+/// One real pole or two.
+pub static LAG: Kind = Kind {
+    name: "lag",
+    words: "it follows slowly, without overshoot",
+    equation: "y = mean_rev(mean_rev(x, tau_s (1 - second)), tau_s second)",
+    usual: &[Side::Input, Side::Output],
+    parameters: |e, _| {
+        vec![
+            EffectParameter::sized("tau_s", "s", 0.0..=2.0 * e.late_s()),
+            EffectParameter::formed("second", "1", 0.0..=0.5, 0.1),
+        ]
+    },
+    starts: Some(|e| [0.03, 0.12, 0.4].map(|k| vec![2.0 * k * e.late_s(), 0.1]).into()),
+    operator: |v, _, grid| {
+        Box::new(Lowpass::new(Poles { tau_s: v[0].max(1e-9), second: v[1] }, grid))
+    },
+    sketch: Some(|v, _, signals| {
+        let x = signals.x.clone();
+        let sketch = match v[1] {
+            0.0 => {
+                let body = "let k = exp(-DT / TAU)
+                    let m = (1 - k) * TAU / DT
+                    s.z = k * s.z + (m - k) * s.last + (1 - m) * x
+                    s.last = x
+                    let y = s.z";
+                Sketch::of(x, body).with("TAU", v[0], "s").remembering(["z", "last"])
+            }
+            second => {
+                let body = "let k = exp(-DT / (TAU * (1 - SECOND)))
+                    let m = (1 - k) * TAU * (1 - SECOND) / DT
+                    let before = s.z
+                    s.z = k * s.z + (m - k) * s.last + (1 - m) * x
+                    s.last = x
+                    let k2 = exp(-DT / (TAU * SECOND))
+                    let m2 = (1 - k2) * TAU * SECOND / DT
+                    s.w = k2 * s.w + (m2 - k2) * before + (1 - m2) * s.z
+                    let y = s.w";
+                let sketch = Sketch::of(x, body).remembering(["z", "last", "w"]);
+                sketch.with_all(&[("TAU", v[0], "s"), ("SECOND", second, "1")])
+            }
+        };
+        sketch.with("DT", signals.dt_s, "s")
+    }),
+    twins: &["delay", "skew", "second_order_lag", "relaxation"],
+    family: Some((Family::Late, |v| v[0])),
+    needs_fine_steps: true,
+    ..Kind::PLAIN
+};
+
+/// The amplifier is slow.
+pub(crate) static AMPLIFIER_LOWPASS: Effect = Effect {
+    name: "amplifier_lowpass",
+    words: "the amplifier is slow",
+    equation: "v -> mean_rev(mean_rev(v, tau (1 - second)), tau second)",
+    parameters: &[
+        EffectParameter::strength("tau", "s", 0.0, 0.4, 0.05),
+        EffectParameter::form("second", "1", 0.0, 0.5, Form { neutral: 0.0, usual: 0.1 }),
+    ],
+    acts: Acts::at(&LAG, Place::Volts),
+    twins: &["channel_skew", "gauge_relaxation"],
+    starts: Some(|_| each([0.004, 0.02, 0.08])),
+    live: Some(Live {
+        parameters: &[
+            EffectParameter::shape("tau", "s", 5e-4, 1.0, 0.02),
+            EffectParameter::form("second", "1", 0.005, 0.5, Form { neutral: 0.1, usual: 0.1 }),
+        ],
+        set: |v, _, map| map.lowpass_s = Some([v[0] * (1.0 - v[1]), v[0] * v[1]]),
+        ..Live::BY_CURVE
+    }),
+    ..Effect::PLAIN
+};

@@ -1,6 +1,13 @@
 //! A zero that is off, and wanders.
 
-use crate::operator::{Operator, Span};
+use alloc::{boxed::Box, vec};
+
+use crate::{
+    kind::{Kind, Side},
+    operator::{Operator, Span},
+    parameter::EffectParameter,
+    sketch::{Quantity, Sketch},
+};
 
 /// An offset with session time t: y = x + at_start + per_s t.
 ///
@@ -27,3 +34,47 @@ impl Operator for Offset {
         }
     }
 }
+
+/// A zero that is off.
+pub static OFFSET: Kind = Kind {
+    name: "offset",
+    words: "its zero is off",
+    equation: "y = x + offset",
+    usual: &[Side::Input],
+    parameters: |e, unit| {
+        vec![EffectParameter::sized("offset", unit, -0.3 * e.span()..=0.3 * e.span())]
+    },
+    operator: |v, _, _| Box::new(Offset { at_start: v[0], per_s: 0.0 }),
+    sketch: Some(|v, _, signals| {
+        let sketch = Sketch::of(signals.x.clone(), "let y = x + OFFSET");
+        sketch.with("OFFSET", v[0], &signals.x.unit)
+    }),
+    twins: &["drift"],
+    ..Kind::PLAIN
+};
+
+/// A zero that wanders.
+pub static DRIFT: Kind = Kind {
+    name: "drift",
+    words: "its zero wanders with session time",
+    equation: "y = x + offset + per_session t/session, t since the session began",
+    usual: &[Side::Output],
+    parameters: |e, unit| {
+        let most = 0.3 * e.span();
+        vec![
+            EffectParameter::sized("per_session", unit, -most..=most),
+            EffectParameter::formed("offset", unit, -most..=most, 0.0),
+        ]
+    },
+    starts: Some(|e| [-0.05, 0.05].map(|k| vec![k * e.span(), 0.0]).into()),
+    operator: |v, e, _| Box::new(Offset { at_start: v[1], per_s: v[0] / e.session_s }),
+    sketch: Some(|v, e, signals| {
+        let unit = &*signals.x.unit;
+        Sketch::of(signals.x.clone(), "let y = x + OFFSET + PER_SESSION * t / SESSION")
+            .beside(Quantity::SESSION_TIME)
+            .with_all(&[("OFFSET", v[1], unit), ("PER_SESSION", v[0], unit)])
+            .with("SESSION", e.session_s, "s")
+    }),
+    twins: &["offset"],
+    ..Kind::PLAIN
+};

@@ -1,10 +1,13 @@
 //! A mass on a spring.
 
-use alloc::vec::Vec;
+use alloc::{boxed::Box, format, vec, vec::Vec};
 
 use crate::{
     grid::Grid,
+    kind::{Family, Kind, Side},
     operator::{Operator, Span, Start},
+    parameter::EffectParameter,
+    sketch::Sketch,
 };
 
 /// The numbers of an [`Oscillator`].
@@ -89,3 +92,44 @@ impl Operator for Oscillator {
         cells.copy_from_slice(&[y, velocity, last]);
     }
 }
+
+/// A mass on a spring.
+pub static SECOND_ORDER_LAG: Kind = Kind {
+    name: "second_order_lag",
+    words: "it follows like a mass on a spring",
+    equation: "m_s^2 y'' = x - y - 2 damping m_s y'",
+    usual: &[Side::Output],
+    parameters: |e, _| {
+        vec![
+            EffectParameter::sized("m_s", "s", 0.0..=e.late_s()),
+            EffectParameter::formed("damping", "1", 0.02..=0.95, 0.3).log(),
+        ]
+    },
+    starts: Some(|e| [0.03, 0.12, 0.4].map(|k| vec![k * e.late_s(), 0.3]).into()),
+    operator: |v, _, grid| {
+        Box::new(Oscillator::new(Swing { m: v[0].max(1e-9), damping: v[1] }, grid))
+    },
+    sketch: Some(|v, _, signals| {
+        let body = "let w = sqrt(1 - DAMPING * DAMPING) / M
+            let sn = exp(-DAMPING * DT / M) * sin(w * DT) / w
+            let cs = exp(-DAMPING * DT / M) * cos(w * DT)
+            let slope = (x - s.last) / DT
+            let trail = 2 * DAMPING * M * slope
+            let p = s.at - s.last + trail
+            let q = s.speed - slope
+            s.at = x - trail + (cs + DAMPING / M * sn) * p + sn * q
+            s.speed = slope - sn / (M * M) * p + (cs - DAMPING / M * sn) * q
+            s.last = x
+            let y = s.at";
+        let sketch = Sketch::of(signals.x.clone(), body).remembering(["at", "last"]);
+        let unit = match &*signals.x.unit {
+            "1" => "1/s".into(),
+            unit => format!("{unit}/s"),
+        };
+        let numbers = [("M", v[0], "s"), ("DAMPING", v[1], "1"), ("DT", signals.dt_s, "s")];
+        sketch.cells(["speed"], unit, "0").with_all(&numbers)
+    }),
+    twins: &["lag", "delay", "skew"],
+    family: Some((Family::Late, |v| 2.0 * v[1] * v[0])),
+    ..Kind::PLAIN
+};

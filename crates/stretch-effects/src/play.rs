@@ -1,11 +1,20 @@
 //! Play: a part that follows once its backlash is used up.
 
-use stretch_core::play;
+use alloc::{boxed::Box, vec};
+
+use stretch_core::{Plays, play};
 
 use crate::{
+    effect::{Acts, Effect, each},
+    kind::{Family, Kind, Side},
+    live::Live,
     operator::{Operator, Span, Start},
+    parameter::{EffectParameter, Form},
+    place::Place,
     play_start::play_start,
     prandtl_ishlinskii::PrandtlIshlinskii,
+    sketch::Sketch,
+    stage::Stage,
     unplay::unplay,
 };
 
@@ -72,3 +81,81 @@ impl Operator for Backlash {
         unplay(self.w, signal);
     }
 }
+
+/// Play of a half-width, or three around it.
+pub static BACKLASH: Kind = Kind {
+    name: "backlash",
+    words: "it has play: it follows once a gap is taken up",
+    equation: "y = mean of play(x, w {1 - softness, 1, 1 + softness})",
+    usual: &[Side::Input, Side::Output],
+    parameters: |e, unit| {
+        vec![
+            EffectParameter::sized("w", unit, 0.0..=0.2 * e.span()),
+            EffectParameter::formed("softness", "1", 0.0..=0.6, 0.2),
+        ]
+    },
+    starts: Some(|e| [0.005, 0.03, 0.1].map(|k| vec![k * e.span(), 0.2]).into()),
+    operator: |v, _, _| Box::new(Backlash::soft(v[0], v[1])),
+    sketch: Some(|v, _, signals| {
+        let unit = signals.x.unit.clone();
+        let body = "let ra = W * (1 - SPREAD)
+            let rc = W * (1 + SPREAD)
+            s.a = max(x - ra, min(x + ra, s.a))
+            s.b = max(x - W, min(x + W, s.b))
+            s.c = max(x - rc, min(x + rc, s.c))
+            let y = (s.a + s.b + s.c) / 3";
+        Sketch::of(signals.x.clone(), body)
+            .with_all(&[("W", v[0], &unit), ("SPREAD", v[1], "1")])
+            .remembering(["a", "b", "c"])
+    }),
+    twins: &["hysteresis", "bouc_wen", "dead_zone"],
+    family: Some((Family::Loop, |v| v[0])),
+    hides_input: true,
+    ..Kind::PLAIN
+};
+
+/// The sleeve slips on the muscle.
+pub(crate) static SLEEVE_SLIP: Effect = Effect {
+    name: "sleeve_slip",
+    words: "the sleeve slips on the muscle before it follows",
+    equation: "e -> mean of play(e, w {1 - spread, 1, 1 + spread})",
+    parameters: &[
+        EffectParameter::strength("w", "strain", 0.0, 0.03, 0.008),
+        EffectParameter::form("spread", "1", 0.0, 0.95, Form { neutral: 0.0, usual: 0.3 }),
+    ],
+    acts: Acts::at(&BACKLASH, Place::Strain),
+    twins: &["gauge_hysteresis", "pot_backlash"],
+    starts: Some(|_| each([0.0005, 0.002, 0.01])),
+    live: Some(Live {
+        parameters: &[
+            EffectParameter::shape("w", "1", 1e-4, 0.3, 0.02),
+            EffectParameter::form("spread", "1", 0.0, 0.95, Form { neutral: 0.3, usual: 0.3 }),
+        ],
+        set: |v, _, map| {
+            let radii = [v[0] * (1.0 - v[1]), v[0], v[0] * (1.0 + v[1])];
+            map.slip = Some(Plays { share: 1.0, radii });
+        },
+        ..Live::BY_CURVE
+    }),
+    ..Effect::PLAIN
+};
+
+/// The potentiometer has backlash. A diagnosed calibration undoes it in the reference that it is fitted to.
+pub(crate) static POT_BACKLASH: Effect = Effect {
+    name: "pot_backlash",
+    words: "the potentiometer has backlash",
+    stage: Stage::Reference,
+    equation: "L_meas = mean of play(L, w {1 - spread, 1, 1 + spread})",
+    parameters: &[
+        EffectParameter::strength("w", "mm", 0.0, 2.0, 0.3),
+        EffectParameter::form("spread", "1", 0.0, 0.95, Form { neutral: 0.0, usual: 0.3 }),
+    ],
+    acts: Acts::at(&BACKLASH, Place::Length),
+    twins: &["sleeve_slip"],
+    starts: Some(|_| each([0.05, 0.2, 0.8])),
+    live: Some(Live {
+        parameters: &[EffectParameter::shape("w", "1", 1e-4, 0.2, 0.01)],
+        ..Live::BY_CURVE
+    }),
+    ..Effect::PLAIN
+};

@@ -1,10 +1,18 @@
 //! Prandtl-Ishlinskii hysteresis.
 
-use stretch_core::play;
+use alloc::{boxed::Box, vec};
+
+use stretch_core::{Plays, play};
 
 use crate::{
+    effect::{Acts, Effect, pairs},
+    kind::{Family, Kind, Side},
+    live::Live,
     operator::{Operator, Span, Start},
+    parameter::{EffectParameter, Form},
+    place::Place,
     play_start::play_start,
+    sketch::Sketch,
 };
 
 /// The numbers of a [`PrandtlIshlinskii`] operator.
@@ -73,3 +81,62 @@ impl Operator for PrandtlIshlinskii {
         cells.copy_from_slice(&[a, b, c]);
     }
 }
+
+/// Hysteresis by plays: a share, the largest half-width, and the ratio of each to the next larger one.
+pub static HYSTERESIS: Kind = Kind {
+    name: "hysteresis",
+    words: "it takes another path on the way back (Prandtl-Ishlinskii)",
+    equation: "y = x - h mean of (x - play(x, s {spread^2, spread, 1}))",
+    usual: &[Side::Output],
+    parameters: |e, unit| {
+        vec![
+            EffectParameter::sized("h", "1", 0.0..=0.6),
+            EffectParameter::shaped("s", unit, 0.01 * e.span()..=0.5 * e.span()),
+            EffectParameter::formed("spread", "1", 0.15..=0.95, 0.5),
+        ]
+    },
+    operator: |v, _, _| Box::new(PrandtlIshlinskii::new(Loops { h: v[0], s: v[1], spread: v[2] })),
+    sketch: Some(|v, _, signals| {
+        let unit = signals.x.unit.clone();
+        let body = "let rb = S * SPREAD
+            let ra = rb * SPREAD
+            s.a = max(x - ra, min(x + ra, s.a))
+            s.b = max(x - rb, min(x + rb, s.b))
+            s.c = max(x - S, min(x + S, s.c))
+            let y = x - H * (x - (s.a + s.b + s.c) / 3)";
+        Sketch::of(signals.x.clone(), body)
+            .with_all(&[("H", v[0], "1"), ("S", v[1], &unit), ("SPREAD", v[2], "1")])
+            .remembering(["a", "b", "c"])
+    }),
+    twins: &["backlash", "bouc_wen"],
+    family: Some((Family::Loop, |v| v[0] * v[1] * (1.0 + v[2] + v[2] * v[2]) / 3.0)),
+    ..Kind::PLAIN
+};
+
+/// The gauge remembers its strain.
+pub(crate) static GAUGE_HYSTERESIS: Effect = Effect {
+    name: "gauge_hysteresis",
+    words: "the gauge follows another path on the way back",
+    equation: "e -> e - h mean of (e - play(e, s {spread^2, spread, 1}))",
+    parameters: &[
+        EffectParameter::strength("h", "1", 0.0, 0.6, 0.2),
+        EffectParameter::shape("s", "strain", 0.005, 0.06, 0.02),
+        EffectParameter::form("spread", "1", 0.15, 0.95, Form { neutral: 0.5, usual: 0.5 }),
+    ],
+    acts: Acts::at(&HYSTERESIS, Place::Strain),
+    twins: &["sleeve_slip"],
+    starts: Some(|_| pairs(0.1, [0.006, 0.016, 0.045])),
+    live: Some(Live {
+        parameters: &[
+            EffectParameter::strength("h", "1", 0.0, 0.9, 0.1),
+            EffectParameter::shape("s", "1", 0.003, 0.9, 0.1),
+            EffectParameter::form("spread", "1", 0.1, 0.98, Form { neutral: 0.5, usual: 0.5 }),
+        ],
+        set: |v, _, map| {
+            let (share, radii) = (v[0], [v[1] * v[2] * v[2], v[1] * v[2], v[1]]);
+            map.hysteresis = Some(Plays { share, radii });
+        },
+        ..Live::BY_CURVE
+    }),
+    ..Effect::PLAIN
+};

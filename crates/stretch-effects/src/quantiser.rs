@@ -1,6 +1,13 @@
 //! A converter's steps.
 
-use crate::operator::{Operator, Span};
+use alloc::{boxed::Box, vec};
+
+use crate::{
+    kind::Kind,
+    operator::{Operator, Span},
+    parameter::EffectParameter,
+    sketch::Sketch,
+};
 
 /// Rounds to steps: y = step round(x/step), halves away from zero.
 ///
@@ -24,3 +31,21 @@ impl Operator for Quantiser {
         }
     }
 }
+
+/// Steps.
+pub static QUANTISATION: Kind = Kind {
+    name: "quantisation",
+    words: "it comes in steps",
+    equation: "y = step round(x/step)",
+    parameters: |e, unit| vec![EffectParameter::sized("step", unit, 0.0..=0.1 * e.span())],
+    starts: Some(|e| vec![vec![e.lattice], vec![0.01 * e.span()]]),
+    operator: |v, _, _| Box::new(Quantiser { step: v[0].max(1e-300) }),
+    sketch: Some(|v, _, signals| {
+        let body = "var y = STEP * floor(abs(x) / STEP + 0.5)
+            if x < 0
+            y = -y
+            end";
+        Sketch::of(signals.x.clone(), body).with("STEP", v[0], &signals.x.unit)
+    }),
+    ..Kind::PLAIN
+};

@@ -1,18 +1,18 @@
 //! Samples that show a signal of some time earlier or later.
 
-use crate::{
-    grid::Grid,
-    operator::{Operator, Span},
-};
+use alloc::{boxed::Box, vec};
 
-/// By how much samples are late.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct SkewSpec {
-    /// At the trial's start, s.
-    pub skew_s: f64,
-    /// How much later they get, s/s: two clocks that part.
-    pub rate: f64,
-}
+use crate::{
+    effect::{Acts, Effect, each},
+    grid::Grid,
+    kind::{Family, Kind, Side, Signals},
+    live::Live,
+    operator::{Operator, Span},
+    parameter::{EffectParameter, Form},
+    place::Place,
+    sketch::{Quantity, Sketch},
+    skew_spec::SkewSpec,
+};
 
 /// Reads a signal `skew_s + rate t` before every sample, t since the trial began, by cubics through four nodes (Lagrange);
 /// the first and the last value are held beyond the ends, and beside an end the cubic becomes a line.
@@ -120,3 +120,93 @@ impl Reading {
         }
     }
 }
+
+/// A dead time.
+pub static DELAY: Kind = Kind {
+    name: "delay",
+    words: "it acts a dead time later",
+    equation: "y(t) = x(t - delay_s)",
+    usual: &[Side::Input],
+    parameters: |e, _| vec![EffectParameter::sized("delay_s", "s", 0.0..=e.late_s())],
+    starts: Some(|e| [0.05, 0.2, 0.6].map(|k| vec![k * e.late_s()]).into()),
+    operator: |v, _, grid| Box::new(Skew::new(grid, SkewSpec { skew_s: v[0], rate: 0.0 })),
+    sketch: Some(|v, _, signals| sketch([v[0], 0.0], signals)),
+    twins: &["skew", "lag", "second_order_lag"],
+    family: Some((Family::Late, |v| v[0])),
+    ..Kind::PLAIN
+};
+
+/// Samples of another time, by a clock of their own.
+pub static SKEW: Kind = Kind {
+    name: "skew",
+    words: "it is sampled earlier or later than the rest, by a clock of its own",
+    equation: "y(t) = x(t - skew_s - rate t), t since the trial began",
+    usual: &[Side::Output],
+    parameters: |e, _| {
+        let late = e.late_s();
+        let rate = EffectParameter::formed("rate", "s/s", -1e-3..=1e-3, 0.0);
+        vec![EffectParameter::sized("skew_s", "s", -late..=late), rate]
+    },
+    starts: Some(|e| [-0.2, -0.03, 0.03, 0.1, 0.5].map(|k| vec![k * e.late_s(), 0.0]).into()),
+    operator: |v, _, grid| Box::new(Skew::new(grid, SkewSpec { skew_s: v[0], rate: v[1] })),
+    sketch: Some(|v, _, signals| sketch([v[0], v[1]], signals)),
+    twins: &["delay", "lag", "second_order_lag"],
+    family: Some((Family::Late, |v| v[0])),
+    ..Kind::PLAIN
+};
+
+/// Acts on a record as a whole.
+fn sketch([skew_s, rate]: [f64; 2], signals: &Signals) -> Sketch {
+    let body = "let early = -(SKEW + RATE * i * DT) / DT
+        let whole = floor(early)
+        let u = early - whole
+        let k = i + whole
+        var y = v[0]
+        if k >= n - 1
+        y = v[n - 1]
+        else
+        if (k >= 1) and (k <= n - 3)
+        y = u * (1 - u) * (u - 2) / 6 * v[k - 1] + (u + 1) * (u - 1) * (u - 2) / 2 * v[k]
+        y = y + (u + 1) * u * (2 - u) / 2 * v[k + 1] + (u + 1) * u * (u - 1) / 6 * v[k + 2]
+        else
+        if k >= 0
+        y = v[k] + u * (v[k + 1] - v[k])
+        end
+        end
+        end";
+    Sketch::of(signals.x.clone().named("v").record(), body)
+        .beside(Quantity::COUNT)
+        .beside(Quantity::new("i", "1", "which sample is shown, from 0"))
+        .with_all(&[("SKEW", skew_s, "s"), ("RATE", rate, "s/s"), ("DT", signals.dt_s, "s")])
+}
+
+/// The channels are not sampled at the same time.
+pub(crate) static CHANNEL_SKEW: Effect = Effect {
+    name: "channel_skew",
+    words: "the bridge is sampled earlier or later than the length",
+    equation: "bridge samples show the length of skew_s + rate t earlier, t since the trial began, first and last value held",
+    parameters: &[
+        EffectParameter::strength("skew_s", "s", -0.1, 0.2, 0.02),
+        EffectParameter::form("rate", "s/s", -5e-4, 5e-4, Form { neutral: 0.0, usual: 0.0 }),
+    ],
+    acts: Acts::at(&SKEW, Place::Sampling),
+    twins: &["amplifier_lowpass"],
+    // Two recorders may be started by two hands.
+    alone: |alone, search| {
+        search.reach(1.0);
+        let more = [alone.lag_s, 0.9 * alone.lag_s, -0.15, 0.2];
+        search.starts.extend(more.map(|skew_s| vec![skew_s, 0.0]));
+    },
+    // Late or early by as much throughout, and two clocks that part.
+    starts: Some(|_| {
+        let mut all = each([-0.02, -0.004, 0.004, 0.02, 0.08]);
+        all.extend([-1e-4, 1e-4].map(|rate| vec![0.002, rate]));
+        all
+    }),
+    live: Some(Live {
+        parameters: &[EffectParameter::strength("skew_s", "s", -1.0, 1.0, 0.0)],
+        set: |v, _, map| map.skew_s = v[0],
+        ..Live::BY_CURVE
+    }),
+    ..Effect::PLAIN
+};

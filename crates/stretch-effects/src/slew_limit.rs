@@ -1,6 +1,13 @@
 //! A channel that cannot change faster than a rate.
 
-use crate::operator::{Operator, Span, Start};
+use alloc::{boxed::Box, format, vec};
+
+use crate::{
+    kind::{Kind, Side},
+    operator::{Operator, Span, Start},
+    parameter::EffectParameter,
+    sketch::Sketch,
+};
 
 /// Bounds the rate: y goes towards x by at most rate h in a step of length h. Remembers y.
 ///
@@ -40,3 +47,31 @@ impl Operator for SlewLimit {
         cells[0] = y;
     }
 }
+
+/// A greatest rate.
+pub static SLEW_LIMIT: Kind = Kind {
+    name: "slew_limit",
+    words: "it cannot change faster than a rate",
+    equation: "|y'| <= rate, y follows x",
+    usual: &[Side::Input, Side::Output],
+    // At twice the quickest change that was seen nothing is limited.
+    parameters: |e, unit| {
+        let off = 2.0 * e.quickest.max(1e-9 * e.span() / e.dt_s);
+        vec![EffectParameter::sized("rate", &format!("{unit}/s"), 0.01 * off..=off).off_at(off)]
+    },
+    starts: Some(|e| [0.45, 0.3, 0.15, 0.06].map(|k| vec![2.0 * k * e.quickest]).into()),
+    operator: |v, _, _| Box::new(SlewLimit { rate: v[0] }),
+    sketch: Some(|v, _, signals| {
+        let body = "let most = RATE * DT
+            s.at = max(s.at - most, min(s.at + most, x))
+            let y = s.at";
+        Sketch::of(signals.x.clone(), body)
+            .with_all(&[
+                ("RATE", v[0], &*format!("{}/s", signals.x.unit)),
+                ("DT", signals.dt_s, "s"),
+            ])
+            .remembering(["at"])
+    }),
+    twins: &["lag"],
+    ..Kind::PLAIN
+};

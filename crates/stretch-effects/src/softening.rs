@@ -1,6 +1,19 @@
 //! A response that weakens as it is worked.
 
-use crate::operator::{Operator, Span, Start};
+use alloc::{boxed::Box, format, vec};
+
+use stretch_core::Worn;
+
+use crate::{
+    effect::{Acts, Effect, pairs},
+    extent::Extent,
+    kind::{Beside, Kind, Side, Signals},
+    live::Live,
+    operator::{Operator, Span, Start},
+    parameter::{EffectParameter, Form},
+    place::Place,
+    sketch::Sketch,
+};
 
 /// Softening with travel: y = zero + (x - zero)(1 - m (1 - left)), left = (1 + tail travel/n)^(-1/tail), which is
 /// exp(-travel/n) at a tail of 0. Travel is the summed absolute change of strain since the session began.
@@ -91,3 +104,94 @@ impl Operator for Softening {
         cells.copy_from_slice(&state);
     }
 }
+
+/// A response that weakens with the distance travelled.
+pub static SOFTENING: Kind = Kind {
+    name: "softening",
+    words: "its response weakens with the distance travelled",
+    equation: "y = zero + (x - zero)(1 - m (1 - (1 + tail travel/n)^(-1/tail))), travel since the session began",
+    usual: &[Side::Output],
+    beside: Beside::Itself,
+    parameters: |e, unit| {
+        let s = e.span();
+        // The value that does not soften: 0 where the channel passes it, else its end nearest to 0.
+        let zero = 0.0_f64.clamp(e.low, e.high);
+        vec![
+            EffectParameter::sized("m", "1", 0.0..=0.5),
+            EffectParameter::shaped("n", unit, 1.5 * s..=200.0 * s),
+            EffectParameter::formed("tail", "1", 0.05..=2.5, 1.0 / 3.0).log(),
+            EffectParameter::formed("zero", unit, e.low - s..=e.high + s, zero),
+        ]
+    },
+    operator: |v, e, _| {
+        let reversal = reversal(e);
+        Box::new(Softening { m: v[0], n: v[1], tail: v[2], zero: v[3], reversal })
+    },
+    sketch: Some(sketch),
+    counts_session: true,
+    ..Kind::PLAIN
+};
+
+/// Turns that do not travel, in shares of the range of what travels: noise alone would go a long way.
+const REVERSAL: f64 = 2.5e-3;
+
+fn reversal(e: &Extent) -> f64 {
+    REVERSAL * (e.beside[1] - e.beside[0])
+}
+
+fn sketch(v: &[f64], extent: &Extent, signals: &Signals) -> Sketch {
+    let (x, e) = (&signals.x, &signals.beside);
+    let lost = match v[2] {
+        0.0 => "expm1(-s.travel / N)",
+        _ => "expm1(-log1p(TAIL * s.travel / N) / TAIL)",
+    };
+    let body = format!(
+        "let moved = e - s.reached
+        if (moved * s.direction > 0) or (abs(moved) > REVERSAL)
+        s.travel = s.travel + abs(moved)
+        s.reached = e
+        s.direction = moved / abs(moved)
+        end
+        let y = ZERO + (x - ZERO) * (1 + M * {lost})"
+    );
+    let mut sketch = Sketch::of(x.clone(), body).beside(e.clone());
+    sketch = sketch.with_all(&[("M", v[0], "1"), ("N", v[1], &*e.unit)]);
+    if v[2] != 0.0 {
+        sketch = sketch.with("TAIL", v[2], "1");
+    }
+    sketch
+        .with_all(&[("ZERO", v[3], &*x.unit), ("REVERSAL", reversal(extent), &*e.unit)])
+        .cells(["travel"], e.unit.clone(), "0")
+        .cells(["reached"], e.unit.clone(), e.name)
+        .cells(["direction"], "1", "0")
+}
+
+/// The gauge softens as it is worked.
+pub(crate) static GAUGE_SOFTENING: Effect = Effect {
+    name: "gauge_softening",
+    words: "the gauge's response weakens with the distance travelled",
+    equation: "R - R0 -> (R - R0)(1 - m (1 - (1 + tail travel/n)^(-1/tail))), exp(-travel/n) at a tail of 0; travel: summed abs strain change since the session began",
+    parameters: &[
+        EffectParameter::strength("m", "1", 0.0, 0.3, 0.1),
+        EffectParameter::shape("n", "strain", 0.3, 20.0, 2.5),
+        EffectParameter::form("tail", "1", 0.05, 2.5, Form { neutral: 0.0, usual: 1.0 / 3.0 })
+            .log(),
+    ],
+    acts: Acts::with(&SOFTENING, Place::Resistance, |v, around| {
+        [v, &[around.resistance_zero]].concat()
+    }),
+    starts: Some(|_| pairs(0.03, [0.5, 2.5, 12.0])),
+    live: Some(Live {
+        parameters: &[
+            EffectParameter::strength("m", "1", 0.0, 0.6, 0.05),
+            EffectParameter::shape("n", "1", 0.3, 500.0, 12.0),
+            EffectParameter::form("zero", "1", -3.0, 3.0, Form { neutral: 0.0, usual: 0.0 }),
+        ],
+        set: |v, target, map| {
+            let (m, n, zero) = (v[0], v[1], target.at(v[2]));
+            map.worn = Some(Worn { m, n, zero, reversal: REVERSAL, travelled: 0.0 });
+        },
+        drifts: true,
+    }),
+    ..Effect::PLAIN
+};

@@ -1,11 +1,17 @@
 //! A gain that warms up.
 
-use alloc::vec::Vec;
+use alloc::{boxed::Box, vec, vec::Vec};
 
 use crate::{
+    effect::{Acts, Effect, pairs},
     fading::Times,
     grid::Grid,
+    kind::Kind,
+    live::Live,
     operator::{Operator, Span, Start},
+    parameter::{EffectParameter, Form},
+    place::Place,
+    sketch::Sketch,
 };
 
 /// Warming after switching on: y = x (1 + h (1 - mean of exp(-t/tau))), t since the trial's start.
@@ -60,3 +66,55 @@ impl Operator for Warming {
         });
     }
 }
+
+/// A gain that warms up from a trial's start.
+pub static WARMING: Kind = Kind {
+    name: "warming",
+    words: "its gain warms up in every trial",
+    equation: "y = x (1 + h (1 - mean of exp(-t/(tau_s {1/spread, 1, spread})))), t since the trial began",
+    parameters: |e, _| {
+        vec![
+            EffectParameter::sized("h", "1", -0.3..=0.3),
+            EffectParameter::shaped("tau_s", "s", 20.0 * e.dt_s..=e.trial_s.max(40.0 * e.dt_s)),
+            EffectParameter::formed("spread", "1", 1.0..=8.0, 1.6).log(),
+        ]
+    },
+    operator: |v, _, grid| Box::new(Warming::new(v[0], Times { tau_s: v[1], spread: v[2] }, grid)),
+    sketch: Some(|v, _, signals| {
+        let x = signals.x.clone();
+        let sketch = match v[2] {
+            1.0 => {
+                let body = "let y = x * (1 + H * (1 - s.left))
+                    s.left = s.left * exp(-DT / TAU)";
+                Sketch::of(x, body).cells(["left"], "1", "1")
+            }
+            _ => {
+                let body = "let y = x * (1 + H * (1 - (s.p + s.q + s.r) / 3))
+                    s.p = s.p * exp(-DT * SPREAD / TAU)
+                    s.q = s.q * exp(-DT / TAU)
+                    s.r = s.r * exp(-DT / (TAU * SPREAD))";
+                Sketch::of(x, body).cells(["p", "q", "r"], "1", "1").with("SPREAD", v[2], "1")
+            }
+        };
+        sketch.with_all(&[("H", v[0], "1"), ("TAU", v[1], "s"), ("DT", signals.dt_s, "s")])
+    }),
+    twins: &["gain_drift"],
+    ..Kind::PLAIN
+};
+
+/// The excitation warms the gauge.
+pub(crate) static SELF_HEATING: Effect = Effect {
+    name: "self_heating",
+    words: "the gauge warms up in its own current",
+    equation: "R -> R (1 + h (1 - mean of exp(-t/(tau {1/spread, 1, spread})))), t since the trial's start",
+    parameters: &[
+        EffectParameter::strength("h", "1", -0.05, 0.05, 0.01),
+        EffectParameter::shape("tau", "s", 1.0, 60.0, 8.0),
+        EffectParameter::form("spread", "1", 1.0, 8.0, Form { neutral: 1.0, usual: 1.6 }).log(),
+    ],
+    acts: Acts::at(&WARMING, Place::Resistance),
+    alone: |_, search| search.reach_from(0.15),
+    starts: Some(|_| pairs(0.003, [1.5, 5.0, 15.0, 45.0])),
+    live: Some(Live { drifts: true, ..Live::BY_CURVE }),
+    ..Effect::PLAIN
+};

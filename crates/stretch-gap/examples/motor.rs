@@ -37,7 +37,7 @@ impl Simulator for Motor {
 }
 
 fn main() -> Result<(), GapError> {
-    let strength = |name, unit, most| vec![EffectParameterSpec::strength(name, unit, 0.0..=most)];
+    let strength = |name, unit, most| vec![EffectParameter::sized(name, unit, 0.0..=most)];
     let gain = ParameterSpec::new("gain", "rad/(V s2)", 100.0).within(10.0);
     let damping = ParameterSpec::new("damping", "1/s", 5.0).within(0.5);
     let ratio = ParameterSpec::new("ratio", "1", 0.1).within(0.001);

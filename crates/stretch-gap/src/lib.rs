@@ -39,7 +39,7 @@ pub use problem::{
     record_facts::{Motion, MotionSpec, RecordFacts, Recorded},
     rows_used::RowsUsed,
     simulator::{Batch, Costly, Driven, Model, ModelRuns, Run, Simulator, SpectralLines},
-    spec::{EffectParameterSpec, EffectSpec, ParameterSpec, StageSpec, TrialSpec, Wander},
+    spec::{EffectSpec, ParameterSpec, StageSpec, TrialSpec, Wander},
     spectral_line::Line,
     thresholds::Thresholds,
 };
@@ -48,6 +48,7 @@ pub use record::{
     gross::{Gross, GrossKind},
 };
 pub use search::baselines::Baselines;
+pub use stretch_effects::EffectParameter;
 pub use verdict::{
     diagnosis::{Diagnosis, NextExperiment, Unexplained, VerdictKind},
     next_experiment::{Laboratory, Plan, Proposal, differences, next_experiment},

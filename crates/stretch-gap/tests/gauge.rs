@@ -1,7 +1,7 @@
 //! A gauge with one stage, straight but for what it lacks.
 
 use stretch_gap::{
-    Description, DescriptionSpec, Dice, EffectParameterSpec, EffectSpec, GapError, MotionSpec,
+    Description, DescriptionSpec, Dice, EffectParameter, EffectSpec, GapError, MotionSpec,
     ParameterSpec, RecordFacts, Recorded, Run, Simulator, StageSpec, TrialSpec,
 };
 
@@ -122,7 +122,7 @@ fn description(trials: Vec<TrialSpec>, volt: f64, rod_mm: &[f64]) -> Description
     let offset = ParameterSpec::new("offset", "V", 0.3 * volt).within(0.05 * volt);
     let mut stage = StageSpec::new("gauge", "volts", "V", &[0, 1]);
     stage.noise = Some(stretch_gap::Noise::known(NOISE_V * volt));
-    let quadratic = vec![EffectParameterSpec::strength("c", "1", -0.2..=0.2)];
+    let quadratic = vec![EffectParameter::sized("c", "1", -0.2..=0.2)];
     Description::new(DescriptionSpec {
         stages: vec![stage],
         parameters: vec![gain, offset],

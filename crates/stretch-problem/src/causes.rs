@@ -2,8 +2,9 @@
 
 use stretch_calibrate::{Cause, Options};
 use stretch_data::{SessionTrial, Trial};
+use stretch_effects::{Effect as Known, EffectParameter, Need, gauge_effect};
 use stretch_gap::{Candidate, Diagnosis, Options as Diagnosing, VerdictKind, diagnose};
-use stretch_sim::{Catalogue, Gauge, Stage, effect_named};
+use stretch_sim::{Catalogue, Gauge};
 
 use crate::{GaugeSetup, GaugeSimulator};
 
@@ -54,14 +55,15 @@ impl Causes {
     /// Without those that need a pressure, where some trial has none; which is said.
     pub fn felt(mut self, trials: &[Trial], options: &Options) -> Self {
         let has_pressure = trials.iter().all(|t| t.channel(&options.pressure).is_some());
-        let needs = |cause: &Cause| cause.effect == "pressure_crosstalk" && !has_pressure;
-        if self.found.iter().any(needs) {
-            self.found.retain(|cause| !needs(cause));
-            self.notes.push(format!(
-                "pressure_crosstalk needs the pressure, and no {} was recorded: it is left out",
-                options.pressure
-            ));
-        }
+        let needs = |cause: &Cause| {
+            let effect = gauge_effect(&cause.effect);
+            !has_pressure && effect.is_some_and(|e| e.needs == Some(Need::Pressure))
+        };
+        let left_out: Vec<Cause> = self.found.extract_if(.., |cause| needs(cause)).collect();
+        self.notes.extend(left_out.iter().map(|cause| {
+            let (effect, column) = (&cause.effect, &options.pressure);
+            format!("{effect} needs the pressure, and no {column} was recorded: it is left out")
+        }));
         self
     }
 }
@@ -79,21 +81,16 @@ pub fn causes(diagnosis: &Diagnosis) -> Vec<Cause> {
         return Vec::new();
     };
     let is_alone = diagnosis.location.stages.len() == 1;
-    let of_gauge = |name: &&String| {
-        effect_named(name).is_some_and(|e| matches!(e.stage, Stage::Sensing | Stage::Reference))
-    };
-    let cause = |name: &String| {
-        let own = first.parameters.iter().filter(|p| p.effect == *name);
-        let parameters = effect_named(name).map_or(&[][..], |e| e.parameters);
-        let unit = |parameter: &str| {
-            let found = parameters.iter().find(|p| p.name == parameter);
-            if is_alone { 1.0 } else { found.map_or(1.0, Gauge::unit) }
-        };
+    let cause = |effect: &'static Known| {
         // A voltage's own zero is not told: where the rails lie a fit finds.
-        let is_level = |parameter: &str| !is_alone && parameter.starts_with("v_");
-        let told = own.filter(|p| !is_level(&p.name));
-        let values = told.map(|p| (p.name.clone(), p.value * unit(&p.name))).collect();
-        Cause { effect: name.clone(), values }
+        let is_level = |p: &EffectParameter| p.unit == "V" && p.off().is_some_and(|off| off != 0.0);
+        let value = |p: &EffectParameter| {
+            let mut own = first.parameters.iter().filter(|own| own.effect == effect.name);
+            let found = own.find(|own| own.name == p.name).filter(|_| is_alone || !is_level(p))?;
+            Some((p.name.to_string(), found.value * if is_alone { 1.0 } else { Gauge::unit(p) }))
+        };
+        let values = effect.parameters.iter().filter_map(value).collect();
+        Cause { effect: effect.name.to_owned(), values }
     };
-    first.effects.iter().filter(of_gauge).map(cause).collect()
+    first.effects.iter().filter_map(|name| gauge_effect(name)).map(cause).collect()
 }

@@ -3,6 +3,7 @@
 use std::{f64::consts::TAU, path::Path};
 
 use stretch_data::{Remarks, RigFile};
+use stretch_effects::EffectParameter;
 use stretch_gap::{
     Candidate, Diagnosis, EffectSpec, EffectValue, Evidence, Frame, Model, Run, Simulator,
     VerdictKind,
@@ -127,8 +128,7 @@ impl<'a> Chosen<'a> {
         let wanted = self.found.map_or(&[][..], |found| &found.effects);
         self.model.effects.iter().filter_map(move |(index, values)| {
             let spec = catalogue.get(*index)?;
-            let mut strengths = spec.parameters.iter().zip(values);
-            let is_off = strengths.all(|(p, value)| p.off.is_none_or(|off| *value == off));
+            let is_off = EffectParameter::are_off(&spec.parameters, values);
             (wanted.contains(&spec.name) && !is_off).then_some((*index, values.as_slice()))
         })
     }
@@ -281,7 +281,7 @@ fn found_line(
     model: &Model,
     (effect, values): (&Effect, &[f64]),
 ) -> Option<[f64; 2]> {
-    let line = effect.line?(values);
+    let line = effect.line(values)?;
     let (stage, unit) = place;
     let is_other = |(index, _): &&(usize, Vec<f64>)| rows[*index].name != effect.name;
     let without = Model {

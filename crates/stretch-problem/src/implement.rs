@@ -69,7 +69,7 @@ pub(crate) fn implementations(
             stage: effect.stage.name().to_owned(),
             formula: effect.equation.to_owned(),
             numbers: chosen.numbers(effect.name),
-            sketch: effect.sketch.map(|sketch| sketch(&values, around)),
+            sketch: effect.sketch(&values, around),
         }
     };
     chosen.named(catalogue).into_iter().map(one).collect()

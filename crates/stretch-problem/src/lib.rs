@@ -30,5 +30,5 @@ pub use implement::Implementation;
 pub use init::first_problem;
 pub use problem::{Diagnosable, Problem, Reading, name_of};
 pub use rig::{RigSession, RigSetup, RigSimulator, RigTrial};
+pub use stretch_effects::{KINDS, Kind, kind_named};
 pub use stretch_sim::Tolerance;
-pub use wrap::{Beside, Extent, Family, Measure, Side, Starts, Wrapper, wrapper_named, wrappers};

@@ -1,22 +1,46 @@
 //! Effects are written once: what the simulator runs, the diagnosis finds and the menu of experiments parts; a user's own, too.
 
+use std::sync::Arc;
+
 use approx::assert_relative_eq;
-use stretch_data::{EffectEntry, SessionTrial, Split};
-use stretch_effects::Hum;
-use stretch_gap::{Laboratory, Model, Options, Simulator, VerdictKind, diagnose, differences};
-use stretch_problem::{GaugeSetup, GaugeSimulator, RigSession, RigSetup, RigSimulator};
+use stretch_data::{Channel, EffectEntry, SessionTrial, Split, Trial};
+use stretch_effects::{
+    Acts, Effect, EffectParameter, Hum, Kind, Language, Place, Quantity, Side, Sketch,
+};
+use stretch_gap::{
+    Dice, Laboratory, Model, Options, Simulator, VerdictKind, diagnose, differences,
+};
+use stretch_problem::{
+    Ask, BlackBox, GaugeSetup, GaugeSimulator, Parameter, Problem, ProblemSpec, RigSession,
+    RigSetup, RigSimulator, Stage, closure,
+};
 use stretch_sim::{
-    Action, CATALOGUE, Catalogue, Effect, EffectParameter, EffectSet, GaugeRig, GaugeSpec, Rig,
-    RunSettings, Tolerance, TrialPlan,
+    CATALOGUE, Catalogue, EffectSet, GaugeRig, GaugeSpec, Rig, RunSettings, Tolerance, TrialPlan,
 };
 
-/// A charger beside the rig: no effect of the catalogue swings slowly by itself.
+/// A charger that swings a channel: no kind of the catalogue swings slowly by itself.
+static RIPPLE: Kind = Kind {
+    name: "ripple",
+    words: "a charger swings it",
+    equation: "y = x + a sin(2 pi 0.4 Hz t), t since the session began",
+    usual: &[Side::Output],
+    parameters: |e, unit| vec![EffectParameter::sized("a", unit, 0.0..=0.3 * e.span())],
+    operator: |v, _, _| Box::new(Hum { a: v[0], f_hz: 0.4, phase: 0.0 }),
+    sketch: Some(|v, _, signals| {
+        Sketch::of(signals.x.clone(), "let y = x + A * sin(2.5132741228718345 * t)")
+            .beside(Quantity::SESSION_TIME)
+            .with("A", v[0], &signals.x.unit)
+    }),
+    ..Kind::PLAIN
+};
+
+/// The same beside the rig.
 static CHARGER: Effect = Effect {
     name: "charger_ripple",
     words: "a charger swings the bridge",
     equation: "v -> v + a sin(2 pi 0.4 Hz t)",
     parameters: &[EffectParameter::strength("a", "V", 0.0, 0.1, 0.02)],
-    action: |values, _| Action::Record(Box::new(Hum { a: values[0], f_hz: 0.4, phase: 0.0 })),
+    acts: Acts::at(&RIPPLE, Place::Record),
     ..Effect::PLAIN
 };
 
@@ -101,7 +125,7 @@ fn what_a_diagnosis_answers_is_what_a_simulation_takes() {
     let rig = simulator(&Rig::default(), 1, &Catalogue::default());
     for effect in &rig.description().effects {
         for start in &effect.starts {
-            let names = effect.parameters.iter().map(|p| p.name.as_str());
+            let names = effect.parameters.iter().map(|p| &*p.name);
             let given: Vec<(&str, f64)> = names.zip(start.iter().copied()).collect();
             EffectSet::new().insert(&effect.name, &given).unwrap();
         }
@@ -120,7 +144,7 @@ fn what_a_diagnosis_answers_is_what_a_simulation_takes() {
     };
     for effect in &gauge().description().effects {
         for start in &effect.starts {
-            let names = effect.parameters.iter().map(|p| p.name.clone());
+            let names = effect.parameters.iter().map(|p| p.name.to_string());
             let parameters = names.zip(start.iter().copied()).collect();
             let mut file = gauge_file.to_file();
             file.effects.push(EffectEntry { name: effect.name.clone(), parameters });
@@ -145,4 +169,65 @@ fn an_effect_of_ones_own_is_simulated_listed_and_named() {
     assert_relative_eq!(a.value, 0.02, epsilon = 0.0, max_relative = 0.02);
     let before = Catalogue::default().without(&["charger_ripple"]);
     assert!(before.is_err());
+    let params = Rig::default().params;
+    let grid = stretch_sim::Grid::samples(0.01).unwrap();
+    let sketch = CHARGER.sketch(&[a.value], &params.surroundings(&grid)).unwrap();
+    let code = sketch.code(Language::Python, CHARGER.name, &[]);
+    assert!(code.contains("def charger_ripple(x, t):"), "{code}");
+}
+
+#[test]
+fn a_kind_of_ones_own_is_wrapped_named_and_printed() {
+    let (dt_s, samples) = (0.02, 1500);
+    let load = |t: f64| 20.0 * (1.3 * t).sin() + 10.0 * (3.1 * t).sin();
+    let trial = |number: usize| {
+        let time_s: Vec<f64> = (0..samples).map(|i| dt_s * i as f64).collect();
+        let start_s = 40.0 * number as f64;
+        let mut dice = Dice::new(5, number as u64);
+        let force: Vec<f64> = time_s.iter().map(|t| load(t + start_s)).collect();
+        let ripple = |t: f64| 4.0 * (std::f64::consts::TAU * 0.4 * (t + start_s)).sin();
+        let shown = force.iter().zip(&time_s);
+        let length = shown.map(|(f, t)| 2.0 * f + ripple(*t) + 0.05 * dice.gauss()).collect();
+        let channel = |name: &str, values| Channel { name: name.into(), values };
+        let channels = vec![channel("force_N", force), channel("length_mm", length)];
+        let split = if number == 1 { Split::Test } else { Split::Fit };
+        let trial = Trial { name: format!("{number}.csv"), time_s, channels };
+        SessionTrial { start_s, split, ..SessionTrial::new(trial) }
+    };
+    let problem = Problem::new(ProblemSpec {
+        stages: vec![Stage {
+            name: "spring".into(),
+            output: "length_mm".into(),
+            inputs: vec!["force_N".into()],
+            ..Stage::default()
+        }],
+        parameters: vec![Parameter {
+            name: "compliance".into(),
+            unit: "mm/N".into(),
+            value: 2.0,
+            tolerance: stretch_problem::Tolerance::Relative(0.1),
+            ..Parameter::default()
+        }],
+        wrap: ["output.ripple", "output.lag", "output.curve"].map(String::from).into(),
+        kinds: vec![&RIPPLE],
+        trials: vec![trial(0), trial(1)],
+        ..ProblemSpec::default()
+    })
+    .unwrap();
+    let force = problem.session().column("force_N").unwrap().to_vec();
+    let session = problem.session().clone();
+    let spring = closure(move |ask: &Ask<'_>| {
+        Ok(force[..session.samples(ask.trials)].iter().map(|f| ask.parameters[0] * f).collect())
+    });
+    let listed: Vec<&str> = problem.description().effects.iter().map(|e| e.name.as_str()).collect();
+    let at = listed.iter().position(|name| *name == "output.ripple").unwrap();
+    let black_box = BlackBox::new(problem, Arc::new(spring));
+    let (diagnosis, _) = diagnose(&black_box, &Options::default(), &|_| (), &|| false).unwrap();
+    assert_eq!(diagnosis.named, ["output.ripple"], "{}", diagnosis.sentence);
+    let a = diagnosis.candidates[0].parameters[0].value;
+    // The noise of 1500 samples leaves the amplitude to a thousandth.
+    assert_relative_eq!(a, 4.0, epsilon = 0.0, max_relative = 0.005);
+    let code = black_box.problem().sketch(at, &[a]).unwrap().code(Language::C, "ripple", &[]);
+    assert!(code.contains("double ripple(double x, double t)"), "{code}");
+    assert!(code.contains("x (mm): length_mm, as the simulator makes it"), "{code}");
 }

@@ -38,7 +38,7 @@ pub enum SimError {
         /// Greatest value allowed.
         max: f64,
         /// Unit of the three.
-        unit: &'static str,
+        unit: String,
     },
     /// A parameter that has to be given is not there.
     #[error("`{owner}` lacks the parameter `{name}`")]

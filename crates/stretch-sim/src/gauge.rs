@@ -1,14 +1,14 @@
 //! A gauge alone: any stretch sensor with a reference is a rig of one stage.
 
-use stretch_effects::{Grid, Skew, Span, Start};
+use stretch_effects::{
+    Alone, Effect, EffectParameter, Extent, Grid, Need, Search, Skew, Span, Stage, Start,
+    Surroundings,
+};
 
 use crate::{
     SimError,
-    effects::{
-        ActiveEffect, Alone, Effect, EffectParameter, EffectSet, Extent, Need, Search, Surroundings,
-    },
+    effects::{ActiveEffect, EffectSet},
     memory::Memory,
-    stage::Stage,
     stages::{Reference, Sites, check_length, pick},
 };
 
@@ -42,9 +42,6 @@ pub struct Gauge {
 }
 
 impl Gauge {
-    /// Strokes of the rig in its own units, which ranges are divided by: strain, mm and V for the whole stroke.
-    const STROKES: [(&'static str, f64); 3] = [("strain", 0.2), ("mm", 30.0), ("V", 1.07)];
-
     /// Whether an effect can act in a gauge alone.
     pub fn accepts(effect: &Effect, has_pressure: bool) -> bool {
         matches!(effect.stage, Stage::Sensing | Stage::Reference)
@@ -57,14 +54,19 @@ impl Gauge {
 
     /// The catalogue's unit of a parameter in units of e and of y's span.
     pub fn unit(parameter: &EffectParameter) -> f64 {
-        Self::STROKES.iter().find(|(unit, _)| *unit == parameter.unit).map_or(1.0, |s| 1.0 / s.1)
+        1.0 / Self::stroke(parameter)
+    }
+
+    /// The whole stroke in the unit of a parameter; 1 in others.
+    fn stroke(parameter: &EffectParameter) -> f64 {
+        let mut strokes = Surroundings::STROKES.iter();
+        strokes.find(|(unit, _)| *unit == parameter.unit).map_or(1.0, |s| s.1)
     }
 
     /// Where an effect is looked for in a gauge alone.
     pub fn search(effect: &Effect, alone: &Alone) -> Search {
         let units: Vec<f64> = effect.fitted().map(Self::unit).collect();
-        let mut search =
-            Search::of(effect, &Extent { volts: (0.0, 1.0), strain: 0.0 }).times(&units);
+        let mut search = Search::of(effect, &Extent::between(0.0, 1.0)).times(&units);
         (effect.alone)(alone, &mut search);
         search
     }
@@ -77,8 +79,7 @@ impl Gauge {
     /// assert_eq!(Gauge::range(w), (0.0, 0.15, 0.04));
     /// ```
     pub fn range(parameter: &EffectParameter) -> (f64, f64, f64) {
-        let stroke =
-            Self::STROKES.iter().find(|(unit, _)| *unit == parameter.unit).map_or(1.0, |s| s.1);
+        let stroke = Self::stroke(parameter);
         (parameter.min / stroke, parameter.max / stroke, parameter.typical / stroke)
     }
 
@@ -117,7 +118,7 @@ impl Gauge {
 
     /// What an effect may know of a gauge alone.
     pub fn surroundings<'a>(spec: &GaugeSpec, grid: &'a Grid) -> Surroundings<'a> {
-        Surroundings::of_gauge(spec.pressure_scale, 1.0 / Self::STROKES[0].1, grid)
+        Surroundings::of_gauge(spec.pressure_scale, grid)
     }
 
     /// A memory for it.

@@ -4,7 +4,7 @@ use std::ops::{Index, IndexMut};
 
 use stretch_data::Parameter;
 
-use crate::stage::Stage;
+use stretch_effects::{Grid, Stage, Surroundings};
 
 /// How far a nominal parameter may be wrong without that being an unmodelled effect: one standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -174,6 +174,23 @@ impl RigParams {
     /// All values, to be changed.
     pub fn values_mut(&mut self) -> &mut [f64; Key::COUNT] {
         &mut self.0
+    }
+
+    /// What an effect may know of a rig with these values.
+    pub fn surroundings<'a>(&self, grid: &'a Grid) -> Surroundings<'a> {
+        let (stretch, k_max) = (1.0 + self[Key::E0], self[Key::KMax]);
+        Surroundings {
+            grid,
+            strain_scale: self[Key::E0],
+            strain_stroke: stretch * k_max,
+            contraction_stroke: k_max,
+            resistance_zero: self[Key::R0],
+            length_zero: self[Key::L0],
+            length_span: -self[Key::L0] * k_max,
+            pressure_scale_kpa: 1e-3 * self[Key::PRef],
+            strain_unit: 1.0,
+            least_opening: self[Key::UMin],
+        }
     }
 }
 

@@ -4,13 +4,14 @@ use std::{collections::BTreeMap, fmt::Write};
 
 use stretch_data::{Parameter, RigFile};
 
+use stretch_effects::Stage;
+
 use crate::{
     Bridge, SimError, StaticLaw,
     effects::EffectSet,
     nearest::nearest,
     params::{Key, PARAMETERS, RigParams, Tolerance},
     random::Random,
-    stage::Stage,
 };
 
 /// Least gauge strain over the stroke of a rig whose sleeve stays stretched.
@@ -155,7 +156,7 @@ impl Rig {
                     value,
                     min,
                     max,
-                    unit: key.info().unit,
+                    unit: key.info().unit.into(),
                 });
             }
         }

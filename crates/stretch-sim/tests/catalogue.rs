@@ -1,7 +1,7 @@
 //! What must hold of every effect of the catalogue.
 
 use stretch_sim::{
-    Alone, CATALOGUE, Effect, EffectSet, Extent, Gauge, Role, Scale, Search, effect_named,
+    Alone, CATALOGUE, Effect, EffectSet, Extent, Gauge, Place, Role, Scale, Search, effect_named,
 };
 
 fn is_form(role: Role) -> bool {
@@ -25,7 +25,7 @@ fn every_effect_is_described() {
         };
         assert!(effect.parameters.is_sorted_by_key(|p| rank(p.role)), "{}", effect.name);
         let is_found = |p: &stretch_sim::EffectParameter| matches!(p.role, Role::Found { .. });
-        assert_eq!(effect.find.is_some(), effect.parameters.iter().any(is_found));
+        assert_eq!(effect.find().is_some(), effect.parameters.iter().any(is_found));
         for p in effect.parameters {
             let at = format!("{} {}", effect.name, p.name);
             assert!(p.min < p.max && p.allowed().contains(&p.typical), "{at}");
@@ -58,17 +58,20 @@ fn check_starts(effect: &Effect, search: &Search, place: &str) {
 
 #[test]
 fn every_effect_is_looked_for_within_its_ranges() {
-    let extent = Extent { volts: (1.24, 2.31), strain: 0.019 };
+    let extent = |effect: &Effect| match effect.at() {
+        Some((_, Place::Volts)) => Extent::between(1.24, 2.31),
+        _ => Extent::between(0.019, 0.22),
+    };
     let alone = Alone { session_s: 300.0, lag_s: 0.05 };
     for effect in CATALOGUE {
-        check_starts(effect, &Search::of(effect, &extent), "in the rig");
+        check_starts(effect, &Search::of(effect, &extent(effect)), "in the rig");
         if Gauge::accepts(effect, true) {
             check_starts(effect, &Gauge::search(effect, &alone), "in a gauge alone");
         }
     }
     // A user's own effect that says nothing is looked for at points of its ranges.
     let own = Effect { starts: None, ..*effect_named("muscle_creep").unwrap() };
-    let search = Search::of(&own, &extent);
+    let search = Search::of(&own, &extent(&own));
     check_starts(&own, &search, "at points");
     assert_eq!(search.starts.len(), 2 * 3);
 }
@@ -83,7 +86,7 @@ fn forms_that_are_left_out_are_neutral() {
         let named: Vec<(&str, f64)> = effect.parameters[..typical.len() - forms]
             .iter()
             .filter(|p| !is_form(p.role))
-            .map(|p| (p.name, p.typical))
+            .map(|p| (&*p.name, p.typical))
             .collect();
         left_out.insert(effect.name, &named).unwrap();
         assert_eq!(given, left_out, "{}", effect.name);

@@ -8,10 +8,9 @@ use std::{
     process::{Command, Stdio},
 };
 
-use stretch_effects::{Skew, Span};
+use stretch_effects::{EffectParameter, Extent, KINDS, Kind, Signals, Skew, Span};
 use stretch_sim::{
-    Action, CATALOGUE, Effect, Grid, Language, Operator, RigParams, Role, Sketch, Start,
-    Surroundings,
+    Action, CATALOGUE, Effect, Grid, Language, Operator, Quantity, RigParams, Role, Sketch, Start,
 };
 
 /// What separates two libraries of mathematics over four seconds of memory, as a share of the greatest value.
@@ -20,9 +19,9 @@ const DT_S: f64 = 0.01;
 const SAMPLES: usize = 400;
 
 /// Values to try: forms neutral, usual, and a third of the way through their range.
-fn variants(effect: &Effect) -> Vec<Vec<f64>> {
+fn variants(parameters: &[EffectParameter]) -> Vec<Vec<f64>> {
     let value = |which: usize| {
-        move |p: &stretch_sim::EffectParameter| match (p.role, which) {
+        move |p: &EffectParameter| match (p.role, which) {
             (Role::Form { .. }, 0) => p.typical,
             (Role::Form { usual }, 1) => usual,
             (Role::Form { .. }, _) => p.min + 0.3 * (p.max - p.min),
@@ -30,7 +29,7 @@ fn variants(effect: &Effect) -> Vec<Vec<f64>> {
             _ => p.typical,
         }
     };
-    (0..3).map(|which| effect.parameters.iter().map(value(which)).collect()).collect()
+    (0..3).map(|which| parameters.iter().map(value(which)).collect()).collect()
 }
 
 /// A course between 0 and 1 that rises, turns, dwells and steps.
@@ -67,7 +66,7 @@ fn run(operator: &dyn Operator, span: &Span<'_>, first: f64, signal: &[f64]) -> 
 
 fn trace(effect: &Effect, values: &[f64], side: usize) -> Trace {
     let (params, grid) = (RigParams::default(), Grid::samples(DT_S).unwrap());
-    let around = Surroundings::of_rig(&params, &grid);
+    let around = params.surroundings(&grid);
     let course = course();
     let times: Vec<f64> = (0..SAMPLES).map(|i| DT_S * i as f64).collect();
     let plain = Span::whole(&grid);
@@ -77,7 +76,7 @@ fn trace(effect: &Effect, values: &[f64], side: usize) -> Trace {
         a.iter().zip(b).map(|(a, b)| vec![*a, *b]).collect()
     };
     let alone = |a: &[f64]| -> Vec<Vec<f64>> { a.iter().map(|a| vec![*a]).collect() };
-    match (effect.action)(values, &around) {
+    match effect.action(values, &around) {
         Action::Strain(operator) => {
             let span = Span { pressure_kpa: &pressure, ..plain };
             let expected = run(&*operator, &span, strain[0], &strain);
@@ -154,7 +153,7 @@ fn trace(effect: &Effect, values: &[f64], side: usize) -> Trace {
 
 /// Arguments of a call, the records by name and the rest as the row's columns.
 fn arguments(sketch: &Sketch, row: &str) -> String {
-    let one = |(i, input): (usize, &stretch_sim::Quantity)| match input.is_record {
+    let one = |(i, input): (usize, &Quantity)| match input.is_record {
         true => "record".to_owned(),
         false => row.replace('#', &i.to_string()),
     };
@@ -163,8 +162,7 @@ fn arguments(sketch: &Sketch, row: &str) -> String {
 
 /// Which column the state begins at.
 fn first(sketch: &Sketch, row: &str) -> String {
-    let begins =
-        |input: &stretch_sim::Quantity| sketch.state.iter().any(|c| c.begins == input.name);
+    let begins = |input: &Quantity| sketch.state.iter().any(|c| c.begins == input.name);
     let at = sketch.inputs.iter().position(begins);
     at.map_or(String::new(), |i| row.replace('#', &i.to_string()))
 }
@@ -232,40 +230,89 @@ fn agrees(
     command: fn(&Path, &str) -> Command,
 ) {
     let folder = tempfile::tempdir().unwrap();
+    for Case { name, which, sketch, trace } in cases() {
+        let code = sketch.code(language, name, &["what it does".to_owned()]);
+        let file = folder.path().join(format!("{name}.{}", language.ending()));
+        fs::write(file, &code).unwrap();
+        let driver = format!("run_it.{}", language.ending());
+        fs::write(folder.path().join(driver), prepare(&sketch, name)).unwrap();
+        let mut rows = String::new();
+        for row in &trace.rows {
+            let row: Vec<String> = row.iter().map(|x| format!("{x:?}")).collect();
+            let _ = writeln!(rows, "{}", row.join(" "));
+        }
+        fs::write(folder.path().join("rows.txt"), &rows).unwrap();
+        let found = output(&mut command(folder.path(), name), &rows);
+        assert_eq!(found.len(), SAMPLES, "{code}");
+        let size = trace.expected.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        assert!(size > 0.0, "{name}: nothing happens");
+        for (i, (found, own)) in found.iter().zip(&trace.expected).enumerate() {
+            assert!(
+                (found - own).abs() <= SAME * size,
+                "{name}, variant {which}, sample {i}: {found} in place of {own}\n{code}"
+            );
+        }
+    }
+}
+
+/// A sketch beside what the operator makes of its inputs.
+struct Case {
+    name: &'static str,
+    which: usize,
+    sketch: Sketch,
+    trace: Trace,
+}
+
+/// Every effect of the rig and every kind on a channel, with values of every sort.
+fn cases() -> Vec<Case> {
     let (params, grid) = (RigParams::default(), Grid::samples(DT_S).unwrap());
-    let around = Surroundings::of_rig(&params, &grid);
+    let around = params.surroundings(&grid);
+    let mut cases = Vec::new();
     for effect in CATALOGUE {
         let name = effect.name;
-        let sketch = effect.sketch.expect("every effect of the catalogue has its code");
-        for (which, values) in variants(effect).iter().enumerate() {
-            let sides = if name == "valve_deadband" { 2 } else { 1 };
-            for side in 0..sides {
-                let trace = trace(effect, values, side);
-                let sketch = sketch(values, &around);
-                let code = sketch.code(language, name, &[effect.words.to_owned()]);
-                let file = folder.path().join(format!("{name}.{}", language.ending()));
-                fs::write(file, &code).unwrap();
-                let driver = format!("run_it.{}", language.ending());
-                fs::write(folder.path().join(driver), prepare(&sketch, name)).unwrap();
-                let mut rows = String::new();
-                for row in &trace.rows {
-                    let row: Vec<String> = row.iter().map(|x| format!("{x:?}")).collect();
-                    let _ = writeln!(rows, "{}", row.join(" "));
-                }
-                fs::write(folder.path().join("rows.txt"), &rows).unwrap();
-                let found = output(&mut command(folder.path(), name), &rows);
-                assert_eq!(found.len(), SAMPLES, "{code}");
-                let size = trace.expected.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-                assert!(size > 0.0, "{name}: nothing happens");
-                for (i, (found, own)) in found.iter().zip(&trace.expected).enumerate() {
-                    assert!(
-                        (found - own).abs() <= SAME * size,
-                        "{name}, variant {which}, sample {i}: {found} in place of {own}\n{code}"
-                    );
-                }
+        for (which, values) in variants(effect.parameters).iter().enumerate() {
+            for side in 0..if name == "valve_deadband" { 2 } else { 1 } {
+                let sketch = effect.sketch(values, &around).expect("every effect has its code");
+                cases.push(Case { name, which, sketch, trace: trace(effect, values, side) });
             }
         }
     }
+    let extent = Extent { beside: [-0.7, 0.9], ..Extent::between(-1.0, 2.0) };
+    for kind in KINDS {
+        let name = kind.name;
+        for (which, values) in variants(&(kind.parameters)(&extent, "V")).iter().enumerate().skip(1)
+        {
+            let x = Quantity::new("x", "V", "the channel");
+            let beside = Quantity::new("e", "1", "what is beside it");
+            let signals = Signals { x, beside, dt_s: DT_S };
+            let sketch = kind.sketch.expect("every kind has its code")(values, &extent, &signals);
+            let trace = of_kind(kind, values, &extent, &sketch);
+            cases.push(Case { name, which, sketch, trace });
+        }
+    }
+    cases
+}
+
+/// A channel from -1 to 2 with another one beside it.
+fn of_kind(kind: &Kind, values: &[f64], extent: &Extent, sketch: &Sketch) -> Trace {
+    let grid = Grid::samples(DT_S).unwrap();
+    let course = course();
+    let x = on(&course, -1.0, 2.0);
+    let beside: Vec<f64> = course.iter().rev().map(|x| 1.6 * x - 0.7).collect();
+    let span = Span { strain: &beside, ..Span::whole(&grid) };
+    // What travels begins where it is, a signal where the signal is.
+    let begins_beside = sketch.state.iter().any(|cell| cell.begins == "e");
+    let first = if begins_beside { beside[0] } else { x[0] };
+    let expected = run(&*(kind.operator)(values, extent, &grid), &span, first, &x);
+    let value = |i: usize, q: &Quantity| match (q.name, q.is_record) {
+        ("x", _) | ("v", true) => x[i],
+        ("t", _) => DT_S * i as f64,
+        ("n", _) => SAMPLES as f64,
+        ("i", _) => i as f64,
+        _ => beside[i],
+    };
+    let row = |i: usize| sketch.inputs.iter().map(|q| value(i, q)).collect();
+    Trace { rows: (0..SAMPLES).map(row).collect(), expected }
 }
 
 #[test]
@@ -312,10 +359,10 @@ fn with_octave_the_code_of_every_effect_does_what_the_simulator_does() {
 #[test]
 fn code_is_a_dozen_lines_or_two() {
     let (params, grid) = (RigParams::default(), Grid::samples(DT_S).unwrap());
-    let around = Surroundings::of_rig(&params, &grid);
+    let around = params.surroundings(&grid);
     for effect in CATALOGUE {
-        for values in variants(effect) {
-            let sketch = effect.sketch.unwrap()(&values, &around);
+        for values in variants(effect.parameters) {
+            let sketch = effect.sketch(&values, &around).unwrap();
             assert!(sketch.body.lines().count() <= 22, "{}", effect.name);
             let is_told = sketch.initial_state().is_some();
             assert_eq!(is_told, !sketch.state.is_empty(), "{}", effect.name);

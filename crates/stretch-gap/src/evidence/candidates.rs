@@ -9,6 +9,8 @@ use rayon::prelude::*;
 
 use serde::{Deserialize, Serialize};
 
+use stretch_effects::EffectParameter;
+
 use crate::{
     evidence::{
         bootstrap::closed_interval,
@@ -18,7 +20,7 @@ use crate::{
         probability::Weighed,
     },
     fit::{hypothesis::Hypothesis, prepared::Problem},
-    problem::{error::GapError, simulator::Simulator, spec::EffectParameterSpec},
+    problem::{error::GapError, simulator::Simulator},
 };
 
 /// A set of effects that was held against the data.
@@ -170,12 +172,12 @@ fn effect_values(simulator: &dyn Simulator, hypothesis: &Hypothesis) -> Vec<Effe
             let sd = sds.and_then(|s| s.get(i)).copied().unwrap_or(0.0);
             all.push(EffectValue {
                 effect: spec.name.clone(),
-                name: p.name.clone(),
-                unit: p.unit.clone(),
+                name: p.name.to_string(),
+                unit: p.unit.to_string(),
                 value: *value,
                 sd,
                 interval: interval(p, *value, sd),
-                is_form: p.form.is_some(),
+                is_form: p.usual_form().is_some(),
             });
         }
     }
@@ -183,8 +185,8 @@ fn effect_values(simulator: &dyn Simulator, hypothesis: &Hypothesis) -> Vec<Effe
 }
 
 /// 95 % interval of a fitted parameter, as far as its range goes: of what is fitted in equal ratios in equal ratios.
-fn interval(p: &EffectParameterSpec, value: f64, sd: f64) -> [f64; 2] {
-    let ends = match p.is_log && value > 0.0 {
+fn interval(p: &EffectParameter, value: f64, sd: f64) -> [f64; 2] {
+    let ends = match p.is_log() && value > 0.0 {
         true => [-COVERS, COVERS].map(|k| value * libm::exp(k * sd / value)),
         false => [-COVERS, COVERS].map(|k| value + k * sd),
     };
@@ -247,9 +249,9 @@ mod tests {
     /// 95 % of a Gaussian lie within 1.96 standard deviations; where the range is searched in equal ratios, of the logarithm.
     #[test]
     fn intervals_reach_two_deviations_to_either_side() {
-        let strength = EffectParameterSpec::strength("c", "1", -1.0..=1.0);
+        let strength = EffectParameter::sized("c", "1", -1.0..=1.0);
         assert_eq!(interval(&strength, 0.2, 0.1), [0.2 - 0.196, 0.2 + 0.196]);
-        let shape = EffectParameterSpec::shape("tau", "s", 0.01..=10.0);
+        let shape = EffectParameter::shaped("tau", "s", 0.01..=10.0);
         let [low, high] = interval(&shape, 1.0, 0.1);
         assert_relative_eq!(low * high, 1.0, epsilon = 0.0, max_relative = F64_ROUNDING);
         assert_relative_eq!(high.ln(), 0.196, epsilon = 0.0, max_relative = 1e-12);
@@ -257,8 +259,8 @@ mod tests {
 
     #[test]
     fn intervals_stay_in_the_range_and_hold_the_value() {
-        let strength = EffectParameterSpec::strength("c", "1", 0.0..=1.0);
-        let shape = EffectParameterSpec::shape("tau", "s", 0.01..=10.0);
+        let strength = EffectParameter::sized("c", "1", 0.0..=1.0);
+        let shape = EffectParameter::shaped("tau", "s", 0.01..=10.0);
         for (spec, values) in [(&strength, [0.0, 0.03, 0.5, 1.0]), (&shape, [0.01, 0.1, 3.0, 10.0])]
         {
             for value in values {
@@ -274,8 +276,7 @@ mod tests {
     /// A threshold that is off may stand outside of its range: it is its own end.
     #[test]
     fn a_value_outside_of_its_range_is_an_end() {
-        let mut spec = EffectParameterSpec::strength("threshold", "V", 1.0..=2.0);
-        spec.off = Some(9.0);
+        let spec = EffectParameter::sized("threshold", "V", 1.0..=2.0).off_at(9.0);
         assert_eq!(interval(&spec, 9.0, 100.0), [1.0, 9.0]);
         assert_eq!(interval(&spec, 9.0, 0.0), [9.0, 9.0]);
     }

@@ -2,6 +2,8 @@
 
 use rayon::prelude::*;
 
+use stretch_effects::EffectParameter;
+
 use crate::{
     evidence::{
         gathered::{Evidence, held_out},
@@ -9,7 +11,7 @@ use crate::{
     },
     fit::{hypothesis::Hypothesis, levenberg_marquardt::possible, prepared::Problem},
     numerics::linear::dot,
-    problem::{error::GapError, frame::Role, spec::EffectParameterSpec},
+    problem::{error::GapError, frame::Role},
 };
 
 /// Where the values lie: shares of the reach on either side of the fitted one.
@@ -22,7 +24,7 @@ const RATIO: f64 = 4.0;
 struct Turned<'a> {
     effect: usize,
     parameter: usize,
-    spec: &'a EffectParameterSpec,
+    spec: &'a EffectParameter,
     fitted: f64,
     values: Vec<f64>,
 }
@@ -60,8 +62,8 @@ pub(crate) fn responses(
     let parameters = turned.iter().zip(answered).filter(|(_, answers)| !answers.is_empty());
     let parameters = parameters.map(|(at, answers)| Response {
         effect: simulator.effects()[at.effect].name.clone(),
-        name: at.spec.name.clone(),
-        unit: at.spec.unit.clone(),
+        name: at.spec.name.to_string(),
+        unit: at.spec.unit.to_string(),
         fitted: at.fitted,
         answers: answers.into_iter().map(|(_, one)| one).collect(),
     });
@@ -82,7 +84,7 @@ fn turned<'a>(problem: &Problem<'a>, best: &Hypothesis, stage: usize) -> Vec<Tur
         let sd = best.effect_sd.get(&effect).map_or(&[][..], Vec::as_slice);
         for (parameter, (spec, &fitted)) in own.parameters.iter().zip(fitted).enumerate() {
             let values = values(spec, fitted, sd.get(parameter).copied().unwrap_or(0.0));
-            if spec.is_fitted && !values.is_empty() {
+            if spec.is_fitted() && !values.is_empty() {
                 turned.push(Turned { effect, parameter, spec, fitted, values });
             }
         }
@@ -91,8 +93,8 @@ fn turned<'a>(problem: &Problem<'a>, best: &Hypothesis, stage: usize) -> Vec<Tur
 }
 
 /// Values around a fitted one, within what is plausible.
-fn values(spec: &EffectParameterSpec, fitted: f64, sd: f64) -> Vec<f64> {
-    let at = |share: f64| match spec.is_log && fitted > 0.0 {
+fn values(spec: &EffectParameter, fitted: f64, sd: f64) -> Vec<f64> {
+    let at = |share: f64| match spec.is_log() && fitted > 0.0 {
         true => fitted * libm::pow(RATIO, share),
         false => fitted + share * fitted.abs().max(DEVIATIONS * sd),
     };
@@ -134,11 +136,11 @@ mod tests {
 
     #[test]
     fn values_stay_plausible_and_leave_out_the_fitted_one() {
-        let strength = EffectParameterSpec::strength("c", "1", 0.0..=1.0);
+        let strength = EffectParameter::sized("c", "1", 0.0..=1.0);
         assert_eq!(values(&strength, 0.5, 0.0), [0.0, 0.25, 0.375, 0.625, 0.75, 1.0]);
         assert_eq!(values(&strength, 0.5, 0.25), [0.0, 0.125, 0.3125, 0.6875, 0.875, 1.0]);
         assert_eq!(values(&strength, 0.0, 0.0), [0.0; 0]);
-        let shape = EffectParameterSpec::shape("tau", "s", 0.01..=10.0);
+        let shape = EffectParameter::shaped("tau", "s", 0.01..=10.0);
         assert_eq!(values(&shape, 5.0, 0.0).last(), Some(&10.0));
         assert_eq!(values(&shape, 1.0, 0.0)[..2], [0.25, 0.5]);
     }

@@ -10,10 +10,9 @@
 //! The prior's part of a cost is -ln p(x) without its constant. A flat prior on a strength makes the effect's absence no
 //! special case; the penalty for looking is the score's.
 
-use crate::problem::{
-    simulator::{Model, Simulator},
-    spec::EffectParameterSpec,
-};
+use stretch_effects::EffectParameter;
+
+use crate::problem::simulator::{Model, Simulator};
 
 /// Standard deviation of a form around its usual value, as a share of its range.
 const FORM_SD: f64 = 0.35;
@@ -142,26 +141,26 @@ fn of_effects(
         let free = specs.iter().enumerate().filter(|&(index, p)| {
             // A second threshold that is off stays off: it is another form of the effect.
             let is_other = index > 0 || values.len() > 1;
-            let is_off = p.off == Some(values[index]) && values[index] != 0.0;
-            p.is_fitted && !(is_other && is_off)
+            let is_off = p.off() == Some(values[index]) && values[index] != 0.0;
+            p.is_fitted() && !(is_other && is_off)
         });
         free.map(move |(index, p)| of_parameter(slot, index, p))
     })
 }
 
-fn of_parameter(slot: usize, index: usize, p: &EffectParameterSpec) -> (Coordinate, [f64; 2]) {
-    if p.is_log {
+fn of_parameter(slot: usize, index: usize, p: &EffectParameter) -> (Coordinate, [f64; 2]) {
+    if p.is_log() {
         let (a, b) = (p.min.ln(), p.max.ln());
         // A form is looked for near its usual value, anything else in the whole range.
-        let (middle, half) = match p.form {
+        let (middle, half) = match p.usual_form() {
             Some(usual) => (usual.ln(), FORM_SD * (b - a)),
             None => (0.5 * (a + b), 0.5 * (b - a)),
         };
-        let is_form = p.form.is_some();
+        let is_form = p.usual_form().is_some();
         (Coordinate::Log { slot, index, middle, half, is_form }, [a, b])
     } else {
         let range = p.max - p.min;
-        let usual = p.form.map(|usual| usual / range);
+        let usual = p.usual_form().map(|usual| usual / range);
         (Coordinate::Linear { slot, index, range, usual }, [p.min / range, p.max / range])
     }
 }
@@ -177,7 +176,7 @@ pub(crate) fn form_cost(simulator: &dyn Simulator, model: &Model) -> f64 {
 pub(crate) fn choice_cost(simulator: &dyn Simulator, model: &Model) -> f64 {
     let one = |(effect, values): &(usize, Vec<f64>)| {
         let specs = &simulator.effects()[*effect].parameters;
-        let ways = specs.iter().zip(values).filter_map(|(p, v)| p.off.map(|off| off == *v));
+        let ways = specs.iter().zip(values).filter_map(|(p, v)| p.off().map(|off| off == *v));
         let off = ways.clone().filter(|is_off| *is_off).count();
         if off > 0 { (ways.count() as f64).ln() } else { 0.0 }
     };
@@ -188,9 +187,9 @@ pub(crate) fn choice_cost(simulator: &dyn Simulator, model: &Model) -> f64 {
 pub(crate) fn free_parameters(simulator: &dyn Simulator, model: &Model) -> usize {
     let one = |(effect, values): &(usize, Vec<f64>)| {
         let specs = simulator.effects()[*effect].parameters.iter().zip(values);
-        let is_free = |p: &EffectParameterSpec, v: f64| {
-            let is_on = p.off.is_none_or(|off| off == 0.0 || off != v);
-            p.is_fitted && p.form.is_none() && is_on
+        let is_free = |p: &EffectParameter, v: f64| {
+            let is_on = p.off().is_none_or(|off| off == 0.0 || off != v);
+            p.is_fitted() && p.usual_form().is_none() && is_on
         };
         specs.filter(|(p, v)| is_free(p, **v)).count()
     };

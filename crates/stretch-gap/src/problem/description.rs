@@ -3,11 +3,12 @@
 use std::{ops::Deref, sync::Arc};
 
 use serde::Serialize;
+use stretch_effects::EffectParameter;
 
 use crate::problem::{
     record_facts::RecordFacts,
     rows_used::RowsUsed,
-    spec::{EffectParameterSpec, EffectSpec, ParameterSpec, StageSpec, TrialSpec},
+    spec::{EffectSpec, ParameterSpec, StageSpec, TrialSpec},
 };
 
 /// What a simulator is made of and what was recorded beside it, as it is written down; [`Description::new`] checks it.
@@ -131,7 +132,7 @@ impl Description {
     /// [`DescriptionError`] names the first entry that does not do, and what to do about it.
     pub fn new(mut spec: DescriptionSpec) -> Result<Self, DescriptionError> {
         for effect in spec.effects.iter_mut().filter(|e| e.starts.is_empty()) {
-            effect.starts = EffectSpec::starts_of(&effect.parameters);
+            effect.starts = EffectParameter::starts(&effect.parameters);
         }
         let whole = || "description".to_owned();
         // from 1e-3 to 1e7 Hz: every time that is counted in samples is then a number of them
@@ -257,19 +258,19 @@ fn check_effect(effect: &EffectSpec, stages: usize) -> Result<(), DescriptionErr
     Ok(())
 }
 
-fn check_effect_parameter(effect: &str, p: &EffectParameterSpec) -> Result<(), DescriptionError> {
+fn check_effect_parameter(effect: &str, p: &EffectParameter) -> Result<(), DescriptionError> {
     let owner = || format!("effect `{effect}`, parameter `{}`", p.name);
     number(&owner, "min", p.min, "finite", f64::is_finite)?;
     number(&owner, "max", p.max, "finite", f64::is_finite)?;
     if p.min >= p.max {
         return Err(DescriptionError::Range { owner: owner(), min: p.min, max: p.max });
     }
-    if p.is_log {
+    if p.is_log() {
         number(&owner, "min", p.min, "above 0, as it is searched in equal ratios", |x| x > 0.0)?;
     }
-    let form = p.form.unwrap_or(p.min);
+    let form = p.usual_form().unwrap_or(p.min);
     number(&owner, "form", form, "within its range", |x| (p.min..=p.max).contains(&x))?;
-    number(&owner, "off", p.off.unwrap_or(0.0), "finite", f64::is_finite)
+    number(&owner, "off", p.off().unwrap_or(0.0), "finite", f64::is_finite)
 }
 
 fn filled<T>(

@@ -2,9 +2,8 @@
 //!
 //! Entries are plain data; [`Description::new`](crate::Description::new) checks them together.
 
-use std::ops::RangeInclusive;
-
 use serde::Serialize;
+use stretch_effects::EffectParameter;
 
 use crate::problem::noise::Noise;
 
@@ -98,66 +97,6 @@ impl ParameterSpec {
     }
 }
 
-/// A parameter of an effect.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct EffectParameterSpec {
-    /// Name in reports.
-    pub name: String,
-    /// Unit.
-    pub unit: String,
-    /// Least plausible value.
-    pub min: f64,
-    /// Greatest plausible value.
-    pub max: f64,
-    /// Value at which it does nothing; none for a shape.
-    pub off: Option<f64>,
-    /// Whether it is searched in equal ratios.
-    pub is_log: bool,
-    /// Usual value of what only gives the effect its form (a knee's width, a spread): fitted around it within its range,
-    /// and not counted as a parameter of the effect.
-    pub form: Option<f64>,
-    /// Whether it is fitted; otherwise it keeps the value of the start.
-    pub is_fitted: bool,
-}
-
-impl EffectParameterSpec {
-    /// A strength that does nothing at 0.
-    pub fn strength(name: &str, unit: &str, range: RangeInclusive<f64>) -> Self {
-        Self {
-            name: name.into(),
-            unit: unit.into(),
-            min: *range.start(),
-            max: *range.end(),
-            off: Some(0.0),
-            is_log: false,
-            form: None,
-            is_fitted: true,
-        }
-    }
-
-    /// A shape (a time constant, a spread) above 0, searched in equal ratios.
-    pub fn shape(name: &str, unit: &str, range: RangeInclusive<f64>) -> Self {
-        Self { off: None, is_log: true, ..Self::strength(name, unit, range) }
-    }
-
-    /// Values to screen at: a strength at a fiftieth and a fifth of its range, of both signs where it has both; a shape at
-    /// a sixth, a half and five sixths of its range, in equal ratios; a form at its usual value.
-    fn points(&self) -> Vec<f64> {
-        if let Some(usual) = self.form {
-            return vec![usual];
-        }
-        if self.off.is_none() && !self.is_log {
-            return [1.0, 3.0, 5.0].map(|k| self.min + (self.max - self.min) * k / 6.0).into();
-        }
-        if self.off.is_none() {
-            let ratio = self.max / self.min;
-            return [1.0, 3.0, 5.0].map(|k| self.min * libm::pow(ratio, k / 6.0)).into();
-        }
-        let ends = [self.min, self.max].into_iter().filter(|end| *end != 0.0);
-        ends.flat_map(|end| [0.02 * end, 0.2 * end]).collect()
-    }
-}
-
 /// Share of its range within which a parameter stands at an end of it.
 const AT_END: f64 = 1e-3;
 
@@ -171,7 +110,7 @@ pub struct EffectSpec {
     /// Indices of the stages whose output it changes.
     pub touches: Vec<usize>,
     /// Its parameters.
-    pub parameters: Vec<EffectParameterSpec>,
+    pub parameters: Vec<EffectParameter>,
     /// Values to screen it at, a few per shape and threshold; strengths in between are interpolated.
     pub starts: Vec<Vec<f64>>,
     /// Whether its course is found in the record: its size then only says how much is looked for.
@@ -184,21 +123,21 @@ impl EffectSpec {
     /// An effect in one stage, screened at a small and a large value of each strength and at three of each shape.
     ///
     /// ```
-    /// use stretch_gap::{EffectParameterSpec, EffectSpec};
+    /// use stretch_gap::{EffectParameter, EffectSpec};
     /// let parameters = vec![
-    ///     EffectParameterSpec::strength("c", "1", 0.0..=1.0),
-    ///     EffectParameterSpec::shape("tau", "s", 0.01..=10.0),
+    ///     EffectParameter::sized("c", "1", 0.0..=1.0),
+    ///     EffectParameter::shaped("tau", "s", 0.01..=10.0),
     /// ];
     /// let relaxation = EffectSpec::new("relaxation", (0, "sensing"), parameters);
     /// assert_eq!(relaxation.starts.len(), 2 * 3);
     /// assert_eq!(relaxation.starts[0][0], 0.02);
     /// ```
-    pub fn new(name: &str, stage: (usize, &str), parameters: Vec<EffectParameterSpec>) -> Self {
+    pub fn new(name: &str, stage: (usize, &str), parameters: Vec<EffectParameter>) -> Self {
         Self {
             name: name.into(),
             stage: stage.1.into(),
             touches: vec![stage.0],
-            starts: Self::starts_of(&parameters),
+            starts: EffectParameter::starts(&parameters),
             parameters,
             is_found: false,
             twins: Vec::new(),
@@ -208,24 +147,15 @@ impl EffectSpec {
     /// Whether a size stands at an end of its range where the effect is not off: it stands in for something
     /// else then.
     pub(crate) fn is_at_bound(&self, values: &[f64]) -> bool {
-        let mut fitted = self.parameters.iter().zip(values).filter(|(p, _)| p.is_fitted);
+        let mut fitted = self.parameters.iter().zip(values).filter(|(p, _)| p.is_fitted());
         fitted.any(|(p, value)| {
-            let near = |end: f64| match p.is_log {
+            let near = |end: f64| match p.is_log() {
                 true => (value / end).ln().abs() < AT_END * (p.max / p.min).ln(),
                 false => (value - end).abs() < AT_END * (p.max - p.min),
             };
             // A time beyond its range is still that of a memory; a size beyond it is another cause's.
-            p.off.is_some_and(|off| !near(off)) && (near(p.min) || near(p.max))
+            p.off().is_some_and(|off| !near(off)) && (near(p.min) || near(p.max))
         }) && !self.is_found
-    }
-
-    /// Every combination of the parameters' points.
-    pub(crate) fn starts_of(parameters: &[EffectParameterSpec]) -> Vec<Vec<f64>> {
-        parameters.iter().fold(vec![Vec::new()], |starts, parameter| {
-            let points = parameter.points();
-            let with = |start: &Vec<f64>, x: &f64| [start.as_slice(), &[*x]].concat();
-            starts.iter().flat_map(|s| points.iter().map(move |x| with(s, x))).collect()
-        })
     }
 }
 

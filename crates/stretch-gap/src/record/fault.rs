@@ -1,11 +1,12 @@
 //! The hypotheses: one error of the record or of the rig file each, as an effect with one number.
 
 use stretch_data::ends;
+use stretch_effects::{EffectParameter, Role};
 
 use crate::problem::{
     column::{Column, Distortion},
     simulator::Simulator,
-    spec::{EffectParameterSpec, EffectSpec},
+    spec::EffectSpec,
 };
 
 /// Factors that are looked for, as deviations from 1.
@@ -93,11 +94,12 @@ impl Fault {
 
     /// As the engine fits it.
     pub(crate) fn spec(&self) -> EffectSpec {
-        let strength = EffectParameterSpec {
+        let (least, greatest) = self.range;
+        let mut strength = EffectParameter::sized("size", &self.unit, least..=greatest);
+        if self.kind == Kind::Sign {
             // Upside down is never off.
-            off: (self.kind != Kind::Sign).then_some(0.0),
-            ..EffectParameterSpec::strength("size", &self.unit, self.range.0..=self.range.1)
-        };
+            strength = strength.with_role(Role::Shape);
+        }
         let first = self.touches.first().copied().unwrap_or(0);
         EffectSpec {
             touches: self.touches.clone(),

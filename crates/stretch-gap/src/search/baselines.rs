@@ -132,7 +132,8 @@ fn criterion(
             return Ok(0.0);
         }
         let spec = &compare.simulator().effects()[effect];
-        let free = spec.parameters.iter().filter(|p| p.is_fitted && p.form.is_none()).count();
+        let free =
+            spec.parameters.iter().filter(|p| p.is_fitted() && p.usual_form().is_none()).count();
         let all = samples * nominal.misfits.len() as f64;
         let fall = |misfits: &[Misfit]| {
             let gain = |m: &Misfit| samples * (nominal.misfits[m.stage].fit / m.fit).ln();

@@ -89,7 +89,7 @@ impl Comparison<'_> {
         for (values, change) in spec.starts.iter().zip(changes) {
             let Some((own, with_residual)) = change else { continue };
             // Strengths scale with the amplitude; thresholds do not scale at all.
-            let scalable = spec.parameters[0].off == Some(0.0);
+            let scalable = spec.parameters[0].off() == Some(0.0);
             let (value, range) = (values[0], &spec.parameters[0]);
             let alpha = with_residual / own;
             let (least, most) = if scalable && value != 0.0 {

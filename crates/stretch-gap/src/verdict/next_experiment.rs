@@ -233,12 +233,12 @@ impl Tangent {
         }
         for (slot, (effect, effect_values)) in model.effects.iter().enumerate() {
             let specs = &simulator.description().effects[*effect].parameters;
-            for (k, p) in specs.iter().enumerate().filter(|(_, p)| p.is_fitted) {
+            for (k, p) in specs.iter().enumerate().filter(|(_, p)| p.is_fitted()) {
                 let range = p.max - p.min;
                 let x = effect_values[k];
                 let step = if x > p.min + 0.5 * range { -SMALL } else { SMALL };
                 // Small beside the value where the range is wide.
-                let step = if p.is_log && x > 0.0 {
+                let step = if p.is_log() && x > 0.0 {
                     step.signum() * (0.1 * x / range).min(SMALL)
                 } else {
                     step

@@ -1,6 +1,6 @@
 //! What the toys compute: laws of stages, and effects on their inputs and outputs.
 
-use stretch_gap::{EffectParameterSpec, EffectSpec, ParameterSpec};
+use stretch_gap::{EffectParameter, EffectSpec, ParameterSpec};
 
 /// What a stage computes of its input x.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -98,7 +98,7 @@ impl Effect {
 
     /// As the catalogue has it; sizes are shares of -1..1, seconds, and shares of it a second.
     pub(crate) fn spec(self, stage: usize) -> EffectSpec {
-        let strength = |name, unit, range| vec![EffectParameterSpec::strength(name, unit, range)];
+        let strength = |name, unit, range| vec![EffectParameter::sized(name, unit, range)];
         let parameters = match self {
             Self::Play => strength("w", "1", 0.0..=0.3),
             Self::Quadratic | Self::Cubic => strength("c", "1", -0.5..=0.5),
@@ -106,8 +106,8 @@ impl Effect {
             Self::Slow => strength("tau", "s", 0.0..=0.3),
             Self::Drift => strength("rate", "1/s", -0.01..=0.01),
             Self::Creep => vec![
-                EffectParameterSpec::strength("c", "1", -0.5..=0.5),
-                EffectParameterSpec::shape("tau", "s", 0.2..=5.0),
+                EffectParameter::sized("c", "1", -0.5..=0.5),
+                EffectParameter::shaped("tau", "s", 0.2..=5.0),
             ],
         };
         EffectSpec::new(&super::Toy::name(stage, self), (stage, "toy"), parameters)

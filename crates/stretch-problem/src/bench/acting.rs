@@ -59,7 +59,7 @@ pub(crate) fn lines(
     unit: f64,
 ) -> Vec<Line> {
     all(base, rows, model)
-        .filter_map(|(effect, values)| effect.line.map(|line| line(values)))
+        .filter_map(|(effect, values)| effect.line(values))
         .map(|line| Line { hertz: line.hertz, amplitude: unit * line.amplitude })
         .collect()
 }
@@ -74,7 +74,7 @@ impl<'a> Acting<'a> {
     ) -> Result<Self, SimError> {
         let mut acting = Self { inside: EffectSet::new(), found: Vec::new() };
         for (effect, values) in all(base, rows, model) {
-            match effect.find {
+            match effect.find() {
                 Some(find) => acting.found.push((find, values)),
                 None => acting.inside.push(effect, values)?,
             }

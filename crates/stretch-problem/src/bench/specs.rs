@@ -1,7 +1,7 @@
 //! Effects as the engine of the diagnosis takes them.
 
-use stretch_gap::{Description, EffectParameterSpec, EffectSpec};
-use stretch_sim::{Effect, EffectParameter, Role, Scale, Search};
+use stretch_gap::{Description, EffectSpec};
+use stretch_sim::{Effect, EffectParameter, Search};
 
 /// Where an effect acts, and where it is looked for.
 pub(crate) struct Place {
@@ -17,16 +17,8 @@ pub(crate) fn spec(effect: &Effect, place: Place) -> EffectSpec {
     let Place { touches, search, unit } = place;
     let parameter = |(p, range): (&EffectParameter, &[f64; 2])| {
         let unit = unit(p);
-        EffectParameterSpec {
-            name: p.name.into(),
-            unit: if unit == 1.0 { p.unit } else { "1" }.into(),
-            min: range[0],
-            max: range[1],
-            off: p.off().map(|off| off * unit),
-            is_log: p.scale == Scale::Log,
-            is_fitted: p.role != Role::Choice,
-            form: matches!(p.role, Role::Form { .. }).then(|| p.usual() * unit),
-        }
+        let name = if unit == 1.0 { &p.unit } else { "1" };
+        EffectParameter { min: range[0], max: range[1], ..p.times(unit, name) }
     };
     EffectSpec {
         name: effect.name.into(),
@@ -34,7 +26,7 @@ pub(crate) fn spec(effect: &Effect, place: Place) -> EffectSpec {
         touches,
         parameters: effect.fitted().zip(&search.ranges).map(parameter).collect(),
         starts: search.starts,
-        is_found: effect.find.is_some(),
+        is_found: effect.find().is_some(),
         twins: effect.twins.iter().map(|twin| (*twin).to_owned()).collect(),
     }
 }
@@ -57,7 +49,7 @@ pub(crate) fn shown(
     let rate_hz = 1.0 / dt_s;
     effects
         .filter_map(|(effect, mut place)| {
-            let Some(needed) = place.search.at_rate(effect, rate_hz) else {
+            let Some(needed) = place.search.at_rate(|values| effect.least_rate_hz(values), rate_hz) else {
                 return Some((effect, place));
             };
             notes.push(format!(

@@ -1,11 +1,12 @@
 //! The catalogue of a user's own problem: what is looked for, and what acts in every run.
 
-use stretch_gap::{EffectParameterSpec, EffectSpec};
+use stretch_effects::{EffectParameter, Role, Side};
+use stretch_gap::EffectSpec;
 
 use super::spec::{OwnEffect, ProblemSpec, Stage, Wrapped};
 use crate::{
     error::ProblemError,
-    wrap::{Among, Placed, Side, Site, placed},
+    wrap::{Among, Placed, Site, placed},
 };
 
 /// What an effect of the catalogue is.
@@ -116,12 +117,12 @@ fn outputs_of(name: &str) -> String {
 fn values_of(wrapper: &Placed, known: &Wrapped) -> Result<Vec<f64>, ProblemError> {
     let owner = || format!("[[wrapped]] {}", known.name);
     let parameters = wrapper.parameters();
-    let names = || parameters.iter().map(|p| p.name.as_str());
+    let names = || parameters.iter().map(|p| &*p.name);
     if let Some(name) = known.values.keys().find(|name| names().all(|n| n != name.as_str())) {
         return Err(ProblemError::unknown(owner(), "parameter", name, names()));
     }
-    let value = |p: &EffectParameterSpec| {
-        known.values.get(&p.name).copied().or(p.form).ok_or_else(|| {
+    let value = |p: &EffectParameter| {
+        known.values.get(&*p.name).copied().or(p.usual_form()).ok_or_else(|| {
             let found = format!("it has no {}", p.name);
             ProblemError::value(owner(), found, format!("write {} = VALUE", p.name))
         })
@@ -172,44 +173,20 @@ pub(crate) fn own_effects(
             let name = if a.name.is_empty() { &effect.name } else { &a.name };
             let middle = if a.is_log { (a.min * a.max).sqrt() } else { 0.5 * (a.min + a.max) };
             off.push(a.value.or(a.off).unwrap_or(middle));
-            parameters.push(EffectParameterSpec {
-                off: a.off,
-                is_log: a.is_log && a.off.is_none(),
-                ..EffectParameterSpec::strength(name, &a.unit, a.min..=a.max)
+            let strength = EffectParameter::sized(name, &a.unit, a.min..=a.max);
+            parameters.push(match a.off {
+                Some(off) => strength.off_at(off),
+                None if a.is_log => strength.with_role(Role::Shape).log(),
+                None => strength.with_role(Role::Shape),
             });
         }
         let place = (all.first().copied().unwrap_or(0), stages[all[0]].name.as_str());
         let mut spec = EffectSpec::new(&effect.name, place, parameters);
         spec.touches = all;
         spec.twins.clone_from(&effect.twins);
-        shift_starts(&mut spec);
         if !effect.is_standing() {
             specs.push((Acting::Own(first), spec));
         }
     }
     Ok((specs, off))
-}
-
-/// Starts of strengths whose off value is not 0 are shares of the way from there.
-fn shift_starts(spec: &mut EffectSpec) {
-    let points = |p: &EffectParameterSpec| match p.off {
-        Some(off) if off != 0.0 => {
-            let ends = [p.min, p.max].into_iter().filter(|end| (end - off).abs() > 0.0);
-            Some(ends.flat_map(|end| [0.05, 0.2, 0.6].map(|k| off + k * (end - off))).collect())
-        }
-        _ => None,
-    };
-    let is_shifted = spec.parameters.iter().any(|p| points(p).is_some());
-    if !is_shifted {
-        return;
-    }
-    let plain = |p: &EffectParameterSpec| -> Vec<f64> {
-        let alone = EffectSpec::new("", (0, ""), vec![p.clone()]);
-        alone.starts.into_iter().map(|s| s[0]).collect()
-    };
-    spec.starts = spec.parameters.iter().fold(vec![Vec::new()], |starts, p| {
-        let points: Vec<f64> = points(p).unwrap_or_else(|| plain(p));
-        let with = |s: &Vec<f64>, x: &f64| [s.as_slice(), &[*x]].concat();
-        starts.iter().flat_map(|s| points.iter().map(move |x| with(s, x))).collect()
-    });
 }

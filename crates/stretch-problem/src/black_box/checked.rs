@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use stretch_data::unit;
-use stretch_effects::Grid;
+use stretch_effects::{Grid, Kind, Side, Sketch};
 use stretch_gap::{Description, DescriptionSpec, Noise, ParameterSpec, StageSpec};
 
 use stretch_sim::Tolerance;
@@ -18,7 +18,7 @@ use super::{
 };
 use crate::{
     error::ProblemError,
-    wrap::{Among, Placed, Side, Site},
+    wrap::{Among, Placed, Site},
 };
 
 /// A [`ProblemSpec`] that was checked, with its recordings on one grid.
@@ -75,6 +75,7 @@ impl Checked {
             velocities: &velocities,
             inputs: stages.iter().map(|s| s.inputs.len()).collect(),
             others: columns.names.clone(),
+            kinds: &spec.kinds,
         };
         let around = Around::of(&spec, &sites(stages, &unit_of), &among, &mut notes)?;
         let (mut looked_for, off) = own_effects(effects, stages)?;
@@ -141,12 +142,23 @@ impl Checked {
     }
 
     /// The wrapper that an effect of the catalogue is; none for the user's own.
-    pub fn wrapper(&self, effect: usize) -> Option<&'static crate::wrap::Wrapper> {
+    pub fn wrapper(&self, effect: usize) -> Option<&'static Kind> {
         match *self.acting.get(effect)? {
             Acting::Wrapper(at) => Some(self.wrappers[at].kind),
             Acting::Recorder => skews(&self.wrappers).next().map(|(_, w)| w.kind),
             Acting::Own(_) => None,
         }
+    }
+
+    /// How somebody would type the wrapper that an effect of the catalogue is, with these values, in front of the simulator or behind it;
+    /// none for the user's own.
+    pub fn sketch(&self, effect: usize, values: &[f64]) -> Option<Sketch> {
+        let wrapper = match *self.acting.get(effect)? {
+            Acting::Wrapper(at) => Some(&self.wrappers[at]),
+            Acting::Recorder => skews(&self.wrappers).next().map(|(_, w)| w),
+            Acting::Own(_) => None,
+        };
+        wrapper?.sketch(values, self.grid.dt_s())
     }
 
     /// The wrapper on one side of a stage that an effect of the catalogue is, if it is one.

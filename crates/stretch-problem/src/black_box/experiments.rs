@@ -9,13 +9,11 @@ use std::{
 };
 
 use stretch_data::{Channel, Trial, ends};
+use stretch_effects::{Beside, Side};
 use stretch_gap::{GapError, Laboratory, Model, Plan, Run, Simulator};
 
 use super::{BlackBox, source::SourceError};
-use crate::{
-    bench::courses::{course, moving},
-    wrap::{Beside, Side},
-};
+use crate::bench::courses::{course, moving};
 
 /// Most inputs that candidates move.
 const MOVED: usize = 3;

@@ -1,9 +1,9 @@
 //! What wrappers that data do not tell apart agree on.
 
+use stretch_effects::Family;
 use stretch_gap::{Candidate, Diagnosis};
 
 use super::checked::Checked;
-use crate::wrap::Family;
 
 /// Wrappers of one family, any of which may be what is missing.
 #[derive(Debug, Clone, PartialEq)]

@@ -44,7 +44,8 @@ impl BlackBox {
     /// Gives an effect that was found its values in every run from now on.
     fn add(&self, file: &mut ProblemFile, effect: usize, values: &[f64]) {
         let spec = &self.description().effects[effect];
-        let named = || spec.parameters.iter().map(|p| p.name.clone()).zip(values.iter().copied());
+        let named =
+            || spec.parameters.iter().map(|p| p.name.to_string()).zip(values.iter().copied());
         match self.problem.acting[effect] {
             Acting::Own(_) => {
                 let own = file.spec.effects.iter_mut().find(|own| own.name == spec.name);
@@ -96,7 +97,7 @@ impl Diagnosable for BlackBox {
 
     fn implementations(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
         let Ok(chosen) = Chosen::of(diagnosis, evidence) else { return Vec::new() };
-        let one = |(effect, _): (usize, &[f64])| {
+        let one = |(effect, values): (usize, &[f64])| {
             let Meaning { name, words, equation } = self.meaning(effect);
             Implementation {
                 name: name.to_owned(),
@@ -104,7 +105,7 @@ impl Diagnosable for BlackBox {
                 stage: self.description().effects[effect].stage.clone(),
                 formula: equation.to_owned(),
                 numbers: chosen.numbers(name),
-                sketch: None,
+                sketch: self.problem.sketch(effect, values),
             }
         };
         chosen.named(&self.description().effects).into_iter().map(one).collect()

@@ -20,12 +20,9 @@ use stretch_gap::{
     SpectralLines,
 };
 
-use stretch_effects::WanderingLine;
+use stretch_effects::{Find, Kind, Measured, Side};
 
-use crate::{
-    file::ProblemFile,
-    wrap::{Side, Trials},
-};
+use crate::{file::ProblemFile, wrap::Trials};
 use catalogue::Acting;
 use linear::Linear;
 use runs::{Inner, Runs};
@@ -223,23 +220,20 @@ impl BlackBox {
         let trials = self.trials_of();
         for (at, values) in self.acting(run, Side::Output) {
             let wrapper = &self.problem.wrappers[at];
-            match wrapper.kind.is_found {
-                true => self.follow(run.stage, values, out),
-                false => wrapper.act(values, &trials, out),
+            match wrapper.kind.find {
+                Some(find) => self.follow(find, run.stage, values, out),
+                None => wrapper.act(values, &trials, out),
             }
         }
     }
 
-    /// A hum on the samples that may be fitted, its phase found in what was measured of them.
-    fn follow(&self, stage: usize, values: &[f64], out: &mut [f64]) {
-        let line = WanderingLine { a: values[0], f_hz: values[1] };
-        if line.a == 0.0 {
-            return;
-        }
+    /// What is found in the record, on the samples that may be fitted.
+    fn follow(&self, find: Find, stage: usize, values: &[f64], out: &mut [f64]) {
         let (measured, noise) = (self.measured(stage), self.problem.noise[stage]);
         let end = out.len();
         for range in self.problem.columns.looked_at().into_iter().filter(|r| r.end <= end) {
-            line.follow(&measured[range.clone()], noise, self.description().dt_s, &mut out[range]);
+            let (samples, dt_s) = (&measured[range.clone()], self.description().dt_s);
+            find(values, &Measured { samples, noise, unit: 1.0, dt_s }, &mut out[range]);
         }
     }
 }
@@ -349,14 +343,15 @@ impl Costly for BlackBox {
 
 impl SpectralLines for BlackBox {
     fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
-        let found = model.effects.iter().filter(|(effect, _)| {
-            let wrapper = self.problem.wrapper(*effect);
-            wrapper.is_some_and(|w| w.is_found)
-                && self.description().effects[*effect].touches.contains(&stage)
-        });
+        let is_here = |effect: usize| self.description().effects[effect].touches.contains(&stage);
+        let found = model.effects.iter().filter(|(effect, _)| is_here(*effect));
+        let found = found.filter_map(|(effect, v)| Some((self.problem.wrapper(*effect)?, v)));
         let own = self.problem.standing(stage, Side::Output);
-        let own = own.filter(|(at, _)| self.problem.wrappers[*at].kind.is_found);
-        let all = found.map(|(_, values)| values).chain(own.map(|(_, values)| values));
-        all.map(|values| Line { hertz: values[1], amplitude: values[0] }).collect()
+        let own = own.map(|(at, values)| (self.problem.wrappers[at].kind, values));
+        let line = |(kind, values): (&Kind, &Vec<f64>)| {
+            let line = kind.line?(values);
+            Some(Line { hertz: line.hertz, amplitude: line.amplitude })
+        };
+        found.chain(own).filter_map(line).collect()
     }
 }

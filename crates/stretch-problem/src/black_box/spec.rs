@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Deserializer, de::Error};
 use stretch_data::SessionTrial;
+use stretch_effects::Kind;
 use stretch_sim::Tolerance;
 
 /// A problem with its recordings in memory.
@@ -22,6 +23,9 @@ pub struct ProblemSpec {
     pub effects: Vec<OwnEffect>,
     /// Wrappers to look for, as `input.delay`, `output.backlash`, `stage.output.lag`, or `all`.
     pub wrap: Vec<String>,
+    /// Kinds of effects of the user's own, which `wrap` may name beside those of the catalogue.
+    #[serde(skip)]
+    pub kinds: Vec<&'static Kind>,
     /// Wrappers that act in every run, with their values: what was found before. They are not looked for.
     pub wrapped: Vec<Wrapped>,
     /// Effects that are not looked for, by name; a wrapper also by its kind or its place.

@@ -127,6 +127,7 @@ impl ProblemFile {
             inputs: named(&top, "input", input)?,
             parameters: named(&top, "parameter", parameter)?,
             effects: named(&top, "effect", effect)?,
+            kinds: Vec::new(),
             wrap: top.texts("wrap")?,
             wrapped: named(&top, "wrapped", wrapped)?,
             without: top.texts("without")?,

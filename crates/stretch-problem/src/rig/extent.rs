@@ -1,6 +1,6 @@
-//! What the screens need to know of a measured session.
+//! How far the gauge of a measured session goes.
 
-use stretch_sim::{Bridge, Extent, RigParams};
+use stretch_sim::{Bridge, Effect, Extent, Key, Place, RigParams};
 
 use super::session::Inputs;
 use crate::bench::acting::FitRecord;
@@ -8,11 +8,29 @@ use crate::bench::acting::FitRecord;
 /// Share of the samples beyond either end of the voltage: noise.
 const OUTERMOST: f64 = 0.002;
 
-/// Voltages and strains that the trials to fit span.
-pub(super) fn extent_of(params: &RigParams, inputs: &Inputs, bridge: &FitRecord) -> Extent {
-    let mut volts: Vec<f64> = bridge.samples().collect();
-    volts.sort_by(f64::total_cmp);
-    let at = |q: f64| volts[(q * (volts.len() - 1) as f64) as usize];
-    let strain = Bridge::new(params).strain(inputs.stroke.0);
-    Extent { volts: (at(OUTERMOST), at(1.0 - OUTERMOST)), strain }
+/// What the voltage and the strain of the trials to fit span, where an effect acts on either.
+pub(super) struct Extents {
+    volts: Extent,
+    strain: Extent,
+}
+
+impl Extents {
+    pub(super) fn of(params: &RigParams, inputs: &Inputs, bridge: &FitRecord) -> Self {
+        let mut volts: Vec<f64> = bridge.samples().collect();
+        volts.sort_by(f64::total_cmp);
+        let at = |q: f64| volts[(q * (volts.len() - 1) as f64) as usize];
+        let strain = Bridge::new(params).strain(inputs.stroke.0);
+        Self {
+            volts: Extent::between(at(OUTERMOST), at(1.0 - OUTERMOST)),
+            strain: Extent::between(strain, params[Key::E0]),
+        }
+    }
+
+    /// That of the channel that an effect acts on.
+    pub(super) fn at(&self, effect: &Effect) -> &Extent {
+        match effect.at() {
+            Some((_, Place::Volts)) => &self.volts,
+            _ => &self.strain,
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 use stretch_data::Remarks;
 use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, next_experiment};
-use stretch_sim::{EffectParameter, Grid, Rig, Surroundings};
+use stretch_sim::{EffectParameter, Grid, Rig};
 
 use super::{RigSimulator, nominal::Knob};
 use crate::{
@@ -23,7 +23,7 @@ impl RigSimulator {
                 params[key] = *value;
             }
         }
-        let around = Surroundings::of_rig(&params, &grid);
+        let around = params.surroundings(&grid);
         let place = (self.about.record().sensor.unwrap_or(0), 1.0);
         let answer = (diagnosis, evidence);
         implementations(answer, &self.about.effects, &self.rows, &around, |effect, values| {

@@ -27,7 +27,7 @@ use stretch_data::DataSet;
 use stretch_gap::{Description, DescriptionSpec, TrialSpec};
 use stretch_sim::{Catalogue, Effect, EffectSet, Key, Rig, RigParams, Search, Stage, Tolerance};
 
-use extent::extent_of;
+use extent::Extents;
 use facts::facts;
 use found::Found;
 use noises::Noises;
@@ -115,10 +115,10 @@ impl RigSimulator {
         let trials: Vec<_> = session.trials.iter().map(trial_spec).collect();
         let measured: Vec<_> = stage_kinds.iter().map(|kind| measured(&session, *kind)).collect();
         let bridge = FitRecord::of(&trials, measured.last().map_or(&[], Vec::as_slice), dt_s);
-        let extent = extent_of(base, &inputs, &bridge);
+        let extents = Extents::of(base, &inputs, &bridge);
         let place = |effect: &Effect| Place {
             touches: touched(&stage_kinds, effect.stage),
-            search: Search::of(effect, &extent),
+            search: Search::of(effect, extents.at(effect)),
             unit: |_| 1.0,
         };
         let missing = catalogue.iter().filter(|e| effects.find(e.name).is_none());

@@ -63,7 +63,7 @@ pub(super) fn simulate(
     let grid = match kind {
         // Driven by a measured input.
         Stage::Muscle | Stage::Sensing => {
-            let is_fine = acting.inside.acting_in(kind).any(|e| e.effect().needs_fine_steps);
+            let is_fine = acting.inside.acting_in(kind).any(|e| e.effect().needs_fine_steps());
             let pieces = if is_fine { PIECES } else { 1.0 };
             Grid::new(rig.about.dt_s, run.step.min(1.0) * rig.about.dt_s / pieces, 0.0)?
         }
@@ -313,7 +313,7 @@ impl Setting<'_> {
     ) -> Result<(), ProblemError> {
         let stage = Sensing::new(&self.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
-        let shown = self.shown(&self.effects.only(|e| !e.hides_input))?;
+        let shown = self.shown(&self.effects.only(|e| !e.hides_input()))?;
         let needs_pressure = self
             .effects
             .acting_in(Stage::Sensing)
@@ -323,7 +323,7 @@ impl Setting<'_> {
             false => Arc::default(),
         };
         // What counts from the session's start allows no move before it.
-        if !self.effects.iter().any(|e| e.effect().counts_session) {
+        if !self.effects.iter().any(|e| e.effect().counts_session()) {
             let (before, kpa) = (self.before_mm(), self.before_kpa());
             let nodes = self.grid.nodes(2);
             let mut volts = [0.0; 2];

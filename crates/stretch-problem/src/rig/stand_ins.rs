@@ -39,7 +39,7 @@ impl Setting<'_> {
     /// What play in the reference hides of the length: the model of the motion says which flank it lies on, the record how
     /// long the muscle is.
     pub(super) fn hidden(&self, count: usize) -> Result<Option<Vec<f64>>, ProblemError> {
-        let alone = self.effects.only(|e| e.hides_input);
+        let alone = self.effects.only(|e| e.hides_input());
         if alone.acting_in(Stage::Reference).next().is_none() {
             return Ok(None);
         }
@@ -58,7 +58,7 @@ impl Setting<'_> {
 
     /// Length that the model of the motion shows without play in the reference.
     fn free_length(&self, count: usize) -> Result<Arc<Vec<f64>>, ProblemError> {
-        let effects = self.effects.only(|e| !e.hides_input);
+        let effects = self.effects.only(|e| !e.hides_input());
         let has_pressure = !self.rig.inputs.pressure.is_empty();
         let grid = if has_pressure {
             Grid::samples(self.rig.about.dt_s)?

@@ -1,16 +1,14 @@
-//! A kind of wrapper at a place: an effect of the catalogue.
+//! A kind of effect on a channel of a stage.
 
 use std::{ops::Range, sync::Arc};
 
 use stretch_data::ends;
-use stretch_effects::{Grid, Span, Start};
-use stretch_gap::{EffectParameterSpec, EffectSpec};
-
-use super::{
-    catalogue::wrappers,
-    extent::Extent,
-    kind::{Beside, Side, Wrapper},
+use stretch_effects::{
+    Beside, EffectParameter, Extent, Grid, KINDS, Kind, Quantity, Search, Side, Signals, Sketch,
+    Span, Start,
 };
+use stretch_gap::EffectSpec;
+
 use crate::{
     black_box::{columns::Columns, velocity::Velocity},
     error::ProblemError,
@@ -33,10 +31,14 @@ pub(crate) struct Site {
 /// A kind of wrapper on a channel.
 #[derive(Debug, Clone)]
 pub(crate) struct Placed {
-    pub(crate) kind: &'static Wrapper,
+    pub(crate) kind: &'static Kind,
     pub(crate) site: Site,
     pub(crate) name: String,
     extent: Extent,
+    /// Its parameters but those that are found in the record.
+    parameters: Vec<EffectParameter>,
+    /// Values to look for it at.
+    starts: Vec<Vec<f64>>,
     /// What it looks at beside the channel, all trials end to end.
     beside: Option<Arc<Vec<f64>>>,
     aliases: Vec<String>,
@@ -53,6 +55,8 @@ pub(crate) struct Among<'a> {
     pub(crate) inputs: Vec<usize>,
     /// Columns that may talk across.
     pub(crate) others: Vec<String>,
+    /// Kinds of the user's own, which act behind those of the catalogue.
+    pub(crate) kinds: &'a [&'static Kind],
 }
 
 /// Wrappers that some patterns ask for, in the order in which they act.
@@ -68,7 +72,7 @@ pub(crate) fn placed(
     let mut all = Vec::new();
     for site in sites {
         let extent = extent_of(among, &site.column)?;
-        for kind in wrappers() {
+        for kind in KINDS.iter().chain(among.kinds) {
             all.extend(at(kind, site, extent, among));
         }
     }
@@ -80,15 +84,15 @@ pub(crate) fn placed(
     }
     let rate_hz = 1.0 / among.columns.dt_s;
     all.retain(|p| p.aliases.iter().any(|a| patterns.contains(a)));
-    all.retain(|p| {
-        let is_shown = p.kind.least_rate_hz <= rate_hz * (1.0 + 1e-6);
-        if !is_shown {
-            notes.push(format!(
-                "{} is not looked for: at {rate_hz:.4} samples a second it cannot be told; from {} on it can",
-                p.name, p.kind.least_rate_hz
-            ));
-        }
-        is_shown
+    all.retain_mut(|p| {
+        let needed = p.shown_at(rate_hz);
+        notes.extend(needed.map(|needed| {
+            format!(
+                "{} is not looked for: at {rate_hz:.4} samples a second it cannot be told; from {needed} on it can",
+                p.name
+            )
+        }));
+        needed.is_none()
     });
     Ok(all)
 }
@@ -126,17 +130,28 @@ fn extent_of(among: &Among<'_>, column: &str) -> Result<Extent, ProblemError> {
 }
 
 /// A kind on a channel: once, or once for every channel that it may look at.
-fn at(kind: &'static Wrapper, site: &Site, extent: Extent, among: &Among<'_>) -> Vec<Placed> {
+fn at(kind: &'static Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Vec<Placed> {
     let own = &site.column;
     let looked = among.columns.looked_at();
     let with = |beside: Option<&[f64]>, label: String| {
-        let range =
-            beside.map_or([0.0; 2], |b| ends(looked.iter().flat_map(|r| &b[r.clone()])).into());
+        let own = [extent.low, extent.high];
+        let range = beside.map_or(own, |b| ends(looked.iter().flat_map(|r| &b[r.clone()])).into());
         let extent = Extent { beside: range, ..extent };
-        let name = named(site, among, &label);
-        let beside = beside.map(|b| Arc::new(b.to_vec()));
-        let aliases = aliases(kind, site, among, &label);
-        Placed { kind, site: site.clone(), name, extent, beside, aliases }
+        let parameters = kind.fitted(&extent, &site.unit);
+        let starts = kind.starts.map_or_else(
+            || EffectParameter::starts(&parameters),
+            |starts| within(&parameters, starts(&extent)),
+        );
+        Placed {
+            kind,
+            site: site.clone(),
+            name: named(site, among, &label),
+            extent,
+            parameters,
+            starts,
+            beside: beside.map(|b| Arc::new(b.to_vec())),
+            aliases: aliases(kind, site, among, &label),
+        }
     };
     match kind.beside {
         Beside::Nothing | Beside::Itself => vec![with(None, kind.name.to_owned())],
@@ -175,7 +190,7 @@ fn named(site: &Site, among: &Among<'_>, label: &str) -> String {
 }
 
 /// Everything that a user may call it by.
-fn aliases(kind: &Wrapper, site: &Site, among: &Among<'_>, label: &str) -> Vec<String> {
+fn aliases(kind: &Kind, site: &Site, among: &Among<'_>, label: &str) -> Vec<String> {
     let is_usual = kind.usual.contains(&site.side);
     let word = if site.side == Side::Input { "input" } else { "output" };
     let mut kinds = vec![label.to_owned(), kind.name.to_owned()];
@@ -205,24 +220,16 @@ impl Placed {
     }
 
     /// Its numbers, with their ranges.
-    pub(crate) fn parameters(&self) -> Vec<EffectParameterSpec> {
-        (self.kind.parameters)(&self.extent, &self.site.unit)
+    pub(crate) fn parameters(&self) -> &[EffectParameter] {
+        &self.parameters
     }
 
     /// As an effect of the catalogue.
     pub(crate) fn spec(&self, among: &[Self], stage: &str) -> EffectSpec {
-        let mut spec = EffectSpec::new(&self.name, (self.site.stage, stage), self.parameters());
-        if let Some(starts) = self.kind.starts {
-            spec.starts = starts(&self.extent);
-            for start in &mut spec.starts {
-                let rest = spec.parameters.iter().skip(start.len());
-                start.extend(rest.map(|p| p.form.or(p.off).unwrap_or(p.min)));
-                for (x, p) in start.iter_mut().zip(&spec.parameters) {
-                    *x = x.clamp(p.min, p.max);
-                }
-            }
-        }
-        spec.is_found = self.kind.is_found;
+        let parameters = self.parameters.clone();
+        let mut spec = EffectSpec::new(&self.name, (self.site.stage, stage), parameters);
+        spec.starts.clone_from(&self.starts);
+        spec.is_found = self.kind.find.is_some();
         let is_twin = |other: &&Self| {
             other.site.stage == self.site.stage
                 && other.name != self.name
@@ -232,11 +239,43 @@ impl Placed {
         spec
     }
 
-    /// Acts on a channel of one trial after the other; `found` is what was measured of it, where its course is found in there.
+    /// Whether it is taken off the channel where it would be added behind the stage.
+    fn is_taken(&self) -> bool {
+        self.kind.beside == Beside::Velocity && self.site.side == Side::Input
+    }
+
+    /// Leaves out the starts at which it does not show at a sample rate, Hz; says which rate would do where none is left.
+    fn shown_at(&mut self, rate_hz: f64) -> Option<f64> {
+        let mut search = Search { ranges: Vec::new(), starts: std::mem::take(&mut self.starts) };
+        let needed = search.at_rate(|values| self.kind.least_rate_hz(values), rate_hz);
+        self.starts = search.starts;
+        needed
+    }
+
+    /// How somebody would type it with these values into a simulator sampled every `dt_s`.
+    pub(crate) fn sketch(&self, values: &[f64], dt_s: f64) -> Option<Sketch> {
+        let unit = |unit: &str| if unit.is_empty() { "1".into() } else { unit.to_owned().into() };
+        let meaning = match self.site.side {
+            Side::Input => format!("{}, on its way to the stage", self.site.column),
+            Side::Output => format!("{}, as the simulator makes it", self.site.column),
+        };
+        let x = Quantity { meaning: meaning.into(), ..Quantity::new("x", "", "") };
+        let x = Quantity { unit: unit(&self.site.unit), ..x };
+        let beside = match self.kind.beside {
+            Beside::Velocity => Quantity::new("v", "velocity", "velocity at which the stage rubs"),
+            _ => Quantity::new("e", "1", "the other channel"),
+        };
+        let sketch = self.kind.sketch?(values, &self.extent, &Signals { x, beside, dt_s });
+        let sketch = match self.kind.beside {
+            Beside::Itself => sketch.beside_itself("e"),
+            _ => sketch,
+        };
+        Some(if self.is_taken() { sketch.then("y = x - (y - x)") } else { sketch })
+    }
+
+    /// Acts on a channel of one trial after the other.
     pub(crate) fn act(&self, values: &[f64], trials: &Trials<'_>, channel: &mut [f64]) {
-        let parameters = self.parameters();
-        let mut strengths = parameters.iter().zip(values).filter(|(p, _)| p.off.is_some());
-        if strengths.all(|(p, v)| p.off == Some(*v)) {
+        if EffectParameter::are_off(&self.parameters, values) {
             return;
         }
         let operator = (self.kind.operator)(values, &self.extent, trials.grid);
@@ -262,7 +301,7 @@ impl Placed {
             operator.begin(start, first, &mut cells);
             let span = Span { start_s: *start_s, strain: beside, ..Span::whole(trials.grid) };
             // What a stage rubs with is taken off in front of it, and needed behind it.
-            let is_taken = self.kind.beside == Beside::Velocity && self.site.side == Side::Input;
+            let is_taken = self.is_taken();
             let before = is_taken.then(|| signal.to_vec());
             operator.run(&span, &mut cells, signal);
             for (y, x) in signal.iter_mut().zip(before.iter().flatten()) {
@@ -278,4 +317,13 @@ pub(crate) struct Trials<'a> {
     pub(crate) grid: &'a Grid,
     /// Samples and session time of each, s, from the session's start.
     pub(crate) parts: &'a [(Range<usize>, f64)],
+}
+
+/// Starts with forms that were left out at their usual value, each value within its range.
+fn within(parameters: &[EffectParameter], starts: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    let held = |start| {
+        let start = EffectParameter::complete(parameters, start);
+        start.into_iter().zip(parameters).map(|(x, p)| x.clamp(p.min, p.max)).collect()
+    };
+    starts.into_iter().map(held).collect()
 }

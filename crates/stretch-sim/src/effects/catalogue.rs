@@ -1,6 +1,8 @@
 //! A catalogue: effects to be diagnosed, the built-in ones and a user's own.
 
-use super::{CATALOGUE, Effect};
+use stretch_effects::Effect;
+
+use super::CATALOGUE;
 use crate::{SimError, nearest::nearest};
 
 /// Effects that a diagnosis knows.

@@ -1,10 +1,7 @@
 //! The chamber grows as the muscle contracts.
 
-use crate::{
-    effects::{Action, Effect, EffectParameter, Form, search::each},
-    law::Law,
-    sketch::growth,
-    stage::Stage,
+use stretch_effects::{
+    Action, Acts, Effect, EffectParameter, Form, Law, Quantity, Sketch, Stage, each,
 };
 
 /// The chamber grows as the muscle contracts.
@@ -17,9 +14,17 @@ pub(super) static CHAMBER_VOLUME: Effect = Effect {
         EffectParameter::strength("g", "1", 0.0, 3.0, 1.0),
         EffectParameter::form("bend", "1", -0.7, 0.7, Form { neutral: 0.0, usual: 0.0 }),
     ],
-    action: |values, _| Action::Volume(Box::new(Growth { g: values[0], bend: values[1] })),
+    acts: Acts::Own {
+        action: |values, _| Action::Volume(Box::new(Growth { g: values[0], bend: values[1] })),
+        sketch: Some(|v, _| {
+            let body = "let y = 1 + G * x * (1 + BEND * (1 - x))";
+            let volume = "V/V0; p = m R T/V then has the p dV/dt term in it";
+            Sketch::of(Quantity::new("x", "1", "contraction k/k_max"), body)
+                .giving(Quantity::new("y", "1", volume))
+                .with_all(&[("G", v[0], "1"), ("BEND", v[1], "1")])
+        }),
+    },
     starts: Some(|_| each([0.1, 1.0])),
-    sketch: Some(|v, _| growth([v[0], v[1]])),
     ..Effect::PLAIN
 };
 

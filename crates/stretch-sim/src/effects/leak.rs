@@ -1,10 +1,7 @@
 //! Air leaks out of the chamber.
 
-use crate::{
-    effects::{Action, Effect, EffectParameter, Form, search::each},
-    law::Law,
-    sketch::leak,
-    stage::Stage,
+use stretch_effects::{
+    Action, Acts, Effect, EffectParameter, Form, Law, Quantity, Sketch, Stage, each,
 };
 
 /// Air leaks out of the chamber.
@@ -17,9 +14,11 @@ pub(super) static LEAK: Effect = Effect {
         EffectParameter::strength("c", "kg/(s Pa)", 0.0, 2e-10, 5e-11),
         EffectParameter::form("power", "1", 0.4, 2.0, Form { neutral: 1.0, usual: 1.0 }),
     ],
-    action: |values, _| Action::Leak(Box::new(Leak { c: values[0], excess: values[1] - 1.0 })),
+    acts: Acts::Own {
+        action: |values, _| Action::Leak(Box::new(Leak { c: values[0], excess: values[1] - 1.0 })),
+        sketch: Some(|v, _| sketch([v[0], v[1]])),
+    },
     starts: Some(|_| each([1e-11])),
-    sketch: Some(|v, _| leak([v[0], v[1], AT_PA])),
     ..Effect::PLAIN
 };
 
@@ -48,4 +47,22 @@ impl Law for Leak {
         };
         self.c * p * shape.max(0.0)
     }
+}
+
+fn sketch([c, power]: [f64; 2]) -> Sketch {
+    let shape = if power >= 1.0 {
+        "1 + (POWER - 1) * (p / P_AT - 1)"
+    } else {
+        "(2 - POWER) / (1 - (POWER - 1) * p / P_AT)"
+    };
+    let body = format!(
+        "var y = C * p
+        if p > 0
+        y = C * p * max(0, {shape})
+        end"
+    );
+    let flow = "mass flow out of the chamber; less it from the net inflow of m' = q_in - q_out";
+    Sketch::of(Quantity::new("p", "Pa", "pressure in the chamber above the atmosphere"), body)
+        .giving(Quantity::new("y", "kg/s", flow))
+        .with_all(&[("C", c, "kg/(s Pa)"), ("POWER", power, "1"), ("P_AT", AT_PA, "Pa")])
 }

@@ -1,70 +1,44 @@
-//! The catalogue of effects, one file each.
+//! The catalogue of the rig's effects: those inside its differential equation are its own, the others are kinds at its places.
 
-mod action;
+use stretch_effects::{Effect, GAUGE};
+
 mod catalogue;
-mod effect;
-mod parameter;
-mod search;
 mod set;
-mod starts;
 
-pub use action::{Action, Surroundings};
-pub use catalogue::Catalogue;
-pub use effect::{Alone, Effect, Extent, Find, Line, Measured, Need, Starts};
-pub use parameter::{EffectParameter, Form, Role, Scale};
-pub use search::Search;
-pub use set::{ActiveEffect, EffectSet};
-
-mod amplifier_lowpass;
-mod amplifier_saturation;
 mod chamber_volume;
-mod channel_skew;
-mod crossbeam_inertia;
-mod gauge_hysteresis;
-mod gauge_nonlinearity;
-mod gauge_relaxation;
-mod gauge_softening;
 mod leak;
-mod mains_hum;
-mod muscle_creep;
-mod muscle_hysteresis;
-mod pot_backlash;
-mod pot_nonlinearity;
-mod pressure_crosstalk;
-mod self_heating;
-mod sleeve_slack;
-mod sleeve_slip;
+mod muscle;
 mod supply_sag;
-mod thermal_drift;
 mod valve_deadband;
 mod valve_delay;
 
-/// Every effect, in the order in which several of one stage act.
-pub static CATALOGUE: &[&Effect] = &[
+pub use catalogue::Catalogue;
+pub use set::{ActiveEffect, EffectSet};
+
+/// Effects of valves, chamber and muscle.
+static ACTUATION: [&Effect; 8] = [
     &supply_sag::SUPPLY_SAG,
     &valve_delay::VALVE_DELAY,
     &valve_deadband::VALVE_DEADBAND,
     &leak::LEAK,
     &chamber_volume::CHAMBER_VOLUME,
-    &muscle_hysteresis::MUSCLE_HYSTERESIS,
-    &muscle_creep::MUSCLE_CREEP,
-    &crossbeam_inertia::CROSSBEAM_INERTIA,
-    &sleeve_slack::SLEEVE_SLACK,
-    &sleeve_slip::SLEEVE_SLIP,
-    &pressure_crosstalk::PRESSURE_CROSSTALK,
-    &gauge_hysteresis::GAUGE_HYSTERESIS,
-    &gauge_relaxation::GAUGE_RELAXATION,
-    &gauge_softening::GAUGE_SOFTENING,
-    &gauge_nonlinearity::GAUGE_NONLINEARITY,
-    &thermal_drift::THERMAL_DRIFT,
-    &self_heating::SELF_HEATING,
-    &amplifier_saturation::AMPLIFIER_SATURATION,
-    &amplifier_lowpass::AMPLIFIER_LOWPASS,
-    &mains_hum::MAINS_HUM,
-    &channel_skew::CHANNEL_SKEW,
-    &pot_nonlinearity::POT_NONLINEARITY,
-    &pot_backlash::POT_BACKLASH,
+    &muscle::MUSCLE_HYSTERESIS,
+    &muscle::MUSCLE_CREEP,
+    &muscle::CROSSBEAM_INERTIA,
 ];
+
+/// Every effect, in the order in which several of one stage act: those of the actuation, then those of the gauge.
+pub static CATALOGUE: &[&Effect] = &joined();
+
+const fn joined() -> [&'static Effect; ACTUATION.len() + GAUGE.len()] {
+    let mut all = [ACTUATION[0]; ACTUATION.len() + GAUGE.len()];
+    let mut i = 0;
+    while i < all.len() {
+        all[i] = if i < ACTUATION.len() { ACTUATION[i] } else { GAUGE[i - ACTUATION.len()] };
+        i += 1;
+    }
+    all
+}
 
 /// The catalogue's effect called `name`, if there is one.
 ///

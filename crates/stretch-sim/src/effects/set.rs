@@ -1,11 +1,10 @@
 //! Effects that are on, with their values.
 
-use super::{Action, CATALOGUE, Effect, EffectParameter, Role, Surroundings, effect_named};
 use stretch_data::EffectEntry;
+use stretch_effects::{Action, Effect, EffectParameter, Grid, Role, Stage, Surroundings};
 
-use stretch_effects::Grid;
-
-use crate::{SimError, nearest::nearest, params::RigParams, stage::Stage};
+use super::{CATALOGUE, effect_named};
+use crate::{SimError, nearest::nearest, params::RigParams};
 
 /// One effect with the values of its parameters, in the order of [`Effect`]'s parameters.
 #[derive(Debug, Clone)]
@@ -33,6 +32,11 @@ impl ActiveEffect {
     /// Values, to be changed; whoever changes them keeps them finite.
     pub fn values_mut(&mut self) -> &mut [f64] {
         &mut self.values
+    }
+
+    /// How it acts with its values.
+    pub fn action(&self, around: &Surroundings<'_>) -> Action {
+        self.effect.action(&self.values, around)
     }
 
     /// Whether these values do nothing.
@@ -194,10 +198,10 @@ impl EffectSet {
     /// Times that are not positive.
     pub fn grid(&self, params: &RigParams, dt_s: f64, max_step_s: f64) -> Result<Grid, SimError> {
         let whole = Grid::samples(dt_s)?;
-        let around = Surroundings::of_rig(params, &whole);
+        let around = params.surroundings(&whole);
         let mut delay_s = 0.0;
         for active in self.acting_in(Stage::Pneumatics) {
-            if let Action::Delay(seconds) = (active.effect().action)(active.values(), &around) {
+            if let Action::Delay(seconds) = active.action(&around) {
                 delay_s += seconds;
             }
         }
@@ -231,7 +235,7 @@ fn out_of_range(effect: &Effect, p: &EffectParameter, value: f64) -> SimError {
         value,
         min: *allowed.start(),
         max: *allowed.end(),
-        unit: p.unit,
+        unit: p.unit.to_string(),
     }
 }
 
@@ -253,7 +257,7 @@ fn resolve(
         return Err(SimError::UnknownParameter {
             owner: effect.name.to_string(),
             name: name.to_string(),
-            nearest: nearest(name, parameters.iter().map(|p| p.name)),
+            nearest: nearest(name, parameters.iter().map(|p| &*p.name)),
         });
     }
     // One strength is enough where there are several (the rails of an amplifier): the others stay off.

@@ -1,10 +1,7 @@
 //! The supply gives way to the flow that is drawn from it.
 
-use crate::{
-    effects::{Action, Effect, EffectParameter, Form, search::each},
-    law::Droop,
-    sketch::droop,
-    stage::Stage,
+use stretch_effects::{
+    Action, Acts, Droop, Effect, EffectParameter, Form, Quantity, Sketch, Stage, each,
 };
 
 /// The supply gives way to the flow that is drawn from it.
@@ -17,9 +14,19 @@ pub(super) static SUPPLY_SAG: Effect = Effect {
         EffectParameter::strength("r", "Pa s/kg", 0.0, 4e8, 1e8),
         EffectParameter::form("lag_s", "s", 0.1, 1.5, Form { neutral: 0.5, usual: 0.5 }).log(),
     ],
-    action: |values, _| Action::Droop(Box::new(Sag { r: values[0], lag_s: values[1] })),
+    acts: Acts::Own {
+        action: |values, _| Action::Droop(Box::new(Sag { r: values[0], lag_s: values[1] })),
+        sketch: Some(|v, _| {
+            let state =
+                "how far the supply has fallen: a state of the chamber's equations, 0 at rest";
+            let rate = "rate of the droop; the valve sees P_s - droop";
+            Sketch::of(Quantity::new("droop", "Pa", state), "let y = (R * flow - droop) / LAG")
+                .beside(Quantity::new("flow", "kg/s", "mass flow through the inlet"))
+                .giving(Quantity::new("y", "Pa/s", rate))
+                .with_all(&[("R", v[0], "Pa s/kg"), ("LAG", v[1], "s")])
+        }),
+    },
     starts: Some(|_| each([3e7, 1.5e8])),
-    sketch: Some(|v, _| droop([v[0], v[1]])),
     ..Effect::PLAIN
 };
 

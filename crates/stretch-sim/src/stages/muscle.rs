@@ -1,14 +1,13 @@
 //! Stage `muscle`: chamber pressure to length.
 
-use stretch_effects::{Grid, MeanReversion, Row, Span, Start};
+use stretch_effects::{Action, Grid, MeanReversion, Row, Span, Stage, Start};
 
 use super::check_length;
 use crate::{
     SimError,
-    effects::{Action, EffectSet, Surroundings},
+    effects::EffectSet,
     memory::Memory,
     params::{Key, RigParams},
-    stage::Stage,
     static_law::StaticLaw,
 };
 
@@ -42,10 +41,10 @@ impl Muscle {
         grid: &Grid,
         offset: usize,
     ) -> Result<Self, SimError> {
-        let around = Surroundings::of_rig(params, grid);
+        let around = params.surroundings(grid);
         let (mut before, mut behind) = (Vec::new(), Vec::new());
         for active in effects.acting_in(Stage::Muscle) {
-            match (active.effect().action)(active.values(), &around) {
+            match active.action(&around) {
                 Action::StaticContraction(operator) => before.push(operator),
                 Action::MovingContraction(operator) => behind.push(operator),
                 _ => {}

@@ -1,15 +1,13 @@
 //! Stage `pneumatics`: openings of the valves to chamber pressure.
 
-use stretch_effects::{Grid, Row, Span, Start};
+use stretch_effects::{Action, Droop, Grid, Law, Row, Span, Stage, Start};
 
 use super::{check_length, openings::Openings};
 use crate::{
     SimError,
-    effects::{Action, EffectSet, Surroundings},
-    law::{Droop, Law},
+    effects::EffectSet,
     memory::Memory,
     params::{Key, RigParams},
-    stage::Stage,
 };
 
 /// Steps longer than this many times the time constant of the pressure are too long for the Runge-Kutta rule.
@@ -68,13 +66,13 @@ impl Pneumatics {
     /// # Errors
     /// More than two effects that draw on the supply, a grid made for another valve delay.
     pub fn new(params: &RigParams, effects: &EffectSet, grid: &Grid) -> Result<Self, SimError> {
-        let around = Surroundings::of_rig(params, grid);
+        let around = params.surroundings(grid);
         let [mut leaks, mut volumes] = [const { Vec::new() }; 2];
         let [mut inlet, mut outlet] = [const { Vec::new() }; 2];
         let mut droops: Vec<Box<dyn Droop>> = Vec::new();
         let (mut delay_s, mut coupled_by) = (0.0, None);
         for active in effects.acting_in(Stage::Pneumatics) {
-            match (active.effect().action)(active.values(), &around) {
+            match active.action(&around) {
                 Action::Delay(seconds) => delay_s += seconds,
                 Action::Commands([of_inlet, of_outlet]) => {
                     inlet.push(of_inlet);

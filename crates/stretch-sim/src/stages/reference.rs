@@ -1,15 +1,9 @@
 //! Stage `reference`: true length to the length that the potentiometer shows.
 
-use stretch_effects::{Grid, Row, Span, Start};
+use stretch_effects::{Action, Grid, Row, Span, Stage, Start, Surroundings};
 
 use super::{check_length, sensing::pick};
-use crate::{
-    SimError,
-    effects::{Action, EffectSet, Surroundings},
-    memory::Memory,
-    params::RigParams,
-    stage::Stage,
-};
+use crate::{SimError, effects::EffectSet, memory::Memory, params::RigParams};
 
 /// The reference, prepared; without an effect it shows the true length.
 #[derive(Debug)]
@@ -24,13 +18,13 @@ impl Reference {
     /// # Errors
     /// None for the catalogue's effects.
     pub fn new(params: &RigParams, effects: &EffectSet, grid: &Grid) -> Result<Self, SimError> {
-        Ok(Self::around(&Surroundings::of_rig(params, grid), effects, grid))
+        Ok(Self::around(&params.surroundings(grid), effects, grid))
     }
 
     pub(crate) fn around(around: &Surroundings<'_>, effects: &EffectSet, grid: &Grid) -> Self {
         let row = effects
             .acting_in(Stage::Reference)
-            .filter_map(|active| match (active.effect().action)(active.values(), around) {
+            .filter_map(|active| match active.action(around) {
                 Action::Length(operator) => Some(operator),
                 _ => None,
             })

@@ -1,14 +1,13 @@
 //! Stage `sensing`: length to bridge voltage.
 
-use stretch_effects::{Grid, Row, Skew, SkewSpec, Span, Start};
+use stretch_effects::{Action, Grid, Need, Row, Skew, SkewSpec, Span, Stage, Start, Surroundings};
 
 use super::check_length;
 use crate::{
     SimError,
-    effects::{Action, ActiveEffect, EffectSet, Need, Surroundings},
+    effects::{ActiveEffect, EffectSet},
     memory::Memory,
     params::{Key, RigParams},
-    stage::Stage,
 };
 
 /// Values worked on at a time: small enough to stay in the nearest cache.
@@ -85,7 +84,7 @@ impl Sensing {
     /// # Errors
     /// None for the catalogue's effects.
     pub fn new(params: &RigParams, effects: &EffectSet, grid: &Grid) -> Result<Self, SimError> {
-        let around = Surroundings::of_rig(params, grid);
+        let around = params.surroundings(grid);
         let sites = Sites::new(effects.acting_in(Stage::Sensing), &around);
         Ok(Self {
             grid: grid.clone(),
@@ -276,7 +275,7 @@ impl Sites {
         let [mut strain, mut resistance, mut volts, mut record] = [const { Vec::new() }; 4];
         let mut skew = SkewSpec::default();
         for active in effects {
-            match (active.effect().action)(active.values(), around) {
+            match active.action(around) {
                 Action::Strain(operator) => strain.push(operator),
                 Action::Resistance(operator) => resistance.push(operator),
                 Action::Volts(operator) => volts.push(operator),

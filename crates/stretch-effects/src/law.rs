@@ -1,6 +1,6 @@
 //! Laws of the rig that an effect may bend.
 
-use std::fmt;
+use core::fmt;
 
 /// A memoryless law y = f(x).
 pub trait Law: fmt::Debug + Send + Sync {

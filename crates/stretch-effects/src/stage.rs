@@ -1,6 +1,6 @@
 //! The stages of the rig, as names.
 
-use std::{fmt, str::FromStr};
+use core::fmt;
 
 /// A stage of the rig: what is simulated alone on a measured input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -43,18 +43,5 @@ impl Stage {
 impl fmt::Display for Stage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
-    }
-}
-
-impl FromStr for Stage {
-    type Err = crate::SimError;
-    fn from_str(s: &str) -> Result<Self, Self::Err> {
-        Self::ALL.into_iter().find(|x| x.name() == s).ok_or_else(|| {
-            crate::SimError::UnknownParameter {
-                owner: "rig".into(),
-                name: s.into(),
-                nearest: crate::nearest::nearest(s, Self::ALL.map(Self::name)),
-            }
-        })
     }
 }

@@ -1,5 +1,16 @@
 //! Where an effect is looked for.
 
+use alloc::vec::Vec;
+
+/// What the search needs to know of the measurement of a gauge alone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alone {
+    /// From the first to the last sample, s.
+    pub session_s: f64,
+    /// Time by which the signal seems to trail the reference, s.
+    pub lag_s: f64,
+}
+
 /// Ranges and starting points of the search for an effect, one number each of its [fitted](crate::Effect::fitted) parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Search {
@@ -31,14 +42,13 @@ impl Search {
         self.reach(most);
         self.starts.iter_mut().for_each(|start| start[0] = 0.2 * most);
     }
-}
 
-/// Starts of one number each.
-pub(super) fn each<const N: usize>(values: [f64; N]) -> Vec<Vec<f64>> {
-    values.map(|x| vec![x]).into()
-}
-
-/// Starts of the same first number and several second ones.
-pub(super) fn pairs<const N: usize>(first: f64, seconds: [f64; N]) -> Vec<Vec<f64>> {
-    seconds.map(|x| vec![first, x]).into()
+    /// Leaves out the points at which an effect does not show at a sample rate, Hz; says which rate would do where none is left.
+    /// `least` tells the rate that it needs with some values.
+    pub fn at_rate(&mut self, least: impl Fn(&[f64]) -> f64, rate_hz: f64) -> Option<f64> {
+        let needed = self.starts.iter().map(|s| least(s)).fold(f64::INFINITY, f64::min);
+        // A rate told by rounded stamps may miss its own value by a little.
+        self.starts.retain(|start| least(start) <= rate_hz * (1.0 + 1e-6));
+        self.starts.is_empty().then_some(needed)
+    }
 }

@@ -1,8 +1,14 @@
 //! The notation of a sketch, spelt in three languages.
 
-use std::fmt::Write;
+use alloc::{
+    borrow::ToOwned,
+    format,
+    string::{String, ToString},
+    vec::Vec,
+};
+use core::fmt::Write;
 
-use super::{Quantity, Sketch};
+use crate::sketch::{Cell, Quantity, Sketch};
 
 /// A language that a sketch is spelt in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -214,7 +220,7 @@ impl Sketch {
         let mut inputs = self.names();
         if !self.state.is_empty() {
             let _ = writeln!(out, "\n\ndef {name}_start({}):", self.begins_at().unwrap_or(""));
-            let cell = |cell: &super::Cell| format!("{}={}", cell.name, cell.begins);
+            let cell = |cell: &Cell| format!("{}={}", cell.name, cell.begins);
             let cells: Vec<String> = self.state.iter().map(cell).collect();
             let _ = writeln!(out, "    return SimpleNamespace({})", cells.join(", "));
             inputs.insert(0, "s");

@@ -1,6 +1,7 @@
-//! How far a channel goes: what ranges of wrappers are made of.
+//! How far a channel goes: what the ranges of an effect's parameters are made of.
 
-use stretch_data::ends;
+use alloc::vec::Vec;
+use core::f64::consts::TAU;
 
 /// What was measured of a channel, without the samples that are tested on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,14 +20,28 @@ pub struct Extent {
     pub session_s: f64,
     /// Step of the lattice that the values stand on best.
     pub lattice: f64,
-    /// Least and greatest value of what the wrapper looks at beside the channel.
+    /// Least and greatest value of what the effect looks at beside the channel.
     pub beside: [f64; 2],
 }
 
 impl Extent {
+    /// Of a channel of which nothing but its least and its greatest value is known: at 100 Hz, a minute a trial and ten a session, from
+    /// one end to the other in a second, and nothing but itself beside it.
+    pub const fn between(low: f64, high: f64) -> Self {
+        let (quickest, lattice, beside) = (high - low, 0.01 * (high - low), [low, high]);
+        Self { low, high, quickest, dt_s: 0.01, trial_s: 60.0, session_s: 600.0, lattice, beside }
+    }
+
     /// Of the parts of a channel that may be looked at.
-    pub(crate) fn of<'a>(parts: impl Iterator<Item = &'a [f64]> + Clone, dt_s: f64) -> Self {
-        let (low, high) = ends(parts.clone().flatten());
+    ///
+    /// ```
+    /// use stretch_effects::Extent;
+    /// let channel = Extent::of([[0.0, 1.0, 3.0, 2.0].as_slice()].into_iter(), 0.1);
+    /// assert_eq!((channel.span(), channel.trial_s), (3.0, 0.4));
+    /// assert!((channel.quickest - 20.0).abs() < 1e-9);
+    /// ```
+    pub fn of<'a>(parts: impl Iterator<Item = &'a [f64]> + Clone, dt_s: f64) -> Self {
+        let [low, high] = ends(parts.clone().flatten());
         let mut rates: Vec<f64> =
             parts.clone().flat_map(|p| p.windows(2).map(|w| (w[1] - w[0]).abs() / dt_s)).collect();
         let at = rates.len() * 99 / 100;
@@ -75,9 +90,9 @@ fn lattice<'a>(values: impl Iterator<Item = &'a f64> + Clone, [low, high]: [f64;
     while per_unit <= STEPS[1] / span {
         let (mut cos, mut sin) = (0.0, 0.0);
         for x in &some {
-            let angle = std::f64::consts::TAU * (x * per_unit);
-            cos += angle.cos();
-            sin += angle.sin();
+            let angle = TAU * (x * per_unit);
+            cos += libm::cos(angle);
+            sin += libm::sin(angle);
         }
         // Multiples stand at phase 0.
         if cos > most && cos > sin.abs() {
@@ -86,4 +101,9 @@ fn lattice<'a>(values: impl Iterator<Item = &'a f64> + Clone, [low, high]: [f64;
         per_unit += 0.1 / reach;
     }
     best
+}
+
+/// Least and greatest.
+fn ends<'a>(values: impl Iterator<Item = &'a f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(*x), b.max(*x)])
 }

@@ -1,0 +1,193 @@
+//! An operator as somebody would type it into a simulator of their own: in C, Python or MATLAB, a dozen lines with the state in sight.
+
+use alloc::{borrow::Cow, format, string::String, vec, vec::Vec};
+use core::fmt;
+
+/// What goes into an operator, or comes out of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Quantity {
+    /// Name in the code.
+    pub name: &'static str,
+    /// Unit.
+    pub unit: Cow<'static, str>,
+    /// What it is.
+    pub meaning: Cow<'static, str>,
+    /// Whether it is a whole record, one value a sample.
+    pub is_record: bool,
+}
+
+impl Quantity {
+    /// A quantity with one value a sample.
+    pub const fn new(name: &'static str, unit: &'static str, meaning: &'static str) -> Self {
+        let (unit, meaning) = (Cow::Borrowed(unit), Cow::Borrowed(meaning));
+        Self { name, unit, meaning, is_record: false }
+    }
+
+    /// Time since the session began.
+    pub const SESSION_TIME: Self = Self::new("t", "s", "time since the session began");
+
+    /// How many samples a record has.
+    pub const COUNT: Self = Self::new("n", "1", "how many samples it has");
+
+    /// The same by another name.
+    pub fn named(self, name: &'static str) -> Self {
+        Self { name, ..self }
+    }
+
+    /// The same as a whole record.
+    pub fn record(self) -> Self {
+        Self { is_record: true, ..self }
+    }
+
+    /// What comes out where it went in.
+    fn behind(&self) -> Self {
+        let meaning = Cow::Borrowed("what goes on in its place");
+        Self { name: "y", unit: self.unit.clone(), meaning, is_record: false }
+    }
+}
+
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &*self.unit {
+            "1" => write!(f, "{}: {}", self.name, self.meaning),
+            unit => write!(f, "{} ({unit}): {}", self.name, self.meaning),
+        }
+    }
+}
+
+/// A number of an operator.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Constant {
+    /// Name in the code.
+    pub name: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+/// A number that an operator remembers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cell {
+    /// Name in the code.
+    pub name: &'static str,
+    /// Unit.
+    pub unit: Cow<'static, str>,
+    /// What it begins at: a number, or an input.
+    pub begins: &'static str,
+}
+
+/// An operator, told in the one notation from which its code is written.
+///
+/// A line of `body` is `let n = ...`, `var n = ...`, `n = ...`, `if ...`, `else` or `end`; functions are those that C, Python and
+/// MATLAB share, `s.n` is a state and `v[i]` the sample i, from 0, of a record. The output is called `y`.
+///
+/// ```
+/// use stretch_effects::{Language, Quantity, Sketch};
+/// let shown = Quantity::new("x", "mm", "what the scale shows");
+/// let scale = Sketch::of(shown, "let y = x + OFFSET").with("OFFSET", 0.5, "mm");
+/// let code = scale.code(Language::Python, "zero", &[]);
+/// assert!(code.contains("OFFSET = 0.5  # mm") && code.contains("def zero(x):"));
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sketch {
+    /// What goes in, the signal first.
+    pub inputs: Vec<Quantity>,
+    /// What comes out.
+    pub output: Quantity,
+    /// Its numbers.
+    pub constants: Vec<Constant>,
+    /// What it remembers; empty where it remembers nothing.
+    pub state: Vec<Cell>,
+    /// What it does with a sample.
+    pub body: String,
+}
+
+impl Sketch {
+    /// What changes a signal, so far without numbers and memory.
+    pub fn of(signal: Quantity, body: impl Into<String>) -> Self {
+        let (output, inputs) = (signal.behind(), vec![signal]);
+        Self { inputs, output, constants: Vec::new(), state: Vec::new(), body: body.into() }
+    }
+
+    /// The same with an input more.
+    pub fn beside(mut self, input: Quantity) -> Self {
+        self.inputs.push(input);
+        self
+    }
+
+    /// The same with another output than the signal's successor.
+    pub fn giving(self, output: Quantity) -> Self {
+        Self { output, ..self }
+    }
+
+    /// The same with a number more.
+    pub fn with(mut self, name: &'static str, value: f64, unit: &str) -> Self {
+        self.constants.push(Constant { name, value, unit: unit.into() });
+        self
+    }
+
+    /// The same with numbers more.
+    pub fn with_all(self, all: &[(&'static str, f64, &str)]) -> Self {
+        all.iter().fold(self, |sketch, &(name, value, unit)| sketch.with(name, value, unit))
+    }
+
+    /// The same with cells of its signal's unit that begin at the first sample.
+    pub fn remembering<const N: usize>(self, names: [&'static str; N]) -> Self {
+        let (unit, begins) = (self.inputs[0].unit.clone(), self.inputs[0].name);
+        self.cells(names, unit, begins)
+    }
+
+    /// The same with cells of one unit and one beginning.
+    pub fn cells<const N: usize>(
+        mut self,
+        names: [&'static str; N],
+        unit: impl Into<Cow<'static, str>>,
+        begins: &'static str,
+    ) -> Self {
+        let unit = unit.into();
+        self.state.extend(names.map(|name| Cell { name, unit: unit.clone(), begins }));
+        self
+    }
+
+    /// The same where the input called `name` is the signal itself.
+    pub fn beside_itself(mut self, name: &str) -> Self {
+        let signal = self.inputs[0].name;
+        self.inputs.retain(|q| q.name != name);
+        self.state.iter_mut().filter(|c| c.begins == name).for_each(|c| c.begins = signal);
+        self.body = format!("let {name} = {signal}\n{}", self.body);
+        self
+    }
+
+    /// The same with a line more, behind which `y` has to be a `var`.
+    pub fn then(mut self, line: &str) -> Self {
+        self.body = format!("{}\n{line}", self.body);
+        self
+    }
+
+    /// The initial state in words; none where there is no state.
+    ///
+    /// ```
+    /// use stretch_effects::{Extent, Quantity, Signals, kind_named};
+    /// let x = Quantity::new("x", "strain", "gauge strain");
+    /// let signals = Signals { beside: x.clone(), x, dt_s: 0.01 };
+    /// let play = kind_named("backlash").unwrap().sketch.unwrap();
+    /// let sketch = play(&[0.008, 0.3], &Extent::between(0.0, 0.2), &signals);
+    /// assert_eq!(sketch.initial_state().unwrap(), "a, b, c (strain) begin at the first x");
+    /// ```
+    pub fn initial_state(&self) -> Option<String> {
+        let mut parts: Vec<String> = Vec::new();
+        for cells in self.state.chunk_by(|a, b| (&a.unit, a.begins) == (&b.unit, b.begins)) {
+            let names: Vec<&str> = cells.iter().map(|cell| cell.name).collect();
+            let unit = match &*cells[0].unit {
+                "1" => String::new(),
+                unit => format!(" ({unit})"),
+            };
+            let begin = if names.len() > 1 { "begin" } else { "begins" };
+            let is_input = self.inputs.iter().any(|input| input.name == cells[0].begins);
+            let at = if is_input { "at the first " } else { "at " };
+            parts.push(format!("{}{unit} {begin} {at}{}", names.join(", "), cells[0].begins));
+        }
+        (!parts.is_empty()).then(|| parts.join("; "))
+    }
+}

@@ -11,7 +11,7 @@ use stretch_gap::{
     Dice, Laboratory, Model, Options, Simulator, VerdictKind, diagnose, differences,
 };
 use stretch_problem::{
-    Ask, BlackBox, GaugeSetup, GaugeSimulator, Parameter, Problem, ProblemSpec, RigSession,
+    Ask, BlackBox, Checked, GaugeSetup, GaugeSimulator, Parameter, ProblemSpec, RigSession,
     RigSetup, RigSimulator, Stage, closure,
 };
 use stretch_sim::{
@@ -194,7 +194,7 @@ fn a_kind_of_ones_own_is_wrapped_named_and_printed() {
         let trial = Trial { name: format!("{number}.csv"), time_s, channels };
         SessionTrial { start_s, split, ..SessionTrial::new(trial) }
     };
-    let problem = Problem::new(ProblemSpec {
+    let problem = Checked::new(ProblemSpec {
         stages: vec![Stage {
             name: "spring".into(),
             output: "length_mm".into(),

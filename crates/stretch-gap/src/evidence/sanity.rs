@@ -71,7 +71,9 @@ fn left(simulator: &dyn Simulator, evidence: &Evidence, stage: usize) -> f64 {
     let (traces, measured) = (&evidence.stages[stage], simulator.measured(stage));
     let (mut count, mut sum, mut squares, mut left) = (0.0, 0.0, 0.0, 0.0);
     for segment in evidence.frame.of_role(Role::Test) {
-        for i in segment.from..segment.to {
+        // What was not measured counts for nothing, whatever stands in its place.
+        let is_lost = |i: &usize| simulator.record().is_lost.get(*i) == Some(&true);
+        for i in (segment.from..segment.to).filter(|i| !is_lost(i)) {
             count += 1.0;
             sum += measured[i];
             squares += measured[i] * measured[i];

@@ -21,3 +21,6 @@ pub(crate) mod nuisance;
 pub(crate) mod octaves;
 pub(crate) mod prepared;
 pub(crate) mod score;
+
+#[cfg(test)]
+pub(crate) mod tests;

@@ -8,3 +8,6 @@ pub(crate) mod arrowhead;
 pub(crate) mod linear;
 pub(crate) mod random;
 pub(crate) mod stopwatch;
+
+#[cfg(test)]
+mod tests;

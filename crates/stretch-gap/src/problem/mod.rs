@@ -22,3 +22,6 @@ pub(crate) mod simulator;
 pub(crate) mod spec;
 pub(crate) mod spectral_line;
 pub(crate) mod thresholds;
+
+#[cfg(test)]
+mod tests;

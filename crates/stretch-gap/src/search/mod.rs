@@ -14,3 +14,6 @@ pub(crate) mod re_estimate;
 pub(crate) mod screen;
 pub(crate) mod selection;
 pub(crate) mod sets;
+
+#[cfg(test)]
+mod tests;

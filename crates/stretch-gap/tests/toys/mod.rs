@@ -74,7 +74,14 @@ const APART_S: f64 = 60.0;
 impl Toy {
     /// Agrees with its bench but for noise of a hundredth: three trials of 10 s to fit, one of 10 s to test, no effects.
     pub(crate) fn of(laws: &[Law]) -> Self {
-        let parameters: Vec<ParameterSpec> = laws.iter().flat_map(|law| law.parameters()).collect();
+        let named = |i: usize, p: ParameterSpec| {
+            let own = p.name.rsplit('.').next().unwrap_or_default();
+            ParameterSpec { name: format!("{}.{own}", stage_name(laws, i)), ..p }
+        };
+        let stages = laws.iter().enumerate();
+        let parameters: Vec<ParameterSpec> = stages
+            .flat_map(|(i, law)| law.parameters().into_iter().map(move |p| named(i, p)))
+            .collect();
         Self {
             laws: laws.to_vec(),
             truth: parameters.iter().map(|p| p.nominal).collect(),
@@ -132,8 +139,9 @@ impl Toy {
 
     /// What the simulator is made of, in the units that the toy is written in.
     pub(crate) fn description(&self) -> Description {
-        let stages = self.laws.iter().enumerate().map(|(i, law)| {
-            let mut stage = StageSpec::new(law.name(), &format!("y{i}"), "u", &self.own(i));
+        let stages = (0..self.laws.len()).map(|i| {
+            let name = stage_name(&self.laws, i);
+            let mut stage = StageSpec::new(&name, &format!("y{i}"), "u", &self.own(i));
             stage.noise = self.stated.map(|times| Noise::known(times * self.noise * self.units[1]));
             stage
         });
@@ -252,6 +260,12 @@ impl Toy {
         };
         self.trials.iter().map(one).collect()
     }
+}
+
+/// Name of a stage: that of its law, with its number where an earlier one has the same.
+fn stage_name(laws: &[Law], stage: usize) -> String {
+    let name = laws[stage].name();
+    if laws[..stage].contains(&laws[stage]) { format!("{name}_{stage}") } else { name.to_owned() }
 }
 
 /// An Ornstein-Uhlenbeck process of a standard deviation and a correlation time, both s and samples of `dt_s` seconds: what a parameter that

@@ -1,6 +1,9 @@
 //! A toy bound to its record: everything that depends on the trait [`Simulator`].
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{
+    Arc,
+    atomic::{AtomicUsize, Ordering},
+};
 
 use super::{Effect, Fails, Toy, laws::Plant};
 use stretch_gap::{
@@ -17,8 +20,8 @@ pub(crate) struct Measured {
     pub(crate) x: Vec<f64>,
     /// By stage, the column `y0`, `y1` and so on.
     pub(crate) outputs: Vec<Vec<f64>>,
-    /// Simulations that were made.
-    runs: AtomicUsize,
+    /// Simulations that were made, those beside a corrected column as well.
+    runs: Arc<AtomicUsize>,
 }
 
 impl Measured {
@@ -45,7 +48,7 @@ impl Measured {
             ..RecordFacts::default()
         };
         let description = description.with_record(known).expect("facts that fit the toy");
-        Self { toy, description, x, outputs, runs: AtomicUsize::new(0) }
+        Self { toy, description, x, outputs, runs: Arc::default() }
     }
 
     /// The same toy beside a record that says something else of `x` and of the outputs.
@@ -80,7 +83,8 @@ impl Measured {
             let undone = error.undone(&values[range.clone()], self.toy.dt_s);
             values[range].copy_from_slice(&undone);
         }
-        Some(Self::new(self.toy.clone(), x, outputs))
+        let runs = Arc::clone(&self.runs);
+        Some(Self { runs, ..Self::new(self.toy.clone(), x, outputs) })
     }
 
     /// Input of a stage in the units of -1..1, with another draw of the noise of `x` where that is asked for.

@@ -1,0 +1,117 @@
+//! Slow drift marginalised out, beside dense matrices; its size and its correlation time found in the record.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::prepared;
+use crate::{
+    numerics::random::Dice,
+    problem::{frame::Role, spec::Wander},
+    toys::{Law, Toy, slow},
+};
+
+/// Relative: a dense factor of 250 rows of condition up to 1e4 beside one of a few knots.
+const DENSE: f64 = 1e-9;
+/// Samples between knots of a drift: 0.1 s.
+const KNOT: usize = 10;
+
+/// A line whose zero drifts by `sd` and `correlation_s` as described.
+fn drifting(wander: Wander, samples: usize) -> Toy {
+    let mut toy = Toy { trials: vec![(samples, false), (samples, true)], ..Toy::of(&[Law::Line]) };
+    toy.parameters[1].wander = Some(wander);
+    toy
+}
+
+/// V = I + s W K W' s of one trial, W the straight lines between knots and K the covariance exp(-|t|/tau) at the knots, in units of the noise.
+fn dense(wander: Wander, noise: f64, samples: usize) -> DMatrix<f64> {
+    let knots = (samples - 1) / KNOT + 2;
+    let weights = DMatrix::from_fn(samples, knots, |i, k| {
+        let share = (i % KNOT) as f64 / KNOT as f64;
+        match k as i64 - (i / KNOT) as i64 {
+            0 => 1.0 - share,
+            1 => share,
+            _ => 0.0,
+        }
+    });
+    let kept = (-0.1 / wander.correlation_s).exp();
+    let prior = DMatrix::from_fn(knots, knots, |i, j| kept.powi(i.abs_diff(j) as i32));
+    let size = (wander.sd / noise).powi(2);
+    DMatrix::identity(samples, samples) + size * &weights * prior * weights.transpose()
+}
+
+#[test]
+fn products_and_determinants_are_those_of_the_dense_covariance() {
+    let samples = 245;
+    for (sd, correlation_s) in [(0.005, 0.3), (0.02, 2.0), (0.1, 20.0)] {
+        let wander = Wander { sd, correlation_s };
+        let record = drifting(wander, samples).measured(1);
+        let problem = prepared(&record);
+        let (frame, metric) = (&problem.compare.frame, &problem.compare.metrics[0]);
+        let mut dice = Dice::new(2, 0);
+        let [x, y] = [0, 1].map(|_| DVector::from_fn(samples, |_, _| dice.gauss()));
+        let column = |x: &DVector<f64>| metric.column(frame, x.as_slice().to_vec());
+        let product = metric.product(frame, &column(&x), &column(&y), Role::Fit);
+        let factor = dense(wander, record.toy.noise, samples).cholesky().expect("definite");
+        let expected = x.dot(&factor.solve(&y));
+        // A difference of sums as large as the samples.
+        approx::assert_abs_diff_eq!(product, expected, epsilon = DENSE * samples as f64);
+        let expected = 2.0 * factor.l().diagonal().map(f64::ln).sum();
+        approx::assert_relative_eq!(
+            metric.ln_det(frame, Role::Fit),
+            expected,
+            max_relative = DENSE
+        );
+        // What is left of a residual without its most likely drift is V^-1 of it.
+        let mut cleaned = x.as_slice().to_vec();
+        metric.clean(frame, &mut cleaned);
+        let expected = factor.solve(&x);
+        approx::assert_abs_diff_eq!(cleaned[..], expected.as_slice()[..], epsilon = DENSE);
+    }
+}
+
+/// The re-tuned line beside a drift of its zero, by generalised least squares with the dense covariance.
+#[test]
+fn re_tuning_beside_a_drift_is_generalised_least_squares() {
+    let samples = 245;
+    let wander = Wander { sd: 0.02, correlation_s: 2.0 };
+    let mut toy = drifting(wander, samples).off_by(&[1.0, 0.5]);
+    toy.courses = vec![(1, slow(0.02, 2.0, (2 * samples, 0.01), 3))];
+    let record = toy.measured(3);
+    let found = prepared(&record).nominal.model.parameters;
+    let factor = dense(wander, toy.noise, samples).cholesky().expect("definite");
+    let a = DMatrix::from_fn(samples, 2, |i, j| if j == 0 { record.x[i] } else { 1.0 } / toy.noise);
+    let start = DVector::from_iterator(2, toy.parameters.iter().map(|p| p.nominal));
+    let measured = DVector::from_fn(samples, |i, _| record.outputs[0][i] / toy.noise);
+    let weighted = factor.solve(&a);
+    // A block of half a second counts as one observation.
+    let prior = toy.parameters.iter().map(|p| 1.0 / (p.sd * p.sd));
+    let prior = DMatrix::from_diagonal(&DVector::from_iterator(2, prior));
+    let normal = a.transpose() * &weighted / 50.0 + prior;
+    let right = weighted.transpose() * (measured - &a * &start) / 50.0;
+    let expected = start + normal.cholesky().expect("definite").solve(&right);
+    for (p, spec) in toy.parameters.iter().enumerate() {
+        // As a fit without drift: it ends on a step damped by a thousandth.
+        assert!((found[p] - expected[p]).abs() < 1e-5 * spec.sd, "{found:?} {expected}");
+    }
+}
+
+/// Three trials of 29 s hold 15 to 60 correlation times, which tell a size to a tenth and a time to some thirty per cent; sizes are tried in
+/// steps of up to 1.75, times in steps of up to 2.5, so that the neighbour of the right one may win and none beyond it.
+#[test]
+fn size_and_time_of_a_drift_are_found_to_the_next_that_is_tried() {
+    let described = Wander { sd: 0.05, correlation_s: 3.0 };
+    for (seed, (size, time_s)) in
+        [(0.4, 1.5), (1.0, 3.0), (2.0, 3.0), (1.0, 6.0)].into_iter().enumerate()
+    {
+        let mut toy = drifting(described, 2900);
+        toy.trials = vec![(2900, false); 3];
+        let count = (toy.samples(), toy.dt_s);
+        toy.courses = vec![(1, slow(size * described.sd, time_s, count, seed as u64))];
+        let record = toy.measured(seed as u64);
+        let problem = prepared(&record);
+        let adapted = problem.adapted(&problem.nominal.model, 1).expect("it can be simulated");
+        let problem = adapted.unwrap_or(problem);
+        let level = problem.compare.metrics[0].loose()[0].level;
+        assert!((0.55..1.8).contains(&(level.size / size)), "{level:?} for {size} {time_s}");
+        assert!((0.38..2.6).contains(&(level.time_s / time_s)), "{level:?} for {size} {time_s}");
+    }
+}

@@ -1,0 +1,60 @@
+//! Noise of the measured input that arrives at an output, beside the variance that theory gives it.
+
+use super::prepared;
+use crate::{
+    fit::noise_level::floors_of,
+    problem::{frame::Frame, runs::Runs, simulator::Model},
+    toys::{Effect, Law, Measured, Toy},
+};
+
+/// Relative: standard deviation from twelve draws of 4000 samples, of which a lag of ten makes every twentieth independent:
+/// 1/sqrt(2 * 2400) = 1.4 %, three of them.
+const DRAWN: f64 = 0.045;
+
+fn root_mean_square(record: &Measured, stage: usize) -> f64 {
+    let runs = Runs::new(record, &super::GO_ON).expect("measured");
+    let frame = Frame::of(record).expect("something to fit");
+    let floors = floors_of(&runs, &frame, &Model::nominal(record), 1).expect("simulated");
+    floors[stage].rms
+}
+
+/// sigma^2 = own^2 + gain^2 s^2 through a line, and own^2 + s^2 (1 - k)/(1 + k) through a lag of k = exp(-dt/tau) from sample to sample.
+#[test]
+fn noise_of_the_input_arrives_as_theory_says() {
+    let kept = (-0.1_f64).exp();
+    for (law, share) in
+        [(Law::Line, 1.0), (Law::Lag, (1.0 - kept) / (1.0 + kept)), (Law::Delay, 1.0)]
+    {
+        let toy = Toy { input_noise: 0.05, ..Toy::of(&[law]) };
+        let expected = f64::sqrt(0.01_f64.powi(2) + share * 0.05_f64.powi(2));
+        let found = root_mean_square(&toy.measured(1), 0);
+        approx::assert_relative_eq!(found, expected, max_relative = DRAWN);
+    }
+    let quiet = Toy::of(&[Law::Lag]).measured(1);
+    assert_eq!(root_mean_square(&quiet, 0), 0.01);
+}
+
+/// An error in variables is no gap: with the noise that is transmitted in it, the reduced chi-square is one.
+#[test]
+fn an_input_that_is_noisy_leaves_no_gap() {
+    for law in [Law::Line, Law::Lag, Law::Oscillator] {
+        let toy = Toy { input_noise: 0.03, ..Toy::of(&[law]) };
+        let record = toy.measured(2);
+        let problem = prepared(&record);
+        // 3000 samples of neighbours that are alike over ten: sqrt(2/300) = 0.08, three of them.
+        approx::assert_abs_diff_eq!(problem.nominal.misfits[0].fit, 1.0, epsilon = 0.25);
+    }
+}
+
+/// Where nothing is stated, the record's second differences tell its noise: 1.6/sqrt(3000) of it is one standard error, five of them.
+#[test]
+fn noise_that_is_not_stated_comes_from_the_record() {
+    for law in [Law::Line, Law::Lag, Law::Oscillator] {
+        for noise in [0.001, 0.01, 0.1] {
+            let toy =
+                Toy { noise, stated: None, ..Toy::of(&[law]).hiding(&[(Effect::Play, &[0.1])]) };
+            let found = root_mean_square(&toy.measured(3), 0);
+            approx::assert_relative_eq!(found, noise, max_relative = 0.15);
+        }
+    }
+}

@@ -1,0 +1,179 @@
+//! Linear algebra and random numbers beside nalgebra and theory.
+
+use nalgebra::{DMatrix, DVector};
+use proptest::{prelude::*, test_runner::RngSeed};
+
+use crate::numerics::{
+    arrowhead::Arrow,
+    extent::ends,
+    linear::{Cholesky, boxed},
+    random::Dice,
+};
+
+/// Relative to the largest value: matrices of up to 15 rows whose condition is held below 1e3, and a jitter of 1e-13 of the diagonal.
+const SOLVED: f64 = 1e-9;
+
+/// B B' + I of a square matrix B of normal numbers: positive definite, of condition up to some hundred.
+fn definite(n: usize, seed: u64) -> DMatrix<f64> {
+    let mut dice = Dice::new(seed, 1);
+    let b = DMatrix::from_fn(n, n, |_, _| dice.gauss());
+    &b * b.transpose() + DMatrix::identity(n, n)
+}
+
+fn vector(n: usize, seed: u64) -> DVector<f64> {
+    let mut dice = Dice::new(seed, 2);
+    DVector::from_fn(n, |_, _| dice.gauss())
+}
+
+fn cases(cases: u32) -> ProptestConfig {
+    ProptestConfig { cases, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() }
+}
+
+proptest! {
+    #![proptest_config(cases(64))]
+
+    #[test]
+    fn a_factor_solves_as_nalgebra_does(n in 1_usize..12, seed: u64) {
+        let (a, b) = (definite(n, seed), vector(n, seed));
+        let factor = Cholesky::of(a.clone());
+        let exact = a.clone().lu();
+        let mut x = b.as_slice().to_vec();
+        factor.solve(&mut x);
+        let expected = exact.solve(&b).expect("definite");
+        approx::assert_abs_diff_eq!(x[..], expected.as_slice()[..], epsilon = SOLVED);
+        approx::assert_abs_diff_eq!(factor.ln_determinant(), exact.determinant().ln(), epsilon = SOLVED);
+        approx::assert_abs_diff_eq!(factor.inverse() * &a, DMatrix::identity(n, n), epsilon = SOLVED);
+        // L then L' is the whole.
+        let mut halves = b.as_slice().to_vec();
+        factor.forward(&mut halves);
+        factor.backward(&mut halves);
+        approx::assert_abs_diff_eq!(halves[..], x[..], epsilon = SOLVED);
+    }
+
+    /// The conditions of Karush, Kuhn and Tucker: inside the slope is nought, at a face it points out of the box; nothing else is a minimum
+    /// of a convex function.
+    #[test]
+    fn a_boxed_minimum_meets_its_conditions(n in 1_usize..8, seed: u64, width in 0.01_f64..2.0) {
+        let (a, g) = (definite(n, seed), vector(n, seed));
+        let mut dice = Dice::new(seed, 3);
+        let low: Vec<f64> = (0..n).map(|_| -width * dice.unit()).collect();
+        let high: Vec<f64> = (0..n).map(|_| width * dice.unit()).collect();
+        let x = DVector::from_vec(boxed(&a, g.as_slice(), &low, &high));
+        let slope = &a * &x + &g;
+        for i in 0..n {
+            prop_assert!((low[i]..=high[i]).contains(&x[i]));
+            let is_met = (x[i] == low[i] && slope[i] > -SOLVED)
+                || (x[i] == high[i] && slope[i] < SOLVED)
+                || slope[i].abs() < SOLVED;
+            prop_assert!(is_met, "{i}: {} in {}..{}, slope {}", x[i], low[i], high[i], slope[i]);
+        }
+    }
+
+    /// An arrow with any number of knots and border columns, none of either included.
+    #[test]
+    fn an_arrow_solves_as_its_dense_matrix_does(knots in 0_usize..12, columns in 0_usize..4, seed: u64) {
+        prop_assume!(knots + columns > 0);
+        let n = knots + columns;
+        let mut dice = Dice::new(seed, 4);
+        let mut arrow = Arrow::zeros(knots, columns);
+        arrow.beside.iter_mut().for_each(|x| *x = dice.unit() - 0.5);
+        arrow.border.iter_mut().flatten().for_each(|x| *x = 0.5 * (dice.unit() - 0.5));
+        // More on the diagonal than beside it in every row: definite.
+        arrow.diagonal.iter_mut().for_each(|x| *x = 2.0 + dice.unit());
+        for i in 0..columns {
+            for j in 0..columns {
+                let apart = if i == j { 4.0 + 0.25 * knots as f64 } else { 0.3 };
+                arrow.corner[i][j] = apart;
+            }
+        }
+        let dense = DMatrix::from_fn(n, n, |i, j| {
+            let (low, high) = (i.min(j), i.max(j));
+            match (low < knots, high < knots) {
+                (true, true) if low == high => arrow.diagonal[low],
+                (true, true) if low + 1 == high => arrow.beside[low],
+                (true, true) => 0.0,
+                (true, false) => arrow.border[high - knots][low],
+                _ => arrow.corner[low - knots][high - knots],
+            }
+        });
+        let b = vector(n, seed);
+        let factor = arrow.factor();
+        let mut x = b.as_slice().to_vec();
+        factor.solve(&mut x);
+        let exact = dense.lu();
+        let expected = exact.solve(&b).expect("definite");
+        approx::assert_abs_diff_eq!(x[..], expected.as_slice()[..], epsilon = SOLVED);
+        approx::assert_abs_diff_eq!(factor.ln_determinant(), exact.determinant().ln(), epsilon = SOLVED);
+        // |L^-1 b|^2 = b'A^-1 b
+        let mut half = b.as_slice().to_vec();
+        factor.forward(&mut half);
+        let square: f64 = half.iter().map(|x| x * x).sum();
+        approx::assert_abs_diff_eq!(square, b.dot(&expected), epsilon = SOLVED);
+    }
+
+    #[test]
+    fn ends_are_the_least_and_the_greatest(values in prop::collection::vec(-1e9_f64..1e9, 1..20)) {
+        let (low, high) = ends(&values);
+        prop_assert!(values.iter().all(|x| (low..=high).contains(x)));
+        prop_assert!(values.contains(&low) && values.contains(&high));
+        // What is no number is passed over.
+        let with_gap: Vec<f64> = values.iter().copied().chain([f64::NAN]).collect();
+        prop_assert_eq!(ends(&with_gap), (low, high));
+    }
+}
+
+#[test]
+fn ends_of_nothing_hold_nothing() {
+    let (low, high) = ends(&[]);
+    assert!(low > high);
+}
+
+/// Means of 100 000 draws, five standard errors each: the moments of a normal number are 0, 1, 0, and 3 less 12/120 for a sum of twelve
+/// (the fourth cumulant of a uniform number is -1/120).
+#[test]
+fn gauss_has_the_moments_of_a_sum_of_twelve() {
+    const DRAWS: usize = 100_000;
+    let mut dice = Dice::new(5, 0);
+    let mut sums = [0.0; 4];
+    for _ in 0..DRAWS {
+        let x = dice.gauss();
+        sums.iter_mut().enumerate().for_each(|(k, sum)| *sum += x.powi(k as i32 + 1));
+    }
+    // Standard deviations of x, x^2, x^3 and x^4 of a normal number: 1, sqrt 2, sqrt 15, sqrt 96.
+    for (k, (expected, sd)) in
+        [(0.0, 1.0), (1.0, 2.0_f64.sqrt()), (0.0, 15.0_f64.sqrt()), (2.9, 96.0_f64.sqrt())]
+            .into_iter()
+            .enumerate()
+    {
+        let error = 5.0 * sd / (DRAWS as f64).sqrt();
+        approx::assert_abs_diff_eq!(sums[k] / DRAWS as f64, expected, epsilon = error);
+    }
+}
+
+/// Tenths of the unit interval hold 10 000 each of 100 000 draws, with a deviation of 95: five of them. Whole numbers below ten, as well.
+#[test]
+fn uniform_numbers_are_uniform_and_below_their_bound() {
+    let mut dice = Dice::new(6, 0);
+    let mut counts = [[0_i32; 10]; 2];
+    for _ in 0..100_000 {
+        let unit = dice.unit();
+        assert!((0.0..1.0).contains(&unit));
+        counts[0][(10.0 * unit) as usize] += 1;
+        counts[1][dice.below(10)] += 1;
+    }
+    assert!(counts.iter().flatten().all(|n| (n - 10_000).abs() < 475), "{counts:?}");
+    assert_eq!((dice.below(1), dice.below(0)), (0, 0));
+}
+
+/// Streams of one seed, and seeds of one stream, have nothing to do with each other: correlations of 10 000 draws stay within five of 1/100.
+#[test]
+fn streams_and_seeds_are_independent() {
+    let draws = |seed, stream| {
+        let mut dice = Dice::new(seed, stream);
+        (0..10_000).map(move |_| dice.gauss())
+    };
+    for (a, b) in [((1, 0), (1, 1)), ((1, 0), (2, 0)), ((7, 3), (3, 7))] {
+        let product: f64 = draws(a.0, a.1).zip(draws(b.0, b.1)).map(|(x, y)| x * y).sum();
+        assert!((product / 10_000.0).abs() < 0.05, "{a:?} {b:?}: {product}");
+    }
+}

@@ -1,0 +1,101 @@
+//! What an effect must bring to be taken, and how often noise brings it.
+
+use super::index;
+use crate::{
+    fit::{
+        prepared::Problem,
+        tests::{prepared, with_effects},
+    },
+    problem::{frame::Role, thresholds::Thresholds},
+    search::{acceptance::Worth, selection::Search, sets::Sets},
+    toys::{Effect, Law, Measured, Toy, slow},
+};
+
+fn is_any_taken(record: &Measured) -> bool {
+    let (problem, thresholds) = (prepared(record), Thresholds::frozen());
+    let mut search = Search::new(&problem, &thresholds, 4);
+    !search.best(&problem.nominal, &|_: &str| ()).expect("a search").effects.is_empty()
+}
+
+/// An effect of two numbers rises by 12 nats and 2 ln(60)/2 nats of price by chance once in exp(16): of 20 records of four toys, with seven
+/// effects each, none.
+#[test]
+fn pure_noise_is_no_effect() {
+    for law in [Law::Line, Law::Lag, Law::Oscillator, Law::Delay] {
+        for seed in 0..20 {
+            let toy = Toy::of(&[law]).may_lack(&Effect::ALL).off_by(&[1.0, -1.0, 1.0]);
+            assert!(!is_any_taken(&toy.measured(seed)), "{law:?} {seed}");
+        }
+    }
+}
+
+/// The same beside noise half of whose variance is remembered for 0.05 s, which its stated size includes: octaves know no colour.
+#[test]
+fn coloured_noise_is_no_effect() {
+    for seed in 0..20 {
+        let mut toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL);
+        toy.stated = Some(2.0_f64.sqrt());
+        toy.courses = vec![(1, slow(toy.noise, 0.05, (toy.samples(), toy.dt_s), seed))];
+        assert!(!is_any_taken(&toy.measured(seed)), "seed {seed}");
+    }
+}
+
+/// Of a number that does nothing chance makes chi^2/2 with one degree of freedom: half a nat in the mean, of deviation 0.71. The price of
+/// Schwarz is taken off: ln(blocks)/2.
+#[test]
+fn a_number_that_does_nothing_rises_the_score_by_half_a_nat_less_its_price() {
+    const DRAWS: u64 = 40;
+    let mut sum = 0.0;
+    for seed in 0..DRAWS {
+        let record = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic]).measured(seed);
+        let problem = prepared(&record);
+        let mut sets = Sets::new(&problem);
+        let set = sets.refit(&with_effects(&problem, &[(0, vec![0.01])])).expect("fitted");
+        sum += set.score + 0.5 * problem.compare.frame.blocks(Role::Fit).ln();
+    }
+    // Three standard errors of 0.71/sqrt(40).
+    approx::assert_abs_diff_eq!(sum / DRAWS as f64, 0.5, epsilon = 0.34);
+}
+
+fn worth<'a>(problem: &'a Problem<'a>, thresholds: &'a Thresholds) -> Worth<'a> {
+    Worth { problem, thresholds }
+}
+
+#[test]
+fn a_strong_effect_is_worth_it_and_the_same_set_is_not() {
+    let toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL).hiding(&[(Effect::Play, &[0.1])]);
+    let record = toy.measured(1);
+    let (problem, thresholds) = (prepared(&record), Thresholds::frozen());
+    let worth = worth(&problem, &thresholds);
+    let play = with_effects(&problem, &[(index(&record, "play"), vec![0.1])]);
+    let play = Sets::new(&problem).refit(&play).expect("fitted");
+    assert!(worth.is_worth(&problem.nominal, &play));
+    assert!(!worth.is_worth(&play, &play) && !worth.is_worth(&play, &problem.nominal));
+    // All that was left in the stage is closed, so that no further effect can be more than model discrepancy.
+    assert!(worth.is_possible(&problem.nominal, index(&record, "cubic")));
+    assert!(!worth.is_possible(&play, index(&record, "cubic")));
+}
+
+/// What closes less than counts as a gap has to rise further.
+#[test]
+fn what_closes_little_has_to_rise_more() {
+    let record = Toy::of(&[Law::Line]).measured(1);
+    let (problem, thresholds) = (prepared(&record), Thresholds::frozen());
+    let worth = worth(&problem, &thresholds);
+    assert_eq!(worth.least_rise(0.99 * thresholds.null_excess), thresholds.faint_rise);
+    assert_eq!(worth.least_rise(1.01 * thresholds.null_excess), thresholds.rise);
+    assert!(thresholds.faint_rise > thresholds.rise);
+}
+
+/// An effect that is larger than its range ends at the end of it, and says so.
+#[test]
+fn an_effect_at_the_end_of_its_range_is_told() {
+    for (size, is_bound) in [(0.15, false), (0.5, true)] {
+        let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Play]);
+        let record = toy.hiding(&[(Effect::Play, &[size])]).measured(4);
+        let (problem, thresholds) = (prepared(&record), Thresholds::frozen());
+        let play = with_effects(&problem, &[(0, vec![0.2])]);
+        let play = Sets::new(&problem).refit(&play).expect("fitted");
+        assert_eq!(worth(&problem, &thresholds).is_at_bound(&play, 0), is_bound, "{size}");
+    }
+}

@@ -1,0 +1,21 @@
+//! The search on toys: what is screened, taken, and dropped again.
+
+mod acceptance;
+mod screening;
+mod selecting;
+
+use crate::{fit::hypothesis::Hypothesis, fit::prepared::Problem, toys::Measured};
+
+/// Names of the effects of a set, in alphabetical order.
+fn names(problem: &Problem<'_>, set: &Hypothesis) -> Vec<String> {
+    let effects = problem.simulator().effects();
+    let mut names: Vec<String> = set.effects.iter().map(|e| effects[*e].name.clone()).collect();
+    names.sort();
+    names
+}
+
+fn index(record: &Measured, name: &str) -> usize {
+    let catalogue = record.toy.catalogue.iter();
+    let mut names = catalogue.map(|(stage, effect)| crate::toys::Toy::name(*stage, *effect));
+    names.position(|own| own == name).expect("an effect of that name")
+}

@@ -1,0 +1,90 @@
+//! How a session is cut: every sample in one role, by rules that can be told beforehand.
+
+use proptest::{prelude::*, test_runner::RngSeed};
+use stretch_gap::{BLOCK_S, Frame, GapError, Role};
+
+use crate::toys::{Law, Toy};
+
+fn config() -> ProptestConfig {
+    ProptestConfig { cases: 64, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() }
+}
+
+fn toy(trials: Vec<(usize, bool)>, dt_s: f64) -> Toy {
+    Toy { trials, dt_s, ..Toy::of(&[Law::Line]) }
+}
+
+proptest! {
+    #![proptest_config(config())]
+
+    #[test]
+    fn segments_hold_every_sample_once_in_order(
+        trials in prop::collection::vec((1_usize..6000, any::<bool>()), 1..6),
+        dt_s in prop::sample::select(vec![0.001, 0.01, 0.05]),
+    ) {
+        let record = toy(trials.clone(), dt_s).measured(1);
+        let all_tested = trials.iter().all(|(_, is_test)| *is_test);
+        let frame = match Frame::of(&record) {
+            Err(GapError::TooLittle { .. }) => {
+                prop_assert!(all_tested, "{trials:?}");
+                return Ok(());
+            }
+            frame => frame.expect("a frame"),
+        };
+        let mut end = 0;
+        for segment in &frame.segments {
+            prop_assert_eq!(segment.from, end);
+            prop_assert!(segment.to > segment.from);
+            end = segment.to;
+        }
+        prop_assert_eq!(end, record.toy.samples());
+        let counts = [Role::Fit, Role::Held, Role::Test].map(|role| frame.count(role));
+        prop_assert_eq!(counts.iter().sum::<usize>(), end);
+        prop_assert_eq!(frame.block, ((BLOCK_S / dt_s).round() as usize).max(1));
+        prop_assert_eq!(frame.blocks(Role::Fit), counts[0] as f64 / frame.block as f64);
+        prop_assert_eq!(frame.borrowed_test, trials.iter().all(|(_, is_test)| !is_test));
+        let last = trials.iter().rposition(|(_, is_test)| !is_test).expect("one to fit");
+        prop_assert_eq!(frame.fit_trials, last + 1);
+        let specs = record.toy.description();
+        let not_tested = Frame::not_tested(&specs.trials);
+        for (trial, range) in record.toy.ranges().into_iter().enumerate() {
+            let own: Vec<_> = frame.segments.iter().filter(|s| s.trial == trial).collect();
+            prop_assert!(own.iter().all(|s| range.contains(&s.from) && s.to <= range.end));
+            let of = |role| -> usize {
+                own.iter().filter(|s| s.role == role).map(|s| s.to - s.from).sum()
+            };
+            // What may be looked at stands first, and no more than that is fitted or held out.
+            prop_assert_eq!(of(Role::Fit) + of(Role::Held), not_tested[trial]);
+            let order = |role: Role| match role { Role::Fit => 0, Role::Held => 1, Role::Test => 2 };
+            prop_assert!(own.is_sorted_by_key(|s| order(s.role)));
+            // Three tenths of 30 s and more are held out, and nothing of less.
+            let is_long = not_tested[trial] as f64 * dt_s >= 30.0;
+            let held = if is_long { (0.3 * not_tested[trial] as f64) as usize } else { 0 };
+            prop_assert_eq!(of(Role::Held), held);
+            // A test trial is tested on as a whole; without one, the last quarter of every trial is.
+            let quarter = (0.25 * range.len() as f64) as usize;
+            let tested = match (trials[trial].1, frame.borrowed_test) {
+                (true, _) => range.len(),
+                (false, true) => quarter,
+                (false, false) => 0,
+            };
+            prop_assert_eq!(of(Role::Test), tested);
+        }
+    }
+}
+
+#[test]
+fn a_session_of_tests_alone_is_refused_with_what_to_do() {
+    let record = toy(vec![(1000, true), (1000, true)], 0.01).measured(1);
+    let error = Frame::of(&record).expect_err("nothing to fit").to_string();
+    assert_eq!(error, "no trial may be fitted: give at least one trial split = \"fit\"");
+}
+
+/// Samples of the first trials: as many as the trials hold, whatever is tested in them.
+#[test]
+fn samples_are_counted_by_trial() {
+    let record = toy(vec![(400, false), (600, true), (800, false)], 0.01).measured(1);
+    let frame = Frame::of(&record).expect("a frame");
+    let samples = [0, 1, 2, 3].map(|trials| frame.samples(trials));
+    assert_eq!(samples, [0, 400, 1000, 1800]);
+    assert_eq!(frame.of_role(Role::Test).map(|s| s.trial).collect::<Vec<_>>(), [1]);
+}

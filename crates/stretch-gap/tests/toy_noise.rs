@@ -1,0 +1,164 @@
+//! The noise of a channel from its record: what it is told to be, and what passes for it.
+
+use stretch_gap::{Dice, Noise, VerdictKind, WINDOW, noise_variance};
+
+use crate::toys::{Effect, Law, Toy, slow};
+
+const SAMPLES: usize = 20_000;
+/// Standard errors of a deviation told by the median of n squared second differences: the median of a squared normal variable is known
+/// to 0.5/(0.4711 sqrt n) of 0.4549, and neighbours that share samples make a third of them independent (1/(1 + 2 (4/6)^2 + 2 (1/6)^2)):
+/// 1.6/sqrt n of the deviation; five of them.
+const TOLD: f64 = 5.0 * 1.6 / 141.0;
+
+fn white(sd: f64, seed: u64) -> Vec<f64> {
+    let mut dice = Dice::new(seed, 0);
+    (0..SAMPLES).map(|_| sd * dice.gauss()).collect()
+}
+
+fn deviation(record: &[f64], dt_s: f64) -> f64 {
+    noise_variance([record].into_iter(), dt_s).sqrt()
+}
+
+#[test]
+fn white_noise_is_found_beside_motion_and_rests() {
+    for (seed, sd) in [1e-6, 0.02, 3.0].into_iter().enumerate() {
+        let noise = white(sd, seed as u64);
+        approx::assert_relative_eq!(deviation(&noise, 0.01), sd, max_relative = TOLD);
+        // Moves of a second between rests of two: bends of 0.01^2 (2 pi)^2 of the amplitude in a third of the samples.
+        let moved = |i: usize| match (i / 100) % 3 {
+            0 => 20.0 * sd * (1.0 - (std::f64::consts::TAU * 0.01 * (i % 100) as f64).cos()),
+            _ => 0.0,
+        };
+        let record: Vec<f64> = noise.iter().enumerate().map(|(i, x)| x + moved(i)).collect();
+        approx::assert_relative_eq!(deviation(&record, 0.01), sd, max_relative = TOLD);
+    }
+}
+
+/// Noise has a unit: what is written in another one has that many times the noise, to the bit where the factor is a power of two.
+#[test]
+fn noise_is_in_the_unit_of_its_record() {
+    let record = white(0.1, 1);
+    let scaled: Vec<f64> = record.iter().map(|x| 1024.0 * x + 5.0 * 1024.0).collect();
+    let shifted: Vec<f64> = record.iter().map(|x| x + 5.0).collect();
+    assert_eq!(deviation(&scaled, 0.01), 1024.0 * deviation(&shifted, 0.01));
+}
+
+/// A converter of steps q adds q^2/12; a median of whole steps is off by half a step of a size of 0.6745 sqrt 6 = 1.65 deviations at most.
+#[test]
+fn rounding_is_noise_to_half_a_step_of_the_median() {
+    for share in [0.25, 0.5, 1.0, 2.0] {
+        let record: Vec<f64> = white(0.1, 2)
+            .iter()
+            .enumerate()
+            .map(|(i, x)| {
+                let step = share * 0.1;
+                ((x + 1e-4 * i as f64) / step).round() * step
+            })
+            .collect();
+        let expected = 0.1 * (1.0 + share * share / 12.0).sqrt();
+        let most = TOLD + 0.5 * share * 0.1 / (1.65 * expected);
+        approx::assert_relative_eq!(deviation(&record, 0.01), expected, max_relative = most);
+    }
+}
+
+/// The mains are no noise, wherever they fold to: 50 Hz of 250 Hz and of 100, 60 Hz at 40 Hz of 100. Below 0.15 turns a sample they may be
+/// motion, and stay.
+#[test]
+fn a_hum_of_the_mains_is_left_out() {
+    for (hertz, dt_s) in [(50.0, 0.01), (60.0, 0.01), (50.0, 0.004), (60.0, 0.004)] {
+        let wave = |i: usize| (std::f64::consts::TAU * hertz * dt_s * i as f64 + 0.7).cos();
+        let record: Vec<f64> = white(0.1, 3).iter().enumerate().map(|(i, x)| x + wave(i)).collect();
+        // Of each second some waves of noise are taken with it, and made up for.
+        approx::assert_relative_eq!(deviation(&record, dt_s), 0.1, max_relative = 1.5 * TOLD);
+    }
+}
+
+/// A resonance that rings all the time passes for noise, for nothing in the record says that it is none: of A sin(2 pi f t) second differences
+/// have the mean square A^2 (2 - 2 cos(2 pi f dt))^2/2, told as if a sixth were variance, and up to 1/0.4549 of that where the median of a
+/// sine's square, which is its mean, is taken for a normal variable's.
+#[test]
+fn a_resonance_passes_for_noise_as_far_as_its_bends_do() {
+    for (hertz, amplitude) in [(5.0, 1.0), (12.0, 0.3), (20.0, 1.0)] {
+        let turn = std::f64::consts::TAU * hertz * 0.01;
+        let record: Vec<f64> = white(0.1, 4)
+            .iter()
+            .enumerate()
+            .map(|(i, x)| x + amplitude * (turn * i as f64).sin())
+            .collect();
+        let bends = 0.5 * (amplitude * (2.0 - 2.0 * turn.cos())).powi(2) / 6.0;
+        let least = (0.01 + bends).sqrt();
+        let most = least / 0.4549_f64.sqrt();
+        let found = deviation(&record, 0.01);
+        assert!(
+            ((1.0 - TOLD) * least..(1.0 + TOLD) * most).contains(&found),
+            "{least} {found} {most}"
+        );
+    }
+}
+
+/// Noise that is remembered shows little of itself from sample to sample: of a correlation rho^k second differences hold
+/// 6 - 8 rho + 2 rho^2 of the variance, a sixth of which is told.
+#[test]
+fn differences_tell_of_slow_noise_what_changes_from_sample_to_sample() {
+    for memory in [2.0_f64, 10.0, 50.0] {
+        let record = slow(0.1, 0.01 * memory, (SAMPLES, 0.01), 5);
+        let kept = (-1.0 / memory).exp();
+        let expected = 0.1 * ((6.0 - 8.0 * kept + 2.0 * kept * kept) / 6.0).sqrt();
+        // Correlations of its differences are those of white noise at most.
+        approx::assert_relative_eq!(deviation(&record, 0.01), expected, max_relative = TOLD);
+    }
+}
+
+/// Windows are still, and tell slow noise as well: the same level whatever is stated, as many samples as asked for.
+#[test]
+fn windows_tell_slow_noise_that_differences_miss() {
+    let record = slow(0.1, 0.2, (100 * WINDOW, 0.01), 6);
+    let mut dice = Dice::new(6, 1);
+    let noisy: Vec<f64> = record.iter().map(|x| x + 0.02 * dice.gauss()).collect();
+    let windows: Vec<Vec<f64>> = noisy.chunks(WINDOW).map(<[f64]>::to_vec).collect();
+    let found = Noise::of_windows(&windows, Some(0.02), true, 0.01).expect("enough windows");
+    // 100 windows of 1.28 s hold some 320 correlation times of 0.2 s twice over: 5 %, and parabolas take what is slower than a window.
+    approx::assert_relative_eq!(found.sd(), 0.1, max_relative = 0.25);
+    let (share, memory) = found.slow();
+    assert!(share > 0.85 && (10.0..40.0).contains(&memory), "{share} {memory}");
+    // Of what is not still, no slow part is told: only what is quick.
+    let quick = Noise::of_windows(&windows, Some(0.02), false, 0.01).expect("enough windows");
+    assert!(quick.sd() < 0.05 && quick.slow().0 == 0.0, "{quick:?}");
+    let samples = found.samples(50_000, &mut dice);
+    let power = samples.iter().map(|x| x * x).sum::<f64>() / 50_000.0;
+    // 50 000 samples of a memory of 20: 1250 independent ones of a square, 4 %, three of them.
+    approx::assert_relative_eq!(power.sqrt(), found.sd(), max_relative = 0.08);
+}
+
+/// A diagnosis that takes its noise from the record says the same of what is missing as one that was told it.
+#[test]
+fn noise_from_the_record_names_what_stated_noise_names() {
+    for law in [Law::Line, Law::Lag, Law::Oscillator] {
+        for hidden in [None, Some(Effect::Play)] {
+            let mut toy = Toy::of(&[law]).may_lack(&Effect::ALL);
+            toy.hidden = hidden.iter().map(|effect| (0, *effect, vec![0.1])).collect();
+            let named = [Some(1.0), None].map(|stated| {
+                let toy = Toy { stated, ..toy.clone() };
+                toy.measured(7).diagnosed().0.named
+            });
+            let expected: Vec<&str> = hidden.iter().map(|e| e.name()).collect();
+            assert_eq!(named, [expected.clone(), expected], "{law:?}");
+        }
+    }
+}
+
+/// Noise that is stated a third too large or a third too small hides no effect, and what is stated too small is a gap without a name.
+#[test]
+fn stated_noise_that_is_wrong_names_nothing() {
+    for seed in 0..5 {
+        let toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL);
+        let told = |times| Toy { stated: Some(times), ..toy.clone() }.measured(seed).diagnosed().0;
+        let large = told(1.5);
+        assert_eq!(large.verdict, VerdictKind::NoGap, "{}", large.sentence);
+        // 1/0.7^2 - 1: twice the variance that is stated.
+        let small = told(0.7);
+        assert!(small.named.is_empty(), "{}", small.sentence);
+        // Of 1000 samples to test on, a chi-square of 2.04 is known to 0.09, three of them.
+        approx::assert_abs_diff_eq!(small.gap.retuned, 1.04, epsilon = 0.28);
+    }
+}

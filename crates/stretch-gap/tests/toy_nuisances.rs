@@ -1,0 +1,96 @@
+//! Slow drift and offsets that a simulator describes are no effects, and effects beside them are still found.
+
+use stretch_gap::{Options, VerdictKind, Wander};
+
+use crate::toys::{Effect, Law, Toy, slow};
+
+fn drifting(described: Wander, course: (f64, f64), seed: u64) -> Toy {
+    let mut toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL);
+    toy.parameters[1].wander = Some(described);
+    toy.courses = vec![(1, slow(course.0, course.1, (toy.samples(), toy.dt_s), seed))];
+    toy
+}
+
+const DESCRIBED: Wander = Wander { sd: 0.03, correlation_s: 3.0 };
+
+/// As described, half as large, twice as large, quicker: of 20 records none has a name, for a name takes 12 nats.
+#[test]
+fn a_drift_that_is_described_is_no_effect() {
+    for (i, course) in [(0.03, 3.0), (0.015, 3.0), (0.06, 3.0), (0.03, 1.0)].into_iter().enumerate()
+    {
+        for seed in 0..5 {
+            let told =
+                drifting(DESCRIBED, course, 10 * i as u64 + seed).measured(seed).diagnosed().0;
+            assert!(told.named.is_empty(), "{course:?} {seed}: {}", told.sentence);
+        }
+    }
+}
+
+/// An effect whose changes, 0.06, are twelve times the drift's: no size of the drift that is tried, 2.5 times what is described at most, does as
+/// much. (Beside a drift of half its size the same effect is left unnamed, for so much the drift may have done.)
+#[test]
+fn an_effect_beside_a_smaller_drift_is_found() {
+    let described = Wander { sd: 0.005, correlation_s: 3.0 };
+    for seed in 0..5 {
+        let toy = drifting(described, (0.005, 3.0), seed).hiding(&[(Effect::Quadratic, &[0.4])]);
+        let told = toy.measured(seed).diagnosed().0;
+        assert_eq!(told.named, ["quadratic"], "{}", told.sentence);
+        let value = told.candidates[0].parameters[0].value;
+        // A drift a twelfth as large moves the size by less than that, even were it all of the effect's form.
+        approx::assert_abs_diff_eq!(value, 0.4, epsilon = 0.4 / 12.0);
+    }
+}
+
+/// What nobody described is a gap, and no effect of the catalogue is to blame: the same drift is in no way an effect's.
+#[test]
+fn a_drift_that_nobody_described_is_a_gap() {
+    for seed in 0..5 {
+        let mut toy = drifting(DESCRIBED, (0.03, 3.0), seed);
+        toy.parameters[1].wander = None;
+        let told = toy.measured(seed).diagnosed().0;
+        assert!(told.gap.retuned > 1.0, "nine times the noise's variance: {:?}", told.gap);
+        assert_ne!(told.verdict, VerdictKind::NoGap, "{}", told.sentence);
+    }
+}
+
+#[test]
+fn offsets_by_trial_are_no_effect_where_they_are_described() {
+    for seed in 0..5 {
+        let mut toy = Toy::of(&[Law::Lag, Law::Line]);
+        toy.catalogue = Effect::ALL.map(|effect| (1, effect)).into();
+        toy.parameters[3].per_trial_sd = Some(0.05);
+        let steps = [0.05, -0.03, 0.06, -0.05].into_iter().zip(toy.ranges());
+        toy.courses = vec![(3, steps.flat_map(|(step, range)| range.map(move |_| step)).collect())];
+        let told = toy.measured(seed).diagnosed().0;
+        assert!(told.named.is_empty(), "{}", told.sentence);
+        assert!(
+            matches!(told.verdict, VerdictKind::NoGap | VerdictKind::Parameters),
+            "{}",
+            told.sentence
+        );
+    }
+}
+
+/// Simpler methods name what is hidden where it stands alone, and nothing in noise.
+#[test]
+fn simpler_methods_name_a_strong_effect_and_no_noise() {
+    let options = Options { baselines: true, ..Options::default() };
+    for effect in [Effect::Play, Effect::Quadratic, Effect::Cubic] {
+        let toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL).hiding(&[(effect, &[0.2])]);
+        let (told, _) = toy.measured(1).diagnosed_by(&options);
+        let simpler = told.baselines.expect("they were asked for");
+        let name = Some(effect.name().to_owned());
+        assert_eq!(simpler.bic, name);
+        assert_eq!(simpler.largest_drop, name);
+        // One change of the output, whose shape goes with its size where the effect is linear in it; a play's is not.
+        if effect != Effect::Play {
+            assert_eq!(simpler.signature, name);
+        }
+    }
+    let quiet = Toy::of(&[Law::Line]).may_lack(&Effect::ALL).measured(2);
+    let (told, _) = quiet.diagnosed_by(&options);
+    let simpler = told.baselines.expect("they were asked for");
+    assert_eq!((simpler.largest_drop, simpler.signature), (None, None));
+    let plain = quiet.diagnosed().0;
+    assert_eq!(plain.baselines, None);
+}

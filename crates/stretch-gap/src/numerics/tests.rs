@@ -5,7 +5,6 @@ use proptest::{prelude::*, test_runner::RngSeed};
 
 use crate::numerics::{
     arrowhead::Arrow,
-    extent::ends,
     linear::{Cholesky, boxed},
     random::Dice,
 };
@@ -110,22 +109,6 @@ proptest! {
         let square: f64 = half.iter().map(|x| x * x).sum();
         approx::assert_abs_diff_eq!(square, b.dot(&expected), epsilon = SOLVED);
     }
-
-    #[test]
-    fn ends_are_the_least_and_the_greatest(values in prop::collection::vec(-1e9_f64..1e9, 1..20)) {
-        let (low, high) = ends(&values);
-        prop_assert!(values.iter().all(|x| (low..=high).contains(x)));
-        prop_assert!(values.contains(&low) && values.contains(&high));
-        // What is no number is passed over.
-        let with_gap: Vec<f64> = values.iter().copied().chain([f64::NAN]).collect();
-        prop_assert_eq!(ends(&with_gap), (low, high));
-    }
-}
-
-#[test]
-fn ends_of_nothing_hold_nothing() {
-    let (low, high) = ends(&[]);
-    assert!(low > high);
 }
 
 /// Means of 100 000 draws, five standard errors each: the moments of a normal number are 0, 1, 0, and 3 less 12/120 for a sum of twelve

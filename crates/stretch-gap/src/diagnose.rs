@@ -1,4 +1,6 @@
-//! The flow: a problem is prepared, searched, its evidence gathered, judged, and told. Nothing flows back.
+//! The flow: a problem is prepared, searched, the record doubted, the evidence gathered, judged, and put into words. Nothing flows back.
+
+use std::collections::BTreeMap;
 
 use crate::{
     evidence::{
@@ -6,23 +8,31 @@ use crate::{
         gathered::Evidence,
         localise::{self, location::Where},
         null_band::null_band,
-        probability::{covering_set, unknown},
+        probability::{Weighed, covering_set, unknown},
         responses::responses,
         sanity::Sanity,
-        shares::{peeled, shares},
-        transfer::transfer,
+        shares::{EffectShare, eliminated, shares},
     },
-    fit::prepared::Problem,
+    fit::{hypothesis::Hypothesis, prepared::Problem},
     numerics::stopwatch::Stopwatch,
-    problem::{error::GapError, simulator::Simulator, thresholds::Thresholds},
-    record::{columns_alone::plain, examine::Doubts, suspect::Suspect, weigh::weighed},
-    search::{baselines::baselines, command_timing, re_estimate::settled, selection::Search},
+    problem::{
+        altered_parameters::Altered, error::GapError, simulator::Simulator, thresholds::Thresholds,
+    },
+    record::{
+        columns_alone::columns_alone, examine::Doubts, gross::Gross, suspect::Suspect,
+        weigh::weighed,
+    },
+    search::{
+        baselines::baselines,
+        command_timing,
+        re_estimate::re_estimated,
+        selection::{Found, Search},
+    },
     verdict::{
-        coverage::{carried, is_short, thin},
+        coverage::{is_short, too_little},
         diagnosis::{Diagnosis, Unexplained, VerdictKind},
-        judge::{Case, judge},
-        naming::Naming,
-        proposal::lacking,
+        judge::{Case, Judged, judge},
+        proposal::Lacking,
         sentence::{Answer, tell},
     },
 };
@@ -71,154 +81,247 @@ pub fn diagnose(
     progress: &(dyn Fn(&str) + Sync),
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<(Diagnosis, Evidence), GapError> {
+    let task = Task { simulator, options, depth: options.depth, progress, stop };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads).build();
     match pool {
-        Ok(pool) => pool.install(|| run(simulator, options, progress, stop)),
+        Ok(pool) => pool.install(|| run(task)),
         // No thread could be started: the caller's own will do.
-        Err(_) => run(simulator, options, progress, stop),
+        Err(_) => run(task),
     }
 }
 
-fn run(
-    simulator: &dyn Simulator,
-    options: &Options,
-    progress: &(dyn Fn(&str) + Sync),
-    stop: &(dyn Fn() -> bool + Sync),
-) -> Result<(Diagnosis, Evidence), GapError> {
-    let (begun, seed, thresholds) = (Stopwatch::start(), options.seed, &options.thresholds);
-    // What the columns alone say: with one of them copied or dead, effects mean nothing.
-    let plain = plain(&simulator.columns(), simulator.trials(), simulator.dt_s());
-    let depth = if plain.is_empty() { options.depth } else { 0 };
-    // Prepared.
-    let at_rows = Problem::prepare(simulator, stop, seed, progress)?;
+/// What is diagnosed, how, who is told what goes on, and who is asked whether to stop.
+#[derive(Clone, Copy)]
+struct Task<'a> {
+    simulator: &'a dyn Simulator,
+    options: &'a Options,
+    /// Most effects named at once; 0 where the columns alone say that effects mean nothing.
+    depth: usize,
+    progress: &'a (dyn Fn(&str) + Sync),
+    stop: &'a (dyn Fn() -> bool + Sync),
+}
+
+fn run(task: Task<'_>) -> Result<(Diagnosis, Evidence), GapError> {
+    let begun = Stopwatch::start();
+    let simulator = task.simulator;
+    // With a column that is copied or dead effects mean nothing.
+    let columns = columns_alone(&simulator.columns(), simulator.trials(), simulator.dt_s());
+    let task = Task { depth: if columns.is_empty() { task.depth } else { 0 }, ..task };
     let between_rows = command_timing::between_rows(simulator);
-    let between_rows = between_rows.as_ref();
-    let (problem, from) =
-        command_timing::likelier(at_rows, between_rows, (thresholds, depth), seed, progress)?;
-    let simulator = problem.simulator();
-    // Searched, once more where the nuisances turn out to be others.
-    let mut search = Search::new(&problem, thresholds, depth);
-    let mut best = search.best(&from, progress)?;
-    progress("nuisances");
-    let settled = settled(&problem, &mut search.sets, &best, seed)?;
-    let problem = settled.as_ref().map_or(&problem, |(problem, _)| problem);
-    if let Some((problem, from)) = &settled {
-        search = Search::new(problem, thresholds, depth);
-        best = search.best(from, progress)?;
-    }
-    let found = search.rivalled(best, progress)?;
-    let peeled = peeled(&mut search.sets, &found.best)?;
-    // Doubted: an error of the record or of the rig file has one number and leaves noise.
-    progress("errors of the record");
-    let suspect = Suspect::of(simulator);
-    let doubted = problem.beside(&suspect);
-    let doubts = match plain.is_empty() && !problem.is_spent() {
-        true => Doubts::of(&doubted, &suspect, thresholds)?
-            .closer_if(&doubted, &suspect, &found, thresholds)?,
-        false => Doubts::default(),
-    };
-    let record = weighed(&doubted, &suspect, doubts.errors, &found, thresholds);
-    let searched = problem;
-    let (problem, found, peeled, gross) = match record {
-        Some((gross, found)) => (&doubted, found, Vec::new(), gross),
-        None => (problem, found, peeled, plain),
-    };
-    let (simulator, runs) = (problem.simulator(), &problem.compare.runs);
-    // Gathered: from here on test trials are read.
-    progress("test trials");
-    let (mut evidence, weighed) = Evidence::gather(problem, thresholds, &found)?;
-    let candidates = candidates(problem, &evidence, &weighed, seed)?;
-    let shares = shares(problem, &evidence, &found.best, &peeled, thresholds.null_excess)?;
-    let sanity = Sanity::of(problem, &found.best, &evidence)?;
-    progress("where the gap sits");
-    let location = locate(problem, &evidence, seed)?;
-    // Judged.
-    let first = candidates.first();
-    let case = Case {
-        gap: evidence.gap,
-        first,
-        strongest: shares.first(),
-        sanity: &sanity,
-        is_record: !gross.is_empty(),
-    };
-    let rows_used = simulator.description().rows_used();
-    let thin = thin(&evidence.frame, rows_used, simulator.dt_s());
-    let is_short = is_short(&evidence.frame, simulator.dt_s());
-    let judged = carried(judge(case, thresholds), thin);
-    let naming = match judged.names() {
-        true => Naming::of(&candidates, &shares, thresholds, is_short),
-        false => Naming::default(),
-    };
-    // At an end of its range an effect stands in for something else.
-    let verdict = if naming.named.is_empty() { judged.nameless() } else { judged };
-    let (verdict, proposed) = lacking(problem, &found.best, (verdict, evidence.gap), progress)?;
-    // Names that a sum of terms beats stand for nothing.
-    let is_beaten = !naming.named.is_empty() && !verdict.names();
-    let naming = if is_beaten { Naming::default() } else { naming };
-    let transfer = match verdict.names() {
-        true => {
-            progress("what the gap costs a calibration");
-            transfer(runs, &evidence, seed)?
-        }
+    let (problem, from) = prepare(task, between_rows.as_ref())?;
+    let searched = search(task, problem, &from)?;
+    let suspect = Suspect::of(searched.problem.simulator());
+    let doubted = searched.problem.beside(&suspect);
+    let error = match columns.is_empty() {
+        true => doubt(task, &searched, (&doubted, &suspect))?,
         false => None,
     };
-    let partial = first.filter(|_| verdict.kind == VerdictKind::Partial);
-    let unexplained = partial.map(|first| unexplained(simulator, &evidence, first, seed));
-    let ambiguous = match verdict.kind {
-        VerdictKind::NoGap | VerdictKind::Parameters | VerdictKind::Record => Vec::new(),
-        _ => covering_set(&weighed, simulator),
+    let answer = match &error {
+        Some((gross, found)) => Cause { problem: &doubted, found, eliminated: &[], gross },
+        None => Cause {
+            problem: &searched.problem,
+            found: &searched.found,
+            eliminated: &searched.eliminated,
+            gross: &columns,
+        },
     };
-    let is_quiet = matches!(verdict.kind, VerdictKind::NoGap | VerdictKind::Parameters);
-    let null_band = is_quiet.then(|| null_band(problem, seed)).transpose()?;
+    let gathered = gather(task, answer)?;
+    let judged = decide(task, answer, &gathered)?;
+    report(task, &searched, answer, (gathered, judged), &begun)
+}
+
+/// The problem in which the records are likelier, of commands that switch at rows and between them, and the set of effects to go on from.
+fn prepare<'a>(
+    task: Task<'a>,
+    between_rows: Option<&'a Altered<'a>>,
+) -> Result<(Problem<'a>, Hypothesis), GapError> {
+    let Task { simulator, options, depth, progress, stop } = task;
+    let at_rows = Problem::prepare(simulator, stop, options.seed, progress)?;
+    let limits = (&options.thresholds, depth);
+    command_timing::likelier(at_rows, between_rows, limits, options.seed, progress)
+}
+
+/// What the search found, in the problem whose nuisances the record has.
+struct Searched<'a> {
+    problem: Problem<'a>,
+    found: Found,
+    /// The best set by backward elimination.
+    eliminated: Vec<(usize, Hypothesis)>,
+    /// Every set that was fitted.
+    tried: BTreeMap<Vec<usize>, Hypothesis>,
+}
+
+/// Searches, once more where the nuisances turn out to be others beside what was found.
+fn search<'a>(
+    task: Task<'a>,
+    problem: Problem<'a>,
+    from: &Hypothesis,
+) -> Result<Searched<'a>, GapError> {
+    let Task { options, depth, progress, .. } = task;
+    let mut search = Search::new(&problem, &options.thresholds, depth);
+    let best = search.best(from, progress)?;
+    progress("nuisances");
+    let other = re_estimated(&problem, &mut search.sets, &best, options.seed)?;
+    let rivalled = |mut search: Search<'_>, best| {
+        let found = search.rivalled(best, progress)?;
+        let eliminated = eliminated(&mut search.sets, &found.best)?;
+        Ok::<_, GapError>((found, eliminated, search.sets.tried))
+    };
+    let (problem, (found, eliminated, tried)) = match other {
+        Some((other, from)) => {
+            let mut search = Search::new(&other, &options.thresholds, depth);
+            let best = search.best(&from, progress)?;
+            let rest = rivalled(search, best)?;
+            (other, rest)
+        }
+        None => {
+            let rest = rivalled(search, best)?;
+            (problem, rest)
+        }
+    };
+    Ok(Searched { problem, found, eliminated, tried })
+}
+
+/// The errors of the record or of the rig file that stand above the best set of effects, and what was found with the first of them in its
+/// place: an error has one number and leaves noise. None where the effects stand.
+fn doubt(
+    task: Task<'_>,
+    searched: &Searched<'_>,
+    (doubted, suspect): (&Problem<'_>, &Suspect<'_>),
+) -> Result<Option<(Vec<Gross>, Found)>, GapError> {
+    let (thresholds, found) = (&task.options.thresholds, &searched.found);
+    (task.progress)("errors of the record");
+    if searched.problem.is_spent() {
+        return Ok(None);
+    }
+    let doubts = Doubts::of(doubted, suspect, thresholds)?;
+    let doubts = doubts.closer_if(doubted, suspect, found, thresholds)?;
+    Ok(weighed(doubted, suspect, doubts.errors, found, thresholds))
+}
+
+/// What the gap is put down to: the best set of effects, or an error.
+#[derive(Clone, Copy)]
+struct Cause<'p> {
+    problem: &'p Problem<'p>,
+    found: &'p Found,
+    eliminated: &'p [(usize, Hypothesis)],
+    /// What is wrong with the record or the rig file.
+    gross: &'p [Gross],
+}
+
+/// What the test trials say of a cause.
+struct Gathered {
+    evidence: Evidence,
+    weighed: Vec<Weighed>,
+    candidates: Vec<Candidate>,
+    shares: Vec<EffectShare>,
+    sanity: Sanity,
+    location: Where,
+}
+
+/// Gathers the evidence: from here on test trials are read.
+fn gather(task: Task<'_>, cause: Cause<'_>) -> Result<Gathered, GapError> {
+    let Cause { problem, found, eliminated, .. } = cause;
+    let (seed, thresholds) = (task.options.seed, &task.options.thresholds);
+    (task.progress)("test trials");
+    let (evidence, weighed) = Evidence::gather(problem, thresholds, found)?;
+    let candidates = candidates(problem, &evidence, &weighed, seed)?;
+    let shares = shares(problem, &evidence, &found.best, eliminated, thresholds.null_excess)?;
+    let sanity = Sanity::of(problem, &found.best, &evidence)?;
+    (task.progress)("where the gap sits");
+    let location = Where {
+        stages: stage_gaps(problem, &evidence),
+        slices: localise::slices(problem.simulator(), &evidence, |s| &s.residual_retuned, seed),
+        end_to_end: localise::end_to_end(&problem.compare.runs, &evidence)?,
+    };
+    Ok(Gathered { evidence, weighed, candidates, shares, sanity, location })
+}
+
+/// The verdict with its names.
+fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Result<Judged, GapError> {
+    let Gathered { evidence, candidates, shares, sanity, .. } = gathered;
+    let about = cause.problem.simulator().description();
+    let case = Case {
+        gap: evidence.gap,
+        candidates,
+        shares,
+        sanity,
+        is_record: !cause.gross.is_empty(),
+        too_little: too_little(&evidence.frame, about.rows_used(), about.dt_s),
+        is_short: is_short(&evidence.frame, about.dt_s),
+    };
+    let best = &cause.found.best;
+    let lacking = |names| Lacking::of(cause.problem, best, names, task.progress);
+    judge(&case, &task.options.thresholds, lacking)
+}
+
+/// The verdict in words and numbers.
+fn report(
+    task: Task<'_>,
+    searched: &Searched<'_>,
+    cause: Cause<'_>,
+    (gathered, judged): (Gathered, Judged),
+    begun: &Stopwatch,
+) -> Result<(Diagnosis, Evidence), GapError> {
+    let (options, thresholds) = (task.options, &task.options.thresholds);
+    let Gathered { mut evidence, weighed, candidates, shares, location, .. } = gathered;
+    let (simulator, runs) = (cause.problem.simulator(), &cause.problem.compare.runs);
+    let partial = candidates.first().filter(|_| judged.kind == VerdictKind::Partial);
+    let unexplained = partial.map(|first| unexplained(simulator, &evidence, first, options.seed));
+    let is_quiet = matches!(judged.kind, VerdictKind::NoGap | VerdictKind::Parameters);
+    let null_band = is_quiet.then(|| null_band(cause.problem, options.seed)).transpose()?;
+    let ambiguous = match is_quiet || judged.kind == VerdictKind::Record {
+        true => Vec::new(),
+        false => covering_set(&weighed, simulator),
+    };
     let (runtime_s, simulations) = (begun.elapsed_s(), runs.count());
-    let simpler = || baselines(searched, &search.sets.tried, thresholds.null_excess);
-    // Told.
+    // The probability of a candidate is that beside what the catalogue lacks.
+    let unknown = unknown(evidence.gap, thresholds);
+    let candidates = beside_unknown(candidates, evidence.gap, unknown);
     let answer = Answer {
-        verdict: &verdict,
-        naming: &naming,
+        judged: &judged,
+        gap: evidence.gap,
+        first: candidates.first(),
+        shares: &shares,
         unexplained: unexplained.as_ref(),
-        proposed: proposed.as_ref(),
-        gross: &gross,
+        gross: cause.gross,
         null_band,
     };
-    // What is told of a candidate is its probability beside what the catalogue lacks.
-    let unknown = unknown(evidence.gap, thresholds);
-    let beside = beside_unknown(candidates.clone(), evidence.gap, unknown);
-    let case = Case { first: beside.first(), ..case };
-    let mut told = tell(answer, case, simulator, &evidence, &shares);
+    let mut told = tell(answer, simulator, &evidence);
     let model_runs = runs.counted();
     told.notes.extend(model_runs.and_then(|runs| runs.note()));
     // What a page needs beside the answer counts as none of its cost.
     if let (true, Some(stage)) = (options.responses, location.worst()) {
-        evidence.responses = responses(problem, &evidence, &found.best, stage)?;
+        evidence.responses = responses(cause.problem, &evidence, &cause.found.best, stage)?;
     }
+    let simpler = || baselines(&searched.problem, &searched.tried, thresholds.null_excess);
     let diagnosis = Diagnosis {
         schema: 1,
-        verdict: verdict.kind,
+        verdict: judged.kind,
         sentence: told.sentence,
-        tied: naming.tied(),
-        named: naming.named,
-        faint: naming.faint,
+        tied: judged.naming.tied(),
+        named: judged.naming.named,
+        faint: judged.naming.faint,
         least_share: thresholds.least_share,
         unexplained,
-        proposed,
-        gross,
+        proposed: judged.proposed,
+        gross: cause.gross.to_vec(),
         ambiguous,
         shares,
         gap: evidence.gap,
         null_band,
         location,
         parameters: shifts(simulator, &evidence),
-        identifiability: searched.identified(),
-        transfer,
+        identifiability: searched.problem.identified(),
+        transfer: None,
         next_experiment: None,
         baselines: options.baselines.then(simpler).transpose()?,
         notes: told.notes,
-        rows_used,
+        rows_used: simulator.description().rows_used(),
         simulations,
         model_runs,
         runtime_s,
-        candidates: beside,
+        candidates,
     };
     Ok((diagnosis, evidence))
 }
@@ -241,13 +344,4 @@ fn unexplained(
     loud.sort_by(|a, b| b.excess.total_cmp(&a.excess));
     let sits = loud.iter().take(TOLD_SLICES).map(|s| format!("{}: {}", s.by, s.slice)).collect();
     Unexplained { share: 1.0 - first.closed, stage, sits }
-}
-
-/// Where the gap sits: by stage, by slices, and from end to end.
-fn locate(problem: &Problem<'_>, evidence: &Evidence, seed: u64) -> Result<Where, GapError> {
-    Ok(Where {
-        stages: stage_gaps(problem, evidence),
-        slices: localise::slices(problem.simulator(), evidence, |s| &s.residual_retuned, seed),
-        end_to_end: localise::end_to_end(&problem.compare.runs, evidence)?,
-    })
 }

@@ -25,14 +25,14 @@ pub use evidence::{
     localise::location::{SliceGap, StageGap, StageShare, Where},
     response::{Answered, Response, Responses},
     shares::EffectShare,
-    transfer::{Transfer, TransferError},
 };
 pub use fit::identifiability::{Identified, Knowledge};
 pub use missing::{Factor, Passage, Proposed, ProposedTerm, RateForm, SignalScale, Term};
 pub use numerics::random::Dice;
 pub use problem::{
+    checks::DescriptionError,
     column::{Column, Distortion},
-    description::{Description, DescriptionError, DescriptionSpec},
+    description::{Description, DescriptionSpec},
     error::GapError,
     frame::{BLOCK_S, Frame, Role, Segment},
     noise::{Noise, WINDOW, noise_variance},
@@ -50,6 +50,6 @@ pub use record::{
 pub use search::baselines::Baselines;
 pub use stretch_effects::EffectParameter;
 pub use verdict::{
-    diagnosis::{Diagnosis, NextExperiment, Unexplained, VerdictKind},
+    diagnosis::{Diagnosis, NextExperiment, Transfer, TransferError, Unexplained, VerdictKind},
     next_experiment::{Laboratory, Plan, Proposal, differences, next_experiment},
 };

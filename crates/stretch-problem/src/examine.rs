@@ -1,6 +1,6 @@
 //! The one flow: a problem is diagnosed, and everything that follows from the diagnosis is made.
 
-use std::fmt;
+use std::{fmt, sync::atomic::AtomicUsize};
 
 use serde_json::{Value, json};
 use stretch_data::Trial;
@@ -12,6 +12,7 @@ use crate::{
     fix::{Fix, Fixed, NoFix},
     implement::Implementation,
     problem::Problem,
+    transfer::transfer,
 };
 
 /// A diagnosis, what it was found from, and what follows from it.
@@ -82,6 +83,13 @@ impl Problem {
             None => progress(what),
         };
         let (mut diagnosis, evidence) = diagnose(self.simulator(), options, &told, stop)?;
+        if !diagnosis.named.is_empty() {
+            told("what the gap costs a calibration");
+            let simulations = AtomicUsize::new(0);
+            let asked = (options.seed, &simulations);
+            diagnosis.transfer = transfer(self.simulator(), &evidence, asked)?;
+            diagnosis.simulations += simulations.into_inner();
+        }
         let mut proposal = None;
         if diagnosis.ambiguous.len() > 1 && looks_on {
             told("the next experiment");

@@ -12,6 +12,7 @@ mod implement;
 mod init;
 mod problem;
 mod rig;
+mod transfer;
 pub mod worker;
 mod wrap;
 

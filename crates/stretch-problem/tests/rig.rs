@@ -7,7 +7,7 @@ use crate::support::session::session;
 use approx::{abs_diff_eq, assert_abs_diff_eq, assert_relative_eq};
 use stretch_data::{RigFile, SessionTrial, Split};
 use stretch_gap::{Diagnosis, Evidence, Options, Run, Simulator, VerdictKind, diagnose};
-use stretch_problem::{RigSession, RigSetup, RigSimulator};
+use stretch_problem::{Bench, RigSession, RigSetup, RigSimulator};
 use stretch_sim::{Catalogue, EffectSet, Rig, RigParams, SimError, default_rig_text};
 use testkit::tolerance::{FLOW_FOUND, GAP_NULL, LAG_FOUND, POLE_FOUND_S, TRAINED_AGAIN, TURNED};
 
@@ -21,6 +21,14 @@ fn run(trials: Vec<SessionTrial>, without: &[&str], options: &Options) -> Diagno
     let catalogue = Catalogue::default().without(without).expect("known names");
     let simulator = RigSimulator::new(setup(&trials, &catalogue)).expect("a simulator");
     diagnose(&simulator, options, &|_| (), &|| false).expect("a diagnosis").0
+}
+
+/// A diagnosis with everything that comes of asking for it.
+fn examined(trials: Vec<SessionTrial>) -> Diagnosis {
+    let catalogue = Catalogue::default();
+    let rig = RigSimulator::new(setup(&trials, &catalogue)).expect("a simulator");
+    let options = Options { baselines: true, ..shallow() };
+    Bench::from(rig).examine(&options, false, &|_| (), &|| false).expect("a diagnosis").diagnosis
 }
 
 fn run_of(simulator: &dyn Simulator) -> Evidence {
@@ -121,7 +129,7 @@ fn a_calibration_trained_with_the_effect_is_as_good_as_one_trained_on_the_rig() 
     let effects = effect("gauge_relaxation", &[("c", 0.3), ("tau", 0.1)]);
     for pressure in [true, false] {
         let trials = session(&own_rig(), &effects, pressure, 7);
-        let diagnosis = run(trials, &[], &Options { baselines: true, ..shallow() });
+        let diagnosis = examined(trials);
         assert_eq!(diagnosis.named, ["gauge_relaxation"], "{}", diagnosis.sentence);
         let transfer = diagnosis.transfer.expect("a gauge has a calibration");
         let poly13 = transfer.poly13;
@@ -139,7 +147,7 @@ fn a_calibration_trained_with_the_effect_is_as_good_as_one_trained_on_the_rig() 
 #[test]
 fn simpler_methods_blame_an_effect_for_parameters_that_are_off() {
     let trials = session(&own_rig(), &EffectSet::new(), true, 8);
-    let diagnosis = run(trials, &[], &Options { baselines: true, ..shallow() });
+    let diagnosis = examined(trials);
     assert!(diagnosis.named.is_empty() && diagnosis.transfer.is_none());
     // The parameters are off by their tolerances and nothing else is wrong.
     let said = diagnosis.baselines.expect("asked for");

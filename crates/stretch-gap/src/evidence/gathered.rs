@@ -58,6 +58,8 @@ pub struct Evidence {
     pub retuned: Model,
     /// Best set of effects, whether the verdict names it or not.
     pub best: Model,
+    /// Multiple of the simulator's usual step of integration that every run took.
+    pub step: f64,
     /// Fitted model of every candidate, in the order of the diagnosis.
     pub candidates: Vec<Model>,
     /// One standard deviation of every nominal parameter of the re-tuned nominal, 0 where it is exact.
@@ -175,6 +177,7 @@ impl Evidence {
         let evidence = Self {
             stages,
             frame: problem.compare.frame.clone(),
+            step: problem.compare.runs.step(),
             retuned: problem.nominal.model.clone(),
             best: found.best.model.clone(),
             candidates: weighed.iter().map(|w| w.hypothesis.model.clone()).collect(),

@@ -3,7 +3,7 @@
 //! In: a prepared problem and what the search found. Out: [`gathered::Evidence`], the traces and residuals of every stage; the
 //! [`candidates`] with probabilities ([`probability`]) and intervals ([`bootstrap`]); what each effect closes ([`shares`]); whether
 //! it is the right simulator at all ([`sanity`]); what noise alone leaves ([`null_band`]); where the gap sits ([`localise`]);
-//! what the gap costs a calibration ([`transfer`]); and how the output answers to each number ([`responses`]).
+//! and how the output answers to each number ([`responses`]).
 //! Imports: `numerics`, `problem`, `fit`, `search`.
 
 pub(crate) mod bootstrap;
@@ -17,4 +17,3 @@ pub(crate) mod response;
 pub(crate) mod responses;
 pub(crate) mod sanity;
 pub(crate) mod shares;
-pub(crate) mod transfer;

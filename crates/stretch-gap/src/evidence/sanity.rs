@@ -2,10 +2,10 @@
 //!
 //! Two signs that data come from something else than the simulator is of:
 //!
-//! * *foreign*: more of a channel's variance is left on the test trials than a missing effect leaves
+//! * *gross misfit*: more of a channel's variance is left on the test trials than a missing effect leaves
 //!   ([`RecordFacts::gross_misfit_share`](crate::RecordFacts::gross_misfit_share)): another rig, or a column that is not what its name says. The share is that of
 //!   1 - R^2, noise taken off: (sum (y - y_sim)^2 - N floor^2)/sum (y - mean y)^2;
-//! * *strained*: two parameters of a stage stand at the end of their tolerances and more than noise is left all the same. If the
+//! * *at bounds*: two parameters of a stage stand at the end of their tolerances and more than noise is left all the same. If the
 //!   same two, set loose, explain as much without any effect, what bends them is no effect but other parameters.
 
 use crate::{
@@ -34,13 +34,13 @@ pub(crate) struct Sanity {
     pub(crate) left: Vec<f64>,
     /// Share that may be left before names of effects mean nothing.
     pub(crate) allowed: f64,
-    /// The stage whose parameters are strained most, if any.
-    pub(crate) strained: Option<Strained>,
+    /// The stage with parameters at their bounds that leaves most, if any.
+    pub(crate) at_bounds: Option<AtBounds>,
 }
 
 /// A stage with two or more parameters at the end of their tolerances.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Strained {
+pub(crate) struct AtBounds {
     pub(crate) stage: usize,
     /// These parameters.
     pub(crate) ended: Vec<usize>,
@@ -62,7 +62,7 @@ impl Sanity {
         Ok(Self {
             left: left.collect(),
             allowed: simulator.record().gross_misfit_share,
-            strained: strained(problem, best, evidence)?,
+            at_bounds: at_bounds(problem, best, evidence)?,
         })
     }
 }
@@ -86,11 +86,11 @@ fn left(simulator: &dyn Simulator, evidence: &Evidence, stage: usize) -> f64 {
     (left - noise) / variance.max(noise).max(f64::MIN_POSITIVE)
 }
 
-fn strained(
+fn at_bounds(
     problem: &Problem<'_>,
     best: &Hypothesis,
     evidence: &Evidence,
-) -> Result<Option<Strained>, GapError> {
+) -> Result<Option<AtBounds>, GapError> {
     let simulator = problem.simulator();
     let at_end = |index: &usize| {
         let spec = &simulator.parameters()[*index];
@@ -101,9 +101,9 @@ fn strained(
         .filter(|(_, (_, traces))| traces.excess_after > LEFT)
         .map(|(stage, (spec, traces))| {
             let ended: Vec<usize> = spec.parameters.iter().copied().filter(at_end).collect();
-            Strained { stage, ended, left: traces.excess_after, rivals: None }
+            AtBounds { stage, ended, left: traces.excess_after, rivals: None }
         })
-        .filter(|strained| strained.ended.len() >= 2)
+        .filter(|found| found.ended.len() >= 2)
         .max_by(|a, b| a.left.total_cmp(&b.left));
     let Some(worst) = worst else { return Ok(None) };
     let rivals = match best.effects.is_empty() {
@@ -113,7 +113,7 @@ fn strained(
             Some((problem.gap_in(best, worst.stage), loose))
         }
     };
-    Ok(Some(Strained { rivals, ..worst }))
+    Ok(Some(AtBounds { rivals, ..worst }))
 }
 
 /// Excess of a stage without effects, some of its parameters set loose.

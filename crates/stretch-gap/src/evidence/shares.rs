@@ -34,7 +34,7 @@ pub struct EffectShare {
 }
 
 /// The best set with its effects taken out one after the other, the weakest first: the effect, and what is left without it.
-pub(crate) fn peeled(
+pub(crate) fn eliminated(
     sets: &mut Sets<'_>,
     best: &Hypothesis,
 ) -> Result<Vec<(usize, Hypothesis)>, GapError> {
@@ -60,7 +60,7 @@ pub(crate) fn shares(
     problem: &Problem<'_>,
     evidence: &Evidence,
     best: &Hypothesis,
-    peeled: &[(usize, Hypothesis)],
+    eliminated: &[(usize, Hypothesis)],
     least_gap: f64,
 ) -> Result<Vec<EffectShare>, GapError> {
     // Floors are known to some per cent: what the best set leaves is the noise where it is less than they say.
@@ -72,7 +72,7 @@ pub(crate) fn shares(
     let whole = nominal.iter().sum::<f64>().max(f64::MIN_POSITIVE);
     let mut with: Vec<f64> = evidence.stages.iter().map(|s| s.excess_after.max(0.0)).collect();
     let mut out = Vec::new();
-    for (effect, less) in peeled {
+    for (effect, less) in eliminated {
         let stages = 0..nominal.len();
         let without: Vec<f64> = match less.effects.is_empty() {
             // The nominal was run already.

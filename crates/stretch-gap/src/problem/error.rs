@@ -1,6 +1,6 @@
 //! Why a diagnosis was refused.
 
-use crate::problem::description::DescriptionError;
+use crate::problem::checks::DescriptionError;
 
 /// Why a diagnosis was refused; carries the evidence.
 #[derive(Debug, thiserror::Error)]

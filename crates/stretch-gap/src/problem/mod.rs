@@ -9,6 +9,7 @@
 //! Imports: `numerics` alone.
 
 pub(crate) mod altered_parameters;
+pub(crate) mod checks;
 pub(crate) mod column;
 pub(crate) mod description;
 pub(crate) mod error;

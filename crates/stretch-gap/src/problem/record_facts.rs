@@ -1,8 +1,8 @@
 //! What is known of a record beside stages, parameters, effects and trials.
 
 use crate::problem::{
+    checks::{DescriptionError, check_parameter, indices, number},
     column::Column,
-    description::{DescriptionError, DescriptionSpec, check_parameter, indices, number},
     rows_used::RowsUsed,
     spec::ParameterSpec,
 };
@@ -65,7 +65,7 @@ impl MotionSpec {
     }
 }
 
-/// What is known of a record beside what a [`DescriptionSpec`] says; by default no more.
+/// What is known of a record beside what a [`DescriptionSpec`](crate::DescriptionSpec) says; by default no more.
 ///
 /// [`Description::with_record`](crate::Description::with_record) checks it. All that has a value for each sample counts the samples of
 /// all trials end to end.
@@ -138,11 +138,14 @@ impl RecordFacts {
         Some(&own.1)
     }
 
-    /// Whether it fits the description that it stands beside.
-    pub(crate) fn check(&self, spec: &DescriptionSpec) -> Result<(), DescriptionError> {
+    /// Whether the facts fit so many stages, parameters, and samples of all trials.
+    pub(crate) fn check(
+        &self,
+        stages: usize,
+        parameters: usize,
+        samples: usize,
+    ) -> Result<(), DescriptionError> {
         let owner = || "record".to_owned();
-        let (stages, parameters) = (spec.stages.len(), spec.parameters.len());
-        let samples: usize = spec.trials.iter().map(|t| t.samples).sum();
         let whole = |what, found: usize| {
             number(&owner, what, found as f64, "that of the samples", |_| found == samples)
         };

@@ -74,6 +74,11 @@ impl<'a> Runs<'a> {
         self.simulator.costly().map(|costly| ModelRuns { is_spent, ..costly.model_runs() })
     }
 
+    /// Multiple of the usual step of integration of every run.
+    pub(crate) fn step(&self) -> f64 {
+        self.step
+    }
+
     pub(crate) fn stop(&self) -> &'a (dyn Fn() -> bool + Sync) {
         self.stop
     }

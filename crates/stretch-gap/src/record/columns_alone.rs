@@ -37,7 +37,7 @@ const MOVES: f64 = 0.3;
 const CHANCE: f64 = -20.7;
 
 /// Everything that is wrong with the columns of a session; empty, as a rule.
-pub(crate) fn plain(columns: &[Column<'_>], trials: &[TrialSpec], dt_s: f64) -> Vec<Gross> {
+pub(crate) fn columns_alone(columns: &[Column<'_>], trials: &[TrialSpec], dt_s: f64) -> Vec<Gross> {
     let own: Vec<&Column<'_>> = columns.iter().filter(|c| !c.values.is_empty()).collect();
     let mut out = Vec::new();
     for (i, a) in own.iter().enumerate() {

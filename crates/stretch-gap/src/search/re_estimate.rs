@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// The problem with the nuisances that the record has, and the set to go on from; none where they are as described.
-pub(crate) fn settled<'a>(
+pub(crate) fn re_estimated<'a>(
     problem: &Problem<'a>,
     sets: &mut Sets<'_>,
     best: &Hypothesis,

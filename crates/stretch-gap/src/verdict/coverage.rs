@@ -11,41 +11,25 @@ use crate::{
         frame::{Frame, Role},
         rows_used::RowsUsed,
     },
-    verdict::{
-        diagnosis::VerdictKind,
-        judge::{Overruled, Verdict},
-        too_little::{LEAST_FIT_S, LEAST_SHARE, LEAST_TEST_S, Thin},
-    },
+    verdict::too_little::{LEAST_FIT_S, LEAST_SHARE, LEAST_TEST_S, TooLittle},
 };
 
 /// Fitted records shorter than this, s, part no lags.
 const SHORT_S: f64 = 60.0;
 
 /// Why the record carries no name, if it does not.
-pub(crate) fn thin(frame: &Frame, rows: RowsUsed, dt_s: f64) -> Option<Thin> {
+pub(crate) fn too_little(frame: &Frame, rows: RowsUsed, dt_s: f64) -> Option<TooLittle> {
     if rows.share() < LEAST_SHARE {
-        return Some(Thin::Rows(rows));
+        return Some(TooLittle::Rows(rows));
     }
     let seconds = |role| frame.count(role) as f64 * dt_s;
     let (fit_s, test_s) = (seconds(Role::Fit) + seconds(Role::Held), seconds(Role::Test));
-    (fit_s < LEAST_FIT_S || test_s < LEAST_TEST_S).then_some(Thin::Short { fit_s, test_s })
+    (fit_s < LEAST_FIT_S || test_s < LEAST_TEST_S).then_some(TooLittle::Short { fit_s, test_s })
 }
 
 /// Whether so little was fitted that what closes as much is a tie.
 pub(crate) fn is_short(frame: &Frame, dt_s: f64) -> bool {
     (frame.count(Role::Fit) + frame.count(Role::Held)) as f64 * dt_s < SHORT_S
-}
-
-/// The verdict without names where the record carries none.
-pub(crate) fn carried(verdict: Verdict, thin: Option<Thin>) -> Verdict {
-    match thin.filter(|_| verdict.names()) {
-        None => verdict,
-        Some(thin) => Verdict {
-            kind: VerdictKind::Unknown,
-            seen: verdict.seen,
-            overruled: Some(Overruled::Thin(thin)),
-        },
-    }
 }
 
 #[cfg(test)]
@@ -66,17 +50,11 @@ mod tests {
     #[test]
     fn names_need_rows_and_seconds() {
         let all = RowsUsed { used: 4000, read: 4000 };
-        assert_eq!(thin(&frame(3000, 1000), all, 0.01), None);
+        assert_eq!(too_little(&frame(3000, 1000), all, 0.01), None);
         let few = RowsUsed { used: 4000, read: 30_000 };
-        assert_eq!(thin(&frame(3000, 1000), few, 0.01), Some(Thin::Rows(few)));
-        let short = thin(&frame(375, 125), RowsUsed { used: 500, read: 500 }, 0.01);
-        assert_eq!(short, Some(Thin::Short { fit_s: 3.75, test_s: 1.25 }));
-        let effect =
-            Verdict { kind: VerdictKind::Effect, seen: VerdictKind::Effect, overruled: None };
-        assert_eq!(carried(effect.clone(), None), effect);
-        assert_eq!(carried(effect.clone(), short).kind, VerdictKind::Unknown);
-        let null = Verdict { kind: VerdictKind::NoGap, ..effect };
-        assert_eq!(carried(null.clone(), short), null);
-        assert!(short.is_some_and(|thin| thin.words().contains("Record at least 10 s")));
+        assert_eq!(too_little(&frame(3000, 1000), few, 0.01), Some(TooLittle::Rows(few)));
+        let short = too_little(&frame(375, 125), RowsUsed { used: 500, read: 500 }, 0.01);
+        assert_eq!(short, Some(TooLittle::Short { fit_s: 3.75, test_s: 1.25 }));
+        assert!(short.is_some_and(|why| why.words().contains("Record at least 10 s")));
     }
 }

@@ -8,7 +8,6 @@ use crate::{
         excess::Excess,
         localise::location::Where,
         shares::EffectShare,
-        transfer::Transfer,
     },
     fit::identifiability::Identified,
     missing::Proposed,
@@ -44,6 +43,28 @@ pub struct Unexplained {
     pub stage: String,
     /// Slices of that stage where it stands out, the loudest first.
     pub sits: Vec<String>,
+}
+
+/// What the gap costs a user.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Transfer {
+    /// Straight line.
+    pub linear: TransferError,
+    /// Surface poly13.
+    pub poly13: TransferError,
+    /// `percent_full_scale`.
+    pub unit: String,
+}
+
+/// Error of a calibration trained in one place and applied to measured trials.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TransferError {
+    /// Trained on measured trials.
+    pub real: f64,
+    /// Trained in the re-tuned nominal simulator.
+    pub sim: f64,
+    /// Trained in the simulator with the named effects.
+    pub sim_with_effect: f64,
 }
 
 /// The experiment that would tell rivals apart.

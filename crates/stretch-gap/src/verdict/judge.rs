@@ -1,102 +1,137 @@
-//! The verdict: one pure function of the evidence and the thresholds.
+//! The verdict: one function of the evidence and the thresholds, which asks for what the catalogue lacks where a gap is left.
 //!
 //! | in order | holds when | verdict |
 //! | --- | --- | --- |
 //! | record | a column alone says so, or an error of record or rig file stands above every set of effects | `record` |
-//! | foreign | a channel's variance left exceeds what a missing effect leaves | `unknown` |
-//! | strained | parameters at their ends explain as much as the effects do | `unknown` |
+//! | gross misfit | a channel's variance left exceeds what a missing effect leaves | `unknown` |
+//! | at bounds | parameters at their ends explain as much as the effects do | `unknown` |
+//! | too little | there would be a name, and the record is too short or too full of gaps to carry one | `unknown` |
 //! | effect | confirmed on the test trials, and g_left <= u + v g_retuned | `effect` |
 //! | mostly | the same but for what is left, and the strongest effect alone closes the share m of the held-out gap, off its bounds | `partial` |
 //! | unexplained | g_retuned > n, and g_left > u + v g_retuned, all of g_retuned being left by what is not confirmed | `unknown` |
 //! | parameters | g_raw > n | `parameters` |
 //! | else | | `no_gap` |
 //!
-//! with gaps g in floors, n = `null_excess`, u = `unknown_excess`, v = `unknown_share` and m = `partial_share`: mismatch of form may leave a
-//! share of the gap in a rig that has the named effect. A set that closes its part by halves stands in for something else. The first two overrule what the others say; that is kept as `seen`.
+//! with gaps g in variances of the noise, n = `null_excess`, u = `unknown_excess`, v = `unknown_share` and m = `partial_share`: a model
+//! discrepancy may leave a share of the gap in a rig that has the named effect. The rows `gross misfit` to `too little` overrule the rows below
+//! them, whose verdict is kept as `seen`. Three things turn an answer with names, or without one, into another:
+//!
+//! * a set whose sizes all stand at an end of their ranges stands in for something else: `unknown`;
+//! * names that a sum of terms outside the catalogue beats stand for nothing: `unknown`;
+//! * an unknown rest that is small, and random in time or no larger than what noise of a measured input makes, is noise: `parameters`.
 
 use crate::{
     evidence::{
         candidates::Candidate,
         excess::Excess,
-        sanity::{Sanity, Strained},
+        sanity::{AtBounds, Sanity},
         shares::EffectShare,
     },
-    problem::thresholds::Thresholds,
-    verdict::{diagnosis::VerdictKind, too_little::Thin},
+    missing::Proposed,
+    problem::{error::GapError, thresholds::Thresholds},
+    verdict::{diagnosis::VerdictKind, naming::Naming, proposal::Lacking, too_little::TooLittle},
 };
+
+/// Noise is known to a factor of two of its variance: what is left below that may be noise.
+const NOISE: f64 = 1.0;
 
 /// What the verdict is a function of.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Case<'a> {
     pub(crate) gap: Excess,
-    /// The most probable candidate; it has no effects where none was worth it.
-    pub(crate) first: Option<&'a Candidate>,
-    /// What the strongest effect of the best set does, if there is one.
-    pub(crate) strongest: Option<&'a EffectShare>,
+    /// The most probable first; it has no effects where none met the acceptance criterion.
+    pub(crate) candidates: &'a [Candidate],
+    /// What each effect of the best set does, the strongest first.
+    pub(crate) shares: &'a [EffectShare],
     pub(crate) sanity: &'a Sanity,
     /// Whether an error of the record or of the rig file stands above all effects.
     pub(crate) is_record: bool,
+    /// Why the record carries no name, if it does not.
+    pub(crate) too_little: Option<TooLittle>,
+    /// Whether so little was fitted that what closes as much is a tie.
+    pub(crate) is_short: bool,
 }
 
-/// The verdict.
+/// The verdict with its names.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Verdict {
+pub(crate) struct Judged {
     pub(crate) kind: VerdictKind,
-    /// What it would be in the right simulator.
+    /// What the verdict would be if nothing overruled it.
     pub(crate) seen: VerdictKind,
-    /// Why it is the wrong one.
+    /// Why the evidence carries no other verdict.
     pub(crate) overruled: Option<Overruled>,
+    pub(crate) naming: Naming,
+    /// What the catalogue lacks, where a gap is left.
+    pub(crate) proposed: Option<Proposed>,
 }
 
-impl Verdict {
-    /// Whether it says which effects are missing.
-    pub(crate) fn names(&self) -> bool {
-        matches!(self.kind, VerdictKind::Effect | VerdictKind::Partial)
-    }
-
-    /// The same where no name is left: what was found stands in for something else.
-    pub(crate) fn nameless(self) -> Self {
-        let without = |kind| match kind {
-            VerdictKind::Effect | VerdictKind::Partial => VerdictKind::Unknown,
-            kind => kind,
-        };
-        Self { kind: without(self.kind), seen: without(self.seen), overruled: self.overruled }
-    }
-}
-
-/// Why the data cannot come from the simulator.
+/// Why the data cannot come from the simulator, or cannot say so.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Overruled {
-    /// Most of a channel is not in it.
-    Foreign { stage: usize, share: f64 },
-    /// Its parameters do not fit.
-    Strained(Strained),
+    /// Most of a channel is not in the simulator.
+    GrossMisfit { stage: usize, share: f64 },
+    /// The parameters of a stage do not fit within their tolerances.
+    AtBounds(AtBounds),
     /// The record carries no name.
-    Thin(Thin),
+    TooLittle(TooLittle),
 }
 
-/// Judges.
-pub(crate) fn judge(case: Case<'_>, thresholds: &Thresholds) -> Verdict {
+/// Judges. `lacking` looks for what the catalogue lacks: instead of names, and, asked with `true`, beside them too.
+pub(crate) fn judge(
+    case: &Case<'_>,
+    thresholds: &Thresholds,
+    lacking: impl FnOnce(bool) -> Result<Lacking, GapError>,
+) -> Result<Judged, GapError> {
+    use VerdictKind::{Effect, Parameters, Partial, Record, Unknown};
+    let nameless = |kind, overruled, proposed| {
+        let naming = Naming::default();
+        Judged { kind, seen: kind, overruled, naming, proposed }
+    };
     if case.is_record {
-        let kind = VerdictKind::Record;
-        return Verdict { kind, seen: kind, overruled: None };
+        return Ok(nameless(Record, None, None));
     }
     let seen = seen(case, thresholds);
-    let overruled = foreign(case).or_else(|| strained(case));
-    let kind = if overruled.is_some() { VerdictKind::Unknown } else { seen };
-    Verdict { kind, seen, overruled }
+    let would_name = matches!(seen, Effect | Partial);
+    let too_little = case.too_little.filter(|_| would_name).map(Overruled::TooLittle);
+    let overruled = gross_misfit(case).or_else(|| at_bounds(case)).or(too_little);
+    let naming = match would_name && overruled.is_none() {
+        true => Naming::of(case.candidates, case.shares, thresholds, case.is_short),
+        false => Naming::default(),
+    };
+    let seen = if would_name && naming.named.is_empty() { Unknown } else { seen };
+    let kind = if overruled.is_some() { Unknown } else { seen };
+    let mut judged = Judged { kind, seen, overruled, naming, proposed: None };
+    if !matches!(kind, Partial | Unknown) {
+        return Ok(judged);
+    }
+    let lacking = lacking(kind == Partial)?;
+    if kind == Partial {
+        return Ok(match lacking.beats_names {
+            true => nameless(Unknown, None, lacking.instead),
+            false => Judged { proposed: lacking.beside, ..judged },
+        });
+    }
+    if case.gap.left < NOISE && lacking.is_like_noise && judged.overruled.is_none() {
+        (judged.kind, judged.seen) = (Parameters, Parameters);
+    } else {
+        judged.proposed = lacking.instead;
+    }
+    Ok(judged)
 }
 
-fn seen(case: Case<'_>, thresholds: &Thresholds) -> VerdictKind {
+/// The verdict of the rows from `effect` on.
+fn seen(case: &Case<'_>, thresholds: &Thresholds) -> VerdictKind {
     let Excess { raw, retuned, left } = case.gap;
     let left_allowed = thresholds.unknown_excess + thresholds.unknown_share * retuned;
-    let is_confirmed =
-        case.first.is_some_and(|c| !c.effects.is_empty() && c.is_confirmed && c.closed > 0.0);
+    let is_confirmed = case
+        .candidates
+        .first()
+        .is_some_and(|c| !c.effects.is_empty() && c.is_confirmed && c.closed > 0.0);
     // What is not confirmed explains nothing.
     let unexplained = if is_confirmed { left } else { retuned };
     if is_confirmed && left <= left_allowed {
         VerdictKind::Effect
-    } else if is_confirmed && case.strongest.is_some_and(|s| is_mostly(s, thresholds)) {
+    } else if is_confirmed && case.shares.first().is_some_and(|s| is_mostly(s, thresholds)) {
         VerdictKind::Partial
     } else if retuned > thresholds.null_excess && unexplained > left_allowed {
         VerdictKind::Unknown
@@ -112,27 +147,30 @@ fn is_mostly(strongest: &EffectShare, thresholds: &Thresholds) -> bool {
 }
 
 /// The channel that the simulator has least to do with, if any.
-fn foreign(case: Case<'_>) -> Option<Overruled> {
+fn gross_misfit(case: &Case<'_>) -> Option<Overruled> {
     let mut worst: Option<(usize, f64)> = None;
     for (stage, &share) in case.sanity.left.iter().enumerate() {
         if share > case.sanity.allowed && worst.is_none_or(|w| share > w.1) {
             worst = Some((stage, share));
         }
     }
-    worst.map(|(stage, share)| Overruled::Foreign { stage, share })
+    worst.map(|(stage, share)| Overruled::GrossMisfit { stage, share })
 }
 
-fn strained(case: Case<'_>) -> Option<Overruled> {
-    let strained = case.sanity.strained.as_ref()?;
+fn at_bounds(case: &Case<'_>) -> Option<Overruled> {
+    let found = case.sanity.at_bounds.as_ref()?;
     // The effects stand where they explain more than loose parameters would.
-    let is_effect = strained.rivals.is_some_and(|(effects, loose)| loose > effects);
-    (!is_effect).then(|| Overruled::Strained(strained.clone()))
+    let is_effect = found.rivals.is_some_and(|(effects, loose)| loose > effects);
+    (!is_effect).then(|| Overruled::AtBounds(found.clone()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use VerdictKind::{Effect, NoGap, Parameters, Partial, Record, Unknown};
     use std::collections::BTreeMap;
+
+    const SOUND: Sanity = Sanity { left: Vec::new(), allowed: 0.1, at_bounds: None };
 
     fn candidate(effects: &[&str], is_confirmed: bool) -> Candidate {
         Candidate {
@@ -149,74 +187,110 @@ mod tests {
         }
     }
 
-    fn gap(raw: f64, retuned: f64, left: f64) -> Excess {
-        Excess { raw, retuned, left }
+    fn share(closes: f64, at_bound: bool) -> EffectShare {
+        EffectShare { effect: "play".into(), closes, closes_of_stage: closes, at_bound }
     }
 
-    /// Every row of the module's table.
+    fn case<'a>(gap: [f64; 3], candidates: &'a [Candidate], shares: &'a [EffectShare]) -> Case<'a> {
+        let [raw, retuned, left] = gap;
+        let gap = Excess { raw, retuned, left };
+        let (is_record, too_little, is_short) = (false, None, false);
+        Case { gap, candidates, shares, sanity: &SOUND, is_record, too_little, is_short }
+    }
+
+    /// Judged where nothing can be proposed.
+    fn judged(case: &Case<'_>) -> Judged {
+        judge(case, &Thresholds::frozen(), |_| Ok(Lacking::default())).unwrap()
+    }
+
+    /// Every row of the module's table from `effect` on.
     #[test]
     fn each_row_has_its_verdict() {
-        use VerdictKind::{Effect, NoGap, Parameters, Partial, Unknown};
-        let (sound, named) =
-            (Sanity { left: vec![0.0], allowed: 0.1, strained: None }, candidate(&["play"], true));
-        let (chance, none) = (candidate(&["play"], false), candidate(&[], true));
-        let cases = [
-            (gap(20.0, 10.0, 0.1), &named, Effect),
-            (gap(20.0, 10.0, 5.0), &named, Unknown),
-            (gap(20.0, 10.0, 10.0), &none, Unknown),
-            (gap(20.0, 0.01, 0.01), &none, Parameters),
-            (gap(0.01, 0.01, 0.01), &none, NoGap),
-            (gap(20.0, 10.0, 0.1), &chance, Unknown),
+        let named = [candidate(&["play"], true)];
+        let (chance, none) = ([candidate(&["play"], false)], [candidate(&[], true)]);
+        for (gap, candidates, expected) in [
+            ([20.0, 10.0, 0.1], &named, Effect),
+            ([20.0, 10.0, 5.0], &named, Unknown),
+            ([20.0, 10.0, 10.0], &none, Unknown),
+            ([20.0, 0.01, 0.01], &none, Parameters),
+            ([0.01, 0.01, 0.01], &none, NoGap),
+            ([20.0, 10.0, 0.1], &chance, Unknown),
             // A small gap that falls on no test trial is nobody's.
-            (gap(0.01, 0.1, 0.05), &chance, NoGap),
-        ];
-        for (gap, first, expected) in cases {
-            let case =
-                Case { gap, first: Some(first), strongest: None, sanity: &sound, is_record: false };
-            let verdict = judge(case, &Thresholds::frozen());
+            ([0.01, 0.1, 0.05], &chance, NoGap),
+        ] {
+            let verdict = judged(&case(gap, candidates, &[]));
             assert_eq!((verdict.kind, verdict.seen), (expected, expected), "{gap:?}");
+            assert_eq!(verdict.naming.named.is_empty(), expected != Effect);
         }
-        let share = |closes, at_bound| EffectShare {
-            effect: "play".into(),
-            closes,
-            closes_of_stage: closes,
-            at_bound,
-        };
         for (strongest, expected) in [
             (share(0.7, false), Partial),
             (share(0.7, true), Unknown),
             (share(0.4, false), Unknown),
         ] {
-            let gap = gap(20.0, 10.0, 3.0);
-            let case = Case {
-                gap,
-                first: Some(&named),
-                strongest: Some(&strongest),
-                sanity: &sound,
-                is_record: false,
-            };
-            assert_eq!(judge(case, &Thresholds::frozen()).kind, expected, "{strongest:?}");
+            let shares = [strongest];
+            let verdict = judged(&case([20.0, 10.0, 3.0], &named, &shares));
+            assert_eq!(verdict.kind, expected, "{shares:?}");
         }
+        // A set that stands at its bounds is found, and named nowhere.
+        let (bound, gap) = ([share(0.9, true)], [20.0, 10.0, 0.1]);
+        let verdict = judged(&case(gap, &named, &bound));
+        assert_eq!((verdict.kind, verdict.seen), (Unknown, Unknown));
+        assert_eq!((verdict.naming.named.len(), verdict.naming.faint), (0, vec!["play".into()]));
     }
 
     #[test]
-    fn the_wrong_simulator_overrules_a_name() {
-        let first = candidate(&["play"], true);
-        let strained = |rivals| Some(Strained { stage: 0, ended: vec![0, 1], left: 3.0, rivals });
-        let judged = |left: f64, strained, is_record| {
-            let sanity = Sanity { left: vec![0.0, left], allowed: 0.1, strained };
-            let (gap, first) = (gap(20.0, 10.0, 0.1), Some(&first));
-            let case = Case { gap, first, strongest: None, sanity: &sanity, is_record };
-            judge(case, &Thresholds::frozen())
+    fn the_wrong_simulator_and_a_short_record_overrule_a_name() {
+        let named = [candidate(&["play"], true)];
+        let at_bounds = |rivals| Some(AtBounds { stage: 0, ended: vec![0, 1], left: 3.0, rivals });
+        let of = |left: f64, at_bounds, is_record, too_little| {
+            let sanity = Sanity { left: vec![0.0, left], allowed: 0.1, at_bounds };
+            let case = case([20.0, 10.0, 0.1], &named, &[]);
+            judged(&Case { sanity: &sanity, is_record, too_little, ..case })
         };
-        let error = judged(0.5, None, true);
-        assert_eq!((error.kind, error.overruled), (VerdictKind::Record, None));
-        let foreign = judged(0.5, None, false);
-        assert_eq!(foreign.overruled, Some(Overruled::Foreign { stage: 1, share: 0.5 }));
-        assert_eq!((foreign.kind, foreign.seen), (VerdictKind::Unknown, VerdictKind::Effect));
-        assert_eq!(judged(0.0, strained(Some((0.1, 0.05))), false).kind, VerdictKind::Unknown);
-        assert_eq!(judged(0.0, strained(None), false).kind, VerdictKind::Unknown);
+        let error = of(0.5, None, true, None);
+        assert_eq!((error.kind, error.overruled), (Record, None));
+        let misfit = of(0.5, None, false, None);
+        assert_eq!(misfit.overruled, Some(Overruled::GrossMisfit { stage: 1, share: 0.5 }));
+        assert_eq!((misfit.kind, misfit.seen), (Unknown, Unknown));
+        assert_eq!(misfit.naming, Naming::default());
+        assert_eq!(of(0.0, at_bounds(Some((0.1, 0.05))), false, None).kind, Unknown);
+        assert_eq!(of(0.0, at_bounds(None), false, None).kind, Unknown);
         // Loose parameters leave more than the effects do: the effects stand.
-        assert_eq!(judged(0.0, strained(Some((0.1, 4.0))), false).kind, VerdictKind::Effect);
+        assert_eq!(of(0.0, at_bounds(Some((0.1, 4.0))), false, None).kind, Effect);
+        let short = TooLittle::Short { fit_s: 3.75, test_s: 1.25 };
+        let verdict = of(0.0, None, false, Some(short));
+        assert_eq!((verdict.kind, verdict.naming.named.len()), (Unknown, 0));
+        assert_eq!(verdict.overruled, Some(Overruled::TooLittle(short)));
+        // Without a name there is nothing that a short record could not carry.
+        let none = [candidate(&[], true)];
+        let quiet = Case { too_little: Some(short), ..case([0.01; 3], &none, &[]) };
+        assert_eq!((judged(&quiet).kind, judged(&quiet).overruled), (NoGap, None));
+    }
+
+    #[test]
+    fn what_the_catalogue_lacks_is_asked_for_where_a_gap_is_left() {
+        let thresholds = Thresholds::frozen();
+        let (named, none) = ([candidate(&["play"], true)], [candidate(&[], true)]);
+        let strong = [share(0.7, false)];
+        let never = |_| panic!("no gap is left");
+        assert_eq!(
+            judge(&case([20.0, 10.0, 0.1], &named, &[]), &thresholds, never).unwrap().kind,
+            Effect
+        );
+        let beaten = |names| {
+            assert!(names);
+            Ok(Lacking { beats_names: true, ..Lacking::default() })
+        };
+        let verdict =
+            judge(&case([20.0, 10.0, 3.0], &named, &strong), &thresholds, beaten).unwrap();
+        assert_eq!((verdict.kind, verdict.naming), (Unknown, Naming::default()));
+        let noise = |names: bool| {
+            assert!(!names);
+            Ok(Lacking { is_like_noise: true, ..Lacking::default() })
+        };
+        let small = judge(&case([0.9; 3], &none, &[]), &thresholds, noise).unwrap();
+        assert_eq!((small.kind, small.seen), (Parameters, Parameters));
+        let large = judge(&case([1.1; 3], &none, &[]), &thresholds, noise).unwrap();
+        assert_eq!(large.kind, Unknown);
     }
 }

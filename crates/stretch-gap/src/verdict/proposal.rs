@@ -1,51 +1,61 @@
-//! What the catalogue lacks, where a gap is left: proposed as a term, told to be random, or taken for noise.
+//! What the catalogue lacks, where a gap is left: sums of terms, instead of the named effects and beside them.
+//!
+//! What a known cause leaves because its form is another, and what an unknown cause leaves, are two hypotheses: the named effects with a sum of
+//! terms beside them, and a sum of terms alone. The names stand where the first closes more of the held-out gap.
+//!
+//! A gap that is random in time may be noise. So may be one that is smaller than what noise of a measured input makes of it, though it
+//! follows that input: the noise does so, too, where the input rests and nothing else moves it.
 
 use crate::{
-    evidence::excess::Excess,
     fit::{hypothesis::Hypothesis, prepared::Problem, score::gap},
     missing::{Proposed, propose},
     problem::error::GapError,
-    verdict::{diagnosis::VerdictKind, judge::Verdict},
 };
 
-/// Noise is known to a factor of two of its variance: what is left below that and random in time is noise.
-const NOISE: f64 = 1.0;
-/// What the catalogue lacks where a gap is left, and the verdict beside it: a gap that is random in time may be noise. So may be one that is
-/// smaller than the noise of a measured input that arrives there, though it follows that input: its noise does so, too, where the input
-/// rests and nothing else moves it.
-///
-/// What a known cause leaves because its form is another, and what an unknown cause leaves, are two hypotheses: the named effects with a sum of
-/// terms beside them, and a sum of terms alone. The names stand where the first closes more of the held-out gap.
-pub(crate) fn lacking(
+/// Sums of terms outside the catalogue.
+#[derive(Debug, Default)]
+pub(crate) struct Lacking {
+    /// The sum that closes the gap of the re-tuned nominal.
+    pub(crate) instead: Option<Proposed>,
+    /// The sum that closes what the best set leaves, where that was asked for.
+    pub(crate) beside: Option<Proposed>,
+    /// Whether the first closes more than the best set and the second do together.
+    pub(crate) beats_names: bool,
+    /// Whether what is left is random in time, or no larger than what noise of a measured input makes.
+    pub(crate) is_like_noise: bool,
+}
+
+impl Lacking {
+    /// Proposes a sum instead of the best set of effects, and one beside it where the set has `names`.
+    pub(crate) fn of(
+        problem: &Problem<'_>,
+        best: &Hypothesis,
+        names: bool,
+        progress: &dyn Fn(&str),
+    ) -> Result<Self, GapError> {
+        progress("what the catalogue lacks");
+        let instead = propose(problem, &problem.nominal)?;
+        let is_random = instead.as_ref().is_some_and(|p| p.random);
+        let is_like_noise = is_random || problem.is_transmitted(best);
+        let beside = if names { propose(problem, best)? } else { None };
+        let (other, own) = (instead.as_ref(), beside.as_ref());
+        let beats_names = names && other.is_some_and(|other| beats(problem, best, other, own));
+        Ok(Self { instead, beside, beats_names, is_like_noise })
+    }
+}
+
+/// Whether a sum closes more of its stage's held-out gap than the best set does with `own` beside it.
+fn beats(
     problem: &Problem<'_>,
     best: &Hypothesis,
-    (verdict, gaps): (Verdict, Excess),
-    progress: &dyn Fn(&str),
-) -> Result<(Verdict, Option<Proposed>), GapError> {
-    if !matches!(verdict.kind, VerdictKind::Partial | VerdictKind::Unknown) {
-        return Ok((verdict, None));
-    }
-    progress("what the catalogue lacks");
-    let instead = propose(problem, &problem.nominal)?;
-    if verdict.kind == VerdictKind::Unknown {
-        let is_random = instead.as_ref().is_some_and(|p| p.random);
-        let is_noise = gaps.left < NOISE && (is_random || problem.is_transmitted(best));
-        let noise = VerdictKind::Parameters;
-        return Ok(match is_noise && verdict.overruled.is_none() {
-            true => (Verdict { kind: noise, seen: noise, ..verdict }, None),
-            false => (verdict, instead),
-        });
-    }
-    let beside = propose(problem, best)?;
-    let held = |h: &Hypothesis, stage: usize| gap(h.misfits[stage].held);
-    let of = |p: &Proposed| problem.simulator().stages().iter().position(|s| s.name == p.stage);
-    let is_beaten = instead.as_ref().is_some_and(|other| {
-        of(other).is_some_and(|stage| {
-            let whole = held(&problem.nominal, stage).max(f64::MIN_POSITIVE);
-            let own = beside.as_ref().filter(|own| own.stage == other.stage);
-            let left = held(best, stage) / whole * (1.0 - own.map_or(0.0, |p| p.closes_held));
-            other.closes_held > 1.0 - left
-        })
-    });
-    Ok(if is_beaten { (verdict.nameless(), instead) } else { (verdict, beside) })
+    other: &Proposed,
+    own: Option<&Proposed>,
+) -> bool {
+    let mut stages = problem.simulator().stages().iter();
+    let Some(stage) = stages.position(|s| s.name == other.stage) else { return false };
+    let held = |h: &Hypothesis| gap(h.misfits[stage].held);
+    let whole = held(&problem.nominal).max(f64::MIN_POSITIVE);
+    let own = own.filter(|own| own.stage == other.stage);
+    let left = held(best) / whole * (1.0 - own.map_or(0.0, |p| p.closes_held));
+    other.closes_held > 1.0 - left
 }

@@ -1,13 +1,12 @@
 //! The answer in words, made from the verdict when nothing can change any more.
 
 use crate::{
-    evidence::{excess::Excess, gathered::Evidence, shares::EffectShare},
-    missing::Proposed,
+    evidence::{candidates::Candidate, excess::Excess, gathered::Evidence, shares::EffectShare},
     problem::simulator::Simulator,
     record::{gross::Gross, sentence::sentence},
     verdict::{
         diagnosis::{Unexplained, VerdictKind},
-        judge::{Case, Overruled, Verdict},
+        judge::{Judged, Overruled},
         naming::Naming,
     },
 };
@@ -24,55 +23,47 @@ pub(crate) struct Told {
     pub(crate) notes: Vec<String>,
 }
 
-/// The verdict with its names, and what a partial one leaves.
+/// The verdict, and the numbers that are reported with it.
 #[derive(Clone, Copy)]
 pub(crate) struct Answer<'a> {
-    pub(crate) verdict: &'a Verdict,
-    pub(crate) naming: &'a Naming,
+    pub(crate) judged: &'a Judged,
+    pub(crate) gap: Excess,
+    /// The most probable candidate, its probability beside that of what the catalogue lacks.
+    pub(crate) first: Option<&'a Candidate>,
+    pub(crate) shares: &'a [EffectShare],
+    /// What a partial answer leaves.
     pub(crate) unexplained: Option<&'a Unexplained>,
-    pub(crate) proposed: Option<&'a Proposed>,
     /// What is wrong with the record or the rig file.
     pub(crate) gross: &'a [Gross],
     /// Gap that noise alone may leave, where nothing is named.
     pub(crate) null_band: Option<f64>,
 }
 
-/// Tells a verdict.
-pub(crate) fn tell(
-    answer: Answer<'_>,
-    case: Case<'_>,
-    simulator: &dyn Simulator,
-    evidence: &Evidence,
-    shares: &[EffectShare],
-) -> Told {
+/// Puts a verdict into words.
+pub(crate) fn tell(answer: Answer<'_>, simulator: &dyn Simulator, evidence: &Evidence) -> Told {
     let mut notes = Vec::new();
     if evidence.frame.borrowed_test {
         let held =
             "there is no test trial: the last quarter of every trial is held back and tested on";
         notes.push(held.into());
     }
-    let seen = seen(answer, case, simulator, evidence, shares);
-    let sentence = match &answer.verdict.overruled {
+    let seen = seen(answer, simulator, evidence);
+    let sentence = match &answer.judged.overruled {
         None => seen,
         Some(overruled) => {
             notes.push(format!("before that was seen: {seen}"));
             wrong(overruled, simulator)
         }
     };
-    let proposed = answer.proposed.map_or(String::new(), |p| format!(" {}", p.sentence));
+    let proposed = &answer.judged.proposed;
+    let proposed = proposed.as_ref().map_or(String::new(), |p| format!(" {}", p.sentence));
     Told { sentence: sentence + &proposed, notes }
 }
 
-fn seen(
-    answer: Answer<'_>,
-    case: Case<'_>,
-    simulator: &dyn Simulator,
-    evidence: &Evidence,
-    shares: &[EffectShare],
-) -> String {
-    let gap = case.gap;
-    let naming = answer.naming;
-    match (answer.verdict.seen, case.first) {
+fn seen(answer: Answer<'_>, simulator: &dyn Simulator, evidence: &Evidence) -> String {
+    let Answer { judged, gap, .. } = answer;
+    let naming = &judged.naming;
+    match (judged.seen, answer.first) {
         (VerdictKind::Record, Some(first)) if !answer.gross.iter().any(Gross::is_plain) => {
             sentence(answer.gross)
                 + &format!(
@@ -87,11 +78,7 @@ fn seen(
             sentence(answer.gross) + " Nothing can be said of effects until that is put right."
         }
         (VerdictKind::Effect, Some(first)) => {
-            // Overruled, nothing was named: what was seen is told as it stood.
-            let names = match naming.named.is_empty() {
-                true => first.effects.clone(),
-                false => naming.alternatives(),
-            };
+            let names = naming.alternatives();
             format!(
                 "The simulator lacks {}: {} {:.0} % of the gap ({:.0} to {:.0} %) on trials that were not fitted; probability {:.2}.",
                 names.join(" and "),
@@ -102,7 +89,7 @@ fn seen(
                 first.probability
             ) + &beside(naming)
         }
-        (VerdictKind::Partial, Some(_)) => partial(answer, shares) + &beside(naming),
+        (VerdictKind::Partial, Some(_)) => partial(answer) + &beside(naming),
         (VerdictKind::Effect | VerdictKind::Partial | VerdictKind::Unknown, _) => {
             let all = evidence.stages.iter().zip(simulator.stages());
             let worst = all.max_by(|a, b| a.0.excess_after.total_cmp(&b.0.excess_after));
@@ -113,11 +100,11 @@ fn seen(
                 multiple(gap.left),
                 multiple(gap.retuned),
                 best.unwrap_or("none")
-            ) + &parts(shares)
+            ) + &parts(answer.shares)
         }
         (VerdictKind::Parameters | VerdictKind::NoGap, _) => match answer.null_band {
             Some(band) if gap.retuned > band => too_faint(gap, band, evidence, simulator),
-            _ if answer.verdict.seen == VerdictKind::NoGap => {
+            _ if judged.seen == VerdictKind::NoGap => {
                 "Simulator and rig agree within the noise floor.".into()
             }
             _ => format!(
@@ -143,14 +130,15 @@ fn too_faint(gap: Excess, band: f64, evidence: &Evidence, simulator: &dyn Simula
 }
 
 /// Mostly this, and so much else.
-fn partial(answer: Answer<'_>, shares: &[EffectShare]) -> String {
+fn partial(answer: Answer<'_>) -> String {
+    let naming = &answer.judged.naming;
     let closes =
-        |name: &String| shares.iter().find(|s| s.effect == *name).map_or(0.0, |s| s.closes);
+        |name: &String| answer.shares.iter().find(|s| s.effect == *name).map_or(0.0, |s| s.closes);
     let in_words = |share: f64| match share < LEAST_TOLD {
         true => " (below 1 %)".to_owned(),
         false => format!(" ({:.0} %)", 100.0 * share),
     };
-    let pairs = answer.naming.named.iter().zip(answer.naming.alternatives());
+    let pairs = naming.named.iter().zip(naming.alternatives());
     let mut names: Vec<(f64, String)> = pairs.map(|(name, told)| (closes(name), told)).collect();
     names.sort_by(|a, b| b.0.total_cmp(&a.0));
     let names: Vec<String> =
@@ -203,7 +191,7 @@ fn parts(shares: &[EffectShare]) -> String {
 /// Why it may not be the right simulator.
 fn wrong(overruled: &Overruled, simulator: &dyn Simulator) -> String {
     match overruled {
-        Overruled::Foreign { stage, share } => {
+        Overruled::GrossMisfit { stage, share } => {
             let spec = &simulator.stages()[*stage];
             format!(
                 "The gap is everything: {:.0} % of what {} does is not in the simulator of {}. Is it the right rig, and is every \
@@ -213,15 +201,15 @@ fn wrong(overruled: &Overruled, simulator: &dyn Simulator) -> String {
                 spec.name
             )
         }
-        Overruled::Thin(thin) => thin.words(),
-        Overruled::Strained(strained) => {
-            let names = strained.ended.iter().map(|&p| simulator.parameters()[p].name.as_str());
+        Overruled::TooLittle(why) => why.words(),
+        Overruled::AtBounds(found) => {
+            let names = found.ended.iter().map(|&p| simulator.parameters()[p].name.as_str());
             format!(
                 "The parameters of {} do not fit within their tolerances: {} stand at the end of them, and {:.1} times the noise is left \
                  all the same. Is it the right rig? If its parameters are right, something is missing that is not in the catalogue.",
-                simulator.stages()[strained.stage].name,
+                simulator.stages()[found.stage].name,
                 names.collect::<Vec<_>>().join(", "),
-                multiple(strained.left)
+                multiple(found.left)
             )
         }
     }

@@ -1,4 +1,4 @@
-//! Why a record is too thin to carry a name, and what to record instead.
+//! Why a record is too little to carry a name, and what to record instead.
 
 use crate::problem::rows_used::RowsUsed;
 
@@ -11,14 +11,14 @@ pub(crate) const LEAST_FIT_S: f64 = 10.0;
 
 /// Why a record carries no name.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Thin {
+pub(crate) enum TooLittle {
     /// Most rows were left out.
     Rows(RowsUsed),
     /// Too short, s: to fit and to test on.
     Short { fit_s: f64, test_s: f64 },
 }
 
-impl Thin {
+impl TooLittle {
     /// What is wrong, and what to record.
     pub(crate) fn words(&self) -> String {
         match self {

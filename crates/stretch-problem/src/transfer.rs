@@ -3,45 +3,15 @@
 //! The *transfer gap* is the error on measured test trials of a calibration trained in the simulator minus that of one trained on measured
 //! trials. It is what a user pays; the chi-square is not: a true effect can close the gap and leave a calibration as it was.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use rayon::prelude::*;
 use stretch_calibrate::{CalibrateError, ModelKind, Options, apply, calibrate};
 use stretch_core::Degree;
 use stretch_data::{Channel, Trial, ends};
-
-use serde::{Deserialize, Serialize};
-
-use crate::{
-    evidence::gathered::Evidence,
-    numerics::random::Dice,
-    problem::{
-        error::GapError,
-        frame::{Frame, Role},
-        runs::Runs,
-        simulator::{Model, Run},
-    },
+use stretch_gap::{
+    Dice, Evidence, Frame, GapError, Model, Noise, Role, Run, Simulator, Transfer, TransferError,
 };
-
-/// What the gap costs a user.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Transfer {
-    /// Straight line.
-    pub linear: TransferError,
-    /// Surface poly13.
-    pub poly13: TransferError,
-    /// `percent_full_scale`.
-    pub unit: String,
-}
-
-/// Error of a calibration trained in one place and applied to measured trials.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct TransferError {
-    /// Trained on measured trials.
-    pub real: f64,
-    /// Trained in the re-tuned nominal simulator.
-    pub sim: f64,
-    /// Trained in the simulator with the named effects.
-    pub sim_with_effect: f64,
-}
 
 const SIGNAL: &str = "signal";
 const REFERENCE: &str = "reference";
@@ -57,13 +27,13 @@ struct Records {
 /// determine a calibration.
 ///
 /// In the simulator nothing is measured but the commands: the stages run one on the other, and its reference and its
-/// signal get the noise that the channels are known to have. A sensor that is the first stage sees the measured motion.
+/// signal get the noise that the channels are known to have. A sensor that is the first stage sees the measured motion. Every run of a
+/// stage is added to `simulations`.
 pub(crate) fn transfer(
-    runs: &Runs<'_>,
+    simulator: &dyn Simulator,
     evidence: &Evidence,
-    seed: u64,
+    (seed, simulations): (u64, &AtomicUsize),
 ) -> Result<Option<Transfer>, GapError> {
-    let simulator = runs.simulator();
     let Some(sensor) = simulator.record().sensor else { return Ok(None) };
     let motion = simulator.motion().values;
     let real = Records { reference: motion.to_vec(), signal: simulator.measured(sensor).to_vec() };
@@ -71,7 +41,10 @@ pub(crate) fn transfer(
     let models = [(&evidence.retuned, &first.retuned), (&evidence.best, &first.after)];
     let simulated: Result<Vec<_>, GapError> = models
         .par_iter()
-        .map(|(model, first)| records(runs, evidence, sensor, model, first, seed))
+        .map(|(model, first)| {
+            let chain = Chain { simulator, evidence, sensor, seed, simulations };
+            chain.records(model, first)
+        })
         .collect();
     let [Some(retuned), Some(best)] = &simulated?[..] else { return Ok(None) };
     let frame = &evidence.frame;
@@ -94,40 +67,66 @@ pub(crate) fn transfer(
     Ok(is_sound.then(|| Transfer { linear: of(0), poly13: of(3), unit }))
 }
 
-/// The fitted trials as a model records them, whose first stage gave `first`; `None` where the stages cannot run one on the
-/// other.
-fn records(
-    runs: &Runs<'_>,
-    evidence: &Evidence,
+/// The stages of a simulator up to the sensor, run one on the other.
+struct Chain<'a> {
+    simulator: &'a dyn Simulator,
+    evidence: &'a Evidence,
     sensor: usize,
-    model: &Model,
-    first: &[f64],
     seed: u64,
-) -> Result<Option<Records>, GapError> {
-    let simulator = runs.simulator();
-    let trials = evidence.frame.fit_trials;
-    let samples = evidence.frame.samples(trials);
-    let mut output = first[..samples].to_vec();
-    let mut before = None;
-    for stage in 1..=sensor {
-        let run = Run::exact(stage, model, trials);
-        let Some(next) = runs.run_on(run, &output)? else { return Ok(None) };
-        before = Some(std::mem::replace(&mut output, next));
+    /// Runs of a stage so far.
+    simulations: &'a AtomicUsize,
+}
+
+impl Chain<'_> {
+    /// The fitted trials as a model records them, whose first stage gave `first`; `None` where the stages cannot run one on the
+    /// other.
+    fn records(&self, model: &Model, first: &[f64]) -> Result<Option<Records>, GapError> {
+        let samples = self.evidence.frame.samples(self.evidence.frame.fit_trials);
+        let mut output = first[..samples].to_vec();
+        let mut before = None;
+        for stage in 1..=self.sensor {
+            let Some(next) = self.run_on(stage, model, &output)? else { return Ok(None) };
+            before = Some(std::mem::replace(&mut output, next));
+        }
+        let reference = match before {
+            Some(motion) => self.noisy(motion, self.sensor - 1),
+            None => self.simulator.motion().values[..samples].to_vec(),
+        };
+        Ok(Some(Records { reference, signal: self.noisy(output, self.sensor) }))
     }
-    let noisy = |mut values: Vec<f64>, stage: usize| {
-        let sd = simulator.stages()[stage]
-            .noise
-            .as_ref()
-            .map_or(evidence.stages[stage].floor, crate::problem::noise::Noise::sd);
-        let mut dice = Dice::new(seed, 900 + stage as u64);
-        values.iter_mut().for_each(|x| *x += sd * dice.gauss());
+
+    /// The output of a stage on an input that was not measured; `None` where the stage cannot.
+    fn run_on(
+        &self,
+        stage: usize,
+        model: &Model,
+        input: &[f64],
+    ) -> Result<Option<Vec<f64>>, GapError> {
+        // Only the sum is read, and only after the work is done: no order is needed.
+        self.simulations.fetch_add(1, Ordering::Relaxed);
+        let Some(driven) = self.simulator.driven() else { return Ok(None) };
+        let run = Run::exact(stage, model, self.evidence.frame.fit_trials);
+        let mut out = vec![0.0; input.len()];
+        let run = Run { step: self.evidence.step, ..run };
+        if !driven.simulate_on(run, input, &mut out)? {
+            return Ok(None);
+        }
+        match out.iter().all(|x| x.is_finite()) {
+            true => Ok(Some(out)),
+            false => {
+                Err(GapError::NotFinite { stage: self.simulator.stages()[stage].name.clone() })
+            }
+        }
+    }
+
+    /// The output of a stage with the noise that its channel is known to have.
+    fn noisy(&self, mut values: Vec<f64>, stage: usize) -> Vec<f64> {
+        let known = self.simulator.stages()[stage].noise.as_ref();
+        let sd = known.map_or(self.evidence.stages[stage].floor, Noise::sd);
+        let mut random = Dice::new(self.seed, 900 + stage as u64);
+        values.iter_mut().for_each(|x| *x += sd * random.gauss());
         values
-    };
-    let reference = match before {
-        Some(motion) => noisy(motion, sensor - 1),
-        None => simulator.motion().values[..samples].to_vec(),
-    };
-    Ok(Some(Records { reference, signal: noisy(output, sensor) }))
+    }
 }
 
 /// The trials to train on, or to test on.

@@ -15,7 +15,7 @@ use stretch_blind::{Label, Seal};
 use stretch_calibrate::{Cause, Memory, ModelKind, Options, calibrate, evaluate};
 use stretch_core::{Calibration, Design, DiagnosedMap, Model, RestLevel};
 use stretch_data::{DataSet, SessionTrial, Split, Trial};
-use stretch_gap::{Dice, Options as Diagnosing, diagnose};
+use stretch_gap::{RandomGenerator, Options as Diagnosing, diagnose};
 use stretch_problem::{GaugeSetup, GaugeSimulator, causes};
 use stretch_receptor::{Defects, DefectsMemory};
 use stretch_recording::{ReadOptions, Recording};
@@ -194,7 +194,7 @@ fn particles(calibration: &Calibration, agility: f64, trial: &Trial) -> Result<V
         true => -map.steady_s * (-map.skew_s / map.steady_s).exp_m1(),
         false => map.skew_s,
     };
-    let mut random = Dice::new(7, 0);
+    let mut random = RandomGenerator::new(7, 0);
     let pressures = trial.channel("pressure_kpa");
     let pressure = |i: usize| pressures.map_or(0.0, |p| p[i]);
     let volts = trial.require("bridge_v")?;

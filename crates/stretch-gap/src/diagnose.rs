@@ -69,7 +69,7 @@ impl Default for Options {
 
 /// Diagnoses a simulator beside its measurements.
 ///
-/// `progress` is told in words what goes on. `stop` is asked between simulations; once it says yes, the
+/// `progress` takes in words what goes on. `stop` is asked between simulations; once it says yes, the
 /// diagnosis ends with [`GapError::Stopped`].
 ///
 /// # Errors
@@ -90,7 +90,7 @@ pub fn diagnose(
     }
 }
 
-/// What is diagnosed, how, who is told what goes on, and who is asked whether to stop.
+/// What is diagnosed, how, where progress is reported, and what says whether to stop.
 #[derive(Clone, Copy)]
 struct Task<'a> {
     simulator: &'a dyn Simulator,
@@ -326,7 +326,7 @@ fn report(
     Ok((diagnosis, evidence))
 }
 
-/// Slices that are told of what a partial answer leaves.
+/// Slices that are reported of what a partial answer leaves.
 const TOLD_SLICES: usize = 3;
 
 /// What the first candidate leaves of the held-out gap, and where it stands out.

@@ -28,7 +28,7 @@ pub use evidence::{
 };
 pub use fit::identifiability::{Identified, Knowledge};
 pub use missing::{Factor, Passage, Proposed, ProposedTerm, RateForm, SignalScale, Term};
-pub use numerics::random::Dice;
+pub use numerics::random::RandomGenerator;
 pub use problem::{
     checks::DescriptionError,
     column::{Column, Distortion},
@@ -39,7 +39,7 @@ pub use problem::{
     record_facts::{Motion, MotionSpec, RecordFacts, Recorded},
     rows_used::RowsUsed,
     simulator::{Batch, Costly, Driven, Model, ModelRuns, Run, Simulator, SpectralLines},
-    spec::{EffectSpec, ParameterSpec, StageSpec, TrialSpec, Wander},
+    spec::{EffectSpec, ParameterSpec, SlowDrift, StageSpec, TrialSpec},
     spectral_line::Line,
     thresholds::Thresholds,
 };

@@ -1,8 +1,8 @@
 //! A gauge with one stage, straight but for what it lacks.
 
 use stretch_gap::{
-    Description, DescriptionSpec, Dice, EffectParameter, EffectSpec, GapError, MotionSpec,
-    ParameterSpec, RecordFacts, Recorded, Run, Simulator, StageSpec, TrialSpec,
+    Description, DescriptionSpec, EffectParameter, EffectSpec, GapError, MotionSpec, ParameterSpec,
+    RandomGenerator, RecordFacts, Recorded, Run, Simulator, StageSpec, TrialSpec,
 };
 
 /// Samples of a trial, and their time, s.
@@ -33,7 +33,7 @@ pub(crate) enum Lack {
     /// White noise above the floor.
     White,
     /// A random walk that returns.
-    Wander,
+    SlowDrift,
 }
 
 /// A gauge of a rod.
@@ -54,7 +54,7 @@ pub(crate) const RANGE_MM: f64 = 25.0;
 
 impl Gauge {
     pub(crate) fn lacking(lack: Lack, seed: u64) -> Self {
-        let mut dice = Dice::new(seed, 9);
+        let mut dice = RandomGenerator::new(seed, 9);
         let trials = [("one", false), ("two", false), ("three", false), ("test", true)];
         let specs: Vec<TrialSpec> = trials
             .iter()
@@ -140,7 +140,7 @@ fn description(trials: Vec<TrialSpec>, volt: f64, rod_mm: &[f64]) -> Description
     .expect("a description that holds together")
 }
 
-fn extra(lack: Lack, x: &[f64], dice: &mut Dice) -> Vec<f64> {
+fn extra(lack: Lack, x: &[f64], dice: &mut RandomGenerator) -> Vec<f64> {
     let rate =
         |i: usize| (x[(i + 1).min(x.len() - 1)] - x[i.saturating_sub(1)]) / (2.0 * DT_S) / 0.5;
     let (mut held, mut level) = (x[0], if dice.unit() < 0.5 { 0.0 } else { 1.0 });
@@ -171,7 +171,7 @@ fn extra(lack: Lack, x: &[f64], dice: &mut Dice) -> Vec<f64> {
         Lack::Nothing => 0.0,
         Lack::Whisper => NOISE_V / 3.0 * dice.gauss(),
         Lack::White => 0.01 * dice.gauss(),
-        Lack::Wander => {
+        Lack::SlowDrift => {
             held += if i == 0 { -held } else { -DT_S * held / 2.0 + DT_S.sqrt() * dice.gauss() };
             0.01 * held
         }

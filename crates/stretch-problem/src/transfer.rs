@@ -10,7 +10,8 @@ use stretch_calibrate::{CalibrateError, ModelKind, Options, apply, calibrate};
 use stretch_core::Degree;
 use stretch_data::{Channel, Trial, ends};
 use stretch_gap::{
-    Dice, Evidence, Frame, GapError, Model, Noise, Role, Run, Simulator, Transfer, TransferError,
+    Evidence, Frame, GapError, Model, Noise, RandomGenerator, Role, Run, Simulator, Transfer,
+    TransferError,
 };
 
 const SIGNAL: &str = "signal";
@@ -122,8 +123,8 @@ impl Chain<'_> {
     /// The output of a stage with the noise that its channel is known to have.
     fn noisy(&self, mut values: Vec<f64>, stage: usize) -> Vec<f64> {
         let known = self.simulator.stages()[stage].noise.as_ref();
-        let sd = known.map_or(self.evidence.stages[stage].floor, Noise::sd);
-        let mut random = Dice::new(self.seed, 900 + stage as u64);
+        let sd = known.map_or(self.evidence.stages[stage].noise, Noise::sd);
+        let mut random = RandomGenerator::new(self.seed, 900 + stage as u64);
         values.iter_mut().for_each(|x| *x += sd * random.gauss());
         values
     }

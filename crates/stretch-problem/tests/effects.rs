@@ -8,7 +8,7 @@ use stretch_effects::{
     Acts, Effect, EffectParameter, Hum, Kind, Language, Place, Quantity, Side, Sketch,
 };
 use stretch_gap::{
-    Dice, Laboratory, Model, Options, Simulator, VerdictKind, diagnose, differences,
+    Laboratory, Model, Options, RandomGenerator, Simulator, VerdictKind, diagnose, differences,
 };
 use stretch_problem::{
     Ask, BlackBox, Checked, GaugeSetup, GaugeSimulator, Parameter, ProblemSpec, RigSession,
@@ -183,7 +183,7 @@ fn a_kind_of_ones_own_is_wrapped_named_and_printed() {
     let trial = |number: usize| {
         let time_s: Vec<f64> = (0..samples).map(|i| dt_s * i as f64).collect();
         let start_s = 40.0 * number as f64;
-        let mut dice = Dice::new(5, number as u64);
+        let mut dice = RandomGenerator::new(5, number as u64);
         let force: Vec<f64> = time_s.iter().map(|t| load(t + start_s)).collect();
         let ripple = |t: f64| 4.0 * (std::f64::consts::TAU * 0.4 * (t + start_s)).sin();
         let shown = force.iter().zip(&time_s);

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use stretch_data::{Channel, SessionTrial, Split, Trial};
-use stretch_gap::{Dice, Options, VerdictKind};
+use stretch_gap::{Options, RandomGenerator, VerdictKind};
 use stretch_problem::{
     Argument, Ask, BlackBox, Checked, Examined, Fixed, NoFix, OwnEffect, Parameter, Problem,
     ProblemFile, ProblemSpec, Sensor, Session, Stage, Tolerance, Wrapped, closure,
@@ -55,7 +55,7 @@ fn play(w: f64, x: &[f64]) -> Vec<f64> {
 /// Three trials of what a real toy shows for its shaft.
 fn recorded(real: impl Fn(&[f64]) -> Vec<f64>) -> Vec<SessionTrial> {
     let one = |trial: usize| {
-        let mut dice = Dice::new(7, trial as u64);
+        let mut dice = RandomGenerator::new(7, trial as u64);
         let time_s: Vec<f64> = (0..SAMPLES).map(|i| i as f64 * DT_S).collect();
         let x: Vec<f64> = time_s.iter().map(|t| shaft(trial, *t)).collect();
         let y = real(&x).iter().map(|y| y + 0.02 * dice.gauss()).collect();

@@ -7,7 +7,7 @@ use crate::support::session::session;
 use approx::{abs_diff_eq, assert_abs_diff_eq, assert_relative_eq};
 use stretch_data::{RigFile, SessionTrial, Split};
 use stretch_gap::{Diagnosis, Evidence, Options, Run, Simulator, VerdictKind, diagnose};
-use stretch_problem::{Bench, RigSession, RigSetup, RigSimulator};
+use stretch_problem::{Problem, RigSession, RigSetup, RigSimulator};
 use stretch_sim::{Catalogue, EffectSet, Rig, RigParams, SimError, default_rig_text};
 use testkit::tolerance::{FLOW_FOUND, GAP_NULL, LAG_FOUND, POLE_FOUND_S, TRAINED_AGAIN, TURNED};
 
@@ -28,7 +28,7 @@ fn examined(trials: Vec<SessionTrial>) -> Diagnosis {
     let catalogue = Catalogue::default();
     let rig = RigSimulator::new(setup(&trials, &catalogue)).expect("a simulator");
     let options = Options { baselines: true, ..shallow() };
-    Bench::from(rig).examine(&options, false, &|_| (), &|| false).expect("a diagnosis").diagnosis
+    Problem::from(rig).examine(&options, false, &|_| (), &|| false).expect("a diagnosis").diagnosis
 }
 
 fn run_of(simulator: &dyn Simulator) -> Evidence {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use stretch_data::{Channel, SessionTrial, Split, Trial};
-use stretch_gap::{Diagnosis, Dice, Options, diagnose};
+use stretch_gap::{Diagnosis, Options, RandomGenerator, diagnose};
 use stretch_problem::{
     Ask, BlackBox, Checked, Parameter, ProblemSpec, Stage, Tolerance, agreed, closure,
 };
@@ -27,7 +27,7 @@ fn recorded(late_s: [f64; 3], tau_s: f64) -> Vec<SessionTrial> {
     let one = |trial: usize| {
         let t = |i: usize| i as f64 * DT_S;
         let column = |which: usize| -> Vec<f64> {
-            let mut dice = Dice::new(31, (10 * trial + which) as u64);
+            let mut dice = RandomGenerator::new(31, (10 * trial + which) as u64);
             let mut slow: Option<f64> = None;
             let kept = (-DT_S / tau_s).exp();
             (0..SAMPLES)

@@ -8,7 +8,7 @@ use std::{
 
 use proptest::prelude::*;
 use stretch_data::{Channel, SessionTrial, Trial};
-use stretch_gap::{Diagnosis, Dice, Options, diagnose};
+use stretch_gap::{Diagnosis, Options, RandomGenerator, diagnose};
 use stretch_problem::{
     Argument, Ask, BlackBox, Checked, OwnEffect, Parameter, ProblemSpec, Source, SourceError,
     Stage, Tolerance,
@@ -34,7 +34,7 @@ fn plant(u: &[f64]) -> Vec<f64> {
 }
 
 fn problem() -> Checked {
-    let mut dice = Dice::new(3, 0);
+    let mut dice = RandomGenerator::new(3, 0);
     let mut held = 0.0;
     let u: Vec<f64> = (0..SAMPLES)
         .map(|i| {

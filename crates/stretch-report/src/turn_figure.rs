@@ -71,7 +71,7 @@ pub(crate) fn turn_figure(subject: &Subject<'_>, stage: usize, shown: &Shown) ->
         "link": GAP,
         "ink": AFTER.class(),
         "unit": spec.unit,
-        "noise": subject.evidence.stages[stage].floor,
+        "noise": subject.evidence.stages[stage].noise,
         "products": responses.products,
         "parameters": turned,
     });

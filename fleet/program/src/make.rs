@@ -12,7 +12,7 @@ use serde::Serialize;
 use stretch_calibrate::rated;
 use stretch_core::{RateEstimator, SampleRate};
 use stretch_data::{Channel, Split, Trial, TrialKind};
-use stretch_gap::Dice;
+use stretch_gap::RandomGenerator;
 
 use crate::{
     lake::{About, Footer, Place, Samples, digest, write},
@@ -127,9 +127,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
 
 /// Chance of a sensor and a day: each begins at a number of its own, for streams of one seed that stand side by side are each other's,
 /// moved on by a few draws.
-fn dice(seed: u64, of: [u32; 2]) -> Dice {
-    let seed = of.iter().fold(seed, |seed, &part| Dice::new(seed, part.into()).bits());
-    Dice::new(seed, 0)
+fn dice(seed: u64, of: [u32; 2]) -> RandomGenerator {
+    let seed = of.iter().fold(seed, |seed, &part| RandomGenerator::new(seed, part.into()).bits());
+    RandomGenerator::new(seed, 0)
 }
 
 /// One simulated sleeve.

@@ -159,10 +159,10 @@ mod tests {
     use super::*;
     use stretch_core::Degree;
     use stretch_fit::SurfaceAccumulator;
-    use stretch_gap::Dice;
+    use stretch_gap::RandomGenerator;
 
     /// A day whose rows share an error, beside one that goes slowly: white noise would be a wrong null.
-    fn day(dice: &mut Dice, gain: f64) -> Day {
+    fn day(dice: &mut RandomGenerator, gain: f64) -> Day {
         let degree = Degree::POLY13;
         let mut sides = [(); 2].map(|()| SurfaceAccumulator::<f64, 7, 64>::new(degree).unwrap());
         let (shared, mut slow) = (0.004 * dice.gauss(), 0.0);
@@ -180,7 +180,7 @@ mod tests {
         sides.map(|side| Some(side.factor()))
     }
 
-    fn month(dice: &mut Dice, days: usize, gain: f64) -> Vec<Day> {
+    fn month(dice: &mut RandomGenerator, days: usize, gain: f64) -> Vec<Day> {
         (0..days).map(|_| day(dice, gain)).collect()
     }
 
@@ -189,7 +189,7 @@ mod tests {
     /// nearly all of them.
     #[test]
     fn p_is_what_it_says_where_nothing_has_moved() {
-        let mut dice = Dice::new(5, 0);
+        let mut dice = RandomGenerator::new(5, 0);
         for days in [8, 20] {
             let mut called = 0;
             let mut effect = 0.0;
@@ -207,7 +207,7 @@ mod tests {
 
     #[test]
     fn a_gain_that_moved_is_seen() {
-        let mut dice = Dice::new(6, 0);
+        let mut dice = RandomGenerator::new(6, 0);
         let compared = compare(&month(&mut dice, 20, 1.0), &month(&mut dice, 20, 1.05)).unwrap();
         assert!(compared.p < 1e-3, "{compared:?}");
         // five hundredths of what moves between 0 and about 0.2
@@ -216,7 +216,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_compared_says_why() {
-        let mut dice = Dice::new(7, 0);
+        let mut dice = RandomGenerator::new(7, 0);
         let whole = month(&mut dice, 6, 1.0);
         assert!(compare(&whole[..3], &whole).unwrap_err().contains("3 days in the first month"));
         let half: Vec<Day> = whole.iter().map(|day| [day[0], None]).collect();

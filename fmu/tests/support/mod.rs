@@ -8,7 +8,7 @@ use std::{
 };
 
 use stretch_data::{Channel, SessionTrial, Trial};
-use stretch_gap::Dice;
+use stretch_gap::RandomGenerator;
 use stretch_problem::{
     Argument, Ask, OwnEffect, Parameter, Checked, ProblemSpec, SourceError, Stage, Tolerance,
     worker::WorkersSpec,
@@ -159,7 +159,7 @@ pub(crate) fn answer(problem: &Checked, ask: &Ask<'_>) -> Result<Vec<f64>, Sourc
 /// Two recordings of a servo that brakes with 2 degrees, and a simulator that knows of brakes but has none on.
 pub(crate) fn spec() -> ProblemSpec {
     let trial = |index: u64| {
-        let mut dice = Dice::new(3, index);
+        let mut dice = RandomGenerator::new(3, index);
         let mut held = 0.0;
         let command = |i: usize| {
             if i.is_multiple_of(60) {

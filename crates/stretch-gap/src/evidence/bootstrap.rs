@@ -5,7 +5,7 @@
 
 use crate::{
     fit::score::{gap, mean_square},
-    numerics::random::Dice,
+    numerics::random::RandomGenerator,
 };
 
 /// Draws of the bootstrap.
@@ -31,11 +31,11 @@ pub(crate) fn closed_interval(before: &[Vec<f64>], after: &[Vec<f64>], seed: u64
     let (b, a) = (whole(before), whole(after));
     let count = before.first().map_or(0, Vec::len);
     let (mut draws, mut falls) = (Vec::with_capacity(DRAWS), Vec::with_capacity(DRAWS));
-    let mut dice = Dice::new(seed, 77);
+    let mut random = RandomGenerator::new(seed, 77);
     for _ in 0..DRAWS {
         let mut sums = vec![(0.0, 0.0); before.len()];
         for _ in 0..count {
-            let block = dice.below(count);
+            let block = random.below(count);
             for (sum, (x, y)) in sums.iter_mut().zip(before.iter().zip(after)) {
                 sum.0 += x[block];
                 sum.1 += y[block];
@@ -64,8 +64,8 @@ mod tests {
     use testkit::tolerance::F64_ROUNDING;
 
     /// Blocks of a mean square around `mean`, as uneven as those of ten independent squares: standard deviation 0.45 of it.
-    fn blocks(mean: f64, count: usize, dice: &mut Dice) -> Vec<f64> {
-        let square = |dice: &mut Dice| dice.gauss().powi(2);
+    fn blocks(mean: f64, count: usize, dice: &mut RandomGenerator) -> Vec<f64> {
+        let square = |dice: &mut RandomGenerator| dice.gauss().powi(2);
         (0..count).map(|_| mean * (0..10).map(|_| square(dice)).sum::<f64>() / 10.0).collect()
     }
 
@@ -112,7 +112,7 @@ mod tests {
     /// doubled gaps is the same to the bit.
     #[test]
     fn channels_are_drawn_in_step() {
-        let mut dice = Dice::new(4, 0);
+        let mut dice = RandomGenerator::new(4, 0);
         let (before, after) = (blocks(6.0, 40, &mut dice), blocks(2.0, 40, &mut dice));
         let one = closed_interval(&[before.clone()], &[after.clone()], 7);
         let two = closed_interval(&[before.clone(), before], &[after.clone(), after], 7);
@@ -121,15 +121,16 @@ mod tests {
 
     #[test]
     fn the_interval_holds_the_estimate_and_narrows_with_the_root_of_the_blocks() {
-        let mut dice = Dice::new(5, 0);
-        let width = |count: usize, dice: &mut Dice| {
+        let mut dice = RandomGenerator::new(5, 0);
+        let width = |count: usize, dice: &mut RandomGenerator| {
             let (before, after) = (blocks(6.0, count, dice), blocks(2.0, count, dice));
             let closed = closed_interval(&[before], &[after], 1);
             let [low, high] = closed.interval;
             assert!(low <= closed.closed && closed.closed <= high, "{closed:?}");
             high - low
         };
-        let mean = |count, dice: &mut Dice| (0..40).map(|_| width(count, dice)).sum::<f64>();
+        let mean =
+            |count, dice: &mut RandomGenerator| (0..40).map(|_| width(count, dice)).sum::<f64>();
         let (few, many) = (mean(30, &mut dice), mean(120, &mut dice));
         // Four times the blocks: half the width. A width from 400 draws is known to 7 %, the mean of forty to 2 %; a tenth is five of these.
         assert!((few / many / 2.0 - 1.0).abs() < 0.1, "{few} {many}");
@@ -140,7 +141,7 @@ mod tests {
     #[test]
     fn intervals_hold_the_true_share_as_often_as_they_say() {
         let truth = 1.0 - 1.0 / 5.0;
-        let mut dice = Dice::new(6, 0);
+        let mut dice = RandomGenerator::new(6, 0);
         let mut is_held = |record: u64| {
             let (before, after) = (blocks(6.0, 60, &mut dice), blocks(2.0, 60, &mut dice));
             let [low, high] = closed_interval(&[before], &[after], record).interval;
@@ -154,7 +155,7 @@ mod tests {
     /// same reason as above. 22 is three of these above.
     #[test]
     fn chance_is_seldom_confirmed() {
-        let mut dice = Dice::new(7, 0);
+        let mut dice = RandomGenerator::new(7, 0);
         let mut falls = |record: u64| {
             let (before, after) = (blocks(3.0, 60, &mut dice), blocks(3.0, 60, &mut dice));
             closed_interval(&[before], &[after], record).falls

@@ -26,7 +26,7 @@ use crate::{
 /// A set of effects that was held against the data.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Candidate {
-    /// Its effects, the strongest first; `unknown` stands for whatever the catalogue lacks and is always the last candidate.
+    /// Effects of the set, the strongest first; `unknown` stands for whatever the catalogue lacks and is always the last candidate.
     pub effects: Vec<String>,
     /// Probability among the candidates.
     pub probability: f64,
@@ -38,14 +38,14 @@ pub struct Candidate {
     pub gap_after: f64,
     /// Closed-gap fraction.
     pub closed: f64,
-    /// Its 95 % interval, by block bootstrap.
+    /// 95 % interval of the closed-gap fraction, by block bootstrap.
     pub closed_ci: [f64; 2],
     /// Whether the mean square error falls on the test trials, by the same bootstrap.
     pub is_confirmed: bool,
     /// Values of the effects' parameters by name; with several effects by `effect.parameter`.
     #[serde(rename = "parameters")]
     pub by_name: BTreeMap<String, f64>,
-    /// The same with units and standard deviations.
+    /// Parameters of the effects with units and standard deviations.
     #[serde(rename = "parameter_values")]
     pub parameters: Vec<EffectValue>,
 }
@@ -63,7 +63,7 @@ pub struct EffectValue {
     pub value: f64,
     /// One standard deviation, from the curvature of the fit with one observation per 0.5 s.
     pub sd: f64,
-    /// Its 95 % interval, within the range that it was looked for in.
+    /// 95 % interval of the value, within the range that was searched.
     #[serde(default)]
     pub interval: [f64; 2],
     /// Whether it only gives the effect its form.
@@ -200,7 +200,7 @@ pub(crate) fn stage_gaps(problem: &Problem<'_>, evidence: &Evidence) -> Vec<Stag
     let total: f64 = evidence.stages.iter().map(|s| s.excess_retuned.max(0.0)).sum();
     let one = |(stage, s): (usize, &StageEvidence)| {
         let spec = &problem.simulator().stages()[stage];
-        let floor = &problem.compare.metrics[stage].floor;
+        let noise = &problem.compare.metrics[stage].noise;
         StageGap {
             stage: spec.name.clone(),
             channel: spec.channel.clone(),
@@ -208,9 +208,9 @@ pub(crate) fn stage_gaps(problem: &Problem<'_>, evidence: &Evidence) -> Vec<Stag
             raw: s.excess_raw,
             excess: s.excess_retuned,
             after: s.excess_after,
-            rms: (1.0 + s.excess_retuned).max(0.0).sqrt() * s.floor,
-            floor: s.floor,
-            floor_source: floor.source.clone(),
+            rms: (1.0 + s.excess_retuned).max(0.0).sqrt() * s.noise,
+            floor: s.noise,
+            floor_source: noise.source.clone(),
             unit: spec.unit.clone(),
         }
     };

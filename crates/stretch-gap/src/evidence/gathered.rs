@@ -1,7 +1,7 @@
 //! The evidence: every trial before and after, test trials included, which nothing has read until here.
 //!
-//! A floor is what no model could remove. Where the best set leaves X < 1 of one over the samples that were looked at, the floor was taken
-//! too high: its square is X of what it was, and excesses count from there.
+//! Noise is what no model could remove. Where the best set leaves a reduced chi-square X < 1 over the samples that were looked at, the noise was
+//! taken too large: its variance is X of what it was, and every excess (reduced chi-square minus one) counts from there.
 
 use crate::{
     evidence::{
@@ -33,12 +33,12 @@ pub struct StageEvidence {
     pub retuned: Vec<f64>,
     /// Output with the best set of effects.
     pub after: Vec<f64>,
-    /// Residual of the re-tuned nominal in floors, slow wander and trial offsets taken out.
+    /// Residual of the re-tuned nominal in multiples of the noise, slow drift and trial offsets taken out.
     pub residual_retuned: Vec<f64>,
-    /// The same with the effects.
+    /// Residual of the best set of effects in multiples of the noise, slow drift and trial offsets taken out.
     pub residual_after: Vec<f64>,
-    /// Floor, one standard deviation in the unit of the output.
-    pub floor: f64,
+    /// Noise, one standard deviation in the unit of the output.
+    pub noise: f64,
     /// Excess on the test trials with the parameters as shipped.
     pub excess_raw: f64,
     /// Excess of the re-tuned nominal on the test trials.
@@ -50,7 +50,7 @@ pub struct StageEvidence {
 /// Everything that a report draws, beside the measured channels that the simulator holds.
 #[derive(Debug, Clone)]
 pub struct Evidence {
-    /// By stage.
+    /// Traces of every stage.
     pub stages: Vec<StageEvidence>,
     /// How the session was cut.
     pub frame: Frame,
@@ -64,17 +64,17 @@ pub struct Evidence {
     pub candidates: Vec<Model>,
     /// One standard deviation of every nominal parameter of the re-tuned nominal, 0 where it is exact.
     pub retuned_sd: Vec<f64>,
-    /// The same of every candidate.
+    /// One standard deviation of every nominal parameter of every candidate.
     pub candidate_sds: Vec<Vec<f64>>,
     /// One standard deviation of every nominal parameter with the best set.
     pub(crate) best_sd: Vec<f64>,
     /// Reduced chi-square of the re-tuned nominal, by stage and test block.
     pub(crate) nominal_blocks: Vec<Vec<f64>>,
-    /// Square of the floor by stage, as a share of what it was taken for: see the module's head.
+    /// Variance of the noise by stage, as a share of what it was taken for: see the module's head.
     levels: Vec<f64>,
     /// The strongest effect of the best set.
     pub(crate) best_effect: Option<usize>,
-    /// How large the gap is.
+    /// Size of the gap.
     pub(crate) gap: Excess,
     /// How the stage with the largest gap answers to the numbers of the best set; none unless [asked for](crate::Options::responses), or
     /// where no effect acts in it.
@@ -89,7 +89,7 @@ struct Traces {
 }
 
 impl Traces {
-    /// `level` is the square of the floor as a share of what it was taken for.
+    /// `level` is the variance of the noise as a share of what it was taken for.
     fn of(
         problem: &Problem<'_>,
         stage: usize,
@@ -108,7 +108,7 @@ impl Traces {
     }
 }
 
-/// A difference of outputs in floors, and that without the most likely nuisances; without the lines that a model leaves where it is not
+/// A difference of outputs in multiples of the noise, and that without the most likely nuisances; without the lines that a model leaves where it is not
 /// fitted. Both are linear in it.
 pub(crate) fn held_out(
     problem: &Problem<'_>,
@@ -118,15 +118,15 @@ pub(crate) fn held_out(
 ) -> (Vec<f64>, Vec<f64>) {
     let (compare, simulator) = (&problem.compare, problem.simulator());
     let metric = &compare.metrics[stage];
-    let mut whole: Vec<f64> = apart.iter().zip(&metric.floor.sd).map(|(x, sd)| x / sd).collect();
+    let mut whole: Vec<f64> = apart.iter().zip(&metric.noise.sd).map(|(x, sd)| x / sd).collect();
     let mut residual = whole.clone();
     metric.clean(&compare.frame, &mut residual);
     let lines = simulator.spectral_lines().map_or_else(Vec::new, |s| s.lines(stage, model));
     for tested in compare.frame.of_role(Role::Test).map(|s| s.from..s.to) {
-        let floor = &metric.floor.sd[tested.clone()];
+        let sd = &metric.noise.sd[tested.clone()];
         for line in &lines {
-            line.level(&mut residual[tested.clone()], floor, simulator.dt_s());
-            line.level(&mut whole[tested.clone()], floor, simulator.dt_s());
+            line.level(&mut residual[tested.clone()], sd, simulator.dt_s());
+            line.level(&mut whole[tested.clone()], sd, simulator.dt_s());
         }
     }
     (whole, residual)
@@ -165,7 +165,7 @@ impl Evidence {
                 after: after.output,
                 residual_retuned: retuned.residual,
                 residual_after: after.residual,
-                floor: levels[stage].sqrt() * metric.floor.rms,
+                noise: levels[stage].sqrt() * metric.noise.rms,
                 excess_raw: excess(mean_square(&raw.blocks)),
                 excess_retuned: excess(mean_square(&retuned.blocks)),
                 excess_after: excess(mean_square(&after.blocks)),
@@ -193,14 +193,14 @@ impl Evidence {
         Ok((evidence, weighed))
     }
 
-    /// What the best set leaves of a stage, as [`held_out`] tells it.
+    /// What the best set leaves of a stage, as [`held_out`] gives it.
     pub(crate) fn left(&self, problem: &Problem<'_>, stage: usize) -> (Vec<f64>, Vec<f64>) {
         let measured = problem.simulator().measured(stage).iter();
         let apart: Vec<f64> = measured.zip(&self.stages[stage].after).map(|(m, s)| m - s).collect();
         held_out(problem, stage, &self.best, &apart)
     }
 
-    /// Square of a stage's floor as a share of what it was taken for.
+    /// Variance of a stage's noise as a share of what it was taken for.
     pub(crate) fn level(&self, stage: usize) -> f64 {
         self.levels[stage]
     }
@@ -216,7 +216,7 @@ impl Evidence {
     }
 }
 
-/// Square of a stage's floor as a share of what it was taken for. Without an effect there nothing says that it was too high.
+/// Variance of a stage's noise as a share of what it was taken for. Without an effect there nothing says that it was too high.
 fn level(problem: &Problem<'_>, best: &Hypothesis, stage: usize) -> f64 {
     let effects = problem.simulator().effects();
     let mut acting = best.effects.iter();

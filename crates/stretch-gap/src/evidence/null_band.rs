@@ -2,7 +2,7 @@
 //!
 //! Draws of a record in which nothing is missing, of the trials and the noise at hand. In the metric the output's own noise is white
 //! whatever its nuisances are, so that N samples leave a chi-square; noise of the measured input, t, arrives through the stage as the
-//! simulator transmits it, slow as it may be, and has the share u of the floor:
+//! simulator transmits it, slow as it may be, and has the share u of the noise:
 //!
 //! ```text
 //! X = ((1 - u)|z|^2 + 2 g sqrt((1 - u) t'V^-1 t) + t'V^-1 t) / N,     z ~ N(0, I), g ~ N(0, 1)
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::{
     fit::{prepared::Problem, score::gap},
-    numerics::random::Dice,
+    numerics::random::RandomGenerator,
     problem::{error::GapError, frame::Role, simulator::Run},
 };
 
@@ -29,7 +29,7 @@ pub(crate) fn null_band(problem: &Problem<'_>, seed: u64) -> Result<f64, GapErro
     let arrives: Result<Vec<Vec<f64>>, GapError> =
         stages.map(|stage| arrives(problem, stage)).collect();
     let arrives = arrives?;
-    let one = |record| excess(problem, &arrives, record, Dice::new(seed, record as u64));
+    let one = |record| excess(problem, &arrives, record, RandomGenerator::new(seed, record as u64));
     let mut excesses: Vec<f64> = (0..RECORDS).map(one).collect();
     excesses.sort_by(f64::total_cmp);
     let last = (WITHIN * RECORDS as f64).ceil() as usize - 1;
@@ -37,7 +37,12 @@ pub(crate) fn null_band(problem: &Problem<'_>, seed: u64) -> Result<f64, GapErro
 }
 
 /// Excess of one record.
-fn excess(problem: &Problem<'_>, arrives: &[Vec<f64>], record: usize, mut dice: Dice) -> f64 {
+fn excess(
+    problem: &Problem<'_>,
+    arrives: &[Vec<f64>],
+    record: usize,
+    mut random: RandomGenerator,
+) -> f64 {
     let frame = &problem.compare.frame;
     let looked = (frame.count(Role::Fit) + frame.count(Role::Held)) as f64;
     let (mut fitted, mut tested) = (0.0, 0.0);
@@ -45,9 +50,9 @@ fn excess(problem: &Problem<'_>, arrives: &[Vec<f64>], record: usize, mut dice: 
         let own = (1.0 - problem.transmits(stage)).max(0.0);
         let mut chance = |samples: f64| {
             // The sum of N squares, nearly normal: mean N, variance 2N.
-            let white = own * (samples + (2.0 * samples).sqrt() * dice.gauss());
+            let white = own * (samples + (2.0 * samples).sqrt() * random.gauss());
             let other = arrives[record] * samples;
-            gap((white + 2.0 * dice.gauss() * (own * other).sqrt() + other) / samples)
+            gap((white + 2.0 * random.gauss() * (own * other).sqrt() + other) / samples)
         };
         fitted += chance(looked);
         tested += chance((frame.count(Role::Test) as f64).max(1.0));
@@ -67,7 +72,7 @@ fn arrives(problem: &Problem<'_>, stage: usize) -> Result<Vec<f64>, GapError> {
     let metric = &compare.metrics[stage];
     let samples = compare.frame.count(Role::Fit) + compare.frame.count(Role::Held);
     let one = |record: usize| {
-        let shaken = compare.arrived(Run { shake: Some(record as u64), ..run }, &plain)?;
+        let shaken = compare.arrived(Run { input_noise: Some(record as u64), ..run }, &plain)?;
         let column = metric.column(&compare.frame, shaken);
         let square = |role| metric.product(&compare.frame, &column, &column, role);
         Ok((square(Role::Fit) + square(Role::Held)) / samples.max(1) as f64)

@@ -55,7 +55,7 @@ pub(crate) fn weigh(
     all
 }
 
-/// Probability that something else than mismatch of its form leaves what the best set leaves: even where that is what form may leave,
+/// Probability that something else than its model discrepancy leaves what the best set leaves: even where that is what form may leave,
 /// by the logistic of the logarithm beyond, with the odds that it has at the border.
 pub(crate) fn unknown(gap: Excess, thresholds: &Thresholds) -> f64 {
     let allowed = thresholds.unknown_excess + thresholds.unknown_share * gap.retuned;

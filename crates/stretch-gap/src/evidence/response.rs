@@ -1,7 +1,7 @@
 //! How the output answers to each number of an effect: what a page needs to turn it without a simulator.
 //!
 //! One parameter at a time takes a few values around the fitted one, D(v) = output(v) - output(fitted). Between two of them the answer is
-//! told by a straight line, of several parameters by their sum; what is left on the test trials follows from the products of
+//! interpolated by a straight line, of several parameters by their sum; what is left on the test trials follows from the products of
 //! the answers with each other and with what the best set leaves, x = (r - sum w D)' V^-1 (r - sum w D), and is exact wherever
 //! the D are.
 
@@ -22,7 +22,7 @@ pub struct Responses {
 pub struct Response {
     /// The effect.
     pub effect: String,
-    /// Its parameter.
+    /// Parameter of that effect.
     pub name: String,
     /// Unit of the parameter.
     pub unit: String,
@@ -32,13 +32,13 @@ pub struct Response {
     pub answers: Vec<Answered>,
 }
 
-/// What one value changes.
+/// What one value of the parameter changes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answered {
-    /// Of the parameter.
+    /// Value of the parameter.
     pub value: f64,
     /// Output less that of the fitted value, in the unit of the stage, all trials end to end.
     pub output: Vec<f64>,
-    /// The same in floors, slow wander and trial offsets taken out: what it takes from [`residual_after`](crate::StageEvidence::residual_after).
+    /// Change of the output in multiples of the noise, slow drift and trial offsets taken out: what the value takes from [`residual_after`](crate::StageEvidence::residual_after).
     pub residual: Vec<f64>,
 }

@@ -104,7 +104,7 @@ fn values(spec: &EffectParameter, fitted: f64, sd: f64) -> Vec<f64> {
     values
 }
 
-/// x' V^-1 y of every pair, a mean over the blocks of the test trials; `columns` hold x and V^-1 x, in floors whose square is `level` of
+/// x' V^-1 y of every pair, a mean over the blocks of the test trials; `columns` hold x and V^-1 x, in multiples of the noise whose square is `level` of
 /// what they were taken for.
 fn products(problem: &Problem<'_>, level: f64, columns: &[(&[f64], &[f64])]) -> Vec<Vec<f64>> {
     let frame = &problem.compare.frame;

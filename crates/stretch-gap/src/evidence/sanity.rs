@@ -1,10 +1,10 @@
-//! Is it the right simulator at all? What the judge is told of that.
+//! Is it the right simulator at all? The two signs that the judge looks at.
 //!
 //! Two signs that data come from something else than the simulator is of:
 //!
 //! * *gross misfit*: more of a channel's variance is left on the test trials than a missing effect leaves
 //!   ([`RecordFacts::gross_misfit_share`](crate::RecordFacts::gross_misfit_share)): another rig, or a column that is not what its name says. The share is that of
-//!   1 - R^2, noise taken off: (sum (y - y_sim)^2 - N floor^2)/sum (y - mean y)^2;
+//!   1 - R^2, noise taken off: (sum (y - y_sim)^2 - N s^2)/sum (y - mean y)^2;
 //! * *at bounds*: two parameters of a stage stand at the end of their tolerances and more than noise is left all the same. If the
 //!   same two, set loose, explain as much without any effect, what bends them is no effect but other parameters.
 
@@ -27,7 +27,7 @@ const LOOSE: f64 = 5.0;
 /// Share of its nominal value that a parameter keeps then.
 const KEPT: f64 = 0.02;
 
-/// What was found out.
+/// Whether the data can come from the simulator at all.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sanity {
     /// By stage: share of its channel's variance that the best effects leave.
@@ -42,7 +42,7 @@ pub(crate) struct Sanity {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct AtBounds {
     pub(crate) stage: usize,
-    /// These parameters.
+    /// Indices of the parameters at the end of their tolerances.
     pub(crate) ended: Vec<usize>,
     /// Excess that is left on the test trials.
     pub(crate) left: f64,
@@ -82,7 +82,7 @@ fn left(simulator: &dyn Simulator, evidence: &Evidence, stage: usize) -> f64 {
     }
     let variance = squares - sum * sum / f64::max(count, 1.0);
     // What is noise is nobody's fault.
-    let noise = count * traces.floor * traces.floor;
+    let noise = count * traces.noise * traces.noise;
     (left - noise) / variance.max(noise).max(f64::MIN_POSITIVE)
 }
 

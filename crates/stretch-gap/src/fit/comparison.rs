@@ -6,7 +6,7 @@ use crate::{
     fit::{
         coordinate::{Coordinate, coordinates},
         metric::{Column, Metric},
-        noise_level::floors_of,
+        noise_level::noise_levels,
         octaves::Octaves,
         score::{Misfit, samples_per_observation},
     },
@@ -22,7 +22,7 @@ use crate::{
 /// Draws of the measured input's noise; the same for every model, so that differences of models are none of the draws'.
 const DRAWS: u64 = 4;
 
-/// What a fit needs to know.
+/// A simulator beside its measurements, with the metric of every stage.
 #[derive(Clone)]
 pub(crate) struct Comparison<'a> {
     pub(crate) runs: Runs<'a>,
@@ -43,12 +43,12 @@ impl<'a> Comparison<'a> {
         like: Option<&[Metric]>,
         seed: u64,
     ) -> Result<Self, GapError> {
-        let floors = floors_of(&runs, &frame, model, seed)?;
-        let floors: Vec<_> = floors.into_iter().enumerate().collect();
-        let metrics: Result<Vec<Metric>, GapError> = floors
+        let levels = noise_levels(&runs, &frame, model, seed)?;
+        let levels: Vec<_> = levels.into_iter().enumerate().collect();
+        let metrics: Result<Vec<Metric>, GapError> = levels
             .into_par_iter()
-            .map(|(stage, floor)| {
-                Metric::of(&runs, &frame, stage, floor, model, like.map(|l| &l[stage]))
+            .map(|(stage, noise)| {
+                Metric::of(&runs, &frame, stage, noise, model, like.map(|l| &l[stage]))
             })
             .collect();
         Ok(Self { metrics: metrics?, runs, frame })
@@ -90,7 +90,7 @@ impl<'a> Comparison<'a> {
         1.0 / self.frame.block as f64
     }
 
-    /// Measured minus simulated, in floors, over the trials that fits run.
+    /// Measured minus simulated, in multiples of the noise, over the trials that fits run.
     pub(crate) fn residual_values(
         &self,
         stage: usize,
@@ -100,15 +100,15 @@ impl<'a> Comparison<'a> {
         Ok(self.apart(stage, values))
     }
 
-    /// The run of a stage over the trials that fits run; may be told from a run near by.
+    /// The run of a stage over the trials that fits run; may be taken from the linearisation at a run near by.
     fn run_of<'m>(&self, stage: usize, model: &'m Model, near: Option<&'m [f64]>) -> Run<'m> {
         Run { near, ..Run::exact(stage, model, self.frame.fit_trials) }
     }
 
-    /// Measured minus simulated, in floors.
+    /// Measured minus simulated, in multiples of the noise.
     fn apart(&self, stage: usize, mut values: Vec<f64>) -> Vec<f64> {
         let measured = self.simulator().measured(stage);
-        for ((x, m), sd) in values.iter_mut().zip(measured).zip(&self.metrics[stage].floor.sd) {
+        for ((x, m), sd) in values.iter_mut().zip(measured).zip(&self.metrics[stage].noise.sd) {
             *x = (m - *x) / sd;
         }
         values
@@ -126,7 +126,7 @@ impl<'a> Comparison<'a> {
         outputs.map(|(output, (stage, _))| Ok(self.apart(*stage, output?))).collect()
     }
 
-    /// The same, ready for products.
+    /// Measured minus simulated, in multiples of the noise, ready for products.
     pub(crate) fn residual(&self, stage: usize, model: &Model) -> Result<Column, GapError> {
         let values = self.residual_values(stage, model)?;
         Ok(self.metrics[stage].column(&self.frame, values))
@@ -166,7 +166,7 @@ impl<'a> Comparison<'a> {
         Ok(samples_per_observation(&parts.collect::<Vec<_>>(), self.frame.block))
     }
 
-    /// Octaves of a residual in floors over fitted and held-out samples.
+    /// Octaves of a residual in multiples of the noise over fitted and held-out samples.
     fn octaves(&self, stage: usize, residual: &[f64]) -> Octaves {
         let mut clean = residual.to_vec();
         self.metrics[stage].clean(&self.frame, &mut clean);
@@ -177,22 +177,22 @@ impl<'a> Comparison<'a> {
         octaves
     }
 
-    /// Noise transmitted: what of the measured input's noise arrives at the output of a stage, in floors squared.
+    /// Noise transmitted: what of the measured input's noise arrives at the output of a stage, in variances of the noise.
     pub(crate) fn transmitted(&self, stage: usize, model: &Model) -> Result<Misfit, GapError> {
         let run = Run::exact(stage, model, self.frame.fit_trials);
         let plain = self.runs.run(run)?;
         let mut mean = Misfit { stage, ..Misfit::default() };
         for draw in 0..DRAWS {
-            let shaken = self.arrived(Run { shake: Some(draw), ..run }, &plain)?;
+            let arrived = self.arrived(Run { input_noise: Some(draw), ..run }, &plain)?;
             let power = |role| {
-                let parts = self.frame.of_role(role).map(|s| &shaken[s.from..s.to]);
+                let parts = self.frame.of_role(role).map(|s| &arrived[s.from..s.to]);
                 let sum: f64 = parts.map(|part| dot(part, part)).sum();
                 sum / (self.frame.count(role) as f64).max(1.0)
             };
             mean.fit += power(Role::Fit) / DRAWS as f64;
             mean.held += power(Role::Held) / DRAWS as f64;
             for s in self.frame.looked_at() {
-                mean.octaves.add(&shaken[s.from..s.to], &shaken[s.from..s.to]);
+                mean.octaves.add(&arrived[s.from..s.to], &arrived[s.from..s.to]);
             }
             if mean.fit == 0.0 {
                 break;
@@ -202,19 +202,19 @@ impl<'a> Comparison<'a> {
         Ok(mean)
     }
 
-    /// What one draw of the measured input's noise makes of an output that is `plain` without it, in floors.
+    /// What one draw of the measured input's noise makes of an output that is `plain` without it, in multiples of the noise.
     pub(crate) fn arrived(&self, run: Run<'_>, plain: &[f64]) -> Result<Vec<f64>, GapError> {
-        let mut shaken = self.runs.run(run)?;
-        let sds = &self.metrics[run.stage].floor.sd;
-        for ((x, y), sd) in shaken.iter_mut().zip(plain).zip(sds) {
+        let mut arrived = self.runs.run(run)?;
+        let sds = &self.metrics[run.stage].noise.sd;
+        for ((x, y), sd) in arrived.iter_mut().zip(plain).zip(sds) {
             *x = (*x - y) / sd;
         }
-        Ok(shaken)
+        Ok(arrived)
     }
 
     /// Sensitivities -dr/dx of the stages to some coordinates, by one-sided differences in one batch; none where a coordinate does not act.
     ///
-    /// The moved runs may be told from a run at the parameters `near`.
+    /// The moved runs may be taken from a run at the parameters `near`.
     pub(crate) fn sensitivities(
         &self,
         stages: &[usize],

@@ -1,7 +1,7 @@
 //! How large and how quick the nuisances of a stage are, from the record.
 //!
-//! A supply wanders by a tenth of a per cent or by half of one, in half a second or in thirty; who assumes one of these finds an effect in
-//! the difference. So size a and correlation time tau of every wander, and the size of offsets, are those of the greatest
+//! A supply drifts by a tenth of a per cent or by half of one, in half a second or in thirty; who assumes one of these finds an effect in
+//! the difference. So size a and correlation time tau of every slow drift, and the size of offsets, are those of the greatest
 //!
 //! ```text
 //! L = -(r'V^-1 r + ln det V)/2 + ln p(a, tau),     V = s I + C P^-1 C'
@@ -28,7 +28,7 @@ const TIMES_S: [f64; 7] = [0.3, 0.7, 1.5, 3.0, 6.0, 12.0, 30.0];
 const SPREAD: (f64, f64) = (0.7, 1.1);
 
 impl Metric {
-    /// The metric with nuisances of the greatest likelihood for a residual in floors, and by how many nats it is greater than with
+    /// The metric with nuisances of the greatest likelihood for a residual in multiples of the noise, and by how many nats it is greater than with
     /// those of this one.
     pub(crate) fn adapted(&self, frame: &Frame, dt_s: f64, residual: &[f64]) -> (Self, f64) {
         let (mut best, mut gained) = (self.clone(), 0.0);
@@ -52,7 +52,7 @@ impl Metric {
         (best, gained)
     }
 
-    /// ln of the likelihood beside a floor that is `noise` times as high, a and tau integrated over:
+    /// ln of the likelihood beside noise that is `noise` times as large, a and tau integrated over:
     ///
     /// ```text
     /// ln E = l + sum over nuisances i of ln( sum_k p_k exp(l_k - l) / sum_k p_k )
@@ -79,13 +79,13 @@ impl Metric {
         own + (0..self.loose().len()).map(one).sum::<f64>()
     }
 
-    /// L of the module's head beside a floor that is `noise` times as high.
+    /// L of the module's head beside noise that is `noise` times as large.
     fn beside(&self, frame: &Frame, dt_s: f64, residual: &[f64], noise: f64) -> f64 {
         let price: f64 = self.loose().iter().map(|loose| cost(loose, loose.level)).sum();
         self.likelihood_beside(frame, dt_s, residual, noise) - price
     }
 
-    /// The likelihood beside a floor that is `noise` times as high: V/s has nuisances that much smaller.
+    /// The likelihood beside noise that is `noise` times as large: V/s has nuisances that much smaller.
     fn likelihood_beside(&self, frame: &Frame, dt_s: f64, residual: &[f64], noise: f64) -> f64 {
         if noise == 1.0 {
             return self.likelihood(frame, residual);
@@ -116,7 +116,7 @@ impl Metric {
 }
 
 fn hypotheses(loose: &Loose) -> impl Iterator<Item = Level> {
-    let times_s: Vec<f64> = match loose.wander {
+    let times_s: Vec<f64> = match loose.drift {
         _ if loose.is_by_tick => Vec::new(),
         Some(_) => TIMES_S.into(),
         None => vec![loose.level.time_s],
@@ -126,7 +126,7 @@ fn hypotheses(loose: &Loose) -> impl Iterator<Item = Level> {
 
 /// -ln p.
 fn cost(loose: &Loose, Level { size, time_s }: Level) -> f64 {
-    let usual_s = loose.wander.map_or(time_s, |w| w.correlation_s);
+    let usual_s = loose.drift.map_or(time_s, |w| w.correlation_s);
     0.5 * (size.ln() / SPREAD.0).powi(2) + 0.5 * ((time_s / usual_s).ln() / SPREAD.1).powi(2)
 }
 
@@ -140,33 +140,35 @@ fn log_sum_exp(values: impl IntoIterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{fit::noise_level::Floor, numerics::random::Dice, problem::frame::Segment};
+    use crate::{
+        fit::noise_level::NoiseLevel, numerics::random::RandomGenerator, problem::frame::Segment,
+    };
 
-    /// A residual of noise and a wander that acts with changing strength.
+    /// A residual of noise and a drift that acts with changing strength.
     fn residual(size: f64, time_s: f64, drive: &[f64]) -> Vec<f64> {
-        let mut dice = Dice::new(12, (100.0 * time_s) as u64);
+        let mut random = RandomGenerator::new(12, (100.0 * time_s) as u64);
         let kept = (-0.01 / time_s).exp();
-        let mut wander = dice.gauss();
+        let mut drift = random.gauss();
         let one = |drive: &f64| {
-            wander = kept * wander + (1.0 - kept * kept).sqrt() * dice.gauss();
-            size * drive * wander + dice.gauss()
+            drift = kept * drift + (1.0 - kept * kept).sqrt() * random.gauss();
+            size * drive * drift + random.gauss()
         };
         drive.iter().map(one).collect()
     }
 
     #[test]
-    fn size_and_time_of_a_wander_are_found_again() {
+    fn size_and_time_of_a_slow_drift_are_found_again() {
         let samples = 20_000;
         let drive: Vec<f64> = (0..samples).map(|i| 2.0 + (0.003 * i as f64).sin()).collect();
-        let floor = Floor { sd: vec![1.0; samples], rms: 1.0, source: String::new() };
+        let noise = NoiseLevel { sd: vec![1.0; samples], rms: 1.0, source: String::new() };
         let frame = Frame {
             segments: vec![Segment { trial: 0, from: 0, to: samples, role: Role::Fit }],
             block: 50,
             fit_trials: 1,
             borrowed_test: false,
         };
-        let described = crate::problem::spec::Wander { sd: 1.0, correlation_s: 4.0 };
-        let metric = Metric::with_wander(floor, drive.clone(), described, &frame, 0.01);
+        let described = crate::problem::spec::SlowDrift { sd: 1.0, correlation_s: 4.0 };
+        let metric = Metric::with_drift(noise, drive.clone(), described, &frame, 0.01);
         for (size, time_s) in [(0.4, 0.7), (1.6, 3.0), (1.0, 12.0)] {
             let record = residual(size, time_s, &drive);
             let (adapted, gained) = metric.adapted(&frame, 0.01, &record);

@@ -11,7 +11,7 @@ pub(crate) struct Hypothesis {
     pub(crate) effects: Vec<usize>,
     /// Maximum a posteriori.
     pub(crate) model: Model,
-    /// By stage.
+    /// What the model leaves of each stage.
     pub(crate) misfits: Vec<Misfit>,
     /// One standard deviation of the parameters of each effect.
     pub(crate) effect_sd: BTreeMap<usize, Vec<f64>>,

@@ -39,24 +39,24 @@ pub enum Knowledge {
     Weakly,
     /// No better than its tolerance says.
     Not,
-    /// It changes nothing that was measured.
+    /// The parameter changes nothing that was measured.
     Dead,
 }
 
 /// What the data say of one nominal parameter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Identified {
-    /// Its name.
+    /// Name of the parameter.
     pub name: String,
-    /// Its unit.
+    /// Unit of the parameter.
     pub unit: String,
-    /// How well it is known.
+    /// How well the data determine the parameter.
     pub knowledge: Knowledge,
-    /// Its tolerance, one standard deviation.
+    /// Tolerance of the parameter, one standard deviation.
     pub tolerance: f64,
-    /// Its standard deviation with the data, re-tuned without effects.
+    /// Standard deviation of the parameter given the data, re-tuned without effects.
     pub sd: f64,
-    /// The same if all others were known.
+    /// Standard deviation that the parameter would have if all others were known.
     pub sd_alone: f64,
     /// Parameters that do the same as far as these data tell: only together are they known.
     pub like: Vec<String>,

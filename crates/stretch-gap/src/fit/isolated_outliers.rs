@@ -1,28 +1,28 @@
-//! Samples that stand alone: what one sample says and none of its neighbours is the recorder's, not the rig's.
+//! Isolated outliers: what one sample says and none of its neighbours is the recorder's, not the rig's.
 //!
-//! In the residual r, in floors, of the re-tuned simulator nothing moves any more, so that a value that was hidden in the motion stands out.
-//! A sample is alone where it is off both neighbours to the same side,
+//! In the residual r, in multiples of the noise, of the re-tuned simulator nothing moves any more, so that a value that was hidden in the motion stands out.
+//! A sample is isolated where it is off both neighbours to the same side,
 //!
 //! ```text
 //! min(|r_i - r_(i-1)|, |r_i - r_(i+1)|) > 8 max(1, s),     s = median of |steps| within half a second / 0.954
 //! ```
 //!
-//! with the deviation s of the noise that the steps beside it show, so that a hum is not alone. A step or a kink of a gap is off one neighbour
-//! only. Such a sample counts for nothing, as one that was lost. Where more than one of [`RARE`] are alone they are no exceptions, and count.
+//! with the deviation s of the noise that the steps beside it show, so that a hum is not isolated. A step or a kink of a gap is off one neighbour
+//! only. Such a sample counts for nothing, as one that was lost. Where more than one of [`RARE`] are isolated they are no exceptions, and count.
 
 use std::ops::Range;
 
-/// Deviations beyond which a sample is alone: of normal noise one in 10^9.
+/// Deviations beyond which a sample is isolated: of normal noise one in 10^9.
 const ALONE: f64 = 8.0;
 /// Median size of a step of white noise of one standard deviation: 0.6745 sqrt 2.
 const MEDIAN_STEP: f64 = 0.954;
-/// Steps on either side that tell the noise.
+/// Steps on either side that the noise is estimated from.
 const NEAR: usize = 25;
-/// Samples among which one that is alone is an exception.
+/// Samples among which an isolated one is an exception.
 const RARE: usize = 200;
 
-/// Samples of a residual in floors that stand alone within their trials.
-pub(crate) fn lone(residual: &[f64], trials: impl Iterator<Item = Range<usize>>) -> Vec<usize> {
+/// Samples of a residual in multiples of the noise that are isolated within their trials.
+pub(crate) fn isolated(residual: &[f64], trials: impl Iterator<Item = Range<usize>>) -> Vec<usize> {
     let mut out = Vec::new();
     for trial in trials {
         let r = &residual[trial.clone()];
@@ -49,11 +49,11 @@ fn deviation(steps: &[f64], at: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::random::Dice;
+    use crate::numerics::random::RandomGenerator;
 
     fn noise(count: usize) -> Vec<f64> {
-        let mut dice = Dice::new(6, 0);
-        (0..count).map(|_| dice.gauss()).collect()
+        let mut random = RandomGenerator::new(6, 0);
+        (0..count).map(|_| random.gauss()).collect()
     }
 
     #[test]
@@ -67,20 +67,20 @@ mod tests {
             _ => 0.0,
         };
         let with_gap: Vec<f64> = noise(count).iter().enumerate().map(|(i, x)| x + gap(i)).collect();
-        assert!(lone(&noise(count), whole()).is_empty());
-        assert!(lone(&with_gap, whole()).is_empty());
+        assert!(isolated(&noise(count), whole()).is_empty());
+        assert!(isolated(&with_gap, whole()).is_empty());
         let mut record = with_gap;
         let places = [7, 1200, 2200, 5000];
         for place in places {
             record[place] += 20.0;
         }
-        assert_eq!(lone(&record, whole()), places);
+        assert_eq!(isolated(&record, whole()), places);
         // One in a hundred is no exception.
         let often: Vec<f64> = noise(count)
             .iter()
             .enumerate()
             .map(|(i, x)| x + 20.0 * f64::from(i % 100 == 50))
             .collect();
-        assert!(lone(&often, whole()).is_empty());
+        assert!(isolated(&often, whole()).is_empty());
     }
 }

@@ -41,7 +41,7 @@ pub(crate) struct Fitted {
     pub(crate) model: Model,
     /// J of the module's head.
     pub(crate) cost: f64,
-    /// Of the stages that were fitted.
+    /// What the model leaves of each stage that was fitted.
     pub(crate) misfits: Vec<Misfit>,
     /// One standard deviation of each effect parameter, in the order of the model's effects.
     pub(crate) effect_sd: Vec<Vec<f64>>,
@@ -51,14 +51,14 @@ pub(crate) struct Fitted {
     pub(crate) information: Information,
 }
 
-/// How much work a fit may be.
+/// How much work may go into a fit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {
     /// Most iterations.
     iterations: usize,
     /// Iterations at which the sensitivities of the nominal parameters are taken anew.
     renewals: &'static [usize],
-    /// Whether steps of the nominal parameters may be told from a run at those that the fit starts from.
+    /// Whether steps of the nominal parameters may be taken from a run at those that the fit starts from.
     is_rough: bool,
 }
 
@@ -128,9 +128,9 @@ struct Descent<'a, 'b> {
     stages: &'a [usize],
     coordinates: Vec<(Coordinate, [f64; 2])>,
     model: Model,
-    /// Parameters near which steps may be told; none where each is a run of its own.
+    /// Parameters near which steps may be taken; none where each is a run of its own.
     near: Option<Vec<f64>>,
-    /// By stage, as `stages`.
+    /// The residual of each stage, in the order of `stages`.
     residuals: Vec<Column>,
     cost: f64,
     /// Sensitivities by coordinate, then by stage; none where a coordinate does not act.

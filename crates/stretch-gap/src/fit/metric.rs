@@ -1,7 +1,7 @@
-//! The metric of one stage: residuals in floors, nuisances marginalised.
+//! The metric of one stage: residuals in multiples of the noise, nuisances marginalised.
 //!
 //! Within one segment the residual r has the covariance V = I + C P^-1 C' of the [nuisance](crate::fit::nuisance): white noise
-//! of one floor, and what wander and offsets of parameters may change. Segments are independent, so that the squared Mahalanobis
+//! of variance 1, and what slow drift and offsets of parameters may change. Segments are independent, so that the squared Mahalanobis
 //! length of a residual, its chi-square, is
 //!
 //! ```text
@@ -15,8 +15,8 @@ use std::sync::Arc;
 
 use crate::{
     fit::{
-        noise_level::Floor,
-        nuisance::{Nuisance, Patch, Wandering},
+        noise_level::NoiseLevel,
+        nuisance::{Drifting, Nuisance, Patch},
     },
     numerics::linear::dot,
     problem::{
@@ -24,7 +24,7 @@ use crate::{
         frame::{Frame, Role, Segment},
         runs::Runs,
         simulator::Model,
-        spec::Wander,
+        spec::SlowDrift,
     },
 };
 
@@ -32,25 +32,25 @@ use crate::{
 #[derive(Debug, Clone)]
 pub(crate) struct Metric {
     /// One standard deviation of the noise, sample by sample.
-    pub(crate) floor: Floor,
-    /// Parameters of the stage that wander or are offset in each trial.
+    pub(crate) noise: NoiseLevel,
+    /// Parameters of the stage that drift or are offset in each trial.
     loose: Vec<Loose>,
-    /// By segment of the frame; none where no parameter of the stage is loose.
+    /// The nuisance of each segment of the frame; none where no parameter of the stage is loose.
     nuisances: Vec<Option<Nuisance>>,
 }
 
-/// A parameter that wanders or is offset in each trial.
+/// A parameter that drifts or is offset in each trial.
 #[derive(Debug, Clone)]
 pub(crate) struct Loose {
-    /// Change of the output, in floors, for one standard deviation as the simulator describes it.
+    /// Change of the output, in multiples of the noise, for one standard deviation as the simulator describes it.
     column: Arc<[f64]>,
     /// See [`RecordFacts::drift_clocks`](crate::RecordFacts::drift_clocks).
     clock: Arc<[u32]>,
-    /// How it wanders as the simulator describes it; none for an offset.
-    pub(crate) wander: Option<Wander>,
+    /// The slow drift of the parameter as the simulator describes it; none for an offset.
+    pub(crate) drift: Option<SlowDrift>,
     /// Whether each tick of the clock has an offset of its own, as large as the simulator describes it.
     pub(crate) is_by_tick: bool,
-    /// How it is taken to.
+    /// Size and correlation time that the drift is taken to have.
     pub(crate) level: Level,
 }
 
@@ -61,7 +61,7 @@ pub(crate) struct Level {
     pub(crate) time_s: f64,
 }
 
-/// A residual or a sensitivity over whole segments, in floors, ready for products.
+/// A residual or a sensitivity over whole segments, in multiples of the noise, ready for products.
 #[derive(Debug, Clone)]
 pub(crate) struct Column {
     pub(crate) values: Vec<f64>,
@@ -70,13 +70,13 @@ pub(crate) struct Column {
 }
 
 impl Metric {
-    /// The metric of a stage around a model: its sensitivities to the parameters that wander or are offset in each trial
-    /// tell what of a residual can be theirs. They wander as the simulator describes it, unless `like` says otherwise.
+    /// The metric of a stage around a model: its sensitivities to the parameters that drift or are offset in each trial
+    /// tell what of a residual can be theirs. They drift as the simulator describes it, unless `like` says otherwise.
     pub(crate) fn of(
         runs: &Runs<'_>,
         frame: &Frame,
         stage: usize,
-        floor: Floor,
+        noise: NoiseLevel,
         model: &Model,
         like: Option<&Self>,
     ) -> Result<Self, GapError> {
@@ -84,12 +84,12 @@ impl Metric {
         let specs = simulator.parameters();
         let sd = |p: usize| {
             let spec = &specs[p];
-            spec.wander.map(|w| w.sd).or(spec.per_trial_sd).or(spec.per_tick_sd)
+            spec.drift.map(|w| w.sd).or(spec.per_trial_sd).or(spec.per_tick_sd)
         };
         let is_loose = |p: &usize| sd(*p).is_some();
         let own = simulator.stages()[stage].parameters.iter().copied();
         let parameters: Vec<usize> = own.filter(is_loose).collect();
-        let mut metric = Self { floor, loose: Vec::new(), nuisances: Vec::new() };
+        let mut metric = Self { noise, loose: Vec::new(), nuisances: Vec::new() };
         let trials = simulator.trials();
         let plain = match parameters.is_empty() {
             true => Vec::new(),
@@ -100,15 +100,15 @@ impl Metric {
             let mut moved = model.clone();
             moved.parameters[p] += sd(p).unwrap_or(0.0);
             let mut column = runs.output(stage, &moved, trials.len())?;
-            for ((x, y), sd) in column.iter_mut().zip(&plain).zip(&metric.floor.sd) {
+            for ((x, y), sd) in column.iter_mut().zip(&plain).zip(&metric.noise.sd) {
                 *x = (*x - y) / sd;
             }
             let always = || trials.iter().flat_map(|t| 0..t.samples as u32).collect();
             let clock = simulator.record().drift_clock(p).map_or_else(always, <[u32]>::to_vec);
-            let level = Level { size: 1.0, time_s: spec.wander.map_or(1.0, |w| w.correlation_s) };
+            let level = Level { size: 1.0, time_s: spec.drift.map_or(1.0, |w| w.correlation_s) };
             let is_by_tick = spec.per_tick_sd.is_some();
             let (column, clock) = (column.into(), clock.into());
-            metric.loose.push(Loose { column, clock, wander: spec.wander, is_by_tick, level });
+            metric.loose.push(Loose { column, clock, drift: spec.drift, is_by_tick, level });
         }
         if let Some(like) = like {
             let pairs = metric.loose.iter_mut().zip(&like.loose);
@@ -122,7 +122,7 @@ impl Metric {
     fn marginalise(&mut self, frame: &Frame, dt_s: f64) {
         let one = |segment: &Segment| {
             let range = segment.from..segment.to;
-            let (mut offsets, mut wandering) = (Vec::new(), Vec::new());
+            let (mut offsets, mut drifting) = (Vec::new(), Vec::new());
             for loose in &self.loose {
                 let Level { size, time_s } = loose.level;
                 let part: Vec<f64> = loose.column[range.clone()].iter().map(|x| size * x).collect();
@@ -134,23 +134,23 @@ impl Metric {
                         offsets.push(Patch { from, values });
                         from += tick.len();
                     }
-                } else if loose.wander.is_some() {
-                    wandering.push(Wandering::new(part, clock, time_s, dt_s));
+                } else if loose.drift.is_some() {
+                    drifting.push(Drifting::new(part, clock, time_s, dt_s));
                 } else {
                     offsets.push(Patch { from: 0, values: part });
                 }
             }
-            (!self.loose.is_empty()).then(|| Nuisance::new(offsets, wandering))
+            (!self.loose.is_empty()).then(|| Nuisance::new(offsets, drifting))
         };
         self.nuisances = frame.segments.iter().map(one).collect();
     }
 
-    /// Parameters of the stage that wander or are offset in each trial.
+    /// Parameters of the stage that drift or are offset in each trial.
     pub(crate) fn loose(&self) -> &[Loose] {
         &self.loose
     }
 
-    /// The same with all of them at other levels.
+    /// The metric with every loose parameter at another level.
     pub(crate) fn with(
         &self,
         level: impl Fn(usize, Level) -> Level,
@@ -164,7 +164,7 @@ impl Metric {
         other
     }
 
-    /// A column of values in floors over the first trials.
+    /// A column of values in multiples of the noise over the first trials.
     pub(crate) fn column(&self, frame: &Frame, values: Vec<f64>) -> Column {
         let tails = frame
             .segments
@@ -200,14 +200,14 @@ impl Metric {
         pairs.filter_map(|(_, nuisance)| Some(nuisance.as_ref()?.ln_determinant())).sum()
     }
 
-    /// 2 sum ln s over the segments in a role: what floors s add to it in the unit of the output.
-    pub(crate) fn ln_floors(&self, frame: &Frame, role: Role) -> f64 {
+    /// 2 sum ln s over the segments in a role: what noise s adds to it in the unit of the output.
+    pub(crate) fn ln_noise(&self, frame: &Frame, role: Role) -> f64 {
         let own = frame.segments.iter().filter(|s| s.role == role);
-        let floors = own.flat_map(|s| &self.floor.sd[s.from..s.to]).filter(|sd| sd.is_finite());
-        2.0 * floors.map(|sd| sd.ln()).sum::<f64>()
+        let sds = own.flat_map(|s| &self.noise.sd[s.from..s.to]).filter(|sd| sd.is_finite());
+        2.0 * sds.map(|sd| sd.ln()).sum::<f64>()
     }
 
-    /// Takes the most likely nuisances out of a residual in floors.
+    /// Takes the most likely nuisances out of a residual in multiples of the noise.
     pub(crate) fn clean(&self, frame: &Frame, values: &mut [f64]) {
         for (segment, nuisance) in frame.segments.iter().zip(&self.nuisances) {
             if let Some(nuisance) = nuisance.as_ref().filter(|_| segment.to <= values.len()) {
@@ -219,19 +219,19 @@ impl Metric {
 
 #[cfg(test)]
 impl Metric {
-    /// One parameter that wanders in one trial.
-    pub(crate) fn with_wander(
-        floor: Floor,
+    /// One parameter that drifts in one trial.
+    pub(crate) fn with_drift(
+        noise: NoiseLevel,
         column: Vec<f64>,
-        wander: Wander,
+        drift: SlowDrift,
         frame: &Frame,
         dt_s: f64,
     ) -> Self {
         let clock = (0..column.len() as u32).collect();
         let column = column.into();
-        let level = Level { size: 1.0, time_s: wander.correlation_s };
-        let loose = vec![Loose { column, clock, wander: Some(wander), is_by_tick: false, level }];
-        let mut metric = Self { floor, loose, nuisances: Vec::new() };
+        let level = Level { size: 1.0, time_s: drift.correlation_s };
+        let loose = vec![Loose { column, clock, drift: Some(drift), is_by_tick: false, level }];
+        let mut metric = Self { noise, loose, nuisances: Vec::new() };
         metric.marginalise(frame, dt_s);
         metric
     }

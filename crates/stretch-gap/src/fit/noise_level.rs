@@ -1,4 +1,4 @@
-//! The floor of every stage: what no deterministic model could remove.
+//! The noise of every stage: what no deterministic model could remove.
 //!
 //! ```text
 //! sigma_i^2 = sigma_own^2 + mean over draws and neighbours of (f(x + noise)_i - f(x)_i)^2
@@ -12,7 +12,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::{
-    fit::isolated_outliers::lone,
+    fit::isolated_outliers::isolated,
     problem::{
         error::GapError,
         frame::Frame,
@@ -22,11 +22,11 @@ use crate::{
     },
 };
 
-/// Floor of one stage.
+/// NoiseLevel of one stage.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Floor {
+pub(crate) struct NoiseLevel {
     /// One standard deviation at every sample of all trials, in the unit of the output; infinite where nothing was measured and where a
-    /// sample [stands alone](crate::fit::isolated_outliers).
+    /// sample [is isolated](crate::fit::isolated_outliers).
     pub(crate) sd: Vec<f64>,
     /// Root mean square of it.
     pub(crate) rms: f64,
@@ -40,27 +40,27 @@ const NEAR: usize = 12;
 
 /// Floors of all stages around a model.
 ///
-/// The variance of the floor is that of the output's own noise, known or taken from the record's second differences,
+/// The variance of the noise is that of the output's own noise, known or taken from the record's second differences,
 /// plus the *noise transmitted*: what of the measured input's noise arrives at the output, by Monte Carlo with the
-/// same draws for every model. It is larger where the output is steep or the input too quick to be smoothed, so the floor is one
+/// same draws for every model. It is larger where the output is steep or the input too quick to be smoothed, so the noise is one
 /// of every sample.
-pub(crate) fn floors_of(
+pub(crate) fn noise_levels(
     runs: &Runs<'_>,
     frame: &Frame,
     model: &Model,
     seed: u64,
-) -> Result<Vec<Floor>, GapError> {
+) -> Result<Vec<NoiseLevel>, GapError> {
     let stages = 0..runs.simulator().stages().len();
-    stages.into_par_iter().map(|stage| floor(runs, frame, stage, model, seed)).collect()
+    stages.into_par_iter().map(|stage| noise_level(runs, frame, stage, model, seed)).collect()
 }
 
-fn floor(
+fn noise_level(
     runs: &Runs<'_>,
     frame: &Frame,
     stage: usize,
     model: &Model,
     seed: u64,
-) -> Result<Floor, GapError> {
+) -> Result<NoiseLevel, GapError> {
     let simulator = runs.simulator();
     let output = runs.output(stage, model, simulator.trials().len())?;
     let arrived = transmitted(runs, stage, model, &output, seed)?;
@@ -96,12 +96,12 @@ fn floor(
     }
     let apart = simulator.measured(stage).iter().zip(&output).zip(&sd);
     let residual: Vec<f64> = apart.map(|((m, s), sd)| (m - s) / sd).collect();
-    let lone = lone(&residual, trials.into_iter());
-    lone.iter().for_each(|&i| sd[i] = f64::INFINITY);
-    if !lone.is_empty() {
-        source += &format!("; samples that stand alone and do not count: {}", lone.len());
+    let isolated = isolated(&residual, trials.into_iter());
+    isolated.iter().for_each(|&i| sd[i] = f64::INFINITY);
+    if !isolated.is_empty() {
+        source += &format!("; samples that stand alone and do not count: {}", isolated.len());
     }
-    Ok(Floor { sd, rms: (own + mean).sqrt().max(1e-12), source })
+    Ok(NoiseLevel { sd, rms: (own + mean).sqrt().max(1e-12), source })
 }
 
 /// Variance that the measured input's noise causes at every sample of the output, which is `plain` without it.
@@ -116,9 +116,9 @@ fn transmitted(
     let run = Run::exact(stage, model, trials);
     let mut arrived = vec![0.0; plain.len()];
     for draw in 0..DRAWS {
-        let shaken = runs.run(Run { shake: Some(seed + 1000 * draw), ..run })?;
+        let other = runs.run(Run { input_noise: Some(seed + 1000 * draw), ..run })?;
         let mut any = false;
-        for ((sum, a), b) in arrived.iter_mut().zip(plain).zip(&shaken) {
+        for ((sum, a), b) in arrived.iter_mut().zip(plain).zip(&other) {
             *sum += (a - b) * (a - b) / DRAWS as f64;
             any |= a != b;
         }

@@ -1,7 +1,7 @@
-//! Nuisances of one stretch of samples: slow wander and trial offsets of parameters, marginalised out of a residual.
+//! Nuisances of one stretch of samples: slow drift and trial offsets of parameters, marginalised out of a residual.
 //!
-//! With columns C of what the nuisances could change (in floors, per unit of each), amplitudes b with prior precision P and
-//! white noise of one floor, a residual r has the covariance V = I + C P^-1 C'. By the matrix inversion lemma
+//! With columns C of what the nuisances could change (in multiples of the noise, per unit of each), amplitudes b with prior precision P and
+//! white noise of one multiple, a residual r has the covariance V = I + C P^-1 C'. By the matrix inversion lemma
 //!
 //! ```text
 //! x' V^-1 y = x'y - (L^-1 C'x)' (L^-1 C'y),     L L' = C'C + P
@@ -27,8 +27,8 @@ const KNOT_S: f64 = 0.1;
 pub(super) struct Nuisance {
     /// Columns of offsets; their amplitudes have prior precision 1.
     offsets: Vec<Patch>,
-    /// Columns of parameters that wander.
-    wandering: Vec<Wandering>,
+    /// Columns of parameters that drift.
+    drifting: Vec<Drifting>,
     /// L of the module's head.
     factor: ArrowFactor,
     ln_determinant: f64,
@@ -60,12 +60,12 @@ impl Patch {
     }
 }
 
-/// Sensitivity to a wandering parameter, and the knots that each sample lies between.
+/// Sensitivity to a drifting parameter, and the knots that each sample lies between.
 ///
-/// The wander is linear between knots: sample i at the share w between knots k and k + 1 moves by
-/// s_i ((1 - w) b_k + w b_(k+1)). The clock of a sample is the time at which the wander last had a way into the output.
+/// the drift is linear between knots: sample i at the share w between knots k and k + 1 moves by
+/// s_i ((1 - w) b_k + w b_(k+1)). The clock of a sample is the time at which the drift last had a way into the output.
 #[derive(Debug, Clone)]
-pub(super) struct Wandering {
+pub(super) struct Drifting {
     sensitivity: Vec<f64>,
     /// Knot before, and share of the way to the next.
     place: Vec<(u32, f64)>,
@@ -74,8 +74,8 @@ pub(super) struct Wandering {
     kept: f64,
 }
 
-impl Wandering {
-    /// Of a wander of variance 1 and correlation time `time_s`; `clock` counts samples of `dt_s`.
+impl Drifting {
+    /// A drift of variance 1 and correlation time `time_s`; `clock` counts samples of `dt_s`.
     pub(super) fn new(sensitivity: Vec<f64>, clock: &[u32], time_s: f64, dt_s: f64) -> Self {
         let knot = ((KNOT_S / dt_s) as usize).max(1);
         let first = clock.first().copied().unwrap_or(0);
@@ -105,13 +105,13 @@ impl Wandering {
 }
 
 impl Nuisance {
-    pub(super) fn new(offsets: Vec<Patch>, wandering: Vec<Wandering>) -> Self {
-        let factor = precision(&offsets, &wandering).factor();
+    pub(super) fn new(offsets: Vec<Patch>, drifting: Vec<Drifting>) -> Self {
+        let factor = precision(&offsets, &drifting).factor();
         // ln det P of chains of correlation rho with variance 1: -(K - 1) ln(1 - rho^2).
-        let prior = |w: &Wandering| -(w.knots as f64 - 1.0) * (1.0 - w.kept * w.kept).ln();
-        let prior: f64 = wandering.iter().map(prior).sum();
+        let prior = |w: &Drifting| -(w.knots as f64 - 1.0) * (1.0 - w.kept * w.kept).ln();
+        let prior: f64 = drifting.iter().map(prior).sum();
         let ln_determinant = factor.ln_determinant() - prior;
-        Self { offsets, wandering, factor, ln_determinant }
+        Self { offsets, drifting, factor, ln_determinant }
     }
 
     /// ln det V = ln det(C'C + P) - ln det P.
@@ -121,21 +121,21 @@ impl Nuisance {
 
     /// L^-1 C'x: what a product of columns loses to the nuisances.
     pub(super) fn tail(&self, x: &[f64]) -> Vec<f64> {
-        let mut tail = project(&self.offsets, &self.wandering, x);
+        let mut tail = project(&self.offsets, &self.drifting, x);
         self.factor.forward(&mut tail);
         tail
     }
 
     /// Takes the most likely nuisance out of a residual.
     pub(super) fn clean(&self, x: &mut [f64]) {
-        let mut b = project(&self.offsets, &self.wandering, x);
+        let mut b = project(&self.offsets, &self.drifting, x);
         self.factor.solve(&mut b);
         let mut base = 0;
-        for wandering in &self.wandering {
-            for (i, k, this, next) in wandering.each() {
+        for drifting in &self.drifting {
+            for (i, k, this, next) in drifting.each() {
                 x[i] -= this * b[base + k] + next * b[base + k + 1];
             }
-            base += wandering.knots;
+            base += drifting.knots;
         }
         for (offset, b) in self.offsets.iter().zip(&b[base..]) {
             x[offset.from..].iter_mut().zip(&offset.values).for_each(|(x, d)| *x -= b * d);
@@ -143,13 +143,13 @@ impl Nuisance {
     }
 }
 
-/// C'x: the knots of what wanders, then the offsets.
-fn project(offsets: &[Patch], wandering: &[Wandering], x: &[f64]) -> Vec<f64> {
+/// C'x: the knots of what drifts, then the offsets.
+fn project(offsets: &[Patch], drifting: &[Drifting], x: &[f64]) -> Vec<f64> {
     let mut out = Vec::new();
-    for wandering in wandering {
+    for drifting in drifting {
         let base = out.len();
-        out.resize(base + wandering.knots, 0.0);
-        for (i, k, this, next) in wandering.each() {
+        out.resize(base + drifting.knots, 0.0);
+        for (i, k, this, next) in drifting.each() {
             out[base + k] += this * x[i];
             out[base + k + 1] += next * x[i];
         }
@@ -158,20 +158,20 @@ fn project(offsets: &[Patch], wandering: &[Wandering], x: &[f64]) -> Vec<f64> {
     out
 }
 
-/// Posterior precision C'C + P. Two wanders of one stage are taken as orthogonal.
-fn precision(offsets: &[Patch], wandering: &[Wandering]) -> Arrow {
-    let knots = wandering.iter().map(|w| w.knots).sum();
+/// Posterior precision C'C + P. Two drifts of one stage are taken as orthogonal.
+fn precision(offsets: &[Patch], drifting: &[Drifting]) -> Arrow {
+    let knots = drifting.iter().map(|w| w.knots).sum();
     let mut a = Arrow::zeros(knots, offsets.len());
     for (i, column) in offsets.iter().enumerate() {
         let mut base = 0;
-        for wandering in wandering {
+        for drifting in drifting {
             let span = column.from..column.from + column.values.len();
-            for (sample, k, this, next) in wandering.within(span) {
+            for (sample, k, this, next) in drifting.within(span) {
                 let x = column.values[sample - column.from];
                 a.border[i][base + k] += this * x;
                 a.border[i][base + k + 1] += next * x;
             }
-            base += wandering.knots;
+            base += drifting.knots;
         }
         for (j, other) in offsets.iter().enumerate() {
             a.corner[i][j] = column.overlap(other);
@@ -179,9 +179,9 @@ fn precision(offsets: &[Patch], wandering: &[Wandering]) -> Arrow {
         a.corner[i][i] += 1.0;
     }
     let mut base = 0;
-    for wandering in wandering {
+    for drifting in drifting {
         // A sample lies between two knots: C'C is tridiagonal there.
-        for (_, k, x, y) in wandering.each() {
+        for (_, k, x, y) in drifting.each() {
             let k = base + k;
             a.diagonal[k] += x * x;
             a.beside[k] += x * y;
@@ -189,7 +189,7 @@ fn precision(offsets: &[Patch], wandering: &[Wandering]) -> Arrow {
         }
         // Inverse covariance of an Ornstein-Uhlenbeck process at even knots, of correlation rho between neighbours:
         // (1, 1 + rho^2, ..., 1)/(1 - rho^2) on the diagonal, -rho/(1 - rho^2) beside it.
-        let (knots, kept) = (wandering.knots, wandering.kept);
+        let (knots, kept) = (drifting.knots, drifting.kept);
         let scale = 1.0 / (1.0 - kept * kept);
         for k in 0..knots {
             let inner = k > 0 && k + 1 < knots;
@@ -206,7 +206,7 @@ fn precision(offsets: &[Patch], wandering: &[Wandering]) -> Arrow {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::random::Dice;
+    use crate::numerics::random::RandomGenerator;
     use testkit::tolerance::FIT_WELL;
 
     const SAMPLES: usize = 60;
@@ -218,14 +218,14 @@ mod tests {
     fn nuisance() -> Nuisance {
         let clock: Vec<u32> = (0..SAMPLES as u32).collect();
         let slope: Vec<f64> = (0..SAMPLES).map(|i| 0.1 * i as f64).collect();
-        Nuisance::new(vec![patch(0, SAMPLES)], vec![Wandering::new(slope, &clock, 0.3, 0.01)])
+        Nuisance::new(vec![patch(0, SAMPLES)], vec![Drifting::new(slope, &clock, 0.3, 0.01)])
     }
 
     /// x'V^-1 y = x'(y - C b) with the most likely b: two ways to the same product.
     #[test]
     fn the_product_is_that_with_a_cleaned_column() {
-        let mut dice = Dice::new(2, 0);
-        let [x, y] = [0, 1].map(|_| (0..SAMPLES).map(|_| dice.gauss()).collect::<Vec<f64>>());
+        let mut random = RandomGenerator::new(2, 0);
+        let [x, y] = [0, 1].map(|_| (0..SAMPLES).map(|_| random.gauss()).collect::<Vec<f64>>());
         let nuisance = nuisance();
         let product = dot(&x, &y) - dot(&nuisance.tail(&x), &nuisance.tail(&y));
         let mut cleaned = y.clone();
@@ -241,8 +241,8 @@ mod tests {
     /// Two equal offsets at the same samples have twice the variance of one; at other samples they do not know of each other.
     #[test]
     fn offsets_share_what_they_explain() {
-        let mut dice = Dice::new(5, 0);
-        let x: Vec<f64> = (0..SAMPLES).map(|_| dice.gauss()).collect();
+        let mut random = RandomGenerator::new(5, 0);
+        let x: Vec<f64> = (0..SAMPLES).map(|_| random.gauss()).collect();
         let lost = |nuisance: &Nuisance| dot(&nuisance.tail(&x), &nuisance.tail(&x));
         let both = Nuisance::new(vec![patch(10, 20), patch(10, 20)], Vec::new());
         let wide = Patch { from: 10, values: vec![0.5 * 2.0_f64.sqrt(); 20] };

@@ -1,4 +1,4 @@
-//! Mean squares of a residual by octaves of time: what tells a rise from chance, whatever the residual's colour is.
+//! Mean squares of a residual by octaves of time: what parts a rise from chance, whatever the residual's colour is.
 //!
 //! A mean square over all frequencies is mostly that of the quick ones, for there are most of them; a slow regressor that takes 5 % of slow
 //! noise away is then credited with several nats where chance gives half a one. So a residual is turned by the orthonormal Haar transform
@@ -24,7 +24,7 @@ use crate::numerics::linear::dot;
 
 /// Octaves: the last holds what is slower than 2^10 samples, ten seconds at 100 Hz.
 const OCTAVES: usize = 11;
-/// Least mean square, in floors squared: noise may be foretold too large, but nothing is exact.
+/// Least mean square, in variances of the noise: noise may be predicted too large, but nothing is exact.
 const LEAST: f64 = 0.05;
 
 /// Share to which the noise of an octave is known, whatever the number of its coefficients: no recorder's noise is as it was described.
@@ -58,7 +58,7 @@ impl Octaves {
         self
     }
 
-    /// The same `share` as large.
+    /// Mean squares that are `share` times as large.
     pub(crate) fn scaled(mut self, share: f64) -> Self {
         self.sums.iter_mut().for_each(|sum| *sum *= share);
         self
@@ -97,7 +97,7 @@ fn coefficients(values: &[f64]) -> [Vec<f64>; OCTAVES] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::{linear::dot, random::Dice};
+    use crate::numerics::{linear::dot, random::RandomGenerator};
     use testkit::tolerance::FIT_WELL;
 
     fn of(values: &[f64]) -> Octaves {
@@ -107,11 +107,11 @@ mod tests {
     }
 
     /// An Ornstein-Uhlenbeck process of variance 1.
-    fn slow(samples: usize, memory: f64, dice: &mut Dice) -> Vec<f64> {
+    fn slow(samples: usize, memory: f64, random: &mut RandomGenerator) -> Vec<f64> {
         let kept = (-1.0 / memory).exp();
-        let mut x = dice.gauss();
+        let mut x = random.gauss();
         let mut next = || {
-            x = kept * x + (1.0 - kept * kept).sqrt() * dice.gauss();
+            x = kept * x + (1.0 - kept * kept).sqrt() * random.gauss();
             x
         };
         (0..samples).map(|_| next()).collect()
@@ -119,9 +119,9 @@ mod tests {
 
     #[test]
     fn the_transform_keeps_every_square() {
-        let mut dice = Dice::new(3, 0);
+        let mut random = RandomGenerator::new(3, 0);
         for samples in [1, 2, 7, 4099] {
-            let x: Vec<f64> = (0..samples).map(|_| dice.gauss()).collect();
+            let x: Vec<f64> = (0..samples).map(|_| random.gauss()).collect();
             let octaves = of(&x);
             let sum: f64 = octaves.sums.iter().sum();
             approx::assert_relative_eq!(sum, dot(&x, &x), max_relative = FIT_WELL);
@@ -136,15 +136,15 @@ mod tests {
         const DRAWS: usize = 200;
         for (share, memory) in [(0.0, 1.0), (0.05, 100.0), (0.05, 400.0), (0.5, 20.0)] {
             for regressor in [3.0, 50.0, 300.0] {
-                let mut dice = Dice::new(8, (10.0 * regressor + memory) as u64);
+                let mut random = RandomGenerator::new(8, (10.0 * regressor + memory) as u64);
                 let mut rises = Vec::with_capacity(DRAWS);
                 for _ in 0..DRAWS {
-                    let wander = slow(12_000, memory, &mut dice);
-                    let noise: Vec<f64> = wander
+                    let drift = slow(12_000, memory, &mut random);
+                    let noise: Vec<f64> = drift
                         .iter()
-                        .map(|w| f64::sqrt(share) * w + f64::sqrt(1.0 - share) * dice.gauss())
+                        .map(|w| f64::sqrt(share) * w + f64::sqrt(1.0 - share) * random.gauss())
                         .collect();
-                    let d = slow(12_000, regressor, &mut dice);
+                    let d = slow(12_000, regressor, &mut random);
                     // Fitted as fits do, in the metric of white noise.
                     let size = dot(&d, &noise) / dot(&d, &d);
                     let left: Vec<f64> = noise.iter().zip(&d).map(|(r, d)| r - size * d).collect();

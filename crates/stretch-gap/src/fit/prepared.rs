@@ -2,9 +2,9 @@
 //!
 //! Preparation runs once, in an order in which each part needs the ones before:
 //!
-//! 1. the frame; floors and metrics around the parameters as shipped;
+//! 1. the frame; noise and metrics around the parameters as shipped;
 //! 2. a first re-tuning: maximum a posteriori within the tolerances;
-//! 3. floors and metrics around what it found, for sensitivities have moved; a second re-tuning in them;
+//! 3. noise and metrics around what it found, for sensitivities have moved; a second re-tuning in them;
 //! 4. the effective sample size of every stage and the noise transmitted, both at the re-tuned nominal, so that they are the same
 //!    for every hypothesis.
 //!
@@ -32,7 +32,7 @@ use crate::{
     },
 };
 
-/// Root mean square change in floors that a halved step of integration may make: a tenth, a hundredth of the floor's square.
+/// Root mean square change in multiples of the noise that a halved step of integration may make: a tenth, a hundredth of the noise's variance.
 const SOLVED: f64 = 0.1;
 
 /// Steps of integration that are tried first, as a multiple of the simulator's own.
@@ -48,7 +48,7 @@ pub(crate) struct Problem<'a> {
     pub(crate) shipped: Model,
     /// Re-tuned, without effects.
     pub(crate) nominal: Hypothesis,
-    /// What that says of the nominal parameters.
+    /// What the re-tuning says of the nominal parameters.
     information: Vec<Information>,
     /// By stage: samples that count as one observation.
     memory: Vec<f64>,
@@ -59,7 +59,7 @@ pub(crate) struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
-    /// Frame, floors, metrics, re-tuning, sample sizes and noise transmitted.
+    /// Frame, noise, metrics, re-tuning, sample sizes and noise transmitted.
     ///
     /// # Errors
     /// [`GapError::Solver`] when the step of integration shows, [`GapError::TooLittle`] without anything to fit,
@@ -85,7 +85,7 @@ impl<'a> Problem<'a> {
         let simulator = runs.simulator();
         let frame = Frame::of(simulator)?;
         let shipped = Model::nominal(simulator);
-        progress("floors");
+        progress("noise");
         let rough = Comparison::around(runs.clone(), frame.clone(), &shipped, None, seed)?;
         progress("re-tuning the nominal parameters");
         let (first, _) = retuned(&rough, &shipped)?;
@@ -193,7 +193,7 @@ impl<'a> Problem<'a> {
             - choice_cost(simulator, model)
     }
 
-    /// Stages whose parameters wander or are offset in each trial.
+    /// Stages whose parameters drift or are offset in each trial.
     pub(crate) fn loose_stages(&self) -> impl Iterator<Item = usize> {
         let all = self.compare.metrics.iter().enumerate();
         all.filter(|(_, m)| !m.loose().is_empty()).map(|(stage, _)| stage)
@@ -244,7 +244,7 @@ impl<'a> Problem<'a> {
     /// l = -(1/block) sum over stages [ (N/2) ln max(X, 1) + (1/2) ln det V + sum ln s_i ] - penalties
     /// ```
     ///
-    /// with floors s_i, the metric V and the reduced chi-square X over fitted and held-out samples: a model may leave more than its
+    /// with noise s_i, the metric V and the reduced chi-square X over fitted and held-out samples: a model may leave more than its
     /// noise, but noise that is foretold too large is no better for it. One observation a block, whatever the residual's own memory is.
     pub(crate) fn log_likelihood(&self, hypothesis: &Hypothesis) -> f64 {
         let (compare, frame) = (&self.compare, &self.compare.frame);
@@ -252,7 +252,7 @@ impl<'a> Problem<'a> {
         for (misfit, metric) in hypothesis.misfits.iter().zip(&compare.metrics) {
             for (role, x) in [(Role::Fit, misfit.fit), (Role::Held, misfit.held)] {
                 sum += 0.5 * frame.count(role) as f64 * x.max(1.0).ln();
-                sum += 0.5 * (metric.ln_det(frame, role) + metric.ln_floors(frame, role));
+                sum += 0.5 * (metric.ln_det(frame, role) + metric.ln_noise(frame, role));
             }
         }
         let free = free_parameters(self.simulator(), &hypothesis.model) as f64;
@@ -273,7 +273,7 @@ impl<'a> Problem<'a> {
         worst.is_some_and(|stage| left(&stage) < self.transmitted[stage].fit)
     }
 
-    /// Share of a stage's floor that noise of its measured input makes.
+    /// Share of a stage's noise that noise of its measured input makes.
     pub(crate) fn transmits(&self, stage: usize) -> f64 {
         self.transmitted[stage].fit
     }
@@ -283,14 +283,14 @@ impl<'a> Problem<'a> {
         gap(self.compare.mean_square(&hypothesis.misfits[stage]))
     }
 
-    /// What a hypothesis closes of one stage that another leaves. Floors are known to some per cent: what is closed below them
+    /// What a hypothesis closes of one stage that another leaves. Noise is known to some per cent: what is closed below it
     /// counts as well.
     pub(crate) fn closes(&self, base: &Hypothesis, next: &Hypothesis, stage: usize) -> f64 {
         let mean_square = |h: &Hypothesis| self.compare.mean_square(&h.misfits[stage]);
         mean_square(base) - mean_square(next)
     }
 
-    /// The same summed over stages.
+    /// The gap that a hypothesis leaves, summed over stages.
     pub(crate) fn gap(&self, hypothesis: &Hypothesis) -> f64 {
         (0..hypothesis.misfits.len()).map(|stage| self.gap_in(hypothesis, stage)).sum()
     }
@@ -341,7 +341,7 @@ fn solver_check(compare: &Comparison<'_>, model: &Model) -> Result<(), GapError>
         let plain = compare.runs.run(run)?;
         let fine = compare.runs.run(Run { step: 0.5, ..run })?;
         let square: f64 = plain.iter().zip(&fine).map(|(a, b)| (a - b) * (a - b)).sum();
-        let moved = (square / plain.len().max(1) as f64).sqrt() / metric.floor.rms;
+        let moved = (square / plain.len().max(1) as f64).sqrt() / metric.noise.rms;
         if moved > SOLVED {
             let stage = compare.simulator().stages()[stage].name.clone();
             return Err(GapError::Solver { stage, moved });

@@ -1,6 +1,6 @@
-//! What a residual is worth: reduced chi-square, effective sample size, and the score of one hypothesis beside another.
+//! What a residual says: reduced chi-square, effective sample size, and the score of one hypothesis beside another.
 //!
-//! Residuals r are in units of the floor, nuisance taken out. Their mean square is the *reduced chi-square*
+//! Residuals r are in multiples of the noise, nuisance taken out. Their mean square is the *reduced chi-square*
 //!
 //! ```text
 //! X = (1/N) sum r_i^2,     excess = X - 1
@@ -26,13 +26,13 @@
 
 use crate::{fit::octaves::Octaves, numerics::linear::dot};
 
-/// Mean squares of one stage in units of its floor: the reduced chi-square over fitted and over held-out samples.
+/// Mean squares of one stage in variances of its noise: the reduced chi-square over fitted and over held-out samples.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Misfit {
     pub(crate) stage: usize,
     pub(crate) fit: f64,
     pub(crate) held: f64,
-    /// Of both together.
+    /// Mean squares of fitted and held-out samples together, by octaves.
     pub(crate) octaves: Octaves,
 }
 
@@ -53,7 +53,7 @@ pub(crate) fn excess(reduced_chi_square: f64) -> f64 {
     reduced_chi_square - 1.0
 }
 
-/// The gap that an excess stands for: chance may leave less than the floor, which is no gap.
+/// The gap that an excess (reduced chi-square minus one) stands for: chance may leave less than the noise, which is no gap.
 pub(crate) fn gap(reduced_chi_square: f64) -> f64 {
     excess(reduced_chi_square).max(0.0)
 }
@@ -68,7 +68,7 @@ impl Misfit {
     ///
     /// X holds what arrives of that noise at the output. A slow amplifier or a slipping sleeve transmits less of it, and would
     /// win wherever the input is noisy, whether it exists or not. So hypotheses are compared at equal noise transmitted:
-    /// X + k (T_nominal - T), where T is the noise transmitted, in floors. It is known to a factor only, and a gap may be noise that is
+    /// X + k (T_nominal - T), where T is the noise transmitted, in multiples of the noise. It is known to a factor only, and a gap may be noise that is
     /// larger than was taken: k is what would make the nominal's gap of it, [`LARGER`] at most, where less is transmitted.
     pub(crate) fn at_equal_noise(self, nominal: &Self, own: &Self, gap: f64) -> Self {
         let larger = 1.0 + (gap / nominal.fit.max(f64::MIN_POSITIVE)).min(LARGER);
@@ -118,13 +118,13 @@ pub(crate) fn score(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::random::Dice;
+    use crate::numerics::random::RandomGenerator;
     use testkit::tolerance::{EFFECTIVE_SIZE, F64_ROUNDING};
 
     #[test]
     fn samples_count_as_far_as_they_are_alike() {
-        let mut dice = Dice::new(4, 0);
-        let white: Vec<f64> = (0..40_000).map(|_| dice.gauss()).collect();
+        let mut random = RandomGenerator::new(4, 0);
+        let white: Vec<f64> = (0..40_000).map(|_| random.gauss()).collect();
         let kept = 0.8_f64;
         let mut x = 0.0;
         let red: Vec<f64> = white
@@ -147,7 +147,7 @@ mod tests {
         let of = |x: f64| Misfit { fit: x, held: x, ..Misfit::default() };
         let level = |gap| of(1.2).at_equal_noise(&of(0.5), &of(0.2), gap).fit;
         approx::assert_relative_eq!(level(0.0), 1.5, max_relative = F64_ROUNDING);
-        // A gap of a tenth could be noise a fifth larger; one of ten floors could not.
+        // A gap of a tenth could be noise a fifth larger; one of ten variances of the noise could not.
         approx::assert_relative_eq!(level(0.1), 1.56, max_relative = F64_ROUNDING);
         approx::assert_relative_eq!(level(10.0), 1.65, max_relative = F64_ROUNDING);
         // What transmits more is helped by no doubt.

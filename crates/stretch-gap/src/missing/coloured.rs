@@ -68,7 +68,7 @@ fn autoregression(parts: &[Vec<f64>]) -> Vec<f64> {
     weights
 }
 
-/// What the weights do not foretell.
+/// Residual that the weights do not predict.
 fn innovations<'a>(part: &'a [f64], weights: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
     part.windows(ORDER + 1).map(move |window| {
         let told: f64 = window[..ORDER].iter().zip(weights).map(|(x, w)| x * w).sum();

@@ -10,7 +10,7 @@ use crate::numerics::linear::Cholesky;
 /// Ridges that are tried, as shares of each diagonal element.
 const RIDGES: [f64; 5] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
 
-/// A residual and columns over the same means, in floors.
+/// A residual and columns over the same means, in multiples of the noise.
 pub(crate) struct Rows {
     pub(crate) residual: Vec<f64>,
     pub(crate) columns: Vec<Vec<f64>>,

@@ -31,7 +31,7 @@ struct Settled {
 
 /// Proposes what is missing where most of a hypothesis's gap sits; none where no stage has one.
 ///
-/// Everything is chosen and fitted without the test trials; they are read at the end, for the share that is told.
+/// Everything is chosen and fitted without the test trials; they are read at the end, for the share that is reported.
 pub(crate) fn propose(
     problem: &Problem<'_>,
     base: &Hypothesis,
@@ -96,7 +96,7 @@ fn weigh(residue: &Residue<'_>, choice: &Frame, sum: &Sum, settled: &Settled) ->
     }
 }
 
-/// All of it as it is told.
+/// A proposal as it is reported.
 fn told(
     residue: &Residue<'_>,
     sum: &Sum,
@@ -201,14 +201,14 @@ fn left(
     residue.compare.metrics[residue.stage].column(residue.frame(), values)
 }
 
-/// Share of the gap on the test trials that a settled sum closes.
+/// Share of the gap on the test trials that a refitted sum closes.
 fn tested(residue: &Residue<'_>, terms: &[Term], settled: &Settled) -> Result<f64, GapError> {
     let (compare, stage) = (residue.compare, residue.stage);
     let trials = compare.simulator().trials().len();
     let (metric, frame) = (&compare.metrics[stage], residue.frame());
     let residual = |model: &Model| -> Result<Vec<f64>, GapError> {
         let output = compare.runs.output(stage, model, trials)?;
-        let apart = compare.simulator().measured(stage).iter().zip(output).zip(&metric.floor.sd);
+        let apart = compare.simulator().measured(stage).iter().zip(output).zip(&metric.noise.sd);
         Ok(apart.map(|((m, s), sd)| (m - s) / sd).collect())
     };
     let square = |values: Vec<f64>| {
@@ -219,7 +219,7 @@ fn tested(residue: &Residue<'_>, terms: &[Term], settled: &Settled) -> Result<f6
     let mut values = residual(&settled.model)?;
     for (term, c) in terms.iter().zip(&settled.coefficients) {
         let own = term.values(&residue.record, trials);
-        for ((x, d), sd) in values.iter_mut().zip(own).zip(&metric.floor.sd) {
+        for ((x, d), sd) in values.iter_mut().zip(own).zip(&metric.noise.sd) {
             *x -= c * d / sd;
         }
     }

@@ -41,12 +41,12 @@ pub struct ProposedTerm {
 
 /// A sum of terms that the simulator lacks and the catalogue does not hold, or that there is none to be found.
 ///
-/// It can be computed from what stands here alone: `channel += sum coefficient form`, memories settled at the start of every trial.
+/// The sum can be computed from these fields alone: `channel += sum coefficient form`, memories at rest at the start of every trial.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Proposed {
     /// Stage where most of what is left sits.
     pub stage: String,
-    /// Its channel.
+    /// Output channel of that stage.
     pub channel: String,
     /// Equation with numbers and units; empty where nothing was found.
     pub equation: String,
@@ -60,9 +60,9 @@ pub struct Proposed {
     pub initial: String,
     /// Share of the stage's remaining gap that is closed on the samples that terms were chosen by.
     pub closes_held: f64,
-    /// The same on the test trials, which are read for this alone.
+    /// Share of the gap that the sum closes on the test trials, which are read for this alone.
     pub closes_test: f64,
-    /// Where it acts.
+    /// Where the sum acts.
     pub acts: String,
     /// Whether what is left is random in time: no function of what was recorded foretells it.
     pub random: bool,

@@ -108,15 +108,15 @@ impl<'a> Residue<'a> {
         &self.columns
     }
 
-    /// A term in floors, over the trials that fits run.
+    /// A term in multiples of the noise, over the trials that fits run.
     pub(crate) fn values(&self, term: &Term) -> Vec<f64> {
         let mut values = term.values(&self.record, self.frame().fit_trials);
-        let sds = &self.compare.metrics[self.stage].floor.sd;
+        let sds = &self.compare.metrics[self.stage].noise.sd;
         values.iter_mut().zip(sds).for_each(|(x, sd)| *x /= sd);
         values
     }
 
-    /// The same ready for products; none where it is not finite or does nothing.
+    /// A term ready for products; none where the term is not finite or does nothing.
     pub(crate) fn column(&self, term: &Term) -> Option<Column> {
         let values = self.values(term);
         let acts = values.iter().any(|x| x.abs() > 1e-9) && values.iter().all(|x| x.is_finite());
@@ -137,7 +137,7 @@ impl<'a> Residue<'a> {
         products
     }
 
-    /// The same with one column more; `before` are those that products are of.
+    /// The normal equations with one column more; `before` are the columns that products are taken with.
     pub(crate) fn with(
         &self,
         frame: &Frame,

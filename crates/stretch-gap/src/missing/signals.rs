@@ -142,7 +142,7 @@ fn recorded(simulator: &dyn Simulator) -> Vec<Recorded> {
 }
 
 impl Signal {
-    /// None where it does not move in what is fitted.
+    /// The signal with its rate; none where it does not move in what is fitted.
     fn of(recorded: Recorded, frame: &Frame, dt_s: f64) -> Option<Self> {
         let Recorded { name, unit, mut values, is_command } = recorded;
         let (low, high) =

@@ -68,7 +68,7 @@ pub(crate) fn choice(frame: &Frame) -> Frame {
     choice
 }
 
-/// Means over a few samples of the segments in a role, at which noise of one floor still has the variance 1.
+/// Means over a few samples of the segments in a role, at which noise of one multiple still has the variance 1.
 fn means(frame: &Frame, role: Role, values: &[f64], count: usize) -> Vec<f64> {
     let parts = frame.of_role(role).flat_map(|s| values[s.from..s.to].chunks_exact(count));
     parts.map(|part| part.iter().sum::<f64>() / (count as f64).sqrt()).collect()

@@ -59,9 +59,9 @@ pub enum Factor {
     Rate { signal: usize, form: RateForm },
     /// dv/dt times the sample time, looking back.
     Bend { signal: usize },
-    /// x - play(x, width), settled at a trial's start; width is half the backlash.
+    /// x - play(x, width), at rest at a trial's start; width is half the backlash.
     Play { signal: usize, width: f64 },
-    /// x - lag(x, tau), settled at a trial's start.
+    /// x - lag(x, tau), at rest at a trial's start.
     Lag { signal: usize, tau_s: f64 },
     /// x(t - delay) - x(t)
     Late { signal: usize, delay_s: f64 },
@@ -99,9 +99,9 @@ pub enum Passage {
 /// A term.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Term {
-    /// What is multiplied; nothing is 1.
+    /// Factors that are multiplied; a product of none is 1.
     pub factors: Vec<Factor>,
-    /// How the product arrives.
+    /// How the product reaches the output.
     pub passage: Passage,
 }
 
@@ -126,7 +126,7 @@ impl Term {
         copy.shapes_mut().into_iter().map(|x| *x).collect()
     }
 
-    /// The same with another shape.
+    /// The factor with another shape.
     pub(crate) fn with_shape(&self, index: usize, value: f64) -> Self {
         let mut copy = self.clone();
         if let Some(shape) = copy.shapes_mut().into_iter().nth(index) {

@@ -113,18 +113,18 @@ impl ArrowFactor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::random::Dice;
+    use crate::numerics::random::RandomGenerator;
     use approx::assert_relative_eq;
     use testkit::tolerance::FIT_WELL;
 
     #[test]
     fn agrees_with_the_dense_factor() {
-        let mut dice = Dice::new(8, 0);
+        let mut random = RandomGenerator::new(8, 0);
         let (knots, columns) = (7, 2);
         let mut arrow = Arrow::zeros(knots, columns);
-        arrow.diagonal.iter_mut().for_each(|x| *x = 5.0 + dice.gauss().abs());
-        arrow.beside.iter_mut().for_each(|x| *x = dice.gauss());
-        arrow.border.iter_mut().flatten().for_each(|x| *x = 0.3 * dice.gauss());
+        arrow.diagonal.iter_mut().for_each(|x| *x = 5.0 + random.gauss().abs());
+        arrow.beside.iter_mut().for_each(|x| *x = random.gauss());
+        arrow.border.iter_mut().flatten().for_each(|x| *x = 0.3 * random.gauss());
         arrow.corner = vec![vec![4.0, 0.5], vec![0.5, 3.0]];
         let n = knots + columns;
         let dense = DMatrix::from_fn(n, n, |i, j| {
@@ -137,7 +137,7 @@ mod tests {
                 (false, false) => arrow.corner[low - knots][high - knots],
             }
         });
-        let b: Vec<f64> = (0..n).map(|_| dice.gauss()).collect();
+        let b: Vec<f64> = (0..n).map(|_| random.gauss()).collect();
         let factor = arrow.factor();
         let exact = Cholesky::of(dense.clone());
         for (ours, theirs) in [

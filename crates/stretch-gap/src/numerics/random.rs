@@ -1,24 +1,24 @@
 //! Seeded random numbers: the same on every machine.
 
-/// SplitMix64 (doi 10.1145/2660193.2660195): what a simulator draws from when it is asked to [shake](crate::Run::shake)
+/// SplitMix64 (doi 10.1145/2660193.2660195): what a simulator draws from when it is asked for [another draw of the input noise](crate::Run::input_noise)
 /// its inputs.
 ///
 /// ```
-/// use stretch_gap::Dice;
-/// let (mut one, mut same, mut other) = (Dice::new(1, 0), Dice::new(1, 0), Dice::new(1, 1));
+/// use stretch_gap::RandomGenerator;
+/// let (mut one, mut same, mut other) = (RandomGenerator::new(1, 0), RandomGenerator::new(1, 0), RandomGenerator::new(1, 1));
 /// let first = one.gauss();
 /// assert_eq!(first, same.gauss());
 /// assert_ne!(first, other.gauss());
 /// ```
 #[derive(Debug, Clone)]
-pub struct Dice(u64);
+pub struct RandomGenerator(u64);
 
-impl Dice {
-    /// Of a seed and one of its streams.
+impl RandomGenerator {
+    /// The generator of a seed and one of its streams.
     pub fn new(seed: u64, stream: u64) -> Self {
-        let mut dice = Self(seed ^ stream.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-        dice.bits();
-        dice
+        let mut random = Self(seed ^ stream.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        random.bits();
+        random
     }
 
     /// 64 random bits.

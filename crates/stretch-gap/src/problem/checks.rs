@@ -95,9 +95,9 @@ pub(super) fn check_parameter(p: &ParameterSpec) -> Result<(), DescriptionError>
     }
     let offset = p.per_trial_sd.unwrap_or(0.0);
     number(&owner, "per_trial_sd", offset, "0 or more", |x| x >= 0.0)?;
-    if let Some(wander) = p.wander {
-        number(&owner, "wander.sd", wander.sd, "0 or more", |x| x >= 0.0)?;
-        number(&owner, "wander.correlation_s", wander.correlation_s, "above 0", |x| x > 0.0)?;
+    if let Some(drift) = p.drift {
+        number(&owner, "drift.sd", drift.sd, "0 or more", |x| x >= 0.0)?;
+        number(&owner, "drift.correlation_s", drift.correlation_s, "above 0", |x| x > 0.0)?;
     }
     Ok(())
 }

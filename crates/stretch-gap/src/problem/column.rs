@@ -23,7 +23,7 @@ pub struct Distortion {
 }
 
 impl Default for Distortion {
-    /// None.
+    /// A recorder that changes nothing.
     fn default() -> Self {
         Self { scale: 1.0, offset: 0.0, delay_s: 0.0 }
     }
@@ -62,7 +62,7 @@ fn shifted(values: &[f64], samples: f64) -> Vec<f64> {
 /// A column of the record as the stages of a simulator use it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column<'a> {
-    /// Its name.
+    /// Name of the column.
     pub name: Cow<'a, str>,
     /// Unit, `1` where it has none.
     pub unit: Cow<'a, str>,
@@ -73,11 +73,11 @@ pub struct Column<'a> {
     pub output_of: Option<usize>,
     /// Stages that are driven by it: [`Driven::corrected`](crate::Driven::corrected) can correct it for them.
     pub read_by: Vec<usize>,
-    /// Whether a scale can be told from the simulator's own parameters; a command has nothing but a scale.
+    /// Whether it is a command: the only error that a command may have is a scale.
     pub is_command: bool,
     /// Delays that an effect of the catalogue stands for, s: none of these is an error of the record.
     pub skew_s: [f64; 2],
-    /// What to look at when it is wrong, for the end of a sentence.
+    /// What to look at when the column is wrong, for the end of a sentence.
     pub hint: Cow<'a, str>,
 }
 

@@ -15,9 +15,9 @@ use crate::problem::{
 /// What a simulator is made of and what was recorded beside it, as it is written down; [`Description::new`] checks it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DescriptionSpec {
-    /// Its stages.
+    /// Stages of the simulator.
     pub stages: Vec<StageSpec>,
-    /// Its nominal parameters.
+    /// Nominal parameters of the simulator.
     pub parameters: Vec<ParameterSpec>,
     /// The catalogue of effects that it may lack.
     pub effects: Vec<EffectSpec>,
@@ -93,7 +93,7 @@ impl Description {
         Ok(Self { spec, record: Arc::default() })
     }
 
-    /// The same with what is known of the record.
+    /// The description with what is known of the record.
     ///
     /// # Errors
     /// [`DescriptionError`] where an index or a length does not fit the stages, the parameters or the trials.
@@ -114,14 +114,14 @@ impl Description {
         self.record.rows_used.unwrap_or(RowsUsed { used, read: used })
     }
 
-    /// The same with more effects, which are valid.
+    /// The description with more effects, which are valid.
     pub(crate) fn with_effects(&self, more: impl Iterator<Item = EffectSpec>) -> Self {
         let mut out = self.clone();
         out.spec.effects.extend(more);
         out
     }
 
-    /// The same with other tolerances: `altered` gives every parameter anew, and keeps it valid.
+    /// The description with other tolerances: `altered` gives every parameter anew, and keeps it valid.
     pub(crate) fn with_parameters(
         &self,
         altered: impl Fn(usize, &ParameterSpec) -> ParameterSpec,

@@ -32,14 +32,14 @@ pub enum GapError {
         /// What to do.
         hint: String,
     },
-    /// Integration is too coarse for the floor.
+    /// Integration is too coarse for the noise.
     #[error(
         "{stage}: halving the step of integration moves the output by {moved} of its floor, so that what is computed is not yet what its equations say: a number of the rig file makes this stage much faster than a rig is (a volume that is too small, a conductance, friction or time constant in another unit); of a simulator of your own, shorten the step"
     )]
     Solver {
         /// The stage.
         stage: String,
-        /// Root mean square change in units of the floor.
+        /// Root mean square change in multiples of the noise.
         moved: f64,
     },
     /// A simulated output was not finite.
@@ -62,7 +62,7 @@ impl GapError {
         matches!(self, Self::Stopped | Self::Broken(_))
     }
 
-    /// What a simulator says for itself.
+    /// An error of the simulator itself.
     ///
     /// ```
     /// use stretch_gap::GapError;

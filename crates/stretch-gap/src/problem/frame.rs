@@ -29,7 +29,7 @@ pub struct Segment {
     pub from: usize,
     /// Sample behind the last.
     pub to: usize,
-    /// What it is used for.
+    /// What the stretch is used for.
     pub role: Role,
 }
 

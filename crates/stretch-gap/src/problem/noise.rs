@@ -17,11 +17,11 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use stretch_filter::log::second_differences;
 
-use crate::numerics::random::Dice;
+use crate::numerics::random::RandomGenerator;
 
 /// Samples a window.
 pub const WINDOW: usize = 128;
-/// Fewest windows that tell a level: a tenth in sixteen.
+/// Fewest windows that determine a level: a tenth in sixteen.
 const FEWEST: usize = 12;
 /// Waves slower than parabolas leave, in half turns a window.
 const SLOWEST: usize = 3;
@@ -66,35 +66,35 @@ impl Noise {
         ((self.slow / self.sd().max(f64::MIN_POSITIVE)).powi(2), self.memory_samples)
     }
 
-    /// Where it comes from, for a report.
+    /// Where the level of the noise is known from, for a report.
     pub fn source(&self) -> &str {
         &self.source
     }
 
     /// So many samples of it.
-    pub fn samples(&self, count: usize, dice: &mut Dice) -> Vec<f64> {
+    pub fn samples(&self, count: usize, random: &mut RandomGenerator) -> Vec<f64> {
         if self.slow == 0.0 {
-            return (0..count).map(|_| self.white * dice.gauss()).collect();
+            return (0..count).map(|_| self.white * random.gauss()).collect();
         }
         let kept = (-1.0 / self.memory_samples).exp();
         let fresh = (1.0 - kept * kept).sqrt();
-        let mut slow = dice.gauss();
+        let mut slow = random.gauss();
         (0..count)
             .map(|_| {
-                slow = kept * slow + fresh * dice.gauss();
-                self.white * dice.gauss() + self.slow * slow
+                slow = kept * slow + fresh * random.gauss();
+                self.white * random.gauss() + self.slow * slow
             })
             .collect()
     }
 
-    /// From windows of [`WINDOW`] samples in which nothing was done; `stated` is what a rig file says. Where they are not still,
+    /// Estimates noise from windows of [`WINDOW`] samples in which nothing was done; `stated` is what a rig file says. Where they are not still,
     /// because something moves on by itself, only the quicker half of the waves is looked at, and of slow noise nothing is said.
     /// None where there are too few windows or nothing changes in them. `dt_s` is the sample time, s: waves of the mains (50 and 60 Hz) are left out.
     ///
     /// ```
-    /// use stretch_gap::{Dice, Noise, WINDOW};
-    /// let mut dice = Dice::new(1, 0);
-    /// let mut window = || (0..WINDOW).map(|i| 0.01 * i as f64 + 0.2 * dice.gauss()).collect::<Vec<f64>>();
+    /// use stretch_gap::{RandomGenerator, Noise, WINDOW};
+    /// let mut random = RandomGenerator::new(1, 0);
+    /// let mut window = || (0..WINDOW).map(|i| 0.01 * i as f64 + 0.2 * random.gauss()).collect::<Vec<f64>>();
     /// let windows: Vec<Vec<f64>> = (0..60).map(|_| window()).collect();
     /// let noise = Noise::of_windows(&windows, Some(0.2), true, 0.01).unwrap();
     /// assert_eq!(noise.sd(), 0.2);
@@ -257,9 +257,9 @@ fn mains(dt_s: f64) -> [f64; 2] {
 /// record squared.
 ///
 /// ```
-/// use stretch_gap::{Dice, noise_variance};
-/// let mut dice = Dice::new(1, 0);
-/// let record: Vec<f64> = (0..20_000).map(|i| (1e-3 * f64::from(i)).sin() + 0.2 * dice.gauss()).collect();
+/// use stretch_gap::{RandomGenerator, noise_variance};
+/// let mut random = RandomGenerator::new(1, 0);
+/// let record: Vec<f64> = (0..20_000).map(|i| (1e-3 * f64::from(i)).sin() + 0.2 * random.gauss()).collect();
 /// let sd = noise_variance([record.as_slice()].into_iter(), 0.01).sqrt();
 /// assert!((sd - 0.2).abs() < 0.01);
 /// ```
@@ -314,8 +314,8 @@ mod tests {
     use testkit::tolerance::NOISE_LEVEL;
 
     fn windows(noise: &Noise, count: usize, seed: u64) -> Vec<Vec<f64>> {
-        let mut dice = Dice::new(seed, 0);
-        (0..count).map(|_| noise.samples(WINDOW, &mut dice)).collect()
+        let mut random = RandomGenerator::new(seed, 0);
+        (0..count).map(|_| noise.samples(WINDOW, &mut random)).collect()
     }
 
     #[test]

@@ -14,9 +14,9 @@ pub struct Motion<'a> {
     pub values: &'a [f64],
     /// Unit.
     pub unit: &'a str,
-    /// What it is called when the values fall.
+    /// Word for a motion whose values fall.
     pub falling: &'a str,
-    /// What it is called when they rise.
+    /// Word for a motion whose values rise.
     pub rising: &'a str,
 }
 
@@ -47,9 +47,9 @@ pub struct MotionSpec {
     pub values: Vec<f64>,
     /// Unit.
     pub unit: String,
-    /// What it is called when the values fall.
+    /// Word for a motion whose values fall.
     pub falling: String,
-    /// What it is called when they rise.
+    /// Word for a motion whose values rise.
     pub rising: String,
 }
 
@@ -65,7 +65,7 @@ impl MotionSpec {
     }
 }
 
-/// What is known of a record beside what a [`DescriptionSpec`](crate::DescriptionSpec) says; by default no more.
+/// What is known of a record beside what a [`DescriptionSpec`](crate::DescriptionSpec) says; by default nothing more is known.
 ///
 /// [`Description::with_record`](crate::Description::with_record) checks it. All that has a value for each sample counts the samples of
 /// all trials end to end.

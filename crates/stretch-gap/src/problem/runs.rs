@@ -22,7 +22,7 @@ pub(crate) struct Runs<'a> {
 }
 
 impl<'a> Runs<'a> {
-    /// Of a simulator whose measured channels are complete.
+    /// The runs of a simulator whose measured channels are complete.
     ///
     /// # Errors
     /// [`GapError::Measured`] where a channel is shorter than the trials or not finite: everything after indexes it.
@@ -52,7 +52,7 @@ impl<'a> Runs<'a> {
         Runs { simulator, stop: self.stop, count, was_cut, step: self.step }
     }
 
-    /// The same with steps of integration so many times as long.
+    /// Runs with steps of integration so many times as long.
     pub(crate) fn at_step(&self, step: f64) -> Self {
         Self { step, ..self.clone() }
     }

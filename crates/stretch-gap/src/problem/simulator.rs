@@ -39,18 +39,18 @@ impl Model {
 /// One run of one stage over the session.
 #[derive(Debug, Clone, Copy)]
 pub struct Run<'a> {
-    /// Which stage.
+    /// Index of the stage that is run.
     pub stage: usize,
     /// Parameters and effects.
     pub model: &'a Model,
-    /// How many of the session's trials, from the first.
+    /// Number of the session's trials that are run, from the first.
     pub trials: usize,
-    /// Adds another draw of their noise to the measured inputs, from this seed: tells how much of it arrives at
+    /// Adds another draw of their noise to the measured inputs, from this seed: shows how much of it arrives at
     /// the output.
-    pub shake: Option<u64>,
+    pub input_noise: Option<u64>,
     /// Multiple of the usual step of integration: 0.5 for the check of the solver, 2 where that check allows longer steps.
     pub step: f64,
-    /// Nominal parameters so near that the output may be told from the run there and the [linearisation](Costly::linearise), where a
+    /// Nominal parameters so near that the output may be taken from the run there and the [linearisation](Costly::linearise), where a
     /// run costs more than that; none where it has to be exact.
     pub near: Option<&'a [f64]>,
 }
@@ -58,16 +58,16 @@ pub struct Run<'a> {
 impl<'a> Run<'a> {
     /// An exact run on the inputs as they were measured, at the usual step.
     pub fn exact(stage: usize, model: &'a Model, trials: usize) -> Self {
-        Self { stage, model, trials, shake: None, step: 1.0, near: None }
+        Self { stage, model, trials, input_noise: None, step: 1.0, near: None }
     }
 }
 
 /// Runs of a simulator that are counted, because they cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct ModelRuns {
-    /// How many were made.
+    /// Number of runs that were made.
     pub count: usize,
-    /// How many may be made, where that is limited.
+    /// Number of runs that may be made, where that is limited.
     pub budget: Option<usize>,
     /// Whether no more may be made but those that the answer itself needs; in a diagnosis, whether the search was cut short for it.
     pub is_spent: bool,
@@ -200,15 +200,15 @@ pub trait SpectralLines {
 
 /// Short ways to what the [description](Simulator::description) of any simulator says.
 impl dyn Simulator + '_ {
-    /// Its stages.
+    /// Stages of the simulator.
     pub fn stages(&self) -> &[StageSpec] {
         &self.description().stages
     }
-    /// Its nominal parameters.
+    /// Nominal parameters of the simulator.
     pub fn parameters(&self) -> &[ParameterSpec] {
         &self.description().parameters
     }
-    /// The catalogue of effects that it may lack.
+    /// The catalogue of effects that the simulator may lack.
     pub fn effects(&self) -> &[EffectSpec] {
         &self.description().effects
     }
@@ -220,7 +220,7 @@ impl dyn Simulator + '_ {
     pub fn dt_s(&self) -> f64 {
         self.description().dt_s
     }
-    /// What is known of the record besides.
+    /// What is known of the record beside the description's lists.
     pub fn record(&self) -> &RecordFacts {
         self.description().record()
     }

@@ -35,12 +35,12 @@ impl StageSpec {
     }
 }
 
-/// A slow wander of a parameter around its value that nobody models: it belongs to the floor.
+/// A slow drift of a parameter around its value that nobody models: it belongs to the noise.
 ///
 /// An Ornstein-Uhlenbeck process of about the standard deviation `sd` and the correlation time `correlation_s`: both are
 /// looked for in the record, around these within factors of some two and three.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Wander {
+pub struct SlowDrift {
     /// Standard deviation, in the parameter's unit.
     pub sd: f64,
     /// Correlation time, s.
@@ -63,8 +63,8 @@ pub struct ParameterSpec {
     pub least: f64,
     /// Greatest value that makes sense.
     pub greatest: f64,
-    /// Slow wander within a trial, when there is one.
-    pub wander: Option<Wander>,
+    /// Slow drift within a trial, when there is one.
+    pub drift: Option<SlowDrift>,
     /// Standard deviation of a constant offset in each trial, in the parameter's unit.
     pub per_trial_sd: Option<f64>,
     /// Standard deviation of an offset of its own for each tick of its [drift clock](crate::RecordFacts::drift_clocks), in the
@@ -84,14 +84,14 @@ impl ParameterSpec {
             sd: 0.0,
             least: f64::NEG_INFINITY,
             greatest: f64::INFINITY,
-            wander: None,
+            drift: None,
             per_trial_sd: None,
             per_tick_sd: None,
             is_evidence: true,
         }
     }
 
-    /// The same with a tolerance: one standard deviation, in the parameter's unit.
+    /// The parameter with a tolerance: one standard deviation, in the parameter's unit.
     pub fn within(self, sd: f64) -> Self {
         Self { sd, ..self }
     }
@@ -109,7 +109,7 @@ pub struct EffectSpec {
     pub stage: String,
     /// Indices of the stages whose output it changes.
     pub touches: Vec<usize>,
-    /// Its parameters.
+    /// Parameters of the effect.
     pub parameters: Vec<EffectParameter>,
     /// Values to screen it at, a few per shape and threshold; strengths in between are interpolated.
     pub starts: Vec<Vec<f64>>,
@@ -164,7 +164,7 @@ impl EffectSpec {
 pub struct TrialSpec {
     /// Name in reports.
     pub name: String,
-    /// How many samples it has.
+    /// Number of samples of the trial.
     pub samples: usize,
     /// Session time of its first sample, s.
     pub start_s: f64,

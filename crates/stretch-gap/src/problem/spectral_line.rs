@@ -1,7 +1,7 @@
 //! A line of known strength and unknown phase, where nothing may be fitted: judged by its power.
 //!
 //! A model that holds a hum of amplitude a foretells how strong its line is, not where its waves lie. In each second the residual r, in
-//! floors s, then has the covariance
+//! multiples of the noise s, then has the covariance
 //!
 //! ```text
 //! V = I + C C',     C = (a/sqrt 2) (cos(2 pi f t_i)/s_i, sin(2 pi f t_i)/s_i)
@@ -17,13 +17,13 @@ use std::f64::consts::TAU;
 ///
 /// ```
 /// use stretch_gap::Line;
-/// // Ten floors of 60 Hz on one second at 100 Hz: of a mean square of 50 one floor's worth is left.
+/// // A line of ten times the noise at 60 Hz, one second at 100 Hz: of a mean square of 50 that of the noise is left.
 /// let turn = std::f64::consts::TAU * 60.0 * 0.01;
 /// let mut residual: Vec<f64> = (0..100).map(|i| 10.0 * (turn * i as f64 + 0.3).sin()).collect();
 /// let line = Line { hertz: 60.0, amplitude: 10.0 };
 /// line.level(&mut residual, &[1.0; 100], 0.01);
 /// let left: f64 = residual.iter().map(|r| r * r).sum();
-/// assert!((left - 2.0).abs() < 0.1); // both quadratures at their own floor
+/// assert!((left - 2.0).abs() < 0.1); // both quadratures at their own noise
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
@@ -37,11 +37,11 @@ pub struct Line {
 const STEADY_S: f64 = 1.0;
 
 impl Line {
-    /// Levels a residual in floors without a break; `floor` is one standard deviation at every sample, in the unit of the
+    /// Levels a residual in multiples of the noise without a break; `noise` is one standard deviation at every sample, in the unit of the
     /// output, `dt_s` the sample time, s.
-    pub fn level(&self, residual: &mut [f64], floor: &[f64], dt_s: f64) {
+    pub fn level(&self, residual: &mut [f64], noise: &[f64], dt_s: f64) {
         let window = ((STEADY_S / dt_s) as usize).max(8);
-        for (r, sd) in residual.chunks_mut(window).zip(floor.chunks(window)) {
+        for (r, sd) in residual.chunks_mut(window).zip(noise.chunks(window)) {
             let columns = self.columns(sd, dt_s);
             for (axis, variance) in principal(&columns) {
                 // Along an axis u of V the variance is 1 + lambda.
@@ -87,17 +87,17 @@ fn principal([c, s]: &[Vec<f64>; 2]) -> Vec<(Vec<f64>, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::random::Dice;
+    use crate::numerics::random::RandomGenerator;
     use testkit::tolerance::MEDIAN_SPREAD;
 
     fn left(hertz: f64, amplitude: f64, foretold: f64) -> f64 {
-        let mut dice = Dice::new(3, 0);
+        let mut random = RandomGenerator::new(3, 0);
         let mut sum = 0.0;
         let seconds = 200;
         for second in 0..seconds {
             let phase = TAU * f64::from(second) * 0.618;
             let wave = |i: usize| amplitude * libm::sin(TAU * hertz * 0.01 * i as f64 + phase);
-            let mut r: Vec<f64> = (0..100).map(|i| wave(i) + dice.gauss()).collect();
+            let mut r: Vec<f64> = (0..100).map(|i| wave(i) + random.gauss()).collect();
             Line { hertz, amplitude: foretold }.level(&mut r, &[1.0; 100], 0.01);
             sum += r.iter().map(|r| r * r).sum::<f64>() / 100.0;
         }

@@ -10,11 +10,11 @@ pub struct Thresholds {
     pub null_excess: f64,
     /// Least rise of the score for an effect that closes a gap, nats.
     pub rise: f64,
-    /// The same for one that closes less than what counts as a gap.
+    /// Least rise of the score for an effect that closes less than what counts as a gap.
     pub faint_rise: f64,
     /// Least share of the gap left that an effect must close.
     pub share: f64,
-    /// Share of what was closed in a stage that mismatch of form may leave to a further effect.
+    /// Share of what was closed in a stage that model discrepancy may leave to a further effect.
     pub mismatch: f64,
     /// Temperature of the probabilities, nats.
     pub temperature: f64,
@@ -22,7 +22,7 @@ pub struct Thresholds {
     pub rho: f64,
     /// Excess that may be left whatever it was before.
     pub unknown_excess: f64,
-    /// Share of the excess that mismatch of form may leave.
+    /// Share of the excess that model discrepancy may leave.
     pub unknown_share: f64,
     /// Width of the border to `unknown`, in logarithms of the excess left.
     pub unknown_soft: f64,
@@ -35,7 +35,7 @@ pub struct Thresholds {
 }
 
 impl Thresholds {
-    /// Those frozen in this version.
+    /// The thresholds that this version froze.
     pub fn frozen() -> Self {
         toml::from_str(include_str!("../../thresholds.toml")).expect("a test reads it")
     }

@@ -1,6 +1,6 @@
 //! What a look at the columns alone says, before any simulation: copied, dead and stuck channels.
 //!
-//! Every test asks whether *noise* can be what was recorded. Noise of standard deviation s is told by differences of second and of
+//! Every test asks whether *noise* can be what was recorded. Noise of standard deviation s is found by differences of second and of
 //! fourth order, which pass white noise alike and what moves slowly not at all:
 //!
 //! ```text
@@ -102,11 +102,11 @@ fn noise(values: &[f64]) -> (f64, f64) {
 /// rounding. Where there is no white noise nothing is said: a good sensor would look the same.
 ///
 /// ```
-/// use stretch_gap::{Dice, copied};
-/// let mut dice = Dice::new(1, 0);
-/// let a: Vec<f64> = (0..1000).map(|i| 0.01 * f64::from(i) + 0.1 * dice.gauss()).collect();
+/// use stretch_gap::{RandomGenerator, copied};
+/// let mut random = RandomGenerator::new(1, 0);
+/// let a: Vec<f64> = (0..1000).map(|i| 0.01 * f64::from(i) + 0.1 * random.gauss()).collect();
 /// let b: Vec<f64> = a.iter().map(|x| 2.0 * x + 1.0).collect();
-/// let c: Vec<f64> = (0..1000).map(|i| 0.02 * f64::from(i) + 0.1 * dice.gauss()).collect();
+/// let c: Vec<f64> = (0..1000).map(|i| 0.02 * f64::from(i) + 0.1 * random.gauss()).collect();
 /// assert!(copied(&a, &b).is_some_and(|factor| (factor - 2.0).abs() < 1e-9));
 /// assert_eq!(copied(&a, &c), None);
 /// ```
@@ -220,14 +220,14 @@ fn stuck(values: &[f64], others: &[&[f64]], trials: &[(usize, usize)]) -> Vec<(u
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::random::Dice;
+    use crate::numerics::random::RandomGenerator;
 
     const N: usize = 4000;
 
     fn wave(noise: f64, seed: u64) -> Vec<f64> {
-        let mut dice = Dice::new(seed, 0);
+        let mut random = RandomGenerator::new(seed, 0);
         let rounded = |x: f64| (x * 1e3).round() * 1e-3;
-        (0..N).map(|i| rounded(10.0 * (5e-3 * i as f64).sin() + noise * dice.gauss())).collect()
+        (0..N).map(|i| rounded(10.0 * (5e-3 * i as f64).sin() + noise * random.gauss())).collect()
     }
 
     #[test]
@@ -248,15 +248,15 @@ mod tests {
     #[test]
     fn a_dead_channel_is_told_from_a_loose_sleeve() {
         let other = wave(0.05, 1);
-        let mut dice = Dice::new(3, 0);
+        let mut random = RandomGenerator::new(3, 0);
         let trials = [(0, N / 2), (N / 2, N)];
         let mut died = wave(0.05, 2);
-        died[N / 2..].iter_mut().for_each(|x| *x = 4.0 + 0.05 * dice.gauss());
+        died[N / 2..].iter_mut().for_each(|x| *x = 4.0 + 0.05 * random.gauss());
         let found = dead(&died, &[&other], &trials, 100);
         assert!(matches!(found[..], [(from, to)] if from >= N / 2 - BLOCK && to == N), "{found:?}");
         // Half of the stroke is not seen.
         let slack: Vec<f64> =
-            wave(0.0, 2).iter().map(|x| x.max(0.0) + 0.05 * dice.gauss()).collect();
+            wave(0.0, 2).iter().map(|x| x.max(0.0) + 0.05 * random.gauss()).collect();
         assert_eq!(dead(&slack, &[&other], &trials, 100), []);
     }
 

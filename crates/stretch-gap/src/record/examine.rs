@@ -32,9 +32,9 @@ const NEAR: f64 = 0.5;
 const FITTED: usize = 4;
 /// Errors that are fitted to the end after a coarse fit.
 const POLISHED: usize = 2;
-/// Least scale and offset (a share of the span) that are told: an instrument is that good.
+/// Least scale and offset (a share of the span) that are reported: an instrument is that good.
 const LEAST: f64 = 0.03;
-/// Least delay that is told, in samples: less is when within a sample a channel is read.
+/// Least delay that is reported, in samples: less is when within a sample a channel is read.
 const LEAST_SAMPLES: f64 = 2.0;
 /// Standard deviations by which a size must lie beyond what is allowed.
 const SURE: f64 = 3.0;
@@ -127,7 +127,7 @@ impl Doubts {
     }
 }
 
-/// Those that are gross, the best first.
+/// Errors that are larger than tolerances and instruments allow, the best first.
 fn sorted(suspect: &Suspect<'_>, mut found: Vec<Hypothesis>) -> Vec<Hypothesis> {
     found.retain(|one| {
         let sd = one.effect_sd.values().flatten().copied().fold(0.0, f64::max);

@@ -27,9 +27,9 @@ pub enum GrossKind {
 pub struct Gross {
     /// What is wrong.
     pub what: GrossKind,
-    /// With which column.
+    /// Name of the column that is wrong.
     pub column: Option<String>,
-    /// With which nominal parameter.
+    /// Name of the nominal parameter that is wrong.
     pub parameter: Option<String>,
     /// Factor by which the column, or the rig's parameter, is larger than it is said to be.
     pub factor: Option<f64>,
@@ -45,9 +45,9 @@ pub struct Gross {
     pub unit: String,
     /// First trial in which it shows, of what shows in stretches.
     pub trial: Option<String>,
-    /// Where that stretch begins, s from the trial's start.
+    /// Begin of the stretch in which the error shows, s from the trial's start.
     pub from_s: Option<f64>,
-    /// Where it ends, s.
+    /// End of the stretch in which the error shows, s.
     pub to_s: Option<f64>,
     /// What is wrong, in words.
     pub sentence: String,

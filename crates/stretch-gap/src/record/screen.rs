@@ -38,11 +38,11 @@ pub(crate) const REACH: f64 = 3.0;
 #[derive(Debug, Clone)]
 pub(crate) struct Promising {
     pub(crate) fault: usize,
-    /// Where a fit may start from.
+    /// Model that a fit may start from.
     pub(crate) start: Model,
-    /// The same from the rig as shipped, where a large error did not bend what was re-tuned.
+    /// Model that a fit may start from around the rig as shipped, where a large error did not bend what was re-tuned.
     pub(crate) plain: Option<Model>,
-    /// Fall of the sum of squares, in floors.
+    /// Fall of the sum of squares, in multiples of the noise.
     pub(crate) fall: f64,
     /// Share of the excess of the stages that it touches.
     pub(crate) share: f64,
@@ -193,7 +193,7 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
         self.problem.compare.product(stage, residual, residual) - dot(&told, &told)
     }
 
-    /// Sizes worth a simulation.
+    /// Sizes that a simulation is spent on.
     fn sizes(&self, fault: &Fault) -> Vec<f64> {
         let column = fault.column.map(|c| &self.suspect.columns()[c]);
         match (fault.kind, column) {

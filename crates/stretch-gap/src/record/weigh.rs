@@ -12,7 +12,7 @@ use crate::{
 
 /// No effect of the best set: the rival stands in the place of the whole.
 const WHOLE: usize = usize::MAX;
-/// Nats within which one error cannot be told from another.
+/// Nats within which two errors are a tie.
 const TIE: f64 = 1.1;
 
 /// Gap that a set of effects, or an error, may leave.
@@ -20,7 +20,7 @@ pub(crate) fn allowed(problem: &Problem<'_>, thresholds: &Thresholds) -> f64 {
     thresholds.unknown_excess + thresholds.unknown_share * problem.gap(&problem.nominal)
 }
 
-/// The errors that stand above the best effects, told, and what was found with the first of them in its place; none where
+/// The errors that stand above the best effects, as they are reported, and what was found with the first of them in its place; none where
 /// the effects stand.
 pub(crate) fn weighed(
     doubted: &Problem<'_>,

@@ -1,9 +1,9 @@
-//! What an effect must bring to be taken: more than chance, more than what counts, more than mismatch of form.
+//! What an effect must bring to be taken: more than chance, more than what counts, more than model discrepancy.
 //!
-//! Four hurdles, all of them in [`Thresholds`]. What is closed is more than chance makes of noise of this colour: `rise` nats by the
+//! Four acceptance criteria, all of them in [`Thresholds`]. What is closed is more than chance makes of noise of this colour: `rise` nats by the
 //! [octaves](crate::fit::octaves). The score rises by as much, and by `faint_rise` where what is closed would not count as a gap: so little may be
-//! mismatch of form within the noise. At least `share` of the gap that is left in the effect's stages closes. And in one of these stages more
-//! closes than *mismatch of form* could explain: the rig's backlash is not the textbook's; an effect in the right place leaves a share
+//! model discrepancy within the noise. At least `share` of the gap that is left in the effect's stages closes. And in one of these stages more
+//! closes than *model discrepancy* could explain: the rig's backlash is not the textbook's; an effect in the right place leaves a share
 //! `mismatch` of what it closes, with the shape of a further effect, and evidence grows with the samples while that share does not.
 
 use crate::{
@@ -11,16 +11,16 @@ use crate::{
     problem::thresholds::Thresholds,
 };
 
-/// The hurdles of a problem.
+/// The acceptance criteria of a problem.
 #[derive(Clone, Copy)]
-pub(crate) struct Worth<'a> {
+pub(crate) struct Acceptance<'a> {
     pub(crate) problem: &'a Problem<'a>,
     pub(crate) thresholds: &'a Thresholds,
 }
 
-impl Worth<'_> {
-    /// Whether `next`, which has one effect more than `base`, takes every hurdle.
-    pub(crate) fn is_worth(&self, base: &Hypothesis, next: &Hypothesis) -> bool {
+impl Acceptance<'_> {
+    /// Whether `next`, which has one effect more than `base`, meets every acceptance criterion.
+    pub(crate) fn is_accepted(&self, base: &Hypothesis, next: &Hypothesis) -> bool {
         let Some(&new) = next.effects.iter().find(|e| !base.effects.contains(e)) else {
             return false;
         };
@@ -38,7 +38,7 @@ impl Worth<'_> {
         set.model.effect(effect).is_some_and(|values| spec.is_at_bound(values))
     }
 
-    /// Whether an effect on top of `base` can be more than what mismatch of form left.
+    /// Whether an effect on top of `base` can be more than what model discrepancy left.
     pub(crate) fn is_possible(&self, base: &Hypothesis, effect: usize) -> bool {
         let mut touched = self.touched(effect).iter();
         touched.any(|&s| self.problem.gap_in(base, s) >= self.mismatch(base, s))
@@ -62,7 +62,7 @@ impl Worth<'_> {
         })
     }
 
-    /// Gap that mismatch of form may leave of what a set closes in a stage.
+    /// Gap that model discrepancy may leave of what a set closes in a stage.
     fn mismatch(&self, base: &Hypothesis, stage: usize) -> f64 {
         let gap = |set: &Hypothesis| self.problem.gap_in(set, stage);
         self.thresholds.mismatch * (gap(&self.problem.nominal) - gap(base)).max(0.0)

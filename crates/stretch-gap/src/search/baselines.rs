@@ -62,21 +62,21 @@ pub(crate) fn baselines(
     })
 }
 
-/// The effect whose own parameters, fitted alone, take most from the mean square error in floors, all parameters of the
+/// The effect whose own parameters, fitted alone, take most from the mean square error in multiples of the noise, all parameters of the
 /// simulator left as shipped; none where that is less than what counts as a gap.
 fn largest_drop(problem: &Problem<'_>, null_excess: f64) -> Result<Option<usize>, GapError> {
-    // Nothing is re-tuned, nothing wanders.
+    // Nothing is re-tuned, nothing drifts.
     let compare = &problem.compare;
     let frozen = Altered::of(problem.simulator(), |_, p| ParameterSpec {
         sd: 0.0,
-        wander: None,
+        drift: None,
         per_trial_sd: None,
         per_tick_sd: None,
         ..p.clone()
     });
     let (runs, shipped) = (compare.runs.beside(&frozen), Model::nominal(&frozen));
     let metrics = compare.metrics.iter().enumerate().map(|(stage, metric)| {
-        Metric::of(&runs, &compare.frame, stage, metric.floor.clone(), &shipped, Some(metric))
+        Metric::of(&runs, &compare.frame, stage, metric.noise.clone(), &shipped, Some(metric))
     });
     let rigid = compare.beside(&frozen, metrics.collect::<Result<_, _>>()?);
     let ground = Ground::around(&rigid, shipped)?;

@@ -1,6 +1,6 @@
 //! Cheap look at every effect: the change that it would make, nominal sensitivities projected out.
 //!
-//! Let d be the change of the output, in floors, that an effect of finite severity makes, r the residual and A the sensitivities of the
+//! Let d be the change of the output, in multiples of the noise, that an effect of finite severity makes, r the residual and A the sensitivities of the
 //! nominal parameters, whose prior precision is 1. What the parameters can do is marginalised as nuisances are:
 //!
 //! ```text
@@ -10,7 +10,7 @@
 //! An effect a times as strong changes the cost by (0.5 a^2 <d,d> - a <d,r>)/b, which is least at a = <d,r>/<d,d>. The reduction
 //! there is the *gain*, half the score statistic of Rao (1948, doi 10.1017/S0305004100023987) for the effect, b samples a block:
 //! one simulation a start instead of a fit. Strengths scale so; thresholds do not, and are judged as they are.
-//! A kink bends the change, so gains only say what is worth a fit.
+//! A kink bends the change, so gains only say what a fit may be spent on.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -26,7 +26,7 @@ use crate::{
 
 /// Times by which the first start's strength may be scaled.
 const SCALED: f64 = 8.0;
-/// A change smaller than this, in floors squared over all samples, is none.
+/// A change smaller than this, in variances of the noise over all samples, is none.
 const NO_CHANGE: f64 = 1e-9;
 
 /// What a screen says of one effect.

@@ -12,7 +12,7 @@ use crate::{
     fit::{hypothesis::Hypothesis, prepared::Problem},
     problem::{error::GapError, thresholds::Thresholds},
     search::{
-        acceptance::Worth,
+        acceptance::Acceptance,
         screen::{Ground, Screened},
         sets::Sets,
     },
@@ -41,7 +41,7 @@ const LOOKED: usize = 4;
 /// The search over sets of effects.
 pub(crate) struct Search<'a> {
     problem: &'a Problem<'a>,
-    worth: Worth<'a>,
+    acceptance: Acceptance<'a>,
     pub(crate) sets: Sets<'a>,
     /// Most effects at once.
     depth: usize,
@@ -65,11 +65,11 @@ pub(crate) struct Found {
 
 impl<'a> Search<'a> {
     pub(crate) fn new(problem: &'a Problem<'a>, thresholds: &'a Thresholds, depth: usize) -> Self {
-        let worth = Worth { problem, thresholds };
-        Self { problem, worth, sets: Sets::new(problem), depth, looked: Vec::new() }
+        let acceptance = Acceptance { problem, thresholds };
+        Self { problem, acceptance, sets: Sets::new(problem), depth, looked: Vec::new() }
     }
 
-    /// The best set that grows from one of this or another problem: effects are added as long as they are worth it.
+    /// The best set that grows from one of this or another problem: effects are added as long as they meet the acceptance criterion.
     pub(crate) fn best(
         &mut self,
         from: &Hypothesis,
@@ -147,13 +147,13 @@ impl<'a> Search<'a> {
             let kept = if round == 0 { KEPT } else { KEPT_LATER };
             let list = self.shortlist(&best, screened, kept);
             progress(&format!("fitting {} candidates, round {}", list.len(), round + 1));
-            let mut next = self.first_worth(&best, ground, &list)?;
-            let is_open = self.problem.gap(&best) > self.worth.thresholds.null_excess;
+            let mut next = self.first_accepted(&best, ground, &list)?;
+            let is_open = self.problem.gap(&best) > self.acceptance.thresholds.null_excess;
             if next.is_none() && is_open && !self.problem.is_spent() {
                 // A screen is a straight line: before a gap is left as it is, whatever could be in it is fitted.
                 progress(&format!("fitting the other candidates, round {}", round + 1));
                 let others: Vec<Screened> = self.others(&best, screened, &list);
-                next = self.first_worth(&best, ground, &others)?;
+                next = self.first_accepted(&best, ground, &others)?;
             }
             let Some(next) = next else { break };
             best = next;
@@ -165,21 +165,21 @@ impl<'a> Search<'a> {
         Ok(best)
     }
 
-    /// The best may only pick up what mismatch of form left elsewhere: the first that is worth it is taken.
-    fn first_worth(
+    /// The best may only pick up what model discrepancy left elsewhere: the first that meets the acceptance criterion is taken.
+    fn first_accepted(
         &mut self,
         base: &Hypothesis,
         ground: &Ground,
         list: &[Screened],
     ) -> Result<Option<Hypothesis>, GapError> {
         let found = self.sets.extend_all(base, ground, list, base.score)?;
-        Ok(found.into_iter().find(|next| self.worth.is_worth(base, next)))
+        Ok(found.into_iter().find(|next| self.acceptance.is_accepted(base, next)))
     }
 
     /// Effects that a shortlist leaves out, where a gap is left for them, each from its best start.
     fn others(&self, base: &Hypothesis, screened: &[Screened], list: &[Screened]) -> Vec<Screened> {
         let is_new = |s: &&Screened| list.iter().all(|l| l.effect != s.effect);
-        let is_possible = |s: &&Screened| self.worth.is_possible(base, s.effect);
+        let is_possible = |s: &&Screened| self.acceptance.is_possible(base, s.effect);
         let one = |s: &Screened| {
             let starts = s.starts.iter().take(1).cloned().collect();
             Screened { effect: s.effect, starts }
@@ -197,7 +197,7 @@ impl<'a> Search<'a> {
                 }
             }
             match weakest {
-                Some(less) if !self.worth.is_worth(&less, &best) => best = less,
+                Some(less) if !self.acceptance.is_accepted(&less, &best) => best = less,
                 _ => break,
             }
         }
@@ -226,17 +226,18 @@ impl<'a> Search<'a> {
     /// The best of a screen, and the twins of the very best.
     fn shortlist(&self, base: &Hypothesis, screened: &[Screened], kept: usize) -> Vec<Screened> {
         let screened: Vec<&Screened> =
-            screened.iter().filter(|s| self.worth.is_possible(base, s.effect)).collect();
+            screened.iter().filter(|s| self.acceptance.is_possible(base, s.effect)).collect();
         let specs = self.problem.simulator().effects();
         let best = screened.first().map_or(0.0, |s| s.gain());
         // Gains count a block as one observation, scores the effective sample size.
         let finest = self.problem.finest();
-        let floor = |effect: usize| {
-            (FAINT * best)
-                .max(PROMISE * self.worth.least_rise(self.worth.left(base, effect)) * finest)
+        let least = |effect: usize| {
+            (FAINT * best).max(
+                PROMISE * self.acceptance.least_rise(self.acceptance.left(base, effect)) * finest,
+            )
         };
-        let worth = screened.iter().take(kept).filter(|s| s.gain() >= floor(s.effect));
-        let mut list: Vec<Screened> = worth.copied().cloned().collect();
+        let promising = screened.iter().take(kept).filter(|s| s.gain() >= least(s.effect));
+        let mut list: Vec<Screened> = promising.copied().cloned().collect();
         let leaders: Vec<usize> = list.iter().take(LEADERS).map(|s| s.effect).collect();
         for leader in leaders {
             for twin in &specs[leader].twins {
@@ -266,7 +267,7 @@ impl<'a> Search<'a> {
             let screened: Vec<&Screened> = all
                 .iter()
                 .filter(|s| !best.effects.contains(&s.effect))
-                .filter(|s| self.worth.is_possible(&less, s.effect))
+                .filter(|s| self.acceptance.is_possible(&less, s.effect))
                 .collect();
             let twins = &self.problem.simulator().effects()[effect].twins;
             let is_twin =
@@ -280,7 +281,7 @@ impl<'a> Search<'a> {
                 .collect();
             for solution in self.sets.extend_all(&less, ground, &list, best.score)? {
                 let new = solution.effects.iter().find(|e| !less.effects.contains(e));
-                if new.is_some_and(|new| !self.worth.is_at_bound(&solution, *new)) {
+                if new.is_some_and(|new| !self.acceptance.is_at_bound(&solution, *new)) {
                     out.push((effect, solution));
                 }
             }

@@ -22,7 +22,7 @@ use crate::{
 
 /// Starts of one effect that are fitted, and the share of the best one's promise that the others need.
 const STARTS: usize = 3;
-const WORTH_A_START: f64 = 0.3;
+const PROMISING_START: f64 = 0.3;
 /// Share of the best candidate's rise, and nats beside, within which a candidate may still win once it is fitted to the end.
 const NEAR: f64 = 0.3;
 const NEAR_NATS: f64 = 30.0;
@@ -32,7 +32,7 @@ pub(crate) struct Sets<'a> {
     pub(crate) problem: &'a Problem<'a>,
     /// Every set that was fitted, by its sorted effects.
     pub(crate) tried: BTreeMap<Vec<usize>, Hypothesis>,
-    /// Those of them that were fitted from a larger set.
+    /// Sets among the fitted ones that were fitted from a larger set.
     refitted: BTreeSet<Vec<usize>>,
 }
 
@@ -187,8 +187,9 @@ impl<'a> Sets<'a> {
         let starts: Vec<(usize, Vec<&Vec<f64>>)> = screened
             .iter()
             .map(|screen| {
-                let worth = screen.starts.iter().filter(|s| s.1 > WORTH_A_START * screen.gain());
-                (screen.effect, worth.take(STARTS).map(|s| &s.0).collect())
+                let promising =
+                    screen.starts.iter().filter(|s| s.1 > PROMISING_START * screen.gain());
+                (screen.effect, promising.take(STARTS).map(|s| &s.0).collect())
             })
             .collect();
         let (several, one): (Vec<_>, Vec<_>) = starts.into_iter().partition(|s| s.1.len() > 1);

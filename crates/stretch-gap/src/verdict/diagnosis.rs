@@ -20,15 +20,15 @@ use crate::{
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum VerdictKind {
-    /// Simulation and measurement agree within the floor.
+    /// Simulation and measurement agree within the noise.
     NoGap,
-    /// They agree once parameters are re-tuned within their tolerances.
+    /// Simulation and measurement agree once parameters are re-tuned within their tolerances.
     Parameters,
-    /// A column of the record or a number of the rig file is wrong, and is told.
+    /// A column of the record or a number of the rig file is wrong, and is reported.
     Record,
     /// Effects of the catalogue are missing, and are named.
     Effect,
-    /// An effect of the catalogue is missing, is named, and leaves more than the mismatch of its form explains.
+    /// An effect of the catalogue is missing, is named, and leaves more than its model discrepancy explains.
     Partial,
     /// There is a gap that no effect of the catalogue explains.
     Unknown,
@@ -74,7 +74,7 @@ pub struct NextExperiment {
     pub name: String,
     /// Rivals that it separates.
     pub separates: Vec<String>,
-    /// Difference that no re-tuning removes, in floors.
+    /// Difference that no re-tuning removes, in multiples of the noise.
     pub d: f64,
     /// Minutes that it takes.
     pub minutes: f64,
@@ -119,7 +119,7 @@ pub struct Diagnosis {
     /// What each effect of the best set closes of the held-out gap, the strongest first; named or not.
     #[serde(default)]
     pub shares: Vec<EffectShare>,
-    /// How large the gap is.
+    /// Size of the gap.
     #[serde(default)]
     pub gap: Excess,
     /// Gap that 19 of 20 records like this one stay below in which nothing is missing; none where something is named, or the record
@@ -140,7 +140,7 @@ pub struct Diagnosis {
     pub next_experiment: Option<NextExperiment>,
     /// What simpler methods say.
     pub baselines: Option<Baselines>,
-    /// What was noticed and assumed.
+    /// Sentences about what was noticed and assumed.
     pub notes: Vec<String>,
     /// Rows that it stands on, of those that were read.
     #[serde(default)]

@@ -170,7 +170,7 @@ mod tests {
     use VerdictKind::{Effect, NoGap, Parameters, Partial, Record, Unknown};
     use std::collections::BTreeMap;
 
-    const SOUND: Sanity = Sanity { left: Vec::new(), allowed: 0.1, at_bounds: None };
+    static SOUND: Sanity = Sanity { left: Vec::new(), allowed: 0.1, at_bounds: None };
 
     fn candidate(effects: &[&str], is_confirmed: bool) -> Candidate {
         Candidate {
@@ -277,7 +277,7 @@ mod tests {
             judge(&case([20.0, 10.0, 0.1], &named, &[]), &thresholds, never).unwrap().kind,
             Effect
         );
-        let beaten = |names| {
+        let beaten = |names: bool| {
             assert!(names);
             Ok(Lacking { beats_names: true, ..Lacking::default() })
         };

@@ -1,4 +1,4 @@
-//! The verdict, and how it is told.
+//! The verdict, and how it is put into words.
 //!
 //! In: the evidence, the errors of the record and the thresholds. Out: a [`diagnosis::Diagnosis`].
 //! [`judge`] decides what kind of answer the evidence carries, [`naming`] which effects are named, tied or faint, [`coverage`]

@@ -1,7 +1,7 @@
 //! Which names stand in the headline, which beside it, and which below.
 //!
 //! Evidence is not importance: with 50 000 samples sixty nats stand for a hundred-thousandth of the gap. So a name closes a stated share of
-//! the gap that was *held out* in one of its stages, or is told as faint. And names that the data tell apart no better than a coin does are a tie: two
+//! the gap that was *held out* in one of its stages, or is reported as faint. And names that the data tell apart no better than a coin does are a tie: two
 //! sets that differ in one effect, the probability of the second at least [`TIE`] of the first's.
 
 use crate::{
@@ -9,7 +9,7 @@ use crate::{
     problem::thresholds::Thresholds,
 };
 
-/// Ratio of probabilities from which two sets are told as one or the other: one to three, less than a nat and a half.
+/// Ratio of probabilities from which two sets are reported as one or the other: one to three, less than a nat and a half.
 const TIE: f64 = 1.0 / 3.0;
 
 /// Effects of the first candidate by what may be said of them.
@@ -17,14 +17,14 @@ const TIE: f64 = 1.0 / 3.0;
 pub(crate) struct Naming {
     /// For the headline, the strongest first.
     pub(crate) named: Vec<String>,
-    /// What may stand in the place of a name: the name, and the other.
+    /// Pairs of a name and another effect that may stand in its place.
     pub(crate) ties: Vec<(String, String)>,
-    /// Found, but they close less than counts.
+    /// Effects that were found but close less than a name must.
     pub(crate) faint: Vec<String>,
 }
 
 impl Naming {
-    /// Of the most probable candidate and its rivals; shares are of the held-out gap.
+    /// Names the effects of the most probable candidate beside its rivals; shares are of the held-out gap.
     pub(crate) fn of(
         candidates: &[Candidate],
         shares: &[EffectShare],

@@ -35,7 +35,7 @@ const SMALL: f64 = 0.02;
 pub struct Plan {
     /// Name in the menu.
     pub name: String,
-    /// How to do it, in a sentence.
+    /// A sentence that says how the experiment is done.
     pub how: String,
     /// Time to prepare it, minutes.
     pub prepare_min: f64,
@@ -80,14 +80,14 @@ pub struct Proposal {
     pub next: NextExperiment,
     /// Openings by time, and what is to be set from outside.
     pub trial: Trial,
-    /// Every experiment of the menu: name, difference in floors, minutes; the best first.
+    /// Every experiment of the menu: name, difference in multiples of the noise, minutes; the best first.
     pub menu: Vec<(String, f64, f64)>,
 }
 
 /// Recommends an experiment when the 95 % set of a diagnosis holds more than one effect.
 ///
 /// D(x) is the root mean square difference between the predictions of the two leading rivals for the experiment x, in
-/// floors, that is left when one rival's nominal and effect parameters are moved, within their tolerances and at the
+/// multiples of the noise, that is left when one rival's nominal and effect parameters are moved, within their tolerances and at the
 /// price of what has been measured already, to come as near to the other as they can (linearised); both ways, the
 /// smaller. The experiment with the largest D^2 times blocks a minute wins: evidence adds up in squares. The
 /// preparation counts into the minutes.
@@ -104,12 +104,12 @@ pub fn next_experiment<L: Laboratory>(
     };
     let menu = simulator.menu();
     let rated = rate(simulator, one, two, &menu)?.into_iter().enumerate();
-    let worth = |&(i, d): &(usize, f64)| {
+    let value = |&(i, d): &(usize, f64)| {
         let plan = &menu[i].0;
         d * d * plan.runs_min() / plan.minutes()
     };
     let mut rated: Vec<(usize, f64)> = rated.collect();
-    rated.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
+    rated.sort_by(|a, b| value(b).total_cmp(&value(a)));
     let Some(&(best, d)) = rated.first().filter(|r| r.1.is_finite()) else { return Ok(None) };
     let chosen = &menu[best].0;
     let next = NextExperiment {
@@ -124,7 +124,7 @@ pub fn next_experiment<L: Laboratory>(
     Ok(Some(Proposal { next, trial, menu: rated.collect() }))
 }
 
-/// D of every experiment of the menu for two models, in floors: see [`next_experiment`].
+/// D of every experiment of the menu for two models, in multiples of the noise: see [`next_experiment`].
 ///
 /// # Errors
 /// What the simulator says.
@@ -160,7 +160,7 @@ fn rate<L: Laboratory>(
         .collect()
 }
 
-/// How often it has to be done until it tells, where once is not enough.
+/// How often the experiment has to be repeated until rivals part, where once is not enough.
 fn repeats(d: f64, minutes: f64) -> String {
     let told = 0.5 * d * d * 60.0 * minutes / BLOCK_S;
     match (ENOUGH / told).ceil() {

@@ -11,13 +11,13 @@ use crate::{
     },
 };
 
-/// Least share of the gap that is told of an effect that is not named.
+/// Least share of the gap that is reported of an effect that is not named.
 const TOLD: f64 = 0.05;
 
-/// Share that is told as a number.
+/// Least share that is reported as a number.
 const LEAST_TOLD: f64 = 0.01;
 
-/// What is told: the answer in one sentence, and what was noticed and assumed.
+/// What is reported: the answer in one sentence, and what was noticed and assumed.
 pub(crate) struct Told {
     pub(crate) sentence: String,
     pub(crate) notes: Vec<String>,

@@ -19,7 +19,7 @@ pub(crate) enum TooLittle {
 }
 
 impl TooLittle {
-    /// What is wrong, and what to record.
+    /// A sentence that says what is missing from the record, and what to record.
     pub(crate) fn words(&self) -> String {
         match self {
             Self::Rows(rows) => format!(

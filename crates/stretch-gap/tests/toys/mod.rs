@@ -16,7 +16,9 @@ mod simulator;
 
 pub(crate) use laws::{Effect, Law};
 pub(crate) use simulator::Measured;
-use stretch_gap::{Description, DescriptionSpec, Dice, Noise, ParameterSpec, StageSpec, TrialSpec};
+use stretch_gap::{
+    Description, DescriptionSpec, Noise, ParameterSpec, RandomGenerator, StageSpec, TrialSpec,
+};
 
 /// A simulator and the bench beside it.
 #[derive(Debug, Clone)]
@@ -169,8 +171,8 @@ impl Toy {
         for value in [&mut p.per_trial_sd, &mut p.per_tick_sd].into_iter().flatten() {
             *value *= unit;
         }
-        if let Some(wander) = &mut p.wander {
-            wander.sd *= unit;
+        if let Some(drift) = &mut p.drift {
+            drift.sd *= unit;
         }
         p
     }
@@ -178,7 +180,7 @@ impl Toy {
     /// The record that the bench makes, drawn from a seed: `x` is four tones a trial, with values within -1..1.
     pub(crate) fn measured(&self, seed: u64) -> Measured {
         let x = self.trials.iter().enumerate().flat_map(|(trial, (samples, _))| {
-            let mut dice = Dice::new(seed, 100 + trial as u64);
+            let mut dice = RandomGenerator::new(seed, 100 + trial as u64);
             let tones: Vec<[f64; 2]> = (0..4)
                 .map(|k| [0.5 + 1.1 * f64::from(k) + 0.7 * dice.unit(), 6.3 * dice.unit()])
                 .collect();
@@ -195,7 +197,7 @@ impl Toy {
     /// The record that the bench makes of an input of one's own, in the units of -1..1.
     pub(crate) fn driven_by(&self, x: Vec<f64>, seed: u64) -> Measured {
         assert_eq!(x.len(), self.samples(), "one sample of x for each of the trials");
-        let mut dice = Dice::new(seed, 7);
+        let mut dice = RandomGenerator::new(seed, 7);
         let mut outputs: Vec<Vec<f64>> = Vec::new();
         for stage in 0..self.laws.len() {
             let input = outputs.last().unwrap_or(&x);
@@ -276,7 +278,7 @@ pub(crate) fn slow(
     (samples, dt_s): (usize, f64),
     seed: u64,
 ) -> Vec<f64> {
-    let mut dice = Dice::new(seed, 55);
+    let mut dice = RandomGenerator::new(seed, 55);
     let kept = (-dt_s / correlation_s).exp();
     let mut x = dice.gauss();
     let next = |_| {

@@ -7,8 +7,8 @@ use std::sync::{
 
 use super::{Effect, Fails, Toy, laws::Plant};
 use stretch_gap::{
-    Column, Costly, Description, Diagnosis, Dice, Distortion, Driven, Evidence, GapError,
-    ModelRuns, MotionSpec, Options, RecordFacts, Recorded, Run, Simulator, diagnose,
+    Column, Costly, Description, Diagnosis, Distortion, Driven, Evidence, GapError, ModelRuns,
+    MotionSpec, Options, RandomGenerator, RecordFacts, Recorded, Run, Simulator, diagnose,
 };
 
 /// A toy beside its record. Outputs may be altered in place; for `x`, which the simulator is driven by, see [`Measured::rewritten`].
@@ -88,14 +88,14 @@ impl Measured {
     }
 
     /// Input of a stage in the units of -1..1, with another draw of the noise of `x` where that is asked for.
-    fn input_of(&self, stage: usize, shake: Option<u64>) -> Vec<f64> {
+    fn input_of(&self, stage: usize, input_noise: Option<u64>) -> Vec<f64> {
         let toy = &self.toy;
         if stage > 0 {
             return self.outputs[stage - 1].iter().map(|y| y / toy.units[1]).collect();
         }
         let mut x: Vec<f64> = self.x.iter().map(|x| x / toy.units[0]).collect();
-        if let Some(seed) = shake.filter(|_| toy.input_noise > 0.0) {
-            let mut dice = Dice::new(seed, 31);
+        if let Some(seed) = input_noise.filter(|_| toy.input_noise > 0.0) {
+            let mut dice = RandomGenerator::new(seed, 31);
             x.iter_mut().for_each(|x| *x += toy.input_noise * dice.gauss());
         }
         x
@@ -158,7 +158,7 @@ impl Simulator for Measured {
             }
             _ => {}
         }
-        let input = self.input_of(run.stage, run.shake);
+        let input = self.input_of(run.stage, run.input_noise);
         self.compute(run, &input, out);
         Ok(())
     }

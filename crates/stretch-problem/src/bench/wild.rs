@@ -73,11 +73,11 @@ fn deviation(off: &[f64]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use stretch_gap::Dice;
+    use stretch_gap::RandomGenerator;
 
     /// Ramps with kinks and a step, in noise.
     fn motion() -> Vec<f64> {
-        let mut dice = Dice::new(3, 0);
+        let mut dice = RandomGenerator::new(3, 0);
         let ramp =
             |i: usize| if i % 200 < 100 { (i % 200) as f64 } else { 200.0 - (i % 200) as f64 };
         (0..4000)

@@ -16,7 +16,7 @@ pub(crate) mod velocity;
 use std::sync::{Arc, PoisonError, RwLock};
 
 use stretch_gap::{
-    Batch, Costly, Description, Dice, GapError, Line, Model, ModelRuns, Run, Simulator,
+    Batch, Costly, Description, GapError, Line, Model, ModelRuns, RandomGenerator, Run, Simulator,
     SpectralLines,
 };
 
@@ -139,7 +139,7 @@ impl BlackBox {
         let problem = &self.problem;
         let before = self.acting(run, Side::Input);
         let noise = &problem.input_noise[run.stage];
-        let shake = run.shake.filter(|_| noise.iter().any(|sd| *sd > 0.0));
+        let shake = run.input_noise.filter(|_| noise.iter().any(|sd| *sd > 0.0));
         if before.is_empty() && shake.is_none() {
             return self.driven_by(run, None);
         }
@@ -150,7 +150,7 @@ impl BlackBox {
         if let Some(seed) = shake {
             how.push(seed);
             for (i, (column, sd)) in inputs.iter_mut().zip(noise).enumerate() {
-                let mut dice = Dice::new(seed, 1 + (run.stage * 64 + i) as u64);
+                let mut dice = RandomGenerator::new(seed, 1 + (run.stage * 64 + i) as u64);
                 column.iter_mut().for_each(|x| *x += sd * dice.gauss());
             }
         }
@@ -186,7 +186,7 @@ impl BlackBox {
     /// The run that a run is told from, and how far it lies from there; the run itself where it has to be exact.
     fn told(&self, run: &Run<'_>) -> (Inner, Option<Apart>) {
         let inner = self.inner(run);
-        let line = run.near.filter(|_| run.shake.is_none()).zip(self.line(run.stage));
+        let line = run.near.filter(|_| run.input_noise.is_none()).zip(self.line(run.stage));
         let Some((near, line)) = line.filter(|(_, line)| line.trials() >= run.trials) else {
             return (inner, None);
         };

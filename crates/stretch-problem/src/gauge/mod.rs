@@ -182,7 +182,7 @@ impl GaugeSimulator {
         let mut from = 0;
         for (i, trial) in self.record.trials[..run.trials].iter().enumerate() {
             let to = from + trial.samples;
-            let input = match run.shake {
+            let input = match run.input_noise {
                 None => self.inputs[i].values.clone(),
                 Some(seed) => self.draws.shaken(&self.inputs, &self.reference_noise, seed, i),
             };

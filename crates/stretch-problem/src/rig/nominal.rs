@@ -1,6 +1,6 @@
 //! What may be re-tuned of a rig, and the stages that it acts in.
 
-use stretch_gap::{ParameterSpec, StageSpec, Wander};
+use stretch_gap::{ParameterSpec, SlowDrift, StageSpec};
 use stretch_sim::{Key, PARAMETERS, Rig, Stage};
 
 use super::{noises::Noises, timing};
@@ -36,11 +36,13 @@ impl Knob {
 pub(super) fn parameters(rig: &Rig, kinds: &[Stage]) -> (Vec<ParameterSpec>, Vec<Knob>) {
     let parameter = |key: Key| {
         let (info, nominal) = (key.info(), rig.params[key]);
-        let wander = (key == Key::PS)
-            .then_some(Wander { sd: SUPPLY_WANDER * nominal, correlation_s: SUPPLY_CORRELATION_S });
+        let drift = (key == Key::PS).then_some(SlowDrift {
+            sd: SUPPLY_WANDER * nominal,
+            correlation_s: SUPPLY_CORRELATION_S,
+        });
         ParameterSpec {
             least: 0.15 * nominal,
-            wander,
+            drift,
             // These stand in for one another in the nominal rig.
             is_evidence: !matches!(key, Key::E0 | Key::R0 | Key::VExc | Key::G),
             ..ParameterSpec::new(info.name, info.unit, nominal)

@@ -41,7 +41,7 @@ pub(super) struct Setting<'a> {
     pub(super) unwound: f64,
     /// The same of the muscle.
     pub(super) unwound_muscle: f64,
-    pub(super) shake: Option<u64>,
+    pub(super) input_noise: Option<u64>,
     /// Input of the stage that stands in for the measured one, all trials end to end.
     pub(super) given: Option<&'a [f64]>,
     pub(super) kind: Stage,
@@ -79,7 +79,7 @@ pub(super) fn simulate(
         leads,
         unwound,
         unwound_muscle,
-        shake: run.shake,
+        input_noise: run.input_noise,
         given,
         kind,
     };
@@ -194,7 +194,7 @@ impl Setting<'_> {
         }
         let inputs = &self.rig.inputs;
         let input = if of_pressure { &inputs.pressure[trial] } else { &inputs.length[trial] };
-        let Some(seed) = self.shake else { return input.values.clone() };
+        let Some(seed) = self.input_noise else { return input.values.clone() };
         let noises = &self.rig.noises;
         match of_pressure {
             true => {

@@ -2,7 +2,7 @@
 
 use std::{convert::Infallible, num::NonZeroUsize};
 
-use stretch_gap::{Dice, Noise};
+use stretch_gap::{Noise, RandomGenerator};
 
 use crate::bench::kept::Kept;
 
@@ -126,7 +126,7 @@ impl Smoothed {
     }
 
     /// Another draw of the noise, as far as the smoothing lets it pass.
-    fn drawn(&self, noise: &Noise, dice: &mut Dice) -> Vec<f64> {
+    fn drawn(&self, noise: &Noise, dice: &mut RandomGenerator) -> Vec<f64> {
         self.smoother.apply(&noise.samples(self.values.len(), dice))
     }
 }
@@ -151,8 +151,9 @@ impl Draws {
         seed: u64,
         trial: usize,
     ) -> Vec<f64> {
-        let draw =
-            |(i, input): (usize, &Smoothed)| input.drawn(noise, &mut Dice::new(seed, i as u64));
+        let draw = |(i, input): (usize, &Smoothed)| {
+            input.drawn(noise, &mut RandomGenerator::new(seed, i as u64))
+        };
         let all = || Ok::<_, Infallible>(inputs.iter().enumerate().map(draw).collect());
         let Ok(drawn) = self.0.or_make(seed, all);
         inputs[trial].values.iter().zip(&drawn[trial]).map(|(x, n)| x + n).collect()
@@ -192,7 +193,7 @@ mod tests {
 
     #[test]
     fn takes_noise_out_where_nothing_is_commanded() {
-        let mut dice = Dice::new(1, 1);
+        let mut dice = RandomGenerator::new(1, 1);
         let noise: Vec<f64> = (0..20_000).map(|_| 0.05 * dice.gauss()).collect();
         let shut = vec![0.0; noise.len()];
         let allowed = schedule(&shut, &shut, 0.01, false);

@@ -77,7 +77,7 @@ impl Setting<'_> {
             Ok(all)
         };
         // What is shaken or stood in for is asked for once.
-        if self.shake.is_some() || self.given.is_some() {
+        if self.input_noise.is_some() || self.given.is_some() {
             return make().map(Arc::new);
         }
         let stages = [Stage::Pneumatics, Stage::Muscle, Stage::Reference];
@@ -112,7 +112,7 @@ impl Setting<'_> {
             Ok(own)
         };
         // A chamber that follows the length follows its noise and what stands in for it.
-        if self.shake.is_some() || self.given.is_some() {
+        if self.input_noise.is_some() || self.given.is_some() {
             return make().map(Arc::new);
         }
         let others = self.begun(count);

@@ -10,7 +10,7 @@ use std::sync::{
 use hidden::hidden;
 use stretch_data::{Channel, SessionTrial, Split, Trial};
 use stretch_gap::{
-    Description, Diagnosis, Dice, GapError, Knowledge, Options, Run, Simulator, diagnose,
+    Description, Diagnosis, GapError, Knowledge, Options, RandomGenerator, Run, Simulator, diagnose,
 };
 use stretch_problem::{
     Argument, Ask, BlackBox, Checked, OwnEffect, Parameter, ProblemSpec, Stage, Tolerance, agreed,
@@ -22,7 +22,7 @@ const SAMPLES: usize = 3000;
 
 /// Command of a trial: steps, ramps and waves.
 fn command(trial: usize) -> Vec<f64> {
-    let mut dice = Dice::new(40 + trial as u64, 0);
+    let mut dice = RandomGenerator::new(40 + trial as u64, 0);
     let (mut held, mut out) = (0.0, Vec::with_capacity(SAMPLES));
     for i in 0..SAMPLES {
         let t = i as f64 * DT_S;
@@ -63,7 +63,7 @@ fn servo_of(ask: &Ask<'_>, measured: &[f64]) -> Vec<f64> {
 fn recorded(plant: impl Fn(&[f64], f64) -> Vec<f64>) -> Vec<SessionTrial> {
     let one = |trial: usize| {
         let (u, start_s) = (command(trial), 60.0 * trial as f64);
-        let mut dice = Dice::new(7, trial as u64);
+        let mut dice = RandomGenerator::new(7, trial as u64);
         let angle = plant(&u, start_s).iter().map(|y| y + 0.02 * dice.gauss()).collect();
         let channel = |name: &str, values| Channel { name: name.into(), values };
         let channels = vec![channel("command_V", u), channel("angle_deg", angle)];
@@ -213,7 +213,7 @@ fn a_black_box_is_run_less_than_half_as_often_as_it_is_simulated() {
 /// A mass on a rail that rubs: its force from its recorded motion, the inverse form.
 fn rail(trials: usize) -> Vec<SessionTrial> {
     let one = |trial: usize| {
-        let mut dice = Dice::new(90, trial as u64);
+        let mut dice = RandomGenerator::new(90, trial as u64);
         let at = |t: f64| {
             let phase = trial as f64;
             [
@@ -364,7 +364,7 @@ fn wrong_problems_are_refused_with_what_to_do() {
 fn what_one_sine_cannot_part_is_told_as_a_family() {
     let sine = |t: f64| 5.0 * (2.0 * t).sin();
     let one = |trial: usize| {
-        let mut dice = Dice::new(5, trial as u64);
+        let mut dice = RandomGenerator::new(5, trial as u64);
         let time_s: Vec<f64> = (0..SAMPLES).map(|i| i as f64 * DT_S).collect();
         let late = |t: &f64| 3.0 * sine(t - 0.12) + 0.02 * dice.gauss();
         let channel = |name: &str, values| Channel { name: name.into(), values };

@@ -294,9 +294,9 @@ mod tests {
 
     #[test]
     fn noise_is_that_of_the_record() {
-        let mut dice = crate::numerics::random::Dice::new(3, 1);
+        let mut random = crate::numerics::random::RandomGenerator::new(3, 1);
         let values: Vec<f64> =
-            (0..20_000).map(|i| 1e-3 * f64::from(i) + 0.2 * dice.gauss()).collect();
+            (0..20_000).map(|i| 1e-3 * f64::from(i) + 0.2 * random.gauss()).collect();
         assert_relative_eq!(noise(&values), 0.2, max_relative = MEDIAN_SPREAD, epsilon = 0.0);
     }
 

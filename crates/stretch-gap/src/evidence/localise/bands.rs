@@ -10,7 +10,7 @@ const WINDOW: usize = 512;
 /// Octaves counted down from half the sample rate; the last takes all that is below.
 const BANDS: usize = 8;
 
-/// Power in octave bands by window (Welch's method with Hann's window): white noise of one floor has power 1 in
+/// Power in octave bands by window (Welch's method with Hann's window): white noise of one multiple has power 1 in
 /// every line. Segments shorter than a window are left out.
 pub(super) fn cells(frame: &Frame, residual: &[f64], dt_s: f64) -> (Vec<String>, Cells) {
     let window: Vec<f64> =
@@ -97,8 +97,8 @@ mod tests {
 
     #[test]
     fn the_transform_is_the_sum_it_stands_for() {
-        let mut dice = crate::numerics::random::Dice::new(9, 2);
-        let x: Vec<f64> = (0..32).map(|_| dice.gauss()).collect();
+        let mut random = crate::numerics::random::RandomGenerator::new(9, 2);
+        let x: Vec<f64> = (0..32).map(|_| random.gauss()).collect();
         let mut fast: Vec<(f64, f64)> = x.iter().map(|x| (*x, 0.0)).collect();
         transform(&mut fast);
         for (k, (re, im)) in fast.iter().enumerate() {
@@ -135,7 +135,7 @@ mod tests {
     /// Energy is kept: sum |X|^2 = n sum |x|^2.
     #[test]
     fn the_transform_keeps_energy() {
-        let mut dice = crate::numerics::random::Dice::new(10, 2);
+        let mut dice = crate::numerics::random::RandomGenerator::new(10, 2);
         let mut x: Vec<(f64, f64)> = (0..256).map(|_| (dice.gauss(), dice.gauss())).collect();
         let energy = |x: &[(f64, f64)]| x.iter().map(|(a, b)| a * a + b * b).sum::<f64>();
         let before = energy(&x);
@@ -165,7 +165,7 @@ mod tests {
     /// independent powers, whose mean is known to 0.07: three of these; wider ones better.
     #[test]
     fn white_noise_has_the_same_power_in_every_octave() {
-        let mut dice = crate::numerics::random::Dice::new(11, 2);
+        let mut dice = crate::numerics::random::RandomGenerator::new(11, 2);
         let noise: Vec<f64> = (0..32_768).map(|_| dice.gauss()).collect();
         let found = excesses(&noise);
         assert!(found.iter().all(|e| e.abs() < 0.21), "{found:?}");

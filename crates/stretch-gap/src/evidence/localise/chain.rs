@@ -61,7 +61,7 @@ pub(super) fn shapley(runs: &Runs<'_>, evidence: &Evidence) -> Result<Vec<f64>, 
         variants = next;
     }
     let last = stages - 1;
-    let floor = evidence.stages[last].floor;
+    let sd = evidence.stages[last].noise;
     let mut gaps = vec![0.0; 1 << stages];
     for variant in &variants {
         let Some(output) = &variant.output else { continue };
@@ -74,25 +74,25 @@ pub(super) fn shapley(runs: &Runs<'_>, evidence: &Evidence) -> Result<Vec<f64>, 
             count += segment.to - segment.from;
         }
         // A corrected last stage leaves no noise.
-        let noise = if variant.simulated >> last & 1 == 1 { floor * floor } else { 0.0 };
+        let noise = if variant.simulated >> last & 1 == 1 { sd * sd } else { 0.0 };
         gaps[variant.simulated] = sum / count.max(1) as f64 - noise;
     }
-    if gaps[(1 << stages) - 1] <= 0.1 * floor * floor {
+    if gaps[(1 << stages) - 1] <= 0.1 * sd * sd {
         return Ok(Vec::new());
     }
     Ok(shares(&gaps, stages))
 }
 
-/// Shapley values (1953) of a game whose worth is given for every set of players, as shares of their sum; none
+/// Shapley values (1953) of a game whose value is given for every set of players, as shares of their sum; none
 /// below 0.
-fn shares(worth: &[f64], players: usize) -> Vec<f64> {
+fn shares(value_of: &[f64], players: usize) -> Vec<f64> {
     let factorial = |n: usize| (1..=n).map(|i| i as f64).product::<f64>();
     let mut values = vec![0.0; players];
     for (player, value) in values.iter_mut().enumerate() {
         for set in (0..1_usize << players).filter(|set| set >> player & 1 == 0) {
             let size = set.count_ones() as usize;
             let weight = factorial(size) * factorial(players - size - 1) / factorial(players);
-            *value += weight * (worth[set | 1 << player] - worth[set]);
+            *value += weight * (value_of[set | 1 << player] - value_of[set]);
         }
     }
     let total: f64 = values.iter().map(|v| v.max(0.0)).sum();
@@ -109,8 +109,8 @@ mod tests {
     fn shares_are_those_of_the_glove_game() {
         // Two left gloves and one right: 1/6, 1/6, 4/6 (any textbook).
         let pairs = |set: usize| if set & 4 != 0 && set & 3 != 0 { 1.0 } else { 0.0 };
-        let worth: Vec<f64> = (0..8).map(pairs).collect();
-        let shares = shares(&worth, 3);
+        let value_of: Vec<f64> = (0..8).map(pairs).collect();
+        let shares = shares(&value_of, 3);
         for (share, expected) in shares.iter().zip([1.0 / 6.0, 1.0 / 6.0, 4.0 / 6.0]) {
             assert_relative_eq!(*share, expected, max_relative = F64_ROUNDING, epsilon = 0.0);
         }
@@ -148,7 +148,7 @@ mod tests {
     /// Values of random games: the sum is the worth of all minus that of none, twins share alike, names do not matter, and neither does the unit.
     #[test]
     fn shares_do_not_depend_on_names_or_units() {
-        let mut dice = crate::numerics::random::Dice::new(1, 0);
+        let mut dice = crate::numerics::random::RandomGenerator::new(1, 0);
         for _ in 0..50 {
             let worth: Vec<f64> =
                 (0..8_u32).map(|set| f64::from(set.count_ones()) + dice.unit()).collect();

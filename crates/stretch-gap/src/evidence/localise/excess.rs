@@ -1,7 +1,7 @@
 //! Excess of slices, with intervals by block bootstrap, and the false-discovery correction.
 
 use super::axes::Axis;
-use crate::{fit::score::excess, numerics::random::Dice, problem::frame::Frame};
+use crate::{fit::score::excess, numerics::random::RandomGenerator, problem::frame::Frame};
 
 /// Share of false discoveries allowed among the slices that stand out.
 const FALSE_DISCOVERIES: f64 = 0.05;
@@ -13,11 +13,11 @@ const LEAST_BLOCKS: usize = 6;
 /// Sums of squares and counts by block and slice.
 pub(super) struct Cells {
     slices: usize,
-    /// By block, then by slice: sum of squares in floors, number of samples.
+    /// By block, then by slice: sum of squares in multiples of the noise, number of samples.
     cells: Vec<(f64, f64)>,
 }
 
-/// What is said of one slice.
+/// Excess (reduced chi-square minus one) of one slice, and its significance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Sliced {
     pub(super) share: f64,
@@ -66,10 +66,10 @@ impl Cells {
         let whole = sums.iter().fold((0.0, 0.0), |a, s| (a.0 + s.0, a.1 + s.1));
         let gaps: f64 = sums.iter().map(|s| (s.0 - s.1).max(0.0)).sum();
         let mut draws = vec![Vec::with_capacity(DRAWS); self.slices];
-        let mut dice = Dice::new(seed, 900 + stream);
+        let mut random = RandomGenerator::new(seed, 900 + stream);
         for _ in 0..DRAWS {
             let mut times = vec![0_u32; blocks];
-            (0..blocks).for_each(|_| times[dice.below(blocks)] += 1);
+            (0..blocks).for_each(|_| times[random.below(blocks)] += 1);
             for (slice, sum) in self.sums(&times).iter().enumerate() {
                 if sum.1 > 0.0 {
                     draws[slice].push(excess(sum.0 / sum.1));
@@ -161,11 +161,11 @@ mod tests {
 
     #[test]
     fn a_loud_slice_has_the_gap_and_stands_out() {
-        let mut dice = Dice::new(5, 0);
+        let mut random = RandomGenerator::new(5, 0);
         let mut cells = Vec::new();
         for _ in 0..100 {
             for size in [1.0, 3.0] {
-                let sum = (0..25).map(|_| (size * dice.gauss()).powi(2)).sum::<f64>();
+                let sum = (0..25).map(|_| (size * random.gauss()).powi(2)).sum::<f64>();
                 cells.push((sum, 25.0));
             }
         }
@@ -179,7 +179,7 @@ mod tests {
     }
 
     /// Cells of `blocks` blocks of 25 samples in each slice, of the standard deviations given.
-    fn drawn(sds: &[f64], blocks: usize, dice: &mut Dice) -> Cells {
+    fn drawn(sds: &[f64], blocks: usize, dice: &mut RandomGenerator) -> Cells {
         let mut cells = Vec::new();
         for _ in 0..blocks {
             for sd in sds {
@@ -191,7 +191,7 @@ mod tests {
 
     #[test]
     fn shares_sum_to_the_whole_and_quiet_slices_have_none() {
-        let sliced = drawn(&[1.5, 0.5, 3.0], 60, &mut Dice::new(1, 0)).sliced(1, 0);
+        let sliced = drawn(&[1.5, 0.5, 3.0], 60, &mut RandomGenerator::new(1, 0)).sliced(1, 0);
         let sum: f64 = sliced.iter().map(|s| s.share).sum();
         approx::assert_relative_eq!(sum, 1.0, max_relative = testkit::tolerance::F64_ROUNDING);
         assert_eq!((sliced[1].share, sliced[1].excess < 0.0), (0.0, true));
@@ -205,7 +205,7 @@ mod tests {
     /// Two slices are each other's rest: what the one is worse than, the other is better than, with the same variance.
     #[test]
     fn of_two_slices_one_p_value_is_the_others_complement() {
-        let mut dice = Dice::new(2, 0);
+        let mut dice = RandomGenerator::new(2, 0);
         for sd in [0.7, 1.0, 1.1] {
             let sliced = drawn(&[1.0, sd], 30, &mut dice).sliced(1, 0);
             approx::assert_relative_eq!(sliced[0].p + sliced[1].p, 1.0, max_relative = 1e-12);
@@ -215,7 +215,7 @@ mod tests {
     /// Of 400 records in which no slice is worse, 5 in 100 have a p below 0.05: 20, standard deviation 4.4; three of these to either side.
     #[test]
     fn p_values_are_as_rare_as_they_say() {
-        let mut dice = Dice::new(3, 0);
+        let mut dice = RandomGenerator::new(3, 0);
         let mut is_rare = |_: &u64| drawn(&[1.0; 4], 60, &mut dice).sliced(1, 0)[2].p < 0.05;
         let rare = (0..400).filter(|record| is_rare(record)).count();
         assert!((7..=33).contains(&rare), "{rare} of 400");
@@ -225,7 +225,7 @@ mod tests {
     /// below 280; an interval that always holds says nothing.
     #[test]
     fn intervals_of_an_excess_hold_it() {
-        let mut dice = Dice::new(4, 0);
+        let mut dice = RandomGenerator::new(4, 0);
         let mut is_held = |record: &u64| {
             let [low, high] = drawn(&[2.0, 1.0], 60, &mut dice).sliced(*record, 0)[0].interval;
             low <= 3.0 && 3.0 <= high
@@ -236,7 +236,7 @@ mod tests {
 
     #[test]
     fn a_handful_of_blocks_is_no_evidence() {
-        let mut dice = Dice::new(5, 0);
+        let mut dice = RandomGenerator::new(5, 0);
         let few = drawn(&[1.0, 9.0], LEAST_BLOCKS - 1, &mut dice).sliced(1, 0);
         assert!(few.iter().all(|s| s.p == 1.0));
         let enough = drawn(&[1.0, 9.0], LEAST_BLOCKS, &mut dice).sliced(1, 0);
@@ -286,7 +286,7 @@ mod tests {
     /// stands; the order does not matter.
     #[test]
     fn discoveries_lie_between_bonferroni_and_the_level() {
-        let mut dice = Dice::new(6, 0);
+        let mut dice = RandomGenerator::new(6, 0);
         for count in [1_usize, 2, 7, 40] {
             for _ in 0..50 {
                 let p: Vec<f64> = (0..count).map(|_| dice.unit().powi(3)).collect();
@@ -308,7 +308,7 @@ mod tests {
     /// deviation 9.7; three of these to either side.
     #[test]
     fn false_discoveries_are_as_rare_as_allowed() {
-        let mut dice = Dice::new(7, 0);
+        let mut dice = RandomGenerator::new(7, 0);
         let mut any = |_: &u32| {
             let p: Vec<f64> = (0..30).map(|_| dice.unit()).collect();
             discoveries(&p).contains(&true)
@@ -321,7 +321,7 @@ mod tests {
     /// over 500 by 0.0016: five of these.
     #[test]
     fn among_true_ones_few_are_false() {
-        let mut dice = Dice::new(8, 0);
+        let mut dice = RandomGenerator::new(8, 0);
         let (mut false_share, mut true_share) = (0.0, 0.0);
         for _ in 0..500 {
             let p: Vec<f64> = (0..40)

@@ -19,9 +19,9 @@ pub struct StageGap {
     pub after: f64,
     /// Root mean square of what the re-tuned nominal leaves, nuisance taken out.
     pub rms: f64,
-    /// Floor, one standard deviation.
+    /// Noise, one standard deviation.
     pub floor: f64,
-    /// Where the floor comes from.
+    /// Where the noise is known from.
     pub floor_source: String,
     /// Unit of the two.
     pub unit: String,
@@ -32,7 +32,7 @@ pub struct StageGap {
 pub struct SliceGap {
     /// `regime`, `level`, `rate`, `time` (in the trial), `session` (time), `travel`, `trial` or `frequency`.
     pub by: String,
-    /// Which slice.
+    /// Label of the slice.
     pub slice: String,
     /// Stage whose output it is.
     pub stage: String,
@@ -51,18 +51,18 @@ pub struct SliceGap {
 pub struct StageShare {
     /// Stage.
     pub stage: String,
-    /// Its Shapley value as a share of the gap of the last output.
+    /// Shapley value of the stage as a share of the gap of the last output.
     pub share: f64,
 }
 
 /// Where the gap sits.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Where {
-    /// By stage.
+    /// Gap of every stage.
     pub stages: Vec<StageGap>,
-    /// By slices of the trials.
+    /// Gap of every slice of the trials.
     pub slices: Vec<SliceGap>,
-    /// By stage in the gap of the last output, when nothing but the commands is given; empty where that cannot be told.
+    /// By stage in the gap of the last output, when nothing but the commands is given; empty where the stages cannot be run one on the other.
     #[serde(default)]
     pub end_to_end: Vec<StageShare>,
 }

@@ -19,7 +19,7 @@ use excess::{Cells, Sliced};
 
 /// Cuts the residual of the re-tuned nominal, over all trials, along every axis.
 ///
-/// The excess of a slice is the mean square in it, in floors, minus 1; its interval is a bootstrap over blocks of
+/// The excess of a slice is the mean square in it, in multiples of the noise, minus 1; its interval is a bootstrap over blocks of
 /// 0.5 s (over windows for frequency bands). A slice stands out when its excess is above 0 and above that of the
 /// rest of the stage, after Benjamini and Hochberg's correction (doi 10.1111/j.2517-6161.1995.tb02031.x) over
 /// all slices.

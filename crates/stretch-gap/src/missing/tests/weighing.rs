@@ -6,11 +6,11 @@ use crate::{
         coloured::odds,
         dense::{Rows, ridge},
     },
-    numerics::random::Dice,
+    numerics::random::RandomGenerator,
 };
 
 /// Rows of which the residual is 2 a - b plus noise; a, b and `idle` others are noise themselves.
-fn rows(count: usize, idle: usize, noise: f64, dice: &mut Dice) -> Rows {
+fn rows(count: usize, idle: usize, noise: f64, dice: &mut RandomGenerator) -> Rows {
     let columns: Vec<Vec<f64>> =
         (0..2 + idle).map(|_| (0..count).map(|_| dice.gauss()).collect()).collect();
     let residual =
@@ -20,7 +20,7 @@ fn rows(count: usize, idle: usize, noise: f64, dice: &mut Dice) -> Rows {
 
 #[test]
 fn a_ridge_finds_weights_where_there_is_no_noise() {
-    let mut dice = Dice::new(1, 0);
+    let mut dice = RandomGenerator::new(1, 0);
     let weights = ridge(&rows(300, 3, 0.0, &mut dice), &rows(100, 3, 0.0, &mut dice));
     // The smallest ridge is 1e-5 of the diagonal, which shrinks by as much; cross products of 300 draws add a tenth of that.
     for (weight, expected) in weights.iter().zip([2.0, -1.0, 0.0, 0.0, 0.0]) {
@@ -32,7 +32,7 @@ fn a_ridge_finds_weights_where_there_is_no_noise() {
 /// leaves less of such samples than the smallest ridge does.
 #[test]
 fn a_ridge_shrinks_where_columns_are_many() {
-    let mut dice = Dice::new(2, 0);
+    let mut dice = RandomGenerator::new(2, 0);
     let (fit, held) = (rows(60, 50, 3.0, &mut dice), rows(400, 50, 3.0, &mut dice));
     // Held against the rows that they were fitted to, weights do best without a ridge.
     let again = Rows { residual: fit.residual.clone(), columns: fit.columns.clone() };
@@ -52,7 +52,7 @@ fn without_columns_there_are_no_weights() {
 }
 
 /// Noise whose next value keeps a share of the last.
-fn coloured(samples: usize, kept: f64, dice: &mut Dice) -> Vec<f64> {
+fn coloured(samples: usize, kept: f64, dice: &mut RandomGenerator) -> Vec<f64> {
     let mut x = dice.gauss() / (1.0 - kept * kept).sqrt();
     let next = |_| {
         x = kept * x + dice.gauss();
@@ -64,7 +64,7 @@ fn coloured(samples: usize, kept: f64, dice: &mut Dice) -> Vec<f64> {
 /// A term that takes nothing away gains nothing, and costs ln M for each that was chosen.
 #[test]
 fn a_choice_costs_what_there_was_to_choose_from() {
-    let mut dice = Dice::new(3, 0);
+    let mut dice = RandomGenerator::new(3, 0);
     let (frame, left) = (frame(&[3000, 3000], 900), coloured(6000, 0.9, &mut dice));
     for (chosen, of) in [(1_usize, 400_usize), (3, 400), (2, 1000)] {
         let expected = -(chosen as f64) * (of as f64).ln();
@@ -76,7 +76,7 @@ fn a_choice_costs_what_there_was_to_choose_from() {
 /// wave: of the 20 records each is told.
 #[test]
 fn a_function_is_told_from_coloured_noise() {
-    let mut dice = Dice::new(4, 0);
+    let mut dice = RandomGenerator::new(4, 0);
     let frame = frame(&[3000, 3000], 900);
     for record in 0..20 {
         let noise: Vec<f64> = (0..6000).map(|_| dice.gauss()).collect();
@@ -100,7 +100,7 @@ fn a_function_is_told_from_coloured_noise() {
 /// 40 records do the odds favour it, for one chance weight gains half a nat on average, and ln 500 are asked for.
 #[test]
 fn a_chance_term_is_no_function() {
-    let mut dice = Dice::new(5, 0);
+    let mut dice = RandomGenerator::new(5, 0);
     let frame = frame(&[3000, 3000], 900);
     let favoured = (0..40)
         .filter(|_| {

@@ -148,6 +148,8 @@ fn from_json(text: &str, name: &str, seal: Seal) -> Result<Calibration, Calibrat
         unusable(if field == "." { cause.to_string() } else { format!("in {field}: {cause}") })
     })?;
     json.end().map_err(|error| unusable(error.to_string()))?;
+    let schema = spec.schema;
+    let calibration = Calibration::new(spec).map_err(|error| unusable(error.to_string()))?;
     let computed = digest::digest(&object);
     let advice = format!(
         "check every number, then renew it with: stretch record seal {name}; or calibrate again"
@@ -161,12 +163,12 @@ fn from_json(text: &str, name: &str, seal: Seal) -> Result<Calibration, Calibrat
             )));
         }
         // schema 1 had none
-        None if spec.schema != Schema::CURRENT => {}
+        None if schema != Schema::CURRENT => {}
         None => {
             return Err(unusable(format!("it has no digest as its last field; {advice}")));
         }
     }
-    Calibration::new(spec).map_err(|error| unusable(error.to_string()))
+    Ok(calibration)
 }
 
 /// What a record of any kind is.

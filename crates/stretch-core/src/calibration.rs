@@ -182,8 +182,8 @@ impl Calibration {
     ///
     /// # Errors
     /// [`DesignError`] that names the field.
-    pub fn new(mut spec: CalibrationSpec) -> Result<Self, DesignError> {
-        spec.schema = Schema::CURRENT;
+    pub fn new(spec: CalibrationSpec) -> Result<Self, DesignError> {
+        let spec = CalibrationSpec { schema: Schema::CURRENT, ..spec };
         if let Target::Contraction { rest_length } = spec.target {
             DesignError::check("target.rest_length", rest_length, rest_length > 0.0)?;
         }

@@ -2,11 +2,14 @@
 
 use std::{fs, path::Path};
 
-/// Compares what `told` makes of every file of a folder with its line in `sentences.txt` there.
+use snapbox::{Assert, Data, assert::DEFAULT_ACTION_ENV};
+
+/// Compares what `told` makes of every file of a folder with its line in `sentences.txt` there. `SNAPSHOTS=overwrite` writes that
+/// file anew: then look at what git says has changed.
 ///
 /// # Panics
 ///
-/// Where a line differs or has no file, naming the folder and all that differ; where the folder has no file.
+/// Where a line differs or has no file, showing both; where the folder has no file.
 pub fn is_as_it_should(folder: &Path, told: impl Fn(&str) -> String) {
     let entries = fs::read_dir(folder).expect("a folder of the corpus");
     let mut names: Vec<String> = entries
@@ -15,8 +18,7 @@ pub fn is_as_it_should(folder: &Path, told: impl Fn(&str) -> String) {
         .collect();
     names.sort();
     assert!(!names.is_empty(), "{}: no file", folder.display());
-    let expected = fs::read_to_string(folder.join("sentences.txt")).unwrap_or_default();
     let all: String = names.iter().map(|name| told(name) + "\n").collect();
-    let differ: Vec<_> = all.lines().filter(|line| !expected.lines().any(|e| e == *line)).collect();
-    assert!(all == expected, "{}: these differ:\n{}", folder.display(), differ.join("\n"));
+    let expected = Data::read_from(&folder.join("sentences.txt"), None).raw();
+    Assert::new().action_env(DEFAULT_ACTION_ENV).eq(all, expected);
 }

@@ -23,6 +23,7 @@ fn told(scratch: &Scratch, arguments: &[&str]) -> (bool, String) {
 }
 
 #[test]
+#[ignore = "three million rows in bounded memory; ./ci.sh runs it"]
 fn a_long_log_is_calibrated_on_in_the_memory_of_a_block() {
     let scratch = Scratch::new();
     log(&scratch.path("long.csv"), 3_000_000, 0.01);

@@ -26,6 +26,7 @@ fn rmse(methods: &Value) -> [f64; 4] {
 }
 
 #[test]
+#[ignore = "the whole demo, half a minute; ./ci.sh runs it"]
 fn the_demo_does_the_whole_job_without_anybody_s_data() {
     let scratch = Scratch::new();
     let out = scratch.path("demo");

@@ -81,6 +81,7 @@ fn diagnose(folder: &Path) -> Command {
 }
 
 #[test]
+#[ignore = "five whole diagnoses; ./ci.sh runs it"]
 fn a_simulated_effect_is_named_and_reported() {
     let scratch = Scratch::new();
     let folder = bench(&scratch, "bench", &["gauge_hysteresis:h=0.25,s=0.015"]);
@@ -275,6 +276,7 @@ fn a_simulator_that_has_the_effect_agrees() {
 }
 
 #[test]
+#[ignore = "whole diagnoses of two rigs; ./ci.sh runs it"]
 fn a_wrong_rig_is_no_effect_and_a_strong_effect_is_no_wrong_rig() {
     let scratch = Scratch::new();
     let folder = bench(&scratch, "bench", &[]);

@@ -26,7 +26,7 @@ fn spelled(effect: &Effect) -> String {
 const TIE: f64 = 1.0;
 
 #[test]
-#[ignore = "minutes in a debug build: ci.sh runs it in release"]
+#[ignore = "every effect of the catalogue, minutes; ./ci.sh runs it"]
 fn is_named_when_it_is_simulated() {
     let scratch = Scratch::new();
     let mut wrong = Vec::new();
@@ -91,7 +91,7 @@ fn without_pressure(folder: &Path) {
 }
 
 #[test]
-#[ignore = "minutes in a debug build: ci.sh runs it in release"]
+#[ignore = "every effect of the catalogue, minutes; ./ci.sh runs it"]
 fn is_agreed_with_once_it_is_written_into_the_rig_file() {
     let scratch = Scratch::new();
     let mut wrong = Vec::new();

@@ -206,6 +206,7 @@ fn difference(record: &[u8], frames: &[Frame], what: &str) -> f64 {
 }
 
 #[test]
+#[ignore = "every model is fitted and listened to; ./ci.sh runs it"]
 fn every_model_that_is_calibrated_is_listened_to() {
     let scratch = Scratch::new();
     let (trial, out) = (scratch.loops("a.csv", 20.0, 1.1), scratch.path("cal.json"));

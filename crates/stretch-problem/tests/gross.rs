@@ -374,7 +374,7 @@ fn an_error_is_told_though_rows_are_lost() {
 
 /// The whole table, as it stands in docs/record.md.
 #[test]
-#[ignore = "several minutes; a step of its own runs it in release"]
+#[ignore = "forty diagnoses, minutes; ./ci.sh runs it"]
 fn no_error_is_given_the_name_of_an_effect() {
     let (mut right, mut wrong, all) = (0, Vec::new(), cases());
     let only = std::env::var("CASES").unwrap_or_default();

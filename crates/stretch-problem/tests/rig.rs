@@ -226,6 +226,7 @@ fn without_test_trials_the_last_part_is_held_back() {
 }
 
 #[test]
+#[ignore = "eighteen whole diagnoses; ./ci.sh runs it"]
 fn lost_rows_change_no_verdict() {
     let cases = [
         effect("gauge_relaxation", &[("c", 0.3), ("tau", 0.1)]),

@@ -9,7 +9,7 @@ use crate::{Event, Frame};
 ///
 /// ```
 /// use stretch_link::{Answer, Event, Frame, TimeLine};
-/// let frame = |time_ms| Frame { counter: 0, time_ms, code: 0, answer: Answer::WarmingUp };
+/// let frame = |time_ms| Frame { counter: 0, time_ms, code: 0, answer: Answer::Warming };
 /// let mut line = TimeLine::new(0.01);
 /// assert_eq!(line.time_s(&Event::Frame(frame(u32::MAX - 4)), 7.0), Some(0.0));
 /// assert_eq!(line.time_s(&Event::Frame(frame(5)), 7.01), Some(0.01));

@@ -13,7 +13,7 @@ use super::{
     columns::Columns,
     facts::facts,
     source::{Session, SessionColumn, SessionPart, SessionStage},
-    spec::{OwnEffect, Parameter, ProblemSpec, Sensor, Stage},
+    spec::{Input, OwnEffect, Parameter, ProblemSpec, Sensor, Stage},
     velocity::Velocity,
 };
 use crate::{
@@ -83,22 +83,6 @@ impl Checked {
         let looked_for = around.without(looked_for, &spec.without)?;
         let (acting, catalogue) = looked_for.into_iter().unzip();
         let Around { wrappers, standing, .. } = around;
-        let input_noise = stages.iter().map(|stage| {
-            let noise =
-                |c: &String| inputs.iter().find(|i| i.column == *c).map_or(0.0, |i| i.noise);
-            stage.inputs.iter().map(noise).collect()
-        });
-        let input_noise = input_noise.collect();
-        let noise_of = |s: &Stage| {
-            let values = columns.of(&s.output).unwrap_or(&[]);
-            let looked = columns.looked_at();
-            let parts = looked.iter().map(|r| &values[r.clone()]);
-            s.noise.unwrap_or_else(|| Noise::of_differences(parts, columns.dt_s).sd())
-        };
-        let noise = stages.iter().map(noise_of).collect();
-        let begun_s = columns.trials.first().map_or(0.0, |t| t.start_s);
-        let starts = columns.trials.iter().map(|t| t.start_s - begun_s);
-        let parts = columns.ranges().into_iter().zip(starts).collect();
         let about = Description::new(DescriptionSpec {
             stages: stages.iter().map(|s| stage_spec(s, parameters, &unit_of)).collect(),
             parameters: parameters.iter().map(parameter_spec).collect::<Result<_, _>>()?,
@@ -111,16 +95,16 @@ impl Checked {
         Ok(Self {
             about: about.with_record(known)?,
             session,
-            columns,
             stages: stages.clone(),
-            input_noise,
-            noise,
+            input_noise: stages.iter().map(|stage| input_noise(stage, inputs)).collect(),
+            noise: stages.iter().map(|stage| noise(stage, &columns)).collect(),
+            parts: parts(&columns),
+            columns,
             wrappers,
             acting,
             off,
             standing,
             grid,
-            parts,
             notes,
             spec,
         })
@@ -190,6 +174,27 @@ impl Checked {
     pub(crate) fn stage_inputs(&self, stage: usize) -> impl Iterator<Item = &[f64]> {
         self.stages[stage].inputs.iter().map(|c| self.columns.of(c).unwrap_or(&[]))
     }
+}
+
+/// Noise of what drives a stage, one standard deviation each.
+fn input_noise(stage: &Stage, inputs: &[Input]) -> Vec<f64> {
+    let noise = |c: &String| inputs.iter().find(|i| i.column == *c).map_or(0.0, |i| i.noise);
+    stage.inputs.iter().map(noise).collect()
+}
+
+/// Noise of the output of a stage, one standard deviation: as stated, or from the record.
+fn noise(stage: &Stage, columns: &Columns) -> f64 {
+    let values = columns.of(&stage.output).unwrap_or(&[]);
+    let looked = columns.looked_at();
+    let parts = looked.iter().map(|r| &values[r.clone()]);
+    stage.noise.unwrap_or_else(|| Noise::of_differences(parts, columns.dt_s).sd())
+}
+
+/// Samples and session time of each trial, s, from the session's start.
+fn parts(columns: &Columns) -> Vec<(Range<usize>, f64)> {
+    let begun_s = columns.trials.first().map_or(0.0, |t| t.start_s);
+    let starts = columns.trials.iter().map(|t| t.start_s - begun_s);
+    columns.ranges().into_iter().zip(starts).collect()
 }
 
 /// Every column that is used, once each.

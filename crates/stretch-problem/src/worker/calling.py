@@ -1,10 +1,10 @@
 """How a simulator in Python is called: the wheel calls one that it was handed, a worker one that a problem's file names.
 
-An object has a method `simulate(params[n, p], effects[n, e]) -> [n, samples]`, asked for many models at once (at most its attribute `batch`);
-a function takes two dicts for one model and returns `[samples]`. Both may take by keyword `inputs` (every column by name, those that drive
-the stage as they were altered), `trials` (name, slice and start_s of each that is asked for) and `stage`; `**kw` takes all of them. With
-several outputs a simulator that does not take `stage` returns a dict of arrays by output. A method `begin(session)` is told once what stays
-the same.
+An object has a method `simulate(params[n, p], effects[n, e]) -> [n, samples]`, asked for many models at once (at most its
+attribute `batch`); a function takes two dicts for one model and returns `[samples]`. Both may take by keyword `inputs` (every
+column by name, those that drive the stage as they were altered), `trials` (name, slice and start_s of each that is asked for)
+and `stage`; `**kw` takes all of them. With several outputs a simulator that does not take `stage` returns a dict of arrays by
+output. A method `begin(session)` is told once what stays the same.
 """
 
 from __future__ import annotations

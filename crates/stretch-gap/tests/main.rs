@@ -1,9 +1,16 @@
 //! The tests of stretch-gap from outside, one program: linking takes longer than most of them.
 
+mod answers;
+mod consistent;
 mod floor;
 mod gauge;
+mod invariant;
+mod laboratory;
+mod located;
 mod missing_term;
 mod null_band;
+mod probable;
+mod proposals;
 mod toy_basics;
 mod toy_frame;
 mod toy_invariance;
@@ -13,3 +20,4 @@ mod toy_record;
 mod toy_refusals;
 mod toy_retuning;
 mod toys;
+mod verdicts;

@@ -61,6 +61,8 @@ pub(crate) enum Effect {
     Play,
     /// x + c x^2.
     Quadratic,
+    /// The quadratic under another name: its twin.
+    Square,
     /// x + c x^3.
     Cubic,
     /// The input comes d seconds late.
@@ -74,6 +76,7 @@ pub(crate) enum Effect {
 }
 
 impl Effect {
+    /// All but the twin.
     pub(crate) const ALL: [Self; 7] = [
         Self::Play,
         Self::Quadratic,
@@ -88,6 +91,7 @@ impl Effect {
         match self {
             Self::Play => "play",
             Self::Quadratic => "quadratic",
+            Self::Square => "square",
             Self::Cubic => "cubic",
             Self::Late => "late",
             Self::Slow => "slow",
@@ -101,7 +105,7 @@ impl Effect {
         let strength = |name, unit, range| vec![EffectParameter::sized(name, unit, range)];
         let parameters = match self {
             Self::Play => strength("w", "1", 0.0..=0.3),
-            Self::Quadratic | Self::Cubic => strength("c", "1", -0.5..=0.5),
+            Self::Quadratic | Self::Square | Self::Cubic => strength("c", "1", -0.5..=0.5),
             Self::Late => strength("d", "s", 0.0..=0.2),
             Self::Slow => strength("tau", "s", 0.0..=0.3),
             Self::Drift => strength("rate", "1/s", -0.01..=0.01),
@@ -114,7 +118,7 @@ impl Effect {
     }
 
     fn is_of_input(self) -> bool {
-        matches!(self, Self::Play | Self::Quadratic | Self::Cubic | Self::Late)
+        matches!(self, Self::Play | Self::Quadratic | Self::Square | Self::Cubic | Self::Late)
     }
 
     /// Alters the samples of one trial that began at a session time, s.
@@ -128,7 +132,7 @@ impl Effect {
                     *x = held;
                 }
             }
-            Self::Quadratic => signal.iter_mut().for_each(|x| *x += size * *x * *x),
+            Self::Quadratic | Self::Square => signal.iter_mut().for_each(|x| *x += size * *x * *x),
             Self::Cubic => signal.iter_mut().for_each(|x| *x += size * x.powi(3)),
             Self::Late => late(signal, size / dt_s),
             Self::Slow => lag(signal, size, dt_s),

@@ -11,9 +11,11 @@
 
 #![allow(dead_code)] // The program of the tests from outside and that of the unit tests use a part each.
 
+mod laboratory;
 mod laws;
 mod simulator;
 
+pub(crate) use laboratory::levels;
 pub(crate) use laws::{Effect, Law};
 pub(crate) use simulator::Measured;
 use stretch_gap::{
@@ -57,6 +59,8 @@ pub(crate) struct Toy {
     pub(crate) shared: Vec<(usize, usize)>,
     /// What happens instead of some runs.
     pub(crate) fails: Option<Fails>,
+    /// Session time of the first trial, s.
+    pub(crate) begins_s: f64,
 }
 
 /// How a simulator may fail.
@@ -102,6 +106,7 @@ impl Toy {
             is_lost: Vec::new(),
             shared: Vec::new(),
             fails: None,
+            begins_s: 0.0,
         }
     }
 
@@ -148,7 +153,7 @@ impl Toy {
             stage
         });
         let trials = self.trials.iter().enumerate().map(|(i, (samples, is_test))| {
-            TrialSpec::new(&format!("trial {i}"), *samples, APART_S * i as f64, *is_test)
+            TrialSpec::new(&format!("trial {i}"), *samples, self.start_s(i), *is_test)
         });
         let effects = self.catalogue.iter();
         Description::new(DescriptionSpec {
@@ -235,7 +240,7 @@ impl Toy {
                 effects: &effects,
                 dt_s: self.dt_s,
                 step_s: self.step_s,
-                start_s: APART_S * trial as f64,
+                start_s: self.start_s(trial),
             };
             bench.run(self.laws[stage], &input[range.clone()], &mut out[range]);
         }
@@ -251,6 +256,11 @@ impl Toy {
             own[0] = *other;
         }
         own
+    }
+
+    /// Session time of a trial's first sample, s.
+    fn start_s(&self, trial: usize) -> f64 {
+        self.begins_s + APART_S * trial as f64
     }
 
     /// Samples of every trial.

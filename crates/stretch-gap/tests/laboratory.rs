@@ -1,0 +1,89 @@
+//! What to measure next: rivals that tie on what was measured are parted by the experiment that moves them apart.
+
+use crate::{
+    consistent::evidenced,
+    toys::{Effect, Law, Measured, Toy, levels},
+};
+use stretch_gap::{Diagnosis, Evidence, Model, Options, differences, next_experiment};
+
+/// A line with a cubic, held at three levels: a square with another gain does as well.
+fn tied() -> (Measured, Diagnosis, Evidence) {
+    let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic, Effect::Cubic]);
+    let toy = toy.hiding(&[(Effect::Cubic, &[0.1])]);
+    let measured = toy.driven_by(levels(toy.samples()), 1);
+    let (told, evidence) = evidenced(&measured, &Options::default());
+    (measured, told, evidence)
+}
+
+#[test]
+fn what_was_measured_cannot_tell_and_the_next_experiment_can() {
+    let (measured, told, evidence) = tied();
+    let mut ambiguous = told.ambiguous.clone();
+    ambiguous.sort();
+    assert_eq!(ambiguous, ["cubic", "quadratic"], "{}", told.sentence);
+    let proposal =
+        next_experiment(&measured, &told, &evidence).expect("simulated").expect("a proposal");
+    let mut separates = proposal.next.separates.clone();
+    separates.sort();
+    assert_eq!(separates, ["cubic", "quadratic"]);
+    // From -1 on x^2 and x^3 go apart; at the three levels again they do not.
+    assert_eq!(proposal.next.name, "to both sides");
+    let d = |name: &str| proposal.menu.iter().find(|m| m.0 == name).map_or(f64::NAN, |m| m.1);
+    assert_eq!(d("to both sides"), proposal.next.d);
+    assert!(
+        d("to both sides") > 1.0 && d("three levels") < 0.2 && d("rest") < 0.2,
+        "{:?}",
+        proposal.menu
+    );
+    assert_eq!(proposal.menu.len(), 4);
+    assert!(
+        !proposal.trial.is_empty() && proposal.next.why.starts_with("Move"),
+        "{}",
+        proposal.next.why
+    );
+}
+
+/// Evidence a minute is what counts: the same motion behind ten minutes of preparation is worth less, and stands behind.
+#[test]
+fn preparation_counts_into_the_minutes() {
+    let (measured, told, evidence) = tied();
+    let proposal =
+        next_experiment(&measured, &told, &evidence).expect("simulated").expect("a proposal");
+    let place = |name: &str| proposal.menu.iter().position(|m| m.0 == name).expect("of the menu");
+    assert!(place("to both sides") < place("to both sides, prepared"));
+    let entry = |name: &str| &proposal.menu[place(name)];
+    assert_eq!(entry("to both sides").1, entry("to both sides, prepared").1);
+    assert!((entry("to both sides, prepared").2 - entry("to both sides").2 - 10.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_single_name_needs_no_experiment() {
+    let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic, Effect::Cubic]);
+    let measured = toy.hiding(&[(Effect::Cubic, &[0.3])]).measured(2);
+    let (told, evidence) = evidenced(&measured, &Options::default());
+    assert_eq!(told.ambiguous, ["cubic"], "{}", told.sentence);
+    assert_eq!(next_experiment(&measured, &told, &evidence).expect("simulated"), None);
+    // So does a record without a gap.
+    let quiet = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic]).measured(3);
+    let (told, evidence) = evidenced(&quiet, &Options::default());
+    assert_eq!(next_experiment(&quiet, &told, &evidence).expect("simulated"), None);
+}
+
+/// Nobody knows which rival is true: both are tried, and it does not matter which is told first. A model does not differ from itself.
+#[test]
+fn differences_have_no_order() {
+    let (measured, _, _) = tied();
+    let of = |effect: usize, size: f64| Model {
+        effects: vec![(effect, vec![size])],
+        parameters: measured.toy.parameters.iter().map(|p| p.nominal).collect(),
+    };
+    let (square, cube) = (of(0, 0.15), of(1, 0.1));
+    let there = differences(&measured, &square, &cube).expect("simulated");
+    let back = differences(&measured, &cube, &square).expect("simulated");
+    for ((name, there), (_, back)) in there.iter().zip(&back) {
+        assert!((there - back).abs() < 1e-9 * there.max(1.0), "{name}: {there} {back}");
+    }
+    for (name, d) in differences(&measured, &cube, &cube).expect("simulated") {
+        assert!(d < 1e-9, "{name}: {d}");
+    }
+}

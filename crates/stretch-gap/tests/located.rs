@@ -1,0 +1,170 @@
+//! Where a gap sits: a gap that was put in one place stands out there, and not elsewhere.
+
+use crate::{
+    consistent::{evidenced, told},
+    toys::{Effect, Law, Measured, Toy, binomial_bound},
+};
+use stretch_gap::{Diagnosis, Dice, Options};
+
+/// A line beside a bench whose offset jumps by noise wherever `is_there` says so of sample, motion and rate. No parameter can follow that.
+fn disturbed(seed: u64, sd: f64, is_there: impl Fn(usize, f64, f64) -> bool) -> Measured {
+    let toy =
+        Toy { trials: vec![(1500, false), (1500, false), (1500, true)], ..Toy::of(&[Law::Line]) };
+    let x = toy.measured(seed).x;
+    let mut dice = Dice::new(seed, 60);
+    let course = (0..x.len())
+        .map(|i| {
+            let rate = (x[(i + 1).min(x.len() - 1)] - x[i.saturating_sub(1)]) / 0.02;
+            let drawn = sd * dice.gauss();
+            if is_there(i, x[i], rate) { drawn } else { 0.0 }
+        })
+        .collect();
+    Toy { courses: vec![(toy.parameter("line.zero"), course)], ..toy }.measured(seed)
+}
+
+fn standing_out<'a>(told: &'a Diagnosis, by: &str) -> Vec<&'a str> {
+    let slices = told.location.slices.iter().filter(|s| s.by == by && s.stands_out);
+    slices.map(|s| s.slice.as_str()).collect()
+}
+
+/// Axes that stand out and say something else than `allowed`.
+fn elsewhere<'a>(told: &'a Diagnosis, allowed: &[&str]) -> Vec<(&'a str, &'a str)> {
+    let slices = told.location.slices.iter().filter(|s| s.stands_out);
+    let all = slices.map(|s| (s.by.as_str(), s.slice.as_str()));
+    all.filter(|(by, _)| !allowed.contains(by)).collect()
+}
+
+#[test]
+fn a_gap_at_high_level_stands_out_there() {
+    let told = told(&disturbed(1, 0.03, |_, x, _| x > 0.45));
+    let levels: Vec<&str> =
+        told.location.slices.iter().filter(|s| s.by == "level").map(|s| s.slice.as_str()).collect();
+    let out = standing_out(&told, "level");
+    // Of five levels between -1 and 1 the highest begins at some 0.5: it holds most of the gap, the one before the rest.
+    assert_eq!(levels.len(), 5);
+    assert!(out.contains(&levels[4]) && !out.iter().any(|o| levels[..3].contains(o)), "{out:?}");
+    let high = told.location.slices.iter().filter(|s| levels[3..].contains(&s.slice.as_str()));
+    let share: f64 = high.map(|s| s.share).sum();
+    // Nine variances in some tenth of 4500 samples are 4000; each of the other three levels has some 1200 samples, whose noise leaves
+    // sqrt(2 1200) = 49: three of these from each are a tenth.
+    assert!(share > 0.9, "{share}");
+}
+
+#[test]
+fn a_gap_at_turnarounds_stands_out_there() {
+    // Where it is slow it turns: within 150 ms of a reversal rates are below some 0.15 of a wave of 2 rad/s and more.
+    let told = told(&disturbed(2, 0.03, |_, _, rate| rate.abs() < 0.05));
+    assert_eq!(standing_out(&told, "regime"), ["turnaround"]);
+    let moving = told.location.slices.iter().find(|s| s.by == "regime" && s.slice == "rising");
+    assert!(moving.is_some_and(|s| s.share < 0.2), "{moving:?}");
+}
+
+#[test]
+fn a_gap_of_one_trial_stands_out_in_its_trial() {
+    let told = told(&disturbed(3, 0.01, |i, _, _| (1500..3000).contains(&i)));
+    assert_eq!(standing_out(&told, "trial"), ["trial 1"]);
+    // Session and travel are other clocks of the same; of motion, time within a trial and frequency it knows nothing.
+    assert_eq!(elsewhere(&told, &["trial", "session", "travel"]), []);
+}
+
+#[test]
+fn a_gap_that_only_begins_a_trial_stands_out_in_time() {
+    let told = told(&disturbed(4, 0.02, |i, _, _| i % 1500 < 300));
+    assert_eq!(standing_out(&told, "time"), ["first 1 s", "1 to 3 s"]);
+    assert_eq!(elsewhere(&told, &["time", "session", "travel"]), []);
+}
+
+/// A hum of 18 Hz lies between 12.5 and 25 Hz.
+#[test]
+fn a_gap_of_one_octave_stands_out_there() {
+    let toy = Toy { trials: vec![(2000, false), (2000, true)], ..Toy::of(&[Law::Line]) };
+    let hum = |i: usize| 0.01 * (std::f64::consts::TAU * 18.0 * 0.01 * i as f64).sin();
+    let course = (0..toy.samples()).map(hum).collect();
+    let toy = Toy { courses: vec![(toy.parameter("line.zero"), course)], ..toy };
+    let told = told(&toy.measured(5));
+    assert_eq!(standing_out(&told, "frequency"), ["12.5 to 25 Hz"]);
+    let slice = told.location.slices.iter().find(|s| s.slice == "12.5 to 25 Hz");
+    // Half a squared amplitude over the noise's variance, 0.5, all in a quarter of the lines: an excess of 2.
+    let excess = slice.map_or(0.0, |s| s.excess);
+    assert!((excess - 2.0).abs() < 0.4, "{excess}");
+    assert_eq!(elsewhere(&told, &["frequency"]), []);
+}
+
+/// Where nothing is wrong something stands out in 5 of 100 records at most (dependent slices make it fewer): over 60 no more than a binomial count
+/// exceeds once in a thousand.
+#[test]
+fn nothing_stands_out_of_noise() {
+    let alarms = (0..60)
+        .filter(|seed| {
+            let told = told(&disturbed(300 + seed, 0.0, |_, _, _| false));
+            assert!(!told.location.slices.is_empty());
+            told.location.slices.iter().any(|s| s.stands_out)
+        })
+        .count();
+    assert!(alarms <= binomial_bound(60, 0.05, 0.001), "{alarms} of 60");
+}
+
+/// Along each axis that cuts all samples the shares sum to the whole.
+#[test]
+fn shares_of_slices_sum_to_the_gap() {
+    let told = told(&disturbed(6, 0.03, |_, x, _| x > 0.3));
+    for by in ["level", "time", "session", "travel", "trial", "frequency", "regime"] {
+        let shares = told.location.slices.iter().filter(|s| s.by == by).map(|s| s.share);
+        let sum: f64 = shares.sum();
+        assert!((sum - 1.0).abs() < 1e-9, "{by}: {sum}");
+    }
+    for s in &told.location.slices {
+        assert!(s.excess_ci[0] <= s.excess_ci[1], "{s:?}");
+        assert!(!s.stands_out || (s.excess > 0.0 && s.excess_ci[0] > 0.0), "{s:?}");
+    }
+}
+
+/// A lag drives a line: what was measured of the lag, its noise included, is what the line gets. From end to end nobody measures the lag: its noise,
+/// one variance, is missing beside its gap, and passes a line of gain 1 as it is. With gaps e of the two, in variances of the noise, the
+/// share of the lag is (1 + e_0)/(1 + e_0 + e_1).
+fn end_to_end(wrong: usize, size: f64) -> ([f64; 2], [f64; 2]) {
+    let mut toy = Toy::of(&[Law::Lag, Law::Line]);
+    toy.hidden = vec![(wrong, Effect::Cubic, vec![size])];
+    let told = told(&toy.measured(7));
+    let ends: Vec<f64> = told.location.end_to_end.iter().map(|s| s.share).collect();
+    let gaps: Vec<f64> = told.location.stages.iter().map(|s| s.excess.max(0.0)).collect();
+    ([gaps[0], gaps[1]], [ends[0], ends[1]])
+}
+
+#[test]
+fn a_gap_has_the_stage_that_makes_it() {
+    for (wrong, other) in [(0, 1), (1, 0)] {
+        let (gaps, ends) = end_to_end(wrong, 0.3);
+        assert!(gaps[wrong] > 5.0 && gaps[other] < 0.2, "{gaps:?}");
+        assert!((ends[0] + ends[1] - 1.0).abs() < 1e-9, "{ends:?}");
+        let expected = (1.0 + gaps[0]) / (1.0 + gaps[0] + gaps[1]);
+        // Noise and gap are independent: their product over 1000 tested samples is 2 sqrt(e/1000) of a variance, 0.03 of the whole; two of these.
+        assert!((ends[0] - expected).abs() < 0.06, "{wrong}: {ends:?} for {expected}");
+    }
+}
+
+/// Where nothing is wrong all that is missing from end to end is the noise that drives the line.
+#[test]
+fn noise_that_drives_a_stage_is_that_of_the_stage_before() {
+    let (gaps, ends) = end_to_end(0, 0.0);
+    assert!(gaps.iter().all(|e| *e < 0.2), "{gaps:?}");
+    // The product of two noises over 1000 samples is 2/sqrt(1000) = 0.06 of a variance, beside that of a mean square, 0.045: three of these.
+    assert!(ends[0] > 0.8, "{ends:?}");
+}
+
+/// What a named effect leaves is noise wherever one looks; before, the gap of a cubic is at the ends of the range.
+#[test]
+fn the_residual_after_a_named_effect_is_noise() {
+    let toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL).hiding(&[(Effect::Cubic, &[0.4])]);
+    let (told, evidence) = evidenced(&toy.measured(9), &Options::default());
+    assert_eq!(told.named, ["cubic"]);
+    let stage = &evidence.stages[0];
+    // 1000 tested samples: a mean square is known to sqrt(2/1000) = 0.045; four of these.
+    assert!(
+        stage.excess_after.abs() < 0.18 && stage.excess_retuned > 1.0,
+        "{}",
+        stage.excess_after
+    );
+    let rms = (stage.residual_after.iter().map(|r| r * r).sum::<f64>() / 4000.0).sqrt();
+    assert!((rms - 1.0).abs() < 0.05, "{rms}");
+}

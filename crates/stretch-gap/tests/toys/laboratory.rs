@@ -1,0 +1,67 @@
+//! Experiments that nobody has done yet, with a toy of one stage.
+
+use super::{
+    Effect, Measured,
+    laws::{Plant, unit},
+};
+use stretch_data::{Channel, Trial};
+use stretch_gap::{GapError, Laboratory, Model, Plan};
+
+/// Levels of 0, a half and 1, held for 0.4 s each in an order that is drawn: there x^3 is 1.5 x^2 - 0.5 x.
+pub(crate) fn levels(samples: usize) -> Vec<f64> {
+    let mut dice = stretch_gap::Dice::new(5, 0);
+    let mut level = 0.0;
+    let next = |i: usize| {
+        if i.is_multiple_of(40) {
+            level = 0.5 * dice.below(3) as f64;
+        }
+        level
+    };
+    (0..samples).map(next).collect()
+}
+
+/// An experiment that drives the first stage by x, with so many minutes of preparation.
+fn plan(name: &str, prepare_min: f64, x: Vec<f64>) -> (Plan, Vec<f64>) {
+    let channels = vec![Channel { name: "x".into(), values: x.clone() }];
+    let time_s = (0..x.len()).map(|i| 0.01 * i as f64).collect();
+    let trial = Trial { name: name.into(), time_s, channels };
+    (Plan { name: name.into(), how: "Move it.".into(), prepare_min, trial }, x)
+}
+
+impl Laboratory for Measured {
+    type Setting = Vec<f64>;
+
+    fn menu(&self) -> Vec<(Plan, Vec<f64>)> {
+        let sweep: Vec<f64> = (0..3000).map(|i| (0.004 * f64::from(i)).sin()).collect();
+        vec![
+            plan("three levels", 0.0, levels(3000)),
+            plan("rest", 0.0, vec![0.0; 3000]),
+            plan("to both sides, prepared", 10.0, sweep.clone()),
+            plan("to both sides", 0.0, sweep),
+        ]
+    }
+
+    fn done(&self) -> Vec<f64> {
+        self.x.clone()
+    }
+
+    fn predict(&self, model: &Model, x: &Vec<f64>) -> Result<Vec<Vec<f64>>, GapError> {
+        let toy = &self.toy;
+        let specs = toy.parameters.iter().zip(&model.parameters);
+        let parameters: Vec<f64> = specs.map(|(p, x)| x / unit(&p.unit, toy.units)).collect();
+        let effects: Vec<(Effect, &[f64])> =
+            model.effects.iter().map(|(e, v)| (toy.catalogue[*e].1, v.as_slice())).collect();
+        let plant = Plant {
+            parameters: &parameters,
+            courses: &[],
+            effects: &effects,
+            dt_s: toy.dt_s,
+            step_s: toy.step_s,
+            start_s: 0.0,
+        };
+        let mut out = vec![0.0; x.len()];
+        plant.run(toy.laws[0], x, &mut out);
+        out.iter_mut().for_each(|y| *y /= toy.noise);
+        Ok(vec![out])
+    }
+}

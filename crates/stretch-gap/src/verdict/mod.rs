@@ -10,6 +10,8 @@ pub(crate) mod coverage;
 pub(crate) mod diagnosis;
 pub(crate) mod judge;
 pub(crate) mod naming;
+#[cfg(test)]
+mod naming_tests;
 pub(crate) mod next_experiment;
 pub(crate) mod proposal;
 pub(crate) mod sentence;

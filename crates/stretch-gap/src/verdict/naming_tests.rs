@@ -1,0 +1,113 @@
+//! What the naming must hold whatever the candidates: properties over thousands of drawn cases.
+
+use std::collections::BTreeSet;
+
+use crate::{
+    evidence::{candidates::Candidate, shares::EffectShare},
+    numerics::random::Dice,
+    problem::thresholds::Thresholds,
+    verdict::naming::Naming,
+};
+
+const NAMES: [&str; 6] = ["play", "drift", "lag", "leak", "slack", "sag"];
+
+/// A set of up to three different effects.
+fn set(dice: &mut Dice) -> Vec<String> {
+    let count = dice.below(4);
+    let mut names: Vec<String> = Vec::new();
+    while names.len() < count {
+        let name = NAMES[dice.below(NAMES.len())].to_owned();
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names
+}
+
+fn candidate(effects: Vec<String>, probability: f64, dice: &mut Dice) -> Candidate {
+    let closed = 1.2 * dice.unit() - 0.2;
+    Candidate {
+        effects,
+        probability,
+        score: 10.0 * probability,
+        gap_before: 10.0,
+        gap_after: 10.0 * (1.0 - closed),
+        closed,
+        closed_ci: [closed - 0.1, closed + 0.1],
+        is_confirmed: dice.unit() < 0.7,
+        by_name: Default::default(),
+        parameters: Vec::new(),
+    }
+}
+
+/// Candidates, the most probable first, and the shares of the first one's effects, the strongest first.
+fn drawn(dice: &mut Dice) -> (Vec<Candidate>, Vec<EffectShare>, bool) {
+    let mut candidates = Vec::new();
+    for probability in [0.6, 0.3, 0.1] {
+        let effects = set(dice);
+        candidates.push(candidate(effects, probability, dice));
+    }
+    let mut shares: Vec<EffectShare> = candidates[0]
+        .effects
+        .iter()
+        .map(|effect| {
+            let closes = dice.unit() * dice.unit();
+            let at_bound = dice.unit() < 0.2;
+            EffectShare { effect: effect.clone(), closes, closes_of_stage: closes, at_bound }
+        })
+        .collect();
+    shares.sort_by(|a, b| b.closes.total_cmp(&a.closes));
+    (candidates, shares, dice.unit() < 0.2)
+}
+
+/// Named and faint are the first set, parted; a tie is between a name and what the first set does not hold; every name is told once.
+#[test]
+fn names_part_the_first_set() {
+    let mut dice = Dice::new(4, 0);
+    let thresholds = Thresholds::frozen();
+    let mut ties = 0;
+    for _ in 0..5000 {
+        let (candidates, shares, is_short) = drawn(&mut dice);
+        let naming = Naming::of(&candidates, &shares, &thresholds, is_short);
+        let both: Vec<&String> = naming.named.iter().chain(&naming.faint).collect();
+        let parted: BTreeSet<&String> = both.iter().copied().collect();
+        assert_eq!(parted.len(), both.len());
+        assert_eq!(parted, candidates[0].effects.iter().collect());
+        for (own, other) in &naming.ties {
+            assert!(naming.named.contains(own) && !candidates[0].effects.contains(other));
+        }
+        ties += naming.ties.len();
+        let tied = naming.tied();
+        assert_eq!(tied.iter().collect::<BTreeSet<_>>().len(), tied.len());
+        let told = naming.alternatives();
+        assert_eq!(told.len(), naming.named.len());
+        for (name, told) in naming.named.iter().zip(&told) {
+            assert!(told.split(" or ").next() == Some(name), "{told}");
+        }
+    }
+    assert!(ties > 100, "{ties} ties are enough to say something");
+}
+
+/// What closes less than counts is no headline beside what closes more, and what stands at the end of its range is none alone.
+#[test]
+fn what_is_named_counts() {
+    let mut dice = Dice::new(5, 0);
+    let thresholds = Thresholds::frozen();
+    for _ in 0..5000 {
+        let (candidates, shares, is_short) = drawn(&mut dice);
+        let naming = Naming::of(&candidates, &shares, &thresholds, is_short);
+        let share = |name: &String| shares.iter().find(|s| s.effect == *name);
+        let counts = |name: &String| {
+            share(name).is_some_and(|s| s.closes_of_stage >= thresholds.least_share)
+        };
+        if naming.named.len() > 1 {
+            assert!(naming.named.iter().all(counts), "{naming:?}");
+        }
+        if !naming.named.is_empty() {
+            assert!(
+                naming.named.iter().any(|n| share(n).is_some_and(|s| !s.at_bound)),
+                "{naming:?}"
+            );
+        }
+    }
+}

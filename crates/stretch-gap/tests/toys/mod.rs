@@ -9,7 +9,7 @@
 //! let (diagnosis, evidence) = toy.measured(1).diagnosed();
 //! ```
 
-#![allow(dead_code)] // The program of the tests from outside and that of the unit tests use a part each.
+#![allow(dead_code, unused_imports)] // The program of the tests from outside and that of the unit tests use a part each.
 
 mod laboratory;
 mod laws;

@@ -78,7 +78,7 @@ fn products_tell_what_is_left() {
     }
     assert!((products[0][0] - 1.0 - stage.excess_after).abs() < 1e-9, "{}", products[0][0]);
     // Nothing moves slowly in this toy: what is left is white, and its square is that of the residuals.
-    let level = (stage.floor / 0.01).powi(2);
+    let level = (stage.noise / 0.01).powi(2);
     for (k, answer) in responses.parameters[0].answers.iter().enumerate() {
         let test = 3000..4000;
         let left = stage.residual_after[test.clone()].iter().zip(&answer.residual[test]);

@@ -4,14 +4,14 @@ use crate::{
     consistent::{evidenced, told},
     toys::{Effect, Law, Measured, Toy, binomial_bound},
 };
-use stretch_gap::{Diagnosis, Dice, Options};
+use stretch_gap::{Diagnosis, Options, RandomGenerator};
 
 /// A line beside a bench whose offset jumps by noise wherever `is_there` says so of sample, motion and rate. No parameter can follow that.
 fn disturbed(seed: u64, sd: f64, is_there: impl Fn(usize, f64, f64) -> bool) -> Measured {
     let toy =
         Toy { trials: vec![(1500, false), (1500, false), (1500, true)], ..Toy::of(&[Law::Line]) };
     let x = toy.measured(seed).x;
-    let mut dice = Dice::new(seed, 60);
+    let mut dice = RandomGenerator::new(seed, 60);
     let course = (0..x.len())
         .map(|i| {
             let rate = (x[(i + 1).min(x.len() - 1)] - x[i.saturating_sub(1)]) / 0.02;

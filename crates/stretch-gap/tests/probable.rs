@@ -4,7 +4,7 @@ use crate::{
     consistent::{evidenced, told},
     toys::{Effect, Law, Toy, binomial_bound},
 };
-use stretch_gap::{Diagnosis, Dice, Options, VerdictKind};
+use stretch_gap::{Diagnosis, Options, RandomGenerator, VerdictKind};
 
 /// A line whose parameters are exact: what a bench adds is all of the gap.
 fn exact() -> Toy {
@@ -51,7 +51,7 @@ fn what_is_told_apart_is_no_tie() {
 fn half_closed(seed: u64) -> (Diagnosis, f64) {
     let (c, e) = (0.1, 0.012);
     let toy = exact().may_lack(&[Effect::Quadratic]).hiding(&[(Effect::Quadratic, &[c])]);
-    let mut dice = Dice::new(seed, 70);
+    let mut dice = RandomGenerator::new(seed, 70);
     let course = (0..toy.samples()).map(|_| e * dice.gauss()).collect();
     let toy = Toy { courses: vec![(toy.parameter("line.zero"), course)], ..toy };
     let measured = toy.measured(seed);

@@ -4,7 +4,7 @@ use crate::{
     consistent::told,
     toys::{Effect, Law, Toy, slow},
 };
-use stretch_gap::{Dice, Factor, Passage, Proposed, RateForm, VerdictKind};
+use stretch_gap::{Factor, Passage, Proposed, RandomGenerator, RateForm, VerdictKind};
 
 /// Samples of a trial: 29 s.
 const SAMPLES: usize = 2900;
@@ -124,7 +124,7 @@ fn nothing_is_proposed_for_noise() {
     for seed in 0..12 {
         let (proposed, verdict) = with_offset(20 + seed, |x| match seed % 2 {
             0 => {
-                let mut dice = Dice::new(seed, x.len() as u64);
+                let mut dice = RandomGenerator::new(seed, x.len() as u64);
                 x.iter().map(|_| 0.03 * dice.gauss()).collect()
             }
             _ => slow(0.03, 0.5, (x.len(), 0.01), seed ^ x[5].to_bits()),
@@ -144,7 +144,7 @@ fn nothing_is_proposed_for_noise() {
 /// close it unless they do.
 #[test]
 fn a_function_of_many_terms_is_not_called_random() {
-    let mut dice = Dice::new(8, 0);
+    let mut dice = RandomGenerator::new(8, 0);
     let waves: Vec<[f64; 2]> =
         (0..30).map(|k| [1.0 + 0.5 * f64::from(k), 6.28 * dice.unit()]).collect();
     let (proposed, verdict) = with_offset(5, |x| {

@@ -1,6 +1,6 @@
 //! The noise of a channel from its record: what it is told to be, and what passes for it.
 
-use stretch_gap::{Dice, Noise, VerdictKind, WINDOW, noise_variance};
+use stretch_gap::{Noise, RandomGenerator, VerdictKind, WINDOW, noise_variance};
 
 use crate::toys::{Effect, Law, Toy, slow};
 
@@ -11,7 +11,7 @@ const SAMPLES: usize = 20_000;
 const TOLD: f64 = 5.0 * 1.6 / 141.0;
 
 fn white(sd: f64, seed: u64) -> Vec<f64> {
-    let mut dice = Dice::new(seed, 0);
+    let mut dice = RandomGenerator::new(seed, 0);
     (0..SAMPLES).map(|_| sd * dice.gauss()).collect()
 }
 
@@ -113,7 +113,7 @@ fn differences_tell_of_slow_noise_what_changes_from_sample_to_sample() {
 #[test]
 fn windows_tell_slow_noise_that_differences_miss() {
     let record = slow(0.1, 0.2, (100 * WINDOW, 0.01), 6);
-    let mut dice = Dice::new(6, 1);
+    let mut dice = RandomGenerator::new(6, 1);
     let noisy: Vec<f64> = record.iter().map(|x| x + 0.02 * dice.gauss()).collect();
     let windows: Vec<Vec<f64>> = noisy.chunks(WINDOW).map(<[f64]>::to_vec).collect();
     let found = Noise::of_windows(&windows, Some(0.02), true, 0.01).expect("enough windows");

@@ -1,17 +1,17 @@
 //! Slow drift and offsets that a simulator describes are no effects, and effects beside them are still found.
 
-use stretch_gap::{Options, VerdictKind, Wander};
+use stretch_gap::{Options, SlowDrift, VerdictKind};
 
 use crate::toys::{Effect, Law, Toy, slow};
 
-fn drifting(described: Wander, course: (f64, f64), seed: u64) -> Toy {
+fn drifting(described: SlowDrift, course: (f64, f64), seed: u64) -> Toy {
     let mut toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL);
-    toy.parameters[1].wander = Some(described);
+    toy.parameters[1].drift = Some(described);
     toy.courses = vec![(1, slow(course.0, course.1, (toy.samples(), toy.dt_s), seed))];
     toy
 }
 
-const DESCRIBED: Wander = Wander { sd: 0.03, correlation_s: 3.0 };
+const DESCRIBED: SlowDrift = SlowDrift { sd: 0.03, correlation_s: 3.0 };
 
 /// As described, half as large, twice as large, quicker: of 20 records none has a name, for a name takes 12 nats.
 #[test]
@@ -30,7 +30,7 @@ fn a_drift_that_is_described_is_no_effect() {
 /// much. (Beside a drift of half its size the same effect is left unnamed, for so much the drift may have done.)
 #[test]
 fn an_effect_beside_a_smaller_drift_is_found() {
-    let described = Wander { sd: 0.005, correlation_s: 3.0 };
+    let described = SlowDrift { sd: 0.005, correlation_s: 3.0 };
     for seed in 0..5 {
         let toy = drifting(described, (0.005, 3.0), seed).hiding(&[(Effect::Quadratic, &[0.4])]);
         let told = toy.measured(seed).diagnosed().0;
@@ -46,7 +46,7 @@ fn an_effect_beside_a_smaller_drift_is_found() {
 fn a_drift_that_nobody_described_is_a_gap() {
     for seed in 0..5 {
         let mut toy = drifting(DESCRIBED, (0.03, 3.0), seed);
-        toy.parameters[1].wander = None;
+        toy.parameters[1].drift = None;
         let told = toy.measured(seed).diagnosed().0;
         assert!(told.gap.retuned > 1.0, "nine times the noise's variance: {:?}", told.gap);
         assert_ne!(told.verdict, VerdictKind::NoGap, "{}", told.sentence);

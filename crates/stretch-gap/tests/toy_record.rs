@@ -1,6 +1,6 @@
 //! Errors of the record, each told as what it is, and none where there is none.
 
-use stretch_gap::{Diagnosis, Dice, Distortion, Gross, GrossKind, VerdictKind};
+use stretch_gap::{Diagnosis, Distortion, Gross, GrossKind, RandomGenerator, VerdictKind};
 
 use crate::toys::{Effect, Law, Measured, Toy};
 
@@ -128,7 +128,7 @@ fn a_copied_column_is_told_with_its_factor() {
 #[test]
 fn a_dead_column_is_told_with_where() {
     let mut record = chain().measured(2);
-    let mut dice = Dice::new(3, 0);
+    let mut dice = RandomGenerator::new(3, 0);
     // The second trial, from 10 s of the session's samples on.
     record.outputs[1][1000..2000].iter_mut().for_each(|y| *y = 0.1 + 0.01 * dice.gauss());
     let told = told(&record);

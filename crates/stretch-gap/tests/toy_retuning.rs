@@ -1,6 +1,6 @@
 //! Re-tuning recovers parameters, and says how well.
 
-use stretch_gap::{Diagnosis, Dice, Knowledge, Options};
+use stretch_gap::{Diagnosis, Knowledge, Options, RandomGenerator};
 
 use crate::toys::{Effect, Law, Measured, Toy, binomial_bound, slow};
 
@@ -16,7 +16,7 @@ fn told(record: &Measured) -> Diagnosis {
 /// midpoint rule, which lies (2 pi rate h)^2/6 = 1.6e-4 off in the rate.
 #[test]
 fn parameters_come_back_as_near_as_theory_says() {
-    let mut dice = Dice::new(1, 0);
+    let mut dice = RandomGenerator::new(1, 0);
     for law in [Law::Line, Law::Lag, Law::Oscillator, Law::Delay] {
         for seed in 0..8 {
             let off: Vec<f64> = (0..3).map(|_| dice.gauss().clamp(-2.5, 2.5)).collect();
@@ -44,7 +44,7 @@ fn parameters_come_back_as_near_as_theory_says() {
 #[test]
 fn intervals_cover_where_noise_has_a_memory() {
     const SEEDS: u64 = 40;
-    let mut dice = Dice::new(2, 0);
+    let mut dice = RandomGenerator::new(2, 0);
     let mut missed = 0;
     for seed in 0..SEEDS {
         let mut toy = Toy::of(&[Law::Line]).off_by(&[dice.gauss(), dice.gauss()]);

@@ -6,7 +6,7 @@ use proptest::{prelude::*, test_runner::RngSeed};
 use crate::numerics::{
     arrowhead::Arrow,
     linear::{Cholesky, boxed},
-    random::Dice,
+    random::RandomGenerator,
 };
 
 /// Relative to the largest value: matrices of up to 15 rows whose condition is held below 1e3, and a jitter of 1e-13 of the diagonal.
@@ -14,13 +14,13 @@ const SOLVED: f64 = 1e-9;
 
 /// B B' + I of a square matrix B of normal numbers: positive definite, of condition up to some hundred.
 fn definite(n: usize, seed: u64) -> DMatrix<f64> {
-    let mut dice = Dice::new(seed, 1);
+    let mut dice = RandomGenerator::new(seed, 1);
     let b = DMatrix::from_fn(n, n, |_, _| dice.gauss());
     &b * b.transpose() + DMatrix::identity(n, n)
 }
 
 fn vector(n: usize, seed: u64) -> DVector<f64> {
-    let mut dice = Dice::new(seed, 2);
+    let mut dice = RandomGenerator::new(seed, 2);
     DVector::from_fn(n, |_, _| dice.gauss())
 }
 
@@ -54,7 +54,7 @@ proptest! {
     #[test]
     fn a_boxed_minimum_meets_its_conditions(n in 1_usize..8, seed: u64, width in 0.01_f64..2.0) {
         let (a, g) = (definite(n, seed), vector(n, seed));
-        let mut dice = Dice::new(seed, 3);
+        let mut dice = RandomGenerator::new(seed, 3);
         let low: Vec<f64> = (0..n).map(|_| -width * dice.unit()).collect();
         let high: Vec<f64> = (0..n).map(|_| width * dice.unit()).collect();
         let x = DVector::from_vec(boxed(&a, g.as_slice(), &low, &high));
@@ -73,7 +73,7 @@ proptest! {
     fn an_arrow_solves_as_its_dense_matrix_does(knots in 0_usize..12, columns in 0_usize..4, seed: u64) {
         prop_assume!(knots + columns > 0);
         let n = knots + columns;
-        let mut dice = Dice::new(seed, 4);
+        let mut dice = RandomGenerator::new(seed, 4);
         let mut arrow = Arrow::zeros(knots, columns);
         arrow.beside.iter_mut().for_each(|x| *x = dice.unit() - 0.5);
         arrow.border.iter_mut().flatten().for_each(|x| *x = 0.5 * (dice.unit() - 0.5));
@@ -116,7 +116,7 @@ proptest! {
 #[test]
 fn gauss_has_the_moments_of_a_sum_of_twelve() {
     const DRAWS: usize = 100_000;
-    let mut dice = Dice::new(5, 0);
+    let mut dice = RandomGenerator::new(5, 0);
     let mut sums = [0.0; 4];
     for _ in 0..DRAWS {
         let x = dice.gauss();
@@ -136,7 +136,7 @@ fn gauss_has_the_moments_of_a_sum_of_twelve() {
 /// Tenths of the unit interval hold 10 000 each of 100 000 draws, with a deviation of 95: five of them. Whole numbers below ten, as well.
 #[test]
 fn uniform_numbers_are_uniform_and_below_their_bound() {
-    let mut dice = Dice::new(6, 0);
+    let mut dice = RandomGenerator::new(6, 0);
     let mut counts = [[0_i32; 10]; 2];
     for _ in 0..100_000 {
         let unit = dice.unit();
@@ -152,7 +152,7 @@ fn uniform_numbers_are_uniform_and_below_their_bound() {
 #[test]
 fn streams_and_seeds_are_independent() {
     let draws = |seed, stream| {
-        let mut dice = Dice::new(seed, stream);
+        let mut dice = RandomGenerator::new(seed, stream);
         (0..10_000).map(move |_| dice.gauss())
     };
     for (a, b) in [((1, 0), (1, 1)), ((1, 0), (2, 0)), ((7, 3), (3, 7))] {

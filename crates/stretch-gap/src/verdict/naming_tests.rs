@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::{
     evidence::{candidates::Candidate, shares::EffectShare},
-    numerics::random::Dice,
+    numerics::random::RandomGenerator,
     problem::thresholds::Thresholds,
     verdict::naming::Naming,
 };
@@ -12,7 +12,7 @@ use crate::{
 const NAMES: [&str; 6] = ["play", "drift", "lag", "leak", "slack", "sag"];
 
 /// A set of up to three different effects.
-fn set(dice: &mut Dice) -> Vec<String> {
+fn set(dice: &mut RandomGenerator) -> Vec<String> {
     let count = dice.below(4);
     let mut names: Vec<String> = Vec::new();
     while names.len() < count {
@@ -24,7 +24,7 @@ fn set(dice: &mut Dice) -> Vec<String> {
     names
 }
 
-fn candidate(effects: Vec<String>, probability: f64, dice: &mut Dice) -> Candidate {
+fn candidate(effects: Vec<String>, probability: f64, dice: &mut RandomGenerator) -> Candidate {
     let closed = 1.2 * dice.unit() - 0.2;
     Candidate {
         effects,
@@ -41,7 +41,7 @@ fn candidate(effects: Vec<String>, probability: f64, dice: &mut Dice) -> Candida
 }
 
 /// Candidates, the most probable first, and the shares of the first one's effects, the strongest first.
-fn drawn(dice: &mut Dice) -> (Vec<Candidate>, Vec<EffectShare>, bool) {
+fn drawn(dice: &mut RandomGenerator) -> (Vec<Candidate>, Vec<EffectShare>, bool) {
     let mut candidates = Vec::new();
     for probability in [0.6, 0.3, 0.1] {
         let effects = set(dice);
@@ -63,7 +63,7 @@ fn drawn(dice: &mut Dice) -> (Vec<Candidate>, Vec<EffectShare>, bool) {
 /// Named and faint are the first set, parted; a tie is between a name and what the first set does not hold; every name is told once.
 #[test]
 fn names_part_the_first_set() {
-    let mut dice = Dice::new(4, 0);
+    let mut dice = RandomGenerator::new(4, 0);
     let thresholds = Thresholds::frozen();
     let mut ties = 0;
     for _ in 0..5000 {
@@ -91,7 +91,7 @@ fn names_part_the_first_set() {
 /// What closes less than counts is no headline beside what closes more, and what stands at the end of its range is none alone.
 #[test]
 fn what_is_named_counts() {
-    let mut dice = Dice::new(5, 0);
+    let mut dice = RandomGenerator::new(5, 0);
     let thresholds = Thresholds::frozen();
     for _ in 0..5000 {
         let (candidates, shares, is_short) = drawn(&mut dice);

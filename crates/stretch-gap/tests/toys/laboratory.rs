@@ -9,7 +9,7 @@ use stretch_gap::{GapError, Laboratory, Model, Plan};
 
 /// Levels of 0, a half and 1, held for 0.4 s each in an order that is drawn: there x^3 is 1.5 x^2 - 0.5 x.
 pub(crate) fn levels(samples: usize) -> Vec<f64> {
-    let mut dice = stretch_gap::Dice::new(5, 0);
+    let mut dice = stretch_gap::RandomGenerator::new(5, 0);
     let mut level = 0.0;
     let next = |i: usize| {
         if i.is_multiple_of(40) {

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::prepared;
 use crate::{
-    numerics::random::Dice,
+    numerics::random::RandomGenerator,
     problem::frame::BLOCK_S,
     toys::{Law, Measured, Toy},
 };
@@ -67,7 +67,7 @@ fn assert_agrees(record: &Measured, counts: impl Fn(usize) -> bool, offset: f64)
 
 #[test]
 fn re_tuning_a_line_is_ridge_regression() {
-    let mut dice = Dice::new(1, 0);
+    let mut dice = RandomGenerator::new(1, 0);
     for seed in 0..8 {
         let noise = 0.003 * 3.0_f64.powi((seed % 4) as i32);
         let off = [dice.gauss().clamp(-2.5, 2.5), dice.gauss().clamp(-2.5, 2.5)];

@@ -4,8 +4,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::prepared;
 use crate::{
-    numerics::random::Dice,
-    problem::{frame::Role, spec::Wander},
+    numerics::random::RandomGenerator,
+    problem::{frame::Role, spec::SlowDrift},
     toys::{Law, Toy, slow},
 };
 
@@ -15,14 +15,14 @@ const DENSE: f64 = 1e-9;
 const KNOT: usize = 10;
 
 /// A line whose zero drifts by `sd` and `correlation_s` as described.
-fn drifting(wander: Wander, samples: usize) -> Toy {
+fn drifting(wander: SlowDrift, samples: usize) -> Toy {
     let mut toy = Toy { trials: vec![(samples, false), (samples, true)], ..Toy::of(&[Law::Line]) };
-    toy.parameters[1].wander = Some(wander);
+    toy.parameters[1].drift = Some(wander);
     toy
 }
 
 /// V = I + s W K W' s of one trial, W the straight lines between knots and K the covariance exp(-|t|/tau) at the knots, in units of the noise.
-fn dense(wander: Wander, noise: f64, samples: usize) -> DMatrix<f64> {
+fn dense(wander: SlowDrift, noise: f64, samples: usize) -> DMatrix<f64> {
     let knots = (samples - 1) / KNOT + 2;
     let weights = DMatrix::from_fn(samples, knots, |i, k| {
         let share = (i % KNOT) as f64 / KNOT as f64;
@@ -42,11 +42,11 @@ fn dense(wander: Wander, noise: f64, samples: usize) -> DMatrix<f64> {
 fn products_and_determinants_are_those_of_the_dense_covariance() {
     let samples = 245;
     for (sd, correlation_s) in [(0.005, 0.3), (0.02, 2.0), (0.1, 20.0)] {
-        let wander = Wander { sd, correlation_s };
+        let wander = SlowDrift { sd, correlation_s };
         let record = drifting(wander, samples).measured(1);
         let problem = prepared(&record);
         let (frame, metric) = (&problem.compare.frame, &problem.compare.metrics[0]);
-        let mut dice = Dice::new(2, 0);
+        let mut dice = RandomGenerator::new(2, 0);
         let [x, y] = [0, 1].map(|_| DVector::from_fn(samples, |_, _| dice.gauss()));
         let column = |x: &DVector<f64>| metric.column(frame, x.as_slice().to_vec());
         let product = metric.product(frame, &column(&x), &column(&y), Role::Fit);
@@ -72,7 +72,7 @@ fn products_and_determinants_are_those_of_the_dense_covariance() {
 #[test]
 fn re_tuning_beside_a_drift_is_generalised_least_squares() {
     let samples = 245;
-    let wander = Wander { sd: 0.02, correlation_s: 2.0 };
+    let wander = SlowDrift { sd: 0.02, correlation_s: 2.0 };
     let mut toy = drifting(wander, samples).off_by(&[1.0, 0.5]);
     toy.courses = vec![(1, slow(0.02, 2.0, (2 * samples, 0.01), 3))];
     let record = toy.measured(3);
@@ -98,7 +98,7 @@ fn re_tuning_beside_a_drift_is_generalised_least_squares() {
 /// steps of up to 1.75, times in steps of up to 2.5, so that the neighbour of the right one may win and none beyond it.
 #[test]
 fn size_and_time_of_a_drift_are_found_to_the_next_that_is_tried() {
-    let described = Wander { sd: 0.05, correlation_s: 3.0 };
+    let described = SlowDrift { sd: 0.05, correlation_s: 3.0 };
     for (seed, (size, time_s)) in
         [(0.4, 1.5), (1.0, 3.0), (2.0, 3.0), (1.0, 6.0)].into_iter().enumerate()
     {

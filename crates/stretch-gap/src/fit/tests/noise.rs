@@ -2,7 +2,7 @@
 
 use super::prepared;
 use crate::{
-    fit::noise_level::floors_of,
+    fit::noise_level::noise_levels,
     problem::{frame::Frame, runs::Runs, simulator::Model},
     toys::{Effect, Law, Measured, Toy},
 };
@@ -14,7 +14,7 @@ const DRAWN: f64 = 0.045;
 fn root_mean_square(record: &Measured, stage: usize) -> f64 {
     let runs = Runs::new(record, &super::GO_ON).expect("measured");
     let frame = Frame::of(record).expect("something to fit");
-    let floors = floors_of(&runs, &frame, &Model::nominal(record), 1).expect("simulated");
+    let floors = noise_levels(&runs, &frame, &Model::nominal(record), 1).expect("simulated");
     floors[stage].rms
 }
 

@@ -7,7 +7,7 @@ use crate::{
         tests::{prepared, with_effects},
     },
     problem::{frame::Role, thresholds::Thresholds},
-    search::{acceptance::Worth, selection::Search, sets::Sets},
+    search::{acceptance::Acceptance, selection::Search, sets::Sets},
     toys::{Effect, Law, Measured, Toy, slow},
 };
 
@@ -57,8 +57,8 @@ fn a_number_that_does_nothing_rises_the_score_by_half_a_nat_less_its_price() {
     approx::assert_abs_diff_eq!(sum / DRAWS as f64, 0.5, epsilon = 0.34);
 }
 
-fn worth<'a>(problem: &'a Problem<'a>, thresholds: &'a Thresholds) -> Worth<'a> {
-    Worth { problem, thresholds }
+fn worth<'a>(problem: &'a Problem<'a>, thresholds: &'a Thresholds) -> Acceptance<'a> {
+    Acceptance { problem, thresholds }
 }
 
 #[test]
@@ -69,8 +69,8 @@ fn a_strong_effect_is_worth_it_and_the_same_set_is_not() {
     let worth = worth(&problem, &thresholds);
     let play = with_effects(&problem, &[(index(&record, "play"), vec![0.1])]);
     let play = Sets::new(&problem).refit(&play).expect("fitted");
-    assert!(worth.is_worth(&problem.nominal, &play));
-    assert!(!worth.is_worth(&play, &play) && !worth.is_worth(&play, &problem.nominal));
+    assert!(worth.is_accepted(&problem.nominal, &play));
+    assert!(!worth.is_accepted(&play, &play) && !worth.is_accepted(&play, &problem.nominal));
     // All that was left in the stage is closed, so that no further effect can be more than model discrepancy.
     assert!(worth.is_possible(&problem.nominal, index(&record, "cubic")));
     assert!(!worth.is_possible(&play, index(&record, "cubic")));

@@ -66,7 +66,10 @@ impl Place {
                 beside: [strain - STROKE * around.strain_unit, strain],
                 ..Extent::between(around.resistance_zero, 2.0 * around.resistance_zero)
             },
-            Self::Volts | Self::Sampling | Self::Record => Extent::between(0.0, 1.0),
+            // Where a voltage ends only an effect on it says.
+            Self::Volts | Self::Sampling | Self::Record => {
+                Extent::between(f64::NEG_INFINITY, f64::INFINITY)
+            }
             Self::Length => {
                 Extent::between(around.length_zero, around.length_zero + around.length_span)
             }

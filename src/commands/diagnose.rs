@@ -156,7 +156,12 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
         jobs: args.jobs.into(),
         budget: args.budget.map(|n| n as usize),
     };
-    let problem = Problem::read(&args.data_set, &reading).with_context(shown)?;
+    let problem = Problem::read(&args.data_set, &reading).map_err(|error| {
+        // what is wrong in a problem's own file is told with that file's name
+        let is_named = error.to_string().starts_with(&shown());
+        let error = anyhow::Error::from(error);
+        if is_named { error } else { error.context(shown()) }
+    })?;
     if let Some(fix) = args.fix.as_deref().filter(|fix| problem.is_read_from(fix)) {
         bail!("{}: --fix would replace a file that is read; give it another name", fix.display());
     }

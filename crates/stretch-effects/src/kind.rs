@@ -83,6 +83,9 @@ pub struct Signals {
     pub dt_s: f64,
 }
 
+/// How somebody would type a kind with these values at a place.
+pub type Sketched = fn(&[f64], &Extent, &Signals) -> Sketch;
+
 /// A kind of effect: an operator and what it means. At a place (a side of a stage of somebody's simulator, the strain of a gauge) it is
 /// an effect.
 ///
@@ -117,7 +120,7 @@ pub struct Kind {
     /// The operator with these values.
     pub operator: fn(&[f64], &Extent, &Grid) -> Box<dyn Operator>,
     /// How somebody would type it; none where nobody has written that down.
-    pub sketch: Option<fn(&[f64], &Extent, &Signals) -> Sketch>,
+    pub sketch: Option<Sketched>,
     /// Kinds that are hard to tell from it on the same channel.
     pub twins: &'static [&'static str],
     /// What it shares with others of its family that data may not tell apart, and how much of it its values make.

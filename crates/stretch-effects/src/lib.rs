@@ -59,7 +59,9 @@ pub use friction::Friction;
 pub use gauge::{GAUGE, gauge_effect};
 pub use grid::{DEFAULT_STEP_S, Grid, GridError};
 pub use hum::Hum;
-pub use kind::{Beside, Family, Find, Kind, Line, Measure, Measured, Side, Signals, Starts};
+pub use kind::{
+    Beside, Family, Find, Kind, Line, Measure, Measured, Side, Signals, Sketched, Starts,
+};
 pub use kinds::{KINDS, kind_named};
 pub use knees::{Knees, soft_ceiling, soft_floor};
 pub use law::{Droop, Law};

@@ -146,9 +146,11 @@ fn nothing_is_proposed_for_noise() {
 fn a_function_of_many_terms_is_not_called_random() {
     let mut dice = RandomGenerator::new(8, 0);
     let waves: Vec<[f64; 2]> =
-        (0..30).map(|k| [1.0 + 0.5 * f64::from(k), 6.28 * dice.unit()]).collect();
+        (0..30).map(|k| [1.0 + 0.5 * f64::from(k), std::f64::consts::TAU * dice.unit()]).collect();
     let (proposed, verdict) = with_offset(5, |x| {
-        let of = |x: &f64| waves.iter().map(|[w, p]| (w * 3.14 * x + p).sin()).sum::<f64>();
+        let of = |x: &f64| {
+            waves.iter().map(|[w, p]| (w * std::f64::consts::PI * x + p).sin()).sum::<f64>()
+        };
         x.iter().map(|x| 0.02 * of(x)).collect()
     });
     assert_eq!(verdict, VerdictKind::Unknown);

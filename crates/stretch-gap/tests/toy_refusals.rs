@@ -107,7 +107,6 @@ fn a_fit_does_not_mind_what_cannot_be_simulated_beyond_it() {
 }
 
 #[test]
-#[ignore = "bug: a refusal at the step of a sensitivity ends the diagnosis, where the fit should turn back"]
 fn a_bench_beyond_what_can_be_simulated_is_fitted_up_to_there() {
     let mut toy = Toy::of(&[Law::Line]).off_by(&[2.0, 1.0]);
     toy.fails = Some(Fails::Above(0, 1.06));

@@ -13,6 +13,7 @@ mod names;
 mod options;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod read;
 mod recording;
 mod sniff;
 mod stamps;

@@ -114,7 +114,7 @@ mod tests {
     fn channels_are_drawn_in_step() {
         let mut dice = RandomGenerator::new(4, 0);
         let (before, after) = (blocks(6.0, 40, &mut dice), blocks(2.0, 40, &mut dice));
-        let one = closed_interval(&[before.clone()], &[after.clone()], 7);
+        let one = closed_interval(std::slice::from_ref(&before), std::slice::from_ref(&after), 7);
         let two = closed_interval(&[before.clone(), before], &[after.clone(), after], 7);
         assert_eq!((one.closed, one.interval, one.falls), (two.closed, two.interval, two.falls));
     }

@@ -243,8 +243,19 @@ impl<'a> Comparison<'a> {
             places.iter().map(|&(c, s)| (stages[s], &moved[c].1)).collect();
         let there = self.residuals_of(&wanted, Some(near));
         let columns = places.par_iter().zip(there).map(|(&(c, s), there)| {
-            let (step, here) = (moved[c].0, &residuals[s].values);
-            let values = here.iter().zip(there?).map(|(a, b)| (a - b) / step).collect();
+            let ((coordinate, _), (step, _)) = (&coordinates[c], &moved[c]);
+            let (step, there) = match there {
+                // What lies beyond cannot be simulated: the slope is that of the other side.
+                Err(error) if !error.ends_all() => {
+                    let mut other = model.clone();
+                    coordinate.write(&mut other, coordinate.read(model) - step);
+                    let mut back = self.residuals_of(&[(stages[s], &other)], Some(near));
+                    (-step, back.remove(0)?)
+                }
+                there => (*step, there?),
+            };
+            let here = &residuals[s].values;
+            let values = here.iter().zip(there).map(|(a, b)| (a - b) / step).collect();
             Ok((c, s, self.metrics[stages[s]].column(&self.frame, values)))
         });
         let columns: Result<Vec<_>, GapError> = columns.collect();

@@ -64,6 +64,9 @@ pub struct ProblemFile {
     pub budget: Option<usize>,
 }
 
+/// The folder in which one stands.
+const HERE: &str = ".";
+
 impl ProblemFile {
     /// Reads a problem's file.
     ///
@@ -72,9 +75,13 @@ impl ProblemFile {
     pub fn read(path: impl AsRef<Path>) -> Result<Self, ProblemError> {
         let path = path.as_ref();
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-        let folder = folder.unwrap_or_else(|| Path::new(".")).to_owned();
+        let beside = folder.unwrap_or_else(|| Path::new(HERE));
         let file = Self::from_file(&TomlFile::read(path)?)?;
-        Ok(Self { folder: folder.join(&file.folder), ..file })
+        let folder = match file.folder == Path::new(HERE) {
+            true => beside.to_owned(),
+            false => beside.join(&file.folder),
+        };
+        Ok(Self { folder, ..file })
     }
 
     /// Reads the problem's file that a path means: itself where it ends in `.toml`, or the `problem.toml` of a folder that is no data
@@ -152,7 +159,7 @@ impl ProblemFile {
         }
         Ok(Self {
             name: top.optional_text("name")?.unwrap_or("problem").to_owned(),
-            folder: PathBuf::from(top.optional_text("folder")?.unwrap_or(".")),
+            folder: PathBuf::from(top.optional_text("folder")?.unwrap_or(HERE)),
             simulator,
             spec,
             trials,

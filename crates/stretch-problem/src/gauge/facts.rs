@@ -2,9 +2,10 @@
 
 use std::borrow::Cow;
 
+use stretch_data::{unit, written_unit};
 use stretch_gap::{Column, Description, MotionSpec, RecordFacts, Recorded, RowsUsed};
 
-use super::{record::Record, unit_of};
+use super::record::Record;
 use crate::{bench::specs::skew_of, rig::smooth::Smoothed};
 
 /// Delays of two recorders that were not started together, without a catalogue, s.
@@ -56,4 +57,9 @@ fn columns(about: &Description, name: &str, record: &Record) -> Vec<Column<'stat
         ..signal.clone()
     };
     vec![signal, reference]
+}
+
+/// Unit of a column, empty where its name gives none.
+pub(super) fn unit_of(column: &str) -> &str {
+    unit(column).map_or("", written_unit)
 }

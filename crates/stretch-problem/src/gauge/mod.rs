@@ -7,7 +7,7 @@ mod lag;
 mod record;
 mod source;
 
-use stretch_data::{SessionTrial, unit, written_unit};
+use stretch_data::SessionTrial;
 use stretch_gap::{
     Description, DescriptionSpec, GapError, Line, Model, Noise, ParameterSpec, Run, Simulator,
     SpectralLines, StageSpec, TrialSpec,
@@ -16,7 +16,7 @@ use stretch_sim::{
     Alone, Catalogue, Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Start, Tolerance,
 };
 
-use facts::facts;
+use facts::{facts, unit_of};
 use lag::lag;
 use record::Record;
 
@@ -224,11 +224,6 @@ impl SpectralLines for GaugeSimulator {
     fn lines(&self, _stage: usize, model: &Model) -> Vec<Line> {
         lines(&self.nominal.effects, &self.rows, model, self.spread)
     }
-}
-
-/// Unit of a column, empty where its name gives none.
-fn unit_of(column: &str) -> &str {
-    unit(column).map_or("", written_unit)
 }
 
 /// Trials with their part of a column.

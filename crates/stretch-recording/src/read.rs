@@ -1,0 +1,106 @@
+//! Reads a recording in whatever format it was made: text in any dialect, arrays, messages.
+
+use std::{
+    fs::File,
+    io::{self, Cursor, Read},
+    path::Path,
+};
+
+use crate::{ReadOptions, Recording, RecordingError, clock, grid, sniff, sniff::Format, text};
+
+impl Recording {
+    /// Reads a recording from a file, `-` being standard input.
+    ///
+    /// The format is told by the file's first bytes, never by its name:
+    ///
+    /// - A table of text: separated by commas, semicolons, tabs or runs of blanks; decimal points or, where no comma
+    ///   separates, decimal commas; comment lines (`#`, `%`, `//`), lines above the header, a row of units, units in
+    ///   brackets (`Pos (mm)` becomes `pos_mm`), time in seconds, `ms`, `us`, `ns`, since 1970, or (feature `iso-time`)
+    ///   as ISO 8601; without a header line with [`ReadOptions::columns`].
+    /// - Any of these in gzip (feature `gzip`).
+    /// - NumPy's NPY and NPZ (`npz`), MATLAB's MAT of version 5 (`mat`), HDF5 and with it MAT 7.3 (`hdf5`), MCAP with
+    ///   messages in JSON or ROS 2's CDR (`mcap`), Parquet (`parquet`).
+    ///
+    /// Channels on several clocks are brought to that of the fastest, or to [`ReadOptions::grid_hz`], within the time
+    /// that all of them cover: by straight lines, the commands `inlet` and `outlet` held.
+    ///
+    /// # Errors
+    /// A file that cannot be opened or read, what its format refuses, with row and column where there are any; a column that
+    /// [`ReadOptions::require`] asks for and the file lacks; a rate outside 1e-3 .. 1e7 Hz; seconds that must be milliseconds; a format
+    /// whose feature is off.
+    pub fn read(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self, RecordingError> {
+        let path = path.as_ref();
+        if path.as_os_str() == "-" {
+            return Self::from_reader(io::stdin().lock(), "standard input", options);
+        }
+        let file = path.display().to_string();
+        let reader = File::open(path).map_err(|e| RecordingError::io(&file, "open it", e))?;
+        let mut recording = Self::from_reader(reader, &file, options)?;
+        if let Some(name) = path.file_name() {
+            recording.trial.name = name.to_string_lossy().into_owned();
+        }
+        Ok(recording)
+    }
+
+    /// Reads a recording from any stream; `name` stands for the file.
+    ///
+    /// # Errors
+    /// As [`Recording::read`].
+    pub fn from_reader(
+        mut reader: impl Read,
+        name: &str,
+        options: &ReadOptions,
+    ) -> Result<Self, RecordingError> {
+        let (head, format) = sniff::head(&mut reader, name)?;
+        Self::read_format(format, &mut Cursor::new(head).chain(reader), name, options)
+    }
+
+    /// Whether a stream that begins so is a table of text, whose rows can be read as they come.
+    pub fn is_text(head: &[u8]) -> bool {
+        Format::of(head) == Format::Text
+    }
+
+    fn read_format(
+        format: Format,
+        reader: &mut dyn Read,
+        name: &str,
+        options: &ReadOptions,
+    ) -> Result<Self, RecordingError> {
+        if format == Format::Gzip {
+            return Self::unpacked(reader, name, options);
+        }
+        let (mut recording, time) = match format {
+            Format::Text => text::read(reader, name, options)?,
+            other => {
+                let (tracks, notes) = other.tracks(reader, name, options)?;
+                grid::merged(name, tracks, notes, options)?
+            }
+        };
+        clock::check(&recording.trial, &time, options)?;
+        if let (Some(rate_hz), Format::Text) = (options.grid_rate(), format) {
+            recording = grid::resampled(recording, rate_hz)?;
+        }
+        Ok(recording)
+    }
+
+    #[cfg(feature = "gzip")]
+    fn unpacked(
+        reader: &mut dyn Read,
+        name: &str,
+        options: &ReadOptions,
+    ) -> Result<Self, RecordingError> {
+        let mut reader = flate2::read::MultiGzDecoder::new(reader);
+        let (head, format) = sniff::head(&mut reader, name)?;
+        if format == Format::Gzip {
+            let problem = "it is packed twice; unpack it once with gunzip".to_owned();
+            return Err(RecordingError::Format { file: name.to_owned(), format: "gzip", problem });
+        }
+        Self::read_format(format, &mut Cursor::new(head).chain(reader), name, options)
+    }
+
+    #[cfg(not(feature = "gzip"))]
+    fn unpacked(_: &mut dyn Read, name: &str, _: &ReadOptions) -> Result<Self, RecordingError> {
+        let file = name.to_owned();
+        Err(RecordingError::Feature { file, format: "a gzip file", feature: "gzip" })
+    }
+}

@@ -15,7 +15,7 @@ use stretch_blind::{Label, Seal};
 use stretch_calibrate::{Cause, Memory, ModelKind, Options, calibrate, evaluate};
 use stretch_core::{Calibration, Design, DiagnosedMap, Model, RestLevel};
 use stretch_data::{DataSet, SessionTrial, Split, Trial};
-use stretch_gap::{RandomGenerator, Options as Diagnosing, diagnose};
+use stretch_gap::{Options as Diagnosing, RandomGenerator, diagnose};
 use stretch_problem::{GaugeSetup, GaugeSimulator, causes};
 use stretch_receptor::{Defects, DefectsMemory};
 use stretch_recording::{ReadOptions, Recording};

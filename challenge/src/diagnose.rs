@@ -23,7 +23,8 @@ pub struct Asked {
 /// # Errors
 /// Data that the diagnosis refuses, a file that cannot be written.
 pub fn write_diagnosis(folder: &Path, asked: &Asked, file: &Path) -> anyhow::Result<()> {
-    let problem = Problem::read(folder, &Reading { without: &asked.without, ..Reading::default() })?;
+    let problem =
+        Problem::read(folder, &Reading { without: &asked.without, ..Reading::default() })?;
     let Asked { threads, baselines, .. } = *asked;
     let options = Options { threads, baselines, ..Options::default() };
     let examined = problem.examine(&options, false, &|_| (), &stretch_files::interrupted)?;

@@ -6,7 +6,7 @@ use std::fs;
 
 use stretch_fmu::{Fmu, FmuError};
 use stretch_problem::{
-    Ask, Parameter, Checked, ProblemSpec, Source, SourceError,
+    Ask, Checked, Parameter, ProblemSpec, Source, SourceError,
     worker::{Workers, WorkersSpec},
 };
 use support::{Wrong, servo, spec, worker};

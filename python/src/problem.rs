@@ -16,8 +16,7 @@ use serde::Deserialize;
 use stretch_data::{Channel, SessionTrial, Split, Trial};
 use stretch_gap::Options;
 use stretch_problem::{
-    BlackBox, Checked, Examined, Problem, ProblemFile, ProblemSpec, Source,
-    kind_named,
+    BlackBox, Checked, Examined, Problem, ProblemFile, ProblemSpec, Source, kind_named,
     worker::{Workers, WorkersSpec, session_header},
 };
 use stretch_report::{Subject, diagnosis_page};

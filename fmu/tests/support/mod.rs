@@ -10,7 +10,7 @@ use std::{
 use stretch_data::{Channel, SessionTrial, Trial};
 use stretch_gap::RandomGenerator;
 use stretch_problem::{
-    Argument, Ask, OwnEffect, Parameter, Checked, ProblemSpec, SourceError, Stage, Tolerance,
+    Argument, Ask, Checked, OwnEffect, Parameter, ProblemSpec, SourceError, Stage, Tolerance,
     worker::WorkersSpec,
 };
 use tempfile::TempDir;

@@ -54,7 +54,9 @@ fn rates_are_those_of_a_calibration() {
     let path = file(folder.path(), &one);
     let lake = folder.path().join("lake");
     said("ingest {} --lake {} --sensor 1 --date 2026-01-01", &[&path, &lake]);
-    let read = stretch_recording::Recording::read(&path, &stretch_recording::ReadOptions::new()).unwrap().trial;
+    let read = stretch_recording::Recording::read(&path, &stretch_recording::ReadOptions::new())
+        .unwrap()
+        .trial;
     let rated = rated(&read, "bridge_v", &[], RateEstimator::SAVGOL_11_2, None).unwrap();
     let expected: Vec<f64> =
         rated.parts.iter().flat_map(|part| part.rate.iter().flatten().copied()).collect();
@@ -81,8 +83,11 @@ fn a_record_is_that_of_a_calibration() {
             .contains("1 records of 1 sensors, 0 refused")
     );
     let found = read_calibration(&out.join("site/rig/1.json")).unwrap();
-    let read =
-        |path: &Path| stretch_recording::Recording::read(path, &stretch_recording::ReadOptions::new()).unwrap().trial;
+    let read = |path: &Path| {
+        stretch_recording::Recording::read(path, &stretch_recording::ReadOptions::new())
+            .unwrap()
+            .trial
+    };
     let read = paths.each_ref().map(|path| read(path));
     let options = Options { dead_band: Some(0.0), rest_length: Some(180.0), ..Options::default() };
     let expected = calibrate(&read, &options).unwrap().calibration;

@@ -262,7 +262,7 @@ def test_a_dead_column_is_told_and_no_effect_is_blamed():
 def test_progress_is_told_and_may_stop_it():
     words = []
     diagnose(Spring(), BENT, progress=words.append)
-    assert "test trials" in words
+    assert any(word.startswith("test trials") for word in words)
 
     def enough(_):
         raise TimeoutError("enough")

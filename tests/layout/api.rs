@@ -5,8 +5,8 @@ use std::{collections::BTreeMap, path::Path};
 
 use quote::ToTokens;
 use syn::{
-    Attribute, Fields, ImplItem, Item, ItemEnum, ItemImpl, ItemStruct, ItemTrait, TraitItem,
-    Visibility,
+    Attribute, Fields, FnArg, ImplItem, Item, ItemEnum, ItemImpl, ItemStruct, ItemTrait, Pat,
+    Signature, TraitItem, Visibility,
 };
 
 /// A line an item, sorted: where it stands, and what it says without its body.
@@ -27,7 +27,7 @@ pub(crate) fn listing(files: &BTreeMap<String, String>) -> Vec<String> {
 fn items(place: &str, all: &[Item], lines: &mut Vec<String>) {
     for item in all {
         let said = match item {
-            Item::Fn(f) if is_pub(&f.vis) => words(&f.sig),
+            Item::Fn(f) if is_pub(&f.vis) => words(&signature(&f.sig)),
             Item::Const(c) if is_pub(&c.vis) => {
                 format!("const {}: {}", c.ident, words(&c.ty))
             }
@@ -103,8 +103,10 @@ fn enumeration(e: &ItemEnum) -> String {
 
 fn interface(t: &ItemTrait) -> String {
     let part = |item: &TraitItem| match item {
-        TraitItem::Fn(f) if f.default.is_some() => format!("{} {{ .. }}", words(&f.sig)),
-        TraitItem::Fn(f) => words(&f.sig),
+        TraitItem::Fn(f) if f.default.is_some() => {
+            format!("{} {{ .. }}", words(&signature(&f.sig)))
+        }
+        TraitItem::Fn(f) => words(&signature(&f.sig)),
         TraitItem::Type(own) => format!("type {}: {}", own.ident, words(&own.bounds)),
         TraitItem::Const(own) => format!("const {}: {}", own.ident, words(&own.ty)),
         other => words(other),
@@ -123,7 +125,7 @@ fn implementation(place: &str, block: &ItemImpl, lines: &mut Vec<String>) {
     }
     for item in &block.items {
         let said = match item {
-            ImplItem::Fn(f) if is_pub(&f.vis) => words(&f.sig),
+            ImplItem::Fn(f) if is_pub(&f.vis) => words(&signature(&f.sig)),
             ImplItem::Const(c) if is_pub(&c.vis) => format!("const {}: {}", c.ident, words(&c.ty)),
             _ => continue,
         };
@@ -147,6 +149,19 @@ fn is_for_tests(attributes: &[Attribute]) -> bool {
 }
 
 /// As it is written, in one line.
+/// What a caller sees of a signature: whether a function changes its own copy of an argument is its own matter.
+fn signature(sig: &Signature) -> Signature {
+    let mut seen = sig.clone();
+    for argument in &mut seen.inputs {
+        if let FnArg::Typed(typed) = argument
+            && let Pat::Ident(name) = typed.pat.as_mut()
+        {
+            name.mutability = None;
+        }
+    }
+    seen
+}
+
 fn words(tokens: &impl ToTokens) -> String {
     let text = tokens.to_token_stream().to_string();
     text.split_whitespace().collect::<Vec<_>>().join(" ")

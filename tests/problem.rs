@@ -61,7 +61,7 @@ fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
     stretch().arg("init").arg(folder.path()).assert().failure();
     let file = folder.path().join("problem.toml");
     let first = fs::read_to_string(&file).unwrap();
-    assert!(first.contains("# Guessed: the last column that is no command is what is simulated"));
+    assert!(first.contains("# Guessed: the last column that is no command is the output"));
     let own = first
         .replace("wrap = \"all\"", "wrap = [\"input.delay\", \"output.lag\", \"output.backlash\"]")
         .replace("sim.py", "servo.py");

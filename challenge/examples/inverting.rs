@@ -19,7 +19,7 @@ use stretch_gap::{Options as Diagnosing, RandomGenerator, diagnose};
 use stretch_problem::{GaugeSetup, GaugeSimulator, causes};
 use stretch_receptor::{Defects, DefectsMemory};
 use stretch_recording::{ReadOptions, Recording};
-use stretch_sim::{Catalogue, Stage, effect_named};
+use stretch_sim::{Catalogue, RigStage, effect_named};
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
 
@@ -51,7 +51,7 @@ fn main() -> Result<(), Failure> {
 }
 
 fn is_sensing(label: &Label) -> bool {
-    let own = |name: &String| effect_named(name).is_some_and(|e| e.stage == Stage::Sensing);
+    let own = |name: &String| effect_named(name).is_some_and(|e| e.stage == RigStage::Sensing);
     (1..=3).contains(&label.effects.len())
         && label.effects.iter().all(own)
         && label.excess >= LEAST_EXCESS

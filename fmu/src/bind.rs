@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use stretch_data::nearest;
-use stretch_problem::Session;
+use stretch_problem::RecordedSession;
 
 use crate::{
     error::FmuError,
@@ -38,7 +38,11 @@ pub(crate) struct Bound {
 }
 
 impl Bound {
-    pub(crate) fn new(model: &Model, session: &Session, names: &Names) -> Result<Self, FmuError> {
+    pub(crate) fn new(
+        model: &Model,
+        session: &RecordedSession,
+        names: &Names,
+    ) -> Result<Self, FmuError> {
         check_mapped(session, names)?;
         let mut bound = Self {
             values: Slots::default(),
@@ -105,7 +109,7 @@ fn step_note(model: &Model, dt_s: f64) -> Option<String> {
     })
 }
 
-fn check_mapped(session: &Session, names: &Names) -> Result<(), FmuError> {
+fn check_mapped(session: &RecordedSession, names: &Names) -> Result<(), FmuError> {
     let columns = session.columns.iter().map(|c| &c.name);
     let known: Vec<&str> = session
         .parameters

@@ -4,8 +4,8 @@ use std::io::{ErrorKind, Read, Write};
 
 use serde_json::{Map, Value, json};
 use stretch_problem::{
-    Ask, Session, SessionColumn, SessionPart, SessionStage, Source, SourceError,
-    worker::{Frame, FrameError, PREFIX, Prefix},
+    Ask, RecordedSession, SessionColumn, SessionPart, SessionStage, Source, SourceError,
+    worker::{FrameError, PREFIX, Prefix, WorkerFrame},
 };
 
 /// Version of the protocol.
@@ -42,7 +42,7 @@ fn wrong(what: &str) -> ServeError {
 pub fn serve<S, E>(
     mut from: impl Read,
     mut to: impl Write,
-    begin: impl Fn(&Session) -> Result<S, E>,
+    begin: impl Fn(&RecordedSession) -> Result<S, E>,
 ) -> Result<(), ServeError>
 where
     S: Source,
@@ -51,7 +51,7 @@ where
     let ended = answer(&mut from, &mut to, begin);
     if let Err(error @ (ServeError::Simulator(_) | ServeError::Protocol(_))) = &ended {
         let told = json!({ "kind": "error", "message": error.to_string() });
-        to.write_all(&Frame::bytes(&told, &[]))?;
+        to.write_all(&WorkerFrame::bytes(&told, &[]))?;
         to.flush()?;
     }
     ended
@@ -60,25 +60,25 @@ where
 fn answer<S, E>(
     from: &mut impl Read,
     to: &mut impl Write,
-    begin: impl Fn(&Session) -> Result<S, E>,
+    begin: impl Fn(&RecordedSession) -> Result<S, E>,
 ) -> Result<(), ServeError>
 where
     S: Source,
     E: std::fmt::Display,
 {
-    let mut open: Option<(Session, S)> = None;
+    let mut open: Option<(RecordedSession, S)> = None;
     while let Some(frame) = receive(from)? {
         let bytes = match frame.header.get("kind").and_then(Value::as_str) {
             Some("hello") => {
                 let hello = json!({ "all": true, "batch": 1, "inputs": true, "kind": "hello", "version": VERSION });
-                Frame::bytes(&hello, &[])
+                WorkerFrame::bytes(&hello, &[])
             }
             Some("session") => {
                 let session = read_session(&frame).ok_or_else(|| wrong("session"))?;
                 let source = begin(&session).map_err(|e| ServeError::Simulator(e.to_string()))?;
                 let notes = source.notes();
                 open = Some((session, source));
-                Frame::bytes(&json!({ "kind": "ready", "notes": notes }), &[])
+                WorkerFrame::bytes(&json!({ "kind": "ready", "notes": notes }), &[])
             }
             Some("simulate") => {
                 let (session, source) = open.as_ref().ok_or_else(|| wrong("order of frames"))?;
@@ -97,7 +97,7 @@ where
 }
 
 /// The next frame; none where the other side is gone.
-fn receive(from: &mut impl Read) -> Result<Option<Frame>, ServeError> {
+fn receive(from: &mut impl Read) -> Result<Option<WorkerFrame>, ServeError> {
     let mut prefix = [0; PREFIX];
     match from.read_exact(&mut prefix) {
         Err(e) if e.kind() == ErrorKind::UnexpectedEof => return Ok(None),
@@ -111,7 +111,7 @@ fn receive(from: &mut impl Read) -> Result<Option<Frame>, ServeError> {
         if read < bytes { Err(wrong("end of a frame")) } else { Ok(out) }
     };
     let (header, body) = (part(header)?, part(body)?);
-    Ok(Some(Frame::parse(&header, &body)?))
+    Ok(Some(WorkerFrame::parse(&header, &body)?))
 }
 
 fn text(of: &Value, key: &str) -> Option<String> {
@@ -130,7 +130,7 @@ fn each<T>(
     of.get(key)?.as_array()?.iter().map(read).collect()
 }
 
-fn read_session(frame: &Frame) -> Option<Session> {
+fn read_session(frame: &WorkerFrame) -> Option<RecordedSession> {
     let header = &frame.header;
     let mut end = 0;
     let trials = each(header, "trials", |t| {
@@ -150,7 +150,7 @@ fn read_session(frame: &Frame) -> Option<Session> {
         let (name, unit) = (text(c, "name")?, text(c, "unit")?);
         Some(SessionColumn { name, unit, values: values.to_vec() })
     })?;
-    Some(Session {
+    Some(RecordedSession {
         dt_s: header.get("dt_s")?.as_f64()?,
         trials,
         stages,
@@ -169,7 +169,7 @@ struct Owned<'a> {
     trials: usize,
 }
 
-fn read_asks<'a>(frame: &'a Frame, session: &Session) -> Option<Vec<Owned<'a>>> {
+fn read_asks<'a>(frame: &'a WorkerFrame, session: &RecordedSession) -> Option<Vec<Owned<'a>>> {
     let mut rest = frame.body.as_slice();
     let mut take = |count: usize| {
         let (own, behind) = rest.split_at_checked(count)?;
@@ -196,7 +196,11 @@ fn read_asks<'a>(frame: &'a Frame, session: &Session) -> Option<Vec<Owned<'a>>> 
     })
 }
 
-fn simulate(frame: &Frame, session: &Session, source: &impl Source) -> Result<Vec<u8>, ServeError> {
+fn simulate(
+    frame: &WorkerFrame,
+    session: &RecordedSession,
+    source: &impl Source,
+) -> Result<Vec<u8>, ServeError> {
     let asks = read_asks(frame, session).ok_or_else(|| wrong("models"))?;
     let ask = |own: &Owned<'_>| -> Result<Vec<f64>, SourceError> {
         let Owned { stage, parameters, effects, ref inputs, trials } = *own;
@@ -215,5 +219,5 @@ fn simulate(frame: &Frame, session: &Session, source: &impl Source) -> Result<Ve
             Err(refused) => json!({ "error": refused.to_string() }),
         });
     }
-    Ok(Frame::bytes(&json!({ "kind": "outputs", "models": models }), &body))
+    Ok(WorkerFrame::bytes(&json!({ "kind": "outputs", "models": models }), &body))
 }

@@ -6,7 +6,7 @@ use std::{
     thread,
 };
 
-use stretch_problem::{Ask, Session, SessionPart, Source, SourceError};
+use stretch_problem::{Ask, RecordedSession, SessionPart, Source, SourceError};
 
 use crate::{
     archive::Fmu,
@@ -27,7 +27,7 @@ use crate::{
 #[derive(Debug)]
 pub struct FmuSource {
     fmu: Fmu,
-    session: Session,
+    session: RecordedSession,
     bound: Bound,
     /// One run at a time.
     turn: Mutex<()>,
@@ -38,7 +38,7 @@ impl FmuSource {
     ///
     /// # Errors
     /// Names without a variable, variables that cannot be used so, units that differ, and libraries that cannot be loaded.
-    pub fn new(fmu: Fmu, session: Session, names: &Names) -> Result<Self, FmuError> {
+    pub fn new(fmu: Fmu, session: RecordedSession, names: &Names) -> Result<Self, FmuError> {
         let bound = Bound::new(fmu.model(), &session, names)?;
         let gone =
             || FmuError::Instance { file: fmu.file().to_owned(), said: ": no thread".into() };

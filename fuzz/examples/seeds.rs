@@ -12,7 +12,7 @@ use stretch_calibrate::{
 };
 use stretch_core::{Calibration, RateEstimator};
 use stretch_data::{Channel, Trial};
-use stretch_problem::worker::Frame;
+use stretch_problem::worker::WorkerFrame;
 use stretch_receptor::{
     code::{CodeCalibration, FixedCalibration, FixedObserver},
     example_calibration, example_diagnosed, example_observer,
@@ -179,7 +179,7 @@ fn texts() -> Done {
     put("problem_toml", "servo", problem.as_bytes())?;
     let header =
         serde_json::json!({ "kind": "outputs", "models": [{ "samples": 2 }, { "error": "no" }] });
-    let frame = Frame::bytes(&header, &[1.0, 2.0]);
+    let frame = WorkerFrame::bytes(&header, &[1.0, 2.0]);
     put("worker_frames", "two", &[frame.clone(), frame].concat())?;
     for (name, text) in [
         ("model", "history+rest"),

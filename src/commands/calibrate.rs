@@ -287,7 +287,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         options.signal.clone_from(&best.signal);
         detail(format!("chose the signal {} of {}", best.signal, ranking.len()));
     }
-    let causes = args.causes(&trials, &options)?.felt(&trials, &options);
+    let causes = args.causes(&trials, &options)?.without_missing_pressure(&trials, &options);
     options.causes.clone_from(&causes.found);
     let choice = match args.model {
         Model::Auto => Some(choose_model(&trials, &options).map_err(named)?),

@@ -46,7 +46,7 @@ impl Operator for BoucWen {
     fn begin(&self, start: Start, first: f64, cells: &mut [f64]) {
         match start {
             Start::Settled => cells[0] = 0.0,
-            Start::Wound(share) => cells[0] = share.clamp(-1.0, 1.0),
+            Start::Hysteresis(share) => cells[0] = share.clamp(-1.0, 1.0),
             Start::Carried { .. } => cells[0] = self.moved(cells[0], first - cells[1]),
         }
         cells[1] = first;

@@ -9,8 +9,8 @@ use crate::{
     operator::{Operator, Span},
     parameter::{EffectParameter, Form},
     place::Place,
+    rig_stage::RigStage,
     sketch::Sketch,
-    stage::Stage,
 };
 
 /// c 4 x (1 - x)(1 + skew (2 x - 1)): zero at 0 and 1, c in the middle, its top off the middle where skewed.
@@ -175,7 +175,7 @@ pub(crate) static GAUGE_NONLINEARITY: Effect = Effect {
 pub(crate) static POT_NONLINEARITY: Effect = Effect {
     name: "pot_nonlinearity",
     words: "the potentiometer's scale bends",
-    stage: Stage::Reference,
+    stage: RigStage::Reference,
     equation: "L_meas = L + c 4 y (1 - y)(1 + skew (2 y - 1)), y = k/k_max",
     parameters: &[
         EffectParameter::strength("c", "mm", -3.0, 3.0, 0.5),

@@ -8,9 +8,9 @@ use crate::{
     live::Live,
     parameter::EffectParameter,
     place::{Action, Place, Surroundings},
+    rig_stage::RigStage,
     search::{Alone, Search},
     sketch::Sketch,
-    stage::Stage,
 };
 
 /// What an effect needs beside the input of its stage.
@@ -92,7 +92,7 @@ pub struct Effect {
     /// What it is, for someone who does not know its name, in one line.
     pub words: &'static str,
     /// Stage it acts in.
-    pub stage: Stage,
+    pub stage: RigStage,
     /// Its equation, in plain text.
     pub equation: &'static str,
     /// Its parameters: the strengths first, then shapes, then forms; what is found in the record last.
@@ -117,7 +117,7 @@ impl Effect {
     pub const PLAIN: Self = Self {
         name: "",
         words: "",
-        stage: Stage::Sensing,
+        stage: RigStage::Sensing,
         equation: "",
         parameters: &[],
         acts: Acts::Own { action: |_, _| Action::Nothing, sketch: None },
@@ -170,7 +170,7 @@ impl Effect {
 
     /// Whether the true length cannot be told from what the reference shows (play in the reference).
     pub fn hides_input(&self) -> bool {
-        self.stage == Stage::Reference && self.is_kind(|kind| kind.hides_input)
+        self.stage == RigStage::Reference && self.is_kind(|kind| kind.hides_input)
     }
 
     /// Whether it asks for steps shorter than a sample where a measured input drives its stage.

@@ -65,7 +65,7 @@ pub struct FadingMemory {
 }
 
 impl FadingMemory {
-    /// Of a share and time constants on a grid; `reach` is the stroke of the input, for what is wound by a move.
+    /// Of a share and time constants on a grid; `reach` is the stroke of the input, for the hysteresis state that a motion leaves.
     pub fn new(share: f64, times: Times, reach: f64, grid: &Grid) -> Self {
         let lags = times.all().into_iter().map(|tau| MeanReversion::new(tau, reach, grid));
         Self { share, lags: lags.collect() }

@@ -45,7 +45,7 @@ impl MeanReversion {
         cells[0] = match start {
             Start::Settled => first,
             Start::Carried { rest_s } => first + (cells[0] - first) * libm::exp(-rest_s / self.tau),
-            Start::Wound(share) => first - share.clamp(-1.0, 1.0) * self.reach,
+            Start::Hysteresis(share) => first - share.clamp(-1.0, 1.0) * self.reach,
         };
         cells[1] = first;
     }

@@ -13,8 +13,8 @@ use crate::{
     place::Place,
     play_start::play_start,
     prandtl_ishlinskii::PrandtlIshlinskii,
+    rig_stage::RigStage,
     sketch::Sketch,
-    stage::Stage,
     unplay::unplay,
 };
 
@@ -144,7 +144,7 @@ pub(crate) static SLEEVE_SLIP: Effect = Effect {
 pub(crate) static POT_BACKLASH: Effect = Effect {
     name: "pot_backlash",
     words: "the potentiometer has backlash",
-    stage: Stage::Reference,
+    stage: RigStage::Reference,
     equation: "L_meas = mean of play(L, w {1 - spread, 1, 1 + spread})",
     parameters: &[
         EffectParameter::strength("w", "mm", 0.0, 2.0, 0.3),

@@ -9,6 +9,6 @@ pub(crate) fn play_start(start: Start, last: f64, first: f64, w: f64) -> f64 {
     match start {
         Start::Settled => first,
         Start::Carried { .. } => play(last, first, w),
-        Start::Wound(share) => first - share.clamp(-1.0, 1.0) * w,
+        Start::Hysteresis(share) => first - share.clamp(-1.0, 1.0) * w,
     }
 }

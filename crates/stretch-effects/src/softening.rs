@@ -85,7 +85,7 @@ impl Operator for Softening {
         let mut state = [cells[0], cells[1], cells[2]];
         match start {
             Start::Settled => state = [0.0, first, 0.0],
-            Start::Carried { .. } | Start::Wound(_) => {
+            Start::Carried { .. } | Start::Hysteresis(_) => {
                 self.go(&mut state, first);
             }
         }

@@ -1,4 +1,4 @@
-//! From a diagnosis to what a calibration can use of it.
+//! The effects of a diagnosis that a calibration can use.
 
 use stretch_calibrate::{Cause, Options};
 use stretch_data::{SessionTrial, Trial};
@@ -8,19 +8,19 @@ use stretch_sim::{Catalogue, Gauge};
 
 use crate::{GaugeSetup, GaugeSimulator};
 
-/// What a calibration builds on: effects of the gauge, and what there is to say of how they were found.
+/// Effects of the gauge that a calibration builds on, and notes on how the effects were found.
 #[derive(Debug, Clone, Default)]
 pub struct Causes {
-    /// The effects.
+    /// The effects of the gauge.
     pub found: Vec<Cause>,
-    /// Sentences.
+    /// Notes, in sentences.
     pub notes: Vec<String>,
 }
 
 impl Causes {
-    /// Of trials, diagnosed as a gauge alone; none where they cannot be, which is said.
+    /// The effects of trials that are diagnosed as a gauge alone; no effects and a note where the trials cannot be diagnosed.
     ///
-    /// `progress` and `stop` as [`diagnose`] takes them.
+    /// `progress` and `stop` mean what they mean to [`diagnose`].
     pub fn of(
         trials: &[Trial],
         options: &Options,
@@ -52,8 +52,8 @@ impl Causes {
         }
     }
 
-    /// Without those that need a pressure, where some trial has none; which is said.
-    pub fn felt(mut self, trials: &[Trial], options: &Options) -> Self {
+    /// Leaves out effects that need a pressure, with a note for each, where some trial has no pressure.
+    pub fn without_missing_pressure(mut self, trials: &[Trial], options: &Options) -> Self {
         let has_pressure = trials.iter().all(|t| t.channel(&options.pressure).is_some());
         let needs = |cause: &Cause| {
             let effect = gauge_effect(&cause.effect);
@@ -68,11 +68,11 @@ impl Causes {
     }
 }
 
-/// The effects of the gauge and its reference in the best set of a diagnosis, with their values in shares of the reference's range:
-/// those of the whole rig divided by its strokes, those of a gauge alone as they are. Empty where the simulator
-/// is not short of any, and where the record is wrong.
+/// The effects of the gauge and its reference in the first candidate of a diagnosis, with values in shares of the reference's range:
+/// values of the whole rig are divided by its strokes, values of a gauge alone stay as they are. There are none where no effect is
+/// missing, and none where the recording is wrong.
 ///
-/// A set that the verdict does not name is among them: whether it is of use a calibration finds out on trials left out.
+/// The first candidate is taken even where the verdict does not name it: a calibration finds out on trials left out whether its effects help.
 pub fn causes(diagnosis: &Diagnosis) -> Vec<Cause> {
     use VerdictKind::{Effect, Partial, Unknown};
     let first: Option<&Candidate> = diagnosis.candidates.first();
@@ -82,7 +82,7 @@ pub fn causes(diagnosis: &Diagnosis) -> Vec<Cause> {
     };
     let is_alone = diagnosis.location.stages.len() == 1;
     let cause = |effect: &'static Known| {
-        // A voltage's own zero is not told: where the rails lie a fit finds.
+        // The off value of a voltage is left out: a fit finds where the rails lie.
         let is_level = |p: &EffectParameter| p.unit == "V" && p.off().is_some_and(|off| off != 0.0);
         let value = |p: &EffectParameter| {
             let mut own = first.parameters.iter().filter(|own| own.effect == effect.name);

@@ -5,44 +5,44 @@ use stretch_gap::{DescriptionError, GapError};
 use stretch_recording::RecordingError;
 use stretch_sim::{GridError, SimError};
 
-/// Why a problem was refused; says where and what to do.
+/// Why a problem was refused; the message says where, and what to do.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProblemError {
-    /// The problem's file or its recordings could not be read, or the recordings not be brought onto one grid.
+    /// The problem's file or its recordings could not be read, or the recordings could not be brought onto one grid.
     #[error(transparent)]
     Data(#[from] DataError),
     /// A recording could not be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// What the problem is made of does not hold together.
+    /// Stages, parameters, effects and trials of the problem contradict one another.
     #[error(transparent)]
     Description(#[from] DescriptionError),
-    /// A name that stands for nothing.
+    /// A name is unknown.
     #[error("{owner}: there is no {what} {name}{meant}; there are {known}")]
     Unknown {
-        /// Entry that names it.
+        /// Entry that holds the name.
         owner: String,
-        /// What is named.
+        /// Kind of the entry that the name should stand for.
         what: &'static str,
         /// The name.
         name: String,
-        /// What may be meant, in parentheses.
+        /// A known name that may be meant, in parentheses.
         meant: String,
-        /// What there is.
+        /// The known names.
         known: String,
     },
-    /// A value that does not do.
+    /// A value is not allowed.
     #[error("{owner}: {found}; {hint}")]
     Value {
-        /// Entry that holds it.
+        /// Entry that holds the value.
         owner: String,
         /// What is wrong.
         found: String,
         /// What to do.
         hint: String,
     },
-    /// A simulator that could not be started.
+    /// A simulator could not be started.
     #[error("{0}")]
     Simulator(String),
     /// The rig or an effect was refused.
@@ -53,7 +53,7 @@ pub enum ProblemError {
     RigFile {
         /// The file.
         file: String,
-        /// What is wrong in it.
+        /// What is wrong in the file.
         #[source]
         cause: SimError,
     },
@@ -67,7 +67,7 @@ pub enum ProblemError {
         /// What to do.
         hint: String,
     },
-    /// There is nothing to fit on.
+    /// There are too few data to fit.
     #[error("{what}: {hint}")]
     TooLittle {
         /// What is missing.
@@ -85,7 +85,7 @@ pub enum ProblemError {
     },
 }
 
-/// Refuses a sample time outside 1e-3 .. 1e7 Hz, before anything is counted in samples of it: stamps of another unit.
+/// Refuses a sample rate outside 1e-3 .. 1e7 Hz, before anything is counted in samples: such time stamps are in another unit.
 pub(crate) fn check_rate(dt_s: f64) -> Result<(), ProblemError> {
     if (1e-7..=1e3).contains(&dt_s) {
         return Ok(());
@@ -104,7 +104,7 @@ impl From<GridError> for ProblemError {
 }
 
 impl ProblemError {
-    /// A name that is not among those known.
+    /// The error for a name that is not among the known ones.
     pub(crate) fn unknown<'a>(
         owner: impl Into<String>,
         what: &'static str,

@@ -1,4 +1,4 @@
-//! The one flow: a problem is diagnosed, and everything that follows from the diagnosis is made.
+//! The one flow: a problem is diagnosed, and experiment, fix, code and JSON are made from the diagnosis.
 
 use std::{fmt, sync::atomic::AtomicUsize};
 
@@ -15,23 +15,23 @@ use crate::{
     transfer::transfer,
 };
 
-/// A diagnosis, what it was found from, and what follows from it.
+/// A diagnosis, its evidence, and what follows from the diagnosis.
 pub struct Examined {
-    /// What the data are called.
+    /// Name of the data.
     pub name: String,
     /// Seed of the intervals.
     pub seed: u64,
-    /// What was found, with the notes of the record around its own.
+    /// The diagnosis, with the notes on the recordings before its own.
     pub diagnosis: Diagnosis,
-    /// What a report draws.
+    /// The evidence for the diagnosis, from which a report draws.
     pub evidence: Evidence,
-    /// The experiment that would tell rivals apart, where it was looked for and there is one.
+    /// The experiment that would tell rivals apart; none where no experiment was looked for or found.
     pub experiment: Option<Trial>,
-    /// What is named, as something to type.
+    /// The named effects, as code to type.
     pub implementations: Vec<Implementation>,
-    /// What effects agree on that are not told apart.
+    /// Families of effects that the data do not tell apart, with what the members agree on.
     pub families: Vec<Agreed>,
-    /// The simulator with what was found of it, or why there is no such file.
+    /// The fixed simulator as a file, or why there is no such file.
     pub fix: Result<Fix, NoFix>,
 }
 
@@ -42,8 +42,8 @@ impl fmt::Debug for Examined {
 }
 
 impl Problem {
-    /// Diagnoses; with `looks_on` also looks for the experiment that would tell rivals apart, where there are any. `progress` and `stop` as
-    /// [`diagnose`] takes them.
+    /// Diagnoses the problem; with `looks_on` also looks for the experiment that would tell rivals apart, where there are rivals. `progress`
+    /// and `stop` mean what they mean to [`diagnose`].
     ///
     /// # Errors
     /// Those of [`diagnose`] and [`next_experiment`](stretch_gap::next_experiment).
@@ -78,13 +78,13 @@ impl Problem {
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Examined, GapError> {
         let source = self.source();
-        let told = |what: &str| match self.simulator().costly().map(Costly::model_runs) {
+        let report = |what: &str| match self.simulator().costly().map(Costly::model_runs) {
             Some(runs) => progress(&format!("{what} ({} model runs)", runs.count)),
             None => progress(what),
         };
-        let (mut diagnosis, evidence) = diagnose(self.simulator(), options, &told, stop)?;
+        let (mut diagnosis, evidence) = diagnose(self.simulator(), options, &report, stop)?;
         if !diagnosis.named.is_empty() {
-            told("what the gap costs a calibration");
+            report("what the gap costs a calibration");
             let simulations = AtomicUsize::new(0);
             let asked = (options.seed, &simulations);
             diagnosis.transfer = transfer(self.simulator(), &evidence, asked)?;
@@ -92,7 +92,7 @@ impl Problem {
         }
         let mut proposal = None;
         if diagnosis.ambiguous.len() > 1 && looks_on {
-            told("the next experiment");
+            report("the next experiment");
             proposal = source.next(&diagnosis, &evidence)?;
         }
         diagnosis.next_experiment = proposal.as_ref().map(|p| p.next.clone());
@@ -114,13 +114,13 @@ impl Problem {
 }
 
 impl Examined {
-    /// Everything as JSON: the diagnosis in its schema, what it was made from, and what follows from it.
+    /// Everything as JSON: the diagnosis in its schema, its data set, seed and version, and what follows from the diagnosis.
     ///
-    /// Beside the keys of the diagnosis stand `data_set`, `seed` and `version` of what made it, `implement` (what is named, with equation,
-    /// numbers and initial state), `families`, and `fixed_rig` or `fixed_problem`, the file with what was found; both are null where
-    /// there is none.
+    /// Beside the keys of the diagnosis stand `data_set`, `seed`, `version` (of this crate), `implement` (the named effects with equation,
+    /// numbers and initial state), `families`, and the fixed simulator as `fixed_rig` or `fixed_problem`; both are null where
+    /// there is no fix.
     pub fn to_json(&self) -> Value {
-        // a diagnosis has no key that JSON could not hold
+        // Every key of a diagnosis is a text, as JSON demands.
         let mut value = serde_json::to_value(&self.diagnosis).unwrap_or_default();
         let fixed = self.fix.as_ref().ok().map(|fix| &fix.file);
         value["implement"] = self.implementations.iter().map(implementation).collect();
@@ -140,7 +140,7 @@ impl Examined {
     }
 }
 
-/// A named effect as something to implement.
+/// A named effect as JSON.
 fn implementation(one: &Implementation) -> Value {
     let quantity = |q: &Quantity| json!({ "name": q.name, "unit": q.unit, "meaning": q.meaning });
     let sketch = one.sketch.as_ref();
@@ -156,7 +156,7 @@ fn implementation(one: &Implementation) -> Value {
     })
 }
 
-/// What some effects that cannot be told apart agree on.
+/// A family of effects as JSON.
 fn family(agreed: &Agreed) -> Value {
     json!({
         "names": agreed.names,

@@ -1,4 +1,4 @@
-//! What a diagnosis found, as a file: the simulator that lacked it, fixed.
+//! The fix of a simulator: what a diagnosis found, as a file.
 
 use std::{f64::consts::TAU, path::Path};
 
@@ -13,10 +13,10 @@ use stretch_sim::{Effect, SimError, Tolerance};
 use crate::file::ProblemFile;
 
 /// A rig file or a problem's file that holds what a diagnosis found: re-tuned parameters with tolerances as found, and the effects with every
-/// parameter and form. Comments beside the entries say where each comes from.
+/// parameter and form. Comments beside the entries say where each entry comes from.
 ///
-/// A tolerance is one standard deviation of the fit, never more than it was. It holds if the model does: intervals of parameters
-/// that stand in for one another are each told as if the other were free, and together they are narrower.
+/// A tolerance is one standard deviation of the fit, and never wider than the tolerance before. A tolerance is right if the model is right.
+/// Where two parameters stand in for one another, the interval of each is given with the other one free; the two together are narrower.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fix {
     /// The file.
@@ -27,12 +27,12 @@ pub struct Fix {
     pub remarks: Remarks,
 }
 
-/// What a fix is written as.
+/// The file that a fix is written as.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Fixed {
     /// The built-in rig, or a gauge alone.
     Rig(RigFile),
-    /// A simulator of a user's own: its problem, the parameters re-tuned, what was found around it under `[[wrapped]]`.
+    /// The problem's file of a user's own simulator: parameters re-tuned, effects around the simulator under `[[wrapped]]`.
     Problem(Box<ProblemFile>),
 }
 
@@ -46,7 +46,7 @@ impl Fix {
     }
 }
 
-/// What an effect of a fix is.
+/// An effect of a fix in words.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Meaning<'a> {
     pub(crate) name: &'a str,
@@ -64,8 +64,8 @@ impl From<&Effect> for Meaning<'static> {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoFix {
-    /// The record or the rig file is wrong: whatever was fitted to it is, too.
-    #[error("the record or the rig file has to be put right first: {hint}")]
+    /// The recording or the rig file is wrong, and so is whatever was fitted to the recording.
+    #[error("the recording or the rig file has to be corrected first: {hint}")]
     Record {
         /// What to check.
         hint: String,
@@ -75,29 +75,29 @@ pub enum NoFix {
         "the gap is not explained, so that no file closes it; what is known of it stands in the diagnosis"
     )]
     Unknown,
-    /// What was found is none that a rig file may hold.
-    #[error("what was found is no rig that can be written: {0}")]
+    /// No rig file may hold what was found.
+    #[error("what was found cannot be written as a rig file: {0}")]
     Refused(#[from] SimError),
 }
 
-/// What is written of a diagnosis.
+/// The part of a diagnosis that a fix writes.
 #[derive(Clone, Copy)]
 pub(crate) struct Chosen<'a> {
     pub(crate) model: &'a Model,
     /// One standard deviation of every nominal parameter.
     pub(crate) sd: &'a [f64],
     diagnosis: &'a Diagnosis,
-    /// The set of effects, where it has some.
+    /// The candidate whose effects are written, where effects are named.
     found: Option<&'a Candidate>,
 }
 
 /// Standard deviations to either side that hold 95 % of a Gaussian.
 const COVERS: f64 = 1.96;
-/// Least tolerance, a share of the value: a parameter without one would count as exact.
+/// Least tolerance, a share of the value: a parameter without a tolerance would count as exact.
 const LEAST: f64 = 1e-6;
 
 impl<'a> Chosen<'a> {
-    /// The first candidate where effects are named, the re-tuned nominal where none is missing.
+    /// The first candidate where effects are named, the re-tuned nominal model where no effect is missing.
     pub(crate) fn of(diagnosis: &'a Diagnosis, evidence: &'a Evidence) -> Result<Self, NoFix> {
         match diagnosis.verdict {
             VerdictKind::Record => {
@@ -120,7 +120,7 @@ impl<'a> Chosen<'a> {
         }
     }
 
-    /// Effects of the set that do something: index in a simulator's catalogue, values.
+    /// Effects of the candidate that are not at their off values: index in a simulator's catalogue, and values.
     pub(crate) fn effects(
         &self,
         catalogue: &'a [EffectSpec],
@@ -133,7 +133,7 @@ impl<'a> Chosen<'a> {
         })
     }
 
-    /// Those that the diagnosis names, in its order.
+    /// Effects that the diagnosis names, in the order of the diagnosis.
     pub(crate) fn named(&self, catalogue: &'a [EffectSpec]) -> Vec<(usize, &'a [f64])> {
         let place = |index: usize| {
             self.diagnosis.named.iter().position(|name| *name == catalogue[index].name)
@@ -144,7 +144,7 @@ impl<'a> Chosen<'a> {
         named
     }
 
-    /// Tolerance of a re-tuned parameter, in the way in which the old one was told.
+    /// Tolerance of a re-tuned parameter, relative where the old tolerance was relative.
     pub(crate) fn tolerance(&self, index: usize, value: f64, old: Tolerance) -> Tolerance {
         let found = self.sd.get(index).copied().unwrap_or(0.0);
         let sd = found.min(old.sd(value)).max(LEAST * value.abs()).max(f64::MIN_POSITIVE);
@@ -154,8 +154,8 @@ impl<'a> Chosen<'a> {
         }
     }
 
-    /// What is said behind a re-tuned parameter.
-    pub(crate) fn told(&self, index: usize, unit: &str, (was, value): (f64, f64)) -> String {
+    /// The comment behind a re-tuned parameter.
+    pub(crate) fn remark(&self, index: usize, unit: &str, (was, value): (f64, f64)) -> String {
         let sd = self.sd.get(index).copied().unwrap_or(0.0);
         format!(
             "was {}; 95 %: {} .. {}{}",
@@ -187,13 +187,13 @@ impl<'a> Chosen<'a> {
         lines
     }
 
-    /// Adds what is said of an effect and its parameters.
-    pub(crate) fn tell(&self, effect: Meaning<'_>, remarks: &mut Remarks) {
+    /// Adds the comments on an effect and its parameters.
+    pub(crate) fn describe(&self, effect: Meaning<'_>, remarks: &mut Remarks) {
         let name = effect.name;
         remarks.effects.insert(name.into(), self.lines(effect));
         for p in self.numbers(name) {
             let key = (name.to_owned(), p.name.clone());
-            remarks.effect_parameters.insert(key, told_of_effect(&p));
+            remarks.effect_parameters.insert(key, effect_remark(&p));
         }
     }
 
@@ -236,8 +236,8 @@ pub(crate) fn names(file: &RigFile) -> Vec<String> {
     file.effects.iter().map(|effect| effect.name.clone()).collect()
 }
 
-/// What is said behind a parameter of an effect.
-fn told_of_effect(p: &EffectValue) -> String {
+/// The comment behind a parameter of an effect.
+fn effect_remark(p: &EffectValue) -> String {
     let [low, high] = p.interval.map(digits);
     let form = if p.is_form { "form; " } else { "" };
     format!("{form}95 %: {low} .. {high}{}", of_unit(&p.unit))
@@ -257,8 +257,9 @@ pub(crate) fn digits(x: f64) -> String {
     }
 }
 
-/// Values of an effect with amplitude and phase of its line, which a diagnosis leaves to the record: those in what a model leaves
-/// without it in the samples that are not tested on. An effect that leaves no line keeps its values. `place` is the stage that shows it, and what an amplitude of one is there.
+/// Values of an effect with the amplitude and phase of its spectral line, which a diagnosis takes from the recording. Amplitude and phase are
+/// those of the residual of the model without the effect, over the samples that are not tested on. An effect without a line keeps its
+/// values. `place` is the stage that shows the line, and what an amplitude of one is in units of that stage's output.
 pub(crate) fn with_line(
     simulator: &dyn Simulator,
     place: (usize, f64),
@@ -273,7 +274,7 @@ pub(crate) fn with_line(
     }
 }
 
-/// Amplitude and phase of an effect's line.
+/// Amplitude and phase of an effect's spectral line.
 fn found_line(
     simulator: &dyn Simulator,
     place: (usize, f64),
@@ -303,13 +304,13 @@ fn found_line(
     Some(sine(line.hertz, &left))
 }
 
-/// Seconds in which the phase of the mains is taken as steady.
+/// Time for which the phase of the mains is taken as steady, s.
 const STEADY_S: f64 = 1.0;
 
-/// Amplitude and phase of a sine in pairs of time (s) and value: the steady one where it holds half of the power that the line has
-/// second by second, else the amplitude of the seconds with the phase of the whole.
+/// Amplitude and phase of a sine in pairs of time (s) and value. Where the sine fitted to the whole holds at least half of the mean power of
+/// the sines fitted second by second, its amplitude and phase are given, else the root of that mean power with the phase of the whole.
 ///
-/// On samples at twice the frequency one quadrature is never seen, and is taken as nothing.
+/// On samples at twice the frequency one quadrature is never seen and counts as zero.
 fn sine(hertz: f64, left: &[(f64, f64)]) -> [f64; 2] {
     let of = |part: &[(f64, f64)]| -> [f64; 2] {
         let mut sums = [0.0; 5];
@@ -343,7 +344,7 @@ mod tests {
     use approx::assert_abs_diff_eq;
 
     #[test]
-    fn a_sine_is_found_steady_or_wandering() {
+    fn a_sine_is_found_with_a_steady_or_a_drifting_phase() {
         let wave = |hertz: f64, phase: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
             let at = |i: u32| 0.01 * f64::from(i);
             (0..1000).map(at).map(|t| (t, 0.02 * (TAU * hertz * t + phase(t)).sin())).collect()

@@ -1,4 +1,4 @@
-//! What a diagnosis names, as something to type into a simulator.
+//! The effects that a diagnosis names, as code to type into a simulator.
 
 use stretch_gap::{Diagnosis, EffectSpec, EffectValue, Evidence};
 use stretch_sim::{Effect, Language, Sketch, Surroundings};
@@ -10,35 +10,35 @@ use crate::fix::{Chosen, digits};
 pub struct Implementation {
     /// The effect's name.
     pub name: String,
-    /// What it is, for someone who does not know its name.
+    /// What the effect does, for someone who does not know its name.
     pub words: String,
-    /// The stage that it belongs to.
+    /// The stage that the effect belongs to.
     pub stage: String,
-    /// Its equation, in its parameters' names.
+    /// The effect's equation, in the names of its parameters.
     pub formula: String,
-    /// Its parameters and forms, with intervals.
+    /// The effect's parameters and forms, with intervals.
     pub numbers: Vec<EffectValue>,
-    /// How it is typed; none for an effect that says nothing of that.
+    /// The effect as code; none for an effect without a sketch.
     pub sketch: Option<Sketch>,
 }
 
 impl Implementation {
-    /// Its equation with its numbers.
+    /// The equation with the fitted numbers.
     pub fn equation(&self) -> String {
-        let numbers: Vec<String> = self.numbers.iter().map(told).collect();
+        let numbers: Vec<String> = self.numbers.iter().map(with_interval).collect();
         match numbers.is_empty() {
             true => self.formula.clone(),
             false => format!("{}; with {}", self.formula, numbers.join(", ")),
         }
     }
 
-    /// What it remembers and where that begins, in words.
+    /// What the effect remembers, and the initial value of the memory, in words.
     pub fn state(&self) -> String {
         let state = self.sketch.as_ref().and_then(Sketch::initial_state);
         state.unwrap_or_else(|| "it remembers nothing".to_owned())
     }
 
-    /// A function of its name that takes a sample and hands back the next one.
+    /// A function with the effect's name that takes a sample and returns the sample with the effect.
     pub fn code(&self, language: Language) -> Option<String> {
         let comments = [
             format!("{}: {}.", self.name, self.words),
@@ -51,7 +51,7 @@ impl Implementation {
     }
 }
 
-/// The effects of the built-in catalogue that a diagnosis names; `complete` finds what it leaves to the record.
+/// The effects of the built-in catalogue that a diagnosis names; `complete` adds the values that are found in the recording.
 pub(crate) fn implementations(
     (diagnosis, evidence): (&Diagnosis, &Evidence),
     catalogue: &[EffectSpec],
@@ -76,7 +76,7 @@ pub(crate) fn implementations(
 }
 
 /// A number with its unit and its 95 % interval.
-fn told(p: &EffectValue) -> String {
+fn with_interval(p: &EffectValue) -> String {
     let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
     let [low, high] = p.interval.map(digits);
     format!("{} = {}{unit} ({low} .. {high})", p.name, digits(p.value))

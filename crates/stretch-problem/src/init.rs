@@ -1,4 +1,4 @@
-//! A first problem from a folder of recordings: what is found is written, what is guessed is said in comments.
+//! A first problem from a folder of recordings; comments say which entries are guessed.
 
 use std::{
     fmt::Write,
@@ -10,22 +10,22 @@ use stretch_recording::{ReadOptions, Recording};
 
 use crate::error::ProblemError;
 
-/// Names that a column of time has.
+/// Usual names of the column of time.
 const TIMES: [&str; 10] =
     ["time_s", "time_ms", "time_us", "time_ns", "time", "t_s", "t", "timestamp", "Time", "stamp_s"];
-/// Parts of names of what is commanded.
+/// Parts of the names that commands usually have.
 const COMMANDS: [&str; 10] =
     ["cmd", "command", "ref", "target", "goal", "setpoint", "action", "input", "duty", "pwm"];
-/// Ends of names that recordings have.
+/// File extensions of recordings.
 const RECORDINGS: [&str; 11] =
     ["csv", "tsv", "txt", "gz", "npy", "npz", "mat", "h5", "hdf5", "mcap", "parquet"];
-/// Most columns that are told one by one.
-const TOLD: usize = 40;
+/// Greatest number of columns that are listed one by one.
+const LISTED: usize = 40;
 
 /// The text of a first `problem.toml` for a folder of recordings.
 ///
 /// # Errors
-/// No recording in the folder that can be read.
+/// There is no recording in the folder that can be read.
 ///
 /// ```
 /// let folder = std::env::temp_dir().join(format!("stretch-init-{}", std::process::id()));
@@ -55,14 +55,14 @@ pub fn first_problem(folder: impl AsRef<Path>) -> Result<String, ProblemError> {
         return Err(ProblemError::value(shown, found, hint));
     };
     let mut out = String::new();
-    // A String takes everything.
+    // Writing to a String does not fail.
     let _ = write(&mut out, folder, &trials, first, &time, &left);
     Ok(out)
 }
 
 type Found = (Vec<(String, Trial)>, String, Vec<String>);
 
-/// Recordings that can be read, their column of time, and why others cannot.
+/// Recordings that can be read, their column of time, and why the other recordings cannot be read.
 fn recordings(folder: &Path) -> Result<Found, ProblemError> {
     let fail = |e: std::io::Error| {
         ProblemError::value(
@@ -106,7 +106,7 @@ fn recordings(folder: &Path) -> Result<Found, ProblemError> {
     Ok((trials, time.unwrap_or_else(|| "time_s".into()), left))
 }
 
-/// What is known of a column.
+/// A column of the recordings, and whether it looks like a command.
 struct Known {
     name: String,
     range: [f64; 2],
@@ -146,7 +146,7 @@ fn write(
     let name = name.as_deref().and_then(Path::file_name).map(|n| n.to_string_lossy().into_owned());
     writeln!(
         out,
-        "# A first problem from what stands in this folder. What was guessed says so: correct it."
+        "# A first problem from the recordings in this folder. Comments say which entries were guessed: correct them."
     )?;
     writeln!(out, "name = {}", quoted(name.as_deref().unwrap_or("problem")))?;
     if time != "time_s" {
@@ -162,11 +162,11 @@ fn write(
     writeln!(out, "wrap = \"all\"")?;
     writeln!(
         out,
-        "\n# What simulates: a worker (docs/worker.md), or python = \"module:object\", or builtin = \"rig\" or \"gauge\"."
+        "\n# The simulator: a worker (docs/worker.md), or python = \"module:object\", or builtin = \"rig\" or \"gauge\"."
     )?;
     writeln!(out, "[simulator]\ncommand = [\"python3\", \"sim.py\"]  # guessed: write it")?;
     writeln!(out, "\n# Columns, with the least and the greatest value:")?;
-    for c in columns.iter().take(TOLD) {
+    for c in columns.iter().take(LISTED) {
         let kind = if c.is_command { ", held or called like a command" } else { "" };
         let unit = unit(&c.name).unwrap_or("unit not in its name");
         writeln!(out, "#   {} ({unit}): {} to {}{kind}", c.name, c.range[0], c.range[1])?;
@@ -174,7 +174,7 @@ fn write(
     stage(out, &columns)?;
     writeln!(
         out,
-        "\n# Parameters of the simulator, each with one standard deviation of what it may be off."
+        "\n# Parameters of the simulator, each with its tolerance: one standard deviation."
     )?;
     writeln!(
         out,
@@ -182,7 +182,7 @@ fn write(
     )?;
     writeln!(
         out,
-        "\n# Effects that the simulator has itself, with the value at which they do nothing."
+        "\n# Effects that the simulator has itself, each with the value at which the effect does nothing."
     )?;
     writeln!(
         out,
@@ -204,16 +204,16 @@ fn stage(out: &mut String, columns: &[Known]) -> std::fmt::Result {
         .collect();
     writeln!(
         out,
-        "\n# Guessed: the last column that is no command is what is simulated, commands drive it."
+        "\n# Guessed: the last column that is no command is the output, and commands drive the stage."
     )?;
     writeln!(out, "[[stage]]\nname = \"plant\"\noutput = {}", quoted(own))?;
     if unit(own).is_none() {
-        writeln!(out, "unit = \"\"  # its name tells none")?;
+        writeln!(out, "unit = \"\"  # the name gives no unit")?;
     }
     writeln!(out, "inputs = [{}]", inputs.join(", "))?;
     writeln!(
         out,
-        "# noise = 0.01     # one standard deviation, where it is known; else the record tells"
+        "# noise = 0.01     # one standard deviation, where the noise is known; else it is estimated from the recordings"
     )?;
     writeln!(
         out,
@@ -227,7 +227,7 @@ fn trials_of(out: &mut String, trials: &[(String, Trial)]) -> std::fmt::Result {
         n => n.div_ceil(4),
     };
     match tested {
-        0 => writeln!(out, "\n# One trial: its last quarter is held back and tested on.")?,
+        0 => writeln!(out, "\n# There is one trial: its last quarter is held back and tested on.")?,
         _ => writeln!(
             out,
             "\n# Guessed: the last {tested} of {} trials are tested on, read once at the end.",

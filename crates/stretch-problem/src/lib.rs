@@ -18,8 +18,8 @@ mod wrap;
 
 pub use black_box::{
     Agreed, Argument, Ask, BlackBox, Checked, Closure, Input, OwnEffect, Parameter, ProblemSpec,
-    Sensor, Session, SessionColumn, SessionPart, SessionStage, Source, SourceError, Stage, Wrapped,
-    agreed, closure,
+    RecordedSession, Sensor, SessionColumn, SessionPart, SessionStage, Source, SourceError,
+    StageEntry, Wrapped, agreed, closure,
 };
 pub use causes::{Causes, causes};
 pub use error::ProblemError;
@@ -31,5 +31,5 @@ pub use implement::Implementation;
 pub use init::first_problem;
 pub use problem::{Diagnosable, Problem, Reading, name_of};
 pub use rig::{RigSession, RigSetup, RigSimulator, RigTrial};
-pub use stretch_effects::{KINDS, Kind, kind_named};
+pub use stretch_effects::{KINDS, Kind, Language, kind_named};
 pub use stretch_sim::Tolerance;

@@ -1,4 +1,4 @@
-//! One problem: a simulator beside one session of recordings, whatever simulates.
+//! One problem: any simulator beside one session of recordings.
 
 use std::{
     fmt::Debug,
@@ -21,45 +21,45 @@ use crate::{
     worker::Workers,
 };
 
-/// A simulator beside its recordings: everything that [`Problem::examine`] asks of it. A new kind of simulator implements this.
+/// A simulator beside its recordings, with everything that [`Problem::examine`] asks. A new kind of simulator implements this trait.
 pub trait Diagnosable: Simulator + Debug + Send {
-    /// What was done to the recordings, and what is not looked for, in sentences.
+    /// Notes on what was done to the recordings and which effects are not looked for, in sentences.
     fn notes(&self) -> Vec<String>;
 
-    /// What there is to say once it was diagnosed, in sentences.
+    /// Notes after the diagnosis, in sentences.
     fn afterwards(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// What effects agree on that a diagnosis cannot tell apart.
+    /// Families of effects that a diagnosis cannot tell apart, with what the members agree on.
     fn families(&self, _diagnosis: &Diagnosis) -> Vec<Agreed> {
         Vec::new()
     }
 
-    /// The experiment that would tell the rivals of a diagnosis apart; none where there is none, or the simulator foretells none.
+    /// The experiment that would tell the rivals of a diagnosis apart; none where no candidate does, or the simulator predicts none.
     ///
     /// # Errors
-    /// What the simulator says.
+    /// The errors of the simulator.
     fn next(
         &self,
         diagnosis: &Diagnosis,
         evidence: &Evidence,
     ) -> Result<Option<Proposal>, GapError>;
 
-    /// What a diagnosis names, as something to type.
+    /// The effects that a diagnosis names, as code to type.
     fn implementations(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation>;
 
-    /// The simulator with what was found of it, as a file.
+    /// The fixed simulator, as a file.
     ///
     /// # Errors
-    /// Why there is no such file.
+    /// [`NoFix`] says why there is no such file.
     fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix>;
 }
 
 /// A simulator beside one session of recordings, ready to be [examined](Problem::examine).
 #[derive(Debug)]
 pub struct Problem {
-    /// What the data are called.
+    /// Name of the data.
     pub name: String,
     source: Box<dyn Diagnosable>,
     /// Files that must not be written over.
@@ -75,20 +75,20 @@ impl<S: Diagnosable + 'static> From<S> for Problem {
 /// How a problem is read from a path.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Reading<'a> {
-    /// Rig file in place of the data's own.
+    /// Rig file in place of that of the data.
     pub rig: Option<&'a Path>,
-    /// Columns of reference and signal: of a gauge alone, or of a stage that is a sensor.
+    /// Columns of reference and signal, of a gauge alone or of a stage that is a sensor.
     pub columns: Option<(&'a str, &'a str)>,
     /// Effects that are not looked for.
     pub without: &'a [String],
-    /// Workers at once, where the problem's file does not say.
+    /// Number of workers at once, where the problem's file gives none.
     pub jobs: usize,
-    /// Most runs of a simulator that is not built in.
+    /// Greatest number of runs of a simulator that is not built in.
     pub budget: Option<usize>,
 }
 
 impl Problem {
-    /// Reads what stands at a path: the folder of a data set, a trial of a gauge alone (`-` is standard input), or a problem's file. The
+    /// Reads a problem from a path: the folder of a data set, a trial of a gauge alone (`-` is standard input), or a problem's file. The
     /// workers of a simulator that is not built in are started.
     ///
     /// # Errors
@@ -112,7 +112,7 @@ impl Problem {
         Ok(problem)
     }
 
-    /// A data set's folder, or a trial.
+    /// Reads a built-in simulator's problem from a data set's folder, or from a trial.
     fn built_in(path: &Path, reading: &Reading<'_>) -> Result<Self, ProblemError> {
         if reading.budget.is_some() {
             let hint = "the built-in ones need none";
@@ -137,7 +137,7 @@ impl Problem {
         Ok(Self { name: name_of(path), source, read: read.into_iter().flatten().collect() })
     }
 
-    /// A simulator that is not built in, behind its workers.
+    /// Starts the workers of a simulator that is not built in, and binds them to the problem of a file.
     fn of_file(
         path: &Path,
         mut file: ProblemFile,
@@ -159,7 +159,7 @@ impl Problem {
         Ok(Self { name, source: Box::new(own), read: vec![path.to_owned()] })
     }
 
-    /// The same under another name.
+    /// The problem under another name.
     pub fn named(self, name: impl Into<String>) -> Self {
         Self { name: name.into(), ..self }
     }
@@ -169,12 +169,12 @@ impl Problem {
         &*self.source
     }
 
-    /// The same with all that is asked of it.
+    /// The simulator with everything that is asked of a [`Diagnosable`].
     pub(crate) fn source(&self) -> &dyn Diagnosable {
         &*self.source
     }
 
-    /// Whether a path is one of the files that it was read from.
+    /// Whether a path is one of the files that the problem was read from.
     pub fn is_read_from(&self, path: &Path) -> bool {
         let real = |path: &Path| path.canonicalize().ok();
         let real_path = real(path);
@@ -186,7 +186,7 @@ fn no_option(option: &str, found: &str, hint: &str) -> ProblemError {
     ProblemError::value(option, found, hint)
 }
 
-/// What data are called: the folder's or the file's name.
+/// Name of data: that of the folder or the file.
 pub fn name_of(path: &Path) -> String {
     if path.as_os_str() == "-" {
         return "standard input".to_owned();

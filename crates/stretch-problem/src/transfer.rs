@@ -1,7 +1,7 @@
-//! What the gap costs whoever trains a calibration in the simulator and runs it on the rig.
+//! What the gap costs a calibration that is trained in the simulator and runs on the rig.
 //!
 //! The *transfer gap* is the error on measured test trials of a calibration trained in the simulator minus that of one trained on measured
-//! trials. It is what a user pays; the chi-square is not: a true effect can close the gap and leave a calibration as it was.
+//! trials. A user pays the transfer gap and not the chi-square: a true effect can close the gap and leave a calibration as it was.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -17,19 +17,19 @@ use stretch_gap::{
 const SIGNAL: &str = "signal";
 const REFERENCE: &str = "reference";
 
-/// What a calibration is trained on or applied to: the motion and the signal, all trials end to end.
+/// The motion and the signal that a calibration is trained on or applied to, all trials end to end.
 struct Records {
     reference: Vec<f64>,
     signal: Vec<f64>,
 }
 
 /// Errors on the measured test trials of calibrations that were trained on the measured fit trials, in the re-tuned
-/// simulator, and in the simulator with the effects; `None` where the simulator has no sensor, or the records do not
+/// simulator, and in the simulator with the effects; `None` where the simulator has no sensor, or the recordings do not
 /// determine a calibration.
 ///
-/// In the simulator nothing is measured but the commands: the stages run one on the other, and its reference and its
-/// signal get the noise that the channels are known to have. A sensor that is the first stage sees the measured motion. Every run of a
-/// stage is added to `simulations`.
+/// In the simulator only the commands are measured: each stage runs on the output of the stage before, and the simulated reference and
+/// signal get the known noise of their channels. A sensor that is the first stage sees the measured motion. Every run of a stage is added
+/// to `simulations`.
 pub(crate) fn transfer(
     simulator: &dyn Simulator,
     evidence: &Evidence,
@@ -68,7 +68,7 @@ pub(crate) fn transfer(
     Ok(is_sound.then(|| Transfer { linear: of(0), poly13: of(3), unit }))
 }
 
-/// The stages of a simulator up to the sensor, run one on the other.
+/// The stages of a simulator up to the sensor, each run on the output of the stage before.
 struct Chain<'a> {
     simulator: &'a dyn Simulator,
     evidence: &'a Evidence,
@@ -79,8 +79,8 @@ struct Chain<'a> {
 }
 
 impl Chain<'_> {
-    /// The fitted trials as a model records them, whose first stage gave `first`; `None` where the stages cannot run one on the
-    /// other.
+    /// The fitted trials as a model records them, with `first` as the output of the first stage; `None` where a stage cannot run on the
+    /// output of the stage before.
     fn records(&self, model: &Model, first: &[f64]) -> Result<Option<Records>, GapError> {
         let samples = self.evidence.frame.samples(self.evidence.frame.fit_trials);
         let mut output = first[..samples].to_vec();
@@ -96,14 +96,14 @@ impl Chain<'_> {
         Ok(Some(Records { reference, signal: self.noisy(output, self.sensor) }))
     }
 
-    /// The output of a stage on an input that was not measured; `None` where the stage cannot.
+    /// The output of a stage on an input that was not measured; `None` where the stage cannot run on such an input.
     fn run_on(
         &self,
         stage: usize,
         model: &Model,
         input: &[f64],
     ) -> Result<Option<Vec<f64>>, GapError> {
-        // Only the sum is read, and only after the work is done: no order is needed.
+        // Only the sum is read, and only after the work is done, so that no memory order is needed.
         self.simulations.fetch_add(1, Ordering::Relaxed);
         let Some(driven) = self.simulator.driven() else { return Ok(None) };
         let run = Run::exact(stage, model, self.evidence.frame.fit_trials);
@@ -120,7 +120,7 @@ impl Chain<'_> {
         }
     }
 
-    /// The output of a stage with the noise that its channel is known to have.
+    /// The output of a stage with the known noise of its channel.
     fn noisy(&self, mut values: Vec<f64>, stage: usize) -> Vec<f64> {
         let known = self.simulator.stages()[stage].noise.as_ref();
         let sd = known.map_or(self.evidence.stages[stage].noise, Noise::sd);
@@ -130,7 +130,7 @@ impl Chain<'_> {
     }
 }
 
-/// The trials to train on, or to test on.
+/// The trials to train on, or the trials to test on.
 fn trials(records: &Records, frame: &Frame, dt_s: f64, is_test: bool) -> Vec<Trial> {
     let mut spans: Vec<(usize, usize, usize)> = Vec::new();
     for segment in frame.segments.iter().filter(|s| (s.role == Role::Test) == is_test) {

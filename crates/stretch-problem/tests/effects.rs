@@ -1,4 +1,5 @@
-//! Effects are written once: what the simulator runs, the diagnosis finds and the menu of experiments parts; a user's own, too.
+//! Effects are written once: the simulator runs an effect, the diagnosis finds it, and candidate experiments tell it from others; so it is with
+//! a user's own effects.
 
 use std::sync::Arc;
 
@@ -12,7 +13,7 @@ use stretch_gap::{
 };
 use stretch_problem::{
     Ask, BlackBox, Checked, GaugeSetup, GaugeSimulator, Parameter, ProblemSpec, RigSession,
-    RigSetup, RigSimulator, Stage, closure,
+    RigSetup, RigSimulator, StageEntry, closure,
 };
 use stretch_sim::{
     CATALOGUE, Catalogue, EffectSet, GaugeRig, GaugeSpec, Rig, RunSettings, Tolerance, TrialPlan,
@@ -86,15 +87,16 @@ fn models(simulator: &dyn Simulator, effect: usize) -> Vec<Model> {
     starts.map(with).collect()
 }
 
-/// Effects that change no experiment of the menu at any point where they are looked for.
+/// Effects that change no candidate experiment at any point where they are looked for.
 fn unseen<L: Laboratory>(simulator: &L) -> Vec<String> {
-    let menu = simulator.menu();
+    let candidates = simulator.menu();
     let nominal = Model::nominal(simulator);
-    let plain: Vec<_> = menu.iter().map(|(_, x)| simulator.predict(&nominal, x).unwrap()).collect();
+    let before: Vec<_> =
+        candidates.iter().map(|(_, x)| simulator.predict(&nominal, x).unwrap()).collect();
     let is_seen = |effect: usize| {
         models(simulator, effect).iter().any(|model| {
-            let mut all = menu.iter().zip(&plain);
-            all.any(|((_, x), plain)| simulator.predict(model, x).unwrap() != *plain)
+            let mut all = candidates.iter().zip(&before);
+            all.any(|((_, x), before)| simulator.predict(model, x).unwrap() != *before)
         })
     };
     let names = simulator.description().effects.iter().enumerate();
@@ -117,7 +119,7 @@ fn every_effect_can_be_told_by_an_experiment() {
         let model = models(&rig, i).pop().unwrap();
         let d = differences(&rig, &model, &Model::nominal(&rig)).unwrap();
         assert!(d.iter().all(|x| x.1.is_finite()), "{}: {d:?}", effect.name);
-        assert!(d.iter().any(|x| x.1 > 0.0), "{} is told by nothing: {d:?}", effect.name);
+        assert!(d.iter().any(|x| x.1 > 0.0), "no experiment shows {}: {d:?}", effect.name);
     }
 }
 
@@ -184,11 +186,11 @@ fn a_kind_of_ones_own_is_wrapped_named_and_printed() {
     let trial = |number: usize| {
         let time_s: Vec<f64> = (0..samples).map(|i| dt_s * i as f64).collect();
         let start_s = 40.0 * number as f64;
-        let mut dice = RandomGenerator::new(5, number as u64);
+        let mut random = RandomGenerator::new(5, number as u64);
         let force: Vec<f64> = time_s.iter().map(|t| load(t + start_s)).collect();
         let ripple = |t: f64| 4.0 * (std::f64::consts::TAU * 0.4 * (t + start_s)).sin();
         let shown = force.iter().zip(&time_s);
-        let length = shown.map(|(f, t)| 2.0 * f + ripple(*t) + 0.05 * dice.gauss()).collect();
+        let length = shown.map(|(f, t)| 2.0 * f + ripple(*t) + 0.05 * random.gauss()).collect();
         let channel = |name: &str, values| Channel { name: name.into(), values };
         let channels = vec![channel("force_N", force), channel("length_mm", length)];
         let split = if number == 1 { Split::Test } else { Split::Fit };
@@ -196,11 +198,11 @@ fn a_kind_of_ones_own_is_wrapped_named_and_printed() {
         SessionTrial { start_s, split, ..SessionTrial::new(trial) }
     };
     let problem = Checked::new(ProblemSpec {
-        stages: vec![Stage {
+        stages: vec![StageEntry {
             name: "spring".into(),
             output: "length_mm".into(),
             inputs: vec!["force_N".into()],
-            ..Stage::default()
+            ..StageEntry::default()
         }],
         parameters: vec![Parameter {
             name: "compliance".into(),

@@ -1,4 +1,4 @@
-//! The menu of experiments: what motion cannot part, other experiments do.
+//! Candidate experiments: some tell effects apart that motion alone does not.
 
 use stretch_data::SessionTrial;
 use stretch_gap::{Laboratory, Model, Simulator, differences};
@@ -19,7 +19,7 @@ fn rig() -> RigSimulator {
     RigSimulator::new(RigSetup { session, rig: Default::default(), catalogue }).unwrap()
 }
 
-/// D of every experiment of the menu for two effects at given first parameters.
+/// D of every candidate experiment for two effects at given first parameters.
 fn of(rig: &RigSimulator, one: (&str, f64), two: (&str, f64)) -> Vec<(String, f64)> {
     let model = |(name, value): (&str, f64)| {
         let at = rig.description().effects.iter().position(|e| e.name == name).unwrap();
@@ -51,7 +51,7 @@ fn what_motion_cannot_part_other_experiments_do() {
     assert!(all.iter().all(|x| x.1.is_finite()));
 }
 
-/// What is written of an experiment is all of it: the simulator that replays the trial does what the menu foretells.
+/// The trial of a candidate experiment holds all of it: the simulator that replays the trial gives what the candidate predicts.
 #[test]
 fn every_experiment_is_replayed_from_its_columns() {
     let rig = rig();
@@ -64,7 +64,7 @@ fn every_experiment_is_replayed_from_its_columns() {
         // Length and voltage in noises; there is no pressure here.
         let foretold = rig.predict(&nominal, &setting).unwrap();
         for (column, values) in ["length_mm", "bridge_v"].into_iter().zip(&foretold) {
-            // A vented muscle shows the voltage of its own pressure where the menu lets the pressure follow a course of its own.
+            // A vented muscle shows the voltage of its own pressure where the candidate lets the pressure follow a course of its own.
             let noise = if column == "length_mm" { 0.05 } else { 0.002 };
             let shown = trial.channel(column).unwrap();
             let worst = shown.iter().zip(values).map(|(a, b)| (a / noise - b).abs());

@@ -34,7 +34,7 @@ fn course(seconds: f64, noise: &mut Noise) -> Vec<f64> {
     e
 }
 
-/// What is wrong with the gauge, in forms of this file: `strength` one is plain to see.
+/// What is wrong with the gauge, in forms of this file: a `strength` of one is large.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fault {
     None,
@@ -287,7 +287,7 @@ fn twins_that_no_motion_parts_call_for_gauge_blocks() {
     let (d, evidence) =
         diagnose(&gauge, &Options::default(), &|_| (), &|| false).expect("a diagnosis");
     assert_eq!(d.ambiguous.len(), 2, "{:?}", d.ambiguous);
-    let next = next_experiment(&gauge, &d, &evidence).expect("a menu").expect("rivals");
+    let next = next_experiment(&gauge, &d, &evidence).expect("candidates").expect("rivals");
     assert_eq!(next.next.name, "gauge_blocks", "{:?}", next.menu);
     let set = next.trial.channel("set_rod_mm").expect("a course");
     assert!(set.iter().all(|x| (115.0..165.0).contains(x)));
@@ -315,7 +315,7 @@ fn a_rig_file_gives_the_nominal_gauge() {
             .0
     };
     let gain = |d: &Diagnosis| d.parameters.iter().find(|p| p.name == "gain").cloned().unwrap();
-    // A gain that is off by two of its tolerances is re-tuned and told.
+    // A gain that is off by two of its tolerances is re-tuned and reported.
     let d = run(-0.82);
     assert_eq!(d.verdict, VerdictKind::Parameters, "{}", d.sentence);
     assert!(gain(&d).is_evidence);
@@ -431,9 +431,9 @@ fn columns_that_cannot_be_what_they_say_are_refused_or_told() {
 #[test]
 fn a_swapped_pair_and_a_foreign_signal_get_no_name() {
     // A signal that has nothing to do with the reference: another trial's.
-    let mut foreign = trials(Fault::None, 0.0, 1, 5);
+    let mut mixed = trials(Fault::None, 0.0, 1, 5);
     let other = trials(Fault::None, 0.0, 1, 6);
-    foreign[0].trial.channels[1] = other[0].trial.channels[1].clone();
-    let d = run(&foreign, &[]);
+    mixed[0].trial.channels[1] = other[0].trial.channels[1].clone();
+    let d = run(&mixed, &[]);
     assert!(d.named.is_empty() && d.verdict == VerdictKind::Unknown, "{}", d.sentence);
 }

@@ -1,4 +1,4 @@
-//! Errors of the record and of the rig file: told as what they are, never given an effect's name.
+//! Errors of the recording and of the rig file are reported as such, never under an effect's name.
 
 use crate::support::Noise;
 use crate::support::rigs::own_rig;
@@ -29,14 +29,14 @@ enum Done {
     Rig(Key, f64),
 }
 
-/// A case: what is done, whether there is a pressure column, and what may be told of it: kinds with a name in the
+/// A case: what is done, whether there is a pressure column, and what may be reported: kinds with a name in the
 /// sentence, or a refusal with words of it.
 #[derive(Debug, Clone, Copy)]
 struct Case {
     name: &'static str,
     pressure: bool,
     done: Done,
-    told: &'static [(GrossKind, &'static str)],
+    reported: &'static [(GrossKind, &'static str)],
     refused: &'static str,
     /// A gauge alone in the place of a rig, its gain and offset in a rig file.
     alone: bool,
@@ -74,19 +74,31 @@ const COMMANDS: &[(G, &str)] = &[(G::Scale, U)];
 
 /// Every case.
 fn cases() -> Vec<Case> {
-    let case =
-        |name, pressure, done, told| Case { name, pressure, done, told, refused: "", alone: false };
+    let case = |name, pressure, done, reported| Case {
+        name,
+        pressure,
+        done,
+        reported,
+        refused: "",
+        alone: false,
+    };
     let refused = |name, pressure, done, refused| Case {
         name,
         pressure,
         done,
-        told: &[],
+        reported: &[],
         refused,
         alone: false,
     };
     // A rig within its tolerances explains it: that is no error.
-    let within =
-        |name, pressure, done| Case { name, pressure, done, told: &[], refused: "", alone: false };
+    let within = |name, pressure, done| Case {
+        name,
+        pressure,
+        done,
+        reported: &[],
+        refused: "",
+        alone: false,
+    };
     let mut all = Vec::new();
     for p in [true, false] {
         all.extend([
@@ -122,7 +134,7 @@ fn cases() -> Vec<Case> {
             case("voltage holds the length", p, Holds(V, L, |l| l), &[(G::Copied, V)]),
             // Without a pressure column the muscle's own tolerances explain it.
             Case {
-                told: if p { SUPPLY } else { &[] },
+                reported: if p { SUPPLY } else { &[] },
                 ..within("supply 5 % above the rig file's", p, InRig(Key::PS, 1.0 / 1.05))
             },
             case("supply 30 % above the rig file's", p, InRig(Key::PS, 1.0 / 1.3), SUPPLY),
@@ -165,7 +177,7 @@ fn cases() -> Vec<Case> {
         refused("pressure and length exchanged", true, Swap(L, P), "swapped"),
         refused("pressure in bar", true, Column(P, |p| 0.01 * p), "bar"),
     ]);
-    let alone = |name, done, told| Case { alone: true, ..case(name, false, done, told) };
+    let alone = |name, done, reported| Case { alone: true, ..case(name, false, done, reported) };
     let gain = &[(G::Scale, V), (G::Parameter, "gain")];
     all.extend([
         alone(
@@ -326,9 +338,9 @@ fn answer(case: &Case, seed: u64) -> Answer {
         },
         Ok(d) => Answer {
             verdict: format!("{:?}", d.verdict),
-            is_right: d.verdict == VerdictKind::Parameters && case.told.is_empty()
+            is_right: d.verdict == VerdictKind::Parameters && case.reported.is_empty()
                 || d.verdict == VerdictKind::Record
-                    && case.told.iter().any(|(what, name)| {
+                    && case.reported.iter().any(|(what, name)| {
                         d.gross.iter().any(|g| g.what == *what && g.sentence.contains(name))
                     }),
             is_wrong: matches!(d.verdict, VerdictKind::Effect | VerdictKind::Partial),
@@ -378,11 +390,11 @@ fn an_error_is_told_though_rows_are_lost() {
 fn no_error_is_given_the_name_of_an_effect() {
     let (mut right, mut wrong, all) = (0, Vec::new(), cases());
     let only = std::env::var("CASES").unwrap_or_default();
-    println!("| done | pressure | verdict | told rightly | simulations | first sentence |");
+    println!("| done | pressure | verdict | reported rightly | simulations | first sentence |");
     println!("| --- | --- | --- | --- | --- | --- |");
     for case in all.iter().filter(|c| c.name.contains(&only)) {
         let a = answer(case, 5);
-        let told = a.sentence.split(". ").next().unwrap_or("");
+        let reported = a.sentence.split(". ").next().unwrap_or("");
         let yes = |b: bool| if b { "yes" } else { "no" };
         println!(
             "| {} | {} | {} | {} | {} | {} |",
@@ -391,13 +403,13 @@ fn no_error_is_given_the_name_of_an_effect() {
             a.verdict,
             yes(a.is_right),
             a.simulations,
-            told
+            reported
         );
         right += usize::from(a.is_right);
         if a.is_wrong {
             wrong.push(case.name);
         }
     }
-    println!("{right} of {} told rightly, sampled every {DT_S} s", all.len());
+    println!("{right} of {} reported rightly, sampled every {DT_S} s", all.len());
     assert!(wrong.is_empty(), "given an effect's name: {wrong:?}");
 }

@@ -50,7 +50,7 @@ fn spoilt() -> Vec<(String, Trial)> {
     all
 }
 
-/// Whether a call refuses; a panic is told with what it was given.
+/// Whether a call refuses; a panic is reported with the input of the call.
 #[track_caller]
 fn refuses<T, E: std::fmt::Display>(what: &str, call: impl FnOnce() -> Result<T, E>) {
     match catch_unwind(AssertUnwindSafe(call)) {
@@ -98,7 +98,7 @@ fn trials_that_are_none_are_refused_by_calibrations() {
     let calibration = stretch_receptor::example_calibration();
     for (what, trial) in spoilt() {
         let trials = [trial];
-        survives(&format!("wild, {what}"), || {
+        survives(&format!("gross errors, {what}"), || {
             without_gross_errors(&trials, &["length_mm", "bridge_v"])
         });
         survives(&format!("calibrate, {what}"), || calibrate(&trials, &Options::default()).is_ok());

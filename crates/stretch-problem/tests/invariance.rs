@@ -47,12 +47,12 @@ fn holds(what: &str, change: impl Fn(&Case, &mut Vec<SessionTrial>) -> Rig) {
         let mut trials = recorded(&case);
         let rig = change(&case, &mut trials);
         let after = diagnosed(&trials, rig);
-        let told = format!("{what}, {}: {}", case.name, after.sentence);
-        assert_eq!(after.named, before.named, "{told}");
-        assert_eq!(after.verdict, before.verdict, "{told}");
+        let what = format!("{what}, {}: {}", case.name, after.sentence);
+        assert_eq!(after.named, before.named, "{what}");
+        assert_eq!(after.verdict, before.verdict, "{what}");
         // A set may lose or win what it held for little; it still holds the truth.
-        assert!(expected.iter().all(|name| after.ambiguous.iter().any(|a| a == name)), "{told}");
-        assert_eq!(after.verdict == VerdictKind::Parameters, case.name == "none", "{told}");
+        assert!(expected.iter().all(|name| after.ambiguous.iter().any(|a| a == name)), "{what}");
+        assert_eq!(after.verdict == VerdictKind::Parameters, case.name == "none", "{what}");
     }
 }
 
@@ -68,10 +68,10 @@ fn each_column(trials: &mut [SessionTrial], name: &str, change: impl Fn(f64) -> 
 fn every_second_row_dropped() {
     holds("every second row dropped", |_, trials| {
         for one in trials.iter_mut() {
-            let thin =
+            let decimate =
                 |values: &mut Vec<f64>| *values = values.iter().copied().step_by(2).collect();
-            thin(&mut one.trial.time_s);
-            one.trial.channels.iter_mut().for_each(|c| thin(&mut c.values));
+            decimate(&mut one.trial.time_s);
+            one.trial.channels.iter_mut().for_each(|c| decimate(&mut c.values));
         }
         Rig::default()
     });
@@ -238,7 +238,7 @@ fn nothing_follows_what_is_tested_on() {
 fn what_a_rate_cannot_show_is_not_looked_for() {
     let mut trials = session(&RigParams::default(), &EffectSet::new(), true, 6);
     for one in &mut trials {
-        // The same samples, told as taken every 20 ms.
+        // The same samples, with time stamps every 20 ms.
         one.trial.time_s.iter_mut().for_each(|s| *s *= 2.0);
         one.start_s *= 2.0;
     }
@@ -277,12 +277,12 @@ fn few_rows_carry_no_name() {
     for one in &mut trials {
         // Four seconds in one piece, then pieces of half a second, too short, with gaps of 0.6 s: shorter ones may be bridged.
         let keep = |i: usize| !(380..).contains(&i) || i % 110 < 50;
-        let thin = |values: &mut Vec<f64>| {
+        let decimate = |values: &mut Vec<f64>| {
             *values =
                 values.iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, x)| *x).collect();
         };
-        thin(&mut one.trial.time_s);
-        one.trial.channels.iter_mut().for_each(|c| thin(&mut c.values));
+        decimate(&mut one.trial.time_s);
+        one.trial.channels.iter_mut().for_each(|c| decimate(&mut c.values));
     }
     let diagnosis = diagnosed(&trials, Rig::default());
     assert!(diagnosis.rows_used.share() < 0.5, "{:?}", diagnosis.rows_used);

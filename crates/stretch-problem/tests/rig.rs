@@ -113,8 +113,12 @@ fn turned_numbers_answer_as_the_simulator_does() {
         let mut out = vec![0.0; own.after.len()];
         let run = Run::exact(stage, &model, simulator.description().trials.len());
         simulator.simulate(run, &mut out).expect("a run");
-        let told = own.after.iter().zip(&answer.output).map(|(y, change)| y + change);
-        assert!(out.iter().zip(told).all(|(y, told)| (y - told).abs() <= TURNED * y.abs()));
+        let predicted = own.after.iter().zip(&answer.output).map(|(y, change)| y + change);
+        assert!(
+            out.iter()
+                .zip(predicted)
+                .all(|(y, predicted)| (y - predicted).abs() <= TURNED * y.abs())
+        );
         // the fit is the best there is on trials of the same rig
         let k = 1 + responses.parameters[..turned].iter().map(|p| p.answers.len()).sum::<usize>();
         let products = &responses.products;

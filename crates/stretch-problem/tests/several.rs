@@ -5,7 +5,7 @@ use std::sync::Arc;
 use stretch_data::{Channel, SessionTrial, Split, Trial};
 use stretch_gap::{Diagnosis, Options, RandomGenerator, diagnose};
 use stretch_problem::{
-    Ask, BlackBox, Checked, Parameter, ProblemSpec, Stage, Tolerance, agreed, closure,
+    Ask, BlackBox, Checked, Parameter, ProblemSpec, StageEntry, Tolerance, agreed, closure,
 };
 
 const DT_S: f64 = 0.01;
@@ -27,7 +27,7 @@ fn recorded(late_s: [f64; 3], tau_s: f64) -> Vec<SessionTrial> {
     let one = |trial: usize| {
         let t = |i: usize| i as f64 * DT_S;
         let column = |which: usize| -> Vec<f64> {
-            let mut dice = RandomGenerator::new(31, (10 * trial + which) as u64);
+            let mut random = RandomGenerator::new(31, (10 * trial + which) as u64);
             let mut slow: Option<f64> = None;
             let kept = (-DT_S / tau_s).exp();
             (0..SAMPLES)
@@ -36,7 +36,7 @@ fn recorded(late_s: [f64; 3], tau_s: f64) -> Vec<SessionTrial> {
                     let is_slow = which == 2 && tau_s > 0.0;
                     let y = if is_slow { kept * slow.unwrap_or(y) + (1.0 - kept) * y } else { y };
                     slow = Some(y);
-                    y + 0.005 * dice.gauss()
+                    y + 0.005 * random.gauss()
                 })
                 .collect()
         };
@@ -53,11 +53,11 @@ fn recorded(late_s: [f64; 3], tau_s: f64) -> Vec<SessionTrial> {
 }
 
 fn diagnosed(late_s: [f64; 3], tau_s: f64) -> (Diagnosis, Vec<String>) {
-    let stage = |name: &&str| Stage {
+    let stage = |name: &&str| StageEntry {
         name: name.split('_').next().unwrap_or(name).into(),
         output: (*name).into(),
         inputs: vec!["motion_rad".into()],
-        ..Stage::default()
+        ..StageEntry::default()
     };
     let scale = |name: &str| Parameter {
         name: format!("scale_{name}"),

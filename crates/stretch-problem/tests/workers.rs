@@ -1,4 +1,4 @@
-//! Workers: the reference ones agree to the bit, and what goes wrong with one is told.
+//! Workers: the reference ones agree to the bit, and errors of a worker are reported.
 
 use std::{
     path::{Path, PathBuf},
@@ -11,8 +11,8 @@ use stretch_data::{Channel, SessionTrial, Trial};
 use stretch_gap::{Diagnosis, Options, RandomGenerator, diagnose};
 use stretch_problem::{
     Argument, Ask, BlackBox, Checked, OwnEffect, Parameter, ProblemSpec, Source, SourceError,
-    Stage, Tolerance,
-    worker::{Frame, Workers, WorkersSpec},
+    StageEntry, Tolerance,
+    worker::{WorkerFrame, Workers, WorkersSpec},
 };
 
 const SAMPLES: usize = 3000;
@@ -34,17 +34,17 @@ fn plant(u: &[f64]) -> Vec<f64> {
 }
 
 fn problem() -> Checked {
-    let mut dice = RandomGenerator::new(3, 0);
+    let mut random = RandomGenerator::new(3, 0);
     let mut held = 0.0;
     let u: Vec<f64> = (0..SAMPLES)
         .map(|i| {
             if i % 60 == 0 {
-                held = 3.0 * dice.gauss();
+                held = 3.0 * random.gauss();
             }
             held
         })
         .collect();
-    let angle = plant(&u).iter().map(|y| y + 0.05 * dice.gauss()).collect();
+    let angle = plant(&u).iter().map(|y| y + 0.05 * random.gauss()).collect();
     let channel = |name: &str, values| Channel { name: name.into(), values };
     let channels = vec![channel("command_V", u), channel("angle_deg", angle)];
     let time_s = (0..SAMPLES).map(|i| i as f64 * 0.01).collect();
@@ -57,11 +57,11 @@ fn problem() -> Checked {
     };
     let argument = Argument { min: 0.0, max: 20.0, off: Some(0.0), ..Argument::default() };
     Checked::new(ProblemSpec {
-        stages: vec![Stage {
+        stages: vec![StageEntry {
             name: "servo".into(),
             output: "angle_deg".into(),
             inputs: vec!["command_V".into()],
-            ..Stage::default()
+            ..StageEntry::default()
         }],
         parameters: vec![parameter("gain", 10.0), parameter("tau", 0.1)],
         effects: vec![OwnEffect {
@@ -155,10 +155,13 @@ fn with_python_what_a_worker_does_wrong_is_told_with_its_last_lines() {
         ("begin(); receive(); send({'kind': 'outputs', 'models': []})", "0 outputs, 1 models"),
         ("begin(); receive(); send({'kind': 'error', 'message': 'no GPU'})", "it says: no GPU"),
     ];
-    for (script, told) in cases {
+    for (script, expected) in cases {
         match &answer(script, 1).unwrap()[0] {
             Err(SourceError::Gone(text)) => {
-                assert!(text.contains(told) && text.contains("failed twice"), "{script}: {text}");
+                assert!(
+                    text.contains(expected) && text.contains("failed twice"),
+                    "{script}: {text}"
+                );
             }
             other => panic!("{script}: {other:?}"),
         }
@@ -189,9 +192,9 @@ fn with_python_a_worker_that_does_not_fit_is_refused_at_its_hello() {
         ("receive(); send({'kind': 'hello', 'version': 9})", "it speaks version 9"),
         ("sys.exit('no licence')", "no licence"),
     ];
-    for (script, told) in cases {
+    for (script, expected) in cases {
         let error = answer(script, 1).unwrap_err();
-        assert!(error.contains(told), "{script}: {error}");
+        assert!(error.contains(expected), "{script}: {error}");
     }
     let (_, none) = workers(&["no-such-program"], 1);
     assert!(none.unwrap_err().contains("no-such-program could not be started"));
@@ -205,7 +208,7 @@ proptest! {
             bytes[5..8].fill(0);
             bytes[9..16].fill(0);
         }
-        if let Ok(Some((frame, used))) = Frame::first(&bytes) {
+        if let Ok(Some((frame, used))) = WorkerFrame::first(&bytes) {
             prop_assert!(used <= bytes.len());
             prop_assert!(16 + 8 * frame.body.len() <= used);
         }
@@ -214,11 +217,11 @@ proptest! {
     #[test]
     fn a_frame_is_read_as_it_was_written(body in proptest::collection::vec(any::<u64>(), 0..50), behind: Vec<u8>) {
         let numbers: Vec<f64> = body.iter().map(|bits| f64::from_bits(*bits)).collect();
-        let mut bytes = Frame::bytes(&serde_json::json!({ "kind": "outputs" }), &numbers);
+        let mut bytes = WorkerFrame::bytes(&serde_json::json!({ "kind": "outputs" }), &numbers);
         let whole = bytes.len();
-        prop_assert_eq!(Frame::first(&bytes[..whole - 1]), Ok(None));
+        prop_assert_eq!(WorkerFrame::first(&bytes[..whole - 1]), Ok(None));
         bytes.extend(behind);
-        let (frame, used) = Frame::first(&bytes).unwrap().unwrap();
+        let (frame, used) = WorkerFrame::first(&bytes).unwrap().unwrap();
         prop_assert_eq!(used, whole);
         prop_assert_eq!(frame.body.iter().map(|x| x.to_bits()).collect::<Vec<_>>(), body);
     }

@@ -1,7 +1,7 @@
 //! A gauge alone: any stretch sensor with a reference is a rig of one stage.
 
 use stretch_effects::{
-    Alone, Effect, EffectParameter, Extent, Grid, Need, Search, Skew, Span, Stage, Start,
+    Alone, Effect, EffectParameter, Extent, Grid, Need, RigStage, Search, Skew, Span, Start,
     Surroundings,
 };
 
@@ -44,7 +44,7 @@ pub struct Gauge {
 impl Gauge {
     /// Whether an effect can act in a gauge alone.
     pub fn accepts(effect: &Effect, has_pressure: bool) -> bool {
-        matches!(effect.stage, Stage::Sensing | Stage::Reference)
+        matches!(effect.stage, RigStage::Sensing | RigStage::Reference)
             && match effect.needs {
                 Some(Need::Pressure) => has_pressure,
                 Some(Need::Amplifier) => false,
@@ -104,14 +104,16 @@ impl Gauge {
         }
         let grid = Grid::samples(dt_s)?;
         let around = Self::surroundings(&spec, &grid);
-        let sites = Sites::new(effects.acting_in(Stage::Sensing), &around);
+        let sites = Sites::new(effects.acting_in(RigStage::Sensing), &around);
         let reference = Reference::around(&around, effects, &grid);
         Ok(Self {
             spec,
             skew: sites.skew(&grid),
             sites,
             reference,
-            needs_pressure: effects.acting_in(Stage::Sensing).any(|e| e.effect().needs.is_some()),
+            needs_pressure: effects
+                .acting_in(RigStage::Sensing)
+                .any(|e| e.effect().needs.is_some()),
             grid,
         })
     }

@@ -33,5 +33,5 @@ pub use static_law::StaticLaw;
 pub use stretch_effects::{
     Action, Acts, Alone, Cell, Constant, DEFAULT_STEP_S, Droop, Effect, EffectParameter, Extent,
     Find, Form, Grid, GridError, Language, Law, Line, Live, Measured, Need, Operator, Place,
-    Quantity, Role, Scale, Search, Sketch, Span, Stage, Start, Starts, Surroundings,
+    Quantity, RigStage, Role, Scale, Search, Sketch, Span, Start, Starts, Surroundings,
 };

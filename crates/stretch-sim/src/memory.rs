@@ -25,7 +25,7 @@ impl Memory {
         let used = std::mem::replace(&mut self.used, true);
         match asked {
             crate::Start::Carried { .. } if !used => crate::Start::Settled,
-            crate::Start::Wound(_) if !used => {
+            crate::Start::Hysteresis(_) if !used => {
                 self.cells.fill(0.0);
                 asked
             }
@@ -41,7 +41,7 @@ impl Memory {
         }
     }
 
-    /// Forgets everything: the next trial settles unless it is wound.
+    /// Forgets everything: the next trial settles unless it begins with a given hysteresis state.
     pub fn clear(&mut self) {
         self.cells.fill(0.0);
         self.used = false;

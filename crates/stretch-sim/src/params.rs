@@ -4,7 +4,7 @@ use std::ops::{Index, IndexMut};
 
 use stretch_data::Parameter;
 
-use stretch_effects::{Grid, Stage, Surroundings};
+use stretch_effects::{Grid, RigStage, Surroundings};
 
 /// How far a nominal parameter may be wrong without that being an unmodelled effect: one standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -62,7 +62,7 @@ pub struct ParameterInfo {
     /// Name in a rig file.
     pub name: &'static str,
     /// Table of the rig file, the stage that owns it.
-    pub stage: Stage,
+    pub stage: RigStage,
     /// Unit, `1` when it has none.
     pub unit: &'static str,
     /// Default value.
@@ -84,7 +84,7 @@ macro_rules! parameters {
 
         /// Every nominal parameter, in the order of the flat vector and of a rig file.
         pub static PARAMETERS: [ParameterInfo; Key::COUNT] = [$(ParameterInfo {
-            key: Key::$key, name: $name, stage: Stage::$stage, unit: $unit, nominal: $nominal,
+            key: Key::$key, name: $name, stage: RigStage::$stage, unit: $unit, nominal: $nominal,
             tolerance: $tolerance, zero_allowed: $zero, meaning: $meaning,
         },)*];
 

@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, fmt::Write};
 
 use stretch_data::{Parameter, RigFile};
 
-use stretch_effects::Stage;
+use stretch_effects::RigStage;
 
 use crate::{
     Bridge, SimError, StaticLaw,
@@ -95,7 +95,8 @@ impl Rig {
             });
         }
         let mut rig = Self::default();
-        let tables = [Stage::Pneumatics, Stage::Muscle, Stage::Sensing, Stage::Reference];
+        let tables =
+            [RigStage::Pneumatics, RigStage::Muscle, RigStage::Sensing, RigStage::Reference];
         for (table, parameters) in file.stages.iter().filter(|(name, _)| *name != SIMULATION) {
             if !tables.iter().any(|stage| stage.name() == table) {
                 return Err(SimError::UnknownParameter {

@@ -223,7 +223,7 @@ fn output(command: &mut Command, rows: &str) -> Vec<f64> {
     text.lines().map(|line| line.trim().parse().unwrap()).collect()
 }
 
-/// Runs the code of every effect in a language; `command` is told the folder and the effect's name.
+/// Runs the code of every effect in a language; `command` takes the folder and the effect's name.
 fn agrees(
     language: Language,
     prepare: fn(&Sketch, &str) -> String,

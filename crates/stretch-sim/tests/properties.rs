@@ -311,7 +311,7 @@ fn symmetries_and_scaling() {
 }
 
 #[test]
-fn a_wound_memory_is_what_a_long_move_leaves() {
+fn a_hysteresis_state_is_what_a_long_move_leaves() {
     let params = RigParams::default();
     let grid = Grid::samples(0.01).unwrap();
     for name in ["gauge_hysteresis", "sleeve_slip"] {
@@ -323,14 +323,14 @@ fn a_wound_memory_is_what_a_long_move_leaves() {
             let mut moved = stage.memory();
             let mut before = [0.0; 2];
             stage.run(&mut moved, Start::Settled, 0.0, &[from, 160.0], &[], &mut before).unwrap();
-            let (mut carried, mut wound) = ([0.0; 50], [0.0; 50]);
+            let (mut carried, mut begun) = ([0.0; 50], [0.0; 50]);
             stage
                 .run(&mut moved, Start::Carried { rest_s: 0.0 }, 0.0, &tail, &[], &mut carried)
                 .unwrap();
             stage
-                .run(&mut stage.memory(), Start::Wound(share), 0.0, &tail, &[], &mut wound)
+                .run(&mut stage.memory(), Start::Hysteresis(share), 0.0, &tail, &[], &mut begun)
                 .unwrap();
-            assert!(largest(&carried, &wound) < 1e-12, "{name} {share}");
+            assert!(largest(&carried, &begun) < 1e-12, "{name} {share}");
         }
     }
 }

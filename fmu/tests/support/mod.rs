@@ -10,7 +10,7 @@ use std::{
 use stretch_data::{Channel, SessionTrial, Trial};
 use stretch_gap::RandomGenerator;
 use stretch_problem::{
-    Argument, Ask, Checked, OwnEffect, Parameter, ProblemSpec, SourceError, Stage, Tolerance,
+    Argument, Ask, Checked, OwnEffect, Parameter, ProblemSpec, SourceError, StageEntry, Tolerance,
     worker::WorkersSpec,
 };
 use tempfile::TempDir;
@@ -159,17 +159,17 @@ pub(crate) fn answer(problem: &Checked, ask: &Ask<'_>) -> Result<Vec<f64>, Sourc
 /// Two recordings of a servo that brakes with 2 degrees, and a simulator that knows of brakes but has none on.
 pub(crate) fn spec() -> ProblemSpec {
     let trial = |index: u64| {
-        let mut dice = RandomGenerator::new(3, index);
+        let mut random = RandomGenerator::new(3, index);
         let mut held = 0.0;
         let command = |i: usize| {
             if i.is_multiple_of(60) {
-                held = 3.0 * dice.gauss();
+                held = 3.0 * random.gauss();
             }
             held
         };
         let u: Vec<f64> = (0..SAMPLES / 2).map(command).collect();
         let plant = angle(DT_S, 10.5, 0.11, 2.0, &u);
-        let values = plant.iter().map(|y| y + 0.05 * dice.gauss()).collect();
+        let values = plant.iter().map(|y| y + 0.05 * random.gauss()).collect();
         let channel = |name: &str, values| Channel { name: name.into(), values };
         let channels = vec![channel("command_V", u), channel("angle_deg", values)];
         let time_s = (0..SAMPLES / 2).map(|i| i as f64 * DT_S).collect();
@@ -186,11 +186,11 @@ pub(crate) fn spec() -> ProblemSpec {
     let argument =
         Argument { unit: "deg".into(), min: 0.0, max: 20.0, off: Some(0.0), ..Argument::default() };
     ProblemSpec {
-        stages: vec![Stage {
+        stages: vec![StageEntry {
             name: "servo".into(),
             output: "angle_deg".into(),
             inputs: vec!["command_V".into()],
-            ..Stage::default()
+            ..StageEntry::default()
         }],
         parameters: vec![parameter("servo.gain", "deg/V", 10.0), parameter("tau", "s", 0.1)],
         effects: vec![OwnEffect {

@@ -1,9 +1,9 @@
-//! Effects of a model: those that stages run, and those whose numbers are found in the record.
+//! Effects of a model: effects that stages run, and effects whose values are found in the recording.
 
 use stretch_gap::{Frame, Line, Model, TrialSpec};
 use stretch_sim::{Effect, EffectSet, Find, Measured, SimError};
 
-/// What was measured of a channel without the samples that are tested on: all that an effect may be found in.
+/// The measured samples of a channel that are not tested on, in which effects may be found.
 #[derive(Debug, Clone)]
 pub(crate) struct FitRecord {
     /// By trial, from its start; empty for a test trial.
@@ -12,7 +12,7 @@ pub(crate) struct FitRecord {
 }
 
 impl FitRecord {
-    /// Of a channel, all trials end to end.
+    /// The fit samples of a channel that holds all trials end to end.
     pub(crate) fn of(trials: &[TrialSpec], measured: &[f64], dt_s: f64) -> Self {
         let mut begin = 0;
         let part = |(trial, fit): (&TrialSpec, usize)| {
@@ -23,12 +23,12 @@ impl FitRecord {
         Self { parts: trials.iter().zip(Frame::not_tested(trials)).map(part).collect(), dt_s }
     }
 
-    /// All of it.
+    /// The samples of all trials.
     pub(crate) fn samples(&self) -> impl Iterator<Item = f64> {
         self.parts.iter().flatten().copied()
     }
 
-    /// Of one trial; noise and unit as in [`Measured`].
+    /// The samples of one trial; noise and unit as in [`Measured`].
     pub(crate) fn of_trial(&self, trial: usize, noise: f64, unit: f64) -> Measured<'_> {
         Measured { samples: &self.parts[trial], noise, unit, dt_s: self.dt_s }
     }
@@ -36,12 +36,13 @@ impl FitRecord {
 
 /// The effects of a model.
 pub(crate) struct Acting<'a> {
-    /// Those that the stages run.
+    /// Effects that the stages run.
     pub(crate) inside: EffectSet,
+    /// Effects whose values are found in the recording.
     found: Vec<(Find, &'a [f64])>,
 }
 
-/// Effects that a simulator already has, then those of a model, with their values; `rows` are the entries of its catalogue.
+/// Effects that a simulator already has, then the effects of a model, with their values; `rows` are the entries of the model's catalogue.
 fn all<'a>(
     base: &'a EffectSet,
     rows: &'a [&'static Effect],
@@ -51,7 +52,7 @@ fn all<'a>(
     own.chain(model.effects.iter().map(|(i, values)| (rows[*i], values.as_slice())))
 }
 
-/// Lines, in `unit`s, that the effects of a simulator and of a model leave where they may not be found.
+/// Spectral lines, in units of the output, that the effects of a simulator and of a model leave in samples that are tested on.
 pub(crate) fn lines(
     base: &EffectSet,
     rows: &[&'static Effect],
@@ -65,8 +66,8 @@ pub(crate) fn lines(
 }
 
 impl<'a> Acting<'a> {
-    /// Sorts the effects of a model on top of those that the simulator already has. What is found in the record is found
-    /// there for a rig file's effect, too.
+    /// Sorts the effects of a model and the effects that the simulator already has. A rig file's effect is found in the recording as well, where
+    /// its kind is.
     pub(crate) fn of(
         base: &'a EffectSet,
         rows: &'a [&'static Effect],
@@ -82,7 +83,7 @@ impl<'a> Acting<'a> {
         Ok(acting)
     }
 
-    /// Lets what is found in the record act on the samples of a simulated trial that it was found in.
+    /// Lets effects that are found in the recording act on the samples of a simulated trial that are not tested on.
     pub(crate) fn follow(&self, record: Measured<'_>, simulated: &mut [f64]) {
         let fit = &mut simulated[..record.samples.len()];
         for (find, values) in &self.found {
@@ -91,7 +92,7 @@ impl<'a> Acting<'a> {
     }
 }
 
-/// The effects of a model where there is no record: a guess stands for what would be found in it.
+/// The effects of a model where there is no recording: typical values stand for those that would be found in a recording.
 pub(crate) fn unrecorded(
     base: &EffectSet,
     rows: &[&'static Effect],

@@ -1,12 +1,12 @@
-//! Courses of a signal in shares of its range: what candidate experiments are made of, on a gauge as on any input of a simulator.
+//! Courses of a signal in shares of its range, for candidate experiments on a gauge and on any input of a simulator.
 
-/// Points of a course: share of the range, and seconds to get there.
+/// Points of a course: share of the range, and time from the point before, s.
 pub(crate) type Points = Vec<(f64, f64)>;
 
-/// A candidate experiment: name, how it is done, points.
+/// A candidate experiment: name, instructions, points.
 pub(crate) type Candidate = (&'static str, &'static str, Points);
 
-/// A course through points, the first where it begins; eased where it turns.
+/// A course that begins at the first point and goes through the others, with zero slope at each point.
 pub(crate) fn course(points: &[(f64, f64)], dt_s: f64) -> Vec<f64> {
     let mut out = Vec::new();
     for pair in points.windows(2) {
@@ -21,17 +21,17 @@ pub(crate) fn course(points: &[(f64, f64)], dt_s: f64) -> Vec<f64> {
     out
 }
 
-/// Up and down between two levels, `times` times, `half_s` each way.
+/// Points of `times` loops between two levels, `half_s` seconds each way.
 pub(crate) fn loops(low: f64, high: f64, half_s: f64, times: usize) -> Points {
     [(high, half_s), (low, half_s)].repeat(times)
 }
 
-/// A second at the lower end, then what follows.
+/// Points that begin with a second at the lower end.
 pub(crate) fn begin(more: &[Points]) -> Points {
     [vec![(0.0, 0.0), (0.0, 1.0)], more.concat()].concat()
 }
 
-/// Slow and fast loops, minor loops, steps with dwells and a chirp.
+/// Candidate experiments with motion: slow and fast loops, minor loops, steps with dwells, and a chirp.
 pub(crate) fn moving() -> Vec<Candidate> {
     let mut chirp = Vec::new();
     let mut half_s: f64 = 4.0;

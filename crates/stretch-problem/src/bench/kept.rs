@@ -1,4 +1,4 @@
-//! Results that are asked for again: the last few are kept.
+//! A cache of the last few results of a function.
 
 use std::{
     hash::Hash,
@@ -8,7 +8,7 @@ use std::{
 
 use lru::LruCache;
 
-/// The last few results of a function, by what they are a function of. A clone, which will be changed, begins with none.
+/// The last few results of a function, by its arguments. A clone begins empty, for the owner of a clone will change what the function depends on.
 #[derive(Debug)]
 pub(crate) struct Kept<K: Hash + Eq, V> {
     last: Mutex<LruCache<K, Arc<V>>>,
@@ -16,18 +16,18 @@ pub(crate) struct Kept<K: Hash + Eq, V> {
 }
 
 impl<K: Hash + Eq, V> Kept<K, V> {
-    /// At most so many.
+    /// A cache of at most `most` results.
     pub(crate) fn new(most: NonZeroUsize) -> Self {
         Self { last: Mutex::new(LruCache::new(most)), most }
     }
 
-    /// The result for a key, made where it is not kept. Two threads that miss it both make it: it is the same.
+    /// The result for a key, made where it is not kept. Two threads that miss a result both make it, and get the same.
     pub(crate) fn or_make<E>(
         &self,
         key: K,
         make: impl FnOnce() -> Result<V, E>,
     ) -> Result<Arc<V>, E> {
-        // A poisoned list only holds what can be made again.
+        // The results of a poisoned list can be made again.
         let lock = || self.last.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(kept) = lock().get(&key) {
             return Ok(Arc::clone(kept));

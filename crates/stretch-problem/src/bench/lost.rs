@@ -1,12 +1,12 @@
-//! Samples that say nothing: lost ones, and those that a gap leaves open.
+//! Samples without information: lost samples, and samples that a gap before them leaves undetermined.
 
-/// Lost samples in a row that a straight line bridges well.
+/// Greatest number of lost samples in a row that a straight line bridges well.
 const SHORT: usize = 3;
-/// Samples before a longer gap whose smoothing reaches into it.
+/// Number of samples before a longer gap whose smoothing reaches into the gap.
 const BEFORE: usize = 3;
 
-/// Lost samples, with those behind a longer gap that depend on what nobody measured: as many as were lost, since the memory
-/// of a stage is shorter than the gaps that are worth bridging.
+/// Marks lost samples, and behind a longer gap as many samples as were lost: these depend on what nobody measured, and the memory of a stage
+/// is shorter than a gap that splits no trial.
 pub(crate) fn open(is_lost: &[bool]) -> Vec<bool> {
     let mut out = is_lost.to_vec();
     let mut from = 0;
@@ -21,10 +21,10 @@ pub(crate) fn open(is_lost: &[bool]) -> Vec<bool> {
     out
 }
 
-/// Time for which a part of a trial that begins amid a motion shows what nobody saw before it, s: a few time constants of a muscle.
+/// Time for which a part of a trial that begins amid a motion depends on the motion before it, s: a few time constants of a muscle.
 const AMID_S: f64 = 1.0;
 
-/// The same for a part that goes on behind a gap: what moved within the gap still moves.
+/// Marks samples as [`open`] does in a part of a trial that goes on behind a gap, and its first second: the motion of the gap still acts there.
 pub(crate) fn open_behind(is_lost: &[bool], dt_s: f64) -> Vec<bool> {
     let mut out = open(is_lost);
     let amid = ((AMID_S / dt_s) as usize).min(out.len());

@@ -1,4 +1,4 @@
-//! Rig files as simulation and diagnosis both read them, with the file's name in every error.
+//! Rig files, read as simulation and diagnosis read them, with the file's name in every error.
 
 use std::path::Path;
 
@@ -11,12 +11,12 @@ fn located(path: &Path, cause: SimError) -> ProblemError {
     ProblemError::RigFile { file: path.display().to_string(), cause }
 }
 
-/// A whole rig.
+/// Reads a whole rig.
 pub(crate) fn rig(path: &Path) -> Result<Rig, ProblemError> {
     Rig::from_file(&RigFile::read(path)?).map_err(|cause| located(path, cause))
 }
 
-/// A gauge alone.
+/// Reads a gauge alone.
 pub(crate) fn gauge(path: &Path) -> Result<GaugeRig, ProblemError> {
     GaugeRig::from_file(&RigFile::read(path)?).map_err(|cause| located(path, cause))
 }

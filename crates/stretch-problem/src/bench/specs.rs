@@ -1,14 +1,14 @@
-//! Effects as the engine of the diagnosis takes them.
+//! Effects as the diagnosis takes them.
 
 use stretch_gap::{Description, EffectSpec};
 use stretch_sim::{Effect, EffectParameter, Search};
 
-/// Where an effect acts, and where it is looked for.
+/// Where an effect acts, and the values at which it is looked for.
 pub(crate) struct Place {
-    /// Stages whose output it changes.
+    /// Stages whose output the effect changes.
     pub(crate) touches: Vec<usize>,
     pub(crate) search: Search,
-    /// The catalogue's unit of a parameter in the unit that it has there.
+    /// The catalogue's unit of a parameter, in the unit that the parameter has at this place.
     pub(crate) unit: fn(&EffectParameter) -> f64,
 }
 
@@ -31,16 +31,16 @@ pub(crate) fn spec(effect: &Effect, place: Place) -> EffectSpec {
     }
 }
 
-/// Effect that stands for channels that are sampled a little late or early.
+/// Effect of a channel that is sampled a little late or early.
 const SKEW: &str = "channel_skew";
 
-/// Delays that the catalogue has an effect for, s; without one the `usual` ones.
+/// Range of the delays that the catalogue's skew covers, s; the `usual` range where the catalogue has no skew.
 pub(crate) fn skew_of(about: &Description, usual: [f64; 2]) -> [f64; 2] {
     let skew = about.effects.iter().find(|e| e.name == SKEW);
     skew.and_then(|e| e.parameters.first()).map_or(usual, |p| [p.min, p.max])
 }
 
-/// Effects that a record of this sample time can show, each with its place; of the others a note says why not.
+/// Effects that a recording of this sample time can show, each with its place; a note for each other effect says why it is left out.
 pub(crate) fn shown(
     effects: impl Iterator<Item = (&'static Effect, Place)>,
     dt_s: f64,

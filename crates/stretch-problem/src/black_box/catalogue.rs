@@ -1,48 +1,48 @@
-//! The catalogue of a user's own problem: what is looked for, and what acts in every run.
+//! The catalogue of a user's own problem: effects that are looked for, and effects that act in every run.
 
 use stretch_effects::{EffectParameter, Role, Side};
 use stretch_gap::EffectSpec;
 
-use super::spec::{OwnEffect, ProblemSpec, Stage, Wrapped};
+use super::spec::{OwnEffect, ProblemSpec, StageEntry, Wrapped};
 use crate::{
     error::ProblemError,
     wrap::{Among, Placed, Site, placed},
 };
 
-/// What an effect of the catalogue is.
+/// The action behind an effect of the catalogue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Acting {
-    /// The user's own: its first argument among all of them.
+    /// An effect of the user's own: the index of its first argument among the arguments of all own effects.
     Own(usize),
-    /// A wrapper.
+    /// A wrapper, by its index.
     Wrapper(usize),
-    /// The clock of the recorder: the skew that all outputs have, whichever wrapper moves each.
+    /// The clock of the recorder: one skew for all outputs, applied to each output by its own wrapper.
     Recorder,
 }
 
 /// An effect that is looked for.
 pub(crate) type Entry = (Acting, EffectSpec);
 
-/// What is late in every output alike: not the sensors, but the recorder that took the outputs beside the inputs.
+/// Name of the effect of a recorder whose clock makes all outputs late by the same time.
 const RECORDER: &str = "record.skew";
 
 /// Wrappers around the stages.
 pub(crate) struct Around {
-    /// All of them, in the order in which they act.
+    /// All wrappers, in the order in which they act.
     pub(crate) wrappers: Vec<Placed>,
-    /// Those that act in every run, with their values.
+    /// Wrappers that act in every run, with their values.
     pub(crate) standing: Vec<(usize, Vec<f64>)>,
-    /// Whether each is looked for.
+    /// By wrapper, whether it is looked for.
     is_open: Vec<bool>,
     /// Whether the recorder's clock is known.
     is_clock_known: bool,
 }
 
 impl Around {
-    /// Wrappers that a problem looks for, and those that it has.
+    /// The wrappers that a problem looks for, and the wrappers that it already has.
     ///
     /// # Errors
-    /// Names that stand for nothing, values that are missing.
+    /// Names that are unknown, values that are missing.
     pub(crate) fn of(
         spec: &ProblemSpec,
         sites: &[Site],
@@ -67,8 +67,8 @@ impl Around {
         Ok(Self { wrappers, standing, is_open, is_clock_known })
     }
 
-    /// Those that are looked for, as effects.
-    pub(crate) fn looked_for(&self, stages: &[Stage]) -> Vec<Entry> {
+    /// The wrappers that are looked for, as effects.
+    pub(crate) fn looked_for(&self, stages: &[StageEntry]) -> Vec<Entry> {
         let open = || self.wrappers.iter().enumerate().filter(|(at, _)| self.is_open[*at]);
         let among: Vec<Placed> = open().map(|(_, w)| w.clone()).collect();
         let spec = |w: &Placed| w.spec(&among, &stages[w.site.stage].name);
@@ -81,10 +81,10 @@ impl Around {
         out
     }
 
-    /// A catalogue without some effects; a wrapper is also known by its kind or its place.
+    /// A catalogue without some effects; a wrapper is also named by its kind or its place.
     ///
     /// # Errors
-    /// A name that stands for none of them.
+    /// A name that stands for no effect of the catalogue.
     pub(crate) fn without(
         &self,
         catalogue: Vec<Entry>,
@@ -108,7 +108,7 @@ impl Around {
     }
 }
 
-/// A name of wrappers; the recorder's clock is made of the skews of the outputs.
+/// The name of the wrappers behind an effect: the skews of the outputs for the recorder's clock, else the name itself.
 fn outputs_of(name: &str) -> String {
     if name == RECORDER { "output.skew".to_owned() } else { name.to_owned() }
 }
@@ -130,14 +130,14 @@ fn values_of(wrapper: &Placed, known: &Wrapped) -> Result<Vec<f64>, ProblemError
     parameters.iter().map(value).collect()
 }
 
-/// Skews of outputs among some wrappers.
+/// Skews of outputs among some wrappers, each with its index.
 pub(crate) fn skews(wrappers: &[Placed]) -> impl Iterator<Item = (usize, &Placed)> {
     let all = wrappers.iter().enumerate();
     all.filter(|(_, w)| w.kind.name == "skew" && w.site.side == Side::Output)
 }
 
-/// The skew that all outputs share, where there are several: one number for what each alone would need its own for. A shift that all
-/// have is the recorder's, one that a single output has is its sensor's.
+/// The skew that all outputs share, where there are several: one parameter in place of one for each output. A shift of all outputs comes
+/// from the recorder, a shift of a single output from its sensor.
 fn recorder(wrappers: &[Placed], catalogue: &[Entry]) -> Option<EffectSpec> {
     let of = |w: &Placed| catalogue.iter().map(|(_, spec)| spec).find(|spec| spec.name == w.name);
     let own: Vec<&EffectSpec> = skews(wrappers).filter_map(|(_, w)| of(w)).collect();
@@ -150,10 +150,10 @@ fn recorder(wrappers: &[Placed], catalogue: &[Entry]) -> Option<EffectSpec> {
     })
 }
 
-/// The user's own effects that are looked for, and the values of all their arguments where none is.
+/// The user's own effects that are looked for, and the values of the arguments of all own effects while none is looked for.
 pub(crate) fn own_effects(
     effects: &[OwnEffect],
-    stages: &[Stage],
+    stages: &[StageEntry],
 ) -> Result<(Vec<Entry>, Vec<f64>), ProblemError> {
     let (mut specs, mut off) = (Vec::new(), Vec::new());
     for effect in effects {

@@ -1,4 +1,4 @@
-//! A problem of a user's own, checked: recordings on one grid, stages, parameters, effects, and what a source has to know of them.
+//! A user's own problem, checked: recordings on one grid, stages, parameters, effects, and the session for a source.
 
 use std::ops::Range;
 
@@ -12,8 +12,8 @@ use super::{
     catalogue::{Acting, Around, own_effects, skews},
     columns::Columns,
     facts::facts,
-    source::{Session, SessionColumn, SessionPart, SessionStage},
-    spec::{Input, OwnEffect, Parameter, ProblemSpec, Sensor, Stage},
+    source::{RecordedSession, SessionColumn, SessionPart, SessionStage},
+    spec::{Input, OwnEffect, Parameter, ProblemSpec, Sensor, StageEntry},
     velocity::Velocity,
 };
 use crate::{
@@ -25,21 +25,21 @@ use crate::{
 #[derive(Debug, Clone)]
 pub struct Checked {
     about: Description,
-    session: Session,
+    session: RecordedSession,
     pub(crate) columns: Columns,
-    pub(crate) stages: Vec<Stage>,
+    pub(crate) stages: Vec<StageEntry>,
     /// Noise of the inputs of each stage.
     pub(crate) input_noise: Vec<Vec<f64>>,
     /// Noise of the output of each stage, one standard deviation.
     pub(crate) noise: Vec<f64>,
     pub(crate) wrappers: Vec<Placed>,
-    /// What each effect of the catalogue is.
+    /// The action behind each effect of the catalogue.
     pub(crate) acting: Vec<Acting>,
-    /// Values of the own effects' arguments where none is looked for: off, or as they were found before.
+    /// Values of the own effects' arguments while no own effect is looked for: the off values, or the values that were found before.
     pub(crate) off: Vec<f64>,
     /// Wrappers that act in every run, with their values.
     pub(crate) standing: Vec<(usize, Vec<f64>)>,
-    /// Everything that was asked for, the recordings apart.
+    /// The entries of the problem, without the recordings.
     pub(crate) spec: ProblemSpec,
     pub(crate) grid: Grid,
     /// Samples and session time of each trial, s, from the session's start.
@@ -51,7 +51,7 @@ impl Checked {
     /// Checks a problem and brings its recordings onto one grid.
     ///
     /// # Errors
-    /// Names that stand for nothing, values that do not do, and recordings that cannot be read.
+    /// Names that are unknown, values that are not allowed, and recordings that cannot be read.
     pub fn new(spec: ProblemSpec) -> Result<Self, ProblemError> {
         let (trials, spec) = (spec.trials.clone(), ProblemSpec { trials: Vec::new(), ..spec });
         let ProblemSpec { stages, inputs, parameters, effects, .. } = &spec;
@@ -110,8 +110,8 @@ impl Checked {
         })
     }
 
-    /// What a source has to know once.
-    pub fn session(&self) -> &Session {
+    /// The session that a source receives once, before the first run.
+    pub fn session(&self) -> &RecordedSession {
         &self.session
     }
 
@@ -120,12 +120,12 @@ impl Checked {
         &self.about
     }
 
-    /// What had to be done to the recordings, and what is not looked for, in sentences.
+    /// Notes on what was done to the recordings and which effects are not looked for, in sentences.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
 
-    /// The wrapper that an effect of the catalogue is; none for the user's own.
+    /// The kind of the wrapper behind an effect of the catalogue; none for the user's own effects.
     pub fn wrapper(&self, effect: usize) -> Option<&'static Kind> {
         match *self.acting.get(effect)? {
             Acting::Wrapper(at) => Some(self.wrappers[at].kind),
@@ -134,8 +134,8 @@ impl Checked {
         }
     }
 
-    /// How somebody would type the wrapper that an effect of the catalogue is, with these values, in front of the simulator or behind it;
-    /// none for the user's own.
+    /// The code of the wrapper behind an effect of the catalogue, with these values, in front of the simulator or behind it; none for the
+    /// user's own effects.
     pub fn sketch(&self, effect: usize, values: &[f64]) -> Option<Sketch> {
         let wrapper = match *self.acting.get(effect)? {
             Acting::Wrapper(at) => Some(&self.wrappers[at]),
@@ -145,7 +145,7 @@ impl Checked {
         wrapper?.sketch(values, self.grid.dt_s())
     }
 
-    /// The wrapper on one side of a stage that an effect of the catalogue is, if it is one.
+    /// The index of the wrapper behind an effect of the catalogue, if that wrapper stands on this side of the stage.
     pub(crate) fn around(&self, effect: usize, stage: usize, side: Side) -> Option<usize> {
         let is_here = |at: usize| {
             let site = &self.wrappers[at].site;
@@ -176,14 +176,14 @@ impl Checked {
     }
 }
 
-/// Noise of what drives a stage, one standard deviation each.
-fn input_noise(stage: &Stage, inputs: &[Input]) -> Vec<f64> {
+/// Noise of the inputs of a stage, one standard deviation each.
+fn input_noise(stage: &StageEntry, inputs: &[Input]) -> Vec<f64> {
     let noise = |c: &String| inputs.iter().find(|i| i.column == *c).map_or(0.0, |i| i.noise);
     stage.inputs.iter().map(noise).collect()
 }
 
-/// Noise of the output of a stage, one standard deviation: as stated, or from the record.
-fn noise(stage: &Stage, columns: &Columns) -> f64 {
+/// Noise of the output of a stage, one standard deviation: as stated, or estimated from the recordings.
+fn noise(stage: &StageEntry, columns: &Columns) -> f64 {
     let values = columns.of(&stage.output).unwrap_or(&[]);
     let looked = columns.looked_at();
     let parts = looked.iter().map(|r| &values[r.clone()]);
@@ -197,9 +197,9 @@ fn parts(columns: &Columns) -> Vec<(Range<usize>, f64)> {
     columns.ranges().into_iter().zip(starts).collect()
 }
 
-/// Every column that is used, once each.
+/// Names of the columns that are used, each once.
 fn used(spec: &ProblemSpec) -> Vec<String> {
-    let of_stage = |s: &Stage| {
+    let of_stage = |s: &StageEntry| {
         let more = s.velocity.iter().chain(&s.position).cloned();
         std::iter::once(s.output.clone()).chain(s.inputs.clone()).chain(more).collect::<Vec<_>>()
     };
@@ -216,8 +216,8 @@ fn used(spec: &ProblemSpec) -> Vec<String> {
     out
 }
 
-/// The stage of a sensor, and the column that it measures.
-fn sensor_of(sensor: &Sensor, stages: &[Stage]) -> Result<(usize, String), ProblemError> {
+/// The stage of a sensor, and the column that the sensor measures.
+fn sensor_of(sensor: &Sensor, stages: &[StageEntry]) -> Result<(usize, String), ProblemError> {
     let at = stages.iter().position(|s| s.output == sensor.signal);
     let outputs = stages.iter().map(|s| s.output.as_str());
     let at =
@@ -225,7 +225,7 @@ fn sensor_of(sensor: &Sensor, stages: &[Stage]) -> Result<(usize, String), Probl
     Ok((at, sensor.reference.clone()))
 }
 
-fn velocity(stage: &Stage, columns: &Columns) -> Option<Velocity> {
+fn velocity(stage: &StageEntry, columns: &Columns) -> Option<Velocity> {
     let recorded = stage.velocity.as_ref().and_then(|c| columns.of(c));
     let position = || stage.position.as_ref().and_then(|c| columns.of(c));
     let differences = |x: &[f64]| Velocity::of_position(x, &columns.ranges(), columns.dt_s);
@@ -233,7 +233,7 @@ fn velocity(stage: &Stage, columns: &Columns) -> Option<Velocity> {
 }
 
 /// Every channel of every stage, inputs first.
-fn sites(stages: &[Stage], unit_of: &impl Fn(&str) -> String) -> Vec<Site> {
+fn sites(stages: &[StageEntry], unit_of: &impl Fn(&str) -> String) -> Vec<Site> {
     let mut out = Vec::new();
     for (stage, s) in stages.iter().enumerate() {
         for (input, column) in s.inputs.iter().enumerate() {
@@ -247,7 +247,7 @@ fn sites(stages: &[Stage], unit_of: &impl Fn(&str) -> String) -> Vec<Site> {
 }
 
 fn stage_spec(
-    stage: &Stage,
+    stage: &StageEntry,
     parameters: &[Parameter],
     unit_of: &impl Fn(&str) -> String,
 ) -> StageSpec {
@@ -277,19 +277,19 @@ fn parameter_spec(p: &Parameter) -> Result<ParameterSpec, ProblemError> {
 }
 
 fn session(
-    stages: &[Stage],
+    stages: &[StageEntry],
     parameters: &[Parameter],
     effects: &[OwnEffect],
     columns: &Columns,
     unit_of: &impl Fn(&str) -> String,
-) -> Session {
+) -> RecordedSession {
     let ranges = columns.ranges();
     let part = |(trial, samples): (&stretch_gap::TrialSpec, Range<usize>)| SessionPart {
         name: trial.name.clone(),
         samples,
         start_s: trial.start_s,
     };
-    let stage = |s: &Stage| SessionStage {
+    let stage = |s: &StageEntry| SessionStage {
         name: s.name.clone(),
         output: s.output.clone(),
         inputs: s.inputs.clone(),
@@ -299,7 +299,7 @@ fn session(
         unit: unit_of(name),
         values: values.clone(),
     };
-    Session {
+    RecordedSession {
         dt_s: columns.dt_s,
         trials: columns.trials.iter().zip(ranges).map(part).collect(),
         stages: stages.iter().map(stage).collect(),
@@ -309,9 +309,9 @@ fn session(
     }
 }
 
-/// Stages that parameters and effects name are there.
+/// Checks that the stages which parameters and effects name are there.
 fn check_known(
-    stages: &[Stage],
+    stages: &[StageEntry],
     parameters: &[Parameter],
     effects: &[OwnEffect],
 ) -> Result<(), ProblemError> {

@@ -1,4 +1,4 @@
-//! Recorded columns on one grid, and what may be looked at of them.
+//! Recorded columns on one grid, and the samples that are not tested on.
 
 use std::ops::Range;
 
@@ -60,7 +60,7 @@ impl Columns {
         Some(&self.values[at])
     }
 
-    /// Samples of every trial.
+    /// Range of samples of every trial.
     pub(crate) fn ranges(&self) -> Vec<Range<usize>> {
         let mut end = 0;
         let one = |trial: &TrialSpec| {
@@ -70,14 +70,14 @@ impl Columns {
         self.trials.iter().map(one).collect()
     }
 
-    /// Samples that may be looked at before the end.
+    /// Ranges of samples that are not tested on.
     pub(crate) fn looked_at(&self) -> Vec<Range<usize>> {
         let fit = Frame::not_tested(&self.trials);
         let parts = self.ranges().into_iter().zip(fit);
         parts.map(|(all, fit)| all.start..all.start + fit).filter(|r| !r.is_empty()).collect()
     }
 
-    /// From the first to the last sample, s.
+    /// Time from the first to the last sample of the session, s.
     pub(crate) fn session_s(&self) -> f64 {
         let end_s = |t: &TrialSpec| t.start_s + t.samples as f64 * self.dt_s;
         let begun_s = self.trials.first().map_or(0.0, |t| t.start_s);

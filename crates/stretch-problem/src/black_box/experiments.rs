@@ -1,7 +1,7 @@
-//! Candidate experiments on a user's own simulator, and what a model foretells of each.
+//! Candidate experiments on a user's own simulator, and what a model predicts of each.
 //!
-//! A candidate moves one input over the range in which it was measured, for as long as the first trial lasted; the others rest at their
-//! median. The simulator is asked for it as for any altered input, so that whatever takes these can foretell experiments.
+//! A candidate moves one input over the range in which it was measured, for as long as the first trial lasted; the other inputs rest at their
+//! median. The simulator runs a candidate as it runs any altered input, so that every simulator that takes altered inputs predicts experiments.
 
 use std::{
     collections::hash_map::DefaultHasher,
@@ -15,14 +15,14 @@ use stretch_gap::{GapError, Laboratory, Model, Plan, Run, Simulator};
 use super::{BlackBox, source::SourceError};
 use crate::bench::courses::{course, moving};
 
-/// Most inputs that candidates move.
+/// Greatest number of inputs that candidates move.
 const MOVED: usize = 3;
-/// Minutes to prepare a candidate.
+/// Time to prepare a candidate, minutes.
 const PREPARE_MIN: f64 = 0.25;
-/// Least noise of an output, a share of what it spans.
+/// Least noise of an output, a share of its range.
 const LEAST_NOISE: f64 = 1e-6;
 
-/// What drives the simulator from outside, by column, for the samples of the first trial.
+/// The inputs of the simulator from outside, by column, for the samples of the first trial.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Course(Vec<(String, Vec<f64>)>);
 
@@ -47,7 +47,7 @@ impl Course {
     }
 }
 
-/// An input that comes from outside: its name, its range and its median where it may be looked at.
+/// An input that comes from outside: its name, and its range and median over the samples that are not tested on.
 struct Driven {
     name: String,
     range: (f64, f64),
@@ -55,7 +55,7 @@ struct Driven {
 }
 
 impl BlackBox {
-    /// Inputs that are no output of a stage.
+    /// The inputs that are no output of a stage.
     fn driven(&self) -> Vec<Driven> {
         let session = self.problem.session();
         let is_output = |name: &str| session.stages.iter().any(|s| s.output == name);
@@ -79,7 +79,7 @@ impl BlackBox {
         out
     }
 
-    /// All inputs at rest but one, which goes through shares of its range.
+    /// A course with all inputs at rest but one, which goes through shares of its range.
     fn moved(&self, all: &[Driven], moved: Option<(usize, &[f64])>) -> Course {
         let samples = self.problem.session().samples(1);
         let one = |(at, d): (usize, &Driven)| {
@@ -97,7 +97,7 @@ impl BlackBox {
         Course(all.iter().enumerate().map(one).collect())
     }
 
-    /// What drives a stage in an experiment in which the stages before it gave `outputs`.
+    /// The inputs of a stage in an experiment in which the stages before it gave `outputs`.
     fn inputs_in(
         &self,
         stage: usize,
@@ -124,13 +124,13 @@ impl BlackBox {
         side: Side,
     ) -> Result<Vec<(usize, &'a Vec<f64>)>, GapError> {
         let all = self.acting(run, side);
-        let unforetold = |(at, _): &&(usize, &Vec<f64>)| {
+        let unpredicted = |(at, _): &&(usize, &Vec<f64>)| {
             matches!(self.problem.wrappers[*at].kind.beside, Beside::Velocity | Beside::Another)
         };
-        match all.iter().find(unforetold) {
+        match all.iter().find(unpredicted) {
             Some((at, _)) => {
                 let name = &self.problem.wrappers[*at].name;
-                let why = format!("{name} looks at a column that no experiment foretells");
+                let why = format!("{name} looks at a column that no experiment predicts");
                 Err(GapError::simulator(SourceError::Refused(why)))
             }
             None => Ok(all),
@@ -148,7 +148,7 @@ impl Laboratory for BlackBox {
         if all.is_empty() || !self.runs.takes_inputs() {
             return Vec::new();
         }
-        let mut menu = Vec::new();
+        let mut candidates = Vec::new();
         for (at, d) in all.iter().enumerate().filter(|(_, d)| d.range.0 < d.range.1).take(MOVED) {
             for (name, how, points) in moving() {
                 let whole_s: f64 = points.iter().skip(1).map(|(_, seconds)| seconds).sum();
@@ -159,13 +159,13 @@ impl Laboratory for BlackBox {
                     1 => (name.to_owned(), how.to_owned()),
                     _ => (format!("{name} of {}", d.name), format!("{how} By {}.", d.name)),
                 };
-                menu.push((setting.plan((name, how), dt_s), setting));
+                candidates.push((setting.plan((name, how), dt_s), setting));
             }
         }
         let rest = self.moved(&all, None);
         let how = "Leave all inputs at their median: what changes does not come from motion.";
-        menu.push((rest.plan(("rest".to_owned(), how.to_owned()), dt_s), rest));
-        menu
+        candidates.push((rest.plan(("rest".to_owned(), how.to_owned()), dt_s), rest));
+        candidates
     }
 
     /// The first trial.
@@ -192,9 +192,9 @@ impl Laboratory for BlackBox {
             let mut hasher = DefaultHasher::new();
             inputs.iter().flatten().for_each(|x| x.to_bits().hash(&mut hasher));
             let inner = self.driven_by(&run, Some((inputs, vec![u64::MAX, hasher.finish()])));
-            let told = self.runs.outputs(session, &[inner]).pop();
-            let told = told.unwrap_or_else(|| Err(SourceError::Gone("no answer".into())));
-            let mut output = told.map_err(super::refused)?.to_vec();
+            let answer = self.runs.outputs(session, &[inner]).pop();
+            let answer = answer.unwrap_or_else(|| Err(SourceError::Gone("no answer".into())));
+            let mut output = answer.map_err(super::refused)?.to_vec();
             for (at, values) in self.around(&run, Side::Output)? {
                 self.problem.wrappers[at].act(values, &trials, &mut output);
             }

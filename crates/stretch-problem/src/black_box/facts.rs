@@ -4,15 +4,15 @@ use std::borrow::Cow;
 
 use stretch_gap::{Column, Description, MotionSpec, RecordFacts, Recorded, RowsUsed};
 
-use super::{columns::Columns, source::Session};
+use super::{columns::Columns, source::RecordedSession};
 
-/// Delays that skews of the catalogue stand for, s.
+/// Range of the delays that skews of the catalogue stand for, s.
 const SKEW_S: [f64; 2] = [-0.2, 0.2];
 
 /// The facts of recordings.
 pub(super) fn facts(
     about: &Description,
-    session: &Session,
+    session: &RecordedSession,
     columns: &Columns,
     sensor: Option<&(usize, String)>,
 ) -> RecordFacts {
@@ -29,8 +29,8 @@ pub(super) fn facts(
     }
 }
 
-/// What the stages are fed with, once each.
-fn signals(session: &Session) -> Vec<Recorded> {
+/// The inputs of the stages, each once.
+fn signals(session: &RecordedSession) -> Vec<Recorded> {
     let mut out: Vec<Recorded> = Vec::new();
     for name in session.stages.iter().flat_map(|s| &s.inputs) {
         let column = session.columns.iter().find(|c| c.name == *name);
@@ -44,9 +44,9 @@ fn signals(session: &Session) -> Vec<Recorded> {
     out
 }
 
-/// The outputs of the stages, and every other column but commands: one may stand still while the rest moves, and nothing is wrong
-/// with it then.
-fn record_columns(about: &Description, session: &Session) -> Vec<Column<'static>> {
+/// The outputs of the stages, and every other column but commands: a command may stand still while the rest moves, and nothing is wrong
+/// with such a command.
+fn record_columns(about: &Description, session: &RecordedSession) -> Vec<Column<'static>> {
     let stages = about.stages.iter().enumerate();
     let output = |(stage, spec)| Column { skew_s: SKEW_S, ..Column::output(stage, spec) };
     let mut out: Vec<Column<'static>> = stages.map(output).collect();
@@ -68,7 +68,7 @@ fn record_columns(about: &Description, session: &Session) -> Vec<Column<'static>
     out
 }
 
-/// Whether a column is held from sample to sample, as commands are: a tenth of its samples are the one before.
+/// Whether a column is held from sample to sample, as commands are: at least a tenth of its samples equal the sample before.
 fn is_command(values: &[f64]) -> bool {
     let held = values.windows(2).filter(|w| w[0] == w[1]).count();
     10 * held >= values.len()

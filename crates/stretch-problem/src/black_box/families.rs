@@ -1,4 +1,4 @@
-//! What wrappers that data do not tell apart agree on.
+//! Families of wrappers that data do not tell apart, and what the members of a family agree on.
 
 use stretch_effects::Family;
 use stretch_gap::{Candidate, Diagnosis};
@@ -8,18 +8,18 @@ use super::checked::Checked;
 /// Wrappers of one family, any of which may be what is missing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreed {
-    /// Their names, the most probable first.
+    /// Names of the wrappers, the most probable first.
     pub names: Vec<String>,
-    /// What they agree on.
+    /// The family, which says what the wrappers agree on.
     pub family: Family,
-    /// From the least to the greatest that any of them says, with its uncertainty.
+    /// Range of the agreed quantity, from the least to the greatest value of any wrapper, uncertainties included.
     pub range: [f64; 2],
     /// Unit of the range.
     pub unit: String,
 }
 
 impl Agreed {
-    /// In a sentence.
+    /// The family as a sentence.
     pub fn sentence(&self) -> String {
         let [low, high] = self.range;
         let how = match self.family {
@@ -69,9 +69,9 @@ pub fn agreed(problem: &Checked, diagnosis: &Diagnosis) -> Vec<Agreed> {
             continue;
         }
         let names: Vec<&String> = std::iter::once(name).chain(rivals).collect();
-        let told =
+        let ranges =
             names.iter().filter_map(|n| kind(n).and_then(|(_, (_, of))| said(diagnosis, n, of)));
-        let range = told.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], [low, high]| {
+        let range = ranges.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], [low, high]| {
             [a.min(low), b.max(high)]
         });
         let unit = match family {
@@ -85,7 +85,8 @@ pub fn agreed(problem: &Checked, diagnosis: &Diagnosis) -> Vec<Agreed> {
     out
 }
 
-/// What the most probable candidate with an effect says of its family's quantity, with two standard deviations of its first number.
+/// The range of a family's quantity by the most probable candidate with an effect: the effect's first value moves by 1.96 standard
+/// deviations to either side.
 fn said(diagnosis: &Diagnosis, name: &str, of: fn(&[f64]) -> f64) -> Option<[f64; 2]> {
     let holds = |c: &&Candidate| c.effects.iter().any(|e| e == name);
     let candidate = diagnosis.candidates.iter().find(holds)?;

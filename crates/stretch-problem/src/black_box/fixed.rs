@@ -1,4 +1,4 @@
-//! A user's own problem with what a diagnosis found of it.
+//! A user's own problem with what a diagnosis found.
 
 use stretch_data::Remarks;
 use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, Simulator, next_experiment};
@@ -11,11 +11,11 @@ use crate::{
     problem::Diagnosable,
 };
 
-/// What an argument of the simulator's own is called where its equation stands.
+/// Words and equation of an effect that the simulator has itself.
 const OWN: (&str, &str) = ("an effect that the simulator has itself", "arguments of the simulator");
 
 impl BlackBox {
-    /// What an effect of the catalogue is.
+    /// An effect of the catalogue in words.
     fn meaning(&self, effect: usize) -> Meaning<'_> {
         let name = self.description().effects[effect].name.as_str();
         match self.problem.wrapper(effect) {
@@ -24,7 +24,7 @@ impl BlackBox {
         }
     }
 
-    /// The problem as a file: the one that it was read from, or one that says what is in memory.
+    /// The problem as a file: the file that it was read from, or a new file for a problem in memory.
     fn as_file(&self) -> ProblemFile {
         let spec = self.problem.spec.clone();
         match &self.file {
@@ -41,7 +41,7 @@ impl BlackBox {
         }
     }
 
-    /// Gives an effect that was found its values in every run from now on.
+    /// Writes the values of an effect that was found into the file, so that the effect acts in every run.
     fn add(&self, file: &mut ProblemFile, effect: usize, values: &[f64]) {
         let spec = &self.description().effects[effect];
         let named =
@@ -65,7 +65,7 @@ impl Diagnosable for BlackBox {
         self.problem.notes().to_vec()
     }
 
-    /// What the source says of its runs, and what it refused.
+    /// The notes of the source on its runs, and the number of runs that it refused.
     fn afterwards(&self) -> Vec<String> {
         let mut notes = self.runs.notes();
         let refused = self.runs.refused();
@@ -89,9 +89,9 @@ impl Diagnosable for BlackBox {
         evidence: &Evidence,
     ) -> Result<Option<Proposal>, GapError> {
         match next_experiment(self, diagnosis, evidence) {
-            // Where the runs are spent, or a model cannot be run on other inputs, nothing is foretold.
+            // Where the runs are spent, or a model cannot be run on other inputs, there is no prediction.
             Err(GapError::Simulator(_)) => Ok(None),
-            told => told,
+            proposal => proposal,
         }
     }
 
@@ -120,15 +120,15 @@ impl Diagnosable for BlackBox {
             if self.description().parameters[index].sd == 0.0 {
                 continue;
             }
-            let told = chosen.told(index, &parameter.unit, (parameter.value, *value));
-            remarks.parameters.insert(("parameter".into(), parameter.name.clone()), told);
+            let remark = chosen.remark(index, &parameter.unit, (parameter.value, *value));
+            remarks.parameters.insert(("parameter".into(), parameter.name.clone()), remark);
             parameter.tolerance = chosen.tolerance(index, *value, parameter.tolerance);
             parameter.value = *value;
         }
         let mut effects = Vec::new();
         for (effect, values) in chosen.effects(&self.description().effects) {
             let meaning = self.meaning(effect);
-            chosen.tell(meaning, &mut remarks);
+            chosen.describe(meaning, &mut remarks);
             self.add(&mut file, effect, values);
             effects.push(meaning.name.to_owned());
         }

@@ -1,11 +1,11 @@
-//! A stage of a black box, linearised in its nominal parameters: what a run near by is told with.
+//! A stage of a black box, linearised in its nominal parameters, to predict a run from a run with similar parameters.
 //!
 //! ```text
 //! y(p) = y(p_near) + sum over i of J_i (p_i - p_near,i),     J_i = (y(p_0 + d_i) - y(p_0))/d_i
 //! ```
 //!
-//! with J taken at p_0 and kept while fits stay around it (a chord). The run at p_near is exact. A probe of a fit, a small step from a
-//! run that was just made, so costs no run; what is told in the end stands on exact runs.
+//! J is taken at p_0 and kept while fits stay around p_0 (a chord). The run at p_near is exact. A probe of a fit, which is a small step from
+//! a run that was just made, costs no run that way; the values that a diagnosis reports come from exact runs.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ const STEP: f64 = 0.1;
 /// Tolerances within which a linearisation serves as it is.
 const SERVES: f64 = 0.5;
 
-/// Sensitivities of one stage.
+/// Sensitivities of the output of one stage.
 #[derive(Debug, Clone)]
 pub(crate) struct Linear {
     at: Inner,
@@ -35,7 +35,7 @@ pub(crate) struct Move {
 }
 
 impl Linear {
-    /// The runs beside one that it takes: each parameter that has a tolerance moved alone, downwards at its upper bound.
+    /// The runs that a linearisation takes beside the run at p_0: each parameter with a tolerance is moved alone, downwards at its upper bound.
     pub(crate) fn moves(at: &Inner, own: &[usize], specs: &[ParameterSpec]) -> Vec<Move> {
         let tuned = own.iter().copied().filter(|&p| specs[p].sd > 0.0);
         tuned
@@ -45,28 +45,28 @@ impl Linear {
                 let step = if up > spec.greatest { -STEP * spec.sd } else { STEP * spec.sd };
                 let mut inner = at.clone();
                 inner.parameters[parameter] = value + step;
-                // What was really added.
+                // The step after rounding.
                 Move { parameter, step: inner.parameters[parameter] - value, inner }
             })
             .collect()
     }
 
-    /// From the outputs of the run itself and of its moves.
+    /// The linearisation from the outputs of the run itself and of its moves.
     pub(crate) fn of(at: Inner, moves: &[Move], outputs: &[Arc<Vec<f64>>]) -> Self {
-        let (plain, moved) = (&outputs[0], &outputs[1..]);
+        let (unmoved, moved) = (&outputs[0], &outputs[1..]);
         let column = |(m, there): (&Move, &Arc<Vec<f64>>)| {
-            let slopes = there.iter().zip(plain.iter()).map(|(a, b)| (a - b) / m.step);
+            let slopes = there.iter().zip(unmoved.iter()).map(|(a, b)| (a - b) / m.step);
             (m.parameter, slopes.collect())
         };
         Self { columns: moves.iter().zip(moved).map(column).collect(), at }
     }
 
-    /// Trials that it reaches over.
+    /// Number of trials that the linearisation covers.
     pub(crate) fn trials(&self) -> usize {
         self.at.trials
     }
 
-    /// Whether it does for a run as well: the same but for parameters within half a tolerance.
+    /// Whether the linearisation serves another run: effects and inputs are the same, parameters differ by at most half a tolerance.
     pub(crate) fn serves(&self, run: &Inner, specs: &[ParameterSpec]) -> bool {
         let pairs = self.at.parameters.iter().zip(&run.parameters).zip(specs);
         let how = |inner: &Inner| inner.inputs.as_ref().map(|(_, how)| how.clone());
@@ -77,7 +77,7 @@ impl Linear {
     }
 
     /// Moves an output by differences of the parameters.
-    pub(crate) fn go(&self, apart: &[f64], out: &mut [f64]) {
+    pub(crate) fn shift(&self, apart: &[f64], out: &mut [f64]) {
         for (parameter, column) in self.columns.iter().filter(|(p, _)| apart[*p] != 0.0) {
             let by = apart[*parameter];
             out.iter_mut().zip(column).for_each(|(y, slope)| *y += by * slope);

@@ -1,4 +1,4 @@
-//! A user's simulator, wrapped, as the diagnosis takes it.
+//! A user's simulator with wrappers around it, as the diagnosis takes it.
 
 mod catalogue;
 mod checked;
@@ -30,21 +30,23 @@ use runs::{Inner, Runs};
 pub use checked::Checked;
 pub use families::{Agreed, agreed};
 pub use source::{
-    Ask, Closure, Session, SessionColumn, SessionPart, SessionStage, Source, SourceError, closure,
+    Ask, Closure, RecordedSession, SessionColumn, SessionPart, SessionStage, Source, SourceError,
+    closure,
 };
-pub use spec::{Argument, Input, OwnEffect, Parameter, ProblemSpec, Sensor, Stage, Wrapped};
+pub use spec::{Argument, Input, OwnEffect, Parameter, ProblemSpec, Sensor, StageEntry, Wrapped};
 
 /// A checked problem and a source, bound together: a [`Simulator`].
 ///
-/// The source is run for parameters, own effects and what stands in front of a stage; what stands behind one acts on a run that is kept.
+/// A change of parameters, own effects or wrappers in front of a stage takes a run of the source; wrappers behind a stage act on a run that
+/// is kept.
 ///
 /// ```
 /// use std::sync::Arc;
 /// use stretch_data::{Channel, SessionTrial, Trial};
 /// use stretch_gap::{Options, diagnose};
-/// use stretch_problem::{Ask, BlackBox, Checked, Parameter, ProblemSpec, Stage, Tolerance, closure};
+/// use stretch_problem::{Ask, BlackBox, Checked, Parameter, ProblemSpec, StageEntry, Tolerance, closure};
 ///
-/// // A spring that shows 0.06 s late what it is loaded with.
+/// // A spring whose length follows its load 0.06 s late.
 /// let load = |t: f64| 20.0 * (1.3 * t).sin() + 10.0 * (3.1 * t).sin();
 /// let noise = |i: usize| 1e-2 * ((i * i * 7919) % 1000) as f64 / 1000.0;
 /// let time_s: Vec<f64> = (0..3000).map(|i| 0.01 * i as f64).collect();
@@ -55,11 +57,11 @@ pub use spec::{Argument, Input, OwnEffect, Parameter, ProblemSpec, Sensor, Stage
 /// let trial = Trial { name: "spring.csv".into(), time_s, channels };
 ///
 /// let problem = Checked::new(ProblemSpec {
-///     stages: vec![Stage {
+///     stages: vec![StageEntry {
 ///         name: "spring".into(),
 ///         output: "length_mm".into(),
 ///         inputs: vec!["force_N".into()],
-///         ..Stage::default()
+///         ..StageEntry::default()
 ///     }],
 ///     parameters: vec![Parameter {
 ///         name: "compliance".into(),
@@ -88,17 +90,17 @@ pub struct BlackBox {
     problem: Checked,
     file: Option<ProblemFile>,
     runs: Runs,
-    /// By stage: the last linearisation.
+    /// By stage, the last linearisation.
     lines: RwLock<Vec<Option<Arc<Linear>>>>,
 }
 
 impl BlackBox {
-    /// Binds a problem to the source that answers it.
+    /// Binds a problem to the source that simulates it.
     pub fn new(problem: Checked, source: Arc<dyn Source>) -> Self {
         Self::within(problem, source, None)
     }
 
-    /// The same with at most so many runs of the source.
+    /// Binds a problem to a source that may be run at most `budget` times.
     pub fn within(problem: Checked, source: Arc<dyn Source>, budget: Option<usize>) -> Self {
         let samples =
             problem.columns.is_lost.len().max(problem.parts.last().map_or(1, |p| p.0.end));
@@ -113,17 +115,17 @@ impl BlackBox {
         &self.problem
     }
 
-    /// Runs of the source so far.
+    /// Number of runs of the source so far.
     pub fn model_runs(&self) -> usize {
         self.runs.count()
     }
 
-    /// Says which file it was read from: a [fix](crate::Fix) is that file with what was found.
+    /// Notes the file that the problem was read from: a [fix](crate::Fix) is that file with what was found.
     pub fn from_file(self, file: ProblemFile) -> Self {
         Self { file: Some(file), ..self }
     }
 
-    /// Wrappers that act on one side of a stage, in their order, with their values: those that a model has, and those that act in every run.
+    /// Wrappers that act on one side of a stage, in their order, with their values: wrappers of the model, and wrappers that act in every run.
     fn acting<'a>(&'a self, run: &Run<'a>, side: Side) -> Vec<(usize, &'a Vec<f64>)> {
         let problem = &self.problem;
         let mut all: Vec<(usize, &Vec<f64>)> = problem.standing(run.stage, side).collect();
@@ -134,24 +136,24 @@ impl BlackBox {
         all
     }
 
-    /// What has to be run for a model.
+    /// The run of the source that a model needs.
     fn inner(&self, run: &Run<'_>) -> Inner {
         let problem = &self.problem;
         let before = self.acting(run, Side::Input);
         let noise = &problem.input_noise[run.stage];
-        let shake = run.input_noise.filter(|_| noise.iter().any(|sd| *sd > 0.0));
-        if before.is_empty() && shake.is_none() {
+        let noise_seed = run.input_noise.filter(|_| noise.iter().any(|sd| *sd > 0.0));
+        if before.is_empty() && noise_seed.is_none() {
             return self.driven_by(run, None);
         }
         let end = problem.session().samples(run.trials);
         let mut inputs: Vec<Vec<f64>> =
             problem.stage_inputs(run.stage).map(|c| c[..end].to_vec()).collect();
         let mut how = Vec::new();
-        if let Some(seed) = shake {
+        if let Some(seed) = noise_seed {
             how.push(seed);
             for (i, (column, sd)) in inputs.iter_mut().zip(noise).enumerate() {
-                let mut dice = RandomGenerator::new(seed, 1 + (run.stage * 64 + i) as u64);
-                column.iter_mut().for_each(|x| *x += sd * dice.gauss());
+                let mut random = RandomGenerator::new(seed, 1 + (run.stage * 64 + i) as u64);
+                column.iter_mut().for_each(|x| *x += sd * random.gauss());
             }
         }
         let trials = self.trials_of();
@@ -164,7 +166,7 @@ impl BlackBox {
         self.driven_by(run, Some((inputs, how)))
     }
 
-    /// The run of a model on inputs that were altered, with the numbers that say how.
+    /// The run of a model on inputs that were altered; beside the inputs stand the numbers that identify the alteration.
     fn driven_by(&self, run: &Run<'_>, inputs: Option<(Vec<Vec<f64>>, Vec<u64>)>) -> Inner {
         let mut parameters: Vec<f64> =
             self.description().parameters.iter().map(|p| p.nominal).collect();
@@ -183,8 +185,8 @@ impl BlackBox {
         Inner { stage: run.stage, parameters, effects, inputs, trials: run.trials }
     }
 
-    /// The run that a run is told from, and how far it lies from there; the run itself where it has to be exact.
-    fn told(&self, run: &Run<'_>) -> (Inner, Option<Apart>) {
+    /// The run that a run is predicted from, and the difference of the parameters; the run itself where it has to be exact.
+    fn base_of(&self, run: &Run<'_>) -> (Inner, Option<Apart>) {
         let inner = self.inner(run);
         let line = run.near.filter(|_| run.input_noise.is_none()).zip(self.line(run.stage));
         let Some((near, line)) = line.filter(|(_, line)| line.trials() >= run.trials) else {
@@ -215,7 +217,7 @@ impl BlackBox {
         Trials { grid: &self.problem.grid, parts: &self.problem.parts }
     }
 
-    /// What stands behind a stage acts on its output.
+    /// Applies the wrappers behind a stage to its output.
     fn behind(&self, run: &Run<'_>, out: &mut [f64]) {
         let trials = self.trials_of();
         for (at, values) in self.acting(run, Side::Output) {
@@ -227,7 +229,7 @@ impl BlackBox {
         }
     }
 
-    /// What is found in the record, on the samples that may be fitted.
+    /// Applies an effect that is found in the recording, on the samples that are not tested on.
     fn follow(&self, find: Find, stage: usize, values: &[f64], out: &mut [f64]) {
         let (measured, noise) = (self.measured(stage), self.problem.noise[stage]);
         let end = out.len();
@@ -238,13 +240,13 @@ impl BlackBox {
     }
 }
 
-/// A linearisation, and how far the parameters of a run lie from those of the run that it is told from.
+/// A linearisation, and the differences of the parameters between a run and the run that it is predicted from.
 type Apart = (Arc<Linear>, Vec<f64>);
 
-/// Runs that the answer itself needs once the search is over, and more for each stage.
-const ANSWER: (usize, usize) = (20, 8);
+/// Runs that the final evaluation needs once the search is over, and further runs for each stage.
+const FINAL: (usize, usize) = (20, 8);
 
-/// What the engine makes of a source's error: where values cannot be simulated a fit turns back.
+/// A source's error as the diagnosis takes it: a fit turns back where values cannot be simulated.
 fn refused(error: SourceError) -> GapError {
     match error {
         SourceError::Gone(_) | SourceError::Length { .. } => GapError::Broken(Box::new(error)),
@@ -283,14 +285,14 @@ impl Simulator for BlackBox {
 
 impl Batch for BlackBox {
     fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
-        let told: Vec<(Inner, Option<Apart>)> = runs.iter().map(|run| self.told(run)).collect();
-        let inner: Vec<Inner> = told.iter().map(|(inner, _)| inner.clone()).collect();
+        let bases: Vec<(Inner, Option<Apart>)> = runs.iter().map(|run| self.base_of(run)).collect();
+        let inner: Vec<Inner> = bases.iter().map(|(inner, _)| inner.clone()).collect();
         let outputs = self.runs.outputs(self.problem.session(), &inner);
-        let each = runs.iter().zip(&told).zip(outputs).zip(outs);
+        let each = runs.iter().zip(&bases).zip(outputs).zip(outs);
         each.map(|(((run, (_, line)), output), out)| {
             out.copy_from_slice(&output.map_err(refused)?);
             if let Some((line, apart)) = line {
-                line.go(apart, out);
+                line.shift(apart, out);
             }
             self.behind(run, out);
             Ok(())
@@ -318,7 +320,7 @@ impl Costly for BlackBox {
             self.runs.outputs(self.problem.session(), &wanted).into_iter().collect();
         match outputs {
             Ok(outputs) => self.set_line(stage, Linear::of(inner, &moves, &outputs)),
-            // Without one every run is exact.
+            // Without a linearisation every run is exact.
             Err(SourceError::Refused(_) | SourceError::NotFinite { .. }) => {}
             Err(error) => return Err(refused(error)),
         }
@@ -335,7 +337,7 @@ impl Costly for BlackBox {
 
     fn model_runs(&self) -> ModelRuns {
         let (count, budget) = (self.runs.count(), self.runs.budget());
-        let kept = (ANSWER.0 + ANSWER.1 * self.problem.stages.len()).min(budget.unwrap_or(0) / 2);
+        let kept = (FINAL.0 + FINAL.1 * self.problem.stages.len()).min(budget.unwrap_or(0) / 2);
         let is_spent = budget.is_some_and(|budget| count + kept >= budget);
         ModelRuns { count, budget, is_spent }
     }

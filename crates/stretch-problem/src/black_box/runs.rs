@@ -1,4 +1,4 @@
-//! Runs of a user's simulator: none is made twice, all are counted, and no more are made than may be.
+//! Runs of a user's simulator: no run is made twice, all runs are counted, and a budget limits their number.
 
 use std::{
     collections::HashSet,
@@ -8,14 +8,14 @@ use std::{
 
 use lru::LruCache;
 
-use crate::black_box::source::{Ask, Session, Source, SourceError};
+use crate::black_box::source::{Ask, RecordedSession, Source, SourceError};
 
-/// Samples that are kept, of all runs together: a quarter of a gigabyte.
+/// Number of samples that are kept, of all runs together: a quarter of a gigabyte.
 const KEPT: usize = 1 << 25;
-/// Fewest runs that are kept.
+/// Least number of runs that are kept.
 const FEWEST: usize = 32;
 
-/// What a run depends on, bit by bit.
+/// Everything that a run depends on, bit by bit.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct Key {
     stage: usize,
@@ -28,7 +28,7 @@ pub(crate) struct Inner {
     pub(crate) stage: usize,
     pub(crate) parameters: Vec<f64>,
     pub(crate) effects: Vec<f64>,
-    /// Altered inputs, and the numbers that say how.
+    /// Altered inputs, and the numbers that identify the alteration.
     pub(crate) inputs: Option<(Vec<Vec<f64>>, Vec<u64>)>,
     pub(crate) trials: usize,
 }
@@ -43,7 +43,7 @@ struct Made {
     refused: Vec<String>,
 }
 
-/// A source, and what it has answered.
+/// A source and its answers.
 pub(crate) struct Runs {
     source: Arc<dyn Source>,
     budget: Option<usize>,
@@ -67,7 +67,7 @@ impl Runs {
         Self { source, budget, made: Mutex::new(made), done: Condvar::new(), answers_all }
     }
 
-    /// How many were made.
+    /// Number of runs that were made.
     pub(crate) fn count(&self) -> usize {
         self.lock().count
     }
@@ -76,7 +76,7 @@ impl Runs {
         self.budget
     }
 
-    /// Whether it takes inputs that were altered.
+    /// Whether the source takes inputs that were altered.
     pub(crate) fn takes_inputs(&self) -> bool {
         self.source.takes_inputs()
     }
@@ -85,7 +85,7 @@ impl Runs {
         self.source.notes()
     }
 
-    /// What was refused, the first few words of it.
+    /// Why runs were refused, one text for each.
     pub(crate) fn refused(&self) -> Vec<String> {
         self.lock().refused.clone()
     }
@@ -105,8 +105,13 @@ impl Runs {
         }
     }
 
-    /// The part of an answer that a run asks for; none where it is not long enough.
-    fn part(&self, session: &Session, run: &Inner, kept: &(usize, Answer)) -> Option<Answer> {
+    /// The part of an answer that a run asks for; none where the answer covers fewer trials.
+    fn part(
+        &self,
+        session: &RecordedSession,
+        run: &Inner,
+        kept: &(usize, Answer),
+    ) -> Option<Answer> {
         let (trials, answer) = kept;
         if *trials < run.trials {
             return None;
@@ -124,11 +129,11 @@ impl Runs {
         })
     }
 
-    /// Outputs of some runs, those that are new in one batch.
+    /// Outputs of some runs; new runs are made in one batch.
     ///
-    /// What another thread is at is waited for. The source is asked from a thread of its own, so that nothing that it does in parallel can
-    /// take up work that waits for it.
-    pub(crate) fn outputs(&self, session: &Session, wanted: &[Inner]) -> Vec<Answer> {
+    /// A run that another thread is making is waited for. The source is asked from a thread of its own, so that no parallel iterator of the
+    /// source can take up work that waits for that same source.
+    pub(crate) fn outputs(&self, session: &RecordedSession, wanted: &[Inner]) -> Vec<Answer> {
         let keys: Vec<Key> = wanted.iter().map(|run| self.key(run)).collect();
         let mut out: Vec<Option<Answer>> = vec![None; wanted.len()];
         loop {
@@ -167,7 +172,7 @@ impl Runs {
 
     fn make(
         &self,
-        session: &Session,
+        session: &RecordedSession,
         wanted: &[Inner],
         keys: &[Key],
         mine: &[usize],
@@ -199,10 +204,10 @@ impl Runs {
         self.done.notify_all();
     }
 
-    /// As many finite numbers as were asked for.
+    /// Checks that an answer holds as many finite numbers as were asked for.
     fn checked(
         &self,
-        session: &Session,
+        session: &RecordedSession,
         run: &Inner,
         values: Vec<f64>,
     ) -> Result<Vec<f64>, SourceError> {

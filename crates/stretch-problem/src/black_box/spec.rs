@@ -1,6 +1,6 @@
-//! What a problem is made of, entry by entry, as a user writes it down; [`Checked::new`](crate::Checked::new) checks it.
+//! The entries of a problem as a user writes them down; [`Checked::new`](crate::Checked::new) checks the entries.
 //!
-//! Python hands these entries over by serde: the names of the fields are those of its package.
+//! Python hands these entries over by serde: the fields have the names that the Python package gives them.
 
 use std::collections::BTreeMap;
 
@@ -13,9 +13,9 @@ use stretch_sim::Tolerance;
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ProblemSpec {
-    /// Stages; one is enough.
-    pub stages: Vec<Stage>,
-    /// Columns that drive stages, where more is known of them than their name.
+    /// Stages, at least one.
+    pub stages: Vec<StageEntry>,
+    /// Unit and noise of columns that drive stages, where they are known.
     pub inputs: Vec<Input>,
     /// Nominal parameters.
     pub parameters: Vec<Parameter>,
@@ -23,17 +23,17 @@ pub struct ProblemSpec {
     pub effects: Vec<OwnEffect>,
     /// Wrappers to look for, as `input.delay`, `output.backlash`, `stage.output.lag`, or `all`.
     pub wrap: Vec<String>,
-    /// Kinds of effects of the user's own, which `wrap` may name beside those of the catalogue.
+    /// Kinds of effects of the user's own, which `wrap` may name beside the kinds of the catalogue.
     #[serde(skip)]
     pub kinds: Vec<&'static Kind>,
-    /// Wrappers that act in every run, with their values: what was found before. They are not looked for.
+    /// Wrappers that were found before and act in every run, with their values. These wrappers are not looked for.
     pub wrapped: Vec<Wrapped>,
-    /// Effects that are not looked for, by name; a wrapper also by its kind or its place.
+    /// Effects that are not looked for, by name; a wrapper is also named by its kind or its place.
     pub without: Vec<String>,
-    /// Further columns that a wrapper may take: what may talk across to a channel.
+    /// Further columns that a wrapper may take: channels that may talk across to another channel.
     pub beside: Vec<String>,
-    /// The stage that is a sensor, by the column of its output, and the column that it measures, where there is such a stage: what a
-    /// calibration of the sensor loses by the gap is told then, and slices go by that column.
+    /// The stage that is a sensor, where there is one, by the column of its output and the column that it measures: the diagnosis then
+    /// reports what a calibration of the sensor loses by the gap, and slices go by the measured column.
     pub sensor: Option<Sensor>,
     /// Recordings.
     #[serde(skip)]
@@ -41,7 +41,7 @@ pub struct ProblemSpec {
 }
 
 impl ProblemSpec {
-    /// Takes columns as those of a sensor, where some are given.
+    /// Takes columns as those of a sensor, where columns are given.
     pub(crate) fn set_sensor(&mut self, columns: Option<(&str, &str)>) {
         if let Some((reference, signal)) = columns {
             let (reference, signal) = (reference.to_owned(), signal.to_owned());
@@ -53,9 +53,9 @@ impl ProblemSpec {
 /// A stage that is a sensor.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 pub struct Sensor {
-    /// Column of what it measures.
+    /// Column that the sensor measures.
     pub reference: String,
-    /// Column of what it says: the output of a stage.
+    /// Column of its output: the output of a stage.
     pub signal: String,
 }
 
@@ -65,31 +65,31 @@ pub struct Sensor {
 pub struct Wrapped {
     /// Place and kind, as `output.backlash`.
     pub name: String,
-    /// Its values by name; forms that are left out are usual.
+    /// Its values by name; a form that is left out has its usual value.
     pub values: BTreeMap<String, f64>,
 }
 
-/// A stage: it turns measured input columns into one measured output column.
+/// A stage, which turns measured input columns into one measured output column.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Stage {
+pub struct StageEntry {
     /// Name in reports.
     pub name: String,
-    /// Column that its output is held against.
+    /// Column that the simulated output is compared with.
     pub output: String,
     /// Unit of the output; the last part of the column's name where it is empty.
     pub unit: String,
-    /// Columns that it is driven by.
+    /// Columns that drive the stage.
     pub inputs: Vec<String>,
-    /// Noise of the output, one standard deviation; taken from the record where it is not known.
+    /// Noise of the output, one standard deviation; estimated from the recordings where it is not given.
     pub noise: Option<f64>,
-    /// Column of the velocity at which it rubs, for friction.
+    /// Column of the velocity of the rubbing parts, for friction.
     pub velocity: Option<String>,
     /// Column of the position whose change is that velocity.
     pub position: Option<String>,
 }
 
-/// What is known of a column that drives a stage.
+/// Unit and noise of a column that drives a stage.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Input {
@@ -109,20 +109,20 @@ pub struct Parameter {
     pub name: String,
     /// Unit.
     pub unit: String,
-    /// Value that the simulator ships with.
+    /// Value that the simulator is shipped with.
     pub value: f64,
-    /// How far it may be off; to serde a number in its unit, or a text, `"10 %"`.
+    /// Tolerance, one standard deviation; for serde a number in the unit, or a text such as `"10 %"`.
     #[serde(deserialize_with = "tolerance")]
     pub tolerance: Tolerance,
     /// Least value that makes sense.
     pub least: Option<f64>,
     /// Greatest value that makes sense.
     pub greatest: Option<f64>,
-    /// Stages that it acts in; all where there is none.
+    /// Stages that the parameter acts in; all stages where none is named.
     pub stages: Vec<String>,
 }
 
-/// An effect that the user's simulator has itself: arguments with values at which they do nothing.
+/// An effect that the user's simulator has itself: arguments, with the values at which the effect does nothing.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct OwnEffect {
@@ -130,19 +130,19 @@ pub struct OwnEffect {
     pub name: String,
     /// Its arguments.
     pub arguments: Vec<Argument>,
-    /// Stages that it acts in; all where there is none.
+    /// Stages that the effect acts in; all stages where none is named.
     pub stages: Vec<String>,
     /// Names of effects that are hard to tell from it.
     pub twins: Vec<String>,
 }
 
 impl OwnEffect {
-    /// Whether it acts in every run, with values that were found before.
+    /// Whether the effect acts in every run, with values that were found before.
     pub(crate) fn is_standing(&self) -> bool {
         self.arguments.iter().any(|a| a.value.is_some())
     }
 
-    /// What a simulator knows the value of an argument by: the effect's name, and with several arguments `effect.argument`.
+    /// Name of an argument's value for the simulator: the effect's name, or `effect.argument` where the effect has several arguments.
     pub(crate) fn value_name(&self, argument: &Argument) -> String {
         match self.arguments.len() {
             1 => self.name.clone(),
@@ -155,7 +155,7 @@ impl OwnEffect {
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Argument {
-    /// Name; that of the effect where it is empty.
+    /// Name; the name of the effect where this one is empty.
     pub name: String,
     /// Unit.
     pub unit: String,
@@ -163,36 +163,38 @@ pub struct Argument {
     pub min: f64,
     /// Greatest plausible value.
     pub max: f64,
-    /// Value at which it does nothing; none for a shape, which is then passed as the middle of its range where the effect is off.
+    /// Value at which the effect does nothing; none for a shape, which has the middle of its range where the effect is off.
     pub off: Option<f64>,
-    /// Whether it is searched in equal ratios.
+    /// Whether the value is searched in equal ratios.
     #[serde(rename = "log")]
     pub is_log: bool,
-    /// Value that it has in every run, where it was found before: the effect is not looked for then.
+    /// Value in every run, where the value was found before; the effect is then not looked for.
     pub value: Option<f64>,
 }
 
-/// What a tolerance is written as.
+/// A tolerance as it is written.
 #[derive(Deserialize)]
 #[serde(untagged)]
-enum Told {
+enum WrittenTolerance {
     Absolute(f64),
     Share(String),
 }
 
 fn tolerance<'de, D: Deserializer<'de>>(from: D) -> Result<Tolerance, D::Error> {
-    match Option::<Told>::deserialize(from)? {
+    match Option::<WrittenTolerance>::deserialize(from)? {
         None => Ok(Tolerance::Exact),
-        Some(Told::Absolute(sd)) => Ok(Tolerance::Absolute(sd)),
-        Some(Told::Share(text)) => share(&text).map(Tolerance::Relative).ok_or_else(|| {
-            D::Error::custom(format!(
-                "{text:?} is no share; write \"10 %\", or a number in its unit"
-            ))
-        }),
+        Some(WrittenTolerance::Absolute(sd)) => Ok(Tolerance::Absolute(sd)),
+        Some(WrittenTolerance::Share(text)) => {
+            share(&text).map(Tolerance::Relative).ok_or_else(|| {
+                D::Error::custom(format!(
+                    "{text:?} is no share; write \"10 %\", or a number in its unit"
+                ))
+            })
+        }
     }
 }
 
-/// The share that a text with a per cent sign says.
+/// The share that a text with a per cent sign gives.
 pub(crate) fn share(text: &str) -> Option<f64> {
     let percent = text.strip_suffix('%')?.trim().parse::<f64>().ok()?;
     percent.is_finite().then_some(percent / 100.0)

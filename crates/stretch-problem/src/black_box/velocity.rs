@@ -1,10 +1,10 @@
-//! The velocity at which a stage rubs: recorded, or the change of a recorded position.
+//! The velocity of the rubbing parts of a stage: recorded, or the derivative of a recorded position.
 
 use std::ops::Range;
 
-/// Longest stretch over which a change is taken, s.
+/// Longest time over which a difference is taken, s.
 const LONGEST_S: f64 = 0.05;
-/// Share of the greatest velocity that its noise may be.
+/// Greatest noise of a velocity, a share of the greatest velocity.
 const NOISY: f64 = 0.01;
 
 /// A velocity, all trials end to end.
@@ -14,14 +14,14 @@ pub(crate) struct Velocity {
 }
 
 impl Velocity {
-    /// As recorded.
+    /// The velocity as recorded.
     pub(crate) fn recorded(values: &[f64]) -> Self {
         Self { values: values.to_vec() }
     }
 
-    /// v_i = (x_(i+k) - x_(i-k))/(2 k dt) within each trial, k the smallest for which the noise of the position, as second differences show
-    /// it, makes no more than a hundredth of the greatest velocity; no longer than a twentieth of a second. At the ends the
-    /// difference is one-sided.
+    /// The velocity v_i = (x_(i+k) - x_(i-k))/(2 k dt) within each trial, with the smallest k (doubled from 1) for which the noise of the
+    /// position makes at most a hundredth of the greatest velocity, and 2 k dt at most a twentieth of a second. The noise of the position is
+    /// estimated from second differences. At the ends of a trial the difference is one-sided.
     pub(crate) fn of_position(position: &[f64], trials: &[Range<usize>], dt_s: f64) -> Self {
         let parts = || trials.iter().map(|r| &position[r.clone()]);
         let noise = stretch_gap::noise_variance(parts(), dt_s).sqrt();

@@ -3,27 +3,27 @@
 use stretch_data::{DataError, Split, TomlView};
 use stretch_sim::Tolerance;
 
-use crate::black_box::spec::{Argument, Input, OwnEffect, Parameter, Stage, Wrapped, share};
+use crate::black_box::spec::{Argument, Input, OwnEffect, Parameter, StageEntry, Wrapped, share};
 
 /// A trial of a problem's file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrialFile {
     /// File, relative to the problem's folder.
     pub file: String,
-    /// Session time of its first sample, s; trials without follow one another.
+    /// Session time of its first sample, s; where it is 0, the trial follows the one before.
     pub start_s: f64,
-    /// Whether it may be fitted or only tested on.
+    /// Whether the trial may be fitted or is only tested on.
     pub split: Split,
 }
 
-pub(super) fn stage(view: &TomlView<'_>) -> Result<Stage, DataError> {
+pub(super) fn stage(view: &TomlView<'_>) -> Result<StageEntry, DataError> {
     view.only(&["name", "output", "unit", "inputs", "noise", "velocity", "position"])?;
     let noise = view.optional_number("noise")?;
     if noise.is_some_and(|noise| noise < 0.0) {
         return view.fail("noise", "it is below 0; give one standard deviation");
     }
     let output = view.text("output")?;
-    Ok(Stage {
+    Ok(StageEntry {
         name: view.optional_text("name")?.unwrap_or(output).to_owned(),
         unit: unit(view)?,
         inputs: view.texts("inputs")?,
@@ -56,13 +56,13 @@ pub(super) fn parameter(view: &TomlView<'_>) -> Result<Parameter, DataError> {
     })
 }
 
-/// A number in the parameter's unit, or a text with a per cent sign; without one it is exact.
+/// A tolerance: a number in the parameter's unit, or a text with a per cent sign; a parameter without a tolerance is exact.
 fn tolerance(view: &TomlView<'_>) -> Result<Tolerance, DataError> {
     const KEY: &str = "tolerance";
     if !view.has(KEY) {
         return Ok(Tolerance::Exact);
     }
-    let told = match view.text(KEY) {
+    let tolerance = match view.text(KEY) {
         Ok(text) => match share(text) {
             Some(share) => Tolerance::Relative(share),
             None => {
@@ -74,11 +74,11 @@ fn tolerance(view: &TomlView<'_>) -> Result<Tolerance, DataError> {
         },
         Err(_) => Tolerance::Absolute(view.number(KEY)?),
     };
-    match told {
+    match tolerance {
         Tolerance::Absolute(x) | Tolerance::Relative(x) if x < 0.0 => {
             view.fail(KEY, "it is below 0; give one standard deviation")
         }
-        told => Ok(told),
+        tolerance => Ok(tolerance),
     }
 }
 
@@ -138,7 +138,7 @@ pub(super) fn trial(view: &TomlView<'_>) -> Result<TrialFile, DataError> {
     Ok(TrialFile { file: view.text("file")?.to_owned(), start_s, split })
 }
 
-/// A unit, empty where none is given.
+/// The unit of an entry, empty where none is given.
 fn unit(view: &TomlView<'_>) -> Result<String, DataError> {
     Ok(view.optional_text("unit")?.unwrap_or_default().to_owned())
 }

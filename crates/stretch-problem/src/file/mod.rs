@@ -48,23 +48,23 @@ pub use simulator::{SimulatorEntry, WorkersEntry};
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProblemFile {
-    /// What the problem is called.
+    /// Name of the problem.
     pub name: String,
     /// Folder that its files are relative to.
     pub folder: PathBuf,
-    /// What simulates.
+    /// The simulator.
     pub simulator: SimulatorEntry,
-    /// Everything else, the recordings apart.
+    /// All other entries, without the recordings.
     pub spec: ProblemSpec,
-    /// Recordings.
+    /// The recordings.
     pub trials: Vec<TrialFile>,
     /// Column of the time.
     pub time: String,
-    /// Most runs of the simulator.
+    /// Greatest number of runs of the simulator.
     pub budget: Option<usize>,
 }
 
-/// The folder in which one stands.
+/// The current folder.
 const HERE: &str = ".";
 
 impl ProblemFile {
@@ -84,8 +84,8 @@ impl ProblemFile {
         Ok(Self { folder, ..file })
     }
 
-    /// Reads the problem's file that a path means: itself where it ends in `.toml`, or the `problem.toml` of a folder that is no data
-    /// set; none where it means none.
+    /// Reads the problem's file that a path stands for: the path itself where it ends in `.toml`, or the `problem.toml` of a folder that is
+    /// no data set. None where the path stands for no problem's file.
     ///
     /// # Errors
     /// As [`ProblemFile::read`].
@@ -100,7 +100,7 @@ impl ProblemFile {
         }
     }
 
-    /// Parses the text of a problem's file; `file` stands for it in messages.
+    /// Parses the text of a problem's file; `file` is its name in messages.
     ///
     /// # Errors
     /// As [`ProblemFile::read`].
@@ -168,10 +168,10 @@ impl ProblemFile {
         })
     }
 
-    /// The workers that answer it, `jobs` at once where the file does not say; none for what is built in.
+    /// The workers of the problem's simulator, `jobs` at once where the file gives no number; none for a simulator that is built in.
     ///
     /// # Errors
-    /// An FMU where there is no program that runs it.
+    /// There is no program that runs FMUs, and the simulator is one.
     pub fn workers(&self, jobs: usize) -> Result<Option<WorkersSpec>, ProblemError> {
         let (spec, how) = match &self.simulator {
             SimulatorEntry::Rig { .. } | SimulatorEntry::Gauge { .. } | SimulatorEntry::Caller => {
@@ -193,7 +193,7 @@ impl ProblemFile {
         Ok(Some(WorkersSpec { jobs, deadline_s: how.deadline_s, start_s: how.start_s, ..spec }))
     }
 
-    /// The problem with its recordings.
+    /// Reads the recordings; the problem with its recordings.
     ///
     /// # Errors
     /// Recordings that cannot be read.
@@ -211,7 +211,7 @@ impl ProblemFile {
     }
 }
 
-/// The columns of reference and signal, where they are named.
+/// The columns of reference and signal, where both are named.
 fn sensor(top: &TomlView<'_>) -> Result<Option<Sensor>, DataError> {
     match (top.optional_text("reference")?, top.optional_text("signal")?) {
         (Some(reference), Some(signal)) => {
@@ -222,7 +222,7 @@ fn sensor(top: &TomlView<'_>) -> Result<Option<Sensor>, DataError> {
     }
 }
 
-/// Units of parameters and of the values of own effects, by the names that workers know them by.
+/// Units of parameters and of the values of own effects, by their names for workers.
 fn units(spec: &ProblemSpec) -> Vec<(String, &str)> {
     let parameters = spec.parameters.iter().map(|p| (p.name.clone(), p.unit.as_str()));
     let effects = spec.effects.iter().flat_map(|effect| {
@@ -231,7 +231,7 @@ fn units(spec: &ProblemSpec) -> Vec<(String, &str)> {
     parameters.chain(effects).filter(|(_, unit)| !unit.is_empty()).collect()
 }
 
-/// Every table of one kind, called by its name where it has one.
+/// Every table of one kind; messages call a table by its name where it has one.
 fn named<T>(
     top: &TomlView<'_>,
     kind: &str,

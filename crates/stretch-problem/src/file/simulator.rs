@@ -1,4 +1,4 @@
-//! What simulates, as a problem's file says it.
+//! The simulator of a problem's file.
 
 use std::collections::BTreeMap;
 
@@ -6,61 +6,61 @@ use stretch_data::{DataError, TomlView};
 
 use super::sensor;
 
-/// What simulates.
+/// The simulator of a problem.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum SimulatorEntry {
     /// The built-in rig, on a data set.
     Rig {
-        /// Folder of the data set, relative to the problem's.
+        /// Folder of the data set, relative to the problem's folder.
         data_set: String,
-        /// Rig file; the data set's own where there is none.
+        /// Rig file; the data set's own where none is given.
         rig: Option<String>,
     },
     /// A gauge alone, on a data set or a trial.
     Gauge {
-        /// Folder or file, relative to the problem's.
+        /// Folder or file, relative to the problem's folder.
         data_set: String,
         /// Rig file.
         rig: Option<String>,
-        /// Columns of reference and signal, where they are not the usual ones.
+        /// Columns of reference and signal, where these are not the usual ones.
         columns: Option<(String, String)>,
     },
     /// Another program, as workers.
     Command {
         /// Program and arguments, started in the problem's folder.
         command: Vec<String>,
-        /// How it is run.
+        /// How the workers are run.
         workers: WorkersEntry,
     },
     /// An object of a Python module, behind a worker that comes with the program.
     Python {
         /// `module:object`.
         object: String,
-        /// How it is run.
+        /// How the workers are run.
         workers: WorkersEntry,
     },
     /// A functional mock-up unit.
     Fmu {
         /// The file, relative to the problem's folder.
         file: String,
-        /// Variables of parameters, effects and columns that are called otherwise in it.
+        /// Variables of the FMU for parameters, effects and columns, where the names differ.
         variables: BTreeMap<String, String>,
-        /// How it is run.
+        /// How the workers are run.
         workers: WorkersEntry,
     },
-    /// In the memory of the caller: no file can name it.
+    /// A simulator in the memory of the caller, which no file can name.
     Caller,
 }
 
 /// How workers are run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WorkersEntry {
-    /// How many at once; the program's `--jobs` where there is none.
+    /// Number of workers at once; the program's `--jobs` where none is given.
     pub jobs: Option<usize>,
     /// Longest time that one model may take, s.
     pub deadline_s: f64,
-    /// Longest time that it may take to begin, s.
+    /// Longest time that a worker may take to begin, s.
     pub start_s: f64,
 }
 
@@ -106,7 +106,7 @@ impl SimulatorEntry {
             }
             [] => view.fail(
                 "command",
-                "nothing says what simulates; write one of builtin, command, python, fmu",
+                "there is no simulator; write one of builtin, command, python, fmu",
             ),
             [_, second, ..] => {
                 view.fail(second, format!("{} are given; keep one", given.join(" and ")))
@@ -133,7 +133,7 @@ impl SimulatorEntry {
     }
 }
 
-/// The table `[simulator.variables]`: a name of the problem, and what the FMU calls it.
+/// The table `[simulator.variables]`: names of the problem, and the FMU's names for them.
 fn variables(view: &TomlView<'_>) -> Result<BTreeMap<String, String>, DataError> {
     let Some(own) = view.table("variables")? else { return Ok(BTreeMap::new()) };
     let own = own.called("[simulator.variables]");

@@ -10,13 +10,13 @@ use super::{ProblemFile, SimulatorEntry, WorkersEntry};
 use crate::black_box::spec::{Argument, OwnEffect, Parameter, ProblemSpec};
 
 impl ProblemFile {
-    /// The text of the file in its own folder; it reads back to the same.
+    /// The text of the file in its own folder; the text reads back to the same file.
     pub fn to_toml(&self) -> String {
         self.to_toml_with(&self.folder.join("problem.toml"), &Remarks::default())
     }
 
-    /// The text of the file as it stands at `path`, with comments beside its entries; it reads back to the same. Where its files are
-    /// relative to another folder than that of `path`, the text says so.
+    /// The text of the file at `path`, with comments beside its entries; the text reads back to the same file. Where its files are relative
+    /// to another folder than that of `path`, the text names that folder.
     ///
     /// Comments on parameters stand under the table `parameter`.
     pub fn to_toml_with(&self, path: &Path, remarks: &Remarks) -> String {
@@ -52,7 +52,7 @@ impl ProblemFile {
         out.0
     }
 
-    /// What its files are relative to, where that is another folder than the one in which `path` stands.
+    /// The folder that the files of the problem are relative to, where it is another one than that of `path`.
     fn folder_from(&self, path: &Path) -> Option<String> {
         let beside = path.parent().filter(|p| !p.as_os_str().is_empty());
         let beside = beside.unwrap_or_else(|| Path::new(".")).canonicalize();
@@ -104,14 +104,14 @@ impl ProblemFile {
 struct Lines(String);
 
 impl Lines {
-    /// A comment ends with its line, and holds no control character.
+    /// Writes a comment, with blanks in place of line ends and other control characters.
     fn comment(&mut self, text: &str) {
         let text: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
         self.put(&format!("# {text}"));
     }
 
     fn put(&mut self, line: &str) {
-        // a string takes every write
+        // Writing to a String does not fail.
         let _ = writeln!(self.0, "{line}");
     }
 
@@ -186,7 +186,7 @@ impl Lines {
     }
 }
 
-/// What simulates, in one line.
+/// The simulator in one line.
 fn simulator(entry: &SimulatorEntry) -> Value {
     let mut table = Table::new();
     let mut put = |key: &str, value: Value| drop(table.insert(key.to_owned(), value));

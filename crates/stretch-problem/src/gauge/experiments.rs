@@ -1,8 +1,8 @@
-//! A menu of experiments on a gauge alone, and what a model predicts of each.
+//! Candidate experiments on a gauge alone, and what a model predicts of each.
 
 use stretch_data::{Channel, Trial};
 use stretch_gap::{GapError, Laboratory, Model, Plan};
-use stretch_sim::{Gauge, Stage, Start};
+use stretch_sim::{Gauge, RigStage, Start};
 
 use super::GaugeSimulator;
 use crate::{
@@ -13,7 +13,7 @@ use crate::{
     error::ProblemError,
 };
 
-/// An experiment on a gauge: the course of e.
+/// An experiment on a gauge: the course of e, the reference over its range.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Course {
     e: Vec<f64>,
@@ -23,7 +23,7 @@ pub struct Course {
     pressure: Vec<f64>,
 }
 
-/// A course that gauge blocks may hold, without a pressure.
+/// A course without a pressure, which gauge blocks may hold.
 fn held(points: &[(f64, f64)], is_known: bool, dt_s: f64) -> Course {
     let e = course(points, dt_s);
     Course { pressure: vec![0.0; e.len()], e, is_known }
@@ -35,7 +35,8 @@ fn held_under_pressure(dt_s: f64) -> Course {
     Course { e: vec![0.5; pressure.len()], is_known: true, pressure }
 }
 
-/// Held at known lengths with blocks, and left alone: name, how, minutes to prepare, points, whether blocks hold it.
+/// Experiments in which the gauge is held at known lengths with blocks, or left alone: name, how, minutes to prepare, points, and
+/// whether blocks hold the gauge.
 fn still() -> [(&'static str, &'static str, f64, Points, bool); 2] {
     let block = |e: f64| [(e, 3.0), (e, 10.0)];
     [
@@ -61,17 +62,17 @@ impl GaugeSimulator {
     fn prediction(&self, model: &Model, course: &Course) -> Result<Vec<Vec<f64>>, ProblemError> {
         let (mut model, mut base) = (model.clone(), self.nominal.effects.clone());
         if course.is_known {
-            model.effects.retain(|(i, _)| self.rows[*i].stage != Stage::Reference);
+            model.effects.retain(|(i, _)| self.rows[*i].stage != RigStage::Reference);
             let shown =
-                self.nominal.effects.iter().filter(|e| e.effect().stage == Stage::Reference);
+                self.nominal.effects.iter().filter(|e| e.effect().stage == RigStage::Reference);
             shown.for_each(|known| drop(base.remove(known.name())));
         }
         let effects = unrecorded(&base, &self.rows, &model)?;
-        let gauge = Gauge::new(self.nominal(&model), &effects, self.record.dt_s)?;
+        let gauge = Gauge::new(self.nominal(&model), &effects, self.session.dt_s)?;
         let shown = self.reference_of(course);
         let mut signal = vec![0.0; shown.len()];
-        // Without a pressure column there is no effect of it either.
-        let pressure = match self.record.pressure.is_empty() {
+        // Without a pressure column there is no effect of pressure either.
+        let pressure = match self.session.pressure.is_empty() {
             true => Vec::new(),
             false => self.pressure_of(course),
         };
@@ -100,7 +101,7 @@ impl GaugeSimulator {
         if course.pressure.iter().any(|share| *share != 0.0) {
             channels.push(channel("set_pressure_kpa".into(), self.pressure_of(course)));
         }
-        let time_s = (0..course.e.len()).map(|i| i as f64 * self.record.dt_s).collect();
+        let time_s = (0..course.e.len()).map(|i| i as f64 * self.session.dt_s).collect();
         Trial { name: name.into(), time_s, channels }
     }
 
@@ -119,25 +120,25 @@ impl Laboratory for GaugeSimulator {
     type Setting = Course;
 
     fn menu(&self) -> Vec<(Plan, Course)> {
-        let dt_s = self.record.dt_s;
+        let dt_s = self.session.dt_s;
         let moving =
             moving().into_iter().map(|(name, how, points)| (name, how, 0.25, points, false));
         let all = moving.chain(still()).map(|(name, how, prepare_min, points, is_known)| {
             self.experiment((name, how), prepare_min, held(&points, is_known, dt_s))
         });
-        let mut menu: Vec<(Plan, Course)> = all.collect();
-        if !self.record.pressure.is_empty() {
+        let mut candidates: Vec<(Plan, Course)> = all.collect();
+        if !self.session.pressure.is_empty() {
             let how =
                 "Hold the gauge at one length, with a block, while the pressure goes up and down.";
-            let told = ("held_under_pressure", how);
-            menu.push(self.experiment(told, 3.0, held_under_pressure(dt_s)));
+            let named = ("held_under_pressure", how);
+            candidates.push(self.experiment(named, 3.0, held_under_pressure(dt_s)));
         }
-        menu
+        candidates
     }
 
-    /// The first minute of the record.
+    /// The first minute of the recording.
     fn done(&self) -> Course {
-        let samples = ((60.0 / self.record.dt_s) as usize).min(self.inputs[0].values.len());
+        let samples = ((60.0 / self.session.dt_s) as usize).min(self.inputs[0].values.len());
         let values = &self.inputs[0].values[..samples];
         let e: Vec<f64> =
             values.iter().map(|x| (x - self.nominal.spec.zero) / self.nominal.spec.span).collect();

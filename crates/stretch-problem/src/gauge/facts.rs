@@ -1,48 +1,49 @@
-//! What is known of the record of a gauge alone.
+//! What is known of the recording of a gauge alone.
 
 use std::borrow::Cow;
 
 use stretch_data::{unit, written_unit};
 use stretch_gap::{Column, Description, MotionSpec, RecordFacts, Recorded, RowsUsed};
 
-use super::record::Record;
+use super::session::GaugeSession;
 use crate::{bench::specs::skew_of, rig::smooth::Smoothed};
 
 /// Delays of two recorders that were not started together, without a catalogue, s.
 const SKEW_S: [f64; 2] = [-1.0, 1.0];
 
-/// The facts of a record with the column `reference`, of whose trials `inputs` are the references as they drive the gauge.
+/// The facts of a session with the column `reference`; `inputs` are the references of its trials as they drive the gauge.
 pub(super) fn facts(
     about: &Description,
     reference: &str,
-    record: &Record,
+    session: &GaugeSession,
     inputs: &[Smoothed],
 ) -> RecordFacts {
     RecordFacts {
-        is_lost: record.is_lost.clone(),
-        rows_used: Some(RowsUsed { used: record.rows.used(), read: record.rows.read }),
-        motion: Some(MotionSpec::new(record.reference.clone(), unit_of(reference))),
-        signals: signals(reference, record, inputs),
-        columns: columns(about, reference, record),
+        is_lost: session.is_lost.clone(),
+        rows_used: Some(RowsUsed { used: session.rows.used(), read: session.rows.read }),
+        motion: Some(MotionSpec::new(session.reference.clone(), unit_of(reference))),
+        signals: signals(reference, session, inputs),
+        columns: columns(about, reference, session),
         sensor: Some(0),
-        // A line follows whatever it is fitted to; where it does not follow half of it, the two have little to do with each other.
+        // A straight line follows most signals that it is fitted to; where the line leaves half of the signal, reference and signal have
+        // little to do with each other.
         gross_misfit_share: 0.5,
         ..RecordFacts::default()
     }
 }
 
 /// The reference as it drives the gauge, and the pressure where it was recorded.
-fn signals(reference: &str, record: &Record, inputs: &[Smoothed]) -> Vec<Recorded> {
+fn signals(reference: &str, session: &GaugeSession, inputs: &[Smoothed]) -> Vec<Recorded> {
     let driving = inputs.iter().flat_map(|s| &s.values).copied().collect();
     let mut out = vec![Recorded::measured(reference, unit_of(reference), driving)];
-    if !record.pressure.is_empty() {
-        out.push(Recorded::measured("pressure_kpa", "kPa", record.pressure.clone()));
+    if !session.pressure.is_empty() {
+        out.push(Recorded::measured("pressure_kpa", "kPa", session.pressure.clone()));
     }
     out
 }
 
 /// The signal, and the reference that drives the gauge.
-fn columns(about: &Description, name: &str, record: &Record) -> Vec<Column<'static>> {
+fn columns(about: &Description, name: &str, session: &GaugeSession) -> Vec<Column<'static>> {
     let signal = Column {
         skew_s: skew_of(about, SKEW_S),
         hint: Cow::Borrowed("the gauge, its wires and its amplifier"),
@@ -51,7 +52,7 @@ fn columns(about: &Description, name: &str, record: &Record) -> Vec<Column<'stat
     let reference = Column {
         name: Cow::Owned(name.to_owned()),
         unit: Cow::Owned(unit_of(name).to_owned()),
-        values: Cow::Owned(record.reference.clone()),
+        values: Cow::Owned(session.reference.clone()),
         output_of: None,
         hint: Cow::Borrowed("the reference, its cable and its scale"),
         ..signal.clone()
@@ -59,7 +60,7 @@ fn columns(about: &Description, name: &str, record: &Record) -> Vec<Column<'stat
     vec![signal, reference]
 }
 
-/// Unit of a column, empty where its name gives none.
+/// Unit of a column, empty where the column's name gives none.
 pub(super) fn unit_of(column: &str) -> &str {
     unit(column).map_or("", written_unit)
 }

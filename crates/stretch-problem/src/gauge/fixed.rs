@@ -1,4 +1,4 @@
-//! A gauge alone with what a diagnosis found of it.
+//! A gauge alone with what a diagnosis found.
 
 use stretch_data::Remarks;
 use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, next_experiment};
@@ -15,10 +15,10 @@ use crate::{
 const TABLE: &str = "sensing";
 
 impl GaugeSimulator {
-    /// What a diagnosis of this gauge names, as something to type: with its numbers, in units of e.
+    /// The effects that a diagnosis of this gauge names, as code to type with the fitted numbers, in units of e.
     fn typed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
-        // a sample time that was diagnosed is one
-        let Ok(grid) = Grid::samples(self.record.dt_s) else { return Vec::new() };
+        // A sample time with which a diagnosis ran makes a grid.
+        let Ok(grid) = Grid::samples(self.session.dt_s) else { return Vec::new() };
         let model = evidence.candidates.first().unwrap_or(&evidence.best);
         let around = Gauge::surroundings(&self.nominal.spec, &grid);
         let place = (0, model.parameters[GAIN]);
@@ -28,8 +28,8 @@ impl GaugeSimulator {
         })
     }
 
-    /// A gauge file (`kind = "gauge"`) with what a diagnosis of this gauge found: see [`Fix`]. How the gauge was wound before the
-    /// session belongs to the record and stays out.
+    /// A gauge file (`kind = "gauge"`) with what a diagnosis of this gauge found: see [`Fix`]. The initial hysteresis state belongs to the
+    /// recording and stays out.
     ///
     /// # Errors
     /// [`NoFix`] where the diagnosis names nothing to fix, or a gauge that no file may hold.
@@ -44,11 +44,11 @@ impl GaugeSimulator {
             (OFFSET, "offset", (self.nominal.spec.offset, rig.spec.offset)),
             (GAIN, "gain", (self.nominal.spec.gain, rig.spec.gain)),
         ] {
-            let told = chosen.told(index, &self.about.parameters[index].unit, values);
-            remarks.parameters.insert((TABLE.into(), name.into()), told);
+            let remark = chosen.remark(index, &self.about.parameters[index].unit, values);
+            remarks.parameters.insert((TABLE.into(), name.into()), remark);
         }
         for effect in self.nominal.effects.iter() {
-            let own = vec!["It was in the rig file already.".to_owned()];
+            let own = vec!["This effect was in the rig file already.".to_owned()];
             remarks.effects.insert(effect.name().into(), own);
         }
         let gain = rig.spec.gain;
@@ -56,7 +56,7 @@ impl GaugeSimulator {
             let effect = self.rows[index];
             let found = (effect, values.to_vec());
             let values = with_line(self, (0, gain), &self.rows, chosen.model, found);
-            chosen.tell(effect.into(), &mut remarks);
+            chosen.describe(effect.into(), &mut remarks);
             rig.effects.push(effect, &values)?;
         }
         let file = rig.to_file();

@@ -1,9 +1,9 @@
 //! How far one column trails another.
 
-/// So far a lag is looked for, s.
+/// Longest lag that is looked for, s.
 const REACH_S: f64 = 1.0;
 
-/// Time by which `y` trails `x`, s: where they correlate best, of all within [`REACH_S`].
+/// Time by which `y` trails `x`, s: the lag within [`REACH_S`] at which `x` and `y` correlate best.
 pub(super) fn lag(x: &[f64], y: &[f64], dt_s: f64) -> f64 {
     let reach = ((REACH_S / dt_s) as usize).min(x.len() / 4);
     if reach == 0 {

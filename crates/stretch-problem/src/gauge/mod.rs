@@ -4,7 +4,7 @@ mod experiments;
 mod facts;
 mod fixed;
 mod lag;
-mod record;
+mod session;
 mod source;
 
 use stretch_data::SessionTrial;
@@ -18,7 +18,7 @@ use stretch_sim::{
 
 use facts::{facts, unit_of};
 use lag::lag;
-use record::Record;
+use session::GaugeSession;
 
 use crate::{
     bench::{
@@ -29,33 +29,35 @@ use crate::{
     rig::smooth::{Draws, Smoothed, unscheduled},
 };
 
-/// Where the parameters stand.
+/// Index of the offset among the parameters.
 const OFFSET: usize = 0;
+/// Index of the gain.
 const GAIN: usize = 1;
-/// The one that says how the memories of the gauge begin the session: wound from below (1), from above (-1), settled.
-const WINDING: usize = 2;
+/// Index of the initial hysteresis state: how the memories of the gauge begin the session, after a motion from below (1), from above
+/// (-1), or settled (0).
+const INITIAL_STATE: usize = 2;
 
 /// What a [`GaugeSimulator`] is made of.
 #[derive(Debug, Clone, Copy)]
 pub struct GaugeSetup<'a> {
-    /// Trials, each with both columns; `pressure_kpa` is welcome.
+    /// Trials, each with both columns; a column `pressure_kpa` is used where every trial has one.
     pub trials: &'a [SessionTrial],
     /// Column of the reference: what the gauge measures.
     pub reference: &'a str,
     /// Column of the signal: what the gauge says.
     pub signal: &'a str,
-    /// The gauge as it should be; without one zero, span, offset and gain are those of the record.
+    /// The gauge as it should be; without a rig, zero, span, offset and gain are those of the recording.
     pub rig: Option<&'a GaugeRig>,
-    /// Effects that are looked for, those that the gauge has apart.
+    /// Effects that are looked for; effects that the gauge already has are left out.
     pub catalogue: &'a Catalogue,
 }
 
-/// Any stretch sensor with a reference: y = offset + gain e, e the reference over its range in the fit trials.
+/// Any stretch sensor with a reference: y = offset + gain e, where e is the reference over its range in the fit trials.
 ///
-/// Offset and gain are free unless a rig file (`kind = "gauge"`) gives them; its effects act in every run. Effects of the catalogue act on e in place
-/// of the strain and on (y - offset)/gain in place of resistance and voltage. The reference is smoothed as far as its own
-/// noise allows; what of that noise arrives at the signal belongs to the floor. Noise comes from second differences:
-/// it is what changes from sample to sample, and errors that last longer count as gap.
+/// Offset and gain are free unless a rig file (`kind = "gauge"`) gives them; the rig file's effects act in every run. Effects of the catalogue
+/// act on e in place of the strain and on (y - offset)/gain in place of resistance and voltage. The reference is smoothed as far as its own
+/// noise allows; the part of that noise that arrives at the signal belongs to the noise of the signal. Noise is estimated from second
+/// differences: the noise is what changes from sample to sample, and errors that last longer count as gap.
 ///
 /// ```
 /// use stretch_data::{Channel, SessionTrial, Trial};
@@ -87,10 +89,10 @@ pub struct GaugeSetup<'a> {
 #[derive(Debug)]
 pub struct GaugeSimulator {
     about: Description,
-    /// The gauge as shipped, with the effects that it already has.
+    /// The gauge as shipped, with the effects that the gauge already has.
     nominal: GaugeRig,
     rows: Vec<&'static Effect>,
-    record: Record,
+    session: GaugeSession,
     /// The reference of each trial as it drives the gauge.
     inputs: Vec<Smoothed>,
     draws: Draws,
@@ -107,22 +109,22 @@ pub struct GaugeSimulator {
 }
 
 impl GaugeSimulator {
-    /// Binds a gauge to trials and two of their columns; the effects of the catalogue that can act in it and that it does
-    /// not have are looked for.
+    /// Binds a gauge to trials and two of their columns. Effects of the catalogue that can act in a gauge and that this gauge does not
+    /// have are looked for.
     ///
     /// # Errors
     /// Columns that are missing, dead, hold too few numbers or look swapped.
     pub fn new(setup: &GaugeSetup<'_>) -> Result<Self, ProblemError> {
         let GaugeSetup { trials, reference, signal, rig, catalogue } = *setup;
-        let record = Record::read(trials, reference, signal)?;
-        let nominal = nominal(&record, rig);
-        let (least, greatest) = record.range(&record.signal);
+        let session = GaugeSession::read(trials, reference, signal)?;
+        let nominal = nominal(&session, rig);
+        let (least, greatest) = session.range(&session.signal);
         let (reference_noise, noise) =
-            (record.noise(&record.reference), record.noise(&record.signal).sd());
-        let inputs: Vec<Smoothed> = parts(&record.trials, &record.reference)
+            (session.noise(&session.reference), session.noise(&session.signal).sd());
+        let inputs: Vec<Smoothed> = parts(&session.trials, &session.reference)
             .map(|(_, x)| Smoothed::of(x, reference_noise.sd(), &unscheduled(x.len())))
             .collect();
-        let alone = alone(&record);
+        let alone = alone(&session);
         let has_pressure = nominal.spec.pressure_scale.is_some();
         let is_missing = |e: &&Effect| nominal.effects.find(e.name).is_none();
         let place = |effect: &Effect| Place {
@@ -131,16 +133,17 @@ impl GaugeSimulator {
             unit: Gauge::unit,
         };
         let missing = catalogue.iter().filter(|e| Gauge::accepts(e, has_pressure) && is_missing(e));
-        let mut notes = record.notes.clone();
-        let (rows, places) = shown(missing.map(|e| (e, place(e))), record.dt_s, &mut notes);
+        let mut notes = session.notes.clone();
+        let (rows, places) = shown(missing.map(|e| (e, place(e))), session.dt_s, &mut notes);
         let effects =
             rows.iter().zip(places).map(|(effect, place)| spec_of(effect, place)).collect();
-        let stage = StageSpec::new("sensing", signal, unit_of(signal), &[OFFSET, GAIN, WINDING]);
+        let stage =
+            StageSpec::new("sensing", signal, unit_of(signal), &[OFFSET, GAIN, INITIAL_STATE]);
         let parameters = parameters(&nominal, signal, rig.is_some());
-        let (trials, dt_s) = (record.trials.clone(), record.dt_s);
+        let (trials, dt_s) = (session.trials.clone(), session.dt_s);
         let about = DescriptionSpec { stages: vec![stage], parameters, effects, trials, dt_s };
         let about = Description::new(about)?;
-        let known = facts(&about, reference, &record, &inputs);
+        let known = facts(&about, reference, &session, &inputs);
         Ok(Self {
             about: about.with_record(known)?,
             rows,
@@ -150,14 +153,14 @@ impl GaugeSimulator {
             reference_noise,
             noise,
             spread: greatest - least,
-            found_in: FitRecord::of(&record.trials, &record.signal, dt_s),
+            found_in: FitRecord::of(&session.trials, &session.signal, dt_s),
             notes,
-            record,
+            session,
             nominal,
         })
     }
 
-    /// What was noticed while it was read.
+    /// What was noticed while the recordings were read, in sentences.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
@@ -177,20 +180,20 @@ impl GaugeSimulator {
         let acting = Acting::of(&self.nominal.effects, &self.rows, run.model)?;
         let gauge = Gauge::new(self.nominal(run.model), &acting.inside, self.about.dt_s)?;
         let mut memory = gauge.memory();
-        // What was done to the gauge before the session nobody knows.
-        let mut start = Start::Wound(run.model.parameters[WINDING]);
+        // Nobody knows what was done to the gauge before the session.
+        let mut start = Start::Hysteresis(run.model.parameters[INITIAL_STATE]);
         let mut from = 0;
-        for (i, trial) in self.record.trials[..run.trials].iter().enumerate() {
+        for (i, trial) in self.session.trials[..run.trials].iter().enumerate() {
             let to = from + trial.samples;
             let input = match run.input_noise {
                 None => self.inputs[i].values.clone(),
-                Some(seed) => self.draws.shaken(&self.inputs, &self.reference_noise, seed, i),
+                Some(seed) => self.draws.with_noise(&self.inputs, &self.reference_noise, seed, i),
             };
-            let pressure = self.record.pressure.get(from..to).unwrap_or(&[]);
+            let pressure = self.session.pressure.get(from..to).unwrap_or(&[]);
             gauge.run(&mut memory, start, trial.start_s, &input, pressure, &mut out[from..to])?;
             let record = self.found_in.of_trial(i, self.noise, self.spread);
             acting.follow(record, &mut out[from..to]);
-            let next = self.record.trials.get(i + 1).map_or(f64::INFINITY, |t| t.start_s);
+            let next = self.session.trials.get(i + 1).map_or(f64::INFINITY, |t| t.start_s);
             let rest_s = (next - trial.start_s - trial.samples as f64 * self.about.dt_s).max(0.0);
             start = Start::Carried { rest_s };
             from = to;
@@ -208,7 +211,7 @@ impl Simulator for GaugeSimulator {
     }
 
     fn measured(&self, _stage: usize) -> &[f64] {
-        &self.record.signal
+        &self.session.signal
     }
 
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
@@ -239,11 +242,11 @@ fn parts<'a>(
     })
 }
 
-/// The gauge of a rig file; without one that of the record, its offset and gain free.
-fn nominal(record: &Record, rig: Option<&GaugeRig>) -> GaugeRig {
-    let (low, high) = record.range(&record.reference);
-    let (least, greatest) = record.range(&record.signal);
-    let scale = (!record.pressure.is_empty()).then(|| record.range(&record.pressure).1);
+/// The gauge of a rig file; without a rig file the gauge that the recording gives, with offset and gain free.
+fn nominal(session: &GaugeSession, rig: Option<&GaugeRig>) -> GaugeRig {
+    let (low, high) = session.range(&session.reference);
+    let (least, greatest) = session.range(&session.signal);
+    let scale = (!session.pressure.is_empty()).then(|| session.range(&session.pressure).1);
     let pressure_scale = scale.filter(|scale| *scale > 0.0);
     if let Some(rig) = rig {
         let mut rig = rig.clone();
@@ -252,7 +255,7 @@ fn nominal(record: &Record, rig: Option<&GaugeRig>) -> GaugeRig {
     }
     let mut spec =
         GaugeSpec { zero: low, span: high - low, offset: 0.0, gain: 1.0, pressure_scale };
-    (spec.offset, spec.gain) = line(record, &spec);
+    (spec.offset, spec.gain) = line(session, &spec);
     let free = Tolerance::Absolute(3.0 * (greatest - least));
     GaugeRig { spec, offset: free, gain: free, effects: EffectSet::new() }
 }
@@ -267,27 +270,27 @@ fn parameters(rig: &GaugeRig, signal: &str, is_evidence: bool) -> Vec<ParameterS
         parameter("gain", rig.spec.gain, rig.gain),
         ParameterSpec {
             is_evidence: false,
-            ..ParameterSpec::new("winding", "1", 0.0).within(1.0 / 3.0)
+            ..ParameterSpec::new("initial_state", "1", 0.0).within(1.0 / 3.0)
         },
     ]
 }
 
-fn alone(record: &Record) -> Alone {
-    let end_s = |t: &TrialSpec| t.start_s + t.samples as f64 * record.dt_s;
-    let begun_s = record.trials.first().map_or(0.0, |t| t.start_s);
-    let longest = record.fitted().max_by_key(ExactSizeIterator::len).unwrap_or(0..0);
+fn alone(session: &GaugeSession) -> Alone {
+    let end_s = |t: &TrialSpec| t.start_s + t.samples as f64 * session.dt_s;
+    let begun_s = session.trials.first().map_or(0.0, |t| t.start_s);
+    let longest = session.fitted().max_by_key(ExactSizeIterator::len).unwrap_or(0..0);
     Alone {
-        session_s: record.trials.last().map_or(0.0, end_s) - begun_s,
-        lag_s: lag(&record.reference[longest.clone()], &record.signal[longest], record.dt_s),
+        session_s: session.trials.last().map_or(0.0, end_s) - begun_s,
+        lag_s: lag(&session.reference[longest.clone()], &session.signal[longest], session.dt_s),
     }
 }
 
 /// Offset and gain of the straight line of the signal over e, in the trials that are fitted.
-fn line(record: &Record, spec: &GaugeSpec) -> (f64, f64) {
+fn line(session: &GaugeSession, spec: &GaugeSpec) -> (f64, f64) {
     let pairs = || {
-        record.fitted().flat_map(|r| {
-            let e = record.reference[r.clone()].iter().map(|x| (x - spec.zero) / spec.span);
-            e.zip(&record.signal[r])
+        session.fitted().flat_map(|r| {
+            let e = session.reference[r.clone()].iter().map(|x| (x - spec.zero) / spec.span);
+            e.zip(&session.signal[r])
         })
     };
     let (n, e, y) = pairs().fold((0.0, 0.0, 0.0), |(n, a, b), (e, y)| (n + 1.0, a + e, b + y));

@@ -9,14 +9,14 @@ use stretch_sim::Catalogue;
 use super::{GaugeSetup, GaugeSimulator};
 use crate::{bench::rig_file, error::ProblemError};
 
-/// Columns that need no naming.
+/// Columns that are taken where none are named.
 const USUAL: (&str, &str) = ("length_mm", "bridge_v");
 
 impl GaugeSimulator {
     /// Reads a gauge alone: a trial, or the folder of a data set. `columns` are reference and signal; without them
-    /// `length_mm` and `bridge_v` are taken. None when it is no gauge alone: nothing says so, and the trials have openings.
+    /// `length_mm` and `bridge_v` are taken. None where the path holds no gauge alone: nothing says that it does, and the trials have openings.
     ///
-    /// A gauge is told by its columns, by a rig file of `kind = "gauge"` (given, or named by the data set), or by trials
+    /// A gauge alone is recognised by its columns, by a rig file of `kind = "gauge"` (given, or named by the data set), or by trials
     /// without openings.
     ///
     /// # Errors
@@ -48,7 +48,7 @@ impl GaugeSimulator {
         let (reference, signal) = (reference.to_owned(), signal.to_owned());
         let (reference, signal) = (reference.as_str(), signal.as_str());
         let trials = match &set {
-            // Read once: it may be standard input.
+            // The recording is read once, for it may be standard input.
             None => vec![SessionTrial::from(first)],
             Some(set) => {
                 let options = ReadOptions::new().require(reference).require(signal);

@@ -1,4 +1,4 @@
-//! The rig driven by a record of which one column is corrected.
+//! The rig driven by a recording with one corrected column.
 
 use stretch_gap::Distortion;
 use stretch_sim::Key;
@@ -10,14 +10,14 @@ use super::{
 };
 
 impl RigSimulator {
-    /// The rig with a session in which one column is corrected; none where the column drives nothing. What was measured of
-    /// the outputs stays as it is.
+    /// The rig with a session in which one column is corrected; none where the column drives no stage. The measured outputs stay as they
+    /// are.
     pub(super) fn with_corrected(&self, column: &str, error: Distortion) -> Option<Self> {
         let dt_s = self.about.dt_s;
         let mut rig = self.clone();
-        let right = |values: &mut Vec<f64>| *values = error.undone(values, dt_s);
+        let correct = |values: &mut Vec<f64>| *values = error.undone(values, dt_s);
         let each = |trials: &mut Vec<RigTrial>, of: fn(&mut RigTrial) -> Option<&mut Vec<f64>>| {
-            trials.iter_mut().filter_map(of).for_each(right);
+            trials.iter_mut().filter_map(of).for_each(correct);
         };
         let trials = &mut rig.session.trials;
         match column {
@@ -26,8 +26,8 @@ impl RigSimulator {
             COMMANDS => {
                 for trial in trials {
                     for valve in [&mut trial.inlet, &mut trial.outlet] {
-                        right(valve);
-                        // No valve opens further than it can.
+                        correct(valve);
+                        // An opening stays between shut (0) and open (1).
                         valve.iter_mut().for_each(|opening| *opening = opening.clamp(0.0, 1.0));
                     }
                 }

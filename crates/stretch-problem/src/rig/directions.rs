@@ -1,8 +1,8 @@
-//! Which columns are wrong where the muscle goes against its valves: each way to be wrong is weighed.
+//! The columns that are wrong where the muscle moves against its valves: each possible error is weighed.
 
 use stretch_data::ends;
 
-/// What the valves of a trial did, and what came of it.
+/// The openings of a trial, and the pressure and the length that followed.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Motion<'a> {
     pub(super) inlet: &'a [f64],
@@ -11,19 +11,18 @@ pub(super) struct Motion<'a> {
     pub(super) length_mm: &'a [f64],
 }
 
-/// Seconds that are told as one.
+/// Length of the blocks that samples are averaged over, s.
 const BLOCK_S: f64 = 0.1;
-/// Farthest that commands are looked for beside the rest, s.
+/// Longest time by which commands may be shifted, s.
 const FARTHEST_S: f64 = 10.0;
-/// Least share of what happens that a way to be wrong must explain to be told.
+/// Least share of the sum of squares that an error must explain to be named.
 const LEAST: f64 = 0.1;
 
-/// Column and hint, of measurements in which the muscle lengthens while the inlet is open.
+/// The wrong column and a hint, for measurements in which the muscle lengthens while the inlet is open.
 ///
-/// Where a pressure was recorded it is the witness. It follows `dx/dt = a u_in (1 - x) - b u_out x`
-/// (`x` from empty to full, `u` the openings) with the columns exchanged, with time
-/// reversed, or with the commands so much early or late: that of the least squares wins, a shift by as much
-/// more as a search of so many shifts gains by chance.
+/// The model `dx/dt = a u_in (1 - x) - b u_out x` (`x` from empty to full, `u` the openings) is fitted to the pressure where one was
+/// recorded, else to the length: with the valves' columns exchanged, with time reversed, and with the commands shifted. The error with the
+/// least sum of squares is named; a shift pays for the gain that a search of so many shifts has by chance.
 pub(super) fn against(trials: &[Motion<'_>], dt_s: f64) -> (&'static str, String) {
     let (mut with, mut seen) = (0.0, false);
     for trial in trials {
@@ -34,7 +33,7 @@ pub(super) fn against(trials: &[Motion<'_>], dt_s: f64) -> (&'static str, String
     }
     let length = ends(trials.iter().flat_map(|t| t.length_mm));
     let pressure = ends(trials.iter().filter_map(|t| t.pressure_kpa).flatten());
-    // A muscle keeps most of its length, a chamber none of its pressure.
+    // A length stays above half of its greatest value, a pressure falls to zero.
     let is_length = |(low, high): (f64, f64)| low > 0.5 * high;
     if seen && is_length(pressure) && !is_length(length) {
         return ("length_mm, pressure_kpa", "they look swapped: exchange the two names".into());
@@ -75,7 +74,7 @@ pub(super) fn against(trials: &[Motion<'_>], dt_s: f64) -> (&'static str, String
     }
 }
 
-/// A way to be wrong.
+/// An error in the columns of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Wrong {
     Exchanged,
@@ -84,7 +83,7 @@ enum Wrong {
     Shifted(f64),
 }
 
-/// A trial in blocks: how full it is, 0 to 1, and the openings.
+/// A trial in blocks: the filling of the chamber, 0 to 1, and the openings.
 struct Blocks {
     full: Vec<f64>,
     inlet: Vec<f64>,
@@ -100,12 +99,12 @@ fn likeliest(trials: &[Motion<'_>], dt_s: f64) -> Option<Wrong> {
     let shifts =
         (-most..=most).filter(|k| *k != 0).map(|k| (Wrong::Shifted(k as f64 * BLOCK_S), k));
     let ways = [(Wrong::Exchanged, 0), (Wrong::Reversed, 0)].into_iter().chain(shifts);
-    let told = ways.map(|(wrong, shift)| {
+    let weighed = ways.map(|(wrong, shift)| {
         let left = squares(&trials, wrong, shift);
         let price = if shift == 0 { 0.0 } else { 2.0 * (2.0 * most as f64).ln() };
         (steps.len() as f64 * left.max(f64::MIN_POSITIVE).ln() + price, left, wrong)
     });
-    let (_, left, wrong) = told.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (_, left, wrong) = weighed.min_by(|a, b| a.0.total_cmp(&b.0))?;
     (left < (1.0 - LEAST) * all).then_some(wrong)
 }
 
@@ -130,9 +129,9 @@ fn blocks(trials: &[Motion<'_>], dt_s: f64) -> Vec<Blocks> {
     trials.iter().zip(&all).map(one).collect()
 }
 
-/// Sum of squares that a way to be wrong leaves of the steps, with the two factors that are its best.
+/// Sum of squares that an error leaves of the steps of the filling, with the best factors a and b.
 fn squares(trials: &[Blocks], wrong: Wrong, shift: isize) -> f64 {
-    // normal equations of y = a p + b q, two unknowns of one size
+    // These are the normal equations of y = a p + b q; the two unknowns are of one size.
     let (mut pp, mut pq, mut qq, mut py, mut qy, mut yy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     for trial in trials {
         let last = trial.full.len().saturating_sub(1) as isize;
@@ -158,7 +157,7 @@ fn squares(trials: &[Blocks], wrong: Wrong, shift: isize) -> f64 {
     }
     let determinant = pp * qq - pq * pq;
     let (a, b) = ((py * qq - qy * pq) / determinant, (qy * pp - py * pq) / determinant);
-    // air does not flow backwards
+    // Air does not flow backwards: a negative factor is taken as 0.
     let one = |py: f64, pp: f64| if py > 0.0 && pp > 0.0 { yy - py * py / pp } else { yy };
     match determinant > 0.0 && a >= 0.0 && b >= 0.0 {
         true => yy - a * py - b * qy,

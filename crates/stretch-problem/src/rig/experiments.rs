@@ -1,10 +1,10 @@
-//! A menu of experiments on the rig, and what a model predicts of each.
+//! Candidate experiments on the rig, and what a model predicts of each.
 
 use stretch_data::{Channel, Trial};
 use stretch_gap::{GapError, Laboratory, Model, Plan};
 use stretch_sim::{
-    Chain, DEFAULT_STEP_S, EffectSet, Grid, Key, Openings, Recorded, Reference, RigParams, Sensing,
-    Stage, Start, TrialPlan,
+    Chain, DEFAULT_STEP_S, EffectSet, Grid, Key, Openings, Recorded, Reference, RigParams,
+    RigStage, Sensing, Start, TrialPlan,
 };
 
 use super::RigSimulator;
@@ -12,34 +12,43 @@ use crate::{bench::acting::unrecorded, error::ProblemError};
 
 /// Sample time of an experiment, s.
 const DT_S: f64 = 0.01;
-/// Step of integration, s: four times the usual; differences between rivals are wanted, not digits.
+/// Step of integration, s: four times the usual one, for differences between rivals need few digits.
 const STEP_S: f64 = 4.0 * DEFAULT_STEP_S;
 /// Share by which the shunt changes the bridge's trim.
 const SHUNT: f64 = 0.02;
 
-/// What is done to the rig.
+/// How an experiment drives the rig.
 #[derive(Debug, Clone, PartialEq)]
 enum Drive {
-    /// Openings; whether the chamber begins full.
-    Valves { full: bool },
-    /// The length (mm) is held or set from outside, the pressure (kPa) follows its own course.
-    /// Share by which a shunt lowers the bridge's trim; empty without one.
-    Held { length_mm: Vec<f64>, pressure_kpa: Vec<f64>, shunt: Vec<f64> },
+    /// Valves drive the rig.
+    Valves {
+        /// Whether the chamber begins full.
+        full: bool,
+    },
+    /// Length and pressure are set from outside.
+    Held {
+        /// Length, mm.
+        length_mm: Vec<f64>,
+        /// Pressure, kPa.
+        pressure_kpa: Vec<f64>,
+        /// Share by which a shunt lowers the bridge's trim; empty without a shunt.
+        shunt: Vec<f64>,
+    },
 }
 
 /// An experiment on the rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {
-    /// Name in the menu.
+    /// Name in the list of candidates.
     name: &'static str,
-    /// How to do it, in a sentence.
+    /// Instructions, in a sentence.
     how: &'static str,
-    /// Time to prepare it, minutes.
+    /// Time to prepare the experiment, minutes.
     prepare_min: f64,
     inlet: Vec<f64>,
     outlet: Vec<f64>,
     drive: Drive,
-    /// Excitation as a share of the usual.
+    /// Excitation as a share of the usual one.
     excitation: f64,
 }
 
@@ -49,7 +58,7 @@ impl Experiment {
         Plan { name, how, prepare_min: self.prepare_min, trial }
     }
 
-    /// The trial that runs it: openings, and what is set from outside.
+    /// The trial of the experiment: openings, and channels that are set from outside.
     fn trial(&self) -> Trial {
         let samples = self.inlet.len();
         let channel =
@@ -83,7 +92,7 @@ impl Experiment {
         }
     }
 
-    /// Openings by pieces of (inlet, outlet, seconds), after a second of rest.
+    /// An experiment of pieces of (inlet, outlet, seconds), after a second of rest.
     fn pieces(name: &'static str, how: &'static str, pieces: &[(f64, f64, f64)]) -> Self {
         let (mut inlet, mut outlet) = (vec![0.0; 100], vec![0.0; 100]);
         for &(i, o, s) in pieces {
@@ -114,7 +123,7 @@ impl Experiment {
         }
     }
 
-    /// The menu for a rig whose length goes from `stroke.0` to `stroke.1` mm and whose supply is at `supply_kpa`.
+    /// The candidates for a rig whose length goes from `stroke.0` to `stroke.1` mm and whose supply is at `supply_kpa`.
     fn all(stroke: (f64, f64), supply_kpa: f64) -> Vec<Self> {
         let at = |share: f64| stroke.0 + share * (stroke.1 - stroke.0);
         let repeat = |piece: &[(f64, f64, f64)], times: usize| piece.repeat(times);
@@ -164,7 +173,7 @@ impl Experiment {
             let fills = (i / seconds(5.0)).is_multiple_of(2);
             *if fills { inlet } else { outlet } = 0.1;
         }
-        // Ten seconds on each of three blocks, and three to go from one to the next.
+        // Each of three blocks takes ten seconds, and the way from one block to the next three seconds.
         let blocks: Vec<f64> = (0..seconds(36.0))
             .map(|i| {
                 let (block, s) = (i / seconds(13.0), (i % seconds(13.0)) as f64 * DT_S);
@@ -186,7 +195,7 @@ impl Experiment {
             vec![0.0; seconds(8.0)],
         );
         if let Drive::Held { length_mm, shunt, .. } = &mut shunt.drive {
-            // Off, on, off.
+            // The shunt is off, on, and off again.
             *shunt = vec![0.0; length_mm.len()];
             let part = length_mm.len() / 4;
             shunt[part..3 * part].fill(SHUNT);
@@ -238,8 +247,8 @@ impl RigSimulator {
     /// Rig and effects of a model.
     fn rig_of(&self, model: &Model) -> Result<(RigParams, EffectSet), ProblemError> {
         let mut params = self.base;
-        for (knob, value) in self.knobs.iter().zip(&model.parameters) {
-            if let Some(key) = knob.key() {
+        for (parameter, value) in self.tuned.iter().zip(&model.parameters) {
+            if let Some(key) = parameter.key() {
                 params[key] = *value;
             }
         }
@@ -276,7 +285,7 @@ impl RigSimulator {
                 pressure_kpa.copy_from_slice(pressure);
             }
         }
-        let has_pressure = self.stage_kinds.contains(&Stage::Pneumatics);
+        let has_pressure = self.stage_kinds.contains(&RigStage::Pneumatics);
         let sds = [1e-3 * params[Key::SigmaP], params[Key::SigmaL], params[Key::SigmaV]];
         let channels = out.into_iter().zip(sds).enumerate();
         Ok(channels

@@ -1,14 +1,14 @@
-//! How far the gauge of a measured session goes.
+//! Ranges of the gauge in a measured session.
 
 use stretch_sim::{Bridge, Effect, Extent, Key, Place, RigParams};
 
 use super::session::Inputs;
 use crate::bench::acting::FitRecord;
 
-/// Share of the samples beyond either end of the voltage: noise.
+/// Share of the samples at either end of the voltage that are left out as noise.
 const OUTERMOST: f64 = 0.002;
 
-/// What the voltage and the strain of the trials to fit span, where an effect acts on either.
+/// Ranges of voltage and strain over the trials that are fitted.
 pub(super) struct Extents {
     volts: Extent,
     strain: Extent,
@@ -26,7 +26,7 @@ impl Extents {
         }
     }
 
-    /// That of the channel that an effect acts on.
+    /// The range of the channel that an effect acts on.
     pub(super) fn at(&self, effect: &Effect) -> &Extent {
         match effect.at() {
             Some((_, Place::Volts)) => &self.volts,

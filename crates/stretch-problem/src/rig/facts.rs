@@ -1,22 +1,22 @@
-//! What is known of a rig's record: what a diagnosis is told beside stages, parameters, effects and trials.
+//! The facts of a rig's recording that a diagnosis takes beside stages, parameters, effects and trials.
 
 use stretch_gap::{Description, MotionSpec, ParameterSpec, RecordFacts, Recorded, RowsUsed};
-use stretch_sim::{Key, Stage};
+use stretch_sim::{Key, RigStage};
 
 use super::{
-    nominal::Knob,
+    nominal::TunedParameter,
     record_columns::record_columns,
     session::{Inputs, RigSession},
     smooth::Smoothed,
     timing,
 };
 
-/// The facts of a session, of whose stages `measured` are the outputs.
+/// The facts of a session; `measured` holds the measured outputs of the stages.
 pub(super) fn facts(
     about: &Description,
     session: &RigSession,
     inputs: &Inputs,
-    (stage_kinds, knobs): (&[Stage], &[Knob]),
+    (stage_kinds, tuned): (&[RigStage], &[TunedParameter]),
     measured: &[Vec<f64>],
 ) -> RecordFacts {
     let length = about.stages.iter().position(|s| s.channel == "length_mm").unwrap_or(0);
@@ -31,9 +31,9 @@ pub(super) fn facts(
         }),
         signals: signals(session, inputs),
         columns: record_columns(about, stage_kinds),
-        sensor: stage_kinds.iter().position(|kind| *kind == Stage::Sensing),
-        command_timing: command_timing(session, knobs),
-        drift_clocks: drift_clocks(session, knobs),
+        sensor: stage_kinds.iter().position(|kind| *kind == RigStage::Sensing),
+        command_timing: command_timing(session, tuned),
+        drift_clocks: drift_clocks(session, tuned),
         ..RecordFacts::default()
     }
 }
@@ -57,29 +57,29 @@ fn signals(session: &RigSession, inputs: &Inputs) -> Vec<Recorded> {
     out
 }
 
-fn command_timing(session: &RigSession, knobs: &[Knob]) -> Vec<(usize, ParameterSpec)> {
+fn command_timing(session: &RigSession, tuned: &[TunedParameter]) -> Vec<(usize, ParameterSpec)> {
     if !timing::is_slow(session.dt_s()) {
         return Vec::new();
     }
-    let timing = |(i, knob): (usize, &Knob)| match knob {
-        Knob::Lead(which) => Some((i, timing::anywhere(*which))),
+    let timing = |(i, parameter): (usize, &TunedParameter)| match parameter {
+        TunedParameter::CommandLead(which) => Some((i, timing::anywhere(*which))),
         _ => None,
     };
-    knobs.iter().enumerate().filter_map(timing).collect()
+    tuned.iter().enumerate().filter_map(timing).collect()
 }
 
-/// The supply reaches the chamber through the inlet only: while that is shut, its clock stands still. The lead of commands has a
-/// tick for each switch.
-fn drift_clocks(session: &RigSession, knobs: &[Knob]) -> Vec<(usize, Vec<u32>)> {
+/// The clocks of parameters that drift. The supply reaches the chamber through the inlet alone: while the inlet is shut, the clock of the
+/// supply stands still. The clock of the lead of commands advances with every switch.
+fn drift_clocks(session: &RigSession, tuned: &[TunedParameter]) -> Vec<(usize, Vec<u32>)> {
     let trials = &session.trials;
     let switches = || trials.iter().flat_map(|t| timing::switches(&t.inlet, &t.outlet)).collect();
     let open = || trials.iter().flat_map(|t| last_open(&t.inlet)).collect();
-    let clock = |(i, knob): (usize, &Knob)| match knob {
-        Knob::Rig(Key::PS) => Some((i, open())),
-        Knob::Lead(_) => Some((i, switches())),
+    let clock = |(i, parameter): (usize, &TunedParameter)| match parameter {
+        TunedParameter::Rig(Key::PS) => Some((i, open())),
+        TunedParameter::CommandLead(_) => Some((i, switches())),
         _ => None,
     };
-    knobs.iter().enumerate().filter_map(clock).collect()
+    tuned.iter().enumerate().filter_map(clock).collect()
 }
 
 /// For every sample of a trial, the last one at which the inlet was open.

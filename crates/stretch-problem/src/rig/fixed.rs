@@ -1,10 +1,10 @@
-//! The rig with what a diagnosis found of it.
+//! The rig with what a diagnosis found.
 
 use stretch_data::Remarks;
 use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, next_experiment};
 use stretch_sim::{EffectParameter, Grid, Rig};
 
-use super::{RigSimulator, nominal::Knob};
+use super::{RigSimulator, nominal::TunedParameter};
 use crate::{
     fix::{Chosen, Fix, Fixed, NoFix, names, with_line},
     implement::{Implementation, implementations},
@@ -12,14 +12,14 @@ use crate::{
 };
 
 impl RigSimulator {
-    /// What a diagnosis of this rig names, as something to type: with its numbers, in the rig as it was re-tuned.
+    /// The effects that a diagnosis of this rig names, as code to type with the fitted numbers, in the re-tuned rig.
     fn typed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
-        // a sample time that was diagnosed is one
+        // A sample time with which a diagnosis ran makes a grid.
         let Ok(grid) = Grid::samples(self.about.dt_s) else { return Vec::new() };
         let mut params = self.base;
         let model = evidence.candidates.first().unwrap_or(&evidence.best);
-        for (knob, value) in self.knobs.iter().zip(&model.parameters) {
-            if let Knob::Rig(key) = *knob {
+        for (parameter, value) in self.tuned.iter().zip(&model.parameters) {
+            if let TunedParameter::Rig(key) = *parameter {
                 params[key] = *value;
             }
         }
@@ -31,10 +31,10 @@ impl RigSimulator {
         })
     }
 
-    /// A rig file with what a diagnosis of this rig found: see [`Fix`]. Held against the same record it says `no_gap`.
+    /// A rig file with what a diagnosis of this rig found: see [`Fix`]. A diagnosis of the same recording with this file says `no_gap`.
     ///
-    /// What belongs to the record and not to the rig (the pressure at a trial's start, the timing of commands) stays out. A hum's
-    /// amplitude and phase, which no diagnosis answers, are those that the fit trials show on the session's clock.
+    /// Parameters of the recording (the pressure at a trial's start, the timing of commands, the initial hysteresis states) stay out. A
+    /// diagnosis does not fit a hum's amplitude and phase: the file has those that the fit trials show on the session's clock.
     ///
     /// # Errors
     /// [`NoFix`] where the diagnosis names nothing to fix, or a rig that no file may hold.
@@ -43,33 +43,33 @@ impl RigSimulator {
         let mut remarks = Remarks { head: chosen.head(), ..Remarks::default() };
         let mut rig =
             Rig { params: self.base, tolerances: self.tolerances, effects: self.effects.clone() };
-        let tuned = self.knobs.iter().zip(&chosen.model.parameters).enumerate();
-        for (index, (knob, value)) in tuned {
-            let Knob::Rig(key) = *knob else { continue };
+        let tuned = self.tuned.iter().zip(&chosen.model.parameters).enumerate();
+        for (index, (parameter, value)) in tuned {
+            let TunedParameter::Rig(key) = *parameter else { continue };
             let info = key.info();
             let old = rig.tolerances[key as usize];
             rig.tolerances[key as usize] = chosen.tolerance(index, *value, old);
-            let told = chosen.told(index, info.unit, (self.base[key], *value));
-            remarks.parameters.insert((info.stage.name().into(), info.name.into()), told);
+            let remark = chosen.remark(index, info.unit, (self.base[key], *value));
+            remarks.parameters.insert((info.stage.name().into(), info.name.into()), remark);
             rig.params[key] = *value;
         }
         for effect in self.effects.iter() {
-            let own = vec!["It was in the rig file already.".to_owned()];
+            let own = vec!["This effect was in the rig file already.".to_owned()];
             remarks.effects.insert(effect.name().into(), own);
         }
         let stage = self.about.record().sensor.unwrap_or(0);
         for (index, values) in chosen.effects(&self.about.effects) {
             let effect = self.rows[index];
-            // A fit in equal ratios may end a rounding beyond its range.
+            // Rounding may put the end of a fit in equal ratios beyond its range.
             let allowed = effect.parameters.iter().map(EffectParameter::allowed);
             let within = allowed.zip(values).map(|(ends, x)| x.clamp(*ends.start(), *ends.end()));
             let found = (effect, within.collect());
             let values = with_line(self, (stage, 1.0), &self.rows, chosen.model, found);
-            chosen.tell(effect.into(), &mut remarks);
+            chosen.describe(effect.into(), &mut remarks);
             rig.effects.push(effect, &values)?;
         }
         let file = rig.to_file(None);
-        // Whatever could not be read again is refused here.
+        // A file that could not be read again is refused here.
         Rig::from_file(&file)?;
         Ok(Fix { effects: names(&file), file: Fixed::Rig(file), remarks })
     }

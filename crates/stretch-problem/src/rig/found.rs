@@ -1,31 +1,31 @@
-//! What a run finds that is no function of what was moved: pressures of the chamber, lengths of the muscle.
+//! Intermediate results that several runs share: pressures of the chamber, lengths of the muscle.
 //!
-//! Runs that differ in the muscle alone find the chamber's pressure kept; those that differ in the gauge alone, the pressure and the length
-//! that stand in for what was not measured.
+//! Runs that differ in the muscle alone share the chamber's pressure. Runs that differ in the gauge alone share the simulated pressure and
+//! length that stand in for channels without a measurement.
 
 use std::num::NonZeroUsize;
 
-use stretch_sim::{ActiveEffect, EffectSet, Grid, PARAMETERS, ParameterInfo, RigParams, Stage};
+use stretch_sim::{ActiveEffect, EffectSet, Grid, PARAMETERS, ParameterInfo, RigParams, RigStage};
 
 use crate::bench::kept::Kept;
 
-/// By trial, pressure at every node or sample, kPa.
+/// Pressure at every node or sample, kPa, by trial.
 pub(super) type Pressures = Vec<Vec<f64>>;
-/// Effects, and bits of all numbers.
+/// Names of effects, and the bits of all numbers.
 pub(super) type Causes = (Vec<&'static str>, Vec<u64>);
 
-/// What is kept, by what it is a function of.
+/// Intermediate results, by the causes that they depend on.
 #[derive(Debug, Clone)]
 pub(super) struct Found {
     /// Pressures at every node.
     pub(super) nodes: Kept<Causes, Pressures>,
-    /// Pressures at every sample: what there is without a pressure column.
+    /// Simulated pressures at every sample, for recordings without a pressure column.
     pub(super) samples: Kept<Causes, Pressures>,
     /// Lengths without play in the reference, mm, all trials end to end.
     pub(super) lengths: Kept<Causes, Vec<f64>>,
 }
 
-/// Results of each kind that are kept: those of the probes and steps of the fits under way.
+/// Number of results of each kind that are kept: enough for the probes and steps of the fits under way.
 const KEPT: NonZeroUsize = NonZeroUsize::new(12).expect("not 0");
 
 impl Found {
@@ -34,9 +34,9 @@ impl Found {
     }
 }
 
-/// All that what happens in some stages is a function of; `others` are what a run has beside parameters and effects.
+/// Everything that the outputs of some stages depend on; `others` are the numbers of a run beside parameters and effects.
 pub(super) fn causes(
-    stages: &[Stage],
+    stages: &[RigStage],
     params: &RigParams,
     effects: &EffectSet,
     grid: &Grid,
@@ -44,9 +44,9 @@ pub(super) fn causes(
 ) -> Causes {
     let acting = || stages.iter().flat_map(|stage| effects.acting_in(*stage));
     let acts = acting().next().is_some();
-    // Effects know of the scales around them.
+    // An effect may depend on the scales of the muscle.
     let counts = |info: &&ParameterInfo| {
-        stages.contains(&info.stage) || (acts && info.stage == Stage::Muscle)
+        stages.contains(&info.stage) || (acts && info.stage == RigStage::Muscle)
     };
     let numbers = PARAMETERS
         .iter()

@@ -7,6 +7,7 @@ mod extent;
 mod facts;
 mod fixed;
 mod found;
+mod initial_state;
 mod noises;
 mod nominal;
 mod rails;
@@ -18,20 +19,19 @@ mod simulator;
 pub(crate) mod smooth;
 mod stand_ins;
 mod timing;
-mod turned;
-mod unwound;
+mod tuned;
 
 use std::path::Path;
 
 use stretch_data::DataSet;
 use stretch_gap::{Description, DescriptionSpec, TrialSpec};
-use stretch_sim::{Catalogue, Effect, EffectSet, Key, Rig, RigParams, Search, Stage, Tolerance};
+use stretch_sim::{Catalogue, Effect, EffectSet, Key, Rig, RigParams, RigStage, Search, Tolerance};
 
 use extent::Extents;
 use facts::facts;
 use found::Found;
 use noises::Noises;
-use nominal::{Knob, parameters, stages};
+use nominal::{TunedParameter, parameters, stages};
 use session::Inputs;
 pub use session::{RigSession, RigTrial};
 
@@ -47,11 +47,11 @@ use crate::{
 /// What a [`RigSimulator`] is made of.
 #[derive(Debug, Clone)]
 pub struct RigSetup<'a> {
-    /// What was measured.
+    /// The measured session.
     pub session: RigSession,
-    /// The rig beside it: parameters, how far each may be wrong, and the effects that it already has.
+    /// The rig: parameters with tolerances, and the effects that the rig already has.
     pub rig: Rig,
-    /// Effects that are looked for, those of the rig apart.
+    /// Effects that are looked for; effects that the rig already has are left out.
     pub catalogue: &'a Catalogue,
 }
 
@@ -66,12 +66,12 @@ pub struct RigSimulator {
     inputs: Inputs,
     noises: Noises,
     about: Description,
-    stage_kinds: Vec<Stage>,
-    /// What each parameter turns.
-    knobs: Vec<Knob>,
+    stage_kinds: Vec<RigStage>,
+    /// What each parameter of the diagnosis sets.
+    tuned: Vec<TunedParameter>,
     rows: Vec<&'static Effect>,
     measured: Vec<Vec<f64>>,
-    /// The bridge voltage that effects may be found in.
+    /// The samples of the bridge voltage in which effects may be found.
     bridge: FitRecord,
     found: Found,
     notes: Vec<String>,
@@ -106,11 +106,11 @@ impl RigSimulator {
         let (length_sd, pressure_sd) = (noises.length_mm.sd(), noises.pressure_kpa.sd());
         let inputs = Inputs::of(&session, length_sd, pressure_sd, 1e-3 * base[Key::PS]);
         let stage_kinds = match session.trials[0].pressure_kpa {
-            Some(_) => vec![Stage::Pneumatics, Stage::Muscle, Stage::Sensing],
-            None => vec![Stage::Actuation, Stage::Sensing],
+            Some(_) => vec![RigStage::Pneumatics, RigStage::Muscle, RigStage::Sensing],
+            None => vec![RigStage::Actuation, RigStage::Sensing],
         };
-        let (parameters, knobs) = parameters(&rig, &stage_kinds);
-        let stages = stages(&stage_kinds, &knobs, &noises);
+        let (parameters, tuned) = parameters(&rig, &stage_kinds);
+        let stages = stages(&stage_kinds, &tuned, &noises);
         let dt_s = session.dt_s();
         let trials: Vec<_> = session.trials.iter().map(trial_spec).collect();
         let measured: Vec<_> = stage_kinds.iter().map(|kind| measured(&session, *kind)).collect();
@@ -127,7 +127,7 @@ impl RigSimulator {
         let missing = rows.iter().zip(places).map(|(effect, place)| spec(effect, place)).collect();
         let about = DescriptionSpec { stages, parameters, effects: missing, trials, dt_s };
         let about = Description::new(about)?;
-        let known = facts(&about, &session, &inputs, (&stage_kinds, &knobs), &measured);
+        let known = facts(&about, &session, &inputs, (&stage_kinds, &tuned), &measured);
         Ok(Self {
             about: about.with_record(known)?,
             base: *base,
@@ -137,7 +137,7 @@ impl RigSimulator {
             inputs,
             noises,
             stage_kinds,
-            knobs,
+            tuned,
             rows,
             measured,
             bridge,
@@ -151,7 +151,7 @@ impl RigSimulator {
         &self.session
     }
 
-    /// What was noticed, in sentences for a report: of the session, and what it cannot show.
+    /// Notes on the session, and on effects that it cannot show, in sentences for a report.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
@@ -161,15 +161,15 @@ impl RigSimulator {
         &self.base
     }
 
-    /// Measured inputs, smoothed as the stages see them: length (mm) of a trial; none for a trial that is not there.
+    /// The measured length (mm) of a trial, smoothed as the stages see it; none for a trial that does not exist.
     pub fn smooth_length(&self, trial: usize) -> Option<&[f64]> {
         self.inputs.length.get(trial).map(|length| length.values.as_slice())
     }
 }
 
-/// Stages whose output an effect of a stage changes.
-fn touched(kinds: &[Stage], stage: Stage) -> Vec<usize> {
-    let shows = |kind: Stage| stage == Stage::Reference && kind != Stage::Pneumatics;
+/// Indices of the stages whose output an effect of `stage` changes.
+fn touched(kinds: &[RigStage], stage: RigStage) -> Vec<usize> {
+    let shows = |kind: RigStage| stage == RigStage::Reference && kind != RigStage::Pneumatics;
     (0..kinds.len()).filter(|&i| kinds[i].holds(stage) || shows(kinds[i])).collect()
 }
 
@@ -182,11 +182,11 @@ fn trial_spec(trial: &RigTrial) -> TrialSpec {
     }
 }
 
-/// What was measured of a stage, all trials end to end.
-fn measured(session: &RigSession, stage: Stage) -> Vec<f64> {
+/// The measured output of a stage, all trials end to end.
+fn measured(session: &RigSession, stage: RigStage) -> Vec<f64> {
     let channel = |trial: &'_ RigTrial| match stage {
-        Stage::Pneumatics => trial.pressure_kpa.clone().unwrap_or_default(),
-        Stage::Sensing => trial.bridge_v.clone(),
+        RigStage::Pneumatics => trial.pressure_kpa.clone().unwrap_or_default(),
+        RigStage::Sensing => trial.bridge_v.clone(),
         _ => trial.length_mm.clone(),
     };
     session.trials.iter().flat_map(channel).collect()

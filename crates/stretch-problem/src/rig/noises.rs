@@ -1,17 +1,17 @@
-//! Noise of the rig's channels: what the record bears out of what the rig file says.
+//! Noise of the rig's channels, from the recording or from the rig file.
 
 use stretch_gap::{Noise, WINDOW};
 use stretch_sim::{Key, RigParams};
 
 use super::session::{RigSession, RigTrial};
 
-/// Share of the quiet windows that are listened to, those the longest after a command, and how many at least.
-const LISTENED: (f64, usize) = (0.5, 24);
+/// Share of the quiet windows that the noise is estimated from, taken from the end of the longest rests, and the least number of such windows.
+const USED: (f64, usize) = (0.5, 24);
 
-/// Time after a command from which a muscle stands still but for what a parabola follows, s: a few of its time constants.
+/// Time after a command from which a parabola follows the rest of the muscle's motion, s: a few time constants of the muscle.
 const SETTLED_S: f64 = 2.0;
 
-/// Noise of every channel, steps of the converters included.
+/// Noise of every channel, with the quantisation noise of the converters.
 #[derive(Debug, Clone)]
 pub(super) struct Noises {
     pub(super) length_mm: Noise,
@@ -20,10 +20,10 @@ pub(super) struct Noises {
 }
 
 impl Noises {
-    /// From the windows of the trials to fit in which nothing was commanded; where there are too few of them, as the
-    /// rig file says.
+    /// Noise from the windows of the fit trials in which nothing was commanded; where there are too few such windows, the noise of the rig
+    /// file.
     pub(super) fn of(params: &RigParams, session: &RigSession) -> Self {
-        // A step adds a uniform error of variance step^2/12.
+        // The step of a converter adds a uniform error of variance step^2/12.
         let with_step = |sigma: Key, full_scale: Key| {
             let step = params[full_scale] / (params[Key::Bits].exp2() - 1.0);
             (params[sigma].powi(2) + step * step / 12.0).sqrt()
@@ -46,10 +46,11 @@ impl Noises {
     }
 }
 
-/// Windows without a command: trial and first sample.
+/// Windows without a command.
 struct Quiet {
+    /// Trial and first sample of each window.
     places: Vec<(usize, usize)>,
-    /// Whether all of them begin long after a command.
+    /// Whether all windows begin long after a command.
     is_still: bool,
 }
 
@@ -69,10 +70,10 @@ fn quiet(session: &RigSession) -> Quiet {
         }
     }
     all.sort_by_key(|window| std::cmp::Reverse(window.0));
-    let listened = ((LISTENED.0 * all.len() as f64) as usize).max(LISTENED.1);
+    let used = ((USED.0 * all.len() as f64) as usize).max(USED.1);
     let settled = (SETTLED_S / session.dt_s()) as usize;
     let count = all.iter().filter(|(since, _)| *since >= settled).count();
-    let is_still = count >= LISTENED.1;
-    all.truncate(if is_still { listened.min(count) } else { listened });
+    let is_still = count >= USED.1;
+    all.truncate(if is_still { used.min(count) } else { used });
     Quiet { places: all.into_iter().map(|(_, place)| place).collect(), is_still }
 }

@@ -1,17 +1,17 @@
-//! Channels that ran into an end of their recorder.
+//! Channels that are saturated at an end of the recorder's range.
 
 use stretch_filter::log::{noise_of_differences, second_differences};
 use stretch_sim::{Key, RigParams};
 
 use super::{RigSession, RigSimulator, RigTrial};
 
-/// Share of the samples at one value from which it is no accident.
+/// Share of the samples at one value that chance does not explain.
 const SHARE: f64 = 0.002;
-/// Share of the stated noise that a record must show: without noise a channel at rest repeats itself.
+/// Least noise of a recording, a share of the stated noise: without noise a channel at rest repeats its value.
 const NOISY: f64 = 0.3;
 
 impl RigSimulator {
-    /// A sentence for every end of a channel at which more samples stand than noise would leave there.
+    /// A sentence for every end of a channel that holds more samples than noise explains.
     pub fn rails(&self) -> Vec<String> {
         rails(self.nominal(), self.session())
     }
@@ -44,7 +44,7 @@ fn rails(params: &RigParams, session: &RigSession) -> Vec<String> {
     said
 }
 
-/// Noise of a record from its median second difference, away from one value.
+/// Noise of a channel from its median second difference, without the samples at one value.
 fn noise_off(values: &[f64], end: f64) -> f64 {
     let away = values.windows(3).filter(|w| w.iter().all(|v| *v != end));
     let mut bends: Vec<f64> = away.flat_map(second_differences).collect();
@@ -85,7 +85,7 @@ mod tests {
         assert!(
             clipped.len() == 1 && clipped[0].contains("bridge_v stands at 0.5 V, its greatest")
         );
-        // As clean as a simulation without noise.
+        // A simulation without noise gives no note.
         assert!(said(at(0.5, 0.0)).is_empty());
     }
 }

@@ -1,9 +1,9 @@
-//! The columns of a rig's record, and which stages are driven by them.
+//! The columns of a rig's recording, and the stages that each column drives.
 
 use std::borrow::Cow;
 
 use stretch_gap::{Column, Description};
-use stretch_sim::Stage;
+use stretch_sim::RigStage;
 
 use crate::bench::specs::skew_of;
 
@@ -12,25 +12,28 @@ pub(super) const LENGTH: &str = "length_mm";
 const VOLTAGE: &str = "bridge_v";
 pub(super) const COMMANDS: &str = "inlet, outlet";
 
-/// Delays of the voltage without a catalogue, s.
+/// Range of the delays of the voltage where the catalogue has no skew, s.
 const SKEW_S: [f64; 2] = [-0.1, 0.2];
 
-/// The columns, and which stages are driven by them.
-pub(super) fn record_columns(about: &Description, stage_kinds: &[Stage]) -> Vec<Column<'static>> {
-    // How a trial begins is read off the record, too: of the pressure, or of the length where there is none.
-    let reads = |stages: [Stage; 2]| -> Vec<usize> {
+/// The columns of a recording, and the stages that each column drives.
+pub(super) fn record_columns(
+    about: &Description,
+    stage_kinds: &[RigStage],
+) -> Vec<Column<'static>> {
+    // The start of a trial is read from the pressure, or from the length where there is no pressure.
+    let reads = |stages: [RigStage; 2]| -> Vec<usize> {
         (0..stage_kinds.len()).filter(|&i| stages.contains(&stage_kinds[i])).collect()
     };
     let skew_s = skew_of(about, SKEW_S);
-    let output = |(stage, kind): (usize, &Stage)| {
+    let output = |(stage, kind): (usize, &RigStage)| {
         let (name, read_by, skew_s, hint) = match kind {
-            Stage::Pneumatics => (
+            RigStage::Pneumatics => (
                 PRESSURE,
-                reads([Stage::Pneumatics, Stage::Muscle]),
+                reads([RigStage::Pneumatics, RigStage::Muscle]),
                 [0.0; 2],
                 "the pressure gauge, its scale and its zero",
             ),
-            Stage::Sensing => (
+            RigStage::Sensing => (
                 VOLTAGE,
                 Vec::new(),
                 skew_s,
@@ -38,7 +41,7 @@ pub(super) fn record_columns(about: &Description, stage_kinds: &[Stage]) -> Vec<
             ),
             _ => (
                 LENGTH,
-                reads([Stage::Actuation, Stage::Sensing]),
+                reads([RigStage::Actuation, RigStage::Sensing]),
                 [0.0; 2],
                 "the potentiometer, its scale and its zero, and L0 in the rig file",
             ),
@@ -51,7 +54,8 @@ pub(super) fn record_columns(about: &Description, stage_kinds: &[Stage]) -> Vec<
             ..Column::output(stage, &about.stages[stage])
         }
     };
-    let commanded = |&i: &usize| matches!(stage_kinds[i], Stage::Pneumatics | Stage::Actuation);
+    let commanded =
+        |&i: &usize| matches!(stage_kinds[i], RigStage::Pneumatics | RigStage::Actuation);
     let commands = Column {
         name: Cow::Borrowed(COMMANDS),
         unit: Cow::Borrowed("1"),

@@ -1,33 +1,34 @@
-//! One stage of the rig over the session.
+//! The simulation of one stage of the rig over the session.
 
 use std::{borrow::Cow, sync::Arc};
 
 use stretch_gap::Run;
 use stretch_sim::{
     Actuation, DEFAULT_STEP_S, EffectSet, Grid, Key, Memory, Muscle, Need, Openings, Pneumatics,
-    RigParams, Sensing, Stage, Start,
+    RigParams, RigStage, Sensing, Start,
 };
 
 use super::{
-    RigSimulator, session::Begin, shown::Shown, smooth::cubic, timing, timing::Leads,
-    turned::Turned, unwound::unwind,
+    RigSimulator, initial_state::set_initial_state, session::Begin, shown::Shown, smooth::cubic,
+    timing, timing::Leads, tuned::Tuned,
 };
 use crate::{bench::acting::Acting, error::ProblemError};
 
 /// Step of integration while fitting, s.
 const STEP_S: f64 = 2.0 * DEFAULT_STEP_S;
-/// Pieces of a sample where an effect needs fine steps: between samples the length is no straight line.
+/// Number of steps for each sample where an effect needs fine steps, because the length between samples is no straight line.
 const PIECES: f64 = 4.0;
-/// Offset of a vented chamber, kPa: as a rule a little above the atmosphere (mean, 1 sd).
+/// Pressure of a vented chamber, kPa (mean, 1 sd): as a rule a little above the atmosphere.
 const EMPTY_KPA: (f64, f64) = (0.08, 0.06);
-/// Offset of a filled chamber below the supply, a share of it (mean, 1 sd).
+/// Pressure of a filled chamber below the supply, a share of the supply (mean, 1 sd).
 const FULL_SHARE: (f64, f64) = (0.0008, 0.0006);
 
-/// How well a length tells the pressure of a trial's start, at rest and amid a motion, kPa (1 sd).
+/// Error of the pressure at a trial's start that is derived from a length at rest, kPa (1 sd).
 const LENGTH_KPA: f64 = 3.0;
+/// Error of that pressure amid a motion, kPa (1 sd).
 const MOVING_KPA: f64 = 10.0;
 
-/// What a run needs beside the rig.
+/// Everything that a run needs beside the rig.
 pub(super) struct Setting<'a> {
     pub(super) rig: &'a RigSimulator,
     pub(super) params: RigParams,
@@ -37,14 +38,14 @@ pub(super) struct Setting<'a> {
     pub(super) grid: Grid,
     pub(super) offset: f64,
     pub(super) leads: Leads,
-    /// How little of the move before the session the stage remembers, 0 to 1.
-    pub(super) unwound: f64,
-    /// The same of the muscle.
-    pub(super) unwound_muscle: f64,
+    /// Share of the settled state in the initial state of the stage, 0 to 1.
+    pub(super) initial_share: f64,
+    /// Share of the settled state in the initial state of the muscle, 0 to 1.
+    pub(super) initial_muscle: f64,
     pub(super) input_noise: Option<u64>,
     /// Input of the stage that stands in for the measured one, all trials end to end.
     pub(super) given: Option<&'a [f64]>,
-    pub(super) kind: Stage,
+    pub(super) kind: RigStage,
 }
 
 /// Simulates one stage, on the measured input unless another one is given.
@@ -55,14 +56,14 @@ pub(super) fn simulate(
     out: &mut [f64],
 ) -> Result<(), ProblemError> {
     let kind = rig.stage_kinds[run.stage];
-    let turned = Turned::of(&rig.base, &rig.knobs, run.model);
-    let Turned { params, offset, leads, unwound_muscle, unwound_gauge } = turned;
-    let unwound = if kind == Stage::Sensing { unwound_gauge } else { unwound_muscle };
+    let tuned = Tuned::of(&rig.base, &rig.tuned, run.model);
+    let Tuned { params, offset, leads, initial_muscle, initial_gauge } = tuned;
+    let initial_share = if kind == RigStage::Sensing { initial_gauge } else { initial_muscle };
     let acting = Acting::of(&rig.effects, &rig.rows, run.model)?;
     let step_s = run.step * STEP_S;
     let grid = match kind {
-        // Driven by a measured input.
-        Stage::Muscle | Stage::Sensing => {
+        // These stages are driven by a measured input.
+        RigStage::Muscle | RigStage::Sensing => {
             let is_fine = acting.inside.acting_in(kind).any(|e| e.effect().needs_fine_steps());
             let pieces = if is_fine { PIECES } else { 1.0 };
             Grid::new(rig.about.dt_s, run.step.min(1.0) * rig.about.dt_s / pieces, 0.0)?
@@ -77,16 +78,16 @@ pub(super) fn simulate(
         grid,
         offset,
         leads,
-        unwound,
-        unwound_muscle,
+        initial_share,
+        initial_muscle,
         input_noise: run.input_noise,
         given,
         kind,
     };
     match kind {
-        Stage::Pneumatics => setting.pneumatics(run.trials, out)?,
-        Stage::Muscle => setting.muscle(run.trials, out)?,
-        Stage::Sensing => setting.sensing(run.trials, &acting, out)?,
+        RigStage::Pneumatics => setting.pneumatics(run.trials, out)?,
+        RigStage::Muscle => setting.muscle(run.trials, out)?,
+        RigStage::Sensing => setting.sensing(run.trials, &acting, out)?,
         _ => setting.actuation(run.trials, out)?,
     }
     if out.iter().all(|x| x.is_finite()) {
@@ -97,10 +98,10 @@ pub(super) fn simulate(
 }
 
 impl Setting<'_> {
-    /// How a trial begins: as the one before left it, after the pause between them.
+    /// The start of a trial in the state that the trial before left, after the pause between the two.
     pub(super) fn start(&self, trial: usize) -> Start {
-        if trial == 0 && self.unwound > 0.0 {
-            // It is behind the memory already.
+        if trial == 0 && self.initial_share > 0.0 {
+            // The memory already holds the pause before the first trial.
             return Start::Carried { rest_s: 0.0 };
         }
         self.after_pause(trial)
@@ -116,27 +117,27 @@ impl Setting<'_> {
             }
             None => 15.0,
         };
-        // The move to the new start took a little of the pause.
+        // The motion to the new start took about a second of the pause.
         Start::Carried { rest_s: (rest_s - 1.0).max(0.0) }
     }
 
-    /// Moves the stage's memory, left at the other end of the stroke, towards one that had settled.
-    fn unwind(
+    /// Sets the initial state of the stage's memory, which was left at the other end of the stroke.
+    fn set_initial_state(
         &self,
         memory: &mut Memory,
         settled: Memory,
         begin: impl FnMut(&mut Memory, Start) -> Result<(), ProblemError>,
     ) -> Result<(), ProblemError> {
-        unwind(self.unwound, self.after_pause(0), memory, settled, begin)
+        set_initial_state(self.initial_share, self.after_pause(0), memory, settled, begin)
     }
 
-    /// The same for what the reference remembers of the muscle.
-    pub(super) fn unwind_shown(
+    /// Sets the initial state of the reference, which follows the muscle.
+    pub(super) fn set_reference_state(
         &self,
         shown: &mut Shown,
         length: &[f64],
     ) -> Result<(), ProblemError> {
-        shown.unwind(self.unwound_muscle, self.after_pause(0), length)
+        shown.set_initial_state(self.initial_muscle, self.after_pause(0), length)
     }
 
     fn is_vented(&self) -> bool {
@@ -145,12 +146,12 @@ impl Setting<'_> {
         first > 0.5 * (inputs.stroke.0 + inputs.stroke.1)
     }
 
-    /// Pressure before the session: a muscle that begins it vented was filled, and the other way round.
+    /// Pressure before the session, kPa: a muscle that begins vented was filled before, and a muscle that begins filled was vented.
     pub(super) fn before_kpa(&self) -> f64 {
         if self.is_vented() { 1e-3 * self.params[Key::PS] } else { 0.0 }
     }
 
-    /// Length before the session.
+    /// Length before the session, mm.
     pub(super) fn before_mm(&self) -> f64 {
         let (filled, vented) = self.rig.inputs.stroke;
         if self.is_vented() { filled } else { vented }
@@ -171,7 +172,7 @@ impl Setting<'_> {
         }
     }
 
-    /// Pressure that belongs to a length at rest.
+    /// Pressure at which the muscle rests at a length, kPa.
     fn static_kpa(&self, mm: f64) -> f64 {
         let p = &self.params;
         let x = (1.0 - mm / p[Key::L0]) / p[Key::KMax];
@@ -179,15 +180,15 @@ impl Setting<'_> {
         (1e-3 * p[Key::PRef] * law).max(0.0)
     }
 
-    /// Inlet and outlet as they act.
+    /// Inlet and outlet, with commands that act ahead of their rows.
     pub(super) fn openings(&self, trial: usize) -> [Cow<'_, [f64]>; 2] {
         let own = &self.rig.session.trials[trial];
         timing::ahead(&own.inlet, &own.outlet, self.leads)
     }
 
-    /// A measured input: smoothed, and shaken if asked for.
+    /// A measured input of the stage, smoothed, with a draw of its noise where the run asks for one.
     fn input(&self, trial: usize, of_pressure: bool) -> Vec<f64> {
-        if let Some(given) = self.given.filter(|_| of_pressure == (self.kind == Stage::Muscle)) {
+        if let Some(given) = self.given.filter(|_| of_pressure == (self.kind == RigStage::Muscle)) {
             let trials = &self.rig.about.trials;
             let from = trials[..trial].iter().map(|t| t.samples).sum::<usize>();
             return given[from..from + trials[trial].samples].to_vec();
@@ -199,13 +200,13 @@ impl Setting<'_> {
         match of_pressure {
             true => {
                 let draws = &inputs.pressure_draws;
-                draws.shaken(&inputs.pressure, &noises.pressure_kpa, seed, trial)
+                draws.with_noise(&inputs.pressure, &noises.pressure_kpa, seed, trial)
             }
-            false => inputs.length_draws.shaken(&inputs.length, &noises.length_mm, seed, trial),
+            false => inputs.length_draws.with_noise(&inputs.length, &noises.length_mm, seed, trial),
         }
     }
 
-    /// Trials with their part of the output.
+    /// Visits every trial with its part of the output.
     pub(super) fn each(
         &self,
         count: usize,
@@ -247,10 +248,10 @@ impl Setting<'_> {
         shown.condition(&filled)?;
         let first = self.input(0, true).first().copied().unwrap_or(before);
         let mut begun = [0.0];
-        self.unwind(&mut memory, stage.memory(), |memory, start| {
+        self.set_initial_state(&mut memory, stage.memory(), |memory, start| {
             Ok(stage.run(memory, start, &[first], &mut begun)?)
         })?;
-        self.unwind_shown(&mut shown, &begun)?;
+        self.set_reference_state(&mut shown, &begun)?;
         self.each(count, out, |trial, own| {
             stage.run(&mut memory, self.start(trial), &self.input(trial, true), own)?;
             shown.run(self.start(trial), own)
@@ -270,10 +271,10 @@ impl Setting<'_> {
             let pressure = self.chamber_kpa(&stage, count)?;
             let first = pressure.first().and_then(|p| p.first()).copied().unwrap_or(before);
             let mut begun = [0.0];
-            self.unwind(&mut memory, stage.memory(), |memory, start| {
+            self.set_initial_state(&mut memory, stage.memory(), |memory, start| {
                 Ok(stage.run_length(memory, start, &[first], &mut begun)?)
             })?;
-            self.unwind_shown(&mut shown, &begun)?;
+            self.set_reference_state(&mut shown, &begun)?;
             return self.each(count, out, |trial, own| {
                 stage.run_length(&mut memory, self.start(trial), &pressure[trial], own)?;
                 shown.run(self.start(trial), own)
@@ -285,10 +286,10 @@ impl Setting<'_> {
         shown.condition(&filled)?;
         let (initial, mut begun) = (self.initial_kpa(0), [0.0]);
         let shut = Openings { inlet: &[0.0], outlet: &[0.0] };
-        self.unwind(&mut memory, stage.memory(), |memory, start| {
+        self.set_initial_state(&mut memory, stage.memory(), |memory, start| {
             Ok(stage.run(memory, start, shut, initial, &mut [0.0], &mut begun)?)
         })?;
-        self.unwind_shown(&mut shown, &begun)?;
+        self.set_reference_state(&mut shown, &begun)?;
         let mut pressure = Vec::new();
         self.each(count, out, |trial, own| {
             pressure.resize(own.len(), 0.0);
@@ -316,13 +317,13 @@ impl Setting<'_> {
         let shown = self.shown(&self.effects.only(|e| !e.hides_input()))?;
         let needs_pressure = self
             .effects
-            .acting_in(Stage::Sensing)
+            .acting_in(RigStage::Sensing)
             .any(|e| e.effect().needs == Some(Need::Pressure));
         let pressures = match needs_pressure && self.rig.inputs.pressure.is_empty() {
             true => self.simulated_pressure(count)?,
             false => Arc::default(),
         };
-        // What counts from the session's start allows no move before it.
+        // An effect that counts from the start of the session allows no motion before that start.
         if !self.effects.iter().any(|e| e.effect().counts_session()) {
             let (before, kpa) = (self.before_mm(), self.before_kpa());
             let nodes = self.grid.nodes(2);
@@ -342,7 +343,7 @@ impl Setting<'_> {
             let mut length = [first(false, before)];
             shown.undo(&mut length);
             let (pressure, mut volts) = ([first(true, self.initial_kpa(0))], [0.0]);
-            self.unwind(&mut memory, stage.memory(), |memory, start| {
+            self.set_initial_state(&mut memory, stage.memory(), |memory, start| {
                 let start_s = self.rig.about.trials[0].start_s;
                 Ok(stage.run(memory, start, start_s, &length, &pressure, &mut volts)?)
             })?;
@@ -372,7 +373,7 @@ impl Setting<'_> {
         })
     }
 
-    /// By trial: sensing where the bridge is excited otherwise than usual. The memory is that of the one gauge.
+    /// By trial, the sensing stage where the excitation of the bridge is not the usual one. All trials share the memory of the one gauge.
     fn dimmed(&self, count: usize) -> Result<Vec<Option<Sensing>>, ProblemError> {
         let one = |excitation: f64| -> Result<Option<Sensing>, ProblemError> {
             let mut params = self.params;
@@ -384,7 +385,7 @@ impl Setting<'_> {
         self.rig.session.trials[..count].iter().map(|t| one(t.excitation)).collect()
     }
 
-    /// By cubics through four samples where the grid is finer.
+    /// Samples at every node of the grid, interpolated by cubics through four samples.
     fn refined(&self, samples: Vec<f64>) -> Vec<f64> {
         let pieces = self.grid.pieces();
         if pieces == 1 || samples.is_empty() {

@@ -10,25 +10,25 @@ use super::directions::{self, Motion};
 use super::smooth::{Draws, Smoothed, schedule};
 use crate::{
     bench::{
+        isolated_outliers::without_isolated_outliers,
         lost::{open, open_behind},
-        wild::tamed,
     },
     error::{ProblemError, check_rate},
 };
 
-/// Columns that a rig needs; a pressure is welcome.
+/// Columns that a rig needs; the pressure is optional.
 const NEEDED: [&str; 4] = ["inlet", "outlet", "length_mm", "bridge_v"];
 const PRESSURE: &str = "pressure_kpa";
 /// Column of the bridge's excitation, a share of the nominal one, the same throughout a trial; 1 where it is missing.
 const EXCITATION: &str = "excitation_share";
 /// Parts of a trial with fewer samples are left out.
 const SHORTEST: usize = 100;
-/// Standard deviations that noise alone hardly ever spans.
+/// Range that noise alone hardly ever reaches, standard deviations.
 const NOISE_SPAN: f64 = 15.0;
 /// Least samples that may be fitted.
 const LEAST: usize = 300;
 
-/// A measured trial of the rig, on the session's even grid; all channels are of one length.
+/// A measured trial of the rig, on the session's even grid; all channels have the same length.
 #[derive(Debug, Clone)]
 pub struct RigTrial {
     pub(super) name: String,
@@ -39,16 +39,16 @@ pub struct RigTrial {
     pub(super) pressure_kpa: Option<Vec<f64>>,
     pub(super) length_mm: Vec<f64>,
     pub(super) bridge_v: Vec<f64>,
-    /// Samples that were lost, or that a lost one before them leaves open.
+    /// Marks samples that were lost, and samples that a gap before them leaves undetermined.
     pub(super) is_lost: Vec<bool>,
-    /// Whether it is the next part of the trial before it.
+    /// Whether the trial is the next part of the trial before it.
     goes_on: bool,
-    /// Of the bridge, a share of the nominal one.
+    /// Excitation of the bridge, a share of the nominal one.
     pub(super) excitation: f64,
 }
 
 impl RigTrial {
-    /// The trial of a session whose columns are [`NEEDED`], then the pressure where there is one; `before` is the one before it.
+    /// The trial of a session whose columns are [`NEEDED`] and then, where there is one, the pressure; `before` is the trial before it.
     fn of(trial: &EvenTrial, before: Option<&EvenTrial>, excitation: f64, dt_s: f64) -> Self {
         let goes_on = before.is_some_and(|before| before.source() == trial.source());
         let column = |i: usize| trial.columns().get(i).cloned();
@@ -71,7 +71,7 @@ impl RigTrial {
         }
     }
 
-    /// Gauge pressure, kPa, when every trial of the session has it.
+    /// Gauge pressure, kPa, where every trial of the session has one.
     pub fn pressure_kpa(&self) -> Option<&[f64]> {
         self.pressure_kpa.as_deref()
     }
@@ -87,7 +87,7 @@ impl RigTrial {
     }
 }
 
-/// A session of the rig and what was noticed while it was read: at least one trial, one to be fitted among them.
+/// A measured session of the rig, with notes on the reading: at least one trial, and at least one that may be fitted.
 #[derive(Debug, Clone)]
 pub struct RigSession {
     pub(super) trials: Vec<RigTrial>,
@@ -108,9 +108,9 @@ impl RigSession {
     }
 
     /// Binds trials with the columns `inlet`, `outlet` (0..1), `length_mm`, `bridge_v` and, where it was recorded,
-    /// `pressure_kpa`. They are brought onto one even grid ([`EvenSession`]): lost samples are bridged, a long gap in
-    /// time makes two trials of one, and the notes say so. Without a test trial nothing is held back here (the
-    /// diagnosis then tests on the last part of each trial).
+    /// `pressure_kpa`. The trials are brought onto one even grid ([`EvenSession`]): lost samples are bridged, a long gap in
+    /// time splits a trial into two, and the notes name both. Without a test trial nothing is held back here: the
+    /// diagnosis then tests on the last part of each trial.
     ///
     /// # Errors
     /// Columns that are missing or are not what their names say, trials of different rates, too little to fit.
@@ -127,8 +127,8 @@ impl RigSession {
             });
         }
         let shares: Vec<f64> = trials.iter().map(excitation).collect::<Result<_, _>>()?;
-        // Before anything is resampled: between two rows a wild value would spread.
-        let (trials, wild) = tamed(trials);
+        // Outliers are replaced before anything is resampled: an outlier between two rows would spread.
+        let (trials, outlier_notes) = without_isolated_outliers(trials);
         let trials = &trials[..];
         let even = EvenSession::new(trials, &columns, SHORTEST)?;
         check_rate(even.dt_s())?;
@@ -139,7 +139,7 @@ impl RigSession {
             trials: even.trials().iter().zip(before).map(of).collect(),
             dt_s: even.dt_s(),
             rows: even.rows(),
-            notes: even.notes().iter().cloned().chain(wild).collect(),
+            notes: even.notes().iter().cloned().chain(outlier_notes).collect(),
         };
         if with > 0 && with < trials.len() {
             session.notes.push(format!(
@@ -156,7 +156,7 @@ impl RigSession {
         &self.trials
     }
 
-    /// What was noticed, in sentences for a report.
+    /// Notes on the reading, in sentences for a report.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
@@ -181,7 +181,7 @@ impl RigSession {
         ends(self.trials.iter().flat_map(column))
     }
 
-    /// Whether the voltage is a copy of another column, which is no matter of units: the diagnosis says so.
+    /// Whether the voltage is a copy of another column: the diagnosis reports a copy, and no unit is questioned.
     fn is_copied(&self) -> bool {
         let all = |of: fn(&RigTrial) -> &[f64]| -> Vec<f64> {
             self.trials.iter().flat_map(of).copied().collect()
@@ -191,7 +191,7 @@ impl RigSession {
         others.iter().any(|other| copied(other, &volts).is_some())
     }
 
-    /// Whether a column of such a span moves by no more than its noise does.
+    /// Whether a column with this range holds nothing but noise.
     fn is_noise<'a>(&self, trials: impl Iterator<Item = &'a [f64]>, span: f64) -> bool {
         span < NOISE_SPAN * noise_variance(trials, self.dt_s).sqrt()
     }
@@ -235,7 +235,7 @@ impl RigSession {
                 let hint = "the channel is dead: check the sensor, or take the column out";
                 return bad("pressure_kpa", format!("{} in every sample", pressure.0), hint);
             }
-            // Noise alone has no unit: the diagnosis says that the channel is dead.
+            // No unit can be read from noise alone: the diagnosis says that the channel is dead.
             let pressures = self.trials.iter().filter_map(|t| t.pressure_kpa.as_deref());
             if self.is_noise(pressures, pressure.1 - pressure.0) {
                 return self.check_directions();
@@ -267,11 +267,11 @@ fn excitation(one: &SessionTrial) -> Result<f64, ProblemError> {
     })
 }
 
-/// Share of one stroke at the widest opening that must go against the valves before their columns look exchanged.
+/// Motion against the valves from which the recording is refused, in strokes at the widest opening.
 const AGAINST: f64 = 0.5;
 
 impl RigSession {
-    /// An open inlet shortens the muscle, an open outlet lets it out; and no channel stands still while the muscle moves.
+    /// Checks that an open inlet shortens the muscle and an open outlet lengthens it, and that no channel stands still while the muscle moves.
     fn check_directions(&self) -> Result<(), ProblemError> {
         let span = |values: &[f64]| {
             let (low, high) = ends(values);
@@ -301,7 +301,7 @@ impl RigSession {
                 }
             }
         }
-        // Noise alone has no direction: the diagnosis says that the channel is dead.
+        // No direction can be read from noise alone: the diagnosis says that the channel is dead.
         let lengths = self.trials.iter().map(|t| t.length_mm.as_slice());
         if against > AGAINST * widest * stroke && !self.is_noise(lengths, stroke) {
             let motions = self.trials.iter().map(|t| Motion {
@@ -321,22 +321,22 @@ impl RigSession {
     }
 }
 
-/// How the chamber begins a trial.
+/// The state of the chamber at the start of a trial.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Begin {
-    /// Vented: at the atmosphere, as a rule a little above.
+    /// The chamber is vented: its pressure is that of the atmosphere, as a rule a little above.
     Empty,
-    /// Filled: settled at the supply, as a rule a little below.
+    /// The chamber is filled: its pressure has settled at the supply, as a rule a little below.
     Full,
-    /// At a measured gauge pressure, kPa, known to so many kPa.
+    /// The gauge pressure was measured: its value and its standard deviation, kPa.
     Pressure(f64, f64),
-    /// At the pressure that belongs to a measured length, mm.
+    /// The pressure is the one at which the muscle rests at a measured length, mm.
     Length(f64),
-    /// Amid a motion, at a measured length and rate: mm, mm/s.
+    /// The muscle is amid a motion, at a measured length (mm) and rate (mm/s).
     Moving(f64, f64),
 }
 
-/// Measured inputs smoothed, and how every trial begins.
+/// The smoothed measured inputs, and the state of the chamber at the start of every trial.
 #[derive(Debug, Clone)]
 pub(crate) struct Inputs {
     pub(crate) length: Vec<Smoothed>,
@@ -382,7 +382,7 @@ impl Inputs {
         pressure_sd: f64,
         supply_kpa: f64,
     ) -> Begin {
-        // The rest at the trial's start, at most a fifth of a second of it.
+        // The number of samples at rest at the trial's start, over at most a fifth of a second.
         let longest = ((0.2 / dt_s) as usize).max(1);
         let shut = trial.inlet.iter().zip(&trial.outlet).take_while(|(i, o)| **i + **o == 0.0);
         let rest = shut.count().clamp(1, longest).min(trial.length_mm.len());
@@ -414,10 +414,10 @@ impl Inputs {
     }
 }
 
-/// Samples at the beginning of a part that tell its motion.
+/// Number of samples at the beginning of a part that its motion is estimated from.
 const LINE: usize = 9;
 
-/// First value and slope a sample of the straight line through values, by least squares.
+/// First value and slope (for each sample) of the straight line through values, by least squares.
 fn line(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let middle = 0.5 * (n - 1.0);

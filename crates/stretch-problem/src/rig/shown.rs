@@ -1,11 +1,11 @@
-//! The reference at the end of a stage.
+//! The reference sensor behind a stage: from true length to measured length.
 
-use stretch_sim::{EffectSet, Grid, Memory, Reference, RigParams, Stage, Start};
+use stretch_sim::{EffectSet, Grid, Memory, Reference, RigParams, RigStage, Start};
 
-use super::unwound::unwind;
+use super::initial_state::set_initial_state;
 use crate::error::ProblemError;
 
-/// The reference at the end of a stage, skipped where nothing acts in it.
+/// The reference sensor behind a stage, skipped where no effect acts in the reference.
 pub(super) struct Shown {
     stage: Reference,
     memory: Memory,
@@ -20,13 +20,13 @@ impl Shown {
         dt_s: f64,
     ) -> Result<Self, ProblemError> {
         let stage = Reference::new(params, effects, &Grid::samples(dt_s)?)?;
-        let acts = effects.acting_in(Stage::Reference).next().is_some();
+        let acts = effects.acting_in(RigStage::Reference).next().is_some();
         let memory = stage.memory();
         Ok(Self { stage, memory, acts, work: Vec::new() })
     }
 
-    /// Moves what it remembers towards having settled at a length.
-    pub(super) fn unwind(
+    /// Sets the initial state of the reference: a share of the way towards one that has settled at a length.
+    pub(super) fn set_initial_state(
         &mut self,
         share: f64,
         after_pause: Start,
@@ -34,7 +34,7 @@ impl Shown {
     ) -> Result<(), ProblemError> {
         let Self { stage, memory, .. } = self;
         let mut out = vec![0.0; length.len()];
-        unwind(share, after_pause, memory, stage.memory(), |memory, start| {
+        set_initial_state(share, after_pause, memory, stage.memory(), |memory, start| {
             Ok(stage.run(memory, start, length, &mut out)?)
         })
     }

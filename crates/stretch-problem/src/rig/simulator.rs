@@ -1,9 +1,9 @@
-//! What a diagnosis asks of the rig.
+//! The rig as the diagnosis sees it.
 
 use stretch_gap::{
     Description, Distortion, Driven, GapError, Line, Model, Run, Simulator, SpectralLines,
 };
-use stretch_sim::Stage;
+use stretch_sim::RigStage;
 
 use super::{RigSimulator, run};
 use crate::bench::acting::lines;
@@ -33,8 +33,8 @@ impl Simulator for RigSimulator {
 impl Driven for RigSimulator {
     fn input(&self, stage: usize) -> Option<Vec<f64>> {
         let smooth = match self.stage_kinds[stage] {
-            Stage::Muscle => &self.inputs.pressure,
-            Stage::Sensing => &self.inputs.length,
+            RigStage::Muscle => &self.inputs.pressure,
+            RigStage::Sensing => &self.inputs.length,
             _ => return None,
         };
         Some(smooth.iter().flat_map(|s| &s.values).copied().collect())
@@ -61,7 +61,7 @@ impl Driven for RigSimulator {
 impl SpectralLines for RigSimulator {
     fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
         match self.stage_kinds[stage] {
-            Stage::Sensing => lines(&self.effects, &self.rows, model, 1.0),
+            RigStage::Sensing => lines(&self.effects, &self.rows, model, 1.0),
             _ => Vec::new(),
         }
     }

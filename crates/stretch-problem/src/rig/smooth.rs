@@ -1,4 +1,4 @@
-//! Smoothing of a measured input, as wide as the commands allow.
+//! Smoothing of a measured input, over windows as wide as the commands allow.
 
 use std::{convert::Infallible, num::NonZeroUsize};
 
@@ -10,17 +10,17 @@ use crate::bench::kept::Kept;
 const WIDEST: usize = 15;
 /// Narrowest half-width.
 const NARROWEST: usize = 2;
-/// A window reaches no further than this share of the time since the last command, less its wake.
+/// Greatest half-width of a window, a share of the time since the last command without [`WAKE_S`].
 const SHARE: f64 = 0.125;
-/// Time that the wake of a command lasts at least, s.
+/// Time for which the response to a command lasts at least, s.
 const WAKE_S: f64 = 0.1;
-/// Standard deviations of its own by which a residual sum of squares may exceed its mean: noise alone hardly ever does.
+/// Greatest excess of a residual sum of squares over its mean, in standard deviations of that sum: noise alone hardly ever exceeds it.
 const PATIENCE: f64 = 4.0;
 
-/// For every sample the half-width of the parabola, by least squares, that replaces it; 0 leaves it as it is.
+/// For every sample the half-width of the least-squares parabola that replaces the sample; 0 leaves the sample as it is.
 ///
-/// Windows are chosen by what was commanded, not by the record: a choice by the record would favour noise that happens
-/// to look smooth, and what it leaves would pose as a gap. Only where a parabola is far off is a window narrowed.
+/// Windows are chosen by the commands and not by the recording: a choice by the recording would favour noise that happens
+/// to look smooth, and the noise that is left would look like a gap. A window is narrowed only where the parabola is far off.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Smoother {
     halves: Vec<u8>,
@@ -51,12 +51,12 @@ fn parabola(record: &[f64], i: usize, h: usize) -> (f64, f64) {
     (middle + a, (yy - a * y0 - y1 * y1 / s2 - c * y2).max(0.0))
 }
 
-/// Half-widths that the commands allow: narrow behind a change, wider the longer nothing was changed, never beyond the next
-/// change. A signal with corners (`sharp`) is not smoothed across a change at all.
+/// Half-widths that the commands allow: narrow behind a change of the commands, wider with the time since that change, never beyond the
+/// next change. A signal with corners (`sharp`) is not smoothed across a change at all.
 pub(crate) fn schedule(inlet: &[f64], outlet: &[f64], dt_s: f64, sharp: bool) -> Vec<u8> {
     let changes = |i: usize| i > 0 && (inlet[i] != inlet[i - 1] || outlet[i] != outlet[i - 1]);
     let mut halves = vec![0_u8; inlet.len()];
-    // A trial begins at rest: nothing was changed for long.
+    // A trial begins at rest: the last change of the commands was long before.
     let mut since = (1.0 / dt_s) as usize;
     for (i, half) in halves.iter_mut().enumerate() {
         since = if changes(i) { 0 } else { since + 1 };
@@ -76,7 +76,7 @@ pub(crate) fn schedule(inlet: &[f64], outlet: &[f64], dt_s: f64, sharp: bool) ->
 }
 
 impl Smoother {
-    /// Chooses for a record with noise of standard deviation `sd` and half-widths that the commands allow.
+    /// Chooses the half-widths for a recording with noise of standard deviation `sd`, within the half-widths that the commands allow.
     pub(crate) fn choose(record: &[f64], sd: f64, allowed: &[u8]) -> Self {
         let variance = sd * sd;
         let halves = allowed
@@ -99,7 +99,7 @@ impl Smoother {
         Self { halves }
     }
 
-    /// The record smoothed.
+    /// The smoothed recording.
     pub(crate) fn apply(&self, record: &[f64]) -> Vec<f64> {
         let each = self.halves.iter().enumerate();
         each.map(|(i, &h)| match usize::from(h) {
@@ -110,7 +110,7 @@ impl Smoother {
     }
 }
 
-/// A measured input as a stage is fed with it.
+/// A measured input, smoothed for a stage.
 #[derive(Debug, Clone)]
 pub(crate) struct Smoothed {
     smoother: Smoother,
@@ -118,23 +118,23 @@ pub(crate) struct Smoothed {
 }
 
 impl Smoothed {
-    /// A record with noise of standard deviation `sd`, smoothed over half-widths that are allowed.
+    /// Smooths a recording with noise of standard deviation `sd`, within the half-widths that are allowed.
     pub(crate) fn of(record: &[f64], sd: f64, allowed: &[u8]) -> Self {
         let smoother = Smoother::choose(record, sd, allowed);
         let values = smoother.apply(record);
         Self { smoother, values }
     }
 
-    /// Another draw of the noise, as far as the smoothing lets it pass.
-    fn drawn(&self, noise: &Noise, dice: &mut RandomGenerator) -> Vec<f64> {
-        self.smoother.apply(&noise.samples(self.values.len(), dice))
+    /// A draw of the noise, smoothed like the recording.
+    fn drawn(&self, noise: &Noise, random: &mut RandomGenerator) -> Vec<f64> {
+        self.smoother.apply(&noise.samples(self.values.len(), random))
     }
 }
 
-/// Draws of a channel's noise that are kept: those of the floors and of what is transmitted.
+/// Number of draws of a channel's noise that are kept: those for the noise of the outputs and those for the transmitted noise.
 const DRAWS: NonZeroUsize = NonZeroUsize::new(16).expect("not 0");
 
-/// Draws of the noise of a measured input, every model given the same.
+/// Draws of the noise of a measured input; every model gets the same draws.
 #[derive(Debug, Clone)]
 pub(crate) struct Draws(Kept<u64, Vec<Vec<f64>>>);
 
@@ -143,8 +143,8 @@ impl Draws {
         Self(Kept::new(DRAWS))
     }
 
-    /// A trial of an input with the draw of a seed.
-    pub(crate) fn shaken(
+    /// A trial of an input with the draw of its noise that belongs to a seed.
+    pub(crate) fn with_noise(
         &self,
         inputs: &[Smoothed],
         noise: &Noise,
@@ -160,7 +160,7 @@ impl Draws {
     }
 }
 
-/// Half-widths where nothing is commanded: as wide as the record itself lets a parabola be.
+/// Half-widths where nothing is commanded: the recording alone limits the width.
 pub(crate) fn unscheduled(samples: usize) -> Vec<u8> {
     vec![WIDEST as u8; samples]
 }
@@ -193,8 +193,8 @@ mod tests {
 
     #[test]
     fn takes_noise_out_where_nothing_is_commanded() {
-        let mut dice = RandomGenerator::new(1, 1);
-        let noise: Vec<f64> = (0..20_000).map(|_| 0.05 * dice.gauss()).collect();
+        let mut random = RandomGenerator::new(1, 1);
+        let noise: Vec<f64> = (0..20_000).map(|_| 0.05 * random.gauss()).collect();
         let shut = vec![0.0; noise.len()];
         let allowed = schedule(&shut, &shut, 0.01, false);
         let out = Smoother::choose(&noise, 0.05, &allowed).apply(&noise);

@@ -1,8 +1,8 @@
-//! What stands in for what was not measured, each kept as long as nothing of its causes moves.
+//! Simulated channels that stand in for channels without a measurement; a result is kept for runs with the same causes.
 
 use std::sync::Arc;
 
-use stretch_sim::{Actuation, Grid, Openings, Stage, Start};
+use stretch_sim::{Actuation, Grid, Openings, RigStage, Start};
 
 use super::{
     found::{Pressures, causes},
@@ -11,14 +11,14 @@ use super::{
 use crate::error::ProblemError;
 
 impl Setting<'_> {
-    /// By trial, the chamber's pressure at every node where it does not depend on the muscle: what acts in the muscle alone finds it kept.
+    /// By trial, the chamber's pressure at every node, where the pressure does not depend on the muscle: runs that differ in the muscle alone share it.
     pub(super) fn chamber_kpa(
         &self,
         stage: &Actuation,
         count: usize,
     ) -> Result<Arc<Pressures>, ProblemError> {
         let begun = self.begun(count);
-        let key = causes(&[Stage::Pneumatics], &self.params, &self.effects, &self.grid, begun);
+        let key = causes(&[RigStage::Pneumatics], &self.params, &self.effects, &self.grid, begun);
         self.rig.found.nodes.or_make(key, || {
             let mut memory = stage.memory();
             let before = self.before_kpa();
@@ -36,17 +36,17 @@ impl Setting<'_> {
         })
     }
 
-    /// What play in the reference hides of the length: the model of the motion says which flank it lies on, the record how
-    /// long the muscle is.
+    /// The part of the length that play in the reference hides: the model of the motion gives the flank on which the play lies, the
+    /// recording gives the length of the muscle.
     pub(super) fn hidden(&self, count: usize) -> Result<Option<Vec<f64>>, ProblemError> {
         let alone = self.effects.only(|e| e.hides_input());
-        if alone.acting_in(Stage::Reference).next().is_none() {
+        if alone.acting_in(RigStage::Reference).next().is_none() {
             return Ok(None);
         }
         let mut free = self.free_length(count)?.to_vec();
         let mut shown = self.shown(&alone)?;
         shown.condition(&[self.before_mm(); 2])?;
-        self.unwind_shown(&mut shown, free.get(..1).unwrap_or(&[]))?;
+        self.set_reference_state(&mut shown, free.get(..1).unwrap_or(&[]))?;
         self.each(count, &mut free, |trial, own| {
             let before = own.to_vec();
             shown.run(self.start(trial), own)?;
@@ -56,7 +56,7 @@ impl Setting<'_> {
         Ok(Some(free))
     }
 
-    /// Length that the model of the motion shows without play in the reference.
+    /// Length, mm, of the model of the motion without play in the reference.
     fn free_length(&self, count: usize) -> Result<Arc<Vec<f64>>, ProblemError> {
         let effects = self.effects.only(|e| !e.hides_input());
         let has_pressure = !self.rig.inputs.pressure.is_empty();
@@ -65,9 +65,9 @@ impl Setting<'_> {
         } else {
             effects.grid(&self.params, self.rig.about.dt_s, self.step_s)?
         };
-        let unwound = self.unwound_muscle;
+        let initial_share = self.initial_muscle;
         let without =
-            Setting { rig: self.rig, params: self.params, effects, grid, unwound, ..*self };
+            Setting { rig: self.rig, params: self.params, effects, grid, initial_share, ..*self };
         let make = || {
             let mut all = vec![0.0; self.samples(count)];
             match has_pressure {
@@ -76,27 +76,27 @@ impl Setting<'_> {
             }
             Ok(all)
         };
-        // What is shaken or stood in for is asked for once.
+        // A length with a draw of the noise, or on a given input, is asked for only once.
         if self.input_noise.is_some() || self.given.is_some() {
             return make().map(Arc::new);
         }
-        let stages = [Stage::Pneumatics, Stage::Muscle, Stage::Reference];
-        let others = self.begun(count).chain([unwound]);
+        let stages = [RigStage::Pneumatics, RigStage::Muscle, RigStage::Reference];
+        let others = self.begun(count).chain([initial_share]);
         let key = causes(&stages, &without.params, &without.effects, &without.grid, others);
         self.rig.found.lengths.or_make(key, make)
     }
 
-    /// How the first trials begin and commands act in them: what a run depends on beside parameters and effects.
+    /// The numbers that a run depends on beside parameters and effects: leads of the commands, and pressures at the start of the first trials.
     fn begun(&self, count: usize) -> impl Iterator<Item = f64> {
         self.leads.into_iter().chain((0..count).map(|trial| self.initial_kpa(trial)))
     }
 
-    /// Samples of the first trials.
+    /// Number of samples in the first trials.
     fn samples(&self, count: usize) -> usize {
         self.rig.about.trials[..count].iter().map(|t| t.samples).sum()
     }
 
-    /// Pressure of the nominal pneumatics: what there is without a pressure column.
+    /// Pressure of the nominal pneumatics, kPa, for recordings without a pressure column.
     pub(super) fn simulated_pressure(&self, count: usize) -> Result<Arc<Pressures>, ProblemError> {
         let effects = &self.rig.effects;
         let grid = effects.grid(&self.params, self.rig.about.dt_s, self.step_s)?;
@@ -111,12 +111,12 @@ impl Setting<'_> {
             })?;
             Ok(own)
         };
-        // A chamber that follows the length follows its noise and what stands in for it.
+        // A chamber that depends on the length depends on its noise and on a given length.
         if self.input_noise.is_some() || self.given.is_some() {
             return make().map(Arc::new);
         }
         let others = self.begun(count);
-        let key = causes(&[Stage::Pneumatics], &nominal.params, effects, &nominal.grid, others);
+        let key = causes(&[RigStage::Pneumatics], &nominal.params, effects, &nominal.grid, others);
         self.rig.found.samples.or_make(key, make)
     }
 }

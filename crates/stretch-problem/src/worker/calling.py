@@ -4,7 +4,7 @@ An object has a method `simulate(params[n, p], effects[n, e]) -> [n, samples]`, 
 attribute `batch`); a function takes two dicts for one model and returns `[samples]`. Both may take by keyword `inputs` (every
 column by name, those that drive the stage as they were altered), `trials` (name, slice and start_s of each that is asked for)
 and `stage`; `**kw` takes all of them. With several outputs a simulator that does not take `stage` returns a dict of arrays by
-output. A method `begin(session)` is told once what stays the same.
+output. A method `begin(session)` is called once with everything that stays the same.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ class Asked:
 
     @property
     def answers_all(self) -> bool:
-        """Whether it answers with all outputs at once, and is not told which stage is asked for."""
+        """Whether it answers with all outputs at once, whichever stage is asked for."""
         return "stage" not in self.optional
 
     def bind(self, session: Mapping[str, Any]) -> None:
@@ -146,16 +146,16 @@ class Asked:
         if self.many:
             if inputs is not None:
                 more["inputs"] = inputs
-            told = self.call(Named.of(params, self.parameters), Named.of(effects, self.effects), **more)
-            return self._table(told, models, samples, outputs)
+            answer = self.call(Named.of(params, self.parameters), Named.of(effects, self.effects), **more)
+            return self._table(answer, models, samples, outputs)
         rows = []
         for model in range(models):
             one = dict(zip(self.parameters, params[model].tolist()))
             values = dict(zip(self.effects, effects[model].tolist()))
             if inputs is not None:
                 more["inputs"] = {name: columns[model] for name, columns in inputs.items()}
-            told = self.call(one, values, **more)
-            rows.append(self._table(_first_axis(told), 1, samples, outputs))
+            answer = self.call(one, values, **more)
+            rows.append(self._table(_first_axis(answer), 1, samples, outputs))
         return np.concatenate(rows)
 
     def _inputs(
@@ -169,23 +169,23 @@ class Asked:
             given[name] = np.stack(rows)
         return given
 
-    def _table(self, told: Any, models: int, samples: int, outputs: Sequence[str]) -> Array:
+    def _table(self, answer: Any, models: int, samples: int, outputs: Sequence[str]) -> Array:
         """What came back, checked; several outputs side by side."""
-        if len(outputs) == 1 and not isinstance(told, dict):
-            return self._rows(told, models, samples, outputs[0])
-        if not isinstance(told, dict):
+        if len(outputs) == 1 and not isinstance(answer, dict):
+            return self._rows(answer, models, samples, outputs[0])
+        if not isinstance(answer, dict):
             raise StretchError(
-                f"the simulator returned a {type(told).__name__}; with {len(outputs)} outputs it must return a dict of "
+                f"the simulator returned a {type(answer).__name__}; with {len(outputs)} outputs it must return a dict of "
                 f"arrays by output: {', '.join(outputs)}"
             )
-        missing = [output for output in outputs if output not in told]
+        missing = [output for output in outputs if output not in answer]
         if missing:
-            raise StretchError(f"the simulator returned no {missing[0]}; it returned {', '.join(map(str, told))}")
-        return np.concatenate([self._rows(told[o], models, samples, o) for o in outputs], axis=1)
+            raise StretchError(f"the simulator returned no {missing[0]}; it returned {', '.join(map(str, answer))}")
+        return np.concatenate([self._rows(answer[o], models, samples, o) for o in outputs], axis=1)
 
-    def _rows(self, told: Any, models: int, samples: int, output: str) -> Array:
+    def _rows(self, answer: Any, models: int, samples: int, output: str) -> Array:
         try:
-            table = np.asarray(told, dtype=np.float64)
+            table = np.asarray(answer, dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise StretchError(f"the simulator returned no numbers for {output}: {error}") from None
         if table.ndim == 1 and models == 1:
@@ -202,11 +202,11 @@ class Asked:
         return np.ascontiguousarray(table[:, :samples])
 
 
-def _first_axis(told: Any) -> Any:
+def _first_axis(answer: Any) -> Any:
     """One model's outputs as a batch of one."""
-    if isinstance(told, dict):
-        return {output: np.asarray(values)[np.newaxis] for output, values in told.items()}
+    if isinstance(answer, dict):
+        return {output: np.asarray(values)[np.newaxis] for output, values in answer.items()}
     try:
-        return np.asarray(told, dtype=np.float64)[np.newaxis]
+        return np.asarray(answer, dtype=np.float64)[np.newaxis]
     except (TypeError, ValueError) as error:
         raise StretchError(f"the simulator returned no numbers: {error}") from None

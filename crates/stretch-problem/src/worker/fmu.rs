@@ -1,4 +1,4 @@
-//! The worker for FMUs: a program of its own, for it loads native code.
+//! The worker for FMUs: a program of its own, because an FMU is native code.
 
 use std::{
     collections::BTreeMap,
@@ -9,18 +9,20 @@ use std::{
 use super::pool::WorkersSpec;
 use crate::error::ProblemError;
 
-/// Names the program where it is neither beside this one nor on the path.
+/// Environment variable with the path of the worker for FMUs.
 const VARIABLE: &str = "STRETCH_FMU";
+/// Name of the worker for FMUs.
 const PROGRAM: &str = "stretch-fmu";
 
 impl WorkersSpec {
-    /// An FMU in a folder, behind the program `stretch-fmu`: `STRETCH_FMU`, else beside this program, else on the path.
+    /// An FMU in a folder, run by the program `stretch-fmu`: the one of the variable `STRETCH_FMU`, else one beside this program, else one
+    /// on the path.
     ///
-    /// `variables` says what parameters, effects and columns are called in the FMU where they are called otherwise, `units` what those of
-    /// parameters and effects are in the problem.
+    /// `variables` holds the FMU's names of parameters, effects and columns where these differ from the problem's names; `units` holds the
+    /// problem's units of parameters and effects.
     ///
     /// # Errors
-    /// Where there is no such program.
+    /// There is no such program.
     pub fn fmu(
         file: &str,
         variables: &BTreeMap<String, String>,
@@ -47,10 +49,10 @@ impl WorkersSpec {
     }
 }
 
-/// The program; as it was named where it was.
+/// Path of the worker for FMUs, if there is one.
 fn program() -> Option<PathBuf> {
     if let Some(named) = env::var_os(VARIABLE).filter(|named| !named.is_empty()) {
-        // Workers are started in the problem's folder.
+        // The path is made absolute because workers are started in the problem's folder.
         return std::path::absolute(named).ok();
     }
     let name = format!("{PROGRAM}{}", env::consts::EXE_SUFFIX);

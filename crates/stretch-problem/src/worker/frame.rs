@@ -1,4 +1,4 @@
-//! Frames: what goes to a worker and comes back, byte by byte. Nothing here reads or writes; it only parses.
+//! Frames that go to a worker and come back, byte by byte. This module parses and composes frames; other modules read and write them.
 //!
 //! ```text
 //! bytes 0..4     "STR1"
@@ -17,11 +17,11 @@ const HEADER: u32 = 16 << 20;
 /// Longest body, bytes.
 const BODY: u64 = 4 << 30;
 
-/// Why bytes are no frame.
+/// Why bytes form no frame.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FrameError {
-    /// The first bytes are something else: most often text that was printed.
+    /// The first bytes are those of no frame; most often they are text that was printed.
     #[error(
         "its standard output holds {text:?} where a frame begins; only frames may go there, print to standard error"
     )]
@@ -29,14 +29,14 @@ pub enum FrameError {
         /// The bytes, as text.
         text: String,
     },
-    /// A length that no frame has.
+    /// A length is beyond the limits of a frame.
     #[error("a frame says that its {part} is {bytes} bytes long; {hint}")]
     Length {
         /// Header or body.
         part: &'static str,
-        /// What it says.
+        /// The length, bytes.
         bytes: u64,
-        /// What is allowed.
+        /// The limit, in words.
         hint: &'static str,
     },
     /// The header is no JSON object.
@@ -57,7 +57,7 @@ pub struct Prefix {
 }
 
 impl Prefix {
-    /// From the first bytes of a frame.
+    /// Parses the first bytes of a frame.
     ///
     /// # Errors
     /// [`FrameError::Magic`] and [`FrameError::Length`].
@@ -80,17 +80,17 @@ impl Prefix {
     }
 }
 
-/// A header and the numbers behind it.
+/// A frame of the worker protocol: a header, and numbers.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Frame {
-    /// One JSON object.
+pub struct WorkerFrame {
+    /// The header, one JSON object.
     pub header: serde_json::Map<String, serde_json::Value>,
-    /// Numbers.
+    /// The numbers of the body.
     pub body: Vec<f64>,
 }
 
-impl Frame {
-    /// From the bytes behind a prefix.
+impl WorkerFrame {
+    /// Parses the bytes behind a prefix.
     ///
     /// # Errors
     /// [`FrameError::Header`].
@@ -101,19 +101,19 @@ impl Frame {
         Ok(Self { header, body: body.chunks_exact(8).map(number).collect() })
     }
 
-    /// The first frame of some bytes, and how many it takes; none where more have to come.
+    /// The first frame of some bytes, and the number of its bytes; none where bytes are still missing.
     ///
     /// # Errors
-    /// As [`Prefix::parse`] and [`Frame::parse`].
+    /// As [`Prefix::parse`] and [`WorkerFrame::parse`].
     ///
     /// ```
-    /// use stretch_problem::worker::Frame;
-    /// let bytes = Frame::bytes(&serde_json::json!({ "kind": "ready" }), &[1.5, -2.0]);
+    /// use stretch_problem::worker::WorkerFrame;
+    /// let bytes = WorkerFrame::bytes(&serde_json::json!({ "kind": "ready" }), &[1.5, -2.0]);
     /// assert_eq!(bytes.len(), 16 + 16 + 2 * 8);
-    /// let (frame, used) = Frame::first(&bytes)?.unwrap();
+    /// let (frame, used) = WorkerFrame::first(&bytes)?.unwrap();
     /// assert_eq!((frame.body, used), (vec![1.5, -2.0], bytes.len()));
-    /// assert_eq!(Frame::first(&bytes[..20])?, None);
-    /// assert!(Frame::first(b"step 1 of 10 done").is_err());
+    /// assert_eq!(WorkerFrame::first(&bytes[..20])?, None);
+    /// assert!(WorkerFrame::first(b"step 1 of 10 done").is_err());
     /// # Ok::<(), stretch_problem::worker::FrameError>(())
     /// ```
     pub fn first(bytes: &[u8]) -> Result<Option<(Self, usize)>, FrameError> {
@@ -126,7 +126,7 @@ impl Frame {
         Ok(Some((Self::parse(text, numbers)?, PREFIX + header + body)))
     }
 
-    /// A frame as it goes over the wire.
+    /// The bytes of a frame.
     pub fn bytes(header: &serde_json::Value, body: &[f64]) -> Vec<u8> {
         let header = header.to_string();
         let mut out = Vec::with_capacity(PREFIX + header.len() + 8 * body.len());

@@ -1,35 +1,35 @@
-//! What frames say.
+//! The messages of the worker protocol, in frames.
 
 use std::collections::BTreeMap;
 
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::frame::Frame;
-use crate::black_box::source::{Ask, Session, SourceError};
+use super::frame::WorkerFrame;
+use crate::black_box::source::{Ask, RecordedSession, SourceError};
 
 /// The version of the protocol.
 pub(super) const VERSION: u64 = 1;
 
-// Keys are written in the order of the alphabet, so that a worker without a JSON parser can read them where they stand.
+// Keys are written in alphabetical order, so that a worker without a JSON parser finds each key at a fixed place.
 
-/// What a worker says of itself.
+/// The first message of a worker: its abilities.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(default)]
 pub(super) struct Hello {
-    /// Version of the protocol that it speaks.
+    /// Version of the protocol that the worker speaks.
     pub(super) version: u64,
-    /// Models that it likes to have in one request.
+    /// Number of models that the worker wants in one request.
     pub(super) batch: usize,
-    /// Whether it takes altered inputs.
+    /// Whether the worker takes altered inputs.
     pub(super) inputs: bool,
-    /// Whether it answers all stages at once.
+    /// Whether the worker answers all stages at once.
     pub(super) all: bool,
-    /// Parameters that it knows; all where it does not say.
+    /// Parameters that the worker knows; all parameters where the list is missing.
     pub(super) parameters: Option<Vec<String>>,
-    /// Effects that it knows.
+    /// Effects that the worker knows; all effects where the list is missing.
     pub(super) effects: Option<Vec<String>>,
-    /// Units of columns as it takes and gives them.
+    /// Units in which the worker takes and gives columns.
     pub(super) units: BTreeMap<String, String>,
 }
 
@@ -47,11 +47,11 @@ impl Default for Hello {
     }
 }
 
-/// What is wrong with an answer.
+/// A sentence about what is wrong with an answer.
 pub(super) type Wrong = String;
 
-/// The header's kind, or what the worker refuses.
-pub(super) fn kind(frame: &Frame, wanted: &str) -> Result<(), Wrong> {
+/// Checks that a frame is of the wanted kind.
+pub(super) fn kind(frame: &WorkerFrame, wanted: &str) -> Result<(), Wrong> {
     let text = |key: &str| frame.header.get(key).and_then(Value::as_str);
     match text("kind") {
         Some(kind) if kind == wanted => Ok(()),
@@ -61,15 +61,15 @@ pub(super) fn kind(frame: &Frame, wanted: &str) -> Result<(), Wrong> {
 }
 
 pub(super) fn hello() -> Vec<u8> {
-    Frame::bytes(&json!({ "kind": "hello", "version": VERSION }), &[])
+    WorkerFrame::bytes(&json!({ "kind": "hello", "version": VERSION }), &[])
 }
 
 pub(super) fn bye() -> Vec<u8> {
-    Frame::bytes(&json!({ "kind": "bye" }), &[])
+    WorkerFrame::bytes(&json!({ "kind": "bye" }), &[])
 }
 
-/// What a worker says of itself, checked against the session.
-pub(super) fn read_hello(frame: &Frame, session: &Session) -> Result<Hello, Wrong> {
+/// Reads the first message of a worker and checks it against the session.
+pub(super) fn read_hello(frame: &WorkerFrame, session: &RecordedSession) -> Result<Hello, Wrong> {
     kind(frame, "hello")?;
     let hello: Hello = serde_json::from_value(Value::Object(frame.header.clone()))
         .map_err(|e| format!("its hello does not do: {e}"))?;
@@ -89,8 +89,8 @@ pub(super) fn read_hello(frame: &Frame, session: &Session) -> Result<Hello, Wron
         }
     }
     for column in &session.columns {
-        let told = hello.units.get(&column.name).filter(|u| **u != column.unit);
-        if let Some(unit) = told.filter(|_| !column.unit.is_empty()) {
+        let other = hello.units.get(&column.name).filter(|u| **u != column.unit);
+        if let Some(unit) = other.filter(|_| !column.unit.is_empty()) {
             return Err(format!(
                 "it has column {} in {unit}, the problem in {}; convert it in the simulator, or give the stage or input the unit that it has",
                 column.name, column.unit
@@ -100,14 +100,14 @@ pub(super) fn read_hello(frame: &Frame, session: &Session) -> Result<Hello, Wron
     Ok(Hello { batch: hello.batch.max(1), ..hello })
 }
 
-/// What a worker has to know once.
-pub(super) fn session(session: &Session) -> Vec<u8> {
+/// The message that hands the session to a worker.
+pub(super) fn session(session: &RecordedSession) -> Vec<u8> {
     let body: Vec<f64> = session.columns.iter().flat_map(|c| c.values.iter().copied()).collect();
-    Frame::bytes(&session_header(session), &body)
+    WorkerFrame::bytes(&session_header(session), &body)
 }
 
-/// What a simulator has to know once, the values of the columns apart: the header of the frame `session`.
-pub fn session_header(session: &Session) -> Value {
+/// The header of the message `session`: the session as a simulator receives it once, without the values of the columns.
+pub fn session_header(session: &RecordedSession) -> Value {
     let trials = session
         .trials
         .iter()
@@ -128,14 +128,14 @@ pub fn session_header(session: &Session) -> Value {
     })
 }
 
-/// What a worker has to say of a session: `notes`, a list of sentences, which may be left out.
-pub(super) fn read_ready(frame: &Frame) -> Result<Vec<String>, Wrong> {
+/// Reads the answer to the session; its `notes`, a list of sentences, may be left out.
+pub(super) fn read_ready(frame: &WorkerFrame) -> Result<Vec<String>, Wrong> {
     kind(frame, "ready")?;
     let notes = frame.header.get("notes").and_then(Value::as_array).into_iter().flatten();
     Ok(notes.filter_map(|note| note.as_str().map(str::to_owned)).collect())
 }
 
-/// Models to simulate.
+/// The message that asks for models.
 pub(super) fn simulate(asks: &[Ask<'_>]) -> Vec<u8> {
     let one = |ask: &Ask<'_>| json!({ "stage": ask.stage, "trials": ask.trials, "inputs": ask.inputs.is_some() });
     let models: Vec<Value> = asks.iter().map(one).collect();
@@ -145,12 +145,12 @@ pub(super) fn simulate(asks: &[Ask<'_>]) -> Vec<u8> {
         body.extend_from_slice(ask.effects);
         ask.inputs.iter().copied().flatten().for_each(|column| body.extend_from_slice(column));
     }
-    Frame::bytes(&json!({ "kind": "simulate", "models": models }), &body)
+    WorkerFrame::bytes(&json!({ "kind": "simulate", "models": models }), &body)
 }
 
-/// Outputs, one for each model; lengths are as the worker says them.
+/// Reads the outputs, one for each model, with the lengths that the worker states.
 pub(super) fn read_outputs(
-    frame: &Frame,
+    frame: &WorkerFrame,
     count: usize,
 ) -> Result<Vec<Result<Vec<f64>, SourceError>>, Wrong> {
     kind(frame, "outputs")?;
@@ -185,7 +185,7 @@ mod tests {
     use super::*;
 
     fn outputs(header: Value, body: &[f64]) -> Result<Vec<Result<Vec<f64>, SourceError>>, Wrong> {
-        let (frame, _) = Frame::first(&Frame::bytes(&header, body)).unwrap().unwrap();
+        let (frame, _) = WorkerFrame::first(&WorkerFrame::bytes(&header, body)).unwrap().unwrap();
         read_outputs(&frame, 2)
     }
 

@@ -8,6 +8,6 @@ mod message;
 mod pool;
 mod process;
 
-pub use frame::{Frame, FrameError, PREFIX, Prefix};
+pub use frame::{FrameError, PREFIX, Prefix, WorkerFrame};
 pub use message::session_header;
 pub use pool::{Workers, WorkersSpec};

@@ -1,4 +1,4 @@
-//! Workers of one command: started as they are needed, each batch sent to one that is idle.
+//! Workers of one command, started as they are needed; each batch goes to an idle worker.
 
 use std::{
     path::PathBuf,
@@ -15,30 +15,30 @@ use super::{
     process::{Lost, Process},
 };
 use crate::{
-    black_box::source::{Ask, Session, Source, SourceError},
+    black_box::source::{Ask, RecordedSession, Source, SourceError},
     error::ProblemError,
 };
 
-/// The worker for Python objects: how a simulator is called, as the Python package calls it, and the frames around that.
+/// The worker for Python objects: the code that calls a simulator, shared with the Python package, and the code that exchanges frames.
 const SHIM: &str = concat!(include_str!("calling.py"), include_str!("serving.py"));
 
-/// What workers are started by.
+/// How workers are started and run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WorkersSpec {
     /// Program and arguments.
     pub command: Vec<String>,
-    /// Folder that it is started in.
+    /// Folder that the program is started in.
     pub folder: PathBuf,
-    /// Most workers at once, at least 1.
+    /// Greatest number of workers at once, at least 1.
     pub jobs: usize,
-    /// Longest time that one model may take, s; a batch may take as much for each of its models.
+    /// Longest time that one model may take, s; a batch may take that time for each of its models.
     pub deadline_s: f64,
     /// Longest time that a worker may take to say hello and to take the session, s.
     pub start_s: f64,
 }
 
 impl WorkersSpec {
-    /// A command in a folder: one worker, a minute a model, two to begin.
+    /// A command in a folder, with one worker, 60 s for each model and 120 s to begin.
     pub fn new(command: &[&str], folder: impl Into<PathBuf>) -> Self {
         Self {
             command: command.iter().map(|s| (*s).to_owned()).collect(),
@@ -50,12 +50,12 @@ impl WorkersSpec {
     }
 
     /// An object of a Python module, `module:object`, behind the worker that comes with this crate: a function that takes parameters and
-    /// effects as dicts by name, or an object with `simulate(parameters[n, p], effects[n, e])`. Needs python3 with NumPy.
+    /// effects as dicts by name, or an object with `simulate(parameters[n, p], effects[n, e])`. The worker needs python3 with NumPy.
     pub fn python(object: &str, folder: impl Into<PathBuf>) -> Self {
         Self::new(&["python3", "-c", SHIM, object], folder)
     }
 
-    /// The command as it is shown: the program's own text is left out.
+    /// The command for messages, without the text of the worker for Python objects.
     fn shown(&self) -> String {
         let parts = self.command.iter().map(|s| if s == SHIM { "(worker of stretch)" } else { s });
         parts.collect::<Vec<_>>().join(" ")
@@ -64,15 +64,15 @@ impl WorkersSpec {
 
 /// Workers that answer asks.
 ///
-/// A worker that dies, hangs or does not keep to the protocol is started anew and its batch repeated, once; then the source is
-/// [gone](SourceError::Gone), and says what the worker printed last.
+/// A worker that dies, hangs or does not keep to the protocol is started anew, and its batch is repeated once. If the batch fails again, the
+/// source is [gone](SourceError::Gone), and the error holds what the worker printed last.
 #[derive(Debug)]
 pub struct Workers {
     spec: WorkersSpec,
-    session: Session,
+    session: RecordedSession,
     hello: Hello,
-    /// What the first worker said of the session.
-    told: Vec<String>,
+    /// Notes of the first worker on the session.
+    session_notes: Vec<String>,
     crew: Mutex<Crew>,
     free: Condvar,
     restarts: AtomicUsize,
@@ -90,21 +90,21 @@ impl Workers {
     ///
     /// # Errors
     /// A command that cannot be started, a worker that does not say hello or takes another unit than the problem.
-    pub fn start(spec: WorkersSpec, session: &Session) -> Result<Self, ProblemError> {
+    pub fn start(spec: WorkersSpec, session: &RecordedSession) -> Result<Self, ProblemError> {
         let named =
             |why: String| ProblemError::Simulator(format!("simulator {}: {why}", spec.shown()));
         let begun = begin(&spec, session);
-        let (process, hello, told) = begun.map_err(|lost| match lost {
+        let (process, hello, session_notes) = begun.map_err(|lost| match lost {
             Lost::Failed(why) => named(why),
             Lost::Interrupted => named("interrupted".into()),
         })?;
         let crew = Mutex::new(Crew { idle: vec![process], busy: 0 });
         let session = session.clone();
         let (free, restarts) = (Condvar::new(), AtomicUsize::new(0));
-        Ok(Self { spec, session, hello, told, crew, free, restarts })
+        Ok(Self { spec, session, hello, session_notes, crew, free, restarts })
     }
 
-    /// An idle worker, or a new one where there may be more.
+    /// An idle worker, or a new worker where there may be more.
     fn take(&self) -> Result<Process, Lost> {
         let mut crew = self.crew.lock().unwrap_or_else(PoisonError::into_inner);
         loop {
@@ -125,7 +125,7 @@ impl Workers {
         }
     }
 
-    /// A worker that is no longer at work: idle again, or gone.
+    /// Takes a worker back that is no longer at work: it is idle again, or gone.
     fn left(&self, process: Option<Process>) {
         let mut crew = self.crew.lock().unwrap_or_else(PoisonError::into_inner);
         crew.busy -= 1;
@@ -168,15 +168,18 @@ impl Workers {
     }
 }
 
-/// Starts a worker: hello, then the session.
-fn begin(spec: &WorkersSpec, session: &Session) -> Result<(Process, Hello, Vec<String>), Lost> {
+/// Starts a worker and exchanges hello and session with it.
+fn begin(
+    spec: &WorkersSpec,
+    session: &RecordedSession,
+) -> Result<(Process, Hello, Vec<String>), Lost> {
     let mut process = Process::start(&spec.command, &spec.folder).map_err(Lost::Failed)?;
     let most = Duration::from_secs_f64(spec.start_s.max(0.001));
     let frame = process.exchange(message::hello(), most)?;
     let hello = message::read_hello(&frame, session).map_err(|why| process.failed(&why))?;
     let frame = process.exchange(message::session(session), most)?;
-    let told = message::read_ready(&frame).map_err(|why| process.failed(&why))?;
-    Ok((process, hello, told))
+    let notes = message::read_ready(&frame).map_err(|why| process.failed(&why))?;
+    Ok((process, hello, notes))
 }
 
 impl Source for Workers {
@@ -224,6 +227,6 @@ impl Source for Workers {
         let note = format!(
             "a worker of the simulator failed and was started anew {restarts} time(s); its batch was repeated"
         );
-        self.told.iter().cloned().chain((restarts > 0).then_some(note)).collect()
+        self.session_notes.iter().cloned().chain((restarts > 0).then_some(note)).collect()
     }
 }

@@ -1,4 +1,4 @@
-//! One worker: a process that answers frames, and what it printed last.
+//! One worker: a process that answers frames, and the last lines that it printed.
 
 use std::{
     collections::VecDeque,
@@ -13,20 +13,21 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::frame::{Frame, PREFIX, Prefix};
+use super::frame::{PREFIX, Prefix, WorkerFrame};
 
-/// Lines of standard error that are kept, and bytes of each.
+/// Number of lines of standard error that are kept.
 const LINES: usize = 12;
+/// Number of bytes that are kept of each line.
 const LINE_BYTES: usize = 400;
-/// How often an interrupt is looked for while a worker is waited for.
+/// Time between two checks for an interrupt while a worker is waited for.
 const GLANCE: Duration = Duration::from_millis(50);
-/// How long a worker may take to leave.
+/// Longest time that a worker may take to end.
 const LEAVES: Duration = Duration::from_millis(500);
 
 /// Why a worker gave no answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Lost {
-    /// It died, hung, or did not keep to the protocol; what happened.
+    /// The worker died, hung, or did not keep to the protocol; the text says what happened.
     Failed(String),
     /// Somebody asked to stop.
     Interrupted,
@@ -39,7 +40,7 @@ type Last = Arc<Mutex<VecDeque<String>>>;
 pub(super) struct Process {
     child: Child,
     to: Option<Sender<Vec<u8>>>,
-    from: Receiver<Result<Frame, String>>,
+    from: Receiver<Result<WorkerFrame, String>>,
     last: Last,
 }
 
@@ -62,7 +63,7 @@ impl Process {
         let (to, asked) = channel::<Vec<u8>>();
         thread::spawn(move || {
             for bytes in asked {
-                // Its end is seen where its answer is waited for.
+                // The end of the worker is noticed where its answer is waited for.
                 if stdin.write_all(&bytes).and_then(|()| stdin.flush()).is_err() {
                     break;
                 }
@@ -85,7 +86,7 @@ impl Process {
     }
 
     /// Sends a frame and waits for the answer.
-    pub(super) fn exchange(&mut self, bytes: Vec<u8>, most: Duration) -> Result<Frame, Lost> {
+    pub(super) fn exchange(&mut self, bytes: Vec<u8>, most: Duration) -> Result<WorkerFrame, Lost> {
         let sent = self.to.as_ref().is_some_and(|to| to.send(bytes).is_ok());
         if !sent {
             return Err(self.failed("it takes no more requests"));
@@ -110,9 +111,9 @@ impl Process {
         }
     }
 
-    /// What happened, how it ended and what it printed last.
+    /// The error of a worker: what happened, the exit status, and the last lines that the worker printed.
     pub(super) fn failed(&mut self, why: &str) -> Lost {
-        // What it printed as it died may still be under way.
+        // Lines that the worker printed as it died may still be under way.
         let until = Instant::now() + LEAVES;
         let mut ended = None;
         while ended.is_none() && Instant::now() < until {
@@ -157,13 +158,13 @@ impl Drop for Process {
 }
 
 /// The next frame of a stream.
-fn read(from: &mut impl Read) -> Result<Frame, String> {
+fn read(from: &mut impl Read) -> Result<WorkerFrame, String> {
     let mut prefix = [0; PREFIX];
     let mut have = 0;
     while have < PREFIX {
         match from.read(&mut prefix[have..]) {
             Ok(0) if have == 0 => return Err("it closed its standard output".into()),
-            // Whatever came is no frame, and says more than its length.
+            // The bytes that came are no frame, and the parser says more about them than their number does.
             Ok(0) => {
                 return Err(Prefix::parse(&prefix).map_or_else(
                     |e| e.to_string(),
@@ -176,7 +177,7 @@ fn read(from: &mut impl Read) -> Result<Frame, String> {
         }
     }
     let Prefix { header, body } = Prefix::parse(&prefix).map_err(|e| e.to_string())?;
-    // The lengths are only what it says: what is read decides how much memory is taken.
+    // The lengths are the worker's claim: memory is taken only for bytes that arrive.
     let mut part = |bytes: usize| {
         let mut out = Vec::new();
         let read = from.by_ref().take(bytes as u64).read_to_end(&mut out);
@@ -187,7 +188,7 @@ fn read(from: &mut impl Read) -> Result<Frame, String> {
         }
     };
     let (header, body) = (part(header)?, part(body)?);
-    Frame::parse(&header, &body).map_err(|e| e.to_string())
+    WorkerFrame::parse(&header, &body).map_err(|e| e.to_string())
 }
 
 /// Keeps the last lines of a stream.
@@ -196,7 +197,7 @@ fn keep(from: impl Read, last: &Mutex<VecDeque<String>>) {
     let mut line = Vec::new();
     loop {
         line.clear();
-        // A line without an end takes no more memory than is kept of it.
+        // A line without an end takes at most 64 KiB.
         let mut short = lines.by_ref().take(1 << 16);
         match short.read_until(b'\n', &mut line) {
             Ok(0) | Err(_) => return,

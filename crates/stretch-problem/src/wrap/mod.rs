@@ -1,4 +1,4 @@
-//! Wrappers: what may stand in front of or behind a stage that nobody can look into.
+//! Wrappers: effects in front of or behind a stage of a black box.
 //!
 //! A [kind of effect](stretch_effects::Kind) at a place (an input or the output of a stage) is a wrapper.
 

@@ -22,7 +22,7 @@ const FORCES: [&str; 8] = ["N", "kN", "mN", "Nm", "mNm", "N m", "N·m", "kNm"];
 pub(crate) struct Site {
     pub(crate) stage: usize,
     pub(crate) side: Side,
-    /// Which of the stage's inputs.
+    /// Index of the input among the inputs of the stage.
     pub(crate) input: usize,
     pub(crate) column: String,
     pub(crate) unit: String,
@@ -35,31 +35,31 @@ pub(crate) struct Placed {
     pub(crate) site: Site,
     pub(crate) name: String,
     extent: Extent,
-    /// Its parameters but those that are found in the record.
+    /// Its parameters, without those that are found in the recording.
     parameters: Vec<EffectParameter>,
-    /// Values to look for it at.
+    /// Values at which the search begins.
     starts: Vec<Vec<f64>>,
-    /// What it looks at beside the channel, all trials end to end.
+    /// The other channel that the wrapper depends on, all trials end to end.
     beside: Option<Arc<Vec<f64>>>,
     aliases: Vec<String>,
 }
 
-/// What wrappers are placed among.
+/// Columns, stages and kinds among which wrappers are placed.
 pub(crate) struct Among<'a> {
     pub(crate) columns: &'a Columns,
     /// Names of the stages.
     pub(crate) stages: Vec<&'a str>,
-    /// By stage, what it rubs at.
+    /// By stage, the velocity of its rubbing parts.
     pub(crate) velocities: &'a [Option<Velocity>],
-    /// By stage, how many inputs it has.
+    /// By stage, the number of its inputs.
     pub(crate) inputs: Vec<usize>,
-    /// Columns that may talk across.
+    /// Columns that may talk across to a channel.
     pub(crate) others: Vec<String>,
-    /// Kinds of the user's own, which act behind those of the catalogue.
+    /// Kinds of the user's own, which act behind the kinds of the catalogue.
     pub(crate) kinds: &'a [&'static Kind],
 }
 
-/// Wrappers that some patterns ask for, in the order in which they act.
+/// The wrappers that some patterns ask for, in the order in which the wrappers act.
 pub(crate) fn placed(
     sites: &[Site],
     among: &Among<'_>,
@@ -97,7 +97,7 @@ pub(crate) fn placed(
     Ok(all)
 }
 
-/// Why a pattern stands for nothing.
+/// The error for a pattern that stands for no wrapper.
 fn refused(pattern: &str, all: &[Placed], among: &Among<'_>) -> ProblemError {
     let is_friction = ["coulomb_friction", "viscous_friction", "stribeck_friction"]
         .iter()
@@ -129,7 +129,7 @@ fn extent_of(among: &Among<'_>, column: &str) -> Result<Extent, ProblemError> {
     ))
 }
 
-/// A kind on a channel: once, or once for every channel that it may look at.
+/// The wrappers of a kind on a channel: one, or one for every other channel that the kind may depend on.
 fn at(kind: &'static Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Vec<Placed> {
     let own = &site.column;
     let looked = among.columns.looked_at();
@@ -172,7 +172,7 @@ fn at(kind: &'static Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Ve
     }
 }
 
-/// What the side of a channel is called: `input`, the column where there are several, `output`.
+/// The name of a channel's side: `output`, or `input`, or the column where the stage has several inputs.
 fn side(site: &Site, among: &Among<'_>) -> String {
     match site.side {
         Side::Output => "output".to_owned(),
@@ -189,7 +189,7 @@ fn named(site: &Site, among: &Among<'_>, label: &str) -> String {
     }
 }
 
-/// Everything that a user may call it by.
+/// All names by which a user may ask for a wrapper.
 fn aliases(kind: &Kind, site: &Site, among: &Among<'_>, label: &str) -> Vec<String> {
     let is_usual = kind.usual.contains(&site.side);
     let word = if site.side == Side::Input { "input" } else { "output" };
@@ -214,17 +214,17 @@ fn aliases(kind: &Kind, site: &Site, among: &Among<'_>, label: &str) -> Vec<Stri
 }
 
 impl Placed {
-    /// Whether a name or a pattern (`all`) means it.
+    /// Whether a name or a pattern (`all`) stands for the wrapper.
     pub(crate) fn is_called(&self, name: &str) -> bool {
         self.name == name || self.aliases.iter().any(|alias| alias == name)
     }
 
-    /// Its numbers, with their ranges.
+    /// The parameters of the wrapper, with their ranges.
     pub(crate) fn parameters(&self) -> &[EffectParameter] {
         &self.parameters
     }
 
-    /// As an effect of the catalogue.
+    /// The wrapper as an effect of the catalogue.
     pub(crate) fn spec(&self, among: &[Self], stage: &str) -> EffectSpec {
         let parameters = self.parameters.clone();
         let mut spec = EffectSpec::new(&self.name, (self.site.stage, stage), parameters);
@@ -239,12 +239,12 @@ impl Placed {
         spec
     }
 
-    /// Whether it is taken off the channel where it would be added behind the stage.
+    /// Whether the effect is subtracted from the channel: friction is subtracted in front of a stage and added behind it.
     fn is_taken(&self) -> bool {
         self.kind.beside == Beside::Velocity && self.site.side == Side::Input
     }
 
-    /// Leaves out the starts at which it does not show at a sample rate, Hz; says which rate would do where none is left.
+    /// Leaves out the starts at which the wrapper does not show at a sample rate, Hz; gives the least sufficient rate where no start is left.
     fn shown_at(&mut self, rate_hz: f64) -> Option<f64> {
         let mut search = Search { ranges: Vec::new(), starts: std::mem::take(&mut self.starts) };
         let needed = search.at_rate(|values| self.kind.least_rate_hz(values), rate_hz);
@@ -252,7 +252,7 @@ impl Placed {
         needed
     }
 
-    /// How somebody would type it with these values into a simulator sampled every `dt_s`.
+    /// The code of the wrapper with these values, for a simulator that is sampled every `dt_s` seconds.
     pub(crate) fn sketch(&self, values: &[f64], dt_s: f64) -> Option<Sketch> {
         let unit = |unit: &str| if unit.is_empty() { "1".into() } else { unit.to_owned().into() };
         let meaning = match self.site.side {
@@ -273,7 +273,7 @@ impl Placed {
         Some(if self.is_taken() { sketch.then("y = x - (y - x)") } else { sketch })
     }
 
-    /// Acts on a channel of one trial after the other.
+    /// Applies the wrapper to a channel, one trial after the other.
     pub(crate) fn act(&self, values: &[f64], trials: &Trials<'_>, channel: &mut [f64]) {
         if EffectParameter::are_off(&self.parameters, values) {
             return;
@@ -300,7 +300,7 @@ impl Placed {
             };
             operator.begin(start, first, &mut cells);
             let span = Span { start_s: *start_s, strain: beside, ..Span::whole(trials.grid) };
-            // What a stage rubs with is taken off in front of it, and needed behind it.
+            // The friction of a stage is subtracted from the force in front of it, and added to the force behind it.
             let is_taken = self.is_taken();
             let before = is_taken.then(|| signal.to_vec());
             operator.run(&span, &mut cells, signal);
@@ -312,14 +312,14 @@ impl Placed {
     }
 }
 
-/// Trials that operators act on.
+/// The trials that operators act on.
 pub(crate) struct Trials<'a> {
     pub(crate) grid: &'a Grid,
     /// Samples and session time of each, s, from the session's start.
     pub(crate) parts: &'a [(Range<usize>, f64)],
 }
 
-/// Starts with forms that were left out at their usual value, each value within its range.
+/// Starts with every form: a form that was left out has its usual value, and each value lies within its range.
 fn within(parameters: &[EffectParameter], starts: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     let held = |start| {
         let start = EffectParameter::complete(parameters, start);

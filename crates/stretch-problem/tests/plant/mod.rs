@@ -13,8 +13,8 @@ use stretch_gap::{
     Description, Diagnosis, GapError, Knowledge, Options, RandomGenerator, Run, Simulator, diagnose,
 };
 use stretch_problem::{
-    Argument, Ask, BlackBox, Checked, OwnEffect, Parameter, ProblemSpec, Stage, Tolerance, agreed,
-    closure,
+    Argument, Ask, BlackBox, Checked, OwnEffect, Parameter, ProblemSpec, StageEntry, Tolerance,
+    agreed, closure,
 };
 
 const DT_S: f64 = 0.01;
@@ -22,12 +22,12 @@ const SAMPLES: usize = 3000;
 
 /// Command of a trial: steps, ramps and waves.
 fn command(trial: usize) -> Vec<f64> {
-    let mut dice = RandomGenerator::new(40 + trial as u64, 0);
+    let mut random = RandomGenerator::new(40 + trial as u64, 0);
     let (mut held, mut out) = (0.0, Vec::with_capacity(SAMPLES));
     for i in 0..SAMPLES {
         let t = i as f64 * DT_S;
         if i % 130 == 0 {
-            held = (4.0 * dice.gauss()).clamp(-6.0, 6.0);
+            held = (4.0 * random.gauss()).clamp(-6.0, 6.0);
         }
         let wave = 3.0 * (1.1 * t).sin() + 2.0 * (2.9 * t + trial as f64).sin();
         out.push(if (i / 600) % 2 == 0 { held } else { wave });
@@ -63,8 +63,8 @@ fn servo_of(ask: &Ask<'_>, measured: &[f64]) -> Vec<f64> {
 fn recorded(plant: impl Fn(&[f64], f64) -> Vec<f64>) -> Vec<SessionTrial> {
     let one = |trial: usize| {
         let (u, start_s) = (command(trial), 60.0 * trial as f64);
-        let mut dice = RandomGenerator::new(7, trial as u64);
-        let angle = plant(&u, start_s).iter().map(|y| y + 0.02 * dice.gauss()).collect();
+        let mut random = RandomGenerator::new(7, trial as u64);
+        let angle = plant(&u, start_s).iter().map(|y| y + 0.02 * random.gauss()).collect();
         let channel = |name: &str, values| Channel { name: name.into(), values };
         let channels = vec![channel("command_V", u), channel("angle_deg", angle)];
         let time_s = (0..SAMPLES).map(|i| i as f64 * DT_S).collect();
@@ -81,11 +81,11 @@ fn parameter(name: &str, unit: &str, value: f64, tolerance: Tolerance) -> Parame
 
 fn problem(trials: Vec<SessionTrial>, wrap: &[&str]) -> ProblemSpec {
     ProblemSpec {
-        stages: vec![Stage {
+        stages: vec![StageEntry {
             name: "servo".into(),
             output: "angle_deg".into(),
             inputs: vec!["command_V".into()],
-            ..Stage::default()
+            ..StageEntry::default()
         }],
         parameters: vec![
             parameter("gain", "deg/V", 10.0, Tolerance::Relative(0.1)),
@@ -215,7 +215,7 @@ fn a_black_box_is_run_less_than_half_as_often_as_it_is_simulated() {
 /// A mass on a rail that rubs: its force from its recorded motion, the inverse form.
 fn rail(trials: usize) -> Vec<SessionTrial> {
     let one = |trial: usize| {
-        let mut dice = RandomGenerator::new(90, trial as u64);
+        let mut random = RandomGenerator::new(90, trial as u64);
         let at = |t: f64| {
             let phase = trial as f64;
             [
@@ -226,10 +226,10 @@ fn rail(trials: usize) -> Vec<SessionTrial> {
         };
         let time_s: Vec<f64> = (0..SAMPLES).map(|i| i as f64 * DT_S).collect();
         let states: Vec<[f64; 3]> = time_s.iter().map(|t| at(*t)).collect();
-        let position = states.iter().map(|s| s[0] + 1e-6 * dice.gauss()).collect();
+        let position = states.iter().map(|s| s[0] + 1e-6 * random.gauss()).collect();
         let force = states
             .iter()
-            .map(|[_, v, a]| 95.0 * a + 200.0 * v + 20.4 * (v / 1e-3).tanh() + 0.5 * dice.gauss())
+            .map(|[_, v, a]| 95.0 * a + 200.0 * v + 20.4 * (v / 1e-3).tanh() + 0.5 * random.gauss())
             .collect();
         let acceleration = states.iter().map(|s| s[2]).collect();
         let channel = |name: &str, values| Channel { name: name.into(), values };
@@ -249,12 +249,12 @@ fn rail(trials: usize) -> Vec<SessionTrial> {
 #[test]
 fn friction_is_found_from_the_inverse_form_at_a_difference_of_positions() {
     let spec = ProblemSpec {
-        stages: vec![Stage {
+        stages: vec![StageEntry {
             name: "drive".into(),
             output: "force_N".into(),
             inputs: vec!["acceleration".into()],
             position: Some("position_m".into()),
-            ..Stage::default()
+            ..StageEntry::default()
         }],
         parameters: vec![parameter("mass", "kg", 90.0, Tolerance::Relative(0.1))],
         wrap: vec!["output.friction".into(), "output.lag".into(), "output.curve".into()],
@@ -345,30 +345,30 @@ fn wrong_problems_are_refused_with_what_to_do() {
         change(&mut spec);
         Checked::new(spec).unwrap_err().to_string()
     };
-    let told = refused(|s| s.wrap = vec!["output.backlahs".into()]);
+    let error = refused(|s| s.wrap = vec!["output.backlahs".into()]);
     assert!(
-        told.contains("there is no wrapper output.backlahs (did you mean output.backlash?)"),
-        "{told}"
+        error.contains("there is no wrapper output.backlahs (did you mean output.backlash?)"),
+        "{error}"
     );
-    let told = refused(|s| s.wrap = vec!["output.friction".into()]);
-    assert!(told.contains("friction"), "{told}");
-    let told = refused(|s| s.stages[0].output = "angle".into());
-    assert!(told.contains("there is no column angle"), "{told}");
-    let told = refused(|s| s.parameters[2].tolerance = Tolerance::Relative(0.1));
-    assert!(told.contains("parameter zero") && told.contains("absolute tolerance"), "{told}");
-    let told = refused(|s| s.effects[0].arguments[0].off = None);
-    assert!(told.contains("effect brake") && told.contains("give off"), "{told}");
-    let told = refused(|s| s.parameters[0].stages = vec!["gear".into()]);
-    assert!(told.contains("there is no stage gear; there are servo"), "{told}");
+    let error = refused(|s| s.wrap = vec!["output.friction".into()]);
+    assert!(error.contains("friction"), "{error}");
+    let error = refused(|s| s.stages[0].output = "angle".into());
+    assert!(error.contains("there is no column angle"), "{error}");
+    let error = refused(|s| s.parameters[2].tolerance = Tolerance::Relative(0.1));
+    assert!(error.contains("parameter zero") && error.contains("absolute tolerance"), "{error}");
+    let error = refused(|s| s.effects[0].arguments[0].off = None);
+    assert!(error.contains("effect brake") && error.contains("give off"), "{error}");
+    let error = refused(|s| s.parameters[0].stages = vec!["gear".into()]);
+    assert!(error.contains("there is no stage gear; there are servo"), "{error}");
 }
 
 #[test]
 fn what_one_sine_cannot_part_is_told_as_a_family() {
     let sine = |t: f64| 5.0 * (2.0 * t).sin();
     let one = |trial: usize| {
-        let mut dice = RandomGenerator::new(5, trial as u64);
+        let mut random = RandomGenerator::new(5, trial as u64);
         let time_s: Vec<f64> = (0..SAMPLES).map(|i| i as f64 * DT_S).collect();
-        let late = |t: &f64| 3.0 * sine(t - 0.12) + 0.02 * dice.gauss();
+        let late = |t: &f64| 3.0 * sine(t - 0.12) + 0.02 * random.gauss();
         let channel = |name: &str, values| Channel { name: name.into(), values };
         let shown = time_s.iter().map(late).collect();
         let rod = time_s.iter().map(|t| sine(*t)).collect();
@@ -377,11 +377,11 @@ fn what_one_sine_cannot_part_is_told_as_a_family() {
         SessionTrial::new(trial)
     };
     let spec = ProblemSpec {
-        stages: vec![Stage {
+        stages: vec![StageEntry {
             name: "sensor".into(),
             output: "shown_mm".into(),
             inputs: vec!["rod_mm".into()],
-            ..Stage::default()
+            ..StageEntry::default()
         }],
         parameters: vec![parameter("gain", "1", 3.0, Tolerance::Relative(0.1))],
         wrap: vec!["output.skew".into(), "output.lag".into(), "output.curve".into()],

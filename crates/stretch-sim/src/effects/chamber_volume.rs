@@ -1,14 +1,14 @@
 //! The chamber grows as the muscle contracts.
 
 use stretch_effects::{
-    Action, Acts, Effect, EffectParameter, Form, Law, Quantity, Sketch, Stage, each,
+    Action, Acts, Effect, EffectParameter, Form, Law, Quantity, RigStage, Sketch, each,
 };
 
 /// The chamber grows as the muscle contracts.
 pub(super) static CHAMBER_VOLUME: Effect = Effect {
     name: "chamber_volume",
     words: "the chamber's volume grows as the muscle contracts",
-    stage: Stage::Pneumatics,
+    stage: RigStage::Pneumatics,
     equation: "V = V0 (1 + g y (1 + bend (1 - y))), y = k/k_max, with the p dV/dt term",
     parameters: &[
         EffectParameter::strength("g", "1", 0.0, 3.0, 1.0),

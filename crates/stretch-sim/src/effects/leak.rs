@@ -1,14 +1,14 @@
 //! Air leaks out of the chamber.
 
 use stretch_effects::{
-    Action, Acts, Effect, EffectParameter, Form, Law, Quantity, Sketch, Stage, each,
+    Action, Acts, Effect, EffectParameter, Form, Law, Quantity, RigStage, Sketch, each,
 };
 
 /// Air leaks out of the chamber.
 pub(super) static LEAK: Effect = Effect {
     name: "leak",
     words: "air leaks from the chamber",
-    stage: Stage::Pneumatics,
+    stage: RigStage::Pneumatics,
     equation: "q_leak = c p (p/620 kPa)^(power - 1), p above the atmosphere",
     parameters: &[
         EffectParameter::strength("c", "kg/(s Pa)", 0.0, 2e-10, 5e-11),

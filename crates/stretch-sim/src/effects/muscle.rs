@@ -1,7 +1,7 @@
 //! What the muscle and the crossbeam that it lifts do: kinds at the places of the muscle.
 
 use stretch_effects::{
-    Acts, Effect, EffectParameter, Form, Place, Stage, each,
+    Acts, Effect, EffectParameter, Form, Place, RigStage, each,
     kinds::{HYSTERESIS, RELAXATION, SECOND_ORDER_LAG},
     pairs,
 };
@@ -10,7 +10,7 @@ use stretch_effects::{
 pub(super) static MUSCLE_HYSTERESIS: Effect = Effect {
     name: "muscle_hysteresis",
     words: "the muscle follows another path on the way back",
-    stage: Stage::Muscle,
+    stage: RigStage::Muscle,
     equation: "k_s -> k_s - h mean of (k_s - play(k_s, s {spread^2, spread, 1}))",
     parameters: &[
         EffectParameter::strength("h", "1", 0.0, 0.6, 0.2),
@@ -27,7 +27,7 @@ pub(super) static MUSCLE_HYSTERESIS: Effect = Effect {
 pub(super) static MUSCLE_CREEP: Effect = Effect {
     name: "muscle_creep",
     words: "the muscle creeps on after the pressure has settled",
-    stage: Stage::Muscle,
+    stage: RigStage::Muscle,
     equation: "k_s -> k_s + c (mean of mean_rev(k_s, tau {1/spread, 1, spread}) - k_s)",
     parameters: &[
         EffectParameter::strength("c", "1", 0.0, 0.3, 0.1),
@@ -44,7 +44,7 @@ pub(super) static MUSCLE_CREEP: Effect = Effect {
 pub(super) static CROSSBEAM_INERTIA: Effect = Effect {
     name: "crossbeam_inertia",
     words: "the crossbeam's mass overshoots and rings",
-    stage: Stage::Muscle,
+    stage: RigStage::Muscle,
     equation: "k'' = (k_lag - k)/m^2 - 2 damping k'/m behind the lag: natural frequency 1/(2 pi m)",
     parameters: &[
         EffectParameter::strength("m", "s", 0.0, 0.08, 0.02),

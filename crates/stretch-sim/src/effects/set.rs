@@ -1,7 +1,7 @@
 //! Effects that are on, with their values.
 
 use stretch_data::EffectEntry;
-use stretch_effects::{Action, Effect, EffectParameter, Grid, Role, Stage, Surroundings};
+use stretch_effects::{Action, Effect, EffectParameter, Grid, RigStage, Role, Surroundings};
 
 use super::{CATALOGUE, effect_named};
 use crate::{SimError, nearest::nearest, params::RigParams};
@@ -188,7 +188,7 @@ impl EffectSet {
     }
 
     /// Those that do something in the stage.
-    pub fn acting_in(&self, stage: Stage) -> impl Iterator<Item = &ActiveEffect> {
+    pub fn acting_in(&self, stage: RigStage) -> impl Iterator<Item = &ActiveEffect> {
         self.entries.iter().filter(move |e| stage.holds(e.effect.stage) && !e.is_off())
     }
 
@@ -200,7 +200,7 @@ impl EffectSet {
         let whole = Grid::samples(dt_s)?;
         let around = params.surroundings(&whole);
         let mut delay_s = 0.0;
-        for active in self.acting_in(Stage::Pneumatics) {
+        for active in self.acting_in(RigStage::Pneumatics) {
             if let Action::Delay(seconds) = active.action(&around) {
                 delay_s += seconds;
             }

@@ -1,14 +1,14 @@
 //! The supply gives way to the flow that is drawn from it.
 
 use stretch_effects::{
-    Action, Acts, Droop, Effect, EffectParameter, Form, Quantity, Sketch, Stage, each,
+    Action, Acts, Droop, Effect, EffectParameter, Form, Quantity, RigStage, Sketch, each,
 };
 
 /// The supply gives way to the flow that is drawn from it.
 pub(super) static SUPPLY_SAG: Effect = Effect {
     name: "supply_sag",
     words: "the supply pressure sags while air is drawn",
-    stage: Stage::Pneumatics,
+    stage: RigStage::Pneumatics,
     equation: "P_s -> P_s - y, y = mean_rev(r q_in, lag_s)",
     parameters: &[
         EffectParameter::strength("r", "Pa s/kg", 0.0, 4e8, 1e8),

@@ -1,14 +1,14 @@
 //! The valves stay shut up to a least command.
 
 use stretch_effects::{
-    Action, Acts, DeadBand, Effect, EffectParameter, Form, Quantity, Sketch, Stage, each,
+    Action, Acts, DeadBand, Effect, EffectParameter, Form, Quantity, RigStage, Sketch, each,
 };
 
 /// The valves stay shut up to a least command.
 pub(super) static VALVE_DEADBAND: Effect = Effect {
     name: "valve_deadband",
     words: "the valves stay shut at small openings",
-    stage: Stage::Pneumatics,
+    stage: RigStage::Pneumatics,
     equation: "u -> max(0, (u - d(u))/(1 - d(1))), d(u) = u_db (1 - exp(-u/(u_db softness))) before u_eff; conductance times 1 - exp(-u/(u_db gate)); u_db times outlet at the outlet, times 2 - outlet at the inlet",
     parameters: &[
         EffectParameter::strength("u_db", "1", 0.0, 0.11, 0.03),

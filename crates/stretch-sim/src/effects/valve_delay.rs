@@ -1,12 +1,12 @@
 //! The valves act late.
 
-use stretch_effects::{Action, Acts, Effect, EffectParameter, Quantity, Sketch, Stage, each};
+use stretch_effects::{Action, Acts, Effect, EffectParameter, Quantity, RigStage, Sketch, each};
 
 /// The valves act late.
 pub(super) static VALVE_DELAY: Effect = Effect {
     name: "valve_delay",
     words: "the valves act late",
-    stage: Stage::Pneumatics,
+    stage: RigStage::Pneumatics,
     equation: "u(t) -> u(t - delay_s)",
     parameters: &[EffectParameter::strength("delay_s", "s", 0.0, 0.12, 0.03)],
     acts: Acts::Own {
@@ -18,7 +18,7 @@ pub(super) static VALVE_DELAY: Effect = Effect {
     ..Effect::PLAIN
 };
 
-/// What a valve is told at a time.
+/// The command of a valve at a time.
 fn sketch(delay_s: f64, dt_s: f64) -> Sketch {
     let body = "let k = floor((t - DELAY) / DT)
         var y = 0

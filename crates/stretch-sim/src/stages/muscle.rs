@@ -1,6 +1,6 @@
 //! Stage `muscle`: chamber pressure to length.
 
-use stretch_effects::{Action, Grid, MeanReversion, Row, Span, Stage, Start};
+use stretch_effects::{Action, Grid, MeanReversion, RigStage, Row, Span, Start};
 
 use super::check_length;
 use crate::{
@@ -43,7 +43,7 @@ impl Muscle {
     ) -> Result<Self, SimError> {
         let around = params.surroundings(grid);
         let (mut before, mut behind) = (Vec::new(), Vec::new());
-        for active in effects.acting_in(Stage::Muscle) {
+        for active in effects.acting_in(RigStage::Muscle) {
             match active.action(&around) {
                 Action::StaticContraction(operator) => before.push(operator),
                 Action::MovingContraction(operator) => behind.push(operator),
@@ -118,8 +118,8 @@ impl Muscle {
     pub(crate) fn begin(&self, cells: &mut [f64], start: Start, pressure_kpa: f64) -> f64 {
         let span = self.span(0);
         let still = self.before.begin(&span, start, self.law.contraction(pressure_kpa), cells);
-        // The lag itself is never wound: it settles within a fifth of a second.
-        let lag_start = if matches!(start, Start::Wound(_)) { Start::Settled } else { start };
+        // The lag has no hysteresis state: it settles within a fifth of a second.
+        let lag_start = if matches!(start, Start::Hysteresis(_)) { Start::Settled } else { start };
         self.lag.begin(lag_start, still, &mut cells[self.offset..]);
         let moving = cells[self.offset];
         self.behind.begin(&span, start, moving, cells)

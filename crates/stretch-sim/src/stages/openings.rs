@@ -1,4 +1,4 @@
-//! What the valves are told.
+//! The commands of the valves.
 
 use super::check_length;
 use crate::SimError;

@@ -1,6 +1,6 @@
 //! Stage `pneumatics`: openings of the valves to chamber pressure.
 
-use stretch_effects::{Action, Droop, Grid, Law, Row, Span, Stage, Start};
+use stretch_effects::{Action, Droop, Grid, Law, RigStage, Row, Span, Start};
 
 use super::{check_length, openings::Openings};
 use crate::{
@@ -71,7 +71,7 @@ impl Pneumatics {
         let [mut inlet, mut outlet] = [const { Vec::new() }; 2];
         let mut droops: Vec<Box<dyn Droop>> = Vec::new();
         let (mut delay_s, mut coupled_by) = (0.0, None);
-        for active in effects.acting_in(Stage::Pneumatics) {
+        for active in effects.acting_in(RigStage::Pneumatics) {
             match active.action(&around) {
                 Action::Delay(seconds) => delay_s += seconds,
                 Action::Commands([of_inlet, of_outlet]) => {

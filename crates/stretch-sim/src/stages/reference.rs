@@ -1,6 +1,6 @@
 //! Stage `reference`: true length to the length that the potentiometer shows.
 
-use stretch_effects::{Action, Grid, Row, Span, Stage, Start, Surroundings};
+use stretch_effects::{Action, Grid, RigStage, Row, Span, Start, Surroundings};
 
 use super::{check_length, sensing::pick};
 use crate::{SimError, effects::EffectSet, memory::Memory, params::RigParams};
@@ -23,7 +23,7 @@ impl Reference {
 
     pub(crate) fn around(around: &Surroundings<'_>, effects: &EffectSet, grid: &Grid) -> Self {
         let row = effects
-            .acting_in(Stage::Reference)
+            .acting_in(RigStage::Reference)
             .filter_map(|active| match active.action(around) {
                 Action::Length(operator) => Some(operator),
                 _ => None,

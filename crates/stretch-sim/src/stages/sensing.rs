@@ -1,6 +1,8 @@
 //! Stage `sensing`: length to bridge voltage.
 
-use stretch_effects::{Action, Grid, Need, Row, Skew, SkewSpec, Span, Stage, Start, Surroundings};
+use stretch_effects::{
+    Action, Grid, Need, RigStage, Row, Skew, SkewSpec, Span, Start, Surroundings,
+};
 
 use super::check_length;
 use crate::{
@@ -85,7 +87,7 @@ impl Sensing {
     /// None for the catalogue's effects.
     pub fn new(params: &RigParams, effects: &EffectSet, grid: &Grid) -> Result<Self, SimError> {
         let around = params.surroundings(grid);
-        let sites = Sites::new(effects.acting_in(Stage::Sensing), &around);
+        let sites = Sites::new(effects.acting_in(RigStage::Sensing), &around);
         Ok(Self {
             grid: grid.clone(),
             bridge: Bridge::new(params),
@@ -95,7 +97,7 @@ impl Sensing {
             volts: sites.volts,
             record: sites.record,
             needs_pressure: effects
-                .acting_in(Stage::Sensing)
+                .acting_in(RigStage::Sensing)
                 .find(|e| e.effect().needs == Some(Need::Pressure))
                 .map(|e| e.name()),
         })

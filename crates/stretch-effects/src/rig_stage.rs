@@ -4,7 +4,7 @@ use core::fmt;
 
 /// A stage of the rig: what is simulated alone on a measured input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Stage {
+pub enum RigStage {
     /// Openings to pressure.
     Pneumatics,
     /// Pressure to length.
@@ -17,7 +17,7 @@ pub enum Stage {
     Reference,
 }
 
-impl Stage {
+impl RigStage {
     /// All of them.
     pub const ALL: [Self; 5] =
         [Self::Pneumatics, Self::Muscle, Self::Actuation, Self::Sensing, Self::Reference];
@@ -40,7 +40,7 @@ impl Stage {
     }
 }
 
-impl fmt::Display for Stage {
+impl fmt::Display for RigStage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
     }

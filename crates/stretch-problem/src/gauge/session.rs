@@ -1,4 +1,4 @@
-//! The measured trials of a gauge alone: two columns, evenly sampled, and what was noticed of them.
+//! The measured trials of a gauge alone: two columns, evenly sampled, and what was noticed of the trials.
 
 use std::ops::Range;
 
@@ -17,13 +17,13 @@ const SHORTEST: usize = 100;
 /// Column of the pressure.
 const PRESSURE: &str = "pressure_kpa";
 
-/// All trials end to end.
+/// The measured session of a gauge alone; columns hold all trials end to end.
 #[derive(Debug)]
-pub(super) struct Record {
+pub(super) struct GaugeSession {
     pub(super) trials: Vec<TrialSpec>,
     pub(super) reference: Vec<f64>,
     pub(super) signal: Vec<f64>,
-    /// Empty unless every trial has one.
+    /// Empty unless every trial has a pressure column.
     pub(super) pressure: Vec<f64>,
     pub(super) is_lost: Vec<bool>,
     pub(super) dt_s: f64,
@@ -31,7 +31,9 @@ pub(super) struct Record {
     pub(super) notes: Vec<String>,
 }
 
-impl Record {
+impl GaugeSession {
+    /// Reads two columns of some trials, and the pressure where every trial has one.
+    ///
     /// # Errors
     /// Columns that are missing, dead or hold what is no number, rates that differ, too little to fit.
     pub(super) fn read(
@@ -60,7 +62,7 @@ impl Record {
             start_s: trial.start_s(),
             is_test: trial.is_test(),
         };
-        let mut record = Self {
+        let mut own = Self {
             trials: session.trials().iter().map(spec).collect(),
             reference: all(0),
             signal: all(1),
@@ -70,11 +72,11 @@ impl Record {
             rows: session.rows(),
             notes: session.notes().to_vec(),
         };
-        record.check(reference, signal)?;
-        Ok(record)
+        own.check(reference, signal)?;
+        Ok(own)
     }
 
-    /// Samples that may be looked at before the end.
+    /// Samples that are not tested on.
     pub(super) fn fitted(&self) -> impl Iterator<Item = Range<usize>> {
         let mut begin = 0;
         self.trials.iter().zip(Frame::not_tested(&self.trials)).filter_map(move |(t, fit)| {
@@ -84,7 +86,7 @@ impl Record {
         })
     }
 
-    /// Least and greatest of a column over the trials that are fitted.
+    /// Least and greatest value of a column over the trials that are fitted.
     pub(super) fn range(&self, values: &[f64]) -> (f64, f64) {
         ends(self.fitted().flat_map(|r| &values[r]))
     }

@@ -1,65 +1,67 @@
-//! Wild values: single samples that no motion explains.
+//! Isolated outliers: gross errors of single samples, which no motion explains.
 //!
-//! A sample is held against the cubic through its four neighbours,
+//! A sample is compared with the cubic through its four neighbours,
 //!
 //! ```text
 //! d_i = x_i - (-x_(i-2) + 4 x_(i-1) + 4 x_(i+1) - x_(i+2))/6
 //! ```
 //!
-//! It is wild where |d_i| is more than eight deviations of the record's own d and half of what the record moves on either side, and more
-//! than d is beside it: a kink and a step of the motion are neither. A wild value gives way to the cubic.
+//! The sample is an outlier where |d_i| is more than eight standard deviations of the recording's own d plus half of what the recording moves
+//! on either side, and more than 1.25 times |d| of either neighbour: a kink and a step of the motion are no outliers. The cubic replaces an outlier.
 
 use stretch_data::SessionTrial;
 
-/// Deviations beyond which a sample is wild.
-const WILD: f64 = 8.0;
-/// Share of the motion on either side that a kink stays below: a third of it.
+/// Standard deviations beyond which a sample is an outlier.
+const OUTLIER: f64 = 8.0;
+/// Share of the motion on either side that is added to the limit: a kink gives a third of that motion.
 const KINK: f64 = 0.5;
-/// Ratio to the neighbours' that a step stays below: 1, where a single value has 3/2.
+/// Ratio of |d| to that of a neighbour beyond which a sample is an outlier: a step gives 1, a single value 3/2.
 const STEP: f64 = 1.25;
 
 /// Measured columns of a rig.
 const MEASURED: [&str; 3] = ["pressure_kpa", "length_mm", "bridge_v"];
 
-/// Trials with the wild values of their measured columns replaced, and a sentence for each column that had some.
-pub(crate) fn tamed(trials: &[SessionTrial]) -> (Vec<SessionTrial>, Vec<String>) {
+/// Trials with the isolated outliers of their measured columns replaced, and a sentence for each column that had some.
+pub(crate) fn without_isolated_outliers(
+    trials: &[SessionTrial],
+) -> (Vec<SessionTrial>, Vec<String>) {
     let mut trials = trials.to_vec();
     let mut notes = Vec::new();
     for name in MEASURED {
         let channels = trials.iter_mut().flat_map(|t| &mut t.trial.channels);
         let own = channels.filter(|channel| channel.name == name);
-        let count: usize = own.map(|channel| tame(&mut channel.values)).sum();
+        let count: usize = own.map(|channel| replace_outliers(&mut channel.values)).sum();
         if count > 0 {
             notes.push(format!(
-                "{count} wild values of {name} were replaced by what lies on either side"
+                "{count} isolated outliers of {name} were replaced by interpolation between their neighbours"
             ));
         }
     }
     (trials, notes)
 }
 
-/// Replaces the wild values of a channel; how many there were.
-fn tame(values: &mut [f64]) -> usize {
+/// Replaces the isolated outliers of a channel and gives their number.
+fn replace_outliers(values: &mut [f64]) -> usize {
     let off: Vec<f64> =
         values.windows(5).map(|x| x[2] - (4.0 * (x[1] + x[3]) - x[0] - x[4]) / 6.0).collect();
     let Some(sd) = deviation(&off) else { return 0 };
-    let mut wild = Vec::new();
+    let mut outliers = Vec::new();
     for i in 1..off.len().saturating_sub(1) {
         let x = &values[i..i + 5];
         let motion = (x[1] - x[0]).abs().max((x[4] - x[3]).abs());
         let beside = off[i - 1].abs().max(off[i + 1].abs());
         let size = off[i].abs();
-        if size > WILD * sd + KINK * motion && size > STEP * beside {
-            wild.push(i);
+        if size > OUTLIER * sd + KINK * motion && size > STEP * beside {
+            outliers.push(i);
         }
     }
-    for &i in &wild {
+    for &i in &outliers {
         values[i + 2] -= off[i];
     }
-    wild.len()
+    outliers.len()
 }
 
-/// Standard deviation from the median size, 0.6745 of it for a normal variable; none where most are 0.
+/// Standard deviation from the median size, which is 0.6745 standard deviations of a normal variable; none where most values are 0.
 fn deviation(off: &[f64]) -> Option<f64> {
     let mut sizes: Vec<f64> = off.iter().map(|d| d.abs()).collect();
     let middle = sizes.len() / 2;
@@ -77,21 +79,21 @@ mod tests {
 
     /// Ramps with kinks and a step, in noise.
     fn motion() -> Vec<f64> {
-        let mut dice = RandomGenerator::new(3, 0);
+        let mut random = RandomGenerator::new(3, 0);
         let ramp =
             |i: usize| if i % 200 < 100 { (i % 200) as f64 } else { 200.0 - (i % 200) as f64 };
         (0..4000)
-            .map(|i| ramp(i) + f64::from(u8::from(i > 2050)) * 50.0 + 0.1 * dice.gauss())
+            .map(|i| ramp(i) + f64::from(u8::from(i > 2050)) * 50.0 + 0.1 * random.gauss())
             .collect()
     }
 
     #[test]
     fn kinks_steps_and_noise_are_left_alone() {
         let mut values = motion();
-        assert_eq!(tame(&mut values), 0);
+        assert_eq!(replace_outliers(&mut values), 0);
         assert_eq!(values, motion());
-        assert_eq!(tame(&mut vec![1.0; 100]), 0);
-        assert_eq!(tame(&mut [1.0, 2.0]), 0);
+        assert_eq!(replace_outliers(&mut vec![1.0; 100]), 0);
+        assert_eq!(replace_outliers(&mut [1.0, 2.0]), 0);
     }
 
     #[test]
@@ -101,7 +103,7 @@ mod tests {
         for (place, size) in places.into_iter().zip([5.0, -3.0, 20.0, 1e6]) {
             values[place] += size;
         }
-        assert_eq!(tame(&mut values), places.len());
+        assert_eq!(replace_outliers(&mut values), places.len());
         for (value, clean) in values.iter().zip(motion()) {
             approx::assert_abs_diff_eq!(*value, clean, epsilon = 0.5);
         }

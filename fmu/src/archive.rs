@@ -107,7 +107,7 @@ fn described(file: &Path, folder: &Path) -> Result<Model, FmuError> {
     if !path.is_file() {
         return Err(fail("there is none".into()));
     }
-    let told = |e: ModelDescriptionError| match e {
+    let refused = |e: ModelDescriptionError| match e {
         ModelDescriptionError::UnsupportedVersion(version)
         | ModelDescriptionError::UnknownVersion(version) => {
             FmuError::Version { file: file.to_owned(), version }
@@ -115,9 +115,9 @@ fn described(file: &Path, folder: &Path) -> Result<Model, FmuError> {
         ModelDescriptionError::Io(e) => fail(e.to_string()),
         e => fail(e.to_string()),
     };
-    let model = match model_description::peek_fmi_major_version(&path).map_err(told)? {
-        FMIMajorVersion::V2 => Model::of_fmi2(&Description2::from_path(&path).map_err(told)?),
-        FMIMajorVersion::V3 => Model::of_fmi3(&Description3::from_path(&path).map_err(told)?),
+    let model = match model_description::peek_fmi_major_version(&path).map_err(refused)? {
+        FMIMajorVersion::V2 => Model::of_fmi2(&Description2::from_path(&path).map_err(refused)?),
+        FMIMajorVersion::V3 => Model::of_fmi3(&Description3::from_path(&path).map_err(refused)?),
     };
     let model = model.ok_or_else(|| FmuError::Exchange { file: file.to_owned() })?;
     // The identifier becomes a part of a path.

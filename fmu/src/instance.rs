@@ -73,7 +73,7 @@ impl Said {
     }
 
     /// As the end of a sentence; empty where nothing was said.
-    fn told(&self) -> String {
+    fn text(&self) -> String {
         let said = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         said.as_ref().map_or(String::new(), |said| format!("; it says: {said}"))
     }
@@ -195,7 +195,7 @@ impl Instance {
 
     /// What a status means for the run.
     fn checked(&mut self, call: &str, status: Status) -> Result<(), Stopped> {
-        let said = self.said.told();
+        let said = self.said.text();
         match status {
             Status::Fine => Ok(()),
             Status::Discard => Err(Stopped::Refused(format!("{call} answers discard{said}"))),
@@ -309,7 +309,7 @@ impl Instance {
         self.checked(&at(), status)?;
         if is_over || is_early {
             let how = if is_over { "ends the simulation" } else { "returns early" };
-            let said = self.said.told();
+            let said = self.said.text();
             return Err(Stopped::Refused(format!("{} {how} at {reached_s:.6} s{said}", at())));
         }
         Ok(())
@@ -340,7 +340,7 @@ fn not_made(fmu: &Fmu, error: SimulationError, said: &Said) -> FmuError {
                 true => "; it needs the program that it was exported from, installed and licensed",
                 false => "",
             };
-            FmuError::Instance { file, said: said.told() + tool }
+            FmuError::Instance { file, said: said.text() + tool }
         }
         other => FmuError::Instance { file, said: format!(": {other}") },
     }

@@ -33,9 +33,9 @@ fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Asked, String> {
     let (mut file, mut names, mut describes) = (None, Names::default(), false);
     while let Some(argument) = arguments.next() {
         let mut pair = |into: &mut std::collections::BTreeMap<String, String>| {
-            let told = arguments.next().ok_or_else(|| format!("{argument} needs NAME=VALUE"))?;
+            let pair = arguments.next().ok_or_else(|| format!("{argument} needs NAME=VALUE"))?;
             let (name, value) =
-                told.split_once('=').ok_or_else(|| format!("{told:?} is not NAME=VALUE"))?;
+                pair.split_once('=').ok_or_else(|| format!("{pair:?} is not NAME=VALUE"))?;
             into.insert(name.to_owned(), value.to_owned());
             Ok::<(), String>(())
         };
@@ -79,7 +79,7 @@ fn run() -> Result<(), String> {
             };
             match serve(io::stdin().lock(), to, begin) {
                 Ok(()) => Ok(()),
-                // It was told where it is read; twice would be once too often.
+                // The other side has this error already and reports it.
                 Err(ServeError::Simulator(_)) => std::process::exit(1),
                 Err(error) => Err(error.to_string()),
             }

@@ -11,7 +11,7 @@ use stretch_problem::{
 /// Version of the protocol.
 const VERSION: u64 = 1;
 
-/// Why a worker ends before it is told to.
+/// Why a worker ends before it is asked to end.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ServeError {
@@ -35,7 +35,7 @@ fn wrong(what: &str) -> ServeError {
 
 /// Answers frames until the other side says bye or is gone; `begin` makes the simulator of a session.
 ///
-/// What will not do is told to the other side before this ends.
+/// Errors are sent to the other side before the worker ends.
 ///
 /// # Errors
 /// What cannot be read or written, and simulators that do not begin or are gone.
@@ -50,8 +50,8 @@ where
 {
     let ended = answer(&mut from, &mut to, begin);
     if let Err(error @ (ServeError::Simulator(_) | ServeError::Protocol(_))) = &ended {
-        let told = json!({ "kind": "error", "message": error.to_string() });
-        to.write_all(&WorkerFrame::bytes(&told, &[]))?;
+        let message = json!({ "kind": "error", "message": error.to_string() });
+        to.write_all(&WorkerFrame::bytes(&message, &[]))?;
         to.flush()?;
     }
     ended

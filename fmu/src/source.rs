@@ -54,10 +54,10 @@ impl FmuSource {
         let mut out = vec![0.0; stages * samples];
         for trial in &self.session.trials[..ask.trials] {
             self.run(trial, &values, &inputs, &mut out, samples).map_err(|stopped| {
-                let told = |why: String| format!("trial {}: {why}", trial.name);
+                let in_trial = |why: String| format!("trial {}: {why}", trial.name);
                 match stopped {
-                    Stopped::Refused(why) => SourceError::Refused(told(why)),
-                    Stopped::Fatal(why) => SourceError::Gone(told(why)),
+                    Stopped::Refused(why) => SourceError::Refused(in_trial(why)),
+                    Stopped::Fatal(why) => SourceError::Gone(in_trial(why)),
                 }
             })?;
         }
@@ -96,15 +96,15 @@ impl FmuSource {
         instance.set(set, values)?;
         instance.begin()?;
         let mut now = vec![0.0; inputs.len()];
-        let mut told = vec![0.0; outputs.len()];
+        let mut current = vec![0.0; outputs.len()];
         for (i, sample) in trial.samples.clone().enumerate() {
             now.iter_mut().zip(inputs).for_each(|(now, column)| *now = column[sample]);
             instance.set(inputs_at, &now)?;
             if i == 0 {
                 instance.begun()?;
             }
-            instance.read(outputs, &mut told)?;
-            told.iter().enumerate().for_each(|(stage, x)| out[stage * samples + sample] = *x);
+            instance.read(outputs, &mut current)?;
+            current.iter().enumerate().for_each(|(stage, x)| out[stage * samples + sample] = *x);
             if sample + 1 < trial.samples.end {
                 instance.step(i as f64 * dt_s, dt_s)?;
             }

@@ -120,8 +120,8 @@ class Simulator:
 
     def simulate(self, params, effects):
         """Both joints of n arms."""
-        told = [self.one(row, {name: effects[name][i] for name in CATALOGUE}) for i, row in enumerate(np.asarray(params))]
-        return {"shoulder_rad": np.array([t[0] for t in told]), "elbow_rad": np.array([t[1] for t in told])}
+        answers = [self.one(row, {name: effects[name][i] for name in CATALOGUE}) for i, row in enumerate(np.asarray(params))]
+        return {"shoulder_rad": np.array([t[0] for t in answers]), "elbow_rad": np.array([t[1] for t in answers])}
 
     def one(self, params, e):
         """Both joints of one arm."""

@@ -1,4 +1,4 @@
-//! Calibrations: made, applied, judged.
+//! Calibrations are made, applied and evaluated here.
 
 use std::path::PathBuf;
 
@@ -25,11 +25,11 @@ use crate::{
 /// A calibration record.
 #[pyclass(frozen, module = "stretch")]
 #[derive(Debug)]
-pub(crate) struct Record {
+pub(crate) struct CalibrationRecord {
     calibration: Calibration,
 }
 
-/// What is chosen about a calibration, by the names of the package.
+/// Options of a calibration, under the names of the package.
 #[derive(Debug, FromPyObject)]
 pub(crate) struct Choices {
     #[pyo3(item)]
@@ -57,7 +57,7 @@ pub(crate) struct Choices {
 }
 
 impl Choices {
-    /// As Rust takes them; no model where it is to be chosen.
+    /// The options as Rust takes them; no model where the model is to be chosen.
     fn options(&self) -> PyResult<(Options, Option<ModelKind>)> {
         let base = if self.paper { Options::paper() } else { Options::default() };
         let model = match self.model.as_str() {
@@ -93,7 +93,7 @@ impl Choices {
     }
 }
 
-/// What there is to say of a calibration that was just made.
+/// The fits, models and notes of a calibration that was just made.
 #[derive(Serialize)]
 struct Made<'a> {
     model: String,
@@ -102,13 +102,13 @@ struct Made<'a> {
     notes: &'a [String],
 }
 
-/// Fits a calibration; with the record comes what there is to say of the fit, as JSON.
+/// Fits a calibration; beside the record stand fits, models and notes as JSON.
 #[pyfunction]
 pub(crate) fn calibrate(
     py: Python<'_>,
     recordings: Vec<Recording<'_>>,
     choices: Choices,
-) -> PyResult<(Record, String)> {
+) -> PyResult<(CalibrationRecord, String)> {
     let trials = trials(&recordings);
     let (mut options, model) = choices.options()?;
     let work = move || -> Result<_, CalibrateError> {
@@ -129,15 +129,15 @@ pub(crate) fn calibrate(
         });
         Ok((made.calibration, said))
     };
-    let (calibration, told) = watched(py, work)?.map_err(said)?;
-    Ok((Record { calibration }, told.map_err(said)?))
+    let (calibration, made) = watched(py, work)?.map_err(said)?;
+    Ok((CalibrationRecord { calibration }, made.map_err(said)?))
 }
 
-/// Judges calibrations beside the raw signal; the answer is JSON.
+/// Evaluates calibrations beside the raw signal; the answer is JSON.
 #[pyfunction]
 pub(crate) fn evaluate(
     py: Python<'_>,
-    calibrations: Vec<(String, PyRef<'_, Record>)>,
+    calibrations: Vec<(String, PyRef<'_, CalibrationRecord>)>,
     recordings: Vec<Recording<'_>>,
 ) -> PyResult<String> {
     let trials = trials(&recordings);
@@ -152,25 +152,25 @@ pub(crate) fn evaluate(
 }
 
 #[pymethods]
-impl Record {
-    /// From the JSON that `stretch calibrate` writes.
+impl CalibrationRecord {
+    /// Reads the JSON that `stretch calibrate` writes.
     #[staticmethod]
     fn from_json(text: &str) -> PyResult<Self> {
         Ok(Self { calibration: calibration_from_json(text, "the text").map_err(said)? })
     }
 
-    /// From a file: postcard where its name ends in `.postcard`, else JSON.
+    /// Reads a file: postcard where its name ends in `.postcard`, else JSON.
     #[staticmethod]
     fn load(path: PathBuf) -> PyResult<Self> {
         Ok(Self { calibration: read_calibration(&path).map_err(said)? })
     }
 
-    /// Into a file, whole or not at all.
+    /// Writes a file, whole or not at all.
     fn save(&self, path: PathBuf) -> PyResult<()> {
         write_calibration(&path, &self.calibration).map_err(said)
     }
 
-    /// The JSON that the program reads.
+    /// The record as the JSON that the program reads.
     fn to_json(&self) -> PyResult<String> {
         calibration_to_json(&self.calibration).map_err(said)
     }
@@ -193,7 +193,7 @@ impl Record {
         self.calibration.reference.unit()
     }
 
-    /// Samples a second at which it runs.
+    /// Sample rate of the calibration, Hz.
     #[getter]
     fn rate_hz(&self) -> f64 {
         self.calibration.sample_rate_hz.hz()
@@ -211,18 +211,18 @@ impl Record {
         }
     }
 
-    /// Whether it needs the pressure beside the signal.
+    /// Whether the calibration needs the pressure beside the signal.
     #[getter]
     fn needs_pressure(&self) -> bool {
         pressure_column(&self.calibration).is_some()
     }
 
-    /// A receptor that runs it live.
+    /// A receptor that runs the calibration live.
     fn receptor(&self) -> PyResult<Receptor> {
         LiveReceptor::new(&self.calibration).map(Receptor::new).map_err(said)
     }
 
-    /// Estimates of a whole recording, as it would run live: NaN where a sample has none.
+    /// Estimates of a whole recording, as the receptor gives them live: NaN where a sample has no estimate.
     fn apply<'py>(
         &self,
         py: Python<'py>,

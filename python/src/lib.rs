@@ -1,7 +1,7 @@
 //! The native part of the Python package `stretch`.
 //!
-//! What Rust does is here: calibrations and diagnoses. What Python does better is in `package/stretch`: taking whatever
-//! holds numbers apart, and showing results.
+//! Calibrations and diagnoses are done here, in Rust. The Python code in `package/stretch` takes recordings in whatever form they come,
+//! and shows results.
 
 mod calibration;
 mod error;
@@ -17,11 +17,11 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _stretch {
     #[pymodule_export]
-    use crate::calibration::{Record, calibrate, evaluate};
+    use crate::calibration::{CalibrationRecord, calibrate, evaluate};
     #[pymodule_export]
     use crate::error::StretchError;
     #[pymodule_export]
-    use crate::problem::{Entries, wrapper};
+    use crate::problem::Entries;
     #[pymodule_export]
     use crate::receptor::{Reading, Receptor};
     #[pymodule_export]

@@ -1,4 +1,4 @@
-//! A simulator beside recordings: asked, and diagnosed.
+//! A simulator beside recordings: its problem is checked and diagnosed.
 
 use std::{
     path::PathBuf,
@@ -16,7 +16,7 @@ use serde::Deserialize;
 use stretch_data::{Channel, SessionTrial, Split, Trial};
 use stretch_gap::Options;
 use stretch_problem::{
-    BlackBox, Checked, Examined, Problem, ProblemFile, ProblemSpec, Source, kind_named,
+    BlackBox, Checked, Examined, Language, Problem, ProblemFile, ProblemSpec, Source,
     worker::{Workers, WorkersSpec, session_header},
 };
 use stretch_report::{Subject, diagnosis_page};
@@ -27,7 +27,7 @@ use crate::{
     source::{Asked, Message, serve},
 };
 
-/// How to diagnose, as the package hands it over.
+/// Options of a diagnosis, as the package hands them over.
 #[derive(Debug, Clone, Deserialize)]
 pub(crate) struct How {
     name: String,
@@ -44,7 +44,7 @@ pub(crate) struct How {
     experiment: bool,
 }
 
-/// A recording, the session time of its first sample, s, and whether it may only be tested on.
+/// A recording, the session time of its first sample, s, and whether the recording may only be tested on.
 type Entry<'py> = (Recording<'py>, f64, bool);
 
 fn session_trial((recording, start_s, is_test): &Entry<'_>) -> SessionTrial {
@@ -52,25 +52,28 @@ fn session_trial((recording, start_s, is_test): &Entry<'_>) -> SessionTrial {
     SessionTrial { start_s: *start_s, split, ..SessionTrial::new(recording.trial()) }
 }
 
-/// A checked problem, its recordings on one grid.
+/// A checked problem with its recordings on one grid.
 #[pyclass(frozen, module = "stretch", name = "Problem")]
 #[derive(Debug)]
 pub(crate) struct Entries {
     checked: Checked,
-    /// The file that it was read from.
+    /// The file that the problem was read from.
     file: Option<ProblemFile>,
 }
 
-/// What a diagnosis leaves: itself as JSON, its report, the curves of each stage, and the columns of the next experiment.
+/// The results of a diagnosis: its JSON, its report, the curves of each stage, the code of the named effects, and the next experiment.
 struct Answer {
     json: String,
     page: String,
     curves: Vec<(String, [Vec<f64>; 4])>,
+    /// Python functions of the named effects that have code, by effect.
+    code: Vec<(String, String)>,
     experiment: Option<Trial>,
 }
 
-/// The same as Python takes it.
-type Told<'py> = (String, String, Bound<'py, PyDict>, Option<Bound<'py, PyDict>>);
+/// An [`Answer`] as Python takes it.
+type PyAnswer<'py> =
+    (String, String, Bound<'py, PyDict>, Bound<'py, PyDict>, Option<Bound<'py, PyDict>>);
 
 #[pymethods]
 impl Entries {
@@ -96,13 +99,13 @@ impl Entries {
         Ok(Self { checked: Checked::new(spec).map_err(said)?, file: Some(file) })
     }
 
-    /// What the problem is called.
+    /// Name of the problem.
     #[getter]
     fn name(&self) -> &str {
         self.file.as_ref().map_or("data", |file| file.name.as_str())
     }
 
-    /// What stays the same from one model to the next, the columns apart, as JSON.
+    /// The session as JSON, without the columns.
     #[getter]
     fn session(&self) -> String {
         session_header(self.checked.session()).to_string()
@@ -124,16 +127,17 @@ impl Entries {
         Ok(columns)
     }
 
-    /// Diagnoses; gives the diagnosis as JSON, its report, and by output what was measured and simulated: as shipped,
-    /// re-tuned, and with the best effects. Without a simulator the workers of the problem's file answer.
+    /// Diagnoses the problem. The answer holds the diagnosis as JSON, its report, the measured and the simulated curves of each output (as
+    /// shipped, re-tuned, and with the best effects), the code of the named effects, and the columns of the next experiment. Without a
+    /// simulator the workers of the problem's file answer.
     fn diagnose<'py>(
         &self,
         py: Python<'py>,
         simulator: Option<&Bound<'py, PyAny>>,
         how: &str,
         progress: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Told<'py>> {
-        let (desk, told) = mpsc::channel();
+    ) -> PyResult<PyAnswer<'py>> {
+        let (main_thread, messages) = mpsc::channel();
         let how: How = serde_json::from_str(how).map_err(said)?;
         let batch = how.batch.max(1);
         let workers = match (&self.file, simulator) {
@@ -146,15 +150,17 @@ impl Entries {
         }
         let left = Arc::new(AtomicBool::new(false));
         let (checked, file) = (self.checked.clone(), self.file.clone());
-        let work = Work { checked, file, workers, how, desk, left: left.clone() };
+        let work = Work { checked, file, workers, how, main_thread, left: left.clone() };
         thread::Builder::new().name("stretch".into()).spawn(move || work.run())?;
-        let done = serve(py, told, simulator, progress, batch)
+        let done = serve(py, messages, simulator, progress, batch)
             .inspect_err(|_| left.store(true, SeqCst))?;
-        let Answer { json, page, curves, experiment } = done.map_err(said)?;
+        let Answer { json, page, curves, code, experiment } = done.map_err(said)?;
         let shown = PyDict::new(py);
         for (output, all) in curves {
             shown.set_item(output, all.map(|curve| PyArray1::from_vec(py, curve)))?;
         }
+        let functions = PyDict::new(py);
+        code.into_iter().try_for_each(|(effect, text)| functions.set_item(effect, text))?;
         let columns = |trial: Trial| -> PyResult<Bound<'py, PyDict>> {
             let columns = PyDict::new(py);
             columns.set_item("time_s", PyArray1::from_vec(py, trial.time_s))?;
@@ -163,29 +169,30 @@ impl Entries {
             }
             Ok(columns)
         };
-        Ok((json, page, shown, experiment.map(columns).transpose()?))
+        Ok((json, page, shown, functions, experiment.map(columns).transpose()?))
     }
 }
 
-/// What the thread that works has.
+/// Everything that the working thread needs.
 struct Work {
     checked: Checked,
     file: Option<ProblemFile>,
     workers: Option<WorkersSpec>,
     how: How,
-    desk: mpsc::Sender<Message<Result<Answer, String>>>,
-    /// Whether nobody is at the desk any more: the caller was interrupted.
+    /// Messages to the main thread.
+    main_thread: mpsc::Sender<Message<Result<Answer, String>>>,
+    /// Whether the main thread has left, because the caller was interrupted.
     left: Arc<AtomicBool>,
 }
 
 impl Work {
     fn run(&self) {
         let answered = self.answered();
-        drop(self.desk.send(Message::Done(answered)));
+        drop(self.main_thread.send(Message::Done(answered)));
     }
 
     fn answered(&self) -> Result<Answer, String> {
-        let Self { checked, file, workers, how, desk, left } = self;
+        let Self { checked, file, workers, how, main_thread, left } = self;
         let source: Arc<dyn Source> = match workers {
             Some(spec) => {
                 let started = Workers::start(spec.clone(), checked.session());
@@ -193,7 +200,8 @@ impl Work {
             }
             None => {
                 let How { answers_all, batch, takes_inputs, .. } = *how;
-                Arc::new(Asked { desk: desk.clone(), answers_all, batch, takes_inputs })
+                let main_thread = main_thread.clone();
+                Arc::new(Asked { main_thread, answers_all, batch, takes_inputs })
             }
         };
         let budget = how.budget.or(file.as_ref().and_then(|file| file.budget));
@@ -211,18 +219,18 @@ impl Work {
             responses: true,
             ..Options::default()
         };
-        let progress = |words: &str| drop(desk.send(Message::Progress(words.to_owned())));
+        let progress = |words: &str| drop(main_thread.send(Message::Progress(words.to_owned())));
         let stop = || left.load(SeqCst);
         let examined = problem.examine(&options, how.experiment, &progress, &stop);
         Ok(answer(&problem, examined.map_err(|e| e.to_string())?))
     }
 }
 
-/// Workers at once: as many as processors, unless told.
+/// Number of workers at once: that of the processors where `threads` is 0.
 fn jobs(threads: usize) -> usize {
     match threads {
         0 => thread::available_parallelism().map_or(1, usize::from),
-        told => told,
+        given => given,
     }
 }
 
@@ -234,12 +242,14 @@ fn answer(problem: &Problem, examined: Examined) -> Answer {
         (simulator.description().stages[stage].channel.clone(), curves)
     };
     let curves = examined.evidence.stages.iter().enumerate().map(curve).collect();
-    let page = diagnosis_page(&Subject::of(problem, &examined));
-    Answer { json: examined.to_json().to_string(), page, curves, experiment: examined.experiment }
-}
-
-/// What a wrapper is, in words, and its equation; None for another name.
-#[pyfunction]
-pub(crate) fn wrapper(name: &str) -> Option<(&'static str, &'static str)> {
-    kind_named(name).map(|kind| (kind.words, kind.equation))
+    let implementations = examined.implementations.iter();
+    let code =
+        implementations.filter_map(|one| Some((one.name.clone(), one.code(Language::Python)?)));
+    Answer {
+        json: examined.to_json().to_string(),
+        page: diagnosis_page(&Subject::of(problem, &examined)),
+        curves,
+        code: code.collect(),
+        experiment: examined.experiment,
+    }
 }

@@ -16,7 +16,7 @@ pub(crate) struct Recording<'py> {
 }
 
 impl Recording<'_> {
-    /// The same in Rust's memory, so that nobody changes it meanwhile.
+    /// A copy of the recording in Rust's memory, which Python code cannot change meanwhile.
     pub(crate) fn trial(&self) -> Trial {
         let channel = |(name, values): &(String, PyReadonlyArray1<'_, f64>)| Channel {
             name: name.clone(),
@@ -30,7 +30,7 @@ impl Recording<'_> {
     }
 }
 
-/// All of them.
+/// Copies of all recordings.
 pub(crate) fn trials(recordings: &[Recording<'_>]) -> Vec<Trial> {
     recordings.iter().map(Recording::trial).collect()
 }

@@ -1,8 +1,7 @@
-//! A simulator that lives in Python, asked from Rust's threads and answered on the thread that called.
+//! A simulator that lives in Python: Rust's threads ask it, and the main thread, which called, answers.
 //!
-//! Python's signal handlers run on its main thread, and simulators keep things that belong to a thread. So the work goes to a
-//! thread of its own and the caller's thread stays at a desk: it takes questions, many at once where they come so, asks the
-//! user's simulator, and looks after Ctrl-C.
+//! Python's signal handlers run on the main thread, and simulators keep objects that belong to a thread. So the work goes to a thread of its
+//! own, while the main thread takes questions (several at once where several wait), asks the user's simulator, and handles Ctrl-C.
 
 use std::{
     sync::mpsc::{self, Receiver, RecvTimeoutError, Sender},
@@ -25,7 +24,7 @@ create_exception!(
 /// How often Python is asked whether it was interrupted.
 const TICK: Duration = Duration::from_millis(50);
 
-/// One run that is asked for, and where its answer goes.
+/// One run that is asked for, and the channel for its answer.
 #[derive(Debug)]
 pub(crate) struct Question {
     stage: usize,
@@ -36,12 +35,12 @@ pub(crate) struct Question {
     reply: Sender<Result<Vec<f64>, SourceError>>,
 }
 
-/// What comes to the desk.
+/// A message to the main thread.
 #[derive(Debug)]
 pub(crate) enum Message<T> {
     /// A run is asked for.
     Question(Question),
-    /// What goes on, in words.
+    /// The progress of the work, in words.
     Progress(String),
     /// The work is done.
     Done(T),
@@ -50,7 +49,8 @@ pub(crate) enum Message<T> {
 /// The simulator as Rust's threads see it.
 #[derive(Debug)]
 pub(crate) struct Asked<T> {
-    pub(crate) desk: Sender<Message<T>>,
+    /// Messages to the main thread.
+    pub(crate) main_thread: Sender<Message<T>>,
     pub(crate) answers_all: bool,
     pub(crate) batch: usize,
     pub(crate) takes_inputs: bool,
@@ -72,9 +72,9 @@ impl<T: Send> Source for Asked<T> {
                 inputs: ask.inputs.map(<[Vec<f64>]>::to_vec),
                 reply,
             };
-            self.desk.send(Message::Question(question)).map(|()| answer).map_err(|_| gone())
+            self.main_thread.send(Message::Question(question)).map(|()| answer).map_err(|_| gone())
         };
-        // All are on their way before the first answer is waited for.
+        // All questions are sent before the first answer is waited for.
         let answers: Vec<_> = asks.iter().map(send).collect();
         answers.into_iter().map(|answer| answer?.recv().map_err(|_| gone())?).collect()
     }
@@ -98,16 +98,16 @@ impl<T: Send> Source for Asked<T> {
 /// array `[n, samples]` each, or None; it returns `[n, samples]`.
 ///
 /// # Errors
-/// What the simulator raises, and KeyboardInterrupt; the work then ends by itself, for nobody answers it any more.
+/// Exceptions of the simulator, and KeyboardInterrupt; the work then ends by itself, for its questions stay without an answer.
 pub(crate) fn serve<T: Send>(
     py: Python<'_>,
-    mut desk: Receiver<Message<T>>,
+    mut messages: Receiver<Message<T>>,
     simulator: Option<&Bound<'_, PyAny>>,
     progress: Option<&Bound<'_, PyAny>>,
     batch: usize,
 ) -> PyResult<T> {
     loop {
-        let waiting = &mut desk;
+        let waiting = &mut messages;
         let first = match py.detach(move || waiting.recv_timeout(TICK)) {
             Ok(message) => message,
             Err(RecvTimeoutError::Timeout) => {
@@ -122,7 +122,7 @@ pub(crate) fn serve<T: Send>(
         };
         let mut groups: Vec<Vec<Question>> = Vec::new();
         let mut waiting: Vec<Message<T>> = vec![first];
-        waiting.extend(desk.try_iter());
+        waiting.extend(messages.try_iter());
         for message in waiting {
             match message {
                 Message::Done(done) => return Ok(done),
@@ -149,19 +149,19 @@ pub(crate) fn serve<T: Send>(
 }
 
 impl Question {
-    /// Whether two can be asked in one call.
+    /// Whether two questions can be asked in one call.
     fn goes_with(&self, other: &Self) -> bool {
         (self.stage, self.trials) == (other.stage, other.trials)
             && self.inputs.is_some() == other.inputs.is_some()
     }
 }
 
-/// Asks once for all; one by one where some of them are refused.
+/// Asks the simulator once for all questions of a group, and one by one where the simulator refuses the group.
 fn answer(py: Python<'_>, simulator: &Bound<'_, PyAny>, group: Vec<Question>) -> PyResult<()> {
     match call(py, simulator, &group) {
         Ok(rows) => {
             for (question, row) in group.into_iter().zip(rows) {
-                // Whoever asked may have gone.
+                // The thread that asked may have ended.
                 drop(question.reply.send(Ok(row)));
             }
             Ok(())
@@ -192,7 +192,7 @@ fn call(
     let wrong = |e: numpy::ndarray::ShapeError| PyRuntimeError::new_err(e.to_string());
     let parameters = table(|q| &q.parameters).map_err(wrong)?;
     let effects = table(|q| &q.effects).map_err(wrong)?;
-    // By input, one column for each model.
+    // For each input there is one column for each model.
     let inputs = first.inputs.as_ref().map(|columns| {
         let of = |column: usize| {
             let own = |q: &Question| q.inputs.as_ref().map(|all| all[column].clone());
@@ -201,7 +201,7 @@ fn call(
         };
         (0..columns.len()).map(of).collect::<Vec<_>>()
     });
-    let told = simulator.call1((first.stage, first.trials, parameters, effects, inputs))?;
-    let rows: PyReadonlyArray2<'_, f64> = told.extract()?;
+    let answer = simulator.call1((first.stage, first.trials, parameters, effects, inputs))?;
+    let rows: PyReadonlyArray2<'_, f64> = answer.extract()?;
     Ok(rows.as_array().rows().into_iter().map(|row| row.to_vec()).collect())
 }

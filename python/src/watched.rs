@@ -1,4 +1,4 @@
-//! Work that Ctrl-C ends.
+//! Work that Ctrl-C interrupts.
 
 use std::{
     sync::mpsc::{self, RecvTimeoutError},
@@ -11,20 +11,20 @@ use pyo3::{exceptions::PyRuntimeError, prelude::*};
 /// How often Python is asked whether it was interrupted.
 const TICK: Duration = Duration::from_millis(50);
 
-/// Does `work` on a thread of its own, without the interpreter's lock, and asks Python meanwhile whether it was
-/// interrupted: signal handlers run on Python's main thread alone, which must not be the one that works.
+/// Does `work` on a thread of its own, without the interpreter's lock, and asks Python meanwhile for interrupts: signal handlers run on
+/// Python's main thread alone, so the work must run on another thread.
 ///
-/// An interrupted caller returns at once; the work runs out unseen.
+/// An interrupted caller returns at once; the work runs to its end, and its result is dropped.
 pub(crate) fn watched<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> PyResult<T> {
-    let (tell, mut told) = mpsc::channel();
-    // Nobody listens any more once the caller was interrupted.
-    thread::Builder::new().name("stretch".into()).spawn(move || drop(tell.send(work())))?;
+    let (send, mut answer) = mpsc::channel();
+    // The channel is closed once the caller was interrupted.
+    thread::Builder::new().name("stretch".into()).spawn(move || drop(send.send(work())))?;
     loop {
-        let told = &mut told;
-        match py.detach(move || told.recv_timeout(TICK)) {
+        let answer = &mut answer;
+        match py.detach(move || answer.recv_timeout(TICK)) {
             Ok(done) => return Ok(done),
             Err(RecvTimeoutError::Timeout) => py.check_signals()?,
             Err(RecvTimeoutError::Disconnected) => {

@@ -92,10 +92,10 @@ def test_a_function_of_one_model_says_the_same_as_batches(bent):
         return params["compliance"] * FORCE + effects["bend"] * FORCE**2
 
     one = diagnose(spring, BENT)
-    told, batches = json.loads(one.to_json()), json.loads(bent.to_json())
+    single, batches = json.loads(one.to_json()), json.loads(bent.to_json())
     for name in ("runtime_s", "notes"):
-        del told[name], batches[name]
-    assert told == batches
+        del single[name], batches[name]
+    assert single == batches
 
 
 def test_batches_are_asked_for_as_batches():

@@ -1,46 +1,88 @@
-"""Code that is pasted computes what the diagnosis meant: each effect is hidden by its code and found with its values."""
+"""The code of a fix computes what the diagnosis found: effects hidden by other code are named, and pasted code gives them."""
+
+import inspect
 
 import numpy as np
 import pytest
 import stretch
-from stretch import effects
 from test_diagnosis import FORCE, RATE_HZ, STIFFER, diagnose, noise
 
-VALUES = {
-    "delay": {"delay_s": 0.055},
-    "skew": {"skew_s": 0.043, "rate": 0.0},
-    "lag": {"tau_s": 0.08, "second": 0.1},
-    "second_order_lag": {"m_s": 0.06, "damping": 0.3},
-    "relaxation": {"c": 0.2, "tau_s": 0.8, "spread": 1.6},
-    "slew_limit": {"rate": 70.0},
-    "backlash": {"w": 1.5, "softness": 0.2},
-    "hysteresis": {"h": 0.2, "s": 20.0, "spread": 0.5},
-    "bouc_wen": {"c": 3.0, "s": 8.0},
-    "saturation": {"low": -45.0, "high": 40.0, "knee": 0.5},
-    "dead_zone": {"w": 3.0, "softness": 0.3},
-}
+DT_S = 1.0 / RATE_HZ
 
 
-@pytest.mark.parametrize("kind", VALUES)
-def test_the_code_of_an_effect_is_the_effect(kind):
-    hidden = effects.CODE[kind](STIFFER, 1.0 / RATE_HZ, **VALUES[kind])
+def late(x):
+    """A dead time of 55 ms."""
+    time_s = DT_S * np.arange(x.size)
+    return np.interp(time_s - 0.055, time_s, x)
+
+
+def slow(x):
+    """A first-order lag of 80 ms."""
+    y, share = x.copy(), 1.0 - np.exp(-DT_S / 0.08)
+    for i in range(1, x.size):
+        y[i] = y[i - 1] + share * (0.5 * (x[i - 1] + x[i]) - y[i - 1])
+    return y
+
+
+def loose(x):
+    """A play of half-width 1.5."""
+    y = x.copy()
+    for i in range(1, x.size):
+        y[i] = min(max(y[i - 1], x[i] - 1.5), x[i] + 1.5)
+    return y
+
+
+def limited(x):
+    """A slew rate of 70 per second."""
+    y = x.copy()
+    for i in range(1, x.size):
+        y[i] = y[i - 1] + min(max(x[i] - y[i - 1], -70.0 * DT_S), 70.0 * DT_S)
+    return y
+
+
+HIDDEN = [
+    ("delay", late, "delay_s", 0.055),
+    ("lag", slow, "tau_s", 0.08),
+    ("backlash", loose, "w", 1.5),
+    ("slew_limit", limited, "rate", 70.0),
+]
+
+
+def run(pasted, name, x):
+    """A column through pasted code, sample by sample, whatever the function takes."""
+    step, start = pasted[name], pasted.get(f"{name}_start")
+    wanted = list(inspect.signature(step).parameters)
+    state = start(*[x[0]] * len(inspect.signature(start).parameters)) if start else None
+    given = [{"s": state, "x": x[i], "v": x, "n": x.size, "i": i, "t": i * DT_S} for i in range(x.size)]
+    return np.array([step(**{key: row[key] for key in wanted}) for row in given])
+
+
+@pytest.mark.parametrize("kind, hide, parameter, value", HIDDEN, ids=[one[0] for one in HIDDEN])
+def test_the_code_of_an_effect_is_the_effect(kind, hide, parameter, value):
+    hidden = hide(STIFFER)
     found = diagnose(lambda params, effects: params["compliance"] * FORCE, hidden + noise(FORCE.size), effects=None,
                      wrap=[f"output.{kind}"])  # fmt: skip
     assert found.named == [f"output.{kind}"]
     assert found.how_far["with_effects"]["length_mm"] < 1.2  # noise is 1
-    first = next(iter(VALUES[kind]))
-    assert found.effects[f"output.{kind}"][first] == pytest.approx(VALUES[kind][first], rel=0.1)
+    assert found.effects[f"output.{kind}"][parameter] == pytest.approx(value, rel=0.1)
     pasted = {}
     exec(found.fix().code, pasted)  # what a user would paste
-    tuned = pasted["parameters"]["compliance"] * FORCE
-    fixed = pasted[kind](tuned, 1.0 / RATE_HZ, **pasted[f"output_{kind}"])
-    left = np.std(fixed - hidden)
-    assert left < 0.4 * np.std(noise(FORCE.size))
+    fixed = run(pasted, f"output_{kind}", pasted["parameters"]["compliance"] * FORCE)
+    assert np.std(fixed - hidden) < 0.4 * np.std(noise(FORCE.size))
+
+
+def test_a_diagnosis_from_text_has_equations_in_place_of_functions():
+    found = diagnose(lambda params, effects: params["compliance"] * FORCE, late(STIFFER) + noise(FORCE.size), effects=None,
+                     wrap=["output.delay"])  # fmt: skip
+    code = stretch.Diagnosis.from_json(found.to_json()).fix().code
+    pasted = {}
+    exec(code, pasted)
+    assert pasted["output_delay"] == found.effects["output.delay"] and "y(t) = x(t - delay_s)" in code
 
 
 def test_friction_is_found_by_the_speed_at_which_it_rubs():
-    speed = np.gradient(FORCE, 1.0 / RATE_HZ)
-    pull = effects.coulomb_friction(2.1 * FORCE, speed, f=1.5, width=0.3)
+    speed = np.gradient(FORCE, DT_S)
+    pull = 2.1 * FORCE + 1.5 * np.tanh(speed / 0.3)
     found = stretch.diagnose(
         lambda params, effects: params["stiffness"] * FORCE,
         {"travel_mm": FORCE, "pull_N": pull + noise(FORCE.size), "speed_mmps": speed},
@@ -53,4 +95,4 @@ def test_friction_is_found_by_the_speed_at_which_it_rubs():
     )
     assert found.named == ["output.coulomb_friction"]
     assert found.effects["output.coulomb_friction"]["f"] == pytest.approx(1.5, rel=0.05)
-    assert "coulomb_friction(x, v, **output_coulomb_friction)" in found.fix().code
+    assert "def output_coulomb_friction(x, v):" in found.fix().code

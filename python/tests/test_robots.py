@@ -31,17 +31,17 @@ def folder(name: str) -> Path:
 @pytest.mark.parametrize("every", [5, 10])
 def test_the_axis_lacks_the_coulomb_friction_that_was_published(every: int) -> None:
     emps = example("emps")
-    told = emps.diagnosed("inverse", folder("emps"), every)
-    assert told.named == ["output.coulomb_friction"]
-    found = told.effects["output.coulomb_friction"]
+    diagnosis = emps.diagnosed("inverse", folder("emps"), every)
+    assert diagnosis.named == ["output.coulomb_friction"]
+    found = diagnosis.effects["output.coulomb_friction"]
     # published: 20.39 N, and an offset of -3.16 N, which is lopsided friction
     assert found["f"] == pytest.approx(emps.PUBLISHED["coulomb"], rel=0.02)
     assert found["f"] * found["lopsided"] == pytest.approx(emps.PUBLISHED["offset"], rel=0.05)
-    assert told.parameters["mass"] == pytest.approx(emps.PUBLISHED["mass"], rel=0.02)
+    assert diagnosis.parameters["mass"] == pytest.approx(emps.PUBLISHED["mass"], rel=0.02)
 
 
 @pytest.mark.parametrize("every", [1, 2])
 def test_a_play_in_the_elbow_foretells_a_motion_that_was_not_fitted(every: int) -> None:
-    told = example("so101").diagnosed(folder("so101"), "elbow", every)
-    assert told.named == ["input.backlash"]
-    assert told.how_far["closed"] > 0.9
+    diagnosis = example("so101").diagnosed(folder("so101"), "elbow", every)
+    assert diagnosis.named == ["input.backlash"]
+    assert diagnosis.how_far["closed"] > 0.9

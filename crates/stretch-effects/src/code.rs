@@ -213,10 +213,6 @@ impl Sketch {
         if !self.state.is_empty() {
             out.push_str("from types import SimpleNamespace\n");
         }
-        out.push('\n');
-        for c in &self.constants {
-            let _ = writeln!(out, "{} = {}  # {}", c.name, literal(c.value), c.unit);
-        }
         let mut inputs = self.names();
         if !self.state.is_empty() {
             let _ = writeln!(out, "\n\ndef {name}_start({}):", self.begins_at().unwrap_or(""));
@@ -226,6 +222,10 @@ impl Sketch {
             inputs.insert(0, "s");
         }
         let _ = writeln!(out, "\n\ndef {name}({}):", inputs.join(", "));
+        // Constants are local, so that the code of several effects can stand in one file.
+        for c in &self.constants {
+            let _ = writeln!(out, "    {} = {}  # {}", c.name, literal(c.value), c.unit);
+        }
         out + &Language::Python.body(&self.body, 1) + "    return y\n"
     }
 

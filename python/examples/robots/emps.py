@@ -112,14 +112,14 @@ def main():
     parser.add_argument("--report", help="folder for the reports")
     args = parser.parse_args()
     for form in ("inverse", "forward"):
-        told = diagnosed(form, args.folder, args.every)
-        print(f"\n{form}: {told.sentence}")
-        print("  parameters", {k: round(v, 2) for k, v in told.parameters.items()})
-        print("  effects", told.effects)
-        print("  how far", told.how_far)
-        print("  model runs", told.model_runs)
+        found = diagnosed(form, args.folder, args.every)
+        print(f"\n{form}: {found.sentence}")
+        print("  parameters", {k: round(v, 2) for k, v in found.parameters.items()})
+        print("  effects", found.effects)
+        print("  how far", found.how_far)
+        print("  model runs", found.model_runs)
         if args.report:
-            told.report(Path(args.report) / f"emps_{form}.html")
+            found.report(Path(args.report) / f"emps_{form}.html")
     print("\npublished:", PUBLISHED)
 
 

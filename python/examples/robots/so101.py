@@ -87,22 +87,22 @@ def main():
     args = parser.parse_args()
     for joint in args.joints.split(","):
         for every in (1, 2) if args.drop else (1,):
-            told = diagnosed(args.folder, joint, every)
-            print(f"\n{joint}{', every second row' if every == 2 else ''}: {told.sentence}")
-            print("  named", told.named, "rivals", told.rivals)
-            print("  parameters", {k: round(v, 4) for k, v in told.parameters.items()})
-            print("  effects", told.effects)
-            far = told.how_far
+            found = diagnosed(args.folder, joint, every)
+            print(f"\n{joint}{', every second row' if every == 2 else ''}: {found.sentence}")
+            print("  named", found.named, "rivals", found.rivals)
+            print("  parameters", {k: round(v, 4) for k, v in found.parameters.items()})
+            print("  effects", found.effects)
+            far = found.how_far
             print(
                 "  error on the test motion, rad, in steps of the encoder's noise:",
                 {k: round(next(iter(far[k].values())), 2) for k in ("as_shipped", "retuned", "with_effects")},
                 f"closed {far['closed']:.2f} ({far['interval'][0]:.2f} to {far['interval'][1]:.2f})",
                 "model runs",
-                told.model_runs,
+                found.model_runs,
                 flush=True,
             )
             if args.report:
-                told.report(Path(args.report) / f"so101_{joint}_{every}.html")
+                found.report(Path(args.report) / f"so101_{joint}_{every}.html")
 
 
 if __name__ == "__main__":

@@ -47,19 +47,19 @@ class Estimate:
 class Calibration:
     """A calibration record: apply it to recordings, run it live, write it for the program and for boards."""
 
-    def __init__(self, record: _stretch.Record, made: dict[str, Any] | None = None) -> None:
+    def __init__(self, record: _stretch.CalibrationRecord, made: dict[str, Any] | None = None) -> None:
         self._record = record
         self._made = made or {}
 
     @staticmethod
     def from_json(text: str) -> Calibration:
         """From the JSON that `to_json` gives, or `stretch calibrate` writes."""
-        return Calibration(_stretch.Record.from_json(text))
+        return Calibration(_stretch.CalibrationRecord.from_json(text))
 
     @staticmethod
     def load(path: str | os.PathLike[str]) -> Calibration:
         """From a file: postcard where its name ends in `.postcard`, else JSON."""
-        return Calibration(_stretch.Record.load(path))
+        return Calibration(_stretch.CalibrationRecord.load(path))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Into a file, whole or not at all: postcard for a board where its name ends in `.postcard`, else JSON."""
@@ -125,19 +125,19 @@ class Calibration:
         """Estimates of a recording, sample by sample, as they would come live.
 
         Without `rate_hz` and `time_s` the recording is taken to be at the calibration's own rate. `pressure` is needed by a
-        calibration whose gauge feels it.
+        calibration whose gauge depends on it.
         """
         values = column(signal, "signal")
         if rate_hz is None and time_s is None:
             rate_hz = self.rate_hz
         stamps = times(values.size, rate_hz, time_s, "the recording")
-        felt = None
+        pressures = None
         if self._record.needs_pressure:
             if pressure is None:
-                raise _stretch.StretchError("the gauge of this calibration feels the pressure: give pressure, in kPa")
-            felt = column(pressure, "pressure")
-            same_length(felt, values.size, "pressure")
-        answer = self._record.apply(stamps, values, felt)
+                raise _stretch.StretchError("the gauge of this calibration depends on the pressure: give pressure, in kPa")
+            pressures = column(pressure, "pressure")
+            same_length(pressures, values.size, "pressure")
+        answer = self._record.apply(stamps, values, pressures)
         faults = {key: answer[key] for key in ("missing", "jittered", "backwards")}
         return Estimate(answer["estimate"], answer["rate"], answer["sd"], answer["inside"], faults=faults, unit=self.unit)
 
@@ -199,7 +199,7 @@ class Calibration:
 
 
 def _again(text: str, made: dict[str, Any]) -> Calibration:
-    return Calibration(_stretch.Record.from_json(text), made)
+    return Calibration(_stretch.CalibrationRecord.from_json(text), made)
 
 
 def calibrate(
@@ -238,7 +238,7 @@ def calibrate(
     columns = {signal_name: signal, reference_name: reference}
     if pressure is not None:
         columns["pressure_kpa"] = pressure
-    told = diagnosis if diagnosis is None or isinstance(diagnosis, str) else diagnosis.to_json()
+    diagnosed = diagnosis if diagnosis is None or isinstance(diagnosis, str) else diagnosis.to_json()
     choices = {
         "model": model,
         "signal": signal_name,
@@ -250,7 +250,7 @@ def calibrate(
         "rest_length": rest_length,
         "dead_band": dead_band,
         "date": date,
-        "diagnosis": told,
+        "diagnosis": diagnosed,
     }
     record, made = _stretch.calibrate(recordings(columns, rate_hz, time_s, names), choices)
     return Calibration(record, json.loads(made))

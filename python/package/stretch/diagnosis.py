@@ -22,14 +22,16 @@ class Diagnosis:
 
     def __init__(
         self,
-        told: dict[str, Any],
+        answer: dict[str, Any],
         page: str = "",
         curves: Mapping[str, Sequence[Array]] | None = None,
+        functions: Mapping[str, str] | None = None,
         experiment: Mapping[str, Array] | None = None,
     ) -> None:
-        self._told = told
+        self._answer = answer
         self._page = page
         self._curves = curves or {}
+        self._functions = functions or {}
         self._experiment = experiment
 
     @staticmethod
@@ -40,37 +42,37 @@ class Diagnosis:
     @property
     def verdict(self) -> str:
         """`no_gap`, `parameters`, `effect`, `partial`, `record` or `unknown`."""
-        return str(self._told["verdict"])
+        return str(self._answer["verdict"])
 
     @property
     def sentence(self) -> str:
         """The answer in a sentence."""
-        return str(self._told["sentence"])
+        return str(self._answer["sentence"])
 
     @property
     def named(self) -> list[str]:
         """The effects that are missing, the strongest first; empty where none is named."""
-        return list(self._told["named"])
+        return list(self._answer["named"])
 
     @property
     def probabilities(self) -> dict[str, float]:
         """Probability of every candidate that was weighed, the most probable first; `unknown` is whatever nobody listed."""
-        weighed = self._told["candidates"]
+        weighed = self._answer["candidates"]
         return {" + ".join(c["effects"]) or "nothing": c["probability"] for c in weighed}
 
     @property
     def where(self) -> dict[str, float]:
         """Share of the gap in each output."""
-        return {s["channel"]: s["share"] for s in self._told["where"]["stages"]}
+        return {s["channel"]: s["share"] for s in self._answer["where"]["stages"]}
 
     @property
     def how_far(self) -> dict[str, Any]:
         """How far the named effects close the gap on samples that were not fitted: `closed`, its 95 % interval, and what
         is left by output, in the output's noise: 1 is noise alone."""
-        best = self._told["candidates"][0] if self._told["candidates"] else {}
+        best = self._answer["candidates"][0] if self._answer["candidates"] else {}
 
         def left(key: str) -> dict[str, float]:
-            return {s["channel"]: max(1.0 + s[key], 0.0) ** 0.5 for s in self._told["where"]["stages"]}
+            return {s["channel"]: max(1.0 + s[key], 0.0) ** 0.5 for s in self._answer["where"]["stages"]}
 
         return {
             "closed": best.get("closed", 0.0),
@@ -83,7 +85,7 @@ class Diagnosis:
     @property
     def parameters(self) -> dict[str, float]:
         """Every nominal parameter as it is with the named effects in."""
-        return {p["name"]: p["fitted"] for p in self._told["parameters"]}
+        return {p["name"]: p["fitted"] for p in self._answer["parameters"]}
 
     @property
     def effects(self) -> dict[str, dict[str, float]]:
@@ -95,46 +97,46 @@ class Diagnosis:
         return found
 
     def _best_values(self) -> list[dict[str, Any]]:
-        candidates = self._told["candidates"]
+        candidates = self._answer["candidates"]
         return list(candidates[0]["parameter_values"]) if candidates and self.named else []
 
     @property
     def rivals(self) -> list[str]:
         """Everything that these data cannot rule out, named or not."""
-        return list(self._told["ambiguous"])
+        return list(self._answer["ambiguous"])
 
     @property
     def families(self) -> list[dict[str, Any]]:
         """Effects that these data cannot tell apart, with what they agree on: "late by 0.10 .. 0.14 s"."""
-        return list(self._told.get("families", []))
+        return list(self._answer.get("families", []))
 
     @property
     def next_experiment(self) -> dict[str, Any] | None:
         """The experiment that would tell rivals apart, where it was looked for: name, why, minutes, and `columns` to command."""
-        found = self._told.get("next_experiment")
+        found = self._answer.get("next_experiment")
         return {**found, "columns": dict(self._experiment or {})} if found else None
 
     @property
     def proposed(self) -> dict[str, Any] | None:
         """The equation that is proposed where no effect of the list explains the gap."""
-        proposed = self._told.get("proposed")
+        proposed = self._answer.get("proposed")
         return dict(proposed) if proposed else None
 
     @property
     def identifiability(self) -> list[dict[str, Any]]:
         """Which nominal parameters these data determine and which not, with what they look like."""
-        return list(self._told.get("identifiability", []))
+        return list(self._answer.get("identifiability", []))
 
     @property
     def notes(self) -> list[str]:
         """What was done to the recordings, what they cannot say, and what to look at."""
-        return list(self._told["notes"])
+        return list(self._answer["notes"])
 
     @property
     def model_runs(self) -> int:
         """Models that the simulator was asked for."""
-        runs = self._told.get("model_runs")
-        return int(runs["count"]) if isinstance(runs, dict) else int(self._told["simulations"])
+        runs = self._answer.get("model_runs")
+        return int(runs["count"]) if isinstance(runs, dict) else int(self._answer["simulations"])
 
     def curves(self, output: str | None = None) -> dict[str, Array]:
         """One output over all trials end to end: `measured`, `as_shipped`, `retuned` and `with_effects`."""
@@ -146,12 +148,15 @@ class Diagnosis:
         return dict(zip(("measured", "as_shipped", "retuned", "with_effects"), self._curves[name]))
 
     def fix(self) -> Fix:
-        """What to change in the simulator: parameters re-tuned, and the named effects as Python code."""
-        return fix(self.parameters, self._best_values(), self.named)
+        """The changes to the simulator: parameters re-tuned, and the named effects as Python code.
+
+        A diagnosis that was read from text has equations and values in place of functions.
+        """
+        return fix(self.parameters, self.effects, self._answer.get("implement", []), self._functions)
 
     def to_json(self) -> str:
         """Everything, as `stretch diagnose --json` writes it and `stretch calibrate --from` reads it."""
-        return json.dumps(self._told, indent=2)
+        return json.dumps(self._answer, indent=2)
 
     def to_frame(self) -> Any:
         """One row a candidate, as a pandas frame; a dict of columns where there is no pandas."""
@@ -166,7 +171,7 @@ class Diagnosis:
                 "gap_after": c["gap_after"],
                 "parameters": dict(c["parameters"]),
             }
-            for c in self._told["candidates"]
+            for c in self._answer["candidates"]
         ]
         return frame(rows)
 
@@ -225,8 +230,8 @@ def diagnose(
     several outputs it returns a dict of arrays by output. Two more arguments it may take by name: `inputs`, a dict of
     columns that it is to be driven by (without it nothing is looked for on the input's side), and `trials`, the slices of
     the recordings, which stand end to end; with `stage` by name it answers for one stage at a time. A method
-    `begin(session)` is told once what stays the same. The same object can stand in a problem.toml. What it raises comes out
-    as it is; `stretch.Refused` says that values cannot be simulated.
+    `begin(session)` is called once with everything that stays the same. The same object can stand in a problem.toml. An
+    exception of the simulator comes out as it is; `stretch.Refused` says that values cannot be simulated.
 
     `data`: a dict of arrays by column, a frame, a `Trial`, or a list of these; with `rate_hz` or a column `time_s`.
     Or the path of a problem.toml, which says all of the following; without a simulator (None) the file's own is run.
@@ -236,8 +241,9 @@ def diagnose(
     `(value, tolerance)` or an exact number. `effects` that the simulator has itself: an `Effect`, an `Argument`, `(least,
     greatest)`, or `(least, greatest, off)`. `wrap`: effects around the simulator, as `"input.delay"`, `"output.backlash"`,
     or all of them; `without` leaves some out, by name or by kind. `units` and `noise` by column. `reference` is the column that
-    the output senses: what a calibration of it loses by the gap is told then. With `experiment` the next one is looked for that
-    would tell rivals apart, where the simulator takes `inputs`. `budget` is the most models that may be run.
+    the output senses: the diagnosis then reports what a calibration of that output loses by the gap. With `experiment` the
+    experiment is looked for that would tell rivals apart, where the simulator takes `inputs`.
+    `budget` is the most models that may be run.
     """
     asked = None if simulator is None else Asked(simulator)
     notes: list[str] = []
@@ -287,10 +293,10 @@ def diagnose(
         "takes_inputs": asked is None or asked.takes_inputs,
         "experiment": experiment,
     }
-    text, page, curves, trial = checked.diagnose(asked, json.dumps(how), progress)
-    told = json.loads(text)
-    told["notes"] = notes + told["notes"]
-    return Diagnosis(told, page, curves, trial)
+    text, page, curves, functions, trial = checked.diagnose(asked, json.dumps(how), progress)
+    answer = json.loads(text)
+    answer["notes"] = notes + answer["notes"]
+    return Diagnosis(answer, page, curves, functions, trial)
 
 
 def _behind(wrappers: list[str], driven: list[str], notes: list[str]) -> list[str]:

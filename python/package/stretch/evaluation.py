@@ -15,37 +15,37 @@ from .recordings import recordings
 class Evaluation:
     """Errors of calibrations and of the raw signal, over all recordings and one by one."""
 
-    def __init__(self, told: dict[str, Any]) -> None:
-        self._told = told
+    def __init__(self, answer: dict[str, Any]) -> None:
+        self._answer = answer
 
     @property
     def unit(self) -> str:
         """Unit of the reference and of the errors."""
-        return str(self._told["unit"])
+        return str(self._answer["unit"])
 
     @property
     def pooled(self) -> dict[str, dict[str, Any]]:
         """Errors over all recordings, by method: `raw` is the signal laid on the reference's extremes."""
-        return {row["method"]: row for row in self._told["pooled"]}
+        return {row["method"]: row for row in self._answer["pooled"]}
 
     @property
     def recordings(self) -> dict[str, dict[str, dict[str, Any]]]:
         """Errors of each recording, by method."""
-        return {t["trial"]: {row["method"]: row for row in t["methods"]} for t in self._told["trials"]}
+        return {t["trial"]: {row["method"]: row for row in t["methods"]} for t in self._answer["trials"]}
 
     @property
     def comparisons(self) -> list[dict[str, Any]]:
         """Paired tests between methods: whether a difference is more than chance."""
-        return list(self._told["comparisons"])
+        return list(self._answer["comparisons"])
 
     @property
     def rmse(self) -> float:
         """Root mean square error of the last calibration."""
-        return float(self._told["pooled"][-1]["rmse"])
+        return float(self._answer["pooled"][-1]["rmse"])
 
     def to_json(self) -> str:
         """As `stretch evaluate --json` prints it."""
-        return json.dumps(self._told, indent=2)
+        return json.dumps(self._answer, indent=2)
 
     def to_frame(self) -> Any:
         """One row a method and recording, as a pandas frame; a dict of columns where there is no pandas."""

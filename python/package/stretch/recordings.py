@@ -1,4 +1,4 @@
-"""Arrays as people have them, checked and told apart."""
+"""Checks arrays in the forms in which users have them."""
 
 from __future__ import annotations
 

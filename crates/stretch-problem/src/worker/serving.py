@@ -89,9 +89,9 @@ def main():
             send({"kind": "ready"})
         elif header["kind"] == "simulate":
             rows = simulate(asked, header["models"], body)
-            told = [{"error": row} if isinstance(row, str) else {"samples": len(row)} for row in rows]
+            models = [{"error": row} if isinstance(row, str) else {"samples": len(row)} for row in rows]
             numbers = [row for row in rows if not isinstance(row, str)]
-            send({"kind": "outputs", "models": told}, b"".join(np.ascontiguousarray(n, "<f8").tobytes() for n in numbers))
+            send({"kind": "outputs", "models": models}, b"".join(np.ascontiguousarray(n, "<f8").tobytes() for n in numbers))
 
 
 main()

@@ -89,10 +89,10 @@ fn main() -> anyhow::Result<()> {
             }
         }
         if wanted.contains(name) {
-            let frame = &evidence.frame;
+            let roles = &evidence.roles;
             for (s, stage) in evidence.stages.iter().enumerate() {
                 print!("        {}:", diagnosis.location.stages[s].stage);
-                for segment in &frame.segments {
+                for segment in &roles.segments {
                     let mean = |r: &[f64]| {
                         let part = &r[segment.from..segment.to];
                         part.iter().map(|x| x * x).sum::<f64>() / part.len() as f64 - 1.0

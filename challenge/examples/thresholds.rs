@@ -2,7 +2,7 @@
 //! `cargo run --release --manifest-path challenge/Cargo.toml --example thresholds -- [--write] FOLDER...`.
 //!
 //! `challenge make` and `challenge run` make such folders, `dev_score` too. The thresholds that steer the search
-//! itself (`null_excess`, `rise`, `share`, `mismatch`) act while a case is diagnosed: they are kept as they are.
+//! itself (`null_excess`, `rise`, `share`, `model_discrepancy`) act while a case is diagnosed: they are kept as they are.
 
 use std::{fs, path::Path};
 

@@ -47,6 +47,24 @@ fn files_of_a_crate_import_in_no_circle() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// The folders of the engine in the order of its flow: a file imports from its own folder and from those before it.
+const ENGINE: [&str; 9] = [
+    "numerics", "problem", "fit", "search", "missing", "evidence", "record", "verdict", "diagnose",
+];
+
+#[test]
+fn folders_of_the_engine_import_in_the_order_of_the_flow() {
+    let found = imports(&sources(&root().join("crates/stretch-gap/src")));
+    let place = |module: &Module| module.first().and_then(|f| ENGINE.iter().position(|e| e == f));
+    for folder in ENGINE {
+        assert!(found.keys().any(|m| m.first().is_some_and(|f| f == folder)), "no {folder}");
+    }
+    let against = found.iter().flat_map(|(from, all)| all.iter().map(move |to| (from, to)));
+    let against: Vec<_> =
+        against.filter(|(from, to)| place(from).is_some() && place(to) > place(from)).collect();
+    assert!(against.is_empty(), "{against:?}");
+}
+
 #[test]
 fn every_file_of_tests_is_compiled() {
     let crates = fs::read_dir(root().join("crates")).unwrap().map(|entry| entry.unwrap().path());

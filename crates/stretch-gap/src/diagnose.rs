@@ -13,7 +13,7 @@ use crate::{
         sanity::Sanity,
         shares::{EffectShare, eliminated, shares},
     },
-    fit::{hypothesis::Hypothesis, prepared::Problem},
+    fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
     numerics::stopwatch::Stopwatch,
     problem::{
         altered_parameters::Altered, error::GapError, simulator::Simulator, thresholds::Thresholds,
@@ -134,16 +134,16 @@ fn run(task: Task<'_>) -> Result<(Diagnosis, Evidence), GapError> {
 fn prepare<'a>(
     task: Task<'a>,
     between_rows: Option<&'a Altered<'a>>,
-) -> Result<(Problem<'a>, Hypothesis), GapError> {
+) -> Result<(PreparedProblem<'a>, Hypothesis), GapError> {
     let Task { simulator, options, depth, progress, stop } = task;
-    let at_rows = Problem::prepare(simulator, stop, options.seed, progress)?;
+    let at_rows = PreparedProblem::prepare(simulator, stop, options.seed, progress)?;
     let limits = (&options.thresholds, depth);
     command_timing::likelier(at_rows, between_rows, limits, options.seed, progress)
 }
 
 /// What the search found, in the problem whose nuisances the record has.
 struct Searched<'a> {
-    problem: Problem<'a>,
+    problem: PreparedProblem<'a>,
     found: Found,
     /// The best set by backward elimination.
     eliminated: Vec<(usize, Hypothesis)>,
@@ -154,7 +154,7 @@ struct Searched<'a> {
 /// Searches, once more where the nuisances turn out to be others beside what was found.
 fn search<'a>(
     task: Task<'a>,
-    problem: Problem<'a>,
+    problem: PreparedProblem<'a>,
     from: &Hypothesis,
 ) -> Result<Searched<'a>, GapError> {
     let Task { options, depth, progress, .. } = task;
@@ -187,7 +187,7 @@ fn search<'a>(
 fn doubt(
     task: Task<'_>,
     searched: &Searched<'_>,
-    (doubted, suspect): (&Problem<'_>, &Suspect<'_>),
+    (doubted, suspect): (&PreparedProblem<'_>, &Suspect<'_>),
 ) -> Result<Option<(Vec<Gross>, Found)>, GapError> {
     let (thresholds, found) = (&task.options.thresholds, &searched.found);
     (task.progress)("errors of the record");
@@ -202,7 +202,7 @@ fn doubt(
 /// What the gap is put down to: the best set of effects, or an error.
 #[derive(Clone, Copy)]
 struct Cause<'p> {
-    problem: &'p Problem<'p>,
+    problem: &'p PreparedProblem<'p>,
     found: &'p Found,
     eliminated: &'p [(usize, Hypothesis)],
     /// What is wrong with the record or the rig file.
@@ -247,8 +247,8 @@ fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Result<Judge
         shares,
         sanity,
         is_record: !cause.gross.is_empty(),
-        too_little: too_little(&evidence.frame, about.rows_used(), about.dt_s),
-        is_short: is_short(&evidence.frame, about.dt_s),
+        too_little: too_little(&evidence.roles, about.rows_used(), about.dt_s),
+        is_short: is_short(&evidence.roles, about.dt_s),
     };
     let best = &cause.found.best;
     let lacking = |names| Lacking::of(cause.problem, best, names, task.progress);
@@ -287,9 +287,9 @@ fn report(
         gross: cause.gross,
         null_band,
     };
-    let mut told = tell(answer, simulator, &evidence);
+    let mut text = tell(answer, simulator, &evidence);
     let model_runs = runs.counted();
-    told.notes.extend(model_runs.and_then(|runs| runs.note()));
+    text.notes.extend(model_runs.and_then(|runs| runs.note()));
     // What a page needs beside the answer counts as none of its cost.
     if let (true, Some(stage)) = (options.responses, location.worst()) {
         evidence.responses = responses(cause.problem, &evidence, &cause.found.best, stage)?;
@@ -298,7 +298,7 @@ fn report(
     let diagnosis = Diagnosis {
         schema: 1,
         verdict: judged.kind,
-        sentence: told.sentence,
+        sentence: text.sentence,
         tied: judged.naming.tied(),
         named: judged.naming.named,
         faint: judged.naming.faint,
@@ -316,7 +316,7 @@ fn report(
         transfer: None,
         next_experiment: None,
         baselines: options.baselines.then(simpler).transpose()?,
-        notes: told.notes,
+        notes: text.notes,
         rows_used: simulator.description().rows_used(),
         simulations,
         model_runs,
@@ -327,7 +327,7 @@ fn report(
 }
 
 /// Slices that are reported of what a partial answer leaves.
-const TOLD_SLICES: usize = 3;
+const REPORTED_SLICES: usize = 3;
 
 /// What the first candidate leaves of the held-out gap, and where it stands out.
 fn unexplained(
@@ -342,6 +342,7 @@ fn unexplained(
     let mut loud = localise::slices(simulator, evidence, |s| &s.residual_after, seed);
     loud.retain(|s| s.stands_out && s.stage == stage);
     loud.sort_by(|a, b| b.excess.total_cmp(&a.excess));
-    let sits = loud.iter().take(TOLD_SLICES).map(|s| format!("{}: {}", s.by, s.slice)).collect();
+    let sits =
+        loud.iter().take(REPORTED_SLICES).map(|s| format!("{}: {}", s.by, s.slice)).collect();
     Unexplained { share: 1.0 - first.closed, stage, sits }
 }

@@ -54,7 +54,7 @@ pub(crate) const RANGE_MM: f64 = 25.0;
 
 impl Gauge {
     pub(crate) fn lacking(lack: Lack, seed: u64) -> Self {
-        let mut dice = RandomGenerator::new(seed, 9);
+        let mut random = RandomGenerator::new(seed, 9);
         let trials = [("one", false), ("two", false), ("three", false), ("test", true)];
         let specs: Vec<TrialSpec> = trials
             .iter()
@@ -64,7 +64,7 @@ impl Gauge {
         let (mut rod_mm, mut volts) = (Vec::new(), Vec::new());
         for _ in 0..trials.len() {
             let tones: Vec<[f64; 2]> = (0..4)
-                .map(|k| [0.3 + 0.9 * f64::from(k) + 0.6 * dice.unit(), 6.0 * dice.unit()])
+                .map(|k| [0.3 + 0.9 * f64::from(k) + 0.6 * random.unit(), 6.0 * random.unit()])
                 .collect();
             let x: Vec<f64> = (0..SAMPLES)
                 .map(|i| {
@@ -73,10 +73,10 @@ impl Gauge {
                     0.5 + 0.125 * sum
                 })
                 .collect();
-            let extra = extra(lack, &x, &mut dice);
+            let extra = extra(lack, &x, &mut random);
             for (x, extra) in x.iter().zip(extra) {
                 rod_mm.push(ZERO_MM + RANGE_MM * x);
-                volts.push(0.3 + 1.02 * GAIN * x + extra + NOISE_V * dice.gauss());
+                volts.push(0.3 + 1.02 * GAIN * x + extra + NOISE_V * random.gauss());
             }
         }
         Self { description: description(specs, 1.0, &rod_mm), units: [1.0; 2], rod_mm, volts }
@@ -140,11 +140,11 @@ fn description(trials: Vec<TrialSpec>, volt: f64, rod_mm: &[f64]) -> Description
     .expect("a description that holds together")
 }
 
-fn extra(lack: Lack, x: &[f64], dice: &mut RandomGenerator) -> Vec<f64> {
+fn extra(lack: Lack, x: &[f64], random: &mut RandomGenerator) -> Vec<f64> {
     let rate =
         |i: usize| (x[(i + 1).min(x.len() - 1)] - x[i.saturating_sub(1)]) / (2.0 * DT_S) / 0.5;
-    let (mut held, mut level) = (x[0], if dice.unit() < 0.5 { 0.0 } else { 1.0 });
-    let at = dice.below(x.len());
+    let (mut held, mut level) = (x[0], if random.unit() < 0.5 { 0.0 } else { 1.0 });
+    let at = random.below(x.len());
     let mut each = |i: usize| match lack {
         Lack::Play => {
             held = x[i] - (x[i] - held).clamp(-0.1, 0.1);
@@ -156,23 +156,23 @@ fn extra(lack: Lack, x: &[f64], dice: &mut RandomGenerator) -> Vec<f64> {
             0.02 * held
         }
         Lack::Telegraph => {
-            if dice.unit() < DT_S / 1.5 {
+            if random.unit() < DT_S / 1.5 {
                 level = 1.0 - level;
             }
             0.02 * level
         }
         Lack::Jumps => {
             if i == at {
-                level = dice.gauss();
+                level = random.gauss();
             }
             0.02 * level
         }
         Lack::Curve => 0.04 * x[i] * (1.0 - x[i]),
         Lack::Nothing => 0.0,
-        Lack::Whisper => NOISE_V / 3.0 * dice.gauss(),
-        Lack::White => 0.01 * dice.gauss(),
+        Lack::Whisper => NOISE_V / 3.0 * random.gauss(),
+        Lack::White => 0.01 * random.gauss(),
         Lack::SlowDrift => {
-            held += if i == 0 { -held } else { -DT_S * held / 2.0 + DT_S.sqrt() * dice.gauss() };
+            held += if i == 0 { -held } else { -DT_S * held / 2.0 + DT_S.sqrt() * random.gauss() };
             0.01 * held
         }
     };

@@ -28,14 +28,15 @@ fn what_was_measured_cannot_tell_and_the_next_experiment_can() {
     assert_eq!(separates, ["cubic", "quadratic"]);
     // From -1 on x^2 and x^3 go apart; at the three levels again they do not.
     assert_eq!(proposal.next.name, "to both sides");
-    let d = |name: &str| proposal.menu.iter().find(|m| m.0 == name).map_or(f64::NAN, |m| m.1);
+    let d =
+        |name: &str| proposal.experiments.iter().find(|m| m.0 == name).map_or(f64::NAN, |m| m.1);
     assert_eq!(d("to both sides"), proposal.next.d);
     assert!(
         d("to both sides") > 1.0 && d("three levels") < 0.2 && d("rest") < 0.2,
         "{:?}",
-        proposal.menu
+        proposal.experiments
     );
-    assert_eq!(proposal.menu.len(), 4);
+    assert_eq!(proposal.experiments.len(), 4);
     assert!(
         !proposal.trial.is_empty() && proposal.next.why.starts_with("Move"),
         "{}",
@@ -49,9 +50,11 @@ fn preparation_counts_into_the_minutes() {
     let (measured, told, evidence) = tied();
     let proposal =
         next_experiment(&measured, &told, &evidence).expect("simulated").expect("a proposal");
-    let place = |name: &str| proposal.menu.iter().position(|m| m.0 == name).expect("of the menu");
+    let place = |name: &str| {
+        proposal.experiments.iter().position(|m| m.0 == name).expect("of the experiments")
+    };
     assert!(place("to both sides") < place("to both sides, prepared"));
-    let entry = |name: &str| &proposal.menu[place(name)];
+    let entry = |name: &str| &proposal.experiments[place(name)];
     assert_eq!(entry("to both sides").1, entry("to both sides, prepared").1);
     assert!((entry("to both sides, prepared").2 - entry("to both sides").2 - 10.0).abs() < 1e-9);
 }

@@ -11,11 +11,11 @@ fn disturbed(seed: u64, sd: f64, is_there: impl Fn(usize, f64, f64) -> bool) -> 
     let toy =
         Toy { trials: vec![(1500, false), (1500, false), (1500, true)], ..Toy::of(&[Law::Line]) };
     let x = toy.measured(seed).x;
-    let mut dice = RandomGenerator::new(seed, 60);
+    let mut random = RandomGenerator::new(seed, 60);
     let course = (0..x.len())
         .map(|i| {
             let rate = (x[(i + 1).min(x.len() - 1)] - x[i.saturating_sub(1)]) / 0.02;
-            let drawn = sd * dice.gauss();
+            let drawn = sd * random.gauss();
             if is_there(i, x[i], rate) { drawn } else { 0.0 }
         })
         .collect();

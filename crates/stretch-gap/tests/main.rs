@@ -2,22 +2,22 @@
 
 mod answers;
 mod consistent;
-mod floor;
 mod gauge;
 mod invariant;
 mod laboratory;
 mod located;
 mod missing_term;
+mod noise_too_high;
 mod null_band;
 mod probable;
 mod proposals;
 mod toy_basics;
-mod toy_frame;
 mod toy_invariance;
 mod toy_noise;
 mod toy_nuisances;
 mod toy_record;
 mod toy_refusals;
 mod toy_retuning;
+mod toy_sample_roles;
 mod toys;
 mod verdicts;

@@ -51,8 +51,8 @@ fn what_is_told_apart_is_no_tie() {
 fn half_closed(seed: u64) -> (Diagnosis, f64) {
     let (c, e) = (0.1, 0.012);
     let toy = exact().may_lack(&[Effect::Quadratic]).hiding(&[(Effect::Quadratic, &[c])]);
-    let mut dice = RandomGenerator::new(seed, 70);
-    let course = (0..toy.samples()).map(|_| e * dice.gauss()).collect();
+    let mut random = RandomGenerator::new(seed, 70);
+    let course = (0..toy.samples()).map(|_| e * random.gauss()).collect();
     let toy = Toy { courses: vec![(toy.parameter("line.zero"), course)], ..toy };
     let measured = toy.measured(seed);
     let test = &measured.x[3000..];

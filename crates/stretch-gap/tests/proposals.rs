@@ -124,8 +124,8 @@ fn nothing_is_proposed_for_noise() {
     for seed in 0..12 {
         let (proposed, verdict) = with_offset(20 + seed, |x| match seed % 2 {
             0 => {
-                let mut dice = RandomGenerator::new(seed, x.len() as u64);
-                x.iter().map(|_| 0.03 * dice.gauss()).collect()
+                let mut random = RandomGenerator::new(seed, x.len() as u64);
+                x.iter().map(|_| 0.03 * random.gauss()).collect()
             }
             _ => slow(0.03, 0.5, (x.len(), 0.01), seed ^ x[5].to_bits()),
         });
@@ -144,9 +144,10 @@ fn nothing_is_proposed_for_noise() {
 /// close it unless they do.
 #[test]
 fn a_function_of_many_terms_is_not_called_random() {
-    let mut dice = RandomGenerator::new(8, 0);
-    let waves: Vec<[f64; 2]> =
-        (0..30).map(|k| [1.0 + 0.5 * f64::from(k), std::f64::consts::TAU * dice.unit()]).collect();
+    let mut random = RandomGenerator::new(8, 0);
+    let waves: Vec<[f64; 2]> = (0..30)
+        .map(|k| [1.0 + 0.5 * f64::from(k), std::f64::consts::TAU * random.unit()])
+        .collect();
     let (proposed, verdict) = with_offset(5, |x| {
         let of = |x: &f64| {
             waves.iter().map(|[w, p]| (w * std::f64::consts::PI * x + p).sin()).sum::<f64>()

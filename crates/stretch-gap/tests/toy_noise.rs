@@ -11,8 +11,8 @@ const SAMPLES: usize = 20_000;
 const TOLD: f64 = 5.0 * 1.6 / 141.0;
 
 fn white(sd: f64, seed: u64) -> Vec<f64> {
-    let mut dice = RandomGenerator::new(seed, 0);
-    (0..SAMPLES).map(|_| sd * dice.gauss()).collect()
+    let mut random = RandomGenerator::new(seed, 0);
+    (0..SAMPLES).map(|_| sd * random.gauss()).collect()
 }
 
 fn deviation(record: &[f64], dt_s: f64) -> f64 {
@@ -113,8 +113,8 @@ fn differences_tell_of_slow_noise_what_changes_from_sample_to_sample() {
 #[test]
 fn windows_tell_slow_noise_that_differences_miss() {
     let record = slow(0.1, 0.2, (100 * WINDOW, 0.01), 6);
-    let mut dice = RandomGenerator::new(6, 1);
-    let noisy: Vec<f64> = record.iter().map(|x| x + 0.02 * dice.gauss()).collect();
+    let mut random = RandomGenerator::new(6, 1);
+    let noisy: Vec<f64> = record.iter().map(|x| x + 0.02 * random.gauss()).collect();
     let windows: Vec<Vec<f64>> = noisy.chunks(WINDOW).map(<[f64]>::to_vec).collect();
     let found = Noise::of_windows(&windows, Some(0.02), true, 0.01).expect("enough windows");
     // 100 windows of 1.28 s hold some 320 correlation times of 0.2 s twice over: 5 %, and parabolas take what is slower than a window.
@@ -124,7 +124,7 @@ fn windows_tell_slow_noise_that_differences_miss() {
     // Of what is not still, no slow part is told: only what is quick.
     let quick = Noise::of_windows(&windows, Some(0.02), false, 0.01).expect("enough windows");
     assert!(quick.sd() < 0.05 && quick.slow().0 == 0.0, "{quick:?}");
-    let samples = found.samples(50_000, &mut dice);
+    let samples = found.samples(50_000, &mut random);
     let power = samples.iter().map(|x| x * x).sum::<f64>() / 50_000.0;
     // 50 000 samples of a memory of 20: 1250 independent ones of a square, 4 %, three of them.
     approx::assert_relative_eq!(power.sqrt(), found.sd(), max_relative = 0.08);

@@ -84,7 +84,7 @@ fn scale_offset_sign_and_delay_of_an_output_are_told() {
     }
 }
 
-/// What drives the first stage is put right for it.
+/// What drives the first stage is corrected for it.
 #[test]
 fn errors_of_the_driving_column_are_told() {
     let none = Distortion::default();
@@ -128,9 +128,9 @@ fn a_copied_column_is_told_with_its_factor() {
 #[test]
 fn a_dead_column_is_told_with_where() {
     let mut record = chain().measured(2);
-    let mut dice = RandomGenerator::new(3, 0);
+    let mut random = RandomGenerator::new(3, 0);
     // The second trial, from 10 s of the session's samples on.
-    record.outputs[1][1000..2000].iter_mut().for_each(|y| *y = 0.1 + 0.01 * dice.gauss());
+    record.outputs[1][1000..2000].iter_mut().for_each(|y| *y = 0.1 + 0.01 * random.gauss());
     let told = told(&record);
     let dead = found(&told, GrossKind::Dead, "y1");
     assert_eq!(dead.trial.as_deref(), Some("trial 1"));

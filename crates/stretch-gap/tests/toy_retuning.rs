@@ -16,10 +16,10 @@ fn told(record: &Measured) -> Diagnosis {
 /// midpoint rule, which lies (2 pi rate h)^2/6 = 1.6e-4 off in the rate.
 #[test]
 fn parameters_come_back_as_near_as_theory_says() {
-    let mut dice = RandomGenerator::new(1, 0);
+    let mut random = RandomGenerator::new(1, 0);
     for law in [Law::Line, Law::Lag, Law::Oscillator, Law::Delay] {
         for seed in 0..8 {
-            let off: Vec<f64> = (0..3).map(|_| dice.gauss().clamp(-2.5, 2.5)).collect();
+            let off: Vec<f64> = (0..3).map(|_| random.gauss().clamp(-2.5, 2.5)).collect();
             let toy = Toy::of(&[law]).off_by(&off);
             let told = told(&toy.measured(seed));
             for ((p, spec), truth) in told.parameters.iter().zip(&toy.parameters).zip(&toy.truth) {
@@ -44,10 +44,10 @@ fn parameters_come_back_as_near_as_theory_says() {
 #[test]
 fn intervals_cover_where_noise_has_a_memory() {
     const SEEDS: u64 = 40;
-    let mut dice = RandomGenerator::new(2, 0);
+    let mut random = RandomGenerator::new(2, 0);
     let mut missed = 0;
     for seed in 0..SEEDS {
-        let mut toy = Toy::of(&[Law::Line]).off_by(&[dice.gauss(), dice.gauss()]);
+        let mut toy = Toy::of(&[Law::Line]).off_by(&[random.gauss(), random.gauss()]);
         // All of the noise is remembered for 0.25 s: its integral time is half a second.
         toy.courses = vec![(1, slow(0.01, 0.25, (toy.samples(), toy.dt_s), seed))];
         (toy.noise, toy.stated) = (0.001, Some(10.0));

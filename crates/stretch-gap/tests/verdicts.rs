@@ -12,9 +12,9 @@ fn line() -> Toy {
 
 /// The offset of the bench moves by noise of its own: something that no catalogue holds.
 fn restless(toy: Toy, sd: f64, seed: u64) -> Toy {
-    let mut dice = RandomGenerator::new(seed, 40);
+    let mut random = RandomGenerator::new(seed, 40);
     let zero = toy.parameter("line.zero");
-    let course = (0..toy.samples()).map(|_| sd * dice.gauss()).collect();
+    let course = (0..toy.samples()).map(|_| sd * random.gauss()).collect();
     Toy { courses: vec![(zero, course)], ..toy }
 }
 
@@ -168,8 +168,8 @@ fn strangers_get_no_name() {
 #[test]
 fn nothing_is_named_on_noise() {
     for seed in 0..40 {
-        let mut dice = RandomGenerator::new(seed, 3);
-        let off: Vec<f64> = (0..2).map(|_| 4.0 * dice.unit() - 2.0).collect();
+        let mut random = RandomGenerator::new(seed, 3);
+        let off: Vec<f64> = (0..2).map(|_| 4.0 * random.unit() - 2.0).collect();
         let told = told(&line().off_by(&off).measured(100 + seed));
         assert!(
             matches!(told.verdict, VerdictKind::NoGap | VerdictKind::Parameters),

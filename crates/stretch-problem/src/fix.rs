@@ -5,7 +5,7 @@ use std::{f64::consts::TAU, path::Path};
 use stretch_data::{Remarks, RigFile};
 use stretch_effects::EffectParameter;
 use stretch_gap::{
-    Candidate, Diagnosis, EffectSpec, EffectValue, Evidence, Frame, Model, Run, Simulator,
+    Candidate, Diagnosis, EffectSpec, EffectValue, Evidence, Model, Run, SampleRoles, Simulator,
     VerdictKind,
 };
 use stretch_sim::{Effect, SimError, Tolerance};
@@ -295,7 +295,7 @@ fn found_line(
     simulator.simulate(run, &mut simulated).ok()?;
     let mut begin = 0;
     let mut left = Vec::new();
-    for (trial, fit) in trials.iter().zip(Frame::not_tested(trials)) {
+    for (trial, fit) in trials.iter().zip(SampleRoles::not_tested(trials)) {
         let at = |i: usize| trial.start_s + i as f64 * simulator.dt_s();
         let apart = |i: usize| (measured[begin + i] - simulated[begin + i]) / unit;
         left.extend((0..fit).map(|i| (at(i), apart(i))));

@@ -10,7 +10,7 @@ use stretch_calibrate::{CalibrateError, ModelKind, Options, apply, calibrate};
 use stretch_core::Degree;
 use stretch_data::{Channel, Trial, ends};
 use stretch_gap::{
-    Evidence, Frame, GapError, Model, Noise, RandomGenerator, Role, Run, Simulator, Transfer,
+    Evidence, GapError, Model, Noise, RandomGenerator, Role, Run, SampleRoles, Simulator, Transfer,
     TransferError,
 };
 
@@ -48,10 +48,10 @@ pub(crate) fn transfer(
         })
         .collect();
     let [Some(retuned), Some(best)] = &simulated?[..] else { return Ok(None) };
-    let frame = &evidence.frame;
+    let roles = &evidence.roles;
     let dt_s = simulator.dt_s();
-    let trained = [&real, retuned, best].map(|records| trials(records, frame, dt_s, false));
-    let tested = trials(&real, frame, dt_s, true);
+    let trained = [&real, retuned, best].map(|records| trials(records, roles, dt_s, false));
+    let tested = trials(&real, roles, dt_s, true);
     let scale = span(trained[0].iter().flat_map(|t| &t.channels[0].values));
     let kinds = [ModelKind::Linear, ModelKind::Surface(Degree::POLY13)];
     let jobs: Vec<_> = kinds.iter().flat_map(|k| trained.iter().map(move |t| (*k, t))).collect();
@@ -82,7 +82,7 @@ impl Chain<'_> {
     /// The fitted trials as a model records them, with `first` as the output of the first stage; `None` where a stage cannot run on the
     /// output of the stage before.
     fn records(&self, model: &Model, first: &[f64]) -> Result<Option<Records>, GapError> {
-        let samples = self.evidence.frame.samples(self.evidence.frame.fit_trials);
+        let samples = self.evidence.roles.samples(self.evidence.roles.fit_trials);
         let mut output = first[..samples].to_vec();
         let mut before = None;
         for stage in 1..=self.sensor {
@@ -106,7 +106,7 @@ impl Chain<'_> {
         // Only the sum is read, and only after the work is done, so that no memory order is needed.
         self.simulations.fetch_add(1, Ordering::Relaxed);
         let Some(driven) = self.simulator.driven() else { return Ok(None) };
-        let run = Run::exact(stage, model, self.evidence.frame.fit_trials);
+        let run = Run::exact(stage, model, self.evidence.roles.fit_trials);
         let mut out = vec![0.0; input.len()];
         let run = Run { step: self.evidence.step, ..run };
         if !driven.simulate_on(run, input, &mut out)? {
@@ -131,9 +131,9 @@ impl Chain<'_> {
 }
 
 /// The trials to train on, or the trials to test on.
-fn trials(records: &Records, frame: &Frame, dt_s: f64, is_test: bool) -> Vec<Trial> {
+fn trials(records: &Records, roles: &SampleRoles, dt_s: f64, is_test: bool) -> Vec<Trial> {
     let mut spans: Vec<(usize, usize, usize)> = Vec::new();
-    for segment in frame.segments.iter().filter(|s| (s.role == Role::Test) == is_test) {
+    for segment in roles.segments.iter().filter(|s| (s.role == Role::Test) == is_test) {
         match spans.last_mut() {
             Some((trial, _, to)) if *trial == segment.trial && *to == segment.from => {
                 *to = segment.to;

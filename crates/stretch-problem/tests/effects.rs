@@ -89,7 +89,7 @@ fn models(simulator: &dyn Simulator, effect: usize) -> Vec<Model> {
 
 /// Effects that change no candidate experiment at any point where they are looked for.
 fn unseen<L: Laboratory>(simulator: &L) -> Vec<String> {
-    let candidates = simulator.menu();
+    let candidates = simulator.experiments();
     let nominal = Model::nominal(simulator);
     let before: Vec<_> =
         candidates.iter().map(|(_, x)| simulator.predict(&nominal, x).unwrap()).collect();

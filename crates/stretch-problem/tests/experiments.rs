@@ -56,7 +56,7 @@ fn what_motion_cannot_part_other_experiments_do() {
 fn every_experiment_is_replayed_from_its_columns() {
     let rig = rig();
     let nominal = Model::nominal(&rig);
-    for (plan, setting) in rig.menu() {
+    for (plan, setting) in rig.experiments() {
         let replay = stretch_sim::TrialPlan::from_trial(&plan.trial, rig.nominal()).unwrap();
         let quiet = stretch_sim::RunSettings { noise: false, ..Default::default() };
         let mut session = stretch_sim::Session::new(&Default::default(), &quiet).unwrap();

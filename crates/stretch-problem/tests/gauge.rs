@@ -288,7 +288,7 @@ fn twins_that_no_motion_parts_call_for_gauge_blocks() {
         diagnose(&gauge, &Options::default(), &|_| (), &|| false).expect("a diagnosis");
     assert_eq!(d.ambiguous.len(), 2, "{:?}", d.ambiguous);
     let next = next_experiment(&gauge, &d, &evidence).expect("candidates").expect("rivals");
-    assert_eq!(next.next.name, "gauge_blocks", "{:?}", next.menu);
+    assert_eq!(next.next.name, "gauge_blocks", "{:?}", next.experiments);
     let set = next.trial.channel("set_rod_mm").expect("a course");
     assert!(set.iter().all(|x| (115.0..165.0).contains(x)));
 }

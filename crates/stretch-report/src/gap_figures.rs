@@ -177,7 +177,7 @@ fn worst_segment<'a>(subject: &'a Subject<'_>, stage: usize) -> Option<&'a stret
         let part = &residual[s.from..s.to];
         part.iter().map(|r| r * r).sum::<f64>() / part.len().max(1) as f64
     };
-    let tests = subject.evidence.frame.of_role(Role::Test).filter(|s| s.to - s.from > 20);
+    let tests = subject.evidence.roles.of_role(Role::Test).filter(|s| s.to - s.from > 20);
     tests.max_by(|a, b| gap(a).total_cmp(&gap(b)))
 }
 

@@ -64,9 +64,9 @@ mod tests {
     use testkit::tolerance::F64_ROUNDING;
 
     /// Blocks of a mean square around `mean`, as uneven as those of ten independent squares: standard deviation 0.45 of it.
-    fn blocks(mean: f64, count: usize, dice: &mut RandomGenerator) -> Vec<f64> {
-        let square = |dice: &mut RandomGenerator| dice.gauss().powi(2);
-        (0..count).map(|_| mean * (0..10).map(|_| square(dice)).sum::<f64>() / 10.0).collect()
+    fn blocks(mean: f64, count: usize, random: &mut RandomGenerator) -> Vec<f64> {
+        let square = |random: &mut RandomGenerator| random.gauss().powi(2);
+        (0..count).map(|_| mean * (0..10).map(|_| square(random)).sum::<f64>() / 10.0).collect()
     }
 
     #[test]
@@ -112,8 +112,8 @@ mod tests {
     /// doubled gaps is the same to the bit.
     #[test]
     fn channels_are_drawn_in_step() {
-        let mut dice = RandomGenerator::new(4, 0);
-        let (before, after) = (blocks(6.0, 40, &mut dice), blocks(2.0, 40, &mut dice));
+        let mut random = RandomGenerator::new(4, 0);
+        let (before, after) = (blocks(6.0, 40, &mut random), blocks(2.0, 40, &mut random));
         let one = closed_interval(std::slice::from_ref(&before), std::slice::from_ref(&after), 7);
         let two = closed_interval(&[before.clone(), before], &[after.clone(), after], 7);
         assert_eq!((one.closed, one.interval, one.falls), (two.closed, two.interval, two.falls));
@@ -121,17 +121,18 @@ mod tests {
 
     #[test]
     fn the_interval_holds_the_estimate_and_narrows_with_the_root_of_the_blocks() {
-        let mut dice = RandomGenerator::new(5, 0);
-        let width = |count: usize, dice: &mut RandomGenerator| {
-            let (before, after) = (blocks(6.0, count, dice), blocks(2.0, count, dice));
+        let mut random = RandomGenerator::new(5, 0);
+        let width = |count: usize, random: &mut RandomGenerator| {
+            let (before, after) = (blocks(6.0, count, random), blocks(2.0, count, random));
             let closed = closed_interval(&[before], &[after], 1);
             let [low, high] = closed.interval;
             assert!(low <= closed.closed && closed.closed <= high, "{closed:?}");
             high - low
         };
-        let mean =
-            |count, dice: &mut RandomGenerator| (0..40).map(|_| width(count, dice)).sum::<f64>();
-        let (few, many) = (mean(30, &mut dice), mean(120, &mut dice));
+        let mean = |count, random: &mut RandomGenerator| {
+            (0..40).map(|_| width(count, random)).sum::<f64>()
+        };
+        let (few, many) = (mean(30, &mut random), mean(120, &mut random));
         // Four times the blocks: half the width. A width from 400 draws is known to 7 %, the mean of forty to 2 %; a tenth is five of these.
         assert!((few / many / 2.0 - 1.0).abs() < 0.1, "{few} {many}");
     }
@@ -141,9 +142,9 @@ mod tests {
     #[test]
     fn intervals_hold_the_true_share_as_often_as_they_say() {
         let truth = 1.0 - 1.0 / 5.0;
-        let mut dice = RandomGenerator::new(6, 0);
+        let mut random = RandomGenerator::new(6, 0);
         let mut is_held = |record: u64| {
-            let (before, after) = (blocks(6.0, 60, &mut dice), blocks(2.0, 60, &mut dice));
+            let (before, after) = (blocks(6.0, 60, &mut random), blocks(2.0, 60, &mut random));
             let [low, high] = closed_interval(&[before], &[after], record).interval;
             low <= truth && truth <= high
         };
@@ -155,9 +156,9 @@ mod tests {
     /// same reason as above. 22 is three of these above.
     #[test]
     fn chance_is_seldom_confirmed() {
-        let mut dice = RandomGenerator::new(7, 0);
+        let mut random = RandomGenerator::new(7, 0);
         let mut falls = |record: u64| {
-            let (before, after) = (blocks(3.0, 60, &mut dice), blocks(3.0, 60, &mut dice));
+            let (before, after) = (blocks(3.0, 60, &mut random), blocks(3.0, 60, &mut random));
             closed_interval(&[before], &[after], record).falls
         };
         let confirmed = (0..400).filter(|record| falls(*record)).count();

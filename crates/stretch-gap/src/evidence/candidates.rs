@@ -19,7 +19,7 @@ use crate::{
         localise::location::StageGap,
         probability::Weighed,
     },
-    fit::{hypothesis::Hypothesis, prepared::Problem},
+    fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
     problem::{error::GapError, simulator::Simulator},
 };
 
@@ -101,7 +101,7 @@ const UNKNOWN: &str = "unknown";
 
 /// Every weighed hypothesis on the test trials.
 pub(crate) fn candidates(
-    problem: &Problem<'_>,
+    problem: &PreparedProblem<'_>,
     evidence: &Evidence,
     weighed: &[Weighed],
     seed: u64,
@@ -110,7 +110,7 @@ pub(crate) fn candidates(
 }
 
 fn candidate(
-    problem: &Problem<'_>,
+    problem: &PreparedProblem<'_>,
     evidence: &Evidence,
     Weighed { hypothesis, probability }: &Weighed,
     seed: u64,
@@ -196,7 +196,7 @@ fn interval(p: &EffectParameter, value: f64, sd: f64) -> [f64; 2] {
 }
 
 /// The gap of every stage on the test trials.
-pub(crate) fn stage_gaps(problem: &Problem<'_>, evidence: &Evidence) -> Vec<StageGap> {
+pub(crate) fn stage_gaps(problem: &PreparedProblem<'_>, evidence: &Evidence) -> Vec<StageGap> {
     let total: f64 = evidence.stages.iter().map(|s| s.excess_retuned.max(0.0)).sum();
     let one = |(stage, s): (usize, &StageEvidence)| {
         let spec = &problem.simulator().stages()[stage];

@@ -11,13 +11,13 @@ use crate::{
     },
     fit::{
         hypothesis::Hypothesis,
-        prepared::Problem,
+        prepared::PreparedProblem,
         score::{self, excess, mean_square},
     },
     numerics::linear::dot,
     problem::{
         error::GapError,
-        frame::{Frame, Role, Segment},
+        sample_roles::{Role, SampleRoles, Segment},
         simulator::Model,
         thresholds::Thresholds,
     },
@@ -53,7 +53,7 @@ pub struct Evidence {
     /// Traces of every stage.
     pub stages: Vec<StageEvidence>,
     /// How the session was cut.
-    pub frame: Frame,
+    pub roles: SampleRoles,
     /// Re-tuned nominal.
     pub retuned: Model,
     /// Best set of effects, whether the verdict names it or not.
@@ -91,7 +91,7 @@ struct Traces {
 impl Traces {
     /// `level` is the variance of the noise as a share of what it was taken for.
     fn of(
-        problem: &Problem<'_>,
+        problem: &PreparedProblem<'_>,
         stage: usize,
         model: &Model,
         level: f64,
@@ -102,7 +102,7 @@ impl Traces {
         let apart = simulator.measured(stage).iter().zip(&output);
         let apart: Vec<f64> = apart.map(|(m, s)| m - s).collect();
         let (whole, residual) = held_out(problem, stage, model, &apart);
-        let mut blocks = test_blocks(&compare.frame, &whole, &residual);
+        let mut blocks = test_blocks(&compare.roles, &whole, &residual);
         blocks.iter_mut().for_each(|x| *x /= level);
         Ok(Self { output, residual, blocks })
     }
@@ -111,7 +111,7 @@ impl Traces {
 /// A difference of outputs in multiples of the noise, and that without the most likely nuisances; without the lines that a model leaves where it is not
 /// fitted. Both are linear in it.
 pub(crate) fn held_out(
-    problem: &Problem<'_>,
+    problem: &PreparedProblem<'_>,
     stage: usize,
     model: &Model,
     apart: &[f64],
@@ -120,9 +120,9 @@ pub(crate) fn held_out(
     let metric = &compare.metrics[stage];
     let mut whole: Vec<f64> = apart.iter().zip(&metric.noise.sd).map(|(x, sd)| x / sd).collect();
     let mut residual = whole.clone();
-    metric.clean(&compare.frame, &mut residual);
+    metric.clean(&compare.roles, &mut residual);
     let lines = simulator.spectral_lines().map_or_else(Vec::new, |s| s.lines(stage, model));
-    for tested in compare.frame.of_role(Role::Test).map(|s| s.from..s.to) {
+    for tested in compare.roles.of_role(Role::Test).map(|s| s.from..s.to) {
         let sd = &metric.noise.sd[tested.clone()];
         for line in &lines {
             line.level(&mut residual[tested.clone()], sd, simulator.dt_s());
@@ -133,20 +133,20 @@ pub(crate) fn held_out(
 }
 
 /// r V^-1 r by block: V^-1 r is the residual without its most likely nuisances, whose own improbability so counts.
-fn test_blocks(frame: &Frame, whole: &[f64], clean: &[f64]) -> Vec<f64> {
+fn test_blocks(roles: &SampleRoles, whole: &[f64], clean: &[f64]) -> Vec<f64> {
     let block = |s: &Segment| {
-        let parts = whole[s.from..s.to].chunks_exact(frame.block);
-        let pairs = parts.zip(clean[s.from..s.to].chunks_exact(frame.block));
+        let parts = whole[s.from..s.to].chunks_exact(roles.block);
+        let pairs = parts.zip(clean[s.from..s.to].chunks_exact(roles.block));
         pairs.map(|(r, c)| dot(r, c) / r.len() as f64).collect::<Vec<f64>>()
     };
-    frame.of_role(Role::Test).flat_map(block).collect()
+    roles.of_role(Role::Test).flat_map(block).collect()
 }
 
 impl Evidence {
     /// Runs the simulator as shipped, re-tuned and with the best set over every trial, and weighs the best set against its
     /// rivals.
     pub(crate) fn gather(
-        problem: &Problem<'_>,
+        problem: &PreparedProblem<'_>,
         thresholds: &Thresholds,
         found: &Found,
     ) -> Result<(Self, Vec<Weighed>), GapError> {
@@ -176,7 +176,7 @@ impl Evidence {
         let weighed = weigh(thresholds, &found.best, gap, &found.rivals);
         let evidence = Self {
             stages,
-            frame: problem.compare.frame.clone(),
+            roles: problem.compare.roles.clone(),
             step: problem.compare.runs.step(),
             retuned: problem.nominal.model.clone(),
             best: found.best.model.clone(),
@@ -194,7 +194,7 @@ impl Evidence {
     }
 
     /// What the best set leaves of a stage, as [`held_out`] gives it.
-    pub(crate) fn left(&self, problem: &Problem<'_>, stage: usize) -> (Vec<f64>, Vec<f64>) {
+    pub(crate) fn left(&self, problem: &PreparedProblem<'_>, stage: usize) -> (Vec<f64>, Vec<f64>) {
         let measured = problem.simulator().measured(stage).iter();
         let apart: Vec<f64> = measured.zip(&self.stages[stage].after).map(|(m, s)| m - s).collect();
         held_out(problem, stage, &self.best, &apart)
@@ -208,7 +208,7 @@ impl Evidence {
     /// Reduced chi-square of a model by test block of a stage.
     pub(crate) fn blocks(
         &self,
-        problem: &Problem<'_>,
+        problem: &PreparedProblem<'_>,
         stage: usize,
         model: &Model,
     ) -> Result<Vec<f64>, GapError> {
@@ -217,7 +217,7 @@ impl Evidence {
 }
 
 /// Variance of a stage's noise as a share of what it was taken for. Without an effect there nothing says that it was too high.
-fn level(problem: &Problem<'_>, best: &Hypothesis, stage: usize) -> f64 {
+fn level(problem: &PreparedProblem<'_>, best: &Hypothesis, stage: usize) -> f64 {
     let effects = problem.simulator().effects();
     let mut acting = best.effects.iter();
     match acting.any(|e| effects[*e].touches.contains(&stage)) {
@@ -228,7 +228,7 @@ fn level(problem: &Problem<'_>, best: &Hypothesis, stage: usize) -> f64 {
 
 /// Of the fitted and the test trials the greater: a gap that only one of them shows is a gap.
 fn gap(
-    problem: &Problem<'_>,
+    problem: &PreparedProblem<'_>,
     best: &Hypothesis,
     stages: &[StageEvidence],
     levels: &[f64],

@@ -13,9 +13,9 @@
 use rayon::prelude::*;
 
 use crate::{
-    fit::{prepared::Problem, score::gap},
+    fit::{prepared::PreparedProblem, score::gap},
     numerics::random::RandomGenerator,
-    problem::{error::GapError, frame::Role, simulator::Run},
+    problem::{error::GapError, sample_roles::Role, simulator::Run},
 };
 
 /// Records that are drawn, and the share of them that lies within the band.
@@ -24,7 +24,7 @@ const WITHIN: f64 = 0.95;
 
 /// The excess that 19 of 20 records stay below in which nothing is missing; as every gap the greater of fitted and tested, summed over
 /// stages.
-pub(crate) fn null_band(problem: &Problem<'_>, seed: u64) -> Result<f64, GapError> {
+pub(crate) fn null_band(problem: &PreparedProblem<'_>, seed: u64) -> Result<f64, GapError> {
     let stages = 0..problem.compare.metrics.len();
     let arrives: Result<Vec<Vec<f64>>, GapError> =
         stages.map(|stage| arrives(problem, stage)).collect();
@@ -38,13 +38,13 @@ pub(crate) fn null_band(problem: &Problem<'_>, seed: u64) -> Result<f64, GapErro
 
 /// Excess of one record.
 fn excess(
-    problem: &Problem<'_>,
+    problem: &PreparedProblem<'_>,
     arrives: &[Vec<f64>],
     record: usize,
     mut random: RandomGenerator,
 ) -> f64 {
-    let frame = &problem.compare.frame;
-    let looked = (frame.count(Role::Fit) + frame.count(Role::Held)) as f64;
+    let roles = &problem.compare.roles;
+    let looked = (roles.count(Role::Fit) + roles.count(Role::Held)) as f64;
     let (mut fitted, mut tested) = (0.0, 0.0);
     for (stage, arrives) in arrives.iter().enumerate() {
         let own = (1.0 - problem.transmits(stage)).max(0.0);
@@ -55,26 +55,27 @@ fn excess(
             gap((white + 2.0 * random.gauss() * (own * other).sqrt() + other) / samples)
         };
         fitted += chance(looked);
-        tested += chance((frame.count(Role::Test) as f64).max(1.0));
+        tested += chance((roles.count(Role::Test) as f64).max(1.0));
     }
     f64::max(fitted, tested)
 }
 
 /// t'V^-1 t a sample, by record.
-fn arrives(problem: &Problem<'_>, stage: usize) -> Result<Vec<f64>, GapError> {
+fn arrives(problem: &PreparedProblem<'_>, stage: usize) -> Result<Vec<f64>, GapError> {
     if problem.transmits(stage) == 0.0 {
         return Ok(vec![0.0; RECORDS]);
     }
     let compare = &problem.compare;
-    let (model, trials) = (&problem.nominal.model, compare.frame.fit_trials);
+    let (model, trials) = (&problem.nominal.model, compare.roles.fit_trials);
     let run = Run::exact(stage, model, trials);
-    let plain = compare.runs.run(run)?;
+    let undisturbed = compare.runs.run(run)?;
     let metric = &compare.metrics[stage];
-    let samples = compare.frame.count(Role::Fit) + compare.frame.count(Role::Held);
+    let samples = compare.roles.count(Role::Fit) + compare.roles.count(Role::Held);
     let one = |record: usize| {
-        let shaken = compare.arrived(Run { input_noise: Some(record as u64), ..run }, &plain)?;
-        let column = metric.column(&compare.frame, shaken);
-        let square = |role| metric.product(&compare.frame, &column, &column, role);
+        let disturbed =
+            compare.arrived(Run { input_noise: Some(record as u64), ..run }, &undisturbed)?;
+        let column = metric.column(&compare.roles, disturbed);
+        let square = |role| metric.product(&compare.roles, &column, &column, role);
         Ok((square(Role::Fit) + square(Role::Held)) / samples.max(1) as f64)
     };
     (0..RECORDS).into_par_iter().map(one).collect()

@@ -9,9 +9,9 @@ use crate::{
         gathered::{Evidence, held_out},
         response::{Answered, Response, Responses},
     },
-    fit::{hypothesis::Hypothesis, levenberg_marquardt::possible, prepared::Problem},
+    fit::{hypothesis::Hypothesis, levenberg_marquardt::possible, prepared::PreparedProblem},
     numerics::linear::dot,
-    problem::{error::GapError, frame::Role},
+    problem::{error::GapError, sample_roles::Role},
 };
 
 /// Where the values lie: shares of the reach on either side of the fitted one.
@@ -31,7 +31,7 @@ struct Turned<'a> {
 
 /// The answers of a stage around the best set; none where no number of an effect acts in it that may be turned at no great cost.
 pub(crate) fn responses(
-    problem: &Problem<'_>,
+    problem: &PreparedProblem<'_>,
     evidence: &Evidence,
     best: &Hypothesis,
     stage: usize,
@@ -71,7 +71,7 @@ pub(crate) fn responses(
 }
 
 /// The numbers of a set's effects that act in a stage and may be turned at no great cost.
-fn turned<'a>(problem: &Problem<'a>, best: &Hypothesis, stage: usize) -> Vec<Turned<'a>> {
+fn turned<'a>(problem: &PreparedProblem<'a>, best: &Hypothesis, stage: usize) -> Vec<Turned<'a>> {
     let simulator = problem.simulator();
     let mut turned = Vec::new();
     for &effect in &best.effects {
@@ -106,16 +106,20 @@ fn values(spec: &EffectParameter, fitted: f64, sd: f64) -> Vec<f64> {
 
 /// x' V^-1 y of every pair, a mean over the blocks of the test trials; `columns` hold x and V^-1 x, in multiples of the noise whose square is `level` of
 /// what they were taken for.
-fn products(problem: &Problem<'_>, level: f64, columns: &[(&[f64], &[f64])]) -> Vec<Vec<f64>> {
-    let frame = &problem.compare.frame;
-    let blocks: Vec<std::ops::Range<usize>> = frame
+fn products(
+    problem: &PreparedProblem<'_>,
+    level: f64,
+    columns: &[(&[f64], &[f64])],
+) -> Vec<Vec<f64>> {
+    let roles = &problem.compare.roles;
+    let blocks: Vec<std::ops::Range<usize>> = roles
         .of_role(Role::Test)
         .flat_map(|s| {
-            let count = (s.to - s.from) / frame.block;
-            (0..count).map(move |k| s.from + k * frame.block..s.from + (k + 1) * frame.block)
+            let count = (s.to - s.from) / roles.block;
+            (0..count).map(move |k| s.from + k * roles.block..s.from + (k + 1) * roles.block)
         })
         .collect();
-    let samples = (blocks.len() * frame.block).max(1) as f64;
+    let samples = (blocks.len() * roles.block).max(1) as f64;
     let product = |x: &[f64], y: &[f64]| {
         blocks.iter().map(|b| dot(&x[b.clone()], &y[b.clone()])).sum::<f64>() / samples / level
     };

@@ -10,9 +10,11 @@
 
 use crate::{
     evidence::gathered::Evidence,
-    fit::{hypothesis::Hypothesis, levenberg_marquardt::FINE, prepared::Problem, score::gap},
+    fit::{
+        hypothesis::Hypothesis, levenberg_marquardt::FINE, prepared::PreparedProblem, score::gap,
+    },
     problem::{
-        altered_parameters::Altered, error::GapError, frame::Role, simulator::Simulator,
+        altered_parameters::Altered, error::GapError, sample_roles::Role, simulator::Simulator,
         spec::ParameterSpec,
     },
 };
@@ -53,7 +55,7 @@ pub(crate) struct AtBounds {
 
 impl Sanity {
     pub(crate) fn of(
-        problem: &Problem<'_>,
+        problem: &PreparedProblem<'_>,
         best: &Hypothesis,
         evidence: &Evidence,
     ) -> Result<Self, GapError> {
@@ -70,7 +72,7 @@ impl Sanity {
 fn left(simulator: &dyn Simulator, evidence: &Evidence, stage: usize) -> f64 {
     let (traces, measured) = (&evidence.stages[stage], simulator.measured(stage));
     let (mut count, mut sum, mut squares, mut left) = (0.0, 0.0, 0.0, 0.0);
-    for segment in evidence.frame.of_role(Role::Test) {
+    for segment in evidence.roles.of_role(Role::Test) {
         // What was not measured counts for nothing, whatever stands in its place.
         let is_lost = |i: &usize| simulator.record().is_lost.get(*i) == Some(&true);
         for i in (segment.from..segment.to).filter(|i| !is_lost(i)) {
@@ -87,7 +89,7 @@ fn left(simulator: &dyn Simulator, evidence: &Evidence, stage: usize) -> f64 {
 }
 
 fn at_bounds(
-    problem: &Problem<'_>,
+    problem: &PreparedProblem<'_>,
     best: &Hypothesis,
     evidence: &Evidence,
 ) -> Result<Option<AtBounds>, GapError> {
@@ -118,7 +120,7 @@ fn at_bounds(
 
 /// Excess of a stage without effects, some of its parameters set loose.
 fn loosened(
-    problem: &Problem<'_>,
+    problem: &PreparedProblem<'_>,
     evidence: &Evidence,
     stage: usize,
     ended: &[usize],

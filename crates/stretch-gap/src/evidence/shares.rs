@@ -10,7 +10,7 @@ use crate::{
     evidence::gathered::Evidence,
     fit::{
         hypothesis::Hypothesis,
-        prepared::Problem,
+        prepared::PreparedProblem,
         score::{excess, mean_square},
     },
     problem::error::GapError,
@@ -57,13 +57,13 @@ pub(crate) fn eliminated(
 
 /// What each effect closes of the held-out gap, the strongest first. Stages whose gap is below `least_gap` have none.
 pub(crate) fn shares(
-    problem: &Problem<'_>,
+    problem: &PreparedProblem<'_>,
     evidence: &Evidence,
     best: &Hypothesis,
     eliminated: &[(usize, Hypothesis)],
     least_gap: f64,
 ) -> Result<Vec<EffectShare>, GapError> {
-    // Floors are known to some per cent: what the best set leaves is the noise where it is less than they say.
+    // Noise is known to some per cent: what the best set leaves is the noise where it is less than they say.
     let least: Vec<f64> = evidence.stages.iter().map(|s| s.excess_after.min(0.0)).collect();
     let above =
         |stage: usize, blocks: &[f64]| (excess(mean_square(blocks)) - least[stage]).max(0.0);

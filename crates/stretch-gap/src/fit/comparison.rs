@@ -13,8 +13,8 @@ use crate::{
     numerics::linear::dot,
     problem::{
         error::GapError,
-        frame::{Frame, Role},
         runs::Runs,
+        sample_roles::{Role, SampleRoles},
         simulator::{Model, Run, Simulator},
     },
 };
@@ -26,7 +26,7 @@ const DRAWS: u64 = 4;
 #[derive(Clone)]
 pub(crate) struct Comparison<'a> {
     pub(crate) runs: Runs<'a>,
-    pub(crate) frame: Frame,
+    pub(crate) roles: SampleRoles,
     /// One per stage.
     pub(crate) metrics: Vec<Metric>,
 }
@@ -35,23 +35,23 @@ pub(crate) struct Comparison<'a> {
 pub(crate) type Sensitivities = Vec<(usize, Column)>;
 
 impl<'a> Comparison<'a> {
-    /// Floors and metrics around a model; nuisances as large as those of `like`, where there is one.
+    /// Noise and metrics around a model; nuisances as large as those of `like`, where there is one.
     pub(crate) fn around(
         runs: Runs<'a>,
-        frame: Frame,
+        roles: SampleRoles,
         model: &Model,
         like: Option<&[Metric]>,
         seed: u64,
     ) -> Result<Self, GapError> {
-        let levels = noise_levels(&runs, &frame, model, seed)?;
+        let levels = noise_levels(&runs, &roles, model, seed)?;
         let levels: Vec<_> = levels.into_iter().enumerate().collect();
         let metrics: Result<Vec<Metric>, GapError> = levels
             .into_par_iter()
             .map(|(stage, noise)| {
-                Metric::of(&runs, &frame, stage, noise, model, like.map(|l| &l[stage]))
+                Metric::of(&runs, &roles, stage, noise, model, like.map(|l| &l[stage]))
             })
             .collect();
-        Ok(Self { metrics: metrics?, runs, frame })
+        Ok(Self { metrics: metrics?, runs, roles })
     }
 
     /// Nuisances as large and as quick as the residual of a model has them; the rise of their likelihood, nats.
@@ -61,7 +61,7 @@ impl<'a> Comparison<'a> {
         for stage in 0..self.metrics.len() {
             if !self.metrics[stage].loose().is_empty() {
                 let residual = self.residual_values(stage, model)?;
-                let (metric, more) = self.metrics[stage].adapted(&self.frame, dt_s, &residual);
+                let (metric, more) = self.metrics[stage].adapted(&self.roles, dt_s, &residual);
                 self.metrics[stage] = metric;
                 gained += more;
             }
@@ -78,7 +78,7 @@ impl<'a> Comparison<'a> {
     where
         'a: 'b,
     {
-        Comparison { runs: self.runs.beside(simulator), frame: self.frame.clone(), metrics }
+        Comparison { runs: self.runs.beside(simulator), roles: self.roles.clone(), metrics }
     }
 
     pub(crate) fn simulator(&self) -> &'a dyn Simulator {
@@ -87,7 +87,7 @@ impl<'a> Comparison<'a> {
 
     /// An observation for each block: what the cost of a fit counts, whatever the residual's own memory is.
     pub(crate) fn weight(&self) -> f64 {
-        1.0 / self.frame.block as f64
+        1.0 / self.roles.block as f64
     }
 
     /// Measured minus simulated, in multiples of the noise, over the trials that fits run.
@@ -102,7 +102,7 @@ impl<'a> Comparison<'a> {
 
     /// The run of a stage over the trials that fits run; may be taken from the linearisation at a run near by.
     fn run_of<'m>(&self, stage: usize, model: &'m Model, near: Option<&'m [f64]>) -> Run<'m> {
-        Run { near, ..Run::exact(stage, model, self.frame.fit_trials) }
+        Run { near, ..Run::exact(stage, model, self.roles.fit_trials) }
     }
 
     /// Measured minus simulated, in multiples of the noise.
@@ -129,19 +129,19 @@ impl<'a> Comparison<'a> {
     /// Measured minus simulated, in multiples of the noise, ready for products.
     pub(crate) fn residual(&self, stage: usize, model: &Model) -> Result<Column, GapError> {
         let values = self.residual_values(stage, model)?;
-        Ok(self.metrics[stage].column(&self.frame, values))
+        Ok(self.metrics[stage].column(&self.roles, values))
     }
 
     /// x'V^-1 y of a stage over the fitted samples.
     pub(crate) fn product(&self, stage: usize, x: &Column, y: &Column) -> f64 {
-        self.metrics[stage].product(&self.frame, x, y, Role::Fit)
+        self.metrics[stage].product(&self.roles, x, y, Role::Fit)
     }
 
     /// Reduced chi-squares of a residual, at the noise that its own model transmits.
     pub(crate) fn misfit(&self, stage: usize, residual: &Column) -> Misfit {
         let mean = |role| {
-            let n = self.frame.count(role) as f64;
-            let sum = self.metrics[stage].product(&self.frame, residual, residual, role);
+            let n = self.roles.count(role) as f64;
+            let sum = self.metrics[stage].product(&self.roles, residual, residual, role);
             if n > 0.0 { sum / n } else { 1.0 }
         };
         let octaves = self.octaves(stage, &residual.values);
@@ -150,7 +150,7 @@ impl<'a> Comparison<'a> {
 
     /// Reduced chi-square over fitted and held-out samples together.
     pub(crate) fn mean_square(&self, misfit: &Misfit) -> f64 {
-        let (fit, held) = (self.frame.blocks(Role::Fit), self.frame.blocks(Role::Held));
+        let (fit, held) = (self.roles.blocks(Role::Fit), self.roles.blocks(Role::Held));
         (fit * misfit.fit + held * misfit.held) / (fit + held)
     }
 
@@ -161,17 +161,17 @@ impl<'a> Comparison<'a> {
         model: &Model,
     ) -> Result<f64, GapError> {
         let mut values = self.residual_values(stage, model)?;
-        self.metrics[stage].clean(&self.frame, &mut values);
-        let parts = self.frame.of_role(Role::Fit).map(|s| &values[s.from..s.to]);
-        Ok(samples_per_observation(&parts.collect::<Vec<_>>(), self.frame.block))
+        self.metrics[stage].clean(&self.roles, &mut values);
+        let parts = self.roles.of_role(Role::Fit).map(|s| &values[s.from..s.to]);
+        Ok(samples_per_observation(&parts.collect::<Vec<_>>(), self.roles.block))
     }
 
     /// Octaves of a residual in multiples of the noise over fitted and held-out samples.
     fn octaves(&self, stage: usize, residual: &[f64]) -> Octaves {
         let mut clean = residual.to_vec();
-        self.metrics[stage].clean(&self.frame, &mut clean);
+        self.metrics[stage].clean(&self.roles, &mut clean);
         let mut octaves = Octaves::default();
-        for s in self.frame.looked_at() {
+        for s in self.roles.looked_at() {
             octaves.add(&residual[s.from..s.to], &clean[s.from..s.to]);
         }
         octaves
@@ -179,19 +179,19 @@ impl<'a> Comparison<'a> {
 
     /// Noise transmitted: what of the measured input's noise arrives at the output of a stage, in variances of the noise.
     pub(crate) fn transmitted(&self, stage: usize, model: &Model) -> Result<Misfit, GapError> {
-        let run = Run::exact(stage, model, self.frame.fit_trials);
-        let plain = self.runs.run(run)?;
+        let run = Run::exact(stage, model, self.roles.fit_trials);
+        let undisturbed = self.runs.run(run)?;
         let mut mean = Misfit { stage, ..Misfit::default() };
         for draw in 0..DRAWS {
-            let arrived = self.arrived(Run { input_noise: Some(draw), ..run }, &plain)?;
+            let arrived = self.arrived(Run { input_noise: Some(draw), ..run }, &undisturbed)?;
             let power = |role| {
-                let parts = self.frame.of_role(role).map(|s| &arrived[s.from..s.to]);
+                let parts = self.roles.of_role(role).map(|s| &arrived[s.from..s.to]);
                 let sum: f64 = parts.map(|part| dot(part, part)).sum();
-                sum / (self.frame.count(role) as f64).max(1.0)
+                sum / (self.roles.count(role) as f64).max(1.0)
             };
             mean.fit += power(Role::Fit) / DRAWS as f64;
             mean.held += power(Role::Held) / DRAWS as f64;
-            for s in self.frame.looked_at() {
+            for s in self.roles.looked_at() {
                 mean.octaves.add(&arrived[s.from..s.to], &arrived[s.from..s.to]);
             }
             if mean.fit == 0.0 {
@@ -202,11 +202,11 @@ impl<'a> Comparison<'a> {
         Ok(mean)
     }
 
-    /// What one draw of the measured input's noise makes of an output that is `plain` without it, in multiples of the noise.
-    pub(crate) fn arrived(&self, run: Run<'_>, plain: &[f64]) -> Result<Vec<f64>, GapError> {
+    /// What one draw of the measured input's noise makes of an output that is `undisturbed` without it, in multiples of the noise.
+    pub(crate) fn arrived(&self, run: Run<'_>, undisturbed: &[f64]) -> Result<Vec<f64>, GapError> {
         let mut arrived = self.runs.run(run)?;
         let sds = &self.metrics[run.stage].noise.sd;
-        for ((x, y), sd) in arrived.iter_mut().zip(plain).zip(sds) {
+        for ((x, y), sd) in arrived.iter_mut().zip(undisturbed).zip(sds) {
             *x = (*x - y) / sd;
         }
         Ok(arrived)
@@ -256,7 +256,7 @@ impl<'a> Comparison<'a> {
             };
             let here = &residuals[s].values;
             let values = here.iter().zip(there).map(|(a, b)| (a - b) / step).collect();
-            Ok((c, s, self.metrics[stages[s]].column(&self.frame, values)))
+            Ok((c, s, self.metrics[stages[s]].column(&self.roles, values)))
         });
         let columns: Result<Vec<_>, GapError> = columns.collect();
         let mut out = vec![vec![None; stages.len()]; coordinates.len()];

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use crate::{
     fit::metric::{Level, Loose, Metric},
-    problem::frame::{Frame, Role},
+    problem::sample_roles::{Role, SampleRoles},
 };
 
 /// Sizes that are tried, as multiples of what the simulator describes.
@@ -30,17 +30,17 @@ const SPREAD: (f64, f64) = (0.7, 1.1);
 impl Metric {
     /// The metric with nuisances of the greatest likelihood for a residual in multiples of the noise, and by how many nats it is greater than with
     /// those of this one.
-    pub(crate) fn adapted(&self, frame: &Frame, dt_s: f64, residual: &[f64]) -> (Self, f64) {
+    pub(crate) fn adapted(&self, roles: &SampleRoles, dt_s: f64, residual: &[f64]) -> (Self, f64) {
         let (mut best, mut gained) = (self.clone(), 0.0);
         for which in 0..self.loose().len() {
             let own = best.loose()[which].level;
             let levels = hypotheses(&best.loose()[which]).chain([own]);
-            let one = |level| best.with(|i, own| if i == which { level } else { own }, frame, dt_s);
+            let one = |level| best.with(|i, own| if i == which { level } else { own }, roles, dt_s);
             let levels: Vec<Level> = levels.collect();
             let tried: Vec<Self> = levels.into_par_iter().map(one).collect();
-            let noise = tried.par_iter().map(|m| m.spectral_level(frame, residual));
+            let noise = tried.par_iter().map(|m| m.spectral_level(roles, residual));
             let noise = noise.reduce(|| f64::INFINITY, f64::min).max(1.0).sqrt();
-            let fit = |m: &Self| m.beside(frame, dt_s, residual, noise);
+            let fit = |m: &Self| m.beside(roles, dt_s, residual, noise);
             let fits: Vec<f64> = tried.par_iter().map(fit).collect();
             let before = fits.last().copied().unwrap_or(0.0);
             let all = fits.iter().copied().zip(&tried);
@@ -60,8 +60,14 @@ impl Metric {
     ///
     /// where l is L of the module's head without ln p, and l_k has nuisance i at level k of the grid and the others as they are. It is
     /// exact for one nuisance, and as independent ones are beyond.
-    pub(crate) fn evidence(&self, frame: &Frame, dt_s: f64, residual: &[f64], noise: f64) -> f64 {
-        let own = self.likelihood_beside(frame, dt_s, residual, noise);
+    pub(crate) fn evidence(
+        &self,
+        roles: &SampleRoles,
+        dt_s: f64,
+        residual: &[f64],
+        noise: f64,
+    ) -> f64 {
+        let own = self.likelihood_beside(roles, dt_s, residual, noise);
         let one = |which: usize| {
             let loose = &self.loose()[which];
             let levels: Vec<Level> = hypotheses(loose).collect();
@@ -69,8 +75,8 @@ impl Metric {
                 return 0.0;
             }
             let fit = |&level: &Level| {
-                let at = self.with(|i, own| if i == which { level } else { own }, frame, dt_s);
-                at.likelihood_beside(frame, dt_s, residual, noise) - own - cost(loose, level)
+                let at = self.with(|i, own| if i == which { level } else { own }, roles, dt_s);
+                at.likelihood_beside(roles, dt_s, residual, noise) - own - cost(loose, level)
             };
             let fits: Vec<f64> = levels.par_iter().map(fit).collect();
             let prior = levels.iter().map(|level| -cost(loose, *level));
@@ -80,38 +86,44 @@ impl Metric {
     }
 
     /// L of the module's head beside noise that is `noise` times as large.
-    fn beside(&self, frame: &Frame, dt_s: f64, residual: &[f64], noise: f64) -> f64 {
+    fn beside(&self, roles: &SampleRoles, dt_s: f64, residual: &[f64], noise: f64) -> f64 {
         let price: f64 = self.loose().iter().map(|loose| cost(loose, loose.level)).sum();
-        self.likelihood_beside(frame, dt_s, residual, noise) - price
+        self.likelihood_beside(roles, dt_s, residual, noise) - price
     }
 
     /// The likelihood beside noise that is `noise` times as large: V/s has nuisances that much smaller.
-    fn likelihood_beside(&self, frame: &Frame, dt_s: f64, residual: &[f64], noise: f64) -> f64 {
+    fn likelihood_beside(
+        &self,
+        roles: &SampleRoles,
+        dt_s: f64,
+        residual: &[f64],
+        noise: f64,
+    ) -> f64 {
         if noise == 1.0 {
-            return self.likelihood(frame, residual);
+            return self.likelihood(roles, residual);
         }
         let smaller = |_, level: Level| Level { size: level.size / noise, ..level };
         let scaled: Vec<f64> = residual.iter().map(|r| r / noise).collect();
-        self.with(smaller, frame, dt_s).likelihood(frame, &scaled)
+        self.with(smaller, roles, dt_s).likelihood(roles, &scaled)
     }
 
     /// -(r'V^-1 r + ln det V)/2 over the samples that are not tested on.
-    fn likelihood(&self, frame: &Frame, residual: &[f64]) -> f64 {
-        let column = self.column(frame, residual.to_vec());
-        let square = |role| self.product(frame, &column, &column, role);
-        let ln_det = self.ln_det(frame, Role::Fit) + self.ln_det(frame, Role::Held);
+    fn likelihood(&self, roles: &SampleRoles, residual: &[f64]) -> f64 {
+        let column = self.column(roles, residual.to_vec());
+        let square = |role| self.product(roles, &column, &column, role);
+        let ln_det = self.ln_det(roles, Role::Fit) + self.ln_det(roles, Role::Held);
         -0.5 * (square(Role::Fit) + square(Role::Held) + ln_det)
     }
 
     /// s of the module's head for one residual.
-    pub(crate) fn spectral_level(&self, frame: &Frame, residual: &[f64]) -> f64 {
+    pub(crate) fn spectral_level(&self, roles: &SampleRoles, residual: &[f64]) -> f64 {
         let mut clean = residual.to_vec();
-        self.clean(frame, &mut clean);
-        let looked = frame.looked_at().filter(|s| s.to <= clean.len());
-        let blocks = looked.flat_map(|s| clean[s.from..s.to].chunks_exact(frame.block));
+        self.clean(roles, &mut clean);
+        let looked = roles.looked_at().filter(|s| s.to <= clean.len());
+        let blocks = looked.flat_map(|s| clean[s.from..s.to].chunks_exact(roles.block));
         let means = blocks.map(|b| b.iter().sum::<f64>() / b.len() as f64);
         let (count, sum) = means.fold((0.0, 0.0), |(n, sum), mean| (n + 1.0, sum + mean * mean));
-        frame.block as f64 * sum / f64::max(count, 1.0)
+        roles.block as f64 * sum / f64::max(count, 1.0)
     }
 }
 
@@ -141,7 +153,8 @@ fn log_sum_exp(values: impl IntoIterator<Item = f64>) -> f64 {
 mod tests {
     use super::*;
     use crate::{
-        fit::noise_level::NoiseLevel, numerics::random::RandomGenerator, problem::frame::Segment,
+        fit::noise_level::NoiseLevel, numerics::random::RandomGenerator,
+        problem::sample_roles::Segment,
     };
 
     /// A residual of noise and a drift that acts with changing strength.
@@ -161,17 +174,17 @@ mod tests {
         let samples = 20_000;
         let drive: Vec<f64> = (0..samples).map(|i| 2.0 + (0.003 * i as f64).sin()).collect();
         let noise = NoiseLevel { sd: vec![1.0; samples], rms: 1.0, source: String::new() };
-        let frame = Frame {
+        let roles = SampleRoles {
             segments: vec![Segment { trial: 0, from: 0, to: samples, role: Role::Fit }],
             block: 50,
             fit_trials: 1,
             borrowed_test: false,
         };
         let described = crate::problem::spec::SlowDrift { sd: 1.0, correlation_s: 4.0 };
-        let metric = Metric::with_drift(noise, drive.clone(), described, &frame, 0.01);
+        let metric = Metric::with_drift(noise, drive.clone(), described, &roles, 0.01);
         for (size, time_s) in [(0.4, 0.7), (1.6, 3.0), (1.0, 12.0)] {
             let record = residual(size, time_s, &drive);
-            let (adapted, gained) = metric.adapted(&frame, 0.01, &record);
+            let (adapted, gained) = metric.adapted(&roles, 0.01, &record);
             let Level { size: found, time_s: found_s } = adapted.loose()[0].level;
             // The next one of the grid at most.
             assert!((0.55..1.8).contains(&(found / size)), "{found} for {size}");
@@ -180,9 +193,9 @@ mod tests {
         }
         // What is integrated over lies below the greatest, and not below what the greatest's own share of the prior leaves of it.
         let record = residual(1.0, 3.0, &drive);
-        let (best, _) = metric.adapted(&frame, 0.01, &record);
-        let evidence = best.evidence(&frame, 0.01, &record, 1.0);
-        let most = best.likelihood(&frame, &record);
+        let (best, _) = metric.adapted(&roles, 0.01, &record);
+        let evidence = best.evidence(&roles, 0.01, &record, 1.0);
+        let most = best.likelihood(&roles, &record);
         let count = (SIZES.len() * TIMES_S.len()) as f64;
         assert!(evidence < most, "{evidence} {most}");
         assert!(
@@ -190,11 +203,11 @@ mod tests {
             "{evidence} {most}"
         );
         // The same integral from any level that it is begun at.
-        let begun = metric.evidence(&frame, 0.01, &record, 1.0);
+        let begun = metric.evidence(&roles, 0.01, &record, 1.0);
         approx::assert_abs_diff_eq!(begun, evidence, epsilon = 1e-6);
         // Noise alone: as little as there is, and nothing gained by a second look.
-        let (quiet, _) = metric.adapted(&frame, 0.01, &residual(0.0, 1.0, &drive));
+        let (quiet, _) = metric.adapted(&roles, 0.01, &residual(0.0, 1.0, &drive));
         assert!(quiet.loose()[0].level.size < 0.5);
-        assert_eq!(quiet.adapted(&frame, 0.01, &residual(0.0, 1.0, &drive)).1, 0.0);
+        assert_eq!(quiet.adapted(&roles, 0.01, &residual(0.0, 1.0, &drive)).1, 0.0);
     }
 }

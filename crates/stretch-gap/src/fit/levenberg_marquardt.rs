@@ -176,7 +176,7 @@ impl<'a, 'b> Descent<'a, 'b> {
         let wanted: Vec<(usize, &Model)> = self.stages.iter().map(|&s| (s, model)).collect();
         let values = self.compare.residuals_of(&wanted, self.near.as_deref());
         let columns = self.stages.iter().zip(values);
-        columns.map(|(&s, v)| Ok(self.compare.metrics[s].column(&self.compare.frame, v?))).collect()
+        columns.map(|(&s, v)| Ok(self.compare.metrics[s].column(&self.compare.roles, v?))).collect()
     }
 
     /// J of the module's head.

@@ -21,8 +21,8 @@ use crate::{
     numerics::linear::dot,
     problem::{
         error::GapError,
-        frame::{Frame, Role, Segment},
         runs::Runs,
+        sample_roles::{Role, SampleRoles, Segment},
         simulator::Model,
         spec::SlowDrift,
     },
@@ -35,7 +35,7 @@ pub(crate) struct Metric {
     pub(crate) noise: NoiseLevel,
     /// Parameters of the stage that drift or are offset in each trial.
     loose: Vec<Loose>,
-    /// The nuisance of each segment of the frame; none where no parameter of the stage is loose.
+    /// The nuisance of each segment; none where no parameter of the stage is loose.
     nuisances: Vec<Option<Nuisance>>,
 }
 
@@ -74,7 +74,7 @@ impl Metric {
     /// tell what of a residual can be theirs. They drift as the simulator describes it, unless `like` says otherwise.
     pub(crate) fn of(
         runs: &Runs<'_>,
-        frame: &Frame,
+        roles: &SampleRoles,
         stage: usize,
         noise: NoiseLevel,
         model: &Model,
@@ -114,12 +114,12 @@ impl Metric {
             let pairs = metric.loose.iter_mut().zip(&like.loose);
             pairs.for_each(|(own, other)| own.level = other.level);
         }
-        metric.marginalise(frame, simulator.dt_s());
+        metric.marginalise(roles, simulator.dt_s());
         Ok(metric)
     }
 
     /// Factors of the nuisances as the loose parameters now are.
-    fn marginalise(&mut self, frame: &Frame, dt_s: f64) {
+    fn marginalise(&mut self, roles: &SampleRoles, dt_s: f64) {
         let one = |segment: &Segment| {
             let range = segment.from..segment.to;
             let (mut offsets, mut drifting) = (Vec::new(), Vec::new());
@@ -142,7 +142,7 @@ impl Metric {
             }
             (!self.loose.is_empty()).then(|| Nuisance::new(offsets, drifting))
         };
-        self.nuisances = frame.segments.iter().map(one).collect();
+        self.nuisances = roles.segments.iter().map(one).collect();
     }
 
     /// Parameters of the stage that drift or are offset in each trial.
@@ -154,19 +154,19 @@ impl Metric {
     pub(crate) fn with(
         &self,
         level: impl Fn(usize, Level) -> Level,
-        frame: &Frame,
+        roles: &SampleRoles,
         dt_s: f64,
     ) -> Self {
         let mut other = self.clone();
         let each = other.loose.iter_mut().enumerate();
         each.for_each(|(i, loose)| loose.level = level(i, loose.level));
-        other.marginalise(frame, dt_s);
+        other.marginalise(roles, dt_s);
         other
     }
 
     /// A column of values in multiples of the noise over the first trials.
-    pub(crate) fn column(&self, frame: &Frame, values: Vec<f64>) -> Column {
-        let tails = frame
+    pub(crate) fn column(&self, roles: &SampleRoles, values: Vec<f64>) -> Column {
+        let tails = roles
             .segments
             .iter()
             .zip(&self.nuisances)
@@ -181,9 +181,9 @@ impl Metric {
     }
 
     /// x'V^-1 y over the segments in a role.
-    pub(crate) fn product(&self, frame: &Frame, x: &Column, y: &Column, role: Role) -> f64 {
+    pub(crate) fn product(&self, roles: &SampleRoles, x: &Column, y: &Column, role: Role) -> f64 {
         let mut sum = 0.0;
-        for (i, segment) in frame.segments.iter().enumerate() {
+        for (i, segment) in roles.segments.iter().enumerate() {
             if segment.role != role || segment.to > x.values.len() {
                 continue;
             }
@@ -195,21 +195,21 @@ impl Metric {
     }
 
     /// ln det V over the segments in a role.
-    pub(crate) fn ln_det(&self, frame: &Frame, role: Role) -> f64 {
-        let pairs = frame.segments.iter().zip(&self.nuisances).filter(|(s, _)| s.role == role);
+    pub(crate) fn ln_det(&self, roles: &SampleRoles, role: Role) -> f64 {
+        let pairs = roles.segments.iter().zip(&self.nuisances).filter(|(s, _)| s.role == role);
         pairs.filter_map(|(_, nuisance)| Some(nuisance.as_ref()?.ln_determinant())).sum()
     }
 
     /// 2 sum ln s over the segments in a role: what noise s adds to it in the unit of the output.
-    pub(crate) fn ln_noise(&self, frame: &Frame, role: Role) -> f64 {
-        let own = frame.segments.iter().filter(|s| s.role == role);
+    pub(crate) fn ln_noise(&self, roles: &SampleRoles, role: Role) -> f64 {
+        let own = roles.segments.iter().filter(|s| s.role == role);
         let sds = own.flat_map(|s| &self.noise.sd[s.from..s.to]).filter(|sd| sd.is_finite());
         2.0 * sds.map(|sd| sd.ln()).sum::<f64>()
     }
 
     /// Takes the most likely nuisances out of a residual in multiples of the noise.
-    pub(crate) fn clean(&self, frame: &Frame, values: &mut [f64]) {
-        for (segment, nuisance) in frame.segments.iter().zip(&self.nuisances) {
+    pub(crate) fn clean(&self, roles: &SampleRoles, values: &mut [f64]) {
+        for (segment, nuisance) in roles.segments.iter().zip(&self.nuisances) {
             if let Some(nuisance) = nuisance.as_ref().filter(|_| segment.to <= values.len()) {
                 nuisance.clean(&mut values[segment.from..segment.to]);
             }
@@ -224,7 +224,7 @@ impl Metric {
         noise: NoiseLevel,
         column: Vec<f64>,
         drift: SlowDrift,
-        frame: &Frame,
+        roles: &SampleRoles,
         dt_s: f64,
     ) -> Self {
         let clock = (0..column.len() as u32).collect();
@@ -232,7 +232,7 @@ impl Metric {
         let level = Level { size: 1.0, time_s: drift.correlation_s };
         let loose = vec![Loose { column, clock, drift: Some(drift), is_by_tick: false, level }];
         let mut metric = Self { noise, loose, nuisances: Vec::new() };
-        metric.marginalise(frame, dt_s);
+        metric.marginalise(roles, dt_s);
         metric
     }
 }

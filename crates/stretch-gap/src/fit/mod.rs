@@ -1,6 +1,6 @@
 //! Fits of one hypothesis, and what a fit is measured by.
 //!
-//! In: the runs and the frame of a problem. Out: a [`prepared::Problem`], re-tuned, in which any set of effects becomes a
+//! In: the runs of a problem and the roles of its samples. Out: a [`prepared::PreparedProblem`], re-tuned, in which any set of effects becomes a
 //! [`hypothesis::Hypothesis`]: a model, what it leaves of every stage, and a score.
 //! In the order of use: the noise of every stage ([`noise_level`], less [`isolated_outliers`]); residuals in multiples of it with
 //! slow drift and offsets marginalised ([`metric`], [`nuisance`], [`hyper_parameters`]); residuals and sensitivities of the

@@ -15,14 +15,14 @@ use crate::{
     fit::isolated_outliers::isolated,
     problem::{
         error::GapError,
-        frame::Frame,
         noise::Noise,
         runs::Runs,
+        sample_roles::SampleRoles,
         simulator::{Model, Run, Simulator},
     },
 };
 
-/// NoiseLevel of one stage.
+/// Noise of one stage.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct NoiseLevel {
     /// One standard deviation at every sample of all trials, in the unit of the output; infinite where nothing was measured and where a
@@ -38,7 +38,7 @@ const DRAWS: u64 = 12;
 /// Half-width over which what arrives of them is averaged, in samples.
 const NEAR: usize = 12;
 
-/// Floors of all stages around a model.
+/// Noise of all stages around a model.
 ///
 /// The variance of the noise is that of the output's own noise, known or taken from the record's second differences,
 /// plus the *noise transmitted*: what of the measured input's noise arrives at the output, by Monte Carlo with the
@@ -46,17 +46,17 @@ const NEAR: usize = 12;
 /// of every sample.
 pub(crate) fn noise_levels(
     runs: &Runs<'_>,
-    frame: &Frame,
+    roles: &SampleRoles,
     model: &Model,
     seed: u64,
 ) -> Result<Vec<NoiseLevel>, GapError> {
     let stages = 0..runs.simulator().stages().len();
-    stages.into_par_iter().map(|stage| noise_level(runs, frame, stage, model, seed)).collect()
+    stages.into_par_iter().map(|stage| noise_level(runs, roles, stage, model, seed)).collect()
 }
 
 fn noise_level(
     runs: &Runs<'_>,
-    frame: &Frame,
+    roles: &SampleRoles,
     stage: usize,
     model: &Model,
     seed: u64,
@@ -67,7 +67,7 @@ fn noise_level(
     let samples = arrived.len();
     let noise = match &simulator.stages()[stage].noise {
         Some(noise) => noise.clone(),
-        None => of_record(simulator, frame, stage),
+        None => of_record(simulator, roles, stage),
     };
     let (own, mut source) = (noise.sd().powi(2), noise.source().to_owned());
     let mean = arrived.iter().sum::<f64>() / samples.max(1) as f64;
@@ -104,21 +104,21 @@ fn noise_level(
     Ok(NoiseLevel { sd, rms: (own + mean).sqrt().max(1e-12), source })
 }
 
-/// Variance that the measured input's noise causes at every sample of the output, which is `plain` without it.
+/// Variance that the measured input's noise causes at every sample of the output, which is `undisturbed` without it.
 fn transmitted(
     runs: &Runs<'_>,
     stage: usize,
     model: &Model,
-    plain: &[f64],
+    undisturbed: &[f64],
     seed: u64,
 ) -> Result<Vec<f64>, GapError> {
     let trials = runs.simulator().trials().len();
     let run = Run::exact(stage, model, trials);
-    let mut arrived = vec![0.0; plain.len()];
+    let mut arrived = vec![0.0; undisturbed.len()];
     for draw in 0..DRAWS {
         let other = runs.run(Run { input_noise: Some(seed + 1000 * draw), ..run })?;
         let mut any = false;
-        for ((sum, a), b) in arrived.iter_mut().zip(plain).zip(&other) {
+        for ((sum, a), b) in arrived.iter_mut().zip(undisturbed).zip(&other) {
             *sum += (a - b) * (a - b) / DRAWS as f64;
             any |= a != b;
         }
@@ -131,7 +131,7 @@ fn transmitted(
 }
 
 /// Noise of the output of a stage, from the samples that may be looked at.
-fn of_record(simulator: &dyn Simulator, frame: &Frame, stage: usize) -> Noise {
+fn of_record(simulator: &dyn Simulator, roles: &SampleRoles, stage: usize) -> Noise {
     let measured = simulator.measured(stage);
-    Noise::of_differences(frame.looked_at().map(|s| &measured[s.from..s.to]), simulator.dt_s())
+    Noise::of_differences(roles.looked_at().map(|s| &measured[s.from..s.to]), simulator.dt_s())
 }

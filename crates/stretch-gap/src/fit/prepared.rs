@@ -2,13 +2,13 @@
 //!
 //! Preparation runs once, in an order in which each part needs the ones before:
 //!
-//! 1. the frame; noise and metrics around the parameters as shipped;
+//! 1. the roles of the samples; noise and metrics around the parameters as shipped;
 //! 2. a first re-tuning: maximum a posteriori within the tolerances;
 //! 3. noise and metrics around what it found, for sensitivities have moved; a second re-tuning in them;
 //! 4. the effective sample size of every stage and the noise transmitted, both at the re-tuned nominal, so that they are the same
 //!    for every hypothesis.
 //!
-//! What exists is complete: nothing of a [`Problem`] is set later.
+//! What exists is complete: nothing of a [`PreparedProblem`] is set later.
 
 use std::collections::BTreeMap;
 
@@ -25,9 +25,9 @@ use crate::{
     },
     problem::{
         error::GapError,
-        frame::{Frame, Role},
         linked_stages::groups,
         runs::Runs,
+        sample_roles::{Role, SampleRoles},
         simulator::{Model, Run, Simulator},
     },
 };
@@ -42,7 +42,7 @@ const LONGER: f64 = 2.0;
 const LEARNT: f64 = 5.0;
 
 /// Everything that a search needs.
-pub(crate) struct Problem<'a> {
+pub(crate) struct PreparedProblem<'a> {
     pub(crate) compare: Comparison<'a>,
     /// Parameters as shipped.
     pub(crate) shipped: Model,
@@ -58,8 +58,8 @@ pub(crate) struct Problem<'a> {
     transmitted: Vec<Misfit>,
 }
 
-impl<'a> Problem<'a> {
-    /// Frame, noise, metrics, re-tuning, sample sizes and noise transmitted.
+impl<'a> PreparedProblem<'a> {
+    /// SampleRoles, noise, metrics, re-tuning, sample sizes and noise transmitted.
     ///
     /// # Errors
     /// [`GapError::Solver`] when the step of integration shows, [`GapError::TooLittle`] without anything to fit,
@@ -83,13 +83,13 @@ impl<'a> Problem<'a> {
 
     fn at(runs: Runs<'a>, seed: u64, progress: &dyn Fn(&str)) -> Result<Self, GapError> {
         let simulator = runs.simulator();
-        let frame = Frame::of(simulator)?;
+        let roles = SampleRoles::of(simulator)?;
         let shipped = Model::nominal(simulator);
         progress("noise");
-        let rough = Comparison::around(runs.clone(), frame.clone(), &shipped, None, seed)?;
+        let rough = Comparison::around(runs.clone(), roles.clone(), &shipped, None, seed)?;
         progress("re-tuning the nominal parameters");
         let (first, _) = retuned(&rough, &shipped)?;
-        let compare = Comparison::around(runs, frame, &first.model, None, seed)?;
+        let compare = Comparison::around(runs, roles, &first.model, None, seed)?;
         Self::of(compare, shipped, &first.model)
     }
 
@@ -99,9 +99,9 @@ impl<'a> Problem<'a> {
         if compare.adapt(model)? < LEARNT {
             return Ok(None);
         }
-        let (runs, frame) = (compare.runs.clone(), compare.frame.clone());
+        let (runs, roles) = (compare.runs.clone(), compare.roles.clone());
         let like = Some(compare.metrics.as_slice());
-        let compare = Comparison::around(runs, frame, &self.nominal.model, like, seed)?;
+        let compare = Comparison::around(runs, roles, &self.nominal.model, like, seed)?;
         Self::of(compare, self.shipped.clone(), &self.nominal.model).map(Some)
     }
 
@@ -114,7 +114,7 @@ impl<'a> Problem<'a> {
             .map(|s| compare.samples_per_observation(s, &nominal.model))
             .collect();
         let memory = memory?;
-        let count = |role, memory: f64| compare.frame.count(role) as f64 / memory;
+        let count = |role, memory: f64| compare.roles.count(role) as f64 / memory;
         let observations = memory
             .iter()
             .map(|&m| Observations { fit: count(Role::Fit, m), held: count(Role::Held, m) })
@@ -127,11 +127,11 @@ impl<'a> Problem<'a> {
     }
 
     /// The same problem beside another simulator of the same stages and parameters.
-    pub(crate) fn beside<'b>(&self, simulator: &'b dyn Simulator) -> Problem<'b>
+    pub(crate) fn beside<'b>(&self, simulator: &'b dyn Simulator) -> PreparedProblem<'b>
     where
         'a: 'b,
     {
-        Problem {
+        PreparedProblem {
             compare: self.compare.beside(simulator, self.compare.metrics.clone()),
             shipped: self.shipped.clone(),
             nominal: self.nominal.clone(),
@@ -187,7 +187,7 @@ impl<'a> Problem<'a> {
     pub(crate) fn score(&self, misfits: &[Misfit], model: &Model) -> f64 {
         let simulator = self.simulator();
         let free = free_parameters(simulator, model);
-        let blocks = self.compare.frame.blocks(Role::Fit);
+        let blocks = self.compare.roles.blocks(Role::Fit);
         score(&self.nominal.misfits, misfits, &self.observations, free, blocks)
             - form_cost(simulator, model)
             - choice_cost(simulator, model)
@@ -209,13 +209,13 @@ impl<'a> Problem<'a> {
     pub(crate) fn levels(&self, hypothesis: &Hypothesis) -> Result<Vec<f64>, GapError> {
         let one = |stage| {
             let residual = self.compare.residual_values(stage, &hypothesis.model)?;
-            Ok(self.compare.metrics[stage].spectral_level(&self.compare.frame, &residual).max(1.0))
+            Ok(self.compare.metrics[stage].spectral_level(&self.compare.roles, &residual).max(1.0))
         };
         self.loose_stages().map(one).collect()
     }
 
     /// Log-likelihood of a hypothesis in the stages with loose parameters, their nuisances marginalised and the sizes of these
-    /// integrated over, what the effects cost taken off, nats; `levels` as of [`Problem::levels`].
+    /// integrated over, what the effects cost taken off, nats; `levels` as of [`PreparedProblem::levels`].
     pub(crate) fn likelihood(
         &self,
         hypothesis: &Hypothesis,
@@ -224,7 +224,7 @@ impl<'a> Problem<'a> {
         let mut model = hypothesis.model.clone();
         model.effects.retain(|(e, _)| self.is_in_loose_stage(*e));
         let simulator = self.simulator();
-        let blocks = self.compare.frame.blocks(Role::Fit);
+        let blocks = self.compare.roles.blocks(Role::Fit);
         let free = free_parameters(simulator, &model) as f64;
         let price = 0.5 * free * blocks.ln()
             + form_cost(simulator, &model)
@@ -233,7 +233,7 @@ impl<'a> Problem<'a> {
         for (stage, level) in self.loose_stages().zip(levels) {
             let residual = self.compare.residual_values(stage, &hypothesis.model)?;
             let metric = &self.compare.metrics[stage];
-            sum += metric.evidence(&self.compare.frame, simulator.dt_s(), &residual, level.sqrt());
+            sum += metric.evidence(&self.compare.roles, simulator.dt_s(), &residual, level.sqrt());
         }
         Ok(sum)
     }
@@ -247,16 +247,16 @@ impl<'a> Problem<'a> {
     /// with noise s_i, the metric V and the reduced chi-square X over fitted and held-out samples: a model may leave more than its
     /// noise, but noise that is foretold too large is no better for it. One observation a block, whatever the residual's own memory is.
     pub(crate) fn log_likelihood(&self, hypothesis: &Hypothesis) -> f64 {
-        let (compare, frame) = (&self.compare, &self.compare.frame);
+        let (compare, roles) = (&self.compare, &self.compare.roles);
         let mut sum = 0.0;
         for (misfit, metric) in hypothesis.misfits.iter().zip(&compare.metrics) {
             for (role, x) in [(Role::Fit, misfit.fit), (Role::Held, misfit.held)] {
-                sum += 0.5 * frame.count(role) as f64 * x.max(1.0).ln();
-                sum += 0.5 * (metric.ln_det(frame, role) + metric.ln_noise(frame, role));
+                sum += 0.5 * roles.count(role) as f64 * x.max(1.0).ln();
+                sum += 0.5 * (metric.ln_det(roles, role) + metric.ln_noise(roles, role));
             }
         }
         let free = free_parameters(self.simulator(), &hypothesis.model) as f64;
-        -compare.weight() * sum - 0.5 * free * frame.blocks(Role::Fit).ln()
+        -compare.weight() * sum - 0.5 * free * roles.blocks(Role::Fit).ln()
     }
 
     /// Rise of the log-likelihood from one hypothesis to another by the [octaves](crate::fit::octaves) of what they leave, nats.
@@ -298,7 +298,7 @@ impl<'a> Problem<'a> {
     /// Least samples per observation of all stages, as a share of a block.
     pub(crate) fn finest(&self) -> f64 {
         let memory = self.memory.iter().copied().fold(f64::INFINITY, f64::min);
-        (memory / self.compare.frame.block as f64).min(1.0)
+        (memory / self.compare.roles.block as f64).min(1.0)
     }
 }
 
@@ -310,7 +310,7 @@ fn retuned(
     let simulator = compare.simulator();
     if let Some(costly) = simulator.costly() {
         for stage in 0..compare.metrics.len() {
-            costly.linearise(stage, start, compare.frame.fit_trials)?;
+            costly.linearise(stage, start, compare.roles.fit_trials)?;
         }
     }
     let groups = groups(simulator);
@@ -337,11 +337,11 @@ fn retuned(
 /// Refuses a simulator whose step of integration shows: its error would be named as an effect.
 fn solver_check(compare: &Comparison<'_>, model: &Model) -> Result<(), GapError> {
     for (stage, metric) in compare.metrics.iter().enumerate() {
-        let run = Run::exact(stage, model, compare.frame.fit_trials);
-        let plain = compare.runs.run(run)?;
+        let run = Run::exact(stage, model, compare.roles.fit_trials);
+        let whole_step = compare.runs.run(run)?;
         let fine = compare.runs.run(Run { step: 0.5, ..run })?;
-        let square: f64 = plain.iter().zip(&fine).map(|(a, b)| (a - b) * (a - b)).sum();
-        let moved = (square / plain.len().max(1) as f64).sqrt() / metric.noise.rms;
+        let square: f64 = whole_step.iter().zip(&fine).map(|(a, b)| (a - b) * (a - b)).sum();
+        let moved = (square / whole_step.len().max(1) as f64).sqrt() / metric.noise.rms;
         if moved > SOLVED {
             let stage = compare.simulator().stages()[stage].name.clone();
             return Err(GapError::Solver { stage, moved });

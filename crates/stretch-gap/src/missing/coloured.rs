@@ -19,7 +19,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::{
     numerics::linear::Cholesky,
-    problem::frame::{Frame, Role},
+    problem::sample_roles::{Role, SampleRoles},
 };
 
 /// Order of the autoregression.
@@ -28,21 +28,27 @@ const ORDER: usize = 5;
 const PER_BLOCK: usize = 5;
 
 /// ln of the odds of a function against the coloured process alone, nats; both residuals over whole segments, nuisances taken out.
-pub(crate) fn odds(frame: &Frame, alone: &[f64], beside: &[f64], chosen: usize, of: usize) -> f64 {
-    log_score(frame, beside) - log_score(frame, alone) - chosen as f64 * (of as f64).ln()
+pub(crate) fn odds(
+    roles: &SampleRoles,
+    alone: &[f64],
+    beside: &[f64],
+    chosen: usize,
+    of: usize,
+) -> f64 {
+    log_score(roles, beside) - log_score(roles, alone) - chosen as f64 * (of as f64).ln()
 }
 
 /// L of the held-out samples.
-fn log_score(frame: &Frame, residual: &[f64]) -> f64 {
-    let count = (frame.block / PER_BLOCK).max(1);
+fn log_score(roles: &SampleRoles, residual: &[f64]) -> f64 {
+    let count = (roles.block / PER_BLOCK).max(1);
     let means = |role: Role| -> Vec<Vec<f64>> {
-        let parts = frame.of_role(role).filter(|s| s.to <= residual.len());
+        let parts = roles.of_role(role).filter(|s| s.to <= residual.len());
         let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
         parts.map(|s| residual[s.from..s.to].chunks_exact(count).map(mean).collect()).collect()
     };
     let fitted = means(Role::Fit);
     // Without anything held out both are scored on what they were fitted to; the cost of the choice is all that is left.
-    let held = if frame.count(Role::Held) > 0 { means(Role::Held) } else { fitted.clone() };
+    let held = if roles.count(Role::Held) > 0 { means(Role::Held) } else { fitted.clone() };
     let weights = autoregression(&fitted);
     let (mut sum, mut n) = (0.0, 0.0);
     for e in fitted.iter().flat_map(|part| innovations(part, &weights)) {

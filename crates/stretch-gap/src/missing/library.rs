@@ -12,10 +12,10 @@
 //! A nominal's own constants take out what of a term they could have been, so that terms need not be centred.
 
 use crate::missing::{
-    signals::Record,
     term::{Factor, Passage, RateForm, Term},
+    term_inputs::TermInputs,
 };
-use crate::problem::frame::Frame;
+use crate::problem::sample_roles::SampleRoles;
 
 use Factor::{
     Above, Below, Bend, Cosine, High, Lag, Late, Low, Peak, Play, Power, Rate, Session, Sine, Time,
@@ -38,20 +38,20 @@ const WEAR: [f64; 2] = [2.0, 8.0];
 
 /// Collects terms.
 struct Shelf<'a> {
-    record: &'a Record,
-    frame: &'a Frame,
+    inputs: &'a TermInputs,
+    roles: &'a SampleRoles,
     times_s: Vec<f64>,
     terms: Vec<Term>,
 }
 
 /// All terms of a stage; `is_commanded` says that it is driven by commands rather than by a measured input.
-pub(crate) fn library(record: &Record, frame: &Frame, is_commanded: bool) -> Vec<Term> {
-    let shortest = 3.0 * record.grid.dt_s();
-    let ratio = (record.trial_s / shortest).max(1.0);
+pub(crate) fn library(inputs: &TermInputs, roles: &SampleRoles, is_commanded: bool) -> Vec<Term> {
+    let shortest = 3.0 * inputs.grid.dt_s();
+    let ratio = (inputs.trial_s / shortest).max(1.0);
     let time = |k: usize| shortest * libm::pow(ratio, k as f64 / (TIMES - 1) as f64);
     let times_s = (0..TIMES).map(time).collect();
-    let mut shelf = Shelf { record, frame, times_s, terms: Vec::new() };
-    let (states, commands) = (record.of_kind(false), record.of_kind(true));
+    let mut shelf = Shelf { inputs, roles, times_s, terms: Vec::new() };
+    let (states, commands) = (inputs.of_kind(false), inputs.of_kind(true));
     shelf.clocks();
     for &s in &states {
         shelf.curves(s);
@@ -114,7 +114,7 @@ impl Shelf<'_> {
             self.direct(&[power(s, p)]);
         }
         for share in QUANTILES {
-            let at = self.record.quantile(s, share, self.frame);
+            let at = self.inputs.quantile(s, share, self.roles);
             for p in [1.0, 2.0] {
                 self.direct(&[Above { signal: s, at, power: p }]);
                 self.direct(&[Below { signal: s, at, power: p }]);
@@ -147,7 +147,7 @@ impl Shelf<'_> {
         let x = power(s, 1.0);
         let plays = WIDTHS.map(|width| Play { signal: s, width });
         let turns = WIDTHS.map(|width| Turned { signal: s, width });
-        let lates = DELAYS.map(|n| Late { signal: s, delay_s: n * self.record.grid.dt_s() });
+        let lates = DELAYS.map(|n| Late { signal: s, delay_s: n * self.inputs.grid.dt_s() });
         let lags: Vec<Factor> =
             self.times_s.iter().map(|&tau_s| Lag { signal: s, tau_s }).collect();
         let all = plays.into_iter().chain(turns).chain(lates).chain(lags);
@@ -178,7 +178,7 @@ impl Shelf<'_> {
         self.lagged(&[x, rate(s, Magnitude)]);
         self.lagged(&[Above {
             signal: s,
-            at: self.record.quantile(s, 0.5, self.frame),
+            at: self.inputs.quantile(s, 0.5, self.roles),
             power: 1.0,
         }]);
         for p in [0.5, 1.0] {
@@ -224,7 +224,7 @@ impl Shelf<'_> {
         self.direct(&[power(c, 1.0)]);
         self.lagged(&[power(c, 1.0)]);
         for n in DELAYS {
-            self.direct(&[Late { signal: c, delay_s: n * self.record.grid.dt_s() }]);
+            self.direct(&[Late { signal: c, delay_s: n * self.inputs.grid.dt_s() }]);
         }
     }
 
@@ -270,7 +270,7 @@ impl Shelf<'_> {
                 sources.push(vec![Lag { signal: c, tau_s }]);
             }
             for n in DELAYS {
-                sources.push(vec![Late { signal: c, delay_s: n * self.record.grid.dt_s() }]);
+                sources.push(vec![Late { signal: c, delay_s: n * self.inputs.grid.dt_s() }]);
             }
         }
         for tau_s in [0.1, 0.3, 1.0, 3.0] {

@@ -15,9 +15,9 @@ mod library;
 mod propose;
 mod proposed;
 mod residue;
-mod signals;
 mod sparse;
 mod term;
+mod term_inputs;
 #[cfg(test)]
 mod tests;
 

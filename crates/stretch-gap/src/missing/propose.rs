@@ -8,10 +8,10 @@ use crate::missing::{
     term::Term,
 };
 use crate::{
-    fit::{hypothesis::Hypothesis, metric::Column, prepared::Problem},
+    fit::{hypothesis::Hypothesis, metric::Column, prepared::PreparedProblem},
     problem::{
         error::GapError,
-        frame::{Frame, Role},
+        sample_roles::{Role, SampleRoles},
         simulator::Model,
     },
 };
@@ -20,7 +20,7 @@ use crate::{
 const STEPS: usize = 2;
 
 /// A sum at the model that was moved with it.
-struct Settled {
+struct Estimated {
     model: Model,
     coefficients: Vec<f64>,
     sd: Vec<f64>,
@@ -33,7 +33,7 @@ struct Settled {
 ///
 /// Everything is chosen and fitted without the test trials; they are read at the end, for the share that is reported.
 pub(crate) fn propose(
-    problem: &Problem<'_>,
+    problem: &PreparedProblem<'_>,
     base: &Hypothesis,
 ) -> Result<Option<Proposed>, GapError> {
     let simulator = problem.simulator();
@@ -43,17 +43,17 @@ pub(crate) fn propose(
         .filter(|&stage| problem.gap_in(base, stage) > 0.0);
     let Some(stage) = largest else { return Ok(None) };
     let residue = Residue::of(&problem.compare, stage, &base.model)?;
-    let choice = choice(&problem.compare.frame);
+    let choice = choice(&problem.compare.roles);
     let is_commanded = simulator.driven().is_none_or(|d| d.input(stage).is_none())
-        && !residue.record.of_kind(true).is_empty();
+        && !residue.inputs.of_kind(true).is_empty();
     let sum = pursue(&residue, &choice, is_commanded);
-    let settled = settle(&residue, &choice, &sum)?;
-    let weighed = weigh(&residue, &choice, &sum, &settled);
+    let estimated = estimate(&residue, &choice, &sum)?;
+    let weighed = weigh(&residue, &choice, &sum, &estimated);
     let closes_test = match weighed.stands {
-        true => tested(&residue, &sum.terms, &settled)?,
+        true => tested(&residue, &sum.terms, &estimated)?,
         false => 0.0,
     };
-    Ok(Some(told(&residue, &sum, &settled, &weighed, closes_test)))
+    Ok(Some(proposed(&residue, &sum, &estimated, &weighed, closes_test)))
 }
 
 /// What the samples held out say of a sum.
@@ -69,14 +69,14 @@ struct Weighed {
 
 /// Many terms at once say whether it is a function of what was recorded at all, the sum whether it is that function: what a
 /// chosen few see alone was chosen by chance.
-fn weigh(residue: &Residue<'_>, choice: &Frame, sum: &Sum, settled: &Settled) -> Weighed {
+fn weigh(residue: &Residue<'_>, choice: &SampleRoles, sum: &Sum, estimated: &Estimated) -> Weighed {
     let metric = &residue.compare.metrics[residue.stage];
     let clean = |column: &Column| {
         let mut values = column.values.clone();
-        metric.clean(residue.frame(), &mut values);
+        metric.clean(residue.roles(), &mut values);
         values
     };
-    let (alone, beside) = (clean(&residue.residual), clean(&settled.left));
+    let (alone, beside) = (clean(&residue.residual), clean(&estimated.left));
     // A function has one term of the library at least.
     let log_odds = odds(choice, &alone, &sum.beside_many, 1, sum.library);
     let stands = log_odds > 0.0
@@ -87,7 +87,7 @@ fn weigh(residue: &Residue<'_>, choice: &Frame, sum: &Sum, settled: &Settled) ->
     };
     let held = |column: &Column| metric.product(choice, column, column, Role::Held);
     let samples = choice.count(Role::Held);
-    let closes = closed(held(&residue.residual), held(&settled.left), samples);
+    let closes = closed(held(&residue.residual), held(&estimated.left), samples);
     Weighed {
         log_odds,
         stands,
@@ -97,16 +97,16 @@ fn weigh(residue: &Residue<'_>, choice: &Frame, sum: &Sum, settled: &Settled) ->
 }
 
 /// A proposal as it is reported.
-fn told(
+fn proposed(
     residue: &Residue<'_>,
     sum: &Sum,
-    settled: &Settled,
+    estimated: &Estimated,
     weighed: &Weighed,
     closes_test: f64,
 ) -> Proposed {
     let spec = &residue.compare.simulator().stages()[residue.stage];
-    let signals = scales(&residue.record);
-    let pairs = sum.terms.iter().zip(settled.coefficients.iter().zip(&settled.sd));
+    let signals = scales(&residue.inputs);
+    let pairs = sum.terms.iter().zip(estimated.coefficients.iter().zip(&estimated.sd));
     let terms: Vec<ProposedTerm> = pairs
         .filter(|_| weighed.stands)
         .map(|(term, (&coefficient, &sd))| ProposedTerm {
@@ -124,7 +124,7 @@ fn told(
         acts: acts(&spec.name, &terms),
         terms,
         signals,
-        time_scales_s: [residue.record.trial_s, residue.record.session_s],
+        time_scales_s: [residue.inputs.trial_s, residue.inputs.session_s],
         initial: "settled at the start of every trial".into(),
         closes_held: weighed.closes,
         closes_test,
@@ -144,20 +144,20 @@ fn closed(before: f64, after: f64, samples: usize) -> f64 {
 }
 
 /// Fits parameters and coefficients to the fitted samples, whole runs instead of lines where that is better.
-fn settle(residue: &Residue<'_>, choice: &Frame, sum: &Sum) -> Result<Settled, GapError> {
+fn estimate(residue: &Residue<'_>, choice: &SampleRoles, sum: &Sum) -> Result<Estimated, GapError> {
     // What was held out for the choice alone is fitted now.
-    let frame = match choice.count(Role::Held) == residue.frame().count(Role::Held) {
+    let roles = match choice.count(Role::Held) == residue.roles().count(Role::Held) {
         true => choice,
-        false => residue.frame(),
+        false => residue.roles(),
     };
     let at = |model: &Model, residual: &Column| {
-        let products = products(residue, frame, residual, sum);
+        let products = products(residue, roles, residual, sum);
         let fit = residue.solve(&products, model, false);
         let own = residue.parameters();
         let coefficients = fit.values[own..].to_vec();
         let sd = residue.coefficient_sd(&products, model);
         let left = left(residue, residual, &sum.columns, &coefficients);
-        (products, Settled { model: model.clone(), coefficients, sd, cost: fit.cost, left })
+        (products, Estimated { model: model.clone(), coefficients, sd, cost: fit.cost, left })
     };
     let (mut products, mut best) = at(&residue.model, &residue.residual);
     for _ in 0..STEPS {
@@ -178,11 +178,11 @@ fn settle(residue: &Residue<'_>, choice: &Frame, sum: &Sum) -> Result<Settled, G
     Ok(best)
 }
 
-fn products(residue: &Residue<'_>, frame: &Frame, residual: &Column, sum: &Sum) -> Products {
-    let mut products = residue.products(frame, residual);
+fn products(residue: &Residue<'_>, roles: &SampleRoles, residual: &Column, sum: &Sum) -> Products {
+    let mut products = residue.products(roles, residual);
     let mut before: Vec<&Column> = std::iter::once(residual).chain(residue.columns()).collect();
     for column in &sum.columns {
-        products = residue.with(frame, &products, &before, column);
+        products = residue.with(roles, &products, &before, column);
         before.push(column);
     }
     products
@@ -198,30 +198,30 @@ fn left(
     for (column, c) in columns.iter().zip(coefficients) {
         values.iter_mut().zip(&column.values).for_each(|(x, d)| *x -= c * d);
     }
-    residue.compare.metrics[residue.stage].column(residue.frame(), values)
+    residue.compare.metrics[residue.stage].column(residue.roles(), values)
 }
 
 /// Share of the gap on the test trials that a refitted sum closes.
-fn tested(residue: &Residue<'_>, terms: &[Term], settled: &Settled) -> Result<f64, GapError> {
+fn tested(residue: &Residue<'_>, terms: &[Term], estimated: &Estimated) -> Result<f64, GapError> {
     let (compare, stage) = (residue.compare, residue.stage);
     let trials = compare.simulator().trials().len();
-    let (metric, frame) = (&compare.metrics[stage], residue.frame());
+    let (metric, roles) = (&compare.metrics[stage], residue.roles());
     let residual = |model: &Model| -> Result<Vec<f64>, GapError> {
         let output = compare.runs.output(stage, model, trials)?;
         let apart = compare.simulator().measured(stage).iter().zip(output).zip(&metric.noise.sd);
         Ok(apart.map(|((m, s), sd)| (m - s) / sd).collect())
     };
     let square = |values: Vec<f64>| {
-        let column = metric.column(frame, values);
-        metric.product(frame, &column, &column, Role::Test)
+        let column = metric.column(roles, values);
+        metric.product(roles, &column, &column, Role::Test)
     };
     let before = square(residual(&residue.model)?);
-    let mut values = residual(&settled.model)?;
-    for (term, c) in terms.iter().zip(&settled.coefficients) {
-        let own = term.values(&residue.record, trials);
+    let mut values = residual(&estimated.model)?;
+    for (term, c) in terms.iter().zip(&estimated.coefficients) {
+        let own = term.values(&residue.inputs, trials);
         for ((x, d), sd) in values.iter_mut().zip(own).zip(&metric.noise.sd) {
             *x -= c * d / sd;
         }
     }
-    Ok(closed(before, square(values), frame.count(Role::Test)))
+    Ok(closed(before, square(values), roles.count(Role::Test)))
 }

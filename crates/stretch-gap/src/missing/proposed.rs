@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::missing::{
-    signals::Record,
     term::{Factor, Passage, RateForm, Term},
+    term_inputs::TermInputs,
 };
 
 /// A signal of a proposal and its scale: x = (signal - offset)/scale, v = (dx/dt)/`rate_per_s`.
@@ -76,8 +76,8 @@ pub struct Proposed {
 }
 
 /// Signals of a record that terms speak of.
-pub(crate) fn scales(record: &Record) -> Vec<SignalScale> {
-    let one = |s: &super::signals::Signal| SignalScale {
+pub(crate) fn scales(inputs: &TermInputs) -> Vec<SignalScale> {
+    let one = |s: &super::term_inputs::Signal| SignalScale {
         name: s.name.clone(),
         unit: s.unit.clone(),
         offset: s.offset,
@@ -85,7 +85,7 @@ pub(crate) fn scales(record: &Record) -> Vec<SignalScale> {
         rate_per_s: s.rate,
         is_command: s.is_command,
     };
-    record.signals.iter().map(one).collect()
+    inputs.signals.iter().map(one).collect()
 }
 
 /// `channel += ...`, and what its letters are.

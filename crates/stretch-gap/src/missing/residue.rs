@@ -13,7 +13,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::missing::{signals::Record, term::Term};
+use crate::missing::{term::Term, term_inputs::TermInputs};
 use crate::{
     fit::{
         comparison::Comparison,
@@ -23,7 +23,7 @@ use crate::{
     numerics::linear::{Cholesky, boxed},
     problem::{
         error::GapError,
-        frame::{Frame, Role},
+        sample_roles::{Role, SampleRoles},
         simulator::Model,
     },
 };
@@ -38,7 +38,7 @@ pub(crate) struct Residue<'a> {
     pub(crate) model: Model,
     /// Over the trials that fits run.
     pub(crate) residual: Column,
-    pub(crate) record: Record,
+    pub(crate) inputs: TermInputs,
     /// What is fitted together with the terms.
     coordinates: Vec<(Coordinate, [f64; 2])>,
     /// -dr/dx of each.
@@ -71,7 +71,7 @@ impl<'a> Residue<'a> {
     ) -> Result<Self, GapError> {
         let simulator = compare.simulator();
         let own = compare.runs.output(stage, model, simulator.trials().len())?;
-        let record = Record::of(simulator, &compare.frame, stage, own)?;
+        let inputs = TermInputs::of(simulator, &compare.roles, stage, own)?;
         let residual = compare.residual(stage, model)?;
         let (mut kept, mut columns) = (Vec::new(), Vec::new());
         let places = coordinates(simulator, &[stage], model);
@@ -88,7 +88,7 @@ impl<'a> Residue<'a> {
             stage,
             model: model.clone(),
             residual,
-            record,
+            inputs,
             coordinates: kept,
             columns,
         })
@@ -99,8 +99,8 @@ impl<'a> Residue<'a> {
         self.columns.len()
     }
 
-    pub(crate) fn frame(&self) -> &Frame {
-        &self.compare.frame
+    pub(crate) fn roles(&self) -> &SampleRoles {
+        &self.compare.roles
     }
 
     /// The sensitivities' columns.
@@ -110,7 +110,7 @@ impl<'a> Residue<'a> {
 
     /// A term in multiples of the noise, over the trials that fits run.
     pub(crate) fn values(&self, term: &Term) -> Vec<f64> {
-        let mut values = term.values(&self.record, self.frame().fit_trials);
+        let mut values = term.values(&self.inputs, self.roles().fit_trials);
         let sds = &self.compare.metrics[self.stage].noise.sd;
         values.iter_mut().zip(sds).for_each(|(x, sd)| *x /= sd);
         values
@@ -120,19 +120,19 @@ impl<'a> Residue<'a> {
     pub(crate) fn column(&self, term: &Term) -> Option<Column> {
         let values = self.values(term);
         let acts = values.iter().any(|x| x.abs() > 1e-9) && values.iter().all(|x| x.is_finite());
-        acts.then(|| self.compare.metrics[self.stage].column(self.frame(), values))
+        acts.then(|| self.compare.metrics[self.stage].column(self.roles(), values))
     }
 
-    fn product(&self, frame: &Frame, a: &Column, b: &Column, role: Role) -> f64 {
-        self.compare.metrics[self.stage].product(frame, a, b, role)
+    fn product(&self, roles: &SampleRoles, a: &Column, b: &Column, role: Role) -> f64 {
+        self.compare.metrics[self.stage].product(roles, a, b, role)
     }
 
-    /// Products of residual and sensitivities; `frame` says which samples are held out.
-    pub(crate) fn products(&self, frame: &Frame, residual: &Column) -> Products {
+    /// Products of residual and sensitivities; `roles` says which samples are held out.
+    pub(crate) fn products(&self, roles: &SampleRoles, residual: &Column) -> Products {
         let mut products = Products { fit: DMatrix::zeros(0, 0), held: DMatrix::zeros(0, 0) };
         let all: Vec<&Column> = std::iter::once(residual).chain(&self.columns).collect();
         for n in 0..all.len() {
-            products = self.with(frame, &products, &all[..n], all[n]);
+            products = self.with(roles, &products, &all[..n], all[n]);
         }
         products
     }
@@ -140,7 +140,7 @@ impl<'a> Residue<'a> {
     /// The normal equations with one column more; `before` are the columns that products are taken with.
     pub(crate) fn with(
         &self,
-        frame: &Frame,
+        roles: &SampleRoles,
         products: &Products,
         before: &[&Column],
         new: &Column,
@@ -149,7 +149,7 @@ impl<'a> Residue<'a> {
             let n = before.len();
             let mut all = old.clone().resize(n + 1, n + 1, 0.0);
             for (i, column) in before.iter().copied().chain([new]).enumerate() {
-                let product = self.product(frame, column, new, role);
+                let product = self.product(roles, column, new, role);
                 all[(i, n)] = product;
                 all[(n, i)] = product;
             }

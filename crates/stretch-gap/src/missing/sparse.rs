@@ -19,7 +19,7 @@ use crate::missing::{
 use crate::{
     fit::metric::Column,
     numerics::linear::{Cholesky, dot},
-    problem::frame::{Frame, Role},
+    problem::sample_roles::{Role, SampleRoles},
 };
 
 /// Most terms of a sum.
@@ -55,9 +55,9 @@ pub(crate) struct Sum {
 }
 
 /// Which samples terms are chosen by: those held out, or every third trial where trials are too short for that.
-pub(crate) fn choice(frame: &Frame) -> Frame {
-    let mut choice = frame.clone();
-    if (frame.count(Role::Held) as f64) < FEW * frame.count(Role::Fit) as f64 {
+pub(crate) fn choice(roles: &SampleRoles) -> SampleRoles {
+    let mut choice = roles.clone();
+    if (roles.count(Role::Held) as f64) < FEW * roles.count(Role::Fit) as f64 {
         let fitted = choice.segments.iter_mut().filter(|s| s.role == Role::Fit);
         for (i, segment) in fitted.enumerate() {
             if i % 3 == 1 {
@@ -69,15 +69,15 @@ pub(crate) fn choice(frame: &Frame) -> Frame {
 }
 
 /// Means over a few samples of the segments in a role, at which noise of one multiple still has the variance 1.
-fn means(frame: &Frame, role: Role, values: &[f64], count: usize) -> Vec<f64> {
-    let parts = frame.of_role(role).flat_map(|s| values[s.from..s.to].chunks_exact(count));
+fn means(roles: &SampleRoles, role: Role, values: &[f64], count: usize) -> Vec<f64> {
+    let parts = roles.of_role(role).flat_map(|s| values[s.from..s.to].chunks_exact(count));
     parts.map(|part| part.iter().sum::<f64>() / (count as f64).sqrt()).collect()
 }
 
 /// A pursuit under way.
 struct Pursuit<'a, 'b> {
     residue: &'a Residue<'b>,
-    frame: &'a Frame,
+    roles: &'a SampleRoles,
     sum: Sum,
     /// Library, in means.
     shelf: Vec<(Term, Vec<f64>)>,
@@ -86,12 +86,12 @@ struct Pursuit<'a, 'b> {
     cleaned: Vec<Vec<f64>>,
 }
 
-/// Chooses a sum for a residue; `frame` says what it is fitted to and what it is chosen by.
-pub(crate) fn pursue(residue: &Residue<'_>, frame: &Frame, is_commanded: bool) -> Sum {
-    let products = residue.products(frame, &residue.residual);
+/// Chooses a sum for a residue; `roles` says what it is fitted to and what it is chosen by.
+pub(crate) fn pursue(residue: &Residue<'_>, roles: &SampleRoles, is_commanded: bool) -> Sum {
+    let products = residue.products(roles, &residue.residual);
     let fit = residue.solve(&products, &residue.model, true);
-    let terms = library(&residue.record, frame, is_commanded);
-    let count = (frame.count(Role::Fit) / SCREENED).max(1);
+    let terms = library(&residue.inputs, roles, is_commanded);
+    let count = (roles.count(Role::Fit) / SCREENED).max(1);
     let sum = Sum {
         terms: Vec::new(),
         columns: Vec::new(),
@@ -102,14 +102,14 @@ pub(crate) fn pursue(residue: &Residue<'_>, frame: &Frame, is_commanded: bool) -
     };
     let shelf = terms.into_iter().map(|term| {
         let values = residue.values(&term);
-        (term, means(frame, Role::Fit, &values, count))
+        (term, means(roles, Role::Fit, &values, count))
     });
     let shelf = shelf.filter(|(_, d)| d.iter().all(|x| x.is_finite())).collect();
-    let mut pursuit = Pursuit { residue, frame, sum, shelf, count, cleaned: Vec::new() };
+    let mut pursuit = Pursuit { residue, roles, sum, shelf, count, cleaned: Vec::new() };
     pursuit.clean(&residue.residual);
     residue.columns().iter().for_each(|column| pursuit.clean(column));
     pursuit.sum.beside_many = pursuit.beside_many();
-    let samples = frame.count(Role::Held) as f64;
+    let samples = roles.count(Role::Held) as f64;
     let whole = pursuit.sum.fit.held - samples;
     while pursuit.sum.terms.len() < MOST {
         let before = pursuit.sum.fit.held;
@@ -137,8 +137,8 @@ impl Pursuit<'_, '_> {
     fn clean(&mut self, column: &Column) {
         let mut values = column.values.clone();
         let compare = self.residue.compare;
-        compare.metrics[self.residue.stage].clean(&compare.frame, &mut values);
-        self.cleaned.push(means(self.frame, Role::Fit, &values, self.count));
+        compare.metrics[self.residue.stage].clean(&compare.roles, &mut values);
+        self.cleaned.push(means(self.roles, Role::Fit, &values, self.count));
     }
 
     /// The term that leaves least of what is held out.
@@ -196,9 +196,9 @@ impl Pursuit<'_, '_> {
         columns.extend(self.promising(MANY).iter().map(|term| self.residue.values(term)));
         let mut residual = self.residue.residual.values.clone();
         let compare = self.residue.compare;
-        compare.metrics[self.residue.stage].clean(&compare.frame, &mut residual);
+        compare.metrics[self.residue.stage].clean(&compare.roles, &mut residual);
         let rows = |role| {
-            let means = |values: &Vec<f64>| means(self.frame, role, values, self.count);
+            let means = |values: &Vec<f64>| means(self.roles, role, values, self.count);
             Rows { residual: means(&residual), columns: columns.iter().map(means).collect() }
         };
         let weights = ridge(&rows(Role::Fit), &rows(Role::Held));
@@ -214,7 +214,7 @@ impl Pursuit<'_, '_> {
             .chain(self.residue.columns())
             .chain(&self.sum.columns)
             .collect();
-        let products = self.residue.with(self.frame, &self.sum.products, &before, &column);
+        let products = self.residue.with(self.roles, &self.sum.products, &before, &column);
         let fit = self.residue.solve(&products, &self.residue.model, true);
         fit.cost.is_finite().then_some(Next { term, column, products, fit })
     }
@@ -222,7 +222,7 @@ impl Pursuit<'_, '_> {
     /// A term with its shapes where it promises most.
     fn refined(&self, mut term: Term, gain: &impl Fn(&[f64]) -> f64) -> Term {
         let of = |term: &Term| {
-            gain(&means(self.frame, Role::Fit, &self.residue.values(term), self.count))
+            gain(&means(self.roles, Role::Fit, &self.residue.values(term), self.count))
         };
         let mut most = of(&term);
         for shape in 0..term.shapes().len() {

@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize};
 use stretch_effects::{Backlash, MeanReversion, Operator, Span, Start};
 
-use crate::missing::signals::{Record, Signal};
+use crate::missing::term_inputs::{Signal, TermInputs};
 
 /// A function of one signal's rate v.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -111,12 +111,12 @@ impl Term {
     }
 
     /// Values over the first trials.
-    pub(crate) fn values(&self, record: &Record, trials: usize) -> Vec<f64> {
-        let mut out = vec![1.0; record.samples(trials)];
+    pub(crate) fn values(&self, inputs: &TermInputs, trials: usize) -> Vec<f64> {
+        let mut out = vec![1.0; inputs.samples(trials)];
         for factor in &self.factors {
-            factor.multiply(record, trials, &mut out);
+            factor.multiply(inputs, trials, &mut out);
         }
-        self.passage.pass(record, trials, &mut out);
+        self.passage.pass(inputs, trials, &mut out);
         out
     }
 
@@ -175,18 +175,18 @@ impl RateForm {
 
 impl Factor {
     /// Multiplies values over the first trials by this factor.
-    fn multiply(self, record: &Record, trials: usize, out: &mut [f64]) {
+    fn multiply(self, inputs: &TermInputs, trials: usize, out: &mut [f64]) {
         for trial in 0..trials {
-            let range = record.trials[trial].clone();
-            self.in_trial(record, trial, &mut out[range]);
+            let range = inputs.trials[trial].clone();
+            self.in_trial(inputs, trial, &mut out[range]);
         }
     }
 
-    fn in_trial(self, record: &Record, trial: usize, out: &mut [f64]) {
-        let range = record.trials[trial].clone();
-        let dt_s = record.grid.dt_s();
+    fn in_trial(self, inputs: &TermInputs, trial: usize, out: &mut [f64]) {
+        let range = inputs.trials[trial].clone();
+        let dt_s = inputs.grid.dt_s();
         let signal = |i: usize| {
-            let Signal { x, v, .. } = &record.signals[i];
+            let Signal { x, v, .. } = &inputs.signals[i];
             (&x[range.clone()], &v[range.clone()])
         };
         let mut each = |of: &mut dyn FnMut(usize) -> f64| {
@@ -231,12 +231,12 @@ impl Factor {
             }
             Self::Play { signal: s, width } => {
                 let x = signal(s).0;
-                let play = ran(&Backlash::hard(width), record, x);
+                let play = ran(&Backlash::hard(width), inputs, x);
                 each(&mut |i| x[i] - play[i]);
             }
             Self::Lag { signal: s, tau_s } => {
                 let x = signal(s).0;
-                let lag = lagged(record, x, tau_s, x.first().copied().unwrap_or(0.0));
+                let lag = lagged(inputs, x, tau_s, x.first().copied().unwrap_or(0.0));
                 each(&mut |i| x[i] - lag[i]);
             }
             Self::Late { signal: s, delay_s } => {
@@ -267,11 +267,11 @@ impl Factor {
                 let x = signal(s).0;
                 each(&mut |i| (-travel.follow(x, i) / width).exp());
             }
-            Self::Time { power } => each(&mut |i| raised(i as f64 * dt_s / record.trial_s, power)),
+            Self::Time { power } => each(&mut |i| raised(i as f64 * dt_s / inputs.trial_s, power)),
             Self::TimeFade { tau_s } => each(&mut |i| (-(i as f64) * dt_s / tau_s).exp()),
             Self::Session { power } => {
-                let start_s = record.starts_s[trial].max(0.0);
-                each(&mut |i| raised((start_s + i as f64 * dt_s) / record.session_s, power));
+                let start_s = inputs.starts_s[trial].max(0.0);
+                each(&mut |i| raised((start_s + i as f64 * dt_s) / inputs.session_s, power));
             }
         }
     }
@@ -296,20 +296,20 @@ fn late(x: &[f64], i: usize, by: f64) -> f64 {
     x[whole] + share * (next - x[whole])
 }
 
-fn ran(operator: &dyn Operator, record: &Record, x: &[f64]) -> Vec<f64> {
+fn ran(operator: &dyn Operator, inputs: &TermInputs, x: &[f64]) -> Vec<f64> {
     let mut out = x.to_vec();
     let mut cells = vec![0.0; operator.cells()];
     operator.begin(Start::Settled, x.first().copied().unwrap_or(0.0), &mut cells);
-    operator.run(&Span::whole(&record.grid), &mut cells, &mut out);
+    operator.run(&Span::whole(&inputs.grid), &mut cells, &mut out);
     out
 }
 
-fn lagged(record: &Record, x: &[f64], tau_s: f64, first: f64) -> Vec<f64> {
-    let lag = MeanReversion::new(tau_s, 0.0, &record.grid);
+fn lagged(inputs: &TermInputs, x: &[f64], tau_s: f64, first: f64) -> Vec<f64> {
+    let lag = MeanReversion::new(tau_s, 0.0, &inputs.grid);
     let mut cells = [0.0; MeanReversion::CELLS];
     lag.begin(Start::Settled, first, &mut cells);
     let mut out = x.to_vec();
-    lag.run(&Span::whole(&record.grid), &mut cells, &mut out, |_, z| z);
+    lag.run(&Span::whole(&inputs.grid), &mut cells, &mut out, |_, z| z);
     out
 }
 
@@ -357,22 +357,22 @@ impl Travel {
 }
 
 impl Passage {
-    fn pass(self, record: &Record, trials: usize, values: &mut [f64]) {
-        let dt_s = record.grid.dt_s();
-        for range in &record.trials[..trials] {
+    fn pass(self, inputs: &TermInputs, trials: usize, values: &mut [f64]) {
+        let dt_s = inputs.grid.dt_s();
+        for range in &inputs.trials[..trials] {
             let own = &mut values[range.clone()];
             match self {
                 Self::Direct => {}
                 Self::Lag { tau_s } => {
-                    let z = lagged(record, own, tau_s, 0.0);
+                    let z = lagged(inputs, own, tau_s, 0.0);
                     own.copy_from_slice(&z);
                 }
                 Self::Rest { tau_s } => {
-                    let z = lagged(record, own, tau_s, 0.0);
+                    let z = lagged(inputs, own, tau_s, 0.0);
                     own.iter_mut().zip(z).for_each(|(g, z)| *g -= z);
                 }
                 Self::Leak { tau_s } => {
-                    let open: Vec<&[f64]> = record
+                    let open: Vec<&[f64]> = inputs
                         .signals
                         .iter()
                         .filter(|s| s.is_command)

@@ -14,14 +14,14 @@ const SOLVED: f64 = 1e-9;
 
 /// B B' + I of a square matrix B of normal numbers: positive definite, of condition up to some hundred.
 fn definite(n: usize, seed: u64) -> DMatrix<f64> {
-    let mut dice = RandomGenerator::new(seed, 1);
-    let b = DMatrix::from_fn(n, n, |_, _| dice.gauss());
+    let mut random = RandomGenerator::new(seed, 1);
+    let b = DMatrix::from_fn(n, n, |_, _| random.gauss());
     &b * b.transpose() + DMatrix::identity(n, n)
 }
 
 fn vector(n: usize, seed: u64) -> DVector<f64> {
-    let mut dice = RandomGenerator::new(seed, 2);
-    DVector::from_fn(n, |_, _| dice.gauss())
+    let mut random = RandomGenerator::new(seed, 2);
+    DVector::from_fn(n, |_, _| random.gauss())
 }
 
 fn cases(cases: u32) -> ProptestConfig {
@@ -54,9 +54,9 @@ proptest! {
     #[test]
     fn a_boxed_minimum_meets_its_conditions(n in 1_usize..8, seed: u64, width in 0.01_f64..2.0) {
         let (a, g) = (definite(n, seed), vector(n, seed));
-        let mut dice = RandomGenerator::new(seed, 3);
-        let low: Vec<f64> = (0..n).map(|_| -width * dice.unit()).collect();
-        let high: Vec<f64> = (0..n).map(|_| width * dice.unit()).collect();
+        let mut random = RandomGenerator::new(seed, 3);
+        let low: Vec<f64> = (0..n).map(|_| -width * random.unit()).collect();
+        let high: Vec<f64> = (0..n).map(|_| width * random.unit()).collect();
         let x = DVector::from_vec(boxed(&a, g.as_slice(), &low, &high));
         let slope = &a * &x + &g;
         for i in 0..n {
@@ -73,12 +73,12 @@ proptest! {
     fn an_arrow_solves_as_its_dense_matrix_does(knots in 0_usize..12, columns in 0_usize..4, seed: u64) {
         prop_assume!(knots + columns > 0);
         let n = knots + columns;
-        let mut dice = RandomGenerator::new(seed, 4);
+        let mut random = RandomGenerator::new(seed, 4);
         let mut arrow = Arrow::zeros(knots, columns);
-        arrow.beside.iter_mut().for_each(|x| *x = dice.unit() - 0.5);
-        arrow.border.iter_mut().flatten().for_each(|x| *x = 0.5 * (dice.unit() - 0.5));
+        arrow.beside.iter_mut().for_each(|x| *x = random.unit() - 0.5);
+        arrow.border.iter_mut().flatten().for_each(|x| *x = 0.5 * (random.unit() - 0.5));
         // More on the diagonal than beside it in every row: definite.
-        arrow.diagonal.iter_mut().for_each(|x| *x = 2.0 + dice.unit());
+        arrow.diagonal.iter_mut().for_each(|x| *x = 2.0 + random.unit());
         for i in 0..columns {
             for j in 0..columns {
                 let apart = if i == j { 4.0 + 0.25 * knots as f64 } else { 0.3 };
@@ -116,10 +116,10 @@ proptest! {
 #[test]
 fn gauss_has_the_moments_of_a_sum_of_twelve() {
     const DRAWS: usize = 100_000;
-    let mut dice = RandomGenerator::new(5, 0);
+    let mut random = RandomGenerator::new(5, 0);
     let mut sums = [0.0; 4];
     for _ in 0..DRAWS {
-        let x = dice.gauss();
+        let x = random.gauss();
         sums.iter_mut().enumerate().for_each(|(k, sum)| *sum += x.powi(k as i32 + 1));
     }
     // Standard deviations of x, x^2, x^3 and x^4 of a normal number: 1, sqrt 2, sqrt 15, sqrt 96.
@@ -136,24 +136,24 @@ fn gauss_has_the_moments_of_a_sum_of_twelve() {
 /// Tenths of the unit interval hold 10 000 each of 100 000 draws, with a deviation of 95: five of them. Whole numbers below ten, as well.
 #[test]
 fn uniform_numbers_are_uniform_and_below_their_bound() {
-    let mut dice = RandomGenerator::new(6, 0);
+    let mut random = RandomGenerator::new(6, 0);
     let mut counts = [[0_i32; 10]; 2];
     for _ in 0..100_000 {
-        let unit = dice.unit();
+        let unit = random.unit();
         assert!((0.0..1.0).contains(&unit));
         counts[0][(10.0 * unit) as usize] += 1;
-        counts[1][dice.below(10)] += 1;
+        counts[1][random.below(10)] += 1;
     }
     assert!(counts.iter().flatten().all(|n| (n - 10_000).abs() < 475), "{counts:?}");
-    assert_eq!((dice.below(1), dice.below(0)), (0, 0));
+    assert_eq!((random.below(1), random.below(0)), (0, 0));
 }
 
 /// Streams of one seed, and seeds of one stream, have nothing to do with each other: correlations of 10 000 draws stay within five of 1/100.
 #[test]
 fn streams_and_seeds_are_independent() {
     let draws = |seed, stream| {
-        let mut dice = RandomGenerator::new(seed, stream);
-        (0..10_000).map(move |_| dice.gauss())
+        let mut random = RandomGenerator::new(seed, stream);
+        (0..10_000).map(move |_| random.gauss())
     };
     for (a, b) in [((1, 0), (1, 1)), ((1, 0), (2, 0)), ((7, 3), (3, 7))] {
         let product: f64 = draws(a.0, a.1).zip(draws(b.0, b.1)).map(|(x, y)| x * y).sum();

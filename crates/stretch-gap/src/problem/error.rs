@@ -34,7 +34,7 @@ pub enum GapError {
     },
     /// Integration is too coarse for the noise.
     #[error(
-        "{stage}: halving the step of integration moves the output by {moved} of its floor, so that what is computed is not yet what its equations say: a number of the rig file makes this stage much faster than a rig is (a volume that is too small, a conductance, friction or time constant in another unit); of a simulator of your own, shorten the step"
+        "{stage}: halving the step of integration moves the output by {moved} of its noise, so that what is computed is not yet what its equations say: a number of the rig file makes this stage much faster than a rig is (a volume that is too small, a conductance, friction or time constant in another unit); of a simulator of your own, shorten the step"
     )]
     Solver {
         /// The stage.

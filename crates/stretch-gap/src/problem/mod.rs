@@ -3,7 +3,7 @@
 //! In: what a user writes, an implementation of [`simulator::Simulator`] with a validated [`description::Description`] of its
 //! stages, parameters, effects and trials ([`spec`]), its noise ([`noise`]), and what is known of
 //! the record ([`record_facts`], [`mod@column`]).
-//! Out: the samples that are fitted, held out and tested ([`frame`]), and every run, counted, stoppable and finite
+//! Out: the samples that are fitted, held out and tested ([`roles`]), and every run, counted, stoppable and finite
 //! ([`runs`]). Two simulators stand before another one: one alters parameters ([`altered_parameters`]), one corrects a
 //! column (in `record`). [`thresholds`] are the calibrated numbers of the decisions.
 //! Imports: `numerics` alone.
@@ -13,12 +13,12 @@ pub(crate) mod checks;
 pub(crate) mod column;
 pub(crate) mod description;
 pub(crate) mod error;
-pub(crate) mod frame;
 pub(crate) mod linked_stages;
 pub(crate) mod noise;
 pub(crate) mod record_facts;
 pub(crate) mod rows_used;
 pub(crate) mod runs;
+pub(crate) mod sample_roles;
 pub(crate) mod simulator;
 pub(crate) mod spec;
 pub(crate) mod spectral_line;

@@ -15,7 +15,7 @@ pub struct Thresholds {
     /// Least share of the gap left that an effect must close.
     pub share: f64,
     /// Share of what was closed in a stage that model discrepancy may leave to a further effect.
-    pub mismatch: f64,
+    pub model_discrepancy: f64,
     /// Temperature of the probabilities, nats.
     pub temperature: f64,
     /// Growth of the temperature with the share of the gap that the best set leaves, nats.

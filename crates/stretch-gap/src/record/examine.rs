@@ -8,7 +8,7 @@ use crate::{
     fit::{
         hypothesis::Hypothesis,
         levenberg_marquardt::{COARSE, Effort, FINE, possible},
-        prepared::Problem,
+        prepared::PreparedProblem,
     },
     problem::{
         error::GapError,
@@ -50,7 +50,7 @@ pub(crate) struct Doubts {
 impl Doubts {
     /// Looks at every error, and fits those that could explain most of a gap; `problem` is one of the suspect.
     pub(crate) fn of(
-        problem: &Problem<'_>,
+        problem: &PreparedProblem<'_>,
         suspect: &Suspect<'_>,
         thresholds: &Thresholds,
     ) -> Result<Self, GapError> {
@@ -65,7 +65,7 @@ impl Doubts {
             (0..suspect.faults().len()).into_par_iter().map(|fault| bench.look(fault)).collect();
         let looked: Vec<Promising> = all?.into_iter().flatten().collect();
         // A fall counts as a score does: by the samples of an observation.
-        let least = 2.0 * thresholds.rise * problem.finest() * problem.compare.frame.block as f64;
+        let least = 2.0 * thresholds.rise * problem.finest() * problem.compare.roles.block as f64;
         let counts = |p: &&Promising| p.share > MOST && p.fall > least;
         let mut promising: Vec<&Promising> = looked.iter().filter(counts).collect();
         promising.sort_by(|a, b| b.fall.total_cmp(&a.fall));
@@ -80,7 +80,7 @@ impl Doubts {
     /// Looks closer where the best set of effects leaves more than form may, or parameters stand at their ends.
     pub(crate) fn closer_if(
         mut self,
-        problem: &Problem<'_>,
+        problem: &PreparedProblem<'_>,
         suspect: &Suspect<'_>,
         found: &Found,
         thresholds: &Thresholds,
@@ -96,7 +96,7 @@ impl Doubts {
     /// shipped, and the best of them to the end.
     fn closer(
         &mut self,
-        problem: &Problem<'_>,
+        problem: &PreparedProblem<'_>,
         suspect: &Suspect<'_>,
         best: &Hypothesis,
     ) -> Result<(), GapError> {
@@ -138,7 +138,7 @@ fn sorted(suspect: &Suspect<'_>, mut found: Vec<Hypothesis>) -> Vec<Hypothesis> 
 }
 
 /// Whether a parameter of a model that is evidence stands at an end of its tolerances, or any two of one stage.
-fn is_strained(problem: &Problem<'_>, model: &Model) -> bool {
+fn is_strained(problem: &PreparedProblem<'_>, model: &Model) -> bool {
     let specs = problem.simulator().parameters();
     let at_end = |p: &usize| {
         let spec = &specs[*p];
@@ -151,7 +151,7 @@ fn is_strained(problem: &Problem<'_>, model: &Model) -> bool {
 }
 
 fn fitted(
-    problem: &Problem<'_>,
+    problem: &PreparedProblem<'_>,
     suspect: &Suspect<'_>,
     fault: usize,
     start: &Model,

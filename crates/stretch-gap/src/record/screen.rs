@@ -13,9 +13,9 @@
 use rayon::prelude::*;
 
 use crate::{
-    fit::{metric::Column as Weighted, prepared::Problem},
+    fit::{metric::Column as Weighted, prepared::PreparedProblem},
     numerics::linear::dot,
-    problem::{error::GapError, frame::Role, simulator::Model},
+    problem::{error::GapError, sample_roles::Role, simulator::Model},
     record::{
         fault::{DELAY_S, Fault, Kind},
         suspect::Suspect,
@@ -50,7 +50,7 @@ pub(crate) struct Promising {
 
 /// What every error is held against.
 pub(crate) struct Bench<'a, 'p, 's> {
-    problem: &'a Problem<'p>,
+    problem: &'a PreparedProblem<'p>,
     suspect: &'a Suspect<'s>,
     /// Around the re-tuned nominal.
     ground: &'a Ground,
@@ -64,13 +64,13 @@ pub(crate) struct Bench<'a, 'p, 's> {
 
 impl<'a, 'p, 's> Bench<'a, 'p, 's> {
     pub(crate) fn new(
-        problem: &'a Problem<'p>,
+        problem: &'a PreparedProblem<'p>,
         suspect: &'a Suspect<'s>,
         ground: &'a Ground,
     ) -> Result<Self, GapError> {
         let compare = &problem.compare;
         let stages = 0..compare.metrics.len();
-        let trials = compare.frame.fit_trials;
+        let trials = compare.roles.fit_trials;
         let outputs = stages.clone().map(|s| compare.runs.output(s, &problem.shipped, trials));
         let outputs = outputs.collect::<Result<_, _>>()?;
         let shipped = Ground::around(compare, problem.shipped.clone())?;
@@ -106,7 +106,7 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
     }
 
     fn promising(&self, fault: usize, start: Model, fall: f64) -> Promising {
-        let noise = self.problem.compare.frame.count(Role::Fit) as f64;
+        let noise = self.problem.compare.roles.count(Role::Fit) as f64;
         let touches = &self.suspect.faults()[fault].touches;
         let before: f64 = touches.iter().map(|&s| (self.left[s] - noise).max(0.0)).sum();
         Promising { fault, start, plain: None, fall, share: fall / before.max(1.0) }
@@ -160,7 +160,7 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
             let here = &self.ground.residuals[stage].values;
             let change = here.iter().zip(&there).map(|(a, b)| a - b).collect();
             let change =
-                self.problem.compare.metrics[stage].column(&self.problem.compare.frame, change);
+                self.problem.compare.metrics[stage].column(&self.problem.compare.roles, change);
             let told = self.told(stage, self.ground, &change);
             let product = |x: &Weighted| self.problem.compare.product(stage, &change, x);
             let of_residual = self.told(stage, self.ground, &self.ground.residuals[stage]);
@@ -209,9 +209,9 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
     fn regressed(&self, kind: Kind, stage: usize) -> Option<f64> {
         let measured = self.problem.simulator().measured(stage);
         let simulated = &self.outputs[stage];
-        let frame = &self.problem.compare.frame;
-        let fitted = || frame.of_role(Role::Fit).flat_map(|s| s.from..s.to);
-        let count = frame.count(Role::Fit) as f64;
+        let roles = &self.problem.compare.roles;
+        let fitted = || roles.of_role(Role::Fit).flat_map(|s| s.from..s.to);
+        let count = roles.count(Role::Fit) as f64;
         let mean = |of: &dyn Fn(usize) -> f64| fitted().map(of).sum::<f64>() / count;
         match kind {
             Kind::Scale => {
@@ -227,10 +227,10 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
 
     /// Delay at which the simulated output lies nearest to the measured one, an offset and a scale of it left free.
     fn delay(&self, measured: &[f64], simulated: &[f64]) -> Option<f64> {
-        let (frame, dt_s) = (&self.problem.compare.frame, self.problem.simulator().dt_s());
+        let (roles, dt_s) = (&self.problem.compare.roles, self.problem.simulator().dt_s());
         let reach = (DELAY_S / dt_s) as i64;
         let likeness = |shift: i64| {
-            let pairs = frame.of_role(Role::Fit).flat_map(|s| {
+            let pairs = roles.of_role(Role::Fit).flat_map(|s| {
                 let (from, last) = (s.from as i64, s.to as i64 - 1);
                 (from..=last).step_by(STEP).map(move |i| {
                     (measured[i as usize], simulated[(i - shift).clamp(from, last) as usize])

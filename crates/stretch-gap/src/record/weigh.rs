@@ -4,7 +4,7 @@
 //! best set of effects, by the score that both are held by, and leaves no more than a set that is named may.
 
 use crate::{
-    fit::{hypothesis::Hypothesis, prepared::Problem},
+    fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
     problem::thresholds::Thresholds,
     record::{gross::Gross, suspect::Suspect},
     search::selection::Found,
@@ -16,14 +16,14 @@ const WHOLE: usize = usize::MAX;
 const TIE: f64 = 1.1;
 
 /// Gap that a set of effects, or an error, may leave.
-pub(crate) fn allowed(problem: &Problem<'_>, thresholds: &Thresholds) -> f64 {
+pub(crate) fn allowed(problem: &PreparedProblem<'_>, thresholds: &Thresholds) -> f64 {
     thresholds.unknown_excess + thresholds.unknown_share * problem.gap(&problem.nominal)
 }
 
 /// The errors that stand above the best effects, as they are reported, and what was found with the first of them in its place; none where
 /// the effects stand.
 pub(crate) fn weighed(
-    doubted: &Problem<'_>,
+    doubted: &PreparedProblem<'_>,
     suspect: &Suspect<'_>,
     errors: Vec<Hypothesis>,
     found: &Found,

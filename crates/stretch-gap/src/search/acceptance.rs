@@ -4,17 +4,17 @@
 //! [octaves](crate::fit::octaves). The score rises by as much, and by `faint_rise` where what is closed would not count as a gap: so little may be
 //! model discrepancy within the noise. At least `share` of the gap that is left in the effect's stages closes. And in one of these stages more
 //! closes than *model discrepancy* could explain: the rig's backlash is not the textbook's; an effect in the right place leaves a share
-//! `mismatch` of what it closes, with the shape of a further effect, and evidence grows with the samples while that share does not.
+//! `model_discrepancy` of what it closes, with the shape of a further effect, and evidence grows with the samples while that share does not.
 
 use crate::{
-    fit::{hypothesis::Hypothesis, prepared::Problem},
+    fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
     problem::thresholds::Thresholds,
 };
 
 /// The acceptance criteria of a problem.
 #[derive(Clone, Copy)]
 pub(crate) struct Acceptance<'a> {
-    pub(crate) problem: &'a Problem<'a>,
+    pub(crate) problem: &'a PreparedProblem<'a>,
     pub(crate) thresholds: &'a Thresholds,
 }
 
@@ -29,7 +29,7 @@ impl Acceptance<'_> {
         next.score - base.score > self.least_rise(closed)
             && self.problem.rise(base, next) > self.thresholds.rise
             && closed >= self.thresholds.share * self.left(base, new)
-            && self.is_no_mismatch(base, next, new)
+            && self.exceeds_discrepancy(base, next, new)
     }
 
     /// Whether a parameter of an effect stands at an end of its range: such an effect is announced by nobody.
@@ -41,7 +41,7 @@ impl Acceptance<'_> {
     /// Whether an effect on top of `base` can be more than what model discrepancy left.
     pub(crate) fn is_possible(&self, base: &Hypothesis, effect: usize) -> bool {
         let mut touched = self.touched(effect).iter();
-        touched.any(|&s| self.problem.gap_in(base, s) >= self.mismatch(base, s))
+        touched.any(|&s| self.problem.gap_in(base, s) >= self.discrepancy(base, s))
     }
 
     /// Rise of the score that one effect more has to bring, if it closes that much.
@@ -55,17 +55,17 @@ impl Acceptance<'_> {
         self.touched(effect).iter().map(|&s| self.problem.gap_in(base, s)).sum()
     }
 
-    fn is_no_mismatch(&self, base: &Hypothesis, next: &Hypothesis, new: usize) -> bool {
+    fn exceeds_discrepancy(&self, base: &Hypothesis, next: &Hypothesis, new: usize) -> bool {
         self.touched(new).iter().any(|&s| {
             let closed = self.problem.closes(base, next, s);
-            closed > 0.0 && closed >= self.mismatch(base, s)
+            closed > 0.0 && closed >= self.discrepancy(base, s)
         })
     }
 
     /// Gap that model discrepancy may leave of what a set closes in a stage.
-    fn mismatch(&self, base: &Hypothesis, stage: usize) -> f64 {
+    fn discrepancy(&self, base: &Hypothesis, stage: usize) -> f64 {
         let gap = |set: &Hypothesis| self.problem.gap_in(set, stage);
-        self.thresholds.mismatch * (gap(&self.problem.nominal) - gap(base)).max(0.0)
+        self.thresholds.model_discrepancy * (gap(&self.problem.nominal) - gap(base)).max(0.0)
     }
 
     fn touched(&self, effect: usize) -> &[usize] {

@@ -18,11 +18,11 @@ use crate::{
         hypothesis::Hypothesis,
         levenberg_marquardt::{COARSE, Fitted, possible},
         metric::Metric,
-        prepared::Problem,
+        prepared::PreparedProblem,
         score::Misfit,
     },
     problem::{
-        altered_parameters::Altered, error::GapError, frame::Role, simulator::Model,
+        altered_parameters::Altered, error::GapError, sample_roles::Role, simulator::Model,
         spec::ParameterSpec,
     },
     search::screen::Ground,
@@ -48,7 +48,7 @@ const STARTS: usize = 2;
 
 /// Three methods that leave out one step each.
 pub(crate) fn baselines(
-    problem: &Problem<'_>,
+    problem: &PreparedProblem<'_>,
     tried: &BTreeMap<Vec<usize>, Hypothesis>,
     null_excess: f64,
 ) -> Result<Baselines, GapError> {
@@ -64,7 +64,10 @@ pub(crate) fn baselines(
 
 /// The effect whose own parameters, fitted alone, take most from the mean square error in multiples of the noise, all parameters of the
 /// simulator left as shipped; none where that is less than what counts as a gap.
-fn largest_drop(problem: &Problem<'_>, null_excess: f64) -> Result<Option<usize>, GapError> {
+fn largest_drop(
+    problem: &PreparedProblem<'_>,
+    null_excess: f64,
+) -> Result<Option<usize>, GapError> {
     // Nothing is re-tuned, nothing drifts.
     let compare = &problem.compare;
     let frozen = Altered::of(problem.simulator(), |_, p| ParameterSpec {
@@ -76,7 +79,7 @@ fn largest_drop(problem: &Problem<'_>, null_excess: f64) -> Result<Option<usize>
     });
     let (runs, shipped) = (compare.runs.beside(&frozen), Model::nominal(&frozen));
     let metrics = compare.metrics.iter().enumerate().map(|(stage, metric)| {
-        Metric::of(&runs, &compare.frame, stage, metric.noise.clone(), &shipped, Some(metric))
+        Metric::of(&runs, &compare.roles, stage, metric.noise.clone(), &shipped, Some(metric))
     });
     let rigid = compare.beside(&frozen, metrics.collect::<Result<_, _>>()?);
     let ground = Ground::around(&rigid, shipped)?;
@@ -108,7 +111,7 @@ fn signature(compare: &Comparison<'_>, ground: &Ground) -> Result<Option<usize>,
     let stages = ground.residuals.iter().enumerate();
     let (squares, count) = stages.fold((0.0, 0.0), |(squares, count), (s, residual)| {
         let own = compare.product(s, residual, residual);
-        (squares + own, count + compare.frame.count(Role::Fit) as f64)
+        (squares + own, count + compare.roles.count(Role::Fit) as f64)
     });
     // Correlation r = product / sqrt(own squares); its standard deviation without a likeness is 1 / sqrt(count).
     let least = FAR * (squares / f64::max(count, 1.0)).sqrt();
@@ -118,7 +121,7 @@ fn signature(compare: &Comparison<'_>, ground: &Ground) -> Result<Option<usize>,
 /// The single effect, fitted together with all parameters, with the lowest BIC = n ln(mean square) + k ln(n), every
 /// sample counted as independent; none where no effect has the lowest (Schwarz 1978, doi 10.1214/aos/1176344136).
 fn criterion(
-    problem: &Problem<'_>,
+    problem: &PreparedProblem<'_>,
     ground: &Ground,
     tried: &BTreeMap<Vec<usize>, Hypothesis>,
 ) -> Result<Option<usize>, GapError> {
@@ -126,7 +129,7 @@ fn criterion(
     let gains = each_effect(compare, |effect| Ok(compare.screen(ground, effect)?.gain()))?;
     let mut order: Vec<usize> = (0..gains.len()).collect();
     order.sort_by(|a, b| gains[*b].total_cmp(&gains[*a]));
-    let samples = compare.frame.count(Role::Fit) as f64;
+    let samples = compare.roles.count(Role::Fit) as f64;
     let falls = each_effect(compare, |effect| {
         if !order[..KEPT.min(order.len())].contains(&effect) {
             return Ok(0.0);

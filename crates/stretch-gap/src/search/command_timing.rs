@@ -6,7 +6,7 @@
 //! the better likelihood of the records decides.
 
 use crate::{
-    fit::{hypothesis::Hypothesis, prepared::Problem},
+    fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
     problem::{
         altered_parameters::Altered, error::GapError, simulator::Simulator, spec::ParameterSpec,
         thresholds::Thresholds,
@@ -27,14 +27,14 @@ pub(crate) fn between_rows(simulator: &dyn Simulator) -> Option<Altered<'_>> {
 /// The problem in which the records are likelier, and the set to go on from; that of commands between rows is prepared where there are
 /// such commands and a gap that they could explain.
 pub(crate) fn likelier<'a>(
-    at_rows: Problem<'a>,
+    at_rows: PreparedProblem<'a>,
     between_rows: Option<&'a Altered<'a>>,
     (thresholds, depth): (&Thresholds, usize),
     seed: u64,
     progress: &dyn Fn(&str),
-) -> Result<(Problem<'a>, Hypothesis), GapError> {
-    let plain = at_rows.nominal.clone();
-    let Some(between_rows) = between_rows else { return Ok((at_rows, plain)) };
+) -> Result<(PreparedProblem<'a>, Hypothesis), GapError> {
+    let unaltered = at_rows.nominal.clone();
+    let Some(between_rows) = between_rows else { return Ok((at_rows, unaltered)) };
     let simulator = at_rows.simulator();
     let timing = &simulator.record().command_timing;
     let is_timed = |stage: &usize| {
@@ -43,14 +43,14 @@ pub(crate) fn likelier<'a>(
     let commanded = (0..simulator.stages().len()).filter(is_timed);
     let gap: f64 = commanded.map(|stage| at_rows.gap_in(&at_rows.nominal, stage)).sum();
     if gap < thresholds.null_excess {
-        return Ok((at_rows, plain));
+        return Ok((at_rows, unaltered));
     }
     progress("when commands switch");
-    let between = Problem::prepare(between_rows, at_rows.stop(), seed, progress)?;
+    let between = PreparedProblem::prepare(between_rows, at_rows.stop(), seed, progress)?;
     if between.log_likelihood(&between.nominal) <= at_rows.log_likelihood(&at_rows.nominal) {
-        return Ok((at_rows, plain));
+        return Ok((at_rows, unaltered));
     }
-    let best = |problem: &Problem<'_>| -> Result<(f64, Hypothesis), GapError> {
+    let best = |problem: &PreparedProblem<'_>| -> Result<(f64, Hypothesis), GapError> {
         let best = Search::new(problem, thresholds, depth).best(&problem.nominal, progress)?;
         Ok((problem.log_likelihood(&best), best))
     };

@@ -5,18 +5,18 @@
 //! likelihoods.
 
 use crate::{
-    fit::{hypothesis::Hypothesis, prepared::Problem},
+    fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
     problem::error::GapError,
     search::sets::Sets,
 };
 
 /// The problem with the nuisances that the record has, and the set to go on from; none where they are as described.
 pub(crate) fn re_estimated<'a>(
-    problem: &Problem<'a>,
+    problem: &PreparedProblem<'a>,
     sets: &mut Sets<'_>,
     best: &Hypothesis,
     seed: u64,
-) -> Result<Option<(Problem<'a>, Hypothesis)>, GapError> {
+) -> Result<Option<(PreparedProblem<'a>, Hypothesis)>, GapError> {
     let mut bare = best.clone();
     for effect in best.effects.iter().copied().filter(|e| problem.is_in_loose_stage(*e)) {
         bare = sets.without(&bare, effect)?;

@@ -62,7 +62,7 @@ impl Ground {
             .into_par_iter()
             .map(|s| {
                 if let Some(costly) = compare.runs.simulator().costly() {
-                    costly.linearise(s, &model, compare.frame.fit_trials)?;
+                    costly.linearise(s, &model, compare.roles.fit_trials)?;
                 }
                 let residual = compare.residual(s, &model)?;
                 let known = compare.nominal_sensitivities(s, &model, &residual)?;
@@ -156,7 +156,7 @@ impl Comparison<'_> {
         for (&stage, there) in touches.iter().zip(&there) {
             let here = &ground.residuals[stage].values;
             let change = here.iter().zip(there).map(|(a, b)| a - b).collect();
-            let change = self.metrics[stage].column(&self.frame, change);
+            let change = self.metrics[stage].column(&self.roles, change);
             let (squares, product) = self.projected(stage, ground, &change);
             own += squares;
             mixed += product;
@@ -181,7 +181,7 @@ impl Comparison<'_> {
                 normal[(j, i)] = p;
             }
             // The prior: one standard deviation is 1, and a block counts as one sample.
-            normal[(i, i)] += self.frame.block as f64;
+            normal[(i, i)] += self.roles.block as f64;
         }
         let factor = Cholesky::of(normal);
         let mut of_residual: Vec<f64> = known.iter().map(|(_, k)| product(k, residual)).collect();

@@ -9,7 +9,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use rayon::prelude::*;
 
 use crate::{
-    fit::{hypothesis::Hypothesis, prepared::Problem},
+    fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
     problem::{error::GapError, thresholds::Thresholds},
     search::{
         acceptance::Acceptance,
@@ -40,7 +40,7 @@ const LOOKED: usize = 4;
 
 /// The search over sets of effects.
 pub(crate) struct Search<'a> {
-    problem: &'a Problem<'a>,
+    problem: &'a PreparedProblem<'a>,
     acceptance: Acceptance<'a>,
     pub(crate) sets: Sets<'a>,
     /// Most effects at once.
@@ -64,7 +64,11 @@ pub(crate) struct Found {
 }
 
 impl<'a> Search<'a> {
-    pub(crate) fn new(problem: &'a Problem<'a>, thresholds: &'a Thresholds, depth: usize) -> Self {
+    pub(crate) fn new(
+        problem: &'a PreparedProblem<'a>,
+        thresholds: &'a Thresholds,
+        depth: usize,
+    ) -> Self {
         let acceptance = Acceptance { problem, thresholds };
         Self { problem, acceptance, sets: Sets::new(problem), depth, looked: Vec::new() }
     }

@@ -14,7 +14,7 @@ use crate::{
     fit::{
         hypothesis::Hypothesis,
         levenberg_marquardt::{COARSE, FINE, Fitted, GLANCE, possible},
-        prepared::Problem,
+        prepared::PreparedProblem,
     },
     problem::{error::GapError, linked_stages::linked, simulator::Model},
     search::screen::{Ground, Screened},
@@ -29,7 +29,7 @@ const NEAR_NATS: f64 = 30.0;
 
 /// Sets of effects that were fitted.
 pub(crate) struct Sets<'a> {
-    pub(crate) problem: &'a Problem<'a>,
+    pub(crate) problem: &'a PreparedProblem<'a>,
     /// Every set that was fitted, by its sorted effects.
     pub(crate) tried: BTreeMap<Vec<usize>, Hypothesis>,
     /// Sets among the fitted ones that were fitted from a larger set.
@@ -37,7 +37,7 @@ pub(crate) struct Sets<'a> {
 }
 
 impl<'a> Sets<'a> {
-    pub(crate) fn new(problem: &'a Problem<'a>) -> Self {
+    pub(crate) fn new(problem: &'a PreparedProblem<'a>) -> Self {
         Self { problem, tried: BTreeMap::new(), refitted: BTreeSet::new() }
     }
 

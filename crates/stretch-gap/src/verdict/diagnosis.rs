@@ -70,7 +70,7 @@ pub struct TransferError {
 /// The experiment that would tell rivals apart.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NextExperiment {
-    /// Name in the menu.
+    /// Name of the experiment.
     pub name: String,
     /// Rivals that it separates.
     pub separates: Vec<String>,

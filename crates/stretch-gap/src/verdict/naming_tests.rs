@@ -12,11 +12,11 @@ use crate::{
 const NAMES: [&str; 6] = ["play", "drift", "lag", "leak", "slack", "sag"];
 
 /// A set of up to three different effects.
-fn set(dice: &mut RandomGenerator) -> Vec<String> {
-    let count = dice.below(4);
+fn set(random: &mut RandomGenerator) -> Vec<String> {
+    let count = random.below(4);
     let mut names: Vec<String> = Vec::new();
     while names.len() < count {
-        let name = NAMES[dice.below(NAMES.len())].to_owned();
+        let name = NAMES[random.below(NAMES.len())].to_owned();
         if !names.contains(&name) {
             names.push(name);
         }
@@ -24,8 +24,8 @@ fn set(dice: &mut RandomGenerator) -> Vec<String> {
     names
 }
 
-fn candidate(effects: Vec<String>, probability: f64, dice: &mut RandomGenerator) -> Candidate {
-    let closed = 1.2 * dice.unit() - 0.2;
+fn candidate(effects: Vec<String>, probability: f64, random: &mut RandomGenerator) -> Candidate {
+    let closed = 1.2 * random.unit() - 0.2;
     Candidate {
         effects,
         probability,
@@ -34,40 +34,40 @@ fn candidate(effects: Vec<String>, probability: f64, dice: &mut RandomGenerator)
         gap_after: 10.0 * (1.0 - closed),
         closed,
         closed_ci: [closed - 0.1, closed + 0.1],
-        is_confirmed: dice.unit() < 0.7,
+        is_confirmed: random.unit() < 0.7,
         by_name: Default::default(),
         parameters: Vec::new(),
     }
 }
 
 /// Candidates, the most probable first, and the shares of the first one's effects, the strongest first.
-fn drawn(dice: &mut RandomGenerator) -> (Vec<Candidate>, Vec<EffectShare>, bool) {
+fn drawn(random: &mut RandomGenerator) -> (Vec<Candidate>, Vec<EffectShare>, bool) {
     let mut candidates = Vec::new();
     for probability in [0.6, 0.3, 0.1] {
-        let effects = set(dice);
-        candidates.push(candidate(effects, probability, dice));
+        let effects = set(random);
+        candidates.push(candidate(effects, probability, random));
     }
     let mut shares: Vec<EffectShare> = candidates[0]
         .effects
         .iter()
         .map(|effect| {
-            let closes = dice.unit() * dice.unit();
-            let at_bound = dice.unit() < 0.2;
+            let closes = random.unit() * random.unit();
+            let at_bound = random.unit() < 0.2;
             EffectShare { effect: effect.clone(), closes, closes_of_stage: closes, at_bound }
         })
         .collect();
     shares.sort_by(|a, b| b.closes.total_cmp(&a.closes));
-    (candidates, shares, dice.unit() < 0.2)
+    (candidates, shares, random.unit() < 0.2)
 }
 
 /// Named and faint are the first set, parted; a tie is between a name and what the first set does not hold; every name is told once.
 #[test]
 fn names_part_the_first_set() {
-    let mut dice = RandomGenerator::new(4, 0);
+    let mut random = RandomGenerator::new(4, 0);
     let thresholds = Thresholds::frozen();
     let mut ties = 0;
     for _ in 0..5000 {
-        let (candidates, shares, is_short) = drawn(&mut dice);
+        let (candidates, shares, is_short) = drawn(&mut random);
         let naming = Naming::of(&candidates, &shares, &thresholds, is_short);
         let both: Vec<&String> = naming.named.iter().chain(&naming.faint).collect();
         let parted: BTreeSet<&String> = both.iter().copied().collect();
@@ -91,10 +91,10 @@ fn names_part_the_first_set() {
 /// What closes less than counts is no headline beside what closes more, and what stands at the end of its range is none alone.
 #[test]
 fn what_is_named_counts() {
-    let mut dice = RandomGenerator::new(5, 0);
+    let mut random = RandomGenerator::new(5, 0);
     let thresholds = Thresholds::frozen();
     for _ in 0..5000 {
-        let (candidates, shares, is_short) = drawn(&mut dice);
+        let (candidates, shares, is_short) = drawn(&mut random);
         let naming = Naming::of(&candidates, &shares, &thresholds, is_short);
         let share = |name: &String| shares.iter().find(|s| s.effect == *name);
         let counts = |name: &String| {

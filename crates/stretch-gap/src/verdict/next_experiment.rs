@@ -19,7 +19,7 @@ use crate::{
     numerics::linear::{boxed, dot},
     problem::{
         error::GapError,
-        frame::BLOCK_S,
+        sample_roles::BLOCK_S,
         simulator::{Model, Simulator},
     },
     verdict::diagnosis::{Diagnosis, NextExperiment},
@@ -33,7 +33,7 @@ const SMALL: f64 = 0.02;
 /// An experiment in words, and the trial that does it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Name in the menu.
+    /// Name of the experiment.
     pub name: String,
     /// A sentence that says how the experiment is done.
     pub how: String,
@@ -63,7 +63,7 @@ pub trait Laboratory: Simulator {
     /// What it takes to simulate an experiment.
     type Setting: Sync;
     /// Experiments to choose from, all with the same sample time.
-    fn menu(&self) -> Vec<(Plan, Self::Setting)>;
+    fn experiments(&self) -> Vec<(Plan, Self::Setting)>;
     /// An experiment that stands for what has been measured.
     fn done(&self) -> Self::Setting;
     /// What a model predicts of an experiment: every recorded channel in units of its noise.
@@ -80,8 +80,8 @@ pub struct Proposal {
     pub next: NextExperiment,
     /// Openings by time, and what is to be set from outside.
     pub trial: Trial,
-    /// Every experiment of the menu: name, difference in multiples of the noise, minutes; the best first.
-    pub menu: Vec<(String, f64, f64)>,
+    /// Every candidate experiment: name, difference in multiples of the noise, minutes; the best first.
+    pub experiments: Vec<(String, f64, f64)>,
 }
 
 /// Recommends an experiment when the 95 % set of a diagnosis holds more than one effect.
@@ -102,16 +102,16 @@ pub fn next_experiment<L: Laboratory>(
     let Some((one, two, separates)) = rivals(simulator, diagnosis, evidence) else {
         return Ok(None);
     };
-    let menu = simulator.menu();
-    let rated = rate(simulator, one, two, &menu)?.into_iter().enumerate();
+    let experiments = simulator.experiments();
+    let rated = rate(simulator, one, two, &experiments)?.into_iter().enumerate();
     let value = |&(i, d): &(usize, f64)| {
-        let plan = &menu[i].0;
+        let plan = &experiments[i].0;
         d * d * plan.runs_min() / plan.minutes()
     };
     let mut rated: Vec<(usize, f64)> = rated.collect();
     rated.sort_by(|a, b| value(b).total_cmp(&value(a)));
     let Some(&(best, d)) = rated.first().filter(|r| r.1.is_finite()) else { return Ok(None) };
-    let chosen = &menu[best].0;
+    let chosen = &experiments[best].0;
     let next = NextExperiment {
         name: chosen.name.clone(),
         separates,
@@ -120,11 +120,12 @@ pub fn next_experiment<L: Laboratory>(
         why: chosen.how.clone() + &repeats(d, chosen.runs_min()),
     };
     let trial = chosen.trial.clone();
-    let rated = rated.iter().map(|&(i, d)| (menu[i].0.name.clone(), d, menu[i].0.minutes()));
-    Ok(Some(Proposal { next, trial, menu: rated.collect() }))
+    let rated =
+        rated.iter().map(|&(i, d)| (experiments[i].0.name.clone(), d, experiments[i].0.minutes()));
+    Ok(Some(Proposal { next, trial, experiments: rated.collect() }))
 }
 
-/// D of every experiment of the menu for two models, in multiples of the noise: see [`next_experiment`].
+/// D of every candidate experiment for two models, in multiples of the noise: see [`next_experiment`].
 ///
 /// # Errors
 /// What the simulator says.
@@ -133,21 +134,22 @@ pub fn differences<L: Laboratory>(
     one: &Model,
     two: &Model,
 ) -> Result<Vec<(String, f64)>, GapError> {
-    let menu = simulator.menu();
-    let rated = rate(simulator, one, two, &menu)?;
-    Ok(menu.into_iter().map(|(plan, _)| plan.name).zip(rated).collect())
+    let experiments = simulator.experiments();
+    let rated = rate(simulator, one, two, &experiments)?;
+    Ok(experiments.into_iter().map(|(plan, _)| plan.name).zip(rated).collect())
 }
 
 fn rate<L: Laboratory>(
     simulator: &L,
     one: &Model,
     two: &Model,
-    menu: &[(Plan, L::Setting)],
+    experiments: &[(Plan, L::Setting)],
 ) -> Result<Vec<f64>, GapError> {
     let done = simulator.done();
-    let block = menu.first().map_or(1.0, |(plan, _)| BLOCK_S / plan.dt_s());
+    let block = experiments.first().map_or(1.0, |(plan, _)| BLOCK_S / plan.dt_s());
     let known = [Tangent::of(simulator, one, &done)?, Tangent::of(simulator, two, &done)?];
-    menu.par_iter()
+    experiments
+        .par_iter()
         .map(|(_, experiment)| {
             let here = [
                 Tangent::of(simulator, one, experiment)?,
@@ -162,12 +164,12 @@ fn rate<L: Laboratory>(
 
 /// How often the experiment has to be repeated until rivals part, where once is not enough.
 fn repeats(d: f64, minutes: f64) -> String {
-    let told = 0.5 * d * d * 60.0 * minutes / BLOCK_S;
-    match (ENOUGH / told).ceil() {
+    let nats = 0.5 * d * d * 60.0 * minutes / BLOCK_S;
+    match (ENOUGH / nats).ceil() {
         n if n <= 1.0 => String::new(),
         n if n <= 20.0 => format!(" Once will hardly do: plan {n} runs."),
         _ => {
-            " The rivals are so alike that no experiment of the menu is likely to part them.".into()
+            " The rivals are so alike that none of the candidate experiments is likely to part them.".into()
         }
     }
 }
@@ -340,10 +342,10 @@ mod tests {
         let (n, s, block) = (200_usize, 0.4, 50.0);
         let values = vec![s; n];
         let (truth, rival) = (tangent(&vec![0.0; n], &[]), tangent(&values, &[&values]));
-        let told = 2.0 * n as f64 * s * s / block;
+        let scale = 2.0 * n as f64 * s * s / block;
         let d = left(block, &truth, &rival, &truth, &rival);
         // The solver lifts the diagonal by 1e-13.
-        assert_relative_eq!(d, s / (told + 1.0), epsilon = 0.0, max_relative = 1e-9);
+        assert_relative_eq!(d, s / (scale + 1.0), epsilon = 0.0, max_relative = 1e-9);
     }
 
     /// Data that were measured forbid what would explain the experiment away: the rival may not move where it was pinned.

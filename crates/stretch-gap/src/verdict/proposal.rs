@@ -7,7 +7,7 @@
 //! follows that input: the noise does so, too, where the input rests and nothing else moves it.
 
 use crate::{
-    fit::{hypothesis::Hypothesis, prepared::Problem, score::gap},
+    fit::{hypothesis::Hypothesis, prepared::PreparedProblem, score::gap},
     missing::{Proposed, propose},
     problem::error::GapError,
 };
@@ -28,7 +28,7 @@ pub(crate) struct Lacking {
 impl Lacking {
     /// Proposes a sum instead of the best set of effects, and one beside it where the set has `names`.
     pub(crate) fn of(
-        problem: &Problem<'_>,
+        problem: &PreparedProblem<'_>,
         best: &Hypothesis,
         names: bool,
         progress: &dyn Fn(&str),
@@ -46,7 +46,7 @@ impl Lacking {
 
 /// Whether a sum closes more of its stage's held-out gap than the best set does with `own` beside it.
 fn beats(
-    problem: &Problem<'_>,
+    problem: &PreparedProblem<'_>,
     best: &Hypothesis,
     other: &Proposed,
     own: Option<&Proposed>,

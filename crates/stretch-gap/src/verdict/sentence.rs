@@ -12,13 +12,13 @@ use crate::{
 };
 
 /// Least share of the gap that is reported of an effect that is not named.
-const TOLD: f64 = 0.05;
+const LEAST_PART: f64 = 0.05;
 
 /// Least share that is reported as a number.
-const LEAST_TOLD: f64 = 0.01;
+const LEAST_SHARE_IN_WORDS: f64 = 0.01;
 
 /// What is reported: the answer in one sentence, and what was noticed and assumed.
-pub(crate) struct Told {
+pub(crate) struct Words {
     pub(crate) sentence: String,
     pub(crate) notes: Vec<String>,
 }
@@ -40,9 +40,9 @@ pub(crate) struct Answer<'a> {
 }
 
 /// Puts a verdict into words.
-pub(crate) fn tell(answer: Answer<'_>, simulator: &dyn Simulator, evidence: &Evidence) -> Told {
+pub(crate) fn tell(answer: Answer<'_>, simulator: &dyn Simulator, evidence: &Evidence) -> Words {
     let mut notes = Vec::new();
-    if evidence.frame.borrowed_test {
+    if evidence.roles.borrowed_test {
         let held =
             "there is no test trial: the last quarter of every trial is held back and tested on";
         notes.push(held.into());
@@ -57,7 +57,7 @@ pub(crate) fn tell(answer: Answer<'_>, simulator: &dyn Simulator, evidence: &Evi
     };
     let proposed = &answer.judged.proposed;
     let proposed = proposed.as_ref().map_or(String::new(), |p| format!(" {}", p.sentence));
-    Told { sentence: sentence + &proposed, notes }
+    Words { sentence: sentence + &proposed, notes }
 }
 
 fn seen(answer: Answer<'_>, simulator: &dyn Simulator, evidence: &Evidence) -> String {
@@ -67,7 +67,7 @@ fn seen(answer: Answer<'_>, simulator: &dyn Simulator, evidence: &Evidence) -> S
         (VerdictKind::Record, Some(first)) if !answer.gross.iter().any(Gross::is_plain) => {
             sentence(answer.gross)
                 + &format!(
-                    " With that put right {:.0} % of the gap close ({:.0} to {:.0} %) on trials that were not fitted; probability {:.2}.",
+                    " With that corrected, {:.0} % of the gap close ({:.0} to {:.0} %) on trials that were not fitted; probability {:.2}.",
                     100.0 * first.closed,
                     100.0 * first.closed_ci[0],
                     100.0 * first.closed_ci[1],
@@ -75,7 +75,7 @@ fn seen(answer: Answer<'_>, simulator: &dyn Simulator, evidence: &Evidence) -> S
                 )
         }
         (VerdictKind::Record, _) => {
-            sentence(answer.gross) + " Nothing can be said of effects until that is put right."
+            sentence(answer.gross) + " Nothing can be said of effects until that is corrected."
         }
         (VerdictKind::Effect, Some(first)) => {
             let names = naming.alternatives();
@@ -105,7 +105,7 @@ fn seen(answer: Answer<'_>, simulator: &dyn Simulator, evidence: &Evidence) -> S
         (VerdictKind::Parameters | VerdictKind::NoGap, _) => match answer.null_band {
             Some(band) if gap.retuned > band => too_faint(gap, band, evidence, simulator),
             _ if judged.seen == VerdictKind::NoGap => {
-                "Simulator and rig agree within the noise floor.".into()
+                "Simulator and rig agree within the noise.".into()
             }
             _ => format!(
                 "No effect is missing: with its parameters re-tuned within their tolerances the simulator agrees with the rig (what is left is {:.1} times the noise as shipped, {:.2} re-tuned).",
@@ -134,7 +134,7 @@ fn partial(answer: Answer<'_>) -> String {
     let naming = &answer.judged.naming;
     let closes =
         |name: &String| answer.shares.iter().find(|s| s.effect == *name).map_or(0.0, |s| s.closes);
-    let in_words = |share: f64| match share < LEAST_TOLD {
+    let in_words = |share: f64| match share < LEAST_SHARE_IN_WORDS {
         true => " (below 1 %)".to_owned(),
         false => format!(" ({:.0} %)", 100.0 * share),
     };
@@ -172,17 +172,17 @@ fn multiple(excess: f64) -> f64 {
 
 /// Which effects close parts of a gap that no set of them explains.
 fn parts(shares: &[EffectShare]) -> String {
-    let told = shares.iter().filter(|s| s.closes >= TOLD).map(|s| {
+    let parts = shares.iter().filter(|s| s.closes >= LEAST_PART).map(|s| {
         let end = if s.at_bound { " (at the end of its range)" } else { "" };
         format!("{} {:.0} %{end}", s.effect, 100.0 * s.closes)
     });
-    let told: Vec<String> = told.collect();
+    let parts: Vec<String> = parts.collect();
     let all: f64 = shares.iter().map(|s| s.closes).sum();
-    match told.is_empty() {
+    match parts.is_empty() {
         true => String::new(),
         false => format!(
             " Parts of it close: {} ({:.0} % together, on trials that were not fitted).",
-            told.join(", "),
+            parts.join(", "),
             100.0 * all
         ),
     }

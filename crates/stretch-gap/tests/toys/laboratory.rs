@@ -9,11 +9,11 @@ use stretch_gap::{GapError, Laboratory, Model, Plan};
 
 /// Levels of 0, a half and 1, held for 0.4 s each in an order that is drawn: there x^3 is 1.5 x^2 - 0.5 x.
 pub(crate) fn levels(samples: usize) -> Vec<f64> {
-    let mut dice = stretch_gap::RandomGenerator::new(5, 0);
+    let mut random = stretch_gap::RandomGenerator::new(5, 0);
     let mut level = 0.0;
     let next = |i: usize| {
         if i.is_multiple_of(40) {
-            level = 0.5 * dice.below(3) as f64;
+            level = 0.5 * random.below(3) as f64;
         }
         level
     };
@@ -31,7 +31,7 @@ fn plan(name: &str, prepare_min: f64, x: Vec<f64>) -> (Plan, Vec<f64>) {
 impl Laboratory for Measured {
     type Setting = Vec<f64>;
 
-    fn menu(&self) -> Vec<(Plan, Vec<f64>)> {
+    fn experiments(&self) -> Vec<(Plan, Vec<f64>)> {
         let sweep: Vec<f64> = (0..3000).map(|i| (0.004 * f64::from(i)).sin()).collect();
         vec![
             plan("three levels", 0.0, levels(3000)),

@@ -185,9 +185,9 @@ impl Toy {
     /// The record that the bench makes, drawn from a seed: `x` is four tones a trial, with values within -1..1.
     pub(crate) fn measured(&self, seed: u64) -> Measured {
         let x = self.trials.iter().enumerate().flat_map(|(trial, (samples, _))| {
-            let mut dice = RandomGenerator::new(seed, 100 + trial as u64);
+            let mut random = RandomGenerator::new(seed, 100 + trial as u64);
             let tones: Vec<[f64; 2]> = (0..4)
-                .map(|k| [0.5 + 1.1 * f64::from(k) + 0.7 * dice.unit(), 6.3 * dice.unit()])
+                .map(|k| [0.5 + 1.1 * f64::from(k) + 0.7 * random.unit(), 6.3 * random.unit()])
                 .collect();
             let at = move |i: usize, dt_s: f64| {
                 let t = dt_s * i as f64;
@@ -202,15 +202,15 @@ impl Toy {
     /// The record that the bench makes of an input of one's own, in the units of -1..1.
     pub(crate) fn driven_by(&self, x: Vec<f64>, seed: u64) -> Measured {
         assert_eq!(x.len(), self.samples(), "one sample of x for each of the trials");
-        let mut dice = RandomGenerator::new(seed, 7);
+        let mut random = RandomGenerator::new(seed, 7);
         let mut outputs: Vec<Vec<f64>> = Vec::new();
         for stage in 0..self.laws.len() {
             let input = outputs.last().unwrap_or(&x);
             let mut y = self.of_bench(stage, input);
-            y.iter_mut().for_each(|y| *y += self.noise * dice.gauss());
+            y.iter_mut().for_each(|y| *y += self.noise * random.gauss());
             outputs.push(y);
         }
-        let x = x.iter().map(|x| self.units[0] * (x + self.input_noise * dice.gauss())).collect();
+        let x = x.iter().map(|x| self.units[0] * (x + self.input_noise * random.gauss())).collect();
         let outputs = outputs.into_iter().map(|y| y.iter().map(|y| self.units[1] * y).collect());
         Measured::new(self.clone(), x, outputs.collect())
     }
@@ -288,11 +288,11 @@ pub(crate) fn slow(
     (samples, dt_s): (usize, f64),
     seed: u64,
 ) -> Vec<f64> {
-    let mut dice = RandomGenerator::new(seed, 55);
+    let mut random = RandomGenerator::new(seed, 55);
     let kept = (-dt_s / correlation_s).exp();
-    let mut x = dice.gauss();
+    let mut x = random.gauss();
     let next = |_| {
-        x = kept * x + (1.0 - kept * kept).sqrt() * dice.gauss();
+        x = kept * x + (1.0 - kept * kept).sqrt() * random.gauss();
         sd * x
     };
     (0..samples).map(next).collect()

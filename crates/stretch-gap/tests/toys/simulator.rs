@@ -95,8 +95,8 @@ impl Measured {
         }
         let mut x: Vec<f64> = self.x.iter().map(|x| x / toy.units[0]).collect();
         if let Some(seed) = input_noise.filter(|_| toy.input_noise > 0.0) {
-            let mut dice = RandomGenerator::new(seed, 31);
-            x.iter_mut().for_each(|x| *x += toy.input_noise * dice.gauss());
+            let mut random = RandomGenerator::new(seed, 31);
+            x.iter_mut().for_each(|x| *x += toy.input_noise * random.gauss());
         }
         x
     }

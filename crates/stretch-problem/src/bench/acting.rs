@@ -1,6 +1,6 @@
 //! Effects of a model: effects that stages run, and effects whose values are found in the recording.
 
-use stretch_gap::{Frame, Line, Model, TrialSpec};
+use stretch_gap::{Line, Model, SampleRoles, TrialSpec};
 use stretch_sim::{Effect, EffectSet, Find, Measured, SimError};
 
 /// The measured samples of a channel that are not tested on, in which effects may be found.
@@ -20,7 +20,7 @@ impl FitRecord {
             begin += trial.samples;
             measured[from..from + fit].to_vec()
         };
-        Self { parts: trials.iter().zip(Frame::not_tested(trials)).map(part).collect(), dt_s }
+        Self { parts: trials.iter().zip(SampleRoles::not_tested(trials)).map(part).collect(), dt_s }
     }
 
     /// The samples of all trials.

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial};
-use stretch_gap::{Frame, TrialSpec};
+use stretch_gap::{SampleRoles, TrialSpec};
 
 use crate::error::ProblemError;
 
@@ -72,7 +72,7 @@ impl Columns {
 
     /// Ranges of samples that are not tested on.
     pub(crate) fn looked_at(&self) -> Vec<Range<usize>> {
-        let fit = Frame::not_tested(&self.trials);
+        let fit = SampleRoles::not_tested(&self.trials);
         let parts = self.ranges().into_iter().zip(fit);
         parts.map(|(all, fit)| all.start..all.start + fit).filter(|r| !r.is_empty()).collect()
     }

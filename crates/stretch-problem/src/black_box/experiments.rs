@@ -141,7 +141,7 @@ impl BlackBox {
 impl Laboratory for BlackBox {
     type Setting = Course;
 
-    fn menu(&self) -> Vec<(Plan, Course)> {
+    fn experiments(&self) -> Vec<(Plan, Course)> {
         let all = self.driven();
         let dt_s = self.description().dt_s;
         let lasts_s = self.problem.session().samples(1) as f64 * dt_s;

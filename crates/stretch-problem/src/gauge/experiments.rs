@@ -119,7 +119,7 @@ impl GaugeSimulator {
 impl Laboratory for GaugeSimulator {
     type Setting = Course;
 
-    fn menu(&self) -> Vec<(Plan, Course)> {
+    fn experiments(&self) -> Vec<(Plan, Course)> {
         let dt_s = self.session.dt_s;
         let moving =
             moving().into_iter().map(|(name, how, points)| (name, how, 0.25, points, false));

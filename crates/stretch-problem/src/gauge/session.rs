@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial, ends, unit};
-use stretch_gap::{Frame, Noise, TrialSpec};
+use stretch_gap::{Noise, SampleRoles, TrialSpec};
 
 use crate::{
     bench::lost::open,
@@ -79,7 +79,7 @@ impl GaugeSession {
     /// Samples that are not tested on.
     pub(super) fn fitted(&self) -> impl Iterator<Item = Range<usize>> {
         let mut begin = 0;
-        self.trials.iter().zip(Frame::not_tested(&self.trials)).filter_map(move |(t, fit)| {
+        self.trials.iter().zip(SampleRoles::not_tested(&self.trials)).filter_map(move |(t, fit)| {
             let own = begin..begin + fit;
             begin += t.samples;
             (fit > 0).then_some(own)

@@ -301,7 +301,7 @@ impl RigSimulator {
 impl Laboratory for RigSimulator {
     type Setting = Experiment;
 
-    fn menu(&self) -> Vec<(Plan, Experiment)> {
+    fn experiments(&self) -> Vec<(Plan, Experiment)> {
         let all = Experiment::all(self.inputs.stroke, 1e-3 * self.base[Key::PS]);
         all.into_iter().map(|x| (x.plan(), x)).collect()
     }

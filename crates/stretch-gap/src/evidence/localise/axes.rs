@@ -7,7 +7,7 @@ use stretch_filter::log::second_differences;
 
 use stretch_data::ends;
 
-use crate::problem::{frame::Frame, record_facts::Motion, simulator::Simulator};
+use crate::problem::{record_facts::Motion, sample_roles::SampleRoles, simulator::Simulator};
 
 /// Samples on each side that a rate is fitted over.
 const REACH: usize = 10;
@@ -40,14 +40,14 @@ pub(super) struct Course {
 }
 
 impl Course {
-    pub(super) fn of(simulator: &dyn Simulator, frame: &Frame) -> Self {
+    pub(super) fn of(simulator: &dyn Simulator, roles: &SampleRoles) -> Self {
         let Motion { values, .. } = simulator.motion();
         let dt_s = simulator.dt_s();
         let mut starts = vec![0];
         for trial in simulator.trials() {
             starts.push(starts[starts.len() - 1] + trial.samples);
         }
-        let samples = frame.samples(simulator.trials().len()).min(values.len());
+        let samples = roles.samples(simulator.trials().len()).min(values.len());
         let mut level = vec![0.0; samples];
         let mut rate = vec![0.0; samples];
         for trial in starts.windows(2) {
@@ -116,7 +116,11 @@ impl Course {
 impl Axis {
     pub(super) const NONE: u16 = u16::MAX;
 
-    pub(super) fn all(course: &Course, simulator: &dyn Simulator, frame: &Frame) -> Vec<Self> {
+    pub(super) fn all(
+        course: &Course,
+        simulator: &dyn Simulator,
+        roles: &SampleRoles,
+    ) -> Vec<Self> {
         let mut axes = vec![
             Self::regime(course, simulator),
             Self::level(course, simulator.motion().unit),
@@ -124,7 +128,7 @@ impl Axis {
         ];
         axes.extend(Self::clocks(course, simulator));
         let mut of = vec![Self::NONE; course.len()];
-        for segment in &frame.segments {
+        for segment in &roles.segments {
             let end = segment.to.min(of.len());
             of[segment.from.min(end)..end].fill(segment.trial as u16);
         }

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::excess::Cells;
-use crate::problem::frame::Frame;
+use crate::problem::sample_roles::SampleRoles;
 
 /// Samples of a window; neighbours overlap by half.
 const WINDOW: usize = 512;
@@ -12,12 +12,12 @@ const BANDS: usize = 8;
 
 /// Power in octave bands by window (Welch's method with Hann's window): white noise of one multiple has power 1 in
 /// every line. Segments shorter than a window are left out.
-pub(super) fn cells(frame: &Frame, residual: &[f64], dt_s: f64) -> (Vec<String>, Cells) {
+pub(super) fn cells(roles: &SampleRoles, residual: &[f64], dt_s: f64) -> (Vec<String>, Cells) {
     let window: Vec<f64> =
         (0..WINDOW).map(|i| 0.5 - 0.5 * (TAU * i as f64 / WINDOW as f64).cos()).collect();
     let power: f64 = window.iter().map(|w| w * w).sum();
     let mut cells = Vec::new();
-    for segment in &frame.segments {
+    for segment in &roles.segments {
         let mut from = segment.from;
         while from + WINDOW <= segment.to.min(residual.len()) {
             let mut wave: Vec<(f64, f64)> = residual[from..from + WINDOW]
@@ -120,10 +120,10 @@ mod tests {
         assert_eq!((band(129), band(128), band(64), band(3), band(2), band(0)), (0, 1, 2, 6, 7, 7));
     }
 
-    fn whole(samples: usize) -> Frame {
-        use crate::problem::frame::{Role, Segment};
+    fn whole(samples: usize) -> SampleRoles {
+        use crate::problem::sample_roles::{Role, Segment};
         let segments = vec![Segment { trial: 0, from: 0, to: samples, role: Role::Fit }];
-        Frame { segments, block: 50, fit_trials: 1, borrowed_test: true }
+        SampleRoles { segments, block: 50, fit_trials: 1, borrowed_test: true }
     }
 
     /// Excess by band over a residual at 100 Hz.
@@ -135,8 +135,8 @@ mod tests {
     /// Energy is kept: sum |X|^2 = n sum |x|^2.
     #[test]
     fn the_transform_keeps_energy() {
-        let mut dice = crate::numerics::random::RandomGenerator::new(10, 2);
-        let mut x: Vec<(f64, f64)> = (0..256).map(|_| (dice.gauss(), dice.gauss())).collect();
+        let mut random = crate::numerics::random::RandomGenerator::new(10, 2);
+        let mut x: Vec<(f64, f64)> = (0..256).map(|_| (random.gauss(), random.gauss())).collect();
         let energy = |x: &[(f64, f64)]| x.iter().map(|(a, b)| a * a + b * b).sum::<f64>();
         let before = energy(&x);
         transform(&mut x);
@@ -165,8 +165,8 @@ mod tests {
     /// independent powers, whose mean is known to 0.07: three of these; wider ones better.
     #[test]
     fn white_noise_has_the_same_power_in_every_octave() {
-        let mut dice = crate::numerics::random::RandomGenerator::new(11, 2);
-        let noise: Vec<f64> = (0..32_768).map(|_| dice.gauss()).collect();
+        let mut random = crate::numerics::random::RandomGenerator::new(11, 2);
+        let noise: Vec<f64> = (0..32_768).map(|_| random.gauss()).collect();
         let found = excesses(&noise);
         assert!(found.iter().all(|e| e.abs() < 0.21), "{found:?}");
         assert!(found[0].abs() < 0.05, "{found:?}");

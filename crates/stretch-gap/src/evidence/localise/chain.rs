@@ -12,7 +12,7 @@
 
 use crate::{
     evidence::gathered::Evidence,
-    problem::{error::GapError, frame::Role, runs::Runs, simulator::Run},
+    problem::{error::GapError, runs::Runs, sample_roles::Role, simulator::Run},
 };
 
 /// A variant of what one stage hands to the next.
@@ -67,7 +67,7 @@ pub(super) fn shapley(runs: &Runs<'_>, evidence: &Evidence) -> Result<Vec<f64>, 
         let Some(output) = &variant.output else { continue };
         let (mut sum, mut count) = (0.0, 0_usize);
         let measured = simulator.measured(last);
-        for segment in evidence.frame.of_role(Role::Test) {
+        for segment in evidence.roles.of_role(Role::Test) {
             for i in segment.from..segment.to {
                 sum += (measured[i] - output[i]).powi(2);
             }
@@ -148,10 +148,10 @@ mod tests {
     /// Values of random games: the sum is the worth of all minus that of none, twins share alike, names do not matter, and neither does the unit.
     #[test]
     fn shares_do_not_depend_on_names_or_units() {
-        let mut dice = crate::numerics::random::RandomGenerator::new(1, 0);
+        let mut random = crate::numerics::random::RandomGenerator::new(1, 0);
         for _ in 0..50 {
             let worth: Vec<f64> =
-                (0..8_u32).map(|set| f64::from(set.count_ones()) + dice.unit()).collect();
+                (0..8_u32).map(|set| f64::from(set.count_ones()) + random.unit()).collect();
             let own = shares(&worth, 3);
             assert_relative_eq!(own.iter().sum::<f64>(), 1.0, max_relative = F64_ROUNDING);
             let scaled: Vec<f64> = worth.iter().map(|w| 1e6 * w).collect();

@@ -1,7 +1,9 @@
 //! Excess of slices, with intervals by block bootstrap, and the false-discovery correction.
 
 use super::axes::Axis;
-use crate::{fit::score::excess, numerics::random::RandomGenerator, problem::frame::Frame};
+use crate::{
+    fit::score::excess, numerics::random::RandomGenerator, problem::sample_roles::SampleRoles,
+};
 
 /// Share of false discoveries allowed among the slices that stand out.
 const FALSE_DISCOVERIES: f64 = 0.05;
@@ -32,14 +34,14 @@ impl Cells {
         Self { slices, cells }
     }
 
-    pub(super) fn of_samples(frame: &Frame, residual: &[f64], axis: &Axis) -> Self {
+    pub(super) fn of_samples(roles: &SampleRoles, residual: &[f64], axis: &Axis) -> Self {
         let slices = axis.labels.len();
         let mut cells = Vec::new();
-        for segment in &frame.segments {
+        for segment in &roles.segments {
             let end = segment.to.min(residual.len()).min(axis.of.len());
             let mut from = segment.from.min(end);
             while from < end {
-                let to = (from + frame.block).min(end);
+                let to = (from + roles.block).min(end);
                 let base = cells.len();
                 cells.resize(base + slices, (0.0, 0.0));
                 for (r, slice) in residual[from..to].iter().zip(&axis.of[from..to]) {
@@ -179,11 +181,11 @@ mod tests {
     }
 
     /// Cells of `blocks` blocks of 25 samples in each slice, of the standard deviations given.
-    fn drawn(sds: &[f64], blocks: usize, dice: &mut RandomGenerator) -> Cells {
+    fn drawn(sds: &[f64], blocks: usize, random: &mut RandomGenerator) -> Cells {
         let mut cells = Vec::new();
         for _ in 0..blocks {
             for sd in sds {
-                cells.push(((0..25).map(|_| (sd * dice.gauss()).powi(2)).sum::<f64>(), 25.0));
+                cells.push(((0..25).map(|_| (sd * random.gauss()).powi(2)).sum::<f64>(), 25.0));
             }
         }
         Cells::new(sds.len(), cells)
@@ -205,9 +207,9 @@ mod tests {
     /// Two slices are each other's rest: what the one is worse than, the other is better than, with the same variance.
     #[test]
     fn of_two_slices_one_p_value_is_the_others_complement() {
-        let mut dice = RandomGenerator::new(2, 0);
+        let mut random = RandomGenerator::new(2, 0);
         for sd in [0.7, 1.0, 1.1] {
-            let sliced = drawn(&[1.0, sd], 30, &mut dice).sliced(1, 0);
+            let sliced = drawn(&[1.0, sd], 30, &mut random).sliced(1, 0);
             approx::assert_relative_eq!(sliced[0].p + sliced[1].p, 1.0, max_relative = 1e-12);
         }
     }
@@ -215,8 +217,8 @@ mod tests {
     /// Of 400 records in which no slice is worse, 5 in 100 have a p below 0.05: 20, standard deviation 4.4; three of these to either side.
     #[test]
     fn p_values_are_as_rare_as_they_say() {
-        let mut dice = RandomGenerator::new(3, 0);
-        let mut is_rare = |_: &u64| drawn(&[1.0; 4], 60, &mut dice).sliced(1, 0)[2].p < 0.05;
+        let mut random = RandomGenerator::new(3, 0);
+        let mut is_rare = |_: &u64| drawn(&[1.0; 4], 60, &mut random).sliced(1, 0)[2].p < 0.05;
         let rare = (0..400).filter(|record| is_rare(record)).count();
         assert!((7..=33).contains(&rare), "{rare} of 400");
     }
@@ -225,9 +227,9 @@ mod tests {
     /// below 280; an interval that always holds says nothing.
     #[test]
     fn intervals_of_an_excess_hold_it() {
-        let mut dice = RandomGenerator::new(4, 0);
+        let mut random = RandomGenerator::new(4, 0);
         let mut is_held = |record: &u64| {
-            let [low, high] = drawn(&[2.0, 1.0], 60, &mut dice).sliced(*record, 0)[0].interval;
+            let [low, high] = drawn(&[2.0, 1.0], 60, &mut random).sliced(*record, 0)[0].interval;
             low <= 3.0 && 3.0 <= high
         };
         let held = (0..300).filter(|record| is_held(record)).count();
@@ -236,10 +238,10 @@ mod tests {
 
     #[test]
     fn a_handful_of_blocks_is_no_evidence() {
-        let mut dice = RandomGenerator::new(5, 0);
-        let few = drawn(&[1.0, 9.0], LEAST_BLOCKS - 1, &mut dice).sliced(1, 0);
+        let mut random = RandomGenerator::new(5, 0);
+        let few = drawn(&[1.0, 9.0], LEAST_BLOCKS - 1, &mut random).sliced(1, 0);
         assert!(few.iter().all(|s| s.p == 1.0));
-        let enough = drawn(&[1.0, 9.0], LEAST_BLOCKS, &mut dice).sliced(1, 0);
+        let enough = drawn(&[1.0, 9.0], LEAST_BLOCKS, &mut random).sliced(1, 0);
         assert!(enough[1].p < 0.01, "{:?}", enough[1]);
     }
 
@@ -256,9 +258,9 @@ mod tests {
     /// Samples count once, in the block and the slice that they lie in; those of no slice and those of no segment count nowhere.
     #[test]
     fn samples_are_summed_by_block_and_slice() {
-        use crate::problem::frame::{Role, Segment};
+        use crate::problem::sample_roles::{Role, Segment};
         let segment = |from, to, role| Segment { trial: 0, from, to, role };
-        let frame = Frame {
+        let roles = SampleRoles {
             segments: vec![segment(0, 5, Role::Fit), segment(7, 10, Role::Test)],
             block: 2,
             fit_trials: 1,
@@ -270,7 +272,7 @@ mod tests {
             of: vec![0, 1, 1, 0, Axis::NONE, 0, 0, 1, 1, 0],
         };
         let residual: Vec<f64> = (1..=10).map(f64::from).collect();
-        let cells = Cells::of_samples(&frame, &residual, &axis);
+        let cells = Cells::of_samples(&roles, &residual, &axis);
         // Blocks 1 2, 3 4, 5, 8 9, 10: the fifth is of no slice, the sixth and seventh of no segment.
         let expected = [
             [(1.0, 1.0), (4.0, 1.0)],
@@ -286,10 +288,10 @@ mod tests {
     /// stands; the order does not matter.
     #[test]
     fn discoveries_lie_between_bonferroni_and_the_level() {
-        let mut dice = RandomGenerator::new(6, 0);
+        let mut random = RandomGenerator::new(6, 0);
         for count in [1_usize, 2, 7, 40] {
             for _ in 0..50 {
-                let p: Vec<f64> = (0..count).map(|_| dice.unit().powi(3)).collect();
+                let p: Vec<f64> = (0..count).map(|_| random.unit().powi(3)).collect();
                 let found = discoveries(&p);
                 for (i, p_i) in p.iter().enumerate() {
                     assert!(found[i] || *p_i > FALSE_DISCOVERIES / count as f64);
@@ -308,9 +310,9 @@ mod tests {
     /// deviation 9.7; three of these to either side.
     #[test]
     fn false_discoveries_are_as_rare_as_allowed() {
-        let mut dice = RandomGenerator::new(7, 0);
+        let mut random = RandomGenerator::new(7, 0);
         let mut any = |_: &u32| {
-            let p: Vec<f64> = (0..30).map(|_| dice.unit()).collect();
+            let p: Vec<f64> = (0..30).map(|_| random.unit()).collect();
             discoveries(&p).contains(&true)
         };
         let alarms = (0..2000).filter(|record| any(record)).count();
@@ -321,13 +323,13 @@ mod tests {
     /// over 500 by 0.0016: five of these.
     #[test]
     fn among_true_ones_few_are_false() {
-        let mut dice = RandomGenerator::new(8, 0);
+        let mut random = RandomGenerator::new(8, 0);
         let (mut false_share, mut true_share) = (0.0, 0.0);
         for _ in 0..500 {
             let p: Vec<f64> = (0..40)
                 .map(|i| match i < 20 {
-                    true => 0.5 * libm::erfc((4.0 + dice.gauss()) / 2_f64.sqrt()),
-                    false => dice.unit(),
+                    true => 0.5 * libm::erfc((4.0 + random.gauss()) / 2_f64.sqrt()),
+                    false => random.unit(),
                 })
                 .collect();
             let found = discoveries(&p);

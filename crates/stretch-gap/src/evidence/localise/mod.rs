@@ -29,17 +29,17 @@ pub(crate) fn slices(
     of: fn(&StageEvidence) -> &[f64],
     seed: u64,
 ) -> Vec<SliceGap> {
-    let course = Course::of(simulator, &evidence.frame);
-    let axes = Axis::all(&course, simulator, &evidence.frame);
+    let course = Course::of(simulator, &evidence.roles);
+    let axes = Axis::all(&course, simulator, &evidence.roles);
     let mut found: Vec<(SliceGap, f64)> = Vec::new();
     for (stage, traces) in evidence.stages.iter().enumerate() {
         let name = &simulator.stages()[stage].name;
         let residual = of(traces);
         let mut cut: Vec<(&str, Vec<String>, Cells)> = axes
             .iter()
-            .map(|a| (a.by, a.labels.clone(), Cells::of_samples(&evidence.frame, residual, a)))
+            .map(|a| (a.by, a.labels.clone(), Cells::of_samples(&evidence.roles, residual, a)))
             .collect();
-        let (labels, cells) = bands::cells(&evidence.frame, residual, simulator.dt_s());
+        let (labels, cells) = bands::cells(&evidence.roles, residual, simulator.dt_s());
         cut.push(("frequency", labels, cells));
         for (number, (by, labels, cells)) in cut.into_iter().enumerate() {
             let stream = (stage * 16 + number) as u64;

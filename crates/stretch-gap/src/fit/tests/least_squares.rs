@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::prepared;
 use crate::{
     numerics::random::RandomGenerator,
-    problem::frame::BLOCK_S,
+    problem::sample_roles::BLOCK_S,
     toys::{Law, Measured, Toy},
 };
 
@@ -67,10 +67,10 @@ fn assert_agrees(record: &Measured, counts: impl Fn(usize) -> bool, offset: f64)
 
 #[test]
 fn re_tuning_a_line_is_ridge_regression() {
-    let mut dice = RandomGenerator::new(1, 0);
+    let mut random = RandomGenerator::new(1, 0);
     for seed in 0..8 {
         let noise = 0.003 * 3.0_f64.powi((seed % 4) as i32);
-        let off = [dice.gauss().clamp(-2.5, 2.5), dice.gauss().clamp(-2.5, 2.5)];
+        let off = [random.gauss().clamp(-2.5, 2.5), random.gauss().clamp(-2.5, 2.5)];
         let toy = Toy { noise, ..Toy::of(&[Law::Line]).off_by(&off) };
         assert_agrees(&toy.measured(seed), |_| true, 0.0);
     }

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::prepared;
 use crate::{
     numerics::random::RandomGenerator,
-    problem::{frame::Role, spec::SlowDrift},
+    problem::{sample_roles::Role, spec::SlowDrift},
     toys::{Law, Toy, slow},
 };
 
@@ -15,14 +15,14 @@ const DENSE: f64 = 1e-9;
 const KNOT: usize = 10;
 
 /// A line whose zero drifts by `sd` and `correlation_s` as described.
-fn drifting(wander: SlowDrift, samples: usize) -> Toy {
+fn drifting(drift: SlowDrift, samples: usize) -> Toy {
     let mut toy = Toy { trials: vec![(samples, false), (samples, true)], ..Toy::of(&[Law::Line]) };
-    toy.parameters[1].drift = Some(wander);
+    toy.parameters[1].drift = Some(drift);
     toy
 }
 
 /// V = I + s W K W' s of one trial, W the straight lines between knots and K the covariance exp(-|t|/tau) at the knots, in units of the noise.
-fn dense(wander: SlowDrift, noise: f64, samples: usize) -> DMatrix<f64> {
+fn dense(drift: SlowDrift, noise: f64, samples: usize) -> DMatrix<f64> {
     let knots = (samples - 1) / KNOT + 2;
     let weights = DMatrix::from_fn(samples, knots, |i, k| {
         let share = (i % KNOT) as f64 / KNOT as f64;
@@ -32,9 +32,9 @@ fn dense(wander: SlowDrift, noise: f64, samples: usize) -> DMatrix<f64> {
             _ => 0.0,
         }
     });
-    let kept = (-0.1 / wander.correlation_s).exp();
+    let kept = (-0.1 / drift.correlation_s).exp();
     let prior = DMatrix::from_fn(knots, knots, |i, j| kept.powi(i.abs_diff(j) as i32));
-    let size = (wander.sd / noise).powi(2);
+    let size = (drift.sd / noise).powi(2);
     DMatrix::identity(samples, samples) + size * &weights * prior * weights.transpose()
 }
 
@@ -42,27 +42,27 @@ fn dense(wander: SlowDrift, noise: f64, samples: usize) -> DMatrix<f64> {
 fn products_and_determinants_are_those_of_the_dense_covariance() {
     let samples = 245;
     for (sd, correlation_s) in [(0.005, 0.3), (0.02, 2.0), (0.1, 20.0)] {
-        let wander = SlowDrift { sd, correlation_s };
-        let record = drifting(wander, samples).measured(1);
+        let drift = SlowDrift { sd, correlation_s };
+        let record = drifting(drift, samples).measured(1);
         let problem = prepared(&record);
-        let (frame, metric) = (&problem.compare.frame, &problem.compare.metrics[0]);
-        let mut dice = RandomGenerator::new(2, 0);
-        let [x, y] = [0, 1].map(|_| DVector::from_fn(samples, |_, _| dice.gauss()));
-        let column = |x: &DVector<f64>| metric.column(frame, x.as_slice().to_vec());
-        let product = metric.product(frame, &column(&x), &column(&y), Role::Fit);
-        let factor = dense(wander, record.toy.noise, samples).cholesky().expect("definite");
+        let (roles, metric) = (&problem.compare.roles, &problem.compare.metrics[0]);
+        let mut random = RandomGenerator::new(2, 0);
+        let [x, y] = [0, 1].map(|_| DVector::from_fn(samples, |_, _| random.gauss()));
+        let column = |x: &DVector<f64>| metric.column(roles, x.as_slice().to_vec());
+        let product = metric.product(roles, &column(&x), &column(&y), Role::Fit);
+        let factor = dense(drift, record.toy.noise, samples).cholesky().expect("definite");
         let expected = x.dot(&factor.solve(&y));
         // A difference of sums as large as the samples.
         approx::assert_abs_diff_eq!(product, expected, epsilon = DENSE * samples as f64);
         let expected = 2.0 * factor.l().diagonal().map(f64::ln).sum();
         approx::assert_relative_eq!(
-            metric.ln_det(frame, Role::Fit),
+            metric.ln_det(roles, Role::Fit),
             expected,
             max_relative = DENSE
         );
         // What is left of a residual without its most likely drift is V^-1 of it.
         let mut cleaned = x.as_slice().to_vec();
-        metric.clean(frame, &mut cleaned);
+        metric.clean(roles, &mut cleaned);
         let expected = factor.solve(&x);
         approx::assert_abs_diff_eq!(cleaned[..], expected.as_slice()[..], epsilon = DENSE);
     }
@@ -72,12 +72,12 @@ fn products_and_determinants_are_those_of_the_dense_covariance() {
 #[test]
 fn re_tuning_beside_a_drift_is_generalised_least_squares() {
     let samples = 245;
-    let wander = SlowDrift { sd: 0.02, correlation_s: 2.0 };
-    let mut toy = drifting(wander, samples).off_by(&[1.0, 0.5]);
+    let drift = SlowDrift { sd: 0.02, correlation_s: 2.0 };
+    let mut toy = drifting(drift, samples).off_by(&[1.0, 0.5]);
     toy.courses = vec![(1, slow(0.02, 2.0, (2 * samples, 0.01), 3))];
     let record = toy.measured(3);
     let found = prepared(&record).nominal.model.parameters;
-    let factor = dense(wander, toy.noise, samples).cholesky().expect("definite");
+    let factor = dense(drift, toy.noise, samples).cholesky().expect("definite");
     let a = DMatrix::from_fn(samples, 2, |i, j| if j == 0 { record.x[i] } else { 1.0 } / toy.noise);
     let start = DVector::from_iterator(2, toy.parameters.iter().map(|p| p.nominal));
     let measured = DVector::from_fn(samples, |i, _| record.outputs[0][i] / toy.noise);

@@ -3,7 +3,7 @@
 use super::prepared;
 use crate::{
     fit::noise_level::noise_levels,
-    problem::{frame::Frame, runs::Runs, simulator::Model},
+    problem::{runs::Runs, sample_roles::SampleRoles, simulator::Model},
     toys::{Effect, Law, Measured, Toy},
 };
 
@@ -13,9 +13,9 @@ const DRAWN: f64 = 0.045;
 
 fn root_mean_square(record: &Measured, stage: usize) -> f64 {
     let runs = Runs::new(record, &super::GO_ON).expect("measured");
-    let frame = Frame::of(record).expect("something to fit");
-    let floors = noise_levels(&runs, &frame, &Model::nominal(record), 1).expect("simulated");
-    floors[stage].rms
+    let roles = SampleRoles::of(record).expect("something to fit");
+    let levels = noise_levels(&runs, &roles, &Model::nominal(record), 1).expect("simulated");
+    levels[stage].rms
 }
 
 /// sigma^2 = own^2 + gain^2 s^2 through a line, and own^2 + s^2 (1 - k)/(1 + k) through a lag of k = exp(-dt/tau) from sample to sample.

@@ -6,8 +6,8 @@ mod weighing;
 mod words;
 
 use crate::{
-    missing::signals::{Record, Signal},
-    problem::frame::{Frame, Role, Segment},
+    missing::term_inputs::{Signal, TermInputs},
+    problem::sample_roles::{Role, SampleRoles, Segment},
 };
 use stretch_effects::Grid;
 
@@ -27,7 +27,7 @@ fn signal(name: &str, x: Vec<f64>, is_command: bool) -> Signal {
 }
 
 /// Signals over trials of so many samples, a minute apart.
-fn record(signals: Vec<Signal>, samples: &[usize]) -> Record {
+fn inputs(signals: Vec<Signal>, samples: &[usize]) -> TermInputs {
     let mut end = 0;
     let trials: Vec<std::ops::Range<usize>> = samples
         .iter()
@@ -36,7 +36,7 @@ fn record(signals: Vec<Signal>, samples: &[usize]) -> Record {
             end - samples..end
         })
         .collect();
-    Record {
+    TermInputs {
         signals,
         starts_s: (0..trials.len()).map(|i| 60.0 * i as f64).collect(),
         trial_s: DT_S * samples[0] as f64,
@@ -47,7 +47,7 @@ fn record(signals: Vec<Signal>, samples: &[usize]) -> Record {
 }
 
 /// Every trial fitted but for its last part.
-fn frame(samples: &[usize], held: usize) -> Frame {
+fn roles(samples: &[usize], held: usize) -> SampleRoles {
     let mut end = 0;
     let mut segments = Vec::new();
     for (trial, samples) in samples.iter().enumerate() {
@@ -58,7 +58,7 @@ fn frame(samples: &[usize], held: usize) -> Frame {
             segments.push(Segment { trial, from: end - held, to: end, role: Role::Held });
         }
     }
-    Frame { segments, block: 50, fit_trials: samples.len(), borrowed_test: false }
+    SampleRoles { segments, block: 50, fit_trials: samples.len(), borrowed_test: false }
 }
 
 /// Up, down and up again between 0 and 1.

@@ -1,18 +1,18 @@
 //! The library as a whole: what it holds, and what it may not hold.
 
-use super::{frame, record, signal, wave};
+use super::{inputs, roles, signal, wave};
 use crate::missing::{
     library::library,
     proposed::{scales, words},
-    signals::Record,
     sparse::choice,
     term::{Factor, Passage, Term},
+    term_inputs::TermInputs,
 };
-use crate::problem::frame::Role;
+use crate::problem::sample_roles::Role;
 use std::collections::BTreeSet;
 
 /// A state, another one that is no function of it, and a command.
-fn three() -> Record {
+fn three() -> TermInputs {
     let other: Vec<f64> = (0..600).map(|i| 0.5 + 0.4 * (0.031 * f64::from(i)).sin()).collect();
     let command: Vec<f64> = (0..600).map(|i| f64::from(i / 60 % 2)).collect();
     let signals = vec![
@@ -20,15 +20,15 @@ fn three() -> Record {
         signal("pressure", other, false),
         signal("valve", command, true),
     ];
-    record(signals, &[300, 300])
+    inputs(signals, &[300, 300])
 }
 
 #[test]
 fn no_term_stands_in_it_twice_and_each_has_its_words() {
-    let record = three();
+    let inputs = three();
     for is_commanded in [false, true] {
-        let terms = library(&record, &frame(&[300, 300], 0), is_commanded);
-        let scales = scales(&record);
+        let terms = library(&inputs, &roles(&[300, 300], 0), is_commanded);
+        let scales = scales(&inputs);
         let told: BTreeSet<String> = terms.iter().map(|t| format!("{:?}", t)).collect();
         assert_eq!(told.len(), terms.len(), "a term twice would be paid for twice");
         let words: BTreeSet<String> = terms.iter().map(|t| words(t, &scales)).collect();
@@ -40,9 +40,9 @@ fn no_term_stands_in_it_twice_and_each_has_its_words() {
 
 #[test]
 fn every_term_is_finite_on_what_is_recorded() {
-    let record = three();
-    for term in library(&record, &frame(&[300, 300], 0), true) {
-        let values = term.values(&record, 2);
+    let inputs = three();
+    for term in library(&inputs, &roles(&[300, 300], 0), true) {
+        let values = term.values(&inputs, 2);
         assert!(values.len() == 600 && values.iter().all(|x| x.is_finite()), "{term:?}");
     }
 }
@@ -50,8 +50,8 @@ fn every_term_is_finite_on_what_is_recorded() {
 /// Signals that terms speak of exist, and shapes lie within what a refinement may reach.
 #[test]
 fn terms_speak_of_what_was_recorded() {
-    let record = three();
-    for term in library(&record, &frame(&[300, 300], 0), true) {
+    let inputs = three();
+    for term in library(&inputs, &roles(&[300, 300], 0), true) {
         assert!(term.shapes().iter().all(|s| s.is_finite() && *s > 0.0), "{term:?}");
         let written = serde_json::to_value(&term.factors).expect("written");
         let mut all = vec![&written];
@@ -67,13 +67,13 @@ fn terms_speak_of_what_was_recorded() {
 
 #[test]
 fn what_leaks_through_openings_is_only_where_commands_drive() {
-    let record = three();
+    let inputs = three();
     let is_leak = |t: &Term| matches!(t.passage, Passage::Leak { .. });
-    let of = |is_commanded| library(&record, &frame(&[300, 300], 0), is_commanded);
+    let of = |is_commanded| library(&inputs, &roles(&[300, 300], 0), is_commanded);
     assert!(!of(false).iter().any(is_leak) && of(true).iter().any(is_leak));
     // One signal is never crossed with itself or with what was not recorded.
-    let alone = super::record(vec![signal("rod", wave(300), false)], &[300]);
-    let terms = library(&alone, &frame(&[300], 0), false);
+    let alone = super::inputs(vec![signal("rod", wave(300), false)], &[300]);
+    let terms = library(&alone, &roles(&[300], 0), false);
     assert!(terms.len() < of(false).len() / 2);
 }
 
@@ -81,7 +81,7 @@ fn what_leaks_through_openings_is_only_where_commands_drive() {
 #[test]
 fn the_usual_causes_are_on_the_shelf() {
     use Factor::{Play, Power, Sine};
-    let terms = library(&three(), &frame(&[300, 300], 0), false);
+    let terms = library(&three(), &roles(&[300, 300], 0), false);
     let holds = |factors: &[Factor]| terms.contains(&Term::new(factors, Passage::Direct));
     let power = |signal, power| Power { signal, power };
     assert!(holds(&[]) && holds(&[power(0, 2.0)]) && holds(&[power(0, 3.0)]));
@@ -94,20 +94,20 @@ fn the_usual_causes_are_on_the_shelf() {
 #[test]
 fn quantiles_are_those_of_fitted_samples() {
     let x: Vec<f64> = (0..100).map(|i| if i < 60 { f64::from(i) / 59.0 } else { 50.0 }).collect();
-    let record = record(vec![signal("x", x, false)], &[100]);
-    let frame = frame(&[100], 40);
-    assert_eq!(record.quantile(0, 0.0, &frame), 0.0);
-    assert_eq!(record.quantile(0, 1.0, &frame), 1.0);
-    let middle = record.quantile(0, 0.5, &frame);
+    let inputs = inputs(vec![signal("x", x, false)], &[100]);
+    let roles = roles(&[100], 40);
+    assert_eq!(inputs.quantile(0, 0.0, &roles), 0.0);
+    assert_eq!(inputs.quantile(0, 1.0, &roles), 1.0);
+    let middle = inputs.quantile(0, 0.5, &roles);
     assert!((middle - 0.5).abs() < 0.02, "{middle}");
 }
 
 /// Where little was held out every third trial is: nothing is added or lost, and the last trials stay as they are.
 #[test]
 fn terms_are_chosen_by_samples_that_were_not_fitted() {
-    let enough = frame(&[400, 400, 400], 100);
+    let enough = roles(&[400, 400, 400], 100);
     assert_eq!(choice(&enough).segments, enough.segments);
-    let none = frame(&[400; 5], 0);
+    let none = roles(&[400; 5], 0);
     let chosen = choice(&none);
     assert_eq!(chosen.count(Role::Held), 2 * 400);
     assert_eq!(chosen.count(Role::Fit) + chosen.count(Role::Held), none.count(Role::Fit));

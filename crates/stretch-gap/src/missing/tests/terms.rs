@@ -1,6 +1,6 @@
 //! Every factor and passage against its equation.
 
-use super::{DT_S, record, signal, wave};
+use super::{DT_S, inputs, signal, wave};
 use crate::missing::term::{
     Factor::{self, *},
     Passage, RateForm, Term,
@@ -10,8 +10,8 @@ use testkit::tolerance::LOCAL_VALUE;
 
 /// A factor alone over one trial of a signal.
 fn of(factor: Factor, x: &[f64]) -> Vec<f64> {
-    let record = record(vec![signal("x", x.to_vec(), false)], &[x.len()]);
-    Term::new(&[factor], Passage::Direct).values(&record, 1)
+    let inputs = inputs(vec![signal("x", x.to_vec(), false)], &[x.len()]);
+    Term::new(&[factor], Passage::Direct).values(&inputs, 1)
 }
 
 fn assert_like(found: &[f64], expected: impl Iterator<Item = f64>) {
@@ -125,8 +125,8 @@ fn travel_counts_both_ways_and_no_noise() {
 
 #[test]
 fn clocks_begin_with_the_trial_or_with_the_session() {
-    let record = record(vec![signal("x", wave(400), false)], &[200, 200]);
-    let of = |factor| Term::new(&[factor], Passage::Direct).values(&record, 2);
+    let inputs = inputs(vec![signal("x", wave(400), false)], &[200, 200]);
+    let of = |factor| Term::new(&[factor], Passage::Direct).values(&inputs, 2);
     let time = of(Time { power: 1.0 });
     assert_eq!((time[0], time[200]), (0.0, 0.0));
     assert_abs_diff_eq!(time[100], 0.5, epsilon = LOCAL_VALUE);
@@ -141,7 +141,7 @@ fn clocks_begin_with_the_trial_or_with_the_session() {
 #[test]
 fn memories_begin_anew_with_every_trial() {
     let x = [wave(300), wave(300)].concat();
-    let record = record(vec![signal("x", x.clone(), false), signal("u", x, true)], &[300, 300]);
+    let inputs = inputs(vec![signal("x", x.clone(), false), signal("u", x, true)], &[300, 300]);
     let factors = [
         Play { signal: 0, width: 0.1 },
         Lag { signal: 0, tau_s: 0.5 },
@@ -155,10 +155,10 @@ fn memories_begin_anew_with_every_trial() {
         [Passage::Direct, Passage::Lag { tau_s: 0.4 }, Passage::Rest { tau_s: 0.4 }, leak];
     for factor in factors {
         for passage in passages {
-            let all = Term::new(&[factor], passage).values(&record, 2);
+            let all = Term::new(&[factor], passage).values(&inputs, 2);
             assert_eq!(all[..300], all[300..], "{factor:?} {passage:?}");
             // Of fewer trials the same.
-            assert_eq!(Term::new(&[factor], passage).values(&record, 1), all[..300]);
+            assert_eq!(Term::new(&[factor], passage).values(&inputs, 1), all[..300]);
         }
     }
 }
@@ -169,13 +169,13 @@ fn no_term_looks_ahead() {
     let (x, mut other) = (wave(400), wave(400));
     other[201..].iter_mut().for_each(|x| *x = 0.3);
     let values = |x: &[f64], term: &Term| {
-        let mut record = record(vec![signal("x", x.to_vec(), false)], &[400]);
-        record.signals[0].v = vec![1.0; 400]; // rates are differences to both sides
-        term.values(&record, 1)
+        let mut inputs = inputs(vec![signal("x", x.to_vec(), false)], &[400]);
+        inputs.signals[0].v = vec![1.0; 400]; // rates are differences to both sides
+        term.values(&inputs, 1)
     };
-    let record = record(vec![signal("x", x.clone(), false)], &[400]);
-    let frame = super::frame(&[400], 0);
-    for term in crate::missing::library::library(&record, &frame, false) {
+    let inputs = inputs(vec![signal("x", x.clone(), false)], &[400]);
+    let roles = super::roles(&[400], 0);
+    for term in crate::missing::library::library(&inputs, &roles, false) {
         assert_eq!(values(&x, &term)[..=200], values(&other, &term)[..=200], "{term:?}");
     }
 }
@@ -183,10 +183,10 @@ fn no_term_looks_ahead() {
 #[test]
 fn a_product_is_that_of_its_factors_and_nothing_is_one() {
     let x = wave(200);
-    let record = record(vec![signal("x", x, false)], &[200]);
-    let one = Term::new(&[], Passage::Direct).values(&record, 1);
+    let inputs = inputs(vec![signal("x", x, false)], &[200]);
+    let one = Term::new(&[], Passage::Direct).values(&inputs, 1);
     assert_eq!(one, vec![1.0; 200]);
-    let of = |factors: &[Factor]| Term::new(factors, Passage::Direct).values(&record, 1);
+    let of = |factors: &[Factor]| Term::new(factors, Passage::Direct).values(&inputs, 1);
     let (a, b) = (Power { signal: 0, power: 1.0 }, Cosine { signal: 0, turns: 1.0 });
     let product = of(&[a]).into_iter().zip(of(&[b])).map(|(a, b)| a * b);
     assert_like(&of(&[a, b]), product);
@@ -195,11 +195,11 @@ fn a_product_is_that_of_its_factors_and_nothing_is_one() {
 /// A lag and what it leaves are the whole; of a constant, from 0, the lag is 1 - exp(-t/tau).
 #[test]
 fn passages_part_what_they_are_given() {
-    let record = record(vec![signal("x", wave(300), false)], &[300]);
-    let of = |passage| Term::new(&[Power { signal: 0, power: 1.0 }], passage).values(&record, 1);
+    let inputs = inputs(vec![signal("x", wave(300), false)], &[300]);
+    let of = |passage| Term::new(&[Power { signal: 0, power: 1.0 }], passage).values(&inputs, 1);
     let (lag, rest) = (of(Passage::Lag { tau_s: 0.3 }), of(Passage::Rest { tau_s: 0.3 }));
     assert_like(&of(Passage::Direct), lag.iter().zip(&rest).map(|(a, b)| a + b));
-    let one = Term::new(&[], Passage::Lag { tau_s: 0.3 }).values(&record, 1);
+    let one = Term::new(&[], Passage::Lag { tau_s: 0.3 }).values(&inputs, 1);
     for (i, z) in one.iter().enumerate().skip(1) {
         // Begun at 0 with the first sample, or a sample later.
         let at = |i: f64| 1.0 - (-i * DT_S / 0.3).exp();
@@ -213,9 +213,9 @@ fn a_leak_integrates_while_shut_and_forgets_while_open() {
     let with = |opening: f64| {
         let signals =
             vec![signal("x", vec![1.0; 600], false), signal("u", vec![opening; 600], true)];
-        let record = record(signals, &[600]);
+        let inputs = inputs(signals, &[600]);
         Term::new(&[Power { signal: 0, power: 1.0 }], Passage::Leak { tau_s: 0.5 })
-            .values(&record, 1)
+            .values(&inputs, 1)
     };
     let shut = with(0.0);
     assert_like(&shut, (1..=600).map(|i| f64::from(i) * DT_S / 0.5));

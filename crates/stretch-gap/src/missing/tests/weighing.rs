@@ -1,6 +1,6 @@
 //! Whether a sum is a function of what was recorded: the ridge, and the odds against noise that is coloured.
 
-use super::frame;
+use super::roles;
 use crate::{
     missing::{
         coloured::odds,
@@ -10,18 +10,18 @@ use crate::{
 };
 
 /// Rows of which the residual is 2 a - b plus noise; a, b and `idle` others are noise themselves.
-fn rows(count: usize, idle: usize, noise: f64, dice: &mut RandomGenerator) -> Rows {
+fn rows(count: usize, idle: usize, noise: f64, random: &mut RandomGenerator) -> Rows {
     let columns: Vec<Vec<f64>> =
-        (0..2 + idle).map(|_| (0..count).map(|_| dice.gauss()).collect()).collect();
+        (0..2 + idle).map(|_| (0..count).map(|_| random.gauss()).collect()).collect();
     let residual =
-        (0..count).map(|i| 2.0 * columns[0][i] - columns[1][i] + noise * dice.gauss()).collect();
+        (0..count).map(|i| 2.0 * columns[0][i] - columns[1][i] + noise * random.gauss()).collect();
     Rows { residual, columns }
 }
 
 #[test]
 fn a_ridge_finds_weights_where_there_is_no_noise() {
-    let mut dice = RandomGenerator::new(1, 0);
-    let weights = ridge(&rows(300, 3, 0.0, &mut dice), &rows(100, 3, 0.0, &mut dice));
+    let mut random = RandomGenerator::new(1, 0);
+    let weights = ridge(&rows(300, 3, 0.0, &mut random), &rows(100, 3, 0.0, &mut random));
     // The smallest ridge is 1e-5 of the diagonal, which shrinks by as much; cross products of 300 draws add a tenth of that.
     for (weight, expected) in weights.iter().zip([2.0, -1.0, 0.0, 0.0, 0.0]) {
         assert!((weight - expected).abs() < 1e-4, "{weights:?}");
@@ -32,8 +32,8 @@ fn a_ridge_finds_weights_where_there_is_no_noise() {
 /// leaves less of such samples than the smallest ridge does.
 #[test]
 fn a_ridge_shrinks_where_columns_are_many() {
-    let mut dice = RandomGenerator::new(2, 0);
-    let (fit, held) = (rows(60, 50, 3.0, &mut dice), rows(400, 50, 3.0, &mut dice));
+    let mut random = RandomGenerator::new(2, 0);
+    let (fit, held) = (rows(60, 50, 3.0, &mut random), rows(400, 50, 3.0, &mut random));
     // Held against the rows that they were fitted to, weights do best without a ridge.
     let again = Rows { residual: fit.residual.clone(), columns: fit.columns.clone() };
     let (chosen, least) = (ridge(&fit, &held), ridge(&fit, &again));
@@ -52,10 +52,10 @@ fn without_columns_there_are_no_weights() {
 }
 
 /// Noise whose next value keeps a share of the last.
-fn coloured(samples: usize, kept: f64, dice: &mut RandomGenerator) -> Vec<f64> {
-    let mut x = dice.gauss() / (1.0 - kept * kept).sqrt();
+fn coloured(samples: usize, kept: f64, random: &mut RandomGenerator) -> Vec<f64> {
+    let mut x = random.gauss() / (1.0 - kept * kept).sqrt();
     let next = |_| {
-        x = kept * x + dice.gauss();
+        x = kept * x + random.gauss();
         x
     };
     (0..samples).map(next).collect()
@@ -64,11 +64,11 @@ fn coloured(samples: usize, kept: f64, dice: &mut RandomGenerator) -> Vec<f64> {
 /// A term that takes nothing away gains nothing, and costs ln M for each that was chosen.
 #[test]
 fn a_choice_costs_what_there_was_to_choose_from() {
-    let mut dice = RandomGenerator::new(3, 0);
-    let (frame, left) = (frame(&[3000, 3000], 900), coloured(6000, 0.9, &mut dice));
+    let mut random = RandomGenerator::new(3, 0);
+    let (roles, left) = (roles(&[3000, 3000], 900), coloured(6000, 0.9, &mut random));
     for (chosen, of) in [(1_usize, 400_usize), (3, 400), (2, 1000)] {
         let expected = -(chosen as f64) * (of as f64).ln();
-        assert!((odds(&frame, &left, &left, chosen, of) - expected).abs() < 1e-9);
+        assert!((odds(&roles, &left, &left, chosen, of) - expected).abs() < 1e-9);
     }
 }
 
@@ -76,23 +76,23 @@ fn a_choice_costs_what_there_was_to_choose_from() {
 /// wave: of the 20 records each is told.
 #[test]
 fn a_function_is_told_from_coloured_noise() {
-    let mut dice = RandomGenerator::new(4, 0);
-    let frame = frame(&[3000, 3000], 900);
-    for record in 0..20 {
-        let noise: Vec<f64> = (0..6000).map(|_| dice.gauss()).collect();
+    let mut random = RandomGenerator::new(4, 0);
+    let roles = roles(&[3000, 3000], 900);
+    for inputs in 0..20 {
+        let noise: Vec<f64> = (0..6000).map(|_| random.gauss()).collect();
         // Steps at irregular times, as a play or a valve makes them: no process of the past foretells them.
         let mut level = 1.0;
         let function: Vec<f64> = (0..6000)
             .map(|_| {
-                if dice.unit() < 0.02 {
+                if random.unit() < 0.02 {
                     level = -level;
                 }
                 level
             })
             .collect();
         let alone: Vec<f64> = noise.iter().zip(&function).map(|(n, f)| n + f).collect();
-        let found = odds(&frame, &alone, &noise, 1, 500);
-        assert!(found > 0.0, "{record}: {found}");
+        let found = odds(&roles, &alone, &noise, 1, 500);
+        assert!(found > 0.0, "{inputs}: {found}");
     }
 }
 
@@ -100,17 +100,17 @@ fn a_function_is_told_from_coloured_noise() {
 /// 40 records do the odds favour it, for one chance weight gains half a nat on average, and ln 500 are asked for.
 #[test]
 fn a_chance_term_is_no_function() {
-    let mut dice = RandomGenerator::new(5, 0);
-    let frame = frame(&[3000, 3000], 900);
+    let mut random = RandomGenerator::new(5, 0);
+    let roles = roles(&[3000, 3000], 900);
     let favoured = (0..40)
         .filter(|_| {
-            let left = coloured(6000, 0.98, &mut dice);
-            let chance: Vec<f64> = (0..6000).map(|_| dice.gauss()).collect();
+            let left = coloured(6000, 0.98, &mut random);
+            let chance: Vec<f64> = (0..6000).map(|_| random.gauss()).collect();
             let product: f64 = left.iter().zip(&chance).map(|(a, b)| a * b).sum();
             let square: f64 = chance.iter().map(|b| b * b).sum();
             let beside: Vec<f64> =
                 left.iter().zip(&chance).map(|(a, b)| a - product / square * b).collect();
-            odds(&frame, &left, &beside, 1, 500) > 0.0
+            odds(&roles, &left, &beside, 1, 500) > 0.0
         })
         .count();
     assert_eq!(favoured, 0);
@@ -118,12 +118,12 @@ fn a_chance_term_is_no_function() {
 
 #[test]
 fn odds_are_finite_whatever_is_left() {
-    let frame = frame(&[300], 0);
+    let roles = roles(&[300], 0);
     for left in [vec![0.0; 300], vec![7.0; 300], (0..300).map(f64::from).collect()] {
-        assert!(odds(&frame, &left, &[0.0; 300], 1, 10).is_finite());
-        assert!(odds(&frame, &[0.0; 300], &left, 1, 10).is_finite());
+        assert!(odds(&roles, &left, &[0.0; 300], 1, 10).is_finite());
+        assert!(odds(&roles, &[0.0; 300], &left, 1, 10).is_finite());
     }
     // A record of less than the memory of the process has nothing to score.
-    let short = super::frame(&[20], 0);
+    let short = super::roles(&[20], 0);
     assert!(odds(&short, &[1.0; 20], &[0.5; 20], 1, 10).is_finite());
 }

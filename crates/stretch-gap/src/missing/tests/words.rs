@@ -1,6 +1,6 @@
 //! How proposals are put into words.
 
-use super::{record, signal, wave};
+use super::{inputs, signal, wave};
 use crate::missing::{
     proposed::{Proposed, ProposedTerm, acts, equation, scales, sentence, words},
     term::{Factor, Passage, RateForm, Term},
@@ -8,7 +8,7 @@ use crate::missing::{
 
 fn signals() -> Vec<crate::missing::SignalScale> {
     let signals = vec![signal("rod_mm", wave(100), false), signal("valve", wave(100), true)];
-    scales(&record(signals, &[100]))
+    scales(&inputs(signals, &[100]))
 }
 
 fn term(factors: &[Factor], passage: Passage, coefficient: f64) -> ProposedTerm {

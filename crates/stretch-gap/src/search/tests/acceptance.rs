@@ -3,10 +3,10 @@
 use super::index;
 use crate::{
     fit::{
-        prepared::Problem,
+        prepared::PreparedProblem,
         tests::{prepared, with_effects},
     },
-    problem::{frame::Role, thresholds::Thresholds},
+    problem::{sample_roles::Role, thresholds::Thresholds},
     search::{acceptance::Acceptance, selection::Search, sets::Sets},
     toys::{Effect, Law, Measured, Toy, slow},
 };
@@ -51,13 +51,13 @@ fn a_number_that_does_nothing_rises_the_score_by_half_a_nat_less_its_price() {
         let problem = prepared(&record);
         let mut sets = Sets::new(&problem);
         let set = sets.refit(&with_effects(&problem, &[(0, vec![0.01])])).expect("fitted");
-        sum += set.score + 0.5 * problem.compare.frame.blocks(Role::Fit).ln();
+        sum += set.score + 0.5 * problem.compare.roles.blocks(Role::Fit).ln();
     }
     // Three standard errors of 0.71/sqrt(40).
     approx::assert_abs_diff_eq!(sum / DRAWS as f64, 0.5, epsilon = 0.34);
 }
 
-fn worth<'a>(problem: &'a Problem<'a>, thresholds: &'a Thresholds) -> Acceptance<'a> {
+fn worth<'a>(problem: &'a PreparedProblem<'a>, thresholds: &'a Thresholds) -> Acceptance<'a> {
     Acceptance { problem, thresholds }
 }
 

@@ -4,10 +4,10 @@ mod acceptance;
 mod screening;
 mod selecting;
 
-use crate::{fit::hypothesis::Hypothesis, fit::prepared::Problem, toys::Measured};
+use crate::{fit::hypothesis::Hypothesis, fit::prepared::PreparedProblem, toys::Measured};
 
 /// Names of the effects of a set, in alphabetical order.
-fn names(problem: &Problem<'_>, set: &Hypothesis) -> Vec<String> {
+fn names(problem: &PreparedProblem<'_>, set: &Hypothesis) -> Vec<String> {
     let effects = problem.simulator().effects();
     let mut names: Vec<String> = set.effects.iter().map(|e| effects[*e].name.clone()).collect();
     names.sort();

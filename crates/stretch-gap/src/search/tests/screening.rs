@@ -3,12 +3,12 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::{
-    fit::{prepared::Problem, tests::prepared},
+    fit::{prepared::PreparedProblem, tests::prepared},
     search::screen::{Ground, Screened},
     toys::{Effect, Law, Toy},
 };
 
-fn screened(problem: &Problem<'_>) -> Vec<Screened> {
+fn screened(problem: &PreparedProblem<'_>) -> Vec<Screened> {
     let ground =
         Ground::around(&problem.compare, problem.nominal.model.clone()).expect("simulated");
     let effects = 0..problem.simulator().effects().len();

@@ -44,7 +44,7 @@ const TESTED: f64 = 0.25;
 
 /// The session cut into segments.
 #[derive(Debug, Clone)]
-pub struct Frame {
+pub struct SampleRoles {
     /// Segments in order of time.
     pub segments: Vec<Segment>,
     /// Samples a block.
@@ -61,15 +61,15 @@ fn may_fit(trial: &TrialSpec, borrowed_test: bool) -> usize {
     if trial.is_test { 0 } else { trial.samples - (share * trial.samples as f64) as usize }
 }
 
-impl Frame {
+impl SampleRoles {
     /// By trial: samples from its start that are not tested on, which is all that a simulator may look at before the end.
     ///
     /// ```
-    /// use stretch_gap::{Frame, TrialSpec};
+    /// use stretch_gap::{SampleRoles, TrialSpec};
     /// let fit = TrialSpec::new("a", 400, 0.0, false);
     /// let test = TrialSpec::new("b", 400, 10.0, true);
-    /// assert_eq!(Frame::not_tested(&[fit.clone(), test]), [400, 0]);
-    /// assert_eq!(Frame::not_tested(&[fit]), [300]); // without a test trial the last quarter is held back
+    /// assert_eq!(SampleRoles::not_tested(&[fit.clone(), test]), [400, 0]);
+    /// assert_eq!(SampleRoles::not_tested(&[fit]), [300]); // without a test trial the last quarter is held back
     /// ```
     pub fn not_tested(trials: &[TrialSpec]) -> Vec<usize> {
         let borrowed_test = trials.iter().all(|t| !t.is_test);

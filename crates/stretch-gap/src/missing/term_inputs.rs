@@ -16,8 +16,8 @@ use stretch_data::ends;
 
 use crate::problem::{
     error::GapError,
-    frame::{Frame, Role},
     record_facts::Recorded,
+    sample_roles::{Role, SampleRoles},
     simulator::Simulator,
 };
 
@@ -39,7 +39,7 @@ pub(crate) struct Signal {
 
 /// Signals, trials and clocks of a session.
 #[derive(Debug, Clone)]
-pub(crate) struct Record {
+pub(crate) struct TermInputs {
     pub(crate) signals: Vec<Signal>,
     /// Samples of each trial.
     pub(crate) trials: Vec<Range<usize>>,
@@ -55,12 +55,12 @@ pub(crate) struct Record {
 /// Squared correlation above which two signals say the same.
 const SAME: f64 = 0.998;
 
-impl Record {
+impl TermInputs {
     /// Signals that may act in a stage: everything recorded but its own channel, in whose place stands what the model makes
     /// of it (`own`, all trials end to end), which holds no noise.
     pub(crate) fn of(
         simulator: &dyn Simulator,
-        frame: &Frame,
+        roles: &SampleRoles,
         stage: usize,
         own: Vec<f64>,
     ) -> Result<Self, GapError> {
@@ -74,13 +74,13 @@ impl Record {
         }
         let grid = Grid::samples(dt_s).map_err(|e| GapError::simulator(e.to_string()))?;
         let first_s = trials.first().map_or(0.0, |t| t.start_s);
-        let fitted = || frame.of_role(Role::Fit);
-        let end_s = |s: &crate::problem::frame::Segment| {
+        let fitted = || roles.of_role(Role::Fit);
+        let end_s = |s: &crate::problem::sample_roles::Segment| {
             let trial = &ranges[s.trial];
             trials[s.trial].start_s - first_s + (s.to - trial.start) as f64 * dt_s
         };
         let longest = fitted().map(|s| s.to - s.from).max().unwrap_or(1);
-        let mut record = Self {
+        let mut inputs = Self {
             signals: Vec::new(),
             starts_s: trials.iter().map(|t| t.start_s - first_s).collect(),
             trial_s: longest as f64 * dt_s,
@@ -92,12 +92,12 @@ impl Record {
         all.retain(|s| s.name != spec.channel && s.values.len() >= begin);
         all.push(Recorded::measured(&spec.channel, &spec.unit, own));
         for signal in all {
-            let Some(signal) = Signal::of(signal, frame, dt_s) else { continue };
-            if record.signals.iter().all(|other| alike(other, &signal, frame) < SAME) {
-                record.signals.push(signal);
+            let Some(signal) = Signal::of(signal, roles, dt_s) else { continue };
+            if inputs.signals.iter().all(|other| alike(other, &signal, roles) < SAME) {
+                inputs.signals.push(signal);
             }
         }
-        Ok(record)
+        Ok(inputs)
     }
 
     /// Samples of the first `trials` trials.
@@ -111,10 +111,10 @@ impl Record {
     }
 
     /// x at a quantile of the fitted samples.
-    pub(crate) fn quantile(&self, signal: usize, share: f64, frame: &Frame) -> f64 {
+    pub(crate) fn quantile(&self, signal: usize, share: f64, roles: &SampleRoles) -> f64 {
         let x = &self.signals[signal].x;
         let mut sorted: Vec<f64> =
-            frame.of_role(Role::Fit).flat_map(|s| &x[s.from..s.to]).copied().collect();
+            roles.of_role(Role::Fit).flat_map(|s| &x[s.from..s.to]).copied().collect();
         sorted.sort_by(f64::total_cmp);
         let at = (share * (sorted.len().max(1) - 1) as f64) as usize;
         sorted.get(at).copied().unwrap_or(share)
@@ -143,18 +143,18 @@ fn recorded(simulator: &dyn Simulator) -> Vec<Recorded> {
 
 impl Signal {
     /// The signal with its rate; none where it does not move in what is fitted.
-    fn of(recorded: Recorded, frame: &Frame, dt_s: f64) -> Option<Self> {
+    fn of(recorded: Recorded, roles: &SampleRoles, dt_s: f64) -> Option<Self> {
         let Recorded { name, unit, mut values, is_command } = recorded;
         let (low, high) =
-            ends(frame.of_role(Role::Fit).flat_map(|part| &values[part.from..part.to]));
+            ends(roles.of_role(Role::Fit).flat_map(|part| &values[part.from..part.to]));
         if !(high - low > 0.0 && (high - low).is_finite()) {
             return None;
         }
         let (offset, scale) = if is_command { (0.0, 1.0) } else { (low, high - low) };
         values.iter_mut().for_each(|x| *x = (*x - offset) / scale);
-        let mut v = rates(&values, frame, dt_s);
+        let mut v = rates(&values, roles, dt_s);
         let (mut sum, mut count) = (0.0, 0.0);
-        for segment in frame.of_role(Role::Fit) {
+        for segment in roles.of_role(Role::Fit) {
             sum += v[segment.from..segment.to].iter().map(|v| v * v).sum::<f64>();
             count += (segment.to - segment.from) as f64;
         }
@@ -165,10 +165,10 @@ impl Signal {
 }
 
 /// Central differences within what is tested and within what is not, 1/s.
-fn rates(x: &[f64], frame: &Frame, dt_s: f64) -> Vec<f64> {
+fn rates(x: &[f64], roles: &SampleRoles, dt_s: f64) -> Vec<f64> {
     let mut out = vec![0.0; x.len()];
     let mut parts: Vec<(usize, bool, Range<usize>)> = Vec::new();
-    for s in &frame.segments {
+    for s in &roles.segments {
         let is_test = s.role == Role::Test;
         match parts.last_mut() {
             Some((trial, tested, range))
@@ -192,9 +192,9 @@ fn rates(x: &[f64], frame: &Frame, dt_s: f64) -> Vec<f64> {
 }
 
 /// Squared correlation over the fitted samples.
-fn alike(a: &Signal, b: &Signal, frame: &Frame) -> f64 {
+fn alike(a: &Signal, b: &Signal, roles: &SampleRoles) -> f64 {
     let (mut n, mut x, mut y, mut xx, mut yy, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-    for s in frame.of_role(Role::Fit) {
+    for s in roles.of_role(Role::Fit) {
         for (a, b) in a.x[s.from..s.to].iter().zip(&b.x[s.from..s.to]) {
             n += 1.0;
             x += a;

@@ -1,7 +1,7 @@
 //! How a session is cut: every sample in one role, by rules that can be told beforehand.
 
 use proptest::{prelude::*, test_runner::RngSeed};
-use stretch_gap::{BLOCK_S, Frame, GapError, Role};
+use stretch_gap::{BLOCK_S, GapError, Role, SampleRoles};
 
 use crate::toys::{Law, Toy};
 
@@ -23,31 +23,31 @@ proptest! {
     ) {
         let record = toy(trials.clone(), dt_s).measured(1);
         let all_tested = trials.iter().all(|(_, is_test)| *is_test);
-        let frame = match Frame::of(&record) {
+        let roles = match SampleRoles::of(&record) {
             Err(GapError::TooLittle { .. }) => {
                 prop_assert!(all_tested, "{trials:?}");
                 return Ok(());
             }
-            frame => frame.expect("a frame"),
+            roles => roles.expect("a roles"),
         };
         let mut end = 0;
-        for segment in &frame.segments {
+        for segment in &roles.segments {
             prop_assert_eq!(segment.from, end);
             prop_assert!(segment.to > segment.from);
             end = segment.to;
         }
         prop_assert_eq!(end, record.toy.samples());
-        let counts = [Role::Fit, Role::Held, Role::Test].map(|role| frame.count(role));
+        let counts = [Role::Fit, Role::Held, Role::Test].map(|role| roles.count(role));
         prop_assert_eq!(counts.iter().sum::<usize>(), end);
-        prop_assert_eq!(frame.block, ((BLOCK_S / dt_s).round() as usize).max(1));
-        prop_assert_eq!(frame.blocks(Role::Fit), counts[0] as f64 / frame.block as f64);
-        prop_assert_eq!(frame.borrowed_test, trials.iter().all(|(_, is_test)| !is_test));
+        prop_assert_eq!(roles.block, ((BLOCK_S / dt_s).round() as usize).max(1));
+        prop_assert_eq!(roles.blocks(Role::Fit), counts[0] as f64 / roles.block as f64);
+        prop_assert_eq!(roles.borrowed_test, trials.iter().all(|(_, is_test)| !is_test));
         let last = trials.iter().rposition(|(_, is_test)| !is_test).expect("one to fit");
-        prop_assert_eq!(frame.fit_trials, last + 1);
+        prop_assert_eq!(roles.fit_trials, last + 1);
         let specs = record.toy.description();
-        let not_tested = Frame::not_tested(&specs.trials);
+        let not_tested = SampleRoles::not_tested(&specs.trials);
         for (trial, range) in record.toy.ranges().into_iter().enumerate() {
-            let own: Vec<_> = frame.segments.iter().filter(|s| s.trial == trial).collect();
+            let own: Vec<_> = roles.segments.iter().filter(|s| s.trial == trial).collect();
             prop_assert!(own.iter().all(|s| range.contains(&s.from) && s.to <= range.end));
             let of = |role| -> usize {
                 own.iter().filter(|s| s.role == role).map(|s| s.to - s.from).sum()
@@ -62,7 +62,7 @@ proptest! {
             prop_assert_eq!(of(Role::Held), held);
             // A test trial is tested on as a whole; without one, the last quarter of every trial is.
             let quarter = (0.25 * range.len() as f64) as usize;
-            let tested = match (trials[trial].1, frame.borrowed_test) {
+            let tested = match (trials[trial].1, roles.borrowed_test) {
                 (true, _) => range.len(),
                 (false, true) => quarter,
                 (false, false) => 0,
@@ -75,7 +75,7 @@ proptest! {
 #[test]
 fn a_session_of_tests_alone_is_refused_with_what_to_do() {
     let record = toy(vec![(1000, true), (1000, true)], 0.01).measured(1);
-    let error = Frame::of(&record).expect_err("nothing to fit").to_string();
+    let error = SampleRoles::of(&record).expect_err("nothing to fit").to_string();
     assert_eq!(error, "no trial may be fitted: give at least one trial split = \"fit\"");
 }
 
@@ -83,8 +83,8 @@ fn a_session_of_tests_alone_is_refused_with_what_to_do() {
 #[test]
 fn samples_are_counted_by_trial() {
     let record = toy(vec![(400, false), (600, true), (800, false)], 0.01).measured(1);
-    let frame = Frame::of(&record).expect("a frame");
-    let samples = [0, 1, 2, 3].map(|trials| frame.samples(trials));
+    let roles = SampleRoles::of(&record).expect("a roles");
+    let samples = [0, 1, 2, 3].map(|trials| roles.samples(trials));
     assert_eq!(samples, [0, 400, 1000, 1800]);
-    assert_eq!(frame.of_role(Role::Test).map(|s| s.trial).collect::<Vec<_>>(), [1]);
+    assert_eq!(roles.of_role(Role::Test).map(|s| s.trial).collect::<Vec<_>>(), [1]);
 }

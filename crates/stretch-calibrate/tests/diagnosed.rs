@@ -108,6 +108,7 @@ fn what_was_named_is_fitted_and_pays() {
 
 /// A name that is not there takes a part of the data with it; on trials left out that shows, and another model is taken.
 #[test]
+#[ignore = "cross-validation with every wrong name; ./ci.sh runs it"]
 fn a_wrong_diagnosis_loses_in_cross_validation() {
     let gauge = Gauge { overshoot: 0.4, ..PLAIN };
     let wrong = Cause::new("sleeve_slack", &[("e_s", 0.5), ("knee", 0.05)]);

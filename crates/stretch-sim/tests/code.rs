@@ -316,6 +316,7 @@ fn of_kind(kind: &Kind, values: &[f64], extent: &Extent, sketch: &Sketch) -> Tra
 }
 
 #[test]
+#[ignore = "compiles every effect of the catalogue; ./ci.sh runs it"]
 fn the_c_code_of_every_effect_does_what_the_simulator_does() {
     agrees(Language::C, c_program, |folder, _| {
         let mut compile = Command::new("cc");

@@ -377,8 +377,8 @@ mod tests {
         // A minute holds 120 blocks: d^2 of 0.05 gives 3 nats.
         assert_eq!(repeats(0.05_f64.sqrt() + 1e-9, 1.0), "");
         assert_eq!(repeats(0.02_f64.sqrt() + 1e-9, 1.0), " Once will hardly do: plan 3 runs.");
-        assert!(repeats(1e-3, 1.0).contains("so alike that no experiment"));
-        assert!(repeats(0.0, 1.0).contains("so alike that no experiment"));
+        assert!(repeats(1e-3, 1.0).contains("so alike that none of the candidate experiments"));
+        assert!(repeats(0.0, 1.0).contains("so alike that none of the candidate experiments"));
     }
 
     #[test]

@@ -22,7 +22,13 @@ struct Null {
 /// Without acceptance criteria: the single effect with the greatest score is taken whatever it closes.
 fn without_criteria() -> Thresholds {
     let none = f64::NEG_INFINITY;
-    Thresholds { rise: none, faint_rise: none, share: 0.0, model_discrepancy: 0.0, ..Thresholds::frozen() }
+    Thresholds {
+        rise: none,
+        faint_rise: none,
+        share: 0.0,
+        model_discrepancy: 0.0,
+        ..Thresholds::frozen()
+    }
 }
 
 fn null(seed: u64, protocol: Protocol) -> anyhow::Result<Null> {

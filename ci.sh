@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The gate, the same on a desk and in CI.
+# The gate, the same locally and in CI.
 #
 #     ./ci.sh quick    before a commit: format, lints, `cargo test`, documentation, no_std
 #     ./ci.sh          all of it

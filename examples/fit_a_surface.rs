@@ -1,5 +1,5 @@
 //! Fits the paper's surface to noisy samples, with bounds, and asks which
-//! order is worth having: `cargo run --release --example fit_a_surface`.
+//! order satisfies the acceptance criterion: `cargo run --release --example fit_a_surface`.
 
 use stretch_core::{Degree, Poly13};
 use stretch_fit::{Factor, OrderTable, SurfaceAccumulator};
@@ -58,7 +58,7 @@ fn main() -> anyhow::Result<()> {
         }
     }
     if let Some(degree) = table.recommended() {
-        println!("lowest order worth having: {degree}");
+        println!("lowest order that satisfies the acceptance criterion: {degree}");
     }
     Ok(())
 }

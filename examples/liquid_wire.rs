@@ -24,15 +24,15 @@ const SEED: u64 = 20;
 /// A trial that stands for a log: a muscle that shortens by up to 29 mm, and a
 /// gauge that answers 40 ms late, bends, and has 2 mV of noise.
 fn record(seed: u64, seconds: f64) -> (Vec<f64>, Vec<f64>) {
-    let mut dice = ChaCha8Rng::seed_from_u64(seed);
-    let phase = 6.0 * dice.random::<f64>();
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let phase = 6.0 * random.random::<f64>();
     let contraction = |t: f64| 0.08 - 0.08 * (1.9 * t + phase).cos() * (0.23 * t).cos();
     let samples = (seconds * 100.0) as u32;
     (0..samples)
         .map(|n| {
             let t = f64::from(n) * 0.01;
             let stretch = contraction(t - 0.04);
-            let noise_v = 0.002 * (2.0 * dice.random::<f64>() - 1.0);
+            let noise_v = 0.002 * (2.0 * random.random::<f64>() - 1.0);
             let bridge_v = 1.24 + 6.0 * stretch - 9.0 * stretch * stretch + noise_v;
             (REST_LENGTH_MM * (1.0 - contraction(t)), bridge_v)
         })

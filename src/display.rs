@@ -140,22 +140,22 @@ fn write_err(text: &str) {
 /// A text without what a terminal acts on, or what turns the text around it or hides: names come from
 /// files of anybody. What is written in its place is an escape of JSON, too.
 fn plain(text: &str) -> String {
-    let mut told = String::with_capacity(text.len());
+    let mut plain = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
-            '\n' | '\t' => told.push(c),
+            '\n' | '\t' => plain.push(c),
             '\u{61c}'
             | '\u{200b}'..='\u{200f}'
             | '\u{2028}'..='\u{202e}'
             | '\u{2066}'..='\u{2069}'
             | '\u{feff}' => {
-                told += &format!("\\u{:04x}", u32::from(c));
+                plain += &format!("\\u{:04x}", u32::from(c));
             }
-            c if c.is_control() => told += &format!("\\u{:04x}", u32::from(c)),
-            c => told.push(c),
+            c if c.is_control() => plain += &format!("\\u{:04x}", u32::from(c)),
+            c => plain.push(c),
         }
     }
-    told
+    plain
 }
 
 /// Why standard output could not take all that it was given, if it could not.

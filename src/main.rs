@@ -45,7 +45,7 @@ struct Cli {
     command: Command,
 }
 
-/// Told once, for all commands.
+/// The part of the help that holds for all commands.
 const STATUSES: &str = "\
 Where a file is read or written, - is standard input or output.
 
@@ -77,13 +77,13 @@ enum Command {
     Fleet(fleet::Args),
 }
 
-/// What the shell is told when Ctrl-C ended the program.
+/// Exit status after Ctrl-C.
 const INTERRUPTED: u8 = 130;
 
 fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(told) => return explain(&told),
+        Err(answer) => return explain(&answer),
     };
     // Without a handler Ctrl-C still ends the program; only the cleaning up is lost.
     let _ = ctrlc::set_handler(|| commands::stop::on_ctrl_c(INTERRUPTED));
@@ -132,51 +132,51 @@ fn main() -> ExitCode {
 }
 
 /// Help that was asked for, or what is wrong with the arguments.
-fn explain(told: &clap::Error) -> ExitCode {
+fn explain(answer: &clap::Error) -> ExitCode {
     let is_surplus =
-        matches!(told.kind(), ArgumentError::UnknownArgument | ArgumentError::TooManyValues);
+        matches!(answer.kind(), ArgumentError::UnknownArgument | ArgumentError::TooManyValues);
     let arguments: Vec<String> =
         std::env::args_os().map(|argument| argument.to_string_lossy().into_owned()).collect();
     if let Some(meant) = json::meant_a_file(&arguments).filter(|_| is_surplus) {
         display::fail(meant);
         return ExitCode::from(2);
     }
-    let is_command = told.kind() == ArgumentError::InvalidSubcommand;
+    let is_command = answer.kind() == ArgumentError::InvalidSubcommand;
     if is_command && arguments.get(1).is_some_and(|command| command == "blind") {
         display::fail(
             "the blind check is a program of its own: cargo run --release --manifest-path challenge/Cargo.toml -- --cases 100",
         );
         return ExitCode::from(2);
     }
-    match told.print() {
-        _ if told.use_stderr() => ExitCode::from(2),
+    match answer.print() {
+        _ if answer.use_stderr() => ExitCode::from(2),
         Err(error) if error.kind() != ErrorKind::BrokenPipe => ExitCode::FAILURE,
         _ => ExitCode::SUCCESS,
     }
 }
 
-/// The error and its causes as one sentence; a cause that is already told is
-/// not told again.
+/// The error and its causes as one sentence; a cause that the sentence
+/// already contains is left out.
 fn message(error: &anyhow::Error) -> String {
-    let mut told = without_numbers(&error.to_string());
+    let mut text = without_numbers(&error.to_string());
     for cause in error.chain().skip(1).map(|cause| without_numbers(&cause.to_string())) {
-        if cause.starts_with(&format!("{told}:")) {
-            told = cause;
-        } else if !told.contains(&cause) {
-            told = format!("{told}: {cause}");
+        if cause.starts_with(&format!("{text}:")) {
+            text = cause;
+        } else if !text.contains(&cause) {
+            text = format!("{text}: {cause}");
         }
     }
-    stretch_files::without_temporary_names(&told)
+    stretch_files::without_temporary_names(&text)
 }
 
 /// A text without Rust's `(os error 28)`, which says what stands before it again.
 fn without_numbers(text: &str) -> String {
     let mut parts = text.split(" (os error ");
-    let mut told = parts.next().unwrap_or_default().to_owned();
+    let mut text = parts.next().unwrap_or_default().to_owned();
     for part in parts {
-        told += part.split_once(')').map_or(part, |(_, rest)| rest);
+        text += part.split_once(')').map_or(part, |(_, rest)| rest);
     }
-    told
+    text
 }
 
 fn is_broken_pipe(error: &anyhow::Error) -> bool {

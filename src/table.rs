@@ -104,10 +104,10 @@ mod tests {
         let rows: Vec<Vec<String>> = ["first", "second"].map(row).to_vec();
         let header = ["name", "value", "95 % interval", "mark", "what there is to say"];
         for width in [30, 40, 60, 80, 100] {
-            let told = fitted(&header, &rows, width);
-            assert!(told.lines().all(|line| length(line) <= width), "{width}:\n{told}");
+            let shown = fitted(&header, &rows, width);
+            assert!(shown.lines().all(|line| length(line) <= width), "{width}:\n{shown}");
             for cell in ["0.001368", "12.05", "376.8", "second", "remark", "words"] {
-                assert!(told.contains(cell), "{width}: {cell} is lost:\n{told}");
+                assert!(shown.contains(cell), "{width}: {cell} is lost:\n{shown}");
             }
         }
         assert_eq!(fitted(&header, &rows, 100).lines().count(), 4);

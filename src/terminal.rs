@@ -72,9 +72,9 @@ mod tests {
     #[test]
     fn lines_break_between_words_and_stand_under_their_begin() {
         let text = "- one two three four\n  five six seven\n| a table is as wide as it is |\nshort";
-        let told = wrapped_at(text, 12);
+        let wrapped = wrapped_at(text, 12);
         assert_eq!(
-            told,
+            wrapped,
             "- one two\n  three four\n  five six\n  seven\n| a table is as wide as it is |\nshort"
         );
         let word = "a_path/that_is_longer/than_the_line.csv: there is no such file";

@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use stretch_calibrate::Options;
 use stretch_data::{Channel, Trial};
 
-use crate::{Sheet, score::number, simulated::fitted};
+use crate::{ResultTable, score::number, simulated::fitted};
 
 const SEEDS: u64 = 60;
 const PERIOD_S: f64 = 0.01;
@@ -46,11 +46,11 @@ fn trial(random: &mut ChaCha8Rng, wandering: f64) -> Trial {
     }
 }
 
-pub(crate) fn tables() -> anyhow::Result<Vec<Sheet>> {
+pub(crate) fn tables() -> anyhow::Result<Vec<ResultTable>> {
     let header = ["error of the signal", "lead", "amplitude", "time constant", "fits"];
     let title =
         "Share of fits whose 95 % bounds hold the truth (a gauge of the observer's own form)";
-    let mut sheet = Sheet::new("coverage.csv", title, &header);
+    let mut table = ResultTable::new("coverage.csv", title, &header);
     for (name, wandering) in [("white, 1 %", 0.0), ("white, 1 %, and 1 % over 1 s", 0.01)] {
         let (mut held, mut fits) = ([0.0; 3], 0.0);
         for seed in 0..SEEDS {
@@ -70,7 +70,7 @@ pub(crate) fn tables() -> anyhow::Result<Vec<Sheet>> {
         let mut row = vec![name.to_owned()];
         row.extend(held.iter().map(|held| number(held / fits)));
         row.push(format!("{fits}"));
-        sheet.push(row);
+        table.push(row);
     }
-    Ok(vec![sheet])
+    Ok(vec![table])
 }

@@ -26,14 +26,14 @@ mod why;
 use std::{fs, path::Path};
 
 /// A table that is printed for people and kept as CSV.
-pub(crate) struct Sheet {
+pub(crate) struct ResultTable {
     name: &'static str,
     title: &'static str,
     header: Vec<String>,
     rows: Vec<Vec<String>>,
 }
 
-impl Sheet {
+impl ResultTable {
     pub(crate) fn new(name: &'static str, title: &'static str, header: &[&str]) -> Self {
         let header = header.iter().map(|h| (*h).to_owned()).collect();
         Self { name, title, header, rows: Vec::new() }
@@ -65,7 +65,7 @@ impl Sheet {
 }
 
 /// What makes the tables of one part.
-type Part<'a> = &'a dyn Fn() -> anyhow::Result<Vec<Sheet>>;
+type Part<'a> = &'a dyn Fn() -> anyhow::Result<Vec<ResultTable>>;
 
 fn main() -> anyhow::Result<()> {
     let mut arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -95,10 +95,10 @@ fn main() -> anyhow::Result<()> {
             continue;
         }
         let begun = std::time::Instant::now();
-        for sheet in tables()? {
-            sheet.print();
+        for table in tables()? {
+            table.print();
             if write {
-                sheet.write(&root.join("reference/accuracy"))?;
+                table.write(&root.join("reference/accuracy"))?;
             }
         }
         eprintln!("{name}: {:.0} s", begun.elapsed().as_secs_f64());

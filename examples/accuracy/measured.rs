@@ -8,7 +8,7 @@ use stretch_data::Trial;
 use stretch_recording::{ReadOptions, Recording};
 
 use crate::{
-    Sheet,
+    ResultTable,
     score::{Blocks, number},
     simulated::{MODELS, fitted},
 };
@@ -46,7 +46,7 @@ pub(crate) fn pairs(data: &Path) -> anyhow::Result<Vec<Pair>> {
     Ok(pairs)
 }
 
-pub(crate) fn tables(data: &Path) -> anyhow::Result<Vec<Sheet>> {
+pub(crate) fn tables(data: &Path) -> anyhow::Result<Vec<ResultTable>> {
     let pairs = pairs(data)?;
     if pairs.is_empty() {
         return Ok(Vec::new());
@@ -56,7 +56,7 @@ pub(crate) fn tables(data: &Path) -> anyhow::Result<Vec<Sheet>> {
     header.extend(["auto chose", "auto"]);
     let title =
         "Measured sessions: RMSE in degrees, calibrated on one session and tested on another";
-    let mut sheet = Sheet::new("measured.csv", title, &header);
+    let mut table = ResultTable::new("measured.csv", title, &header);
     let mut logs = vec![0.0; MODELS.len() + 1];
     for pair in pairs {
         let fit = std::slice::from_ref(&pair.fit);
@@ -78,7 +78,7 @@ pub(crate) fn tables(data: &Path) -> anyhow::Result<Vec<Sheet>> {
             vec![stem(&pair.fit), stem(&pair.test), pair.options.signal.clone(), number(raw)];
         row.extend(errors[..MODELS.len()].iter().map(|e| number(*e)));
         row.extend([choice.model.to_string(), number(errors[MODELS.len()])]);
-        sheet.push(row);
+        table.push(row);
     }
     let mean = |log: &f64| format!("{:.2}", (log / 6.0).exp());
     let mut row = vec![
@@ -89,6 +89,6 @@ pub(crate) fn tables(data: &Path) -> anyhow::Result<Vec<Sheet>> {
     ];
     row.extend(logs[..MODELS.len()].iter().map(mean));
     row.extend(["-".to_owned(), mean(&logs[MODELS.len()])]);
-    sheet.push(row);
-    Ok(vec![sheet])
+    table.push(row);
+    Ok(vec![table])
 }

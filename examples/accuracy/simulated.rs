@@ -6,7 +6,7 @@ use stretch_data::Trial;
 use stretch_sim::{Rig, paper_preset};
 
 use crate::{
-    Sheet,
+    ResultTable,
     data::{Fault, Simulated},
     score::{Blocks, interval, number},
 };
@@ -78,7 +78,7 @@ impl Row {
 }
 
 /// All candidates, calibrated on all fit trials and on the paper's twelve ramps.
-pub(crate) fn candidates(seeds: &[u64]) -> anyhow::Result<Vec<Sheet>> {
+pub(crate) fn candidates(seeds: &[u64]) -> anyhow::Result<Vec<ResultTable>> {
     let header = [
         "model",
         "calibrated on",
@@ -91,7 +91,7 @@ pub(crate) fn candidates(seeds: &[u64]) -> anyhow::Result<Vec<Sheet>> {
         "numbers",
     ];
     let title = "Candidates on the simulated rig (preset paper; five seeds; test trials)";
-    let mut sheet = Sheet::new("candidates.csv", title, &header);
+    let mut table = ResultTable::new("candidates.csv", title, &header);
     let sessions = sessions(seeds)?;
     let (mut raw, mut paper) = (Row::default(), Row { numbers: 14, ..Row::default() });
     for session in &sessions {
@@ -100,8 +100,8 @@ pub(crate) fn candidates(seeds: &[u64]) -> anyhow::Result<Vec<Sheet>> {
         raw.pulses.extend(&Blocks::raw(&calibration, session.pulses())?);
         paper.take(session, &calibration)?;
     }
-    sheet.push(raw.cells("raw", "-", &paper));
-    sheet.push(paper.cells("as published", "ramps", &paper));
+    table.push(raw.cells("raw", "-", &paper));
+    table.push(paper.cells("as published", "ramps", &paper));
     for model in MODELS {
         for protocol in ["all", "ramps"] {
             let mut row = Row::default();
@@ -111,10 +111,10 @@ pub(crate) fn candidates(seeds: &[u64]) -> anyhow::Result<Vec<Sheet>> {
                 row.numbers = row.numbers.max(calibrated.fits.iter().map(numbers).sum());
                 row.take(session, &calibrated.calibration)?;
             }
-            sheet.push(row.cells(model, protocol, &paper));
+            table.push(row.cells(model, protocol, &paper));
         }
     }
-    Ok(vec![sheet])
+    Ok(vec![table])
 }
 
 fn numbers(fit: &stretch_calibrate::FitReport) -> usize {
@@ -151,7 +151,7 @@ pub(crate) fn is_effect(name: &str) -> bool {
 }
 
 /// Those of `only`, or all of them.
-pub(crate) fn effects(seeds: &[u64], only: &[&str]) -> anyhow::Result<Vec<Sheet>> {
+pub(crate) fn effects(seeds: &[u64], only: &[&str]) -> anyhow::Result<Vec<ResultTable>> {
     let header = [
         "effect",
         "raw mm",
@@ -164,7 +164,7 @@ pub(crate) fn effects(seeds: &[u64], only: &[&str]) -> anyhow::Result<Vec<Sheet>
         "of published",
     ];
     let title = "One sensing effect at a time, mid range (stock rig; arbitrary and pulse tests)";
-    let mut sheet = Sheet::new("effects.csv", title, &header);
+    let mut table = ResultTable::new("effects.csv", title, &header);
     for (name, values) in EFFECTS {
         if !only.is_empty() && !only.contains(&name) {
             continue;
@@ -183,7 +183,7 @@ pub(crate) fn effects(seeds: &[u64], only: &[&str]) -> anyhow::Result<Vec<Sheet>
         let chosen = calibrate(&session.fit, &options)?.calibration;
         let chosen = Blocks::of(&chosen, &session.test)?;
         let parameters: Vec<String> = values.iter().map(|(n, x)| format!("{n} = {x}")).collect();
-        sheet.push(vec![
+        table.push(vec![
             format!("{name} {}", parameters.join(" ")),
             number(Blocks::raw(&paper, &session.test)?.rmse()),
             number(base.rmse()),
@@ -195,11 +195,11 @@ pub(crate) fn effects(seeds: &[u64], only: &[&str]) -> anyhow::Result<Vec<Sheet>
             interval(chosen.over(&base)),
         ]);
     }
-    Ok(vec![sheet])
+    Ok(vec![table])
 }
 
 /// Faults at use that were not there at calibration.
-pub(crate) fn robustness(seeds: &[u64]) -> anyhow::Result<Vec<Sheet>> {
+pub(crate) fn robustness(seeds: &[u64]) -> anyhow::Result<Vec<ResultTable>> {
     let header = [
         "fault at use",
         "published mm",
@@ -211,7 +211,7 @@ pub(crate) fn robustness(seeds: &[u64]) -> anyhow::Result<Vec<Sheet>> {
         "observer+rest of published",
     ];
     let title = "Faults at use only (preset paper; five seeds; arbitrary tests)";
-    let mut sheet = Sheet::new("robustness.csv", title, &header);
+    let mut table = ResultTable::new("robustness.csv", title, &header);
     let sessions = sessions(seeds)?;
     let faults = [
         ("none", None),
@@ -244,7 +244,7 @@ pub(crate) fn robustness(seeds: &[u64]) -> anyhow::Result<Vec<Sheet>> {
         let mut row = vec![name.to_owned()];
         row.extend(blocks.iter().map(|b| number(b.rmse())));
         row.extend([3, 4].map(|model| interval(blocks[model].over(&blocks[0]))));
-        sheet.push(row);
+        table.push(row);
     }
-    Ok(vec![sheet])
+    Ok(vec![table])
 }

@@ -9,20 +9,20 @@ use stretch_metrics::lag;
 use stretch_sim::{Key, Rig, paper_preset};
 
 use crate::{
-    Sheet,
+    ResultTable,
     data::Simulated,
     measured::{self, Pair},
     score::{Blocks, interval, number},
     simulated::{fitted, published},
 };
 
-pub(crate) fn tables(data: &Path, seeds: &[u64]) -> anyhow::Result<Vec<Sheet>> {
+pub(crate) fn tables(data: &Path, seeds: &[u64]) -> anyhow::Result<Vec<ResultTable>> {
     let pairs = measured::pairs(data)?;
-    let mut sheets = vec![simulated(seeds)?];
+    let mut tables = vec![simulated(seeds)?];
     if !pairs.is_empty() {
-        sheets.push(measured_causes(&pairs)?);
+        tables.push(measured_causes(&pairs)?);
     }
-    Ok(sheets)
+    Ok(tables)
 }
 
 /// What is left of each estimate when something of it is taken away afterwards.
@@ -76,10 +76,10 @@ fn own_ranges(calibration: &Calibration, trials: &[Trial]) -> anyhow::Result<Blo
     Ok(blocks)
 }
 
-fn simulated(seeds: &[u64]) -> anyhow::Result<Sheet> {
+fn simulated(seeds: &[u64]) -> anyhow::Result<ResultTable> {
     let header = ["cause switched off", "how", "arbitrary mm", "of published"];
     let title = "Why it fails: the published method on arbitrary trials, one cause off at a time (preset paper; five seeds)";
-    let mut sheet = Sheet::new("why_simulated.csv", title, &header);
+    let mut table = ResultTable::new("why_simulated.csv", title, &header);
     let without = |effect: &str| -> anyhow::Result<Rig> {
         let mut rig = paper_preset()?;
         rig.effects.remove(effect);
@@ -150,7 +150,7 @@ fn simulated(seeds: &[u64]) -> anyhow::Result<Sheet> {
     let mut row = |cause: &str, how: &str, blocks: &Blocks| {
         let cells =
             [cause.to_owned(), how.to_owned(), number(blocks.rmse()), interval(blocks.over(&base))];
-        sheet.push(cells.into());
+        table.push(cells.into());
     };
     row("none", "as published", &base);
     for ((cause, how, _), blocks) in calibrations.iter().zip(&of_calibrations) {
@@ -165,14 +165,14 @@ fn simulated(seeds: &[u64]) -> anyhow::Result<Sheet> {
         row(cause, how, blocks);
     }
     row("memory, by the model", "observer, calibrated on the same ramps", &others[5]);
-    Ok(sheet)
+    Ok(table)
 }
 
-fn measured_causes(pairs: &[Pair]) -> anyhow::Result<Sheet> {
+fn measured_causes(pairs: &[Pair]) -> anyhow::Result<ResultTable> {
     let header = ["cause switched off", "how", "degree", "of poly13"];
     let title =
         "Why it fails: poly13 from one measured session on another of the same sleeve (six pairs)";
-    let mut sheet = Sheet::new("why_measured.csv", title, &header);
+    let mut table = ResultTable::new("why_measured.csv", title, &header);
     let mut all = vec![Blocks::default(); 9];
     for pair in pairs {
         let tests = std::slice::from_ref(&pair.test);
@@ -213,7 +213,7 @@ fn measured_causes(pairs: &[Pair]) -> anyhow::Result<Sheet> {
             number(blocks.rmse()),
             interval(blocks.over(&all[0])),
         ];
-        sheet.push(cells.into());
+        table.push(cells.into());
     }
-    Ok(sheet)
+    Ok(table)
 }

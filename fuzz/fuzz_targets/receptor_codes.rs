@@ -28,7 +28,7 @@ fuzz_target!(|bytes: &[u8]| {
                 code_steps(Ok::<_, ()>(float), stream);
             }
         }
-        // converted from records on a desk
+        // converted from records on a computer
         _ => {
             let Ok((calibration, stream)) = postcard::take_from_bytes::<Calibration>(bytes) else {
                 return;

@@ -16,7 +16,7 @@ use stretch_recording::{ReadOptions, Recording, RowReader};
 
 use super::{
     pace::Pace,
-    reading::{Recorded, read_recording, told},
+    reading::{Recorded, read_recording, with_notes_printed},
     stop::RecordedInput,
 };
 use crate::display::{Output, warn};
@@ -73,7 +73,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let trial = read_recording(&args.trial, &options)?;
     let applied = apply(&calibration, &trial)?;
     let mut pace = Pace::of(calibration.sample_rate_hz.hz());
-    let told = trial.time_s.iter().find_map(|&time_s| pace.take(time_s));
+    let warning = trial.time_s.iter().find_map(|&time_s| pace.take(time_s));
     match args.out.as_ref().filter(|path| !is_standard_output(path)) {
         Some(path) => write_whole(path, |out| write_all(&calibration, &trial, &applied, out))?,
         None => {
@@ -82,15 +82,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             out.flush()?;
         }
     }
-    tell(&calibration, &trial, &applied);
-    if let Some(told) = told {
-        warn(format!("stretch: {}: {told}", trial.name));
+    report(&calibration, &trial, &applied);
+    if let Some(warning) = warning {
+        warn(format!("stretch: {}: {warning}", trial.name));
     }
     Ok(())
 }
 
-/// What came of a trial, on standard error.
-fn tell(calibration: &Calibration, trial: &Trial, applied: &Applied) {
+/// Reports on a trial on standard error.
+fn report(calibration: &Calibration, trial: &Trial, applied: &Applied) {
     let faults = applied.faults;
     let mut seen = Seen::of(calibration);
     let signal = trial.channel(calibration.signal.as_str()).into_iter().flatten();
@@ -153,10 +153,10 @@ fn live(
     let mut input = BufReader::new(input);
     if !Recording::is_text(input.fill_buf()?) {
         // Packed rows and arrays come whole.
-        let trial = told(Recording::from_reader(input, "standard input", options)?);
+        let trial = with_notes_printed(Recording::from_reader(input, "standard input", options)?);
         let applied = apply(calibration, &trial)?;
         write_all(calibration, &trial, &applied, out)?;
-        tell(calibration, &trial, &applied);
+        report(calibration, &trial, &applied);
         return Ok(());
     }
     let mut receptor = LiveReceptor::new(calibration)?;
@@ -173,8 +173,8 @@ fn live(
                 }
                 let reading = receptor.step(row.time_s, row.values[0]);
                 seen.take(&reading, row.values[0]);
-                if let Some(told) = pace.take(row.time_s) {
-                    warn(format!("stretch: {told}"));
+                if let Some(warning) = pace.take(row.time_s) {
+                    warn(format!("stretch: {warning}"));
                 }
                 line.clear();
                 push_line(&mut line, row.time_s, &reading, knows_sd(calibration));
@@ -223,10 +223,10 @@ fn push_line(line: &mut Vec<u8>, time_s: f64, reading: &Result<Reading, Withheld
     // writing to memory cannot fail
     let _ = match reading {
         Ok(Reading { estimate, rate, branch, domain, sd }) => {
-            let told = write!(line, ",{estimate:.6},{rate:.6},{branch},{domain}");
+            let written = write!(line, ",{estimate:.6},{rate:.6},{branch},{domain}");
             match sd.filter(|_| with_sd) {
-                Some(sd) => told.and_then(|()| write!(line, ",{sd:.6}")),
-                None => told,
+                Some(sd) => written.and_then(|()| write!(line, ",{sd:.6}")),
+                None => written,
             }
         }
         Err(withheld) => write!(line, ",,,,{withheld}{}", if with_sd { "," } else { "" }),

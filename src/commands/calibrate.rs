@@ -275,7 +275,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     };
     // signals that are only candidates may be anything
     let named = [args.reference.as_str(), args.signal.as_str()];
-    let (trials, wild) = without_gross_errors(&trials, &named);
+    let (trials, gross_errors) = without_gross_errors(&trials, &named);
     let named = |error: CalibrateError| of_files(error, &args.trials);
     let candidates = args.candidates(&trials);
     let ranking = if candidates.is_empty() {
@@ -306,13 +306,13 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     };
     let mut calibrated = fit(&options)?;
     detail(format!("fitted {} to {} on {}", options.model, options.reference, options.signal));
-    // those of a long log are told by its own passes
-    calibrated.notes.splice(0..0, if long.is_some() { Vec::new() } else { wild });
+    // the passes over a long log report its gross errors themselves
+    calibrated.notes.splice(0..0, if long.is_some() { Vec::new() } else { gross_errors });
     match explains_nothing(&calibrated.fits) {
         Some(why) if args.force => calibrated.notes.push(format!("{why}; written by --force")),
         Some(why) => {
-            let told = anyhow!("nothing is written: {why}; --force writes it all the same");
-            return Err(of_files(told, &args.trials));
+            let refusal = anyhow!("nothing is written: {why}; --force writes it all the same");
+            return Err(of_files(refusal, &args.trials));
         }
         None => calibrated.notes.extend(explains_little(&calibrated.fits)),
     }

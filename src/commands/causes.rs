@@ -56,8 +56,8 @@ pub(super) fn read(path: &Path, trials: &[PathBuf]) -> anyhow::Result<Causes> {
 pub(super) fn of(trials: &[Trial], options: &Options) -> Causes {
     let bar = spinner();
     bar.set_message("diagnosing the gauge");
-    let told = |text: &str| bar.set_message(text.to_owned());
-    let causes = Causes::of(trials, options, &told, &stretch_files::interrupted);
+    let show = |text: &str| bar.set_message(text.to_owned());
+    let causes = Causes::of(trials, options, &show, &stretch_files::interrupted);
     bar.finish_and_clear();
     causes
 }

@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use stretch_calibrate::{apply, write_calibration};
-use stretch_data::{Trial, TrialKind};
+use stretch_data::{Trial, TrialKind, listed};
 use stretch_files::write_folder;
-use stretch_report::{Context, Judged, Subject, demo_page, listed, readme_picture};
+use stretch_report::{Context, Judged, Subject, demo_page, readme_picture};
 use stretch_sim::{RunSettings, TrialPlan, paper_preset};
 
 use super::{
@@ -143,8 +143,8 @@ fn simulated(folder: &Path, seed: u64) -> anyhow::Result<Sessions> {
     let mut sessions = Sessions::read(folder, &Wanted::default())?;
     let effects: Vec<String> = rig.effects.iter().map(|e| e.name().to_owned()).collect();
     sessions.notes = vec![format!(
-        "Simulated: the paper's session, seed {seed}, on a rig with {}. The simulator at hand has none of them, \
-         and the diagnosis is not told.",
+        "Simulated: the paper's session, seed {seed}, on a rig with {}. The simulator has none of these effects, \
+         and the diagnosis does not know them.",
         listed(&effects)
     )];
     Ok(sessions)

@@ -157,7 +157,7 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
         budget: args.budget.map(|n| n as usize),
     };
     let problem = Problem::read(&args.data_set, &reading).map_err(|error| {
-        // what is wrong in a problem's own file is told with that file's name
+        // an error of a problem's own file already names that file
         let is_named = error.to_string().starts_with(&shown());
         let error = anyhow::Error::from(error);
         if is_named { error } else { error.context(shown()) }

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use stretch_data::listed;
 use stretch_files::{Outputs, write_whole};
 use stretch_problem::{Examined, Fixed, Implementation};
-use stretch_report::listed;
 use stretch_sim::Language;
 
 use super::shared::stage_text;

@@ -2,11 +2,11 @@
 
 use std::fmt::Write;
 
+use stretch_data::listed;
 use stretch_gap::{Candidate, Diagnosis, Knowledge, SliceGap, VerdictKind, Where};
 use stretch_problem::Implementation;
 use stretch_report::{
-    Table, baseline_table, candidate_table, listed, stage_table, times, transfer_in_words,
-    transfer_table,
+    Table, baseline_table, candidate_table, stage_table, times, transfer_in_words, transfer_table,
 };
 
 use super::fail_on::is_faint;
@@ -66,7 +66,7 @@ fn put(out: &mut String, line: &str) {
     let _ = writeln!(out, "{line}");
 }
 
-/// A share as the report tells it.
+/// A share as in the report.
 fn percent(share: f64) -> String {
     unbroken(&stretch_report::percent(share))
 }

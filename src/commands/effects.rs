@@ -75,7 +75,7 @@ impl Entry {
     }
 
     /// Name, words, equation, and where it acts.
-    fn told(&self) -> [&'static str; 4] {
+    fn columns(&self) -> [&'static str; 4] {
         match self {
             Self::Effect(e) => [e.name, e.words, e.equation, e.stage.name()],
             Self::Kind(k) => [k.name, k.words, k.equation, "any channel"],
@@ -136,7 +136,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
 fn list(chosen: &[Entry]) -> anyhow::Result<()> {
     let mut before = None;
     for entry in chosen {
-        let [name, words, equation, place] = entry.told();
+        let [name, words, equation, place] = entry.columns();
         if before != Some(place) {
             say(format!("{}{place}", if before.is_some() { "\n" } else { "" }))?;
             before = Some(place);
@@ -160,7 +160,7 @@ fn list(chosen: &[Entry]) -> anyhow::Result<()> {
 /// The code of an effect as a usual rig has it.
 fn typical_code(entry: &Entry, language: Language) -> anyhow::Result<String> {
     let values: Vec<f64> = entry.parameters().iter().map(EffectParameter::usual).collect();
-    let [name, words, equation, _] = entry.told();
+    let [name, words, equation, _] = entry.columns();
     let comments = [format!("{name}: {words}."), equation.to_owned()];
     Ok(entry.sketch(&values)?.code(language, name, &comments))
 }
@@ -192,7 +192,7 @@ fn json(entry: &Entry) -> serde_json::Value {
         })
     };
     let parameters: Vec<serde_json::Value> = entry.parameters().iter().map(one).collect();
-    let [name, words, equation, place] = entry.told();
+    let [name, words, equation, place] = entry.columns();
     serde_json::json!({
         "name": name, "words": words, "stage": place, "equation": equation, "parameters": parameters,
     })

@@ -16,7 +16,7 @@ use super::shared::tell;
 ///
 /// One C99 header that C++ takes as well: the record as constants, stretch_init(), stretch_step() for
 /// a sample, stretch_lost() for one that did not come, and stretch_self_test(), which runs 200 samples
-/// and compares the answers with the desk's. No allocation, no library; the same bits as on the desk.
+/// and compares the answers with the computer's. No allocation, no library; the same bits as on the computer.
 ///
 ///   stretch export --calibration cal.json --c StretchReceptor --arduino
 ///
@@ -89,6 +89,6 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     tell(if args.arduino {
         "put the folder into the sketchbook's libraries; the IDE then has File > Examples > StretchReceptor > Live"
     } else {
-        "include it in one file of the program; stretch_self_test() is 0 where the board computes as the desk does"
+        "include it in one file of the program; stretch_self_test() is 0 where the board computes as the computer does"
     })
 }

@@ -116,15 +116,15 @@ mod tests {
     use super::meant_a_file;
 
     #[test]
-    fn a_path_behind_the_flag_is_told_where_it_belongs() {
-        let told =
+    fn a_path_behind_the_flag_gets_the_right_flag_named() {
+        let meant =
             |line: &str| meant_a_file(&line.split(' ').map(str::to_owned).collect::<Vec<_>>());
         assert!(
-            told("diagnose bench --json d.json").unwrap().contains("--json-out d.json for a file")
+            meant("diagnose bench --json d.json").unwrap().contains("--json-out d.json for a file")
         );
-        assert!(told("diagnose bench --json=d.txt").unwrap().contains("--json-out d.txt"));
-        assert!(told("diagnose --json - bench").unwrap().contains("--json alone"));
-        assert_eq!(told("diagnose --json bench --bogus"), None);
-        assert_eq!(told("diagnose bench --json-out d.json"), None);
+        assert!(meant("diagnose bench --json=d.txt").unwrap().contains("--json-out d.txt"));
+        assert!(meant("diagnose --json - bench").unwrap().contains("--json alone"));
+        assert_eq!(meant("diagnose --json bench --bogus"), None);
+        assert_eq!(meant("diagnose bench --json-out d.json"), None);
     }
 }

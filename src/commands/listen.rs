@@ -41,9 +41,9 @@ use crate::display::warn;
 /// goes away costs no row of --out. A code that the converter of --adc-bits cannot give is counted.
 ///
 /// The board's estimates are compared with those of the calibration here, and
-/// the largest difference is told: is it the calibration that the board runs? Any
-/// record will do: a calibration of any model, or what --fixed wrote for the board,
-/// which says neither names nor units.
+/// the largest difference is reported: it shows whether the board runs this
+/// calibration. The record may be a calibration of any model, or the record that
+/// --fixed wrote for the board, which holds neither names nor units.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {

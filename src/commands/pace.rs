@@ -1,6 +1,6 @@
 //! Whether samples come as often as a calibration takes them to.
 
-/// Intervals that the pace is told from.
+/// Number of intervals that determine the pace.
 const INTERVALS: usize = 51;
 /// Share of the calibration's interval by which the usual one may differ: as much as counts as on time.
 const TOLERANCE: f64 = 0.2;

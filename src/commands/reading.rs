@@ -73,13 +73,13 @@ impl Recorded {
     }
 }
 
-/// Reads a recording, `-` being standard input, and tells what had to be done for it on standard error.
+/// Reads a recording, `-` being standard input, and reports on standard error what had to be changed.
 pub(crate) fn read_recording(path: &Path, options: &ReadOptions) -> Result<Trial, RecordingError> {
-    Ok(told(Recording::read(path, options)?))
+    Ok(with_notes_printed(Recording::read(path, options)?))
 }
 
-/// The trial of a recording, whose notes are told.
-pub(crate) fn told(Recording { trial, notes }: Recording) -> Trial {
+/// The trial of a recording, after its notes were printed.
+pub(crate) fn with_notes_printed(Recording { trial, notes }: Recording) -> Trial {
     for note in notes {
         warn(format!("note: {}: {note}", trial.name));
     }
@@ -103,10 +103,10 @@ pub(crate) fn read_trials(
             let set = DataSet::read(path)?;
             let before = trials.len();
             for entry in set.entries(split) {
-                trials.push(told(Recording::of_entry(entry, path, options)?));
+                trials.push(with_notes_printed(Recording::of_entry(entry, path, options)?));
             }
             // once: what is wrong is one line of dataset.toml
-            let wrong = trials[before..].iter().find_map(|trial| set.rate_told(trial));
+            let wrong = trials[before..].iter().find_map(|trial| set.rate_mismatch(trial));
             wrong.into_iter().for_each(|note| warn(format!("note: {note}")));
             if trials.len() == before {
                 let split = split.name();

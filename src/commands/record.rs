@@ -53,7 +53,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             seal_calibration(path)?;
         }
         let RecordSummary { kind, seal, is_sealed } = describe_record(path)?;
-        let told = match (is_sealing, is_sealed) {
+        let state = match (is_sealing, is_sealed) {
             (true, _) => "sealed",
             (false, true) => "its seal holds",
             (false, false) => {
@@ -61,7 +61,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             }
         };
         let (path, seal) = (path.display().to_string(), format!("{seal:08x}"));
-        lines.push(format!("{path}: {kind}, {seal}, {told}"));
+        lines.push(format!("{path}: {kind}, {seal}, {state}"));
         answer.push(serde_json::json!({
             "record": path, "kind": kind, "seal": seal, "is_sealed": is_sealing || is_sealed,
         }));

@@ -41,10 +41,10 @@ fn ticking(bar: ProgressBar) -> ProgressBar {
     bar
 }
 
-/// Puts right what a run that was killed left of a folder, and says so.
+/// Repairs a folder that a killed run left half-replaced, and reports the repair.
 pub(crate) fn recover(folder: &Path) -> anyhow::Result<()> {
-    let told = stretch_files::recover(folder).with_context(|| folder.display().to_string())?;
-    told.into_iter().for_each(warn);
+    let sentence = stretch_files::recover(folder).with_context(|| folder.display().to_string())?;
+    sentence.into_iter().for_each(warn);
     Ok(())
 }
 
@@ -60,7 +60,7 @@ pub(crate) fn or_force(error: anyhow::Error) -> anyhow::Error {
 
 /// An error with the files that it came of, where it does not name them itself.
 pub(crate) fn of_files(error: impl Into<anyhow::Error>, paths: &[PathBuf]) -> anyhow::Error {
-    let (error, told) = (error.into(), |path: &Path| path.display().to_string());
+    let (error, shown) = (error.into(), |path: &Path| path.display().to_string());
     let message = format!("{error:#}");
     let is_named = |path: &PathBuf| {
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
@@ -69,8 +69,10 @@ pub(crate) fn of_files(error: impl Into<anyhow::Error>, paths: &[PathBuf]) -> an
     match paths {
         [] => error,
         paths if paths.iter().any(is_named) => error,
-        [path] => error.context(told(path)),
-        [first, others @ ..] => error.context(format!("{} and {} more", told(first), others.len())),
+        [path] => error.context(shown(path)),
+        [first, others @ ..] => {
+            error.context(format!("{} and {} more", shown(first), others.len()))
+        }
     }
 }
 

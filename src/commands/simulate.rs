@@ -162,11 +162,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         "data_set": args.out.display().to_string(), "trials": trials, "duration_s": seconds, "effects": effects, "seed": seed,
     });
     let effects = if effects.is_empty() { "no effect".to_owned() } else { effects.join(", ") };
-    let told = format!(
+    let sentence = format!(
         "wrote {}: {trials} trials, {seconds:.0} s, {effects}, seed {seed}",
         args.out.display()
     );
-    args.json.answer(&answer, || tell(told))
+    args.json.answer(&answer, || tell(sentence))
 }
 
 /// One trial as a stream: a folder cannot be one.

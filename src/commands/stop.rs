@@ -23,7 +23,7 @@ pub(crate) fn on_ctrl_c(exit_code: u8) {
     }
 }
 
-/// From now on the first Ctrl-C only sets what [`ended`] tells.
+/// From now on the first Ctrl-C only sets the flag of [`ended`].
 pub(crate) fn record() {
     RECORDING.store(true, SeqCst);
 }

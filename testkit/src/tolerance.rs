@@ -209,7 +209,7 @@ pub const RIG_STEP: f64 = 1e-4;
 
 /// In units of the noise: how far least absolute residuals may end up from the truth at the
 /// edge of the rectangle, where a few samples decide, when a fifth of all are spoilt.
-pub const FIT_WILD: f64 = 20.0;
+pub const FIT_GROSS_ERRORS: f64 = 20.0;
 
 /// Millimetres between receptors that remember in `f32` and in `f64`: states near
 /// 1 with 24 bits, up to 35 terms of coefficients up to 2, a stroke of 30 mm.
@@ -331,8 +331,8 @@ pub const BLIND_LENGTH_MM: f64 = 0.01;
 /// Volts at rest of a bridge that was trimmed: rounding, magnified by the amplifier.
 pub const BLIND_TRIMMED_V: f64 = 1e-9;
 
-/// Relative: the offset of a slip wound by a vent, which ends where its curve is still a little bent.
-pub const BLIND_WOUND: f64 = 0.2;
+/// Relative: the offset of a slip whose hysteresis state a vent left; the vent ends where its curve is still a little bent.
+pub const BLIND_HYSTERESIS_STATE: f64 = 0.2;
 
 /// Relative: what a steady load has still to draw down after 40 s.
 pub const BLIND_DRAWN: f64 = 0.01;

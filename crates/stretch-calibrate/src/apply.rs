@@ -7,11 +7,11 @@ use stretch_receptor::{MAX_BRIDGED, Reading, Receptor, Withheld};
 
 use crate::{CalibrateError, series::rates_at_use};
 
-/// An interval off by more than this share of a period is counted as jitter.
+/// An interval between samples that differs from the period by more than this share is counted as jitter.
 const JITTER_TOLERANCE: f64 = 0.2;
 
-/// A receptor that minds the time stamps: missing ticks are stepped as missing,
-/// and time that runs backwards starts it afresh.
+/// A receptor that checks the time stamps: missing ticks are stepped as missing samples, and a stamp that runs
+/// backwards resets the receptor.
 ///
 /// ```
 /// use stretch_calibrate::LiveReceptor;
@@ -35,7 +35,7 @@ pub struct LiveReceptor {
     faults: Faults,
 }
 
-/// What was wrong with the time stamps of a stream.
+/// Faults of a stream's time stamps.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Faults {
     /// Samples that did not come.
@@ -65,7 +65,7 @@ impl LiveReceptor {
     /// Takes the next sample.
     ///
     /// # Errors
-    /// [`Withheld`] when there is no reading for it.
+    /// [`Withheld`] when there is no reading for the sample.
     pub fn step(&mut self, time_s: f64, signal: f64) -> Result<Reading, Withheld> {
         match self.cadence.step(Seconds(time_s)) {
             Arrival::Gap { missing } => {
@@ -84,30 +84,30 @@ impl LiveReceptor {
         self.receptor.step(&mut self.memory, Volts(signal))
     }
 
-    /// The pressure of the samples to come, for a calibration that [needs](pressure_column) it.
+    /// Sets the pressure of the samples to come, for a calibration that [needs](pressure_column) a pressure.
     pub fn set_pressure(&mut self, pressure: f64) {
         self.memory.set_pressure(pressure);
     }
 
-    /// What was wrong with the time stamps so far.
+    /// Faults of the time stamps so far.
     pub fn faults(&self) -> Faults {
         self.faults
     }
 }
 
-/// A trial's readings, one a sample, and what was wrong with its time stamps.
+/// A trial's readings, one for each sample, and the faults of the trial's time stamps.
 #[derive(Debug, Clone)]
 pub struct Applied {
-    /// One answer a sample.
+    /// One answer for each sample.
     pub readings: Vec<Result<Reading, Withheld>>,
-    /// What was wrong with the time stamps.
+    /// Faults of the time stamps.
     pub faults: Faults,
 }
 
 /// Applies a calibration to a logged trial, sample by sample, as it would run live.
 ///
-/// A calibration that names the paper's central difference is applied as
-/// published: its rates are taken over the whole log, one sample ahead.
+/// A calibration that names the paper's central difference is applied as published: the rates are taken over the
+/// whole log, one sample ahead.
 ///
 /// # Errors
 /// [`CalibrateError::Data`] when the trial lacks the signal,

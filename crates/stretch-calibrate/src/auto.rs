@@ -13,56 +13,56 @@ use crate::{
     series::{extent, sample_rate_hz},
 };
 
-/// What is not fitted on either side of a part that is left out, in seconds: neighbours tell each other.
+/// Seconds on either side of a part left out that are not fitted either, because neighbouring samples are correlated.
 const GAP_S: f64 = 2.0;
 /// Samples of warm-up that no model is judged on.
 const SETTLE: usize = 20;
 /// Fewer trials than this are cut into parts.
 const LEAST_TRIALS: usize = 3;
-/// Parts that few trials are cut into, each.
+/// Number of parts that each trial is cut into where there are few trials.
 const PARTS: usize = 6;
 /// A turn counts when the reference has come back by this share of its range.
 const TURN: f64 = 0.1;
-/// A root mean square error this close to the best, as a share, is as good.
+/// A root mean square error of at most this multiple of the best one counts as equally good.
 const AS_GOOD: f64 = 1.05;
-/// What following the baseline may cost, as a ratio of root mean square errors on
-/// trials left out: with it, a drift of 5 % in a minute costs a quarter less.
+/// Greatest cost of following the baseline, as a ratio of root mean square errors on trials left out. A followed
+/// baseline lowers the cost of a drift of 5 % in a minute by a quarter.
 const PREMIUM: f64 = 1.05;
-/// Turns that make a trial one that reverses.
+/// A trial with at least this many turns counts as one that reverses.
 const LEAST_TURNS: usize = 3;
 const MAX_LAG_S: f64 = 0.5;
 
-/// What cross-validation says of one model.
+/// The result of cross-validation for one model.
 #[derive(Debug, Clone, Serialize)]
 pub struct ModelRow {
-    /// As `--model` takes it.
+    /// Name of the model, as `--model` takes it.
     pub model: String,
     /// Numbers that the fit determines.
     pub parameters: usize,
     /// Instructions a sample on a Cortex-M3, from volts in `f32`, as measured.
     pub m3_instructions: Option<f64>,
-    /// The same in fixed point, where the model has that form.
+    /// Instructions a sample in fixed point, where the model has a fixed-point form.
     pub m3_instructions_fixed: Option<f64>,
     /// Root mean square error on trials left out, in the reference's unit.
     pub rmse: Option<f64>,
-    /// The same on trials that reverse at will.
+    /// Root mean square error on trials that reverse at arbitrary times.
     pub rmse_arbitrary: Option<f64>,
-    /// On trials of pulses (those with `pulse` in their name).
+    /// Root mean square error on trials of pulses (trials with `pulse` in their name).
     pub rmse_pulses: Option<f64>,
-    /// On trials that move one way.
+    /// Root mean square error on trials that move one way.
     pub rmse_ramps: Option<f64>,
     /// Seconds that the estimate runs behind, mean over trials that reverse.
     pub lag_s: Option<f64>,
     /// Greatest absolute error.
     pub worst: Option<f64>,
-    /// How much worse than the best, in mean squared error of the parts
-    /// left out, and the standard error of that.
+    /// Mean squared error on the parts left out minus that of the best model, and the standard error of this
+    /// difference.
     pub excess: Option<(f64, f64)>,
-    /// Why it has no numbers.
+    /// Why the row has no numbers.
     pub problem: Option<String>,
 }
 
-/// A choice of model, and what it rests on.
+/// A choice of model, and the figures behind the choice.
 #[derive(Debug, Clone, Serialize)]
 pub struct ModelChoice {
     /// All candidates, in the order of their errors.
@@ -70,13 +70,13 @@ pub struct ModelChoice {
     /// The model to use.
     #[serde(skip)]
     pub model: ModelKind,
-    /// Why that one, with the figures that were compared.
+    /// Why this model was chosen, with the figures that were compared.
     pub why: String,
-    /// What the data cannot say, one sentence each.
+    /// Questions that the data cannot answer, one sentence each.
     pub notes: Vec<String>,
 }
 
-/// Whether a trial can tell memory from position: it turns at least three times.
+/// Whether a trial can distinguish memory from position: such a trial turns at least three times.
 fn reverses(reference: &[f64]) -> bool {
     let range = extent(reference.iter().copied());
     let turn = TURN * (range.max - range.min);
@@ -103,15 +103,15 @@ fn reverses(reference: &[f64]) -> bool {
     turns >= LEAST_TURNS
 }
 
-/// A part of the data that is left out together: samples `from..to` of a trial.
+/// A part of the data whose samples are left out together: samples `from..to` of a trial.
 struct Fold {
     trial: usize,
     from: usize,
     to: usize,
 }
 
-/// What became of one model on everything left out: what [`choose_among`] chooses from. It travels as JSON, so that models can be
-/// judged by workers that share no memory.
+/// The cross-validation of one model, from which [`choose_among`] chooses. The value serialises as JSON, so that
+/// workers that share no memory can judge models.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Judged {
     /// Numbers that the fit determines.
@@ -122,7 +122,7 @@ pub struct Judged {
 /// Errors of one model on everything left out.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 struct Errors {
-    /// Mean squared error of each part left out; none where nothing was estimated.
+    /// Mean squared error of each part left out; `None` where nothing was estimated.
     parts: Vec<Option<f64>>,
     /// Sums of squares and counts: arbitrary, pulses, ramps.
     kinds: [(f64, f64); 3],
@@ -130,19 +130,18 @@ struct Errors {
     lag: (f64, f64),
 }
 
-/// Chooses a model: each candidate is fitted with one trial left out, run live
-/// over that trial, and judged there; in turn for all trials (for parts of
-/// trials where there are fewer than three). Time constants, radii and ridge are
-/// chosen once, on all of them. The simplest candidate is taken whose mean
-/// squared error, part by part, is not worse than the best one's by more than
-/// one standard error (Breiman et al. 1984, section 3.4.3), or whose root mean
-/// square error is within 5 % of it. Of a length, which cannot pass its resting
-/// stop, the same model with its baseline followed is taken where that costs at
-/// most 5 %: drift is what such data show last.
+/// Chooses a model by cross-validation.
 ///
-/// Where every trial moves one way, models that remember are not chosen:
-/// such data cannot tell memory from rate. [`ModelChoice::notes`] then says what
-/// to record.
+/// Each candidate is fitted with one trial left out, run live over that trial and judged there. All trials are left
+/// out in turn (parts of trials where there are fewer than three trials). Time constants, radii and ridge are chosen
+/// once, on all trials. The simplest candidate is taken whose mean squared error, part by part, exceeds that of the
+/// best candidate by at most one standard error (Breiman et al. 1984, section 3.4.3), or whose root mean square error
+/// is within 5 % of that of the best. For a length, which cannot pass its resting stop, the same model with a
+/// followed baseline is taken where the followed baseline costs at most 5 %, because short recordings rarely show
+/// drift.
+///
+/// Where every trial moves one way, models that remember are not chosen, because such data cannot distinguish memory
+/// from rate. [`ModelChoice::notes`] then says what to record.
 ///
 /// # Errors
 /// [`CalibrateError`] of the simplest model when none can be fitted.
@@ -151,20 +150,21 @@ pub fn choose_model(trials: &[Trial], options: &Options) -> Result<ModelChoice, 
         .into_par_iter()
         .map(|kind| (kind, judge_model(trials, options, kind)))
         .collect();
-    let told = |judged: &Result<Judged, CalibrateError>| match judged {
+    let outcome = |judged: &Result<Judged, CalibrateError>| match judged {
         Ok(judged) => Ok(judged.clone()),
         Err(error) => Err(error.to_string()),
     };
-    let found = judged.iter().map(|(kind, judged)| (*kind, told(judged))).collect();
+    let found = judged.iter().map(|(kind, judged)| (*kind, outcome(judged))).collect();
     choose_among(trials, options, found).ok_or_else(|| {
-        // a part without a sample has no trial; the user named some
+        // a part without a sample has no trial, but the user named at least one trial
         let first = judged.into_iter().find_map(|(_, judged)| judged.err());
         let first = first.filter(|problem| !matches!(problem, CalibrateError::NoTrials));
         first.unwrap_or(CalibrateError::TooFewToJudge)
     })
 }
 
-/// The models that [`choose_model`] judges: all that have a name; one of what a diagnosis named exists where one named something.
+/// The models that [`choose_model`] judges: every model with a name. The diagnosed model is among them only where a
+/// diagnosis named an effect.
 pub fn candidate_models(options: &Options) -> Vec<ModelKind> {
     let is_here = |kind: &ModelKind| {
         let diagnosed = matches!(kind, ModelKind::Remembering { kind: Memory::Diagnosed, .. });
@@ -191,8 +191,8 @@ fn turning(trials: &[Trial], options: &Options) -> Result<Vec<bool>, CalibrateEr
     trials.iter().map(one).collect()
 }
 
-/// Chooses by the rule of [`choose_model`] among models that were judged, each with what became of it or why nothing did; none
-/// where nothing became of any.
+/// Chooses by the rule of [`choose_model`] among judged models, each given with its cross-validation or with the
+/// reason why there is none. The answer is `None` where no model has a cross-validation.
 ///
 /// ```
 /// use stretch_calibrate::{ModelKind, Options, choose_among, judge_model};
@@ -239,7 +239,7 @@ pub fn choose_among(
             _ => None,
         })
         .collect();
-    // among those that may be chosen, the best and all that are as good
+    // among the candidates that may be chosen: the best one and all that are equally good
     let bar = (0..found.len())
         .filter(|&i| eligible(found[i].0) && good(&found[i]).is_some())
         .min_by(|&a, &b| good(&found[a]).unwrap_or(0.0).total_cmp(&good(&found[b]).unwrap_or(0.0)));
@@ -253,7 +253,7 @@ pub fn choose_among(
                 || share.is_some_and(|share| share <= AS_GOOD))
     };
     let model = (0..found.len()).filter(as_good).min_by_key(|&i| found[i].1).unwrap_or(bar);
-    // a length cannot pass its resting stop: following that is insurance against drift
+    // a length cannot pass its resting stop, so that a followed baseline insures against drift
     let insured = (0..found.len()).find(|&i| {
         let twin = matches!((found[model].0, found[i].0),
             (ModelKind::Remembering { kind: a, rest: false }, ModelKind::Remembering { kind: b, rest: true }) if a == b);
@@ -347,7 +347,7 @@ fn without(trials: &[Trial], fold: &Fold) -> Vec<Trial> {
         }
         let gap = sample_rate_hz(trial).map_or(0, |hz| (GAP_S * hz) as usize);
         for span in [0..fold.from.saturating_sub(gap), fold.to.saturating_add(gap)..trial.len()] {
-            // a stub is no trial: its estimators would hardly warm up
+            // a short remainder is not fitted, because the estimators would hardly warm up on it
             if span.len() > 5 * SETTLE {
                 let mut part = trial.clone();
                 part.time_s = trial.time_s[span.clone()].to_vec();
@@ -441,7 +441,8 @@ fn rmse((sum, count): (f64, f64)) -> Option<f64> {
     (count > 0.0).then(|| (sum / count).sqrt())
 }
 
-/// Mean difference of two models' parts, and its standard error: a part is one draw, however long it is.
+/// Mean difference of two models' errors, part by part, and its standard error. A part of any length counts as one
+/// draw.
 fn excess(parts: &[Option<f64>], best: &[Option<f64>]) -> Option<(f64, f64)> {
     let differences: Vec<f64> =
         parts.iter().zip(best).filter_map(|(a, b)| Some((*a)? - (*b)?)).collect();

@@ -1,44 +1,44 @@
-//! Why a model was chosen, in a sentence.
+//! Sentences that say why a model was chosen.
 
 use crate::reach::four_digits;
 
-/// A candidate as the choice saw it.
+/// The numbers of a candidate that the choice compared.
 #[derive(Debug, Clone)]
 pub(crate) struct Seen {
     pub(crate) model: String,
-    /// Root mean square error on what was left out.
+    /// Root mean square error on the data left out.
     pub(crate) rmse: f64,
     /// Numbers that the fit determines.
     pub(crate) numbers: usize,
 }
 
-/// What the choice rests on.
+/// The figures behind a choice.
 #[derive(Debug)]
 pub(crate) struct Grounds<'a> {
-    /// The candidate of the least error, of those that may be chosen.
+    /// The candidate of the least error, among the candidates that may be chosen.
     pub(crate) best: &'a Seen,
     /// The runner-up of the best.
     pub(crate) second: Option<&'a Seen>,
-    /// The simplest that is as good.
+    /// The simplest candidate that counts as equally good.
     pub(crate) simplest: &'a Seen,
-    /// Mean squared error of the simplest over that of the best, part by part, and its standard error.
+    /// Mean squared error of the simplest candidate minus that of the best, part by part, and its standard error.
     pub(crate) excess: Option<(f64, f64)>,
-    /// The same model with its baseline followed, where that was taken instead.
+    /// The simplest candidate with a followed baseline, where this form was taken instead.
     pub(crate) insured: Option<&'a Seen>,
     /// Unit of the reference.
     pub(crate) unit: &'a str,
-    /// Whether models that remember were asked.
+    /// Whether models that remember were among the candidates.
     pub(crate) memory_shows: bool,
-    /// Share by which an error may be larger and pass for as good.
+    /// Largest multiple of the best error that counts as equally good.
     pub(crate) as_good: f64,
 }
 
-/// The figures that were compared, and what decided.
+/// A sentence with the figures that were compared and the rule that decided.
 pub(crate) fn why(grounds: &Grounds<'_>) -> String {
     let Grounds { best, second, simplest, excess, insured, unit, memory_shows, as_good } = grounds;
     let error = |seen: &Seen| format!("{} {unit}", four_digits(seen.rmse)).trim_end().to_owned();
     let chosen = insured.unwrap_or(simplest);
-    let mut told = if simplest.model == best.model {
+    let mut sentence = if simplest.model == best.model {
         let before = second.map_or(String::new(), |s| format!(", {} {}", s.model, error(s)));
         let (model, least) = (&best.model, error(best));
         let among = if *memory_shows { "" } else { " of those without memory" };
@@ -69,14 +69,14 @@ pub(crate) fn why(grounds: &Grounds<'_>) -> String {
     };
     if let Some(insured) = insured {
         let cost = 100.0 * (insured.rmse / simplest.rmse - 1.0);
-        told += &match cost >= 0.05 {
+        sentence += &match cost >= 0.05 {
             true => {
                 format!("; to follow a drifting baseline costs {cost:.1} % of that and is taken")
             }
             false => "; to follow a drifting baseline costs nothing and is taken".to_owned(),
         };
     }
-    told
+    sentence
 }
 
 #[cfg(test)]
@@ -109,8 +109,11 @@ mod tests {
              difference of their squares is 0.5 of its standard errors, which is chance, and 13 numbers are fewer than 31"
         );
         let close = Grounds { excess: Some((0.3, 0.2)), insured: Some(&rest), ..chance };
-        let told = why(&close);
-        assert!(told.starts_with("hysteresis+rest: ") && told.contains("within 5 %"), "{told}");
-        assert!(told.ends_with("costs 1.9 % of that and is taken"), "{told}");
+        let sentence = why(&close);
+        assert!(
+            sentence.starts_with("hysteresis+rest: ") && sentence.contains("within 5 %"),
+            "{sentence}"
+        );
+        assert!(sentence.ends_with("costs 1.9 % of that and is taken"), "{sentence}");
     }
 }

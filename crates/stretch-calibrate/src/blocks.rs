@@ -1,4 +1,4 @@
-//! A log in blocks of rows, and the rows in it that no motion can have made.
+//! A log in blocks of rows, and the rows of the log that hold gross errors.
 
 use stretch_data::Trial;
 
@@ -8,25 +8,25 @@ use crate::{
     gross_errors::{MOST_SHARE, rows, sentence},
 };
 
-/// Rows in all beyond which a log is not held as a whole where the model does not need it: at a hundred bytes a row,
-/// a quarter of a gigabyte with what is read and fitted.
+/// Longest log, in rows, that is held as a whole where the model can also be fitted block by block. At about a
+/// hundred bytes a row such a log takes a quarter of a gigabyte, together with the memory for reading and fitting.
 pub const LONGEST: u64 = 1_500_000;
 
 /// A log that can be read again and again, block by block.
 ///
-/// The function is given the trial's number, from 0 on, and a block of its rows, in the order of time.
+/// The function is given the trial's number, from 0 on, and a block of the trial's rows, in the order of time.
 pub type Log<'a> = dyn Fn(&mut dyn FnMut(usize, Trial) -> Result<(), CalibrateError>) -> Result<(), CalibrateError>
     + 'a;
 
-/// What has a gross error in each column.
+/// The values of each column that are gross errors.
 pub(crate) struct GrossErrors<'a> {
     spans: Vec<(&'a str, f64, f64)>,
-    /// A sentence for each column that has some.
-    pub told: Vec<String>,
+    /// A sentence for each column that has gross errors.
+    pub sentences: Vec<String>,
 }
 
 impl<'a> GrossErrors<'a> {
-    /// The first pass: what has a gross error in the reference and in the signal.
+    /// The first pass: finds the gross errors of the reference and of the signal.
     pub(crate) fn of(log: &Log<'_>, columns: [&'a str; 2]) -> Result<Self, CalibrateError> {
         let mut seen: [Clusters; 2] = Default::default();
         log(&mut |_, block| {
@@ -35,16 +35,16 @@ impl<'a> GrossErrors<'a> {
             }
             Ok(())
         })?;
-        let (mut spans, mut told) = (Vec::new(), Vec::new());
+        let (mut spans, mut sentences) = (Vec::new(), Vec::new());
         for (clusters, column) in seen.iter().zip(columns) {
             let most = (MOST_SHARE * clusters.count() as f64) as u64;
             if let Some((low, high, beyond)) = clusters.span(most) {
                 let ends = clusters.beyond(low, high);
-                told.push(sentence(column, (beyond, clusters.count()), ends, (low, high)));
+                sentences.push(sentence(column, (beyond, clusters.count()), ends, (low, high)));
                 spans.push((column, low, high));
             }
         }
-        Ok(Self { spans, told })
+        Ok(Self { spans, sentences })
     }
 
     /// A block without the rows in which a column has a gross error.

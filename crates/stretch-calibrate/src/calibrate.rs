@@ -18,22 +18,22 @@ use crate::{
     split::branches,
 };
 
-/// A calibration and what there is to say about it.
+/// A calibration with the reports and notes of its fit.
 #[derive(Debug, Clone)]
 pub struct Calibrated {
     /// The record.
     pub calibration: Calibration,
-    /// The linear fit, or one fit a branch.
+    /// The report of the linear fit, or one report for each branch.
     pub fits: Vec<FitReport>,
-    /// What had to be done to the data, one sentence each.
+    /// Changes made to the data before the fit, one sentence each.
     pub notes: Vec<String>,
 }
 
 /// Fits a calibration to logged trials.
 ///
 /// Ranges are pooled over all trials (of rates, over each branch) and frozen.
-/// Trials are brought onto an even grid as [`Trial::even`] does it: lost samples are bridged, long gaps cut a trial,
-/// uneven stamps are resampled; [`Calibrated::notes`] says where.
+/// Trials are brought onto an even grid by [`Trial::even`]: lost samples are bridged, long gaps cut a trial, uneven
+/// stamps are resampled. [`Calibrated::notes`] says where.
 ///
 /// # Errors
 /// [`CalibrateError`], which names the trial and column, or the branch and term.
@@ -62,7 +62,7 @@ pub fn calibrate(trials: &[Trial], options: &Options) -> Result<Calibrated, Cali
     calibrate_with(trials, options, None).map(|(calibrated, _)| calibrated)
 }
 
-/// The same, keeping a choice made before, and the choice that was made.
+/// Fits a calibration, with an earlier choice where one is given; answers with the choice that was made.
 pub(crate) fn calibrate_with(
     trials: &[Trial],
     options: &Options,
@@ -91,8 +91,7 @@ pub(crate) fn calibrate_with(
     Ok((Calibrated { calibration, fits, notes }, made))
 }
 
-/// What was chosen about a model that remembers, to be kept when it is fitted
-/// to parts of the same data.
+/// Choices about a model that remembers, kept when the model is fitted to parts of the same data.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Choice {
     History(HistoryChoice),
@@ -146,7 +145,7 @@ fn linear(prepared: &Prepared, options: &Options) -> Result<Fitted, CalibrateErr
     Ok((Model::Linear(line), vec![report], Vec::new()))
 }
 
-/// What one branch's samples are before normalisation.
+/// Samples of one branch before normalisation.
 #[derive(Default)]
 struct Raw {
     fold: Vec<usize>,

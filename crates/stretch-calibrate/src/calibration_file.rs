@@ -1,4 +1,4 @@
-//! Calibration records as files: JSON for people, postcard for a board; both under a seal.
+//! Calibration records as files, in JSON for people or in postcard for a board. Both forms carry a seal.
 
 use std::{fs, path::Path};
 
@@ -11,12 +11,12 @@ use crate::{CalibrateError, digest};
 /// Room for the largest record in postcard: two poly55 surfaces and sixteen trials.
 const POSTCARD_BYTES: usize = 4096;
 
-/// What is asked of a record's seal.
+/// How a record's seal is treated.
 #[derive(Clone, Copy, PartialEq)]
 enum Seal {
-    /// To be that of the record.
+    /// The seal must be that of the record.
     Checked,
-    /// Nothing: the record was edited by hand.
+    /// The seal is ignored, because the record was edited by hand.
     Ignored,
 }
 
@@ -27,13 +27,13 @@ fn is_postcard(path: &Path) -> bool {
 /// A calibration from its record: postcard when the name ends in `.postcard`, else JSON.
 ///
 /// # Errors
-/// [`CalibrateError::Record`] with the file, the field and what is wrong with it: a seal that is
-/// not that of the record, too.
+/// [`CalibrateError::Record`] with the file, the field and the fault of that field. A seal that does not match the
+/// record is refused as well.
 pub fn read_calibration(path: &Path) -> Result<Calibration, CalibrateError> {
     read(path, Seal::Checked)
 }
 
-/// A calibration from a record in JSON that is held in memory; `name` is what messages call it.
+/// A calibration from a record in JSON that is held in memory; messages call the record `name`.
 ///
 /// # Errors
 /// As [`read_calibration`].
@@ -57,7 +57,7 @@ pub fn calibration_from_json(text: &str, name: &str) -> Result<Calibration, Cali
 /// The record of a calibration in JSON, sealed.
 ///
 /// # Errors
-/// None for a calibration: all of its numbers are finite.
+/// Never for a [`Calibration`], because all of its numbers are finite.
 pub fn calibration_to_json(calibration: &Calibration) -> Result<String, CalibrateError> {
     let problem = |problem| CalibrateError::Record { file: "record".to_owned(), problem };
     let object = serde_json::to_string_pretty(calibration);
@@ -67,22 +67,22 @@ pub fn calibration_to_json(calibration: &Calibration) -> Result<String, Calibrat
 
 /// The number under which the record of a calibration is sealed: CRC-32C of its bytes in postcard.
 ///
-/// Whoever holds the record in another form (constants in C, a board that is asked) says with it
-/// which calibration that is.
+/// The number identifies the calibration where the record is held in another form (constants in C, a board that
+/// answers with the seal of its record).
 ///
 /// # Errors
-/// None for a calibration: there is room for the largest.
+/// Never for a [`Calibration`], because the buffer has room for the largest record.
 pub fn calibration_seal(calibration: &Calibration) -> Result<u32, CalibrateError> {
     let mut buffer = [0; POSTCARD_BYTES];
     let bytes = record::store(calibration, &mut buffer)?;
     Ok(record::seal(bytes)?.unwrap_or_default())
 }
 
-/// Checks a record that was edited by hand, or is of an earlier schema, and writes it anew under a
-/// seal of today. A record in postcard that is damaged is refused: no hand edited it.
+/// Checks a record that was edited by hand or has an earlier schema, and writes the record again under a seal of the
+/// current schema. A damaged record in postcard is refused, because nobody edits postcard by hand.
 ///
 /// # Errors
-/// As [`read_calibration`] for all but the digest, and [`write_calibration`].
+/// The errors of [`read_calibration`] except that of the digest, and those of [`write_calibration`].
 pub fn seal_calibration(path: &Path) -> Result<Calibration, CalibrateError> {
     let calibration = read(path, Seal::Ignored)?;
     write_calibration(path, &calibration)?;
@@ -99,11 +99,11 @@ pub fn write_calibration(path: &Path, calibration: &Calibration) -> Result<(), C
     Ok(write_whole(path, |out| out.write_all(&bytes))?)
 }
 
-/// What the record of a calibration is in a file of that name: postcard when the name ends in
-/// `.postcard`, else JSON.
+/// The record of a calibration as the bytes of a file of that name: postcard when the name ends in `.postcard`, else
+/// JSON.
 ///
 /// # Errors
-/// None for a calibration: there is room for the largest, and all of its numbers are finite.
+/// Never for a [`Calibration`], because the buffer has room for the largest record and all numbers are finite.
 pub fn calibration_bytes(
     path: &Path,
     calibration: &Calibration,
@@ -126,7 +126,7 @@ fn read(path: &Path, seal: Seal) -> Result<Calibration, CalibrateError> {
         let text = text.map_err(|e| problem(format!("{UNUSABLE}: it is no text: {e}")))?;
         return from_json(&text, &file, seal);
     }
-    // the parts, so that a message can name the field
+    // the specification is loaded without its checks, so that a message can name the field
     let spec = record::load::<CalibrationSpec>(&bytes);
     let made = spec.and_then(Calibration::new);
     made.map_err(|e| problem(format!("{UNUSABLE}: {e}")))
@@ -162,7 +162,7 @@ fn from_json(text: &str, name: &str, seal: Seal) -> Result<Calibration, Calibrat
                 "its digest is {found} and its text gives {computed}: it was edited or damaged; {advice}"
             )));
         }
-        // schema 1 had none
+        // records of schema 1 had no digest
         None if schema != Schema::CURRENT => {}
         None => {
             return Err(unusable(format!("it has no digest as its last field; {advice}")));
@@ -171,18 +171,18 @@ fn from_json(text: &str, name: &str, seal: Seal) -> Result<Calibration, Calibrat
     Ok(calibration)
 }
 
-/// What a record of any kind is.
+/// The kind and the seal of a record.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct RecordSummary {
-    /// The model, or what reads it on a board.
+    /// The model, or the type that reads the record on a board.
     pub kind: String,
     /// CRC-32C of the record's bytes in postcard.
     pub seal: u32,
-    /// Whether the file itself carries a seal: none of schema 1 does.
+    /// Whether the file itself carries a seal. Files of schema 1 carry no seal.
     pub is_sealed: bool,
 }
 
-/// What the record of a file is: a calibration, or what `--fixed` wrote for a board.
+/// Describes the record of a file: a calibration, or a record that `--fixed` wrote for a board.
 ///
 /// # Errors
 /// As [`read_calibration`].

@@ -1,9 +1,9 @@
-//! What a diagnosis named, as a calibration takes it.
+//! An effect that a diagnosis named, as a calibration takes it.
 
-/// An effect of the gauge or of its reference, with the values that were found.
+/// An effect of the gauge or of its reference, with the parameter values that a diagnosis found.
 ///
 /// Names are those of the catalogue (`stretch effects`). Strains, lengths and voltages are in shares of the reference's range over the
-/// calibrated trials, times in seconds; they are where a fit begins.
+/// calibrated trials, times in seconds. A fit begins at these values.
 ///
 /// ```
 /// use stretch_calibrate::Cause;
@@ -19,7 +19,7 @@ pub struct Cause {
 }
 
 impl Cause {
-    /// Of a name and values.
+    /// An effect from its name and the values of its parameters.
     pub fn new(effect: &str, values: &[(&str, f64)]) -> Self {
         let values = values.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
         Self { effect: effect.to_owned(), values }

@@ -1,4 +1,4 @@
-//! Which of several signals to calibrate on, by cross-validation.
+//! Choice of a signal to calibrate on, by cross-validation.
 
 use serde::Serialize;
 use stretch_data::Trial;
@@ -10,10 +10,10 @@ use crate::{CalibrateError, ModelKind, Options, calibrate};
 pub struct Candidate {
     /// The column.
     pub signal: String,
-    /// Root mean square error on data left out, over both branches, in
-    /// normalised target; none where it cannot be calibrated on.
+    /// Root mean square error on data left out, over both branches, in normalised target; `None` where the signal
+    /// cannot be calibrated on.
     pub cross_validated_rmse: Option<f64>,
-    /// Why it cannot be calibrated on.
+    /// Why the signal cannot be calibrated on.
     pub problem: Option<String>,
 }
 

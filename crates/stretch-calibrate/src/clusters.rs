@@ -1,6 +1,6 @@
 //! The values of a channel in bounded memory: clusters, and the widest holes between them.
 
-/// Values from `low` to `high`, between which no hole is as wide as those between clusters.
+/// Values from `low` to `high`. The holes between these values are narrower than the holes between clusters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Cluster {
     low: f64,
@@ -8,8 +8,9 @@ struct Cluster {
     count: u64,
 }
 
-/// What came so far, sorted, in `MOST` clusters: a gross error takes one, so do the widest holes among usual ones. Where there
-/// are more the narrowest hole is closed, so that wide ones stay as they are.
+/// The values so far, sorted into at most `MOST` clusters. Each gross error takes a cluster, and the widest holes
+/// among the usual values separate further clusters. Where there are more than `MOST` clusters the narrowest hole is
+/// closed, so that wide holes remain.
 #[derive(Debug, Clone)]
 pub(crate) struct Clusters<const MOST: usize = 1024> {
     all: Vec<Cluster>,
@@ -23,7 +24,7 @@ impl<const MOST: usize> Default for Clusters<MOST> {
 }
 
 impl<const MOST: usize> Clusters<MOST> {
-    /// Takes a value in; what is no finite number is passed over.
+    /// Takes a value in; a value that is not finite is passed over.
     pub(crate) fn take(&mut self, x: f64) {
         if !x.is_finite() {
             return;
@@ -57,13 +58,15 @@ impl<const MOST: usize> Clusters<MOST> {
         self.all[i].count += count;
     }
 
-    /// From the least to the greatest value between the outermost holes that are wider than all that lies between them, with
-    /// `most` of the values beyond at most; and how many those are. None where no value is beyond.
+    /// The least and the greatest value between the outermost holes that are wider than the whole range of values
+    /// between them, and the number of values beyond these holes, which is at most `most`. The answer is `None` where
+    /// no value lies beyond.
     pub(crate) fn span(&self, most: u64) -> Option<(f64, f64, u64)> {
         let all = &self.all;
         let (mut from, mut to) = (0, all.len().checked_sub(1)?);
         let (mut below, mut above) = (0, 0);
-        // one end after the other, until nothing changes; of several holes the innermost
+        // one end after the other, until nothing changes; where an end has several such holes, the innermost one
+        // counts
         loop {
             let before = (from, to);
             let mut seen = below;
@@ -120,7 +123,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn wild_is_what_all_values_at_once_say(
+        fn a_gross_error_is_what_all_values_at_once_say(
             usual in vec(-1.0..1.0f64, 20..500),
             gross in vec((-300.0..300.0f64, any::<bool>()), 0..40),
         ) {

@@ -1,18 +1,16 @@
-//! What a sample costs on a board: the figures that the firmware's gate measures.
+//! Cost of a sample on a board, as the firmware's gate measures it.
 
 use stretch_core::Degree;
 
 use crate::ModelKind;
 
-/// Measured by `firmware/gate.sh --write`, and held against the measurement by
-/// `firmware/gate.sh`.
+/// Figures that `firmware/gate.sh --write` measures and `firmware/gate.sh` checks against a new measurement.
 const BUDGET: &str = include_str!("budget.txt");
 
-/// Instructions a sample on a Cortex-M3, from volts in `f32`, without a
-/// floating-point unit; none for a model that was not measured.
+/// Instructions a sample on a Cortex-M3, from volts in `f32`, without a floating-point unit; `None` for a model that
+/// was not measured.
 ///
-/// Measured for the largest shape that a fit of the name may choose, one relaxation
-/// in an observer.
+/// The figure holds for the largest shape that a fit of that name may choose, with one relaxation in an observer.
 ///
 /// ```
 /// use stretch_calibrate::{ModelKind, m3_instructions, m3_instructions_fixed};
@@ -30,8 +28,8 @@ pub fn m3_instructions(model: ModelKind) -> Option<f64> {
     }
 }
 
-/// The same from a converter's codes in fixed point; none for a model without
-/// that form.
+/// Instructions a sample on a Cortex-M3, from a converter's codes in fixed point; `None` for a model without a
+/// fixed-point form.
 pub fn m3_instructions_fixed(model: ModelKind) -> Option<f64> {
     mean(&format!("{model}-fixed"))
 }

@@ -1,4 +1,4 @@
-//! The parameters of named defects: where a fit begins, how far it may go, and what map they make.
+//! The parameters of named defects: initial values and ranges of a fit, and the map that the parameters make.
 
 use stretch_core::{DiagnosedMap, FitSummary, Interval, Target as Polarity, Values};
 use stretch_effects::{
@@ -19,7 +19,8 @@ impl Moved {
         format!("{} {}", self.effect.name, self.parameter.name)
     }
 
-    /// The coordinate that a fit moves.
+    /// The coordinate of a value that a fit moves: its logarithm where the parameter spans decades, else the value
+    /// itself.
     fn coordinate(&self, value: f64) -> f64 {
         let value = value.clamp(self.parameter.min, self.parameter.max);
         if self.parameter.is_log() { value.ln() } else { value }
@@ -34,12 +35,13 @@ impl Moved {
         self.parameter.max - self.parameter.min
     }
 
-    /// The step of a difference.
+    /// The step of a difference quotient, in the coordinate.
     pub(crate) fn step(&self) -> f64 {
         if self.parameter.is_log() { 0.01 } else { 0.002 * self.range() }
     }
 
-    /// How far from where it begins it is likely to lie: a form by less than what it is a form of.
+    /// Likely distance of the coordinate from its initial value. The distance of a form parameter is smaller than
+    /// that of a size.
     fn likely(&self) -> f64 {
         match (self.parameter.is_log(), self.parameter.is_form()) {
             (true, true) => 0.3,
@@ -49,29 +51,29 @@ impl Moved {
         }
     }
 
-    /// Coordinates within the range.
+    /// The nearest coordinate within the parameter's range.
     pub(crate) fn held(&self, coordinate: f64) -> f64 {
         self.coordinate(self.value(coordinate))
     }
 
-    /// A standard error of the coordinate as one of the value.
+    /// Converts a standard error of the coordinate into a standard error of the value.
     pub(crate) fn error(&self, value: f64, of_coordinate: f64) -> f64 {
         if self.parameter.is_log() { value * of_coordinate } else { of_coordinate }
     }
 }
 
-/// What was named, with the coordinates of its parameters.
+/// The defects that a diagnosis named, with the coordinates of their parameters.
 #[derive(Debug, Clone)]
 pub(crate) struct Defects {
     named: Vec<(&'static Effect, Live)>,
-    /// Parameters of all of them, one behind the other.
+    /// Parameters of all defects, in the order of the defects.
     pub(crate) moved: Vec<Moved>,
     pub(crate) at: Vec<f64>,
     target: Target,
 }
 
 impl Defects {
-    /// Of what a diagnosis named.
+    /// The defects that a diagnosis named, at the values that it found.
     pub(crate) fn of(prepared: &Prepared) -> Result<Self, CalibrateError> {
         let causes = &prepared.options.causes;
         if causes.is_empty() {
@@ -115,18 +117,19 @@ impl Defects {
         Ok(())
     }
 
-    /// Whether something lets the resting signal drift.
+    /// Whether any of the defects lets the resting signal drift.
     pub(crate) fn drifts(&self) -> bool {
         self.named.iter().any(|(_, live)| live.drifts)
     }
 
-    /// The same elsewhere.
+    /// The same defects at other coordinates, each held to its range.
     pub(crate) fn moved_to(&self, at: Vec<f64>) -> Self {
         let at = self.moved.iter().zip(at).map(|(parameter, x)| parameter.held(x)).collect();
         Self { at, ..self.clone() }
     }
 
-    /// By parameter: distance from where the fit began and weight, in likely distances.
+    /// For each parameter, the distance from the initial coordinate and the weight of that distance: one over the
+    /// square of the likely distance.
     pub(crate) fn strayed(&self, from: &Self) -> Vec<(f64, f64)> {
         let all = self.moved.iter().zip(&self.at).zip(&from.at);
         all.map(|((parameter, x), from)| (x - from, parameter.likely().powi(-2))).collect()
@@ -141,7 +144,7 @@ impl Defects {
         })
     }
 
-    /// The defects as a map whose curve and filter are still open.
+    /// The map of the defects, whose curve and filter are not fitted yet.
     pub(crate) fn map(&self) -> DiagnosedMap {
         let open = Interval { min: 0.0, max: 1.0 };
         let mut map = DiagnosedMap {
@@ -157,8 +160,8 @@ impl Defects {
             ceiling: None,
             lowpass_s: None,
             skew_s: 0.0,
-            // A stream that begins at an end came there from the other.
-            wound: [-1.0, 1.0],
+            // A stream that begins at one end of the range came there from the other end.
+            initial_hysteresis: [-1.0, 1.0],
             curve: Values::EMPTY,
             drive_domain: open,
             noise: 1.0,
@@ -174,7 +177,7 @@ impl Defects {
         map
     }
 
-    /// Undoes in targets that were recorded every `period_s` what the reference itself did to them.
+    /// Removes the effects of the reference itself from targets that were recorded every `period_s`.
     pub(crate) fn undo(&self, period_s: f64, targets: &mut [f64]) {
         let Ok(grid) = Grid::samples(period_s) else { return };
         for (effect, _, values) in self.values().filter(|(.., values)| !values.is_empty()) {

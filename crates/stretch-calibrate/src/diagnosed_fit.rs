@@ -1,4 +1,4 @@
-//! Fits the forward model of what a diagnosis named, then the filter that inverts it.
+//! Fits the forward model of the effects that a diagnosis named, then the filter that inverts this model.
 
 use stretch_core::{
     Design, DiagnosedMap, Interval, Model, Provenance, RestTracker, Stage, Values, Volts,
@@ -17,19 +17,21 @@ use crate::{
 };
 
 const ITERATIONS: usize = 14;
-/// Least slope that an error in signal is divided by, of the mean one: where the curve is flat a target is not told.
+/// Least slope by which an error in signal is divided, as a share of the mean slope: where the curve is flat, the
+/// signal does not determine the target.
 const LEAST_SLOPE: f64 = 0.25;
-/// Rise of the likelihood's square below which a fit has ended, as a share.
+/// A fit ends when a step lowers the sum of squares by less than this share.
 const ENDED: f64 = 1e-4;
-/// Errors of the model are correlated over as long as this, s.
+/// Time over which errors of the model are taken to be correlated, s.
 const BLOCK_S: f64 = 2.0;
-/// Densities of the rate's wandering that are tried, in 1/s^3, and times in which a rate forgets itself, s.
+/// Spectral densities of the rate's random walk that are tried, in 1/s^3.
 const AGILITIES: [f64; 7] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 300.0];
+/// Correlation times of the rate that are tried, in seconds.
 const STEADY_S: [f64; 3] = [0.15, 0.5, 3.0];
-/// A further part of the model must lower the error to this share to be kept.
-const WORTH: f64 = 0.97;
+/// Acceptance criterion: a further part of the model is kept where it lowers the error below this share.
+const ACCEPTED: f64 = 0.97;
 
-/// What a fit was chosen to be; given again, it begins there.
+/// The choices of a fit. A fit that is given earlier choices begins with them.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct DiagnosedChoice {
     at: Vec<f64>,
@@ -39,7 +41,7 @@ pub(crate) struct DiagnosedChoice {
     steady_s: f64,
 }
 
-/// Fits what [`Options::causes`](crate::Options::causes) names; with `rest` the baseline is followed.
+/// Fits the effects of [`Options::causes`](crate::Options::causes); with `rest` the baseline is followed.
 pub(crate) fn diagnosed(
     prepared: &Prepared,
     rest: bool,
@@ -61,14 +63,14 @@ pub(crate) fn diagnosed(
             }
             None => refined(prepared, rest, &defects)?,
         };
-        if best.as_ref().is_none_or(|(_, b)| map.fit.rmse < WORTH * b.fit.rmse) {
+        if best.as_ref().is_none_or(|(_, b)| map.fit.rmse < ACCEPTED * b.fit.rmse) {
             best = Some((forward, map));
         }
     }
     let (forward, map) = best.ok_or(CalibrateError::NoTrials)?;
     let report = report(&forward, &map);
     let note = format!(
-        "diagnosed: {}; noise {:.4}, agility {} 1/s^3, a rate forgets itself in {} s",
+        "diagnosed: {}; noise {:.4}, agility {} 1/s^3, correlation time of the rate {} s",
         prepared.options.causes.iter().map(|c| c.effect.as_str()).collect::<Vec<_>>().join(", "),
         map.noise,
         map.agility,
@@ -81,7 +83,8 @@ pub(crate) fn diagnosed(
     Ok(((Model::Diagnosed(map), vec![report], vec![note]), choice))
 }
 
-/// Fitted to the signal, then for the error of the target, which the slope of the curve weighs otherwise; the one that errs less live.
+/// Fits the forward model to the signal first, then to the error of the target, which the slope of the curve weights
+/// differently. Of the two fits the one with the smaller live error is kept.
 fn refined(
     prepared: &Prepared,
     rest: Option<RestTracker>,
@@ -96,20 +99,20 @@ fn refined(
     Ok(if fine_map.fit.rmse < map.fit.rmse { (fine, fine_map) } else { (forward, map) })
 }
 
-/// What a fit determined.
+/// The numbers that a fit determined.
 struct Forward {
     errors_in: ErrorsIn,
     defects: Defects,
     rest: Option<RestTracker>,
-    /// Signed, rising.
+    /// The curve in signed signal, rising.
     curve: Vec<f64>,
     domain: Interval,
     noise: f64,
     /// Standard errors of the coordinates.
     errors: Vec<f64>,
-    /// How plays stand where a trial begins.
-    wound: [f64; 2],
-    /// The way that the gauge has gone in the end.
+    /// Hysteresis state of the plays where a trial begins.
+    initial_hysteresis: [f64; 2],
+    /// Travel of the gauge at the end of the trials.
     travelled: f64,
 }
 
@@ -133,43 +136,43 @@ fn report(forward: &Forward, map: &DiagnosedMap) -> FitReport {
     FitReport::of_model(kind, &map.fit, sse, 1.0, coefficients, order)
 }
 
-/// What a fit makes small.
+/// The errors whose squares a fit minimises.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum ErrorsIn {
-    /// What the model leaves of the signal.
+    /// Errors of the signal.
     Signal,
-    /// What that would be of the target, by the curve's slope.
+    /// Errors of the target: errors of the signal divided by the curve's slope.
     Target,
 }
 
-/// The trials as a forward fit sees them.
+/// The trials, prepared for a forward fit.
 struct Record<'a> {
     prepared: &'a Prepared,
     rest: Option<RestTracker>,
     errors_in: ErrorsIn,
     pieces: Vec<Piece>,
-    /// From the least target to the greatest.
+    /// The range of the targets, without outliers.
     targets: Option<Interval>,
     period_s: f64,
     least_step: f64,
 }
 
-/// A forward model at some values: what it leaves.
+/// A forward model at given parameter values, and its residuals.
 struct Seen {
     curve: Vec<f64>,
     domain: Interval,
     residuals: Vec<f64>,
     square: f64,
-    /// The same in signal, whatever errors are counted in.
+    /// Sum of squared errors of the signal, whichever errors `square` counts.
     volts: f64,
-    wound: [f64; 2],
+    initial_hysteresis: [f64; 2],
     travelled: f64,
 }
 
-/// Every drive with its signal, and where the defects stood.
+/// Every drive with its signal, and the state of the defects.
 struct Simulated {
     pairs: Vec<(f64, f64)>,
-    wound: [f64; 2],
+    initial_hysteresis: [f64; 2],
     travelled: f64,
 }
 
@@ -187,13 +190,13 @@ impl<'a> Record<'a> {
         Ok(Self { prepared, rest, errors_in, pieces, targets, period_s, least_step })
     }
 
-    /// Pairs of drive and signal, the drive of so long before as the skew says.
+    /// Pairs of drive and signal; the drive is that of `skew_s` earlier.
     fn pairs(&self, defects: &Defects) -> Simulated {
         let map = defects.map();
         let live = LiveDefects::<f64>::new(&map, self.period_s);
         let late = map.skew_s / self.period_s;
         let mut memory = None;
-        let (mut pairs, mut windings) = (Vec::new(), Vec::new());
+        let (mut pairs, mut states) = (Vec::new(), Vec::new());
         for piece in &self.pieces {
             let mut targets = piece.smooth.clone();
             defects.undo(self.period_s, &mut targets);
@@ -202,8 +205,8 @@ impl<'a> Record<'a> {
                 None => live.begin(targets[0], pressure(0)),
                 Some(before) => {
                     let now = live.carry(before, targets[0], pressure(0));
-                    let stands = live.winding(&now, targets[0], pressure(0));
-                    windings.extend(stands.map(|share| (targets[0], share)));
+                    let stands = live.hysteresis_state(&now, targets[0], pressure(0));
+                    states.extend(stands.map(|share| (targets[0], share)));
                     now
                 }
             };
@@ -212,7 +215,7 @@ impl<'a> Record<'a> {
                 each.map(|(i, &y)| live.advance(&mut now, y, pressure(i))).collect();
             memory = Some(now);
             for (i, &signal) in piece.signal.iter().enumerate().skip(SETTLE) {
-                // Behind an end it is held: so every value of the skew leaves as many pairs.
+                // Beyond an end the drive is held, so that every value of the skew gives the same number of pairs.
                 let place = (i as f64 - late).clamp(0.0, (drives.len() - 1) as f64);
                 let below = (place as usize).min(drives.len() - 2);
                 let share = place - below as f64;
@@ -220,19 +223,19 @@ impl<'a> Record<'a> {
                 pairs.push((drive, signal));
             }
         }
-        // A stream begins as trials do that others went before.
+        // A stream begins in the state of trials that follow other trials.
         let mean = |is_upper: bool, otherwise: f64| {
-            let own = windings.iter().filter(|(y, _)| (*y > 0.5) == is_upper);
+            let own = states.iter().filter(|(y, _)| (*y > 0.5) == is_upper);
             let (n, sum) = own.fold((0.0, 0.0), |(n, sum), (_, share)| (n + 1.0, sum + share));
             if n > 0.0 { sum / n } else { otherwise }
         };
-        let wound = [mean(false, -1.0), mean(true, 1.0)];
-        Simulated { pairs, wound, travelled: memory.map_or(0.0, |m| m.travelled()) }
+        let initial_hysteresis = [mean(false, -1.0), mean(true, 1.0)];
+        Simulated { pairs, initial_hysteresis, travelled: memory.map_or(0.0, |m| m.travelled()) }
     }
 
-    /// The curve that leaves least, and what it leaves.
+    /// The curve with the least residuals, and these residuals.
     fn look(&self, defects: &Defects) -> Option<Seen> {
-        let Simulated { pairs, wound, travelled } = self.pairs(defects);
+        let Simulated { pairs, initial_hysteresis, travelled } = self.pairs(defects);
         if pairs.len() <= KNOTS + defects.at.len() {
             return None;
         }
@@ -258,13 +261,13 @@ impl<'a> Record<'a> {
         };
         let residuals: Vec<f64> = pairs.iter().map(left).collect();
         let square = residuals.iter().map(|r| r * r).sum::<f64>();
-        Some(Seen { curve, domain, residuals, square, volts, wound, travelled })
+        Some(Seen { curve, domain, residuals, square, volts, initial_hysteresis, travelled })
     }
 
-    /// Levenberg and Marquardt over the numbers of the defects, the curve solved for at each.
+    /// Levenberg-Marquardt over the parameters of the defects; the curve is solved for at each step.
     fn fit(&self, begin: Defects) -> Result<Forward, CalibrateError> {
         let undetermined = || CalibrateError::Undetermined { model: Memory::Diagnosed.to_string() };
-        // a block counts as one observation, so does where the diagnosis saw it
+        // a block counts as one observation, and so does the value that the diagnosis found
         let block = (BLOCK_S / self.period_s).max(1.0);
         let strayed = |defects: &Defects| defects.strayed(&begin);
         let mut defects = begin.clone();
@@ -315,9 +318,9 @@ impl<'a> Record<'a> {
         let errors = self.errors(&normal, self.mean(&seen).sqrt());
         let noise = (seen.volts / seen.residuals.len() as f64).sqrt();
         let range = seen.curve[KNOTS - 1] - seen.curve[0];
-        // a curve that follows noiseless data exactly still needs a noise to weigh with
+        // a curve that follows noiseless data exactly still needs a positive noise for the weights
         let noise = noise.max(1e-6 * range);
-        let Seen { curve, domain, wound, travelled, .. } = seen;
+        let Seen { curve, domain, initial_hysteresis, travelled, .. } = seen;
         let errors_in = self.errors_in;
         Ok(Forward {
             errors_in,
@@ -327,7 +330,7 @@ impl<'a> Record<'a> {
             domain,
             noise,
             errors,
-            wound,
+            initial_hysteresis,
             travelled,
         })
     }
@@ -336,7 +339,7 @@ impl<'a> Record<'a> {
         seen.square / seen.residuals.len() as f64
     }
 
-    /// By how much each number moves what is left.
+    /// Derivatives of the residuals with respect to each parameter.
     fn sensitivities(&self, defects: &Defects, seen: &Seen) -> Vec<Vec<f64>> {
         use rayon::prelude::*;
         let one = |i: usize| {
@@ -357,7 +360,7 @@ impl<'a> Record<'a> {
         (0..defects.at.len()).into_par_iter().map(one).collect()
     }
 
-    /// Standard errors, with one observation in a block.
+    /// Standard errors of the coordinates, where a block counts as one observation.
     fn errors(&self, normal: &nalgebra::DMatrix<f64>, noise: f64) -> Vec<f64> {
         let block = (BLOCK_S / self.period_s).max(1.0);
         if normal.is_empty() {
@@ -371,7 +374,7 @@ impl<'a> Record<'a> {
         }
     }
 
-    /// The filter that errs least, live.
+    /// The filter with the least live error.
     fn tuned(&self, forward: &Forward) -> Result<DiagnosedMap, CalibrateError> {
         use rayon::prelude::*;
         let grid = STEADY_S.iter().flat_map(|s| AGILITIES.iter().map(move |a| (*a, *s)));
@@ -382,7 +385,7 @@ impl<'a> Record<'a> {
         best.ok_or(CalibrateError::NoTrials)
     }
 
-    /// A map with the statistics of its estimates, run as it will run live.
+    /// The map with the statistics of its estimates, computed by the receptor that runs live.
     fn judged(
         &self,
         forward: &Forward,
@@ -427,7 +430,7 @@ impl<'a> Record<'a> {
         let curve: Vec<f64> = forward.curve.iter().map(|v| sign * v).collect();
         let estimate_domain = self.targets.unwrap_or(forward.domain);
         let map = forward.defects.map();
-        // the fitted curve knows where rest is, noise averaged out
+        // the fitted curve gives the signal at rest without noise
         let live = LiveDefects::<f64>::new(&map, self.period_s);
         let mut still = live.begin(estimate_domain.min, 0.0);
         let at_rest = live.advance(&mut still, estimate_domain.min, 0.0);
@@ -437,7 +440,7 @@ impl<'a> Record<'a> {
         let travelled = forward.travelled;
         Ok(DiagnosedMap {
             rest,
-            wound: forward.wound,
+            initial_hysteresis: forward.initial_hysteresis,
             worn: map.worn.map(|worn| stretch_core::Worn { travelled, ..worn }),
             curve: Values::new("curve", &curve)?,
             drive_domain: forward.domain,

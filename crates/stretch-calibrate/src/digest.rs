@@ -1,14 +1,14 @@
-//! The digest of a record in JSON: its last field, over every other byte that is no white space.
+//! The digest of a record in JSON: the record's last field, computed over every other byte that is no white space.
 
 use stretch_core::record::checksum;
 
 /// The white space of JSON, and no other.
 const SPACE: [char; 4] = [' ', '\n', '\r', '\t'];
 
-/// The digest of an object as text, as the field holds it: `crc32c 5a0e17c3`.
+/// The digest of an object as the text of the digest field: `crc32c 5a0e17c3`.
 ///
-/// White space outside of strings does not count, so that a record can be laid out anew; the order
-/// of the fields and the spelling of a number do.
+/// White space outside of strings does not count, so that a record can be reformatted. The order of the fields and
+/// the spelling of numbers count.
 pub(crate) fn digest(object: &str) -> String {
     let (mut in_string, mut escaped) = (false, false);
     let counts = |byte: &u8| {
@@ -24,7 +24,7 @@ pub(crate) fn digest(object: &str) -> String {
     format!("crc32c {:08x}", checksum(&bytes))
 }
 
-/// The object without its digest, and the digest where it is the last field.
+/// The object without its digest, and the digest where the last field is one.
 pub(crate) fn split(text: &str) -> (String, Option<&str>) {
     let cut = || {
         let text = trimmed(trimmed(text).strip_suffix('}')?);
@@ -38,7 +38,7 @@ pub(crate) fn split(text: &str) -> (String, Option<&str>) {
     }
 }
 
-/// The object, pretty, with its digest behind the last field.
+/// The object, indented, with its digest behind the last field.
 pub(crate) fn join(object: &str) -> Option<String> {
     let open = trimmed(trimmed(object).strip_suffix('}')?);
     Some(format!("{open},\n  \"digest\": \"{}\"\n}}\n", digest(object)))

@@ -1,4 +1,4 @@
-//! Why there is no calibration.
+//! Reasons why there is no calibration.
 
 use stretch_core::DesignError;
 use stretch_filter::FilterError;
@@ -31,24 +31,24 @@ pub enum CalibrateError {
     SampleRates {
         /// The trial.
         trial: String,
-        /// Its rate.
+        /// Sample rate of that trial, Hz.
         rate_hz: f64,
         /// The first trial.
         first: String,
-        /// Its rate.
+        /// Sample rate of that trial, Hz.
         first_hz: f64,
     },
-    /// A channel that never changes.
+    /// A channel never changes.
     #[error(
         "{column} is {value} throughout: a constant has no range to normalise by; check the wiring, or name another column"
     )]
     Constant {
         /// The column.
         column: String,
-        /// Its value.
+        /// The constant value.
         value: f64,
     },
-    /// A direction that the trials do not contain.
+    /// The trials do not contain one of the directions.
     #[error(
         "the {branch} branch has {samples} samples and the model has {terms} terms; add trials in which the muscle moves that way, or fit --model linear"
     )]
@@ -60,16 +60,16 @@ pub enum CalibrateError {
         /// How many terms the model has.
         terms: usize,
     },
-    /// A fit that the data do not determine.
+    /// The data do not determine a fit.
     #[error("{branch}: {cause}")]
     Fit {
         /// Which fit.
         branch: &'static str,
-        /// What the fit said.
+        /// The error of the fit.
         #[source]
         cause: FitError,
     },
-    /// A model whose numbers the trials do not determine.
+    /// The trials do not determine the numbers of a model.
     #[error(
         "the trials do not determine the {model} model: record trials that move up and down at several speeds, or fit --model linear"
     )]
@@ -77,20 +77,20 @@ pub enum CalibrateError {
         /// The model.
         model: String,
     },
-    /// A model of what was named, and nothing was.
+    /// The diagnosed model was asked for, but no effect was named.
     #[error(
         "no effect of the gauge or its reference was named: diagnose first (stretch diagnose) and give its answer with --from, or fit --model observer"
     )]
     NotDiagnosed,
-    /// A cause that acts elsewhere, or that nobody knows.
+    /// A cause acts elsewhere, or is unknown.
     #[error("{effect} is no effect of the gauge or its reference; a calibration can use {known}")]
     UnknownCause {
-        /// The name.
+        /// The name that was given.
         effect: String,
-        /// Those that there are.
+        /// The names that are known.
         known: String,
     },
-    /// A cause that needs a pressure, in trials without.
+    /// A cause needs a pressure, and a trial has none.
     #[error(
         "{effect} needs the pressure, and {trial} has no column {column}; record it, or leave the effect out"
     )]
@@ -102,13 +102,13 @@ pub enum CalibrateError {
         /// The column that was looked for.
         column: String,
     },
-    /// An estimator that cannot be designed.
+    /// An estimator cannot be designed.
     #[error("the rate estimator cannot be used: {0}")]
     Filter(#[from] FilterError),
-    /// A number that is not possible.
+    /// A number is outside its possible range.
     #[error("the calibration is not possible: {0}")]
     Design(#[from] DesignError),
-    /// A model that has no form in integers.
+    /// The model has no form in integers.
     #[error(
         "{model} has no form in integers for a board; those that have are linear, poly13, observer and observer+rest: name one with --model"
     )]
@@ -116,64 +116,64 @@ pub enum CalibrateError {
         /// The model.
         model: String,
     },
-    /// A rate that has no form in integers here.
+    /// The rate estimator has no form in integers in this program.
     #[error(
         "the rate is {rate}; in integers for a board it can be --rate savgol:WINDOW,DEGREE of degree 1 or 2, window {windows}, without delay"
     )]
     FixedRate {
         /// The estimator.
         rate: String,
-        /// The windows that there are.
+        /// The windows that are compiled in.
         windows: String,
     },
-    /// A converter that never sees the signal.
+    /// All of the signal lies outside the converter's range.
     #[error(
         "the signal ran from {min} to {max}, and the converter sees {zero_v} to {full_scale_v}; name the converter that the board has with --adc, in the signal's unit"
     )]
     OutsideConverter {
         /// The least signal of the trials.
         min: f64,
-        /// The greatest.
+        /// The greatest signal of the trials.
         max: f64,
         /// The signal at code 0.
         zero_v: f64,
         /// The signal at the last code.
         full_scale_v: f64,
     },
-    /// A calibration whose numbers integers over the converter cannot hold.
+    /// Integers over the converter cannot hold the calibration's numbers.
     #[error(
         "the calibration does not fit integers over this converter: {0}; name the converter that the board has with --adc"
     )]
     Fixed(#[source] DesignError),
-    /// A calibration file that does not load.
+    /// A calibration file does not load.
     #[error("{file}: {problem}")]
     Record {
         /// The file.
         file: String,
-        /// What is wrong with it, and where.
+        /// The fault of the file, and its place.
         problem: String,
     },
-    /// A log that cannot be held as a whole, for a model that needs that.
+    /// A log is too long to be held as a whole, and the model needs the whole log.
     #[error(
         "{model} is fitted to a whole log, of at most {most} rows; fit a line or a surface by least squares (--model poly13), or \
          give fewer rows (--grid HZ, a part of the log)"
     )]
     TooLong {
-        /// What was to be fitted.
+        /// The model that was to be fitted.
         model: String,
-        /// Most rows.
+        /// Most rows that are held as a whole.
         most: u64,
     },
-    /// A trial that does not hold together, or lacks a column.
+    /// A trial is inconsistent, or lacks a column.
     #[error(transparent)]
     Data(#[from] stretch_data::DataError),
-    /// A file that cannot be read or written.
+    /// A file cannot be read or written.
     #[error(transparent)]
     File(#[from] stretch_files::FileError),
     /// A log could not be read.
     #[error(transparent)]
     Log(Box<dyn std::error::Error + Send + Sync>),
-    /// Nothing to compare: every sample was withheld.
+    /// There is nothing to compare, because every sample was withheld.
     #[error(
         "{trial}: no sample has an estimate; it is shorter than the warm-up of the rate estimator"
     )]

@@ -1,4 +1,4 @@
-//! How good an estimate is, by the paper's measures.
+//! Errors of estimates, by the paper's measures.
 
 use serde::Serialize;
 use stretch_core::{Calibration, Polarity};
@@ -30,11 +30,11 @@ pub struct MethodErrors {
     pub clamped: u64,
     /// Root mean square error, in the unit of the reference.
     pub rmse: f64,
-    /// The same in percent of the reference's range.
+    /// Root mean square error in percent of the reference's range.
     pub rmse_percent: f64,
     /// The paper's average error: `100 mean|d_p - d_s|/range of d_s`.
     pub average_error_percent: f64,
-    /// The same over the range of the reference.
+    /// `100 mean|d_p - d_s|/range of the reference`.
     pub average_error_percent_of_reference: f64,
     /// `100 mean(d_p - d_s)/range of d_s`.
     pub signed_error_percent: f64,
@@ -46,8 +46,7 @@ pub struct MethodErrors {
     pub max: f64,
     /// Coefficient of determination.
     pub r_squared: f64,
-    /// Seconds by which the estimate runs behind the reference; none where a
-    /// trial does not determine it.
+    /// Seconds by which the estimate runs behind the reference; `None` where no trial determines the lag.
     pub lag_s: Option<f64>,
 }
 
@@ -64,22 +63,22 @@ pub struct Comparison {
     pub p_samples: Option<f64>,
     /// P on means of half-second blocks.
     pub p_blocks: Option<f64>,
-    /// How many blocks.
+    /// Number of blocks.
     pub blocks: u64,
     /// 95 % interval of the mean difference, on blocks.
     pub interval_95: Option<(f64, f64)>,
 }
 
-/// Errors a trial and pooled, and tests between the methods.
+/// Errors of each trial and pooled errors, and tests between the methods.
 #[derive(Debug, Clone, Serialize)]
 pub struct Evaluation {
-    /// Unit of the reference as it is written: `mm`, `N`.
+    /// Unit of the reference, as in `mm` or `N`.
     pub unit: String,
-    /// Errors by trial, the methods in one order.
+    /// Errors by trial; the order of the methods is the same in all trials.
     pub trials: Vec<TrialErrors>,
     /// Errors over all trials.
     pub pooled: Vec<MethodErrors>,
-    /// Raw against each calibration, and each calibration against the next.
+    /// Tests of `raw` against each calibration, and of each calibration against the next.
     pub comparisons: Vec<Comparison>,
 }
 
@@ -99,12 +98,12 @@ pub struct TrialErrors {
     /// Estimates of each method; NaN where withheld.
     #[serde(skip)]
     pub estimates: Vec<Vec<f64>>,
-    /// Rates of each method's estimate; NaN where there is none.
+    /// Rates of each method's estimate; NaN where a method has no rate.
     #[serde(skip)]
     pub rates: Vec<Vec<f64>>,
 }
 
-/// What one method says of one trial.
+/// The estimates of one method for one trial.
 struct Estimates {
     values: Vec<f64>,
     rates: Vec<f64>,
@@ -119,7 +118,7 @@ struct Estimates {
 ///
 /// # Errors
 /// [`CalibrateError::Data`] when a trial lacks signal or reference,
-/// [`CalibrateError::NothingEstimated`] for one shorter than the warm-up.
+/// [`CalibrateError::NothingEstimated`] for a trial shorter than the warm-up.
 pub fn evaluate(
     calibrations: &[(&str, &Calibration)],
     trials: &[Trial],
@@ -192,13 +191,13 @@ fn estimates(calibration: &Calibration, trial: &Trial) -> Result<Estimates, Cali
     Ok(Estimates { values: read(|r| r.estimate), rates: read(|r| r.rate), clamped })
 }
 
-/// Sums behind one [`MethodErrors`]; mergeable over trials.
+/// Sums behind one [`MethodErrors`], which can be merged over trials.
 #[derive(Debug, Clone)]
 struct Tally {
     agreement: Agreement<f64>,
     withheld: u64,
     clamped: u64,
-    /// Lag weighted by samples, and those samples.
+    /// Sum of the lags, each weighted by its samples, and the sum of these samples.
     lag: (f64, u64),
 }
 
@@ -218,7 +217,7 @@ impl Tally {
                 tally.agreement.push(truth, estimate);
             }
         }
-        // warm-up stands at the start: what follows it is one piece without a hole
+        // the warm-up stands at the start, and the estimates behind it are one piece without a hole
         let start = method.values.iter().position(|x| !x.is_nan()).unwrap_or(reference.len());
         let (truth, estimate) = (&reference[start..], &method.values[start..]);
         let most = ((MAX_LAG_S / period_s) as usize).min(truth.len() / 4);

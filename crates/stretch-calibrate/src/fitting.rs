@@ -1,4 +1,4 @@
-//! One fit and everything that is reported of it.
+//! One fit and its report.
 
 use serde::Serialize;
 use stretch_core::{Branch, Degree, FitSummary, MAX_TERMS, Model, Surface};
@@ -6,10 +6,10 @@ use stretch_fit::{Factor, Fit, FitError, Loss, OrderTable, SurfaceAccumulator, r
 
 use crate::{CalibrateError, Robust};
 
-/// A fitted model, what there is to say of each fit, and one sentence a remark.
+/// A fitted model, a report for each fit, and remarks of one sentence each.
 pub(crate) type Fitted = (Model, Vec<FitReport>, Vec<String>);
 
-/// A normalised sample, and the part of the data that it is left out with.
+/// A normalised sample, and the number of the fold that contains it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sample {
     pub fold: usize,
@@ -18,7 +18,7 @@ pub(crate) struct Sample {
     pub target: f64,
 }
 
-/// The surface of a model that has none.
+/// The placeholder for the surface of a model without a surface.
 fn no_surface() -> Surface {
     Surface::new(Degree::POLY13, &[0.0; 7]).expect("seven finite coefficients")
 }
@@ -26,12 +26,12 @@ fn no_surface() -> Surface {
 /// One fitted surface (or line) with its statistics, in normalised units.
 #[derive(Debug, Clone, Serialize)]
 pub struct FitReport {
-    /// `inflation`, `deflation` or `linear fit`.
+    /// Name of the fit: `inflation`, `deflation` or `linear fit`.
     pub name: String,
-    /// The branch; none for a line.
+    /// The branch; `None` for a line.
     #[serde(skip)]
     pub branch: Option<Branch>,
-    /// `poly13`; `linear`.
+    /// Name of the model, as `poly13` or `linear`.
     pub model: String,
     /// Samples in the fit.
     pub samples: u64,
@@ -39,12 +39,12 @@ pub struct FitReport {
     pub sse: f64,
     /// Coefficient of determination.
     pub r_squared: f64,
-    /// The same with a price on terms.
+    /// Coefficient of determination, adjusted for the number of terms.
     pub adjusted_r_squared: f64,
     /// `sqrt(SSE/(n - p))`, in normalised target.
     pub rmse: f64,
-    /// Condition number of the design matrix, with the rows of a ridge where the
-    /// fit has one: of an observer that of curve, dynamics and time constants.
+    /// Condition number of the design matrix, with the rows of a ridge where the fit has one. The design matrix of an
+    /// observer holds curve, dynamics and time constants.
     pub condition: f64,
     /// Samples that a bisquare fit rejected altogether.
     pub rejected: Option<u64>,
@@ -52,7 +52,7 @@ pub struct FitReport {
     pub coefficients: Vec<Coefficient>,
     /// Neighbouring orders.
     pub orders: Vec<Order>,
-    /// The lowest order worth having.
+    /// The lowest order that satisfies the acceptance criterion of `stretch_fit::OrderTable`.
     pub recommended: Option<String>,
     /// Samples for a picture, `[rate, signal, target]`, at most a few thousand.
     #[serde(skip)]
@@ -65,7 +65,7 @@ pub struct FitReport {
 /// A coefficient and its 95 % bounds.
 #[derive(Debug, Clone, Serialize)]
 pub struct Coefficient {
-    /// MATLAB's name: `p12`.
+    /// Name of the coefficient in MATLAB's form: `p12`.
     pub name: String,
     /// Power of the rate.
     pub rate_power: u8,
@@ -82,9 +82,9 @@ pub struct Coefficient {
 /// One row of the order table.
 #[derive(Debug, Clone, Serialize)]
 pub struct Order {
-    /// `poly12`.
+    /// Name of the order, as `poly12`.
     pub model: String,
-    /// How many terms.
+    /// Number of terms.
     pub terms: usize,
     /// Coefficient of determination.
     pub r_squared: Option<f64>,
@@ -105,7 +105,7 @@ impl Coefficient {
 }
 
 impl FitReport {
-    /// Of a model that is no surface.
+    /// The report of a model that is no surface.
     pub(crate) fn of_model(
         name: String,
         fit: &FitSummary,
@@ -139,20 +139,20 @@ impl FitReport {
         FitSummary { samples: self.samples, r_squared: self.r_squared, rmse: self.rmse }
     }
 
-    /// A sentence when another order is worth having instead.
+    /// A sentence where cross-validation prefers another order.
     pub(crate) fn note(&self) -> Option<String> {
         let better = self.recommended.as_ref().filter(|r| **r != self.model)?;
         Some(format!(
-            "{}: {better} is the lowest order worth having by cross-validation (fitted: {})",
+            "{}: {better} is the order that cross-validation prefers (fitted: {})",
             self.name, self.model
         ))
     }
 }
 
-/// A triangle a fold.
+/// The triangular factor of each fold.
 pub(crate) type Factors = Vec<Factor<f64, MAX_TERMS>>;
 
-/// The degree that the order table around a surface asks for; of a line its own.
+/// The degree that the order table around a surface needs; for a line the degree of the line.
 pub(crate) fn widest(branch: Option<Branch>, degree: Degree) -> Degree {
     if branch.is_some() { OrderTable::<f64>::covering(degree) } else { degree }
 }
@@ -184,17 +184,17 @@ pub(crate) fn fit(
     };
     let step = samples.len().div_ceil(CLOUD).max(1);
     let cloud = samples.iter().step_by(step).map(|s| [s.rate, s.signal, s.target]).collect();
-    told(name, branch, degree, &folds, fitted, Seen { rejected, cloud })
+    report(name, branch, degree, &folds, fitted, Seen { rejected, cloud })
 }
 
-/// What is told of a fit beside its numbers.
+/// Parts of a report beside the numbers of the fit.
 pub(crate) struct Seen {
     pub rejected: Option<u64>,
     pub cloud: Vec<[f64; 3]>,
 }
 
-/// The report of a fit, whose folds hold the orders around it, too.
-pub(crate) fn told(
+/// The report of a fit; the `folds` hold the neighbouring orders, too.
+pub(crate) fn report(
     name: &'static str,
     branch: Option<Branch>,
     degree: Degree,
@@ -224,7 +224,7 @@ pub(crate) fn told(
         None => (Vec::new(), None),
     };
     let model = if branch.is_some() { degree.to_string() } else { "linear".to_owned() };
-    let report = FitReport {
+    let fit_report = FitReport {
         name: name.to_owned(),
         branch,
         model,
@@ -241,13 +241,13 @@ pub(crate) fn told(
         cloud,
         surface: fitted.surface(),
     };
-    Ok((report, fitted.surface()))
+    Ok((fit_report, fitted.surface()))
 }
 
-/// Points in a picture at most.
+/// Greatest number of points in a picture.
 pub(crate) const CLOUD: usize = 3000;
 
-/// One triangle a fold, of the widest degree that the order table asks for.
+/// The triangular factor of each fold, of the widest degree that the order table needs.
 fn factors(samples: &[Sample], degree: Degree) -> Result<Factors, FitError> {
     let folds = samples.iter().map(|s| s.fold).max().map_or(0, |last| last + 1);
     let mut factors = Vec::with_capacity(folds);

@@ -17,24 +17,24 @@ use crate::{CalibrateError, SpellingError};
 /// Room for the largest record, an observer's with every number at its longest.
 const BYTES: usize = 1024;
 
-/// What the step of a record computes with: for whoever writes it in another language.
+/// The numbers that the step of a record uses, for an implementation in another language.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(clippy::large_enum_variant)] // one lives at a time
 pub enum RecordNumbers {
-    /// Of a [`FixedCalibration`].
+    /// Numbers of a [`FixedCalibration`].
     Rated(FixedNumbers),
-    /// Of a [`FixedObserver`].
+    /// Numbers of a [`FixedObserver`].
     Observer(IntegerObserver),
 }
 
-/// A record for a board, and what reads it there.
+/// A record for a board, and the type that reads the record on the board.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FixedRecord {
-    /// The record in postcard under its seal: about 100 bytes, of an observer 450.
+    /// The record in postcard under its seal: about 100 bytes, or 450 for an observer.
     pub bytes: Vec<u8>,
-    /// The type in [`stretch_receptor::code`] that it is a record of.
+    /// The type in [`stretch_receptor::code`] whose record the bytes are.
     pub read_as: String,
-    /// The same numbers as the bytes.
+    /// The numbers that the bytes hold.
     pub numbers: RecordNumbers,
 }
 
@@ -89,7 +89,7 @@ pub fn fixed_record(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord,
     }
 }
 
-/// Rates are part of a type: those that this program was compiled for.
+/// Rates are part of a type; this program is compiled for these rates.
 macro_rules! windows {
     ($($window:literal)*) => {
         const WINDOWS: &[u16] = &[$($window),*];
@@ -139,12 +139,12 @@ fn made<T: Serialize>(
     numbers: RecordNumbers,
 ) -> Result<FixedRecord, CalibrateError> {
     let mut buffer = [0; BYTES];
-    // there is room for every number: this cannot fail
+    // the buffer has room for every number, so that this cannot fail
     let bytes = record::store(fixed, &mut buffer).map_err(CalibrateError::Fixed)?;
     Ok(FixedRecord { bytes: bytes.to_vec(), read_as, numbers })
 }
 
-/// A record of `stretch calibrate --fixed`, run as the board runs it: code for code, bit for bit.
+/// A record of `stretch calibrate --fixed` that runs here with the same bits as on the board.
 ///
 /// ```
 /// use stretch_calibrate::{BoardReceptor, fixed_record, parse_adc};
@@ -165,8 +165,8 @@ pub struct BoardReceptor {
 }
 
 impl BoardReceptor {
-    /// The receptor of a record; none where the bytes are no such record, or of a rate that
-    /// [`fixed_record`] does not write.
+    /// The receptor of a record; `None` where the bytes are no such record, or hold a rate that [`fixed_record`] does
+    /// not write.
     pub fn new(bytes: &[u8]) -> Option<Self> {
         rated_receptor(bytes).or_else(|| {
             let observer: FixedObserver = record::load(bytes).ok()?;
@@ -175,7 +175,7 @@ impl BoardReceptor {
         })
     }
 
-    /// The same from a file; none where it cannot be read.
+    /// The receptor of a record in a file; `None` where the file cannot be read or holds no such record.
     pub fn read(path: &Path) -> Option<Self> {
         Self::new(&std::fs::read(path).ok()?)
     }
@@ -207,7 +207,7 @@ fn surface_receptor<const WINDOW: usize, const DEGREE: usize>(
     Some(BoardReceptor { adc_bits: fixed.adc_bits(), running })
 }
 
-/// Any receptor over codes, its type forgotten.
+/// Any receptor over codes, as a trait object.
 trait Running: fmt::Debug {
     fn step(&mut self, code: AdcCode) -> Result<CodeReading<i32>, Withheld>;
     fn reset(&mut self);
@@ -229,7 +229,7 @@ where
 const CONVERTER: &str = "BITS,ZERO_V,FULL_SCALE_V such as 12,0,3.3: 1 to 16 bits, the signal at \
                          code 0, and a larger one at the last code";
 
-/// A converter from its spelling: bits, the signal at code 0 and at the last code.
+/// A converter from its spelling: its bits, the signal at code 0 and the signal at the last code.
 ///
 /// # Errors
 /// [`SpellingError`] with the spelling that is understood.

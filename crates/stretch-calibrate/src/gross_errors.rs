@@ -1,21 +1,21 @@
-//! Values that no motion can have taken: what a logger writes where it got none.
+//! Gross errors: values that no motion can have taken, such as the placeholder of a logger for a missing value.
 
 use stretch_core::Interval;
 use stretch_data::{Channel, Trial};
 
 use crate::series::extent;
 
-/// At most this share of the rows is called a gross error: beyond it, two levels that a channel really has
-/// (a muscle held at two lengths) could be taken for values and their outliers. A tenth is what a
-/// location estimate of the simplest kind, the decile mean, still survives.
+/// Greatest share of the rows that can be gross errors. With a larger share, two levels that a channel really has (a
+/// muscle held at two lengths) could be taken for values and their outliers. The simplest robust location estimate,
+/// the decile mean, still tolerates a tenth.
 pub(crate) const MOST_SHARE: f64 = 0.1;
 
 /// The trials without the rows in which one of `columns` has a gross error, and a sentence for each column
 /// that had such values.
 ///
-/// A channel that was sampled while it moved leaves no hole in its values. Gross errors are those beyond a
-/// hole that is wider than all that the other values span, a tenth of the rows at most: `-999`
-/// among lengths, a spike to the supply. What lies inside the span is the robust fit's part.
+/// A channel that was sampled while it moved leaves no hole in its values. Gross errors are values beyond a hole that
+/// is wider than the whole range of the other values, in at most a tenth of the rows: `-999` among lengths, or a
+/// spike to the supply. Outliers inside that range are left to the robust fit.
 ///
 /// ```
 /// use stretch_calibrate::without_gross_errors;
@@ -25,12 +25,12 @@ pub(crate) const MOST_SHARE: f64 = 0.1;
 /// let length = Channel { name: "length_mm".into(), values: values.collect() };
 /// let time_s = (0..100).map(|n| 0.01 * f64::from(n)).collect();
 /// let trial = Trial { name: "ramp.csv".into(), time_s, channels: vec![length] };
-/// let (kept, told) = without_gross_errors(&[trial], &["length_mm"]);
+/// let (kept, sentences) = without_gross_errors(&[trial], &["length_mm"]);
 /// assert_eq!(kept[0].len(), 99);
-/// assert!(told[0].contains("1 of 100 values of length_mm are gross errors (-999"), "{}", told[0]);
+/// assert!(sentences[0].contains("1 of 100 values of length_mm are gross errors (-999"), "{}", sentences[0]);
 /// ```
 pub fn without_gross_errors(trials: &[Trial], columns: &[&str]) -> (Vec<Trial>, Vec<String>) {
-    let mut told = Vec::new();
+    let mut sentences = Vec::new();
     let mut kept: Vec<Trial> = trials.to_vec();
     for column in columns {
         let values: Vec<f64> =
@@ -40,9 +40,9 @@ pub fn without_gross_errors(trials: &[Trial], columns: &[&str]) -> (Vec<Trial>, 
         let gross: Vec<f64> = values.iter().copied().filter(|&x| is_gross(x)).collect();
         let Interval { min: least, max: most } = extent(gross.iter().copied());
         let counts = (gross.len() as u64, values.len() as u64);
-        told.push(sentence(column, counts, (least, most), (low, high)));
+        sentences.push(sentence(column, counts, (least, most), (low, high)));
         for trial in &mut kept {
-            // a ragged one stays as it is: whoever fits it refuses it
+            // a trial with columns of unequal length stays as it is, because the fit refuses it
             let own = trial.channel(column).filter(|_| trial.check_lengths().is_ok());
             let Some(own) = own else { continue };
             let stays: Vec<bool> = own.iter().map(|&x| !is_gross(x)).collect();
@@ -50,10 +50,10 @@ pub fn without_gross_errors(trials: &[Trial], columns: &[&str]) -> (Vec<Trial>, 
         }
     }
     kept.retain(|trial| !trial.is_empty());
-    (kept, told)
+    (kept, sentences)
 }
 
-/// What to say of the gross errors of a column, so many of so many, from their least to their greatest.
+/// A sentence on the gross errors of a column: their number, that of all values, and their least and greatest value.
 pub(crate) fn sentence(
     column: &str,
     (gross, of): (u64, u64),
@@ -67,13 +67,13 @@ pub(crate) fn sentence(
     )
 }
 
-/// From the least to the greatest value that is no gross error; none where no value is.
+/// The least and the greatest value that is no gross error; `None` where no value is a gross error.
 pub(crate) fn span(values: &[f64]) -> Option<(f64, f64)> {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
     let most = (MOST_SHARE * sorted.len() as f64) as usize;
     let (mut from, mut to) = (0, sorted.len().checked_sub(1)?);
-    // the widest holes lie furthest out: one end after the other, until nothing changes
+    // the widest holes lie furthest out, so that the ends are cut one after the other until nothing changes
     loop {
         let before = (from, to);
         let left = most - (from + sorted.len() - 1 - to).min(most);
@@ -94,7 +94,7 @@ pub(crate) fn span(values: &[f64]) -> Option<(f64, f64)> {
         }
     }
     let (low, high) = (sorted[from], sorted[to]);
-    // a channel that stands still but for a few values is no range to err beyond
+    // a channel that is constant but for a few values has no range to compare with
     (low < high && (from > 0 || to + 1 < sorted.len())).then_some((low, high))
 }
 
@@ -116,7 +116,7 @@ mod tests {
     use super::span;
 
     #[test]
-    fn wild_is_what_lies_beyond_a_hole_wider_than_the_rest() {
+    fn a_gross_error_is_what_lies_beyond_a_hole_wider_than_the_rest() {
         let usual: Vec<f64> =
             (0..1000).map(|n| 165.0 + 14.0 * (0.1 * f64::from(n)).cos()).collect();
         assert_eq!(span(&usual), None);
@@ -130,9 +130,9 @@ mod tests {
                 "{gross:?} {found:?}"
             );
         }
-        // beside the range, and not beyond a hole
+        // these values lie beside the range, but not beyond a hole
         assert_eq!(with(&[200.0, 140.0]), None);
-        // two levels that a muscle is held at are none
+        // two levels at which a muscle is held are no gross errors
         let held: Vec<f64> =
             (0..100).map(|n| if n < 85 { 150.0 } else { 170.0 } + f64::from(n % 5)).collect();
         assert_eq!(span(&held), None);

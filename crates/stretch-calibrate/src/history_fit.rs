@@ -1,10 +1,11 @@
-//! Fits a polynomial of the signal's history: one least-squares problem, its
-//! time constants, radii and ridge chosen on data left out.
+//! Fits a polynomial of the signal's history, as one least-squares problem whose time constants, radii and ridge are
+//! chosen on data left out.
 
 use stretch_core::{
     FitSummary, HistoryMap, HistoryShape, Interval, MAX_HISTORY_TERMS, Model, RestTracker, Values,
     lag, lag_share, play,
 };
+use stretch_data::listed;
 
 use crate::{
     CalibrateError, Coefficient, FitReport, Memory, Order,
@@ -14,15 +15,15 @@ use crate::{
     rest::rested,
 };
 
-/// Samples at the start of a piece while low-passes forget where they began.
+/// Samples at the start of a piece that are not fitted, while the low-passes forget their initial values.
 const SETTLE: usize = 10;
-/// Blocks that errors may be correlated within, in seconds.
+/// Length of the blocks within which errors may be correlated, in seconds.
 const BLOCK_S: f64 = 0.5;
 /// Ridges that are tried, as shares of a term's own power.
 const RIDGES: [f64; 3] = [1e-6, 1e-4, 1e-2];
 const RADII: [f64; 3] = [0.03, 0.1, 0.3];
 
-/// One choice of states and products.
+/// A choice of states and products.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Design {
     relaxations_s: &'static [f64],
@@ -80,7 +81,7 @@ fn designs(kind: Memory) -> &'static [Design] {
     }
 }
 
-/// States of a whole piece, and the target.
+/// The states of a whole piece, and its target.
 struct Piece {
     fold: Vec<usize>,
     states: Vec<Vec<f64>>,
@@ -96,7 +97,7 @@ impl Design {
         }
     }
 
-    /// The states of every sample, as the receptor steps them.
+    /// The states of every sample, computed as in the receptor.
     fn states(&self, x: &[f64], period_s: f64) -> Vec<Vec<f64>> {
         let first = x.first().copied().unwrap_or(0.0);
         let mut slow = vec![first; self.relaxations_s.len()];
@@ -120,7 +121,7 @@ impl Design {
         x.iter().map(step).collect()
     }
 
-    /// What a state is called in a table.
+    /// Name of a state in a table.
     fn name(&self, state: usize) -> String {
         if state == 0 {
             return "x".into();
@@ -172,7 +173,7 @@ impl Rows {
     }
 }
 
-/// What a fit was chosen to be; given again, it is fitted without choosing.
+/// The choices of a fit. A fit that is given earlier choices makes no further ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct HistoryChoice {
     pub(crate) design: Design,
@@ -191,8 +192,7 @@ struct Trained {
     cross_validated: f64,
 }
 
-/// Fits `kind`; with `rest` the baseline is followed. A `choice` made before
-/// on more data is kept.
+/// Fits `kind`; with `rest` the baseline is followed. An earlier `choice`, made on more data, is kept.
 pub(crate) fn history(
     prepared: &Prepared,
     kind: Memory,
@@ -253,14 +253,10 @@ pub(crate) fn history(
     Ok(((Model::History(map), vec![report], vec![note]), choice))
 }
 
-/// What a model remembers with, in words; nothing where it has none of the kind.
+/// The states of one kind in words; empty where the model has none of this kind.
 fn several(what: &str, values: &[f64], unit: &str) -> String {
-    let values: Vec<String> = values.iter().map(f64::to_string).collect();
-    match &values[..] {
-        [] => String::new(),
-        [one] => format!(", {what} {one} {unit}"),
-        [all @ .., last] => format!(", {what} {} and {last} {unit}", all.join(", ")),
-    }
+    let words: Vec<String> = values.iter().map(f64::to_string).collect();
+    if words.is_empty() { String::new() } else { format!(", {what} {} {unit}", listed(&words)) }
 }
 
 fn choose(prepared: &Prepared, kind: Memory, rest: bool) -> Result<Trained, CalibrateError> {
@@ -282,7 +278,7 @@ fn choose(prepared: &Prepared, kind: Memory, rest: bool) -> Result<Trained, Cali
     best.ok_or_else(none)
 }
 
-/// Keeps the better of two; a design that the data do not determine is passed over.
+/// Keeps the better of two fits; a design that the data do not determine is passed over.
 fn better(best: &mut Option<Trained>, found: Result<Trained, CalibrateError>) {
     if let Ok(found) = found
         && best.as_ref().is_none_or(|b| found.cross_validated < b.cross_validated)
@@ -352,7 +348,7 @@ fn train(
     Ok(Trained { choice, domain, estimate, pieces, rows, samples, whole, cross_validated })
 }
 
-/// One triangle a fold.
+/// The triangular factor of each fold.
 fn factors(pieces: &[Piece], rows: &Rows, terms: usize) -> Vec<LinearFactor> {
     let last = pieces.iter().flat_map(|p| p.fold.iter()).max().copied().unwrap_or(0);
     let mut folds = vec![RowAccumulator::new(terms); last + 1];
@@ -377,7 +373,7 @@ fn dof(samples: usize, terms: usize) -> f64 {
     (samples as f64 - terms as f64).max(1.0)
 }
 
-/// Root mean square error of each part predicted from the others.
+/// Root mean square error over all folds, each predicted from the others.
 fn held_out(
     pieces: &[Piece],
     rows: &Rows,

@@ -8,15 +8,16 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Rows that wait for a fold, a column: the triangle's own rows then cost a quarter.
+/// Rows for each column that are collected before they are folded; the triangle's own rows then make a quarter of the
+/// cost.
 const WAITING: usize = 4;
-/// Rows that wait at least.
+/// Least number of rows that are collected before they are folded.
 const LEAST_WAITING: usize = 64;
 
 /// Takes rows one by one and keeps only their triangle.
 #[derive(Debug, Clone)]
 pub(crate) struct RowAccumulator {
-    /// The triangle of `[X y]` so far, below it rows that wait, then zeros.
+    /// The triangle of `[X y]` so far; below it the rows that are not folded yet, then zeros.
     stack: DMatrix<f64>,
     filled: usize,
 }
@@ -36,7 +37,7 @@ impl RowAccumulator {
         self.advance();
     }
 
-    /// Adds a row whose terms are zero but for some.
+    /// Adds a row whose terms are zero except for `terms`.
     pub(crate) fn push_at(&mut self, terms: &[(usize, f64)], value: f64) {
         let last = self.stack.ncols() - 1;
         for &(column, x) in terms.iter().chain([&(last, value)]) {
@@ -90,7 +91,7 @@ impl LinearFactor {
         self.triangle.ncols() - 1
     }
 
-    /// The factor of the rows of both.
+    /// The factor of the rows of both factors.
     pub(crate) fn merged(&self, other: &Self) -> Self {
         let mut rows = RowAccumulator::new(self.terms());
         rows.absorb(self, |term| term);
@@ -104,8 +105,7 @@ impl LinearFactor {
     }
 
     /// Least squares with `penalty(k, |column k|^2) c_k^2` on each coefficient, as
-    /// rows of their own; none where a column adds nothing but rounding to those
-    /// before it.
+    /// rows of their own; `None` where a column adds nothing but rounding to the columns before it.
     pub(crate) fn solve(&self, penalty: impl Fn(usize, f64) -> f64) -> Option<Solution> {
         let terms = self.terms();
         let mut stack = self.triangle.clone().resize_vertically(2 * terms + 1, 0.0);
@@ -128,10 +128,10 @@ impl LinearFactor {
     }
 }
 
-/// All parts together, and for each part all the others.
+/// The factor of all parts, and for each part the factor of all others.
 pub(crate) fn leave_one_out(parts: &[LinearFactor]) -> Option<(LinearFactor, Vec<LinearFactor>)> {
     let (first, rest) = parts.split_first()?;
-    // `after[k]`: parts k + 1 and on, so that no part is ever taken away again
+    // `after[k]` holds the parts from k + 1 on, so that no part has to be subtracted
     let mut after: Vec<LinearFactor> = Vec::with_capacity(rest.len());
     for part in rest.iter().rev() {
         let more = after.last().map_or_else(|| part.clone(), |all| part.merged(all));
@@ -148,7 +148,7 @@ pub(crate) fn leave_one_out(parts: &[LinearFactor]) -> Option<(LinearFactor, Vec
     Some((before, others))
 }
 
-/// Coefficients, and the triangle they were found by.
+/// Coefficients, and the triangle from which they were solved.
 #[derive(Debug, Clone)]
 pub(crate) struct Solution {
     r: DMatrix<f64>,
@@ -198,8 +198,8 @@ mod tests {
 
     type Row = ([f64; TERMS], f64);
 
-    /// Rows of a known solution with an error of a tenth: were the values all error,
-    /// their rounding would be magnified against a solution near zero.
+    /// Rows of a known solution with an error of a tenth. With values that are all error, the solution would be near
+    /// zero and the relative rounding would be large.
     fn rows(count: std::ops::Range<usize>) -> impl Strategy<Value = Vec<Row>> {
         let row = (prop::array::uniform5(-1.0..1.0), -0.1..0.1f64).prop_map(|(row, error)| {
             (row, error + row.iter().zip(TRUTH).map(|(x, c)| x * c).sum::<f64>())
@@ -226,7 +226,7 @@ mod tests {
         r.solve_upper_triangular(&q.tr_mul(&y)).expect("no term follows from the others")
     }
 
-    /// How far two solutions lie apart, as a share of the length of the second.
+    /// Distance of two solutions, as a share of the norm of the second.
     fn apart(a: &[f64], b: &DVector<f64>) -> f64 {
         (DVector::from_column_slice(a) - b).norm() / b.norm()
     }
@@ -296,7 +296,7 @@ mod tests {
         }
         let solution = rows.factor().solve(|_, _| 0.0).unwrap();
         assert!(solution.condition() > 1e8, "{:e}", solution.condition());
-        // values themselves are rounded: what that costs grows with the condition
+        // the values themselves are rounded, and the effect of this rounding grows with the condition
         let rounding = f64::EPSILON * solution.condition();
         let off = apart(&solution.weights, &DVector::from_row_slice(&truth));
         assert!(off < rounding, "off by {off:e}, rounding {rounding:e}");

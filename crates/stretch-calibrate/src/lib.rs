@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod acceptance;
 mod apply;
 mod auto;
 mod auto_words;
@@ -35,8 +36,8 @@ mod rest;
 mod rising;
 mod series;
 mod split;
-mod worth;
 
+pub use acceptance::{explains_little, explains_nothing, not_its_own, worse_than_the_mean};
 pub use apply::{Applied, Faults, LiveReceptor, apply, pressure_column, rate_delay_s};
 pub use auto::{
     Judged, ModelChoice, ModelRow, candidate_models, choose_among, choose_model, judge_model,
@@ -60,4 +61,3 @@ pub use options::{Memory, ModelKind, Options, Robust, SpellingError, SplitBy, pa
 pub use own_ranges::on_own_ranges;
 pub use rated::{Rated, RatedPart, rated};
 pub use reach::Reach;
-pub use worth::{explains_little, explains_nothing, not_its_own, worse_than_the_mean};

@@ -1,4 +1,4 @@
-//! A calibration on logs that are longer than what may be held at once: pass by pass over blocks of rows.
+//! A calibration on logs that are too long to be held as a whole, pass by pass over blocks of rows.
 //!
 //! ```text
 //! pass 1   values in clusters                 -> what has a gross error
@@ -7,9 +7,9 @@
 //! pass 4   a triangle a branch and fold       -> the fit
 //! ```
 //!
-//! A block is taken for a part of a trial behind a gap: at its beginning the estimator of the rate warms up anew, which
-//! costs ten samples of hundreds of thousands. The noise is the median of the blocks' own. All else is what
-//! [`calibrate`](crate::calibrate) does with the whole log.
+//! A block is treated as the part of a trial behind a gap: at its beginning the estimator of the rate warms up again,
+//! which costs ten samples of hundreds of thousands. The noise is the median of the noises of the blocks. Everything
+//! else equals the result of [`calibrate`](crate::calibrate) for the whole log.
 
 use stretch_core::{Model, Provenance};
 
@@ -19,21 +19,23 @@ use crate::{
     passes::Passes,
 };
 
-/// Whether a calibration can be fitted block by block: a line or surfaces, by least squares, samples given to the branches one
-/// by one. Models that remember are searched on the whole log, robust weights need its residuals.
+/// Whether a calibration can be fitted block by block: lines and surfaces can, by least squares, with samples
+/// assigned to the branches one by one. Models that remember are searched on the whole log, and robust weights need
+/// the residuals of the whole log.
 pub fn is_plain(options: &Options) -> bool {
     !matches!(options.model, ModelKind::Remembering { .. })
         && options.robust == Robust::Off
         && options.split == SplitBy::Rate
 }
 
-/// Fits a calibration to trials that are read block by block, four times; `names` are those of the trials.
+/// Fits a calibration to trials that are read block by block, four times; `names` are the names of the trials.
 ///
-/// Memory is that of a block, however long the log is. Gross errors are looked for, as
-/// [`without_gross_errors`](crate::without_gross_errors) does, in signal and reference.
+/// The memory used is that of one block, however long the log is. Gross errors of signal and reference are removed as
+/// in [`without_gross_errors`](crate::without_gross_errors).
 ///
 /// # Errors
-/// As [`calibrate`](crate::calibrate), those of the log, and [`CalibrateError::TooLong`] where not [`is_plain`].
+/// The errors of [`calibrate`](crate::calibrate), those of the log, and [`CalibrateError::TooLong`] where the options
+/// are not [`is_plain`].
 ///
 /// ```
 /// use stretch_calibrate::{Options, calibrate, calibrate_long};
@@ -84,10 +86,10 @@ pub fn calibrate_long(
             }
             other => other,
         },
-        // refused above
+        // `is_plain` refused this model above
         ModelKind::Remembering { .. } => return Err(too_long()),
     };
-    let mut notes = gross.told;
+    let mut notes = gross.sentences;
     notes.extend(prepared.notes.iter().cloned());
     if !matches!(options.model, ModelKind::Linear) {
         notes.extend(fits.iter().filter_map(FitReport::note));

@@ -1,33 +1,33 @@
-//! How well the data determine an observer's dynamics.
+//! Standard errors of an observer's dynamics.
 
 use crate::{
     observer_curve::{CurveRows, KNOTS},
     observer_model::{Forward, Piece, SETTLE},
 };
 
-/// Errors of the model are correlated over as long as the slowest of its parts
-/// that matter, not over a few samples.
+/// Time over which errors of the model are taken to be correlated, s: that of the slowest relevant part of the model,
+/// not a few samples.
 const BLOCK_S: f64 = 2.0;
-/// A time constant is moved by this share to see what it does.
+/// Relative step of a time constant for the derivative of the drive.
 const NUDGE: f64 = 0.01;
-/// Keeps a parameter that nothing shows from being divided by: as a share of its
-/// column's power, far below what any data that determine it have.
+/// Ridge that avoids a division by zero for a parameter that no data determine, as a share of its column's power. The
+/// share is far below that of any data that determine the parameter.
 const RIDGE: f64 = 1e-9;
 
-/// How well a forward model is determined.
+/// Standard errors and condition of a forward model.
 pub(crate) struct Bounds {
     /// Standard errors of lead, amplitudes and weights of plays, then of the time
     /// constants; NaN where the data do not determine them.
     pub(crate) errors: Vec<f64>,
-    /// Condition of the rows that they come from.
+    /// Condition number of the rows behind the standard errors.
     pub(crate) condition: f64,
 }
 
 /// Bounds of a forward model on the pieces that it was fitted to.
 ///
-/// The sandwich over blocks of two seconds, of the curve, the dynamics and the time
-/// constants together: what the curve or a time constant could take up instead is
-/// not counted as known. The choice of the structure is.
+/// The bounds are sandwich estimates over blocks of two seconds, for the curve, the dynamics and the time constants
+/// together: an effect that the curve or a time constant could absorb is
+/// not counted as known. The choice of the structure is taken as known.
 pub(crate) fn bounds(pieces: &[Piece], forward: &Forward, period_s: f64) -> Bounds {
     let Forward { choice, curve, drive, dynamics, .. } = forward;
     let taus: Vec<f64> = choice.taus().collect();

@@ -9,10 +9,10 @@ pub(crate) const KNOTS: usize = 25;
 /// Weight of the curve's second differences against a sample's residual.
 const BEND: f64 = 1e-3;
 
-/// The least a curve rises over its whole length, as a share of the signal's range.
+/// Least rise of a curve over its whole length, as a share of the signal's range.
 pub(crate) const LEAST_RISE: f64 = 1e-3;
 
-/// From the least to the greatest, without the outermost two in ten thousand at either end; none where they are one.
+/// The range of the values without the outermost two in ten thousand at either end; `None` where the range is empty.
 pub(crate) fn inner(mut all: Vec<f64>) -> Option<Interval> {
     let edge = all.len() / 5000;
     let last = all.len().checked_sub(1 + edge)?;
@@ -38,20 +38,20 @@ impl Place {
         Self { below, share: at - below as f64 }
     }
 
-    /// The curve there.
+    /// Value of the curve at the place.
     pub(crate) fn on(self, curve: &[f64]) -> f64 {
         curve[self.below] + self.share * (curve[self.below + 1] - curve[self.below])
     }
 
-    /// The curve's slope there, per unit of drive.
+    /// Slope of the curve at the place, per unit of drive.
     pub(crate) fn slope(self, curve: &[f64], domain: Interval) -> f64 {
         let per_knot = (KNOTS - 1) as f64 / (domain.max - domain.min);
         (curve[self.below + 1] - curve[self.below]) * per_knot
     }
 }
 
-/// Rows over the knots and some terms more. A sample touches two knots, so those
-/// between the same two fold into a small triangle of their own first.
+/// Rows over the knots and further terms. A sample touches two knots, so that the samples between the same two knots
+/// fold into a small triangle of their own first.
 pub(crate) struct CurveRows {
     between: Vec<RowAccumulator>,
     samples: usize,
@@ -60,7 +60,7 @@ pub(crate) struct CurveRows {
 }
 
 impl CurveRows {
-    /// For `more` terms beside the knots.
+    /// Rows of the knots and `more` further terms, none yet.
     pub(crate) fn new(more: usize) -> Self {
         let between = vec![RowAccumulator::new(2 + more); KNOTS - 1];
         Self { between, samples: 0, more, row: Vec::new() }

@@ -1,5 +1,4 @@
-//! Fits a gauge's forward model: the signal from the target, then the filter
-//! that inverts it.
+//! Fits a gauge's forward model, which gives the signal from the target, then the filter that inverts this model.
 
 use stretch_core::{
     FitSummary, Interval, Model, ObserverMap, Provenance, RestTracker, Runner, Values, Volts,
@@ -20,15 +19,14 @@ use crate::{
 /// Ridge on the dynamic parameters, as a share of each one's own power.
 const RIDGE: f64 = 1e-4;
 const ITERATIONS: usize = 12;
-/// Densities of the rate's wandering that are tried, in 1/s^3.
+/// Spectral densities of the rate's random walk that are tried, in 1/s^3.
 const AGILITIES: [f64; 8] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 300.0, 3000.0];
-/// Time constants that a first search looks at, in seconds.
+/// Time constants of the first search, in seconds.
 const TAUS: [f64; 7] = [0.03, 0.08, 0.2, 0.4, 0.8, 1.6, 4.0];
-/// A further part of the model must lower the spread around it to this share to be kept.
-const WORTH: f64 = 0.97;
+/// Acceptance criterion: a further part of the model is kept where it lowers the error below this share.
+const ACCEPTED: f64 = 0.97;
 
-/// Fits an observer; with `rest` the baseline is followed. A `choice` made
-/// before on more data is kept.
+/// Fits an observer; with `rest` the baseline is followed. An earlier `choice`, made on more data, is kept.
 pub(crate) fn observer(
     prepared: &Prepared,
     rest: bool,
@@ -85,21 +83,21 @@ fn choose(prepared: &Prepared, rest: bool) -> Result<(Forward, ObserverMap), Cal
         let pieces = pieces(prepared, rest)?;
         let one = one_relaxation(prepared, &pieces, ObserverChoice { rest, ..bare })?;
         let two = second_relaxation(prepared, &pieces, one)?;
-        // the structure by how well it explains the signal, simplest first
+        // the structures are compared by the spread of the signal around them, simplest first
         let mut chosen: Option<(f64, ObserverChoice)> = None;
         for taus in [[None; 2], one.taus, two.taus] {
             for plays in [false, true] {
                 let choice = ObserverChoice { taus, plays, ..one };
                 let Ok(found) = forward(prepared, &pieces, choice) else { continue };
-                let worth = chosen.is_none_or(|(noise, _)| found.noise < WORTH * noise);
-                if worth && found.answers() {
+                let is_accepted = chosen.is_none_or(|(noise, _)| found.noise < ACCEPTED * noise);
+                if is_accepted && found.answers() {
                     chosen = Some((found.noise, choice));
                 }
             }
         }
         let Some((_, choice)) = chosen else { continue };
         let found = tuned(prepared, &pieces, choice)?;
-        if best.as_ref().is_none_or(|(_, map)| found.1.fit.rmse < WORTH * map.fit.rmse) {
+        if best.as_ref().is_none_or(|(_, map)| found.1.fit.rmse < ACCEPTED * map.fit.rmse) {
             best = Some(found);
         }
     }
@@ -136,7 +134,7 @@ fn second_relaxation(
     let first = one.taus[0];
     let mut best = (f64::INFINITY, one);
     for tau in TAUS {
-        // two of one kind cannot be told apart
+        // two time constants this close cannot be distinguished
         if first.is_some_and(|first| (tau / first).ln().abs() < 1.0) {
             continue;
         }
@@ -150,7 +148,7 @@ fn second_relaxation(
     Ok(best.1)
 }
 
-/// A forward model, and the agility with which its filter errs least.
+/// A forward model, and the map whose agility gives the least live error.
 fn tuned(
     prepared: &Prepared,
     pieces: &[Piece],
@@ -195,7 +193,7 @@ fn forward(
         curve = rising(&frozen.0, least_step);
         let (_, moved) =
             solve(&samples, &dynamics, drive, Some(&curve)).ok_or_else(undetermined)?;
-        // half steps first: the curve still takes up what belongs to the dynamics
+        // smaller steps first, because the curve still absorbs a part of the dynamics
         let share = if pass < 2 { 0.7 } else { 1.0 };
         let mut change: f64 = 0.0;
         for (d, m) in dynamics.iter_mut().zip(&moved) {
@@ -211,18 +209,18 @@ fn forward(
         curve = rising(&knots, least_step);
     }
     let noise = spread(&samples, &dynamics, drive, &curve);
-    // a curve that follows noiseless data exactly still needs a noise to weigh with
+    // a curve that follows noiseless data exactly still needs a positive noise for the weights
     let noise = noise.max(1e-6 * (range.max - range.min));
     Ok(Forward { choice, curve, drive, dynamics, noise })
 }
 
-/// The drives that occur, without the outermost five in ten thousand.
+/// The range of the drives, without outliers (see `inner`).
 fn drives(samples: &[Sample], dynamics: &[f64]) -> Result<Interval, CalibrateError> {
     inner(samples.iter().map(|s| s.drive(dynamics)).collect())
         .ok_or_else(|| CalibrateError::Undetermined { model: Memory::Observer.to_string() })
 }
 
-/// Knots alone, or knots and dynamics linearised about a curve.
+/// Solves for the knots alone, or for knots and dynamics linearised about a curve.
 fn solve(
     samples: &[Sample],
     dynamics: &[f64],
@@ -268,7 +266,7 @@ fn map(prepared: &Prepared, forward: &Forward) -> Result<ObserverMap, CalibrateE
     let targets = prepared.series.iter().flat_map(|s| s.target.iter());
     let estimate_domain =
         crate::series::extent(targets.map(|&t| prepared.target_range.normalise(t)));
-    // the fitted curve knows where rest is, noise averaged out
+    // the fitted curve gives the signal at rest without noise
     let level = Place::new(estimate_domain.min, forward.drive).on(&curve);
     let rest =
         forward.choice.rest.map(|rest| RestTracker { level, catch_up_s: LIVE_CATCH_UP_S, ..rest });
@@ -288,7 +286,7 @@ fn map(prepared: &Prepared, forward: &Forward) -> Result<ObserverMap, CalibrateE
     })
 }
 
-/// The same with the statistics of its estimates, run as it will run live.
+/// The map with the statistics of its estimates, computed by the receptor that runs live.
 fn judged(prepared: &Prepared, map: ObserverMap) -> Result<ObserverMap, CalibrateError> {
     let calibration = prepared.calibration(Model::Observer(map), Provenance::new("", []))?;
     let design = ObserverReceptor::<f64>::new(&calibration)?;

@@ -6,14 +6,14 @@ use stretch_filter::{SgFilter, SgShape};
 use crate::{CalibrateError, observer_curve::Place, prepared::Prepared, rest::rested};
 
 const RADII: [f64; 3] = [0.03, 0.1, 0.3];
-/// What engaged plays leave of the drive's slope at least.
+/// Least slope of the drive over the target while plays are engaged.
 const LEAST_ANSWER: f64 = 0.1;
 /// Window of the reference's smoothing, in samples; quadratic.
 const SMOOTH: usize = 7;
 /// Samples at the start of a piece while low-passes forget where they began.
 pub(crate) const SETTLE: usize = 10;
 
-/// What a fit was chosen to be; given again, it is fitted without choosing.
+/// The choices of a fit. A fit that is given earlier choices makes no further ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ObserverChoice {
     pub(crate) taus: [Option<f64>; 2],
@@ -31,7 +31,7 @@ impl ObserverChoice {
         if self.plays { &RADII } else { &[] }
     }
 
-    /// Lead, amplitudes and weights of the plays: how many.
+    /// Number of dynamic parameters: lead, amplitudes and weights of the plays.
     pub(crate) fn dynamics(&self) -> usize {
         1 + self.taus().count() + self.radii().len()
     }
@@ -41,22 +41,22 @@ impl ObserverChoice {
 pub(crate) struct Piece {
     pub(crate) signal: Vec<f64>,
     pub(crate) smooth: Vec<f64>,
-    /// Empty where none is needed.
+    /// Pressures; empty where no pressure is needed.
     pub(crate) pressure: Vec<f64>,
     rate: Vec<f64>,
 }
 
-/// A sample: what the signal was, and what the model makes it of.
+/// A sample: the signal, and the inputs of the model.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sample<'a> {
     pub(crate) target: f64,
-    /// What each dynamic parameter adds to the drive, by its own unit.
+    /// Contribution to the drive of a unit of each dynamic parameter.
     pub(crate) features: &'a [f64],
     pub(crate) signal: f64,
 }
 
 impl Sample<'_> {
-    /// What the dynamics add to the target.
+    /// The sum that the dynamics add to the target.
     pub(crate) fn added(&self, dynamics: &[f64]) -> f64 {
         self.features.iter().zip(dynamics).map(|(a, b)| a * b).sum()
     }
@@ -66,7 +66,7 @@ impl Sample<'_> {
     }
 }
 
-/// All pieces, even in time; those too short to smooth are left out.
+/// All pieces, even in time; pieces too short to smooth are left out.
 pub(crate) fn pieces(
     prepared: &Prepared,
     rest: Option<RestTracker>,
@@ -96,7 +96,7 @@ pub(crate) fn pieces(
 }
 
 impl Piece {
-    /// What each dynamic parameter adds to the drive, a sample.
+    /// Contribution to the drive of a unit of each dynamic parameter, for each sample.
     pub(crate) fn features(&self, choice: ObserverChoice, period_s: f64) -> Vec<Vec<f64>> {
         let first = self.smooth[0];
         let mut slow: Vec<(f64, f64)> =
@@ -117,7 +117,7 @@ impl Piece {
         self.smooth.iter().zip(&self.rate).map(step).collect()
     }
 
-    /// The samples, with features found before, once the low-passes have settled.
+    /// The samples after the low-passes have settled, with their `features`.
     pub(crate) fn samples<'a>(
         &'a self,
         features: &'a [Vec<f64>],
@@ -152,7 +152,7 @@ impl Forward {
         least > 0.0 && engaged
     }
 
-    /// Where a sample's drive stands on the curve.
+    /// The place of a sample's drive on the curve.
     pub(crate) fn place(&self, sample: &Sample) -> Place {
         Place::new(sample.drive(&self.dynamics), self.drive)
     }

@@ -1,11 +1,11 @@
-//! What a user chooses about a calibration, and how it is spelt.
+//! Choices of the user about a calibration, and their spellings.
 
 use std::{fmt, str::FromStr};
 
 use crate::cause::Cause;
 use stretch_core::{Degree, DesignError, Normalisation, RateEstimator, RateSource};
 
-/// Which model is fitted.
+/// The model that is fitted.
 ///
 /// ```
 /// use stretch_calibrate::ModelKind;
@@ -18,21 +18,20 @@ use stretch_core::{Degree, DesignError, Normalisation, RateEstimator, RateSource
 pub enum ModelKind {
     /// One straight line for both directions.
     Linear,
-    /// A polynomial surface a branch.
+    /// A polynomial surface for each branch.
     Surface(Degree),
-    /// The same, mixed across the dead band in place of a jump.
+    /// A polynomial surface for each branch, blended across the dead band in place of a jump.
     Blended(Degree),
-    /// A model that remembers what the signal did.
+    /// A model with a memory of the signal.
     Remembering {
-        /// What it remembers with.
+        /// The form of the memory.
         kind: Memory,
         /// Whether the resting baseline is followed as it drifts.
         rest: bool,
     },
 }
 
-/// What a model remembers with; every time constant, radius and weight is chosen
-/// on data left out of the fit.
+/// The form of a model's memory. Every time constant, radius and weight is chosen on data left out of the fit.
 ///
 /// ```
 /// use stretch_calibrate::{Memory, ModelKind};
@@ -46,18 +45,18 @@ pub enum Memory {
     Hysteresis,
     /// One or two relaxation states: the inverse of lag and lead, on a cubic.
     Relaxation,
-    /// Both.
+    /// Plays and relaxation states.
     Both,
-    /// Both, with all products of states.
+    /// Plays and relaxation states, with all products of states.
     History,
     /// The gauge's forward model, inverted by a Kalman filter.
     Observer,
-    /// The same, built from the effects that a diagnosis named: [`Options::causes`].
+    /// The gauge's forward model, built from the effects that a diagnosis named: [`Options::causes`].
     Diagnosed,
 }
 
 impl Memory {
-    /// All of them, simplest first.
+    /// All forms, simplest first.
     pub const ALL: [Self; 6] = [
         Self::Hysteresis,
         Self::Relaxation,
@@ -81,7 +80,7 @@ impl fmt::Display for Memory {
     }
 }
 
-/// How residuals are weighed.
+/// The weights of residuals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Robust {
     /// Least squares.
@@ -93,10 +92,10 @@ pub enum Robust {
     Lar,
 }
 
-/// How samples are given to the two branches.
+/// The assignment of samples to the two branches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SplitBy {
-    /// Sample by sample, by the sign of the rate with the dead band: as at use.
+    /// Sample by sample, by the sign of the rate outside the dead band, as in the live receptor.
     #[default]
     Rate,
     /// Trial by trial, by the net change of the target: the paper's six
@@ -104,7 +103,7 @@ pub enum SplitBy {
     Trial,
 }
 
-/// A spelling that is not understood, and those that are.
+/// A spelling that is not understood, and the spellings that are understood.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("\"{given}\" is not understood; use {use_instead}")]
 pub struct SpellingError {
@@ -113,15 +112,14 @@ pub struct SpellingError {
 }
 
 impl SpellingError {
-    /// What was given, and what is understood in its place.
+    /// An error with the given spelling and the spellings that are understood.
     pub fn new(given: &str, use_instead: &'static str) -> Self {
         Self { given: given.to_owned(), use_instead }
     }
 }
 
 impl ModelKind {
-    /// Every name that `--model` takes, simplest first; of the surfaces poly13, which
-    /// stands for all of them.
+    /// Every name that `--model` takes, simplest first; poly13 stands for all surfaces.
     ///
     /// ```
     /// use stretch_calibrate::ModelKind;
@@ -217,25 +215,25 @@ pub fn parse_rate(text: &str) -> Result<RateEstimator, SpellingError> {
     estimator.validate().map_err(|_: DesignError| unknown())
 }
 
-/// How a calibration is made. [`Options::default`] is the crate's own choice;
-/// [`Options::paper`] is the paper's.
+/// Options of a calibration. [`Options::default`] is the crate's own choice, [`Options::paper`] the method of the
+/// paper.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
     /// Column of the signal.
     pub signal: String,
     /// Column of the reference.
     pub reference: String,
-    /// What is fitted.
+    /// The model that is fitted.
     pub model: ModelKind,
-    /// How signal, target and rates are normalised.
+    /// The normalisation of signal, target and rates.
     pub normalisation: Normalisation,
-    /// The estimator of the signal's rate, at use.
+    /// The estimator of the signal's rate in the live receptor.
     pub rate: RateEstimator,
     /// The rate that the surfaces are fitted on.
     pub rate_source: RateSource,
-    /// How samples are given to the branches.
+    /// The assignment of samples to the branches.
     pub split: SplitBy,
-    /// How residuals are weighed.
+    /// The weights of residuals.
     pub robust: Robust,
     /// The signal's zero in [`Normalisation::Range`]; 1.24 V for `bridge_v`
     /// and 0 for any other column when not given.
@@ -247,11 +245,11 @@ pub struct Options {
     /// Dead band of the branch decision in signal units per second; three
     /// standard deviations of the rate's noise when not given.
     pub dead_band: Option<f64>,
-    /// Free text for the record: when it was made.
+    /// Date of the calibration, as free text for the record.
     pub date: String,
-    /// What a diagnosis named, for [`Memory::Diagnosed`].
+    /// The effects that a diagnosis named, for [`Memory::Diagnosed`].
     pub causes: Vec<Cause>,
-    /// Column of the pressure, where a cause needs it.
+    /// Column of the pressure, where a cause needs a pressure.
     pub pressure: String,
 }
 

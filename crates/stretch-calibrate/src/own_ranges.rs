@@ -1,4 +1,4 @@
-//! A trial normalised by its own ranges, as the paper did.
+//! A trial normalised by its own ranges, as in the paper.
 
 use stretch_core::{Calibration, Interval, Model, Range, RangeSpec};
 use stretch_data::Trial;
@@ -8,15 +8,15 @@ use crate::{
     series::{extent, rates_at_use},
 };
 
-/// The same calibration with the ranges of one trial: its signal and its rate are
-/// divided by their own total ranges, and nothing is clamped (paper section 2.5).
+/// The same calibration with the ranges of one trial: the trial's signal and rate are divided by their own total
+/// ranges, and nothing is clamped (paper section 2.5).
 ///
-/// For fidelity only: a range is known when the trial is over, so this cannot run
-/// live.
+/// This function exists for comparison with the paper. A trial's ranges are known only at its end, so that such a
+/// calibration cannot run live.
 ///
 /// # Errors
 /// [`CalibrateError::Data`] when the trial lacks the signal,
-/// [`CalibrateError::Constant`] when it never changes.
+/// [`CalibrateError::Constant`] when the signal never changes.
 ///
 /// ```
 /// use stretch_calibrate::on_own_ranges;
@@ -59,7 +59,7 @@ pub fn on_own_ranges(
                 branch.rate_domain = rate_extent;
             }
         }
-        // other models have no ranges of a trial's own
+        // other models have no ranges that a trial could replace
         _ => {}
     }
     spec.signal_range = signal_range;

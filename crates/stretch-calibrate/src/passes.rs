@@ -1,4 +1,4 @@
-//! The passes over a long log behind the first, which looks for gross errors.
+//! The passes over a long log after the first pass, which looks for gross errors.
 
 use stretch_core::{
     Branch, BranchSurface, Degree, Interval, LinearMap, MAX_TERMS, Model, Polarity, Range,
@@ -10,24 +10,24 @@ use stretch_fit::{FitError, SurfaceAccumulator};
 use crate::{
     CalibrateError, FitReport, Options,
     blocks::{GrossErrors, LONGEST, Log},
-    fitting::{CLOUD, Factors, Sample, Seen, merged, told, widest},
+    fitting::{CLOUD, Factors, Sample, Seen, merged, report, widest},
     prepared::{Evened, Prepared, dead_bands, pooled_range, target_below},
     series::{Series, extent, noise, sample_rate_hz, series},
     split::branches,
 };
 
-/// Sentences about single blocks; more are counted.
+/// Most notes about single blocks that are shown; further notes are only counted.
 const MOST_NOTES: usize = 12;
 
-/// Rows that a block has at least, but the first.
+/// Least number of rows of a block other than the first.
 const SHORTEST: usize = 100;
 
-/// Everything that a pass needs.
+/// The inputs of a pass.
 pub(crate) struct Passes<'a> {
     pub log: &'a Log<'a>,
     pub gross: &'a GrossErrors<'a>,
     pub options: &'a Options,
-    /// How many trials there are.
+    /// Number of trials.
     pub trials: usize,
 }
 
@@ -35,8 +35,9 @@ pub(crate) struct Passes<'a> {
 struct Extents {
     signal: Interval,
     reference: Interval,
-    /// Means, and the sum of the products of what differs from them.
+    /// Means of signal and reference.
     mean: [f64; 2],
+    /// Sum of the products of the deviations from the means.
     product: f64,
     samples: u64,
     noises: Vec<f64>,
@@ -64,15 +65,15 @@ impl Extents {
     }
 }
 
-/// What became of the rows, and what is said of it.
+/// Counts of the rows, and the notes about them.
 #[derive(Default)]
-struct Told {
+struct RowNotes {
     rows: Rows,
     first: Vec<String>,
     more: usize,
 }
 
-impl Told {
+impl RowNotes {
     fn take(&mut self, evened: Evened) {
         self.rows.add(evened.rows);
         for note in evened.notes {
@@ -98,12 +99,12 @@ const NOTHING: Interval = Interval { min: f64::INFINITY, max: f64::NEG_INFINITY 
 
 const BRANCHES: [&str; 2] = ["inflation", "deflation"];
 
-/// Which of them.
+/// Index of a branch in `BRANCHES`.
 fn place(branch: Branch) -> usize {
     usize::from(branch == Branch::Deflation)
 }
 
-/// What one branch's samples span, and how many there are.
+/// Ranges of one branch's samples, and the number of these samples.
 #[derive(Clone, Copy)]
 struct Span {
     signal: Interval,
@@ -122,7 +123,7 @@ struct Raw {
     target_rate: f64,
 }
 
-/// The triangles of a fit, and a few of its samples.
+/// The triangular factors of a fit's folds, and a few of its samples.
 struct Sums {
     folds: Vec<SurfaceAccumulator<f64, MAX_TERMS, 128>>,
     step: u64,
@@ -160,7 +161,7 @@ impl Passes<'_> {
     ) -> Result<(), CalibrateError> {
         (self.log)(&mut |index, block| {
             let block = self.gross.without(block);
-            // what is left at the end of a trial may be too short to tell its rate from
+            // the last block of a trial may be too short to determine its sample rate
             if block.len() < SHORTEST && first.is_some() {
                 let rows = Rows { read: block.len(), bridged: 0, dropped: block.len() };
                 return take(Evened { rows, ..Evened::default() });
@@ -175,20 +176,20 @@ impl Passes<'_> {
         })
     }
 
-    /// The second pass: ranges, polarity and dead bands, and how many samples there are.
+    /// The second pass: ranges, polarity and dead bands, and the number of samples.
     pub(crate) fn prepared(&self, names: &[String]) -> Result<(Prepared, u64), CalibrateError> {
         let options = self.options;
         let mut seen = Extents::new();
-        let mut told = Told::default();
+        let mut row_notes = RowNotes::default();
         let mut first = None;
         self.evened(&mut first, &mut |evened| {
             evened.pieces.iter().for_each(|(_, piece)| seen.take(piece));
-            told.take(evened);
+            row_notes.take(evened);
             Ok(())
         })?;
         let Some((first, sample_rate)) = first else { return Err(CalibrateError::NoTrials) };
         if seen.samples == 0 {
-            return Err(CalibrateError::TooShort { trial: first, samples: told.rows.read });
+            return Err(CalibrateError::TooShort { trial: first, samples: row_notes.rows.read });
         }
         let target = target_below(options, seen.reference.max)?;
         let [low, high] = [seen.reference.min, seen.reference.max]
@@ -213,14 +214,14 @@ impl Passes<'_> {
             signal_range,
             target_range,
             dead,
-            notes: told.notes(),
+            notes: row_notes.notes(),
             options,
             first: names.first().cloned().unwrap_or(first),
         };
         Ok((prepared, seen.samples))
     }
 
-    /// Every part of the log with its rates; the number of its first sample in the whole comes with it.
+    /// Calls `take` with every part of the log, its rates, and the index of its first sample in the whole log.
     fn series(
         &self,
         prepared: &Prepared,
@@ -240,7 +241,7 @@ impl Passes<'_> {
         })
     }
 
-    /// Every sample that belongs to a branch.
+    /// Calls `take` with every sample that belongs to a branch.
     fn raw(
         &self,
         prepared: &Prepared,
@@ -266,7 +267,7 @@ impl Passes<'_> {
         })
     }
 
-    /// How many parts of the data are left out in turn, and which a sample belongs to.
+    /// Number of parts of the data that are left out in turn.
     fn folds(&self) -> usize {
         if self.trials >= 3 { self.trials } else { 10 }
     }
@@ -275,7 +276,7 @@ impl Passes<'_> {
         if self.trials >= 3 { trial } else { (index * 10 / total.max(1)).min(9) as usize }
     }
 
-    /// The third pass of a line: a triangle a fold.
+    /// The third pass of a line: a triangular factor for each fold.
     pub(crate) fn line(
         &self,
         prepared: &Prepared,
@@ -309,7 +310,7 @@ impl Passes<'_> {
         Ok((Model::Linear(line), vec![report]))
     }
 
-    /// The third pass of surfaces: what each branch spans.
+    /// The third pass of surfaces: the ranges of each branch.
     fn spans(&self, prepared: &Prepared, degree: Degree) -> Result<[Span; 2], CalibrateError> {
         let none = Span { signal: NOTHING, signal_rate: NOTHING, target_rate: NOTHING, samples: 0 };
         let mut spans = [none; 2];
@@ -330,7 +331,8 @@ impl Passes<'_> {
         Ok(spans)
     }
 
-    /// The third and the fourth pass of surfaces: the rates' ranges by branch, then a triangle a branch and fold.
+    /// The third and the fourth pass of surfaces: the ranges of the rates by branch, then a triangular factor for
+    /// each branch and fold.
     pub(crate) fn surfaces(
         &self,
         prepared: &Prepared,
@@ -398,5 +400,5 @@ fn fitted(
     let failed = |cause| CalibrateError::Fit { branch: name, cause };
     let folds = sums.factors();
     let fit = merged(&folds).and_then(|whole| whole.fit_degree(degree)).map_err(failed)?;
-    told(name, branch, degree, &folds, fit, Seen { rejected: None, cloud: sums.cloud })
+    report(name, branch, degree, &folds, fit, Seen { rejected: None, cloud: sums.cloud })
 }

@@ -56,7 +56,7 @@ impl Prepared {
             range(&options.signal, options.zero(), &mut pairs.clone().map(|(v, _)| v))?;
         let target_range = range(&options.reference, 0.0, &mut pairs.map(|(_, t)| t));
         let target_range = target_range.map_err(|error| match (error, pieces.first()) {
-            // what stands in the file, not the contraction that it is
+            // the message gives the value in the file, not the contraction computed from it
             (CalibrateError::Constant { column, .. }, Some((_, [_, reference, _]))) => {
                 let value = reference.first().copied().unwrap_or_default();
                 CalibrateError::Constant { column, value }
@@ -112,15 +112,15 @@ impl Prepared {
         })?)
     }
 
-    /// Which part of the data is left out together in cross-validation: a trial
-    /// each, or a tenth of the samples when there are fewer than three trials.
+    /// Number of the fold of a sample in cross-validation: each trial is a fold, or each tenth of the samples when
+    /// there are fewer than three trials.
     pub(crate) fn fold(&self, series: &Series, index: usize, before: usize, total: usize) -> usize {
         let trials = self.series.iter().map(|s| s.trial).max().map_or(0, |last| last + 1);
         if trials >= 3 { series.trial } else { (before + index) * 10 / total.max(1) }
     }
 }
 
-/// The dead bands: three standard deviations of the rate's noise, where nobody says another.
+/// The dead bands: those of the options where given, else three standard deviations of the rate's noise.
 pub(crate) fn dead_bands(
     options: &Options,
     sample_rate: SampleRate,
@@ -135,7 +135,7 @@ pub(crate) fn dead_bands(
     Ok(DeadBands { signal, target: signal * target_range.span() / signal_range.span() })
 }
 
-/// Trials, or their parts between gaps, on the grid of the first, and what became of their rows.
+/// Trials, or their parts between gaps, on the grid of the first trial, with the counts of their rows.
 #[derive(Default)]
 pub(crate) struct Evened {
     pub pieces: Vec<Piece>,
@@ -144,7 +144,7 @@ pub(crate) struct Evened {
 }
 
 impl Evened {
-    /// Takes in a trial; `first` says whose grid it is brought to.
+    /// Takes in a trial; `first` names the trial whose grid is used.
     pub(crate) fn take(
         &mut self,
         index: usize,
@@ -158,7 +158,7 @@ impl Evened {
             return Err(CalibrateError::SampleRates { trial, rate_hz, first, first_hz });
         }
         let mut columns = vec![options.signal.as_str(), options.reference.as_str()];
-        // Only where it was recorded: a cause that needs it says so when it is missing.
+        // Only where the pressure was recorded: an error names the cause that lacks it.
         let has_pressure = options.needs_pressure() && trial.channel(&options.pressure).is_some();
         columns.extend(has_pressure.then_some(options.pressure.as_str()));
         let rate_hz = first_hz;
@@ -174,7 +174,7 @@ impl Evened {
     }
 }
 
-/// How well estimates of normalised targets were, summed sample by sample.
+/// Errors of estimates in normalised target, summed sample by sample.
 #[derive(Default)]
 pub(crate) struct Tally {
     squares: f64,
@@ -192,7 +192,7 @@ impl Tally {
         self.count += 1.0;
     }
 
-    /// How many were taken in.
+    /// Number of errors taken in.
     pub(crate) fn count(&self) -> f64 {
         self.count
     }
@@ -208,7 +208,7 @@ impl Tally {
     }
 }
 
-/// Standard deviation of an estimator's rate for white noise of one.
+/// Standard deviation of an estimator's rate for white noise of unit standard deviation.
 pub(crate) fn noise_gain(
     estimator: RateEstimator,
     rate: SampleRate,
@@ -219,7 +219,7 @@ pub(crate) fn noise_gain(
     }
 }
 
-/// Trial; signal, reference and, where it is needed, the pressure.
+/// Number of the trial; signal, reference and, where needed, the pressure.
 pub(crate) type Piece = (usize, [Vec<f64>; 3]);
 
 fn target(options: &Options, pieces: &[Piece]) -> Result<Target, CalibrateError> {
@@ -227,7 +227,7 @@ fn target(options: &Options, pieces: &[Piece]) -> Result<Target, CalibrateError>
     target_below(options, all.fold(f64::MIN, f64::max))
 }
 
-/// What is estimated of a reference whose greatest value is `longest`.
+/// The target of a reference whose greatest value is `longest`.
 pub(crate) fn target_below(options: &Options, longest: f64) -> Result<Target, CalibrateError> {
     let rest_length = match options.rest_length {
         Some(rest_length) => Some(rest_length),

@@ -1,4 +1,4 @@
-//! A trial with the rate of its signal: what depends on the order of samples, and nothing that is fitted.
+//! A trial with the rate of its signal, which depends on the order of samples but on no fit.
 
 use stretch_core::{RateEstimator, SampleRate};
 use stretch_data::{EvenPart, EvenSpec, Rows, Trial};
@@ -19,9 +19,9 @@ pub struct Rated {
     /// Three standard deviations of the rate's noise, in units of the signal a second: the dead band that
     /// [`calibrate`](crate::calibrate()) would take of this trial alone.
     pub dead_band: f64,
-    /// What became of the rows.
+    /// Counts of the rows.
     pub rows: Rows,
-    /// What had to be done, one sentence each.
+    /// Changes made to the data, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -30,18 +30,19 @@ pub struct Rated {
 pub struct RatedPart {
     /// The columns that were asked for, the signal first.
     pub even: EvenPart,
-    /// Rate of the signal in its unit a second, as it would be computed live; none while the estimator warms up.
+    /// Rate of the signal in its unit per second, computed as in the live receptor; `None` while the estimator warms
+    /// up.
     pub rate: Vec<Option<f64>>,
 }
 
-/// Brings a trial onto an even grid, its own where none is given, and computes the rate of its signal, as [`calibrate`](crate::calibrate()) does before
-/// it fits: whoever stores rates stores those that a receptor sees.
+/// Brings a trial onto an even grid (the trial's own where no grid is given) and computes the rate of its signal, as
+/// [`calibrate`](crate::calibrate()) does before a fit. The rates are those of the live receptor and can be stored.
 ///
-/// The rate has the sign of the signal's own change, whatever its polarity.
+/// The rate has the sign of the signal's own change, whatever the polarity.
 ///
 /// # Errors
-/// As [`calibrate`](crate::calibrate()): a column that is missing, too few samples, an estimator that cannot be designed; a rate
-/// that is off that of the grid by more than a twentieth.
+/// The errors of [`calibrate`](crate::calibrate()): a missing column, too few samples, an estimator that cannot be
+/// designed, or a sample rate that differs from that of the grid by more than a twentieth.
 ///
 /// ```
 /// use stretch_calibrate::rated;

@@ -1,11 +1,11 @@
-//! Whether a log's signal lies where a calibration was fitted, and whether it does in another unit.
+//! Whether a log's signal lies in the range of a calibration, as given or in another unit.
 
 use stretch_core::{Calibration, Range};
 use stretch_data::unit_of;
 
-/// Powers of ten that a signal is tried with: from nano to giga.
+/// Powers of ten by which a signal is multiplied for a trial: from nano to giga.
 const POWERS: std::ops::RangeInclusive<i32> = -9..=9;
-/// How many there are.
+/// Number of powers.
 const COUNT: usize = 19;
 
 /// Samples of a signal beside the range of a calibration.
@@ -26,18 +26,18 @@ pub struct Reach {
     range: Range<f64>,
     unit: String,
     samples: u64,
-    /// By power of ten: samples that lie inside once they are multiplied by it.
+    /// For each power of ten, the number of samples that lie inside after multiplication by that power.
     inside: [u64; COUNT],
 }
 
 impl Reach {
-    /// No sample yet.
+    /// The counts of a calibration, before the first sample.
     pub fn of(calibration: &Calibration) -> Self {
         let unit = unit_of(calibration.signal.as_str());
         Self { range: calibration.signal_range, unit, samples: 0, inside: [0; COUNT] }
     }
 
-    /// Takes a sample; one that is missing counts as none.
+    /// Takes a sample; a missing sample is not counted.
     pub fn take(&mut self, signal: f64) {
         if !signal.is_finite() {
             return;
@@ -48,8 +48,8 @@ impl Reach {
         }
     }
 
-    /// What to say of a log most of whose samples lie outside: the power of ten that brings most of them inside is weighed
-    /// against the unit as it is said to be.
+    /// A sentence for a log most of whose samples lie outside. The sentence names the unit in which most samples
+    /// would lie inside, where there is one.
     pub fn doubt(&self) -> Option<String> {
         let as_they_are = self.inside[COUNT / 2];
         let outside = self.samples - as_they_are;
@@ -59,7 +59,7 @@ impl Reach {
         let [low, high] = [self.range.min(), self.range.max()].map(four_digits);
         let (count, all) = (thousands(outside), thousands(self.samples));
         let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
-        let told = format!(
+        let sentence = format!(
             "{count} of {all} samples lie outside the range of the calibration, {low} to {high}{unit}, and were clamped to it"
         );
         let best = POWERS.zip(self.inside).max_by_key(|(power, inside)| (*inside, -power.abs()));
@@ -69,10 +69,13 @@ impl Reach {
                     .map_or("is the unit another".to_owned(), |unit| format!("are they in {unit}"));
                 let by = ten_to(power.abs());
                 let how = if power > 0 { "multiplied" } else { "divided" };
-                format!("{told}: {asked}? {how} by {by}, {} would lie inside", thousands(inside))
+                format!(
+                    "{sentence}: {asked}? {how} by {by}, {} would lie inside",
+                    thousands(inside)
+                )
             }
             None => format!(
-                "{told}: is this a log of that sensor, in that unit? If it is, calibrate on trials that reach as far"
+                "{sentence}: is this a log of that sensor, in that unit? If it is, calibrate on trials that reach as far"
             ),
         })
     }
@@ -102,14 +105,14 @@ fn in_other_unit(unit: &str, power: i32) -> Option<String> {
 /// `5,990`.
 fn thousands(count: u64) -> String {
     let digits = count.to_string();
-    let mut told = String::new();
+    let mut grouped = String::new();
     for (i, digit) in digits.chars().enumerate() {
         if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            told.push(',');
+            grouped.push(',');
         }
-        told.push(digit);
+        grouped.push(digit);
     }
-    told
+    grouped
 }
 
 /// Four significant digits, without zeros behind them.
@@ -127,7 +130,7 @@ mod tests {
 
     #[test]
     fn units_are_told_by_their_powers_of_ten() {
-        for (unit, power, told) in [
+        for (unit, power, expected) in [
             ("V", -3, Some("mV")),
             ("V", -6, Some("uV")),
             ("mV", 3, Some("V")),
@@ -137,14 +140,14 @@ mod tests {
             ("V", -2, None),
             ("counts", -3, None),
         ] {
-            assert_eq!(in_other_unit(unit, power).as_deref(), told, "{unit} {power}");
+            assert_eq!(in_other_unit(unit, power).as_deref(), expected, "{unit} {power}");
         }
         assert_eq!([7, 990, 5990, 1_234_567].map(thousands), ["7", "990", "5,990", "1,234,567"]);
         assert_eq!([2.10004, 1.5e-9, 0.0].map(four_digits), ["2.1", "1.5e-9", "0"]);
     }
 
     #[test]
-    fn a_log_inside_or_of_another_sensor_is_told_apart_from_one_in_another_unit() {
+    fn a_log_inside_or_of_another_sensor_differs_from_one_in_another_unit() {
         let calibration = stretch_receptor::example_calibration();
         let middle = 0.5 * (calibration.signal_range.min() + calibration.signal_range.max());
         let doubt = |values: [f64; 3]| {

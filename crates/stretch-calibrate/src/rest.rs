@@ -1,25 +1,25 @@
-//! The resting baseline over a log, and which ones are worth trying.
+//! The resting baseline over a log, and the candidates for its parameters.
 
 use stretch_core::{Design, Polarity, Range, RestLevel, RestTracker, SampleRate};
 
 use crate::{prepared::Prepared, series::noise};
 
-/// How fast a live baseline of a forward model gives way, in seconds: its level is exact, so at once.
+/// Time in which the live baseline of a forward model follows a signal below rest, s. The time is short because the
+/// level of a forward model is exact.
 pub(crate) const LIVE_CATCH_UP_S: f64 = 0.02;
-/// How fast a baseline gives way to a signal below rest, in seconds.
+/// Time in which a baseline follows a signal below rest, s.
 const CATCH_UP_S: f64 = 0.5;
 /// Leaks that are tried, as shares of the signal's range per second.
 const LEAKS: [f64; 4] = [0.0, 0.0003, 0.001, 0.003];
-/// Noise alone may carry the signal this many standard deviations below the level.
+/// Standard deviations of the noise by which a signal at rest may lie below the level.
 const MARGIN: f64 = 1.0;
 /// A trial that begins this low in the range begins at rest.
 const LOWEST_QUARTER: f64 = 0.25;
 /// Samples at a trial's start that may stand at rest.
 const FIRST: usize = 50;
 
-/// Baselines worth trying. The resting level is that of the first trial that
-/// begins in the lowest quarter of the range, less what noise alone may do: what
-/// later rests have below it is drift.
+/// Candidate baselines. The resting level is that of the first trial that begins in the lowest quarter of the range,
+/// less a margin for noise. Later rests below this level are drift.
 pub(crate) fn candidates(prepared: &Prepared) -> Vec<RestTracker> {
     let sign = prepared.polarity.sign();
     let starts: Vec<f64> = prepared
@@ -43,7 +43,7 @@ pub(crate) fn candidates(prepared: &Prepared) -> Vec<RestTracker> {
     LEAKS.map(tracker).into()
 }
 
-/// A log less its baseline, as the receptor steps it.
+/// A log minus its baseline, computed as in the receptor.
 pub(crate) fn rested(
     signal: &[f64],
     rest: Option<RestTracker>,

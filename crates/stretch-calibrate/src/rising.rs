@@ -1,7 +1,7 @@
-//! Curves made to rise.
+//! Isotonic regression: the nearest rising curve.
 
-/// The nearest curve that rises by at least `step` a knot: pools that violate
-/// it are averaged (Ayer et al. 1955, doi:10.1214/aoms/1177728423).
+/// The nearest curve that rises by at least `step` from knot to knot: neighbouring knots that violate this are
+/// averaged (Ayer et al. 1955, doi:10.1214/aoms/1177728423).
 pub(crate) fn rising(knots: &[f64], step: f64) -> Vec<f64> {
     let mut pools: Vec<(f64, usize)> = Vec::new();
     for (k, knot) in knots.iter().enumerate() {

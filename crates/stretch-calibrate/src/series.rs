@@ -1,4 +1,4 @@
-//! A trial made ready to fit: even in time, with the rates that a fit may use.
+//! A trial prepared for a fit: even in time, with the rates of signal and target.
 
 use stretch_core::{Design, Interval, Polarity, RateEstimator, SampleRate, Stage, Target};
 use stretch_data::Trial;
@@ -15,11 +15,11 @@ pub(crate) struct Series {
     pub trial: usize,
     pub signal: Vec<f64>,
     pub target: Vec<f64>,
-    /// Empty where none is needed.
+    /// Pressures; empty where no pressure is needed.
     pub pressure: Vec<f64>,
-    /// Of the signal, signed by polarity, by the estimator that runs at use.
+    /// Rate of the signal, signed by polarity, by the estimator of the live receptor.
     pub signal_rate: Vec<Option<f64>>,
-    /// Of the target, by central differences or the centred form of the estimator.
+    /// Rate of the target, by central differences or the centred form of the estimator.
     pub target_rate: Vec<f64>,
 }
 
@@ -27,7 +27,7 @@ pub(crate) struct Series {
 pub(crate) fn sample_rate_hz(trial: &Trial) -> Result<f64, CalibrateError> {
     let too_short = || CalibrateError::TooShort { trial: trial.name.clone(), samples: trial.len() };
     let hz = trial.rate_hz().ok_or_else(too_short)?;
-    // time stamps are printed to the millisecond: 100.0000001 Hz is 100 Hz
+    // time stamps are printed to the millisecond, so that 100.0000001 Hz means 100 Hz
     let whole = hz.round();
     Ok(if (hz - whole).abs() < 1e-3 * hz && whole > 0.0 { whole } else { hz })
 }
@@ -38,7 +38,7 @@ pub(crate) fn noise<'a>(records: impl Iterator<Item = &'a [f64]>) -> f64 {
     noise_of_differences(&mut bends).unwrap_or(0.0)
 }
 
-/// From the least value to the greatest.
+/// The least and the greatest value.
 pub(crate) fn extent(values: impl Iterator<Item = f64>) -> Interval {
     values.fold(Interval { min: f64::INFINITY, max: f64::NEG_INFINITY }, |e, x| Interval {
         min: e.min.min(x),
@@ -46,8 +46,8 @@ pub(crate) fn extent(values: impl Iterator<Item = f64>) -> Interval {
     })
 }
 
-/// The rates of a log by the estimator that runs at use: live, or the paper's
-/// central difference over the whole log.
+/// The rates of a log by the estimator of the calibration: the live estimator, or the paper's central difference over
+/// the whole log.
 pub(crate) fn rates_at_use(
     estimator: RateEstimator,
     rate: SampleRate,
@@ -63,8 +63,8 @@ pub(crate) fn rates_at_use(
     Ok(signal.iter().map(|&x| filter.step(&mut memory, x)).collect())
 }
 
-/// The rates of the reference's target, looking ahead: the centred form of a
-/// Savitzky-Golay estimator, or central differences.
+/// The rates of the target without delay, by the centred form of a Savitzky-Golay estimator or by central
+/// differences.
 fn target_rates(
     estimator: RateEstimator,
     rate: SampleRate,
@@ -89,7 +89,7 @@ pub(crate) fn polarity(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> Polar
     if covariance < 0.0 { Polarity::Falling } else { Polarity::Rising }
 }
 
-/// Everything a fit needs of one even piece of a trial.
+/// The series of one even piece of a trial, with the rates of signal and target.
 pub(crate) fn series(
     trial: usize,
     piece: [Vec<f64>; 3],

@@ -1,4 +1,4 @@
-//! Which branch each sample of a trial belongs to.
+//! The branch of each sample of a trial.
 
 use stretch_core::{Branch, RateSource};
 
@@ -28,7 +28,7 @@ fn by_rate(series: &Series, source: RateSource, dead: DeadBands) -> Vec<Option<B
         RateSource::Voltage => series.signal_rate[i].map(|rate| (rate, dead.signal)),
         RateSource::Strain => series.signal_rate[i].map(|_| (series.target_rate[i], dead.target)),
     };
-    // before the first movement the branch is the one that the movement takes
+    // before the first movement the branch is that of the movement
     let first = (0..series.target.len())
         .filter_map(decide)
         .find(|(rate, dead)| rate.abs() > *dead)

@@ -7,8 +7,8 @@ use stretch_calibrate::{
 use stretch_core::{Normalisation, RateSource};
 use stretch_data::{Channel, Trial};
 
-/// Up and down at several speeds, with the noise of a converter; every `wild`-th length is what a recorder makes up.
-fn log(name: &str, count: usize, wild: usize) -> Trial {
+/// Up and down at several speeds, with the noise of a converter; every `placeholder`-th length is the placeholder of a recorder.
+fn log(name: &str, count: usize, placeholder: usize) -> Trial {
     let mut seed = 1u64;
     let mut noise = || {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
@@ -22,8 +22,8 @@ fn log(name: &str, count: usize, wild: usize) -> Trial {
     let channels = vec![channel("bridge_v", bridge_v.collect())];
     let mut trial = Trial { name: name.into(), time_s, channels };
     let length_mm = trial.time_s.iter().enumerate();
-    let length_mm =
-        length_mm.map(|(n, &t)| if wild > 0 && n % wild == 7 { -999.0 } else { length(t) });
+    let length_mm = length_mm
+        .map(|(n, &t)| if placeholder > 0 && n % placeholder == 7 { -999.0 } else { length(t) });
     trial.channels.push(channel("length_mm", length_mm.collect()));
     trial
 }
@@ -114,12 +114,12 @@ fn the_rest_of_a_log_may_be_too_short_to_be_a_block() {
 }
 
 #[test]
-fn wild_values_and_several_trials_are_told_as_of_the_whole() {
+fn gross_errors_and_several_trials_are_reported_as_for_the_whole() {
     let trials = [log("a", 9000, 500), log("b", 7000, 0), log("c", 8001, 900)];
-    let (kept, told) = without_gross_errors(&trials, &["length_mm", "bridge_v"]);
+    let (kept, sentences) = without_gross_errors(&trials, &["length_mm", "bridge_v"]);
     let whole = calibrate(&kept, &Options::default()).unwrap();
     let long = in_blocks(&trials, 2000, &Options::default()).unwrap();
-    assert_eq!(long.notes[0], told[0]);
+    assert_eq!(long.notes[0], sentences[0]);
     assert_eq!(long.calibration.target_range, whole.calibration.target_range);
     assert_eq!(long.calibration.provenance, whole.calibration.provenance);
     assert!(apart(&long, &whole, &kept[1]) < 0.05);

@@ -34,12 +34,12 @@ fn trial(name: &str, seconds: f64, target: impl Fn(f64) -> f64) -> Trial {
 }
 
 /// Sums of sines that no two trials share.
-fn wander(phase: f64) -> impl Fn(f64) -> f64 {
+fn irregular(phase: f64) -> impl Fn(f64) -> f64 {
     move |t| 0.5 + 0.25 * (2.1 * t + phase).sin() + 0.2 * (5.3 * t + 2.0 * phase).sin()
 }
 
 fn wandering() -> Vec<Trial> {
-    [0.0, 1.0, 2.5].map(|p| trial(&format!("wander_{p}.csv"), 30.0, wander(p))).into()
+    [0.0, 1.0, 2.5].map(|p| trial(&format!("irregular_{p}.csv"), 30.0, irregular(p))).into()
 }
 
 fn options(kind: Memory, rest: bool) -> Options {
@@ -64,8 +64,8 @@ fn the_observer_finds_the_gauge() {
 }
 
 #[test]
-fn memory_is_worth_having_and_survives_its_record() {
-    let test = [trial("test.csv", 30.0, wander(4.0))];
+fn memory_lowers_the_error_and_survives_its_record() {
+    let test = [trial("test.csv", 30.0, irregular(4.0))];
     let plain = calibrate(&wandering(), &Options::default()).unwrap();
     let plain = evaluate(&[("x", &plain.calibration)], &test).unwrap().pooled[1].rmse;
     let folder = std::env::temp_dir().join(format!("remembering_{}", std::process::id()));

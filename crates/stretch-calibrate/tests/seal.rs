@@ -174,8 +174,11 @@ fn a_hand_edit_is_told_apart_and_sealed_again() {
     let refused = || read_calibration(&path).unwrap_err().to_string();
     let dead_band = format!("\"dead_band\": {:?}", example_calibration().dead_band);
     edit(&dead_band, "\"dead_band\": 0.125");
-    let told = refused();
-    assert!(told.contains("edited or damaged") && told.contains("stretch record seal"), "{told}");
+    let message = refused();
+    assert!(
+        message.contains("edited or damaged") && message.contains("stretch record seal"),
+        "{message}"
+    );
     seal_calibration(&path).unwrap();
     assert_eq!(read_calibration(&path).unwrap().dead_band, 0.125);
     // a digest that went with the edit
@@ -184,8 +187,8 @@ fn a_hand_edit_is_told_apart_and_sealed_again() {
     edit(",\n  \"digesd\"", ",\n  \"digest\"");
     edit("0.125", "-1.0");
     // a seal is no pardon
-    let told = seal_calibration(&path).unwrap_err().to_string();
-    assert!(told.contains("dead_band"), "{told}");
+    let message = seal_calibration(&path).unwrap_err().to_string();
+    assert!(message.contains("dead_band"), "{message}");
 }
 
 #[test]
@@ -195,9 +198,9 @@ fn damage_in_postcard_says_what_to_do_and_cannot_be_sealed_over() {
     let mut bytes = stored(&example_calibration());
     bytes[40] ^= 4;
     fs::write(&path, &bytes).unwrap();
-    for told in [read_calibration(&path).unwrap_err(), seal_calibration(&path).unwrap_err()] {
-        let told = told.to_string();
-        assert!(told.contains("damaged") && told.contains("calibrate again"), "{told}");
+    for message in [read_calibration(&path).unwrap_err(), seal_calibration(&path).unwrap_err()] {
+        let message = message.to_string();
+        assert!(message.contains("damaged") && message.contains("calibrate again"), "{message}");
     }
     let newer = record::store(&(99u32, 0u8), &mut [0; 16]).unwrap().to_vec();
     let newest = stretch_core::CALIBRATION_SCHEMA;

@@ -132,7 +132,7 @@ pub struct CalibrationSpec {
 
 /// A checked calibration: every number finite and possible, and so every reading.
 ///
-/// Serialised with serde as its [`CalibrationSpec`]: JSON on a desk, `postcard`
+/// Serialised with serde as its [`CalibrationSpec`]: JSON on a computer, `postcard`
 /// on a board, where it loads without an allocator. A record that is not
 /// possible does not deserialise; the error names the field.
 ///

@@ -81,7 +81,7 @@ pub struct Worn {
 /// ```
 ///
 /// A bend of the gauge or of its reference is in the curve. The filter carries `y` and its rate `r`, which forgets itself in
-/// `steady_s` and wanders with `agility`, and the two's covariance; the defects follow the target that it finds.
+/// `steady_s` and has a random walk of spectral density `agility`, and their covariance; the defects follow the estimated target.
 ///
 /// Source: this project; filter as in Kalman 1960, doi:10.1115/1.3662552, with the secant to the drive that the signal suggests in
 /// place of the tangent.
@@ -115,7 +115,8 @@ pub struct DiagnosedMap {
     pub skew_s: f64,
     /// How plays stand when a stream begins at the lower and at the upper end of `estimate_domain`, and on a line between: 1 as if the
     /// target had come up from far below, -1 from far above.
-    pub wound: [f64; 2],
+    #[cfg_attr(feature = "serde", serde(rename = "wound"))]
+    pub initial_hysteresis: [f64; 2],
     /// Signal at evenly spaced drives over `drive_domain`, strictly monotone.
     pub curve: Values<MAX_KNOTS>,
     /// The drives of the first and the last knot.
@@ -173,8 +174,8 @@ impl DiagnosedMap {
         }
         let skew = self.skew_s;
         DesignError::check("diagnosed.skew_s", skew, skew.abs() <= Self::MOST_SKEW_S)?;
-        for wound in self.wound {
-            DesignError::check("diagnosed.wound", wound, wound.abs() <= 1.0)?;
+        for state in self.initial_hysteresis {
+            DesignError::check("diagnosed.wound", state, state.abs() <= 1.0)?;
         }
         for (field, value) in [
             ("diagnosed.noise", self.noise),

@@ -22,7 +22,7 @@ pub fn lag<T: Real>(before: T, x: T, share: T) -> T {
 /// The share of the way that a lag of time constant `tau_s` goes in `step_s`:
 /// `1 - exp(-step_s/tau_s)`. Exact for an input that holds over the step.
 ///
-/// Computed through `libm`, hence the same bits on a desk and on a board.
+/// Computed through `libm`, hence the same bits on a computer and on a board.
 ///
 /// ```
 /// assert!((stretch_core::lag_share(1.0, 1.0) - 0.632_120_558_828_557_7).abs() < 1e-15);

@@ -19,7 +19,7 @@ pub const MAX_KNOTS: usize = 33;
 /// - drive `u = y + lead_s r + sum a_i (y - l_i) + sum b_j (y - play(y, w_j))`;
 /// - signal `v = curve(u) + noise`, a rising (or falling) line between knots.
 ///
-/// The filter carries `y`, `r` and every `l_i`; `r` wanders with `agility`. Its
+/// The filter carries `y`, `r` and every `l_i`; `r` is a random walk of spectral density `agility`. Its
 /// gain follows the slope of the curve: where the signal hardly answers the
 /// target it trusts the motion, elsewhere the signal. `y` never leaves
 /// `estimate_domain`.

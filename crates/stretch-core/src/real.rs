@@ -12,7 +12,7 @@ mod sealed {
 ///
 /// It extends [`FloatCore`] and adds only the square root, which IEEE 754
 /// rounds correctly: a live step can therefore not call a function whose last
-/// bit differs between a desk and a board. Designs are computed in `f64` and
+/// bit differs between a computer and a board. Designs are computed in `f64` and
 /// rounded with [`Real::from_f64`].
 ///
 /// ```

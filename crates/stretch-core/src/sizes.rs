@@ -28,7 +28,7 @@ pub(crate) fn extent(field: &'static str, x: f64) -> Result<f64, DesignError> {
     DesignError::check(field, x, (LEAST..=MOST).contains(&x))
 }
 
-/// Neighbours on a curve that `f32` still tells apart: what lies between them is divided by.
+/// Checks that neighbours on a curve differ in `f32`, because their difference is a divisor.
 pub(crate) fn apart(field: &'static str, pair: &[f64]) -> Result<f64, DesignError> {
     let step = pair[1] - pair[0];
     DesignError::check(field, step, step.abs() >= LEAST && pair[1] as f32 != pair[0] as f32)

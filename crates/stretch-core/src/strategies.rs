@@ -188,7 +188,7 @@ pub fn diagnosed_map(range: Range, sign: f64) -> impl Strategy<Value = Diagnosed
                     radii: [r * (1.0 - spread), r, r * (1.0 + spread)],
                 })
             };
-            let (lowpass, skew_s, wound, steady_s) = slow;
+            let (lowpass, skew_s, initial, steady_s) = slow;
             DiagnosedMap {
                 rest: map.rest,
                 slack_low: at(low, 0.0, 1.0),
@@ -211,7 +211,7 @@ pub fn diagnosed_map(range: Range, sign: f64) -> impl Strategy<Value = Diagnosed
                 ceiling: at(ends.1, 1.0, -1.0),
                 lowpass_s: lowpass.map(|tau| [0.9 * tau, 0.1 * tau]),
                 skew_s,
-                wound: [-wound, wound],
+                initial_hysteresis: [-initial, initial],
                 curve: map.curve,
                 drive_domain: map.drive_domain,
                 noise: map.noise,

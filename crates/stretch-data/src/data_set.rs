@@ -141,11 +141,11 @@ impl DataSet {
     /// let set = DataSet { name: "b".into(), rate_hz: 250.0, rig: None, trials: Vec::new() };
     /// let time_s = (0..50).map(|n| 0.01 * f64::from(n)).collect();
     /// let trial = Trial { name: "a.csv".into(), time_s, ..Trial::default() };
-    /// let told = set.rate_told(&trial).expect("they differ");
-    /// assert!(told.contains("rate_hz = 250") && told.contains("100.00 Hz"), "{told}");
-    /// assert_eq!(DataSet { rate_hz: 100.0, ..set }.rate_told(&trial), None);
+    /// let mismatch = set.rate_mismatch(&trial).expect("they differ");
+    /// assert!(mismatch.contains("rate_hz = 250") && mismatch.contains("100.00 Hz"), "{mismatch}");
+    /// assert_eq!(DataSet { rate_hz: 100.0, ..set }.rate_mismatch(&trial), None);
     /// ```
-    pub fn rate_told(&self, trial: &Trial) -> Option<String> {
+    pub fn rate_mismatch(&self, trial: &Trial) -> Option<String> {
         let stamped_hz = trial.rate_hz()?;
         let differs = (stamped_hz / self.rate_hz - 1.0).abs() > 0.05;
         differs.then(|| {

@@ -12,7 +12,7 @@ const ON_TIME: f64 = 0.2;
 const CLOCKS: f64 = 1e-3;
 /// A rate that differs by more than this share is another rate.
 const OTHER_RATE: f64 = 0.05;
-/// More gaps than these are told in one sentence.
+/// More gaps than these are reported in one sentence.
 const TOLD: usize = 3;
 /// Change of an opening that is a switch: one sample of it is more than noise. What is smaller is bridged well by whatever holds.
 const SWITCH: f64 = 0.05;

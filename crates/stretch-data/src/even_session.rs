@@ -125,7 +125,7 @@ impl EvenSession {
         shortest: usize,
     ) -> Result<Self, DataError> {
         let rate_hz = trials.iter().find_map(|t| t.trial.rate_hz()).ok_or(DataError::NoSamples)?;
-        // Stamps are rounded: 100 Hz is told as 100.000000000002, and whatever counts samples would count one less.
+        // Stamps are rounded: a rate of 100 Hz is computed as 100.000000000002, and a count of samples would be one less.
         let whole = rate_hz.round();
         let is_whole = whole > 0.0 && (rate_hz / whole - 1.0).abs() < STAMPED;
         let rate_hz = if is_whole { whole } else { rate_hz };
@@ -135,8 +135,8 @@ impl EvenSession {
             let spec = EvenSpec { rate_hz, shortest, bridged_s: BRIDGED_S, over_switches: false };
             let even = one.trial.even(columns, spec)?;
             let count = even.parts.len();
-            let told = one.notes.iter().map(|note| format!("{}: {note}", one.trial.name));
-            session.notes.extend(told);
+            let notes = one.notes.iter().map(|note| format!("{}: {note}", one.trial.name));
+            session.notes.extend(notes);
             session.rows.add(even.rows);
             session.notes.extend(even.notes);
             session.trials.extend(even.parts.into_iter().enumerate().map(|(i, part)| EvenTrial {

@@ -5,6 +5,7 @@ mod data_set;
 mod error;
 mod even;
 mod even_session;
+mod listed;
 mod nearest;
 mod rig_file;
 #[cfg(feature = "proptest")]
@@ -21,6 +22,7 @@ pub use data_set::{DataSet, Split, TrialEntry, TrialKind};
 pub use error::{DataError, Place, shown};
 pub use even::{Even, EvenPart, EvenSpec, Rows};
 pub use even_session::{EvenSession, EvenTrial, SessionTrial};
+pub use listed::{listed, listed_up_to};
 pub use nearest::nearest;
 pub use rig_file::{EffectEntry, Parameter, Remarks, RigFile};
 pub use time::tidy_time;

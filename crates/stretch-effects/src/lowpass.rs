@@ -50,7 +50,7 @@ impl Lowpass {
     /// Of one or two poles on a grid.
     pub fn new(poles: Poles, grid: &Grid) -> Self {
         let Poles { tau_s, second } = poles;
-        // It is never wound: its reach does not matter.
+        // A low-pass has no hysteresis state: the reach does not matter.
         let pole = |tau: f64| MeanReversion::new(tau, 0.0, grid);
         let mut poles = Vec::from([pole(tau_s * (1.0 - second))]);
         if second != 0.0 {

@@ -42,7 +42,7 @@ fn properties(header: &Header) -> String {
         "name=StretchReceptor\nversion={}\nauthor=The stretch developers\nmaintainer=The stretch developers\n\
          sentence=Length from a stretch sensor's voltage, by one calibration.\nparagraph=Model {model}, form \
          {form}. Missing samples are bridged, and every reading says whether it is inside the calibrated \
-         domain. The same bits as on the desk.\ncategory=Sensors\nurl=\narchitectures=*\nincludes={HEADER}\n",
+         domain. The same bits as on the computer.\ncategory=Sensors\nurl=\narchitectures=*\nincludes={HEADER}\n",
         env!("CARGO_PKG_VERSION"),
     )
 }

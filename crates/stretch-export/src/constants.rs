@@ -81,10 +81,10 @@ impl Constants {
         ))
     }
 
-    /// The sheets of a line or of both branches; a macro, because their type comes later.
-    pub(crate) fn sheets(&mut self, sheets: &[String]) -> &mut Self {
-        let rows = sheets.join(", \\\n        ");
-        self.line(&format!("#define STRETCH_SHEETS \\\n    {{ \\\n        {rows} \\\n    }}"))
+    /// The surfaces with their ranges, one for a line, else one a branch. They are a macro because their type is declared further down.
+    pub(crate) fn surfaces(&mut self, surfaces: &[String]) -> &mut Self {
+        let rows = surfaces.join(", \\\n        ");
+        self.line(&format!("#define STRETCH_SURFACES \\\n    {{ \\\n        {rows} \\\n    }}"))
     }
 
     /// A line as it is.

@@ -34,9 +34,9 @@ pub enum ExportError {
     /// A calibration that is no record.
     #[error(transparent)]
     NoRecord(CalibrateError),
-    /// A record that the desk itself does not run: there are no answers to test against.
+    /// A record that the computer itself does not run: there are no answers to test against.
     #[error(
-        "the record in the form {form} does not run on the desk; there is nothing to hold the C against"
+        "the record in the form {form} does not run on the computer; there is nothing to hold the C against"
     )]
     NoAnswers {
         /// The form.

@@ -28,7 +28,7 @@ pub struct Header {
     pub form: Form,
     /// The model, as `--model` calls it.
     pub model: String,
-    /// Whether the program has to tell it a pressure, by `stretch_set_pressure`.
+    /// Whether the program has to set a pressure, by `stretch_set_pressure`.
     pub pressure: bool,
 }
 
@@ -145,11 +145,11 @@ fn opening(calibration: &Calibration, form: Form, model: &str, has: &[&str]) -> 
     let _ = write!(
         text,
         "/* A stretch receptor: {signal} in, {reference} out, every {period} s.\n *\n * Model {model}, form \
-         {form}: {taken} in,\n * {given} out; the same bits as on the desk.\n * Written by stretch \
+         {form}: {taken} in,\n * {given} out; the same bits as on the computer.\n * Written by stretch \
          {version} from a calibration of {from}.\n *\n *     stretch_state state;\n *     \
          stretch_init(&state);\n *     then every period\n{pressure} *     reading = stretch_step(&state, sample); or \
          stretch_lost(&state) where none came\n *\n * One state a channel. C99 and C++11; no malloc, \
-         {libm}.\n * stretch_self_test() is 0 where the board computes as the desk does.\n */\n\
+         {libm}.\n * stretch_self_test() is 0 where the board computes as the computer does.\n */\n\
          #ifndef STRETCH_H\n#define STRETCH_H\n\n#include <stdint.h>\n\n",
         period = calibration.sample_rate_hz.period_s(),
         version = env!("CARGO_PKG_VERSION"),

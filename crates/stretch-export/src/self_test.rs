@@ -1,4 +1,4 @@
-//! Samples and the desk's answers, for the board to repeat.
+//! Samples and the computer's answers, for the board to repeat.
 
 use std::fmt::Write;
 
@@ -24,7 +24,7 @@ fn signals(calibration: &Calibration) -> impl Iterator<Item = Option<f64>> {
     let (min, max) = (calibration.signal_range.min(), calibration.signal_range.max());
     (0..SAMPLES).map(move |n| {
         let lost = n == 48 || (90..93).contains(&n) || (121..126).contains(&n);
-        // smooth at both ends, by products alone: the same numbers on every desk
+        // smooth at both ends, by products alone: the same numbers on every computer
         let ramp = (n % PERIOD) as f64 / (PERIOD / 2) as f64;
         let t = if ramp < 1.0 { ramp } else { 2.0 - ramp };
         let share = 1.2 * (t * t * (3.0 - 2.0 * t)) - 0.1;

@@ -77,7 +77,7 @@ fn trial() -> Vec<i32> {
 }
 
 /// Walks, jumps to anywhere, numbers that are no codes, and gaps of every length to seven.
-fn wild() -> Vec<i32> {
+fn erratic() -> Vec<i32> {
     let mut seed = 0x9e37_79b9_7f4a_7c15u64;
     let mut below = move |n: i32| {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -220,7 +220,7 @@ fn holds(name: &str, calibration: &Calibration, form: Form, compilers: &[Compile
     fs::write(folder.path().join(HEADER), made.text).unwrap();
     for compiler in compilers {
         let program = compiled(folder.path(), form, compiler);
-        for codes in [trial(), wild()] {
+        for codes in [trial(), erratic()] {
             let (found, expected) = (
                 run(&program, &input(calibration, form, &codes)),
                 expected(calibration, form, &codes),

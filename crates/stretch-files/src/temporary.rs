@@ -36,16 +36,17 @@ fn known() -> MutexGuard<'static, Vec<Known>> {
 ///     said = format!("{}: cannot be read", folder.join("a.csv").display());
 ///     Err(FileError::Exists { path: said.clone() })
 /// });
-/// let told = stretch_files::without_temporary_names(&said);
-/// assert_eq!(told, format!("{}: cannot be read", out.join("a.csv").display()));
+/// let shown = stretch_files::without_temporary_names(&said);
+/// assert_eq!(shown, format!("{}: cannot be read", out.join("a.csv").display()));
 /// # Ok::<(), std::io::Error>(())
 /// ```
 pub fn without_temporary_names(text: &str) -> String {
-    let mut told = text.to_owned();
+    let mut shown = text.to_owned();
     for Known { temporary, target, .. } in known().iter() {
-        told = told.replace(&*temporary.join(NEW).to_string_lossy(), &target.display().to_string());
+        shown =
+            shown.replace(&*temporary.join(NEW).to_string_lossy(), &target.display().to_string());
     }
-    told
+    shown
 }
 
 /// Takes all unfinished folders away: somebody leaves the process.

@@ -166,11 +166,11 @@ impl Draft {
         // what came into the old folder in the meantime
         if let Err(why) = carry(&old, &self.real, disk::rename) {
             let left = temporary.leave();
-            let told = format!(
+            let message = format!(
                 "all is written, but not all of the folder that was there came along: {why}; the rest is in {}",
                 left.display()
             );
-            return Err(fail(io::Error::other(told)));
+            return Err(fail(io::Error::other(message)));
         }
         Ok(())
     }
@@ -204,8 +204,8 @@ fn real(path: &Path) -> io::Result<PathBuf> {
 
 /// Finishes or takes back what a run that was killed left of a folder that it replaced.
 ///
-/// [`write_folder`] asks for it first. What it did is a sentence; without one there was nothing to
-/// put right.
+/// [`write_folder`] calls this function first. The answer is a sentence on the changes, or `None` where there was nothing to
+/// correct.
 ///
 /// # Errors
 /// What the system says.
@@ -218,7 +218,7 @@ fn real(path: &Path) -> io::Result<PathBuf> {
 pub fn recover(path: impl AsRef<Path>) -> io::Result<Option<String>> {
     let path = path.as_ref();
     let Ok(real) = real(path) else { return Ok(None) };
-    let (mut told, shown) = (None, path.display());
+    let (mut message, shown) = (None, path.display());
     for left in left_behind(&real) {
         let [new, old] = [NEW, OLD].map(|name| left.folder.join(name));
         let is_there = fs::symlink_metadata(&real).is_ok();
@@ -230,7 +230,7 @@ pub fn recover(path: impl AsRef<Path>) -> io::Result<Option<String>> {
                 false => (&old, "taken back"),
             };
             disk::rename(from, &real)?;
-            told = Some(format!(
+            message = Some(format!(
                 "{shown}: an earlier run was stopped while it replaced this folder; that is {what} now"
             ));
         }
@@ -241,7 +241,7 @@ pub fn recover(path: impl AsRef<Path>) -> io::Result<Option<String>> {
         }
         let _ = fs::remove_dir_all(&left.folder);
     }
-    Ok(told)
+    Ok(message)
 }
 
 /// Makes the folders that are missing; those that it made, innermost first.

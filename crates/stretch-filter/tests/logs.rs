@@ -134,7 +134,7 @@ fn a_long_log_has_the_bits_of_the_live_filter() {
 
 #[test]
 fn a_fit_does_not_reach_across_a_gap() {
-    // Two ramps of opposite slope, and one lone sample between two gaps.
+    // Two ramps of opposite slope, and one isolated sample between two gaps.
     let mut times: Vec<f64> = (0..10).map(|n| n as f64 / HZ).collect();
     times.push(1.0);
     times.extend((0..10).map(|n| 2.0 + n as f64 / HZ));

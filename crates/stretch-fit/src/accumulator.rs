@@ -14,7 +14,7 @@ use crate::{
 /// `TERMS^2 + (TERMS + 4) ROWS` numbers whatever the length of the log.
 ///
 /// - `TERMS`: room for terms, 7 for poly13, 21 for any degree.
-/// - `ROWS`: 64 to 256 on a desk (128 is fastest for poly13), 8 to 16 on a
+/// - `ROWS`: 64 to 256 on a computer (128 is fastest for poly13), 8 to 16 on a
 ///   board. It changes speed and memory, and results only by rounding, which
 ///   grows with the number of blocks: below 8 rows, logs of more than 1e5
 ///   samples lose a digit or two and dependent terms may go unseen.

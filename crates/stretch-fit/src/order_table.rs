@@ -1,4 +1,4 @@
-//! Which order is worth having.
+//! The acceptance criterion for the order of a surface.
 
 use stretch_core::{Degree, MAX_DEGREE, Real};
 
@@ -33,10 +33,10 @@ pub type OrderEntry<T> = (Degree, Result<OrderRow<T>, FitError>);
 
 /// A chosen order beside its neighbours: next lower, chosen, next higher.
 ///
-/// The lowest order worth having is the one with the fewest terms whose excess
+/// The lowest order that satisfies the acceptance criterion is the one with the fewest terms whose excess
 /// over the best order's cross-validated mean squared error is within one
 /// standard error of zero, the excess taken trial by trial: an order that
-/// beats another on every trial by a little is worth having, one that wins on
+/// beats another on every trial by a little is accepted, one that wins on
 /// some trials and loses on others is not (the one-standard-error rule of
 /// Breiman et al., *Classification and Regression Trees*, 1984, section 3.4.3,
 /// on paired differences).
@@ -149,7 +149,7 @@ impl<T: Real> OrderTable<T> {
             .reduce(|best, row| if error(row) < error(best) { row } else { best })
     }
 
-    /// The lowest order worth having, by the rule above. `None` when there are
+    /// The lowest order that satisfies the acceptance criterion above. `None` when there are
     /// not enough trials to leave one out: no statistic of a single trial can
     /// say how the surface does on the next.
     pub fn recommended(&self) -> Option<Degree> {

@@ -76,7 +76,7 @@ pub struct RobustFit<T, const TERMS: usize> {
 /// use stretch_core::Degree;
 /// use stretch_fit::{Loss, robust_fit};
 ///
-/// // A line, a wobble, and one wild sample in ten.
+/// // A line, a wobble, and one gross error in ten samples.
 /// let samples = || (0..100).map(|k| {
 ///     let volts = f64::from(k) / 100.0;
 ///     let wobble = 0.01 * f64::from(k * k % 7 - 3);

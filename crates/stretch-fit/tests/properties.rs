@@ -285,14 +285,14 @@ proptest! {
 
     /// Up to a fifth of the samples may be anything at all.
     #[test]
-    fn robust_fits_ignore_wild_samples(
+    fn robust_fits_ignore_gross_errors(
         log in observations(Degree::POLY13, 0.01, 80..150),
-        wild in prop::collection::vec(-1e6..1e6_f64, 16),
+        gross in prop::collection::vec(-1e6..1e6_f64, 16),
         apart in 5..9_usize,
     ) {
         let n = log.samples.len();
         let spoilt = || log.samples.iter().enumerate().map(|(k, &(rate, volts, value))| {
-            let error = if k % apart == 0 { wild[(k / apart) % 16] } else { 0.0 };
+            let error = if k % apart == 0 { gross[(k / apart) % 16] } else { 0.0 };
             (rate, volts, value + error)
         });
         let mut memory = vec![0.0; n];
@@ -301,7 +301,7 @@ proptest! {
         let surface = absolute.unwrap().fit.surface();
         for &(rate, volts, _) in &log.samples {
             let (found, truth) = (surface.eval(rate, volts), log.surface.eval(rate, volts));
-            assert_abs_diff_eq!(found, truth, epsilon = tol::FIT_WILD * 0.01);
+            assert_abs_diff_eq!(found, truth, epsilon = tol::FIT_GROSS_ERRORS * 0.01);
         }
     }
 
@@ -341,18 +341,18 @@ fn finite_or_refused<T: Real>(
     samples: &[(f64, f64, f64, f64)],
     scale: f64,
 ) -> Result<(), TestCaseError> {
-    let mut wild = SurfaceAccumulator::<T, 21, 8>::new(degree).unwrap();
-    let mut tame = wild.clone();
+    let mut gross = SurfaceAccumulator::<T, 21, 8>::new(degree).unwrap();
+    let mut tame = gross.clone();
     for (k, &(rate, volts, value, weight)) in samples.iter().enumerate() {
         let [r, v, z, w] = [rate, volts, value, weight.abs()].map(T::from_f64);
-        let _ = wild.push(r, v, z);
-        let _ = wild.push_weighted(r, v, z, w);
+        let _ = gross.push(r, v, z);
+        let _ = gross.push_weighted(r, v, z, w);
         let unit = |x: f64| if x.is_finite() && x != 0.0 { x.abs().log2() % 1.0 } else { 0.5 };
         let sample = [unit(rate) * scale, k as f64 * scale, unit(value) / scale];
         let [r, v, z] = sample.map(T::from_f64);
         let _ = tame.push(r, v, z);
     }
-    for sums in [wild, tame] {
+    for sums in [gross, tame] {
         let fit = match sums.fit() {
             Ok(fit) => fit,
             Err(error) => {

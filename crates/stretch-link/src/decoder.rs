@@ -56,7 +56,7 @@ pub struct Counts {
 /// A streaming decoder.
 ///
 /// A frame begins at a `$` and ends at a newline; a `$` inside a frame begins a
-/// new one. A counter that steps ahead tells how many frames were lost. A frame that is
+/// new one. A counter that steps ahead gives the number of lost frames. A frame that is
 /// one of the last [`REPLAYED`](Self::REPLAYED), to the last field, is a repetition, alone or
 /// in a block that came twice; any other step back of the counter or of the board's clock is
 /// a board that started again, and so is any step back to the counter 0.

@@ -13,7 +13,7 @@ pub struct Lag {
     /// Pearson's correlation at the best whole lag.
     pub correlation: f64,
     /// Pearson's correlation at lag 0. Little below `correlation`: the lag costs little, or
-    /// the signals hardly determine it (a lone ramp correlates with itself at any lag).
+    /// the signals hardly determine it (a single ramp correlates with itself at any lag).
     pub correlation_at_zero: f64,
     /// Whether the best lag is the largest that was tried: the true one may be beyond it.
     pub at_limit: bool,

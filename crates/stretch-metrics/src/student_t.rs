@@ -12,7 +12,7 @@ use core::f64::consts::PI;
 /// P(|T| >= |t|) for `dof` degrees of freedom, 0..=1; NaN for a NaN `t` or `dof` not above 0.
 ///
 /// Relative error about 1e-13. Below about 1e-308 it is a subnormal number or 0, as in any
-/// `f64`: [`ln_two_tailed`] has no such floor.
+/// `f64`: [`ln_two_tailed`] has no such limit.
 ///
 /// ```
 /// use stretch_metrics::student_t::two_tailed;

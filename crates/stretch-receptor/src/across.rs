@@ -1,4 +1,4 @@
-//! From one surface to the other as the rate crosses the dead band.
+//! The transition from one surface to the other as the rate crosses the dead band.
 
 use stretch_core::{Branch, Calibration, DesignError, Model, Real};
 
@@ -8,11 +8,11 @@ use crate::{
     map::{Map, Point},
 };
 
-/// What happens across the dead band.
+/// The estimate across the dead band.
 pub trait Across<T>: Sized {
-    /// The surfaces of a calibration that is meant so.
+    /// The surfaces of a calibration of this form.
     fn map(calibration: &Calibration) -> Result<Map<T>, DesignError>;
-    /// For a dead band.
+    /// The transition for a dead band.
     fn new(direction: Direction<T>) -> Self;
     /// Value and slope on a branch at a rate.
     fn point(
@@ -34,7 +34,7 @@ impl<T: Real> Across<T> for Jump {
         match &calibration.model {
             Model::Linear(line) => Ok(Map::line(calibration, line)),
             Model::Surfaces { inflation, deflation } => {
-                Map::sheets(calibration, inflation, deflation)
+                Map::surfaces(calibration, inflation, deflation)
             }
             other => Err(other.instead_of("linear or surfaces")),
         }
@@ -50,7 +50,7 @@ impl<T: Real> Across<T> for Jump {
     }
 }
 
-/// Both surfaces inside the dead band, weighed by the rate.
+/// A mean of both surfaces inside the dead band, weighted by the rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mixed<T> {
     per_band: T,
@@ -60,7 +60,7 @@ impl<T: Real> Across<T> for Mixed<T> {
     fn map(calibration: &Calibration) -> Result<Map<T>, DesignError> {
         match &calibration.model {
             Model::Blended { inflation, deflation } => {
-                Map::sheets(calibration, inflation, deflation)
+                Map::surfaces(calibration, inflation, deflation)
             }
             other => Err(other.instead_of("blended")),
         }
@@ -68,7 +68,7 @@ impl<T: Real> Across<T> for Mixed<T> {
 
     fn new(direction: Direction<T>) -> Self {
         let band = direction.dead_band;
-        // without a band there is nothing to mix in: the weight is never asked for
+        // without a dead band the weight is never used
         Self { per_band: if band > T::zero() { band.recip() } else { T::zero() } }
     }
 
@@ -90,7 +90,7 @@ impl<T: Real> Across<T> for Mixed<T> {
         let rising = half + half * direction.signed(rate) * self.per_band;
         let weight = if branch == Branch::Inflation { rising } else { T::one() - rising };
         let mix = |here: T, there: T| there + weight * (here - there);
-        // each surface knows one sign of the rate only: beyond its own is no surprise here
+        // each surface is fitted to one sign of the rate, so that a rate beyond its domain is expected here
         let outside = here.domain.signal_outside() || there.domain.signal_outside();
         Point {
             estimate: mix(here.estimate, there.estimate),

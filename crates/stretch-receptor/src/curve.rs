@@ -7,20 +7,20 @@ use crate::fold::{held, rounded};
 /// A rising line of signals over evenly spaced drives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Curve<T> {
-    /// Knots.
+    /// Number of knots.
     pub knots: usize,
-    /// Signed signals at them.
+    /// Signed signals at the knots.
     pub values: [T; MAX_KNOTS],
-    /// The drive of the first.
+    /// The drive of the first knot.
     pub low: T,
-    /// From knot to knot.
+    /// Difference of the drives of neighbouring knots.
     pub step: T,
-    /// Its reciprocal.
+    /// Reciprocal of `step`.
     pub per_step: T,
 }
 
 impl<T: Real> Curve<T> {
-    /// Of signed values over a domain of drives.
+    /// The curve through signed values at evenly spaced drives of a domain.
     pub(crate) fn new(values: impl ExactSizeIterator<Item = f64>, domain: Interval) -> Self {
         let knots = values.len();
         let step = (domain.max - domain.min) / (knots - 1) as f64;
@@ -39,11 +39,12 @@ impl<T: Real> Curve<T> {
         (self.values[0], self.values[self.knots - 1])
     }
 
-    /// The drive that a signal suggests by itself; beyond an end as the last line goes on. Whether the signal lies on the curve.
+    /// The drive at which the curve has the signal, and whether the signal lies on the curve. Beyond an end the last
+    /// segment is extended.
     #[inline(always)]
     pub(crate) fn inverse(&self, signal: T) -> (T, bool) {
         let (first, last) = self.ends();
-        // the last knot at or below, by halving
+        // bisection for the last knot at or below the signal
         let (mut below, mut above) = (0, self.knots - 1);
         while above - below > 1 {
             let middle = (below + above) / 2;
@@ -54,7 +55,7 @@ impl<T: Real> Curve<T> {
         (self.low + place * self.step, signal >= first && signal <= last)
     }
 
-    /// The signal at a drive and the slope there; beyond an end as the last line goes on.
+    /// The signal at a drive, and the slope at that drive. Beyond an end the last segment is extended.
     #[inline(always)]
     pub(crate) fn forward(&self, drive: T) -> (T, T) {
         let most = T::from_f64((self.knots - 2) as f64);

@@ -1,16 +1,16 @@
-//! What named defects of a gauge make of a target, sample by sample.
+//! The forward model of a gauge's named defects, sample by sample.
 
 use stretch_core::{DiagnosedMap, Fading, Knee, Plays, Real, Worn, lag_weights};
 
 use crate::fold::held;
 
-/// ln 2, by which a soft knee lies inside at its bound, in widths.
+/// Distance of a soft knee from its bound at the bound, in widths: ln 2.
 const LN_2: f64 = core::f64::consts::LN_2;
 
 /// The defects of a [`DiagnosedMap`] in the order in which they act, with their rates folded to one sample.
 ///
-/// What is linear in the target within a sample is poised once, so that asking for the drive of several targets
-/// costs little more than their plays.
+/// The parts that are linear in the target within a sample are computed once, so that the drives of several targets
+/// cost little more than their plays.
 ///
 /// ```
 /// use stretch_receptor::{Defects, example_diagnosed};
@@ -30,39 +30,39 @@ const LN_2: f64 = core::f64::consts::LN_2;
 pub struct Defects<T> {
     /// The sleeve goes slack at low targets.
     pub slack_low: Option<Bound<T>>,
-    /// At high ones.
+    /// The sleeve goes slack at high targets.
     pub slack_high: Option<Bound<T>>,
     /// The sleeve slips.
     pub slip: Option<Played<T>>,
-    /// Of pressure and of its square.
+    /// Coefficients of the pressure and of its square.
     pub crosstalk: Option<[T; 2]>,
     /// The gauge takes another way back.
     pub hysteresis: Option<Played<T>>,
-    /// It relaxes or overshoots.
+    /// The gauge relaxes or overshoots.
     pub relaxation: Option<Relaxing<T>>,
-    /// It softens.
+    /// The gauge softens.
     pub worn: Option<Wearing<T>>,
     /// The amplifier's lower end.
     pub floor: Option<Bound<T>>,
-    /// Its upper end.
+    /// The amplifier's upper end.
     pub ceiling: Option<Bound<T>>,
-    /// The amplifier is slow: weights of what came out, of the input before and of the input now.
+    /// The amplifier is slow: for each of two poles, weights of the last output, of the last input and of the input.
     pub poles: Option<[[T; 3]; 2]>,
-    /// Winding at a target of zero, and by how much it grows with the target.
-    pub wound: [T; 2],
+    /// The plays' state at a target of zero, and the change of that state per target.
+    pub initial_hysteresis: [T; 2],
 }
 
-/// What they remember.
+/// The state of [`Defects`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DefectsMemory<T> {
     slip: [T; 3],
     hysteresis: [T; 3],
-    /// What each lag will take from the next drive.
+    /// The contribution of each lag to the next drive.
     fading: [T; 3],
     travelled: T,
     reached: T,
     direction: T,
-    /// What the past gives to the next sample of either pole.
+    /// The contribution of the past to the next output of each pole.
     poles: [T; 2],
 }
 
@@ -78,7 +78,7 @@ pub(crate) struct Poised<T> {
 /// A bound with a knee.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bound<T> {
-    /// The drive that is not left.
+    /// The bound on the drive.
     pub at: T,
     /// 4 (w ln 2)^2.
     pub round: T,
@@ -87,7 +87,7 @@ pub struct Bound<T> {
 /// Three plays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Played<T> {
-    /// Their half-widths.
+    /// Half-widths of the plays.
     pub radii: [T; 3],
     /// A third of the share.
     pub each: T,
@@ -96,38 +96,38 @@ pub struct Played<T> {
 /// Three lags.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relaxing<T> {
-    /// What of a lag's share is left after a sample.
+    /// Share of each lag's contribution that remains after a sample.
     pub kept: [T; 3],
-    /// What a drive adds to it.
+    /// Increase of each lag's contribution per drive.
     pub taken: [T; 3],
-    /// What it is at rest, of a drive.
+    /// Each lag's contribution at rest, per drive.
     pub settled: [T; 3],
-    /// What a sample's own input gets in all.
+    /// Total weight of the drive of the sample itself.
     pub own: T,
 }
 
-/// A response that weakens as it is worked.
+/// A response that weakens with its travel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wearing<T> {
-    /// What is lost in the end.
+    /// Share of the response that is lost after infinite travel.
     pub m: T,
-    /// The way by which half of it is lost.
+    /// Travel after which half of that share is lost, in drive.
     pub n: T,
     /// The drive at which nothing is lost.
     pub zero: T,
-    /// Turns smaller than this do not count.
+    /// Turns smaller than this do not count as travel.
     pub reversal: T,
-    /// The way at which a stream begins.
+    /// Travel at the beginning of a stream.
     pub travelled: T,
 }
 
 impl<T: Copy> DefectsMemory<T> {
-    /// The way that the gauge has gone, in drive.
+    /// Travel of the gauge, in drive.
     pub fn travelled(&self) -> T {
         self.travelled
     }
 
-    /// The same, as far worked as another.
+    /// The same memory with the travel of another.
     pub(crate) fn as_worked(self, other: &Self) -> Self {
         Self { travelled: other.travelled, ..self }
     }
@@ -139,7 +139,7 @@ impl<T: Real> Bound<T> {
         Self { at: T::from_f64(sign * knee.at), round: T::from_f64(inside * inside) }
     }
 
-    /// From below; a ceiling is asked with both signs turned.
+    /// The drive bounded from below; a ceiling is evaluated with both signs changed.
     #[inline(always)]
     fn hold(&self, u: T) -> T {
         let above = u - self.at;
@@ -159,7 +159,7 @@ impl<T: Real> Played<T> {
         Self { radii: plays.radii.map(T::from_f64), each: T::from_f64(plays.share / 3.0) }
     }
 
-    /// How far a play stays behind u: u - play(at, u, radius) without the two ends.
+    /// Distance of a play behind u: u - play(at, u, radius) without the two ends.
     #[inline(always)]
     fn apart(&self, i: usize, at: T, u: T) -> T {
         let (behind, radius) = (u - at, self.radii[i]);
@@ -190,15 +190,16 @@ impl<T: Real> Played<T> {
         out
     }
 
-    /// As far wound as that at u.
-    fn begin(&self, wound: T, u: T) -> [T; 3] {
-        self.radii.map(|radius| u - wound * radius)
+    /// The plays at a drive of u, in the hysteresis state `initial`.
+    fn begin(&self, initial: T, u: T) -> [T; 3] {
+        self.radii.map(|radius| u - initial * radius)
     }
 }
 
 impl<T: Real> Relaxing<T> {
     fn new(fading: Fading, period_s: f64) -> Self {
-        // z' = a z + b x + c x' is p + c x', p = a z + b x: the past in one number, which goes on as p' = a p + (a c + b) x'
+        // z' = a z + b x + c x' is p + c x' with p = a z + b x, which holds the past in one number and moves on by p'
+        // = a p + (a c + b) x'
         let exact = fading.taus_s.map(|tau| lag_weights(period_s, tau));
         let now: f64 = exact.iter().map(|w| w[2]).sum();
         let each = -fading.share / 3.0;
@@ -210,7 +211,7 @@ impl<T: Real> Relaxing<T> {
         }
     }
 
-    /// What the past takes from the drive: its own linear part is [`Self::own`].
+    /// The contribution of the past to the drive; the drive of the sample itself has the weight [`Self::own`].
     #[inline(always)]
     fn past(fading: &[T; 3]) -> T {
         fading[0] + fading[1] + fading[2]
@@ -229,13 +230,13 @@ impl<T: Real> Relaxing<T> {
 }
 
 impl<T: Real> Wearing<T> {
-    /// What is left of the response.
+    /// Share of the response that is left after a travel.
     #[inline(always)]
     fn left(&self, travelled: T) -> T {
         T::one() - self.m * travelled / (self.n + travelled)
     }
 
-    /// Turns that are smaller than a reversal do not travel: noise alone would go a long way.
+    /// Adds to the travel. Turns smaller than a reversal do not count, because noise alone would add much travel.
     #[inline(always)]
     fn go(&self, memory: &mut DefectsMemory<T>, u: T) {
         let moved = u - memory.reached;
@@ -249,10 +250,10 @@ impl<T: Real> Wearing<T> {
 }
 
 impl<T: Real> Defects<T> {
-    /// Of a map that was checked, sampled every `period_s`.
+    /// The defects of a checked map, sampled every `period_s`.
     pub fn new(map: &DiagnosedMap, period_s: f64) -> Self {
-        let [wound, end] = map.wound;
-        let slope = (end - wound) / (map.estimate_domain.max - map.estimate_domain.min);
+        let [first, last] = map.initial_hysteresis;
+        let slope = (last - first) / (map.estimate_domain.max - map.estimate_domain.min);
         Self {
             slack_low: map.slack_low.map(|knee| Bound::new(knee, 1.0)),
             slack_high: map.slack_high.map(|knee| Bound::new(knee, -1.0)),
@@ -275,7 +276,7 @@ impl<T: Real> Defects<T> {
             poles: map
                 .lowpass_s
                 .map(|taus| taus.map(|tau| lag_weights(period_s, tau).map(T::from_f64))),
-            wound: [wound - slope * map.estimate_domain.min, slope].map(T::from_f64),
+            initial_hysteresis: [first - slope * map.estimate_domain.min, slope].map(T::from_f64),
         }
     }
 
@@ -284,7 +285,7 @@ impl<T: Real> Defects<T> {
         self.crosstalk.is_some()
     }
 
-    /// The memory of a target that has rested at `y` since it came there.
+    /// The memory of a target that has rested at `y`.
     pub fn begin(&self, y: T, pressure: T) -> DefectsMemory<T> {
         let zero = T::zero();
         let mut memory = DefectsMemory {
@@ -296,11 +297,11 @@ impl<T: Real> Defects<T> {
             direction: zero,
             poles: [zero; 2],
         };
-        let wound = self.wound_at(y);
+        let initial = self.initial_hysteresis_at(y);
         let u = self.taut(y);
-        memory.slip = self.slip.map_or([u; 3], |slip| slip.begin(wound, u));
+        memory.slip = self.slip.map_or([u; 3], |slip| slip.begin(initial, u));
         let u = self.slip.map_or(u, |slip| slip.of(memory.slip, u)) + self.pressed(pressure);
-        memory.hysteresis = self.hysteresis.map_or([u; 3], |h| h.begin(wound, u));
+        memory.hysteresis = self.hysteresis.map_or([u; 3], |h| h.begin(initial, u));
         let u = self.hysteresis.map_or(u, |h| h.of(memory.hysteresis, u));
         memory.fading = self.relaxation.map_or([zero; 3], |r| r.begin(u));
         memory.reached = u;
@@ -309,7 +310,8 @@ impl<T: Real> Defects<T> {
         memory
     }
 
-    /// The memory of a trial that begins at `y`, of a session that goes on: the target went straight there and rested.
+    /// The memory at the beginning of a further trial of the same session: the target went straight to `y` and
+    /// rested.
     pub fn carry(&self, before: &DefectsMemory<T>, y: T, pressure: T) -> DefectsMemory<T> {
         let mut memory = self.begin(y, pressure);
         let u = self.taut(y);
@@ -318,36 +320,37 @@ impl<T: Real> Defects<T> {
             memory.slip = before.slip;
             slipped = slip.follow(&mut memory.slip, u);
         }
-        let mut felt = slipped + self.pressed(pressure);
+        let mut input = slipped + self.pressed(pressure);
         if let Some(hysteresis) = &self.hysteresis {
             memory.hysteresis = before.hysteresis;
-            felt = hysteresis.follow(&mut memory.hysteresis, felt);
+            input = hysteresis.follow(&mut memory.hysteresis, input);
         }
         if let Some(relaxation) = &self.relaxation {
-            memory.fading = relaxation.begin(felt);
+            memory.fading = relaxation.begin(input);
         }
         if let Some(worn) = &self.worn {
             (memory.travelled, memory.reached, memory.direction) =
                 (before.travelled, before.reached, before.direction);
-            worn.go(&mut memory, felt);
-            felt = worn.zero + (felt - worn.zero) * worn.left(memory.travelled);
+            worn.go(&mut memory, input);
+            input = worn.zero + (input - worn.zero) * worn.left(memory.travelled);
         }
-        memory.poles = self.settled(self.bounded(felt));
+        memory.poles = self.settled(self.bounded(input));
         memory
     }
 
-    /// Poles that have rested at a drive.
+    /// The memory of poles that have rested at a drive.
     fn settled(&self, u: T) -> [T; 2] {
         self.poles.map_or([T::zero(); 2], |poles| poles.map(|[a, b, _]| (a + b) * u))
     }
 
-    /// How plays stand where a stream begins.
-    pub(crate) fn wound_at(&self, y: T) -> T {
-        held(self.wound[0] + self.wound[1] * y, -T::one(), T::one())
+    /// Hysteresis state of the plays where a stream begins at a target of `y`.
+    pub(crate) fn initial_hysteresis_at(&self, y: T) -> T {
+        held(self.initial_hysteresis[0] + self.initial_hysteresis[1] * y, -T::one(), T::one())
     }
 
-    /// How plays stand at a target: 1 as if it had come up from far below, -1 from far above, their mean; none without plays.
-    pub fn winding(&self, memory: &DefectsMemory<T>, y: T, pressure: T) -> Option<T> {
+    /// Hysteresis state of the plays at a target, as the mean over the plays: 1 as if the target had come up from far
+    /// below, -1 as if from far above; `None` without plays.
+    pub fn hysteresis_state(&self, memory: &DefectsMemory<T>, y: T, pressure: T) -> Option<T> {
         let u = self.taut(y);
         let slipped = self.slip.map_or(u, |slip| slip.of(memory.slip, u)) + self.pressed(pressure);
         let share = |plays: &Played<T>, at: [T; 3], u: T| {
@@ -371,7 +374,7 @@ impl<T: Real> Defects<T> {
         self.crosstalk.map_or(T::zero(), |[a, b]| pressure * (a + b * pressure))
     }
 
-    /// What a sleeve that may go slack has of a target.
+    /// The stretch that a target gives to a sleeve that may go slack.
     #[inline(always)]
     fn taut(&self, y: T) -> T {
         between(self.slack_low, self.slack_high, y)
@@ -408,14 +411,14 @@ impl<T: Real> Defects<T> {
         self.poles.map_or(u, |[first, second]| second[2] * (first[2] * u) + poised.passed)
     }
 
-    /// Moves on by a sample at a target; its drive.
+    /// Moves the memory on by a sample at a target, and gives the drive.
     #[inline(always)]
     pub fn advance(&self, memory: &mut DefectsMemory<T>, y: T, pressure: T) -> T {
         let poised = self.poise(memory, pressure);
         self.follow(memory, &poised, y)
     }
 
-    /// The same for a sample that was poised.
+    /// Moves the memory on by a sample whose linear parts are known, and gives the drive.
     #[inline(always)]
     pub(crate) fn follow(&self, memory: &mut DefectsMemory<T>, poised: &Poised<T>, y: T) -> T {
         let mut u = self.taut(y);
@@ -429,14 +432,14 @@ impl<T: Real> Defects<T> {
             u = hysteresis.follow(&mut memory.hysteresis, u);
         }
         if let Some(relaxation) = &self.relaxation {
-            let felt = u;
+            let input = u;
             u = relaxation.own * u + poised.relaxed;
-            relaxation.follow(&mut memory.fading, felt);
+            relaxation.follow(&mut memory.fading, input);
         }
         if let Some(worn) = &self.worn {
-            let felt = u;
+            let input = u;
             u = worn.zero + (u - worn.zero) * poised.worn;
-            worn.go(memory, felt);
+            worn.go(memory, input);
         }
         u = self.bounded(u);
         if let Some([first, second]) = &self.poles {

@@ -1,8 +1,8 @@
-//! The live form of a gauge with named defects: asks which motion explains the signal.
+//! The live form of a gauge with named defects: a Kalman filter that estimates the motion behind the signal.
 
 use stretch_core::{
-    Baseline, Branch, Calibration, Design, DesignError, DiagnosedMap, Model, Real, RestLevel,
-    Volts, lag, lag_share,
+    Baseline, Branch, Calibration, Design, DesignError, DiagnosedMap, Model, Real, RestLevel, lag,
+    lag_share,
 };
 
 use crate::{
@@ -10,36 +10,38 @@ use crate::{
     curve::Curve,
     defects::{Defects, DefectsMemory},
     fold::{greater, held, output, reference_dead_band},
-    front::{Live, usable},
+    front::{Live, over_volts, usable},
 };
 
-/// A secant is taken over at least this share of the way between knots.
+/// Least length of a secant, as a share of the distance between knots.
 pub const LEAST_RUN: f64 = 0.01;
-/// A drive is taken to answer a target by at least this share: what answers less cannot be asked.
+/// Least slope of the drive over the target: a smaller slope would not determine the target.
 pub const LEAST_ANSWER: f64 = 0.05;
-/// Share of a sample in what the signal shows, and the share of the noise's variance that is left of it: s/(2 - s).
+/// Share s of a sample in the smoothed signal. The smoothed signal keeps the share s/(2 - s) of the noise's variance.
 pub const SMOOTH: f64 = 0.33;
 const SHOWN: f64 = 0.2;
-/// Standard deviations of it by which a sleeve must have come back before it is taken to have turned.
-const SURE: f64 = 6.0;
-/// Greatest standard deviation of a target, in those of what one signal tells over the whole curve.
+/// A sleeve has turned when the smoothed signal has come back by this many of its standard deviations.
+const TURN_DEVIATIONS: f64 = 6.0;
+/// Greatest standard deviation of a target, in multiples of the mean standard deviation that one signal gives over
+/// the whole curve.
 const WIDEST: f64 = 4.0;
-/// Beyond the targets that were fitted by this share of them the estimate does not go.
+/// The estimate exceeds the fitted targets by at most this share of their range.
 const BEYOND: f64 = 0.003;
 
 /// A receptor for [`Model::Diagnosed`].
 ///
-/// A sample:
-/// 1. target and rate go on as they were, the rate forgetting itself in `steady_s`; their covariance grows;
-/// 2. the drive that the defects make of that target is compared with the one that the signal suggests; a second target is tried
-///    where it would have to lie;
-/// 3. the secant between the two is the slope that a Kalman step takes;
-/// 4. the defects follow the target that was found. A sleeve that slips is asked for where it stands itself: the muscle is ahead of it in
-///    the direction in which it last moved for certain.
+/// For each sample:
+/// 1. target and rate are predicted, with a rate that decays within `steady_s`; their covariance grows;
+/// 2. the drive of the predicted target is compared with the drive at which the curve has the signal; the drive of a
+///    second target is computed where the difference would vanish;
+/// 3. the secant between the two targets is the slope of a Kalman step;
+/// 4. the defects follow the estimated target. Of a sleeve that slips the filter estimates the sleeve's own position:
+///    the muscle is ahead of the sleeve in the direction of the last certain movement.
 ///
-/// So what a play, a clipped end or a delay hides is told by the motion, and [`Reading::sd`] says how surely. A skew is predicted
-/// over: the estimate is of now. It answers from the first sample on. Where the map has a crosstalk, tell it the pressure
-/// with [`ReceptorMemory::set_pressure`] before a sample.
+/// The motion therefore determines a target that a play, a clipped end or a delay hides, and [`Reading::sd`] gives
+/// the standard deviation. A skew is compensated by prediction, so that the estimate is that of the present. There is
+/// an estimate from the first sample on. Where the map has a crosstalk, set the pressure with
+/// [`ReceptorMemory::set_pressure`] before a sample.
 ///
 /// ```
 /// use stretch_core::{Design, Stage, Volts};
@@ -56,49 +58,49 @@ pub type DiagnosedReceptor<T> = Front<Diagnosed<T>>;
 /// The model of a [`DiagnosedReceptor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Diagnosed<T> {
-    /// Multiplies the signal: -1 where it falls as the target rises.
+    /// Factor of the signal: -1 where the signal falls as the target rises.
     pub sign: T,
-    /// The baseline, where one is followed.
+    /// The baseline, where a baseline is followed.
     pub rest: RestLevel<T>,
-    /// What stands between target and curve.
+    /// The defects between target and curve.
     pub defects: Defects<T>,
-    /// From drive to signal.
+    /// The curve from drive to signal.
     pub curve: Curve<T>,
     /// Seconds from a sample to the next.
     pub period_s: T,
-    /// What a rate keeps of itself in a sample.
+    /// Share of a rate that is left after a sample.
     pub kept: T,
-    /// The same squared.
+    /// Square of `kept`.
     pub kept_twice: T,
-    /// What it wanders, squared.
-    pub wander: T,
+    /// Variance that a sample adds to the rate.
+    pub process_noise: T,
     /// Variance of the signal around the model.
     pub noise: T,
     /// Greatest variance of a target.
     pub widest: T,
     /// The least target.
     pub low: T,
-    /// The greatest.
+    /// The greatest target.
     pub high: T,
-    /// Seconds that the estimate is ahead of the signal, as far as a rate reaches.
+    /// Seconds by which the estimate is ahead of the signal, shortened for the decay of the rate.
     pub ahead_s: T,
     /// Reference units per standard deviation that the filter finds.
     pub spread: T,
     /// Half-width of the sleeve's slip.
     pub slip: T,
-    /// By how much a sleeve must have come back, in signal.
-    pub sure: T,
-    /// Variance of a target that may be anywhere in it.
-    pub hideout: T,
-    /// The share of it that a sample adds.
-    pub hiding: T,
+    /// A sleeve has turned when the signal has come back by more than this.
+    pub turn_threshold: T,
+    /// Variance of a target that may be anywhere in the slip.
+    pub slip_variance: T,
+    /// Share of that variance that a sample adds.
+    pub slip_variance_share: T,
     /// Reference units per target.
     pub gain: T,
     /// The reference at a target of zero.
     pub zero: T,
     /// The largest rate of the target that keeps the branch.
     pub dead_band: T,
-    /// The signal where the target rests, memory settled.
+    /// The signal of a target at rest with settled memory.
     pub at_rest: T,
 }
 
@@ -115,11 +117,12 @@ pub struct DiagnosedMemory<T> {
     pressure: T,
     /// Variance of the target that a play hides.
     hidden: T,
-    /// By how much the muscle is ahead of its sleeve.
+    /// Distance of the muscle ahead of its sleeve.
     slipped: T,
-    /// How far the sleeve has come in the direction in which it last moved, in signal.
+    /// Furthest point of the sleeve in the direction of its last movement, in signal.
     reached: T,
-    /// What the signal of the sleeve would be without memory, a little smoothed: a filter that carries a rate overshoots where it stops.
+    /// The smoothed signal that the sleeve would give without memory. The filter's own target is not used, because a
+    /// filter with a rate overshoots where the motion stops.
     shown: T,
 }
 
@@ -138,7 +141,7 @@ impl<T: Real> DiagnosedReceptor<T> {
 }
 
 impl<T: Real> ReceptorMemory<DiagnosedMemory<T>> {
-    /// The pressure of the samples to come, in the unit of the map's crosstalk.
+    /// Sets the pressure of the samples to come, in the unit of the map's crosstalk.
     pub fn set_pressure(&mut self, pressure: T) {
         self.model.set_pressure(pressure);
     }
@@ -158,18 +161,18 @@ impl<T: Real> Diagnosed<T> {
         let (sign, period_s) = (polarity.sign(), sample_rate.period_s());
         let (gain, zero) = output(calibration);
         let knots = map.curve.len();
-        // a curve against the polarity would be inverted the wrong way round
+        // a curve against the polarity would be inverted in the wrong direction
         let rises = sign * (map.curve[knots - 1] - map.curve[0]);
         DesignError::check("rise of diagnosed.curve", rises, rises > 0.0)?;
         let widest = WIDEST * map.noise * (map.drive_domain.max - map.drive_domain.min) / rises;
         let values = map.curve.iter().map(|v| sign * v);
-        // a slow amplifier is late by its time constants, as far as a rate tells
+        // a slow amplifier delays a ramp by the sum of its time constants
         let slow: f64 = map.lowpass_s.into_iter().flatten().sum();
         let (skew, steady) = (map.skew_s + slow, map.steady_s);
-        // what is left of a rate's way after so long; into the past it is not known to have been another
+        // distance that a decaying rate goes in that time; into the past the rate is taken as constant
         let ahead = if skew > 0.0 { -steady * libm::expm1(-skew / steady) } else { skew };
         let edge = BEYOND * (map.estimate_domain.max - map.estimate_domain.min);
-        // the filter asks for the sleeve; where in it the muscle is its turns tell
+        // the filter estimates the sleeve; the sleeve's turns determine the position of the muscle inside
         let slip = map.slip.map_or(0.0, |p| p.radii.iter().sum::<f64>() / 3.0);
         let defects = Defects::new(&DiagnosedMap { slip: None, lowpass_s: None, ..*map }, period_s);
         let model = Self {
@@ -180,7 +183,7 @@ impl<T: Real> Diagnosed<T> {
             period_s: T::from_f64(period_s),
             kept: T::from_f64(libm::exp(-period_s / steady)),
             kept_twice: T::from_f64(libm::exp(-2.0 * period_s / steady)),
-            wander: T::from_f64(map.agility * period_s),
+            process_noise: T::from_f64(map.agility * period_s),
             noise: T::from_f64(map.noise * map.noise),
             widest: T::from_f64(widest * widest),
             low: T::from_f64(map.estimate_domain.min - edge),
@@ -188,9 +191,9 @@ impl<T: Real> Diagnosed<T> {
             ahead_s: T::from_f64(ahead),
             spread: T::from_f64(map.spread * gain.abs()),
             slip: T::from_f64(slip),
-            sure: T::from_f64(SURE * libm::sqrt(SHOWN) * map.noise),
-            hideout: T::from_f64(slip * slip / 3.0),
-            hiding: T::from_f64(lag_share(period_s, steady)),
+            turn_threshold: T::from_f64(TURN_DEVIATIONS * libm::sqrt(SHOWN) * map.noise),
+            slip_variance: T::from_f64(slip * slip / 3.0),
+            slip_variance_share: T::from_f64(lag_share(period_s, steady)),
             gain: T::from_f64(gain),
             zero: T::from_f64(zero),
             dead_band: T::from_f64((reference_dead_band(calibration) / gain).abs()),
@@ -201,11 +204,11 @@ impl<T: Real> Diagnosed<T> {
         Ok(Self { at_rest: at_rest.0, ..model })
     }
 
-    /// The target that would rest at a signal, and what its defects remember.
+    /// Begins with the target that would rest at a signal, and with the memory of its defects.
     fn begin(&self, memory: &mut DiagnosedMemory<T>, signal: T) {
         let (to, _) = self.curve.inverse(signal);
         let mut target = held(to, self.low, self.high);
-        // plays that are wound stand off by a constant; a second look takes what bends
+        // plays offset the drive by a constant; the repetitions take the bends
         for _ in 0..3 {
             let defects = self.defects.begin(target, memory.pressure);
             let poised = self.defects.poise(&defects, memory.pressure);
@@ -214,7 +217,7 @@ impl<T: Real> Diagnosed<T> {
         }
         memory.target = target;
         memory.rate = T::zero();
-        memory.slipped = self.slip * self.defects.wound_at(target);
+        memory.slipped = self.slip * self.defects.initial_hysteresis_at(target);
         (memory.shown, _) = self.curve.forward(target);
         memory.reached = memory.shown;
         let travelled = memory.defects;
@@ -233,18 +236,19 @@ impl<T: Real> Diagnosed<T> {
         let [yy, yr, rr] = memory.covariance;
         let across = yr + dt * rr;
         let grown = yy + dt * (yr + across);
-        // where the signal hardly answers, a variance without end would throw the target from end to end of the flat
+        // where the signal hardly depends on the target, an unbounded variance would move the target from end to end
+        // of the flat part
         let (grown, across) = if grown > self.widest {
             let share = self.widest / grown;
             (share * grown, share * (kept * across))
         } else {
             (grown, kept * across)
         };
-        memory.covariance = [grown, across, self.kept_twice * rr + self.wander];
+        memory.covariance = [grown, across, self.kept_twice * rr + self.process_noise];
         self.hold(memory);
     }
 
-    /// Keeps target and rate where they can be.
+    /// Holds the target to its range, and the rate to zero or inwards at an end.
     #[inline(always)]
     fn hold(&self, memory: &mut DiagnosedMemory<T>) {
         if memory.target < self.low {
@@ -257,7 +261,7 @@ impl<T: Real> Diagnosed<T> {
         }
     }
 
-    /// By how much memory moves the signal of a target at rest now.
+    /// Shift of the signal that memory causes for a target at rest now.
     #[inline(always)]
     fn rest_shift(&self, memory: &DiagnosedMemory<T>) -> T {
         if memory.target.is_nan() {
@@ -268,28 +272,28 @@ impl<T: Real> Diagnosed<T> {
         self.curve.forward(drive).0 - self.at_rest
     }
 
-    /// Takes in a signed signal above its baseline; whether it lay on the curve.
+    /// Takes in a signed signal above its baseline; answers whether the signal lay on the curve.
     #[inline(always)]
     fn correct(&self, memory: &mut DiagnosedMemory<T>, signal: T) -> bool {
         let poised = self.defects.poise(&memory.defects, memory.pressure);
         let here = memory.target;
         let drive = self.defects.drive(&memory.defects, &poised, here);
         let (predicted, tangent) = self.curve.forward(drive);
-        // a spike counts as a signal one whole curve away, no more
+        // a spike counts as a signal at most one whole curve beyond the end
         let (first, last) = self.curve.ends();
         let span = last - first;
-        let felt = held(signal, first - span, last + span);
-        let (to, on_curve) = self.curve.inverse(felt);
-        let (run, surprise) = (to - drive, felt - predicted);
+        let bounded = held(signal, first - span, last + span);
+        let (to, on_curve) = self.curve.inverse(bounded);
+        let (run, surprise) = (to - drive, bounded - predicted);
         let least = T::from_f64(LEAST_RUN) * self.curve.step;
         let far = run.abs() > least;
         let toward = if run < T::zero() { -T::one() } else { T::one() };
 
-        // the slope of the drive, as a secant to where the target would have to be
+        // the slope of the drive, as a secant to the target that would explain the signal
         let probe = if far { run } else { toward * least };
         let moved = self.defects.drive(&memory.defects, &poised, here + probe) - drive;
         let answer = greater(moved / probe, T::from_f64(LEAST_ANSWER));
-        // and of the curve, so that a flat end of it cannot throw the estimate
+        // the slope of the curve, so that a flat end of the curve does not move the estimate far
         let secant = if far { surprise / run } else { tangent };
         let slope = answer * greater(secant, tangent);
         let [yy, yr, rr] = memory.covariance;
@@ -311,8 +315,8 @@ impl<T: Real> Diagnosed<T> {
         on_curve
     }
 
-    /// Where the muscle is in its sleeve: ahead of it in the direction in which it last moved. While the sleeve stands, the muscle
-    /// may have gone anywhere inside.
+    /// Estimates the position of the muscle in its sleeve: the muscle is ahead of the sleeve in the direction of the
+    /// sleeve's last movement. While the sleeve stands, the muscle may be anywhere inside.
     #[inline(always)]
     fn turn(&self, memory: &mut DiagnosedMemory<T>) {
         let toward = if memory.slipped < T::zero() { -T::one() } else { T::one() };
@@ -321,13 +325,13 @@ impl<T: Real> Diagnosed<T> {
             memory.reached = memory.shown;
             memory.slipped = toward * self.slip;
             memory.hidden = T::zero();
-        } else if back > self.sure {
+        } else if back > self.turn_threshold {
             memory.reached = memory.shown;
             memory.slipped = -toward * self.slip;
             memory.hidden = T::zero();
         } else {
-            memory.reached = lag(memory.reached, memory.shown, self.hiding);
-            memory.hidden = lag(memory.hidden, self.hideout, self.hiding);
+            memory.reached = lag(memory.reached, memory.shown, self.slip_variance_share);
+            memory.hidden = lag(memory.hidden, self.slip_variance, self.slip_variance_share);
         }
     }
 }
@@ -353,15 +357,7 @@ impl<T: Real> Design for Diagnosed<T> {
 }
 
 impl<T: Real> Live for Diagnosed<T> {
-    type Sample = Volts<T>;
-    type Signal = T;
-    type Side = Branch;
-    type Reading = Reading<T>;
-
-    #[inline(always)]
-    fn signal(&self, sample: Volts<T>) -> Option<T> {
-        usable(sample.0)
-    }
+    over_volts!(T);
 
     #[inline(always)]
     fn read(
@@ -392,7 +388,7 @@ impl<T: Real> Live for Diagnosed<T> {
         })
     }
 
-    /// By the motion that it predicts.
+    /// Bridges by the predicted motion.
     fn bridge(&self, memory: &mut DiagnosedMemory<T>, _: u8) -> bool {
         let begun = !memory.target.is_nan();
         if begun {
@@ -402,7 +398,7 @@ impl<T: Real> Live for Diagnosed<T> {
         begun
     }
 
-    /// All but baseline, pressure, and how far the gauge was worked.
+    /// Forgets everything except baseline, pressure, and the travel of the gauge.
     fn forget(&self, memory: &mut DiagnosedMemory<T>) {
         let (baseline, pressure) = (memory.baseline, memory.pressure);
         let fresh = self.memory();

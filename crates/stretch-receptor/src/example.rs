@@ -9,8 +9,8 @@ use stretch_core::{
 /// The paper's published surfaces (section 3.2) as a calibration record, for an
 /// 180 mm muscle and a bridge that rises from 1.24 V by 1 V over the stroke.
 ///
-/// For examples and tests: the paper prints no ranges, so those here are
-/// plausible, not published.
+/// The calibration is for examples and tests. The paper prints no ranges, so that the ranges here are plausible, not
+/// published.
 ///
 /// ```
 /// use stretch_core::Model;
@@ -21,9 +21,9 @@ pub fn example_calibration() -> Calibration {
     build().expect("the parts are constants and in range")
 }
 
-/// An observer as `stretch calibrate --model observer+rest` finds it on the simulated
-/// rig that resembles the paper's: a gauge that overshoots by 40 % over a quarter
-/// of a second, behind a curve that flattens towards full contraction.
+/// An observer as fitted by `stretch calibrate --model observer+rest` on the simulated rig that resembles the
+/// paper's: a gauge that overshoots by 40 % over a quarter of a second, behind a curve that flattens towards full
+/// contraction.
 ///
 /// ```
 /// use stretch_core::Model;
@@ -34,8 +34,8 @@ pub fn example_observer() -> Calibration {
     observer().expect("the parts are constants and in range")
 }
 
-/// A gauge with two named defects, as `stretch calibrate --model diagnosed` finds it: it overshoots by a fifth over a quarter of a
-/// second, and its sleeve slips by 2 % of the stroke.
+/// A gauge with two named defects, as fitted by `stretch calibrate --model diagnosed`: the gauge overshoots by a
+/// fifth over a quarter of a second, and its sleeve slips by 2 % of the stroke.
 ///
 /// ```
 /// use stretch_core::Model;
@@ -64,7 +64,7 @@ fn diagnosed() -> Result<Calibration, DesignError> {
         ceiling: None,
         lowpass_s: None,
         skew_s: 0.0,
-        wound: [-1.0, 1.0],
+        initial_hysteresis: [-1.0, 1.0],
         curve: map.curve,
         drive_domain: map.drive_domain,
         noise: 0.005,

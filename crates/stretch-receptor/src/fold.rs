@@ -21,7 +21,7 @@ pub(crate) fn estimator<T: Real>(calibration: &Calibration) -> Result<RateFilter
     RateFilter::new(calibration.rate_estimator, calibration.sample_rate_hz)
 }
 
-/// Values in the receptor's precision, zero behind them.
+/// Values in the receptor's precision, filled up with zeros.
 pub(crate) fn rounded<T: Real, const N: usize>(values: impl Iterator<Item = f64>) -> [T; N] {
     let mut out = [T::zero(); N];
     for (place, value) in out.iter_mut().zip(values) {
@@ -30,9 +30,9 @@ pub(crate) fn rounded<T: Real, const N: usize>(values: impl Iterator<Item = f64>
     out
 }
 
-/// x held to low .. high; low for what is not a number.
+/// The number x held to low .. high; low where x is not a number.
 ///
-/// Two comparisons: `max` and `min` are calls on a board that has no such instruction.
+/// The function uses two comparisons, because `max` and `min` are calls on a board without such instructions.
 #[inline(always)]
 pub(crate) fn held<T: Real>(x: T, low: T, high: T) -> T {
     let x = greater(x, low);

@@ -1,29 +1,28 @@
-//! What every receptor does with a sample, whatever its model.
+//! The part of a receptor that all models share.
 
 use stretch_core::{Branch, Design, Polarity, Real, Stage};
 use stretch_filter::LARGEST_SAMPLE;
 
 use crate::Withheld;
 
-/// Missing samples in a row that are bridged by prediction; one more starts the
-/// warm-up again.
+/// Most missing samples in a row that are bridged by prediction; a further missing sample starts the warm-up again.
 pub const MAX_BRIDGED: u8 = 3;
 
-/// What differs from model to model behind a [`Front`].
+/// A model behind a [`Front`].
 pub trait Live: Design {
-    /// What comes in: volts, or a converter's code.
+    /// The input: volts, or a converter's code.
     type Sample;
     /// A sample that can be used.
     type Signal: Copy;
-    /// How the branch is held.
+    /// The form in which the branch is stored.
     type Side: Side;
-    /// What comes out.
+    /// The output.
     type Reading;
 
-    /// What a sample measured; none for one that did not come.
+    /// The value of a sample; `None` for a missing sample.
     fn signal(&self, sample: Self::Sample) -> Option<Self::Signal>;
 
-    /// Takes a usable sample in and moves the branch; none while it warms up.
+    /// Takes a usable sample in and updates the branch; `None` while the model warms up.
     fn read(
         &self,
         memory: &mut Self::Memory,
@@ -31,18 +30,34 @@ pub trait Live: Design {
         signal: Self::Signal,
     ) -> Option<Self::Reading>;
 
-    /// Goes on over the `nth` missing sample in a row; whether it can.
+    /// Bridges the `nth` missing sample in a row; answers whether the model can bridge it.
     fn bridge(&self, memory: &mut Self::Memory, nth: u8) -> bool;
 
-    /// Forgets what a long gap makes worthless: everything, unless a model says otherwise.
+    /// Forgets the state that a long gap makes invalid: everything, unless a model overrides this.
     fn forget(&self, memory: &mut Self::Memory) {
         *memory = self.memory();
     }
 }
 
-/// A branch, in the form that is cheapest to hold.
+/// The part of [`Live`] that all models over a signal in volts share.
+macro_rules! over_volts {
+    ($real:ty) => {
+        type Sample = stretch_core::Volts<$real>;
+        type Signal = $real;
+        type Side = Branch;
+        type Reading = Reading<$real>;
+
+        #[inline(always)]
+        fn signal(&self, sample: stretch_core::Volts<$real>) -> Option<$real> {
+            crate::front::usable(sample.0)
+        }
+    };
+}
+pub(crate) use over_volts;
+
+/// A branch, in the form that is cheapest to store.
 pub trait Side: Copy {
-    /// From a branch.
+    /// The stored form of a branch.
     fn of(branch: Branch) -> Self;
     /// The branch.
     fn branch(self) -> Branch;
@@ -57,19 +72,18 @@ impl Side for Branch {
     }
 }
 
-/// A receptor: a model `M`, and before it what all models share.
+/// A receptor: a model `M` behind the part that all models share.
 ///
-/// - A sample that did not come (a NaN, an infinity, a size beyond
-///   [`LARGEST_SAMPLE`], a code that the converter does not have) is answered with
-///   [`Withheld::Missing`] and never enters the memory. Up to [`MAX_BRIDGED`] in a row
-///   the model goes on by its own prediction; one more forgets the stream, but
-///   not the branch.
-/// - Until the model can answer there is [`Withheld::Warming`].
+/// - A missing sample (a NaN, an infinity, a size beyond [`LARGEST_SAMPLE`], a code that the converter does not have)
+///   is answered with [`Withheld::Missing`] and never enters the memory. Up to [`MAX_BRIDGED`] missing samples in a row
+///   the model goes on by its own prediction; after a further missing sample the model forgets the stream, but not the
+///   branch.
+/// - Until the model can answer, a sample is answered with [`Withheld::Warming`].
 /// - The branch before the first movement is [`Branch::Inflation`] unless
 ///   [`ReceptorMemory::starting_on`] says otherwise; it turns when a rate leaves
 ///   the dead band.
 ///
-/// Its names are [`StretchReceptor`](crate::StretchReceptor),
+/// The aliases of this type are [`StretchReceptor`](crate::StretchReceptor),
 /// [`HistoryReceptor`](crate::HistoryReceptor), [`ObserverReceptor`](crate::ObserverReceptor),
 /// [`Receptor`](crate::Receptor) for any of them, and in [`code`](mod@crate::code)
 /// [`CodeReceptor`](crate::code::CodeReceptor) and [`FixedObserver`](crate::code::FixedObserver).
@@ -84,7 +98,7 @@ pub struct Front<M> {
 pub struct ReceptorMemory<M, S = Branch> {
     pub(crate) model: M,
     side: S,
-    /// In a row; [`MAX_BRIDGED`] where there is nothing to predict from.
+    /// Missing samples in a row; [`MAX_BRIDGED`] where there is nothing to predict from.
     missing: u8,
 }
 
@@ -102,7 +116,7 @@ impl<M, S: Side> ReceptorMemory<M, S> {
 }
 
 impl<M> Front<M> {
-    /// What the receptor computes with, for whoever writes its step in another language; see
+    /// The numbers of the receptor, for an implementation of its step in another language; see
     /// [`numbers`](crate::numbers).
     pub fn model(&self) -> &M {
         &self.model
@@ -110,7 +124,7 @@ impl<M> Front<M> {
 }
 
 impl<M: Live> Front<M> {
-    /// A missing sample: bridge a short gap, forget the stream after a long one.
+    /// Bridges a short gap; forgets the stream after a long gap.
     #[cold]
     #[inline(never)]
     fn missed(&self, memory: &mut ReceptorMemory<M::Memory, M::Side>) {
@@ -146,14 +160,14 @@ impl<M: Live> Stage<M::Sample> for Front<M> {
     }
 }
 
-/// A float that a memory may hold; none for NaN and what is too large.
+/// A float that a memory may hold; `None` for NaN and for a float that is too large.
 #[inline(always)]
 pub(crate) fn usable<T: Real>(signal: T) -> Option<T> {
-    // one comparison, false for NaN as well
+    // the comparison is false for NaN as well
     (signal.abs() <= T::from_f64(LARGEST_SAMPLE)).then_some(signal)
 }
 
-/// Which branch a rate chooses: by its sign, outside the dead band.
+/// The branch that a rate chooses, by its sign outside the dead band.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Direction<T> {
     /// The branch of a positive rate.
@@ -163,7 +177,7 @@ pub struct Direction<T> {
 }
 
 impl<T: Real> Direction<T> {
-    /// For rates of the signal.
+    /// The direction for rates of the signal.
     pub(crate) fn of_signal(polarity: Polarity, dead_band: f64) -> Self {
         let rising = match polarity {
             Polarity::Rising => Branch::Inflation,
@@ -172,7 +186,7 @@ impl<T: Real> Direction<T> {
         Self { rising, dead_band: T::from_f64(dead_band) }
     }
 
-    /// The rate with the sign of the target's.
+    /// The rate with the sign of the target's rate.
     #[inline(always)]
     pub(crate) fn signed(&self, rate: T) -> T {
         if self.rising == Branch::Inflation { rate } else { -rate }

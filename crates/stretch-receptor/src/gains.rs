@@ -1,25 +1,25 @@
-//! The gains that a Kalman filter settles at, slope by slope.
+//! The stationary gains of a Kalman filter, slope by slope.
 
 use stretch_core::{DesignError, MAX_OBSERVER_RELAXATIONS, ObserverMap, lag_share};
 
-/// Target, its rate, and the relaxations.
+/// Number of states: the target, its rate, and the relaxations.
 pub(crate) const STATES: usize = 2 + MAX_OBSERVER_RELAXATIONS;
-/// Slopes of the curve that gains are made for, evenly spaced in ratio from its
-/// flattest to its steepest. Twice and eight times as many gave the same errors.
+/// Number of slopes of the curve with gains of their own, evenly spaced in ratio from the flattest to the steepest
+/// slope. Twice and eight times as many gave the same errors.
 pub(crate) const SLOPES: usize = 12;
-/// Doublings at most: the filter after `2^n` samples.
+/// Most doublings; `n` doublings give the filter after `2^n` samples.
 const DOUBLINGS: usize = 30;
 /// A change of the covariance below this share ends the doubling.
 const SETTLED: f64 = 1e-12;
 
 pub(crate) type Square = [[f64; STATES]; STATES];
 
-/// A gain a slope, and the slopes between which each is the nearest.
+/// The gains for each slope, and the slopes between which each gain is the nearest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Gains {
-    /// Below `ends[k]` and not below `ends[k - 1]` the gains are `of[k]`; the last has no end.
+    /// Below `ends[k]` and not below `ends[k - 1]` the gains are `of[k]`; the last gains have no end.
     pub(crate) ends: [f64; SLOPES - 1],
-    /// State per signal, for target, rate and relaxations.
+    /// Gains as state per signal, for target, rate and relaxations.
     pub(crate) of: [[f64; STATES]; SLOPES],
 }
 
@@ -49,7 +49,7 @@ impl Gains {
     }
 }
 
-/// The gain of the filter that has seen one slope for ever.
+/// The stationary gain for one slope.
 ///
 /// Source: structure-preserving doubling, Chu et al. 2004,
 /// doi:10.1080/00207170410001714988.
@@ -60,11 +60,11 @@ fn settled(map: &ObserverMap, period_s: f64, slope: f64) -> [f64; STATES] {
     for (i, (&tau, &amplitude)) in map.relaxations_s.iter().zip(map.amplitudes.iter()).enumerate() {
         let share = lag_share(period_s, tau);
         (gradient[0], gradient[2 + i]) = (gradient[0] + amplitude, -amplitude);
-        // the transition, transposed: a relaxation follows the target as predicted
+        // the transition, transposed; a relaxation follows the predicted target
         (a[0][2 + i], a[1][2 + i], a[2 + i][2 + i]) = (share, share * period_s, 1.0 - share);
     }
     a[1][0] = period_s;
-    // what no relaxation uses would stay as it is for ever
+    // an unused state would keep its variance
     for unused in 2 + map.relaxations_s.len()..STATES {
         a[unused][unused] = 0.0;
     }
@@ -131,7 +131,7 @@ fn times(x: &Square, y: &Square) -> Square {
     out
 }
 
-/// By Gauss and Jordan with row exchanges; none for a singular one.
+/// The inverse by Gauss-Jordan elimination with row exchanges; `None` for a singular matrix.
 fn inverse(x: &Square) -> Option<Square> {
     let (mut left, mut right) = (*x, identity());
     for i in 0..STATES {

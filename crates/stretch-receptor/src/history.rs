@@ -2,32 +2,32 @@
 
 use stretch_core::{
     Baseline, Branch, Calibration, Design, DesignError, HistoryMap, MAX_HISTORY_TERMS, MAX_PLAYS,
-    MAX_RELAXATIONS, MAX_STATES, Model, Real, RestLevel, Stage, Volts, lag, lag_share, play,
+    MAX_RELAXATIONS, MAX_STATES, Model, Real, RestLevel, Stage, lag, lag_share, play,
 };
 use stretch_filter::{FilterError, RateFilter};
 
 use crate::{
     Domain, Front, Reading,
     fold::{estimator, output, reference_dead_band, rounded},
-    front::{Direction, Live, usable},
+    front::{Direction, Live, over_volts},
 };
 
 /// A receptor for [`Model::History`]: low-passes and plays of the signal, then
 /// one polynomial.
 ///
-/// A sample every period:
+/// For each sample:
 /// 1. the baseline, where one is followed;
 /// 2. the states of [`HistoryMap`], each moved into its domain
 ///    ([`Reading::domain`] says so);
-/// 3. the polynomial gives the estimate, held to what the fit saw;
-/// 4. the estimator `R` gives the estimate's own rate, and so the branch: by its
-///    sign, outside the dead band carried over to the reference.
+/// 3. the polynomial gives the estimate, held to the fitted range;
+/// 4. the estimator `R` gives the rate of the estimate, whose sign gives the branch, outside the dead band converted
+///    to the reference.
 ///
-/// The first sample finds every state settled at it. Warm-up, missing samples
-/// and branch are those of every [`Front`]: a short gap is bridged by the last
-/// sample, a longer one forgets all but branch and baseline.
+/// Every state begins settled at the first sample. Warm-up, missing samples and branch are those of every [`Front`]:
+/// a short gap is bridged by the last sample, and after a longer gap the model forgets everything except branch and
+/// baseline.
 ///
-/// Cost: a product and a sum a term, a product a state.
+/// Cost: a product and a sum for each term, a product for each state.
 pub type HistoryReceptor<T, R = RateFilter<T>> = Front<History<T, R>>;
 
 /// The model of a [`HistoryReceptor`].
@@ -45,7 +45,7 @@ pub struct History<T, R> {
     centre: [T; MAX_STATES],
     per_half: [T; MAX_STATES],
     terms: usize,
-    /// Of every term beyond the constant: the term it extends, and by which state.
+    /// For every term beyond the constant, the term that is extended, and the state that extends it.
     products: [(u8, u8); MAX_HISTORY_TERMS],
     coefficients: [T; MAX_HISTORY_TERMS],
     low: T,
@@ -209,15 +209,7 @@ impl<T: Real, R: Stage<T, Out = Option<T>>> History<T, R> {
 }
 
 impl<T: Real, R: Stage<T, Out = Option<T>>> Live for History<T, R> {
-    type Sample = Volts<T>;
-    type Signal = T;
-    type Side = Branch;
-    type Reading = Reading<T>;
-
-    #[inline(always)]
-    fn signal(&self, sample: Volts<T>) -> Option<T> {
-        usable(sample.0)
-    }
+    over_volts!(T);
 
     #[inline(always)]
     fn read(
@@ -232,7 +224,7 @@ impl<T: Real, R: Stage<T, Out = Option<T>>> Live for History<T, R> {
         Some(Reading { estimate, rate, branch: *branch, domain, sd: None })
     }
 
-    /// By the last sample: the memories go on, and nothing is answered.
+    /// Bridges by the last sample: the memory moves on, and there is no answer.
     fn bridge(&self, memory: &mut Self::Memory, _: u8) -> bool {
         let begun = memory.last.is_finite();
         if begun {

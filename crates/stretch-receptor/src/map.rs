@@ -1,8 +1,8 @@
 //! A calibration folded into as few operations as a sample needs.
 //!
 //! Normalisation, denormalisation and the target's unit are affine, so their
-//! scales are multiplied into the coefficients once. What is left per sample is
-//! one subtraction on each input and the polynomial itself.
+//! scales are multiplied into the coefficients once. Each sample then costs one subtraction for each input and the
+//! polynomial itself.
 
 use stretch_core::{
     Branch, BranchSurface, Calibration, DesignError, Interval, LinearMap, Poly13, Real, Surface,
@@ -46,9 +46,9 @@ impl<T: Real> Bounds<T> {
 /// A line over `signal - offset`, in physical units: `intercept + slope (signal - offset)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line<T> {
-    /// Where the signal is clamped to.
+    /// Range to which the signal is clamped.
     pub signal: Bounds<T>,
-    /// What is taken from the signal.
+    /// Offset that is subtracted from the signal.
     pub offset: T,
     /// Reference units per signal unit.
     pub slope: T,
@@ -58,29 +58,29 @@ pub struct Line<T> {
 
 /// A surface over `signal - offset` and `rate - rate_offset`, in physical units.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sheet<T, S> {
-    /// Where the signal is clamped to.
+pub struct RangedSurface<T, S> {
+    /// Range to which the signal is clamped.
     pub signal: Bounds<T>,
-    /// Where its rate is clamped to.
+    /// Range to which the rate is clamped.
     pub rate: Bounds<T>,
-    /// What is taken from the signal.
+    /// Offset that is subtracted from the signal.
     pub offset: T,
-    /// What is taken from the rate.
+    /// Offset that is subtracted from the rate.
     pub rate_offset: T,
-    /// Reference units over what is left.
+    /// The surface in reference units, over the differences.
     pub surface: S,
 }
 
-/// A calibration, folded. The rate it takes is the signal's own, unsigned by polarity.
+/// A folded calibration, over the signal and the signal's own rate, whose sign does not depend on the polarity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(clippy::large_enum_variant)] // no allocator to box with; one lives in a program
 pub enum Map<T> {
     /// One line for both branches.
     Line(Line<T>),
-    /// Inflation, deflation.
-    Poly13([Sheet<T, Poly13<T>>; 2]),
-    /// The same with terms beyond poly13.
-    Surface([Sheet<T, Surface<T>>; 2]),
+    /// One poly13 surface each for inflation and deflation.
+    Poly13([RangedSurface<T, Poly13<T>>; 2]),
+    /// One surface each for inflation and deflation, with terms beyond poly13.
+    Surface([RangedSurface<T, Surface<T>>; 2]),
 }
 
 impl<T: Real> Map<T> {
@@ -89,8 +89,8 @@ impl<T: Real> Map<T> {
         Self::Line(fold_line(calibration, line))
     }
 
-    /// A sheet a branch.
-    pub(crate) fn sheets(
+    /// One surface with ranges for each branch.
+    pub(crate) fn surfaces(
         calibration: &Calibration,
         inflation: &BranchSurface,
         deflation: &BranchSurface,
@@ -116,17 +116,17 @@ impl<T: Real> Map<T> {
                     domain: Domain::from_flags(outside, false),
                 }
             }
-            Self::Poly13(sheets) => {
-                sheets[index].at(rate, signal, |p, r, v| (p.eval(r, v), p.d_volts(r, v)))
+            Self::Poly13(surfaces) => {
+                surfaces[index].at(rate, signal, |p, r, v| (p.eval(r, v), p.d_volts(r, v)))
             }
-            Self::Surface(sheets) => {
-                sheets[index].at(rate, signal, |s, r, v| (s.eval(r, v), s.d_volts(r, v)))
+            Self::Surface(surfaces) => {
+                surfaces[index].at(rate, signal, |s, r, v| (s.eval(r, v), s.d_volts(r, v)))
             }
         }
     }
 }
 
-impl<T: Real, S> Sheet<T, S> {
+impl<T: Real, S> RangedSurface<T, S> {
     #[inline(always)]
     fn at(&self, rate: T, signal: T, eval: impl Fn(&S, T, T) -> (T, T)) -> Point<T> {
         let (v, signal_outside) = self.signal.clamp(signal);
@@ -136,10 +136,10 @@ impl<T: Real, S> Sheet<T, S> {
     }
 }
 
-impl<S> Sheet<f64, S> {
-    fn with<T: Real, U>(self, surface: U) -> Sheet<T, U> {
+impl<S> RangedSurface<f64, S> {
+    fn with<T: Real, U>(self, surface: U) -> RangedSurface<T, U> {
         let bounds = |b: Bounds<f64>| Bounds::round(Interval { min: b.min, max: b.max });
-        Sheet {
+        RangedSurface {
             signal: bounds(self.signal),
             rate: bounds(self.rate),
             offset: T::from_f64(self.offset),
@@ -168,7 +168,7 @@ fn fold_line<T: Real>(calibration: &Calibration, line: &LinearMap) -> Line<T> {
 fn fold_surface(
     calibration: &Calibration,
     branch: &BranchSurface,
-) -> Result<Sheet<f64, Surface>, DesignError> {
+) -> Result<RangedSurface<f64, Surface>, DesignError> {
     let (gain, zero) = output(calibration);
     let sign = calibration.polarity.sign();
     let rate_scale = sign / branch.rate_range.span();
@@ -182,7 +182,7 @@ fn fold_surface(
     folded[0] += zero;
     let [min, max] = [branch.rate_domain.min, branch.rate_domain.max].map(|rate| sign * rate);
     let rate = if sign > 0.0 { Bounds { min, max } } else { Bounds { min: max, max: min } };
-    Ok(Sheet {
+    Ok(RangedSurface {
         signal: Bounds::round(branch.signal_domain),
         rate,
         offset: calibration.signal_range.offset(),

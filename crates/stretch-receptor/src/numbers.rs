@@ -1,7 +1,7 @@
-//! What the steps compute with: for whoever writes one in another language.
+//! The numbers of the steps, for an implementation of a step in another language.
 //!
 //! [`Front::model`](crate::Front::model) gives the numbers of a receptor that takes volts;
-//! those of one that takes codes are in [`code`](mod@crate::code) (`FixedNumbers`, `IntegerObserver`).
+//! those of a receptor that takes codes are in [`code`](mod@crate::code) (`FixedNumbers`, `IntegerObserver`).
 //!
 //! ```
 //! use stretch_receptor::{StretchReceptor, example_calibration, numbers::Map};
@@ -16,7 +16,7 @@ pub use crate::{
     defects::{Bound, Played, Relaxing, Wearing},
     diagnosed::{Diagnosed, LEAST_ANSWER, LEAST_RUN, SMOOTH},
     front::Direction,
-    map::{Bounds, Line, Map, Sheet},
+    map::{Bounds, Line, Map, RangedSurface},
     observer::Observer,
     receptor::Surfaces,
 };

@@ -2,37 +2,34 @@
 
 use stretch_core::{
     Baseline, Branch, Calibration, Design, DesignError, MAX_KNOTS, MAX_OBSERVER_PLAYS,
-    MAX_OBSERVER_RELAXATIONS, Model, Real, RestLevel, Volts, lag, lag_share, play,
+    MAX_OBSERVER_RELAXATIONS, Model, Real, RestLevel, lag, lag_share, play,
 };
 
 use crate::{
     Domain, Front, Reading,
     fold::{output, reference_dead_band, rounded},
-    front::{Live, usable},
+    front::{Live, over_volts},
     gains::{Gains, SLOPES, STATES},
 };
 
-/// A secant is taken over at least this share of the way between knots.
+/// Least length of a secant, as a share of the distance between knots.
 const LEAST_RUN: f64 = 0.01;
 
-/// A receptor for [`Model::Observer`]: predicts the motion, compares the signal
-/// it would give with the one that came, and corrects.
+/// A receptor for [`Model::Observer`]: predicts the motion, compares the predicted with the measured signal, and
+/// corrects the states.
 ///
-/// It answers from the first sample on, and its rate is a state, not a
-/// difference. A missing sample is predicted over as every [`Front`] does; a long
-/// gap forgets all but branch and baseline.
+/// There is an estimate from the first sample on, and the rate is a state, not a difference. A missing sample is
+/// bridged by prediction as in every [`Front`]; after a long gap the model forgets everything except branch and
+/// baseline.
 ///
-/// A sample corrects every state by a gain times what the signal has over its
-/// prediction. The gain is the one that a Kalman filter settles at for the slope
-/// of the curve, from a table made when the receptor is: carrying the covariance
-/// along costs twenty times as much and errs more (the slope changes faster than
-/// a covariance can follow, and a filter that is wrong trusts itself). The slope
-/// is the greater of the tangent at the prediction and of the secant to the drive
-/// that the signal alone suggests, so that a flat end of the curve cannot throw
-/// the estimate.
+/// A sample corrects every state by a gain times the innovation (signal minus predicted signal). The gain is the
+/// stationary gain of a Kalman filter for the slope of the curve, from a table that is computed with the receptor. A
+/// covariance recursion costs twenty times as much and errs more, because the slope changes faster than a covariance
+/// can follow. The slope is the greater of the tangent at the prediction and of the secant to the drive at which the
+/// curve has the signal, so that a flat end of the curve does not move the estimate far.
 ///
-/// The baseline, where it is followed, is compared with the signal that rest would
-/// give now, memory included: an undershoot after a fast release is not drift.
+/// A followed baseline is compared with the signal that a target at rest would give now, memory included, so that an
+/// undershoot after a fast release is not taken for drift.
 pub type ObserverReceptor<T> = Front<Observer<T>>;
 
 /// The model of an [`ObserverReceptor`].
@@ -40,41 +37,41 @@ pub type ObserverReceptor<T> = Front<Observer<T>>;
 pub struct Observer<T> {
     /// Multiplies the signal: -1 where it falls as the target rises.
     pub sign: T,
-    /// The baseline, where one is followed.
+    /// The baseline, where a baseline is followed.
     pub rest: RestLevel<T>,
-    /// Knots of the curve.
+    /// Number of knots of the curve.
     pub knots: usize,
     /// Signed signals at the knots, rising.
     pub curve: [T; MAX_KNOTS],
     /// The drive of the first knot.
     pub drive_low: T,
-    /// From knot to knot.
+    /// Difference of the drives of neighbouring knots.
     pub drive_step: T,
-    /// Its reciprocal.
+    /// Reciprocal of `drive_step`.
     pub per_step: T,
-    /// How many there are.
+    /// Number of relaxations.
     pub relaxations: usize,
-    /// The share of the way that each goes in a sample.
+    /// Share of its distance that each relaxation covers in a sample.
     pub shares: [T; MAX_OBSERVER_RELAXATIONS],
-    /// What each adds to the drive.
+    /// Weight of each relaxation in the drive.
     pub amplitudes: [T; MAX_OBSERVER_RELAXATIONS],
     /// Seconds by which the signal leads.
     pub lead_s: T,
-    /// How many there are.
+    /// Number of plays.
     pub plays: usize,
-    /// Their half-widths.
+    /// Half-widths of the plays.
     pub radii: [T; MAX_OBSERVER_PLAYS],
-    /// What each adds to the drive.
+    /// Weight of each play in the drive.
     pub play_weights: [T; MAX_OBSERVER_PLAYS],
-    /// Below `ends[k]`, and not below the one before, a slope has the gains `gains[k]`.
+    /// A slope below `ends[k]` and not below `ends[k - 1]` has the gains `gains[k]`.
     pub ends: [T; SLOPES - 1],
-    /// State (target, rate, relaxations) per signal.
+    /// Gains as state (target, rate, relaxations) per signal.
     pub gains: [[T; STATES]; SLOPES],
     /// Seconds from a sample to the next.
     pub period_s: T,
     /// The least target.
     pub low: T,
-    /// The greatest.
+    /// The greatest target.
     pub high: T,
     /// Reference units per target.
     pub gain: T,
@@ -82,14 +79,14 @@ pub struct Observer<T> {
     pub zero: T,
     /// The largest rate of the target that keeps the branch.
     pub dead_band: T,
-    /// The signal where the target rests, memory settled.
+    /// The signal of a target at rest with settled memory.
     pub at_rest: T,
 }
 
 /// What an [`ObserverReceptor`]'s model remembers: its states, the plays, the baseline.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObserverMemory<T> {
-    /// Target, rate, relaxations: normalised. The target is NaN before the first sample.
+    /// Target, rate and relaxations, normalised. The target is NaN before the first sample.
     states: [T; STATES],
     plays: [T; MAX_OBSERVER_PLAYS],
     baseline: Baseline<T>,
@@ -111,7 +108,7 @@ impl<T: Real> ObserverReceptor<T> {
         let knots = map.curve.len();
         let drive = map.drive_domain;
         let step = (drive.max - drive.min) / (knots - 1) as f64;
-        // a curve against the polarity would be inverted the wrong way round
+        // a curve against the polarity would be inverted in the wrong direction
         let rises = sign * (map.curve[knots - 1] - map.curve[0]);
         DesignError::check("rise of observer.curve", rises, rises > 0.0)?;
         let slopes = map.curve.windows(2).map(|pair| sign * (pair[1] - pair[0]) / step);
@@ -148,12 +145,12 @@ impl<T: Real> ObserverReceptor<T> {
 }
 
 impl<T: Real> Observer<T> {
-    /// The drive that a signal suggests by itself, the nearest end beyond the curve.
+    /// The drive at which the curve has the signal, and the signal held to the curve.
     #[inline(always)]
     fn inverse(&self, signal: T) -> (T, T) {
         let (first, last) = (self.curve[0], self.curve[self.knots - 1]);
         let held = signal.max(first).min(last);
-        // the last knot at or below, by halving
+        // bisection for the last knot at or below the signal
         let (mut below, mut above) = (0, self.knots - 1);
         while above - below > 1 {
             let middle = (below + above) / 2;
@@ -164,7 +161,7 @@ impl<T: Real> Observer<T> {
         (self.drive_low + place * self.drive_step, held)
     }
 
-    /// The signal at a drive and the slope there; the curve ends where it was fitted.
+    /// The signal at a drive, the slope at that drive, and the drive held to the fitted curve.
     #[inline(always)]
     fn forward(&self, drive: T) -> (T, T, T) {
         let most = T::from_f64((self.knots - 1) as f64);
@@ -208,7 +205,7 @@ impl<T: Real> Observer<T> {
         drive
     }
 
-    /// By how much memory moves the signal of a target at rest now.
+    /// Shift of the signal that memory causes for a target at rest now.
     #[inline(always)]
     fn rest_shift(&self, memory: &ObserverMemory<T>) -> T {
         if memory.states[0].is_nan() {
@@ -217,19 +214,19 @@ impl<T: Real> Observer<T> {
         self.forward(self.drive_at(memory, self.low)).0 - self.at_rest
     }
 
-    /// Takes in a signed signal above its baseline; whether it lay on the curve.
+    /// Takes in a signed signal above its baseline; answers whether the signal lay on the curve.
     #[inline(always)]
     fn correct(&self, memory: &mut ObserverMemory<T>, signal: T) -> bool {
         let drive = self.drive_at(memory, memory.states[0]) + self.lead_s * memory.states[1];
         let (predicted, tangent, from) = self.forward(drive);
         let (to, held) = self.inverse(signal);
         let run = to - from;
-        // over a hair's breadth rounding alone would decide the secant
+        // over a very small distance rounding would determine the secant
         let far = run.abs() > T::from_f64(LEAST_RUN) * self.drive_step;
         let secant = if far { (held - predicted) / run } else { tangent };
         let slope = tangent.max(secant);
 
-        // a spike counts as a signal one whole curve away, no more
+        // a spike counts as a signal at most one whole curve beyond the end
         let (first, last) = (self.curve[0], self.curve[self.knots - 1]);
         let span = last - first;
         let surprise = signal.max(first - span).min(last + span) - predicted;
@@ -241,7 +238,7 @@ impl<T: Real> Observer<T> {
         held == signal
     }
 
-    /// The place of the gains for a slope, by halving.
+    /// Index of the gains for a slope, by bisection.
     #[inline(always)]
     fn nearest(&self, slope: T) -> usize {
         let (mut from, mut to) = (0, SLOPES - 1);
@@ -252,7 +249,7 @@ impl<T: Real> Observer<T> {
         from
     }
 
-    /// Keeps target and rate where they can be.
+    /// Holds the target to its range, and the rate to zero or inwards at an end.
     #[inline(always)]
     fn hold(&self, memory: &mut ObserverMemory<T>) {
         if memory.states[0] < self.low {
@@ -282,15 +279,7 @@ impl<T: Real> Design for Observer<T> {
 }
 
 impl<T: Real> Live for Observer<T> {
-    type Sample = Volts<T>;
-    type Signal = T;
-    type Side = Branch;
-    type Reading = Reading<T>;
-
-    #[inline(always)]
-    fn signal(&self, sample: Volts<T>) -> Option<T> {
-        usable(sample.0)
-    }
+    over_volts!(T);
 
     #[inline(always)]
     fn read(
@@ -318,7 +307,7 @@ impl<T: Real> Live for Observer<T> {
         })
     }
 
-    /// By the motion that it predicts.
+    /// Bridges by the predicted motion.
     fn bridge(&self, memory: &mut ObserverMemory<T>, _: u8) -> bool {
         let begun = !memory.states[0].is_nan();
         if begun {

@@ -1,6 +1,6 @@
-//! A receptor for whatever model a calibration holds.
+//! A receptor for any model that a calibration can hold.
 
-use stretch_core::{Branch, Calibration, Design, Model, Real, Stage, Volts};
+use stretch_core::{Branch, Calibration, Design, Model, Real, Stage};
 use stretch_filter::{FilterError, RateFilter};
 
 use crate::{
@@ -9,7 +9,7 @@ use crate::{
     across::{Jump, Mixed},
     diagnosed::{Diagnosed, DiagnosedMemory},
     fold::estimator,
-    front::{Live, usable},
+    front::{Live, over_volts},
     history::{History, HistoryMemory},
     observer::{Observer, ObserverMemory},
     receptor::{Surfaces, SurfacesMemory},
@@ -17,8 +17,7 @@ use crate::{
 
 /// A receptor for any calibration, chosen at run time by its model.
 ///
-/// Where the model is known, name its receptor instead: a board then carries
-/// the code of that one alone.
+/// Where the model is known, use the receptor of that model instead: a board then carries the code of one model only.
 ///
 /// ```
 /// use stretch_core::{Runner, Volts};
@@ -34,9 +33,9 @@ pub type Receptor<T, R = RateFilter<T>> = Front<AnyModel<T, R>>;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(clippy::large_enum_variant)] // no allocator to box with; one lives in a program
 pub enum AnyModel<T, R> {
-    /// Of a [`StretchReceptor`].
+    /// The model of a [`StretchReceptor`].
     Surfaces(Surfaces<T, R, Jump>),
-    /// Of a [`BlendedReceptor`].
+    /// The model of a [`BlendedReceptor`].
     Blended(Surfaces<T, R, Mixed<T>>),
     /// Of a [`HistoryReceptor`].
     History(History<T, R>),
@@ -46,11 +45,11 @@ pub enum AnyModel<T, R> {
     Diagnosed(Diagnosed<T>),
 }
 
-/// What a [`Receptor`]'s model remembers: a memory of its own kind.
+/// The memory of a [`Receptor`]'s model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(clippy::large_enum_variant)] // no allocator to box with; one lives in a program
 pub enum AnyMemory<T, M> {
-    /// Of a [`StretchReceptor`] or a [`BlendedReceptor`].
+    /// The memory of a [`StretchReceptor`] or a [`BlendedReceptor`].
     Surfaces(SurfacesMemory<T, M>),
     /// Of a [`HistoryReceptor`].
     History(HistoryMemory<T, M>),
@@ -68,7 +67,7 @@ impl<T: Real> Receptor<T> {
     /// or a coefficient leaves the range of `T`.
     pub fn new(calibration: &Calibration) -> Result<Self, FilterError> {
         match &calibration.model {
-            // its rate is a state: it needs no estimator, and none that could run live
+            // the rate of these models is a state, so that no estimator is needed
             Model::Observer(_) | Model::Diagnosed(_) => Self::observer(calibration),
             _ => Self::with_rate(calibration, estimator(calibration)?),
         }
@@ -104,7 +103,8 @@ impl<T: Real, R> Receptor<T, R> {
 }
 
 impl<T: Real, M> ReceptorMemory<AnyMemory<T, M>> {
-    /// The pressure of the samples to come, for a [`DiagnosedReceptor`] with a crosstalk; others do not mind it.
+    /// Sets the pressure of the samples to come, for a [`DiagnosedReceptor`] with a crosstalk; other models ignore
+    /// the pressure.
     pub fn set_pressure(&mut self, pressure: T) {
         if let AnyMemory::Diagnosed(memory) = &mut self.model {
             memory.set_pressure(pressure);
@@ -112,7 +112,7 @@ impl<T: Real, M> ReceptorMemory<AnyMemory<T, M>> {
     }
 }
 
-/// Does the same with the model and the memory of its kind, else with neither.
+/// Evaluates `answer` with the model and its memory; `else` where the memory is that of another model.
 macro_rules! with_its_own {
     ($model:expr, $memory:expr, |$own:ident, $its:ident| $answer:expr, $else:expr) => {
         match ($model, $memory) {
@@ -121,7 +121,7 @@ macro_rules! with_its_own {
             (AnyModel::History($own), AnyMemory::History($its)) => $answer,
             (AnyModel::Observer($own), AnyMemory::Observer($its)) => $answer,
             (AnyModel::Diagnosed($own), AnyMemory::Diagnosed($its)) => $answer,
-            // a memory of another model's receptor
+            // the memory of another model's receptor
             _ => $else,
         }
     };
@@ -142,15 +142,7 @@ impl<T: Real, R: Design> Design for AnyModel<T, R> {
 }
 
 impl<T: Real, R: Stage<T, Out = Option<T>>> Live for AnyModel<T, R> {
-    type Sample = Volts<T>;
-    type Signal = T;
-    type Side = Branch;
-    type Reading = Reading<T>;
-
-    #[inline(always)]
-    fn signal(&self, sample: Volts<T>) -> Option<T> {
-        usable(sample.0)
-    }
+    over_volts!(T);
 
     /// A memory of another model's receptor is replaced by a fresh one.
     #[inline]

@@ -1,23 +1,22 @@
-//! What a receptor answers for one sample.
+//! The answer of a receptor for one sample.
 
 use core::fmt;
 
 use stretch_core::{Branch, Millimetres, MillimetresPerSecond, Real};
 
-/// One answer: the estimate, its rate, and how much to trust it.
+/// An answer: the estimate, its rate, and the quality of the estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading<T = f64> {
-    /// The estimated reference, in its own unit (millimetres of a muscle,
-    /// degrees of a joint).
+    /// The estimated reference, in the unit of the reference (millimetres of a muscle, degrees of a joint).
     pub estimate: T,
-    /// Its rate, in that unit per second: the local slope of the calibration
-    /// times the rate of the signal.
+    /// Rate of the estimate, in that unit per second: the local slope of the calibration times the rate of the
+    /// signal.
     pub rate: T,
     /// The branch that was evaluated.
     pub branch: Branch,
-    /// Whether the inputs lay where the calibration was fitted.
+    /// Whether the inputs lay in the calibrated domain.
     pub domain: Domain,
-    /// Standard deviation of the estimate, in the reference's unit, where the model knows it.
+    /// Standard deviation of the estimate, in the reference's unit, where the model estimates it.
     pub sd: Option<T>,
 }
 
@@ -27,7 +26,7 @@ impl<T: Real> Reading<T> {
         Millimetres(self.estimate)
     }
 
-    /// The rate as that of a length, for a calibration whose reference is in millimetres.
+    /// The rate of a length, for a calibration whose reference is in millimetres.
     pub fn length_rate(&self) -> MillimetresPerSecond<T> {
         MillimetresPerSecond(self.rate)
     }
@@ -35,17 +34,17 @@ impl<T: Real> Reading<T> {
 
 /// Whether the inputs of a [`Reading`] lay in the calibrated domain.
 ///
-/// An input outside is moved to the nearest end before the calibration is
-/// evaluated, and this says so: a polynomial is never extrapolated.
+/// An input outside the domain is moved to the nearest end before the calibration is evaluated, because a polynomial
+/// is never extrapolated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Domain {
-    /// Both inside: the estimate interpolates what was calibrated.
+    /// Both inputs were inside: the estimate is an interpolation.
     Inside,
     /// The signal was outside, and was clamped.
     SignalClamped,
     /// The rate was outside, and was clamped.
     RateClamped,
-    /// Both were.
+    /// Both inputs were outside, and were clamped.
     BothClamped,
 }
 
@@ -77,7 +76,7 @@ impl fmt::Display for Domain {
     }
 }
 
-/// Why there is no [`Reading`] for a sample.
+/// The reason why there is no [`Reading`] for a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Withheld {

@@ -1,27 +1,26 @@
-//! Lines and surfaces, live: signal in, reading out, one sample at a time.
+//! The live form of lines and surfaces: a signal in, a reading out, one sample at a time.
 
-use stretch_core::{Branch, Calibration, Design, DesignError, Real, Stage, Volts};
+use stretch_core::{Branch, Calibration, Design, DesignError, Real, Stage};
 use stretch_filter::{FilterError, RateFilter};
 
 use crate::{
     Front, Reading,
     across::{Across, Jump, Mixed},
     fold::estimator,
-    front::{Direction, Live, usable},
+    front::{Direction, Live, over_volts},
     map::{Map, Point},
 };
 
 /// A stretch receptor: a line or two surfaces, folded, with the rate estimator they
 /// were fitted for.
 ///
-/// A sample every period, in volts (or the unit of the calibration's signal):
+/// For each sample, in volts (or the unit of the calibration's signal):
 /// 1. the rate of the signal, by the estimator `R`;
 /// 2. the branch, from the sign of that rate outside the dead band;
 /// 3. inputs outside the calibrated domain are clamped, and [`Reading::domain`] says so;
-/// 4. the branch's surface gives the estimate in the reference's unit, its slope
-///    times the rate of the signal gives the estimate's rate (the surface's own
-///    dependence on the rate is left out of that derivative: it would need the
-///    second derivative of a noisy signal).
+/// 4. the branch's surface gives the estimate in the reference's unit, and the slope of the surface times the rate of
+///    the signal gives the estimate's rate (the derivative leaves out the surface's dependence on the rate, which would
+///    need the second derivative of a noisy signal).
 ///
 /// [`BlendedReceptor`] is the same without the jump at a reversal.
 ///
@@ -54,11 +53,11 @@ use crate::{
 pub type StretchReceptor<T, R = RateFilter<T>> = Front<Surfaces<T, R, Jump>>;
 
 /// A [`StretchReceptor`] for [`Model::Blended`](stretch_core::Model::Blended): inside
-/// the dead band it answers with both surfaces, weighed by the rate, so that there is
-/// no jump at a reversal. With `r` the signed rate and `d` the dead band, the
-/// inflation surface weighs `(1 + r/d)/2`, held to 0..1.
+/// the dead band the estimate is a mean of both surfaces, weighted by the rate, so that there is no jump at a
+/// reversal. With `r` the signed rate and `d` the dead band, the weight of the inflation surface is `(1 + r/d)/2`,
+/// held to 0..1.
 ///
-/// Cost: outside the dead band one surface, inside it two.
+/// Cost: one surface outside the dead band, two inside.
 pub type BlendedReceptor<T, R = RateFilter<T>> = Front<Surfaces<T, R, Mixed<T>>>;
 
 /// The model of a [`StretchReceptor`]; `A` says what happens across the dead band.
@@ -72,12 +71,12 @@ pub struct Surfaces<T, R, A> {
 }
 
 impl<T: Real, R, A> Surfaces<T, R, A> {
-    /// The line or the surfaces, folded.
+    /// The folded line or surfaces.
     pub fn map(&self) -> &Map<T> {
         &self.map
     }
 
-    /// How the rate chooses the branch.
+    /// The rule by which the rate chooses the branch.
     pub fn direction(&self) -> Direction<T> {
         self.direction
     }
@@ -115,8 +114,7 @@ impl<T: Real, R, A: Across<T>> Front<Surfaces<T, R, A>> {
     /// A receptor for `calibration`, with a rate estimator built for it.
     ///
     /// `rate` must be the estimator that [`CalibrationSpec::rate_estimator`]
-    /// names, designed for the calibration's sample rate: a surface is only
-    /// right with the estimator it was fitted on.
+    /// names, designed for the calibration's sample rate: a surface is valid only with the estimator of its fit.
     ///
     /// [`CalibrationSpec::rate_estimator`]: stretch_core::CalibrationSpec::rate_estimator
     ///
@@ -135,8 +133,8 @@ impl<T: Real, R, A: Across<T>> Front<Surfaces<T, R, A>> {
         Ok(Self { model })
     }
 
-    /// The reading of a signal whose rate is known, on a branch that is known: no memory, so that
-    /// samples may come in any order. `R` can be `()`.
+    /// The reading of a signal at a known rate, on a known branch. No memory is involved, so that samples may come in
+    /// any order. `R` can be `()`.
     ///
     /// ```
     /// use stretch_core::Branch;
@@ -174,15 +172,7 @@ impl<T: Real, R: Design, A> Design for Surfaces<T, R, A> {
 }
 
 impl<T: Real, R: Stage<T, Out = Option<T>>, A: Across<T>> Live for Surfaces<T, R, A> {
-    type Sample = Volts<T>;
-    type Signal = T;
-    type Side = Branch;
-    type Reading = Reading<T>;
-
-    #[inline(always)]
-    fn signal(&self, sample: Volts<T>) -> Option<T> {
-        usable(sample.0)
-    }
+    over_volts!(T);
 
     #[inline(always)]
     fn read(
@@ -198,12 +188,12 @@ impl<T: Real, R: Stage<T, Out = Option<T>>, A: Across<T>> Live for Surfaces<T, R
         Some(self.reading(*branch, rate, signal))
     }
 
-    /// By the last sample, moved on by the last rate.
+    /// Bridges by the last sample, moved on by the last rate.
     fn bridge(&self, memory: &mut Self::Memory, _: u8) -> bool {
         let bridged = memory.last + memory.last_rate * self.period_s;
         if bridged.is_finite() {
             memory.last = bridged;
-            // only the window matters here: nothing is answered for this sample
+            // only the window is updated, because there is no answer for this sample
             let _ = self.rate.step(&mut memory.rate, bridged);
         }
         bridged.is_finite()

@@ -1,4 +1,4 @@
-//! Proptest strategies: voltage streams with the faults that a bench has.
+//! Proptest strategies: voltage streams with the faults of measurements.
 
 extern crate std;
 
@@ -15,7 +15,7 @@ pub enum Fault {
     Lost(f64),
     /// A spike of any finite size in place of the sample.
     Spike(f64),
-    /// The value before, once more: a stuck converter.
+    /// The previous value again, as from a stuck converter.
     Stuck,
 }
 
@@ -33,7 +33,7 @@ pub fn fault() -> impl Strategy<Value = Fault> {
     ]
 }
 
-/// A bridge voltage of 1..2.5 V that wanders, without faults: `length` samples.
+/// A random walk of the bridge voltage in 1..2.5 V, without faults: `length` samples.
 pub fn clean_stream(length: usize) -> impl Strategy<Value = Vec<f64>> {
     (1.0..2.5f64, collection::vec(-0.05..0.05f64, length)).prop_map(
         |(start, steps): (f64, Vec<f64>)| {

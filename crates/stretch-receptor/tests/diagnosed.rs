@@ -21,7 +21,13 @@ const OVERSHOOT: Fading = Fading { share: 0.3, taus_s: [0.2, 0.4, 0.8] };
 
 fn plain() -> DiagnosedMap {
     let Model::Diagnosed(map) = example_diagnosed().model else { unreachable!() };
-    DiagnosedMap { slip: None, relaxation: None, wound: [-1.0, 1.0], noise: 0.002, ..map }
+    DiagnosedMap {
+        slip: None,
+        relaxation: None,
+        initial_hysteresis: [-1.0, 1.0],
+        noise: 0.002,
+        ..map
+    }
 }
 
 fn calibration(map: DiagnosedMap) -> Calibration {
@@ -78,7 +84,7 @@ fn forwards_it_is_the_operators() {
         hysteresis: Some(LOOPS),
         relaxation: Some(OVERSHOOT),
         lowpass_s: Some([0.03, 0.005]),
-        wound: [0.0, 0.0],
+        initial_hysteresis: [0.0, 0.0],
         ..plain()
     };
     let defects = Defects::<f64>::new(&map, DT_S);

@@ -12,7 +12,7 @@ use stretch_core::{Calibration, Runner, strategies};
 use stretch_receptor::{
     code::{
         Adc, AdcCode, AdcSpec, FixedCalibration, FixedNumbers, FixedObserver, FixedReceptor,
-        IntegerObserver, Sheet, Sheets, Span,
+        IntegerObserver, RangedSurface, RangedSurfaces, Span,
     },
     example_calibration, example_observer,
 };
@@ -131,17 +131,17 @@ impl Sum {
     }
 }
 
-/// What a sheet gives over the whole of its domain, in thousandths.
+/// What a surface with ranges gives over the whole of its domain, in thousandths.
 fn surface(
     of_eval: impl Fn(Between, Between) -> Proof,
     thousandths: i32,
-    sheet: (Span, Span),
+    ranged: (Span, Span),
 ) -> Proof {
     let spread = |span: Span| {
         let ends = of(span.min, i128::from(span.min) + i128::from(span.width));
         (ends * just(span.factor)).fits(32, "spread")
     };
-    let (signal, rate) = sheet;
+    let (signal, rate) = ranged;
     let bits = of_eval(spread(rate)?, spread(signal)?)?;
     let product = (bits * just(thousandths)).fits(64, "thousandths")?;
     (product >> 32).fits(32, "estimate")
@@ -151,15 +151,15 @@ fn surface(
 fn prove_surfaces(numbers: &FixedNumbers) -> Proof {
     // the largest that a 16-bit sample can be away from a centre, moved up
     (both(u16::MAX) * just(1 << 15)).fits(32, "signal from the centre")?;
-    match numbers.sheets {
-        Sheets::Line(Sheet { signal, rate, surface: line, .. }) => {
+    match numbers.surfaces {
+        RangedSurfaces::Line(RangedSurface { signal, rate, surface: line, .. }) => {
             let (intercept, slope) = <(i32, i32)>::from(line.of);
             let eval = |_: Between, v: Between| Sum::new(intercept.into()).plus(slope, v)?.value();
             surface(eval, line.thousandths, (signal, rate))
         }
-        Sheets::Poly13(sheets) => {
+        RangedSurfaces::Poly13(surfaces) => {
             let mut all: Option<Between> = None;
-            for Sheet { signal, rate, surface: poly, .. } in sheets {
+            for RangedSurface { signal, rate, surface: poly, .. } in surfaces {
                 let [p00, p10, p01, p11, p02, p12, p03] = <[i32; 7]>::from(poly.of);
                 let eval = |r: Between, v: Between| {
                     let by_rate = Sum::new(p11.into()).plus(p12, v)?.times(v, p10)?;
@@ -172,7 +172,7 @@ fn prove_surfaces(numbers: &FixedNumbers) -> Proof {
                 let own = surface(eval, poly.thousandths, (signal, rate))?;
                 all = Some(all.map_or(own, |all| all.join(own)));
             }
-            all.ok_or_else(|| "no sheet".to_owned())
+            all.ok_or_else(|| "no ranged".to_owned())
         }
     }
 }
@@ -423,9 +423,11 @@ fn every_code_at_a_grid_of_rates_is_within_its_rounding() {
     let calibration = example_calibration();
     let adc = Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 }).unwrap();
     let fixed = FixedCalibration::<11, 2>::new(&calibration, &adc).unwrap();
-    let Sheets::Poly13(sheets) = fixed.numbers().sheets else { panic!("it has surfaces") };
+    let RangedSurfaces::Poly13(surfaces) = fixed.numbers().surfaces else {
+        panic!("it has surfaces")
+    };
     let (mut worst, mut seen) = (0.0f64, 0u32);
-    for Sheet { centre, signal, rate, surface } in sheets {
+    for RangedSurface { centre, signal, rate, surface } in surfaces {
         let (p, unit) = (surface.of.coefficients(), (1u64 << 32) as f64);
         for code in 0..4096i32 {
             let volts = ((code << 4) - i32::from(centre)) << 15;

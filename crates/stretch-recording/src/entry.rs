@@ -70,7 +70,7 @@ impl Recording {
         let load = |entry: &TrialEntry| {
             let mut recording = read(entry)?;
             // once for all trials: what is wrong is one line of dataset.toml
-            let told = set.rate_told(&recording.trial).filter(|_| !is_told);
+            let told = set.rate_mismatch(&recording.trial).filter(|_| !is_told);
             is_told |= told.is_some();
             recording.notes.extend(told);
             Ok(SessionTrial {

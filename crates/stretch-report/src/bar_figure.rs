@@ -53,8 +53,8 @@ pub struct Row {
 pub enum Scale {
     /// From 0 to 1, in percent.
     Percent,
-    /// Equal ratios from 1, the noise floor.
-    Floors,
+    /// Equal ratios from 1, the noise.
+    NoiseMultiples,
 }
 
 /// Letters of a label that stand side by side on a phone, and the height of each further line in pixels.
@@ -100,14 +100,14 @@ pub fn bar_figure(description: &str, rows: &[Row], scale: Scale, x_label: &str) 
     Figure::new(description)
         .draw(FigureSize { width: 400, height }, draw)
         .draw(FigureSize { width: 880, height }, draw)
-        .live(bars_json(GAP, &told(rows, &[], x_label)))
+        .live(bars_json(GAP, &bar_rows(rows, &[], x_label)))
 }
 
 /// Plots over time in which a bar shows its samples.
 pub(crate) const GAP: &str = "gap";
 
 /// Where every row stands and what it says, with the samples that are its own.
-fn told(rows: &[Row], picks: &[Option<Pick>], unit: &str) -> Vec<BarRow> {
+fn bar_rows(rows: &[Row], picks: &[Option<Pick>], unit: &str) -> Vec<BarRow> {
     let mut y = 2.0;
     let mut one = |(index, row): (usize, &Row)| {
         let top = y;
@@ -134,8 +134,8 @@ pub(crate) fn picking_figure(
     picks: &[Option<Pick>],
     unit: &str,
 ) -> Figure {
-    narrow_bar_figure(description, rows, Scale::Floors, unit)
-        .live(bars_json(GAP, &told(rows, picks, unit)))
+    narrow_bar_figure(description, rows, Scale::NoiseMultiples, unit)
+        .live(bars_json(GAP, &bar_rows(rows, picks, unit)))
 }
 
 /// The same in one shape, for figures that stand side by side.
@@ -152,7 +152,7 @@ fn draw(area: &Area<'_>, rows: &[Row], scale: Scale, most: f64, x_label: &str) -
     let end = match scale {
         Scale::Percent => 1.0,
         // The next 1, 2 or 5 times a power of ten.
-        Scale::Floors => [1.0, 2.0, 5.0, 10.0]
+        Scale::NoiseMultiples => [1.0, 2.0, 5.0, 10.0]
             .map(|k| k * 10f64.powf(most.log10().floor()))
             .into_iter()
             .find(|e| *e >= most.max(1.9))
@@ -161,13 +161,13 @@ fn draw(area: &Area<'_>, rows: &[Row], scale: Scale, most: f64, x_label: &str) -
     let place = |value: f64| -> i32 {
         let share = match scale {
             Scale::Percent => value,
-            Scale::Floors => value.max(1.0).log10() / end.log10(),
+            Scale::NoiseMultiples => value.max(1.0).log10() / end.log10(),
         };
         left + (f64::from(right - left) * share.clamp(0.0, 1.0)).round() as i32
     };
     let ticks: Vec<f64> = match scale {
         Scale::Percent => vec![0.0, 0.25, 0.5, 0.75, 1.0],
-        Scale::Floors => {
+        Scale::NoiseMultiples => {
             let fine: &[f64] = match end {
                 e if e <= 20.0 => &[1.0, 2.0, 5.0],
                 e if e <= 2e3 => &[1.0, 3.0],
@@ -184,7 +184,7 @@ fn draw(area: &Area<'_>, rows: &[Row], scale: Scale, most: f64, x_label: &str) -
         area.draw(&PathElement::new(line, stroke(Ink::Grid.color(), 1.0)))?;
         let text = match scale {
             Scale::Percent => tick(100.0 * t, 100.0),
-            Scale::Floors => number(t, 1),
+            Scale::NoiseMultiples => number(t, 1),
         };
         let h = if t == ticks_start(scale) { HPos::Left } else { HPos::Center };
         area.draw(&Text::new(text, (x, bottom + px(4.0)), words(Ink::Text, h, VPos::Top)))?;
@@ -227,7 +227,7 @@ fn draw(area: &Area<'_>, rows: &[Row], scale: Scale, most: f64, x_label: &str) -
 fn ticks_start(scale: Scale) -> f64 {
     match scale {
         Scale::Percent => 0.0,
-        Scale::Floors => 1.0,
+        Scale::NoiseMultiples => 1.0,
     }
 }
 

@@ -1,6 +1,7 @@
 //! The report of a calibration: how good it is, and what it is made of.
 
 use stretch_calibrate::{Calibrated, Candidate, Evaluation, MethodErrors, TrialErrors};
+use stretch_data::listed;
 
 use super::{
     branch::BranchView,
@@ -115,11 +116,11 @@ fn judged(page: &mut Page, evaluation: &Evaluation, names: &[String], context: &
     page.section("How good it is", "");
     page.text(&format!(
         "Fitted on {}; held against {}.",
-        listed(&context.calibrated_on),
+        recordings(&context.calibrated_on),
         if context.tested_on.is_empty() {
             "the same data, which flatters every method".to_owned()
         } else {
-            listed(&context.tested_on)
+            recordings(&context.tested_on)
         }
     ));
     let caption = "All test recordings together";
@@ -170,7 +171,7 @@ fn over_time(page: &mut Page, evaluation: &Evaluation, names: &[String]) {
     let caption = |trial: &TrialErrors| format!("{}, the whole recording.", trial.trial);
     let closer = "The eight seconds with the most motion, away from the ends.";
     let mut drawn: Vec<&TrialErrors> = evaluation.trials.iter().collect();
-    // what a model is worth shows where there is motion
+    // the quality of a model shows where there is motion
     let pace = |i: &usize| travel_per_second(&evaluation.trials[*i]);
     let first = (0..drawn.len()).rev().max_by(|a, b| pace(a).total_cmp(&pace(b)));
     if let Some(first) = first {
@@ -299,12 +300,13 @@ fn fits(page: &mut Page, calibrated: &[(&str, &Calibrated)], context: &Context) 
     }
 }
 
-/// Names in a sentence.
-fn listed(names: &[String]) -> String {
+/// Names of recordings in a sentence.
+fn recordings(names: &[String]) -> String {
     match names {
         [] => "data that are not named".to_owned(),
-        [one] => one.clone(),
-        [all @ .., last] if names.len() <= 6 => format!("{} and {last}", all.join(", ")),
-        [first, .., last] => format!("{} recordings, {first} to {last}", names.len()),
+        [first, .., last] if names.len() > 6 => {
+            format!("{} recordings, {first} to {last}", names.len())
+        }
+        _ => listed(names),
     }
 }

@@ -1,5 +1,6 @@
 //! The report of a diagnosis: what to fix in the simulator, how sure that is, and what it gains.
 
+use stretch_data::listed;
 use stretch_gap::Diagnosis;
 use stretch_sim::Language;
 
@@ -21,7 +22,7 @@ use super::{
     subject::Subject,
     turn_figure::turn_figure,
 };
-use crate::plain::{listed, transfer_in_words};
+use crate::plain::transfer_in_words;
 
 /// Candidates that are drawn.
 const DRAWN: usize = 6;
@@ -123,8 +124,9 @@ fn located(page: &mut Page, subject: &Subject<'_>) {
     if after {
         legend.push((AFTER, after_name(d)));
     }
-    let figure = bar_figure("What is left, by stage", &rows, Scale::Floors, "\u{d7} the noise")
-        .legend(legend);
+    let figure =
+        bar_figure("What is left, by stage", &rows, Scale::NoiseMultiples, "\u{d7} the noise")
+            .legend(legend);
     page.figure(&figure, "What is left, stage by stage.");
     if !d.location.end_to_end.is_empty() {
         let share = |s: &stretch_gap::StageShare| Row {

@@ -49,7 +49,7 @@ pub(crate) struct Shared<'a> {
 pub(crate) fn dots_figure(description: &str, against: &Shared<'_>, panels: &[Dots]) -> Figure {
     let most = against.most;
     let tall = |i: usize| PANEL + if i + 1 == panels.len() { LABEL } else { 0 };
-    let told: Vec<Panel> = (0_u32..)
+    let live_panels: Vec<Panel> = (0_u32..)
         .zip(panels)
         .enumerate()
         .map(|(i, (above, panel))| {
@@ -58,7 +58,7 @@ pub(crate) fn dots_figure(description: &str, against: &Shared<'_>, panels: &[Dot
         })
         .collect();
     let (link, by) = against.brush;
-    let live = scatter_json(link, by, &against.x, against.names, &told);
+    let live = scatter_json(link, by, &against.x, against.names, &live_panels);
     let frame = FigureSize { width: 400, height: PANEL * panels.len() as u32 + LABEL };
     Figure::new(description)
         .draw(frame, |area| {

@@ -49,7 +49,7 @@ impl FigureSize {
 /// A drawing, maybe in two shapes, with a legend in words; or why there is none.
 #[derive(Debug, Clone, Default)]
 pub struct Figure {
-    /// What a reader who cannot see it is told.
+    /// Text for a reader who cannot see the figure.
     pub description: String,
     /// Colours and what they stand for.
     pub legend: Vec<(Ink, String)>,

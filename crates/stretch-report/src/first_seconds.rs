@@ -1,24 +1,24 @@
 //! The first ten seconds of a diagnosis: what to change, how sure that is, what it gains, what to do next.
 
+use stretch_data::listed;
 use stretch_gap::{Diagnosis, Gross, VerdictKind};
 
 use super::{
     markup::{number, percent, with_unit},
     subject::Subject,
 };
-use crate::plain::listed;
 
 /// The result in one sentence.
 pub(crate) fn diagnosis_verdict(subject: &Subject<'_>) -> String {
     let d = subject.diagnosis;
     let sentence = d.sentence.replace(" %", "\u{a0}%");
-    // a probability is one among the candidates, and is told as such
-    let told = d.candidates.first().and_then(|c| {
+    // a probability is one among the candidates, and is reported as such
+    let conditional = d.candidates.first().and_then(|c| {
         let (before, after) = sentence.split_once("; probability ")?;
         let rest = after.get("0.00".len()..)?;
         Some(format!("{before}; probability {} {GIVEN}{rest}", percent(c.probability)))
     });
-    told.unwrap_or(sentence)
+    conditional.unwrap_or(sentence)
 }
 
 /// What every probability stands under.
@@ -132,7 +132,7 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
         (VerdictKind::Unknown, _) => {
             "That there is a gap is certain; what the catalogue offers explains at best a part of it.".to_owned()
         }
-        _ => "What is left is within the noise floor on trials that were not fitted.".to_owned(),
+        _ => "What is left is within the noise on trials that were not fitted.".to_owned(),
     };
     let gain = match d.verdict {
         VerdictKind::Effect | VerdictKind::Partial => format!("{gain}{}", cheaper(d)),

@@ -106,10 +106,10 @@ pub(crate) fn trace_figures(
         }
         .json()
     };
-    let (told, told_left) = (live(&lines, &names, true), live(&left, &names[1..], false));
+    let (whole, whole_left) = (live(&lines, &names, true), live(&left, &names[1..], false));
     let left_legend = legend[1..].to_vec();
-    let top = lines_figure(time, &lines, window, &name, 280).legend(legend).live(told);
-    let below = lines_figure(time, &left, window, LEFT, 190).legend(left_legend).live(told_left);
+    let top = lines_figure(time, &lines, window, &name, 280).legend(legend).live(whole);
+    let below = lines_figure(time, &left, window, LEFT, 190).legend(left_legend).live(whole_left);
     (top, below)
 }
 

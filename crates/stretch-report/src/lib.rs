@@ -35,7 +35,7 @@ pub use diagnosis_tables::{baseline_table, candidate_table, stage_table, transfe
 pub use markup::percent;
 pub use multiple::times;
 pub use page::Table;
-pub use plain::{listed, number, transfer_in_words};
+pub use plain::{number, transfer_in_words};
 pub use subject::Subject;
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! What the script of a page draws: the data of a figure as compact JSON.
 //!
-//! A curve is told on an even grid of time, once over the whole recording and once, finer, around what is shown first.
-//! Where a slot of the grid holds several samples it is told by its least and its greatest, in their order, so that no
-//! peak is lost. Values are whole multiples of `q` above `o`, each told as its step from the one before.
+//! A curve is given on an even grid of time, once over the whole recording and once on a finer grid around the first view.
+//! Where a slot of the grid holds several samples, the slot gives the least and the greatest in their order, so that no
+//! peak is lost. Values are whole multiples of `q` above `o`, each given as the step from the value before.
 
 use std::ops::Range;
 
@@ -92,7 +92,7 @@ impl TimePlot<'_> {
             .iter()
             .map(|(key, values)| ((*key).to_owned(), serde_json::json!(levels(values))))
             .collect();
-        let told = serde_json::json!({
+        let figure = serde_json::json!({
             "kind": "time",
             "link": self.link,
             "x": self.labels[0],
@@ -106,7 +106,7 @@ impl TimePlot<'_> {
             "keys": keys,
             "moves": self.moves,
         });
-        Some(told.to_string())
+        Some(figure.to_string())
     }
 }
 
@@ -116,8 +116,8 @@ pub(crate) fn change(time: &[f64], values: &[f64], view: &Range<f64>) -> Vec<Pac
     levels(time, values, [&span, view], mean)
 }
 
-/// How the samples of a slot are told on its two places.
-type Told = fn(&[(f64, f64)]) -> Option<[f64; 2]>;
+/// From the samples of a slot to the slot's two values.
+type SlotValues = fn(&[(f64, f64)]) -> Option<[f64; 2]>;
 
 /// By the least and the greatest, in their order.
 fn ends(part: &[(f64, f64)]) -> Option<[f64; 2]> {
@@ -138,7 +138,7 @@ fn levels(
     time: &[f64],
     values: &[f64],
     [span, view]: [&Range<f64>; 2],
-    of_slot: Told,
+    of_slot: SlotValues,
 ) -> Vec<Packed> {
     let half = 0.5 * (view.end - view.start);
     let around = (view.start - half).max(span.start)..(view.end + half).min(span.end);
@@ -154,7 +154,7 @@ fn packed(
     values: &[f64],
     window: &Range<f64>,
     slots: usize,
-    of_slot: Told,
+    of_slot: SlotValues,
 ) -> Packed {
     let inside: Vec<(f64, f64)> = time
         .iter()
@@ -164,29 +164,29 @@ fn packed(
         .collect();
     let span = window.end - window.start;
     let few = inside.len() <= 2 * slots;
-    let (t, dt, told) = if few {
+    let (t, dt, values_at) = if few {
         let dt = span / inside.len().saturating_sub(1).max(1) as f64;
-        let mut told = vec![None; inside.len().max(1)];
+        let mut values_at = vec![None; inside.len().max(1)];
         for (t, y) in &inside {
             let at = ((t - window.start) / dt).round() as usize;
-            if let Some(place) = told.get_mut(at) {
+            if let Some(place) = values_at.get_mut(at) {
                 *place = Some(*y);
             }
         }
-        (window.start, dt, told)
+        (window.start, dt, values_at)
     } else {
         let width = span / slots as f64;
         let slot = |t: f64| (((t - window.start) / width) as usize).min(slots - 1);
-        let mut told = vec![None; 2 * slots];
+        let mut values_at = vec![None; 2 * slots];
         for part in inside.chunk_by(|a, b| slot(a.0) == slot(b.0)) {
             if let Some(pair) = of_slot(part) {
                 let at = 2 * slot(part[0].0);
-                (told[at], told[at + 1]) = (Some(pair[0]), Some(pair[1]));
+                (values_at[at], values_at[at + 1]) = (Some(pair[0]), Some(pair[1]));
             }
         }
-        (window.start + 0.25 * width, 0.5 * width, told)
+        (window.start + 0.25 * width, 0.5 * width, values_at)
     };
-    steps(t, dt, &told)
+    steps(t, dt, &values_at)
 }
 
 /// Values as whole steps.
@@ -306,13 +306,13 @@ mod tests {
         values[12_345] = 7.0;
         values[20_000..30_000].fill(f64::NAN);
         let packed = packed(&time, &values, &(0.0..199.995), 600, ends);
-        let told = unpacked(&packed);
-        assert_eq!(told.len(), 1200);
-        let most = told.iter().flatten().copied().fold(f64::MIN, f64::max);
+        let shown = unpacked(&packed);
+        assert_eq!(shown.len(), 1200);
+        let most = shown.iter().flatten().copied().fold(f64::MIN, f64::max);
         assert!((most - 7.0).abs() <= packed.q);
-        let at = told.iter().position(|y| y.is_some_and(|y| y > 6.0)).unwrap();
+        let at = shown.iter().position(|y| y.is_some_and(|y| y > 6.0)).unwrap();
         assert!((packed.t + packed.dt * at as f64 - time[12_345]).abs() <= 2.0 * packed.dt);
-        assert!(told[700..800].iter().all(Option::is_none));
+        assert!(shown[700..800].iter().all(Option::is_none));
     }
 
     #[test]
@@ -320,9 +320,9 @@ mod tests {
         let time: Vec<f64> = (0..100).map(|i| 2.0 + f64::from(i) * 0.01).collect();
         let values: Vec<f64> = (0..100).map(|i| f64::from(i * i)).collect();
         let packed = packed(&time, &values, &(2.0..2.99), 800, ends);
-        let told = unpacked(&packed);
-        assert_eq!(told.len(), 100);
-        assert!(told.iter().zip(&values).all(|(a, b)| (a.unwrap() - b).abs() <= packed.q));
+        let shown = unpacked(&packed);
+        assert_eq!(shown.len(), 100);
+        assert!(shown.iter().zip(&values).all(|(a, b)| (a.unwrap() - b).abs() <= packed.q));
     }
 
     #[test]

@@ -60,11 +60,11 @@ pub fn fixed(x: f64, decimals: usize) -> String {
 /// A share in whole percent, rounded once; below one to a digit.
 pub fn percent(share: f64) -> String {
     let percent = 100.0 * share;
-    let told = match percent.abs() < 0.95 {
+    let digits = match percent.abs() < 0.95 {
         true => number((10.0 * percent).round() / 10.0, 1),
         false => fixed(percent, 0),
     };
-    format!("{told}\u{a0}%")
+    format!("{digits}\u{a0}%")
 }
 
 /// A number on an axis that spans `span`.

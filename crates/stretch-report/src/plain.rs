@@ -1,15 +1,7 @@
 //! Names, numbers and findings in plain words.
 
+use stretch_data::listed;
 use stretch_gap::{Baselines, Transfer, TransferError};
-
-/// Names joined as in a sentence.
-pub fn listed(names: &[String]) -> String {
-    match names {
-        [] => "nothing".to_owned(),
-        [one] => one.clone(),
-        [all @ .., last] => format!("{} and {last}", all.join(", ")),
-    }
-}
 
 /// Points of full scale below which two calibrations err alike.
 const ALIKE: f64 = 0.05;
@@ -66,10 +58,5 @@ mod tests {
         assert_eq!(words(error(3.0, 1.1), error(2.0, 2.01)), None);
         let said = words(error(3.0, 1.1), error(2.0, 2.2)).expect("poly13 got worse");
         assert!(said.contains("the poly13 calibration") && !said.contains("linear"), "{said}");
-    }
-
-    #[test]
-    fn names_are_listed_as_in_a_sentence() {
-        assert_eq!(listed(&["a", "b", "c"].map(str::to_owned)), "a, b and c");
     }
 }

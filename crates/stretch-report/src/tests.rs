@@ -139,7 +139,7 @@ fn a_page_is_one_well_formed_file_with_every_figure() {
     let count = |name: &str| all.iter().filter(|e| *e == name).count();
     // twice over time, errors twice, histogram, two surfaces, two cuts
     assert_eq!(count("figure"), 9);
-    // three of them in a shape for phones and one for desks
+    // three of them in a shape for phones and one for desktops
     assert_eq!(count("svg"), 12);
     assert!(!page.contains("class=\"missing\""));
     // methods, comparisons, signals; coefficients of three fits, orders of two

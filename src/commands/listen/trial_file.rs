@@ -85,7 +85,7 @@ impl TrialFile {
                 })?,
             other => other?,
         };
-        // where files cannot be locked, two recordings into one are not told from one after the other
+        // where files cannot be locked, two recordings into one file look like one after the other
         if let Err(TryLockError::WouldBlock) = file.try_lock() {
             return Err(io::Error::other("another recording goes there"));
         }
@@ -118,7 +118,7 @@ impl TrialFile {
         let written = self.file.write_all(&self.line);
         match written {
             Ok(()) => self.whole += self.line.len() as u64,
-            // a disk that is full took a part of the line: what is told is why, not that this failed too
+            // a disk that is full took a part of the line: the error reports why, not that this truncation failed too
             Err(_) => drop(self.file.set_len(self.whole)),
         }
         written

@@ -67,7 +67,7 @@ impl View {
                 match block {
                     Shown::Note(text) => warn(format!("stretch: {text}")),
                     Shown::Lines(_) if is_gone.load(SeqCst) => {}
-                    // `Output` keeps the failure, the end of the program tells it
+                    // `Output` keeps the failure, and the end of the program reports it
                     Shown::Lines(lines) => {
                         if out.write_all(&lines).and_then(|()| out.flush()).is_err() {
                             is_gone.store(true, SeqCst);

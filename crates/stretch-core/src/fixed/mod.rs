@@ -11,7 +11,7 @@
 //! a step of Horner's rule is one multiply-accumulate (`SMLAL`) and no shift.
 //!
 //! Integer arithmetic rounds the same way everywhere: results are the same bits
-//! on a desk and on any core. Designs are computed in `f64` and refused when
+//! on a computer and on any core. Designs are computed in `f64` and refused when
 //! they do not fit ([`DesignError::OutOfRange`](crate::DesignError::OutOfRange)); a step takes any `i32` and
 //! never panics or wraps.
 

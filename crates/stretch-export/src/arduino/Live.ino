@@ -11,7 +11,7 @@ void setup() {
 #endif
   int wrong = stretch_self_test();
   if (wrong) {
-    Serial.print("this board computes otherwise than the desk, from sample ");
+    Serial.print("this board computes differently from the host computer, from sample ");
     Serial.println(wrong);
     for (;;) {
     }

@@ -171,11 +171,11 @@ STRETCH_INLINE void stretch_work(stretch_state *s, float u)
 }
 
 @end
-@if wound
-/* How plays stand where a stream begins: 1 as if the target had come up from far below. */
-STRETCH_INLINE float stretch_wound(float y)
+@if initial_hysteresis
+/* Hysteresis state of the plays where a stream begins: 1 as if the target had come up from far below. */
+STRETCH_INLINE float stretch_initial_hysteresis(float y)
 {
-    return stretch_held(STRETCH_WOUND + STRETCH_WOUND_SLOPE * y, -1.0f, 1.0f);
+    return stretch_held(STRETCH_INITIAL_HYSTERESIS + STRETCH_INITIAL_HYSTERESIS_SLOPE * y, -1.0f, 1.0f);
 }
 
 @end
@@ -211,7 +211,7 @@ STRETCH_INLINE void stretch_follow(stretch_state *s)
 {
     float u = s->target;
 @if hysteresis relaxation worn
-    float felt;
+    float input;
 @end
 @if hysteresis relaxation
     int i;
@@ -223,26 +223,26 @@ STRETCH_INLINE void stretch_follow(stretch_state *s)
     u = u + s->pressed;
 @end
 @if hysteresis
-    felt = u;
+    input = u;
     u = stretch_played(s, u);
     for (i = 0; i < 3; i++) {
-        const float behind = felt - s->plays[i];
+        const float behind = input - s->plays[i];
         if ((behind < 0.0f ? -behind : behind) > stretch_radii[i]) {
-            s->plays[i] = felt - stretch_apart(s->plays[i], felt, stretch_radii[i]);
+            s->plays[i] = input - stretch_apart(s->plays[i], input, stretch_radii[i]);
         }
     }
 @end
 @if relaxation
-    felt = u;
+    input = u;
     u = STRETCH_OWN * u + stretch_past(s);
     for (i = 0; i < 3; i++) {
-        s->fading[i] = stretch_kept[i] * s->fading[i] + stretch_taken[i] * felt;
+        s->fading[i] = stretch_kept[i] * s->fading[i] + stretch_taken[i] * input;
     }
 @end
 @if worn
-    felt = u;
+    input = u;
     u = stretch_worn(s, u);
-    stretch_work(s, felt);
+    stretch_work(s, input);
 @end
 @if bounded
     u = stretch_bounded(u);
@@ -284,7 +284,7 @@ STRETCH_INLINE void stretch_settle(stretch_state *s, float y)
 @if remembers
     float u = y;
 @if hysteresis
-    const float wound = stretch_wound(y);
+    const float initial = stretch_initial_hysteresis(y);
 @end
 @if hysteresis relaxation
     int i;
@@ -297,7 +297,7 @@ STRETCH_INLINE void stretch_settle(stretch_state *s, float y)
 @end
 @if hysteresis
     for (i = 0; i < 3; i++) {
-        s->plays[i] = u - wound * stretch_radii[i];
+        s->plays[i] = u - initial * stretch_radii[i];
     }
     u = stretch_played(s, u);
 @end
@@ -332,7 +332,7 @@ static STRETCH_APART void stretch_begin(stretch_state *s, float signal)
 @if worn
     const float travelled = s->travelled;
 @end
-    /* plays that are wound stand off by a constant; a second look takes what bends */
+    /* plays offset the drive by a constant; the repetitions take the bends */
     for (k = 0; k < 3; k++) {
         stretch_settle(s, target);
         target = stretch_held(target + (to - stretch_drive(s, target)), STRETCH_LOW, STRETCH_HIGH);
@@ -344,7 +344,7 @@ static STRETCH_APART void stretch_begin(stretch_state *s, float signal)
     s->target = target;
     s->rate = 0.0f;
 @if slip
-    s->slipped = STRETCH_SLIP * stretch_wound(target);
+    s->slipped = STRETCH_SLIP * stretch_initial_hysteresis(target);
     s->shown = stretch_forward(target, &slope);
     s->came = s->shown;
 @end
@@ -383,7 +383,7 @@ STRETCH_INLINE void stretch_predict(stretch_state *s)
     }
     s->yy = grown;
     s->yr = across;
-    s->rr = STRETCH_KEPT_TWICE * s->rr + STRETCH_WANDER;
+    s->rr = STRETCH_KEPT_TWICE * s->rr + STRETCH_PROCESS_NOISE;
     stretch_hold(s);
 }
 
@@ -397,13 +397,13 @@ STRETCH_INLINE void stretch_turn(stretch_state *s)
         s->came = s->shown;
         s->slipped = toward * STRETCH_SLIP;
         s->hidden = 0.0f;
-    } else if (back > STRETCH_SURE) {
+    } else if (back > STRETCH_TURN_THRESHOLD) {
         s->came = s->shown;
         s->slipped = -toward * STRETCH_SLIP;
         s->hidden = 0.0f;
     } else {
-        s->came = s->came + STRETCH_HIDING * (s->shown - s->came);
-        s->hidden = s->hidden + STRETCH_HIDING * (STRETCH_HIDEOUT - s->hidden);
+        s->came = s->came + STRETCH_SLIP_VARIANCE_SHARE * (s->shown - s->came);
+        s->hidden = s->hidden + STRETCH_SLIP_VARIANCE_SHARE * (STRETCH_SLIP_VARIANCE - s->hidden);
     }
 }
 
@@ -418,9 +418,9 @@ STRETCH_INLINE int stretch_correct(stretch_state *s, float signal)
     float tangent;
     const float predicted = stretch_forward(drive, &tangent);
     /* a spike counts as a signal one whole curve away, no more */
-    const float felt = stretch_held(signal, first - span, last + span);
-    const int on_curve = felt >= first && felt <= last;
-    const float run = stretch_inverse(felt) - drive, surprise = felt - predicted;
+    const float input = stretch_held(signal, first - span, last + span);
+    const int on_curve = input >= first && input <= last;
+    const float run = stretch_inverse(input) - drive, surprise = input - predicted;
     const int far = (run < 0.0f ? -run : run) > STRETCH_LEAST_RUN;
     /* the slope of the drive, as a secant to where the target would have to be */
     const float probe = far ? run : run < 0.0f ? -STRETCH_LEAST_RUN : STRETCH_LEAST_RUN;

@@ -1,23 +1,23 @@
-typedef struct stretch_sheet {
+typedef struct stretch_surface {
     int32_t centre;
     stretch_span signal;
     stretch_span rate;
     int32_t thousandths; /* 2^32 of these make a thousandth of a least bit */
     int32_t p[7];        /* p11 p12 p10 p00 p02 p03 p01, as they are used */
-} stretch_sheet;
+} stretch_surface;
 
-static const stretch_sheet stretch_sheets[2] = STRETCH_SHEETS;
+static const stretch_surface stretch_surfaces[2] = STRETCH_SURFACES;
 
 /* Horner's rule; what a product leaves below the point is carried into the next. */
 STRETCH_INLINE int32_t stretch_estimate(const stretch_state *s, uint32_t sample, int32_t rate,
                                        uint8_t *outside)
 {
-    const stretch_sheet *sheet = &stretch_sheets[s->branch];
-    const int32_t *p = sheet->p;
+    const stretch_surface *surface = &stretch_surfaces[s->branch];
+    const int32_t *p = surface->p;
     const int32_t volts =
-        stretch_clamp(&sheet->signal, ((int32_t)sample - sheet->centre) * 32768,
+        stretch_clamp(&surface->signal, ((int32_t)sample - surface->centre) * 32768,
                       STRETCH_SIGNAL_CLAMPED, outside);
-    const int32_t r = stretch_clamp(&sheet->rate, rate, STRETCH_RATE_CLAMPED, outside);
+    const int32_t r = stretch_clamp(&surface->rate, rate, STRETCH_RATE_CLAMPED, outside);
     uint64_t sum, moving;
     sum = stretch_sum((uint32_t)p[0], 0x7fffffffu, p[1], volts);
     sum = stretch_sum((uint32_t)p[2], (uint32_t)sum, stretch_high(sum), volts);
@@ -25,6 +25,6 @@ STRETCH_INLINE int32_t stretch_estimate(const stretch_state *s, uint32_t sample,
     sum = stretch_sum((uint32_t)p[4], (uint32_t)moving, p[5], volts);
     sum = stretch_sum((uint32_t)p[6], (uint32_t)sum, stretch_high(sum), volts);
     sum = stretch_sum((uint32_t)(moving >> 32), (uint32_t)sum, stretch_high(sum), volts);
-    return (int32_t)(stretch_product(stretch_high(sum), sheet->thousandths) >> 32);
+    return (int32_t)(stretch_product(stretch_high(sum), surface->thousandths) >> 32);
 }
 

@@ -1,6 +1,6 @@
 /* ---- self-test ---- */
 
-/* Runs the samples below, 0 when every answer is the desk's, bit for bit; else the number of the
+/* Runs the samples below, 0 when every answer is the computer's, bit for bit; else the number of the
  * first that is not, from 1. */
 static STRETCH_APART int stretch_self_test(void)
 {

@@ -22,16 +22,32 @@ pub(crate) fn diagnosed_float(calibration: &Calibration) -> Result<Part, ExportE
         constants
             .define("SLIP", model.slip, "half-width of the sleeve's slip")
             .define("SMOOTH", SMOOTH as f32, "share of a sample in what the signal shows")
-            .define("SURE", model.sure, "by how much the sleeve must have come back")
-            .define("HIDEOUT", model.hideout, "variance of a target anywhere in it")
-            .define("HIDING", model.hiding, "the share of it that a sample adds");
+            .define(
+                "TURN_THRESHOLD",
+                model.turn_threshold,
+                "the sleeve has turned when the signal has come back by more",
+            )
+            .define(
+                "SLIP_VARIANCE",
+                model.slip_variance,
+                "variance of a target anywhere in the slip",
+            )
+            .define(
+                "SLIP_VARIANCE_SHARE",
+                model.slip_variance_share,
+                "share of that variance that a sample adds",
+            );
     }
     if has.contains(&"slip") || has.contains(&"hysteresis") {
-        has.push("wound");
-        let [wound, slope] = model.defects.wound;
+        has.push("initial_hysteresis");
+        let [initial, slope] = model.defects.initial_hysteresis;
         constants
-            .define("WOUND", wound, "how plays stand at a target of 0 where a stream begins")
-            .define("WOUND_SLOPE", slope, "and how that grows with the target");
+            .define(
+                "INITIAL_HYSTERESIS",
+                initial,
+                "state of the plays at a target of 0 where a stream begins",
+            )
+            .define("INITIAL_HYSTERESIS_SLOPE", slope, "change of that state per target");
     }
     if model.ahead_s != 0.0 {
         has.push("skew");
@@ -79,7 +95,7 @@ fn filter(constants: &mut Constants, model: &Diagnosed<f32>) {
         .define("LEAST_ANSWER", LEAST_ANSWER as f32, "of a drive to a target")
         .define("KEPT", model.kept, "what a rate keeps of itself in a sample")
         .define("KEPT_TWICE", model.kept_twice, "the same squared")
-        .define("WANDER", model.wander, "what it wanders, squared")
+        .define("PROCESS_NOISE", model.process_noise, "variance that a sample adds to the rate")
         .define("NOISE", model.noise, "variance of the signal around the model")
         .define("WIDEST", model.widest, "greatest variance of a target")
         .define("BEGIN_YY", tenth * tenth, "variance of the first target")

@@ -1,7 +1,7 @@
 //! `linear` and `poly13` in integers.
 
 use stretch_core::{Poly13, fixed::FixedPoly13};
-use stretch_receptor::code::{FixedNumbers, Scaled, Sheet, Sheets, Span};
+use stretch_receptor::code::{FixedNumbers, RangedSurface, RangedSurfaces, Scaled, Span};
 
 use crate::{
     constants::{Constants, Literal},
@@ -14,7 +14,7 @@ const STEP: &str = include_str!("../c/surfaces_fixed_step.h");
 
 /// The constants and the step of a converted calibration.
 pub(crate) fn surfaces_fixed(numbers: &FixedNumbers) -> Part {
-    let FixedNumbers { adc_bits, falling, dead_band, sheets, rate } = numbers;
+    let FixedNumbers { adc_bits, falling, dead_band, surfaces, rate } = numbers;
     let adc_bits = u32::from((*adc_bits).min(16));
     let (factor, shift) = rate.change;
     let mut constants = Constants::default();
@@ -41,17 +41,17 @@ pub(crate) fn surfaces_fixed(numbers: &FixedNumbers) -> Part {
             if *falling { u32::MAX } else { 0 },
             "all ones where a rising signal means a falling target",
         );
-    let (model, surface) = match sheets {
-        Sheets::Line(sheet) => {
-            let Scaled { of, thousandths } = sheet.surface;
+    let (model, surface) = match surfaces {
+        RangedSurfaces::Line(ranged) => {
+            let Scaled { of, thousandths } = ranged.surface;
             let (intercept, slope) = <(i32, i32)>::from(of);
-            let signal = span(&sheet.signal);
+            let signal = span(&ranged.signal);
             let line = [thousandths, intercept, slope].map(|n| n.c()).join(", ");
-            constants.sheets(&[format!("{{{}, {signal}, {line}}}", sheet.centre)]);
+            constants.surfaces(&[format!("{{{}, {signal}, {line}}}", ranged.centre)]);
             ("linear", include_str!("../c/line_fixed.h"))
         }
-        Sheets::Poly13([inflation, deflation]) => {
-            constants.sheets(&[poly13(inflation), poly13(deflation)]);
+        RangedSurfaces::Poly13([inflation, deflation]) => {
+            constants.surfaces(&[poly13(inflation), poly13(deflation)]);
             ("poly13", include_str!("../c/poly13_fixed.h"))
         }
     };
@@ -67,14 +67,14 @@ fn span(span: &Span) -> String {
     format!("{{{}, {}, {}}}", span.min.c(), span.width.c(), span.factor.c())
 }
 
-/// A branch's sheet.
-fn poly13(sheet: &Sheet<Scaled<FixedPoly13>>) -> String {
-    let Scaled { of, thousandths } = sheet.surface;
+/// The surface of one branch with its ranges.
+fn poly13(ranged: &RangedSurface<Scaled<FixedPoly13>>) -> String {
+    let Scaled { of, thousandths } = ranged.surface;
     // all of them integers of 32 bits: nothing is lost
     let Poly13 { p00, p10, p01, p11, p02, p12, p03 } = of.coefficients();
     let ordered = [p11, p12, p10, p00, p02, p03, p01].map(|p| p as i32);
     let ordered = ordered.map(|p| p.c()).join(", ");
-    let (signal, rate) = (span(&sheet.signal), span(&sheet.rate));
-    let domain = format!("{}, {signal}, {rate}, {}", sheet.centre, thousandths.c());
+    let (signal, rate) = (span(&ranged.signal), span(&ranged.rate));
+    let domain = format!("{}, {signal}, {rate}, {}", ranged.centre, thousandths.c());
     format!("{{{domain}, \\\n         {{{ordered}}}}}")
 }

@@ -4,7 +4,7 @@ use stretch_core::{Branch, Calibration, Poly13, RateEstimator};
 use stretch_filter::{SgFilter, SgShape};
 use stretch_receptor::{
     StretchReceptor,
-    numbers::{Line, Map, Sheet},
+    numbers::{Line, Map, RangedSurface},
 };
 
 use crate::{
@@ -54,11 +54,11 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
             ("linear", include_str!("../c/line_float.h"))
         }
         Map::Poly13([inflation, deflation]) => {
-            constants.sheets(&[poly13(inflation), poly13(deflation)]);
+            constants.surfaces(&[poly13(inflation), poly13(deflation)]);
             ("poly13", include_str!("../c/poly13_float.h"))
         }
-        Map::Surface([sheet, _]) => {
-            return Err(ExportError::NoForm { model: sheet.surface.degree().to_string() });
+        Map::Surface([ranged, _]) => {
+            return Err(ExportError::NoForm { model: ranged.surface.degree().to_string() });
         }
     };
     Ok(Part {
@@ -75,9 +75,9 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
     })
 }
 
-/// A branch's sheet.
-fn poly13(sheet: &Sheet<f32, Poly13<f32>>) -> String {
-    let Sheet { signal, rate, offset, rate_offset, surface } = *sheet;
+/// The surface of one branch with its ranges.
+fn poly13(ranged: &RangedSurface<f32, Poly13<f32>>) -> String {
+    let RangedSurface { signal, rate, offset, rate_offset, surface } = *ranged;
     let Poly13 { p00, p10, p01, p11, p02, p12, p03 } = surface;
     let join = |numbers: &[f32]| numbers.iter().map(Literal::c).collect::<Vec<_>>().join(", ");
     let domain = join(&[signal.min, signal.max, rate.min, rate.max, offset, rate_offset]);

@@ -6,7 +6,7 @@
 //! | uneven | [`local_polynomial`]: a fit at the actual times |
 //! | uneven, and an even grid is needed | [`resample`] first, at no finer a grid than the log has |
 //!
-//! [`noise_of_differences`] tells how noisy a log is, whatever moves in it.
+//! [`noise_of_differences`] gives the noise of a log, whatever the motion in the log.
 //!
 //! Every function writes into the caller's slice and allocates nothing.
 

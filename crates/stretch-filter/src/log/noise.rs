@@ -1,4 +1,4 @@
-//! How noisy a log is, told apart from its motion.
+//! The noise of a log, separated from its motion.
 
 /// The second differences `x[i-1] - 2 x[i] + x[i+1]` of a log: of a slow motion
 /// next to nothing, of white noise six times its variance.

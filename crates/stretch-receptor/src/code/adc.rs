@@ -1,20 +1,19 @@
-//! The converter at the edge.
+//! The analogue-to-digital converter.
 
 use stretch_core::DesignError;
 
-/// One conversion, right-aligned as data registers hold it.
+/// One conversion, right-aligned as in data registers.
 ///
-/// Any other number than `0 .. 2^bits` is a sample that did not come; firmware
-/// uses [`AdcCode::MISSING`].
+/// A number outside `0 .. 2^bits` is a missing sample; firmware uses [`AdcCode::MISSING`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AdcCode(pub i32);
 
 impl AdcCode {
-    /// A sample that did not come.
+    /// A missing sample.
     pub const MISSING: Self = Self(-1);
 }
 
-/// What a converter's codes mean.
+/// The meaning of a converter's codes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdcSpec {
     /// Bits of a code, 1 to 16.
@@ -56,7 +55,7 @@ impl Adc {
         Ok(Self(spec))
     }
 
-    /// The parts.
+    /// The checked specification.
     pub fn spec(&self) -> AdcSpec {
         self.0
     }
@@ -71,15 +70,15 @@ impl Adc {
         (self.0.full_scale_v - self.0.zero_v) / f64::from(self.largest())
     }
 
-    /// Volts of a code; `None` for one that the converter does not have.
+    /// Volts of a code; `None` for a code that the converter does not have.
     pub fn volts(&self, code: AdcCode) -> Option<f64> {
         let share = f64::from(code.0) / f64::from(self.largest());
         let volts = self.0.zero_v + share * (self.0.full_scale_v - self.0.zero_v);
         (0..=self.largest()).contains(&code.0).then_some(volts)
     }
 
-    /// The code that the converter gives for a voltage: the nearest, at the ends
-    /// the last; [`AdcCode::MISSING`] for NaN.
+    /// The code that the converter gives for a voltage: the nearest code, which beyond an end is that end;
+    /// [`AdcCode::MISSING`] for NaN.
     pub fn code(&self, volts: f64) -> AdcCode {
         if volts.is_nan() {
             return AdcCode::MISSING;

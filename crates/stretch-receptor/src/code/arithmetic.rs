@@ -1,10 +1,10 @@
-//! What evaluates a surface: [`Fixed`](super::Fixed) point, or a float.
+//! The arithmetic that evaluates a surface: [`Fixed`](super::Fixed) point, or a float.
 
 use stretch_core::DesignError;
 
 use super::{
     fold::Folded,
-    sheet::{Sheets, Span},
+    ranged_surface::{RangedSurfaces, Span},
 };
 
 pub(super) mod sealed {
@@ -16,18 +16,19 @@ pub(super) mod sealed {
         type Surface: Copy + core::fmt::Debug + PartialEq;
         type Estimate: Copy + core::fmt::Debug + PartialEq;
 
-        fn round(folded: &Folded) -> Result<Sheets<Self::Line, Self::Surface>, DesignError>;
-        /// The largest error in thousandths; `None` where it is a float's own.
+        fn round(folded: &Folded)
+        -> Result<RangedSurfaces<Self::Line, Self::Surface>, DesignError>;
+        /// The largest error in thousandths; `None` for the rounding of a float.
         fn worst_case(
-            sheets: &Sheets<Self::Line, Self::Surface>,
+            surfaces: &RangedSurfaces<Self::Line, Self::Surface>,
             rate_rounding: f64,
         ) -> Option<f64>;
-        /// As the step evaluates it: a float takes the factor of the span into its coefficients.
+        /// The line that the step evaluates: a float takes the factor of the span into its coefficients.
         fn line_over(line: Self::Line, signal: &Span) -> Self::Line;
         fn surface_over(surface: Self::Surface, signal: &Span, rate: &Span) -> Self::Surface;
-        /// At a signal inside its span.
+        /// Evaluates a line at a signal inside its span.
         fn line(line: &Self::Line, signal: &Span, volts: i32) -> Self::Estimate;
-        /// At a rate and a signal inside their spans.
+        /// Evaluates a surface at a rate and a signal inside their spans.
         fn surface(
             surface: &Self::Surface,
             volts: (&Span, i32),
@@ -38,6 +39,6 @@ pub(super) mod sealed {
     }
 }
 
-/// The arithmetic that a [`CodeReceptor`](super::CodeReceptor) evaluates its
-/// surface in: [`Fixed`](crate::code::Fixed), `f32` or `f64`.
+/// The arithmetic in which a [`CodeReceptor`](super::CodeReceptor) evaluates its surface:
+/// [`Fixed`](crate::code::Fixed), `f32` or `f64`.
 pub trait CodeArithmetic: sealed::Arithmetic {}

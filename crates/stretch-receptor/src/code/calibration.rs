@@ -11,7 +11,7 @@ use super::{
     arithmetic::CodeArithmetic,
     fixed_arithmetic::{Fixed, Scaled, worst_case},
     fold::{Units, fold},
-    sheet::Sheets,
+    ranged_surface::RangedSurfaces,
 };
 use crate::fold::output;
 
@@ -22,10 +22,8 @@ pub const CODE_SCHEMA: u32 = stretch_core::CALIBRATION_SCHEMA;
 /// with a Savitzky-Golay rate of `WINDOW`, `DEGREE` and `DELAY`.
 ///
 /// Everything affine (volts per code, both normalisations, the target's unit,
-/// the sample rate, the polarity) is folded into the coefficients. Serialised
-/// with the feature `serde`, it is what a board carries in flash: about 100
-/// bytes, checked while it loads, and without a floating-point design on the
-/// board.
+/// the sample rate, the polarity) is folded into the coefficients. A board carries the serialised form (feature
+/// `serde`) in flash: about 100 bytes, checked when loaded, and without a floating-point design on the board.
 ///
 /// ```
 /// use stretch_receptor::code::{Adc, AdcSpec, FixedCalibration};
@@ -49,14 +47,14 @@ pub struct CodeCalibration<
     pub(super) falling: bool,
     /// The largest rate that keeps the branch.
     pub(super) dead_band: i32,
-    pub(super) sheets: Sheets<A::Line, A::Surface>,
+    pub(super) surfaces: RangedSurfaces<A::Line, A::Surface>,
 }
 
 /// A calibration in fixed point: [`CodeCalibration`] in [`Fixed`].
 pub type FixedCalibration<const WINDOW: usize, const DEGREE: usize, const DELAY: usize = 0> =
     CodeCalibration<Fixed, WINDOW, DEGREE, DELAY>;
 
-/// What a [`FixedReceptor`](super::FixedReceptor) computes with.
+/// The numbers of a [`FixedReceptor`](super::FixedReceptor).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FixedNumbers {
     /// Bits of the converter.
@@ -66,7 +64,7 @@ pub struct FixedNumbers {
     /// The largest integer rate that keeps the branch.
     pub dead_band: i32,
     /// A line, or a surface a branch.
-    pub sheets: Sheets<Scaled<FixedLine>, Scaled<FixedPoly13>>,
+    pub surfaces: RangedSurfaces<Scaled<FixedLine>, Scaled<FixedPoly13>>,
     /// The rate.
     pub rate: FixedSgIntegers,
 }
@@ -92,9 +90,9 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
             FixedSgRate::<u16, WINDOW, DEGREE, DELAY>::LARGEST,
         );
         let dead_band = libm::floor(calibration.dead_band / units.rate_v_per_s);
-        let sheets = A::round(&fold(calibration, &units)?)?;
+        let surfaces = A::round(&fold(calibration, &units)?)?;
         let (gain, _) = output(calibration);
-        if let Some(error) = A::worst_case(&sheets, Self::rate_rounding()) {
+        if let Some(error) = A::worst_case(&surfaces, Self::rate_rounding()) {
             DesignError::check("fixed.error", error, error <= 1e-4 * 1000.0 * gain.abs())?;
         }
         Ok(Self {
@@ -103,11 +101,11 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
             falling: calibration.polarity == Polarity::Falling,
             // the cast saturates: no rate is beyond 32 bits
             dead_band: dead_band as i32,
-            sheets,
+            surfaces,
         })
     }
 
-    /// Samples a second at which the rate is right.
+    /// Sample rate for which the rate estimator is designed.
     pub fn sample_rate(&self) -> SampleRate {
         self.sample_rate
     }
@@ -134,7 +132,7 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
         same("rate.delay", delay, DELAY)
     }
 
-    /// By how much of its unit the integer rate may be rounded.
+    /// Largest rounding of the integer rate, in its unit.
     fn rate_rounding() -> f64 {
         if FixedSgRate::<u16, WINDOW, DEGREE, DELAY>::SHIFT == 0 { 0.0 } else { 0.5 }
     }
@@ -143,13 +141,13 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
 impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
     FixedCalibration<WINDOW, DEGREE, DELAY>
 {
-    /// The integers, the shape forgotten: for whoever writes the step in another language.
+    /// The integers, without the shape in their type, for an implementation of the step in another language.
     pub fn numbers(&self) -> FixedNumbers {
         FixedNumbers {
             adc_bits: self.bits,
             falling: self.falling,
             dead_band: self.dead_band,
-            sheets: self.sheets,
+            surfaces: self.surfaces,
             rate: FixedSgRate::<u16, WINDOW, DEGREE, DELAY>::INTEGERS,
         }
     }
@@ -166,6 +164,6 @@ impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
     /// missing sample. A bridged sample is rounded to 1/65536 of the converter's
     /// full scale, as a converter of 16 bits would.
     pub fn worst_case_error_um(&self) -> f64 {
-        worst_case(&self.sheets, Self::rate_rounding())
+        worst_case(&self.surfaces, Self::rate_rounding())
     }
 }

@@ -6,12 +6,12 @@ use stretch_core::{DesignError, SampleRate};
 use super::{
     arithmetic::CodeArithmetic,
     calibration::{CODE_SCHEMA, CodeCalibration},
-    sheet::Sheets,
+    ranged_surface::RangedSurfaces,
 };
 
 #[derive(Serialize, Deserialize)]
 struct CodeRecord<L, P> {
-    /// First, so that a newer record is refused before the rest is read.
+    /// Schema of the record. The field stands first, so that a newer record is refused before the rest is read.
     schema: u32,
     /// Window, degree and delay of the rate.
     shape: (u16, u8, u16),
@@ -19,7 +19,8 @@ struct CodeRecord<L, P> {
     sample_rate_hz: SampleRate,
     falling: bool,
     dead_band: i32,
-    sheets: Sheets<L, P>,
+    #[serde(rename = "sheets")]
+    surfaces: RangedSurfaces<L, P>,
 }
 
 impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: usize> Serialize
@@ -36,7 +37,7 @@ where
             sample_rate_hz: self.sample_rate,
             falling: self.falling,
             dead_band: self.dead_band,
-            sheets: self.sheets,
+            surfaces: self.surfaces,
         }
         .serialize(serializer)
     }
@@ -58,7 +59,7 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
     CodeCalibration<A, WINDOW, DEGREE, DELAY>
 {
     fn check(record: CodeRecord<A::Line, A::Surface>) -> Result<Self, DesignError> {
-        let CodeRecord { schema, shape, adc_bits, sample_rate_hz, falling, dead_band, sheets } =
+        let CodeRecord { schema, shape, adc_bits, sample_rate_hz, falling, dead_band, surfaces } =
             record;
         if !(1..=CODE_SCHEMA).contains(&schema) {
             return Err(DesignError::Schema { found: schema, newest: CODE_SCHEMA });
@@ -66,17 +67,17 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
         Self::check_shape(shape)?;
         DesignError::check("adc.bits", adc_bits.into(), (1..=16).contains(&adc_bits))?;
         DesignError::check("dead_band", dead_band.into(), dead_band >= 0)?;
-        let spans = match &sheets {
-            Sheets::Line(sheet) => {
-                A::valid_line(&sheet.surface)?;
-                sheet.signal.holds()
+        let spans = match &surfaces {
+            RangedSurfaces::Line(ranged) => {
+                A::valid_line(&ranged.surface)?;
+                ranged.signal.holds()
             }
-            Sheets::Poly13(both) => {
-                both.iter().try_for_each(|sheet| A::valid_surface(&sheet.surface))?;
-                both.iter().all(|sheet| sheet.signal.holds() && sheet.rate.holds())
+            RangedSurfaces::Poly13(both) => {
+                both.iter().try_for_each(|ranged| A::valid_surface(&ranged.surface))?;
+                both.iter().all(|ranged| ranged.signal.holds() && ranged.rate.holds())
             }
         };
         DesignError::check("domain", 0.0, spans)?;
-        Ok(Self { bits: adc_bits, sample_rate: sample_rate_hz, falling, dead_band, sheets })
+        Ok(Self { bits: adc_bits, sample_rate: sample_rate_hz, falling, dead_band, surfaces })
     }
 }

@@ -8,20 +8,20 @@ use stretch_core::{
 use super::{
     arithmetic::{CodeArithmetic, sealed},
     fold::Folded,
-    sheet::{COARSE_BITS, Sheets, Span},
+    ranged_surface::{COARSE_BITS, RangedSurfaces, Span},
 };
 
 /// 32-bit fixed point; estimates are thousandths of the reference's unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fixed {}
 
-/// A fixed-point line or surface in `2^-bits` thousandths, half of one included.
+/// A fixed-point line or surface in `2^-bits` thousandths, half a thousandth included for rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Scaled<S> {
     /// The line or surface.
     pub of: S,
-    /// `2^(32 - bits)`: what the upper word of a product with it makes thousandths.
+    /// The factor `2^(32 - bits)`: the upper word of a product with this factor is in thousandths.
     pub thousandths: i32,
 }
 
@@ -31,15 +31,15 @@ impl<S> Scaled<S> {
         DesignError::check("fixed.thousandths", self.thousandths.into(), holds).map(|_| ())
     }
 
-    /// Least bits to thousandths: the half is already in.
+    /// Converts least bits to thousandths; the half for rounding is already included.
     #[inline(always)]
     fn finish(&self, bits: i32) -> i32 {
         ((i64::from(bits) * i64::from(self.thousandths)) >> 32) as i32
     }
 }
 
-/// Bits behind the thousandths: beyond these the half that rounds would cost more
-/// range than it gains precision, and with fewer it would not fit.
+/// Bits behind the thousandths: with more bits the half for rounding would cost more range than it gains precision,
+/// and with fewer bits the half would not fit.
 const BITS: core::ops::RangeInclusive<u8> = 2..=16;
 
 impl CodeArithmetic for Fixed {}
@@ -48,20 +48,23 @@ impl sealed::Arithmetic for Fixed {
     type Surface = Scaled<FixedPoly13>;
     type Estimate = i32;
 
-    /// The finest thousandths in which everything fits.
-    fn round(folded: &Folded) -> Result<Sheets<Self::Line, Self::Surface>, DesignError> {
+    /// The surfaces with the most bits behind the thousandths that fit.
+    fn round(folded: &Folded) -> Result<RangedSurfaces<Self::Line, Self::Surface>, DesignError> {
         let mut refused = DesignError::OutOfRange { field: "fixed.bits", value: 0.0 };
         for bits in BITS.rev() {
             match fixed_with(folded, bits) {
-                Ok(sheets) => return Ok(sheets),
+                Ok(surfaces) => return Ok(surfaces),
                 Err(error) => refused = error,
             }
         }
         Err(refused)
     }
 
-    fn worst_case(sheets: &Sheets<Self::Line, Self::Surface>, rate_rounding: f64) -> Option<f64> {
-        Some(worst_case(sheets, rate_rounding))
+    fn worst_case(
+        surfaces: &RangedSurfaces<Self::Line, Self::Surface>,
+        rate_rounding: f64,
+    ) -> Option<f64> {
+        Some(worst_case(surfaces, rate_rounding))
     }
 
     fn line_over(line: Self::Line, _: &Span) -> Self::Line {
@@ -93,7 +96,7 @@ impl sealed::Arithmetic for Fixed {
 fn fixed_with(
     folded: &Folded,
     bits: u8,
-) -> Result<Sheets<Scaled<FixedLine>, Scaled<FixedPoly13>>, DesignError> {
+) -> Result<RangedSurfaces<Scaled<FixedLine>, Scaled<FixedPoly13>>, DesignError> {
     let scale = 1000.0 * f64::from(1u32 << bits);
     let half = 0.5 * f64::from(1u32 << bits);
     let thousandths = 1 << (32 - bits);
@@ -117,41 +120,41 @@ fn fixed_with(
     )
 }
 
-/// The largest error of sheets in thousandths: see
+/// The largest error of surfaces in thousandths: see
 /// [`FixedCalibration::worst_case_error_um`](super::FixedCalibration::worst_case_error_um).
 pub(super) fn worst_case(
-    sheets: &Sheets<Scaled<FixedLine>, Scaled<FixedPoly13>>,
+    surfaces: &RangedSurfaces<Scaled<FixedLine>, Scaled<FixedPoly13>>,
     rate_rounding: f64,
 ) -> f64 {
-    // an end of a domain is a whole number: up to one off, and the rate's own rounding
+    // an end of a domain is rounded to a whole number, which adds up to one to the rate's own rounding
     let spread = |factor: i32, rounding: f64| libm::ldexp(rounding * f64::from(factor), -32);
     let signal = |factor: i32| spread(factor, 1.0 + f64::from(1u32 << COARSE_BITS) * SIGNAL_F64);
     let bits =
         |error: f64, thousandths: i32| 0.5 + libm::ldexp(error * f64::from(thousandths), -32);
-    match sheets {
-        Sheets::Line(sheet) => {
-            let (_, slope) = <(i32, i32)>::from(sheet.surface.of);
-            let error = FixedLine::ROUNDING + f64::from(slope).abs() * signal(sheet.signal.factor);
-            bits(error, sheet.surface.thousandths)
+    match surfaces {
+        RangedSurfaces::Line(ranged) => {
+            let (_, slope) = <(i32, i32)>::from(ranged.surface.of);
+            let error = FixedLine::ROUNDING + f64::from(slope).abs() * signal(ranged.signal.factor);
+            bits(error, ranged.surface.thousandths)
         }
-        Sheets::Poly13(both) => {
-            let each = both.map(|sheet| {
-                let p = sheet.surface.of.coefficients();
-                // the steepest that the surface can be for inputs within a half
+        RangedSurfaces::Poly13(both) => {
+            let each = both.map(|ranged| {
+                let p = ranged.surface.of.coefficients();
+                // the steepest slope of the surface for inputs within a half
                 let by_rate = p.p10.abs() + 0.5 * p.p11.abs() + 0.25 * p.p12.abs();
                 let by_signal = p.p01.abs()
                     + p.p02.abs()
                     + 0.75 * p.p03.abs()
                     + 0.5 * (p.p11.abs() + p.p12.abs());
                 let error = FixedPoly13::ROUNDING
-                    + by_rate * spread(sheet.rate.factor, 1.0 + rate_rounding)
-                    + by_signal * signal(sheet.signal.factor);
-                bits(error, sheet.surface.thousandths)
+                    + by_rate * spread(ranged.rate.factor, 1.0 + rate_rounding)
+                    + by_signal * signal(ranged.signal.factor);
+                bits(error, ranged.surface.thousandths)
             });
             each[0].max(each[1])
         }
     }
 }
 
-/// What `f64` may cost a sample's place in the fold, in samples.
+/// Largest rounding error of `f64` in a sample's place, in samples.
 const SIGNAL_F64: f64 = 1e-9;

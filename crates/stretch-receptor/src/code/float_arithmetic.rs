@@ -5,7 +5,7 @@ use stretch_core::{DesignError, Poly13, Real};
 use super::{
     arithmetic::{CodeArithmetic, sealed},
     fold::Folded,
-    sheet::{Sheets, Span},
+    ranged_surface::{RangedSurfaces, Span},
 };
 
 macro_rules! float {
@@ -16,15 +16,16 @@ macro_rules! float {
             type Surface = Poly13<$float>;
             type Estimate = $float;
 
-            fn round(folded: &Folded) -> Result<Sheets<[$float; 2], Poly13<$float>>, DesignError> {
+            fn round(folded: &Folded) -> Result<RangedSurfaces<[$float; 2], Poly13<$float>>, DesignError> {
                 float(folded)
             }
 
-            fn worst_case(_: &Sheets<Self::Line, Self::Surface>, _: f64) -> Option<f64> {
+            fn worst_case(_: &RangedSurfaces<Self::Line, Self::Surface>, _: f64) -> Option<f64> {
                 None
             }
 
-            // a factor is a power of two: whether it multiplies an input or a coefficient, the bits are the same
+            // a factor is a power of two, so that the bits are the same whether the factor multiplies an input or a
+            // coefficient
             fn line_over([intercept, slope]: Self::Line, signal: &Span) -> Self::Line {
                 [intercept, slope * signal.factor as $float]
             }
@@ -70,7 +71,7 @@ fn finite<T: Real>(coefficients: &[T]) -> Result<(), DesignError> {
 }
 
 /// The coefficients over integers instead of halves, rounded.
-fn float<T: Real>(folded: &Folded) -> Result<Sheets<[T; 2], Poly13<T>>, DesignError> {
+fn float<T: Real>(folded: &Folded) -> Result<RangedSurfaces<[T; 2], Poly13<T>>, DesignError> {
     let round = |c: f64, powers: i32| T::from_f64(libm::ldexp(c, -32 * powers));
     folded.try_map(
         |&[intercept, slope]| Ok([round(intercept, 0), round(slope, 1)]),

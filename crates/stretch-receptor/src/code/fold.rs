@@ -1,19 +1,19 @@
-//! A calibration over volts becomes one over a converter's integers, in `f64`.
+//! Converts a calibration over volts into a calibration over a converter's integers, in `f64`.
 
 use stretch_core::{BranchSurface, Calibration, DesignError, Interval, LinearMap, Model, Poly13};
 
 use super::{
     adc::Adc,
-    sheet::{COARSE_BITS, Sheet, Sheets, Span},
+    ranged_surface::{COARSE_BITS, RangedSurface, RangedSurfaces, Span},
 };
 use crate::fold::output;
 
-/// Reference units over inputs in -1/2..1/2: what each arithmetic rounds.
-pub(super) type Folded = Sheets<[f64; 2], Poly13>;
+/// Surfaces in reference units over inputs in -1/2..1/2, before an arithmetic rounds them.
+pub(super) type Folded = RangedSurfaces<[f64; 2], Poly13>;
 
-/// Integers and what they mean.
+/// Units of the integers.
 pub(super) struct Units {
-    /// Volts at an aligned sample of 0, and a step of it.
+    /// Volts at an aligned sample of 0, and volts per step of the sample.
     pub zero_v: f64,
     pub step_v: f64,
     /// Volts a second per unit of the integer rate, and the most units there can be.
@@ -29,23 +29,23 @@ impl Units {
     }
 }
 
-/// A part of an integer that rounding of `f64` may have cost at an end of a domain.
+/// Tolerance for the rounding of `f64` at an end of a domain, in integers.
 const SLACK: f64 = 1.0 / 1024.0;
 
 /// The integers inside `min ..= max`, at most `most` in magnitude.
 fn span(min: f64, max: f64, most: i32) -> Span {
     let end = |x: f64| x.clamp(-f64::from(most), f64::from(most)) as i32;
     let (min, max) = (end(libm::ceil(min - SLACK)), end(libm::floor(max + SLACK)));
-    // an interval between two integers, or wholly outside: the nearest one
+    // an interval between two integers, or wholly outside, becomes the nearest integer
     Span::new(min, max.max(min))
 }
 
 pub(super) fn fold(calibration: &Calibration, units: &Units) -> Result<Folded, DesignError> {
     match &calibration.model {
-        Model::Linear(line) => Ok(Sheets::Line(fold_line(calibration, line, units))),
+        Model::Linear(line) => Ok(RangedSurfaces::Line(fold_line(calibration, line, units))),
         Model::Surfaces { inflation, deflation } => {
-            let sheet = |branch| fold_surface(calibration, branch, units);
-            Ok(Sheets::Poly13([sheet(inflation)?, sheet(deflation)?]))
+            let ranged = |branch| fold_surface(calibration, branch, units);
+            Ok(RangedSurfaces::Poly13([ranged(inflation)?, ranged(deflation)?]))
         }
         other => Err(other.instead_of("linear or surfaces")),
     }
@@ -70,19 +70,23 @@ fn normalised(calibration: &Calibration, centre: u16, volts: f64, units: &Units)
     (range.normalise(centre_v), volts / range.span())
 }
 
-fn fold_line(calibration: &Calibration, line: &LinearMap, units: &Units) -> Sheet<[f64; 2]> {
+fn fold_line(
+    calibration: &Calibration,
+    line: &LinearMap,
+    units: &Units,
+) -> RangedSurface<[f64; 2]> {
     let (gain, zero) = output(calibration);
     let (centre, span, volts) = signal(line.signal_domain, units);
     let (at, per) = normalised(calibration, centre, volts, units);
     let surface = [zero + gain * (line.intercept + line.slope * at), gain * line.slope * per];
-    Sheet { centre, signal: span, rate: Span::new(0, 0), surface }
+    RangedSurface { centre, signal: span, rate: Span::new(0, 0), surface }
 }
 
 fn fold_surface(
     calibration: &Calibration,
     branch: &BranchSurface,
     units: &Units,
-) -> Result<Sheet<Poly13>, DesignError> {
+) -> Result<RangedSurface<Poly13>, DesignError> {
     let degree = branch.surface.degree();
     let Some(p) = branch.surface.as_poly13() else {
         let (field, asked) = ("model.surface.terms", degree.terms());
@@ -99,7 +103,7 @@ fn fold_surface(
     let (at, per) = normalised(calibration, centre, volts, units);
     let (still, moving) =
         (branch.rate_range.normalise(0.0), sign * per_s / branch.rate_range.span());
-    // the row of the rate, and what a rate of zero leaves at rest
+    // the terms of the rate, then the cubic at a rate of zero
     let by_rate = shifted([p.p10, p.p11, p.p12, 0.0], at, per);
     let at_rest = shifted([p.p00, p.p01, p.p02, p.p03], at, per);
     let rest = |j: usize| gain * (at_rest[j] + still * by_rate[j]);
@@ -113,7 +117,7 @@ fn fold_surface(
         p11: rise(1),
         p12: rise(2),
     };
-    Ok(Sheet { centre, signal, rate, surface })
+    Ok(RangedSurface { centre, signal, rate, surface })
 }
 
 /// The cubic `c` in `at + per x`, as a cubic in x.

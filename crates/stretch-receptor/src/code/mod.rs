@@ -3,7 +3,7 @@
 //! An analogue-to-digital converter gives integers, and a Savitzky-Golay rate of
 //! integers is an integer: up to the surface nothing has to be rounded and no
 //! floating-point number is needed. [`CodeReceptor`] works that way. It answers
-//! as [`StretchReceptor`](crate::StretchReceptor) does (branch, domain, warm-up,
+//! like [`StretchReceptor`](crate::StretchReceptor) (branch, domain, warm-up,
 //! missing samples) and evaluates the surface
 //!
 //! - in 32-bit fixed point ([`FixedReceptor`]): thousandths of the reference's
@@ -11,9 +11,9 @@
 //! - in `f32` ([`CodeReceptor<f32, ..>`](CodeReceptor)): six products and six
 //!   sums, the reference's unit.
 //!
-//! [`FixedObserver`] does the same for a model that remembers.
+//! [`FixedObserver`] is the receptor of this kind for a model that remembers.
 //!
-//! A calibration is converted once, on a desk, by [`CodeCalibration::new`], and
+//! A calibration is converted once, on a computer, by [`CodeCalibration::new`], and
 //! travels as a record of about 100 bytes.
 #![doc = include_str!("board.md")]
 
@@ -27,9 +27,9 @@ mod float_arithmetic;
 mod fold;
 mod observer;
 mod observer_numbers;
+mod ranged_surface;
 mod reading;
 mod receptor;
-mod sheet;
 
 pub use adc::{Adc, AdcCode, AdcSpec};
 pub use arithmetic::CodeArithmetic;
@@ -37,6 +37,6 @@ pub use calibration::{CODE_SCHEMA, CodeCalibration, FixedCalibration, FixedNumbe
 pub use fixed_arithmetic::{Fixed, Scaled};
 pub use observer::{FixedObserver, IntegerObserver};
 pub use observer_numbers::{Numbers, Rest};
+pub use ranged_surface::{RangedSurface, RangedSurfaces, Span};
 pub use reading::CodeReading;
 pub use receptor::{CodeReceptor, FixedReceptor};
-pub use sheet::{Sheet, Sheets, Span};

@@ -14,24 +14,23 @@ use crate::{Domain, Front, front::Live, gains::SLOPES};
 
 /// The fastest rate: a whole range in a sample.
 const FASTEST: i32 = 1 << TARGET_BITS;
-/// No target: beyond every target that a record may allow.
+/// Marks a memory without a target: the value is beyond every target that a record may allow.
 const UNBEGUN: i32 = i32::MIN;
-/// The furthest that a relaxation goes.
+/// Largest magnitude of a relaxation.
 const FURTHEST: i32 = 8 << TARGET_BITS;
-/// The furthest that a drive goes.
+/// Largest magnitude of a drive.
 const MOST_DRIVE: i32 = 1 << 30;
-/// A secant is taken over at least this share of the way between knots.
+/// Least length of a secant, as a share of the distance between knots.
 const LEAST_RUN: i32 = (1 << PLACE_BITS) / 100;
 
 /// An [`ObserverReceptor`](crate::ObserverReceptor) for converter codes, in
 /// 32-bit integers: the same filter with the same table of gains, codes in,
 /// thousandths of the reference's unit out (micrometres for millimetres).
 ///
-/// Converted once, on a desk, by [`FixedObserver::new`]; with the feature
-/// `serde` it travels as a record of about 400 bytes. No step can overflow:
-/// numbers whose sums could are refused, states are clamped to where they can be.
-/// A code that the converter does not have is a missing sample, predicted over at
-/// most [`MAX_BRIDGED`](crate::MAX_BRIDGED) in a row.
+/// [`FixedObserver::new`] converts a calibration once, on a computer; with the feature `serde` the observer travels
+/// as a record of about 400 bytes. No step can overflow: numbers whose sums could overflow are refused, and states
+/// are clamped to their ranges. A code that the converter does not have is a missing sample; at most
+/// [`MAX_BRIDGED`](crate::MAX_BRIDGED) of them in a row are bridged by prediction.
 ///
 /// ```
 /// use stretch_core::Runner;
@@ -48,15 +47,15 @@ pub type FixedObserver = Front<IntegerObserver>;
 /// The model of a [`FixedObserver`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IntegerObserver {
-    /// What the record holds.
+    /// The numbers of the record.
     pub numbers: Numbers,
     /// Places per signal inside each segment, times `2^recip_bits`.
     pub recips: [i32; KNOTS],
-    /// See `recips`.
+    /// Bits behind the point of `recips`.
     pub recip_bits: u32,
-    /// The gains of each segment's slope.
+    /// Index of the gains for each segment's slope.
     pub tangents: [u8; KNOTS],
-    /// The signal where the target rests, memory settled.
+    /// The signal of a target at rest with settled memory.
     pub at_rest: i32,
 }
 
@@ -65,7 +64,7 @@ pub struct IntegerObserver {
 pub struct IntegerMemory {
     /// [`UNBEGUN`] before the first sample.
     target: i32,
-    /// A sample, not a second.
+    /// Rate per sample, not per second.
     rate: i32,
     slow: [i32; MAX_OBSERVER_RELAXATIONS],
     plays: [i32; MAX_OBSERVER_PLAYS],
@@ -101,7 +100,7 @@ impl IntegerObserver {
         let knots = usize::from(n.knots);
         let rise = |k: usize| n.curve[k + 1] - n.curve[k];
         let flattest = (0..knots - 1).map(rise).min().unwrap_or(1).max(1);
-        // the flattest segment has the largest reciprocal: it must fit
+        // the flattest segment has the largest reciprocal, which must fit
         let mut recip_bits = 0;
         while recip_bits < 31 && (2i64 << (PLACE_BITS + recip_bits)) / i64::from(flattest) < 1 << 31
         {
@@ -119,7 +118,7 @@ impl IntegerObserver {
         out
     }
 
-    /// The place, in knots, that a signal suggests by itself, and the signal held to the curve.
+    /// The place, in knots, at which the curve has the signal, and the signal held to the curve.
     #[inline(always)]
     fn inverse(&self, signal: i32) -> (i32, i32) {
         let last = usize::from(self.numbers.knots) - 1;
@@ -173,7 +172,7 @@ impl IntegerObserver {
         }
     }
 
-    /// Takes in a signal above its baseline; whether it lay on the curve.
+    /// Takes in a signal above its baseline; answers whether the signal lay on the curve.
     #[inline(always)]
     fn correct(&self, memory: &mut IntegerMemory, signal: i32) -> bool {
         let drive = self.drive(memory, memory.target, memory.rate);
@@ -182,7 +181,7 @@ impl IntegerObserver {
         let mut place = usize::from(self.tangents[segment]);
         let (run, change) = ((to - from).abs(), (held - predicted).abs());
         if run > LEAST_RUN {
-            // steeper than an end: change/run >= end, without a division
+            // the slope is at least an end where change/run >= end, tested without a division
             let change = i64::from(change) << PLACE_BITS;
             while place < SLOPES - 1
                 && change >= i64::from(self.numbers.ends[place]) * i64::from(run)
@@ -222,7 +221,7 @@ impl IntegerObserver {
         }
     }
 
-    /// The signal above the baseline, which is moved on.
+    /// Moves the baseline on, and gives the signal above it.
     #[inline(always)]
     fn above_rest(&self, memory: &mut IntegerMemory, signal: i32) -> i32 {
         let rest = &self.numbers.rest;
@@ -306,7 +305,7 @@ impl Live for IntegerObserver {
         })
     }
 
-    /// By the motion that it predicts.
+    /// Bridges by the predicted motion.
     fn bridge(&self, memory: &mut IntegerMemory, _: u8) -> bool {
         let begun = memory.begun();
         if begun {
@@ -322,7 +321,7 @@ impl Live for IntegerObserver {
     }
 }
 
-/// A share of a number, rounded to the nearest.
+/// A share of a number, rounded to the nearest integer.
 #[inline(always)]
 fn part(x: i32, share: i32) -> i32 {
     ((i64::from(x) * i64::from(share) + (1 << (SHARE_BITS - 1))) >> SHARE_BITS) as i32

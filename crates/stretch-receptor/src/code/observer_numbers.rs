@@ -21,9 +21,9 @@ pub(super) const WEIGHT_BITS: u32 = 20;
 pub(super) const PLACE_BITS: u32 = 16;
 /// Bits behind the point of shares.
 pub(super) const SHARE_BITS: u32 = 31;
-/// Bits that a 16-bit sample is moved up by.
+/// Bits by which a 16-bit sample is shifted up.
 pub(super) const SIGNAL_BITS: u32 = 12;
-/// Largest magnitudes: with them no sum of a step leaves 32 bits, no product 63.
+/// Largest magnitudes, with which no sum of a step leaves 32 bits and no product 63 bits.
 const MOST_SIGNAL: i32 = 1 << 28;
 const MOST_TARGET: i32 = 4 << TARGET_BITS;
 const MOST_WEIGHT: i32 = 16 << WEIGHT_BITS;
@@ -35,13 +35,13 @@ const MOST_LEAD: i32 = 1000 << WEIGHT_BITS;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Numbers {
-    /// First, so that a newer record is refused before the rest is read.
+    /// Schema of the record. The field stands first, so that a newer record is refused before the rest is read.
     pub schema: u32,
     /// Bits of the converter.
     pub adc_bits: u8,
     /// The signal falls as the target rises.
     pub falling: bool,
-    /// Knots of the curve.
+    /// Number of knots of the curve.
     pub knots: u8,
     /// Signals at the knots, rising.
     pub curve: [i32; KNOTS],
@@ -49,39 +49,39 @@ pub struct Numbers {
     pub drive_low: i32,
     /// Places per drive, times `2^(32 + PLACE_BITS - TARGET_BITS)`.
     pub per_step: i32,
-    /// The share of the way that each relaxation goes in a sample.
+    /// Share of its distance that each relaxation covers in a sample.
     pub shares: [i32; MAX_OBSERVER_RELAXATIONS],
-    /// What each adds to the drive.
+    /// Weight of each relaxation in the drive.
     pub amplitudes: [i32; MAX_OBSERVER_RELAXATIONS],
     /// Samples by which the signal leads.
     pub lead: i32,
     /// Half-widths of the plays.
     pub radii: [i32; MAX_OBSERVER_PLAYS],
-    /// What each adds to the drive.
+    /// Weight of each play in the drive.
     pub play_weights: [i32; MAX_OBSERVER_PLAYS],
-    /// How many there are.
+    /// Number of relaxations.
     pub relaxations: u8,
-    /// How many there are.
+    /// Number of plays.
     pub plays: u8,
     /// Signal per place between gains.
     pub ends: [i32; SLOPES - 1],
     /// State per signal, times `2^gain_bits`.
     pub gains: [[i32; STATES]; SLOPES],
-    /// See `gains`.
+    /// Bits behind the point of `gains`.
     pub gain_bits: u8,
     /// The least target.
     pub low: i32,
-    /// The greatest.
+    /// The greatest target.
     pub high: i32,
     /// The largest rate that keeps the branch.
     pub dead_band: i32,
-    /// Thousandths at a target of 0, a half included, and per target, times `2^output_bits`.
+    /// Thousandths at a target of 0, with a half for rounding, times `2^output_bits`.
     pub zero: i64,
-    /// See `zero`.
+    /// Thousandths per target, times `2^output_bits`.
     pub gain: i32,
-    /// See `zero`.
+    /// Bits behind the point of `zero` and `gain`.
     pub output_bits: u8,
-    /// Nothing is followed without a pull.
+    /// The baseline, which is followed only where `pull` is above zero.
     pub rest: Rest,
 }
 
@@ -91,15 +91,16 @@ pub struct Numbers {
 pub struct Rest {
     /// The resting signal.
     pub level: i32,
-    /// Share of the excess that is taken up in a sample.
+    /// Share of a negative mean excess (signal above baseline and resting level) by which the baseline falls in a
+    /// sample.
     pub pull: i32,
-    /// What the baseline rises by in a sample without excess.
+    /// Rise of the baseline in a sample whose mean excess is not negative.
     pub leak: i32,
-    /// Share of a sample in the running average of the excess.
+    /// Share of a sample in the running mean of the excess.
     pub average: i32,
-    /// The most that an excess counts for.
+    /// Largest magnitude of an excess in the mean.
     pub most: i32,
-    /// The furthest that the baseline goes.
+    /// Largest magnitude of the baseline.
     pub furthest: i32,
 }
 
@@ -192,7 +193,7 @@ impl Numbers {
             dead_band: target(
                 (reference_dead_band(calibration) / (gain / 1000.0)).abs() * period_s,
             )?,
-            // the cast saturates, and the sum with it: `check` refuses what does not fit
+            // the cast and the sum saturate, and `check` refuses numbers that do not fit
             zero: (libm::ldexp(zero, (TARGET_BITS + output_bits) as i32) as i64)
                 .saturating_add(libm::ldexp(half, (TARGET_BITS + output_bits) as i32) as i64),
             gain: fixed::from_f64("fixed.gain", gain, output_bits)?,
@@ -202,7 +203,7 @@ impl Numbers {
         .check()
     }
 
-    /// Refuses what a step could not compute with.
+    /// Refuses numbers with which a step could overflow.
     pub(super) fn check(self) -> Result<Self, DesignError> {
         if !(1..=SCHEMA).contains(&self.schema) {
             return Err(DesignError::Schema { found: self.schema, newest: SCHEMA });
@@ -254,7 +255,7 @@ impl Numbers {
         Ok(Self { schema: SCHEMA, ..self })
     }
 
-    /// The first number that is no code.
+    /// The least number that is no code.
     pub(super) fn codes(&self) -> u32 {
         1 << self.adc_bits
     }
@@ -282,7 +283,7 @@ fn each<const N: usize>(
     Ok(out)
 }
 
-/// How many bits behind the point leave `largest` inside 31.
+/// Number of bits behind the point with which `largest` fits 31 bits.
 fn bits_for(largest: f64) -> u32 {
     let (mut bits, mut scaled) = (0, largest);
     while bits < 60 && 2.0 * scaled < f64::from(i32::MAX) {

@@ -1,17 +1,17 @@
-//! What a receptor over converter codes answers.
+//! The answer of a receptor over converter codes.
 
 use stretch_core::Branch;
 
 use crate::Domain;
 
-/// What a [`CodeReceptor`](super::CodeReceptor) answers for one sample.
+/// The answer of a [`CodeReceptor`](super::CodeReceptor) for one sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CodeReading<E> {
-    /// The estimated reference: in [`Fixed`](super::Fixed) thousandths of its unit
-    /// (micrometres for a reference in millimetres), else the unit itself.
+    /// The estimated reference: in thousandths of the reference's unit for [`Fixed`](super::Fixed) (micrometres for a
+    /// reference in millimetres), else in the unit.
     pub estimate: E,
     /// The branch that was evaluated.
     pub branch: Branch,
-    /// Whether the inputs lay where the calibration was fitted.
+    /// Whether the inputs lay in the calibrated domain.
     pub domain: Domain,
 }

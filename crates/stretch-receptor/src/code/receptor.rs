@@ -8,8 +8,8 @@ use super::{
     arithmetic::CodeArithmetic,
     calibration::CodeCalibration,
     fixed_arithmetic::Fixed,
+    ranged_surface::{RangedSurface, RangedSurfaces},
     reading::CodeReading,
-    sheet::{Sheet, Sheets},
 };
 use crate::{
     Front,
@@ -18,12 +18,10 @@ use crate::{
 
 /// A stretch receptor for converter codes, in the arithmetic `A`.
 ///
-/// It answers as [`StretchReceptor`](crate::StretchReceptor) does, for codes
-/// instead of volts: the same warm-up, the same branch with the same dead band,
-/// the same clamped domain, and the same bridge over up to [`MAX_BRIDGED`](crate::MAX_BRIDGED)
-/// missing samples. Two things differ: a bridged sample stays inside the
-/// converter's range and is rounded to 16 bits of it, and the estimate's rate is
-/// left out.
+/// The receptor answers like [`StretchReceptor`](crate::StretchReceptor), for codes instead of volts: the same
+/// warm-up, the same branch with the same dead band, the same clamped domain, and the same bridge over up to
+/// [`MAX_BRIDGED`](crate::MAX_BRIDGED) missing samples. There are two differences: a bridged sample stays inside the
+/// converter's range and is rounded to 16 bits of that range, and there is no rate of the estimate.
 ///
 /// No step can overflow, whatever the codes are: codes that the converter does
 /// not have are missing samples, and a [`CodeCalibration`] whose numbers could
@@ -58,14 +56,14 @@ pub struct CodeSurfaces<
     const DEGREE: usize,
     const DELAY: usize,
 > {
-    /// The first number that is no code.
+    /// The least number that is no code.
     codes: u32,
-    /// Moves a code from its place to the upper end of 16 bits.
+    /// Factor that shifts a code to the upper end of 16 bits.
     align: i32,
     dead_band: i32,
     /// All ones where a rising signal means a falling target, else zero.
     mirror: i32,
-    sheets: Sheets<A::Line, A::Surface>,
+    surfaces: RangedSurfaces<A::Line, A::Surface>,
 }
 
 /// The receptor in fixed point: [`CodeReceptor`] in [`Fixed`].
@@ -76,8 +74,9 @@ pub type FixedReceptor<const WINDOW: usize, const DEGREE: usize, const DELAY: us
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CodeMemory<const WINDOW: usize> {
     window: FixedSgMemory<u16, WINDOW>,
-    /// The last sample before the gap, and the rate there.
+    /// The last sample before the gap.
     last: u16,
+    /// The rate at that sample.
     last_rate: i32,
 }
 
@@ -105,21 +104,21 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
 {
     /// The receptor of a calibration.
     pub fn new(calibration: CodeCalibration<A, WINDOW, DEGREE, DELAY>) -> Self {
-        let CodeCalibration { bits, falling, dead_band, sheets, .. } = calibration;
+        let CodeCalibration { bits, falling, dead_band, surfaces, .. } = calibration;
         let bits = u32::from(bits.min(16));
         let mirror = -i32::from(falling);
         let (codes, align) = (1 << bits, 1 << (16 - bits));
-        let sheets =
-            match sheets {
-                Sheets::Line(s) => {
-                    Sheets::Line(Sheet { surface: A::line_over(s.surface, &s.signal), ..s })
-                }
-                Sheets::Poly13(both) => Sheets::Poly13(both.map(|s| Sheet {
-                    surface: A::surface_over(s.surface, &s.signal, &s.rate),
-                    ..s
-                })),
-            };
-        Self { model: CodeSurfaces { codes, align, dead_band, mirror, sheets } }
+        let surfaces = match surfaces {
+            RangedSurfaces::Line(s) => RangedSurfaces::Line(RangedSurface {
+                surface: A::line_over(s.surface, &s.signal),
+                ..s
+            }),
+            RangedSurfaces::Poly13(both) => RangedSurfaces::Poly13(both.map(|s| RangedSurface {
+                surface: A::surface_over(s.surface, &s.signal, &s.rate),
+                ..s
+            })),
+        };
+        Self { model: CodeSurfaces { codes, align, dead_band, mirror, surfaces } }
     }
 }
 
@@ -132,11 +131,11 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
     #[inline(always)]
     fn side(&self, current: SideBit, rate: i32) -> SideBit {
         let band = self.dead_band;
-        // -band <= rate <= band, in one comparison
+        // tests -band <= rate <= band in one comparison
         if rate.wrapping_add(band) as u32 <= 2 * band as u32 {
             current
         } else {
-            // the sign of the target's rate
+            // the sign bit of the target's rate
             SideBit(((rate ^ self.mirror) as u32 >> 31) as u8)
         }
     }
@@ -177,22 +176,22 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
         let now = self.side(*side, rate);
         *side = now;
         let branch = now.branch();
-        let (estimate, domain) = match &self.sheets {
-            Sheets::Line(sheet) => {
-                let (volts, domain) = sheet.input(sample);
-                (A::line(&sheet.surface, &sheet.signal, volts), domain)
+        let (estimate, domain) = match &self.surfaces {
+            RangedSurfaces::Line(ranged) => {
+                let (volts, domain) = ranged.input(sample);
+                (A::line(&ranged.surface, &ranged.signal, volts), domain)
             }
-            Sheets::Poly13(sheets) => {
-                let sheet = &sheets[usize::from(now.0 & 1)];
-                let (volts, rate, domain) = sheet.inputs(sample, rate);
-                let (volts, rate) = ((&sheet.signal, volts), (&sheet.rate, rate));
-                (A::surface(&sheet.surface, volts, rate), domain)
+            RangedSurfaces::Poly13(surfaces) => {
+                let ranged = &surfaces[usize::from(now.0 & 1)];
+                let (volts, rate, domain) = ranged.inputs(sample, rate);
+                let (volts, rate) = ((&ranged.signal, volts), (&ranged.rate, rate));
+                (A::surface(&ranged.surface, volts, rate), domain)
             }
         };
         Some(CodeReading { estimate, branch, domain })
     }
 
-    /// By the last sample before the gap and the rate there, inside the converter's range.
+    /// Bridges by the last sample before the gap, moved on by the rate at that sample, inside the converter's range.
     fn bridge(&self, memory: &mut CodeMemory<WINDOW>, nth: u8) -> bool {
         if nth == 1 {
             memory.last = memory.window.newest();
@@ -200,7 +199,7 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
         }
         let change = Self::RATE.change(memory.last_rate, nth);
         let bridged = (i64::from(memory.last) + change).clamp(0, u16::MAX.into());
-        // only the window matters here: nothing is answered for this sample
+        // only the window is updated, because there is no answer for this sample
         let _ = Self::RATE.step(&mut memory.window, bridged as u16);
         true
     }

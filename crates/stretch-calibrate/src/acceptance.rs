@@ -1,21 +1,21 @@
-//! Whether a calibration is worth having, and whether a log is one of its own.
+//! Acceptance criteria: whether a calibration can be used, and whether a log belongs to the calibration.
 
 use crate::{FitReport, MethodErrors};
 
-/// A fit that leaves this share of the reference's standard deviation explains nothing: the mean of
-/// the reference alone would err as little, but for a twentieth. (A twentieth is also what a model
-/// may cost before another form is preferred.)
+/// A fit that leaves this share of the reference's standard deviation explains nothing: the error of the mean of the
+/// reference alone is at most a twentieth larger. (A model may also cost a twentieth before another form is
+/// preferred.)
 const LEFT: f64 = 0.95;
 
-/// Why a fit should not be used: it errs as somebody would who knows the mean and no signal.
+/// Why a fit should not be used: its error is that of the mean of the reference, without any signal.
 ///
 /// ```text
 /// sqrt(1 - R^2) > 0.95,  R^2 < 0.0975
 /// ```
 ///
-/// None for a fit that explains more. An error of the reference itself (a value that the recorder
-/// writes where it has none), a sensor that is not connected, or a column that is another's look
-/// like that.
+/// The answer is `None` for a fit that explains more. Such fits come from an error of the reference itself (a
+/// placeholder that the recorder writes for a missing value), a sensor that is not connected, or the column of
+/// another quantity.
 pub fn explains_nothing(fits: &[FitReport]) -> Option<String> {
     let worst = fits.iter().min_by(|a, b| a.r_squared.total_cmp(&b.r_squared))?;
     let left = (1.0 - worst.r_squared).max(0.0).sqrt();
@@ -31,7 +31,7 @@ pub fn explains_nothing(fits: &[FitReport]) -> Option<String> {
     })
 }
 
-/// What to say of a fit that leaves more of the reference than it explains; none of one that does not.
+/// A sentence for a fit that leaves more of the reference than the fit explains; `None` for any other fit.
 pub fn explains_little(fits: &[FitReport]) -> Option<String> {
     let worst = fits.iter().min_by(|a, b| a.r_squared.total_cmp(&b.r_squared))?;
     (worst.r_squared < 0.5).then(|| {
@@ -40,9 +40,9 @@ pub fn explains_little(fits: &[FitReport]) -> Option<String> {
     })
 }
 
-/// What to say of a log most of whose samples lie where the calibration was not fitted.
+/// A sentence for a log most of whose samples lie outside the calibrated domain.
 ///
-/// Most: the estimates of such a log are those of the domain's ends more often than not.
+/// Most means more than half: the estimates of such a log are those of the domain's ends more often than not.
 pub fn not_its_own(clamped: u64, samples: u64) -> Option<String> {
     (2 * clamped > samples).then(|| {
         format!(
@@ -53,7 +53,7 @@ pub fn not_its_own(clamped: u64, samples: u64) -> Option<String> {
     })
 }
 
-/// What to say of estimates that are further from the reference than its mean is.
+/// A sentence for estimates that err more than the mean of the reference does.
 pub fn worse_than_the_mean(errors: &MethodErrors) -> Option<String> {
     (errors.r_squared < 0.0).then(|| {
         let r_squared = errors.r_squared;
@@ -64,7 +64,7 @@ pub fn worse_than_the_mean(errors: &MethodErrors) -> Option<String> {
     })
 }
 
-/// In percent, and never 100 where something is left.
+/// A share in percent, which is 100 only where `part` is all of `of`.
 fn share(part: u64, of: u64) -> f64 {
     let percent = 100.0 * part as f64 / of.max(1) as f64;
     if part < of { (10.0 * percent).floor() / 10.0 } else { percent }

@@ -4,19 +4,18 @@ use stretch_core::DesignError;
 
 use crate::Domain;
 
-/// How many bits a converter's code is shifted up from its 16-bit place for the
-/// comparison with the domain's ends.
+/// Bits by which a converter's code is shifted up from its 16-bit place for the comparison with the domain's ends.
 pub(super) const COARSE_BITS: u32 = 15;
 
-/// Ends of a domain in integers, and the factor that then spreads it over 32 bits.
+/// Ends of a domain in integers, and the factor that spreads the domain over 32 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Span {
     /// The lower end.
     pub min: i32,
-    /// From the lower end to the upper one.
+    /// Difference of the upper and the lower end.
     pub width: u32,
-    /// A power of two.
+    /// The factor, a power of two.
     pub factor: i32,
 }
 
@@ -37,10 +36,10 @@ impl Span {
         self.factor > 0 && fits(self.min.into()) && fits(max)
     }
 
-    /// The nearest value inside; and 1 for a value that was outside.
+    /// The nearest value inside, and 1 where the value was outside.
     #[inline(always)]
     fn clamp(&self, x: i32) -> (i32, u8) {
-        // one comparison: below the lower end the difference wraps to a large number
+        // one comparison is enough, because below the lower end the difference wraps to a large number
         if x.wrapping_sub(self.min) as u32 <= self.width { (x, 0) } else { self.nearest_end(x) }
     }
 
@@ -59,18 +58,18 @@ impl Span {
 /// A surface and the domain of its inputs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Sheet<S> {
-    /// The code, aligned to 16 bits, that the surface is expanded about.
+pub struct RangedSurface<S> {
+    /// The code, aligned to 16 bits, about which the surface is expanded.
     pub centre: u16,
-    /// Where the signal is clamped to: `2^15` of a 16-bit sample, from the centre.
+    /// Range to which the signal is clamped, in `2^-15` of a 16-bit sample from the centre.
     pub signal: Span,
-    /// Where the integer rate is clamped to.
+    /// Range to which the integer rate is clamped.
     pub rate: Span,
-    /// Over signal and rate, spread.
+    /// The surface over spread signal and rate.
     pub surface: S,
 }
 
-impl<S> Sheet<S> {
+impl<S> RangedSurface<S> {
     /// Signal and rate inside the domain, not yet spread.
     #[inline(always)]
     pub(super) fn inputs(&self, sample: u16, rate: i32) -> (i32, i32, Domain) {
@@ -88,12 +87,12 @@ impl<S> Sheet<S> {
 
     #[inline(always)]
     fn coarse(&self, sample: u16) -> i32 {
-        // 17 bits and 15: fits
+        // 17 bits shifted up by 15 fit 32 bits
         (i32::from(sample) - i32::from(self.centre)) << COARSE_BITS
     }
 }
 
-/// From a bit for the signal outside and one for the rate.
+/// The domain from a bit for the signal and a bit for the rate.
 #[inline(always)]
 fn domain(outside: u8) -> Domain {
     match outside & 3 {
@@ -104,29 +103,29 @@ fn domain(outside: u8) -> Domain {
     }
 }
 
-/// A calibration's sheets: one line, or a surface a branch.
+/// The surfaces of a calibration with their ranges: one line, or a surface for each branch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Sheets<L, P> {
+pub enum RangedSurfaces<L, P> {
     /// One line for both branches.
-    Line(Sheet<L>),
-    /// Inflation, deflation.
-    Poly13([Sheet<P>; 2]),
+    Line(RangedSurface<L>),
+    /// A surface each for inflation and deflation.
+    Poly13([RangedSurface<P>; 2]),
 }
 
-impl<L, P> Sheets<L, P> {
+impl<L, P> RangedSurfaces<L, P> {
     pub(super) fn try_map<M, Q>(
         &self,
         line: impl Fn(&L) -> Result<M, DesignError>,
         surface: impl Fn(&P) -> Result<Q, DesignError>,
-    ) -> Result<Sheets<M, Q>, DesignError> {
-        fn with<S, T>(sheet: &Sheet<S>, surface: T) -> Sheet<T> {
-            let Sheet { centre, signal, rate, .. } = *sheet;
-            Sheet { centre, signal, rate, surface }
+    ) -> Result<RangedSurfaces<M, Q>, DesignError> {
+        fn with<S, T>(ranged: &RangedSurface<S>, surface: T) -> RangedSurface<T> {
+            let RangedSurface { centre, signal, rate, .. } = *ranged;
+            RangedSurface { centre, signal, rate, surface }
         }
         Ok(match self {
-            Self::Line(sheet) => Sheets::Line(with(sheet, line(&sheet.surface)?)),
-            Self::Poly13([up, down]) => Sheets::Poly13([
+            Self::Line(ranged) => RangedSurfaces::Line(with(ranged, line(&ranged.surface)?)),
+            Self::Poly13([up, down]) => RangedSurfaces::Poly13([
                 with(up, surface(&up.surface)?),
                 with(down, surface(&down.surface)?),
             ]),

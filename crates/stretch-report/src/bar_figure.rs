@@ -1,4 +1,4 @@
-//! Horizontal bars: a few numbers with their intervals, and what they belong to.
+//! Horizontal bars: a few numbers with their intervals and labels.
 
 use plotters::{
     prelude::*,
@@ -22,13 +22,13 @@ const NUMBER: f64 = 88.0;
 /// One bar.
 #[derive(Debug, Clone)]
 pub struct Bar {
-    /// Its colour.
+    /// Colour of the bar.
     pub ink: Ink,
-    /// How long it is.
+    /// Value that the length shows.
     pub value: f64,
-    /// An interval around its end.
+    /// An interval around the end of the bar.
     pub interval: Option<[f64; 2]>,
-    /// What stands behind it; the value when empty.
+    /// Text behind the bar; the value when empty.
     pub text: String,
 }
 
@@ -42,23 +42,24 @@ impl Bar {
 /// Bars under one label.
 #[derive(Debug, Clone)]
 pub struct Row {
-    /// What they belong to.
+    /// The label of the bars.
     pub label: String,
     /// The bars.
     pub bars: Vec<Bar>,
 }
 
-/// How lengths stand for values.
+/// The scale from values to lengths.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Scale {
-    /// From 0 to 1, in percent.
+    /// A linear scale from 0 to 1, in percent.
     Percent,
-    /// Equal ratios from 1, the noise.
+    /// A logarithmic scale in multiples of the noise, from 1.
     NoiseMultiples,
 }
 
-/// Letters of a label that stand side by side on a phone, and the height of each further line in pixels.
+/// Most letters of a label on one line of a phone.
 const LETTERS: usize = 48;
+/// Height of each further line of a label, in pixels.
 const LINE: f64 = 17.0;
 
 /// A label in lines that a phone can hold, broken between words.
@@ -103,10 +104,10 @@ pub fn bar_figure(description: &str, rows: &[Row], scale: Scale, x_label: &str) 
         .live(bars_json(GAP, &bar_rows(rows, &[], x_label)))
 }
 
-/// Plots over time in which a bar shows its samples.
+/// Link of the plots over time in which a bar shows its samples.
 pub(crate) const GAP: &str = "gap";
 
-/// Where every row stands and what it says, with the samples that are its own.
+/// The place and the text of every row, with the samples that belong to the row.
 fn bar_rows(rows: &[Row], picks: &[Option<Pick>], unit: &str) -> Vec<BarRow> {
     let mut y = 2.0;
     let mut one = |(index, row): (usize, &Row)| {
@@ -138,7 +139,7 @@ pub(crate) fn picking_figure(
         .live(bars_json(GAP, &bar_rows(rows, picks, unit)))
 }
 
-/// The same in one shape, for figures that stand side by side.
+/// Draws rows of bars in the narrow shape alone, for figures that stand side by side.
 pub fn narrow_bar_figure(description: &str, rows: &[Row], scale: Scale, x_label: &str) -> Figure {
     let mut figure = bar_figure(description, rows, scale, x_label);
     figure.keep_narrowest();
@@ -151,7 +152,7 @@ fn draw(area: &Area<'_>, rows: &[Row], scale: Scale, most: f64, x_label: &str) -
     let bottom = height as i32 - px(AXIS - 4.0);
     let end = match scale {
         Scale::Percent => 1.0,
-        // The next 1, 2 or 5 times a power of ten.
+        // The scale ends at the next 1, 2 or 5 times a power of ten.
         Scale::NoiseMultiples => [1.0, 2.0, 5.0, 10.0]
             .map(|k| k * 10f64.powf(most.log10().floor()))
             .into_iter()

@@ -13,13 +13,13 @@ pub(crate) struct BranchView<'a> {
     pub(crate) fit: &'a FitReport,
     /// Samples: rate, signal, target.
     pub(crate) cloud: Vec<[f64; 3]>,
-    /// Span of the rates but for the outermost percent on either side.
+    /// Span of the rates without the outermost percent on either side.
     pub(crate) rate: Range<f64>,
     /// Span of the signal.
     pub(crate) signal: Range<f64>,
     /// Span of the target.
     pub(crate) target: Range<f64>,
-    /// What stands on the axes: rate, signal, target.
+    /// Labels of the axes: rate, signal, target.
     pub(crate) labels: [String; 3],
     /// Whether the signal falls as the target rises.
     pub(crate) falling: bool,
@@ -28,7 +28,7 @@ pub(crate) struct BranchView<'a> {
 }
 
 impl<'a> BranchView<'a> {
-    /// The view of each branch; none of a linear calibration, or without samples.
+    /// The view of each branch; empty for a linear calibration, or without samples.
     pub(crate) fn all(calibrated: &'a Calibrated) -> Vec<Self> {
         calibrated.fits.iter().filter_map(|fit| Self::new(&calibrated.calibration, fit)).collect()
     }
@@ -39,7 +39,7 @@ impl<'a> BranchView<'a> {
             Branch::Inflation => inflation,
             Branch::Deflation => deflation,
         };
-        // fitted on the rate of the reference, the common axis is the normalised one
+        // for a fit on the rate of the reference, the common axis is the normalised rate
         let rate_scale =
             (calibration.rate_source == RateSource::Voltage).then_some(surface.rate_range);
         let (signal, reference) = (&calibration.signal, &calibration.reference);
@@ -90,7 +90,7 @@ impl<'a> BranchView<'a> {
         self.shown(self.fit.surface.eval(rate, signal))
     }
 
-    /// What the branch is called.
+    /// Name of the branch.
     pub(crate) fn name(&self) -> &'static str {
         let contraction = matches!(self.calibration.target, Target::Contraction { .. });
         match (self.fit.branch, contraction) {

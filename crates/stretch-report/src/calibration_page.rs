@@ -1,4 +1,4 @@
-//! The report of a calibration: how good it is, and what it is made of.
+//! The report of a calibration: its errors and its parts.
 
 use stretch_calibrate::{Calibrated, Candidate, Evaluation, MethodErrors, TrialErrors};
 use stretch_data::listed;
@@ -19,10 +19,10 @@ use super::{
     surface_figure::surface_figure,
 };
 
-/// Trials whose curves are drawn; the tables hold all.
+/// Most trials whose curves are drawn; the tables hold all trials.
 const DRAWN: usize = 4;
 
-/// What a report says beside the numbers.
+/// The words of a report beside the numbers.
 #[derive(Debug, Clone, Default)]
 pub struct Context {
     /// Heading of the page.
@@ -34,20 +34,20 @@ pub struct Context {
     /// Signals among which the calibrated one was chosen, best first; empty
     /// when the user named it.
     pub signal_choice: Vec<Candidate>,
-    /// Sentences about the data: where they come from, what was done to them.
+    /// Sentences about the data: their source, and changes that were made to them.
     pub notes: Vec<String>,
-    /// Errors on the trials of one kind, by its name, where there are several kinds.
+    /// Errors on the trials of each kind, by the name of the kind, where there are several kinds.
     pub kinds: Vec<(String, Vec<MethodErrors>)>,
 }
 
-/// Calibrations and how they were judged.
+/// Calibrations and their evaluation.
 #[derive(Debug, Clone, Copy)]
 pub struct Judged<'a> {
-    /// The calibrations by the names that `evaluation` knows them by.
+    /// The calibrations with their names in `evaluation`.
     pub calibrated: &'a [(&'a str, &'a Calibrated)],
-    /// Their errors.
+    /// Errors of the calibrations.
     pub evaluation: &'a Evaluation,
-    /// What is said beside the numbers.
+    /// The words beside the numbers.
     pub context: &'a Context,
 }
 
@@ -58,7 +58,7 @@ pub fn calibration_page(judged: &Judged<'_>) -> String {
     page.finish()
 }
 
-/// The sections of the report: a page of their own, or a part of a longer one.
+/// The sections of the report, as a page of their own or as a part of a longer page.
 pub(crate) fn calibration_sections(page: &mut Page, subject: &Judged<'_>) {
     let Judged { calibrated, evaluation, context } = *subject;
     let names = method_names(calibrated, evaluation);
@@ -69,8 +69,8 @@ pub(crate) fn calibration_sections(page: &mut Page, subject: &Judged<'_>) {
     fits(page, calibrated, context);
 }
 
-/// A picture of some seconds of the first trial for a README: an SVG file of
-/// its own, light, with its legend inside. Empty when there is nothing to draw.
+/// A picture of some seconds of the first trial for a README, as an SVG file in light colours with its legend inside.
+/// The text is empty when there is nothing to draw.
 pub fn readme_picture(calibrated: &[(&str, &Calibrated)], evaluation: &Evaluation) -> String {
     let names = method_names(calibrated, evaluation);
     let first = evaluation.trials.first();
@@ -158,7 +158,7 @@ fn judged(page: &mut Page, evaluation: &Evaluation, names: &[String], context: &
     }
 }
 
-/// How far the reference of a recording goes in a second, there and back.
+/// Mean absolute rate of a recording's reference, per second.
 fn travel_per_second(trial: &TrialErrors) -> f64 {
     let steps = trial.reference.windows(2).map(|w| (w[1] - w[0]).abs());
     let travel: f64 = steps.filter(|step| step.is_finite()).sum();

@@ -8,10 +8,10 @@ use super::{
     page::Table,
 };
 
-/// What an evaluation calls the signal without a calibration.
+/// Name that an evaluation gives to the signal without a calibration.
 pub(crate) const RAW: &str = "raw";
 
-/// Cells from anything that is text.
+/// Cells from texts.
 fn cells<const N: usize>(cells: [&str; N]) -> Vec<String> {
     cells.map(str::to_owned).to_vec()
 }
@@ -20,7 +20,7 @@ fn optional(x: Option<f64>, digits: usize) -> String {
     x.map_or_else(|| NONE.to_owned(), |x| number(x, digits))
 }
 
-/// What each method of an evaluation is called on the page.
+/// Names of an evaluation's methods on the page.
 pub(crate) fn method_names(
     calibrated: &[(&str, &Calibrated)],
     evaluation: &Evaluation,
@@ -38,14 +38,13 @@ pub(crate) fn method_names(
     evaluation.pooled.iter().map(|errors| name(&errors.method)).collect()
 }
 
-/// The calibration with the least RMSE: not the raw signal, which is scaled
-/// with the very reference that it is held against.
+/// The calibration with the least RMSE. The raw signal does not take part, because the reference itself scales it.
 pub(crate) fn best(methods: &[MethodErrors]) -> Option<usize> {
     let finite = methods.iter().enumerate().filter(|(_, m)| m.rmse.is_finite() && m.method != RAW);
     finite.min_by(|a, b| a.1.rmse.total_cmp(&b.1.rmse)).map(|(i, _)| i)
 }
 
-/// The paper's measures, one row a method.
+/// The paper's measures, one row for each method.
 pub(crate) fn method_table(
     caption: &str,
     methods: &[MethodErrors],

@@ -1,8 +1,8 @@
 //! An SVG backend for plotters whose colours are names, not numbers.
 //!
 //! Every shape carries a class (`ink-raw`), so that one figure serves light
-//! and dark pages and paper. Dots of one colour are one path: a cloud of a
-//! thousand costs ten kilobytes, not a hundred.
+//! and dark pages and paper. Dots of one colour are one path, so that a cloud of a thousand dots costs ten kilobytes,
+//! not a hundred.
 
 use std::{
     convert::Infallible,
@@ -18,10 +18,10 @@ use plotters_backend::{
 
 use super::markup::escape;
 
-/// Steps of the drawing grid in one pixel of the figure: plotters places on whole steps.
+/// Steps of the drawing grid in one pixel of the figure; plotters places shapes on whole steps.
 pub const STEPS: u32 = 4;
 
-/// A colour by what it stands for; the style sheet says what it looks like.
+/// A colour by its meaning; the style sheet gives its appearance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ink {
     /// Words and numbers.
@@ -30,23 +30,23 @@ pub enum Ink {
     Axis,
     /// Grid lines.
     Grid,
-    /// What was measured by the reference.
+    /// The measured reference.
     Truth,
-    /// The first, second .. of what is compared.
+    /// The first of the compared things.
     First,
-    /// The second.
+    /// The second of the compared things.
     Second,
-    /// The third.
+    /// The third of the compared things.
     Third,
-    /// The fourth.
+    /// The fourth of the compared things.
     Fourth,
-    /// The fifth.
+    /// The fifth of the compared things.
     Fifth,
     /// The low end of an ordered scale.
     Low,
-    /// Its middle.
+    /// The middle of an ordered scale.
     Middle,
-    /// Its high end.
+    /// The high end of an ordered scale.
     High,
 }
 
@@ -66,7 +66,7 @@ impl Ink {
         (Self::High, "ink-high"),
     ];
 
-    /// The ink of the `index`-th thing compared; a sixth looks like the first.
+    /// The ink of the `index`-th of the compared things; the colours repeat after the fifth.
     pub fn of(index: usize) -> Self {
         [Self::First, Self::Second, Self::Third, Self::Fourth, Self::Fifth][index % 5]
     }
@@ -76,24 +76,24 @@ impl Ink {
         Self::ALL.iter().find(|(ink, _)| *ink == self).map_or("ink-text", |(_, class)| class)
     }
 
-    /// The stand-in that plotters carries to the backend.
+    /// The colour that plotters carries to the backend in place of the ink.
     pub fn color(self) -> RGBColor {
         let index = Self::ALL.iter().position(|(ink, _)| *ink == self).unwrap_or(0);
         RGBColor(index as u8, 0, 0)
     }
 
-    /// The same, letting `1 - opacity` of what is behind shine through.
+    /// The colour of the ink with an opacity.
     pub fn faint(self, opacity: f64) -> RGBAColor {
         RGBAColor(self.color().0, 0, 0, opacity)
     }
 }
 
-/// The class that a stand-in colour means.
+/// The class of the ink behind a colour from plotters.
 fn class(color: BackendColor) -> &'static str {
     Ink::ALL.get(usize::from(color.rgb.0)).map_or("ink-text", |(_, class)| class)
 }
 
-/// Dots of one colour and size that wait to be written as one path.
+/// Dots of one colour and size that are collected for one path.
 #[derive(Debug)]
 struct Dots {
     class: &'static str,
@@ -156,7 +156,7 @@ impl<'a> Canvas<'a> {
     }
 }
 
-/// An opacity attribute; nothing when opaque.
+/// An opacity attribute; empty when opaque.
 struct Opacity(&'static str, f64);
 
 impl fmt::Display for Opacity {
@@ -165,12 +165,12 @@ impl fmt::Display for Opacity {
     }
 }
 
-/// Path data through points, relative after the first: short.
+/// Path data through points; coordinates after the first point are relative, which is shorter.
 fn path(points: impl IntoIterator<Item = BackendCoord>) -> String {
     let mut d = String::new();
     let mut last: Option<BackendCoord> = None;
     for (x, y) in points {
-        // a string takes every write
+        // writing to a string cannot fail
         let _ = match last {
             None => write!(d, "M{x} {y}l"),
             Some((x0, y0)) => write!(d, "{} {} ", x - x0, y - y0),

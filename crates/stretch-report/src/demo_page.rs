@@ -1,4 +1,4 @@
-//! The report of the whole job: a calibration, and why simulator and rig disagree.
+//! The report of a demonstration: a calibration, and the diagnosis of the difference between simulator and rig.
 
 use super::{
     calibration_page::{Judged, calibration_sections, calibration_verdict},
@@ -8,7 +8,7 @@ use super::{
     subject::Subject,
 };
 
-/// Both reports as one HTML file; each part is what its own page would be.
+/// Both reports as one HTML file; each part has the content of its own page.
 pub fn demo_page(judged: &Judged<'_>, subject: &Subject<'_>) -> String {
     let mut page = Page::new(&judged.context.title, &calibration_verdict(judged));
     calibration_sections(&mut page, judged);

@@ -1,4 +1,4 @@
-//! The report of a diagnosis: what to fix in the simulator, how sure that is, and what it gains.
+//! The report of a diagnosis: the correction of the simulator, its probability, and its gain.
 
 use stretch_data::listed;
 use stretch_gap::Diagnosis;
@@ -24,7 +24,7 @@ use super::{
 };
 use crate::plain::transfer_in_words;
 
-/// Candidates that are drawn.
+/// Most candidates that are drawn.
 const DRAWN: usize = 6;
 
 /// The report as one HTML file.
@@ -34,12 +34,12 @@ pub fn diagnosis_page(subject: &Subject<'_>) -> String {
     page.finish()
 }
 
-/// What the report is called.
+/// Title of the report.
 pub(crate) fn diagnosis_title(subject: &Subject<'_>) -> String {
     format!("{}: simulator against rig", subject.name)
 }
 
-/// The sections of the report: a page of their own, or a part of a longer one.
+/// The sections of the report, as a page of their own or as a part of a longer page.
 pub(crate) fn diagnosis_sections(page: &mut Page, subject: &Subject<'_>) {
     let diagnosis = subject.diagnosis;
     page.facts(&facts(diagnosis));
@@ -56,7 +56,7 @@ pub(crate) fn diagnosis_sections(page: &mut Page, subject: &Subject<'_>) {
     numbers(page, diagnosis);
 }
 
-/// What can be said of turned numbers.
+/// Description of the figure of varied parameters.
 const TURNED: &str = "What is left on the test trials as each number of the effect is turned, all else as it was fitted: the dot is \
     the fit. Between the values that were simulated, where the line has its corners, it is straight; of several numbers that are turned at \
     once the changes are added.";
@@ -144,7 +144,7 @@ fn located(page: &mut Page, subject: &Subject<'_>) {
     slices(page, subject);
 }
 
-/// The samples of a slice, from what it is called; none for what a plot of one trial cannot show.
+/// The samples of a slice, from the slice's name; `None` for a slice that a plot of one trial cannot show.
 fn pick(by: &str, slice: &str, [falling, rising]: &[&str; 2]) -> Option<Pick> {
     let sides = |from: f64, to: f64| Some(Pick { by: "rate", from, to, size: false });
     let most = 1e300;
@@ -261,7 +261,7 @@ fn named(page: &mut Page, subject: &Subject<'_>) {
             "Share of the gap that closes on the test trials, with its 95 % interval.".to_owned(),
         ),
     ]);
-    // effects of one set stand together: only what may take the place of one is a rival
+    // effects of one set belong together, so that a rival is only an effect that may replace one of them
     let rivals: Vec<String> =
         d.ambiguous.iter().filter(|name| !d.named.contains(name)).cloned().collect();
     if !rivals.is_empty() && !d.named.is_empty() {
@@ -274,7 +274,7 @@ fn named(page: &mut Page, subject: &Subject<'_>) {
     page.table(&candidate_table(&d.candidates));
 }
 
-/// What is named, as something to type into a simulator.
+/// The named effects as code for a simulator.
 fn implemented(page: &mut Page, subject: &Subject<'_>) {
     if subject.implementations.is_empty() {
         return;

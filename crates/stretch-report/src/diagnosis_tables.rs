@@ -17,7 +17,7 @@ fn interval([low, high]: [f64; 2], text: impl Fn(f64) -> String) -> String {
     format!("{} .. {}", text(low), text(high))
 }
 
-/// Gap of every stage.
+/// A table of the gap of every stage.
 pub fn stage_table(stages: &[StageGap], has_after: bool) -> Table {
     let row = |s: &StageGap| {
         vec![
@@ -37,7 +37,7 @@ pub fn stage_table(stages: &[StageGap], has_after: bool) -> Table {
     }
 }
 
-/// Every candidate.
+/// A table of every candidate.
 pub fn candidate_table(candidates: &[Candidate]) -> Table {
     let row = |c: &Candidate| {
         let values: Vec<String> = c
@@ -82,7 +82,7 @@ pub fn candidate_table(candidates: &[Candidate]) -> Table {
     }
 }
 
-/// Nominal parameters; nothing when there are none.
+/// A table of the nominal parameters; `None` when there are none.
 pub(crate) fn parameter_table(d: &Diagnosis) -> Option<Table> {
     let row = |p: &stretch_gap::ParameterShift| {
         let unit = if p.unit == "1" { "" } else { &p.unit };
@@ -102,7 +102,7 @@ pub(crate) fn parameter_table(d: &Diagnosis) -> Option<Table> {
     })
 }
 
-/// What the gap costs a calibration.
+/// A table of the cost of the gap for a calibration.
 pub fn transfer_table(transfer: &Transfer) -> Table {
     let rows = [("linear", transfer.linear), ("poly13", transfer.poly13)].map(|(name, e)| {
         vec![name.to_owned(), number(e.real, 3), number(e.sim, 3), number(e.sim_with_effect, 3)]
@@ -122,7 +122,7 @@ pub fn transfer_table(transfer: &Transfer) -> Table {
     }
 }
 
-/// What simpler methods named.
+/// A table of the effects that simpler methods named.
 pub fn baseline_table(said: &Baselines) -> Table {
     let row = |(method, name): (&str, Option<&str>)| {
         vec![method.to_owned(), name.unwrap_or("nothing").to_owned()]
@@ -135,7 +135,7 @@ pub fn baseline_table(said: &Baselines) -> Table {
     }
 }
 
-/// Every slice of a stage; nothing when there are none.
+/// A table of every slice of a stage; `None` when there are none.
 pub(crate) fn slice_table(slices: &[SliceGap], stage: &str) -> Option<Table> {
     let rows: Vec<Vec<String>> = slices
         .iter()

@@ -1,4 +1,5 @@
-//! Samples as dots against where they were taken, one panel a series: their median, and the band that holds 80 % of them.
+//! Samples as dots against a place (level or rate), one panel for each series, with the median of the samples and the
+//! band that holds 80 % of them.
 
 use std::ops::Range;
 
@@ -11,9 +12,9 @@ use super::{
     thin::{binned, sample},
 };
 
-/// Parts of the axis that have dots and a median of their own.
+/// Number of parts of the axis, each with dots and a median of its own.
 const SLOTS: usize = 24;
-/// Height of a panel, pixels; the last one holds the label of the axis, too.
+/// Height of a panel, pixels; the last panel also holds the label of the axis.
 const PANEL: u32 = 165;
 const LABEL: u32 = 20;
 
@@ -21,27 +22,27 @@ const LABEL: u32 = 20;
 pub(crate) struct Dots {
     /// Colour of the dots and the band.
     pub(crate) ink: Ink,
-    /// What hovering calls it.
+    /// Name of the series on hovering.
     pub(crate) name: String,
-    /// Beside its axis.
+    /// Label of the vertical axis.
     pub(crate) y_label: String,
-    /// Where, and how much.
+    /// Place and value of each sample.
     pub(crate) points: Vec<(f64, f64)>,
 }
 
-/// What the panels share.
+/// Properties that the panels share.
 pub(crate) struct Shared<'a> {
     /// The part of the axis that is drawn.
     pub(crate) x: Range<f64>,
-    /// Below the last panel.
+    /// Label of the horizontal axis, below the last panel.
     pub(crate) x_label: &'a str,
-    /// Name and unit of the place, and unit of the values, as hovering says them.
+    /// Name and unit of the place, and unit of the values, for hovering.
     pub(crate) names: [&'a str; 3],
-    /// Half of every panel's height; what lies beyond has no dot.
+    /// Largest magnitude of a value on a panel; values beyond have no dot.
     pub(crate) most: f64,
-    /// Dots of a panel at most.
+    /// Most dots of a panel.
     pub(crate) dots: usize,
-    /// Figures that a brush picks samples in, and the key that it picks by.
+    /// Link of the figures in which a brush picks samples, and the key by which it picks.
     pub(crate) brush: (&'a str, Option<&'a str>),
 }
 
@@ -101,7 +102,7 @@ fn draw(area: &Area<'_>, against: &Shared<'_>, panel: &Dots, is_last: bool) -> D
     })
 }
 
-/// Dots from every part of the axis: most samples of a log are at rest, in one place.
+/// Dots from every part of the axis, because most samples of a log are at rest, in one place.
 fn spread_over(points: &[(f64, f64)], against: &Shared<'_>) -> Vec<(f64, f64)> {
     let x = &against.x;
     let width = (x.end - x.start) / SLOTS as f64;

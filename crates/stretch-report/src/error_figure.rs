@@ -1,4 +1,4 @@
-//! Where the errors are: against rate, against the reference, and how often.
+//! Errors against rate and reference, and the histogram of errors.
 
 use plotters::prelude::*;
 use stretch_calibrate::Evaluation;
@@ -11,13 +11,13 @@ use super::{
     thin::{extent, padded, quantile, sorted},
 };
 
-/// Dots of one method at most.
+/// Most dots of one method.
 const DOTS: usize = 720;
 
 /// Half the span of the difference that gives the reference's rate, in samples.
 const REACH: usize = 5;
 
-/// What errors are drawn against.
+/// The quantity against which errors are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Against {
     /// The rate of the reference, by a central difference over eleven samples.
@@ -26,7 +26,7 @@ pub(crate) enum Against {
     Reference,
 }
 
-/// Errors (estimate minus reference) of all trials against `against`, one panel a method.
+/// Errors (estimate minus reference) of all trials against `against`, one panel for each method.
 pub(crate) fn error_figure(evaluation: &Evaluation, names: &[String], against: Against) -> Figure {
     let methods = points(evaluation, names.len(), against);
     let errors = sorted(methods.iter().flatten().map(|(_, e)| e.abs()));
@@ -70,7 +70,7 @@ pub(crate) fn error_figure(evaluation: &Evaluation, names: &[String], against: A
     dots_figure(&description, &against, &panels)
 }
 
-/// How often each error occurs, one outline a method.
+/// Histogram of the errors, one outline for each method.
 pub(crate) fn residual_figure(evaluation: &Evaluation, names: &[String]) -> Figure {
     let methods = points(evaluation, names.len(), Against::Reference);
     let size = sorted(methods.iter().flatten().map(|(_, e)| e.abs()));

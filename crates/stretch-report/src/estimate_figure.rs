@@ -13,10 +13,10 @@ use super::{
     thin::{curve, extent, padded},
 };
 
-/// How long the window of [`closest_look`] is, in seconds.
+/// Length of the window of [`closest_look`], in seconds.
 const WINDOW_S: f64 = 8.0;
 
-/// A trial over its whole time; `names` are those of the methods.
+/// A trial over its whole time; `names` are the names of the methods.
 pub(crate) fn estimate_figure(
     evaluation: &Evaluation,
     trial: &TrialErrors,
@@ -29,7 +29,7 @@ pub(crate) fn estimate_figure(
     }
 }
 
-/// The same for some seconds of it, where the reference moves most.
+/// Some seconds of a trial in which the reference moves most.
 pub(crate) fn closest_look(
     evaluation: &Evaluation,
     trial: &TrialErrors,
@@ -42,7 +42,8 @@ pub(crate) fn closest_look(
     }
 }
 
-/// The curves of a trial: the closer look brings them, the whole recording marks what it shows.
+/// The curves of a trial for the script: the closer look holds them, and the figure of the whole recording marks the
+/// shown window.
 fn live(
     evaluation: &Evaluation,
     trial: &TrialErrors,
@@ -70,7 +71,7 @@ fn live(
     .json()
 }
 
-/// A picture that stands alone, such as in a README: light, its legend inside.
+/// A picture that stands alone, as in a README, in light colours with its legend inside.
 pub(crate) fn estimate_picture(
     evaluation: &Evaluation,
     trial: &TrialErrors,
@@ -79,7 +80,7 @@ pub(crate) fn estimate_picture(
     closest_look(evaluation, trial, names).standalone()
 }
 
-/// Its ink, its width in pixels, and its pieces.
+/// A line as its ink, its width in pixels, and its pieces.
 type Line = (Ink, f64, Vec<Vec<(f64, f64)>>);
 
 fn window_figure(
@@ -92,7 +93,7 @@ fn window_figure(
     let lines = |frame: FigureSize| {
         let thin = |values: &[f64]| curve(&trial.time_s, values, window, bins(frame));
         let estimates = trial.estimates.iter().enumerate();
-        // a broad reference below: where an estimate is right, it lies inside
+        // the reference is a broad line below, so that a correct estimate lies inside it
         let broad = if window.end - window.start > 2.0 * WINDOW_S { 2.0 } else { 3.4 };
         let reference = [(Ink::Truth, broad, thin(&trial.reference))];
         let estimates = estimates.map(|(i, y)| (Ink::of(i), 1.4, thin(y)));

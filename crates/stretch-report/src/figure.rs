@@ -13,16 +13,16 @@ use super::{
     markup::{escape, number, tick},
 };
 
-/// Size of words and numbers, in pixels of the figure.
+/// Font size of words and numbers, in pixels of the figure.
 pub const TEXT_PX: u32 = 14;
 
-/// Where figures are drawn.
+/// The area on which figures are drawn.
 pub type Area<'a> = DrawingArea<Canvas<'a>, Shift>;
 
 /// Axes with a place for the data.
 pub type Chart<'a, 'b> = ChartContext<'a, Canvas<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
-/// Drawing cannot fail but for a fault in the figure itself.
+/// The result of drawing, which fails only for a fault in the figure itself.
 pub type Drawn = Result<(), DrawingAreaErrorKind<Infallible>>;
 
 /// Pixels as steps of the drawing grid.
@@ -40,22 +40,22 @@ pub struct FigureSize {
 }
 
 impl FigureSize {
-    /// For half a desktop page or a whole phone: its text stays legible at 360 px.
+    /// The size for half a desktop page or a whole phone: the text stays legible at 360 px.
     pub const NARROW: Self = Self { width: 400, height: 290 };
-    /// For the whole width of a desktop page.
+    /// The size for the whole width of a desktop page.
     pub const WIDE: Self = Self { width: 880, height: 320 };
 }
 
-/// A drawing, maybe in two shapes, with a legend in words; or why there is none.
+/// A drawing in one or two shapes with a legend in words, or the reason why there is no drawing.
 #[derive(Debug, Clone, Default)]
 pub struct Figure {
     /// Text for a reader who cannot see the figure.
     pub description: String,
-    /// Colours and what they stand for.
+    /// Colours and their meanings.
     pub legend: Vec<(Ink, String)>,
-    /// Why it is not drawn.
+    /// Reason why there is no drawing.
     pub missing: Option<String>,
-    /// What the page's script draws in its place, as JSON.
+    /// Data from which the page's script draws the figure, as JSON.
     pub live: Option<String>,
     drawings: Vec<(FigureSize, String)>,
 }
@@ -66,12 +66,12 @@ impl Figure {
         Self { description: description.to_owned(), ..Self::default() }
     }
 
-    /// Nothing to draw, and why.
+    /// A figure without a drawing, and the reason.
     pub fn missing(why: &str) -> Self {
         Self { missing: Some(why.to_owned()), ..Self::default() }
     }
 
-    /// Draws it in one frame; the narrowest of several is for phones.
+    /// Draws the figure in a frame; the narrowest of several frames is for phones.
     #[must_use]
     pub fn draw(mut self, frame: FigureSize, draw: impl FnOnce(&Area<'_>) -> Drawn) -> Self {
         let mut body = String::new();
@@ -86,7 +86,7 @@ impl Figure {
         self
     }
 
-    /// Keeps the shape for phones alone: for figures that stand side by side.
+    /// Keeps only the shape for phones, for figures that stand side by side.
     pub fn keep_narrowest(&mut self) {
         let narrowest = self.drawings.iter().map(|(frame, _)| frame.width).min();
         self.drawings.retain(|(frame, _)| Some(frame.width) == narrowest);
@@ -99,14 +99,14 @@ impl Figure {
         self
     }
 
-    /// Adds what the page's script draws in its place, or answers with.
+    /// Adds the data for the page's script.
     #[must_use]
     pub fn live(mut self, json: impl Into<Option<String>>) -> Self {
         self.live = json.into();
         self
     }
 
-    /// The drawings as inline SVG; of two, the style sheet shows the one that fits.
+    /// The drawings as inline SVG; of two drawings the style sheet shows the one that fits.
     pub fn svg(&self) -> String {
         let both = self.drawings.len() > 1;
         let narrowest = self.drawings.iter().map(|(frame, _)| frame.width).min();
@@ -126,7 +126,7 @@ impl Figure {
         self.drawings.iter().map(drawing).collect()
     }
 
-    /// The widest drawing as a file of its own, light, its legend inside.
+    /// The widest drawing as a file of its own, in light colours with its legend inside.
     pub fn standalone(&self) -> String {
         let Some((frame, body)) = self.drawings.iter().max_by_key(|(frame, _)| frame.width) else {
             return String::new();
@@ -160,22 +160,22 @@ impl Figure {
 /// Height of the legend of a figure that stands alone.
 const LEGEND_PX: u32 = 28;
 
-/// What stands on two axes, and what they span.
+/// Labels and spans of two axes.
 #[derive(Debug, Clone)]
 pub struct Axes {
     /// Horizontal span.
     pub x: Range<f64>,
     /// Vertical span.
     pub y: Range<f64>,
-    /// Below, at the right end; empty for an axis whose numbers another panel bears.
+    /// Label below the right end of the horizontal axis; empty for an axis whose numbers another panel bears.
     pub x_label: String,
-    /// Above, at the left end.
+    /// Label above the vertical axis.
     pub y_label: String,
-    /// Whether horizontal places are logarithms to base ten: the numbers are then those that they stand for.
+    /// Whether horizontal places are logarithms to base ten; the numbers at the axis are then the powers of ten.
     pub is_log: bool,
 }
 
-/// Text in an ink, held at `h` and `v`.
+/// Text in an ink, aligned at `h` and `v`.
 pub fn words(ink: Ink, h: HPos, v: VPos) -> TextStyle<'static> {
     let mut style = TextStyle::from(("sans-serif", TEXT_PX * STEPS).into_font());
     style.color = ink.color().to_backend_color();
@@ -234,7 +234,7 @@ pub fn plot<'b>(
     area.draw(&Text::new(axes.x_label.clone(), corner, below))
 }
 
-/// A span that is finite and not empty, whatever the data were.
+/// A span that is finite and not empty for any data.
 fn spread(span: &Range<f64>) -> Range<f64> {
     let (low, high) = (span.start, span.end);
     if !(low.is_finite() && high.is_finite()) {

@@ -1,4 +1,5 @@
-//! The first ten seconds of a diagnosis: what to change, how sure that is, what it gains, what to do next.
+//! The summary of a diagnosis for the first ten seconds of reading: the change, its probability, its gain, and the
+//! next step.
 
 use stretch_data::listed;
 use stretch_gap::{Diagnosis, Gross, VerdictKind};
@@ -12,7 +13,7 @@ use super::{
 pub(crate) fn diagnosis_verdict(subject: &Subject<'_>) -> String {
     let d = subject.diagnosis;
     let sentence = d.sentence.replace(" %", "\u{a0}%");
-    // a probability is one among the candidates, and is reported as such
+    // a probability holds among the candidates, and is reported as such
     let conditional = d.candidates.first().and_then(|c| {
         let (before, after) = sentence.split_once("; probability ")?;
         let rest = after.get("0.00".len()..)?;
@@ -21,10 +22,10 @@ pub(crate) fn diagnosis_verdict(subject: &Subject<'_>) -> String {
     conditional.unwrap_or(sentence)
 }
 
-/// What every probability stands under.
+/// The condition of every probability.
 pub(crate) const GIVEN: &str = "given this catalogue";
 
-/// Named effects, and what may stand in their place.
+/// Named effects, and effects that may stand in their place.
 fn to_add(named: &[String], tied: &[String]) -> String {
     match (named, tied) {
         (_, []) => listed(named),
@@ -42,7 +43,7 @@ fn to_add(named: &[String], tied: &[String]) -> String {
     }
 }
 
-/// What to do now, in a sentence.
+/// The next step, in a sentence.
 fn to_do(d: &Diagnosis) -> String {
     let experiment = d.next_experiment.as_ref().map(|next| {
         let seconds = 60.0 * next.minutes;
@@ -78,7 +79,7 @@ fn to_do(d: &Diagnosis) -> String {
     }
 }
 
-/// Four answers at a glance.
+/// Four short answers.
 pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
     let best = d.candidates.first();
     let gain = best.map_or_else(String::new, |c| {
@@ -152,7 +153,7 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
     ]
 }
 
-/// What a calibration gains, where it gains anything to speak of.
+/// The gain of a calibration, where it is large enough to be mentioned.
 fn cheaper(d: &Diagnosis) -> String {
     let poly13 = d.transfer.as_ref().map(|t| t.poly13);
     match poly13.filter(|e| e.sim_with_effect < 0.9 * e.sim) {

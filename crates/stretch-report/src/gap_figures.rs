@@ -1,4 +1,4 @@
-//! Measured against simulated, before and after; what is left against level and rate.
+//! Measured and simulated signals, before and after the correction, and residuals against level and rate.
 
 use std::ops::Range;
 
@@ -17,17 +17,17 @@ use super::{
 
 /// Length of the window that is drawn, s.
 const WINDOW_S: f64 = 8.0;
-/// Dots of a panel at most.
+/// Most dots of a panel.
 const DOTS: usize = 900;
-/// Samples on each side of a rate.
+/// Samples on each side in the difference for a rate.
 const REACH: usize = 10;
 
-/// Colours of the measurement, the re-tuned simulator, and the one with the effect.
+/// Colour of the re-tuned simulator.
 pub(crate) const BEFORE: Ink = Ink::Second;
-/// With the effect.
+/// Colour of the simulator with the effect.
 pub(crate) const AFTER: Ink = Ink::Third;
 
-/// Its ink, its width in pixels, and its pieces.
+/// A line as its ink, its width in pixels, and its pieces.
 type Line = (Ink, f64, Vec<Vec<(f64, f64)>>);
 
 /// Whether there is an effect to draw beside the re-tuned simulator.
@@ -35,7 +35,7 @@ pub(crate) fn has_after(subject: &Subject<'_>) -> bool {
     !subject.evidence.best.effects.is_empty()
 }
 
-/// What the curves are called.
+/// Name of the curve of the simulator with the effect.
 pub(crate) fn after_name(diagnosis: &Diagnosis) -> String {
     if diagnosis.named.is_empty() {
         "with the best effects of the catalogue".to_owned()
@@ -46,17 +46,17 @@ pub(crate) fn after_name(diagnosis: &Diagnosis) -> String {
 
 /// The test trial that is drawn.
 pub(crate) struct Shown {
-    /// What it is called.
+    /// Name of the trial.
     pub(crate) name: String,
-    /// Its samples among those of all trials end to end.
+    /// Samples of the trial among those of all trials end to end.
     pub(crate) samples: Range<usize>,
-    /// Their times, s.
+    /// Times of these samples, s.
     pub(crate) time_s: Vec<f64>,
-    /// What is seen of it first, s.
+    /// First view of the trial, s.
     pub(crate) window: Range<f64>,
 }
 
-/// Eight seconds of a test trial: output, and what is left.
+/// Eight seconds of a test trial: output and residual.
 pub(crate) fn trace_figures(
     subject: &Subject<'_>,
     stage: usize,
@@ -153,7 +153,8 @@ fn lines_figure(
         .draw(FigureSize { width: 880, height }, draw(wide))
 }
 
-/// The test trial with the largest gap, and the eight seconds of it in which the re-tuned simulator is farthest off.
+/// The test trial with the largest gap, and the eight seconds of that trial with the largest error of the re-tuned
+/// simulator.
 pub(crate) fn shown(subject: &Subject<'_>, stage: usize) -> Option<Shown> {
     let segment = worst_segment(subject, stage)?;
     let dt_s = subject.simulator.dt_s();
@@ -185,19 +186,19 @@ fn begin_of(subject: &Subject<'_>, trial: usize) -> usize {
     subject.simulator.trials()[..trial].iter().map(|t| t.samples).sum()
 }
 
-/// What is left, above its axis.
+/// Label of the axis of residuals.
 const LEFT: &str = "measured \u{2212} simulated, multiples of the noise";
 
-/// What the residual is drawn against.
+/// The quantity against which the residual is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Against {
     /// The level of the motion.
     Level,
-    /// Its rate.
+    /// The rate of the motion.
     Rate,
 }
 
-/// What is left of one stage over all trials, before and after, one panel each.
+/// The residual of one stage over all trials, before and after the correction, one panel each.
 pub(crate) fn left_figure(subject: &Subject<'_>, stage: usize, against: Against) -> Figure {
     let motion = subject.simulator.motion();
     let evidence = &subject.evidence.stages[stage];

@@ -1,6 +1,7 @@
-//! What pages of other crates are built from: the frame of a page, its figures, and numbers as they stand there.
+//! Parts for the pages of other crates: the frame of a page, its figures, and its numbers.
 //!
-//! Figures are drawn with `plotters`, whose types stand in [`Area`] and [`Chart`]: whoever draws with them takes the same version of it.
+//! Figures are drawn with `plotters`, whose types appear in [`Area`] and [`Chart`]: a crate that draws with these
+//! types needs the same version of `plotters`.
 
 pub use crate::{
     bar_figure::{Bar, Row, Scale, bar_figure, narrow_bar_figure},

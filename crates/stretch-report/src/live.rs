@@ -1,4 +1,4 @@
-//! What the script of a page draws: the data of a figure as compact JSON.
+//! The data of a figure for the script of a page, as compact JSON.
 //!
 //! A curve is given on an even grid of time, once over the whole recording and once on a finer grid around the first view.
 //! Where a slot of the grid holds several samples, the slot gives the least and the greatest in their order, so that no
@@ -14,8 +14,9 @@ use super::{
     thin::extent,
 };
 
-/// Slots over a whole recording, and around the window that is shown first.
+/// Slots over a whole recording.
 const COARSE: usize = 600;
+/// Slots around the first view.
 const FINE: usize = 800;
 /// Steps of a value over the span of its curve.
 const FINENESS: f64 = 2000.0;
@@ -30,7 +31,7 @@ pub(crate) struct Packed {
     d: Vec<Option<i64>>,
 }
 
-/// A curve with its looks.
+/// A curve with its appearance.
 #[derive(Debug, Serialize)]
 struct Series<'a> {
     name: &'a str,
@@ -39,16 +40,16 @@ struct Series<'a> {
     levels: Vec<Packed>,
 }
 
-/// Which samples belong to a bar.
+/// The samples that belong to a bar.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Pick {
     /// `level`, `rate` or `time`.
     pub(crate) by: &'static str,
-    /// From this value.
+    /// Least value of the samples.
     pub(crate) from: f64,
-    /// To this one.
+    /// Greatest value of the samples.
     pub(crate) to: f64,
-    /// Whether the sign does not count.
+    /// Whether magnitudes are compared, without the sign.
     pub(crate) size: bool,
 }
 
@@ -57,28 +58,28 @@ pub(crate) struct Pick {
 pub(crate) struct TimePlot<'a> {
     /// Plots of one name zoom together.
     pub(crate) link: String,
-    /// Below and above.
+    /// Labels of the horizontal and the vertical axis.
     pub(crate) labels: [&'a str; 2],
-    /// Of the values.
+    /// Unit of the values.
     pub(crate) unit: &'a str,
     /// Height in pixels.
     pub(crate) height: u32,
-    /// Of the samples.
+    /// Times of the samples.
     pub(crate) time: &'a [f64],
-    /// What is shown first.
+    /// The first view.
     pub(crate) view: Range<f64>,
-    /// Whether it always shows the whole recording, and marks what the others show; it then draws their curves.
+    /// Whether the plot always shows the whole recording, draws the curves of the linked plots and marks their view.
     pub(crate) is_whole: bool,
     /// Name, colour, width in pixels, values.
     pub(crate) lines: Vec<(&'a str, Ink, f64, &'a [f64])>,
-    /// What samples are picked by.
+    /// Keys by which samples are picked, with their values.
     pub(crate) keys: Vec<(&'static str, &'a [f64])>,
-    /// What moves a curve as numbers are turned: `out` adds to it, `left` takes from it.
+    /// Effect of a varied parameter on the curves: `out` adds to a curve, `left` subtracts from it.
     pub(crate) moves: Option<&'static str>,
 }
 
 impl TimePlot<'_> {
-    /// As JSON; nothing without a stretch of time.
+    /// The plot as JSON; `None` without a span of time.
     pub(crate) fn json(&self) -> Option<String> {
         let span = extent(self.time.iter().copied()).filter(|s| s.end > s.start)?;
         let levels = |values: &[f64]| levels(self.time, values, [&span, &self.view], ends);
@@ -110,7 +111,7 @@ impl TimePlot<'_> {
     }
 }
 
-/// What turning a number adds to a curve, on the grids of the curve.
+/// Change of a curve with a varied parameter, on the grids of the curve.
 pub(crate) fn change(time: &[f64], values: &[f64], view: &Range<f64>) -> Vec<Packed> {
     let span = extent(time.iter().copied()).unwrap_or(0.0..0.0);
     levels(time, values, [&span, view], mean)
@@ -119,7 +120,7 @@ pub(crate) fn change(time: &[f64], values: &[f64], view: &Range<f64>) -> Vec<Pac
 /// From the samples of a slot to the slot's two values.
 type SlotValues = fn(&[(f64, f64)]) -> Option<[f64; 2]>;
 
-/// By the least and the greatest, in their order.
+/// The least and the greatest sample of a slot, in the order of time.
 fn ends(part: &[(f64, f64)]) -> Option<[f64; 2]> {
     let real = || part.iter().filter(|p| p.1.is_finite());
     let low = real().min_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -127,13 +128,13 @@ fn ends(part: &[(f64, f64)]) -> Option<[f64; 2]> {
     Some(if low.0 <= high.0 { [low.1, high.1] } else { [high.1, low.1] })
 }
 
-/// By their mean, twice: it moves both ends.
+/// The mean of a slot's samples, twice, because a change moves both values.
 fn mean(part: &[(f64, f64)]) -> Option<[f64; 2]> {
     let mean = part.iter().map(|p| p.1).sum::<f64>() / part.len() as f64;
     mean.is_finite().then_some([mean; 2])
 }
 
-/// The whole recording, and the view with half of itself on either side.
+/// A curve over the whole recording, and over the view with half its width on either side.
 fn levels(
     time: &[f64],
     values: &[f64],
@@ -148,7 +149,7 @@ fn levels(
     [Some(whole), is_finer.then_some(fine)].into_iter().flatten().collect()
 }
 
-/// Samples inside a window on at most `2 slots` places.
+/// The samples inside a window, at no more than `2 slots` places.
 fn packed(
     time: &[f64],
     values: &[f64],
@@ -202,18 +203,18 @@ fn steps(t: f64, dt: f64, values: &[Option<f64>]) -> Packed {
     Packed { t, dt, o: span.start, q, d: values.iter().map(&mut step).collect() }
 }
 
-/// One row of a bar figure: where it stands, and what it says.
+/// One row of a bar figure, with its place and its texts.
 #[derive(Debug, Serialize)]
 pub(crate) struct BarRow {
-    /// Its label.
+    /// Label of the row.
     pub(crate) label: String,
-    /// Upper end, in steps of the drawing.
+    /// Upper end of the row, in steps of the drawing.
     pub(crate) top: i32,
-    /// Lower end.
+    /// Lower end of the row, in steps of the drawing.
     pub(crate) bottom: i32,
-    /// Its values.
+    /// Values of the row as text.
     pub(crate) text: String,
-    /// The samples that belong to it.
+    /// Samples that belong to the row.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) pick: Option<Pick>,
 }
@@ -271,13 +272,13 @@ pub(crate) fn scatter_json(
     .to_string()
 }
 
-/// JSON that no name in it can end: its markup is written in numbers.
+/// JSON for embedding in a page, with markup characters escaped, so that no name can end the element.
 pub(crate) fn embedded(json: &str) -> String {
     let mut safe = String::with_capacity(json.len());
     for c in json.chars() {
         match c {
             '<' | '>' | '&' => safe.push_str(&format!("\\u{:04x}", u32::from(c))),
-            // what is read from it is the name as a page shows it
+            // a reader of the JSON gets the name as shown on the page
             c if hides(c) => safe.push_str(&format!("\\\\u{:04x}", u32::from(c))),
             c if c.is_control() => safe.push('\u{fffd}'),
             c => safe.push(c),

@@ -19,12 +19,13 @@ pub(crate) fn escape(text: &str) -> String {
     safe
 }
 
-/// Whether a name with it would turn the text around it, or hide a part of itself: it is shown as what it is.
+/// Whether the character would reverse the surrounding text or hide a part of a name; such a character is shown as an
+/// escape.
 pub(crate) fn hides(c: char) -> bool {
     matches!(c, '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
 }
 
-/// What stands where there is no number.
+/// Text in place of a missing number.
 pub(crate) const NONE: &str = "\u{2013}";
 
 /// `x` to `digits` significant digits, in plain notation from 0.0001 to a
@@ -57,7 +58,7 @@ pub fn fixed(x: f64, decimals: usize) -> String {
     minus(if zero { text.trim_start_matches('-').to_owned() } else { text })
 }
 
-/// A share in whole percent, rounded once; below one to a digit.
+/// A share in whole percent, or with one digit below one percent, rounded once.
 pub fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     let digits = match percent.abs() < 0.95 {

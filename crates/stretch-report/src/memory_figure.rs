@@ -1,4 +1,4 @@
-//! What a calibration that remembers does: its answer to a step, and its loops on triangles.
+//! The memory of a calibration: its step response, and its loops on triangular signals.
 
 use plotters::prelude::*;
 use stretch_calibrate::{Calibrated, LiveReceptor};
@@ -25,7 +25,7 @@ pub(crate) fn remembers(calibrated: &Calibrated) -> bool {
     )
 }
 
-/// A signal on its grid of time, and what the calibration makes of it; NaN where it has no answer.
+/// A signal on its grid of time, and the calibration's estimates; NaN where there is no estimate.
 struct Answer {
     time_s: Vec<f64>,
     signal: Vec<f64>,
@@ -41,7 +41,7 @@ impl Answer {
         let mut answer = Self { time_s: Vec::new(), signal: Vec::new(), estimate: Vec::new() };
         for n in 0..count {
             let t = n as f64 * dt_s;
-            // the middle half of what it was calibrated on
+            // the middle half of the calibrated range
             let signal = low + span * (0.25 + 0.5 * share(t));
             answer.estimate.push(live.step(t, signal).map_or(f64::NAN, |reading| reading.estimate));
             answer.time_s.push(t);
@@ -51,7 +51,7 @@ impl Answer {
     }
 }
 
-/// The estimate after the signal leaps up and down again.
+/// The estimate after a step of the signal up and a step down.
 pub(crate) fn step_figure(name: &str, calibrated: &Calibrated, unit: &str) -> Figure {
     let calibration = &calibrated.calibration;
     let up = |t: f64| if (HOLD_S..2.0 * HOLD_S).contains(&t) { 1.0 } else { 0.0 };
@@ -98,7 +98,7 @@ pub(crate) fn step_figure(name: &str, calibrated: &Calibrated, unit: &str) -> Fi
         .live(live.json())
 }
 
-/// The estimate over the signal when that goes up and down evenly: a model without memory draws one line.
+/// The estimate over a triangular signal: the figure of a model without memory is a single line.
 pub(crate) fn loop_figure(name: &str, calibrated: &Calibrated, unit: &str) -> Figure {
     let calibration = &calibrated.calibration;
     let loops: Vec<Vec<(f64, f64)>> = PERIODS_S
@@ -107,7 +107,7 @@ pub(crate) fn loop_figure(name: &str, calibrated: &Calibrated, unit: &str) -> Fi
             let triangle = |t: f64| 1.0 - (2.0 * (t / period_s).fract() - 1.0).abs();
             let answer = Answer::new(calibration, 3.0 * period_s, triangle)?;
             let pairs = answer.time_s.iter().zip(&answer.signal).zip(&answer.estimate);
-            // the last period: by then it has forgotten how it began
+            // the last period, in which the initial state is forgotten
             let last = pairs.filter(|((t, _), y)| **t >= 2.0 * period_s && y.is_finite());
             Some(last.map(|((_, x), y)| (*x, *y)).collect())
         })

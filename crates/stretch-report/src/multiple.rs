@@ -1,19 +1,20 @@
-//! One unit for gaps on a page: the root mean square of what is left, in multiples of the noise.
+//! The unit of gaps on a page: the root mean square of the residual, in multiples of the noise.
 
 use super::markup::{number, with_unit};
 
-/// Root mean square over the noise, of an excess (mean square over that of the noise, minus 1): `sqrt(1 + excess)`.
+/// Root mean square of the residual over that of the noise, `sqrt(1 + excess)`, where the excess is the reduced
+/// chi-square minus one.
 pub(crate) fn multiple(excess: f64) -> f64 {
-    // noise that came out smaller than it was taken for is no less than none
+    // the excess may be below zero, but the root mean square may not
     if excess.is_finite() { (1.0 + excess).max(0.0).sqrt() } else { f64::NAN }
 }
 
-/// What an excess leaves, root mean square, in multiples of the noise: `2.0 ×`.
+/// The root mean square of a residual with this excess, as a multiple of the noise: `2.0 ×`.
 pub fn times(excess: f64) -> String {
     with_unit(&number(multiple(excess), 2), "\u{d7}")
 }
 
-/// In the unit of the channel, and as a multiple of its noise.
+/// The root mean square of a residual with this excess, in the unit of the channel and as a multiple of the noise.
 pub(crate) fn both(excess: f64, noise: f64, unit: &str) -> String {
     format!("{} ({})", with_unit(&number(multiple(excess) * noise, 3), unit), times(excess))
 }

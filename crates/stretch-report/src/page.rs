@@ -4,18 +4,18 @@ use std::fmt::Write as _;
 
 use super::{canvas::Ink, figure::Figure, live::embedded, markup::escape, script};
 
-/// Columns from which a row is a card on a phone.
+/// Least number of columns from which a row is a card on a phone.
 const CARDS: usize = 4;
-/// Letters from which a cell is words, which wrap.
+/// Least number of letters from which the text of a cell wraps.
 const WORDS: usize = 24;
 
-/// The look: colours, type, and what a phone and a printer change.
+/// The style of the page: colours, fonts, and rules for phones and printers.
 const STYLE: &str = include_str!("style.css");
 
 /// A table: the first column names its rows, the others hold numbers.
 #[derive(Debug, Clone, Default)]
 pub struct Table {
-    /// What it shows.
+    /// Caption of the table.
     pub caption: String,
     /// Heads of the columns.
     pub head: Vec<String>,
@@ -62,7 +62,7 @@ impl Page {
         if intro.is_empty() { self } else { self.text(intro) }
     }
 
-    /// A heading within what is open already.
+    /// A heading within the open section.
     pub fn heading(&mut self, heading: &str) -> &mut Self {
         self.put(&format!("<h2>{}</h2>\n", escape(heading)))
     }
@@ -72,12 +72,12 @@ impl Page {
         self.put(&format!("<p>{}</p>\n", escape(text)))
     }
 
-    /// Code, as it is typed.
+    /// A block of code.
     pub fn code(&mut self, code: &str) -> &mut Self {
         self.put(&format!("<pre>{}</pre>\n", escape(code)))
     }
 
-    /// Notes, one a line; nothing when there are none.
+    /// Notes, one on each line; no element when there are none.
     pub fn list(&mut self, items: &[String]) -> &mut Self {
         if items.is_empty() {
             return self;
@@ -134,7 +134,7 @@ impl Page {
     pub fn table(&mut self, table: &Table) -> &mut Self {
         let caption = escape(&table.caption);
         let cards = if table.head.len() >= CARDS { " class=\"cards\"" } else { "" };
-        // the caption stands outside: it must not scroll away
+        // the caption stands outside of the frame, so that it does not scroll away
         self.put(&format!(
             "<p class=\"caption\">{caption}</p>\n\
              <div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{caption}\">\
@@ -193,7 +193,7 @@ impl Page {
     }
 
     fn put(&mut self, html: &str) -> &mut Self {
-        // a string takes every write
+        // writing to a string cannot fail
         let _ = self.body.write_str(html);
         self
     }

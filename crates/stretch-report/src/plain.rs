@@ -3,10 +3,10 @@
 use stretch_data::listed;
 use stretch_gap::{Baselines, Transfer, TransferError};
 
-/// Points of full scale below which two calibrations err alike.
+/// Difference of two errors, in percent of full scale, below which the errors count as equal.
 const ALIKE: f64 = 0.05;
 
-/// Why a calibration may do worse once the simulator is better; none where none does.
+/// A sentence on calibrations that err more with the better simulator; `None` where no calibration does.
 pub fn transfer_in_words(transfer: &Transfer) -> Option<String> {
     let is_worse = |e: &TransferError| e.sim_with_effect > e.sim + ALIKE;
     let kinds = [("linear", &transfer.linear), ("poly13", &transfer.poly13)];
@@ -32,7 +32,7 @@ pub(crate) fn methods(said: &Baselines) -> [(&'static str, Option<&str>); 3] {
     ]
 }
 
-/// A number with four significant digits, as people read it.
+/// A number with four significant digits, in plain notation.
 pub fn number(x: f64) -> String {
     if !x.is_finite() {
         return "-".to_owned();

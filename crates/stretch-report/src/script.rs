@@ -2,10 +2,10 @@
 
 use sha2::{Digest, Sha256};
 
-/// What makes the figures answer.
+/// The script behind the figures.
 const SCRIPT: &str = include_str!("../../../web/report/report.js");
 
-/// The element's whole text: to XML a section of characters, to HTML comments around a program.
+/// The whole text of the element, which is a CDATA section in XML and a program between comments in HTML.
 fn text() -> String {
     format!("/*<![CDATA[*/\n{SCRIPT}/*]]>*/")
 }
@@ -15,7 +15,8 @@ pub(crate) fn element() -> String {
     format!("<script>{}</script>\n", text())
 }
 
-/// What a page may do: run the script with this digest, wear its own style, and nothing else.
+/// The content security policy of a page: the page may run the script with this digest and use its own style, and
+/// nothing else.
 pub(crate) fn policy() -> String {
     format!(
         "default-src 'none'; script-src {}; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'",
@@ -23,12 +24,12 @@ pub(crate) fn policy() -> String {
     )
 }
 
-/// A script as a policy names it.
+/// The digest by which a policy names a script.
 pub(crate) fn digest(text: &str) -> String {
     format!("'sha256-{}'", base64(&Sha256::digest(text.as_bytes())))
 }
 
-/// RFC 4648, section 4.
+/// Base64 by RFC 4648, section 4.
 pub(crate) fn base64(bytes: &[u8]) -> String {
     const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut out = String::new();

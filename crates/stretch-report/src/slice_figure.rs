@@ -14,7 +14,7 @@ use super::{
 
 const INKS: [Ink; 3] = [Ink::Low, Ink::Middle, Ink::High];
 
-/// Dots of each third at most.
+/// Most dots of each third.
 const DOTS: usize = 350;
 
 /// Target over signal: the samples in motion by thirds of their rate, slow to
@@ -73,7 +73,7 @@ fn thirds(view: &BranchView<'_>) -> Vec<Vec<[f64; 3]>> {
     by_pace.chunks(by_pace.len().div_ceil(3).max(1)).map(<[_]>::to_vec).collect()
 }
 
-/// The median rate of a third, and the surface there over the signals it saw.
+/// The median rate of a third, and the surface at that rate over the signals of the third.
 fn curve(view: &BranchView<'_>, third: &[[f64; 3]]) -> Option<(f64, Vec<(f64, f64)>)> {
     let rates = sorted(third.iter().map(|s| s[0]));
     let signals = sorted(third.iter().map(|s| s[1]));

@@ -1,27 +1,27 @@
-//! What a report of a diagnosis is about.
+//! The subject of a report: a diagnosis and its simulator.
 
 use std::fmt;
 
 use stretch_gap::{Diagnosis, Evidence, Simulator};
 use stretch_problem::{Examined, Implementation, Problem};
 
-/// What a report is about.
+/// The subject of a report.
 #[derive(Clone, Copy)]
 pub struct Subject<'a> {
-    /// What the data are called.
+    /// Name of the data.
     pub name: &'a str,
-    /// What was found.
+    /// The diagnosis.
     pub diagnosis: &'a Diagnosis,
-    /// What it was found from.
+    /// The evidence of the diagnosis.
     pub evidence: &'a Evidence,
-    /// What is named, as something to type.
+    /// The named effects as code.
     pub implementations: &'a [Implementation],
     /// The simulator beside its measurements.
     pub simulator: &'a dyn Simulator,
 }
 
 impl<'a> Subject<'a> {
-    /// A problem that was examined.
+    /// The subject of an examined problem.
     pub fn of(problem: &'a Problem, examined: &'a Examined) -> Self {
         let Examined { name, diagnosis, evidence, implementations, .. } = examined;
         Self { name, diagnosis, evidence, implementations, simulator: problem.simulator() }

@@ -16,10 +16,10 @@ use super::{
 /// Cells along each side of the mesh.
 const CELLS: usize = 18;
 
-/// Dots at most.
+/// Most dots.
 const DOTS: usize = 900;
 
-/// The surface where there are samples to support it, with dots above and below.
+/// The surface in the region that samples support, with dots above and below.
 pub(crate) fn surface_figure(view: &BranchView<'_>, ink: Ink) -> Figure {
     let name = view.name().to_lowercase();
     let [rate, signal, target] = &view.labels;
@@ -34,7 +34,7 @@ pub(crate) fn surface_figure(view: &BranchView<'_>, ink: Ink) -> Figure {
         .live(live(view, ink))
 }
 
-/// Samples that a script shows with their distance to the surface.
+/// Most samples that a script shows with their distance to the surface.
 const STEMS: usize = 400;
 
 /// The surface as JSON: heights over the corners of its cells, and samples, in thousandths of the cube.
@@ -75,7 +75,7 @@ fn live(view: &BranchView<'_>, ink: Ink) -> String {
     .to_string()
 }
 
-/// Heights that are drawn: a polynomial may leave the box where samples are few.
+/// Range of heights that are drawn, because a polynomial may leave the box where samples are few.
 const INSIDE: std::ops::RangeInclusive<f64> = -0.15..=1.15;
 
 /// From the unit cube to the page: signal to the right, rate to the left, target up.
@@ -108,7 +108,7 @@ impl View {
         (self.left + self.scale.0 * across, self.top + self.scale.1 * (all - up))
     }
 
-    /// How far from the eye, 0 the nearest.
+    /// Distance of a point from the eye; 0 is the nearest.
     fn depth(&self, u: f64, r: f64) -> f64 {
         self.sin * u + self.cos * r
     }
@@ -119,7 +119,7 @@ impl View {
     }
 }
 
-/// The cube's coordinates of what a view shows.
+/// Conversion from the units of a view to coordinates of the unit cube.
 struct Cube<'a>(&'a BranchView<'a>);
 
 impl Cube<'_> {
@@ -144,7 +144,7 @@ impl Cube<'_> {
         self.z(self.0.surface(rate, signal))
     }
 
-    /// Which cells have a sample in them or near them; holes between samples are closed.
+    /// For each cell, whether a sample lies in or near the cell; holes between samples are closed.
     fn supported(&self) -> Vec<bool> {
         let mut cells = vec![false; CELLS * CELLS];
         let cell = |x: f64| ((x * CELLS as f64) as usize).min(CELLS - 1);
@@ -155,14 +155,15 @@ impl Cube<'_> {
             }
             cells[cell(u) * CELLS + cell(r)] = true;
         }
-        // two steps out and one back
+        // two steps of dilation and one of erosion
         let out = |cells: Vec<bool>| near(&cells, |lit, _| lit > 0);
         let back = |cells: Vec<bool>| near(&cells, |lit, all| lit == all);
         back(out(out(cells)))
     }
 }
 
-/// Says something of each cell by how many of it and its neighbours are lit, and of how many.
+/// Evaluates `say` for each cell with the number of lit cells among the cell and its neighbours, and the number of
+/// these cells.
 fn near(cells: &[bool], say: impl Fn(usize, usize) -> bool) -> Vec<bool> {
     let reach = |i: usize| i.saturating_sub(1)..(i + 2).min(CELLS);
     let around = |c: usize| {
@@ -185,7 +186,7 @@ fn draw(area: &Area<'_>, view: &BranchView<'_>, ink: Ink) -> Drawn {
             side.push(eye.place([u, r, z]));
         }
     }
-    // seen from above: what lies below the surface is behind it
+    // seen from above, points below the surface lie behind it
     for &place in &below {
         area.draw(&Circle::new(place, px(0.9), dot(Ink::Truth, 0.35)))?;
     }
@@ -196,7 +197,7 @@ fn draw(area: &Area<'_>, view: &BranchView<'_>, ink: Ink) -> Drawn {
     Ok(())
 }
 
-/// The cells from the farthest to the nearest, darker where they are steeper.
+/// Draws the cells from the farthest to the nearest, darker where the surface is steeper.
 fn mesh(area: &Area<'_>, cube: &Cube<'_>, eye: &View, ink: Ink) -> Drawn {
     let supported = cube.supported();
     let at = |i: usize| i as f64 / CELLS as f64;
@@ -222,7 +223,7 @@ fn mesh(area: &Area<'_>, cube: &Cube<'_>, eye: &View, ink: Ink) -> Drawn {
     Ok(())
 }
 
-/// Floor, walls, numbers and names of the axes.
+/// Draws floor, walls, numbers and names of the axes.
 fn floor(area: &Area<'_>, view: &BranchView<'_>, eye: &View) -> Drawn {
     let line = |style: ShapeStyle, a: [f64; 3], b: [f64; 3]| {
         area.draw(&PathElement::new(vec![eye.place(a), eye.place(b)], style))

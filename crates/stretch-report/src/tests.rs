@@ -1,4 +1,4 @@
-//! What every report must be, whatever the data.
+//! Properties of every report, for any data.
 
 use stretch_calibrate::{
     Calibrated, Candidate, Evaluation, MethodErrors, ModelKind, Options, TrialErrors, calibrate,
@@ -122,7 +122,7 @@ fn elements(document: &str) -> Vec<String> {
     all
 }
 
-/// No number on the page or in a path is none.
+/// Checks that no number on the page or in a path is NaN.
 fn assert_numbers(page: &str) {
     let page = &without_program(page);
     for bad in ["NaN", "inf ", "inf\"", "inf<", "-inf", "2147483647", "-2147483648"] {

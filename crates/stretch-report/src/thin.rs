@@ -1,4 +1,4 @@
-//! From a hundred thousand samples to what a figure can show.
+//! Reduction of a hundred thousand samples to the points of a figure.
 
 use std::ops::Range;
 
@@ -30,9 +30,9 @@ pub(crate) fn quantile(sorted: &[f64], q: f64) -> f64 {
     sorted.get((q * last).round() as usize).copied().unwrap_or(f64::NAN)
 }
 
-/// A curve inside a window of time, cut where a value is missing or the time
-/// leaps (ten times the mean step), as least and greatest value of each of
-/// `bins` slots: no peak is lost, and each piece keeps its ends.
+/// A curve inside a window of time, as the least and the greatest value of each of `bins` slots. The curve is cut
+/// where a value is missing or the time leaps (ten times the mean step). No peak is lost, and each piece keeps its
+/// ends.
 pub(crate) fn curve(
     time: &[f64],
     values: &[f64],
@@ -78,7 +78,7 @@ pub(crate) fn sample<T: Copy>(items: &[T], most: usize) -> Vec<T> {
     if items.len() <= most {
         return items.to_vec();
     }
-    // steps of the golden ratio fall evenly and never repeat
+    // multiples of the golden ratio are spread evenly and never repeat
     let place = |k: usize| (k as f64 * 0.618_033_988_749_894_9).fract() * items.len() as f64;
     (0..most).filter_map(|k| items.get(place(k) as usize).copied()).collect()
 }
@@ -88,11 +88,11 @@ pub(crate) fn sample<T: Copy>(items: &[T], most: usize) -> Vec<T> {
 pub(crate) struct Bin {
     /// Middle of the slot.
     pub(crate) x: f64,
-    /// A tenth of the values lie below.
+    /// The value below which a tenth of the values lie.
     pub(crate) low: f64,
-    /// Half of them.
+    /// The value below which half of the values lie.
     pub(crate) median: f64,
-    /// Nine tenths.
+    /// The value below which nine tenths of the values lie.
     pub(crate) high: f64,
 }
 

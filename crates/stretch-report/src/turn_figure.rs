@@ -1,4 +1,5 @@
-//! What is left as each number of an effect is turned, and what the page's script needs to let a reader turn it.
+//! The residual over each parameter of an effect, and the data with which the page's script lets a reader vary the
+//! parameter.
 
 use std::ops::Range;
 
@@ -19,7 +20,7 @@ use super::{
 /// Height of a panel, pixels.
 const PANEL: u32 = 165;
 
-/// One number of an effect.
+/// A parameter of an effect.
 #[derive(Debug, Serialize)]
 struct Turned {
     name: String,
@@ -32,7 +33,7 @@ struct Turned {
     panel: Panel,
 }
 
-/// What is left on the test trials against every number, one panel each; none where no number can be turned.
+/// The residual on the test trials over every parameter, one panel each; `None` where no parameter can be varied.
 pub(crate) fn turn_figure(subject: &Subject<'_>, stage: usize, shown: &Shown) -> Option<Figure> {
     let responses = subject.evidence.responses.as_ref().filter(|r| r.stage == stage)?;
     let curves = curves(responses);
@@ -108,7 +109,8 @@ fn draw(area: &Area<'_>, one: &Response, curve: &[(f64, f64)], [x, y]: [&Range<f
     })
 }
 
-/// By parameter, its values, the fitted one among them, and the root mean square that is left there, in multiples of the noise.
+/// For each parameter, its values (the fitted value among them) and the root mean square of the residual at each
+/// value, in multiples of the noise.
 fn curves(responses: &Responses) -> Vec<Vec<(f64, f64)>> {
     let products = &responses.products;
     let all = products[0][0];
@@ -130,7 +132,7 @@ fn named(one: &Response) -> String {
     format!("{}: {}", one.effect, one.name)
 }
 
-/// Of what is plotted; a bare number has none.
+/// Unit of the plotted parameter; empty for a number without unit.
 fn unit(one: &Response) -> &str {
     if one.unit == "1" { "" } else { &one.unit }
 }

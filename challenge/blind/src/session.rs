@@ -301,7 +301,7 @@ mod tests {
     use crate::protocol::{Protocol, session};
     use approx::assert_abs_diff_eq;
     use testkit::tolerance::{
-        BLIND_FILL_PA, BLIND_FULL_PA, BLIND_LENGTH_MM, BLIND_TRIMMED_V, BLIND_HYSTERESIS_STATE,
+        BLIND_FILL_PA, BLIND_FULL_PA, BLIND_HYSTERESIS_STATE, BLIND_LENGTH_MM, BLIND_TRIMMED_V,
     };
 
     fn short_session() -> Vec<Script> {
@@ -451,6 +451,10 @@ mod tests {
         // Vented before the first trial: the slack of 0.01 strain is on the side of relaxing.
         let offset = traces[0].volts[0] - rig.nominal_volts(0.0);
         let slope = (rig.nominal_volts(0.01) - rig.nominal_volts(0.0)) / 0.01 / (1.0 + rig.e0());
-        assert_abs_diff_eq!(offset, 0.01 * slope, epsilon = BLIND_HYSTERESIS_STATE * 0.01 * slope.abs());
+        assert_abs_diff_eq!(
+            offset,
+            0.01 * slope,
+            epsilon = BLIND_HYSTERESIS_STATE * 0.01 * slope.abs()
+        );
     }
 }

@@ -11,7 +11,7 @@ use stretch_fit::{Factor, FitError};
 
 use crate::{
     about::About,
-    record::{Side, Whole},
+    calibration::{Side, Whole},
     span::Span,
     state::Partial,
     triangles::Outcome,

@@ -2,12 +2,12 @@
 
 mod about;
 mod agreement;
+mod calibration;
 mod columns;
 mod estimate;
 mod fit;
 mod fitted;
 mod one;
-mod record;
 mod span;
 mod state;
 mod triangles;

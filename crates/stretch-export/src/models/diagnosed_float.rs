@@ -22,31 +22,15 @@ pub(crate) fn diagnosed_float(calibration: &Calibration) -> Result<Part, ExportE
         constants
             .define("SLIP", model.slip, "half-width of the sleeve's slip")
             .define("SMOOTH", SMOOTH as f32, "share of a sample in what the signal shows")
-            .define(
-                "TURN_THRESHOLD",
-                model.turn_threshold,
-                "the sleeve has turned when the signal has come back by more",
-            )
-            .define(
-                "SLIP_VARIANCE",
-                model.slip_variance,
-                "variance of a target anywhere in the slip",
-            )
-            .define(
-                "SLIP_VARIANCE_SHARE",
-                model.slip_variance_share,
-                "share of that variance that a sample adds",
-            );
+            .define("TURN_THRESHOLD", model.turn_threshold, "way back in signal that makes a turn")
+            .define("SLIP_VARIANCE", model.slip_variance, "variance of a target in the slip")
+            .define("SLIP_VARIANCE_SHARE", model.slip_variance_share, "share added a sample");
     }
     if has.contains(&"slip") || has.contains(&"hysteresis") {
         has.push("initial_hysteresis");
         let [initial, slope] = model.defects.initial_hysteresis;
         constants
-            .define(
-                "INITIAL_HYSTERESIS",
-                initial,
-                "state of the plays at a target of 0 where a stream begins",
-            )
+            .define("INITIAL_HYSTERESIS", initial, "state of the plays at a target of 0")
             .define("INITIAL_HYSTERESIS_SLOPE", slope, "change of that state per target");
     }
     if model.ahead_s != 0.0 {

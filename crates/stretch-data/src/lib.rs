@@ -22,7 +22,7 @@ pub use data_set::{DataSet, Split, TrialEntry, TrialKind};
 pub use error::{DataError, Place, shown};
 pub use even::{Even, EvenPart, EvenSpec, Rows};
 pub use even_session::{EvenSession, EvenTrial, SessionTrial};
-pub use listed::{listed, listed_up_to};
+pub use listed::listed;
 pub use nearest::nearest;
 pub use rig_file::{EffectEntry, Parameter, Remarks, RigFile};
 pub use time::tidy_time;

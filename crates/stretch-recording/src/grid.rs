@@ -14,7 +14,7 @@ const HELD: [&str; 2] = ["inlet", "outlet"];
 /// Periods of a channel's own clock over which a straight line is drawn: as many lost samples as a live receptor bridges, and one.
 const BRIDGED: f64 = 4.5;
 /// Names that a sentence holds; more are counted.
-const MOST_NAMES: usize = 4;
+const TOLD: usize = 4;
 
 /// Channels that were recorded at the same instants.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -354,7 +354,10 @@ fn tell(
     }
 }
 
-/// The first names, and the number of further names.
+/// A few names, and how many more there are.
 pub(crate) fn listed(names: &[&str]) -> String {
-    stretch_data::listed_up_to(MOST_NAMES, names)
+    match names.len() {
+        n if n > TOLD + 1 => format!("{} and {} more", names[..TOLD].join(", "), n - TOLD),
+        _ => names.join(", "),
+    }
 }

@@ -78,10 +78,10 @@ struct Make {
     #[arg(long, value_name = "NAME|all", default_value = "all", value_parser = family)]
     family: Families,
     /// Supply, noise, clock and pauses: plain is the same for every rig, drawn another for each
-    #[arg(long, alias = "clutter", value_name = "plain|drawn", default_value = "drawn", value_parser = disturbances)]
+    #[arg(long, alias = "clutter", value_name = "plain|drawn", default_value = "drawn")]
     disturbances: Disturbances,
     /// Trials of a session: paper, or paper+ with one more at 0.7 of the excitation
-    #[arg(long, value_name = "paper|paper+", default_value = "paper", value_parser = protocol)]
+    #[arg(long, value_name = "paper|paper+", default_value = "paper")]
     protocol: Protocol,
 }
 
@@ -117,20 +117,8 @@ fn family(name: &str) -> Result<Families, String> {
     if name == "all" {
         return Ok(Families(None));
     }
-    let known = || Family::ALL.map(Family::name).join(", ");
-    Family::named(name)
-        .map(|family| Families(Some(family)))
-        .ok_or_else(|| format!("there are {}, all", known()))
-}
-
-fn disturbances(name: &str) -> Result<Disturbances, String> {
-    let found = Disturbances::ALL.into_iter().find(|disturbances| disturbances.name() == name);
-    found.ok_or_else(|| "there are plain, drawn".to_owned())
-}
-
-fn protocol(name: &str) -> Result<Protocol, String> {
-    let found = Protocol::ALL.into_iter().find(|protocol| protocol.name() == name);
-    found.ok_or_else(|| "there are paper, paper+".to_owned())
+    let family = name.parse().map_err(|known| format!("{known}, all"))?;
+    Ok(Families(Some(family)))
 }
 
 fn main() -> ExitCode {

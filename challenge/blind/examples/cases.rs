@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use stretch_blind::{Family, Plan, make};
+use stretch_blind::{Plan, make};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     match forms.first().map(String::as_str) {
         None => {}
         Some("plain") => plan = plan.plain(),
-        Some(name) => plan.family = Some(Family::named(name).ok_or("no such family")?),
+        Some(name) => plan.family = Some(name.parse()?),
     }
     let seal = make(Path::new(folder), seed.parse()?, &plan, &|done| eprint!("\r{done} done"))?;
     println!("\nsealed: {}", seal.sha256());

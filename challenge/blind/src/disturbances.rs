@@ -2,34 +2,20 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
-
 use crate::random::RandomGenerator;
 use crate::rig::{SIGMA_L, SIGMA_P, SIGMA_V};
+use crate::words::worded;
 
-/// How supply, noise, clock, pauses and start pressures of a case come about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Disturbances {
-    /// The same in every rig: white Gaussian noise as the data sheet says, a supply that wanders by
-    /// 0.25 % over 15 s, pauses of 15 s, samples on the grid.
-    Plain,
-    /// Drawn for each rig: levels, colours, tails, correlation times, jitter, dropped samples.
-    #[default]
-    Drawn,
-}
-
-impl Disturbances {
-    /// Both, in the order of reports.
-    pub const ALL: [Self; 2] = [Self::Plain, Self::Drawn];
-
-    /// Name as options write it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Plain => "plain",
-            Self::Drawn => "drawn",
-        }
+worded! {
+    /// How supply, noise, clock, pauses and start pressures of a case come about.
+    #[derive(Default)]
+    Disturbances {
+        /// The same in every rig: white Gaussian noise as the data sheet says, a supply that wanders by
+        /// 0.25 % over 15 s, pauses of 15 s, samples on the grid.
+        Plain "plain",
+        /// Drawn for each rig: levels, colours, tails, correlation times, jitter, dropped samples.
+        #[default]
+        Drawn "drawn",
     }
 }
 

@@ -1,34 +1,20 @@
 //! What may be wrong with a rig: the vocabulary, and the forms each cause takes here.
 
-use serde::{Deserialize, Serialize};
-
 use crate::family::Family;
 use crate::random::RandomGenerator;
+use crate::words::worded;
 
-/// Part of the rig that a cause acts in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Stage {
-    /// Openings to pressure.
-    Pneumatics,
-    /// Pressure to length.
-    Muscle,
-    /// Length to bridge voltage.
-    Sensing,
-    /// True length to measured length.
-    Reference,
-}
-
-impl Stage {
-    /// Name as reports write it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Pneumatics => "pneumatics",
-            Self::Muscle => "muscle",
-            Self::Sensing => "sensing",
-            Self::Reference => "reference",
-        }
+worded! {
+    /// Part of the rig that a cause acts in.
+    Stage {
+        /// Openings to pressure.
+        Pneumatics "pneumatics",
+        /// Pressure to length.
+        Muscle "muscle",
+        /// Length to bridge voltage.
+        Sensing "sensing",
+        /// True length to measured length.
+        Reference "reference",
     }
 }
 

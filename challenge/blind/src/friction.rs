@@ -1,7 +1,8 @@
-//! Friction loops drawn: plays of a random distribution, rate laws, and reaches that differ by
-//! direction.
+//! Friction loops: by Dahl, by Bouc and Wen, and slip elements of spread strength; drawn as plays of a
+//! random distribution, rate laws, and reaches that differ by direction.
 
 use crate::curve::{Wiggle, weights};
+use crate::effect::Cause;
 use crate::family::Family;
 use crate::laws::sign;
 use crate::random::RandomGenerator;
@@ -18,8 +19,8 @@ struct Element {
 /// How the loop turns at a reversal.
 #[derive(Debug, Clone)]
 enum Law {
-    /// z = sum of shares times x - play(x, r).
-    Plays(Vec<Element>),
+    /// z = sum of shares times x - play(x, r), over `whole`.
+    Plays { elements: Vec<Element>, whole: f64 },
     /// dz = dx (1 - turn |z / r|^n), turn = a + (1 - a) sgn(dx z) (Bouc, Wen), or
     /// dz = dx (1 - sgn(dx) z / r)^n (Dahl); r grows towards rest (Stribeck, as in LuGre).
     Rate { dahl: bool, exponent: f64, share: f64, rest: f64, speed: f64, z: f64 },
@@ -34,6 +35,44 @@ pub(crate) struct Friction {
 }
 
 impl Friction {
+    /// The loop of a cause.
+    pub(crate) fn of(cause: &Cause, reach: f64, sharp: bool) -> Self {
+        match cause.is_drawn() {
+            true => Self::draw(cause.family, reach, sharp, &mut cause.random(2)),
+            false => Self::written(cause.form, reach, cause.aux[1], sharp),
+        }
+    }
+
+    /// Form 0 is Dahl's (1968), 1 Bouc's and Wen's (1976), else six slip elements; `reach` is where it
+    /// saturates. `spread` in 0..1 sets what the form leaves open; `sharp` loops turn within their reach.
+    fn written(form: usize, reach: f64, spread: f64, sharp: bool) -> Self {
+        let rate = |dahl, exponent, share| Law::Rate {
+            dahl,
+            exponent,
+            share,
+            rest: 0.0,
+            speed: 1.0,
+            z: 0.0,
+        };
+        let law = match form {
+            0 if sharp => rate(true, 0.35 + 0.3 * spread, 0.0),
+            0 => rate(true, 0.9 + 0.5 * spread, 0.0),
+            1 if sharp => rate(false, 2.5 + 2.0 * spread, 0.65),
+            1 => rate(false, 1.2 + 0.6 * spread, 0.6),
+            _ => {
+                let width = if sharp { 0.25 } else { 1.1 + 0.4 * spread };
+                // Quantiles of a log-uniform spread, scaled so that they sum to six reaches.
+                let raw: [f64; 6] =
+                    std::array::from_fn(|i| (width * (2.0 * (i as f64 + 0.5) / 6.0 - 1.0)).exp());
+                let mean = raw.iter().sum::<f64>() / 6.0;
+                let element =
+                    |r: f64| Element { share: 1.0, up: r / mean, down: r / mean, at: 0.0 };
+                Law::Plays { elements: raw.map(element).to_vec(), whole: 6.0 }
+            }
+        };
+        Self { law, reach, last: None }
+    }
+
     /// A loop of a family; `sharp` ones turn within their reach, as a backlash does.
     pub(crate) fn draw(
         family: Family,
@@ -43,7 +82,7 @@ impl Friction {
     ) -> Self {
         let law = match family {
             Family::RateLaws => Self::rate(sharp, random),
-            _ => Law::Plays(plays(family, sharp, random)),
+            _ => Law::Plays { elements: plays(family, sharp, random), whole: 1.0 },
         };
         Self { law, reach, last: None }
     }
@@ -70,15 +109,13 @@ impl Friction {
             return 0.0;
         }
         match &mut self.law {
-            Law::Plays(elements) => {
+            Law::Plays { elements, whole } => {
                 let reach = self.reach;
-                elements
-                    .iter_mut()
-                    .map(|e| {
-                        e.at = (e.at + dx).clamp(-e.down * reach, e.up * reach);
-                        e.share * e.at
-                    })
-                    .sum()
+                let held = elements.iter_mut().map(|e| {
+                    e.at = (e.at + dx).clamp(-e.down * reach, e.up * reach);
+                    e.share * e.at
+                });
+                held.sum::<f64>() / *whole
             }
             Law::Rate { dahl, exponent, share, rest, speed, z } => {
                 let slow = dx / (h * self.reach * *speed);
@@ -141,7 +178,27 @@ fn plays(family: Family, sharp: bool, random: &mut RandomGenerator) -> Vec<Eleme
 mod tests {
     use super::*;
     use approx::abs_diff_eq;
-    use testkit::tolerance::BLIND_ELASTIC;
+    use testkit::tolerance::{BLIND_ELASTIC, BLIND_LOOP_ELASTIC};
+
+    #[test]
+    fn loops_start_elastic_and_saturate_at_their_reach() {
+        for form in 0..3 {
+            for sharp in [false, true] {
+                let mut element = Friction::written(form, 0.02, 0.5, sharp);
+                element.push(0.0, 1e-3);
+                let early = element.push(1e-5, 1e-3);
+                let elastic = abs_diff_eq!(early, 1e-5, epsilon = BLIND_LOOP_ELASTIC * 1e-5);
+                assert!(elastic, "{form} {sharp} {early}");
+                for i in 1..400 {
+                    element.push(1e-5 + 0.001 * f64::from(i), 1e-3);
+                }
+                let up = element.push(0.4, 1e-3);
+                assert!(up <= 0.02 + 1e-12 && up > 0.019, "{form} {sharp} {up}");
+                let turned = element.push(0.4 - 0.005, 1e-3);
+                assert!(turned < up, "{form}: nothing happens at a reversal");
+            }
+        }
+    }
 
     #[test]
     fn loops_start_elastic_turn_at_a_reversal_and_stay_within_their_reach() {

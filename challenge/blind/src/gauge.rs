@@ -3,11 +3,12 @@
 use crate::curve::Curve;
 use crate::effect::{Cause, Causes, Kind, Stage};
 use crate::electric::Electric;
+use crate::friction::Friction;
+use crate::knee::at_least;
 use crate::laws::bump;
-use crate::memory::{Lags, Loop, at_least};
 use crate::random::RandomGenerator;
+use crate::relaxation::Relaxation;
 use crate::rig::{L_0, P_ATM, P_REF, Rig, V_STEP};
-use crate::timing::mains;
 
 /// One instant of the mechanics: contraction, absolute pressure, openings.
 #[derive(Debug, Clone, Copy)]
@@ -23,9 +24,9 @@ pub(crate) struct Gauge<'a> {
     rig: &'a Rig,
     causes: Causes,
     active: bool,
-    slip: Option<Loop>,
-    hysteresis: Option<(f64, Loop)>,
-    relaxation: Option<(f64, Lags)>,
+    slip: Option<Friction>,
+    hysteresis: Option<(f64, Friction)>,
+    relaxation: Option<(f64, Relaxation)>,
     travel: f64,
     last_strain: Option<f64>,
     poles: Option<[f64; 2]>,
@@ -44,14 +45,14 @@ impl<'a> Gauge<'a> {
         Self {
             rig,
             active: causes.any_in(Stage::Sensing),
-            slip: causes.find(Kind::SleeveSlip).map(|c| Loop::of(&c, c.strength, true)),
+            slip: causes.find(Kind::SleeveSlip).map(|c| Friction::of(&c, c.strength, true)),
             hysteresis: causes.find(Kind::GaugeHysteresis).map(|c| {
                 let reach = 0.58 * c.log_aux(0, 0.006, 0.05);
-                (c.strength, Loop::of(&c, reach, false))
+                (c.strength, Friction::of(&c, reach, false))
             }),
             relaxation: causes
                 .find(Kind::GaugeRelaxation)
-                .map(|c| (c.signed(), Lags::of(&c, c.log_aux(0, 0.03, 3.0), 0.2))),
+                .map(|c| (c.signed(), Relaxation::of(&c, c.log_aux(0, 0.03, 3.0), 0.2))),
             travel: 0.0,
             last_strain: None,
             poles: None,
@@ -249,43 +250,6 @@ impl<'a> Gauge<'a> {
     }
 }
 
-/// How much earlier the length is that a bridge sample shows, s; of a drawn one the mean.
-pub(crate) fn skew(causes: &Causes, t: f64, session: f64) -> f64 {
-    causes.find(Kind::ChannelSkew).map_or(0.0, |c| {
-        if c.is_drawn() {
-            return c.signed();
-        }
-        let drift = match c.form {
-            // A clock that runs 0..80 ppm fast or slow, noticed since the trial began.
-            0 => (c.strength / 0.02).min(1.0) * 8e-5 * (2.0 * c.aux[0] - 1.0) * t,
-            _ => 0.08 * c.strength * (session * (0.3 + 0.5 * c.aux[0])).sin(),
-        };
-        c.signed() + drift
-    })
-}
-
-/// Hum on the samples of one trial, V; `offsets` as in [`mains`].
-pub(crate) fn hum(causes: &Causes, trial: usize, samples: usize, offsets: &[f64]) -> Vec<f64> {
-    let Some(c) = causes.find(Kind::MainsHum) else { return vec![0.0; samples] };
-    if c.is_drawn() {
-        return mains(c, trial, samples, offsets);
-    }
-    let mut random = RandomGenerator::new(c.seed, trial as u64);
-    let mains = if c.form == 0 { 50.0 } else { 60.0 };
-    let mut phase = random.between(0.0, std::f64::consts::TAU);
-    let mut wander = 0.03 * random.gauss();
-    let h = 0.01_f64;
-    (0..samples)
-        .map(|i| {
-            wander += -wander * h / 20.0 + 0.03 * (2.0 * h / 20.0).sqrt() * random.gauss();
-            phase += std::f64::consts::TAU * (mains + wander) * h;
-            let late = offsets.get(i).map_or(0.0, |late| std::f64::consts::TAU * mains * late);
-            let now = phase + late;
-            c.strength * (now.sin() + 0.08 * (3.0 * now).sin())
-        })
-        .collect()
-}
-
 /// What the converter makes of the samples: missing codes and frozen runs, V.
 pub(crate) fn spoil_samples(causes: &Causes, trial: usize, volts: &mut [f64]) {
     if let Some(c) = causes.find(Kind::MissingCodes) {
@@ -318,7 +282,7 @@ pub(crate) fn spoil_samples(causes: &Causes, trial: usize, volts: &mut [f64]) {
 pub(crate) struct Pot<'a> {
     rig: &'a Rig,
     nonlinearity: Option<(Cause, Option<Curve>)>,
-    backlash: Option<Loop>,
+    backlash: Option<Friction>,
     stiction: Option<(f64, Option<f64>)>,
 }
 
@@ -329,7 +293,7 @@ impl<'a> Pot<'a> {
             nonlinearity: causes
                 .find(Kind::PotNonlinearity)
                 .map(|c| (c, c.is_drawn().then(|| bump(c.family, &mut c.random(1))))),
-            backlash: causes.find(Kind::PotBacklash).map(|c| Loop::of(&c, c.strength, true)),
+            backlash: causes.find(Kind::PotBacklash).map(|c| Friction::of(&c, c.strength, true)),
             stiction: causes.find(Kind::PotStiction).map(|c| (c.strength, None)),
         }
     }

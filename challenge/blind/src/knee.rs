@@ -52,11 +52,23 @@ impl Knee {
     }
 }
 
+/// max(x, floor), rounded off by a parabola of half-width `width`.
+pub(crate) fn at_least(x: f64, floor: f64, width: f64) -> f64 {
+    let above = x - floor;
+    if above >= width {
+        x
+    } else if above <= -width {
+        floor
+    } else {
+        floor + (above + width).powi(2) / (4.0 * width)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use approx::assert_abs_diff_eq;
-    use testkit::tolerance::BLIND_CURVE;
+    use approx::{assert_abs_diff_eq, assert_relative_eq};
+    use testkit::tolerance::{BLIND_CURVE, F64_ROUNDING};
 
     #[test]
     fn knees_are_continuous_and_monotone_and_leave_what_is_far_above() {
@@ -76,5 +88,18 @@ mod tests {
                 assert_abs_diff_eq!(knee.at_least(0.9, 0.2), 0.9, epsilon = BLIND_CURVE);
             }
         }
+    }
+
+    #[test]
+    fn knee_is_the_greater_far_from_it() {
+        assert_eq!(at_least(1.0, 0.0, 0.1), 1.0);
+        assert_eq!(at_least(-1.0, 0.0, 0.1), 0.0);
+        assert_relative_eq!(
+            at_least(0.0, 0.0, 0.1),
+            0.025,
+            epsilon = 0.0,
+            max_relative = F64_ROUNDING
+        );
+        assert_eq!(at_least(-0.5, 0.0, 0.0), 0.0);
     }
 }

@@ -2,8 +2,9 @@
 
 use crate::curve::Curve;
 use crate::effect::{Cause, Causes, Kind};
+use crate::friction::Friction;
 use crate::laws::{damping, rising};
-use crate::memory::{Lags, Loop};
+use crate::relaxation::Relaxation;
 use crate::rig::{P_ATM, P_REF, R_T, RHO_0, Rig, V_0};
 use crate::supply::Sag;
 use crate::valves::{DeadBand, Delay};
@@ -27,24 +28,13 @@ pub(crate) struct Plant<'a> {
     snap: (bool, f64),
     travel: f64,
     last_static: Option<f64>,
-    hysteresis: Option<(f64, Loop)>,
-    creep: Option<(f64, Lags)>,
-    sag: Option<Cause>,
-    leak: Option<Cause>,
-    volume: Option<Cause>,
-    inertia: Option<Cause>,
-    adiabatic: Option<Cause>,
-    asymmetric: Option<Cause>,
-    snapping: Option<Cause>,
-    fatigue: Option<Cause>,
-    sticking: Option<Cause>,
-    deadband: Option<Cause>,
-    crossflow: Option<Cause>,
-    delay: Option<Cause>,
+    hysteresis: Option<(f64, Friction)>,
+    creep: Option<(f64, Relaxation)>,
+    causes: Causes,
     drawn: Drawn,
 }
 
-/// Laws that are drawn for the causes at work.
+/// Laws that are drawn for the causes at work, and how the valves are delayed.
 #[derive(Debug, Clone)]
 struct Drawn {
     sag: Option<Sag>,
@@ -64,7 +54,7 @@ impl Drawn {
             volume: find(Kind::ChamberVolume).map(|c| rising(c.family, &mut c.random(1))),
             damping: find(Kind::CrossbeamInertia).map(|c| damping(c.family, &mut c.random(1))),
             deadband: find(Kind::ValveDeadband).map(|c| DeadBand::draw(c.family, &mut c.random(1))),
-            delay: find(Kind::ValveDelay).map(|c| Delay::draw(c.family, &mut c.random(1))),
+            delay: causes.find(Kind::ValveDelay).as_ref().map(Delay::of),
         }
     }
 }
@@ -81,11 +71,11 @@ impl<'a> Plant<'a> {
     pub(crate) fn new(rig: &'a Rig, causes: &Causes) -> Self {
         let hysteresis = causes.find(Kind::MuscleHysteresis).map(|c| {
             let reach = 0.58 * c.log_aux(0, 0.006, 0.05);
-            (c.strength, Loop::of(&c, reach, false))
+            (c.strength, Friction::of(&c, reach, false))
         });
         let creep = causes
             .find(Kind::MuscleCreep)
-            .map(|c| (c.strength, Lags::of(&c, c.log_aux(0, 0.7, 25.0), 0.16)));
+            .map(|c| (c.strength, Relaxation::of(&c, c.log_aux(0, 0.7, 25.0), 0.16)));
         Self {
             rig,
             state: [P_ATM, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -98,19 +88,8 @@ impl<'a> Plant<'a> {
             last_static: None,
             hysteresis,
             creep,
-            sag: causes.find(Kind::SupplySag),
-            leak: causes.find(Kind::Leak),
-            volume: causes.find(Kind::ChamberVolume),
-            inertia: causes.find(Kind::CrossbeamInertia),
-            adiabatic: causes.find(Kind::AdiabaticGas),
-            asymmetric: causes.find(Kind::AsymmetricLag),
-            snapping: causes.find(Kind::SnapThrough),
-            fatigue: causes.find(Kind::MuscleFatigue),
-            sticking: causes.find(Kind::ValveSticking),
-            deadband: causes.find(Kind::ValveDeadband),
-            crossflow: causes.find(Kind::OutletCrossflow),
-            delay: causes.find(Kind::ValveDelay),
             drawn: Drawn::of(causes),
+            causes: causes.clone(),
         }
     }
 
@@ -142,9 +121,11 @@ impl<'a> Plant<'a> {
     /// Conductance share of an opening, 0..1.
     fn share(&self, u: f64, side: usize) -> f64 {
         let mut u = u;
-        if let Some((c, law)) = self.deadband.zip(self.drawn.deadband.as_ref()) {
+        if let Some((c, law)) =
+            self.causes.find(Kind::ValveDeadband).zip(self.drawn.deadband.as_ref())
+        {
             u = law.pass(u, c.strength, side);
-        } else if let Some(c) = self.deadband {
+        } else if let Some(c) = self.causes.find(Kind::ValveDeadband) {
             // The two valves differ a little; no stretching of what is left.
             let band = c.strength * if side == 0 { 1.0 } else { 0.8 + 0.4 * c.aux[0] };
             u = match c.form {
@@ -180,31 +161,18 @@ impl<'a> Plant<'a> {
 
     /// Conductance share of a valve over a step, with whatever delays it.
     fn valve(&mut self, command: &impl Fn(f64) -> (f64, f64), t: f64, h: f64, side: usize) -> f64 {
-        let mut share = match self.delay {
-            Some(c) if c.is_drawn() => self.drawn_delay(c, command, t, h, side),
-            None => self.mean_share(command, t, h, 0.0, side),
-            Some(c) => match c.form {
-                0 => {
-                    let target = self.mean_share(command, t, h, 0.65 * c.strength, side);
-                    let tau = 0.35 * c.strength;
-                    let z = &mut self.valve_lag[side];
-                    let decay = (-h / tau).exp();
-                    let mean = target + (*z - target) * (1.0 - decay) * tau / h;
-                    *z = target + (*z - target) * decay;
-                    mean
-                }
-                1 => {
-                    let (slow, fast) = (1.25 * c.strength, 0.75 * c.strength);
-                    let late = self.mean_share(command, t, h, slow, side);
-                    late.min(self.mean_share(command, t, h, fast, side))
-                }
-                _ => {
-                    let scale = if side == 0 { 0.8 } else { 1.2 };
-                    self.mean_share(command, t, h, scale * c.strength, side)
-                }
-            },
+        let late = |late| self.mean_share(command, t, h, late, side);
+        let mut lag = self.valve_lag[side];
+        let mut share = match (self.causes.find(Kind::ValveDelay), &self.drawn.delay) {
+            (Some(c), Some(law)) => {
+                let (inlet, outlet) = command(t + 1e-9);
+                let opening = if side == 0 { inlet } else { outlet };
+                law.share(c.strength, (side, opening, h), late, &mut lag)
+            }
+            _ => late(0.0),
         };
-        if let Some(c) = self.sticking {
+        self.valve_lag[side] = lag;
+        if let Some(c) = self.causes.find(Kind::ValveSticking) {
             if c.form == 0 {
                 // The longer it was shut, the later it opens.
                 if share > 0.0 && self.shut_s[side] > 0.0 {
@@ -227,24 +195,6 @@ impl<'a> Plant<'a> {
         share
     }
 
-    fn drawn_delay(
-        &mut self,
-        c: Cause,
-        command: &impl Fn(f64) -> (f64, f64),
-        t: f64,
-        h: f64,
-        side: usize,
-    ) -> f64 {
-        let Some(law) = &self.drawn.delay else { return 0.0 };
-        let (inlet, outlet) = command(t + 1e-9);
-        let opening = if side == 0 { inlet } else { outlet };
-        let mut lag = self.valve_lag[side];
-        let late = |late| self.mean_share(command, t, h, late, side);
-        let share = law.share(c.strength, (side, opening, h), late, &mut lag);
-        self.valve_lag[side] = lag;
-        share
-    }
-
     /// Change of the static contraction by the muscle's memories, fed once a step.
     fn offset(&mut self, h: f64) -> f64 {
         let k = self.rig.static_contraction(self.pressure());
@@ -255,7 +205,7 @@ impl<'a> Plant<'a> {
         if let Some((share, lags)) = &mut self.creep {
             offset += *share * (lags.push(k, h) - k);
         }
-        if let Some(c) = self.snapping {
+        if let Some(c) = self.causes.find(Kind::SnapThrough) {
             let level = k / self.rig.k_max();
             let threshold = if self.snap.0 { 0.35 } else { 0.5 } + 0.2 * c.aux[0];
             self.snap.0 = level > threshold;
@@ -263,7 +213,7 @@ impl<'a> Plant<'a> {
             self.snap.1 += (target - self.snap.1) * (h / 0.012).min(1.0);
             offset += self.snap.1;
         }
-        if let Some(c) = self.fatigue {
+        if let Some(c) = self.causes.find(Kind::MuscleFatigue) {
             // Weaker after work, recovering with rest.
             let moved = (k - self.last_static.unwrap_or(k)).abs();
             self.travel += moved - self.travel * h / (20.0 + 100.0 * c.aux[0]);
@@ -309,18 +259,18 @@ impl<'a> Plant<'a> {
         let p = y[0] * (1.0 + y[5]);
         let q_in = rig.flow(rig.c_in() * drive.inlet, drive.supply - y[4], p);
         let mut q_out = rig.flow(rig.c_out() * drive.outlet, p, P_ATM);
-        if let Some(c) = self.leak {
+        if let Some(c) = self.causes.find(Kind::Leak) {
             q_out += self.leak_flow(c, p);
         }
         let mut d = [0.0; 6];
         let target = rig.static_contraction(p) + offset;
         let mut tau = rig.tau_m();
-        if let Some(c) = self.asymmetric {
+        if let Some(c) = self.causes.find(Kind::AsymmetricLag) {
             let slower = if c.form == 0 { target < y[1] } else { target > y[1] };
             tau *= if slower { 1.0 + c.strength } else { 1.0 };
         }
         d[1] = (target - y[1]) / tau;
-        if let Some(c) = self.inertia {
+        if let Some(c) = self.causes.find(Kind::CrossbeamInertia) {
             d[2] = y[3];
             d[3] = self.acceleration(c, y);
         } else {
@@ -328,7 +278,7 @@ impl<'a> Plant<'a> {
         }
         let mut flow = R_T * (q_in - q_out);
         let mut volume = V_0;
-        if let Some(c) = self.volume {
+        if let Some(c) = self.causes.find(Kind::ChamberVolume) {
             let x = y[2] / rig.k_max();
             let law = self.drawn.volume.as_ref();
             let (shape, slope) = match c.form {
@@ -344,11 +294,11 @@ impl<'a> Plant<'a> {
             flow -= p * V_0 * c.strength * slope * d[2] / rig.k_max();
         }
         d[0] = flow / volume;
-        if let Some(c) = self.adiabatic {
+        if let Some(c) = self.causes.find(Kind::AdiabaticGas) {
             d[5] = 0.4 * d[0] / y[0] - y[5] / c.strength;
         }
         // A drawn sag stands still within a step.
-        if let Some(c) = self.sag.filter(|c| !c.is_drawn()) {
+        if let Some(c) = self.causes.find(Kind::SupplySag).filter(|c| !c.is_drawn()) {
             let tau = 0.25 + 0.5 * c.aux[0];
             let scale = c.strength * Q_REF;
             d[4] = match c.form {
@@ -376,7 +326,7 @@ impl<'a> Plant<'a> {
     ) {
         let inlet = self.valve(command, t, h, 0);
         let mut outlet = self.valve(command, t, h, 1);
-        if let Some(c) = self.crossflow {
+        if let Some(c) = self.causes.find(Kind::OutletCrossflow) {
             outlet += c.strength * inlet;
         }
         let drive = Drive { inlet, outlet, supply };
@@ -396,7 +346,7 @@ impl<'a> Plant<'a> {
         self.state =
             std::array::from_fn(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
         self.state[0] = self.state[0].max(P_ATM);
-        if self.inertia.is_none() {
+        if self.causes.find(Kind::CrossbeamInertia).is_none() {
             self.state[2] = self.state[1];
         }
         let rig = self.rig;

@@ -3,36 +3,23 @@
 use serde::{Deserialize, Serialize};
 
 use crate::random::RandomGenerator;
+use crate::words::worded;
 
 /// Samples a second.
 pub(crate) const RATE_HZ: usize = 100;
 /// Pause between trials, s.
 pub(crate) const PAUSE_S: f64 = 15.0;
 
-/// Which trials a session has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
-pub enum Protocol {
-    /// The seventeen trials of the paper.
-    #[default]
-    #[serde(rename = "paper")]
-    Paper,
-    /// One more to fit: an arbitrary trial at [`LOW_EXCITATION`] of the excitation, which parts a
-    /// sleeve that goes slack from an amplifier that saturates.
-    #[serde(rename = "paper+")]
-    PaperPlus,
-}
-
-impl Protocol {
-    /// Both, in the order of reports.
-    pub const ALL: [Self; 2] = [Self::Paper, Self::PaperPlus];
-
-    /// Name as options write it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Paper => "paper",
-            Self::PaperPlus => "paper+",
-        }
+worded! {
+    /// Which trials a session has.
+    #[derive(Default)]
+    Protocol {
+        /// The seventeen trials of the paper.
+        #[default]
+        Paper "paper",
+        /// One more to fit: an arbitrary trial at [`LOW_EXCITATION`] of the excitation, which parts a
+        /// sleeve that goes slack from an amplifier that saturates.
+        PaperPlus "paper+",
     }
 }
 

@@ -1,7 +1,8 @@
-//! Relaxation drawn: spectra of time constants, rates that depend on how far there is to go, and
+//! Relaxation: a few time constants; drawn as spectra of them, rates that depend on how far there is to go, and
 //! ones that differ by direction.
 
 use crate::curve::{Wiggle, weights};
+use crate::effect::Cause;
 use crate::family::Family;
 use crate::laws::sign;
 use crate::random::RandomGenerator;
@@ -15,6 +16,12 @@ struct Part {
     at: f64,
 }
 
+impl Part {
+    fn even(share: f64, tau_s: f64) -> Self {
+        Self { share, rising_s: tau_s, falling_s: tau_s, at: 0.0 }
+    }
+}
+
 /// Weighted sum of lags; shares sum to 1.
 #[derive(Debug, Clone)]
 pub(crate) struct Relaxation {
@@ -25,18 +32,30 @@ pub(crate) struct Relaxation {
 }
 
 impl Relaxation {
+    /// The lags of a cause around `tau` s; `scale` is the span of what is fed.
+    pub(crate) fn of(cause: &Cause, tau: f64, scale: f64) -> Self {
+        match cause.is_drawn() {
+            true => Self::draw(cause.family, tau, scale, &mut cause.random(3)),
+            false => Self::written(cause.form, tau),
+        }
+    }
+
+    /// Form 0: two time constants around `tau` s; else four, spread as a power law would be.
+    fn written(form: usize, tau: f64) -> Self {
+        let shape: &[(f64, f64)] = match form {
+            0 => &[(0.55, 0.45), (2.2, 0.55)],
+            _ => &[(0.25, 0.28), (0.7, 0.26), (1.8, 0.24), (5.0, 0.22)],
+        };
+        let part = |&(scale, share): &(f64, f64)| Part::even(share, tau * scale);
+        Self { parts: shape.iter().map(part).collect(), hurry: (0.0, 1.0), settled: false }
+    }
+
     /// Lags of a family around `tau` s; `scale` is the span of what is fed.
     pub(crate) fn draw(family: Family, tau: f64, scale: f64, random: &mut RandomGenerator) -> Self {
         let mut hurry = (0.0, 1.0);
         let even = |parts: Vec<(f64, f64)>| -> Vec<Part> {
             let total: f64 = parts.iter().map(|p| p.1).sum();
-            let part = |&(s, w): &(f64, f64)| Part {
-                share: w / total,
-                rising_s: tau * s,
-                falling_s: tau * s,
-                at: 0.0,
-            };
-            parts.iter().map(part).collect()
+            parts.iter().map(|&(s, w)| Part::even(w / total, tau * s)).collect()
         };
         let mut parts = match family {
             Family::Written => even(vec![(1.0, 1.0)]),
@@ -105,8 +124,21 @@ impl Relaxation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use approx::abs_diff_eq;
-    use testkit::tolerance::BLIND_RELAXED;
+    use approx::{abs_diff_eq, assert_relative_eq};
+    use testkit::tolerance::{BLIND_RELAXED, BLIND_SETTLED};
+
+    #[test]
+    fn lags_settle_at_their_input() {
+        for form in 0..2 {
+            let mut lags = Relaxation::written(form, 0.1);
+            assert_eq!(lags.push(0.0, 1e-3), 0.0);
+            let mut last = 0.0;
+            for _ in 0..20_000 {
+                last = lags.push(1.0, 1e-3);
+            }
+            assert_relative_eq!(last, 1.0, epsilon = 0.0, max_relative = BLIND_SETTLED);
+        }
+    }
 
     #[test]
     fn lags_stay_between_and_settle_at_their_input() {

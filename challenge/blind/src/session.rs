@@ -2,13 +2,13 @@
 
 use crate::curve::hermite;
 use crate::disturbances::{Drawn, Surroundings};
-use crate::effect::{Cause, Causes, Kind};
-use crate::gauge::{Gauge, Instant, Pot, hum, skew, spoil_samples};
+use crate::effect::{Causes, Kind};
+use crate::gauge::{Gauge, Instant, Pot, spoil_samples};
 use crate::plant::Plant;
 use crate::protocol::{PAUSE_S, RATE_HZ, Script};
 use crate::random::RandomGenerator;
 use crate::rig::{P_ATM, Rig};
-use crate::timing::Wander;
+use crate::timing::{Skew, mains};
 
 /// Steps of a sample while a session is recorded: 0.5 ms each.
 pub(crate) const FINE: usize = 20;
@@ -152,7 +152,7 @@ pub(crate) fn run(
         gauge: Gauge::new(rig, causes),
         pot: Pot::new(rig, causes),
         causes,
-        skew: causes.find(Kind::ChannelSkew).filter(Cause::is_drawn).map(Wander::draw),
+        skew: causes.find(Kind::ChannelSkew).map(Skew::draw),
         supply: &supply,
     };
     bench.pause(true, P_ATM + rig.p_s(), (-PREPARE_S, PAUSE_S));
@@ -177,7 +177,7 @@ struct Bench<'a, S: Fn(f64) -> f64> {
     gauge: Gauge<'a>,
     pot: Pot<'a>,
     causes: &'a Causes,
-    skew: Option<Wander>,
+    skew: Option<Skew>,
     supply: &'a S,
 }
 
@@ -268,8 +268,7 @@ impl<S: Fn(f64) -> f64> Bench<'_, S> {
         for step in (0..path.len()).step_by(every) {
             let t = step as f64 * h;
             let session = script.start_s + t;
-            let wander = self.skew.as_ref().map_or(0.0, |w| w.at(t, session));
-            let shift = (skew(self.causes, t, session) + wander) / h;
+            let shift = self.skew.as_ref().map_or(0.0, |skew| skew.at(t, session)) / h;
             let at = (step as f64 - shift).clamp(0.0, (path.len() - 1) as f64);
             let low = (at as usize).min(path.len() - 2);
             let share = at - low as f64;
@@ -285,8 +284,9 @@ impl<S: Fn(f64) -> f64> Bench<'_, S> {
             }
         }
         let mut volts = resampled(volts, offsets);
-        for (v, hum) in volts.iter_mut().zip(hum(self.causes, trial, path.len() / fine, offsets)) {
-            *v += hum;
+        if let Some(c) = self.causes.find(Kind::MainsHum) {
+            let hum = mains(c, trial, volts.len(), offsets);
+            volts.iter_mut().zip(hum).for_each(|(v, hum)| *v += hum);
         }
         spoil_samples(self.causes, trial, &mut volts);
         volts
@@ -296,7 +296,7 @@ impl<S: Fn(f64) -> f64> Bench<'_, S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effect::{KINDS, Stage};
+    use crate::effect::{Cause, KINDS, Stage};
     use crate::family::Family;
     use crate::protocol::{Protocol, session};
     use approx::assert_abs_diff_eq;

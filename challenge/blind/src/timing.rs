@@ -1,4 +1,4 @@
-//! Clocks and mains drawn: a skew that wanders, and hum of any shape.
+//! Clocks and mains: a skew that wanders, and hum.
 
 use crate::curve::{Wiggle, weights};
 use crate::effect::Cause;
@@ -8,9 +8,9 @@ use crate::random::RandomGenerator;
 /// Longest session that a wandering skew is tabled for, s; it stands still from there on.
 const LONGEST_S: f64 = 1000.0;
 
-/// How far a skew is from its mean, s.
+/// How late the voltage is recorded, s: a mean, and how far it wanders from it.
 #[derive(Debug, Clone)]
-pub(crate) struct Wander {
+pub(crate) struct Skew {
     law: Law,
     /// Offset of this trial.
     trial: f64,
@@ -29,13 +29,20 @@ enum Law {
     Starts(f64),
 }
 
-impl Wander {
-    /// The wander of a skew cause.
+impl Skew {
+    /// The skew of a cause.
     pub(crate) fn draw(cause: Cause) -> Self {
         let mut random = cause.random(1);
         let size = cause.strength * random.between(0.04, 0.12);
         let law = match cause.family {
-            Family::Written => Law::Rate(0.0),
+            // A clock that runs 0..80 ppm fast or slow, or one that swings.
+            Family::Written if cause.form == 0 => {
+                let most = (cause.strength / 0.02).min(1.0);
+                Law::Rate(most * 8e-5 * (2.0 * cause.aux[0] - 1.0))
+            }
+            Family::Written => {
+                Law::Waves(vec![(0.08 * cause.strength, 0.3 + 0.5 * cause.aux[0], 0.0)])
+            }
             Family::Splines => Law::Path(Wiggle::draw(12, 0.7 * size, &mut random)),
             Family::Spectra => {
                 let shares = weights(4, 0.7, &mut random);
@@ -62,16 +69,17 @@ impl Wander {
         }
     }
 
-    /// Wander at `t` s of the trial, `session` s of the session.
+    /// Skew at `t` s of the trial, `session` s of the session.
     pub(crate) fn at(&self, t: f64, session: f64) -> f64 {
-        match &self.law {
+        let wander = match &self.law {
             Law::Path(path) => path.at(session / LONGEST_S),
             Law::Waves(waves) => {
                 waves.iter().map(|(a, omega, phase)| a * (omega * session + phase).sin()).sum()
             }
             Law::Rate(rate) => rate * t,
             Law::Starts(_) => self.trial,
-        }
+        };
+        self.cause.signed() + wander
     }
 }
 
@@ -80,17 +88,22 @@ impl Wander {
 pub(crate) fn mains(cause: Cause, trial: usize, samples: usize, offsets: &[f64]) -> Vec<f64> {
     let mut shape = cause.random(1);
     let mut random = RandomGenerator::new(cause.seed, trial as u64);
-    let hertz = if cause.aux[0] < 0.5 { 50.0 } else { 60.0 };
-    let (spread, memory_s) = (shape.log_between(0.01, 0.08), shape.log_between(3.0, 60.0));
-    // Share of harmonics 2, 3, 5 and 7.
+    let is_slow = if cause.is_drawn() { cause.aux[0] < 0.5 } else { cause.form == 0 };
+    let hertz = if is_slow { 50.0 } else { 60.0 };
+    let (spread, memory_s) = match cause.is_drawn() {
+        true => (shape.log_between(0.01, 0.08), shape.log_between(3.0, 60.0)),
+        false => (0.03, 20.0),
+    };
+    // Numbers and shares of the harmonics.
     let harmonics: Vec<(f64, f64)> = match cause.family {
+        Family::Written => vec![(3.0, 0.08)],
+        Family::Splines => Vec::new(),
         Family::Spectra => {
             let sizes = [2.0, 3.0, 5.0, 7.0].map(|k| (k, 0.3 * shape.gauss() / k));
             sizes.to_vec()
         }
         Family::Asymmetric => vec![(2.0, shape.between(0.1, 0.3)), (4.0, shape.between(0.0, 0.1))],
         Family::RateLaws => vec![(3.0, -shape.between(0.05, 0.2))],
-        _ => Vec::new(),
     };
     let swell = (cause.family == Family::Splines).then(|| Wiggle::draw(8, 0.25, &mut random));
     let mut phase = random.between(0.0, std::f64::consts::TAU);

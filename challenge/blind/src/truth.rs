@@ -6,47 +6,23 @@ use serde::{Deserialize, Serialize};
 
 use crate::effect::Stage;
 use crate::family::Family;
+use crate::words::worded;
 
-/// What kind of case it is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum CaseKind {
-    /// One effect of the catalogue.
-    Single,
-    /// No effect: what differs lies within the tolerances.
-    Null,
-    /// Two effects, each visible on its own.
-    Compound,
-    /// One strong effect and three weak ones.
-    Dominant,
-    /// One effect that the catalogue lacks.
-    OutOfCatalogue,
-    /// One effect whose own entry is struck out of the catalogue at the diagnosis.
-    Struck,
-}
-
-impl CaseKind {
-    /// All kinds, in the order of reports.
-    pub const ALL: [Self; 6] = [
-        Self::Single,
-        Self::Null,
-        Self::Compound,
-        Self::Dominant,
-        Self::OutOfCatalogue,
-        Self::Struck,
-    ];
-
-    /// Name as labels write it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Single => "single",
-            Self::Null => "null",
-            Self::Compound => "compound",
-            Self::Dominant => "dominant",
-            Self::OutOfCatalogue => "out_of_catalogue",
-            Self::Struck => "struck",
-        }
+worded! {
+    /// What kind of case it is.
+    CaseKind {
+        /// One effect of the catalogue.
+        Single "single",
+        /// No effect: what differs lies within the tolerances.
+        Null "null",
+        /// Two effects, each visible on its own.
+        Compound "compound",
+        /// One strong effect and three weak ones.
+        Dominant "dominant",
+        /// One effect that the catalogue lacks.
+        OutOfCatalogue "out_of_catalogue",
+        /// One effect whose own entry is struck out of the catalogue at the diagnosis.
+        Struck "struck",
     }
 }
 

@@ -1,6 +1,7 @@
-//! Valves drawn: openings that act late, and dead bands of any shape.
+//! Valves: openings that act late, and dead bands drawn of any shape.
 
 use crate::curve::{Curve, weights};
+use crate::effect::Cause;
 use crate::family::Family;
 use crate::laws::{rising, sign};
 use crate::random::RandomGenerator;
@@ -19,6 +20,16 @@ pub(crate) enum Delay {
 }
 
 impl Delay {
+    /// The delay of a cause.
+    pub(crate) fn of(cause: &Cause) -> Self {
+        match (cause.is_drawn(), cause.form) {
+            (true, _) => Self::draw(cause.family, &mut cause.random(1)),
+            (false, 0) => Self::Lagged { dead: 0.65 },
+            (false, 1) => Self::Sided([[1.25, 0.75]; 2]),
+            (false, _) => Self::Sided([[0.8; 2], [1.2; 2]]),
+        }
+    }
+
     /// Delays of a family, of mean 1.
     pub(crate) fn draw(family: Family, random: &mut RandomGenerator) -> Self {
         match family {

@@ -16,14 +16,9 @@ pub(crate) fn reliability_figure(calibration: &Calibration) -> Figure {
     if bins.is_empty() {
         return Figure::missing("No probability was stated.");
     }
-    let axes = Axes {
-        x: 0.0..1.0,
-        // below the axis of no case there is room for the counts: none of them lies on a point
-        y: -0.13..1.0,
-        x_label: "probability stated".to_owned(),
-        y_label: "share that came true (below: number of cases)".to_owned(),
-        is_log: false,
-    };
+    let labels = ["probability stated", "share that came true (below: number of cases)"];
+    // below the axis of no case there is room for the counts: none of them lies on a point
+    let axes = Axes::new(0.0..1.0, -0.13..1.0, labels);
     Figure::new("Reliability diagram: probability stated against share that came true").draw(
         FigureSize::NARROW,
         |area| {
@@ -68,13 +63,8 @@ pub(crate) fn time_figure(times: &[f64]) -> Figure {
             [(*t, at(i)), (*t, at(i + 1))]
         })
         .collect();
-    let axes = Axes {
-        x: 0.0..1.05 * longest,
-        y: 0.0..102.0,
-        x_label: "time of a diagnosis, s".to_owned(),
-        y_label: "% of the cases".to_owned(),
-        is_log: false,
-    };
+    let labels = ["time of a diagnosis, s", "% of the cases"];
+    let axes = Axes::new(0.0..1.05 * longest, 0.0..102.0, labels);
     let draw = |area: &Area<'_>| {
         plot(area, &axes, |chart| {
             let line = std::iter::once((0.0, 0.0)).chain(steps.clone());

@@ -64,14 +64,11 @@ fn goals(page: &mut Page, subject: &Subject<'_>) {
          form. Their labels were sealed before the diagnosis ran.",
     );
     page.text(&format!("SHA-256 of the labels: {}", subject.answers.seal.sha256()));
-    page.table(&Table {
-        caption: "Goals; an excess of 1 means an error as large as the noise".to_owned(),
-        head: ["Figure", "Goal", "Reached", "Count", "95 % interval", "Met"]
-            .map(str::to_owned)
-            .to_vec(),
-        rows: subject.goals.iter().map(|goal| goal.cells().to_vec()).collect(),
-        highlight: None,
-    });
+    page.table(&Table::new(
+        "Goals; an excess of 1 means an error as large as the noise",
+        &["Figure", "Goal", "Reached", "Count", "95 % interval", "Met"],
+        subject.goals.iter().map(|goal| goal.cells().to_vec()),
+    ));
     methods(page, subject.score);
 }
 
@@ -112,21 +109,13 @@ fn methods(page: &mut Page, score: &Score) {
         vec![name.to_owned(), cell(top1), cell(above), cell(nulls)]
     };
     let s = &score.singles;
-    let mut rows = vec![row("this diagnosis", &s.top1, &s.top1_above_10, &score.false_names)];
-    rows.extend(
-        score
-            .baselines
-            .iter()
-            .map(|(name, b)| row(method_in_words(name), &b.top1, &b.top1_above_10, &b.false_names)),
-    );
-    page.table(&Table {
-        caption: "The same cases, by method".to_owned(),
-        head: ["Method", "First name right", "Above an excess of 10", "Names something on nulls"]
-            .map(str::to_owned)
-            .to_vec(),
-        rows,
-        highlight: Some(0),
-    });
+    let ours = row("this diagnosis", &s.top1, &s.top1_above_10, &score.false_names);
+    let theirs = |(name, b): (&String, &Baseline)| {
+        row(method_in_words(name), &b.top1, &b.top1_above_10, &b.false_names)
+    };
+    let rows = std::iter::once(ours).chain(score.baselines.iter().map(theirs));
+    let head = ["Method", "First name right", "Above an excess of 10", "Names something on nulls"];
+    page.table(&Table::new("The same cases, by method", &head, rows).highlight(0));
 }
 
 fn rate_row(label: &str, rate: &Rate, ink: Ink) -> Row {
@@ -269,12 +258,7 @@ fn misses(page: &mut Page, score: &Score) {
         return;
     }
     let head = ["Case", "Kind", "There", "Verdict", "Named", "In the set", "Excess", "Pressure"];
-    page.table(&Table {
-        caption: "Wrong answers".to_owned(),
-        head: head.map(str::to_owned).to_vec(),
-        rows: score.misses.iter().map(row).collect(),
-        highlight: None,
-    });
+    page.table(&Table::new("Wrong answers", &head, score.misses.iter().map(row)));
     if !score.unanswered.is_empty() {
         page.text(&format!("Without an answer: {}.", score.unanswered.join(", ")));
     }

@@ -25,13 +25,7 @@ pub(crate) fn paper_page(experiment: &Experiment) -> String {
     page.section("What agrees and what does not", "");
     page.list(&verdicts(experiment));
     page.section("Fits", "Six inflations and six deflations; R^2 and RMSE of normalised strain.");
-    let table = |caption: &str, head: &[&str], rows| Table {
-        caption: caption.to_owned(),
-        head: head.iter().map(|&h| h.to_owned()).collect(),
-        rows,
-        highlight: None,
-    };
-    page.table(&table(
+    page.table(&Table::new(
         "As published, printed in the paper, and with our decisions",
         &[
             "Fit",
@@ -63,7 +57,7 @@ pub(crate) fn paper_page(experiment: &Experiment) -> String {
         ),
         ("Pulses", &PUBLISHED.pulses, &experiment.published.pulses, &experiment.ours.pulses),
     ] {
-        page.table(&table(caption, &head, error_rows(there, paper, here)));
+        page.table(&Table::new(caption, &head, error_rows(there, paper, here)));
     }
     page.section(
         "What the paper asks for next",
@@ -116,13 +110,8 @@ fn gap_figure(experiment: &Experiment) -> Figure {
         (Ink::of(2), curve(|p| p.ours_rmse_mm[2])),
         (Ink::of(3), curve(|p| p.ours_rmse_mm[3])),
     ];
-    let axes = Axes {
-        x: 0.0..2.05,
-        y: 0.0..top(&curves),
-        x_label: "gap between the pulses, s".to_owned(),
-        y_label: "RMSE, mm".to_owned(),
-        is_log: false,
-    };
+    let labels = ["gap between the pulses, s", "RMSE, mm"];
+    let axes = Axes::new(0.0..2.05, 0.0..top(&curves), labels);
     let names = ["raw", "non-linear, as published", "non-linear, ours", "observer"];
     curves_figure(
         "RMSE against the gap between two pulses",
@@ -135,13 +124,7 @@ fn gap_figure(experiment: &Experiment) -> Figure {
 
 /// Frequencies stand on a logarithmic axis.
 fn frequency_axes(y: std::ops::Range<f64>, y_label: &str) -> Axes {
-    Axes {
-        x: -1.75..1.15,
-        y,
-        x_label: "frequency, Hz".to_owned(),
-        y_label: y_label.to_owned(),
-        is_log: true,
-    }
+    Axes { is_log: true, ..Axes::new(-1.75..1.15, y, ["frequency, Hz", y_label]) }
 }
 
 fn gain_figure(experiment: &Experiment) -> Figure {

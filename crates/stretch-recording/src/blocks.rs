@@ -50,7 +50,7 @@ impl Recording {
         let name = path.file_name().map_or_else(|| file.clone(), |n| n.to_string_lossy().into());
         let mut give = |trial: Trial, time: &str| {
             clock::check(&trial, time, options)?;
-            let trial = match options.grid_rate() {
+            let trial = match options.grid_hz {
                 None => trial,
                 Some(hz) => grid::resampled(Self { trial, notes: Vec::new() }, hz)?.trial,
             };

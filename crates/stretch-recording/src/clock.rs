@@ -13,7 +13,7 @@ const TELLING: usize = 50;
 
 /// Where the time stands among names: under the name asked for, or, where nobody asked, under one that elsewhere is usual.
 pub(crate) fn time_among(names: &[String], options: &ReadOptions) -> Option<usize> {
-    let wanted = options.time_column();
+    let wanted = &options.time;
     let usual = || {
         let ranked = names.iter().enumerate().filter_map(|(i, name)| Some((time_rank(name)?, i)));
         ranked.min().map(|(_, i)| i)
@@ -43,7 +43,7 @@ pub(crate) fn check(
     if !RATES_HZ.contains(&rate_hz) {
         return Err(RecordingError::Rate { file, column, rate_hz });
     }
-    let says_so = options.unit_of_time().is_some() || options.sample_rate().is_some();
+    let says_so = options.time_unit.is_some() || options.sample_rate_hz.is_some();
     let is_whole = || trial.time_s.iter().all(|t| t.fract() == 0.0);
     if !says_so && rate_hz <= 1.0 && trial.len() >= TELLING && is_whole() {
         let base = column.strip_suffix("_s").unwrap_or(&column);

@@ -60,25 +60,14 @@ pub(crate) fn merged(
         let (needed, other): (Vec<_>, Vec<_>) =
             tracks.into_iter().partition(|t| t.channels.iter().any(is_asked));
         tracks = needed;
-        if !other.is_empty() {
-            let clocks: Vec<&str> = other.iter().map(|t| t.clock.as_str()).collect();
-            notes.push(format!(
-                "left out, nothing asked for is on these clocks: {}",
-                listed(&clocks)
-            ));
-        }
+        let clocks: Vec<_> = other.into_iter().map(|t| t.clock).collect();
+        note(&mut notes, "left out, nothing asked for is on these clocks", &clocks);
     }
     let mut left_out = Vec::new();
     for track in &mut tracks {
         whole_channels(file, track, is_needed, &mut left_out)?;
     }
-    if !left_out.is_empty() {
-        let names: Vec<&str> = left_out.iter().map(String::as_str).collect();
-        notes.push(format!(
-            "left out, not all of their values are finite numbers: {}",
-            listed(&names)
-        ));
-    }
+    note(&mut notes, "left out, not all of their values are finite numbers", &left_out);
     tracks.retain(|t| !t.channels.is_empty());
     if tracks.len() > 1 {
         tracks.retain(|t| t.counts.len() > 1);
@@ -89,13 +78,13 @@ pub(crate) fn merged(
         return Err(RecordingError::NoTime { file: file.to_owned(), hint });
     }
     if timed.len() == 1
-        && options.grid_rate().is_none()
+        && options.grid_hz.is_none()
         && let Some(Timed { clock, time_s, channels, .. }) = timed.pop()
     {
         let trial = Trial { name: file.to_owned(), time_s, channels };
         return Ok((Recording { trial, notes }, clock));
     }
-    let recording = on_one_grid(file, &timed, options.grid_rate(), notes)?;
+    let recording = on_one_grid(file, &timed, options.grid_hz, notes)?;
     let clock = timed[fastest(&timed)].clock.clone();
     Ok((recording, clock))
 }
@@ -123,10 +112,7 @@ fn tidy_names(tracks: &mut [Track], notes: &mut Vec<String>, options: &ReadOptio
             channel.name = tidied;
         }
     }
-    if !told.is_empty() {
-        let told: Vec<&str> = told.iter().map(String::as_str).collect();
-        notes.push(format!("columns named with their units: {}", listed(&told)));
-    }
+    note(notes, "columns named with their units", &told);
 }
 
 /// Finds a channel by its name, or by the last part of its path where only one ends so, which is then called by that alone.
@@ -354,8 +340,16 @@ fn tell(
     }
 }
 
+/// Notes what is true of some names, if there are any.
+pub(crate) fn note<S: AsRef<str>>(notes: &mut Vec<String>, what: &str, names: &[S]) {
+    if !names.is_empty() {
+        notes.push(format!("{what}: {}", listed(names)));
+    }
+}
+
 /// A few names, and how many more there are.
-pub(crate) fn listed(names: &[&str]) -> String {
+pub(crate) fn listed<S: AsRef<str>>(names: &[S]) -> String {
+    let names: Vec<&str> = names.iter().map(AsRef::as_ref).collect();
     match names.len() {
         n if n > TOLD + 1 => format!("{} and {} more", names[..TOLD].join(", "), n - TOLD),
         _ => names.join(", "),

@@ -18,6 +18,8 @@ mod recording;
 mod sniff;
 mod stamps;
 mod text;
+#[cfg(any(feature = "npz", feature = "mat", feature = "mcap"))]
+mod whole;
 
 pub use error::RecordingError;
 pub use names::tidy_column;

@@ -55,13 +55,13 @@ impl TimeUnit {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadOptions {
-    time: String,
-    time_unit: Option<TimeUnit>,
+    pub(crate) time: String,
+    pub(crate) time_unit: Option<TimeUnit>,
     required: Vec<String>,
-    columns: Option<Vec<String>>,
-    sample_rate_hz: Option<f64>,
-    grid_hz: Option<f64>,
-    max_line_bytes: usize,
+    pub(crate) columns: Option<Vec<String>>,
+    pub(crate) sample_rate_hz: Option<f64>,
+    pub(crate) grid_hz: Option<f64>,
+    pub(crate) max_line_bytes: usize,
 }
 
 /// What the time is called unless somebody says otherwise.
@@ -133,30 +133,6 @@ impl ReadOptions {
     /// The columns asked for by [`require`](Self::require), in order.
     pub fn required(&self) -> &[String] {
         &self.required
-    }
-
-    pub(crate) fn time_column(&self) -> &str {
-        &self.time
-    }
-
-    pub(crate) fn unit_of_time(&self) -> Option<TimeUnit> {
-        self.time_unit
-    }
-
-    pub(crate) fn column_names(&self) -> Option<&[String]> {
-        self.columns.as_deref()
-    }
-
-    pub(crate) fn sample_rate(&self) -> Option<f64> {
-        self.sample_rate_hz
-    }
-
-    pub(crate) fn grid_rate(&self) -> Option<f64> {
-        self.grid_hz
-    }
-
-    pub(crate) fn line_limit(&self) -> usize {
-        self.max_line_bytes
     }
 
     /// What the numbers of a time column of this name are divided by.

@@ -15,7 +15,7 @@ use stretch_data::Channel;
 use crate::{
     ReadOptions, RecordingError,
     clock::time_among,
-    grid::{Track, listed},
+    grid::{Track, note},
     options::TIME,
 };
 
@@ -53,15 +53,12 @@ pub(crate) fn read(
         channels.push(Channel { name, values });
     }
     let mut notes = Vec::new();
-    if !other.is_empty() {
-        let other: Vec<&str> = other.iter().map(String::as_str).collect();
-        notes.push(format!("left out: {}", listed(&other)));
-    }
+    note(&mut notes, "left out", &other);
     let names: Vec<String> = channels.iter().map(|c| c.name.clone()).collect();
-    let track = match (time_among(&names, options), options.sample_rate()) {
+    let track = match (time_among(&names, options), options.sample_rate_hz) {
         (Some(time), _) => {
             let Channel { name: clock, values: counts } = channels.remove(time);
-            if clock != options.time_column() {
+            if clock != options.time {
                 notes.push(format!("the time is column {clock}"));
             }
             let per_second = stamps[time].unwrap_or_else(|| options.divisor(&clock));
@@ -74,7 +71,7 @@ pub(crate) fn read(
         }
         (None, None) => {
             let names = names.iter().map(String::as_str);
-            return Err(RecordingError::missing_column(file, options.time_column(), names));
+            return Err(RecordingError::missing_column(file, &options.time, names));
         }
     };
     if track.counts.is_empty() {

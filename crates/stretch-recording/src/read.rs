@@ -77,7 +77,7 @@ impl Recording {
             }
         };
         clock::check(&recording.trial, &time, options)?;
-        if let (Some(rate_hz), Format::Text) = (options.grid_rate(), format) {
+        if let (Some(rate_hz), Format::Text) = (options.grid_hz, format) {
             recording = grid::resampled(recording, rate_hz)?;
         }
         Ok(recording)

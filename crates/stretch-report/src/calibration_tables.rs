@@ -11,11 +11,6 @@ use super::{
 /// Name that an evaluation gives to the signal without a calibration.
 pub(crate) const RAW: &str = "raw";
 
-/// Cells from texts.
-fn cells<const N: usize>(cells: [&str; N]) -> Vec<String> {
-    cells.map(str::to_owned).to_vec()
-}
-
 fn optional(x: Option<f64>, digits: usize) -> String {
     x.map_or_else(|| NONE.to_owned(), |x| number(x, digits))
 }
@@ -51,15 +46,16 @@ pub(crate) fn method_table(
     names: &[String],
     unit: &str,
 ) -> Table {
-    let head = vec![
-        "Method".to_owned(),
-        "Average error, %".to_owned(),
-        format!("RMSE, {}", if unit.is_empty() { "1" } else { unit }),
-        "RMSE, % of range".to_owned(),
-        "R\u{b2}".to_owned(),
-        "Lag, ms".to_owned(),
-        with_unit("Largest error,", unit).trim_end_matches(',').to_owned(),
-        "Outside domain, %".to_owned(),
+    let largest = with_unit("Largest error,", unit);
+    let head = [
+        "Method",
+        "Average error, %",
+        &format!("RMSE, {}", if unit.is_empty() { "1" } else { unit }),
+        "RMSE, % of range",
+        "R\u{b2}",
+        "Lag, ms",
+        largest.trim_end_matches(','),
+        "Outside domain, %",
     ];
     let row = |(m, name): (&MethodErrors, &String)| {
         let outside = 100.0 * m.clamped as f64 / (m.samples.max(1)) as f64;
@@ -74,12 +70,7 @@ pub(crate) fn method_table(
             fixed(outside, 1),
         ]
     };
-    Table {
-        caption: caption.to_owned(),
-        head,
-        rows: methods.iter().zip(names).map(row).collect(),
-        highlight: best(methods),
-    }
+    Table::new(caption, &head, methods.iter().zip(names).map(row)).highlight(best(methods))
 }
 
 /// Paired tests between methods.
@@ -108,12 +99,9 @@ pub(crate) fn comparison_table(
             probability(c.p_samples),
         ]
     };
-    Table {
-        caption: with_unit("Difference of absolute errors, paired t test; unit:", unit),
-        head: cells(["Difference", "Mean", "95 % interval", "P, blocks", "Blocks", "P, samples"]),
-        rows: comparisons.iter().map(row).collect(),
-        highlight: None,
-    }
+    let caption = with_unit("Difference of absolute errors, paired t test; unit:", unit);
+    let head = ["Difference", "Mean", "95 % interval", "P, blocks", "Blocks", "P, samples"];
+    Table::new(caption, &head, comparisons.iter().map(row))
 }
 
 /// Candidate signals, best first.
@@ -123,12 +111,9 @@ pub(crate) fn signal_table(candidates: &[Candidate]) -> Table {
         let text = c.problem.clone().unwrap_or_else(|| optional(percent, 3));
         vec![c.signal.clone(), text]
     };
-    Table {
-        caption: "Candidate signals, best first".to_owned(),
-        head: cells(["Signal", "Cross-validated RMSE, % of range"]),
-        rows: candidates.iter().map(row).collect(),
-        highlight: (!candidates.is_empty()).then_some(0),
-    }
+    let head = ["Signal", "Cross-validated RMSE, % of range"];
+    Table::new("Candidate signals, best first", &head, candidates.iter().map(row))
+        .highlight((!candidates.is_empty()).then_some(0))
 }
 
 /// The fitted order beside its neighbours.
@@ -151,12 +136,10 @@ pub(crate) fn order_table(fit: &FitReport) -> Table {
             remarks.join(", "),
         ]
     };
-    Table {
-        caption: format!("Orders, {}; errors in normalised target", fit.name),
-        head: cells(["Order", "Terms", "R\u{b2}", "RMSE", "RMSE, left out", "Remarks"]),
-        rows: fit.orders.iter().map(row).collect(),
-        highlight: fit.orders.iter().position(|o| Some(&o.model) == fit.recommended.as_ref()),
-    }
+    let caption = format!("Orders, {}; errors in normalised target", fit.name);
+    let head = ["Order", "Terms", "R\u{b2}", "RMSE", "RMSE, left out", "Remarks"];
+    let best = fit.orders.iter().position(|o| Some(&o.model) == fit.recommended.as_ref());
+    Table::new(caption, &head, fit.orders.iter().map(row)).highlight(best)
 }
 
 /// Coefficients with their bounds.
@@ -173,17 +156,14 @@ pub(crate) fn coefficient_table(fit: &FitReport) -> Table {
         let term = if r.is_empty() && v.is_empty() { "1".to_owned() } else { format!("{r}{v}") };
         vec![c.name.clone(), term, number(c.estimate, 4), number(c.lower, 4), number(c.upper, 4)]
     };
-    Table {
-        caption: format!(
-            "Coefficients, {} ({}): {} samples, R\u{b2} {}, RMSE {} in normalised target",
-            fit.name,
-            fit.model,
-            fit.samples,
-            fixed(fit.r_squared, 4),
-            number(fit.rmse, 3)
-        ),
-        head: cells(["Name", "Multiplies", "Estimate", "Lower, 95 %", "Upper, 95 %"]),
-        rows: fit.coefficients.iter().map(row).collect(),
-        highlight: None,
-    }
+    let caption = format!(
+        "Coefficients, {} ({}): {} samples, R\u{b2} {}, RMSE {} in normalised target",
+        fit.name,
+        fit.model,
+        fit.samples,
+        fixed(fit.r_squared, 4),
+        number(fit.rmse, 3)
+    );
+    let head = ["Name", "Multiplies", "Estimate", "Lower, 95 %", "Upper, 95 %"];
+    Table::new(caption, &head, fit.coefficients.iter().map(row))
 }

@@ -4,10 +4,7 @@
 //! and dark pages and paper. Dots of one colour are one path, so that a cloud of a thousand dots costs ten kilobytes,
 //! not a hundred.
 
-use std::{
-    convert::Infallible,
-    fmt::{self, Write as _},
-};
+use std::{convert::Infallible, fmt::Write as _};
 
 use plotters::style::{RGBAColor, RGBColor};
 use plotters_backend::{
@@ -122,17 +119,12 @@ impl<'a> Canvas<'a> {
     fn flush(&mut self) {
         if let Some(dots) = self.dots.take() {
             let width = 2 * dots.radius;
-            let opacity = Opacity("stroke-opacity", dots.opacity);
-            self.put(format_args!(
+            let opacity = opacity("stroke", dots.opacity);
+            *self.body += &format!(
                 "<path class=\"dots {}\"{opacity} stroke-width=\"{width}\" d=\"{}\"/>\n",
                 dots.class, dots.path
-            ));
+            );
         }
-    }
-
-    /// Writes to a string, which cannot fail.
-    fn put(&mut self, text: fmt::Arguments<'_>) {
-        let _ = self.body.write_fmt(text);
     }
 
     fn shape<S: BackendStyle>(&mut self, d: &str, style: &S, filled: bool) -> Done {
@@ -142,27 +134,20 @@ impl<'a> Canvas<'a> {
         }
         self.flush();
         let class = class(color);
-        if filled {
-            let opacity = Opacity("fill-opacity", color.alpha);
-            self.put(format_args!("<path class=\"area {class}\"{opacity} d=\"{d}z\"/>\n"));
+        *self.body += &if filled {
+            let opacity = opacity("fill", color.alpha);
+            format!("<path class=\"area {class}\"{opacity} d=\"{d}z\"/>\n")
         } else {
-            let opacity = Opacity("stroke-opacity", color.alpha);
-            let width = style.stroke_width();
-            self.put(format_args!(
-                "<path class=\"line {class}\"{opacity} stroke-width=\"{width}\" d=\"{d}\"/>\n"
-            ));
-        }
+            let (opacity, width) = (opacity("stroke", color.alpha), style.stroke_width());
+            format!("<path class=\"line {class}\"{opacity} stroke-width=\"{width}\" d=\"{d}\"/>\n")
+        };
         Ok(())
     }
 }
 
 /// An opacity attribute; empty when opaque.
-struct Opacity(&'static str, f64);
-
-impl fmt::Display for Opacity {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.1 >= 1.0 { Ok(()) } else { write!(f, " {}=\"{:.2}\"", self.0, self.1) }
-    }
+fn opacity(of: &str, share: f64) -> String {
+    if share >= 1.0 { String::new() } else { format!(" {of}-opacity=\"{share:.2}\"") }
 }
 
 /// Path data through points; coordinates after the first point are relative, which is shorter.
@@ -294,10 +279,10 @@ impl DrawingBackend for Canvas<'_> {
             format!(" transform=\"rotate({turn} {x} {y})\"")
         };
         let words = escape(text);
-        self.put(format_args!(
+        *self.body += &format!(
             "<text class=\"{class}\" x=\"{x}\" y=\"{y}\" dy=\"{dy}\" text-anchor=\"{anchor}\" \
              font-size=\"{size}\"{turned}>{words}</text>\n"
-        ));
+        );
         Ok(())
     }
 }

@@ -9,10 +9,6 @@ use super::{
 };
 use crate::plain::methods;
 
-fn cells<const N: usize>(cells: [&str; N]) -> Vec<String> {
-    cells.map(str::to_owned).to_vec()
-}
-
 fn interval([low, high]: [f64; 2], text: impl Fn(f64) -> String) -> String {
     format!("{} .. {}", text(low), text(high))
 }
@@ -28,13 +24,11 @@ pub fn stage_table(stages: &[StageGap], has_after: bool) -> Table {
             if has_after { both(s.after, s.floor, &s.unit) } else { NONE.to_owned() },
         ]
     };
-    Table {
-        caption: "What is left on the test trials: root mean square, and in multiples (\u{d7}) of the noise"
-            .to_owned(),
-        head: cells(["Stage", "Noise", "As shipped", "Re-tuned", "With the effect"]),
-        rows: stages.iter().map(row).collect(),
-        highlight: None,
-    }
+    Table::new(
+        "What is left on the test trials: root mean square, and in multiples (\u{d7}) of the noise",
+        &["Stage", "Noise", "As shipped", "Re-tuned", "With the effect"],
+        stages.iter().map(row),
+    )
 }
 
 /// A table of every candidate.
@@ -64,11 +58,10 @@ pub fn candidate_table(candidates: &[Candidate]) -> Table {
             values.join("; "),
         ]
     };
-    Table {
-        caption: "Candidates, the most probable first: probability given this catalogue; what is left before and after in multiples of the noise, \
-                  all channels with a gap together; the share that closes on trials that were not fitted; \u{b1} is one standard deviation"
-            .to_owned(),
-        head: cells([
+    Table::new(
+        "Candidates, the most probable first: probability given this catalogue; what is left before and after in multiples of the noise, \
+                  all channels with a gap together; the share that closes on trials that were not fitted; \u{b1} is one standard deviation",
+        &[
             "Effects",
             "Probability",
             "Left before",
@@ -76,10 +69,10 @@ pub fn candidate_table(candidates: &[Candidate]) -> Table {
             "Closes",
             "95 % interval",
             "Parameters",
-        ]),
-        rows: candidates.iter().map(row).collect(),
-        highlight: (!candidates.is_empty()).then_some(0),
-    }
+        ],
+        candidates.iter().map(row),
+    )
+    .highlight((!candidates.is_empty()).then_some(0))
 }
 
 /// A table of the nominal parameters; `None` when there are none.
@@ -94,12 +87,9 @@ pub(crate) fn parameter_table(d: &Diagnosis) -> Option<Table> {
             number(p.bent, 4),
         ]
     };
-    (!d.parameters.is_empty()).then(|| Table {
-        caption: "Nominal parameters".to_owned(),
-        head: cells(["Name", "As shipped", "Final", "Moved, tolerances", "Without the effect"]),
-        rows: d.parameters.iter().map(row).collect(),
-        highlight: None,
-    })
+    let head = ["Name", "As shipped", "Final", "Moved, tolerances", "Without the effect"];
+    let table = Table::new("Nominal parameters", &head, d.parameters.iter().map(row));
+    (!d.parameters.is_empty()).then_some(table)
 }
 
 /// A table of the cost of the gap for a calibration.
@@ -107,19 +97,11 @@ pub fn transfer_table(transfer: &Transfer) -> Table {
     let rows = [("linear", transfer.linear), ("poly13", transfer.poly13)].map(|(name, e)| {
         vec![name.to_owned(), number(e.real, 3), number(e.sim, 3), number(e.sim_with_effect, 3)]
     });
-    Table {
-        caption:
-            "Error on measured test trials, % of full scale, by where the calibration was trained"
-                .to_owned(),
-        head: cells([
-            "Calibration",
-            "Measured trials",
-            "Simulator, re-tuned",
-            "Simulator with the effect",
-        ]),
-        rows: rows.to_vec(),
-        highlight: None,
-    }
+    Table::new(
+        "Error on measured test trials, % of full scale, by where the calibration was trained",
+        &["Calibration", "Measured trials", "Simulator, re-tuned", "Simulator with the effect"],
+        rows,
+    )
 }
 
 /// A table of the effects that simpler methods named.
@@ -127,12 +109,8 @@ pub fn baseline_table(said: &Baselines) -> Table {
     let row = |(method, name): (&str, Option<&str>)| {
         vec![method.to_owned(), name.unwrap_or("nothing").to_owned()]
     };
-    Table {
-        caption: "Methods that leave one step out, on the same data".to_owned(),
-        head: cells(["Method", "Names"]),
-        rows: methods(said).map(row).to_vec(),
-        highlight: None,
-    }
+    let caption = "Methods that leave one step out, on the same data";
+    Table::new(caption, &["Method", "Names"], methods(said).map(row))
 }
 
 /// A table of every slice of a stage; `None` when there are none.
@@ -150,12 +128,8 @@ pub(crate) fn slice_table(slices: &[SliceGap], stage: &str) -> Option<Table> {
             ]
         })
         .collect();
-    (!rows.is_empty()).then(|| Table {
-        caption: format!(
-            "{stage}: what is left by slice in multiples of the noise, re-tuned, all trials"
-        ),
-        head: cells(["Slice", "Share of the gap", "Left", "95 % interval", "Stands out"]),
-        rows,
-        highlight: None,
-    })
+    let caption =
+        format!("{stage}: what is left by slice in multiples of the noise, re-tuned, all trials");
+    let head = ["Slice", "Share of the gap", "Left", "95 % interval", "Stands out"];
+    (!rows.is_empty()).then(|| Table::new(caption, &head, rows))
 }

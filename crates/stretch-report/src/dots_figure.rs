@@ -76,13 +76,8 @@ pub(crate) fn dots_figure(description: &str, against: &Shared<'_>, panels: &[Dot
 
 fn draw(area: &Area<'_>, against: &Shared<'_>, panel: &Dots, is_last: bool) -> Drawn {
     let (x, most) = (&against.x, against.most);
-    let axes = Axes {
-        x: x.clone(),
-        y: -most..most,
-        x_label: if is_last { against.x_label.to_owned() } else { String::new() },
-        y_label: panel.y_label.clone(),
-        is_log: false,
-    };
+    let x_label = if is_last { against.x_label } else { "" };
+    let axes = Axes::new(x.clone(), -most..most, [x_label, &panel.y_label]);
     let bins = binned(&panel.points, x, SLOTS);
     let cut = |y: f64| y.clamp(-most, most);
     plot(area, &axes, |chart| {

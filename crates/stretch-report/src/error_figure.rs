@@ -7,7 +7,7 @@ use super::{
     canvas::Ink,
     dots_figure::{Dots, Shared, dots_figure},
     figure::{Axes, Figure, FigureSize, plot, stroke},
-    markup::{number, with_unit},
+    markup::{labelled, number, with_unit},
     thin::{extent, padded, quantile, sorted},
 };
 
@@ -35,14 +35,11 @@ pub(crate) fn error_figure(evaluation: &Evaluation, names: &[String], against: A
         return Figure::missing("There is no error to draw: no sample has both values.");
     }
     let most = 1.05 * quantile(&errors, 0.995).max(f64::MIN_POSITIVE);
-    let x = match against {
-        Against::Rate => quantile(&places, 0.005)..quantile(&places, 0.995),
-        Against::Reference => padded(&(quantile(&places, 0.0)..quantile(&places, 1.0)), 0.02),
-    };
     let unit = &evaluation.unit;
-    let x_label = match against {
-        Against::Rate => per_second(unit),
-        Against::Reference => joined("reference", unit),
+    let between = |from, to| quantile(&places, from)..quantile(&places, to);
+    let (x, x_label) = match against {
+        Against::Rate => (between(0.005, 0.995), per_second(unit)),
+        Against::Reference => (padded(&between(0.0, 1.0), 0.02), labelled("reference", unit)),
     };
     let description = format!(
         "Error of {} against {x_label}: dots are samples, the line their median, the band 80 %",
@@ -63,7 +60,7 @@ pub(crate) fn error_figure(evaluation: &Evaluation, names: &[String], against: A
         .map(|((i, name), points)| Dots {
             ink: Ink::of(i),
             name: format!("error of {name}"),
-            y_label: joined(&format!("{name}: error"), unit),
+            y_label: labelled(&format!("{name}: error"), unit),
             points,
         })
         .collect();
@@ -89,13 +86,9 @@ pub(crate) fn residual_figure(evaluation: &Evaluation, names: &[String]) -> Figu
     };
     let shares: Vec<Vec<f64>> = methods.iter().map(|points| share(points)).collect();
     let top = extent(shares.iter().flatten().copied()).map_or(1.0, |span| span.end.max(1e-9));
-    let axes = Axes {
-        x: -most..most,
-        y: 0.0..1.06 * top,
-        x_label: joined("error", &evaluation.unit),
-        y_label: format!("% of samples in {}", with_unit(&number(width, 2), &evaluation.unit)),
-        is_log: false,
-    };
+    let x_label = labelled("error", &evaluation.unit);
+    let y_label = format!("% of samples in {}", with_unit(&number(width, 2), &evaluation.unit));
+    let axes = Axes::new(-most..most, 0.0..1.06 * top, [&x_label, &y_label]);
     let description =
         format!("Histogram of the errors of {}; unit: {}", names.join(", "), evaluation.unit);
     let steps = |counts: &[f64]| -> Vec<(f64, f64)> {
@@ -148,10 +141,6 @@ fn rates(time_s: &[f64], values: &[f64]) -> Vec<f64> {
         *rate = (y[2 * REACH] - y[0]) / (t[2 * REACH] - t[0]);
     }
     rates
-}
-
-fn joined(name: &str, unit: &str) -> String {
-    if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") }
 }
 
 fn per_second(unit: &str) -> String {

@@ -2,15 +2,14 @@
 
 use std::ops::Range;
 
-use plotters::prelude::*;
 use stretch_calibrate::{Evaluation, TrialErrors};
 
 use super::{
     canvas::Ink,
-    figure::{Axes, Figure, FigureSize, plot, stroke},
+    figure::{Figure, FigureSize, lines_figure},
     live::TimePlot,
     markup::{number, with_unit},
-    thin::{curve, extent, padded},
+    thin::{curve, extent},
 };
 
 /// Length of the window of [`closest_look`], in seconds.
@@ -55,10 +54,10 @@ fn live(
     let estimates = trial.estimates.iter().zip(names).enumerate();
     let lines = std::iter::once(("reference", Ink::Truth, 2.8, &trial.reference[..]))
         .chain(estimates.map(|(i, (y, name))| (name.as_str(), Ink::of(i), 1.4, &y[..])));
-    let unit = with_unit("reference and estimates,", &evaluation.unit);
+    let y_label = y_label(evaluation);
     TimePlot {
         link: trial.trial.clone(),
-        labels: ["time, s", unit.trim_end_matches(',')],
+        labels: ["time, s", &y_label],
         unit: &evaluation.unit,
         height: FigureSize::WIDE.height,
         time: &trial.time_s,
@@ -71,6 +70,11 @@ fn live(
     .json()
 }
 
+fn y_label(evaluation: &Evaluation) -> String {
+    let label = with_unit("reference and estimates,", &evaluation.unit);
+    label.trim_end_matches(',').to_owned()
+}
+
 /// A picture that stands alone, as in a README, in light colours with its legend inside.
 pub(crate) fn estimate_picture(
     evaluation: &Evaluation,
@@ -80,64 +84,36 @@ pub(crate) fn estimate_picture(
     closest_look(evaluation, trial, names).standalone()
 }
 
-/// A line as its ink, its width in pixels, and its pieces.
-type Line = (Ink, f64, Vec<Vec<(f64, f64)>>);
-
 fn window_figure(
     evaluation: &Evaluation,
     trial: &TrialErrors,
     names: &[String],
     window: &Range<f64>,
 ) -> Figure {
-    let bins = |frame: FigureSize| if frame == FigureSize::WIDE { 750 } else { 360 };
-    let lines = |frame: FigureSize| {
-        let thin = |values: &[f64]| curve(&trial.time_s, values, window, bins(frame));
+    let lines = |bins: usize| {
+        let thin = |values: &[f64]| curve(&trial.time_s, values, window, bins);
         let estimates = trial.estimates.iter().enumerate();
         // the reference is a broad line below, so that a correct estimate lies inside it
         let broad = if window.end - window.start > 2.0 * WINDOW_S { 2.0 } else { 3.4 };
         let reference = [(Ink::Truth, broad, thin(&trial.reference))];
         let estimates = estimates.map(|(i, y)| (Ink::of(i), 1.4, thin(y)));
-        reference.into_iter().chain(estimates).collect::<Vec<_>>()
-    };
-    let wide = lines(FigureSize::WIDE);
-    let all = wide.iter().flat_map(|(_, _, pieces)| pieces.iter().flatten());
-    let Some(y) = extent(all.map(|(_, y)| *y)) else {
-        return Figure::missing("Reference and estimates hold no number here.");
-    };
-    let axes = Axes {
-        x: window.clone(),
-        y: padded(&y, 0.04),
-        x_label: "time, s".to_owned(),
-        y_label: with_unit("reference and estimates,", &evaluation.unit)
-            .trim_end_matches(',')
-            .to_owned(),
-        is_log: false,
+        reference.into_iter().chain(estimates).collect()
     };
     let from_to = [window.start, window.end].map(|t| number(t, 3)).join(" to ");
     let description = format!(
         "Reference and estimates of {} over time, from {from_to} s; unit: {}",
         trial.trial, evaluation.unit
     );
-    let narrow = lines(FigureSize::NARROW);
-    let draw = |lines: Vec<Line>| {
-        let axes = &axes;
-        move |area: &super::figure::Area<'_>| {
-            plot(area, axes, |chart| {
-                for (ink, width, pieces) in lines {
-                    for piece in pieces {
-                        chart.draw_series(LineSeries::new(piece, stroke(ink.color(), width)))?;
-                    }
-                }
-                Ok(())
-            })
-        }
-    };
+    let y_label = y_label(evaluation);
+    let axes = (window, 0.04, ["time, s", &*y_label]);
+    let frames = [(FigureSize::NARROW, lines(360)), (FigureSize::WIDE, lines(750))];
+    let missing = "Reference and estimates hold no number here.";
     let methods = names.iter().enumerate().map(|(i, name)| (Ink::of(i), name.clone()));
-    Figure::new(&description)
-        .draw(FigureSize::NARROW, draw(narrow))
-        .draw(FigureSize::WIDE, draw(wide))
-        .legend([(Ink::Truth, "reference".to_owned())])
-        .legend(methods)
+    let figure = lines_figure(&description, axes, frames, missing);
+    if figure.missing.is_some() {
+        return figure;
+    }
+    figure.legend([(Ink::Truth, "reference".to_owned())]).legend(methods)
 }
 
 /// The window of [`WINDOW_S`] in which the reference travels farthest, in the

@@ -11,6 +11,7 @@ use plotters::{
 use super::{
     canvas::{Canvas, Ink, STEPS},
     markup::{escape, number, tick},
+    thin::{extent, padded},
 };
 
 /// Font size of words and numbers, in pixels of the figure.
@@ -173,6 +174,43 @@ pub struct Axes {
     pub y_label: String,
     /// Whether horizontal places are logarithms to base ten; the numbers at the axis are then the powers of ten.
     pub is_log: bool,
+}
+
+impl Axes {
+    /// Axes of plain numbers, with the labels below and above them.
+    pub fn new(x: Range<f64>, y: Range<f64>, labels: [&str; 2]) -> Self {
+        let [x_label, y_label] = labels.map(str::to_owned);
+        Self { x, y, x_label, y_label, is_log: false }
+    }
+}
+
+/// Lines over time: each with its ink, its width in pixels, and its pieces.
+pub(crate) type Lines = Vec<(Ink, f64, Vec<Vec<(f64, f64)>>)>;
+
+/// Lines in two frames, the frame for phones first, on axes that hold all lines; `missing` where there is no number.
+pub(crate) fn lines_figure(
+    description: &str,
+    (x, pad, labels): (&Range<f64>, f64, [&str; 2]),
+    frames: [(FigureSize, Lines); 2],
+    missing: &str,
+) -> Figure {
+    let points = frames[1].1.iter().flat_map(|(_, _, pieces)| pieces.iter().flatten());
+    let Some(y) = extent(points.map(|(_, y)| *y)) else {
+        return Figure::missing(missing);
+    };
+    let axes = Axes::new(x.clone(), padded(&y, pad), labels);
+    frames.into_iter().fold(Figure::new(description), |figure, (frame, lines)| {
+        figure.draw(frame, |area| {
+            plot(area, &axes, |chart| {
+                for (ink, width, pieces) in lines {
+                    for piece in pieces {
+                        chart.draw_series(LineSeries::new(piece, stroke(ink.color(), width)))?;
+                    }
+                }
+                Ok(())
+            })
+        })
+    })
 }
 
 /// Text in an ink, aligned at `h` and `v`.

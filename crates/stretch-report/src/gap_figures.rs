@@ -2,17 +2,17 @@
 
 use std::ops::Range;
 
-use plotters::prelude::*;
 use stretch_gap::{Diagnosis, Role, StageEvidence};
 
 use super::{
     bar_figure::GAP,
     canvas::Ink,
     dots_figure::{Dots, Shared, dots_figure},
-    figure::{Area, Axes, Figure, FigureSize, plot, stroke},
+    figure::{Figure, FigureSize, lines_figure},
     live::TimePlot,
+    markup::labelled,
     subject::Subject,
-    thin::{curve, extent, padded, quantile, sorted},
+    thin::{curve, padded, quantile, sorted},
 };
 
 /// Length of the window that is drawn, s.
@@ -26,9 +26,6 @@ const REACH: usize = 10;
 pub(crate) const BEFORE: Ink = Ink::Second;
 /// Colour of the simulator with the effect.
 pub(crate) const AFTER: Ink = Ink::Third;
-
-/// A line as its ink, its width in pixels, and its pieces.
-type Line = (Ink, f64, Vec<Vec<(f64, f64)>>);
 
 /// Whether there is an effect to draw beside the re-tuned simulator.
 pub(crate) fn has_after(subject: &Subject<'_>) -> bool {
@@ -81,11 +78,7 @@ pub(crate) fn trace_figures(
         left.push((AFTER, 1.4, evidence.residual_after[trial.clone()].to_vec()));
         legend.push((AFTER, format!("simulated, {}", after_name(subject.diagnosis))));
     }
-    let name = if spec.unit.is_empty() {
-        spec.channel.clone()
-    } else {
-        format!("{}, {}", spec.channel, spec.unit)
-    };
+    let name = labelled(&spec.channel, &spec.unit);
     let motion = subject.simulator.motion().values;
     let keys = [("level", motion.to_vec()), ("rate", rates(subject, motion))]
         .map(|(key, values)| (key, values.get(span.clone()).unwrap_or_default().to_vec()));
@@ -94,7 +87,7 @@ pub(crate) fn trace_figures(
         let lines = lines.iter().zip(names).map(|((ink, w, y), name)| (*name, *ink, *w, &y[..]));
         TimePlot {
             link: GAP.to_owned(),
-            labels: ["time in the trial, s", if is_first { &name } else { LEFT }],
+            labels: [TIME, if is_first { &name } else { LEFT }],
             unit: if is_first { &spec.unit } else { "\u{d7} the noise" },
             height: if is_first { 280 } else { 190 },
             time,
@@ -108,49 +101,20 @@ pub(crate) fn trace_figures(
     };
     let (whole, whole_left) = (live(&lines, &names, true), live(&left, &names[1..], false));
     let left_legend = legend[1..].to_vec();
-    let top = lines_figure(time, &lines, window, &name, 280).legend(legend).live(whole);
-    let below = lines_figure(time, &left, window, LEFT, 190).legend(left_legend).live(whole_left);
-    (top, below)
-}
-
-fn lines_figure(
-    time: &[f64],
-    lines: &[(Ink, f64, Vec<f64>)],
-    window: &Range<f64>,
-    y_label: &str,
-    height: u32,
-) -> Figure {
-    let thin = |bins: usize| -> Vec<Line> {
-        lines.iter().map(|(ink, w, y)| (*ink, *w, curve(time, y, window, bins))).collect()
+    let figure = |lines: &[(Ink, f64, Vec<f64>)], name: &str, height: u32| {
+        let thin = |bins: usize| {
+            lines.iter().map(|(ink, w, y)| (*ink, *w, curve(time, y, window, bins))).collect()
+        };
+        let frames = [
+            (FigureSize { width: 400, height: height.min(250) }, thin(360)),
+            (FigureSize { width: 880, height }, thin(750)),
+        ];
+        let description = format!("{name} over time, eight seconds of a test trial");
+        let axes = (window, 0.06, [TIME, name]);
+        lines_figure(&description, axes, frames, "There is no number here.")
     };
-    let wide = thin(750);
-    let points = wide.iter().flat_map(|(_, _, pieces)| pieces.iter().flatten()).map(|p| p.1);
-    let Some(y) = extent(points) else {
-        return Figure::missing("There is no number here.");
-    };
-    let axes = Axes {
-        x: window.clone(),
-        y: padded(&y, 0.06),
-        x_label: "time in the trial, s".to_owned(),
-        y_label: y_label.to_owned(),
-        is_log: false,
-    };
-    let draw = |lines: Vec<Line>| {
-        let axes = &axes;
-        move |area: &Area<'_>| {
-            plot(area, axes, |chart| {
-                for (ink, width, pieces) in lines {
-                    for piece in pieces {
-                        chart.draw_series(LineSeries::new(piece, stroke(ink.color(), width)))?;
-                    }
-                }
-                Ok(())
-            })
-        }
-    };
-    Figure::new(&format!("{y_label} over time, eight seconds of a test trial"))
-        .draw(FigureSize { width: 400, height: height.min(250) }, draw(thin(360)))
-        .draw(FigureSize { width: 880, height }, draw(wide))
+    let top = figure(&lines, &name, 280).legend(legend).live(whole);
+    (top, figure(&left, LEFT, 190).legend(left_legend).live(whole_left))
 }
 
 /// The test trial with the largest gap, and the eight seconds of that trial with the largest error of the re-tuned
@@ -186,6 +150,7 @@ fn begin_of(subject: &Subject<'_>, trial: usize) -> usize {
     subject.simulator.trials()[..trial].iter().map(|t| t.samples).sum()
 }
 
+const TIME: &str = "time in the trial, s";
 /// Label of the axis of residuals.
 const LEFT: &str = "measured \u{2212} simulated, multiples of the noise";
 
@@ -202,18 +167,14 @@ pub(crate) enum Against {
 pub(crate) fn left_figure(subject: &Subject<'_>, stage: usize, against: Against) -> Figure {
     let motion = subject.simulator.motion();
     let evidence = &subject.evidence.stages[stage];
-    let place = match against {
-        Against::Level => motion.values.to_vec(),
-        Against::Rate => rates(subject, motion.values),
+    let (by, place, unit) = match against {
+        Against::Level => ("level", motion.values.to_vec(), motion.unit.to_owned()),
+        Against::Rate => {
+            let unit = if motion.unit.is_empty() { "1" } else { motion.unit };
+            ("rate", rates(subject, motion.values), format!("{unit}/s"))
+        }
     };
-    let unit = match against {
-        Against::Level => motion.unit.to_owned(),
-        Against::Rate => format!("{}/s", if motion.unit.is_empty() { "1" } else { motion.unit }),
-    };
-    let x_label = match against {
-        Against::Level => format!("level, {unit}"),
-        Against::Rate => format!("rate, {unit}"),
-    };
+    let x_label = format!("{by}, {unit}");
     let panels = panels(subject, evidence, &place);
     let sizes = sorted(panels.iter().flat_map(|p| &p.points).map(|(_, r)| r.abs()));
     let places = sorted(place.iter().copied());
@@ -227,10 +188,6 @@ pub(crate) fn left_figure(subject: &Subject<'_>, stage: usize, against: Against)
     }
     let description =
         format!("Measured minus simulated in multiples of the noise against {x_label}");
-    let by = match against {
-        Against::Level => "level",
-        Against::Rate => "rate",
-    };
     let against = Shared {
         x,
         x_label: &x_label,

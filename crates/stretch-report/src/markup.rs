@@ -83,6 +83,11 @@ fn minus(text: String) -> String {
     text.replace('-', "\u{2212}")
 }
 
+/// What an axis shows and in what unit; that may be empty.
+pub(crate) fn labelled(name: &str, unit: &str) -> String {
+    if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") }
+}
+
 /// A quantity with its unit, on one line; the unit may be empty.
 pub(crate) fn with_unit(text: &str, unit: &str) -> String {
     if unit.is_empty() { text.to_owned() } else { format!("{text}\u{a0}{unit}") }

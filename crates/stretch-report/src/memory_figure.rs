@@ -8,6 +8,7 @@ use super::{
     canvas::Ink,
     figure::{Axes, Figure, FigureSize, plot, stroke},
     live::TimePlot,
+    markup::labelled,
     thin::{extent, padded},
 };
 
@@ -64,18 +65,13 @@ pub(crate) fn step_figure(name: &str, calibrated: &Calibrated, unit: &str) -> Fi
         return Figure::missing("There is no estimate to draw.");
     };
     let y_label = labelled("estimate", unit);
-    let axes = Axes {
-        x: 0.0..3.0 * HOLD_S,
-        y: padded(&y, 0.06),
-        x_label: "time, s".to_owned(),
-        y_label: y_label.clone(),
-        is_log: false,
-    };
+    let labels = ["time, s", &y_label];
+    let axes = Axes::new(0.0..3.0 * HOLD_S, padded(&y, 0.06), labels);
     let points: Vec<(f64, f64)> =
         answer.time_s.iter().copied().zip(answer.estimate.iter().copied()).collect();
     let live = TimePlot {
         link: format!("step of {name}"),
-        labels: ["time, s", &y_label],
+        labels,
         unit,
         height: 290,
         time: &answer.time_s,
@@ -118,13 +114,8 @@ pub(crate) fn loop_figure(name: &str, calibrated: &Calibrated, unit: &str) -> Fi
             "This calibration needs more than the signal: it cannot be shown alone.",
         );
     };
-    let axes = Axes {
-        x: padded(&x, 0.02),
-        y: padded(&y, 0.06),
-        x_label: calibration.signal.to_string(),
-        y_label: labelled("estimate", unit),
-        is_log: false,
-    };
+    let labels = [&*calibration.signal.to_string(), &labelled("estimate", unit)];
+    let axes = Axes::new(padded(&x, 0.02), padded(&y, 0.06), labels);
     let legend = PERIODS_S.iter().zip(INKS).map(|(s, ink)| (ink, format!("up and down in {s} s")));
     Figure::new(&format!("Estimate of {name} over the signal on triangles of three speeds"))
         .draw(FigureSize::NARROW, |area| {
@@ -137,10 +128,6 @@ pub(crate) fn loop_figure(name: &str, calibrated: &Calibrated, unit: &str) -> Fi
             })
         })
         .legend(legend)
-}
-
-fn labelled(name: &str, unit: &str) -> String {
-    if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") }
 }
 
 #[cfg(test)]

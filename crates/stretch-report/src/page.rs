@@ -25,6 +25,24 @@ pub struct Table {
     pub highlight: Option<usize>,
 }
 
+impl Table {
+    /// A table none of whose rows stands out.
+    pub fn new(
+        caption: impl Into<String>,
+        head: &[&str],
+        rows: impl IntoIterator<Item = Vec<String>>,
+    ) -> Self {
+        let head = head.iter().map(|&name| name.to_owned()).collect();
+        Self { caption: caption.into(), head, rows: rows.into_iter().collect(), highlight: None }
+    }
+
+    /// The same, with the row to look at first.
+    #[must_use]
+    pub fn highlight(self, row: impl Into<Option<usize>>) -> Self {
+        Self { highlight: row.into(), ..self }
+    }
+}
+
 /// A report under construction; [`Page::finish`] gives the file.
 #[derive(Debug, Clone)]
 pub struct Page {

@@ -29,13 +29,8 @@ pub(crate) fn slice_figure(view: &BranchView<'_>) -> Figure {
         "{target} against {signal} on the {name} branch: samples, and the surface at a slow, \
          a middle and a fast rate"
     );
-    let axes = Axes {
-        x: padded(&view.signal, 0.02),
-        y: padded(&view.target, 0.05),
-        x_label: signal.clone(),
-        y_label: target.clone(),
-        is_log: false,
-    };
+    let (x, y) = (padded(&view.signal, 0.02), padded(&view.target, 0.05));
+    let axes = Axes::new(x, y, [signal, target]);
     let paces = ["slow", "middle", "fast"];
     let legend = curves.iter().zip(INKS).zip(paces).map(|(((rate, _), ink), pace)| {
         let rate = number(*rate, 2);

@@ -13,6 +13,7 @@ use super::{
     figure::{Area, Axes, Drawn, Figure, FigureSize, plot, px, stroke},
     gap_figures::{AFTER, Shown},
     live::{Packed, Panel, change},
+    markup::labelled,
     subject::Subject,
     thin::{extent, padded},
 };
@@ -92,13 +93,8 @@ pub(crate) fn turn_figure(subject: &Subject<'_>, stage: usize, shown: &Shown) ->
 }
 
 fn draw(area: &Area<'_>, one: &Response, curve: &[(f64, f64)], [x, y]: [&Range<f64>; 2]) -> Drawn {
-    let axes = Axes {
-        x: x.clone(),
-        y: y.clone(),
-        x_label: format!("{}, {}", named(one), unit(one)).trim_end_matches(", ").to_owned(),
-        y_label: "left, multiples of the noise".to_owned(),
-        is_log: false,
-    };
+    let labels = [&*labelled(&named(one), unit(one)), "left, multiples of the noise"];
+    let axes = Axes::new(x.clone(), y.clone(), labels);
     plot(area, &axes, |chart| {
         let floor = [(x.start, 1.0), (x.end, 1.0)];
         chart.draw_series(LineSeries::new(floor, stroke(Ink::Axis.color(), 1.0)))?;

@@ -5,7 +5,7 @@ use hdf5_pure::{File, Group};
 use crate::{
     ReadOptions, RecordingError,
     arrays::{Array, tracks},
-    grid::{Track, listed},
+    grid::{Track, listed, note},
 };
 
 /// Groups within groups.
@@ -24,15 +24,15 @@ pub(crate) fn read(
     let opened = File::from_bytes(bytes).map_err(broken)?;
     let mut found = Found::default();
     found.group(&opened.root(), "", 0).map_err(broken)?;
-    let other: Vec<&str> = found.other.iter().map(String::as_str).collect();
     if found.arrays.is_empty() {
-        let told = if other.is_empty() { "nothing".to_owned() } else { listed(&other) };
+        let told = match &found.other[..] {
+            [] => "nothing".to_owned(),
+            other => listed(other),
+        };
         return Err(fail(format!("there is no data set of numbers in it, but {told}")));
     }
     let mut notes = Vec::new();
-    if !other.is_empty() {
-        notes.push(format!("left out: {}", listed(&other)));
-    }
+    note(&mut notes, "left out", &found.other);
     tracks(file, &found.arrays, notes, options)
 }
 

@@ -5,7 +5,8 @@ use std::io::Read;
 use crate::{
     ReadOptions, RecordingError,
     arrays::{Array, tracks},
-    grid::{Track, listed},
+    grid::{Track, listed, note},
+    whole::{signed, word},
 };
 
 /// Structures within structures; a file that says more is broken.
@@ -48,19 +49,16 @@ pub(crate) fn read(
         }
     }
     let mut notes = Vec::new();
-    let other: Vec<&str> = found.other.iter().map(String::as_str).collect();
     if found.arrays.is_empty() {
-        return Err(fail(match other[..] {
+        return Err(fail(match &found.other[..] {
             [] => "there is no variable in it".to_owned(),
-            _ => format!(
+            other => format!(
                 "none of its variables is a matrix of numbers: {}; save their arrays",
-                listed(&other)
+                listed(other)
             ),
         }));
     }
-    if !other.is_empty() {
-        notes.push(format!("left out: {}", listed(&other)));
-    }
+    note(&mut notes, "left out", &found.other);
     tracks(file, &found.arrays, notes, options)
 }
 
@@ -79,8 +77,7 @@ impl<'a> Bytes<'a> {
     }
 
     fn word(&self, bytes: &[u8]) -> Option<u32> {
-        let bytes: [u8; 4] = bytes.get(..4)?.try_into().ok()?;
-        Some(if self.is_big { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) })
+        Some(word(bytes.get(..4)?, self.is_big) as u32)
     }
 
     /// The next data element: its type and its data. Small ones hold both in eight bytes.
@@ -100,19 +97,6 @@ impl<'a> Bytes<'a> {
 
     /// The numbers of an element of type `kind`.
     fn numbers(&self, kind: u32, data: &[u8]) -> Option<Vec<f64>> {
-        let is_big = self.is_big;
-        let whole = |item: &[u8]| {
-            let mut word = 0_u64;
-            for i in 0..item.len() {
-                let byte = if is_big { item[i] } else { item[item.len() - 1 - i] };
-                word = word << 8 | u64::from(byte);
-            }
-            word
-        };
-        let signed = |item: &[u8]| {
-            let unused = 64 - 8 * item.len() as u32;
-            (((whole(item) << unused) as i64) >> unused) as f64
-        };
         let bytes = match kind {
             1 | 2 => 1,
             3 | 4 => 2,
@@ -120,11 +104,11 @@ impl<'a> Bytes<'a> {
             9 | 12 | 13 => 8,
             _ => return None,
         };
-        let value = |item: &[u8]| match kind {
-            1 | 3 | 5 | 12 => signed(item),
-            7 => f32::from_bits(whole(item) as u32).into(),
-            9 => f64::from_bits(whole(item)),
-            _ => whole(item) as f64,
+        let value = |item: &[u8]| match (kind, word(item, self.is_big)) {
+            (1 | 3 | 5 | 12, word) => signed(word, bytes),
+            (7, word) => f32::from_bits(word as u32).into(),
+            (9, word) => f64::from_bits(word),
+            (_, word) => word as f64,
         };
         Some(data.chunks_exact(bytes).map(value).collect())
     }

@@ -11,7 +11,7 @@ use stretch_data::Channel;
 
 use crate::{
     ReadOptions, RecordingError, TimeUnit,
-    grid::{Track, listed},
+    grid::{Track, listed, note},
     names::{clock_of, time_rank},
     options::TIME,
 };
@@ -103,12 +103,7 @@ pub(crate) fn tracks(
             None => left_out.push(array.name.as_str()),
         }
     }
-    if !left_out.is_empty() {
-        notes.push(format!(
-            "left out, no clock has their length or two clocks have: {}",
-            listed(&left_out)
-        ));
-    }
+    note(&mut notes, "left out, no clock has their length or two clocks have", &left_out);
     Ok((tracks, notes))
 }
 
@@ -116,7 +111,7 @@ pub(crate) fn tracks(
 fn clock<'a>(array: &'a Array, options: &ReadOptions) -> Option<ClockArray<'a>> {
     let (samples, 1) = array.matrix()? else { return None };
     let last = array.name.rsplit(['/', '.']).next().unwrap_or_default();
-    let wanted = options.time_column();
+    let wanted = options.time.as_str();
     let of = if array.name == wanted || last == wanted {
         array.name.rsplit_once(['/', '.']).map_or(String::new(), |(group, _)| group.to_owned())
     } else if wanted == TIME {
@@ -179,18 +174,18 @@ fn counted<'a>(
     let own = scalar(&["fs", "fs_hz", "rate_hz", "sample_rate", "sample_rate_hz", "sampling_rate"])
         .or_else(|| scalar(&["dt", "dt_s", "ts", "sample_time"]).map(|dt| 1.0 / dt));
     let samples = others.iter().filter_map(|a| a.matrix()).map(|(r, c)| r.max(c)).max();
-    let (Some(rate_hz), Some(samples)) = (options.sample_rate().or(own), samples) else {
+    let (Some(rate_hz), Some(samples)) = (options.sample_rate_hz.or(own), samples) else {
         let names: Vec<&str> = others.iter().map(|a| a.name.as_str()).collect();
         let hint = format!(
             "save it as an array {} beside the others ({}), or say --sample-rate",
-            options.time_column(),
+            &options.time,
             listed(&names)
         );
         return Err(RecordingError::NoTime { file: file.to_owned(), hint });
     };
-    let said = if options.sample_rate().is_some() { "was said" } else { "the file says" };
+    let said = if options.sample_rate_hz.is_some() { "was said" } else { "the file says" };
     notes.push(format!("there is no time: {rate_hz} samples a second, as {said}"));
-    let per_second = options.unit_of_time().unwrap_or(TimeUnit::Seconds).per_second();
+    let per_second = options.time_unit.unwrap_or(TimeUnit::Seconds).per_second();
     let channels = others.iter().filter(|a| a.values.len() > 1).filter_map(|a| a.columns(samples));
     let channels = channels.flatten().collect();
     let counts = (0..samples).map(|i| i as f64 / rate_hz * per_second).collect();

@@ -5,8 +5,9 @@ use std::io::{Cursor, Read};
 use crate::{
     ReadOptions, RecordingError,
     arrays::{Array, tracks},
-    grid::{Track, listed},
+    grid::{Track, listed, note},
     names::time_rank,
+    whole::{signed, word},
 };
 
 type Tracks = (Vec<Track>, Vec<String>);
@@ -19,14 +20,13 @@ pub(crate) fn read(
 ) -> Result<Tracks, RecordingError> {
     let fail = |problem| RecordingError::Format { file: file.to_owned(), format: "NPY", problem };
     let mut arrays = parse(bytes, "", options).map_err(fail)?;
-    if let (Some(names), [array]) = (options.column_names(), &mut arrays[..]) {
+    if let (Some(names), [array]) = (&options.columns, &mut arrays[..]) {
         arrays = named(array, names).map_err(fail)?;
     }
-    let has_time =
-        arrays.iter().any(|a| a.name == options.time_column() || time_rank(&a.name).is_some());
+    let has_time = arrays.iter().any(|a| a.name == options.time || time_rank(&a.name).is_some());
     if arrays.len() == 1
         && arrays[0].name.is_empty()
-        && options.sample_rate().is_none()
+        && options.sample_rate_hz.is_none()
         && !has_time
     {
         let shape = &arrays[0].shape;
@@ -68,17 +68,13 @@ pub(crate) fn read_archive(
         }
     }
     if arrays.is_empty() {
-        let told: Vec<&str> = other.iter().map(String::as_str).collect();
-        return Err(fail(match told[..] {
+        return Err(fail(match &other[..] {
             [] => "there is no array in it; give the recording itself, or save arrays with numpy.savez".to_owned(),
-            _ => format!("none of its arrays is of numbers: {}", listed(&told)),
+            _ => format!("none of its arrays is of numbers: {}", listed(&other)),
         }));
     }
     let mut notes = Vec::new();
-    if !other.is_empty() {
-        let told: Vec<&str> = other.iter().map(String::as_str).collect();
-        notes.push(format!("left out: {}", listed(&told)));
-    }
+    note(&mut notes, "left out", &other);
     tracks(file, &arrays, notes, options)
 }
 
@@ -147,19 +143,11 @@ impl Kind {
     }
 
     fn value(&self, item: &[u8]) -> f64 {
-        let mut bytes = [0_u8; 8];
-        for (to, from) in bytes.iter_mut().zip(item) {
-            *to = *from;
-        }
-        if self.is_big {
-            bytes[..self.bytes].reverse();
-        }
-        let word = u64::from_le_bytes(bytes);
-        let unused = 64 - 8 * self.bytes as u32;
+        let word = word(item, self.is_big);
         match (self.letter, self.bytes) {
             (b'f', 8) => f64::from_bits(word),
             (b'f', _) => f32::from_bits(word as u32).into(),
-            (b'i' | b'M' | b'm', _) => (((word << unused) as i64) >> unused) as f64,
+            (b'i' | b'M' | b'm', _) => signed(word, self.bytes),
             _ => word as f64,
         }
     }

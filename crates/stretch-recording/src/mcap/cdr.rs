@@ -3,6 +3,7 @@
 use crate::{
     mcap::leaves::Leaves,
     mcap::messages::{Count, Field, Kind, Schema},
+    whole::{signed, word},
 };
 
 /// Messages within messages.
@@ -48,10 +49,7 @@ impl<'a> Reader<'a> {
 
     fn word(&mut self, bytes: usize) -> Option<u64> {
         self.align(bytes);
-        let is_big = self.is_big;
-        let taken = self.take(bytes)?;
-        let fold = |word: u64, byte: &u8| word << 8 | u64::from(*byte);
-        Some(if is_big { taken.iter().fold(0, fold) } else { taken.iter().rev().fold(0, fold) })
+        Some(word(self.take(bytes)?, self.is_big))
     }
 
     fn message(
@@ -116,10 +114,7 @@ impl<'a> Reader<'a> {
         match kind {
             Kind::Bool => leaves.number(self.word(1)? as f64),
             Kind::Unsigned(bytes) => leaves.number(self.word(bytes)? as f64),
-            Kind::Signed(bytes) => {
-                let unused = 64 - 8 * bytes as u32;
-                leaves.number((((self.word(bytes)? << unused) as i64) >> unused) as f64);
-            }
+            Kind::Signed(bytes) => leaves.number(signed(self.word(bytes)?, bytes)),
             Kind::Float(4) => leaves.number(f32::from_bits(self.word(4)? as u32).into()),
             Kind::Float(_) => leaves.number(f64::from_bits(self.word(8)?)),
             Kind::Text => {

@@ -15,7 +15,7 @@ use stretch_data::Channel;
 use crate::{
     ReadOptions, RecordingError,
     clock::{EPOCH_S, told_epoch},
-    grid::{Track, listed},
+    grid::{Track, listed, note},
     mcap::kept::Messages,
     mcap::leaves::{Leaves, Topic},
     mcap::messages::Schema,
@@ -51,7 +51,6 @@ pub(crate) fn read(
         }
     }
     let other: Vec<String> = bag.other.into_iter().map(|(t, why)| format!("{t} ({why})")).collect();
-    let other: Vec<&str> = other.iter().map(String::as_str).collect();
     if bag.topics.is_empty() {
         return Err(fail(match other[..] {
             [] => "there is no message in it".to_owned(),
@@ -61,9 +60,7 @@ pub(crate) fn read(
             ),
         }));
     }
-    if !other.is_empty() {
-        notes.push(format!("left out: {}", listed(&other)));
-    }
+    note(&mut notes, "left out", &other);
     let tracks = tracks(bag.topics, &mut notes);
     Ok((tracks, notes))
 }
@@ -160,15 +157,8 @@ fn tracks(topics: BTreeMap<String, Topic>, notes: &mut Vec<String>) -> Vec<Track
         }
         read.push((topic, ns, columns));
     }
-    for (names, what) in [
-        (&stamped, "time is what the messages' own stamps say"),
-        (&doubled, "messages with the stamp of another are left out"),
-    ] {
-        if !names.is_empty() {
-            let names: Vec<&str> = names.iter().map(String::as_str).collect();
-            notes.push(format!("{what}: {}", listed(&names)));
-        }
-    }
+    note(notes, "time is what the messages' own stamps say", &stamped);
+    note(notes, "messages with the stamp of another are left out", &doubled);
     let first = read.iter().filter_map(|(_, ns, _)| ns.first()).min().copied().unwrap_or(0);
     let first_s = first as f64 / 1e9;
     let origin = if first_s >= EPOCH_S { first } else { 0 };

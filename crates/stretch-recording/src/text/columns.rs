@@ -31,7 +31,7 @@ impl Columns {
         header: &Header,
         options: &ReadOptions,
     ) -> Result<Self, RecordingError> {
-        let time = header.position(file, options.time_column())?;
+        let time = header.position(file, &options.time)?;
         for name in options.required() {
             header.position(file, name)?;
         }
@@ -49,7 +49,7 @@ impl Columns {
         Ok(Self {
             roles,
             time,
-            time_column: options.time_column().to_owned(),
+            time_column: options.time.clone(),
             divisor: options.time_divisor(),
             origin: 0.0,
             previous_s: None,

@@ -1,126 +1,69 @@
 //! Lines of a stream in bounded memory, each as soon as it is there.
 
-use std::io::{self, Read};
+use std::io::{BufRead, BufReader, Read};
+
+use crate::RecordingError;
 
 const BUFFER_BYTES: usize = 256 * 1024;
 
-/// What came out of the stream.
-pub(crate) enum Line<'a> {
-    /// A line without its end.
-    Text(&'a [u8]),
-    /// More than the limit without a line end.
-    TooLong,
-    /// The end of the stream.
-    End,
-}
-
-/// Splits a stream into lines; never holds more than its buffer.
+/// Splits a stream into lines; never holds more than its buffer and one line.
 pub(crate) struct Lines<R> {
-    reader: R,
-    buffer: Vec<u8>,
-    start: usize,
-    end: usize,
+    reader: BufReader<R>,
+    file: String,
+    line: Vec<u8>,
     row: u64,
     limit: usize,
-    ended: bool,
+    /// Whether the line that came last goes on.
+    is_cut: bool,
 }
 
 impl<R: Read> Lines<R> {
-    pub(crate) fn new(reader: R, limit: usize) -> Self {
-        let buffer = vec![0; BUFFER_BYTES.max(limit.saturating_add(2))];
-        Self { reader, buffer, start: 0, end: 0, row: 0, limit, ended: false }
+    /// Lines of `file` of `limit` bytes at most.
+    pub(crate) fn new(reader: R, file: &str, limit: usize) -> Self {
+        let reader = BufReader::with_capacity(BUFFER_BYTES, reader);
+        Self { reader, file: file.to_owned(), line: Vec::new(), row: 0, limit, is_cut: false }
     }
 
-    /// Row of the line that came last; the first is 1.
-    pub(crate) fn row(&self) -> u64 {
-        self.row
-    }
-
-    /// The longest line that is accepted.
-    pub(crate) fn limit(&self) -> usize {
-        self.limit
-    }
-
-    /// The next line, read only when none is complete in the buffer.
-    pub(crate) fn next(&mut self) -> io::Result<Line<'_>> {
-        let mut searched = self.start;
+    /// The next line that is not blank and its row, the first of which is 1; without its end, and without the mark of UTF-8
+    /// before it. The one after an error of a line that is too long is the line below that.
+    pub(crate) fn next(&mut self) -> Result<Option<(u64, &[u8])>, RecordingError> {
         loop {
-            if let Some(at) = memchr::memchr(b'\n', &self.buffer[searched..self.end]) {
-                return Ok(self.take(searched + at, searched + at + 1));
+            if !self.read()? {
+                return Ok(None);
             }
-            searched = self.end;
-            if self.end - self.start > self.limit + 1 {
-                self.row += 1;
-                return Ok(Line::TooLong);
+            self.row += 1;
+            self.is_cut = self.line.pop_if(|byte| *byte == b'\n').is_none();
+            self.line.pop_if(|byte| *byte == b'\r');
+            if self.line.len() > self.limit {
+                let (file, row, limit) = (self.file.clone(), self.row, self.limit);
+                return Err(RecordingError::LineTooLong { file, row, limit });
             }
-            if self.ended {
-                if self.start == self.end {
-                    return Ok(Line::End);
-                }
-                return Ok(self.take(self.end, self.end));
+            if self.row == 1 && self.line.starts_with(b"\xef\xbb\xbf") {
+                self.line.drain(..3);
             }
-            searched -= self.make_room();
-            self.fill()?;
+            if !self.line.trim_ascii().is_empty() {
+                return Ok(Some((self.row, &self.line)));
+            }
         }
     }
 
-    /// Drops everything up to the next line end, after [`Line::TooLong`].
-    pub(crate) fn skip_line(&mut self) -> io::Result<()> {
-        loop {
-            if let Some(at) = memchr::memchr(b'\n', &self.buffer[self.start..self.end]) {
-                self.start += at + 1;
-                return Ok(());
-            }
-            (self.start, self.end) = (0, 0);
-            if self.ended {
-                return Ok(());
-            }
-            self.fill()?;
+    /// Takes up to the end of the next line, or enough of it to see that it is too long; whether there is one.
+    fn read(&mut self) -> Result<bool, RecordingError> {
+        let failed = |e| RecordingError::io(&self.file, "read it", e);
+        if std::mem::take(&mut self.is_cut) {
+            self.reader.skip_until(b'\n').map_err(failed)?;
         }
-    }
-
-    fn take(&mut self, line_end: usize, next: usize) -> Line<'_> {
-        let line = &self.buffer[self.start..line_end];
-        let line = line.strip_suffix(b"\r").unwrap_or(line);
-        self.start = next;
-        self.row += 1;
-        if line.len() > self.limit {
-            // Complete in the buffer already: there is nothing to skip but the caller will
-            // skip a line, so leave it where it was.
-            self.start = next - usize::from(next > line_end);
-            return Line::TooLong;
-        }
-        Line::Text(line)
-    }
-
-    /// Moves what is left to the front when the buffer is full; says by how much.
-    fn make_room(&mut self) -> usize {
-        if self.end < self.buffer.len() && self.start < self.end {
-            return 0;
-        }
-        let moved = self.start;
-        self.buffer.copy_within(self.start..self.end, 0);
-        (self.start, self.end) = (0, self.end - moved);
-        moved
-    }
-
-    fn fill(&mut self) -> io::Result<()> {
-        loop {
-            match self.reader.read(&mut self.buffer[self.end..]) {
-                Ok(count) => {
-                    self.ended = count == 0;
-                    self.end += count;
-                    return Ok(());
-                }
-                Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
-                Err(e) => return Err(e),
-            }
-        }
+        self.line.clear();
+        let most = self.limit.saturating_add(2) as u64;
+        let taken = self.reader.by_ref().take(most).read_until(b'\n', &mut self.line);
+        Ok(taken.map_err(failed)? > 0)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::io;
+
     use super::*;
 
     /// Hands out one byte a read: the worst case for a splitter.
@@ -136,31 +79,25 @@ mod tests {
     }
 
     fn all(reader: impl Read, limit: usize) -> Vec<(u64, Option<String>)> {
-        let mut lines = Lines::new(reader, limit);
+        let mut lines = Lines::new(reader, "memory", limit);
         let mut out = Vec::new();
         loop {
-            let item = match lines.next().expect("memory does not fail") {
-                Line::Text(text) => Some(String::from_utf8(text.to_vec()).expect("text")),
-                Line::TooLong => None,
-                Line::End => return out,
-            };
-            if item.is_none() {
-                lines.skip_line().expect("memory does not fail");
-            }
-            out.push((lines.row(), item));
+            out.push(match lines.next() {
+                Ok(Some((row, text))) => {
+                    (row, Some(String::from_utf8(text.to_vec()).expect("text")))
+                }
+                Err(RecordingError::LineTooLong { row, .. }) => (row, None),
+                Ok(None) => return out,
+                Err(error) => panic!("memory does not fail: {error}"),
+            });
         }
     }
 
     #[test]
-    fn lines_end_in_any_way_and_long_ones_are_skipped_with_their_row() {
+    fn lines_end_in_any_way_and_blank_and_long_ones_are_skipped_with_their_row() {
         let text = b"a\r\nbb\n\n123456789\nlast";
-        let expected = [
-            (1, Some("a".into())),
-            (2, Some("bb".into())),
-            (3, Some(String::new())),
-            (4, None),
-            (5, Some("last".into())),
-        ];
+        let expected =
+            [(1, Some("a".into())), (2, Some("bb".into())), (4, None), (5, Some("last".into()))];
         assert_eq!(all(&text[..], 4), expected);
         assert_eq!(all(Dribble(text), 4), expected);
     }

@@ -8,7 +8,7 @@ use crate::{
     names::{are_units, tidy},
     text::dialect::{BLANKS, cells, is_comment},
     text::header::Header,
-    text::lines::{Line, Lines},
+    text::lines::Lines,
     text::top::{is_whole, name_cells, separator, uncommented},
 };
 
@@ -18,7 +18,7 @@ pub(crate) fn header<R: Read>(
     file: &str,
     options: &ReadOptions,
 ) -> Result<(Header, usize), RecordingError> {
-    let mut header = match options.column_names() {
+    let mut header = match &options.columns {
         Some(names) => {
             let cells = names.iter().map(|name| name.clone().into_bytes()).collect();
             Header { names: Header::named(file, 0, cells)?, delimiter: b',' }
@@ -27,17 +27,13 @@ pub(crate) fn header<R: Read>(
     };
     for i in 0..header.names.len() {
         let name = &header.names[i];
-        let is_asked = options.required().contains(name) || name == options.time_column();
+        let is_asked = options.required().contains(name) || *name == options.time;
         if let Some(tidied) = tidy(name, None).filter(|t| !is_asked && !header.names.contains(t)) {
             header.names[i] = tidied;
         }
     }
     let time = time_among(&header.names, options).ok_or_else(|| {
-        RecordingError::missing_column(
-            file,
-            options.time_column(),
-            header.names.iter().map(String::as_str),
-        )
+        RecordingError::missing_column(file, &options.time, header.names.iter().map(String::as_str))
     })?;
     Ok((header, time))
 }
@@ -47,18 +43,7 @@ fn named<R: Read>(
     file: &str,
     options: &ReadOptions,
 ) -> Result<Header, RecordingError> {
-    loop {
-        let (row, limit) = (lines.row() + 1, lines.limit());
-        let line = match lines.next().map_err(|e| RecordingError::io(file, "read it", e))? {
-            Line::End => return Err(RecordingError::Empty { file: file.to_owned() }),
-            Line::TooLong => {
-                return Err(RecordingError::LineTooLong { file: file.to_owned(), row, limit });
-            }
-            Line::Text(line) => line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line),
-        };
-        if line.trim_ascii().is_empty() {
-            continue;
-        }
+    while let Some((row, line)) = lines.next()? {
         // A comment is the header where it names the time.
         let parsed = if is_comment(line) {
             let parsed = of_line(file, row, uncommented(line)).ok();
@@ -70,6 +55,7 @@ fn named<R: Read>(
             return Ok(header);
         }
     }
+    Err(RecordingError::Empty { file: file.to_owned() })
 }
 
 /// A header line, by blanks where no other separator parts it.

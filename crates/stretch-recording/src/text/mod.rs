@@ -20,7 +20,7 @@ use crate::{
     text::columns::{Columns, located},
     text::dialect::{BLANKS, Dialect},
     text::header::Header,
-    text::lines::{Line, Lines},
+    text::lines::Lines,
     text::top::Top,
 };
 
@@ -41,7 +41,7 @@ pub(crate) fn read_blocks<E: From<RecordingError>>(
     most: usize,
     give: &mut dyn FnMut(Trial, &str) -> Result<(), E>,
 ) -> Result<(Recording, String), E> {
-    let mut lines = Lines::new(reader, options.line_limit());
+    let mut lines = Lines::new(reader, file, options.max_line_bytes);
     let mut top = Top::read(&mut lines, file, options)?;
     top.tidy(options);
     let ahead = std::mem::take(&mut top.ahead);
@@ -49,23 +49,14 @@ pub(crate) fn read_blocks<E: From<RecordingError>>(
     for (row, line) in ahead {
         table.take(row, &line)?;
     }
-    loop {
-        let (row, limit) = (lines.row() + 1, lines.limit());
-        match lines.next().map_err(|e| RecordingError::io(file, "read it", e))? {
-            Line::End => return Ok(table.finish()?),
-            Line::TooLong => {
-                return Err(
-                    RecordingError::LineTooLong { file: file.to_owned(), row, limit }.into()
-                );
-            }
-            Line::Text(line) if line.trim_ascii().is_empty() => {}
-            Line::Text(line) => table.take(row, line)?,
-        }
+    while let Some((row, line)) = lines.next()? {
+        table.take(row, line)?;
         if table.columns.len() >= most {
             table.given += table.columns.len();
             give(table.columns.cut(file, &table.header), &table.header.names[table.time])?;
         }
     }
+    Ok(table.finish()?)
 }
 
 /// Columns that grow, and how their rows are written.
@@ -92,7 +83,7 @@ impl<'a> Table<'a> {
         let Top { mut header, mut notes, .. } = top;
         let fields = header.names.len();
         let found = time_among(&header.names, options);
-        let counted_hz = options.sample_rate().filter(|_| found.is_none());
+        let counted_hz = options.sample_rate_hz.filter(|_| found.is_none());
         let time = match (found, counted_hz) {
             (Some(time), _) => time,
             (None, Some(rate_hz)) => {
@@ -102,11 +93,11 @@ impl<'a> Table<'a> {
             }
             (None, None) => {
                 let names = header.names.iter().map(String::as_str);
-                return Err(RecordingError::missing_column(file, options.time_column(), names));
+                return Err(RecordingError::missing_column(file, &options.time, names));
             }
         };
         let name = header.names[time].clone();
-        if name != options.time_column() && counted_hz.is_none() {
+        if name != options.time && counted_hz.is_none() {
             notes.push(format!("the time is column {name}"));
         }
         let divisor = options.divisor(&name);

@@ -9,7 +9,7 @@ use crate::{
     text::columns::located,
     text::dialect::Dialect,
     text::header::Header,
-    text::lines::{Line, Lines},
+    text::lines::Lines,
     text::live::{header, is_units, separator_of},
     text::row::Role,
 };
@@ -75,10 +75,10 @@ impl<R: Read> RowReader<R> {
     /// # Errors
     /// [`RecordingError`] when there is no header or a column is missing.
     pub fn new(reader: R, name: &str, options: &ReadOptions) -> Result<Self, RecordingError> {
-        let mut lines = Lines::new(reader, options.line_limit());
+        let mut lines = Lines::new(reader, name, options.max_line_bytes);
         let (header, time) = header(&mut lines, name, options)?;
         // The separator of a stream without a header line is told by its first row.
-        let known = options.column_names().is_none();
+        let known = options.columns.is_none();
         let dialect = known.then(|| Dialect::new(header.delimiter, Some(time)));
         let wanted = options
             .required()
@@ -143,39 +143,24 @@ impl<R: Read> RowReader<R> {
 
     /// Fills `fields` from the next line that is not blank; its row.
     fn read_row(&mut self) -> Result<Option<u64>, RecordingError> {
-        let fail = |e| RecordingError::io(&self.name, "read it", e);
-        loop {
-            let (row, limit) = (self.lines.row() + 1, self.lines.limit());
-            match self.lines.next().map_err(fail)? {
-                Line::End => return Ok(None),
-                Line::Text(line) if line.trim_ascii().is_empty() => {}
-                Line::Text(line) => {
-                    let is_first = !std::mem::replace(&mut self.is_begun, true);
-                    if self.dialect.is_none() {
-                        let found = separator_of(line, self.roles.len());
-                        self.dialect = found.map(|d| Dialect::new(d, Some(self.time)));
-                    }
-                    // What comes before the first whole row of a stream without a header is the end of another.
-                    let Some(dialect) = &mut self.dialect else { continue };
-                    if is_first && is_units(line, dialect.delimiter) {
-                        continue;
-                    }
-                    match dialect.parse(line, &self.roles, &mut self.fields) {
-                        Ok(true) => return Ok(Some(row)),
-                        Ok(false) => {}
-                        Err(fault) => return Err(located(&self.name, row, &self.header, fault)),
-                    }
-                }
-                Line::TooLong => {
-                    self.lines.skip_line().map_err(fail)?;
-                    return Err(RecordingError::LineTooLong {
-                        file: self.name.clone(),
-                        row,
-                        limit,
-                    });
-                }
+        while let Some((row, line)) = self.lines.next()? {
+            let is_first = !std::mem::replace(&mut self.is_begun, true);
+            if self.dialect.is_none() {
+                let found = separator_of(line, self.roles.len());
+                self.dialect = found.map(|d| Dialect::new(d, Some(self.time)));
+            }
+            // What comes before the first whole row of a stream without a header is the end of another.
+            let Some(dialect) = &mut self.dialect else { continue };
+            if is_first && is_units(line, dialect.delimiter) {
+                continue;
+            }
+            match dialect.parse(line, &self.roles, &mut self.fields) {
+                Ok(true) => return Ok(Some(row)),
+                Ok(false) => {}
+                Err(fault) => return Err(located(&self.name, row, &self.header, fault)),
             }
         }
+        Ok(None)
     }
 }
 

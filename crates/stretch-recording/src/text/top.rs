@@ -10,7 +10,7 @@ use crate::{
     options::TIME,
     text::dialect::{BLANKS, cells, is_comment, is_value},
     text::header::Header,
-    text::lines::{Line, Lines},
+    text::lines::Lines,
 };
 
 /// Lines that are looked at for the first row of numbers.
@@ -41,33 +41,23 @@ impl Top {
         let (mut rows, mut comment): (Vec<Row>, Option<Row>) = (Vec::new(), None);
         let mut first = None;
         while first.is_none() && rows.len() < MOST_AHEAD {
-            let (row, limit) = (lines.row() + 1, lines.limit());
-            let line = match lines.next().map_err(|e| RecordingError::io(file, "read it", e))? {
-                Line::End => break,
-                Line::TooLong => {
-                    return Err(RecordingError::LineTooLong { file: file.to_owned(), row, limit });
-                }
-                Line::Text(line) => line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line),
-            };
-            if line.trim_ascii().is_empty() {
-                continue;
-            }
+            let Some((row, line)) = lines.next()? else { break };
             if is_comment(line) {
                 comment = Some((row, line.to_vec()));
                 continue;
             }
             rows.push((row, line.to_vec()));
             first = separator(line).filter(|&(_, count)| {
-                options.column_names().is_none_or(|names| names.len() == count)
+                options.columns.as_ref().is_none_or(|names| names.len() == count)
             });
             // Columns may be called by numbers; the time of this project's own form is not.
             first = first.filter(|_| !line.starts_with(TIME.as_bytes()));
             // What comes before the first whole row of a stream is the end of another.
             first = first.filter(|&(delimiter, count)| {
-                options.column_names().is_none() || is_whole(line, delimiter, count)
+                options.columns.is_none() || is_whole(line, delimiter, count)
             });
         }
-        match (options.column_names(), first) {
+        match (&options.columns, first) {
             (Some(names), first) => Self::given(file, rows, names, first),
             (None, _) if rows.is_empty() => Err(RecordingError::Empty { file: file.to_owned() }),
             (None, None) => Self::from_line(file, rows, 0),
@@ -138,9 +128,9 @@ impl Top {
                 .filter(|cells| are_units(cells.iter().map(String::as_str)))
         };
         let has_time = |row: &usize| {
-            names[*row].as_ref().is_some_and(|cells| {
-                texts(cells).iter().any(|name| is_time(name, options.time_column()))
-            })
+            names[*row]
+                .as_ref()
+                .is_some_and(|cells| texts(cells).iter().any(|name| is_time(name, &options.time)))
         };
         let at = match (0..data).find(has_time) {
             Some(at) => at,
@@ -159,8 +149,7 @@ impl Top {
     /// Gives columns names with units in this project's way, and says which; names that are asked for stay.
     pub(crate) fn tidy(&mut self, options: &ReadOptions) {
         let raw = self.header.names.clone();
-        let is_asked =
-            |name: &String| options.required().contains(name) || name == options.time_column();
+        let is_asked = |name: &String| options.required().contains(name) || *name == options.time;
         let mut told = Vec::new();
         for (i, name) in raw.iter().enumerate() {
             let unit = self.units.get(i).map(String::as_str);

@@ -90,11 +90,8 @@ pub(crate) fn check_rate(dt_s: f64) -> Result<(), ProblemError> {
     if (1e-7..=1e3).contains(&dt_s) {
         return Ok(());
     }
-    Err(ProblemError::Implausible {
-        column: "time_s".into(),
-        found: format!("a sample every {dt_s} s"),
-        hint: "rates from 0.001 to 10 000 000 Hz are understood; is the time in seconds?".into(),
-    })
+    let hint = "rates from 0.001 to 10 000 000 Hz are understood; is the time in seconds?";
+    Err(ProblemError::implausible("time_s", format!("a sample every {dt_s} s"), hint))
 }
 
 impl From<GridError> for ProblemError {
@@ -127,6 +124,29 @@ impl ProblemError {
         hint: impl Into<String>,
     ) -> Self {
         Self::Value { owner: owner.into(), found: found.into(), hint: hint.into() }
+    }
+
+    pub(crate) fn implausible(
+        column: impl Into<String>,
+        found: impl Into<String>,
+        hint: impl Into<String>,
+    ) -> Self {
+        Self::Implausible { column: column.into(), found: found.into(), hint: hint.into() }
+    }
+
+    /// A column that stands still.
+    pub(crate) fn dead(column: impl Into<String>, found: String) -> Self {
+        Self::implausible(column, found, "the channel is dead: check the sensor and its cable")
+    }
+
+    /// Fewer samples to fit than are needed.
+    pub(crate) fn few_samples(samples: usize, least: usize) -> Self {
+        let what = format!("the trials to fit have {samples} samples");
+        Self::too_little(what, format!("at least {least} are needed to tell anything"))
+    }
+
+    pub(crate) fn too_little(what: impl Into<String>, hint: impl Into<String>) -> Self {
+        Self::TooLittle { what: what.into(), hint: hint.into() }
     }
 }
 

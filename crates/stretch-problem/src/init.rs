@@ -1,9 +1,6 @@
 //! A first problem from a folder of recordings; comments say which entries are guessed.
 
-use std::{
-    fmt::Write,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use stretch_data::{Trial, ends, unit};
 use stretch_recording::{ReadOptions, Recording};
@@ -54,10 +51,7 @@ pub fn first_problem(folder: impl AsRef<Path>) -> Result<String, ProblemError> {
         let hint = "put recordings with named columns and a column of time there";
         return Err(ProblemError::value(shown, found, hint));
     };
-    let mut out = String::new();
-    // Writing to a String does not fail.
-    let _ = write(&mut out, folder, &trials, first, &time, &left);
-    Ok(out)
+    Ok(text(folder, &trials, first, &time, &left))
 }
 
 type Found = (Vec<(String, Trial)>, String, Vec<String>);
@@ -133,65 +127,44 @@ fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 
-fn write(
-    out: &mut String,
+fn text(
     folder: &Path,
     trials: &[(String, Trial)],
     first: &Trial,
     time: &str,
     left: &[String],
-) -> std::fmt::Result {
+) -> String {
     let columns = known(trials, first);
     let name = folder.canonicalize().ok();
     let name = name.as_deref().and_then(Path::file_name).map(|n| n.to_string_lossy().into_owned());
-    writeln!(
-        out,
-        "# A first problem from the recordings in this folder. Comments say which entries were guessed: correct them."
-    )?;
-    writeln!(out, "name = {}", quoted(name.as_deref().unwrap_or("problem")))?;
+    let mut out = "# A first problem from the recordings in this folder. Comments say which entries were guessed: correct them.\n"
+        .to_owned();
+    out += &format!("name = {}\n", quoted(name.as_deref().unwrap_or("problem")));
     if time != "time_s" {
-        writeln!(out, "time = {}", quoted(time))?;
+        out += &format!("time = {}\n", quoted(time));
     }
     for why in left {
-        writeln!(out, "# left out: {}", why.replace('\n', " "))?;
+        out += &format!("# left out: {}\n", why.replace('\n', " "));
     }
-    writeln!(
-        out,
-        "\n# Wrappers that are looked for around every stage: all, or a list as [\"input.delay\", \"output.backlash\"]."
-    )?;
-    writeln!(out, "wrap = \"all\"")?;
-    writeln!(
-        out,
-        "\n# The simulator: a worker (docs/worker.md), or python = \"module:object\", or builtin = \"rig\" or \"gauge\"."
-    )?;
-    writeln!(out, "[simulator]\ncommand = [\"python3\", \"sim.py\"]  # guessed: write it")?;
-    writeln!(out, "\n# Columns, with the least and the greatest value:")?;
+    out += "\n# Wrappers that are looked for around every stage: all, or a list as [\"input.delay\", \"output.backlash\"].\n";
+    out += "wrap = \"all\"\n";
+    out += "\n# The simulator: a worker (docs/worker.md), or python = \"module:object\", or builtin = \"rig\" or \"gauge\".\n";
+    out += "[simulator]\ncommand = [\"python3\", \"sim.py\"]  # guessed: write it\n";
+    out += "\n# Columns, with the least and the greatest value:\n";
     for c in columns.iter().take(LISTED) {
         let kind = if c.is_command { ", held or called like a command" } else { "" };
         let unit = unit(&c.name).unwrap_or("unit not in its name");
-        writeln!(out, "#   {} ({unit}): {} to {}{kind}", c.name, c.range[0], c.range[1])?;
+        out += &format!("#   {} ({unit}): {} to {}{kind}\n", c.name, c.range[0], c.range[1]);
     }
-    stage(out, &columns)?;
-    writeln!(
-        out,
-        "\n# Parameters of the simulator, each with its tolerance: one standard deviation."
-    )?;
-    writeln!(
-        out,
-        "# [[parameter]]\n# name = \"gain\"\n# unit = \"1\"\n# value = 1.0\n# tolerance = \"10 %\"  # or a number in its unit"
-    )?;
-    writeln!(
-        out,
-        "\n# Effects that the simulator has itself, each with the value at which the effect does nothing."
-    )?;
-    writeln!(
-        out,
-        "# [[effect]]\n# name = \"dof_frictionloss\"\n# unit = \"Nm\"\n# range = [0, 2]\n# off = 0"
-    )?;
-    trials_of(out, trials)
+    out += &stage(&columns);
+    out += "\n# Parameters of the simulator, each with its tolerance: one standard deviation.\n";
+    out += "# [[parameter]]\n# name = \"gain\"\n# unit = \"1\"\n# value = 1.0\n# tolerance = \"10 %\"  # or a number in its unit\n";
+    out += "\n# Effects that the simulator has itself, each with the value at which the effect does nothing.\n";
+    out += "# [[effect]]\n# name = \"dof_frictionloss\"\n# unit = \"Nm\"\n# range = [0, 2]\n# off = 0\n";
+    out + &trials_of(trials)
 }
 
-fn stage(out: &mut String, columns: &[Known]) -> std::fmt::Result {
+fn stage(columns: &[Known]) -> String {
     let moves = |c: &&Known| c.range[1] > c.range[0];
     let output = columns.iter().filter(moves).rfind(|c| !c.is_command);
     let output = output.or(columns.last());
@@ -202,44 +175,36 @@ fn stage(out: &mut String, columns: &[Known]) -> std::fmt::Result {
         .filter(|c| c.is_command && c.name != own)
         .map(|c| quoted(&c.name))
         .collect();
-    writeln!(
-        out,
-        "\n# Guessed: the last column that is no command is the output, and commands drive the stage."
-    )?;
-    writeln!(out, "[[stage]]\nname = \"plant\"\noutput = {}", quoted(own))?;
+    let mut out = "\n# Guessed: the last column that is no command is the output, and commands drive the stage.\n"
+        .to_owned();
+    out += &format!("[[stage]]\nname = \"plant\"\noutput = {}\n", quoted(own));
     if unit(own).is_none() {
-        writeln!(out, "unit = \"\"  # the name gives no unit")?;
+        out += "unit = \"\"  # the name gives no unit\n";
     }
-    writeln!(out, "inputs = [{}]", inputs.join(", "))?;
-    writeln!(
-        out,
-        "# noise = 0.01     # one standard deviation, where the noise is known; else it is estimated from the recordings"
-    )?;
-    writeln!(
-        out,
-        "# velocity = \"COLUMN\"  # or position = \"COLUMN\": at which a force or torque rubs"
-    )
+    out += &format!("inputs = [{}]\n", inputs.join(", "));
+    out += "# noise = 0.01     # one standard deviation, where the noise is known; else it is estimated from the recordings\n";
+    out + "# velocity = \"COLUMN\"  # or position = \"COLUMN\": at which a force or torque rubs\n"
 }
 
-fn trials_of(out: &mut String, trials: &[(String, Trial)]) -> std::fmt::Result {
+fn trials_of(trials: &[(String, Trial)]) -> String {
     let tested = match trials.len() {
         1 => 0,
         n => n.div_ceil(4),
     };
-    match tested {
-        0 => writeln!(out, "\n# There is one trial: its last quarter is held back and tested on.")?,
-        _ => writeln!(
-            out,
-            "\n# Guessed: the last {tested} of {} trials are tested on, read once at the end.",
-            trials.len()
-        )?,
-    }
+    let all = trials.len();
+    let mut out = match tested {
+        0 => "\n# There is one trial: its last quarter is held back and tested on.\n".to_owned(),
+        _ => format!(
+            "\n# Guessed: the last {tested} of {all} trials are tested on, read once at the end.\n"
+        ),
+    };
     for (i, (name, trial)) in trials.iter().enumerate() {
         let split = if i + tested >= trials.len() && tested > 0 { "test" } else { "fit" };
         let rate =
             trial.rate_hz().map_or(String::new(), |hz| format!(", {hz:.4} samples a second"));
-        writeln!(out, "\n[[trial]]\nfile = {}  # {:.2} s{rate}", quoted(name), trial.duration_s())?;
-        writeln!(out, "split = {split:?}")?;
+        out +=
+            &format!("\n[[trial]]\nfile = {}  # {:.2} s{rate}\n", quoted(name), trial.duration_s());
+        out += &format!("split = {split:?}\n");
     }
-    Ok(())
+    out
 }

@@ -126,10 +126,11 @@ impl Problem {
             Some(gauge) => Box::new(gauge),
             None if path.is_dir() => Box::new(RigSimulator::read(path, rig, &catalogue)?),
             None => {
-                return Err(ProblemError::TooLittle {
-                        what: "a single trial is diagnosed as a gauge alone".into(),
-                        hint: "say which columns with --reference and --signal, or give the folder of a data set".into(),
-                    });
+                let hint = "say which columns with --reference and --signal, or give the folder of a data set";
+                return Err(ProblemError::too_little(
+                    "a single trial is diagnosed as a gauge alone",
+                    hint,
+                ));
             }
         };
         let own = DataSet::read(path).ok().and_then(|set| set.rig).map(|file| path.join(file));

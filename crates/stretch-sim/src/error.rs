@@ -148,6 +148,13 @@ pub enum SimError {
     },
 }
 
+impl SimError {
+    /// A name that its owner does not know.
+    pub(crate) fn unknown_parameter(owner: &str, name: &str, nearest: Option<String>) -> Self {
+        Self::UnknownParameter { owner: owner.to_owned(), name: name.to_owned(), nearest }
+    }
+}
+
 impl From<stretch_effects::GridError> for SimError {
     fn from(error: stretch_effects::GridError) -> Self {
         Self::NotPositive { name: error.name, value: error.value }

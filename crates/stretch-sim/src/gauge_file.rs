@@ -57,11 +57,7 @@ impl GaugeRig {
     /// Another kind, a table, parameter or effect that is not known, a parameter
     /// that is missing, or a span or gain that is not usable.
     pub fn from_file(file: &RigFile) -> Result<Self, SimError> {
-        let unknown = |owner: &str, name: &str, nearest| SimError::UnknownParameter {
-            owner: owner.to_owned(),
-            name: name.to_owned(),
-            nearest,
-        };
+        let unknown = SimError::unknown_parameter;
         let kind = file.kind.as_deref().unwrap_or("rig");
         if kind != KIND {
             return Err(unknown("a gauge alone", &format!("kind = \"{kind}\""), None));

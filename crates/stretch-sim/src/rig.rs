@@ -88,33 +88,24 @@ impl Rig {
     /// a sleeve that goes slack within the stroke, or a rig file of another kind (`kind = "gauge"`).
     pub fn from_file(file: &RigFile) -> Result<Self, SimError> {
         if let Some(kind) = file.kind.as_ref().filter(|kind| *kind != "rig") {
-            return Err(SimError::UnknownParameter {
-                owner: "a whole rig".into(),
-                name: format!("kind = \"{kind}\""),
-                nearest: None,
-            });
+            let kind = format!("kind = \"{kind}\"");
+            return Err(SimError::unknown_parameter("a whole rig", &kind, None));
         }
         let mut rig = Self::default();
         let tables =
             [RigStage::Pneumatics, RigStage::Muscle, RigStage::Sensing, RigStage::Reference];
         for (table, parameters) in file.stages.iter().filter(|(name, _)| *name != SIMULATION) {
             if !tables.iter().any(|stage| stage.name() == table) {
-                return Err(SimError::UnknownParameter {
-                    owner: "a rig file".into(),
-                    name: table.clone(),
-                    nearest: nearest(table, tables.iter().map(|s| s.name())),
-                });
+                let nearest = nearest(table, tables.iter().map(|s| s.name()));
+                return Err(SimError::unknown_parameter("a rig file", table, nearest));
             }
             for (name, parameter) in parameters {
                 let known = PARAMETERS.iter().find(|p| p.name == name && p.stage.name() == table);
                 let Some(info) = known else {
                     let elsewhere = Key::named(name).map(|k| format!("{}.{name}", k.info().stage));
                     let here = PARAMETERS.iter().filter(|p| p.stage.name() == table);
-                    return Err(SimError::UnknownParameter {
-                        owner: table.clone(),
-                        name: name.clone(),
-                        nearest: elsewhere.or_else(|| nearest(name, here.map(|p| p.name))),
-                    });
+                    let nearest = elsewhere.or_else(|| nearest(name, here.map(|p| p.name)));
+                    return Err(SimError::unknown_parameter(table, name, nearest));
                 };
                 rig.params[info.key] = parameter.value;
                 rig.tolerances[info.key as usize] = Tolerance::of(parameter);
@@ -264,11 +255,8 @@ impl RunSettings {
                     settings.noise = value == 1.0;
                 }
                 _ => {
-                    return Err(SimError::UnknownParameter {
-                        owner: SIMULATION.into(),
-                        name: name.clone(),
-                        nearest: nearest(name, ["seed", "step_s", "noise"]),
-                    });
+                    let nearest = nearest(name, ["seed", "step_s", "noise"]);
+                    return Err(SimError::unknown_parameter(SIMULATION, name, nearest));
                 }
             }
         }

@@ -14,9 +14,21 @@ use crate::{
 /// Table of the file.
 const TABLE: &str = "sensing";
 
-impl GaugeSimulator {
+impl Diagnosable for GaugeSimulator {
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+
+    fn next(
+        &self,
+        diagnosis: &Diagnosis,
+        evidence: &Evidence,
+    ) -> Result<Option<Proposal>, GapError> {
+        next_experiment(self, diagnosis, evidence)
+    }
+
     /// The effects that a diagnosis of this gauge names, as code to type with the fitted numbers, in units of e.
-    fn typed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
+    fn implementations(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
         // A sample time with which a diagnosis ran makes a grid.
         let Ok(grid) = Grid::samples(self.session.dt_s) else { return Vec::new() };
         let model = evidence.candidates.first().unwrap_or(&evidence.best);
@@ -33,7 +45,7 @@ impl GaugeSimulator {
     ///
     /// # Errors
     /// [`NoFix`] where the diagnosis names nothing to fix, or a gauge that no file may hold.
-    fn written(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
+    fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
         let chosen = Chosen::of(diagnosis, evidence)?;
         let mut remarks = Remarks { head: chosen.head(), ..Remarks::default() };
         let old = &self.nominal;
@@ -62,27 +74,5 @@ impl GaugeSimulator {
         let file = rig.to_file();
         GaugeRig::from_file(&file)?;
         Ok(Fix { effects: names(&file), file: Fixed::Rig(file), remarks })
-    }
-}
-
-impl Diagnosable for GaugeSimulator {
-    fn notes(&self) -> Vec<String> {
-        self.notes.clone()
-    }
-
-    fn next(
-        &self,
-        diagnosis: &Diagnosis,
-        evidence: &Evidence,
-    ) -> Result<Option<Proposal>, GapError> {
-        next_experiment(self, diagnosis, evidence)
-    }
-
-    fn implementations(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
-        self.typed(diagnosis, evidence)
-    }
-
-    fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
-        self.written(diagnosis, evidence)
     }
 }

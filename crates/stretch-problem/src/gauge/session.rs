@@ -99,27 +99,18 @@ impl GaugeSession {
     fn check(&mut self, reference: &str, signal: &str) -> Result<(), ProblemError> {
         let samples: usize = self.fitted().map(|r| r.len()).sum();
         if samples < LEAST {
-            return Err(ProblemError::TooLittle {
-                what: format!("the trials to fit have {samples} samples"),
-                hint: format!("at least {LEAST} are needed to tell anything"),
-            });
+            return Err(ProblemError::few_samples(samples, LEAST));
         }
         if reference == "bridge_v" || signal == "length_mm" {
-            return Err(ProblemError::Implausible {
-                column: format!("--reference {reference}, --signal {signal}"),
-                found: "the two look swapped".into(),
-                hint: "the reference is the length, the signal what the gauge says".into(),
-            });
+            let column = format!("--reference {reference}, --signal {signal}");
+            let hint = "the reference is the length, the signal what the gauge says";
+            return Err(ProblemError::implausible(column, "the two look swapped", hint));
         }
         let mut shares = Vec::new();
         for (name, values) in [(reference, &self.reference), (signal, &self.signal)] {
             let (low, high) = self.range(values);
             if high <= low {
-                return Err(ProblemError::Implausible {
-                    column: name.into(),
-                    found: format!("{low} in every sample"),
-                    hint: "the channel is dead: check the sensor and its cable".into(),
-                });
+                return Err(ProblemError::dead(name, format!("{low} in every sample")));
             }
             shares.push(self.noise(values).sd() / (high - low));
         }

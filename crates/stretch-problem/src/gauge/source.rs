@@ -74,16 +74,13 @@ fn columns_of<'a>(
         None if has(USUAL.0) && has(USUAL.1) => Ok(Some(USUAL)),
         None => {
             let names: Vec<&str> = first.channels.iter().map(|c| c.name.as_str()).collect();
-            Err(ProblemError::TooLittle {
-                what: format!(
-                    "{} is a gauge alone, and nothing says which columns are the reference and the signal",
-                    first.name
+            let (own, names) = (&first.name, names.join(", "));
+            Err(ProblemError::too_little(
+                format!(
+                    "{own} is a gauge alone, and nothing says which columns are the reference and the signal"
                 ),
-                hint: format!(
-                    "name them with --reference and --signal; the columns are {}",
-                    names.join(", ")
-                ),
-            })
+                format!("name them with --reference and --signal; the columns are {names}"),
+            ))
         }
     }
 }

@@ -7,7 +7,7 @@ use stretch_sim::{
     RigStage, Sensing, Start, TrialPlan,
 };
 
-use super::RigSimulator;
+use super::{RigSimulator, tuned::Tuned};
 use crate::{bench::acting::unrecorded, error::ProblemError};
 
 /// Sample time of an experiment, s.
@@ -246,12 +246,7 @@ impl Experiment {
 impl RigSimulator {
     /// Rig and effects of a model.
     fn rig_of(&self, model: &Model) -> Result<(RigParams, EffectSet), ProblemError> {
-        let mut params = self.base;
-        for (parameter, value) in self.tuned.iter().zip(&model.parameters) {
-            if let Some(key) = parameter.key() {
-                params[key] = *value;
-            }
-        }
+        let params = Tuned::of(&self.base, &self.tuned, model).params;
         Ok((params, unrecorded(&self.effects, &self.rows, model)?))
     }
 

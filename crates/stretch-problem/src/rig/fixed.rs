@@ -4,26 +4,36 @@ use stretch_data::Remarks;
 use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, next_experiment};
 use stretch_sim::{EffectParameter, Grid, Rig};
 
-use super::{RigSimulator, nominal::TunedParameter};
+use super::{RigSimulator, nominal::TunedParameter, tuned::Tuned};
 use crate::{
     fix::{Chosen, Fix, Fixed, NoFix, names, with_line},
     implement::{Implementation, implementations},
     problem::Diagnosable,
 };
 
-impl RigSimulator {
+impl Diagnosable for RigSimulator {
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+
+    fn afterwards(&self) -> Vec<String> {
+        self.rails()
+    }
+
+    fn next(
+        &self,
+        diagnosis: &Diagnosis,
+        evidence: &Evidence,
+    ) -> Result<Option<Proposal>, GapError> {
+        next_experiment(self, diagnosis, evidence)
+    }
+
     /// The effects that a diagnosis of this rig names, as code to type with the fitted numbers, in the re-tuned rig.
-    fn typed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
+    fn implementations(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
         // A sample time with which a diagnosis ran makes a grid.
         let Ok(grid) = Grid::samples(self.about.dt_s) else { return Vec::new() };
-        let mut params = self.base;
         let model = evidence.candidates.first().unwrap_or(&evidence.best);
-        for (parameter, value) in self.tuned.iter().zip(&model.parameters) {
-            if let TunedParameter::Rig(key) = *parameter {
-                params[key] = *value;
-            }
-        }
-        let around = params.surroundings(&grid);
+        let around = Tuned::of(&self.base, &self.tuned, model).params.surroundings(&grid);
         let place = (self.about.record().sensor.unwrap_or(0), 1.0);
         let answer = (diagnosis, evidence);
         implementations(answer, &self.about.effects, &self.rows, &around, |effect, values| {
@@ -38,7 +48,7 @@ impl RigSimulator {
     ///
     /// # Errors
     /// [`NoFix`] where the diagnosis names nothing to fix, or a rig that no file may hold.
-    fn written(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
+    fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
         let chosen = Chosen::of(diagnosis, evidence)?;
         let mut remarks = Remarks { head: chosen.head(), ..Remarks::default() };
         let mut rig =
@@ -72,31 +82,5 @@ impl RigSimulator {
         // A file that could not be read again is refused here.
         Rig::from_file(&file)?;
         Ok(Fix { effects: names(&file), file: Fixed::Rig(file), remarks })
-    }
-}
-
-impl Diagnosable for RigSimulator {
-    fn notes(&self) -> Vec<String> {
-        self.notes.clone()
-    }
-
-    fn afterwards(&self) -> Vec<String> {
-        self.rails()
-    }
-
-    fn next(
-        &self,
-        diagnosis: &Diagnosis,
-        evidence: &Evidence,
-    ) -> Result<Option<Proposal>, GapError> {
-        next_experiment(self, diagnosis, evidence)
-    }
-
-    fn implementations(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
-        self.typed(diagnosis, evidence)
-    }
-
-    fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
-        self.written(diagnosis, evidence)
     }
 }

@@ -24,15 +24,6 @@ pub(super) enum TunedParameter {
     InitialState(RigStage),
 }
 
-impl TunedParameter {
-    pub(super) fn key(self) -> Option<Key> {
-        match self {
-            Self::Rig(key) => Some(key),
-            Self::StartPressure | Self::CommandLead(_) | Self::InitialState(_) => None,
-        }
-    }
-}
-
 /// The parameters of a diagnosis, and what each sets: the rig's parameters with a tolerance in the stages, the pressure at a trial's
 /// start, the timing of commands, and the initial hysteresis states.
 pub(super) fn parameters(

@@ -121,10 +121,8 @@ impl RigSession {
             columns.push(PRESSURE);
         }
         if trials.iter().all(|t| t.split == Split::Test) {
-            return Err(ProblemError::TooLittle {
-                what: "no trial may be fitted".into(),
-                hint: "give at least one trial split = \"fit\"".into(),
-            });
+            let hint = "give at least one trial split = \"fit\"";
+            return Err(ProblemError::too_little("no trial may be fitted", hint));
         }
         let shares: Vec<f64> = trials.iter().map(excitation).collect::<Result<_, _>>()?;
         // Outliers are replaced before anything is resampled: an outlier between two rows would spread.
@@ -169,10 +167,7 @@ impl RigSession {
     fn check(&self) -> Result<(), ProblemError> {
         let fit: usize = self.trials.iter().filter(|t| !t.is_test).map(|t| t.inlet.len()).sum();
         if fit < LEAST {
-            return Err(ProblemError::TooLittle {
-                what: format!("the trials to fit have {fit} samples"),
-                hint: format!("at least {LEAST} are needed to tell anything"),
-            });
+            return Err(ProblemError::few_samples(fit, LEAST));
         }
         self.check_units()
     }
@@ -200,7 +195,7 @@ impl RigSession {
         let length = self.range(|t| &t.length_mm);
         let volts = self.range(|t| &t.bridge_v);
         let bad = |column: &str, found: String, hint: &str| {
-            Err(ProblemError::Implausible { column: column.into(), found, hint: hint.into() })
+            Err(ProblemError::implausible(column, found, hint))
         };
         let spread = |(low, high): (f64, f64)| format!("values from {low} to {high}");
         if length.1 < 10.0 && volts.1 > 10.0 {
@@ -215,8 +210,7 @@ impl RigSession {
         }
         for (column, range) in [("length_mm", length), ("bridge_v", volts)] {
             if range.1 - range.0 <= 0.0 {
-                let hint = "the channel is dead: check the sensor and its cable";
-                return bad(column, format!("{} in every sample", range.0), hint);
+                return Err(ProblemError::dead(column, format!("{} in every sample", range.0)));
             }
         }
         let openings = (self.range(|t| &t.inlet), self.range(|t| &t.outlet));
@@ -258,12 +252,11 @@ fn excitation(one: &SessionTrial) -> Result<f64, ProblemError> {
     let is_sound = share > 0.0 && share <= 2.0 && shares.iter().all(|s| *s == share);
     is_sound.then_some(share).ok_or_else(|| {
         let (low, high) = ends(shares);
-        ProblemError::Implausible {
-            column: format!("{}, {EXCITATION}", one.trial.name),
-            found: format!("values from {low} to {high}"),
-            hint: "give the share of the nominal excitation, one number in every row of a trial"
-                .into(),
-        }
+        ProblemError::implausible(
+            format!("{}, {EXCITATION}", one.trial.name),
+            format!("values from {low} to {high}"),
+            "give the share of the nominal excitation, one number in every row of a trial",
+        )
     })
 }
 
@@ -293,11 +286,8 @@ impl RigSession {
             ];
             for (column, values) in others {
                 if let Some(values) = values.filter(|values| moved > 1.0 && span(values) <= 0.0) {
-                    return Err(ProblemError::Implausible {
-                        column: format!("{}, {column}", trial.name),
-                        found: format!("{} in every sample, while the muscle moves", values[0]),
-                        hint: "the channel is dead: check the sensor and its cable".into(),
-                    });
+                    let found = format!("{} in every sample, while the muscle moves", values[0]);
+                    return Err(ProblemError::dead(format!("{}, {column}", trial.name), found));
                 }
             }
         }
@@ -311,11 +301,8 @@ impl RigSession {
                 length_mm: &t.length_mm,
             });
             let (column, hint) = directions::against(&motions.collect::<Vec<_>>(), self.dt_s);
-            return Err(ProblemError::Implausible {
-                column: column.into(),
-                found: "the muscle lengthens while the inlet is open".into(),
-                hint,
-            });
+            let found = "the muscle lengthens while the inlet is open";
+            return Err(ProblemError::implausible(column, found, hint));
         }
         Ok(())
     }

@@ -14,7 +14,7 @@ pub(super) const VERSION: u64 = 1;
 // Keys are written in alphabetical order, so that a worker without a JSON parser finds each key at a fixed place.
 
 /// The first message of a worker: its abilities.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Hello {
     /// Version of the protocol that the worker speaks.
@@ -31,20 +31,6 @@ pub(super) struct Hello {
     pub(super) effects: Option<Vec<String>>,
     /// Units in which the worker takes and gives columns.
     pub(super) units: BTreeMap<String, String>,
-}
-
-impl Default for Hello {
-    fn default() -> Self {
-        Self {
-            version: 0,
-            batch: 1,
-            inputs: false,
-            all: false,
-            parameters: None,
-            effects: None,
-            units: BTreeMap::new(),
-        }
-    }
 }
 
 /// A sentence about what is wrong with an answer.

@@ -254,11 +254,8 @@ fn resolve(
     if let Some((name, _)) =
         given.iter().find(|(name, _)| parameters.iter().all(|p| p.name != *name))
     {
-        return Err(SimError::UnknownParameter {
-            owner: effect.name.to_string(),
-            name: name.to_string(),
-            nearest: nearest(name, parameters.iter().map(|p| &*p.name)),
-        });
+        let nearest = nearest(name, parameters.iter().map(|p| &*p.name));
+        return Err(SimError::unknown_parameter(&effect.name, name, nearest));
     }
     // One strength is enough where there are several (the rails of an amplifier): the others stay off.
     let strengths = |p: &&EffectParameter| p.off().is_some();

@@ -14,7 +14,7 @@ use super::{
     facts::facts,
     source::{RecordedSession, SessionColumn, SessionPart, SessionStage},
     spec::{Input, OwnEffect, Parameter, ProblemSpec, Sensor, StageEntry},
-    velocity::Velocity,
+    velocity::of_position,
 };
 use crate::{
     error::ProblemError,
@@ -67,7 +67,7 @@ impl Checked {
             let known = input.map(|i| &i.unit).or(stage.map(|s| &s.unit));
             known.cloned().unwrap_or_else(|| unit(column).unwrap_or("").to_owned())
         };
-        let velocities: Vec<Option<Velocity>> =
+        let velocities: Vec<Option<Vec<f64>>> =
             stages.iter().map(|stage| velocity(stage, &columns)).collect();
         let among = Among {
             columns: &columns,
@@ -127,9 +127,13 @@ impl Checked {
 
     /// The kind of the wrapper behind an effect of the catalogue; none for the user's own effects.
     pub fn wrapper(&self, effect: usize) -> Option<&'static Kind> {
+        self.placed(effect).map(|wrapper| wrapper.kind)
+    }
+
+    fn placed(&self, effect: usize) -> Option<&Placed> {
         match *self.acting.get(effect)? {
-            Acting::Wrapper(at) => Some(self.wrappers[at].kind),
-            Acting::Recorder => skews(&self.wrappers).next().map(|(_, w)| w.kind),
+            Acting::Wrapper(at) => Some(&self.wrappers[at]),
+            Acting::Recorder => skews(&self.wrappers).next().map(|(_, wrapper)| wrapper),
             Acting::Own(_) => None,
         }
     }
@@ -137,20 +141,12 @@ impl Checked {
     /// The code of the wrapper behind an effect of the catalogue, with these values, in front of the simulator or behind it; none for the
     /// user's own effects.
     pub fn sketch(&self, effect: usize, values: &[f64]) -> Option<Sketch> {
-        let wrapper = match *self.acting.get(effect)? {
-            Acting::Wrapper(at) => Some(&self.wrappers[at]),
-            Acting::Recorder => skews(&self.wrappers).next().map(|(_, w)| w),
-            Acting::Own(_) => None,
-        };
-        wrapper?.sketch(values, self.grid.dt_s())
+        self.placed(effect)?.sketch(values, self.grid.dt_s())
     }
 
     /// The index of the wrapper behind an effect of the catalogue, if that wrapper stands on this side of the stage.
     pub(crate) fn around(&self, effect: usize, stage: usize, side: Side) -> Option<usize> {
-        let is_here = |at: usize| {
-            let site = &self.wrappers[at].site;
-            (site.stage, site.side) == (stage, side)
-        };
+        let is_here = |at: usize| self.is_at(at, stage, side);
         match self.acting[effect] {
             Acting::Wrapper(at) => is_here(at).then_some(at),
             Acting::Recorder => skews(&self.wrappers).map(|(at, _)| at).find(|at| is_here(*at)),
@@ -164,11 +160,13 @@ impl Checked {
         stage: usize,
         side: Side,
     ) -> impl Iterator<Item = (usize, &Vec<f64>)> {
-        let is_here = move |at: usize| {
-            let site = &self.wrappers[at].site;
-            (site.stage, site.side) == (stage, side)
-        };
-        self.standing.iter().filter(move |(at, _)| is_here(*at)).map(|(at, values)| (*at, values))
+        let here = self.standing.iter().filter(move |(at, _)| self.is_at(*at, stage, side));
+        here.map(|(at, values)| (*at, values))
+    }
+
+    fn is_at(&self, wrapper: usize, stage: usize, side: Side) -> bool {
+        let site = &self.wrappers[wrapper].site;
+        (site.stage, site.side) == (stage, side)
     }
 
     pub(crate) fn stage_inputs(&self, stage: usize) -> impl Iterator<Item = &[f64]> {
@@ -225,11 +223,11 @@ fn sensor_of(sensor: &Sensor, stages: &[StageEntry]) -> Result<(usize, String), 
     Ok((at, sensor.reference.clone()))
 }
 
-fn velocity(stage: &StageEntry, columns: &Columns) -> Option<Velocity> {
+fn velocity(stage: &StageEntry, columns: &Columns) -> Option<Vec<f64>> {
     let recorded = stage.velocity.as_ref().and_then(|c| columns.of(c));
     let position = || stage.position.as_ref().and_then(|c| columns.of(c));
-    let differences = |x: &[f64]| Velocity::of_position(x, &columns.ranges(), columns.dt_s);
-    recorded.map(Velocity::recorded).or_else(|| position().map(differences))
+    let differences = |x: &[f64]| of_position(x, &columns.ranges(), columns.dt_s);
+    recorded.map(<[f64]>::to_vec).or_else(|| position().map(differences))
 }
 
 /// Every channel of every stage, inputs first.

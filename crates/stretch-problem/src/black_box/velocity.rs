@@ -7,35 +7,22 @@ const LONGEST_S: f64 = 0.05;
 /// Greatest noise of a velocity, a share of the greatest velocity.
 const NOISY: f64 = 0.01;
 
-/// A velocity, all trials end to end.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Velocity {
-    pub(crate) values: Vec<f64>,
-}
-
-impl Velocity {
-    /// The velocity as recorded.
-    pub(crate) fn recorded(values: &[f64]) -> Self {
-        Self { values: values.to_vec() }
-    }
-
-    /// The velocity v_i = (x_(i+k) - x_(i-k))/(2 k dt) within each trial, with the smallest k (doubled from 1) for which the noise of the
-    /// position makes at most a hundredth of the greatest velocity, and 2 k dt at most a twentieth of a second. The noise of the position is
-    /// estimated from second differences. At the ends of a trial the difference is one-sided.
-    pub(crate) fn of_position(position: &[f64], trials: &[Range<usize>], dt_s: f64) -> Self {
-        let parts = || trials.iter().map(|r| &position[r.clone()]);
-        let noise = stretch_gap::noise_variance(parts(), dt_s).sqrt();
-        let most = ((0.5 * LONGEST_S / dt_s) as usize).max(1);
-        let mut half = 1;
-        loop {
-            let values = differences(position, trials, half, dt_s);
-            let greatest = values.iter().fold(0.0_f64, |a, v| a.max(v.abs()));
-            let sd = noise / (2.0_f64.sqrt() * half as f64 * dt_s);
-            if half >= most || sd <= NOISY * greatest {
-                return Self { values };
-            }
-            half = (2 * half).min(most);
+/// The velocity v_i = (x_(i+k) - x_(i-k))/(2 k dt) within each trial, all trials end to end, with the smallest k (doubled from 1) for
+/// which the noise of the position makes at most a hundredth of the greatest velocity, and 2 k dt at most a twentieth of a second. The
+/// noise of the position is estimated from second differences. At the ends of a trial the difference is one-sided.
+pub(crate) fn of_position(position: &[f64], trials: &[Range<usize>], dt_s: f64) -> Vec<f64> {
+    let parts = || trials.iter().map(|r| &position[r.clone()]);
+    let noise = stretch_gap::noise_variance(parts(), dt_s).sqrt();
+    let most = ((0.5 * LONGEST_S / dt_s) as usize).max(1);
+    let mut half = 1;
+    loop {
+        let values = differences(position, trials, half, dt_s);
+        let greatest = values.iter().fold(0.0_f64, |a, v| a.max(v.abs()));
+        let sd = noise / (2.0_f64.sqrt() * half as f64 * dt_s);
+        if half >= most || sd <= NOISY * greatest {
+            return values;
         }
+        half = (2 * half).min(most);
     }
 }
 
@@ -60,8 +47,8 @@ mod tests {
     fn a_ramp_has_its_slope_to_the_ends_and_no_trial_reaches_into_the_next() {
         let position: Vec<f64> =
             (0..200).map(|i| if i < 100 { 0.5 * i as f64 } else { -3.0 }).collect();
-        let v = Velocity::of_position(&position, &[0..100, 100..200], 0.25);
-        assert!(v.values[..100].iter().all(|v| (*v - 2.0).abs() < 1e-12));
-        assert!(v.values[100..].iter().all(|v| *v == 0.0));
+        let v = of_position(&position, &[0..100, 100..200], 0.25);
+        assert!(v[..100].iter().all(|v| (*v - 2.0).abs() < 1e-12));
+        assert!(v[100..].iter().all(|v| *v == 0.0));
     }
 }

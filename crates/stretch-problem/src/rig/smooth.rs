@@ -17,13 +17,14 @@ const WAKE_S: f64 = 0.1;
 /// Greatest excess of a residual sum of squares over its mean, in standard deviations of that sum: noise alone hardly ever exceeds it.
 const PATIENCE: f64 = 4.0;
 
-/// For every sample the half-width of the least-squares parabola that replaces the sample; 0 leaves the sample as it is.
+/// A measured input, smoothed for a stage: for every sample the half-width of the least-squares parabola that replaces the sample; 0 leaves the sample as it is.
 ///
 /// Windows are chosen by the commands and not by the recording: a choice by the recording would favour noise that happens
 /// to look smooth, and the noise that is left would look like a gap. A window is narrowed only where the parabola is far off.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Smoother {
+#[derive(Debug, Clone)]
+pub(crate) struct Smoothed {
     halves: Vec<u8>,
+    pub(crate) values: Vec<f64>,
 }
 
 /// Sums of x^2 and x^4 over -h .. h, and the number of samples.
@@ -75,11 +76,11 @@ pub(crate) fn schedule(inlet: &[f64], outlet: &[f64], dt_s: f64, sharp: bool) ->
     halves
 }
 
-impl Smoother {
-    /// Chooses the half-widths for a recording with noise of standard deviation `sd`, within the half-widths that the commands allow.
-    pub(crate) fn choose(record: &[f64], sd: f64, allowed: &[u8]) -> Self {
+impl Smoothed {
+    /// Smooths a recording with noise of standard deviation `sd`, within the half-widths that are allowed.
+    pub(crate) fn of(record: &[f64], sd: f64, allowed: &[u8]) -> Self {
         let variance = sd * sd;
-        let halves = allowed
+        let halves: Vec<u8> = allowed
             .iter()
             .enumerate()
             .map(|(i, &allowed)| {
@@ -96,39 +97,22 @@ impl Smoother {
                 0
             })
             .collect();
-        Self { halves }
-    }
-
-    /// The smoothed recording.
-    pub(crate) fn apply(&self, record: &[f64]) -> Vec<f64> {
-        let each = self.halves.iter().enumerate();
-        each.map(|(i, &h)| match usize::from(h) {
-            0 => record[i],
-            h => parabola(record, i, h).0,
-        })
-        .collect()
-    }
-}
-
-/// A measured input, smoothed for a stage.
-#[derive(Debug, Clone)]
-pub(crate) struct Smoothed {
-    smoother: Smoother,
-    pub(crate) values: Vec<f64>,
-}
-
-impl Smoothed {
-    /// Smooths a recording with noise of standard deviation `sd`, within the half-widths that are allowed.
-    pub(crate) fn of(record: &[f64], sd: f64, allowed: &[u8]) -> Self {
-        let smoother = Smoother::choose(record, sd, allowed);
-        let values = smoother.apply(record);
-        Self { smoother, values }
+        Self { values: smoothed(record, &halves), halves }
     }
 
     /// A draw of the noise, smoothed like the recording.
     fn drawn(&self, noise: &Noise, random: &mut RandomGenerator) -> Vec<f64> {
-        self.smoother.apply(&noise.samples(self.values.len(), random))
+        smoothed(&noise.samples(self.values.len(), random), &self.halves)
     }
+}
+
+fn smoothed(record: &[f64], halves: &[u8]) -> Vec<f64> {
+    let each = halves.iter().enumerate();
+    each.map(|(i, &h)| match usize::from(h) {
+        0 => record[i],
+        h => parabola(record, i, h).0,
+    })
+    .collect()
 }
 
 /// Number of draws of a channel's noise that are kept: those for the noise of the outputs and those for the transmitted noise.
@@ -184,10 +168,10 @@ mod tests {
     fn keeps_parabolas_and_corners() {
         let wide = vec![WIDEST as u8; 50];
         let line: Vec<f64> = (0..50).map(|i| 0.01 * f64::from(i * i)).collect();
-        let same = Smoother::choose(&line, 0.05, &wide).apply(&line);
+        let same = Smoothed::of(&line, 0.05, &wide).values;
         assert_abs_diff_eq!(line.as_slice(), same.as_slice(), epsilon = LOCAL_VALUE);
         let corner: Vec<f64> = (0..50).map(|i| f64::from((i - 25).max(0))).collect();
-        let same = Smoother::choose(&corner, 0.05, &wide).apply(&corner);
+        let same = Smoothed::of(&corner, 0.05, &wide).values;
         assert_abs_diff_eq!(corner.as_slice(), same.as_slice(), epsilon = CORNER_KEPT);
     }
 
@@ -197,7 +181,7 @@ mod tests {
         let noise: Vec<f64> = (0..20_000).map(|_| 0.05 * random.gauss()).collect();
         let shut = vec![0.0; noise.len()];
         let allowed = schedule(&shut, &shut, 0.01, false);
-        let out = Smoother::choose(&noise, 0.05, &allowed).apply(&noise);
+        let out = Smoothed::of(&noise, 0.05, &allowed).values;
         let power = |x: &[f64]| x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64;
         assert!(power(&out) < 0.1 * power(&noise));
     }

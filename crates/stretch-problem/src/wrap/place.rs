@@ -9,10 +9,7 @@ use stretch_effects::{
 };
 use stretch_gap::EffectSpec;
 
-use crate::{
-    black_box::{columns::Columns, velocity::Velocity},
-    error::ProblemError,
-};
+use crate::{black_box::columns::Columns, error::ProblemError};
 
 /// Units that forces and torques have.
 const FORCES: [&str; 8] = ["N", "kN", "mN", "Nm", "mNm", "N m", "N·m", "kNm"];
@@ -50,7 +47,7 @@ pub(crate) struct Among<'a> {
     /// Names of the stages.
     pub(crate) stages: Vec<&'a str>,
     /// By stage, the velocity of its rubbing parts.
-    pub(crate) velocities: &'a [Option<Velocity>],
+    pub(crate) velocities: &'a [Option<Vec<f64>>],
     /// By stage, the number of its inputs.
     pub(crate) inputs: Vec<usize>,
     /// Columns that may talk across to a channel.
@@ -158,7 +155,7 @@ fn at(kind: &'static Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Ve
         Beside::Velocity => {
             let is_force = FORCES.iter().any(|unit| *unit == site.unit);
             let velocity = among.velocities[site.stage].as_ref().filter(|_| is_force);
-            velocity.map(|v| with(Some(&v.values), kind.name.to_owned())).into_iter().collect()
+            velocity.map(|v| with(Some(v), kind.name.to_owned())).into_iter().collect()
         }
         Beside::Another => {
             let others = among.others.iter().filter(|other| *other != own);

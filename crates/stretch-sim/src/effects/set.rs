@@ -165,11 +165,6 @@ impl EffectSet {
         self.entries.iter().find(|e| e.name() == name)
     }
 
-    /// The effect called `name`, to change its values.
-    pub fn find_mut(&mut self, name: &str) -> Option<&mut ActiveEffect> {
-        self.entries.iter_mut().find(|e| e.name() == name)
-    }
-
     /// Takes the effect called `name` out.
     pub fn remove(&mut self, name: &str) -> Option<ActiveEffect> {
         let at = self.entries.iter().position(|e| e.name() == name)?;

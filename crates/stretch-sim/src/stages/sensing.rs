@@ -72,10 +72,7 @@ impl Bridge {
 pub struct Sensing {
     grid: Grid,
     bridge: Bridge,
-    strain: Row,
-    resistance: Row,
-    volts: Row,
-    record: Row,
+    sites: Sites,
     skew: Option<Skew>,
     needs_pressure: Option<&'static str>,
 }
@@ -92,10 +89,7 @@ impl Sensing {
             grid: grid.clone(),
             bridge: Bridge::new(params),
             skew: sites.skew(grid),
-            strain: sites.strain,
-            resistance: sites.resistance,
-            volts: sites.volts,
-            record: sites.record,
+            sites,
             needs_pressure: effects
                 .acting_in(RigStage::Sensing)
                 .find(|e| e.effect().needs == Some(Need::Pressure))
@@ -105,7 +99,7 @@ impl Sensing {
 
     /// A memory for it.
     pub fn memory(&self) -> Memory {
-        Memory::with_cells(self.record.end())
+        Memory::with_cells(self.sites.record.end())
     }
 
     /// Steps of time.
@@ -173,8 +167,8 @@ impl Sensing {
         }
         let Some(first) = length_mm.first() else { return Ok(()) };
         let start = memory.start(start);
-        let bridge = &self.bridge;
-        if self.strain.is_empty() && self.resistance.is_empty() && self.volts.is_empty() {
+        let (bridge, sites) = (&self.bridge, &self.sites);
+        if sites.strain.is_empty() && sites.resistance.is_empty() && sites.volts.is_empty() {
             // The nominal bridge: one pass.
             if self.grid.pieces() == 1 && self.skew.is_none() && shunt.is_empty() {
                 for (v, length) in bridge_v.iter_mut().zip(length_mm) {
@@ -189,13 +183,13 @@ impl Sensing {
             |first_node: usize| Span { grid, first_node, start_s, pressure_kpa: &[], strain: &[] };
         let cells = &mut memory.cells;
         let at = Span { pressure_kpa: pressure_kpa.get(..1).unwrap_or(&[]), ..span(0) };
-        let e = [self.strain.begin(&at, start, bridge.strain(*first), cells)];
+        let e = [sites.strain.begin(&at, start, bridge.strain(*first), cells)];
         let at = Span { strain: &e, ..at };
-        self.resistance.begin_at(start, e[0], cells);
+        sites.resistance.begin_at(start, e[0], cells);
         let mut r = [bridge.resistance(e[0])];
-        self.resistance.run(&at, cells, &mut r);
+        sites.resistance.run(&at, cells, &mut r);
         let first_share = shunt.first().copied().unwrap_or(0.0);
-        self.volts.begin(&at, start, bridge.shunted(first_share).volts(r[0]), cells);
+        sites.volts.begin(&at, start, bridge.shunted(first_share).volts(r[0]), cells);
         let mut work = std::mem::take(&mut memory.nodes);
         let direct = grid.pieces() == 1 && self.skew.is_none();
         if !direct {
@@ -212,11 +206,11 @@ impl Sensing {
             }
             let pressure = pressure_kpa.get(from..from + length.len()).unwrap_or(&[]);
             let at = Span { pressure_kpa: pressure, ..span(from) };
-            self.strain.run(&at, &mut memory.cells, strain);
+            sites.strain.run(&at, &mut memory.cells, strain);
             for (v, e) in v.iter_mut().zip(strain.iter()) {
                 *v = bridge.resistance(*e);
             }
-            self.resistance.run(&Span { strain, ..at }, &mut memory.cells, v);
+            sites.resistance.run(&Span { strain, ..at }, &mut memory.cells, v);
             match shunt.get(from..from + length.len()) {
                 Some(shares) if !shares.is_empty() => {
                     for (v, share) in v.iter_mut().zip(shares) {
@@ -225,7 +219,7 @@ impl Sensing {
                 }
                 _ => v.iter_mut().for_each(|v| *v = bridge.volts(*v)),
             }
-            self.volts.run(&at, &mut memory.cells, v);
+            sites.volts.run(&at, &mut memory.cells, v);
         }
         if !direct {
             pick(grid, self.skew.as_ref(), &work, bridge_v);
@@ -237,13 +231,13 @@ impl Sensing {
 
     /// What acts on recorded samples.
     fn write_down(&self, memory: &mut Memory, start_s: f64, samples: &mut [f64]) {
-        if self.record.is_empty() {
+        if self.sites.record.is_empty() {
             return;
         }
         let span =
             Span { grid: &self.grid, first_node: 0, start_s, pressure_kpa: &[], strain: &[] };
-        self.record.begin(&span, Start::Settled, samples[0], &mut memory.cells);
-        self.record.run(&span, &mut memory.cells, samples);
+        self.sites.record.begin(&span, Start::Settled, samples[0], &mut memory.cells);
+        self.sites.record.run(&span, &mut memory.cells, samples);
     }
 }
 

@@ -1,7 +1,7 @@
 //! The report of a blind check: how often the diagnosis was right, and every case in which it was not.
 
 use stretch_blind::{
-    Baseline, COUNTED_EXCESS, CaseKind, Miss, Rate, Score, Verdict, method_in_words,
+    Baseline, COUNTED_EXCESS, CaseKind, Label, Miss, Rate, Score, Verdict, method_in_words,
 };
 use stretch_report::kit::{
     Bar, Ink, Page, Row, Scale, Table, bar_figure, fixed, narrow_bar_figure, number, percent,
@@ -172,39 +172,21 @@ fn strength(page: &mut Page, subject: &Subject<'_>) {
 fn sets(page: &mut Page, subject: &Subject<'_>) {
     let score = subject.score;
     page.section("Are the probabilities honest?", "");
-    let sizes: Vec<Row> =
-        (0..=4_usize)
-            .filter_map(|size| {
-                let counted =
-                    subject.answers.verdicts.iter().filter(|v| {
-                        subject.answers.truth.cases.get(&v.case).is_some_and(|l| {
-                            l.kind == CaseKind::Single && l.excess >= COUNTED_EXCESS
-                        })
-                    });
-                let of_size = |v: &&Verdict| v.ambiguous.len().min(4) == size;
-                let (all, here) = (counted.clone().count(), counted.filter(of_size));
-                let mut rate = Rate { hits: 0, cases: 0 };
-                for verdict in here {
-                    rate.cases += 1;
-                    let label = &subject.answers.truth.cases[&verdict.case];
-                    rate.hits +=
-                        usize::from(label.effects.iter().all(|e| verdict.ambiguous.contains(e)));
-                }
-                let name = match size {
-                    0 => "no name".to_owned(),
-                    4 => "4 or more names".to_owned(),
-                    1 => "1 name".to_owned(),
-                    n => format!("{n} names"),
-                };
-                (rate.cases > 0).then(|| Row {
-                    label: name,
-                    bars: vec![Bar {
-                        text: format!("{}, {} right", rate.cases, rate.hits),
-                        ..Bar::new(Ink::Third, rate.cases as f64 / all.max(1) as f64)
-                    }],
-                })
-            })
-            .collect();
+    let labels = &subject.answers.truth.cases;
+    let labelled = subject.answers.verdicts.iter().filter_map(|v| Some((v, labels.get(&v.case)?)));
+    let counted: Vec<(&Verdict, &Label)> = labelled
+        .filter(|(_, l)| l.kind == CaseKind::Single && l.excess >= COUNTED_EXCESS)
+        .collect();
+    let of_size = |(size, name): (usize, &str)| {
+        let here = counted.iter().filter(|(v, _)| v.ambiguous.len().min(4) == size);
+        let cases = here.clone().count();
+        let right = here.filter(|(v, l)| l.effects.iter().all(|e| v.ambiguous.contains(e))).count();
+        let text = format!("{cases}, {right} right");
+        let bar = Bar { text, ..Bar::new(Ink::Third, cases as f64 / counted.len() as f64) };
+        (cases > 0).then(|| Row { label: name.to_owned(), bars: vec![bar] })
+    };
+    let names = ["no name", "1 name", "2 names", "3 names", "4 or more names"];
+    let sizes: Vec<Row> = names.into_iter().enumerate().filter_map(of_size).collect();
     page.figures(&[
         (
             reliability_figure(&score.calibration),

@@ -250,7 +250,7 @@ fn resolve(
         given.iter().find(|(name, _)| parameters.iter().all(|p| p.name != *name))
     {
         let nearest = nearest(name, parameters.iter().map(|p| &*p.name));
-        return Err(SimError::unknown_parameter(&effect.name, name, nearest));
+        return Err(SimError::unknown_parameter(effect.name, name, nearest));
     }
     // One strength is enough where there are several (the rails of an amplifier): the others stay off.
     let strengths = |p: &&EffectParameter| p.off().is_some();

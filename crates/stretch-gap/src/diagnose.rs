@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use crate::{
     evidence::{
-        candidates::{Candidate, beside_unknown, candidates, shifts, stage_gaps},
+        candidates::{Candidate, beside_unknown, candidates, shifts, stage_gaps, weighed},
         gathered::Evidence,
         localise::{self, location::Where},
         null_band::null_band,
-        probability::{Weighed, covering_set, unknown},
+        probability::{Posterior, covering_set, hypotheses},
         responses::responses,
         sanity::Sanity,
         shares::{EffectShare, eliminated, shares},
@@ -32,7 +32,7 @@ use crate::{
         coverage::{is_short, too_little},
         diagnosis::{Diagnosis, Unexplained, VerdictKind},
         judge::{Case, Judged, judge},
-        proposal::Lacking,
+        proposal::lacking,
         sentence::{Answer, tell},
     },
 };
@@ -212,7 +212,7 @@ struct Cause<'p> {
 /// What the test trials say of a cause.
 struct Gathered {
     evidence: Evidence,
-    weighed: Vec<Weighed>,
+    posterior: Posterior,
     candidates: Vec<Candidate>,
     shares: Vec<EffectShare>,
     sanity: Sanity,
@@ -224,8 +224,10 @@ fn gather(task: Task<'_>, cause: Cause<'_>) -> Result<Gathered, GapError> {
     let Cause { problem, found, eliminated, .. } = cause;
     let (seed, thresholds) = (task.options.seed, &task.options.thresholds);
     (task.progress)("test trials");
-    let (evidence, weighed) = Evidence::gather(problem, thresholds, found)?;
-    let candidates = candidates(problem, &evidence, &weighed, seed)?;
+    let mut evidence = Evidence::gather(problem, found)?;
+    let all = hypotheses(&found.best, &found.rivals, eliminated, &problem.nominal);
+    let held = candidates(problem, &evidence, &all, seed)?;
+    let (posterior, candidates) = weighed(problem, thresholds, &mut evidence, all, held);
     let shares = shares(problem, &evidence, &found.best, eliminated, thresholds.null_excess)?;
     let sanity = Sanity::of(problem, &found.best, &evidence)?;
     (task.progress)("where the gap sits");
@@ -234,15 +236,16 @@ fn gather(task: Task<'_>, cause: Cause<'_>) -> Result<Gathered, GapError> {
         slices: localise::slices(problem.simulator(), &evidence, |s| &s.residual_retuned, seed),
         end_to_end: localise::end_to_end(&problem.compare.runs, &evidence)?,
     };
-    Ok(Gathered { evidence, weighed, candidates, shares, sanity, location })
+    Ok(Gathered { evidence, posterior, candidates, shares, sanity, location })
 }
 
 /// The verdict with its names.
 fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Result<Judged, GapError> {
-    let Gathered { evidence, candidates, shares, sanity, .. } = gathered;
+    let Gathered { evidence, posterior, candidates, shares, sanity, .. } = gathered;
     let about = cause.problem.simulator().description();
     let case = Case {
         gap: evidence.gap,
+        posterior,
         candidates,
         shares,
         sanity,
@@ -251,7 +254,7 @@ fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Result<Judge
         is_short: is_short(&evidence.roles, about.dt_s),
     };
     let best = &cause.found.best;
-    let lacking = |names| Lacking::of(cause.problem, best, names, task.progress);
+    let lacking = |names| lacking(cause.problem, best, names, task.progress);
     judge(&case, &task.options.thresholds, lacking)
 }
 
@@ -264,25 +267,25 @@ fn report(
     begun: &Stopwatch,
 ) -> Result<(Diagnosis, Evidence), GapError> {
     let (options, thresholds) = (task.options, &task.options.thresholds);
-    let Gathered { mut evidence, weighed, candidates, shares, location, .. } = gathered;
+    let Gathered { mut evidence, posterior, candidates, shares, sanity, location } = gathered;
     let (simulator, runs) = (cause.problem.simulator(), &cause.problem.compare.runs);
-    let partial = candidates.first().filter(|_| judged.kind == VerdictKind::Partial);
+    let named = candidates.iter().find(|c| !c.effects.is_empty());
+    let partial = named.filter(|_| judged.kind == VerdictKind::Partial);
     let unexplained = partial.map(|first| unexplained(simulator, &evidence, first, options.seed));
     let is_quiet = matches!(judged.kind, VerdictKind::NoGap | VerdictKind::Parameters);
     let null_band = is_quiet.then(|| null_band(cause.problem, options.seed)).transpose()?;
     let ambiguous = match is_quiet || judged.kind == VerdictKind::Record {
         true => Vec::new(),
-        false => covering_set(&weighed, simulator),
+        false => covering_set(&posterior.sets, simulator),
     };
     let (runtime_s, simulations) = (begun.elapsed_s(), runs.count());
-    // The probability of a candidate is that beside what the catalogue lacks.
-    let unknown = unknown(evidence.gap, thresholds);
-    let candidates = beside_unknown(candidates, evidence.gap, unknown);
+    let candidates = beside_unknown(candidates, evidence.gap, posterior.unknown);
     let answer = Answer {
         judged: &judged,
         gap: evidence.gap,
-        first: candidates.first(),
+        first: candidates.iter().find(|c| !c.effects.is_empty()),
         shares: &shares,
+        sanity: &sanity,
         unexplained: unexplained.as_ref(),
         gross: cause.gross,
         null_band,

@@ -17,10 +17,10 @@ use crate::{
         excess::Excess,
         gathered::{Evidence, StageEvidence},
         localise::location::StageGap,
-        probability::Weighed,
+        probability::{Posterior, Weighed, weigh},
     },
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
-    problem::{error::GapError, simulator::Simulator},
+    problem::{error::GapError, simulator::Simulator, thresholds::Thresholds},
 };
 
 /// A set of effects that was held against the data.
@@ -99,20 +99,51 @@ const COVERS: f64 = 1.96;
 /// Name of what the catalogue lacks.
 const UNKNOWN: &str = "unknown";
 
-/// Every weighed hypothesis on the test trials.
+/// Every hypothesis on the test trials; its probability is that of the others' sum later.
 pub(crate) fn candidates(
     problem: &PreparedProblem<'_>,
     evidence: &Evidence,
-    weighed: &[Weighed],
+    hypotheses: &[Hypothesis],
     seed: u64,
 ) -> Result<Vec<Candidate>, GapError> {
-    weighed.par_iter().map(|one| candidate(problem, evidence, one, seed)).collect()
+    hypotheses.par_iter().map(|one| candidate(problem, evidence, one, seed)).collect()
+}
+
+/// Weighs hypotheses with what they leave; their candidates are put into the same order. A set of effects that does not lower the gap of the test
+/// trials is dropped.
+pub(crate) fn weighed(
+    problem: &PreparedProblem<'_>,
+    thresholds: &Thresholds,
+    evidence: &mut Evidence,
+    hypotheses: Vec<Hypothesis>,
+    candidates: Vec<Candidate>,
+) -> (Posterior, Vec<Candidate>) {
+    let (mut kept, mut by_effects) = (Vec::new(), BTreeMap::new());
+    for (hypothesis, candidate) in hypotheses.into_iter().zip(candidates) {
+        let is_possible = hypothesis.effects.is_empty()
+            || (candidate.is_confirmed && candidate.closed > 0.0);
+        if is_possible {
+            let left = evidence.fitted_gap(problem, &hypothesis).max(candidate.gap_after);
+            by_effects.insert(hypothesis.effects.clone(), candidate);
+            kept.push((hypothesis, left));
+        }
+    }
+    let posterior = weigh(thresholds, evidence.gap.retuned, kept);
+    let of = |w: &Weighed| {
+        let candidate = by_effects.remove(&w.hypothesis.effects)?;
+        Some(Candidate { probability: w.probability, ..candidate })
+    };
+    let candidates = posterior.sets.iter().filter_map(of).collect();
+    evidence.candidates = posterior.sets.iter().map(|w| w.hypothesis.model.clone()).collect();
+    let sds = posterior.sets.iter().map(|w| w.hypothesis.parameter_sd.clone());
+    evidence.candidate_sds = sds.collect();
+    (posterior, candidates)
 }
 
 fn candidate(
     problem: &PreparedProblem<'_>,
     evidence: &Evidence,
-    Weighed { hypothesis, probability }: &Weighed,
+    hypothesis: &Hypothesis,
     seed: u64,
 ) -> Result<Candidate, GapError> {
     let stages = 0..evidence.stages.len();
@@ -129,7 +160,7 @@ fn candidate(
     Ok(Candidate {
         by_name: parameters.iter().map(|p| (name(p), p.value)).collect(),
         effects: hypothesis.effects.iter().map(|&e| specs[e].name.clone()).collect(),
-        probability: *probability,
+        probability: 0.0,
         score: hypothesis.score,
         gap_before: interval.before,
         gap_after: interval.after,
@@ -140,13 +171,12 @@ fn candidate(
     })
 }
 
-/// The candidates with what the catalogue lacks behind them, of a probability that the others share the rest of.
+/// The candidates with what the catalogue lacks behind them.
 pub(crate) fn beside_unknown(
     mut candidates: Vec<Candidate>,
     gap: Excess,
     probability: f64,
 ) -> Vec<Candidate> {
-    candidates.iter_mut().for_each(|c| c.probability *= 1.0 - probability);
     candidates.push(Candidate {
         effects: vec![UNKNOWN.into()],
         probability,
@@ -282,21 +312,11 @@ mod tests {
     }
 
     #[test]
-    fn unknown_stands_last_and_takes_its_part_of_all() {
+    fn unknown_stands_last() {
         let gap = Excess { raw: 9.0, retuned: 4.0, left: 1.0 };
-        let named = vec![candidate("a", 0.7), candidate("b", 0.3)];
-        for probability in [0.0, 0.1, 0.9, 1.0] {
-            let all = beside_unknown(named.clone(), gap, probability);
-            let sum: f64 = all.iter().map(|c| c.probability).sum();
-            assert_relative_eq!(sum, 1.0, epsilon = 0.0, max_relative = F64_ROUNDING);
-            let last = &all[2];
-            assert_eq!(
-                (last.effects.as_slice(), last.probability),
-                (&["unknown".to_owned()][..], probability)
-            );
-            assert_eq!((last.gap_before, last.gap_after, last.closed), (4.0, 4.0, 0.0));
-            // The odds of the others among each other stay.
-            assert!(all[0].probability >= all[1].probability);
-        }
+        let all = beside_unknown(vec![candidate("a", 0.7), candidate("b", 0.2)], gap, 0.1);
+        let last = &all[2];
+        assert_eq!((last.effects.as_slice(), last.probability), (&["unknown".to_owned()][..], 0.1));
+        assert_eq!((last.gap_before, last.gap_after, last.closed), (4.0, 4.0, 0.0));
     }
 }

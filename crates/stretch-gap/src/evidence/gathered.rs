@@ -4,11 +4,7 @@
 //! taken too large: its variance is X of what it was, and every excess (reduced chi-square minus one) counts from there.
 
 use crate::{
-    evidence::{
-        excess::Excess,
-        probability::{Weighed, weigh},
-        response::Responses,
-    },
+    evidence::{excess::Excess, response::Responses},
     fit::{
         hypothesis::Hypothesis,
         prepared::PreparedProblem,
@@ -19,7 +15,6 @@ use crate::{
         error::GapError,
         sample_roles::{Role, SampleRoles, Segment},
         simulator::Model,
-        thresholds::Thresholds,
     },
     search::selection::Found,
 };
@@ -143,13 +138,8 @@ fn test_blocks(roles: &SampleRoles, whole: &[f64], clean: &[f64]) -> Vec<f64> {
 }
 
 impl Evidence {
-    /// Runs the simulator as shipped, re-tuned and with the best set over every trial, and weighs the best set against its
-    /// rivals.
-    pub(crate) fn gather(
-        problem: &PreparedProblem<'_>,
-        thresholds: &Thresholds,
-        found: &Found,
-    ) -> Result<(Self, Vec<Weighed>), GapError> {
+    /// Runs the simulator as shipped, re-tuned and with the best set over every trial; candidates are not yet listed.
+    pub(crate) fn gather(problem: &PreparedProblem<'_>, found: &Found) -> Result<Self, GapError> {
         let mut stages = Vec::new();
         let mut nominal_blocks = Vec::new();
         let all = 0..problem.compare.metrics.len();
@@ -173,24 +163,27 @@ impl Evidence {
             nominal_blocks.push(retuned.blocks);
         }
         let gap = gap(problem, &found.best, &stages, &levels);
-        let weighed = weigh(thresholds, &found.best, gap, &found.rivals);
-        let evidence = Self {
+        Ok(Self {
             stages,
             roles: problem.compare.roles.clone(),
             step: problem.compare.runs.step(),
             retuned: problem.nominal.model.clone(),
             best: found.best.model.clone(),
-            candidates: weighed.iter().map(|w| w.hypothesis.model.clone()).collect(),
+            candidates: Vec::new(),
             retuned_sd: problem.nominal.parameter_sd.clone(),
-            candidate_sds: weighed.iter().map(|w| w.hypothesis.parameter_sd.clone()).collect(),
+            candidate_sds: Vec::new(),
             best_sd: found.best.parameter_sd.clone(),
             nominal_blocks,
             levels,
             best_effect: found.best.effects.first().copied(),
             gap,
             responses: None,
-        };
-        Ok((evidence, weighed))
+        })
+    }
+
+    /// The gap that a hypothesis leaves of the trials that may be looked at, summed over stages.
+    pub(crate) fn fitted_gap(&self, problem: &PreparedProblem<'_>, hypothesis: &Hypothesis) -> f64 {
+        fitted(problem, hypothesis, &self.levels)
     }
 
     /// What the best set leaves of a stage, as [`held_out`] gives it.
@@ -235,13 +228,14 @@ fn gap(
 ) -> Excess {
     let tested =
         |of: fn(&StageEvidence) -> f64| -> f64 { stages.iter().map(|s| of(s).max(0.0)).sum() };
-    let fitted = |h: &Hypothesis| -> f64 {
-        let pairs = h.misfits.iter().zip(levels);
-        pairs.map(|(misfit, level)| score::gap(problem.compare.mean_square(misfit) / level)).sum()
-    };
     Excess {
         raw: tested(|s| s.excess_raw),
-        retuned: fitted(&problem.nominal).max(tested(|s| s.excess_retuned)),
-        left: fitted(best).max(tested(|s| s.excess_after)),
+        retuned: fitted(problem, &problem.nominal, levels).max(tested(|s| s.excess_retuned)),
+        left: fitted(problem, best, levels).max(tested(|s| s.excess_after)),
     }
+}
+
+fn fitted(problem: &PreparedProblem<'_>, hypothesis: &Hypothesis, levels: &[f64]) -> f64 {
+    let pairs = hypothesis.misfits.iter().zip(levels);
+    pairs.map(|(misfit, level)| score::gap(problem.compare.mean_square(misfit) / level)).sum()
 }

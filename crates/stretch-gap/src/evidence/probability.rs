@@ -1,15 +1,18 @@
-//! From scores to probabilities and the 95 % set.
+//! One posterior over everything that a gap may be put down to: nothing, each set of effects, and what the catalogue lacks.
 //!
-//! Scores S_i are log-likelihood ratios in nats of hypotheses that all are wrong in form. A softmax at the temperature t,
+//! Scores S_h are log-likelihood ratios in nats of hypotheses that all are wrong in form: the parameters re-tuned within their tolerances, the
+//! effects fitted, each paid for. What a hypothesis h leaves of the gap, g_h, is noise that is known to a share only and its model discrepancy,
+//! which is no larger than a share of what it closes; something else leaves more. With D_h, the probability that noise and discrepancy leave as
+//! much,
 //!
 //! ```text
-//! p_i = exp(S_i/t)/sum_j exp(S_j/t),     t = T + rho gap_left/gap_retuned
+//! w_h = exp(S_h/t) D_h,     D_h = 1/(1 + o_h),     o_h = o (g_h/(u + v c_h))^(1/s),     c_h = max(g_retuned - g_h, 0)
+//! w_unknown = max over h of exp(S_h/t) (1 - D_h),     t = T + rho g_best/g_retuned
 //! ```
 //!
-//! is a tempered posterior (Grunwald and van Ommen 2017, doi 10.1214/17-BA1085): the more of the gap the best set leaves, the less its
-//! form is the rig's, and the less a difference of scores says. T and rho are calibrated on development cases.
-//!
-//! Beside them stands what the catalogue lacks, `unknown`, with a probability of its own: see [`unknown`].
+//! and probabilities are these weights as shares of their sum. The temperature t tempers the posterior (Grunwald and van Ommen 2017, doi
+//! 10.1214/17-BA1085): the more of the gap the best set leaves, the less its form is the rig's, and the less a difference of scores says. T, rho,
+//! o, u, v and s are calibrated on development cases. A set that does not lower the gap of the trials that were not fitted is no hypothesis.
 
 use crate::{
     evidence::excess::Excess,
@@ -20,23 +23,33 @@ use crate::{
 /// Probability that the 95 % set holds.
 const COVERED: f64 = 0.95;
 
-/// A hypothesis with its probability.
+/// A hypothesis, what it leaves, and its probability.
 #[derive(Debug, Clone)]
 pub(crate) struct Weighed {
     pub(crate) hypothesis: Hypothesis,
+    /// Excess that it leaves: of the fitted and the test trials the greater.
+    pub(crate) left: f64,
     pub(crate) probability: f64,
 }
 
-/// Softmax over the best set and those in which a rival stands in the place of one of its effects; the most probable first.
-pub(crate) fn weigh(
-    thresholds: &Thresholds,
+/// The posterior.
+#[derive(Debug, Clone)]
+pub(crate) struct Posterior {
+    /// Sets of effects, the most probable first; the empty one says that nothing is missing.
+    pub(crate) sets: Vec<Weighed>,
+    /// Probability that it is something that the catalogue lacks.
+    pub(crate) unknown: f64,
+}
+
+/// The hypotheses that are weighed: the best set, those in which a rival stands in the place of one of its effects, those without its weakest
+/// effects, and nothing at all.
+pub(crate) fn hypotheses(
     best: &Hypothesis,
-    gap: Excess,
     rivals: &[(usize, Hypothesis)],
-) -> Vec<Weighed> {
-    let share = gap.left / gap.retuned.max(thresholds.null_excess);
-    let temperature = thresholds.temperature + thresholds.rho * share;
-    let mut all = vec![Weighed { hypothesis: best.clone(), probability: 1.0 }];
+    eliminated: &[(usize, Hypothesis)],
+    nominal: &Hypothesis,
+) -> Vec<Hypothesis> {
+    let mut all = vec![best.clone()];
     for (slot, rival) in rivals {
         let mut hypothesis = rival.clone();
         // The rival stands where the effect stood.
@@ -46,30 +59,71 @@ pub(crate) fn weigh(
             hypothesis.effects.clone_from(&best.effects);
             hypothesis.effects[at] = *newcomer;
         }
-        let probability = ((rival.score - best.score) / temperature).exp();
-        all.push(Weighed { hypothesis, probability });
+        all.push(hypothesis);
     }
-    let total: f64 = all.iter().map(|w| w.probability).sum();
-    all.iter_mut().for_each(|w| w.probability /= total);
-    all.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    all.extend(eliminated.iter().map(|(_, less)| less).filter(|l| !l.effects.is_empty()).cloned());
+    if !best.effects.is_empty() {
+        all.push(nominal.clone());
+    }
     all
 }
 
-/// Probability that something else than its model discrepancy leaves what the best set leaves: even where that is what form may leave,
-/// by the logistic of the logarithm beyond, with the odds that it has at the border.
-pub(crate) fn unknown(gap: Excess, thresholds: &Thresholds) -> f64 {
-    let allowed = thresholds.unknown_excess + thresholds.unknown_share * gap.retuned;
-    let beyond = (gap.left.max(f64::MIN_POSITIVE) / allowed).ln();
+/// Weighs hypotheses with what they leave, the best set first.
+pub(crate) fn weigh(
+    thresholds: &Thresholds,
+    retuned: f64,
+    hypotheses: Vec<(Hypothesis, f64)>,
+) -> Posterior {
+    let share = hypotheses.first().map_or(1.0, |(_, left)| left / retuned.max(thresholds.null_excess));
+    let temperature = thresholds.temperature + thresholds.rho * share;
+    let top = hypotheses.iter().map(|(h, _)| h.score).fold(f64::NEG_INFINITY, f64::max);
+    let mut unknown: f64 = 0.0;
+    let mut sets = Vec::with_capacity(hypotheses.len());
+    for (hypothesis, left) in hypotheses {
+        let tempered = ((hypothesis.score - top) / temperature).exp();
+        let other = something_else(Excess { raw: retuned, retuned, left }, thresholds);
+        unknown = unknown.max(tempered * other);
+        sets.push(Weighed { hypothesis, left, probability: tempered * (1.0 - other) });
+    }
+    let total = unknown + sets.iter().map(|w| w.probability).sum::<f64>();
+    sets.iter_mut().for_each(|w| w.probability /= total);
+    sets.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    Posterior { sets, unknown: unknown / total }
+}
+
+/// Excess that noise and model discrepancy may leave: u + v c of the module's head.
+pub(crate) fn allowed(gap: Excess, thresholds: &Thresholds) -> f64 {
+    let closed = (gap.retuned - gap.left).max(0.0);
+    thresholds.unknown_excess + thresholds.unknown_share * closed
+}
+
+/// Probability that something else than noise and model discrepancy leaves as much: 1 - D of the module's head.
+fn something_else(gap: Excess, thresholds: &Thresholds) -> f64 {
+    let beyond = (gap.left.max(f64::MIN_POSITIVE) / allowed(gap, thresholds)).ln();
     let odds = thresholds.unknown_odds * (beyond / thresholds.unknown_soft).exp();
     odds / (1.0 + odds)
+}
+
+impl Posterior {
+    /// Probability that nothing is missing.
+    pub(crate) fn nothing(&self) -> f64 {
+        let empty = self.sets.iter().filter(|w| w.hypothesis.effects.is_empty());
+        empty.map(|w| w.probability).sum()
+    }
+
+    /// Probability that effects of the catalogue are missing, whichever.
+    pub(crate) fn effects(&self) -> f64 {
+        1.0 - self.unknown - self.nothing()
+    }
 }
 
 /// Effects of the smallest set of candidates that holds 95 % of the probability, the best candidate's first.
 pub(crate) fn covering_set(weighed: &[Weighed], simulator: &dyn Simulator) -> Vec<String> {
     let mut sum = 0.0;
     let mut names: Vec<String> = Vec::new();
-    for Weighed { hypothesis, probability } in weighed {
-        if sum >= COVERED {
+    let all: f64 = weighed.iter().map(|w| w.probability).sum();
+    for Weighed { hypothesis, probability, .. } in weighed {
+        if sum >= COVERED * all {
             break;
         }
         sum += probability;

@@ -30,8 +30,8 @@ pub struct Thresholds {
     pub unknown_odds: f64,
     /// Least share of the held-out gap that a name in the headline closes.
     pub least_share: f64,
-    /// Share of the held-out gap that one effect closes at least where it is named though more is left than its form explains.
-    pub partial_share: f64,
+    /// Excess, summed over channels, from which a gap counts: 0.1 is 1.05 times the noise.
+    pub least_gap: f64,
 }
 
 impl Thresholds {

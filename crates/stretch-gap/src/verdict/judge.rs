@@ -1,29 +1,23 @@
-//! The verdict: one function of the evidence and the thresholds, which asks for what the catalogue lacks where a gap is left.
+//! The verdict: one function of the posterior and of the sizes that matter.
 //!
-//! | in order | holds when | verdict |
-//! | --- | --- | --- |
-//! | record | a column alone says so, or an error of record or rig file stands above every set of effects | `record` |
-//! | gross misfit | a channel's variance left exceeds what a missing effect leaves | `unknown` |
-//! | at bounds | parameters at their ends explain as much as the effects do | `unknown` |
-//! | too little | there would be a name, and the record is too short or too full of gaps to carry one | `unknown` |
-//! | effect | confirmed on the test trials, and g_left <= u + v g_retuned | `effect` |
-//! | mostly | the same but for what is left, and the strongest effect alone closes the share m of the held-out gap, off its bounds | `partial` |
-//! | unexplained | g_retuned > n, and g_left > u + v g_retuned, all of g_retuned being left by what is not confirmed | `unknown` |
-//! | parameters | g_raw > n | `parameters` |
-//! | else | | `no_gap` |
+//! | holds when | verdict |
+//! | --- | --- |
+//! | a column alone says so, or an error of record or rig file stands above every set of effects | `record` |
+//! | what the catalogue lacks is the most probable | `unknown` |
+//! | effects are the most probable, and the gap counts; what is left is noise and model discrepancy | `effect` |
+//! | the same, and more is left | `partial` |
+//! | nothing is the most probable, or the gap is too small to matter; as shipped there is one | `parameters` |
+//! | the same, and there is none as shipped | `no_gap` |
 //!
-//! with gaps g in variances of the noise, n = `null_excess`, u = `unknown_excess`, v = `unknown_share` and m = `partial_share`: a model
-//! discrepancy may leave a share of the gap in a rig that has the named effect. The rows `gross misfit` to `too little` overrule the rows below
-//! them, whose verdict is kept as `seen`. Three things turn an answer with names, or without one, into another:
-//!
-//! * a set whose sizes all stand at an end of their ranges stands in for something else: `unknown`;
-//! * names that a sum of terms outside the catalogue beats stand for nothing: `unknown`;
-//! * an unknown rest that is small, and random in time or no larger than what noise of a measured input makes, is noise: `parameters`.
+//! A gap counts from `least_gap` on; more is left than noise and discrepancy where [`allowed`] is exceeded. Two findings stand beside the sum, for
+//! no probability is known of them: parameters that stand at the ends of their tolerances and, set loose, explain as much as the effects do
+//! (`unknown`); and a record that is too short, or too full of gaps, to carry a name (`unknown`).
 
 use crate::{
     evidence::{
         candidates::Candidate,
         excess::Excess,
+        probability::{Posterior, allowed},
         sanity::{AtBounds, Sanity},
         shares::EffectShare,
     },
@@ -32,14 +26,12 @@ use crate::{
     verdict::{diagnosis::VerdictKind, naming::Naming, proposal::Lacking, too_little::TooLittle},
 };
 
-/// Noise is known to a factor of two of its variance: what is left below that may be noise.
-const NOISE: f64 = 1.0;
-
 /// What the verdict is a function of.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Case<'a> {
     pub(crate) gap: Excess,
-    /// The most probable first; it has no effects where none met the acceptance criterion.
+    pub(crate) posterior: &'a Posterior,
+    /// The most probable first; the one without effects says that nothing is missing.
     pub(crate) candidates: &'a [Candidate],
     /// What each effect of the best set does, the strongest first.
     pub(crate) shares: &'a [EffectShare],
@@ -68,93 +60,60 @@ pub(crate) struct Judged {
 /// Why the data cannot come from the simulator, or cannot say so.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Overruled {
-    /// Most of a channel is not in the simulator.
-    GrossMisfit { stage: usize, share: f64 },
     /// The parameters of a stage do not fit within their tolerances.
     AtBounds(AtBounds),
     /// The record carries no name.
     TooLittle(TooLittle),
 }
 
-/// Judges. `lacking` looks for what the catalogue lacks: instead of names, and, asked with `true`, beside them too.
+/// Judges. `lacking` looks for what the catalogue lacks: instead of names, and, asked with `true`, beside them.
 pub(crate) fn judge(
     case: &Case<'_>,
     thresholds: &Thresholds,
-    lacking: impl FnOnce(bool) -> Result<Lacking, GapError>,
+    lacking: impl FnOnce(bool) -> Result<Option<Proposed>, GapError>,
 ) -> Result<Judged, GapError> {
-    use VerdictKind::{Effect, Parameters, Partial, Record, Unknown};
-    let nameless = |kind, overruled, proposed| {
-        let naming = Naming::default();
-        Judged { kind, seen: kind, overruled, naming, proposed }
-    };
+    use VerdictKind::{Effect, Partial, Record, Unknown};
     if case.is_record {
-        return Ok(nameless(Record, None, None));
+        let naming = Naming::default();
+        return Ok(Judged { kind: Record, seen: Record, overruled: None, naming, proposed: None });
     }
     let seen = seen(case, thresholds);
     let would_name = matches!(seen, Effect | Partial);
     let too_little = case.too_little.filter(|_| would_name).map(Overruled::TooLittle);
-    let overruled = gross_misfit(case).or_else(|| at_bounds(case)).or(too_little);
-    let naming = match would_name && overruled.is_none() {
-        true => Naming::of(case.candidates, case.shares, thresholds, case.is_short),
-        false => Naming::default(),
-    };
-    let seen = if would_name && naming.named.is_empty() { Unknown } else { seen };
+    let overruled = at_bounds(case).or(too_little);
     let kind = if overruled.is_some() { Unknown } else { seen };
-    let mut judged = Judged { kind, seen, overruled, naming, proposed: None };
-    if !matches!(kind, Partial | Unknown) {
-        return Ok(judged);
+    let mut naming = Naming::of(case.candidates, case.shares, thresholds, case.is_short);
+    if kind != seen || kind == Unknown {
+        naming = Naming::default();
+    } else if !would_name {
+        // What is certain and small is told below the headline.
+        let found = case.posterior.effects() > case.posterior.nothing();
+        let names = if found { naming.named.drain(..).chain(naming.faint).collect() } else { Vec::new() };
+        naming = Naming { faint: names, ..Naming::default() };
     }
-    let lacking = lacking(kind == Partial)?;
-    if kind == Partial {
-        return Ok(match lacking.beats_names {
-            true => nameless(Unknown, None, lacking.instead),
-            false => Judged { proposed: lacking.beside, ..judged },
-        });
-    }
-    if case.gap.left < NOISE && lacking.is_like_noise && judged.overruled.is_none() {
-        (judged.kind, judged.seen) = (Parameters, Parameters);
-    } else {
-        judged.proposed = lacking.instead;
-    }
-    Ok(judged)
+    let is_left = matches!(kind, Partial | Unknown);
+    let proposed = if is_left { lacking(kind == Partial)? } else { None };
+    Ok(Judged { kind, seen, overruled, naming, proposed })
 }
 
-/// The verdict of the rows from `effect` on.
+/// The verdict that the posterior and the sizes make.
 fn seen(case: &Case<'_>, thresholds: &Thresholds) -> VerdictKind {
-    let Excess { raw, retuned, left } = case.gap;
-    let left_allowed = thresholds.unknown_excess + thresholds.unknown_share * retuned;
-    let is_confirmed = case
-        .candidates
-        .first()
-        .is_some_and(|c| !c.effects.is_empty() && c.is_confirmed && c.closed > 0.0);
-    // What is not confirmed explains nothing.
-    let unexplained = if is_confirmed { left } else { retuned };
-    if is_confirmed && left <= left_allowed {
-        VerdictKind::Effect
-    } else if is_confirmed && case.shares.first().is_some_and(|s| is_mostly(s, thresholds)) {
-        VerdictKind::Partial
-    } else if retuned > thresholds.null_excess && unexplained > left_allowed {
+    let (nothing, effects) = (case.posterior.nothing(), case.posterior.effects());
+    let Excess { raw, retuned, .. } = case.gap;
+    let first = case.posterior.sets.iter().find(|w| !w.hypothesis.effects.is_empty());
+    if case.posterior.unknown >= nothing.max(effects) {
         VerdictKind::Unknown
-    } else if raw > thresholds.null_excess {
+    } else if effects > nothing
+        && retuned > thresholds.least_gap
+        && let Some(first) = first
+    {
+        let is_explained = first.left <= allowed(Excess { left: first.left, ..case.gap }, thresholds);
+        if is_explained { VerdictKind::Effect } else { VerdictKind::Partial }
+    } else if raw > thresholds.least_gap {
         VerdictKind::Parameters
     } else {
         VerdictKind::NoGap
     }
-}
-
-fn is_mostly(strongest: &EffectShare, thresholds: &Thresholds) -> bool {
-    strongest.closes >= thresholds.partial_share && !strongest.at_bound
-}
-
-/// The channel that the simulator has least to do with, if any.
-fn gross_misfit(case: &Case<'_>) -> Option<Overruled> {
-    let mut worst: Option<(usize, f64)> = None;
-    for (stage, &share) in case.sanity.left.iter().enumerate() {
-        if share > case.sanity.allowed && worst.is_none_or(|w| share > w.1) {
-            worst = Some((stage, share));
-        }
-    }
-    worst.map(|(stage, share)| Overruled::GrossMisfit { stage, share })
 }
 
 fn at_bounds(case: &Case<'_>) -> Option<Overruled> {

@@ -1,7 +1,10 @@
 //! The answer in words, made from the verdict when nothing can change any more.
 
 use crate::{
-    evidence::{candidates::Candidate, excess::Excess, gathered::Evidence, shares::EffectShare},
+    evidence::{
+        candidates::Candidate, excess::Excess, gathered::Evidence, sanity::Sanity,
+        shares::EffectShare,
+    },
     problem::simulator::Simulator,
     record::{gross::Gross, sentence::sentence},
     verdict::{
@@ -13,6 +16,9 @@ use crate::{
 
 /// Least share of the gap that is reported of an effect that is not named.
 const LEAST_PART: f64 = 0.05;
+
+/// Multiple of the noise above which nothing is said to be all of it, or certain.
+const NOT_ALL: f64 = 1.5;
 
 /// Least share that is reported as a number.
 const LEAST_SHARE_IN_WORDS: f64 = 0.01;
@@ -31,6 +37,7 @@ pub(crate) struct Answer<'a> {
     /// The most probable candidate, its probability beside that of what the catalogue lacks.
     pub(crate) first: Option<&'a Candidate>,
     pub(crate) shares: &'a [EffectShare],
+    pub(crate) sanity: &'a Sanity,
     /// What a partial answer leaves.
     pub(crate) unexplained: Option<&'a Unexplained>,
     /// What is wrong with the record or the rig file.
@@ -47,6 +54,7 @@ pub(crate) fn tell(answer: Answer<'_>, simulator: &dyn Simulator, evidence: &Evi
             "there is no test trial: the last quarter of every trial is held back and tested on";
         notes.push(held.into());
     }
+    notes.extend(gross_misfit(answer.sanity, simulator));
     let seen = seen(answer, simulator, evidence);
     let sentence = match &answer.judged.overruled {
         None => seen,
@@ -67,11 +75,9 @@ fn seen(answer: Answer<'_>, simulator: &dyn Simulator, evidence: &Evidence) -> S
         (VerdictKind::Record, Some(first)) if !answer.gross.iter().any(Gross::is_plain) => {
             sentence(answer.gross)
                 + &format!(
-                    " With that corrected, {:.0} % of the gap close ({:.0} to {:.0} %) on trials that were not fitted; probability {:.2}.",
-                    100.0 * first.closed,
-                    100.0 * first.closed_ci[0],
-                    100.0 * first.closed_ci[1],
-                    first.probability
+                    " With that corrected, {} of the gap close on trials that were not fitted, and {}.",
+                    closed(first, gap.left),
+                    left_with(first, gap.left)
                 )
         }
         (VerdictKind::Record, _) => {
@@ -80,13 +86,11 @@ fn seen(answer: Answer<'_>, simulator: &dyn Simulator, evidence: &Evidence) -> S
         (VerdictKind::Effect, Some(first)) => {
             let names = naming.alternatives();
             format!(
-                "The simulator lacks {}: {} {:.0} % of the gap ({:.0} to {:.0} %) on trials that were not fitted; probability {:.2}.",
+                "The simulator lacks {}: {} {} of the gap on trials that were not fitted, and {}.",
                 names.join(" and "),
                 if names.len() > 1 { "together they close" } else { "it closes" },
-                100.0 * first.closed,
-                100.0 * first.closed_ci[0],
-                100.0 * first.closed_ci[1],
-                first.probability
+                closed(first, gap.left),
+                left_with(first, gap.left)
             ) + &beside(naming)
         }
         (VerdictKind::Partial, Some(_)) => partial(answer) + &beside(naming),
@@ -105,13 +109,13 @@ fn seen(answer: Answer<'_>, simulator: &dyn Simulator, evidence: &Evidence) -> S
         (VerdictKind::Parameters | VerdictKind::NoGap, _) => match answer.null_band {
             Some(band) if gap.retuned > band => too_faint(gap, band, evidence, simulator),
             _ if judged.seen == VerdictKind::NoGap => {
-                "Simulator and rig agree within the noise.".into()
+                "Simulator and rig agree within the noise.".to_owned() + &too_small(naming)
             }
             _ => format!(
                 "No effect is missing: with its parameters re-tuned within their tolerances the simulator agrees with the rig (what is left is {:.1} times the noise as shipped, {:.2} re-tuned).",
                 multiple(gap.raw),
                 multiple(gap.retuned)
-            ),
+            ) + &too_small(naming),
         },
     }
 }
@@ -127,6 +131,45 @@ fn too_faint(gap: Excess, band: f64, evidence: &Evidence, simulator: &dyn Simula
         worst.map_or("", |(_, spec)| spec.name.as_str()),
         multiple(band)
     )
+}
+
+/// Share of the gap that a candidate closes, with its interval: never all of it where more than noise is left.
+fn closed(candidate: &Candidate, left: f64) -> String {
+    let most = if multiple(left) > NOT_ALL { 99.0 } else { 100.0 };
+    let percent = |share: f64| (100.0 * share).round().clamp(0.0, most);
+    let [low, high] = candidate.closed_ci.map(percent);
+    format!("{:.0} % ({low:.0} to {high:.0} %)", percent(candidate.closed))
+}
+
+/// What is left with a candidate, and how probable it is: never certain where more than noise is left.
+fn left_with(candidate: &Candidate, left: f64) -> String {
+    let most = if multiple(left) > NOT_ALL { 0.99 } else { 1.0 };
+    format!(
+        "{:.2} times the noise is left; probability {:.2}",
+        multiple(left),
+        candidate.probability.min(most)
+    )
+}
+
+/// What was found, and is too small to matter.
+fn too_small(naming: &Naming) -> String {
+    match naming.faint.is_empty() {
+        true => String::new(),
+        false => format!(" Found, and too small to matter: {}.", naming.faint.join(", ")),
+    }
+}
+
+/// A channel that the simulator has little to do with: a warning, for causes may explain it all the same.
+fn gross_misfit(sanity: &Sanity, simulator: &dyn Simulator) -> Option<String> {
+    let left = sanity.left.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
+    let (stage, share) = left.filter(|(_, share)| **share > sanity.allowed)?;
+    let spec = &simulator.stages()[stage];
+    Some(format!(
+        "{:.0} % of what {} does is not in the simulator of {}: is it the right rig, and is every column what its name says?",
+        100.0 * share.min(1.0),
+        spec.channel,
+        spec.name
+    ))
 }
 
 /// Mostly this, and so much else.
@@ -148,7 +191,9 @@ fn partial(answer: Answer<'_>) -> String {
             true => String::new(),
             false => format!(", most of it at {}", u.sits.join("; ")),
         };
-        format!("{:.0} % are not explained: they sit in {}{sits}.", 100.0 * u.share, u.stage)
+        let share = 100.0 * u.share.clamp(0.0, 1.0);
+        let times = multiple(answer.gap.left);
+        format!("{share:.0} % are not explained, {times:.2} times the noise: they sit in {}{sits}.", u.stage)
     });
     format!("Mostly {} of the gap on trials that were not fitted. {rest}", names.join(", "))
 }
@@ -191,16 +236,6 @@ fn parts(shares: &[EffectShare]) -> String {
 /// Why it may not be the right simulator.
 fn wrong(overruled: &Overruled, simulator: &dyn Simulator) -> String {
     match overruled {
-        Overruled::GrossMisfit { stage, share } => {
-            let spec = &simulator.stages()[*stage];
-            format!(
-                "The gap is everything: {:.0} % of what {} does is not in the simulator of {}. Is it the right rig, and is every \
-                 column what its name says?",
-                100.0 * share.min(1.0),
-                spec.channel,
-                spec.name
-            )
-        }
         Overruled::TooLittle(why) => why.words(),
         Overruled::AtBounds(found) => {
             let names = found.ended.iter().map(|&p| simulator.parameters()[p].name.as_str());

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use crate::{
     evidence::{
-        candidates::{Candidate, beside_unknown, candidates, shifts, stage_gaps, weighed},
+        candidates::{Candidate, beside_unknown, candidates, posterior, shifts, stage_gaps},
         gathered::Evidence,
-        localise::{self, location::Where},
+        localise::{self, causes::with_causes, location::Where},
         null_band::null_band,
         probability::{Posterior, covering_set, hypotheses},
         responses::responses,
@@ -227,7 +227,7 @@ fn gather(task: Task<'_>, cause: Cause<'_>) -> Result<Gathered, GapError> {
     let mut evidence = Evidence::gather(problem, found)?;
     let all = hypotheses(&found.best, &found.rivals, eliminated, &problem.nominal);
     let held = candidates(problem, &evidence, &all, seed)?;
-    let (posterior, candidates) = weighed(problem, thresholds, &mut evidence, all, held);
+    let (posterior, candidates) = posterior(problem, thresholds, &mut evidence, all, held);
     let shares = shares(problem, &evidence, &found.best, eliminated, thresholds.null_excess)?;
     let sanity = Sanity::of(problem, &found.best, &evidence)?;
     (task.progress)("where the gap sits");
@@ -269,8 +269,7 @@ fn report(
     let (options, thresholds) = (task.options, &task.options.thresholds);
     let Gathered { mut evidence, posterior, candidates, shares, sanity, location } = gathered;
     let (simulator, runs) = (cause.problem.simulator(), &cause.problem.compare.runs);
-    let named = candidates.iter().find(|c| !c.effects.is_empty());
-    let partial = named.filter(|_| judged.kind == VerdictKind::Partial);
+    let partial = candidates.first().filter(|_| judged.kind == VerdictKind::Partial);
     let unexplained = partial.map(|first| unexplained(simulator, &evidence, first, options.seed));
     let is_quiet = matches!(judged.kind, VerdictKind::NoGap | VerdictKind::Parameters);
     let null_band = is_quiet.then(|| null_band(cause.problem, options.seed)).transpose()?;
@@ -283,7 +282,7 @@ fn report(
     let answer = Answer {
         judged: &judged,
         gap: evidence.gap,
-        first: candidates.iter().find(|c| !c.effects.is_empty()),
+        first: candidates.first(),
         shares: &shares,
         sanity: &sanity,
         unexplained: unexplained.as_ref(),
@@ -294,6 +293,10 @@ fn report(
     let model_runs = runs.counted();
     text.notes.extend(model_runs.and_then(|runs| runs.note()));
     // What a page needs beside the answer counts as none of its cost.
+    let location = Where {
+        stages: with_causes(location.stages, &shares, &judged.naming.named, simulator),
+        ..location
+    };
     if let (true, Some(stage)) = (options.responses, location.worst()) {
         evidence.responses = responses(cause.problem, &evidence, &cause.found.best, stage)?;
     }

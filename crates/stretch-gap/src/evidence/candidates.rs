@@ -17,7 +17,7 @@ use crate::{
         excess::Excess,
         gathered::{Evidence, StageEvidence},
         localise::location::StageGap,
-        probability::{Posterior, Weighed, weigh},
+        probability::{Fitted, Posterior, Weighed, weigh},
     },
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
     problem::{error::GapError, simulator::Simulator, thresholds::Thresholds},
@@ -111,7 +111,7 @@ pub(crate) fn candidates(
 
 /// Weighs hypotheses with what they leave; their candidates are put into the same order. A set of effects that does not lower the gap of the test
 /// trials is dropped.
-pub(crate) fn weighed(
+pub(crate) fn posterior(
     problem: &PreparedProblem<'_>,
     thresholds: &Thresholds,
     evidence: &mut Evidence,
@@ -120,12 +120,17 @@ pub(crate) fn weighed(
 ) -> (Posterior, Vec<Candidate>) {
     let (mut kept, mut by_effects) = (Vec::new(), BTreeMap::new());
     for (hypothesis, candidate) in hypotheses.into_iter().zip(candidates) {
-        let is_possible = hypothesis.effects.is_empty()
-            || (candidate.is_confirmed && candidate.closed > 0.0);
+        let is_possible =
+            hypothesis.effects.is_empty() || (candidate.is_confirmed && candidate.closed > 0.0);
         if is_possible {
             let left = evidence.fitted_gap(problem, &hypothesis).max(candidate.gap_after);
             by_effects.insert(hypothesis.effects.clone(), candidate);
-            kept.push((hypothesis, left));
+            let strongest = hypothesis.effects.first();
+            let is_at_bound = strongest.is_some_and(|&e| {
+                let spec = &problem.simulator().effects()[e];
+                hypothesis.model.effect(e).is_some_and(|values| spec.is_at_bound(values))
+            });
+            kept.push(Fitted { hypothesis, left, is_at_bound });
         }
     }
     let posterior = weigh(thresholds, evidence.gap.retuned, kept);
@@ -242,6 +247,7 @@ pub(crate) fn stage_gaps(problem: &PreparedProblem<'_>, evidence: &Evidence) -> 
             floor: s.noise,
             floor_source: noise.source.clone(),
             unit: spec.unit.clone(),
+            is_cause_only: false,
         }
     };
     evidence.stages.iter().enumerate().map(one).collect()

@@ -12,7 +12,8 @@
 //!
 //! and probabilities are these weights as shares of their sum. The temperature t tempers the posterior (Grunwald and van Ommen 2017, doi
 //! 10.1214/17-BA1085): the more of the gap the best set leaves, the less its form is the rig's, and the less a difference of scores says. T, rho,
-//! o, u, v and s are calibrated on development cases. A set that does not lower the gap of the trials that were not fitted is no hypothesis.
+//! o, u, v and s are calibrated on development cases. A set that does not lower the gap of the trials that were not fitted is no hypothesis; one whose
+//! strongest effect stands at an end of its range stands in for something else, D_h = 0.
 
 use crate::{
     evidence::excess::Excess,
@@ -32,10 +33,20 @@ pub(crate) struct Weighed {
     pub(crate) probability: f64,
 }
 
+/// A hypothesis beside the data.
+#[derive(Debug, Clone)]
+pub(crate) struct Fitted {
+    pub(crate) hypothesis: Hypothesis,
+    /// Excess that it leaves: of the fitted and the test trials the greater.
+    pub(crate) left: f64,
+    /// Whether its strongest effect stands at an end of its range.
+    pub(crate) is_at_bound: bool,
+}
+
 /// The posterior.
 #[derive(Debug, Clone)]
 pub(crate) struct Posterior {
-    /// Sets of effects, the most probable first; the empty one says that nothing is missing.
+    /// Sets of effects, the most probable first; behind them the empty one, which says that nothing is missing.
     pub(crate) sets: Vec<Weighed>,
     /// Probability that it is something that the catalogue lacks.
     pub(crate) unknown: f64,
@@ -69,25 +80,28 @@ pub(crate) fn hypotheses(
 }
 
 /// Weighs hypotheses with what they leave, the best set first.
-pub(crate) fn weigh(
-    thresholds: &Thresholds,
-    retuned: f64,
-    hypotheses: Vec<(Hypothesis, f64)>,
-) -> Posterior {
-    let share = hypotheses.first().map_or(1.0, |(_, left)| left / retuned.max(thresholds.null_excess));
+pub(crate) fn weigh(thresholds: &Thresholds, retuned: f64, hypotheses: Vec<Fitted>) -> Posterior {
+    let share = hypotheses.first().map_or(1.0, |f| f.left / retuned.max(thresholds.null_excess));
     let temperature = thresholds.temperature + thresholds.rho * share;
-    let top = hypotheses.iter().map(|(h, _)| h.score).fold(f64::NEG_INFINITY, f64::max);
+    let top = hypotheses.iter().map(|f| f.hypothesis.score).fold(f64::NEG_INFINITY, f64::max);
     let mut unknown: f64 = 0.0;
     let mut sets = Vec::with_capacity(hypotheses.len());
-    for (hypothesis, left) in hypotheses {
+    for Fitted { hypothesis, left, is_at_bound } in hypotheses {
         let tempered = ((hypothesis.score - top) / temperature).exp();
-        let other = something_else(Excess { raw: retuned, retuned, left }, thresholds);
+        let other = match is_at_bound {
+            true => 1.0,
+            false => something_else(Excess { raw: retuned, retuned, left }, thresholds),
+        };
         unknown = unknown.max(tempered * other);
         sets.push(Weighed { hypothesis, left, probability: tempered * (1.0 - other) });
     }
     let total = unknown + sets.iter().map(|w| w.probability).sum::<f64>();
     sets.iter_mut().for_each(|w| w.probability /= total);
-    sets.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    // Nothing stands behind the sets, however probable: who wants the best set finds it first.
+    let is_nothing = |w: &Weighed| w.hypothesis.effects.is_empty();
+    sets.sort_by(|a, b| {
+        is_nothing(a).cmp(&is_nothing(b)).then(b.probability.total_cmp(&a.probability))
+    });
     Posterior { sets, unknown: unknown / total }
 }
 
@@ -155,119 +169,137 @@ mod tests {
         }
     }
 
-    /// A gap of ten times the noise's variance of which the best set leaves a share.
-    fn gap(share_left: f64) -> Excess {
-        Excess { raw: 20.0, retuned: 10.0, left: 10.0 * share_left }
+    fn fitted(effects: &[usize], score: f64, left: f64) -> Fitted {
+        Fitted { hypothesis: hypothesis(effects, score), left, is_at_bound: false }
     }
 
-    /// Rivals in the place of effect 0, with these scores.
-    fn rivals(scores: &[f64]) -> Vec<(usize, Hypothesis)> {
-        let one = |(i, score): (usize, &f64)| (0, hypothesis(&[i + 1], *score));
-        scores.iter().enumerate().map(one).collect()
+    /// A gap of ten times the noise's variance; sets of one effect with these scores and what each leaves.
+    fn posterior(sets: &[(f64, f64)]) -> Posterior {
+        let one = |(i, (score, left)): (usize, &(f64, f64))| fitted(&[i], *score, *left);
+        weigh(&Thresholds::frozen(), 10.0, sets.iter().enumerate().map(one).collect())
     }
 
-    fn probabilities(best: f64, scores: &[f64], share_left: f64) -> Vec<f64> {
-        let (best, thresholds) = (hypothesis(&[0], best), Thresholds::frozen());
-        let weighed = weigh(&thresholds, &best, gap(share_left), &rivals(scores));
-        weighed.iter().map(|w| w.probability).collect()
+    fn sum(posterior: &Posterior) -> f64 {
+        posterior.unknown + posterior.nothing() + posterior.effects()
     }
 
     #[test]
-    fn probabilities_are_ordered_as_scores_and_sum_to_one() {
-        let scores = [90.0, -300.0, 99.5, 40.0, 90.0];
-        let thresholds = Thresholds::frozen();
-        let weighed = weigh(&thresholds, &hypothesis(&[0], 100.0), gap(0.02), &rivals(&scores));
-        let sum: f64 = weighed.iter().map(|w| w.probability).sum();
-        assert_relative_eq!(sum, 1.0, epsilon = 0.0, max_relative = F64_ROUNDING);
-        for pair in weighed.windows(2) {
+    fn everything_sums_to_one_and_the_most_probable_comes_first() {
+        let all = posterior(&[(100.0, 0.2), (90.0, 0.3), (-300.0, 9.0), (99.5, 4.0), (40.0, 0.2)]);
+        assert_relative_eq!(sum(&all), 1.0, epsilon = 0.0, max_relative = F64_ROUNDING);
+        for pair in all.sets.windows(2) {
             assert!(pair[0].probability >= pair[1].probability);
-            assert!(pair[0].hypothesis.score >= pair[1].hypothesis.score);
         }
-        assert!(weighed.iter().all(|w| (0.0..=1.0).contains(&w.probability)));
-        // Equal scores are equally probable: the two of 90.
-        assert_eq!(weighed[2].probability, weighed[3].probability);
+        assert!(all.sets.iter().all(|w| (0.0..=1.0).contains(&w.probability)));
     }
 
-    /// ln p_i/p_j = (S_i - S_j)/(T + rho share).
+    /// ln p_i/p_j = (S_i - S_j)/(T + rho share) where both leave the same.
     #[test]
     fn odds_are_the_tempered_likelihood_ratio() {
         let thresholds = Thresholds::frozen();
         for share in [0.0, 0.01, 0.3, 1.0] {
-            let p = probabilities(100.0, &[93.0], share);
+            let all = posterior(&[(100.0, 10.0 * share), (93.0, 10.0 * share)]);
             let temperature = thresholds.temperature + thresholds.rho * share;
             // A logarithm of a ratio of two rounded exponentials.
-            let (found, expected) = ((p[0] / p[1]).ln(), 7.0 / temperature);
-            assert_relative_eq!(found, expected, epsilon = F64_ROUNDING, max_relative = 1e-12);
+            let found = (all.sets[0].probability / all.sets[1].probability).ln();
+            assert_relative_eq!(
+                found,
+                7.0 / temperature,
+                epsilon = F64_ROUNDING,
+                max_relative = 1e-12
+            );
         }
     }
 
+    /// Of two sets of one score the one that leaves less is the more probable; beside what leaves nothing something else is improbable.
     #[test]
-    fn the_more_is_left_the_less_a_score_says() {
-        let first = [0.0, 0.01, 0.1, 0.5, 1.0].map(|share| probabilities(100.0, &[80.0], share)[0]);
-        assert!(first.windows(2).all(|pair| pair[0] > pair[1]), "{first:?}");
-        assert!(
-            first.iter().all(|p| *p > 0.5),
-            "the better score stays the more probable: {first:?}"
+    fn what_leaves_less_is_the_more_probable() {
+        let all = posterior(&[(100.0, 0.1), (100.0, 5.0)]);
+        assert_eq!(all.sets[0].hypothesis.effects, [0]);
+        let unknown = [0.0, 0.1, 1.0, 5.0, 9.9].map(|left| posterior(&[(100.0, left)]).unknown);
+        assert!(unknown.windows(2).all(|pair| pair[0] < pair[1]), "{unknown:?}");
+        assert!(unknown[0] < 1e-6 && unknown[4] > 0.9, "{unknown:?}");
+    }
+
+    /// What stands at the end of its range is something else, however well it does.
+    #[test]
+    fn a_set_at_its_bound_is_something_else() {
+        let bound = Fitted { is_at_bound: true, ..fitted(&[0], 100.0, 0.0) };
+        let all = weigh(
+            &Thresholds::frozen(),
+            10.0,
+            vec![bound, fitted(&[1], 60.0, 0.0), fitted(&[], 0.0, 10.0)],
         );
+        assert!(all.unknown > 0.99, "{all:?}");
+        assert_relative_eq!(sum(&all), 1.0, epsilon = 0.0, max_relative = F64_ROUNDING);
+    }
+
+    /// Where nothing is found and hundreds of times the noise's variance are left, nothing is no explanation.
+    #[test]
+    fn nothing_does_not_explain_a_large_gap() {
+        let of =
+            |retuned: f64| weigh(&Thresholds::frozen(), retuned, vec![fitted(&[], 0.0, retuned)]);
+        assert!(of(757.0).nothing() < 0.01, "{:?}", of(757.0));
+        assert!(of(0.02).nothing() > 0.9, "{:?}", of(0.02));
+        let falling = [0.0, 0.05, 0.2, 1.0, 30.0].map(|gap| of(gap).nothing());
+        assert!(falling.windows(2).all(|pair| pair[0] > pair[1]), "{falling:?}");
     }
 
     #[test]
-    fn only_differences_of_scores_count() {
+    fn only_differences_of_scores_count_and_far_ones_stay_finite() {
         let (low, high) =
-            (probabilities(10.0, &[3.0, -5.0], 0.1), probabilities(510.0, &[503.0, 495.0], 0.1));
-        for (low, high) in low.iter().zip(&high) {
-            assert_relative_eq!(low, high, epsilon = 0.0, max_relative = F64_ROUNDING);
+            (posterior(&[(10.0, 1.0), (3.0, 1.0)]), posterior(&[(510.0, 1.0), (503.0, 1.0)]));
+        for (low, high) in low.sets.iter().zip(&high.sets) {
+            assert_relative_eq!(
+                low.probability,
+                high.probability,
+                epsilon = 0.0,
+                max_relative = F64_ROUNDING
+            );
         }
-    }
-
-    /// Ten thousand nats apart, better or worse, nothing is NaN and nothing is lost.
-    #[test]
-    fn far_scores_stay_finite() {
-        let p = probabilities(0.0, &[-1e4, -1e5], 0.0);
-        assert_eq!(p, [1.0, 0.0, 0.0]);
+        let far = posterior(&[(0.0, 0.0), (-1e4, 0.0), (-1e5, 0.0)]);
+        assert!(far.sets.iter().all(|w| w.probability.is_finite()));
+        assert_eq!(far.sets[1].probability, 0.0);
         // Where there is no gap at all the least one that counts stands in the share.
-        let none = Excess { raw: 0.0, retuned: 0.0, left: 0.0 };
-        let weighed = weigh(&Thresholds::frozen(), &hypothesis(&[0], 0.0), none, &rivals(&[-5.0]));
-        assert!(weighed.iter().all(|w| w.probability.is_finite()));
+        let none = weigh(&Thresholds::frozen(), 0.0, vec![fitted(&[0], 0.0, 0.0)]);
+        assert!(none.sets.iter().all(|w| w.probability.is_finite()) && none.unknown.is_finite());
     }
 
     #[test]
-    fn without_rivals_the_best_set_has_all_and_it_may_be_empty() {
-        assert_eq!(probabilities(3.0, &[], 0.5), [1.0]);
-        let none = weigh(&Thresholds::frozen(), &hypothesis(&[], 0.0), gap(1.0), &[]);
-        assert!(none[0].hypothesis.effects.is_empty());
-    }
-
-    #[test]
-    fn a_rival_stands_where_the_effect_stood() {
+    fn a_rival_stands_where_the_effect_stood_and_nothing_is_last() {
         let best = hypothesis(&[4, 2, 7], 100.0);
         // The search lists what it kept first, the newcomer last.
         let rival = (2, hypothesis(&[4, 7, 5], 95.0));
-        let weighed = weigh(&Thresholds::frozen(), &best, gap(0.1), &[rival]);
-        assert_eq!(weighed[0].hypothesis.effects, [4, 2, 7]);
-        assert_eq!(weighed[1].hypothesis.effects, [4, 5, 7]);
+        let less = [
+            (7, hypothesis(&[4, 2], 60.0)),
+            (2, hypothesis(&[4], 50.0)),
+            (4, hypothesis(&[], 0.0)),
+        ];
+        let all = hypotheses(&best, &[rival], &less, &hypothesis(&[], 0.0));
+        let effects: Vec<&[usize]> = all.iter().map(|h| h.effects.as_slice()).collect();
+        assert_eq!(effects, [&[4, 2, 7][..], &[4, 5, 7], &[4, 2], &[4], &[]]);
+        let nothing = hypothesis(&[], 0.0);
+        assert_eq!(hypotheses(&nothing, &[], &[], &nothing).len(), 1);
     }
 
     #[test]
-    fn unknown_has_its_odds_at_the_border_and_grows_with_what_is_left() {
+    fn a_larger_gap_that_is_closed_may_leave_more() {
         let thresholds = Thresholds::frozen();
-        let allowed = thresholds.unknown_excess + thresholds.unknown_share * 10.0;
-        let at = |left: f64| unknown(Excess { raw: 20.0, retuned: 10.0, left }, &thresholds);
-        let odds = at(allowed) / (1.0 - at(allowed));
-        assert_relative_eq!(odds, thresholds.unknown_odds, epsilon = 0.0, max_relative = 1e-12);
-        let rising = [0.0, 1e-6, 0.1, 1.0, 5.0, 10.0, 1e6].map(at);
-        assert!(rising.windows(2).all(|pair| pair[0] < pair[1]), "{rising:?}");
-        assert!(rising.iter().all(|p| (0.0..=1.0).contains(p)), "{rising:?}");
-        // Odds are proportional to what is left where the border is as soft as a logistic: twice as much, twice the odds.
-        let twice = at(2.0 * allowed) / (1.0 - at(2.0 * allowed));
-        let expected = odds * libm::pow(2.0, 1.0 / thresholds.unknown_soft);
-        assert_relative_eq!(twice, expected, epsilon = 0.0, max_relative = 1e-12);
-    }
-
-    #[test]
-    fn a_larger_gap_may_leave_more() {
-        let thresholds = Thresholds::frozen();
-        let of = |retuned: f64| unknown(Excess { raw: 1e3, retuned, left: 1.0 }, &thresholds);
-        assert!(of(1.0) > of(10.0) && of(10.0) > of(100.0));
+        let of =
+            |retuned: f64| something_else(Excess { raw: 1e3, retuned, left: 1.0 }, &thresholds);
+        assert!(of(2.0) > of(10.0) && of(10.0) > of(100.0));
+        // Odds at the border.
+        let at = Excess {
+            raw: 1.0,
+            retuned: thresholds.unknown_excess,
+            left: thresholds.unknown_excess,
+        };
+        let p = something_else(at, &thresholds);
+        assert_relative_eq!(
+            p / (1.0 - p),
+            thresholds.unknown_odds,
+            epsilon = 0.0,
+            max_relative = 1e-12
+        );
     }
 }

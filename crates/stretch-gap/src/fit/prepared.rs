@@ -265,14 +265,6 @@ impl<'a> PreparedProblem<'a> {
         pairs.map(|(a, b)| a.octaves.rise(&b.octaves)).sum()
     }
 
-    /// Whether what is left where most is left is less than the noise of the measured input that arrives there.
-    pub(crate) fn is_transmitted(&self, hypothesis: &Hypothesis) -> bool {
-        let left = |stage: &usize| self.gap_in(hypothesis, *stage);
-        let stages = 0..hypothesis.misfits.len();
-        let worst = stages.max_by(|a, b| left(a).total_cmp(&left(b)));
-        worst.is_some_and(|stage| left(&stage) < self.transmitted[stage].fit)
-    }
-
     /// Share of a stage's noise that noise of its measured input makes.
     pub(crate) fn transmits(&self, stage: usize) -> f64 {
         self.transmitted[stage].fit

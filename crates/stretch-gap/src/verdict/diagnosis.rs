@@ -114,7 +114,7 @@ pub struct Diagnosis {
     pub gross: Vec<Gross>,
     /// The 95 % set: effects that these data cannot tell apart.
     pub ambiguous: Vec<String>,
-    /// Sets of effects, the most probable first.
+    /// Sets of effects, the most probable first; behind them that nothing is missing (no effect), and what the catalogue lacks (`unknown`).
     pub candidates: Vec<Candidate>,
     /// What each effect of the best set closes of the held-out gap, the strongest first; named or not.
     #[serde(default)]

@@ -23,7 +23,7 @@ use crate::{
     },
     missing::Proposed,
     problem::{error::GapError, thresholds::Thresholds},
-    verdict::{diagnosis::VerdictKind, naming::Naming, proposal::Lacking, too_little::TooLittle},
+    verdict::{diagnosis::VerdictKind, naming::Naming, too_little::TooLittle},
 };
 
 /// What the verdict is a function of.
@@ -31,7 +31,7 @@ use crate::{
 pub(crate) struct Case<'a> {
     pub(crate) gap: Excess,
     pub(crate) posterior: &'a Posterior,
-    /// The most probable first; the one without effects says that nothing is missing.
+    /// The most probable first, behind the sets of effects the one without.
     pub(crate) candidates: &'a [Candidate],
     /// What each effect of the best set does, the strongest first.
     pub(crate) shares: &'a [EffectShare],
@@ -88,7 +88,8 @@ pub(crate) fn judge(
     } else if !would_name {
         // What is certain and small is told below the headline.
         let found = case.posterior.effects() > case.posterior.nothing();
-        let names = if found { naming.named.drain(..).chain(naming.faint).collect() } else { Vec::new() };
+        let names =
+            if found { naming.named.drain(..).chain(naming.faint).collect() } else { Vec::new() };
         naming = Naming { faint: names, ..Naming::default() };
     }
     let is_left = matches!(kind, Partial | Unknown);
@@ -107,7 +108,8 @@ fn seen(case: &Case<'_>, thresholds: &Thresholds) -> VerdictKind {
         && retuned > thresholds.least_gap
         && let Some(first) = first
     {
-        let is_explained = first.left <= allowed(Excess { left: first.left, ..case.gap }, thresholds);
+        let is_explained =
+            first.left <= allowed(Excess { left: first.left, ..case.gap }, thresholds);
         if is_explained { VerdictKind::Effect } else { VerdictKind::Partial }
     } else if raw > thresholds.least_gap {
         VerdictKind::Parameters
@@ -126,130 +128,177 @@ fn at_bounds(case: &Case<'_>) -> Option<Overruled> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{
+        evidence::probability::Weighed, fit::hypothesis::Hypothesis, problem::simulator::Model,
+    };
     use VerdictKind::{Effect, NoGap, Parameters, Partial, Record, Unknown};
     use std::collections::BTreeMap;
 
     static SOUND: Sanity = Sanity { left: Vec::new(), allowed: 0.1, at_bounds: None };
 
-    fn candidate(effects: &[&str], is_confirmed: bool) -> Candidate {
+    fn candidate(effects: &[&str], probability: f64) -> Candidate {
         Candidate {
             effects: effects.iter().map(|e| (*e).to_owned()).collect(),
-            probability: 1.0,
+            probability,
             score: 100.0,
             gap_before: 10.0,
             gap_after: 0.1,
             closed: 0.99,
             closed_ci: [0.98, 1.0],
-            is_confirmed,
+            is_confirmed: true,
             by_name: BTreeMap::new(),
             parameters: Vec::new(),
         }
     }
 
-    fn share(closes: f64, at_bound: bool) -> EffectShare {
-        EffectShare { effect: "play".into(), closes, closes_of_stage: closes, at_bound }
+    /// Probabilities of play, of nothing, and of what the catalogue lacks; what play leaves.
+    fn posterior(play: f64, nothing: f64, unknown: f64, left: f64) -> Posterior {
+        let set = |effects: &[usize], left: f64, probability: f64| Weighed {
+            hypothesis: Hypothesis {
+                effects: effects.into(),
+                model: Model::default(),
+                misfits: Vec::new(),
+                effect_sd: BTreeMap::new(),
+                parameter_sd: Vec::new(),
+                score: 0.0,
+            },
+            left,
+            probability,
+        };
+        Posterior { sets: vec![set(&[0], left, play), set(&[], 10.0, nothing)], unknown }
     }
 
-    fn case<'a>(gap: [f64; 3], candidates: &'a [Candidate], shares: &'a [EffectShare]) -> Case<'a> {
+    /// The verdict on a gap as shipped, re-tuned and left.
+    fn judged(gap: [f64; 3], probabilities: [f64; 3], change: impl Fn(&mut Case<'_>)) -> Judged {
         let [raw, retuned, left] = gap;
-        let gap = Excess { raw, retuned, left };
-        let (is_record, too_little, is_short) = (false, None, false);
-        Case { gap, candidates, shares, sanity: &SOUND, is_record, too_little, is_short }
+        let [play, nothing, unknown] = probabilities;
+        let candidates = [candidate(&["play"], play), candidate(&[], nothing)];
+        let mut case = Case {
+            gap: Excess { raw, retuned, left },
+            posterior: &posterior(play, nothing, unknown, left),
+            candidates: &candidates,
+            shares: &[],
+            sanity: &SOUND,
+            is_record: false,
+            too_little: None,
+            is_short: false,
+        };
+        change(&mut case);
+        judge(&case, &Thresholds::frozen(), |_| Ok(None)).unwrap()
     }
 
-    /// Judged where nothing can be proposed.
-    fn judged(case: &Case<'_>) -> Judged {
-        judge(case, &Thresholds::frozen(), |_| Ok(Lacking::default())).unwrap()
-    }
-
-    /// Every row of the module's table from `effect` on.
+    /// Every row of the module's table from `unknown` on.
     #[test]
     fn each_row_has_its_verdict() {
-        let named = [candidate(&["play"], true)];
-        let (chance, none) = ([candidate(&["play"], false)], [candidate(&[], true)]);
-        for (gap, candidates, expected) in [
-            ([20.0, 10.0, 0.1], &named, Effect),
-            ([20.0, 10.0, 5.0], &named, Unknown),
-            ([20.0, 10.0, 10.0], &none, Unknown),
-            ([20.0, 0.01, 0.01], &none, Parameters),
-            ([0.01, 0.01, 0.01], &none, NoGap),
-            ([20.0, 10.0, 0.1], &chance, Unknown),
-            // A small gap that falls on no test trial is nobody's.
-            ([0.01, 0.1, 0.05], &chance, NoGap),
+        for (gap, probabilities, expected) in [
+            ([20.0, 10.0, 0.1], [0.9, 0.0, 0.1], Effect),
+            ([20.0, 10.0, 3.0], [0.6, 0.0, 0.4], Partial),
+            ([20.0, 10.0, 8.0], [0.2, 0.0, 0.8], Unknown),
+            ([20.0, 10.0, 10.0], [0.0, 0.1, 0.9], Unknown),
+            ([20.0, 0.05, 0.01], [0.9, 0.1, 0.0], Parameters),
+            ([20.0, 0.05, 0.05], [0.1, 0.8, 0.1], Parameters),
+            ([0.05, 0.05, 0.05], [0.1, 0.8, 0.1], NoGap),
         ] {
-            let verdict = judged(&case(gap, candidates, &[]));
+            let verdict = judged(gap, probabilities, |_| ());
             assert_eq!((verdict.kind, verdict.seen), (expected, expected), "{gap:?}");
-            assert_eq!(verdict.naming.named.is_empty(), expected != Effect);
+            assert_eq!(verdict.naming.named.is_empty(), !matches!(expected, Effect | Partial));
         }
-        for (strongest, expected) in [
-            (share(0.7, false), Partial),
-            (share(0.7, true), Unknown),
-            (share(0.4, false), Unknown),
-        ] {
-            let shares = [strongest];
-            let verdict = judged(&case([20.0, 10.0, 3.0], &named, &shares));
-            assert_eq!(verdict.kind, expected, "{shares:?}");
+    }
+
+    /// Whatever the probabilities and the sizes: the verdict is that of the greatest of the three, and a name needs a gap that counts.
+    #[test]
+    fn no_verdict_contradicts_its_own_probability() {
+        let mut random = crate::numerics::random::RandomGenerator::new(11, 0);
+        for _ in 0..2000 {
+            let weights: [f64; 3] = std::array::from_fn(|_| random.unit() + 1e-9);
+            let sum: f64 = weights.iter().sum();
+            let p = weights.map(|w| w / sum);
+            let retuned = 10.0_f64.powf(4.0 * random.unit() - 2.0);
+            let gap = [retuned * (1.0 + random.unit()), retuned, retuned * random.unit()];
+            let verdict = judged(gap, p, |_| ());
+            let greatest = p.iter().copied().fold(0.0, f64::max);
+            match verdict.kind {
+                Effect | Partial => assert!(p[0] == greatest && retuned > 0.1),
+                Unknown => assert_eq!(p[2], greatest),
+                NoGap | Parameters => {
+                    assert!(p[1] == greatest || (p[0] == greatest && retuned <= 0.1))
+                }
+                Record => panic!("nothing is wrong with the record"),
+            }
         }
-        // A set that stands at its bounds is found, and named nowhere.
-        let (bound, gap) = ([share(0.9, true)], [20.0, 10.0, 0.1]);
-        let verdict = judged(&case(gap, &named, &bound));
-        assert_eq!((verdict.kind, verdict.seen), (Unknown, Unknown));
-        assert_eq!((verdict.naming.named.len(), verdict.naming.faint), (0, vec!["play".into()]));
     }
 
     #[test]
-    fn the_wrong_simulator_and_a_short_record_overrule_a_name() {
-        let named = [candidate(&["play"], true)];
-        let at_bounds = |rivals| Some(AtBounds { stage: 0, ended: vec![0, 1], left: 3.0, rivals });
-        let of = |left: f64, at_bounds, is_record, too_little| {
-            let sanity = Sanity { left: vec![0.0, left], allowed: 0.1, at_bounds };
-            let case = case([20.0, 10.0, 0.1], &named, &[]);
-            judged(&Case { sanity: &sanity, is_record, too_little, ..case })
+    fn what_is_certain_and_small_is_told_below() {
+        let small = judged([0.2, 0.05, 0.01], [0.99, 0.01, 0.0], |_| ());
+        assert_eq!(
+            (small.kind, small.naming.faint.as_slice()),
+            (Parameters, &["play".to_owned()][..])
+        );
+        assert!(small.naming.named.is_empty());
+        let chance = judged([0.2, 0.05, 0.01], [0.3, 0.7, 0.0], |_| ());
+        assert_eq!((chance.kind, chance.naming), (Parameters, Naming::default()));
+    }
+
+    #[test]
+    fn parameters_at_their_ends_and_a_short_record_carry_no_name() {
+        let (gap, p) = ([20.0, 10.0, 0.1], [0.9, 0.0, 0.1]);
+        let record = judged(gap, p, |case| case.is_record = true);
+        assert_eq!((record.kind, record.overruled), (Record, None));
+        let ended = |rivals| {
+            let at_bounds = AtBounds { stage: 0, ended: vec![0, 1], left: 3.0, rivals };
+            let sanity = Sanity { at_bounds: Some(at_bounds), ..SOUND.clone() };
+            let [play, nothing, unknown] = p;
+            let candidates = [candidate(&["play"], play)];
+            let case = Case {
+                gap: Excess { raw: 20.0, retuned: 10.0, left: 0.1 },
+                posterior: &posterior(play, nothing, unknown, 0.1),
+                candidates: &candidates,
+                shares: &[],
+                sanity: &sanity,
+                is_record: false,
+                too_little: None,
+                is_short: false,
+            };
+            judge(&case, &Thresholds::frozen(), |_| Ok(None)).unwrap().kind
         };
-        let error = of(0.5, None, true, None);
-        assert_eq!((error.kind, error.overruled), (Record, None));
-        let misfit = of(0.5, None, false, None);
-        assert_eq!(misfit.overruled, Some(Overruled::GrossMisfit { stage: 1, share: 0.5 }));
-        assert_eq!((misfit.kind, misfit.seen), (Unknown, Unknown));
-        assert_eq!(misfit.naming, Naming::default());
-        assert_eq!(of(0.0, at_bounds(Some((0.1, 0.05))), false, None).kind, Unknown);
-        assert_eq!(of(0.0, at_bounds(None), false, None).kind, Unknown);
+        assert_eq!((ended(Some((0.1, 0.05))), ended(None)), (Unknown, Unknown));
         // Loose parameters leave more than the effects do: the effects stand.
-        assert_eq!(of(0.0, at_bounds(Some((0.1, 4.0))), false, None).kind, Effect);
+        assert_eq!(ended(Some((0.1, 4.0))), Effect);
         let short = TooLittle::Short { fit_s: 3.75, test_s: 1.25 };
-        let verdict = of(0.0, None, false, Some(short));
-        assert_eq!((verdict.kind, verdict.naming.named.len()), (Unknown, 0));
+        let verdict = judged(gap, p, |case| case.too_little = Some(short));
+        assert_eq!((verdict.kind, verdict.seen, verdict.naming.named.len()), (Unknown, Effect, 0));
         assert_eq!(verdict.overruled, Some(Overruled::TooLittle(short)));
         // Without a name there is nothing that a short record could not carry.
-        let none = [candidate(&[], true)];
-        let quiet = Case { too_little: Some(short), ..case([0.01; 3], &none, &[]) };
-        assert_eq!((judged(&quiet).kind, judged(&quiet).overruled), (NoGap, None));
+        let quiet = judged([0.01; 3], [0.0, 1.0, 0.0], |case| case.too_little = Some(short));
+        assert_eq!((quiet.kind, quiet.overruled), (NoGap, None));
     }
 
     #[test]
     fn what_the_catalogue_lacks_is_asked_for_where_a_gap_is_left() {
-        let thresholds = Thresholds::frozen();
-        let (named, none) = ([candidate(&["play"], true)], [candidate(&[], true)]);
-        let strong = [share(0.7, false)];
-        let never = |_| panic!("no gap is left");
-        assert_eq!(
-            judge(&case([20.0, 10.0, 0.1], &named, &[]), &thresholds, never).unwrap().kind,
-            Effect
-        );
-        let beaten = |names: bool| {
-            assert!(names);
-            Ok(Lacking { beats_names: true, ..Lacking::default() })
+        let asked = |gap: [f64; 3], p: [f64; 3]| {
+            let (posterior, candidates) =
+                (posterior(p[0], p[1], p[2], gap[2]), [candidate(&["play"], p[0])]);
+            let case = Case {
+                gap: Excess { raw: gap[0], retuned: gap[1], left: gap[2] },
+                posterior: &posterior,
+                candidates: &candidates,
+                shares: &[],
+                sanity: &SOUND,
+                is_record: false,
+                too_little: None,
+                is_short: false,
+            };
+            let mut asked = None;
+            let lacking = |names| {
+                asked = Some(names);
+                Ok(None)
+            };
+            judge(&case, &Thresholds::frozen(), lacking).unwrap();
+            asked
         };
-        let verdict =
-            judge(&case([20.0, 10.0, 3.0], &named, &strong), &thresholds, beaten).unwrap();
-        assert_eq!((verdict.kind, verdict.naming), (Unknown, Naming::default()));
-        let noise = |names: bool| {
-            assert!(!names);
-            Ok(Lacking { is_like_noise: true, ..Lacking::default() })
-        };
-        let small = judge(&case([0.9; 3], &none, &[]), &thresholds, noise).unwrap();
-        assert_eq!((small.kind, small.seen), (Parameters, Parameters));
-        let large = judge(&case([1.1; 3], &none, &[]), &thresholds, noise).unwrap();
-        assert_eq!(large.kind, Unknown);
+        assert_eq!(asked([20.0, 10.0, 0.1], [0.9, 0.0, 0.1]), None);
+        assert_eq!(asked([20.0, 10.0, 3.0], [0.6, 0.0, 0.4]), Some(true));
+        assert_eq!(asked([20.0, 10.0, 9.0], [0.1, 0.0, 0.9]), Some(false));
     }
 }

@@ -31,8 +31,7 @@ impl Naming {
         thresholds: &Thresholds,
         is_short: bool,
     ) -> Self {
-        let is_set = |c: &&Candidate| !c.effects.is_empty();
-        let Some(first) = candidates.iter().find(is_set) else { return Self::default() };
+        let Some(first) = candidates.first() else { return Self::default() };
         let share =
             |name: &str| shares.iter().find(|s| s.effect == name).map(|s| s.closes_of_stage);
         // A rival that came out first was not taken apart: it stands where an effect that was stood.
@@ -45,7 +44,7 @@ impl Naming {
         // On a short record probabilities part what the held-out gap does not.
         let closes_alike = |c: &Candidate| is_short && c.closed >= first.closed_ci[0];
         let is_tied = |c: &&Candidate| c.probability >= TIE * first.probability || closes_alike(c);
-        let rivals = candidates.iter().filter(|c| c.effects != first.effects).filter(is_tied);
+        let rivals = candidates[1..].iter().filter(is_tied);
         let mut ties = Vec::new();
         for rival in rivals.filter(|c| c.effects.len() == first.effects.len()) {
             let lost: Vec<&String> =

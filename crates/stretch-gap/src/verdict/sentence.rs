@@ -111,11 +111,13 @@ fn seen(answer: Answer<'_>, simulator: &dyn Simulator, evidence: &Evidence) -> S
             _ if judged.seen == VerdictKind::NoGap => {
                 "Simulator and rig agree within the noise.".to_owned() + &too_small(naming)
             }
-            _ => format!(
-                "No effect is missing: with its parameters re-tuned within their tolerances the simulator agrees with the rig (what is left is {:.1} times the noise as shipped, {:.2} re-tuned).",
-                multiple(gap.raw),
-                multiple(gap.retuned)
-            ) + &too_small(naming),
+            _ => {
+                format!(
+                    "No effect is missing: with its parameters re-tuned within their tolerances the simulator agrees with the rig (what is left is {:.1} times the noise as shipped, {:.2} re-tuned).",
+                    multiple(gap.raw),
+                    multiple(gap.retuned)
+                ) + &too_small(naming)
+            }
         },
     }
 }
@@ -193,7 +195,10 @@ fn partial(answer: Answer<'_>) -> String {
         };
         let share = 100.0 * u.share.clamp(0.0, 1.0);
         let times = multiple(answer.gap.left);
-        format!("{share:.0} % are not explained, {times:.2} times the noise: they sit in {}{sits}.", u.stage)
+        format!(
+            "{share:.0} % are not explained, {times:.2} times the noise: they sit in {}{sits}.",
+            u.stage
+        )
     });
     format!("Mostly {} of the gap on trials that were not fitted. {rest}", names.join(", "))
 }

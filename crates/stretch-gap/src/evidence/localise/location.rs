@@ -9,7 +9,7 @@ pub struct StageGap {
     pub stage: String,
     /// Output channel.
     pub channel: String,
-    /// Share of the gap of the re-tuned nominal.
+    /// Share of the gap of the re-tuned nominal that has its cause here: what named effects of this stage close, and what is left in it.
     pub share: f64,
     /// Excess with the parameters as shipped.
     pub raw: f64,
@@ -25,6 +25,10 @@ pub struct StageGap {
     pub floor_source: String,
     /// Unit of the two.
     pub unit: String,
+    /// Whether the simulator has no such stage, and only the cause of the gap lies there: in the reference that lengths are measured by. What
+    /// is told of it is what its effects close in the channels where they show.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_cause_only: bool,
 }
 
 /// One slice of the gap; see [`SliceGap::by`].
@@ -68,9 +72,9 @@ pub struct Where {
 }
 
 impl Where {
-    /// The stage with the largest gap; none without a stage.
+    /// The stage of the simulator with the largest gap; none without a stage.
     pub fn worst(&self) -> Option<usize> {
-        let stages = self.stages.iter().enumerate();
-        stages.max_by(|a, b| a.1.share.total_cmp(&b.1.share)).map(|(i, _)| i)
+        let stages = self.stages.iter().enumerate().filter(|(_, s)| !s.is_cause_only);
+        stages.max_by(|a, b| a.1.excess.total_cmp(&b.1.excess)).map(|(i, _)| i)
     }
 }

@@ -136,7 +136,8 @@ fn test_trials_are_never_fitted() {
     assert_eq!(of_one.retuned_sd, of_two.retuned_sd);
     assert_eq!(one.identifiability, two.identifiability);
     for a in &one.candidates {
-        let b = two.candidates.iter().find(|b| b.effects == a.effects).expect("the same sets");
+        // A set that is worse on these test trials than nothing is no candidate.
+        let Some(b) = two.candidates.iter().find(|b| b.effects == a.effects) else { continue };
         assert_eq!((&a.by_name, &a.parameters), (&b.by_name, &b.parameters));
         assert!(a.effects == ["unknown"] || a.score == b.score);
     }
@@ -150,7 +151,6 @@ fn test_trials_are_never_fitted() {
 
 /// What is worse on the test trials than nothing closes no share of them, and is not told as if it did.
 #[test]
-#[should_panic(expected = " %: ")] // bug: "it closes -119 %" is told (issue 26, part 2); goes with it
 fn a_proposal_that_fails_on_the_test_trials_is_not_told() {
     told(&with_another_test(7).1);
 }

@@ -120,8 +120,7 @@ pub(crate) fn posterior(
 ) -> (Posterior, Vec<Candidate>) {
     let (mut kept, mut by_effects) = (Vec::new(), BTreeMap::new());
     for (hypothesis, candidate) in hypotheses.into_iter().zip(candidates) {
-        let is_possible =
-            hypothesis.effects.is_empty() || (candidate.is_confirmed && candidate.closed > 0.0);
+        let is_possible = hypothesis.effects.is_empty() || candidate.closed > 0.0;
         if is_possible {
             let left = evidence.fitted_gap(problem, &hypothesis).max(candidate.gap_after);
             by_effects.insert(hypothesis.effects.clone(), candidate);

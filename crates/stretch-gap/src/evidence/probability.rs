@@ -7,13 +7,13 @@
 //!
 //! ```text
 //! w_h = exp(S_h/t) D_h,     D_h = 1/(1 + o_h),     o_h = o (g_h/(u + v c_h))^(1/s),     c_h = max(g_retuned - g_h, 0)
-//! w_unknown = max over h of exp(S_h/t) (1 - D_h),     t = T + rho g_best/g_retuned
+//! w_unknown = sum over h of exp(S_h/t) (1 - D_h),     t = T + rho g_best/g_retuned
 //! ```
 //!
 //! and probabilities are these weights as shares of their sum. The temperature t tempers the posterior (Grunwald and van Ommen 2017, doi
 //! 10.1214/17-BA1085): the more of the gap the best set leaves, the less its form is the rig's, and the less a difference of scores says. T, rho,
-//! o, u, v and s are calibrated on development cases. A set that does not lower the gap of the trials that were not fitted is no hypothesis; one whose
-//! strongest effect stands at an end of its range stands in for something else, D_h = 0.
+//! o, u, v and s are calibrated on development cases. A set that does not lower the gap of the trials that were not fitted is no hypothesis; of
+//! one whose strongest effect stands at an end of its range the odds o_h are ten times as large, for it may stand in for something else.
 
 use crate::{
     evidence::excess::Excess,
@@ -30,6 +30,8 @@ pub(crate) struct Weighed {
     pub(crate) hypothesis: Hypothesis,
     /// Excess that it leaves: of the fitted and the test trials the greater.
     pub(crate) left: f64,
+    /// Whether its strongest effect stands at an end of its range.
+    pub(crate) is_at_bound: bool,
     pub(crate) probability: f64,
 }
 
@@ -73,7 +75,7 @@ pub(crate) fn hypotheses(
         all.push(hypothesis);
     }
     all.extend(eliminated.iter().map(|(_, less)| less).filter(|l| !l.effects.is_empty()).cloned());
-    if !best.effects.is_empty() {
+    if all.iter().all(|h| !h.effects.is_empty()) {
         all.push(nominal.clone());
     }
     all
@@ -88,12 +90,12 @@ pub(crate) fn weigh(thresholds: &Thresholds, retuned: f64, hypotheses: Vec<Fitte
     let mut sets = Vec::with_capacity(hypotheses.len());
     for Fitted { hypothesis, left, is_at_bound } in hypotheses {
         let tempered = ((hypothesis.score - top) / temperature).exp();
-        let other = match is_at_bound {
-            true => 1.0,
-            false => something_else(Excess { raw: retuned, retuned, left }, thresholds),
-        };
-        unknown = unknown.max(tempered * other);
-        sets.push(Weighed { hypothesis, left, probability: tempered * (1.0 - other) });
+        let times = if is_at_bound { AT_BOUND } else { 1.0 };
+        let odds = times * odds_of_else(Excess { raw: retuned, retuned, left }, thresholds);
+        let other = odds / (1.0 + odds);
+        unknown += tempered * other;
+        let probability = tempered * (1.0 - other);
+        sets.push(Weighed { hypothesis, left, is_at_bound, probability });
     }
     let total = unknown + sets.iter().map(|w| w.probability).sum::<f64>();
     sets.iter_mut().for_each(|w| w.probability /= total);
@@ -111,11 +113,13 @@ pub(crate) fn allowed(gap: Excess, thresholds: &Thresholds) -> f64 {
     thresholds.unknown_excess + thresholds.unknown_share * closed
 }
 
-/// Probability that something else than noise and model discrepancy leaves as much: 1 - D of the module's head.
-fn something_else(gap: Excess, thresholds: &Thresholds) -> f64 {
+/// Times by which something else is likelier where the strongest effect of a set stands at an end of its range.
+const AT_BOUND: f64 = 10.0;
+
+/// Odds that something else than noise and model discrepancy leaves as much: o_h of the module's head.
+fn odds_of_else(gap: Excess, thresholds: &Thresholds) -> f64 {
     let beyond = (gap.left.max(f64::MIN_POSITIVE) / allowed(gap, thresholds)).ln();
-    let odds = thresholds.unknown_odds * (beyond / thresholds.unknown_soft).exp();
-    odds / (1.0 + odds)
+    thresholds.unknown_odds * (beyond / thresholds.unknown_soft).exp()
 }
 
 impl Posterior {
@@ -221,17 +225,17 @@ mod tests {
         assert!(unknown[0] < 1e-6 && unknown[4] > 0.9, "{unknown:?}");
     }
 
-    /// What stands at the end of its range is something else, however well it does.
+    /// What stands at the end of its range is something else the sooner.
     #[test]
-    fn a_set_at_its_bound_is_something_else() {
-        let bound = Fitted { is_at_bound: true, ..fitted(&[0], 100.0, 0.0) };
-        let all = weigh(
-            &Thresholds::frozen(),
-            10.0,
-            vec![bound, fitted(&[1], 60.0, 0.0), fitted(&[], 0.0, 10.0)],
-        );
-        assert!(all.unknown > 0.99, "{all:?}");
-        assert_relative_eq!(sum(&all), 1.0, epsilon = 0.0, max_relative = F64_ROUNDING);
+    fn a_set_at_its_bound_may_stand_in_for_something_else() {
+        let of = |is_at_bound, left| {
+            let set = Fitted { is_at_bound, ..fitted(&[0], 100.0, left) };
+            weigh(&Thresholds::frozen(), 10.0, vec![set]).unknown
+        };
+        for left in [0.01, 0.5, 4.0] {
+            let odds = [false, true].map(|bound| of(bound, left)).map(|p| p / (1.0 - p));
+            assert_relative_eq!(odds[1] / odds[0], AT_BOUND, epsilon = 0.0, max_relative = 1e-9);
+        }
     }
 
     /// Where nothing is found and hundreds of times the noise's variance are left, nothing is no explanation.
@@ -285,8 +289,7 @@ mod tests {
     #[test]
     fn a_larger_gap_that_is_closed_may_leave_more() {
         let thresholds = Thresholds::frozen();
-        let of =
-            |retuned: f64| something_else(Excess { raw: 1e3, retuned, left: 1.0 }, &thresholds);
+        let of = |retuned: f64| odds_of_else(Excess { raw: 1e3, retuned, left: 1.0 }, &thresholds);
         assert!(of(2.0) > of(10.0) && of(10.0) > of(100.0));
         // Odds at the border.
         let at = Excess {
@@ -294,9 +297,8 @@ mod tests {
             retuned: thresholds.unknown_excess,
             left: thresholds.unknown_excess,
         };
-        let p = something_else(at, &thresholds);
         assert_relative_eq!(
-            p / (1.0 - p),
+            odds_of_else(at, &thresholds),
             thresholds.unknown_odds,
             epsilon = 0.0,
             max_relative = 1e-12

@@ -5,7 +5,7 @@
 //! | a column alone says so, or an error of record or rig file stands above every set of effects | `record` |
 //! | what the catalogue lacks is the most probable | `unknown` |
 //! | effects are the most probable, and the gap counts; what is left is noise and model discrepancy | `effect` |
-//! | the same, and more is left | `partial` |
+//! | the same, and more is left, or the strongest effect stands at an end of its range | `partial` |
 //! | nothing is the most probable, or the gap is too small to matter; as shipped there is one | `parameters` |
 //! | the same, and there is none as shipped | `no_gap` |
 //!
@@ -108,9 +108,12 @@ fn seen(case: &Case<'_>, thresholds: &Thresholds) -> VerdictKind {
         && retuned > thresholds.least_gap
         && let Some(first) = first
     {
-        let is_explained =
-            first.left <= allowed(Excess { left: first.left, ..case.gap }, thresholds);
-        if is_explained { VerdictKind::Effect } else { VerdictKind::Partial }
+        let allowed = allowed(Excess { left: first.left, ..case.gap }, thresholds);
+        if first.left <= allowed && !first.is_at_bound {
+            VerdictKind::Effect
+        } else {
+            VerdictKind::Partial
+        }
     } else if raw > thresholds.least_gap {
         VerdictKind::Parameters
     } else {
@@ -163,6 +166,7 @@ mod tests {
                 score: 0.0,
             },
             left,
+            is_at_bound: false,
             probability,
         };
         Posterior { sets: vec![set(&[0], left, play), set(&[], 10.0, nothing)], unknown }

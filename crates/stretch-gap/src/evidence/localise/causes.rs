@@ -100,16 +100,17 @@ mod tests {
         let mut toy = Toy::of(&[Law::Lag, Law::Line]);
         toy.catalogue = vec![(0, Effect::Play), (1, Effect::Quadratic)];
         let measured = toy.measured(1);
-        let names: Vec<String> = measured.effects().iter().map(|e| e.name.clone()).collect();
+        let simulator: &dyn Simulator = &measured;
+        let names: Vec<String> = simulator.effects().iter().map(|e| e.name.clone()).collect();
         let before = [stage("lag", 2.0, 0.0), stage("line", 8.0, 1.0)];
         let shares = [share(&names[1], 0.7), share(&names[0], 0.2)];
-        let told = with_causes(before.to_vec(), &shares, &names, &measured);
+        let told = with_causes(before.to_vec(), &shares, &names, simulator);
         let found: Vec<f64> = told.iter().map(|s| s.share).collect();
         // 0.2 of the first and 0.7 of the second effect, 0.1 left in the second stage.
         approx::assert_abs_diff_eq!(found[0], 0.2, epsilon = 1e-12);
         approx::assert_abs_diff_eq!(found[1], 0.8, epsilon = 1e-12);
         // Without a name the shares are those of the channels.
-        assert_eq!(with_causes(before.to_vec(), &shares, &[], &measured), before);
+        assert_eq!(with_causes(before.to_vec(), &shares, &[], simulator), before);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 mod axes;
 mod bands;
+pub(crate) mod causes;
 mod chain;
 mod excess;
 pub(crate) mod location;

@@ -1,167 +1,124 @@
-//! Calibration of what turns scores into probabilities and gaps into `unknown`.
+//! Calibration of the posterior: the thresholds under which the sealed truths are likeliest.
+//!
+//! A diagnosis lists every hypothesis with its score and with what it leaves, so that its probabilities under other thresholds are known without
+//! another diagnosis. The mean of ln P(truth) over labelled cases, every kind of case with the same weight, is raised one threshold at a time.
+
+use std::collections::{BTreeMap, BTreeSet};
 
 use stretch_blind::{COUNTED_EXCESS, CaseKind, Label, are_twins};
-use stretch_gap::{Diagnosis, Excess, Thresholds, VerdictKind};
+use stretch_gap::{Candidate, Diagnosis, Thresholds, VerdictKind};
 
 /// Probability of a truth that is no candidate.
 const NOT_LISTED: f64 = 1e-3;
 /// Least temperature, nats: other rigs bend the forms in ways that no generator of ours does, and twins are as good as alike then.
 const COLDEST: f64 = 5.0;
-/// Widths of the border between known and unknown that are tried, in logarithms of the excess left; the first is the one that the border is
-/// laid by: a sharp one would follow single cases.
-const SOFT: [f64; 6] = [0.2, 0.3, 0.45, 0.7, 1.0, 1.5];
-/// Odds of `unknown` at its border that are tried.
-const ODDS: [f64; 6] = [0.05, 0.1, 0.165, 0.3, 0.55, 1.0];
-/// Room for rigs that no generator of ours made: `unknown` begins at this many times the greatest gap of a null that was called so.
-const ROOM: f64 = 1.5;
-/// Excess below which nothing is called unknown: the noise is known to a twentieth.
-const LEAST_UNKNOWN: f64 = 0.05;
-/// What a false `unknown` costs, in overlooked ones.
-const DEAR: f64 = 3.0;
-
-/// Thresholds of labelled cases that were diagnosed; those that steer the search stay as they are.
-pub fn calibrated(cases: &[&Case]) -> Thresholds {
-    let (temperature, rho) = probabilities(cases);
-    let (unknown_excess, unknown_share, unknown_soft, unknown_odds) = unknowns(cases);
-    Thresholds {
-        temperature,
-        rho,
-        unknown_excess,
-        unknown_share,
-        unknown_soft,
-        unknown_odds,
-        ..Thresholds::frozen()
-    }
-}
+/// Factors that a threshold is multiplied by in turn, the finest last, and rounds over all thresholds with each.
+const FACTORS: [f64; 3] = [2.0, 1.3, 1.1];
+const ROUNDS: usize = 8;
 
 /// A label, and what the diagnosis said of its case.
 pub type Case = (Label, Diagnosis);
 
-/// Temperature and its growth under which the truths of single effects are most likely.
-fn probabilities(cases: &[&Case]) -> (f64, f64) {
-    let null_excess = Thresholds::frozen().null_excess;
-    let singles: Vec<(Vec<f64>, Option<usize>, f64)> = cases
-        .iter()
-        .filter(|case| {
-            let (label, d) = (&case.0, &case.1);
-            label.kind == CaseKind::Single
-                && label.excess >= COUNTED_EXCESS
-                && d.candidates.first().is_some_and(|c| c.effects.len() == 1)
-        })
-        .map(|case| {
-            let (label, d) = (&case.0, &case.1);
-            let known = d.candidates.iter().filter(|c| c.effects != ["unknown"]);
-            let scores = known.map(|c| c.score).collect();
-            let truth =
-                d.candidates.iter().position(|c| c.effects.first() == label.effects.first());
-            (scores, truth, d.gap.left / d.gap.retuned.max(null_excess))
-        })
-        .collect();
-    let likelihood = |t: f64, rho: f64| -> f64 {
-        let one = |(scores, truth, share): &(Vec<f64>, Option<usize>, f64)| {
-            let top = scores.iter().copied().fold(0.0, f64::max);
-            let odds = scores.iter().map(|s| ((s - top) / (t + rho * share)).exp());
-            let all: f64 = odds.clone().sum();
-            let own = truth.and_then(|at| odds.clone().nth(at)).unwrap_or(0.0);
-            (own / all).max(NOT_LISTED).ln()
-        };
-        singles.iter().map(one).sum()
-    };
-    let temperatures = (0..16).map(|i| COLDEST * 1.25_f64.powi(i));
-    let grid = temperatures.flat_map(|t| (0..50).map(move |i| (t, 10.0 * f64::from(i))));
-    let best = grid.max_by(|a, b| likelihood(a.0, a.1).total_cmp(&likelihood(b.0, b.1)));
-    let (t, rho) = best.unwrap_or((2.0, 100.0));
-    eprintln!(
-        "{} singles, mean log probability {:.4}",
-        singles.len(),
-        likelihood(t, rho) / singles.len() as f64
-    );
-    // What stands at an end of its grid is a bound, not an estimate.
-    if t <= COLDEST {
-        eprintln!("the temperature stands at the coldest that is tried, {COLDEST} nats");
+/// Thresholds of labelled cases that were diagnosed; those that steer the search stay as they are.
+pub fn calibrated(cases: &[&Case]) -> Thresholds {
+    let mut kinds: BTreeMap<CaseKind, Vec<(&Diagnosis, Vec<usize>)>> = BTreeMap::new();
+    for (label, diagnosis) in cases.iter().filter(|(label, d)| is_counted(label, d)) {
+        kinds.entry(label.kind).or_default().push((diagnosis, truth(label, diagnosis)));
     }
-    (round(t), round(rho))
-}
-
-/// Excess (reduced chi-square minus one) and share of it that model discrepancy may leave, between cases that an effect explains and those that none does.
-fn unknowns(cases: &[&Case]) -> (f64, f64, f64, f64) {
-    let is_counted = |label: &Label, d: &Diagnosis| {
-        label.excess >= COUNTED_EXCESS && d.gap.retuned > Thresholds::frozen().null_excess
+    let likelihood = |thresholds: &Thresholds| -> f64 {
+        let one = |(diagnosis, truth): &(&Diagnosis, Vec<usize>)| {
+            let all = diagnosis.probabilities(thresholds);
+            truth.iter().map(|&i| all[i]).sum::<f64>().max(NOT_LISTED).ln()
+        };
+        let mean = |cases: &Vec<_>| cases.iter().map(one).sum::<f64>() / cases.len() as f64;
+        kinds.values().map(mean).sum::<f64>() / kinds.len().max(1) as f64
     };
-    let mut explained = Vec::new();
-    let mut foreign = Vec::new();
-    let mut nulls = Vec::new();
-    for (label, d) in cases.iter().map(|case| (&case.0, &case.1)) {
-        let Some(best) = d.candidates.first() else { continue };
-        let of = |name: &String| best.effects.contains(name);
-        match label.kind {
-            CaseKind::Null => {
-                let is_called = d.verdict == VerdictKind::Unknown;
-                // What is called noise has no gap to be called unknown.
-                nulls.push(if is_called { d.gap } else { Excess { left: 0.0, ..d.gap } });
-            }
-            CaseKind::OutOfCatalogue if is_counted(label, d) => foreign.push(d.gap),
-            CaseKind::Struck if is_counted(label, d) => {
-                let truth = &label.effects[0];
-                if !best.effects.iter().any(|e| are_twins(e, truth, label.pressure_column)) {
-                    foreign.push(d.gap);
+    let mut best = Thresholds::frozen();
+    let mut most = likelihood(&best);
+    eprintln!("mean ln P(truth) of {} kinds: {most:.4} as they are", kinds.len());
+    for factor in FACTORS {
+        for _ in 0..ROUNDS {
+            for threshold in [temperature, rho, excess, share, soft, odds] {
+                for factor in [factor, 1.0 / factor] {
+                    let mut other = best;
+                    *threshold(&mut other) *= factor;
+                    other.temperature = other.temperature.max(COLDEST);
+                    let found = likelihood(&other);
+                    if found > most {
+                        (best, most) = (other, found);
+                    }
                 }
             }
-            CaseKind::Single | CaseKind::Compound | CaseKind::Dominant
-                if is_counted(label, d)
-                    && d.verdict != VerdictKind::Parameters
-                    && (label.effects.iter().take(2).all(of)
-                        || label.dominant.as_ref().is_some_and(of)) =>
-            {
-                explained.push(d.gap);
-            }
-            _ => {}
         }
     }
-    let of = |g: &Excess, excess: f64, share: f64, soft: f64| {
-        let beyond = (g.left.max(1e-6) / (excess + share * g.retuned)).ln();
-        1.0 / (1.0 + (-beyond / soft).exp())
-    };
-    let called = |gaps: &[Excess], excess: f64, share: f64| -> f64 {
-        let sum: f64 = gaps.iter().map(|g| of(g, excess, share, SOFT[0])).sum();
-        sum / gaps.len().max(1) as f64
-    };
-    let gain = |excess: f64, share: f64| {
-        called(&foreign, excess, share)
-            - DEAR * (called(&explained, excess, share) + called(&nulls, excess, share))
-    };
-    let least = (ROOM * nulls.iter().map(|gap| gap.left).fold(0.0, f64::max)).max(LEAST_UNKNOWN);
-    let excesses = (0..20).map(|i| least * 1.1_f64.powi(i));
-    let grid = excesses.flat_map(|e| (0..50).map(move |i| (e, 0.004 * f64::from(i))));
-    let best = grid.max_by(|a, b| gain(a.0, a.1).total_cmp(&gain(b.0, b.1)));
-    let (excess, share) = best.unwrap_or((0.1, 0.08));
-    eprintln!(
-        "called unknown: {:.3} of {} foreign, {:.3} of {} explained, {:.3} of {} nulls",
-        called(&foreign, excess, share),
-        foreign.len(),
-        called(&explained, excess, share),
-        explained.len(),
-        called(&nulls, excess, share),
-        nulls.len()
-    );
-    // Width and odds under which the truths are likeliest.
-    let likelihood = |soft: f64, odds: f64| -> f64 {
-        let ln = |p: f64| p.clamp(NOT_LISTED, 1.0).ln();
-        let of = |g: &Excess| {
-            let beyond = (g.left.max(1e-6) / (excess + share * g.retuned)).ln();
-            let odds = odds * (beyond / soft).exp();
-            odds / (1.0 + odds)
-        };
-        let is: f64 = foreign.iter().map(|g| ln(of(g))).sum();
-        is + explained.iter().chain(&nulls).map(|g| ln(1.0 - of(g))).sum::<f64>()
-    };
-    let grid = SOFT.into_iter().flat_map(|soft| ODDS.map(|odds| (soft, odds)));
-    let best = grid.max_by(|a, b| likelihood(a.0, a.1).total_cmp(&likelihood(b.0, b.1)));
-    let (soft, odds) = best.unwrap_or((SOFT[0], 1.0));
-    (round(excess), round(share), soft, odds)
+    eprintln!("mean ln P(truth): {most:.4} calibrated");
+    for threshold in [temperature, rho, excess, share, soft, odds] {
+        let value = threshold(&mut best);
+        *value = rounded(*value);
+    }
+    best
 }
 
-/// To three digits behind the point.
-fn round(x: f64) -> f64 {
-    (1e3 * x).round() / 1e3
+fn temperature(t: &mut Thresholds) -> &mut f64 {
+    &mut t.temperature
+}
+
+fn rho(t: &mut Thresholds) -> &mut f64 {
+    &mut t.rho
+}
+
+fn excess(t: &mut Thresholds) -> &mut f64 {
+    &mut t.unknown_excess
+}
+
+fn share(t: &mut Thresholds) -> &mut f64 {
+    &mut t.unknown_share
+}
+
+fn soft(t: &mut Thresholds) -> &mut f64 {
+    &mut t.unknown_soft
+}
+
+fn odds(t: &mut Thresholds) -> &mut f64 {
+    &mut t.unknown_odds
+}
+
+/// Whether a case says something of the sum: its cause shows, and the record is not what is wrong.
+fn is_counted(label: &Label, diagnosis: &Diagnosis) -> bool {
+    let shows = label.kind == CaseKind::Null || label.excess >= COUNTED_EXCESS;
+    shows && diagnosis.verdict != VerdictKind::Record
+}
+
+/// Indices of the candidates that are the truth; none where it is not listed.
+fn truth(label: &Label, diagnosis: &Diagnosis) -> Vec<usize> {
+    let named: BTreeSet<&String> = label.effects.iter().collect();
+    let is_twin = |c: &Candidate| {
+        c.effects.len() == 1 && are_twins(&c.effects[0], &label.effects[0], label.pressure_column)
+    };
+    let is_true = |c: &Candidate| match label.kind {
+        CaseKind::Null => c.effects.is_empty(),
+        CaseKind::OutOfCatalogue => c.effects == ["unknown"],
+        CaseKind::Struck => c.effects == ["unknown"] || is_twin(c),
+        CaseKind::Single | CaseKind::Compound => c.effects.iter().collect::<BTreeSet<_>>() == named,
+        CaseKind::Dominant => label.dominant.as_ref().is_some_and(|d| c.effects.contains(d)),
+    };
+    (0..diagnosis.candidates.len()).filter(|&i| is_true(&diagnosis.candidates[i])).collect()
+}
+
+/// To three digits.
+fn rounded(x: f64) -> f64 {
+    let unit = 10.0_f64.powi(x.abs().max(1e-9).log10().floor() as i32 - 2);
+    (x / unit).round() * unit
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn three_digits_stay() {
+        for (x, expected) in [(0.123_456, 0.123), (145.67, 146.0), (5.0, 5.0), (0.001_999, 0.002)] {
+            assert!((rounded(x) - expected).abs() < 1e-9, "{x}");
+        }
+    }
 }

@@ -27,7 +27,7 @@ pub use evidence::{
     shares::EffectShare,
 };
 pub use fit::identifiability::{Identified, Knowledge};
-pub use missing::{Factor, Passage, Proposed, ProposedTerm, RateForm, SignalScale, Term};
+pub use missing::{Course, Factor, Passage, Proposed, ProposedTerm, RateForm, SignalScale, Term};
 pub use numerics::random::RandomGenerator;
 pub use problem::{
     checks::DescriptionError,

@@ -35,6 +35,11 @@ fn assert_probabilities(told: &Diagnosis) {
     for pair in of_effects.windows(2) {
         assert!(pair[0].probability >= pair[1].probability, "{pair:?}");
     }
+    // What a calibration of thresholds computes from the answer is what stands in it.
+    let again = told.probabilities(&stretch_gap::Thresholds::frozen());
+    for (candidate, p) in told.candidates.iter().zip(again) {
+        assert!((candidate.probability - p).abs() < 1e-9, "{p}: {candidate:?}");
+    }
     let different: BTreeSet<BTreeSet<&String>> =
         sets.iter().map(|c| c.effects.iter().collect()).collect();
     assert_eq!(different.len(), sets.len(), "a set stands there twice: {sets:?}");

@@ -36,6 +36,12 @@ pub struct Candidate {
     pub gap_before: f64,
     /// Excess with the effects.
     pub gap_after: f64,
+    /// Excess that the set leaves, of the fitted and the test trials the greater.
+    #[serde(default)]
+    pub left: f64,
+    /// Whether the strongest effect of the set stands at an end of its range.
+    #[serde(default)]
+    pub at_bound: bool,
     /// Closed-gap fraction.
     pub closed: f64,
     /// 95 % interval of the closed-gap fraction, by block bootstrap.
@@ -135,7 +141,8 @@ pub(crate) fn posterior(
     let posterior = weigh(thresholds, evidence.gap.retuned, kept);
     let of = |w: &Weighed| {
         let candidate = by_effects.remove(&w.hypothesis.effects)?;
-        Some(Candidate { probability: w.probability, ..candidate })
+        let (left, at_bound) = (w.left, w.is_at_bound);
+        Some(Candidate { probability: w.probability, left, at_bound, ..candidate })
     };
     let candidates = posterior.sets.iter().filter_map(of).collect();
     evidence.candidates = posterior.sets.iter().map(|w| w.hypothesis.model.clone()).collect();
@@ -168,6 +175,8 @@ fn candidate(
         score: hypothesis.score,
         gap_before: interval.before,
         gap_after: interval.after,
+        left: interval.after,
+        at_bound: false,
         closed: interval.closed,
         closed_ci: interval.interval,
         is_confirmed: interval.falls,
@@ -187,6 +196,8 @@ pub(crate) fn beside_unknown(
         score: 0.0,
         gap_before: gap.retuned,
         gap_after: gap.retuned,
+        left: gap.retuned,
+        at_bound: false,
         closed: 0.0,
         closed_ci: [0.0; 2],
         is_confirmed: false,

@@ -81,30 +81,67 @@ pub(crate) fn hypotheses(
     all
 }
 
-/// Weighs hypotheses with what they leave, the best set first.
-pub(crate) fn weigh(thresholds: &Thresholds, retuned: f64, hypotheses: Vec<Fitted>) -> Posterior {
-    let share = hypotheses.first().map_or(1.0, |f| f.left / retuned.max(thresholds.null_excess));
+/// What the sum needs of a hypothesis.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Standing {
+    /// Score against the re-tuned nominal, nats.
+    pub(crate) score: f64,
+    /// Excess that it leaves.
+    pub(crate) left: f64,
+    /// Whether its strongest effect stands at an end of its range.
+    pub(crate) is_at_bound: bool,
+}
+
+/// The sum of the module's head: the probability of every hypothesis, and that of what the catalogue lacks.
+pub(crate) fn probabilities(
+    thresholds: &Thresholds,
+    retuned: f64,
+    hypotheses: &[Standing],
+) -> (Vec<f64>, f64) {
+    let best = hypotheses.iter().max_by(|a, b| a.score.total_cmp(&b.score));
+    let (top, left) = best.map_or((0.0, retuned), |best| (best.score, best.left));
+    let share = left / retuned.max(thresholds.null_excess);
     let temperature = thresholds.temperature + thresholds.rho * share;
-    let top = hypotheses.iter().map(|f| f.hypothesis.score).fold(f64::NEG_INFINITY, f64::max);
-    let mut unknown: f64 = 0.0;
-    let mut sets = Vec::with_capacity(hypotheses.len());
-    for Fitted { hypothesis, left, is_at_bound } in hypotheses {
-        let tempered = ((hypothesis.score - top) / temperature).exp();
-        let times = if is_at_bound { AT_BOUND } else { 1.0 };
-        let odds = times * odds_of_else(Excess { raw: retuned, retuned, left }, thresholds);
+    let mut unknown = 0.0;
+    let mut all = Vec::with_capacity(hypotheses.len());
+    for h in hypotheses {
+        let tempered = ((h.score - top) / temperature).exp();
+        let times = if h.is_at_bound { AT_BOUND } else { 1.0 };
+        let gap = Excess { raw: retuned, retuned, left: h.left };
+        let odds = times * odds_of_else(gap, thresholds);
         let other = odds / (1.0 + odds);
         unknown += tempered * other;
-        let probability = tempered * (1.0 - other);
-        sets.push(Weighed { hypothesis, left, is_at_bound, probability });
+        all.push(tempered * (1.0 - other));
     }
-    let total = unknown + sets.iter().map(|w| w.probability).sum::<f64>();
-    sets.iter_mut().for_each(|w| w.probability /= total);
+    let total = unknown + all.iter().sum::<f64>();
+    all.iter_mut().for_each(|p| *p /= total);
+    (all, unknown / total)
+}
+
+/// Weighs hypotheses with what they leave.
+pub(crate) fn weigh(thresholds: &Thresholds, retuned: f64, hypotheses: Vec<Fitted>) -> Posterior {
+    let standing = |f: &Fitted| Standing {
+        score: f.hypothesis.score,
+        left: f.left,
+        is_at_bound: f.is_at_bound,
+    };
+    let standings: Vec<Standing> = hypotheses.iter().map(standing).collect();
+    let (all, unknown) = probabilities(thresholds, retuned, &standings);
+    let weighed = hypotheses.into_iter().zip(all);
+    let mut sets: Vec<Weighed> = weighed
+        .map(|(Fitted { hypothesis, left, is_at_bound }, probability)| Weighed {
+            hypothesis,
+            left,
+            is_at_bound,
+            probability,
+        })
+        .collect();
     // Nothing stands behind the sets, however probable: who wants the best set finds it first.
     let is_nothing = |w: &Weighed| w.hypothesis.effects.is_empty();
     sets.sort_by(|a, b| {
         is_nothing(a).cmp(&is_nothing(b)).then(b.probability.total_cmp(&a.probability))
     });
-    Posterior { sets, unknown: unknown / total }
+    Posterior { sets, unknown }
 }
 
 /// Excess that noise and model discrepancy may leave: u + v c of the module's head.

@@ -10,7 +10,9 @@
 //! Imports: `numerics`, `problem`, `fit`.
 
 mod coloured;
+mod course;
 mod dense;
+mod digits;
 mod library;
 mod propose;
 mod proposed;
@@ -21,6 +23,7 @@ mod term_inputs;
 #[cfg(test)]
 mod tests;
 
+pub use course::Course;
 pub(crate) use propose::propose;
 pub use proposed::{Proposed, ProposedTerm, SignalScale};
 pub use term::{Factor, Passage, RateForm, Term};

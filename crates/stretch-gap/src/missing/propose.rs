@@ -2,6 +2,7 @@
 
 use crate::missing::{
     coloured::odds,
+    course::Course,
     proposed::{Proposed, ProposedTerm, acts, equation, scales, sentence, words},
     residue::{Products, Residue},
     sparse::{Sum, choice, pursue},
@@ -65,6 +66,8 @@ struct Weighed {
     /// Shares of the gap that the sum closes and that many terms foretell.
     closes: f64,
     foretold: f64,
+    /// How the residual goes in time, where it is no function of what was recorded.
+    course: Option<Course>,
 }
 
 /// Many terms at once say whether it is a function of what was recorded at all, the sum whether it is that function: what a
@@ -88,7 +91,13 @@ fn weigh(residue: &Residue<'_>, choice: &SampleRoles, sum: &Sum, estimated: &Est
     let held = |column: &Column| metric.product(choice, column, column, Role::Held);
     let samples = choice.count(Role::Held);
     let closes = closed(held(&residue.residual), held(&estimated.left), samples);
+    let course = || {
+        let (roles, noise) = (residue.roles(), metric.noise.rms);
+        let stretches: Vec<&[f64]> = roles.looked_at().map(|s| &alone[s.from..s.to]).collect();
+        Course::of(&stretches, noise, residue.compare.simulator().dt_s())
+    };
     Weighed {
+        course: if log_odds <= 0.0 { course() } else { None },
         log_odds,
         stands,
         closes: if stands { closes } else { 0.0 },
@@ -129,11 +138,12 @@ fn proposed(
         closes_held: weighed.closes,
         closes_test,
         random: weighed.log_odds <= 0.0,
+        course: weighed.course,
         log_odds: weighed.log_odds,
         foretold: weighed.foretold,
         sentence: String::new(),
     };
-    proposed.sentence = sentence(&proposed);
+    proposed.sentence = sentence(&proposed, &spec.unit);
     proposed
 }
 

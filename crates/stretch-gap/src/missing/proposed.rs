@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::missing::{
+    course::Course,
+    digits::number,
     term::{Factor, Passage, RateForm, Term},
     term_inputs::TermInputs,
 };
@@ -66,6 +68,9 @@ pub struct Proposed {
     pub acts: String,
     /// Whether what is left is random in time: no function of what was recorded foretells it.
     pub random: bool,
+    /// How it goes in time, where it is random in time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub course: Option<Course>,
     /// ln of the odds that it is a function of what was recorded rather than random in time.
     pub log_odds: f64,
     /// Share of the remaining gap that many terms of the library foretell together on samples held out.
@@ -123,19 +128,6 @@ pub(crate) fn equation(channel: &str, terms: &[ProposedTerm], signals: &[SignalS
     }
     let with = if letters.is_empty() { String::new() } else { format!("; {}", letters.join(", ")) };
     format!("{channel} += {}{with}", sum.join(" + "))
-}
-
-/// Three significant digits.
-fn number(x: f64) -> String {
-    let size = x.abs();
-    if size == 0.0 {
-        return "0".into();
-    }
-    let digits = (2 - size.log10().floor() as i32).clamp(0, 12) as usize;
-    match size {
-        1e-6..1e6 => format!("{x:.digits$}"),
-        _ => format!("{x:.2e}"),
-    }
 }
 
 /// A term in words.
@@ -217,14 +209,18 @@ pub(crate) fn acts(stage: &str, terms: &[ProposedTerm]) -> String {
 }
 
 /// The sentence.
-pub(crate) fn sentence(proposed: &Proposed) -> String {
-    let Proposed { stage, equation, closes_test, .. } = proposed;
+pub(crate) fn sentence(proposed: &Proposed, unit: &str) -> String {
+    let Proposed { stage, channel, equation, closes_test, .. } = proposed;
     // What the letters are stands with the equation.
     let equation = equation.split(';').next().unwrap_or_default();
     match (proposed.random, proposed.terms.is_empty()) {
-        (true, _) => format!(
-            "What is left in {stage} is random in time: nothing that was recorded explains it."
-        ),
+        (true, _) => {
+            let course = proposed.course.map(|c| format!(": {} in {channel}", c.words(unit)));
+            format!(
+                "What is left in {stage} is random or periodic in time, nothing that was recorded explains it{}.",
+                course.unwrap_or_default()
+            )
+        }
         (false, true) => format!(
             "What is left in {stage} follows what was recorded, but no short sum of terms says how."
         ),

@@ -7,11 +7,12 @@ use crate::{
         candidates::{Candidate, ParameterShift},
         excess::Excess,
         localise::location::Where,
+        probability::{Standing, probabilities},
         shares::EffectShare,
     },
     fit::identifiability::Identified,
     missing::Proposed,
-    problem::{rows_used::RowsUsed, simulator::ModelRuns},
+    problem::{rows_used::RowsUsed, simulator::ModelRuns, thresholds::Thresholds},
     record::gross::Gross,
     search::baselines::Baselines,
 };
@@ -153,4 +154,30 @@ pub struct Diagnosis {
     pub model_runs: Option<ModelRuns>,
     /// Seconds it took.
     pub runtime_s: f64,
+}
+
+impl Diagnosis {
+    /// Probabilities of the candidates, in their order, under other thresholds: what a calibration of these needs, without another diagnosis. The
+    /// last candidate is what the catalogue lacks; all sum to 1.
+    ///
+    /// ```
+    /// use stretch_gap::{Diagnosis, Thresholds};
+    /// fn as_diagnosed(diagnosis: &Diagnosis) {
+    ///     let again = diagnosis.probabilities(&Thresholds::frozen());
+    ///     for (candidate, p) in diagnosis.candidates.iter().zip(again) {
+    ///         assert!((candidate.probability - p).abs() < 1e-9);
+    ///     }
+    /// }
+    /// ```
+    pub fn probabilities(&self, thresholds: &Thresholds) -> Vec<f64> {
+        let Some((_, sets)) = self.candidates.split_last() else { return Vec::new() };
+        let standing = |c: &Candidate| {
+            let Candidate { score, left, at_bound, .. } = *c;
+            Standing { score, left, is_at_bound: at_bound }
+        };
+        let standings: Vec<Standing> = sets.iter().map(standing).collect();
+        let (mut all, unknown) = probabilities(thresholds, self.gap.retuned, &standings);
+        all.push(unknown);
+        all
+    }
 }

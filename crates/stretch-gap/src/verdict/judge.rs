@@ -146,6 +146,8 @@ mod tests {
             score: 100.0,
             gap_before: 10.0,
             gap_after: 0.1,
+            left: 0.1,
+            at_bound: false,
             closed: 0.99,
             closed_ci: [0.98, 1.0],
             is_confirmed: true,

@@ -93,6 +93,8 @@ mod tests {
             score: 0.0,
             gap_before: 1.0,
             gap_after: 0.1,
+            left: 0.1,
+            at_bound: false,
             closed: 0.9,
             closed_ci: [0.8, 1.0],
             is_confirmed: true,

@@ -32,6 +32,8 @@ fn candidate(effects: Vec<String>, probability: f64, random: &mut RandomGenerato
         score: 10.0 * probability,
         gap_before: 10.0,
         gap_after: 10.0 * (1.0 - closed),
+        left: 10.0 * (1.0 - closed),
+        at_bound: false,
         closed,
         closed_ci: [closed - 0.1, closed + 0.1],
         is_confirmed: random.unit() < 0.7,

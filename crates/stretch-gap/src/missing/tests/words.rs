@@ -29,6 +29,7 @@ fn proposed(terms: Vec<ProposedTerm>, random: bool) -> Proposed {
         closes_held: 0.9,
         closes_test: 0.834,
         random,
+        course: None,
         log_odds: 3.0,
         foretold: 0.95,
         sentence: String::new(),
@@ -63,15 +64,15 @@ fn an_equation_tells_each_of_its_letters_once() {
 #[test]
 fn a_sentence_says_which_of_three_it_is() {
     let x = Factor::Power { signal: 0, power: 2.0 };
-    let found = sentence(&proposed(vec![term(&[x], Passage::Direct, 0.5)], false));
+    let found = sentence(&proposed(vec![term(&[x], Passage::Direct, 0.5)], false), "V");
     assert_eq!(
         found,
         "What is missing in gauge may be volts += 0.500 V x[rod_mm]^2: it closes 83 % of what is left there on trials that were not fitted."
     );
-    let dense = sentence(&proposed(Vec::new(), false));
+    let dense = sentence(&proposed(Vec::new(), false), "V");
     assert!(dense.contains("follows what was recorded, but no short sum"), "{dense}");
-    let random = sentence(&proposed(Vec::new(), true));
-    assert!(random.contains("random in time"), "{random}");
+    let random = sentence(&proposed(Vec::new(), true), "V");
+    assert!(random.contains("random or periodic in time"), "{random}");
 }
 
 #[test]

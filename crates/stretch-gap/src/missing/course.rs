@@ -1,0 +1,231 @@
+//! How something goes in time that no recorded signal explains: it swings, jumps or drifts.
+//!
+//! With a residual r in multiples of the noise, over stretches without a break:
+//!
+//! | course | holds when | numbers |
+//! | --- | --- | --- |
+//! | swings | sines of one frequency f, of any phase in each stretch, take half of what is above the noise: sum over stretches (2/n) \|sum r exp(-i 2 pi f t)\|^2 >= (sum r^2 - N)/2 | f, and the amplitude |
+//! | jumps | changes d_i = r_i+1 - r_i of more than six noises hold half of what is above theirs: sum d_i^2 >= (sum d^2 - 2 N)/2 | how many a second, and their root mean square |
+//! | drifts | else | root mean square, and the time after which it is forgotten: its autocorrelation has fallen to 1/e |
+
+use std::f64::consts::TAU;
+
+use serde::{Deserialize, Serialize};
+
+use crate::missing::digits::number;
+
+/// Share of what is above the noise that makes a course.
+const SHARE: f64 = 0.5;
+/// Multiples of the noise from which a change is a jump: chance makes one of 3e4 samples in a thousand records.
+const JUMP: f64 = 6.0;
+/// Turns that a stretch must hold for a frequency to be one.
+const TURNS: f64 = 3.0;
+/// Greatest frequency, in turns a sample.
+const QUICKEST: f64 = 0.4;
+
+/// The course of what no recorded signal explains, in the unit of its channel.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Course {
+    /// It swings.
+    Swings {
+        /// Frequency, Hz.
+        hertz: f64,
+        /// Amplitude.
+        amplitude: f64,
+    },
+    /// It jumps.
+    Jumps {
+        /// Jumps a second.
+        per_s: f64,
+        /// Root mean square of a jump.
+        size: f64,
+    },
+    /// It drifts.
+    Drifts {
+        /// Root mean square.
+        size: f64,
+        /// Time after which it is forgotten, s.
+        correlation_s: f64,
+    },
+}
+
+impl Course {
+    /// The course of a residual in multiples of the noise, which has the standard deviation `noise`; `dt_s` is the sample time. None where there
+    /// is no more than noise.
+    pub(crate) fn of(stretches: &[&[f64]], noise: f64, dt_s: f64) -> Option<Self> {
+        let samples: usize = stretches.iter().map(|s| s.len()).sum();
+        let squares: f64 = stretches.iter().copied().flatten().map(|r| r * r).sum();
+        let above = squares - samples as f64;
+        if above <= 0.0 {
+            return None;
+        }
+        let swings = || {
+            let (turns, taken) = strongest(stretches)?;
+            let amplitude = noise * (2.0 * taken / samples as f64).sqrt();
+            let hertz = turns / dt_s;
+            (taken >= SHARE * above).then_some(Self::Swings { hertz, amplitude })
+        };
+        let drifts = || {
+            let size = noise * (above / samples as f64).sqrt();
+            Self::Drifts { size, correlation_s: dt_s * forgotten_after(stretches) as f64 }
+        };
+        Some(swings().or_else(|| jumps(stretches, noise, dt_s)).unwrap_or_else(drifts))
+    }
+
+    /// In words, with the unit of the channel.
+    pub(crate) fn words(&self, unit: &str) -> String {
+        match *self {
+            Self::Swings { hertz, amplitude } => {
+                format!(
+                    "it swings at {} Hz, {} {unit} to either side",
+                    number(hertz),
+                    number(amplitude)
+                )
+            }
+            Self::Jumps { per_s, size } => {
+                format!(
+                    "it jumps at random, some {} times a second, by {} {unit}",
+                    number(per_s),
+                    number(size)
+                )
+            }
+            Self::Drifts { size, correlation_s } => format!(
+                "it drifts at random by {} {unit}, and is forgotten after {} s",
+                number(size),
+                number(correlation_s)
+            ),
+        }
+    }
+}
+
+/// The frequency, in turns a sample, whose sines take most of the squares, and how much they take.
+fn strongest(stretches: &[&[f64]]) -> Option<(f64, f64)> {
+    let longest = stretches.iter().map(|s| s.len()).max()? as f64;
+    let step = 0.5 / longest;
+    let count = (QUICKEST / step) as usize;
+    let all = (1..=count).map(|i| step * i as f64).filter(|turns| turns * longest >= TURNS);
+    let taken = |turns: f64| stretches.iter().map(|s| taken(s, turns)).sum::<f64>();
+    all.map(|turns| (turns, taken(turns))).max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Sum of squares that a sine takes of a stretch: (2/n) |sum r exp(-i w t)|^2, by Goertzel's recursion (1958, doi 10.2307/2310304).
+fn taken(stretch: &[f64], turns: f64) -> f64 {
+    let twice = 2.0 * libm::cos(TAU * turns);
+    let (mut last, mut before) = (0.0, 0.0);
+    for r in stretch {
+        (last, before) = (r + twice * last - before, last);
+    }
+    let power = last * last + before * before - twice * last * before;
+    2.0 * power / stretch.len().max(1) as f64
+}
+
+fn jumps(stretches: &[&[f64]], noise: f64, dt_s: f64) -> Option<Course> {
+    let changes = || stretches.iter().flat_map(|s| s.windows(2).map(|p| p[1] - p[0]));
+    let count = changes().count() as f64;
+    let all: f64 = changes().map(|d| d * d).sum();
+    let large: Vec<f64> = changes().filter(|d| d.abs() > JUMP).map(|d| d * d).collect();
+    let sum: f64 = large.iter().sum();
+    let is_jumping = !large.is_empty() && sum >= SHARE * (all - 2.0 * count);
+    is_jumping.then(|| Course::Jumps {
+        per_s: large.len() as f64 / (count * dt_s),
+        size: noise * (sum / large.len() as f64).sqrt(),
+    })
+}
+
+/// Samples after which the autocorrelation has fallen to 1/e of that at one sample, which holds no white noise.
+fn forgotten_after(stretches: &[&[f64]]) -> usize {
+    let product = |lag: usize| -> f64 {
+        let long = stretches.iter().filter(|s| s.len() > lag);
+        long.map(|s| s[lag..].iter().zip(*s).map(|(a, b)| a * b).sum::<f64>()).sum()
+    };
+    let longest = stretches.iter().map(|s| s.len()).max().unwrap_or(0);
+    let least = product(1) / std::f64::consts::E;
+    let mut lag = 1;
+    while lag < longest && product(lag) > least {
+        // Every lag while they are few, then in steps of a twentieth.
+        lag += 1 + lag / 20;
+    }
+    lag
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::random::RandomGenerator;
+
+    const DT_S: f64 = 0.01;
+
+    /// White noise of 1 beside a course, in multiples of it.
+    fn beside_noise(course: impl Fn(usize) -> f64, seed: u64) -> Vec<f64> {
+        let mut random = RandomGenerator::new(seed, 0);
+        (0..12_000).map(|i| course(i) + random.gauss()).collect()
+    }
+
+    fn of(values: &[f64]) -> Option<Course> {
+        let stretches: Vec<&[f64]> = values.chunks(6000).collect();
+        Course::of(&stretches, 0.002, DT_S)
+    }
+
+    #[test]
+    fn a_swing_has_its_frequency_and_amplitude() {
+        for (hertz, size) in [(0.07, 3.0), (0.7, 1.5), (11.3, 4.0)] {
+            let found = of(&beside_noise(|i| size * libm::sin(TAU * hertz * DT_S * i as f64), 1));
+            let Some(Course::Swings { hertz: f, amplitude }) = found else { panic!("{found:?}") };
+            // Half a turn in the longest stretch is the grid; off it the sine takes less.
+            assert!((f - hertz).abs() <= 0.5 / 60.0 + 1e-9, "{f} for {hertz}");
+            assert!((amplitude / (0.002 * size) - 1.0).abs() < 0.25, "{amplitude} for {size}");
+        }
+    }
+
+    /// Steps that come twice a second in the mean.
+    #[test]
+    fn jumps_are_counted_and_measured() {
+        let mut random = RandomGenerator::new(3, 1);
+        let mut level = 0.0;
+        let course: Vec<f64> = (0..12_000)
+            .map(|_| {
+                if random.unit() < 0.02 {
+                    level = if level == 0.0 { 12.0 } else { 0.0 };
+                }
+                level
+            })
+            .collect();
+        let found = of(&beside_noise(|i| course[i], 2));
+        let Some(Course::Jumps { per_s, size }) = found else { panic!("{found:?}") };
+        // 240 are expected, sqrt(240) = 15 of them by chance.
+        assert!((1.6..2.4).contains(&per_s), "{per_s}");
+        assert!((size / 0.024 - 1.0).abs() < 0.05, "{size}");
+    }
+
+    #[test]
+    fn a_drift_has_its_time() {
+        let mut random = RandomGenerator::new(5, 1);
+        let kept = libm::exp(-DT_S / 0.8);
+        let mut x = 0.0;
+        let course: Vec<f64> = (0..12_000)
+            .map(|_| {
+                x = kept * x + (1.0 - kept * kept).sqrt() * random.gauss();
+                3.0 * x
+            })
+            .collect();
+        let found = of(&beside_noise(|i| course[i], 4));
+        let Some(Course::Drifts { size, correlation_s }) = found else { panic!("{found:?}") };
+        // 150 correlation times tell a variance to a tenth, and the time to a fifth or so.
+        assert!((size / 0.006 - 1.0).abs() < 0.2, "{size}");
+        assert!((0.5..1.2).contains(&correlation_s), "{correlation_s}");
+    }
+
+    #[test]
+    fn noise_alone_has_no_course() {
+        let quiet: Vec<f64> = beside_noise(|_| 0.0, 6).iter().map(|r| 0.9 * r).collect();
+        assert_eq!(of(&quiet), None);
+        assert_eq!(Course::of(&[], 1.0, DT_S), None);
+    }
+
+    #[test]
+    fn words_have_units() {
+        let swing = Course::Swings { hertz: 0.7, amplitude: 0.012 };
+        assert_eq!(swing.words("V"), "it swings at 0.700 Hz, 0.0120 V to either side");
+    }
+}

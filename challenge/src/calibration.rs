@@ -1,9 +1,10 @@
 //! Calibration of the posterior: the thresholds under which the sealed truths are likeliest.
 //!
 //! A diagnosis lists every hypothesis with its score and with what it leaves, so that its probabilities under other thresholds are known without
-//! another diagnosis. The mean of ln P(truth) over labelled cases is raised one threshold at a time: every kind of case weighs the same, whatever
-//! its number, and a null three times as much, for a false alarm costs more than a cause that is overlooked. Calibrated is what parts the catalogue
-//! from something else; the temperature was calibrated on more cases than such a run has, and stays.
+//! another diagnosis. The mean of ln P(truth) over labelled cases is raised one threshold at a time: nothing, one effect, two, and
+//! what the catalogue lacks weigh the same, whatever their number of cases, and nothing three times as much, for a false alarm costs more than a
+//! cause that is overlooked. Calibrated is what parts the catalogue from something else. The temperature and the softness of that border stay: they
+//! were calibrated on more cases and seeds than one run has, and a border that is as sharp as one generator's forms would be too sure of another's.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -25,7 +26,12 @@ pub type Case = (Label, Diagnosis);
 pub fn calibrated(cases: &[&Case]) -> Thresholds {
     let mut kinds: BTreeMap<CaseKind, Vec<(&Diagnosis, Vec<usize>)>> = BTreeMap::new();
     for (label, diagnosis) in cases.iter().filter(|(label, d)| is_counted(label, d)) {
-        kinds.entry(label.kind).or_default().push((diagnosis, truth(label, diagnosis)));
+        // An entry that was struck out is something that the catalogue lacks.
+        let kind = match label.kind {
+            CaseKind::Struck => CaseKind::OutOfCatalogue,
+            kind => kind,
+        };
+        kinds.entry(kind).or_default().push((diagnosis, truth(label, diagnosis)));
     }
     let likelihood = |thresholds: &Thresholds| -> f64 {
         let one = |(diagnosis, truth): &(&Diagnosis, Vec<usize>)| {
@@ -43,7 +49,7 @@ pub fn calibrated(cases: &[&Case]) -> Thresholds {
     eprintln!("mean ln P(truth) of {} kinds: {most:.4} as they are", kinds.len());
     for factor in FACTORS {
         for _ in 0..ROUNDS {
-            for threshold in [excess, share, soft, odds] {
+            for threshold in [excess, share, odds] {
                 for factor in [factor, 1.0 / factor] {
                     let mut other = best;
                     *threshold(&mut other) *= factor;
@@ -56,7 +62,7 @@ pub fn calibrated(cases: &[&Case]) -> Thresholds {
         }
     }
     eprintln!("mean ln P(truth): {most:.4} calibrated");
-    for threshold in [excess, share, soft, odds] {
+    for threshold in [excess, share, odds] {
         let value = threshold(&mut best);
         *value = rounded(*value);
     }
@@ -69,10 +75,6 @@ fn excess(t: &mut Thresholds) -> &mut f64 {
 
 fn share(t: &mut Thresholds) -> &mut f64 {
     &mut t.unknown_share
-}
-
-fn soft(t: &mut Thresholds) -> &mut f64 {
-    &mut t.unknown_soft
 }
 
 fn odds(t: &mut Thresholds) -> &mut f64 {

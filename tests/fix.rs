@@ -111,7 +111,7 @@ fn where_nothing_is_named_it_is_said_what_is_written() {
         fs::write(&path, format!("{head}\n") + &scaled.collect::<String>()).unwrap();
     }
     let said = run(&folder);
-    assert!(said.contains("fixed.toml is not written: the record or the rig file"), "{said}");
+    assert!(said.contains("fixed.toml is not written: the recording or the rig file"), "{said}");
     assert!(!fixed.exists());
 }
 

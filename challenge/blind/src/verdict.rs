@@ -137,7 +137,9 @@ impl Verdict {
 
     /// What it holds most likely, the names tied with it, and the probability of them together.
     pub(crate) fn belief(&self) -> Option<(Vec<&String>, f64)> {
-        let (first, probability) = self.candidates.first()?;
+        // Of equals the one that is listed first.
+        let candidates = self.candidates.iter().rev();
+        let (first, probability) = candidates.max_by(|a, b| a.1.total_cmp(&b.1))?;
         let mut names: Vec<&String> = first.iter().take(1).collect();
         let mut sum = *probability;
         if first.len() == 1 && self.answer() == first.as_slice() {

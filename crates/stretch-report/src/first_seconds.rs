@@ -14,12 +14,13 @@ pub(crate) fn diagnosis_verdict(subject: &Subject<'_>) -> String {
     let d = subject.diagnosis;
     let sentence = d.sentence.replace(" %", "\u{a0}%");
     // a probability holds among the candidates, and is reported as such
-    let conditional = d.candidates.first().and_then(|c| {
+    let conditional = || {
         let (before, after) = sentence.split_once("; probability ")?;
-        let rest = after.get("0.00".len()..)?;
-        Some(format!("{before}; probability {} {GIVEN}{rest}", percent(c.probability)))
-    });
-    conditional.unwrap_or(sentence)
+        let (probability, rest) = after.split_at_checked("0.00".len())?;
+        let probability = percent(probability.parse().ok()?);
+        Some(format!("{before}; probability {probability} {GIVEN}{rest}"))
+    };
+    conditional().unwrap_or(sentence)
 }
 
 /// The condition of every probability.

@@ -64,7 +64,7 @@ impl fmt::Display for Score {
         row(f, "top-1 from 0.1 to 1", &s.top1_below_1)?;
         row(f, "top-1, twins pooled", &s.top1_twins)?;
         row(f, "first name, ties not counted", &s.first_name)?;
-        row(f, "exactly the one effect named", &s.exact)?;
+        row(f, "exactly the one effect named, a declared tie counted right", &s.exact)?;
         if s.tied.hits > 0 {
             row(f, "ties declared", &s.tied)?;
             number(f, "mean names in a tie", s.tie_size)?;

@@ -33,7 +33,7 @@ use crate::{
         diagnosis::{Diagnosis, Unexplained, VerdictKind},
         judge::{Case, Judged, judge},
         proposal::lacking,
-        sentence::{Answer, tell},
+        sentence::{Answer, cut_short, tell},
     },
 };
 
@@ -149,6 +149,15 @@ struct Searched<'a> {
     eliminated: Vec<(usize, Hypothesis)>,
     /// Every set that was fitted.
     tried: BTreeMap<Vec<usize>, Hypothesis>,
+}
+
+impl Searched<'_> {
+    /// Effects of the catalogue that no fitted set holds.
+    fn not_looked_at(&self) -> Vec<&str> {
+        let effects = self.problem.simulator().effects().iter().enumerate();
+        let is_new = |e: &usize| self.tried.keys().all(|set| !set.contains(e));
+        effects.filter(|(e, _)| is_new(e)).map(|(_, spec)| spec.name.as_str()).collect()
+    }
 }
 
 /// Searches, once more where the nuisances turn out to be others beside what was found.
@@ -291,7 +300,10 @@ fn report(
     };
     let mut text = tell(answer, simulator, &evidence);
     let model_runs = runs.counted();
-    text.notes.extend(model_runs.and_then(|runs| runs.note()));
+    if let Some(note) = model_runs.and_then(|runs| runs.note()) {
+        text.sentence = cut_short(&searched.not_looked_at()) + &text.sentence;
+        text.notes.push(note);
+    }
     // What a page needs beside the answer counts as none of its cost.
     let location = Where {
         stages: with_causes(location.stages, &shares, &judged.naming.named, simulator),

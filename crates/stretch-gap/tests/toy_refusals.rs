@@ -179,6 +179,7 @@ fn a_budget_that_is_spent_is_told() {
         let (told, made) = budgeted(Some(budget));
         let runs = told.model_runs.expect("they are counted");
         assert!(runs.is_spent && runs.budget == Some(budget), "{runs:?}");
+        assert!(told.sentence.starts_with("The budget of runs was spent"), "{}", told.sentence);
         assert!(
             told.notes
                 .iter()

@@ -20,6 +20,9 @@ const LEAST_PART: f64 = 0.05;
 /// Multiple of the noise above which nothing is said to be all of it, or certain.
 const NOT_ALL: f64 = 1.5;
 
+/// Share of the gap from which a name is most of it.
+const MOST: f64 = 0.5;
+
 /// Least share that is reported as a number.
 const LEAST_SHARE_IN_WORDS: f64 = 0.01;
 
@@ -199,24 +202,35 @@ fn partial(answer: Answer<'_>) -> String {
         true => " (below 1 %)".to_owned(),
         false => format!(" ({:.0} %)", 100.0 * share),
     };
+    let is_bound = |name: &String| answer.shares.iter().any(|s| s.effect == *name && s.at_bound);
     let pairs = naming.named.iter().zip(naming.alternatives());
-    let mut names: Vec<(f64, String)> = pairs.map(|(name, told)| (closes(name), told)).collect();
+    let mut names: Vec<(f64, String)> = pairs
+        .map(|(name, words)| {
+            let share = closes(name);
+            let end = if is_bound(name) { ", at the end of its range" } else { "" };
+            (share, words + &in_words(share) + end)
+        })
+        .collect();
     names.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let names: Vec<String> =
-        names.into_iter().map(|(share, told)| told + &in_words(share)).collect();
+    let names: Vec<String> = names.into_iter().map(|(_, words)| words).collect();
+    let closed = answer.first.map_or(0.0, |first| first.closed);
+    let much = if closed >= MOST { "Mostly" } else { "In part" };
+    let times = multiple(answer.gap.left);
     let rest = answer.unexplained.map_or(String::new(), |u| {
         let sits = match u.sits.is_empty() {
             true => String::new(),
             false => format!(", most of it at {}", u.sits.join("; ")),
         };
-        let share = 100.0 * u.share.clamp(0.0, 1.0);
-        let times = multiple(answer.gap.left);
+        let share = match u.share < LEAST_SHARE_IN_WORDS {
+            true => "Less than 1 % is".to_owned(),
+            false => format!("{:.0} % are", 100.0 * u.share.min(1.0)),
+        };
         format!(
-            "{share:.0} % are not explained, {times:.2} times the noise: they sit in {}{sits}.",
+            "{share} not explained, {times:.2} times the noise: that sits in {}{sits}.",
             u.stage
         )
     });
-    format!("Mostly {} of the gap on trials that were not fitted. {rest}", names.join(", "))
+    format!("{much} {} of the gap on trials that were not fitted. {rest}", names.join(", "))
 }
 
 /// Ties and what is faint, behind the headline.

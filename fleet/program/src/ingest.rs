@@ -16,7 +16,10 @@ use stretch_data::{Trial, unit};
 use stretch_recording::ReadOptions;
 
 use crate::{
-    lake::{About, Footer, Lake, LakeFile, Place, Refused, Samples, accept, digest, refuse, write},
+    lake::{
+        About, Footer, Lake, LakeFile, Place, Refused, Samples, accept, digest, files, refuse,
+        write,
+    },
     show::{bar, say, say_json, warn_of},
     sources::{Source, Where, sources},
 };
@@ -341,8 +344,9 @@ impl Ingest<'_> {
     /// The footers of a place, those written just now too.
     fn beside(&self, place: &Place) -> impl Iterator<Item = Footer> {
         let folder = self.folder.join("trials").join(place.folder());
-        let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-        entries.filter_map(|entry| Footer::read(&entry.path()).ok())
+        // A temporary file that a kill left beside them is no trial, however whole it is.
+        let trials = files(&folder).unwrap_or_default();
+        trials.into_iter().filter_map(|path| Footer::read(&path).ok())
     }
 }
 

@@ -92,6 +92,21 @@ fn what_an_ingest_wrote_before_it_was_killed_stays() {
     assert!(same_trials(&killed_lake, &whole), "a killed lake is another");
 }
 
+/// A kill between a trial's last byte and its name leaves a temporary file that is whole.
+#[test]
+fn a_trial_that_was_killed_before_it_had_its_name_is_ingested() {
+    let folder = tempfile::tempdir().unwrap();
+    let [logs, lake] = ["logs", "lake"].map(|name| folder.path().join(name));
+    file(&logs, &trial("ulm/r2/0001/20260103_a.csv", 0.0));
+    let line = "ingest {} --lake {} --from-path {site}/{rig}/{sensor}/{date}_*.csv";
+    said(line, &[&logs, &lake]);
+    let named = only(&lake.join("trials"));
+    fs::rename(&named, named.with_file_name(".stretch-AbCdEf.tmp")).unwrap();
+    let told = said(line, &[&logs, &lake]);
+    assert!(told.contains("1 trials written") && told.contains("0 refused"), "{told}");
+    assert!(named.exists());
+}
+
 #[test]
 fn calibrations_go_on_where_they_were_killed() {
     let folder = tempfile::tempdir().unwrap();

@@ -115,8 +115,11 @@ pub(crate) fn candidates(
     hypotheses.par_iter().map(|one| candidate(problem, evidence, one, seed)).collect()
 }
 
-/// Weighs hypotheses with what they leave; their candidates are put into the same order. A set of effects that does not lower the gap of the test
-/// trials is dropped.
+/// Share of the gap of the test trials that a set of effects closes at least to be a cause of it, as a `partial` answer promises.
+const LEAST_CLOSED: f64 = 0.3;
+
+/// Weighs hypotheses with what they leave; their candidates are put into the same order. A set of effects that closes less than
+/// [`LEAST_CLOSED`] of the gap of the test trials is dropped.
 pub(crate) fn posterior(
     problem: &PreparedProblem<'_>,
     thresholds: &Thresholds,
@@ -126,7 +129,7 @@ pub(crate) fn posterior(
 ) -> (Posterior, Vec<Candidate>) {
     let (mut kept, mut by_effects) = (Vec::new(), BTreeMap::new());
     for (hypothesis, candidate) in hypotheses.into_iter().zip(candidates) {
-        let is_possible = hypothesis.effects.is_empty() || candidate.closed > 0.0;
+        let is_possible = hypothesis.effects.is_empty() || candidate.closed >= LEAST_CLOSED;
         if is_possible {
             let left = evidence.fitted_gap(problem, &hypothesis).max(candidate.gap_after);
             by_effects.insert(hypothesis.effects.clone(), candidate);

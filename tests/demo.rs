@@ -72,7 +72,10 @@ fn with_data_measured_sessions_take_the_same_way() {
     let said: Value = serde_json::from_str(&text).unwrap();
     let [raw, linear, surfaces, chosen] = rmse(&said["evaluation"]["pooled"]);
     assert!(surfaces < linear && surfaces < raw && chosen < surfaces, "{text}");
-    assert_eq!(said["diagnosis"]["verdict"], "unknown");
+    // The built-in rig is no model of this machine: whatever closes a part of the gap, more is left than a form explains.
+    let verdict = said["diagnosis"]["verdict"].as_str().unwrap();
+    assert!(["partial", "unknown"].contains(&verdict), "{verdict}");
+    assert!(said["diagnosis"]["unexplained"]["share"].as_f64().unwrap() > 0.05, "{text}");
     holds_both_parts(&out);
     let command = &mut stretch();
     command.args(["demo", "--sessions", "heel", "--data"]).arg(&sleeve);

@@ -304,11 +304,11 @@ fn report(
         text.sentence = cut_short(&searched.not_looked_at()) + &text.sentence;
         text.notes.push(note);
     }
-    // What a page needs beside the answer counts as none of its cost.
     let location = Where {
         stages: with_causes(location.stages, &shares, &judged.naming.named, simulator),
         ..location
     };
+    // What a page needs beside the answer counts as none of its cost.
     if let (true, Some(stage)) = (options.responses, location.worst()) {
         evidence.responses = responses(cause.problem, &evidence, &cause.found.best, stage)?;
     }

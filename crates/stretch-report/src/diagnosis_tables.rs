@@ -59,7 +59,7 @@ pub fn candidate_table(candidates: &[Candidate]) -> Table {
         ]
     };
     Table::new(
-        "Candidates, the most probable first: probability given this catalogue; what is left before and after in multiples of the noise, \
+        "Candidates, the most probable set first, nothing and unknown behind: probability given this catalogue; what is left before and after in multiples of the noise, \
                   all channels with a gap together; the share that closes on trials that were not fitted; \u{b1} is one standard deviation",
         &[
             "Effects",

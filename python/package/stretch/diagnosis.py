@@ -56,7 +56,8 @@ class Diagnosis:
 
     @property
     def probabilities(self) -> dict[str, float]:
-        """Probability of every candidate that was weighed, the most probable first; `unknown` is whatever nobody listed."""
+        """Probability of every candidate that was weighed, the most probable set first; behind the
+        sets that nothing is missing, and `unknown`, whatever nobody listed."""
         weighed = self._answer["candidates"]
         return {" + ".join(c["effects"]) or "nothing": c["probability"] for c in weighed}
 

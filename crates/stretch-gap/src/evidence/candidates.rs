@@ -17,7 +17,7 @@ use crate::{
         excess::Excess,
         gathered::{Evidence, StageEvidence},
         localise::location::StageGap,
-        probability::{Fitted, Posterior, Weighed, weigh},
+        probability::{Posterior, Standing, Weighed, weigh},
     },
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
     problem::{error::GapError, simulator::Simulator, thresholds::Thresholds},
@@ -133,18 +133,16 @@ pub(crate) fn posterior(
         if is_possible {
             let left = evidence.fitted_gap(problem, &hypothesis).max(candidate.gap_after);
             by_effects.insert(hypothesis.effects.clone(), candidate);
+            let (score, catalogue) = (hypothesis.score, problem.simulator().effects());
             let strongest = hypothesis.effects.first();
-            let is_at_bound = strongest.is_some_and(|&e| {
-                let spec = &problem.simulator().effects()[e];
-                hypothesis.model.effect(e).is_some_and(|values| spec.is_at_bound(values))
-            });
-            kept.push(Fitted { hypothesis, left, is_at_bound });
+            let is_at_bound = strongest.is_some_and(|&e| hypothesis.is_at_bound(e, catalogue));
+            kept.push((hypothesis, Standing { score, left, is_at_bound }));
         }
     }
     let posterior = weigh(thresholds, evidence.gap.retuned, kept);
     let of = |w: &Weighed| {
         let candidate = by_effects.remove(&w.hypothesis.effects)?;
-        let (left, at_bound) = (w.left, w.is_at_bound);
+        let Standing { left, is_at_bound: at_bound, .. } = w.standing;
         Some(Candidate { probability: w.probability, left, at_bound, ..candidate })
     };
     let candidates = posterior.sets.iter().filter_map(of).collect();

@@ -16,7 +16,6 @@
 //! one whose strongest effect stands at an end of its range the odds o_h are ten times as large, for it may stand in for something else.
 
 use crate::{
-    evidence::excess::Excess,
     fit::hypothesis::Hypothesis,
     problem::{simulator::Simulator, thresholds::Thresholds},
 };
@@ -24,25 +23,23 @@ use crate::{
 /// Probability that the 95 % set holds.
 const COVERED: f64 = 0.95;
 
-/// A hypothesis, what it leaves, and its probability.
+/// What the sum needs of a hypothesis.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Standing {
+    /// Score against the re-tuned nominal, nats.
+    pub(crate) score: f64,
+    /// Excess that it leaves: of the fitted and the test trials the greater.
+    pub(crate) left: f64,
+    /// Whether its strongest effect stands at an end of its range.
+    pub(crate) is_at_bound: bool,
+}
+
+/// A hypothesis with its probability.
 #[derive(Debug, Clone)]
 pub(crate) struct Weighed {
     pub(crate) hypothesis: Hypothesis,
-    /// Excess that it leaves: of the fitted and the test trials the greater.
-    pub(crate) left: f64,
-    /// Whether its strongest effect stands at an end of its range.
-    pub(crate) is_at_bound: bool,
+    pub(crate) standing: Standing,
     pub(crate) probability: f64,
-}
-
-/// A hypothesis beside the data.
-#[derive(Debug, Clone)]
-pub(crate) struct Fitted {
-    pub(crate) hypothesis: Hypothesis,
-    /// Excess that it leaves: of the fitted and the test trials the greater.
-    pub(crate) left: f64,
-    /// Whether its strongest effect stands at an end of its range.
-    pub(crate) is_at_bound: bool,
 }
 
 /// The posterior.
@@ -81,17 +78,6 @@ pub(crate) fn hypotheses(
     all
 }
 
-/// What the sum needs of a hypothesis.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Standing {
-    /// Score against the re-tuned nominal, nats.
-    pub(crate) score: f64,
-    /// Excess that it leaves.
-    pub(crate) left: f64,
-    /// Whether its strongest effect stands at an end of its range.
-    pub(crate) is_at_bound: bool,
-}
-
 /// The sum of the module's head: the probability of every hypothesis, and that of what the catalogue lacks.
 pub(crate) fn probabilities(
     thresholds: &Thresholds,
@@ -107,8 +93,7 @@ pub(crate) fn probabilities(
     for h in hypotheses {
         let tempered = ((h.score - top) / temperature).exp();
         let times = if h.is_at_bound { AT_BOUND } else { 1.0 };
-        let gap = Excess { raw: retuned, retuned, left: h.left };
-        let odds = times * odds_of_else(gap, thresholds);
+        let odds = times * odds_of_else(retuned, h.left, thresholds);
         let other = odds / (1.0 + odds);
         unknown += tempered * other;
         all.push(tempered * (1.0 - other));
@@ -119,22 +104,16 @@ pub(crate) fn probabilities(
 }
 
 /// Weighs hypotheses with what they leave.
-pub(crate) fn weigh(thresholds: &Thresholds, retuned: f64, hypotheses: Vec<Fitted>) -> Posterior {
-    let standing = |f: &Fitted| Standing {
-        score: f.hypothesis.score,
-        left: f.left,
-        is_at_bound: f.is_at_bound,
-    };
-    let standings: Vec<Standing> = hypotheses.iter().map(standing).collect();
+pub(crate) fn weigh(
+    thresholds: &Thresholds,
+    retuned: f64,
+    hypotheses: Vec<(Hypothesis, Standing)>,
+) -> Posterior {
+    let standings: Vec<Standing> = hypotheses.iter().map(|(_, standing)| *standing).collect();
     let (all, unknown) = probabilities(thresholds, retuned, &standings);
     let weighed = hypotheses.into_iter().zip(all);
     let mut sets: Vec<Weighed> = weighed
-        .map(|(Fitted { hypothesis, left, is_at_bound }, probability)| Weighed {
-            hypothesis,
-            left,
-            is_at_bound,
-            probability,
-        })
+        .map(|((hypothesis, standing), probability)| Weighed { hypothesis, standing, probability })
         .collect();
     // Nothing stands behind the sets, however probable: who wants the best set finds it first.
     let is_nothing = |w: &Weighed| w.hypothesis.effects.is_empty();
@@ -144,9 +123,9 @@ pub(crate) fn weigh(thresholds: &Thresholds, retuned: f64, hypotheses: Vec<Fitte
     Posterior { sets, unknown }
 }
 
-/// Excess that noise and model discrepancy may leave: u + v c of the module's head.
-pub(crate) fn allowed(gap: Excess, thresholds: &Thresholds) -> f64 {
-    let closed = (gap.retuned - gap.left).max(0.0);
+/// Excess that noise and model discrepancy may leave of a gap: u + v c of the module's head.
+pub(crate) fn allowed(retuned: f64, left: f64, thresholds: &Thresholds) -> f64 {
+    let closed = (retuned - left).max(0.0);
     thresholds.unknown_excess + thresholds.unknown_share * closed
 }
 
@@ -154,8 +133,8 @@ pub(crate) fn allowed(gap: Excess, thresholds: &Thresholds) -> f64 {
 const AT_BOUND: f64 = 10.0;
 
 /// Odds that something else than noise and model discrepancy leaves as much: o_h of the module's head.
-fn odds_of_else(gap: Excess, thresholds: &Thresholds) -> f64 {
-    let beyond = (gap.left.max(f64::MIN_POSITIVE) / allowed(gap, thresholds)).ln();
+fn odds_of_else(retuned: f64, left: f64, thresholds: &Thresholds) -> f64 {
+    let beyond = (left.max(f64::MIN_POSITIVE) / allowed(retuned, left, thresholds)).ln();
     thresholds.unknown_odds * (beyond / thresholds.unknown_soft).exp()
 }
 
@@ -210,8 +189,8 @@ mod tests {
         }
     }
 
-    fn fitted(effects: &[usize], score: f64, left: f64) -> Fitted {
-        Fitted { hypothesis: hypothesis(effects, score), left, is_at_bound: false }
+    fn fitted(effects: &[usize], score: f64, left: f64) -> (Hypothesis, Standing) {
+        (hypothesis(effects, score), Standing { score, left, is_at_bound: false })
     }
 
     /// A gap of ten times the noise's variance; sets of one effect with these scores and what each leaves.
@@ -266,7 +245,8 @@ mod tests {
     #[test]
     fn a_set_at_its_bound_may_stand_in_for_something_else() {
         let of = |is_at_bound, left| {
-            let set = Fitted { is_at_bound, ..fitted(&[0], 100.0, left) };
+            let (hypothesis, standing) = fitted(&[0], 100.0, left);
+            let set = (hypothesis, Standing { is_at_bound, ..standing });
             weigh(&Thresholds::frozen(), 10.0, vec![set]).unknown
         };
         for left in [0.01, 0.5, 4.0] {
@@ -326,16 +306,12 @@ mod tests {
     #[test]
     fn a_larger_gap_that_is_closed_may_leave_more() {
         let thresholds = Thresholds::frozen();
-        let of = |retuned: f64| odds_of_else(Excess { raw: 1e3, retuned, left: 1.0 }, &thresholds);
+        let of = |retuned: f64| odds_of_else(retuned, 1.0, &thresholds);
         assert!(of(2.0) > of(10.0) && of(10.0) > of(100.0));
         // Odds at the border.
-        let at = Excess {
-            raw: 1.0,
-            retuned: thresholds.unknown_excess,
-            left: thresholds.unknown_excess,
-        };
+        let border = thresholds.unknown_excess;
         assert_relative_eq!(
-            odds_of_else(at, &thresholds),
+            odds_of_else(border, border, &thresholds),
             thresholds.unknown_odds,
             epsilon = 0.0,
             max_relative = 1e-12

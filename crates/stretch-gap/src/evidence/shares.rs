@@ -88,7 +88,7 @@ pub(crate) fn shares(
             effect: spec.name.clone(),
             closes: closed.sum::<f64>() / whole,
             closes_of_stage: of_stages.map(|(closed, whole)| closed / whole).fold(0.0, f64::max),
-            at_bound: best.model.effect(*effect).is_some_and(|values| spec.is_at_bound(values)),
+            at_bound: best.is_at_bound(*effect, problem.simulator().effects()),
         });
         with = without;
     }

@@ -2,7 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::{fit::score::Misfit, problem::simulator::Model};
+use crate::{
+    fit::score::Misfit,
+    problem::{simulator::Model, spec::EffectSpec},
+};
 
 /// A set of effects, fitted together with every nominal parameter; the re-tuned nominal is the one without effects.
 #[derive(Debug, Clone)]
@@ -19,4 +22,11 @@ pub(crate) struct Hypothesis {
     pub(crate) parameter_sd: Vec<f64>,
     /// Log-likelihood against the re-tuned nominal, nats, with penalties: see [`crate::fit::score`].
     pub(crate) score: f64,
+}
+
+impl Hypothesis {
+    /// Whether a parameter of an effect stands at an end of its range: the effect may then stand in for something else.
+    pub(crate) fn is_at_bound(&self, effect: usize, catalogue: &[EffectSpec]) -> bool {
+        self.model.effect(effect).is_some_and(|values| catalogue[effect].is_at_bound(values))
+    }
 }

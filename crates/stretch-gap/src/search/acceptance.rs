@@ -32,12 +32,6 @@ impl Acceptance<'_> {
             && self.exceeds_discrepancy(base, next, new)
     }
 
-    /// Whether a parameter of an effect stands at an end of its range: such an effect is announced by nobody.
-    pub(crate) fn is_at_bound(&self, set: &Hypothesis, effect: usize) -> bool {
-        let spec = &self.problem.simulator().effects()[effect];
-        set.model.effect(effect).is_some_and(|values| spec.is_at_bound(values))
-    }
-
     /// Whether an effect on top of `base` can be more than what model discrepancy left.
     pub(crate) fn is_possible(&self, base: &Hypothesis, effect: usize) -> bool {
         let mut touched = self.touched(effect).iter();

@@ -273,9 +273,9 @@ impl<'a> Search<'a> {
                 .filter(|s| !best.effects.contains(&s.effect))
                 .filter(|s| self.acceptance.is_possible(&less, s.effect))
                 .collect();
-            let twins = &self.problem.simulator().effects()[effect].twins;
-            let is_twin =
-                |s: &Screened| twins.contains(&self.problem.simulator().effects()[s.effect].name);
+            let catalogue = self.problem.simulator().effects();
+            let twins = &catalogue[effect].twins;
+            let is_twin = |s: &Screened| twins.contains(&catalogue[s.effect].name);
             let list: Vec<Screened> = screened
                 .iter()
                 .take(kept)
@@ -285,7 +285,7 @@ impl<'a> Search<'a> {
                 .collect();
             for solution in self.sets.extend_all(&less, ground, &list, best.score)? {
                 let new = solution.effects.iter().find(|e| !less.effects.contains(e));
-                if new.is_some_and(|new| !self.acceptance.is_at_bound(&solution, *new)) {
+                if new.is_some_and(|new| !solution.is_at_bound(*new, catalogue)) {
                     out.push((effect, solution));
                 }
             }

@@ -17,7 +17,7 @@ use crate::{
     evidence::{
         candidates::Candidate,
         excess::Excess,
-        probability::{Posterior, allowed},
+        probability::{Posterior, Standing, allowed},
         sanity::{AtBounds, Sanity},
         shares::EffectShare,
     },
@@ -108,8 +108,8 @@ fn seen(case: &Case<'_>, thresholds: &Thresholds) -> VerdictKind {
         && retuned > thresholds.least_gap
         && let Some(first) = first
     {
-        let allowed = allowed(Excess { left: first.left, ..case.gap }, thresholds);
-        if first.left <= allowed && !first.is_at_bound {
+        let Standing { left, is_at_bound, .. } = first.standing;
+        if left <= allowed(retuned, left, thresholds) && !is_at_bound {
             VerdictKind::Effect
         } else {
             VerdictKind::Partial
@@ -167,8 +167,7 @@ mod tests {
                 parameter_sd: Vec::new(),
                 score: 0.0,
             },
-            left,
-            is_at_bound: false,
+            standing: Standing { score: 0.0, left, is_at_bound: false },
             probability,
         };
         Posterior { sets: vec![set(&[0], left, play), set(&[], 10.0, nothing)], unknown }

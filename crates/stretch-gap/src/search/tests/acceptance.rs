@@ -93,9 +93,9 @@ fn an_effect_at_the_end_of_its_range_is_told() {
     for (size, is_bound) in [(0.15, false), (0.5, true)] {
         let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Play]);
         let record = toy.hiding(&[(Effect::Play, &[size])]).measured(4);
-        let (problem, thresholds) = (prepared(&record), Thresholds::frozen());
+        let problem = prepared(&record);
         let play = with_effects(&problem, &[(0, vec![0.2])]);
         let play = Sets::new(&problem).refit(&play).expect("fitted");
-        assert_eq!(worth(&problem, &thresholds).is_at_bound(&play, 0), is_bound, "{size}");
+        assert_eq!(play.is_at_bound(0, problem.simulator().effects()), is_bound, "{size}");
     }
 }

@@ -137,6 +137,7 @@ fn prepare<'a>(
 ) -> Result<(PreparedProblem<'a>, Hypothesis), GapError> {
     let Task { simulator, options, depth, progress, stop } = task;
     let at_rows = PreparedProblem::prepare(simulator, stop, options.seed, progress)?;
+    let at_rows = at_rows.begun_anew(options.thresholds.least_gap, options.seed)?;
     let limits = (&options.thresholds, depth);
     command_timing::likelier(at_rows, between_rows, limits, options.seed, progress)
 }
@@ -169,6 +170,11 @@ fn search<'a>(
     let Task { options, depth, progress, .. } = task;
     let mut search = Search::new(&problem, &options.thresholds, depth);
     let best = search.best(from, progress)?;
+    let least_gap = options.thresholds.least_gap;
+    if let Some(other) = problem.begun_from(&best, least_gap, options.seed)? {
+        let from = other.nominal.clone();
+        return self::search(task, other, &from);
+    }
     progress("nuisances");
     let other = re_estimated(&problem, &mut search.sets, &best, options.seed)?;
     let rivalled = |mut search: Search<'_>, best| {
@@ -260,7 +266,7 @@ fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Result<Judge
         sanity,
         is_record: !cause.gross.is_empty(),
         too_little: too_little(&evidence.roles, about.rows_used(), about.dt_s),
-        is_short: is_short(&evidence.roles, about.dt_s),
+        is_short: is_short(&evidence.roles),
     };
     let best = &cause.found.best;
     let lacking = |names| lacking(cause.problem, best, names, task.progress);
@@ -299,6 +305,7 @@ fn report(
         null_band,
     };
     let mut text = tell(answer, simulator, &evidence);
+    text.notes.extend(searched.problem.starts.note());
     let model_runs = runs.counted();
     if let Some(note) = model_runs.and_then(|runs| runs.note()) {
         text.sentence = cut_short(&searched.not_looked_at()) + &text.sentence;
@@ -339,6 +346,7 @@ fn report(
         simulations,
         model_runs,
         runtime_s,
+        starts: searched.problem.starts,
         candidates,
     };
     Ok((diagnosis, evidence))

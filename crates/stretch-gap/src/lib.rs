@@ -26,7 +26,10 @@ pub use evidence::{
     response::{Answered, Response, Responses},
     shares::EffectShare,
 };
-pub use fit::identifiability::{Identified, Knowledge};
+pub use fit::{
+    identifiability::{Identified, Knowledge},
+    starts::Starts,
+};
 pub use missing::{Course, Factor, Passage, Proposed, ProposedTerm, RateForm, SignalScale, Term};
 pub use numerics::random::RandomGenerator;
 pub use problem::{

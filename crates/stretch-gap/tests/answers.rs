@@ -210,6 +210,7 @@ fn an_older_diagnosis_is_read() {
         "identifiability",
         "rows_used",
         "simulations",
+        "starts",
     ] {
         assert!(object.remove(key).is_some(), "{key}");
     }

@@ -19,5 +19,6 @@ mod toy_record;
 mod toy_refusals;
 mod toy_retuning;
 mod toy_sample_roles;
+mod toy_starts;
 mod toys;
 mod verdicts;

@@ -88,3 +88,15 @@ fn samples_are_counted_by_trial() {
     assert_eq!(samples, [0, 400, 1000, 1800]);
     assert_eq!(roles.of_role(Role::Test).map(|s| s.trial).collect::<Vec<_>>(), [1]);
 }
+
+/// Lengths count in turns of the motion: 8 s at 500 Hz of a motion that turns five times a second hold as much as 80 s of a slow one.
+#[test]
+fn a_quick_record_is_not_too_short() {
+    use crate::toys::Effect;
+    let toy = Toy { trials: vec![(4000, false)], dt_s: 0.002, ..Toy::of(&[Law::Line]) };
+    let toy = toy.may_lack(&Effect::ALL).hiding(&[(Effect::Play, &[0.1])]);
+    let wave = |hertz: f64, t: f64| 0.4 * (std::f64::consts::TAU * hertz * t).sin();
+    let x = (0..toy.samples()).map(|i| 0.002 * i as f64).map(|t| wave(5.0, t) + wave(7.3, t + 0.1));
+    let (told, _) = toy.driven_by(x.collect(), 1).diagnosed();
+    assert_eq!(told.named, ["play"], "{}", told.sentence);
+}

@@ -77,6 +77,13 @@ const TRIES: usize = 5;
 const LEAST_GAIN: (f64, f64) = (0.03, 2e-5);
 
 impl Comparison<'_> {
+    /// J of the module's head at a model, from the residuals of its stages.
+    pub(crate) fn cost(&self, stages: &[usize], model: &Model, residuals: &[Vec<f64>]) -> f64 {
+        let column = |(&s, r): (&usize, &Vec<f64>)| self.metrics[s].column(&self.roles, r.clone());
+        let columns: Vec<Column> = stages.iter().zip(residuals).map(column).collect();
+        cost(self, (stages, &coordinates(self.simulator(), stages, model)), model, &columns)
+    }
+
     /// Fits from a starting model. `known` holds sensitivities of the nominal parameters near the start, by stage.
     pub(crate) fn fit(
         &self,
@@ -104,6 +111,18 @@ impl Comparison<'_> {
         }
         Ok(descent.finish())
     }
+}
+
+/// J of the module's head: of some stages and their coordinates, at a model that leaves these residuals.
+fn cost(
+    compare: &Comparison<'_>,
+    (stages, coordinates): (&[usize], &[(Coordinate, [f64; 2])]),
+    model: &Model,
+    residuals: &[Column],
+) -> f64 {
+    let data: f64 = stages.iter().zip(residuals).map(|(&s, r)| compare.product(s, r, r)).sum();
+    let prior: f64 = coordinates.iter().map(|(c, _)| c.prior(c.read(model)).cost).sum();
+    0.5 * compare.weight() * data + prior
 }
 
 /// Fits that were possible; a simulation that fails takes its candidate out, a stop ends all.
@@ -181,10 +200,7 @@ impl<'a, 'b> Descent<'a, 'b> {
 
     /// J of the module's head.
     fn cost_of(&self, model: &Model, residuals: &[Column]) -> f64 {
-        let stages = self.stages.iter().zip(residuals);
-        let data: f64 = stages.map(|(&s, r)| self.compare.product(s, r, r)).sum();
-        let prior: f64 = self.coordinates.iter().map(|(c, _)| c.prior(c.read(model)).cost).sum();
-        0.5 * self.compare.weight() * data + prior
+        cost(self.compare, (self.stages, &self.coordinates), model, residuals)
     }
 
     /// Sensitivities where they are due, then N and g.

@@ -6,8 +6,10 @@
 //! slow drift and offsets marginalised ([`metric`], [`nuisance`], [`hyper_parameters`]); residuals and sensitivities of the
 //! stages ([`comparison`]); bounded Levenberg-Marquardt in scaled [`coordinate`]s ([`levenberg_marquardt`]); reduced
 //! chi-square and scores ([`score`], [`octaves`]); which parameters the data determine ([`identifiability`]).
+//! A descent ends in the nearest valley, so that re-tuning begins at several places ([`starts`], [`begun_anew`]).
 //! Imports: `numerics`, `problem`.
 
+pub(crate) mod begun_anew;
 pub(crate) mod comparison;
 pub(crate) mod coordinate;
 pub(crate) mod hyper_parameters;
@@ -21,6 +23,7 @@ pub(crate) mod nuisance;
 pub(crate) mod octaves;
 pub(crate) mod prepared;
 pub(crate) mod score;
+pub(crate) mod starts;
 
 #[cfg(test)]
 pub(crate) mod tests;

@@ -21,7 +21,8 @@ use crate::{
         hypothesis::Hypothesis,
         identifiability::{Identified, Information, identified},
         levenberg_marquardt::{Effort, FINE, Fitted},
-        score::{Misfit, Observations, gap, score},
+        score::{LEARNT, Misfit, Observations, gap, score},
+        starts::Starts,
     },
     problem::{
         error::GapError,
@@ -38,9 +39,6 @@ const SOLVED: f64 = 0.1;
 /// Steps of integration that are tried first, as a multiple of the simulator's own.
 const LONGER: f64 = 2.0;
 
-/// Rise of the nuisances' likelihood for which all is done again, nats: what a parameter costs.
-const LEARNT: f64 = 5.0;
-
 /// Everything that a search needs.
 pub(crate) struct PreparedProblem<'a> {
     pub(crate) compare: Comparison<'a>,
@@ -56,6 +54,8 @@ pub(crate) struct PreparedProblem<'a> {
     observations: Vec<Observations>,
     /// By stage: noise that the re-tuned nominal transmits.
     transmitted: Vec<Misfit>,
+    /// How often re-tuning was begun, and how often it ended where it stands.
+    pub(crate) starts: Starts,
 }
 
 impl<'a> PreparedProblem<'a> {
@@ -102,11 +102,21 @@ impl<'a> PreparedProblem<'a> {
         let (runs, roles) = (compare.runs.clone(), compare.roles.clone());
         let like = Some(compare.metrics.as_slice());
         let compare = Comparison::around(runs, roles, &self.nominal.model, like, seed)?;
-        Self::of(compare, self.shipped.clone(), &self.nominal.model).map(Some)
+        let other = Self::of(compare, self.shipped.clone(), &self.nominal.model)?;
+        Ok(Some(other.with_starts(self.starts)))
+    }
+
+    /// The same, re-tuned so often.
+    pub(super) fn with_starts(self, starts: Starts) -> Self {
+        Self { starts, ..self }
     }
 
     /// Re-tuned in metrics that stand.
-    fn of(compare: Comparison<'a>, shipped: Model, start: &Model) -> Result<Self, GapError> {
+    pub(super) fn of(
+        compare: Comparison<'a>,
+        shipped: Model,
+        start: &Model,
+    ) -> Result<Self, GapError> {
         let (nominal, information) = retuned(&compare, start)?;
         let stages = compare.metrics.len();
         let memory: Result<Vec<f64>, GapError> = (0..stages)
@@ -123,7 +133,17 @@ impl<'a> PreparedProblem<'a> {
             (0..stages).into_par_iter().map(|s| compare.transmitted(s, &nominal.model)).collect();
         solver_check(&compare, &nominal.model)?;
         let transmitted = transmitted?;
-        Ok(Self { compare, shipped, nominal, information, memory, observations, transmitted })
+        let starts = Starts { tried: 1, agreed: 1 };
+        Ok(Self {
+            compare,
+            shipped,
+            nominal,
+            information,
+            memory,
+            observations,
+            transmitted,
+            starts,
+        })
     }
 
     /// The same problem beside another simulator of the same stages and parameters.
@@ -139,6 +159,7 @@ impl<'a> PreparedProblem<'a> {
             memory: self.memory.clone(),
             observations: self.observations.clone(),
             transmitted: self.transmitted.clone(),
+            starts: self.starts,
         }
     }
 
@@ -294,17 +315,20 @@ impl<'a> PreparedProblem<'a> {
     }
 }
 
+/// Sensitivities of all stages around a model, where runs cost.
+pub(super) fn linearise(compare: &Comparison<'_>, model: &Model) -> Result<(), GapError> {
+    let Some(costly) = compare.simulator().costly() else { return Ok(()) };
+    let mut stages = 0..compare.metrics.len();
+    stages.try_for_each(|stage| costly.linearise(stage, model, compare.roles.fit_trials))
+}
+
 /// Every stage re-tuned on its own, those that share a parameter together: without effects no other stage knows of it.
 fn retuned(
     compare: &Comparison<'_>,
     start: &Model,
 ) -> Result<(Hypothesis, Vec<Information>), GapError> {
     let simulator = compare.simulator();
-    if let Some(costly) = simulator.costly() {
-        for stage in 0..compare.metrics.len() {
-            costly.linearise(stage, start, compare.roles.fit_trials)?;
-        }
-    }
+    linearise(compare, start)?;
     let groups = groups(simulator);
     let fits: Result<Vec<_>, GapError> =
         groups.par_iter().map(|group| compare.fit(group, start.clone(), &[], FINE)).collect();

@@ -43,6 +43,8 @@ pub(crate) struct Observations {
     pub(crate) held: f64,
 }
 
+/// Rise of a likelihood, or fall of a cost, for which all is done again, nats: what a parameter costs.
+pub(crate) const LEARNT: f64 = 5.0;
 /// Share by which the noise of an input may be larger than was taken: heavy tails pass for little where a robust deviation is asked.
 const LARGER: f64 = 0.5;
 /// Share of a mean square that is left at least when noise is taken from it.

@@ -15,6 +15,7 @@ pub(crate) mod description;
 pub(crate) mod error;
 pub(crate) mod linked_stages;
 pub(crate) mod noise;
+mod pace;
 pub(crate) mod record_facts;
 pub(crate) mod rows_used;
 pub(crate) mod runs;

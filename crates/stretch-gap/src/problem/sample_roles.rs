@@ -6,7 +6,7 @@
 
 use serde::Serialize;
 
-use crate::problem::{error::GapError, simulator::Simulator, spec::TrialSpec};
+use crate::problem::{error::GapError, pace, simulator::Simulator, spec::TrialSpec};
 
 /// What a stretch of samples is used for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -33,10 +33,11 @@ pub struct Segment {
     pub role: Role,
 }
 
-/// Length of a block: residuals within one are taken as one observation, s.
+/// Length of a block: residuals within one are taken as one observation, s. Of a record whose motion turns more quickly than once a second
+/// a block is half a turn.
 pub const BLOCK_S: f64 = 0.5;
-/// Trials at least this long lend their last part to be held out, s.
-const LONG_S: f64 = 30.0;
+/// Trials of at least so many blocks lend their last part to be held out.
+const LONG: f64 = 60.0;
 /// Share of a long trial that is held out.
 const HELD: f64 = 0.3;
 /// Share of every trial that is tested on where there is no test trial.
@@ -59,6 +60,23 @@ pub struct SampleRoles {
 fn may_fit(trial: &TrialSpec, borrowed_test: bool) -> usize {
     let share = if borrowed_test { TESTED } else { 0.0 };
     if trial.is_test { 0 } else { trial.samples - (share * trial.samples as f64) as usize }
+}
+
+/// By stage: the parts of its measured output that are not tested on.
+fn looked_at(
+    simulator: &dyn Simulator,
+) -> impl Iterator<Item = impl Iterator<Item = &[f64]> + Clone> {
+    let trials = simulator.trials();
+    let mut end = 0;
+    let part = |(trial, looked): (&TrialSpec, usize)| {
+        end += trial.samples;
+        end - trial.samples..end - trial.samples + looked
+    };
+    let parts: Vec<_> = trials.iter().zip(SampleRoles::not_tested(trials)).map(part).collect();
+    (0..simulator.stages().len()).map(move |stage| {
+        let measured = simulator.measured(stage);
+        parts.clone().into_iter().map(move |part| &measured[part])
+    })
 }
 
 impl SampleRoles {
@@ -84,6 +102,7 @@ impl SampleRoles {
         let trials = simulator.trials();
         let dt_s = simulator.dt_s();
         let borrowed_test = trials.iter().all(|t| !t.is_test);
+        let block_s = pace::block_s(looked_at(simulator), dt_s);
         let mut segments = Vec::new();
         let mut begin = 0;
         for (trial, spec) in trials.iter().enumerate() {
@@ -97,7 +116,7 @@ impl SampleRoles {
             if spec.is_test {
                 add(begin, end, Role::Test);
             } else {
-                let is_long = (test - begin) as f64 * dt_s >= LONG_S;
+                let is_long = (test - begin) as f64 * dt_s >= LONG * block_s;
                 let held = if is_long { HELD * (test - begin) as f64 } else { 0.0 };
                 let fit = test - held as usize;
                 add(begin, fit, Role::Fit);
@@ -113,7 +132,7 @@ impl SampleRoles {
                 hint: "give at least one trial split = \"fit\"".into(),
             });
         };
-        let block = ((BLOCK_S / dt_s).round() as usize).max(1);
+        let block = ((block_s / dt_s).round() as usize).max(1);
         Ok(Self { segments, block, fit_trials: last + 1, borrowed_test })
     }
 

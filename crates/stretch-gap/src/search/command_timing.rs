@@ -47,6 +47,7 @@ pub(crate) fn likelier<'a>(
     }
     progress("when commands switch");
     let between = PreparedProblem::prepare(between_rows, at_rows.stop(), seed, progress)?;
+    let between = between.begun_anew(thresholds.least_gap, seed)?;
     if between.log_likelihood(&between.nominal) <= at_rows.log_likelihood(&at_rows.nominal) {
         return Ok((at_rows, unaltered));
     }

@@ -10,7 +10,7 @@ use crate::{
         probability::{Standing, probabilities},
         shares::EffectShare,
     },
-    fit::identifiability::Identified,
+    fit::{identifiability::Identified, starts::Starts},
     missing::Proposed,
     problem::{rows_used::RowsUsed, simulator::ModelRuns, thresholds::Thresholds},
     record::gross::Gross,
@@ -152,6 +152,9 @@ pub struct Diagnosis {
     /// Runs of a black box, where that is what costs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_runs: Option<ModelRuns>,
+    /// How often the nominal parameters were re-tuned from other places within their tolerances, and how often that ended alike.
+    #[serde(default)]
+    pub starts: Starts,
     /// Seconds it took.
     pub runtime_s: f64,
 }

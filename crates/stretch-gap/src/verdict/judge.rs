@@ -270,7 +270,7 @@ mod tests {
         assert_eq!((ended(Some((0.1, 0.05))), ended(None)), (Unknown, Unknown));
         // Loose parameters leave more than the effects do: the effects stand.
         assert_eq!(ended(Some((0.1, 4.0))), Effect);
-        let short = TooLittle::Short { fit_s: 3.75, test_s: 1.25 };
+        let short = TooLittle::Short { fit_s: 3.75, test_s: 1.25, block_s: 0.5 };
         let verdict = judged(gap, p, |case| case.too_little = Some(short));
         assert_eq!((verdict.kind, verdict.seen, verdict.naming.named.len()), (Unknown, Effect, 0));
         assert_eq!(verdict.overruled, Some(Overruled::TooLittle(short)));

@@ -13,6 +13,9 @@ pub(crate) enum Law {
     Oscillator,
     /// y(t) = gain x(t - delay), on straight lines between samples.
     Delay,
+    /// y'' = (2 pi rate)^2 (gain x - sin y) - 2 damping (2 pi rate) y', by the midpoint rule, from rest at y = 0: it goes over the top
+    /// where gain x is above 1 for long, and y counts its turns.
+    Pendulum,
 }
 
 impl Law {
@@ -22,6 +25,7 @@ impl Law {
             Self::Lag => "lag",
             Self::Oscillator => "oscillator",
             Self::Delay => "delay",
+            Self::Pendulum => "pendulum",
         }
     }
 
@@ -41,6 +45,11 @@ impl Law {
                 positive(of("damping", "1", 0.3, 0.03)),
             ],
             Self::Delay => vec![gain, positive(of("delay", "s", 0.05, 0.005))],
+            Self::Pendulum => vec![
+                of("gain", "1/v", 1.5, 0.15),
+                positive(of("rate", "Hz", 1.0, 0.05)),
+                positive(of("damping", "1", 0.1, 0.02)),
+            ],
         }
     }
 }
@@ -202,7 +211,8 @@ impl Plant<'_> {
                     *out = y;
                 }
             }
-            Law::Oscillator => self.swing(&x, out),
+            Law::Oscillator => self.swing(&x, out, |y| y),
+            Law::Pendulum => self.swing(&x, out, f64::sin),
             Law::Delay => {
                 late(&mut x, self.at(1, 0) / self.dt_s);
                 for (i, (out, x)) in out.iter_mut().zip(&x).enumerate() {
@@ -221,14 +231,15 @@ impl Plant<'_> {
         self.parameters[parameter] + courses.map(|(_, course)| course[sample]).sum::<f64>()
     }
 
-    fn swing(&self, x: &[f64], out: &mut [f64]) {
+    /// What swings against a restoring force of its angle, from rest.
+    fn swing(&self, x: &[f64], out: &mut [f64], restoring: fn(f64) -> f64) {
         let steps = ((self.dt_s / self.step_s).round() as usize).max(1);
         let h = self.dt_s / steps as f64;
         let (mut y, mut v) = (self.at(0, 0) * x.first().copied().unwrap_or(0.0), 0.0);
         for (i, (out, x)) in out.iter_mut().zip(x).enumerate() {
             let w = std::f64::consts::TAU * self.at(1, i);
             let (to, rub) = (self.at(0, i) * x, 2.0 * self.at(2, i) * w);
-            let push = |y: f64, v: f64| w * w * (to - y) - rub * v;
+            let push = |y: f64, v: f64| w * w * (to - restoring(y)) - rub * v;
             for _ in 0..steps {
                 let (half_y, half_v) = (y + 0.5 * h * v, v + 0.5 * h * push(y, v));
                 (y, v) = (y + h * half_v, v + h * push(half_y, half_v));

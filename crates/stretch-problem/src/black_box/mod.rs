@@ -8,6 +8,7 @@ mod facts;
 mod families;
 mod fixed;
 mod linear;
+mod repeated;
 mod runs;
 pub(crate) mod source;
 pub(crate) mod spec;
@@ -249,7 +250,9 @@ const FINAL: (usize, usize) = (20, 8);
 /// A source's error as the diagnosis takes it: a fit turns back where values cannot be simulated.
 fn refused(error: SourceError) -> GapError {
     match error {
-        SourceError::Gone(_) | SourceError::Length { .. } => GapError::Broken(Box::new(error)),
+        SourceError::Gone(_) | SourceError::Length { .. } | SourceError::Changed { .. } => {
+            GapError::Broken(Box::new(error))
+        }
         _ => GapError::simulator(error),
     }
 }

@@ -4,11 +4,15 @@ use std::{
     collections::HashSet,
     num::NonZeroUsize,
     sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
+    time::{Duration, Instant},
 };
 
 use lru::LruCache;
 
-use crate::black_box::source::{Ask, RecordedSession, Source, SourceError};
+use crate::black_box::{
+    repeated::{self, LONG},
+    source::{Ask, RecordedSession, Source, SourceError},
+};
 
 /// Number of samples that are kept, of all runs together: a quarter of a gigabyte.
 const KEPT: usize = 1 << 25;
@@ -41,6 +45,8 @@ struct Made {
     under_way: HashSet<Key>,
     count: usize,
     refused: Vec<String>,
+    /// Whether a run has been asked for twice.
+    is_repeated: bool,
 }
 
 /// A source and its answers.
@@ -62,7 +68,13 @@ impl Runs {
     pub(crate) fn new(source: Arc<dyn Source>, budget: Option<usize>, samples: usize) -> Self {
         let most = NonZeroUsize::new((KEPT / samples.max(1)).max(FEWEST));
         let kept = LruCache::new(most.unwrap_or(NonZeroUsize::MIN));
-        let made = Made { kept, under_way: HashSet::new(), count: 0, refused: Vec::new() };
+        let made = Made {
+            kept,
+            under_way: HashSet::new(),
+            count: 0,
+            refused: Vec::new(),
+            is_repeated: false,
+        };
         let answers_all = source.answers_all();
         Self { source, budget, made: Mutex::new(made), done: Condvar::new(), answers_all }
     }
@@ -178,12 +190,10 @@ impl Runs {
         mine: &[usize],
         out: &mut [Option<Answer>],
     ) {
-        let asks: Vec<Ask<'_>> = mine.iter().map(|&i| ask(&wanted[i])).collect();
-        let source = &*self.source;
-        let answers = std::thread::scope(|scope| {
-            let asked = scope.spawn(|| source.simulate_many(&asks)).join();
-            asked.unwrap_or_else(|_| vec![Err(SourceError::Gone("the simulator panicked".into()))])
-        });
+        let runs: Vec<&Inner> = mine.iter().map(|&i| &wanted[i]).collect();
+        let begun = Instant::now();
+        let mut answers = self.asked(&runs);
+        self.repeat(session, &runs, &mut answers, begun.elapsed());
         let mut answers = answers.into_iter();
         let mut made = self.lock();
         for &i in mine {
@@ -202,6 +212,44 @@ impl Runs {
         }
         drop(made);
         self.done.notify_all();
+    }
+
+    /// What the source answers, asked from a thread of its own.
+    fn asked(&self, runs: &[&Inner]) -> Vec<Result<Vec<f64>, SourceError>> {
+        let asks: Vec<Ask<'_>> = runs.iter().map(|run| ask(run)).collect();
+        let source = &*self.source;
+        std::thread::scope(|scope| {
+            let asked = scope.spawn(|| source.simulate_many(&asks)).join();
+            asked.unwrap_or_else(|_| vec![Err(SourceError::Gone("the simulator panicked".into()))])
+        })
+    }
+
+    /// Asks for the first run that was ever answered once more; where the source answers differently, that is the answer.
+    fn repeat(
+        &self,
+        session: &RecordedSession,
+        runs: &[&Inner],
+        answers: &mut [Result<Vec<f64>, SourceError>],
+        took: Duration,
+    ) {
+        let Some(at) = answers.iter().position(Result::is_ok) else { return };
+        let mut made = self.lock();
+        let is_spent = self.budget.is_some_and(|budget| made.count >= budget);
+        if std::mem::replace(&mut made.is_repeated, true) || took > LONG || is_spent {
+            return;
+        }
+        made.count += 1;
+        drop(made);
+        let run = runs[at];
+        let samples = session.samples(run.trials);
+        let first = std::mem::replace(&mut answers[at], Ok(Vec::new()));
+        let first = first.and_then(|values| self.checked(session, run, values));
+        let second = self.asked(&[run]).pop().unwrap_or_else(|| Ok(Vec::new()));
+        let stage = if self.answers_all { 0 } else { run.stage };
+        answers[at] = first.and_then(|first| {
+            let second = self.checked(session, run, second?)?;
+            repeated::alike(session, stage, [&first, &second], samples).map(|()| first)
+        });
     }
 
     /// Checks that an answer holds as many finite numbers as were asked for.

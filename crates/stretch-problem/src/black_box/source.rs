@@ -117,6 +117,22 @@ pub enum SourceError {
         /// Time since the trial began, s.
         time_s: f64,
     },
+    /// The same run was asked for twice and answered differently: no difference between two models could be believed.
+    #[error(
+        "stage {stage}: the simulator answers the same question differently, {first} and then {second} in row {row} of trial {trial}; seed its random numbers, and begin every run from the same state"
+    )]
+    Changed {
+        /// The stage.
+        stage: String,
+        /// The trial.
+        trial: String,
+        /// The sample of the trial, from 0.
+        row: usize,
+        /// What was answered first.
+        first: f64,
+        /// What was answered then.
+        second: f64,
+    },
     /// The budget of runs is spent.
     #[error("the budget of {budget} model runs is spent")]
     Spent {

@@ -1,0 +1,261 @@
+//! Re-tuning from several places within the tolerances, so that the end of one descent is not taken for the best that parameters can do.
+//!
+//! A descent ends in the nearest valley of the cost J of [a fit](crate::fit::levenberg_marquardt). What swings or turns over has many valleys: a
+//! phase that is half a turn off at the end is no further from the record than one that is a whole turn off. So where the gap that a re-tuning
+//! leaves counts, further places are looked at before anything is blamed for it:
+//!
+//! 1. the costs at the parameters as shipped and at [`POINTS`] places of a Latin hypercube within [`SPREAD`] tolerances (McKay, Beckman and
+//!    Conover 1979, doi 10.1080/00401706.1979.10489755), in one batch;
+//! 2. a descent from each of the best places whose cost is near that of the re-tuning. Where the cost has one valley there are none;
+//! 3. a descent over growing parts of the trials, from the place that fits their beginnings best: at the beginning of a trial phases are nearly
+//!    right, and every longer part goes on from where the last one ended. It goes on only as long as it leaves little of the gap: a
+//!    beginning that no parameters explain is not explained in the whole.
+//!
+//! A descent that ends [`LEARNT`] nats lower takes the place of the re-tuning.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    fit::{
+        comparison::Comparison,
+        coordinate::coordinates,
+        levenberg_marquardt::{FINE, Fitted},
+        metric::Metric,
+        score::{LEARNT, Misfit, gap},
+    },
+    numerics::random::RandomGenerator,
+    problem::{error::GapError, linked_stages::groups, sample_roles::Role, simulator::Model},
+};
+
+/// Places that are screened.
+const POINTS: usize = 10;
+/// Tolerances within which they lie.
+const SPREAD: f64 = 2.0;
+/// Places that a descent begins from, the best first.
+const DESCENTS: usize = 3;
+/// Times the cost of the re-tuning up to which the cost at a place is near it.
+const NEAR: f64 = 2.0;
+/// Descents one behind the other, each with sensitivities of its own.
+const ROUNDS: usize = 4;
+/// Parts of the trials that a descent grows over.
+const PARTS: [f64; 4] = [0.1, 0.2, 0.4, 0.7];
+/// Share of the gap of the re-tuning that such a descent may leave of a part.
+const LEFT: f64 = 0.1;
+/// Share of the cost within which two descents ended alike.
+const ALIKE: f64 = 0.01;
+
+/// How often re-tuning was begun, and how often it ended where the best one did.
+///
+/// ```
+/// use stretch_gap::Starts;
+/// assert_eq!(Starts { tried: 4, agreed: 3 }.note().as_deref(), Some(
+///     "re-tuning has several ends: of 4 starts within the tolerances 3 came to the best one, which the diagnosis goes on from; tell the parameters more narrowly if you can"
+/// ));
+/// assert_eq!(Starts { tried: 1, agreed: 1 }.note(), None);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Starts {
+    /// Places within the tolerances from which parameters were re-tuned; 1 where no other place came near what was found from the parameters as
+    /// shipped, 0 in a diagnosis of an older version.
+    pub tried: usize,
+    /// How many of them ended where the best one did.
+    pub agreed: usize,
+}
+
+impl Starts {
+    /// That the starts disagree, in words; none where they agree.
+    pub fn note(&self) -> Option<String> {
+        let Self { tried, agreed } = self;
+        (agreed < tried).then(|| {
+            format!(
+                "re-tuning has several ends: of {tried} starts within the tolerances {agreed} came to the best one, which the diagnosis goes on from; tell the parameters more narrowly if you can"
+            )
+        })
+    }
+
+    /// Those of two groups of stages: the group whose starts disagree most.
+    fn beside(self, other: Self) -> Self {
+        let misses = |s: &Self| (s.tried - s.agreed, s.tried);
+        if misses(&other) > misses(&self) { other } else { self }
+    }
+}
+
+/// Where a re-tuning may begin beside the one that was made.
+pub(crate) enum Places<'m> {
+    /// Anywhere within the tolerances, drawn from a seed.
+    Tolerances(u64),
+    /// At the parameters of a model.
+    At(&'m Model),
+}
+
+/// A model whose re-tuned parameters leave less than those of `nominal`, none where there is none; and how the starts agreed.
+///
+/// Groups of stages whose gap is at most `least_gap` are left as they are.
+pub(crate) fn better_start(
+    compare: &Comparison<'_>,
+    nominal: &Model,
+    counts: impl Fn(usize) -> bool,
+    places: &Places<'_>,
+) -> Result<(Option<Model>, Starts), GapError> {
+    let (mut best, mut starts) = (nominal.clone(), Starts { tried: 1, agreed: 1 });
+    for group in groups(compare.simulator()) {
+        if !group.iter().any(|stage| counts(*stage)) || compare.runs.is_spent() {
+            continue;
+        }
+        let (ended, own) = Begun { compare, group: &group, nominal }.looked_at(places)?;
+        starts = starts.beside(own);
+        for &p in group.iter().flat_map(|stage| &compare.simulator().stages()[*stage].parameters) {
+            best.parameters[p] = ended.as_ref().map_or(best.parameters[p], |m| m.parameters[p]);
+        }
+    }
+    Ok(((best != *nominal).then_some(best), starts))
+}
+
+/// Stages that are re-tuned together, and where their re-tuning ended.
+struct Begun<'a, 'b> {
+    compare: &'a Comparison<'b>,
+    group: &'a [usize],
+    nominal: &'a Model,
+}
+
+impl Begun<'_, '_> {
+    /// The model of a descent that ends lower, and how many ended there.
+    fn looked_at(&self, places: &Places<'_>) -> Result<(Option<Model>, Starts), GapError> {
+        let mut models = vec![self.nominal.clone()];
+        match places {
+            Places::Tolerances(seed) => models.extend(self.hypercube(*seed)),
+            Places::At(model) => models.push(Model { effects: Vec::new(), ..(*model).clone() }),
+        }
+        let first = begun(self.compare, PARTS[0]);
+        let costs = self.costs(&models, [self.compare, &first])?;
+        let found = costs[0].map_or(f64::INFINITY, |[whole, _]| whole);
+        let others = models.into_iter().zip(costs).skip(1);
+        let mut others: Vec<(Model, [f64; 2])> =
+            others.filter_map(|(model, costs)| Some((model, costs?))).collect();
+        let mut ends: Vec<Fitted> = Vec::new();
+        if matches!(places, Places::Tolerances(_)) {
+            let of_beginning =
+                |a: &&(Model, [f64; 2]), b: &&(Model, [f64; 2])| a.1[1].total_cmp(&b.1[1]);
+            let best = others.iter().min_by(of_beginning).map(|(model, _)| model.clone());
+            ends.extend(best.map(|model| self.grown(model)).transpose()?.flatten());
+        }
+        others.retain(|(_, [whole, _])| *whole <= NEAR * found);
+        others.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
+        for (model, _) in others.into_iter().take(DESCENTS) {
+            ends.extend(self.descended(self.compare, model)?);
+        }
+        let least = ends.iter().map(|end| end.cost).fold(found, f64::min);
+        let is_least = |cost: &f64| *cost <= (1.0 + ALIKE) * least + LEARNT;
+        let all = || ends.iter().map(|end| end.cost).chain([found]);
+        let starts = Starts { tried: all().count(), agreed: all().filter(is_least).count() };
+        let lowest = ends.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
+        Ok((lowest.filter(|end| found - end.cost > LEARNT).map(|end| end.model), starts))
+    }
+
+    /// The parameters as shipped, and places of a Latin hypercube: of every parameter each of as many equal parts of its range holds one place.
+    fn hypercube(&self, seed: u64) -> Vec<Model> {
+        let free = coordinates(self.compare.simulator(), self.group, self.nominal);
+        let mut random = RandomGenerator::new(seed, 71);
+        let mut models = vec![self.nominal.clone(); if free.is_empty() { 0 } else { POINTS }];
+        for (coordinate, [low, high]) in free {
+            let (low, high) = (low.max(-SPREAD), high.min(SPREAD));
+            let mut order: Vec<(u64, usize)> = (0..POINTS).map(|i| (random.bits(), i)).collect();
+            order.sort_unstable();
+            for (model, (_, part)) in models.iter_mut().zip(order) {
+                let share = (part as f64 + random.unit()) / POINTS as f64;
+                coordinate.write(model, low + share * (high - low));
+            }
+        }
+        models.push(Model::nominal(self.compare.simulator()));
+        models
+    }
+
+    /// Costs of some models, each over the whole and over the beginning of the trials, in one batch; none where one cannot be simulated.
+    fn costs(
+        &self,
+        models: &[Model],
+        compare: [&Comparison<'_>; 2],
+    ) -> Result<Vec<Option<[f64; 2]>>, GapError> {
+        let wanted: Vec<(usize, &Model)> =
+            models.iter().flat_map(|model| self.group.iter().map(move |&s| (s, model))).collect();
+        let mut there = self.compare.residuals_of(&wanted, None).into_iter();
+        let mut out = Vec::with_capacity(models.len());
+        for model in models {
+            let own: Vec<_> = there.by_ref().take(self.group.len()).collect();
+            out.push(match own.into_iter().collect::<Result<Vec<_>, _>>() {
+                Ok(residuals) => Some(compare.map(|c| c.cost(self.group, model, &residuals))),
+                Err(error) if error.ends_all() => return Err(error),
+                Err(_) => None,
+            });
+        }
+        Ok(out)
+    }
+
+    /// Where descents from a model end, one behind the other as long as something is gained; none where it cannot be simulated.
+    fn descended(
+        &self,
+        compare: &Comparison<'_>,
+        mut model: Model,
+    ) -> Result<Option<Fitted>, GapError> {
+        let mut best: Option<Fitted> = None;
+        for _ in 0..ROUNDS {
+            if compare.runs.is_spent() {
+                break;
+            }
+            let fitted = match self.fitted(compare, model) {
+                Ok(fitted) => fitted,
+                Err(error) if error.ends_all() => return Err(error),
+                Err(_) => break,
+            };
+            model = fitted.model.clone();
+            let gained = best.as_ref().map_or(f64::INFINITY, |b| b.cost - fitted.cost);
+            if gained > 0.0 {
+                best = Some(fitted);
+            }
+            if gained < LEARNT {
+                break;
+            }
+        }
+        Ok(best)
+    }
+
+    /// One descent, with sensitivities around where it begins.
+    fn fitted(&self, compare: &Comparison<'_>, model: Model) -> Result<Fitted, GapError> {
+        if let Some(costly) = compare.simulator().costly() {
+            for &stage in self.group {
+                costly.linearise(stage, &model, compare.roles.fit_trials)?;
+            }
+        }
+        compare.fit(self.group, model, &[], FINE)
+    }
+
+    /// Where a descent over growing parts of the trials ends; none where a part is left unexplained.
+    fn grown(&self, mut model: Model) -> Result<Option<Fitted>, GapError> {
+        let gap_of = |misfits: &[Misfit]| misfits.iter().map(|m| gap(m.fit)).sum::<f64>();
+        let stages = self.group.iter().map(|stage| self.compare.residual(*stage, self.nominal));
+        let residuals = stages.collect::<Result<Vec<_>, _>>()?;
+        let whole = self.group.iter().zip(&residuals).map(|(&s, r)| self.compare.misfit(s, r));
+        let most = LEFT * gap_of(&whole.collect::<Vec<_>>());
+        for part in PARTS {
+            let begun = begun(self.compare, part);
+            match self.descended(&begun, model)? {
+                Some(fitted) if gap_of(&fitted.misfits) <= most => model = fitted.model,
+                _ => return Ok(None),
+            }
+        }
+        self.descended(self.compare, model)
+    }
+}
+
+/// A comparison of which only the first part of every fitted segment is fitted.
+fn begun<'a>(compare: &Comparison<'a>, part: f64) -> Comparison<'a> {
+    let mut roles = compare.roles.clone();
+    for segment in roles.segments.iter_mut().filter(|s| s.role == Role::Fit) {
+        let samples = (part * (segment.to - segment.from) as f64).ceil() as usize;
+        segment.to = segment.from + samples;
+    }
+    let dt_s = compare.simulator().dt_s();
+    let own = |metric: &Metric| metric.with(|_, level| level, &roles, dt_s);
+    let metrics = compare.metrics.iter().map(own).collect();
+    Comparison { runs: compare.runs.clone(), roles, metrics }
+}

@@ -1,0 +1,89 @@
+//! How quick a record is: what half a second is to a slow rig, a tenth is to a quick one.
+//!
+//! Residuals are alike for about as long as the motion goes one way. So lengths that a diagnosis needs count in half turns of the motion, never
+//! less than a handful of samples:
+//!
+//! ```text
+//! block = min(0.5 s, max(half a mean turn of the slowest output, 20 samples))
+//! ```
+//!
+//! A turn ends where an output has crossed its middle upwards by more than a tenth of its span and six times its noise, so that noise makes
+//! no turns; an output that makes fewer than [`FEWEST`] counts as slow.
+
+use stretch_data::ends;
+
+use crate::problem::{noise::noise_variance, sample_roles::BLOCK_S};
+
+/// Samples of the shortest block.
+const SAMPLES: f64 = 20.0;
+/// Share of the span, and multiple of the noise, by which the middle is crossed.
+const CROSSED: (f64, f64) = (0.1, 6.0);
+/// Turns of an output that tell how quick it is.
+const FEWEST: usize = 10;
+
+/// Length of a block of a record, s, from the parts of each output that may be looked at.
+pub(super) fn block_s<'a, P>(outputs: impl Iterator<Item = P>, dt_s: f64) -> f64
+where
+    P: Iterator<Item = &'a [f64]> + Clone,
+{
+    let slowest = outputs.map(|parts| half_turn_s(parts, dt_s)).fold(0.0, f64::max);
+    slowest.max(SAMPLES * dt_s).min(BLOCK_S)
+}
+
+/// Half of the mean time from one turn to the next, s; infinite where there are too few turns.
+fn half_turn_s<'a>(parts: impl Iterator<Item = &'a [f64]> + Clone, dt_s: f64) -> f64 {
+    let (low, high) = ends(parts.clone().flatten());
+    let noise = noise_variance(parts.clone(), dt_s).sqrt();
+    let (middle, beside) = (0.5 * (low + high), (CROSSED.0 * (high - low)).max(CROSSED.1 * noise));
+    let (mut turns, mut samples) = (0, 0);
+    for part in parts {
+        let mut is_below = false;
+        for x in part {
+            if is_below && *x > middle + beside {
+                (is_below, turns) = (false, turns + 1);
+            } else if *x < middle - beside {
+                is_below = true;
+            }
+        }
+        samples += part.len();
+    }
+    match turns >= FEWEST {
+        true => 0.5 * samples as f64 * dt_s / turns as f64,
+        false => f64::INFINITY,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::random::RandomGenerator;
+
+    fn wave(hertz: f64, noise: f64, (samples, dt_s): (usize, f64)) -> Vec<f64> {
+        let mut random = RandomGenerator::new(6, 0);
+        let angle = |i: usize| std::f64::consts::TAU * hertz * dt_s * i as f64;
+        (0..samples).map(|i| angle(i).sin() + noise * random.gauss()).collect()
+    }
+
+    fn block(outputs: &[Vec<f64>], dt_s: f64) -> f64 {
+        block_s(outputs.iter().map(|y| std::iter::once(y.as_slice())), dt_s)
+    }
+
+    #[test]
+    fn a_block_is_half_a_turn_of_the_slowest_output() {
+        let at = (4000, 0.002);
+        let [quick, slow] = [5.0, 0.4].map(|hertz| wave(hertz, 0.01, at));
+        let both = [quick, slow];
+        approx::assert_relative_eq!(block(&both[..1], 0.002), 0.1, max_relative = 0.05);
+        assert_eq!(block(&both[1..], 0.002), BLOCK_S);
+        assert_eq!(block(&both, 0.002), BLOCK_S);
+        // Turns of a few samples make no block of a few samples.
+        assert_eq!(block(&[wave(20.0, 0.01, at)], 0.002), 0.04);
+    }
+
+    #[test]
+    fn noise_makes_no_turns() {
+        let noise = wave(0.0, 1.0, (4000, 0.002));
+        assert_eq!(block(&[noise], 0.002), BLOCK_S);
+        assert_eq!(block(&[wave(0.4, 0.3, (40_000, 0.002))], 0.002), BLOCK_S);
+    }
+}

@@ -141,7 +141,7 @@ fn candidates(out: &mut String, diagnosis: &Diagnosis) {
         return;
     }
     let shown: Vec<Candidate> = shown.into_iter().take(CANDIDATES).cloned().collect();
-    put_table(out, &candidate_table(&shown));
+    put_table(out, &candidate_table(&shown, &diagnosis.stabilities));
     if diagnosis.ambiguous.len() > 1 {
         put(
             out,

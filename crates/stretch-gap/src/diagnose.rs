@@ -12,6 +12,7 @@ use crate::{
         responses::responses,
         sanity::Sanity,
         shares::{EffectShare, eliminated, shares},
+        stability::{EffectStability, stabilities},
     },
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
     numerics::stopwatch::Stopwatch,
@@ -230,6 +231,7 @@ struct Gathered {
     posterior: Posterior,
     candidates: Vec<Candidate>,
     shares: Vec<EffectShare>,
+    stabilities: Vec<EffectStability>,
     sanity: Sanity,
     location: Where,
 }
@@ -242,7 +244,9 @@ fn gather(task: Task<'_>, cause: Cause<'_>) -> Result<Gathered, GapError> {
     let mut evidence = Evidence::gather(problem, found)?;
     let all = hypotheses(&found.best, &found.rivals, eliminated, &problem.nominal);
     let held = candidates(problem, &evidence, &all, seed)?;
-    let (posterior, candidates) = posterior(problem, thresholds, &mut evidence, all, held);
+    let (posterior, held) = posterior(problem, thresholds, &mut evidence, all, held);
+    let (candidates, blocks): (Vec<Candidate>, Vec<_>) = held.into_iter().unzip();
+    let stabilities = stabilities(problem, thresholds, &evidence, (&posterior, &blocks), seed);
     let shares = shares(problem, &evidence, &found.best, eliminated, thresholds.null_excess)?;
     let sanity = Sanity::of(problem, &found.best, &evidence)?;
     (task.progress)("where the gap sits");
@@ -251,7 +255,7 @@ fn gather(task: Task<'_>, cause: Cause<'_>) -> Result<Gathered, GapError> {
         slices: localise::slices(problem.simulator(), &evidence, |s| &s.residual_retuned, seed),
         end_to_end: localise::end_to_end(&problem.compare.runs, &evidence)?,
     };
-    Ok(Gathered { evidence, posterior, candidates, shares, sanity, location })
+    Ok(Gathered { evidence, posterior, candidates, shares, stabilities, sanity, location })
 }
 
 /// The verdict with its names.
@@ -282,7 +286,8 @@ fn report(
     begun: &Stopwatch,
 ) -> Result<(Diagnosis, Evidence), GapError> {
     let (options, thresholds) = (task.options, &task.options.thresholds);
-    let Gathered { mut evidence, posterior, candidates, shares, sanity, location } = gathered;
+    let Gathered { mut evidence, posterior, candidates, shares, stabilities, sanity, location } =
+        gathered;
     let (simulator, runs) = (cause.problem.simulator(), &cause.problem.compare.runs);
     let partial = candidates.first().filter(|_| judged.kind == VerdictKind::Partial);
     let unexplained = partial.map(|first| unexplained(simulator, &evidence, first, options.seed));
@@ -333,6 +338,7 @@ fn report(
         gross: cause.gross.to_vec(),
         ambiguous,
         shares,
+        stabilities,
         gap: evidence.gap,
         null_band,
         location,

@@ -25,6 +25,7 @@ pub use evidence::{
     localise::location::{SliceGap, StageGap, StageShare, Where},
     response::{Answered, Response, Responses},
     shares::EffectShare,
+    stability::EffectStability,
 };
 pub use fit::{
     identifiability::{Identified, Knowledge},

@@ -11,6 +11,7 @@ mod noise_too_high;
 mod null_band;
 mod probable;
 mod proposals;
+mod stable;
 mod toy_basics;
 mod toy_invariance;
 mod toy_noise;

@@ -271,7 +271,7 @@ fn named(page: &mut Page, subject: &Subject<'_>) {
             listed(&rivals)
         ));
     }
-    page.table(&candidate_table(&d.candidates));
+    page.table(&candidate_table(&d.candidates, &d.stabilities));
 }
 
 /// The named effects as code for a simulator.

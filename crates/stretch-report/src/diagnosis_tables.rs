@@ -1,6 +1,6 @@
 //! The tables of a diagnosis's report.
 
-use stretch_gap::{Baselines, Candidate, Diagnosis, SliceGap, StageGap, Transfer};
+use stretch_gap::{Baselines, Candidate, Diagnosis, EffectStability, SliceGap, StageGap, Transfer};
 
 use super::multiple::{both, times};
 use super::{
@@ -31,8 +31,16 @@ pub fn stage_table(stages: &[StageGap], has_after: bool) -> Table {
     )
 }
 
-/// A table of every candidate.
-pub fn candidate_table(candidates: &[Candidate]) -> Table {
+/// How firmly each effect of a set stands in the most probable one.
+fn stability(effects: &[String], all: &[EffectStability]) -> String {
+    let of = |name: &String| all.iter().find(|s| s.effect == *name);
+    let known: Vec<String> =
+        effects.iter().filter_map(|name| Some(fixed(of(name)?.stability, 2))).collect();
+    if known.is_empty() { NONE.to_owned() } else { known.join(", ") }
+}
+
+/// A table of every candidate, with the stability of its effects.
+pub fn candidate_table(candidates: &[Candidate], stabilities: &[EffectStability]) -> Table {
     let row = |c: &Candidate| {
         let values: Vec<String> = c
             .parameters
@@ -55,12 +63,14 @@ pub fn candidate_table(candidates: &[Candidate]) -> Table {
             times(c.gap_after),
             percent(c.closed),
             interval(c.closed_ci, percent),
+            stability(&c.effects, stabilities),
             values.join("; "),
         ]
     };
     Table::new(
-        "Candidates, the most probable set first, nothing and unknown behind: probability given this catalogue; what is left before and after in multiples of the noise, \
-                  all channels with a gap together; the share that closes on trials that were not fitted; \u{b1} is one standard deviation",
+        "Candidates, the most probable set first, nothing and unknown behind: probability given this catalogue; what is left before and after in \
+         multiples of the noise, all channels with a gap together; the share that closes on trials that were not fitted; stability, the share of \
+         resampled records in which the most probable set holds the effect; \u{b1} is one standard deviation",
         &[
             "Effects",
             "Probability",
@@ -68,6 +78,7 @@ pub fn candidate_table(candidates: &[Candidate]) -> Table {
             "Left after",
             "Closes",
             "95 % interval",
+            "Stability",
             "Parameters",
         ],
         candidates.iter().map(row),

@@ -62,6 +62,11 @@ class Diagnosis:
         return {" + ".join(c["effects"]) or "nothing": c["probability"] for c in weighed}
 
     @property
+    def stability(self) -> dict[str, float]:
+        """Share of resampled records in which the most probable set holds an effect, by effect."""
+        return {s["effect"]: s["stability"] for s in self._answer.get("stabilities", [])}
+
+    @property
     def where(self) -> dict[str, float]:
         """Share of the gap in each output."""
         return {s["channel"]: s["share"] for s in self._answer["where"]["stages"]}

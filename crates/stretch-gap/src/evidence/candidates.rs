@@ -15,7 +15,7 @@ use crate::{
     evidence::{
         bootstrap::closed_interval,
         excess::Excess,
-        gathered::{Evidence, StageEvidence},
+        gathered::{Blocks, Evidence, StageEvidence},
         localise::location::StageGap,
         probability::{Posterior, Standing, Weighed, weigh},
     },
@@ -105,34 +105,34 @@ const COVERS: f64 = 1.96;
 /// Name of what the catalogue lacks.
 const UNKNOWN: &str = "unknown";
 
-/// Every hypothesis on the test trials; its probability is that of the others' sum later.
+/// Every hypothesis on the test trials, with what it leaves by stage and block; its probability is that of the others' sum later.
 pub(crate) fn candidates(
     problem: &PreparedProblem<'_>,
     evidence: &Evidence,
     hypotheses: &[Hypothesis],
     seed: u64,
-) -> Result<Vec<Candidate>, GapError> {
+) -> Result<Vec<(Candidate, Vec<Blocks>)>, GapError> {
     hypotheses.par_iter().map(|one| candidate(problem, evidence, one, seed)).collect()
 }
 
 /// Share of the gap of the test trials that a set of effects closes at least to be a cause of it, as a `partial` answer promises.
 const LEAST_CLOSED: f64 = 0.3;
 
-/// Weighs hypotheses with what they leave; their candidates are put into the same order. A set of effects that closes less than
+/// Weighs hypotheses with what they leave; their candidates and blocks are put into the same order. A set of effects that closes less than
 /// [`LEAST_CLOSED`] of the gap of the test trials is dropped.
 pub(crate) fn posterior(
     problem: &PreparedProblem<'_>,
     thresholds: &Thresholds,
     evidence: &mut Evidence,
     hypotheses: Vec<Hypothesis>,
-    candidates: Vec<Candidate>,
-) -> (Posterior, Vec<Candidate>) {
+    candidates: Vec<(Candidate, Vec<Blocks>)>,
+) -> (Posterior, Vec<(Candidate, Vec<Blocks>)>) {
     let (mut kept, mut by_effects) = (Vec::new(), BTreeMap::new());
-    for (hypothesis, candidate) in hypotheses.into_iter().zip(candidates) {
+    for (hypothesis, (candidate, blocks)) in hypotheses.into_iter().zip(candidates) {
         let is_possible = hypothesis.effects.is_empty() || candidate.closed >= LEAST_CLOSED;
         if is_possible {
             let left = evidence.fitted_gap(problem, &hypothesis).max(candidate.gap_after);
-            by_effects.insert(hypothesis.effects.clone(), candidate);
+            by_effects.insert(hypothesis.effects.clone(), (candidate, blocks));
             let (score, catalogue) = (hypothesis.score, problem.simulator().effects());
             let strongest = hypothesis.effects.first();
             let is_at_bound = strongest.is_some_and(|&e| hypothesis.is_at_bound(e, catalogue));
@@ -141,9 +141,9 @@ pub(crate) fn posterior(
     }
     let posterior = weigh(thresholds, evidence.gap.retuned, kept);
     let of = |w: &Weighed| {
-        let candidate = by_effects.remove(&w.hypothesis.effects)?;
+        let (candidate, blocks) = by_effects.remove(&w.hypothesis.effects)?;
         let Standing { left, is_at_bound: at_bound, .. } = w.standing;
-        Some(Candidate { probability: w.probability, left, at_bound, ..candidate })
+        Some((Candidate { probability: w.probability, left, at_bound, ..candidate }, blocks))
     };
     let candidates = posterior.sets.iter().filter_map(of).collect();
     evidence.candidates = posterior.sets.iter().map(|w| w.hypothesis.model.clone()).collect();
@@ -157,11 +157,12 @@ fn candidate(
     evidence: &Evidence,
     hypothesis: &Hypothesis,
     seed: u64,
-) -> Result<Candidate, GapError> {
+) -> Result<(Candidate, Vec<Blocks>), GapError> {
     let stages = 0..evidence.stages.len();
     let blocks = stages.map(|s| evidence.blocks(problem, s, &hypothesis.model));
-    let blocks: Result<Vec<Vec<f64>>, GapError> = blocks.collect();
-    let interval = closed_interval(&evidence.nominal_blocks, &blocks?, seed);
+    let blocks = blocks.collect::<Result<Vec<Blocks>, GapError>>()?;
+    let tested = |all: &[Blocks]| all.iter().map(|b| b.test.clone()).collect::<Vec<_>>();
+    let interval = closed_interval(&tested(&evidence.nominal_blocks), &tested(&blocks), seed);
     let parameters = effect_values(problem.simulator(), hypothesis);
     let is_alone = hypothesis.effects.len() == 1;
     let name = |p: &EffectValue| match is_alone {
@@ -169,7 +170,7 @@ fn candidate(
         false => format!("{}.{}", p.effect, p.name),
     };
     let specs = problem.simulator().effects();
-    Ok(Candidate {
+    let candidate = Candidate {
         by_name: parameters.iter().map(|p| (name(p), p.value)).collect(),
         effects: hypothesis.effects.iter().map(|&e| specs[e].name.clone()).collect(),
         probability: 0.0,
@@ -182,7 +183,8 @@ fn candidate(
         closed_ci: interval.interval,
         is_confirmed: interval.falls,
         parameters,
-    })
+    };
+    Ok((candidate, blocks))
 }
 
 /// The candidates with what the catalogue lacks behind them.

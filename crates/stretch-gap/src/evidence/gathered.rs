@@ -8,7 +8,7 @@ use crate::{
     fit::{
         hypothesis::Hypothesis,
         prepared::PreparedProblem,
-        score::{self, excess, mean_square},
+        score::{self, Misfit, excess, mean_square},
     },
     numerics::linear::dot,
     problem::{
@@ -63,8 +63,8 @@ pub struct Evidence {
     pub candidate_sds: Vec<Vec<f64>>,
     /// One standard deviation of every nominal parameter with the best set.
     pub(crate) best_sd: Vec<f64>,
-    /// Reduced chi-square of the re-tuned nominal, by stage and test block.
-    pub(crate) nominal_blocks: Vec<Vec<f64>>,
+    /// Reduced chi-square of the re-tuned nominal by block, one per stage.
+    pub(crate) nominal_blocks: Vec<Blocks>,
     /// Variance of the noise by stage, as a share of what it was taken for: see the module's head.
     levels: Vec<f64>,
     /// The strongest effect of the best set.
@@ -76,11 +76,20 @@ pub struct Evidence {
     pub responses: Option<Responses>,
 }
 
-/// Output of a model over the whole session, its clean residual, and its reduced chi-square by test block.
+/// Reduced chi-square of a model in one stage by block: of the trials that were looked at in variances of the noise as it was taken, of the
+/// test trials in variances of the noise that the best set leaves.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Blocks {
+    pub(crate) fit: Vec<f64>,
+    pub(crate) held: Vec<f64>,
+    pub(crate) test: Vec<f64>,
+}
+
+/// Output of a model over the whole session, its clean residual, and its reduced chi-square by block.
 struct Traces {
     output: Vec<f64>,
     residual: Vec<f64>,
-    blocks: Vec<f64>,
+    blocks: Blocks,
 }
 
 impl Traces {
@@ -97,8 +106,9 @@ impl Traces {
         let apart = simulator.measured(stage).iter().zip(&output);
         let apart: Vec<f64> = apart.map(|(m, s)| m - s).collect();
         let (whole, residual) = held_out(problem, stage, model, &apart);
-        let mut blocks = test_blocks(&compare.roles, &whole, &residual);
-        blocks.iter_mut().for_each(|x| *x /= level);
+        let of = |role| blocks_of(&compare.roles, role, &whole, &residual);
+        let mut blocks = Blocks { fit: of(Role::Fit), held: of(Role::Held), test: of(Role::Test) };
+        blocks.test.iter_mut().for_each(|x| *x /= level);
         Ok(Self { output, residual, blocks })
     }
 }
@@ -128,13 +138,13 @@ pub(crate) fn held_out(
 }
 
 /// r V^-1 r by block: V^-1 r is the residual without its most likely nuisances, whose own improbability so counts.
-fn test_blocks(roles: &SampleRoles, whole: &[f64], clean: &[f64]) -> Vec<f64> {
+fn blocks_of(roles: &SampleRoles, role: Role, whole: &[f64], clean: &[f64]) -> Vec<f64> {
     let block = |s: &Segment| {
         let parts = whole[s.from..s.to].chunks_exact(roles.block);
         let pairs = parts.zip(clean[s.from..s.to].chunks_exact(roles.block));
         pairs.map(|(r, c)| dot(r, c) / r.len() as f64).collect::<Vec<f64>>()
     };
-    roles.of_role(Role::Test).flat_map(block).collect()
+    roles.of_role(role).flat_map(block).collect()
 }
 
 impl Evidence {
@@ -156,9 +166,9 @@ impl Evidence {
                 residual_retuned: retuned.residual,
                 residual_after: after.residual,
                 noise: levels[stage].sqrt() * metric.noise.rms,
-                excess_raw: excess(mean_square(&raw.blocks)),
-                excess_retuned: excess(mean_square(&retuned.blocks)),
-                excess_after: excess(mean_square(&after.blocks)),
+                excess_raw: excess(mean_square(&raw.blocks.test)),
+                excess_retuned: excess(mean_square(&retuned.blocks.test)),
+                excess_after: excess(mean_square(&after.blocks.test)),
             });
             nominal_blocks.push(retuned.blocks);
         }
@@ -183,7 +193,12 @@ impl Evidence {
 
     /// The gap that a hypothesis leaves of the trials that may be looked at, summed over stages.
     pub(crate) fn fitted_gap(&self, problem: &PreparedProblem<'_>, hypothesis: &Hypothesis) -> f64 {
-        fitted(problem, hypothesis, &self.levels)
+        fitted(problem, &hypothesis.misfits, &self.levels)
+    }
+
+    /// The gap of some misfits in the trials that may be looked at, summed over stages.
+    pub(crate) fn gap_of(&self, problem: &PreparedProblem<'_>, misfits: &[Misfit]) -> f64 {
+        fitted(problem, misfits, &self.levels)
     }
 
     /// What the best set leaves of a stage, as [`held_out`] gives it.
@@ -198,13 +213,13 @@ impl Evidence {
         self.levels[stage]
     }
 
-    /// Reduced chi-square of a model by test block of a stage.
+    /// Reduced chi-square of a model by block of a stage.
     pub(crate) fn blocks(
         &self,
         problem: &PreparedProblem<'_>,
         stage: usize,
         model: &Model,
-    ) -> Result<Vec<f64>, GapError> {
+    ) -> Result<Blocks, GapError> {
         Ok(Traces::of(problem, stage, model, self.levels[stage])?.blocks)
     }
 }
@@ -230,12 +245,13 @@ fn gap(
         |of: fn(&StageEvidence) -> f64| -> f64 { stages.iter().map(|s| of(s).max(0.0)).sum() };
     Excess {
         raw: tested(|s| s.excess_raw),
-        retuned: fitted(problem, &problem.nominal, levels).max(tested(|s| s.excess_retuned)),
-        left: fitted(problem, best, levels).max(tested(|s| s.excess_after)),
+        retuned: fitted(problem, &problem.nominal.misfits, levels)
+            .max(tested(|s| s.excess_retuned)),
+        left: fitted(problem, &best.misfits, levels).max(tested(|s| s.excess_after)),
     }
 }
 
-fn fitted(problem: &PreparedProblem<'_>, hypothesis: &Hypothesis, levels: &[f64]) -> f64 {
-    let pairs = hypothesis.misfits.iter().zip(levels);
+fn fitted(problem: &PreparedProblem<'_>, misfits: &[Misfit], levels: &[f64]) -> f64 {
+    let pairs = misfits.iter().zip(levels);
     pairs.map(|(misfit, level)| score::gap(problem.compare.mean_square(misfit) / level)).sum()
 }

@@ -2,7 +2,7 @@
 //!
 //! In: a prepared problem and what the search found. Out: [`gathered::Evidence`], the traces and residuals of every stage; the
 //! [`candidates`] with probabilities ([`probability`]) and intervals ([`bootstrap`]); what each effect closes ([`shares`]); whether
-//! it is the right simulator at all ([`sanity`]); what noise alone leaves ([`null_band`]); where the gap sits ([`localise`]);
+//! it is the right simulator at all ([`sanity`]); how firmly it stands ([`stability`]); what noise alone leaves ([`null_band`]); where the gap sits ([`localise`]);
 //! and how the output answers to each number ([`responses`]).
 //! Imports: `numerics`, `problem`, `fit`, `search`.
 
@@ -17,3 +17,4 @@ pub(crate) mod response;
 pub(crate) mod responses;
 pub(crate) mod sanity;
 pub(crate) mod shares;
+pub(crate) mod stability;

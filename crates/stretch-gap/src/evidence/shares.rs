@@ -68,7 +68,7 @@ pub(crate) fn shares(
     let above =
         |stage: usize, blocks: &[f64]| (excess(mean_square(blocks)) - least[stage]).max(0.0);
     let blocks = evidence.nominal_blocks.iter().enumerate();
-    let nominal: Vec<f64> = blocks.map(|(stage, blocks)| above(stage, blocks)).collect();
+    let nominal: Vec<f64> = blocks.map(|(stage, blocks)| above(stage, &blocks.test)).collect();
     let whole = nominal.iter().sum::<f64>().max(f64::MIN_POSITIVE);
     let mut with: Vec<f64> = evidence.stages.iter().map(|s| s.excess_after.max(0.0)).collect();
     let mut out = Vec::new();
@@ -78,7 +78,7 @@ pub(crate) fn shares(
             // The nominal was run already.
             true => nominal.clone(),
             false => stages
-                .map(|s| Ok(above(s, &evidence.blocks(problem, s, &less.model)?)))
+                .map(|s| Ok(above(s, &evidence.blocks(problem, s, &less.model)?.test)))
                 .collect::<Result<_, GapError>>()?,
         };
         let closed = without.iter().zip(&with).map(|(without, with)| without - with);

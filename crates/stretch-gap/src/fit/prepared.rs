@@ -214,6 +214,11 @@ impl<'a> PreparedProblem<'a> {
             - choice_cost(simulator, model)
     }
 
+    /// Log-likelihood ratio of some misfits to others, nats, nothing paid for parameters.
+    pub(crate) fn ratio(&self, base: &[Misfit], misfits: &[Misfit]) -> f64 {
+        score(base, misfits, &self.observations, 0, 1.0)
+    }
+
     /// Stages whose parameters drift or are offset in each trial.
     pub(crate) fn loose_stages(&self) -> impl Iterator<Item = usize> {
         let all = self.compare.metrics.iter().enumerate();

@@ -9,6 +9,7 @@ use crate::{
         localise::location::Where,
         probability::{Standing, probabilities},
         shares::EffectShare,
+        stability::EffectStability,
     },
     fit::{identifiability::Identified, starts::Starts},
     missing::Proposed,
@@ -120,6 +121,9 @@ pub struct Diagnosis {
     /// What each effect of the best set closes of the held-out gap, the strongest first; named or not.
     #[serde(default)]
     pub shares: Vec<EffectShare>,
+    /// How firmly each effect of the sets that were weighed stands in the most probable one, the firmest first.
+    #[serde(default)]
+    pub stabilities: Vec<EffectStability>,
     /// Size of the gap.
     #[serde(default)]
     pub gap: Excess,

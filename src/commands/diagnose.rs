@@ -1,6 +1,10 @@
 //! `stretch diagnose`: where simulator and measurement part, which effect causes it, how far the gap closes.
 
-use std::{io, path::PathBuf, process::ExitCode};
+use std::{
+    io,
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
 
 use anyhow::{Context, bail, ensure};
 use indicatif::ProgressBar;
@@ -156,12 +160,7 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
         jobs: args.jobs.into(),
         budget: args.budget.map(|n| n as usize),
     };
-    let problem = Problem::read(&args.data_set, &reading).map_err(|error| {
-        // an error of a problem's own file already names that file
-        let is_named = error.to_string().starts_with(&shown());
-        let error = anyhow::Error::from(error);
-        if is_named { error } else { error.context(shown()) }
-    })?;
+    let problem = open(&args.data_set, &reading)?;
     if let Some(fix) = args.fix.as_deref().filter(|fix| problem.is_read_from(fix)) {
         bail!("{}: --fix would replace a file that is read; give it another name", fix.display());
     }
@@ -182,6 +181,17 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
     bar.finish_and_clear();
     conclude(&args, &examined, &problem)?;
     Ok(examined.diagnosis)
+}
+
+/// Reads a problem; an error names the path once.
+pub(super) fn open(path: &Path, reading: &Reading<'_>) -> anyhow::Result<Problem> {
+    Problem::read(path, reading).map_err(|error| {
+        let shown = path.display().to_string();
+        // an error of a problem's own file already names that file
+        let is_named = error.to_string().starts_with(&shown);
+        let error = anyhow::Error::from(error);
+        if is_named { error } else { error.context(shown) }
+    })
 }
 
 /// Tells what goes on: beside a bar, or with `-v` in lines.

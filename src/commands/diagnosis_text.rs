@@ -82,6 +82,11 @@ fn put_table(out: &mut String, report: &Table) {
     put(out, &drawn(report));
 }
 
+/// A table of a report with its caption.
+pub(super) fn table_text(report: &Table) -> String {
+    format!("{}:\n{}", unbroken(&report.caption), drawn(report))
+}
+
 fn drawn(report: &Table) -> String {
     let head: Vec<&str> = report.head.iter().map(String::as_str).collect();
     let rows = report.rows.iter().map(|row| row.iter().map(|cell| unbroken(cell)).collect());

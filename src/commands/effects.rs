@@ -1,5 +1,7 @@
 //! `stretch effects`: the catalogue of what a rig may do beside its nominal physics.
 
+use std::path::PathBuf;
+
 use anyhow::Context;
 use stretch_effects::{
     Effect, EffectParameter, Extent, Grid, KINDS, Kind, Language, Quantity, Role, Signals, Sketch,
@@ -8,6 +10,7 @@ use stretch_effects::{
 use stretch_sim::{CATALOGUE, RATE_HZ, RigParams, SimError, effect_named};
 
 use super::{
+    detectable,
     json::Json,
     shared::{say, say_as_is},
 };
@@ -27,6 +30,11 @@ use super::{
 ///
 /// With --kinds the kinds that they are made of: what `wrap` in a problem file puts in
 /// front of or behind any simulator, with ranges for a channel from 0 to 1.
+///
+/// With --data how strong each effect of a problem would have to be to be named on its data
+/// with probability 0.9, its simulator being right otherwise:
+///
+///   stretch effects --data bench
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
@@ -36,6 +44,9 @@ pub(crate) struct Args {
     /// List kinds, for any channel, in place of the rig's effects
     #[arg(long)]
     kinds: bool,
+    /// List what would be named on these data instead: a folder with dataset.toml, a trial, or problem.toml
+    #[arg(long, value_name = "DATASET", conflicts_with_all = ["kinds", "code"])]
+    data: Option<PathBuf>,
     #[command(flatten)]
     json: Json,
     /// Print code with the typical numbers, for a record at 100 Hz
@@ -111,6 +122,9 @@ impl Entry {
 const CHANNEL: Extent = Extent::between(0.0, 1.0);
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
+    if let Some(data) = &args.data {
+        return detectable::run(data, &args.names, &args.json);
+    }
     let chosen: Vec<Entry> = match (args.names.is_empty(), args.kinds) {
         (true, true) => KINDS.iter().copied().map(Entry::Kind).collect(),
         (true, false) => CATALOGUE.iter().copied().map(Entry::Effect).collect(),

@@ -7,6 +7,7 @@ mod causes;
 pub(crate) mod completions;
 pub(crate) mod convert;
 pub(crate) mod demo;
+mod detectable;
 pub(crate) mod diagnose;
 mod diagnosis_files;
 mod diagnosis_text;

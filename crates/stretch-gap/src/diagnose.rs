@@ -1,10 +1,11 @@
 //! The flow: a problem is prepared, searched, the record doubted, the evidence gathered, judged, and put into words. Nothing flows back.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 use crate::{
     evidence::{
         candidates::{Candidate, beside_unknown, candidates, posterior, shifts, stage_gaps},
+        detection_limit::{Asked, DetectionLimit, detection_limits},
         gathered::Evidence,
         localise::{self, causes::with_causes, location::Where},
         null_band::null_band,
@@ -27,12 +28,13 @@ use crate::{
         baselines::baselines,
         command_timing,
         re_estimate::re_estimated,
-        selection::{Found, Search},
+        selection::{Found, Looked, Search},
     },
     verdict::{
         coverage::{is_short, too_little},
         diagnosis::{Diagnosis, Unexplained, VerdictKind},
         judge::{Case, Judged, judge},
+        nothing_above::nothing_above,
         proposal::lacking,
         sentence::{Answer, cut_short, tell},
     },
@@ -51,6 +53,8 @@ pub struct Options {
     pub baselines: bool,
     /// Whether [answers](crate::Responses) to the numbers of the best set are gathered, for a page where they can be turned.
     pub responses: bool,
+    /// Whether [detection limits](crate::DetectionLimit) are found whatever the verdict is; where nothing is named they are found anyway.
+    pub detection_limits: bool,
     /// Calibrated numbers.
     pub thresholds: Thresholds,
 }
@@ -63,6 +67,7 @@ impl Default for Options {
             seed: 1,
             baselines: false,
             responses: false,
+            detection_limits: false,
             thresholds: Thresholds::frozen(),
         }
     }
@@ -151,6 +156,8 @@ struct Searched<'a> {
     eliminated: Vec<(usize, Hypothesis)>,
     /// Every set that was fitted.
     tried: BTreeMap<Vec<usize>, Hypothesis>,
+    /// The screen around the re-tuned nominal, where it is kept.
+    looked: Option<Arc<Looked>>,
 }
 
 impl Searched<'_> {
@@ -181,9 +188,10 @@ fn search<'a>(
     let rivalled = |mut search: Search<'_>, best| {
         let found = search.rivalled(best, progress)?;
         let eliminated = eliminated(&mut search.sets, &found.best)?;
-        Ok::<_, GapError>((found, eliminated, search.sets.tried))
+        let looked = search.looked_at_nominal();
+        Ok::<_, GapError>((found, eliminated, search.sets.tried, looked))
     };
-    let (problem, (found, eliminated, tried)) = match other {
+    let (problem, (found, eliminated, tried, looked)) = match other {
         Some((other, from)) => {
             let mut search = Search::new(&other, &options.thresholds, depth);
             let best = search.best(&from, progress)?;
@@ -195,7 +203,7 @@ fn search<'a>(
             (problem, rest)
         }
     };
-    Ok(Searched { problem, found, eliminated, tried })
+    Ok(Searched { problem, found, eliminated, tried, looked })
 }
 
 /// The errors of the record or of the rig file that stand above the best set of effects, and what was found with the first of them in its
@@ -213,6 +221,18 @@ fn doubt(
     let doubts = Doubts::of(doubted, suspect, thresholds)?;
     let doubts = doubts.closer_if(doubted, suspect, found, thresholds)?;
     Ok(weighed(doubted, suspect, doubts.errors, found, thresholds))
+}
+
+/// How strong each effect would have to be to be named; none where the record carries no name at all, or no more runs may be made.
+fn limits(task: Task<'_>, searched: &Searched<'_>) -> Result<Vec<DetectionLimit>, GapError> {
+    let problem = &searched.problem;
+    if task.depth == 0 || problem.is_spent() {
+        return Ok(Vec::new());
+    }
+    (task.progress)("detection limits");
+    let (best, thresholds) = (&searched.found.best, &task.options.thresholds);
+    let asked = Asked { problem, best, thresholds, seed: task.options.seed };
+    detection_limits(asked, searched.looked.as_deref())
 }
 
 /// What the gap is put down to: the best set of effects, or an error.
@@ -293,6 +313,12 @@ fn report(
     let unexplained = partial.map(|first| unexplained(simulator, &evidence, first, options.seed));
     let is_quiet = matches!(judged.kind, VerdictKind::NoGap | VerdictKind::Parameters);
     let null_band = is_quiet.then(|| null_band(cause.problem, options.seed)).transpose()?;
+    let about = simulator.description();
+    let carries = too_little(&evidence.roles, about.rows_used(), about.dt_s).is_none();
+    let detection_limits = match carries && (is_quiet || options.detection_limits) {
+        true => limits(task, searched)?,
+        false => Vec::new(),
+    };
     let ambiguous = match is_quiet || judged.kind == VerdictKind::Record {
         true => Vec::new(),
         false => covering_set(&posterior.sets, simulator),
@@ -316,6 +342,8 @@ fn report(
         text.sentence = cut_short(&searched.not_looked_at()) + &text.sentence;
         text.notes.push(note);
     }
+    let no_name = is_quiet.then(|| nothing_above(&detection_limits, simulator.effects()));
+    text.notes.extend(no_name.flatten());
     let location = Where {
         stages: with_causes(location.stages, &shares, &judged.naming.named, simulator),
         ..location
@@ -341,6 +369,7 @@ fn report(
         stabilities,
         gap: evidence.gap,
         null_band,
+        detection_limits,
         location,
         parameters: shifts(simulator, &evidence),
         identifiability: searched.problem.identified(),

@@ -20,6 +20,7 @@ mod toys;
 pub use diagnose::{Options, diagnose};
 pub use evidence::{
     candidates::{Candidate, EffectValue, ParameterShift},
+    detection_limit::DetectionLimit,
     excess::Excess,
     gathered::{Evidence, StageEvidence},
     localise::location::{SliceGap, StageGap, StageShare, Where},

@@ -2,6 +2,7 @@
 
 mod answers;
 mod consistent;
+mod detectable;
 mod gauge;
 mod invariant;
 mod laboratory;

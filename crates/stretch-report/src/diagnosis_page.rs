@@ -15,6 +15,7 @@ use super::{
     gap_figures::{
         AFTER, Against, BEFORE, after_name, has_after, left_figure, shown, trace_figures,
     },
+    limit_table::limit_table,
     live::Pick,
     markup::{number, percent},
     multiple::multiple,
@@ -53,6 +54,7 @@ pub(crate) fn diagnosis_sections(page: &mut Page, subject: &Subject<'_>) {
     implemented(page, subject);
     gained(page, subject);
     next(page, diagnosis);
+    detectable(page, diagnosis);
     numbers(page, diagnosis);
 }
 
@@ -322,6 +324,19 @@ fn gained(page: &mut Page, subject: &Subject<'_>) {
              evidence by themselves.",
         );
     }
+}
+
+/// What would have been named.
+fn detectable(page: &mut Page, d: &Diagnosis) {
+    if d.detection_limits.is_empty() {
+        return;
+    }
+    page.section(
+        "What would have been seen",
+        "An effect weaker than its limit may be there unseen, and one that is stronger is not: it would have been named nine times in ten. \
+         Without a limit these data do not show an effect, or not which of several it is.",
+    );
+    page.table(&limit_table(&d.detection_limits));
 }
 
 fn next(page: &mut Page, d: &Diagnosis) {

@@ -116,7 +116,7 @@ pub(crate) fn candidates(
 }
 
 /// Share of the gap of the test trials that a set of effects closes at least to be a cause of it, as a `partial` answer promises.
-const LEAST_CLOSED: f64 = 0.3;
+pub(crate) const LEAST_CLOSED: f64 = 0.3;
 
 /// Weighs hypotheses with what they leave; their candidates and blocks are put into the same order. A set of effects that closes less than
 /// [`LEAST_CLOSED`] of the gap of the test trials is dropped.

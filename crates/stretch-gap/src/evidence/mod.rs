@@ -8,6 +8,7 @@
 
 pub(crate) mod bootstrap;
 pub(crate) mod candidates;
+pub(crate) mod detection_limit;
 pub(crate) mod excess;
 pub(crate) mod gathered;
 pub(crate) mod localise;

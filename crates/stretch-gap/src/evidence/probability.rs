@@ -103,6 +103,16 @@ pub(crate) fn probabilities(
     (all, unknown / total)
 }
 
+/// Whether an effect is named: what is missing is most probably of the catalogue, and the gap counts. Probabilities are those of effects, of nothing,
+/// and of what the catalogue lacks.
+pub(crate) fn names(
+    [effects, nothing, unknown]: [f64; 3],
+    retuned: f64,
+    thresholds: &Thresholds,
+) -> bool {
+    unknown < nothing.max(effects) && effects > nothing && retuned > thresholds.least_gap
+}
+
 /// Weighs hypotheses with what they leave.
 pub(crate) fn weigh(
     thresholds: &Thresholds,

@@ -167,7 +167,7 @@ impl<'a> Comparison<'a> {
     }
 
     /// Octaves of a residual in multiples of the noise over fitted and held-out samples.
-    fn octaves(&self, stage: usize, residual: &[f64]) -> Octaves {
+    pub(crate) fn octaves(&self, stage: usize, residual: &[f64]) -> Octaves {
         let mut clean = residual.to_vec();
         self.metrics[stage].clean(&self.roles, &mut clean);
         let mut octaves = Octaves::default();

@@ -64,6 +64,12 @@ impl Octaves {
         self
     }
 
+    /// Sums of squares of both: those of what does not know of the other.
+    pub(crate) fn plus(mut self, other: &Self) -> Self {
+        self.sums.iter_mut().zip(other.sums).for_each(|(x, y)| *x += y);
+        self
+    }
+
     /// S of the module's head, from this one to the next.
     pub(crate) fn rise(&self, next: &Self) -> f64 {
         let mean = |sum: f64, count: f64| (sum / count).max(LEAST);

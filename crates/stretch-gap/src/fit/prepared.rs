@@ -214,6 +214,15 @@ impl<'a> PreparedProblem<'a> {
             - choice_cost(simulator, model)
     }
 
+    /// What the effects of a model cost, nats: (k/2) ln(blocks) for k free parameters, and what their forms and choices do.
+    pub(crate) fn price(&self, model: &Model) -> f64 {
+        let simulator = self.simulator();
+        let free = free_parameters(simulator, model) as f64;
+        0.5 * free * self.compare.roles.blocks(Role::Fit).ln()
+            + form_cost(simulator, model)
+            + choice_cost(simulator, model)
+    }
+
     /// Log-likelihood ratio of some misfits to others, nats, nothing paid for parameters.
     pub(crate) fn ratio(&self, base: &[Misfit], misfits: &[Misfit]) -> f64 {
         score(base, misfits, &self.observations, 0, 1.0)
@@ -250,12 +259,7 @@ impl<'a> PreparedProblem<'a> {
         let mut model = hypothesis.model.clone();
         model.effects.retain(|(e, _)| self.is_in_loose_stage(*e));
         let simulator = self.simulator();
-        let blocks = self.compare.roles.blocks(Role::Fit);
-        let free = free_parameters(simulator, &model) as f64;
-        let price = 0.5 * free * blocks.ln()
-            + form_cost(simulator, &model)
-            + choice_cost(simulator, &model);
-        let mut sum = -price;
+        let mut sum = -self.price(&model);
         for (stage, level) in self.loose_stages().zip(levels) {
             let residual = self.compare.residual_values(stage, &hypothesis.model)?;
             let metric = &self.compare.metrics[stage];

@@ -35,6 +35,8 @@ pub(crate) struct Screened {
     pub(crate) effect: usize,
     /// Starting points for a fit, the best first, with the reduction of the cost each promises.
     pub(crate) starts: Vec<(Vec<f64>, f64)>,
+    /// <d,d> at each start of the catalogue, in its order; none where nothing changes.
+    pub(crate) sizes: Vec<Option<f64>>,
 }
 
 impl Screened {
@@ -86,6 +88,7 @@ impl Comparison<'_> {
         let spec = &self.simulator().effects()[effect];
         let mut starts = Vec::new();
         let changes = self.changes(ground, effect, &spec.starts)?;
+        let sizes = changes.iter().map(|change| change.map(|(own, _)| own)).collect();
         for (values, change) in spec.starts.iter().zip(changes) {
             let Some((own, with_residual)) = change else { continue };
             // Strengths scale with the amplitude; thresholds do not scale at all.
@@ -113,7 +116,7 @@ impl Comparison<'_> {
             starts.push((start, gain));
         }
         starts.sort_by(|a, b| b.1.total_cmp(&a.1));
-        Ok(Screened { effect, starts })
+        Ok(Screened { effect, starts, sizes })
     }
 
     /// <d,d> and <d,r> of the change d that an effect makes at each of some values; none where it makes none or cannot be simulated.

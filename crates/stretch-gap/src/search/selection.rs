@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::{
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
-    problem::{error::GapError, thresholds::Thresholds},
+    problem::{error::GapError, simulator::Model, thresholds::Thresholds},
     search::{
         acceptance::Acceptance,
         screen::{Ground, Screened},
@@ -25,13 +25,13 @@ const KEPT_LATER: usize = 5;
 /// Leaders whose twins are kept with them.
 const LEADERS: usize = 4;
 /// Rivals looked at for an effect that stands alone, and for one among others.
-const RIVALS: (usize, usize) = (6, 3);
+pub(crate) const RIVALS: (usize, usize) = (6, 3);
 /// Share of the least rise that a screen must promise: where the change bends it promises too little.
 const PROMISE: f64 = 0.1;
 /// Share of the best gain below which an effect is not fitted.
 const FAINT: f64 = 0.03;
 /// Share of an effect's own gain that a rival in its place must promise; twins are held against it whatever they promise.
-const RIVALRY: f64 = 0.5;
+pub(crate) const RIVALRY: f64 = 0.5;
 /// How often an effect of the best set gives its place to another.
 const EXCHANGES: usize = 2;
 
@@ -50,9 +50,9 @@ pub(crate) struct Search<'a> {
 }
 
 /// A ground, and every effect that is not in it screened on top; the best come first.
-struct Looked {
+pub(crate) struct Looked {
     ground: Ground,
-    screened: Vec<Screened>,
+    pub(crate) screened: Vec<Screened>,
 }
 
 /// What the search found.
@@ -103,6 +103,16 @@ impl<'a> Search<'a> {
             }
             exchanges += 1;
         }
+    }
+
+    /// The screen around a model, where it is kept.
+    fn looked_at(&self, model: &Model) -> Option<Arc<Looked>> {
+        self.looked.iter().find(|l| l.ground.model == *model).map(Arc::clone)
+    }
+
+    /// The screen around the re-tuned nominal, where it is kept.
+    pub(crate) fn looked_at_nominal(&self) -> Option<Arc<Looked>> {
+        self.looked_at(&self.problem.nominal.model)
     }
 
     /// The better of a set of several and of what grows from the runner-up of its first round: a strong effect that stands in for two
@@ -186,7 +196,7 @@ impl<'a> Search<'a> {
         let is_possible = |s: &&Screened| self.acceptance.is_possible(base, s.effect);
         let one = |s: &Screened| {
             let starts = s.starts.iter().take(1).cloned().collect();
-            Screened { effect: s.effect, starts }
+            Screened { starts, ..s.clone() }
         };
         screened.iter().filter(is_new).filter(is_possible).map(one).collect()
     }
@@ -210,8 +220,8 @@ impl<'a> Search<'a> {
 
     /// Screens every effect that is not in `base`, once a model.
     fn look(&mut self, base: &Hypothesis) -> Result<Arc<Looked>, GapError> {
-        if let Some(looked) = self.looked.iter().find(|l| l.ground.model == base.model) {
-            return Ok(Arc::clone(looked));
+        if let Some(looked) = self.looked_at(&base.model) {
+            return Ok(looked);
         }
         let ground = Ground::around(&self.problem.compare, base.model.clone())?;
         let all: Vec<usize> = (0..self.problem.simulator().effects().len())

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     evidence::{
         candidates::{Candidate, ParameterShift},
+        detection_limit::DetectionLimit,
         excess::Excess,
         localise::location::Where,
         probability::{Standing, probabilities},
@@ -131,6 +132,10 @@ pub struct Diagnosis {
     /// itself is wrong.
     #[serde(default)]
     pub null_band: Option<f64>,
+    /// How strong each effect of the catalogue would have to be to be named, in the catalogue's order; empty where something is named and nobody
+    /// [asked](crate::Options::detection_limits), and where the record carries no name.
+    #[serde(default)]
+    pub detection_limits: Vec<DetectionLimit>,
     /// Where the gap sits.
     #[serde(rename = "where")]
     pub location: Where,

@@ -17,7 +17,7 @@ use crate::{
     evidence::{
         candidates::Candidate,
         excess::Excess,
-        probability::{Posterior, Standing, allowed},
+        probability::{Posterior, Standing, allowed, names},
         sanity::{AtBounds, Sanity},
         shares::EffectShare,
     },
@@ -104,8 +104,7 @@ fn seen(case: &Case<'_>, thresholds: &Thresholds) -> VerdictKind {
     let first = case.posterior.sets.iter().find(|w| !w.hypothesis.effects.is_empty());
     if case.posterior.unknown >= nothing.max(effects) {
         VerdictKind::Unknown
-    } else if effects > nothing
-        && retuned > thresholds.least_gap
+    } else if names([effects, nothing, case.posterior.unknown], retuned, thresholds)
         && let Some(first) = first
     {
         let Standing { left, is_at_bound, .. } = first.standing;

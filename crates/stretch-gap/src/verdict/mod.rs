@@ -13,6 +13,7 @@ pub(crate) mod naming;
 #[cfg(test)]
 mod naming_tests;
 pub(crate) mod next_experiment;
+pub(crate) mod nothing_above;
 pub(crate) mod proposal;
 pub(crate) mod sentence;
 pub(crate) mod too_little;

@@ -1,0 +1,329 @@
+//! Records drawn in the space of a few effects, and how often the rule of the verdict names one of them.
+
+use nalgebra::DMatrix;
+
+use crate::{
+    evidence::{
+        candidates::LEAST_CLOSED,
+        detection_limit::{
+            Asked,
+            probes::{Probe, Probes},
+        },
+        probability::{Standing, names, probabilities},
+    },
+    fit::{
+        octaves::Octaves,
+        score::{Misfit, Observations, gap, score},
+    },
+    numerics::{
+        linear::{Cholesky, dot},
+        random::RandomGenerator,
+    },
+    problem::sample_roles::Role,
+    search::{
+        acceptance::Acceptance,
+        selection::{RIVALRY, RIVALS},
+    },
+};
+
+/// Records that are drawn: a probability of 0.9 is known to 0.02.
+const DRAWS: usize = 200;
+/// Most probes that an effect is held against, and the least squared correlation of their changes with its own.
+const HELD_AGAINST: usize = 12;
+const ALIKE: f64 = 0.02;
+/// Ratio of probabilities from which two sets are equally probable: a coin decides.
+const EVEN: f64 = 0.99;
+
+/// Parts of the record: fitted, held out, tested.
+const ROLES: [Role; 3] = [Role::Fit, Role::Held, Role::Test];
+
+/// One stage in the space of some probes.
+struct Place {
+    stage: usize,
+    /// Products u_i'V^-1 u_j by role.
+    gram: [DMatrix<f64>; 3],
+    /// Those over the fitted samples that the fit weighs amplitudes with: what tolerances pay is in them.
+    weighed: DMatrix<f64>,
+    /// Variance of the noise as a share of what it was taken for, and sums of its products by lag, cleaned.
+    noise: f64,
+    noise_lags: Vec<f64>,
+    /// Draws of u'V^-1 n by role, and of |n|^2/N - 1.
+    draws: Vec<[Vec<f64>; 3]>,
+    squares: Vec<[f64; 3]>,
+    /// Noise as it is taken in excesses where an effect of this stage is the best.
+    level: f64,
+}
+
+/// Records like the one at hand, in which one effect is missing.
+pub(super) struct Record<'a> {
+    asked: Asked<'a>,
+    probes: &'a Probes,
+    /// The effect's own probe first, then those that may stand in for it.
+    against: Vec<usize>,
+    places: Vec<Place>,
+    /// Samples by role.
+    samples: [f64; 3],
+}
+
+/// A hypothesis of one drawn record: the re-tuned nominal, or one effect beside it.
+struct Drawn {
+    /// Which of the probes.
+    at: usize,
+    standing: Standing,
+    /// Share of the gap of the test trials that closes.
+    closed: f64,
+    /// Fall of the squares of the fitted samples, in nats as a screen promises them.
+    gain: f64,
+    is_accepted: bool,
+}
+
+impl<'a> Record<'a> {
+    pub(super) fn of(asked: Asked<'a>, probes: &'a Probes, own: usize) -> Self {
+        let roles = &asked.problem.compare.roles;
+        let against = against(asked, probes, own);
+        let mut random = RandomGenerator::new(asked.seed, 500 + own as u64);
+        let samples = ROLES.map(|role| roles.count(role) as f64);
+        let stages = 0..asked.problem.compare.metrics.len();
+        let acts = |stage: &usize| {
+            against.iter().any(|&p| probes.all[p].changes.iter().any(|c| c.stage == *stage))
+        };
+        let places = stages.filter(acts);
+        let places = places
+            .map(|stage| Place::of(asked, probes, (&against, stage), samples, &mut random))
+            .collect();
+        Self { asked, probes, against, places, samples }
+    }
+
+    /// Share of the drawn records in which the effect is named where it acts with an amplitude.
+    pub(super) fn power(&self, amplitude: f64) -> f64 {
+        // What the octaves say is a matter of its size alone.
+        if self.rise(amplitude) <= self.asked.thresholds.rise {
+            return 0.0;
+        }
+        let memory: Vec<f64> = self.places.iter().map(|p| self.memory(p, amplitude)).collect();
+        let named = (0..DRAWS).map(|draw| self.named(draw, amplitude, &memory));
+        named.sum::<f64>() / DRAWS as f64
+    }
+
+    /// Rise of the likelihood by octaves from the nominal to the effect.
+    fn rise(&self, amplitude: f64) -> f64 {
+        let own = &self.probes.all[self.against[0]];
+        let of = own.changes.iter().map(|change| {
+            let noise: Octaves = self.asked.best.misfits[change.stage].octaves;
+            noise.plus(&change.octaves.scaled(amplitude * amplitude)).rise(&noise)
+        });
+        of.sum()
+    }
+
+    /// Samples that count as one observation of the nominal's misfit, where the effect's change is part of it.
+    fn memory(&self, place: &Place, amplitude: f64) -> f64 {
+        let own = &self.probes.all[self.against[0]];
+        let change = own.changes.iter().find(|c| c.stage == place.stage);
+        let square = amplitude * amplitude;
+        let at = |lag: usize| place.noise_lags[lag] + change.map_or(0.0, |c| square * c.lags[lag]);
+        let power = at(0).max(f64::MIN_POSITIVE);
+        let sum: f64 = (1..place.noise_lags.len()).map(|lag| (at(lag) / power).powi(2)).sum();
+        (1.0 + 2.0 * sum).min(self.asked.problem.compare.roles.block as f64)
+    }
+
+    /// Whether the effect is named in one drawn record; a share where a coin decides.
+    fn named(&self, draw: usize, amplitude: f64, memory: &[f64]) -> f64 {
+        let (thresholds, catalogue) =
+            (self.asked.thresholds, self.asked.problem.simulator().effects());
+        let nominal = self.left(draw, amplitude, None);
+        let all: Vec<Drawn> = (0..self.against.len())
+            .map(|at| self.drawn(draw, at, amplitude, (&nominal, memory)))
+            .collect();
+        let accepted = all.iter().filter(|d| d.is_accepted);
+        let Some(best) = accepted.max_by(|a, b| a.standing.score.total_cmp(&b.standing.score))
+        else {
+            return 0.0;
+        };
+        let effect = |d: &Drawn| self.probes.all[self.against[d.at]].effect;
+        let twins = &catalogue[effect(best)].twins;
+        let mut rivals: Vec<&Drawn> = all.iter().filter(|d| effect(d) != effect(best)).collect();
+        rivals.sort_by(|a, b| b.standing.score.total_cmp(&a.standing.score));
+        let mut weighed = vec![best];
+        for rival in rivals {
+            let is_new = weighed.iter().all(|d| effect(d) != effect(rival));
+            let is_near = rival.gain > RIVALRY * best.gain && weighed.len() <= RIVALS.0;
+            if is_new && (is_near || twins.contains(&catalogue[effect(rival)].name)) {
+                weighed.push(rival);
+            }
+        }
+        weighed.retain(|d| d.closed >= LEAST_CLOSED);
+        let retuned = self.gap(&nominal);
+        let mut standings: Vec<Standing> = weighed.iter().map(|d| d.standing).collect();
+        standings.push(Standing { score: 0.0, left: retuned, is_at_bound: false });
+        let (weights, unknown) = probabilities(thresholds, retuned, &standings);
+        let (sets, nothing) = weights.split_at(weighed.len());
+        if !names([sets.iter().sum(), nothing[0], unknown], retuned, thresholds) {
+            return 0.0;
+        }
+        let most = sets.iter().copied().fold(0.0, f64::max);
+        let even: Vec<&&Drawn> =
+            weighed.iter().zip(sets).filter(|(_, p)| **p >= EVEN * most).map(|(d, _)| d).collect();
+        let own = self.probes.all[self.against[0]].effect;
+        even.iter().filter(|d| effect(d) == own).count() as f64 / even.len().max(1) as f64
+    }
+
+    /// One effect fitted to a drawn record.
+    fn drawn(
+        &self,
+        draw: usize,
+        at: usize,
+        amplitude: f64,
+        (nominal, memory): (&[[f64; 3]], &[f64]),
+    ) -> Drawn {
+        let problem = self.asked.problem;
+        let probe = &self.probes.all[self.against[at]];
+        let (mut own, mut mixed) = (0.0, 0.0);
+        for place in &self.places {
+            own += place.weighed[(at, at)];
+            mixed += amplitude * place.weighed[(0, at)] + place.draws[draw][0][at];
+        }
+        let best = mixed / own.max(f64::MIN_POSITIVE);
+        let fitted = best.clamp(probe.range[0], probe.range[1]);
+        let left = self.left(draw, amplitude, Some((at, fitted)));
+        let misfits = |left: &[[f64; 3]]| -> Vec<Misfit> {
+            let one = |(stage, x): (usize, &[f64; 3])| Misfit {
+                stage,
+                fit: x[0],
+                held: x[1],
+                ..Misfit::default()
+            };
+            left.iter().enumerate().map(one).collect()
+        };
+        let observations: Vec<Observations> = memory
+            .iter()
+            .map(|m| Observations { fit: self.samples[0] / m, held: self.samples[1] / m })
+            .collect();
+        let (before, after) = (misfits(nominal), misfits(&left));
+        let score = score(&before, &after, &observations, 0, 1.0) - probe.price;
+        let mean = |x: &Misfit| problem.compare.mean_square(x);
+        let closed: f64 = before.iter().zip(&after).map(|(a, b)| mean(a) - mean(b)).sum();
+        let touched: f64 = before.iter().map(|x| gap(mean(x))).sum();
+        let acceptance = Acceptance { problem, thresholds: self.asked.thresholds };
+        let is_accepted = score > acceptance.least_rise(closed)
+            && closed > 0.0
+            && closed >= self.asked.thresholds.share * touched;
+        let tested = |left: &[[f64; 3]]| -> f64 {
+            self.places.iter().zip(left).map(|(p, x)| gap(x[2] / p.level)).sum()
+        };
+        let whole = tested(nominal);
+        Drawn {
+            at,
+            standing: Standing { score, left: self.gap(&left), is_at_bound: fitted != best },
+            closed: if whole > 1e-9 { 1.0 - tested(&left) / whole } else { 0.0 },
+            gain: fitted * (mixed - 0.5 * fitted * own),
+            is_accepted,
+        }
+    }
+
+    /// Reduced chi-square by place and role, with an amplitude of one probe fitted.
+    fn left(&self, draw: usize, amplitude: f64, fitted: Option<(usize, f64)>) -> Vec<[f64; 3]> {
+        let one = |place: &Place| {
+            std::array::from_fn(|role| {
+                let (n, gram) = (self.samples[role].max(1.0), &place.gram[role]);
+                let v = &place.draws[draw][role];
+                let mut sum = amplitude * amplitude * gram[(0, 0)] + 2.0 * amplitude * v[0];
+                if let Some((at, a)) = fitted {
+                    sum += a * a * gram[(at, at)] - 2.0 * a * (amplitude * gram[(0, at)] + v[at]);
+                }
+                (place.noise * (1.0 + place.squares[draw][role]) + sum / n).max(1e-3)
+            })
+        };
+        self.places.iter().map(one).collect()
+    }
+
+    /// The gap, of the fitted and the test trials the greater.
+    fn gap(&self, left: &[[f64; 3]]) -> f64 {
+        let compare = &self.asked.problem.compare;
+        let looked = self.places.iter().zip(left).map(|(p, x)| {
+            let misfit = Misfit { fit: x[0], held: x[1], ..Misfit::default() };
+            gap(compare.mean_square(&misfit) / p.level)
+        });
+        let tested = self.places.iter().zip(left).map(|(p, x)| gap(x[2] / p.level));
+        looked.sum::<f64>().max(tested.sum())
+    }
+}
+
+/// The probe and those that may stand in for it, the most alike first; of its own effect the first alone.
+fn against(asked: Asked<'_>, probes: &Probes, own: usize) -> Vec<usize> {
+    let compare = &asked.problem.compare;
+    let product = |a: &Probe, b: &Probe| -> f64 {
+        let pairs = a.changes.iter().flat_map(|x| b.changes.iter().map(move |y| (x, y)));
+        let pairs = pairs.filter(|(x, y)| x.stage == y.stage);
+        pairs.map(|(x, y)| compare.product(x.stage, &x.column, &y.column)).sum()
+    };
+    let probe = &probes.all[own];
+    let size = product(probe, probe);
+    let alike = |other: &Probe| product(probe, other).powi(2) / (size * product(other, other));
+    let others = probes.all.iter().enumerate().filter(|(_, p)| p.effect != probe.effect);
+    let mut alike: Vec<(usize, f64)> = others.map(|(i, other)| (i, alike(other))).collect();
+    alike.retain(|(_, share)| *share > ALIKE);
+    alike.sort_by(|a, b| b.1.total_cmp(&a.1));
+    std::iter::once(own).chain(alike.into_iter().take(HELD_AGAINST).map(|(i, _)| i)).collect()
+}
+
+impl Place {
+    fn of(
+        asked: Asked<'_>,
+        probes: &Probes,
+        (against, stage): (&[usize], usize),
+        samples: [f64; 3],
+        random: &mut RandomGenerator,
+    ) -> Self {
+        let compare = &asked.problem.compare;
+        let metric = &compare.metrics[stage];
+        let changes: Vec<_> = against
+            .iter()
+            .map(|&p| probes.all[p].changes.iter().find(|c| c.stage == stage))
+            .collect();
+        let matrix = |product: &dyn Fn(usize, usize) -> f64| {
+            let mut all = DMatrix::zeros(changes.len(), changes.len());
+            for i in 0..changes.len() {
+                for j in 0..=i {
+                    all[(i, j)] = product(i, j);
+                    all[(j, i)] = all[(i, j)];
+                }
+            }
+            all
+        };
+        let of_role = |role: Role| {
+            matrix(&|i, j| match (changes[i], changes[j]) {
+                (Some(x), Some(y)) => metric.product(&compare.roles, &x.column, &y.column, role),
+                _ => 0.0,
+            })
+        };
+        let mut gram = ROLES.map(of_role);
+        // Test trials that were not run are taken to show what the others do.
+        if !probes.covers_test(&compare.roles) {
+            let share = samples[2] / (samples[0] + samples[1]).max(1.0);
+            gram[2] = share * (&gram[0] + &gram[1]);
+        }
+        let prior = compare.roles.block as f64;
+        let weighed = matrix(&|i, j| match (changes[i], changes[j]) {
+            (Some(x), Some(y)) => gram[0][(i, j)] + prior * dot(&x.shifts, &y.shifts),
+            _ => 0.0,
+        });
+        let noise = compare.mean_square(&asked.best.misfits[stage]).max(f64::MIN_POSITIVE);
+        let noise_lags = probes.noise_lags(stage).to_vec();
+        let power = noise_lags[0].max(f64::MIN_POSITIVE);
+        let memory: f64 = noise_lags[1..].iter().map(|x| (x / power).powi(2)).sum();
+        let memory = (1.0 + 2.0 * memory).min(compare.roles.block as f64);
+        // Noise that is remembered weighs as its slow part does.
+        let scale = (noise * memory).sqrt();
+        let factors: Vec<Cholesky> =
+            [&weighed, &gram[1], &gram[2]].map(|g| Cholesky::of(g.clone())).into();
+        let (mut draws, mut squares) = (Vec::new(), Vec::new());
+        for _ in 0..DRAWS {
+            draws.push(std::array::from_fn(|role| {
+                let z: Vec<f64> = changes.iter().map(|_| scale * random.gauss()).collect();
+                factors[role].times(&z)
+            }));
+            squares.push(samples.map(|n| (2.0 * memory / n.max(1.0)).sqrt() * random.gauss()));
+        }
+        Self { stage, gram, weighed, noise, noise_lags, draws, squares, level: noise.min(1.0) }
+    }
+}

@@ -1,0 +1,132 @@
+//! Detection limits: how strong each effect would have to be to be named on these data.
+//!
+//! Let the re-tuned nominal be true, so that what the best set leaves is noise, and let an effect of the strength s be there beside. Around a
+//! probe at the strength s_0 its change of the output is
+//!
+//! ```text
+//! d(s) = (s/s_0)^(p/2) d(s_0),     u = d - A (A'V^-1 A + b I)^-1 A'V^-1 d
+//! ```
+//!
+//! in the metric V of every fit, with the sensitivities A of the nominal parameters (b samples a block, prior precision 1), and p = 2 where the
+//! change is linear. All that the verdict reads (scores, what is left of the fitted and the test trials, probabilities beside rivals) depends on
+//! the noise n through |n|^2 and the few products u_j'V^-1 n, which are normal with the Gram matrix u_i'V^-1 u_j as their covariance: so records
+//! are drawn in the space of the effects, never as time series, and the share of them in which the rule of the
+//! [posterior](crate::evidence::probability) names the effect is its power (Neyman and Pearson 1933, doi 10.1098/rsta.1933.0009). The detection
+//! limit is the strength at which that is 0.9.
+//!
+//! An effect's other parameters stand at the start from which it is found most easily. Rivals stand at each of their starts; a kink bends the
+//! change, so that a limit far from its probe is probed again.
+
+mod draws;
+mod probes;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use self::{
+    draws::Record,
+    probes::{Probes, Start, easiest, sizes},
+};
+use crate::{
+    fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
+    problem::{error::GapError, thresholds::Thresholds},
+    search::selection::Looked,
+};
+
+/// Probability with which an effect at its limit is named.
+const POWER: f64 = 0.9;
+/// Halvings of the ratio between the ends of a range.
+const HALVINGS: usize = 16;
+/// Strengths below this share of the range are not asked for.
+const LEAST: f64 = 1e-6;
+/// Ratio of a limit to its probe beyond which it is probed again.
+const FAR: f64 = 1.5;
+
+/// Smallest strength of an effect that would be named on these data.
+///
+/// ```
+/// let limit: stretch_gap::DetectionLimit =
+///     serde_json::from_str(r#"{ "effect": "leak", "parameter": "g", "strength": null, "unit": "1/s" }"#)?;
+/// assert_eq!(limit.strength, None); // these data do not show it at any strength that makes sense
+/// # Ok::<(), serde_json::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DetectionLimit {
+    /// Effect.
+    pub effect: String,
+    /// Parameter that says how strong it is.
+    pub parameter: String,
+    /// Value of the parameter at which the effect would be named with probability 0.9 if the re-tuned nominal were otherwise true, its other
+    /// parameters at the start from which it is found most easily; none where no value within its range would be.
+    pub strength: Option<f64>,
+    /// Unit of the value.
+    pub unit: String,
+}
+
+/// What limits are found from: the problem, the best set, whose rest is taken for noise, and the rule.
+#[derive(Clone, Copy)]
+pub(crate) struct Asked<'a> {
+    pub(crate) problem: &'a PreparedProblem<'a>,
+    pub(crate) best: &'a Hypothesis,
+    pub(crate) thresholds: &'a Thresholds,
+    pub(crate) seed: u64,
+}
+
+/// The detection limit of every effect of the catalogue, in its order; `looked` is a screen around the re-tuned nominal, where there is one.
+pub(crate) fn detection_limits(
+    asked: Asked<'_>,
+    looked: Option<&Looked>,
+) -> Result<Vec<DetectionLimit>, GapError> {
+    let problem = asked.problem;
+    let sizes = sizes(problem, looked)?;
+    let starts: Vec<Vec<Start>> =
+        sizes.into_iter().enumerate().map(|(e, own)| easiest(problem, e, own, asked)).collect();
+    let mut probes = Probes::of(problem, asked.best, &starts)?;
+    let mut found = limits(asked, &probes)?;
+    // What lies far from its probe is probed where it lies, once; where each run costs, the line has to do.
+    if problem.simulator().costly().is_none() {
+        let moved = probes.moved(problem, &found, FAR)?;
+        if !moved.is_empty() {
+            let again = limits(asked, &probes)?;
+            moved.into_iter().for_each(|e| found[e] = again[e]);
+        }
+    }
+    let effects = problem.simulator().effects().iter().zip(&starts).zip(found);
+    let limit = |((spec, starts), strength): ((&crate::EffectSpec, &Vec<Start>), Option<f64>)| {
+        let main = starts.first().map_or(0, |start| start.main);
+        let parameter = &spec.parameters[main];
+        DetectionLimit {
+            effect: spec.name.clone(),
+            parameter: parameter.name.to_string(),
+            strength,
+            unit: parameter.unit.to_string(),
+        }
+    };
+    Ok(effects.map(limit).collect())
+}
+
+/// The limit of every effect around its probe.
+fn limits(asked: Asked<'_>, probes: &Probes) -> Result<Vec<Option<f64>>, GapError> {
+    let count = asked.problem.simulator().effects().len();
+    (0..count).into_par_iter().map(|effect| limit(asked, probes, effect)).collect()
+}
+
+/// Bisection of the strength, in equal ratios, with the same draws at every strength.
+fn limit(asked: Asked<'_>, probes: &Probes, effect: usize) -> Result<Option<f64>, GapError> {
+    let Some(own) = probes.first(effect) else { return Ok(None) };
+    if (asked.problem.stop())() {
+        return Err(GapError::Stopped);
+    }
+    let record = Record::of(asked, probes, own);
+    let probe = &probes.all[own];
+    let power = |distance: f64| record.power(probe.amplitude(distance));
+    let (mut low, mut high) = (LEAST * probe.reach, probe.reach);
+    if power(high) < POWER {
+        return Ok(None);
+    }
+    for _ in 0..HALVINGS {
+        let middle = (low * high).sqrt();
+        if power(middle) < POWER { low = middle } else { high = middle }
+    }
+    Ok(Some(probe.strength(high)))
+}

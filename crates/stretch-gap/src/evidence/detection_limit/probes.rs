@@ -1,0 +1,404 @@
+//! Probes: what each effect changes at a strength near its limit, the nominal parameters projected out.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use crate::{
+    evidence::detection_limit::Asked,
+    fit::{
+        comparison::Comparison, coordinate::coordinates, hypothesis::Hypothesis, metric::Column,
+        octaves::Octaves, prepared::PreparedProblem,
+    },
+    numerics::linear::{Cholesky, dot},
+    problem::{
+        error::GapError,
+        sample_roles::{Role, SampleRoles},
+        simulator::{Model, Run},
+        spec::EffectSpec,
+    },
+    search::{screen::Ground, selection::Looked},
+};
+
+/// Starts of one effect that are probed: the easiest, and others for what it may pose as.
+const STARTS: usize = 3;
+/// Halvings and doublings of a strength within which powers of it are told from the starts.
+const POWERS: [f64; 2] = [0.5, 8.0];
+
+/// Where an effect is probed.
+#[derive(Debug, Clone)]
+pub(super) struct Start {
+    values: Vec<f64>,
+    /// Index of the parameter that says how strong the effect is.
+    pub(super) main: usize,
+    /// Power of the strength with which the squared change grows.
+    power: f64,
+}
+
+/// A probed effect.
+pub(super) struct Probe {
+    pub(super) effect: usize,
+    start: Start,
+    /// Signed distance of the strength from where it is off, and the greatest one in its range.
+    distance: f64,
+    pub(super) reach: f64,
+    off: f64,
+    /// Amplitudes that a fit may give it, as multiples of the probe.
+    pub(super) range: [f64; 2],
+    /// What the score charges for it, nats.
+    pub(super) price: f64,
+    /// By stage that it touches: the projected change.
+    pub(super) changes: Vec<Change>,
+}
+
+/// The projected change of one stage.
+pub(super) struct Change {
+    pub(super) stage: usize,
+    pub(super) column: Column,
+    /// Shifts of the nominal parameters that it is projected with, in tolerances.
+    pub(super) shifts: Vec<f64>,
+    pub(super) octaves: Octaves,
+    /// Sums over fitted samples of products so many samples apart, cleaned of nuisances.
+    pub(super) lags: Vec<f64>,
+}
+
+impl Probe {
+    /// Multiple of the probe's change at a distance from where the effect is off.
+    pub(super) fn amplitude(&self, distance: f64) -> f64 {
+        (distance / self.distance.abs()).powf(0.5 * self.start.power)
+    }
+
+    /// Value of the main parameter at a distance.
+    pub(super) fn strength(&self, distance: f64) -> f64 {
+        self.off + distance * self.distance.signum()
+    }
+}
+
+/// Squared change <d,d> of every start of every effect around the re-tuned nominal over the fitted samples.
+pub(super) fn sizes(
+    problem: &PreparedProblem<'_>,
+    looked: Option<&Looked>,
+) -> Result<Vec<Vec<Option<f64>>>, GapError> {
+    let effects = problem.simulator().effects();
+    let mut known: Vec<Option<Vec<Option<f64>>>> = vec![None; effects.len()];
+    for screened in looked.into_iter().flat_map(|looked| &looked.screened) {
+        known[screened.effect] = Some(screened.sizes.clone());
+    }
+    if known.iter().all(Option::is_some) {
+        return Ok(known.into_iter().flatten().collect());
+    }
+    let ground = Ground::around(&problem.compare, problem.nominal.model.clone())?;
+    let size = |(e, spec): (usize, &EffectSpec)| {
+        let changes = problem.compare.changes(&ground, e, &spec.starts)?;
+        Ok(changes.into_iter().map(|change| Some(change?.0)).collect())
+    };
+    effects.par_iter().enumerate().map(size).collect()
+}
+
+/// The main parameter of a start, its distance from where it is off: the first strength that is on.
+fn main_of(spec: &EffectSpec, values: &[f64]) -> Option<(usize, f64)> {
+    let mut strengths = spec.parameters.iter().zip(values).enumerate();
+    strengths.find_map(|(i, (p, value))| {
+        let distance = value - p.off()?;
+        (distance != 0.0 && distance.is_finite()).then_some((i, distance))
+    })
+}
+
+/// Starts of an effect from which a change is seen, one for each value of its other parameters, the easiest first, each moved to the strength at which it
+/// may be told; `sizes` are those of [`sizes`].
+pub(super) fn easiest(
+    problem: &PreparedProblem<'_>,
+    effect: usize,
+    sizes: Vec<Option<f64>>,
+    asked: Asked<'_>,
+) -> Vec<Start> {
+    let spec = &problem.simulator().effects()[effect];
+    // A gap that counts in the mean: where its size alone decides, the limit lies there.
+    let target = asked.thresholds.least_gap * problem.compare.roles.count(Role::Fit) as f64;
+    let is_costly = problem.simulator().costly().is_some();
+    let mut known: Vec<(usize, f64, f64, &Vec<f64>)> = Vec::new();
+    for (values, size) in spec.starts.iter().zip(sizes) {
+        let (Some((main, distance)), Some(size)) = (main_of(spec, values), size) else { continue };
+        known.push((main, distance, size, values));
+    }
+    let mut found: Vec<(f64, Start)> = Vec::new();
+    let is_family = |a: &[f64], b: &[f64], main: usize| {
+        a.iter().zip(b).enumerate().all(|(i, (x, y))| i == main || x == y)
+    };
+    for &(main, distance, size, values) in &known {
+        let alike = |k: &&(usize, f64, f64, &Vec<f64>)| {
+            k.0 == main && k.1 * distance > 0.0 && is_family(k.3, values, main)
+        };
+        let parameter = &spec.parameters[main];
+        let off = parameter.off().unwrap_or(0.0);
+        // Of a strength of either sign one side does: a fit turns the sign.
+        if distance < 0.0 && off == 0.0 && parameter.max > 0.0 {
+            continue;
+        }
+        // The start of each family whose change is nearest to the target.
+        let near = |size: f64| (size / target).ln().abs();
+        if known.iter().filter(alike).any(|k| near(k.2) < near(size)) {
+            continue;
+        }
+        let other = known.iter().filter(alike).find(|k| k.1 != distance);
+        let power = other.map_or(2.0, |k| (k.2 / size).ln() / (k.1 / distance).ln());
+        let power = power.clamp(POWERS[0], POWERS[1]);
+        let told = distance * (target / size).powf(1.0 / power);
+        let moved = (off + told).clamp(parameter.min.min(off), parameter.max.max(off));
+        let mut start = Start { values: values.clone(), main, power };
+        if !is_costly && moved != off {
+            start.values[main] = moved;
+        }
+        found.push((told.abs() / (parameter.max - parameter.min), start));
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found.into_iter().take(STARTS).map(|(_, start)| start).collect()
+}
+
+/// Every probe, and what they are projected off.
+pub(super) struct Probes {
+    pub(super) all: Vec<Probe>,
+    trials: usize,
+    stages: Vec<Tuned>,
+    /// By stage: sums of products of what is taken for noise, by lag.
+    noise_lags: Vec<Vec<f64>>,
+}
+
+/// One stage of the re-tuned nominal: its output, the sensitivities of its parameters, and the factor of their normal matrix with the prior.
+struct Tuned {
+    output: Vec<f64>,
+    sensitivities: Vec<Column>,
+    factor: Cholesky,
+}
+
+impl Tuned {
+    fn of(
+        compare: &Comparison<'_>,
+        stage: usize,
+        model: &Model,
+        trials: usize,
+    ) -> Result<Self, GapError> {
+        let run = Run::exact(stage, model, trials);
+        let output = compare.runs.run(run)?;
+        let own = coordinates(compare.simulator(), &[stage], model);
+        let mut models = Vec::new();
+        for (coordinate, bounds) in &own {
+            let x = coordinate.read(model);
+            let step = coordinate.probe(x);
+            let step = if x + step > bounds[1] { -step } else { step };
+            let mut moved = model.clone();
+            coordinate.write(&mut moved, x + step);
+            models.push((step, moved));
+        }
+        let runs: Vec<Run<'_>> = models
+            .iter()
+            .map(|(_, moved)| Run {
+                near: Some(&model.parameters),
+                ..Run::exact(stage, moved, trials)
+            })
+            .collect();
+        let mut sensitivities = Vec::new();
+        for (there, (step, _)) in compare.runs.run_many(&runs).into_iter().zip(&models) {
+            match there {
+                Ok(there) => {
+                    let change = change(compare, stage, &output, there, *step);
+                    sensitivities.push(compare.metrics[stage].column(&compare.roles, change));
+                }
+                Err(error) if error.ends_all() => return Err(error),
+                // What cannot be simulated a fit does not reach either.
+                Err(_) => {}
+            }
+        }
+        let n = sensitivities.len();
+        let normal = DMatrix::from_fn(n, n, |i, j| {
+            let prior = if i == j { compare.roles.block as f64 } else { 0.0 };
+            compare.product(stage, &sensitivities[i], &sensitivities[j]) + prior
+        });
+        Ok(Self { output, sensitivities, factor: Cholesky::of(normal) })
+    }
+}
+
+/// Change of an output for one step, in multiples of the noise.
+fn change(
+    compare: &Comparison<'_>,
+    stage: usize,
+    here: &[f64],
+    mut there: Vec<f64>,
+    step: f64,
+) -> Vec<f64> {
+    let sds = &compare.metrics[stage].noise.sd;
+    for ((x, here), sd) in there.iter_mut().zip(here).zip(sds) {
+        *x = (*x - here) / (sd * step);
+    }
+    there
+}
+
+impl Probes {
+    /// Runs every start over all trials, in one batch; over the fitted ones where each run costs.
+    pub(super) fn of(
+        problem: &PreparedProblem<'_>,
+        best: &Hypothesis,
+        starts: &[Vec<Start>],
+    ) -> Result<Self, GapError> {
+        let simulator = problem.simulator();
+        let trials = match simulator.costly() {
+            Some(_) => problem.compare.roles.fit_trials,
+            None => simulator.trials().len(),
+        };
+        let model = &problem.nominal.model;
+        let stages = 0..problem.compare.metrics.len();
+        let tuned = stages
+            .into_par_iter()
+            .map(|stage| Tuned::of(&problem.compare, stage, model, trials))
+            .collect::<Result<_, GapError>>()?;
+        let compare = &problem.compare;
+        let noise = |stage: usize| {
+            let mut clean = compare.residual_values(stage, &best.model)?;
+            compare.metrics[stage].clean(&compare.roles, &mut clean);
+            Ok(lags(compare, &clean))
+        };
+        let stages = (0..compare.metrics.len()).into_par_iter();
+        let noise_lags = stages.map(noise).collect::<Result<_, GapError>>()?;
+        let mut probes = Self { all: Vec::new(), trials, stages: tuned, noise_lags };
+        let all = starts.iter().enumerate();
+        let all = all.flat_map(|(e, own)| own.iter().map(move |start| (e, start.clone())));
+        probes.all = probes.run(problem, all.collect())?;
+        Ok(probes)
+    }
+
+    /// Whether the test trials were run.
+    pub(super) fn covers_test(&self, roles: &SampleRoles) -> bool {
+        let end = roles.samples(self.trials);
+        roles.of_role(Role::Test).all(|s| s.to <= end)
+    }
+
+    /// Sums over the fitted samples of products of the noise so many samples apart.
+    pub(super) fn noise_lags(&self, stage: usize) -> &[f64] {
+        &self.noise_lags[stage]
+    }
+
+    /// The probe of an effect that its own limit is found around.
+    pub(super) fn first(&self, effect: usize) -> Option<usize> {
+        self.all.iter().position(|p| p.effect == effect)
+    }
+
+    /// Probes again what lies farther from its probe than a ratio; the effects that were.
+    pub(super) fn moved(
+        &mut self,
+        problem: &PreparedProblem<'_>,
+        found: &[Option<f64>],
+        far: f64,
+    ) -> Result<Vec<usize>, GapError> {
+        let mut moved = Vec::new();
+        for (effect, limit) in found.iter().enumerate() {
+            let Some(own) = self.first(effect) else { continue };
+            let probe = &self.all[own];
+            let to = limit.map_or(probe.strength(probe.reach), |s| s);
+            let ratio = ((to - probe.off) / probe.distance).abs();
+            if ratio > far || ratio < 1.0 / far {
+                let mut start = probe.start.clone();
+                start.values[start.main] = to;
+                moved.push((effect, start));
+            }
+        }
+        let effects = moved.iter().map(|(effect, _)| *effect).collect();
+        for probe in self.run(problem, moved)? {
+            if let Some(own) = self.first(probe.effect) {
+                self.all[own] = probe;
+            }
+        }
+        Ok(effects)
+    }
+
+    fn run(
+        &self,
+        problem: &PreparedProblem<'_>,
+        starts: Vec<(usize, Start)>,
+    ) -> Result<Vec<Probe>, GapError> {
+        let effects = problem.simulator().effects();
+        let models: Vec<Model> = starts
+            .iter()
+            .map(|(effect, start)| {
+                let mut model = problem.nominal.model.clone();
+                model.effects.push((*effect, start.values.clone()));
+                model
+            })
+            .collect();
+        let places = starts.iter().zip(&models).flat_map(|((effect, _), model)| {
+            effects[*effect].touches.iter().map(move |stage| Run::exact(*stage, model, self.trials))
+        });
+        let places: Vec<Run<'_>> = places.collect();
+        let mut outputs = problem.compare.runs.run_many(&places).into_iter();
+        let mut begun = Vec::new();
+        for ((effect, start), model) in starts.into_iter().zip(&models) {
+            let touches = &effects[effect].touches;
+            let own: Result<Vec<_>, GapError> = outputs.by_ref().take(touches.len()).collect();
+            match own {
+                Ok(own) => begun.push((effect, start, model, own)),
+                Err(error) if error.ends_all() => return Err(error),
+                Err(_) => {}
+            }
+        }
+        let probe =
+            |(effect, start, model, outputs)| self.probe(problem, (effect, start), model, outputs);
+        Ok(begun.into_par_iter().filter_map(probe).collect())
+    }
+
+    /// A probe from its outputs in the stages that it touches; none where nothing changes.
+    fn probe(
+        &self,
+        problem: &PreparedProblem<'_>,
+        (effect, start): (usize, Start),
+        model: &Model,
+        outputs: Vec<Vec<f64>>,
+    ) -> Option<Probe> {
+        let spec = &problem.simulator().effects()[effect];
+        let stages = spec.touches.iter().zip(outputs);
+        let changes: Vec<Change> =
+            stages.map(|(&stage, there)| self.projected(problem, stage, there)).collect();
+        let size = |c: &Change| problem.compare.product(c.stage, &c.column, &c.column);
+        if changes.iter().map(size).sum::<f64>() <= 0.0 {
+            return None;
+        }
+        let parameter = &spec.parameters[start.main];
+        let off = parameter.off()?;
+        let distance = start.values[start.main] - off;
+        let reach = if distance > 0.0 { parameter.max - off } else { off - parameter.min };
+        let most = (reach / distance.abs()).powf(0.5 * start.power);
+        // A strength of either sign is a fit's to turn; a threshold has one side.
+        let back = if distance > 0.0 { off - parameter.min } else { parameter.max - off };
+        let least = if off == 0.0 && back > 0.0 { -back / distance.abs() } else { 0.0 };
+        let range = [least, most];
+        let price = problem.price(model);
+        Some(Probe { effect, start, distance, reach, off, range, price, changes })
+    }
+
+    /// The change of one stage, the nominal parameters projected out.
+    fn projected(&self, problem: &PreparedProblem<'_>, stage: usize, there: Vec<f64>) -> Change {
+        let (compare, tuned) = (&problem.compare, &self.stages[stage]);
+        let metric = &compare.metrics[stage];
+        let mut values = change(compare, stage, &tuned.output, there, 1.0);
+        let whole = metric.column(&compare.roles, values.clone());
+        let of = tuned.sensitivities.iter();
+        let mut shifts: Vec<f64> = of.map(|k| compare.product(stage, k, &whole)).collect();
+        tuned.factor.solve(&mut shifts);
+        for (k, shift) in tuned.sensitivities.iter().zip(&shifts) {
+            values.iter_mut().zip(&k.values).for_each(|(x, k)| *x -= shift * k);
+        }
+        let mut clean = values.clone();
+        metric.clean(&compare.roles, &mut clean);
+        let octaves = compare.octaves(stage, &values);
+        let lags = lags(compare, &clean);
+        let column = metric.column(&compare.roles, values);
+        Change { stage, column, shifts, octaves, lags }
+    }
+}
+
+/// Sums over the fitted samples of products so many samples apart, up to two blocks.
+fn lags(compare: &Comparison<'_>, clean: &[f64]) -> Vec<f64> {
+    let parts = || compare.roles.of_role(Role::Fit).map(|s| &clean[s.from..s.to]);
+    let product = |lag: usize| -> f64 {
+        let long = parts().filter(|p| p.len() > lag);
+        long.map(|p| dot(&p[lag..], &p[..p.len() - lag])).sum()
+    };
+    (0..=2 * compare.roles.block).map(product).collect()
+}

@@ -5,6 +5,7 @@ mod evidence;
 mod fit;
 mod missing;
 mod numerics;
+mod options;
 mod problem;
 mod record;
 mod search;
@@ -17,7 +18,7 @@ extern crate self as stretch_gap;
 #[path = "../tests/toys/mod.rs"]
 mod toys;
 
-pub use diagnose::{Options, diagnose};
+pub use diagnose::diagnose;
 pub use evidence::{
     candidates::{Candidate, EffectValue, ParameterShift},
     detection_limit::DetectionLimit,
@@ -34,6 +35,7 @@ pub use fit::{
 };
 pub use missing::{Course, Factor, Passage, Proposed, ProposedTerm, RateForm, SignalScale, Term};
 pub use numerics::random::RandomGenerator;
+pub use options::Options;
 pub use problem::{
     checks::DescriptionError,
     column::{Column, Distortion},

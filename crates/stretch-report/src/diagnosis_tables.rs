@@ -68,9 +68,9 @@ pub fn candidate_table(candidates: &[Candidate], stabilities: &[EffectStability]
         ]
     };
     Table::new(
-        "Candidates, the most probable set first, nothing and unknown behind: probability given this catalogue; what is left before and after in \
-         multiples of the noise, all channels with a gap together; the share that closes on trials that were not fitted; stability, the share of \
-         resampled records in which the most probable set holds the effect; \u{b1} is one standard deviation",
+        "Candidates, the most probable set first, nothing and unknown behind: probability given this catalogue; what is left before \
+         and after in multiples of the noise, all channels with a gap together; the share that closes on trials that were not fitted; \
+         stability, the share of resampled records in which the most probable set holds the effect; \u{b1} is one standard deviation",
         &[
             "Effects",
             "Probability",

@@ -24,7 +24,8 @@ pub fn limit_table(limits: &[DetectionLimit]) -> Table {
         vec![limit.effect.clone(), limit.parameter.clone(), strength.unwrap_or_else(none)]
     };
     Table::new(
-        "Detection limits: the strength at which each effect would be named on these data with probability 0.9, the simulator being right otherwise",
+        "Detection limits: the strength at which each effect would be named on these data with probability 0.9, \
+         the simulator being right otherwise",
         &["Effect", "Parameter", "Limit"],
         limits.iter().map(row),
     )

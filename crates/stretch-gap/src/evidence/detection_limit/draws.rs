@@ -6,7 +6,7 @@ use crate::{
     evidence::{
         candidates::LEAST_CLOSED,
         detection_limit::{
-            Asked,
+            asked::Asked,
             probes::{Probe, Probes},
         },
         probability::{Standing, names, probabilities},

@@ -17,19 +17,21 @@
 //! An effect's other parameters stand at the start from which it is found most easily. Rivals stand at each of their starts; a kink bends the
 //! change, so that a limit far from its probe is probed again.
 
+mod asked;
 mod draws;
 mod probes;
+mod tuned;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+pub(crate) use self::asked::Asked;
 use self::{
     draws::Record,
     probes::{Probes, Start, easiest, sizes},
 };
 use crate::{
-    fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
-    problem::{error::GapError, thresholds::Thresholds},
+    problem::{error::GapError, spec::EffectSpec},
     search::selection::Looked,
 };
 
@@ -63,15 +65,6 @@ pub struct DetectionLimit {
     pub unit: String,
 }
 
-/// What limits are found from: the problem, the best set, whose rest is taken for noise, and the rule.
-#[derive(Clone, Copy)]
-pub(crate) struct Asked<'a> {
-    pub(crate) problem: &'a PreparedProblem<'a>,
-    pub(crate) best: &'a Hypothesis,
-    pub(crate) thresholds: &'a Thresholds,
-    pub(crate) seed: u64,
-}
-
 /// The detection limit of every effect of the catalogue, in its order; `looked` is a screen around the re-tuned nominal, where there is one.
 pub(crate) fn detection_limits(
     asked: Asked<'_>,
@@ -92,7 +85,7 @@ pub(crate) fn detection_limits(
         }
     }
     let effects = problem.simulator().effects().iter().zip(&starts).zip(found);
-    let limit = |((spec, starts), strength): ((&crate::EffectSpec, &Vec<Start>), Option<f64>)| {
+    let limit = |((spec, starts), strength): ((&EffectSpec, &Vec<Start>), Option<f64>)| {
         let main = starts.first().map_or(0, |start| start.main);
         let parameter = &spec.parameters[main];
         DetectionLimit {

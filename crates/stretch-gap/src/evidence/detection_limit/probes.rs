@@ -1,15 +1,17 @@
 //! Probes: what each effect changes at a strength near its limit, the nominal parameters projected out.
 
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::{
-    evidence::detection_limit::Asked,
-    fit::{
-        comparison::Comparison, coordinate::coordinates, hypothesis::Hypothesis, metric::Column,
-        octaves::Octaves, prepared::PreparedProblem,
+    evidence::detection_limit::{
+        asked::Asked,
+        tuned::{Tuned, change},
     },
-    numerics::linear::{Cholesky, dot},
+    fit::{
+        comparison::Comparison, hypothesis::Hypothesis, metric::Column, octaves::Octaves,
+        prepared::PreparedProblem,
+    },
+    numerics::linear::dot,
     problem::{
         error::GapError,
         sample_roles::{Role, SampleRoles},
@@ -161,75 +163,6 @@ pub(super) struct Probes {
     stages: Vec<Tuned>,
     /// By stage: sums of products of what is taken for noise, by lag.
     noise_lags: Vec<Vec<f64>>,
-}
-
-/// One stage of the re-tuned nominal: its output, the sensitivities of its parameters, and the factor of their normal matrix with the prior.
-struct Tuned {
-    output: Vec<f64>,
-    sensitivities: Vec<Column>,
-    factor: Cholesky,
-}
-
-impl Tuned {
-    fn of(
-        compare: &Comparison<'_>,
-        stage: usize,
-        model: &Model,
-        trials: usize,
-    ) -> Result<Self, GapError> {
-        let run = Run::exact(stage, model, trials);
-        let output = compare.runs.run(run)?;
-        let own = coordinates(compare.simulator(), &[stage], model);
-        let mut models = Vec::new();
-        for (coordinate, bounds) in &own {
-            let x = coordinate.read(model);
-            let step = coordinate.probe(x);
-            let step = if x + step > bounds[1] { -step } else { step };
-            let mut moved = model.clone();
-            coordinate.write(&mut moved, x + step);
-            models.push((step, moved));
-        }
-        let runs: Vec<Run<'_>> = models
-            .iter()
-            .map(|(_, moved)| Run {
-                near: Some(&model.parameters),
-                ..Run::exact(stage, moved, trials)
-            })
-            .collect();
-        let mut sensitivities = Vec::new();
-        for (there, (step, _)) in compare.runs.run_many(&runs).into_iter().zip(&models) {
-            match there {
-                Ok(there) => {
-                    let change = change(compare, stage, &output, there, *step);
-                    sensitivities.push(compare.metrics[stage].column(&compare.roles, change));
-                }
-                Err(error) if error.ends_all() => return Err(error),
-                // What cannot be simulated a fit does not reach either.
-                Err(_) => {}
-            }
-        }
-        let n = sensitivities.len();
-        let normal = DMatrix::from_fn(n, n, |i, j| {
-            let prior = if i == j { compare.roles.block as f64 } else { 0.0 };
-            compare.product(stage, &sensitivities[i], &sensitivities[j]) + prior
-        });
-        Ok(Self { output, sensitivities, factor: Cholesky::of(normal) })
-    }
-}
-
-/// Change of an output for one step, in multiples of the noise.
-fn change(
-    compare: &Comparison<'_>,
-    stage: usize,
-    here: &[f64],
-    mut there: Vec<f64>,
-    step: f64,
-) -> Vec<f64> {
-    let sds = &compare.metrics[stage].noise.sd;
-    for ((x, here), sd) in there.iter_mut().zip(here).zip(sds) {
-        *x = (*x - here) / (sd * step);
-    }
-    there
 }
 
 impl Probes {

@@ -52,7 +52,7 @@ pub static CROSSTALK: Kind = Kind {
     beside: Beside::Another,
     parameters: |e, unit| {
         let most = 0.3 * e.span();
-        let bend = EffectParameter::formed("bend", "1", -0.6..=0.6, 0.0);
+        let bend = EffectParameter::formed("bend", "1", -1.0..=1.0, 0.0);
         vec![EffectParameter::sized("c", unit, -most..=most), bend]
     },
     starts: Some(|e| [-0.03, 0.03].map(|k| vec![k * e.span(), 0.0]).into()),
@@ -80,7 +80,7 @@ pub(crate) static PRESSURE_CROSSTALK: Effect = Effect {
     equation: "e -> e + c x (1 + bend (1 - x)), x = (p - P_atm)/P_ref",
     parameters: &[
         EffectParameter::strength("c", "strain", -0.05, 0.05, 0.01),
-        EffectParameter::form("bend", "1", -0.6, 0.6, Form { neutral: 0.0, usual: 0.0 }),
+        EffectParameter::form("bend", "1", -1.0, 1.0, Form { neutral: 0.0, usual: 0.0 }),
     ],
     acts: Acts::Own {
         action: |v, around| {

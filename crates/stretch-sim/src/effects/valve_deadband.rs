@@ -32,7 +32,7 @@ fn starts() -> Vec<Vec<f64>> {
     let mut all = each([0.001, 0.01, 0.04]);
     all.extend([0.02, 0.06].map(|u| vec![u, 1.0, 0.01, 1.0]));
     all.extend([0.01, 0.03].map(|u| vec![u, 1.0, 0.01, 1.9]));
-    all.extend([0.005, 0.015].map(|u| vec![u, 0.5, 0.5, 1.0]));
+    all.extend([0.001, 0.002, 0.005, 0.015].map(|u| vec![u, 0.5, 0.5, 1.0]));
     all
 }
 

@@ -115,11 +115,12 @@ pub(crate) fn candidates(
     hypotheses.par_iter().map(|one| candidate(problem, evidence, one, seed)).collect()
 }
 
-/// Share of the gap of the test trials that a set of effects closes at least to be a cause of it, as a `partial` answer promises.
+/// Share of the gap that a set of effects closes at least to be a cause of it, as a `partial` answer promises: of the gap of the fitted and of the
+/// test trials, whichever is the greater, for what acts in long trials alone leaves little gap in short ones.
 pub(crate) const LEAST_CLOSED: f64 = 0.3;
 
 /// Weighs hypotheses with what they leave; their candidates and blocks are put into the same order. A set of effects that closes less than
-/// [`LEAST_CLOSED`] of the gap of the test trials is dropped.
+/// [`LEAST_CLOSED`] of the gap is dropped.
 pub(crate) fn posterior(
     problem: &PreparedProblem<'_>,
     thresholds: &Thresholds,
@@ -129,9 +130,9 @@ pub(crate) fn posterior(
 ) -> (Posterior, Vec<(Candidate, Vec<Blocks>)>) {
     let (mut kept, mut by_effects) = (Vec::new(), BTreeMap::new());
     for (hypothesis, (candidate, blocks)) in hypotheses.into_iter().zip(candidates) {
-        let is_possible = hypothesis.effects.is_empty() || candidate.closed >= LEAST_CLOSED;
-        if is_possible {
-            let left = evidence.fitted_gap(problem, &hypothesis).max(candidate.gap_after);
+        let left = evidence.fitted_gap(problem, &hypothesis).max(candidate.gap_after);
+        let closed = 1.0 - left / evidence.gap.retuned;
+        if hypothesis.effects.is_empty() || closed >= LEAST_CLOSED {
             by_effects.insert(hypothesis.effects.clone(), (candidate, blocks));
             let (score, catalogue) = (hypothesis.score, problem.simulator().effects());
             let strongest = hypothesis.effects.first();

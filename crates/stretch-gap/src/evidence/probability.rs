@@ -12,7 +12,7 @@
 //!
 //! and probabilities are these weights as shares of their sum. The temperature t tempers the posterior (Grunwald and van Ommen 2017, doi
 //! 10.1214/17-BA1085): the more of the gap the best set leaves, the less its form is the rig's, and the less a difference of scores says. T, rho,
-//! o, u, v and s are calibrated on development cases. A set that closes less than 0.3 of the gap of the trials that were not fitted is no hypothesis; of
+//! o, u, v and s are calibrated on development cases. A set that closes less than 0.3 of the gap, of the fitted or of the test trials as either is the greater, is no hypothesis; of
 //! one whose strongest effect stands at an end of its range the odds o_h are ten times as large, for it may stand in for something else.
 
 use crate::{

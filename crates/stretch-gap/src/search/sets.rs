@@ -17,7 +17,10 @@ use crate::{
         prepared::PreparedProblem,
     },
     problem::{error::GapError, linked_stages::linked, simulator::Model},
-    search::screen::{Ground, Screened},
+    search::{
+        screen::{Ground, Screened},
+        unstrained::unstrained,
+    },
 };
 
 /// Starts of one effect that are fitted, and the share of the best one's promise that the others need.
@@ -184,19 +187,26 @@ impl<'a> Sets<'a> {
         ground: &Ground,
         screened: &[&Screened],
     ) -> Result<BTreeMap<usize, Hypothesis>, GapError> {
-        let starts: Vec<(usize, Vec<&Vec<f64>>)> = screened
-            .iter()
+        let starts: Vec<(usize, Vec<Model>)> = screened
+            .par_iter()
             .map(|screen| {
                 let promising =
                     screen.starts.iter().filter(|s| s.1 > PROMISING_START * screen.gain());
-                (screen.effect, promising.take(STARTS).map(|s| &s.0).collect())
+                let mut models: Vec<Model> = promising
+                    .take(STARTS)
+                    .map(|s| with(&base.model, screen.effect, &s.0))
+                    .collect();
+                models.extend(unstrained(self.problem, &base.model, screen.effect)?);
+                Ok((screen.effect, models))
             })
-            .collect();
+            .collect::<Result<_, GapError>>()?;
         let (several, one): (Vec<_>, Vec<_>) = starts.into_iter().partition(|s| s.1.len() > 1);
-        let glances: Vec<(usize, &Vec<f64>)> =
-            several.iter().flat_map(|(e, starts)| starts.iter().map(|s| (*e, *s))).collect();
-        let looked = glances.par_iter().map(|&(effect, values)| {
-            let (stages, model) = self.part(base, effect, with(base, effect, values));
+        let glances: Vec<(usize, Model)> = several
+            .into_iter()
+            .flat_map(|(e, starts)| starts.into_iter().map(move |s| (e, s)))
+            .collect();
+        let looked = glances.into_par_iter().map(|(effect, model)| {
+            let (stages, model) = self.part(base, effect, model);
             let fitted = self.problem.compare.fit(&stages, model, &ground.known, GLANCE)?;
             Ok((effect, fitted))
         });
@@ -206,9 +216,7 @@ impl<'a> Sets<'a> {
                 best.insert(effect, fitted);
             }
         }
-        let begun = one
-            .iter()
-            .filter_map(|(effect, starts)| Some((*effect, with(base, *effect, starts.first()?))));
+        let begun = one.into_iter().filter_map(|(e, starts)| Some((e, starts.into_iter().next()?)));
         let begun: Vec<(usize, Model)> =
             begun.chain(best.into_iter().map(|(effect, fitted)| (effect, fitted.model))).collect();
         let fits = begun
@@ -265,9 +273,9 @@ impl<'a> Sets<'a> {
     }
 }
 
-/// The model of a set with one effect more.
-fn with(base: &Hypothesis, effect: usize, values: &[f64]) -> Model {
-    let mut model = base.model.clone();
+/// A model with one effect more.
+fn with(base: &Model, effect: usize, values: &[f64]) -> Model {
+    let mut model = base.clone();
     model.effects.push((effect, values.to_vec()));
     model
 }

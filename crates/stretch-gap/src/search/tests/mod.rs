@@ -3,6 +3,7 @@
 mod acceptance;
 mod screening;
 mod selecting;
+mod unstrained;
 
 use crate::{fit::hypothesis::Hypothesis, fit::prepared::PreparedProblem, toys::Measured};
 

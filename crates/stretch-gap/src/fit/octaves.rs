@@ -58,6 +58,14 @@ impl Octaves {
         self
     }
 
+    /// Moved as another residual goes `from` one `to` another; a tenth stays at least.
+    pub(crate) fn moved(mut self, from: &Self, to: &Self) -> Self {
+        for ((x, from), to) in self.sums.iter_mut().zip(from.sums).zip(to.sums) {
+            *x = (*x + to - from).max(0.1 * *x);
+        }
+        self
+    }
+
     /// Mean squares that are `share` times as large.
     pub(crate) fn scaled(mut self, share: f64) -> Self {
         self.sums.iter_mut().for_each(|sum| *sum *= share);

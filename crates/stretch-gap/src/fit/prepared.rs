@@ -48,6 +48,8 @@ pub(crate) struct PreparedProblem<'a> {
     pub(crate) nominal: Hypothesis,
     /// What the re-tuning says of the nominal parameters.
     information: Vec<Information>,
+    /// By stage: sensitivities of its nominal parameters around the re-tuned nominal.
+    pub(crate) sensitivities: Vec<Sensitivities>,
     /// By stage: samples that count as one observation.
     memory: Vec<f64>,
     /// By stage: how much its samples count.
@@ -124,6 +126,14 @@ impl<'a> PreparedProblem<'a> {
             .map(|s| compare.samples_per_observation(s, &nominal.model))
             .collect();
         let memory = memory?;
+        let sensitivities: Result<_, GapError> = (0..stages)
+            .into_par_iter()
+            .map(|s| {
+                let residual = compare.residual(s, &nominal.model)?;
+                compare.nominal_sensitivities(s, &nominal.model, &residual)
+            })
+            .collect();
+        let sensitivities = sensitivities?;
         let count = |role, memory: f64| compare.roles.count(role) as f64 / memory;
         let observations = memory
             .iter()
@@ -139,6 +149,7 @@ impl<'a> PreparedProblem<'a> {
             shipped,
             nominal,
             information,
+            sensitivities,
             memory,
             observations,
             transmitted,
@@ -156,6 +167,7 @@ impl<'a> PreparedProblem<'a> {
             shipped: self.shipped.clone(),
             nominal: self.nominal.clone(),
             information: self.information.clone(),
+            sensitivities: self.sensitivities.clone(),
             memory: self.memory.clone(),
             observations: self.observations.clone(),
             transmitted: self.transmitted.clone(),

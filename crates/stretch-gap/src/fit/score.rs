@@ -66,6 +66,17 @@ pub(crate) fn mean_square(blocks: &[f64]) -> f64 {
 }
 
 impl Misfit {
+    /// This misfit, at the noise that is transmitted, moved as its residual's own misfit goes `from` one `to` another.
+    pub(crate) fn moved(self, from: &Self, to: &Self) -> Self {
+        let moved = |x: f64, from: f64, to: f64| (x + to - from).max(LEAST_KEPT * x);
+        Self {
+            fit: moved(self.fit, from.fit, to.fit),
+            held: moved(self.held, from.held, to.held),
+            octaves: self.octaves.moved(&from.octaves, &to.octaves),
+            ..self
+        }
+    }
+
     /// Misfit of a hypothesis beside the re-tuned nominal, each with the noise of the *measured input* that it transmits.
     ///
     /// X holds what arrives of that noise at the output. A slow amplifier or a slipping sleeve transmits less of it, and would

@@ -5,10 +5,11 @@
 //! model discrepancy within the noise. At least `share` of the gap that is left in the effect's stages closes. And in one of these stages more
 //! closes than *model discrepancy* could explain: the rig's backlash is not the textbook's; an effect in the right place leaves a share
 //! `model_discrepancy` of what it closes, with the shape of a further effect, and evidence grows with the samples while that share does not.
+//! The set that an effect is added to stands beside it with the [deviations](crate::fit::deviations) of its own effects' forms.
 
 use crate::{
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
-    problem::thresholds::Thresholds,
+    problem::{error::GapError, thresholds::Thresholds},
 };
 
 /// The acceptance criteria of a problem.
@@ -30,6 +31,12 @@ impl Acceptance<'_> {
             && self.problem.rise(base, next) > self.thresholds.rise
             && closed >= self.thresholds.share * self.left(base, new)
             && self.exceeds_discrepancy(base, next, new)
+    }
+
+    /// A set with the deviations of its effects' forms: what they explain is no further effect's.
+    pub(crate) fn with_deviations(&self, set: &Hypothesis) -> Result<Hypothesis, GapError> {
+        // A share of the variance, and an amplitude.
+        self.problem.with_deviations(set, self.thresholds.model_discrepancy.sqrt())
     }
 
     /// Whether an effect on top of `base` can be more than what model discrepancy left.

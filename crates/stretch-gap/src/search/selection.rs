@@ -187,7 +187,8 @@ impl<'a> Search<'a> {
         list: &[Screened],
     ) -> Result<Option<Hypothesis>, GapError> {
         let found = self.sets.extend_all(base, ground, list, base.score)?;
-        Ok(found.into_iter().find(|next| self.acceptance.is_accepted(base, next)))
+        let base = self.acceptance.with_deviations(base)?;
+        Ok(found.into_iter().find(|next| self.acceptance.is_accepted(&base, next)))
     }
 
     /// Effects that a shortlist leaves out, where a gap is left for them, each from its best start.
@@ -210,10 +211,11 @@ impl<'a> Search<'a> {
                     weakest = Some(less);
                 }
             }
-            match weakest {
-                Some(less) if !self.acceptance.is_accepted(&less, &best) => best = less,
-                _ => break,
+            let Some(less) = weakest else { break };
+            if self.acceptance.is_accepted(&self.acceptance.with_deviations(&less)?, &best) {
+                break;
             }
+            best = less;
         }
         Ok(best)
     }

@@ -13,7 +13,7 @@ use super::{
 /// use stretch_gap::DetectionLimit;
 /// use stretch_report::limit_table;
 /// let strength = Some(0.0123);
-/// let limit = DetectionLimit { effect: "creep".into(), parameter: "c".into(), strength, unit: "1".into() };
+/// let limit = DetectionLimit { effect: "creep".into(), parameter: "c".into(), strength, unit: "1".into(), others: Default::default() };
 /// assert_eq!(limit_table(&[limit]).rows[0], ["creep", "c", "0.0123"]);
 /// ```
 pub fn limit_table(limits: &[DetectionLimit]) -> Table {

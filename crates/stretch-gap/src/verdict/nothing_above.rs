@@ -53,6 +53,7 @@ mod tests {
             parameter: "c".into(),
             strength,
             unit: "V".into(),
+            others: Default::default(),
         };
         let effects: Vec<EffectSpec> = (0..9).map(spec).collect();
         let limits: Vec<DetectionLimit> =

@@ -7,7 +7,8 @@ use crate::{
         candidates::LEAST_CLOSED,
         detection_limit::{
             asked::Asked,
-            probes::{Probe, Probes},
+            lags::Lags,
+            probes::{Change, Probe, Probes},
         },
         probability::{Standing, names, probabilities},
     },
@@ -28,9 +29,12 @@ use crate::{
 
 /// Records that are drawn: a probability of 0.9 is known to 0.02.
 const DRAWS: usize = 200;
-/// Most probes that an effect is held against, and the least squared correlation of their changes with its own.
-const HELD_AGAINST: usize = 12;
-const ALIKE: f64 = 0.02;
+/// Probability with which an effect at its limit is named.
+const POWER: f64 = 0.9;
+/// Most probes that an effect is held against, and the least squared correlation of their changes with its own: a rival promises half as much as
+/// the best.
+const HELD_AGAINST: usize = 8;
+const ALIKE: f64 = 0.3;
 /// Ratio of probabilities from which two sets are equally probable: a coin decides.
 const EVEN: f64 = 0.99;
 
@@ -44,9 +48,9 @@ struct Place {
     gram: [DMatrix<f64>; 3],
     /// Those over the fitted samples that the fit weighs amplitudes with: what tolerances pay is in them.
     weighed: DMatrix<f64>,
-    /// Variance of the noise as a share of what it was taken for, and sums of its products by lag, cleaned.
+    /// Variance of the noise as a share of what it was taken for, and how it is remembered.
     noise: f64,
-    noise_lags: Vec<f64>,
+    noise_lags: Lags,
     /// Draws of u'V^-1 n by role, and of |n|^2/N - 1.
     draws: Vec<[Vec<f64>; 3]>,
     squares: Vec<[f64; 3]>,
@@ -61,8 +65,17 @@ pub(super) struct Record<'a> {
     /// The effect's own probe first, then those that may stand in for it.
     against: Vec<usize>,
     places: Vec<Place>,
+    /// Of the effect's own change in each stage that it touches.
+    own: Vec<Shown>,
     /// Samples by role.
     samples: [f64; 3],
+}
+
+/// How the effect's own change shows in one stage.
+struct Shown {
+    stage: usize,
+    octaves: Octaves,
+    lags: Lags,
 }
 
 /// A hypothesis of one drawn record: the re-tuned nominal, or one effect beside it.
@@ -91,39 +104,46 @@ impl<'a> Record<'a> {
         let places = places
             .map(|stage| Place::of(asked, probes, (&against, stage), samples, &mut random))
             .collect();
-        Self { asked, probes, against, places, samples }
+        let shown = |change: &Change| {
+            let (compare, values) = (&asked.problem.compare, &change.column.values);
+            let mut clean = values.clone();
+            compare.metrics[change.stage].clean(roles, &mut clean);
+            let (octaves, lags) =
+                (compare.octaves(change.stage, values), Lags::of(compare, &clean));
+            Shown { stage: change.stage, octaves, lags }
+        };
+        let own = probes.all[own].changes.iter().map(shown).collect();
+        Self { asked, probes, against, places, own, samples }
     }
 
-    /// Share of the drawn records in which the effect is named where it acts with an amplitude.
-    pub(super) fn power(&self, amplitude: f64) -> f64 {
+    /// Whether the effect is named in as many of the drawn records as a limit asks for, where it acts with an amplitude.
+    pub(super) fn names(&self, amplitude: f64) -> bool {
         // What the octaves say is a matter of its size alone.
         if self.rise(amplitude) <= self.asked.thresholds.rise {
-            return 0.0;
+            return false;
         }
         let memory: Vec<f64> = self.places.iter().map(|p| self.memory(p, amplitude)).collect();
-        let named = (0..DRAWS).map(|draw| self.named(draw, amplitude, &memory));
-        named.sum::<f64>() / DRAWS as f64
+        let mut missed = 0.0;
+        (0..DRAWS).all(|draw| {
+            missed += 1.0 - self.named(draw, amplitude, &memory);
+            missed <= (1.0 - POWER) * DRAWS as f64
+        })
     }
 
     /// Rise of the likelihood by octaves from the nominal to the effect.
     fn rise(&self, amplitude: f64) -> f64 {
-        let own = &self.probes.all[self.against[0]];
-        let of = own.changes.iter().map(|change| {
-            let noise: Octaves = self.asked.best.misfits[change.stage].octaves;
-            noise.plus(&change.octaves.scaled(amplitude * amplitude)).rise(&noise)
+        let of = self.own.iter().map(|own| {
+            let noise: Octaves = self.asked.best.misfits[own.stage].octaves;
+            noise.plus(&own.octaves.scaled(amplitude * amplitude)).rise(&noise)
         });
         of.sum()
     }
 
     /// Samples that count as one observation of the nominal's misfit, where the effect's change is part of it.
     fn memory(&self, place: &Place, amplitude: f64) -> f64 {
-        let own = &self.probes.all[self.against[0]];
-        let change = own.changes.iter().find(|c| c.stage == place.stage);
-        let square = amplitude * amplitude;
-        let at = |lag: usize| place.noise_lags[lag] + change.map_or(0.0, |c| square * c.lags[lag]);
-        let power = at(0).max(f64::MIN_POSITIVE);
-        let sum: f64 = (1..place.noise_lags.len()).map(|lag| (at(lag) / power).powi(2)).sum();
-        (1.0 + 2.0 * sum).min(self.asked.problem.compare.roles.block as f64)
+        let change = self.own.iter().find(|c| c.stage == place.stage);
+        let change = change.map(|c| (&c.lags, amplitude));
+        place.noise_lags.per_observation(change, self.asked.problem.compare.roles.block)
     }
 
     /// Whether the effect is named in one drawn record; a share where a coin decides.
@@ -308,10 +328,8 @@ impl Place {
             _ => 0.0,
         });
         let noise = compare.mean_square(&asked.best.misfits[stage]).max(f64::MIN_POSITIVE);
-        let noise_lags = probes.noise_lags(stage).to_vec();
-        let power = noise_lags[0].max(f64::MIN_POSITIVE);
-        let memory: f64 = noise_lags[1..].iter().map(|x| (x / power).powi(2)).sum();
-        let memory = (1.0 + 2.0 * memory).min(compare.roles.block as f64);
+        let noise_lags = probes.noise_lags(stage).clone();
+        let memory = noise_lags.per_observation(None, compare.roles.block);
         // Noise that is remembered weighs as its slow part does.
         let scale = (noise * memory).sqrt();
         let factors: Vec<Cholesky> =

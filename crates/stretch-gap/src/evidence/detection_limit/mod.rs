@@ -15,12 +15,15 @@
 //! limit is the strength at which that is 0.9.
 //!
 //! An effect's other parameters stand at the start from which it is found most easily. Rivals stand at each of their starts; a kink bends the
-//! change, so that a limit far from its probe is probed again.
+//! change, so that a limit far from its probe is probed again, and p is that of the two last probes.
 
 mod asked;
 mod draws;
+mod lags;
 mod probes;
 mod tuned;
+
+use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -35,14 +38,16 @@ use crate::{
     search::selection::Looked,
 };
 
-/// Probability with which an effect at its limit is named.
-const POWER: f64 = 0.9;
-/// Halvings of the ratio between the ends of a range.
-const HALVINGS: usize = 16;
+/// Halvings of the ratio within which a limit is bracketed: to a part in a hundred.
+const HALVINGS: usize = 6;
 /// Strengths below this share of the range are not asked for.
 const LEAST: f64 = 1e-6;
-/// Ratio of a limit to its probe beyond which it is probed again.
-const FAR: f64 = 1.5;
+/// Share of the range that a limit lies within, and the ratio of the strengths that are asked for around a probe.
+const INSIDE: f64 = 0.99;
+const STEP: f64 = 1.5;
+/// Ratio of a limit to its probe beyond which it is probed again, and how often at most.
+const FAR: f64 = 1.4;
+const ROUNDS: usize = 4;
 
 /// Smallest strength of an effect that would be named on these data.
 ///
@@ -63,9 +68,13 @@ pub struct DetectionLimit {
     pub strength: Option<f64>,
     /// Unit of the value.
     pub unit: String,
+    /// Values of the other parameters.
+    #[serde(default)]
+    pub others: BTreeMap<String, f64>,
 }
 
-/// The detection limit of every effect of the catalogue, in its order; `looked` is a screen around the re-tuned nominal, where there is one.
+/// The detection limit of every effect of the catalogue, in its order, but of those whose course is found in the record: they have no strength of their
+/// own; `looked` is a screen around the re-tuned nominal, where there is one.
 pub(crate) fn detection_limits(
     asked: Asked<'_>,
     looked: Option<&Looked>,
@@ -76,19 +85,28 @@ pub(crate) fn detection_limits(
         sizes.into_iter().enumerate().map(|(e, own)| easiest(problem, e, own, asked)).collect();
     let mut probes = Probes::of(problem, asked.best, &starts)?;
     let mut found = limits(asked, &probes)?;
-    // What lies far from its probe is probed where it lies, once; where each run costs, the line has to do.
-    if problem.simulator().costly().is_none() {
+    // What lies far from its probe is probed where it lies; where each run costs, the line has to do.
+    let rounds = if problem.simulator().costly().is_none() { ROUNDS } else { 0 };
+    for _ in 0..rounds {
         let moved = probes.moved(problem, &found, FAR)?;
-        if !moved.is_empty() {
-            let again = limits(asked, &probes)?;
-            moved.into_iter().for_each(|e| found[e] = again[e]);
+        if moved.is_empty() {
+            break;
+        }
+        let again = moved.into_par_iter().map(|e| Ok((e, limit(asked, &probes, e)?)));
+        for (e, limit) in again.collect::<Result<Vec<_>, GapError>>()? {
+            found[e] = limit;
         }
     }
-    let effects = problem.simulator().effects().iter().zip(&starts).zip(found);
-    let limit = |((spec, starts), strength): ((&EffectSpec, &Vec<Start>), Option<f64>)| {
-        let main = starts.first().map_or(0, |start| start.main);
+    let effects = problem.simulator().effects().iter().enumerate().zip(found);
+    let effects = effects.filter(|((_, spec), _)| !spec.is_found);
+    let limit = |((effect, spec), strength): ((usize, &EffectSpec), Option<f64>)| {
+        let start = probes.first(effect).map(|own| &probes.all[own].start);
+        let main = start.map_or(0, |start| start.main);
         let parameter = &spec.parameters[main];
+        let values = spec.parameters.iter().zip(start.map_or(&[][..], |start| &start.values));
+        let others = values.enumerate().filter(|(i, _)| *i != main);
         DetectionLimit {
+            others: others.map(|(_, (p, value))| (p.name.to_string(), *value)).collect(),
             effect: spec.name.clone(),
             parameter: parameter.name.to_string(),
             strength,
@@ -112,14 +130,22 @@ fn limit(asked: Asked<'_>, probes: &Probes, effect: usize) -> Result<Option<f64>
     }
     let record = Record::of(asked, probes, own);
     let probe = &probes.all[own];
-    let power = |distance: f64| record.power(probe.amplitude(distance));
-    let (mut low, mut high) = (LEAST * probe.reach, probe.reach);
-    if power(high) < POWER {
-        return Ok(None);
+    // At the very end of its range an effect rather stands in for something else.
+    let end = INSIDE * probe.reach;
+    let (mut low, mut high) = (0.0, probe.distance.abs().min(end));
+    while !record.names(probe.amplitude(high)) {
+        if high >= end {
+            return Ok(None);
+        }
+        (low, high) = (high, (STEP * high).min(end));
+    }
+    while low == 0.0 && high > LEAST * end {
+        let below = high / STEP;
+        if record.names(probe.amplitude(below)) { high = below } else { low = below }
     }
     for _ in 0..HALVINGS {
         let middle = (low * high).sqrt();
-        if power(middle) < POWER { low = middle } else { high = middle }
+        if record.names(probe.amplitude(middle)) { high = middle } else { low = middle }
     }
     Ok(Some(probe.strength(high)))
 }

@@ -5,13 +5,10 @@ use rayon::prelude::*;
 use crate::{
     evidence::detection_limit::{
         asked::Asked,
+        lags::Lags,
         tuned::{Tuned, change},
     },
-    fit::{
-        comparison::Comparison, hypothesis::Hypothesis, metric::Column, octaves::Octaves,
-        prepared::PreparedProblem,
-    },
-    numerics::linear::dot,
+    fit::{hypothesis::Hypothesis, metric::Column, prepared::PreparedProblem},
     problem::{
         error::GapError,
         sample_roles::{Role, SampleRoles},
@@ -22,14 +19,14 @@ use crate::{
 };
 
 /// Starts of one effect that are probed: the easiest, and others for what it may pose as.
-const STARTS: usize = 3;
-/// Halvings and doublings of a strength within which powers of it are told from the starts.
-const POWERS: [f64; 2] = [0.5, 8.0];
+const STARTS: usize = 2;
+/// Least and greatest power of the strength that is told from two probes.
+const POWERS: [f64; 2] = [0.5, 60.0];
 
 /// Where an effect is probed.
 #[derive(Debug, Clone)]
 pub(super) struct Start {
-    values: Vec<f64>,
+    pub(super) values: Vec<f64>,
     /// Index of the parameter that says how strong the effect is.
     pub(super) main: usize,
     /// Power of the strength with which the squared change grows.
@@ -39,9 +36,9 @@ pub(super) struct Start {
 /// A probed effect.
 pub(super) struct Probe {
     pub(super) effect: usize,
-    start: Start,
+    pub(super) start: Start,
     /// Signed distance of the strength from where it is off, and the greatest one in its range.
-    distance: f64,
+    pub(super) distance: f64,
     pub(super) reach: f64,
     off: f64,
     /// Amplitudes that a fit may give it, as multiples of the probe.
@@ -58,9 +55,6 @@ pub(super) struct Change {
     pub(super) column: Column,
     /// Shifts of the nominal parameters that it is projected with, in tolerances.
     pub(super) shifts: Vec<f64>,
-    pub(super) octaves: Octaves,
-    /// Sums over fitted samples of products so many samples apart, cleaned of nuisances.
-    pub(super) lags: Vec<f64>,
 }
 
 impl Probe {
@@ -69,10 +63,22 @@ impl Probe {
         (distance / self.distance.abs()).powf(0.5 * self.start.power)
     }
 
+    /// Squared change over the fitted samples.
+    fn size(&self, problem: &PreparedProblem<'_>) -> f64 {
+        let one = |c: &Change| problem.compare.product(c.stage, &c.column, &c.column);
+        self.changes.iter().map(one).sum()
+    }
+
     /// Value of the main parameter at a distance.
     pub(super) fn strength(&self, distance: f64) -> f64 {
         self.off + distance * self.distance.signum()
     }
+}
+
+/// Power of the strength with which a squared change grows from one to another, at a ratio of the strengths.
+fn power_of(size: f64, other: f64, ratio: f64) -> f64 {
+    let power = (other / size).ln() / ratio.abs().ln();
+    if power.is_finite() { power.clamp(POWERS[0], POWERS[1]) } else { 2.0 }
 }
 
 /// Squared change <d,d> of every start of every effect around the re-tuned nominal over the fitted samples.
@@ -122,7 +128,7 @@ pub(super) fn easiest(
         let (Some((main, distance)), Some(size)) = (main_of(spec, values), size) else { continue };
         known.push((main, distance, size, values));
     }
-    let mut found: Vec<(f64, Start)> = Vec::new();
+    let mut found: Vec<((bool, f64), Start)> = Vec::new();
     let is_family = |a: &[f64], b: &[f64], main: usize| {
         a.iter().zip(b).enumerate().all(|(i, (x, y))| i == main || x == y)
     };
@@ -141,18 +147,24 @@ pub(super) fn easiest(
         if known.iter().filter(alike).any(|k| near(k.2) < near(size)) {
             continue;
         }
+        // Below the weakest start a change is as a rule linear.
+        let weakest = known.iter().filter(alike).all(|k| k.1.abs() >= distance.abs());
         let other = known.iter().filter(alike).find(|k| k.1 != distance);
-        let power = other.map_or(2.0, |k| (k.2 / size).ln() / (k.1 / distance).ln());
-        let power = power.clamp(POWERS[0], POWERS[1]);
+        let other = other.filter(|_| off != 0.0 || !weakest || size < target);
+        let power = other.map_or(2.0, |k| power_of(size, k.2, k.1 / distance));
         let told = distance * (target / size).powf(1.0 / power);
         let moved = (off + told).clamp(parameter.min.min(off), parameter.max.max(off));
         let mut start = Start { values: values.clone(), main, power };
         if !is_costly && moved != off {
             start.values[main] = moved;
         }
-        found.push((told.abs() / (parameter.max - parameter.min), start));
+        // With another form than the usual one an effect may act where its strength is off.
+        let forms = spec.parameters.iter().zip(values);
+        let is_odd =
+            forms.into_iter().any(|(p, v)| p.usual_form().is_some_and(|usual| usual != *v));
+        found.push(((is_odd, told.abs() / (parameter.max - parameter.min)), start));
     }
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found.sort_by(|a, b| a.0.0.cmp(&b.0.0).then(a.0.1.total_cmp(&b.0.1)));
     found.into_iter().take(STARTS).map(|(_, start)| start).collect()
 }
 
@@ -161,8 +173,8 @@ pub(super) struct Probes {
     pub(super) all: Vec<Probe>,
     trials: usize,
     stages: Vec<Tuned>,
-    /// By stage: sums of products of what is taken for noise, by lag.
-    noise_lags: Vec<Vec<f64>>,
+    /// By stage: how what is taken for noise is remembered.
+    noise_lags: Vec<Lags>,
 }
 
 impl Probes {
@@ -187,7 +199,7 @@ impl Probes {
         let noise = |stage: usize| {
             let mut clean = compare.residual_values(stage, &best.model)?;
             compare.metrics[stage].clean(&compare.roles, &mut clean);
-            Ok(lags(compare, &clean))
+            Ok(Lags::of(compare, &clean))
         };
         let stages = (0..compare.metrics.len()).into_par_iter();
         let noise_lags = stages.map(noise).collect::<Result<_, GapError>>()?;
@@ -204,8 +216,8 @@ impl Probes {
         roles.of_role(Role::Test).all(|s| s.to <= end)
     }
 
-    /// Sums over the fitted samples of products of the noise so many samples apart.
-    pub(super) fn noise_lags(&self, stage: usize) -> &[f64] {
+    /// How what is taken for noise is remembered.
+    pub(super) fn noise_lags(&self, stage: usize) -> &Lags {
         &self.noise_lags[stage]
     }
 
@@ -225,7 +237,9 @@ impl Probes {
         for (effect, limit) in found.iter().enumerate() {
             let Some(own) = self.first(effect) else { continue };
             let probe = &self.all[own];
-            let to = limit.map_or(probe.strength(probe.reach), |s| s);
+            // Without a limit the probe may be where the effect looks like others: half of the way to the end of its range.
+            let farther = (probe.distance.abs() * probe.reach).sqrt();
+            let to = limit.unwrap_or_else(|| probe.strength(farther));
             let ratio = ((to - probe.off) / probe.distance).abs();
             if ratio > far || ratio < 1.0 / far {
                 let mut start = probe.start.clone();
@@ -234,10 +248,13 @@ impl Probes {
             }
         }
         let effects = moved.iter().map(|(effect, _)| *effect).collect();
-        for probe in self.run(problem, moved)? {
-            if let Some(own) = self.first(probe.effect) {
-                self.all[own] = probe;
-            }
+        for mut probe in self.run(problem, moved)? {
+            let Some(own) = self.first(probe.effect) else { continue };
+            let before = &self.all[own];
+            let ratio = probe.distance / before.distance;
+            probe.start.power = power_of(before.size(problem), probe.size(problem), ratio);
+            probe.range[1] = (probe.reach / probe.distance.abs()).powf(0.5 * probe.start.power);
+            self.all[own] = probe;
         }
         Ok(effects)
     }
@@ -288,10 +305,6 @@ impl Probes {
         let stages = spec.touches.iter().zip(outputs);
         let changes: Vec<Change> =
             stages.map(|(&stage, there)| self.projected(problem, stage, there)).collect();
-        let size = |c: &Change| problem.compare.product(c.stage, &c.column, &c.column);
-        if changes.iter().map(size).sum::<f64>() <= 0.0 {
-            return None;
-        }
         let parameter = &spec.parameters[start.main];
         let off = parameter.off()?;
         let distance = start.values[start.main] - off;
@@ -302,7 +315,8 @@ impl Probes {
         let least = if off == 0.0 && back > 0.0 { -back / distance.abs() } else { 0.0 };
         let range = [least, most];
         let price = problem.price(model);
-        Some(Probe { effect, start, distance, reach, off, range, price, changes })
+        let probe = Probe { effect, start, distance, reach, off, range, price, changes };
+        (probe.size(problem) > 0.0).then_some(probe)
     }
 
     /// The change of one stage, the nominal parameters projected out.
@@ -317,21 +331,7 @@ impl Probes {
         for (k, shift) in tuned.sensitivities.iter().zip(&shifts) {
             values.iter_mut().zip(&k.values).for_each(|(x, k)| *x -= shift * k);
         }
-        let mut clean = values.clone();
-        metric.clean(&compare.roles, &mut clean);
-        let octaves = compare.octaves(stage, &values);
-        let lags = lags(compare, &clean);
         let column = metric.column(&compare.roles, values);
-        Change { stage, column, shifts, octaves, lags }
+        Change { stage, column, shifts }
     }
-}
-
-/// Sums over the fitted samples of products so many samples apart, up to two blocks.
-fn lags(compare: &Comparison<'_>, clean: &[f64]) -> Vec<f64> {
-    let parts = || compare.roles.of_role(Role::Fit).map(|s| &clean[s.from..s.to]);
-    let product = |lag: usize| -> f64 {
-        let long = parts().filter(|p| p.len() > lag);
-        long.map(|p| dot(&p[lag..], &p[..p.len() - lag])).sum()
-    };
-    (0..=2 * compare.roles.block).map(product).collect()
 }

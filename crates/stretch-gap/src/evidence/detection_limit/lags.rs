@@ -1,0 +1,46 @@
+//! How many samples count as one observation, where a change is part of what is left.
+//!
+//! The sum of [`samples_per_observation`](crate::fit::score::samples_per_observation), each of the first lags and every fourth of the others, which stands
+//! for its neighbours. Products of noise and of a change that does not know of it add up.
+
+use crate::{fit::comparison::Comparison, numerics::linear::dot, problem::sample_roles::Role};
+
+/// Lags of which each is summed, and the distance of the others.
+const EACH: usize = 8;
+const APART: usize = 4;
+
+/// Sums over the fitted samples of products so many samples apart.
+#[derive(Debug, Clone)]
+pub(super) struct Lags {
+    square: f64,
+    /// Lags that it stands for, and the sum.
+    sums: Vec<(f64, f64)>,
+}
+
+impl Lags {
+    /// Of a residual in multiples of the noise, cleaned of nuisances, up to two blocks.
+    pub(super) fn of(compare: &Comparison<'_>, clean: &[f64]) -> Self {
+        let parts = || compare.roles.of_role(Role::Fit).map(|s| &clean[s.from..s.to]);
+        let product = |lag: usize| -> f64 {
+            let long = parts().filter(|p| p.len() > lag);
+            long.map(|p| dot(&p[lag..], &p[..p.len() - lag])).sum()
+        };
+        let most = 2 * compare.roles.block;
+        let each = (1..=EACH.min(most)).map(|lag| (1.0, product(lag)));
+        let far = (EACH + APART / 2..=most).step_by(APART);
+        let far = far.map(|lag| (APART as f64, product(lag)));
+        Self { square: product(0), sums: each.chain(far).collect() }
+    }
+
+    /// Samples that count as one observation with a change of so many times the amplitude beside, at most a block.
+    pub(super) fn per_observation(&self, change: Option<(&Self, f64)>, block: usize) -> f64 {
+        let more = change.map_or(0.0, |(c, amplitude)| amplitude * amplitude * c.square);
+        let power = (self.square + more).max(f64::MIN_POSITIVE);
+        let mut sum = 0.0;
+        for (i, (times, own)) in self.sums.iter().enumerate() {
+            let more = change.map_or(0.0, |(c, amplitude)| amplitude * amplitude * c.sums[i].1);
+            sum += times * ((own + more) / power).powi(2);
+        }
+        (1.0 + 2.0 * sum).min(block as f64)
+    }
+}

@@ -98,7 +98,7 @@ pub type Sketched = fn(&[f64], &Extent, &Signals) -> Sketch;
 /// assert!(backlash.usual.contains(&Side::Output));
 /// assert!(backlash.equation.contains("play"));
 /// let w = &(backlash.parameters)(&Extent::between(0.0, 30.0), "mm")[0];
-/// assert_eq!((&*w.name, &*w.unit, w.max), ("w", "mm", 6.0));
+/// assert_eq!((&*w.name, &*w.unit, w.max), ("w", "mm", 15.0));
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Kind {

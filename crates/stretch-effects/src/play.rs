@@ -90,11 +90,11 @@ pub static BACKLASH: Kind = Kind {
     usual: &[Side::Input, Side::Output],
     parameters: |e, unit| {
         vec![
-            EffectParameter::sized("w", unit, 0.0..=0.2 * e.span()),
+            EffectParameter::sized("w", unit, 0.0..=0.5 * e.span()),
             EffectParameter::formed("softness", "1", 0.0..=0.6, 0.2),
         ]
     },
-    starts: Some(|e| [0.005, 0.03, 0.1].map(|k| vec![k * e.span(), 0.2]).into()),
+    starts: Some(|e| [0.005, 0.03, 0.1, 0.3].map(|k| vec![k * e.span(), 0.2]).into()),
     operator: |v, _, _| Box::new(Backlash::soft(v[0], v[1])),
     sketch: Some(|v, _, signals| {
         let unit = signals.x.unit.clone();

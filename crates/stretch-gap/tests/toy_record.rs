@@ -196,3 +196,23 @@ fn a_wrong_number_of_the_rig_file_is_told() {
         );
     }
 }
+
+/// A factor that no sensor errs by is the simulator's unit, with which parameters of some per cent and no effect can do anything.
+#[test]
+fn a_factor_beyond_sensors_is_told_of_the_simulator() {
+    let degrees = 180.0 / std::f64::consts::PI;
+    for factor in [degrees, 1.0 / degrees, 1e3, 1e-3, 40.0] {
+        let toy = Toy::of(&[Law::Lag]).may_lack(&Effect::ALL).off_by(&[0.5, -0.5]);
+        let told =
+            told(&toy.measured(3).rewritten(|_, y| y[0].iter_mut().for_each(|y| *y *= factor)));
+        let gross = found(&told, GrossKind::Scale, "y0");
+        // The lag's own gain, within 5 %, takes part of it.
+        approx::assert_relative_eq!(gross.factor.expect("a factor"), factor, max_relative = 0.1);
+        assert!(
+            told.sentence.starts_with(
+                "Simulator and record are not in the same unit: the simulator's y0 is "
+            )
+        );
+        assert_eq!(gross.units, None, "`u` is no unit that is known");
+    }
+}

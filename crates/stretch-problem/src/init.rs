@@ -1,8 +1,12 @@
 //! A first problem from a folder of recordings; comments say which entries are guessed.
 
-use std::path::{Path, PathBuf};
+use std::{
+    ops::Range,
+    path::{Path, PathBuf},
+};
 
 use stretch_data::{Trial, ends, unit};
+use stretch_gap::Noise;
 use stretch_recording::{ReadOptions, Recording};
 
 use crate::error::ProblemError;
@@ -156,7 +160,7 @@ fn text(
         let unit = unit(&c.name).unwrap_or("unit not in its name");
         out += &format!("#   {} ({unit}): {} to {}{kind}\n", c.name, c.range[0], c.range[1]);
     }
-    out += &stage(&columns);
+    out += &stage(&columns, trials);
     out += "\n# Parameters of the simulator, each with its tolerance: one standard deviation.\n";
     out += "# [[parameter]]\n# name = \"gain\"\n# unit = \"1\"\n# value = 1.0\n# tolerance = \"10 %\"  # or a number in its unit\n";
     out += "\n# Effects that the simulator has itself, each with the value at which the effect does nothing.\n";
@@ -164,17 +168,14 @@ fn text(
     out + &trials_of(trials)
 }
 
-fn stage(columns: &[Known]) -> String {
+fn stage(columns: &[Known], trials: &[(String, Trial)]) -> String {
     let moves = |c: &&Known| c.range[1] > c.range[0];
     let output = columns.iter().filter(moves).rfind(|c| !c.is_command);
     let output = output.or(columns.last());
     let own = output.map_or("", |c| c.name.as_str());
-    let inputs: Vec<String> = columns
-        .iter()
-        .filter(moves)
-        .filter(|c| c.is_command && c.name != own)
-        .map(|c| quoted(&c.name))
-        .collect();
+    let commands = columns.iter().filter(moves).filter(|c| c.is_command && c.name != own);
+    let commands: Vec<&str> = commands.map(|c| c.name.as_str()).collect();
+    let inputs: Vec<String> = commands.iter().map(|name| quoted(name)).collect();
     let mut out = "\n# Guessed: the last column that is no command is the output, and commands drive the stage.\n"
         .to_owned();
     out += &format!("[[stage]]\nname = \"plant\"\noutput = {}\n", quoted(own));
@@ -182,15 +183,51 @@ fn stage(columns: &[Known]) -> String {
         out += "unit = \"\"  # the name gives no unit\n";
     }
     out += &format!("inputs = [{}]\n", inputs.join(", "));
-    out += "# noise = 0.01     # one standard deviation, where the noise is known; else it is estimated from the recordings\n";
+    out += &match noise(own, &commands, trials) {
+        Some(noise) => format!(
+            "noise = {}  # one standard deviation, measured: {}\n",
+            rounded(noise.sd()),
+            noise.source()
+        ),
+        None => "# noise = 0.01     # one standard deviation, where the noise is known; else it is estimated from the recordings\n".to_owned(),
+    };
     out + "# velocity = \"COLUMN\"  # or position = \"COLUMN\": at which a force or torque rubs\n"
 }
 
-fn trials_of(trials: &[(String, Trial)]) -> String {
-    let tested = match trials.len() {
+/// The noise of an output while its commands stand still, in all recordings but those that are tested on.
+fn noise(output: &str, commands: &[&str], trials: &[(String, Trial)]) -> Option<Noise> {
+    let fitted = &trials[..trials.len() - tested(trials)];
+    let dt_s = 1.0 / fitted.first()?.1.rate_hz()?;
+    let of = |name: &str| -> Vec<f64> {
+        fitted.iter().flat_map(|(_, t)| t.channel(name).unwrap_or(&[])).copied().collect()
+    };
+    let mut end = 0;
+    let ranges = fitted.iter().map(|(_, t)| {
+        end += t.time_s.len();
+        end - t.time_s.len()..end
+    });
+    let ranges: Vec<Range<usize>> = ranges.collect();
+    let (output, commands) = (of(output), commands.iter().map(|c| of(c)).collect::<Vec<_>>());
+    let commands: Vec<&[f64]> = commands.iter().map(Vec::as_slice).collect();
+    Noise::of_rests(&output, &commands, &ranges, dt_s)
+}
+
+/// Three digits.
+fn rounded(x: f64) -> f64 {
+    let unit = 10.0_f64.powi(x.log10().floor() as i32 - 2);
+    (x / unit).round() * unit
+}
+
+/// Number of recordings, from the last, that are tested on.
+fn tested(trials: &[(String, Trial)]) -> usize {
+    match trials.len() {
         1 => 0,
         n => n.div_ceil(4),
-    };
+    }
+}
+
+fn trials_of(trials: &[(String, Trial)]) -> String {
+    let tested = tested(trials);
     let all = trials.len();
     let mut out = match tested {
         0 => "\n# There is one trial: its last quarter is held back and tested on.\n".to_owned(),

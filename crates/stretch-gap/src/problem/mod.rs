@@ -17,6 +17,7 @@ pub(crate) mod linked_stages;
 pub(crate) mod noise;
 mod pace;
 pub(crate) mod record_facts;
+mod rests;
 pub(crate) mod rows_used;
 pub(crate) mod runs;
 pub(crate) mod sample_roles;

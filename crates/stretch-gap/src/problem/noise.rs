@@ -52,7 +52,7 @@ impl Noise {
         Self::white(sd, "known noise of the channel".into())
     }
 
-    fn white(sd: f64, source: String) -> Self {
+    pub(super) fn white(sd: f64, source: String) -> Self {
         Self { white: sd, slow: 0.0, memory_samples: 1.0, source }
     }
 
@@ -269,7 +269,7 @@ pub fn noise_variance<'a>(stretches: impl Iterator<Item = &'a [f64]>, dt_s: f64)
     for stretch in stretches {
         let mut bends: Vec<f64> = second_differences(stretch).collect();
         for part in bends.chunks_mut(window) {
-            let taken = take_waves_out(part, dt_s) / part.len() as f64;
+            let taken = take_waves_out(part, dt_s, (2, 6.0)) / part.len() as f64;
             squares.extend(part.iter().map(|x| x * x / (1.0 - taken.min(0.5))));
         }
     }
@@ -283,9 +283,9 @@ pub fn noise_variance<'a>(stretches: impl Iterator<Item = &'a [f64]>, dt_s: f64)
     if median > 1e-3 * mean { median } else { mean.max(1e-18) }
 }
 
-/// Takes the waves of the mains out of a second of second differences, one after the other; how many samples' worth of
-/// white noise went with them.
-fn take_waves_out(values: &mut [f64], dt_s: f64) -> f64 {
+/// Takes the waves of the mains out of a stretch of differences of an order with the squares of their weights summed, one after the
+/// other; how many samples' worth of white noise went with them.
+pub(super) fn take_waves_out(values: &mut [f64], dt_s: f64, (order, power): (usize, f64)) -> f64 {
     let mut taken = 0.0;
     for shown in mains(dt_s) {
         // What shows as a slow wave cannot be told from motion.
@@ -294,15 +294,15 @@ fn take_waves_out(values: &mut [f64], dt_s: f64) -> f64 {
         }
         for phase in [0.0, 0.25] {
             let wave = |i: usize| (std::f64::consts::TAU * (shown * i as f64 + phase)).cos();
-            let power: f64 = (0..values.len()).map(|i| wave(i).powi(2)).sum();
+            let own: f64 = (0..values.len()).map(|i| wave(i).powi(2)).sum();
             // At half the sample rate there is one wave only.
-            if power < 1e-6 * values.len() as f64 {
+            if own < 1e-6 * values.len() as f64 {
                 continue;
             }
-            let size = values.iter().enumerate().map(|(i, x)| x * wave(i)).sum::<f64>() / power;
+            let size = values.iter().enumerate().map(|(i, x)| x * wave(i)).sum::<f64>() / own;
             values.iter_mut().enumerate().for_each(|(i, x)| *x -= size * wave(i));
-            // Of white noise, second differences hold (2 - 2 cos)^2 of each wave, and 6 on the average.
-            taken += (2.0 - 2.0 * (std::f64::consts::TAU * shown).cos()).powi(2) / 6.0;
+            // Of white noise, differences of order n hold (2 - 2 cos)^n of each wave; second ones hold 6 on the average.
+            taken += (2.0 - 2.0 * (std::f64::consts::TAU * shown).cos()).powi(order as i32) / power;
         }
     }
     taken

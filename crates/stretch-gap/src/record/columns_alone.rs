@@ -10,7 +10,10 @@
 //! * copied: the line of one column over another leaves less than half of what two independent noises would, and the second
 //!   differences of the two go together: a hum in one of them would pass for its noise;
 //! * dead: a column keeps within its noise while another goes through most of its range (a loose sleeve hides less);
-//! * stuck: a column repeats one number, not an end of its range, so often that its own noise would do so once in a billion records.
+//! * stuck: a column repeats one number, not an end of its range, so often that its own noise would do so once in a billion records, while
+//!   another moves. A sensor behind a play or a dead band repeats itself as well where it shows no noise: such a stretch counts only if
+//!   its column has white noise, which no play takes away; or jumps at its end, for what comes out of a play moves on from where it
+//!   stood; or if another column goes through more of its range than any play takes up.
 
 use stretch_data::ends;
 
@@ -31,8 +34,10 @@ const RANGE: f64 = 0.8;
 const KEEPS: f64 = 4.0;
 /// Samples of such a block.
 const BLOCK: usize = 10;
-/// Share of its range that another column moves by, at least, while one is stuck: play in a sensor is less.
+/// Share of its range that another column moves by, at least, while one is stuck.
 const MOVES: f64 = 0.3;
+/// Times the greatest step of all but a thousandth by which a column jumps when it is stuck no more.
+const JUMP: f64 = 3.0;
 /// ln of the probability that noise repeats itself like that.
 const CHANCE: f64 = -20.7;
 
@@ -213,8 +218,33 @@ fn stuck(values: &[f64], others: &[&[f64]], trials: &[(usize, usize)]) -> Vec<(u
     let is_end = |from: usize| values[from] == low || values[from] == high;
     runs.retain(|run| doubted(run) && !is_chance(*run) && !is_end(run.0));
     runs.retain(|run| others_move(others, *run, MOVES));
+    let shows_noise = shows_noise(values);
+    let most = JUMP * greatest_step(values);
+    runs.retain(|&(from, to)| {
+        let is_inside = trials.iter().all(|(_, end)| *end != to);
+        let jumps = is_inside && (values[to] - values[to - 1]).abs() > most;
+        shows_noise || jumps || others_move(others, (from, to), RANGE)
+    });
     runs.sort_unstable();
     runs
+}
+
+/// Whether a column has white noise of more than the step that its values are written in.
+fn shows_noise(values: &[f64]) -> bool {
+    let (s2, s4) = noise(values);
+    let steps = values.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|step| *step > 0.0);
+    let step = steps.fold(f64::INFINITY, f64::min);
+    (WHITE.0 * s2..=WHITE.1 * s2).contains(&s4) && s2 > step
+}
+
+/// The greatest change from one sample to the next, a thousandth of all left out.
+fn greatest_step(values: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = values.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+    let at = steps.len() * 999 / 1000;
+    match steps.is_empty() {
+        true => 0.0,
+        false => *steps.select_nth_unstable_by(at, f64::total_cmp).1,
+    }
 }
 
 #[cfg(test)]
@@ -274,6 +304,21 @@ mod tests {
         );
         let railed: Vec<f64> = wave(0.05, 2).iter().map(|x| x.min(5.0)).collect();
         assert_eq!(stuck(&railed, &[&other], &trials), []);
+        // Behind a play of a third of the way, read by a coarse encoder, it stands at every turn and moves on from there.
+        let step = |x: f64| (20.0 * x).round() / 20.0;
+        let mut at = 0.0_f64;
+        let behind = |x: &f64| {
+            at = at.clamp(x - 4.0, x + 4.0);
+            step(at)
+        };
+        let played: Vec<f64> = wave(0.0, 2).iter().map(behind).collect();
+        assert_eq!(stuck(&played, &[&other], &trials), []);
+        // The same encoder, stuck: it jumps to where the rest has gone.
+        let mut held: Vec<f64> = wave(0.0, 2).iter().map(|x| step(*x)).collect();
+        let value = held[1000];
+        held[1000..1300].iter_mut().for_each(|x| *x = value);
+        let found = stuck(&held, &[&other], &trials);
+        assert!(matches!(found[..], [(from, to)] if from <= 1000 && to >= 1300), "{found:?}");
         // A converter of few bits repeats itself all the time.
         let coarse: Vec<f64> = wave(0.05, 2).iter().map(|x| (2.0 * x).round() / 2.0).collect();
         assert_eq!(stuck(&coarse, &[&other], &trials), []);

@@ -190,7 +190,7 @@ fn is_large(suspect: &Suspect<'_>, model: &Model, sd: f64) -> bool {
             let value = model.parameters[p] * (1.0 + size);
             (value - spec.nominal).abs() > REACH * spec.sd
         }
-        (Kind::Scale, _) => sure(LEAST),
+        (Kind::Scale, _) => fault.is_beyond() || sure(LEAST),
         (Kind::Offset, Some(column)) => sure(LEAST * span(&column.values)),
         (Kind::Delay, Some(column)) => {
             let [early, late] = column.skew_s;

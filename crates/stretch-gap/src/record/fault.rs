@@ -11,6 +11,10 @@ use crate::problem::{
 
 /// Factors that are looked for, as deviations from 1.
 const FACTORS: (f64, f64) = (-0.95, 9.0);
+/// Powers of ten around which factors of an output are looked for beside those around 1: a simulator in other units.
+const DECADES: [i32; 8] = [-4, -3, -2, -1, 1, 2, 3, 4];
+/// Factors that stand nearest to a power of ten: a third to three times it.
+const NEAREST: (f64, f64) = (0.316, 3.163);
 /// Offsets that are looked for, in spans of the column.
 const SPANS: f64 = 20.0;
 /// Delays that are looked for, s.
@@ -42,6 +46,8 @@ pub(crate) struct Fault {
     name: String,
     unit: String,
     range: (f64, f64),
+    /// Factor that a size of 0 stands for.
+    base: f64,
 }
 
 impl Fault {
@@ -61,6 +67,7 @@ impl Fault {
                     name: format!("{} in the rig file", spec.name),
                     unit: "1".into(),
                     range: FACTORS,
+                    base: 1.0,
                 });
             }
         }
@@ -88,8 +95,39 @@ impl Fault {
             name: format!("{what} of {}", column.name),
             unit: unit.into(),
             range,
+            base: 1.0,
         };
-        kinds.into_iter().take(offered).map(one).filter(|f| f.range.0 < f.range.1).collect()
+        let scale = one(kinds[0]);
+        let decades = DECADES.iter().filter(|_| column.output_of.is_some()).map(|power| Self {
+            name: format!("{} by 1e{power}", scale.name),
+            base: 10.0_f64.powi(*power),
+            ..scale.clone()
+        });
+        let near = kinds.into_iter().take(offered).map(one);
+        near.chain(decades).filter(|f| f.range.0 < f.range.1).collect()
+    }
+
+    /// Size of the scale that a factor stands for; none where another scale stands nearer to it.
+    pub(crate) fn of_factor(&self, factor: f64) -> Option<f64> {
+        let share = factor / self.base;
+        let is_own = match self.base == 1.0 {
+            true => (1.0 + FACTORS.0..=1.0 + FACTORS.1).contains(&factor) || factor <= 0.0,
+            false => {
+                let is_beyond = !(1.0 + FACTORS.0..=1.0 + FACTORS.1).contains(&factor);
+                is_beyond && (NEAREST.0..NEAREST.1).contains(&share)
+            }
+        };
+        is_own.then_some(share - 1.0)
+    }
+
+    /// Whether it stands for factors that no sensor errs by.
+    pub(crate) fn is_beyond(&self) -> bool {
+        self.base != 1.0
+    }
+
+    /// Factor of a scale of a size.
+    pub(crate) fn factor(&self, size: f64) -> f64 {
+        self.base * (1.0 + size)
     }
 
     /// As the engine fits it.
@@ -115,7 +153,7 @@ impl Fault {
     pub(crate) fn distortion(&self, size: f64) -> Distortion {
         let none = Distortion::default();
         match self.kind {
-            Kind::Scale => Distortion { scale: 1.0 + size, ..none },
+            Kind::Scale => Distortion { scale: self.factor(size), ..none },
             Kind::Offset => Distortion { offset: size, ..none },
             Kind::Delay => Distortion { delay_s: size, ..none },
             Kind::Sign => Distortion { scale: -1.0, offset: size, ..none },

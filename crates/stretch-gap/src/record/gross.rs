@@ -43,6 +43,9 @@ pub struct Gross {
     pub found: Option<f64>,
     /// Unit of the column or the parameter.
     pub unit: String,
+    /// The units that a factor of an output stands for, those of the simulator and of the record: `rpm for rad/s`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub units: Option<String>,
     /// First trial in which it shows, of what shows in stretches.
     pub trial: Option<String>,
     /// Begin of the stretch in which the error shows, s from the trial's start.

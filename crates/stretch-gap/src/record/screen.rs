@@ -199,24 +199,25 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
         match (fault.kind, column) {
             (Kind::Parameter(p), _) => self.factors(fault, p),
             (_, Some(column)) => match column.output_of {
-                Some(stage) => self.regressed(fault.kind, stage).into_iter().collect(),
+                Some(stage) => self.regressed(fault, stage).into_iter().collect(),
                 None => COMMANDS.into(),
             },
             _ => Vec::new(),
         }
     }
 
-    fn regressed(&self, kind: Kind, stage: usize) -> Option<f64> {
+    fn regressed(&self, fault: &Fault, stage: usize) -> Option<f64> {
         let measured = self.problem.simulator().measured(stage);
         let simulated = &self.outputs[stage];
         let roles = &self.problem.compare.roles;
         let fitted = || roles.of_role(Role::Fit).flat_map(|s| s.from..s.to);
         let count = roles.count(Role::Fit) as f64;
         let mean = |of: &dyn Fn(usize) -> f64| fitted().map(of).sum::<f64>() / count;
-        match kind {
+        match fault.kind {
             Kind::Scale => {
                 let power = mean(&|i| simulated[i] * simulated[i]);
-                Some(mean(&|i| measured[i] * simulated[i]) / power.max(f64::MIN_POSITIVE) - 1.0)
+                let mixed = mean(&|i| measured[i] * simulated[i]);
+                fault.of_factor(mixed / power.max(f64::MIN_POSITIVE))
             }
             Kind::Offset => Some(mean(&|i| measured[i] - simulated[i])),
             Kind::Sign => Some(mean(&|i| measured[i] + simulated[i])),

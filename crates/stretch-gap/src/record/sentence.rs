@@ -7,8 +7,12 @@ use crate::{
         fault::Kind,
         gross::{Gross, GrossKind},
         suspect::Suspect,
+        units::units,
     },
 };
+
+/// How a sentence begins that doubts the simulator's unit.
+const SIMULATORS: &str = "the simulator's";
 
 impl Gross {
     fn of(what: GrossKind) -> Self {
@@ -22,6 +26,7 @@ impl Gross {
             says: None,
             found: None,
             unit: String::new(),
+            units: None,
             trial: None,
             from_s: None,
             to_s: None,
@@ -76,6 +81,23 @@ impl Gross {
         }
     }
 
+    /// An output that the simulator computes in other units, or larger by a factor that no sensor errs by.
+    fn of_units(column: &Column<'_>, factor: f64, units: Option<String>) -> Self {
+        let that_is = units.as_ref().map_or(String::new(), |units| format!(": that is {units}"));
+        let ratio = short(1.0 / factor);
+        Self {
+            factor: Some(factor),
+            sentence: format!(
+                "{SIMULATORS} {} is {ratio} times the record's{that_is}",
+                column.name
+            ),
+            hint: "let the simulator answer in the unit of the record, or convert the record"
+                .into(),
+            units,
+            ..Self::of_column(GrossKind::Scale, column)
+        }
+    }
+
     /// The error of a hypothesis with its size; none where it has none.
     pub(crate) fn found(suspect: &Suspect<'_>, hypothesis: &Hypothesis) -> Option<Self> {
         let (fault, size) = suspect.error_of(&hypothesis.model)?;
@@ -103,7 +125,13 @@ impl Gross {
         let name = &column.name;
         Some(match fault.kind {
             Kind::Scale => {
-                let factor = 1.0 + size;
+                let factor = fault.factor(size);
+                let sd = hypothesis.effect_sd.values().flatten().fold(0.0, |a: f64, b| a.max(*b));
+                let units = units(1.0 / factor, sd / (1.0 + size), &column.unit);
+                let units = units.filter(|_| column.output_of.is_some());
+                if units.is_some() || fault.is_beyond() {
+                    return Some(Self::of_units(column, factor, units));
+                }
                 let sentence = match factor >= 1.0 {
                     true => format!("{name} looks {factor:.3} times too large"),
                     false => format!("{name} looks {factor:.3} times as large as it should be"),
@@ -165,8 +193,10 @@ pub(crate) fn sentence(gross: &[Gross]) -> String {
         (false, true) => format!("; {}", rest.join("; ")),
         (false, false) => format!(" (or {}: these data cannot tell)", rest.join(", or ")),
     };
+    let is_of_units = first.sentence.starts_with(SIMULATORS);
     let wrong = match first.what {
         GrossKind::Parameter => "The rig file does not fit the rig",
+        _ if is_of_units => "Simulator and record are not in the same unit",
         _ => "The record is wrong",
     };
     format!("{wrong}: {}{other}; {}.", first.sentence, first.hint)

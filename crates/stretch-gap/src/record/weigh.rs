@@ -37,7 +37,9 @@ pub(crate) fn weighed(
     let (tied, behind): (Vec<Hypothesis>, Vec<Hypothesis>) =
         errors.partition(|e| e.score > first.score - TIE);
     let told = std::iter::once(&first).chain(&tied).filter_map(|e| Gross::found(suspect, e));
-    let gross = told.collect();
+    let mut gross: Vec<Gross> = told.collect();
+    // Of what these data cannot tell apart, a factor that is that of two units is told first.
+    gross.sort_by_key(|g| g.units.is_none());
     let rivals = tied.into_iter().chain(behind).chain([found.best.clone()]);
     let rivals = rivals.map(|rival| (WHOLE, rival)).collect();
     Some((gross, Found { best: first, rivals }))

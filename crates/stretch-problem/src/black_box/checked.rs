@@ -83,8 +83,10 @@ impl Checked {
         let looked_for = around.without(looked_for, &spec.without)?;
         let (acting, catalogue) = looked_for.into_iter().unzip();
         let Around { wrappers, standing, .. } = around;
+        let noises: Vec<Noise> = stages.iter().map(|stage| noise(stage, &columns)).collect();
+        let with_noise = stages.iter().zip(&noises);
         let about = Description::new(DescriptionSpec {
-            stages: stages.iter().map(|s| stage_spec(s, parameters, &unit_of)).collect(),
+            stages: with_noise.map(|(s, n)| stage_spec(s, n, parameters, &unit_of)).collect(),
             parameters: parameters.iter().map(parameter_spec).collect::<Result<_, _>>()?,
             effects: catalogue,
             trials: columns.trials.clone(),
@@ -97,7 +99,7 @@ impl Checked {
             session,
             stages: stages.clone(),
             input_noise: stages.iter().map(|stage| input_noise(stage, inputs)).collect(),
-            noise: stages.iter().map(|stage| noise(stage, &columns)).collect(),
+            noise: noises.iter().map(Noise::sd).collect(),
             parts: parts(&columns),
             columns,
             wrappers,
@@ -180,12 +182,16 @@ fn input_noise(stage: &StageEntry, inputs: &[Input]) -> Vec<f64> {
     stage.inputs.iter().map(noise).collect()
 }
 
-/// Noise of the output of a stage, one standard deviation: as stated, or estimated from the recordings.
-fn noise(stage: &StageEntry, columns: &Columns) -> f64 {
-    let values = columns.of(&stage.output).unwrap_or(&[]);
-    let looked = columns.looked_at();
+/// Noise of the output of a stage: as stated, or from the rests of its inputs, or from second differences of the recordings.
+fn noise(stage: &StageEntry, columns: &Columns) -> Noise {
+    let of = |name: &String| columns.of(name).unwrap_or(&[]);
+    let (values, looked) = (of(&stage.output), columns.looked_at());
+    let inputs: Vec<&[f64]> = stage.inputs.iter().map(of).collect();
     let parts = looked.iter().map(|r| &values[r.clone()]);
-    stage.noise.unwrap_or_else(|| Noise::of_differences(parts, columns.dt_s).sd())
+    let stated = stage.noise.map(Noise::known);
+    stated
+        .or_else(|| Noise::of_rests(values, &inputs, &looked, columns.dt_s))
+        .unwrap_or_else(|| Noise::of_differences(parts, columns.dt_s))
 }
 
 /// Samples and session time of each trial, s, from the session's start.
@@ -246,6 +252,7 @@ fn sites(stages: &[StageEntry], unit_of: &impl Fn(&str) -> String) -> Vec<Site> 
 
 fn stage_spec(
     stage: &StageEntry,
+    noise: &Noise,
     parameters: &[Parameter],
     unit_of: &impl Fn(&str) -> String,
 ) -> StageSpec {
@@ -253,7 +260,7 @@ fn stage_spec(
     let own: Vec<usize> =
         parameters.iter().enumerate().filter(|(_, p)| acts(p)).map(|(i, _)| i).collect();
     let spec = StageSpec::new(&stage.name, &stage.output, &unit_of(&stage.output), &own);
-    StageSpec { noise: stage.noise.map(Noise::known), ..spec }
+    StageSpec { noise: Some(noise.clone()), ..spec }
 }
 
 fn parameter_spec(p: &Parameter) -> Result<ParameterSpec, ProblemError> {

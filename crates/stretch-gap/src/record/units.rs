@@ -1,0 +1,81 @@
+//! Which units a factor stands for: a simulator that computes in other units than the record was written in.
+
+use std::f64::consts::{PI, TAU};
+
+/// Share within which a factor is that of two units.
+const WITHIN: f64 = 0.01;
+
+/// Pairs of units of one quantity, and how many of the first make one of the second.
+const PAIRS: [(&str, &str, f64); 24] = [
+    ("rpm", "rad/s", 60.0 / TAU),
+    ("deg/s", "rad/s", 180.0 / PI),
+    ("deg/s", "rpm", 6.0),
+    ("rpm", "Hz", 60.0),
+    ("rad/s", "Hz", TAU),
+    ("deg", "rad", 180.0 / PI),
+    ("deg", "turns", 360.0),
+    ("rad", "turns", TAU),
+    ("mm", "m", 1e3),
+    ("cm", "m", 100.0),
+    ("mm", "cm", 10.0),
+    ("mm", "in", 25.4),
+    ("mm/s", "m/s", 1e3),
+    ("km/h", "m/s", 3.6),
+    ("mV", "V", 1e3),
+    ("mA", "A", 1e3),
+    ("ms", "s", 1e3),
+    ("%", "1", 100.0),
+    ("N", "kgf", 9.806_65),
+    ("N", "lbf", 4.448_222),
+    ("mNm", "Nm", 1e3),
+    ("kPa", "bar", 100.0),
+    ("kPa", "psi", 6.894_757),
+    ("Pa", "kPa", 1e3),
+];
+
+/// Other names of units.
+const NAMES: [(&str, &str); 7] = [
+    ("degrees", "deg"),
+    ("degree", "deg"),
+    ("\u{b0}", "deg"),
+    ("percent", "%"),
+    ("inch", "in"),
+    ("radians", "rad"),
+    ("", "1"),
+];
+
+/// The units of a simulator whose output is `ratio` times a record in `unit`: "rpm for rad/s". None where no pair of units stands within 1 %
+/// of the ratio, or the record's unit is none of the pair. `sd` is how surely the ratio is known, as a share of it: within two of them the only
+/// pair of the record's unit is taken as well.
+pub(crate) fn units(ratio: f64, sd: f64, unit: &str) -> Option<String> {
+    let unit = NAMES.iter().find(|(name, _)| *name == unit).map_or(unit, |(_, own)| own);
+    let all = PAIRS.iter().flat_map(|&(a, b, factor)| [(a, b, factor), (b, a, 1.0 / factor)]);
+    let apart = |factor: f64| (ratio / factor).ln().abs();
+    let own = all.filter(|(_, of, _)| *of == unit);
+    let own: Vec<(&str, &str, f64)> = own.filter(|p| apart(p.2) < WITHIN.max(2.0 * sd)).collect();
+    let near = own.iter().find(|pair| apart(pair.2) < WITHIN);
+    let (simulated, recorded, _) = near.or(own.first().filter(|_| own.len() == 1))?;
+    Some(format!("{simulated} for {recorded}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn factors_are_told_as_units() {
+        let told = |ratio, unit| units(ratio, 0.0, unit);
+        assert_eq!(told(9.549, "rad/s").as_deref(), Some("rpm for rad/s"));
+        assert_eq!(told(0.1047, "rpm").as_deref(), Some("rad/s for rpm"));
+        assert_eq!(told(57.3, "rad").as_deref(), Some("deg for rad"));
+        assert_eq!(told(0.01745, "degrees").as_deref(), Some("rad for deg"));
+        assert_eq!(told(1000.0, "m").as_deref(), Some("mm for m"));
+        assert_eq!(told(1e-3, "mV").as_deref(), Some("V for mV"));
+        assert_eq!(told(100.0, "").as_deref(), Some("% for 1"));
+        // Not within 1 %, and units of another quantity.
+        assert_eq!(told(9.8, "rad/s"), None);
+        assert_eq!(told(57.3, "mm"), None);
+        // Known to 5 %, one pair is near.
+        assert_eq!(units(9.8, 0.05, "rad/s").as_deref(), Some("rpm for rad/s"));
+    }
+}

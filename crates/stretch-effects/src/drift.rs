@@ -84,6 +84,7 @@ pub static GAIN_DRIFT: Kind = Kind {
         sketch.beside(Quantity::SESSION_TIME)
     }),
     twins: &["drift"],
+    drifts: true,
     ..Kind::PLAIN
 };
 

@@ -168,6 +168,11 @@ impl Effect {
         self.is_kind(|kind| kind.counts_session)
     }
 
+    /// Whether it is a law of session time.
+    pub fn drifts(&self) -> bool {
+        self.is_kind(|kind| kind.drifts)
+    }
+
     /// Whether the true length cannot be told from what the reference shows (play in the reference).
     pub fn hides_input(&self) -> bool {
         self.stage == RigStage::Reference && self.is_kind(|kind| kind.hides_input)

@@ -127,6 +127,8 @@ pub struct Kind {
     pub family: Option<(Family, Measure)>,
     /// Whether its memory goes on from trial to trial.
     pub counts_session: bool,
+    /// Whether it is a law of session time, so that trials outside the time that was fitted are extrapolated.
+    pub drifts: bool,
     /// Whether its input cannot be told from its output.
     pub hides_input: bool,
     /// Whether it asks for steps shorter than a sample where a measured input drives its stage.
@@ -170,6 +172,7 @@ impl Kind {
         twins: &[],
         family: None,
         counts_session: false,
+        drifts: false,
         hides_input: false,
         needs_fine_steps: false,
         find: None,

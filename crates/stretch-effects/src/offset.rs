@@ -76,5 +76,6 @@ pub static DRIFT: Kind = Kind {
             .with("SESSION", e.session_s, "s")
     }),
     twins: &["offset"],
+    drifts: true,
     ..Kind::PLAIN
 };

@@ -129,6 +129,7 @@ pub static SOFTENING: Kind = Kind {
     },
     sketch: Some(sketch),
     counts_session: true,
+    drifts: true,
     ..Kind::PLAIN
 };
 

@@ -32,6 +32,7 @@ use crate::{
     verdict::{
         coverage::{is_short, too_little},
         diagnosis::{Diagnosis, Unexplained, VerdictKind},
+        extrapolated::extrapolated,
         judge::{Case, Judged, judge},
         nothing_above::nothing_above,
         proposal::lacking,
@@ -303,6 +304,7 @@ fn report(
     };
     let mut text = tell(answer, simulator, &evidence);
     text.notes.extend(searched.problem.starts.note());
+    text.notes.extend(extrapolated(simulator, &evidence.roles, &judged.naming.named));
     let model_runs = runs.counted();
     if let Some(note) = model_runs.and_then(|runs| runs.note()) {
         text.sentence = cut_short(&searched.not_looked_at()) + &text.sentence;

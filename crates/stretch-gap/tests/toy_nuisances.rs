@@ -94,3 +94,18 @@ fn simpler_methods_name_a_strong_effect_and_no_noise() {
     let plain = quiet.diagnosed().0;
     assert_eq!(plain.baselines, None);
 }
+
+/// A drift beside which the test trial lies later than all that was fitted goes on by its law alone, and a note says from where to where.
+#[test]
+fn a_drift_is_told_as_extrapolated() {
+    let notes = |effect: Effect, size: f64| {
+        let toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL).hiding(&[(effect, &[size])]);
+        let (told, _) = toy.measured(2).diagnosed();
+        assert_eq!(told.named, [effect.name()], "{}", told.sentence);
+        told.notes.into_iter().filter(|note| note.contains("extrapolated")).collect::<Vec<_>>()
+    };
+    let [note] = &notes(Effect::Drift, 0.003)[..] else { panic!("one note") };
+    let begins = "drift is a law of session time: it was fitted from 0 to 130 s and extrapolated to the test trials, from 180 to 190 s";
+    assert!(note.starts_with(begins), "{note}");
+    assert!(notes(Effect::Play, 0.1).is_empty());
+}

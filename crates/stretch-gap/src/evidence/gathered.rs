@@ -106,7 +106,8 @@ impl Traces {
         let apart = simulator.measured(stage).iter().zip(&output);
         let apart: Vec<f64> = apart.map(|(m, s)| m - s).collect();
         let (whole, residual) = held_out(problem, stage, model, &apart);
-        let of = |role| blocks_of(&compare.roles, role, &whole, &residual);
+        let sd = &compare.metrics[stage].noise.sd;
+        let of = |role| blocks_of(&compare.roles, role, sd, &whole, &residual);
         let mut blocks = Blocks { fit: of(Role::Fit), held: of(Role::Held), test: of(Role::Test) };
         blocks.test.iter_mut().for_each(|x| *x /= level);
         Ok(Self { output, residual, blocks })
@@ -137,14 +138,27 @@ pub(crate) fn held_out(
     (whole, residual)
 }
 
-/// r V^-1 r by block: V^-1 r is the residual without its most likely nuisances, whose own improbability so counts.
-fn blocks_of(roles: &SampleRoles, role: Role, whole: &[f64], clean: &[f64]) -> Vec<f64> {
-    let block = |s: &Segment| {
-        let parts = whole[s.from..s.to].chunks_exact(roles.block);
-        let pairs = parts.zip(clean[s.from..s.to].chunks_exact(roles.block));
-        pairs.map(|(r, c)| dot(r, c) / r.len() as f64).collect::<Vec<f64>>()
-    };
-    roles.of_role(role).flat_map(block).collect()
+/// Mean r V^-1 r by block: V^-1 r is the residual without its most likely nuisances, whose own improbability so counts. Means are over what
+/// was measured, whose noise `sd` is finite; a block without any is no gap.
+fn blocks_of(
+    roles: &SampleRoles,
+    role: Role,
+    sd: &[f64],
+    whole: &[f64],
+    clean: &[f64],
+) -> Vec<f64> {
+    let mut blocks = Vec::new();
+    for segment in roles.of_role(role) {
+        let mut from = segment.from;
+        while from + roles.block <= segment.to {
+            let block = from..from + roles.block;
+            let measured = sd[block.clone()].iter().filter(|sd| sd.is_finite()).count();
+            let sum = dot(&whole[block.clone()], &clean[block.clone()]);
+            blocks.push(if measured > 0 { sum / measured as f64 } else { 1.0 });
+            from = block.end;
+        }
+    }
+    blocks
 }
 
 impl Evidence {

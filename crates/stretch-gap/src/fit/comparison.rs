@@ -140,7 +140,7 @@ impl<'a> Comparison<'a> {
     /// Reduced chi-squares of a residual, at the noise that its own model transmits.
     pub(crate) fn misfit(&self, stage: usize, residual: &Column) -> Misfit {
         let mean = |role| {
-            let n = self.roles.count(role) as f64;
+            let n = self.metrics[stage].measured(&self.roles, role) as f64;
             let sum = self.metrics[stage].product(&self.roles, residual, residual, role);
             if n > 0.0 { sum / n } else { 1.0 }
         };

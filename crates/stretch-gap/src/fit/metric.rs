@@ -194,6 +194,12 @@ impl Metric {
         sum
     }
 
+    /// Samples in a role that count: lost ones and isolated outliers, whose noise is infinite, do not.
+    pub(crate) fn measured(&self, roles: &SampleRoles, role: Role) -> usize {
+        let own = roles.of_role(role).flat_map(|s| &self.noise.sd[s.from..s.to]);
+        own.filter(|sd| sd.is_finite()).count()
+    }
+
     /// ln det V over the segments in a role.
     pub(crate) fn ln_det(&self, roles: &SampleRoles, role: Role) -> f64 {
         let pairs = roles.segments.iter().zip(&self.nuisances).filter(|(s, _)| s.role == role);

@@ -115,6 +115,8 @@ pub struct EffectSpec {
     pub starts: Vec<Vec<f64>>,
     /// Whether its course is found in the record: its size then only says how much is looked for.
     pub is_found: bool,
+    /// Whether it is a law of session time, so that trials outside the time that was fitted are extrapolated.
+    pub drifts: bool,
     /// Names of effects that are hard to tell from it.
     pub twins: Vec<String>,
 }
@@ -140,6 +142,7 @@ impl EffectSpec {
             starts: EffectParameter::starts(&parameters),
             parameters,
             is_found: false,
+            drifts: false,
             twins: Vec::new(),
         }
     }

@@ -8,6 +8,7 @@
 
 pub(crate) mod coverage;
 pub(crate) mod diagnosis;
+pub(crate) mod extrapolated;
 pub(crate) mod judge;
 pub(crate) mod naming;
 #[cfg(test)]

@@ -123,7 +123,8 @@ impl Effect {
                 EffectParameter::shaped("tau", "s", 0.2..=5.0),
             ],
         };
-        EffectSpec::new(&super::Toy::name(stage, self), (stage, "toy"), parameters)
+        let spec = EffectSpec::new(&super::Toy::name(stage, self), (stage, "toy"), parameters);
+        EffectSpec { drifts: self == Self::Drift, ..spec }
     }
 
     fn is_of_input(self) -> bool {

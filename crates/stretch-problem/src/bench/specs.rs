@@ -27,6 +27,7 @@ pub(crate) fn spec(effect: &Effect, place: Place) -> EffectSpec {
         parameters: effect.fitted().zip(&search.ranges).map(parameter).collect(),
         starts: search.starts,
         is_found: effect.find().is_some(),
+        drifts: effect.drifts(),
         twins: effect.twins.iter().map(|twin| (*twin).to_owned()).collect(),
     }
 }

@@ -227,6 +227,7 @@ impl Placed {
         let mut spec = EffectSpec::new(&self.name, (self.site.stage, stage), parameters);
         spec.starts.clone_from(&self.starts);
         spec.is_found = self.kind.find.is_some();
+        spec.drifts = self.kind.drifts;
         let is_twin = |other: &&Self| {
             other.site.stage == self.site.stage
                 && other.name != self.name

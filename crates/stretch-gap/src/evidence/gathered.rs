@@ -13,7 +13,7 @@ use crate::{
     numerics::linear::dot,
     problem::{
         error::GapError,
-        sample_roles::{Role, SampleRoles, Segment},
+        sample_roles::{Role, SampleRoles},
         simulator::Model,
     },
     search::selection::Found,

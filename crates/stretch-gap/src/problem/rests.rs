@@ -96,6 +96,7 @@ mod tests {
     use crate::numerics::random::RandomGenerator;
 
     const DT_S: f64 = 0.01;
+    const TRIALS: [Range<usize>; 2] = [0..3000, 3000..6000];
 
     /// Steps that are held for 1.5 s, through a lag of second order, y'' = w^2 (x - y) - 2 damping w y'.
     fn stepped(hertz: f64, damping: f64, noise: f64) -> (Vec<f64>, Vec<f64>) {
@@ -122,7 +123,7 @@ mod tests {
     fn noise_is_told_beside_what_rings() {
         for (hertz, damping) in [(1.0, 0.05), (3.0, 0.05), (6.0, 0.05), (3.0, 0.5), (10.0, 0.3)] {
             let (command, output) = stepped(hertz, damping, 0.05);
-            let found = Noise::of_rests(&output, &[&command], &[0..3000, 3000..6000], DT_S);
+            let found = Noise::of_rests(&output, &[&command], &TRIALS, DT_S);
             let sd = found.expect("there are rests").sd();
             assert!((sd / 0.05 - 1.0).abs() < 0.2, "{hertz} Hz {damping}: {sd}");
         }
@@ -135,8 +136,8 @@ mod tests {
     fn without_rests_or_changes_nothing_is_told() {
         let (command, output) = stepped(3.0, 0.5, 0.05);
         let ramp: Vec<f64> = (0..6000).map(f64::from).collect();
-        assert_eq!(Noise::of_rests(&output, &[&command, &ramp], &[0..6000], DT_S), None);
-        assert_eq!(Noise::of_rests(&output, &[], &[0..6000], DT_S), None);
-        assert_eq!(Noise::of_rests(&vec![1.0; 6000], &[&command], &[0..6000], DT_S), None);
+        assert_eq!(Noise::of_rests(&output, &[&command, &ramp], &TRIALS, DT_S), None);
+        assert_eq!(Noise::of_rests(&output, &[], &TRIALS, DT_S), None);
+        assert_eq!(Noise::of_rests(&vec![1.0; 6000], &[&command], &TRIALS, DT_S), None);
     }
 }

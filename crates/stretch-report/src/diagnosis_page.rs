@@ -335,7 +335,8 @@ fn detectable(page: &mut Page, d: &Diagnosis) {
         "What would have been seen",
         "An effect weaker than its limit may be there unseen, and one that is stronger is not: it would \
          have been named nine times in ten. \
-         Without a limit these data do not show an effect, or not which of several it is.",
+         These are linearised draws: a twin whose \
+         form is fitted may be named in its place. Without a limit these data do not show an effect, or not which of several it is.",
     );
     page.table(&limit_table(&d.detection_limits));
 }

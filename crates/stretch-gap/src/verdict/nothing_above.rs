@@ -24,7 +24,7 @@ pub(crate) fn nothing_above(limits: &[DetectionLimit], effects: &[EffectSpec]) -
     let rest = if known.len() > LISTED { ", and more in the table" } else { "" };
     (!listed.is_empty()).then(|| {
         format!(
-            "Nothing above: {}{rest} (each would have been named with probability 0.9).",
+            "Nothing above: {}{rest} (named with probability 0.9, by linearised draws).",
             listed.join(", ")
         )
     })

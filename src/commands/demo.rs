@@ -11,7 +11,7 @@ use stretch_calibrate::{apply, write_calibration};
 use stretch_data::{Trial, TrialKind, listed};
 use stretch_files::write_folder;
 use stretch_report::{Context, Judged, Subject, demo_page, readme_picture};
-use stretch_sim::{RunSettings, TrialPlan, paper_preset};
+use stretch_sim::{RunSettings, TrialPlan, demo_preset};
 
 use super::{
     apply::estimates_csv,
@@ -135,9 +135,9 @@ fn whole_job(args: &Args, out: &Path) -> anyhow::Result<(Sessions, Job)> {
     Ok((sessions, job))
 }
 
-/// The paper's session on its preset, written as a data set and read back as one.
+/// The paper's session on the rig of the demonstration, written as a data set and read back as one.
 fn simulated(folder: &Path, seed: u64) -> anyhow::Result<Sessions> {
-    let rig = paper_preset()?;
+    let rig = demo_preset()?;
     let settings = RunSettings { seed, ..RunSettings::default() };
     simulate::write(folder, false, &rig, &settings, &TrialPlan::paper(seed))?;
     let mut sessions = Sessions::read(folder, &Wanted::default())?;

@@ -21,7 +21,7 @@ pub use gauge::{Gauge, GaugeSpec};
 pub use gauge_file::GaugeRig;
 pub use memory::Memory;
 pub use params::{Key, PARAMETERS, ParameterInfo, RigParams, Tolerance};
-pub use preset::paper_preset;
+pub use preset::{demo_preset, paper_preset};
 pub use protocol::{OPENINGS, PAUSE_S, RATE_HZ, TrialPlan};
 pub use rig::{LEAST_STRAIN, Rig, RunSettings, default_rig_text};
 pub use session::Session;

@@ -4,7 +4,7 @@
 //! less than a handful of samples:
 //!
 //! ```text
-//! block = min(0.5 s, max(half a mean turn of the slowest output, 20 samples))
+//! block = min(most, max(half a mean turn of the slowest output, 20 samples))
 //! ```
 //!
 //! A turn ends where an output has crossed its middle upwards by more than a tenth of its span and six times its noise, so that noise makes
@@ -12,7 +12,7 @@
 
 use stretch_data::ends;
 
-use crate::problem::{noise::noise_variance, sample_roles::BLOCK_S};
+use crate::problem::noise::noise_variance;
 
 /// Samples of the shortest block.
 const SAMPLES: f64 = 20.0;
@@ -21,13 +21,13 @@ const CROSSED: (f64, f64) = (0.1, 6.0);
 /// Turns of an output that tell how quick it is.
 const FEWEST: usize = 10;
 
-/// Length of a block of a record, s, from the parts of each output that may be looked at.
-pub(super) fn block_s<'a, P>(outputs: impl Iterator<Item = P>, dt_s: f64) -> f64
+/// Length of a block of a record, s and at most `most_s`, from the parts of each output that may be looked at.
+pub(super) fn block_s<'a, P>(outputs: impl Iterator<Item = P>, dt_s: f64, most_s: f64) -> f64
 where
     P: Iterator<Item = &'a [f64]> + Clone,
 {
     let slowest = outputs.map(|parts| half_turn_s(parts, dt_s)).fold(0.0, f64::max);
-    slowest.max(SAMPLES * dt_s).min(BLOCK_S)
+    slowest.max(SAMPLES * dt_s).min(most_s)
 }
 
 /// Half of the mean time from one turn to the next, s; infinite where there are too few turns.
@@ -56,6 +56,8 @@ fn half_turn_s<'a>(parts: impl Iterator<Item = &'a [f64]> + Clone, dt_s: f64) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const MOST_S: f64 = 0.5;
     use crate::numerics::random::RandomGenerator;
 
     fn wave(hertz: f64, noise: f64, (samples, dt_s): (usize, f64)) -> Vec<f64> {
@@ -65,7 +67,7 @@ mod tests {
     }
 
     fn block(outputs: &[Vec<f64>], dt_s: f64) -> f64 {
-        block_s(outputs.iter().map(|y| std::iter::once(y.as_slice())), dt_s)
+        block_s(outputs.iter().map(|y| std::iter::once(y.as_slice())), dt_s, MOST_S)
     }
 
     #[test]
@@ -74,8 +76,8 @@ mod tests {
         let [quick, slow] = [5.0, 0.4].map(|hertz| wave(hertz, 0.01, at));
         let both = [quick, slow];
         approx::assert_relative_eq!(block(&both[..1], 0.002), 0.1, max_relative = 0.05);
-        assert_eq!(block(&both[1..], 0.002), BLOCK_S);
-        assert_eq!(block(&both, 0.002), BLOCK_S);
+        assert_eq!(block(&both[1..], 0.002), MOST_S);
+        assert_eq!(block(&both, 0.002), MOST_S);
         // Turns of a few samples make no block of a few samples.
         assert_eq!(block(&[wave(20.0, 0.01, at)], 0.002), 0.04);
     }
@@ -83,7 +85,7 @@ mod tests {
     #[test]
     fn noise_makes_no_turns() {
         let noise = wave(0.0, 1.0, (4000, 0.002));
-        assert_eq!(block(&[noise], 0.002), BLOCK_S);
-        assert_eq!(block(&[wave(0.4, 0.3, (40_000, 0.002))], 0.002), BLOCK_S);
+        assert_eq!(block(&[noise], 0.002), MOST_S);
+        assert_eq!(block(&[wave(0.4, 0.3, (40_000, 0.002))], 0.002), MOST_S);
     }
 }

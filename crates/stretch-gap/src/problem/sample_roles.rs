@@ -102,7 +102,7 @@ impl SampleRoles {
         let trials = simulator.trials();
         let dt_s = simulator.dt_s();
         let borrowed_test = trials.iter().all(|t| !t.is_test);
-        let block_s = pace::block_s(looked_at(simulator), dt_s);
+        let block_s = pace::block_s(looked_at(simulator), dt_s, BLOCK_S);
         let mut segments = Vec::new();
         let mut begin = 0;
         for (trial, spec) in trials.iter().enumerate() {

@@ -5,7 +5,7 @@
 //! model discrepancy within the noise. At least `share` of the gap that is left in the effect's stages closes. And in one of these stages more
 //! closes than *model discrepancy* could explain: the rig's backlash is not the textbook's; an effect in the right place leaves a share
 //! `model_discrepancy` of what it closes, with the shape of a further effect, and evidence grows with the samples while that share does not.
-//! The set that an effect is added to stands beside it with the [deviations](crate::fit::deviations) of its own effects' forms.
+//! Both sets stand beside each other with the [deviations](crate::fit::deviations) of their own effects' forms as well.
 
 use crate::{
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
@@ -20,8 +20,23 @@ pub(crate) struct Acceptance<'a> {
 }
 
 impl Acceptance<'_> {
-    /// Whether `next`, which has one effect more than `base`, meets every acceptance criterion.
-    pub(crate) fn is_accepted(&self, base: &Hypothesis, next: &Hypothesis) -> bool {
+    /// Whether `next`, which has one effect more than `base`, meets every acceptance criterion: as both are, and with the deviations of their own
+    /// effects' forms, for what a deviation of the first explains is no further effect's.
+    pub(crate) fn is_accepted(
+        &self,
+        base: &Hypothesis,
+        next: &Hypothesis,
+    ) -> Result<bool, GapError> {
+        if !self.meets(base, next) {
+            return Ok(false);
+        }
+        // The discrepancy is a share of the variance, deviations are amplitudes.
+        let share = self.thresholds.model_discrepancy.sqrt();
+        let deviating = |set| self.problem.with_deviations(set, share);
+        Ok(base.effects.is_empty() || self.meets(&deviating(base)?, &deviating(next)?))
+    }
+
+    fn meets(&self, base: &Hypothesis, next: &Hypothesis) -> bool {
         let Some(&new) = next.effects.iter().find(|e| !base.effects.contains(e)) else {
             return false;
         };
@@ -31,12 +46,6 @@ impl Acceptance<'_> {
             && self.problem.rise(base, next) > self.thresholds.rise
             && closed >= self.thresholds.share * self.left(base, new)
             && self.exceeds_discrepancy(base, next, new)
-    }
-
-    /// A set with the deviations of its effects' forms: what they explain is no further effect's.
-    pub(crate) fn with_deviations(&self, set: &Hypothesis) -> Result<Hypothesis, GapError> {
-        // A share of the variance, and an amplitude.
-        self.problem.with_deviations(set, self.thresholds.model_discrepancy.sqrt())
     }
 
     /// Whether an effect on top of `base` can be more than what model discrepancy left.

@@ -187,8 +187,12 @@ impl<'a> Search<'a> {
         list: &[Screened],
     ) -> Result<Option<Hypothesis>, GapError> {
         let found = self.sets.extend_all(base, ground, list, base.score)?;
-        let base = self.acceptance.with_deviations(base)?;
-        Ok(found.into_iter().find(|next| self.acceptance.is_accepted(&base, next)))
+        for next in found {
+            if self.acceptance.is_accepted(base, &next)? {
+                return Ok(Some(next));
+            }
+        }
+        Ok(None)
     }
 
     /// Effects that a shortlist leaves out, where a gap is left for them, each from its best start.
@@ -212,7 +216,7 @@ impl<'a> Search<'a> {
                 }
             }
             let Some(less) = weakest else { break };
-            if self.acceptance.is_accepted(&self.acceptance.with_deviations(&less)?, &best) {
+            if self.acceptance.is_accepted(&less, &best)? {
                 break;
             }
             best = less;

@@ -1,6 +1,5 @@
 //! Fits of toys whose answers are known in closed form.
 
-mod deviations;
 mod least_squares;
 mod marginal;
 mod noise;

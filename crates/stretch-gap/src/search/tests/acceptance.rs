@@ -69,8 +69,9 @@ fn a_strong_effect_is_worth_it_and_the_same_set_is_not() {
     let worth = worth(&problem, &thresholds);
     let play = with_effects(&problem, &[(index(&record, "play"), vec![0.1])]);
     let play = Sets::new(&problem).refit(&play).expect("fitted");
-    assert!(worth.is_accepted(&problem.nominal, &play));
-    assert!(!worth.is_accepted(&play, &play) && !worth.is_accepted(&play, &problem.nominal));
+    let is_accepted = |base, next| worth.is_accepted(base, next).expect("simulated");
+    assert!(is_accepted(&problem.nominal, &play));
+    assert!(!is_accepted(&play, &play) && !is_accepted(&play, &problem.nominal));
     // All that was left in the stage is closed, so that no further effect can be more than model discrepancy.
     assert!(worth.is_possible(&problem.nominal, index(&record, "cubic")));
     assert!(!worth.is_possible(&play, index(&record, "cubic")));

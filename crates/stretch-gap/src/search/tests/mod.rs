@@ -1,6 +1,7 @@
 //! The search on toys: what is screened, taken, and dropped again.
 
 mod acceptance;
+mod deviations;
 mod screening;
 mod selecting;
 mod unstrained;

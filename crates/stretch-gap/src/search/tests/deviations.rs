@@ -1,8 +1,11 @@
 //! What another form of an effect explains, and what it must not.
 
-use super::{prepared, with_effects};
 use crate::{
-    fit::{hypothesis::Hypothesis, score::excess},
+    fit::{
+        hypothesis::Hypothesis,
+        score::excess,
+        tests::{prepared, with_effects},
+    },
     search::sets::Sets,
     toys::{Effect, Law, Toy},
 };

@@ -68,8 +68,8 @@ class Diagnosis:
 
     @property
     def detection_limits(self) -> dict[str, dict[str, Any]]:
-        """How strong each effect would have to be to be named on these data: `parameter`, `strength` (None where no strength in its range
-        would do) and `unit`, by effect; empty where something is named."""
+        """How strong each effect would have to be to be named on these data: `parameter`, `strength` (None where no
+        strength in its range would do) and `unit`, by effect; empty where something is named."""
         limits = self._answer.get("detection_limits", [])
         return {limit["effect"]: {k: v for k, v in limit.items() if k != "effect"} for limit in limits}
 

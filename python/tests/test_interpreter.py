@@ -38,7 +38,9 @@ def test_other_threads_run_on_while_rust_works():
 def interrupted(code, tmp_path):
     """Runs code that touches `ready` when it is about to work, interrupts it, and gives its exit code, time and text."""
     script = tmp_path / "script.py"
-    script.write_text(textwrap.dedent(code))
+    # a job in the background of a shell is begun with the signal ignored
+    heard = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    script.write_text(heard + textwrap.dedent(code))
     ready = tmp_path / "ready"
     with subprocess.Popen([sys.executable, str(script), str(ready)], stderr=subprocess.PIPE, text=True, cwd=tmp_path) as process:
         for _ in range(600):

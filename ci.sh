@@ -13,7 +13,7 @@ TARGETS="thumbv7m-none-eabi thumbv7em-none-eabihf"
 # crates for boards say so themselves
 LIBRARIES=$(grep -l '^#!\[no_std\]' crates/*/src/lib.rs | cut -d / -f 2 | tr '\n' ' ')
 # what is published with them
-PACKAGES="$LIBRARIES stretch-files stretch-data stretch-recording stretch-calibrate stretch-export stretch-sim"
+PACKAGES="$LIBRARIES stretch-files stretch-data stretch-recording stretch-calibrate stretch-export stretch-sim stretch-gap stretch-problem stretch-report"
 # crates with features that a plain `cargo test` leaves off: readers that cost much to build
 FEATURED="stretch-recording"
 
@@ -82,7 +82,7 @@ done
 
 step "slow tests, and those that need what not every machine has"
 # the program is a release build, which its slow tests gain most by; `demo` is shown with the same
-cargo build --quiet --release --locked -p stretch
+cargo build --quiet --release --locked -p stretch-cli
 without=(--skip gross::)
 lacks() {
     skip "tests that begin with with_$1_: $2"
@@ -99,6 +99,7 @@ have clang || lacks clang "there is no clang"
 have octave || lacks octave "there is no octave"
 have python3 || lacks python "there is no python3"
 python3 -c 'import numpy' 2>/dev/null || lacks numpy "there is no python3 with NumPy"
+python3 -c 'import jsonschema' 2>/dev/null || lacks jsonschema "there is no python3 with jsonschema"
 empty=$(mktemp -d)
 mounts "$empty" || lacks mount "no file system can be mounted here"
 rmdir "$empty"

@@ -23,11 +23,11 @@ use crate::terminal::{self, Ink, wrapped};
 /// How much is said beside results and errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Volume {
-    /// `-q`: nothing.
+    /// `-q`: nothing, and of a diagnosis the verdict alone.
     Quiet,
     /// What was written, what to look at, and progress on a terminal.
     Usual,
-    /// `-v`: also what is read and chosen, and how long it takes, in lines of their own.
+    /// `-v`: also what is read and chosen, how long it takes, in lines of their own, and every detail of a diagnosis.
     Verbose,
 }
 
@@ -41,6 +41,16 @@ pub(crate) fn begin(volume: Volume) {
 
 fn volume() -> Volume {
     BEGUN.get().map_or(Volume::Usual, |(_, volume)| *volume)
+}
+
+/// Whether a result is said in one sentence, without what explains it.
+pub(crate) fn is_quiet() -> bool {
+    volume() == Volume::Quiet
+}
+
+/// Whether a result is said with every detail.
+pub(crate) fn is_verbose() -> bool {
+    volume() == Volume::Verbose
 }
 
 /// Whether progress is drawn: what `-v` says stands in lines of its own.

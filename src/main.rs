@@ -33,12 +33,12 @@ use display::Volume;
 /// judges, says why simulator and rig disagree, and writes one report;
 /// `stretch demo --data DIR` does the same on measured sessions.
 #[derive(Parser)]
-#[command(version, verbatim_doc_comment, max_term_width = 100, after_help = STATUSES)]
+#[command(name = "stretch", version, verbatim_doc_comment, max_term_width = 100, after_help = STATUSES)]
 struct Cli {
-    /// Say nothing but results and errors
+    /// Say nothing but results and errors; of a diagnosis say the verdict alone
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
-    /// Say also what is read and chosen, and how long it takes, on standard error
+    /// Say also what is read and chosen, and how long it takes, on standard error; say every detail of a diagnosis
     #[arg(short, long, global = true)]
     verbose: bool,
     #[command(subcommand)]

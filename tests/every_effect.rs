@@ -9,6 +9,7 @@ use crate::support::{
 };
 use serde_json::Value;
 use stretch_sim::{CATALOGUE, Effect};
+use testkit::random::Random;
 
 /// The effect at the middle of its range's first half, one threshold of several, its shapes at their typical values.
 fn spelled(effect: &Effect) -> String {
@@ -119,6 +120,53 @@ fn is_agreed_with_once_it_is_written_into_the_rig_file() {
             if !(is_agreed(&again) || is_mismatch) || !is_replayed {
                 wrong.push(format!("{given}, {pressure} pressure: {}", again["sentence"]));
             }
+        }
+        fs::remove_dir_all(&folder).unwrap();
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// Sets of two that are drawn.
+const SETS_OF_TWO: usize = 20;
+
+/// Two different effects of the catalogue, each at its typical strength.
+fn set_of_two(random: &mut Random) -> [&'static Effect; 2] {
+    let mut drawn = || CATALOGUE[(random.unit() * CATALOGUE.len() as f64) as usize];
+    loop {
+        let pair = [drawn(), drawn()];
+        if pair[0].name != pair[1].name {
+            return pair;
+        }
+    }
+}
+
+#[test]
+#[ignore = "twenty sets of two effects, minutes; ./ci.sh runs it"]
+fn a_set_of_two_is_agreed_with_once_it_is_written_into_the_rig_file() {
+    let scratch = Scratch::new();
+    let mut random = Random(26);
+    let mut wrong = Vec::new();
+    for _ in 0..SETS_OF_TWO {
+        let pair = set_of_two(&mut random).map(spelled);
+        let (folder, fixed) = (scratch.path("pair"), scratch.path("fixed.toml"));
+        let mut command = stretch();
+        command.args(["simulate", "--out"]).arg(&folder);
+        for given in &pair {
+            command.args(["--effect", given]);
+        }
+        command.assert().success();
+        let first = diagnosed(&scratch, &folder, None, Some(&fixed));
+        let again = diagnosed(&scratch, &folder, Some(&fixed), None);
+        let [before, left] = [&first, &again].map(|d| d["gap"]["retuned"].as_f64().unwrap());
+        println!(
+            "{}: {} then {} {} (gap {before:.3} -> {left:.3})",
+            pair.join(" "),
+            first["named"],
+            again["verdict"],
+            again["named"]
+        );
+        if !(is_agreed(&again) || left <= MISMATCH * before) {
+            wrong.push(format!("{}: {}", pair.join(" "), again["sentence"]));
         }
         fs::remove_dir_all(&folder).unwrap();
     }

@@ -475,3 +475,24 @@ fn on_a_terminal_it_plots() {
     assert!(seen.contains("mm") && seen.contains("frames"), "{seen}");
     assert!(seen.contains("\u{1b}[?1049l"), "the terminal was not given back");
 }
+
+#[test]
+fn a_board_whose_clock_stands_is_told() {
+    let scratch = Scratch::new();
+    scratch.write("cal.json", calibration_to_json(&example_calibration()).unwrap());
+    let said = |standing_from: u32| {
+        let frames = board(300)
+            .into_iter()
+            .map(|frame| Frame { time_ms: frame.time_ms.min(10 * standing_from), ..frame });
+        scratch.write("frames", frames.flat_map(|frame| line(&frame)).collect::<Vec<u8>>());
+        let mut listen = Command::new(program());
+        let listen = listen.current_dir(scratch.path("")).args(["listen", "--port", "frames"]);
+        let out = listen.args(["--calibration", "cal.json"]).output().unwrap();
+        assert!(out.status.success());
+        String::from_utf8_lossy(&out.stderr).split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let stood = said(199);
+    assert!(stood.contains("the board's clock stood still at 100 frames"), "{stood}");
+    let ran = said(300);
+    assert!(!ran.contains("stood still"), "{ran}");
+}

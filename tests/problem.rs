@@ -153,3 +153,83 @@ fn a_problem_of_the_built_in_gauge_is_its_data_set() {
     let (is_good, text) = said(folder.path(), &[]);
     assert!(is_good && text.starts_with("The simulator lacks channel_skew"), "{text}");
 }
+
+/// A folder as it comes from somebody else: recordings, and a problem whose simulator leaves a trace.
+fn downloaded(folder: &Path) -> std::path::PathBuf {
+    recording(&folder.join("a.csv"));
+    let text = "simulator = [\"sh\", \"-c\", \"touch ran; exec cat\"]\n[[stage]]\noutput = \"angle_deg\"\ninputs = [\"command_V\"]\n[[trial]]\nfile = \"a.csv\"\n";
+    fs::write(folder.join("problem.toml"), text).unwrap();
+    folder.join("ran")
+}
+
+#[test]
+#[cfg(unix)]
+fn a_folder_runs_no_program_unasked() {
+    let scratch = tempfile::tempdir().unwrap();
+    // a name that ends like a file's is a folder's nevertheless
+    for name in ["bench", "bench.toml"] {
+        let folder = scratch.path().join(name);
+        fs::create_dir(&folder).unwrap();
+        let ran = downloaded(&folder);
+        for arguments in [&["diagnose"][..], &["effects", "--data"], &["demo", "--data"], &["init"]]
+        {
+            let out = stretch().args(arguments).arg(&folder).output().unwrap();
+            assert!(!out.status.success() && !ran.exists(), "{arguments:?} {name}");
+            let text = String::from_utf8_lossy(&out.stderr).replace('\n', " ");
+            let tells =
+                ["it names a program to run (sh -c \"touch ran; exec cat\")", "--allow-commands"];
+            let is_told = arguments[0] == "demo" || arguments[0] == "init";
+            assert!(
+                is_told || tells.iter().all(|part| text.contains(part)),
+                "{arguments:?}: {text}"
+            );
+        }
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn what_runs_is_said_in_a_line_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let ran = downloaded(folder.path());
+    let file = folder.path().join("problem.toml");
+    let asked: [&[&Path]; 2] = [&[&file], &[folder.path(), Path::new("--allow-commands")]];
+    for command in [&["diagnose"][..], &["effects", "--data"]] {
+        for path in asked {
+            let out = stretch().args(command).args(path).output().unwrap();
+            let text = String::from_utf8_lossy(&out.stderr).into_owned();
+            // a worker that answers with what it is asked says no hello
+            assert!(!out.status.success(), "{text}");
+            fs::remove_file(&ran).unwrap_or_else(|_| panic!("it did not run: {text}"));
+            let lines: Vec<_> =
+                text.lines().filter(|line| line.contains("problem.toml runs")).collect();
+            assert!(
+                lines.len() == 1 && lines[0].ends_with("sh -c \"touch ran; exec cat\""),
+                "{text}"
+            );
+        }
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn what_a_data_set_or_a_rig_file_says_runs_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let ran = downloaded(folder.path());
+    let set =
+        "name = 'a'\nrate_hz = 100\n[[trial]]\nfile = 'a.csv'\nkind = 'other'\nsplit = 'fit'\n";
+    let command = "simulator = ['sh', '-c', 'touch ran']\n";
+    let gauge = ["--reference", "angle_deg", "--signal", "command_V"];
+    // beside a data set a problem's file is not read; a simulator in the data set or in a rig file is a key that nothing reads
+    for text in [set.to_owned(), format!("{command}{set}")] {
+        fs::write(folder.path().join("dataset.toml"), text).unwrap();
+        stretch().arg("diagnose").arg(folder.path()).args(gauge).output().unwrap();
+        stretch().arg("demo").arg("--data").arg(folder.path()).output().unwrap();
+        assert!(!ran.exists());
+    }
+    let rig = folder.path().join("rig.toml");
+    fs::write(&rig, format!("{command}kind = 'gauge'\n")).unwrap();
+    let mut asked = stretch();
+    asked.arg("diagnose").arg(folder.path().join("a.csv")).args(gauge).arg("--rig").arg(rig);
+    assert!(!asked.output().unwrap().status.success() && !ran.exists());
+}

@@ -1,4 +1,4 @@
-//! Every figure of `docs/accuracy.md`, by one command:
+//! Every figure of `book/src/results/accuracy.md`, by one command:
 //!
 //! ```sh
 //! cargo run --release --example accuracy              # prints tables
@@ -56,7 +56,11 @@ impl ResultTable {
         let version = env!("CARGO_PKG_VERSION");
         let mut text = format!("# stretch {version}, examples/accuracy: {}\n", self.title);
         for row in std::iter::once(&self.header).chain(&self.rows) {
-            text += &row.join(",");
+            let quoted = |cell: &String| match cell.contains(',') {
+                true => format!("\"{cell}\""),
+                false => cell.clone(),
+            };
+            text += &row.iter().map(quoted).collect::<Vec<_>>().join(",");
             text.push('\n');
         }
         fs::write(folder.join(self.name), text)?;

@@ -1,4 +1,4 @@
-/* The same servo of first order as servo.py as a worker of stretch, in C99 without a library: the protocol is in docs/worker.md.
+/* The same servo of first order as servo.py as a worker of stretch, in C99 without a library: the protocol is in book/src/reference/worker.md.
  *
  *   cc -O2 -ffp-contract=off -o servo servo.c
  *

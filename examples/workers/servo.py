@@ -1,4 +1,4 @@
-"""A servo of first order as a worker of stretch: NumPy only. The protocol is in docs/worker.md."""
+"""A servo of first order as a worker of stretch: NumPy only. The protocol is in book/src/reference/worker.md."""
 import json
 import struct
 import sys

@@ -13,7 +13,7 @@ const USAGE: &str = "\
 An FMU (FMI 2 or 3, co-simulation) as a worker of stretch.
 
 stretch-fmu FILE.fmu [--variable NAME=VARIABLE]... [--unit NAME=UNIT]...
-    answers frames on standard input with frames on standard output (docs/worker.md);
+    answers frames on standard input with frames on standard output (book/src/reference/worker.md);
     stretch starts it for a problem whose simulator is an fmu
     --variable  what a parameter, an effect or a column is called in the FMU
     --unit      unit of a parameter or an effect in the problem

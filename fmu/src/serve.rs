@@ -1,4 +1,4 @@
-//! The worker's side of the protocol: frames come in, frames go out. The protocol is in `docs/worker.md`.
+//! The worker's side of the protocol: frames come in, frames go out. The protocol is in `book/src/reference/worker.md`.
 
 use std::io::{ErrorKind, Read, Write};
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
-import stretch
+import stretch_gap
 
 MODEL = """
 <mujoco model="arm">
@@ -55,19 +55,19 @@ NO_LOAD = 12.0
 """Speed at which the motor has no torque left, rad/s."""
 
 PARAMETERS = {
-    "tool_mass": stretch.Parameter(0.3, relative=0.1, unit="kg"),
-    "kp": stretch.Parameter(1.0, relative=0.05),
-    "kv": stretch.Parameter(1.0, relative=0.1),
+    "tool_mass": stretch_gap.Parameter(0.3, relative=0.1, unit="kg"),
+    "kp": stretch_gap.Parameter(1.0, relative=0.05),
+    "kv": stretch_gap.Parameter(1.0, relative=0.1),
 }
 
 CATALOGUE = {
-    "armature": stretch.Argument(0.0, 0.1, unit="kg m2"),
-    "frictionloss": stretch.Argument(0.0, 1.5, unit="N m"),
-    "damping": stretch.Argument(0.0, 1.5, unit="N m s/rad"),
-    "delay": stretch.Argument(0.0, 0.015, unit="s"),
-    "backlash": stretch.Argument(0.0, 0.04, unit="rad"),
-    "stall_torque": stretch.Argument(2.0, 20.0, off=20.0, unit="N m"),
-    "gear_compliance": stretch.Argument(0.0, 0.01, unit="rad/(N m)"),
+    "armature": stretch_gap.Argument(0.0, 0.1, unit="kg m2"),
+    "frictionloss": stretch_gap.Argument(0.0, 1.5, unit="N m"),
+    "damping": stretch_gap.Argument(0.0, 1.5, unit="N m s/rad"),
+    "delay": stretch_gap.Argument(0.0, 0.015, unit="s"),
+    "backlash": stretch_gap.Argument(0.0, 0.04, unit="rad"),
+    "stall_torque": stretch_gap.Argument(2.0, 20.0, off=20.0, unit="N m"),
+    "gear_compliance": stretch_gap.Argument(0.0, 0.01, unit="rad/(N m)"),
 }
 OFF = {name: argument.off for name, argument in CATALOGUE.items()}
 
@@ -248,11 +248,11 @@ def built(case, seed):
 def diagnosed(measured):
     """What the diagnosis says, and its models."""
     stages = [
-        stretch.Stage("shoulder_rad", name="shoulder", noise=NOISE_RAD),
-        stretch.Stage("elbow_rad", name="elbow", noise=NOISE_RAD),
+        stretch_gap.Stage("shoulder_rad", name="shoulder", noise=NOISE_RAD),
+        stretch_gap.Stage("elbow_rad", name="elbow", noise=NOISE_RAD),
     ]
     simulator = Simulator()
-    found = stretch.diagnose(
+    found = stretch_gap.diagnose(
         simulator,
         {"shoulder_rad": measured[0], "elbow_rad": measured[1]},
         rate_hz=1.0 / (EVERY * DT_S),

@@ -23,7 +23,7 @@ use crate::{
 };
 
 /// A calibration record.
-#[pyclass(frozen, module = "stretch")]
+#[pyclass(frozen, module = "stretch_gap")]
 #[derive(Debug)]
 pub(crate) struct CalibrationRecord {
     calibration: Calibration,

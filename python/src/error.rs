@@ -5,7 +5,7 @@ use std::fmt::Display;
 use pyo3::{create_exception, exceptions::PyValueError, prelude::*};
 
 create_exception!(
-    stretch,
+    stretch_gap,
     StretchError,
     PyValueError,
     "What is wrong with the data or the question, and what to do about it, in a sentence."

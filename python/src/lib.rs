@@ -1,6 +1,6 @@
 //! The native part of the Python package `stretch`.
 //!
-//! Calibrations and diagnoses are done here, in Rust. The Python code in `package/stretch` takes recordings in whatever form they come,
+//! Calibrations and diagnoses are done here, in Rust. The Python code in `package/stretch_gap` takes recordings in whatever form they come,
 //! and shows results.
 
 mod calibration;

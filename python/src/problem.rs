@@ -53,7 +53,7 @@ fn session_trial((recording, start_s, is_test): &Entry<'_>) -> SessionTrial {
 }
 
 /// A checked problem with its recordings on one grid.
-#[pyclass(frozen, module = "stretch", name = "Problem")]
+#[pyclass(frozen, module = "stretch_gap", name = "Problem")]
 #[derive(Debug)]
 pub(crate) struct Entries {
     checked: Checked,

@@ -5,7 +5,7 @@ use stretch_calibrate::LiveReceptor;
 use stretch_core::Branch;
 
 /// What a receptor answers for one sample.
-#[pyclass(frozen, module = "stretch", get_all)]
+#[pyclass(frozen, module = "stretch_gap", get_all)]
 #[derive(Debug, Clone)]
 pub(crate) struct Reading {
     /// The estimate, in the reference's unit.
@@ -29,7 +29,7 @@ impl Reading {
 }
 
 /// A calibration that takes one sample after the other and minds their time stamps.
-#[pyclass(module = "stretch")]
+#[pyclass(module = "stretch_gap")]
 #[derive(Debug)]
 pub(crate) struct Receptor {
     live: LiveReceptor,

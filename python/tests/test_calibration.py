@@ -2,18 +2,18 @@ import pickle
 
 import numpy as np
 import pytest
-import stretch
+import stretch_gap
 from conftest import RATE_HZ, recording
 
 
 @pytest.fixture(scope="module")
 def poly13(fitted):
-    return stretch.calibrate(*fitted, RATE_HZ, model="poly13", signal_name="gauge_v", reference_name="angle_deg")
+    return stretch_gap.calibrate(*fitted, RATE_HZ, model="poly13", signal_name="gauge_v", reference_name="angle_deg")
 
 
 def test_a_surface_makes_up_for_the_lag_that_a_line_keeps(fitted, tested, poly13):
-    linear = stretch.calibrate(*fitted, RATE_HZ, model="linear", signal_name="gauge_v", reference_name="angle_deg")
-    verdict = stretch.evaluate({"linear": linear, "poly13": poly13}, *tested, RATE_HZ)
+    linear = stretch_gap.calibrate(*fitted, RATE_HZ, model="linear", signal_name="gauge_v", reference_name="angle_deg")
+    verdict = stretch_gap.evaluate({"linear": linear, "poly13": poly13}, *tested, RATE_HZ)
     assert list(verdict.pooled) == ["raw", "linear", "poly13"]
     assert verdict.rmse < 0.5 * verdict.pooled["linear"]["rmse"]
     assert verdict.unit == poly13.unit == "deg"
@@ -35,14 +35,14 @@ def test_a_record_survives_as_text_as_file_and_as_pickle(tmp_path, tested, poly1
     poly13.save(tmp_path / "c.json")
     assert (tmp_path / "c.json").read_text() == poly13.to_json()
     for copy in (
-        stretch.Calibration.from_json(poly13.to_json()),
-        stretch.Calibration.load(tmp_path / "c.json"),
+        stretch_gap.Calibration.from_json(poly13.to_json()),
+        stretch_gap.Calibration.load(tmp_path / "c.json"),
         pickle.loads(pickle.dumps(poly13)),
     ):
         assert copy == poly13
         np.testing.assert_array_equal(copy.apply(tested[0]).value, value)
     poly13.save(tmp_path / "c.postcard")
-    assert stretch.Calibration.load(tmp_path / "c.postcard") == poly13
+    assert stretch_gap.Calibration.load(tmp_path / "c.postcard") == poly13
 
 
 def test_live_steps_give_the_bits_of_the_whole_recording(tested, poly13):
@@ -60,7 +60,7 @@ def test_live_steps_give_the_bits_of_the_whole_recording(tested, poly13):
 def test_auto_shows_what_it_chose_from():
     pairs = [recording(seed, 1.0 + 0.3 * seed, 8.0) for seed in range(3)]
     signals, angles = zip(*pairs)
-    chosen = stretch.calibrate(list(signals), list(angles), RATE_HZ, reference_name="angle_deg")
+    chosen = stretch_gap.calibrate(list(signals), list(angles), RATE_HZ, reference_name="angle_deg")
     named = [row["model"] for row in chosen.models]
     assert chosen.model in named and "linear" in named
     best = chosen.models[0]["rmse"]
@@ -72,9 +72,9 @@ def test_integers_lists_and_strided_arrays_are_arrays(fitted):
     signal, angle = fitted
     spaced = np.column_stack([signal, angle])
     options = {"rate_hz": RATE_HZ, "model": "linear"}
-    one = stretch.calibrate(signal, angle, **options)
-    assert one == stretch.calibrate(spaced[:, 0], spaced[:, 1], **options)
-    assert one == stretch.calibrate([float(x) for x in signal], [float(x) for x in angle], **options)
+    one = stretch_gap.calibrate(signal, angle, **options)
+    assert one == stretch_gap.calibrate(spaced[:, 0], spaced[:, 1], **options)
+    assert one == stretch_gap.calibrate([float(x) for x in signal], [float(x) for x in angle], **options)
 
 
 @pytest.mark.parametrize(
@@ -89,21 +89,21 @@ def test_integers_lists_and_strided_arrays_are_arrays(fitted):
     ],
 )
 def test_bad_columns_are_refused_in_a_sentence(fitted, spoil, words):
-    with pytest.raises(stretch.StretchError, match=words):
-        stretch.calibrate(*spoil(*fitted), RATE_HZ, model="linear")
+    with pytest.raises(stretch_gap.StretchError, match=words):
+        stretch_gap.calibrate(*spoil(*fitted), RATE_HZ, model="linear")
 
 
 def test_bad_questions_are_refused_in_a_sentence(fitted, poly13):
-    with pytest.raises(stretch.StretchError, match='"poly99" is not understood; use linear'):
-        stretch.calibrate(*fitted, RATE_HZ, model="poly99")
-    with pytest.raises(stretch.StretchError, match="either rate_hz"):
-        stretch.calibrate(*fitted)
-    with pytest.raises(stretch.StretchError, match="does not come after"):
-        stretch.calibrate(*fitted, time_s=np.zeros(fitted[0].size))
-    with pytest.raises(stretch.StretchError, match="this is no calibration that can be used"):
-        stretch.Calibration.from_json('{"schema": 1}')
-    with pytest.raises(stretch.StretchError, match="cannot read it"):
-        stretch.Calibration.load("/nowhere/c.json")
-    with pytest.raises(stretch.StretchError, match="no effect of the gauge"):
-        stretch.calibrate(*fitted, RATE_HZ, model="diagnosed")
-    assert issubclass(stretch.StretchError, ValueError)
+    with pytest.raises(stretch_gap.StretchError, match='"poly99" is not understood; use linear'):
+        stretch_gap.calibrate(*fitted, RATE_HZ, model="poly99")
+    with pytest.raises(stretch_gap.StretchError, match="either rate_hz"):
+        stretch_gap.calibrate(*fitted)
+    with pytest.raises(stretch_gap.StretchError, match="does not come after"):
+        stretch_gap.calibrate(*fitted, time_s=np.zeros(fitted[0].size))
+    with pytest.raises(stretch_gap.StretchError, match="this is no calibration that can be used"):
+        stretch_gap.Calibration.from_json('{"schema": 1}')
+    with pytest.raises(stretch_gap.StretchError, match="cannot read it"):
+        stretch_gap.Calibration.load("/nowhere/c.json")
+    with pytest.raises(stretch_gap.StretchError, match="no effect of the gauge"):
+        stretch_gap.calibrate(*fitted, RATE_HZ, model="diagnosed")
+    assert issubclass(stretch_gap.StretchError, ValueError)

@@ -2,7 +2,7 @@ import json
 
 import numpy as np
 import pytest
-import stretch
+import stretch_gap
 
 RATE_HZ = 100.0
 
@@ -38,11 +38,11 @@ def diagnose(simulator, length, **more):
         "output": "length_mm",
         "inputs": ["force_N"],
         "rate_hz": RATE_HZ,
-        "parameters": {"compliance": stretch.Parameter(2.0, relative=0.1, unit="mm/N")},
+        "parameters": {"compliance": stretch_gap.Parameter(2.0, relative=0.1, unit="mm/N")},
         "effects": {"bend": (-0.05, 0.05)},
         "wrap": ["output.backlash", "output.delay"],
     }
-    return stretch.diagnose(simulator, {"force_N": FORCE, "length_mm": length}, **{**question, **more})
+    return stretch_gap.diagnose(simulator, {"force_N": FORCE, "length_mm": length}, **{**question, **more})
 
 
 BENT = STIFFER + 0.02 * FORCE**2 + noise(FORCE.size)
@@ -65,7 +65,7 @@ def test_an_effect_of_the_users_own_is_named_with_its_value(bent):
 
 
 def test_what_was_found_is_shown_as_text_table_page_and_code(bent, tmp_path):
-    again = stretch.Diagnosis.from_json(bent.to_json())
+    again = stretch_gap.Diagnosis.from_json(bent.to_json())
     assert again.named == bent.named and again.probabilities == bent.probabilities
     assert json.loads(bent.to_json())["schema"] == 1
     assert list(bent.to_frame()["effects"])[0] == "bend"
@@ -149,17 +149,17 @@ def test_two_outputs_come_as_a_dict():
         "heat_W": 1.02 * np.array(slow) + noise(FORCE.size, 1),
     }
     stages = [
-        stretch.Stage("length_mm", ["force_N"], name="spring"),
-        stretch.Stage("heat_W", ["force_N"], name="heater"),
+        stretch_gap.Stage("length_mm", ["force_N"], name="spring"),
+        stretch_gap.Stage("heat_W", ["force_N"], name="heater"),
     ]
-    found = stretch.diagnose(
+    found = stretch_gap.diagnose(
         Both(),
         data,
         stages=stages,
         rate_hz=RATE_HZ,
         parameters={
-            "compliance": stretch.Parameter(2.0, 0.2, stages=["spring"]),
-            "loss": stretch.Parameter(1.0, 0.05, stages=["heater"]),
+            "compliance": stretch_gap.Parameter(2.0, 0.2, stages=["spring"]),
+            "loss": stretch_gap.Parameter(1.0, 0.05, stages=["heater"]),
         },
         wrap=["heat_W.lag", "length_mm.backlash"],
     )
@@ -172,20 +172,20 @@ def test_recordings_come_in_many_forms(bent):
     half = FORCE.size // 2
     parts = [
         {"force_N": FORCE[:half], "length_mm": BENT[:half]},
-        stretch.Trial({"force_N": FORCE[half:], "length_mm": BENT[half:]}, rate_hz=RATE_HZ, name="tuesday", test=True),
+        stretch_gap.Trial({"force_N": FORCE[half:], "length_mm": BENT[half:]}, rate_hz=RATE_HZ, name="tuesday", test=True),
     ]
     question = {
         "output": "length_mm",
         "inputs": ["force_N"],
         "parameters": {"compliance": (2.0, 0.2)},
-        "effects": {"bend": stretch.Argument(-0.05, 0.05, unit="mm/N2")},
+        "effects": {"bend": stretch_gap.Argument(-0.05, 0.05, unit="mm/N2")},
         "wrap": None,
     }
-    assert stretch.diagnose(Spring(), parts, rate_hz=RATE_HZ, **question).named == ["bend"]
+    assert stretch_gap.diagnose(Spring(), parts, rate_hz=RATE_HZ, **question).named == ["bend"]
     pandas = pytest.importorskip("pandas")
     time_s = np.arange(FORCE.size) / RATE_HZ
     frame = pandas.DataFrame({"time_s": time_s, "force_N": FORCE, "length_mm": BENT})
-    assert stretch.diagnose(Spring(), frame, **question).named == ["bend"]
+    assert stretch_gap.diagnose(Spring(), frame, **question).named == ["bend"]
 
 
 def test_what_the_simulator_raises_comes_out_as_it_is():
@@ -210,7 +210,7 @@ def test_values_that_are_refused_turn_the_fit_back():
         def simulate(self, params, effects):
             if np.any(effects["bend"] < -0.005):
                 self.refused += 1
-                raise stretch.Refused("bent the other way")
+                raise stretch_gap.Refused("bent the other way")
             return super().simulate(params, effects)
 
     careful = Careful()
@@ -230,7 +230,7 @@ def test_values_that_are_refused_turn_the_fit_back():
     ],
 )
 def test_answers_that_are_none_say_what_was_expected(answer, words):
-    with pytest.raises(stretch.StretchError, match=words):
+    with pytest.raises(stretch_gap.StretchError, match=words):
         diagnose(lambda params, effects: answer(params["compliance"] * FORCE), BENT)
 
 
@@ -243,19 +243,19 @@ def test_answers_that_are_none_say_what_was_expected(answer, words):
         ({"wrap": ["input.delay"]}, "must take the argument inputs"),
         ({"effects": {"bend": 0.3}}, "effect bend is 0.3; give"),
         ({"effects": {"bend": (0.05, -0.05)}}, "the range 0.05 to -0.05 is empty"),
-        ({"parameters": {"compliance": stretch.Parameter(0.0, relative=0.1)}}, "give an absolute tolerance"),
+        ({"parameters": {"compliance": stretch_gap.Parameter(0.0, relative=0.1)}}, "give an absolute tolerance"),
         ({"rate_hz": None}, "give either rate_hz"),
     ],
 )
 def test_bad_questions_are_refused_in_a_sentence(more, words):
-    with pytest.raises(stretch.StretchError, match=words):
+    with pytest.raises(stretch_gap.StretchError, match=words):
         diagnose(Spring(), BENT, **more)
-    with pytest.raises(stretch.StretchError, match="give an object with a method simulate"):
+    with pytest.raises(stretch_gap.StretchError, match="give an object with a method simulate"):
         diagnose(3, BENT)
 
 
 def test_a_dead_column_is_told_and_no_effect_is_blamed():
-    with pytest.raises(stretch.StretchError, match="dead"):
+    with pytest.raises(stretch_gap.StretchError, match="dead"):
         diagnose(Spring(), np.zeros_like(BENT))
 
 
@@ -322,17 +322,17 @@ def problem_file(tmp_path):
 
 
 def test_a_problem_that_is_a_file_takes_an_object_or_its_own_simulator(problem_file):
-    found = stretch.diagnose(Spring(), problem_file)
+    found = stretch_gap.diagnose(Spring(), problem_file)
     assert found.named == ["bend"]
     assert found.parameters["compliance"] == pytest.approx(2.1, rel=0.01)
-    own = stretch.diagnose(None, str(problem_file))
+    own = stretch_gap.diagnose(None, str(problem_file))
     assert own.named == ["bend"]
     names = {}
     exec(WORKER, names)
-    here = stretch.diagnose(names["Spring"](), problem_file)
+    here = stretch_gap.diagnose(names["Spring"](), problem_file)
     # the same object in another process: the same bits
     assert here.probabilities == own.probabilities and here.parameters == own.parameters
-    with pytest.raises(stretch.StretchError, match="says what is diagnosed"):
-        stretch.diagnose(Spring(), problem_file, output="length_mm")
-    with pytest.raises(stretch.StretchError, match="there is no simulator"):
-        stretch.diagnose(None, {"force_N": FORCE, "length_mm": BENT})
+    with pytest.raises(stretch_gap.StretchError, match="says what is diagnosed"):
+        stretch_gap.diagnose(Spring(), problem_file, output="length_mm")
+    with pytest.raises(stretch_gap.StretchError, match="there is no simulator"):
+        stretch_gap.diagnose(None, {"force_N": FORCE, "length_mm": BENT})

@@ -4,7 +4,7 @@ import inspect
 
 import numpy as np
 import pytest
-import stretch
+import stretch_gap
 from test_diagnosis import FORCE, RATE_HZ, STIFFER, diagnose, noise
 
 DT_S = 1.0 / RATE_HZ
@@ -74,7 +74,7 @@ def test_the_code_of_an_effect_is_the_effect(kind, hide, parameter, value):
 def test_a_diagnosis_from_text_has_equations_in_place_of_functions():
     found = diagnose(lambda params, effects: params["compliance"] * FORCE, late(STIFFER) + noise(FORCE.size), effects=None,
                      wrap=["output.delay"])  # fmt: skip
-    code = stretch.Diagnosis.from_json(found.to_json()).fix().code
+    code = stretch_gap.Diagnosis.from_json(found.to_json()).fix().code
     pasted = {}
     exec(code, pasted)
     assert pasted["output_delay"] == found.effects["output.delay"] and "y(t) = x(t - delay_s)" in code
@@ -83,14 +83,14 @@ def test_a_diagnosis_from_text_has_equations_in_place_of_functions():
 def test_friction_is_found_by_the_speed_at_which_it_rubs():
     speed = np.gradient(FORCE, DT_S)
     pull = 2.1 * FORCE + 1.5 * np.tanh(speed / 0.3)
-    found = stretch.diagnose(
+    found = stretch_gap.diagnose(
         lambda params, effects: params["stiffness"] * FORCE,
         {"travel_mm": FORCE, "pull_N": pull + noise(FORCE.size), "speed_mmps": speed},
         output="pull_N",
         inputs=["travel_mm"],
         velocity="speed_mmps",
         rate_hz=RATE_HZ,
-        parameters={"stiffness": stretch.Parameter(2.0, relative=0.1, unit="N/mm")},
+        parameters={"stiffness": stretch_gap.Parameter(2.0, relative=0.1, unit="N/mm")},
         wrap=["output.friction"],
     )
     assert found.named == ["output.coulomb_friction"]

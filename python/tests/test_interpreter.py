@@ -9,7 +9,7 @@ import threading
 import time
 
 import pytest
-import stretch
+import stretch_gap
 from conftest import RATE_HZ, recording
 
 
@@ -25,7 +25,7 @@ def test_other_threads_run_on_while_rust_works():
     other = threading.Thread(target=count)
     other.start()
     begun = time.monotonic()
-    stretch.calibrate(list(signals), list(angles), RATE_HZ, model="auto")
+    stretch_gap.calibrate(list(signals), list(angles), RATE_HZ, model="auto")
     ended = time.monotonic()
     done.set()
     other.join()
@@ -59,12 +59,12 @@ def interrupted(code, tmp_path):
 def test_ctrl_c_ends_a_calibration(tmp_path):
     code = """
         import pathlib, sys
-        import numpy as np, stretch
+        import numpy as np, stretch_gap
         time_s = np.arange(0, 600, 0.01)
         angle = 45 - 45 * np.cos(time_s + np.sin(0.3 * time_s))
         signal = np.interp(time_s - 0.05, time_s, angle)
         pathlib.Path(sys.argv[1]).touch()
-        stretch.calibrate(signal, angle, 100.0, model="auto")
+        stretch_gap.calibrate(signal, angle, 100.0, model="auto")
     """
     status, seconds, text = interrupted(code, tmp_path)
     assert "KeyboardInterrupt" in text and status != 0
@@ -76,12 +76,12 @@ def test_ctrl_c_ends_a_calibration(tmp_path):
 def test_ctrl_c_ends_a_simulator_that_hangs(tmp_path, inside):
     code = f"""
         import pathlib, sys, time
-        import numpy as np, stretch
+        import numpy as np, stretch_gap
         x = np.sin(np.arange(3000) * 0.02)
         def simulate(params, effects):
             pathlib.Path(sys.argv[1]).touch()
             {inside}
-        stretch.diagnose(simulate, {{"x": x, "y_mm": x}}, rate_hz=100.0, output="y_mm", parameters={{"a": (1.0, 0.1)}})
+        stretch_gap.diagnose(simulate, {{"x": x, "y_mm": x}}, rate_hz=100.0, output="y_mm", parameters={{"a": (1.0, 0.1)}})
     """
     status, seconds, text = interrupted(code, tmp_path)
     assert "KeyboardInterrupt" in text and "in simulate" in text and status != 0
@@ -98,7 +98,7 @@ def test_the_simulator_runs_on_the_thread_that_asked():
         threads.add(threading.get_ident())
         return params["a"] * x
 
-    stretch.diagnose(
+    stretch_gap.diagnose(
         simulate,
         {"x": x, "y_mm": 1.1 * x + 1e-3 * np.cos(np.arange(3000) ** 2)},
         rate_hz=100.0,

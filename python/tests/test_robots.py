@@ -1,4 +1,4 @@
-"""The robots of `docs/robots.md`, where their recordings are: STRETCH_DATA names the folder."""
+"""The robots of `book/src/results/robots.md`, where their recordings are: STRETCH_DATA names the folder."""
 
 from __future__ import annotations
 

@@ -24,13 +24,13 @@ use super::{
     causes,
     json::Json,
     long::Long,
-    reading::{Recorded, column, read_trials},
+    reading::{Recorded, column, read_trials, with_columns_to_name},
     shared::{detail, of_files, stage_text, tell},
 };
 
 /// Fit a calibration to logged trials
 ///
-/// Each trial is a recording (CSV in any dialect, NPZ, MAT, ...; docs/recordings.md) with the
+/// Each trial is a recording (CSV in any dialect, NPZ, MAT, ...) with the
 /// time, the signal and the reference, - is standard input; a folder with a dataset.toml stands for its fit trials. The
 /// record that is written holds all that `apply` or a board needs: surfaces,
 /// ranges, rate estimator, dead band, domain, and where it comes from.
@@ -270,9 +270,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         && is_plain(&options);
     let long = Long::of(&args.trials, &columns, is_plain)?;
     let trials = match &long {
-        Some(long) => long.beginnings()?,
-        None => read_trials(&args.trials, Split::Fit, &columns)?,
+        Some(long) => long.beginnings(),
+        None => read_trials(&args.trials, Split::Fit, &columns),
     };
+    let own = "name the columns of yours with --reference and --signal";
+    let trials = trials.map_err(|error| with_columns_to_name(error, own))?;
     // signals that are only candidates may be anything
     let named = [args.reference.as_str(), args.signal.as_str()];
     let (trials, gross_errors) = without_gross_errors(&trials, &named);

@@ -12,7 +12,7 @@ use super::{
 
 /// Bring a foreign log into the format of the other commands
 ///
-/// Reads any recording (CSV in any dialect, NPZ, MAT, ...; docs/recordings.md),
+/// Reads any recording (CSV in any dialect, NPZ, MAT, ...),
 /// takes the time from a column of seconds, milliseconds, microseconds or
 /// nanoseconds, renames and scales columns, and writes a trial:
 ///

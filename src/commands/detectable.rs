@@ -8,18 +8,26 @@ use stretch_problem::Reading;
 use stretch_report::limit_table;
 
 use super::{
-    diagnose::{open, told_on},
+    diagnose::{announce, open, told_on},
     diagnosis_text::table_text,
     json::Json,
     shared::{detail, say, spinner},
 };
 
 /// Diagnoses the data and shows the detection limits of the effects with some names, of all without a name.
-pub(super) fn run(data: &Path, names: &[String], json: &Json) -> anyhow::Result<()> {
+pub(super) fn run(
+    data: &Path,
+    names: &[String],
+    json: &Json,
+    allow_commands: bool,
+) -> anyhow::Result<()> {
     ensure!(data.exists(), "{}: there is no such file or folder", data.display());
     let bar = spinner();
     bar.set_message("reading; a simulator of your own is started");
-    let problem = open(data, &Reading { jobs: 1, ..Reading::default() })?;
+    let problem = open(
+        data,
+        &Reading { jobs: 1, allow_commands, announce: Some(announce), ..Reading::default() },
+    )?;
     detail(format!("read {}", data.display()));
     let options = Options { detection_limits: true, ..Options::default() };
     let stop = &stretch_files::interrupted;

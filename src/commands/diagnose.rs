@@ -21,7 +21,7 @@ use super::{
     reading::column,
     shared::{detail, say, say_first, spinner, stage_text, tell},
 };
-use crate::display::fail;
+use crate::display::{fail, is_quiet, is_verbose, warn};
 
 /// What is said where there are rivals, and still no experiment.
 const NOT_FORETOLD: &str =
@@ -50,6 +50,9 @@ const FAILED_ON: u8 = 3;
 ///
 ///   stretch diagnose problem.toml --jobs 4 --budget 400 --fix fixed.toml
 ///   stretch diagnose fixed.toml
+///
+/// A problem file is a program: its simulator runs with your rights. It runs where the file itself is
+/// named, not where its folder is, unless --allow-commands is given; what runs is said before it runs.
 ///
 /// In a laboratory's checks, where a rig must stay what its simulator says (exit status 3 where it does not):
 ///
@@ -108,6 +111,9 @@ pub(crate) struct Args {
     /// Workers of a simulator of your own that run at once, where its file does not say
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     jobs: u16,
+    /// Run the program that the problem.toml of a folder names; a problem.toml that is named itself runs its program without it
+    #[arg(long)]
+    allow_commands: bool,
     /// Most runs of a simulator of your own
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(20..))]
     budget: Option<u32>,
@@ -159,6 +165,8 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
         without: &args.without,
         jobs: args.jobs.into(),
         budget: args.budget.map(|n| n as usize),
+        allow_commands: args.allow_commands,
+        announce: Some(announce),
     };
     let problem = open(&args.data_set, &reading)?;
     if let Some(fix) = args.fix.as_deref().filter(|fix| problem.is_read_from(fix)) {
@@ -192,6 +200,11 @@ pub(super) fn open(path: &Path, reading: &Reading<'_>) -> anyhow::Result<Problem
         let error = anyhow::Error::from(error);
         if is_named { error } else { error.context(shown) }
     })
+}
+
+/// Says which program is going to run.
+pub(super) fn announce(program: &str) {
+    warn(program);
 }
 
 /// Tells what goes on: beside a bar, or with `-v` in lines.
@@ -241,8 +254,11 @@ fn conclude(args: &Args, examined: &Examined, problem: &Problem) -> anyhow::Resu
     Ok(())
 }
 
-/// The sentence, and everything behind it.
+/// The sentence, and everything behind it unless the program is to be quiet.
 pub(super) fn print(examined: &Examined) -> anyhow::Result<()> {
     say_first(&examined.diagnosis.sentence)?;
-    say(text(&examined.diagnosis, &examined.implementations))
+    if is_quiet() {
+        return Ok(());
+    }
+    say(text(&examined.diagnosis, &examined.implementations, is_verbose()))
 }

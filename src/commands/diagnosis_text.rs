@@ -17,8 +17,13 @@ const SLICES: usize = 8;
 /// Most candidates that are listed.
 const CANDIDATES: usize = 6;
 
-/// Everything behind the sentence: where, which, how far, and what to do next.
-pub(crate) fn text(diagnosis: &Diagnosis, implementations: &[Implementation]) -> String {
+/// Everything behind the sentence: where, which, how far, and what to do next; with every parameter that these data do not
+/// determine where `is_verbose` says so.
+pub(crate) fn text(
+    diagnosis: &Diagnosis,
+    implementations: &[Implementation],
+    is_verbose: bool,
+) -> String {
     let mut out = String::new();
     for one in implementations {
         put(&mut out, &format!("  {}: {}", one.name, one.words));
@@ -38,7 +43,7 @@ pub(crate) fn text(diagnosis: &Diagnosis, implementations: &[Implementation]) ->
     slices(&mut out, diagnosis);
     candidates(&mut out, diagnosis);
     parameters(&mut out, diagnosis);
-    identifiability(&mut out, diagnosis);
+    identifiability(&mut out, diagnosis, is_verbose);
     implement(&mut out, implementations);
     transfer(&mut out, diagnosis);
     baselines(&mut out, diagnosis);
@@ -196,21 +201,27 @@ fn parameters(out: &mut String, diagnosis: &Diagnosis) {
     put(out, &table(&header, rows));
 }
 
-/// Which nominal parameters the data determine, and what is wrong with the others.
-fn identifiability(out: &mut String, diagnosis: &Diagnosis) {
+/// How many nominal parameters the data determine, and with every detail what is wrong with the others.
+fn identifiability(out: &mut String, diagnosis: &Diagnosis, is_verbose: bool) {
     let all = &diagnosis.identifiability;
     if all.is_empty() {
         return;
     }
     let known = all.iter().filter(|p| p.knowledge == Knowledge::Determined).count();
+    let others: Vec<String> = all.iter().filter_map(stretch_gap::Identified::sentence).collect();
+    let more = if is_verbose || others.is_empty() {
+        ""
+    } else {
+        " -v says what is wrong with the others."
+    };
     put(
         out,
         &format!(
-            "\nOf {} nominal parameters these data determine {known} to a third of their tolerance or better.",
+            "\nOf {} nominal parameters these data determine {known} to a third of their tolerance or better.{more}",
             all.len()
         ),
     );
-    for sentence in all.iter().filter_map(stretch_gap::Identified::sentence) {
+    for sentence in others.iter().filter(|_| is_verbose) {
         put(out, &format!("- {sentence}"));
     }
 }

@@ -47,6 +47,9 @@ pub(crate) struct Args {
     /// List what would be named on these data instead: a folder with dataset.toml, a trial, or problem.toml
     #[arg(long, value_name = "DATASET", conflicts_with_all = ["kinds", "code"])]
     data: Option<PathBuf>,
+    /// Run the program that the problem.toml of a folder names; a problem.toml that is named itself runs its program without it
+    #[arg(long, requires = "data")]
+    allow_commands: bool,
     #[command(flatten)]
     json: Json,
     /// Print code with the typical numbers, for a record at 100 Hz
@@ -123,7 +126,7 @@ const CHANNEL: Extent = Extent::between(0.0, 1.0);
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     if let Some(data) = &args.data {
-        return detectable::run(data, &args.names, &args.json);
+        return detectable::run(data, &args.names, &args.json, args.allow_commands);
     }
     let chosen: Vec<Entry> = match (args.names.is_empty(), args.kinds) {
         (true, true) => KINDS.iter().copied().map(Entry::Kind).collect(),
@@ -190,9 +193,9 @@ fn range(p: &EffectParameter) -> String {
     let default = match p.role {
         Role::Strength { .. } => String::new(),
         Role::Form { usual } if usual != p.typical => {
-            format!(" (else {}, usually {})", number(p.typical), number(usual))
+            format!(" ({} unless given, usually {})", number(p.typical), number(usual))
         }
-        _ => format!(" (else {})", number(p.typical)),
+        _ => format!(" ({} unless given)", number(p.typical)),
     };
     let allowed = p.allowed();
     format!("{}: {} .. {}{unit}{default}", p.name, number(*allowed.start()), number(*allowed.end()))

@@ -3,13 +3,15 @@
 use std::path::PathBuf;
 
 use stretch_calibrate::{
-    Evaluation, MethodErrors, Reach, evaluate, not_its_own, read_calibration, worse_than_the_mean,
+    Evaluation, MethodErrors, Reach, beside_a_constant, evaluate, fitted_on, not_its_own,
+    read_calibration, worse_than_the_mean,
 };
 use stretch_data::Split;
 
 use super::{
     json::Json,
-    reading::{Recorded, read_trials},
+    pace::Pace,
+    reading::{Recorded, read_trials, with_columns_to_name},
     shared::{say, short_name},
 };
 use crate::display::warn;
@@ -48,17 +50,31 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         columns = columns.require(calibration.signal.as_str());
         columns = columns.require(calibration.reference.as_str());
     }
-    let trials = read_trials(&args.trials, Split::Test, &columns)?;
+    let renamed =
+        "a calibration needs the columns that it was fitted on: stretch convert renames columns";
+    let trials = read_trials(&args.trials, Split::Test, &columns)
+        .map_err(|error| with_columns_to_name(error, renamed))?;
     let named: Vec<_> = calibrations.iter().map(|(name, c)| (name.as_str(), c)).collect();
     let evaluation = evaluate(&named, &trials)?;
     // on standard error, so that a table and JSON are what they were
+    for (name, calibration) in &calibrations {
+        let paces = trials.iter().filter_map(|trial| {
+            let mut pace = Pace::of(calibration.sample_rate_hz.hz());
+            let told = trial.time_s.iter().find_map(|&time_s| pace.take(time_s))?;
+            Some(format!("{}: {told}", trial.name))
+        });
+        let doubts = paces.chain(fitted_on(calibration, &trials));
+        doubts.for_each(|doubt| warn(format!("stretch: {name}: {doubt}")));
+    }
     let own = evaluation.pooled.iter().filter(|errors| errors.method != "raw");
     for (errors, (_, calibration)) in own.zip(&calibrations) {
         let mut reach = Reach::of(calibration);
         let signals = trials.iter().filter_map(|trial| trial.channel(calibration.signal.as_str()));
         signals.flatten().for_each(|value| reach.take(*value));
         let outside = reach.doubt().or_else(|| not_its_own(errors.clamped, errors.samples));
-        for doubt in [outside, worse_than_the_mean(errors)].into_iter().flatten() {
+        for doubt in
+            [outside, worse_than_the_mean(errors), beside_a_constant(errors)].into_iter().flatten()
+        {
             warn(format!("stretch: {}: {doubt}", errors.method));
         }
     }
@@ -73,7 +89,7 @@ pub(super) fn print_errors(
 ) -> anyhow::Result<()> {
     let rmse = format!("RMSE {unit}").trim_end().to_owned();
     let header =
-        ["method", "average error %", "of reference %", &rmse, "RMSE %", "R^2", "lag s", "clamped"];
+        ["method", "average error %", "of reference %", &rmse, "RMSE %", "R^2", "lag s", "outside"];
     let row = |m: &MethodErrors| {
         vec![
             m.method.clone(),
@@ -101,7 +117,7 @@ pub(super) fn print(evaluation: &Evaluation) -> anyhow::Result<()> {
     }
     say(
         "Average error: mean |reference - estimate| over the range of the estimate (the paper's), and over that of the \
-         reference. Lag: positive when the estimate runs behind.",
+         reference. Lag: positive when the estimate runs behind. Outside: samples that the calibration had to hold at the ends of its range.",
     )?;
     if !evaluation.comparisons.is_empty() {
         let mean = format!("difference of mean error, {unit}");

@@ -153,6 +153,9 @@ fn cannot_record(path: Option<&Path>) -> String {
     format!("{}: cannot record there", path.unwrap_or(Path::new("")).display())
 }
 
+/// A tick of the board's clock, s.
+const TICK_S: f64 = 1e-3;
+
 /// From bytes to samples.
 struct Samples {
     decoder: Decoder,
@@ -162,6 +165,8 @@ struct Samples {
     /// The calibration here, on the board's codes.
     twin: Twin,
     status: Status,
+    /// The board's clock at the frame before, ms.
+    board_ms: Option<u32>,
 }
 
 impl Samples {
@@ -171,9 +176,17 @@ impl Samples {
             adc_bits: adc.spec().bits,
             ..Status::of(&twin.unit)
         };
-        // a record that does not say: a tick of the board's clock
-        let time_line = TimeLine::new(twin.period_s.unwrap_or(1e-3));
-        Self { decoder: Decoder::new(), time_line, begun: Instant::now(), adc, twin, status }
+        // for a record that does not say
+        let time_line = TimeLine::new(twin.period_s.unwrap_or(TICK_S));
+        Self {
+            decoder: Decoder::new(),
+            time_line,
+            begun: Instant::now(),
+            adc,
+            twin,
+            status,
+            board_ms: None,
+        }
     }
 
     fn take(&mut self, bytes: &[u8]) -> Vec<Sample> {
@@ -194,6 +207,10 @@ impl Samples {
             self.twin.reset();
         }
         let time_s = self.time_line.time_s(&event, self.begun.elapsed().as_secs_f64())?;
+        let is_same = self.board_ms.replace(frame.time_ms) == Some(frame.time_ms);
+        // above a thousand samples a second two of them share a millisecond
+        let is_slow = self.twin.period_s.is_some_and(|period_s| period_s >= TICK_S);
+        self.status.standing += u64::from(is_same && is_slow);
         let sample = Sample::new(time_s, frame, &self.adc);
         match frame.code {
             code if code < 0 => self.status.missing += 1,

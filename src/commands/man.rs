@@ -1,6 +1,9 @@
 //! `stretch man`: the help as man pages.
 
-use std::{fs, path::PathBuf};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use anyhow::{Context, ensure};
 use clap_mangen::Man;
@@ -23,15 +26,22 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, mut program: clap::Command) -> anyhow::Result<()> {
     let out = &args.out;
     ensure!(!is_standard_output(out), "-: pages are several files; name a folder");
-    fs::create_dir_all(out).with_context(|| format!("{}: cannot make it", out.display()))?;
     program.build();
     let mut pages = Vec::new();
     collect(&program, &mut pages)?;
+    let made = out.ancestors().take_while(|folder| !folder.exists() && *folder != Path::new(""));
+    let made: Vec<&Path> = made.collect();
+    fs::create_dir_all(out).with_context(|| format!("{}: cannot make it", out.display()))?;
     let mut outputs = Outputs::default();
-    for (name, page) in &pages {
-        outputs.file(out.join(format!("{name}.1")), |file| file.write_all(page))?;
+    let write = |(name, page): &(String, Vec<u8>)| {
+        outputs.file(out.join(format!("{name}.1")), |file| file.write_all(page))
+    };
+    let written = pages.iter().try_for_each(write).and_then(|()| outputs.keep());
+    if written.is_err() {
+        // folders that were made for nothing; one that holds something stays
+        made.iter().take_while(|folder| fs::remove_dir(folder).is_ok()).count();
     }
-    outputs.keep()?;
+    written?;
     tell(format!("wrote {}: {} pages, stretch.1 the first", out.display(), pages.len()))
 }
 

@@ -66,17 +66,23 @@ fn page() -> anyhow::Result<PathBuf> {
     if let Some(beside) = beside.filter(|file| file.is_file()) {
         return Ok(beside);
     }
-    let web = Path::new(env!("CARGO_MANIFEST_DIR")).join("web");
-    let script = web.join("build.sh");
-    if !script.is_file() {
+    let Some(web) = program.as_deref().and_then(sources) else {
         bail!(
-            "there is no page beside this program, and its source tree is gone: set STRETCH_PAGE to the folder that \
-             web/build.sh made (web/target/page), or put that folder beside the program as page"
+            "there is no page beside this program, and it does not stand in its source tree: set STRETCH_PAGE to the \
+             folder that web/build.sh made (web/target/page), or put that folder beside the program as page"
         );
-    }
+    };
+    let script = web.join("build.sh");
     warn("stretch: building the page, some minutes the first time");
     let built = Command::new(&script).status();
     let built = built.with_context(|| format!("{}: it could not be run", script.display()))?;
     ensure!(built.success(), "{}: it did not build the page", script.display());
     Ok(web.join("target/page").join(FILE))
+}
+
+/// The folder of the page's sources, where a program stands in the folder target of its source tree, as cargo builds it.
+fn sources(program: &Path) -> Option<PathBuf> {
+    let target = program.ancestors().find(|folder| folder.ends_with("target"))?;
+    let web = target.parent()?.join("web");
+    (target.join("CACHEDIR.TAG").is_file() && web.join("build.sh").is_file()).then_some(web)
 }

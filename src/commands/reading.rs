@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use stretch_data::{DataSet, Split, Trial};
+use stretch_data::{DataError, DataSet, Split, Trial};
 use stretch_recording::{ReadOptions, Recording, RecordingError, TimeUnit, tidy_column};
 
 use super::shared::progress;
@@ -87,6 +87,17 @@ pub(crate) fn with_notes_printed(Recording { trial, notes }: Recording) -> Trial
     let rate = trial.rate_hz().map_or(String::new(), |hz| format!(", {hz:.4} a second"));
     detail(format!("read {}: {} samples of {}{rate}", trial.name, trial.len(), names.join(", ")));
     trial
+}
+
+/// An error of reading, with what to do where a column that is needed has another name.
+pub(crate) fn with_columns_to_name(error: anyhow::Error, what_to_do: &str) -> anyhow::Error {
+    let missing = match error.downcast_ref() {
+        Some(RecordingError::Data(missing @ DataError::MissingColumn { .. })) => {
+            missing.to_string()
+        }
+        _ => return error,
+    };
+    anyhow::anyhow!("{missing}; {what_to_do}")
 }
 
 /// Reads trials from files; a folder with a `dataset.toml` stands for its

@@ -5,10 +5,13 @@ use std::{
     io::{self, Read},
     sync::{
         atomic::{AtomicBool, Ordering::SeqCst},
-        mpsc::{Receiver, RecvTimeoutError, channel},
+        mpsc::{Receiver, RecvTimeoutError, sync_channel},
     },
     time::Duration,
 };
+
+/// Pieces of standard input that may wait.
+const WAITING: usize = 64;
 
 static RECORDING: AtomicBool = AtomicBool::new(false);
 static ENDED: AtomicBool = AtomicBool::new(false);
@@ -44,7 +47,7 @@ impl RecordedInput {
     /// Reads standard input from now on.
     pub(crate) fn new() -> Self {
         RECORDING.store(true, SeqCst);
-        let (sender, pieces) = channel();
+        let (sender, pieces) = sync_channel(WAITING);
         // Reading blocks; the thread ends with the stream or with the program.
         std::thread::spawn(move || {
             let mut buffer = [0; 4096];

@@ -3,6 +3,7 @@
 mod api;
 mod dependencies;
 mod imports;
+mod packages;
 
 use std::{
     collections::BTreeMap,
@@ -202,4 +203,20 @@ fn a_public_item_that_goes_or_changes_is_seen() {
     ] {
         assert_ne!(list(&other), lines, "{other}");
     }
+}
+
+#[test]
+fn no_program_knows_the_folder_that_it_was_built_in() {
+    let crates = fs::read_dir(root().join("crates")).unwrap().map(|entry| entry.unwrap().path());
+    let mut knows = Vec::new();
+    for folder in crates.chain([root()]) {
+        for (path, text) in texts(&folder.join("src")) {
+            // tests come last in a file, and stay where they are built
+            let shipped = text.split("#[cfg(test)]").next().unwrap_or_default();
+            if shipped.contains("env!(\"CARGO_MANIFEST_DIR\")") {
+                knows.push(folder.join("src").join(path));
+            }
+        }
+    }
+    assert!(knows.is_empty(), "{knows:?}");
 }

@@ -1,5 +1,6 @@
 //! What the tests of the program share: a scratch folder, trials, running.
 
+pub(crate) mod packed;
 pub(crate) mod round_trip;
 pub(crate) mod written;
 

@@ -1,7 +1,7 @@
 //! What a diagnosis says once a known effect has been put into a measured record, beside what it said before.
 //!
 //! Eight records of a knitted sleeve on a knee, each with an unknown gap of its own; five effects, three strengths.
-//! `docs/injections.md` has the tables and says how to read them.
+//! `book/src/results/injections.md` has the tables and says how to read them.
 //!
 //! `cargo run --release --manifest-path challenge/Cargo.toml --example injections -- ../shared/data/knit_sleeve`
 

@@ -1,5 +1,8 @@
 //! Acceptance criteria: whether a calibration can be used, and whether a log belongs to the calibration.
 
+use stretch_core::{Calibration, Label};
+use stretch_data::Trial;
+
 use crate::{FitReport, MethodErrors};
 
 /// A fit that leaves this share of the reference's standard deviation explains nothing: the error of the mean of the
@@ -60,6 +63,32 @@ pub fn worse_than_the_mean(errors: &MethodErrors) -> Option<String> {
         format!(
             "it errs more than the mean of the reference would (R^2 {r_squared:.4}): this log does not belong to \
              that calibration, or its reference is not what was calibrated on"
+        )
+    })
+}
+
+/// A sentence for estimates that were held against a reference that stands still, where no R^2 tells how good they are.
+pub fn beside_a_constant(errors: &MethodErrors) -> Option<String> {
+    (!errors.r_squared.is_finite()).then(|| {
+        format!(
+            "the reference stands still, so that there is no R^2, and the estimate is off it by {:.4} on average: is the reference connected?",
+            errors.mae
+        )
+    })
+}
+
+/// A sentence for trials that have the names of those that a calibration was fitted on; `None` where none has. A record holds the names of
+/// its first trials, and not what was in them.
+pub fn fitted_on(calibration: &Calibration, trials: &[Trial]) -> Option<String> {
+    let is_fitted = |trial: &&Trial| {
+        let name = Label::truncated(&trial.name);
+        calibration.provenance.trials().any(|fitted| fitted == name.as_str())
+    };
+    let names: Vec<&str> = trials.iter().filter(is_fitted).map(|t| t.name.as_str()).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "it was fitted on {}: how good it is on other trials these do not tell; evaluate on trials that were held back",
+            names.join(", ")
         )
     })
 }

@@ -1,6 +1,6 @@
 //! Calibration records as files, in JSON for people or in postcard for a board. Both forms carry a seal.
 
-use std::{fs, path::Path};
+use std::path::Path;
 
 use serde::Serialize;
 use stretch_core::{Calibration, CalibrationSpec, Schema, record};
@@ -187,7 +187,7 @@ pub struct RecordSummary {
 /// # Errors
 /// As [`read_calibration`].
 pub fn describe_record(path: &Path) -> Result<RecordSummary, CalibrateError> {
-    if let Ok(bytes) = fs::read(path)
+    if let Ok(bytes) = read_whole(path)
         && let Some(receptor) = crate::BoardReceptor::new(&bytes)
         && let Ok(found) = record::seal(&bytes)
     {
@@ -197,9 +197,10 @@ pub fn describe_record(path: &Path) -> Result<RecordSummary, CalibrateError> {
     }
     let calibration = read_calibration(path)?;
     let is_sealed = if is_postcard(path) {
-        fs::read(path).is_ok_and(|bytes| matches!(record::seal(&bytes), Ok(Some(_))))
+        read_whole(path).is_ok_and(|bytes| matches!(record::seal(&bytes), Ok(Some(_))))
     } else {
-        fs::read_to_string(path).is_ok_and(|text| digest::split(&text).1.is_some())
+        read_whole(path)
+            .is_ok_and(|bytes| digest::split(&String::from_utf8_lossy(&bytes)).1.is_some())
     };
     let kind = format!("a calibration, {}", calibration.model.name());
     Ok(RecordSummary { kind, seal: calibration_seal(&calibration)?, is_sealed })

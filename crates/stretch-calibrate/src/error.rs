@@ -174,11 +174,25 @@ pub enum CalibrateError {
     #[error(transparent)]
     Log(Box<dyn std::error::Error + Send + Sync>),
     /// There is nothing to compare, because every sample was withheld.
-    #[error(
-        "{trial}: no sample has an estimate; it is shorter than the warm-up of the rate estimator"
-    )]
+    #[error("{trial}: no sample has an estimate; {}", why_withheld(*.rate_hz, *.expected_hz))]
     NothingEstimated {
         /// The trial.
         trial: String,
+        /// Samples a second of the trial.
+        rate_hz: f64,
+        /// Samples a second that the calibration is made for.
+        expected_hz: f64,
     },
+}
+
+/// Why no sample of a trial has an estimate. Samples that come more slowly than a calibration expects have lost samples between them, and the
+/// rate estimator begins anew at each.
+fn why_withheld(rate_hz: f64, expected_hz: f64) -> String {
+    if (rate_hz / expected_hz - 1.0).abs() > 0.05 {
+        format!(
+            "it has {rate_hz:.4} samples a second, and the calibration is made for {expected_hz}: bring it onto that rate (--grid {expected_hz})"
+        )
+    } else {
+        "it is shorter than the warm-up of the rate estimator".to_owned()
+    }
 }

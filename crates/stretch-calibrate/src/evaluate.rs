@@ -118,7 +118,7 @@ struct Estimates {
 ///
 /// # Errors
 /// [`CalibrateError::Data`] when a trial lacks signal or reference,
-/// [`CalibrateError::NothingEstimated`] for a trial shorter than the warm-up.
+/// [`CalibrateError::NothingEstimated`] for a trial shorter than the warm-up, or with fewer samples a second than the calibration expects.
 pub fn evaluate(
     calibrations: &[(&str, &Calibration)],
     trials: &[Trial],
@@ -136,12 +136,17 @@ pub fn evaluate(
         for (_, calibration) in calibrations {
             methods.push(estimates(calibration, trial)?);
         }
-        let period_s = 1.0 / sample_rate_hz(trial)?;
+        let rate_hz = sample_rate_hz(trial)?;
+        let period_s = 1.0 / rate_hz;
         let mut errors = Vec::new();
         for ((name, method), all) in names.iter().zip(&methods).zip(&mut pooled) {
             let tally = Tally::of(reference, method, period_s);
             all.merge(&tally);
-            let nothing = || CalibrateError::NothingEstimated { trial: trial.name.clone() };
+            let nothing = || CalibrateError::NothingEstimated {
+                trial: trial.name.clone(),
+                rate_hz,
+                expected_hz: first.sample_rate_hz.hz(),
+            };
             errors.push(tally.errors(name).ok_or_else(nothing)?);
         }
         tests.push(reference, &methods);

@@ -177,7 +177,7 @@ impl BoardReceptor {
 
     /// The receptor of a record in a file; `None` where the file cannot be read or holds no such record.
     pub fn read(path: &Path) -> Option<Self> {
-        Self::new(&std::fs::read(path).ok()?)
+        Self::new(&stretch_files::read_whole(path).ok()?)
     }
 
     /// Bits of the converter that the record was made for.

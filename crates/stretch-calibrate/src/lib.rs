@@ -37,7 +37,10 @@ mod rising;
 mod series;
 mod split;
 
-pub use acceptance::{explains_little, explains_nothing, not_its_own, worse_than_the_mean};
+pub use acceptance::{
+    beside_a_constant, explains_little, explains_nothing, fitted_on, not_its_own,
+    worse_than_the_mean,
+};
 pub use apply::{Applied, Faults, LiveReceptor, apply, pressure_column, rate_delay_s};
 pub use auto::{
     Judged, ModelChoice, ModelRow, candidate_models, choose_among, choose_model, judge_model,

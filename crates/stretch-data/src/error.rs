@@ -97,6 +97,16 @@ pub enum DataError {
         /// The rate asked for: that of the session's first trial.
         usual_hz: f64,
     },
+    /// A test trial whose samples are those of a trial that may be fitted.
+    #[error(
+        "{test} is to be tested on and holds the samples of {fit}, which is fitted: what was fitted on tests nothing; record another trial, or leave one of them out"
+    )]
+    FittedAndTested {
+        /// The trial that may be fitted.
+        fit: String,
+        /// The test trial.
+        test: String,
+    },
     /// A session in which no trial has two samples.
     #[error("no trial has two samples; give at least one recording")]
     NoSamples,

@@ -81,6 +81,26 @@ impl EvenTrial {
     }
 }
 
+/// Refuses a test trial that is one of those that may be fitted, whatever its name: the columns asked for are compared by their bits.
+fn check_splits(trials: &[SessionTrial], columns: &[&str]) -> Result<(), DataError> {
+    let is_same = |a: &SessionTrial, b: &SessionTrial| {
+        a.trial.len() == b.trial.len()
+            && !a.trial.is_empty()
+            && columns.iter().all(|name| {
+                let [a, b] = [a, b].map(|t| t.trial.channel(name).unwrap_or_default());
+                a.iter().map(|x| x.to_bits()).eq(b.iter().map(|x| x.to_bits()))
+            })
+    };
+    for test in trials.iter().filter(|t| t.split == Split::Test) {
+        let mut fitted = trials.iter().filter(|t| t.split == Split::Fit);
+        if let Some(fit) = fitted.find(|fit| is_same(fit, test)) {
+            let (fit, test) = (fit.trial.name.clone(), test.trial.name.clone());
+            return Err(DataError::FittedAndTested { fit, test });
+        }
+    }
+    Ok(())
+}
+
 /// Trials on one even grid, in the order of time: what simulation and diagnosis are driven by.
 ///
 /// ```
@@ -118,13 +138,14 @@ impl EvenSession {
     /// Parts of a trial with gaps begin where the trial's time says, and inherit its kind and split.
     ///
     /// # Errors
-    /// No trial, none with two samples, and as [`Trial::even`].
+    /// No trial, none with two samples, a test trial with the samples of one that may be fitted, and as [`Trial::even`].
     pub fn new(
         trials: &[SessionTrial],
         columns: &[&str],
         shortest: usize,
     ) -> Result<Self, DataError> {
         let rate_hz = trials.iter().find_map(|t| t.trial.rate_hz()).ok_or(DataError::NoSamples)?;
+        check_splits(trials, columns)?;
         // Stamps are rounded: a rate of 100 Hz is computed as 100.000000000002, and a count of samples would be one less.
         let whole = rate_hz.round();
         let is_whole = whole > 0.0 && (rate_hz / whole - 1.0).abs() < STAMPED;

@@ -156,7 +156,15 @@ pub fn ends<'a>(values: impl IntoIterator<Item = &'a f64>) -> (f64, f64) {
     values.into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)))
 }
 
+/// Steps over which the mean interval of stamps that come early and late is taken.
+const JITTERED_OVER: usize = 50;
+/// Standard deviation of the steps, in medians, above which single steps do not tell the interval.
+const JITTER: f64 = 0.1;
+
 /// Samples a second of rising time stamps; none for fewer than two.
+///
+/// It is the mean of the steps that skip no sample, shorter than 1.5 medians. Where stamps come early and late by much of a step, so that
+/// a step does not tell whether it skips a sample, it is the median over stretches of 50 steps.
 pub fn rate_of(time_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let middle = steps.len() / 2;
@@ -165,6 +173,16 @@ pub fn rate_of(time_s: &[f64]) -> Option<f64> {
         _ => *steps.select_nth_unstable_by(middle, f64::total_cmp).1,
     };
     let short = steps.iter().filter(|step| **step < 1.5 * median);
-    let (count, sum) = short.fold((0_u32, 0.0), |(count, sum), step| (count + 1, sum + step));
-    Some(f64::from(count) / sum).filter(|rate| rate.is_finite())
+    let (count, sum) = short.clone().fold((0_u32, 0.0), |(n, sum), step| (n + 1, sum + step));
+    let mean = sum / f64::from(count);
+    let variance = short.map(|step| (step - mean).powi(2)).sum::<f64>() / f64::from(count);
+    let over = JITTERED_OVER.min(time_s.len() / 2);
+    let rate = if variance > (JITTER * median).powi(2) && over > 1 {
+        let mut long: Vec<f64> = time_s.windows(over + 1).map(|w| w[over] - w[0]).collect();
+        let middle = long.len() / 2;
+        over as f64 / *long.select_nth_unstable_by(middle, f64::total_cmp).1
+    } else {
+        f64::from(count) / sum
+    };
+    Some(rate).filter(|rate| rate.is_finite())
 }

@@ -1,6 +1,8 @@
 //! Trials and sessions on an even grid.
 
-use stretch_data::{Channel, DataError, EvenSession, EvenSpec, SessionTrial, Split, Trial};
+use stretch_data::{
+    Channel, DataError, EvenSession, EvenSpec, SessionTrial, Split, Trial, rate_of,
+};
 
 const SPEC: EvenSpec =
     EvenSpec { rate_hz: 100.0, shortest: 10, bridged_s: 0.0, over_switches: true };
@@ -103,10 +105,11 @@ fn parts_that_are_too_short_are_left_out_and_counted() {
 
 #[test]
 fn a_session_keeps_order_split_and_pauses() {
-    let at = |start_s: f64, split| SessionTrial {
-        start_s,
-        split,
-        ..SessionTrial::new(trial(stamps(200)))
+    let at = |start_s: f64, split| {
+        let mut trial = trial(stamps(200));
+        // what is tested on is another trial
+        trial.channels[0].values[0] += if split == Split::Test { 1.0 } else { 0.0 };
+        SessionTrial { start_s, split, ..SessionTrial::new(trial) }
     };
     let starts = |s: &EvenSession| s.trials().iter().map(|t| t.start_s()).collect::<Vec<_>>();
     let late_first = [at(50.0, Split::Test), at(10.0, Split::Fit)];
@@ -119,4 +122,33 @@ fn a_session_keeps_order_split_and_pauses() {
     assert!((starts(&session)[1] - 17.0).abs() < ROUNDING, "{:?}", starts(&session));
     assert!(session.notes()[0].contains("pauses of 15 s"));
     assert!(matches!(EvenSession::new(&[], &["length_mm"], 10), Err(DataError::NoSamples)));
+}
+
+#[test]
+fn a_test_trial_with_the_samples_of_one_that_is_fitted_is_refused() {
+    let named = |name: &str, split| {
+        let trial = Trial { name: name.into(), ..trial(stamps(200)) };
+        SessionTrial { split, ..SessionTrial::new(trial) }
+    };
+    let of = |trials: &[SessionTrial]| EvenSession::new(trials, &["length_mm"], 10);
+    let (fit, copy) = (named("a", Split::Fit), named("b", Split::Test));
+    let told = of(&[copy.clone(), fit.clone()]).expect_err("a copy").to_string();
+    assert!(told.starts_with("b is to be tested on and holds the samples of a"), "{told}");
+    // one sample makes it another
+    let mut other = copy;
+    other.trial.channels[0].values[7] += 1e-9;
+    assert!(of(&[fit.clone(), other]).is_ok());
+    assert!(of(&[fit.clone(), fit]).is_ok());
+}
+
+#[test]
+fn stamps_that_jitter_have_the_rate_of_long_stretches_and_lost_samples_do_not_count() {
+    // the mean of the steps below 1.5 medians would be a rate of 141 Hz
+    let early_or_late = |i: u32| [0.0, 0.004, -0.004][(11 * i * i / 5 % 3) as usize];
+    let jittered = |i: u32| 0.01 * f64::from(i) + early_or_late(i);
+    let rate_hz = rate_of(&(0..3000).map(jittered).collect::<Vec<_>>()).expect("a rate");
+    assert!((rate_hz - 100.0).abs() < 0.5, "{rate_hz}");
+    let lost = stamps(3000).into_iter().enumerate().filter(|(i, _)| i % 5 != 0).map(|(_, t)| t);
+    let rate_hz = rate_of(&lost.collect::<Vec<_>>()).expect("a rate");
+    assert!((rate_hz - 100.0).abs() < 1e-6, "{rate_hz}");
 }

@@ -17,15 +17,17 @@ pub struct Swing {
     pub m: f64,
     /// Damping ratio, below 1.
     pub damping: f64,
+    /// Damping that grows with the speed, as a fluid's does: m y'' loses drag |y'| y', s over the signal's unit.
+    pub drag: f64,
 }
 
-/// A damped second-order oscillator driven at its foot: m^2 y'' = x - y - 2 damping m y', exact for an input that is
-/// linear between nodes. Remembers position, velocity and the last input.
+/// A damped second-order oscillator driven at its foot: m^2 y'' = x - y - 2 damping m y' - drag m |y'| y', without drag exact for an input
+/// that is linear between nodes; drag acts for half a step before and after the rest (Strang, doi 10.1137/0705041). Remembers position, velocity and the last input.
 ///
 /// ```
 /// use stretch_effects::{Grid, Operator, Oscillator, Span, Start, Swing};
 /// let grid = Grid::samples(0.001)?;
-/// let beam = Oscillator::new(Swing { m: 0.02, damping: 0.25 }, &grid);
+/// let beam = Oscillator::new(Swing { m: 0.02, damping: 0.25, drag: 0.0 }, &grid);
 /// let (mut cells, mut signal) = ([0.0; 3], vec![1.0; 2000]);
 /// beam.begin(Start::Settled, 0.0, &mut cells);
 /// beam.run(&Span::whole(&grid), &mut cells, &mut signal);
@@ -37,14 +39,16 @@ pub struct Swing {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Oscillator {
     swing: Swing,
-    /// For each piece of time: its length, and how position and velocity about the steady response go on.
+    /// Parts of a step: drag asks for more than one.
+    parts: usize,
+    /// For each piece of time: the length of a part, and how position and velocity about the steady response go on.
     steps: Vec<(f64, [f64; 4])>,
 }
 
 impl Oscillator {
     /// Of a natural frequency and a damping ratio on a grid.
     pub fn new(swing: Swing, grid: &Grid) -> Self {
-        let Swing { m, damping } = swing;
+        let Swing { m, damping, .. } = swing;
         let omega = libm::sqrt(1.0 - damping * damping) / m;
         let one = |h: f64| {
             let decay = libm::exp(-damping * h / m);
@@ -52,7 +56,9 @@ impl Oscillator {
             let turn = [cos + damping / m * sin, sin, -sin / (m * m), cos - damping / m * sin];
             (h, turn.map(|x| decay * x))
         };
-        Self { swing, steps: grid.steps().iter().map(|&h| one(h)).collect() }
+        let parts = if swing.drag == 0.0 { 1 } else { PARTS };
+        let steps = grid.steps().iter().map(|&h| one(h / parts as f64)).collect();
+        Self { swing, parts, steps }
     }
 }
 
@@ -72,19 +78,23 @@ impl Operator for Oscillator {
     }
 
     fn run(&self, span: &Span<'_>, cells: &mut [f64], signal: &mut [f64]) {
-        let Swing { m, damping } = self.swing;
+        let Swing { m, damping, drag } = self.swing;
         let [mut y, mut velocity, mut last] = [cells[0], cells[1], cells[2]];
         span.each(signal.len(), |step, i| {
             let x = signal[i];
             if let Some(step) = step {
                 let (h, [a, b, c, d]) = self.steps[step];
-                let slope = (x - last) / h;
+                let (rise, half) = ((x - last) / self.parts as f64, 0.5 * drag * h / m);
+                let slope = rise / h;
                 // The steady response to a ramp trails it by 2 damping m slope.
                 let trail = 2.0 * damping * m * slope;
-                let position = y - (last - trail);
-                let relative = velocity - slope;
-                y = x - trail + (a * position + b * relative);
-                velocity = slope + (c * position + d * relative);
+                for part in 0..self.parts {
+                    let from = last + part as f64 * rise;
+                    let position = y - (from - trail);
+                    let relative = dragged(velocity, half) - slope;
+                    y = from + rise - trail + (a * position + b * relative);
+                    velocity = dragged(slope + (c * position + d * relative), half);
+                }
             }
             last = x;
             signal[i] = y;
@@ -93,40 +103,76 @@ impl Operator for Oscillator {
     }
 }
 
+/// Parts of a step where there is drag.
+const PARTS: usize = 2;
+
+/// What drag leaves of a speed after a time: v' = -k |v| v is v/(1 + k |v| t), `kt` both together.
+fn dragged(speed: f64, kt: f64) -> f64 {
+    // Without drag the same bits.
+    if kt == 0.0 { speed } else { speed / (1.0 + kt * speed.abs()) }
+}
+
 /// A mass on a spring.
 pub static SECOND_ORDER_LAG: Kind = Kind {
     name: "second_order_lag",
     words: "it follows like a mass on a spring",
-    equation: "m_s^2 y'' = x - y - 2 damping m_s y'",
+    equation: "m_s^2 y'' = x - y - 2 damping m_s y' - drag m_s |y'| y'",
     usual: &[Side::Output],
     parameters: |e, _| {
         vec![
             EffectParameter::sized("m_s", "s", 0.0..=e.late_s()),
             EffectParameter::formed("damping", "1", 0.02..=0.95, 0.3).log(),
+            // As much damping at the quickest motion as the ratio can be.
+            EffectParameter::formed(
+                "drag",
+                "s",
+                0.0..=2.0 / e.quickest.max(f64::MIN_POSITIVE),
+                0.0,
+            ),
         ]
     },
-    starts: Some(|e| [0.03, 0.12, 0.4].map(|k| vec![k * e.late_s(), 0.3]).into()),
+    starts: Some(|e| [0.03, 0.12, 0.4].map(|k| vec![k * e.late_s(), 0.3, 0.0]).into()),
     operator: |v, _, grid| {
-        Box::new(Oscillator::new(Swing { m: v[0].max(1e-9), damping: v[1] }, grid))
+        Box::new(Oscillator::new(Swing { m: v[0].max(1e-9), damping: v[1], drag: v[2] }, grid))
     },
     sketch: Some(|v, _, signals| {
-        let body = "let w = sqrt(1 - DAMPING * DAMPING) / M
-            let sn = exp(-DAMPING * DT / M) * sin(w * DT) / w
-            let cs = exp(-DAMPING * DT / M) * cos(w * DT)
+        // Two parts of a step, as where there is drag.
+        let part = |from: &str, to: &str, k: usize| {
+            format!(
+                "let p{k} = s.at - {from} + trail
+            let q{k} = s.speed / (1 + half * abs(s.speed)) - slope
+            s.at = {to} - trail + (cs + DAMPING / M * sn) * p{k} + sn * q{k}
+            let v{k} = slope - sn / (M * M) * p{k} + (cs - DAMPING / M * sn) * q{k}
+            s.speed = v{k} / (1 + half * abs(v{k}))"
+            )
+        };
+        let body = format!(
+            "let w = sqrt(1 - DAMPING * DAMPING) / M
+            let h = DT / 2
+            let sn = exp(-DAMPING * h / M) * sin(w * h) / w
+            let cs = exp(-DAMPING * h / M) * cos(w * h)
             let slope = (x - s.last) / DT
             let trail = 2 * DAMPING * M * slope
-            let p = s.at - s.last + trail
-            let q = s.speed - slope
-            s.at = x - trail + (cs + DAMPING / M * sn) * p + sn * q
-            s.speed = slope - sn / (M * M) * p + (cs - DAMPING / M * sn) * q
+            let half = DRAG * h / (2 * M)
+            let middle = (s.last + x) / 2
+            {}
+            {}
             s.last = x
-            let y = s.at";
+            let y = s.at",
+            part("s.last", "middle", 1),
+            part("middle", "x", 2)
+        );
         let sketch = Sketch::of(signals.x.clone(), body).remembering(["at", "last"]);
         let unit = match &*signals.x.unit {
             "1" => "1/s".into(),
             unit => format!("{unit}/s"),
         };
-        let numbers = [("M", v[0], "s"), ("DAMPING", v[1], "1"), ("DT", signals.dt_s, "s")];
+        let numbers = [
+            ("M", v[0], "s"),
+            ("DAMPING", v[1], "1"),
+            ("DRAG", v[2], "s"),
+            ("DT", signals.dt_s, "s"),
+        ];
         sketch.cells(["speed"], unit, "0").with_all(&numbers)
     }),
     twins: &["lag", "delay", "skew"],

@@ -141,7 +141,11 @@ fn temporary_file(folder: &Path) -> io::Result<NamedTempFile> {
         // Narrowed by the umask, as for any new file.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
-    builder.tempfile_in(folder).map_err(without_path)
+    let file = builder.tempfile_in(folder).map_err(without_path)?;
+    // Held until the file has its name or its writer is gone, so that whoever clears up can tell the two; where files cannot
+    // be locked, nobody clears up.
+    let _ = file.as_file().try_lock();
+    Ok(file)
 }
 
 /// The folder that a path stands in.

@@ -37,6 +37,7 @@ use crate::{
         nothing_above::nothing_above,
         proposal::lacking,
         sentence::{Answer, cut_short, tell},
+        too_little::TooLittle,
     },
 };
 
@@ -221,6 +222,8 @@ struct Gathered {
     stabilities: Vec<EffectStability>,
     sanity: Sanity,
     location: Where,
+    /// Why the record carries no name, where it does not.
+    too_little: Option<TooLittle>,
 }
 
 /// Gathers the evidence: from here on test trials are read.
@@ -234,7 +237,7 @@ fn gather(task: Task<'_>, cause: Cause<'_>) -> Result<Gathered, GapError> {
     let (posterior, held) = posterior(problem, thresholds, &mut evidence, all, held);
     let (candidates, blocks): (Vec<Candidate>, Vec<_>) = held.into_iter().unzip();
     let stabilities = stabilities(problem, thresholds, &evidence, (&posterior, &blocks), seed);
-    let shares = shares(problem, &evidence, &found.best, eliminated, thresholds.null_excess)?;
+    let shares = shares(problem, &evidence, &found.best, eliminated)?;
     let sanity = Sanity::of(problem, &found.best, &evidence)?;
     (task.progress)("where the gap sits");
     let location = Where {
@@ -242,13 +245,23 @@ fn gather(task: Task<'_>, cause: Cause<'_>) -> Result<Gathered, GapError> {
         slices: localise::slices(problem.simulator(), &evidence, |s| &s.residual_retuned, seed),
         end_to_end: localise::end_to_end(&problem.compare.runs, &evidence)?,
     };
-    Ok(Gathered { evidence, posterior, candidates, shares, stabilities, sanity, location })
+    let about = problem.simulator().description();
+    let too_little = too_little(&evidence.roles, about.rows_used(), about.dt_s);
+    Ok(Gathered {
+        evidence,
+        posterior,
+        candidates,
+        shares,
+        stabilities,
+        sanity,
+        location,
+        too_little,
+    })
 }
 
 /// The verdict with its names.
 fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Result<Judged, GapError> {
     let Gathered { evidence, posterior, candidates, shares, sanity, .. } = gathered;
-    let about = cause.problem.simulator().description();
     let case = Case {
         gap: evidence.gap,
         posterior,
@@ -256,7 +269,7 @@ fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Result<Judge
         shares,
         sanity,
         is_record: !cause.gross.is_empty(),
-        too_little: too_little(&evidence.roles, about.rows_used(), about.dt_s),
+        too_little: gathered.too_little,
         is_short: is_short(&evidence.roles),
     };
     let best = &cause.found.best;
@@ -273,16 +286,15 @@ fn report(
     begun: &Stopwatch,
 ) -> Result<(Diagnosis, Evidence), GapError> {
     let (options, thresholds) = (task.options, &task.options.thresholds);
-    let Gathered { mut evidence, posterior, candidates, shares, stabilities, sanity, location } =
+    let Gathered { mut evidence, posterior, candidates, shares, stabilities, sanity, .. } =
         gathered;
+    let Gathered { location, too_little, .. } = gathered;
     let (simulator, runs) = (cause.problem.simulator(), &cause.problem.compare.runs);
     let partial = candidates.first().filter(|_| judged.kind == VerdictKind::Partial);
     let unexplained = partial.map(|first| unexplained(simulator, &evidence, first, options.seed));
     let is_quiet = matches!(judged.kind, VerdictKind::NoGap | VerdictKind::Parameters);
     let null_band = is_quiet.then(|| null_band(cause.problem, options.seed)).transpose()?;
-    let about = simulator.description();
-    let carries = too_little(&evidence.roles, about.rows_used(), about.dt_s).is_none();
-    let detection_limits = match carries && (is_quiet || options.detection_limits) {
+    let detection_limits = match too_little.is_none() && (is_quiet || options.detection_limits) {
         true => limits(task, searched)?,
         false => Vec::new(),
     };
@@ -328,7 +340,7 @@ fn report(
         tied: judged.naming.tied(),
         named: judged.naming.named,
         faint: judged.naming.faint,
-        least_share: thresholds.least_share,
+        least_gap: thresholds.least_gap,
         unexplained,
         proposed: judged.proposed,
         gross: cause.gross.to_vec(),

@@ -171,7 +171,7 @@ fn the_promised_keys_are_there() {
             "proposed",
             "simulations",
             "rows_used",
-            "least_share",
+            "least_gap",
         ],
     );
     keys(
@@ -200,7 +200,7 @@ fn an_older_diagnosis_is_read() {
     for key in [
         "tied",
         "faint",
-        "least_share",
+        "least_gap",
         "unexplained",
         "proposed",
         "gross",

@@ -36,7 +36,7 @@ fn the_limit_falls_with_the_rows() {
     }
 }
 
-/// A gap of less than a tenth of the noise's variance is none, however many rows show it.
+/// A gap of less than `least_gap` of the noise's variance is none, however many rows show it.
 #[test]
 fn a_gap_that_does_not_count_is_not_named_however_long_the_record() {
     let of = |times: usize| {

@@ -60,6 +60,21 @@ fn a_square_is_proposed_as_a_square() {
     assert!(is_near(term.coefficient, 0.3), "{}", proposed.equation);
 }
 
+/// A spring that stiffens on either side of where it is slack is one term, not a sine and a memory.
+#[test]
+fn a_cubic_about_zero_is_proposed_as_one_term() {
+    // Where the motion of this toy is zero, on the scale of terms.
+    const ZERO: f64 = 0.465;
+    for seed in 1..=3 {
+        let proposed = found(seed, |x| x.iter().map(|x| 2.0 * (x - ZERO).powi(3)).collect());
+        let [term] = &proposed.terms[..] else { panic!("{}", proposed.equation) };
+        let [Factor::Centred { signal: 0, at, power: 3 }] = term.form.factors[..] else {
+            panic!("{}", proposed.equation)
+        };
+        assert!(is_near(at, ZERO) && is_near(term.coefficient, 2.0), "{}", proposed.equation);
+    }
+}
+
 /// A thread: two turns over the range.
 #[test]
 fn a_sine_is_proposed_with_its_turns() {

@@ -205,13 +205,12 @@ fn a_factor_beyond_sensors_is_told_of_the_simulator() {
         let toy = Toy::of(&[Law::Lag]).may_lack(&Effect::ALL).off_by(&[0.5, -0.5]);
         let told =
             told(&toy.measured(3).rewritten(|_, y| y[0].iter_mut().for_each(|y| *y *= factor)));
-        let gross = found(&told, GrossKind::Scale, "y0");
+        let gross = found(&told, GrossKind::Factor, "y0");
         // The lag's own gain, within 5 %, takes part of it.
         approx::assert_relative_eq!(gross.factor.expect("a factor"), factor, max_relative = 0.1);
         assert!(
-            told.sentence.starts_with(
-                "Simulator and record are not in the same unit: the simulator's y0 is "
-            )
+            told.sentence
+                .starts_with("Simulator and record differ by a factor: the simulator's y0 is ")
         );
         assert_eq!(gross.units, None, "`u` is no unit that is known");
     }

@@ -11,9 +11,9 @@ use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, Simulator};
 use stretch_sim::Catalogue;
 
 use crate::{
-    black_box::{Agreed, BlackBox, Checked},
+    black_box::{Agreed, BlackBox, Checked, ONLY_BEHIND, Source},
     error::ProblemError,
-    file::{ProblemFile, SimulatorEntry},
+    file::{IN_FOLDER, ProblemFile, SimulatorEntry},
     fix::{Fix, NoFix},
     gauge::GaugeSimulator,
     implement::Implementation,
@@ -85,14 +85,20 @@ pub struct Reading<'a> {
     pub jobs: usize,
     /// Greatest number of runs of a simulator that is not built in.
     pub budget: Option<usize>,
+    /// Whether the program that the `problem.toml` of a folder names may run. A problem's file that is given by its own name
+    /// needs no such permission.
+    pub allow_commands: bool,
+    /// Hears in one line which program is going to run, before it runs.
+    pub announce: Option<fn(&str)>,
 }
 
 impl Problem {
     /// Reads a problem from a path: the folder of a data set, a trial of a gauge alone (`-` is standard input), or a problem's file. The
-    /// workers of a simulator that is not built in are started.
+    /// workers of a simulator that is not built in are started, where the path names the problem's file or [`Reading::allow_commands`] stands.
     ///
     /// # Errors
-    /// Files that cannot be read, names that stand for nothing, and options that mean nothing to the simulator.
+    /// Files that cannot be read, names that stand for nothing, options that mean nothing to the simulator, and a folder whose `problem.toml`
+    /// would run a program.
     pub fn read(path: &Path, reading: &Reading<'_>) -> Result<Self, ProblemError> {
         let Some(file) = ProblemFile::at(path)? else { return Self::built_in(path, reading) };
         let (data_set, rig, columns) = match &file.simulator {
@@ -153,8 +159,26 @@ impl Problem {
         file.budget = reading.budget.or(file.budget);
         let workers = file.workers(reading.jobs)?;
         let workers = workers.ok_or_else(|| ProblemError::Simulator("it is built in".into()))?;
-        let checked = Checked::new(file.load()?)?;
+        let program = workers.shown();
+        let inside = path.join(IN_FOLDER);
+        if path.is_dir() && !reading.allow_commands {
+            let inside = inside.display();
+            return Err(ProblemError::Simulator(format!(
+                "{inside}: it names a program to run ({program}), and a folder runs none; where you trust it, give the file itself, {inside}, or --allow-commands"
+            )));
+        }
+        if let Some(announce) = reading.announce {
+            let file = if path.is_dir() { &inside } else { path };
+            let folder = workers.folder.display();
+            announce(&format!("{} runs, in the folder {folder}: {program}", file.display()));
+        }
+        let spec = file.load()?;
+        let checked = Checked::new(spec.clone())?;
         let source = Workers::start(workers, checked.session())?;
+        let checked = match spec.only_behind().filter(|_| !source.takes_inputs()) {
+            Some(spec) => Checked::new(spec)?.noting(ONLY_BEHIND),
+            None => checked,
+        };
         let name = file.name.clone();
         let own = BlackBox::within(checked, Arc::new(source), file.budget).from_file(file);
         Ok(Self { name, source: Box::new(own), read: vec![path.to_owned()] })

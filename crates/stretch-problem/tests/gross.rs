@@ -384,7 +384,7 @@ fn an_error_is_told_though_rows_are_lost() {
     approx::assert_abs_diff_eq!(probability(&first), probability(&lost), epsilon = PROBABILITY);
 }
 
-/// The whole table, as it stands in docs/record.md.
+/// The whole table, as it stands in book/src/results/record.md.
 #[test]
 #[ignore = "forty diagnoses, minutes; ./ci.sh runs it"]
 fn no_error_is_given_the_name_of_an_effect() {

@@ -8,8 +8,9 @@ use stretch_problem::{
     Ask, BlackBox, Checked, Parameter, ProblemSpec, StageEntry, Tolerance, closure,
 };
 
-/// A first-order lag whose record is in `unit`, with 1 % of noise; the simulator answers `ratio` times as much.
-fn told(unit: &str, ratio: f64) -> Diagnosis {
+/// A first-order lag whose record is in `unit`, with 1 % of noise; the simulator answers `ratio` times as much, and its parameters have these
+/// tolerances.
+fn told(unit: &str, ratio: f64, tolerances: [f64; 2]) -> Diagnosis {
     const DT_S: f64 = 0.01;
     let lag = |gain: f64, tau: f64, u: &[f64]| -> Vec<f64> {
         let kept = (-DT_S / tau).exp();
@@ -20,12 +21,16 @@ fn told(unit: &str, ratio: f64) -> Diagnosis {
         };
         u.iter().map(&mut next).collect()
     };
+    // Parameters that may not move are right.
+    let true_value = |nominal: f64, other, tolerance| if tolerance > 0.0 { other } else { nominal };
+    let (true_gain, true_tau) =
+        (true_value(0.5, 0.51, tolerances[0]), true_value(0.1, 0.11, tolerances[1]));
     let mut random = RandomGenerator::new(7, 0);
     let time_s: Vec<f64> = (0..4000).map(|i| DT_S * f64::from(i)).collect();
     let command: Vec<f64> =
         time_s.iter().map(|t| 4.0 * (1.3 * t).sin() + (4.1 * t).cos()).collect();
     let noisy = |y: f64| y + 0.02 * random.gauss();
-    let output = lag(0.51, 0.11, &command).into_iter().map(noisy).collect();
+    let output = lag(true_gain, true_tau, &command).into_iter().map(noisy).collect();
     let channel = |name: &str, values| Channel { name: name.into(), values };
     let channels = vec![channel("command_V", command.clone()), channel("output", output)];
     let parameter = |name: &str, value, share| Parameter {
@@ -44,7 +49,10 @@ fn told(unit: &str, ratio: f64) -> Diagnosis {
             noise: Some(0.02),
             ..StageEntry::default()
         }],
-        parameters: vec![parameter("gain", 0.5, 0.03), parameter("tau", 0.1, 0.1)],
+        parameters: vec![
+            parameter("gain", 0.5, tolerances[0]),
+            parameter("tau", 0.1, tolerances[1]),
+        ],
         wrap: vec!["all".into()],
         trials: vec![SessionTrial::new(Trial { name: "a.csv".into(), time_s, channels })],
         ..ProblemSpec::default()
@@ -68,10 +76,23 @@ fn other_units_are_told_by_their_names() {
         ("m", 1e3, "mm for m"),
         ("mV", 1e-3, "V for mV"),
     ] {
-        let told = told(unit, ratio);
+        let told = told(unit, ratio, [0.03, 0.1]);
         assert_eq!(told.verdict, VerdictKind::Record, "{units}: {}", told.sentence);
         assert_eq!(told.gross[0].units.as_deref(), Some(units), "{}", told.sentence);
-        let begins = "Simulator and record are not in the same unit: the simulator's output is ";
+        let begins = "Simulator and record differ by a factor: the simulator's output is ";
         assert!(told.sentence.starts_with(begins), "{}", told.sentence);
+    }
+}
+
+/// Where no parameter may move a factor is no more the sensor's than the simulator's.
+#[test]
+fn a_factor_beside_parameters_without_tolerance_is_told_as_a_factor() {
+    for (ratio, says) in [(0.8, "0.8"), (1.25, "1.25")] {
+        let told = told("rad/s", ratio, [0.0, 0.0]);
+        assert_eq!(told.verdict, VerdictKind::Record, "{}", told.sentence);
+        let begins =
+            format!("Simulator and record differ by a factor: the simulator's output is {says}");
+        assert!(told.sentence.starts_with(&begins[..begins.len() - 1]), "{}", told.sentence);
+        assert!(told.sentence.contains("tolerances"), "{}", told.sentence);
     }
 }

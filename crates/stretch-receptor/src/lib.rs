@@ -29,3 +29,8 @@ pub use observer::ObserverReceptor;
 pub use one::Receptor;
 pub use reading::{Domain, Reading, Withheld};
 pub use receptor::{BlendedReceptor, StretchReceptor};
+
+/// The Rust of the tutorial for firmware, which runs as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../../../book/src/tutorials/firmware.md")]
+struct FirmwareTutorial;

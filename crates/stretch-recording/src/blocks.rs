@@ -100,7 +100,7 @@ fn table(path: &Path) -> Result<Option<Table>, RecordingError> {
         Format::Text => Some((Box::new(all), file)),
         #[cfg(feature = "gzip")]
         Format::Gzip => {
-            let mut reader = flate2::read::MultiGzDecoder::new(all);
+            let mut reader = crate::room::Unpacked::new(all).0;
             let (head, format) = sniff::head(&mut reader, &file)?;
             let is_text = format == Format::Text;
             is_text.then(|| (Box::new(Cursor::new(head).chain(reader)) as Box<dyn Read>, file))

@@ -153,6 +153,18 @@ pub enum RecordingError {
         /// The rate as it was read.
         rate_hz: f64,
     },
+    /// A grid that has many more instants than were recorded.
+    #[error(
+        "{file}: a grid of {rate_hz} Hz has {:.1e} instants in its {span_s} s, many times what was recorded; give a lower rate with --grid, or split the recording at the gap in its time", .rate_hz * .span_s
+    )]
+    Grid {
+        /// The file.
+        file: String,
+        /// The grid's rate.
+        rate_hz: f64,
+        /// How long the recording lasts.
+        span_s: f64,
+    },
     /// Whole numbers in a column of seconds that count something shorter.
     #[error("{file}, column {column}: its times are whole numbers, {step} from sample to sample: that is {rate_hz} samples a second if they are seconds and {} if they are milliseconds; say which with --time-unit s or ms, or rename it {column_ms}", 1e3 * .rate_hz)]
     WholeSeconds {

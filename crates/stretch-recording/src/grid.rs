@@ -6,6 +6,7 @@ use crate::{
     ReadOptions, Recording, RecordingError,
     clock::{EPOCH_S, told_epoch},
     names::tidy,
+    room::Room,
     text::columns::KNOWN,
 };
 
@@ -177,7 +178,8 @@ fn timed(
     let mut timed = Vec::new();
     for Track { clock, counts, per_second, channels } in tracks {
         let from = origin.0 * (per_second / origin.1);
-        let time_s: Vec<f64> = counts.iter().map(|count| (count - from) / per_second).collect();
+        let mut time_s = counts;
+        time_s.iter_mut().for_each(|t| *t = (*t - from) / per_second);
         let place =
             |i: usize| Place { file: file.to_owned(), row: i as u64 + 1, column: clock.clone() };
         if let Some(i) = time_s.iter().position(|t| !t.is_finite()) {
@@ -227,7 +229,18 @@ fn on_one_grid(
     let own = fastest(timed);
     let mut time_s: Vec<f64> = match grid_hz {
         None => timed[own].time_s.iter().copied().filter(|t| (from_s..=to_s).contains(t)).collect(),
-        Some(rate_hz) => even(from_s, to_s, rate_hz, file)?,
+        Some(rate_hz) => {
+            let columns = 1 + timed.iter().map(|t| t.channels.len()).sum::<usize>();
+            let own = timed.iter().map(|t| t.time_s.len() * (1 + t.channels.len())).sum::<usize>();
+            let count = ((to_s - from_s) * rate_hz).max(0.0) * columns as f64;
+            let mut room = Room::beside((own * size_of::<f64>()) as u64);
+            room.take_numbers(count as usize).map_err(|_| RecordingError::Grid {
+                file: file.to_owned(),
+                rate_hz,
+                span_s: to_s - from_s,
+            })?;
+            even(from_s, to_s, rate_hz, file)?
+        }
     };
     let before = time_s.len();
     for track in timed {
@@ -254,7 +267,7 @@ fn on_one_grid(
 
 fn even(from_s: f64, to_s: f64, rate_hz: f64, file: &str) -> Result<Vec<f64>, RecordingError> {
     let count = ((to_s - from_s) * rate_hz + 1e-6).floor();
-    if !(1e-3..=1e7).contains(&rate_hz) || count > 1e9 {
+    if !(1e-3..=1e7).contains(&rate_hz) {
         let (file, column) = (file.to_owned(), "grid".to_owned());
         return Err(RecordingError::Rate { file, column, rate_hz });
     }

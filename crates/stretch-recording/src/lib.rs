@@ -15,6 +15,7 @@ mod options;
 mod parquet;
 mod read;
 mod recording;
+mod room;
 mod sniff;
 mod stamps;
 mod text;

@@ -17,11 +17,12 @@ use crate::{
     clock::time_among,
     grid::{Track, note},
     options::TIME,
+    room::Room,
 };
 
 /// Reads a file's columns, those without a value as NaN.
 pub(crate) fn read(
-    bytes: Vec<u8>,
+    (bytes, mut room): (Vec<u8>, Room),
     file: &str,
     options: &ReadOptions,
 ) -> Result<(Vec<Track>, Vec<String>), RecordingError> {
@@ -39,10 +40,16 @@ pub(crate) fn read(
             other.push(format!("{name} (lists)"));
             continue;
         }
+        room.take_numbers(rows).map_err(fail)?;
         let mut values = Vec::new();
         let mut is_number = true;
         for group in 0..reader.num_row_groups() {
             let group = reader.get_row_group(group).map_err(broken)?;
+            // more rows than the file says it has are no rows of it
+            let its_rows = usize::try_from(group.metadata().num_rows()).unwrap_or(usize::MAX);
+            if its_rows > rows - values.len().min(rows) {
+                return Err(fail("its groups hold more rows than the file; write it again".into()));
+            }
             is_number &= numbers(group.as_ref(), i, &column, &mut values).map_err(broken)?;
         }
         if !is_number || values.len() != rows {

@@ -6,7 +6,12 @@ use std::{
     path::Path,
 };
 
-use crate::{ReadOptions, Recording, RecordingError, clock, grid, sniff, sniff::Format, text};
+use crate::{
+    ReadOptions, Recording, RecordingError, clock, grid, room::Packed, sniff, sniff::Format, text,
+};
+
+#[cfg(feature = "gzip")]
+use crate::room::Unpacked;
 
 impl Recording {
     /// Reads a recording from a file, `-` being standard input.
@@ -52,7 +57,7 @@ impl Recording {
         options: &ReadOptions,
     ) -> Result<Self, RecordingError> {
         let (head, format) = sniff::head(&mut reader, name)?;
-        Self::read_format(format, &mut Cursor::new(head).chain(reader), name, options)
+        Self::read_format(format, &mut Cursor::new(head).chain(reader), name, options, None)
     }
 
     /// Whether a stream that begins so is a table of text, whose rows can be read as they come.
@@ -65,14 +70,15 @@ impl Recording {
         reader: &mut dyn Read,
         name: &str,
         options: &ReadOptions,
+        packed: Option<&Packed>,
     ) -> Result<Self, RecordingError> {
         if format == Format::Gzip {
             return Self::unpacked(reader, name, options);
         }
         let (mut recording, time) = match format {
-            Format::Text => text::read(reader, name, options)?,
+            Format::Text => text::read(reader, name, options, packed)?,
             other => {
-                let (tracks, notes) = other.tracks(reader, name, options)?;
+                let (tracks, notes) = other.tracks(reader, name, options, packed)?;
                 grid::merged(name, tracks, notes, options)?
             }
         };
@@ -89,13 +95,14 @@ impl Recording {
         name: &str,
         options: &ReadOptions,
     ) -> Result<Self, RecordingError> {
-        let mut reader = flate2::read::MultiGzDecoder::new(reader);
+        let (mut reader, packed) = Unpacked::new(reader);
         let (head, format) = sniff::head(&mut reader, name)?;
         if format == Format::Gzip {
             let problem = "it is packed twice; unpack it once with gunzip".to_owned();
             return Err(RecordingError::Format { file: name.to_owned(), format: "gzip", problem });
         }
-        Self::read_format(format, &mut Cursor::new(head).chain(reader), name, options)
+        let all = &mut Cursor::new(head).chain(reader);
+        Self::read_format(format, all, name, options, Some(&packed))
     }
 
     #[cfg(not(feature = "gzip"))]

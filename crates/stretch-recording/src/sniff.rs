@@ -2,7 +2,11 @@
 
 use std::io::Read;
 
-use crate::{ReadOptions, RecordingError, grid::Track};
+use crate::{
+    ReadOptions, RecordingError,
+    grid::Track,
+    room::{self, Packed},
+};
 
 /// Bytes that tell every format apart: HDF5 behind the header of a MAT file begins at 512.
 const HEAD_BYTES: usize = 520;
@@ -69,26 +73,31 @@ impl Format {
         reader: &mut dyn Read,
         file: &str,
         options: &ReadOptions,
+        packed: Option<&Packed>,
     ) -> Result<(Vec<Track>, Vec<String>), RecordingError> {
         let off = |format, feature| -> Result<(Vec<Track>, Vec<String>), RecordingError> {
             Err(RecordingError::Feature { file: file.to_owned(), format, feature })
         };
         let mut whole = || {
-            let mut bytes = Vec::new();
-            let read = reader.read_to_end(&mut bytes);
-            read.map(|_| bytes).map_err(|e| RecordingError::io(file, "read it", e))
+            let read = room::whole(reader, packed);
+            let read = read.map_err(|e| RecordingError::io(file, "read it", e))?;
+            read.map_err(|problem| RecordingError::Format {
+                file: file.to_owned(),
+                format: "file",
+                problem,
+            })
         };
         match self {
             #[cfg(feature = "npz")]
-            Self::Npy => crate::arrays::npy::read(&whole()?, file, options),
+            Self::Npy => crate::arrays::npy::read(whole()?, file, options),
             #[cfg(feature = "npz")]
             Self::Npz => crate::arrays::npy::read_archive(whole()?, file, options),
             #[cfg(feature = "mat")]
-            Self::Mat => crate::arrays::mat::read(&whole()?, file, options),
+            Self::Mat => crate::arrays::mat::read(whole()?, file, options),
             #[cfg(feature = "hdf5")]
             Self::Hdf5 => crate::arrays::hdf5::read(whole()?, file, options),
             #[cfg(feature = "mcap")]
-            Self::Mcap => crate::mcap::read(&whole()?, file, options),
+            Self::Mcap => crate::mcap::read(whole()?, file),
             #[cfg(feature = "parquet")]
             Self::Parquet => crate::parquet::read(whole()?, file, options),
             #[cfg(not(feature = "npz"))]

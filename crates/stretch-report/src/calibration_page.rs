@@ -62,8 +62,9 @@ pub fn calibration_page(judged: &Judged<'_>) -> String {
 pub(crate) fn calibration_sections(page: &mut Page, subject: &Judged<'_>) {
     let Judged { calibrated, evaluation, context } = *subject;
     let names = method_names(calibrated, evaluation);
-    judged(page, evaluation, &names, context);
+    // the picture first: what the numbers below it mean is seen there
     over_time(page, evaluation, &names);
+    judged(page, evaluation, &names, context);
     errors(page, evaluation, &names);
     shapes(page, calibrated, &evaluation.unit);
     fits(page, calibrated, context);
@@ -95,9 +96,9 @@ pub(crate) fn calibration_verdict(judged: &Judged<'_>) -> String {
         (_, Some(name)) => format!("{name} calibration"),
         (method, None) => method.to_owned(),
     };
+    // beside the best one the signal itself says enough; the table has the others
     let others: Vec<String> = (0..methods.len())
-        .rev()
-        .filter(|i| *i != best)
+        .filter(|i| *i != best && methods[*i].method == RAW)
         .map(|i| format!("the {} by {}", called(i), short(&methods[i])))
         .collect();
     let judged = &evaluation.trials;

@@ -1,5 +1,7 @@
 //! The report of a demonstration: a calibration, and the diagnosis of the difference between simulator and rig.
 
+use stretch_data::listed;
+
 use super::{
     calibration_page::{Judged, calibration_sections, calibration_verdict},
     diagnosis_page::{diagnosis_sections, diagnosis_title},
@@ -8,9 +10,19 @@ use super::{
     subject::Subject,
 };
 
+/// What the diagnosis names, for the top of the page: the rest stands where its part begins.
+fn headline(subject: &Subject<'_>) -> String {
+    let named: Vec<&str> = subject.implementations.iter().map(|one| one.words.as_str()).collect();
+    match named.as_slice() {
+        [] => diagnosis_verdict(subject),
+        named => format!("What the simulator lacks: {}.", listed(named)),
+    }
+}
+
 /// Both reports as one HTML file; each part has the content of its own page.
 pub fn demo_page(judged: &Judged<'_>, subject: &Subject<'_>) -> String {
-    let mut page = Page::new(&judged.context.title, &calibration_verdict(judged));
+    let both = format!("{} {}", calibration_verdict(judged), headline(subject));
+    let mut page = Page::new(&judged.context.title, &both);
     calibration_sections(&mut page, judged);
     page.part(&diagnosis_title(subject), &diagnosis_verdict(subject));
     diagnosis_sections(&mut page, subject);

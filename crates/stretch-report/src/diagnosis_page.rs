@@ -77,9 +77,10 @@ fn seen(page: &mut Page, subject: &Subject<'_>) {
             "{}: {} in {}, the eight seconds with the largest gap.",
             spec.name, spec.channel, shown.name
         );
+        // curves that nearly coincide show less than what is left between them
+        let left = "What is left, in multiples of the noise: within two of them it is noise.";
+        page.figure(&below, left);
         page.figure(&top, &caption);
-        let caption = "What is left, in multiples of the noise: within two of them it is noise.";
-        page.figure(&below, caption);
         if let Some(turned) = turn_figure(subject, stage, &shown) {
             page.figures(&[(turned, TURNED.to_owned())]);
         }

@@ -3,7 +3,7 @@
 use sha2::{Digest, Sha256};
 
 /// The script behind the figures.
-const SCRIPT: &str = include_str!("../../../web/report/report.js");
+const SCRIPT: &str = include_str!("report.js");
 
 /// The whole text of the element, which is a CDATA section in XML and a program between comments in HTML.
 fn text() -> String {

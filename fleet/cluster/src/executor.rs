@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use anyhow::{Context, anyhow};
+use anyhow::{Context, anyhow, ensure};
 use ballista_core::{
     config::TaskSchedulingPolicy,
     registry::BallistaFunctionRegistry,
@@ -12,7 +12,7 @@ use ballista_executor::executor_process::{ExecutorProcessConfig, start_executor_
 
 use crate::{
     codec::{Marked, Release},
-    ports::{chosen, say},
+    ports::{address, address_towards, before_port, chosen, guard, say},
 };
 
 /// What an executor is started with.
@@ -22,12 +22,15 @@ pub struct ExecutorOptions {
     /// The scheduler: host:port.
     #[arg(long, default_value = "127.0.0.1:50050")]
     pub scheduler: String,
-    /// Address to listen on.
-    #[arg(long, default_value = "127.0.0.1")]
-    pub bind_host: String,
-    /// Host under which other machines reach this one, where it is not the address.
+    /// Address to listen on; that under which the scheduler sees this machine where there is none.
+    #[arg(long)]
+    pub bind_host: Option<String>,
+    /// Host under which other machines reach this one, where it is not that address.
     #[arg(long)]
     pub external_host: Option<String>,
+    /// Allow an address that other machines reach, though nobody is asked who they are.
+    #[arg(long)]
+    pub insecure: bool,
     /// Port on which others fetch results; 0 is a free one.
     #[arg(long, default_value_t = 0)]
     pub port: u16,
@@ -49,7 +52,8 @@ pub struct ExecutorOptions {
 /// Runs an executor until it is stopped. Waits up to a minute for its scheduler.
 ///
 /// # Errors
-/// A scheduler that does not answer, a port that is taken.
+/// A scheduler that does not answer, a port that is taken, an address that other machines reach without
+/// [`insecure`](ExecutorOptions::insecure), one that they do not reach where the scheduler would send them.
 pub async fn run_executor(options: ExecutorOptions) -> anyhow::Result<()> {
     let (host, port) = options
         .scheduler
@@ -59,8 +63,18 @@ pub async fn run_executor(options: ExecutorOptions) -> anyhow::Result<()> {
     let scheduler_port: u16 = port
         .parse()
         .with_context(|| format!("--scheduler {}: {port} is no port", options.scheduler))?;
-    let port = chosen(&options.bind_host, options.port)?;
-    let shown = options.external_host.as_ref().unwrap_or(&options.bind_host);
+    let seen_as = address_towards(host, scheduler_port)?;
+    let listens_on = options.bind_host.as_deref().map_or(Ok(seen_as), address)?;
+    guard("executor", listens_on, options.insecure)?;
+    // what others are told must be where it listens
+    ensure!(
+        options.external_host.is_some() || !listens_on.is_loopback() || seen_as.is_loopback(),
+        "--bind-host {listens_on}: no other machine reaches it there, and the scheduler at {host} would send them; leave it out, \
+         or name --external-host"
+    );
+    let own = if listens_on.is_unspecified() { seen_as } else { listens_on };
+    let shown = options.external_host.unwrap_or_else(|| before_port(own));
+    let port = chosen(listens_on, options.port)?;
     let mut release = Release::own(format!("executor {shown}:{port}"));
     if let Some(version) = options.claim_release {
         release.version = version;
@@ -77,9 +91,9 @@ pub async fn run_executor(options: ExecutorOptions) -> anyhow::Result<()> {
     let work_dir = options.work_dir.unwrap_or_else(|| temporary.path().to_owned());
     let defaults = ExecutorProcessConfig::default();
     let config = ExecutorProcessConfig {
-        grpc_port: chosen(&options.bind_host, 0)?,
-        bind_host: options.bind_host,
-        external_host: options.external_host,
+        grpc_port: chosen(listens_on, 0)?,
+        bind_host: before_port(listens_on),
+        external_host: Some(shown),
         port,
         scheduler_host: host.to_owned(),
         scheduler_port,

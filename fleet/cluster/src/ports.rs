@@ -3,13 +3,60 @@
 use std::{
     fmt,
     io::{self, Write},
-    net::TcpListener,
+    net::{IpAddr, Ipv4Addr, Ipv6Addr, TcpListener, ToSocketAddrs, UdpSocket},
 };
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
+
+/// The address of a host.
+pub(crate) fn address(host: &str) -> anyhow::Result<IpAddr> {
+    let host = host.trim_start_matches('[').trim_end_matches(']');
+    let found = (host, 0).to_socket_addrs().with_context(|| format!("{host} is no address"))?;
+    let found = found.min_by_key(|address| address.is_ipv6());
+    Ok(found.with_context(|| format!("{host} has no address"))?.ip())
+}
+
+/// An address as it stands before a port.
+pub(crate) fn before_port(address: IpAddr) -> String {
+    match address {
+        IpAddr::V4(address) => address.to_string(),
+        IpAddr::V6(address) => format!("[{address}]"),
+    }
+}
+
+/// The address under which this machine is seen from another one; nothing is sent.
+pub(crate) fn address_towards(host: &str, port: u16) -> anyhow::Result<IpAddr> {
+    let to = address(host)?;
+    let any: IpAddr = match to {
+        IpAddr::V4(_) => Ipv4Addr::UNSPECIFIED.into(),
+        IpAddr::V6(_) => Ipv6Addr::UNSPECIFIED.into(),
+    };
+    let told = || format!("no way leads from this machine to {to}");
+    let socket = UdpSocket::bind((any, 0)).with_context(told)?;
+    socket.connect((to, port)).with_context(told)?;
+    Ok(socket.local_addr().with_context(told)?.ip())
+}
+
+/// Refuses to listen where other machines reach this one unless that was asked for, and says loudly what it means.
+pub(crate) fn guard(who: &str, listens_on: IpAddr, is_insecure: bool) -> anyhow::Result<()> {
+    if listens_on.is_loopback() {
+        return Ok(());
+    }
+    ensure!(
+        is_insecure,
+        "a {who} on {listens_on} obeys everybody who reaches it: nothing is encrypted, nobody is asked who they are, and queries \
+         read and write files as this user. Listen on 127.0.0.1, or give the cluster a network of its own and say --insecure"
+    );
+    // there is nobody to tell where even this cannot be written
+    let _ = writeln!(
+        io::stderr().lock(),
+        "WARNING: INSECURE: this {who} on {listens_on} obeys everybody who reaches it; keep that network closed"
+    );
+    Ok(())
+}
 
 /// The port itself, or a free one for 0: what is announced to others must be known before it is bound.
-pub(crate) fn chosen(host: &str, port: u16) -> anyhow::Result<u16> {
+pub(crate) fn chosen(host: IpAddr, port: u16) -> anyhow::Result<u16> {
     if port != 0 {
         return Ok(port);
     }

@@ -2,7 +2,7 @@
 
 use std::{net::SocketAddr, sync::Arc};
 
-use anyhow::{Context, anyhow};
+use anyhow::anyhow;
 use ballista_core::{
     config::TaskSchedulingPolicy,
     extension::SessionConfigExt,
@@ -15,7 +15,7 @@ use datafusion::{execution::SessionStateBuilder, prelude::SessionConfig};
 
 use crate::{
     codec::{Marked, Release},
-    ports::{chosen, say},
+    ports::{address, before_port, chosen, guard, say},
 };
 
 /// What a scheduler is started with.
@@ -31,22 +31,25 @@ pub struct SchedulerOptions {
     /// Seconds without a sign of life after which an executor's tasks go to others.
     #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u64).range(2..))]
     pub executor_timeout_s: u64,
+    /// Allow an address that other machines reach, though nobody is asked who they are.
+    #[arg(long)]
+    pub insecure: bool,
 }
 
 /// Runs a scheduler until it is stopped. Prints one line when it is about to listen.
 ///
 /// # Errors
-/// A port that is taken, an address that is none.
+/// A port that is taken, an address that is none, one that other machines reach without [`insecure`](SchedulerOptions::insecure).
 pub async fn run_scheduler(options: SchedulerOptions) -> anyhow::Result<()> {
-    let port = chosen(&options.bind_host, options.port)?;
-    let text = format!("{}:{port}", options.bind_host);
-    let address: SocketAddr = text.parse().with_context(|| format!("{text} is no address"))?;
+    let host = address(&options.bind_host)?;
+    guard("scheduler", host, options.insecure)?;
+    let address = SocketAddr::new(host, chosen(host, options.port)?);
     let release = Release::own(format!("scheduler {address}"));
     let timeout = options.executor_timeout_s;
     let config = SchedulerConfig {
-        bind_host: options.bind_host.clone(),
-        external_host: options.bind_host,
-        bind_port: port,
+        bind_host: before_port(host),
+        external_host: before_port(host),
+        bind_port: address.port(),
         // executors ask for work: one that hangs is never waited for
         scheduling_policy: TaskSchedulingPolicy::PullStaged,
         executor_timeout_seconds: timeout,

@@ -265,3 +265,44 @@ async fn a_scheduler_that_is_not_there_is_an_error() {
         assert!(error.to_string().contains("df://host:port"), "{error}");
     }
 }
+
+/// What a program says that does not begin to listen.
+fn refused(program: &str, args: &[&str]) -> String {
+    let output = Command::new(program).args(args).output().unwrap();
+    assert!(!output.status.success() && output.stdout.is_empty(), "{args:?} was not refused");
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn nobody_listens_to_other_machines_unless_that_was_asked_for() {
+    let [scheduler, executor] =
+        [env!("CARGO_BIN_EXE_stretch-scheduler"), env!("CARGO_BIN_EXE_stretch-executor")];
+    for host in ["0.0.0.0", "::", "192.0.2.1"] {
+        let said = refused(scheduler, &["--bind-host", host, "--port", "0"]);
+        assert!(said.contains("say --insecure") && said.contains(host), "{said}");
+        let said = refused(executor, &["--bind-host", host]);
+        assert!(said.contains("say --insecure") && said.contains(host), "{said}");
+    }
+    let mut child = Command::new(scheduler)
+        .args(["--bind-host", "0.0.0.0", "--port", "0", "--insecure"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    BufReader::new(child.stderr.take().unwrap()).read_line(&mut line).unwrap();
+    drop(Process(child));
+    assert!(line.starts_with("WARNING: INSECURE: this scheduler on 0.0.0.0 obeys"), "{line}");
+}
+
+/// An executor listens where the scheduler sees it, and says so; where nobody would find it, it does not begin.
+#[test]
+fn an_executor_listens_where_it_is_said_to_be() {
+    let executor = env!("CARGO_BIN_EXE_stretch-executor");
+    let (_process, line) = Process::start(executor, &["--scheduler", "127.0.0.2:50050"]);
+    let told = line.split_whitespace().nth(1).unwrap();
+    let address: std::net::SocketAddr = told.parse().unwrap();
+    assert!(address.ip().is_loopback(), "{line}");
+    let said = refused(executor, &["--scheduler", "nobody.invalid:1"]);
+    assert!(said.contains("nobody.invalid is no address"), "{said}");
+}

@@ -1,18 +1,20 @@
 //! `stretch-fleet calibrate`: a record a sensor.
 
-use std::path::PathBuf;
+use std::{collections::BTreeSet, path::PathBuf};
 
-use anyhow::ensure;
+use anyhow::{Context, ensure};
 use chrono::NaiveDate;
 use serde::Serialize;
 
 use crate::{
     flat::{flat, table},
     lake::{Refused, write_parquet},
+    lock::{Lock, RECORDS_DEPTH},
     records::write_records,
+    session::in_order,
     show::{say, say_json, warn_of},
     sql::On,
-    states::bring_up,
+    states::{bring_up, shared},
 };
 
 /// Sensors that a table on the terminal shows.
@@ -55,23 +57,41 @@ struct Summary {
 }
 
 pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
-    let (lake, session) = args.on.open().await?;
-    let months_computed = bring_up(&lake, &session).await?;
+    let (_lock, lake, session) = args.on.open_to_write().await?;
+    let shares = args.on.shares();
+    let months_computed = bring_up(&lake, &session, shares).await?;
     let dates = lake.files.iter().map(|file| file.place.date);
     let (first, last) = (dates.clone().min(), dates.max());
     let (from, to) =
         (args.from.or(first).unwrap_or_default(), args.to.or(last).unwrap_or_default());
-    let query = format!(
-        "select site, rig, sensor, poly13_merge(state) as fit from states \
-         where date between date '{from}' and date '{to}' group by site, rig, sensor order by site, rig, sensor"
-    );
-    let batches = session.sql(&query).await?.collect().await?;
+    let question = |of: &str| {
+        format!(
+            "select site, rig, sensor, poly13_merge(state) as fit from states \
+             where date between date '{from}' and date '{to}'{of} group by site, rig, sensor order by site, rig, sensor"
+        )
+    };
+    // threads share the rigs, and merge the days of each in their order: the same bits in every run
+    let batches = match shares {
+        None => session.sql(&question("")).await?.collect().await?,
+        Some(shares) => {
+            let rigs: BTreeSet<[&str; 2]> =
+                lake.files.iter().map(|f| [f.place.site.as_str(), f.place.rig.as_str()]).collect();
+            let of = shared(rigs, shares).into_iter().map(|own| {
+                let names: Vec<String> =
+                    own.iter().map(|[site, rig]| format!("'{site}/{rig}'")).collect();
+                question(&format!(" and site || '/' || rig in ({})", names.join(", ")))
+            });
+            in_order(&session, of.collect()).await?
+        }
+    };
     ensure!(
         batches.iter().any(|batch| batch.num_rows() > 0),
         "there is no trial from {from} to {to}"
     );
     let answer = flat(&batches)?;
-    std::fs::create_dir_all(&args.out)?;
+    std::fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
+    ensure!(args.out.canonicalize()? != lake.folder, "--out is the lake: name a folder of its own");
+    let _out = Lock::of(&args.out, RECORDS_DEPTH)?;
     let (records, refused) = write_records(&lake, &answer, &args.out)?;
     write_parquet(&args.out.join("calibrations.parquet"), &answer, Vec::new(), None)?;
     let summary = Summary { months_computed, sensors: answer.num_rows(), records, refused };

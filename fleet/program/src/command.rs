@@ -1,6 +1,6 @@
 //! The command line: parse, dispatch.
 
-use std::process::ExitCode;
+use std::{ffi::OsString, process::ExitCode};
 
 use clap::{Parser, Subcommand};
 
@@ -27,9 +27,9 @@ enum Command {
 /// What the shell is told when Ctrl-C ended the program.
 const INTERRUPTED: u8 = 130;
 
-/// The program `stretch-fleet`.
-pub fn run() -> ExitCode {
-    let cli = Cli::parse();
+/// The program `stretch-fleet`, asked by its name and words.
+pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = Cli::parse_from(words);
     let runtime = match tokio::runtime::Builder::new_multi_thread().enable_all().build() {
         Ok(runtime) => runtime,
         Err(e) => {

@@ -19,7 +19,9 @@ use stretch_sim::{Catalogue, Rig};
 use crate::{
     flat::table,
     lake::{Lake, LakeFile, digest, write_parquet},
-    show::{bar, say, say_json, warn_of},
+    lock::remove_abandoned,
+    show::{bar, say, say_json},
+    sql::tell_unfit,
 };
 
 /// Say of every sensor and day which effect causes a gap
@@ -78,7 +80,7 @@ fn share(text: &str) -> Result<(usize, usize), String> {
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let lake = Lake::open(&args.lake)?;
-    warn_of("set aside:", &lake.refused);
+    tell_unfit(&lake);
     ensure!(!lake.files.is_empty(), "{}: there is no trial in it", args.lake.display());
     let mut sets: BTreeMap<[String; 4], Vec<&LakeFile>> = BTreeMap::new();
     for file in &lake.files {
@@ -92,6 +94,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
     let parts = args.out.join("verdicts");
     std::fs::create_dir_all(&parts).with_context(|| parts.display().to_string())?;
+    // shares write side by side: nobody has the folder alone
+    remove_abandoned(&args.out, 1)?;
     let (which, of) = args.share;
     let open: Vec<_> = sets
         .iter()

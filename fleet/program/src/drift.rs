@@ -76,8 +76,8 @@ pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
     ensure!(args.from != args.to, "a month cannot be held against itself");
     let level = args.false_discoveries;
     ensure!(level > 0.0 && level < 1.0, "--false-discoveries {level} is no share between 0 and 1");
-    let (lake, session) = args.on.open().await?;
-    bring_up(&lake, &session).await?;
+    let (_lock, lake, session) = args.on.open_to_write().await?;
+    bring_up(&lake, &session, args.on.shares()).await?;
     let within = |first: NaiveDate| -> anyhow::Result<String> {
         let next =
             first.checked_add_months(chrono::Months::new(1)).context("the last of all months")?;

@@ -1,7 +1,7 @@
 //! `stretch-fleet ingest`: trials into a lake.
 
 use std::{
-    collections::{BTreeMap, HashMap},
+    collections::{BTreeMap, HashMap, HashSet},
     fs,
     path::{Path, PathBuf},
     sync::Mutex,
@@ -16,10 +16,12 @@ use stretch_data::{Trial, unit};
 use stretch_recording::ReadOptions;
 
 use crate::{
+    candidates::{Candidate, candidates, copies},
+    known::Known,
     lake::{
-        About, Footer, Lake, LakeFile, Place, Refused, Samples, accept, digest, files, refuse,
-        write,
+        About, Footer, Lake, LakeFile, Refused, Samples, accept, digest, refuse, set_aside, write,
     },
+    lock::Lock,
     show::{bar, say, say_json, warn_of},
     sources::{Source, Where, sources},
 };
@@ -31,7 +33,8 @@ use crate::{
 ///
 /// A trial is a recording in any format that stretch reads; a folder with a dataset.toml stands for its trials, any other
 /// folder for every file below it. Each becomes one Parquet file, whole or not at all. What is in the lake already is
-/// left as it is; what cannot be read is named in the lake's folder refused, and the rest goes on.
+/// left as it is; what cannot be read is named in the lake's folder refused, and the rest goes on. Where anything was refused
+/// the exit status is 1. Of files with the same bytes one counts, whatever their names and dates.
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
@@ -77,37 +80,46 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         ensure!(length.is_finite() && length > 0.0, "--rest-length {length} is no length above 0");
     }
     fs::create_dir_all(&args.lake).with_context(|| args.lake.display().to_string())?;
-    let sources = sources(&args.trials, &args.places)?;
+    let _lock = Lock::of(&args.lake, usize::MAX)?;
+    let mut sources = sources(&args.trials, &args.places)?;
+    // a file that was named twice is one
+    let mut named = HashSet::new();
+    sources.retain(|source| {
+        let path = source.path.canonicalize().unwrap_or_else(|_| source.path.clone());
+        named.insert((path, source.place.as_ref().ok().cloned()))
+    });
     ensure!(!sources.is_empty(), "there is no file among what was named");
     let about = about(&args, &sources)?;
     let there = Lake::open(&args.lake)?;
+    let mut summary = Summary { refused: set_aside(&there)?, ..Summary::default() };
     let ingest = Ingest {
         folder: &there.folder,
         about: &about,
         options: args.options(&about),
         rest_length: args.rest_length,
-        there: there.files.iter().map(|file| (file.footer.digest.as_str(), file)).collect(),
+        there: there.files.iter().map(|file| file.footer.digest.as_str()).collect(),
+        known: Mutex::new(Known::of(&there.files)),
     };
-    let mut by_gauge: BTreeMap<[String; 3], Vec<&Source>> = BTreeMap::new();
-    let mut summary = Summary::default();
-    for source in &sources {
-        match &source.place {
-            Ok(place) => {
-                by_gauge.entry(place.gauge().map(str::to_owned)).or_default().push(source);
-            }
-            Err(why) => {
-                summary.refused.push(refuse(&there.folder, &source.path, &format!("{why:#}"))?);
-            }
+    let (all, mut refused) = candidates(&sources);
+    let copies = copies(&all, &there.files);
+    let mut by_gauge: BTreeMap<[String; 3], Vec<Candidate<'_>>> = BTreeMap::new();
+    for (one, why) in all.into_iter().zip(copies) {
+        match why {
+            Some(why) => refused.push((&one.source.path, why)),
+            None => by_gauge.entry(one.place.gauge().map(str::to_owned)).or_default().push(one),
         }
+    }
+    for (path, why) in refused {
+        summary.refused.push(refuse(&there.folder, path, &why)?);
     }
     let rests = rest_lengths(&there);
     let bar = bar("trials", sources.len());
     let summary = Mutex::new(summary);
     // trials of one sensor in order: the first says what its rest length is
-    by_gauge.par_iter().try_for_each(|(gauge, sources)| {
+    by_gauge.par_iter().try_for_each(|(gauge, candidates)| {
         let mut rest = rests.get(gauge).copied();
-        for source in sources {
-            let done = ingest.one(source, &mut rest)?;
+        for candidate in candidates {
+            let done = ingest.one(candidate, &mut rest)?;
             bar.inc(1);
             let mut summary = summary.lock().map_err(|_| anyhow::anyhow!("a thread has failed"))?;
             match done {
@@ -122,9 +134,14 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         anyhow::Ok(())
     })?;
     bar.finish_and_clear();
-    let mut summary = summary.into_inner().map_err(|_| anyhow::anyhow!("a thread has failed"))?;
-    summary.refused.extend(there.refused);
-    tell(&args, &summary)
+    let summary = summary.into_inner().map_err(|_| anyhow::anyhow!("a thread has failed"))?;
+    tell(&args, &summary)?;
+    let (refused, lake) = (summary.refused.len(), args.lake.display());
+    ensure!(
+        refused == 0,
+        "{refused} files are not in the lake: {lake}/refused has a sentence for each"
+    );
+    Ok(())
 }
 
 fn tell(args: &Args, summary: &Summary) -> anyhow::Result<()> {
@@ -196,8 +213,9 @@ struct Ingest<'a> {
     about: &'a About,
     options: ReadOptions,
     rest_length: Option<f64>,
-    /// Files of the lake by the digests of what they came from.
-    there: HashMap<&'a str, &'a LakeFile>,
+    /// Digests of what the files of the lake came from.
+    there: HashSet<&'a str>,
+    known: Mutex<Known>,
 }
 
 enum Done {
@@ -207,39 +225,35 @@ enum Done {
 }
 
 impl Ingest<'_> {
-    fn one(&self, source: &Source, rest: &mut Option<f64>) -> anyhow::Result<Done> {
-        let Ok(place) = &source.place else { return Ok(Done::There) };
+    fn one(
+        &self,
+        Candidate { source, place, digest }: &Candidate<'_>,
+        rest: &mut Option<f64>,
+    ) -> anyhow::Result<Done> {
         let refused = |why: &str| refuse(self.folder, &source.path, why).map(Done::Refused);
-        let bytes = match fs::read(&source.path) {
-            Ok(bytes) => bytes,
-            Err(e) => return refused(&format!("it cannot be read: {e}")),
-        };
-        let of_file = digest([bytes.as_slice()]);
-        drop(bytes);
-        let path = self.folder.join("trials").join(place.folder());
-        let path = path.join(format!("{}.parquet", &of_file[..16]));
-        match self.there.get(of_file.as_str()) {
-            Some(there) if there.place == *place => return Ok(Done::There),
-            Some(there) => {
-                return refused(&format!(
-                    "the lake has it already as a trial of {}, and here it is said to be of {place}: take it out there, or leave it",
-                    there.place
-                ));
-            }
-            None => {}
+        if self.there.contains(digest.as_str()) {
+            // a run that was killed may not have come to this
+            accept(self.folder, &source.path)?;
+            return Ok(Done::There);
         }
+        let path = self.folder.join("trials").join(place.folder());
+        let path = path.join(format!("{}.parquet", &digest[..16]));
         let read = source.read(&self.options).map_err(anyhow::Error::from);
         let made = read.and_then(|recording| {
             let notes = recording.notes;
             let (footer, samples) = self.samples(recording.trial, source, *rest)?;
-            Ok((Footer { notes, digest: of_file, ..footer }, samples))
+            Ok((Footer { notes, digest: digest.clone(), ..footer }, samples))
         });
         let (footer, samples) = match made {
             Ok(made) => made,
             Err(why) if stretch_files::interrupted() => return Err(why),
             Err(why) => return refused(&format!("{why:#}")),
         };
-        if let Some(why) = self.second(&footer, place) {
+        let claimed = match self.known.lock() {
+            Ok(mut known) => known.claim(&footer, place),
+            Err(_) => bail!("a thread has failed"),
+        };
+        if let Err(why) = claimed {
             return refused(&why);
         }
         let rows = samples.time_s.len() as u64;
@@ -318,35 +332,6 @@ impl Ingest<'_> {
             notes: Vec::new(),
         };
         Ok((footer, samples))
-    }
-
-    /// Why a trial is in the lake already, in another file.
-    fn second(&self, footer: &Footer, place: &Place) -> Option<String> {
-        let stem = |name: &str| Path::new(name).file_stem().map(|stem| stem.to_owned());
-        let mut beside = self.beside(place);
-        beside.find_map(|other| {
-            if other.samples == footer.samples {
-                return Some(format!(
-                    "its samples are those of {}, which is in the lake already: a trial counted twice would weigh double",
-                    other.source
-                ));
-            }
-            (stem(&other.trial) == stem(&footer.trial)).then(|| {
-                format!(
-                    "it is a second record of trial {} of {place}, with other samples than {}, which stays: rename it if it is \
-                     another trial, or take that one out of the lake",
-                    footer.trial, other.source
-                )
-            })
-        })
-    }
-
-    /// The footers of a place, those written just now too.
-    fn beside(&self, place: &Place) -> impl Iterator<Item = Footer> {
-        let folder = self.folder.join("trials").join(place.folder());
-        // A temporary file that a kill left beside them is no trial, however whole it is.
-        let trials = files(&folder).unwrap_or_default();
-        trials.into_iter().filter_map(|path| Footer::read(&path).ok())
     }
 }
 

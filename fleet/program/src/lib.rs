@@ -1,6 +1,7 @@
 //! Lakes of trials: what the program `stretch-fleet` does.
 
 mod calibrate;
+mod candidates;
 mod command;
 mod diagnose;
 mod drift;
@@ -8,7 +9,9 @@ mod false_discovery;
 mod flat;
 mod from_path;
 mod ingest;
+mod known;
 mod lake;
+mod lock;
 mod make;
 mod month_test;
 mod records;

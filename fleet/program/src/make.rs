@@ -16,6 +16,7 @@ use stretch_gap::RandomGenerator;
 
 use crate::{
     lake::{About, Footer, Place, Samples, digest, write},
+    lock::Lock,
     show::{bar, say, say_json},
 };
 
@@ -87,6 +88,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     ensure!(*sensors > 0 && *days > 0 && *rows > 20, "there must be a sensor, a day and 20 rows");
     ensure!((0.0..=1.0).contains(&args.drifting), "--drifting {} is not 0 to 1", args.drifting);
     std::fs::create_dir_all(lake).with_context(|| lake.display().to_string())?;
+    let _lock = Lock::of(lake, usize::MAX)?;
     let about =
         About::new(SIGNAL, REFERENCE, RateEstimator::SAVGOL_11_2, SampleRate::new(RATE_HZ)?);
     match About::read(lake)? {

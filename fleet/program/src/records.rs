@@ -1,6 +1,6 @@
 //! Records that `stretch apply` takes, from the fits of a query.
 
-use std::path::Path;
+use std::{collections::HashSet, path::Path};
 
 use anyhow::{Context, ensure};
 use datafusion::arrow::array::RecordBatch;
@@ -9,7 +9,7 @@ use stretch_core::{Calibration, Label, Provenance, Target};
 
 use crate::{
     flat::{column, texts},
-    lake::{Lake, LakeFile, Refused},
+    lake::{Lake, LakeFile, Refused, check_name},
 };
 
 /// Writes a record a row, in folders of site and rig where the answer has them; rows whose fit or record is refused come back with the reason.
@@ -33,15 +33,21 @@ pub(crate) fn write_records(
         records.len()
     );
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    let (mut written, mut refused) = (0, Vec::new());
+    let (mut written, mut refused, mut taken) = (0, Vec::new(), HashSet::new());
     for (row, record) in records.iter().enumerate() {
         let of: Vec<(&str, &str)> =
             keys.iter().map(|(key, own)| (*key, own[row].as_str())).collect();
         let names: Vec<&str> = of.iter().map(|(_, name)| *name).collect();
         let name = if names.is_empty() { "record".to_owned() } else { names.join("/") };
+        // a query may call anything a sensor: its record stands in the folder all the same, and beside no other of its name
+        let place = of.iter().try_for_each(|(key, name)| check_name(key, name));
+        let place = place.and_then(|()| match taken.insert(name.clone()) {
+            true => Ok(()),
+            false => Err(anyhow::anyhow!("another row of the answer has that name")),
+        });
         let reason = reasons.as_ref().map_or("", |reasons| &reasons[row]);
         let made = match (record.is_empty(), reason) {
-            (false, _) => completed(lake, record, &of),
+            (false, _) => place.and_then(|()| completed(lake, record, &of)),
             (true, "") => Err(anyhow::anyhow!(
                 "its fit has no record: the columns must be those of the lake, rate and signal among them"
             )),

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use datafusion::{
+    arrow::array::RecordBatch,
     execution::runtime_env::RuntimeEnvBuilder,
     prelude::{SessionConfig, SessionContext},
 };
@@ -32,4 +33,26 @@ pub(crate) async fn session(
     let session = SessionContext::new_with_config_rt(config, Arc::new(runtime));
     stretch_fleet::register(&session);
     Ok(session)
+}
+
+/// Answers of several questions, one behind the other.
+///
+/// Each is answered by one thread, which takes files and rows in their order, and all of them at once: sums have the same bits in
+/// every run, however many questions there are.
+pub(crate) async fn in_order(
+    session: &SessionContext,
+    questions: Vec<String>,
+) -> anyhow::Result<Vec<RecordBatch>> {
+    let mut state = session.state();
+    state.config_mut().options_mut().execution.target_partitions = 1;
+    let alone = SessionContext::new_with_state(state);
+    let tasks = questions.into_iter().map(|question| {
+        let alone = alone.clone();
+        tokio::spawn(async move { alone.sql(&question).await?.collect().await })
+    });
+    let mut batches = Vec::new();
+    for task in tasks.collect::<Vec<_>>() {
+        batches.extend(task.await??);
+    }
+    Ok(batches)
 }

@@ -106,7 +106,11 @@ pub(crate) fn sources(paths: &[PathBuf], places: &Where) -> anyhow::Result<Vec<S
         } else {
             let mut below = Vec::new();
             for entry in fs::read_dir(&path).with_context(|| path.display().to_string())? {
-                below.push(entry?.path());
+                let entry = entry?;
+                // what a killed writer left is nobody's trial
+                if !entry.file_name().to_string_lossy().starts_with(".stretch-") {
+                    below.push(entry.path());
+                }
             }
             below.sort_by(|a, b| b.cmp(a));
             rest.extend(below);

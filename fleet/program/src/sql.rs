@@ -1,13 +1,14 @@
 //! `stretch-fleet sql`: any question of a lake.
 
-use std::path::PathBuf;
+use std::{num::NonZeroUsize, path::PathBuf};
 
-use anyhow::ensure;
-use datafusion::prelude::SessionContext;
+use anyhow::{Context, ensure};
+use datafusion::{error::DataFusionError, execution::context::SQLOptions, prelude::SessionContext};
 
 use crate::{
     flat::{csv, flat, table},
-    lake::{Lake, register},
+    lake::{Lake, Refused, register},
+    lock::{Lock, RECORDS_DEPTH},
     records::write_records,
     session::session,
     show::{say, warn, warn_of},
@@ -34,6 +35,9 @@ pub(crate) struct Args {
     /// Write the records of the fits, a file a row, into a folder: stretch apply takes them
     #[arg(long, value_name = "DIR")]
     records: Option<PathBuf>,
+    /// Allow what writes, such as copy ... to, insert, create and set; without it a question only reads
+    #[arg(long)]
+    write: bool,
 }
 
 /// Which lake, and who answers.
@@ -51,21 +55,55 @@ pub(crate) struct On {
 }
 
 impl On {
-    /// The lake, what was noticed of it told, and a session that has it as the table `trials`.
+    /// The lake, what was noticed of it told, and a session that has it as the table `trials`. Nothing is written.
     pub(crate) async fn open(&self) -> anyhow::Result<(Lake, SessionContext)> {
         let lake = Lake::open(&self.lake)?;
-        warn_of("set aside:", &lake.refused);
+        tell_unfit(&lake);
         lake.notes.iter().for_each(|note| warn(format!("note: {note}")));
         ensure!(!lake.files.is_empty(), "{}: there is no trial in it", self.lake.display());
         let session = session(self.cluster.as_deref(), self.threads).await?;
         register(&session, &lake)?;
         Ok((lake, session))
     }
+
+    /// Among how many threads of this machine a command shares its work; none where a cluster answers.
+    pub(crate) fn shares(&self) -> Option<usize> {
+        let all = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+        self.cluster.is_none().then(|| self.threads.unwrap_or_else(all).max(1))
+    }
+
+    /// The same for a command that writes partial fits into the lake: no other one writes until the lock is gone.
+    pub(crate) async fn open_to_write(&self) -> anyhow::Result<(Lock, Lake, SessionContext)> {
+        ensure!(self.lake.is_dir(), "{}: there is no such folder", self.lake.display());
+        let lock = Lock::of(&self.lake, usize::MAX)?;
+        let (lake, session) = self.open().await?;
+        Ok((lock, lake, session))
+    }
+}
+
+/// Says which files of a lake are left out.
+pub(crate) fn tell_unfit(lake: &Lake) {
+    let refused = lake
+        .unfit
+        .iter()
+        .map(|file| Refused { file: file.path.display().to_string(), why: file.why.clone() });
+    warn_of("left out:", &refused.collect::<Vec<_>>());
 }
 
 pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
     let (lake, session) = args.on.open().await?;
-    let answer = session.sql(&args.query).await?;
+    let writes = SQLOptions::new()
+        .with_allow_ddl(args.write)
+        .with_allow_dml(args.write)
+        .with_allow_statements(args.write);
+    let answer =
+        session.sql_with_options(&args.query, writes).await.map_err(|e| match args.write {
+            false if is_of_writing(&e) => anyhow::anyhow!(
+                "{}: a question of a lake only reads; --write allows what writes",
+                e.strip_backtrace()
+            ),
+            _ => e.into(),
+        })?;
     let schema = answer.schema().inner().clone();
     let mut batches = answer.collect().await?;
     if batches.is_empty() {
@@ -73,6 +111,8 @@ pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
     }
     let answer = flat(&batches)?;
     if let Some(folder) = &args.records {
+        std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        let _lock = Lock::of(folder, RECORDS_DEPTH)?;
         let (written, refused) = write_records(&lake, &answer, folder)?;
         warn_of("no record of", &refused);
         return say(format!("{}: {written} records, {} refused", folder.display(), refused.len()));
@@ -81,4 +121,9 @@ pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
         true => csv(&answer)?.trim_end().to_owned(),
         false => table(&answer)?,
     })
+}
+
+/// Whether a query was refused for what it would write: DDL, DML, or a statement such as `set`.
+fn is_of_writing(error: &DataFusionError) -> bool {
+    matches!(error.find_root(), DataFusionError::Plan(text) if text.contains("not supported: "))
 }

@@ -1,6 +1,10 @@
 //! Partial fits, a day each: computed once, stored, and merged by whoever asks.
 
-use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::PathBuf,
+    sync::Arc,
+};
 
 use anyhow::Context;
 use chrono::NaiveDate;
@@ -16,6 +20,7 @@ use datafusion::{
 
 use crate::{
     lake::{Lake, LakeFile, digest, register_folder, write_parquet},
+    session::in_order,
     show::bar,
 };
 
@@ -49,25 +54,52 @@ impl Unit<'_> {
     }
 
     /// Computes the states of all sensors and days in one pass, and writes them whole.
-    async fn compute(&self, lake: &Lake, session: &SessionContext) -> anyhow::Result<()> {
+    ///
+    /// Threads of this machine share the sensors: each takes the rows of its own in their order, so that sums have the same bits
+    /// in every run. Machines of a cluster share the rows, and sums come in the order in which they are done.
+    async fn compute(
+        &self,
+        lake: &Lake,
+        session: &SessionContext,
+        shares: Option<usize>,
+    ) -> anyhow::Result<()> {
         let Some(first) = self.files.first() else { return Ok(()) };
         let [site, rig, _] = first.place.gauge();
         let dates = self.files.iter().map(|file| file.place.date);
         let (from, to) = dates.fold((NaiveDate::MAX, NaiveDate::MIN), |(from, to), date| {
             (from.min(date), to.max(date))
         });
-        let query = format!(
-            "select sensor, date, poly13_state(rate, \"{}\", \"{}\") as state from trials \
-             where site = '{site}' and rig = '{rig}' and date between date '{from}' and date '{to}' \
-             group by sensor, date order by sensor, date",
-            lake.about.signal,
-            lake.about.target()
-        );
-        let batches = session.sql(&query).await?.collect().await?;
+        let question = |of: &str| {
+            format!(
+                "select sensor, date, poly13_state(rate, \"{}\", \"{}\") as state from trials \
+                 where site = '{site}' and rig = '{rig}' and date between date '{from}' and date '{to}'{of} \
+                 group by sensor, date order by sensor, date",
+                lake.about.signal,
+                lake.about.target()
+            )
+        };
+        let batches = match shares {
+            None => session.sql(&question("")).await?.collect().await?,
+            Some(shares) => {
+                let sensors: BTreeSet<&str> =
+                    self.files.iter().map(|file| file.place.sensor.as_str()).collect();
+                let of = shared(sensors, shares).into_iter().map(|own| {
+                    let (first, last) = (own[0], own[own.len() - 1]);
+                    question(&format!(" and sensor between '{first}' and '{last}'"))
+                });
+                in_order(session, of.collect()).await?
+            }
+        };
         let batch = plain(&batches)?;
         let sources = KeyValue::new(SOURCES.to_owned(), self.sources());
         write_parquet(&self.path, &batch, vec![sources], None)
     }
+}
+
+/// What is shared among threads, in order; no share is empty.
+pub(crate) fn shared<T: Copy>(all: impl IntoIterator<Item = T>, shares: usize) -> Vec<Vec<T>> {
+    let all: Vec<T> = all.into_iter().collect();
+    all.chunks(all.len().div_ceil(shares.max(1)).max(1)).map(<[T]>::to_vec).collect()
 }
 
 /// The states as this program stores them, whatever types the engine gave texts.
@@ -94,7 +126,11 @@ fn plain(batches: &[RecordBatch]) -> anyhow::Result<RecordBatch> {
 /// `states`: site, rig, sensor, date, state. How many months were computed comes back.
 ///
 /// A month of a rig is written whole; what a kill left undone is all that the next run does.
-pub(crate) async fn bring_up(lake: &Lake, session: &SessionContext) -> anyhow::Result<usize> {
+pub(crate) async fn bring_up(
+    lake: &Lake,
+    session: &SessionContext,
+    shares: Option<usize>,
+) -> anyhow::Result<usize> {
     let folder = lake.folder.join("states/poly13");
     std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     let mut units: BTreeMap<PathBuf, Unit<'_>> = BTreeMap::new();
@@ -114,7 +150,7 @@ pub(crate) async fn bring_up(lake: &Lake, session: &SessionContext) -> anyhow::R
     let bar = bar("months of rigs", open.len());
     for unit in &open {
         bar.set_message(format!("month {} of a rig", unit.month));
-        unit.compute(lake, session).await?;
+        unit.compute(lake, session, shares).await?;
         bar.inc(1);
         anyhow::ensure!(!stretch_files::interrupted(), "interrupted");
     }

@@ -13,7 +13,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-import stretch
+import stretch_gap
 
 NEWTON_PER_VOLT = 35.15065188248547
 HALF_WINDOW = 5
@@ -52,7 +52,7 @@ def record(folder, name, every):
         "acceleration_m_s2": acceleration,
     }
     columns = {key: values[::every] for key, values in columns.items()}
-    return stretch.Trial(columns, name=name, test=name.endswith("pulses"))
+    return stretch_gap.Trial(columns, name=name, test=name.endswith("pulses"))
 
 
 class Inverse:
@@ -86,14 +86,14 @@ def diagnosed(form, folder, every):
     """The axis in one of its two forms."""
     data = [record(folder, name, every) for name in ("emps_identification", "emps_pulses")]
     parameters = {
-        "mass": stretch.Parameter(100.0, relative=0.2, unit="kg", least=1.0),
-        "viscous": stretch.Parameter(200.0, relative=0.5, unit="N s/m", least=1.0),
+        "mass": stretch_gap.Parameter(100.0, relative=0.2, unit="kg", least=1.0),
+        "viscous": stretch_gap.Parameter(200.0, relative=0.5, unit="N s/m", least=1.0),
     }
     side, simulator, output, inputs = {
         "inverse": ("output", Inverse(), "force_n", ["velocity_m_s", "acceleration_m_s2"]),
         "forward": ("input", Forward(every * 1e-3), "velocity_m_s", ["force_n"]),
     }[form]
-    return stretch.diagnose(
+    return stretch_gap.diagnose(
         simulator,
         data,
         output=output,

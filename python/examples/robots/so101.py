@@ -13,7 +13,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-import stretch
+import stretch_gap
 
 MOTIONS = ("step_response", "multisine", "friction_gravity")
 TESTED = "friction_gravity"
@@ -39,7 +39,7 @@ def trials(folder, joint, every=1):
             "commanded_rad": commanded[f"{joint}_rad"][np.maximum(held, 0)],
             "measured_rad": np.interp(time_s, measured["time_s"], measured[f"{joint}_rad"]),
         }
-        made.append(stretch.Trial(columns, name=motion, test=motion == TESTED))
+        made.append(stretch_gap.Trial(columns, name=motion, test=motion == TESTED))
     return made
 
 
@@ -64,10 +64,10 @@ class Servo:
 
 def diagnosed(folder, joint, every):
     parameters = {
-        "tau": stretch.Parameter(0.1, relative=0.5, unit="s", least=0.005),
-        "offset": stretch.Parameter(0.0, tolerance=0.05, unit="rad"),
+        "tau": stretch_gap.Parameter(0.1, relative=0.5, unit="s", least=0.005),
+        "offset": stretch_gap.Parameter(0.0, tolerance=0.05, unit="rad"),
     }
-    return stretch.diagnose(
+    return stretch_gap.diagnose(
         Servo(every / RATE_HZ),
         trials(folder, joint, every),
         output="measured_rad",

@@ -4,7 +4,7 @@ use std::{
     fs::{File, OpenOptions},
     io::{self, Read},
     path::{Path, PathBuf},
-    sync::mpsc::{Receiver, Sender, channel},
+    sync::mpsc::{Receiver, SyncSender, sync_channel},
     thread,
     time::Duration,
 };
@@ -22,12 +22,15 @@ pub(crate) enum Heard {
 /// How long to wait before a port that went away is opened again.
 const RETRY: Duration = Duration::from_millis(200);
 
+/// Pieces that may wait: a port that is faster than what is made of it waits itself.
+const WAITING: usize = 64;
+
 /// Reads a port from now on, `-` for standard input.
 ///
 /// # Errors
 /// When the port cannot be opened the first time, or is a folder.
 pub(crate) fn listen(path: &Path, baud: u32) -> io::Result<Receiver<Heard>> {
-    let (sender, heard) = channel();
+    let (sender, heard) = sync_channel(WAITING);
     if path.as_os_str() == "-" {
         thread::spawn(move || {
             let _ = read_all(io::stdin(), &sender);
@@ -49,7 +52,7 @@ pub(crate) fn listen(path: &Path, baud: u32) -> io::Result<Receiver<Heard>> {
     Ok(heard)
 }
 
-fn keep_reading(first: File, path: PathBuf, baud: u32, sender: &Sender<Heard>) {
+fn keep_reading(first: File, path: PathBuf, baud: u32, sender: &SyncSender<Heard>) {
     let mut port = Some(first);
     loop {
         if let Some(file) = port.take() {
@@ -74,7 +77,7 @@ fn keep_reading(first: File, path: PathBuf, baud: u32, sender: &Sender<Heard>) {
     }
 }
 
-fn read_all(mut port: impl Read, sender: &Sender<Heard>) -> io::Result<()> {
+fn read_all(mut port: impl Read, sender: &SyncSender<Heard>) -> io::Result<()> {
     let mut buffer = [0; 4096];
     loop {
         match port.read(&mut buffer) {

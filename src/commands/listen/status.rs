@@ -17,6 +17,8 @@ pub(crate) struct Status {
     /// difference; none where the calibration cannot answer.
     pub(super) compared: Option<(u64, f64)>,
     pub(super) unit: String,
+    /// Frames beside which the board's clock had not gone on although the calibration's period is a tick of it or more.
+    pub(super) standing: u64,
     /// Rows that were recorded, at the end of a recording.
     pub(super) rows: Option<u64>,
 }
@@ -42,6 +44,13 @@ impl Status {
         }
         if self.missing > 0 {
             text += &format!("; {} samples that the board did not get", self.missing);
+        }
+        if self.standing > 0 {
+            text += &format!(
+                "; the board's clock stood still at {} frames: their times say their order alone, look at what the board takes its \
+                 milliseconds from",
+                self.standing
+            );
         }
         let Self { beyond, largest, adc_bits, .. } = self;
         if *beyond > 0 {

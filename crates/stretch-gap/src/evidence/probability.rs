@@ -113,6 +113,15 @@ pub(crate) fn names(
     unknown < nothing.max(effects) && effects > nothing && retuned > thresholds.least_gap
 }
 
+/// Ratio of probabilities from which two sets are equally probable.
+const EVEN: f64 = 0.99;
+
+/// The most probable of some sets, and those that are as probable, by their places.
+pub(crate) fn most_probable(probabilities: &[f64]) -> Vec<usize> {
+    let most = probabilities.iter().copied().fold(0.0, f64::max);
+    (0..probabilities.len()).filter(|&i| probabilities[i] >= EVEN * most).collect()
+}
+
 /// Weighs hypotheses with what they leave.
 pub(crate) fn weigh(
     thresholds: &Thresholds,

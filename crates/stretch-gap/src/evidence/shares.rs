@@ -25,10 +25,9 @@ pub struct EffectShare {
     /// Share of the re-tuned nominal's gap that opens again when it is taken out, those that closed less than it gone
     /// before: the shares add up to what the set closes.
     pub closes: f64,
-    /// Greatest share of the gap of one stage that it closes, of those that have one: a stage with little noise must not hide
-    /// what is wrong in another.
+    /// What it closes of the stage in which it closes most, in variances of the noise.
     #[serde(default)]
-    pub closes_of_stage: f64,
+    pub closes_excess: f64,
     /// Whether one of its parameters went to an end of its range: it then rather stands in for something else.
     pub at_bound: bool,
 }
@@ -55,13 +54,12 @@ pub(crate) fn eliminated(
     Ok(out)
 }
 
-/// What each effect closes of the held-out gap, the strongest first. Stages whose gap is below `least_gap` have none.
+/// What each effect closes of the held-out gap, the strongest first.
 pub(crate) fn shares(
     problem: &PreparedProblem<'_>,
     evidence: &Evidence,
     best: &Hypothesis,
     eliminated: &[(usize, Hypothesis)],
-    least_gap: f64,
 ) -> Result<Vec<EffectShare>, GapError> {
     // Noise is known to some per cent: what the best set leaves is the noise where it is less than they say.
     let least: Vec<f64> = evidence.stages.iter().map(|s| s.excess_after.min(0.0)).collect();
@@ -82,12 +80,11 @@ pub(crate) fn shares(
                 .collect::<Result<_, GapError>>()?,
         };
         let closed = without.iter().zip(&with).map(|(without, with)| without - with);
-        let of_stages = closed.clone().zip(&nominal).filter(|(_, whole)| **whole >= least_gap);
         let spec = &problem.simulator().effects()[*effect];
         out.push(EffectShare {
             effect: spec.name.clone(),
-            closes: closed.sum::<f64>() / whole,
-            closes_of_stage: of_stages.map(|(closed, whole)| closed / whole).fold(0.0, f64::max),
+            closes: closed.clone().sum::<f64>() / whole,
+            closes_excess: closed.fold(0.0, f64::max),
             at_bound: best.is_at_bound(*effect, problem.simulator().effects()),
         });
         with = without;

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     evidence::{
         gathered::{Blocks, Evidence},
-        probability::{Posterior, Standing, Weighed, probabilities},
+        probability::{Posterior, Standing, Weighed, most_probable, probabilities},
     },
     fit::{
         prepared::PreparedProblem,
@@ -22,9 +22,6 @@ use crate::{
 
 /// Records that are drawn.
 const DRAWS: usize = 200;
-
-/// Ratio of probabilities from which two sets are equally probable.
-const EVEN: f64 = 0.99;
 
 /// How firmly an effect stands in the most probable set of effects.
 ///
@@ -121,10 +118,9 @@ pub(crate) fn stabilities(
         let standings: Vec<Standing> = posterior.sets.iter().zip(blocks).map(again).collect();
         let gap = retuned.gap(problem, evidence);
         let (weights, _) = probabilities(thresholds, gap, &standings);
-        let most = weights.iter().copied().fold(0.0, f64::max);
-        let even = posterior.sets.iter().zip(&weights).filter(|(_, p)| **p >= EVEN * most);
-        let share = 1.0 / even.clone().count().max(1) as f64;
-        for effect in even.flat_map(|(set, _)| &set.hypothesis.effects) {
+        let even = most_probable(&weights);
+        let share = 1.0 / even.len().max(1) as f64;
+        for effect in even.iter().flat_map(|&i| &posterior.sets[i].hypothesis.effects) {
             held[*effect] += share / DRAWS as f64;
         }
     }

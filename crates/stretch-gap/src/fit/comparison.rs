@@ -126,6 +126,27 @@ impl<'a> Comparison<'a> {
         outputs.map(|(output, (stage, _))| Ok(self.apart(*stage, output?))).collect()
     }
 
+    /// [`Comparison::residual_values`] of each of some models in each of some stages, in one batch; none of a model that cannot be simulated.
+    pub(crate) fn possible_residuals(
+        &self,
+        stages: &[usize],
+        models: &[Model],
+    ) -> Result<Vec<Option<Vec<Vec<f64>>>>, GapError> {
+        let wanted: Vec<(usize, &Model)> =
+            models.iter().flat_map(|model| stages.iter().map(move |&s| (s, model))).collect();
+        let mut there = self.residuals_of(&wanted, None).into_iter();
+        let one = |_| {
+            // All of a model's residuals are taken, one that failed among them or not.
+            let own: Vec<Result<Vec<f64>, GapError>> = there.by_ref().take(stages.len()).collect();
+            match own.into_iter().collect::<Result<Vec<_>, _>>() {
+                Ok(own) => Ok(Some(own)),
+                Err(error) if error.ends_all() => Err(error),
+                Err(_) => Ok(None),
+            }
+        };
+        models.iter().map(one).collect()
+    }
+
     /// Measured minus simulated, in multiples of the noise, ready for products.
     pub(crate) fn residual(&self, stage: usize, model: &Model) -> Result<Column, GapError> {
         let values = self.residual_values(stage, model)?;

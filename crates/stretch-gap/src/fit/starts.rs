@@ -176,19 +176,12 @@ impl Begun<'_, '_> {
         models: &[Model],
         compare: [&Comparison<'_>; 2],
     ) -> Result<Vec<Option<[f64; 2]>>, GapError> {
-        let wanted: Vec<(usize, &Model)> =
-            models.iter().flat_map(|model| self.group.iter().map(move |&s| (s, model))).collect();
-        let mut there = self.compare.residuals_of(&wanted, None).into_iter();
-        let mut out = Vec::with_capacity(models.len());
-        for model in models {
-            let own: Vec<_> = there.by_ref().take(self.group.len()).collect();
-            out.push(match own.into_iter().collect::<Result<Vec<_>, _>>() {
-                Ok(residuals) => Some(compare.map(|c| c.cost(self.group, model, &residuals))),
-                Err(error) if error.ends_all() => return Err(error),
-                Err(_) => None,
-            });
-        }
-        Ok(out)
+        let there = self.compare.possible_residuals(self.group, models)?;
+        let cost = |(model, residuals): (&Model, Option<Vec<Vec<f64>>>)| {
+            let residuals = residuals?;
+            Some(compare.map(|c| c.cost(self.group, model, &residuals)))
+        };
+        Ok(models.iter().zip(there).map(cost).collect())
     }
 
     /// Where descents from a model end, one behind the other as long as something is gained; none where it cannot be simulated.

@@ -2,7 +2,7 @@
 //!
 //! | kind | terms of a state x with rate v | stands for |
 //! | --- | --- | --- |
-//! | curve | x^p, knees at quantiles, exp(-x/w) at either end, waves of x | scales, ends, contacts, threads |
+//! | curve | x^p, (x - centre)^p, knees at quantiles, exp(-x/w) at either end, waves of x | scales, ends, contacts, threads |
 //! | friction | v, abs v, v^2, sign v, striction, each times x | viscous, dry, sticking |
 //! | memory | x - play, x - lag, late x, way since a turn, greatest x; times x and the motion | backlash, relaxation, delay, hysteresis, damage |
 //! | slow | lags of what was dissipated, travel, time in the trial, session; times x | warming, wear, drift |
@@ -18,8 +18,8 @@ use crate::missing::{
 use crate::problem::sample_roles::SampleRoles;
 
 use Factor::{
-    Above, Below, Bend, Cosine, High, Lag, Late, Low, Peak, Play, Power, Rate, Session, Sine, Time,
-    TimeFade, Travel, TravelFade, Turned,
+    Above, Below, Bend, Centred, Cosine, High, Lag, Late, Low, Peak, Play, Power, Rate, Session,
+    Sine, Time, TimeFade, Travel, TravelFade, Turned,
 };
 use RateForm::{Linear, Magnitude, Rising, Sign, SignedRoot, SignedSquare, Square, Striction};
 
@@ -112,6 +112,10 @@ impl Shelf<'_> {
     fn curves(&mut self, s: usize) {
         for p in [0.5, 1.0, 1.5, 2.0, 3.0, 4.0] {
             self.direct(&[power(s, p)]);
+        }
+        let at = self.inputs.signals[s].centre();
+        for p in [3, 4, 5] {
+            self.direct(&[Centred { signal: s, at, power: p }]);
         }
         for share in QUANTILES {
             let at = self.inputs.quantile(s, share, self.roles);

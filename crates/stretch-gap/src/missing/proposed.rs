@@ -150,6 +150,9 @@ fn factor(factor: Factor, signals: &[SignalScale]) -> String {
     let raised = |what: String, p: f64| if p == 1.0 { what } else { format!("{what}^{p}") };
     match factor {
         Factor::Power { signal, power } => raised(x(signal), power),
+        Factor::Centred { signal, at, power } => {
+            raised(format!("({} - {})", x(signal), number(at)), f64::from(power))
+        }
         Factor::Above { signal, at, power } => {
             raised(format!("max(0, {} - {})", x(signal), number(at)), power)
         }

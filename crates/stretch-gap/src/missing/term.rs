@@ -43,6 +43,8 @@ const TURN: f64 = 0.01;
 pub enum Factor {
     /// x^power
     Power { signal: usize, power: f64 },
+    /// (x - at)^power, odd or even about the centre
+    Centred { signal: usize, at: f64, power: i32 },
     /// max(0, x - at)^power
     Above { signal: usize, at: f64, power: f64 },
     /// max(0, at - x)^power
@@ -137,7 +139,9 @@ impl Term {
 
     fn shapes_mut(&mut self) -> Vec<&mut f64> {
         let factors = self.factors.iter_mut().filter_map(|f| match f {
-            Factor::Above { at, .. } | Factor::Below { at, .. } => Some(at),
+            Factor::Centred { at, .. } | Factor::Above { at, .. } | Factor::Below { at, .. } => {
+                Some(at)
+            }
             Factor::Low { width, .. }
             | Factor::High { width, .. }
             | Factor::Play { width, .. }
@@ -196,6 +200,10 @@ impl Factor {
             Self::Power { signal: s, power } => {
                 let x = signal(s).0;
                 each(&mut |i| raised(x[i].max(0.0), power));
+            }
+            Self::Centred { signal: s, at, power } => {
+                let x = signal(s).0;
+                each(&mut |i| (x[i] - at).powi(power));
             }
             Self::Above { signal: s, at, power } => {
                 let x = signal(s).0;

@@ -37,6 +37,14 @@ pub(crate) struct Signal {
     pub(crate) v: Vec<f64>,
 }
 
+impl Signal {
+    /// x about which a law is odd or even: where the signal is zero, which it passes through; else the middle of its range.
+    pub(crate) fn centre(&self) -> f64 {
+        let zero = -self.offset / self.scale;
+        if (0.0..=1.0).contains(&zero) { zero } else { 0.5 }
+    }
+}
+
 /// Signals, trials and clocks of a session.
 #[derive(Debug, Clone)]
 pub(crate) struct TermInputs {

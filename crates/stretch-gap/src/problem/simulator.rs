@@ -34,6 +34,13 @@ impl Model {
     pub fn effect(&self, index: usize) -> Option<&[f64]> {
         self.effects.iter().find(|(i, _)| *i == index).map(|(_, values)| values.as_slice())
     }
+
+    /// The same model with one effect more.
+    pub(crate) fn with(&self, effect: usize, values: &[f64]) -> Self {
+        let mut model = self.clone();
+        model.effects.push((effect, values.to_vec()));
+        model
+    }
 }
 
 /// One run of one stage over the session.

@@ -28,9 +28,7 @@ pub struct Thresholds {
     pub unknown_soft: f64,
     /// Odds of `unknown` at its border.
     pub unknown_odds: f64,
-    /// Least share of the held-out gap that a name in the headline closes.
-    pub least_share: f64,
-    /// Excess, summed over channels, from which a gap counts: 0.1 is 1.05 times the noise.
+    /// Excess from which a gap counts, summed over channels, and from which what a further name closes does: 0.05 is 1.025 times the noise.
     pub least_gap: f64,
 }
 

@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 pub enum GrossKind {
     /// A column is too large by a factor.
     Scale,
+    /// Simulator and record differ by a factor that no sensor need err by: other units, or parameters that may not move.
+    Factor,
     /// A column has an offset.
     Offset,
     /// A column is late or early.

@@ -11,9 +11,6 @@ use crate::{
     },
 };
 
-/// How a sentence begins that doubts the simulator's unit.
-const SIMULATORS: &str = "the simulator's";
-
 impl Gross {
     fn of(what: GrossKind) -> Self {
         Self {
@@ -81,20 +78,20 @@ impl Gross {
         }
     }
 
-    /// An output that the simulator computes in other units, or larger by a factor that no sensor errs by.
-    fn of_units(column: &Column<'_>, factor: f64, units: Option<String>) -> Self {
+    /// An output that the simulator computes in other units, larger by a factor that no sensor errs by, or without a parameter that may move.
+    fn of_factor(column: &Column<'_>, factor: f64, units: Option<String>) -> Self {
         let that_is = units.as_ref().map_or(String::new(), |units| format!(": that is {units}"));
         let ratio = short(1.0 / factor);
         Self {
             factor: Some(factor),
             sentence: format!(
-                "{SIMULATORS} {} is {ratio} times the record's{that_is}",
+                "the simulator's {} is {ratio} times the record's{that_is}",
                 column.name
             ),
-            hint: "let the simulator answer in the unit of the record, or convert the record"
+            hint: "let the simulator answer in the unit of the record, or convert the record, or give the parameters of the simulator tolerances"
                 .into(),
             units,
-            ..Self::of_column(GrossKind::Scale, column)
+            ..Self::of_column(GrossKind::Factor, column)
         }
     }
 
@@ -128,9 +125,11 @@ impl Gross {
                 let factor = fault.factor(size);
                 let sd = hypothesis.effect_sd.values().flatten().fold(0.0, |a: f64, b| a.max(*b));
                 let units = units(1.0 / factor, sd / (1.0 + size), &column.unit);
-                let units = units.filter(|_| column.output_of.is_some());
-                if units.is_some() || fault.is_beyond() {
-                    return Some(Self::of_units(column, factor, units));
+                let is_output = column.output_of.is_some();
+                let units = units.filter(|_| is_output);
+                let is_exact = suspect.description().parameters.iter().all(|p| p.sd == 0.0);
+                if units.is_some() || fault.is_beyond() || is_exact && is_output {
+                    return Some(Self::of_factor(column, factor, units));
                 }
                 let sentence = match factor >= 1.0 {
                     true => format!("{name} looks {factor:.3} times too large"),
@@ -193,10 +192,9 @@ pub(crate) fn sentence(gross: &[Gross]) -> String {
         (false, true) => format!("; {}", rest.join("; ")),
         (false, false) => format!(" (or {}: these data cannot tell)", rest.join(", or ")),
     };
-    let is_of_units = first.sentence.starts_with(SIMULATORS);
     let wrong = match first.what {
         GrossKind::Parameter => "The rig file does not fit the rig",
-        _ if is_of_units => "Simulator and record are not in the same unit",
+        GrossKind::Factor => "Simulator and record differ by a factor",
         _ => "The record is wrong",
     };
     format!("{wrong}: {}{other}; {}.", first.sentence, first.hint)

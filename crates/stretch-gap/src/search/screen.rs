@@ -126,26 +126,10 @@ impl Comparison<'_> {
         effect: usize,
         starts: &[Vec<f64>],
     ) -> Result<Vec<Option<(f64, f64)>>, GapError> {
-        let with = |values: &Vec<f64>| {
-            let mut model = ground.model.clone();
-            model.effects.push((effect, values.clone()));
-            model
-        };
-        let models: Vec<Model> = starts.iter().map(with).collect();
+        let models: Vec<Model> = starts.iter().map(|v| ground.model.with(effect, v)).collect();
         let touches = &self.simulator().effects()[effect].touches;
-        let wanted: Vec<(usize, &Model)> =
-            models.iter().flat_map(|model| touches.iter().map(move |&s| (s, model))).collect();
-        let mut there = self.residuals_of(&wanted, None).into_iter();
-        let mut out = Vec::with_capacity(starts.len());
-        for _ in starts {
-            let own: Vec<_> = there.by_ref().take(touches.len()).collect();
-            out.push(match own.into_iter().collect() {
-                Ok(own) => self.change(ground, touches, own),
-                Err(error) if error.ends_all() => return Err(error),
-                Err(_) => None,
-            });
-        }
-        Ok(out)
+        let there = self.possible_residuals(touches, &models)?;
+        Ok(there.into_iter().map(|own| self.change(ground, touches, own?)).collect())
     }
 
     /// <d,d> and <d,r> of a change, from the residuals with it in the stages that it touches.

@@ -192,10 +192,8 @@ impl<'a> Sets<'a> {
             .map(|screen| {
                 let promising =
                     screen.starts.iter().filter(|s| s.1 > PROMISING_START * screen.gain());
-                let mut models: Vec<Model> = promising
-                    .take(STARTS)
-                    .map(|s| with(&base.model, screen.effect, &s.0))
-                    .collect();
+                let mut models: Vec<Model> =
+                    promising.take(STARTS).map(|s| base.model.with(screen.effect, &s.0)).collect();
                 models.extend(unstrained(self.problem, &base.model, screen.effect)?);
                 Ok((screen.effect, models))
             })
@@ -271,11 +269,4 @@ impl<'a> Sets<'a> {
         self.tried.insert(key, better.clone());
         Ok(better)
     }
-}
-
-/// A model with one effect more.
-fn with(base: &Model, effect: usize, values: &[f64]) -> Model {
-    let mut model = base.clone();
-    model.effects.push((effect, values.to_vec()));
-    model
 }

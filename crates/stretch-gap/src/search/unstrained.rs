@@ -30,27 +30,13 @@ pub(crate) fn unstrained(
     if model.parameters == base.parameters {
         return Ok(None);
     }
-    let with = |values: &Vec<f64>| {
-        let mut model = model.clone();
-        model.effects.push((effect, values.clone()));
-        model
-    };
-    let models: Vec<Model> = spec.starts.iter().map(with).collect();
-    let wanted: Vec<(usize, &Model)> =
-        models.iter().flat_map(|m| spec.touches.iter().map(move |&s| (s, m))).collect();
-    let mut there = problem.compare.residuals_of(&wanted, None).into_iter();
-    let mut best: Option<(f64, &Model)> = None;
-    for model in &models {
-        let own: Vec<_> = there.by_ref().take(spec.touches.len()).collect();
-        match own.into_iter().collect::<Result<Vec<_>, _>>() {
-            Ok(residuals) => {
-                let cost = problem.compare.cost(&spec.touches, model, &residuals);
-                best = best.filter(|b| b.0 <= cost).or(Some((cost, model)));
-            }
-            Err(error) if error.ends_all() => return Err(error),
-            // What cannot be simulated is no start.
-            Err(_) => {}
-        }
+    let mut models: Vec<Model> = spec.starts.iter().map(|v| model.with(effect, v)).collect();
+    let there = problem.compare.possible_residuals(&spec.touches, &models)?;
+    let mut best: Option<(f64, usize)> = None;
+    for (i, residuals) in there.iter().enumerate() {
+        let Some(residuals) = residuals else { continue };
+        let cost = problem.compare.cost(&spec.touches, &models[i], residuals);
+        best = best.filter(|b| b.0 <= cost).or(Some((cost, i)));
     }
-    Ok(best.map(|(_, model)| model.clone()))
+    Ok(best.map(|(_, i)| models.swap_remove(i)))
 }

@@ -99,12 +99,12 @@ pub struct Diagnosis {
     /// Effects that these data cannot tell from one that is named.
     #[serde(default)]
     pub tied: Vec<String>,
-    /// Effects that were found but close less of the held-out gap than `least_share`.
+    /// Effects that were found but close less than counts: `least_gap`.
     #[serde(default)]
     pub faint: Vec<String>,
-    /// Least share of the held-out gap that a name closes.
+    /// Excess from which a gap counts, and from which what a further name closes does, in variances of the noise.
     #[serde(default)]
-    pub least_share: f64,
+    pub least_gap: f64,
     /// What a partial answer leaves.
     #[serde(default)]
     pub unexplained: Option<Unexplained>,

@@ -199,9 +199,9 @@ mod tests {
             ([20.0, 10.0, 3.0], [0.6, 0.0, 0.4], Partial),
             ([20.0, 10.0, 8.0], [0.2, 0.0, 0.8], Unknown),
             ([20.0, 10.0, 10.0], [0.0, 0.1, 0.9], Unknown),
-            ([20.0, 0.05, 0.01], [0.9, 0.1, 0.0], Parameters),
+            ([20.0, 0.04, 0.01], [0.9, 0.1, 0.0], Parameters),
             ([20.0, 0.05, 0.05], [0.1, 0.8, 0.1], Parameters),
-            ([0.05, 0.05, 0.05], [0.1, 0.8, 0.1], NoGap),
+            ([0.04, 0.04, 0.04], [0.1, 0.8, 0.1], NoGap),
         ] {
             let verdict = judged(gap, probabilities, |_| ());
             assert_eq!((verdict.kind, verdict.seen), (expected, expected), "{gap:?}");
@@ -213,6 +213,7 @@ mod tests {
     #[test]
     fn no_verdict_contradicts_its_own_probability() {
         let mut random = crate::numerics::random::RandomGenerator::new(11, 0);
+        let least_gap = Thresholds::frozen().least_gap;
         for _ in 0..2000 {
             let weights: [f64; 3] = std::array::from_fn(|_| random.unit() + 1e-9);
             let sum: f64 = weights.iter().sum();
@@ -222,10 +223,10 @@ mod tests {
             let verdict = judged(gap, p, |_| ());
             let greatest = p.iter().copied().fold(0.0, f64::max);
             match verdict.kind {
-                Effect | Partial => assert!(p[0] == greatest && retuned > 0.1),
+                Effect | Partial => assert!(p[0] == greatest && retuned > least_gap),
                 Unknown => assert_eq!(p[2], greatest),
                 NoGap | Parameters => {
-                    assert!(p[1] == greatest || (p[0] == greatest && retuned <= 0.1))
+                    assert!(p[1] == greatest || (p[0] == greatest && retuned <= least_gap))
                 }
                 Record => panic!("nothing is wrong with the record"),
             }
@@ -234,13 +235,13 @@ mod tests {
 
     #[test]
     fn what_is_certain_and_small_is_told_below() {
-        let small = judged([0.2, 0.05, 0.01], [0.99, 0.01, 0.0], |_| ());
+        let small = judged([0.2, 0.04, 0.01], [0.99, 0.01, 0.0], |_| ());
         assert_eq!(
             (small.kind, small.naming.faint.as_slice()),
             (Parameters, &["play".to_owned()][..])
         );
         assert!(small.naming.named.is_empty());
-        let chance = judged([0.2, 0.05, 0.01], [0.3, 0.7, 0.0], |_| ());
+        let chance = judged([0.2, 0.04, 0.01], [0.3, 0.7, 0.0], |_| ());
         assert_eq!((chance.kind, chance.naming), (Parameters, Naming::default()));
     }
 

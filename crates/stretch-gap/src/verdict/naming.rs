@@ -1,7 +1,7 @@
 //! Which names stand in the headline, which beside it, and which below.
 //!
-//! Evidence is not importance: with 50 000 samples sixty nats stand for a hundred-thousandth of the gap. So a name closes a stated share of
-//! the gap that was *held out* in one of its stages, or is reported as faint. And names that the data tell apart no better than a coin does are a tie: two
+//! Evidence is not importance: with 50 000 samples sixty nats stand for a hundred-thousandth of the gap. So what a
+//! name closes in one of its stages, on trials that were not fitted, is itself a gap that counts, or the name is reported as faint. And names that the data tell apart no better than a coin does are a tie: two
 //! sets that differ in one effect, the probability of the second at least [`TIE`] of the first's.
 
 use crate::{
@@ -32,10 +32,9 @@ impl Naming {
         is_short: bool,
     ) -> Self {
         let Some(first) = candidates.first() else { return Self::default() };
-        let share =
-            |name: &str| shares.iter().find(|s| s.effect == name).map(|s| s.closes_of_stage);
+        let size = |name: &str| shares.iter().find(|s| s.effect == name).map(|s| s.closes_excess);
         // A rival that came out first was not taken apart: it stands where an effect that was stood.
-        let counts = |name: &&String| share(name).is_none_or(|s| s >= thresholds.least_share);
+        let counts = |name: &&String| size(name).is_none_or(|s| s >= thresholds.least_gap);
         let (mut named, mut faint): (Vec<String>, Vec<String>) =
             first.effects.iter().cloned().partition(|name| counts(&name));
         if named.is_empty() && !faint.is_empty() {
@@ -104,7 +103,7 @@ mod tests {
     }
 
     fn share(effect: &str, closes: f64) -> EffectShare {
-        EffectShare { effect: effect.into(), closes, closes_of_stage: closes, at_bound: false }
+        EffectShare { effect: effect.into(), closes, closes_excess: closes, at_bound: false }
     }
 
     #[test]

@@ -55,7 +55,7 @@ fn drawn(random: &mut RandomGenerator) -> (Vec<Candidate>, Vec<EffectShare>, boo
         .map(|effect| {
             let closes = random.unit() * random.unit();
             let at_bound = random.unit() < 0.2;
-            EffectShare { effect: effect.clone(), closes, closes_of_stage: closes, at_bound }
+            EffectShare { effect: effect.clone(), closes, closes_excess: closes, at_bound }
         })
         .collect();
     shares.sort_by(|a, b| b.closes.total_cmp(&a.closes));
@@ -99,9 +99,8 @@ fn what_is_named_counts() {
         let (candidates, shares, is_short) = drawn(&mut random);
         let naming = Naming::of(&candidates, &shares, &thresholds, is_short);
         let share = |name: &String| shares.iter().find(|s| s.effect == *name);
-        let counts = |name: &String| {
-            share(name).is_some_and(|s| s.closes_of_stage >= thresholds.least_share)
-        };
+        let counts =
+            |name: &String| share(name).is_some_and(|s| s.closes_excess >= thresholds.least_gap);
         if naming.named.len() > 1 {
             assert!(naming.named.iter().all(counts), "{naming:?}");
         }

@@ -117,16 +117,26 @@ fn seen(answer: Answer<'_>, simulator: &dyn Simulator, evidence: &Evidence) -> S
             let all = evidence.stages.iter().zip(simulator.stages());
             let worst = all.max_by(|a, b| a.0.excess_after.total_cmp(&b.0.excess_after));
             let best = evidence.best_effect.map(|e| simulator.effects()[e].name.as_str());
+            let with_best = best.map_or("no effect closes any of that".to_owned(), |best| {
+                format!("{:.2} times with {best} in it, which closes most", multiple(gap.left))
+            });
             format!(
-                "There is a gap in {} that the catalogue does not explain: what is left is {:.2} times the noise of {:.2} after the best ({}).",
+                "There is a gap in {} that the catalogue does not explain: the re-tuned simulator leaves {:.2} times the noise, and {with_best}.",
                 worst.map_or("", |(_, spec)| spec.name.as_str()),
-                multiple(gap.left),
                 multiple(gap.retuned),
-                best.unwrap_or("none")
             ) + &parts(answer.shares)
         }
         (VerdictKind::Parameters | VerdictKind::NoGap, _) => match answer.null_band {
-            Some(band) if gap.retuned > band => too_faint(gap, band, evidence, simulator),
+            Some(band) if gap.retuned > band => {
+                let left = too_faint(gap, band, evidence, simulator);
+                match naming.faint.is_empty() {
+                    true => "Too faint to name: ".to_owned() + &left,
+                    false => format!(
+                        "Found, and too small to matter: {}; {left}",
+                        naming.faint.join(", ")
+                    ),
+                }
+            }
             _ if judged.seen == VerdictKind::NoGap => {
                 "Simulator and rig agree within the noise.".to_owned() + &too_small(naming)
             }
@@ -146,7 +156,7 @@ fn too_faint(gap: Excess, band: f64, evidence: &Evidence, simulator: &dyn Simula
     let all = evidence.stages.iter().zip(simulator.stages());
     let worst = all.max_by(|a, b| a.0.excess_retuned.total_cmp(&b.0.excess_retuned));
     format!(
-        "Too faint to name: with its parameters re-tuned the simulator leaves {:.3} times the noise, most of it in {}. Noise as it is described \
+        "with its parameters re-tuned the simulator leaves {:.3} times the noise, most of it in {}. Noise as it is described \
          stays below {:.3} in 19 of 20 records like this one: it is larger, or something is missing.",
         multiple(gap.retuned),
         worst.map_or("", |(_, spec)| spec.name.as_str()),

@@ -171,6 +171,16 @@ pub(crate) fn own_effects(
         let mut parameters = Vec::new();
         for a in &effect.arguments {
             let name = if a.name.is_empty() { &effect.name } else { &a.name };
+            // what is searched in equal ratios never reaches the 0 at which it does nothing
+            let is_off = |off: f64| (a.min..=a.max).contains(&off) || a.is_log && off == 0.0;
+            // an empty range is told as one by whoever fits it
+            if let Some(off) = a.off.filter(|off| a.min < a.max && !is_off(*off)) {
+                return Err(ProblemError::value(
+                    format!("effect {name}"),
+                    format!("off = {off} is outside of its range, {} to {}", a.min, a.max),
+                    "give a range that holds the value at which it does nothing",
+                ));
+            }
             let middle = if a.is_log { (a.min * a.max).sqrt() } else { 0.5 * (a.min + a.max) };
             off.push(a.value.or(a.off).unwrap_or(middle));
             let strength = EffectParameter::sized(name, &a.unit, a.min..=a.max);

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use stretch_data::unit;
-use stretch_effects::{Grid, Kind, Side, Sketch};
+use stretch_data::{ends, unit};
+use stretch_effects::{Grid, Kind, Side, Sketch, kind_named};
 use stretch_gap::{Description, DescriptionSpec, Noise, ParameterSpec, StageSpec};
 
 use stretch_sim::Tolerance;
@@ -57,6 +57,7 @@ impl Checked {
         let ProblemSpec { stages, inputs, parameters, effects, .. } = &spec;
         check_known(stages, parameters, effects)?;
         let columns = Columns::read(&trials, used(&spec))?;
+        check_stated(stages, inputs, &columns)?;
         let sensor = spec.sensor.as_ref().map(|s| sensor_of(s, stages)).transpose()?;
         let mut notes = columns.notes.clone();
         let grid = Grid::samples(columns.dt_s)
@@ -80,6 +81,7 @@ impl Checked {
         let around = Around::of(&spec, &sites(stages, &unit_of), &among, &mut notes)?;
         let (mut looked_for, off) = own_effects(effects, stages)?;
         looked_for.extend(around.looked_for(stages));
+        check_twins(effects, looked_for.iter().map(|(_, spec)| spec.name.as_str()))?;
         let looked_for = around.without(looked_for, &spec.without)?;
         let (acting, catalogue) = looked_for.into_iter().unzip();
         let Around { wrappers, standing, .. } = around;
@@ -120,6 +122,12 @@ impl Checked {
     /// Stages, parameters, effects and trials as the diagnosis takes them.
     pub fn description(&self) -> &Description {
         &self.about
+    }
+
+    /// The problem with a note more.
+    pub(crate) fn noting(mut self, note: &str) -> Self {
+        self.notes.push(note.to_owned());
+        self
     }
 
     /// Notes on what was done to the recordings and which effects are not looked for, in sentences.
@@ -333,6 +341,104 @@ fn check_known(
     }
     for e in effects {
         check(format!("effect {}", e.name), &e.stages)?;
+    }
+    let fed_back = stages.iter().find(|s| s.inputs.contains(&s.output));
+    fed_back.map_or(Ok(()), |s| {
+        let found =
+            format!("its output {} is one of its inputs, which tells it the answer", s.output);
+        let hint = "drive it by what is commanded or by the output of another stage";
+        Err(ProblemError::value(format!("stage {}", s.name), found, hint))
+    })
+}
+
+/// Checks what is stated of columns against what was recorded in them: a unit that the column's own name contradicts, and a noise greater
+/// than all that the column ever does, beside which nothing could be seen.
+fn check_stated(
+    stages: &[StageEntry],
+    inputs: &[Input],
+    columns: &Columns,
+) -> Result<(), ProblemError> {
+    let outputs = stages.iter().map(|s| ("stage", &s.name, &s.output, &s.unit, s.noise));
+    let driving = inputs.iter().map(|i| ("input", &i.column, &i.column, &i.unit, Some(i.noise)));
+    for (what, name, column, stated, noise) in outputs.chain(driving) {
+        let owner = || format!("{what} {name}");
+        // a single letter at the end of a name may as well be that of the second motor
+        let named = unit(column).filter(|named| named.len() > 1);
+        let kind = |unit: &str| {
+            let known = KNOWN_UNITS.iter().find(|(known, _)| known.eq_ignore_ascii_case(unit));
+            known.map(|(_, kind)| *kind)
+        };
+        if let Some(named) = named.filter(|_| !stated.is_empty())
+            && let (Some(own), Some(other)) = (kind(named), kind(stated))
+            && own != other
+        {
+            let found = format!("its unit is {stated}, and its column {column} is in {named}");
+            let hint = "give the unit that the column has, or leave it out";
+            return Err(ProblemError::value(owner(), found, hint));
+        }
+        let (least, greatest) = ends(columns.of(column).unwrap_or(&[]));
+        if let Some(noise) = noise.filter(|noise| *noise > 0.0 && *noise >= greatest - least) {
+            let span = greatest - least;
+            let found = format!("a noise of {noise} hides all of {column}, which spans {span}");
+            let hint = "give one standard deviation, in the unit of the column";
+            return Err(ProblemError::value(owner(), found, hint));
+        }
+    }
+    Ok(())
+}
+
+/// Units as columns and people spell them, and what they measure.
+const KNOWN_UNITS: [(&str, &str); 29] = [
+    ("m", "length"),
+    ("cm", "length"),
+    ("mm", "length"),
+    ("um", "length"),
+    ("deg", "angle"),
+    ("degree", "angle"),
+    ("degrees", "angle"),
+    ("\u{b0}", "angle"),
+    ("rad", "angle"),
+    ("mrad", "angle"),
+    ("kg", "mass"),
+    ("g", "mass"),
+    ("n", "force"),
+    ("kn", "force"),
+    ("v", "voltage"),
+    ("mv", "voltage"),
+    ("uv", "voltage"),
+    ("a", "current"),
+    ("ma", "current"),
+    ("pa", "pressure"),
+    ("hpa", "pressure"),
+    ("kpa", "pressure"),
+    ("mpa", "pressure"),
+    ("bar", "pressure"),
+    ("s", "time"),
+    ("ms", "time"),
+    ("w", "power"),
+    ("hz", "frequency"),
+    ("ohm", "resistance"),
+];
+
+/// Checks that the twins of the user's own effects are effects.
+fn check_twins<'a>(
+    effects: &'a [OwnEffect],
+    looked_for: impl Iterator<Item = &'a str> + Clone,
+) -> Result<(), ProblemError> {
+    let own = effects.iter().map(|e| e.name.as_str());
+    for effect in effects {
+        // an effect that is not looked for this time may be a twin
+        let known = own.clone().chain(looked_for.clone());
+        let is_wrapper =
+            |name: &str| name.rsplit('.').next().is_some_and(|k| kind_named(k).is_some());
+        let unknown = effect
+            .twins
+            .iter()
+            .find(|twin| known.clone().all(|name| name != twin.as_str()) && !is_wrapper(twin));
+        if let Some(twin) = unknown {
+            let owner = format!("effect {}", effect.name);
+            return Err(ProblemError::unknown(owner, "twin", twin, known));
+        }
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial};
+use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial, Split};
 use stretch_gap::{SampleRoles, TrialSpec};
 
 use crate::error::ProblemError;
@@ -26,6 +26,10 @@ impl Columns {
     pub(crate) fn read(trials: &[SessionTrial], names: Vec<String>) -> Result<Self, ProblemError> {
         let asked: Vec<&str> = names.iter().map(String::as_str).collect();
         let session = EvenSession::new(trials, &asked, SHORTEST)?;
+        if !trials.is_empty() && trials.iter().all(|t| t.split == Split::Test) {
+            let hint = "give at least one trial split = \"fit\"";
+            return Err(ProblemError::too_little("no trial may be fitted", hint));
+        }
         if session.trials().is_empty() {
             return Err(ProblemError::value(
                 "recordings",

@@ -34,6 +34,7 @@ pub use source::{
     Ask, Closure, RecordedSession, SessionColumn, SessionPart, SessionStage, Source, SourceError,
     closure,
 };
+pub(crate) use spec::ONLY_BEHIND;
 pub use spec::{Argument, Input, OwnEffect, Parameter, ProblemSpec, Sensor, StageEntry, Wrapped};
 
 /// A checked problem and a source, bound together: a [`Simulator`].

@@ -134,7 +134,9 @@ pub enum SourceError {
         second: f64,
     },
     /// The budget of runs is spent.
-    #[error("the budget of {budget} model runs is spent")]
+    #[error(
+        "the budget of {budget} model runs is spent before there is an answer; give a greater one"
+    )]
     Spent {
         /// The budget.
         budget: usize,

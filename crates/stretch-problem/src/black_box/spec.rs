@@ -50,6 +50,25 @@ impl ProblemSpec {
     }
 }
 
+/// Says that the catalogue was narrowed for a simulator that takes no altered inputs.
+pub(crate) const ONLY_BEHIND: &str = "nothing was looked for on the input's side: the simulator takes no altered inputs (inputs = false in a worker's hello)";
+
+impl ProblemSpec {
+    /// The problem for a simulator that cannot be driven by other inputs than the recorded ones: `all` stands for what can be behind the
+    /// simulator, and noise of its inputs is not drawn. `None` where the problem asks for nothing else anyway.
+    pub(crate) fn only_behind(mut self) -> Option<Self> {
+        let is_noisy = |input: &Input| input.noise > 0.0;
+        if !self.wrap.iter().any(|name| name == "all") && !self.inputs.iter().any(is_noisy) {
+            return None;
+        }
+        for name in self.wrap.iter_mut().filter(|name| *name == "all") {
+            "output.all".clone_into(name);
+        }
+        self.inputs.iter_mut().for_each(|input| input.noise = 0.0);
+        Some(self)
+    }
+}
+
 /// A stage that is a sensor.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 pub struct Sensor {

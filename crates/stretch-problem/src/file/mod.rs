@@ -64,6 +64,8 @@ pub struct ProblemFile {
     pub budget: Option<usize>,
 }
 
+/// Name of a problem's file in a folder.
+pub(crate) const IN_FOLDER: &str = "problem.toml";
 /// The current folder.
 const HERE: &str = ".";
 
@@ -90,7 +92,7 @@ impl ProblemFile {
     /// # Errors
     /// As [`ProblemFile::read`].
     pub fn at(path: &Path) -> Result<Option<Self>, ProblemError> {
-        let inside = path.join("problem.toml");
+        let inside = path.join(IN_FOLDER);
         match path {
             path if path.is_dir() && inside.is_file() && !path.join("dataset.toml").exists() => {
                 Self::read(inside).map(Some)

@@ -12,7 +12,7 @@ use std::{
 
 use super::{
     message::{self, Hello},
-    process::{Lost, Process},
+    process::{Lost, NO_BODY, Process},
 };
 use crate::{
     black_box::source::{Ask, RecordedSession, Source, SourceError},
@@ -55,10 +55,19 @@ impl WorkersSpec {
         Self::new(&["python3", "-c", SHIM, object], folder)
     }
 
-    /// The command for messages, without the text of the worker for Python objects.
-    fn shown(&self) -> String {
-        let parts = self.command.iter().map(|s| if s == SHIM { "(worker of stretch)" } else { s });
-        parts.collect::<Vec<_>>().join(" ")
+    /// The command for messages, in one line: a part that holds white space or what is not printed stands in quotation marks, and the
+    /// text of the worker for Python objects is left out.
+    pub(crate) fn shown(&self) -> String {
+        let part = |part: &String| match part.as_str() {
+            SHIM => "(worker of stretch)".to_owned(),
+            part if part.is_empty()
+                || part.contains(|c: char| c.is_whitespace() || c.is_control()) =>
+            {
+                format!("{part:?}")
+            }
+            part => part.to_owned(),
+        };
+        self.command.iter().map(part).collect::<Vec<_>>().join(" ")
     }
 }
 
@@ -135,8 +144,12 @@ impl Workers {
 
     fn try_once(&self, asks: &[Ask<'_>]) -> Result<Vec<Result<Vec<f64>, SourceError>>, Lost> {
         let mut process = self.take()?;
-        let most = Duration::from_secs_f64((self.spec.deadline_s * asks.len() as f64).max(0.001));
-        let answered = process.exchange(message::simulate(asks), most).and_then(|frame| {
+        let most = seconds(self.spec.deadline_s * asks.len() as f64);
+        // a worker that answers all stages gives each of them
+        let samples: usize = asks.iter().map(|ask| self.session.samples(ask.trials)).sum();
+        let bytes = (samples * self.session.stages.len() * size_of::<f64>()) as u64;
+        let answer = process.exchange(message::simulate(asks), most, bytes.max(NO_BODY));
+        let answered = answer.and_then(|frame| {
             message::read_outputs(&frame, asks.len()).map_err(|why| process.failed(&why))
         });
         self.left(answered.is_ok().then_some(process));
@@ -168,16 +181,21 @@ impl Workers {
     }
 }
 
+/// A deadline; one that no clock reaches is thirty years.
+fn seconds(seconds: f64) -> Duration {
+    Duration::try_from_secs_f64(seconds.clamp(0.001, 1e9)).unwrap_or_default()
+}
+
 /// Starts a worker and exchanges hello and session with it.
 fn begin(
     spec: &WorkersSpec,
     session: &RecordedSession,
 ) -> Result<(Process, Hello, Vec<String>), Lost> {
     let mut process = Process::start(&spec.command, &spec.folder).map_err(Lost::Failed)?;
-    let most = Duration::from_secs_f64(spec.start_s.max(0.001));
-    let frame = process.exchange(message::hello(), most)?;
+    let most = seconds(spec.start_s);
+    let frame = process.exchange(message::hello(), most, NO_BODY)?;
     let hello = message::read_hello(&frame, session).map_err(|why| process.failed(&why))?;
-    let frame = process.exchange(message::session(session), most)?;
+    let frame = process.exchange(message::session(session), most, NO_BODY)?;
     let notes = message::read_ready(&frame).map_err(|why| process.failed(&why))?;
     Ok((process, hello, notes))
 }
@@ -219,7 +237,7 @@ impl Source for Workers {
     }
 
     fn batch(&self) -> usize {
-        self.hello.batch * self.spec.jobs
+        self.hello.batch.saturating_mul(self.spec.jobs)
     }
 
     fn notes(&self) -> Vec<String> {

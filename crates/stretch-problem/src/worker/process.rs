@@ -4,16 +4,20 @@ use std::{
     collections::VecDeque,
     io::{BufRead, BufReader, Read, Write},
     path::Path,
-    process::{Child, Command, Stdio},
+    process::{Command, Stdio},
     sync::{
         Arc, Mutex, PoisonError,
-        mpsc::{Receiver, RecvTimeoutError, Sender, channel},
+        atomic::{AtomicU64, Ordering::SeqCst},
+        mpsc::{Receiver, RecvTimeoutError, Sender, channel, sync_channel},
     },
     thread,
     time::{Duration, Instant},
 };
 
-use super::frame::{PREFIX, Prefix, WorkerFrame};
+use super::{
+    frame::{PREFIX, Prefix, WorkerFrame},
+    group::Group,
+};
 
 /// Number of lines of standard error that are kept.
 const LINES: usize = 12;
@@ -21,6 +25,8 @@ const LINES: usize = 12;
 const LINE_BYTES: usize = 400;
 /// Time between two checks for an interrupt while a worker is waited for.
 const GLANCE: Duration = Duration::from_millis(50);
+/// Longest body of an answer that needs none, bytes.
+pub(super) const NO_BODY: u64 = 1 << 16;
 /// Longest time that a worker may take to end.
 const LEAVES: Duration = Duration::from_millis(500);
 
@@ -38,24 +44,24 @@ type Last = Arc<Mutex<VecDeque<String>>>;
 /// A running worker.
 #[derive(Debug)]
 pub(super) struct Process {
-    child: Child,
+    group: Group,
     to: Option<Sender<Vec<u8>>>,
     from: Receiver<Result<WorkerFrame, String>>,
     last: Last,
+    /// Longest body that the next answer may have, bytes.
+    most_bytes: Arc<AtomicU64>,
 }
 
 impl Process {
     /// Starts a command in a folder.
     pub(super) fn start(command: &[String], folder: &Path) -> Result<Self, String> {
         let (program, arguments) = command.split_first().ok_or("the command is empty")?;
-        let mut child = Command::new(program)
-            .args(arguments)
-            .current_dir(folder)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
+        let mut command = Command::new(program);
+        command.args(arguments).current_dir(folder);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut group = Group::spawn(&mut command)
             .map_err(|e| format!("{program} could not be started: {e}"))?;
+        let child = &mut group.child;
         let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
         let (Some(mut stdin), Some(mut stdout), Some(stderr)) = pipes else {
             return Err("its pipes could not be opened".into());
@@ -69,10 +75,13 @@ impl Process {
                 }
             }
         });
-        let (answered, from) = channel();
+        // An answer that nobody asked for waits in the pipe.
+        let (answered, from) = sync_channel(1);
+        let most_bytes = Arc::new(AtomicU64::new(NO_BODY));
+        let most = Arc::clone(&most_bytes);
         thread::spawn(move || {
             loop {
-                let frame = read(&mut stdout);
+                let frame = read(&mut stdout, &most);
                 let is_last = frame.is_err();
                 if answered.send(frame).is_err() || is_last {
                     break;
@@ -82,11 +91,17 @@ impl Process {
         let last = Last::default();
         let kept = Arc::clone(&last);
         thread::spawn(move || keep(stderr, &kept));
-        Ok(Self { child, to: Some(to), from, last })
+        Ok(Self { group, to: Some(to), from, last, most_bytes })
     }
 
-    /// Sends a frame and waits for the answer.
-    pub(super) fn exchange(&mut self, bytes: Vec<u8>, most: Duration) -> Result<WorkerFrame, Lost> {
+    /// Sends a frame and waits for the answer, whose body has at most so many bytes.
+    pub(super) fn exchange(
+        &mut self,
+        bytes: Vec<u8>,
+        most: Duration,
+        most_bytes: u64,
+    ) -> Result<WorkerFrame, Lost> {
+        self.most_bytes.store(most_bytes, SeqCst);
         let sent = self.to.as_ref().is_some_and(|to| to.send(bytes).is_ok());
         if !sent {
             return Err(self.failed("it takes no more requests"));
@@ -102,7 +117,7 @@ impl Process {
                     return Err(Lost::Interrupted);
                 }
                 Err(RecvTimeoutError::Timeout) if left.is_zero() => {
-                    let _ = self.child.kill();
+                    self.group.kill();
                     let why = format!("it did not answer within {:.1} s", most.as_secs_f64());
                     return Err(self.failed(&why));
                 }
@@ -117,7 +132,7 @@ impl Process {
         let until = Instant::now() + LEAVES;
         let mut ended = None;
         while ended.is_none() && Instant::now() < until {
-            ended = self.child.try_wait().ok().flatten();
+            ended = self.group.child.try_wait().ok().flatten();
             if ended.is_none() {
                 thread::sleep(Duration::from_millis(5));
             }
@@ -147,18 +162,17 @@ impl Drop for Process {
         }
         let until = Instant::now() + LEAVES;
         while Instant::now() < until {
-            match self.child.try_wait() {
+            match self.group.child.try_wait() {
                 Ok(None) => thread::sleep(Duration::from_millis(5)),
-                _ => return,
+                _ => break,
             }
         }
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        // The group is killed as it is dropped, with whatever the worker left behind.
     }
 }
 
 /// The next frame of a stream.
-fn read(from: &mut impl Read) -> Result<WorkerFrame, String> {
+fn read(from: &mut impl Read, most: &AtomicU64) -> Result<WorkerFrame, String> {
     let mut prefix = [0; PREFIX];
     let mut have = 0;
     while have < PREFIX {
@@ -177,6 +191,12 @@ fn read(from: &mut impl Read) -> Result<WorkerFrame, String> {
         }
     }
     let Prefix { header, body } = Prefix::parse(&prefix).map_err(|e| e.to_string())?;
+    let most = most.load(SeqCst);
+    if body as u64 > most {
+        return Err(format!(
+            "a frame says that its body is {body} bytes long; the answer that is due has at most {most}"
+        ));
+    }
     // The lengths are the worker's claim: memory is taken only for bytes that arrive.
     let mut part = |bytes: usize| {
         let mut out = Vec::new();

@@ -6,6 +6,7 @@ use crate::{
     ReadOptions, RecordingError,
     arrays::{Array, tracks},
     grid::{Track, listed, note},
+    room::Room,
 };
 
 /// Groups within groups.
@@ -15,15 +16,18 @@ const INTERNAL: &str = "#";
 
 /// Reads a file's data sets.
 pub(crate) fn read(
-    bytes: Vec<u8>,
+    (bytes, room): (Vec<u8>, Room),
     file: &str,
     options: &ReadOptions,
 ) -> Result<(Vec<Track>, Vec<String>), RecordingError> {
     let fail = |problem| RecordingError::Format { file: file.to_owned(), format: "HDF5", problem };
     let broken = |e: hdf5_pure::Error| fail(format!("{e}; write it again, or export it as CSV"));
     let opened = File::from_bytes(bytes).map_err(broken)?;
-    let mut found = Found::default();
+    let mut found = Found { room, arrays: Vec::new(), other: Vec::new(), full: None };
     found.group(&opened.root(), "", 0).map_err(broken)?;
+    if let Some(full) = found.full.take() {
+        return Err(fail(full));
+    }
     if found.arrays.is_empty() {
         let told = match &found.other[..] {
             [] => "nothing".to_owned(),
@@ -33,19 +37,30 @@ pub(crate) fn read(
     }
     let mut notes = Vec::new();
     note(&mut notes, "left out", &found.other);
-    tracks(file, &found.arrays, notes, options)
+    tracks(file, found.arrays, notes, options)
 }
 
-#[derive(Default)]
 struct Found {
     arrays: Vec<Array>,
     other: Vec<String>,
+    room: Room,
+    /// Why no more is taken: the room is used up.
+    full: Option<String>,
 }
 
 impl Found {
     fn group(&mut self, group: &Group, path: &str, depth: usize) -> Result<(), hdf5_pure::Error> {
         for name in group.datasets()? {
             let full = format!("{path}{name}");
+            // what a data set says of its shape is known before its values are unpacked
+            let shape = group.dataset(&name)?.shape().unwrap_or_default();
+            let count = shape
+                .iter()
+                .fold(1_usize, |n, m| n.saturating_mul(usize::try_from(*m).unwrap_or(usize::MAX)));
+            if let Err(no_room) = self.room.take_numbers(count) {
+                self.full = Some(format!("{full}: {no_room}"));
+                return Ok(());
+            }
             match array(group, &name, &full) {
                 Ok(array) => self.arrays.push(array),
                 Err(e) => self.other.push(format!("{full} ({e})")),

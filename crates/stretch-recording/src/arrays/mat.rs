@@ -1,19 +1,16 @@
 //! MATLAB's files of version 5 (`save` up to -v7): matrices of numbers, and structures of them.
 
-use std::io::Read;
-
 use crate::{
     ReadOptions, RecordingError,
     arrays::{Array, tracks},
     grid::{Track, listed, note},
+    room::Room,
     whole::{signed, word},
 };
 
 /// Structures within structures; a file that says more is broken.
 const DEEPEST: usize = 16;
 const HEADER_BYTES: usize = 128;
-/// Largest block once it is unpacked.
-const LARGEST_BYTES: u64 = 8 << 30;
 
 /// Types of data elements.
 const COMPRESSED: u32 = 15;
@@ -21,13 +18,13 @@ const MATRIX: u32 = 14;
 
 /// Reads a file's arrays.
 pub(crate) fn read(
-    bytes: &[u8],
+    (bytes, room): (Vec<u8>, Room),
     file: &str,
     options: &ReadOptions,
 ) -> Result<(Vec<Track>, Vec<String>), RecordingError> {
     let fail = |problem| RecordingError::Format { file: file.to_owned(), format: "MAT", problem };
     let is_big = bytes.get(126..128) == Some(b"MI");
-    let mut found = Found::default();
+    let mut found = Found { room, arrays: Vec::new(), other: Vec::new(), full: None };
     let mut rest = Bytes { bytes: bytes.get(HEADER_BYTES..).unwrap_or_default(), is_big };
     let mut block = 0_usize;
     while !rest.bytes.is_empty() {
@@ -35,19 +32,22 @@ pub(crate) fn read(
         let broken =
             || fail(format!("variable {block} ends before its end; save the file again with -v7"));
         let (kind, data) = rest.element(false).ok_or_else(broken)?;
-        if kind == COMPRESSED {
-            let mut unpacked = Vec::new();
-            let reader = flate2::read::ZlibDecoder::new(data);
-            reader.take(LARGEST_BYTES).read_to_end(&mut unpacked).map_err(|_| broken())?;
+        let taken = if kind == COMPRESSED {
+            let unpacked = found.room.unpack(flate2::read::ZlibDecoder::new(data));
+            let unpacked = unpacked.map_err(|_| broken())?.map_err(fail)?;
             let mut inner = Bytes { bytes: &unpacked, is_big };
             let (kind, data) = inner.element(false).ok_or_else(broken)?;
-            if kind == MATRIX {
-                found.matrix(Bytes { bytes: data, is_big }, "", 0).ok_or_else(broken)?;
-            }
-        } else if kind == MATRIX {
-            found.matrix(Bytes { bytes: data, is_big }, "", 0).ok_or_else(broken)?;
+            let taken = found.variable(kind, Bytes { bytes: data, is_big });
+            found.room.give_back(unpacked.len());
+            taken
+        } else {
+            found.variable(kind, Bytes { bytes: data, is_big })
+        };
+        if taken.is_none() {
+            return Err(found.full.take().map_or_else(broken, fail));
         }
     }
+    drop(bytes);
     let mut notes = Vec::new();
     if found.arrays.is_empty() {
         return Err(fail(match &found.other[..] {
@@ -59,7 +59,7 @@ pub(crate) fn read(
         }));
     }
     note(&mut notes, "left out", &found.other);
-    tracks(file, &found.arrays, notes, options)
+    tracks(file, found.arrays, notes, options)
 }
 
 /// What is left of a block.
@@ -97,13 +97,7 @@ impl<'a> Bytes<'a> {
 
     /// The numbers of an element of type `kind`.
     fn numbers(&self, kind: u32, data: &[u8]) -> Option<Vec<f64>> {
-        let bytes = match kind {
-            1 | 2 => 1,
-            3 | 4 => 2,
-            5..=7 => 4,
-            9 | 12 | 13 => 8,
-            _ => return None,
-        };
+        let bytes = bytes_of(kind)?;
         let value = |item: &[u8]| match (kind, word(item, self.is_big)) {
             (1 | 3 | 5 | 12, word) => signed(word, bytes),
             (7, word) => f32::from_bits(word as u32).into(),
@@ -114,14 +108,42 @@ impl<'a> Bytes<'a> {
     }
 }
 
+/// Bytes of a number of an element's type; none where the type is none of numbers.
+fn bytes_of(kind: u32) -> Option<usize> {
+    match kind {
+        1 | 2 => Some(1),
+        3 | 4 => Some(2),
+        5..=7 => Some(4),
+        9 | 12 | 13 => Some(8),
+        _ => None,
+    }
+}
+
 /// Variables that hold numbers, and those that do not.
-#[derive(Default)]
 struct Found {
     arrays: Vec<Array>,
     other: Vec<String>,
+    room: Room,
+    /// Why no more is taken: the room is used up.
+    full: Option<String>,
 }
 
 impl Found {
+    /// Takes a variable that is a matrix, and passes over any other.
+    fn variable(&mut self, kind: u32, rest: Bytes<'_>) -> Option<()> {
+        if kind == MATRIX { self.matrix(rest, "", 0) } else { Some(()) }
+    }
+
+    /// The numbers of an element, where there is room for them.
+    fn numbers(&mut self, rest: &Bytes<'_>, kind: u32, data: &[u8]) -> Option<Vec<f64>> {
+        let count = data.len() / bytes_of(kind)?;
+        if let Err(full) = self.room.take_numbers(count) {
+            self.full = Some(full);
+            return None;
+        }
+        rest.numbers(kind, data)
+    }
+
     /// Takes a matrix below `path`; none where it ends before its end.
     fn matrix(&mut self, mut rest: Bytes<'_>, path: &str, depth: usize) -> Option<()> {
         if rest.bytes.is_empty() {
@@ -132,7 +154,7 @@ impl Found {
         let class = flags & 0xff;
         let (kind, dims) = rest.element(true)?;
         let dims: Vec<usize> =
-            rest.numbers(kind, dims)?.into_iter().map(|n| n.max(0.0) as usize).collect();
+            self.numbers(&rest, kind, dims)?.into_iter().map(|n| n.max(0.0) as usize).collect();
         let (_, own) = rest.element(true)?;
         let own = String::from_utf8_lossy(own).into_owned();
         let name = match (path, &own[..]) {
@@ -143,7 +165,7 @@ impl Found {
         match class {
             6..=15 => {
                 let (kind, data) = rest.element(true)?;
-                let values = rest.numbers(kind, data)?;
+                let values = self.numbers(&rest, kind, data)?;
                 let count = dims.iter().try_fold(1_usize, |n, &m| n.checked_mul(m))?;
                 if values.len() != count {
                     return None;
@@ -156,7 +178,7 @@ impl Found {
                     self.arrays.push(Array { name, shape, values });
                 }
             }
-            2 if dims.iter().product::<usize>() == 1 && depth < DEEPEST => {
+            2 if dims.iter().all(|n| *n == 1) && depth < DEEPEST => {
                 self.structure(rest, &name, depth)?;
             }
             2 => self.other.push(format!("{name} (an array of structures)")),
@@ -170,7 +192,7 @@ impl Found {
 
     fn structure(&mut self, mut rest: Bytes<'_>, name: &str, depth: usize) -> Option<()> {
         let (kind, length) = rest.element(true)?;
-        let length = *rest.numbers(kind, length)?.first()? as usize;
+        let length = *self.numbers(&rest, kind, length)?.first()? as usize;
         let (_, names) = rest.element(true)?;
         if length == 0 {
             return Some(());

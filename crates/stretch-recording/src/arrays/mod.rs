@@ -44,71 +44,78 @@ impl Array {
         }
     }
 
-    /// Its columns over `samples` instants, whichever way it lies; none where it has another length.
-    fn columns(&self, samples: usize) -> Option<Vec<Channel>> {
+    /// Number of its columns over `samples` instants, whichever way it lies, and the steps to the next sample and to the next column;
+    /// none where it has another length.
+    fn layout(&self, samples: usize) -> Option<(usize, usize, usize)> {
         let (rows, columns) = self.matrix()?;
         let (count, step, next) = match (rows == samples, columns == samples) {
             (true, _) => (columns, columns, 1),
             (_, true) => (rows, 1, columns),
             _ => return None,
         };
-        if count > MOST_COLUMNS {
-            return None;
+        (count <= MOST_COLUMNS).then_some((count, step, next))
+    }
+
+    /// Its columns over `samples` instants; none where it has another length.
+    fn into_columns(self, samples: usize) -> Option<Vec<Channel>> {
+        let (count, step, next) = self.layout(samples)?;
+        if count == 1 {
+            return Some(vec![Channel { name: self.name, values: self.values }]);
         }
-        let name = |i: usize| match count {
-            1 => self.name.clone(),
-            _ => format!("{}.{i}", self.name),
-        };
         let values = |i: usize| (0..samples).map(|k| self.values[k * step + i * next]).collect();
-        Some((0..count).map(|i| Channel { name: name(i), values: values(i) }).collect())
+        let column = |i| Channel { name: format!("{}.{i}", self.name), values: values(i) };
+        Some((0..count).map(column).collect())
     }
 }
 
 /// A clock among the arrays.
-struct ClockArray<'a> {
-    array: &'a Array,
+struct ClockArray {
+    array: Array,
+    /// The group that it is the clock of.
     of: String,
-    rises: bool,
 }
 
 /// Gives each array to the clock that it runs on.
 pub(crate) fn tracks(
     file: &str,
-    arrays: &[Array],
+    arrays: Vec<Array>,
     mut notes: Vec<String>,
     options: &ReadOptions,
 ) -> Result<(Vec<Track>, Vec<String>), RecordingError> {
-    let mut clocks: Vec<ClockArray<'_>> = arrays.iter().filter_map(|a| clock(a, options)).collect();
+    let found: Vec<_> = arrays.iter().map(|array| clock(array, options)).collect();
     // One that does not rise is a clock only by its name, and told as one where there is no other.
-    if clocks.iter().any(|clock| clock.rises) {
-        clocks.retain(|clock| clock.rises);
+    let one_rises = found.iter().flatten().any(|(_, rises)| *rises);
+    let (mut clocks, mut others) = (Vec::new(), Vec::new());
+    for (array, found) in arrays.into_iter().zip(found) {
+        match found.filter(|(_, rises)| *rises || !one_rises) {
+            Some((of, _)) => clocks.push(ClockArray { array, of }),
+            None => others.push(array),
+        }
     }
-    let others = arrays.iter().filter(|a| !clocks.iter().any(|c| std::ptr::eq(c.array, *a)));
     if clocks.is_empty() {
         return counted(file, others, notes, options);
     }
-    let mut tracks: Vec<Track> = clocks
-        .iter()
-        .map(|clock| Track {
-            clock: clock.array.name.clone(),
-            counts: clock.array.values.clone(),
-            per_second: options.divisor(&clock.array.name),
-            channels: Vec::new(),
-        })
-        .collect();
+    let mut channels: Vec<Vec<Channel>> = clocks.iter().map(|_| Vec::new()).collect();
     let mut left_out = Vec::new();
     for array in others {
-        match on(array, &clocks) {
-            Some((i, columns)) => tracks[i].channels.extend(columns),
-            None => left_out.push(array.name.as_str()),
-        }
+        let Some(i) = on(&array, &clocks) else {
+            left_out.push(array.name);
+            continue;
+        };
+        channels[i].extend(array.into_columns(clocks[i].array.values.len()).into_iter().flatten());
     }
     note(&mut notes, "left out, no clock has their length or two clocks have", &left_out);
-    Ok((tracks, notes))
+    let track = |(clock, channels): (ClockArray, _)| Track {
+        per_second: options.divisor(&clock.array.name),
+        clock: clock.array.name,
+        counts: clock.array.values,
+        channels,
+    };
+    Ok((clocks.into_iter().zip(channels).map(track).collect(), notes))
 }
 
-/// The array as a clock, if it can be one: named so, of one dimension, and rising.
-fn clock<'a>(array: &'a Array, options: &ReadOptions) -> Option<ClockArray<'a>> {
+/// What the array is the clock of and whether it rises, if it can be a clock: named so, of one dimension, and rising.
+fn clock(array: &Array, options: &ReadOptions) -> Option<(String, bool)> {
     let (samples, 1) = array.matrix()? else { return None };
     let last = array.name.rsplit(['/', '.']).next().unwrap_or_default();
     let wanted = options.time.as_str();
@@ -121,23 +128,23 @@ fn clock<'a>(array: &'a Array, options: &ReadOptions) -> Option<ClockArray<'a>> 
     };
     let rises = array.values.windows(2).all(|t| t[1] > t[0]);
     let is_named = array.name == wanted || last == wanted || time_rank(last).is_some();
-    (samples > 1 && (rises || is_named)).then_some(ClockArray { array, of, rises })
+    (samples > 1 && (rises || is_named)).then_some((of, rises))
 }
 
 /// The clock of an array: of its length, and by its name the nearest; none where two are as near.
-fn on(array: &Array, clocks: &[ClockArray<'_>]) -> Option<(usize, Vec<Channel>)> {
+fn on(array: &Array, clocks: &[ClockArray]) -> Option<usize> {
     let fits = clocks.iter().enumerate().filter_map(|(i, clock)| {
-        let columns = array.columns(clock.array.values.len())?;
-        Some((nearness(&array.name, &clock.of), i, columns))
+        array.layout(clock.array.values.len())?;
+        Some((nearness(&array.name, &clock.of), i))
     });
     let mut fits: Vec<_> = fits.collect();
-    fits.sort_by_key(|(near, ..)| std::cmp::Reverse(*near));
+    fits.sort_by_key(|(near, _)| std::cmp::Reverse(*near));
     match &fits[..] {
         [first, second, ..] if first.0 == second.0 => {
-            let (a, b) = (clocks[first.1].array, clocks[second.1].array);
-            (a.values == b.values).then(|| (first.1, first.2.clone()))
+            let (a, b) = (&clocks[first.1].array, &clocks[second.1].array);
+            (a.values == b.values).then_some(first.1)
         }
-        [first, ..] => Some((first.1, first.2.clone())),
+        [first, ..] => Some(first.1),
         [] => None,
     }
 }
@@ -158,13 +165,12 @@ fn nearness(name: &str, of: &str) -> usize {
 }
 
 /// Arrays without a clock, at a rate that the file or somebody says.
-fn counted<'a>(
+fn counted(
     file: &str,
-    others: impl Iterator<Item = &'a Array>,
+    others: Vec<Array>,
     mut notes: Vec<String>,
     options: &ReadOptions,
 ) -> Result<(Vec<Track>, Vec<String>), RecordingError> {
-    let others: Vec<&Array> = others.collect();
     let scalar = |names: &[&str]| {
         others.iter().find_map(|a| match a.values[..] {
             [value] if names.contains(&a.name.to_lowercase().as_str()) => Some(value),
@@ -173,7 +179,7 @@ fn counted<'a>(
     };
     let own = scalar(&["fs", "fs_hz", "rate_hz", "sample_rate", "sample_rate_hz", "sampling_rate"])
         .or_else(|| scalar(&["dt", "dt_s", "ts", "sample_time"]).map(|dt| 1.0 / dt));
-    let samples = others.iter().filter_map(|a| a.matrix()).map(|(r, c)| r.max(c)).max();
+    let samples = others.iter().filter_map(Array::matrix).map(|(r, c)| r.max(c)).max();
     let (Some(rate_hz), Some(samples)) = (options.sample_rate_hz.or(own), samples) else {
         let names: Vec<&str> = others.iter().map(|a| a.name.as_str()).collect();
         let hint = format!(
@@ -186,7 +192,8 @@ fn counted<'a>(
     let said = if options.sample_rate_hz.is_some() { "was said" } else { "the file says" };
     notes.push(format!("there is no time: {rate_hz} samples a second, as {said}"));
     let per_second = options.time_unit.unwrap_or(TimeUnit::Seconds).per_second();
-    let channels = others.iter().filter(|a| a.values.len() > 1).filter_map(|a| a.columns(samples));
+    let channels = others.into_iter().filter(|a| a.values.len() > 1);
+    let channels = channels.filter_map(|a| a.into_columns(samples));
     let channels = channels.flatten().collect();
     let counts = (0..samples).map(|i| i as f64 / rate_hz * per_second).collect();
     Ok((vec![Track { clock: TIME.to_owned(), counts, per_second, channels }], notes))

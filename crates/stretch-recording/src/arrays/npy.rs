@@ -1,12 +1,13 @@
 //! NumPy's arrays: one in an NPY file, several in an NPZ archive.
 
-use std::io::{Cursor, Read};
+use std::io::Cursor;
 
 use crate::{
     ReadOptions, RecordingError,
     arrays::{Array, tracks},
     grid::{Track, listed, note},
     names::time_rank,
+    room::Room,
     whole::{signed, word},
 };
 
@@ -14,12 +15,13 @@ type Tracks = (Vec<Track>, Vec<String>);
 
 /// Reads one array: columns with names, or those that somebody names.
 pub(crate) fn read(
-    bytes: &[u8],
+    (bytes, mut room): (Vec<u8>, Room),
     file: &str,
     options: &ReadOptions,
 ) -> Result<Tracks, RecordingError> {
     let fail = |problem| RecordingError::Format { file: file.to_owned(), format: "NPY", problem };
-    let mut arrays = parse(bytes, "", options).map_err(fail)?;
+    let mut arrays = parse(&bytes, "", options, &mut room).map_err(fail)?.map_err(fail)?;
+    drop(bytes);
     if let (Some(names), [array]) = (&options.columns, &mut arrays[..]) {
         arrays = named(array, names).map_err(fail)?;
     }
@@ -37,12 +39,12 @@ pub(crate) fn read(
     for (i, array) in arrays.iter_mut().enumerate().filter(|(_, a)| a.name.is_empty()) {
         array.name = format!("column_{i}");
     }
-    tracks(file, &arrays, Vec::new(), options)
+    tracks(file, arrays, Vec::new(), options)
 }
 
 /// Reads an archive of arrays.
 pub(crate) fn read_archive(
-    bytes: Vec<u8>,
+    (bytes, mut room): (Vec<u8>, Room),
     file: &str,
     options: &ReadOptions,
 ) -> Result<Tracks, RecordingError> {
@@ -59,11 +61,15 @@ pub(crate) fn read_archive(
             return Err(fail("it is an Excel workbook; save the sheet as CSV".to_owned()));
         }
         let Some(name) = path.strip_suffix(".npy") else { continue };
-        let mut content = Vec::new();
-        let read = member.read_to_end(&mut content);
-        read.map_err(|e| fail(format!("array {name}: {e}; save it again with numpy.savez")))?;
-        match parse(&content, name, options) {
-            Ok(found) => arrays.extend(found),
+        let read = room.unpack(&mut member);
+        let read =
+            read.map_err(|e| fail(format!("array {name}: {e}; save it again with numpy.savez")))?;
+        let content = read.map_err(|full| fail(format!("array {name}: {full}")))?;
+        match parse(&content, name, options, &mut room).map_err(fail)? {
+            Ok(found) => {
+                arrays.extend(found);
+                room.give_back(content.len());
+            }
             Err(problem) => other.push(format!("{name} ({problem})")),
         }
     }
@@ -73,9 +79,10 @@ pub(crate) fn read_archive(
             _ => format!("none of its arrays is of numbers: {}", listed(&other)),
         }));
     }
+    drop(archive);
     let mut notes = Vec::new();
     note(&mut notes, "left out", &other);
-    tracks(file, &arrays, notes, options)
+    tracks(file, arrays, notes, options)
 }
 
 /// The columns of a matrix by the names that somebody gives.
@@ -156,8 +163,47 @@ impl Kind {
 /// A field of an item: its name, where it begins, what it is.
 type Place = (String, usize, Kind);
 
-/// The arrays of one NPY file: one, or one a field.
-fn parse(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<Vec<Array>, String> {
+/// What an array's header says.
+struct Head {
+    fields: Vec<Place>,
+    shape: Vec<usize>,
+    is_fortran: bool,
+    /// Number of its items, bytes of each, and where the first stands.
+    count: usize,
+    item: usize,
+    begin: usize,
+}
+
+/// The arrays of one NPY file: one, or one a field. The outer error is that of the whole file: its room is used up.
+fn parse(
+    bytes: &[u8],
+    name: &str,
+    options: &ReadOptions,
+    room: &mut Room,
+) -> Result<Result<Vec<Array>, String>, String> {
+    let Head { fields, mut shape, is_fortran, count, item, begin } = match head(bytes, name) {
+        Ok(head) => head,
+        Err(problem) => return Ok(Err(problem)),
+    };
+    room.take_numbers(count.saturating_mul(fields.len()))?;
+    let data = &bytes[begin..];
+    if is_fortran {
+        shape.reverse();
+    }
+    let array = |(name, at, kind): Place| {
+        // A date is counted in what the name of its column says.
+        let scale = match kind.letter {
+            b'M' | b'm' => options.divisor(&name) / kind.per_second,
+            _ => 1.0,
+        };
+        let value = |i: usize| kind.value(&data[i * item + at..i * item + at + kind.bytes]) * scale;
+        Array { name, shape: shape.clone(), values: (0..count).map(value).collect() }
+    };
+    Ok(Ok(fields.into_iter().map(array).collect()))
+}
+
+/// Reads an array's header, and whether all of its values are there.
+fn head(bytes: &[u8], name: &str) -> Result<Head, String> {
     let broken = || "it ends within its header; save it again with numpy.save".to_owned();
     let wide = bytes.get(6).is_some_and(|&version| version >= 2);
     let length = match bytes.get(8..12) {
@@ -176,7 +222,7 @@ fn parse(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<Vec<Array>, 
     let descr = after("descr").ok_or_else(broken)?;
     let is_fortran = after("fortran_order").ok_or_else(broken)?.starts_with("True");
     let shape = after("shape").and_then(|s| s.strip_prefix('(')).and_then(|s| s.split_once(')'));
-    let mut shape: Vec<usize> = shape
+    let shape: Vec<usize> = shape
         .ok_or_else(broken)?
         .0
         .split(',')
@@ -188,22 +234,12 @@ fn parse(bytes: &[u8], name: &str, options: &ReadOptions) -> Result<Vec<Array>, 
     let product = shape.iter().try_fold(1_usize, |n, &m| n.checked_mul(m));
     let count = product.ok_or_else(|| format!("no memory holds its shape {shape:?}"))?;
     let needed = count.saturating_mul(item);
-    let data = bytes.get(data..).filter(|d| d.len() >= needed).ok_or_else(|| {
-        format!("it ends before the last of its {count} values; save it again with numpy.save")
-    })?;
-    if is_fortran {
-        shape.reverse();
+    if bytes.len() - data < needed {
+        return Err(format!(
+            "it ends before the last of its {count} values; save it again with numpy.save"
+        ));
     }
-    let array = |(name, at, kind): Place| {
-        // A date is counted in what the name of its column says.
-        let scale = match kind.letter {
-            b'M' | b'm' => options.divisor(&name) / kind.per_second,
-            _ => 1.0,
-        };
-        let value = |i: usize| kind.value(&data[i * item + at..i * item + at + kind.bytes]) * scale;
-        Array { name, shape: shape.clone(), values: (0..count).map(value).collect() }
-    };
-    Ok(fields.into_iter().map(array).collect())
+    Ok(Head { fields, shape, is_fortran, count, item, begin: data })
 }
 
 /// Fields of an item and its length in bytes.

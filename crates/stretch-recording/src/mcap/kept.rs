@@ -12,8 +12,8 @@ use ::mcap::{
     sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions},
 };
 
-/// The longest record, bytes: no recorder's is longer.
-const LONGEST: usize = 1 << 32;
+/// The longest record, bytes: recorders begin a new chunk after some megabytes.
+const LONGEST: usize = 1 << 28;
 
 /// Reads messages in the order of the file; ends at the end of its data, or after the first error.
 pub(super) struct Messages<'a> {

@@ -13,12 +13,13 @@ use serde_json::Value;
 use stretch_data::Channel;
 
 use crate::{
-    ReadOptions, RecordingError,
+    RecordingError,
     clock::{EPOCH_S, told_epoch},
     grid::{Track, listed, note},
     mcap::kept::Messages,
     mcap::leaves::{Leaves, Topic},
     mcap::messages::Schema,
+    room::Room,
 };
 
 /// Longest array whose numbers become channels.
@@ -33,14 +34,17 @@ const STAMPS: [(&str, &str); 4] = [
 
 /// Reads all topics whose messages can be understood.
 pub(crate) fn read(
-    bytes: &[u8],
+    (bytes, mut room): (Vec<u8>, Room),
     file: &str,
-    _: &ReadOptions,
 ) -> Result<(Vec<Track>, Vec<String>), RecordingError> {
     let fail = |problem| RecordingError::Format { file: file.to_owned(), format: "MCAP", problem };
     let mut bag = Bag::default();
     let mut notes = Vec::new();
-    for (count, message) in Messages::new(bytes).enumerate() {
+    for (count, message) in Messages::new(&bytes).enumerate() {
+        if let Ok(message) = &message {
+            // a byte becomes two on average: numbers of four bytes have eight here
+            room.take(2 * message.data.len() as u64).map_err(fail)?;
+        }
         match message {
             Ok(message) => bag.take(&message.channel, message.log_time.into(), &message.data),
             Err(e) if count > 0 => {

@@ -17,6 +17,7 @@ use crate::{
     ReadOptions, Recording, RecordingError,
     clock::{EPOCH_S, time_among, told_epoch},
     options::TIME,
+    room::{Packed, Room},
     text::columns::{Columns, located},
     text::dialect::{BLANKS, Dialect},
     text::header::Header,
@@ -29,8 +30,21 @@ pub(crate) fn read(
     reader: impl Read,
     file: &str,
     options: &ReadOptions,
+    packed: Option<&Packed>,
 ) -> Result<(Recording, String), RecordingError> {
-    read_blocks(reader, file, options, usize::MAX, &mut |_, _| Ok(()))
+    let mut lines = Lines::new(reader, file, options.max_line_bytes);
+    let mut table = Table::begun(&mut lines, file, options)?;
+    while let Some((row, line)) = lines.next()? {
+        table.take(row, line)?;
+        // text takes at most four times its length as numbers; what is packed has no such measure
+        if let Some(packed) = packed.filter(|_| table.columns.len() % 4096 == 0) {
+            let numbers = table.columns.len().saturating_mul(table.header.names.len());
+            Room::beside(packed.get()).take_numbers(numbers).map_err(|problem| {
+                RecordingError::Format { file: file.to_owned(), format: "gzip", problem }
+            })?;
+        }
+    }
+    table.finish()
 }
 
 /// The same, every `most` rows given away with the name of the time column; what is left, and the notes of all, come back.
@@ -42,13 +56,7 @@ pub(crate) fn read_blocks<E: From<RecordingError>>(
     give: &mut dyn FnMut(Trial, &str) -> Result<(), E>,
 ) -> Result<(Recording, String), E> {
     let mut lines = Lines::new(reader, file, options.max_line_bytes);
-    let mut top = Top::read(&mut lines, file, options)?;
-    top.tidy(options);
-    let ahead = std::mem::take(&mut top.ahead);
-    let mut table = Table::new(file, top, options)?;
-    for (row, line) in ahead {
-        table.take(row, &line)?;
-    }
+    let mut table = Table::begun(&mut lines, file, options)?;
     while let Some((row, line)) = lines.next()? {
         table.take(row, line)?;
         if table.columns.len() >= most {
@@ -79,6 +87,22 @@ struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
+    /// The table that some lines begin, with the rows that were read ahead.
+    fn begun(
+        lines: &mut Lines<impl Read>,
+        file: &'a str,
+        options: &ReadOptions,
+    ) -> Result<Self, RecordingError> {
+        let mut top = Top::read(lines, file, options)?;
+        top.tidy(options);
+        let ahead = std::mem::take(&mut top.ahead);
+        let mut table = Self::new(file, top, options)?;
+        for (row, line) in ahead {
+            table.take(row, &line)?;
+        }
+        Ok(table)
+    }
+
     fn new(file: &'a str, top: Top, options: &ReadOptions) -> Result<Self, RecordingError> {
         let Top { mut header, mut notes, .. } = top;
         let fields = header.names.len();

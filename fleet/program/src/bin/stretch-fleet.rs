@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    stretch_fleet_program::run()
+    stretch_fleet_program::run(std::env::args_os())
 }

@@ -61,6 +61,7 @@ impl About {
             "{}: this is layout {found} of a lake, and this release reads layout {SCHEMA}",
             path.display()
         );
+        about.sample_rate().with_context(|| path.display().to_string())?;
         Ok(Some(about))
     }
 

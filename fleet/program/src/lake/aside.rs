@@ -2,9 +2,10 @@
 
 use std::{fs, path::Path};
 
+use anyhow::ensure;
 use serde::Serialize;
 
-use super::digest;
+use super::{Lake, digest, open::Unfit};
 
 /// A file that was refused.
 #[derive(Debug, Clone, Serialize)]
@@ -31,6 +32,39 @@ pub(crate) fn accept(lake: &Path, file: &Path) -> std::io::Result<()> {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(e),
         _ => Ok(()),
     }
+}
+
+/// Moves the files that no query could read into `refused/`, under names that say where they stood.
+///
+/// # Errors
+/// More files that lake.json does not fit than files that it does: it is wrong rather than they, and all stay where they are.
+pub(crate) fn set_aside(lake: &Lake) -> anyhow::Result<Vec<Refused>> {
+    let others: Vec<&Unfit> = lake.unfit.iter().filter(|file| file.is_of_another_lake).collect();
+    if let Some(Unfit { path, why, .. }) = others.first() {
+        ensure!(
+            others.len() <= lake.files.len(),
+            "lake.json fits {} of the lake's files and does not fit {}, the first {}: {why}. Nothing was moved: put lake.json \
+             right, or take those files out",
+            lake.files.len(),
+            others.len(),
+            path.display()
+        );
+    }
+    let one = |Unfit { path, why, .. }: &Unfit| {
+        let stood = path.strip_prefix(lake.folder.join("trials")).unwrap_or(path);
+        let name = stood.display().to_string().replace('/', ",");
+        let refused = refuse(&lake.folder, path, why)?;
+        let folder = lake.folder.join("refused");
+        let mut free = folder.join(&name);
+        let mut number = 1;
+        while free.exists() {
+            number += 1;
+            free = folder.join(format!("{name}.{number}"));
+        }
+        fs::rename(path, free)?;
+        Ok(refused)
+    };
+    lake.unfit.iter().map(one).collect()
 }
 
 /// A name that stays with the path.

@@ -1,6 +1,6 @@
 //! What the footer of a trial's file says of it.
 
-use std::{collections::BTreeMap, fs::File, path::Path};
+use std::collections::BTreeMap;
 
 use anyhow::{Context, bail};
 use datafusion::parquet::arrow::arrow_reader::ArrowReaderMetadata;
@@ -43,13 +43,7 @@ pub(crate) struct Footer {
 }
 
 impl Footer {
-    /// The footer of a file, without its rows.
-    pub(crate) fn read(path: &Path) -> anyhow::Result<Self> {
-        let file = File::open(path)?;
-        Self::of(&ArrowReaderMetadata::load(&file, Default::default())?)
-    }
-
-    /// The same of a file that is open already.
+    /// The footer of a file that is open.
     pub(crate) fn of(parquet: &ArrowReaderMetadata) -> anyhow::Result<Self> {
         let pairs = parquet.metadata().file_metadata().key_value_metadata();
         let pair = pairs.into_iter().flatten().find(|pair| pair.key == KEY);

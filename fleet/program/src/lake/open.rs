@@ -14,7 +14,7 @@ use datafusion::{
 };
 use rayon::prelude::*;
 
-use super::{About, Footer, Place, Refused, refuse};
+use super::{About, Footer, Place};
 
 /// A lake and its files.
 #[derive(Debug)]
@@ -25,10 +25,20 @@ pub(crate) struct Lake {
     pub files: Vec<LakeFile>,
     /// Columns of all files; what a file lacks is null there.
     pub schema: SchemaRef,
-    /// Files that were set aside just now.
-    pub refused: Vec<Refused>,
+    /// Files below `trials` that no query could read beside the others.
+    pub unfit: Vec<Unfit>,
     /// What was noticed.
     pub notes: Vec<String>,
+}
+
+/// A file below `trials` that is left out.
+#[derive(Debug)]
+pub(crate) struct Unfit {
+    pub path: PathBuf,
+    /// Why, and what to do.
+    pub why: String,
+    /// Whether it could be read, and its rates are not those that lake.json names.
+    pub is_of_another_lake: bool,
 }
 
 /// A trial of a lake.
@@ -41,8 +51,8 @@ pub(crate) struct LakeFile {
 }
 
 impl Lake {
-    /// Reads every footer. A file that cannot be read, or that no query could read beside the others, is moved into
-    /// `refused/` with a sentence.
+    /// Reads every footer, and writes nothing. A file that cannot be read, or that no query could read beside the others, is
+    /// left out.
     pub(crate) fn open(folder: &Path) -> anyhow::Result<Self> {
         let shown = folder.display();
         let Some(about) = About::read(folder)? else {
@@ -52,27 +62,33 @@ impl Lake {
         let paths = files(&folder.join("trials"))?;
         let read: Vec<_> =
             paths.par_iter().map(|path| LakeFile::read(&folder, path, &about)).collect();
-        let (mut files, mut refused) = (Vec::new(), Vec::new());
-        for (path, read) in paths.iter().zip(read) {
+        let (mut files, mut unfit) = (Vec::new(), Vec::new());
+        for read in read {
             match read {
                 Ok(file) => files.push(file),
-                Err(why) => refused.push(set_aside(&folder, path, &format!("{why:#}"))?),
+                Err(why) => unfit.push(why),
             }
         }
         files.sort_by(|a, b| (&a.place, &a.path).cmp(&(&b.place, &b.path)));
         let (schema, notes) = common(&about, &files);
-        Ok(Self { folder, about, files, schema, refused, notes })
+        Ok(Self { folder, about, files, schema, unfit, notes })
     }
 }
 
 impl LakeFile {
-    fn read(lake: &Path, path: &Path, about: &About) -> anyhow::Result<Self> {
+    fn read(lake: &Path, path: &Path, about: &About) -> Result<Self, Unfit> {
+        let unfit = |why, is_of_another_lake| Unfit { path: path.into(), why, is_of_another_lake };
+        let file = Self::parse(lake, path).map_err(|why| unfit(format!("{why:#}"), false))?;
+        about.check(&file.footer.about).map_err(|why| unfit(why, true))?;
+        Ok(file)
+    }
+
+    fn parse(lake: &Path, path: &Path) -> anyhow::Result<Self> {
         let place = Place::of(path.strip_prefix(lake.join("trials"))?)?;
         let damaged = "it is damaged; ingest its trial again";
         let parquet = ArrowReaderMetadata::load(&File::open(path)?, Default::default())
             .map_err(|e| anyhow::anyhow!("{damaged}: {e}"))?;
         let footer = Footer::of(&parquet)?;
-        about.check(&footer.about).map_err(anyhow::Error::msg)?;
         let columns = parquet.schema().clone();
         for field in columns.fields() {
             let fits = match field.name().as_str() {
@@ -96,33 +112,30 @@ impl LakeFile {
 
 /// Every Parquet file below a folder, in order.
 pub(crate) fn files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
-    let (mut found, mut folders) = (Vec::new(), vec![folder.to_owned()]);
-    while let Some(folder) = folders.pop() {
+    let mut found = below(folder, usize::MAX)?;
+    found.retain(|path| path.extension().is_some_and(|ending| ending == "parquet"));
+    Ok(found)
+}
+
+/// Every file at most `depth` folders below a folder, in order; none where there is no folder.
+pub(crate) fn below(folder: &Path, depth: usize) -> anyhow::Result<Vec<PathBuf>> {
+    let (mut found, mut folders) = (Vec::new(), vec![(folder.to_owned(), depth)]);
+    while let Some((folder, depth)) = folders.pop() {
         let entries = match fs::read_dir(&folder) {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => continue,
             entries => entries.with_context(|| folder.display().to_string())?,
         };
         for entry in entries {
             let entry = entry?;
-            let path = entry.path();
-            if entry.file_type()?.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|ending| ending == "parquet") {
-                found.push(path);
+            if !entry.file_type()?.is_dir() {
+                found.push(entry.path());
+            } else if depth > 0 {
+                folders.push((entry.path(), depth - 1));
             }
         }
     }
     found.sort();
     Ok(found)
-}
-
-/// Moves a file of the lake into `refused/`, under a name that says where it stood.
-fn set_aside(lake: &Path, path: &Path, why: &str) -> anyhow::Result<Refused> {
-    let stood = path.strip_prefix(lake.join("trials")).unwrap_or(path);
-    let name = stood.display().to_string().replace('/', ",");
-    let refused = refuse(lake, path, why)?;
-    fs::rename(path, lake.join("refused").join(name))?;
-    Ok(refused)
 }
 
 /// The columns of all files, numbers as f64, and which files lack some.

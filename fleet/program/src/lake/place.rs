@@ -8,6 +8,22 @@ use chrono::NaiveDate;
 /// Columns of the place, in the order of the folders.
 pub(crate) const COLUMNS: [&str; 4] = ["site", "rig", "sensor", "date"];
 
+/// Longest name of a site, rig or sensor: with its column, and its ending as a record, it is the name of a file everywhere.
+const MOST_LETTERS: usize = 100;
+
+/// Refuses a name that could not be that of a folder, or that would lead out of one.
+pub(crate) fn check_name(what: &str, name: &str) -> anyhow::Result<()> {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    ensure!(
+        !name.is_empty()
+            && name.len() <= MOST_LETTERS
+            && name.chars().all(is_plain)
+            && !name.starts_with('.'),
+        "{name:?} cannot be a {what}: use letters, digits, -, _ and ., at most {MOST_LETTERS} of them"
+    );
+    Ok(())
+}
+
 /// The partition of a trial.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) struct Place {
@@ -21,11 +37,7 @@ impl Place {
     /// Names that can be those of folders, and a date as 2026-11-21 or 20261121.
     pub(crate) fn new([site, rig, sensor, date]: [&str; 4]) -> anyhow::Result<Self> {
         for (what, name) in COLUMNS.iter().zip([site, rig, sensor]) {
-            let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
-            ensure!(
-                !name.is_empty() && name.chars().all(is_plain) && !name.starts_with('.'),
-                "{name:?} cannot be a {what}: use letters, digits, -, _ and ."
-            );
+            check_name(what, name)?;
         }
         let forms = ["%Y-%m-%d", "%Y%m%d"];
         let read = forms.iter().find_map(|form| NaiveDate::parse_from_str(date, form).ok());

@@ -5,7 +5,9 @@ use std::{fs, path::Path, sync::Arc};
 use datafusion::arrow::array::{ArrayRef, Int64Array, StringArray};
 use stretch_data::Channel;
 
-use crate::support::{altered, file, numbers, only, parquet, refused, rows, said, trial};
+use crate::support::{
+    altered, asked, file, numbers, only, parquet, refused, rows, said, tree, trial, warned,
+};
 
 const FIT: &str = "select sensor, fit['rows'] as n, fit['rows_left_out'] as lost, fit['rmse'] as rmse, fit['refused'] as why from \
      (select sensor, poly13_fit(rate, bridge_v, contraction) as fit from trials group by sensor) order by sensor";
@@ -53,7 +55,7 @@ fn a_column_that_one_file_lacks_is_null_there_and_said() {
 }
 
 #[test]
-fn whole_numbers_are_numbers_and_text_is_set_aside() {
+fn whole_numbers_are_numbers_and_text_is_left_out() {
     let folder = tempfile::tempdir().unwrap();
     let lake = lake(folder.path());
     let whole: Int64Array = (0..600).map(|n| Some(n % 7)).collect();
@@ -64,10 +66,10 @@ fn whole_numbers_are_numbers_and_text_is_set_aside() {
     altered(&path, "bridge_v", Some(text), &same);
     let told = said("calibrate --lake {} --out {}", &[&lake, &folder.path().join("out")]);
     assert!(
-        told.contains("set aside:") && told.contains("its column bridge_v is of type Utf8"),
+        told.contains("left out:") && told.contains("its column bridge_v is of type Utf8"),
         "{told}"
     );
-    assert!(!path.exists() && lake.join("refused").exists());
+    assert!(path.exists() && !lake.join("refused").exists(), "a question moved a file");
     assert_eq!(rows(&lake, "select distinct sensor from trials"), [["1"]]);
 }
 
@@ -143,7 +145,7 @@ fn rates_of_another_estimator_are_refused() {
         )
     });
     let told = said("calibrate --lake {} --out {}", &[&lake, &out]);
-    assert!(told.contains("set aside:") && told.contains(sentence), "{told}");
+    assert!(told.contains("left out:") && told.contains(sentence), "{told}");
 }
 
 #[test]
@@ -152,7 +154,7 @@ fn a_sensor_has_one_rest_length() {
     let lake = lake(folder.path());
     let path = file(folder.path(), &trial("again.csv", 0.5));
     let line = "ingest {} --lake {} --sensor 1 --date 2026-01-02";
-    let told = said(&format!("{line} --rest-length 190"), &[&path, &lake]);
+    let told = warned(&format!("{line} --rest-length 190"), &[&path, &lake]);
     assert!(told.contains("and --rest-length says 190: one fit cannot have two zeros"), "{told}");
     assert!(said(line, &[&path, &lake]).contains("1 trials written"));
     // (L0 - L)/L0 is the same line for both
@@ -167,7 +169,7 @@ fn two_records_of_one_trial_are_said() {
     let lake = lake(folder.path());
     let line = "ingest {} --lake {} --sensor 1 --date 2026-01-01";
     let again = file(&folder.path().join("again"), &trial("1.csv", 0.1));
-    let told = said(line, &[&again, &lake]);
+    let told = warned(line, &[&again, &lake]);
     assert!(
         told.contains("it is a second record of trial 1.csv of site/rig/1 of 2026-01-01"),
         "{told}"
@@ -176,11 +178,11 @@ fn two_records_of_one_trial_are_said() {
     let text = fs::read_to_string(folder.path().join("1.csv")).unwrap();
     let semicolons = folder.path().join("other.csv");
     fs::write(&semicolons, text.replace(',', ";")).unwrap();
-    let told = said(line, &[&semicolons, &lake]);
+    let told = warned(line, &[&semicolons, &lake]);
     assert!(told.contains("a trial counted twice would weigh double"), "{told}");
     // the same file for another sensor
     let first = folder.path().join("1.csv");
-    let told = said("ingest {} --lake {} --sensor 9 --date 2026-01-01", &[&first, &lake]);
+    let told = warned("ingest {} --lake {} --sensor 9 --date 2026-01-01", &[&first, &lake]);
     assert!(told.contains("the lake has it already as a trial of site/rig/1"), "{told}");
     assert_eq!(rows(&lake, "select count(*) from trials"), [["1200"]]);
 }
@@ -195,11 +197,68 @@ fn a_damaged_file_of_the_lake_is_set_aside() {
     let told = said("calibrate --lake {} --out {}", &[&lake, &folder.path().join("out")]);
     assert!(told.contains("it is damaged; ingest its trial again"), "{told}");
     assert!(told.contains("1 records of 1 sensors"), "{told}");
-    // and it can be
-    let told = said(
-        "ingest {} --lake {} --sensor 2 --date 2026-01-01",
-        &[&folder.path().join("2.csv"), &lake],
-    );
-    assert!(told.contains("1 trials written"), "{told}");
+    assert!(path.exists(), "a question moved a file");
+    assert_eq!(rows(&lake, "select count(*) from trials"), [["600"]]);
+    // an ingest sets it aside, brings its trial in again, and says so
+    let line = "ingest {} --lake {} --sensor 2 --date 2026-01-01";
+    let told = warned(line, &[&folder.path().join("2.csv"), &lake]);
+    assert!(told.contains("1 trials written (600 rows), 0 there already, 1 refused"), "{told}");
+    let moved = fs::read_dir(lake.join("refused")).unwrap().flatten();
+    assert_eq!(moved.filter(|entry| entry.path().metadata().unwrap().len() > 1000).count(), 1);
+    assert_eq!(rows(&lake, "select count(*) from trials"), [["1200"]]);
+    let told = said(line, &[&folder.path().join("2.csv"), &lake]);
+    assert!(told.contains("1 there already, 0 refused"), "{told}");
+}
+
+/// Trials of the day of a damaged one are still read, each with its place, and fitted as if the damaged one were not there.
+#[test]
+fn what_stands_beside_a_damaged_file_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let lake = lake(folder.path());
+    let line = "ingest {} --lake {} --sensor 2 --date 2026-01-01";
+    let before = rows(&lake, FIT);
+    let more = file(folder.path(), &trial("more.csv", 0.7));
+    said(line, &[&more, &lake]);
+    let is_more = |path: &Path| parquet(path).1[0].value.as_ref().unwrap().contains("more.csv");
+    let of_day = lake.join("trials/site=site/rig=rig/sensor=2/date=2026-01-01");
+    let paths = fs::read_dir(&of_day).unwrap().map(|entry| entry.unwrap().path());
+    let damaged = paths.into_iter().find(|path| is_more(path)).unwrap();
+    fs::write(&damaged, "PAR1 and nothing else").unwrap();
+    assert_eq!(rows(&lake, FIT), before);
+    let places =
+        "select site, rig, sensor, date, count(*) from trials group by 1, 2, 3, 4 order by 3";
+    let told = rows(&lake, places);
+    assert_eq!(told[1], ["site", "rig", "2", "2026-01-01", "600"]);
+    assert_eq!(told.len(), 2);
+    let out = folder.path().join("out");
+    let told = said("calibrate --lake {} --out {}", &[&lake, &out]);
+    assert!(told.contains("left out:") && told.contains("2 records of 2 sensors"), "{told}");
+}
+
+/// A description that fits no trial is wrong itself: questions say so, and nobody moves a trial.
+#[test]
+fn a_wrong_number_in_lake_json_moves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let lake = lake(folder.path());
+    let path = lake.join("lake.json");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replace("100.0", "101.0")).unwrap();
+    let before = tree(&lake);
+    let (is_answered, told) = asked(&lake, "select count(*) from trials", &[]);
+    assert!(!is_answered && told.contains("and that of the lake is"), "{told}");
+    for line in ["calibrate --lake {} --out {}", "diagnose --lake {} --out {}"] {
+        refused(line, &[&lake, &folder.path().join("out")]);
+    }
+    let more = file(folder.path(), &trial("3.csv", 0.5));
+    let line = "ingest {} --lake {} --sensor 3 --date 2026-01-01";
+    let told = refused(line, &[&more, &lake]);
+    assert!(told.contains("Nothing was moved: put lake.json right"), "{told}");
+    assert!(tree(&lake) == before);
+    for wrong in ["-100.0", "1e999", "\"100\"", "null"] {
+        fs::write(&path, text.replace("100.0", wrong)).unwrap();
+        let (is_answered, told) = asked(&lake, "select count(*) from trials", &[]);
+        assert!(!is_answered && told.contains("lake.json"), "{wrong}: {told}");
+    }
+    fs::write(&path, text).unwrap();
     assert_eq!(rows(&lake, "select count(*) from trials"), [["1200"]]);
 }

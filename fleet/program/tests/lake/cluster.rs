@@ -6,7 +6,7 @@ use std::{
     process::{Child, Command, Stdio},
 };
 
-use crate::support::{PROGRAM, bytes, parquet, said};
+use crate::support::{PROGRAM, bytes, only, parquet, said};
 
 /// Processes that end with the test.
 struct Cluster(Vec<Child>);
@@ -44,6 +44,22 @@ fn cluster() -> Option<(Cluster, String)> {
     Some((all, url))
 }
 
+/// Sums of a cluster come in another order, and round otherwise.
+fn assert_same_fits(here: &Path, there: &Path) {
+    let rmse = |out: &Path| {
+        let (rows, _) = parquet(&out.join("calibrations.parquet"));
+        let column = rows.column_by_name("rmse").unwrap();
+        let column: &datafusion::arrow::array::Float64Array =
+            datafusion::arrow::array::AsArray::as_primitive(column.as_ref());
+        column.values().to_vec()
+    };
+    let [here, there] = [here, there].map(rmse);
+    assert_eq!(here.len(), there.len());
+    for (a, b) in here.iter().zip(there) {
+        assert!((a / b - 1.0).abs() < 1e-12, "{a} {b}");
+    }
+}
+
 #[test]
 fn ready_commands_answer_the_same_on_a_cluster() {
     let Some((_cluster, url)) = cluster() else { return };
@@ -60,15 +76,89 @@ fn ready_commands_answer_the_same_on_a_cluster() {
         "{told}"
     );
     assert_eq!(bytes(&here).len(), bytes(&there).len());
-    let rmse = |out: &Path| {
-        let (rows, _) = parquet(&out.join("calibrations.parquet"));
-        let column = rows.column_by_name("rmse").unwrap();
-        let column: &datafusion::arrow::array::Float64Array =
-            datafusion::arrow::array::AsArray::as_primitive(column.as_ref());
-        column.values().to_vec()
-    };
-    for (a, b) in rmse(&here).iter().zip(rmse(&there)) {
-        assert!((a / b - 1.0).abs() < 1e-12, "{a} {b}");
-    }
+    assert_same_fits(&here, &there);
     assert_eq!(said(&format!("{drift} --cluster {url}"), &[&lake]), moved);
+    // a damaged file is left out by executors as well
+    std::fs::write(only(&lake.join("trials")), "PAR1 and nothing else").unwrap();
+    let told = said("calibrate --lake {} --out {}", &[&lake, &here]);
+    assert!(told.contains("left out:") && told.contains("1 months of rigs computed now"), "{told}");
+    std::fs::remove_dir_all(lake.join("states")).unwrap();
+    let told = said(&format!("calibrate --lake {{}} --out {{}} --cluster {url}"), &[&lake, &there]);
+    assert!(told.contains("left out:") && told.contains("5 records of 5 sensors"), "{told}");
+    assert_same_fits(&here, &there);
+}
+
+/// Two machines that are joined by a cable: network namespaces, which go with this.
+struct Machines([String; 2]);
+
+impl Machines {
+    fn new() -> Self {
+        let names = ["a", "b"].map(|letter| format!("stretch-{}-{letter}", std::process::id()));
+        let machines = Self(names);
+        let [a, b] = &machines.0;
+        for name in [a, b] {
+            ip(&["netns", "add", name]);
+        }
+        ip(&["-n", a, "link", "add", "cable", "type", "veth", "peer", "name", "cable", "netns", b]);
+        for (name, address) in [(a, "10.0.0.1/24"), (b, "10.0.0.2/24")] {
+            ip(&["-n", name, "address", "add", address, "dev", "cable"]);
+            ip(&["-n", name, "link", "set", "cable", "up"]);
+            ip(&["-n", name, "link", "set", "lo", "up"]);
+        }
+        machines
+    }
+
+    /// A program on one of them.
+    fn on(&self, machine: usize, program: &Path) -> Command {
+        let mut command = Command::new("ip");
+        command.args(["netns", "exec", &self.0[machine]]).arg(program);
+        command
+    }
+}
+
+impl Drop for Machines {
+    fn drop(&mut self) {
+        for name in &self.0 {
+            let _ = Command::new("ip").args(["netns", "del", name]).status();
+        }
+    }
+}
+
+fn ip(words: &[&str]) {
+    assert!(Command::new("ip").args(words).status().expect("ip runs").success(), "ip {words:?}");
+}
+
+/// The recipe of the README for many machines: the scheduler and the program on one, an executor on the other.
+#[test]
+#[ignore = "needs root and network namespaces; gate.sh runs it where they can be made"]
+fn with_netns_the_recipe_for_many_machines_answers() {
+    let beside = |name: &str| Path::new(PROGRAM).with_file_name(name);
+    let folder = tempfile::tempdir().unwrap();
+    let [lake, here, there] = ["lake", "here", "there"].map(|name| folder.path().join(name));
+    said("make --lake {} --sensors 3 --days 4 --rows 200", &[&lake]);
+    said("calibrate --lake {} --out {}", &[&lake, &here]);
+    std::fs::remove_dir_all(lake.join("states")).unwrap();
+    let machines = Machines::new();
+    let mut all = Cluster(Vec::new());
+    let mut start = |machine: usize, name: &str, words: &[&str]| {
+        let mut command = machines.on(machine, &beside(name));
+        let mut child = command.args(words).stdout(Stdio::piped()).spawn().expect("it starts");
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).expect("a line");
+        all.0.push(child);
+        line
+    };
+    let line = start(0, "stretch-scheduler", &["--bind-host", "10.0.0.1", "--insecure"]);
+    assert!(line.trim_end().ends_with("df://10.0.0.1:50050"), "{line}");
+    let line = start(1, "stretch-executor", &["--scheduler", "10.0.0.1:50050", "--insecure"]);
+    assert!(line.starts_with("executor 10.0.0.2:"), "{line}");
+    let output = machines
+        .on(0, Path::new(PROGRAM))
+        .args(["calibrate", "--cluster", "df://10.0.0.1:50050", "--lake"])
+        .args([lake.as_path(), Path::new("--out"), &there])
+        .output()
+        .unwrap();
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{told}");
+    assert_same_fits(&here, &there);
 }

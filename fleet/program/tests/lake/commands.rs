@@ -5,7 +5,7 @@ use std::fs;
 use datafusion::arrow::array::{AsArray, BooleanArray};
 use stretch_data::{Channel, Trial};
 
-use crate::support::{bytes, file, fleet, parquet, refused, said, trial};
+use crate::support::{asked, bytes, file, fleet, parquet, refused, said, tree, trial};
 
 /// Sensors that drift are found, others are not: four of ten sensors lose a twentieth of their gain.
 #[test]
@@ -124,4 +124,81 @@ fn a_partition_is_diagnosed_once() {
     assert!(
         fleet("diagnose --lake {} --out {} --share 4/3", &[&lake, &out]).status.code() == Some(2)
     );
+}
+
+#[test]
+fn a_question_only_reads_unless_it_may_write() {
+    let folder = tempfile::tempdir().unwrap();
+    let (lake, to) = (folder.path().join("lake"), folder.path().join("copied.parquet"));
+    said("make --lake {} --sensors 1 --days 1 --rows 100", &[&lake]);
+    let before = tree(&lake);
+    let copy = format!("copy (select * from trials) to '{}'", to.display());
+    for query in [
+        copy.as_str(),
+        "insert into trials select * from trials",
+        "create table mine as select * from trials",
+        "create external table mine stored as csv location '/etc/passwd'",
+        "drop table trials",
+        "set datafusion.execution.batch_size = 1",
+    ] {
+        let (is_answered, told) = asked(&lake, query, &[]);
+        assert!(!is_answered && told.contains("--write allows what writes"), "{query}: {told}");
+    }
+    assert!(!to.exists() && tree(&lake) == before);
+    for query in ["select * from '/etc/passwd'", "select 1 from trials where"] {
+        let (is_answered, told) = asked(&lake, query, &[]);
+        assert!(!is_answered && !told.contains("--write"), "{query}: {told}");
+    }
+    for query in ["explain select * from trials", "describe trials", "show tables"] {
+        let (is_answered, told) = asked(&lake, query, &[]);
+        assert!(is_answered, "{query}: {told}");
+    }
+    let (is_answered, told) = asked(&lake, &copy, &["--write"]);
+    assert!(is_answered && to.exists(), "{told}");
+}
+
+/// A query may call anything a sensor; its record does not leave the folder.
+#[test]
+fn records_stay_in_their_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let [lake, out] = ["lake", "deep/er/out"].map(|name| folder.path().join(name));
+    said("make --lake {} --sensors 1 --days 1 --rows 300", &[&lake]);
+    let fit = |sensor: &str| {
+        format!(
+            "select {sensor} as sensor, poly13_fit(rate, bridge_v, contraction) as fit from trials"
+        )
+    };
+    let shown = out.display().to_string();
+    let absolute = format!("'{}'", folder.path().join("absolute").display());
+    for sensor in ["'../../escaped'", "'..'", "'a/b'", "'.hidden'", "''", "null", &absolute] {
+        let (is_answered, told) = asked(&lake, &fit(sensor), &["--records", &shown]);
+        assert!(is_answered && told.contains("0 records, 1 refused"), "{sensor}: {told}");
+        assert!(told.contains("cannot be a sensor"), "{sensor}: {told}");
+    }
+    let names: Vec<_> = tree(folder.path()).into_keys().collect();
+    assert!(names.iter().all(|name| name.starts_with("lake/")), "{names:?}");
+    // nor does a second row take the name of the first
+    let twice = format!("({0}) union all ({0})", fit("'00000'"));
+    let (is_answered, told) = asked(&lake, &twice, &["--records", &shown]);
+    assert!(is_answered && told.contains("1 records, 1 refused"), "{told}");
+    assert!(told.contains("another row of the answer has that name"), "{told}");
+}
+
+/// Sums come in the order of files and rows, whoever takes them.
+#[test]
+fn calibrations_have_the_same_bits_on_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let lake = folder.path().join("lake");
+    // two trials a day: a day's state is of several files as well
+    said("make --lake {} --sensors 5 --days 40 --rows 400 --rigs 2", &[&lake]);
+    said("make --lake {} --sensors 5 --days 40 --rows 400 --rigs 2 --seed 2", &[&lake]);
+    let mut first = None;
+    for (run, threads) in [1, 2, 2, 3, 2, 4].into_iter().enumerate() {
+        let out = folder.path().join(format!("out-{run}"));
+        let _ = fs::remove_dir_all(lake.join("states"));
+        said(&format!("calibrate --lake {{}} --out {{}} --threads {threads}"), &[&lake, &out]);
+        let found = (tree(&out), tree(&lake.join("states")));
+        let first = first.get_or_insert_with(|| found.clone());
+        assert!(*first == found, "run {run} of {threads} threads has other bits");
+    }
 }

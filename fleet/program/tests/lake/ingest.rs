@@ -5,7 +5,9 @@ use std::{fs, path::Path};
 use stretch_calibrate::{Options, calibrate, rated, read_calibration};
 use stretch_core::RateEstimator;
 
-use crate::support::{bytes, file, fleet, only, parquet, refused, rows, said, trial};
+use crate::support::{
+    PROGRAM, bytes, file, fleet, only, parquet, refused, rows, said, tree, trial, warned,
+};
 
 #[test]
 fn a_trial_is_a_file_and_a_second_ingest_changes_nothing() {
@@ -120,15 +122,16 @@ fn a_damaged_trial_is_named_and_the_rest_goes_on() {
     fs::write(logs.join("2_20260101.csv"), text.replacen("\n0.05,", "\nnonsense,", 1)).unwrap();
     fs::write(logs.join("notes.txt"), "to do: coffee").unwrap();
     let line = "ingest {} --lake {} --from-path {sensor}_{date}.csv";
-    let told = said(line, &[&logs, &lake]);
+    let told = warned(line, &[&logs, &lake]);
     assert!(told.contains("1 trials written (600 rows), 0 there already, 2 refused"), "{told}");
+    assert!(told.contains("2 files are not in the lake"), "{told}");
     assert!(told.contains("2_20260101.csv") && told.contains("nonsense"), "{told}");
     assert!(told.contains("does not fit the pattern"), "{told}");
     assert_eq!(bytes(&lake.join("refused")).len(), 2);
     // put right, it is in the lake, and no longer named
     fs::write(logs.join("2_20260101.csv"), text).unwrap();
     assert!(
-        said(line, &[&logs, &lake])
+        warned(line, &[&logs, &lake])
             .contains("1 trials written (600 rows), 1 there already, 1 refused")
     );
     assert_eq!(bytes(&lake.join("refused")).len(), 1);
@@ -139,13 +142,13 @@ fn what_nobody_says_is_asked_for() {
     let folder = tempfile::tempdir().unwrap();
     let path = file(folder.path(), &trial("a.csv", 0.0));
     let lake = folder.path().join("lake");
-    let told = said("ingest {} --lake {} --date 2026-01-01", &[&path, &lake]);
+    let told = warned("ingest {} --lake {} --date 2026-01-01", &[&path, &lake]);
     assert!(told.contains("which sensor it is of: --sensor NAME"), "{told}");
-    let told = said("ingest {} --lake {} --sensor 1", &[&path, &lake]);
+    let told = warned("ingest {} --lake {} --sensor 1", &[&path, &lake]);
     assert!(told.contains("of which day it is: --date"), "{told}");
-    let told = said("ingest {} --lake {} --sensor a/b --date 2026-01-01", &[&path, &lake]);
+    let told = warned("ingest {} --lake {} --sensor a/b --date 2026-01-01", &[&path, &lake]);
     assert!(told.contains("cannot be a sensor"), "{told}");
-    let told = said("ingest {} --lake {} --sensor 1 --date 3.1.2026", &[&path, &lake]);
+    let told = warned("ingest {} --lake {} --sensor 1 --date 3.1.2026", &[&path, &lake]);
     assert!(told.contains("is no date: write 2026-11-21"), "{told}");
     let told = refused("sql --lake {} x", &[folder.path()]);
     assert!(told.contains("is no lake"), "{told}");
@@ -153,4 +156,92 @@ fn what_nobody_says_is_asked_for() {
         refused("ingest {} --lake {} --signal knee_v", &[&path, &folder.path().join("other")]);
     assert!(told.contains("knee_v"), "{told}");
     assert!(fleet("ingest", &[]).status.code() == Some(2));
+}
+
+/// Of files with the same bytes one counts, whatever they are called and in whatever order they come, and a second ingest
+/// refuses the same ones.
+#[test]
+fn a_byte_identical_copy_under_another_date_is_refused_and_the_original_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let [logs, lake] = ["logs", "lake"].map(|name| folder.path().join(name));
+    let first = file(&logs, &trial("0042/20260103_a.csv", 0.0));
+    for copy in ["0042/20260104_b.csv", "0042/20260103_c.csv", "0043/20260103_a.csv"] {
+        fs::create_dir_all(logs.join(copy).parent().unwrap()).unwrap();
+        fs::copy(&first, logs.join(copy)).unwrap();
+    }
+    let line = "ingest {} --lake {} --from-path {sensor}/{date}_*.csv";
+    let told = warned(line, &[&logs, &lake]);
+    assert!(told.contains("1 trials written (600 rows), 0 there already, 3 refused"), "{told}");
+    assert!(told.contains("it has the same bytes as"), "{told}");
+    let before = tree(&lake.join("trials"));
+    assert!(before.keys().all(|name| name.contains("sensor=0042/date=2026-01-03")), "{before:?}");
+    let told = warned(line, &[&logs, &lake]);
+    assert!(told.contains("0 trials written (0 rows), 1 there already, 3 refused"), "{told}");
+    let of_original = format!("refused: {}:", first.display());
+    assert!(told.contains("refused: ") && !told.contains(&of_original), "{told}");
+    assert!(tree(&lake.join("trials")) == before);
+    // the copies gone, nothing is refused, and what was named twice is one file
+    fs::remove_dir_all(logs.join("0043")).unwrap();
+    for copy in ["0042/20260104_b.csv", "0042/20260103_c.csv"] {
+        fs::remove_file(logs.join(copy)).unwrap();
+    }
+    let line = "ingest {} {} --lake {} --from-path {sensor}/{date}_*.csv";
+    let told = said(line, &[&logs, &first, &lake]);
+    assert!(told.contains("1 there already, 0 refused"), "{told}");
+}
+
+/// The same samples in another format are the same trial, on whatever day.
+#[test]
+fn the_same_samples_under_another_date_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let lake = folder.path().join("lake");
+    let first = file(folder.path(), &trial("a.csv", 0.0));
+    let line = "ingest {} --lake {} --sensor 1";
+    said(&format!("{line} --date 2026-01-01"), &[&first, &lake]);
+    let semicolons = folder.path().join("b.csv");
+    fs::write(&semicolons, fs::read_to_string(&first).unwrap().replace(',', ";")).unwrap();
+    let told = warned(&format!("{line} --date 2026-01-02"), &[&semicolons, &lake]);
+    assert!(told.contains("a trial counted twice would weigh double"), "{told}");
+    assert_eq!(rows(&lake, "select count(*) from trials"), [["600"]]);
+}
+
+#[test]
+fn what_a_killed_writer_left_among_the_logs_is_nobodys_trial() {
+    let folder = tempfile::tempdir().unwrap();
+    let [logs, lake] = ["logs", "lake"].map(|name| folder.path().join(name));
+    file(&logs, &trial("a.csv", 0.0));
+    file(&logs, &trial(".stretch-AbCdEf.tmp", 1.0));
+    let told = said("ingest {} --lake {} --sensor 1 --date 2026-01-01", &[&logs, &lake]);
+    assert!(told.contains("1 trials written (600 rows), 0 there already, 0 refused"), "{told}");
+}
+
+#[test]
+fn three_ingests_at_once_end_complete_and_refuse_nothing() {
+    let folder = crate::support::scratch();
+    let [logs, lake] = ["logs", "lake"].map(|name| folder.path().join(name));
+    for k in 0..60_u8 {
+        file(&logs, &trial(&format!("{:02}/202601{:02}_a.csv", k % 4, 1 + k / 4), f64::from(k)));
+    }
+    let start = || {
+        let mut command = std::process::Command::new(PROGRAM);
+        command.arg("ingest").arg(&logs).arg("--lake").arg(&lake);
+        command.args(["--from-path", "{sensor}/{date}_*.csv", "--json"]);
+        command.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped());
+        command.spawn().expect("the program runs")
+    };
+    let all = [(); 3].map(|()| start());
+    let mut written = 0;
+    for child in all {
+        let output = child.wait_with_output().unwrap();
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{told}");
+        let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(told["refused"].as_array().unwrap().len(), 0, "{told}");
+        written += told["written"].as_u64().unwrap();
+        assert_eq!(told["written"].as_u64().unwrap() + told["there_already"].as_u64().unwrap(), 60);
+    }
+    assert_eq!(written, 60);
+    let alone = folder.path().join("alone");
+    said("ingest {} --lake {} --from-path {sensor}/{date}_*.csv", &[&logs, &alone]);
+    assert!(tree(&lake) == tree(&alone), "three at once make another lake than one");
 }

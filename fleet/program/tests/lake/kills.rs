@@ -1,14 +1,18 @@
 //! What a kill leaves is whole, and what is done is not done again.
 
 use std::{
+    collections::BTreeMap,
     fs,
+    io::{BufRead, BufReader},
+    os::unix::process::ExitStatusExt,
     path::Path,
-    process::{Command, Stdio},
+    process::{Command, ExitCode, Stdio},
+    sync::atomic::{AtomicUsize, Ordering::Relaxed},
     thread::sleep,
     time::{Duration, Instant},
 };
 
-use crate::support::{PROGRAM, bytes, file, only, said, trial};
+use crate::support::{PROGRAM, bytes, file, fleet, only, said, scratch, tree, trial};
 
 /// Starts the program, kills it once `is_reached`, and says whether it was still running then.
 fn killed(words: &[&str], is_reached: impl Fn() -> bool) -> bool {
@@ -131,10 +135,194 @@ fn calibrations_go_on_where_they_were_killed() {
     // the same as without a kill, to the bit: states are merged in the order of their days
     fs::remove_dir_all(&states).unwrap();
     said("calibrate --lake {} --out {} --threads 1", &[&lake, &fresh]);
-    assert_eq!(bytes(&fresh).len(), bytes(&out).len());
+    assert!(tree(&fresh) == tree(&out), "a killed calibration is another");
     // a day more makes its month anew, and no other
     let told = said("make --lake {} --sensors 6 --days 63 --rows 200 --rigs 3", &[&lake]);
     assert!(told.contains("1200 rows written"), "{told}");
     let told = said("calibrate --lake {} --out {}", &[&lake, &out]);
     assert!(told.contains("3 months of rigs computed now"), "{told}");
+}
+
+/// What is killed: a command on a folder, and what is there when it was not.
+struct Job {
+    line: &'static str,
+    prepare: fn(&Path),
+    /// Folders of the answer.
+    answer: [&'static str; 2],
+}
+
+const INGEST: Job = Job {
+    line: "ingest logs --lake lake --from-path {sensor}/{date}_*.csv",
+    prepare: |folder| {
+        for (k, name) in
+            ["1/20260101_a.csv", "1/20260102_a.csv", "2/20260101_a.csv"].iter().enumerate()
+        {
+            file(&folder.join("logs"), &trial(name, k as f64));
+        }
+        // a trial that is refused, and one that was refused and is put right
+        fs::create_dir(folder.join("logs/3")).unwrap();
+        fs::write(folder.join("logs/3/20260101_a.csv"), "no trial").unwrap();
+        file(&folder.join("logs"), &trial("4/20260101_a.csv", 9.0));
+    },
+    answer: ["lake/trials", "lake/refused"],
+};
+
+const CALIBRATE: Job = Job {
+    line: "calibrate --lake lake --out out",
+    prepare: |folder| {
+        said("make --lake {} --sensors 2 --days 2 --rows 100 --rigs 2", &[&folder.join("lake")]);
+    },
+    answer: ["lake/states", "out"],
+};
+
+impl Job {
+    fn command(&self, folder: &Path) -> Command {
+        let mut command = Command::new(PROGRAM);
+        command.args(self.line.split(' ')).current_dir(folder);
+        command.stdout(Stdio::null()).stderr(Stdio::null());
+        command
+    }
+
+    fn answer(&self, folder: &Path) -> [BTreeMap<String, Vec<u8>>; 2] {
+        self.answer.map(|name| tree(&folder.join(name)))
+    }
+
+    /// What is there when nothing was killed, and how long that takes.
+    fn expected(&self) -> ([BTreeMap<String, Vec<u8>>; 2], Duration) {
+        let folder = scratch();
+        (self.prepare)(folder.path());
+        let begun = Instant::now();
+        self.command(folder.path()).status().unwrap();
+        (self.answer(folder.path()), begun.elapsed())
+    }
+
+    /// Runs the command again after a kill: all is there, and nothing else.
+    fn assert_mended(&self, folder: &Path, expected: &[BTreeMap<String, Vec<u8>>; 2], case: &str) {
+        let names = |answer: &[BTreeMap<String, Vec<u8>>; 2]| {
+            answer.each_ref().map(|tree| tree.keys().cloned().collect::<Vec<_>>())
+        };
+        self.command(folder).status().unwrap();
+        let found = self.answer(folder);
+        assert_eq!(names(&found), names(expected), "{case}");
+        assert!(found == *expected, "{case}: what is there differs");
+        let left = tree(folder).into_keys().find(|name| name.ends_with(".tmp"));
+        assert_eq!(left, None, "{case}: a temporary file is left");
+    }
+
+    /// Ends the command before every `step`th of its calls on the file system; how many those are.
+    fn is_killed_before_its_calls(&self, step: usize) -> usize {
+        let (expected, _) = self.expected();
+        for at in (1..).step_by(step) {
+            let folder = scratch();
+            (self.prepare)(folder.path());
+            let output = Command::new(std::env::current_exe().unwrap())
+                .args(["kills::a_child_that_is_killed", "--exact", "--quiet"])
+                .env("KILLED_LINE", self.line)
+                .env("KILLED_AT", at.to_string())
+                .current_dir(folder.path())
+                .output()
+                .unwrap();
+            // SIGABRT, which nobody handles
+            let is_killed = output.status.signal() == Some(6);
+            let case = format!("{} killed before call {at}: {output:?}", self.line);
+            assert!(is_killed || output.status.success(), "{case}");
+            self.assert_mended(folder.path(), &expected, &case);
+            if !is_killed {
+                return at - 1;
+            }
+        }
+        0
+    }
+
+    /// Kills the command at moments that are spread over the time that it takes; how many kills came before its end.
+    fn is_killed_at_moments(&self, kills: u32) -> u32 {
+        let (expected, takes) = self.expected();
+        let mut hit = 0;
+        for kill in 0..kills {
+            let folder = scratch();
+            (self.prepare)(folder.path());
+            let mut child = self.command(folder.path()).spawn().unwrap();
+            sleep(takes * kill / kills);
+            child.kill().unwrap();
+            hit += u32::from(child.wait().unwrap().signal() == Some(9));
+            self.assert_mended(folder.path(), &expected, &format!("{}: kill {kill}", self.line));
+        }
+        hit
+    }
+}
+
+/// What the tests below start as a process of its own; by itself it does nothing.
+#[test]
+fn a_child_that_is_killed() {
+    let Ok(line) = std::env::var("KILLED_LINE") else { return };
+    let at: usize = std::env::var("KILLED_AT").unwrap().parse().unwrap();
+    let calls = AtomicUsize::new(0);
+    assert!(stretch_files::ask_before_disk_calls(move |_| {
+        if calls.fetch_add(1, Relaxed) + 1 == at {
+            // as by kill -9: nothing is cleaned up
+            std::process::abort();
+        }
+        Ok(())
+    }));
+    let words = std::iter::once("stretch-fleet").chain(line.split(' '));
+    let status = stretch_fleet_program::run(words.map(Into::into));
+    // an ingest has refused a file, which is a status
+    assert!(status == ExitCode::SUCCESS || line.starts_with("ingest"));
+}
+
+#[test]
+fn an_ingest_killed_before_any_call_is_mended_by_the_next() {
+    let calls = INGEST.is_killed_before_its_calls(3);
+    assert!(calls > 20, "{calls}");
+}
+
+#[test]
+fn a_calibration_killed_before_any_call_is_mended_by_the_next() {
+    let calls = CALIBRATE.is_killed_before_its_calls(6);
+    assert!(calls > 20, "{calls}");
+}
+
+#[test]
+#[ignore = "a minute of kills; gate.sh runs it"]
+fn every_call_of_an_ingest_and_of_a_calibration_may_be_the_last() {
+    let calls = [INGEST, CALIBRATE].map(|job| job.is_killed_before_its_calls(1));
+    println!("{calls:?} kills, all mended");
+}
+
+#[test]
+#[ignore = "a minute of kills; gate.sh runs it"]
+fn thirty_kills_of_an_ingest_and_of_a_calibration_are_mended() {
+    let hit = [INGEST, CALIBRATE].map(|job| job.is_killed_at_moments(30));
+    println!("{hit:?} of 30 kills came before the end, all mended");
+    assert!(hit.iter().all(|&hit| hit > 15), "{hit:?}");
+}
+
+/// Whoever has the lock of a lake keeps it only while it lives.
+#[test]
+fn the_lock_of_a_dead_command_is_nobodys() {
+    let folder = tempfile::tempdir().unwrap();
+    let lake = folder.path().join("lake");
+    let path = file(folder.path(), &trial("1.csv", 0.0));
+    said("ingest {} --lake {} --sensor 1 --date 2026-01-01", &[&path, &lake]);
+    let left = lake.join("trials/.stretch-AbCdEf.tmp");
+    fs::write(&left, "half a trial").unwrap();
+    let held = fs::File::open(lake.join(".stretch-lock")).unwrap();
+    held.lock().unwrap();
+    let line = format!("sql --lake {} --csv --threads 1", lake.display());
+    let mut words: Vec<&str> = line.split(' ').collect();
+    words.push("select count(*) from trials");
+    let answer = Command::new(PROGRAM).args(words).output().unwrap();
+    assert!(
+        answer.status.success() && left.exists(),
+        "a question waits for nobody, and clears up nothing"
+    );
+    let shown = lake.display().to_string();
+    let words = ["make", "--lake", &shown, "--sensors", "1", "--days", "1", "--rows", "100"];
+    let mut waits = Command::new(PROGRAM).args(words).stderr(Stdio::piped()).spawn().unwrap();
+    let mut told = String::new();
+    BufReader::new(waits.stderr.take().unwrap()).read_line(&mut told).unwrap();
+    assert!(told.contains("another command writes into it") && left.exists(), "{told}");
+    drop(held);
+    assert!(waits.wait().unwrap().success());
+    assert!(!left.exists() && fleet("sql --lake {} x", &[&lake]).status.code() == Some(1));
 }

@@ -1,6 +1,7 @@
 //! Trials, lakes, and the program.
 
 use std::{
+    collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
     process::{Command, Output},
@@ -41,6 +42,39 @@ pub(crate) fn refused(line: &str, paths: &[&Path]) -> String {
     let output = fleet(line, paths);
     assert!(!output.status.success(), "{line} did not fail");
     String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// What it says, having done its work and refused some files.
+pub(crate) fn warned(line: &str, paths: &[&Path]) -> String {
+    let output = fleet(line, paths);
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{line}: {told}");
+    format!("{}{told}", String::from_utf8_lossy(&output.stdout))
+}
+
+/// A question, what is said beside its answer, and whether it was answered.
+pub(crate) fn asked(lake: &Path, query: &str, more: &[&str]) -> (bool, String) {
+    let output = Command::new(PROGRAM)
+        .args(["sql", "--lake", &lake.display().to_string(), query])
+        .args(more)
+        .output()
+        .expect("the program runs");
+    let [said, told] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
+    (output.status.success(), said + &told)
+}
+
+/// Every file below a folder with its bytes, by its path there; but not the empty one that is locked.
+pub(crate) fn tree(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let below = |path: PathBuf| path.strip_prefix(folder).unwrap().display().to_string();
+    let all = bytes(folder).into_iter().map(|(path, bytes)| (below(path), bytes));
+    all.filter(|(name, _)| !name.ends_with(".stretch-lock")).collect()
+}
+
+/// Where syncing takes no time, if there is such a place.
+pub(crate) fn scratch() -> tempfile::TempDir {
+    let memory = Path::new("/dev/shm");
+    let made = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() };
+    made.expect("a folder can be made")
 }
 
 /// The answer of a query as CSV, a line a row.

@@ -10,7 +10,7 @@ use crate::{
             lags::Lags,
             probes::{Change, Probe, Probes},
         },
-        probability::{Standing, names, probabilities},
+        probability::{Standing, most_probable, names, probabilities},
     },
     fit::{
         octaves::Octaves,
@@ -35,8 +35,6 @@ const POWER: f64 = 0.9;
 /// the best.
 const HELD_AGAINST: usize = 8;
 const ALIKE: f64 = 0.3;
-/// Ratio of probabilities from which two sets are equally probable: a coin decides.
-const EVEN: f64 = 0.99;
 
 /// Parts of the record: fitted, held out, tested.
 const ROLES: [Role; 3] = [Role::Fit, Role::Held, Role::Test];
@@ -180,11 +178,11 @@ impl<'a> Record<'a> {
         if !names([sets.iter().sum(), nothing[0], unknown], retuned, thresholds) {
             return 0.0;
         }
-        let most = sets.iter().copied().fold(0.0, f64::max);
-        let even: Vec<&&Drawn> =
-            weighed.iter().zip(sets).filter(|(_, p)| **p >= EVEN * most).map(|(d, _)| d).collect();
+        // Between sets that are as probable a coin decides.
+        let even = most_probable(sets);
         let own = self.probes.all[self.against[0]].effect;
-        even.iter().filter(|d| effect(d) == own).count() as f64 / even.len().max(1) as f64
+        let is_own = |i: &&usize| effect(weighed[**i]) == own;
+        even.iter().filter(is_own).count() as f64 / even.len().max(1) as f64
     }
 
     /// One effect fitted to a drawn record.

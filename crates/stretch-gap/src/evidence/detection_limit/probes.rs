@@ -267,11 +267,7 @@ impl Probes {
         let effects = problem.simulator().effects();
         let models: Vec<Model> = starts
             .iter()
-            .map(|(effect, start)| {
-                let mut model = problem.nominal.model.clone();
-                model.effects.push((*effect, start.values.clone()));
-                model
-            })
+            .map(|(effect, start)| problem.nominal.model.with(*effect, &start.values))
             .collect();
         let places = starts.iter().zip(&models).flat_map(|((effect, _), model)| {
             effects[*effect].touches.iter().map(move |stage| Run::exact(*stage, model, self.trials))

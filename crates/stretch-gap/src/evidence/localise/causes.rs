@@ -91,7 +91,7 @@ mod tests {
     }
 
     fn share(effect: &str, closes: f64) -> EffectShare {
-        EffectShare { effect: effect.into(), closes, closes_of_stage: closes, at_bound: false }
+        EffectShare { effect: effect.into(), closes, closes_excess: closes, at_bound: false }
     }
 
     /// Effects of a toy of two stages, and one of the reference that shows in both.

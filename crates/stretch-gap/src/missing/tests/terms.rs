@@ -24,7 +24,8 @@ fn assert_like(found: &[f64], expected: impl Iterator<Item = f64>) {
 fn curves_are_what_their_equations_say() {
     let x = wave(400);
     type Curve = (Factor, fn(f64) -> f64);
-    let each: [Curve; 7] = [
+    let each: [Curve; 8] = [
+        (Centred { signal: 0, at: 0.4, power: 3 }, |x| (x - 0.4) * (x - 0.4) * (x - 0.4)),
         (Power { signal: 0, power: 1.5 }, |x| x.powf(1.5)),
         (Power { signal: 0, power: 3.0 }, |x| x * x * x),
         (Above { signal: 0, at: 0.3, power: 2.0 }, |x| (x - 0.3).max(0.0).powi(2)),

@@ -1,0 +1,92 @@
+//! A process and all that it starts, which end when this program ends, however it ends.
+//!
+//! On Unix the processes form a group. The group's leader is a shell that waits for the end of a pipe which this program alone holds
+//! open, and then kills the group. The kernel closes the pipe when this program ends, after SIGKILL too. A parent-death signal would
+//! reach the first process only, and needs unsafe code between fork and exec.
+
+use std::{
+    io,
+    process::{Child, Command},
+};
+
+/// A process with its group. What is still running of the group is killed where this value is dropped.
+#[derive(Debug)]
+pub(super) struct Group {
+    /// The first process of those that are at work.
+    pub(super) child: Child,
+    #[cfg(unix)]
+    guard: guard::Guard,
+}
+
+impl Group {
+    /// Starts a command in a group of its own.
+    #[cfg(unix)]
+    pub(super) fn spawn(command: &mut Command) -> io::Result<Self> {
+        use std::os::unix::process::CommandExt as _;
+        let guard = guard::Guard::new()?;
+        let child = command.process_group(guard.group()).spawn()?;
+        Ok(Self { child, guard })
+    }
+
+    /// Starts a command; where there are no groups its children are not followed.
+    #[cfg(not(unix))]
+    pub(super) fn spawn(command: &mut Command) -> io::Result<Self> {
+        Ok(Self { child: command.spawn()? })
+    }
+
+    /// Ends every process of the group at once.
+    pub(super) fn kill(&mut self) {
+        #[cfg(unix)]
+        self.guard.close();
+        let _ = self.child.kill();
+    }
+}
+
+impl Drop for Group {
+    fn drop(&mut self) {
+        self.kill();
+        let _ = self.child.wait();
+    }
+}
+
+#[cfg(unix)]
+mod guard {
+    use std::{
+        io,
+        os::unix::process::CommandExt as _,
+        process::{Child, Command, Stdio},
+    };
+
+    /// What the shell does: signals that a worker sends to its own group must not end the guard; nothing is ever written to the pipe.
+    const WAITS: &str = "trap '' HUP INT QUIT TERM; read -r _; kill -KILL 0";
+
+    /// The leader of a group.
+    #[derive(Debug)]
+    pub(super) struct Guard(Child);
+
+    impl Guard {
+        pub(super) fn new() -> io::Result<Self> {
+            let mut shell = Command::new("/bin/sh");
+            shell.args(["-c", WAITS]).process_group(0);
+            shell.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null());
+            shell.spawn().map(Self)
+        }
+
+        /// Number of the group.
+        pub(super) fn group(&self) -> i32 {
+            self.0.id() as i32
+        }
+
+        /// Closes the pipe: the shell kills the group, itself included.
+        pub(super) fn close(&mut self) {
+            drop(self.0.stdin.take());
+            let _ = self.0.wait();
+        }
+    }
+
+    impl Drop for Guard {
+        fn drop(&mut self) {
+            self.close();
+        }
+    }
+}

@@ -1,0 +1,1 @@
+../../../web/report/report.js

@@ -1,0 +1,129 @@
+//! Lakes with anything in their files: a sentence for each file that is unfit, no panic, and nothing is written.
+
+use std::{fs, path::Path};
+
+use proptest::{collection::vec, prelude::*, sample::Index};
+use stretch_core::{RateEstimator, SampleRate};
+use stretch_data::{Split, TrialKind};
+
+use super::{About, Footer, Lake, Place, Samples, write};
+
+/// The folder of a lake with two trials of a place, and the paths of the two.
+fn lake() -> (tempfile::TempDir, [std::path::PathBuf; 2]) {
+    // where syncing takes no time, if there is such a place
+    let memory = Path::new("/dev/shm");
+    let folder = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() };
+    let folder = folder.unwrap();
+    let rate_hz = SampleRate::new(100.0).unwrap();
+    let about = About::new("bridge_v", "length_mm", RateEstimator::SAVGOL_11_2, rate_hz);
+    about.write(folder.path()).unwrap();
+    let place = Place::new(["ulm", "r2", "7", "2026-01-03"]).unwrap();
+    let paths = ["a", "b"].map(|name| {
+        let values: Vec<f64> = (0..50).map(f64::from).collect();
+        let samples = Samples {
+            time_s: values.clone(),
+            channels: vec![("bridge_v".into(), values.clone()), ("length_mm".into(), values)],
+            rate: vec![Some(0.1); 50],
+            contraction: Some(vec![0.1; 50]),
+            is_bridged: vec![false; 50],
+        };
+        let footer = Footer {
+            about: about.clone(),
+            trial: name.into(),
+            kind: TrialKind::Other,
+            split: Split::Fit,
+            start_s: 0.0,
+            units: Default::default(),
+            rest_length: Some(180.0),
+            dead_band: 0.1,
+            source: name.into(),
+            digest: name.into(),
+            samples: name.into(),
+            notes: Vec::new(),
+        };
+        let trials = folder.path().canonicalize().unwrap().join("trials");
+        let path = trials.join(place.folder()).join(format!("{name}.parquet"));
+        write(&path, &footer, samples).unwrap();
+        path
+    });
+    (folder, paths)
+}
+
+/// A change of a file: bytes that are overwritten, and where it is cut off.
+fn change() -> impl Strategy<Value = (Vec<(Index, u8)>, Option<Index>)> {
+    (vec((any::<Index>(), any::<u8>()), 0..8), proptest::option::weighted(0.2, any::<Index>()))
+}
+
+fn changed(
+    mut bytes: Vec<u8>,
+    from: usize,
+    (places, end): &(Vec<(Index, u8)>, Option<Index>),
+) -> Vec<u8> {
+    for (place, byte) in places {
+        let length = bytes.len();
+        bytes[from + place.index(length - from)] = *byte;
+    }
+    if let Some(end) = end {
+        bytes.truncate(end.index(bytes.len()));
+    }
+    bytes
+}
+
+/// Opens a lake of which one file is damaged: the other is there, and no byte has changed.
+fn opens(folder: &Path, [damaged, other]: &[std::path::PathBuf; 2], bytes: &[u8]) {
+    fs::write(damaged, bytes).unwrap();
+    let before = fs::read(other).unwrap();
+    let lake = Lake::open(folder).unwrap();
+    assert_eq!(lake.files.len() + lake.unfit.len(), 2);
+    assert!(lake.files.iter().any(|file| file.path == *other));
+    assert!(lake.unfit.iter().all(|file| file.path == *damaged && !file.why.is_empty()));
+    assert!(fs::read(damaged).unwrap() == bytes && fs::read(other).unwrap() == before);
+    assert!(!folder.join("refused").exists());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
+
+    /// The footer is the last part of the file, and what says what all of it means.
+    #[test]
+    fn a_damaged_footer_is_one_unfit_file(change in change()) {
+        let (folder, paths) = lake();
+        let whole = fs::read(&paths[0]).unwrap();
+        let length = u32::from_le_bytes(whole[whole.len() - 8..][..4].try_into().unwrap());
+        let footer = whole.len() - 8 - length as usize;
+        opens(folder.path(), &paths, &changed(whole, footer, &change));
+    }
+
+    #[test]
+    fn any_bytes_are_an_unfit_file(inside in vec(any::<u8>(), 0..300), length in any::<u32>()) {
+        let (folder, paths) = lake();
+        opens(folder.path(), &paths, &inside);
+        // and as what a reader looks for at both ends
+        let file = [&b"PAR1"[..], &inside, &length.to_le_bytes(), b"PAR1"].concat();
+        opens(folder.path(), &paths, &file);
+    }
+
+    #[test]
+    fn a_changed_description_is_an_error_or_leaves_files_out(change in change()) {
+        let (folder, paths) = lake();
+        let path = folder.path().join("lake.json");
+        let bytes = changed(fs::read(&path).unwrap(), 0, &change);
+        fs::write(&path, &bytes).unwrap();
+        if let Ok(lake) = Lake::open(folder.path()) {
+            prop_assert_eq!(lake.files.len() + lake.unfit.len(), 2);
+            prop_assert!(lake.about.sample_rate_hz.is_finite() && lake.about.sample_rate_hz > 0.0);
+        }
+        prop_assert!(paths.iter().all(|path| path.exists()) && fs::read(&path).unwrap() == bytes);
+    }
+
+    /// What a folder is called is a place that leads to the same folder, or none.
+    #[test]
+    fn a_place_leads_below_the_lake(names in vec("[a-zA-Z0-9._/\\\\%= -]{0,12}", 3), date in "[0-9-]{0,12}") {
+        if let Ok(place) = Place::new([&names[0], &names[1], &names[2], &date]) {
+            let folder = place.folder();
+            prop_assert_eq!(folder.components().count(), 4);
+            prop_assert!(folder.components().all(|c| matches!(c, std::path::Component::Normal(_))));
+            prop_assert_eq!(Place::of(&folder.join("x.parquet")).unwrap(), place);
+        }
+    }
+}

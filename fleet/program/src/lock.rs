@@ -1,0 +1,113 @@
+//! One command at a time writes into a folder, and what a killed one left there is removed.
+
+use std::{
+    fs::{self, File, TryLockError},
+    io::ErrorKind,
+    path::Path,
+    thread::sleep,
+    time::Duration,
+};
+
+use anyhow::{Context, ensure};
+
+use crate::{lake::below, show::warn};
+
+/// The file whose lock is held; it is empty and stays.
+const FILE: &str = ".stretch-lock";
+
+/// How long a waiting command sleeps between two tries.
+const TRY_AGAIN: Duration = Duration::from_millis(50);
+
+/// How deep the records of a calibration stand below their folder: site, rig, sensor.
+pub(crate) const RECORDS_DEPTH: usize = 3;
+
+/// A folder that no other command of the fleet writes into for as long as this lives.
+///
+/// The system holds the lock and takes it from a process that ends, however it ends: nobody's lock outlives its owner.
+#[derive(Debug)]
+pub(crate) struct Lock {
+    _file: File,
+}
+
+impl Lock {
+    /// Waits until no other command writes into a folder that is there, and removes the temporary files that killed ones
+    /// left at most `depth` folders below it.
+    ///
+    /// # Errors
+    /// A folder that cannot be written into, a file system without locks, an interrupt while it waits.
+    pub(crate) fn of(folder: &Path, depth: usize) -> anyhow::Result<Self> {
+        let path = folder.join(FILE);
+        let told = || format!("{}: it cannot be locked", path.display());
+        let mut options = File::options();
+        let file = options.read(true).write(true).create(true).truncate(false).open(&path);
+        let file = file.with_context(told)?;
+        let mut is_told = false;
+        loop {
+            match file.try_lock() {
+                Ok(()) => break,
+                Err(TryLockError::Error(e)) => return Err(e).with_context(told),
+                Err(TryLockError::WouldBlock) if !is_told => {
+                    is_told = true;
+                    warn(format!(
+                        "{}: another command writes into it; this one goes on when that has ended",
+                        folder.display()
+                    ));
+                }
+                Err(TryLockError::WouldBlock) => {}
+            }
+            ensure!(!stretch_files::interrupted(), "interrupted");
+            sleep(TRY_AGAIN);
+        }
+        remove_abandoned(folder, depth)?;
+        Ok(Self { _file: file })
+    }
+}
+
+/// Removes temporary files whose writers are gone: a writer holds the lock of its file for as long as it has that name.
+///
+/// # Errors
+/// A folder that cannot be read, a file that cannot be removed.
+pub(crate) fn remove_abandoned(folder: &Path, depth: usize) -> anyhow::Result<()> {
+    let all = below(folder, depth)?;
+    for path in all.iter().filter(|path| is_temporary(path)) {
+        let is_dead = File::open(path).is_ok_and(|file| file.try_lock().is_ok());
+        if is_dead {
+            match fs::remove_file(path) {
+                // somebody else found it dead as well
+                Err(e) if e.kind() == ErrorKind::NotFound => {}
+                removed => removed.with_context(|| path.display().to_string())?,
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Whether a file has the name that `stretch_files` writes under: `.stretch-`, six letters or digits, `.tmp`.
+fn is_temporary(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let letters = name.strip_prefix(".stretch-").and_then(|rest| rest.strip_suffix(".tmp"));
+    letters.is_some_and(|text| text.len() == 6 && text.bytes().all(|b| b.is_ascii_alphanumeric()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_files_whose_writers_are_gone_are_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at("deep")).unwrap();
+        let names = [".stretch-AbCd12.tmp", "deep/.stretch-zzzzzz.tmp"];
+        let others = [".stretch-notes.txt", "AbCd12.tmp", ".stretch-lake-AbCd12.tmp"];
+        names.iter().chain(&others).for_each(|name| fs::write(at(name), "").unwrap());
+        let alive = at(".stretch-alive1.tmp");
+        let writer = File::create(&alive).unwrap();
+        writer.lock().unwrap();
+        drop(Lock::of(folder.path(), 0).unwrap());
+        assert!(!at(names[0]).exists() && at(names[1]).exists() && alive.exists());
+        drop((writer, Lock::of(folder.path(), 1).unwrap()));
+        assert!(!at(names[1]).exists());
+        assert!(others.iter().all(|name| at(name).exists()));
+    }
+}

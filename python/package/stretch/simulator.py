@@ -1,1 +1,0 @@
-../../../crates/stretch-problem/src/worker/calling.py

@@ -1,0 +1,39 @@
+"""From the voltage of a stretch sensor to length, live; and why a simulator and a recording disagree.
+
+>>> import numpy as np, stretch_gap
+>>> time_s = np.arange(0, 20, 0.01)
+>>> angle_deg = 45 - 45 * np.cos(1.5 * time_s)
+>>> gauge = 0.002 * np.interp(time_s - 0.05, time_s, angle_deg)  # it lags a little
+>>> calibration = stretch_gap.calibrate(gauge, angle_deg, time_s=time_s, model="poly13", reference_name="angle_deg")
+>>> estimate = calibration.apply(gauge, rate_hz=100.0)
+>>> bool(np.nanmax(np.abs(estimate.value - angle_deg)) < 3.0)
+True
+"""
+
+from ._stretch import Reading, Receptor, Refused, StretchError, __version__
+from .calibration import Calibration, Estimate, calibrate
+from .diagnosis import Diagnosis, diagnose
+from .evaluation import Evaluation, evaluate
+from .fix import Fix
+from .problem import Argument, Effect, Parameter, Stage, Trial
+
+__all__ = [
+    "Argument",
+    "Calibration",
+    "Diagnosis",
+    "Effect",
+    "Estimate",
+    "Evaluation",
+    "Fix",
+    "Parameter",
+    "Reading",
+    "Receptor",
+    "Refused",
+    "Stage",
+    "StretchError",
+    "Trial",
+    "__version__",
+    "calibrate",
+    "diagnose",
+    "evaluate",
+]

@@ -1,0 +1,326 @@
+"""Why a simulator and a recording disagree."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from html import escape
+from typing import Any
+
+from . import _stretch, html
+from . import problem as entries
+from ._stretch import StretchError
+from .fix import Fix, fix
+from .frames import frame
+from .recordings import Array
+from .simulator import Asked
+
+
+class Diagnosis:
+    """What is missing in a simulator, how sure that is, where it sits, and how far naming it closes the gap."""
+
+    def __init__(
+        self,
+        answer: dict[str, Any],
+        page: str = "",
+        curves: Mapping[str, Sequence[Array]] | None = None,
+        functions: Mapping[str, str] | None = None,
+        experiment: Mapping[str, Array] | None = None,
+    ) -> None:
+        self._answer = answer
+        self._page = page
+        self._curves = curves or {}
+        self._functions = functions or {}
+        self._experiment = experiment
+
+    @staticmethod
+    def from_json(text: str) -> Diagnosis:
+        """From what `to_json` or `stretch diagnose --json-out` wrote; figures are not in there."""
+        return Diagnosis(json.loads(text))
+
+    @property
+    def verdict(self) -> str:
+        """`no_gap`, `parameters`, `effect`, `partial`, `record` or `unknown`."""
+        return str(self._answer["verdict"])
+
+    @property
+    def sentence(self) -> str:
+        """The answer in a sentence."""
+        return str(self._answer["sentence"])
+
+    @property
+    def named(self) -> list[str]:
+        """The effects that are missing, the strongest first; empty where none is named."""
+        return list(self._answer["named"])
+
+    @property
+    def probabilities(self) -> dict[str, float]:
+        """Probability of every candidate that was weighed, the most probable set first; behind the
+        sets that nothing is missing, and `unknown`, whatever nobody listed."""
+        weighed = self._answer["candidates"]
+        return {" + ".join(c["effects"]) or "nothing": c["probability"] for c in weighed}
+
+    @property
+    def stability(self) -> dict[str, float]:
+        """Share of resampled records in which the most probable set holds an effect, by effect."""
+        return {s["effect"]: s["stability"] for s in self._answer.get("stabilities", [])}
+
+    @property
+    def detection_limits(self) -> dict[str, dict[str, Any]]:
+        """How strong each effect would have to be to be named on these data: `parameter`, `strength` (None where no
+        strength in its range would do) and `unit`, by effect; empty where something is named."""
+        limits = self._answer.get("detection_limits", [])
+        return {limit["effect"]: {k: v for k, v in limit.items() if k != "effect"} for limit in limits}
+
+    @property
+    def where(self) -> dict[str, float]:
+        """Share of the gap in each output."""
+        return {s["channel"]: s["share"] for s in self._answer["where"]["stages"]}
+
+    @property
+    def how_far(self) -> dict[str, Any]:
+        """How far the named effects close the gap on samples that were not fitted: `closed`, its 95 % interval, and what
+        is left by output, in the output's noise: 1 is noise alone."""
+        best = self._answer["candidates"][0] if self._answer["candidates"] else {}
+
+        def left(key: str) -> dict[str, float]:
+            return {s["channel"]: max(1.0 + s[key], 0.0) ** 0.5 for s in self._answer["where"]["stages"]}
+
+        return {
+            "closed": best.get("closed", 0.0),
+            "interval": tuple(best.get("closed_ci", (0.0, 0.0))),
+            "as_shipped": left("raw"),
+            "retuned": left("excess"),
+            "with_effects": left("after"),
+        }
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Every nominal parameter as it is with the named effects in."""
+        return {p["name"]: p["fitted"] for p in self._answer["parameters"]}
+
+    @property
+    def effects(self) -> dict[str, dict[str, float]]:
+        """Values of the named effects."""
+        found: dict[str, dict[str, float]] = {name: {} for name in self.named}
+        for value in self._best_values():
+            if value["effect"] in found:
+                found[value["effect"]][value["name"]] = value["value"]
+        return found
+
+    def _best_values(self) -> list[dict[str, Any]]:
+        candidates = self._answer["candidates"]
+        return list(candidates[0]["parameter_values"]) if candidates and self.named else []
+
+    @property
+    def rivals(self) -> list[str]:
+        """Everything that these data cannot rule out, named or not."""
+        return list(self._answer["ambiguous"])
+
+    @property
+    def families(self) -> list[dict[str, Any]]:
+        """Effects that these data cannot tell apart, with what they agree on: "late by 0.10 .. 0.14 s"."""
+        return list(self._answer.get("families", []))
+
+    @property
+    def next_experiment(self) -> dict[str, Any] | None:
+        """The experiment that would tell rivals apart, where it was looked for: name, why, minutes, and `columns` to command."""
+        found = self._answer.get("next_experiment")
+        return {**found, "columns": dict(self._experiment or {})} if found else None
+
+    @property
+    def proposed(self) -> dict[str, Any] | None:
+        """The equation that is proposed where no effect of the list explains the gap."""
+        proposed = self._answer.get("proposed")
+        return dict(proposed) if proposed else None
+
+    @property
+    def identifiability(self) -> list[dict[str, Any]]:
+        """Which nominal parameters these data determine and which not, with what they look like."""
+        return list(self._answer.get("identifiability", []))
+
+    @property
+    def notes(self) -> list[str]:
+        """What was done to the recordings, what they cannot say, and what to look at."""
+        return list(self._answer["notes"])
+
+    @property
+    def model_runs(self) -> int:
+        """Models that the simulator was asked for."""
+        runs = self._answer.get("model_runs")
+        return int(runs["count"]) if isinstance(runs, dict) else int(self._answer["simulations"])
+
+    def curves(self, output: str | None = None) -> dict[str, Array]:
+        """One output over all trials end to end: `measured`, `as_shipped`, `retuned` and `with_effects`."""
+        if not self._curves:
+            raise StretchError("a diagnosis that was read from text has no curves; diagnose again")
+        name = output or next(iter(self._curves))
+        if name not in self._curves:
+            raise StretchError(f"there is no output {name}; there are {', '.join(self._curves)}")
+        return dict(zip(("measured", "as_shipped", "retuned", "with_effects"), self._curves[name]))
+
+    def fix(self) -> Fix:
+        """The changes to the simulator: parameters re-tuned, and the named effects as Python code.
+
+        A diagnosis that was read from text has equations and values in place of functions.
+        """
+        return fix(self.parameters, self.effects, self._answer.get("implement", []), self._functions)
+
+    def to_json(self) -> str:
+        """Everything, as `stretch diagnose --json` writes it and `stretch calibrate --from` reads it."""
+        return json.dumps(self._answer, indent=2)
+
+    def to_frame(self) -> Any:
+        """One row a candidate, as a pandas frame; a dict of columns where there is no pandas."""
+        rows = [
+            {
+                "effects": " + ".join(c["effects"]) or "nothing",
+                "probability": c["probability"],
+                "closed": c["closed"],
+                "closed_low": c["closed_ci"][0],
+                "closed_high": c["closed_ci"][1],
+                "gap_before": c["gap_before"],
+                "gap_after": c["gap_after"],
+                "parameters": dict(c["parameters"]),
+            }
+            for c in self._answer["candidates"]
+        ]
+        return frame(rows)
+
+    def report(self, path: str | os.PathLike[str] | None = None) -> str:
+        """The report with all figures, one HTML file that needs no network; written where a path is given."""
+        if not self._page:
+            raise StretchError("a diagnosis that was read from text has no figures; diagnose again")
+        if path is not None:
+            with open(path, "w", encoding="utf-8") as file:
+                file.write(self._page)
+        return self._page
+
+    def __repr__(self) -> str:
+        return f"<Diagnosis {self.verdict}: {self.sentence}>"
+
+    def _repr_html_(self) -> str:
+        sentence = f"<p><b>{escape(self.sentence)}</b></p>"
+        if self._page:
+            # its own document: the page's style stays in it, and the notebook's out of it
+            return f'{sentence}<iframe srcdoc="{escape(self._page)}" style="width:100%;height:40em;border:0"></iframe>'
+        rows = [[name, f"{p:.3f}"] for name, p in self.probabilities.items()]
+        return sentence + html.table(["candidate", "probability"], rows) + html.notes(self.notes)
+
+
+def diagnose(
+    simulator: Any,
+    data: entries.Data,
+    *,
+    output: str | None = None,
+    inputs: Sequence[str] = (),
+    stages: Sequence[entries.Stage] | None = None,
+    parameters: Mapping[str, entries.ParameterLike] | None = None,
+    effects: Mapping[str, entries.EffectLike] | None = None,
+    wrap: str | Sequence[str] | None = "all",
+    rate_hz: float | None = None,
+    units: Mapping[str, str] | None = None,
+    noise: Mapping[str, float] | None = None,
+    velocity: str | None = None,
+    position: str | None = None,
+    beside: Sequence[str] = (),
+    without: Sequence[str] = (),
+    reference: str | None = None,
+    experiment: bool = False,
+    budget: int | None = None,
+    depth: int = 4,
+    seed: int = 1,
+    threads: int = 0,
+    name: str = "data",
+    progress: Callable[[str], Any] | None = None,
+) -> Diagnosis:
+    """Says why a simulator and a recording disagree: which effect is missing, how sure that is, and where it acts.
+
+    `simulator` is an object with `simulate(params, effects) -> [n, samples]`, asked for n models at once: `params` is an
+    array `[n, p]` in the order of `parameters`, `effects` `[n, e]` in that of theirs; both give a column by its name, too:
+    `effects["delay_s"]`. Or it is a function of one model, `f(params, effects) -> [samples]`, with dicts of floats. With
+    several outputs it returns a dict of arrays by output. Two more arguments it may take by name: `inputs`, a dict of
+    columns that it is to be driven by (without it nothing is looked for on the input's side), and `trials`, the slices of
+    the recordings, which stand end to end; with `stage` by name it answers for one stage at a time. A method
+    `begin(session)` is called once with everything that stays the same. The same object can stand in a problem.toml. An
+    exception of the simulator comes out as it is; `stretch_gap.Refused` says that values cannot be simulated.
+
+    `data`: a dict of arrays by column, a frame, a `Trial`, or a list of these; with `rate_hz` or a column `time_s`.
+    Or the path of a problem.toml, which says all of the following; without a simulator (None) the file's own is run.
+
+    `output` is the column that the simulation is held against, `inputs` those that drive it; `stages` says the same of
+    several. `velocity` or `position` is the column by which friction rubs. `parameters` by name: a `Parameter`,
+    `(value, tolerance)` or an exact number. `effects` that the simulator has itself: an `Effect`, an `Argument`, `(least,
+    greatest)`, or `(least, greatest, off)`. `wrap`: effects around the simulator, as `"input.delay"`, `"output.backlash"`,
+    or all of them; `without` leaves some out, by name or by kind. `units` and `noise` by column. `reference` is the column that
+    the output senses: the diagnosis then reports what a calibration of that output loses by the gap. With `experiment` the
+    experiment is looked for that would tell rivals apart, where the simulator takes `inputs`.
+    `budget` is the most models that may be run.
+    """
+    asked = None if simulator is None else Asked(simulator)
+    notes: list[str] = []
+    if isinstance(data, (str, os.PathLike)):
+        if output is not None or stages is not None or parameters or effects:
+            raise StretchError(
+                f"{os.fspath(data)} says what is diagnosed; give a simulator beside it, or None for the file's own"
+            )
+        checked = _stretch.Problem.read(data, asked is None or asked.takes_inputs)
+        name = checked.name if name == "data" else name
+    else:
+        if asked is None:
+            raise StretchError("there is no simulator; give one, or the path of a problem.toml that names it")
+        if (output is None) == (stages is None):
+            raise StretchError("say what is held against the measurement: output, a column's name, or stages")
+        listed = list(stages or [entries.Stage(str(output), tuple(inputs), velocity=velocity, position=position)])
+        units, noise = units or {}, noise or {}
+        driven = list(dict.fromkeys(c for one in listed for c in one.inputs))
+        wrappers = [wrap] if isinstance(wrap, str) else list(wrap or ())
+        if not asked.takes_inputs:
+            wrappers, noise_in = _behind(wrappers, driven, notes), {}
+        else:
+            noise_in = dict(noise)
+        problem = {
+            "stages": [entries.stage(one, i, units, noise) for i, one in enumerate(listed)],
+            "inputs": [{"column": c, "unit": units.get(c, ""), "noise": float(noise_in.get(c, 0.0))} for c in driven],
+            "parameters": [entries.parameter(key, value) for key, value in (parameters or {}).items()],
+            "effects": [entries.effect(key, value) for key, value in (effects or {}).items()],
+            "wrap": wrappers,
+            "without": list(without),
+            "beside": list(beside),
+            "sensor": {"reference": reference, "signal": output or listed[-1].output} if reference else None,
+        }
+        wanted = entries.wanted(listed, [*beside, *([reference] if reference else [])])
+        checked = _stretch.Problem(json.dumps(problem), entries.recorded(data, rate_hz, wanted))
+    if asked is not None:
+        asked.bind({**json.loads(checked.session), "columns": checked.columns})
+    how = {
+        "name": name,
+        "depth": depth,
+        "seed": seed,
+        "threads": threads,
+        "baselines": False,
+        "budget": budget,
+        "batch": 1 if asked is None else asked.batch,
+        "answers_all": asked is not None and asked.answers_all,
+        "takes_inputs": asked is None or asked.takes_inputs,
+        "experiment": experiment,
+    }
+    text, page, curves, functions, trial = checked.diagnose(asked, json.dumps(how), progress)
+    answer = json.loads(text)
+    answer["notes"] = notes + answer["notes"]
+    return Diagnosis(answer, page, curves, functions, trial)
+
+
+def _behind(wrappers: list[str], driven: list[str], notes: list[str]) -> list[str]:
+    """Wrappers that stand behind the simulator: it cannot be driven by other inputs than it has."""
+    sides = ("input", *driven)
+    for one in wrappers:
+        if one.split(".", 1)[0] in sides:
+            raise StretchError(
+                f"wrap, {one}: the simulator must take the argument inputs to be driven by altered ones, as simulate(params, "
+                "effects, inputs)"
+            )
+    if "all" in wrappers and driven:
+        notes.append("nothing was looked for on the input's side: the simulator takes no argument inputs")
+    return ["output.all" if one == "all" else one for one in wrappers]

@@ -1,0 +1,1 @@
+../../../crates/stretch-problem/src/worker/calling.py

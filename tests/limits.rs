@@ -1,0 +1,150 @@
+//! What a small file may take of memory and time: under a limit of the system, a refusal with a sentence, and no abort.
+#![cfg(target_os = "linux")]
+
+use std::{
+    fs::File,
+    process::{Command, Output, Stdio},
+};
+
+use crate::support::{
+    Scratch, calibrate, one_line, packed,
+    packed::{deflated, gzip, mat},
+    program,
+};
+
+/// Address space of a run, kB: the program itself takes a tenth of it, and a file of a few megabytes may take 256 MB.
+const MOST_KB: u32 = 1_500_000;
+
+/// Runs the program in a folder within the limit; a shell's line follows its name.
+fn limited(scratch: &Scratch, line: &str) -> Output {
+    let script = format!("ulimit -v {MOST_KB}; exec \"$0\" {line}");
+    let mut shell = Command::new("sh");
+    shell.current_dir(scratch.path("")).args(["-c", &script]).arg(program());
+    // threads have stacks of address space, as many as there are processors
+    shell.env("RAYON_NUM_THREADS", "2").stdin(Stdio::null());
+    shell.output().expect("a shell runs")
+}
+
+#[track_caller]
+fn refused(scratch: &Scratch, line: &str, parts: &[&str]) {
+    let out = limited(scratch, line);
+    let said = one_line(&String::from_utf8_lossy(&out.stderr));
+    assert_eq!(out.status.code(), Some(1), "{line}: {:?}: {said}", out.status);
+    for part in parts {
+        assert!(said.contains(part), "{line}: no {part:?} in: {said}");
+    }
+}
+
+/// Header of an array of bytes, NPY version 1.
+fn npy(count: usize) -> Vec<u8> {
+    let told = format!("{{'descr': '|u1', 'fortran_order': False, 'shape': ({count},), }}");
+    let told = format!("{told:<117}\n");
+    [b"\x93NUMPY\x01\x00", &(told.len() as u16).to_le_bytes()[..], told.as_bytes()].concat()
+}
+
+#[test]
+fn an_archive_that_unpacks_to_gigabytes_is_refused() {
+    let scratch = Scratch::in_memory();
+    let head = npy(1_500_000_000);
+    let bomb = packed::zip("time_s.npy", &deflated(&head, b' ', 1500), 1_500_000_000);
+    assert!(bomb.len() < 2_000_000, "{}", bomb.len());
+    scratch.write("bomb.npz", bomb);
+    refused(
+        &scratch,
+        "convert bomb.npz --out out.csv",
+        &["bomb.npz", "time_s", "more than 19", "MB of memory"],
+    );
+    // numbers take eight times the bytes that they stand in
+    let small = [npy(60_000_000), vec![1; 60_000_000]].concat();
+    scratch.write("small.npy", small);
+    refused(
+        &scratch,
+        "convert small.npy --sample-rate 100 --columns a --out out.csv",
+        &["MB of memory"],
+    );
+    assert!(!scratch.path("out.csv").exists());
+}
+
+#[test]
+fn a_variable_that_unpacks_to_gigabytes_is_refused() {
+    let scratch = Scratch::in_memory();
+    scratch.write("bomb.mat", mat(&deflated(&14_u32.to_le_bytes(), b' ', 1500)));
+    refused(&scratch, "convert bomb.mat --out out.csv", &["bomb.mat", "MB of memory"]);
+}
+
+#[test]
+fn a_packed_text_that_goes_on_for_ever_is_refused() {
+    let scratch = Scratch::in_memory();
+    // blank lines take no memory, and time
+    scratch
+        .write("lines.csv.gz", gzip(&deflated(b"time_s,length_mm,bridge_v\n0,1,1\n", b'\n', 1500)));
+    for line in ["convert lines.csv.gz --out out.csv", "calibrate lines.csv.gz --out cal.json"] {
+        refused(&scratch, line, &["lines.csv.gz", "more than 100 times its size"]);
+    }
+}
+
+#[test]
+fn a_device_without_an_end_is_refused_by_every_reader() {
+    let scratch = Scratch::in_memory();
+    scratch.loops("a.csv", 5.0, 1.1);
+    for line in [
+        "apply --calibration /dev/zero a.csv --out out.csv",
+        "record check /dev/zero",
+        "export --calibration /dev/zero --c out",
+        "listen --calibration /dev/zero --port a.csv",
+        "calibrate a.csv --model auto --from /dev/zero --out cal.json",
+        "calibrate /dev/zero --out cal.json",
+        "diagnose /dev/zero --reference length_mm --signal bridge_v",
+        "simulate --protocol pulses --rig /dev/zero --out out",
+        "convert /dev/zero --out out.csv",
+    ] {
+        refused(&scratch, line, &["/dev/zero"]);
+    }
+}
+
+#[test]
+fn a_grid_far_finer_than_the_recording_is_refused() {
+    let scratch = Scratch::in_memory();
+    let trial = scratch.loops("a.csv", 6.0, 1.1);
+    assert!(calibrate(&trial, &scratch.path("cal.json")).output().unwrap().status.success());
+    for line in [
+        "convert a.csv --grid 1e7 --out out.csv",
+        "calibrate a.csv --grid 1e7 --out other.json",
+        "evaluate --calibration cal.json a.csv --grid 1e7",
+    ] {
+        refused(&scratch, line, &["a grid of 10000000 Hz has 6.0e7 instants", "--grid"]);
+    }
+}
+
+#[test]
+fn a_port_faster_than_the_program_waits() {
+    let scratch = Scratch::in_memory();
+    scratch.calibration("cal.json");
+    // more than there is memory for, of nothing
+    let zeros = scratch.path("zeros");
+    File::create(&zeros).unwrap().set_len(600_000_000).unwrap();
+    let script = "ulimit -v 300000; exec \"$0\" listen --calibration cal.json --port zeros";
+    let mut shell = Command::new("sh");
+    let out =
+        shell.current_dir(scratch.path("")).args(["-c", script]).arg(program()).output().unwrap();
+    assert!(out.status.success(), "{:?}: {}", out.status, String::from_utf8_lossy(&out.stderr));
+}
+
+#[test]
+fn a_worker_that_says_hello_with_gigabytes_is_refused() {
+    let scratch = Scratch::in_memory();
+    let row = |i: u32| format!("{:.2},{},{}\n", 0.01 * f64::from(i), (i / 50) % 3, (i / 40) % 7);
+    scratch.write("a.csv", format!("time_s,u,y\n{}", (0..800).map(row).collect::<String>()));
+    let hello = br#"{"kind":"hello","version":1}"#;
+    let mut frame = b"STR1".to_vec();
+    frame.extend((hello.len() as u32).to_le_bytes());
+    frame.extend((4_u64 << 30).to_le_bytes());
+    frame.extend(hello);
+    scratch.write("hello.bin", frame);
+    scratch.write(
+        "problem.toml",
+        "simulator = [\"sh\", \"-c\", \"cat hello.bin /dev/zero\"]\n[[stage]]\noutput = \"y\"\ninputs = [\"u\"]\n[[trial]]\nfile = \"a.csv\"\n",
+    );
+    let told = ["a frame says that its body is 4294967296 bytes long", "at most 65536"];
+    refused(&scratch, "diagnose problem.toml", &told);
+}

@@ -1,0 +1,113 @@
+//! Files that unpack to a thousand times their size, byte by byte.
+
+/// A stream of DEFLATE that unpacks to a head, stored as it is, and so many million equal bytes; a million takes a kilobyte.
+pub(crate) fn deflated(head: &[u8], byte: u8, millions: usize) -> Vec<u8> {
+    let mut out = vec![0];
+    let (length, head) = (head.len() as u16, head);
+    out.extend(length.to_le_bytes());
+    out.extend((!length).to_le_bytes());
+    out.extend(head);
+    let mut bits = Bits { out, held: 0, count: 0 };
+    // The last block, with codes of its own: two lengths of codes, then 1 bit for a match of 258 bytes, 1 bit for its distance.
+    bits.put(0b101, 3);
+    // 286 codes of literals and lengths, 1 of distances, 18 lengths of code lengths
+    bits.put(286 - 257, 5);
+    bits.put(0, 5);
+    bits.put(18 - 4, 4);
+    // their own lengths, two bits for each of the symbols 0, 1, 2, and 18, which is a run of zeros
+    for symbol in [16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1] {
+        bits.put(if matches!(symbol, 0 | 1 | 2 | 18) { 2 } else { 0 }, 3);
+    }
+    // the codes 01, 10 and 11, from the highest bit
+    let (one, two, run) = (0b10, 0b01, 0b11);
+    let zeros = |bits: &mut Bits, mut count: usize| {
+        while count >= 11 {
+            let some = count.min(138);
+            bits.put(run, 2);
+            bits.put(some - 11, 7);
+            count -= some;
+        }
+        (0..count).for_each(|_| bits.put(0, 2));
+    };
+    // lengths of codes: 2 of the byte, 2 of the block's end, 1 of the length 258; 1 of the distance
+    zeros(&mut bits, byte.into());
+    bits.put(two, 2);
+    zeros(&mut bits, 255 - usize::from(byte));
+    bits.put(two, 2);
+    zeros(&mut bits, 285 - 257);
+    bits.put(one, 2);
+    bits.put(one, 2);
+    // 285 is 0; of the codes of length 2 the byte is 10, the end 11
+    bits.put(0b01, 2);
+    for _ in 0..millions * 1_000_000 / 258 {
+        bits.put(0b00, 2);
+    }
+    bits.put(0b11, 2);
+    bits.put(0, 7);
+    bits.out
+}
+
+struct Bits {
+    out: Vec<u8>,
+    held: u32,
+    count: u32,
+}
+
+impl Bits {
+    fn put(&mut self, value: usize, count: u32) {
+        self.held |= (value as u32) << self.count;
+        self.count += count;
+        while self.count >= 8 {
+            self.out.push(self.held as u8);
+            self.held >>= 8;
+            self.count -= 8;
+        }
+    }
+}
+
+/// A file of gzip; its checksum is wrong, which nobody sees who refuses it in time.
+pub(crate) fn gzip(deflated: &[u8]) -> Vec<u8> {
+    let head = [0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 255];
+    [&head[..], deflated, &[0; 8]].concat()
+}
+
+/// A MAT file with one packed variable.
+pub(crate) fn mat(deflated: &[u8]) -> Vec<u8> {
+    let mut out = b"MATLAB 5.0 MAT-file".to_vec();
+    out.resize(124, b' ');
+    out.extend([0, 1, b'I', b'M']);
+    let packed = [&[0x78, 0x9c][..], deflated, &[0; 4]].concat();
+    out.extend(15_u32.to_le_bytes());
+    out.extend((packed.len() as u32).to_le_bytes());
+    out.extend(packed);
+    out
+}
+
+/// An archive with one packed member.
+pub(crate) fn zip(name: &str, deflated: &[u8], unpacked_bytes: u32) -> Vec<u8> {
+    let mut shared = Vec::new();
+    // version 2.0, no flags, DEFLATE, no date, no checksum
+    for half in [20_u16, 0, 8, 0, 0, 0, 0] {
+        shared.extend(half.to_le_bytes());
+    }
+    for word in [deflated.len() as u32, unpacked_bytes] {
+        shared.extend(word.to_le_bytes());
+    }
+    shared.extend((name.len() as u16).to_le_bytes());
+    shared.extend(0_u16.to_le_bytes());
+    let mut out = b"PK\x03\x04".to_vec();
+    out.extend(&shared);
+    out.extend(name.bytes());
+    out.extend(deflated);
+    let listed_at = out.len() as u32;
+    out.extend(b"PK\x01\x02\x14\x00");
+    out.extend(&shared);
+    out.extend([0; 14]);
+    out.extend(name.bytes());
+    let listed = out.len() as u32 - listed_at;
+    out.extend(b"PK\x05\x06\x00\x00\x00\x00\x01\x00\x01\x00");
+    out.extend(listed.to_le_bytes());
+    out.extend(listed_at.to_le_bytes());
+    out.extend([0, 0]);
+    out
+}

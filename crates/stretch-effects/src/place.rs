@@ -40,7 +40,7 @@ impl Place {
     /// A kind that acts here.
     pub(crate) fn action(self, kind: &Kind, values: &[f64], around: &Surroundings<'_>) -> Action {
         if self == Self::Sampling {
-            return Action::Skew(SkewSpec { skew_s: values[0], rate: values[1] });
+            return Action::Skew(SkewSpec { skew_s: values[0], rate: values[1], empty: 0.0 });
         }
         let operator = (kind.operator)(values, &self.extent(around), around.grid);
         match self {

@@ -15,13 +15,13 @@ use crate::{
 };
 
 /// Reads a signal `skew_s + rate t` before every sample, t since the trial began, by cubics through four nodes (Lagrange);
-/// the first and the last value are held beyond the ends, and beside an end the cubic becomes a line.
+/// the last value is held beyond the end, of the first one what is not `empty` before the beginning; beside an end the cubic becomes a line.
 ///
 /// ```
 /// use stretch_effects::{Grid, Skew, SkewSpec};
 /// let line: Vec<f64> = (0..100).map(f64::from).collect();
 /// let mut shown = vec![0.0; 100];
-/// Skew::new(&Grid::samples(0.01)?, SkewSpec { skew_s: 0.025, rate: 0.0 }).sample(&line, &mut shown);
+/// Skew::new(&Grid::samples(0.01)?, SkewSpec { skew_s: 0.025, ..Default::default() }).sample(&line, &mut shown);
 /// assert!((shown[50] - 47.5).abs() < 1e-9 && shown[0] == 0.0);
 /// # Ok::<(), stretch_effects::GridError>(())
 /// ```
@@ -57,13 +57,13 @@ impl Skew {
         }
         if self.spec.rate == 0.0 {
             for (i, out) in samples.iter_mut().enumerate() {
-                *out = self.at_start.of(nodes, i * pieces);
+                *out = self.at_start.of(nodes, i * pieces, self.spec.empty);
             }
             return;
         }
         for (i, out) in samples.iter_mut().enumerate() {
             let late_s = self.spec.skew_s + self.spec.rate * (i as f64 * self.grid.dt_s());
-            *out = Reading::new(&self.grid, late_s).of(nodes, i * pieces);
+            *out = Reading::new(&self.grid, late_s).of(nodes, i * pieces, self.spec.empty);
         }
     }
 }
@@ -103,7 +103,7 @@ impl Reading {
 
     /// The value that the sample at a node shows.
     #[inline]
-    fn of(&self, nodes: &[f64], own: usize) -> f64 {
+    fn of(&self, nodes: &[f64], own: usize, empty: f64) -> f64 {
         let last = nodes.len() as isize - 1;
         let node = (own as isize).saturating_add(self.offset);
         if node >= 1 && node + 2 <= last {
@@ -111,7 +111,7 @@ impl Reading {
             let [a, b, c, d] = self.weights;
             a * around[0] + b * around[1] + (c * around[2] + d * around[3])
         } else if node < 0 {
-            nodes[0]
+            (1.0 - empty) * nodes[0]
         } else if node >= last {
             nodes[last as usize]
         } else {
@@ -125,12 +125,21 @@ impl Reading {
 pub static DELAY: Kind = Kind {
     name: "delay",
     words: "it acts a dead time later",
-    equation: "y(t) = x(t - delay_s)",
+    equation: "y(t) = x(t - delay_s), and (1 - empty) x(0) before x(0) arrives",
     usual: &[Side::Input],
-    parameters: |e, _| vec![EffectParameter::sized("delay_s", "s", 0.0..=e.late_s())],
-    starts: Some(|e| [0.05, 0.2, 0.6].map(|k| vec![k * e.late_s()]).into()),
-    operator: |v, _, grid| Box::new(Skew::new(grid, SkewSpec { skew_s: v[0], rate: 0.0 })),
-    sketch: Some(|v, _, signals| sketch([v[0], 0.0], signals)),
+    parameters: |e, _| {
+        // What was commanded before the record began is not in it: the first value as well, or nothing, or something between.
+        let empty = EffectParameter::formed("empty", "1", 0.0..=1.0, 0.0);
+        vec![EffectParameter::sized("delay_s", "s", 0.0..=e.late_s()), empty]
+    },
+    starts: Some(|e| {
+        let late = [0.05, 0.2, 0.6].map(|k| k * e.late_s());
+        late.iter().flat_map(|&late| [vec![late, 0.0], vec![late, 1.0]]).collect()
+    }),
+    operator: |v, _, grid| {
+        Box::new(Skew::new(grid, SkewSpec { skew_s: v[0], rate: 0.0, empty: v[1] }))
+    },
+    sketch: Some(|v, _, signals| sketch(SkewSpec { skew_s: v[0], rate: 0.0, empty: v[1] }, signals)),
     twins: &["skew", "lag", "second_order_lag"],
     family: Some((Family::Late, |v| v[0])),
     ..Kind::PLAIN
@@ -148,20 +157,22 @@ pub static SKEW: Kind = Kind {
         vec![EffectParameter::sized("skew_s", "s", -late..=late), rate]
     },
     starts: Some(|e| [-0.2, -0.03, 0.03, 0.1, 0.5].map(|k| vec![k * e.late_s(), 0.0]).into()),
-    operator: |v, _, grid| Box::new(Skew::new(grid, SkewSpec { skew_s: v[0], rate: v[1] })),
-    sketch: Some(|v, _, signals| sketch([v[0], v[1]], signals)),
+    operator: |v, _, grid| {
+        Box::new(Skew::new(grid, SkewSpec { skew_s: v[0], rate: v[1], empty: 0.0 }))
+    },
+    sketch: Some(|v, _, signals| sketch(SkewSpec { skew_s: v[0], rate: v[1], empty: 0.0 }, signals)),
     twins: &["delay", "lag", "second_order_lag"],
     family: Some((Family::Late, |v| v[0])),
     ..Kind::PLAIN
 };
 
 /// Acts on a record as a whole.
-fn sketch([skew_s, rate]: [f64; 2], signals: &Signals) -> Sketch {
+fn sketch(SkewSpec { skew_s, rate, empty }: SkewSpec, signals: &Signals) -> Sketch {
     let body = "let early = -(SKEW + RATE * i * DT) / DT
         let whole = floor(early)
         let u = early - whole
         let k = i + whole
-        var y = v[0]
+        var y = (1 - EMPTY) * v[0]
         if k >= n - 1
         y = v[n - 1]
         else
@@ -177,7 +188,8 @@ fn sketch([skew_s, rate]: [f64; 2], signals: &Signals) -> Sketch {
     Sketch::of(signals.x.clone().named("v").record(), body)
         .beside(Quantity::COUNT)
         .beside(Quantity::new("i", "1", "which sample is shown, from 0"))
-        .with_all(&[("SKEW", skew_s, "s"), ("RATE", rate, "s/s"), ("DT", signals.dt_s, "s")])
+        .with_all(&[("SKEW", skew_s, "s"), ("RATE", rate, "s/s"), ("EMPTY", empty, "1")])
+        .with("DT", signals.dt_s, "s")
 }
 
 /// The channels are not sampled at the same time.

@@ -176,6 +176,26 @@ fn what_stands_in_front_of_a_simulator_is_written_as_well() {
     assert!(agrees(&again), "{}", again.diagnosis.sentence);
 }
 
+/// Before the first command arrives a plant stands where an idle command left it, which no recording tells.
+#[test]
+fn a_delayed_command_that_does_not_begin_at_zero_is_no_clock_of_the_output() {
+    let late = |x: &[f64]| {
+        let shifted: Vec<f64> =
+            (0..x.len()).map(|i| i.checked_sub(6).map_or(0.0, |i| x[i])).collect();
+        lagging(3.0, 0.0, &shifted)
+    };
+    let wrap = ["input.delay", "output.delay", "output.skew"];
+    let trials = recorded(late);
+    let found = examined(described(trials.clone(), &wrap), lagging);
+    assert_eq!(found.diagnosis.named, ["input.delay"], "{}", found.diagnosis.sentence);
+    let (spec, _) = fixed(&found, trials);
+    let values = &spec.wrapped[0].values;
+    assert!((values["delay_s"] - 0.06).abs() < 1e-3, "{values:?}");
+    assert!((values["empty"] - 1.0).abs() < 0.05, "{values:?}");
+    let again = examined(spec, lagging);
+    assert!(agrees(&again), "{}", again.diagnosis.sentence);
+}
+
 #[test]
 fn an_effect_that_the_simulator_has_itself_gets_its_value() {
     let trials = recorded(|x| line(3.0, 0.02, x));

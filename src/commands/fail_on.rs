@@ -35,5 +35,5 @@ impl FailOn {
 /// Whether more is left than noise as it is described, and too little to name.
 pub(super) fn is_faint(diagnosis: &Diagnosis) -> bool {
     let agrees = matches!(diagnosis.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
-    agrees && diagnosis.null_band.is_some_and(|band| diagnosis.gap.retuned > band)
+    agrees && diagnosis.gap.retuned > diagnosis.null_band
 }

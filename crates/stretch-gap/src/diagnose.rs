@@ -192,14 +192,18 @@ fn doubt(
 }
 
 /// How strong each effect would have to be to be named; none where the record carries no name at all, or no more runs may be made.
-fn limits(task: Task<'_>, searched: &Searched<'_>) -> Result<Vec<DetectionLimit>, GapError> {
+fn limits(
+    task: Task<'_>,
+    searched: &Searched<'_>,
+    null_band: f64,
+) -> Result<Vec<DetectionLimit>, GapError> {
     let problem = &searched.problem;
     if task.depth == 0 || problem.is_spent() {
         return Ok(Vec::new());
     }
     (task.progress)("detection limits");
     let (best, thresholds) = (&searched.found.best, &task.options.thresholds);
-    let asked = Asked { problem, best, thresholds, seed: task.options.seed };
+    let asked = Asked { problem, best, thresholds, null_band, seed: task.options.seed };
     detection_limits(asked, searched.looked.as_deref())
 }
 
@@ -216,6 +220,7 @@ struct Cause<'p> {
 /// What the test trials say of a cause.
 struct Gathered {
     evidence: Evidence,
+    null_band: f64,
     posterior: Posterior,
     candidates: Vec<Candidate>,
     shares: Vec<EffectShare>,
@@ -234,9 +239,11 @@ fn gather(task: Task<'_>, cause: Cause<'_>) -> Result<Gathered, GapError> {
     let mut evidence = Evidence::gather(problem, found)?;
     let all = hypotheses(&found.best, &found.rivals, eliminated, &problem.nominal);
     let held = candidates(problem, &evidence, &all, seed)?;
-    let (posterior, held) = posterior(problem, thresholds, &mut evidence, all, held);
+    let null_band = null_band(problem, seed)?;
+    let (posterior, held) = posterior(problem, thresholds, (&mut evidence, null_band), all, held);
     let (candidates, blocks): (Vec<Candidate>, Vec<_>) = held.into_iter().unzip();
-    let stabilities = stabilities(problem, thresholds, &evidence, (&posterior, &blocks), seed);
+    let stabilities =
+        stabilities(problem, thresholds, &evidence, (&posterior, &blocks), (null_band, seed));
     let shares = shares(problem, &evidence, &found.best, eliminated)?;
     let sanity = Sanity::of(problem, &found.best, &evidence)?;
     (task.progress)("where the gap sits");
@@ -249,6 +256,7 @@ fn gather(task: Task<'_>, cause: Cause<'_>) -> Result<Gathered, GapError> {
     let too_little = too_little(&evidence.roles, about.rows_used(), about.dt_s);
     Ok(Gathered {
         evidence,
+        null_band,
         posterior,
         candidates,
         shares,
@@ -288,14 +296,13 @@ fn report(
     let (options, thresholds) = (task.options, &task.options.thresholds);
     let Gathered { mut evidence, posterior, candidates, shares, stabilities, sanity, .. } =
         gathered;
-    let Gathered { location, too_little, .. } = gathered;
+    let Gathered { location, too_little, null_band, .. } = gathered;
     let (simulator, runs) = (cause.problem.simulator(), &cause.problem.compare.runs);
     let partial = candidates.first().filter(|_| judged.kind == VerdictKind::Partial);
     let unexplained = partial.map(|first| unexplained(simulator, &evidence, first, options.seed));
     let is_quiet = matches!(judged.kind, VerdictKind::NoGap | VerdictKind::Parameters);
-    let null_band = is_quiet.then(|| null_band(cause.problem, options.seed)).transpose()?;
     let detection_limits = match too_little.is_none() && (is_quiet || options.detection_limits) {
-        true => limits(task, searched)?,
+        true => limits(task, searched, null_band)?,
         false => Vec::new(),
     };
     let ambiguous = match is_quiet || judged.kind == VerdictKind::Record {

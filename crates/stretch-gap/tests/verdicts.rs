@@ -186,7 +186,7 @@ fn noise_alone_stays_within_the_null_band() {
     let toy = Toy::of(&[Law::Lag, Law::Line]);
     let is_outside = |seed: &u64| {
         let told = told(&toy.measured(200 + seed));
-        let band = told.null_band.expect("nothing is named");
+        let band = told.null_band;
         // Two stages of 1000 tested samples: 2 sqrt(2/1000) = 0.09 each at the most, and their sum is what counts.
         assert!((0.01..0.2).contains(&band), "{band}");
         told.gap.retuned > band
@@ -201,7 +201,7 @@ fn the_null_band_narrows_with_the_record() {
     let band = |times: usize, units: [f64; 2]| {
         let trials = vec![(1000 * times, false), (1000 * times, true)];
         let toy = Toy { trials, units, ..Toy::of(&[Law::Line]) };
-        told(&toy.measured(13)).null_band.expect("nothing is named")
+        told(&toy.measured(13)).null_band
     };
     let (short, long) = (band(1, [1.0; 2]), band(4, [1.0; 2]));
     // The same draws at a quarter of the variance; the greater of two parts that both shrink alike.

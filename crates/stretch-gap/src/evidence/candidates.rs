@@ -17,7 +17,7 @@ use crate::{
         excess::Excess,
         gathered::{Blocks, Evidence, StageEvidence},
         localise::location::StageGap,
-        probability::{Posterior, Standing, Weighed, weigh},
+        probability::{Gap, Posterior, Standing, Weighed, weigh},
     },
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
     problem::{error::GapError, simulator::Simulator, thresholds::Thresholds},
@@ -124,7 +124,7 @@ pub(crate) const LEAST_CLOSED: f64 = 0.3;
 pub(crate) fn posterior(
     problem: &PreparedProblem<'_>,
     thresholds: &Thresholds,
-    evidence: &mut Evidence,
+    (evidence, null_band): (&mut Evidence, f64),
     hypotheses: Vec<Hypothesis>,
     candidates: Vec<(Candidate, Vec<Blocks>)>,
 ) -> (Posterior, Vec<(Candidate, Vec<Blocks>)>) {
@@ -137,10 +137,11 @@ pub(crate) fn posterior(
             let (score, catalogue) = (hypothesis.score, problem.simulator().effects());
             let strongest = hypothesis.effects.first();
             let is_at_bound = strongest.is_some_and(|&e| hypothesis.is_at_bound(e, catalogue));
-            kept.push((hypothesis, Standing { score, left, is_at_bound }));
+            let is_nothing = hypothesis.effects.is_empty();
+            kept.push((hypothesis, Standing { score, left, is_at_bound, is_nothing }));
         }
     }
-    let posterior = weigh(thresholds, evidence.gap.retuned, kept);
+    let posterior = weigh(thresholds, Gap { retuned: evidence.gap.retuned, null_band }, kept);
     let of = |w: &Weighed| {
         let (candidate, blocks) = by_effects.remove(&w.hypothesis.effects)?;
         let Standing { left, is_at_bound: at_bound, .. } = w.standing;

@@ -8,6 +8,7 @@
 //! X = ((1 - u)|z|^2 + 2 g sqrt((1 - u) t'V^-1 t) + t'V^-1 t) / N,     z ~ N(0, I), g ~ N(0, 1)
 //! ```
 //!
+//! where the level of the own noise is an estimate, (1 - u) is known to its relative standard deviation only, the same in all trials of a record.
 //! Re-tuning would take some of it away, which is left out: the band errs to the wide side.
 
 use rayon::prelude::*;
@@ -47,7 +48,9 @@ fn excess(
     let looked = (roles.count(Role::Fit) + roles.count(Role::Held)) as f64;
     let (mut fitted, mut tested) = (0.0, 0.0);
     for (stage, arrives) in arrives.iter().enumerate() {
-        let own = (1.0 - problem.transmits(stage)).max(0.0);
+        let known_to = problem.compare.metrics[stage].noise.known_to;
+        let level = (1.0 + known_to * random.gauss()).max(0.0);
+        let own = level * (1.0 - problem.transmits(stage)).max(0.0);
         let mut chance = |samples: f64| {
             // The sum of N squares, nearly normal: mean N, variance 2N.
             let white = own * (samples + (2.0 * samples).sqrt() * random.gauss());

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     evidence::{
         gathered::{Blocks, Evidence},
-        probability::{Posterior, Standing, Weighed, most_probable, probabilities},
+        probability::{Gap, Posterior, Standing, Weighed, most_probable, probabilities},
     },
     fit::{
         prepared::PreparedProblem,
@@ -98,7 +98,7 @@ pub(crate) fn stabilities(
     thresholds: &Thresholds,
     evidence: &Evidence,
     (posterior, blocks): (&Posterior, &[Vec<Blocks>]),
-    seed: u64,
+    (null_band, seed): (f64, u64),
 ) -> Vec<EffectStability> {
     let Some(like) = evidence.nominal_blocks.first() else { return Vec::new() };
     let mut random = RandomGenerator::new(seed, 78);
@@ -116,7 +116,7 @@ pub(crate) fn stabilities(
             Standing { score, left: left.gap(problem, evidence), ..set.standing }
         };
         let standings: Vec<Standing> = posterior.sets.iter().zip(blocks).map(again).collect();
-        let gap = retuned.gap(problem, evidence);
+        let gap = Gap { retuned: retuned.gap(problem, evidence), null_band };
         let (weights, _) = probabilities(thresholds, gap, &standings);
         let even = most_probable(&weights);
         let share = 1.0 / even.len().max(1) as f64;

@@ -31,6 +31,8 @@ pub(crate) struct NoiseLevel {
     /// Root mean square of it.
     pub(crate) rms: f64,
     pub(crate) source: String,
+    /// Relative standard deviation with which the variance of the output's own noise is known.
+    pub(crate) known_to: f64,
 }
 
 /// Draws of the inputs' noise.
@@ -70,6 +72,7 @@ fn noise_level(
         None => of_record(simulator, roles, stage),
     };
     let (own, mut source) = (noise.sd().powi(2), noise.source().to_owned());
+    let known_to = noise.known_to();
     let mean = arrived.iter().sum::<f64>() / samples.max(1) as f64;
     if mean > 1e-4 * own {
         source += ", and the measured input's noise";
@@ -101,7 +104,7 @@ fn noise_level(
     if !isolated.is_empty() {
         source += &format!("; samples that stand alone and do not count: {}", isolated.len());
     }
-    Ok(NoiseLevel { sd, rms: (own + mean).sqrt().max(1e-12), source })
+    Ok(NoiseLevel { sd, rms: (own + mean).sqrt().max(1e-12), source, known_to })
 }
 
 /// Variance that the measured input's noise causes at every sample of the output, which is `undisturbed` without it.

@@ -39,7 +39,11 @@ pub struct Noise {
     slow: f64,
     memory_samples: f64,
     source: String,
+    known_to: f64,
 }
+
+/// Relative standard deviation of a variance from second differences: a tenth of the noise itself, for they hold whatever else is quick.
+const DIFFERENCES_KNOWN_TO: f64 = 0.2;
 
 impl Noise {
     /// White noise of a known standard deviation, rounding included.
@@ -49,11 +53,16 @@ impl Noise {
     /// assert_eq!(Noise::known(0.05).sd(), 0.05);
     /// ```
     pub fn known(sd: f64) -> Self {
-        Self::white(sd, "known noise of the channel".into())
+        Self::white(sd, "known noise of the channel".into(), 0.0)
     }
 
-    pub(super) fn white(sd: f64, source: String) -> Self {
-        Self { white: sd, slow: 0.0, memory_samples: 1.0, source }
+    pub(super) fn white(sd: f64, source: String, known_to: f64) -> Self {
+        Self { white: sd, slow: 0.0, memory_samples: 1.0, source, known_to }
+    }
+
+    /// Relative standard deviation with which its variance is known; 0 where it was stated.
+    pub fn known_to(&self) -> f64 {
+        self.known_to
     }
 
     /// Standard deviation of white and slow part together.
@@ -122,7 +131,11 @@ impl Noise {
         let fitted = shapes.fit(&powers, whole.len(), stated);
         // What lies below its step, a converter rounds: uniform errors of variance step^2/12 at least.
         let rounded = step / 12.0_f64.sqrt();
-        Some(if fitted.sd() < rounded { Self::white(rounded, fitted.source) } else { fitted })
+        let known_to = fitted.known_to;
+        Some(match fitted.sd() < rounded {
+            true => Self::white(rounded, fitted.source, known_to),
+            false => fitted,
+        })
     }
 
     /// White noise from second differences: what changes from sample to sample; errors that last longer are none.
@@ -130,7 +143,7 @@ impl Noise {
     /// See [`noise_variance`].
     pub fn of_differences<'a>(stretches: impl Iterator<Item = &'a [f64]>, dt_s: f64) -> Self {
         let sd = noise_variance(stretches, dt_s).sqrt();
-        Self::white(sd, "second differences of the record".into())
+        Self::white(sd, "second differences of the record".into(), DIFFERENCES_KNOWN_TO)
     }
 }
 
@@ -215,7 +228,9 @@ impl Shapes {
         };
         let price = 0.5 * (n * self.waves.len() as f64).ln();
         let white = level(&|k| self.white[k]);
-        let mut best = Noise::white(white.sqrt(), "noise of the record".into());
+        // A mean of so many squares: its variance is 2/N of its square.
+        let known_to = (2.0 / (n * self.waves.len() as f64)).sqrt();
+        let mut best = Noise::white(white.sqrt(), "noise of the record".into(), known_to);
         let mut least = cost(&|k| white * self.white[k]) + price;
         if let Some(sd) = stated.filter(|sd| *sd > 0.0) {
             let own = cost(&|k| sd * sd * self.white[k]);
@@ -232,7 +247,7 @@ impl Shapes {
                     least = own;
                     let (white, slow) = (((1.0 - share) * all).sqrt(), (share * all).sqrt());
                     let source = "noise of the record, some of it slow".to_owned();
-                    best = Noise { white, slow, memory_samples, source };
+                    best = Noise { white, slow, memory_samples, source, known_to };
                 }
             }
         }
@@ -323,7 +338,8 @@ mod tests {
         for (seed, (slow, memory)) in [(0.3, 2.0), (0.5, 7.0), (0.7, 20.0)].into_iter().enumerate()
         {
             let (white, slow) = ((1.0_f64 - slow).sqrt(), f64::sqrt(slow));
-            let truth = Noise { white, slow, memory_samples: memory, source: String::new() };
+            let truth =
+                Noise { white, slow, memory_samples: memory, source: String::new(), known_to: 0.0 };
             let found =
                 Noise::of_windows(&windows(&truth, 100, seed as u64), Some(1.0), true, 0.01);
             let found = found.expect("enough windows");

@@ -25,6 +25,8 @@ const FEWEST: usize = 6;
 const MOVES: f64 = 3.0;
 /// Order of the differences, and the sum of their squared weights.
 const ORDER: (usize, f64) = (6, 924.0);
+/// Squared correlations of sixth differences, summed over all lags: 24!/(12! 12!)/924^2. So many of them say as much as one sample.
+const TOGETHER: f64 = 2_704_156.0 / (924.0 * 924.0);
 
 impl Noise {
     /// Noise of an output over the `trials` that may be looked at, from rests of all its `inputs`; `dt_s` is the sample time, s.
@@ -56,7 +58,8 @@ impl Noise {
         let mean = kept.iter().sum::<f64>() / kept.len() as f64;
         let seconds = (kept.len() * PART) as f64 * dt_s;
         let source = format!("rests of the record: {seconds:.1} s in which the inputs stand still");
-        (kept.len() >= FEWEST && mean > 0.0).then(|| Self::white(mean.sqrt(), source))
+        let known_to = (2.0 * TOGETHER / (kept.len() * PART).max(1) as f64).sqrt();
+        (kept.len() >= FEWEST && mean > 0.0).then(|| Self::white(mean.sqrt(), source, known_to))
     }
 }
 

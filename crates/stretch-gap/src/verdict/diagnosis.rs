@@ -8,7 +8,7 @@ use crate::{
         detection_limit::DetectionLimit,
         excess::Excess,
         localise::location::Where,
-        probability::{Standing, probabilities},
+        probability::{Gap, Standing, probabilities},
         shares::EffectShare,
         stability::EffectStability,
     },
@@ -128,10 +128,9 @@ pub struct Diagnosis {
     /// Size of the gap.
     #[serde(default)]
     pub gap: Excess,
-    /// Gap that 19 of 20 records like this one stay below in which nothing is missing; none where something is named, or the record
-    /// itself is wrong.
+    /// Gap that 19 of 20 records like this one stay below in which nothing is missing.
     #[serde(default)]
-    pub null_band: Option<f64>,
+    pub null_band: f64,
     /// How strong each effect of the catalogue would have to be to be named, in the catalogue's order; empty where something is named and nobody
     /// [asked](crate::Options::detection_limits), and where the record carries no name.
     #[serde(default)]
@@ -185,10 +184,11 @@ impl Diagnosis {
         let Some((_, sets)) = self.candidates.split_last() else { return Vec::new() };
         let standing = |c: &Candidate| {
             let Candidate { score, left, at_bound, .. } = *c;
-            Standing { score, left, is_at_bound: at_bound }
+            Standing { score, left, is_at_bound: at_bound, is_nothing: c.effects.is_empty() }
         };
         let standings: Vec<Standing> = sets.iter().map(standing).collect();
-        let (mut all, unknown) = probabilities(thresholds, self.gap.retuned, &standings);
+        let gap = Gap { retuned: self.gap.retuned, null_band: self.null_band };
+        let (mut all, unknown) = probabilities(thresholds, gap, &standings);
         all.push(unknown);
         all
     }

@@ -166,7 +166,7 @@ mod tests {
                 parameter_sd: Vec::new(),
                 score: 0.0,
             },
-            standing: Standing { score: 0.0, left, is_at_bound: false },
+            standing: Standing { score: 0.0, left, is_at_bound: false, is_nothing: false },
             probability,
         };
         Posterior { sets: vec![set(&[0], left, play), set(&[], 10.0, nothing)], unknown }

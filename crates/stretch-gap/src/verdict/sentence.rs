@@ -45,8 +45,8 @@ pub(crate) struct Answer<'a> {
     pub(crate) unexplained: Option<&'a Unexplained>,
     /// What is wrong with the record or the rig file.
     pub(crate) gross: &'a [Gross],
-    /// Gap that noise alone may leave, where nothing is named.
-    pub(crate) null_band: Option<f64>,
+    /// Gap that noise alone may leave.
+    pub(crate) null_band: f64,
 }
 
 /// Puts a verdict into words.
@@ -127,7 +127,7 @@ fn seen(answer: Answer<'_>, simulator: &dyn Simulator, evidence: &Evidence) -> S
             ) + &parts(answer.shares)
         }
         (VerdictKind::Parameters | VerdictKind::NoGap, _) => match answer.null_band {
-            Some(band) if gap.retuned > band => {
+            band if gap.retuned > band => {
                 let left = too_faint(gap, band, evidence, simulator);
                 match naming.faint.is_empty() {
                     true => "Too faint to name: ".to_owned() + &left,

@@ -10,7 +10,7 @@ use crate::{
             lags::Lags,
             probes::{Change, Probe, Probes},
         },
-        probability::{Standing, most_probable, names, probabilities},
+        probability::{Gap, Standing, most_probable, names, probabilities},
     },
     fit::{
         octaves::Octaves,
@@ -172,8 +172,10 @@ impl<'a> Record<'a> {
         weighed.retain(|d| d.closed >= LEAST_CLOSED);
         let retuned = self.gap(&nominal);
         let mut standings: Vec<Standing> = weighed.iter().map(|d| d.standing).collect();
-        standings.push(Standing { score: 0.0, left: retuned, is_at_bound: false });
-        let (weights, unknown) = probabilities(thresholds, retuned, &standings);
+        let nothing = Standing { score: 0.0, left: retuned, is_at_bound: false, is_nothing: true };
+        standings.push(nothing);
+        let gap = Gap { retuned, null_band: self.asked.null_band };
+        let (weights, unknown) = probabilities(thresholds, gap, &standings);
         let (sets, nothing) = weights.split_at(weighed.len());
         if !names([sets.iter().sum(), nothing[0], unknown], retuned, thresholds) {
             return 0.0;
@@ -231,7 +233,12 @@ impl<'a> Record<'a> {
         let whole = tested(nominal);
         Drawn {
             at,
-            standing: Standing { score, left: self.gap(&left), is_at_bound: fitted != best },
+            standing: Standing {
+                score,
+                left: self.gap(&left),
+                is_at_bound: fitted != best,
+                is_nothing: false,
+            },
             closed: if whole > 1e-9 { 1.0 - tested(&left) / whole } else { 0.0 },
             gain: fitted * (mixed - 0.5 * fitted * own),
             is_accepted,

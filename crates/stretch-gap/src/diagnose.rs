@@ -18,7 +18,11 @@ use crate::{
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
     numerics::stopwatch::Stopwatch,
     options::Options,
-    problem::{altered_parameters::Altered, error::GapError, simulator::Simulator},
+    problem::{
+        altered_parameters::Altered,
+        error::{GapError, unless_spent},
+        simulator::Simulator,
+    },
     record::{
         columns_alone::columns_alone, examine::Doubts, gross::Gross, suspect::Suspect,
         weigh::weighed,
@@ -83,25 +87,52 @@ fn run(task: Task<'_>) -> Result<(Diagnosis, Evidence), GapError> {
     let task = Task { depth: if columns.is_empty() { task.depth } else { 0 }, ..task };
     let between_rows = command_timing::between_rows(simulator);
     let (problem, from) = prepare(task, between_rows.as_ref())?;
-    let searched = search(task, problem, &from)?;
+    let is_limited = simulator.costly().is_some_and(|costly| costly.model_runs().budget.is_some());
+    let spare = is_limited.then(|| Searched::without(problem.clone()));
+    // What an answer without effects needs is run first: whatever a search spends, there is an answer.
+    if let Some(spare) = &spare {
+        gather(task, spare.cause(&columns))?;
+    }
+    match (answered(task, problem, &from, &columns, &begun), spare) {
+        (Err(GapError::Spent { .. }), Some(spare)) => {
+            concluded(task, &spare, spare.cause(&columns), &begun)
+        }
+        (answer, _) => answer,
+    }
+}
+
+/// The answer after a search.
+fn answered<'a>(
+    task: Task<'a>,
+    problem: PreparedProblem<'a>,
+    from: &Hypothesis,
+    columns: &[Gross],
+    begun: &Stopwatch,
+) -> Result<(Diagnosis, Evidence), GapError> {
+    let searched = search(task, problem, from)?;
     let suspect = Suspect::of(searched.problem.simulator());
     let doubted = searched.problem.beside(&suspect);
     let error = match columns.is_empty() {
         true => doubt(task, &searched, (&doubted, &suspect))?,
         false => None,
     };
-    let answer = match &error {
+    let cause = match &error {
         Some((gross, found)) => Cause { problem: &doubted, found, eliminated: &[], gross },
-        None => Cause {
-            problem: &searched.problem,
-            found: &searched.found,
-            eliminated: &searched.eliminated,
-            gross: &columns,
-        },
+        None => searched.cause(columns),
     };
-    let gathered = gather(task, answer)?;
-    let judged = decide(task, answer, &gathered)?;
-    report(task, &searched, answer, (gathered, judged), &begun)
+    concluded(task, &searched, cause, begun)
+}
+
+/// What a cause comes to.
+fn concluded(
+    task: Task<'_>,
+    searched: &Searched<'_>,
+    cause: Cause<'_>,
+    begun: &Stopwatch,
+) -> Result<(Diagnosis, Evidence), GapError> {
+    let gathered = gather(task, cause)?;
+    let judged = decide(task, cause, &gathered)?;
+    report(task, searched, cause, (gathered, judged), begun)
 }
 
 /// The problem in which the records are likelier, of commands that switch at rows and between them, and the set of effects to go on from.
@@ -128,7 +159,22 @@ struct Searched<'a> {
     looked: Option<Arc<Looked>>,
 }
 
-impl Searched<'_> {
+impl<'a> Searched<'a> {
+    /// What is there before a search: the re-tuned nominal.
+    fn without(problem: PreparedProblem<'a>) -> Self {
+        let found = Found { best: problem.nominal.clone(), rivals: Vec::new() };
+        Self { problem, found, eliminated: Vec::new(), tried: BTreeMap::new(), looked: None }
+    }
+
+    /// The best set as the cause, or what the columns alone say is wrong with the record.
+    fn cause<'p>(&'p self, gross: &'p [Gross]) -> Cause<'p>
+    where
+        'a: 'p,
+    {
+        let Self { problem, found, eliminated, .. } = self;
+        Cause { problem, found, eliminated, gross }
+    }
+
     /// Effects of the catalogue that no fitted set holds.
     fn not_looked_at(&self) -> Vec<&str> {
         let effects = self.problem.simulator().effects().iter().enumerate();
@@ -186,8 +232,9 @@ fn doubt(
     if searched.problem.is_spent() {
         return Ok(None);
     }
-    let doubts = Doubts::of(doubted, suspect, thresholds)?;
-    let doubts = doubts.closer_if(doubted, suspect, found, thresholds)?;
+    let doubts = Doubts::of(doubted, suspect, thresholds)
+        .and_then(|doubts| doubts.closer_if(doubted, suspect, found, thresholds));
+    let Some(doubts) = unless_spent(doubts)? else { return Ok(None) };
     Ok(weighed(doubted, suspect, doubts.errors, found, thresholds))
 }
 
@@ -200,7 +247,7 @@ fn limits(task: Task<'_>, searched: &Searched<'_>) -> Result<Vec<DetectionLimit>
     (task.progress)("detection limits");
     let (best, thresholds) = (&searched.found.best, &task.options.thresholds);
     let asked = Asked { problem, best, thresholds, seed: task.options.seed };
-    detection_limits(asked, searched.looked.as_deref())
+    Ok(unless_spent(detection_limits(asked, searched.looked.as_deref()))?.unwrap_or_default())
 }
 
 /// What the gap is put down to: the best set of effects, or an error.
@@ -273,7 +320,10 @@ fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Result<Judge
         is_short: is_short(&evidence.roles),
     };
     let best = &cause.found.best;
-    let lacking = |names| lacking(cause.problem, best, names, task.progress);
+    let lacking = |names| {
+        let found = lacking(cause.problem, best, names, task.progress);
+        Ok(unless_spent(found)?.flatten())
+    };
     judge(&case, &task.options.thresholds, lacking)
 }
 
@@ -293,7 +343,8 @@ fn report(
     let partial = candidates.first().filter(|_| judged.kind == VerdictKind::Partial);
     let unexplained = partial.map(|first| unexplained(simulator, &evidence, first, options.seed));
     let is_quiet = matches!(judged.kind, VerdictKind::NoGap | VerdictKind::Parameters);
-    let null_band = is_quiet.then(|| null_band(cause.problem, options.seed)).transpose()?;
+    let null_band = is_quiet.then(|| unless_spent(null_band(cause.problem, options.seed)));
+    let null_band = null_band.transpose()?.flatten();
     let detection_limits = match too_little.is_none() && (is_quiet || options.detection_limits) {
         true => limits(task, searched)?,
         false => Vec::new(),
@@ -330,7 +381,8 @@ fn report(
     };
     // What a page needs beside the answer counts as none of its cost.
     if let (true, Some(stage)) = (options.responses, location.worst()) {
-        evidence.responses = responses(cause.problem, &evidence, &cause.found.best, stage)?;
+        let responses = responses(cause.problem, &evidence, &cause.found.best, stage);
+        evidence.responses = unless_spent(responses)?.unwrap_or_default();
     }
     let simpler = || baselines(&searched.problem, &searched.tried, thresholds.null_excess);
     let diagnosis = Diagnosis {
@@ -355,7 +407,10 @@ fn report(
         identifiability: searched.problem.identified(),
         transfer: None,
         next_experiment: None,
-        baselines: options.baselines.then(simpler).transpose()?,
+        baselines: match options.baselines {
+            true => unless_spent(simpler())?,
+            false => None,
+        },
         notes: text.notes,
         rows_used: simulator.description().rows_used(),
         simulations,

@@ -54,6 +54,7 @@ Exit status:
   1    not done: standard error says why, and nothing is half-written
   2    the arguments are not understood
   3    done, and the verdict of `stretch diagnose` is one that --fail-on names
+  4    done as far as the --budget of `stretch diagnose` lasted: what was found until then is the answer
   130  ended by Ctrl-C";
 
 #[derive(Subcommand)]

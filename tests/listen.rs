@@ -487,12 +487,25 @@ fn a_board_whose_clock_stands_is_told() {
         scratch.write("frames", frames.flat_map(|frame| line(&frame)).collect::<Vec<u8>>());
         let mut listen = Command::new(program());
         let listen = listen.current_dir(scratch.path("")).args(["listen", "--port", "frames"]);
-        let out = listen.args(["--calibration", "cal.json"]).output().unwrap();
+        let name = format!("{standing_from}.csv");
+        let out = listen.args(["--calibration", "cal.json", "--out", &name]).output().unwrap();
         assert!(out.status.success());
-        String::from_utf8_lossy(&out.stderr).split_whitespace().collect::<Vec<_>>().join(" ")
+        let text = std::fs::read_to_string(scratch.path(&name)).unwrap();
+        let time_s =
+            text.lines().skip(1).map(|row| row.split(',').next().unwrap().parse().unwrap());
+        let time_s: Vec<f64> = time_s.collect();
+        let told = String::from_utf8_lossy(&out.stderr);
+        (told.split_whitespace().collect::<Vec<_>>().join(" "), time_s)
     };
-    let stood = said(199);
+    let (stood, time_s) = said(199);
     assert!(stood.contains("the board's clock stood still at 100 frames"), "{stood}");
-    let ran = said(300);
-    assert!(!ran.contains("stood still"), "{ran}");
+    assert!(stood.contains("without a new time and no rows"), "{stood}");
+    // no time is invented: those that are recorded are the board's
+    let of_board = |frames: Vec<Frame>| -> Vec<f64> {
+        let sampled = frames.into_iter().filter(|frame| frame.code >= 0);
+        sampled.map(|frame| f64::from(frame.time_ms) / 1e3).collect()
+    };
+    assert_eq!(time_s, of_board(board(200)));
+    let (ran, time_s) = said(300);
+    assert!(!ran.contains("stood still") && time_s == of_board(board(300)), "{ran}");
 }

@@ -36,13 +36,36 @@ fn an_evaluation_says_what_its_numbers_hide() {
     let scratch = Scratch::new();
     scratch.calibration("cal.json");
     log(&scratch, "fast.csv", 200.0, |_, length| length);
-    log(&scratch, "other.csv", 100.0, |_, length| length);
+    // not to the bit what was fitted
+    log(&scratch, "other.csv", 100.0, |t, length| length + 0.1 * t.sin());
     log(&scratch, "still.csv", 100.0, |_, _| 74.0);
     let said = |trial: &str| warned(&scratch, &["evaluate", "--calibration", "cal.json", trial]);
     let fast = said("fast.csv");
     assert!(fast.contains("cal: fast.csv: 200.0000 samples a second come where"), "{fast}");
     let own = said("for_calibration.csv");
     assert!(own.contains("cal: it was fitted on for_calibration.csv"), "{own}");
+    // a copy under another name, and the same samples in other digits, later and with a column more
+    fs::copy(scratch.path("for_calibration.csv"), scratch.path("copy.csv")).unwrap();
+    let text = fs::read_to_string(scratch.path("for_calibration.csv")).unwrap();
+    let mut lines = text.lines();
+    let mut later = format!("{},more\n", lines.next().unwrap());
+    for line in lines {
+        let mut cells = line.split(',').map(|cell| cell.parse::<f64>().unwrap());
+        write!(later, "{:.4}", 9.0 + cells.next().unwrap()).unwrap();
+        cells.for_each(|value| write!(later, ",{value:e}").unwrap());
+        later += ",1\n";
+    }
+    scratch.write("later.csv", later);
+    for name in ["copy.csv", "later.csv"] {
+        let copy = said(name);
+        let told = format!("cal: it was fitted on {name} (under another name)");
+        assert!(copy.contains(&told), "{copy}");
+    }
+    // another log that has the name of a fitted one
+    fs::create_dir(scratch.path("elsewhere")).unwrap();
+    fs::copy(scratch.path("other.csv"), scratch.path("elsewhere/for_calibration.csv")).unwrap();
+    let named = said("elsewhere/for_calibration.csv");
+    assert!(named.contains("for_calibration.csv (by its name: its samples are others)"), "{named}");
     let still = said("still.csv");
     assert!(still.contains("the reference stands still, so that there is no R^2"), "{still}");
     let other = said("other.csv");

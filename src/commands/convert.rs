@@ -74,9 +74,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     for column in &args.columns {
         options = options.require(&column.old);
     }
-    let log = read_recording(&args.log, &options)?;
+    let mut log = read_recording(&args.log, &options)?;
+    // a second copy of a long log may not fit beside the first
     let channels = if args.columns.is_empty() {
-        log.channels.clone()
+        std::mem::take(&mut log.channels)
     } else {
         let convert = |column: &Column| -> anyhow::Result<Channel> {
             let values = log.require(&column.old)?.iter();
@@ -87,8 +88,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     };
     let start_s = if args.from_zero { log.time_s[0] } else { 0.0 };
     let largest_s = log.time_s.iter().fold(0.0, |most: f64, t| most.max(t.abs()));
-    let time_s = log.time_s.iter().map(|t| tidy_time(t - start_s, largest_s)).collect();
-    let trial = Trial { name: log.name.clone(), time_s, channels };
+    log.time_s.iter_mut().for_each(|t| *t = tidy_time(*t - start_s, largest_s));
+    let trial = Trial { channels, ..log };
     trial.write(&args.out).context("nothing was written")?;
     let names: Vec<_> = trial.channels.iter().map(|c| c.name.as_str()).collect();
     tell(format!("wrote {}: {} samples of {}", args.out.display(), trial.len(), names.join(", ")))

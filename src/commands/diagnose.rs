@@ -28,6 +28,8 @@ const NOT_FORETOLD: &str =
     " that the simulator could foretell: it takes no altered inputs, or its runs are spent";
 /// Status of a diagnosis whose verdict is one that `--fail-on` names.
 const FAILED_ON: u8 = 3;
+/// Status of a diagnosis that stands on less than it asked for, because the budget of runs was spent.
+const SPENT: u8 = 4;
 
 /// Say where a simulator and a measurement part, which effect causes it, and how far the gap closes
 ///
@@ -114,8 +116,9 @@ pub(crate) struct Args {
     /// Run the program that the problem.toml of a folder names; a problem.toml that is named itself runs its program without it
     #[arg(long)]
     allow_commands: bool,
-    /// Most runs of a simulator of your own
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(20..))]
+    /// Most runs of a simulator of your own; where they are spent before the search is over, what was found is the answer, and the exit
+    /// status is 4
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     budget: Option<u32>,
     /// Exit with status 3 where the verdict is one of these, several with commas: effect (one is named, wholly or in part),
     /// unknown (a gap, or a part of one, that nothing explains), record (a column or the rig file is wrong), faint (more
@@ -136,7 +139,12 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
     let fail_on = args.fail_on.clone();
     let diagnosis = diagnosed(args)?;
     let is_failure = fail_on.iter().any(|on| on.covers(&diagnosis));
-    Ok(if is_failure { ExitCode::from(FAILED_ON) } else { ExitCode::SUCCESS })
+    let is_spent = diagnosis.model_runs.is_some_and(|runs| runs.is_spent);
+    Ok(match is_failure {
+        true => ExitCode::from(FAILED_ON),
+        false if is_spent => ExitCode::from(SPENT),
+        false => ExitCode::SUCCESS,
+    })
 }
 
 fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {

@@ -165,8 +165,6 @@ struct Samples {
     /// The calibration here, on the board's codes.
     twin: Twin,
     status: Status,
-    /// The board's clock at the frame before, ms.
-    board_ms: Option<u32>,
 }
 
 impl Samples {
@@ -178,15 +176,7 @@ impl Samples {
         };
         // for a record that does not say
         let time_line = TimeLine::new(twin.period_s.unwrap_or(TICK_S));
-        Self {
-            decoder: Decoder::new(),
-            time_line,
-            begun: Instant::now(),
-            adc,
-            twin,
-            status,
-            board_ms: None,
-        }
+        Self { decoder: Decoder::new(), time_line, begun: Instant::now(), adc, twin, status }
     }
 
     fn take(&mut self, bytes: &[u8]) -> Vec<Sample> {
@@ -206,12 +196,8 @@ impl Samples {
             // that did: both agree again when the window has filled
             self.twin.reset();
         }
-        let time_s = self.time_line.time_s(&event, self.begun.elapsed().as_secs_f64())?;
-        let is_same = self.board_ms.replace(frame.time_ms) == Some(frame.time_ms);
-        // above a thousand samples a second two of them share a millisecond
-        let is_slow = self.twin.period_s.is_some_and(|period_s| period_s >= TICK_S);
-        self.status.standing += u64::from(is_same && is_slow);
-        let sample = Sample::new(time_s, frame, &self.adc);
+        let time_s = self.time_line.time_s(&event, self.begun.elapsed().as_secs_f64());
+        let sample = Sample::new(time_s.unwrap_or(f64::NAN), frame, &self.adc);
         match frame.code {
             code if code < 0 => self.status.missing += 1,
             code if sample.signal.is_none() => {
@@ -221,7 +207,9 @@ impl Samples {
             _ => {}
         }
         self.compare(&sample);
-        Some(sample)
+        // a sample whose time nobody knows is no row of a trial
+        self.status.standing += u64::from(time_s.is_none());
+        time_s.map(|_| sample)
     }
 
     /// Where both have an estimate on the same branch, by how much they differ.

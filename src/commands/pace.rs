@@ -1,9 +1,9 @@
 //! Whether samples come as often as a calibration takes them to.
 
+use stretch_calibrate::PACE_TOLERANCE;
+
 /// Number of intervals that determine the pace.
 const INTERVALS: usize = 51;
-/// Share of the calibration's interval by which the usual one may differ: as much as counts as on time.
-const TOLERANCE: f64 = 0.2;
 
 /// The usual interval of a stream beside the calibration's.
 #[derive(Debug)]
@@ -36,7 +36,7 @@ impl Pace {
         sorted.sort_by(f64::total_cmp);
         let usual_s = sorted[INTERVALS / 2];
         let (share, rate_hz) = (usual_s * self.rate_hz, self.rate_hz);
-        if (share - 1.0).abs() <= TOLERANCE {
+        if (share - 1.0).abs() <= PACE_TOLERANCE {
             return None;
         }
         let what = if share < 1.0 {

@@ -85,29 +85,56 @@ pub(crate) fn mat(deflated: &[u8]) -> Vec<u8> {
 
 /// An archive with one packed member.
 pub(crate) fn zip(name: &str, deflated: &[u8], unpacked_bytes: u32) -> Vec<u8> {
-    let mut shared = Vec::new();
-    // version 2.0, no flags, DEFLATE, no date, no checksum
-    for half in [20_u16, 0, 8, 0, 0, 0, 0] {
-        shared.extend(half.to_le_bytes());
+    archive(&[(name, deflated)], 8, |_| unpacked_bytes)
+}
+
+/// An archive with members that are stored as they are.
+pub(crate) fn zip_stored(members: &[(&str, Vec<u8>)]) -> Vec<u8> {
+    let members: Vec<(&str, &[u8])> =
+        members.iter().map(|(name, bytes)| (*name, &bytes[..])).collect();
+    archive(&members, 0, |bytes| bytes.len() as u32)
+}
+
+fn archive(members: &[(&str, &[u8])], method: u16, length: impl Fn(&[u8]) -> u32) -> Vec<u8> {
+    let (mut out, mut listed) = (Vec::new(), Vec::new());
+    for (name, bytes) in members {
+        let mut shared = Vec::new();
+        // version 2.0, no flags, no date, no checksum
+        for half in [20_u16, 0, method, 0, 0] {
+            shared.extend(half.to_le_bytes());
+        }
+        let checksum = if method == 0 { crc32(bytes) } else { 0 };
+        for word in [checksum, bytes.len() as u32, length(bytes)] {
+            shared.extend(word.to_le_bytes());
+        }
+        shared.extend((name.len() as u16).to_le_bytes());
+        shared.extend(0_u16.to_le_bytes());
+        let begin = out.len() as u32;
+        out.extend(b"PK\x03\x04");
+        out.extend(&shared);
+        out.extend(name.bytes());
+        out.extend(*bytes);
+        listed.extend(b"PK\x01\x02\x14\x00");
+        listed.extend(&shared);
+        listed.extend([0; 10]);
+        listed.extend(begin.to_le_bytes());
+        listed.extend(name.bytes());
     }
-    for word in [deflated.len() as u32, unpacked_bytes] {
-        shared.extend(word.to_le_bytes());
-    }
-    shared.extend((name.len() as u16).to_le_bytes());
-    shared.extend(0_u16.to_le_bytes());
-    let mut out = b"PK\x03\x04".to_vec();
-    out.extend(&shared);
-    out.extend(name.bytes());
-    out.extend(deflated);
-    let listed_at = out.len() as u32;
-    out.extend(b"PK\x01\x02\x14\x00");
-    out.extend(&shared);
-    out.extend([0; 14]);
-    out.extend(name.bytes());
-    let listed = out.len() as u32 - listed_at;
-    out.extend(b"PK\x05\x06\x00\x00\x00\x00\x01\x00\x01\x00");
-    out.extend(listed.to_le_bytes());
+    let (listed_at, count) = (out.len() as u32, members.len() as u16);
+    let length = listed.len() as u32;
+    out.extend(listed);
+    out.extend(b"PK\x05\x06\x00\x00\x00\x00");
+    out.extend([count.to_le_bytes(), count.to_le_bytes()].concat());
+    out.extend(length.to_le_bytes());
     out.extend(listed_at.to_le_bytes());
     out.extend([0, 0]);
     out
+}
+
+/// CRC-32 as archives have it.
+fn crc32(bytes: &[u8]) -> u32 {
+    let table: Vec<u32> = (0..256_u32)
+        .map(|n| (0..8).fold(n, |c, _| if c & 1 == 1 { 0xedb8_8320 ^ (c >> 1) } else { c >> 1 }))
+        .collect();
+    !bytes.iter().fold(!0, |c, byte| table[((c ^ u32::from(*byte)) & 0xff) as usize] ^ (c >> 8))
 }

@@ -3,7 +3,7 @@
 use stretch_core::{Calibration, Label};
 use stretch_data::Trial;
 
-use crate::{FitReport, MethodErrors};
+use crate::{FitReport, MethodErrors, without_gross_errors};
 
 /// A fit that leaves this share of the reference's standard deviation explains nothing: the error of the mean of the
 /// reference alone is at most a twentieth larger. (A model may also cost a twentieth before another form is
@@ -77,18 +77,39 @@ pub fn beside_a_constant(errors: &MethodErrors) -> Option<String> {
     })
 }
 
-/// A sentence for trials that have the names of those that a calibration was fitted on; `None` where none has. A record holds the names of
-/// its first trials, and not what was in them.
+/// A sentence for trials that a calibration was fitted on; `None` where none is. A record holds the names of its first trials and the
+/// checksums of their samples: a trial is found again under another name, and a name that another trial has is told as well.
 pub fn fitted_on(calibration: &Calibration, trials: &[Trial]) -> Option<String> {
-    let is_fitted = |trial: &&Trial| {
-        let name = Label::truncated(&trial.name);
-        calibration.provenance.trials().any(|fitted| fitted == name.as_str())
+    let (provenance, columns) =
+        (&calibration.provenance, [calibration.signal.as_str(), calibration.reference.as_str()]);
+    let is_known = |trial: &Trial| {
+        let checksum = trial.checksum(&columns);
+        checksum.is_some_and(|sum| provenance.checksums().contains(&sum))
     };
-    let names: Vec<&str> = trials.iter().filter(is_fitted).map(|t| t.name.as_str()).collect();
-    (!names.is_empty()).then(|| {
+    // a fit leaves out what holds a gross error, and its checksums are of what it kept
+    let cleaned = |trial: &Trial| {
+        let (kept, _) =
+            without_gross_errors(std::slice::from_ref(trial), &[columns[1], columns[0]]);
+        kept.iter().any(is_known)
+    };
+    let has_checksums = !provenance.checksums().is_empty();
+    let told = trials.iter().filter_map(|trial| {
+        let label = Label::truncated(&trial.name);
+        let is_named = provenance.trials().any(|fitted| fitted == label.as_str());
+        let how = match has_checksums && (is_known(trial) || cleaned(trial)) {
+            true if is_named => "",
+            true => " (under another name)",
+            false if !is_named => return None,
+            false if has_checksums => " (by its name: its samples are others)",
+            false => "",
+        };
+        Some(format!("{}{how}", trial.name))
+    });
+    let told: Vec<String> = told.collect();
+    (!told.is_empty()).then(|| {
         format!(
             "it was fitted on {}: how good it is on other trials these do not tell; evaluate on trials that were held back",
-            names.join(", ")
+            told.join(", ")
         )
     })
 }

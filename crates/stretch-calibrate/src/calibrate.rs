@@ -87,7 +87,10 @@ pub(crate) fn calibrate_with(
     };
     notes.splice(0..0, prepared.notes.iter().cloned());
     let names = trials.iter().map(|t| t.name.as_str());
-    let calibration = prepared.calibration(model, Provenance::new(&options.date, names))?;
+    let columns = [options.signal.as_str(), options.reference.as_str()];
+    let provenance = Provenance::new(&options.date, names)
+        .with_checksums(trials.iter().filter_map(|t| t.checksum(&columns)));
+    let calibration = prepared.calibration(model, provenance)?;
     Ok((Calibrated { calibration, fits, notes }, made))
 }
 

@@ -185,10 +185,13 @@ pub enum CalibrateError {
     },
 }
 
+/// Share of a calibration's interval by which the usual interval of a log may differ: as much as counts as on time.
+pub const PACE_TOLERANCE: f64 = 0.2;
+
 /// Why no sample of a trial has an estimate. Samples that come more slowly than a calibration expects have lost samples between them, and the
 /// rate estimator begins anew at each.
 fn why_withheld(rate_hz: f64, expected_hz: f64) -> String {
-    if (rate_hz / expected_hz - 1.0).abs() > 0.05 {
+    if (expected_hz / rate_hz - 1.0).abs() > PACE_TOLERANCE {
         format!(
             "it has {rate_hz:.4} samples a second, and the calibration is made for {expected_hz}: bring it onto that rate (--grid {expected_hz})"
         )

@@ -54,7 +54,7 @@ pub use calibration_file::{
 pub use cause::Cause;
 pub use choose::{Candidate, rank_signals};
 pub use cost::{m3_instructions, m3_instructions_fixed};
-pub use error::CalibrateError;
+pub use error::{CalibrateError, PACE_TOLERANCE};
 pub use evaluate::{Comparison, Evaluation, MethodErrors, TrialErrors, evaluate};
 pub use fitting::{Coefficient, FitReport, Order};
 pub use fixed_record::{BoardReceptor, FixedRecord, RecordNumbers, fixed_record, parse_adc};

@@ -11,7 +11,10 @@
 //! which costs ten samples of hundreds of thousands. The noise is the median of the noises of the blocks. Everything
 //! else equals the result of [`calibrate`](crate::calibrate) for the whole log.
 
+use std::cell::RefCell;
+
 use stretch_core::{Model, Provenance};
+use stretch_files::Checksum;
 
 use crate::{
     CalibrateError, Calibrated, FitReport, ModelKind, Options, Robust, SplitBy,
@@ -75,8 +78,19 @@ pub fn calibrate_long(
     }
     let columns = [options.reference.as_str(), options.signal.as_str()];
     let gross = GrossErrors::of(log, columns)?;
+    // the rows that are fitted are those that a record tells its trials by
+    let checksums = RefCell::new(vec![Checksum::default(); names.len()]);
+    let summed: &Log<'_> = &|take| {
+        log(&mut |trial, block| {
+            let block = gross.without(block);
+            if let Some(own) = checksums.borrow_mut().get_mut(trial) {
+                block.add_to(own, &[&options.signal, &options.reference]);
+            }
+            take(trial, block)
+        })
+    };
     let long = Passes { log, gross: &gross, options, trials: names.len() };
-    let (prepared, total) = long.prepared(names)?;
+    let (prepared, total) = Passes { log: summed, ..long }.prepared(names)?;
     let (model, fits) = match options.model {
         ModelKind::Linear => long.line(&prepared, total)?,
         ModelKind::Surface(degree) => long.surfaces(&prepared, degree, total)?,
@@ -94,6 +108,7 @@ pub fn calibrate_long(
     if !matches!(options.model, ModelKind::Linear) {
         notes.extend(fits.iter().filter_map(FitReport::note));
     }
-    let provenance = Provenance::new(&options.date, names.iter().map(String::as_str));
+    let provenance = Provenance::new(&options.date, names.iter().map(String::as_str))
+        .with_checksums(checksums.borrow().iter().map(Checksum::value));
     Ok(Calibrated { calibration: prepared.calibration(model, provenance)?, fits, notes })
 }

@@ -23,6 +23,7 @@ const MOST_NOTES: usize = 12;
 const SHORTEST: usize = 100;
 
 /// The inputs of a pass.
+#[derive(Clone, Copy)]
 pub(crate) struct Passes<'a> {
     pub log: &'a Log<'a>,
     pub gross: &'a GrossErrors<'a>,

@@ -13,12 +13,15 @@ use crate::Label;
 /// assert_eq!(provenance.trials().collect::<Vec<_>>(), ["ramp_1.csv", "ramp_2.csv"]);
 /// ```
 #[derive(Debug, Clone, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Provenance {
     date: Label,
     trial_count: u32,
-    trials: heapless::Vec<Label, { Provenance::NAMED_TRIALS }>,
+    trials: Named<Label>,
+    checksums: Named<u32>,
 }
+
+/// One for each of the trials that are named.
+type Named<T> = heapless::Vec<T, { Provenance::NAMED_TRIALS }>;
 
 impl Provenance {
     /// How many trials are named; those beyond are only counted.
@@ -33,6 +36,24 @@ impl Provenance {
             let _ = record.trials.push(Label::truncated(name));
         }
         record
+    }
+
+    /// The same with CRC-32C of the samples of each of the first [`Provenance::NAMED_TRIALS`], which tell a trial under another
+    /// name. They stand in JSON alone: a board has no trials to compare.
+    ///
+    /// ```
+    /// use stretch_core::Provenance;
+    /// let provenance = Provenance::new("", ["ramp.csv"]).with_checksums([0xe306_9283]);
+    /// assert_eq!(provenance.checksums(), [0xe306_9283]);
+    /// ```
+    pub fn with_checksums(self, checksums: impl IntoIterator<Item = u32>) -> Self {
+        let checksums = checksums.into_iter().take(Self::NAMED_TRIALS).collect();
+        Self { checksums, ..self }
+    }
+
+    /// CRC-32C of the samples of the named trials; none in a record that was made without, or comes from a board.
+    pub fn checksums(&self) -> &[u32] {
+        &self.checksums
     }
 
     /// The date as the caller gave it.
@@ -61,4 +82,53 @@ pub struct FitSummary {
     pub r_squared: f64,
     /// Root mean square error with `n - p` degrees of freedom, in normalised target.
     pub rmse: f64,
+}
+
+/// The two forms in which it is written.
+#[cfg(feature = "serde")]
+mod forms {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    use super::{Named, Provenance};
+    use crate::Label;
+
+    /// As bytes, field behind field: nothing may be optional there, and earlier records are read by the same code.
+    #[derive(Serialize, Deserialize)]
+    struct Bytes {
+        date: Label,
+        trial_count: u32,
+        trials: Named<Label>,
+    }
+
+    /// As text, where a field may be missing.
+    #[derive(Serialize, Deserialize)]
+    struct Text {
+        date: Label,
+        trial_count: u32,
+        trials: Named<Label>,
+        #[serde(default, skip_serializing_if = "Named::is_empty")]
+        checksums: Named<u32>,
+    }
+
+    impl Serialize for Provenance {
+        fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+            let Self { date, trial_count, trials, checksums } = self.clone();
+            match serializer.is_human_readable() {
+                true => Text { date, trial_count, trials, checksums }.serialize(serializer),
+                false => Bytes { date, trial_count, trials }.serialize(serializer),
+            }
+        }
+    }
+
+    impl<'de> Deserialize<'de> for Provenance {
+        fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+            if deserializer.is_human_readable() {
+                let Text { date, trial_count, trials, checksums } =
+                    Text::deserialize(deserializer)?;
+                return Ok(Self { date, trial_count, trials, checksums });
+            }
+            let Bytes { date, trial_count, trials } = Bytes::deserialize(deserializer)?;
+            Ok(Self { date, trial_count, trials, ..Self::default() })
+        }
+    }
 }

@@ -1,5 +1,7 @@
 //! A session: its trials on one even grid of time, in the order in which they were recorded.
 
+use std::collections::HashMap;
+
 use crate::{DataError, EvenSpec, Rows, Split, Trial, TrialKind};
 
 /// Pause between trials that do not say when they began, s.
@@ -81,24 +83,19 @@ impl EvenTrial {
     }
 }
 
-/// Refuses a test trial that is one of those that may be fitted, whatever its name: the columns asked for are compared by their bits.
+/// Refuses a test trial that is one of those that may be fitted, whatever its name: the columns asked for have the same checksum.
 fn check_splits(trials: &[SessionTrial], columns: &[&str]) -> Result<(), DataError> {
-    let is_same = |a: &SessionTrial, b: &SessionTrial| {
-        a.trial.len() == b.trial.len()
-            && !a.trial.is_empty()
-            && columns.iter().all(|name| {
-                let [a, b] = [a, b].map(|t| t.trial.channel(name).unwrap_or_default());
-                a.iter().map(|x| x.to_bits()).eq(b.iter().map(|x| x.to_bits()))
-            })
+    let of = |split| {
+        let own = trials.iter().filter(move |t| t.split == split);
+        own.filter_map(|t| Some((t.trial.checksum(columns)?, &t.trial.name)))
     };
-    for test in trials.iter().filter(|t| t.split == Split::Test) {
-        let mut fitted = trials.iter().filter(|t| t.split == Split::Fit);
-        if let Some(fit) = fitted.find(|fit| is_same(fit, test)) {
-            let (fit, test) = (fit.trial.name.clone(), test.trial.name.clone());
-            return Err(DataError::FittedAndTested { fit, test });
+    let fitted: HashMap<u32, &String> = of(Split::Fit).collect();
+    match of(Split::Test).find_map(|(sum, test)| Some((fitted.get(&sum)?, test))) {
+        Some((fit, test)) => {
+            Err(DataError::FittedAndTested { fit: (*fit).clone(), test: test.clone() })
         }
+        None => Ok(()),
     }
-    Ok(())
 }
 
 /// Trials on one even grid, in the order of time: what simulation and diagnosis are driven by.

@@ -2,6 +2,8 @@
 
 use std::iter;
 
+use stretch_files::Checksum;
+
 use crate::{DataError, Place};
 
 /// A recording: time stamps and, beside them, named channels of the same length.
@@ -65,6 +67,33 @@ impl Trial {
         self.channel(name).ok_or_else(|| {
             DataError::missing_column(&self.name, name, iter::once("time_s").chain(names))
         })
+    }
+
+    /// CRC-32C of the values of some columns, row by row: what tells a trial whatever it is called, whenever it began and in whatever
+    /// format it is stored. `None` without a sample, or where a column is missing.
+    ///
+    /// ```
+    /// use stretch_data::{Channel, Trial};
+    /// let channel = Channel { name: "length_mm".into(), values: vec![180.0, 179.5] };
+    /// let trial = Trial { name: "a.csv".into(), time_s: vec![0.0, 0.01], channels: vec![channel] };
+    /// let copy = Trial { name: "b.csv".into(), time_s: vec![7.0, 7.01], ..trial.clone() };
+    /// assert!(trial.checksum(&["length_mm"]).is_some());
+    /// assert_eq!(trial.checksum(&["length_mm"]), copy.checksum(&["length_mm"]));
+    /// ```
+    pub fn checksum(&self, columns: &[&str]) -> Option<u32> {
+        let mut checksum = Checksum::default();
+        (self.add_to(&mut checksum, columns) && !self.is_empty()).then(|| checksum.value())
+    }
+
+    /// Adds the rows of a part of a trial to its [checksum](Trial::checksum); false where a column is missing.
+    pub fn add_to(&self, checksum: &mut Checksum, columns: &[&str]) -> bool {
+        let own: Option<Vec<&[f64]>> = columns.iter().map(|name| self.channel(name)).collect();
+        let Some(own) = own else { return false };
+        for row in 0..self.len() {
+            let values = own.iter().filter_map(|column| column.get(row));
+            values.for_each(|value| checksum.take(&value.to_bits().to_le_bytes()));
+        }
+        true
     }
 
     /// Seconds from the first sample to the last; 0 for fewer than two.

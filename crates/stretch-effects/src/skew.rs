@@ -139,7 +139,9 @@ pub static DELAY: Kind = Kind {
     operator: |v, _, grid| {
         Box::new(Skew::new(grid, SkewSpec { skew_s: v[0], rate: 0.0, empty: v[1] }))
     },
-    sketch: Some(|v, _, signals| sketch(SkewSpec { skew_s: v[0], rate: 0.0, empty: v[1] }, signals)),
+    sketch: Some(|v, _, signals| {
+        sketch(SkewSpec { skew_s: v[0], rate: 0.0, empty: v[1] }, signals)
+    }),
     twins: &["skew", "lag", "second_order_lag"],
     family: Some((Family::Late, |v| v[0])),
     ..Kind::PLAIN
@@ -160,7 +162,9 @@ pub static SKEW: Kind = Kind {
     operator: |v, _, grid| {
         Box::new(Skew::new(grid, SkewSpec { skew_s: v[0], rate: v[1], empty: 0.0 }))
     },
-    sketch: Some(|v, _, signals| sketch(SkewSpec { skew_s: v[0], rate: v[1], empty: 0.0 }, signals)),
+    sketch: Some(|v, _, signals| {
+        sketch(SkewSpec { skew_s: v[0], rate: v[1], empty: 0.0 }, signals)
+    }),
     twins: &["delay", "lag", "second_order_lag"],
     family: Some((Family::Late, |v| v[0])),
     ..Kind::PLAIN

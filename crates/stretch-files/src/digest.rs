@@ -11,10 +11,45 @@ use crc::{CRC_32_ISCSI, Crc};
 use toml::{Table, Value};
 
 /// CRC-32C, as records have it.
-const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
 
 /// What a digest begins with.
 const KIND: &str = "crc32c ";
+
+/// CRC-32C of bytes that come in pieces.
+///
+/// ```
+/// let mut checksum = stretch_files::Checksum::default();
+/// checksum.take(b"1234");
+/// checksum.take(b"56789");
+/// assert_eq!(checksum.value(), 0xe306_9283);
+/// ```
+#[derive(Clone)]
+pub struct Checksum(crc::Digest<'static, u32>);
+
+impl Default for Checksum {
+    fn default() -> Self {
+        Self(CRC.digest())
+    }
+}
+
+impl std::fmt::Debug for Checksum {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Checksum({:08x})", self.value())
+    }
+}
+
+impl Checksum {
+    /// Takes the next bytes.
+    pub fn take(&mut self, bytes: &[u8]) {
+        self.0.update(bytes);
+    }
+
+    /// The checksum of all bytes so far.
+    pub fn value(&self) -> u32 {
+        self.0.clone().finalize()
+    }
+}
 
 /// The digest of a file's bytes: `crc32c`, and eight hexadecimal digits.
 ///
@@ -28,11 +63,11 @@ const KIND: &str = "crc32c ";
 /// # Ok::<(), std::io::Error>(())
 /// ```
 pub fn digest_of(mut file: impl Read) -> io::Result<String> {
-    let (mut digest, mut buffer) = (CRC.digest(), vec![0; 1 << 16]);
+    let (mut checksum, mut buffer) = (Checksum::default(), vec![0; 1 << 16]);
     loop {
         match file.read(&mut buffer) {
-            Ok(0) => return Ok(format!("{KIND}{:08x}", digest.finalize())),
-            Ok(n) => digest.update(&buffer[..n]),
+            Ok(0) => return Ok(format!("{KIND}{:08x}", checksum.value())),
+            Ok(n) => checksum.take(&buffer[..n]),
             Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
             Err(e) => return Err(e),
         }

@@ -12,7 +12,7 @@ mod temporary;
 mod write_folder;
 mod write_whole;
 
-pub use digest::{digest_of, is_digest};
+pub use digest::{Checksum, digest_of, is_digest};
 pub use disk::DiskCall;
 #[doc(hidden)]
 pub use disk::ask_before_disk_calls;

@@ -18,7 +18,11 @@ use crate::{
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
     numerics::stopwatch::Stopwatch,
     options::Options,
-    problem::{altered_parameters::Altered, error::GapError, simulator::Simulator},
+    problem::{
+        altered_parameters::Altered,
+        error::{GapError, unless_spent},
+        simulator::Simulator,
+    },
     record::{
         columns_alone::columns_alone, examine::Doubts, gross::Gross, suspect::Suspect,
         weigh::weighed,
@@ -83,25 +87,53 @@ fn run(task: Task<'_>) -> Result<(Diagnosis, Evidence), GapError> {
     let task = Task { depth: if columns.is_empty() { task.depth } else { 0 }, ..task };
     let between_rows = command_timing::between_rows(simulator);
     let (problem, from) = prepare(task, between_rows.as_ref())?;
-    let searched = search(task, problem, &from)?;
+    let is_limited = simulator.costly().is_some_and(|costly| costly.model_runs().budget.is_some());
+    let spare = is_limited.then(|| Searched::without(problem.clone()));
+    // What an answer without effects needs is run first: whatever a search spends, there is an answer.
+    if let Some(spare) = &spare {
+        gather(task, spare.cause(&columns), 0.0)?;
+    }
+    match (answered(task, problem, &from, &columns, &begun), spare) {
+        (Err(GapError::Spent { .. }), Some(spare)) => {
+            concluded(task, &spare, spare.cause(&columns), &begun)
+        }
+        (answer, _) => answer,
+    }
+}
+
+/// The answer after a search.
+fn answered<'a>(
+    task: Task<'a>,
+    problem: PreparedProblem<'a>,
+    from: &Hypothesis,
+    columns: &[Gross],
+    begun: &Stopwatch,
+) -> Result<(Diagnosis, Evidence), GapError> {
+    let searched = search(task, problem, from)?;
     let suspect = Suspect::of(searched.problem.simulator());
     let doubted = searched.problem.beside(&suspect);
     let error = match columns.is_empty() {
         true => doubt(task, &searched, (&doubted, &suspect))?,
         false => None,
     };
-    let answer = match &error {
+    let cause = match &error {
         Some((gross, found)) => Cause { problem: &doubted, found, eliminated: &[], gross },
-        None => Cause {
-            problem: &searched.problem,
-            found: &searched.found,
-            eliminated: &searched.eliminated,
-            gross: &columns,
-        },
+        None => searched.cause(columns),
     };
-    let gathered = gather(task, answer)?;
-    let judged = decide(task, answer, &gathered)?;
-    report(task, &searched, answer, (gathered, judged), &begun)
+    concluded(task, &searched, cause, begun)
+}
+
+/// What a cause comes to.
+fn concluded(
+    task: Task<'_>,
+    searched: &Searched<'_>,
+    cause: Cause<'_>,
+    begun: &Stopwatch,
+) -> Result<(Diagnosis, Evidence), GapError> {
+    let null_band = null_band(cause.problem, task.options.seed)?;
+    let gathered = gather(task, cause, null_band)?;
+    let judged = decide(task, cause, &gathered)?;
+    report(task, searched, cause, (gathered, judged), begun)
 }
 
 /// The problem in which the records are likelier, of commands that switch at rows and between them, and the set of effects to go on from.
@@ -128,7 +160,22 @@ struct Searched<'a> {
     looked: Option<Arc<Looked>>,
 }
 
-impl Searched<'_> {
+impl<'a> Searched<'a> {
+    /// What is there before a search: the re-tuned nominal.
+    fn without(problem: PreparedProblem<'a>) -> Self {
+        let found = Found { best: problem.nominal.clone(), rivals: Vec::new() };
+        Self { problem, found, eliminated: Vec::new(), tried: BTreeMap::new(), looked: None }
+    }
+
+    /// The best set as the cause, or what the columns alone say is wrong with the record.
+    fn cause<'p>(&'p self, gross: &'p [Gross]) -> Cause<'p>
+    where
+        'a: 'p,
+    {
+        let Self { problem, found, eliminated, .. } = self;
+        Cause { problem, found, eliminated, gross }
+    }
+
     /// Effects of the catalogue that no fitted set holds.
     fn not_looked_at(&self) -> Vec<&str> {
         let effects = self.problem.simulator().effects().iter().enumerate();
@@ -186,8 +233,9 @@ fn doubt(
     if searched.problem.is_spent() {
         return Ok(None);
     }
-    let doubts = Doubts::of(doubted, suspect, thresholds)?;
-    let doubts = doubts.closer_if(doubted, suspect, found, thresholds)?;
+    let doubts = Doubts::of(doubted, suspect, thresholds)
+        .and_then(|doubts| doubts.closer_if(doubted, suspect, found, thresholds));
+    let Some(doubts) = unless_spent(doubts)? else { return Ok(None) };
     Ok(weighed(doubted, suspect, doubts.errors, found, thresholds))
 }
 
@@ -204,7 +252,7 @@ fn limits(
     (task.progress)("detection limits");
     let (best, thresholds) = (&searched.found.best, &task.options.thresholds);
     let asked = Asked { problem, best, thresholds, null_band, seed: task.options.seed };
-    detection_limits(asked, searched.looked.as_deref())
+    Ok(unless_spent(detection_limits(asked, searched.looked.as_deref()))?.unwrap_or_default())
 }
 
 /// What the gap is put down to: the best set of effects, or an error.
@@ -232,14 +280,13 @@ struct Gathered {
 }
 
 /// Gathers the evidence: from here on test trials are read.
-fn gather(task: Task<'_>, cause: Cause<'_>) -> Result<Gathered, GapError> {
+fn gather(task: Task<'_>, cause: Cause<'_>, null_band: f64) -> Result<Gathered, GapError> {
     let Cause { problem, found, eliminated, .. } = cause;
     let (seed, thresholds) = (task.options.seed, &task.options.thresholds);
     (task.progress)("test trials");
     let mut evidence = Evidence::gather(problem, found)?;
     let all = hypotheses(&found.best, &found.rivals, eliminated, &problem.nominal);
     let held = candidates(problem, &evidence, &all, seed)?;
-    let null_band = null_band(problem, seed)?;
     let (posterior, held) = posterior(problem, thresholds, (&mut evidence, null_band), all, held);
     let (candidates, blocks): (Vec<Candidate>, Vec<_>) = held.into_iter().unzip();
     let stabilities =
@@ -281,7 +328,10 @@ fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Result<Judge
         is_short: is_short(&evidence.roles),
     };
     let best = &cause.found.best;
-    let lacking = |names| lacking(cause.problem, best, names, task.progress);
+    let lacking = |names| {
+        let found = lacking(cause.problem, best, names, task.progress);
+        Ok(unless_spent(found)?.flatten())
+    };
     judge(&case, &task.options.thresholds, lacking)
 }
 
@@ -337,7 +387,8 @@ fn report(
     };
     // What a page needs beside the answer counts as none of its cost.
     if let (true, Some(stage)) = (options.responses, location.worst()) {
-        evidence.responses = responses(cause.problem, &evidence, &cause.found.best, stage)?;
+        let responses = responses(cause.problem, &evidence, &cause.found.best, stage);
+        evidence.responses = unless_spent(responses)?.unwrap_or_default();
     }
     let simpler = || baselines(&searched.problem, &searched.tried, thresholds.null_excess);
     let diagnosis = Diagnosis {
@@ -362,7 +413,10 @@ fn report(
         identifiability: searched.problem.identified(),
         transfer: None,
         next_experiment: None,
-        baselines: options.baselines.then(simpler).transpose()?,
+        baselines: match options.baselines {
+            true => unless_spent(simpler())?,
+            false => None,
+        },
         notes: text.notes,
         rows_used: simulator.description().rows_used(),
         simulations,

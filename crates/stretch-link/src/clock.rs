@@ -7,6 +7,9 @@ use crate::{Event, Frame};
 /// A frame's time is that of the frame before it plus the step of the board's clock, which wraps at 2^32 ms. A board that started again counts anew:
 /// then the time that passed at the receiver, and at least one sample period, stands in for the step. Times are rounded to 1 us.
 ///
+/// A frame with the millisecond of the frame before it has no time of its own where samples are two milliseconds apart or more: the board's
+/// clock stands, and none is invented. Faster samples share a millisecond; 1 us apart, their times say their order.
+///
 /// ```
 /// use stretch_link::{Answer, Event, Frame, TimeLine};
 /// let frame = |time_ms| Frame { counter: 0, time_ms, code: 0, answer: Answer::Warming };
@@ -15,6 +18,8 @@ use crate::{Event, Frame};
 /// assert_eq!(line.time_s(&Event::Frame(frame(5)), 7.01), Some(0.01));
 /// assert_eq!(line.time_s(&Event::Restarted(frame(0)), 9.01), Some(2.01));
 /// assert_eq!(line.time_s(&Event::Damaged, 9.02), None);
+/// assert_eq!(line.time_s(&Event::Frame(frame(0)), 9.02), None);
+/// assert_eq!(line.time_s(&Event::Frame(frame(10)), 9.03), Some(2.02));
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimeLine {
@@ -30,13 +35,17 @@ struct Last {
     heard_s: f64,
 }
 
+/// Samples this far apart never share a millisecond, however their clock jitters, s.
+const APART_S: f64 = 2e-3;
+
 impl TimeLine {
-    /// A time line of samples that are at least `period_s` apart where the board starts again, s.
+    /// A time line of samples that are `period_s` apart, s; where the board starts again, at least that far.
     pub fn new(period_s: f64) -> Self {
         Self { period_s, last: None }
     }
 
-    /// Seconds from the first frame to that of `event`, which was heard at `now_s` of the receiver's clock, s; none for an event without a frame.
+    /// Seconds from the first frame to that of `event`, which was heard at `now_s` of the receiver's clock, s; none for an event without a
+    /// frame, and for a frame at which the board's clock stands.
     pub fn time_s(&mut self, event: &Event, now_s: f64) -> Option<f64> {
         let Frame { time_ms: board_ms, .. } = event.frame()?;
         let time_s = match self.last {
@@ -44,11 +53,11 @@ impl TimeLine {
             Some(last) if matches!(event, Event::Restarted(_)) => {
                 last.time_s + (now_s - last.heard_s).max(self.period_s)
             }
-            Some(last) => {
-                let step_ms = board_ms.wrapping_sub(last.board_ms);
-                // two frames within a millisecond of the board's clock
-                last.time_s + if step_ms > 0 { f64::from(step_ms) / 1e3 } else { 1e-6 }
-            }
+            Some(last) => match board_ms.wrapping_sub(last.board_ms) {
+                0 if self.period_s >= APART_S => return None,
+                0 => last.time_s + 1e-6,
+                step_ms => last.time_s + f64::from(step_ms) / 1e3,
+            },
         };
         // sums of steps carry rounding errors
         let time_s = libm::round(time_s * 1e6) / 1e6;

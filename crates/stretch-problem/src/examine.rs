@@ -87,7 +87,11 @@ impl Problem {
             report("what the gap costs a calibration");
             let simulations = AtomicUsize::new(0);
             let asked = (options.seed, &simulations);
-            diagnosis.transfer = transfer(self.simulator(), &evidence, asked)?;
+            // where no more runs may be made, what was found is told without it
+            diagnosis.transfer = match transfer(self.simulator(), &evidence, asked) {
+                Err(GapError::Spent { .. }) => None,
+                found => found?,
+            };
             diagnosis.simulations += simulations.into_inner();
         }
         let mut proposal = None;

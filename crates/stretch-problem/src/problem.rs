@@ -173,9 +173,11 @@ impl Problem {
             announce(&format!("{} runs, in the folder {folder}: {program}", file.display()));
         }
         let spec = file.load()?;
-        let checked = Checked::new(spec.clone())?;
+        // a second copy of the recordings only where they may have to be checked against less
+        let behind = spec.only_behind();
+        let checked = Checked::new(spec)?;
         let source = Workers::start(workers, checked.session())?;
-        let checked = match spec.only_behind().filter(|_| !source.takes_inputs()) {
+        let checked = match behind.filter(|_| !source.takes_inputs()) {
             Some(spec) => Checked::new(spec)?.noting(ONLY_BEHIND),
             None => checked,
         };

@@ -1,5 +1,6 @@
 //! The tests of stretch-problem from outside, one program: linking takes longer than most of them.
 
+mod budget;
 mod effects;
 mod experiments;
 mod flow;

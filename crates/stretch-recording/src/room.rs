@@ -63,6 +63,8 @@ impl Room {
     pub(crate) fn unpack(&mut self, reader: impl Read) -> io::Result<Result<Vec<u8>, String>> {
         let (mut bytes, left) = (Vec::new(), self.most.saturating_sub(self.taken));
         reader.take(left + 1).read_to_end(&mut bytes)?;
+        // what it grew into is up to twice as much
+        bytes.shrink_to_fit();
         Ok(self.take(bytes.len() as u64).map(|()| bytes))
     }
 
@@ -93,6 +95,7 @@ pub(crate) fn whole(
             )));
         }
         if read == 0 {
+            bytes.shrink_to_fit();
             return Ok(Ok((bytes, room)));
         }
     }

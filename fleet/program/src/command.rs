@@ -1,10 +1,20 @@
 //! The command line: parse, dispatch.
 
-use std::{ffi::OsString, process::ExitCode};
+use std::{
+    any::Any,
+    ffi::OsString,
+    panic::{AssertUnwindSafe, catch_unwind},
+    process::ExitCode,
+};
 
 use clap::{Parser, Subcommand};
 
-use crate::{calibrate, diagnose, drift, ingest, make, show::warn, sql};
+use crate::{
+    calibrate, diagnose, drift, ingest, make,
+    panics::{message, tell_in_a_line},
+    show::warn,
+    sql,
+};
 
 /// Years of logs and thousands of sensors: a lake of trials, and what to ask of it.
 #[derive(Debug, Parser)]
@@ -30,6 +40,7 @@ const INTERRUPTED: u8 = 130;
 /// The program `stretch-fleet`, asked by its name and words.
 pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
     let cli = Cli::parse_from(words);
+    tell_in_a_line();
     let runtime = match tokio::runtime::Builder::new_multi_thread().enable_all().build() {
         Ok(runtime) => runtime,
         Err(e) => {
@@ -42,7 +53,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
             std::process::exit(INTERRUPTED.into());
         }
     });
-    let result = runtime.block_on(async {
+    let work = async {
         match cli.command {
             Command::Ingest(args) => tokio::task::block_in_place(|| ingest::run(args)),
             Command::Make(args) => tokio::task::block_in_place(|| make::run(args)),
@@ -51,8 +62,10 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
             Command::Drift(args) => drift::run(args).await,
             Command::Diagnose(args) => tokio::task::block_in_place(|| diagnose::run(args)),
         }
-    });
-    match result {
+    };
+    // what a query panics on, such as rows that are damaged, ends the command like any other error
+    let result = catch_unwind(AssertUnwindSafe(|| runtime.block_on(work)));
+    match result.unwrap_or_else(|panic| Err(gave_up(panic.as_ref()))) {
         Ok(()) => ExitCode::SUCCESS,
         Err(_) if stretch_files::interrupted() => ExitCode::from(INTERRUPTED),
         Err(error) => {
@@ -60,6 +73,13 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+fn gave_up(panic: &(dyn Any + Send)) -> anyhow::Error {
+    anyhow::anyhow!(
+        "a reader gave up: {}. Damaged rows of a file do this: ingest its trial again, or report a fault of the program",
+        message(panic)
+    )
 }
 
 /// The error and its causes; a cause that is told already is not told again.

@@ -9,7 +9,7 @@ use datafusion::{
         compute::{cast, concat_batches},
         datatypes::{DataType, Field, Float64Type, Schema},
     },
-    parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder,
+    parquet::{arrow::arrow_reader::ParquetRecordBatchReaderBuilder, errors::ParquetError},
 };
 use stretch_data::{Channel, SessionTrial, Trial};
 use stretch_gap::{Diagnosis, Options};
@@ -20,6 +20,7 @@ use crate::{
     flat::table,
     lake::{Lake, LakeFile, digest, write_parquet},
     lock::remove_abandoned,
+    panics::caught,
     show::{bar, say, say_json},
     sql::tell_unfit,
 };
@@ -219,10 +220,12 @@ fn read(paths: &[PathBuf]) -> anyhow::Result<RecordBatch> {
     let mut batches = Vec::new();
     for path in paths {
         let told = || path.display().to_string();
-        let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(path).with_context(told)?);
-        for batch in reader.with_context(told)?.build()? {
-            batches.push(batch.with_context(told)?);
-        }
+        let file = File::open(path).with_context(told)?;
+        let rows = caught(|| {
+            let rows = ParquetRecordBatchReaderBuilder::try_new(file)?.build()?;
+            Ok::<_, ParquetError>(rows.collect::<Result<Vec<_>, _>>()?)
+        });
+        batches.extend(rows.with_context(told)?.with_context(told)?);
     }
     let schema = batches.first().map_or_else(|| Arc::new(Schema::empty()), RecordBatch::schema);
     Ok(concat_batches(&schema, &batches)?)

@@ -1,6 +1,9 @@
 //! `stretch-fleet drift`: which sensors moved from one month to another.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use anyhow::{Context, bail, ensure};
 use chrono::NaiveDate;
@@ -15,6 +18,7 @@ use crate::{
     false_discovery::q_values,
     flat::table,
     lake::write_parquet,
+    lock::remove_abandoned,
     month_test::{Compared, Day, compare},
     show::{bar, say, say_json},
     sql::On,
@@ -112,6 +116,8 @@ pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
     }
     let batch = told(&rows, level)?;
     if let Some(path) = &args.out {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        remove_abandoned(folder.unwrap_or(Path::new(".")), 0)?;
         write_parquet(path, &batch, Vec::new(), None)?;
     }
     tell(&args, &rows, &batch)

@@ -14,6 +14,7 @@ mod lake;
 mod lock;
 mod make;
 mod month_test;
+mod panics;
 mod records;
 mod session;
 mod show;

@@ -14,12 +14,12 @@ use datafusion::{
         compute::concat_batches,
         datatypes::{DataType, Field, Schema, SchemaRef},
     },
-    parquet::{arrow::arrow_reader::ArrowReaderMetadata, file::metadata::KeyValue},
+    parquet::file::metadata::KeyValue,
     prelude::SessionContext,
 };
 
 use crate::{
-    lake::{Lake, LakeFile, digest, register_folder, write_parquet},
+    lake::{Lake, LakeFile, digest, metadata, register_folder, write_parquet},
     session::in_order,
     show::bar,
 };
@@ -43,9 +43,7 @@ impl Unit<'_> {
     }
 
     fn is_done(&self) -> bool {
-        let file = std::fs::File::open(&self.path).ok();
-        let parquet =
-            file.and_then(|file| ArrowReaderMetadata::load(&file, Default::default()).ok());
+        let parquet = metadata(&self.path).ok();
         let own = parquet.as_ref().and_then(|parquet| {
             let pairs = parquet.metadata().file_metadata().key_value_metadata()?;
             pairs.iter().find(|pair| pair.key == SOURCES)?.value.clone()

@@ -47,8 +47,8 @@ impl Status {
         }
         if self.standing > 0 {
             text += &format!(
-                "; the board's clock stood still at {} frames: their times say their order alone, look at what the board takes its \
-                 milliseconds from",
+                "; the board's clock stood still at {} frames: they are without a new time and no rows, look at what the board takes \
+                 its milliseconds from",
                 self.standing
             );
         }

@@ -126,6 +126,8 @@ struct Frames {
     missing: u64,
     /// Codes that the converter cannot give, and the largest.
     beyond: (u64, i32),
+    /// Frames at which the board's clock stood still.
+    standing: u64,
 }
 
 impl Frames {
@@ -138,6 +140,7 @@ impl Frames {
             compared: (0, 0.0),
             missing: 0,
             beyond: (0, 0),
+            standing: 0,
         })
     }
 
@@ -148,7 +151,7 @@ impl Frames {
             // the board has seen samples that did not arrive here
             twin.reset();
         }
-        let time_s = self.time_line.time_s(&event, now_s)?;
+        let time_s = self.time_line.time_s(&event, now_s);
         let signal = self.adc.volts(AdcCode(frame.code));
         let own = self.twin.as_mut().map(|twin| twin.step(Volts(signal.unwrap_or(f64::NAN))));
         let estimate = match frame.answer {
@@ -161,6 +164,11 @@ impl Frames {
                 estimate
             }
             _ => f64::NAN,
+        };
+        // a sample whose time nobody knows is no row
+        let Some(time_s) = time_s else {
+            self.standing += 1;
+            return None;
         };
         match signal {
             Some(signal) => push_line(lines, time_s, signal, &frame),
@@ -187,6 +195,12 @@ impl Frames {
             let (count, bits) = (self.beyond.0, self.adc.spec().bits);
             text += &format!(
                 "; {count} codes up to {largest} are beyond a converter of {bits} bits and no rows"
+            );
+        }
+        if self.standing > 0 {
+            text += &format!(
+                "; the board's clock stood still at {} frames: they are without a new time and no rows",
+                self.standing
             );
         }
         if self.compared.0 > 0 {

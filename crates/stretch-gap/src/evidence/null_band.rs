@@ -16,7 +16,11 @@ use rayon::prelude::*;
 use crate::{
     fit::{prepared::PreparedProblem, score::gap},
     numerics::random::RandomGenerator,
-    problem::{error::GapError, sample_roles::Role, simulator::Run},
+    problem::{
+        error::{GapError, unless_spent},
+        sample_roles::Role,
+        simulator::Run,
+    },
 };
 
 /// Records that are drawn, and the share of them that lies within the band.
@@ -24,13 +28,16 @@ const RECORDS: usize = 40;
 const WITHIN: f64 = 0.95;
 
 /// The excess that 19 of 20 records stay below in which nothing is missing; as every gap the greater of fitted and tested, summed over
-/// stages.
+/// stages. Where no more runs may be made, all noise is taken for the outputs' own.
 pub(crate) fn null_band(problem: &PreparedProblem<'_>, seed: u64) -> Result<f64, GapError> {
     let stages = 0..problem.compare.metrics.len();
     let arrives: Result<Vec<Vec<f64>>, GapError> =
         stages.map(|stage| arrives(problem, stage)).collect();
-    let arrives = arrives?;
-    let one = |record| excess(problem, &arrives, record, RandomGenerator::new(seed, record as u64));
+    let arrives = unless_spent(arrives)?;
+    let one = |record| {
+        let random = RandomGenerator::new(seed, record as u64);
+        excess(problem, arrives.as_deref(), record, random)
+    };
     let mut excesses: Vec<f64> = (0..RECORDS).map(one).collect();
     excesses.sort_by(f64::total_cmp);
     let last = (WITHIN * RECORDS as f64).ceil() as usize - 1;
@@ -40,21 +47,25 @@ pub(crate) fn null_band(problem: &PreparedProblem<'_>, seed: u64) -> Result<f64,
 /// Excess of one record.
 fn excess(
     problem: &PreparedProblem<'_>,
-    arrives: &[Vec<f64>],
+    arrives: Option<&[Vec<f64>]>,
     record: usize,
     mut random: RandomGenerator,
 ) -> f64 {
     let roles = &problem.compare.roles;
     let looked = (roles.count(Role::Fit) + roles.count(Role::Held)) as f64;
     let (mut fitted, mut tested) = (0.0, 0.0);
-    for (stage, arrives) in arrives.iter().enumerate() {
+    for stage in 0..problem.compare.metrics.len() {
+        let (share, arrives) = match arrives {
+            Some(arrives) => (problem.transmits(stage), arrives[stage][record]),
+            None => (0.0, 0.0),
+        };
         let known_to = problem.compare.metrics[stage].noise.known_to;
         let level = (1.0 + known_to * random.gauss()).max(0.0);
-        let own = level * (1.0 - problem.transmits(stage)).max(0.0);
+        let own = level * (1.0 - share).max(0.0);
         let mut chance = |samples: f64| {
             // The sum of N squares, nearly normal: mean N, variance 2N.
             let white = own * (samples + (2.0 * samples).sqrt() * random.gauss());
-            let other = arrives[record] * samples;
+            let other = arrives * samples;
             gap((white + 2.0 * random.gauss() * (own * other).sqrt() + other) / samples)
         };
         fitted += chance(looked);

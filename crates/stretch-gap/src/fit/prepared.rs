@@ -40,6 +40,7 @@ const SOLVED: f64 = 0.1;
 const LONGER: f64 = 2.0;
 
 /// Everything that a search needs.
+#[derive(Clone)]
 pub(crate) struct PreparedProblem<'a> {
     pub(crate) compare: Comparison<'a>,
     /// Parameters as shipped.

@@ -51,9 +51,27 @@ pub enum GapError {
     /// The simulator is gone, or answers what nobody asked for: nothing that it said since can be relied on.
     #[error(transparent)]
     Broken(Box<dyn std::error::Error + Send + Sync>),
+    /// No more runs may be made.
+    #[error(
+        "the budget of {budget} model runs is spent before there is an answer; give {least} or more, the least that one needs"
+    )]
+    Spent {
+        /// Runs that may be made.
+        budget: usize,
+        /// The least budget with which there is an answer.
+        least: usize,
+    },
     /// The caller asked to stop.
     #[error("stopped")]
     Stopped,
+}
+
+/// What an answer can do without: none where no more runs may be made for it.
+pub(crate) fn unless_spent<T>(found: Result<T, GapError>) -> Result<Option<T>, GapError> {
+    match found {
+        Err(GapError::Spent { .. }) => Ok(None),
+        found => found.map(Some),
+    }
 }
 
 impl GapError {

@@ -106,7 +106,7 @@ impl<'a> Runs<'a> {
     /// One run of one stage on its measured input.
     pub(crate) fn run(&self, run: Run<'_>) -> Result<Vec<f64>, GapError> {
         let mut out = self.begin(run)?;
-        self.simulator.simulate(self.stepped(run), &mut out)?;
+        self.heard(self.simulator.simulate(self.stepped(run), &mut out))?;
         self.finite(run.stage, out)
     }
 
@@ -120,17 +120,26 @@ impl<'a> Runs<'a> {
         let stepped: Vec<Run<'_>> = runs.iter().map(|run| self.stepped(*run)).collect();
         let done = simulate_many(self.simulator, &stepped, &mut outs);
         let each = runs.iter().zip(done).zip(outs);
-        each.map(|((run, done), out)| done.and_then(|()| self.finite(run.stage, out))).collect()
+        each.map(|((run, done), out)| self.heard(done).and_then(|()| self.finite(run.stage, out)))
+            .collect()
     }
 
     /// One run on an input that was not measured; none where the stage cannot.
     pub(crate) fn run_on(&self, run: Run<'_>, input: &[f64]) -> Result<Option<Vec<f64>>, GapError> {
         let mut out = self.begin(run)?;
         let Some(driven) = self.simulator.driven() else { return Ok(None) };
-        match driven.simulate_on(self.stepped(run), input, &mut out)? {
+        match self.heard(driven.simulate_on(self.stepped(run), input, &mut out))? {
             true => self.finite(run.stage, out).map(Some),
             false => Ok(None),
         }
+    }
+
+    /// Notes a run that could not be made because none may be any more: what it was for is missing in the answer.
+    fn heard<T>(&self, done: Result<T, GapError>) -> Result<T, GapError> {
+        if matches!(done, Err(GapError::Spent { .. })) {
+            self.was_cut.store(true, Ordering::Relaxed);
+        }
+        done
     }
 
     fn stepped<'m>(&self, run: Run<'m>) -> Run<'m> {

@@ -52,8 +52,8 @@ impl Checked {
     ///
     /// # Errors
     /// Names that are unknown, values that are not allowed, and recordings that cannot be read.
-    pub fn new(spec: ProblemSpec) -> Result<Self, ProblemError> {
-        let (trials, spec) = (spec.trials.clone(), ProblemSpec { trials: Vec::new(), ..spec });
+    pub fn new(mut spec: ProblemSpec) -> Result<Self, ProblemError> {
+        let trials = std::mem::take(&mut spec.trials);
         let ProblemSpec { stages, inputs, parameters, effects, .. } = &spec;
         check_known(stages, parameters, effects)?;
         let columns = Columns::read(&trials, used(&spec))?;

@@ -194,7 +194,8 @@ impl Laboratory for BlackBox {
             let inner = self.driven_by(&run, Some((inputs, vec![u64::MAX, hasher.finish()])));
             let answer = self.runs.outputs(session, &[inner]).pop();
             let answer = answer.unwrap_or_else(|| Err(SourceError::Gone("no answer".into())));
-            let mut output = answer.map_err(super::refused)?.to_vec();
+            let mut output =
+                answer.map_err(|error| super::refused(error, self.least_runs()))?.to_vec();
             for (at, values) in self.around(&run, Side::Output)? {
                 self.problem.wrappers[at].act(values, &trials, &mut output);
             }

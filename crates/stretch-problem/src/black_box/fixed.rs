@@ -90,7 +90,7 @@ impl Diagnosable for BlackBox {
     ) -> Result<Option<Proposal>, GapError> {
         match next_experiment(self, diagnosis, evidence) {
             // Where the runs are spent, or a model cannot be run on other inputs, there is no prediction.
-            Err(GapError::Simulator(_)) => Ok(None),
+            Err(GapError::Simulator(_) | GapError::Spent { .. }) => Ok(None),
             proposal => proposal,
         }
     }

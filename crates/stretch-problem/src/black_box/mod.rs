@@ -122,6 +122,19 @@ impl BlackBox {
         self.runs.count()
     }
 
+    /// The least number of runs with which there is an answer: of every stage the run as shipped, one a parameter, and the draws of the
+    /// noise of its inputs; one run is repeated.
+    pub fn least_runs(&self) -> usize {
+        let each = self.description().stages.iter().map(|spec| 1 + spec.parameters.len());
+        1 + each.sum::<usize>() + self.draws()
+    }
+
+    /// Runs with draws of the noise of inputs, of all stages together.
+    fn draws(&self) -> usize {
+        let is_noisy = |noise: &&Vec<f64>| noise.iter().any(|sd| *sd > 0.0);
+        DRAWS * self.problem.input_noise.iter().filter(is_noisy).count()
+    }
+
     /// Notes the file that the problem was read from: a [fix](crate::Fix) is that file with what was found.
     pub fn from_file(self, file: ProblemFile) -> Self {
         Self { file: Some(file), ..self }
@@ -248,9 +261,14 @@ type Apart = (Arc<Linear>, Vec<f64>);
 /// Runs that the final evaluation needs once the search is over, and further runs for each stage.
 const FINAL: (usize, usize) = (20, 8);
 
+/// Draws of the noise of a stage's inputs with which a diagnosis begins: those that the noise of the output and what of it arrives there
+/// are computed from.
+const DRAWS: usize = 16;
+
 /// A source's error as the diagnosis takes it: a fit turns back where values cannot be simulated.
-fn refused(error: SourceError) -> GapError {
+fn refused(error: SourceError, least: usize) -> GapError {
     match error {
+        SourceError::Spent { budget } => GapError::Spent { budget, least },
         SourceError::Gone(_) | SourceError::Length { .. } | SourceError::Changed { .. } => {
             GapError::Broken(Box::new(error))
         }
@@ -292,9 +310,10 @@ impl Batch for BlackBox {
         let bases: Vec<(Inner, Option<Apart>)> = runs.iter().map(|run| self.base_of(run)).collect();
         let inner: Vec<Inner> = bases.iter().map(|(inner, _)| inner.clone()).collect();
         let outputs = self.runs.outputs(self.problem.session(), &inner);
+        let least = self.least_runs();
         let each = runs.iter().zip(&bases).zip(outputs).zip(outs);
         each.map(|(((run, (_, line)), output), out)| {
-            out.copy_from_slice(&output.map_err(refused)?);
+            out.copy_from_slice(&output.map_err(|error| refused(error, least))?);
             if let Some((line, apart)) = line {
                 line.shift(apart, out);
             }
@@ -326,7 +345,7 @@ impl Costly for BlackBox {
             Ok(outputs) => self.set_line(stage, Linear::of(inner, &moves, &outputs)),
             // Without a linearisation every run is exact.
             Err(SourceError::Refused(_) | SourceError::NotFinite { .. }) => {}
-            Err(error) => return Err(refused(error)),
+            Err(error) => return Err(refused(error, self.least_runs())),
         }
         Ok(())
     }
@@ -342,7 +361,8 @@ impl Costly for BlackBox {
     fn model_runs(&self) -> ModelRuns {
         let (count, budget) = (self.runs.count(), self.runs.budget());
         let kept = (FINAL.0 + FINAL.1 * self.problem.stages.len()).min(budget.unwrap_or(0) / 2);
-        let is_spent = budget.is_some_and(|budget| count + kept >= budget);
+        // once parameters were re-tuned the noise is drawn anew
+        let is_spent = budget.is_some_and(|budget| count + kept + self.draws() >= budget);
         ModelRuns { count, budget, is_spent }
     }
 }

@@ -133,10 +133,8 @@ pub enum SourceError {
         /// What was answered then.
         second: f64,
     },
-    /// The budget of runs is spent.
-    #[error(
-        "the budget of {budget} model runs is spent before there is an answer; give a greater one"
-    )]
+    /// No more runs may be made.
+    #[error("the budget of {budget} model runs is spent")]
     Spent {
         /// The budget.
         budget: usize,

@@ -56,16 +56,17 @@ pub(crate) const ONLY_BEHIND: &str = "nothing was looked for on the input's side
 impl ProblemSpec {
     /// The problem for a simulator that cannot be driven by other inputs than the recorded ones: `all` stands for what can be behind the
     /// simulator, and noise of its inputs is not drawn. `None` where the problem asks for nothing else anyway.
-    pub(crate) fn only_behind(mut self) -> Option<Self> {
+    pub(crate) fn only_behind(&self) -> Option<Self> {
         let is_noisy = |input: &Input| input.noise > 0.0;
         if !self.wrap.iter().any(|name| name == "all") && !self.inputs.iter().any(is_noisy) {
             return None;
         }
-        for name in self.wrap.iter_mut().filter(|name| *name == "all") {
+        let mut spec = self.clone();
+        for name in spec.wrap.iter_mut().filter(|name| *name == "all") {
             "output.all".clone_into(name);
         }
-        self.inputs.iter_mut().for_each(|input| input.noise = 0.0);
-        Some(self)
+        spec.inputs.iter_mut().for_each(|input| input.noise = 0.0);
+        Some(spec)
     }
 }
 

@@ -16,6 +16,9 @@ use crate::{
     options::TIME,
 };
 
+/// Blocks in which a matrix is taken apart.
+const BLOCKS: usize = 32;
+
 /// Columns of one array that are taken.
 const MOST_COLUMNS: usize = 64;
 
@@ -57,14 +60,39 @@ impl Array {
     }
 
     /// Its columns over `samples` instants; none where it has another length.
-    fn into_columns(self, samples: usize) -> Option<Vec<Channel>> {
+    ///
+    /// Rows are moved from the last to the first, block by block, and what was moved is given back: beside the array itself there is never
+    /// more than a block.
+    fn into_columns(mut self, samples: usize) -> Option<Vec<Channel>> {
         let (count, step, next) = self.layout(samples)?;
         if count == 1 {
             return Some(vec![Channel { name: self.name, values: self.values }]);
         }
-        let values = |i: usize| (0..samples).map(|k| self.values[k * step + i * next]).collect();
-        let column = |i| Channel { name: format!("{}.{i}", self.name), values: values(i) };
-        Some((0..count).map(column).collect())
+        let mut columns = vec![Vec::new(); count];
+        if next == 1 {
+            // a row behind the other
+            let block = samples.div_ceil(BLOCKS);
+            let mut left = samples;
+            while left > 0 {
+                let from = left.saturating_sub(block);
+                for (i, column) in columns.iter_mut().enumerate() {
+                    column.reserve_exact(left - from);
+                    column.extend((from..left).rev().map(|k| self.values[k * step + i]));
+                }
+                self.values.truncate(from * step);
+                self.values.shrink_to_fit();
+                left = from;
+            }
+            columns.iter_mut().for_each(|column| column.reverse());
+        } else {
+            // a column behind the other
+            for (i, column) in columns.iter_mut().enumerate().rev() {
+                *column = self.values.split_off(i * next);
+                self.values.shrink_to_fit();
+            }
+        }
+        let named = |(i, values)| Channel { name: format!("{}.{i}", self.name), values };
+        Some(columns.into_iter().enumerate().map(named).collect())
     }
 }
 

@@ -7,6 +7,7 @@ use stretch_core::{RateEstimator, SampleRate};
 use stretch_data::{Split, TrialKind};
 
 use super::{About, Footer, Lake, Place, Samples, write};
+use crate::{panics::caught, session::session};
 
 /// The folder of a lake with two trials of a place, and the paths of the two.
 fn lake() -> (tempfile::TempDir, [std::path::PathBuf; 2]) {
@@ -81,8 +82,59 @@ fn opens(folder: &Path, [damaged, other]: &[std::path::PathBuf; 2], bytes: &[u8]
     assert!(!folder.join("refused").exists());
 }
 
+/// Where the embedded Arrow schema stands in a file: its value under `ARROW:schema`, in base64.
+fn embedded(file: &[u8]) -> std::ops::Range<usize> {
+    let key = b"ARROW:schema";
+    let from = file.windows(key.len()).position(|part| part == key).unwrap() + key.len();
+    let is_base64 = |byte: &u8| byte.is_ascii_alphanumeric() || b"+/=".contains(byte);
+    // two bytes at least say what follows and how long it is; the text itself begins with the mark of a message, 0xffffffff
+    let from = from + file[from..].windows(5).position(|part| part == b"/////").unwrap();
+    from..from + file[from..].iter().take_while(|byte| is_base64(byte)).count()
+}
+
+/// Of an embedded schema every byte is changed: some are those of a type, and its reader panics on one that it does not know.
+#[test]
+fn an_embedded_schema_of_unknown_types_is_an_unfit_file() {
+    let (folder, paths) = lake();
+    let whole = fs::read(&paths[0]).unwrap();
+    let mut gave_up = 0;
+    for place in embedded(&whole) {
+        for byte in *b"A7z" {
+            let mut bytes = whole.clone();
+            bytes[place] = byte;
+            opens(folder.path(), &paths, &bytes);
+            let lake = Lake::open(folder.path()).unwrap();
+            gave_up += lake.unfit.iter().filter(|file| file.why.contains("gave up")).count();
+        }
+    }
+    // the case that this is about was met
+    assert!(gave_up > 0);
+}
+
+/// A question of a lake whose rows are damaged has an answer or an error; a panic of the engine is one, as in the program.
+fn asks(folder: &Path, bytes: &[u8], damaged: &Path) {
+    fs::write(damaged, bytes).unwrap();
+    let lake = Lake::open(folder).unwrap();
+    let runtime = tokio::runtime::Runtime::new().unwrap();
+    let answer = caught(|| {
+        runtime.block_on(async {
+            let session = session(None, Some(1)).await?;
+            super::register(&session, &lake)?;
+            anyhow::Ok(session.sql("select * from trials").await?.collect().await?)
+        })
+    });
+    if let Err(why) = answer.flatten() {
+        assert!(!why.to_string().is_empty());
+    }
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
+    #[test]
+    fn damaged_rows_are_an_error_of_the_question(change in change()) {
+        let (folder, paths) = lake();
+        let whole = fs::read(&paths[0]).unwrap();
+        asks(folder.path(), &changed(whole, 4, &(change.0, None)), &paths[0]);
+    }
 
     /// The footer is the last part of the file, and what says what all of it means.
     #[test]

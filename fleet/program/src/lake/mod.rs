@@ -21,7 +21,7 @@ mod write;
 pub(crate) use about::About;
 pub(crate) use aside::{Refused, accept, refuse, set_aside};
 pub(crate) use footer::{Footer, digest};
-pub(crate) use open::{Lake, LakeFile, below, files};
+pub(crate) use open::{Lake, LakeFile, below, files, metadata};
 pub(crate) use place::{Place, check_name};
 pub(crate) use table::{register, register_folder};
 pub(crate) use write::{Samples, write, write_parquet};

@@ -15,6 +15,7 @@ use datafusion::{
 use rayon::prelude::*;
 
 use super::{About, Footer, Place};
+use crate::panics::caught;
 
 /// A lake and its files.
 #[derive(Debug)]
@@ -86,8 +87,7 @@ impl LakeFile {
     fn parse(lake: &Path, path: &Path) -> anyhow::Result<Self> {
         let place = Place::of(path.strip_prefix(lake.join("trials"))?)?;
         let damaged = "it is damaged; ingest its trial again";
-        let parquet = ArrowReaderMetadata::load(&File::open(path)?, Default::default())
-            .map_err(|e| anyhow::anyhow!("{damaged}: {e}"))?;
+        let parquet = metadata(path).context(damaged)?;
         let footer = Footer::of(&parquet)?;
         let columns = parquet.schema().clone();
         for field in columns.fields() {
@@ -108,6 +108,15 @@ impl LakeFile {
         }
         Ok(Self { path: path.to_owned(), place, footer, columns })
     }
+}
+
+/// What the footer of a Parquet file says, with the schema that is embedded in it.
+///
+/// # Errors
+/// A file that cannot be read, and one that its reader panics on.
+pub(crate) fn metadata(path: &Path) -> anyhow::Result<ArrowReaderMetadata> {
+    let file = File::open(path)?;
+    Ok(caught(|| ArrowReaderMetadata::load(&file, Default::default()))??)
 }
 
 /// Every Parquet file below a folder, in order.

@@ -175,6 +175,14 @@ const CALIBRATE: Job = Job {
     answer: ["lake/states", "out"],
 };
 
+const DRIFT: Job = Job {
+    line: "drift --lake lake --from 2026-01 --to 2026-02 --out out/drift.parquet",
+    prepare: |folder| {
+        said("make --lake {} --sensors 1 --days 34 --rows 100", &[&folder.join("lake")]);
+    },
+    answer: ["lake/states", "out"],
+};
+
 impl Job {
     fn command(&self, folder: &Path) -> Command {
         let mut command = Command::new(PROGRAM);
@@ -282,10 +290,17 @@ fn a_calibration_killed_before_any_call_is_mended_by_the_next() {
     assert!(calls > 20, "{calls}");
 }
 
+/// The table of a drift stands outside the lake, where no lock of the lake protects what another command writes.
+#[test]
+fn a_drift_killed_before_any_call_is_mended_by_the_next() {
+    let calls = DRIFT.is_killed_before_its_calls(2);
+    assert!(calls > 10, "{calls}");
+}
+
 #[test]
 #[ignore = "a minute of kills; gate.sh runs it"]
 fn every_call_of_an_ingest_and_of_a_calibration_may_be_the_last() {
-    let calls = [INGEST, CALIBRATE].map(|job| job.is_killed_before_its_calls(1));
+    let calls = [INGEST, CALIBRATE, DRIFT].map(|job| job.is_killed_before_its_calls(1));
     println!("{calls:?} kills, all mended");
 }
 

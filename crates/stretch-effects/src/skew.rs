@@ -124,6 +124,7 @@ impl Reading {
 /// A dead time.
 pub static DELAY: Kind = Kind {
     name: "delay",
+    title: "a delay",
     words: "it acts a dead time later",
     equation: "y(t) = x(t - delay_s)",
     usual: &[Side::Input],
@@ -139,6 +140,7 @@ pub static DELAY: Kind = Kind {
 /// Samples of another time, by a clock of their own.
 pub static SKEW: Kind = Kind {
     name: "skew",
+    title: "a time offset",
     words: "it is sampled earlier or later than the rest, by a clock of its own",
     equation: "y(t) = x(t - skew_s - rate t), t since the trial began",
     usual: &[Side::Output],
@@ -183,6 +185,7 @@ fn sketch([skew_s, rate]: [f64; 2], signals: &Signals) -> Sketch {
 /// The channels are not sampled at the same time.
 pub(crate) static CHANNEL_SKEW: Effect = Effect {
     name: "channel_skew",
+    title: "the time offset between bridge and length",
     words: "the bridge is sampled earlier or later than the length",
     equation: "bridge samples show the length of skew_s + rate t earlier, t since the trial began, first and last value held",
     parameters: &[

@@ -40,7 +40,7 @@ tools() {
         python3 -m venv "$tools"
         "$tools/bin/pip" install --quiet --disable-pip-version-check 'cargo-zigbuild>=0.20' ziglang 'maturin>=1.9,<2'
     }
-    # shellcheck disable=SC2046
+    # shellcheck disable=SC2046,SC2086
     rustup target add wasm32-unknown-unknown $(printf '%s\n' $PROGRAMS $WHEELS | sort -u)
     # before paths are remapped, so that every folder of sources exists
     cargo fetch --locked

@@ -135,8 +135,13 @@ fn judged(page: &mut Page, evaluation: &Evaluation, names: &[String], context: &
     ));
     let caption = "All test recordings together";
     page.table(&method_table(caption, &evaluation.pooled, names, &evaluation.unit));
-    for (kind, methods) in &context.kinds {
-        page.table(&method_table(kind, methods, names, &evaluation.unit));
+    if !context.kinds.is_empty() {
+        // on a phone each of them is four screens
+        page.folded("By kind of recording", |page| {
+            for (kind, methods) in &context.kinds {
+                page.table(&method_table(kind, methods, names, &evaluation.unit));
+            }
+        });
     }
     page.text(
         "Raw is the signal itself, its extremes laid on those of the reference, which no \

@@ -13,7 +13,8 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-PROGRAMS="x86_64-unknown-linux-musl aarch64-unknown-linux-musl x86_64-pc-windows-gnu"
+# x86_64-pc-windows-gnu is not among them: whether zig links it has not been tried
+PROGRAMS="x86_64-unknown-linux-musl aarch64-unknown-linux-musl"
 WHEELS="x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu x86_64-unknown-linux-musl aarch64-unknown-linux-musl"
 version=${STRETCH_VERSION:-$(awk -F '"' '/^version = / { print $2; exit }' Cargo.toml)}
 dist=$PWD/target/dist
@@ -50,21 +51,15 @@ tools() {
 page() { web/build.sh; }
 
 program() {
-    local target name folder end=""
+    local target name folder
     for target in "$@"; do
         name=stretch-$version-$target
         folder=target/dist-folders/$name
-        case $target in *windows*) end=.exe ;; *) end="" ;; esac
         STRETCH_PAGE=$PWD/web/target/page RUSTFLAGS=$(remapped) \
             cargo zigbuild --release --locked -p stretch-cli --features page --target "$target"
         rm -rf "$folder" && mkdir -p "$folder" "$dist"
-        cp "target/$target/release/stretch$end" README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "$folder"
-        if [ -n "$end" ]; then
-            rm -f "$dist/$name.zip"
-            (cd target/dist-folders && python3 -m zipfile -c "$dist/$name.zip" "$name")
-        else
-            tar -C target/dist-folders --owner=0 --group=0 --numeric-owner --sort=name -czf "$dist/$name.tar.gz" "$name"
-        fi
+        cp "target/$target/release/stretch" README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "$folder"
+        tar -C target/dist-folders --owner=0 --group=0 --numeric-owner --sort=name -czf "$dist/$name.tar.gz" "$name"
     done
 }
 

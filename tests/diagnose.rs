@@ -313,7 +313,8 @@ fn a_saturated_channel_is_noticed_with_its_share() {
     assert!(text.contains("bridge_v stands at 1.9 V, its greatest value, in"), "{text}");
     // What a clipped record looks like is a saturated amplifier or a slack sleeve, and nothing else.
     let first = text.lines().next().unwrap();
-    let named = ["amplifier_saturation", "sleeve_slack"].iter().any(|e| first.contains(e));
+    let named =
+        ["the amplifier's saturation", "the sleeve's slack"].iter().any(|e| first.contains(e));
     assert!(named || !first.contains("lacks"), "{text}");
 }
 
@@ -352,7 +353,10 @@ fn a_gauge_alone_is_diagnosed_beside_its_reference() {
     let columns = ["--reference", "length_mm", "--signal", "bridge_v"];
     let text = runs(diagnose(&trial).args(columns).arg("--report").arg(&page));
     let first = text.lines().next().unwrap();
-    assert!(first.contains("channel_skew") || first.contains("amplifier_lowpass"), "{text}");
+    assert!(
+        first.contains("the time offset between") || first.contains("the amplifier's lag"),
+        "{text}"
+    );
     assert!(text.contains("skew_s = 0.03") || text.contains("skew_s = 0.029"), "{text}");
     assert!(!without_program(&fs::read_to_string(page).unwrap()).contains("NaN"));
     let dead = scratch.write("dead.csv", fs::read_to_string(&trial).unwrap());

@@ -78,7 +78,7 @@ pub fn off_throughout(errors: &MethodErrors, unit: &str) -> Option<String> {
     let is_far = rmse_percent * bias.abs() > FAR_OFF_PERCENT * rmse;
     (is_far && 2.0 * bias * bias >= rmse * rmse).then(|| {
         let off = format!("{:.4} {unit}", bias.abs());
-        let side = if bias > 0.0 { "below" } else { "above" };
+        let side = if bias > 0.0 { "above" } else { "below" };
         format!(
             "it is {} {side} the reference on average, which is most of its error: is the reference in the unit of the calibration \
              (stretch convert --column 'length_mm=length_cm*10' brings it there)? If it is, the sensor was mounted anew or has drifted: \

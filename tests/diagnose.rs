@@ -93,7 +93,7 @@ fn a_simulated_effect_is_named_and_reported() {
     };
     let text = runs(run("2", &json).arg("--report").arg(&page));
     let first = text.lines().next().unwrap();
-    assert!(first.contains("gauge_hysteresis"), "{text}");
+    assert!(first.contains("the gauge's hysteresis"), "{text}");
     let read = |path: &Path| -> Value {
         let mut value: Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
         assert!(value["runtime_s"].take().as_f64().unwrap() > 0.0);
@@ -130,7 +130,7 @@ fn a_simulated_effect_is_named_and_reported() {
     runs(&mut run("1", &again));
     assert!(d == read(&again));
     let page = without_program(&fs::read_to_string(page).unwrap());
-    assert!(page.contains("What to change") && page.contains("Add gauge_hysteresis"));
+    assert!(page.contains("What to change") && page.contains("Add the gauge&#39;s hysteresis"));
     assert!(page.contains("trained in the simulator then errs"));
     assert!(page.contains("simpler methods") && page.contains("by where the calibration"));
     assert!(

@@ -163,5 +163,8 @@ fn with_data_a_measured_sleeve_gets_shares_and_no_confident_name() {
     let first = text.lines().next().unwrap();
     assert!(!first.contains("lacks"), "{first}");
     // Slow memory, as a fit of other forms finds it too (book/src/results/gauge_alone.md), and a term for the rest.
-    assert!(first.contains("the gauge's relaxation") && first.contains("What is missing"), "{first}");
+    assert!(
+        first.contains("the gauge's relaxation") && first.contains("What is missing"),
+        "{first}"
+    );
 }

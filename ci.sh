@@ -166,6 +166,13 @@ CARGO_TARGET_DIR=$target challenge/gate.sh
 
 step "the reports' script, in a browser"
 STRETCH=$target/release/stretch web/gate.sh
+
+step "the page inside the program"
+if [ -f web/target/page/index.html ]; then
+    STRETCH_PAGE=$PWD/web/target/page cargo test --quiet --locked --features page --test it page::
+else
+    skip "there is no page: web/build.sh could not make it"
+fi
 spare web/target
 
 step "FMUs"
@@ -179,6 +186,25 @@ spare firmware/target target/debug
 step "fleet"
 fleet/gate.sh
 spare fleet/target
+
+step "book and workflows"
+# its Rust blocks are documentation tests of the crates; the others are typed by the tests of pages
+if have mdbook; then mdbook build --dest-dir "$target/book" book; else skip "there is no mdbook: cargo install mdbook"; fi
+if have actionlint; then
+    actionlint .github/workflows/*.yml
+else
+    skip "there is no actionlint: go install github.com/rhysd/actionlint/cmd/actionlint@latest"
+fi
+
+step "public items since the last release"
+if ! cargo semver-checks --version >/dev/null 2>&1; then
+    skip "there is no cargo semver-checks: cargo install cargo-semver-checks"
+elif ! released=$(git describe --tags --abbrev=0 --match 'v*' 2>/dev/null); then
+    skip "nothing was released yet: there is no tag v*"
+else
+    # shellcheck disable=SC2046,SC2086
+    cargo semver-checks --baseline-rev "$released" $(printf -- '-p %s ' $PACKAGES)
+fi
 
 step "oldest supported compiler"
 skip "only the toolchain of rust-toolchain.toml can be installed here; rust-version in Cargo.toml is what the dependencies ask for"

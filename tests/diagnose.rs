@@ -93,7 +93,7 @@ fn a_simulated_effect_is_named_and_reported() {
     };
     let text = runs(run("2", &json).arg("--report").arg(&page));
     let first = text.lines().next().unwrap();
-    assert!(first.contains("gauge_hysteresis"), "{text}");
+    assert!(first.contains("the gauge's hysteresis"), "{text}");
     let read = |path: &Path| -> Value {
         let mut value: Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
         assert!(value["runtime_s"].take().as_f64().unwrap() > 0.0);
@@ -130,7 +130,7 @@ fn a_simulated_effect_is_named_and_reported() {
     runs(&mut run("1", &again));
     assert!(d == read(&again));
     let page = without_program(&fs::read_to_string(page).unwrap());
-    assert!(page.contains("What to change") && page.contains("Add gauge_hysteresis"));
+    assert!(page.contains("What to change") && page.contains("Add the gauge&#39;s hysteresis"));
     assert!(page.contains("trained in the simulator then errs"));
     assert!(page.contains("simpler methods") && page.contains("by where the calibration"));
     assert!(
@@ -313,7 +313,8 @@ fn a_saturated_channel_is_noticed_with_its_share() {
     assert!(text.contains("bridge_v stands at 1.9 V, its greatest value, in"), "{text}");
     // What a clipped record looks like is a saturated amplifier or a slack sleeve, and nothing else.
     let first = text.lines().next().unwrap();
-    let named = ["amplifier_saturation", "sleeve_slack"].iter().any(|e| first.contains(e));
+    let named =
+        ["the amplifier's saturation", "the sleeve's slack"].iter().any(|e| first.contains(e));
     assert!(named || !first.contains("lacks"), "{text}");
 }
 
@@ -352,7 +353,10 @@ fn a_gauge_alone_is_diagnosed_beside_its_reference() {
     let columns = ["--reference", "length_mm", "--signal", "bridge_v"];
     let text = runs(diagnose(&trial).args(columns).arg("--report").arg(&page));
     let first = text.lines().next().unwrap();
-    assert!(first.contains("channel_skew") || first.contains("amplifier_lowpass"), "{text}");
+    assert!(
+        first.contains("the time offset between") || first.contains("the amplifier's lag"),
+        "{text}"
+    );
     assert!(text.contains("skew_s = 0.03") || text.contains("skew_s = 0.029"), "{text}");
     assert!(!without_program(&fs::read_to_string(page).unwrap()).contains("NaN"));
     let dead = scratch.write("dead.csv", fs::read_to_string(&trial).unwrap());

@@ -55,7 +55,7 @@ fn a_gauge_is_told_by_columns_rig_file_or_missing_openings() {
     let scratch = Scratch::new();
     let named = |text: &str| {
         let first = text.lines().next().unwrap();
-        assert!(first.contains("channel_skew"), "{text}");
+        assert!(first.contains("the time offset between bridge and length"), "{text}");
     };
     // One trial and two columns; the report and the JSON say the same.
     let file = scratch.path("joint.csv");
@@ -132,7 +132,7 @@ fn records_that_cannot_be_used_are_refused_by_name() {
     let kept = good.lines().enumerate().filter(|(i, _)| !(4000..4300).contains(i));
     let gap: String = kept.map(|(_, l)| l.to_owned() + "\n").collect();
     let text = runs(&mut run(&gap, "angle_deg", "s2"));
-    assert!(text.lines().next().unwrap().contains("channel_skew"), "{text}");
+    assert!(text.lines().next().unwrap().contains("the time offset between"), "{text}");
     assert!(text.contains("joint.csv: 3.000 s are missing after 39.98 s"), "{text}");
     let value = |i: usize| -> Option<f64> { good.lines().nth(i)?.split(',').nth(2)?.parse().ok() };
     let all: Vec<Option<f64>> = (0..6001).map(value).collect();
@@ -147,7 +147,9 @@ fn records_that_cannot_be_used_are_refused_by_name() {
     let mut command = stretch();
     command.arg("diagnose").arg(&metres).args(["--reference", "length_mm", "--signal", "s2"]);
     let text = runs(&mut command);
-    assert!(text.contains("metres") && text.lines().next().unwrap().contains("channel_skew"));
+    assert!(
+        text.contains("metres") && text.lines().next().unwrap().contains("the time offset between")
+    );
 }
 
 #[test]
@@ -161,5 +163,8 @@ fn with_data_a_measured_sleeve_gets_shares_and_no_confident_name() {
     let first = text.lines().next().unwrap();
     assert!(!first.contains("lacks"), "{first}");
     // Slow memory, as a fit of other forms finds it too (book/src/results/gauge_alone.md), and a term for the rest.
-    assert!(first.contains("gauge_relaxation") && first.contains("What is missing"), "{first}");
+    assert!(
+        first.contains("the gauge's relaxation") && first.contains("What is missing"),
+        "{first}"
+    );
 }

@@ -51,7 +51,7 @@ fn a_gauge_in_another_unit_is_told_by_its_power_of_ten() {
     );
     let record = scratch.path("cal.json");
     runs(&mut calibrate(&volts, &record));
-    let says = "3,000 of 3,000 samples lie outside the range of the calibration, 1.273 to 2.196 V, and were clamped to it: \
+    let says = "3,000 of 3,000 samples lie outside the range of the calibration, 1.273 to 2.196 V, and were held at its ends: \
                 are they in mV? divided by 1000, 2,999 would lie inside";
     let told = |command: &str, log: &std::path::Path| {
         let output =
@@ -167,4 +167,37 @@ fn what_agrees_has_no_slices_that_stand_out() {
     runs(stretch().args(["simulate", "--protocol", "pulses", "--out"]).arg(&bench));
     let told = one_line(&runs(stretch().arg("diagnose").arg(&bench).arg("--no-next")));
     assert!(told.contains("agree") && !told.contains("stands out"), "{told}");
+}
+
+#[test]
+fn a_reference_that_is_off_throughout_is_remarked_on_with_what_to_do() {
+    let scratch = Scratch::new();
+    let log = trial(&scratch, "millimetres.csv", "time_s,length_mm,bridge_v", 1.0);
+    let record = scratch.path("cal.json");
+    runs(&mut calibrate(&log, &record));
+    let told = |log: &std::path::Path| {
+        let mut evaluate = stretch();
+        let output = evaluate.args(["evaluate", "--calibration"]).arg(&record).arg(log).output();
+        let output = output.unwrap();
+        assert!(output.status.success());
+        one_line(&String::from_utf8(output.stderr).unwrap())
+    };
+    let text = std::fs::read_to_string(&log).unwrap();
+    let other = |name: &str, change: fn(f64) -> f64| {
+        let row = |line: &str| {
+            let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+            format!("{},{:.5},{}\n", cells[0], change(cells[1]), cells[2])
+        };
+        let rows: String = text.lines().skip(1).map(row).collect();
+        scratch.write(name, format!("time_s,length_mm,bridge_v\n{rows}"))
+    };
+    // in centimetres, and on a mount that has moved by 10 mm
+    for (name, change, off) in [
+        ("centimetres.csv", (|mm| mm / 10.0) as fn(f64) -> f64, "it is 148."),
+        ("moved.csv", |mm| mm + 10.0, "10.0000 mm below the reference on average"),
+    ] {
+        let told = told(&other(name, change));
+        assert!(told.contains(off) && told.contains("stretch convert --column"), "{told}");
+    }
+    assert!(!told(&other("same.csv", |mm| mm)).contains("on average"));
 }

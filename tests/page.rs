@@ -35,3 +35,16 @@ fn what_is_no_page_is_refused_and_nothing_is_left() {
         assert!(!out.exists());
     }
 }
+
+#[test]
+#[cfg(has_page)]
+fn a_program_that_carries_the_page_needs_nothing_beside_it() {
+    let scratch = Scratch::new();
+    let (alone, out) = (scratch.path("stretch"), scratch.path("out"));
+    // away from the source tree, where it would find the page
+    fs::copy(env!("CARGO_BIN_EXE_stretch"), &alone).unwrap();
+    runs(assert_cmd::Command::new(&alone).env_clear().arg("page").arg("--out").arg(&out));
+    let written = fs::read(out.join("index.html")).unwrap();
+    assert!(written == fs::read(env!("STRETCH_PAGE_FILE")).unwrap());
+    assert!(written.ends_with(b"</html>\n"));
+}

@@ -151,7 +151,11 @@ fn a_problem_of_the_built_in_gauge_is_its_data_set() {
     let text = "[simulator]\nbuiltin = \"gauge\"\ndata_set = \"rod.csv\"\nreference = \"rod_mm\"\nsignal = \"s1\"\n";
     fs::write(folder.path().join("problem.toml"), text).unwrap();
     let (is_good, text) = said(folder.path(), &[]);
-    assert!(is_good && text.starts_with("The simulator lacks channel_skew"), "{text}");
+    assert!(
+        is_good
+            && text.starts_with("The simulator lacks the time offset between bridge and length"),
+        "{text}"
+    );
 }
 
 /// A folder as it comes from somebody else: recordings, and a problem whose simulator leaves a trace.

@@ -54,7 +54,7 @@ cp "$bench"/arbitrary_1.csv "$named"
 trials=("$bench"/inflation_50.csv "$bench"/deflation_50.csv "$named")
 stretch calibrate "${trials[@]}" --model poly13 --out "$fresh/surface.json" --report "$fresh/surface.html" >/dev/null
 stretch calibrate "${trials[@]}" --model observer --out "$fresh/memory.json" --report "$fresh/memory.html" >/dev/null
-stretch diagnose "$bench" --report "$fresh/diagnosis.html" --json-out "$fresh/diagnosis.json" >/dev/null
+stretch diagnose "$bench" --report "$fresh/diagnosis.html" --json-out "$fresh/diagnosis.json" >"$fresh/diagnosis.txt"
 stretch demo --out "$fresh/demo" >/dev/null
 stretch demo --paper --out "$fresh/paper" >/dev/null
 reports=("$fresh"/{surface,memory,diagnosis}.html "$fresh"/demo/report.html "$fresh"/paper/paper.html)

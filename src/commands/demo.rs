@@ -11,7 +11,7 @@ use stretch_calibrate::{apply, write_calibration};
 use stretch_data::{Trial, TrialKind, listed};
 use stretch_files::write_folder;
 use stretch_report::{Context, Judged, Subject, demo_page, readme_picture};
-use stretch_sim::{RunSettings, TrialPlan, demo_preset};
+use stretch_sim::{ActiveEffect, RunSettings, TrialPlan, demo_preset, effect_named};
 
 use super::{
     apply::estimates_csv,
@@ -141,7 +141,10 @@ fn simulated(folder: &Path, seed: u64) -> anyhow::Result<Sessions> {
     let settings = RunSettings { seed, ..RunSettings::default() };
     simulate::write(folder, false, &rig, &settings, &TrialPlan::paper(seed))?;
     let mut sessions = Sessions::read(folder, &Wanted::default())?;
-    let effects: Vec<String> = rig.effects.iter().map(|e| e.name().to_owned()).collect();
+    let in_words = |e: &ActiveEffect| {
+        effect_named(e.name()).map_or(e.name(), |effect| effect.title).to_owned()
+    };
+    let effects: Vec<String> = rig.effects.iter().map(in_words).collect();
     sessions.notes = vec![format!(
         "Simulated: the paper's session, seed {seed}, on a rig with {}. The simulator has none of these effects, \
          and the diagnosis does not know them.",

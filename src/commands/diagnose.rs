@@ -11,7 +11,7 @@ use indicatif::ProgressBar;
 use stretch_files::{FileError, Outputs};
 use stretch_gap::{Diagnosis, Options};
 use stretch_problem::{Examined, Problem, Reading};
-use stretch_report::{Subject, diagnosis_page};
+use stretch_report::{Subject, diagnosis_page, in_words};
 
 use super::{
     diagnosis_files::{write_fix, write_snippets},
@@ -264,9 +264,14 @@ fn conclude(args: &Args, examined: &Examined, problem: &Problem) -> anyhow::Resu
 
 /// The sentence, and everything behind it unless the program is to be quiet.
 pub(super) fn print(examined: &Examined) -> anyhow::Result<()> {
-    say_first(&examined.diagnosis.sentence)?;
+    // with every detail the names are those of files and options
+    let diagnosis = match is_verbose() {
+        true => &examined.diagnosis,
+        false => &in_words(&examined.diagnosis),
+    };
+    say_first(&diagnosis.sentence)?;
     if is_quiet() {
         return Ok(());
     }
-    say(text(&examined.diagnosis, &examined.implementations, is_verbose()))
+    say(text(diagnosis, &examined.implementations, is_verbose()))
 }

@@ -6,7 +6,8 @@ use stretch_data::listed;
 use stretch_gap::{Candidate, Diagnosis, Knowledge, SliceGap, VerdictKind, Where};
 use stretch_problem::Implementation;
 use stretch_report::{
-    Table, baseline_table, candidate_table, stage_table, times, transfer_in_words, transfer_table,
+    Table, baseline_table, candidate_table, effect_in_words, stage_table, times, transfer_in_words,
+    transfer_table,
 };
 
 use super::fail_on::is_faint;
@@ -26,7 +27,7 @@ pub(crate) fn text(
 ) -> String {
     let mut out = String::new();
     for one in implementations {
-        put(&mut out, &format!("  {}: {}", one.name, one.words));
+        put(&mut out, &format!("  {}: {}", named(one, diagnosis), one.words));
     }
     if let Some(proposed) = diagnosis.proposed.as_ref().filter(|p| !p.equation.is_empty()) {
         put(&mut out, &format!("  proposed, on the {}: {}", proposed.acts, proposed.equation));
@@ -44,7 +45,7 @@ pub(crate) fn text(
     candidates(&mut out, diagnosis);
     parameters(&mut out, diagnosis);
     identifiability(&mut out, diagnosis, is_verbose);
-    implement(&mut out, implementations);
+    implement(&mut out, implementations, diagnosis);
     transfer(&mut out, diagnosis);
     baselines(&mut out, diagnosis);
     next(&mut out, diagnosis);
@@ -64,6 +65,14 @@ pub(crate) fn text(
         }
     }
     out.trim_end().to_owned()
+}
+
+/// What an effect is, and the name by which options and files call it.
+fn named(one: &Implementation, diagnosis: &Diagnosis) -> String {
+    match effect_in_words(&one.name, diagnosis) {
+        words if words == one.name => words,
+        words => format!("{words} ({})", one.name),
+    }
 }
 
 fn put(out: &mut String, line: &str) {
@@ -161,13 +170,13 @@ fn candidates(out: &mut String, diagnosis: &Diagnosis) {
 }
 
 /// What is named, as something to type.
-fn implement(out: &mut String, all: &[Implementation]) {
+fn implement(out: &mut String, all: &[Implementation], diagnosis: &Diagnosis) {
     if all.is_empty() {
         return;
     }
     put(out, "\nTo implement (--snippets DIR or the report has the code in C, Python and MATLAB):");
     for one in all {
-        put(out, &format!("- {}: {}", one.name, one.equation()));
+        put(out, &format!("- {}: {}", named(one, diagnosis), one.equation()));
         if let Some(sketch) = &one.sketch {
             for q in &sketch.inputs {
                 put(out, &format!("  {q}"));

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use stretch_calibrate::{
     Evaluation, MethodErrors, Reach, beside_a_constant, evaluate, fitted_on, not_its_own,
-    read_calibration, worse_than_the_mean,
+    off_throughout, read_calibration, worse_than_the_mean,
 };
 use stretch_data::Split;
 
@@ -72,8 +72,14 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         let signals = trials.iter().filter_map(|trial| trial.channel(calibration.signal.as_str()));
         signals.flatten().for_each(|value| reach.take(*value));
         let outside = reach.doubt().or_else(|| not_its_own(errors.clamped, errors.samples));
-        for doubt in
-            [outside, worse_than_the_mean(errors), beside_a_constant(errors)].into_iter().flatten()
+        for doubt in [
+            outside,
+            off_throughout(errors, &evaluation.unit),
+            worse_than_the_mean(errors),
+            beside_a_constant(errors),
+        ]
+        .into_iter()
+        .flatten()
         {
             warn(format!("stretch: {}: {doubt}", errors.method));
         }

@@ -1,6 +1,7 @@
 //! `stretch page`: the page that needs no installation.
 
 use std::{
+    borrow::Cow,
     env, fs,
     path::{Path, PathBuf},
     process::Command,
@@ -15,6 +16,12 @@ use crate::display::warn;
 /// The page's one file.
 const FILE: &str = "index.html";
 
+/// The page that was built before this program (`build.rs`).
+#[cfg(has_page)]
+const CARRIED: Option<&[u8]> = Some(include_bytes!(env!("STRETCH_PAGE_FILE")));
+#[cfg(not(has_page))]
+const CARRIED: Option<&[u8]> = None;
+
 /// Write the page that needs no installation: calibrate, diagnose and listen in a browser
 ///
 /// One HTML file with the same crates in it, compiled to WASM. It opens from a disk, works offline,
@@ -22,9 +29,9 @@ const FILE: &str = "index.html";
 ///
 ///   stretch page --out page
 ///
-/// The page is taken from where STRETCH_PAGE says, or from the folder page beside this program;
-/// in the source tree that this program was built from it is built (rustup target add
-/// wasm32-unknown-unknown).
+/// A program of a release carries the page. One that was built without the feature page takes it
+/// from where STRETCH_PAGE says, or builds it in the source tree that it stands in (rustup target
+/// add wasm32-unknown-unknown).
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {
@@ -38,10 +45,7 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     recover(&args.out)?;
-    let from = page()?;
-    let page = fs::read(&from).with_context(|| from.display().to_string())?;
-    let is_page = page.starts_with(b"<!DOCTYPE html>") && page.ends_with(b"</html>\n");
-    ensure!(is_page, "{}: this is no page of stretch; build it with web/build.sh", from.display());
+    let page = page()?;
     write_folder(&args.out, args.force, |folder| {
         Ok(write_whole(folder.join(FILE), |out| out.write_all(&page))?)
     })
@@ -53,23 +57,31 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     ))
 }
 
-/// Where the page is.
-fn page() -> anyhow::Result<PathBuf> {
-    if let Some(asked) = env::var_os("STRETCH_PAGE") {
-        let asked = PathBuf::from(asked);
-        let file = if asked.is_dir() { asked.join(FILE) } else { asked };
-        ensure!(file.is_file(), "STRETCH_PAGE: {}: there is no such file", file.display());
-        return Ok(file);
-    }
+/// The page: the one that is asked for, the one that this program carries, or one that is built.
+fn page() -> anyhow::Result<Cow<'static, [u8]>> {
+    let from = match (env::var_os("STRETCH_PAGE"), CARRIED) {
+        (Some(asked), _) => {
+            let asked = PathBuf::from(asked);
+            let file = if asked.is_dir() { asked.join(FILE) } else { asked };
+            ensure!(file.is_file(), "STRETCH_PAGE: {}: there is no such file", file.display());
+            file
+        }
+        (None, Some(page)) => return Ok(page.into()),
+        (None, None) => build()?,
+    };
+    let page = fs::read(&from).with_context(|| from.display().to_string())?;
+    let is_page = page.starts_with(b"<!DOCTYPE html>") && page.ends_with(b"</html>\n");
+    ensure!(is_page, "{}: this is no page of stretch; build it with web/build.sh", from.display());
+    Ok(page.into())
+}
+
+/// Builds the page in the source tree that this program stands in.
+fn build() -> anyhow::Result<PathBuf> {
     let program = env::current_exe().ok();
-    let beside = program.as_deref().and_then(Path::parent).map(|at| at.join("page").join(FILE));
-    if let Some(beside) = beside.filter(|file| file.is_file()) {
-        return Ok(beside);
-    }
     let Some(web) = program.as_deref().and_then(sources) else {
         bail!(
-            "there is no page beside this program, and it does not stand in its source tree: set STRETCH_PAGE to the \
-             folder that web/build.sh made (web/target/page), or put that folder beside the program as page"
+            "this program carries no page, and it does not stand in its source tree: take the program of a release, \
+             or set STRETCH_PAGE to the folder that web/build.sh made (web/target/page)"
         );
     };
     let script = web.join("build.sh");

@@ -55,8 +55,8 @@ fn every_crate_says_truly_what_it_is() {
 }
 
 #[test]
-fn every_crate_carries_both_licences() {
-    for folder in crates() {
+fn every_package_carries_both_licences() {
+    for folder in crates().into_iter().chain([super::root().join("python")]) {
         for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
             assert_eq!(
                 read(&folder.join(licence)),

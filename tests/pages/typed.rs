@@ -18,7 +18,7 @@ const NOT_TYPED: [(&str, &str); 10] = [
     ("cargo add", "it needs a project of the reader's"),
     ("pip install", "the Python package has a gate of its own"),
     ("stretch listen", "it needs a board"),
-    ("stretch page", "it needs the page that a release has beside the program"),
+    ("stretch page", "it needs the page that the program of a release carries"),
     ("stretch fleet", "the fleet has a gate of its own"),
     ("python python/examples/", "it needs recordings of others"),
     ("cargo run --release --manifest-path challenge/", "the challenge has a gate of its own"),

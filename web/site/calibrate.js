@@ -84,7 +84,7 @@ const calibration = {
     tell.table("errors", pooled.map(row), pooled.length - 1);
     const names = trials.map((t) => t.trial);
     const own = pooled[pooled.length - 1];
-    const where = held_out ? "on recordings that were not fitted" : "on what was fitted: for an honest figure name test trials in a dataset.toml";
+    const where = held_out ? "on recordings that were not fitted" : "on what was fitted: for an honest figure drop another recording and choose “only test” for it above";
     html("fitted").textContent += ` Off by ${shown(own.rmse, 3)} ${unit} (root mean square) ${where}.`;
     html("judged-on").textContent = `Judged on ${names.slice(0, 4).join(", ")}${names.length > 4 ? ` and ${names.length - 4} more` : ""}.`;
   },

@@ -59,6 +59,7 @@ const page = {
     html("clear").hidden = html("recordings").hidden;
     tell.table("list", all.map((a) =>
       [a.name, String(a.rows), shown(a.seconds, 5), shown(a.rate_hz, 4), a.columns.map((c) => c.name).join(", ")]));
+    page.uses();
     const sum = (/** @type {(a: About) => number} */ of) => all.reduce((before, a) => before + of(a), 0);
     html("counted").textContent =
       `${all.length === 1 ? "1 recording" : `${all.length} recordings`}, ${sum((a) => a.rows)} rows, ${shown(sum((a) => a.seconds), 6)} s`;
@@ -67,6 +68,26 @@ const page = {
     page.guess(all);
     page.options("shown", all.map((a) => a.name), select("shown").value);
     await page.look();
+  },
+
+  /** What each recording is for: a dataset.toml says so itself, else it is chosen here. */
+  uses() {
+    const isSaid = state.files.has("dataset.toml");
+    for (const row of html("list").querySelectorAll("tr")) {
+      const name = row.firstElementChild?.textContent ?? "";
+      const cell = row.insertCell();
+      cell.dataset.head = "use";
+      if (isSaid) {
+        cell.textContent = "as dataset.toml says";
+        continue;
+      }
+      const choice = document.createElement("select");
+      choice.ariaLabel = `use of ${name}`;
+      choice.append(new Option("fit", "fit"), new Option("only test", "test"));
+      choice.value = state.held.has(name) ? "test" : "fit";
+      choice.onchange = () => { choice.value === "test" ? state.held.add(name) : state.held.delete(name); };
+      cell.append(choice);
+    }
   },
 
   /** @param {string} id @param {string[]} names @param {string} wanted */
@@ -126,6 +147,7 @@ const page = {
     crew.end();
     state.files.clear();
     state.recordings.clear();
+    state.held.clear();
     page.refused.clear();
     for (const id of ["calibrated", "diagnosed"]) html(id).hidden = true;
     report.close();
@@ -234,7 +256,7 @@ const dropped = {
   const first = crew.hand(CALIBRATOR);
   first.ready.then(async ({ version, models }) => {
     html("version").textContent = version;
-    page.options("model", ["auto", ...models], "poly13");
+    page.options("model", ["auto", ...models], "auto");
     for (const option of select("model").options) {
       if (option.value === "auto") option.text = "auto: the best on trials left out";
       if (option.value === "poly13") option.text = "poly13: as published";

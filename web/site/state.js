@@ -26,6 +26,8 @@ const state = {
   files: new Map(),
   /** Those that are read, in the order in which they came. @type {Map<string, About>} */
   recordings: new Map(),
+  /** Names of those that are only tested on. @type {Set<string>} */
+  held: new Set(),
   /** How they are read, and how often that changed. */
   asked: {},
   edition: 0,
@@ -62,6 +64,7 @@ const crew = {
       if (i === CALIBRATOR || i === DIAGNOSER) tell.doing(`reading ${name}`);
       await crew.read(hand, name, file);
     }
+    await hand.call("hold", JSON.stringify([...state.held]));
     return hand;
   },
 

@@ -100,7 +100,8 @@ const same = async () => {
   check((await saved(page, "save-report")).text.startsWith("<!DOCTYPE html>"), "the report is saved");
   await press(page, "diagnose");
   const sentence = await page.innerText("#sentence");
-  check(sentence === JSON.parse(text(join(wanted, "diagnosis.json"))).sentence, `the diagnosis is the program's: ${sentence}`);
+  const flowing = (words) => words.replace(/\s+/g, " ").trim();
+  check(flowing(text(join(wanted, "diagnosis.txt"))).startsWith(flowing(sentence)), `the diagnosis is the program's: ${sentence}`);
   console.log(`a diagnosis of the rig: ${Number(await page.getAttribute("#sentence", "data-seconds")).toFixed(1)} s`);
   await press(page, "see-diagnosis");
   check((await frame.locator(".verdict").first().innerText()).length > 20, "its report opens in place");
@@ -149,6 +150,13 @@ const refused = async () => {
   check((await said(page)).startsWith("empty.csv"), "an empty file is named");
   check(await page.locator("#list tr").count() === 1, "the good one stays");
   check(await page.inputValue("#reference") === "pos_mm" && await page.inputValue("#signal") === "out_v", "units tell columns");
+  check(await page.inputValue("#model") === "auto", "the best model is what is proposed");
+  await page.selectOption("#model", "linear");
+  await put(page, [file("held.csv", `time_s,pos_mm,out_v\n${rows.map((row) => `${row}1`).join("\n")}\n`)]);
+  await page.selectOption("#list tr:nth-child(2) select", "test");
+  await press(page, "calibrate");
+  check((await page.innerText("#fitted")).includes("not fitted"), `a recording is held out: ${await page.innerText("#fitted")}`);
+  check((await page.innerText("#judged-on")).startsWith("Judged on held"), `and judged on: ${await page.innerText("#judged-on")}`);
   await put(page, [file("text.csv", `time_s,pos_mm,out_v\n${rows.slice(0, 9).join("\n")}\n9,n/a,1.5\n`)]);
   await press(page, "calibrate");
   check((await said(page)).startsWith("text.csv, row 11, column pos_mm"), `a column that is needed: ${await said(page)}`);
@@ -172,6 +180,7 @@ const looks = async () => {
     const page = await opened(name, { width, scheme });
     if (shots) await page.screenshot({ path: join(shots, `begin-${width}-${scheme}.png`) });
     await put(page, all);
+    await page.selectOption("#model", "poly13");
     await press(page, "calibrate");
     for (const fault of await page.evaluate(faults)) check(false, `${name}: ${fault}`);
     await press(page, "see-calibration");
@@ -250,6 +259,7 @@ const fast = async () => {
   writeFileSync(log, `time_s,length_mm,bridge_v\n${Array.from({ length: 1e6 }, row).join("\n")}\n`);
   const begun = performance.now();
   await put(page, [log]);
+  await page.selectOption("#model", "poly13");
   const read = performance.now();
   await page.click("#calibrate");
   await until(page, () => !document.getElementById("calibrated").hidden, null, 60_000);

@@ -49,7 +49,7 @@ pub fn explains_little(fits: &[FitReport]) -> Option<String> {
 pub fn not_its_own(clamped: u64, samples: u64) -> Option<String> {
     (2 * clamped > samples).then(|| {
         format!(
-            "{} % of the samples lie outside of what was calibrated and were clamped to it: is this a log of that \
+            "{} % of the samples lie outside of what was calibrated and were held at its ends: is this a log of that \
              sensor, in that unit? If it is, calibrate on trials that reach as far",
             share(clamped, samples)
         )
@@ -63,6 +63,27 @@ pub fn worse_than_the_mean(errors: &MethodErrors) -> Option<String> {
         format!(
             "it errs more than the mean of the reference would (R^2 {r_squared:.4}): this log does not belong to \
              that calibration, or its reference is not what was calibrated on"
+        )
+    })
+}
+
+/// Share of the range of the reference from which a constant error is worth a sentence.
+const FAR_OFF_PERCENT: f64 = 5.0;
+
+/// A sentence for estimates whose error is mostly a constant: `bias^2` at least half of `rmse^2`, and a twentieth of the range.
+///
+/// A reference in centimetres beside a calibration in millimetres looks like that, and so does a sensor that was mounted anew.
+pub fn off_throughout(errors: &MethodErrors, unit: &str) -> Option<String> {
+    let MethodErrors { bias, rmse, rmse_percent, .. } = *errors;
+    let is_far = rmse_percent * bias.abs() > FAR_OFF_PERCENT * rmse;
+    (is_far && 2.0 * bias * bias >= rmse * rmse).then(|| {
+        let off = format!("{:.4} {unit}", bias.abs());
+        let side = if bias > 0.0 { "above" } else { "below" };
+        format!(
+            "it is {} {side} the reference on average, which is most of its error: is the reference in the unit of the calibration \
+             (stretch convert --column 'length_mm=length_cm*10' brings it there)? If it is, the sensor was mounted anew or has drifted: \
+             calibrate again, or with --model observer+rest, which follows a drifting zero",
+            off.trim_end()
         )
     })
 }

@@ -38,7 +38,7 @@ pub struct MethodErrors {
     pub average_error_percent_of_reference: f64,
     /// `100 mean(d_p - d_s)/range of d_s`.
     pub signed_error_percent: f64,
-    /// Mean of reference minus estimate.
+    /// Mean of estimate minus reference.
     pub bias: f64,
     /// Mean absolute error.
     pub mae: f64,

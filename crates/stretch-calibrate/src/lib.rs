@@ -38,7 +38,7 @@ mod series;
 mod split;
 
 pub use acceptance::{
-    beside_a_constant, explains_little, explains_nothing, fitted_on, not_its_own,
+    beside_a_constant, explains_little, explains_nothing, fitted_on, not_its_own, off_throughout,
     worse_than_the_mean,
 };
 pub use apply::{Applied, Faults, LiveReceptor, apply, pressure_column, rate_delay_s};

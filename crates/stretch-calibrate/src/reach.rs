@@ -60,7 +60,7 @@ impl Reach {
         let (count, all) = (thousands(outside), thousands(self.samples));
         let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
         let sentence = format!(
-            "{count} of {all} samples lie outside the range of the calibration, {low} to {high}{unit}, and were clamped to it"
+            "{count} of {all} samples lie outside the range of the calibration, {low} to {high}{unit}, and were held at its ends"
         );
         let best = POWERS.zip(self.inside).max_by_key(|(power, inside)| (*inside, -power.abs()));
         Some(match best.filter(|(_, inside)| 2 * inside > self.samples) {

@@ -80,6 +80,7 @@ impl BoucWen {
 /// Hysteresis that turns smoothly.
 pub static BOUC_WEN: Kind = Kind {
     name: "bouc_wen",
+    title: "smooth hysteresis",
     words: "it turns back on a smooth loop (Bouc-Wen)",
     equation: "y = x - c u, du = dx/s (1 - u sign(dx)) where u dx > 0, else dx/s",
     usual: &[Side::Output],

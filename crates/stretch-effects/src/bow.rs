@@ -111,6 +111,7 @@ impl Operator for BowedGain {
 /// A scale that bends.
 pub static CURVE: Kind = Kind {
     name: "curve",
+    title: "a bent scale",
     words: "its scale is bent",
     equation: "y = x + 4 c z (1 - z)(1 + skew (2 z - 1)), z = (x - low)/span",
     usual: &[Side::Input, Side::Output],
@@ -134,6 +135,7 @@ pub static CURVE: Kind = Kind {
 /// A gain that bends with what is beside the signal.
 pub static GAIN_CURVE: Kind = Kind {
     name: "gain_curve",
+    title: "a bent gain",
     words: "its gain bends",
     equation: "y = x (1 + 4 c z (1 - z)(1 + skew (2 z - 1))), z = x over its largest size",
     beside: Beside::Itself,
@@ -156,6 +158,7 @@ pub static GAIN_CURVE: Kind = Kind {
 /// The gauge is not quite linear.
 pub(crate) static GAUGE_NONLINEARITY: Effect = Effect {
     name: "gauge_nonlinearity",
+    title: "the gauge's non-linearity",
     words: "the gauge's resistance bends away from the ideal curve",
     equation: "R -> R (1 + c 4 x (1 - x)(1 + skew (2 x - 1))), x = e/e0",
     parameters: &[
@@ -174,6 +177,7 @@ pub(crate) static GAUGE_NONLINEARITY: Effect = Effect {
 /// The potentiometer is not quite linear.
 pub(crate) static POT_NONLINEARITY: Effect = Effect {
     name: "pot_nonlinearity",
+    title: "the potentiometer's non-linearity",
     words: "the potentiometer's scale bends",
     stage: RigStage::Reference,
     equation: "L_meas = L + c 4 y (1 - y)(1 + skew (2 y - 1)), y = k/k_max",

@@ -46,6 +46,7 @@ impl Operator for Crosstalk {
 /// Another channel.
 pub static CROSSTALK: Kind = Kind {
     name: "crosstalk",
+    title: "crosstalk",
     words: "another channel talks across to it",
     equation: "y = x + c z (1 + bend z), z the other channel from its middle, over its span",
     usual: &[Side::Output],
@@ -76,6 +77,7 @@ pub static CROSSTALK: Kind = Kind {
 /// The pressure inside the muscle stretches the gauge: with a zero that is the pressure's own, a term that no [`CROSSTALK`] is.
 pub(crate) static PRESSURE_CROSSTALK: Effect = Effect {
     name: "pressure_crosstalk",
+    title: "crosstalk from pressure to gauge",
     words: "the pressure itself strains the gauge",
     equation: "e -> e + c x (1 + bend (1 - x)), x = (p - P_atm)/P_ref",
     parameters: &[

@@ -49,6 +49,7 @@ impl Operator for DeadZone {
 /// Small values that do nothing.
 pub static DEAD_ZONE: Kind = Kind {
     name: "dead_zone",
+    title: "a dead zone",
     words: "small values do nothing",
     equation: "y = x - clamp(x, -w, w)",
     usual: &[Side::Input],

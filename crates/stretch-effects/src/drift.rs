@@ -60,6 +60,7 @@ impl Operator for Drift {
 /// A gain that drifts with session time.
 pub static GAIN_DRIFT: Kind = Kind {
     name: "gain_drift",
+    title: "drift of the gain",
     words: "its gain drifts with session time",
     equation: "y = x (1 + d (1 - exp(-settle_per_s t))/settle_per_s), t since the session began",
     parameters: |e, _| {
@@ -91,6 +92,7 @@ pub static GAIN_DRIFT: Kind = Kind {
 /// The gauge drifts while the session lasts.
 pub(crate) static THERMAL_DRIFT: Effect = Effect {
     name: "thermal_drift",
+    title: "the gauge's thermal drift",
     words: "the gauge drifts with time",
     equation: "R -> R (1 + d (1 - exp(-settle_per_s t))/settle_per_s), 1 + d t at 0; t since the session began",
     parameters: &[

@@ -77,6 +77,7 @@ impl Acts {
 /// use stretch_effects::{Acts, Effect, EffectParameter, Place, kinds::BACKLASH};
 /// static CLAMP_PLAY: Effect = Effect {
 ///     name: "clamp_play",
+///     title: "the clamp's play",
 ///     words: "the clamp of the sleeve has play",
 ///     equation: "e -> play(e, w)",
 ///     parameters: &[EffectParameter::strength("w", "strain", 0.0, 0.02, 0.005)],
@@ -89,6 +90,8 @@ impl Acts {
 pub struct Effect {
     /// Name: the vocabulary of every file and report.
     pub name: &'static str,
+    /// What it is called in headlines and tables: a noun with its owner.
+    pub title: &'static str,
     /// What it is, for someone who does not know its name, in one line.
     pub words: &'static str,
     /// Stage it acts in.
@@ -116,6 +119,7 @@ impl Effect {
     /// An effect that does nothing, to be filled in.
     pub const PLAIN: Self = Self {
         name: "",
+        title: "",
         words: "",
         stage: RigStage::Sensing,
         equation: "",

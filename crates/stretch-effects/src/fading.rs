@@ -100,6 +100,7 @@ impl Operator for FadingMemory {
 /// Memory that fades with a time constant, or three.
 pub static RELAXATION: Kind = Kind {
     name: "relaxation",
+    title: "relaxation",
     words: "it overshoots a quick change and relaxes, or creeps after it",
     equation: "y = x + c (x - mean of mean_rev(x, tau_s {1/spread, 1, spread}))",
     usual: &[Side::Output],
@@ -147,6 +148,7 @@ fn sketch(v: &[f64], _: &Extent, signals: &Signals) -> Sketch {
 /// The gauge overshoots a quick strain and relaxes.
 pub(crate) static GAUGE_RELAXATION: Effect = Effect {
     name: "gauge_relaxation",
+    title: "the gauge's relaxation",
     words: "the gauge relaxes (or overshoots) after a change of strain",
     equation: "e -> e + c (e - mean of mean_rev(e, tau {1/spread, 1, spread}))",
     parameters: &[

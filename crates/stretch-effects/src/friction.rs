@@ -72,6 +72,7 @@ const FORCES: &[Side] = &[Side::Input, Side::Output];
 /// Friction by direction.
 pub static COULOMB_FRICTION: Kind = Kind {
     name: "coulomb_friction",
+    title: "dry friction",
     words: "it rubs by direction, whatever the speed",
     equation: "y = x + f tanh(v/width)(1 + lopsided sign(v)) behind the stage, x - the same in front of it",
     usual: FORCES,
@@ -92,6 +93,7 @@ pub static COULOMB_FRICTION: Kind = Kind {
 /// Friction by speed.
 pub static VISCOUS_FRICTION: Kind = Kind {
     name: "viscous_friction",
+    title: "viscous friction",
     words: "it rubs in proportion to the speed",
     equation: "y = x + b v behind the stage, x - b v in front of it",
     usual: FORCES,
@@ -109,6 +111,7 @@ pub static VISCOUS_FRICTION: Kind = Kind {
 /// Friction that is larger while it is slow.
 pub static STRIBECK_FRICTION: Kind = Kind {
     name: "stribeck_friction",
+    title: "stick-slip friction",
     words: "it rubs more while it is slow",
     equation: "y = x + tanh(v/width) more exp(-(v/slow)^2) behind the stage, x - the same in front of it",
     usual: FORCES,

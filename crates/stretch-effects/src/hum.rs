@@ -59,6 +59,7 @@ impl Operator for Hum {
 /// The mains, picked up with a phase that only a record tells.
 pub static HUM: Kind = Kind {
     name: "hum",
+    title: "mains hum",
     words: "it picks up the mains",
     equation: "y = x + a sin(2 pi f t + phase), the phase found in the record second by second",
     usual: &[Side::Output],
@@ -109,6 +110,7 @@ fn find(values: &[f64], record: &Measured<'_>, simulated: &mut [f64]) {
 /// The mains couple into the bridge.
 pub(crate) static MAINS_HUM: Effect = Effect {
     name: "mains_hum",
+    title: "the gauge's mains hum",
     words: "mains hum is picked up",
     equation: "v -> v + a sin(2 pi f t + phase), not skewed",
     parameters: &[EffectParameter::strength("a", "V", 0.0, 0.1, 0.02), MAINS, PHASE],

@@ -104,6 +104,8 @@ pub type Sketched = fn(&[f64], &Extent, &Signals) -> Sketch;
 pub struct Kind {
     /// Name, as in `output.backlash`.
     pub name: &'static str,
+    /// What it is called in headlines and tables: a noun, as in "backlash" at the output.
+    pub title: &'static str,
     /// What it is, for someone who does not know its name.
     pub words: &'static str,
     /// Its equation: x becomes y.
@@ -161,6 +163,7 @@ impl Kind {
     /// A kind that does nothing, to be filled in.
     pub const PLAIN: Self = Self {
         name: "",
+        title: "",
         words: "",
         equation: "",
         usual: &[],

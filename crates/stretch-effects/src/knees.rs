@@ -80,6 +80,7 @@ impl Operator for Knees {
 /// An end at either side, or at both.
 pub static SATURATION: Kind = Kind {
     name: "saturation",
+    title: "saturation",
     words: "it runs into an end",
     equation: "y cannot leave [low, high], soft knees of the width given",
     usual: &[Side::Input, Side::Output],
@@ -137,6 +138,7 @@ fn reached(values: &[f64], e: &Extent) -> [Option<f64>; 2] {
 /// The sleeve goes slack: the gauge cannot be compressed.
 pub(crate) static SLEEVE_SLACK: Effect = Effect {
     name: "sleeve_slack",
+    title: "the sleeve's slack",
     words: "the sleeve goes slack when the muscle is short",
     equation: "e -> e_s + knee ln(1 + exp((e - e_s)/knee)): cannot fall below e_s",
     parameters: &[
@@ -181,6 +183,7 @@ const RAILS_V: [f64; 2] = [0.5, 3.3];
 /// The amplifier's output is bounded.
 pub(crate) static AMPLIFIER_SATURATION: Effect = Effect {
     name: "amplifier_saturation",
+    title: "the amplifier's saturation",
     words: "the amplifier runs into its limit",
     equation: "v cannot leave [v_lo, v_hi], soft knees of the width given",
     parameters: &[

@@ -81,6 +81,7 @@ impl Operator for Lowpass {
 /// One real pole or two.
 pub static LAG: Kind = Kind {
     name: "lag",
+    title: "a lag",
     words: "it follows slowly, without overshoot",
     equation: "y = mean_rev(mean_rev(x, tau_s (1 - second)), tau_s second)",
     usual: &[Side::Input, Side::Output],
@@ -130,6 +131,7 @@ pub static LAG: Kind = Kind {
 /// The amplifier is slow.
 pub(crate) static AMPLIFIER_LOWPASS: Effect = Effect {
     name: "amplifier_lowpass",
+    title: "the amplifier's lag",
     words: "the amplifier is slow",
     equation: "v -> mean_rev(mean_rev(v, tau (1 - second)), tau second)",
     parameters: &[

@@ -38,6 +38,7 @@ impl Operator for Offset {
 /// A zero that is off.
 pub static OFFSET: Kind = Kind {
     name: "offset",
+    title: "an offset",
     words: "its zero is off",
     equation: "y = x + offset",
     usual: &[Side::Input],
@@ -56,6 +57,7 @@ pub static OFFSET: Kind = Kind {
 /// A zero that wanders.
 pub static DRIFT: Kind = Kind {
     name: "drift",
+    title: "drift of the zero",
     words: "its zero wanders with session time",
     equation: "y = x + offset + per_session t/session, t since the session began",
     usual: &[Side::Output],

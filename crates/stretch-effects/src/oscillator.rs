@@ -115,6 +115,7 @@ fn dragged(speed: f64, kt: f64) -> f64 {
 /// A mass on a spring.
 pub static SECOND_ORDER_LAG: Kind = Kind {
     name: "second_order_lag",
+    title: "a second-order lag",
     words: "it follows like a mass on a spring",
     equation: "m_s^2 y'' = x - y - 2 damping m_s y' - drag m_s |y'| y'",
     usual: &[Side::Output],

@@ -85,6 +85,7 @@ impl Operator for Backlash {
 /// Play of a half-width, or three around it.
 pub static BACKLASH: Kind = Kind {
     name: "backlash",
+    title: "backlash",
     words: "it has play: it follows once a gap is taken up",
     equation: "y = mean of play(x, w {1 - softness, 1, 1 + softness})",
     usual: &[Side::Input, Side::Output],
@@ -117,6 +118,7 @@ pub static BACKLASH: Kind = Kind {
 /// The sleeve slips on the muscle.
 pub(crate) static SLEEVE_SLIP: Effect = Effect {
     name: "sleeve_slip",
+    title: "the sleeve's slip",
     words: "the sleeve slips on the muscle before it follows",
     equation: "e -> mean of play(e, w {1 - spread, 1, 1 + spread})",
     parameters: &[
@@ -143,6 +145,7 @@ pub(crate) static SLEEVE_SLIP: Effect = Effect {
 /// The potentiometer has backlash. A diagnosed calibration undoes it in the reference that it is fitted to.
 pub(crate) static POT_BACKLASH: Effect = Effect {
     name: "pot_backlash",
+    title: "the potentiometer's backlash",
     words: "the potentiometer has backlash",
     stage: RigStage::Reference,
     equation: "L_meas = mean of play(L, w {1 - spread, 1, 1 + spread})",

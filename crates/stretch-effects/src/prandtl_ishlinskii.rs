@@ -85,6 +85,7 @@ impl Operator for PrandtlIshlinskii {
 /// Hysteresis by plays: a share, the largest half-width, and the ratio of each to the next larger one.
 pub static HYSTERESIS: Kind = Kind {
     name: "hysteresis",
+    title: "hysteresis",
     words: "it takes another path on the way back (Prandtl-Ishlinskii)",
     equation: "y = x - h mean of (x - play(x, s {spread^2, spread, 1}))",
     usual: &[Side::Output],
@@ -116,6 +117,7 @@ pub static HYSTERESIS: Kind = Kind {
 /// The gauge remembers its strain.
 pub(crate) static GAUGE_HYSTERESIS: Effect = Effect {
     name: "gauge_hysteresis",
+    title: "the gauge's hysteresis",
     words: "the gauge follows another path on the way back",
     equation: "e -> e - h mean of (e - play(e, s {spread^2, spread, 1}))",
     parameters: &[

@@ -35,6 +35,7 @@ impl Operator for Quantiser {
 /// Steps.
 pub static QUANTISATION: Kind = Kind {
     name: "quantisation",
+    title: "quantisation",
     words: "it comes in steps",
     equation: "y = step round(x/step)",
     parameters: |e, unit| vec![EffectParameter::sized("step", unit, 0.0..=0.1 * e.span())],

@@ -124,6 +124,7 @@ impl Reading {
 /// A dead time.
 pub static DELAY: Kind = Kind {
     name: "delay",
+    title: "a delay",
     words: "it acts a dead time later",
     equation: "y(t) = x(t - delay_s), and (1 - empty) x(0) before x(0) arrives",
     usual: &[Side::Input],
@@ -150,6 +151,7 @@ pub static DELAY: Kind = Kind {
 /// Samples of another time, by a clock of their own.
 pub static SKEW: Kind = Kind {
     name: "skew",
+    title: "a time offset",
     words: "it is sampled earlier or later than the rest, by a clock of its own",
     equation: "y(t) = x(t - skew_s - rate t), t since the trial began",
     usual: &[Side::Output],
@@ -199,6 +201,7 @@ fn sketch(SkewSpec { skew_s, rate, empty }: SkewSpec, signals: &Signals) -> Sket
 /// The channels are not sampled at the same time.
 pub(crate) static CHANNEL_SKEW: Effect = Effect {
     name: "channel_skew",
+    title: "the time offset between bridge and length",
     words: "the bridge is sampled earlier or later than the length",
     equation: "bridge samples show the length of skew_s + rate t earlier, t since the trial began, first and last value held",
     parameters: &[

@@ -51,6 +51,7 @@ impl Operator for SlewLimit {
 /// A greatest rate.
 pub static SLEW_LIMIT: Kind = Kind {
     name: "slew_limit",
+    title: "a limit of the rate",
     words: "it cannot change faster than a rate",
     equation: "|y'| <= rate, y follows x",
     usual: &[Side::Input, Side::Output],

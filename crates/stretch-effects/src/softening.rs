@@ -108,6 +108,7 @@ impl Operator for Softening {
 /// A response that weakens with the distance travelled.
 pub static SOFTENING: Kind = Kind {
     name: "softening",
+    title: "softening",
     words: "its response weakens with the distance travelled",
     equation: "y = zero + (x - zero)(1 - m (1 - (1 + tail travel/n)^(-1/tail))), travel since the session began",
     usual: &[Side::Output],
@@ -170,6 +171,7 @@ fn sketch(v: &[f64], extent: &Extent, signals: &Signals) -> Sketch {
 /// The gauge softens as it is worked.
 pub(crate) static GAUGE_SOFTENING: Effect = Effect {
     name: "gauge_softening",
+    title: "the gauge's softening",
     words: "the gauge's response weakens with the distance travelled",
     equation: "R - R0 -> (R - R0)(1 - m (1 - (1 + tail travel/n)^(-1/tail))), exp(-travel/n) at a tail of 0; travel: summed abs strain change since the session began",
     parameters: &[

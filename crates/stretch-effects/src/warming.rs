@@ -70,6 +70,7 @@ impl Operator for Warming {
 /// A gain that warms up from a trial's start.
 pub static WARMING: Kind = Kind {
     name: "warming",
+    title: "warming up",
     words: "its gain warms up in every trial",
     equation: "y = x (1 + h (1 - mean of exp(-t/(tau_s {1/spread, 1, spread})))), t since the trial began",
     parameters: |e, _| {
@@ -105,6 +106,7 @@ pub static WARMING: Kind = Kind {
 /// The excitation warms the gauge.
 pub(crate) static SELF_HEATING: Effect = Effect {
     name: "self_heating",
+    title: "the gauge's self-heating",
     words: "the gauge warms up in its own current",
     equation: "R -> R (1 + h (1 - mean of exp(-t/(tau {1/spread, 1, spread})))), t since the trial's start",
     parameters: &[

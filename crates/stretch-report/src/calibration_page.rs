@@ -1,6 +1,6 @@
 //! The report of a calibration: its errors and its parts.
 
-use stretch_calibrate::{Calibrated, Candidate, Evaluation, MethodErrors, TrialErrors};
+use stretch_calibrate::{Calibrated, Candidate, Evaluation, MethodErrors, ModelKind, TrialErrors};
 use stretch_data::listed;
 
 use super::{
@@ -93,7 +93,16 @@ pub(crate) fn calibration_verdict(judged: &Judged<'_>) -> String {
     let short = |m: &MethodErrors| with_unit(&number(m.rmse, 3), &evaluation.unit);
     let called = |i: usize| match (methods[i].method.as_str(), names.get(i)) {
         (RAW, _) => "raw signal, laid on the reference's extremes,".to_owned(),
-        (_, Some(name)) => format!("{name} calibration"),
+        (method, Some(name)) => {
+            let kind = || method.parse::<ModelKind>().ok();
+            let remembers = kind().is_some_and(|k| matches!(k, ModelKind::Remembering { .. }));
+            match (remembers, name.split_once(" (")) {
+                (true, _) => "calibration with memory".to_owned(),
+                // which of them it is says the table
+                (false, Some((words, _))) => format!("{words} calibration"),
+                (false, None) => format!("{name} calibration"),
+            }
+        }
         (method, None) => method.to_owned(),
     };
     // beside the best one the signal itself says enough; the table has the others
@@ -126,8 +135,13 @@ fn judged(page: &mut Page, evaluation: &Evaluation, names: &[String], context: &
     ));
     let caption = "All test recordings together";
     page.table(&method_table(caption, &evaluation.pooled, names, &evaluation.unit));
-    for (kind, methods) in &context.kinds {
-        page.table(&method_table(kind, methods, names, &evaluation.unit));
+    if !context.kinds.is_empty() {
+        // on a phone each of them is four screens
+        page.folded("By kind of recording", |page| {
+            for (kind, methods) in &context.kinds {
+                page.table(&method_table(kind, methods, names, &evaluation.unit));
+            }
+        });
     }
     page.text(
         "Raw is the signal itself, its extremes laid on those of the reference, which no \

@@ -8,19 +8,21 @@ use super::{
     first_seconds::diagnosis_verdict,
     page::Page,
     subject::Subject,
+    words::in_words,
 };
 
 /// What the diagnosis names, for the top of the page: the rest stands where its part begins.
 fn headline(subject: &Subject<'_>) -> String {
-    let named: Vec<&str> = subject.implementations.iter().map(|one| one.words.as_str()).collect();
-    match named.as_slice() {
+    match subject.diagnosis.named.as_slice() {
         [] => diagnosis_verdict(subject),
-        named => format!("What the simulator lacks: {}.", listed(named)),
+        named => format!("The simulator lacks {}.", listed(named)),
     }
 }
 
 /// Both reports as one HTML file; each part has the content of its own page.
 pub fn demo_page(judged: &Judged<'_>, subject: &Subject<'_>) -> String {
+    let worded = in_words(subject.diagnosis);
+    let subject = &Subject { diagnosis: &worded, ..*subject };
     let both = format!("{} {}", calibration_verdict(judged), headline(subject));
     let mut page = Page::new(&judged.context.title, &both);
     calibration_sections(&mut page, judged);

@@ -23,13 +23,18 @@ use super::{
     subject::Subject,
     turn_figure::turn_figure,
 };
-use crate::plain::transfer_in_words;
+use crate::{
+    plain::transfer_in_words,
+    words::{effect_in_words, in_words},
+};
 
 /// Most candidates that are drawn.
 const DRAWN: usize = 6;
 
 /// The report as one HTML file.
 pub fn diagnosis_page(subject: &Subject<'_>) -> String {
+    let worded = in_words(subject.diagnosis);
+    let subject = &Subject { diagnosis: &worded, ..*subject };
     let mut page = Page::new(&diagnosis_title(subject), &diagnosis_verdict(subject));
     diagnosis_sections(&mut page, subject);
     page.finish()
@@ -288,7 +293,8 @@ fn implemented(page: &mut Page, subject: &Subject<'_>) {
          takes a sample and hands back the next one.",
     );
     for one in subject.implementations {
-        page.text(&format!("{}: {}. State: {}.", one.name, one.equation(), one.state()));
+        let words = effect_in_words(&one.name, subject.diagnosis);
+        page.text(&format!("{words} ({}): {}. State: {}.", one.name, one.equation(), one.state()));
         for language in Language::ALL {
             if let Some(code) = one.code(language) {
                 let summary = format!("{} in {}", one.name, language.name());

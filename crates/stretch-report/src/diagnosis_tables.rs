@@ -7,7 +7,7 @@ use super::{
     markup::{NONE, fixed, number, percent, with_unit},
     page::Table,
 };
-use crate::plain::methods;
+use crate::plain::{LINE, SURFACE, methods};
 
 fn interval([low, high]: [f64; 2], text: impl Fn(f64) -> String) -> String {
     format!("{} .. {}", text(low), text(high))
@@ -105,7 +105,7 @@ pub(crate) fn parameter_table(d: &Diagnosis) -> Option<Table> {
 
 /// A table of the cost of the gap for a calibration.
 pub fn transfer_table(transfer: &Transfer) -> Table {
-    let rows = [("linear", transfer.linear), ("poly13", transfer.poly13)].map(|(name, e)| {
+    let rows = [(LINE, transfer.linear), (SURFACE, transfer.poly13)].map(|(name, e)| {
         vec![name.to_owned(), number(e.real, 3), number(e.sim, 3), number(e.sim_with_effect, 3)]
     });
     Table::new(

@@ -7,6 +7,7 @@ use stretch_gap::{Diagnosis, Gross, VerdictKind};
 use super::{
     markup::{number, percent, with_unit},
     subject::Subject,
+    words::effect_in_words,
 };
 
 /// The result in one sentence.
@@ -159,7 +160,7 @@ fn cheaper(d: &Diagnosis) -> String {
     let poly13 = d.transfer.as_ref().map(|t| t.poly13);
     match poly13.filter(|e| e.sim_with_effect < 0.9 * e.sim) {
         Some(e) => format!(
-            " A poly13 calibration trained in the simulator then errs {} in place of {} of full scale.",
+            " A non-linear calibration trained in the simulator then errs {} in place of {} of full scale.",
             percent(0.01 * e.sim_with_effect),
             percent(0.01 * e.sim)
         ),
@@ -188,7 +189,7 @@ pub(crate) fn causes(subject: &Subject<'_>) -> Vec<String> {
                 format!("{} = {} \u{b1} {}", p.name, number(p.value, 3), unit_number(p.sd, &p.unit))
             })
             .collect();
-        let own = subject.implementations.iter().find(|own| own.name == *name);
+        let own = subject.implementations.iter().find(|own| effect_in_words(&own.name, d) == *name);
         let words = own.map_or(String::new(), |own| format!(": {}", own.words));
         let values =
             if values.is_empty() { String::new() } else { format!(" ({})", values.join(", ")) };

@@ -6,10 +6,14 @@ use stretch_gap::{Baselines, Transfer, TransferError};
 /// Difference of two errors, in percent of full scale, below which the errors count as equal.
 const ALIKE: f64 = 0.05;
 
+/// The calibrations that a transfer tries, `linear` and `poly13`.
+pub(crate) const LINE: &str = "linear";
+pub(crate) const SURFACE: &str = "non-linear";
+
 /// A sentence on calibrations that err more with the better simulator; `None` where no calibration does.
 pub fn transfer_in_words(transfer: &Transfer) -> Option<String> {
     let is_worse = |e: &TransferError| e.sim_with_effect > e.sim + ALIKE;
-    let kinds = [("linear", &transfer.linear), ("poly13", &transfer.poly13)];
+    let kinds = [(LINE, &transfer.linear), (SURFACE, &transfer.poly13)];
     let worse: Vec<String> =
         kinds.iter().filter(|(_, e)| is_worse(e)).map(|(name, _)| (*name).to_owned()).collect();
     (!worse.is_empty()).then(|| {
@@ -57,6 +61,6 @@ mod tests {
         };
         assert_eq!(words(error(3.0, 1.1), error(2.0, 2.01)), None);
         let said = words(error(3.0, 1.1), error(2.0, 2.2)).expect("poly13 got worse");
-        assert!(said.contains("the poly13 calibration") && !said.contains("linear"), "{said}");
+        assert!(said.contains("the non-linear calibration") && !said.contains("linear"), "{said}");
     }
 }

@@ -195,7 +195,7 @@ fn the_first_sentence_says_what_the_numbers_say() {
     assert_eq!(
         sentence(&made.page(&context("tuesday"))),
         format!(
-            "On a recording that was not used for the fit, the non-linear (poly13) calibration is \
+            "On a recording that was not used for the fit, the non-linear calibration is \
              off by {} (RMSE, {}\u{a0}% of the range); the raw signal, laid on the reference&#39;s \
              extremes, by {}.",
             deg(poly13),

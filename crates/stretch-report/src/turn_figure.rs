@@ -16,6 +16,7 @@ use super::{
     markup::labelled,
     subject::Subject,
     thin::{extent, padded},
+    words::effect_in_words,
 };
 
 /// Height of a panel, pixels.
@@ -56,7 +57,7 @@ pub(crate) fn turn_figure(subject: &Subject<'_>, stage: usize, shown: &Shown) ->
                 one.answers.iter().map(part).collect()
             };
             Turned {
-                name: named(one),
+                name: named(one, subject),
                 unit: unit(one).to_owned(),
                 at: one.fitted,
                 values: one.answers.iter().map(|answer| answer.value).collect(),
@@ -84,7 +85,7 @@ pub(crate) fn turn_figure(subject: &Subject<'_>, stage: usize, shown: &Shown) ->
             for ((one, curve), x) in responses.parameters.iter().zip(&curves).zip(&spans) {
                 let (here, below) = rest.split_vertically(px(f64::from(PANEL)));
                 rest = below;
-                draw(&here, one, curve, [x, &y])?;
+                draw(&here, (one, &named(one, subject)), curve, [x, &y])?;
             }
             Ok(())
         })
@@ -92,8 +93,13 @@ pub(crate) fn turn_figure(subject: &Subject<'_>, stage: usize, shown: &Shown) ->
     Some(figure)
 }
 
-fn draw(area: &Area<'_>, one: &Response, curve: &[(f64, f64)], [x, y]: [&Range<f64>; 2]) -> Drawn {
-    let labels = [&*labelled(&named(one), unit(one)), "left, multiples of the noise"];
+fn draw(
+    area: &Area<'_>,
+    (one, name): (&Response, &str),
+    curve: &[(f64, f64)],
+    [x, y]: [&Range<f64>; 2],
+) -> Drawn {
+    let labels = [&*labelled(name, unit(one)), "left, multiples of the noise"];
     let axes = Axes::new(x.clone(), y.clone(), labels);
     plot(area, &axes, |chart| {
         let floor = [(x.start, 1.0), (x.end, 1.0)];
@@ -124,8 +130,8 @@ fn curves(responses: &Responses) -> Vec<Vec<(f64, f64)>> {
     responses.parameters.iter().map(of).collect()
 }
 
-fn named(one: &Response) -> String {
-    format!("{}: {}", one.effect, one.name)
+fn named(one: &Response, subject: &Subject<'_>) -> String {
+    format!("{}: {}", effect_in_words(&one.effect, subject.diagnosis), one.name)
 }
 
 /// Unit of the plotted parameter; empty for a number without unit.

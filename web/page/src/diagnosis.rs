@@ -5,7 +5,7 @@ use stretch_gap::Options;
 use stretch_problem::{
     Examined, GaugeSetup, GaugeSimulator, Problem, RigSession, RigSetup, RigSimulator,
 };
-use stretch_report::{Subject, diagnosis_page};
+use stretch_report::{Subject, diagnosis_page, in_words};
 use stretch_sim::{Catalogue, GaugeRig, Rig};
 use wasm_bindgen::prelude::*;
 
@@ -42,9 +42,9 @@ pub(crate) struct Found {
 
 /// The first ten seconds of it.
 #[derive(Serialize)]
-pub(crate) struct Told<'a> {
-    sentence: &'a str,
-    notes: &'a [String],
+pub(crate) struct Told {
+    sentence: String,
+    notes: Vec<String>,
     seconds: f64,
     /// Candidates with what they close of the gap.
     candidates: Vec<(String, f64, f64)>,
@@ -62,13 +62,14 @@ impl Found {
         Ok(Self { problem, examined })
     }
 
-    pub(crate) fn told(&self) -> Told<'_> {
+    pub(crate) fn told(&self) -> Told {
+        let diagnosis = in_words(&self.examined.diagnosis);
         let one = |c: &stretch_gap::Candidate| (c.effects.join(" and "), c.probability, c.closed);
         Told {
-            sentence: &self.examined.diagnosis.sentence,
-            notes: &self.examined.diagnosis.notes,
+            candidates: diagnosis.candidates.iter().map(one).collect(),
+            sentence: diagnosis.sentence,
+            notes: diagnosis.notes,
             seconds: self.examined.diagnosis.runtime_s,
-            candidates: self.examined.diagnosis.candidates.iter().map(one).collect(),
             no_rig: self.examined.fix.as_ref().err().map(ToString::to_string),
         }
     }

@@ -86,6 +86,8 @@ pub(crate) struct Files {
     set: Option<DataSet>,
     rigs: Vec<(String, RigFile)>,
     recordings: Vec<(String, Recording)>,
+    /// Recordings that are only tested on, where no `dataset.toml` says which.
+    held: Vec<String>,
 }
 
 impl Files {
@@ -160,12 +162,23 @@ impl Files {
     pub(crate) fn session(&self) -> Result<Vec<SessionTrial>, Said> {
         let all = || self.recordings.iter();
         match &self.set {
-            None => Ok(all().map(|(_, recording)| recording.clone().into()).collect()),
+            None => Ok(all().map(|(name, recording)| self.trial(name, recording)).collect()),
             Some(set) => Recording::session_by(set, |entry| {
                 let found = all().find(|(name, _)| *name == entry.file);
                 found.map(|(_, one)| one.clone()).ok_or_else(|| missing(&entry.file))
             }),
         }
+    }
+
+    fn trial(&self, name: &String, recording: &Recording) -> SessionTrial {
+        let trial = SessionTrial::from(recording.clone());
+        let split = if self.held.contains(name) { Split::Test } else { trial.split };
+        SessionTrial { split, ..trial }
+    }
+
+    /// Keeps these recordings to test on: none of them is fitted.
+    pub(crate) fn hold(&mut self, names: Vec<String>) {
+        self.held = names;
     }
 
     /// Trials that may be fitted, or those that are only tested on.

@@ -56,6 +56,15 @@ impl Desk {
         Ok(to_json(&self.files.take(name, bytes, &asked)?)?)
     }
 
+    /// Keeps the recordings of these names, a JSON list, to test on; `dataset.toml`, where there is one, says so itself.
+    ///
+    /// # Errors
+    /// What is no list of names.
+    pub fn hold(&mut self, names: &str) -> Result<(), JsError> {
+        self.files.hold(from_json(names)?);
+        Ok(())
+    }
+
     /// Some points of two columns of a recording: time, reference and signal, flat.
     pub fn points(&self, name: &str, reference: &str, signal: &str, most: usize) -> Vec<f64> {
         self.files.points(name, [reference, signal], most)

@@ -75,24 +75,21 @@ impl Course {
 
     /// In words, with the unit of the channel.
     pub(crate) fn words(&self, unit: &str) -> String {
+        let sized = |size: f64| format!("{} {unit}", number(size)).trim_end().to_owned();
         match *self {
             Self::Swings { hertz, amplitude } => {
-                format!(
-                    "it swings at {} Hz, {} {unit} to either side",
-                    number(hertz),
-                    number(amplitude)
-                )
+                format!("it swings at {} Hz, {} to either side", number(hertz), sized(amplitude))
             }
             Self::Jumps { per_s, size } => {
                 format!(
-                    "it jumps at random, some {} times a second, by {} {unit}",
+                    "it jumps at random, some {} times a second, by {}",
                     number(per_s),
-                    number(size)
+                    sized(size)
                 )
             }
             Self::Drifts { size, correlation_s } => format!(
-                "it drifts at random by {} {unit}, and is forgotten after {} s",
-                number(size),
+                "it drifts at random by {}, and is forgotten after {} s",
+                sized(size),
                 number(correlation_s)
             ),
         }

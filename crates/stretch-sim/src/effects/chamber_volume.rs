@@ -7,6 +7,7 @@ use stretch_effects::{
 /// The chamber grows as the muscle contracts.
 pub(super) static CHAMBER_VOLUME: Effect = Effect {
     name: "chamber_volume",
+    title: "the chamber's growing volume",
     words: "the chamber's volume grows as the muscle contracts",
     stage: RigStage::Pneumatics,
     equation: "V = V0 (1 + g y (1 + bend (1 - y))), y = k/k_max, with the p dV/dt term",

@@ -7,6 +7,7 @@ use stretch_effects::{
 /// Air leaks out of the chamber.
 pub(super) static LEAK: Effect = Effect {
     name: "leak",
+    title: "the chamber's leak",
     words: "air leaks from the chamber",
     stage: RigStage::Pneumatics,
     equation: "q_leak = c p (p/620 kPa)^(power - 1), p above the atmosphere",

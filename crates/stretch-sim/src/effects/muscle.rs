@@ -9,6 +9,7 @@ use stretch_effects::{
 /// Friction in the braid: the static contraction depends on its history.
 pub(super) static MUSCLE_HYSTERESIS: Effect = Effect {
     name: "muscle_hysteresis",
+    title: "the muscle's hysteresis",
     words: "the muscle follows another path on the way back",
     stage: RigStage::Muscle,
     equation: "k_s -> k_s - h mean of (k_s - play(k_s, s {spread^2, spread, 1}))",
@@ -26,6 +27,7 @@ pub(super) static MUSCLE_HYSTERESIS: Effect = Effect {
 /// The rubber of the muscle creeps.
 pub(super) static MUSCLE_CREEP: Effect = Effect {
     name: "muscle_creep",
+    title: "the muscle's creep",
     words: "the muscle creeps on after the pressure has settled",
     stage: RigStage::Muscle,
     equation: "k_s -> k_s + c (mean of mean_rev(k_s, tau {1/spread, 1, spread}) - k_s)",
@@ -43,6 +45,7 @@ pub(super) static MUSCLE_CREEP: Effect = Effect {
 /// The crossbeam has a mass, on the spring of the muscle.
 pub(super) static CROSSBEAM_INERTIA: Effect = Effect {
     name: "crossbeam_inertia",
+    title: "the crossbeam's inertia",
     words: "the crossbeam's mass overshoots and rings",
     stage: RigStage::Muscle,
     equation: "k'' = (k_lag - k)/m^2 - (2 damping + drag |k'|) k'/m behind the lag: natural frequency 1/(2 pi m)",

@@ -7,6 +7,7 @@ use stretch_effects::{
 /// The supply gives way to the flow that is drawn from it.
 pub(super) static SUPPLY_SAG: Effect = Effect {
     name: "supply_sag",
+    title: "the supply's sag",
     words: "the supply pressure sags while air is drawn",
     stage: RigStage::Pneumatics,
     equation: "P_s -> P_s - y, y = mean_rev(r q_in, lag_s)",

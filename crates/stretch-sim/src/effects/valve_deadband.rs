@@ -7,6 +7,7 @@ use stretch_effects::{
 /// The valves stay shut up to a least command.
 pub(super) static VALVE_DEADBAND: Effect = Effect {
     name: "valve_deadband",
+    title: "the valves' dead band",
     words: "the valves stay shut at small openings",
     stage: RigStage::Pneumatics,
     equation: "u -> max(0, (u - d(u))/(1 - d(1))), d(u) = u_db (1 - exp(-u/(u_db softness))) before u_eff; conductance times 1 - exp(-u/(u_db gate)); u_db times outlet at the outlet, times 2 - outlet at the inlet",

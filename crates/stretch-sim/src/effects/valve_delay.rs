@@ -5,6 +5,7 @@ use stretch_effects::{Action, Acts, Effect, EffectParameter, Quantity, RigStage,
 /// The valves act late.
 pub(super) static VALVE_DELAY: Effect = Effect {
     name: "valve_delay",
+    title: "the valves' delay",
     words: "the valves act late",
     stage: RigStage::Pneumatics,
     equation: "u(t) -> u(t - delay_s)",

@@ -1,0 +1,42 @@
+//! Where the feature `page` is on, finds the page that was built beforehand, so that the program carries it: what `STRETCH_PAGE` names, else what
+//! web/build.sh made. A page that is named and missing is an error, for a release would lack it; where none is named, the program is built without.
+
+use std::{
+    env, fs,
+    path::{Path, PathBuf},
+};
+
+const ASKED: &str = "STRETCH_PAGE";
+
+fn main() {
+    println!("cargo::rustc-check-cfg=cfg(has_page)");
+    println!("cargo::rerun-if-changed=build.rs");
+    if env::var_os("CARGO_FEATURE_PAGE").is_none() {
+        return;
+    }
+    println!("cargo::rerun-if-env-changed={ASKED}");
+    let asked = env::var_os(ASKED).map(PathBuf::from);
+    let built = || {
+        let root = env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default();
+        Path::new(&root).join("web/target/page")
+    };
+    let at = asked.clone().unwrap_or_else(built);
+    let file =
+        if at.extension().is_some_and(|end| end == "html") { at } else { at.join("index.html") };
+    println!("cargo::rerun-if-changed={}", file.display());
+    let is_page = fs::read(&file).is_ok_and(|page| page.starts_with(b"<!DOCTYPE html>"));
+    if is_page {
+        println!("cargo::rustc-env=STRETCH_PAGE_FILE={}", file.display());
+        println!("cargo::rustc-cfg=has_page");
+    } else if asked.is_some() {
+        println!(
+            "cargo::error={ASKED}: {}: there is no page; web/build.sh makes one",
+            file.display()
+        );
+    } else {
+        println!(
+            "cargo::warning=the program will carry no page: there is no {}; web/build.sh makes one",
+            file.display()
+        );
+    }
+}

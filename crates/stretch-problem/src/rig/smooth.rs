@@ -8,8 +8,11 @@ use crate::bench::kept::Kept;
 
 /// Widest half-width, in samples.
 const WIDEST: usize = 15;
-/// Narrowest half-width.
+/// Narrowest half-width, in samples.
 const NARROWEST: usize = 2;
+/// Longest time that the widest and the narrowest half-width may take, s: fewer samples where the rate is low, for what a valve does is as
+/// quick there. A window of less than [`NARROWEST`] samples on either side is none.
+const LONGEST_S: [f64; 2] = [0.15, 0.02];
 /// Greatest half-width of a window, a share of the time since the last command without [`WAKE_S`].
 const SHARE: f64 = 0.125;
 /// Time for which the response to a command lasts at least, s.
@@ -55,6 +58,9 @@ fn parabola(record: &[f64], i: usize, h: usize) -> (f64, f64) {
 /// Half-widths that the commands allow: narrow behind a change of the commands, wider with the time since that change, never beyond the
 /// next change. A signal with corners (`sharp`) is not smoothed across a change at all.
 pub(crate) fn schedule(inlet: &[f64], outlet: &[f64], dt_s: f64, sharp: bool) -> Vec<u8> {
+    // Rounding must not take a sample from a whole number of them.
+    let [widest, narrowest] = LONGEST_S.map(|time_s| (time_s / dt_s + 1e-6) as usize);
+    let (widest, narrowest) = (WIDEST.min(widest), NARROWEST.min(narrowest));
     let changes = |i: usize| i > 0 && (inlet[i] != inlet[i - 1] || outlet[i] != outlet[i - 1]);
     let mut halves = vec![0_u8; inlet.len()];
     // A trial begins at rest: the last change of the commands was long before.
@@ -62,16 +68,16 @@ pub(crate) fn schedule(inlet: &[f64], outlet: &[f64], dt_s: f64, sharp: bool) ->
     for (i, half) in halves.iter_mut().enumerate() {
         since = if changes(i) { 0 } else { since + 1 };
         let reach = SHARE * (since as f64 - WAKE_S / dt_s);
-        *half = (reach.max(0.0) as usize).clamp(NARROWEST, WIDEST) as u8;
+        *half = (reach.max(0.0) as usize).clamp(narrowest, widest) as u8;
         if sharp {
-            *half = (*half).min(since.min(WIDEST) as u8);
+            *half = (*half).min(since.min(widest) as u8);
         }
     }
-    let least = if sharp { 0 } else { NARROWEST };
-    let mut until = WIDEST;
+    let least = if sharp { 0 } else { narrowest };
+    let mut until = widest;
     for i in (0..halves.len()).rev() {
         halves[i] = halves[i].min(until.max(least) as u8);
-        until = if changes(i) { 0 } else { (until + 1).min(WIDEST) };
+        until = if changes(i) { 0 } else { (until + 1).min(widest) };
     }
     halves
 }
@@ -195,5 +201,10 @@ mod tests {
         assert_eq!(usize::from(halves[130]), WIDEST.min(20));
         assert!(halves[145..165].iter().all(|h| *h <= 5));
         assert_eq!(usize::from(halves[299]), WIDEST);
+        // Half the rate: as long in time, and behind a command no window is short enough.
+        let slower: Vec<f64> = inlet.iter().step_by(2).copied().collect();
+        let halves = schedule(&slower, &[0.0; 150], 0.02, false);
+        assert!(halves[74..78].iter().all(|h| usize::from(*h) < NARROWEST), "{halves:?}");
+        assert_eq!(usize::from(halves[149]), WIDEST / 2);
     }
 }

@@ -19,27 +19,37 @@ pub struct Swing {
     pub damping: f64,
     /// Damping that grows with the speed, as a fluid's does: m y'' loses drag |y'| y', s over the signal's unit.
     pub drag: f64,
+    /// Dry friction, as a guide's: how far off its rest the mass may stand, in the signal's unit.
+    pub dry: f64,
 }
 
-/// A damped second-order oscillator driven at its foot: m^2 y'' = x - y - 2 damping m y' - drag m |y'| y', without drag exact for an input
-/// that is linear between nodes; drag acts for half a step before and after the rest (Strang, doi 10.1137/0705041). Remembers position, velocity and the last input.
+/// A damped second-order oscillator driven at its foot: m^2 y'' = x - y - 2 damping m y' - drag m |y'| y' - dry y'/(|y'| + 0.3 dry/m), without drag
+/// and dry friction exact for an input that is linear between nodes; these two act for half a step before and after the rest (Strang, doi
+/// 10.1137/0705041). Friction that were dry at any speed would be no function that can be fitted: below a third of the speed at which the spring
+/// lets the mass go, dry/m, it gives way as a fluid does. Remembers position, velocity and the last input.
 ///
 /// ```
 /// use stretch_effects::{Grid, Operator, Oscillator, Span, Start, Swing};
 /// let grid = Grid::samples(0.001)?;
-/// let beam = Oscillator::new(Swing { m: 0.02, damping: 0.25, drag: 0.0 }, &grid);
+/// let beam = Oscillator::new(Swing { m: 0.02, damping: 0.25, drag: 0.0, dry: 0.0 }, &grid);
 /// let (mut cells, mut signal) = ([0.0; 3], vec![1.0; 2000]);
 /// beam.begin(Start::Settled, 0.0, &mut cells);
 /// beam.run(&Span::whole(&grid), &mut cells, &mut signal);
 /// // A step overshoots by exp(-pi damping/sqrt(1 - damping^2)) = 44 %, then settles.
 /// let top = signal.iter().copied().fold(0.0, f64::max);
 /// assert!((top - 1.444).abs() < 2e-3 && (signal[1999] - 1.0).abs() < 1e-6);
+/// // Dry friction takes the overshoot.
+/// let rubbing = Oscillator::new(Swing { m: 0.02, damping: 0.25, drag: 0.0, dry: 0.2 }, &grid);
+/// let (mut cells, mut signal) = ([0.0; 3], vec![1.0; 2000]);
+/// rubbing.begin(Start::Settled, 0.0, &mut cells);
+/// rubbing.run(&Span::whole(&grid), &mut cells, &mut signal);
+/// assert!(signal.iter().copied().fold(0.0, f64::max) < 1.2 && (signal[1999] - 1.0).abs() < 0.01);
 /// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Oscillator {
     swing: Swing,
-    /// Parts of a step: drag asks for more than one.
+    /// Parts of a step: drag and dry friction ask for more than one.
     parts: usize,
     /// For each piece of time: the length of a part, and how position and velocity about the steady response go on.
     steps: Vec<(f64, [f64; 4])>,
@@ -56,7 +66,7 @@ impl Oscillator {
             let turn = [cos + damping / m * sin, sin, -sin / (m * m), cos - damping / m * sin];
             (h, turn.map(|x| decay * x))
         };
-        let parts = if swing.drag == 0.0 { 1 } else { PARTS };
+        let parts = if swing.drag == 0.0 && swing.dry == 0.0 { 1 } else { PARTS };
         let steps = grid.steps().iter().map(|&h| one(h / parts as f64)).collect();
         Self { swing, parts, steps }
     }
@@ -78,22 +88,26 @@ impl Operator for Oscillator {
     }
 
     fn run(&self, span: &Span<'_>, cells: &mut [f64], signal: &mut [f64]) {
-        let Swing { m, damping, drag } = self.swing;
+        let Swing { m, damping, drag, dry } = self.swing;
         let [mut y, mut velocity, mut last] = [cells[0], cells[1], cells[2]];
         span.each(signal.len(), |step, i| {
             let x = signal[i];
             if let Some(step) = step {
                 let (h, [a, b, c, d]) = self.steps[step];
-                let (rise, half) = ((x - last) / self.parts as f64, 0.5 * drag * h / m);
+                let rise = (x - last) / self.parts as f64;
+                let slowed = Slowed {
+                    drag: 0.5 * drag * h / m,
+                    dry: 0.5 * dry * h / (m * m),
+                    slow: SLOW * dry / m,
+                };
                 let slope = rise / h;
                 // The steady response to a ramp trails it by 2 damping m slope.
                 let trail = 2.0 * damping * m * slope;
                 for part in 0..self.parts {
                     let from = last + part as f64 * rise;
-                    let position = y - (from - trail);
-                    let relative = dragged(velocity, half) - slope;
+                    let (position, relative) = (y - (from - trail), slowed.speed(velocity) - slope);
                     y = from + rise - trail + (a * position + b * relative);
-                    velocity = dragged(slope + (c * position + d * relative), half);
+                    velocity = slowed.speed(slope + (c * position + d * relative));
                 }
             }
             last = x;
@@ -103,23 +117,43 @@ impl Operator for Oscillator {
     }
 }
 
-/// Parts of a step where there is drag.
+/// Parts of a step where there is drag or dry friction.
 const PARTS: usize = 2;
 
-/// What drag leaves of a speed after a time: v' = -k |v| v is v/(1 + k |v| t), `kt` both together.
-fn dragged(speed: f64, kt: f64) -> f64 {
-    // Without drag the same bits.
-    if kt == 0.0 { speed } else { speed / (1.0 + kt * speed.abs()) }
+/// What drag and dry friction take of a speed in a while.
+struct Slowed {
+    /// v' = -k |v| v is v/(1 + k |v| t): k t.
+    drag: f64,
+    /// v' = -f v/(|v| + slow) is v/(1 + f t/(|v| + slow)), the speed in the ratio that of the beginning: f t.
+    dry: f64,
+    slow: f64,
 }
+
+impl Slowed {
+    fn speed(&self, speed: f64) -> f64 {
+        // Without both the same bits.
+        let dragged =
+            if self.drag == 0.0 { speed } else { speed / (1.0 + self.drag * speed.abs()) };
+        match self.dry {
+            0.0 => dragged,
+            dry => dragged / (1.0 + dry / (dragged.abs() + self.slow)),
+        }
+    }
+}
+
+/// Greatest dry friction that is looked for, a share of the signal's span.
+const DRY: f64 = 0.1;
+/// Speed below which dry friction gives way, a share of dry/m.
+const SLOW: f64 = 0.3;
 
 /// A mass on a spring.
 pub static SECOND_ORDER_LAG: Kind = Kind {
     name: "second_order_lag",
     title: "a second-order lag",
     words: "it follows like a mass on a spring",
-    equation: "m_s^2 y'' = x - y - 2 damping m_s y' - drag m_s |y'| y'",
+    equation: "m_s^2 y'' = x - y - 2 damping m_s y' - drag m_s |y'| y' - dry y'/(|y'| + 0.3 dry/m_s)",
     usual: &[Side::Output],
-    parameters: |e, _| {
+    parameters: |e, unit| {
         vec![
             EffectParameter::sized("m_s", "s", 0.0..=e.late_s()),
             EffectParameter::formed("damping", "1", 0.02..=0.95, 0.3).log(),
@@ -130,21 +164,25 @@ pub static SECOND_ORDER_LAG: Kind = Kind {
                 0.0..=2.0 / e.quickest.max(f64::MIN_POSITIVE),
                 0.0,
             ),
+            EffectParameter::formed("dry", unit, 0.0..=DRY * e.span(), 0.0),
         ]
     },
-    starts: Some(|e| [0.03, 0.12, 0.4].map(|k| vec![k * e.late_s(), 0.3, 0.0]).into()),
+    starts: Some(|e| [0.03, 0.12, 0.4].map(|k| vec![k * e.late_s(), 0.3, 0.0, 0.0]).into()),
     operator: |v, _, grid| {
-        Box::new(Oscillator::new(Swing { m: v[0].max(1e-9), damping: v[1], drag: v[2] }, grid))
+        let swing = Swing { m: v[0].max(1e-9), damping: v[1], drag: v[2], dry: v[3] };
+        Box::new(Oscillator::new(swing, grid))
     },
     sketch: Some(|v, _, signals| {
-        // Two parts of a step, as where there is drag.
+        // Two parts of a step, as where there is drag or dry friction.
         let part = |from: &str, to: &str, k: usize| {
             format!(
-                "let p{k} = s.at - {from} + trail
-            let q{k} = s.speed / (1 + half * abs(s.speed)) - slope
+                "let d{k} = s.speed / (1 + half * abs(s.speed))
+            let p{k} = s.at - {from} + trail
+            let q{k} = d{k} / (1 + rub / (abs(d{k}) + slow)) - slope
             s.at = {to} - trail + (cs + DAMPING / M * sn) * p{k} + sn * q{k}
             let v{k} = slope - sn / (M * M) * p{k} + (cs - DAMPING / M * sn) * q{k}
-            s.speed = v{k} / (1 + half * abs(v{k}))"
+            let e{k} = v{k} / (1 + half * abs(v{k}))
+            s.speed = e{k} / (1 + rub / (abs(e{k}) + slow))"
             )
         };
         let body = format!(
@@ -155,6 +193,8 @@ pub static SECOND_ORDER_LAG: Kind = Kind {
             let slope = (x - s.last) / DT
             let trail = 2 * DAMPING * M * slope
             let half = DRAG * h / (2 * M)
+            let rub = DRY * h / (2 * M * M)
+            let slow = 0.3 * DRY / M + 1e-300
             let middle = (s.last + x) / 2
             {}
             {}
@@ -172,6 +212,7 @@ pub static SECOND_ORDER_LAG: Kind = Kind {
             ("M", v[0], "s"),
             ("DAMPING", v[1], "1"),
             ("DRAG", v[2], "s"),
+            ("DRY", v[3], &*signals.x.unit),
             ("DT", signals.dt_s, "s"),
         ];
         sketch.cells(["speed"], unit, "0").with_all(&numbers)

@@ -6,6 +6,7 @@ use crate::{
     evidence::{
         candidates::{Candidate, beside_unknown, candidates, posterior, shifts, stage_gaps},
         detection_limit::{Asked, DetectionLimit, detection_limits},
+        function::function,
         gathered::Evidence,
         localise::{self, causes::with_causes, location::Where},
         null_band::null_band,
@@ -16,6 +17,7 @@ use crate::{
         stability::{EffectStability, stabilities},
     },
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
+    missing::{Proposed, propose},
     numerics::stopwatch::Stopwatch,
     options::Options,
     problem::{
@@ -275,6 +277,8 @@ struct Gathered {
     stabilities: Vec<EffectStability>,
     sanity: Sanity,
     location: Where,
+    /// What the catalogue lacks, where that was asked for already.
+    proposed: Option<Proposed>,
     /// Why the record carries no name, where it does not.
     too_little: Option<TooLittle>,
 }
@@ -287,7 +291,14 @@ fn gather(task: Task<'_>, cause: Cause<'_>, null_band: f64) -> Result<Gathered, 
     let mut evidence = Evidence::gather(problem, found)?;
     let all = hypotheses(&found.best, &found.rivals, eliminated, &problem.nominal);
     let held = candidates(problem, &evidence, &all, seed)?;
-    let (posterior, held) = posterior(problem, thresholds, (&mut evidence, null_band), all, held);
+    let mut proposal = None;
+    let lacks = |evidence: &Evidence| {
+        (task.progress)("what the catalogue lacks");
+        proposal = unless_spent(propose(problem, &problem.nominal))?.flatten();
+        Ok(proposal.as_ref().and_then(|proposal| function(problem, evidence, proposal)))
+    };
+    let (posterior, held) =
+        posterior(problem, thresholds, (&mut evidence, null_band), (all, held), lacks)?;
     let (candidates, blocks): (Vec<Candidate>, Vec<_>) = held.into_iter().unzip();
     let stabilities =
         stabilities(problem, thresholds, &evidence, (&posterior, &blocks), (null_band, seed));
@@ -310,6 +321,7 @@ fn gather(task: Task<'_>, cause: Cause<'_>, null_band: f64) -> Result<Gathered, 
         stabilities,
         sanity,
         location,
+        proposed: proposal.map(|proposal| proposal.told),
         too_little,
     })
 }
@@ -329,7 +341,8 @@ fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Result<Judge
     };
     let best = &cause.found.best;
     let lacking = |names| {
-        let found = lacking(cause.problem, best, names, task.progress);
+        let found =
+            lacking(cause.problem, best, (names, gathered.proposed.as_ref()), task.progress);
         Ok(unless_spent(found)?.flatten())
     };
     judge(&case, &task.options.thresholds, lacking)
@@ -360,7 +373,8 @@ fn report(
         false => covering_set(&posterior.sets, simulator),
     };
     let (runtime_s, simulations) = (begun.elapsed_s(), runs.count());
-    let candidates = beside_unknown(candidates, evidence.gap, posterior.unknown);
+    let candidates =
+        beside_unknown(candidates, evidence.gap, (posterior.unknown, posterior.function));
     let answer = Answer {
         judged: &judged,
         gap: evidence.gap,

@@ -17,7 +17,7 @@ use crate::{
         excess::Excess,
         gathered::{Blocks, Evidence, StageEvidence},
         localise::location::StageGap,
-        probability::{Gap, Posterior, Standing, Weighed, weigh},
+        probability::{Function, Gap, Posterior, Standing, Weighed, allowed, weigh},
     },
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
     problem::{error::GapError, simulator::Simulator, thresholds::Thresholds},
@@ -120,14 +120,15 @@ pub(crate) fn candidates(
 pub(crate) const LEAST_CLOSED: f64 = 0.3;
 
 /// Weighs hypotheses with what they leave; their candidates and blocks are put into the same order. A set of effects that closes less than
-/// [`LEAST_CLOSED`] of the gap is dropped.
+/// [`LEAST_CLOSED`] of the gap is dropped. Where every set leaves more than noise and model discrepancy would, `function` is asked for what the
+/// catalogue lacks.
 pub(crate) fn posterior(
     problem: &PreparedProblem<'_>,
     thresholds: &Thresholds,
     (evidence, null_band): (&mut Evidence, f64),
-    hypotheses: Vec<Hypothesis>,
-    candidates: Vec<(Candidate, Vec<Blocks>)>,
-) -> (Posterior, Vec<(Candidate, Vec<Blocks>)>) {
+    (hypotheses, candidates): (Vec<Hypothesis>, Vec<(Candidate, Vec<Blocks>)>),
+    function: impl FnOnce(&Evidence) -> Result<Option<Function>, GapError>,
+) -> Result<(Posterior, Vec<(Candidate, Vec<Blocks>)>), GapError> {
     let (mut kept, mut by_effects) = (Vec::new(), BTreeMap::new());
     for (hypothesis, (candidate, blocks)) in hypotheses.into_iter().zip(candidates) {
         let left = evidence.fitted_gap(problem, &hypothesis).max(candidate.gap_after);
@@ -141,7 +142,11 @@ pub(crate) fn posterior(
             kept.push((hypothesis, Standing { score, left, is_at_bound, is_nothing }));
         }
     }
-    let posterior = weigh(thresholds, Gap { retuned: evidence.gap.retuned, null_band }, kept);
+    let retuned = evidence.gap.retuned;
+    let mut sets = kept.iter().filter(|(_, s)| !s.is_nothing).map(|(_, s)| s.left).peekable();
+    let is_left = sets.peek().is_some() && sets.all(|l| l > allowed(retuned, l, thresholds));
+    let function = if is_left { function(evidence)? } else { None };
+    let posterior = weigh(thresholds, Gap { retuned, null_band }, kept, function);
     let of = |w: &Weighed| {
         let (candidate, blocks) = by_effects.remove(&w.hypothesis.effects)?;
         let Standing { left, is_at_bound: at_bound, .. } = w.standing;
@@ -151,7 +156,7 @@ pub(crate) fn posterior(
     evidence.candidates = posterior.sets.iter().map(|w| w.hypothesis.model.clone()).collect();
     let sds = posterior.sets.iter().map(|w| w.hypothesis.parameter_sd.clone());
     evidence.candidate_sds = sds.collect();
-    (posterior, candidates)
+    Ok((posterior, candidates))
 }
 
 fn candidate(
@@ -189,19 +194,21 @@ fn candidate(
     Ok((candidate, blocks))
 }
 
-/// The candidates with what the catalogue lacks behind them.
+/// The candidates with what the catalogue lacks behind them, which has the score of a function and leaves what that leaves, where there is one.
 pub(crate) fn beside_unknown(
     mut candidates: Vec<Candidate>,
     gap: Excess,
-    probability: f64,
+    (probability, function): (f64, Option<Function>),
 ) -> Vec<Candidate> {
+    let nothing = Function { score: 0.0, left: gap.retuned };
+    let Function { score, left } = function.unwrap_or(nothing);
     candidates.push(Candidate {
         effects: vec![UNKNOWN.into()],
         probability,
-        score: 0.0,
+        score,
         gap_before: gap.retuned,
         gap_after: gap.retuned,
-        left: gap.retuned,
+        left,
         at_bound: false,
         closed: 0.0,
         closed_ci: [0.0; 2],
@@ -292,7 +299,7 @@ mod tests {
     use testkit::tolerance::F64_ROUNDING;
 
     fn candidate(effect: &str, probability: f64) -> Candidate {
-        let mut unknown = beside_unknown(Vec::new(), Excess::default(), probability);
+        let mut unknown = beside_unknown(Vec::new(), Excess::default(), (probability, None));
         let candidate = unknown.remove(0);
         Candidate { effects: vec![effect.into()], ..candidate }
     }
@@ -335,7 +342,7 @@ mod tests {
     #[test]
     fn unknown_stands_last() {
         let gap = Excess { raw: 9.0, retuned: 4.0, left: 1.0 };
-        let all = beside_unknown(vec![candidate("a", 0.7), candidate("b", 0.2)], gap, 0.1);
+        let all = beside_unknown(vec![candidate("a", 0.7), candidate("b", 0.2)], gap, (0.1, None));
         let last = &all[2];
         assert_eq!((last.effects.as_slice(), last.probability), (&["unknown".to_owned()][..], 0.1));
         assert_eq!((last.gap_before, last.gap_after, last.closed), (4.0, 4.0, 0.0));

@@ -8,8 +8,11 @@
 //! ```text
 //! w_h = exp(S_h/t) D_h,     D_h = 1/(1 + o_h),     o_h = o (g_h/(u + v c_h))^(1/s),     c_h = max(g_retuned - g_h, 0)
 //! o_nothing = o r exp((r^2 - 1)/2),     r = g_retuned/sqrt(u^2 + b^2)
-//! w_unknown = sum over h of exp(S_h/t) (1 - D_h),     t = T + rho g_best/g_retuned
+//! w_unknown = sum over h of exp(S_h/t) (1 - D_h) + o exp(S_f/t) D_f,     t = T + rho g_best/g_retuned
 //! ```
+//!
+//! f is a hypothesis of its own beside the catalogue: a [function](crate::evidence::function) of what was recorded, where no set leaves as little as
+//! noise and discrepancy would. It pays for its parameters and for the choice of its terms; o are the odds of what the catalogue lacks before the data.
 //!
 //! and probabilities are these weights as shares of their sum. The temperature t tempers the posterior (Grunwald and van Ommen 2017, doi
 //! 10.1214/17-BA1085): the more of the gap the best set leaves, the less its form is the rig's, and the less a difference of scores says. T, rho,
@@ -38,6 +41,15 @@ pub(crate) struct Standing {
     pub(crate) is_nothing: bool,
 }
 
+/// A function of what was recorded, which the catalogue lacks, as the sum needs it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Function {
+    /// Score against the re-tuned nominal, nats.
+    pub(crate) score: f64,
+    /// Excess that it leaves: of the fitted and the test trials the greater.
+    pub(crate) left: f64,
+}
+
 /// The gap that is to be explained.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Gap {
@@ -62,6 +74,8 @@ pub(crate) struct Posterior {
     pub(crate) sets: Vec<Weighed>,
     /// Probability that it is something that the catalogue lacks.
     pub(crate) unknown: f64,
+    /// What it would be, where that was asked.
+    pub(crate) function: Option<Function>,
 }
 
 /// The hypotheses that are weighed: the best set, those in which a rival stands in the place of one of its effects, those without its weakest
@@ -96,13 +110,20 @@ pub(crate) fn probabilities(
     thresholds: &Thresholds,
     gap: Gap,
     hypotheses: &[Standing],
+    function: Option<Function>,
 ) -> (Vec<f64>, f64) {
     let retuned = gap.retuned;
-    let best = hypotheses.iter().max_by(|a, b| a.score.total_cmp(&b.score));
-    let (top, left) = best.map_or((0.0, retuned), |best| (best.score, best.left));
+    let all = hypotheses.iter().map(|h| (h.score, h.left));
+    let all = all.chain(function.map(|f| (f.score, f.left)));
+    let best = all.max_by(|a, b| a.0.total_cmp(&b.0));
+    let (top, left) = best.unwrap_or((0.0, retuned));
     let share = left / retuned.max(thresholds.null_excess);
     let temperature = thresholds.temperature + thresholds.rho * share;
-    let mut unknown = 0.0;
+    let of_function = |f: Function| {
+        let stands = 1.0 / (1.0 + odds_of_else(retuned, f.left, thresholds));
+        thresholds.unknown_odds * ((f.score - top) / temperature).exp() * stands
+    };
+    let mut unknown = function.map_or(0.0, of_function);
     let mut all = Vec::with_capacity(hypotheses.len());
     for h in hypotheses {
         let tempered = ((h.score - top) / temperature).exp();
@@ -144,9 +165,10 @@ pub(crate) fn weigh(
     thresholds: &Thresholds,
     gap: Gap,
     hypotheses: Vec<(Hypothesis, Standing)>,
+    function: Option<Function>,
 ) -> Posterior {
     let standings: Vec<Standing> = hypotheses.iter().map(|(_, standing)| *standing).collect();
-    let (all, unknown) = probabilities(thresholds, gap, &standings);
+    let (all, unknown) = probabilities(thresholds, gap, &standings, function);
     let weighed = hypotheses.into_iter().zip(all);
     let mut sets: Vec<Weighed> = weighed
         .map(|((hypothesis, standing), probability)| Weighed { hypothesis, standing, probability })
@@ -156,7 +178,7 @@ pub(crate) fn weigh(
     sets.sort_by(|a, b| {
         is_nothing(a).cmp(&is_nothing(b)).then(b.probability.total_cmp(&a.probability))
     });
-    Posterior { sets, unknown }
+    Posterior { sets, unknown, function }
 }
 
 /// Excess that noise and model discrepancy may leave of a gap: u + v c of the module's head.
@@ -244,7 +266,8 @@ mod tests {
     /// A gap of ten times the noise's variance; sets of one effect with these scores and what each leaves.
     fn posterior(sets: &[(f64, f64)]) -> Posterior {
         let one = |(i, (score, left)): (usize, &(f64, f64))| fitted(&[i], *score, *left);
-        weigh(&Thresholds::frozen(), of_size(10.0), sets.iter().enumerate().map(one).collect())
+        let sets = sets.iter().enumerate().map(one).collect();
+        weigh(&Thresholds::frozen(), of_size(10.0), sets, None)
     }
 
     fn sum(posterior: &Posterior) -> f64 {
@@ -295,7 +318,7 @@ mod tests {
         let of = |is_at_bound, left| {
             let (hypothesis, standing) = fitted(&[0], 100.0, left);
             let set = (hypothesis, Standing { is_at_bound, ..standing });
-            weigh(&Thresholds::frozen(), of_size(10.0), vec![set]).unknown
+            weigh(&Thresholds::frozen(), of_size(10.0), vec![set], None).unknown
         };
         for left in [0.01, 0.5, 4.0] {
             let odds = [false, true].map(|bound| of(bound, left)).map(|p| p / (1.0 - p));
@@ -307,7 +330,7 @@ mod tests {
     #[test]
     fn nothing_does_not_explain_a_large_gap() {
         let of = |retuned: f64| {
-            weigh(&Thresholds::frozen(), of_size(retuned), vec![fitted(&[], 0.0, retuned)])
+            weigh(&Thresholds::frozen(), of_size(retuned), vec![fitted(&[], 0.0, retuned)], None)
         };
         assert!(of(757.0).nothing() < 0.01, "{:?}", of(757.0));
         assert!(of(0.02).nothing() > 0.9, "{:?}", of(0.02));
@@ -317,8 +340,21 @@ mod tests {
         assert!(of(0.2).unknown > 0.5, "{:?}", of(0.2));
         // The same where chance alone leaves as much.
         let chance = Gap { retuned: 0.2, null_band: 0.3 };
-        let short = weigh(&Thresholds::frozen(), chance, vec![fitted(&[], 0.0, 0.2)]);
+        let short = weigh(&Thresholds::frozen(), chance, vec![fitted(&[], 0.0, 0.2)], None);
         assert!(short.nothing() > 0.8, "{short:?}");
+    }
+
+    /// A function that explains what no set does is something that the catalogue lacks; one that explains less changes hardly anything.
+    #[test]
+    fn a_function_that_leaves_less_stands_beside_the_catalogue() {
+        let of = |function| {
+            weigh(&Thresholds::frozen(), of_size(10.0), vec![fitted(&[0], 300.0, 3.0)], function)
+        };
+        let alone = of(None);
+        assert!(alone.effects() > 0.5, "{alone:?}");
+        let [worse, better] = [(-200.0, 9.0), (900.0, 0.1)]
+            .map(|(score, left)| of(Some(Function { score, left })).unknown);
+        assert!((worse - alone.unknown).abs() < 0.01 && better > 0.99, "{worse} {better}");
     }
 
     #[test]
@@ -337,7 +373,7 @@ mod tests {
         assert!(far.sets.iter().all(|w| w.probability.is_finite()));
         assert_eq!(far.sets[1].probability, 0.0);
         // Where there is no gap at all the least one that counts stands in the share.
-        let none = weigh(&Thresholds::frozen(), of_size(0.0), vec![fitted(&[0], 0.0, 0.0)]);
+        let none = weigh(&Thresholds::frozen(), of_size(0.0), vec![fitted(&[0], 0.0, 0.0)], None);
         assert!(none.sets.iter().all(|w| w.probability.is_finite()) && none.unknown.is_finite());
     }
 

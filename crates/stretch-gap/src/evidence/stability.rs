@@ -117,7 +117,7 @@ pub(crate) fn stabilities(
         };
         let standings: Vec<Standing> = posterior.sets.iter().zip(blocks).map(again).collect();
         let gap = Gap { retuned: retuned.gap(problem, evidence), null_band };
-        let (weights, _) = probabilities(thresholds, gap, &standings);
+        let (weights, _) = probabilities(thresholds, gap, &standings, posterior.function);
         let even = most_probable(&weights);
         let share = 1.0 / even.len().max(1) as f64;
         for effect in even.iter().flat_map(|&i| &posterior.sets[i].hypothesis.effects) {

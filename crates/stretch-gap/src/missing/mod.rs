@@ -24,6 +24,6 @@ mod term_inputs;
 mod tests;
 
 pub use course::Course;
-pub(crate) use propose::propose;
+pub(crate) use propose::{Proposal, propose};
 pub use proposed::{Proposed, ProposedTerm, SignalScale};
 pub use term::{Factor, Passage, RateForm, Term};

@@ -9,7 +9,7 @@ use crate::missing::{
     term::Term,
 };
 use crate::{
-    fit::{hypothesis::Hypothesis, metric::Column, prepared::PreparedProblem},
+    fit::{hypothesis::Hypothesis, metric::Column, prepared::PreparedProblem, score::Misfit},
     problem::{
         error::GapError,
         sample_roles::{Role, SampleRoles},
@@ -30,13 +30,24 @@ struct Estimated {
     left: Column,
 }
 
+/// A sum of terms in the place of what is missing.
+pub(crate) struct Proposal {
+    pub(crate) told: Proposed,
+    /// The stage that it acts in.
+    pub(crate) stage: usize,
+    /// Misfits of all stages with it.
+    pub(crate) misfits: Vec<Misfit>,
+    /// Terms that were to choose from.
+    pub(crate) library: usize,
+}
+
 /// Proposes what is missing where most of a hypothesis's gap sits; none where no stage has one.
 ///
 /// Everything is chosen and fitted without the test trials; they are read at the end, for the share that is reported.
 pub(crate) fn propose(
     problem: &PreparedProblem<'_>,
     base: &Hypothesis,
-) -> Result<Option<Proposed>, GapError> {
+) -> Result<Option<Proposal>, GapError> {
     let simulator = problem.simulator();
     let stages = 0..simulator.stages().len();
     let largest = stages
@@ -54,7 +65,11 @@ pub(crate) fn propose(
         true => tested(&residue, &sum.terms, &estimated)?,
         false => 0.0,
     };
-    Ok(Some(proposed(&residue, &sum, &estimated, &weighed, closes_test)))
+    let mut misfits = base.misfits.clone();
+    let misfit = |residual| problem.compare.misfit(stage, residual);
+    misfits[stage] = misfits[stage].moved(&misfit(&residue.residual), &misfit(&estimated.left));
+    let told = proposed(&residue, &sum, &estimated, &weighed, closes_test);
+    Ok(Some(Proposal { told, stage, misfits, library: sum.library }))
 }
 
 /// What the samples held out say of a sum.

@@ -8,7 +8,7 @@ use crate::{
         detection_limit::DetectionLimit,
         excess::Excess,
         localise::location::Where,
-        probability::{Gap, Standing, probabilities},
+        probability::{Function, Gap, Standing, probabilities},
         shares::EffectShare,
         stability::EffectStability,
     },
@@ -181,14 +181,17 @@ impl Diagnosis {
     /// }
     /// ```
     pub fn probabilities(&self, thresholds: &Thresholds) -> Vec<f64> {
-        let Some((_, sets)) = self.candidates.split_last() else { return Vec::new() };
+        let Some((lacking, sets)) = self.candidates.split_last() else { return Vec::new() };
+        // Where no function was asked for, what the catalogue lacks has no score.
+        let of = |lacking: &Candidate| Function { score: lacking.score, left: lacking.left };
+        let function = Some(of(lacking)).filter(|f| f.score != 0.0);
         let standing = |c: &Candidate| {
             let Candidate { score, left, at_bound, .. } = *c;
             Standing { score, left, is_at_bound: at_bound, is_nothing: c.effects.is_empty() }
         };
         let standings: Vec<Standing> = sets.iter().map(standing).collect();
         let gap = Gap { retuned: self.gap.retuned, null_band: self.null_band };
-        let (mut all, unknown) = probabilities(thresholds, gap, &standings);
+        let (mut all, unknown) = probabilities(thresholds, gap, &standings, function);
         all.push(unknown);
         all
     }

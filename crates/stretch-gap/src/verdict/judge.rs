@@ -169,7 +169,11 @@ mod tests {
             standing: Standing { score: 0.0, left, is_at_bound: false, is_nothing: false },
             probability,
         };
-        Posterior { sets: vec![set(&[0], left, play), set(&[], 10.0, nothing)], unknown }
+        Posterior {
+            sets: vec![set(&[0], left, play), set(&[], 10.0, nothing)],
+            unknown,
+            function: None,
+        }
     }
 
     /// The verdict on a gap as shipped, re-tuned and left.

@@ -48,11 +48,12 @@ pub(super) static CROSSBEAM_INERTIA: Effect = Effect {
     title: "the crossbeam's inertia",
     words: "the crossbeam's mass overshoots and rings",
     stage: RigStage::Muscle,
-    equation: "k'' = (k_lag - k)/m^2 - (2 damping + drag |k'|) k'/m behind the lag: natural frequency 1/(2 pi m)",
+    equation: "k'' = (k_lag - k - dry k'/(|k'| + 0.3 dry/m))/m^2 - (2 damping + drag |k'|) k'/m behind the lag: natural frequency 1/(2 pi m)",
     parameters: &[
         EffectParameter::strength("m", "s", 0.0, 0.08, 0.02),
         EffectParameter::form("damping", "1", 0.1, 0.6, Form { neutral: 0.25, usual: 0.25 }),
         EffectParameter::form("drag", "s", 0.0, 1.25, Form { neutral: 0.0, usual: 0.1 }),
+        EffectParameter::form("dry", "strain", 0.0, 0.008, Form { neutral: 0.0, usual: 0.0003 }),
     ],
     acts: Acts::at(&SECOND_ORDER_LAG, Place::MovingContraction),
     twins: &["valve_delay"],

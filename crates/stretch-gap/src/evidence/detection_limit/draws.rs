@@ -175,7 +175,7 @@ impl<'a> Record<'a> {
         let nothing = Standing { score: 0.0, left: retuned, is_at_bound: false, is_nothing: true };
         standings.push(nothing);
         let gap = Gap { retuned, null_band: self.asked.null_band };
-        let (weights, unknown) = probabilities(thresholds, gap, &standings);
+        let (weights, unknown) = probabilities(thresholds, gap, &standings, None);
         let (sets, nothing) = weights.split_at(weighed.len());
         if !names([sets.iter().sum(), nothing[0], unknown], retuned, thresholds) {
             return 0.0;

@@ -1,0 +1,39 @@
+//! What the catalogue lacks as a hypothesis of its own: a function of what was recorded, in the place of every effect.
+//!
+//! A sum of k terms with j shapes, chosen among M, fitted together with the nominal parameters, scores as every set of effects does, and pays for the
+//! choice:
+//!
+//! ```text
+//! S_f = sum over stages of (N/2m) ln(X_nominal/X) - ((k + j)/2) ln(blocks) - k ln M
+//! ```
+//!
+//! Where such a sum explains what no set of effects explains, the cause is none of the catalogue's.
+
+use crate::{
+    evidence::{gathered::Evidence, probability::Function},
+    fit::prepared::PreparedProblem,
+    missing::Proposal,
+    problem::sample_roles::Role,
+};
+
+/// The function that a proposal in the place of all effects is; none where no sum of terms was found that foretells anything.
+pub(crate) fn function(
+    problem: &PreparedProblem<'_>,
+    evidence: &Evidence,
+    proposal: &Proposal,
+) -> Option<Function> {
+    let terms = &proposal.told.terms;
+    if terms.is_empty() {
+        return None;
+    }
+    let free: usize = terms.iter().map(|term| 1 + term.form.shapes().len()).sum();
+    let blocks = problem.compare.roles.blocks(Role::Fit);
+    let choice = terms.len() as f64 * (proposal.library as f64).ln();
+    let score = problem.ratio(&problem.nominal.misfits, &proposal.misfits)
+        - 0.5 * free as f64 * blocks.ln()
+        - choice;
+    let tested: f64 = evidence.stages.iter().map(|stage| stage.excess_retuned.max(0.0)).sum();
+    let own = evidence.stages[proposal.stage].excess_retuned.max(0.0);
+    let tested = tested - proposal.told.closes_test * own;
+    Some(Function { score, left: evidence.gap_of(problem, &proposal.misfits).max(tested) })
+}

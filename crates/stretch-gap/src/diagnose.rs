@@ -292,10 +292,11 @@ fn gather(task: Task<'_>, cause: Cause<'_>, null_band: f64) -> Result<Gathered, 
     let all = hypotheses(&found.best, &found.rivals, eliminated, &problem.nominal);
     let held = candidates(problem, &evidence, &all, seed)?;
     let mut proposal = None;
-    let lacks = |evidence: &Evidence| {
+    let lacks = |evidence: &Evidence, best: &Hypothesis| {
         (task.progress)("what the catalogue lacks");
         proposal = unless_spent(propose(problem, &problem.nominal))?.flatten();
-        Ok(proposal.as_ref().and_then(|proposal| function(problem, evidence, proposal)))
+        let Some(proposal) = &proposal else { return Ok(None) };
+        Ok(unless_spent(function(problem, evidence, (proposal, best), thresholds))?.flatten())
     };
     let (posterior, held) =
         posterior(problem, thresholds, (&mut evidence, null_band), (all, held), lacks)?;

@@ -121,13 +121,13 @@ pub(crate) const LEAST_CLOSED: f64 = 0.3;
 
 /// Weighs hypotheses with what they leave; their candidates and blocks are put into the same order. A set of effects that closes less than
 /// [`LEAST_CLOSED`] of the gap is dropped. Where every set leaves more than noise and model discrepancy would, `function` is asked for what the
-/// catalogue lacks.
+/// catalogue lacks, beside the set with the greatest score.
 pub(crate) fn posterior(
     problem: &PreparedProblem<'_>,
     thresholds: &Thresholds,
     (evidence, null_band): (&mut Evidence, f64),
     (hypotheses, candidates): (Vec<Hypothesis>, Vec<(Candidate, Vec<Blocks>)>),
-    function: impl FnOnce(&Evidence) -> Result<Option<Function>, GapError>,
+    function: impl FnOnce(&Evidence, &Hypothesis) -> Result<Option<Function>, GapError>,
 ) -> Result<(Posterior, Vec<(Candidate, Vec<Blocks>)>), GapError> {
     let (mut kept, mut by_effects) = (Vec::new(), BTreeMap::new());
     for (hypothesis, (candidate, blocks)) in hypotheses.into_iter().zip(candidates) {
@@ -143,9 +143,13 @@ pub(crate) fn posterior(
         }
     }
     let retuned = evidence.gap.retuned;
-    let mut sets = kept.iter().filter(|(_, s)| !s.is_nothing).map(|(_, s)| s.left).peekable();
-    let is_left = sets.peek().is_some() && sets.all(|l| l > allowed(retuned, l, thresholds));
-    let function = if is_left { function(evidence)? } else { None };
+    let sets = || kept.iter().filter(|(_, standing)| !standing.is_nothing);
+    let is_left = sets().all(|(_, s)| s.left > allowed(retuned, s.left, thresholds));
+    let best = sets().max_by(|a, b| a.1.score.total_cmp(&b.1.score));
+    let function = match best.filter(|_| is_left) {
+        Some((best, _)) => function(evidence, best)?,
+        None => None,
+    };
     let posterior = weigh(thresholds, Gap { retuned, null_band }, kept, function);
     let of = |w: &Weighed| {
         let (candidate, blocks) = by_effects.remove(&w.hypothesis.effects)?;

@@ -4,36 +4,42 @@
 //! choice:
 //!
 //! ```text
-//! S_f = sum over stages of (N/2m) ln(X_nominal/X) - ((k + j)/2) ln(blocks) - k ln M
+//! S_f = sum over stages of (N/2m) ln(X_nominal/X) - ((k + j)/2) ln(blocks) - k ln M - d
 //! ```
 //!
-//! Where such a sum explains what no set of effects explains, the cause is none of the catalogue's.
+//! where d is what [deviations](crate::fit::deviations) of its own effects' forms add to the best set: a sum of any terms has to explain more than
+//! another form of the effects would. Where it does, the cause is none of the catalogue's.
 
 use crate::{
     evidence::{gathered::Evidence, probability::Function},
-    fit::prepared::PreparedProblem,
+    fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
     missing::Proposal,
-    problem::sample_roles::Role,
+    problem::{error::GapError, sample_roles::Role, thresholds::Thresholds},
 };
 
-/// The function that a proposal in the place of all effects is; none where no sum of terms was found that foretells anything.
+/// The function that a proposal in the place of all effects is, beside the best set of effects; none where no sum of terms was found that
+/// foretells anything.
 pub(crate) fn function(
     problem: &PreparedProblem<'_>,
     evidence: &Evidence,
-    proposal: &Proposal,
-) -> Option<Function> {
+    (proposal, best): (&Proposal, &Hypothesis),
+    thresholds: &Thresholds,
+) -> Result<Option<Function>, GapError> {
     let terms = &proposal.told.terms;
     if terms.is_empty() {
-        return None;
+        return Ok(None);
     }
+    let deviating = problem.with_deviations(best, thresholds.discrepancy_amplitude())?;
     let free: usize = terms.iter().map(|term| 1 + term.form.shapes().len()).sum();
     let blocks = problem.compare.roles.blocks(Role::Fit);
     let choice = terms.len() as f64 * (proposal.library as f64).ln();
     let score = problem.ratio(&problem.nominal.misfits, &proposal.misfits)
         - 0.5 * free as f64 * blocks.ln()
-        - choice;
+        - choice
+        - (deviating.score - best.score);
     let tested: f64 = evidence.stages.iter().map(|stage| stage.excess_retuned.max(0.0)).sum();
     let own = evidence.stages[proposal.stage].excess_retuned.max(0.0);
     let tested = tested - proposal.told.closes_test * own;
-    Some(Function { score, left: evidence.gap_of(problem, &proposal.misfits).max(tested) })
+    let left = evidence.gap_of(problem, &proposal.misfits).max(tested);
+    Ok(Some(Function { score, left }))
 }

@@ -33,6 +33,11 @@ pub struct Thresholds {
 }
 
 impl Thresholds {
+    /// Share of an effect's doing that another form of it does otherwise: the discrepancy is a share of the variance, deviations are amplitudes.
+    pub(crate) fn discrepancy_amplitude(&self) -> f64 {
+        self.model_discrepancy.sqrt()
+    }
+
     /// The thresholds that this version froze.
     pub fn frozen() -> Self {
         toml::from_str(include_str!("../../thresholds.toml")).expect("a test reads it")

@@ -30,8 +30,7 @@ impl Acceptance<'_> {
         if !self.meets(base, next) {
             return Ok(false);
         }
-        // The discrepancy is a share of the variance, deviations are amplitudes.
-        let share = self.thresholds.model_discrepancy.sqrt();
+        let share = self.thresholds.discrepancy_amplitude();
         let deviating = |set| self.problem.with_deviations(set, share);
         Ok(base.effects.is_empty() || self.meets(&deviating(base)?, &deviating(next)?))
     }

@@ -8,11 +8,12 @@
 //! ```text
 //! w_h = exp(S_h/t) D_h,     D_h = 1/(1 + o_h),     o_h = o (g_h/(u + v c_h))^(1/s),     c_h = max(g_retuned - g_h, 0)
 //! o_nothing = o r exp((r^2 - 1)/2),     r = g_retuned/sqrt(u^2 + b^2)
-//! w_unknown = sum over h of exp(S_h/t) (1 - D_h) + o exp(S_f/t) D_f,     t = T + rho g_best/g_retuned
+//! w_unknown = max(sum over h of exp(S_h/t) (1 - D_h), o exp(S_f/t) D_f),     t = T + rho g_best/g_retuned
 //! ```
 //!
 //! f is a hypothesis of its own beside the catalogue: a [function](crate::evidence::function) of what was recorded, where no set leaves as little as
 //! noise and discrepancy would. It pays for its parameters and for the choice of its terms; o are the odds of what the catalogue lacks before the data.
+//! It is one of the things that something else may be, so that the greater of the two weights counts.
 //!
 //! and probabilities are these weights as shares of their sum. The temperature t tempers the posterior (Grunwald and van Ommen 2017, doi
 //! 10.1214/17-BA1085): the more of the gap the best set leaves, the less its form is the rig's, and the less a difference of scores says. T, rho,
@@ -123,7 +124,7 @@ pub(crate) fn probabilities(
         let stands = 1.0 / (1.0 + odds_of_else(retuned, f.left, thresholds));
         thresholds.unknown_odds * ((f.score - top) / temperature).exp() * stands
     };
-    let mut unknown = function.map_or(0.0, of_function);
+    let mut unknown = 0.0;
     let mut all = Vec::with_capacity(hypotheses.len());
     for h in hypotheses {
         let tempered = ((h.score - top) / temperature).exp();
@@ -136,6 +137,7 @@ pub(crate) fn probabilities(
         unknown += tempered * (1.0 - stands);
         all.push(tempered * stands);
     }
+    unknown = function.map_or(0.0, of_function).max(unknown);
     let total = unknown + all.iter().sum::<f64>();
     all.iter_mut().for_each(|p| *p /= total);
     (all, unknown / total)

@@ -23,7 +23,7 @@ pub struct Swing {
     pub dry: f64,
 }
 
-/// A damped second-order oscillator driven at its foot: m^2 y'' = x - y - 2 damping m y' - drag m |y'| y' - dry y'/(|y'| + 0.3 dry/m), without drag
+/// A damped second-order oscillator driven at its foot: m^2 y'' = x - y - 2 damping m y' - drag m |y'| y' - dry y'/sqrt(y'^2 + (0.3 dry/m)^2), without drag
 /// and dry friction exact for an input that is linear between nodes; these two act for half a step before and after the rest (Strang, doi
 /// 10.1137/0705041). Friction that were dry at any speed would be no function that can be fitted: below a third of the speed at which the spring
 /// lets the mass go, dry/m, it gives way as a fluid does. Remembers position, velocity and the last input.
@@ -124,7 +124,7 @@ const PARTS: usize = 2;
 struct Slowed {
     /// v' = -k |v| v is v/(1 + k |v| t): k t.
     drag: f64,
-    /// v' = -f v/(|v| + slow) is v/(1 + f t/(|v| + slow)), the speed in the ratio that of the beginning: f t.
+    /// v' = -f v/sqrt(v^2 + slow^2) is v/(1 + f t/sqrt(v^2 + slow^2)), the root that of the beginning: f t.
     dry: f64,
     slow: f64,
 }
@@ -136,7 +136,10 @@ impl Slowed {
             if self.drag == 0.0 { speed } else { speed / (1.0 + self.drag * speed.abs()) };
         match self.dry {
             0.0 => dragged,
-            dry => dragged / (1.0 + dry / (dragged.abs() + self.slow)),
+            dry => {
+                let root = libm::sqrt(dragged * dragged + self.slow * self.slow);
+                dragged / (1.0 + dry / root)
+            }
         }
     }
 }
@@ -151,7 +154,7 @@ pub static SECOND_ORDER_LAG: Kind = Kind {
     name: "second_order_lag",
     title: "a second-order lag",
     words: "it follows like a mass on a spring",
-    equation: "m_s^2 y'' = x - y - 2 damping m_s y' - drag m_s |y'| y' - dry y'/(|y'| + 0.3 dry/m_s)",
+    equation: "m_s^2 y'' = x - y - 2 damping m_s y' - drag m_s |y'| y' - dry y'/sqrt(y'^2 + (0.3 dry/m_s)^2)",
     usual: &[Side::Output],
     parameters: |e, unit| {
         vec![
@@ -178,11 +181,11 @@ pub static SECOND_ORDER_LAG: Kind = Kind {
             format!(
                 "let d{k} = s.speed / (1 + half * abs(s.speed))
             let p{k} = s.at - {from} + trail
-            let q{k} = d{k} / (1 + rub / (abs(d{k}) + slow)) - slope
+            let q{k} = d{k} / (1 + rub / sqrt(d{k} * d{k} + slow * slow)) - slope
             s.at = {to} - trail + (cs + DAMPING / M * sn) * p{k} + sn * q{k}
             let v{k} = slope - sn / (M * M) * p{k} + (cs - DAMPING / M * sn) * q{k}
             let e{k} = v{k} / (1 + half * abs(v{k}))
-            s.speed = e{k} / (1 + rub / (abs(e{k}) + slow))"
+            s.speed = e{k} / (1 + rub / sqrt(e{k} * e{k} + slow * slow))"
             )
         };
         let body = format!(
@@ -194,7 +197,7 @@ pub static SECOND_ORDER_LAG: Kind = Kind {
             let trail = 2 * DAMPING * M * slope
             let half = DRAG * h / (2 * M)
             let rub = DRY * h / (2 * M * M)
-            let slow = 0.3 * DRY / M + 1e-300
+            let slow = 0.3 * DRY / M + 1e-150
             let middle = (s.last + x) / 2
             {}
             {}

@@ -48,7 +48,7 @@ pub(super) static CROSSBEAM_INERTIA: Effect = Effect {
     title: "the crossbeam's inertia",
     words: "the crossbeam's mass overshoots and rings",
     stage: RigStage::Muscle,
-    equation: "k'' = (k_lag - k - dry k'/(|k'| + 0.3 dry/m))/m^2 - (2 damping + drag |k'|) k'/m behind the lag: natural frequency 1/(2 pi m)",
+    equation: "k'' = (k_lag - k - dry k'/sqrt(k'^2 + (0.3 dry/m)^2))/m^2 - (2 damping + drag |k'|) k'/m behind the lag: natural frequency 1/(2 pi m)",
     parameters: &[
         EffectParameter::strength("m", "s", 0.0, 0.08, 0.02),
         EffectParameter::form("damping", "1", 0.1, 0.6, Form { neutral: 0.25, usual: 0.25 }),

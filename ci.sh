@@ -206,5 +206,21 @@ else
     cargo semver-checks --baseline-rev "$released" $(printf -- '-p %s ' $PACKAGES)
 fi
 
+step "advisories of what the lock files name"
+# a database on this machine does where none can be fetched
+known=${CARGO_HOME:-$HOME/.cargo}/advisory-dbs
+if ! cargo deny --version >/dev/null 2>&1; then
+    skip "there is no cargo deny: cargo install cargo-deny --locked"
+elif ! cargo deny fetch db >/dev/null 2>&1 && [ -z "$(ls -A "$known" 2>/dev/null)" ]; then
+    skip "the database of advisories cannot be fetched, and none is in $known"
+else
+    for manifest in Cargo.toml */Cargo.toml; do
+        [ -f "${manifest%.toml}.lock" ] || continue
+        cargo fetch --quiet --locked --manifest-path "$manifest"
+        echo "$manifest"
+        cargo deny --offline --config deny.toml --manifest-path "$manifest" check advisories bans
+    done
+fi
+
 step "oldest supported compiler"
 skip "only the toolchain of rust-toolchain.toml can be installed here; rust-version in Cargo.toml is what the dependencies ask for"

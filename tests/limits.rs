@@ -131,6 +131,7 @@ fn a_device_without_an_end_is_refused_by_every_reader() {
         "diagnose /dev/zero --reference length_mm --signal bridge_v",
         "simulate --protocol pulses --rig /dev/zero --out out",
         "convert /dev/zero --out out.csv",
+        "demo --data /dev/zero --out out",
     ] {
         refused(&scratch, line, &["/dev/zero"]);
     }

@@ -88,6 +88,13 @@ fn a_trial_that_is_fitted_is_not_tested_on_under_another_name() {
     let stage = "[[stage]]\noutput = \"bridge_v\"\ninputs = [\"length_mm\"]\n";
     let problem = scratch.write("p.toml", format!("simulator = [\"true\"]\n{stage}{trials}"));
     fails(stretch().arg("diagnose").arg(problem), &told);
+    // fitted twice, it weighs double
+    let out = calibrate(&scratch.path("a.csv"), &scratch.path("c.json"))
+        .arg(scratch.path("b.csv"))
+        .output();
+    let out = out.unwrap();
+    let said = one_line(&String::from_utf8_lossy(&[out.stdout, out.stderr].concat()));
+    assert!(said.contains("b.csv holds the samples of a.csv: they weigh double"), "{said}");
 }
 
 const PROBLEM: &str = r#"
@@ -160,6 +167,12 @@ fn a_gap_in_time_is_told_as_a_gap() {
     let said = calibrate(&path, &scratch.path("c.json")).output().unwrap();
     let said = one_line(&String::from_utf8_lossy(&[said.stdout, said.stderr].concat()));
     assert!(said.contains("s are missing after 14.99 s"), "{said}");
+    // more samples than a gap's count can hold
+    let longer = fs::read_to_string(&path).unwrap().replace("\n100000", "\n999900000");
+    scratch.write("longer.csv", longer);
+    let said =
+        warned(&scratch, &["apply", "--calibration", "c.json", "longer.csv", "--out", "o.csv"]);
+    assert!(said.contains("time stamps: at least 42949672"), "{said}");
 }
 
 #[test]

@@ -95,8 +95,10 @@ fn report(calibration: &Calibration, trial: &Trial, applied: &Applied) {
     let mut seen = Seen::of(calibration);
     let signal = trial.channel(calibration.signal.as_str()).into_iter().flatten();
     applied.readings.iter().zip(signal).for_each(|(reading, signal)| seen.take(reading, *signal));
+    // a gap is counted up to what its count can hold
+    let at_least = if faults.missing >= u64::from(u32::MAX) - 1 { "at least " } else { "" };
     warn(format!(
-        "{}; time stamps: {} missing, {} early or late",
+        "{}; time stamps: {at_least}{} missing, {} early or late",
         seen.line(),
         faults.missing,
         faults.jittered,

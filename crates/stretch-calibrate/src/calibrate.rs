@@ -16,6 +16,7 @@ use crate::{
     prepared::Prepared,
     series::extent,
     split::branches,
+    twice::fitted_twice,
 };
 
 /// A calibration with the reports and notes of its fit.
@@ -88,8 +89,10 @@ pub(crate) fn calibrate_with(
     notes.splice(0..0, prepared.notes.iter().cloned());
     let names = trials.iter().map(|t| t.name.as_str());
     let columns = [options.signal.as_str(), options.reference.as_str()];
-    let provenance = Provenance::new(&options.date, names)
-        .with_checksums(trials.iter().filter_map(|t| t.checksum(&columns)));
+    let checksums: Vec<Option<u32>> = trials.iter().map(|t| t.checksum(&columns)).collect();
+    notes.extend(fitted_twice(names.clone(), checksums.iter().copied()));
+    let provenance =
+        Provenance::new(&options.date, names).with_checksums(checksums.into_iter().flatten());
     let calibration = prepared.calibration(model, provenance)?;
     Ok((Calibrated { calibration, fits, notes }, made))
 }

@@ -36,6 +36,7 @@ mod rest;
 mod rising;
 mod series;
 mod split;
+mod twice;
 
 pub use acceptance::{
     beside_a_constant, explains_little, explains_nothing, fitted_on, not_its_own, off_throughout,

@@ -20,6 +20,7 @@ use crate::{
     CalibrateError, Calibrated, FitReport, ModelKind, Options, Robust, SplitBy,
     blocks::{GrossErrors, LONGEST, Log},
     passes::Passes,
+    twice::fitted_twice,
 };
 
 /// Whether a calibration can be fitted block by block: lines and surfaces can, by least squares, with samples
@@ -108,7 +109,9 @@ pub fn calibrate_long(
     if !matches!(options.model, ModelKind::Linear) {
         notes.extend(fits.iter().filter_map(FitReport::note));
     }
-    let provenance = Provenance::new(&options.date, names.iter().map(String::as_str))
-        .with_checksums(checksums.borrow().iter().map(Checksum::value));
+    let names = names.iter().map(String::as_str);
+    let checksums: Vec<u32> = checksums.borrow().iter().map(Checksum::value).collect();
+    notes.extend(fitted_twice(names.clone(), checksums.iter().copied().map(Some)));
+    let provenance = Provenance::new(&options.date, names).with_checksums(checksums);
     Ok(Calibrated { calibration: prepared.calibration(model, provenance)?, fits, notes })
 }

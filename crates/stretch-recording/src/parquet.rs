@@ -20,6 +20,9 @@ use crate::{
     room::Room,
 };
 
+/// Rows that are taken at once.
+const PIECE: usize = 1 << 16;
+
 /// Reads a file's columns, those without a value as NaN.
 pub(crate) fn read(
     (bytes, mut room): (Vec<u8>, Room),
@@ -32,6 +35,7 @@ pub(crate) fn read(
     let reader = SerializedFileReader::new(Bytes::from(bytes)).map_err(broken)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let rows = usize::try_from(reader.metadata().file_metadata().num_rows()).unwrap_or(0);
+    room.take_time(rows).map_err(fail)?;
     let (mut channels, mut stamps, mut other) = (Vec::new(), Vec::new(), Vec::new());
     for i in 0..schema.num_columns() {
         let column = schema.column(i);
@@ -41,7 +45,7 @@ pub(crate) fn read(
             continue;
         }
         room.take_numbers(rows).map_err(fail)?;
-        let mut values = Vec::new();
+        let mut values = Vec::with_capacity(rows);
         let mut is_number = true;
         for group in 0..reader.num_row_groups() {
             let group = reader.get_row_group(group).map_err(broken)?;
@@ -50,7 +54,12 @@ pub(crate) fn read(
             if its_rows > rows - values.len().min(rows) {
                 return Err(fail("its groups hold more rows than the file; write it again".into()));
             }
+            // its pages are in memory while it is read
+            let pages = usize::try_from(group.metadata().column(i).uncompressed_size());
+            let pages = pages.unwrap_or(usize::MAX);
+            room.take(pages as u64).map_err(fail)?;
             is_number &= numbers(group.as_ref(), i, &column, &mut values).map_err(broken)?;
+            room.give_back(pages);
         }
         if !is_number || values.len() != rows {
             other.push(format!("{name} (no numbers)"));
@@ -133,20 +142,22 @@ fn append<T: DataType>(
     number: impl Fn(T::T) -> f64,
 ) -> Result<(), ParquetError> {
     let mut left = rows;
+    let (mut read, mut levels) = (Vec::new(), Vec::new());
     while left > 0 {
-        let (mut read, mut levels) = (Vec::new(), Vec::new());
+        read.clear();
+        levels.clear();
         let asked = (full > 0).then_some(&mut levels);
-        let (records, _, _) = reader.read_records(left, asked, None, &mut read)?;
+        let (records, _, _) = reader.read_records(left.min(PIECE), asked, None, &mut read)?;
         if records == 0 {
             break;
         }
-        let mut read = read.into_iter().map(&number);
+        let mut read = read.drain(..).map(&number);
         if full == 0 {
             values.extend(read);
         } else {
             // A level below the full one is a row without a value.
             let whole = |level: i16| if level == full { read.next() } else { None };
-            values.extend(levels.into_iter().map(whole).map(|x| x.unwrap_or(f64::NAN)));
+            values.extend(levels.drain(..).map(whole).map(|x| x.unwrap_or(f64::NAN)));
         }
         left -= records;
     }

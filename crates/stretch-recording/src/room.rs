@@ -58,6 +58,12 @@ impl Room {
         self.take((count as u64).saturating_mul(size_of::<f64>() as u64))
     }
 
+    /// Takes room for what every recording has beside its channels: its time, and for its rate the steps of that.
+    #[cfg(any(feature = "npz", feature = "mat", feature = "hdf5", feature = "parquet"))]
+    pub(crate) fn take_time(&mut self, rows: usize) -> Result<(), String> {
+        self.take_numbers(rows.saturating_mul(2))
+    }
+
     /// Unpacks a stream into memory.
     #[cfg(any(feature = "npz", feature = "mat"))]
     pub(crate) fn unpack(&mut self, reader: impl Read) -> io::Result<Result<Vec<u8>, String>> {
@@ -69,7 +75,13 @@ impl Room {
     }
 
     /// Gives room back that is used no more.
-    #[cfg(any(feature = "npz", feature = "mat"))]
+    #[cfg(any(
+        feature = "npz",
+        feature = "mat",
+        feature = "hdf5",
+        feature = "mcap",
+        feature = "parquet"
+    ))]
     pub(crate) fn give_back(&mut self, bytes: usize) {
         self.taken = self.taken.saturating_sub(bytes as u64);
     }

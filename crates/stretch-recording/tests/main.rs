@@ -5,5 +5,6 @@ mod corpus;
 mod data_sets;
 mod dialects;
 mod found;
+mod memory;
 mod recordings;
 mod round_trips;

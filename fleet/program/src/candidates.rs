@@ -1,11 +1,11 @@
 //! Files that are to be trials of a lake, and which of them are copies.
 
-use std::{collections::HashMap, fs, path::Path};
+use std::{collections::HashMap, path::Path};
 
 use rayon::prelude::*;
 
 use crate::{
-    lake::{LakeFile, Place, digest},
+    lake::{LakeFile, Place, digest_of_file},
     sources::Source,
 };
 
@@ -33,8 +33,11 @@ pub(crate) fn candidates(sources: &[Source]) -> (Vec<Candidate<'_>>, Vec<(&Path,
 
 fn candidate(source: &Source) -> Result<Candidate<'_>, String> {
     let place = source.place.as_ref().map_err(|why| format!("{why:#}"))?;
-    let bytes = fs::read(&source.path).map_err(|e| format!("it cannot be read: {e}"))?;
-    Ok(Candidate { source, place, digest: digest([bytes.as_slice()]) })
+    if source.is_endless() {
+        return Err("it is no file, but a device or a pipe, which may have no end".to_owned());
+    }
+    let digest = digest_of_file(&source.path).map_err(|e| format!("it cannot be read: {e}"))?;
+    Ok(Candidate { source, place, digest })
 }
 
 /// Why each file is a byte-identical copy of another one, or none where it is the one that counts: that at the place where the

@@ -184,7 +184,7 @@ fn about(args: &Args, sources: &[Source]) -> anyhow::Result<About> {
     }
     let options = ReadOptions::new().time(&args.time).require(&signal).require(&reference);
     let mut first = None;
-    for source in sources {
+    for source in sources.iter().filter(|source| !source.is_endless()) {
         let rated = source.read(&options).map_err(anyhow::Error::from).and_then(|recording| {
             Ok(rated(&recording.trial, &signal, &[], rate, None)?.sample_rate)
         });

@@ -74,6 +74,7 @@ struct Made {
     seed: u64,
     sensors: u32,
     days: u32,
+    /// Of all sensors and days, those that were there already among them: a killed command made some.
     rows: u64,
     drifting: Vec<String>,
 }
@@ -111,7 +112,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         seed: args.seed,
         sensors: *sensors,
         days: *days,
-        rows: written.into_inner(),
+        rows: [*sensors, *days]
+            .iter()
+            .fold(u64::from(*rows), |all, &n| all.saturating_mul(n.into())),
         drifting: drifting.collect(),
     };
     let text = serde_json::to_string_pretty(&made)? + "\n";
@@ -122,7 +125,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     say(format!(
         "{}: {sensors} sensors by {days} days, {} rows written, {} sensors drift",
         lake.display(),
-        made.rows,
+        written.into_inner(),
         made.drifting.len()
     ))
 }

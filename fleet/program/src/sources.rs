@@ -70,6 +70,11 @@ impl Source {
         Self { path, place, entry }
     }
 
+    /// Whether it is a device or a pipe, which may have no end.
+    pub(crate) fn is_endless(&self) -> bool {
+        fs::metadata(&self.path).is_ok_and(|about| !about.is_file())
+    }
+
     pub(crate) fn kind(&self) -> TrialKind {
         self.entry.as_ref().map_or(TrialKind::Other, |(_, entry)| entry.kind)
     }

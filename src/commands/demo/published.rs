@@ -1,8 +1,12 @@
 //! A knee in a knitted sleeve, as its authors published it.
 
-use std::{fs, path::Path};
+use std::{
+    fs::File,
+    io::{BufRead, BufReader, Read},
+    path::Path,
+};
 
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use stretch_data::{Channel, Trial};
 
 /// Where the files are.
@@ -12,6 +16,8 @@ pub(super) const COMMIT: &str = "47369abac95fd43a10ada4156dd22cae91ee7f70";
 
 /// The columns that are read; accelerometer and gyroscope stand behind them.
 const COLUMNS: [&str; 6] = ["angle_deg", "s1", "s2", "s3", "s4", "s5"];
+/// No line of such a file is as long, bytes.
+const LONGEST: u64 = 64 << 10;
 /// The authors' sample rate.
 const RATE_HZ: f64 = 100.0;
 
@@ -25,16 +31,29 @@ const RATE_HZ: f64 = 100.0;
 /// # Errors
 /// A file that cannot be read, and fields that are not numbers.
 pub(super) fn sessions(path: &Path) -> anyhow::Result<Option<Vec<Trial>>> {
-    let text = fs::read_to_string(path)
-        .with_context(|| format!("{}: cannot read it as text", path.display()))?;
-    let text = text.trim_start_matches('\u{feff}');
-    let first = text.split([',', '\n']).next().unwrap_or_default();
-    if first.trim().parse::<f64>().is_err() {
-        return Ok(None);
-    }
+    let told = || format!("{}: cannot read it as text", path.display());
+    let mut file = BufReader::new(File::open(path).with_context(told)?);
     let mut sessions: Vec<Vec<[f64; COLUMNS.len()]>> = Vec::new();
-    for (i, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
-        let row = row(line).with_context(|| format!("{}, row {}", path.display(), i + 1))?;
+    let mut line = String::new();
+    for number in 1.. {
+        line.clear();
+        // what has no lines may have no end either
+        let length = (&mut file).take(LONGEST).read_line(&mut line).with_context(told)?;
+        let text = line.trim_start_matches('\u{feff}').trim();
+        if number == 1
+            && text.split(',').next().is_none_or(|first| first.trim().parse::<f64>().is_err())
+        {
+            return Ok(None);
+        }
+        if length == 0 {
+            break;
+        }
+        let place = || format!("{}, row {number}", path.display());
+        ensure!((length as u64) < LONGEST, "{}: the line is longer than {LONGEST} bytes", place());
+        if text.is_empty() {
+            continue;
+        }
+        let row = row(text).with_context(place)?;
         match sessions.last_mut() {
             Some(session) if row[1..].iter().any(|x| *x != 0.0) => session.push(row),
             _ => sessions.push(vec![row]),
@@ -72,6 +91,8 @@ fn trial(name: String, rows: &[[f64; COLUMNS.len()]]) -> Trial {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     fn read(text: &str) -> anyhow::Result<Option<Vec<Trial>>> {

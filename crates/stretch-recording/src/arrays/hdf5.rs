@@ -4,7 +4,7 @@ use hdf5_pure::{File, Group};
 
 use crate::{
     ReadOptions, RecordingError,
-    arrays::{Array, tracks},
+    arrays::{Array, beside, tracks},
     grid::{Track, listed, note},
     room::Room,
 };
@@ -37,6 +37,7 @@ pub(crate) fn read(
     }
     let mut notes = Vec::new();
     note(&mut notes, "left out", &found.other);
+    beside(&found.arrays, &mut found.room).map_err(fail)?;
     tracks(file, found.arrays, notes, options)
 }
 
@@ -57,10 +58,12 @@ impl Found {
             let count = shape
                 .iter()
                 .fold(1_usize, |n, m| n.saturating_mul(usize::try_from(*m).unwrap_or(usize::MAX)));
-            if let Err(no_room) = self.room.take_numbers(count) {
+            // the unpacked chunk and the bytes of all chunks stand beside the numbers until those are made
+            if let Err(no_room) = self.room.take_numbers(count.saturating_mul(3)) {
                 self.full = Some(format!("{full}: {no_room}"));
                 return Ok(());
             }
+            self.room.give_back(2 * count * size_of::<f64>());
             match array(group, &name, &full) {
                 Ok(array) => self.arrays.push(array),
                 Err(e) => self.other.push(format!("{full} ({e})")),

@@ -2,7 +2,7 @@
 
 use crate::{
     ReadOptions, RecordingError,
-    arrays::{Array, tracks},
+    arrays::{Array, beside, tracks},
     grid::{Track, listed, note},
     room::Room,
     whole::{signed, word},
@@ -59,6 +59,7 @@ pub(crate) fn read(
         }));
     }
     note(&mut notes, "left out", &found.other);
+    beside(&found.arrays, &mut found.room).map_err(fail)?;
     tracks(file, found.arrays, notes, options)
 }
 

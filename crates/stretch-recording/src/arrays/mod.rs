@@ -14,6 +14,7 @@ use crate::{
     grid::{Track, listed, note},
     names::{clock_of, time_rank},
     options::TIME,
+    room::Room,
 };
 
 /// Blocks in which a matrix is taken apart.
@@ -94,6 +95,12 @@ impl Array {
         let named = |(i, values)| Channel { name: format!("{}.{i}", self.name), values };
         Some(columns.into_iter().enumerate().map(named).collect())
     }
+}
+
+/// Takes room for the time that the longest of some arrays will have.
+pub(crate) fn beside(arrays: &[Array], room: &mut Room) -> Result<(), String> {
+    let lengths = arrays.iter().filter_map(Array::matrix).map(|(rows, columns)| rows.max(columns));
+    room.take_time(lengths.max().unwrap_or(0))
 }
 
 /// A clock among the arrays.

@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use crate::{
     ReadOptions, RecordingError,
-    arrays::{Array, tracks},
+    arrays::{Array, beside, tracks},
     grid::{Track, listed, note},
     names::time_rank,
     room::Room,
@@ -39,6 +39,7 @@ pub(crate) fn read(
     for (i, array) in arrays.iter_mut().enumerate().filter(|(_, a)| a.name.is_empty()) {
         array.name = format!("column_{i}");
     }
+    beside(&arrays, &mut room).map_err(fail)?;
     tracks(file, arrays, Vec::new(), options)
 }
 
@@ -82,6 +83,7 @@ pub(crate) fn read_archive(
     drop(archive);
     let mut notes = Vec::new();
     note(&mut notes, "left out", &other);
+    beside(&arrays, &mut room).map_err(fail)?;
     tracks(file, arrays, notes, options)
 }
 

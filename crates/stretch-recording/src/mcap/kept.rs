@@ -13,7 +13,7 @@ use ::mcap::{
 };
 
 /// The longest record, bytes: recorders begin a new chunk after some megabytes.
-const LONGEST: usize = 1 << 28;
+const LONGEST: usize = 1 << 26;
 
 /// Reads messages in the order of the file; ends at the end of its data, or after the first error.
 pub(super) struct Messages<'a> {

@@ -4,6 +4,10 @@ use std::collections::{BTreeMap, HashMap};
 
 use stretch_data::Channel;
 
+use crate::room::Room;
+
+/// Memory of a message's time, bytes: its stamp in a list that grows to twice its length, its time, and the step to it.
+const STAMP: u64 = 48;
 /// Columns of one topic.
 const MOST_COLUMNS: usize = 512;
 
@@ -15,14 +19,27 @@ pub(crate) struct Topic {
     index: HashMap<String, usize>,
     columns: Vec<Channel>,
     texts: BTreeMap<String, String>,
+    /// Why no more is taken: the room is used up.
+    pub(crate) full: Option<String>,
 }
 
 impl Topic {
     /// Begins a message; what it holds goes into what is returned.
-    pub(crate) fn begin(&mut self, logged_ns: i128) -> Leaves<'_> {
+    pub(crate) fn begin<'a>(&'a mut self, logged_ns: i128, room: &'a mut Room) -> Leaves<'a> {
         let row = self.logged_ns.len();
+        self.full = room.take(STAMP).err();
         self.logged_ns.push(logged_ns);
-        Leaves { topic: self, row, path: String::new(), is_mute: false }
+        Leaves { topic: self, room, row, path: String::new(), is_mute: false }
+    }
+
+    /// Takes room for what its columns lack, of messages that had no such number.
+    ///
+    /// # Errors
+    /// There is no more.
+    pub(crate) fn take_rest(&self, room: &mut Room) -> Result<(), String> {
+        let rows = self.logged_ns.len();
+        let lack = self.columns.iter().map(|column| rows.saturating_sub(column.values.len()));
+        room.take_numbers(lack.sum())
     }
 
     /// Takes the last message back.
@@ -54,6 +71,7 @@ impl Topic {
 #[derive(Debug)]
 pub(crate) struct Leaves<'a> {
     topic: &'a mut Topic,
+    room: &'a mut Room,
     row: usize,
     path: String,
     is_mute: bool,
@@ -88,7 +106,7 @@ impl Leaves<'_> {
     }
 
     pub(crate) fn number(&mut self, value: f64) {
-        if self.is_mute {
+        if self.is_mute || self.topic.full.is_some() {
             return;
         }
         let at = match self.topic.index.get(&self.path) {
@@ -101,6 +119,12 @@ impl Leaves<'_> {
             }
         };
         let values = &mut self.topic.columns[at].values;
+        // a message may have a number that a million before it had not; what grows has up to twice its length
+        let more = (self.row + 1).saturating_sub(values.len());
+        if let Err(full) = self.room.take_numbers(more.saturating_mul(2)) {
+            self.topic.full = Some(full);
+            return;
+        }
         values.resize(self.row, f64::NAN);
         values.push(value);
     }

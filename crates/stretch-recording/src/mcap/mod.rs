@@ -7,7 +7,7 @@ mod messages;
 
 use std::collections::{BTreeMap, HashMap};
 
-use ::mcap::Channel as Source;
+use ::mcap::{Channel as Source, Message};
 use serde_json::Value;
 
 use stretch_data::Channel;
@@ -22,6 +22,8 @@ use crate::{
     room::Room,
 };
 
+/// Bytes that a byte of JSON takes at most while it is read: a digit and a comma are a value of 32, in a list that grows to twice its length.
+const JSON: usize = 32;
 /// Longest array whose numbers become channels.
 const LONGEST: usize = 64;
 /// Where messages say themselves when they were measured: seconds, and the nanoseconds beside them.
@@ -41,12 +43,8 @@ pub(crate) fn read(
     let mut bag = Bag::default();
     let mut notes = Vec::new();
     for (count, message) in Messages::new(&bytes).enumerate() {
-        if let Ok(message) = &message {
-            // a byte becomes two on average: numbers of four bytes have eight here
-            room.take(2 * message.data.len() as u64).map_err(fail)?;
-        }
         match message {
-            Ok(message) => bag.take(&message.channel, message.log_time.into(), &message.data),
+            Ok(message) => bag.take(&message, &mut room).map_err(fail)?,
             Err(e) if count > 0 => {
                 notes.push(format!("it breaks off after {count} messages ({e}); those are read"));
                 break;
@@ -65,6 +63,7 @@ pub(crate) fn read(
         }));
     }
     note(&mut notes, "left out", &other);
+    bag.topics.values().try_for_each(|topic| topic.take_rest(&mut room)).map_err(fail)?;
     let tracks = tracks(bag.topics, &mut notes);
     Ok((tracks, notes))
 }
@@ -79,32 +78,41 @@ struct Bag {
 }
 
 impl Bag {
-    fn take(&mut self, source: &Source<'_>, logged_ns: i128, data: &[u8]) {
+    /// Takes a message; an error is that there is no more room.
+    fn take(&mut self, message: &Message<'_>, room: &mut Room) -> Result<(), String> {
+        let (source, data) = (&message.channel, &message.data[..]);
+        let logged_ns = message.log_time.into();
         if self.other.contains_key(&source.topic) {
-            return;
+            return Ok(());
         }
         let topic = self.topics.entry(source.topic.clone()).or_default();
         let taken = match source.message_encoding.as_str() {
             "json" => {
+                // while it is read
+                let parsed = JSON.saturating_mul(data.len());
+                room.take(parsed as u64)?;
                 let value: Result<Value, _> = serde_json::from_slice(data);
+                room.give_back(parsed);
                 value.map_err(|e| format!("a message is no JSON: {e}")).map(|value| {
-                    json(&value, &mut topic.begin(logged_ns));
+                    json(&value, &mut topic.begin(logged_ns, room));
                 })
             }
             "cdr" => {
                 let schema = self.schemas.entry(source.id).or_insert_with(|| schema(source));
                 match schema {
                     Err(why) => Err(why.clone()),
-                    Ok(schema) => cdr::decode(data, schema, &mut topic.begin(logged_ns))
+                    Ok(schema) => cdr::decode(data, schema, &mut topic.begin(logged_ns, room))
                         .inspect_err(|_| topic.undo()),
                 }
             }
             other => Err(format!("messages in {other}")),
         };
+        let full = topic.full.take();
         if let Err(why) = taken {
             self.topics.remove(&source.topic);
             self.other.insert(source.topic.clone(), why);
         }
+        full.map_or(Ok(()), Err)
     }
 }
 

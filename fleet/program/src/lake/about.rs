@@ -1,6 +1,6 @@
 //! What all trials of a lake have in common.
 
-use std::{fs, path::Path};
+use std::path::Path;
 
 use anyhow::{Context, ensure};
 use serde::{Deserialize, Serialize};
@@ -48,13 +48,13 @@ impl About {
     /// What the lake says of itself; none where the folder is none yet.
     pub(crate) fn read(lake: &Path) -> anyhow::Result<Option<Self>> {
         let path = lake.join(FILE);
-        let text = match fs::read_to_string(&path) {
-            Ok(text) => text,
+        let bytes = match stretch_files::read_whole(&path) {
+            Ok(bytes) => bytes,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             Err(e) => return Err(e).context(path.display().to_string()),
         };
         let about: Self =
-            serde_json::from_str(&text).with_context(|| path.display().to_string())?;
+            serde_json::from_slice(&bytes).with_context(|| path.display().to_string())?;
         let found = about.schema;
         ensure!(
             found == SCHEMA,

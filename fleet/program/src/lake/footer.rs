@@ -1,6 +1,11 @@
 //! What the footer of a trial's file says of it.
 
-use std::collections::BTreeMap;
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    io::{self, Read},
+    path::Path,
+};
 
 use anyhow::{Context, bail};
 use datafusion::parquet::arrow::arrow_reader::ArrowReaderMetadata;
@@ -60,5 +65,23 @@ impl Footer {
 pub(crate) fn digest<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> String {
     let mut sha = Sha256::new();
     parts.into_iter().for_each(|part| sha.update(part));
+    hexadecimal(sha)
+}
+
+/// The same of a file, of which a piece at a time is in memory.
+///
+/// # Errors
+/// What the system says.
+pub(crate) fn digest_of_file(path: &Path) -> io::Result<String> {
+    let (mut file, mut piece, mut sha) = (File::open(path)?, vec![0; 1 << 20], Sha256::new());
+    loop {
+        match file.read(&mut piece)? {
+            0 => return Ok(hexadecimal(sha)),
+            read => sha.update(&piece[..read]),
+        }
+    }
+}
+
+fn hexadecimal(sha: Sha256) -> String {
     sha.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }

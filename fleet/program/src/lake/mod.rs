@@ -20,7 +20,7 @@ mod write;
 
 pub(crate) use about::About;
 pub(crate) use aside::{Refused, accept, refuse, set_aside};
-pub(crate) use footer::{Footer, digest};
+pub(crate) use footer::{Footer, digest, digest_of_file};
 pub(crate) use open::{Lake, LakeFile, below, files, metadata};
 pub(crate) use place::{Place, check_name};
 pub(crate) use table::{register, register_folder};

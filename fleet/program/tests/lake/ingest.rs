@@ -245,3 +245,24 @@ fn three_ingests_at_once_end_complete_and_refuse_nothing() {
     said("ingest {} --lake {} --from-path {sensor}/{date}_*.csv", &[&logs, &alone]);
     assert!(tree(&lake) == tree(&alone), "three at once make another lake than one");
 }
+
+/// What has no end is refused before it is read, and the trial beside it is brought in.
+#[test]
+#[cfg(unix)]
+fn a_device_or_a_pipe_among_the_logs_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let logs = folder.path().join("logs");
+    file(&logs, &trial("1.csv", 0.0));
+    std::os::unix::fs::symlink("/dev/zero", logs.join("2.csv")).unwrap();
+    let pipe = std::process::Command::new("mkfifo").arg(logs.join("0.csv")).status().unwrap();
+    assert!(pipe.success());
+    // bytes without end end at the limit; a pipe would wait for ever, and the test with it
+    let line = "ulimit -v 4000000; exec timeout 120 \"$0\" ingest logs --lake lake --date 2026-01-01 --from-path {sensor}.csv";
+    let mut shell = std::process::Command::new("sh");
+    let output = shell.args(["-c", line, PROGRAM]).current_dir(folder.path()).output().unwrap();
+    let told = [output.stdout, output.stderr].concat();
+    let told = String::from_utf8_lossy(&told);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("1 trials written (600 rows), 0 there already, 2 refused"), "{told}");
+    assert_eq!(told.matches("it is no file").count(), 2, "{told}");
+}

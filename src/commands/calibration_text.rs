@@ -62,6 +62,13 @@ fn instructions(row: &ModelRow) -> String {
 
 /// The tables of a calibration, as the paper prints them.
 pub(super) fn print(calibrated: &Calibrated, ranking: &[Candidate]) -> anyhow::Result<()> {
+    print_fits(calibrated, ranking)?;
+    print_coefficients(calibrated)?;
+    print_notes(calibrated)
+}
+
+/// How well each part was fitted.
+pub(super) fn print_fits(calibrated: &Calibrated, ranking: &[Candidate]) -> anyhow::Result<()> {
     if !ranking.is_empty() {
         say("Signals, by error on data left out of the fit (normalised):")?;
         let row = |c: &Candidate| {
@@ -81,7 +88,18 @@ pub(super) fn print(calibrated: &Calibrated, ranking: &[Candidate]) -> anyhow::R
         ]
     };
     let header = ["fit", "model", "samples", "R^2", "RMSE % of range", "condition"];
-    say(table(&header, calibrated.fits.iter().map(row)))?;
+    say(table(&header, calibrated.fits.iter().map(row)))
+}
+
+pub(super) fn print_notes(calibrated: &Calibrated) -> anyhow::Result<()> {
+    for note in &calibrated.notes {
+        tell(format!("note: {note}"))?;
+    }
+    Ok(())
+}
+
+/// The numbers of the fit, and the orders that it was chosen from.
+fn print_coefficients(calibrated: &Calibrated) -> anyhow::Result<()> {
     say("Coefficients (normalised rate r, signal V) with 95 % bounds:")?;
     let rows = calibrated.fits.iter().flat_map(|fit| {
         fit.coefficients.iter().map(|c| {
@@ -94,7 +112,8 @@ pub(super) fn print(calibrated: &Calibrated, ranking: &[Candidate]) -> anyhow::R
         })
     });
     say(table(&["coefficient", "estimate", "lower", "upper"], rows))?;
-    if calibrated.fits.iter().any(|fit| !fit.orders.is_empty()) {
+    // an order alone is beside nothing
+    if calibrated.fits.iter().any(|fit| fit.orders.len() > 1) {
         say("Orders beside it (CV: on data left out of the fit):")?;
         let rows = calibrated.fits.iter().flat_map(|fit| {
             fit.orders.iter().map(|order| {
@@ -111,9 +130,6 @@ pub(super) fn print(calibrated: &Calibrated, ranking: &[Candidate]) -> anyhow::R
         });
         let header = ["order", "terms", "R^2", "RMSE %", "CV RMSE %", ""];
         say(table(&header, rows))?;
-    }
-    for note in &calibrated.notes {
-        tell(format!("note: {note}"))?;
     }
     Ok(())
 }

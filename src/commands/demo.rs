@@ -15,7 +15,7 @@ use stretch_sim::{ActiveEffect, RunSettings, TrialPlan, demo_preset, effect_name
 
 use super::{
     apply::estimates_csv,
-    calibration_text::{print as print_calibration, print_models},
+    calibration_text::{print as print_calibration, print_fits, print_models, print_notes},
     diagnose::print as print_diagnosis,
     evaluate::print_errors,
     json::Json,
@@ -23,6 +23,7 @@ use super::{
     shared::{or_force, recover, say, tell, write_text},
     simulate,
 };
+use crate::display::is_verbose;
 use job::Job;
 use sessions::{Sessions, Wanted};
 
@@ -202,7 +203,12 @@ fn print(sessions: &Sessions, job: &Job) -> anyhow::Result<()> {
     let calibrations = &job.calibrations;
     let evaluation = &calibrations.evaluation;
     say(format!("\nThe paper's calibrations, on {}:", trials(sessions.ramps().len())))?;
-    print_calibration(&calibrations.surfaces, &job.ranking)?;
+    if is_verbose() {
+        print_calibration(&calibrations.surfaces, &job.ranking)?;
+    } else {
+        print_fits(&calibrations.surfaces, &job.ranking)?;
+        print_notes(&calibrations.surfaces)?;
+    }
     say(format!("\nChosen by cross-validation on {}:", trials(sessions.fit.len())))?;
     print_models(&calibrations.choice, &sessions.reference)?;
     say("\nTested on trials that no fit has seen:")?;

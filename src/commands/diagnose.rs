@@ -10,8 +10,8 @@ use anyhow::{Context, bail, ensure};
 use indicatif::ProgressBar;
 use stretch_files::{FileError, Outputs};
 use stretch_gap::{Diagnosis, Options};
-use stretch_problem::{Examined, Problem, Reading};
-use stretch_report::{Subject, diagnosis_page, in_words};
+use stretch_problem::{Examined, Problem, Reading, in_words};
+use stretch_report::{Subject, diagnosis_page};
 
 use super::{
     diagnosis_files::{write_fix, write_snippets},

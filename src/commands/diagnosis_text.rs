@@ -4,13 +4,12 @@ use std::fmt::Write;
 
 use stretch_data::listed;
 use stretch_gap::{Candidate, Diagnosis, Knowledge, SliceGap, VerdictKind, Where};
-use stretch_problem::Implementation;
+use stretch_problem::{Implementation, effect_in_words};
 use stretch_report::{
-    Table, baseline_table, candidate_table, effect_in_words, stage_table, times, transfer_in_words,
-    transfer_table,
+    Table, baseline_table, candidate_table, stage_table, times, transfer_in_words, transfer_table,
 };
 
-use super::fail_on::is_faint;
+use super::{fail_on::is_faint, notation::notation};
 use crate::table::{number, table};
 
 /// Most slices that are listed.
@@ -161,11 +160,23 @@ fn candidates(out: &mut String, diagnosis: &Diagnosis) {
     }
     let shown: Vec<Candidate> = shown.into_iter().take(CANDIDATES).cloned().collect();
     put_table(out, &candidate_table(&shown, &diagnosis.stabilities));
-    if diagnosis.ambiguous.len() > 1 {
-        put(
+    // effects of one set belong together, so that a rival is only an effect that may replace one of them
+    let Diagnosis { named, ambiguous, .. } = diagnosis;
+    let rivals: Vec<&String> = ambiguous.iter().filter(|name| !named.contains(name)).collect();
+    match (named.as_slice(), rivals.as_slice()) {
+        (_, []) | ([], [_]) => {}
+        ([], rivals) => put(
             out,
-            &format!("95 % set, not told apart by these data: {}.", listed(&diagnosis.ambiguous)),
-        );
+            &format!("Not told apart by these data, with 95 % probability: {}.", listed(rivals)),
+        ),
+        (named, rivals) => put(
+            out,
+            &format!(
+                "These data cannot tell {} from {} with 95 % probability.",
+                listed(named),
+                listed(rivals)
+            ),
+        ),
     }
 }
 
@@ -183,6 +194,9 @@ fn implement(out: &mut String, all: &[Implementation], diagnosis: &Diagnosis) {
             }
             put(out, &format!("  state: {}", one.state()));
         }
+    }
+    if let Some(words) = notation(all.iter().map(|one| one.formula.as_str())) {
+        put(out, words);
     }
 }
 

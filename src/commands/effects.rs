@@ -12,6 +12,7 @@ use stretch_sim::{CATALOGUE, RATE_HZ, RigParams, SimError, effect_named};
 use super::{
     detectable,
     json::Json,
+    notation::notation,
     shared::{say, say_as_is},
 };
 
@@ -171,7 +172,10 @@ fn list(chosen: &[Entry]) -> anyhow::Result<()> {
             say(format!("      form {forms}"))?;
         }
     }
-    Ok(())
+    match notation(chosen.iter().map(|entry| entry.columns()[2])) {
+        Some(words) => say(format!("\n{words}")),
+        None => Ok(()),
+    }
 }
 
 /// The code of an effect as a usual rig has it.

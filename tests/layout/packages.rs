@@ -5,11 +5,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The folders of the crates that can be published.
+/// The folders of the packages that can be published: the crates, and the program.
 fn crates() -> Vec<PathBuf> {
     let entries = fs::read_dir(super::root().join("crates")).expect("the crates");
     let mut folders: Vec<PathBuf> = entries.map(|entry| entry.expect("an entry").path()).collect();
     folders.sort();
+    folders.push(super::root());
     folders
 }
 
@@ -42,7 +43,9 @@ fn every_crate_says_truly_what_it_is() {
             entries.iter().filter_map(toml::Value::as_str).map(str::to_owned).collect()
         };
         let categories = list("categories");
-        let is_for_boards = read(&folder.join("src/lib.rs")).contains("#![no_std]");
+        // a program is for no board
+        let is_for_boards = fs::read_to_string(folder.join("src/lib.rs"))
+            .is_ok_and(|text| text.contains("#![no_std]"));
         let says_so = categories.iter().any(|category| category == "no-std");
         assert_eq!(says_so, is_for_boards, "{name}: {categories:?}");
         // what the registry accepts
@@ -71,7 +74,8 @@ fn every_package_carries_both_licences() {
 #[test]
 fn pages_of_crates_link_to_nothing_that_is_not_packaged() {
     for folder in crates() {
-        let page = read(&folder.join("README.md"));
+        let package = package(&folder.join("Cargo.toml"));
+        let page = read(&folder.join(package["readme"].as_str().expect("a page")));
         let targets = page.split("](").skip(1).filter_map(|rest| rest.split(')').next());
         for target in targets.filter(|target| target.contains('/') || target.ends_with(".md")) {
             assert!(target.starts_with("https://"), "{}: {target}", folder.display());

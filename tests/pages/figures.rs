@@ -1,11 +1,11 @@
 //! Tables of figures on the pages, written from the files that the gate and the evaluations write.
 //!
 //! A page has `<!-- figures: NAME -->` above a table and `<!-- end of figures -->` below it. NAME is a CSV file below
-//! `reference/`, or one of the tables made here. `STRETCH_FIGURES=write cargo test --test it figures` writes all of them anew.
+//! `reference/`, or one of the tables made here. `STRETCH_PAGES=write cargo test --test it pages` writes all of them anew.
 
 use std::{collections::BTreeMap, fs};
 
-use super::markdown::{pages, read, root};
+use super::markdown::{crate_pages, pages, read, root};
 
 const BEGIN: &str = "<!-- figures: ";
 const END: &str = "<!-- end of figures -->\n";
@@ -127,16 +127,16 @@ fn renewed(page: &str) -> String {
 
 #[test]
 fn figures_on_pages_are_those_of_the_files() {
-    let is_writing = std::env::var("STRETCH_FIGURES").is_ok_and(|what| what == "write");
+    let is_writing = std::env::var("STRETCH_PAGES").is_ok_and(|what| what == "write");
     let mut tables = 0;
-    for page in pages() {
+    for page in pages().into_iter().chain(crate_pages()) {
         let text = read(&page);
         tables += text.matches(BEGIN).count();
         let new = renewed(&text);
         if is_writing {
             fs::write(root().join(&page), new).expect("the page");
         } else {
-            let how = "STRETCH_FIGURES=write cargo test --test it figures writes them anew";
+            let how = "STRETCH_PAGES=write cargo test --test it pages writes them anew";
             assert!(new == text, "{}: figures differ from the files; {how}", page.display());
         }
     }

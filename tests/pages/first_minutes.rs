@@ -3,7 +3,7 @@
 use std::{fmt::Write, fs, path::Path};
 
 use super::markdown::{blocks, read};
-use crate::support::{Scratch, fails, one_line, runs, stretch};
+use crate::support::{Scratch, fails, one_line, program, runs, stretch};
 
 /// A trial of a minute at 20 Hz in centimetres, with short names as people give them.
 fn own_trial(header: &str, factor: f64) -> String {
@@ -65,6 +65,28 @@ fn a_diagnosis_says_as_much_as_is_asked_for() {
     let lines = |text: &str| text.lines().filter(|line| line.starts_with("- ")).count();
     assert!(one_line(&usual).contains("-v says what is wrong with the others"), "{usual}");
     assert!(lines(&verbose) > lines(&usual), "{verbose}");
+}
+
+#[cfg(unix)]
+#[test]
+fn the_action_fails_where_simulator_and_rig_disagree_and_keeps_the_report() {
+    let scratch = Scratch::new();
+    let action = read(Path::new("action.yml"));
+    let line = action.lines().find_map(|line| line.trim().strip_prefix("run: stretch diagnose"));
+    let typed = format!("\"$STRETCH\" diagnose{}", line.expect("a command"));
+    for (effect, status) in [(None, 0), (Some("gauge_hysteresis:h=0.2,s=0.012"), 3)] {
+        let bench = scratch.path(&format!("bench_{status}"));
+        let mut simulate = stretch();
+        simulate.args(["simulate", "--protocol", "pulses", "--out"]).arg(&bench);
+        runs(simulate.args(effect.map(|effect| ["--effect", effect]).iter().flatten()));
+        let report = scratch.path(&format!("report_{status}.html"));
+        let mut shell = std::process::Command::new("bash");
+        shell.args(["-euc", &typed]).env("STRETCH", program().canonicalize().expect("the program"));
+        shell.env("DATA", &bench).env("RIG", "").env("FAIL_ON", "gap").env("REPORT", &report);
+        let said = shell.output().expect("bash");
+        assert_eq!(said.status.code(), Some(status), "{}", String::from_utf8_lossy(&said.stderr));
+        assert!(fs::read_to_string(&report).expect("a report").contains("</html>"));
+    }
 }
 
 #[test]

@@ -28,6 +28,15 @@ pub(super) fn pages() -> Vec<PathBuf> {
     found
 }
 
+/// The pages of the crates, which are the first pages of their documentation.
+pub(super) fn crate_pages() -> Vec<PathBuf> {
+    let entries = fs::read_dir(root().join("crates")).expect("the crates");
+    let page = |entry: fs::DirEntry| Path::new("crates").join(entry.file_name()).join("README.md");
+    let mut found: Vec<PathBuf> = entries.map(|entry| page(entry.expect("an entry"))).collect();
+    found.sort();
+    found
+}
+
 pub(super) fn read(page: &Path) -> String {
     fs::read_to_string(root().join(page)).unwrap_or_else(|e| panic!("{}: {e}", page.display()))
 }

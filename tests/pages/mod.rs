@@ -2,6 +2,7 @@
 //! figures are those of the files that the gate writes.
 
 mod figures;
+mod files;
 mod first_minutes;
 mod markdown;
 mod reference;
@@ -20,6 +21,55 @@ fn links_of_readme_and_book_lead_somewhere() {
             assert!(folder.join(target).exists(), "{}: {target} is not there", page.display());
         }
     }
+}
+
+#[test]
+fn the_book_links_to_nothing_outside_of_it() {
+    // a book that was built stands alone: what leads to a file of the repository leads nowhere there
+    let book = root().join("book/src").canonicalize().expect("the book");
+    for page in pages().iter().filter(|page| page.starts_with("book")) {
+        let folder = root().join(page).parent().expect("a folder").to_owned();
+        for target in links(&read(page)) {
+            let to = folder.join(target).canonicalize().unwrap_or_default();
+            assert!(to.starts_with(&book), "{}: {target} is no page of it", page.display());
+        }
+    }
+}
+
+/// What an answer says in numbers: "24 of 27" as it stands, else each number with its own word.
+fn figures(answer: &str) -> Vec<String> {
+    let words: Vec<&str> =
+        answer.split(' ').map(|word| word.trim_matches([',', ';', '(', ')'])).collect();
+    let is_number =
+        |at: usize| words.get(at).is_some_and(|word| word.contains(|c: char| c.is_ascii_digit()));
+    let mut found = Vec::new();
+    let mut at = 0;
+    while at < words.len() {
+        let is_share = is_number(at) && words.get(at + 1) == Some(&"of") && is_number(at + 2);
+        let taken = if is_share { 3 } else { 1 };
+        if is_number(at) {
+            found.push(words[at..at + taken].join(" "));
+        }
+        at += taken;
+    }
+    found
+}
+
+#[test]
+fn the_index_of_results_says_what_its_pages_say() {
+    let index = read(Path::new("book/src/results/README.md"));
+    let mut seen = 0;
+    for row in index.lines().filter(|line| line.starts_with("| ") && line.contains("](")) {
+        let answer = row.split(" | ").nth(1).expect("an answer");
+        let page = links(row)[0].to_owned();
+        let text = read(&Path::new("book/src/results").join(&page));
+        for figure in figures(answer) {
+            seen += 1;
+            assert!(text.contains(&figure), "{page} does not say {figure}: {answer}");
+        }
+    }
+    assert!(seen > 5, "{seen} figures");
+    assert_eq!(figures("24 of 27, no name on 22 (0.5 of it)"), ["24 of 27", "22", "0.5"]);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Pages of the reference that the program writes: its command line and its catalogue of effects.
 //!
-//! `STRETCH_REFERENCE=write cargo test --test it reference` writes them anew.
+//! `STRETCH_PAGES=write cargo test --test it pages` writes them anew.
 
 use std::fs;
 
@@ -29,13 +29,13 @@ fn commands() -> Vec<String> {
     names.collect()
 }
 
-fn is_written_by_the_program(page: &str, text: &str) {
+pub(super) fn is_written_by_the_program(page: &str, text: &str) {
     let path = root().join("book/src/reference").join(page);
-    if std::env::var("STRETCH_REFERENCE").is_ok_and(|what| what == "write") {
+    if std::env::var("STRETCH_PAGES").is_ok_and(|what| what == "write") {
         fs::write(path, text).expect("the page");
     } else {
         let now = fs::read_to_string(path).unwrap_or_default();
-        let how = "STRETCH_REFERENCE=write cargo test --test it reference writes it anew";
+        let how = "STRETCH_PAGES=write cargo test --test it pages writes it anew";
         assert!(now == text, "{page} differs from what the program says; {how}");
     }
 }

@@ -98,6 +98,12 @@ fn the_readme_is_typed_from_top_to_bottom() {
 }
 
 #[test]
+#[ignore = "the demo and a diagnosis; ./ci.sh runs it"]
+fn the_page_in_an_archive_is_typed() {
+    type_page("release/README.md");
+}
+
+#[test]
 #[ignore = "calibrations and a diagnosis; ./ci.sh runs it"]
 fn the_tutorial_of_the_laboratory_is_typed() {
     type_page("book/src/tutorials/lab.md");

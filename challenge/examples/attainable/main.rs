@@ -2,7 +2,7 @@
 //! What is missed or confounded here is missed for no form and no disturbance.
 //!
 //! Two tables: how far nulls stray, and which effects cannot be told apart, for the trials of the paper with and without a
-//! pressure column and for the paper's with one trial more at 0.7 of the excitation. `docs/blind.md` says how to read them.
+//! pressure column and for the paper's with one trial more at 0.7 of the excitation. `book/src/results/sealed_cases.md` says how to read them.
 //!
 //! `cargo run --release --manifest-path challenge/Cargo.toml --example attainable -- [NULLS [SEEDS]]`: nulls of each protocol (20), sessions of each effect
 //! and strength (1). As many at a time as `RAYON_NUM_THREADS` says, else as there are cores.

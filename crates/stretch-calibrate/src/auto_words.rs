@@ -37,14 +37,14 @@ pub(crate) struct Grounds<'a> {
 pub(crate) fn why(grounds: &Grounds<'_>) -> String {
     let Grounds { best, second, simplest, excess, insured, unit, memory_shows, as_good } = grounds;
     let error = |seen: &Seen| format!("{} {unit}", four_digits(seen.rmse)).trim_end().to_owned();
-    let chosen = insured.unwrap_or(simplest);
+    // the form with a followed baseline is no candidate of this comparison
+    let chosen = insured.map_or(String::new(), |seen| format!("{}: ", seen.model));
     let mut sentence = if simplest.model == best.model {
         let before = second.map_or(String::new(), |s| format!(", {} {}", s.model, error(s)));
         let (model, least) = (&best.model, error(best));
         let among = if *memory_shows { "" } else { " of those without memory" };
         format!(
-            "{}: {model} errs least{among} on what was left out of the fit, {least}{before}",
-            chosen.model
+            "{chosen}{model} errs least{among} on what was left out of the fit, {least}{before}"
         )
     } else {
         let by_chance = excess.filter(|(mean, error)| mean <= error);
@@ -57,8 +57,7 @@ pub(crate) fn why(grounds: &Grounds<'_>) -> String {
             None => format!("which is within {:.0} %", 100.0 * (as_good - 1.0)),
         };
         format!(
-            "{}: {} errs {} on what was left out of the fit, the best, {}, {}; {decided}, and {} numbers are fewer than {}",
-            chosen.model,
+            "{chosen}{} errs {} on what was left out of the fit, the best, {}, {}; {decided}, and {} numbers are fewer than {}",
             simplest.model,
             error(simplest),
             best.model,
@@ -100,12 +99,12 @@ mod tests {
         };
         assert_eq!(
             why(&grounds),
-            "observer: observer errs least on what was left out of the fit, 0.5 mm, hysteresis 0.52 mm"
+            "observer errs least on what was left out of the fit, 0.5 mm, hysteresis 0.52 mm"
         );
         let chance = Grounds { simplest: &simple, excess: Some((0.1, 0.2)), ..grounds };
         assert_eq!(
             why(&chance),
-            "hysteresis: hysteresis errs 0.52 mm on what was left out of the fit, the best, observer, 0.5 mm; the \
+            "hysteresis errs 0.52 mm on what was left out of the fit, the best, observer, 0.5 mm; the \
              difference of their squares is 0.5 of its standard errors, which is chance, and 13 numbers are fewer than 31"
         );
         let close = Grounds { excess: Some((0.3, 0.2)), insured: Some(&rest), ..chance };

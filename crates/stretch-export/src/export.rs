@@ -139,7 +139,7 @@ fn opening(calibration: &Calibration, form: Form, model: &str, has: &[&str]) -> 
     } else {
         ""
     };
-    let libm = if has.contains(&"sd") { "of libm sqrtf alone" } else { "no libm" };
+    let libm = if has.contains(&"sd") { "of libm sqrtf alone (gcc wants -lm)" } else { "no libm" };
     let mut text = String::new();
     // writing to memory cannot fail
     let _ = write!(

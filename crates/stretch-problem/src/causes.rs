@@ -6,7 +6,7 @@ use stretch_effects::{Effect as Known, EffectParameter, Need, gauge_effect};
 use stretch_gap::{Candidate, Diagnosis, Options as Diagnosing, VerdictKind, diagnose};
 use stretch_sim::{Catalogue, Gauge};
 
-use crate::{GaugeSetup, GaugeSimulator};
+use crate::{GaugeSetup, GaugeSimulator, in_words};
 
 /// Effects of the gauge that a calibration builds on, and notes on how the effects were found.
 #[derive(Debug, Clone, Default)]
@@ -42,7 +42,7 @@ impl Causes {
         });
         match done {
             Ok(diagnosis) => {
-                let notes = vec![format!("the gauge alone: {}", diagnosis.sentence)];
+                let notes = vec![format!("the gauge alone: {}", in_words(&diagnosis).sentence)];
                 Self { found: causes(&diagnosis), notes }
             }
             Err(error) => {

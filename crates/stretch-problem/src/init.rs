@@ -152,7 +152,7 @@ fn text(
     }
     out += "\n# Wrappers that are looked for around every stage: all, or a list as [\"input.delay\", \"output.backlash\"].\n";
     out += "wrap = \"all\"\n";
-    out += "\n# The simulator: a worker (book/src/reference/worker.md), or python = \"module:object\", or builtin = \"rig\" or \"gauge\".\n";
+    out += "\n# The simulator: a worker, which answers requests on its standard input, or python = \"module:object\", or builtin = \"rig\" or \"gauge\".\n";
     out += "[simulator]\ncommand = [\"python3\", \"sim.py\"]  # guessed: write it\n";
     out += "\n# Columns, with the least and the greatest value:\n";
     for c in columns.iter().take(LISTED) {

@@ -13,6 +13,7 @@ mod init;
 mod problem;
 mod rig;
 mod transfer;
+mod words;
 pub mod worker;
 mod wrap;
 
@@ -33,3 +34,4 @@ pub use problem::{Diagnosable, Problem, Reading, name_of};
 pub use rig::{RigSession, RigSetup, RigSimulator, RigTrial};
 pub use stretch_effects::{KINDS, Kind, Language, kind_named};
 pub use stretch_sim::Tolerance;
+pub use words::{effect_in_words, in_words};

@@ -92,7 +92,7 @@ pub(crate) fn calibration_verdict(judged: &Judged<'_>) -> String {
     };
     let short = |m: &MethodErrors| with_unit(&number(m.rmse, 3), &evaluation.unit);
     let called = |i: usize| match (methods[i].method.as_str(), names.get(i)) {
-        (RAW, _) => "raw signal, laid on the reference's extremes,".to_owned(),
+        (RAW, _) => "raw signal".to_owned(),
         (method, Some(name)) => {
             let kind = || method.parse::<ModelKind>().ok();
             let remembers = kind().is_some_and(|k| matches!(k, ModelKind::Remembering { .. }));

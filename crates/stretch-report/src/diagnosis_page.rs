@@ -2,6 +2,7 @@
 
 use stretch_data::listed;
 use stretch_gap::Diagnosis;
+use stretch_problem::{effect_in_words, in_words};
 use stretch_sim::Language;
 
 use super::{
@@ -11,7 +12,7 @@ use super::{
         baseline_table, candidate_table, parameter_table, slice_table, stage_table, transfer_table,
     },
     figure::Figure,
-    first_seconds::{GIVEN, causes, diagnosis_verdict, facts},
+    first_seconds::{GIVEN, causes, facts, headline},
     gap_figures::{
         AFTER, Against, BEFORE, after_name, has_after, left_figure, shown, trace_figures,
     },
@@ -23,10 +24,7 @@ use super::{
     subject::Subject,
     turn_figure::turn_figure,
 };
-use crate::{
-    plain::transfer_in_words,
-    words::{effect_in_words, in_words},
-};
+use crate::plain::transfer_in_words;
 
 /// Most candidates that are drawn.
 const DRAWN: usize = 6;
@@ -35,7 +33,7 @@ const DRAWN: usize = 6;
 pub fn diagnosis_page(subject: &Subject<'_>) -> String {
     let worded = in_words(subject.diagnosis);
     let subject = &Subject { diagnosis: &worded, ..*subject };
-    let mut page = Page::new(&diagnosis_title(subject), &diagnosis_verdict(subject));
+    let mut page = Page::new(&diagnosis_title(subject), &headline(subject));
     diagnosis_sections(&mut page, subject);
     page.finish()
 }
@@ -48,6 +46,7 @@ pub(crate) fn diagnosis_title(subject: &Subject<'_>) -> String {
 /// The sections of the report, as a page of their own or as a part of a longer page.
 pub(crate) fn diagnosis_sections(page: &mut Page, subject: &Subject<'_>) {
     let diagnosis = subject.diagnosis;
+    left_over(page, subject);
     page.facts(&facts(diagnosis));
     page.list(&causes(subject));
     if let Some(proposed) = diagnosis.proposed.as_ref().filter(|p| !p.equation.is_empty()) {
@@ -68,6 +67,21 @@ const TURNED: &str = "What is left on the test trials as each number of the effe
     the fit. Between the values that were simulated, where the line has its corners, it is straight; of several numbers that are turned at \
     once the changes are added.";
 
+/// The picture that stands first: what the headline speaks of is seen in it.
+fn left_over(page: &mut Page, subject: &Subject<'_>) {
+    let stage = subject.diagnosis.location.worst().unwrap_or(0);
+    let Some(shown) = shown(subject, stage) else { return };
+    let channel = &subject.simulator.stages()[stage].channel;
+    page.figure(
+        // curves that nearly coincide show less than what is left between them
+        &trace_figures(subject, stage, &shown).1,
+        &format!(
+            "What is left of {channel} in {}, the eight seconds with the largest gap: within two multiples of the noise it is noise.",
+            shown.name
+        ),
+    );
+}
+
 fn seen(page: &mut Page, subject: &Subject<'_>) {
     let stage = subject.diagnosis.location.worst().unwrap_or(0);
     let spec = &subject.simulator.stages()[stage];
@@ -77,14 +91,11 @@ fn seen(page: &mut Page, subject: &Subject<'_>) {
          off. The noise is what no simulator could remove.",
     );
     if let Some(shown) = shown(subject, stage) {
-        let (top, below) = trace_figures(subject, stage, &shown);
+        let (top, _) = trace_figures(subject, stage, &shown);
         let caption = format!(
             "{}: {} in {}, the eight seconds with the largest gap.",
             spec.name, spec.channel, shown.name
         );
-        // curves that nearly coincide show less than what is left between them
-        let left = "What is left, in multiples of the noise: within two of them it is noise.";
-        page.figure(&below, left);
         page.figure(&top, &caption);
         if let Some(turned) = turn_figure(subject, stage, &shown) {
             page.figures(&[(turned, TURNED.to_owned())]);

@@ -3,15 +3,30 @@
 
 use stretch_data::listed;
 use stretch_gap::{Diagnosis, Gross, VerdictKind};
+use stretch_problem::effect_in_words;
 
 use super::{
     markup::{number, percent, with_unit},
+    multiple::multiple,
     subject::Subject,
-    words::effect_in_words,
 };
 
+/// The first words of a page: what is missing, where the answer is a name; what it closes and how sure it is stands right below.
+pub(crate) fn headline(subject: &Subject<'_>) -> String {
+    let d = subject.diagnosis;
+    match (d.verdict, d.sentence.split_once(LACKS)) {
+        (VerdictKind::Effect, Some((before, _))) => {
+            format!("{before}{LACKS}{}.", to_add(&d.named, &d.tied))
+        }
+        _ => verdict(subject),
+    }
+}
+
+/// How the sentence of a diagnosis begins that names effects, behind what it may have to say first.
+const LACKS: &str = "The simulator lacks ";
+
 /// The result in one sentence.
-pub(crate) fn diagnosis_verdict(subject: &Subject<'_>) -> String {
+fn verdict(subject: &Subject<'_>) -> String {
     let d = subject.diagnosis;
     let sentence = d.sentence.replace(" %", "\u{a0}%");
     // a probability holds among the candidates, and is reported as such
@@ -85,11 +100,12 @@ fn to_do(d: &Diagnosis) -> String {
 pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
     let best = d.candidates.first();
     let gain = best.map_or_else(String::new, |c| {
+        let [low, high] = c.closed_ci.map(percent);
+        let interval = if low == high { String::new() } else { format!(" ({low} to {high})") };
         format!(
-            "{} of the gap closes on trials that were not fitted ({} to {}).",
+            "{} of the gap closes on trials that were not fitted{interval}: {} times the noise is left.",
             percent(c.closed),
-            percent(c.closed_ci[0]),
-            percent(c.closed_ci[1])
+            number(multiple(d.gap.left), 3)
         )
     });
     let place = d
@@ -174,28 +190,14 @@ fn moved(d: &Diagnosis) -> Vec<String> {
     far.map(|p| format!("{} to {}", p.name, unit_number(p.fitted, &p.unit))).collect()
 }
 
-/// Every named effect in words, with its values.
+/// Every named effect in words; its numbers stand where it is implemented.
 pub(crate) fn causes(subject: &Subject<'_>) -> Vec<String> {
     let d = subject.diagnosis;
-    let Some(first) = d.candidates.first().filter(|c| c.effects == d.named) else {
-        return Vec::new();
-    };
     let one = |name: &String| {
-        let values: Vec<String> = first
-            .parameters
-            .iter()
-            .filter(|p| p.effect == *name)
-            .map(|p| {
-                format!("{} = {} \u{b1} {}", p.name, number(p.value, 3), unit_number(p.sd, &p.unit))
-            })
-            .collect();
         let own = subject.implementations.iter().find(|own| effect_in_words(&own.name, d) == *name);
-        let words = own.map_or(String::new(), |own| format!(": {}", own.words));
-        let values =
-            if values.is_empty() { String::new() } else { format!(" ({})", values.join(", ")) };
-        format!("{name}{words}{values}.")
+        own.map(|own| format!("{name}: {}.", own.words))
     };
-    d.named.iter().map(one).collect()
+    d.named.iter().filter_map(one).collect()
 }
 
 fn unit_number(x: f64, unit: &str) -> String {

@@ -34,10 +34,11 @@ pub(crate) fn has_after(subject: &Subject<'_>) -> bool {
 
 /// Name of the curve of the simulator with the effect.
 pub(crate) fn after_name(diagnosis: &Diagnosis) -> String {
-    if diagnosis.named.is_empty() {
-        "with the best effects of the catalogue".to_owned()
-    } else {
-        format!("with {}", diagnosis.named.join(" and "))
+    match diagnosis.named.as_slice() {
+        [] => "with the best effects of the catalogue".to_owned(),
+        [one] => format!("with {one}"),
+        // a legend of three names is longer than a phone is wide
+        _ => "with the effects that are missing".to_owned(),
     }
 }
 

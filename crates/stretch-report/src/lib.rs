@@ -28,7 +28,6 @@ mod subject;
 mod surface_figure;
 mod thin;
 mod turn_figure;
-mod words;
 
 pub use calibration_page::{Context, Judged, calibration_page, readme_picture};
 pub use demo_page::demo_page;
@@ -40,7 +39,6 @@ pub use multiple::times;
 pub use page::Table;
 pub use plain::{number, transfer_in_words};
 pub use subject::Subject;
-pub use words::{effect_in_words, in_words};
 
 #[cfg(test)]
 mod tests;

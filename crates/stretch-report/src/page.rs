@@ -62,14 +62,20 @@ impl Page {
         Self { title: title.to_owned(), body, in_section: false }
     }
 
-    /// Begins a part of a report that has several: its own title and sentence.
-    pub fn part(&mut self, title: &str, verdict: &str) -> &mut Self {
+    /// Begins a part of a report that has several: its own title and sentence. [`Page::jump`] leads to its `id`.
+    pub fn part(&mut self, id: &str, title: &str, verdict: &str) -> &mut Self {
         self.close();
         self.put(&format!(
-            "<header class=\"part\"><h1>{}</h1>\n<p class=\"verdict\">{}</p></header>\n",
+            "<header class=\"part\" id=\"{}\"><h1>{}</h1>\n<p class=\"verdict\">{}</p></header>\n",
+            escape(id),
             escape(title),
             escape(verdict)
         ))
+    }
+
+    /// A way to a part further down.
+    pub fn jump(&mut self, id: &str, words: &str) -> &mut Self {
+        self.put(&format!("<p><a href=\"#{}\">{}</a></p>\n", escape(id), escape(words)))
     }
 
     /// Begins a section; `intro` may be empty.

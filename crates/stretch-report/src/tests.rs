@@ -196,8 +196,8 @@ fn the_first_sentence_says_what_the_numbers_say() {
         sentence(&made.page(&context("tuesday"))),
         format!(
             "On a recording that was not used for the fit, the non-linear calibration is \
-             off by {} (RMSE, {}\u{a0}% of the range); the raw signal, laid on the reference&#39;s \
-             extremes, by {}.",
+             off by {} (RMSE, {}\u{a0}% of the range); the raw signal \
+             by {}.",
             deg(poly13),
             number(poly13.rmse_percent, 2),
             deg(raw)
@@ -424,7 +424,7 @@ fn numbers_read_as_written() {
 #[test]
 fn a_part_closes_what_stands_before_it() {
     let mut page = Page::new("Whole", "One.");
-    page.section("A", "").part("Second", "Two & three.").section("B", "");
+    page.section("A", "").part("second", "Second", "Two & three.").section("B", "");
     let names = elements(&page.finish());
     let count = |name: &str| names.iter().filter(|n| *n == name).count();
     assert_eq!(["h1", "h2", "header", "section"].map(count), [2; 4]);

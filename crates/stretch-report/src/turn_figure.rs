@@ -6,6 +6,7 @@ use std::ops::Range;
 use plotters::prelude::*;
 use serde::Serialize;
 use stretch_gap::{Answered, Response, Responses};
+use stretch_problem::effect_in_words;
 
 use super::{
     bar_figure::GAP,
@@ -16,7 +17,6 @@ use super::{
     markup::labelled,
     subject::Subject,
     thin::{extent, padded},
-    words::effect_in_words,
 };
 
 /// Height of a panel, pixels.

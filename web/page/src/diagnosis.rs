@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 use stretch_gap::Options;
 use stretch_problem::{
-    Examined, GaugeSetup, GaugeSimulator, Problem, RigSession, RigSetup, RigSimulator,
+    Examined, GaugeSetup, GaugeSimulator, Problem, RigSession, RigSetup, RigSimulator, in_words,
 };
-use stretch_report::{Subject, diagnosis_page, in_words};
+use stretch_report::{Subject, diagnosis_page};
 use stretch_sim::{Catalogue, GaugeRig, Rig};
 use wasm_bindgen::prelude::*;
 

@@ -24,7 +24,7 @@ pub(crate) fn nothing_above(limits: &[DetectionLimit], effects: &[EffectSpec]) -
     let rest = if known.len() > LISTED { ", and more in the table" } else { "" };
     (!listed.is_empty()).then(|| {
         format!(
-            "Nothing above: {}{rest} (named with probability 0.9, by linearised draws).",
+            "It would have been named if it were stronger than: {}{rest} (with probability 0.9, by linearised draws).",
             listed.join(", ")
         )
     })
@@ -59,7 +59,12 @@ mod tests {
         let limits: Vec<DetectionLimit> =
             (0..9).map(|i| limit(i, (i > 0).then(|| 0.1 * (10 - i) as f64))).collect();
         let words = nothing_above(&limits, &effects).expect("limits");
-        assert!(words.starts_with("Nothing above: e8 0.2 V, e7 0.3 V, "), "{words}");
+        assert!(
+            words.starts_with(
+                "It would have been named if it were stronger than: e8 0.2 V, e7 0.3 V, "
+            ),
+            "{words}"
+        );
         assert!(words.contains("e3") && !words.contains("e2") && words.contains("in the table"));
         assert_eq!(nothing_above(&limits[..1], &effects), None);
         assert_eq!(in_digits(2.04e-11), "2e-11");

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use stretch_effects::kind_named;
 use stretch_gap::Diagnosis;
-use stretch_sim::{RigStage, effect_named};
+use stretch_sim::{CATALOGUE, RigStage, effect_named};
 
 /// What an effect is, as a noun: `the gauge's hysteresis` for `gauge_hysteresis`, `backlash at the output` for `output.backlash`. A name that no
 /// catalogue has, such as an effect of one's own simulator, stands for itself.
@@ -74,7 +74,11 @@ impl Words {
                 d.baselines.iter().flat_map(|b| [&b.largest_drop, &b.signature, &b.bic]).flatten(),
             )
             .chain(d.next_experiment.iter().flat_map(|next| &next.separates));
-        Self(names.map(|name| (name.clone(), effect_in_words(name, d))).collect())
+        // a note may speak of an effect that the answer does not; a name without an underscore may be a word of its own there
+        let others = CATALOGUE.iter().map(|effect| effect.name.to_owned());
+        let others = others.filter(|name| name.contains('_'));
+        let all = names.cloned().chain(others);
+        Self(all.map(|name| (name.clone(), effect_in_words(&name, d))).collect())
     }
 
     fn name(&self, name: &str) -> String {

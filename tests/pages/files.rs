@@ -1,0 +1,126 @@
+//! The page on the files that the program writes and reads: its examples are such files.
+
+use std::{fs, path::Path};
+
+use serde_json::Value;
+
+use super::reference::is_written_by_the_program;
+use crate::support::{Scratch, calibrate, prints, runs, stretch};
+
+const BEGIN: &str = "\
+# Files
+
+The program reads and writes four kinds of files beside recordings. Each example of this page is a file as the program writes it. In rig
+files, problems and records a key that is not known is an error that names the key.
+
+";
+
+const DATA_SET: &str = "
+## A data set: dataset.toml
+
+A folder with `dataset.toml` and its trials is a data set; most commands take its name in place of files. A trial has a `kind` (`inflation`,
+`deflation`, `arbitrary`, `pulses` or `other`) and a `split`: `fit` trials are fitted, `test` trials are held back. `start_s` is where a trial
+begins in the session, which drifts need. A `digest`, which `stretch simulate` adds, is checked as the file is read. `rig` names the rig file of
+the simulator.
+
+";
+
+const RIG: &str = "
+## A rig file
+
+`stretch rig` prints the stock rig. A tolerance is one standard deviation; a parameter without one is exact. An effect that is on is an
+`[[effect]]` with its name and parameters, as `stretch effects` lists them. `stretch diagnose --fix` writes such a file.
+
+";
+
+const PROBLEM: &str = "
+## A simulator of one's own: problem.toml
+
+`stretch init FOLDER` writes a first one beside the recordings in a folder. [The tutorial](../tutorials/worker.md) fills it in, and
+[the worker protocol](worker.md) says what the command has to answer. The command runs with your rights.
+
+";
+
+const RECORD: &str = "
+## A calibration record
+
+`stretch calibrate --out cal.json` writes a record as JSON; a name that ends with `.postcard` gives the same as bytes for a board. `stretch record
+check` checks its digest, and `stretch record seal` renews the digest after a change by hand.
+
+| key | what |
+| --- | --- |
+| `schema` | version of the format; a newer one is refused before anything else is read |
+| `signal`, `reference` | columns of the recording; the unit is the last part of the name |
+| `sample_rate_hz` | rate at which the calibration runs |
+| `target` | what the model gives: the reference itself (`direct`), or a contraction with its resting length |
+| `polarity` | whether the signal rises or falls as the target rises |
+| `signal_range`, `target_range` | least and greatest value of the fitted trials, by which both are divided |
+| `rate_estimator` | window and degree of the Savitzky-Golay filter that gives the rate |
+| `rate_source` | what the rate of the fit was taken from |
+| `dead_band` | rate within which the direction of motion is kept, in units of the signal a second |
+| `model` | the model by its name, with its coefficients, time constants and domains |
+| `provenance` | date, number, names and checksums of the fitted trials |
+| `digest` | checksum of all other keys |
+";
+
+/// The first lines of a text, with a note of what is left out.
+fn first(text: &str, lines: usize) -> String {
+    let shown: Vec<&str> = text.lines().take(lines).map(str::trim_end).collect();
+    format!("{}\n...\n", shown.join("\n").trim_end())
+}
+
+fn toml(text: &str) -> String {
+    format!("```toml\n{}\n```\n", text.trim())
+}
+
+/// Without sums of recordings, which change whenever a last bit of the simulation does.
+fn without_digests(text: &str) -> String {
+    let kept = text.lines().filter(|line| !line.starts_with("digest"));
+    kept.map(|line| format!("{line}\n")).collect()
+}
+
+#[test]
+fn the_files_are_such_as_the_program_writes() {
+    let scratch = Scratch::new();
+    let bench = scratch.path("bench");
+    runs(stretch().args(["simulate", "--protocol", "pulses", "--out"]).arg(&bench));
+    let set = fs::read_to_string(bench.join("dataset.toml")).expect("a data set");
+    let rig = prints(stretch().arg("rig"));
+    let folder = scratch.path("servo");
+    fs::create_dir(&folder).expect("a folder");
+    let row = |n: u32| format!("{:.2},{},{}\n", 0.01 * f64::from(n), n / 50, n / 2);
+    let rows: String = (0..2000).map(row).collect();
+    for name in ["monday.csv", "tuesday.csv"] {
+        fs::write(folder.join(name), format!("time_s,command_V,angle_deg\n{rows}")).expect("a log");
+    }
+    runs(stretch().arg("init").arg(&folder));
+    let problem = fs::read_to_string(folder.join("problem.toml")).expect("a problem");
+    let text = [
+        BEGIN.trim_end(),
+        "\n",
+        DATA_SET,
+        &toml(&first(&without_digests(&set), 16)),
+        RIG,
+        &toml(&first(&rig, 16)),
+        PROBLEM,
+        &toml(&problem),
+        RECORD,
+    ];
+    is_written_by_the_program("files.md", &text.concat());
+}
+
+#[test]
+fn every_key_of_a_record_stands_on_the_page() {
+    let scratch = Scratch::new();
+    let log = scratch.loops("log.csv", 30.0, 1.1);
+    let record = scratch.path("cal.json");
+    runs(&mut calibrate(&log, Path::new(&record)));
+    let text = fs::read_to_string(&record).expect("a record");
+    let keys: Value = serde_json::from_str(&text).expect("JSON");
+    let keys: Vec<&String> = keys.as_object().expect("an object").keys().collect();
+    assert!(keys.len() > 10, "{keys:?}");
+    let rows: String = RECORD.lines().filter_map(|line| line.split(" | ").next()).collect();
+    for key in keys {
+        assert!(rows.contains(&format!("`{key}`")), "{key}");
+    }
+}

@@ -105,13 +105,16 @@ const COVERS: f64 = 1.96;
 /// Name of what the catalogue lacks.
 const UNKNOWN: &str = "unknown";
 
+/// A candidate, with what it leaves by stage and block.
+pub(crate) type Held = (Candidate, Vec<Blocks>);
+
 /// Every hypothesis on the test trials, with what it leaves by stage and block; its probability is that of the others' sum later.
 pub(crate) fn candidates(
     problem: &PreparedProblem<'_>,
     evidence: &Evidence,
     hypotheses: &[Hypothesis],
     seed: u64,
-) -> Result<Vec<(Candidate, Vec<Blocks>)>, GapError> {
+) -> Result<Vec<Held>, GapError> {
     hypotheses.par_iter().map(|one| candidate(problem, evidence, one, seed)).collect()
 }
 
@@ -126,9 +129,9 @@ pub(crate) fn posterior(
     problem: &PreparedProblem<'_>,
     thresholds: &Thresholds,
     (evidence, null_band): (&mut Evidence, f64),
-    (hypotheses, candidates): (Vec<Hypothesis>, Vec<(Candidate, Vec<Blocks>)>),
+    (hypotheses, candidates): (Vec<Hypothesis>, Vec<Held>),
     function: impl FnOnce(&Evidence, &Hypothesis) -> Result<Option<Function>, GapError>,
-) -> Result<(Posterior, Vec<(Candidate, Vec<Blocks>)>), GapError> {
+) -> Result<(Posterior, Vec<Held>), GapError> {
     let (mut kept, mut by_effects) = (Vec::new(), BTreeMap::new());
     for (hypothesis, (candidate, blocks)) in hypotheses.into_iter().zip(candidates) {
         let left = evidence.fitted_gap(problem, &hypothesis).max(candidate.gap_after);
@@ -168,7 +171,7 @@ fn candidate(
     evidence: &Evidence,
     hypothesis: &Hypothesis,
     seed: u64,
-) -> Result<(Candidate, Vec<Blocks>), GapError> {
+) -> Result<Held, GapError> {
     let stages = 0..evidence.stages.len();
     let blocks = stages.map(|s| evidence.blocks(problem, s, &hypothesis.model));
     let blocks = blocks.collect::<Result<Vec<Blocks>, GapError>>()?;

@@ -114,7 +114,7 @@ impl Entry {
             Self::Kind(kind) => {
                 let x = Quantity::new("x", "1", "the channel");
                 let beside = Quantity::new("e", "1", "what is beside it");
-                let signals = Signals { x, beside, dt_s: grid.dt_s() };
+                let signals = Signals { x, beside, load: Quantity::LOAD, dt_s: grid.dt_s() };
                 kind.sketch.map(|sketch| sketch(values, &CHANNEL, &signals))
             }
         };

@@ -80,6 +80,6 @@ pub static DEAD_ZONE: Kind = Kind {
         };
         sketch.with("W", v[0], &signals.x.unit)
     }),
-    twins: &["backlash"],
+    twins: &["backlash", "firmware_dead_band"],
     ..Kind::PLAIN
 };

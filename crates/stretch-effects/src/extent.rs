@@ -22,14 +22,18 @@ pub struct Extent {
     pub lattice: f64,
     /// Least and greatest value of what the effect looks at beside the channel.
     pub beside: [f64; 2],
+    /// Least and greatest value of what loads a contact.
+    pub load: [f64; 2],
 }
 
 impl Extent {
     /// Of a channel of which nothing but its least and its greatest value is known: at 100 Hz, a minute a trial and ten a session, from
     /// one end to the other in a second, and nothing but itself beside it.
     pub const fn between(low: f64, high: f64) -> Self {
-        let (quickest, lattice, beside) = (high - low, 0.01 * (high - low), [low, high]);
-        Self { low, high, quickest, dt_s: 0.01, trial_s: 60.0, session_s: 600.0, lattice, beside }
+        let (quickest, lattice) = (high - low, 0.01 * (high - low));
+        let (beside, load) = ([low, high], [low, high]);
+        let (dt_s, trial_s, session_s) = (0.01, 60.0, 600.0);
+        Self { low, high, quickest, dt_s, trial_s, session_s, lattice, beside, load }
     }
 
     /// Of the parts of a channel that may be looked at.
@@ -52,7 +56,8 @@ impl Extent {
         let longest = parts.clone().map(<[f64]>::len).max().unwrap_or(0);
         let trial_s = longest as f64 * dt_s;
         let lattice = lattice(parts.flatten(), [low, high]);
-        Self { low, high, quickest, dt_s, trial_s, session_s: trial_s, lattice, beside: [0.0; 2] }
+        let (session_s, beside, load) = (trial_s, [0.0; 2], [0.0; 2]);
+        Self { low, high, quickest, dt_s, trial_s, session_s, lattice, beside, load }
     }
 
     /// From the least to the greatest value.
@@ -63,6 +68,11 @@ impl Extent {
     /// Longest delay or lag that is looked for, s: a fifth of a second or twenty samples, and no more than a tenth of a trial.
     pub fn late_s(&self) -> f64 {
         (20.0 * self.dt_s).max(0.2).min(0.1 * self.trial_s).max(self.dt_s)
+    }
+
+    /// Largest absolute value of the load, above 0.
+    pub fn load_size(&self) -> f64 {
+        self.load[0].abs().max(self.load[1].abs()).max(f64::MIN_POSITIVE)
     }
 
     /// Largest absolute value of what is looked at beside.

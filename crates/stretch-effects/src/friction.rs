@@ -67,7 +67,7 @@ impl Operator for Friction {
 }
 
 /// Where friction is looked for: on forces and torques only, whichever side they are on.
-const FORCES: &[Side] = &[Side::Input, Side::Output];
+pub(crate) const FORCES: &[Side] = &[Side::Input, Side::Output];
 
 /// Friction by direction.
 pub static COULOMB_FRICTION: Kind = Kind {
@@ -77,6 +77,7 @@ pub static COULOMB_FRICTION: Kind = Kind {
     equation: "y = x + f tanh(v/width)(1 + lopsided sign(v)) behind the stage, x - the same in front of it",
     usual: FORCES,
     beside: Beside::Velocity,
+    opposes: true,
     parameters: |e, unit| {
         vec![
             EffectParameter::sized("f", unit, 0.0..=0.5 * e.span()),
@@ -86,7 +87,7 @@ pub static COULOMB_FRICTION: Kind = Kind {
     },
     operator: |v, _, _| Box::new(coulomb(v)),
     sketch: Some(|v, _, signals| coulomb(v).sketch(signals)),
-    twins: &["stribeck_friction", "viscous_friction"],
+    twins: &["stribeck_friction", "viscous_friction", "dahl_friction", "load_friction"],
     ..Kind::PLAIN
 };
 
@@ -98,6 +99,7 @@ pub static VISCOUS_FRICTION: Kind = Kind {
     equation: "y = x + b v behind the stage, x - b v in front of it",
     usual: FORCES,
     beside: Beside::Velocity,
+    opposes: true,
     parameters: |e, unit| {
         let most = 0.5 * e.span() / e.beside_size().max(1e-300);
         vec![EffectParameter::sized("b", &format!("{unit}/velocity"), -0.2 * most..=most)]
@@ -116,6 +118,7 @@ pub static STRIBECK_FRICTION: Kind = Kind {
     equation: "y = x + tanh(v/width) more exp(-(v/slow)^2) behind the stage, x - the same in front of it",
     usual: FORCES,
     beside: Beside::Velocity,
+    opposes: true,
     parameters: |e, unit| {
         let v = e.beside_size();
         vec![
@@ -131,7 +134,7 @@ pub static STRIBECK_FRICTION: Kind = Kind {
 };
 
 /// Velocity at which the direction is told.
-fn width(v: f64) -> EffectParameter {
+pub(crate) fn width(v: f64) -> EffectParameter {
     EffectParameter::formed("width", "velocity", 1e-4 * v..=0.1 * v, 0.01 * v).log()
 }
 

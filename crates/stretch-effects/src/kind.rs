@@ -30,6 +30,12 @@ pub enum Beside {
     Another,
     /// The velocity at which the stage rubs.
     Velocity,
+    /// The position at which the stage rubs.
+    Position,
+    /// That velocity and another channel that loads the contact: one effect for each.
+    VelocityAndLoad,
+    /// That position and another channel that loads the contact: one effect for each.
+    PositionAndLoad,
 }
 
 /// How much of what its family shares the values of an effect make.
@@ -79,6 +85,8 @@ pub struct Signals {
     pub x: Quantity,
     /// What it looks at beside it.
     pub beside: Quantity,
+    /// The channel that loads it, where it looks at one.
+    pub load: Quantity,
     /// Sample time, s.
     pub dt_s: f64,
 }
@@ -114,6 +122,8 @@ pub struct Kind {
     pub usual: &'static [Side],
     /// What it looks at beside the channel.
     pub beside: Beside,
+    /// Whether it opposes a motion: behind a stage it is added to the force, in front of one it is subtracted.
+    pub opposes: bool,
     /// Its parameters on a channel of that extent and unit: strengths first, then shapes, choices and forms; what is found in the
     /// record last.
     pub parameters: fn(&Extent, &str) -> Vec<EffectParameter>,
@@ -168,6 +178,7 @@ impl Kind {
         equation: "",
         usual: &[],
         beside: Beside::Nothing,
+        opposes: false,
         parameters: |_, _| Vec::new(),
         starts: None,
         operator: |_, _, _| Box::new(Same),

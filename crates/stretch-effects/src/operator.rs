@@ -33,12 +33,14 @@ pub struct Span<'a> {
     pub pressure_kpa: &'a [f64],
     /// Gauge strain at the same nodes, after the effects on it; empty where it is not yet known.
     pub strain: &'a [f64],
+    /// What loads a contact at the same nodes; empty when there is nothing.
+    pub load: &'a [f64],
 }
 
 impl<'a> Span<'a> {
     /// From node 0 on, in a session that begins with it, without pressure or strain.
     pub fn whole(grid: &'a Grid) -> Self {
-        Self { grid, first_node: 0, start_s: 0.0, pressure_kpa: &[], strain: &[] }
+        Self { grid, first_node: 0, start_s: 0.0, pressure_kpa: &[], strain: &[], load: &[] }
     }
 }
 

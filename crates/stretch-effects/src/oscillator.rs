@@ -59,17 +59,19 @@ impl Oscillator {
     /// Of a natural frequency and a damping ratio on a grid.
     pub fn new(swing: Swing, grid: &Grid) -> Self {
         let Swing { m, damping, .. } = swing;
-        let omega = libm::sqrt(1.0 - damping * damping) / m;
-        let one = |h: f64| {
-            let decay = libm::exp(-damping * h / m);
-            let (sin, cos) = (libm::sin(omega * h) / omega, libm::cos(omega * h));
-            let turn = [cos + damping / m * sin, sin, -sin / (m * m), cos - damping / m * sin];
-            (h, turn.map(|x| decay * x))
-        };
+        let one = |h: f64| (h, turn(m, damping, h));
         let parts = if swing.drag == 0.0 && swing.dry == 0.0 { 1 } else { PARTS };
         let steps = grid.steps().iter().map(|&h| one(h / parts as f64)).collect();
         Self { swing, parts, steps }
     }
+}
+
+/// How a free damped swing goes on over a time `h`: position and velocity from position and velocity.
+pub(crate) fn turn(m: f64, damping: f64, h: f64) -> [f64; 4] {
+    let omega = libm::sqrt(1.0 - damping * damping) / m;
+    let decay = libm::exp(-damping * h / m);
+    let (sin, cos) = (libm::sin(omega * h) / omega, libm::cos(omega * h));
+    [cos + damping / m * sin, sin, -sin / (m * m), cos - damping / m * sin].map(|x| decay * x)
 }
 
 impl Operator for Oscillator {
@@ -220,7 +222,7 @@ pub static SECOND_ORDER_LAG: Kind = Kind {
         ];
         sketch.cells(["speed"], unit, "0").with_all(&numbers)
     }),
-    twins: &["lag", "delay", "skew"],
+    twins: &["lag", "delay", "skew", "flexible_joint", "profile"],
     family: Some((Family::Late, |v| 2.0 * v[1] * v[0])),
     ..Kind::PLAIN
 };

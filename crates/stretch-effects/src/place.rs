@@ -87,7 +87,12 @@ impl Place {
             Self::Sampling | Self::Record => around.record(),
             Self::Length => around.length(),
         };
-        Signals { x, beside: around.strain_beside(), dt_s: around.grid.dt_s() }
+        Signals {
+            x,
+            beside: around.strain_beside(),
+            load: Quantity::LOAD,
+            dt_s: around.grid.dt_s(),
+        }
     }
 }
 

@@ -109,7 +109,7 @@ pub static BACKLASH: Kind = Kind {
             .with_all(&[("W", v[0], &unit), ("SPREAD", v[1], "1")])
             .remembering(["a", "b", "c"])
     }),
-    twins: &["hysteresis", "bouc_wen", "dead_zone"],
+    twins: &["hysteresis", "bouc_wen", "dead_zone", "firmware_dead_band"],
     family: Some((Family::Loop, |v| v[0])),
     hides_input: true,
     ..Kind::PLAIN

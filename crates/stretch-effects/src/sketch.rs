@@ -26,6 +26,9 @@ impl Quantity {
     /// Time since the session began.
     pub const SESSION_TIME: Self = Self::new("t", "s", "time since the session began");
 
+    /// What loads a contact.
+    pub const LOAD: Self = Self::new("load", "1", "what loads the contact");
+
     /// How many samples a record has.
     pub const COUNT: Self = Self::new("n", "1", "how many samples it has");
 
@@ -170,7 +173,7 @@ impl Sketch {
     /// ```
     /// use stretch_effects::{Extent, Quantity, Signals, kind_named};
     /// let x = Quantity::new("x", "strain", "gauge strain");
-    /// let signals = Signals { beside: x.clone(), x, dt_s: 0.01 };
+    /// let signals = Signals { beside: x.clone(), x, load: Quantity::LOAD, dt_s: 0.01 };
     /// let play = kind_named("backlash").unwrap().sketch.unwrap();
     /// let sketch = play(&[0.008, 0.3], &Extent::between(0.0, 0.2), &signals);
     /// assert_eq!(sketch.initial_state().unwrap(), "a, b, c (strain) begin at the first x");

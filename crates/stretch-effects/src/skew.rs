@@ -1,6 +1,6 @@
 //! Samples that show a signal of some time earlier or later.
 
-use alloc::{boxed::Box, vec};
+use alloc::{boxed::Box, format, vec};
 
 use crate::{
     effect::{Acts, Effect, each},
@@ -167,14 +167,22 @@ pub static SKEW: Kind = Kind {
     sketch: Some(|v, _, signals| {
         sketch(SkewSpec { skew_s: v[0], rate: v[1], empty: 0.0 }, signals)
     }),
-    twins: &["delay", "lag", "second_order_lag"],
+    twins: &["delay", "lag", "second_order_lag", "clock_drift"],
     family: Some((Family::Late, |v| v[0])),
     ..Kind::PLAIN
 };
 
 /// Acts on a record as a whole.
 fn sketch(SkewSpec { skew_s, rate, empty }: SkewSpec, signals: &Signals) -> Sketch {
-    let body = "let early = -(SKEW + RATE * i * DT) / DT
+    read_at("SKEW + RATE * i * DT", signals)
+        .with_all(&[("SKEW", skew_s, "s"), ("RATE", rate, "s/s"), ("EMPTY", empty, "1")])
+        .with("DT", signals.dt_s, "s")
+}
+
+/// Reads a record some time before each of its samples, so far without numbers.
+pub(crate) fn read_at(late: &str, signals: &Signals) -> Sketch {
+    let body = format!(
+        "let early = -({late}) / DT
         let whole = floor(early)
         let u = early - whole
         let k = i + whole
@@ -190,12 +198,11 @@ fn sketch(SkewSpec { skew_s, rate, empty }: SkewSpec, signals: &Signals) -> Sket
         y = v[k] + u * (v[k + 1] - v[k])
         end
         end
-        end";
+        end"
+    );
     Sketch::of(signals.x.clone().named("v").record(), body)
         .beside(Quantity::COUNT)
         .beside(Quantity::new("i", "1", "which sample is shown, from 0"))
-        .with_all(&[("SKEW", skew_s, "s"), ("RATE", rate, "s/s"), ("EMPTY", empty, "1")])
-        .with("DT", signals.dt_s, "s")
 }
 
 /// The channels are not sampled at the same time.

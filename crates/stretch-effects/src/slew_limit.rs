@@ -73,6 +73,6 @@ pub static SLEW_LIMIT: Kind = Kind {
             ])
             .remembering(["at"])
     }),
-    twins: &["lag"],
+    twins: &["lag", "profile"],
     ..Kind::PLAIN
 };

@@ -155,8 +155,7 @@ impl Gauge {
         strain.extend(reference.iter().map(|x| (x - self.spec.zero) / self.spec.span));
         self.reference.undo(&mut strain);
         let sites = &self.sites;
-        let whole =
-            Span { grid: &self.grid, first_node: 0, start_s, pressure_kpa: pressure, strain: &[] };
+        let whole = Span { start_s, pressure_kpa: pressure, ..Span::whole(&self.grid) };
         let first = Span { pressure_kpa: pressure.get(..1).unwrap_or(&[]), ..whole };
         let cells = &mut memory.cells;
         let e = [sites.strain.begin(&first, start, strain[0], cells)];

@@ -277,14 +277,14 @@ fn cases() -> Vec<Case> {
             }
         }
     }
-    let extent = Extent { beside: [-0.7, 0.9], ..Extent::between(-1.0, 2.0) };
+    let extent = Extent { beside: [-0.7, 0.9], load: [-2.0, 3.0], ..Extent::between(-1.0, 2.0) };
     for kind in KINDS {
         let name = kind.name;
         for (which, values) in variants(&(kind.parameters)(&extent, "V")).iter().enumerate().skip(1)
         {
             let x = Quantity::new("x", "V", "the channel");
             let beside = Quantity::new("e", "1", "what is beside it");
-            let signals = Signals { x, beside, dt_s: DT_S };
+            let signals = Signals { x, beside, load: Quantity::LOAD, dt_s: DT_S };
             let sketch = kind.sketch.expect("every kind has its code")(values, &extent, &signals);
             let trace = of_kind(kind, values, &extent, &sketch);
             cases.push(Case { name, which, sketch, trace });
@@ -299,9 +299,10 @@ fn of_kind(kind: &Kind, values: &[f64], extent: &Extent, sketch: &Sketch) -> Tra
     let course = course();
     let x = on(&course, -1.0, 2.0);
     let beside: Vec<f64> = course.iter().rev().map(|x| 1.6 * x - 0.7).collect();
-    let span = Span { strain: &beside, ..Span::whole(&grid) };
+    let load: Vec<f64> = course.iter().map(|x| 5.0 * x * x - 2.0).collect();
+    let span = Span { strain: &beside, load: &load, ..Span::whole(&grid) };
     // What travels begins where it is, a signal where the signal is.
-    let begins_beside = sketch.state.iter().any(|cell| cell.begins == "e");
+    let begins_beside = sketch.state.iter().any(|cell| ["e", "p"].contains(&cell.begins));
     let first = if begins_beside { beside[0] } else { x[0] };
     let expected = run(&*(kind.operator)(values, extent, &grid), &span, first, &x);
     let value = |i: usize, q: &Quantity| match (q.name, q.is_record) {
@@ -309,6 +310,7 @@ fn of_kind(kind: &Kind, values: &[f64], extent: &Extent, sketch: &Sketch) -> Tra
         ("t", _) => DT_S * i as f64,
         ("n", _) => SAMPLES as f64,
         ("i", _) => i as f64,
+        ("load", _) => load[i],
         _ => beside[i],
     };
     let row = |i: usize| sketch.inputs.iter().map(|q| value(i, q)).collect();

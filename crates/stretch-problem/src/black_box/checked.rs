@@ -14,7 +14,7 @@ use super::{
     facts::facts,
     source::{RecordedSession, SessionColumn, SessionPart, SessionStage},
     spec::{Input, OwnEffect, Parameter, ProblemSpec, Sensor, StageEntry},
-    velocity::of_position,
+    velocity::{integral_of, of_position},
 };
 use crate::{
     error::ProblemError,
@@ -70,10 +70,18 @@ impl Checked {
         };
         let velocities: Vec<Option<Vec<f64>>> =
             stages.iter().map(|stage| velocity(stage, &columns)).collect();
+        let positions: Vec<Option<Vec<f64>>> =
+            stages.iter().map(|stage| position(stage, &columns)).collect();
         let among = Among {
             columns: &columns,
             stages: stages.iter().map(|s| s.name.as_str()).collect(),
             velocities: &velocities,
+            positions: &positions,
+            moving: stages
+                .iter()
+                .flat_map(|s| s.velocity.iter().chain(&s.position))
+                .map(String::as_str)
+                .collect(),
             inputs: stages.iter().map(|s| s.inputs.len()).collect(),
             others: columns.names.clone(),
             kinds: &spec.kinds,
@@ -242,6 +250,14 @@ fn velocity(stage: &StageEntry, columns: &Columns) -> Option<Vec<f64>> {
     let position = || stage.position.as_ref().and_then(|c| columns.of(c));
     let differences = |x: &[f64]| of_position(x, &columns.ranges(), columns.dt_s);
     recorded.map(<[f64]>::to_vec).or_else(|| position().map(differences))
+}
+
+/// The position of the rubbing parts of a stage: recorded, or the integral of a recorded velocity.
+fn position(stage: &StageEntry, columns: &Columns) -> Option<Vec<f64>> {
+    let recorded = stage.position.as_ref().and_then(|c| columns.of(c));
+    let velocity = || stage.velocity.as_ref().and_then(|c| columns.of(c));
+    let integral = |v: &[f64]| integral_of(v, &columns.ranges(), columns.dt_s);
+    recorded.map(<[f64]>::to_vec).or_else(|| velocity().map(integral))
 }
 
 /// Every channel of every stage, inputs first.

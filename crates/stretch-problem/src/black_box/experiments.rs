@@ -125,7 +125,7 @@ impl BlackBox {
     ) -> Result<Vec<(usize, &'a Vec<f64>)>, GapError> {
         let all = self.acting(run, side);
         let unpredicted = |(at, _): &&(usize, &Vec<f64>)| {
-            matches!(self.problem.wrappers[*at].kind.beside, Beside::Velocity | Beside::Another)
+            !matches!(self.problem.wrappers[*at].kind.beside, Beside::Nothing | Beside::Itself)
         };
         match all.iter().find(unpredicted) {
             Some((at, _)) => {

@@ -26,6 +26,20 @@ pub(crate) fn of_position(position: &[f64], trials: &[Range<usize>], dt_s: f64) 
     }
 }
 
+/// The position p_i = sum of (v_j + v_(j-1)) dt/2 within each trial, from 0, all trials end to end.
+pub(crate) fn integral_of(velocity: &[f64], trials: &[Range<usize>], dt_s: f64) -> Vec<f64> {
+    let mut out = Vec::with_capacity(velocity.len());
+    for trial in trials {
+        let (mut at, mut last) = (0.0, None);
+        for v in &velocity[trial.clone()] {
+            at += last.map_or(0.0, |last: f64| 0.5 * (last + v) * dt_s);
+            last = Some(*v);
+            out.push(at);
+        }
+    }
+    out
+}
+
 fn differences(position: &[f64], trials: &[Range<usize>], half: usize, dt_s: f64) -> Vec<f64> {
     let mut out = Vec::with_capacity(position.len());
     for trial in trials {
@@ -50,5 +64,7 @@ mod tests {
         let v = of_position(&position, &[0..100, 100..200], 0.25);
         assert!(v[..100].iter().all(|v| (*v - 2.0).abs() < 1e-12));
         assert!(v[100..].iter().all(|v| *v == 0.0));
+        let back = integral_of(&v, &[0..100, 100..200], 0.25);
+        assert!((back[99] - 49.5).abs() < 1e-12 && back[100..].iter().all(|p| *p == 0.0));
     }
 }

@@ -38,6 +38,8 @@ pub(crate) struct Placed {
     starts: Vec<Vec<f64>>,
     /// The other channel that the wrapper depends on, all trials end to end.
     beside: Option<Arc<Vec<f64>>>,
+    /// The channel that loads the contact, all trials end to end, with its name and unit.
+    load: Option<(Arc<Vec<f64>>, String)>,
     aliases: Vec<String>,
 }
 
@@ -48,6 +50,10 @@ pub(crate) struct Among<'a> {
     pub(crate) stages: Vec<&'a str>,
     /// By stage, the velocity of its rubbing parts.
     pub(crate) velocities: &'a [Option<Vec<f64>>],
+    /// By stage, the position of its rubbing parts.
+    pub(crate) positions: &'a [Option<Vec<f64>>],
+    /// Columns of velocities and positions, which load nothing.
+    pub(crate) moving: Vec<&'a str>,
     /// By stage, the number of its inputs.
     pub(crate) inputs: Vec<usize>,
     /// Columns that may talk across to a channel.
@@ -96,9 +102,9 @@ pub(crate) fn placed(
 
 /// The error for a pattern that stands for no wrapper.
 fn refused(pattern: &str, all: &[Placed], among: &Among<'_>) -> ProblemError {
-    let is_friction = ["coulomb_friction", "viscous_friction", "stribeck_friction"]
-        .iter()
-        .any(|kind| pattern.ends_with(kind));
+    // `load_friction(load_N)` is friction, too
+    let kind = pattern.split('(').next().unwrap_or(pattern);
+    let is_friction = kind.ends_with("friction") || kind.ends_with("torque_speed_limit");
     if is_friction && among.velocities.iter().all(Option::is_none) {
         return ProblemError::value(
             format!("wrap, {pattern}"),
@@ -130,15 +136,21 @@ fn extent_of(among: &Among<'_>, column: &str) -> Result<Extent, ProblemError> {
 fn at(kind: &'static Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Vec<Placed> {
     let own = &site.column;
     let looked = among.columns.looked_at();
-    let with = |beside: Option<&[f64]>, label: String| {
+    let range_of = |x: &[f64]| ends(looked.iter().flat_map(|r| &x[r.clone()])).into();
+    let with = |beside: Option<&[f64]>, load: Option<(&[f64], &str)>| {
         let own = [extent.low, extent.high];
-        let range = beside.map_or(own, |b| ends(looked.iter().flat_map(|r| &b[r.clone()])).into());
-        let extent = Extent { beside: range, ..extent };
+        let extent = Extent {
+            beside: beside.map_or(own, range_of),
+            load: load.map_or(own, |(load, _)| range_of(load)),
+            ..extent
+        };
         let parameters = kind.fitted(&extent, &site.unit);
         let starts = kind.starts.map_or_else(
             || EffectParameter::starts(&parameters),
             |starts| within(&parameters, starts(&extent)),
         );
+        let other = load.map(|(_, name)| name);
+        let label = other.map_or(kind.name.to_owned(), |other| format!("{}({other})", kind.name));
         Placed {
             kind,
             site: site.clone(),
@@ -147,26 +159,34 @@ fn at(kind: &'static Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Ve
             parameters,
             starts,
             beside: beside.map(|b| Arc::new(b.to_vec())),
+            load: load.map(|(load, name)| (Arc::new(load.to_vec()), name.to_owned())),
             aliases: aliases(kind, site, among, &label),
         }
     };
-    match kind.beside {
-        Beside::Nothing | Beside::Itself => vec![with(None, kind.name.to_owned())],
-        Beside::Velocity => {
-            let is_force = FORCES.iter().any(|unit| *unit == site.unit);
-            let velocity = among.velocities[site.stage].as_ref().filter(|_| is_force);
-            velocity.map(|v| with(Some(v), kind.name.to_owned())).into_iter().collect()
-        }
+    let others = || among.others.iter().filter(|other| *other != own);
+    let moves = |x: &[f64]| {
+        let [low, high]: [f64; 2] = range_of(x);
+        high > low
+    };
+    let rubs = match kind.beside {
+        Beside::Nothing | Beside::Itself => return vec![with(None, None)],
         Beside::Another => {
-            let others = among.others.iter().filter(|other| *other != own);
-            others
-                .filter_map(|other| {
-                    let placed = with(among.columns.of(other), format!("{}({other})", kind.name));
-                    (placed.extent.beside[1] > placed.extent.beside[0]).then_some(placed)
-                })
-                .collect()
+            let each = others().filter_map(|name| Some((among.columns.of(name)?, name.as_str())));
+            let each = each.filter(|(x, _)| moves(x));
+            // what talks across is what the wrapper looks at
+            return each.map(|(x, name)| with(Some(x), Some((x, name)))).collect();
         }
+        Beside::Velocity | Beside::VelocityAndLoad => &among.velocities[site.stage],
+        Beside::Position | Beside::PositionAndLoad => &among.positions[site.stage],
+    };
+    let is_force = FORCES.iter().any(|unit| *unit == site.unit);
+    let Some(rubs) = rubs.as_deref().filter(|x| is_force && moves(x)) else { return Vec::new() };
+    if matches!(kind.beside, Beside::Velocity | Beside::Position) {
+        return vec![with(Some(rubs), None)];
     }
+    let loads = others().filter(|name| among.moving.iter().all(|moving| *moving != *name));
+    let loads = loads.filter_map(|name| Some((among.columns.of(name)?, name.as_str())));
+    loads.filter(|(x, _)| moves(x)).map(|load| with(Some(rubs), Some(load))).collect()
 }
 
 /// The name of a channel's side: `output`, or `input`, or the column where the stage has several inputs.
@@ -239,7 +259,7 @@ impl Placed {
 
     /// Whether the effect is subtracted from the channel: friction is subtracted in front of a stage and added behind it.
     fn is_taken(&self) -> bool {
-        self.kind.beside == Beside::Velocity && self.site.side == Side::Input
+        self.kind.opposes && self.site.side == Side::Input
     }
 
     /// Leaves out the starts at which the wrapper does not show at a sample rate, Hz; gives the least sufficient rate where no start is left.
@@ -260,10 +280,20 @@ impl Placed {
         let x = Quantity { meaning: meaning.into(), ..Quantity::new("x", "", "") };
         let x = Quantity { unit: unit(&self.site.unit), ..x };
         let beside = match self.kind.beside {
-            Beside::Velocity => Quantity::new("v", "velocity", "velocity at which the stage rubs"),
+            Beside::Velocity | Beside::VelocityAndLoad => {
+                Quantity::new("v", "velocity", "velocity at which the stage rubs")
+            }
+            Beside::Position | Beside::PositionAndLoad => {
+                Quantity::new("p", "position", "position at which the stage rubs")
+            }
             _ => Quantity::new("e", "1", "the other channel"),
         };
-        let sketch = self.kind.sketch?(values, &self.extent, &Signals { x, beside, dt_s });
+        let load = self.load.as_ref().map_or(Quantity::LOAD, |(_, name)| Quantity {
+            meaning: format!("{name}, which loads the contact").into(),
+            ..Quantity::LOAD
+        });
+        let signals = Signals { x, beside, load, dt_s };
+        let sketch = self.kind.sketch?(values, &self.extent, &signals);
         let sketch = match self.kind.beside {
             Beside::Itself => sketch.beside_itself("e"),
             _ => sketch,
@@ -296,8 +326,12 @@ impl Placed {
                 Some(ended_s) => Start::Carried { rest_s: (start_s - ended_s).max(0.0) },
                 None => Start::Settled,
             };
+            let is_driven = matches!(self.kind.beside, Beside::Position | Beside::PositionAndLoad);
+            // what is driven by a position begins where the position does
+            let first = beside.first().copied().filter(|_| is_driven).unwrap_or(first);
             operator.begin(start, first, &mut cells);
-            let span = Span { start_s: *start_s, strain: beside, ..Span::whole(trials.grid) };
+            let load = self.load.as_ref().map_or(&[][..], |(load, _)| &load[range.clone()]);
+            let span = Span { start_s: *start_s, strain: beside, load, ..Span::whole(trials.grid) };
             // The friction of a stage is subtracted from the force in front of it, and added to the force behind it.
             let is_taken = self.is_taken();
             let before = is_taken.then(|| signal.to_vec());

@@ -143,7 +143,7 @@ impl Muscle {
     }
 
     fn span(&self, first_node: usize) -> Span<'_> {
-        Span { grid: &self.grid, first_node, start_s: 0.0, pressure_kpa: &[], strain: &[] }
+        Span { first_node, ..Span::whole(&self.grid) }
     }
 
     #[inline]

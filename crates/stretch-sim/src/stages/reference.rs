@@ -55,8 +55,7 @@ impl Reference {
             pick(&self.grid, None, true_mm, length_mm);
             return Ok(());
         }
-        let span =
-            Span { grid: &self.grid, first_node: 0, start_s: 0.0, pressure_kpa: &[], strain: &[] };
+        let span = Span::whole(&self.grid);
         self.row.begin(&span, start, *first, &mut memory.cells);
         if self.grid.pieces() == 1 {
             length_mm.copy_from_slice(true_mm);

@@ -179,8 +179,7 @@ impl Sensing {
             }
         }
         let grid = &self.grid;
-        let span =
-            |first_node: usize| Span { grid, first_node, start_s, pressure_kpa: &[], strain: &[] };
+        let span = |first_node: usize| Span { first_node, start_s, ..Span::whole(grid) };
         let cells = &mut memory.cells;
         let at = Span { pressure_kpa: pressure_kpa.get(..1).unwrap_or(&[]), ..span(0) };
         let e = [sites.strain.begin(&at, start, bridge.strain(*first), cells)];
@@ -234,8 +233,7 @@ impl Sensing {
         if self.sites.record.is_empty() {
             return;
         }
-        let span =
-            Span { grid: &self.grid, first_node: 0, start_s, pressure_kpa: &[], strain: &[] };
+        let span = Span { start_s, ..Span::whole(&self.grid) };
         self.sites.record.begin(&span, Start::Settled, samples[0], &mut memory.cells);
         self.sites.record.run(&span, &mut memory.cells, samples);
     }

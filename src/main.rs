@@ -14,8 +14,8 @@ use std::{io::ErrorKind, process::ExitCode};
 use clap::{CommandFactory, Parser, Subcommand, error::ErrorKind as ArgumentError};
 
 use commands::{
-    apply, calibrate, completions, convert, demo, diagnose, effects, evaluate, export, fleet, init,
-    json, listen, man, page, record, rig, simulate,
+    apply, calibrate, completions, convert, demo, diagnose, effects, evaluate, export, fleet,
+    foretell, init, json, listen, man, page, record, rig, simulate,
 };
 use display::Volume;
 
@@ -53,7 +53,8 @@ Exit status:
   0    done
   1    not done: standard error says why, and nothing is half-written
   2    the arguments are not understood
-  3    done, and the verdict of `stretch diagnose` is one that --fail-on names
+  3    done, and the verdict of `stretch diagnose` is one that --fail-on names, or an error of
+       `stretch foretell` is above --fail-above
   4    done as far as the --budget of `stretch diagnose` lasted: what was found until then is the answer
   130  ended by Ctrl-C";
 
@@ -66,6 +67,7 @@ enum Command {
     Demo(demo::Args),
     Simulate(simulate::Args),
     Diagnose(diagnose::Args),
+    Foretell(foretell::Args),
     Init(init::Args),
     Effects(effects::Args),
     Rig(rig::Args),
@@ -102,6 +104,7 @@ fn main() -> ExitCode {
         Command::Demo(args) => demo::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Diagnose(args) => diagnose::run(args).map(|status| done = status),
+        Command::Foretell(args) => foretell::run(args).map(|status| done = status),
         Command::Init(args) => init::run(args),
         Command::Effects(args) => effects::run(args),
         Command::Rig(args) => rig::run(args),

@@ -10,15 +10,15 @@ use anyhow::{Context, bail, ensure};
 use indicatif::ProgressBar;
 use stretch_files::{FileError, Outputs};
 use stretch_gap::{Diagnosis, Options};
-use stretch_problem::{Examined, Problem, Reading, in_words};
-use stretch_report::{Subject, diagnosis_page};
+use stretch_problem::{ByTrial, Examined, Problem, Reading, in_words};
+use stretch_report::{Subject, diagnosis_page, difference_table, run_table};
 
 use super::{
     diagnosis_files::{write_fix, write_snippets},
-    diagnosis_text::text,
+    diagnosis_text::{table_text, text},
     fail_on::FailOn,
     json::Json,
-    reading::column,
+    reading::{column, columns},
     shared::{detail, say, say_first, spinner, stage_text, tell},
 };
 use crate::display::{fail, is_quiet, is_verbose, warn};
@@ -98,8 +98,8 @@ pub(crate) struct Args {
     /// Reference column of a gauge alone, or what an output of your own simulator senses
     #[arg(long, value_name = "COLUMN", requires = "signal", value_parser = column)]
     reference: Option<String>,
-    /// Signal column of a gauge alone, or that output
-    #[arg(long, value_name = "COLUMN", requires = "reference", value_parser = column)]
+    /// Signal column of a gauge alone, several of one recorder with commas, or that output
+    #[arg(long, value_name = "COLUMN", requires = "reference", value_parser = columns)]
     signal: Option<String>,
     /// Write the recommended experiment as a trial file
     #[arg(long, value_name = "next.csv")]
@@ -107,6 +107,9 @@ pub(crate) struct Args {
     /// Do not look for the experiment that would tell rivals apart
     #[arg(long, hide = true, conflicts_with = "experiment")]
     no_next: bool,
+    /// Fit every run by itself, too, and say which runs disagree, in what, and which values the data tell
+    #[arg(long, value_name = "trial", value_enum, hide_possible_values = true)]
+    by: Option<By>,
     /// Say what simpler methods would have named, too
     #[arg(long)]
     baselines: bool,
@@ -132,6 +135,12 @@ pub(crate) struct Args {
         hide_possible_values = true
     )]
     fail_on: Vec<FailOn>,
+}
+
+/// By what runs are told apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum By {
+    Trial,
 }
 
 /// Diagnoses, and says with which status the program ends.
@@ -194,8 +203,16 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
     let stop = &stretch_files::interrupted;
     let examined =
         problem.examine(&options, looks_on, &told_on(&bar), stop).with_context(beside)?;
+    let by_trial = match args.by {
+        Some(By::Trial) => Some(
+            problem
+                .by_trial(&examined, &told_on(&bar), stop)
+                .with_context(|| format!("{}: --by trial", shown()))?,
+        ),
+        None => None,
+    };
     bar.finish_and_clear();
-    conclude(&args, &examined, &problem)?;
+    conclude(&args, (&examined, by_trial.as_ref()), &problem)?;
     Ok(examined.diagnosis)
 }
 
@@ -224,7 +241,11 @@ pub(super) fn told_on(bar: &ProgressBar) -> impl Fn(&str) + Sync {
 }
 
 /// Writes the files first, all or none: a message that they are there is then true.
-fn conclude(args: &Args, examined: &Examined, problem: &Problem) -> anyhow::Result<()> {
+fn conclude(
+    args: &Args,
+    (examined, by_trial): (&Examined, Option<&ByTrial>),
+    problem: &Problem,
+) -> anyhow::Result<()> {
     let (mut said, mut missing, mut outputs) = (Vec::new(), Vec::new(), Outputs::default());
     match (&args.experiment, &examined.experiment) {
         (Some(path), Some(trial)) => {
@@ -240,10 +261,13 @@ fn conclude(args: &Args, examined: &Examined, problem: &Problem) -> anyhow::Resu
         )),
         _ => {}
     }
-    let answer = examined.to_json();
+    let mut answer = examined.to_json();
+    if let Some(by_trial) = by_trial {
+        answer["by_trial"] = serde_json::to_value(by_trial)?;
+    }
     args.json.stage(&mut outputs, &answer)?;
     if let Some(path) = &args.report {
-        let page = diagnosis_page(&Subject::of(problem, examined));
+        let page = diagnosis_page(&Subject::of(problem, examined).by_trial(by_trial));
         stage_text(&mut outputs, path, &page)?;
         said.push(format!("wrote {}", path.display()));
     }
@@ -256,6 +280,7 @@ fn conclude(args: &Args, examined: &Examined, problem: &Problem) -> anyhow::Resu
     outputs.keep()?;
     args.json.say(&answer, || {
         print(examined)?;
+        by_trial.iter().try_for_each(|by_trial| print_by_trial(by_trial))?;
         said.iter().try_for_each(tell)
     })?;
     missing.iter().for_each(fail);
@@ -274,4 +299,14 @@ pub(super) fn print(examined: &Examined) -> anyhow::Result<()> {
         return Ok(());
     }
     say(text(diagnosis, &examined.implementations, is_verbose()))
+}
+
+/// Which runs disagree, and in what; every value unless the program is to be quiet.
+fn print_by_trial(by_trial: &ByTrial) -> anyhow::Result<()> {
+    if is_quiet() {
+        return Ok(());
+    }
+    by_trial.sentences().iter().try_for_each(|sentence| say(format!("\n{sentence}")))?;
+    say(format!("\n{}", table_text(&difference_table(by_trial))))?;
+    say(format!("\n{}", table_text(&run_table(by_trial))))
 }

@@ -16,6 +16,7 @@ pub(crate) mod evaluate;
 pub(crate) mod export;
 mod fail_on;
 pub(crate) mod fleet;
+pub(crate) mod foretell;
 pub(crate) mod init;
 pub(crate) mod json;
 pub(crate) mod listen;

@@ -48,6 +48,11 @@ pub(crate) fn column(name: &str) -> Result<String, std::convert::Infallible> {
     Ok(tidy_column(name))
 }
 
+/// Names of columns with commas, each as recordings are read.
+pub(crate) fn columns(names: &str) -> Result<String, std::convert::Infallible> {
+    Ok(names.split(',').map(tidy_column).collect::<Vec<_>>().join(","))
+}
+
 impl Recorded {
     /// What is asked of each recording.
     pub(crate) fn options(&self) -> ReadOptions {

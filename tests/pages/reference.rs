@@ -63,3 +63,14 @@ fn the_effects_are_those_of_the_catalogue() {
     text += &block(&["effects", "--kinds"]);
     is_written_by_the_program("effects.md", &text);
 }
+
+#[test]
+fn the_keys_of_a_problem_are_those_that_its_reader_takes() {
+    let mut text = "# problem.toml\n\nEvery key of a problem's file. `problem.schema.json` beside this page says the same to editors; what a worker is sent and\n\
+                    what it may answer stands in [the worker protocol](worker.md).\n\n"
+        .to_owned();
+    text += &stretch_problem::problem_reference();
+    is_written_by_the_program("problem.md", &text);
+    let schema = serde_json::to_string_pretty(&stretch_problem::problem_schema()).expect("JSON");
+    is_written_by_the_program("problem.schema.json", &(schema + "\n"));
+}

@@ -239,8 +239,16 @@ impl EffectParameter {
     }
 
     /// Values to screen at: a strength at a fiftieth and a fifth of its range, of both signs where it has both; a threshold, which is off
-    /// elsewhere than at 0, at a twentieth, a fifth and three fifths of the way from there; a shape at a sixth, a half and
-    /// five sixths of its range; a form at its usual value.
+    /// elsewhere than at 0, at a twentieth, a fifth and three fifths of the way from there; a shape, and a strength that is searched in equal
+    /// ratios, at a sixth, a half and five sixths of its range; a form at its usual value.
+    ///
+    /// ```
+    /// use stretch_effects::EffectParameter;
+    /// let leak = EffectParameter::sized("leak", "1/s", 1e-4..=1e2).log();
+    /// let points = leak.points();
+    /// assert!(points.len() == 3 && points.iter().all(|x| leak.allowed().contains(x)));
+    /// assert!((points[1] - 0.1).abs() < 1e-9);
+    /// ```
     pub fn points(&self) -> Vec<f64> {
         let between = |k: f64| match self.scale {
             Scale::Linear => self.min + (self.max - self.min) * k / 6.0,
@@ -252,6 +260,10 @@ impl EffectParameter {
                 None => [1.0, 3.0, 5.0].map(between).into(),
             };
         };
+        // What is searched in equal ratios never gets to 0.
+        if off == 0.0 && self.is_log() && self.min > 0.0 {
+            return [1.0, 3.0, 5.0].map(between).into();
+        }
         let shares: &[f64] = if off == 0.0 { &[0.02, 0.2] } else { &[0.05, 0.2, 0.6] };
         let ends = [self.min, self.max].into_iter().filter(|end| *end != off);
         ends.flat_map(|end| shares.iter().map(move |s| off + s * (end - off))).collect()

@@ -15,8 +15,10 @@ use crate::error::ProblemError;
 const TIMES: [&str; 10] =
     ["time_s", "time_ms", "time_us", "time_ns", "time", "t_s", "t", "timestamp", "Time", "stamp_s"];
 /// Parts of the names that commands usually have.
-const COMMANDS: [&str; 10] =
-    ["cmd", "command", "ref", "target", "goal", "setpoint", "action", "input", "duty", "pwm"];
+const COMMANDS: [&str; 12] = [
+    "cmd", "command", "ref", "target", "goal", "setpoint", "action", "input", "duty", "pwm",
+    "desired", "demand",
+];
 /// File extensions of recordings.
 const RECORDINGS: [&str; 11] =
     ["csv", "tsv", "txt", "gz", "npy", "npz", "mat", "h5", "hdf5", "mcap", "parquet"];
@@ -108,7 +110,15 @@ fn recordings(folder: &Path) -> Result<Found, ProblemError> {
 struct Known {
     name: String,
     range: [f64; 2],
-    is_command: bool,
+    is_called: bool,
+    is_held: bool,
+}
+
+impl Known {
+    /// Whether it is held, or called like a command.
+    fn is_command(&self) -> bool {
+        self.is_called || self.is_held
+    }
 }
 
 fn known(trials: &[(String, Trial)], first: &Trial) -> Vec<Known> {
@@ -122,7 +132,7 @@ fn known(trials: &[(String, Trial)], first: &Trial) -> Vec<Known> {
             let low = name.to_lowercase();
             let is_called = COMMANDS.iter().any(|word| low.contains(word)) || low.starts_with("u_");
             let is_held = 2 * held > samples;
-            Known { range: ends(all().flatten()).into(), is_command: is_called || is_held, name }
+            Known { range: ends(all().flatten()).into(), is_called, is_held, name }
         })
         .collect()
 }
@@ -156,7 +166,7 @@ fn text(
     out += "[simulator]\ncommand = [\"python3\", \"sim.py\"]  # guessed: write it\n";
     out += "\n# Columns, with the least and the greatest value:\n";
     for c in columns.iter().take(LISTED) {
-        let kind = if c.is_command { ", held or called like a command" } else { "" };
+        let kind = if c.is_command() { ", held or called like a command" } else { "" };
         let unit = unit(&c.name).unwrap_or("unit not in its name");
         out += &format!("#   {} ({unit}): {} to {}{kind}\n", c.name, c.range[0], c.range[1]);
     }
@@ -168,12 +178,24 @@ fn text(
     out + &trials_of(trials)
 }
 
+/// What stands in place of a stage where nothing looks measured.
+const NO_OUTPUT: &str = "
+# No output is proposed: every column that moves is called like a command. Name the one that was measured:
+# [[stage]]
+# name = \"plant\"
+# output = \"COLUMN\"
+# inputs = [\"COLUMN\"]
+";
+
 fn stage(columns: &[Known], trials: &[(String, Trial)]) -> String {
     let moves = |c: &&Known| c.range[1] > c.range[0];
-    let output = columns.iter().filter(moves).rfind(|c| !c.is_command);
-    let output = output.or(columns.last());
-    let own = output.map_or("", |c| c.name.as_str());
-    let commands = columns.iter().filter(moves).filter(|c| c.is_command && c.name != own);
+    let moving = || columns.iter().filter(moves);
+    // A coarse encoder holds its values, too; what is called like a command is never measured.
+    let output = moving().rfind(|c| !c.is_command()).or(moving().rfind(|c| !c.is_called));
+    let Some(own) = output.map(|c| c.name.as_str()) else {
+        return NO_OUTPUT.to_owned();
+    };
+    let commands = moving().filter(|c| c.is_command() && c.name != own);
     let commands: Vec<&str> = commands.map(|c| c.name.as_str()).collect();
     let inputs: Vec<String> = commands.iter().map(|name| quoted(name)).collect();
     let mut out = "\n# Guessed: the last column that is no command is the output, and commands drive the stage.\n"
@@ -244,4 +266,35 @@ fn trials_of(trials: &[(String, Trial)]) -> String {
         out += &format!("split = {split:?}\n");
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn column(name: &str, is_held: bool) -> Known {
+        let is_called = COMMANDS.iter().any(|word| name.contains(word));
+        Known { name: name.into(), range: [0.0, 1.0], is_called, is_held }
+    }
+
+    #[test]
+    fn a_command_is_never_proposed_as_the_output() {
+        let trial = |names: &[&str]| {
+            let channels = names.iter().map(|name| stretch_data::Channel {
+                name: (*name).to_owned(),
+                values: vec![0.0, 1.0],
+            });
+            Trial { name: "a".into(), time_s: vec![0.0, 0.01], channels: channels.collect() }
+        };
+        let of = |columns: &[Known]| {
+            let names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();
+            stage(columns, &[("a".into(), trial(&names))])
+        };
+        // The command stands behind the measurement, and the encoder is so coarse that it holds its values.
+        let coarse = of(&[column("angle_deg", true), column("command_V", false)]);
+        assert!(coarse.contains("output = \"angle_deg\"\n"), "{coarse}");
+        assert!(coarse.contains("inputs = [\"command_V\"]"), "{coarse}");
+        let none = of(&[column("target_deg", false), column("goal_deg", true)]);
+        assert!(!none.contains("\noutput =") && none.contains("No output is proposed"), "{none}");
+    }
 }

@@ -11,13 +11,14 @@ use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, Simulator};
 use stretch_sim::Catalogue;
 
 use crate::{
-    black_box::{Agreed, BlackBox, Checked, ONLY_BEHIND, Source},
+    black_box::{Agreed, BlackBox},
     error::ProblemError,
     file::{IN_FOLDER, ProblemFile, SimulatorEntry},
     fix::{Fix, NoFix},
     gauge::GaugeSimulator,
     implement::Implementation,
     rig::RigSimulator,
+    sensors::read_sensors,
     worker::Workers,
 };
 
@@ -125,6 +126,14 @@ impl Problem {
             return Err(no_option("--budget", "it counts runs of a simulator of your own", hint));
         }
         let Reading { rig, columns, .. } = *reading;
+        if let Some(several) = columns.filter(|(_, signal)| signal.contains(',')) {
+            if rig.is_some() {
+                let hint = "diagnose one signal at a time beside it";
+                return Err(no_option("--rig", "it is of one signal", hint));
+            }
+            let source = Box::new(read_sensors(path, several, reading.without)?);
+            return Ok(Self { name: name_of(path), source, read: vec![path.to_owned()] });
+        }
         let catalogue = Catalogue::default().without(reading.without)?;
         let source: Box<dyn Diagnosable> = match GaugeSimulator::read(
             path, columns, rig, &catalogue,
@@ -172,15 +181,7 @@ impl Problem {
             let folder = workers.folder.display();
             announce(&format!("{} runs, in the folder {folder}: {program}", file.display()));
         }
-        let spec = file.load()?;
-        // a second copy of the recordings only where they may have to be checked against less
-        let behind = spec.only_behind();
-        let checked = Checked::new(spec)?;
-        let source = Workers::start(workers, checked.session())?;
-        let checked = match behind.filter(|_| !source.takes_inputs()) {
-            Some(spec) => Checked::new(spec)?.noting(ONLY_BEHIND),
-            None => checked,
-        };
+        let (checked, source) = Workers::bound(file.load()?, workers)?;
         let name = file.name.clone();
         let own = BlackBox::within(checked, Arc::new(source), file.budget).from_file(file);
         Ok(Self { name, source: Box::new(own), read: vec![path.to_owned()] })

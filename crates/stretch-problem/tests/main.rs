@@ -1,9 +1,12 @@
 //! The tests of stretch-problem from outside, one program: linking takes longer than most of them.
 
 mod budget;
+mod by_trial;
+mod contacts;
 mod effects;
 mod experiments;
 mod flow;
+mod foretold;
 mod gauge;
 mod gross;
 mod in_memory;
@@ -13,7 +16,9 @@ mod plant;
 mod repeated;
 mod rests;
 mod rig;
+mod sensors;
 mod several;
+mod states;
 mod support;
 mod units;
 mod workers;

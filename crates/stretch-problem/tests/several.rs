@@ -70,7 +70,9 @@ fn diagnosed(late_s: [f64; 3], tau_s: f64) -> (Diagnosis, Vec<String>) {
     let problem = Checked::new(ProblemSpec {
         stages: SIGNALS.iter().map(stage).collect(),
         parameters: ["grip", "bend", "turn"].map(scale).into(),
-        wrap: ["skew", "lag", "backlash", "offset"].map(|k| format!("output.{k}")).into(),
+        wrap: ["skew", "clock_drift", "lag", "backlash", "offset"]
+            .map(|k| format!("output.{k}"))
+            .into(),
         trials: recorded(late_s, tau_s),
         ..ProblemSpec::default()
     })

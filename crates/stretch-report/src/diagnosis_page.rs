@@ -7,6 +7,7 @@ use stretch_sim::Language;
 
 use super::{
     bar_figure::{Bar, Row, Scale, bar_figure, narrow_bar_figure, picking_figure},
+    by_trial_tables::{difference_table, run_table},
     canvas::Ink,
     diagnosis_tables::{
         baseline_table, candidate_table, parameter_table, slice_table, stage_table, transfer_table,
@@ -57,6 +58,7 @@ pub(crate) fn diagnosis_sections(page: &mut Page, subject: &Subject<'_>) {
     named(page, subject);
     implemented(page, subject);
     gained(page, subject);
+    agreeing(page, subject);
     next(page, diagnosis);
     detectable(page, diagnosis);
     numbers(page, diagnosis);
@@ -80,6 +82,20 @@ fn left_over(page: &mut Page, subject: &Subject<'_>) {
             shown.name
         ),
     );
+}
+
+/// Whether the runs agree, where that was asked.
+fn agreeing(page: &mut Page, subject: &Subject<'_>) {
+    let Some(by_trial) = subject.by_trial else { return };
+    page.section(
+        "Do the runs agree?",
+        "Every run fitted by itself, with the named effects in place. What differs by more than the intervals is another rig, another load, or an effect that nobody named.",
+    );
+    page.list(&by_trial.sentences());
+    page.table(&difference_table(by_trial));
+    page.folded("Every value of every run", |page| {
+        page.table(&run_table(by_trial));
+    });
 }
 
 fn seen(page: &mut Page, subject: &Subject<'_>) {

@@ -2,6 +2,7 @@
 
 mod bar_figure;
 mod branch;
+mod by_trial_tables;
 mod calibration_page;
 mod calibration_tables;
 mod canvas;
@@ -13,6 +14,7 @@ mod error_figure;
 mod estimate_figure;
 mod figure;
 mod first_seconds;
+mod foretell_page;
 mod gap_figures;
 pub mod kit;
 mod limit_table;
@@ -29,10 +31,12 @@ mod surface_figure;
 mod thin;
 mod turn_figure;
 
+pub use by_trial_tables::{difference_table, run_table};
 pub use calibration_page::{Context, Judged, calibration_page, readme_picture};
 pub use demo_page::demo_page;
 pub use diagnosis_page::diagnosis_page;
 pub use diagnosis_tables::{baseline_table, candidate_table, stage_table, transfer_table};
+pub use foretell_page::{foretell_page, foretell_table};
 pub use limit_table::limit_table;
 pub use markup::percent;
 pub use multiple::times;

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use stretch_gap::{Diagnosis, Evidence, Simulator};
-use stretch_problem::{Examined, Implementation, Problem};
+use stretch_problem::{ByTrial, Examined, Implementation, Problem};
 
 /// The subject of a report.
 #[derive(Clone, Copy)]
@@ -18,13 +18,24 @@ pub struct Subject<'a> {
     pub implementations: &'a [Implementation],
     /// The simulator beside its measurements.
     pub simulator: &'a dyn Simulator,
+    /// Every run fitted by itself, where that was asked for.
+    pub by_trial: Option<&'a ByTrial>,
 }
 
 impl<'a> Subject<'a> {
     /// The subject of an examined problem.
     pub fn of(problem: &'a Problem, examined: &'a Examined) -> Self {
         let Examined { name, diagnosis, evidence, implementations, .. } = examined;
-        Self { name, diagnosis, evidence, implementations, simulator: problem.simulator() }
+        let simulator = problem.simulator();
+        Self { name, diagnosis, evidence, implementations, simulator, by_trial: None }
+    }
+}
+
+impl<'a> Subject<'a> {
+    /// The same, with every run fitted by itself.
+    #[must_use]
+    pub fn by_trial(self, by_trial: Option<&'a ByTrial>) -> Self {
+        Self { by_trial, ..self }
     }
 }
 

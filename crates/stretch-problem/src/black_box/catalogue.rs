@@ -16,15 +16,21 @@ pub(crate) enum Acting {
     Own(usize),
     /// A wrapper, by its index.
     Wrapper(usize),
-    /// The clock of the recorder: one skew for all outputs, applied to each output by its own wrapper.
-    Recorder,
+    /// The clock of the recorder: one effect of this kind for all outputs, applied to each output by its own wrapper.
+    Recorder(&'static str),
 }
 
 /// An effect that is looked for.
 pub(crate) type Entry = (Acting, EffectSpec);
 
-/// Name of the effect of a recorder whose clock makes all outputs late by the same time.
-const RECORDER: &str = "record.skew";
+/// Kinds that a recorder's clock gives to all outputs at once, and what they are called then.
+const RECORDERS: [(&str, &str); 2] =
+    [("skew", "record.skew"), ("clock_drift", "record.clock_drift")];
+
+/// Whether a name is that of an effect of the recorder's clock.
+fn is_recorder(name: &str) -> bool {
+    RECORDERS.iter().any(|(_, recorder)| *recorder == name)
+}
 
 /// Wrappers around the stages.
 pub(crate) struct Around {
@@ -34,8 +40,8 @@ pub(crate) struct Around {
     pub(crate) standing: Vec<(usize, Vec<f64>)>,
     /// By wrapper, whether it is looked for.
     is_open: Vec<bool>,
-    /// Whether the recorder's clock is known.
-    is_clock_known: bool,
+    /// Names of what is known of the recorder's clock.
+    known_clocks: Vec<String>,
 }
 
 impl Around {
@@ -59,12 +65,13 @@ impl Around {
         for known in &spec.wrapped {
             let name = outputs_of(&known.name);
             for (at, wrapper) in wrappers.iter().enumerate().filter(|(_, w)| w.is_called(&name)) {
-                is_open[at] &= known.name == RECORDER;
+                is_open[at] &= is_recorder(&known.name);
                 standing.push((at, values_of(wrapper, known)?));
             }
         }
-        let is_clock_known = spec.wrapped.iter().any(|w| w.name == RECORDER);
-        Ok(Self { wrappers, standing, is_open, is_clock_known })
+        let known = spec.wrapped.iter().map(|w| w.name.clone());
+        let known_clocks = known.filter(|name| is_recorder(name)).collect();
+        Ok(Self { wrappers, standing, is_open, known_clocks })
     }
 
     /// The wrappers that are looked for, as effects.
@@ -73,10 +80,12 @@ impl Around {
         let among: Vec<Placed> = open().map(|(_, w)| w.clone()).collect();
         let spec = |w: &Placed| w.spec(&among, &stages[w.site.stage].name);
         let mut out: Vec<Entry> = open().map(|(at, w)| (Acting::Wrapper(at), spec(w))).collect();
-        if let Some(clock) = recorder(&among, &out).filter(|_| !self.is_clock_known) {
+        let is_open = |name: &str| self.known_clocks.iter().all(|known| known != name);
+        for (kind, name) in RECORDERS.into_iter().filter(|(_, name)| is_open(name)) {
+            let Some(clock) = recorder((kind, name), &among, &out) else { continue };
             let own = out.iter_mut().filter(|(_, own)| clock.twins.contains(&own.name));
-            own.for_each(|(_, own)| own.twins.push(RECORDER.to_owned()));
-            out.push((Acting::Recorder, clock));
+            own.for_each(|(_, own)| own.twins.push(name.to_owned()));
+            out.push((Acting::Recorder(kind), clock));
         }
         out
     }
@@ -108,9 +117,10 @@ impl Around {
     }
 }
 
-/// The name of the wrappers behind an effect: the skews of the outputs for the recorder's clock, else the name itself.
+/// The name of the wrappers behind an effect: those of the outputs for the recorder's clock, else the name itself.
 fn outputs_of(name: &str) -> String {
-    if name == RECORDER { "output.skew".to_owned() } else { name.to_owned() }
+    let recorder = RECORDERS.iter().find(|(_, recorder)| *recorder == name);
+    recorder.map_or_else(|| name.to_owned(), |(kind, _)| format!("output.{kind}"))
 }
 
 /// Values of a wrapper that acts in every run, in the order of its parameters.
@@ -130,20 +140,27 @@ fn values_of(wrapper: &Placed, known: &Wrapped) -> Result<Vec<f64>, ProblemError
     parameters.iter().map(value).collect()
 }
 
-/// Skews of outputs among some wrappers, each with its index.
-pub(crate) fn skews(wrappers: &[Placed]) -> impl Iterator<Item = (usize, &Placed)> {
+/// Wrappers of a kind behind the outputs among some wrappers, each with its index.
+pub(crate) fn behind_outputs<'a>(
+    kind: &'a str,
+    wrappers: &'a [Placed],
+) -> impl Iterator<Item = (usize, &'a Placed)> {
     let all = wrappers.iter().enumerate();
-    all.filter(|(_, w)| w.kind.name == "skew" && w.site.side == Side::Output)
+    all.filter(move |(_, w)| w.kind.name == kind && w.site.side == Side::Output)
 }
 
-/// The skew that all outputs share, where there are several: one parameter in place of one for each output. A shift of all outputs comes
+/// The kind that all outputs share, where there are several: one effect in place of one for each output. A shift of all outputs comes
 /// from the recorder, a shift of a single output from its sensor.
-fn recorder(wrappers: &[Placed], catalogue: &[Entry]) -> Option<EffectSpec> {
+fn recorder(
+    (kind, name): (&str, &str),
+    wrappers: &[Placed],
+    catalogue: &[Entry],
+) -> Option<EffectSpec> {
     let of = |w: &Placed| catalogue.iter().map(|(_, spec)| spec).find(|spec| spec.name == w.name);
-    let own: Vec<&EffectSpec> = skews(wrappers).filter_map(|(_, w)| of(w)).collect();
+    let own: Vec<&EffectSpec> = behind_outputs(kind, wrappers).filter_map(|(_, w)| of(w)).collect();
     let first = own.first().filter(|_| own.len() > 1)?;
     Some(EffectSpec {
-        name: RECORDER.to_owned(),
+        name: name.to_owned(),
         touches: own.iter().flat_map(|spec| spec.touches.clone()).collect(),
         twins: own.iter().map(|spec| spec.name.clone()).collect(),
         ..(*first).clone()

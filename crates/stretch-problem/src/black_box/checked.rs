@@ -9,7 +9,7 @@ use stretch_gap::{Description, DescriptionSpec, Noise, ParameterSpec, StageSpec}
 use stretch_sim::Tolerance;
 
 use super::{
-    catalogue::{Acting, Around, own_effects, skews},
+    catalogue::{Acting, Around, behind_outputs, own_effects},
     columns::Columns,
     facts::facts,
     source::{RecordedSession, SessionColumn, SessionPart, SessionStage},
@@ -151,7 +151,7 @@ impl Checked {
     fn placed(&self, effect: usize) -> Option<&Placed> {
         match *self.acting.get(effect)? {
             Acting::Wrapper(at) => Some(&self.wrappers[at]),
-            Acting::Recorder => skews(&self.wrappers).next().map(|(_, wrapper)| wrapper),
+            Acting::Recorder(kind) => behind_outputs(kind, &self.wrappers).next().map(|(_, w)| w),
             Acting::Own(_) => None,
         }
     }
@@ -167,7 +167,9 @@ impl Checked {
         let is_here = |at: usize| self.is_at(at, stage, side);
         match self.acting[effect] {
             Acting::Wrapper(at) => is_here(at).then_some(at),
-            Acting::Recorder => skews(&self.wrappers).map(|(at, _)| at).find(|at| is_here(*at)),
+            Acting::Recorder(kind) => {
+                behind_outputs(kind, &self.wrappers).map(|(at, _)| at).find(|at| is_here(*at))
+            }
             Acting::Own(_) => None,
         }
     }
@@ -185,6 +187,11 @@ impl Checked {
     fn is_at(&self, wrapper: usize, stage: usize, side: Side) -> bool {
         let site = &self.wrappers[wrapper].site;
         (site.stage, site.side) == (stage, side)
+    }
+
+    /// Whether a wrapper stands in front of its stage.
+    pub(crate) fn is_in_front(&self, wrapper: usize) -> bool {
+        self.wrappers[wrapper].site.side == Side::Input
     }
 
     pub(crate) fn stage_inputs(&self, stage: usize) -> impl Iterator<Item = &[f64]> {

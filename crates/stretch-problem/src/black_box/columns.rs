@@ -7,8 +7,15 @@ use stretch_gap::{SampleRoles, TrialSpec};
 
 use crate::error::ProblemError;
 
-/// Parts of a trial with fewer samples are left out.
-const SHORTEST: usize = 50;
+/// Parts of a trial with fewer samples are left out: those of five seconds, and no more than the second nor fewer than the first.
+const SHORTEST: [usize; 2] = [20, 50];
+const SHORTEST_S: f64 = 5.0;
+
+/// Least samples of a part at the rate of some trials.
+fn shortest(trials: &[SessionTrial]) -> usize {
+    let rate_hz = trials.iter().find_map(|t| t.trial.rate_hz()).unwrap_or(f64::INFINITY);
+    ((SHORTEST_S * rate_hz) as usize).clamp(SHORTEST[0], SHORTEST[1])
+}
 
 /// Columns of all trials end to end.
 #[derive(Debug, Clone)]
@@ -16,6 +23,8 @@ pub(crate) struct Columns {
     pub(crate) names: Vec<String>,
     pub(crate) values: Vec<Vec<f64>>,
     pub(crate) trials: Vec<TrialSpec>,
+    /// Which recording each trial is, or is a part of.
+    sources: Vec<usize>,
     pub(crate) is_lost: Vec<bool>,
     pub(crate) dt_s: f64,
     pub(crate) rows: Rows,
@@ -25,7 +34,7 @@ pub(crate) struct Columns {
 impl Columns {
     pub(crate) fn read(trials: &[SessionTrial], names: Vec<String>) -> Result<Self, ProblemError> {
         let asked: Vec<&str> = names.iter().map(String::as_str).collect();
-        let session = EvenSession::new(trials, &asked, SHORTEST)?;
+        let session = EvenSession::new(trials, &asked, shortest(trials))?;
         if !trials.is_empty() && trials.iter().all(|t| t.split == Split::Test) {
             let hint = "give at least one trial split = \"fit\"";
             return Err(ProblemError::too_little("no trial may be fitted", hint));
@@ -33,7 +42,7 @@ impl Columns {
         if session.trials().is_empty() {
             return Err(ProblemError::value(
                 "recordings",
-                format!("no trial has {SHORTEST} samples in a row"),
+                format!("no trial has {} samples in a row", shortest(trials)),
                 "record at least 10 s to fit and 5 s to test on, without gaps",
             ));
         }
@@ -52,6 +61,7 @@ impl Columns {
             values: (0..names.len()).map(all).collect(),
             names,
             trials: session.trials().iter().map(spec).collect(),
+            sources: session.trials().iter().map(EvenTrial::source).collect(),
             is_lost: if is_lost.iter().any(|lost| *lost) { is_lost } else { Vec::new() },
             dt_s: session.dt_s(),
             rows: session.rows(),
@@ -62,6 +72,11 @@ impl Columns {
     pub(crate) fn of(&self, name: &str) -> Option<&[f64]> {
         let at = self.names.iter().position(|n| n == name)?;
         Some(&self.values[at])
+    }
+
+    /// Trials that are a recording from the index `first` on, or a part of one.
+    pub(crate) fn sources_from(&self, first: usize) -> Vec<usize> {
+        (0..self.sources.len()).filter(|trial| self.sources[*trial] >= first).collect()
     }
 
     /// Range of samples of every trial.

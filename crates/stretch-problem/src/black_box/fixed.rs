@@ -36,6 +36,7 @@ impl BlackBox {
                 spec,
                 trials: Vec::new(),
                 time: "time_s".into(),
+                time_unit: None,
                 budget: self.runs.budget(),
             },
         }
@@ -52,7 +53,7 @@ impl BlackBox {
                 let arguments = own.into_iter().flat_map(|own| &mut own.arguments);
                 arguments.zip(values).for_each(|(a, value)| a.value = Some(*value));
             }
-            Acting::Wrapper(_) | Acting::Recorder => {
+            Acting::Wrapper(_) | Acting::Recorder(_) => {
                 let (name, values) = (spec.name.clone(), named().collect());
                 file.spec.wrapped.push(Wrapped { name, values });
             }
@@ -115,6 +116,7 @@ impl Diagnosable for BlackBox {
         let chosen = Chosen::of(diagnosis, evidence)?;
         let mut remarks = Remarks { head: chosen.head(), ..Remarks::default() };
         let mut file = self.as_file();
+        let is_bare = chosen.effects(&self.description().effects).next().is_none();
         let tuned = file.spec.parameters.iter_mut().zip(&chosen.model.parameters).enumerate();
         for (index, (parameter, value)) in tuned {
             if self.description().parameters[index].sd == 0.0 {
@@ -124,6 +126,10 @@ impl Diagnosable for BlackBox {
             remarks.parameters.insert(("parameter".into(), parameter.name.clone()), remark);
             parameter.tolerance = chosen.tolerance(index, *value, parameter.tolerance);
             parameter.value = *value;
+            if !is_bare {
+                // of a simulator with several fixes the one before the first
+                parameter.alone.get_or_insert(evidence.retuned.parameters[index]);
+            }
         }
         let mut effects = Vec::new();
         for (effect, values) in chosen.effects(&self.description().effects) {

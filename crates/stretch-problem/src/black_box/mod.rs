@@ -12,6 +12,7 @@ mod repeated;
 mod runs;
 pub(crate) mod source;
 pub(crate) mod spec;
+mod states;
 pub(crate) mod velocity;
 
 use std::sync::{Arc, PoisonError, RwLock};
@@ -36,6 +37,7 @@ pub use source::{
 };
 pub(crate) use spec::ONLY_BEHIND;
 pub use spec::{Argument, Input, OwnEffect, Parameter, ProblemSpec, Sensor, StageEntry, Wrapped};
+pub use states::State;
 
 /// A checked problem and a source, bound together: a [`Simulator`].
 ///
@@ -354,7 +356,7 @@ impl Costly for BlackBox {
         match self.problem.acting[effect] {
             Acting::Own(_) => true,
             Acting::Wrapper(at) => self.problem.wrappers[at].site.side == Side::Input,
-            Acting::Recorder => false,
+            Acting::Recorder(_) => false,
         }
     }
 

@@ -140,6 +140,8 @@ pub struct Parameter {
     pub greatest: Option<f64>,
     /// Stages that the parameter acts in; all stages where none is named.
     pub stages: Vec<String>,
+    /// Value re-tuned without the effects that were found, beside which a [foretelling](crate::foretell) is judged; a fix writes it.
+    pub alone: Option<f64>,
 }
 
 /// An effect that the user's simulator has itself: arguments, with the values at which the effect does nothing.

@@ -3,6 +3,7 @@
 use stretch_data::{DataError, Split, TomlView};
 use stretch_sim::Tolerance;
 
+use super::keys::{ARGUMENT, EFFECT, INPUT, PARAMETER, STAGE, TRIAL};
 use crate::black_box::spec::{Argument, Input, OwnEffect, Parameter, StageEntry, Wrapped, share};
 
 /// A trial of a problem's file.
@@ -17,7 +18,7 @@ pub struct TrialFile {
 }
 
 pub(super) fn stage(view: &TomlView<'_>) -> Result<StageEntry, DataError> {
-    view.only(&["name", "output", "unit", "inputs", "noise", "velocity", "position"])?;
+    view.only(&STAGE.names())?;
     let noise = view.optional_number("noise")?;
     if noise.is_some_and(|noise| noise < 0.0) {
         return view.fail("noise", "it is below 0; give one standard deviation");
@@ -35,7 +36,7 @@ pub(super) fn stage(view: &TomlView<'_>) -> Result<StageEntry, DataError> {
 }
 
 pub(super) fn input(view: &TomlView<'_>) -> Result<Input, DataError> {
-    view.only(&["column", "unit", "noise"])?;
+    view.only(&INPUT.names())?;
     let noise = view.optional_number("noise")?.unwrap_or(0.0);
     if noise < 0.0 {
         return view.fail("noise", format!("{noise} is below 0; give one standard deviation"));
@@ -44,7 +45,7 @@ pub(super) fn input(view: &TomlView<'_>) -> Result<Input, DataError> {
 }
 
 pub(super) fn parameter(view: &TomlView<'_>) -> Result<Parameter, DataError> {
-    view.only(&["name", "unit", "value", "tolerance", "least", "greatest", "stages"])?;
+    view.only(&PARAMETER.names())?;
     Ok(Parameter {
         name: view.text("name")?.to_owned(),
         unit: unit(view)?,
@@ -53,6 +54,7 @@ pub(super) fn parameter(view: &TomlView<'_>) -> Result<Parameter, DataError> {
         least: view.optional_number("least")?,
         greatest: view.optional_number("greatest")?,
         stages: view.texts("stages")?,
+        alone: view.optional_number("alone")?,
     })
 }
 
@@ -86,14 +88,14 @@ pub(super) fn effect(view: &TomlView<'_>) -> Result<OwnEffect, DataError> {
     let several = view.tables("argument")?;
     let arguments = match several.is_empty() {
         true => {
-            view.only(&["name", "unit", "range", "off", "log", "value", "stages", "twins"])?;
+            view.only(&EFFECT.names())?;
             vec![argument(view, "")?]
         }
         false => {
             view.only(&["name", "argument", "stages", "twins"])?;
             let one = |own: TomlView<'_>| {
                 let own = own.called(view.name());
-                own.only(&["name", "unit", "range", "off", "log", "value"])?;
+                own.only(&ARGUMENT.names())?;
                 argument(&own, own.text("name")?)
             };
             several.into_iter().map(one).collect::<Result<_, _>>()?
@@ -128,7 +130,7 @@ pub(super) fn wrapped(view: &TomlView<'_>) -> Result<Wrapped, DataError> {
 }
 
 pub(super) fn trial(view: &TomlView<'_>) -> Result<TrialFile, DataError> {
-    view.only(&["file", "start_s", "split"])?;
+    view.only(&TRIAL.names())?;
     let split = match view.optional_text("split")?.unwrap_or("fit") {
         "fit" => Split::Fit,
         "test" => Split::Test,

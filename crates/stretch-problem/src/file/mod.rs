@@ -1,13 +1,14 @@
 //! A problem as a file: `problem.toml`.
 
 mod entries;
+mod keys;
 mod simulator;
 mod write;
 
 use std::path::{Path, PathBuf};
 
 use stretch_data::{DataError, SessionTrial, TomlFile, TomlView};
-use stretch_recording::{ReadOptions, Recording};
+use stretch_recording::{ReadOptions, Recording, TimeUnit};
 
 use crate::{
     black_box::spec::{ProblemSpec, Sensor},
@@ -15,8 +16,10 @@ use crate::{
     worker::WorkersSpec,
 };
 use entries::{effect, input, parameter, stage, trial, wrapped};
+use keys::TOP;
 
 pub use entries::TrialFile;
+pub use keys::{problem_reference, problem_schema};
 pub use simulator::{SimulatorEntry, WorkersEntry};
 
 /// The contents of a `problem.toml`.
@@ -60,6 +63,8 @@ pub struct ProblemFile {
     pub trials: Vec<TrialFile>,
     /// Column of the time.
     pub time: String,
+    /// What the time counts, where the name of its column does not say.
+    pub time_unit: Option<TimeUnit>,
     /// Greatest number of runs of the simulator.
     pub budget: Option<usize>,
 }
@@ -112,24 +117,7 @@ impl ProblemFile {
 
     fn from_file(file: &TomlFile) -> Result<Self, DataError> {
         let top = file.top();
-        top.only(&[
-            "name",
-            "folder",
-            "simulator",
-            "wrap",
-            "wrapped",
-            "without",
-            "beside",
-            "reference",
-            "signal",
-            "time",
-            "budget",
-            "stage",
-            "input",
-            "parameter",
-            "effect",
-            "trial",
-        ])?;
+        top.only(&TOP.names())?;
         let simulator = SimulatorEntry::of(&top)?;
         let spec = ProblemSpec {
             stages: named(&top, "stage", stage)?,
@@ -166,6 +154,7 @@ impl ProblemFile {
             spec,
             trials,
             time: top.optional_text("time")?.unwrap_or("time_s").to_owned(),
+            time_unit: time_unit(&top)?,
             budget: top.optional_count("budget")?,
         })
     }
@@ -195,13 +184,22 @@ impl ProblemFile {
         Ok(Some(WorkersSpec { jobs, deadline_s: how.deadline_s, start_s: how.start_s, ..spec }))
     }
 
+    /// How recordings of the problem are read.
+    pub(crate) fn reading(&self) -> ReadOptions {
+        let options = ReadOptions::new().time(&self.time);
+        match self.time_unit {
+            Some(unit) => options.time_unit(unit),
+            None => options,
+        }
+    }
+
     /// Reads the recordings; the problem with its recordings.
     ///
     /// # Errors
     /// Recordings that cannot be read.
     pub fn load(&self) -> Result<ProblemSpec, ProblemError> {
         let mut spec = self.spec.clone();
-        let options = ReadOptions::new().time(&self.time);
+        let options = self.reading();
         for entry in &self.trials {
             let recording = Recording::read(self.folder.join(&entry.file), &options)?;
             let mut trial = SessionTrial::from(recording);
@@ -210,6 +208,23 @@ impl ProblemFile {
             spec.trials.push(trial);
         }
         Ok(spec)
+    }
+}
+
+/// Units of the time, as they are written.
+pub(crate) const TIME_UNITS: [(&str, TimeUnit); 4] = [
+    ("s", TimeUnit::Seconds),
+    ("ms", TimeUnit::Milliseconds),
+    ("us", TimeUnit::Microseconds),
+    ("ns", TimeUnit::Nanoseconds),
+];
+
+fn time_unit(top: &TomlView<'_>) -> Result<Option<TimeUnit>, DataError> {
+    const KEY: &str = "time_unit";
+    let Some(text) = top.optional_text(KEY)? else { return Ok(None) };
+    match TIME_UNITS.iter().find(|(name, _)| *name == text) {
+        Some((_, unit)) => Ok(Some(*unit)),
+        None => top.fail(KEY, format!("{text:?} is none of s, ms, us, ns")),
     }
 }
 

@@ -6,7 +6,7 @@ use stretch_data::{Remarks, Split};
 use stretch_sim::Tolerance;
 use toml::{Table, Value};
 
-use super::{ProblemFile, SimulatorEntry, WorkersEntry};
+use super::{ProblemFile, SimulatorEntry, TIME_UNITS, WorkersEntry};
 use crate::black_box::spec::{Argument, OwnEffect, Parameter, ProblemSpec};
 
 impl ProblemFile {
@@ -41,6 +41,8 @@ impl ProblemFile {
             out.key("signal", sensor.signal.as_str());
         }
         out.key("time", self.time.as_str());
+        let unit = TIME_UNITS.iter().find(|(_, unit)| Some(*unit) == self.time_unit);
+        out.optional("time_unit", unit.map(|(name, _)| *name));
         out.optional("budget", self.budget.and_then(|budget| i64::try_from(budget).ok()));
         self.entries(remarks, &mut out);
         for trial in &self.trials {
@@ -154,6 +156,7 @@ impl Lines {
         self.optional("least", p.least);
         self.optional("greatest", p.greatest);
         self.texts("stages", &p.stages);
+        self.optional("alone", p.alone);
     }
 
     fn effect<'a>(

@@ -6,7 +6,10 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::frame::WorkerFrame;
-use crate::black_box::source::{Ask, RecordedSession, SourceError};
+use crate::black_box::{
+    State,
+    source::{Ask, RecordedSession, SourceError},
+};
 
 /// The version of the protocol.
 pub(super) const VERSION: u64 = 1;
@@ -31,6 +34,8 @@ pub(super) struct Hello {
     pub(super) effects: Option<Vec<String>>,
     /// Units in which the worker takes and gives columns.
     pub(super) units: BTreeMap<String, String>,
+    /// States that the worker can hold or drain.
+    pub(super) states: Vec<State>,
 }
 
 /// A sentence about what is wrong with an answer.
@@ -70,7 +75,12 @@ pub(super) fn read_hello(frame: &WorkerFrame, session: &RecordedSession) -> Resu
         ("effect", &hello.effects, &session.effects),
     ] {
         let Some(known) = known else { continue };
-        if let Some(name) = used.iter().find(|name| !known.contains(name)) {
+        let is_of_state = |name: &str| {
+            let mut states = hello.states.iter();
+            what == "effect" && states.any(|s| name.starts_with(&format!("state.{}.", s.name)))
+        };
+        let is_known = |name: &String| known.contains(name) || is_of_state(name);
+        if let Some(name) = used.iter().find(|name| !is_known(name)) {
             return Err(format!("it has no {what} {name}; it has {}", known.join(", ")));
         }
     }

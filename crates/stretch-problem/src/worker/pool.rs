@@ -15,7 +15,10 @@ use super::{
     process::{Lost, NO_BODY, Process},
 };
 use crate::{
-    black_box::source::{Ask, RecordedSession, Source, SourceError},
+    black_box::{
+        State,
+        source::{Ask, RecordedSession, Source, SourceError},
+    },
     error::ProblemError,
 };
 
@@ -111,6 +114,11 @@ impl Workers {
         let session = session.clone();
         let (free, restarts) = (Condvar::new(), AtomicUsize::new(0));
         Ok(Self { spec, session, hello, session_notes, crew, free, restarts })
+    }
+
+    /// States that the workers declare.
+    pub fn states(&self) -> &[State] {
+        &self.hello.states
     }
 
     /// An idle worker, or a new worker where there may be more.

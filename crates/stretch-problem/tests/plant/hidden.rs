@@ -196,6 +196,74 @@ pub(crate) fn hidden() -> Vec<Hidden> {
                     .collect()
             }),
         ),
+        ("input.profile", Box::new(|u, _| plain(&trapezoid(u, 60.0, 8.0), 0.0))),
+        (
+            "input.firmware_dead_band",
+            Box::new(|u, _| {
+                let mut z = u[0];
+                let held = |u: &f64| {
+                    if (u - z).abs() > 0.35 {
+                        z = *u;
+                    }
+                    z
+                };
+                plain(&u.iter().map(held).collect::<Vec<_>>(), 0.0)
+            }),
+        ),
+        (
+            "output.flexible_joint",
+            Box::new(|u, _| {
+                // m y'' = k (x - y) + d (x' - y') in steps of 1/20 of a sample, a natural frequency of 4 Hz.
+                let (k, d) = (25.0_f64.powi(2), 2.0 * 0.08 * 25.0);
+                let (mut y, mut v, mut before) = (0.2, 0.0, 0.2);
+                let x = plain(u, 0.0).into_iter();
+                x.map(|x| {
+                    let slope = (x - before) / DT_S;
+                    for i in 0..20 {
+                        let at = before + (x - before) * (f64::from(i) + 0.5) / 20.0;
+                        v += DT_S / 20.0 * (k * (at - y) + d * (slope - v));
+                        y += DT_S / 20.0 * v;
+                    }
+                    before = x;
+                    y
+                })
+                .collect()
+            }),
+        ),
+        (
+            "output.clock_drift",
+            Box::new(|u, start_s| {
+                let y = plain(u, 0.0);
+                let at = |i: usize| {
+                    let late = 0.02 + 6e-4 * (start_s + i as f64 * DT_S);
+                    let t = (i as f64 - late / DT_S).max(0.0);
+                    let (k, share) = (t.floor() as usize, t.fract());
+                    y[k] + share * (y[(k + 1).min(y.len() - 1)] - y[k])
+                };
+                (0..y.len()).map(at).collect()
+            }),
+        ),
         ("brake", Box::new(|u, _| plain(u, 3.0))),
     ]
+}
+
+/// A command followed with a greatest acceleration and rate: bang-bang in steps of 1/50 of a sample.
+fn trapezoid(u: &[f64], acceleration: f64, rate: f64) -> Vec<f64> {
+    let h = DT_S / 50.0;
+    let (mut y, mut v) = (u[0], 0.0_f64);
+    let follow = |u: &f64| {
+        let shown = y;
+        for _ in 0..50 {
+            let apart = u - y;
+            // Away from where it would stop if it braked now.
+            let past = apart - v * v.abs() / (2.0 * acceleration);
+            v = (v + past.signum() * acceleration * h).clamp(-rate, rate);
+            if apart.abs() < acceleration * h * h && v.abs() < 2.0 * acceleration * h {
+                (y, v) = (*u, 0.0);
+            }
+            y += v * h;
+        }
+        shown
+    };
+    u.iter().map(follow).collect()
 }

@@ -1,0 +1,203 @@
+//! Whether values are the same in all runs.
+//!
+//! Cochran's Q of the values x_i with variances v_i, weights w_i = 1/v_i:
+//!
+//! ```text
+//! Q = sum w_i (x_i - m)^2,     m = sum w_i x_i/sum w_i,     chi-square with n - 1 degrees of freedom where all are the same
+//! ```
+//!
+//! Probabilities are corrected for the number of questions by the false discovery rate (Benjamini and Hochberg 1995,
+//! doi 10.1111/j.2517-6161.1995.tb02031.x), at 5 %.
+
+use serde::Serialize;
+use statrs::function::{erf::erfc, gamma::checked_gamma_ur};
+
+use super::{fit::Fit, unknowns::Unknowns};
+
+/// False discovery rate.
+const RATE: f64 = 0.05;
+
+/// Whether a value is the same in all runs that tell it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Heterogeneity {
+    /// Name of the value.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Mean of the runs, weighted by what each says.
+    pub mean: f64,
+    /// Least and greatest value of a run that tells it.
+    pub range: [f64; 2],
+    /// Runs that tell it.
+    pub runs: usize,
+    /// Cochran's Q.
+    pub q: f64,
+    /// Share of the scatter that is not the intervals': max(0, 1 - (n - 1)/Q).
+    pub i_squared: f64,
+    /// Probability of a greater Q where all runs are the same.
+    pub p: f64,
+    /// The same, corrected for the number of values.
+    pub p_corrected: f64,
+    /// Whether the runs disagree.
+    pub differs: bool,
+}
+
+impl Heterogeneity {
+    /// In a sentence.
+    pub fn sentence(&self) -> String {
+        let [low, high] = self.range;
+        let spread = 100.0 * (high - low) / self.mean.abs().max(f64::MIN_POSITIVE);
+        let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
+        format!(
+            "{} differs from run to run: {low:.4} to {high:.4}{unit} ({spread:.0} % of its mean) over {} runs, P = {:.1e}",
+            self.name, self.runs, self.p_corrected
+        )
+    }
+}
+
+/// A run that stands apart from the others, which agree without it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Apart {
+    /// Name of the run.
+    pub run: String,
+    /// Names of the values in which it stands apart.
+    pub values: Vec<String>,
+    /// By how many standard deviations, for each.
+    pub deviations: Vec<f64>,
+    /// Whether the other runs agree in these values without it: it is then another set-up, or was recorded in one.
+    pub is_set_up: bool,
+}
+
+impl Apart {
+    /// In a sentence.
+    pub fn sentence(&self) -> String {
+        let each = self.values.iter().zip(&self.deviations);
+        let each: Vec<String> = each.map(|(name, z)| format!("{name} ({z:+.1} sd)")).collect();
+        let other = match self.is_set_up {
+            true => "; the other runs agree without it: it is another set-up",
+            false => "",
+        };
+        format!("{} stands apart in {}{other}", self.run, each.join(", "))
+    }
+}
+
+/// What the data of a run say of a value: index of the run, number, variance.
+type Said = (usize, f64, f64);
+
+fn said(runs: &[(String, Fit, f64)], value: usize) -> Vec<Said> {
+    let one =
+        |(i, (_, fit, _)): (usize, &(String, Fit, f64))| fit.data(value).map(|(x, v)| (i, x, v));
+    runs.iter().enumerate().filter_map(one).collect()
+}
+
+/// Weighted mean, its variance, and Q.
+fn pooled(said: &[Said]) -> (f64, f64, f64) {
+    let weight: f64 = said.iter().map(|(_, _, v)| 1.0 / v).sum();
+    let mean = said.iter().map(|(_, x, v)| x / v).sum::<f64>() / weight;
+    let q = said.iter().map(|(_, x, v)| (x - mean) * (x - mean) / v).sum();
+    (mean, 1.0 / weight, q)
+}
+
+/// Probability of a greater chi-square.
+fn beyond(q: f64, degrees: usize) -> f64 {
+    checked_gamma_ur(0.5 * degrees as f64, 0.5 * q).unwrap_or(1.0)
+}
+
+/// By value: whether the runs agree.
+pub(super) fn values(unknowns: &Unknowns, runs: &[(String, Fit, f64)]) -> Vec<Heterogeneity> {
+    let mut out = Vec::new();
+    for value in 0..unknowns.len() {
+        let said = said(runs, value);
+        if said.len() < 2 {
+            continue;
+        }
+        let (mean, _, q) = pooled(&said);
+        let of = |x: f64| unknowns.at(value, x, 0.0).0;
+        let ends = said.iter().map(|(_, x, _)| of(*x));
+        let range = ends.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
+        let degrees = said.len() - 1;
+        out.push(Heterogeneity {
+            name: unknowns.name(value).to_owned(),
+            unit: unknowns.unit(value).to_owned(),
+            mean: of(mean),
+            range,
+            runs: said.len(),
+            q,
+            i_squared: (1.0 - degrees as f64 / q).max(0.0),
+            p: beyond(q, degrees),
+            p_corrected: 1.0,
+            differs: false,
+        });
+    }
+    let corrected = corrected(&out.iter().map(|h| h.p).collect::<Vec<_>>());
+    for (one, p) in out.iter_mut().zip(corrected) {
+        (one.p_corrected, one.differs) = (p, p < RATE);
+    }
+    out
+}
+
+/// Runs that stand apart from the mean of the others.
+pub(super) fn apart(unknowns: &Unknowns, runs: &[(String, Fit, f64)]) -> Vec<Apart> {
+    let mut asked: Vec<(usize, usize, f64, bool)> = Vec::new();
+    for value in 0..unknowns.len() {
+        let said = said(runs, value);
+        // Of two that differ nobody knows which is the other one.
+        if said.len() < 3 {
+            continue;
+        }
+        for (run, x, v) in &said {
+            let rest: Vec<Said> = said.iter().copied().filter(|(r, ..)| r != run).collect();
+            let (mean, variance, q) = pooled(&rest);
+            let agree = beyond(q, rest.len() - 1) > RATE;
+            asked.push((*run, value, (x - mean) / (v + variance).sqrt(), agree));
+        }
+    }
+    let p: Vec<f64> =
+        asked.iter().map(|(_, _, z, _)| erfc(z.abs() / std::f64::consts::SQRT_2)).collect();
+    let found = asked.iter().zip(corrected(&p)).filter(|(_, p)| *p < RATE);
+    let found: Vec<_> = found.map(|(one, _)| *one).collect();
+    let of_run = |run: usize| {
+        let own: Vec<_> = found.iter().filter(|(r, ..)| *r == run).collect();
+        // One run cannot be judged by others that disagree among themselves.
+        let is_set_up = own.iter().any(|(.., agree)| *agree);
+        (is_set_up).then(|| Apart {
+            run: runs[run].0.clone(),
+            values: own.iter().map(|(_, v, ..)| unknowns.name(*v).to_owned()).collect(),
+            deviations: own.iter().map(|(_, _, z, _)| *z).collect(),
+            is_set_up,
+        })
+    };
+    (0..runs.len()).filter_map(of_run).collect()
+}
+
+/// Probabilities corrected for their number: the least false discovery rate at which each would be found.
+fn corrected(p: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..p.len()).collect();
+    order.sort_by(|a, b| p[*b].total_cmp(&p[*a]));
+    let (mut out, mut least) = (vec![1.0; p.len()], 1.0_f64);
+    for (behind, i) in order.into_iter().enumerate() {
+        let rank = p.len() - behind;
+        least = least.min(p[i] * p.len() as f64 / rank as f64);
+        out[i] = least;
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn corrected_probabilities_are_those_of_benjamini_and_hochberg() {
+        // The example of their table, the first five of fifteen.
+        let p = [0.0001, 0.0004, 0.0019, 0.0095, 0.0201, 0.0278, 0.0298, 0.0344, 0.0459, 0.3240];
+        let p = [&p[..], &[0.4262, 0.5719, 0.6528, 0.7590, 1.0]].concat();
+        let found = corrected(&p).iter().filter(|p| **p < 0.05).count();
+        assert_eq!(found, 4);
+    }
+
+    #[test]
+    fn the_tail_of_a_chi_square_is_that_of_the_tables() {
+        assert!((beyond(3.841, 1) - 0.05).abs() < 1e-4 && (beyond(18.307, 10) - 0.05).abs() < 1e-4);
+    }
+}

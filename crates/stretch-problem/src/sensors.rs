@@ -1,0 +1,126 @@
+//! Several sensors of one recorder beside one reference, in one problem.
+
+use std::{path::Path, sync::Arc};
+
+use stretch_data::{DataSet, SessionTrial, Split, ends};
+use stretch_gap::noise_variance;
+use stretch_recording::{ReadOptions, Recording};
+use stretch_sim::Tolerance;
+
+use crate::{
+    black_box::{Ask, BlackBox, Checked, Input, Parameter, ProblemSpec, StageEntry, closure},
+    error::ProblemError,
+};
+
+/// Tolerance of offset and gain, in ranges of the signal: they are free.
+const FREE: f64 = 3.0;
+
+/// A sensor as it should be: y = offset + gain e.
+#[derive(Debug, Clone, Copy)]
+struct Line {
+    offset: f64,
+    gain: f64,
+    /// Range of the signal.
+    size: f64,
+}
+
+/// Several sensors that one recorder recorded beside one reference: of each y = offset + gain e, with e the reference over its range. All
+/// kinds of effects are looked for behind each, and what the recorder's clock does to all of them at once (`record.skew`,
+/// `record.clock_drift`).
+///
+/// One signal at a time a shift stands beside everything else that makes a loop; several that are late alike have one cause.
+///
+/// # Errors
+/// Columns that are missing or dead, trials that cannot be brought onto one grid.
+pub fn sensors(
+    trials: Vec<SessionTrial>,
+    reference: &str,
+    signals: &[&str],
+    without: &[String],
+) -> Result<BlackBox, ProblemError> {
+    let of = |name: &str| -> Vec<&[f64]> {
+        let fitted = trials.iter().filter(|t| t.split != Split::Test);
+        fitted.filter_map(|t| t.trial.channel(name)).collect()
+    };
+    let dt_s = trials.iter().find_map(|t| t.trial.rate_hz()).map_or(0.01, |hz| 1.0 / hz);
+    let references = of(reference);
+    let (low, high) = ends(references.iter().flat_map(|x| x.iter()));
+    let span = if high > low { high - low } else { 1.0 };
+    let lines: Vec<Line> = signals.iter().map(|s| line(&references, &of(s), (low, span))).collect();
+    let noise = noise_variance(references.iter().copied(), dt_s).sqrt();
+    let stage = |signal: &&str| StageEntry {
+        name: (*signal).to_owned(),
+        output: (*signal).to_owned(),
+        inputs: vec![reference.to_owned()],
+        ..StageEntry::default()
+    };
+    let parameters = signals.iter().zip(&lines).flat_map(|(signal, line)| {
+        let one = |name: &str, value: f64| Parameter {
+            name: format!("{name}_{signal}"),
+            value,
+            tolerance: Tolerance::Absolute(FREE * line.size),
+            stages: vec![(*signal).to_owned()],
+            ..Parameter::default()
+        };
+        [one("offset", line.offset), one("gain", line.gain)]
+    });
+    let checked = Checked::new(ProblemSpec {
+        stages: signals.iter().map(stage).collect(),
+        inputs: vec![Input { column: reference.to_owned(), noise, ..Input::default() }],
+        parameters: parameters.collect(),
+        wrap: vec!["output.all".to_owned()],
+        without: without.to_vec(),
+        trials,
+        ..ProblemSpec::default()
+    })?;
+    let session = checked.session().clone();
+    let source = closure(move |ask: &Ask<'_>| {
+        let recorded = session.column(reference_of(&session)).unwrap_or(&[]);
+        let own = &recorded[..session.samples(ask.trials)];
+        let x = ask.inputs.map_or(own, |inputs| &inputs[0]);
+        let [offset, gain] = [0, 1].map(|i| ask.parameters[2 * ask.stage + i]);
+        Ok(x.iter().map(|x| offset + gain * ((x - low) / span)).collect())
+    });
+    Ok(BlackBox::new(checked, Arc::new(source)))
+}
+
+/// The column that drives every stage.
+fn reference_of(session: &crate::RecordedSession) -> &str {
+    session.stages.first().and_then(|s| s.inputs.first()).map_or("", String::as_str)
+}
+
+/// The straight line of a signal over the reference.
+fn line(references: &[&[f64]], signals: &[&[f64]], (low, span): (f64, f64)) -> Line {
+    let pairs = || {
+        let trials = references.iter().zip(signals);
+        let pairs = trials.flat_map(|(x, y)| x.iter().zip(*y));
+        pairs.filter(|(x, y)| x.is_finite() && y.is_finite()).map(|(x, y)| ((x - low) / span, *y))
+    };
+    let (n, e, y) = pairs().fold((0.0, 0.0, 0.0), |(n, a, b), (e, y)| (n + 1.0, a + e, b + y));
+    let (e, y) = (e / f64::max(n, 1.0), y / f64::max(n, 1.0));
+    let (ee, ey) = pairs()
+        .fold((0.0, 0.0), |(ee, ey), (x, z)| (ee + (x - e) * (x - e), ey + (x - e) * (z - y)));
+    let gain = if ee > 0.0 && ey != 0.0 { ey / ee } else { 1.0 };
+    let (least, greatest) = ends(signals.iter().flat_map(|y| y.iter()));
+    Line { offset: y - gain * e, gain, size: (greatest - least).max(f64::MIN_POSITIVE) }
+}
+
+/// Reads several sensors from a trial or the folder of a data set; `signals` are parted by commas.
+pub(crate) fn read_sensors(
+    path: &Path,
+    (reference, signals): (&str, &str),
+    without: &[String],
+) -> Result<BlackBox, ProblemError> {
+    let signals: Vec<&str> = signals.split(',').map(str::trim).collect();
+    let twice = signals.iter().enumerate().find(|(i, name)| signals[..*i].contains(name));
+    if let Some((_, name)) = twice {
+        let hint = "name each signal once";
+        return Err(ProblemError::value("--signal", format!("{name} is named twice"), hint));
+    }
+    let options = signals.iter().fold(ReadOptions::new().require(reference), |o, s| o.require(*s));
+    let trials = match path.is_dir() {
+        true => Recording::session(&DataSet::read(path)?, path, &options)?,
+        false => vec![SessionTrial::from(Recording::read(path, &options)?)],
+    };
+    sensors(trials, reference, &signals, without)
+}

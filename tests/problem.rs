@@ -6,7 +6,11 @@ use crate::support::stretch;
 
 /// A servo whose brake holds 2 degrees, commanded every 0.6 s.
 fn recording(path: &Path) {
-    let (mut rows, mut held, mut angle, mut seed) = (String::new(), 0.0, 0.0_f64, 7_u64);
+    recording_from(path, 7);
+}
+
+fn recording_from(path: &Path, mut seed: u64) {
+    let (mut rows, mut held, mut angle) = (String::new(), 0.0, 0.0_f64);
     let mut random = || {
         seed = seed.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
         (seed >> 11) as f64 / 2_f64.powi(52) - 1.0
@@ -95,6 +99,46 @@ fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
         serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
     let agrees = ["no_gap", "parameters"].contains(&again["verdict"].as_str().unwrap());
     assert!(is_good && agrees, "{text}");
+
+    // It foretells a recording that was not fitted, and what was not excited is said.
+    recording_from(&folder.path().join("b.csv"), 8);
+    let (b, page) = (folder.path().join("b.csv"), folder.path().join("f.html"));
+    let json = folder.path().join("f.json");
+    let foretold = |more: &[&str]| {
+        let mut command = stretch();
+        command.arg("foretell").arg(&fixed).arg(&b).args(more);
+        command.output().unwrap()
+    };
+    let files = ["--report", page.to_str().unwrap(), "--json-out", json.to_str().unwrap()];
+    let out = foretold(&files);
+    let text = String::from_utf8_lossy(&out.stdout).into_owned();
+    assert!(
+        out.status.success() && text.contains("with brake the simulator foretells 1 of 1"),
+        "{text}"
+    );
+    let value: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
+    let output = &value["trials"][0]["outputs"][0];
+    assert!(output["ratio"].as_f64().unwrap() < 0.7, "{output}");
+    assert!(output["times_noise"].as_f64().unwrap() < 1.5, "{output}");
+    assert!(fs::read_to_string(page).unwrap().contains("foretold without the fix"));
+    assert_eq!(foretold(&["--fail-above", "3"]).status.code(), Some(0));
+    assert_eq!(foretold(&["--fail-above", "0.5", "--quiet"]).status.code(), Some(3));
+    assert_eq!(foretold(&["--fail-above", "0"]).status.code(), Some(1));
+    let bare = stretch().arg("foretell").arg(&file).arg(&b).output().unwrap();
+    let text = String::from_utf8_lossy(&bare.stderr).into_owned();
+    assert!(!bare.status.success() && text.contains("it holds no effect that was found"), "{text}");
+
+    // Both runs by themselves.
+    let two = own.clone() + PARAMETERS + "[[trial]]\nfile = \"b.csv\"\n";
+    let both = folder.path().join("both.toml");
+    fs::write(&both, two).unwrap();
+    let json = folder.path().join("by.json");
+    let (is_good, text) = said(&both, &["--by", "trial", "--json-out", json.to_str().unwrap()]);
+    assert!(is_good && text.contains("the 2 runs agree in every value that they tell"), "{text}");
+    let value: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
+    assert_eq!(value["by_trial"]["runs"][1]["values"][2]["name"], "brake.brake");
 
     // An object of a Python module, and one that is wrong.
     let module = "def servo(parameters, effects):\n    raise ValueError('no such gear')\n";

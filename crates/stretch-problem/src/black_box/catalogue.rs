@@ -202,6 +202,7 @@ pub(crate) fn own_effects(
             off.push(a.value.or(a.off).unwrap_or(middle));
             let strength = EffectParameter::sized(name, &a.unit, a.min..=a.max);
             parameters.push(match a.off {
+                Some(off) if a.is_log => strength.off_at(off).log(),
                 Some(off) => strength.off_at(off),
                 None if a.is_log => strength.with_role(Role::Shape).log(),
                 None => strength.with_role(Role::Shape),

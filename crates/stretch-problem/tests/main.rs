@@ -11,6 +11,8 @@ mod gauge;
 mod gross;
 mod in_memory;
 mod invariance;
+mod joints;
+mod keys;
 mod pendulum;
 mod plant;
 mod repeated;

@@ -11,11 +11,12 @@ use indicatif::ProgressBar;
 use stretch_files::{FileError, Outputs};
 use stretch_gap::{Diagnosis, Options};
 use stretch_problem::{ByTrial, Examined, Problem, Reading, in_words};
-use stretch_report::{Subject, diagnosis_page, difference_table, run_table};
+use stretch_report::{Subject, diagnosis_page};
 
 use super::{
+    by_trial::{By, print_by_trial},
     diagnosis_files::{write_fix, write_snippets},
-    diagnosis_text::{table_text, text},
+    diagnosis_text::text,
     fail_on::FailOn,
     json::Json,
     reading::{column, columns},
@@ -135,12 +136,6 @@ pub(crate) struct Args {
         hide_possible_values = true
     )]
     fail_on: Vec<FailOn>,
-}
-
-/// By what runs are told apart.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum By {
-    Trial,
 }
 
 /// Diagnoses, and says with which status the program ends.
@@ -299,14 +294,4 @@ pub(super) fn print(examined: &Examined) -> anyhow::Result<()> {
         return Ok(());
     }
     say(text(diagnosis, &examined.implementations, is_verbose()))
-}
-
-/// Which runs disagree, and in what; every value unless the program is to be quiet.
-fn print_by_trial(by_trial: &ByTrial) -> anyhow::Result<()> {
-    if is_quiet() {
-        return Ok(());
-    }
-    by_trial.sentences().iter().try_for_each(|sentence| say(format!("\n{sentence}")))?;
-    say(format!("\n{}", table_text(&difference_table(by_trial))))?;
-    say(format!("\n{}", table_text(&run_table(by_trial))))
 }

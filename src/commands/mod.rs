@@ -1,6 +1,7 @@
 //! One file a subcommand, and what they share.
 
 pub(crate) mod apply;
+mod by_trial;
 pub(crate) mod calibrate;
 mod calibration_text;
 mod causes;

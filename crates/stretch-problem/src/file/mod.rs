@@ -2,6 +2,7 @@
 
 mod entries;
 mod keys;
+mod schema;
 mod simulator;
 mod write;
 
@@ -19,7 +20,7 @@ use entries::{effect, input, parameter, stage, trial, wrapped};
 use keys::TOP;
 
 pub use entries::TrialFile;
-pub use keys::{problem_reference, problem_schema};
+pub use schema::{problem_reference, problem_schema};
 pub use simulator::{SimulatorEntry, WorkersEntry};
 
 /// The contents of a `problem.toml`.

@@ -8,7 +8,9 @@ use stretch_recording::{ReadOptions, Recording};
 use stretch_sim::Tolerance;
 
 use crate::{
-    black_box::{Ask, BlackBox, Checked, Input, Parameter, ProblemSpec, StageEntry, closure},
+    black_box::{
+        Ask, BlackBox, Checked, Input, Parameter, ProblemSpec, RecordedSession, StageEntry, closure,
+    },
     error::ProblemError,
 };
 
@@ -85,7 +87,7 @@ pub fn sensors(
 }
 
 /// The column that drives every stage.
-fn reference_of(session: &crate::RecordedSession) -> &str {
+fn reference_of(session: &RecordedSession) -> &str {
     session.stages.first().and_then(|s| s.inputs.first()).map_or("", String::as_str)
 }
 

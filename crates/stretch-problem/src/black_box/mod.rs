@@ -1,7 +1,7 @@
 //! A user's simulator with wrappers around it, as the diagnosis takes it.
 
 mod catalogue;
-mod checked;
+pub(crate) mod checked;
 pub(crate) mod columns;
 mod experiments;
 mod facts;
@@ -12,7 +12,7 @@ mod repeated;
 mod runs;
 pub(crate) mod source;
 pub(crate) mod spec;
-mod states;
+pub(crate) mod states;
 pub(crate) mod velocity;
 
 use std::sync::{Arc, PoisonError, RwLock};
@@ -35,7 +35,7 @@ pub use source::{
     Ask, Closure, RecordedSession, SessionColumn, SessionPart, SessionStage, Source, SourceError,
     closure,
 };
-pub(crate) use spec::ONLY_BEHIND;
+
 pub use spec::{Argument, Input, OwnEffect, Parameter, ProblemSpec, Sensor, StageEntry, Wrapped};
 pub use states::State;
 

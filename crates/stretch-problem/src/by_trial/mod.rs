@@ -2,36 +2,18 @@
 
 mod fit;
 mod heterogeneity;
+mod told;
 mod unknowns;
 
 use serde::Serialize;
 use stretch_gap::{GapError, Simulator};
 
-use crate::{examine::Examined, problem::Problem};
+use crate::{error::ProblemError, examine::Examined, problem::Problem};
 use fit::{Fit, Target};
 use unknowns::Unknowns;
 
 pub use heterogeneity::{Apart, Heterogeneity};
-pub use unknowns::Standing;
-
-/// A value with its 95 % interval, and whether the data tell it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct FittedValue {
-    /// Name: of a nominal parameter, or `effect.parameter`.
-    pub name: String,
-    /// Unit.
-    pub unit: String,
-    /// The value.
-    pub value: f64,
-    /// One standard deviation, errors that are left and their correlation in time taken into account.
-    pub sd: f64,
-    /// 95 % interval, within the range that was searched.
-    pub interval: [f64; 2],
-    /// Whether the data tell it.
-    pub standing: Standing,
-    /// Names of the values that absorb it; empty unless its standing is `absorbed`.
-    pub absorbed_by: Vec<String>,
-}
+pub use told::{FittedValue, Standing};
 
 /// What some runs say when they are fitted without the others.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -113,7 +95,7 @@ fn by_trial(
     progress: &(dyn Fn(&str) + Sync),
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<ByTrial, GapError> {
-    let refused = |why: &str| Err(GapError::simulator(crate::ProblemError::too_little(why, HINT)));
+    let refused = |why: &str| Err(GapError::simulator(ProblemError::too_little(why, HINT)));
     let trials = simulator.trials();
     if trials.len() < 2 {
         return refused("there is one run");
@@ -141,14 +123,14 @@ fn by_trial(
     }
     let values = heterogeneity::values(&unknowns, &runs);
     let apart = heterogeneity::apart(&unknowns, &runs);
-    let told = |(name, fit, of_all): &(String, Fit, f64)| RunFit {
+    let one = |(name, fit, of_all): &(String, Fit, f64)| RunFit {
         run: name.clone(),
         times_noise: fit.times_noise,
         times_noise_of_all: *of_all,
-        values: unknowns.told(fit),
+        values: told::values(&unknowns, fit),
     };
     let together = ("all".to_owned(), all.clone(), all.times_noise);
-    Ok(ByTrial { all: told(&together), runs: runs.iter().map(told).collect(), values, apart })
+    Ok(ByTrial { all: one(&together), runs: runs.iter().map(one).collect(), values, apart })
 }
 
 /// What to do where runs cannot be told apart.

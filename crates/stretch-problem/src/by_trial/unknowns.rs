@@ -1,22 +1,7 @@
 //! What is fitted in every run, as numbers around 0 in units of what is known before.
 
-use serde::Serialize;
 use stretch_effects::EffectParameter;
 use stretch_gap::{Diagnosis, Evidence, Model, Simulator};
-
-use super::{FittedValue, fit::Fit};
-
-/// Whether data tell a value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Standing {
-    /// To a third of its tolerance, or an effect's value to half of itself.
-    Identified,
-    /// It would be, if others were known that act as it does.
-    Absorbed,
-    /// The data say little more than was known before.
-    Free,
-}
 
 /// Where a value stands in a model.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,14 +56,6 @@ pub(super) struct Unknowns {
 
 /// Tolerances to either side within which a nominal parameter is fitted.
 const REACH: f64 = 3.0;
-/// Share of its tolerance to which a parameter is known where data tell it, and of itself to which an effect's value is.
-const KNOWN: [f64; 2] = [1.0 / 3.0, 0.5];
-/// By how much others blur a value that they absorb, and how alike the errors of both are.
-const BLURRED: f64 = 2.0;
-const ALIKE: f64 = 0.5;
-/// Most names of what absorbs a value.
-const ABSORBERS: usize = 3;
-
 impl Unknowns {
     /// Nominal parameters with a tolerance, and the parameters of the named effects.
     pub(super) fn of(
@@ -188,38 +165,8 @@ impl Unknowns {
         (value, sd * self.all[i].slope(value).abs())
     }
 
-    /// The values of a fit in the words of a report.
-    pub(super) fn told(&self, fit: &Fit) -> Vec<FittedValue> {
-        let one = |(i, u): (usize, &Unknown)| {
-            let x_sd = fit.sd(i);
-            let (value, sd) = self.at(i, fit.at[i], x_sd);
-            let ends = [-1.96, 1.96].map(|k| u.value(fit.at[i] + k * x_sd));
-            let is_known = match u.place {
-                Place::Parameter(_) => x_sd <= KNOWN[0],
-                Place::Effect(..) => sd <= KNOWN[1] * value.abs(),
-            };
-            let like = self.like(fit, i);
-            let standing = match (is_known, like.is_empty()) {
-                (true, _) => Standing::Identified,
-                (false, false) => Standing::Absorbed,
-                (false, true) => Standing::Free,
-            };
-            let absorbed_by = if standing == Standing::Absorbed { like } else { Vec::new() };
-            let (name, unit) = (u.name.clone(), u.unit.clone());
-            FittedValue { name, unit, value, sd, interval: ends, standing, absorbed_by }
-        };
-        self.all.iter().enumerate().map(one).collect()
-    }
-
-    /// Names of the values that blur another one, the most alike first.
-    fn like(&self, fit: &Fit, i: usize) -> Vec<String> {
-        if fit.sd(i) < BLURRED * fit.sd_alone(i) {
-            return Vec::new();
-        }
-        let mut others: Vec<(f64, usize)> =
-            (0..self.len()).filter(|j| *j != i).map(|j| (fit.correlation(i, j).abs(), j)).collect();
-        others.retain(|(correlation, _)| *correlation >= ALIKE);
-        others.sort_by(|a, b| b.0.total_cmp(&a.0));
-        others.iter().take(ABSORBERS).map(|(_, j)| self.all[*j].name.clone()).collect()
+    /// Whether a value is a nominal parameter's.
+    pub(super) fn is_parameter(&self, i: usize) -> bool {
+        matches!(self.all[i].place, Place::Parameter(_))
     }
 }

@@ -2,7 +2,11 @@
 
 use super::pool::{Workers, WorkersSpec};
 use crate::{
-    black_box::{Checked, ONLY_BEHIND, ProblemSpec, Source},
+    black_box::{
+        checked::Checked,
+        source::Source,
+        spec::{ONLY_BEHIND, ProblemSpec},
+    },
     error::ProblemError,
 };
 

@@ -7,8 +7,8 @@ use serde_json::{Value, json};
 
 use super::frame::WorkerFrame;
 use crate::black_box::{
-    State,
     source::{Ask, RecordedSession, SourceError},
+    states::State,
 };
 
 /// The version of the protocol.

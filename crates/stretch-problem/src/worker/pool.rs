@@ -16,8 +16,8 @@ use super::{
 };
 use crate::{
     black_box::{
-        State,
         source::{Ask, RecordedSession, Source, SourceError},
+        states::State,
     },
     error::ProblemError,
 };

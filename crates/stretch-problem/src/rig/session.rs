@@ -8,6 +8,7 @@ use stretch_recording::{ReadOptions, Recording};
 
 use super::directions::{self, Motion};
 use super::smooth::{Draws, Smoothed, schedule};
+use super::timing::{is_slow, switched};
 use crate::{
     bench::{
         isolated_outliers::without_isolated_outliers,
@@ -344,7 +345,11 @@ impl Inputs {
     ) -> Self {
         let smooth = |trial: &RigTrial, record: &[f64], sd: f64, sharp: bool| {
             let allowed = schedule(&trial.inlet, &trial.outlet, session.dt_s, sharp);
-            Smoothed::of(record, sd, &allowed)
+            let smoothed = Smoothed::of(record, sd, &allowed);
+            match sharp && is_slow(session.dt_s) {
+                true => smoothed.cornered(switched(&trial.inlet, &trial.outlet)),
+                false => smoothed,
+            }
         };
         let trials = &session.trials;
         let length: Vec<_> =

@@ -28,6 +28,8 @@ const PATIENCE: f64 = 4.0;
 pub(crate) struct Smoothed {
     halves: Vec<u8>,
     pub(crate) values: Vec<f64>,
+    /// Samples before which the slope changed somewhere between two rows, and by how much a sample.
+    corners: Vec<(usize, f64)>,
 }
 
 /// Sums of x^2 and x^4 over -h .. h, and the number of samples.
@@ -103,12 +105,32 @@ impl Smoothed {
                 0
             })
             .collect();
-        Self { values: smoothed(record, &halves), halves }
+        Self { values: smoothed(record, &halves), halves, corners: Vec::new() }
     }
 
-    /// A draw of the noise, smoothed like the recording.
+    /// The same, where commands may have switched anywhere in the sample before each of some rows: the input then has a corner there that no row shows.
+    pub(crate) fn cornered(self, switches: impl Iterator<Item = usize>) -> Self {
+        let change = |i: usize| {
+            let at = |i: usize| self.values.get(i).copied();
+            let before = at(i.checked_sub(1)?)? - at(i.checked_sub(2)?)?;
+            Some((i, at(i + 1)? - at(i)? - before))
+        };
+        Self { corners: switches.filter_map(change).collect(), ..self }
+    }
+
+    /// A draw of the noise, smoothed like the recording, and of the corners between two rows.
+    ///
+    /// A corner a share a of a sample before row i, at which the slope changes by d a sample, lies a (1 - a) d below the straight line from row i - 1
+    /// to row i. What acts on a stage that is slower than a row is the area: both rows are lowered by a quarter of that.
     fn drawn(&self, noise: &Noise, random: &mut RandomGenerator) -> Vec<f64> {
-        smoothed(&noise.samples(self.values.len(), random), &self.halves)
+        let mut drawn = smoothed(&noise.samples(self.values.len(), random), &self.halves);
+        for &(i, change) in &self.corners {
+            let share = random.unit();
+            let lower = 0.25 * share * (1.0 - share) * change;
+            drawn[i - 1] -= lower;
+            drawn[i] -= lower;
+        }
+        drawn
     }
 }
 
@@ -190,6 +212,21 @@ mod tests {
         let out = Smoothed::of(&noise, 0.05, &allowed).values;
         let power = |x: &[f64]| x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64;
         assert!(power(&out) < 0.1 * power(&noise));
+    }
+
+    /// Where a switch may lie between two rows the two rows around it are less certain, by an eighth of a quarter of the change of slope at most.
+    #[test]
+    fn corners_between_rows_are_drawn() {
+        let line: Vec<f64> = (0..50).map(|i| 10.0 * f64::from((i - 25).max(0))).collect();
+        let input = Smoothed::of(&line, 0.0, &[0; 50]).cornered([25].into_iter());
+        let quiet = Noise::known(0.0);
+        let mut random = RandomGenerator::new(3, 1);
+        let draws: Vec<Vec<f64>> = (0..40).map(|_| input.drawn(&quiet, &mut random)).collect();
+        for drawn in &draws {
+            assert!(drawn.iter().enumerate().all(|(i, x)| *x == 0.0 || i == 24 || i == 25));
+            assert!((-0.25 * 0.25 * 10.0..=0.0).contains(&drawn[24]) && drawn[24] == drawn[25]);
+        }
+        assert!(draws.iter().any(|drawn| drawn[24] < -0.4));
     }
 
     #[test]

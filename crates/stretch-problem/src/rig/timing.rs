@@ -57,6 +57,12 @@ pub(super) fn switches(inlet: &[f64], outlet: &[f64]) -> impl Iterator<Item = u3
     })
 }
 
+/// Samples at which the commands are other than in the sample before.
+pub(super) fn switched(inlet: &[f64], outlet: &[f64]) -> impl Iterator<Item = usize> {
+    let counts: Vec<u32> = switches(inlet, outlet).collect();
+    (1..counts.len()).filter(move |&i| counts[i] != counts[i - 1])
+}
+
 /// Inlet and outlet, with switches that act ahead of their rows by shares of a sample.
 pub(super) fn ahead<'a>(inlet: &'a [f64], outlet: &'a [f64], leads: Leads) -> [Cow<'a, [f64]>; 2] {
     if leads == [0.0; 2] {

@@ -1,0 +1,27 @@
+"""A damper from its displacement to its force: viscous, or dry with a little viscous friction."""
+
+import numpy as np
+
+WIDTH_MM_PER_S = 5.0
+"""Speed over which dry friction changes sides."""
+
+
+class Damper:
+    def __init__(self, is_dry):
+        self.is_dry = is_dry
+
+    def begin(self, session):
+        self.dt_s = session["dt_s"]
+
+    def simulate(self, params, effects, inputs, trials):
+        x = inputs["displacement_mm"]
+        out = np.zeros((len(params), x.shape[-1]))
+        for part in trials:
+            speed = np.gradient(x[..., part.samples], self.dt_s, axis=-1)
+            out[:, part.samples] = params[:, :1] * speed
+            if self.is_dry:
+                out[:, part.samples] += params[:, 1:2] * np.tanh(speed / WIDTH_MM_PER_S)
+        return out
+
+
+viscous, dry = Damper(False), Damper(True)

@@ -18,7 +18,7 @@ class Tanks:
 
     def simulate(self, params, effects, inputs, trials):
         k1, k2, k3, k4 = (params[name] for name in ("k1", "k2", "k3", "k4"))
-        brim1, brim2, caught = effects["upper_overflow.brim"], effects["lower_overflow.brim"], effects["upper_overflow.caught"]
+        brim1, caught, brim2 = effects["upper_overflow.brim"], effects["upper_overflow.caught"], effects["lower_overflow"]
         u = inputs["pump_v"]
         h, out = self.dt_s / STEPS, np.zeros((len(params), u.shape[-1]))
         for part in trials:

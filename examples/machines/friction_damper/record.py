@@ -27,9 +27,12 @@ def test(data: Path, name: str, every: int = 1) -> dict[str, np.ndarray]:
         "displacement_mm": rows[:, 1] * MM_PER_INCH,
         "velocity_mm_per_s": rows[:, 3] * MM_PER_INCH,
         "force_kn": rows[:, 2] * KN_PER_KIP,
+        "pull_1_kn": rows[:, 4] * KN_PER_KIP / 1000.0,
+        "pull_2_kn": rows[:, 5] * KN_PER_KIP / 1000.0,
     }
 
 
-def recordings(data: Path, every: int = 1) -> dict[str, dict[str, np.ndarray]]:
-    """Five tests at 30 lb."""
-    return {name: test(data, name, every) for name in (*FITTED, *TESTED)}
+def recordings(data: Path, every: int = 1, tests: str = "30 lb") -> dict[str, dict[str, np.ndarray]]:
+    """Five tests at 30 lb, or the eleven at 0 lb."""
+    names = (*FITTED, *TESTED) if tests == "30 lb" else (*FLAGGED, *SOUND)
+    return {name: test(data, name, every) for name in names}

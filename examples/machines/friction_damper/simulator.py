@@ -1,4 +1,4 @@
-"""A damper from its displacement to its force: viscous, or dry with a little viscous friction."""
+"""A damper from its displacement to its force: viscous, or dry with a little viscous friction; and from the pulls at its band."""
 
 import numpy as np
 
@@ -24,4 +24,11 @@ class Damper:
         return out
 
 
-viscous, dry = Damper(False), Damper(True)
+class Band:
+    """The band brake from the pulls at its two ends: force = leverage (pull 2 - pull 1)."""
+
+    def simulate(self, params, effects, inputs):
+        return params[:, :1] * (inputs["pull_2_kn"] - inputs["pull_1_kn"])
+
+
+viscous, dry, band = Damper(False), Damper(True), Band()

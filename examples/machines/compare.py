@@ -1,7 +1,8 @@
 """What one does without a diagnosis: re-tuning alone, and all candidates free at once (as `mujoco.sysid` fits whatever is free).
 
-Both are least squares over the fitted trials, from the simulator as shipped. Candidates are written here from their textbook forms, a few
-for each signal: delay, lag, backlash, dead zone, saturation, friction. None is chosen: every one has the value that lowers the sum most.
+Both are least squares over the fitted trials, from the simulator as shipped. Candidates are written here from their textbook
+forms, a few for each signal: delay, lag, backlash, dead zone, saturation, friction. None is chosen: every one has the value
+that lowers the sum most.
 """
 
 from __future__ import annotations
@@ -9,11 +10,11 @@ from __future__ import annotations
 import importlib
 import inspect
 import sys
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import tomllib
 from scipy.optimize import least_squares
 
 
@@ -94,9 +95,7 @@ class Problem:
             rows = zip(params, effects, range(len(params)))
             return np.stack(
                 [
-                    self.simulator(
-                        dict(zip(params.names, p)), dict(zip(effects.names, e)), {k: v[i] for k, v in inputs.items()}
-                    )
+                    self.simulator(dict(zip(params.names, p)), dict(zip(effects.names, e)), {k: v[i] for k, v in inputs.items()})
                     for p, e, i in rows
                 ]
             )
@@ -180,7 +179,9 @@ class Model:
         own = values[:, p : p + len(problem.own)] if len(self.free) > p else np.tile(problem.off, (len(values), 1))
         first = p + (len(problem.own) if len(self.free) > p else 0)
         inputs = {
-            name: np.tile(column, (len(values), 1)) if name in problem.stage["inputs"] else np.broadcast_to(column, (len(values), len(column)))
+            name: np.tile(column, (len(values), 1))
+            if name in problem.stage["inputs"]
+            else np.broadcast_to(column, (len(values), len(column)))
             for name, column in problem.columns.items()
         }
         for name in problem.stage["inputs"] if self.places else ():
@@ -213,7 +214,12 @@ class Model:
 
         start = np.clip([f.start for f in free], low + 1e-9 * scale, high - 1e-9 * scale)
         done = least_squares(
-            lambda z: residuals((z * scale)[None])[0], start / scale, slope, (low / scale, high / scale), x_scale=1.0, max_nfev=100
+            lambda z: residuals((z * scale)[None])[0],
+            start / scale,
+            slope,
+            (low / scale, high / scale),
+            x_scale=1.0,
+            max_nfev=100,
         )
         return done.x * scale, runs
 

@@ -2,8 +2,8 @@
 
     python run.py SYSTEM DATA [--problem viscous.toml] [--every 2] [--set joint=wpitch] [--out FOLDER] [--compare]
 
-SYSTEM is a folder beside this file, DATA the folder of its recordings (see its DOCUMENTED.md). The program that runs is the `stretch` of the
-search path, or --program.
+SYSTEM is a folder beside this file, DATA the folder of its recordings (see its DOCUMENTED.md). The program that runs is the
+`stretch` of the search path, or --program.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ def row(answer: dict) -> str:
     tuned = ", ".join(f"{p['name']} {p['nominal']:.4g} -> {p['fitted']:.4g}" for p in answer["parameters"])
     lines = [
         answer["sentence"],
-        f"  verdict {answer['verdict']}, named {', '.join(answer['named']) or 'nothing'}; not ruled out {', '.join(answer['ambiguous']) or 'nothing'}",
+        f"  verdict {answer['verdict']}, named {', '.join(answer['named']) or 'nothing'}; not ruled out "
+        f"{', '.join(answer['ambiguous']) or 'nothing'}",
         f"  probabilities {probabilities}",
         f"  closed {best['closed']:.3f} ({best['closed_ci'][0]:.3f} to {best['closed_ci'][1]:.3f})",
         f"  values of the most probable {values}",
@@ -43,7 +44,9 @@ def main() -> None:
     parser.add_argument("--problem", default="problem.toml", help="another problem of the system's folder")
     parser.add_argument("--every", type=int, default=1, help="keep every so many rows")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="an argument of the system's recordings")
-    parser.add_argument("--out", type=Path, help="folder for recordings, problem, diagnosis, and report; a temporary one otherwise")
+    parser.add_argument(
+        "--out", type=Path, help="folder for recordings, problem, diagnosis, and report; a temporary one otherwise"
+    )
     parser.add_argument("--program", default="stretch")
     parser.add_argument("--compare", action="store_true", help="re-tuning alone, and all candidates free, by least squares")
     args = parser.parse_args()

@@ -26,8 +26,8 @@ class Cart:
 
 
 def stepped(make, action, observed=0):
-    """The simulator of an environment: `make(**parameters)` gives it, `action` is the column that drives it, and one number of what it
-    observes is held against the measurement."""
+    """The simulator of an environment: `make(**parameters)` gives it, `action` is the column that drives it, and one number
+    of what it observes is held against the measurement."""
 
     def simulate(params, effects, inputs, trials):
         out = []

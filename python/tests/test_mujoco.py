@@ -160,9 +160,12 @@ def test_what_cannot_be_right_is_told_with_what_to_do():
     turned = {"elbow_cmd": np.degrees(asked), "elbow": np.degrees(seen)}
     names = {"elbow_cmd_rad": "x", "elbow_rad": "y"}
     told("these are degrees. Say degrees=True", model=narrow, columns=turned, called=names)
-    ball = ONE.replace('<geom', '<geom name="g"').replace('type="hinge" axis="0 1 0" armature="0.02"', 'type="ball"')
+    ball = ONE.replace("<geom", '<geom name="g"').replace('type="hinge" axis="0 1 0" armature="0.02"', 'type="ball"')
     told("quaternion", model=ball.split("<actuator>")[0] + "</mujoco>", joints=["elbow"])
-    told("is no position actuator", model=ONE.replace('<position name="motor" joint="elbow" kp="20" kv="1"/>', '<motor name="motor" joint="elbow"/>'))
+    told(
+        "is no position actuator",
+        model=ONE.replace('<position name="motor" joint="elbow" kp="20" kv="1"/>', '<motor name="motor" joint="elbow"/>'),
+    )
 
 
 def test_columns_in_degrees_give_the_same_problem(rubbing):

@@ -2,8 +2,9 @@
 
     python tension.py FOLDER
 
-FOLDER is the data set's `data`. The simulator takes the force of the damper from the pulls at the two ends of its band; its one parameter is re-tuned test by
-test, and a test whose value differs from the middle of all by more than a tenth is told. The authors flag five of the eleven tests at 0 lb that could be had.
+FOLDER is the data set's `data`. The simulator takes the force of the damper from the pulls at the two ends of its band; its
+one parameter is re-tuned test by test, and a test whose value differs from the middle of all by more than a tenth is told.
+The authors flag five of the eleven tests at 0 lb that could be had.
 """
 
 from __future__ import annotations

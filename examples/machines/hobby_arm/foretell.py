@@ -2,8 +2,14 @@
 
     python foretell.py FOLDER [--joints rot,pitch] [--drop]
 
+<<<<<<< HEAD
 FOLDER is the authors' `output/real/so101/custom`: a folder a motion. Three motions are fitted, the others are looked at once the fit has ended.
 For every motion in which a joint is commanded to move: the error with what is named, over that of the re-tuned simulator.
+=======
+FOLDER is the authors' `output/real/so101/custom`: a folder a motion. Three motions are fitted, and the fix that the diagnosis
+gives (parameters and functions) is run on all others. For every motion in which a joint is commanded to move: the error with
+the fix, over that of the simulator whose parameters were re-tuned on the same three motions.
+>>>>>>> 55a1142 (Python: lines and types of the new modules; the gate looks at the machines as well)
 """
 
 from __future__ import annotations
@@ -61,7 +67,12 @@ def diagnosed(data: Path, joint: str, every: int = 1) -> tuple[stretch_gap.Diagn
 def text(shares: list[float]) -> str:
     values = np.array(shares)
     mean = np.exp(np.mean(np.log(values)))
+<<<<<<< HEAD
     return f"{len(values)} motions, geometric mean {mean:.3f}, below 1 in {100 * np.mean(values < 1):.0f} %, worst {values.max():.2f}"
+=======
+    below = 100 * np.mean(values < 1)
+    return f"{len(values)} motions, geometric mean {mean:.3f}, below 1 in {below:.0f} %, greatest {values.max():.2f}"
+>>>>>>> 55a1142 (Python: lines and types of the new modules; the gate looks at the machines as well)
 
 
 def main() -> None:
@@ -77,8 +88,16 @@ def main() -> None:
             found, shares = diagnosed(args.data, joint, every)
             every_share += shares.values() if every == 1 else []
             print(f"{joint}{', every second row' if every == 2 else ''}: {found.sentence}")
+<<<<<<< HEAD
             print(f"  named {found.named}, not ruled out {found.rivals}, runs {found.model_runs}, {time.monotonic() - begun:.0f} s")
             print(f"  parameters {found.parameters}\n  effects {found.effects}\n  probabilities {dict(list(found.probabilities.items())[:4])}")
+=======
+            print(f"  named {found.named}, not ruled out {found.rivals}, runs {found.model_runs}, {seconds:.0f} s")
+            print(
+                f"  parameters {found.parameters}\n  effects {found.effects}\n  probabilities "
+                f"{dict(list(found.probabilities.items())[:4])}"
+            )
+>>>>>>> 55a1142 (Python: lines and types of the new modules; the gate looks at the machines as well)
             print(f"  {text(list(shares.values()))}")
             worst = sorted(shares.items(), key=lambda item: -item[1])[:6]
             print(f"  least foretold: {', '.join(f'{name} {share:.2f}' for name, share in worst)}", flush=True)

@@ -1,4 +1,5 @@
-"""Recordings of a sleeve: FOLDER is the authors' `data/Regression`, a folder a movement. One minute of the first session of a file.
+"""Recordings of a sleeve: FOLDER is the authors' `data/Regression`, a folder a movement. One minute of the first session of a
+file.
 
 FOLDER may also be one session as a file with the columns time_s, angle_deg, s1 to s5.
 """

@@ -2,7 +2,8 @@
 
     python shifted.py FOLDER [--program stretch] [--only 4]
 
-FOLDER is the authors' `data/Regression`. Of a session both answers are compared: what is named of time, and by how much later it is.
+FOLDER is the authors' `data/Regression`. Of a session both answers are compared: what is named of time, and by how much later
+it is.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ FILES = [
 
 
 def late(answer: dict) -> tuple[list[str], float]:
-    """Effects of time in the most probable set, and the seconds by which they are late together, the mean of the sensors they act on."""
+    """Effects of time in the most probable set, and the seconds by which they are late together, the mean of the sensors they
+    act on."""
     values = answer["candidates"][0]["parameter_values"] if answer["candidates"] else []
     times = [v for v in values if v["effect"].rsplit(".", 1)[-1] in TIMES and v["name"] in ("skew_s", "delay_s", "tau_s", "m_s")]
     shared = [v["value"] for v in times if "input" in v["effect"] or "angle_deg" in v["effect"]]

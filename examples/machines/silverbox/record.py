@@ -8,7 +8,8 @@ import numpy as np
 
 RATE_HZ = 1e7 / 2**14
 PARTS = {"multisine": (40540, 42590), "other_multisine": (57920, 58945), "arrow": (30000, 31025)}
-"""First and last row of the excerpts: two realisations of the multisine, each from the silence before it, and noise that grows."""
+"""First and last row of the excerpts: two realisations of the multisine, each from the silence before it, and noise that
+grows."""
 
 
 def recordings(data: Path, every: int = 1) -> dict[str, dict[str, np.ndarray]]:

@@ -1,7 +1,8 @@
 """A mass on a spring: y'' + 2 damping w y' + w^2 y = gain w^2 u, w = 2 pi frequency.
 
-Its owner can switch on what a spring and a damper may have besides: a quadratic and a cubic spring, dry friction, quadratic damping. The linear
-part is exact for an input on straight lines; the rest kicks the speed between its steps (Strang's splitting).
+Its owner can switch on what a spring and a damper may have besides: a quadratic and a cubic spring, dry friction, quadratic
+damping. The linear part is exact for an input on straight lines; the rest kicks the speed between its steps (Strang's
+splitting).
 """
 
 import numpy as np

@@ -170,15 +170,15 @@ class Diagnosis:
         return fix(self.parameters, self.effects, self._answer.get("implement", []), self._functions)
 
     def apply(self, spec: Any) -> list[str]:
-        """Writes what was found into a MuJoCo specification (`MjSpec`); gives the named effects that have no place in it, for which `fix().code`
-        has functions. For diagnoses of `stretch_gap.mujoco.problem`."""
+        """Writes what was found into a MuJoCo specification (`MjSpec`); gives the named effects that have no place in it, for
+        which `fix().code` has functions. For diagnoses of `stretch_gap.mujoco.problem`."""
         from . import mujoco
 
         return mujoco.apply(self, spec)
 
     def to_rerun(self, path: str | os.PathLike[str]) -> None:
-        """Writes a recording for Rerun's viewer (`rerun why.rrd`): by trial and output the measured curve, the simulated ones as shipped, re-tuned and
-        with the named effects, and what is left of each, on one time line. Needs rerun-sdk."""
+        """Writes a recording for Rerun's viewer (`rerun why.rrd`): by trial and output the measured curve, the simulated ones
+        as shipped, re-tuned and with the named effects, and what is left of each, on one time line. Needs rerun-sdk."""
         if not self._curves or not self._session:
             raise StretchError("a diagnosis that was read from text has no curves; diagnose again")
         spans = [(trial["name"], trial["samples"], trial["start_s"]) for trial in self._session["trials"]]

@@ -1,4 +1,5 @@
-"""Which columns of a recording are the commands and the positions of which joints of a model, and what cannot be right about them."""
+"""Which columns of a recording are the commands and the positions of which joints of a model, and what cannot be right about
+them."""
 
 from __future__ import annotations
 
@@ -51,7 +52,8 @@ def words(column: str) -> list[str]:
 
 
 def of_joint(name: str, columns: Sequence[str], names: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Columns of a joint's command and of its position: all words of its name stand in theirs, and no longer name of a joint does."""
+    """Columns of a joint's command and of its position: all words of its name stand in theirs, and no longer name of a joint
+    does."""
     own = words(name)
 
     def holds(column: list[str], joint: list[str]) -> bool:
@@ -75,14 +77,16 @@ def found(
 ) -> tuple[list[Joint], list[str]]:
     """The joints that are looked at, and notes on those that are not.
 
-    `joints` of the model by name, with whether one number is their position; `actuators` by joint; `limits` of joints that turn, rad.
+    `joints` of the model by name, with whether one number is their position; `actuators` by joint; `limits` of joints that
+    turn, rad.
     """
     columns, named = list(map(str, given[0].columns)), list(joints)
     for name in asked or ():
         if name not in joints:
             near = difflib.get_close_matches(name, named, 1, 0.5)
             raise StretchError(
-                f"the model has no joint {name!r}; it has {', '.join(named) or 'none'}" + (f"; is it {near[0]!r}?" if near else "")
+                f"the model has no joint {name!r}; it has {', '.join(named) or 'none'}"
+                + (f"; is it {near[0]!r}?" if near else "")
             )
     chosen, notes = [], []
     for name in asked or named:
@@ -92,7 +96,8 @@ def found(
             continue
         if not joints[name]:
             raise StretchError(
-                f"joint {name} is a ball or a free body: its position is a quaternion, not one number; name the other joints (joints=[...])"
+                f"joint {name} is a ball or a free body: its position is a quaternion, not one number; name the other "
+                f"joints (joints=[...])"
             )
         if name not in actuators:
             raise StretchError(f"joint {name} has no actuator in the model; give it one, or leave it out (joints=[...])")
@@ -108,7 +113,8 @@ def found(
         chosen.append(Joint(name, actuators[name], *pair, _scale(name, pair, limits.get(name), given, degrees)))
     if not chosen:
         raise StretchError(
-            f"no joint of the model moves in these columns. Joints: {', '.join(named) or 'none'}. Columns: {', '.join(columns)}. Say which "
+            f"no joint of the model moves in these columns. Joints: {', '.join(named) or 'none'}. Columns: "
+            f"{', '.join(columns)}. Say which "
             'belong together: joints={"elbow": ("elbow_cmd_rad", "elbow_rad")}'
         )
     return chosen, notes
@@ -122,7 +128,8 @@ def _columns(name: str, columns: Sequence[str], names: Sequence[str], is_asked: 
         return None
     what = f"{', '.join(commanded) or 'none'} for its command and {', '.join(measured) or 'none'} for its position"
     raise StretchError(
-        f'joint {name}: there is {what}; one of each is needed. Say which: joints={{"{name}": ("column of the command", "column of the '
+        f'joint {name}: there is {what}; one of each is needed. Say which: joints={{"{name}": ("column of the command", '
+        f'"column of the '
         f'position")}}; the columns are {", ".join(columns)}'
     )
 
@@ -150,7 +157,8 @@ def _scale(
     is_beyond = reach > 2.0 * most and math.pi / 180.0 * reach <= 1.2 * most
     if is_beyond and degrees is None and not pair[1].lower().endswith(("_rad", "_m", "_mm")):
         raise StretchError(
-            f"joint {name}: {pair[1]} goes to {reach:.4g}, the model to {most:.4g} rad: these are degrees. Say degrees=True (or degrees=False where "
+            f"joint {name}: {pair[1]} goes to {reach:.4g}, the model to {most:.4g} rad: these are degrees. Say "
+            f"degrees=True (or degrees=False where "
             "they are not)"
         )
     return 1.0
@@ -162,10 +170,12 @@ def require_commands(joints: Sequence[Joint], given: Sequence[entries.Trial]) ->
         commanded, measured = _all(given, joint.commanded), _all(given, joint.measured)
         if commanded.shape == measured.shape and np.array_equal(commanded, measured):
             raise StretchError(
-                f"joint {joint.name}: the command {joint.commanded} is the measurement {joint.measured} itself, number for number; record what was "
+                f"joint {joint.name}: the command {joint.commanded} is the measurement {joint.measured} itself, number "
+                f"for number; record what was "
                 "sent to the servo"
             )
         if np.ptp(commanded) == 0.0:
             raise StretchError(
-                f"joint {joint.name}: the command {joint.commanded} is the same in every row, yet the joint moves; record what was sent to the servo"
+                f"joint {joint.name}: the command {joint.commanded} is the same in every row, yet the joint moves; "
+                f"record what was sent to the servo"
             )

@@ -5,8 +5,9 @@
 >>> found = problem.diagnose()                                       # doctest: +SKIP
 >>> left = found.apply(spec := problem.spec)                         # doctest: +SKIP
 
-Joints are found by their names among the columns. Gains, damping and armature that the model has are parameters with tolerances; friction
-loss, damping and armature that it lacks are candidates, beside whatever may be around a simulator (delay, backlash, a flexible joint ...).
+Joints are found by their names among the columns. Gains, damping and armature that the model has are parameters with
+tolerances; friction loss, damping and armature that it lacks are candidates, beside whatever may be around a simulator
+(delay, backlash, a flexible joint ...).
 """
 
 from __future__ import annotations
@@ -41,8 +42,8 @@ TOLERANCES = {GAIN: 0.2, RATE_GAIN: 0.5, "damping": 0.5, "armature": 0.5, "frict
 def library() -> Any:
     """The package `mujoco`, or the sentence that says how to get it."""
     try:
-        import mujoco
-        import mujoco.rollout
+        import mujoco  # type: ignore[import-untyped,import-not-found,unused-ignore]
+        import mujoco.rollout  # type: ignore[import-untyped,import-not-found,unused-ignore]
     except ImportError:
         raise StretchError("the package mujoco is not installed; pip install mujoco") from None
     return mujoco
@@ -174,12 +175,14 @@ def problem(
 ) -> Problem:
     """Makes simulator, parameters with tolerances, and candidates from a model and what was recorded of it.
 
-    `model` is the path of an XML file, its text, or an `MjSpec`. `recording` is whatever `stretch_gap.diagnose` takes as data. `joints` says which
-    joints of the model are looked at, by name, or also by which columns: `{"elbow": ("elbow_cmd_rad", "elbow_rad")}`; without it, all whose name
-    stands in the columns. Angles are in radians; columns that end with `_deg` are in degrees, and all with `degrees=True`.
+    `model` is the path of an XML file, its text, or an `MjSpec`. `recording` is whatever `stretch_gap.diagnose` takes as
+    data. `joints` says which joints of the model are looked at, by name, or also by which columns: `{"elbow":
+    ("elbow_cmd_rad", "elbow_rad")}`; without it, all whose name stands in the columns. Angles are in radians; columns that
+    end with `_deg` are in degrees, and all with `degrees=True`.
 
-    Refused, with what to do: joints that no column is called like, joints that never moved, a command that is the measurement, angles that can
-    only be degrees, joints without a position actuator, balls and free bodies, whose positions are quaternions.
+    Refused, with what to do: joints that no column is called like, joints that never moved, a command that is the
+    measurement, angles that can only be degrees, joints without a position actuator, balls and free bodies, whose positions
+    are quaternions.
     """
     mujoco = library()
     spec = specification(mujoco, model)
@@ -195,14 +198,17 @@ def problem(
         if int(compiled.actuator_trntype[i]) == int(mujoco.mjtTrn.mjTRN_JOINT)
     }
     limits = {
-        compiled.joint(i).name: tuple(map(float, compiled.jnt_range[i]))
+        compiled.joint(i).name: (float(compiled.jnt_range[i, 0]), float(compiled.jnt_range[i, 1]))
         for i in range(compiled.njnt)
         if compiled.jnt_limited[i] and int(compiled.jnt_type[i]) == int(mujoco.mjtJoint.mjJNT_HINGE)
     }
     chosen, notes = found(hinges, actuators, limits, given, joints, degrees)
     require_commands(chosen, given)
     for joint in chosen:
-        if read(compiled, joint.actuator, GAIN) <= 0.0 or compiled.actuator_biasprm[compiled.actuator(joint.actuator).id, 1] >= 0.0:
+        if (
+            read(compiled, joint.actuator, GAIN) <= 0.0
+            or compiled.actuator_biasprm[compiled.actuator(joint.actuator).id, 1] >= 0.0
+        ):
             raise StretchError(
                 f"joint {joint.name}: its actuator {joint.actuator} is no position actuator; give the model <position joint="
                 f"{joint.name!r} kp=.../>, or write a simulator of your own"
@@ -246,7 +252,7 @@ def greatest(model: Any, joint: Joint, given: Sequence[entries.Trial]) -> dict[s
     for trial in given:
         measured = joint.scale * np.asarray(trial.columns[joint.measured], dtype=float)
         commanded = joint.scale * np.asarray(trial.columns[joint.commanded], dtype=float)
-        stamps = np.arange(measured.size) / trial.rate_hz if trial.time_s is None else np.asarray(trial.time_s, dtype=float)
+        stamps = np.arange(measured.size) / (trial.rate_hz or 1.0) if trial.time_s is None else np.asarray(trial.time_s, float)
         reach = max(1, measured.size // 2000)
         rate = (measured[2 * reach :] - measured[: -2 * reach]) / (stamps[2 * reach :] - stamps[: -2 * reach])
         torque = max(torque, gain * float(np.quantile(np.abs(commanded - measured), 0.99)))
@@ -263,8 +269,8 @@ def greatest(model: Any, joint: Joint, given: Sequence[entries.Trial]) -> dict[s
 def apply(diagnosis: Diagnosis, spec: Any) -> list[str]:
     """Writes what was found into a specification; gives the effects that have no place in it.
 
-    Parameters of joints and actuators, and effects that the model has itself, are written as they are; a delay of a command becomes the delay of
-    its actuator where this MuJoCo has one. For what is left `diagnosis.fix().code` has functions.
+    Parameters of joints and actuators, and effects that the model has itself, are written as they are; a delay of a command
+    becomes the delay of its actuator where this MuJoCo has one. For what is left `diagnosis.fix().code` has functions.
     """
     known = {joint.name: joint for joint in spec.joints} | {actuator.name: actuator for actuator in spec.actuators}
     own = {name: next(iter(values.values())) for name, values in diagnosis.effects.items() if parts(name)[0] in known and values}

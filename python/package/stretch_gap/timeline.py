@@ -26,7 +26,7 @@ def write(
     `spans` are name, samples and session time, s, of the trials that stand end to end in the curves.
     """
     try:
-        import rerun
+        import rerun  # type: ignore[import-untyped,import-not-found,unused-ignore]
     except ImportError:
         raise StretchError("the package rerun-sdk is not installed; pip install rerun-sdk") from None
     stream = rerun.RecordingStream("stretch")

@@ -2,14 +2,9 @@
 
     python foretell.py FOLDER [--joints rot,pitch] [--drop]
 
-<<<<<<< HEAD
-FOLDER is the authors' `output/real/so101/custom`: a folder a motion. Three motions are fitted, the others are looked at once the fit has ended.
-For every motion in which a joint is commanded to move: the error with what is named, over that of the re-tuned simulator.
-=======
 FOLDER is the authors' `output/real/so101/custom`: a folder a motion. Three motions are fitted, and the fix that the diagnosis
 gives (parameters and functions) is run on all others. For every motion in which a joint is commanded to move: the error with
 the fix, over that of the simulator whose parameters were re-tuned on the same three motions.
->>>>>>> 55a1142 (Python: lines and types of the new modules; the gate looks at the machines as well)
 """
 
 from __future__ import annotations
@@ -17,62 +12,98 @@ from __future__ import annotations
 import argparse
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import record
 import simulator
 import stretch_gap
+from scipy.optimize import least_squares
 
-STEP_RAD = 2.0 * np.pi / 4096.0
-
-
-def trials(data: Path, joint: str, every: int) -> tuple[list[stretch_gap.Trial], list[str]]:
-    """The fitted motions, then those in which the joint is commanded to move."""
-    others = sorted(p.name for p in data.iterdir() if (p / "control.csv").is_file() and p.name not in record.FITTED)
-    made, moving = [], []
-    for name in (*record.FITTED, *others):
-        columns = record.motion(data, name, joint, every)
-        if name in record.FITTED or np.ptp(columns["commanded_rad"]) > 0.0:
-            made.append(stretch_gap.Trial(columns, name=name, test=name not in record.FITTED))
-            moving += [] if name in record.FITTED else [name]
-    return made, moving
+NOISE_RAD = 2.0 * np.pi / 4096.0 / 12**0.5
 
 
-def diagnosed(data: Path, joint: str, every: int = 1) -> tuple[stretch_gap.Diagnosis, dict[str, float]]:
-    """The diagnosis of a joint, and by motion the share of the re-tuned simulator's error that is left."""
-    given, moving = trials(data, joint, every)
-    found = stretch_gap.diagnose(
+class Fixed:
+    """The simulator with the parameters and the functions of a fix."""
+
+    def __init__(self, fix: stretch_gap.Fix, dt_s: float) -> None:
+        self.parameters, self.dt_s = fix.parameters, dt_s
+        self.functions: dict[str, object] = {}
+        exec(fix.code, self.functions)
+        self.names = {"input": [], "output": []}
+        for name in fix.effects:
+            if f"{name.replace('.', '_')}_start" not in self.functions:
+                raise SystemExit(f"{name} has no function in the fix; it cannot be run here")
+            self.names[name.split(".")[0]].append(name.replace(".", "_"))
+
+    def _through(self, side: str, values: np.ndarray) -> np.ndarray:
+        for name in self.names[side]:
+            state, step = self.functions[f"{name}_start"](float(values[0])), self.functions[name]
+            values = np.array([step(state, x) for x in values.tolist()])
+        return values
+
+    def __call__(self, command: np.ndarray) -> np.ndarray:
+        return self._through("output", servo(list(self.parameters.values()), self._through("input", command), self.dt_s))
+
+
+def servo(parameters, command: np.ndarray, dt_s: float) -> np.ndarray:
+    """The simulator of the problem, for one command."""
+    made = simulator.Servo()
+    made.begin({"dt_s": dt_s})
+    part = SimpleNamespace(samples=slice(0, len(command)))
+    return made.simulate(np.array([parameters]), None, {"commanded_rad": command[np.newaxis]}, [part])[0]
+
+
+def retuned(motions: list[dict[str, np.ndarray]], dt_s: float) -> np.ndarray:
+    """Time constant and offset of least squares on the fitted motions."""
+
+    def left(z):
+        return np.concatenate([servo(z, m["commanded_rad"], dt_s) - m["measured_rad"] for m in motions])
+
+    return least_squares(left, [0.1, 0.0], bounds=([0.005, -0.3], [1.0, 0.3]), x_scale=[0.05, 0.02], diff_step=1e-4).x
+
+
+def diagnosed(motions: dict[str, dict[str, np.ndarray]], joint: str) -> stretch_gap.Diagnosis:
+    return stretch_gap.diagnose(
         simulator.Servo(),
-        given,
+        [stretch_gap.Trial(columns, name=name) for name, columns in motions.items()],
         output="measured_rad",
         inputs=["commanded_rad"],
         parameters={
             "tau": stretch_gap.Parameter(0.1, relative=0.5, unit="s", least=0.005),
             "offset": stretch_gap.Parameter(0.0, tolerance=0.05, unit="rad"),
         },
-        noise={"measured_rad": STEP_RAD / 12**0.5},
+        noise={"measured_rad": NOISE_RAD},
         wrap="all",
         name=joint,
     )
-    curves, shares, first = found.curves(), {}, 0
-    for trial in given:
-        part = slice(first, first := first + len(trial.columns["measured_rad"]))
-        measured = curves["measured"][part]
-        left = {name: float(np.sqrt(np.mean((curves[name][part] - measured) ** 2))) for name in ("retuned", "with_effects")}
-        if trial.name in moving:
-            shares[trial.name] = left["with_effects"] / left["retuned"]
-    return found, shares
+
+
+def foretold(data: Path, joint: str, every: int = 1) -> tuple[stretch_gap.Diagnosis, dict[str, float], float]:
+    """The diagnosis of a joint, the share of the re-tuned error that is left by motion, and the seconds of the diagnosis."""
+    dt_s = every / record.RATE_HZ
+    fitted = {name: record.motion(data, name, joint, every) for name in record.FITTED}
+    begun = time.monotonic()
+    found = diagnosed(fitted, joint)
+    seconds = time.monotonic() - begun
+    plain, fixed = retuned(list(fitted.values()), dt_s), Fixed(found.fix(), dt_s)
+    shares = {}
+    for folder in sorted(data.iterdir()):
+        if folder.name in record.FITTED or not (folder / "control.csv").is_file():
+            continue
+        columns = record.motion(data, folder.name, joint, every)
+        command, measured = columns["commanded_rad"], columns["measured_rad"]
+        if np.ptp(command) > 0.0:
+            left = [np.sqrt(np.mean((y - measured) ** 2)) for y in (fixed(command), servo(plain, command, dt_s))]
+            shares[folder.name] = float(left[0] / left[1])
+    return found, shares, seconds
 
 
 def text(shares: list[float]) -> str:
     values = np.array(shares)
     mean = np.exp(np.mean(np.log(values)))
-<<<<<<< HEAD
-    return f"{len(values)} motions, geometric mean {mean:.3f}, below 1 in {100 * np.mean(values < 1):.0f} %, worst {values.max():.2f}"
-=======
     below = 100 * np.mean(values < 1)
     return f"{len(values)} motions, geometric mean {mean:.3f}, below 1 in {below:.0f} %, greatest {values.max():.2f}"
->>>>>>> 55a1142 (Python: lines and types of the new modules; the gate looks at the machines as well)
 
 
 def main() -> None:
@@ -81,27 +112,21 @@ def main() -> None:
     parser.add_argument("--joints", default=",".join(record.JOINTS))
     parser.add_argument("--drop", action="store_true", help="again on every second row")
     args = parser.parse_args()
-    every_share: list[float] = []
     for every in (1, 2) if args.drop else (1,):
+        all_shares: list[float] = []
         for joint in args.joints.split(","):
-            begun = time.monotonic()
-            found, shares = diagnosed(args.data, joint, every)
-            every_share += shares.values() if every == 1 else []
+            found, shares, seconds = foretold(args.data, joint, every)
+            all_shares += shares.values()
             print(f"{joint}{', every second row' if every == 2 else ''}: {found.sentence}")
-<<<<<<< HEAD
-            print(f"  named {found.named}, not ruled out {found.rivals}, runs {found.model_runs}, {time.monotonic() - begun:.0f} s")
-            print(f"  parameters {found.parameters}\n  effects {found.effects}\n  probabilities {dict(list(found.probabilities.items())[:4])}")
-=======
             print(f"  named {found.named}, not ruled out {found.rivals}, runs {found.model_runs}, {seconds:.0f} s")
             print(
                 f"  parameters {found.parameters}\n  effects {found.effects}\n  probabilities "
                 f"{dict(list(found.probabilities.items())[:4])}"
             )
->>>>>>> 55a1142 (Python: lines and types of the new modules; the gate looks at the machines as well)
             print(f"  {text(list(shares.values()))}")
-            worst = sorted(shares.items(), key=lambda item: -item[1])[:6]
+            worst = sorted(shares.items(), key=lambda item: -item[1])[:8]
             print(f"  least foretold: {', '.join(f'{name} {share:.2f}' for name, share in worst)}", flush=True)
-    print(f"all joints: {text(every_share)}")
+        print(f"all joints{', every second row' if every == 2 else ''}: {text(all_shares)}", flush=True)
 
 
 if __name__ == "__main__":

@@ -19,14 +19,16 @@ trap 'rm -rf "$fresh"' EXIT
 "$python" -m venv "$fresh/build" 2>/dev/null || skip "$python has no venv"
 "$fresh/build/bin/pip" install --quiet --disable-pip-version-check 'maturin>=1.9,<2' 'ruff>=0.12' mypy numpy 2>/dev/null \
     || skip "pip cannot install maturin, ruff and mypy"
-"$fresh/build/bin/ruff" check --quiet package tests examples
-"$fresh/build/bin/ruff" format --quiet --check package tests examples
+"$fresh/build/bin/ruff" check --quiet --config pyproject.toml package tests examples ../examples/machines
+"$fresh/build/bin/ruff" format --quiet --check --config pyproject.toml package tests examples ../examples/machines
 "$fresh/build/bin/mypy" --no-error-summary package/stretch_gap
 
 # a build of its own each time would compile numpy and all again: the target folder stays
 "$fresh/build/bin/maturin" build --quiet --profile "$profile" --interpreter "$python" --out "$fresh/wheels"
 "$python" -m venv "$fresh/use"
 "$fresh/use/bin/pip" install --quiet --disable-pip-version-check "$fresh"/wheels/*.whl pytest pandas
+# without these their tests say SKIPPED
+"$fresh/use/bin/pip" install --quiet --disable-pip-version-check mujoco rerun-sdk 2>/dev/null || echo "SKIPPED: tests that need mujoco and rerun-sdk"
 ls -l "$fresh"/wheels/*.whl | awk '{ print $5 " bytes: the wheel" }'
 
 # from elsewhere, so that it is the installed package that is tested

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from typing import Any
 
-from . import _stretch, html
+from . import _stretch, html, timeline
 from . import problem as entries
 from ._stretch import StretchError
 from .fix import Fix, fix
@@ -27,12 +27,14 @@ class Diagnosis:
         curves: Mapping[str, Sequence[Array]] | None = None,
         functions: Mapping[str, str] | None = None,
         experiment: Mapping[str, Array] | None = None,
+        session: Mapping[str, Any] | None = None,
     ) -> None:
         self._answer = answer
         self._page = page
         self._curves = curves or {}
         self._functions = functions or {}
         self._experiment = experiment
+        self._session = session or {}
 
     @staticmethod
     def from_json(text: str) -> Diagnosis:
@@ -167,6 +169,21 @@ class Diagnosis:
         """
         return fix(self.parameters, self.effects, self._answer.get("implement", []), self._functions)
 
+    def apply(self, spec: Any) -> list[str]:
+        """Writes what was found into a MuJoCo specification (`MjSpec`); gives the named effects that have no place in it, for
+        which `fix().code` has functions. For diagnoses of `stretch_gap.mujoco.problem`."""
+        from . import mujoco
+
+        return mujoco.apply(self, spec)
+
+    def to_rerun(self, path: str | os.PathLike[str]) -> None:
+        """Writes a recording for Rerun's viewer (`rerun why.rrd`): by trial and output the measured curve, the simulated ones
+        as shipped, re-tuned and with the named effects, and what is left of each, on one time line. Needs rerun-sdk."""
+        if not self._curves or not self._session:
+            raise StretchError("a diagnosis that was read from text has no curves; diagnose again")
+        spans = [(trial["name"], trial["samples"], trial["start_s"]) for trial in self._session["trials"]]
+        timeline.write(path, self._curves, spans, self._session["dt_s"], self.sentence)
+
     def to_json(self) -> str:
         """Everything, as `stretch diagnose --json` writes it and `stretch calibrate --from` reads it."""
         return json.dumps(self._answer, indent=2)
@@ -292,8 +309,9 @@ def diagnose(
         }
         wanted = entries.wanted(listed, [*beside, *([reference] if reference else [])])
         checked = _stretch.Problem(json.dumps(problem), entries.recorded(data, rate_hz, wanted))
+    session = json.loads(checked.session)
     if asked is not None:
-        asked.bind({**json.loads(checked.session), "columns": checked.columns})
+        asked.bind({**session, "columns": checked.columns})
     how = {
         "name": name,
         "depth": depth,
@@ -309,7 +327,7 @@ def diagnose(
     text, page, curves, functions, trial = checked.diagnose(asked, json.dumps(how), progress)
     answer = json.loads(text)
     answer["notes"] = notes + answer["notes"]
-    return Diagnosis(answer, page, curves, functions, trial)
+    return Diagnosis(answer, page, curves, functions, trial, session)
 
 
 def _behind(wrappers: list[str], driven: list[str], notes: list[str]) -> list[str]:

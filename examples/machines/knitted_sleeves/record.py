@@ -1,0 +1,35 @@
+"""Recordings of a sleeve: FOLDER is the authors' `data/Regression`, a folder a movement. One minute of the first session of a
+file.
+
+FOLDER may also be one session as a file with the columns time_s, angle_deg, s1 to s5.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+RATE_HZ = 100.0
+SENSORS = ("s1", "s2", "s3", "s4", "s5")
+SECONDS = 60.0
+
+
+def session(data: Path, file: str = "") -> dict[str, np.ndarray]:
+    """Angle and sensors of a session, from the authors' file or one of these columns."""
+    path = data / file if file else data
+    with open(path, encoding="utf-8-sig") as lines:
+        has_names = "time_s" in lines.readline()
+    rows = np.genfromtxt(path, delimiter=",", skip_header=int(has_names), encoding="utf-8-sig")
+    rows = rows[:, 1:7] if has_names else rows[:, :6]
+    return dict(zip(("angle_deg", *SENSORS), rows[: int(SECONDS * RATE_HZ)].T))
+
+
+def recordings(data: Path, every: int = 1, file: str = "", shift_s: float = 0.0) -> dict[str, dict[str, np.ndarray]]:
+    """A session at 50 Hz; with `shift_s` all sensors are read that much later than they were."""
+    columns = session(data, file)
+    time_s = np.arange(len(columns["angle_deg"])) / RATE_HZ
+    for name in SENSORS if shift_s else ():
+        columns[name] = np.interp(time_s - shift_s, time_s, columns[name])
+    rows = slice(None, None, 2 * every)
+    return {"session": {"time_s": time_s[rows], **{name: values[rows] for name, values in columns.items()}}}

@@ -1,0 +1,56 @@
+"""Sixteen sessions of knitted sensors, as they are and with all sensors 80 ms late: is that told?
+
+    python shifted.py FOLDER [--program stretch] [--only 4]
+
+FOLDER is the authors' `data/Regression`. Of a session both answers are compared: what is named of time, and by how much later
+it is.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+import machines
+
+SHIFT_S = 0.08
+TIMES = ("skew", "delay", "lag", "second_order_lag", "clock_drift")
+FILES = [
+    f"{movement}/S{2 * i + 1}_{2 * i + 2}_{end}.csv" for movement, end in (("HC_45", "HC45"), ("HC_90", "HC90")) for i in range(8)
+]
+
+
+def late(answer: dict) -> tuple[list[str], float]:
+    """Effects of time in the most probable set, and the seconds by which they are late together, the mean of the sensors they
+    act on."""
+    values = answer["candidates"][0]["parameter_values"] if answer["candidates"] else []
+    times = [v for v in values if v["effect"].rsplit(".", 1)[-1] in TIMES and v["name"] in ("skew_s", "delay_s", "tau_s", "m_s")]
+    shared = [v["value"] for v in times if "input" in v["effect"] or "angle_deg" in v["effect"]]
+    own = [v["value"] for v in times if v not in shared and "output" in v["effect"]]
+    return sorted({v["effect"] for v in times}), sum(shared) + (sum(own) / 5.0)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("data", type=Path)
+    parser.add_argument("--program", default="stretch")
+    parser.add_argument("--only", type=int, default=len(FILES))
+    args = parser.parse_args()
+    told = 0
+    for file in FILES[: args.only]:
+        found = []
+        for shift_s in (0.0, SHIFT_S):
+            with tempfile.TemporaryDirectory() as folder:
+                problem = machines.prepare("knitted_sleeves", args.data, Path(folder), file=file, shift_s=shift_s)
+                found.append(machines.diagnose(problem, args.program))
+        (names, before), (shifted, after) = map(late, found)
+        told += bool(shifted) and abs(after - before - SHIFT_S) < 0.02
+        print(f"{file}: as it is {names} {before:.3f} s; shifted {shifted} {after:.3f} s; {after - before:+.3f} s", flush=True)
+    print(f"{told} of {min(args.only, len(FILES))} sessions tell the shift within 20 ms")
+
+
+if __name__ == "__main__":
+    main()

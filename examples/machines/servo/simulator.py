@@ -1,0 +1,5 @@
+"""A servo on its holds, with a stiff spring at its output: angle = offset + compliance times pull."""
+
+
+def servo(params, effects, inputs):
+    return params["offset"] + params["compliance"] * inputs["pull_deg"]

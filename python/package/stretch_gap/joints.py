@@ -1,0 +1,181 @@
+"""Which columns of a recording are the commands and the positions of which joints of a model, and what cannot be right about
+them."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import problem as entries
+from ._stretch import StretchError
+
+COMMANDS = ("cmd", "command", "commanded", "target", "goal", "desired", "setpoint", "ref", "reference", "action", "ctrl")
+"""Words that the column of a command has beside the joint's name."""
+OTHERS = ("vel", "velocity", "speed", "torque", "effort", "current", "load", "acc", "acceleration", "temp", "force")
+"""Words of columns that are neither a command nor a position."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint of a model with its actuator, and its columns."""
+
+    name: str
+    actuator: str
+    commanded: str
+    measured: str
+    scale: float
+    """What a number of the columns is in the unit of the model: pi/180 for degrees."""
+
+
+def trials(recording: entries.Data, rate_hz: float | None) -> list[entries.Trial]:
+    """Recordings with their times beside the columns."""
+    made = []
+    for trial in entries.trials(recording, rate_hz):
+        columns = dict(trial.columns)
+        time_s = columns.pop("time_s", None) if trial.time_s is None and trial.rate_hz is None else trial.time_s
+        rate = None if time_s is not None else trial.rate_hz or rate_hz
+        if time_s is None and rate is None:
+            raise StretchError("the recording has no column time_s; give rate_hz, the samples a second")
+        made.append(entries.Trial(columns, rate_hz=rate, time_s=time_s, name=trial.name, test=trial.test, start_s=trial.start_s))
+    if not made:
+        raise StretchError("there is no recording; give at least one")
+    return made
+
+
+def words(column: str) -> list[str]:
+    """The words of a column's name."""
+    return [word for word in "".join(c.lower() if c.isalnum() else " " for c in column).split() if word]
+
+
+def of_joint(name: str, columns: Sequence[str], names: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Columns of a joint's command and of its position: all words of its name stand in theirs, and no longer name of a joint
+    does."""
+    own = words(name)
+
+    def holds(column: list[str], joint: list[str]) -> bool:
+        return any(column[i : i + len(joint)] == joint for i in range(len(column) - len(joint) + 1))
+
+    longer = [words(other) for other in names if other != name and len(words(other)) > len(own)]
+    mine = [c for c in columns if holds(words(c), own) and not any(holds(words(c), other) for other in longer)]
+    rest = {c: set(words(c)) - set(own) for c in mine}
+    commanded = [c for c in mine if rest[c] & set(COMMANDS) and not rest[c] & set(OTHERS)]
+    measured = [c for c in mine if c not in commanded and not rest[c] & set(OTHERS)]
+    return commanded, measured
+
+
+def found(
+    joints: Mapping[str, bool],
+    actuators: Mapping[str, str],
+    limits: Mapping[str, tuple[float, float]],
+    given: Sequence[entries.Trial],
+    asked: Sequence[str] | Mapping[str, tuple[str, str]] | None,
+    degrees: bool | None,
+) -> tuple[list[Joint], list[str]]:
+    """The joints that are looked at, and notes on those that are not.
+
+    `joints` of the model by name, with whether one number is their position; `actuators` by joint; `limits` of joints that
+    turn, rad.
+    """
+    columns, named = list(map(str, given[0].columns)), list(joints)
+    for name in asked or ():
+        if name not in joints:
+            near = difflib.get_close_matches(name, named, 1, 0.5)
+            raise StretchError(
+                f"the model has no joint {name!r}; it has {', '.join(named) or 'none'}"
+                + (f"; is it {near[0]!r}?" if near else "")
+            )
+    chosen, notes = [], []
+    for name in asked or named:
+        pair = asked[name] if isinstance(asked, Mapping) else _columns(name, columns, named, asked is not None)
+        if pair is None:
+            notes.append(f"joint {name} is not looked at: no column for its command and its position")
+            continue
+        if not joints[name]:
+            raise StretchError(
+                f"joint {name} is a ball or a free body: its position is a quaternion, not one number; name the other "
+                f"joints (joints=[...])"
+            )
+        if name not in actuators:
+            raise StretchError(f"joint {name} has no actuator in the model; give it one, or leave it out (joints=[...])")
+        for column in pair:
+            missing = [trial.name or "the recording" for trial in given if column not in trial.columns]
+            if missing:
+                raise StretchError(f"{missing[0]}: there is no column {column}; the columns are {', '.join(columns)}")
+        if not _moves(given, pair[1]):
+            if asked:
+                raise StretchError(f"joint {name} never moved: {pair[1]} is the same in every row; leave it out (joints=[...])")
+            notes.append(f"joint {name} is not looked at: it never moved")
+            continue
+        chosen.append(Joint(name, actuators[name], *pair, _scale(name, pair, limits.get(name), given, degrees)))
+    if not chosen:
+        raise StretchError(
+            f"no joint of the model moves in these columns. Joints: {', '.join(named) or 'none'}. Columns: "
+            f"{', '.join(columns)}. Say which "
+            'belong together: joints={"elbow": ("elbow_cmd_rad", "elbow_rad")}'
+        )
+    return chosen, notes
+
+
+def _columns(name: str, columns: Sequence[str], names: Sequence[str], is_asked: bool) -> tuple[str, str] | None:
+    commanded, measured = of_joint(name, columns, names)
+    if len(commanded) == 1 and len(measured) == 1:
+        return commanded[0], measured[0]
+    if not is_asked and not (commanded and measured):
+        return None
+    what = f"{', '.join(commanded) or 'none'} for its command and {', '.join(measured) or 'none'} for its position"
+    raise StretchError(
+        f'joint {name}: there is {what}; one of each is needed. Say which: joints={{"{name}": ("column of the command", '
+        f'"column of the '
+        f'position")}}; the columns are {", ".join(columns)}'
+    )
+
+
+def _all(given: Sequence[entries.Trial], column: str) -> np.ndarray:
+    return np.concatenate([np.asarray(trial.columns[column], dtype=float) for trial in given])
+
+
+def _moves(given: Sequence[entries.Trial], column: str) -> bool:
+    return bool(np.ptp(_all(given, column)) > 0.0)
+
+
+def _scale(
+    name: str, pair: tuple[str, str], limit: tuple[float, float] | None, given: Sequence[entries.Trial], degrees: bool | None
+) -> float:
+    """What a number of the columns is in radians; angles that can only be degrees are refused unless it was said."""
+    is_deg = [column.lower().rsplit("_", 1)[-1] in ("deg", "degrees") for column in pair]
+    if is_deg[0] != is_deg[1] and degrees is None:
+        raise StretchError(f"joint {name}: of {pair[0]} and {pair[1]} one is in degrees by its name; bring both to one unit")
+    if degrees or (degrees is None and is_deg[0]):
+        return math.pi / 180.0
+    values = _all(given, pair[1])
+    low, high = limit if limit else (-2.0 * math.pi, 2.0 * math.pi)
+    reach, most = float(np.max(np.abs(values))), max(abs(low), abs(high))
+    is_beyond = reach > 2.0 * most and math.pi / 180.0 * reach <= 1.2 * most
+    if is_beyond and degrees is None and not pair[1].lower().endswith(("_rad", "_m", "_mm")):
+        raise StretchError(
+            f"joint {name}: {pair[1]} goes to {reach:.4g}, the model to {most:.4g} rad: these are degrees. Say "
+            f"degrees=True (or degrees=False where "
+            "they are not)"
+        )
+    return 1.0
+
+
+def require_commands(joints: Sequence[Joint], given: Sequence[entries.Trial]) -> None:
+    """Refuses commands that are the measurement, or nothing."""
+    for joint in joints:
+        commanded, measured = _all(given, joint.commanded), _all(given, joint.measured)
+        if commanded.shape == measured.shape and np.array_equal(commanded, measured):
+            raise StretchError(
+                f"joint {joint.name}: the command {joint.commanded} is the measurement {joint.measured} itself, number "
+                f"for number; record what was "
+                "sent to the servo"
+            )
+        if np.ptp(commanded) == 0.0:
+            raise StretchError(
+                f"joint {joint.name}: the command {joint.commanded} is the same in every row, yet the joint moves; "
+                f"record what was sent to the servo"
+            )

@@ -1,0 +1,89 @@
+"""What joints and actuators of a MuJoCo model have: read, set in a compiled model, and written into a specification."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ._stretch import StretchError
+
+if TYPE_CHECKING:
+    from .diagnosis import Diagnosis
+
+GAIN = "kp"
+RATE_GAIN = "kv"
+DOF = ("damping", "armature", "frictionloss")
+"""What a joint has: fields of the model are called `dof_...`, those of its specification as here."""
+UNITS = {"damping": "N m s/rad", "armature": "kg m^2", "frictionloss": "N m", GAIN: "N m/rad", RATE_GAIN: "N m s/rad"}
+
+
+def parts(name: str) -> tuple[str, str]:
+    """Whose a parameter is, and what: `elbow_damping` is the damping of elbow."""
+    owner, _, what = name.rpartition("_")
+    return (owner, what) if what in UNITS else ("", name)
+
+
+def write(model: Any, owner: str, what: str, value: float) -> None:
+    """Sets what a joint or an actuator of a compiled model has."""
+    if what in DOF:
+        getattr(model, f"dof_{what}")[model.jnt_dofadr[model.joint(owner).id]] = value
+        return
+    actuator = model.actuator(owner).id
+    if what == GAIN:
+        model.actuator_gainprm[actuator, 0], model.actuator_biasprm[actuator, 1] = value, -value
+    else:
+        model.actuator_biasprm[actuator, 2] = -value
+
+
+def read(model: Any, owner: str, what: str) -> float:
+    """What `write` sets."""
+    if what in DOF:
+        return float(getattr(model, f"dof_{what}")[model.jnt_dofadr[model.joint(owner).id]])
+    actuator = model.actuator(owner).id
+    return float(model.actuator_gainprm[actuator, 0] if what == GAIN else -model.actuator_biasprm[actuator, 2])
+
+
+def apply(diagnosis: Diagnosis, spec: Any) -> list[str]:
+    """Writes what was found into a specification; gives the effects that have no place in it.
+
+    Parameters of joints and actuators, and effects that the model has itself, are written as they are; a delay of a command
+    becomes the delay of its actuator where this MuJoCo has one. For what is left `diagnosis.fix().code` has functions.
+    """
+    known = {joint.name: joint for joint in spec.joints} | {actuator.name: actuator for actuator in spec.actuators}
+    own = {name: next(iter(values.values())) for name, values in diagnosis.effects.items() if parts(name)[0] in known and values}
+    for name, value in {**diagnosis.parameters, **own}.items():
+        owner, what = parts(name)
+        if owner not in known:
+            raise StretchError(f"{name}: the specification has no joint or actuator {owner}; give the one of the problem")
+        _write_spec(known[owner], what, value)
+    left = [name for name in diagnosis.effects if name not in own]
+    return [name for name in left if not _delayed(diagnosis, spec, name)]
+
+
+def _write_spec(owner: Any, what: str, value: float) -> None:
+    if what in DOF:
+        held = getattr(owner, what)
+        if np.ndim(held):  # damping is a polynomial of the speed in newer versions
+            held[0] = value
+        else:
+            setattr(owner, what, value)
+    elif what == GAIN:
+        owner.gainprm[0], owner.biasprm[1] = value, -value
+    else:
+        owner.biasprm[2] = -value
+
+
+def _delayed(diagnosis: Diagnosis, spec: Any, name: str) -> bool:
+    """Writes a delay in front of a joint as that of its actuator; false where it is none."""
+    place, _, kind = name.rpartition(".")
+    joints = {joint.name for joint in spec.joints}
+    joint = next((part for part in place.split(".") if part in joints), None)
+    if joint is None and len(spec.actuators) == 1:
+        joint = spec.actuators[0].target
+    own = [actuator for actuator in spec.actuators if actuator.target == joint]
+    if kind != "delay" or "output" in place or len(own) != 1 or not hasattr(own[0], "delay"):
+        return False
+    own[0].delay = diagnosis.effects[name]["delay_s"]
+    own[0].nsample = int(np.ceil(own[0].delay / spec.option.timestep)) + 2
+    return True

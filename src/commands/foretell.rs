@@ -82,7 +82,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 /// The sentence, and everything behind it unless the program is to be quiet.
 fn print(foretold: &Foretold) -> anyhow::Result<()> {
-    say_first(&foretold.sentence())?;
+    say_first(foretold.sentence())?;
     if is_quiet() {
         return Ok(());
     }

@@ -37,7 +37,7 @@ fn command(trial: usize, joint: usize) -> Vec<f64> {
     let mut held = 0.0;
     let one = |i: usize| {
         let t = i as f64 * DT_S;
-        if i % (50 + 7 * joint) == 0 {
+        if i.is_multiple_of(50 + 7 * joint) {
             held = (2.0 * random.gauss()).clamp(-3.0, 3.0);
         }
         held + 1.5 * ((0.9 + 0.2 * joint as f64) * t + trial as f64).sin()
@@ -48,7 +48,7 @@ fn command(trial: usize, joint: usize) -> Vec<f64> {
 /// Angles of all joints over one trial, joint by joint; an angle carries a share of the joint before.
 fn arm(p: &[f64], commands: &[&[f64]]) -> Vec<Vec<f64>> {
     let shared = &p[JOINTS * OWN.len()..];
-    let mut out = vec![Vec::with_capacity(SAMPLES); JOINTS];
+    let mut out = vec![Vec::new(); JOINTS];
     let mut angle = [0.0_f64; JOINTS];
     for i in 0..commands[0].len() {
         let mut before = shared[3];
@@ -76,7 +76,7 @@ impl Source for Arm {
     fn simulate_many(&self, asks: &[Ask<'_>]) -> Vec<Result<Vec<f64>, SourceError>> {
         let one = |ask: &Ask<'_>| {
             let samples = ask.trials * SAMPLES;
-            let mut all = vec![Vec::with_capacity(samples); JOINTS];
+            let mut all = vec![Vec::new(); JOINTS];
             for trial in 0..ask.trials {
                 let range = trial * SAMPLES..(trial + 1) * SAMPLES;
                 let of = |joint: usize| match ask.inputs {

@@ -109,7 +109,7 @@ fn traces(
     let below = span.start - 0.06 * (span.end - span.start);
     let is_beyond = |t: &f64| {
         let mut parts = trial.unexcited.iter().flat_map(|u| &u.parts);
-        parts.any(|[from, to]| (from - foretold.dt_s..=to + foretold.dt_s).contains(&t))
+        parts.any(|[from, to]| (from - foretold.dt_s..=to + foretold.dt_s).contains(t))
     };
     let mark: Vec<f64> = time.iter().map(|t| if is_beyond(t) { below } else { f64::NAN }).collect();
     let lines = [

@@ -20,7 +20,7 @@ const NOT_TYPED: [(&str, &str); 10] = [
     ("stretch listen", "it needs a board"),
     ("stretch page", "it needs the page that the program of a release carries"),
     ("stretch fleet", "the fleet has a gate of its own"),
-    ("python python/examples/", "it needs recordings of others"),
+    ("python examples/machines/", "it needs recordings of others"),
     ("cargo run --release --manifest-path challenge/", "the challenge has a gate of its own"),
 ];
 

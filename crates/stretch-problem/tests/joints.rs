@@ -75,7 +75,6 @@ struct Arm {
 impl Source for Arm {
     fn simulate_many(&self, asks: &[Ask<'_>]) -> Vec<Result<Vec<f64>, SourceError>> {
         let one = |ask: &Ask<'_>| {
-            let samples = ask.trials * SAMPLES;
             let mut all = vec![Vec::new(); JOINTS];
             for trial in 0..ask.trials {
                 let range = trial * SAMPLES..(trial + 1) * SAMPLES;

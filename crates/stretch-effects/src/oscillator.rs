@@ -23,9 +23,9 @@ pub struct Swing {
     pub dry: f64,
 }
 
-/// A damped second-order oscillator driven at its foot: m^2 y'' = x - y - 2 damping m y' - drag m |y'| y' - dry y'/sqrt(y'^2 + (0.3 dry/m)^2), without drag
+/// A damped second-order oscillator driven at its foot: m^2 y'' = x - y - 2 damping m y' - drag m |y'| y' - dry y'/sqrt(y'^2 + (0.5 dry/m)^2), without drag
 /// and dry friction exact for an input that is linear between nodes; these two act for half a step before and after the rest (Strang, doi
-/// 10.1137/0705041). Friction that were dry at any speed would be no function that can be fitted: below a third of the speed at which the spring
+/// 10.1137/0705041). Friction that were dry at any speed would be no function that can be fitted: below half the speed at which the spring
 /// lets the mass go, dry/m, it gives way as a fluid does. Remembers position, velocity and the last input.
 ///
 /// ```
@@ -149,14 +149,14 @@ impl Slowed {
 /// Greatest dry friction that is looked for, a share of the signal's span.
 const DRY: f64 = 0.1;
 /// Speed below which dry friction gives way, a share of dry/m.
-const SLOW: f64 = 0.3;
+const SLOW: f64 = 0.5;
 
 /// A mass on a spring.
 pub static SECOND_ORDER_LAG: Kind = Kind {
     name: "second_order_lag",
     title: "a second-order lag",
     words: "it follows like a mass on a spring",
-    equation: "m_s^2 y'' = x - y - 2 damping m_s y' - drag m_s |y'| y' - dry y'/sqrt(y'^2 + (0.3 dry/m_s)^2)",
+    equation: "m_s^2 y'' = x - y - 2 damping m_s y' - drag m_s |y'| y' - dry y'/sqrt(y'^2 + (0.5 dry/m_s)^2)",
     usual: &[Side::Output],
     parameters: |e, unit| {
         vec![
@@ -182,42 +182,42 @@ pub static SECOND_ORDER_LAG: Kind = Kind {
         let part = |from: &str, to: &str, k: usize| {
             format!(
                 "let d{k} = s.speed / (1 + half * abs(s.speed))
-            let p{k} = s.at - {from} + trail
-            let q{k} = d{k} / (1 + rub / sqrt(d{k} * d{k} + slow * slow)) - slope
+            let p{k} = s.at - ({from}) + trail
+            let q{k} = d{k} / (1 + rub / sqrt(d{k} * d{k} + SLOW * SLOW)) - slope
             s.at = {to} - trail + (cs + DAMPING / M * sn) * p{k} + sn * q{k}
             let v{k} = slope - sn / (M * M) * p{k} + (cs - DAMPING / M * sn) * q{k}
             let e{k} = v{k} / (1 + half * abs(v{k}))
-            s.speed = e{k} / (1 + rub / sqrt(e{k} * e{k} + slow * slow))"
+            s.speed = e{k} / (1 + rub / sqrt(e{k} * e{k} + SLOW * SLOW))"
             )
         };
         let body = format!(
-            "let w = sqrt(1 - DAMPING * DAMPING) / M
-            let h = DT / 2
-            let sn = exp(-DAMPING * h / M) * sin(w * h) / w
-            let cs = exp(-DAMPING * h / M) * cos(w * h)
+            "let sn = exp(-DAMPING * DT / (2 * M)) * sin(W * DT / 2) / W
+            let cs = exp(-DAMPING * DT / (2 * M)) * cos(W * DT / 2)
             let slope = (x - s.last) / DT
             let trail = 2 * DAMPING * M * slope
-            let half = DRAG * h / (2 * M)
-            let rub = DRY * h / (2 * M * M)
-            let slow = 0.3 * DRY / M + 1e-150
-            let middle = (s.last + x) / 2
+            let half = DRAG * DT / (4 * M)
+            let rub = DRY * DT / (4 * M * M)
             {}
             {}
             s.last = x
             let y = s.at",
-            part("s.last", "middle", 1),
-            part("middle", "x", 2)
+            part("s.last", "(s.last + x) / 2", 1),
+            part("(s.last + x) / 2", "x", 2)
         );
         let sketch = Sketch::of(signals.x.clone(), body).remembering(["at", "last"]);
         let unit = match &*signals.x.unit {
             "1" => "1/s".into(),
             unit => format!("{unit}/s"),
         };
+        let speed = unit.clone();
         let numbers = [
             ("M", v[0], "s"),
             ("DAMPING", v[1], "1"),
             ("DRAG", v[2], "s"),
             ("DRY", v[3], &*signals.x.unit),
+            ("W", libm::sqrt(1.0 - v[1] * v[1]) / v[0].max(1e-9), "1/s"),
+            // Not 0 where nothing is dry, for it divides.
+            ("SLOW", (SLOW * v[3] / v[0].max(1e-9)).max(1e-150), &*speed),
             ("DT", signals.dt_s, "s"),
         ];
         sketch.cells(["speed"], unit, "0").with_all(&numbers)

@@ -84,7 +84,9 @@ fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
     assert!(value["model_runs"]["count"].as_u64().unwrap() < 400);
     assert_eq!(value["identifiability"][0]["knowledge"], "determined");
     assert!(fs::read_to_string(page).unwrap().contains("brake"));
-    assert_eq!((&value["seed"], &value["data_set"]), (&1.into(), &"problem".into()));
+    // The name that the first file has is that of its folder.
+    let name = folder.path().file_name().unwrap().to_str().unwrap();
+    assert_eq!((&value["seed"], &value["data_set"]), (&1.into(), &name.into()));
 
     // What was found is written into the problem, and nothing is missing then.
     let fixed = folder.path().join("fixed.toml");

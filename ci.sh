@@ -139,6 +139,7 @@ step "packages of all crates"
 packages=$(mktemp -d)
 # shellcheck disable=SC2046,SC2086
 cargo package --quiet --locked --allow-dirty --target-dir "$packages" $(printf -- '-p %s ' $PACKAGES)
+rm -rf "$packages"
 
 step "fuzzing, so many executions a target"
 fuzz/run.sh gate
